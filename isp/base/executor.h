@@ -1,0 +1,72 @@
+#pragma once
+
+#include <memory>
+
+namespace lowlux {
+
+/// Runs the n parts of one piece of work, at most width() at a time. Nothing is allocated and nothing thrown.
+class Executor {
+ public:
+  virtual ~Executor() = default;
+  virtual int width() const noexcept = 0;
+  /// Calls fn(context, i) for each i in 0..n-1 and returns when all are done. Not re-entrant.
+  virtual void run(int n, void (*fn)(void* context, int index), void* context) noexcept = 0;
+};
+
+/// Everything on the calling thread.
+class InlineExecutor final : public Executor {
+ public:
+  int width() const noexcept override { return 1; }
+  void run(int n, void (*fn)(void* context, int index), void* context) noexcept override;
+};
+
+/// The calling thread and threads - 1 workers named "lowlux", which sleep between calls and end with the object.
+class PoolExecutor final : public Executor {
+ public:
+  explicit PoolExecutor(int threads);
+  ~PoolExecutor() override;
+  PoolExecutor(const PoolExecutor&) = delete;
+  PoolExecutor& operator=(const PoolExecutor&) = delete;
+
+  int width() const noexcept override;
+  void run(int n, void (*fn)(void* context, int index), void* context) noexcept override;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// A contiguous run of rows, first included, last excluded.
+struct RowBand {
+  int first = 0;
+  int last = 0;
+};
+
+/// Band `index` of `count` over `height` rows. Every band starts at an even row, so that the CFA phase is kept.
+constexpr RowBand row_band(int height, int count, int index) {
+  const int pairs = (height + 1) / 2;
+  const auto edge = [&](int i) {
+    const int row = 2 * static_cast<int>(static_cast<long long>(pairs) * i / count);
+    return row < height ? row : height;
+  };
+  return {edge(index), edge(index + 1)};
+}
+
+/// Calls work(band) for executor.width() bands of `height` rows.
+template <class Work>
+void for_each_band(Executor& executor, int height, const Work& work) {
+  struct Call {
+    const Work& work;
+    int height;
+    int count;
+  } call{work, height, executor.width()};
+  executor.run(
+      call.count,
+      [](void* context, int index) {
+        const Call& c = *static_cast<Call*>(context);
+        c.work(row_band(c.height, c.count, index), index);
+      },
+      &call);
+}
+
+}  // namespace lowlux

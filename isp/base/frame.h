@@ -1,0 +1,151 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isp/base/cfa.h"
+#include "isp/base/correction.h"
+#include "isp/base/matrix3.h"
+#include "isp/base/plane.h"
+
+namespace lowlux {
+
+struct Rect {
+  int x = 0;
+  int y = 0;
+  int width = 0;
+  int height = 0;
+  friend bool operator==(const Rect&, const Rect&) = default;
+};
+
+/// What one sample of a readout stands for.
+enum class SensorLayout : std::uint8_t {
+  bayer,       // one filter per pixel, see BayerPhase
+  monochrome,  // no filters
+  linear_rgb,  // three samples per pixel, already demosaiced (DNG LinearRaw), interleaved R G B
+};
+
+/// EXIF orientation, 1 to 8: what has to be done to the stored picture to see it upright.
+enum class Orientation : std::uint8_t {
+  normal = 1,
+  mirror_horizontal,
+  rotate_180,
+  mirror_vertical,
+  transpose,
+  rotate_90,
+  transverse,
+  rotate_270
+};
+
+/// What is known about how a frame was taken; what the source does not tell is absent, never guessed.
+struct FrameInfo {
+  std::string make;
+  std::string model;
+  std::string software;
+  std::string date_time;  // as the source writes it, "YYYY:MM:DD hh:mm:ss"
+  std::optional<double> exposure_s;
+  std::optional<double> iso;
+  std::optional<double> f_number;
+  std::optional<double> focal_length_mm;
+  std::optional<double> temperature_c;  // of the sensor, or of the camera where only that is told
+  Orientation orientation = Orientation::normal;
+};
+
+/// Black level a source states: a pattern that repeats from the corner of the active area, plus an offset for
+/// each active column and row (DNG BlackLevelRepeatDim, BlackLevel, BlackLevelDeltaH, BlackLevelDeltaV).
+struct BlackLevel {
+  int rows = 1;
+  int columns = 1;
+  int samples = 1;                 // per pixel: 3 for SensorLayout::linear_rgb
+  std::vector<double> pattern_dn;  // rows x columns x samples
+  std::vector<double> column_dn;   // empty, or one for each active column
+  std::vector<double> row_dn;      // empty, or one for each active row
+
+  /// Black level [DN] of sample `sample` at active column x, row y.
+  double at(int x, int y, int sample = 0) const {
+    const int i = ((y % rows) * columns + x % columns) * samples + sample;
+    return pattern_dn[i] + (column_dn.empty() ? 0.0 : column_dn[x]) + (row_dn.empty() ? 0.0 : row_dn[y]);
+  }
+};
+
+/// One readout, as the source delivers it after its own LinearizationTable and before anything else.
+/// `dn` holds the whole readout, borders included: readout height x width (x 3 interleaved for linear_rgb).
+/// `active` is in readout pixels; `phase`, `black_tag` and `default_crop` count from the corner of `active`.
+struct RawDn {
+  Plane<std::uint16_t> dn;
+  SensorLayout layout = SensorLayout::bayer;
+  BayerPhase phase = BayerPhase::rggb;  // only for SensorLayout::bayer
+  Rect active;
+  Rect default_crop;                    // the part of the active area that makes the picture
+  std::vector<Rect> masked;             // light-shielded parts of the readout, in readout pixels
+  bool masked_is_stated = false;        // true: the source says so; false: taken to be all that is not active
+  std::optional<BlackLevel> black_tag;  // what the source states; absent if it states nothing
+  std::array<double, 3> white_dn{};     // saturation of R, G, B (all equal for monochrome)
+  FrameInfo info;
+};
+
+/// Black point of one frame, per CFA site. The pedestal [DN] is what is subtracted from the data as a whole;
+/// when it was measured on masked pixels it holds the dark charge too, and the dark mean left to subtract is 0.
+struct BlackPoint {
+  PerSite<double> pedestal_dn{};
+  PerSite<double> pedestal_standard_error_dn{};  // 0 where it is quoted and not measured
+  PerSite<double> dark_mean_e{};                 // left in the data once the pedestal is off; 0 if unknown
+  PerSite<double> noise_std_dn{};                // of masked pixels; 0 where nothing was measured
+  enum class Holds : std::uint8_t { pedestal_only, pedestal_and_dark } holds = Holds::pedestal_only;
+  enum class Source : std::uint8_t { masked_pixels, tag, given } source = Source::tag;
+  std::optional<BlackLevel> pattern;  // set when `source` is tag and four figures cannot express it
+};
+
+/// Variance of a raw value x in 0..1 (black to white): scale * x + offset (DNG NoiseProfile), R, G, B.
+struct NoiseProfile {
+  std::array<double, 3> scale{};
+  std::array<double, 3> offset{};
+};
+
+/// One colour calibration of a camera (DNG ColorMatrixN, CameraCalibrationN, ForwardMatrixN).
+struct ColourCalibration {
+  double cct_k = 0;  // of its calibration illuminant; 0 if the source does not say
+  Matrix3 xyz_to_camera = identity3();
+  Matrix3 camera_calibration = identity3();
+  std::optional<Matrix3> forward;  // white-balanced camera RGB -> XYZ under D50
+};
+
+/// What a source knows about a camera's colour. No calibration: nothing beyond camera RGB can be made.
+struct CameraColour {
+  std::vector<ColourCalibration> calibrations;  // none, one or two; by rising cct_k
+  Vector3 analog_balance{1, 1, 1};
+  std::optional<Vector3> as_shot_neutral;  // camera RGB of a neutral, largest 1
+  std::optional<std::array<double, 2>> as_shot_white_xy;
+  enum class Source : std::uint8_t { none, file_tags, decoder_table } source = Source::none;
+};
+
+/// A frame with all its source tells about it: what capture hands to the pipeline.
+struct RawFrame {
+  RawDn raw;
+  CameraColour colour;
+  std::optional<NoiseProfile> noise;
+  RawCorrections corrections;
+  std::vector<std::string> warnings;  // what could not be honoured, by name; one line each
+};
+
+struct Electrons {};        // the system gain is known
+struct FractionOfWhite {};  // it is not: 0 is black, 1 the white level
+struct DarkIn {};           // the dark charge is still in the values
+struct DarkOut {};          // it has been subtracted
+
+/// A mosaic in linear signed units, active area only; pedestal removed, nothing clipped: values below zero are data.
+/// The unit and whether dark is still in are part of the type, so that neither can be mistaken.
+template <class Unit, class Dark>
+struct LinearMosaic {
+  Plane<float> value;
+  BayerPhase phase = BayerPhase::rggb;
+};
+using RawElectrons = LinearMosaic<Electrons, DarkIn>;
+using SignalElectrons = LinearMosaic<Electrons, DarkOut>;
+using RawFraction = LinearMosaic<FractionOfWhite, DarkIn>;
+using SignalFraction = LinearMosaic<FractionOfWhite, DarkOut>;
+
+}  // namespace lowlux
