@@ -89,6 +89,7 @@ struct RawDn {
 
 /// Black point of one frame, per CFA site. The pedestal [DN] is what is subtracted from the data as a whole;
 /// when it was measured on masked pixels it holds the dark charge too, and the dark mean left to subtract is 0.
+/// For SensorLayout::linear_rgb the four figures are those of R, G, B and B.
 struct BlackPoint {
   PerSite<double> pedestal_dn{};
   PerSite<double> pedestal_standard_error_dn{};  // 0 where it is quoted and not measured

@@ -42,6 +42,9 @@ using Encoded16 = Encoded<std::uint16_t>;
 /// A finished picture in one of the three sample types files are written in.
 using Picture = std::variant<Encoded8, Encoded16, SceneLinear>;
 
+/// The sample type of a picture: display codes of 8 or 16 bits, or scene-linear float.
+enum class SampleType : std::uint8_t { u8, u16, f32 };
+
 /// What the numbers of a picture mean. `camera` has no known primaries.
 enum class OutputSpace : std::uint8_t { srgb, display_p3, rec2020, linear_srgb, linear_rec2020, xyz, camera };
 
