@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "isp/base/frame.h"
+#include "isp/base/matrix3.h"
+#include "isp/base/result.h"
+#include "isp/model/colorimetry.h"
+
+namespace lowlux::test {
+
+/// What to photograph with what. Names are those of the tables in testdata/spectra and of isp::light_named.
+struct ChartSetup {
+  std::string camera = "Nikon_D5100";
+  std::string light = "D65";
+  std::vector<std::string> calibration_lights = {"D65"};  // by rising temperature, one or two
+  bool with_forward_matrix = false;
+};
+
+/// A noise-free photograph of a ColorChecker, as colours: what the scene is, what the camera measures, and what a raw
+/// file would tell of the camera's colour.
+struct SyntheticChart {
+  static constexpr int patches = 24;
+  std::array<isp::Xyz, patches> scene_xyz;  // under the light, Y = 1 for a perfect diffuser
+  std::array<Vector3, patches> camera_rgb;  // largest channel of a perfect diffuser 1
+  isp::Xyz scene_white;                     // of a perfect diffuser, Y = 1
+  CameraColour colour;                      // as_shot_neutral is the camera RGB of a perfect diffuser
+};
+
+/// The 24 patches from Ohta's reflectances. Camera RGB and XYZ are integrals over the light's nodes.
+/// ColorMatrix (and ForwardMatrix) come from least squares on training_reflectances(), which hold no patch of a chart.
+Result<SyntheticChart> photograph_chart(const ChartSetup& setup);
+
+/// Each training reflectance seen under the setup's light: for scenes that are not the chart.
+Result<std::vector<Vector3>> photograph_training_set(const ChartSetup& setup);
+
+/// The cameras of testdata/spectra.
+std::vector<std::string> chart_cameras();
+
+}  // namespace lowlux::test
