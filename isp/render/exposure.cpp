@@ -1,0 +1,55 @@
+#include "isp/render/exposure.h"
+
+#include <cmath>
+#include <limits>
+
+#include "isp/render/thumbnail.h"
+
+namespace lowlux::isp {
+namespace {
+
+/// EV that takes `from` to `to`; infinite if there is nothing to take.
+double ev_to_reach(double to, double from) {
+  return from > 0 ? std::log2(to / from) : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+std::string_view name_of(ExposureRule rule) {
+  switch (rule) {
+    case ExposureRule::mid_grey:
+      return "mid-grey";
+    case ExposureRule::highlights:
+      return "highlights";
+    case ExposureRule::black_noise:
+      return "black-noise";
+    case ExposureRule::no_gain:
+      return "no-gain";
+    case ExposureRule::most_gain:
+      return "most-gain";
+    case ExposureRule::no_signal:
+      break;
+  }
+  return "no-signal";
+}
+
+AutoExposure auto_exposure(std::span<const float> luminance, double noise_floor, const AutoExposureOptions& options) {
+  const double bright = quantile(luminance, 0.99).value_or(0);
+  const double median = quantile(luminance, 0.5).value_or(0);
+  if (bright <= 0 || bright <= options.signal_to_scatter * black_scatter(luminance)) {
+    return {0, ExposureRule::no_signal};
+  }
+  AutoExposure chosen{ev_to_reach(options.mid_grey, median), ExposureRule::mid_grey};
+  const AutoExposure others[] = {
+      {ev_to_reach(options.highlight, bright) + options.shoulder_ev, ExposureRule::highlights},
+      {ev_to_reach(options.black_noise, noise_floor), ExposureRule::black_noise},
+      {options.max_ev, ExposureRule::most_gain},
+  };
+  for (const AutoExposure& other : others) {
+    if (other.ev < chosen.ev) chosen = other;
+  }
+  if (chosen.ev <= 0) return {0, ExposureRule::no_gain};
+  return chosen;
+}
+
+}  // namespace lowlux::isp

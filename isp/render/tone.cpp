@@ -1,0 +1,97 @@
+#include "isp/render/tone.h"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cmath>
+
+#include "isp/render/output_space.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double mid_grey = 0.18;
+constexpr double black_slope = 0.7;
+constexpr double mid_slope = 2 - black_slope;
+constexpr double shoulder_power = 1.5;
+
+double toe(double x) { return x <= 0 ? black_slope * x : x * (black_slope + (1 - black_slope) * x / mid_grey); }
+
+double shoulder(double x, double limit) {
+  const double range = limit - mid_grey;
+  const double needed = std::pow(mid_slope * range / (1 - mid_grey), shoulder_power) - 1;
+  const double t = x - mid_grey;
+  const double bend = needed * std::pow(t / range, shoulder_power);
+  return mid_grey + mid_slope * t / std::pow(1 + bend, 1 / shoulder_power);
+}
+
+constexpr int mantissa_bits = 23;
+
+/// Bins in use for 2^log2 bins per octave: the octaves from offset = 2^-octaves to 1, and the rest up to 1 + offset.
+constexpr int bins_in_use(int octaves, int log2) { return (octaves << log2) + ((1 << log2) >> octaves) + 1; }
+
+/// Most bins per octave, as a power of two, that fit the table.
+constexpr int bins_per_octave_log2(int octaves) {
+  int log2 = 0;
+  while (bins_in_use(octaves, log2 + 1) <= ToneTable::capacity) ++log2;
+  return log2;
+}
+
+float lower_edge_of(const ToneTable& table, int bin) {
+  const std::uint32_t bits = table.base_bits() + (static_cast<std::uint32_t>(bin) << table.shift);
+  return std::bit_cast<float>(bits) - table.offset;
+}
+
+/// Moves the edge above v = 1 so that the last bin's line passes through 1 at v = 1.
+void meet_white(ToneTable& table) {
+  const int last = table.bins - 1;
+  const double low = lower_edge_of(table, last), high = lower_edge_of(table, table.bins);
+  const double t = (1.0 - low) / (high - low);
+  if (t > 0) {
+    table.edge[table.bins] = static_cast<float>(table.edge[last] + (1.0 - table.edge[last]) / t);
+  } else {
+    table.edge[last] = 1;
+  }
+  table.code8[last] = 255;
+}
+
+}  // namespace
+
+std::optional<ToneCurve> tone_curve_named(std::string_view name) {
+  if (name == name_of(ToneCurve::standard)) return ToneCurve::standard;
+  if (name == name_of(ToneCurve::none)) return ToneCurve::none;
+  return std::nullopt;
+}
+
+std::string_view name_of(ToneCurve curve) { return curve == ToneCurve::standard ? "standard" : "none"; }
+
+double tone_limit(ToneCurve curve, double exposure_ev) {
+  return curve == ToneCurve::none ? 1 : std::clamp(std::exp2(exposure_ev), 1.0, max_tone_limit);
+}
+
+double apply_tone(ToneCurve curve, double scene_linear, double limit) {
+  if (scene_linear >= limit) return 1;
+  if (curve == ToneCurve::none) return scene_linear;
+  return scene_linear <= mid_grey ? toe(scene_linear) : shoulder(scene_linear, limit);
+}
+
+ToneTable make_tone_table(ToneCurve curve, OutputSpace space, double limit) {
+  assert(limit >= 1 && limit <= max_tone_limit && (curve == ToneCurve::standard || limit == 1));
+  const auto exact = [&](double v) {
+    return encode_transfer(space, apply_tone(curve, std::clamp(v, 0.0, 1.0) * limit, limit));
+  };
+  const int octaves = 6 + static_cast<int>(std::lround(std::log2(limit)));
+  ToneTable table;
+  table.offset = std::ldexp(1.0f, -octaves);
+  table.shift = mantissa_bits - bins_per_octave_log2(octaves);
+  table.bins = table.bin_of(1.0f) + 1;
+  for (int bin = 0; bin <= table.bins; ++bin) table.edge[bin] = static_cast<float>(exact(lower_edge_of(table, bin)));
+  for (int bin = 0; bin < table.bins; ++bin) {
+    const double middle = 0.5 * (static_cast<double>(lower_edge_of(table, bin)) + lower_edge_of(table, bin + 1));
+    table.code8[bin] = static_cast<std::int32_t>(std::lround(255 * exact(middle)));
+  }
+  meet_white(table);
+  return table;
+}
+
+}  // namespace lowlux::isp

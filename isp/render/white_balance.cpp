@@ -1,0 +1,160 @@
+#include "isp/render/white_balance.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "isp/model/correlated_colour_temperature.h"
+#include "isp/render/thumbnail.h"
+
+namespace lowlux::isp {
+namespace {
+
+std::string rounded(double value) { return std::to_string(std::lround(value)); }
+
+Vector3 scaled_to_one(const Vector3& v) {
+  const double largest = *std::max_element(v.begin(), v.end());
+  return {v[0] / largest, v[1] / largest, v[2] / largest};
+}
+
+WhiteBalance balance_of(const CameraColour& colour, const Vector3& neutral, WhiteSource source) {
+  WhiteBalance out{scaled_to_one(neutral), std::nullopt, source, {}};
+  if (const auto white = white_of_neutral(colour, neutral)) out.white = *white;
+  return out;
+}
+
+Result<WhiteBalance> balance_of_white(const CameraColour& colour, const Xy& xy, WhiteSource source) {
+  const auto neutral = neutral_of_white(colour, xy);
+  if (!neutral) return tl::make_unexpected(neutral.error());
+  const auto temperature = colour_temperature_of(xy);
+  WhiteBalance out{*neutral, std::nullopt, source, {}};
+  if (temperature) out.white = WhitePoint{xy, temperature->cct_k, temperature->duv};
+  return out;
+}
+
+struct GreyEstimate {
+  Vector3 neutral{};
+  int blocks = 0;
+};
+
+/// Shades of grey over the blocks that qualify. The values are at most 1, so their powers sum without care.
+GreyEstimate shades_of_grey(const RgbView<const float>& blocks, double block_noise, const AutoWhiteOptions& options) {
+  std::array<double, 3> floor{};
+  for (int c = 0; c < 3; ++c) {
+    floor[c] = std::fmax(options.signal_to_scatter * black_scatter(block_values(blocks[c])),
+                         options.signal_to_noise * block_noise);
+  }
+  GreyEstimate estimate;
+  for (int y = 0; y < blocks[0].height; ++y) {
+    for (int x = 0; x < blocks[0].width; ++x) {
+      const Vector3 rgb{blocks[0].at(x, y), blocks[1].at(x, y), blocks[2].at(x, y)};
+      bool qualifies = true;
+      for (int c = 0; c < 3; ++c) qualifies = qualifies && rgb[c] > floor[c] && rgb[c] <= options.clipped;
+      if (!qualifies) continue;
+      for (int c = 0; c < 3; ++c) estimate.neutral[c] += std::pow(rgb[c], options.norm);
+      ++estimate.blocks;
+    }
+  }
+  for (double& channel : estimate.neutral) channel = std::pow(channel / std::max(1, estimate.blocks), 1 / options.norm);
+  return estimate;
+}
+
+/// The nearest white that a light can have, by `options`; nullopt if it is one already.
+std::optional<Xy> held_to_lights(const WhitePoint& white, const AutoWhiteOptions& options) {
+  const double kelvin = std::clamp(white.cct_k, options.min_k, options.max_k);
+  const auto usual = white_of_temperature(kelvin);
+  const auto usual_temperature = usual ? colour_temperature_of(*usual) : std::nullopt;
+  if (!usual_temperature) return std::nullopt;
+  const double usual_duv = usual_temperature->duv;
+  const double duv = std::clamp(white.duv, usual_duv - options.max_duv, usual_duv + options.max_duv);
+  if (kelvin == white.cct_k && duv == white.duv) return std::nullopt;
+  return planckian_xy(kelvin, duv);
+}
+
+WhiteBalance fallback(const CameraColour& colour, const std::string& reason) {
+  if (auto as_shot = as_shot_white_balance(colour)) {
+    as_shot->reason = reason + "; as shot instead";
+    return *std::move(as_shot);
+  }
+  if (auto daylight = balance_of_white(colour, white_d65, WhiteSource::daylight)) {
+    daylight->reason = reason + "; daylight (D65) instead";
+    return *std::move(daylight);
+  }
+  return {{1, 1, 1}, std::nullopt, WhiteSource::none, reason + "; no colour matrix either: channels left as they are"};
+}
+
+}  // namespace
+
+std::string_view name_of(WhiteSource source) {
+  switch (source) {
+    case WhiteSource::as_shot:
+      return "as-shot";
+    case WhiteSource::estimated:
+      return "auto";
+    case WhiteSource::temperature:
+      return "temperature";
+    case WhiteSource::daylight:
+      return "daylight";
+    case WhiteSource::none:
+      break;
+  }
+  return "none";
+}
+
+Result<WhiteBalance> as_shot_white_balance(const CameraColour& colour) {
+  if (colour.as_shot_neutral) {
+    const Vector3& neutral = *colour.as_shot_neutral;
+    for (const double channel : neutral) {
+      if (!std::isfinite(channel) || channel <= 0) {
+        return fail(ErrorCode::malformed, "the neutral holds a figure that is not positive; choose a white balance",
+                    "AsShotNeutral");
+      }
+    }
+    return balance_of(colour, neutral, WhiteSource::as_shot);
+  }
+  if (colour.as_shot_white_xy) {
+    return balance_of_white(colour, {(*colour.as_shot_white_xy)[0], (*colour.as_shot_white_xy)[1]},
+                            WhiteSource::as_shot);
+  }
+  return fail(ErrorCode::insufficient,
+              "the file does not tell the camera's white balance; choose auto or a temperature", "AsShotNeutral");
+}
+
+Result<WhiteBalance> white_balance_of_temperature(const CameraColour& colour, double kelvin) {
+  const auto xy = white_of_temperature(kelvin);
+  if (!xy) {
+    return fail(ErrorCode::invalid_argument,
+                "a colour temperature must be in " + rounded(white_min_k) + ".." + rounded(white_max_k) + " K, found " +
+                    std::to_string(kelvin),
+                "white balance");
+  }
+  return balance_of_white(colour, *xy, WhiteSource::temperature);
+}
+
+WhiteBalance auto_white_balance(const RgbView<const float>& blocks, double block_noise, const CameraColour& colour,
+                                const AutoWhiteOptions& options) {
+  const GreyEstimate estimate = shades_of_grey(blocks, block_noise, options);
+  if (estimate.blocks < options.min_blocks) {
+    return fallback(colour, "only " + std::to_string(estimate.blocks) +
+                                " of the picture's blocks are neither black nor "
+                                "clipped, too few to tell the white");
+  }
+  WhiteBalance found = balance_of(colour, estimate.neutral, WhiteSource::estimated);
+  if (!found.white) {
+    found.reason = "no usable colour matrix: the estimate is not held to the whites of lights";
+    return found;
+  }
+  const auto held = held_to_lights(*found.white, options);
+  if (!held) return found;
+  auto limited = balance_of_white(colour, *held, WhiteSource::estimated);
+  if (!limited) {
+    found.reason =
+        "the colour matrices do not reach the nearest light: the estimate is not held to the whites of lights";
+    return found;
+  }
+  limited->reason = "the estimate was moved to the nearest white of a light";
+  return *std::move(limited);
+}
+
+}  // namespace lowlux::isp
