@@ -1,0 +1,254 @@
+#include "isp/codec/exr.h"
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfIO.h>
+#include <ImfInputFile.h>
+#include <ImfOutputFile.h>
+#include <ImfStandardAttributes.h>
+#include <ImfStringAttribute.h>
+#include <ImfXdr.h>
+#include <half.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <limits>
+#include <new>
+#include <stdexcept>
+#include <vector>
+
+#include "isp/codec/exr_header.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr int rows_per_call = 32;  // one PIZ block
+constexpr float largest_half = 65504.0f;
+constexpr std::array<const char*, 3> colour_names{"R", "G", "B"};
+
+/// Writes to the caller's stream and keeps its first failure: OpenEXR rewords what is thrown through it, and its
+/// destructor, which writes the table of rows, swallows it.
+class OutputStream final : public Imf::OStream {
+ public:
+  explicit OutputStream(std::FILE* file) : OStream("picture"), file_(file) {}
+
+  void write(const char bytes[], int count) override {
+    keep(write_bytes(file_, std::as_bytes(std::span(bytes, static_cast<std::size_t>(count)))));
+  }
+  std::uint64_t tellp() override { return static_cast<std::uint64_t>(ftello(file_)); }
+  void seekp(std::uint64_t place) override {
+    errno = 0;
+    if (fseeko(file_, static_cast<off_t>(place), SEEK_SET) != 0) keep(write_failure());
+  }
+  const Result<void>& status() const { return status_; }
+
+ private:
+  void keep(Result<void> written) {
+    if (written) return;
+    if (status_) status_ = std::move(written);
+    throw std::runtime_error("cannot write");
+  }
+
+  std::FILE* file_;
+  Result<void> status_;
+};
+
+class InputStream final : public Imf::IStream {
+ public:
+  explicit InputStream(std::span<const std::byte> bytes) : IStream("picture"), bytes_(bytes) {}
+
+  bool read(char out[], int count) override {
+    const std::uint64_t left = place_ < bytes_.size() ? bytes_.size() - place_ : 0;
+    if (count < 0 || static_cast<std::uint64_t>(count) > left) throw std::runtime_error("the file ends too early");
+    if (count > 0) std::memcpy(out, bytes_.data() + place_, static_cast<std::size_t>(count));
+    place_ += static_cast<std::uint64_t>(count);
+    return place_ < bytes_.size();
+  }
+  std::uint64_t tellg() override { return place_; }
+  void seekg(std::uint64_t place) override { place_ = place; }
+
+ private:
+  std::span<const std::byte> bytes_;
+  std::uint64_t place_ = 0;
+};
+
+Imath::V2f to_v2f(const Chromaticities::Xy& xy) { return {static_cast<float>(xy.x), static_cast<float>(xy.y)}; }
+Chromaticities::Xy to_xy(const Imath::V2f& v) { return {v.x, v.y}; }
+
+bool usable(const std::optional<double>& number) { return number && std::isfinite(*number) && *number > 0; }
+
+void set_text(Imf::Header& header, const char* name, const std::string& text) {
+  if (!text.empty()) header.insert(name, Imf::StringAttribute(text));
+}
+
+Imf::Header header_of(const SceneLinear& picture, const FileMetadata& metadata, const ExrOptions& options) {
+  Imf::Header header(picture.width(), picture.height());
+  const bool piz = options.compression == ExrOptions::Compression::piz;
+  header.compression() = piz ? Imf::PIZ_COMPRESSION : Imf::NO_COMPRESSION;
+  const Imf::PixelType type = options.depth == ExrOptions::Depth::full ? Imf::FLOAT : Imf::HALF;
+  for (const char* name : colour_names) header.channels().insert(name, Imf::Channel(type));
+  if (const auto& c = metadata.chromaticities) {
+    Imf::addChromaticities(header, {to_v2f(c->red), to_v2f(c->green), to_v2f(c->blue), to_v2f(c->white)});
+  }
+  const FrameInfo& info = metadata.info;
+  if (usable(info.exposure_s)) Imf::addExpTime(header, static_cast<float>(*info.exposure_s));
+  if (usable(info.f_number)) Imf::addAperture(header, static_cast<float>(*info.f_number));
+  if (usable(info.iso)) Imf::addIsoSpeed(header, static_cast<float>(*info.iso));
+  if (info.date_time.size() == 19) Imf::addCapDate(header, info.date_time);
+  set_text(header, "cameraMake", info.make);
+  set_text(header, "cameraModel", info.model);
+  set_text(header, "software", info.software);
+  return header;
+}
+
+void write_full(Imf::OutputFile& file, const SceneLinear& picture) {
+  Imf::FrameBuffer buffer;
+  for (int c = 0; c < 3; ++c) {
+    buffer.insert(colour_names[c], Imf::Slice::Make(Imf::FLOAT, picture.plane[c].data(), Imath::V2i(0, 0),
+                                                    picture.width(), picture.height()));
+  }
+  file.setFrameBuffer(buffer);
+  file.writePixels(picture.height());
+}
+
+void write_half(Imf::OutputFile& file, const SceneLinear& picture) {
+  const std::size_t width = picture.width();
+  std::array<std::vector<half>, 3> rows;
+  for (auto& plane : rows) plane.resize(width * rows_per_call);
+  for (int y = 0; y < picture.height(); y += rows_per_call) {
+    const int count = std::min(rows_per_call, picture.height() - y);
+    Imf::FrameBuffer buffer;
+    for (int c = 0; c < 3; ++c) {
+      const float* in = picture.plane[c].row(y);
+      std::transform(in, in + width * count, rows[c].begin(), [](float value) {
+        return half(std::isnan(value) ? value : std::clamp(value, -largest_half, largest_half));
+      });
+      buffer.insert(colour_names[c],
+                    Imf::Slice::Make(Imf::HALF, rows[c].data(), Imath::V2i(0, y), picture.width(), count));
+    }
+    file.setFrameBuffer(buffer);
+    file.writePixels(count);
+  }
+}
+
+/// Reads nothing but the header, and refuses what would make OpenEXR allocate without bound.
+Result<Imath::Box2i> check_window(std::span<const std::byte> bytes, const DecodeLimits& limits) {
+  if (auto sound = check_exr_header(bytes); !sound) return tl::make_unexpected(sound.error());
+  InputStream stream(bytes);
+  int magic = 0;
+  int version = 0;
+  Imf::Xdr::read<Imf::StreamIO>(stream, magic);
+  Imf::Xdr::read<Imf::StreamIO>(stream, version);
+  Imf::Header header;
+  header.readFrom(stream, version);
+  const Imath::Box2i& window = header.dataWindow();
+  const auto side = [](int first, int last) { return std::int64_t{last} - first + 1; };
+  auto fits = check_size(side(window.min.x, window.max.x), side(window.min.y, window.max.y), limits);
+  if (fits && header.hasTileDescription()) {
+    fits = check_size(header.tileDescription().xSize, header.tileDescription().ySize, limits);
+  }
+  if (!fits) return tl::make_unexpected(fits.error());
+  return window;
+}
+
+FileMetadata metadata_of(const Imf::Header& header) {
+  FileMetadata metadata;
+  FrameInfo& info = metadata.info;
+  if (Imf::hasChromaticities(header)) {
+    const auto& c = Imf::chromaticities(header);
+    metadata.chromaticities = Chromaticities{to_xy(c.red), to_xy(c.green), to_xy(c.blue), to_xy(c.white)};
+  }
+  if (Imf::hasExpTime(header)) info.exposure_s = Imf::expTime(header);
+  if (Imf::hasAperture(header)) info.f_number = Imf::aperture(header);
+  if (Imf::hasIsoSpeed(header)) info.iso = Imf::isoSpeed(header);
+  if (Imf::hasCapDate(header)) info.date_time = Imf::capDate(header);
+  const auto text = [&](const char* name) {
+    const auto* attribute = header.findTypedAttribute<Imf::StringAttribute>(name);
+    return attribute == nullptr ? std::string() : attribute->value();
+  };
+  info.make = text("cameraMake");
+  info.model = text("cameraModel");
+  info.software = text("software");
+  return metadata;
+}
+
+/// The channel each colour is read from; an error if there are none or they are subsampled.
+Result<std::array<const char*, 3>> colour_channels(const Imf::ChannelList& channels) {
+  const bool rgb = std::all_of(colour_names.begin(), colour_names.end(),
+                               [&](const char* name) { return channels.findChannel(name) != nullptr; });
+  if (!rgb && channels.findChannel("Y") == nullptr) {
+    return fail(ErrorCode::unsupported, "the OpenEXR file has neither R, G, B nor Y channels");
+  }
+  if (!rgb && channels.findChannel("RY") != nullptr) {
+    return fail(ErrorCode::unsupported, "luminance-chroma OpenEXR files are not read: convert to RGB first");
+  }
+  const std::array<const char*, 3> names = rgb ? colour_names : std::array<const char*, 3>{"Y", "Y", "Y"};
+  for (const char* name : names) {
+    const Imf::Channel& channel = channels[name];
+    if (channel.xSampling != 1 || channel.ySampling != 1) {
+      return fail(ErrorCode::unsupported, "subsampled OpenEXR channels are not read");
+    }
+  }
+  return names;
+}
+
+Result<DecodedPicture> read_picture(Imf::InputFile& file, const Imath::Box2i& window) {
+  const auto names = colour_channels(file.header().channels());
+  if (!names) return tl::make_unexpected(names.error());
+  const int width = window.max.x - window.min.x + 1;
+  const int height = window.max.y - window.min.y + 1;
+  SceneLinear picture(width, height);
+  Imf::FrameBuffer buffer;
+  const bool grey = (*names)[0] == (*names)[1];
+  for (int c = 0; c < (grey ? 1 : 3); ++c) {
+    buffer.insert((*names)[c], Imf::Slice::Make(Imf::FLOAT, picture.plane[c].data(), window));
+  }
+  file.setFrameBuffer(buffer);
+  file.readPixels(window.min.y, window.max.y);
+  if (grey) {
+    picture.plane[1] = picture.plane[0].clone();
+    picture.plane[2] = picture.plane[0].clone();
+  }
+  return DecodedPicture{std::move(picture), metadata_of(file.header())};
+}
+
+}  // namespace
+
+Result<void> encode_exr(const SceneLinear& picture, const FileMetadata& metadata, const ExrOptions& options,
+                        std::FILE* file) {
+  constexpr DecodeLimits any_number{std::numeric_limits<std::int64_t>::max()};
+  if (auto size = check_size(picture.width(), picture.height(), any_number); !size) return size;
+  OutputStream stream(file);
+  try {
+    Imf::OutputFile out(stream, header_of(picture, metadata, options), 0);
+    if (options.depth == ExrOptions::Depth::full) {
+      write_full(out, picture);
+    } else {
+      write_half(out, picture);
+    }
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::too_large, "no memory to write the OpenEXR file");
+  } catch (const std::exception& error) {
+    if (stream.status()) return fail(ErrorCode::unwritable, std::string("OpenEXR: ") + error.what());
+  }
+  return stream.status();
+}
+
+Result<DecodedPicture> decode_exr(std::span<const std::byte> bytes, const DecodeLimits& limits) try {
+  const auto window = check_window(bytes, limits);
+  if (!window) return tl::make_unexpected(window.error());
+  InputStream stream(bytes);
+  Imf::InputFile file(stream, 0);
+  return read_picture(file, *window);
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::too_large, "no memory for the pixels of the OpenEXR file");
+} catch (const std::exception& error) {
+  return fail(ErrorCode::malformed, std::string("not a readable OpenEXR file: ") + error.what());
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <span>
+
+#include "isp/codec/picture_file.h"
+
+namespace lowlux::isp {
+
+struct ExrOptions {
+  /// Half keeps 11 significant bits (1 part in 2048) from 6.1e-5 to 65504, what lies beyond is held at +-65504:
+  /// finer than the noise of any camera. Full keeps every float as it is.
+  enum class Depth : std::uint8_t { half, full } depth = Depth::half;
+  /// PIZ is lossless: wavelets and Huffman codes. What it saves and costs on sensor noise is in the README.
+  enum class Compression : std::uint8_t { none, piz } compression = Compression::none;
+};
+
+/// Writes scene-linear R, G, B channels. `metadata.chromaticities` and the exposure time, f-number,
+/// ISO, camera and time of `metadata.info` become attributes; an OpenEXR file has no place for an ICC profile.
+/// @param file open for writing, at its start
+Result<void> encode_exr(const SceneLinear& picture, const FileMetadata& metadata, const ExrOptions& options,
+                        std::FILE* file);
+
+/// Reads the data window of the channels R, G, B, or of Y as grey, whatever their type; other channels, alpha among
+/// them, are dropped. Deep files, those of several parts, subsampled
+/// colour and files without these channels are refused.
+Result<DecodedPicture> decode_exr(std::span<const std::byte> bytes, const DecodeLimits& limits = {});
+
+}  // namespace lowlux::isp

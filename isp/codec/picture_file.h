@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isp/base/frame.h"
+#include "isp/base/image.h"
+#include "isp/base/result.h"
+
+namespace lowlux::isp {
+
+/// CIE 1931 xy of the three primaries and the white of an RGB space.
+struct Chromaticities {
+  struct Xy {
+    double x = 0;
+    double y = 0;
+    friend bool operator==(const Xy&, const Xy&) = default;
+  };
+  Xy red, green, blue, white;
+  friend bool operator==(const Chromaticities&, const Chromaticities&) = default;
+};
+
+/// What a picture file carries besides its pixels; each format keeps what it has a place for.
+struct FileMetadata {
+  std::vector<std::byte> icc;   // ICC profile; empty: none (PNG, JPEG, TIFF)
+  std::vector<std::byte> exif;  // EXIF block from its TIFF header on, without "Exif\0\0"; empty: none (PNG, JPEG)
+  FrameInfo info;               // as fields of the format's own (TIFF, OpenEXR)
+  std::optional<Chromaticities> chromaticities;  // OpenEXR
+};
+
+struct DecodedPicture {
+  Picture picture;
+  FileMetadata metadata;
+};
+
+struct DecodeLimits {
+  std::int64_t max_pixels = std::int64_t{1} << 28;  // 268 MP; 3.2 GB as float RGB
+};
+
+/// An error unless 1 <= width, height <= 2^30 / 3 and width * height <= limits.max_pixels.
+Result<void> check_size(std::int64_t width, std::int64_t height, const DecodeLimits& limits);
+
+/// Writes all of `bytes` at the position of `file`; an error names what the system said.
+Result<void> write_bytes(std::FILE* file, std::span<const std::byte> bytes);
+
+/// The error of a failed write, from errno.
+tl::unexpected<Error> write_failure();
+
+}  // namespace lowlux::isp
