@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "isp/base/result.h"
+
+namespace lowlux::isp {
+
+enum class Overwrite : std::uint8_t { no, yes };
+
+/// A file that appears under its name whole or not at all. It is written under a hidden temporary name in the same
+/// directory (".lowlux-PID-N.part") and gets its own by commit(); without commit() the temporary is removed.
+/// A symbolic link to an existing file stays: the file it points to is the one replaced. Permissions follow the umask.
+/// There is no fsync: a crash of the program leaves the old file or the new one, a power cut in the seconds after
+/// commit() may not; syncing every picture of a batch would cost more than developing it on a slow disk.
+class AtomicFile {
+ public:
+  /// Errors: the name is taken and `overwrite` is no; it is a directory or a device; the directory is missing or
+  /// may not be written.
+  static Result<AtomicFile> create(const std::string& path, Overwrite overwrite);
+
+  AtomicFile(AtomicFile&& other) noexcept;
+  AtomicFile& operator=(AtomicFile&&) = delete;
+  ~AtomicFile();
+
+  /// Open for reading and writing, at its start; owned by this object.
+  std::FILE* file() const { return file_.get(); }
+
+  /// Flushes and closes the file, then gives it its name in one step. Without Overwrite::yes a file that has appeared
+  /// under that name since create() is kept, and that is an error. To be called once.
+  Result<void> commit();
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  AtomicFile(std::string path, std::string target, Overwrite overwrite);
+
+  std::string path_;       // as the caller named it
+  std::string target_;     // behind symbolic links
+  std::string temporary_;  // empty once it is gone
+  Overwrite overwrite_;
+  std::unique_ptr<std::FILE, Close> file_;
+};
+
+}  // namespace lowlux::isp

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/image.h"
+#include "isp/base/result.h"
+#include "isp/codec/exr.h"
+#include "isp/codec/jpeg.h"
+#include "isp/codec/tiff.h"
+#include "isp/output/atomic_file.h"
+
+namespace lowlux::isp {
+
+enum class FileFormat : std::uint8_t { png, jpeg, tiff, exr };
+
+SampleType sample_type(const Picture& picture);
+
+/// By the end of the name, in any case: .png .jpg .jpeg .tif .tiff .exr; others are an error that lists these.
+Result<FileFormat> format_of(const std::string& path);
+
+/// PNG: u8, u16. JPEG: u8. TIFF: all. OpenEXR: f32.
+bool supported(FileFormat format, SampleType type);
+
+/// What can be known before the work: the format holds the samples, and floats are scene-linear.
+Result<void> check_writable(FileFormat format, SampleType type, OutputSpace space);
+
+struct WriteOptions {
+  Overwrite overwrite = Overwrite::no;
+  std::string software = "lowlux";  // with its version, for the metadata
+  JpegOptions jpeg;
+  TiffOptions tiff;
+  ExrOptions exr;
+};
+
+/// Writes the picture whole or not at all, with the ICC profile or chromaticities of `space` and what `info` tells of
+/// the exposure. Pixels are written as they lie: turn them first (orient.h); the file says orientation 1.
+/// The executor's threads compress PNG.
+Result<void> write_picture(const Picture& picture, OutputSpace space, const FrameInfo& info, const std::string& path,
+                           const WriteOptions& options, Executor& executor);
+
+}  // namespace lowlux::isp

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "isp/base/frame.h"
+#include "isp/base/image.h"
+
+namespace lowlux::isp {
+
+/// What an EXIF block says about the picture, besides how the frame was taken.
+struct ExifPicture {
+  int width = 0;
+  int height = 0;
+  OutputSpace space = OutputSpace::srgb;
+  std::string software;  // who made it, e.g. "lowlux 0.1.0"
+};
+
+/// An EXIF 2.32 block from its TIFF header on (little-endian). What `info` does not know stays absent; orientation is
+/// always 1, because pixels are turned before they are written. Times that are not "YYYY:MM:DD hh:mm:ss" and numbers
+/// that are not positive are left out; text keeps its printable ASCII, at most 255 characters.
+std::vector<std::byte> exif_block(const FrameInfo& info, const ExifPicture& picture);
+
+/// `info` as it holds for the finished picture: upright, made by `software`, with clean text.
+FrameInfo written_info(const FrameInfo& info, const std::string& software);
+
+}  // namespace lowlux::isp

@@ -1,0 +1,178 @@
+#include "isp/output/atomic_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <thread>
+#include <vector>
+
+#include "isp/output/publish.h"
+#include "tests/output/scratch_directory.h"
+
+namespace lowlux::isp {
+namespace {
+
+using test::ScratchDirectory;
+
+Result<void> write_words(const std::string& path, const std::string& words, Overwrite overwrite) {
+  return AtomicFile::create(path, overwrite).and_then([&](AtomicFile out) {
+    std::fputs(words.c_str(), out.file());
+    return out.commit();
+  });
+}
+
+TEST(AtomicFile, AppearsOnlyOnCommitAndLeavesNothingElse) {
+  const ScratchDirectory scratch;
+  {
+    auto out = AtomicFile::create(scratch.file("a.txt"), Overwrite::no);
+    ASSERT_TRUE(out) << out.error().message;
+    std::fputs("words", out->file());
+    EXPECT_FALSE(scratch.holds("a.txt"));
+    EXPECT_EQ(scratch.names().size(), 1U);  // the temporary
+    ASSERT_TRUE(out->commit());
+  }
+  EXPECT_EQ(scratch.names(), std::vector<std::string>{"a.txt"});
+  EXPECT_EQ(scratch.read("a.txt"), "words");
+}
+
+TEST(AtomicFile, WithoutCommitNothingIsLeft) {
+  const ScratchDirectory scratch;
+  {
+    auto out = AtomicFile::create(scratch.file("a.txt"), Overwrite::no);
+    ASSERT_TRUE(out);
+    std::fputs("words", out->file());
+  }
+  EXPECT_TRUE(scratch.names().empty());
+}
+
+TEST(AtomicFile, AnExistingFileIsKeptUnlessOverwritingIsAskedFor) {
+  const ScratchDirectory scratch;
+  scratch.write("a.txt", "old");
+  const auto refused = write_words(scratch.file("a.txt"), "new", Overwrite::no);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::exists);
+  EXPECT_EQ(refused.error().message, scratch.file("a.txt") + " exists: use --force to overwrite it");
+  EXPECT_EQ(scratch.read("a.txt"), "old");
+  ASSERT_TRUE(write_words(scratch.file("a.txt"), "new", Overwrite::yes));
+  EXPECT_EQ(scratch.read("a.txt"), "new");
+  EXPECT_EQ(scratch.names().size(), 1U);
+}
+
+TEST(AtomicFile, AFileThatAppearsMeanwhileIsKept) {
+  const ScratchDirectory scratch;
+  auto out = AtomicFile::create(scratch.file("a.txt"), Overwrite::no);
+  ASSERT_TRUE(out);
+  scratch.write("a.txt", "someone else's");
+  const auto committed = out->commit();
+  ASSERT_FALSE(committed);
+  EXPECT_EQ(committed.error().code, ErrorCode::exists);
+  EXPECT_EQ(scratch.read("a.txt"), "someone else's");
+}
+
+TEST(AtomicFile, OfManyWritersOfOneNameExactlyOneWins) {
+  for (int round = 0; round < 50; ++round) {
+    const ScratchDirectory scratch;
+    std::atomic<int> winners{0}, ready{0};
+    std::vector<std::thread> writers;
+    for (int i = 0; i < 4; ++i) {
+      writers.emplace_back([&, i] {
+        auto out = AtomicFile::create(scratch.file("a.txt"), Overwrite::no);
+        if (out) std::fprintf(out->file(), "writer %d", i);
+        ++ready;
+        while (ready < 4) std::this_thread::yield();  // all have passed create() before one commits
+        if (out && out->commit()) ++winners;
+      });
+    }
+    for (std::thread& writer : writers) writer.join();
+    EXPECT_EQ(winners, 1);
+    EXPECT_EQ(scratch.names(), std::vector<std::string>{"a.txt"});
+    EXPECT_EQ(scratch.read("a.txt").substr(0, 7), "writer ");
+  }
+}
+
+TEST(AtomicFile, PermissionsFollowTheUmask) {
+  const ScratchDirectory scratch;
+  const mode_t before = umask(027);
+  ASSERT_TRUE(write_words(scratch.file("a.txt"), "words", Overwrite::no));
+  umask(before);
+  struct stat found {};
+  ASSERT_EQ(stat(scratch.file("a.txt").c_str(), &found), 0);
+  EXPECT_EQ(found.st_mode & 0777U, 0640U);
+}
+
+TEST(AtomicFile, ALinkStaysAndTheFileItLeadsToIsReplaced) {
+  const ScratchDirectory scratch;
+  ASSERT_EQ(mkdir(scratch.file("sub").c_str(), 0777), 0);
+  scratch.write("sub/target.txt", "old");
+  ASSERT_EQ(symlink("sub/target.txt", scratch.file("link.txt").c_str()), 0);
+  EXPECT_FALSE(write_words(scratch.file("link.txt"), "new", Overwrite::no));
+  ASSERT_TRUE(write_words(scratch.file("link.txt"), "new", Overwrite::yes));
+  struct stat found {};
+  ASSERT_EQ(lstat(scratch.file("link.txt").c_str(), &found), 0);
+  EXPECT_TRUE(S_ISLNK(found.st_mode));
+  EXPECT_EQ(scratch.read("sub/target.txt"), "new");
+}
+
+TEST(AtomicFile, ALinkThatLeadsNowhereIsInTheWayLikeAFile) {
+  const ScratchDirectory scratch;
+  ASSERT_EQ(symlink("nowhere", scratch.file("link.txt").c_str()), 0);
+  EXPECT_FALSE(write_words(scratch.file("link.txt"), "new", Overwrite::no));
+  ASSERT_TRUE(write_words(scratch.file("link.txt"), "new", Overwrite::yes));
+  EXPECT_EQ(scratch.read("link.txt"), "new");
+  EXPECT_FALSE(scratch.holds("nowhere"));
+}
+
+TEST(AtomicFile, ErrorsSayWhatIsInTheWay) {
+  const ScratchDirectory scratch;
+  const auto message = [](const std::string& path) {
+    const auto out = AtomicFile::create(path, Overwrite::yes);
+    return out ? std::string() : out.error().message;
+  };
+  EXPECT_EQ(message(scratch.path()), scratch.path() + " is a directory: name a file in it");
+  EXPECT_NE(message(scratch.file("none/a.txt")).find("there is no directory " + scratch.file("none")),
+            std::string::npos);
+  EXPECT_NE(message("/dev/null").find("is not a regular file"), std::string::npos);
+  EXPECT_NE(message("").find("without a name"), std::string::npos);
+  EXPECT_NE(message(scratch.file(std::string(300, 'a'))), "");
+  scratch.write("file.txt", "");
+  EXPECT_NE(message(scratch.file("file.txt/a.txt")).find("there is no directory"), std::string::npos);
+  EXPECT_EQ(scratch.names(), std::vector<std::string>{"file.txt"});
+}
+
+TEST(AtomicFile, ADirectoryThatMayNotBeWrittenIsAnError) {
+  if (geteuid() == 0) GTEST_SKIP() << "root may write anywhere";
+  const ScratchDirectory scratch;
+  ASSERT_EQ(chmod(scratch.path().c_str(), 0555), 0);
+  const auto out = AtomicFile::create(scratch.file("a.txt"), Overwrite::no);
+  chmod(scratch.path().c_str(), 0777);
+  ASSERT_FALSE(out);
+  EXPECT_NE(out.error().message.find("no permission"), std::string::npos);
+}
+
+class EveryWay : public testing::TestWithParam<Publish> {};
+
+TEST_P(EveryWay, MovesToAFreeNameAndKeepsATakenOne) {
+  const ScratchDirectory scratch;
+  scratch.write("from", "new");
+  EXPECT_EQ(publish_new(scratch.file("from"), scratch.file("to"), GetParam()), 0);
+  EXPECT_EQ(scratch.names(), std::vector<std::string>{"to"});
+  scratch.write("from", "newer");
+  EXPECT_EQ(publish_new(scratch.file("from"), scratch.file("to"), GetParam()), EEXIST);
+  EXPECT_EQ(scratch.read("to"), "new");
+  EXPECT_EQ(scratch.read("from"), "newer");
+}
+
+TEST_P(EveryWay, WithoutASourceTheNameStaysFree) {
+  const ScratchDirectory scratch;
+  EXPECT_EQ(publish_new(scratch.file("from"), scratch.file("to"), GetParam()), ENOENT);
+  EXPECT_TRUE(scratch.names().empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Publish, EveryWay,
+                         testing::Values(Publish::rename_noreplace, Publish::hard_link, Publish::claim));
+
+}  // namespace
+}  // namespace lowlux::isp
