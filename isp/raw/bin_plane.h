@@ -1,0 +1,11 @@
+#pragma once
+
+#include "isp/base/executor.h"
+#include "isp/base/plane.h"
+
+namespace lowlux::isp {
+
+/// Mean of each whole 2x2 block: `out` is floor(height / 2) x floor(width / 2).
+void bin_plane(PlaneView<const float> in, PlaneView<float> out, Executor& executor);
+
+}  // namespace lowlux::isp

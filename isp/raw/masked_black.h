@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "isp/base/frame.h"
+
+namespace lowlux::isp {
+
+/// Black point measured on light-shielded pixels, or why they do not serve.
+struct MaskedBlack {
+  std::optional<BlackPoint> black;
+  Rect region;          // the part of the readout that was used, in readout pixels
+  std::string refusal;  // set when `black` is absent
+};
+
+/// Measures pedestal plus dark on the masked pixels of one frame, per CFA site and so per row parity.
+///
+/// Of the masked rectangles the largest beside the active area is used, columns before rows: only columns share
+/// the read-out of every active row. Its outer 4 and inner 12 pixels are left out (edge effects, stray light).
+/// Per site: mean of the samples within 5 standard deviations (from the median absolute deviation) of the median;
+/// the cut is symmetric and takes 6e-7 of a normal law. Standard error, with row and column noise in it:
+///     se^2 = var(row means) / rows + var(column means) / columns - var(sample) / samples
+/// Borders that a source does not call masked are refused when they look lit: when their level is more than 5 % of
+/// the range off the tag, or when their row profile follows that of the neighbouring active columns.
+MaskedBlack measure_masked_black(const RawDn& raw);
+
+}  // namespace lowlux::isp

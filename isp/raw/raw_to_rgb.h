@@ -1,0 +1,100 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <variant>
+
+#include "isp/base/cfa.h"
+#include "isp/base/executor.h"
+#include "isp/base/image.h"
+#include "isp/base/plane.h"
+#include "isp/base/tone_table.h"
+
+namespace lowlux::isp {
+
+/// value = (dn - black[site]) * gain[site], sites as in site_of(). The gain holds 1 / (white - black) and the white
+/// balance.
+struct SiteLevels {
+  PerSite<float> black{};  // [DN]
+  PerSite<float> gain{1, 1, 1, 1};
+};
+
+/// A Bayer mosaic as read out. The rows are read once, front to back, so they may lie in uncached memory.
+struct DnMosaic {
+  PlaneView<const std::uint16_t> dn;
+  BayerPhase phase = BayerPhase::rggb;
+  SiteLevels levels;
+};
+
+/// A signed linear Bayer mosaic, black already removed; value = sample * gain[site].
+/// A sample that is not a number counts as 0, one beyond +-1e9 as +-1e9.
+struct SignedMosaic {
+  PlaneView<const float> value;
+  BayerPhase phase = BayerPhase::rggb;
+  PerSite<float> gain{1, 1, 1, 1};
+};
+
+/// Camera RGB that needs no demosaicing; samples as in SignedMosaic. For monochrome data all three planes may be one.
+struct CameraPlanes {
+  RgbView<const float> rgb;
+  std::array<float, 3> gain{1, 1, 1};
+};
+
+using RgbInput = std::variant<DnMosaic, SignedMosaic, CameraPlanes>;
+
+/// From white-balanced camera RGB c to the output's primaries, 0..1 being the display range:
+///     out = matrix * min(c, clip)
+/// and then, on request, along the line to the neutral of the same luminance Y until all channels are in 0..1:
+///     out' = Y + t (out - Y), t the largest in 0..1 that fits; Y <= 0 gives black, Y >= 1 white.
+struct RgbTransform {
+  std::array<float, 9> matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};  // rows; exposure included
+  std::array<float, 3> luminance{};  // weights of Y, >= 0, sum 1; only read when colours are moved into the gamut
+  float clip = 1;                    // 1 makes clipped highlights neutral; +infinity keeps all
+  bool move_into_gamut = true;       // false: encoders clamp each channel, linear() leaves values as they are
+};
+
+/// Mosaic or camera RGB to a picture in one pass over row bands: Malvar-He-Cutler demosaic (ICASSP 2004, the
+/// 5x5 filters of its figure 2; borders mirrored without repeating the edge), RgbTransform, tone.
+///
+/// Owns its scratch memory and allocates only in the constructor; does one frame at a time. The result does not depend
+/// on the number of threads. Every coefficient and level that is not finite, or beyond +-1e9, counts as 0.
+class RawToRgb {
+ public:
+  /// For pictures up to `max_width` pixels wide, and up to `threads` of an executor's threads.
+  RawToRgb(int max_width, int threads);
+
+  /// Interleaved display codes: `out` is height x 3 width. The tone table must reach its last bin at 1.
+  void rgb8(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, PlaneView<std::uint8_t> out,
+            Executor& executor);
+  /// The same with round(65535 tone), linear between the edges of a bin.
+  void rgb16(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, PlaneView<std::uint16_t> out,
+             Executor& executor);
+  /// Planar float, no tone.
+  void linear(const RgbInput& in, const RgbTransform& transform, RgbView<float> out, Executor& executor);
+
+  /// R, (G1 + G2) / 2 and B of each whole 2x2 cell: `out` is floor(height / 2) x floor(width / 2).
+  void bin2x2(const DnMosaic& in, RgbView<float> out, Executor& executor);
+  void bin2x2(const SignedMosaic& in, RgbView<float> out, Executor& executor);
+
+ private:
+  template <class Mosaic>
+  void bin(const Mosaic& in, RgbView<float> out, Executor& executor);
+  template <class SinkOfRow>
+  void convert(const RgbInput& in, const RgbTransform& transform, const SinkOfRow& sink_of_row, Executor& executor);
+  float* scratch(int thread) const;
+
+  int max_width_;
+  int threads_;
+  std::size_t run_stride_;  // floats from one run of scratch samples to the next
+  std::unique_ptr<float[]> memory_;
+};
+
+/// The vector instruction set the kernels use on this machine, as Highway names it.
+const char* raw_to_rgb_target();
+
+/// Whether this processor has what the kernels need at least: SSSE3 on x86; always true elsewhere.
+bool cpu_runs_raw_to_rgb();
+
+}  // namespace lowlux::isp

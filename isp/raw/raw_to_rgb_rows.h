@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstdint>
+
+#include "isp/base/tone_table.h"
+
+/// The row kernels under RawToRgb, dispatched at run time. Plain types only: their sources are compiled for several
+/// instruction sets, and shared inline code must not be.
+namespace lowlux::isp::rows {
+
+/// Samples that may be read before the first and after the last pair of a run; see docs/kernels.md.
+inline constexpr int padding_before = 16;
+inline constexpr int padding_after = 48;
+
+/// One row in two runs: even[i] is column 2i, odd[i] column 2i + 1.
+struct SplitRow {
+  float* even;
+  float* odd;
+};
+
+/// Levels of the even and the odd columns of one row.
+struct RowLevels {
+  float black[2];
+  float gain[2];
+};
+
+/// (in - black) * gain of one row, without mirrored ends. A row of odd width leaves a finite figure in its last odd
+/// place.
+void split_dn(const std::uint16_t* in, int width, const RowLevels& levels, const SplitRow& out);
+void split_float(const float* in, int width, const RowLevels& levels, const SplitRow& out);
+
+/// The rows y-2 .. y+2 around an output row, borders mirrored in. Each row holds green and one of red and blue:
+/// its own colour, at odd columns if own_is_odd.
+struct MosaicRows {
+  const float* even[5];
+  const float* odd[5];
+  bool own_is_odd;
+};
+
+/// Three rows of camera RGB.
+struct PlaneRows {
+  const float* even[3];
+  const float* odd[3];
+};
+
+/// RgbTransform for one order of the camera channels: (own, green, other) of a mosaic row, (R, G, B) of planes.
+struct Colour {
+  float column[3][3];  // column[c][j]: what camera channel c adds to output j
+  float luminance[3];
+  float clip;
+  bool move_into_gamut;
+};
+
+struct Codes8 {
+  const ToneTable* tone;
+  std::uint8_t* out;  // 3 width interleaved
+};
+struct Codes16 {
+  const ToneTable* tone;
+  std::uint16_t* out;
+};
+struct Planes {
+  float* out[3];
+};
+
+void convert_row(const MosaicRows& in, const Colour& colour, int width, const Codes8& out);
+void convert_row(const MosaicRows& in, const Colour& colour, int width, const Codes16& out);
+void convert_row(const MosaicRows& in, const Colour& colour, int width, const Planes& out);
+void convert_row(const PlaneRows& in, const Colour& colour, int width, const Codes8& out);
+void convert_row(const PlaneRows& in, const Colour& colour, int width, const Codes16& out);
+void convert_row(const PlaneRows& in, const Colour& colour, int width, const Planes& out);
+
+/// One row of 2x2 cells; the sites of a cell in the order R, G1, G2, B, one run each.
+struct CellRow {
+  const float* site[4];
+};
+void bin_row(const CellRow& in, int cells, const Planes& out);
+
+const char* target_name();
+
+}  // namespace lowlux::isp::rows

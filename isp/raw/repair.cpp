@@ -1,0 +1,137 @@
+#include "isp/raw/repair.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+
+#include "isp/raw/black_point.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double range_factor = 4;
+constexpr double noise_factor = 8;
+constexpr double floor_of_white = 0.01;
+constexpr double max_shared = 0.1;
+
+struct Neighbours {
+  int low;
+  int high;
+};
+
+Neighbours eight_same_colour(const PlaneView<const std::uint16_t>& dn, int x, int y) {
+  const std::uint16_t* above = dn.row(y - 2) + x;
+  const std::uint16_t* here = dn.row(y) + x;
+  const std::uint16_t* below = dn.row(y + 2) + x;
+  const std::array<int, 8> v{above[-2], above[0], above[2], here[-2], here[2], below[-2], below[0], below[2]};
+  return {*std::min_element(v.begin(), v.end()), *std::max_element(v.begin(), v.end())};
+}
+
+// How far a pixel stands out of the mean of its four nearest neighbours of the same colour that lie inside the plane.
+double excess(const PlaneView<const std::uint16_t>& dn, int x, int y) {
+  double sum = 0;
+  int n = 0;
+  for (const auto [dx, dy] : {std::array{-2, 0}, {2, 0}, {0, -2}, {0, 2}}) {
+    if (x + dx < 0 || x + dx >= dn.width || y + dy < 0 || y + dy >= dn.height) continue;
+    sum += dn.at(x + dx, y + dy);
+    ++n;
+  }
+  return n > 0 ? dn.at(x, y) - sum / n : 0.0;
+}
+
+// The direct neighbours' mean excess in the direction of this pixel's own.
+double shared_excess(const PlaneView<const std::uint16_t>& dn, int x, int y) {
+  return (excess(dn, x - 1, y) + excess(dn, x + 1, y) + excess(dn, x, y - 1) + excess(dn, x, y + 1)) / 4;
+}
+
+bool is_defect(const PlaneView<const std::uint16_t>& dn, int x, int y, double floor_dn) {
+  const Neighbours n = eight_same_colour(dn, x, y);
+  const int value = dn.at(x, y);
+  const double beyond = value > n.high ? value - n.high : n.low - value;
+  if (beyond <= range_factor * (n.high - n.low) + floor_dn) return false;
+  const double own = excess(dn, x, y);
+  return shared_excess(dn, x, y) * (own > 0 ? 1 : -1) < max_shared * std::fabs(own);
+}
+
+// Cheap first test of a whole row, so that the careful one runs on few pixels: out of the range of left and right.
+void judge_row(const PlaneView<const std::uint16_t>& dn, int y, double floor_dn, std::vector<Pixel>& found) {
+  const std::uint16_t* row = dn.row(y);
+  const int floor = static_cast<int>(floor_dn);
+  for (int x = 2; x < dn.width - 2; ++x) {
+    const int left = row[x - 2], right = row[x + 2], value = row[x];
+    const bool outside = (value > std::max(left, right) + floor) | (value < std::min(left, right) - floor);
+    if (outside && is_defect(dn, x, y, floor_dn)) found.push_back({x, y});
+  }
+}
+
+bool before(const Pixel& a, const Pixel& b) { return a.y != b.y ? a.y < b.y : a.x < b.x; }
+
+}  // namespace
+
+std::vector<Pixel> find_defects(const RawDn& raw, const BlackPoint& black, double noise_std_dn, Executor& executor) {
+  const Rect& a = raw.active;
+  if (raw.layout != SensorLayout::bayer || a.width < 5 || a.height < 5) return {};
+  const PlaneView<const std::uint16_t> dn = raw.dn.view().crop(a.x, a.y, a.width, a.height);
+  double range = 0;
+  for (int site = 0; site < 4; ++site) range = std::max(range, white_at(raw, site) - black.pedestal_dn[site]);
+  const double floor_dn = noise_factor * noise_std_dn + floor_of_white * range;
+  std::vector<std::vector<Pixel>> found(executor.width());
+  for_each_band(executor, a.height, [&](RowBand band, int index) {
+    const int last = std::min(band.last, a.height - 2);
+    for (int y = std::max(band.first, 2); y < last; ++y) judge_row(dn, y, floor_dn, found[index]);
+  });
+  std::vector<Pixel> all;
+  for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+std::vector<Pixel> named_defects(const RawDn& raw, const std::vector<DefectRect>& defects) {
+  std::vector<Pixel> pixels;
+  for (const DefectRect& d : defects) {
+    const int x_end = std::min(d.x + d.width, raw.active.width);
+    const int y_end = std::min(d.y + d.height, raw.active.height);
+    for (int y = std::max(d.y, 0); y < y_end; ++y) {
+      for (int x = std::max(d.x, 0); x < x_end; ++x) pixels.push_back({x, y});
+    }
+  }
+  std::sort(pixels.begin(), pixels.end(), before);
+  pixels.erase(std::unique(pixels.begin(), pixels.end()), pixels.end());
+  return pixels;
+}
+
+std::vector<Pixel> merged(const std::vector<Pixel>& a, const std::vector<Pixel>& b) {
+  std::vector<Pixel> all;
+  all.reserve(a.size() + b.size());
+  std::set_union(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(all), before);
+  return all;
+}
+
+void repair(PlaneView<float> mosaic, const std::vector<Pixel>& defects, int step) {
+  const auto sound = [&](int x, int y) {
+    if (x < 0 || x >= mosaic.width || y < 0 || y >= mosaic.height) return false;
+    return !std::binary_search(defects.begin(), defects.end(), Pixel{x, y}, before);
+  };
+  for (const Pixel& p : defects) {
+    float best_difference = INFINITY;
+    float best = mosaic.at(p.x, p.y);
+    float sum = 0;
+    int n = 0;
+    for (const auto [dx, dy] : {std::array{step, 0}, {0, step}}) {
+      const bool low = sound(p.x - dx, p.y - dy), high = sound(p.x + dx, p.y + dy);
+      const float a = low ? mosaic.at(p.x - dx, p.y - dy) : 0.0f;
+      const float b = high ? mosaic.at(p.x + dx, p.y + dy) : 0.0f;
+      sum += a + b;
+      n += low + high;
+      if (low && high && std::fabs(a - b) < best_difference) {
+        best_difference = std::fabs(a - b);
+        best = (a + b) / 2;
+      }
+    }
+    if (best_difference == INFINITY && n > 0) best = sum / static_cast<float>(n);
+    mosaic.at(p.x, p.y) = best;
+  }
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+
+namespace lowlux::isp {
+
+/// A pixel of the active area.
+struct Pixel {
+  int x = 0;
+  int y = 0;
+  friend bool operator==(const Pixel&, const Pixel&) = default;
+};
+
+/// Finds hot and dead pixels of a Bayer frame by one fact of optics: a point of light passes a lens and so never lands
+/// in a single pixel, while a defect does. A pixel is defective when both hold (all in DN above black):
+///   1. it lies outside the range of its eight nearest neighbours of the same colour, beyond the nearer end by more
+///   than
+///      4 ranges + 8 noise_std_dn + 1 % of the range from black to white;
+///   2. its four direct neighbours, against their own same-colour surroundings, share less than a tenth of its excess
+///      (a star of 1.5 pixels FWHM gives them two fifths).
+/// @param noise_std_dn  standard deviation of black pixels, 0 if unknown
+/// @return ascending by row, then column. Pixels within two of the border are not judged.
+std::vector<Pixel> find_defects(const RawDn& raw, const BlackPoint& black, double noise_std_dn, Executor& executor);
+
+/// The pixels a source names as defective that lie in the active area, ascending, each once.
+std::vector<Pixel> named_defects(const RawDn& raw, const std::vector<DefectRect>& defects);
+
+/// Both ascending lists in one, each pixel once.
+std::vector<Pixel> merged(const std::vector<Pixel>& a, const std::vector<Pixel>& b);
+
+/// Replaces each defect in a mosaic by the mean of the pair of same-colour neighbours (left and right, or above and
+/// below) that differ least; defective neighbours do not count. A defect without any sound neighbour stays.
+/// @param defects  ascending
+/// @param step     distance of the same-colour neighbours: 2 for Bayer, 1 for monochrome
+void repair(PlaneView<float> mosaic, const std::vector<Pixel>& defects, int step);
+
+}  // namespace lowlux::isp

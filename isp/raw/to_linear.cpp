@@ -1,0 +1,116 @@
+#include "isp/raw/to_linear.h"
+
+#include <cmath>
+#include <utility>
+
+#include "isp/raw/black_point.h"
+
+namespace lowlux::isp {
+namespace {
+
+struct SiteScale {
+  PerSite<float> black;
+  PerSite<float> gain;
+};
+
+SiteScale site_scale(const RawDn& raw, const BlackPoint& black) {
+  SiteScale scale{};
+  for (int site = 0; site < 4; ++site) {
+    scale.black[site] = static_cast<float>(black.pedestal_dn[site]);
+    scale.gain[site] = static_cast<float>(1.0 / (white_at(raw, site) - black.pedestal_dn[site]));
+  }
+  return scale;
+}
+
+// The pattern of a tag that four figures cannot express; white stays that of the site.
+void row_by_pattern(const RawDn& raw, const BlackLevel& pattern, int y, float* out) {
+  const std::uint16_t* dn = raw.dn.row(raw.active.y + y) + raw.active.x;
+  for (int x = 0; x < raw.active.width; ++x) {
+    const double black = pattern.at(x, y);
+    out[x] = static_cast<float>((dn[x] - black) / (white_at(raw, site_of(x, y)) - black));
+  }
+}
+
+void row_by_site(const RawDn& raw, const SiteScale& scale, int y, float* out) {
+  const std::uint16_t* dn = raw.dn.row(raw.active.y + y) + raw.active.x;
+  const int left = site_of(0, y);
+  const float black[2] = {scale.black[left], scale.black[left + 1]};
+  const float gain[2] = {scale.gain[left], scale.gain[left + 1]};
+  for (int x = 0; x < raw.active.width; ++x) out[x] = (static_cast<float>(dn[x]) - black[x & 1]) * gain[x & 1];
+}
+
+// Multiplies (or shifts) each site by its own figure.
+template <class Apply>
+void for_each_site(Plane<float>& plane, Executor& executor, const Apply& apply) {
+  for_each_band(executor, plane.height(), [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      float* row = plane.row(y);
+      for (int x = 0; x < plane.width(); ++x) row[x] = apply(row[x], site_of(x, y));
+    }
+  });
+}
+
+}  // namespace
+
+void to_fraction(const RawDn& raw, const BlackPoint& black, PlaneView<float> out, Executor& executor) {
+  const SiteScale scale = site_scale(raw, black);
+  for_each_band(executor, raw.active.height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      if (black.pattern) {
+        row_by_pattern(raw, *black.pattern, y, out.row(y));
+      } else {
+        row_by_site(raw, scale, y, out.row(y));
+      }
+    }
+  });
+}
+
+RawFraction to_fraction(const RawDn& raw, const BlackPoint& black, Executor& executor) {
+  RawFraction out{Plane<float>(raw.active.width, raw.active.height), raw.phase};
+  to_fraction(raw, black, out.value.view(), executor);
+  return out;
+}
+
+void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, RgbView<float> out, Executor& executor) {
+  for_each_band(executor, raw.active.height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      const std::uint16_t* dn = raw.dn.row(raw.active.y + y) + 3 * raw.active.x;
+      for (int c = 0; c < 3; ++c) {
+        float* row = out[c].row(y);
+        for (int x = 0; x < raw.active.width; ++x) {
+          const double level = black.pattern ? black.pattern->at(x, y, c) : black.pedestal_dn[c];
+          row[x] = static_cast<float>((dn[3 * x + c] - level) / (raw.white_dn[c] - level));
+        }
+      }
+    }
+  });
+}
+
+std::optional<PerSite<double>> electrons_at_white(const RawDn& raw, const NoiseProfile& noise) {
+  PerSite<double> electrons{};
+  for (int site = 0; site < 4; ++site) {
+    const bool bayer = raw.layout == SensorLayout::bayer;
+    const int colour = bayer ? static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)) : 0;
+    electrons[site] = 1.0 / noise.scale[colour];
+    if (!(noise.scale[colour] > 0) || !std::isfinite(electrons[site])) return std::nullopt;
+  }
+  return electrons;
+}
+
+RawElectrons to_electrons(RawFraction fraction, const PerSite<double>& electrons_at_white, Executor& executor) {
+  for_each_site(fraction.value, executor,
+                [&](float v, int site) { return v * static_cast<float>(electrons_at_white[site]); });
+  return {std::move(fraction.value), fraction.phase};
+}
+
+SignalElectrons subtract_dark(RawElectrons raw, const BlackPoint& black, Executor& executor) {
+  if (black.dark_mean_e != PerSite<double>{}) {
+    for_each_site(raw.value, executor,
+                  [&](float v, int site) { return v - static_cast<float>(black.dark_mean_e[site]); });
+  }
+  return {std::move(raw.value), raw.phase};
+}
+
+SignalFraction subtract_dark(RawFraction raw) { return {std::move(raw.value), raw.phase}; }
+
+}  // namespace lowlux::isp

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/image.h"
+#include "isp/base/result.h"
+
+namespace lowlux::isp {
+
+/// Takes the black point off the active area: value = (dn - black) / (white - black), signed, nothing clipped.
+/// Bayer or monochrome frames. The dark charge stays in unless the black point holds it.
+RawFraction to_fraction(const RawDn& raw, const BlackPoint& black, Executor& executor);
+/// The same into the caller's plane, active height x width.
+void to_fraction(const RawDn& raw, const BlackPoint& black, PlaneView<float> out, Executor& executor);
+
+/// The same for SensorLayout::linear_rgb: three planes of active height x width.
+void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, RgbView<float> out, Executor& executor);
+
+/// Electrons that one FractionOfWhite stands for, per CFA site. With shot noise alone the variance of a fraction x is
+/// x / electrons, so this is 1 / NoiseProfile::scale. Nullopt where a scale is not positive and finite.
+std::optional<PerSite<double>> electrons_at_white(const RawDn& raw, const NoiseProfile& noise);
+
+/// Fractions counted in electrons.
+RawElectrons to_electrons(RawFraction fraction, const PerSite<double>& electrons_at_white, Executor& executor);
+
+/// Takes the mean dark charge off. Where the black point already held it (masked pixels) nothing is left to take.
+SignalElectrons subtract_dark(RawElectrons raw, const BlackPoint& black, Executor& executor);
+/// Without a known gain the dark charge is unknown too: what the pedestal did not hold stays, and only the type
+/// changes.
+SignalFraction subtract_dark(RawFraction raw);
+
+}  // namespace lowlux::isp
