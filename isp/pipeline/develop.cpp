@@ -1,0 +1,21 @@
+#include "isp/pipeline/develop.h"
+
+#include <utility>
+
+#include "isp/pipeline/pipeline.h"
+#include "isp/pipeline/stage_clock.h"
+
+namespace lowlux::isp {
+
+Result<Developed> develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
+  Result<DevelopPlan> plan = plan_develop(frame, options, executor);
+  if (!plan) return tl::make_unexpected(std::move(plan.error()));
+  Developed out{Picture{}, std::move(*plan)};
+  StageClock clock(out.plan.times);
+  out.picture = make_picture(out.plan);
+  Pipeline(executor).render(frame, out.plan, out.picture);
+  clock.lap("render");
+  return out;
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,151 @@
+#include "isp/pipeline/pipeline.h"
+
+#include <algorithm>
+#include <type_traits>
+#include <utility>
+
+#include "isp/raw/bin_plane.h"
+#include "isp/raw/corrections.h"
+#include "isp/raw/to_linear.h"
+
+namespace lowlux::isp {
+namespace {
+
+// Figures of the active area's sites in the order of the sites of a crop of it.
+PerSite<float> of_crop(const PerSite<double>& active, const Rect& crop) {
+  PerSite<float> out{};
+  for (int site = 0; site < 4; ++site) {
+    out[site] = static_cast<float>(active[site_of(crop.x + (site & 1), crop.y + (site >> 1))]);
+  }
+  return out;
+}
+
+PlaneView<const float> crop_of(const Plane<float>& active, const Rect& crop) {
+  return active.view().crop(crop.x, crop.y, crop.width, crop.height);
+}
+
+// White-balance gain of each site of the active area, divided by what one unit of the mosaic is worth.
+PerSite<double> site_gain(const RawDn& raw, const DevelopPlan& plan, const PerSite<double>& units_at_white) {
+  PerSite<double> gain{};
+  for (int site = 0; site < 4; ++site) {
+    const int colour = static_cast<int>(colour_at(raw.phase, site & 1, site >> 1));
+    gain[site] = plan.white_gain[colour] / units_at_white[site];
+  }
+  return gain;
+}
+
+template <class T>
+void fit(Plane<T>& plane, int width, int height) {
+  if (plane.width() != width || plane.height() != height) plane = Plane<T>(width, height);
+}
+
+DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
+  const Rect& crop = raw.default_crop;
+  PerSite<double> range{};
+  for (int site = 0; site < 4; ++site) range[site] = white_at(raw, site) - plan.black.pedestal_dn[site];
+  return {raw.dn.view().crop(raw.active.x + crop.x, raw.active.y + crop.y, crop.width, crop.height),
+          phase_of_crop(raw.phase, crop.x, crop.y),
+          {of_crop(plan.black.pedestal_dn, crop), of_crop(site_gain(raw, plan, range), crop)}};
+}
+
+}  // namespace
+
+// Bayer frames that have to be repaired or multiplied first: in electrons where the gain is known.
+PerSite<float> Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& plan) {
+  const RawDn& raw = frame.raw;
+  fit(mosaic_, raw.active.width, raw.active.height);
+  to_fraction(raw, plan.black, mosaic_.view(), executor_);
+  PerSite<double> units_at_white{1, 1, 1, 1};
+  if (plan.electrons_at_white) {
+    units_at_white = *plan.electrons_at_white;
+    RawElectrons electrons = to_electrons(RawFraction{std::move(mosaic_), raw.phase}, units_at_white, executor_);
+    mosaic_ = subtract_dark(std::move(electrons), plan.black, executor_).value;
+  }
+  repair(mosaic_.view(), plan.defects, 2);
+  apply_gains(frame.corrections, mosaic_.view(), executor_);
+  return of_crop(site_gain(raw, plan, units_at_white), raw.default_crop);
+}
+
+RgbInput Pipeline::prepare_bayer(const RawFrame& frame, const DevelopPlan& plan) {
+  const RawDn& raw = frame.raw;
+  const Rect& crop = raw.default_crop;
+  const auto half_or_whole = [&](const auto& mosaic) -> RgbInput {
+    if (!plan.options.half) return mosaic;
+    const RgbView<float> half{half_planes_[0].view(), half_planes_[1].view(), half_planes_[2].view()};
+    kernel_->bin2x2(mosaic, half, executor_);
+    return CameraPlanes{{half[0], half[1], half[2]}, {1, 1, 1}};
+  };
+  if (plan.from_codes) return half_or_whole(code_mosaic(raw, plan));
+  const PerSite<float> gain = float_mosaic(frame, plan);
+  return half_or_whole(SignedMosaic{crop_of(mosaic_, crop), phase_of_crop(raw.phase, crop.x, crop.y), gain});
+}
+
+// Monochrome frames serve as R, G and B at once; demosaiced ones have three planes of their own.
+RgbInput Pipeline::prepare_planes(const RawFrame& frame, const DevelopPlan& plan) {
+  const RawDn& raw = frame.raw;
+  const bool monochrome = raw.layout == SensorLayout::monochrome;
+  const int planes = monochrome ? 1 : 3;
+  for (int c = 0; c < planes; ++c) fit(planes_[c], raw.active.width, raw.active.height);
+  if (monochrome) {
+    to_fraction(raw, plan.black, planes_[0].view(), executor_);
+    repair(planes_[0].view(), plan.defects, 1);
+    apply_gains(frame.corrections, planes_[0].view(), executor_);
+  } else {
+    const RgbView<float> rgb{planes_[0].view(), planes_[1].view(), planes_[2].view()};
+    to_fraction_rgb(raw, plan.black, rgb, executor_);
+    for (const auto& plane : rgb) repair(plane, plan.defects, 1);
+    apply_gains(frame.corrections, rgb, executor_);
+  }
+  CameraPlanes out{{}, plan.white_gain};
+  for (int c = 0; c < 3; ++c) {
+    const int source = std::min(c, planes - 1);
+    out.rgb[c] = crop_of(planes_[source], raw.default_crop);
+    if (!plan.options.half) continue;
+    if (c == source) bin_plane(out.rgb[c], half_planes_[c].view(), executor_);
+    out.rgb[c] = half_planes_[source].view();
+  }
+  return out;
+}
+
+void Pipeline::reserve(const RawFrame& frame, const DevelopPlan& plan) {
+  const int width = frame.raw.default_crop.width;
+  if (!kernel_ || kernel_width_ < width) {
+    kernel_ = std::make_unique<RawToRgb>(width, executor_.width());
+    kernel_width_ = width;
+  }
+  if (plan.options.half) {
+    for (Plane<float>& plane : half_planes_) fit(plane, plan.width, plan.height);
+  }
+}
+
+void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
+  reserve(frame, plan);
+  const RgbInput in =
+      frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);
+  std::visit(
+      [&](auto& picture) {
+        using P = std::remove_reference_t<decltype(picture)>;
+        if constexpr (std::is_same_v<P, Encoded8>) {
+          kernel_->rgb8(in, plan.transform, plan.tone, picture.codes.view(), executor_);
+        } else if constexpr (std::is_same_v<P, Encoded16>) {
+          kernel_->rgb16(in, plan.transform, plan.tone, picture.codes.view(), executor_);
+        } else {
+          kernel_->linear(in, plan.transform, picture.view(), executor_);
+        }
+      },
+      out);
+}
+
+Picture make_picture(const DevelopPlan& plan) {
+  switch (plan.options.samples) {
+    case SampleType::u8:
+      return Encoded8{Plane<std::uint8_t>(3 * plan.width, plan.height)};
+    case SampleType::u16:
+      return Encoded16{Plane<std::uint16_t>(3 * plan.width, plan.height)};
+    case SampleType::f32:
+      break;
+  }
+  return SceneLinear(plan.width, plan.height);
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/image.h"
+#include "isp/pipeline/plan.h"
+
+namespace lowlux::isp {
+
+/// Turns raw frames into pictures as their plans say. Owns every buffer between the two: the first frame of a size
+/// allocates them, later ones of that size or smaller allocate nothing. One frame at a time.
+class Pipeline {
+ public:
+  explicit Pipeline(Executor& executor) : executor_(executor) {}
+
+  /// `out` holds a picture of plan.width x plan.height of the planned sample type: see make_picture().
+  void render(const RawFrame& frame, const DevelopPlan& plan, Picture& out);
+
+ private:
+  void reserve(const RawFrame& frame, const DevelopPlan& plan);
+  RgbInput prepare_bayer(const RawFrame& frame, const DevelopPlan& plan);
+  RgbInput prepare_planes(const RawFrame& frame, const DevelopPlan& plan);
+  PerSite<float> float_mosaic(const RawFrame& frame, const DevelopPlan& plan);
+
+  Executor& executor_;
+  std::unique_ptr<RawToRgb> kernel_;
+  int kernel_width_ = 0;
+  Plane<float> mosaic_;                 // active area, black and dark off
+  std::array<Plane<float>, 3> planes_;  // camera RGB of frames that need no demosaicing
+  std::array<Plane<float>, 3> half_planes_;
+};
+
+/// An uninitialised picture for a plan.
+Picture make_picture(const DevelopPlan& plan);
+
+}  // namespace lowlux::isp

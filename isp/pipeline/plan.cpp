@@ -1,0 +1,188 @@
+#include "isp/pipeline/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "isp/pipeline/stage_clock.h"
+#include "isp/raw/corrections.h"
+#include "isp/raw/thumbnail.h"
+#include "isp/raw/to_linear.h"
+#include "isp/render/output_space.h"
+
+namespace lowlux::isp {
+namespace {
+
+Result<void> check(const RawFrame& frame, const DevelopOptions& o) {
+  if (Result<void> options = check_options(o); !options) return options;
+  const bool coloured = frame.raw.layout != SensorLayout::monochrome;
+  if (coloured && o.space != OutputSpace::camera && frame.colour.calibrations.empty()) {
+    return fail(ErrorCode::insufficient,
+                "the file has no colour matrix and the decoder does not know the camera; "
+                "--space camera develops it without colour conversion");
+  }
+  const Rect& crop = frame.raw.default_crop;
+  if (o.half && (crop.width < 2 || crop.height < 2)) {
+    return fail(ErrorCode::invalid_argument, "the picture is too small to halve");
+  }
+  return {};
+}
+
+// Defects the source names and, if asked for, those that stand out.
+std::vector<Pixel> all_defects(const RawFrame& frame, const DevelopPlan& plan, double black_noise_dn,
+                               Executor& executor) {
+  std::vector<Pixel> defects = named_defects(frame.raw, frame.corrections.defects);
+  if (!plan.options.find_defects) return defects;
+  const std::vector<Pixel> found = find_defects(frame.raw, plan.black, black_noise_dn, executor);
+  return merged(defects, found);
+}
+
+double mean_range_dn(const RawDn& raw, const BlackPoint& black) {
+  double range = 0;
+  for (int site = 0; site < 4; ++site) range += (white_at(raw, site) - black.pedestal_dn[site]) / 4;
+  return range;
+}
+
+Result<WhiteBalance> choose_white(const RawFrame& frame, const DevelopOptions& o, const Thumbnail& thumbnail) {
+  using Mode = WhiteBalanceChoice::Mode;
+  if (frame.raw.layout == SensorLayout::monochrome) return WhiteBalance{};
+  if (o.white_balance.mode == Mode::temperature)
+    return white_balance_of_temperature(frame.colour, o.white_balance.cct_k);
+  if (o.white_balance.mode == Mode::as_shot) {
+    Result<WhiteBalance> as_shot = as_shot_white_balance(frame.colour);
+    if (as_shot || as_shot.error().code != ErrorCode::insufficient) return as_shot;
+  }
+  const Rect& active = frame.raw.active;
+  const double block_pixels = std::max(
+      1.0, static_cast<double>(active.width) * active.height / (thumbnail.mean.width() * thumbnail.mean.height()) / 4);
+  WhiteBalance found =
+      auto_white_balance(thumbnail.mean.view(), thumbnail.black_noise_std / std::sqrt(block_pixels), frame.colour);
+  if (o.white_balance.mode == Mode::as_shot && found.reason.empty())
+    found.reason = "the file states no white balance: estimated from the picture";
+  return found;
+}
+
+// Luminance of each block as it will be rendered, before exposure.
+std::vector<float> rendered_luminance(const CameraRgb& blocks, const Vector3& weights,
+                                      const std::array<float, 3>& gain) {
+  std::vector<float> luminance(blocks.plane[0].size());
+  for (std::size_t i = 0; i < luminance.size(); ++i) {
+    double y = 0;
+    for (int c = 0; c < 3; ++c) y += weights[c] * std::min(blocks.plane[c].data()[i] * gain[c], 1.0f);
+    luminance[i] = static_cast<float>(y);
+  }
+  return luminance;
+}
+
+// Luminance weights of white-balanced camera RGB.
+Vector3 luminance_of_balanced(const Vector3& luminance, const Matrix3& balanced) {
+  Vector3 weights{};
+  for (int c = 0; c < 3; ++c) {
+    for (int i = 0; i < 3; ++i) weights[c] += luminance[i] * balanced[i][c];
+  }
+  return weights;
+}
+
+// White-balanced camera RGB -> linear values of the space, white at (1, 1, 1).
+Result<Matrix3> balanced_to_output(const RawFrame& frame, const DevelopOptions& o, const WhiteBalance& balance) {
+  if (o.space == OutputSpace::camera) return identity3();
+  const Matrix3 to_output = *xyz_to_output(o.space);
+  if (frame.raw.layout == SensorLayout::monochrome) {
+    const Xyz white = *xyz_of(output_white);
+    return to_output * diagonal3(vector_of(white)) * Matrix3{{{0, 1, 0}, {0, 1, 0}, {0, 1, 0}}};
+  }
+  const Result<Matrix3> to_xyz = camera_to_xyz(frame.colour, balance.white->xy, output_white);
+  if (!to_xyz) return to_xyz;
+  return to_output * *to_xyz * diagonal3(balance.neutral);
+}
+
+// Camera RGB is written as it is; everything else is white balanced, smallest gain 1, and clipped where the first
+// channel saturates: what is clipped is then neutral.
+void set_transform(DevelopPlan& plan, const Matrix3& balanced, const Vector3& luminance) {
+  const bool camera = plan.options.space == OutputSpace::camera;
+  const double limit = tone_limit(plan.options.tone, plan.exposure_ev);
+  const Matrix3 scaled = (std::exp2(plan.exposure_ev) / limit) * balanced;
+  RgbTransform& t = plan.transform;
+  for (int i = 0; i < 9; ++i) t.matrix[i] = static_cast<float>(scaled[i / 3][i % 3]);
+  for (int c = 0; c < 3; ++c) t.luminance[c] = static_cast<float>(luminance[c]);
+  t.clip = camera ? INFINITY : 1.0f;
+  t.move_into_gamut = plan.options.samples != SampleType::f32;
+  if (plan.options.samples != SampleType::f32)
+    plan.tone = make_tone_table(plan.options.tone, plan.options.space, limit);
+}
+
+void decide_exposure(DevelopPlan& plan, const Thumbnail& thumbnail, const Vector3& weights) {
+  if (plan.options.exposure_ev) {
+    plan.exposure_ev = *plan.options.exposure_ev;
+    plan.exposure_rule = "given";
+    return;
+  }
+  const std::vector<float> luminance = rendered_luminance(thumbnail.mean, weights, plan.white_gain);
+  const double gain = *std::max_element(plan.white_gain.begin(), plan.white_gain.end());
+  const AutoExposure automatic = auto_exposure(luminance, thumbnail.black_noise_std * gain);
+  plan.exposure_ev = automatic.ev;
+  plan.exposure_rule = name_of(automatic.rule);
+}
+
+void set_size(DevelopPlan& plan, const Rect& crop) {
+  plan.width = plan.options.half ? crop.width / 2 : crop.width;
+  plan.height = plan.options.half ? crop.height / 2 : crop.height;
+}
+
+}  // namespace
+
+Result<void> check_options(const DevelopOptions& o) {
+  const bool needs_float = o.space == OutputSpace::camera || o.space == OutputSpace::xyz;
+  if (needs_float && o.samples != SampleType::f32) {
+    return fail(
+        ErrorCode::invalid_argument,
+        "camera RGB and XYZ are signed and reach above 1: they need float samples, TIFF with --bits 32 or OpenEXR");
+  }
+  if (o.samples == SampleType::f32 && (!is_linear(o.space) || o.tone != ToneCurve::none)) {
+    return fail(ErrorCode::invalid_argument,
+                "float samples are scene-linear: they go with a linear space and --tone none");
+  }
+  return {};
+}
+
+Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
+  if (const Result<void> checked = check(frame, options); !checked) return tl::make_unexpected(checked.error());
+  DevelopPlan plan;
+  plan.options = options;
+  plan.warnings = frame.warnings;
+  set_size(plan, frame.raw.default_crop);
+  StageClock clock(plan.times);
+
+  Result<BlackPoint> black = choose_black(frame.raw, options.black);
+  if (!black) return tl::make_unexpected(std::move(black.error()));
+  plan.black = std::move(*black);
+  if (frame.noise) plan.electrons_at_white = electrons_at_white(frame.raw, *frame.noise);
+  clock.lap("black point");
+
+  const Thumbnail thumbnail = make_thumbnail(frame, plan.black, executor);
+  clock.lap("thumbnail");
+  plan.defects = all_defects(frame, plan, thumbnail.black_noise_std * mean_range_dn(frame.raw, plan.black), executor);
+  clock.lap("defects");
+
+  Result<WhiteBalance> balance{};
+  if (options.space != OutputSpace::camera) balance = choose_white(frame, options, thumbnail);
+  if (!balance) return tl::make_unexpected(std::move(balance.error()));
+  plan.neutral = balance->neutral;
+  plan.white = balance->white;
+  plan.white_balance_rule = name_of(balance->source);
+  if (!balance->reason.empty()) plan.warnings.push_back(balance->reason);
+  for (int c = 0; c < 3; ++c) plan.white_gain[c] = static_cast<float>(1 / plan.neutral[c]);
+
+  const Result<Matrix3> balanced = balanced_to_output(frame, options, *balance);
+  if (!balanced) return tl::make_unexpected(balanced.error());
+  const Vector3 luminance = luminance_weights(options.space).value_or(Vector3{0, 1, 0});
+  decide_exposure(plan, thumbnail, luminance_of_balanced(luminance, *balanced));
+  set_transform(plan, *balanced, luminance);
+  plan.from_codes = frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.black.pattern &&
+                    plan.black.dark_mean_e == PerSite<double>{} && frame.corrections.radial_gains.empty() &&
+                    std::none_of(frame.corrections.gain_maps.begin(), frame.corrections.gain_maps.end(), has_effect);
+  clock.lap("white and exposure");
+  return plan;
+}
+
+}  // namespace lowlux::isp

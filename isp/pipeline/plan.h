@@ -1,0 +1,79 @@
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/image.h"
+#include "isp/base/result.h"
+#include "isp/base/tone_table.h"
+#include "isp/model/camera_colour.h"
+#include "isp/raw/black_point.h"
+#include "isp/raw/raw_to_rgb.h"
+#include "isp/raw/repair.h"
+#include "isp/render/exposure.h"
+#include "isp/render/tone.h"
+#include "isp/render/white_balance.h"
+
+namespace lowlux::isp {
+
+struct WhiteBalanceChoice {
+  enum class Mode : std::uint8_t { as_shot, automatic, temperature } mode = Mode::as_shot;
+  double cct_k = 0;  // for Mode::temperature, white_min_k..white_max_k
+};
+
+/// How a frame is to be developed.
+struct DevelopOptions {
+  WhiteBalanceChoice white_balance;
+  std::optional<double> exposure_ev;  // absent: automatic
+  ToneCurve tone = ToneCurve::standard;
+  OutputSpace space = OutputSpace::srgb;
+  SampleType samples = SampleType::u8;  // f32 is scene-linear: signed, unbounded, without tone
+  bool half = false;                    // exact 2x2 binning in place of demosaicing
+  BlackRequest black;
+  bool find_defects = true;  // hot and dead pixels beyond those the source names
+};
+
+/// Time one step took.
+struct StageTime {
+  std::string_view stage;
+  double seconds;
+};
+
+/// Everything decided about one frame before a pixel is touched: what was measured, and what the kernels need.
+struct DevelopPlan {
+  // measured and decided
+  BlackPoint black;
+  std::optional<PerSite<double>> electrons_at_white;  // known system gain: the mosaic is counted in electrons
+  std::vector<Pixel> defects;                         // ascending
+  Vector3 neutral{1, 1, 1};                           // camera RGB of white, largest 1
+  std::optional<WhitePoint> white;                    // absent without a colour calibration
+  std::string_view white_balance_rule;
+  double exposure_ev = 0;
+  std::string_view exposure_rule;
+  std::vector<std::string> warnings;
+
+  // for the kernels
+  DevelopOptions options;
+  int width = 0;  // of the picture, before orientation
+  int height = 0;
+  bool from_codes = false;  // straight from 16-bit codes: nothing has to be repaired or multiplied on the way
+  RgbTransform transform;
+  std::array<float, 3> white_gain{1, 1, 1};
+  ToneTable tone;
+
+  std::vector<StageTime> times;
+};
+
+/// Whether the options fit together: float samples go with linear spaces and no tone curve, and XYZ and camera RGB
+/// with float samples. Error: invalid_argument.
+Result<void> check_options(const DevelopOptions& options);
+
+/// Measures black, noise, exposure and white of a frame, and decides how to develop it. Errors: no black point
+/// (insufficient), no colour calibration for a space other than `camera` (insufficient), white not above black,
+/// matrices that cannot be (malformed), options that do not fit together or the frame (invalid_argument).
+Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
+
+}  // namespace lowlux::isp
