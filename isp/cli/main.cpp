@@ -1,1 +1,67 @@
-int main() { return 0; }
+#include <array>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "isp/cli/exit_code.h"
+#include "isp/cli/verbs.h"
+#include "isp/cli/version.h"
+
+namespace lowlux::cli {
+namespace {
+
+struct Verb {
+  std::string_view name;
+  std::string_view summary;
+  int (*run)(const std::vector<std::string>& args);
+};
+
+constexpr std::array verbs{
+    Verb{"develop", "raw files to pictures", run_develop},
+    Verb{"info", "what a raw file says, and what was measured on it", run_info},
+};
+
+void print_help() {
+  fmt::print("lowlux: a raw developer for pictures taken in the dark\n\nusage: lowlux VERB [OPTIONS]\n\nverbs:\n");
+  for (const Verb& verb : verbs) fmt::print("  {:<10} {}\n", verb.name, verb.summary);
+  fmt::print(
+      "\n`lowlux VERB --help` lists a verb's options, `lowlux --version` what is built in.\n"
+      "exit codes: 0 done, 1 an input or the work failed, 2 the command line is wrong\n");
+}
+
+int run(const std::vector<std::string>& args) {
+  const std::string_view first = args.empty() ? std::string_view() : args.front();
+  if (first == "--help" || first == "-h") {
+    print_help();
+    return exit_done;
+  }
+  if (first == "--version") {
+    fmt::print("{}\n", version_text());
+    return exit_done;
+  }
+  for (const Verb& verb : verbs) {
+    if (verb.name == first) return verb.run({args.begin() + 1, args.end()});
+  }
+  if (first.empty()) {
+    fmt::print(stderr, "lowlux: no verb given; `lowlux --help` lists them\n");
+  } else {
+    fmt::print(stderr, "lowlux: there is no verb '{}'; `lowlux --help` lists them\n", first);
+  }
+  return exit_usage;
+}
+
+}  // namespace
+}  // namespace lowlux::cli
+
+int main(int argc, char** argv) {
+  try {
+    return lowlux::cli::run({argv + 1, argv + argc});
+  } catch (const std::exception& failure) {  // out of memory, above all
+    std::fprintf(stderr, "lowlux: %s\n", failure.what());
+    return lowlux::cli::exit_failed;
+  }
+}

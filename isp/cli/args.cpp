@@ -1,0 +1,202 @@
+#include "isp/cli/args.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "isp/cli/exit_code.h"
+#include "isp/model/correlated_colour_temperature.h"
+#include "isp/render/output_space.h"
+#include "isp/render/tone.h"
+
+namespace lowlux::cli {
+namespace {
+
+constexpr double max_exposure_ev = 12;  // the tone curve's range
+
+template <class Enum>
+using Names = std::map<std::string, Enum>;
+
+Names<OutputSpace> space_names() {
+  Names<OutputSpace> names;
+  for (const isp::NamedOutputSpace& named : isp::output_spaces) names.emplace(named.name, named.space);
+  return names;
+}
+
+template <class Enum>
+std::string joined(const Names<Enum>& names) {
+  std::string text;
+  for (const auto& [name, value] : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+// An option whose values are names; the message for any other lists them.
+template <class Enum, class Store>
+CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum>& names, Store store,
+                        const std::string& help) {
+  return app
+      .add_option_function<std::string>(
+          flag,
+          [names, store, flag](const std::string& name) {
+            const auto found = names.find(name);
+            if (found == names.end()) {
+              throw CLI::ValidationError(flag, fmt::format("'{}' is none of {}", name, joined(names)));
+            }
+            store(found->second);
+          },
+          fmt::format("{} ({})", help, joined(names)))
+      ->type_name("NAME");
+}
+
+std::optional<double> number_of(const std::string& text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+void set_white_balance(const std::string& text, isp::WhiteBalanceChoice& choice) {
+  using Mode = isp::WhiteBalanceChoice::Mode;
+  if (text == "as-shot") {
+    choice.mode = Mode::as_shot;
+  } else if (text == "auto") {
+    choice.mode = Mode::automatic;
+  } else if (const auto kelvin = number_of(text);
+             kelvin && *kelvin >= isp::white_min_k && *kelvin <= isp::white_max_k) {
+    choice = {Mode::temperature, *kelvin};
+  } else {
+    throw CLI::ValidationError(
+        "--wb", fmt::format("'{}' is neither as-shot nor auto nor a temperature from {:.0f} to {:.0f} K", text,
+                            isp::white_min_k, isp::white_max_k));
+  }
+}
+
+// One figure for all sites or four; nullopt if it is neither.
+std::optional<PerSite<double>> site_figures(const std::string& text) {
+  std::vector<double> figures;
+  for (std::size_t start = 0; start <= text.size();) {
+    const std::size_t end = std::min(text.find(',', start), text.size());
+    const auto figure = number_of(text.substr(start, end - start));
+    if (!figure || figures.size() == 4) return std::nullopt;
+    figures.push_back(*figure);
+    start = end + 1;
+  }
+  if (figures.size() == 1) figures.resize(4, figures.front());
+  if (figures.size() != 4) return std::nullopt;
+  return PerSite<double>{figures[0], figures[1], figures[2], figures[3]};
+}
+
+void set_black(const std::string& text, isp::BlackRequest& request) {
+  static const Names<isp::BlackChoice> names{{"auto", isp::BlackChoice::automatic},
+                                             {"metadata", isp::BlackChoice::metadata},
+                                             {"masked", isp::BlackChoice::masked}};
+  if (const auto named = names.find(text); named != names.end()) {
+    request.choice = named->second;
+  } else if (const auto figures = site_figures(text)) {
+    request = {isp::BlackChoice::given, *figures};
+  } else {
+    throw CLI::ValidationError("--black",
+                               fmt::format("'{}' is neither {} nor one or four figures in DN", text, joined(names)));
+  }
+}
+
+void set_exposure(const std::string& text, DevelopArgs& args) {
+  args.exposure_given = true;
+  if (text == "auto") {
+    args.options.exposure_ev.reset();
+  } else if (const auto ev = number_of(text); ev && std::fabs(*ev) <= max_exposure_ev) {
+    args.options.exposure_ev = *ev;
+  } else {
+    throw CLI::ValidationError("--exposure", fmt::format("'{}' is neither auto nor a number of EV from -{} to {}", text,
+                                                         max_exposure_ev, max_exposure_ev));
+  }
+}
+
+void add_rendering(CLI::App& app, DevelopArgs& args) {
+  isp::DevelopOptions& o = args.options;
+  app.add_option_function<std::string>(
+         "--exposure", [&args](const std::string& text) { set_exposure(text, args); },
+         "gain in EV; auto brings the middle of the picture to mid-grey without lifting the black noise "
+         "(default: auto, in linear spaces 0)")
+      ->type_name("auto|EV");
+  app.add_option_function<std::string>(
+         "--wb", [&o](const std::string& text) { set_white_balance(text, o.white_balance); },
+         "white balance: as the camera chose (default), estimated from the picture, or by colour temperature")
+      ->type_name("as-shot|auto|KELVIN");
+  add_choice<isp::ToneCurve>(
+      app, "--tone", {{"standard", isp::ToneCurve::standard}, {"none", isp::ToneCurve::none}},
+      [&args](isp::ToneCurve tone) { args.tone = tone; }, "tone curve (default: standard, in linear spaces none)");
+  add_choice<OutputSpace>(
+      app, "--space", space_names(), [&args](OutputSpace space) { args.space = space; },
+      "what the numbers mean (default: srgb; linear-srgb for OpenEXR)");
+  app.add_option_function<std::string>(
+         "--black", [&o](const std::string& text) { set_black(text, o.black); },
+         "black point: measured on masked pixels where there are any, else the file's figure (auto, default); one of "
+         "the "
+         "two; or given in DN, for all pixels or for the four sites of the 2x2 cell")
+      ->type_name("auto|metadata|masked|DN[,DN,DN,DN]");
+  add_choice<bool>(
+      app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
+      "hot and dead pixels: look for them (default), or repair only those the file names");
+  app.add_flag("--half", o.half, "half size: exact 2x2 binning in place of demosaicing");
+}
+
+void add_output(CLI::App& app, DevelopArgs& args) {
+  app.add_option("-o,--output", args.output,
+                 "picture to write (.png .jpg .tif .exr), or a folder for several (made if it ends with /)")
+      ->required()
+      ->type_name("OUT");
+  app.add_option("--format", args.format, "format of pictures written to a folder: png (default), jpg, tif or exr")
+      ->check(CLI::IsMember({"png", "jpg", "tif", "exr"}));
+  app.add_option("--bits", args.bits, "bits per sample: 8, 16 or 32 (float; for OpenEXR 16 is half float)")
+      ->check(CLI::IsMember({8, 16, 32}));
+  app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
+  app.add_flag("--force", args.force, "overwrite pictures that exist");
+  app.add_option("--jobs", args.jobs, "files at a time (default: one for each processor)")->check(CLI::Range(1, 256));
+  app.add_flag("--json", args.json, "one JSON object for each file on stdout, as an array");
+  app.add_flag("--timings", args.timings, "time of each stage");
+  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+}
+
+// What CLI11 says, as one line; 0 after help.
+int report(const CLI::App& app, const CLI::ParseError& error) {
+  if (error.get_exit_code() == 0) return app.exit(error);
+  std::string text = error.what();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  fmt::print(stderr, "{}: {}; --help lists the options\n", app.get_name(), text);
+  return exit_usage;
+}
+
+template <class Args>
+Parsed<Args> parse(CLI::App& app, const std::vector<std::string>& words, const Args& args) {
+  try {
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // CLI11 takes them last first
+  } catch (const CLI::ParseError& error) {
+    return report(app, error);
+  }
+  return args;
+}
+
+}  // namespace
+
+Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
+  CLI::App app("Develops raw files to pictures.", "lowlux develop");
+  DevelopArgs args;
+  app.add_option("RAW", args.inputs, "raw files")->required();
+  add_output(app, args);
+  add_rendering(app, args);
+  return parse(app, words, args);
+}
+
+Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
+  CLI::App app("Prints what raw files say, and what was measured on them.", "lowlux info");
+  InfoArgs args;
+  app.add_option("RAW", args.inputs, "raw files")->required();
+  app.add_flag("--json", args.json, "JSON instead of text");
+  return parse(app, words, args);
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "isp/pipeline/plan.h"
+
+namespace lowlux::cli {
+
+/// `develop`: what the command line asks for, checked as far as that is possible without opening a file.
+struct DevelopArgs {
+  std::vector<std::string> inputs;
+  std::string output;                  // a file, or a folder
+  std::string format;                  // extension of files in an output folder, without dot
+  std::optional<int> bits;             // 8, 16 or 32; absent: the format's default
+  std::optional<isp::ToneCurve> tone;  // absent: standard, or none for linear spaces
+  std::optional<OutputSpace> space;    // absent: srgb, or linear-srgb for OpenEXR
+  bool exposure_given = false;
+  isp::DevelopOptions options;  // white balance, black, half, defects, exposure
+  int jpeg_quality = 92;
+  int jobs = 0;  // files at a time; 0: one for each processor
+  bool force = false;
+  bool json = false;
+  bool timings = false;
+  bool quiet = false;
+};
+
+struct InfoArgs {
+  std::vector<std::string> inputs;
+  bool json = false;
+};
+
+/// The parsed arguments; or the exit code, help or error having been printed.
+template <class Args>
+using Parsed = std::variant<Args, int>;
+
+Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& args);
+Parsed<InfoArgs> parse_info(const std::vector<std::string>& args);
+
+}  // namespace lowlux::cli

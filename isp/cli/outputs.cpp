@@ -1,0 +1,87 @@
+#include "isp/cli/outputs.h"
+
+#include <filesystem>
+#include <set>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "isp/render/output_space.h"
+
+namespace lowlux::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using isp::FileFormat;
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code ignored;
+  return fs::equivalent(a, b, ignored);
+}
+
+bool names_folder(const DevelopArgs& args) {
+  std::error_code ignored;
+  return args.output.ends_with('/') || fs::is_directory(args.output, ignored);
+}
+
+int default_bits(FileFormat format, OutputSpace space) {
+  switch (format) {
+    case FileFormat::png:
+    case FileFormat::jpeg:
+      return 8;
+    case FileFormat::tiff:
+      return space == OutputSpace::camera || space == OutputSpace::xyz ? 32 : 16;
+    case FileFormat::exr:
+      break;
+  }
+  return 16;
+}
+
+SampleType sample_type_of(FileFormat format, int bits) {
+  if (format == FileFormat::exr || bits == 32) return SampleType::f32;
+  return bits == 16 ? SampleType::u16 : SampleType::u8;
+}
+
+}  // namespace
+
+Result<std::vector<Job>> plan_outputs(const DevelopArgs& args) {
+  const bool folder = names_folder(args);
+  if (args.inputs.size() > 1 && !folder) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("{} raw files need a folder to go to: '{}/'", args.inputs.size(), args.output), "-o");
+  }
+  std::vector<Job> jobs;
+  std::set<std::string> taken;
+  for (const std::string& input : args.inputs) {
+    std::string output = args.output;
+    if (folder) {
+      const std::string extension = args.format.empty() ? "png" : args.format;
+      output = (fs::path(args.output) / fs::path(input).stem()).string() + "." + extension;
+    }
+    if (!taken.insert(output).second) {
+      return fail(ErrorCode::invalid_argument, fmt::format("two raw files would become {}", output), "-o");
+    }
+    if (same_file(input, output)) {
+      return fail(ErrorCode::invalid_argument, fmt::format("{} would be replaced by its own picture", input), "-o");
+    }
+    jobs.push_back({input, output});
+  }
+  return jobs;
+}
+
+Result<isp::DevelopOptions> complete_options(const DevelopArgs& args, FileFormat format) {
+  isp::DevelopOptions o = args.options;
+  o.space = args.space.value_or(format == FileFormat::exr ? OutputSpace::linear_srgb : OutputSpace::srgb);
+  const int bits = args.bits.value_or(default_bits(format, o.space));
+  if (format == FileFormat::exr && bits == 8)
+    return fail(ErrorCode::invalid_argument, "OpenEXR holds 16 or 32 bits", "--bits");
+  o.samples = sample_type_of(format, bits);
+  if (const auto fits = isp::check_writable(format, o.samples, o.space); !fits)
+    return tl::make_unexpected(fits.error());
+  o.tone = args.tone.value_or(is_linear(o.space) ? isp::ToneCurve::none : isp::ToneCurve::standard);
+  if (!args.exposure_given && is_linear(o.space)) o.exposure_ev = 0;
+  if (const auto fits = isp::check_options(o); !fits) return tl::make_unexpected(fits.error());
+  return o;
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "isp/base/result.h"
+#include "isp/cli/args.h"
+#include "isp/output/image_writer.h"
+
+namespace lowlux::cli {
+
+/// One file to develop and where its picture goes.
+struct Job {
+  std::string input;
+  std::string output;
+};
+
+/// The picture of each input: `output` itself for one, files in it where it is a folder (it exists as one, ends with /
+/// or there are several inputs). Errors (command line wrong): several inputs and no folder, an unknown extension, two
+/// inputs for one picture, a picture that would replace its own raw file.
+Result<std::vector<Job>> plan_outputs(const DevelopArgs& args);
+
+/// Completes space, samples, tone and exposure by what the format of the output can hold. Errors: they do not fit.
+Result<isp::DevelopOptions> complete_options(const DevelopArgs& args, isp::FileFormat format);
+
+}  // namespace lowlux::cli

@@ -1,0 +1,40 @@
+#include "isp/cli/progress.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include <fmt/format.h>
+
+namespace lowlux::cli {
+namespace {
+
+constexpr std::chrono::seconds patience{1};
+constexpr int bar_width = 30;
+
+}  // namespace
+
+Progress::Progress(int total, bool wanted) : total_(total), wanted_(wanted && ::isatty(STDERR_FILENO) == 1) {}
+
+Progress::~Progress() { clear(); }
+
+void Progress::advance(double amount, const std::string& what) {
+  const std::lock_guard lock(mutex_);
+  done_ += amount;
+  if (!wanted_ || std::chrono::steady_clock::now() - start_ < patience) return;
+  const int filled = std::min(bar_width, static_cast<int>(bar_width * done_ / total_));
+  fmt::print(stderr, "\r\033[K[{:<{}}] {:.0f} % {}", std::string(filled, '#'), bar_width, 100 * done_ / total_, what);
+  std::fflush(stderr);
+  shown_ = true;
+}
+
+void Progress::clear() {
+  const std::lock_guard lock(mutex_);
+  if (!shown_) return;
+  fmt::print(stderr, "\r\033[K");
+  std::fflush(stderr);
+  shown_ = false;
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+#include "isp/pipeline/plan.h"
+
+namespace lowlux::cli {
+
+/// What became of one file of `develop`.
+struct DevelopOutcome {
+  std::string input;
+  std::string output;
+  std::optional<Error> error;            // set: nothing was written
+  std::optional<isp::DevelopPlan> plan;  // set without an error
+  int width = 0;                         // of the picture as written, upright
+  int height = 0;
+  std::vector<isp::StageTime> times;  // all stages, in order
+};
+
+/// One JSON object.
+std::string develop_json(const DevelopOutcome& outcome);
+/// Stage times as text, one line for each and their sum.
+std::string timings_text(const DevelopOutcome& outcome);
+
+/// What a raw file says and what was measured on it: text for people, or one JSON object.
+std::string info_text(const std::string& file, const RawFrame& frame);
+std::string info_json(const std::string& file, const RawFrame& frame);
+std::string error_json(const std::string& file, const Error& error);
+
+/// "lowlux: FILE: what is wrong", one line.
+std::string error_line(const std::string& file, const Error& error);
+
+}  // namespace lowlux::cli

@@ -1,0 +1,156 @@
+#include <nlohmann/json.hpp>
+
+#include "isp/cli/report.h"
+#include "isp/model/camera_colour.h"
+#include "isp/model/scene_luminance.h"
+#include "isp/raw/masked_black.h"
+#include "isp/raw/to_linear.h"
+
+namespace lowlux::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Names are bytes on Linux: what is not UTF-8 is replaced, so that the output stays JSON.
+std::string dumped(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
+
+Json rect_json(const Rect& r) { return {{"x", r.x}, {"y", r.y}, {"width", r.width}, {"height", r.height}}; }
+
+template <class T>
+Json optional_json(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+const char* name_of(BlackPoint::Source source) {
+  switch (source) {
+    case BlackPoint::Source::masked_pixels:
+      return "masked-pixels";
+    case BlackPoint::Source::tag:
+      return "tag";
+    case BlackPoint::Source::given:
+      return "given";
+  }
+  return "";
+}
+
+Json black_json(const BlackPoint& black) {
+  return {{"source", name_of(black.source)},
+          {"pedestal_dn", black.pedestal_dn},
+          {"standard_error_dn", black.pedestal_standard_error_dn},
+          {"noise_std_dn", black.noise_std_dn},
+          {"holds_dark", black.holds == BlackPoint::Holds::pedestal_and_dark}};
+}
+
+Json tag_json(const std::optional<BlackLevel>& tag) {
+  if (!tag) return nullptr;
+  return {{"rows", tag->rows},
+          {"columns", tag->columns},
+          {"pattern_dn", tag->pattern_dn},
+          {"column_offsets", tag->column_dn.size()},
+          {"row_offsets", tag->row_dn.size()}};
+}
+
+Json white_json(const isp::DevelopPlan& plan) {
+  Json json{{"rule", plan.white_balance_rule}, {"neutral", plan.neutral}};
+  if (plan.white) {
+    json["cct_k"] = plan.white->cct_k;
+    json["duv"] = plan.white->duv;
+    json["xy"] = {plan.white->xy.x, plan.white->xy.y};
+  }
+  return json;
+}
+
+Json colour_json(const CameraColour& colour) {
+  static constexpr const char* sources[] = {"none", "file-tags", "decoder-table"};
+  Json json{{"source", sources[static_cast<int>(colour.source)]}, {"calibrations", Json::array()}};
+  for (const ColourCalibration& c : colour.calibrations) {
+    json["calibrations"].push_back(
+        {{"cct_k", c.cct_k}, {"xyz_to_camera", c.xyz_to_camera}, {"has_forward_matrix", c.forward.has_value()}});
+  }
+  json["as_shot_neutral"] = optional_json(colour.as_shot_neutral);
+  if (colour.as_shot_neutral) {
+    if (const auto white = isp::white_of_neutral(colour, *colour.as_shot_neutral)) json["as_shot_cct_k"] = white->cct_k;
+  }
+  return json;
+}
+
+const char* name_of(SensorLayout layout) {
+  static constexpr const char* names[] = {"bayer", "monochrome", "linear-rgb"};
+  return names[static_cast<int>(layout)];
+}
+
+Json exposure_json(const FrameInfo& info) {
+  return {{"exposure_s", optional_json(info.exposure_s)},
+          {"iso", optional_json(info.iso)},
+          {"f_number", optional_json(info.f_number)},
+          {"focal_length_mm", optional_json(info.focal_length_mm)},
+          {"temperature_c", optional_json(info.temperature_c)},
+          {"saturation_luminance_cd_m2", optional_json(isp::saturation_luminance_cd_m2(info))}};
+}
+
+}  // namespace
+
+std::string develop_json(const DevelopOutcome& outcome) {
+  if (outcome.error) return error_json(outcome.input, *outcome.error);
+  const isp::DevelopPlan& plan = *outcome.plan;
+  Json json{{"file", outcome.input},
+            {"ok", true},
+            {"output", outcome.output},
+            {"width", outcome.width},
+            {"height", outcome.height},
+            {"black", black_json(plan.black)},
+            {"unit", plan.electrons_at_white ? "electrons" : "fraction-of-white"},
+            {"white_balance", white_json(plan)},
+            {"exposure", {{"ev", plan.exposure_ev}, {"rule", plan.exposure_rule}}},
+            {"defects_repaired", plan.defects.size()},
+            {"warnings", plan.warnings}};
+  for (const isp::StageTime& time : outcome.times) json["timings_s"][std::string(time.stage)] = time.seconds;
+  return dumped(json);
+}
+
+std::string info_json(const std::string& file, const RawFrame& frame) {
+  const RawDn& raw = frame.raw;
+  Json json{
+      {"file", file},
+      {"ok", true},
+      {"make", raw.info.make},
+      {"model", raw.info.model},
+      {"date_time", raw.info.date_time},
+      {"layout", name_of(raw.layout)},
+      {"readout",
+       {{"width", raw.dn.width() / (raw.layout == SensorLayout::linear_rgb ? 3 : 1)}, {"height", raw.dn.height()}}},
+      {"active", rect_json(raw.active)},
+      {"default_crop", rect_json(raw.default_crop)},
+      {"orientation", static_cast<int>(raw.info.orientation)},
+      {"white_dn", raw.white_dn}};
+  if (raw.layout == SensorLayout::bayer) {
+    static constexpr const char* phases[] = {"RGGB", "GRBG", "GBRG", "BGGR"};
+    json["cfa"] = phases[static_cast<int>(raw.phase)];
+  }
+  json["masked"] = Json::array();
+  for (const Rect& r : raw.masked) json["masked"].push_back(rect_json(r));
+  json["masked_is_stated"] = raw.masked_is_stated;
+  const isp::MaskedBlack measured = isp::measure_masked_black(raw);
+  json["black"] = {{"tag", tag_json(raw.black_tag)}};
+  json["black"]["measured"] = measured.black ? black_json(*measured.black) : Json(nullptr);
+  if (measured.black) {
+    json["black"]["region"] = rect_json(measured.region);
+  } else {
+    json["black"]["why_not_measured"] = measured.refusal;
+  }
+  json["noise_profile"] =
+      frame.noise ? Json{{"scale", frame.noise->scale}, {"offset", frame.noise->offset}} : Json(nullptr);
+  json["exposure"] = exposure_json(raw.info);
+  json["colour"] = colour_json(frame.colour);
+  json["corrections"] = {{"gain_maps", frame.corrections.gain_maps.size()},
+                         {"radial_gains", frame.corrections.radial_gains.size()},
+                         {"named_defects", frame.corrections.defects.size()}};
+  json["warnings"] = frame.warnings;
+  return dumped(json);
+}
+
+std::string error_json(const std::string& file, const Error& error) {
+  return dumped(Json{{"file", file}, {"ok", false}, {"error", error.message}, {"where", error.where}});
+}
+
+}  // namespace lowlux::cli

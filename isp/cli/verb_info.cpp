@@ -1,0 +1,36 @@
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "capture/file/dng_source.h"
+#include "isp/cli/args.h"
+#include "isp/cli/exit_code.h"
+#include "isp/cli/report.h"
+#include "isp/cli/verbs.h"
+
+namespace lowlux::cli {
+
+int run_info(const std::vector<std::string>& words) {
+  const Parsed<InfoArgs> parsed = parse_info(words);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& args = std::get<InfoArgs>(parsed);
+
+  int code = exit_done;
+  std::string json;
+  for (const std::string& file : args.inputs) {
+    const Result<RawFrame> frame = capture::read_raw(file);
+    if (!frame) {
+      code = exit_failed;
+      fmt::print(stderr, "{}\n", error_line(file, frame.error()));
+    }
+    if (args.json) {
+      json += (json.empty() ? "" : ",\n") + (frame ? info_json(file, *frame) : error_json(file, frame.error()));
+    } else if (frame) {
+      fmt::print("{}", info_text(file, *frame));
+    }
+  }
+  if (args.json) fmt::print("[{}]\n", json);
+  return code;
+}
+
+}  // namespace lowlux::cli
