@@ -1,0 +1,186 @@
+#include "capture/file/dng_colour.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "capture/file/dng_tags.h"
+#include "capture/file/number_text.h"
+#include "capture/file/pass_on.h"
+
+namespace lowlux::capture {
+namespace {
+
+using Numbers = std::optional<std::vector<double>>;
+
+/// The profile and as-shot tags belong into the first directory; some writers put them beside the raw image.
+const TiffDirectory& directory_with(const DngFile& dng, const TiffDirectory& raw_image, TagName name) {
+  return dng.main.find(name) != nullptr ? dng.main : raw_image;
+}
+
+Result<Numbers> numbers_of(const DngFile& dng, const TiffDirectory& raw_image, TagName name, std::size_t count) {
+  return directory_with(dng, raw_image, name).numbers(name, count, count);
+}
+
+tl::unexpected<Error> bad(TagName name, const std::string& what) {
+  return fail(ErrorCode::malformed, std::string("the tag ") + name.name + " " + what, name.name);
+}
+
+/// A 3x3 matrix with an inverse; nullopt if there is no such tag.
+Result<std::optional<Matrix3>> read_matrix(const DngFile& dng, const TiffDirectory& raw_image, TagName name) {
+  auto values = numbers_of(dng, raw_image, name, 9);
+  if (!values) return pass_on(values);
+  if (!*values) return std::nullopt;
+  Matrix3 matrix{};
+  for (int i = 0; i < 9; ++i) {
+    const double value = (**values)[i];
+    if (!std::isfinite(value)) return bad(name, "holds a value that is not a number");
+    matrix[i / 3][i % 3] = value;
+  }
+  if (!inverse(matrix)) return bad(name, "is a singular matrix");
+  return matrix;
+}
+
+/// Three positive numbers; nullopt if there is no such tag.
+Result<std::optional<Vector3>> read_positive(const DngFile& dng, const TiffDirectory& raw_image, TagName name) {
+  auto values = numbers_of(dng, raw_image, name, 3);
+  if (!values) return pass_on(values);
+  if (!*values) return std::nullopt;
+  Vector3 out{};
+  for (int i = 0; i < 3; ++i) {
+    out[i] = (**values)[i];
+    if (!std::isfinite(out[i]) || out[i] <= 0)
+      return bad(name, "holds " + number_text(out[i]) + ", expected numbers above 0");
+  }
+  return out;
+}
+
+/// Calibration `index` (0 or 1); nullopt if the file has no colour matrix for it.
+Result<std::optional<ColourCalibration>> read_calibration(const DngFile& dng, const TiffDirectory& raw_image,
+                                                          int index) {
+  auto colour = read_matrix(dng, raw_image, tag::color_matrix[index]);
+  if (!colour) return pass_on(colour);
+  if (!*colour) return std::nullopt;
+  auto calibration = read_matrix(dng, raw_image, tag::camera_calibration[index]);
+  if (!calibration) return pass_on(calibration);
+  auto forward = read_matrix(dng, raw_image, tag::forward_matrix[index]);
+  if (!forward) return pass_on(forward);
+  const TagName light = tag::calibration_illuminant[index];
+  auto illuminant = directory_with(dng, raw_image, light).whole(light);
+  if (!illuminant) return pass_on(illuminant);
+  ColourCalibration out;
+  out.xyz_to_camera = **colour;
+  out.camera_calibration = calibration->value_or(identity3());
+  out.forward = *forward;
+  out.cct_k = illuminant_cct_k(illuminant->value_or(0));
+  return out;
+}
+
+Result<void> read_white(const DngFile& dng, const TiffDirectory& raw_image, CameraColour& colour) {
+  auto neutral = read_positive(dng, raw_image, tag::as_shot_neutral);
+  if (!neutral) return pass_on(neutral);
+  if (*neutral) {
+    const Vector3& n = **neutral;
+    const double top = std::max({n[0], n[1], n[2]});
+    colour.as_shot_neutral = Vector3{n[0] / top, n[1] / top, n[2] / top};
+  }
+  auto xy = numbers_of(dng, raw_image, tag::as_shot_white_xy, 2);
+  if (!xy) return pass_on(xy);
+  if (*xy) {
+    const double x = (**xy)[0], y = (**xy)[1];
+    if (!(x > 0 && y > 0 && x + y < 1)) {
+      return bad(tag::as_shot_white_xy,
+                 "holds " + number_text(x) + ", " + number_text(y) + ", which is no chromaticity");
+    }
+    colour.as_shot_white_xy = {x, y};
+  }
+  return {};
+}
+
+}  // namespace
+
+double illuminant_cct_k(std::uint32_t light_source) {
+  // CIE 15: A 2856, B 4874, C 6774, D50 5003, D55 5503, D65 6504, D75 7504 K. Fluorescent lamps: the middle of the
+  // range EXIF gives for each. The words "daylight", "cloudy" and "shade" are taken as D55, D65 and D75.
+  switch (light_source) {
+    case 1:   // daylight
+    case 4:   // flash
+    case 9:   // fine weather
+    case 20:  // D55
+      return 5503;
+    case 2:  // fluorescent: cool white, CIE F2
+      return 4230;
+    case 3:   // tungsten
+    case 17:  // standard light A
+      return 2856;
+    case 10:  // cloudy
+    case 21:  // D65
+      return 6504;
+    case 11:  // shade
+    case 22:  // D75
+      return 7504;
+    case 12:  // daylight fluorescent, 5700 to 7100 K
+      return 6400;
+    case 13:  // day white fluorescent, 4600 to 5500 K
+      return 5050;
+    case 14:  // cool white fluorescent, 3800 to 4500 K
+      return 4150;
+    case 15:  // white fluorescent, 3250 to 3800 K
+      return 3525;
+    case 16:  // warm white fluorescent, 2600 to 3250 K
+      return 2925;
+    case 18:
+      return 4874;
+    case 19:
+      return 6774;
+    case 23:
+      return 5003;
+    case 24:  // ISO studio tungsten
+      return 3200;
+    default:
+      return 0;
+  }
+}
+
+Result<CameraColour> read_colour(const DngFile& dng, const TiffDirectory& raw_image,
+                                 std::vector<std::string>& warnings) {
+  CameraColour colour;
+  for (int i = 0; i < 2; ++i) {
+    auto calibration = read_calibration(dng, raw_image, i);
+    if (!calibration) return pass_on(calibration);
+    if (*calibration) colour.calibrations.push_back(**std::move(calibration));
+  }
+  std::stable_sort(colour.calibrations.begin(), colour.calibrations.end(),
+                   [](const auto& a, const auto& b) { return a.cct_k < b.cct_k; });
+  if (!colour.calibrations.empty()) colour.source = CameraColour::Source::file_tags;
+  auto balance = read_positive(dng, raw_image, tag::analog_balance);
+  if (!balance) return pass_on(balance);
+  colour.analog_balance = balance->value_or(Vector3{1, 1, 1});
+  if (auto white = read_white(dng, raw_image, colour); !white) return pass_on(white);
+  if (dng.main.find(tag::color_matrix_3) != nullptr) warnings.emplace_back("ColorMatrix3 is not used");
+  return colour;
+}
+
+Result<std::optional<NoiseProfile>> read_noise(const DngFile& dng, const TiffDirectory& raw_image, int planes) {
+  const TagName name = tag::noise_profile;
+  const TiffDirectory& directory = raw_image.find(name) != nullptr ? raw_image : dng.main;
+  auto values = directory.numbers(name, 2, 8);
+  if (!values) return pass_on(values);
+  if (!*values) return std::nullopt;
+  const std::vector<double>& pairs = **values;
+  if (pairs.size() != 2 && pairs.size() < 2 * static_cast<std::size_t>(planes)) {
+    return bad(name, "has " + std::to_string(pairs.size()) + " values, expected 2 or two for each colour");
+  }
+  NoiseProfile noise;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t at = pairs.size() == 2 || planes == 1 ? 0 : 2 * i;
+    if (!std::isfinite(pairs[at]) || !std::isfinite(pairs[at + 1]) || pairs[at] < 0) {
+      return bad(name, "holds a value that is no variance");
+    }
+    noise.scale[i] = pairs[at];
+    noise.offset[i] = pairs[at + 1];
+  }
+  return noise;
+}
+
+}  // namespace lowlux::capture

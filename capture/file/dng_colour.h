@@ -1,0 +1,25 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "capture/file/dng_file.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+
+namespace lowlux::capture {
+
+/// Colour calibrations and the as-shot white of a DNG; tags of the first directory before those of the raw image.
+/// A matrix or white with a value that is not a number, or without an inverse, is an error that names its tag.
+Result<CameraColour> read_colour(const DngFile& dng, const TiffDirectory& raw_image,
+                                 std::vector<std::string>& warnings);
+
+/// nullopt if the file states none. `planes` is 3, or 1 for monochrome.
+Result<std::optional<NoiseProfile>> read_noise(const DngFile& dng, const TiffDirectory& raw_image, int planes);
+
+/// Correlated colour temperature [K] of an EXIF LightSource code (EXIF 2.31, 4.6.5, tag 37384), which DNG's
+/// CalibrationIlluminant uses; 0 for codes without one.
+double illuminant_cct_k(std::uint32_t light_source);
+
+}  // namespace lowlux::capture

@@ -1,0 +1,87 @@
+#include "capture/file/dng_file.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "capture/file/dng_tags.h"
+#include "capture/file/pass_on.h"
+
+namespace lowlux::capture {
+namespace {
+
+constexpr std::size_t max_directories = 64;
+
+/// A tag's whole number, or `otherwise` where the file has no such tag.
+Result<std::uint32_t> whole_or(const TiffDirectory& directory, TagName name, std::uint32_t otherwise) {
+  return directory.whole(name).map([otherwise](auto found) { return found.value_or(otherwise); });
+}
+
+bool is_full_raw(const TiffDirectory& directory) {
+  const auto kind = whole_or(directory, tag::new_subfile_type, 0);
+  const auto photometric = whole_or(directory, tag::photometric, 0);
+  return kind && *kind == 0 && photometric &&
+         (*photometric == tag::photometric_cfa || *photometric == tag::photometric_linear_raw);
+}
+
+double area_of(const TiffDirectory& directory) {
+  const auto width = whole_or(directory, tag::image_width, 0), height = whole_or(directory, tag::image_length, 0);
+  return width && height ? static_cast<double>(*width) * *height : 0.0;
+}
+
+/// Offsets of the directories right below one, and of the one that follows it.
+std::vector<std::uint32_t> neighbours(const TiffDirectory& directory) {
+  std::vector<std::uint32_t> offsets;
+  if (const auto below = directory.numbers(tag::sub_ifds, 1, max_directories); below && *below) {
+    for (const double offset : **below) {
+      if (offset > 0 && offset <= 4294967295.0) offsets.push_back(static_cast<std::uint32_t>(offset));
+    }
+  }
+  if (directory.next != 0) offsets.push_back(directory.next);
+  return offsets;
+}
+
+/// All directories, the first one first; damaged ones that nothing else needs are left out.
+std::vector<TiffDirectory> all_directories(const TiffFile& tiff, TiffDirectory first) {
+  std::vector<TiffDirectory> found;
+  std::set<std::uint32_t> seen{tiff.first_directory()};
+  std::vector<std::uint32_t> pending = neighbours(first);
+  found.push_back(std::move(first));
+  while (!pending.empty() && found.size() < max_directories) {
+    const std::uint32_t offset = pending.front();
+    pending.erase(pending.begin());
+    if (!seen.insert(offset).second) continue;
+    auto directory = tiff.directory(offset);
+    if (!directory) continue;
+    const auto more = neighbours(*directory);
+    pending.insert(pending.end(), more.begin(), more.end());
+    found.push_back(*std::move(directory));
+  }
+  return found;
+}
+
+}  // namespace
+
+Result<std::optional<DngFile>> open_dng(std::span<const std::byte> bytes) {
+  const auto tiff = TiffFile::open(bytes);
+  if (!tiff) return std::nullopt;
+  auto first = tiff->directory(tiff->first_directory());
+  if (!first) return pass_on(first);
+  if (first->find(tag::dng_version) == nullptr) return std::nullopt;
+
+  DngFile dng;
+  dng.main = *first;
+  for (TiffDirectory& directory : all_directories(*tiff, *std::move(first))) {
+    if (is_full_raw(directory)) dng.raw_images.push_back(std::move(directory));
+  }
+  if (dng.raw_images.empty())
+    return fail(ErrorCode::unsupported, "this DNG holds no raw image, only rendered pictures");
+  std::stable_sort(dng.raw_images.begin(), dng.raw_images.end(),
+                   [](const auto& a, const auto& b) { return area_of(a) > area_of(b); });
+  if (const auto exif = dng.main.whole(tag::exif_ifd); exif && *exif) {
+    if (auto directory = tiff->directory(**exif)) dng.exif = *std::move(directory);
+  }
+  return dng;
+}
+
+}  // namespace lowlux::capture

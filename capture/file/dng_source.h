@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "capture/file/read_limits.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+
+namespace lowlux::capture {
+
+/// Reads a raw file: a DNG, or any other raw that LibRaw decodes. What the file does not tell stays absent.
+/// LibRaw runs in a process of its own, so a file that crashes it or keeps it busy is an Error here.
+Result<RawFrame> read_raw(const std::filesystem::path& file, const ReadLimits& limits = {});
+
+/// The same from the bytes of a file; `name` is what errors call it.
+Result<RawFrame> read_raw(std::span<const std::byte> bytes, const std::string& name, const ReadLimits& limits = {});
+
+}  // namespace lowlux::capture

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "capture/file/decoder_process.h"
+
+namespace lowlux::capture {
+
+/// Decodes the mosaic of a raw file with LibRaw: unpacking only, none of its processing. A DecodeFunction.
+void decode_with_libraw(std::span<const std::byte> file, const ReadLimits& limits, DecodeSink& sink);
+
+/// "LibRaw 0.20.2": for messages.
+std::string decoder_name();
+
+}  // namespace lowlux::capture

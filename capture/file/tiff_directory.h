@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isp/base/result.h"
+
+namespace lowlux::capture {
+
+/// A tag by number and by the name it has in its specification (TIFF 6.0, DNG 1.4, EXIF 2.31).
+struct TagName {
+  std::uint16_t id;
+  const char* name;
+};
+
+/// One entry of a TIFF directory. Its values stay where they are, in the bytes of the file.
+class TiffEntry {
+ public:
+  enum class Type : std::uint16_t {
+    byte = 1,
+    ascii,
+    u16,
+    u32,
+    rational,
+    sbyte,
+    undefined,
+    s16,
+    s32,
+    srational,
+    f32,
+    f64,
+    ifd
+  };
+
+  std::uint16_t id = 0;
+  Type type = Type::byte;
+  std::uint32_t count = 0;
+  bool big_endian = false;
+  bool inside_file = false;  // false: `values` is empty because the entry points outside of the file
+  std::span<const std::byte> values;
+
+  /// Whether the values are numbers that can be read.
+  bool is_numeric() const;
+  /// Value i, whatever the numeric type; a rational n/0 is infinite, and 0/0 is NaN.
+  /// Precondition: i < count, is_numeric().
+  double number(std::size_t i) const;
+  /// Text up to the first NUL, without what is not printable ASCII and without blanks around it.
+  std::string text() const;
+};
+
+/// A directory of a TIFF file.
+class TiffDirectory {
+ public:
+  std::vector<TiffEntry> entries;
+  std::uint32_t next = 0;  // offset of the next directory; 0: none
+
+  /// nullptr if there is no such tag.
+  const TiffEntry* find(TagName tag) const;
+
+  /// The values of a tag; nullopt if there is no such tag. Fails if they lie outside of the file, or are not
+  /// numbers, or if their count is not within the limits, which are checked before memory is taken.
+  Result<std::optional<std::vector<double>>> numbers(TagName tag, std::size_t min_count, std::size_t max_count) const;
+  /// The first value of a tag that must be a whole number from 0 to 2^32 - 1; nullopt if there is no such tag.
+  Result<std::optional<std::uint32_t>> whole(TagName tag) const;
+  /// Empty if there is no such tag.
+  std::string text(TagName tag) const;
+  /// Bytes of a tag of any type; empty if there is no such tag. Fails if they lie outside of the file.
+  Result<std::span<const std::byte>> bytes(TagName tag) const;
+};
+
+/// The directories of a TIFF file held in memory. Nothing is copied: `bytes` must outlive it and all it returns.
+class TiffFile {
+ public:
+  /// nullopt if the bytes do not begin as a classic (32-bit) TIFF.
+  static std::optional<TiffFile> open(std::span<const std::byte> bytes);
+
+  std::uint32_t first_directory() const { return first_directory_; }
+  /// The directory at an offset; fails if it does not lie inside the file.
+  Result<TiffDirectory> directory(std::uint32_t offset) const;
+
+ private:
+  TiffFile(std::span<const std::byte> bytes, bool big_endian, std::uint32_t first)
+      : bytes_(bytes), big_endian_(big_endian), first_directory_(first) {}
+
+  std::span<const std::byte> bytes_;
+  bool big_endian_;
+  std::uint32_t first_directory_;
+};
+
+/// Unsigned and floating-point numbers in a stated byte order. Precondition: enough bytes.
+std::uint16_t load_u16(const std::byte* at, bool big_endian);
+std::uint32_t load_u32(const std::byte* at, bool big_endian);
+float load_f32(const std::byte* at, bool big_endian);
+double load_f64(const std::byte* at, bool big_endian);
+
+}  // namespace lowlux::capture

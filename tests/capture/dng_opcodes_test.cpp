@@ -1,0 +1,252 @@
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <utility>
+
+#include "tests/capture/read_built.h"
+
+namespace lowlux::test {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+struct Opcode {
+  std::uint32_t id;
+  Bytes parameters;
+};
+
+/// An opcode list as DNG 1.4 chapter 7 lays it out, always big-endian.
+Tag opcode_list(const std::vector<Opcode>& opcodes) {
+  Bytes out;
+  append_u32(out, static_cast<std::uint32_t>(opcodes.size()));
+  for (const Opcode& opcode : opcodes) {
+    append_u32(out, opcode.id);
+    append_u32(out, 0x01030000);
+    append_u32(out, 1);
+    append_u32(out, static_cast<std::uint32_t>(opcode.parameters.size()));
+    out.insert(out.end(), opcode.parameters.begin(), opcode.parameters.end());
+  }
+  return Tag::opaque(out);
+}
+
+struct MapFields {
+  std::uint32_t top = 0, left = 0, bottom = 24, right = 24, plane = 0, planes = 1, row_pitch = 2, column_pitch = 2;
+  std::uint32_t points_v = 2, points_h = 3;
+  double spacing_v = 1.0, spacing_h = 0.5, origin_v = 0.0, origin_h = 0.0;
+  std::uint32_t map_planes = 1;
+  std::vector<float> gain = {1, 1.5F, 2, 2.5F, 3, 3.5F};
+};
+
+Opcode gain_map(const MapFields& m) {
+  Bytes out;
+  for (const std::uint32_t field :
+       {m.top, m.left, m.bottom, m.right, m.plane, m.planes, m.row_pitch, m.column_pitch, m.points_v, m.points_h}) {
+    append_u32(out, field);
+  }
+  for (const double field : {m.spacing_v, m.spacing_h, m.origin_v, m.origin_h}) append_f64(out, field);
+  append_u32(out, m.map_planes);
+  for (const float gain : m.gain) append_f32(out, gain);
+  return {9, out};
+}
+
+Opcode words(std::uint32_t id, const std::vector<std::uint32_t>& values) {
+  Bytes out;
+  for (const std::uint32_t value : values) append_u32(out, value);
+  return {id, out};
+}
+
+Opcode vignette(const std::vector<double>& values) {
+  Bytes out;
+  for (const double value : values) append_f64(out, value);
+  return {3, out};
+}
+
+DngBuilder with(std::uint16_t list_tag, const std::vector<Opcode>& opcodes) {
+  DngBuilder dng;
+  dng.set(list_tag, opcode_list(opcodes));
+  return dng;
+}
+
+constexpr std::uint16_t list1 = 51008, list2 = 51009, list3 = 51022;
+
+TEST(DngOpcodes, AGainMapKeepsEveryField) {
+  MapFields fields;
+  fields.top = 1, fields.left = 0, fields.bottom = 23, fields.right = 100;
+  fields.origin_v = 0.25;
+  const RawFrame frame = read_built(with(list2, {gain_map(fields)}));
+  ASSERT_EQ(frame.corrections.gain_maps.size(), 1u);
+  const GainMap& map = frame.corrections.gain_maps[0];
+  EXPECT_EQ(map.top, 1);
+  EXPECT_EQ(map.left, 0);
+  EXPECT_EQ(map.bottom, 23);
+  EXPECT_EQ(map.right, 24) << "cut to the active area";
+  EXPECT_EQ(map.row_pitch, 2);
+  EXPECT_EQ(map.column_pitch, 2);
+  EXPECT_EQ(map.points_v, 2);
+  EXPECT_EQ(map.points_h, 3);
+  EXPECT_EQ(map.spacing_v, 1.0);
+  EXPECT_EQ(map.spacing_h, 0.5);
+  EXPECT_EQ(map.origin_v, 0.25);
+  EXPECT_EQ(map.gain, fields.gain);
+  EXPECT_TRUE(frame.warnings.empty());
+}
+
+TEST(DngOpcodes, AMapOfDemosaicedDataForAllColoursIsKeptWhole) {
+  MapFields fields;
+  fields.planes = 3, fields.row_pitch = fields.column_pitch = 1;
+  const RawFrame frame = read_built(with(list3, {gain_map(fields)}));
+  ASSERT_EQ(frame.corrections.gain_maps.size(), 1u);
+  EXPECT_EQ(frame.corrections.gain_maps[0].row_pitch, 1);
+  EXPECT_EQ(frame.corrections.gain_maps[0].gain, fields.gain);
+}
+
+TEST(DngOpcodes, AMapOfDemosaicedDataPerColourBecomesOneForEachSite) {
+  MapFields fields;
+  fields.planes = 3, fields.row_pitch = fields.column_pitch = 1, fields.map_planes = 3;
+  fields.points_v = fields.points_h = 1;
+  fields.gain = {1.25F, 1.5F, 1.75F};  // R, G, B
+  fields.top = 3;
+  DngBuilder dng = with(list3, {gain_map(fields)});
+  dng.phase = BayerPhase::grbg;
+  const RawFrame frame = read_built(dng);
+  ASSERT_EQ(frame.corrections.gain_maps.size(), 4u);
+  for (const GainMap& map : frame.corrections.gain_maps) {
+    EXPECT_EQ(map.row_pitch, 2);
+    EXPECT_EQ(map.column_pitch, 2);
+    EXPECT_GE(map.top, 3);
+    EXPECT_LE(map.top, 4);
+    const auto colour = static_cast<std::size_t>(colour_at(BayerPhase::grbg, map.left, map.top));
+    EXPECT_EQ(map.gain, std::vector<float>{fields.gain[colour]});
+  }
+}
+
+TEST(DngOpcodes, AMapForOneColourOfDemosaicedDataTouchesItsSitesOnly) {
+  MapFields fields;
+  fields.plane = 2, fields.planes = 1, fields.row_pitch = fields.column_pitch = 1;
+  const RawFrame frame = read_built(with(list3, {gain_map(fields)}));
+  ASSERT_EQ(frame.corrections.gain_maps.size(), 1u);
+  EXPECT_EQ(frame.corrections.gain_maps[0].top, 1);
+  EXPECT_EQ(frame.corrections.gain_maps[0].left, 1);
+}
+
+TEST(DngOpcodes, AVignetteIsKept) {
+  const RawFrame frame = read_built(with(list3, {vignette({0.1, 0.2, 0.3, 0.4, 0.5, 0.45, 0.55})}));
+  ASSERT_EQ(frame.corrections.radial_gains.size(), 1u);
+  const RadialGain& radial = frame.corrections.radial_gains[0];
+  EXPECT_EQ(radial.k[0], 0.1);
+  EXPECT_EQ(radial.k[4], 0.5);
+  EXPECT_EQ(radial.centre_x, 0.45);
+  EXPECT_EQ(radial.centre_y, 0.55);
+}
+
+TEST(DngOpcodes, DefectListsCountFromTheReadoutInList1AndFromTheActiveAreaInList2) {
+  // Phase, one point (row 7, column 9), one rectangle (top 4, left 5, bottom 6, right 8).
+  const Opcode defects = words(5, {0, 1, 1, 7, 9, 4, 5, 6, 8});
+  for (const std::uint16_t list : {list1, list2}) {
+    DngBuilder dng = with(list, {defects});
+    dng.width = dng.height = 40;
+    dng.set(50829, Tag::numbers(TagType::u32, {5, 4, 40, 40}));
+    const auto found = read_built(dng).corrections.defects;
+    ASSERT_EQ(found.size(), 2u);
+    const int dx = list == list1 ? 4 : 0, dy = list == list1 ? 5 : 0;
+    EXPECT_EQ(found[0].x, 9 - dx);
+    EXPECT_EQ(found[0].y, 7 - dy);
+    EXPECT_EQ(found[0].width * found[0].height, 1);
+    EXPECT_EQ(found[1].x, 5 - dx);
+    EXPECT_EQ(found[1].y, list == list1 ? 0 : 4) << "the row outside of the active area is cut off";
+    EXPECT_EQ(found[1].width, 3);
+    EXPECT_EQ(found[1].height, list == list1 ? 1 : 2);
+  }
+}
+
+TEST(DngOpcodes, DefectsOutsideOfTheActiveAreaAreLeftOut) {
+  const RawFrame frame = read_built(with(list2, {words(5, {0, 2, 0, 24, 0, 4294967295U, 4294967295U})}));
+  EXPECT_TRUE(frame.corrections.defects.empty());
+}
+
+TEST(DngOpcodes, PixelsOfTheConstantAreFoundInTheReadout) {
+  DngBuilder dng = with(list1, {words(4, {777, 0})});
+  dng.width = dng.height = 30;
+  dng.pixels = std::vector<std::uint16_t>(900, 500);
+  dng.pixels[10 * 30 + 7] = 777;
+  dng.pixels[0] = 777;  // outside of the active area
+  dng.set(50829, Tag::numbers(TagType::u32, {2, 3, 30, 30}));
+  const auto found = read_built(dng).corrections.defects;
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].x, 4);
+  EXPECT_EQ(found[0].y, 8);
+}
+
+TEST(DngOpcodes, AConstantBeforeALinearizationTableIsNotSearchedAfterIt) {
+  DngBuilder dng = with(list1, {words(4, {3, 0})});
+  dng.bits = 8;
+  std::vector<double> table(256);
+  for (int i = 0; i < 256; ++i) table[i] = i * 4;
+  dng.set(50712, Tag::numbers(TagType::u16, table));
+  dng.set(50717, Tag::numbers(TagType::u16, {1020}));
+  const RawFrame frame = read_built(dng);
+  EXPECT_TRUE(frame.corrections.defects.empty());
+  ASSERT_EQ(frame.warnings.size(), 1u);
+  EXPECT_NE(frame.warnings[0].find("FixBadPixelsConstant (OpcodeList1) is not applied"), std::string::npos);
+}
+
+TEST(DngOpcodes, WhatIsNotAppliedIsNamed) {
+  DngBuilder dng = with(list3, {words(1, std::vector<std::uint32_t>(14, 0)), words(2, {}), words(99, {1, 2})});
+  dng.set(list2, opcode_list({words(6, {0, 0, 24, 24}), words(7, {}), words(8, {}), words(10, {}), words(13, {})}));
+  dng.set(list1, opcode_list({gain_map({})}));
+  const std::vector<std::string> expected = {
+      "GainMap (OpcodeList1) is not applied: it is meant for values that still hold the black level",
+      "TrimBounds (OpcodeList2) is not applied",
+      "MapTable (OpcodeList2) is not applied",
+      "MapPolynomial (OpcodeList2) is not applied",
+      "DeltaPerRow (OpcodeList2) is not applied",
+      "ScalePerColumn (OpcodeList2) is not applied",
+      "WarpRectilinear (OpcodeList3) is not applied",
+      "WarpFisheye (OpcodeList3) is not applied",
+      "opcode 99 (OpcodeList3) is not applied"};
+  EXPECT_EQ(read_built(dng).warnings, expected);
+}
+
+TEST(DngOpcodes, ListsThatClaimMoreThanTheyHoldAreRefused) {
+  Bytes claims;
+  append_u32(claims, 0xFFFFFFFF);
+  DngBuilder count;
+  count.set(list2, Tag::opaque(claims));
+  EXPECT_TRUE(has(refused(count), "OpcodeList2 is damaged"));
+
+  Bytes longer;
+  for (const std::uint32_t word : {1U, 9U, 0U, 0U, 0xFFFFFFF0U, 1U}) append_u32(longer, word);
+  DngBuilder size;
+  size.set(list2, Tag::opaque(longer));
+  EXPECT_TRUE(has(refused(size), "OpcodeList2 is damaged"));
+
+  MapFields points;
+  points.points_v = points.points_h = 0x7FFFFFFF;
+  EXPECT_TRUE(has(refused(with(list2, {gain_map(points)})), "GainMap (OpcodeList2) is damaged"));
+  EXPECT_TRUE(has(refused(with(list1, {words(5, {0, 0xFFFFFFFF, 0xFFFFFFFF, 1, 1})})), "FixBadPixelsList"));
+  EXPECT_TRUE(has(refused(with(list3, {vignette({0, 0, 0})})), "FixVignetteRadial"));
+  EXPECT_TRUE(has(refused(with(list1, {words(4, {})})), "FixBadPixelsConstant"));
+}
+
+TEST(DngOpcodes, MapsThatCannotBeEvaluatedAreRefused) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  MapFields gain;
+  gain.gain[2] = nan;
+  MapFields pitch;
+  pitch.row_pitch = 0;
+  MapFields empty;
+  empty.points_h = 0;
+  MapFields spacing;
+  spacing.spacing_h = 0;
+  MapFields origin;
+  origin.origin_v = std::numeric_limits<double>::infinity();
+  MapFields negative;
+  negative.gain[0] = -1;
+  for (const MapFields& fields : {gain, pitch, empty, spacing, origin, negative}) {
+    EXPECT_TRUE(has(refused(with(list2, {gain_map(fields)})), "GainMap (OpcodeList2) is damaged"));
+  }
+  EXPECT_TRUE(has(refused(with(list2, {vignette({nan, 0, 0, 0, 0, 0.5, 0.5})})), "FixVignetteRadial"));
+}
+
+}  // namespace
+}  // namespace lowlux::test

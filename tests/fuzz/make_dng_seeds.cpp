@@ -1,0 +1,102 @@
+// Writes small files that together use every part of the reader: the corpus its fuzzers start from.
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "tests/support/dng_builder.h"
+
+namespace lowlux::test {
+namespace {
+
+std::vector<std::byte> opcodes() {
+  std::vector<std::byte> out;
+  const auto words = [&out](const std::vector<std::uint32_t>& values) {
+    for (const std::uint32_t value : values) append_u32(out, value);
+  };
+  words({4});
+  words({9, 0x01030000, 0, 76 + 4 * 4, 0, 0, 24, 24, 0, 1, 2, 2, 2, 2});  // GainMap of 2 x 2 points
+  for (const double value : {1.0, 1.0, 0.0, 0.0}) append_f64(out, value);
+  words({1});
+  for (int i = 0; i < 4; ++i) append_f32(out, 1.0F + 0.1F * static_cast<float>(i));
+  words({3, 0x01030000, 0, 56});  // FixVignetteRadial
+  for (const double value : {0.1, 0.0, 0.0, 0.0, 0.0, 0.5, 0.5}) append_f64(out, value);
+  words({5, 0x01030000, 0, 36, 0, 1, 1, 3, 4, 5, 6, 7, 8});  // FixBadPixelsList
+  words({4, 0x01030000, 0, 8, 0, 0});                        // FixBadPixelsConstant
+  return out;
+}
+
+DngBuilder plain(int bits) {
+  DngBuilder dng;
+  dng.bits = bits;
+  return dng;
+}
+
+DngBuilder everything() {
+  DngBuilder dng = plain(12);
+  dng.width = 32, dng.height = 28;
+  dng.raw_in_sub_ifd = true;
+  dng.set(50829, Tag::numbers(TagType::u32, {2, 3, 27, 31}));
+  dng.set(50830, Tag::numbers(TagType::u32, {2, 0, 27, 3}));
+  dng.set(50719, Tag::numbers(TagType::u32, {1, 1}));
+  dng.set(50720, Tag::numbers(TagType::u32, {26, 22}));
+  dng.set(50713, Tag::numbers(TagType::u16, {2, 2}));
+  dng.set(50714, Tag::numbers(TagType::rational, {64, 65.5, 66, 67}));
+  dng.set(50715, Tag::numbers(TagType::srational, std::vector<double>(28, 0.5)));
+  dng.set(50716, Tag::numbers(TagType::srational, std::vector<double>(25, -0.5)));
+  dng.set(50722, Tag::numbers(TagType::srational, {0.9, -0.3, -0.1, -0.5, 1.3, 0.2, -0.1, 0.2, 0.6}));
+  dng.set(50723, Tag::numbers(TagType::srational, {1, 0, 0, 0, 1, 0, 0, 0, 1}));
+  dng.set(50727, Tag::numbers(TagType::rational, {1, 1, 1}));
+  dng.set(50729, Tag::numbers(TagType::rational, {0.31, 0.33}));
+  dng.set(50779, Tag::numbers(TagType::u16, {17}));
+  dng.set(50964, Tag::numbers(TagType::srational, {0.6, 0.2, 0.16, 0.25, 0.7, 0.05, 0.01, 0.1, 0.71}));
+  dng.set(51041, Tag::numbers(TagType::f64, {1e-4, 1e-7}));
+  for (const std::uint16_t list : {51008, 51009, 51022}) dng.set(list, Tag::opaque(opcodes()));
+  dng.set(33434, Tag::rationals(TagType::rational, {{1, 30}}));
+  dng.set(34855, Tag::numbers(TagType::u16, {3200}));
+  dng.set(36867, Tag::text("2024:12:24 23:59:01"));
+  return dng;
+}
+
+std::vector<std::pair<std::string, DngBuilder>> seeds() {
+  std::vector<std::pair<std::string, DngBuilder>> all;
+  for (const int bits : {8, 10, 16}) all.emplace_back("plain" + std::to_string(bits), plain(bits));
+  all.emplace_back("everything", everything());
+  DngBuilder jpeg = plain(14);
+  jpeg.storage = DngStorage::lossless_jpeg;
+  all.emplace_back("jpeg", jpeg);
+  DngBuilder tiles = jpeg;
+  tiles.storage = DngStorage::tiled_lossless_jpeg;
+  all.emplace_back("tiles", tiles);
+  DngBuilder rgb = plain(8);
+  rgb.samples = 3;
+  all.emplace_back("rgb", rgb);
+  DngBuilder mono = plain(12);
+  mono.monochrome = mono.big_endian = true;
+  all.emplace_back("mono", mono);
+  DngBuilder table = plain(8);
+  std::vector<double> values(256);
+  for (int i = 0; i < 256; ++i) values[i] = i * 200;
+  table.set(50712, Tag::numbers(TagType::u16, values));
+  table.set(50717, Tag::numbers(TagType::u16, {51000}));
+  all.emplace_back("table", table);
+  return all;
+}
+
+}  // namespace
+}  // namespace lowlux::test
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fputs("usage: make_dng_seeds FOLDER\n", stderr);
+    return 2;
+  }
+  for (const auto& [name, dng] : lowlux::test::seeds()) {
+    const std::vector<std::byte> bytes = dng.build();
+    std::ofstream file(std::filesystem::path(argv[1]) / (name + ".dng"), std::ios::binary);
+    file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    if (!file) return 1;
+  }
+  return 0;
+}
