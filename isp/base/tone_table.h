@@ -18,7 +18,8 @@ struct ToneTable {
   int shift = 0;
   int bins = 0;                                // in use; the bin of v = 1 is the last
   std::array<std::int32_t, capacity> code8{};  // 0..255, at the middle of each bin
-  std::array<float, capacity + 1> edge{};      // 0..1, at the lower edge of each bin and the upper edge of the last
+  std::array<float, capacity + 1> edge{};      // 0..1, at the lower edge of each bin; the upper edge of the
+                                               // last may lie above, so that the line through it meets 1 at v = 1
 
   std::uint32_t base_bits() const { return std::bit_cast<std::uint32_t>(offset); }
   int bin_of(float v) const {

@@ -36,7 +36,7 @@ struct InfoArgs {
 template <class Args>
 using Parsed = std::variant<Args, int>;
 
-Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& args);
-Parsed<InfoArgs> parse_info(const std::vector<std::string>& args);
+Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words);
+Parsed<InfoArgs> parse_info(const std::vector<std::string>& words);
 
 }  // namespace lowlux::cli

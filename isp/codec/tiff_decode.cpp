@@ -135,12 +135,12 @@ struct Run {
 template <class Code>
 void put(Encoded<Code>& picture, const Run& run, const Code* in, int step) {
   Code* out = picture.codes.row(run.y) + std::ptrdiff_t{3} * run.x + run.colour;
-  for (int i = 0; i < run.count; ++i) out[3 * i] = in[static_cast<std::ptrdiff_t>(i) * step];
+  for (std::ptrdiff_t i = 0; i < run.count; ++i) out[3 * i] = in[i * step];
 }
 
 void put(SceneLinear& picture, const Run& run, const float* in, int step) {
   float* out = picture.plane[run.colour].row(run.y) + run.x;
-  for (int i = 0; i < run.count; ++i) out[i] = in[static_cast<std::ptrdiff_t>(i) * step];
+  for (std::ptrdiff_t i = 0; i < run.count; ++i) out[i] = in[i * step];
 }
 
 template <class Image, class Sample>

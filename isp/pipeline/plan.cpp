@@ -91,7 +91,7 @@ Result<Matrix3> balanced_to_output(const RawFrame& frame, const DevelopOptions& 
     const Xyz white = *xyz_of(output_white);
     return to_output * diagonal3(vector_of(white)) * Matrix3{{{0, 1, 0}, {0, 1, 0}, {0, 1, 0}}};
   }
-  const Result<Matrix3> to_xyz = camera_to_xyz(frame.colour, balance.white->xy, output_white);
+  Result<Matrix3> to_xyz = camera_to_xyz(frame.colour, balance.white->xy, output_white);
   if (!to_xyz) return to_xyz;
   return to_output * *to_xyz * diagonal3(balance.neutral);
 }

@@ -51,11 +51,12 @@ struct ColourVectors {
         hn::MulAdd(luminance[2], v.c[2], hn::MulAdd(luminance[1], v.c[1], hn::Mul(luminance[0], v.c[0])));
     const VF y = hn::Min(hn::Max(weighted, zero), one);
     const VF rest = hn::Sub(one, y);
-    const VF below = hn::Sub(y, hn::Min(least, zero));
-    const VF above = hn::Sub(hn::Max(greatest, one), y);
+    // The ends lie a hair outside 0..1, so that neither distance is 0, and t is 0 where Y is at one of them.
+    const VF below = hn::Sub(y, hn::Min(least, constant(-1e-30f)));
+    const VF above = hn::Sub(hn::Max(greatest, constant(1 + 0x1p-23f)), y);
     const auto low_end_first = hn::Lt(hn::Mul(y, above), hn::Mul(rest, below));
     const VF part = hn::Mul(hn::IfThenElse(low_end_first, y, rest), constant(1 - 0x1p-22f));
-    const VF whole = hn::Max(hn::IfThenElse(low_end_first, below, above), constant(1e-30f));
+    const VF whole = hn::IfThenElse(low_end_first, below, above);
     const auto outside = hn::Or(hn::Lt(least, zero), hn::Gt(greatest, one));
     const VF t = hn::IfThenElse(outside, hn::Div(part, whole), one);
     const VF from = hn::IfThenElseZero(outside, y);

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "isp/render/thumbnail.h"
+#include "isp/render/block_statistics.h"
 
 namespace lowlux::isp {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "isp/model/correlated_colour_temperature.h"
-#include "isp/render/thumbnail.h"
+#include "isp/render/block_statistics.h"
 
 namespace lowlux::isp {
 namespace {

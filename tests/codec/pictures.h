@@ -28,7 +28,8 @@ Encoded<Code> noisy_codes(int width, int height, unsigned seed = 1) {
   const double top = static_cast<Code>(-1);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < 3 * width; ++x) {
-      const double smooth = 0.5 + 0.3 * std::sin(0.02 * (x / 3) + x % 3) * std::cos(0.03 * y);
+      const int pixel = x / 3;
+      const double smooth = 0.5 + 0.3 * std::sin(0.02 * pixel + x % 3) * std::cos(0.03 * y);
       const double noise = 0.02 * (static_cast<double>(random()) / 4294967295.0 - 0.5);
       picture.codes.at(x, y) = static_cast<Code>(top * (smooth + noise));
     }

@@ -77,6 +77,7 @@ TEST(AtomicFile, OfManyWritersOfOneNameExactlyOneWins) {
     const ScratchDirectory scratch;
     std::atomic<int> winners{0}, ready{0};
     std::vector<std::thread> writers;
+    writers.reserve(4);
     for (int i = 0; i < 4; ++i) {
       writers.emplace_back([&, i] {
         auto out = AtomicFile::create(scratch.file("a.txt"), Overwrite::no);

@@ -29,8 +29,8 @@ Profile open(const std::vector<std::byte>& bytes) {
 Vector3 read_by_profile(OutputSpace space, const Vector3& rgb) {
   const Profile profile = open(icc_profile(space));
   const Profile xyz(cmsCreateXYZProfile());
-  const cmsHTRANSFORM transform = cmsCreateTransform(profile.get(), TYPE_RGB_DBL, xyz.get(), TYPE_XYZ_DBL,
-                                                     INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOOPTIMIZE);
+  cmsHTRANSFORM transform = cmsCreateTransform(profile.get(), TYPE_RGB_DBL, xyz.get(), TYPE_XYZ_DBL,
+                                               INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOOPTIMIZE);
   Vector3 out{};
   cmsDoTransform(transform, rgb.data(), out.data(), 1);
   cmsDeleteTransform(transform);

@@ -98,7 +98,7 @@ TEST(TemperatureWhiteBalance, IsRefusedOutsideItsRangeAndWithoutMatrices) {
   EXPECT_EQ(white_balance_of_temperature(CameraColour{}, 5000).error().code, ErrorCode::insufficient);
 }
 
-// 3 degrees of camera RGB is some 500 K in daylight. These scenes hold a fairly even mix of colours, as the method
+// 3 degrees of camera RGB is some 900 K at 6500 K. These scenes hold a fairly even mix of colours, as the method
 // supposes; the worst found is 1.8 degrees.
 TEST(AutoWhiteBalance, FindsTheLightOfAMixedSceneForDaylightTungstenAndLamps) {
   for (const char* light : {"D65", "D50", "D75", "A", "FL2", "LED-B3", "HPS_super", "HPS_generic"}) {

@@ -1,4 +1,4 @@
-#include "isp/render/thumbnail.h"
+#include "isp/render/block_statistics.h"
 
 #include <gtest/gtest.h>
 
