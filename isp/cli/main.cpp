@@ -10,6 +10,7 @@
 #include "isp/cli/exit_code.h"
 #include "isp/cli/verbs.h"
 #include "isp/cli/version.h"
+#include "isp/raw/raw_to_rgb.h"
 
 namespace lowlux::cli {
 namespace {
@@ -42,6 +43,10 @@ int run(const std::vector<std::string>& args) {
   if (first == "--version") {
     fmt::print("{}\n", version_text());
     return exit_done;
+  }
+  if (!isp::cpu_runs_raw_to_rgb()) {
+    fmt::print(stderr, "lowlux: this processor lacks SSSE3, which the kernels need\n");
+    return exit_failed;
   }
   for (const Verb& verb : verbs) {
     if (verb.name == first) return verb.run({args.begin() + 1, args.end()});

@@ -92,7 +92,7 @@ TEST(BadInput, FlippedBitsGiveAnErrorOrAFrameButNeverACrash) {
 TEST(BadInput, AnEmptyFileIsCalledEmpty) { EXPECT_TRUE(has(refused(std::vector<std::byte>{}), "empty")); }
 
 TEST(BadInput, TextIsNotTakenForTheDumpOfACameraThatHasItsSize) {
-  std::string letters(1024 * 768, 'a');
+  const std::string letters(std::size_t{1024} * 768, 'a');
   EXPECT_TRUE(has(refused(bytes_of(letters)), "this is text"));
 }
 

@@ -97,7 +97,7 @@ TEST(DecoderFrame, ABlackOfZeroBesideStatedMasksIsNotATag) {
 
 TEST(DecoderFrame, AHeaderlessDumpIsReadFromEndToEnd) {
   // LibRaw knows the AVT F-080C by the size of its dumps: 1024 x 768 pixels of 8 bits, RGGB.
-  std::vector<std::byte> dump(1024 * 768);
+  std::vector<std::byte> dump(std::size_t{1024} * 768);
   for (std::size_t i = 0; i < dump.size(); ++i) dump[i] = static_cast<std::byte>(i * 2654435761U >> 13);
   const auto frame = read_raw(dump, "dump.raw");
   ASSERT_TRUE(frame) << frame.error().message;
