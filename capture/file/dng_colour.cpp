@@ -100,46 +100,21 @@ Result<void> read_white(const DngFile& dng, const TiffDirectory& raw_image, Came
 }  // namespace
 
 double illuminant_cct_k(std::uint32_t light_source) {
-  // CIE 15: A 2856, B 4874, C 6774, D50 5003, D55 5503, D65 6504, D75 7504 K. Fluorescent lamps: the middle of the
-  // range EXIF gives for each. The words "daylight", "cloudy" and "shade" are taken as D55, D65 and D75.
-  switch (light_source) {
-    case 1:   // daylight
-    case 4:   // flash
-    case 9:   // fine weather
-    case 20:  // D55
-      return 5503;
-    case 2:  // fluorescent: cool white, CIE F2
-      return 4230;
-    case 3:   // tungsten
-    case 17:  // standard light A
-      return 2856;
-    case 10:  // cloudy
-    case 21:  // D65
-      return 6504;
-    case 11:  // shade
-    case 22:  // D75
-      return 7504;
-    case 12:  // daylight fluorescent, 5700 to 7100 K
-      return 6400;
-    case 13:  // day white fluorescent, 4600 to 5500 K
-      return 5050;
-    case 14:  // cool white fluorescent, 3800 to 4500 K
-      return 4150;
-    case 15:  // white fluorescent, 3250 to 3800 K
-      return 3525;
-    case 16:  // warm white fluorescent, 2600 to 3250 K
-      return 2925;
-    case 18:
-      return 4874;
-    case 19:
-      return 6774;
-    case 23:
-      return 5003;
-    case 24:  // ISO studio tungsten
-      return 3200;
-    default:
-      return 0;
+  // CIE 15: A 2856, B 4874, C 6774, D50 5003, D55 5503, D65 6504, D75 7504, F2 4230 K. Other fluorescent lamps: the
+  // middle of the range EXIF gives for each. Daylight, fine weather and flash are taken as D55, cloudy as D65, shade
+  // as D75; tungsten as A.
+  struct Illuminant {
+    std::uint32_t light_source;
+    double cct_k;
+  };
+  constexpr Illuminant illuminants[] = {{1, 5503},  {2, 4230},  {3, 2856},  {4, 5503},  {9, 5503},
+                                        {10, 6504}, {11, 7504}, {12, 6400}, {13, 5050}, {14, 4150},
+                                        {15, 3525}, {16, 2925}, {17, 2856}, {18, 4874}, {19, 6774},
+                                        {20, 5503}, {21, 6504}, {22, 7504}, {23, 5003}, {24, 3200}};
+  for (const Illuminant& known : illuminants) {
+    if (known.light_source == light_source) return known.cct_k;
   }
+  return 0;
 }
 
 Result<CameraColour> read_colour(const DngFile& dng, const TiffDirectory& raw_image,

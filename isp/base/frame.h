@@ -50,7 +50,7 @@ struct FrameInfo {
   std::optional<double> iso;
   std::optional<double> f_number;
   std::optional<double> focal_length_mm;
-  std::optional<double> temperature_c;  // of the sensor, or of the camera where only that is told
+  std::optional<double> temperature_c;  // of the sensor, else of the camera, else of the air
   Orientation orientation = Orientation::normal;
 };
 

@@ -7,6 +7,7 @@
 
 #include "tests/support/dng_builder.h"
 #include "tests/support/process.h"
+#include "tests/support/scratch_directory.h"
 
 namespace lowlux {
 namespace {
@@ -31,7 +32,7 @@ class BadInput : public testing::Test {
   // Writes the bytes as a raw file and develops it.
   test::ProcessResult develop(const std::vector<std::byte>& bytes) {
     test::write_file(raw_, bytes.data(), bytes.size());
-    return test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.path("out.png")});
+    return test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.png")});
   }
 
   // Exit code 1, one line that names the file and holds `clue`, and no file but the raw.
@@ -44,8 +45,8 @@ class BadInput : public testing::Test {
     EXPECT_EQ(scratch_.names(), (std::vector<std::string>{"in.dng"}));
   }
 
-  test::ScratchFolder scratch_;
-  std::string raw_ = scratch_.path("in.dng");
+  test::ScratchDirectory scratch_;
+  std::string raw_ = scratch_.file("in.dng");
 };
 
 TEST_F(BadInput, SoundFilesAreDeveloped) {
@@ -73,7 +74,7 @@ TEST_F(BadInput, BitFlippedFilesEitherDevelopOrSayWhyNot) {
     if (result.exit_code == 1) {
       expect_refused(result, "");
     } else {
-      std::filesystem::remove(scratch_.path("out.png"));
+      std::filesystem::remove(scratch_.file("out.png"));
     }
   }
 }
@@ -120,14 +121,14 @@ TEST_F(BadInput, MissingMatricesSayThatCameraRgbIsStillPossible) {
   dng.remove(colour_matrix_1);
   expect_refused(develop(dng.build()), "--space camera");
   const auto camera =
-      test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.path("out.tif"), "--space", "camera"});
+      test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.tif"), "--space", "camera"});
   EXPECT_EQ(camera.exit_code, 0) << camera.err;
 }
 
 TEST_F(BadInput, MissingFilesAndFolders) {
   expect_refused(develop({}), "");
-  for (const std::string& name : {scratch_.path("absent.dng"), std::string("/")}) {
-    const auto result = test::run_process({LOWLUX_COMMAND, "develop", name, "-o", scratch_.path("out.png")});
+  for (const std::string& name : {scratch_.file("absent.dng"), std::string("/")}) {
+    const auto result = test::run_process({LOWLUX_COMMAND, "develop", name, "-o", scratch_.file("out.png")});
     EXPECT_EQ(result.exit_code, 1);
     EXPECT_NE(result.err.find(name), std::string::npos);
     EXPECT_EQ(scratch_.names(), (std::vector<std::string>{"in.dng"}));
@@ -137,7 +138,7 @@ TEST_F(BadInput, MissingFilesAndFolders) {
 TEST_F(BadInput, OutputsThatCannotBeWritten) {
   ASSERT_EQ(develop(small_dng().build()).exit_code, 0);
   for (const std::string& out :
-       {scratch_.path("no/such/folder/out.png"), std::string("/proc/out.png"), scratch_.path("in.dng/out.png")}) {
+       {scratch_.file("no/such/folder/out.png"), std::string("/proc/out.png"), scratch_.file("in.dng/out.png")}) {
     const auto result = test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", out});
     EXPECT_EQ(result.exit_code, 1) << out;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
@@ -147,22 +148,22 @@ TEST_F(BadInput, OutputsThatCannotBeWritten) {
 }
 
 TEST_F(BadInput, ExistingOutputsAreKeptWithoutForce) {
-  test::write_file(scratch_.path("out.png"), "precious", 8);
+  test::write_file(scratch_.file("out.png"), "precious", 8);
   const auto refused = develop(small_dng().build());
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_NE(refused.err.find("--force"), std::string::npos);
-  EXPECT_EQ(test::read_file(scratch_.path("out.png")), "precious");
-  const auto forced = test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.path("out.png"), "--force"});
+  EXPECT_EQ(test::read_file(scratch_.file("out.png")), "precious");
+  const auto forced = test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.png"), "--force"});
   EXPECT_EQ(forced.exit_code, 0);
-  EXPECT_NE(test::read_file(scratch_.path("out.png")), "precious");
+  EXPECT_NE(test::read_file(scratch_.file("out.png")), "precious");
 }
 
 TEST_F(BadInput, AFailedFileLeavesTheForcedOutputAsItWas) {
-  test::write_file(scratch_.path("out.png"), "precious", 8);
+  test::write_file(scratch_.file("out.png"), "precious", 8);
   test::write_file(raw_, "II", 2);
-  EXPECT_EQ(test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.path("out.png"), "--force"}).exit_code,
+  EXPECT_EQ(test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.png"), "--force"}).exit_code,
             1);
-  EXPECT_EQ(test::read_file(scratch_.path("out.png")), "precious");
+  EXPECT_EQ(test::read_file(scratch_.file("out.png")), "precious");
 }
 
 TEST_F(BadInput, AbsentBlackIsNotGuessed) {
@@ -170,7 +171,7 @@ TEST_F(BadInput, AbsentBlackIsNotGuessed) {
   dng.remove(black_level);
   expect_refused(develop(dng.build()), "--black");
   const auto given =
-      test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.path("out.png"), "--black", "64.5"});
+      test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.png"), "--black", "64.5"});
   EXPECT_EQ(given.exit_code, 0) << given.err;
 }
 

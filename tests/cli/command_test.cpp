@@ -7,6 +7,7 @@
 
 #include "tests/support/dng_builder.h"
 #include "tests/support/process.h"
+#include "tests/support/scratch_directory.h"
 
 namespace lowlux {
 namespace {
@@ -41,15 +42,15 @@ TEST(Command, VersionNamesTheDecoderAndTheKernels) {
 }
 
 TEST(Command, WrongCommandLinesExitWithTwoAndOneLine) {
-  const test::ScratchFolder scratch;
-  const std::string png = scratch.path("x.png");
+  const test::ScratchDirectory scratch;
+  const std::string png = scratch.file("x.png");
   const std::vector<std::vector<std::string>> wrong{
       {},
       {"fry"},
       {"develop"},
       {"develop", dog},
-      {"develop", dog, "-o", scratch.path("x.gif")},
-      {"develop", dog, "-o", scratch.path("x")},
+      {"develop", dog, "-o", scratch.file("x.gif")},
+      {"develop", dog, "-o", scratch.file("x")},
       {"develop", dog, "-o", png, "--exposure", "bright"},
       {"develop", dog, "-o", png, "--exposure", "nan"},
       {"develop", dog, "-o", png, "--exposure", "1e9"},
@@ -60,16 +61,16 @@ TEST(Command, WrongCommandLinesExitWithTwoAndOneLine) {
       {"develop", dog, "-o", png, "--space", "xyz"},
       {"develop", dog, "-o", png, "--bits", "12"},
       {"develop", dog, "-o", png, "--bits", "32"},
-      {"develop", dog, "-o", scratch.path("x.jpg"), "--bits", "16"},
-      {"develop", dog, "-o", scratch.path("x.jpg"), "--quality", "0"},
-      {"develop", dog, "-o", scratch.path("x.exr"), "--space", "srgb"},
-      {"develop", dog, "-o", scratch.path("x.exr"), "--bits", "8"},
+      {"develop", dog, "-o", scratch.file("x.jpg"), "--bits", "16"},
+      {"develop", dog, "-o", scratch.file("x.jpg"), "--quality", "0"},
+      {"develop", dog, "-o", scratch.file("x.exr"), "--space", "srgb"},
+      {"develop", dog, "-o", scratch.file("x.exr"), "--bits", "8"},
       {"develop", dog, "-o", png, "--tone", "punchy"},
       {"develop", dog, "-o", png, "--black", "25,25"},
       {"develop", dog, "-o", png, "--jobs", "0"},
       {"develop", dog, "-o", png, "--no-such-option"},
       {"develop", dog, chart, "-o", png},
-      {"develop", dog, dog, "-o", scratch.path("") + "/"},
+      {"develop", dog, dog, "-o", scratch.path() + "/"},
       {"info"},
       {"info", dog, "--xml"},
   };
@@ -84,8 +85,8 @@ TEST(Command, WrongCommandLinesExitWithTwoAndOneLine) {
 }
 
 TEST(Command, FloatSamplesWithAToneCurveAreRefused) {
-  const test::ScratchFolder scratch;
-  const auto result = lowlux({"develop", dog, "-o", scratch.path("x.exr"), "--tone", "standard"});
+  const test::ScratchDirectory scratch;
+  const auto result = lowlux({"develop", dog, "-o", scratch.file("x.exr"), "--tone", "standard"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_TRUE(scratch.names().empty());
 }
@@ -109,8 +110,8 @@ TEST(Command, InfoShowsTagAndMeasurementOfTheKissX4SideBySide) {
 }
 
 TEST(Command, DevelopReportsTheBlackItUsed) {
-  const test::ScratchFolder scratch;
-  const auto measured = lowlux({"develop", chart, "-o", scratch.path("a.png"), "--json", "--half"});
+  const test::ScratchDirectory scratch;
+  const auto measured = lowlux({"develop", chart, "-o", scratch.file("a.png"), "--json", "--half"});
   ASSERT_EQ(measured.exit_code, 0) << measured.err;
   const Json report = Json::parse(measured.out)[0];
   EXPECT_EQ(report["black"]["source"], "masked-pixels");
@@ -119,13 +120,13 @@ TEST(Command, DevelopReportsTheBlackItUsed) {
   EXPECT_EQ(report["height"], 578);
   EXPECT_TRUE(report["timings_s"].contains("render"));
   const auto tagged =
-      lowlux({"develop", chart, "-o", scratch.path("b.png"), "--json", "--half", "--black", "metadata"});
+      lowlux({"develop", chart, "-o", scratch.file("b.png"), "--json", "--half", "--black", "metadata"});
   EXPECT_EQ(Json::parse(tagged.out)[0]["black"]["pedestal_dn"][0], 2056);
 }
 
 TEST(Command, GoProFilesAreRefusedWithTheReason) {
-  const test::ScratchFolder scratch;
-  const auto result = lowlux({"develop", raws + "gopro_hero6_GOPR0024.gpr", "-o", scratch.path("x.png")});
+  const test::ScratchDirectory scratch;
+  const auto result = lowlux({"develop", raws + "gopro_hero6_GOPR0024.gpr", "-o", scratch.file("x.png")});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_NE(result.err.find("VC-5"), std::string::npos);
   EXPECT_NE(result.err.find("convert"), std::string::npos);
@@ -133,7 +134,7 @@ TEST(Command, GoProFilesAreRefusedWithTheReason) {
 }
 
 TEST(Command, EveryFormatAndDepthIsWritten) {
-  const test::ScratchFolder scratch;
+  const test::ScratchDirectory scratch;
   const std::vector<std::vector<std::string>> kinds{
       {"a.png"},
       {"b.png", "--bits", "16"},
@@ -149,7 +150,7 @@ TEST(Command, EveryFormatAndDepthIsWritten) {
       {"l.PNG", "--space", "rec2020"},
       {"m.tif", "--space", "linear-srgb", "--tone", "none", "--exposure", "0"}};
   for (const auto& kind : kinds) {
-    std::vector<std::string> args{"develop", dog, "-o", scratch.path(kind[0])};
+    std::vector<std::string> args{"develop", dog, "-o", scratch.file(kind[0])};
     args.insert(args.end(), kind.begin() + 1, kind.end());
     const auto result = lowlux(args);
     EXPECT_EQ(result.exit_code, 0) << kind[0] << result.err;
@@ -158,10 +159,10 @@ TEST(Command, EveryFormatAndDepthIsWritten) {
 }
 
 TEST(Command, BatchesGoOnAfterABadFileAndSaySoAtTheEnd) {
-  const test::ScratchFolder scratch;
-  const std::string bad = scratch.path("bad.dng");
+  const test::ScratchDirectory scratch;
+  const std::string bad = scratch.file("bad.dng");
   test::write_file(bad, "no raw", 6);
-  const std::string folder = scratch.path("out/");
+  const std::string folder = scratch.file("out/");
   const auto result = lowlux({"develop", dog, bad, raws + "nikon_dsc1339_crop_rggb14.dng", "-o", folder, "--format",
                               "jpg", "--jobs", "2", "--json"});
   EXPECT_EQ(result.exit_code, 1);
@@ -178,27 +179,27 @@ TEST(Command, BatchesGoOnAfterABadFileAndSaySoAtTheEnd) {
 }
 
 TEST(Command, NumberOfJobsDoesNotChangeAPicture) {
-  const test::ScratchFolder scratch;
+  const test::ScratchDirectory scratch;
   for (const char* jobs : {"1", "2", "5"}) {
-    ASSERT_EQ(lowlux({"develop", dog, chart, "-o", scratch.path(jobs) + "/", "--jobs", jobs}).exit_code, 0);
+    ASSERT_EQ(lowlux({"develop", dog, chart, "-o", scratch.file(jobs) + "/", "--jobs", jobs}).exit_code, 0);
   }
   for (const char* name : {"/n900_dog_small_grbg10in16.png", "/canon_kissx4_ml_colorchart.png"}) {
-    const std::string one = test::read_file(scratch.path("1") + name);
+    const std::string one = test::read_file(scratch.file("1") + name);
     EXPECT_FALSE(one.empty());
-    EXPECT_EQ(one, test::read_file(scratch.path("2") + name));
-    EXPECT_EQ(one, test::read_file(scratch.path("5") + name));
+    EXPECT_EQ(one, test::read_file(scratch.file("2") + name));
+    EXPECT_EQ(one, test::read_file(scratch.file("5") + name));
   }
 }
 
 TEST(Command, OrientationIsAppliedToThePixels) {
-  const test::ScratchFolder scratch;
+  const test::ScratchDirectory scratch;
   test::DngBuilder dng;
   dng.width = 64;
   dng.height = 48;
   dng.set(274, test::Tag::numbers(test::TagType::u16, {6}));
   const std::vector<std::byte> bytes = dng.build();
-  test::write_file(scratch.path("in.dng"), bytes.data(), bytes.size());
-  const auto result = lowlux({"develop", scratch.path("in.dng"), "-o", scratch.path("x.png"), "--json"});
+  test::write_file(scratch.file("in.dng"), bytes.data(), bytes.size());
+  const auto result = lowlux({"develop", scratch.file("in.dng"), "-o", scratch.file("x.png"), "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json report = Json::parse(result.out)[0];
   EXPECT_EQ(report["width"], 48);
@@ -206,20 +207,20 @@ TEST(Command, OrientationIsAppliedToThePixels) {
 }
 
 TEST(Command, TimingsNameTheStages) {
-  const test::ScratchFolder scratch;
-  const auto result = lowlux({"develop", dog, "-o", scratch.path("x.png"), "--timings"});
+  const test::ScratchDirectory scratch;
+  const auto result = lowlux({"develop", dog, "-o", scratch.file("x.png"), "--timings"});
   for (const char* stage : {"read and decode", "black point", "render", "encode and write", "sum"}) {
     EXPECT_NE(result.out.find(stage), std::string::npos) << stage;
   }
 }
 
 TEST(Command, ARawFileIsNeverReplacedByItsPicture) {
-  const test::ScratchFolder scratch;
-  const std::string raw = scratch.path("photo.tif");  // many raw formats are TIFF files
+  const test::ScratchDirectory scratch;
+  const std::string raw = scratch.file("photo.tif");  // many raw formats are TIFF files
   std::filesystem::copy_file(dog, raw);
   const std::string before = test::read_file(raw);
   EXPECT_EQ(lowlux({"develop", raw, "-o", raw, "--force"}).exit_code, 2);
-  EXPECT_EQ(lowlux({"develop", raw, "-o", scratch.path("") + "/", "--format", "tif", "--force"}).exit_code, 2);
+  EXPECT_EQ(lowlux({"develop", raw, "-o", scratch.path() + "/", "--format", "tif", "--force"}).exit_code, 2);
   EXPECT_EQ(test::read_file(raw), before);
 }
 

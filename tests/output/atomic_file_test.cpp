@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "isp/output/publish.h"
-#include "tests/output/scratch_directory.h"
+#include "tests/support/scratch_directory.h"
 
 namespace lowlux::isp {
 namespace {

@@ -11,7 +11,7 @@
 #include "isp/codec/png.h"
 #include "isp/output/icc.h"
 #include "tests/codec/pictures.h"
-#include "tests/output/scratch_directory.h"
+#include "tests/support/scratch_directory.h"
 
 namespace lowlux::isp {
 namespace {

@@ -156,49 +156,52 @@ DngBuilder& DngBuilder::remove(std::uint16_t id) {
   return *this;
 }
 
+DngBuilder::Directories DngBuilder::directories(const Parts& parts, const Offsets& at) const {
+  Directories out;
+  std::vector<double> offsets, sizes;
+  auto next = static_cast<double>(at.data);
+  for (const auto& part : parts) {
+    offsets.push_back(next);
+    sizes.push_back(static_cast<double>(part.size()));
+    next += static_cast<double>(part.size());
+  }
+  add_image_tags(*this, offsets, sizes, raw_in_sub_ifd ? out.raw : out.main);
+  add_camera_tags(*this, out.main);
+  if (raw_in_sub_ifd) {
+    add_preview_tags(next, out.main);
+    out.main[330] = one(TagType::u32, static_cast<double>(at.raw));
+  }
+  for (const auto& [id, tag] : set_) {
+    TagDirectory& home = belongs_to_exif(id) ? out.exif : (raw_in_sub_ifd && belongs_to_image(id) ? out.raw : out.main);
+    home[id] = tag;
+  }
+  if (!out.exif.empty()) out.main[34665] = one(TagType::u32, static_cast<double>(at.exif));
+  for (const std::uint16_t id : removed_) {
+    out.main.erase(id);
+    out.raw.erase(id);
+  }
+  return out;
+}
+
 std::vector<std::byte> DngBuilder::build() const {
-  const auto parts = image_parts(*this);
-  std::size_t exif_offset = 0, raw_offset = 0, data_offset = 0;
-  std::vector<std::byte> main_bytes, exif_bytes, raw_bytes;
+  const Parts parts = image_parts(*this);
+  Offsets at;
+  std::vector<std::byte> main, exif, raw;
   // The first round finds the sizes of the directories, the second writes them with the offsets that follow.
   for (int round = 0; round < 2; ++round) {
-    TagDirectory main, exif, raw;
-    std::vector<double> offsets, sizes;
-    auto next = static_cast<double>(data_offset);
-    for (const auto& part : parts) {
-      offsets.push_back(next);
-      sizes.push_back(static_cast<double>(part.size()));
-      next += static_cast<double>(part.size());
-    }
-    add_image_tags(*this, offsets, sizes, raw_in_sub_ifd ? raw : main);
-    add_camera_tags(*this, main);
-    if (raw_in_sub_ifd) {
-      add_preview_tags(next, main);
-      main[330] = one(TagType::u32, static_cast<double>(raw_offset));
-    }
-    for (const auto& [id, tag] : set_) {
-      TagDirectory& home = belongs_to_exif(id) ? exif : (raw_in_sub_ifd && belongs_to_image(id) ? raw : main);
-      home[id] = tag;
-    }
-    if (!exif.empty()) main[34665] = one(TagType::u32, static_cast<double>(exif_offset));
-    for (const std::uint16_t id : removed_) {
-      main.erase(id);
-      raw.erase(id);
-    }
-    main_bytes = encode_directory(main, 8, big_endian);
-    exif_offset = 8 + main_bytes.size();
-    if (!exif.empty()) exif_bytes = encode_directory(exif, exif_offset, big_endian);
-    raw_offset = exif_offset + exif_bytes.size();
-    if (raw_in_sub_ifd) raw_bytes = encode_directory(raw, raw_offset, big_endian);
-    data_offset = raw_offset + raw_bytes.size();
+    const Directories all = directories(parts, at);
+    main = encode_directory(all.main, 8, big_endian);
+    at.exif = 8 + main.size();
+    if (!all.exif.empty()) exif = encode_directory(all.exif, at.exif, big_endian);
+    at.raw = at.exif + exif.size();
+    if (raw_in_sub_ifd) raw = encode_directory(all.raw, at.raw, big_endian);
+    at.data = at.raw + raw.size();
   }
   ByteWriter file(big_endian);
   file.append(std::vector<std::byte>(2, big_endian ? std::byte{'M'} : std::byte{'I'}));
   file.number(42, 2);
   file.number(8, 4);
-  file.append(main_bytes);
-  file.append(exif_bytes);
-  file.append(raw_bytes);
+  for (const auto* directory : {&main, &exif, &raw}) file.append(*directory);
   for (const auto& part : parts) file.append(part);
   if (raw_in_sub_ifd) file.append(std::vector<std::byte>(48, std::byte{128}));
   return file.out;

@@ -45,6 +45,15 @@ struct DngBuilder {
   std::vector<std::byte> build() const;
 
  private:
+  using Parts = std::vector<std::vector<std::byte>>;  // strips or tiles
+  struct Directories {
+    TagDirectory main, exif, raw;
+  };
+  struct Offsets {
+    std::size_t exif = 0, raw = 0, data = 0;
+  };
+  Directories directories(const Parts& parts, const Offsets& at) const;
+
   std::map<std::uint16_t, Tag> set_;
   std::set<std::uint16_t> removed_;
 };

@@ -5,19 +5,20 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
+
+#include "tests/support/scratch_directory.h"
 
 extern char** environ;
 
 namespace lowlux::test {
 
 ProcessResult run_process(const std::vector<std::string>& command) {
-  const ScratchFolder scratch;
-  const std::string out = scratch.path("out");
-  const std::string err = scratch.path("err");
+  const ScratchDirectory scratch;
+  const std::string out = scratch.file("out");
+  const std::string err = scratch.file("err");
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
@@ -33,24 +34,6 @@ ProcessResult run_process(const std::vector<std::string>& command) {
   int status = 0;
   waitpid(child, &status, 0);
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_file(out), read_file(err)};
-}
-
-ScratchFolder::ScratchFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "lowlux-test-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make " + name);
-  folder_ = name;
-}
-
-ScratchFolder::~ScratchFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(folder_, ignored);
-}
-
-std::vector<std::string> ScratchFolder::names() const {
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(folder_)) names.push_back(entry.path().filename());
-  std::sort(names.begin(), names.end());
-  return names;
 }
 
 void write_file(const std::string& path, const void* data, std::size_t bytes) {
