@@ -61,7 +61,7 @@ void judge_row(const PlaneView<const std::uint16_t>& dn, int y, double floor_dn,
   const int floor = static_cast<int>(floor_dn);
   for (int x = 2; x < dn.width - 2; ++x) {
     const int left = row[x - 2], right = row[x + 2], value = row[x];
-    const bool outside = (value > std::max(left, right) + floor) | (value < std::min(left, right) - floor);
+    const bool outside = value > std::max(left, right) + floor || value < std::min(left, right) - floor;
     if (outside && is_defect(dn, x, y, floor_dn)) found.push_back({x, y});
   }
 }
