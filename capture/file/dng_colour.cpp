@@ -149,7 +149,8 @@ Result<std::optional<NoiseProfile>> read_noise(const DngFile& dng, const TiffDir
   NoiseProfile noise;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t at = pairs.size() == 2 || planes == 1 ? 0 : 2 * i;
-    if (!std::isfinite(pairs[at]) || !std::isfinite(pairs[at + 1]) || pairs[at] < 0) {
+    // Of a value from 0 to 1: no variance is above 1.
+    if (!(pairs[at] >= 0 && pairs[at] <= 1 && std::fabs(pairs[at + 1]) <= 1)) {
       return bad(name, "holds a value that is no variance");
     }
     noise.scale[i] = pairs[at];

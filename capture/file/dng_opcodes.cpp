@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t max_constant_defects = 1 << 20;
 constexpr std::size_t opcode_header_bytes = 16;
+constexpr std::size_t max_gains = 64;
 constexpr std::uint32_t fix_vignette_radial = 3, fix_bad_pixels_constant = 4, fix_bad_pixels_list = 5, gain_map = 9;
 
 /// Big-endian numbers one after the other. Past the end it reads zeros and remembers that.
@@ -251,6 +252,9 @@ Result<void> read_opcodes(std::span<const std::byte> bytes, int list, bool linea
     const auto parameters = in.block(in.u32());
     if (!in.complete()) return fail(ErrorCode::malformed, "the tag " + name + " is damaged", name);
     if (auto read = read_opcode(context, id, parameters); !read) return read;
+  }
+  if (frame.corrections.gain_maps.size() + frame.corrections.radial_gains.size() > max_gains) {
+    return fail(ErrorCode::malformed, "the tag " + name + " asks for more gain maps than any camera writes", name);
   }
   return {};
 }

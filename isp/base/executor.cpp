@@ -5,6 +5,7 @@
 #include <cassert>
 #include <condition_variable>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -50,9 +51,13 @@ struct PoolExecutor::State {
 PoolExecutor::PoolExecutor(int threads) : state_(std::make_unique<State>()) {
   assert(threads >= 1);
   const std::lock_guard lock(state_->mutex);  // workers wait here until the list of them is whole
-  for (int worker = 1; worker < threads; ++worker) {
-    state_->workers.emplace_back([state = state_.get(), worker] { state->worker_loop(worker); });
-    pthread_setname_np(state_->workers.back().native_handle(), "lowlux");
+  try {
+    for (int worker = 1; worker < threads; ++worker) {
+      state_->workers.emplace_back([state = state_.get(), worker] { state->worker_loop(worker); });
+      pthread_setname_np(state_->workers.back().native_handle(), "lowlux");
+    }
+  } catch (const std::system_error&) {
+    // The system gives no more threads: those there are do the work.
   }
 }
 

@@ -20,7 +20,8 @@ class InlineExecutor final : public Executor {
   void run(int n, void (*fn)(void* context, int index), void* context) noexcept override;
 };
 
-/// The calling thread and threads - 1 workers named "lowlux", which sleep between calls and end with the object.
+/// The calling thread and up to threads - 1 workers (as many as the system gives) named "lowlux", which sleep between
+/// calls and end with the object.
 class PoolExecutor final : public Executor {
  public:
   explicit PoolExecutor(int threads);

@@ -87,7 +87,7 @@ struct RawDn {
   FrameInfo info;
 };
 
-/// Black point of one frame, per CFA site. The pedestal [DN] is what is subtracted from the data as a whole;
+/// Black point of one frame, per CFA site. The pedestal [DN] is what is subtracted, or its mean where `pattern` is set;
 /// when it was measured on masked pixels it holds the dark charge too, and the dark mean left to subtract is 0.
 /// For SensorLayout::linear_rgb the four figures are those of R, G, B and B.
 struct BlackPoint {

@@ -64,7 +64,10 @@ int run(const std::vector<std::string>& args) {
 
 int main(int argc, char** argv) {
   try {
-    return lowlux::cli::run({argv + 1, argv + argc});
+    const int code = lowlux::cli::run({argv + 1, argv + argc});
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+    std::fprintf(stderr, "lowlux: cannot write to standard output\n");
+    return lowlux::cli::exit_failed;
   } catch (const std::exception& failure) {  // out of memory, above all
     std::fprintf(stderr, "lowlux: %s\n", failure.what());
     return lowlux::cli::exit_failed;

@@ -19,11 +19,6 @@ bool same_file(const std::string& a, const std::string& b) {
   return fs::equivalent(a, b, ignored);
 }
 
-bool names_folder(const DevelopArgs& args) {
-  std::error_code ignored;
-  return args.output.ends_with('/') || fs::is_directory(args.output, ignored);
-}
-
 int default_bits(FileFormat format, OutputSpace space) {
   switch (format) {
     case FileFormat::png:
@@ -43,6 +38,11 @@ SampleType sample_type_of(FileFormat format, int bits) {
 }
 
 }  // namespace
+
+bool names_folder(const DevelopArgs& args) {
+  std::error_code ignored;
+  return args.output.ends_with('/') || fs::is_directory(args.output, ignored);
+}
 
 Result<std::vector<Job>> plan_outputs(const DevelopArgs& args) {
   const bool folder = names_folder(args);

@@ -15,10 +15,13 @@ struct Job {
   std::string output;
 };
 
-/// The picture of each input: `output` itself for one, files in it where it is a folder (it exists as one, ends with /
-/// or there are several inputs). Errors (command line wrong): several inputs and no folder, an unknown extension, two
+/// The picture of each input: `output` itself for one, files in it where it is a folder (it exists as one or ends
+/// with /). Errors (command line wrong): several inputs and no folder, an unknown extension, two
 /// inputs for one picture, a picture that would replace its own raw file.
 Result<std::vector<Job>> plan_outputs(const DevelopArgs& args);
+
+/// Whether the output is a folder.
+bool names_folder(const DevelopArgs& args);
 
 /// Completes space, samples, tone and exposure by what the format of the output can hold. Errors: they do not fit.
 Result<isp::DevelopOptions> complete_options(const DevelopArgs& args, isp::FileFormat format);

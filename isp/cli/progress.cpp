@@ -29,8 +29,13 @@ void Progress::advance(double amount, const std::string& what) {
   shown_ = true;
 }
 
-void Progress::clear() {
+void Progress::print(const std::function<void()>& print) {
   const std::lock_guard lock(mutex_);
+  clear();
+  print();
+}
+
+void Progress::clear() {
   if (!shown_) return;
   fmt::print(stderr, "\r\033[K");
   std::fflush(stderr);

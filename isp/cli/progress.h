@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <mutex>
 #include <string>
 
@@ -17,10 +18,12 @@ class Progress {
 
   /// Another `amount` of the total is done; `what` is being worked on.
   void advance(double amount, const std::string& what);
-  /// Takes the bar off the line, so that something else can be printed there.
-  void clear();
+  /// Takes the bar off its line and calls print(); the bar stays away until that is done.
+  void print(const std::function<void()>& print);
 
  private:
+  void clear();
+
   std::mutex mutex_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   int total_;

@@ -31,6 +31,8 @@ std::string info_text(const std::string& file, const RawFrame& frame);
 std::string info_json(const std::string& file, const RawFrame& frame);
 std::string error_json(const std::string& file, const Error& error);
 
+/// The text with every control character made a blank, so that no file name can break a line.
+std::string one_line(std::string text);
 /// "lowlux: FILE: what is wrong", one line.
 std::string error_line(const std::string& file, const Error& error);
 

@@ -46,7 +46,10 @@ void add_black(Lines& out, const RawDn& raw) {
   out.add("black [DN]", "{:>9} {:>9} {:>9} {:>9}", "site 00", "site 01", "site 10", "site 11");
   if (raw.black_tag) {
     const int last = raw.black_tag->samples - 1;
-    const auto tag = [&](int site) { return raw.black_tag->at(site & 1, site >> 1, std::min(site, last)); };
+    const auto tag = [&](int site) {
+      return raw.black_tag->at(std::min(site & 1, raw.active.width - 1), std::min(site >> 1, raw.active.height - 1),
+                               std::min(site, last));
+    };
     out.add("  tag", "{:9.2f} {:9.2f} {:9.2f} {:9.2f}", tag(0), tag(1), tag(2), tag(3));
   } else {
     out.add("  tag", "none");
@@ -143,14 +146,18 @@ std::string info_text(const std::string& file, const RawFrame& frame) {
   return file + "\n" + out.text_;
 }
 
+std::string one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
+  return text;
+}
+
 std::string error_line(const std::string& file, const Error& error) {
   std::string text = fmt::format("lowlux: {}: {}", file, error.message);
   if (!error.where.empty() && error.where != file && error.message.find(error.where) == std::string::npos) {
     text += fmt::format(" ({})", error.where);
   }
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20; }, ' ');
-  return text;
+  return one_line(std::move(text));
 }
 
 }  // namespace lowlux::cli

@@ -1,8 +1,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
-#include <mutex>
+#include <new>
 #include <thread>
 #include <utility>
 
@@ -102,10 +103,16 @@ void print_outcome(const Task& task, const DevelopOutcome& outcome) {
   }
   if (!task.args.quiet) {
     for (const std::string& warning : outcome.plan->warnings) {
-      fmt::print(stderr, "lowlux: {}: warning: {}\n", outcome.input, warning);
+      fmt::print(stderr, "{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome.input, warning)));
     }
   }
   if (task.args.timings && !task.args.json) fmt::print("{}\n{}", outcome.input, timings_text(outcome));
+}
+
+DevelopOutcome failed(const Job& job, const std::string& why) {
+  DevelopOutcome out{job.input, job.output};
+  out.error = Error{ErrorCode::too_large, why, job.input};
+  return out;
 }
 
 // Each worker takes the next file: while one reads, another renders or encodes.
@@ -115,7 +122,6 @@ std::vector<DevelopOutcome> develop_all(const Task& task) {
   const int workers = std::min(files, task.args.jobs > 0 ? task.args.jobs : processors);
   std::vector<DevelopOutcome> outcomes(task.jobs.size());
   std::atomic<int> next{0};
-  std::mutex print_mutex;
   Progress progress(files, !task.args.quiet);
   const auto work = [&] {
     PoolExecutor executor(std::clamp(processors / workers, 1, 8));
@@ -123,24 +129,24 @@ std::vector<DevelopOutcome> develop_all(const Task& task) {
       try {
         outcomes[i] = develop_file(task, task.jobs[i], executor, progress);
       } catch (const std::bad_alloc&) {
-        outcomes[i] = {task.jobs[i].input, task.jobs[i].output};
-        outcomes[i].error =
-            Error{ErrorCode::too_large, "not enough memory; --jobs 1 takes the least", task.jobs[i].input};
+        outcomes[i] = failed(task.jobs[i], "not enough memory; --jobs 1 takes the least");
+      } catch (const std::exception& failure) {
+        outcomes[i] = failed(task.jobs[i], failure.what());
       }
-      const std::lock_guard lock(print_mutex);
-      progress.clear();
-      print_outcome(task, outcomes[i]);
+      progress.print([&] { print_outcome(task, outcomes[i]); });
     }
   };
-  std::vector<std::thread> threads;
-  for (int i = 1; i < workers; ++i) threads.emplace_back(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
+  {
+    std::vector<std::jthread> threads;
+    for (int i = 1; i < workers; ++i) threads.emplace_back(work);
+    work();
+  }
   return outcomes;
 }
 
 int usage_error(const Error& error) {
-  fmt::print(stderr, "lowlux develop: {}{}{}\n", error.where, error.where.empty() ? "" : ": ", error.message);
+  const std::string place = error.where.empty() ? "" : error.where + ": ";
+  fmt::print(stderr, "{}\n", one_line("lowlux develop: " + place + error.message));
   return exit_usage;
 }
 
@@ -169,6 +175,10 @@ int run_develop(const std::vector<std::string>& words) {
   if (!jobs) return usage_error(jobs.error());
   const Result<isp::FileFormat> format = isp::format_of(jobs->front().output);
   if (!format) return usage_error(format.error());
+  if (!args.format.empty() && !names_folder(args)) {
+    return usage_error(
+        {ErrorCode::invalid_argument, "goes with a folder as output; a file's name says its format", "--format"});
+  }
   const Result<isp::DevelopOptions> options = complete_options(args, *format);
   if (!options) return usage_error(options.error());
 

@@ -11,7 +11,7 @@
 namespace lowlux::isp {
 
 /// Turns raw frames into pictures as their plans say. Owns every buffer between the two: the first frame of a size
-/// allocates them, later ones of that size or smaller allocate nothing. One frame at a time.
+/// allocates them, later ones of that size allocate nothing. One frame at a time.
 class Pipeline {
  public:
   explicit Pipeline(Executor& executor) : executor_(executor) {}

@@ -13,6 +13,8 @@
 namespace lowlux::isp {
 namespace {
 
+constexpr double daylight_k = 6504;  // D65
+
 Result<void> check(const RawFrame& frame, const DevelopOptions& o) {
   if (Result<void> options = check_options(o); !options) return options;
   const bool coloured = frame.raw.layout != SensorLayout::monochrome;
@@ -29,9 +31,11 @@ Result<void> check(const RawFrame& frame, const DevelopOptions& o) {
 }
 
 // Defects the source names and, if asked for, those that stand out.
-std::vector<Pixel> all_defects(const RawFrame& frame, const DevelopPlan& plan, double black_noise_dn,
-                               Executor& executor) {
-  std::vector<Pixel> defects = named_defects(frame.raw, frame.corrections.defects);
+std::vector<Pixel> all_defects(const RawFrame& frame, DevelopPlan& plan, double black_noise_dn, Executor& executor) {
+  const auto named = named_defects(frame.raw, frame.corrections.defects);
+  if (!named)
+    plan.warnings.emplace_back("the file names a large part of its pixels as defective: these are not repaired");
+  std::vector<Pixel> defects = named.value_or(std::vector<Pixel>{});
   if (!plan.options.find_defects) return defects;
   const std::vector<Pixel> found = find_defects(frame.raw, plan.black, black_noise_dn, executor);
   return merged(defects, found);
@@ -60,6 +64,19 @@ Result<WhiteBalance> choose_white(const RawFrame& frame, const DevelopOptions& o
   if (o.white_balance.mode == Mode::as_shot && found.reason.empty())
     found.reason = "the file states no white balance: estimated from the picture";
   return found;
+}
+
+// A neutral that is no colour of a light leads to no XYZ: an automatic one gives way to daylight, others are errors.
+Result<WhiteBalance> with_white(Result<WhiteBalance> balance, const RawFrame& frame, const DevelopOptions& o) {
+  if (!balance || balance->white || frame.raw.layout == SensorLayout::monochrome) return balance;
+  if (o.white_balance.mode == WhiteBalanceChoice::Mode::automatic) {
+    if (Result<WhiteBalance> daylight = white_balance_of_temperature(frame.colour, daylight_k)) {
+      daylight->reason = "the picture's white is no colour of a light under the file's matrices: taken as daylight";
+      return daylight;
+    }
+  }
+  return fail(ErrorCode::malformed,
+              "the white balance is no colour of a light under the file's matrices: try --wb 5500, or --space camera");
 }
 
 // Luminance of each block as it will be rendered, before exposure.
@@ -165,7 +182,8 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   clock.lap("defects");
 
   Result<WhiteBalance> balance{};
-  if (options.space != OutputSpace::camera) balance = choose_white(frame, options, thumbnail);
+  if (options.space != OutputSpace::camera)
+    balance = with_white(choose_white(frame, options, thumbnail), frame, options);
   if (!balance) return tl::make_unexpected(std::move(balance.error()));
   plan.neutral = balance->neutral;
   plan.white = balance->white;
@@ -181,6 +199,7 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   plan.from_codes = frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.black.pattern &&
                     plan.black.dark_mean_e == PerSite<double>{} && frame.corrections.radial_gains.empty() &&
                     std::none_of(frame.corrections.gain_maps.begin(), frame.corrections.gain_maps.end(), has_effect);
+  if (plan.from_codes || frame.raw.layout != SensorLayout::bayer) plan.electrons_at_white.reset();
   clock.lap("white and exposure");
   return plan;
 }

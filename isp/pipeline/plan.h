@@ -46,7 +46,7 @@ struct StageTime {
 struct DevelopPlan {
   // measured and decided
   BlackPoint black;
-  std::optional<PerSite<double>> electrons_at_white;  // known system gain: the mosaic is counted in electrons
+  std::optional<PerSite<double>> electrons_at_white;  // set where the mosaic is counted in electrons on its way
   std::vector<Pixel> defects;                         // ascending
   Vector3 neutral{1, 1, 1};                           // camera RGB of white, largest 1
   std::optional<WhitePoint> white;                    // absent without a colour calibration

@@ -1,6 +1,9 @@
 #include "isp/raw/black_point.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -9,46 +12,61 @@
 namespace lowlux::isp {
 namespace {
 
-Result<BlackPoint> black_from_tag(const RawDn& raw) {
+// Mean of the offsets of every other column or row, from `start`; 0 if there are none.
+double mean_offset(const std::vector<double>& offsets, std::size_t start) {
+  double sum = 0;
+  int n = 0;
+  for (std::size_t i = std::min(start, offsets.empty() ? 0 : offsets.size() - 1); i < offsets.size(); i += 2, ++n) {
+    sum += offsets[i];
+  }
+  return n > 0 ? sum / n : 0;
+}
+
+// Mean of a tag over all pixels of one site (R, G, B for demosaiced samples).
+double site_mean(const BlackLevel& tag, int site) {
+  const bool rgb = tag.samples > 1;
+  const int step_x = rgb || tag.columns % 2 != 0 ? 1 : 2;
+  const int step_y = rgb || tag.rows % 2 != 0 ? 1 : 2;
+  const int sample = std::min(site, tag.samples - 1);
+  double sum = 0;
+  int n = 0;
+  for (int y = step_y == 2 ? site >> 1 : 0; y < tag.rows; y += step_y) {
+    for (int x = step_x == 2 ? site & 1 : 0; x < tag.columns; x += step_x, ++n) {
+      sum += tag.pattern_dn[(y * tag.columns + x) * tag.samples + sample];
+    }
+  }
+  return sum / n + mean_offset(tag.column_dn, site & 1) + mean_offset(tag.row_dn, site >> 1);
+}
+
+bool four_figures_do(const BlackLevel& tag) {
+  return 2 % tag.rows == 0 && 2 % tag.columns == 0 && tag.column_dn.empty() && tag.row_dn.empty() && tag.samples == 1;
+}
+
+Result<BlackPoint> black_from_tag(const RawDn& raw, const std::string& why_not_measured) {
   if (!raw.black_tag) {
     return fail(ErrorCode::insufficient,
-                "the file states no black level and has no masked pixels to measure it on; black is not guessed: "
-                "give it with --black DN");
+                fmt::format("the file states no black level{}{}; black is not guessed: give it with --black DN",
+                            why_not_measured.empty() ? "" : ", and ", why_not_measured));
   }
-  const BlackLevel& tag = *raw.black_tag;
   BlackPoint black;
   black.source = BlackPoint::Source::tag;
-  const int last = tag.samples - 1;
-  for (int site = 0; site < 4; ++site) black.pedestal_dn[site] = tag.at(site & 1, site >> 1, std::min(site, last));
-  const bool four_do =
-      2 % tag.rows == 0 && 2 % tag.columns == 0 && tag.column_dn.empty() && tag.row_dn.empty() && tag.samples == 1;
-  if (!four_do) black.pattern = tag;
+  for (int site = 0; site < 4; ++site) black.pedestal_dn[site] = site_mean(*raw.black_tag, site);
+  if (!four_figures_do(*raw.black_tag)) black.pattern = *raw.black_tag;
   return black;
 }
 
-Result<BlackPoint> black_from_masked_pixels(const RawDn& raw) {
-  MaskedBlack measured = measure_masked_black(raw);
-  if (!measured.black) return fail(ErrorCode::insufficient, measured.refusal);
-  return *measured.black;
-}
-
 Result<BlackPoint> requested_black(const RawDn& raw, const BlackRequest& request) {
-  switch (request.choice) {
-    case BlackChoice::given:
-      return BlackPoint{.pedestal_dn = request.given_dn, .source = BlackPoint::Source::given};
-    case BlackChoice::metadata:
-      return black_from_tag(raw);
-    case BlackChoice::masked:
-      return black_from_masked_pixels(raw);
-    case BlackChoice::automatic:
-      break;
+  if (request.choice == BlackChoice::given) {
+    return BlackPoint{.pedestal_dn = request.given_dn, .source = BlackPoint::Source::given};
   }
-  // Per-row and per-column offsets are finer than four figures: a tag that has them is not replaced.
-  const bool tag_is_finer = raw.black_tag && (!raw.black_tag->column_dn.empty() || !raw.black_tag->row_dn.empty());
-  if (!tag_is_finer) {
-    if (Result<BlackPoint> measured = black_from_masked_pixels(raw)) return measured;
-  }
-  return black_from_tag(raw);
+  if (request.choice == BlackChoice::metadata) return black_from_tag(raw, "");
+  // A tag that is finer than four figures is not replaced by four.
+  const bool tag_is_finer = raw.black_tag && !four_figures_do(*raw.black_tag);
+  if (request.choice == BlackChoice::automatic && tag_is_finer) return black_from_tag(raw, "");
+  MaskedBlack measured = measure_masked_black(raw);
+  if (measured.black) return *measured.black;
+  if (request.choice == BlackChoice::masked) return fail(ErrorCode::insufficient, measured.refusal);
+  return black_from_tag(raw, measured.refusal);
 }
 
 }  // namespace

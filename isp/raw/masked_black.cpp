@@ -16,8 +16,9 @@ constexpr int inner_trim = 12;
 constexpr int min_side = 8;                // of the trimmed strip, in pixels
 constexpr int min_samples_per_site = 500;  // standard error below 0.05 standard deviations
 constexpr double cut_sigma = 5.0;
-constexpr double max_offset_of_range = 0.05;
-constexpr double mad_to_std = 1.4826;  // of a normal law
+constexpr double max_offset_of_range = 0.005;  // of an unstated border from the tag
+constexpr double max_offset_of_noise = 16;     // likewise, in standard deviations of its pixels
+constexpr double mad_to_std = 1.4826;          // of a normal law
 
 enum class Side { left, right, top, bottom, elsewhere };
 
@@ -211,13 +212,15 @@ bool profile_follows_scene(const RawDn& raw, const Rect& region, double noise_st
 double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
 
 std::string why_not_dark(const RawDn& raw, const Rect& region, const BlackPoint& black) {
+  if (!raw.black_tag)
+    return "the file does not say that its border is masked, and there is no black level to check it by";
   const double level = mean_of(black.pedestal_dn);
-  if (raw.black_tag) {
-    const double tag = raw.black_tag->at(0, 0);
-    if (std::fabs(level - tag) > max_offset_of_range * (raw.white_dn[1] - tag)) {
-      return fmt::format("the border's level {:.1f} DN is too far from the tagged black {:.1f} DN to be masked", level,
-                         tag);
-    }
+  const double noise = mean_of(black.noise_std_dn);
+  const double tag = raw.black_tag->pattern_dn.front();
+  if (!(noise > 0)) return "the border holds one value only, so it was not read out";
+  if (std::fabs(level - tag) > std::max(max_offset_of_noise * noise, max_offset_of_range * (raw.white_dn[1] - tag))) {
+    return fmt::format("the border's level {:.1f} DN is too far from the tagged black {:.1f} DN to be masked", level,
+                       tag);
   }
   if (profile_follows_scene(raw, region, mean_of(black.noise_std_dn)))
     return "the border shows the scene, so it is not masked";

@@ -21,8 +21,9 @@ struct MaskedBlack {
 /// Per site: mean of the samples within 5 standard deviations (from the median absolute deviation) of the median;
 /// the cut is symmetric and takes 6e-7 of a normal law. Standard error, with row and column noise in it:
 ///     se^2 = var(row means) / rows + var(column means) / columns - var(sample) / samples
-/// Borders that a source does not call masked are refused when they look lit: when their level is more than 5 % of
-/// the range off the tag, or when their row profile follows that of the neighbouring active columns.
+/// Borders that a source does not call masked are refused when there is no tag to check them by, when they are constant
+/// (padding), when their level is off the tag by more than 16 standard deviations of a pixel and 0.5 % of the range, or
+/// when their row profile follows that of the neighbouring active columns.
 MaskedBlack measure_masked_black(const RawDn& raw);
 
 }  // namespace lowlux::isp

@@ -15,6 +15,7 @@ constexpr double range_factor = 4;
 constexpr double noise_factor = 8;
 constexpr double floor_of_white = 0.01;
 constexpr double max_shared = 0.1;
+constexpr std::int64_t max_named_share = 16;
 
 struct Neighbours {
   int low;
@@ -58,7 +59,7 @@ bool is_defect(const PlaneView<const std::uint16_t>& dn, int x, int y, double fl
 // Cheap first test of a whole row, so that the careful one runs on few pixels: out of the range of left and right.
 void judge_row(const PlaneView<const std::uint16_t>& dn, int y, double floor_dn, std::vector<Pixel>& found) {
   const std::uint16_t* row = dn.row(y);
-  const int floor = static_cast<int>(floor_dn);
+  const int floor = static_cast<int>(std::min(floor_dn, 65536.0));
   for (int x = 2; x < dn.width - 2; ++x) {
     const int left = row[x - 2], right = row[x + 2], value = row[x];
     const bool outside = value > std::max(left, right) + floor || value < std::min(left, right) - floor;
@@ -87,7 +88,14 @@ std::vector<Pixel> find_defects(const RawDn& raw, const BlackPoint& black, doubl
   return all;
 }
 
-std::vector<Pixel> named_defects(const RawDn& raw, const std::vector<DefectRect>& defects) {
+std::optional<std::vector<Pixel>> named_defects(const RawDn& raw, const std::vector<DefectRect>& defects) {
+  std::int64_t area = 0;
+  for (const DefectRect& d : defects) {
+    const std::int64_t width = std::min(d.x + d.width, raw.active.width) - std::max(d.x, 0);
+    const std::int64_t height = std::min(d.y + d.height, raw.active.height) - std::max(d.y, 0);
+    area += std::max<std::int64_t>(width, 0) * std::max<std::int64_t>(height, 0);
+    if (area * max_named_share > std::int64_t{raw.active.width} * raw.active.height) return std::nullopt;
+  }
   std::vector<Pixel> pixels;
   for (const DefectRect& d : defects) {
     const int x_end = std::min(d.x + d.width, raw.active.width);

@@ -26,8 +26,9 @@ struct Pixel {
 /// @return ascending by row, then column. Pixels within two of the border are not judged.
 std::vector<Pixel> find_defects(const RawDn& raw, const BlackPoint& black, double noise_std_dn, Executor& executor);
 
-/// The pixels a source names as defective that lie in the active area, ascending, each once.
-std::vector<Pixel> named_defects(const RawDn& raw, const std::vector<DefectRect>& defects);
+/// The pixels a source names as defective that lie in the active area, ascending, each once; nullopt if it names more
+/// than a sixteenth of them (repeats counted), which is a fault of the source and would take memory without bound.
+std::optional<std::vector<Pixel>> named_defects(const RawDn& raw, const std::vector<DefectRect>& defects);
 
 /// Both ascending lists in one, each pixel once.
 std::vector<Pixel> merged(const std::vector<Pixel>& a, const std::vector<Pixel>& b);

@@ -34,7 +34,7 @@ struct Layout {
 Layout layout_of(const RawDn& raw) {
   Layout l;
   const int side = std::max(raw.active.width, raw.active.height);
-  l.block = std::max(2, (side + max_blocks - 1) / max_blocks);
+  l.block = std::max(4, (side + max_blocks - 1) / max_blocks);
   l.block += l.block & 1;
   l.samples = raw.layout == SensorLayout::linear_rgb ? 3 : 1;
   l.columns = (raw.active.width + l.block - 1) / l.block;
@@ -67,11 +67,13 @@ void add_row(const std::uint16_t* dn, int width, int y, std::uint16_t white, Blo
 
 void add_rgb_row(const std::uint16_t* dn, int width, const std::array<double, 3>& white, BlockSums& block) {
   for (int x = 0; x < width; ++x) {
+    if (x + 1 < width) block.difference += std::abs(dn[3 * x + 1] - dn[3 * x + 4]);
     for (int c = 0; c < 3; ++c) {
       block.sum[c] += dn[3 * x + c];
       block.clipped += dn[3 * x + c] >= white[c];
     }
   }
+  block.differences += width - 1;
   for (int c = 0; c < 3; ++c) block.n[c] += width;
 }
 
@@ -160,7 +162,7 @@ Thumbnail make_thumbnail(const RawFrame& frame, const BlackPoint& black, Executo
       const std::int64_t n = block.n[0] + block.n[1] + block.n[2] + block.n[3];
       out.clipped_fraction.at(x, y) =
           static_cast<float>(static_cast<double>(block.clipped) / static_cast<double>(std::max<std::int64_t>(n, 1)));
-      if (block.differences > 0)
+      if (block.difference > 0 && block.clipped == 0)
         differences.push_back(static_cast<double>(block.difference) / static_cast<double>(block.differences));
     }
   }

@@ -1,12 +1,13 @@
 #include "isp/raw/to_linear.h"
 
-#include <cmath>
 #include <utility>
 
 #include "isp/raw/black_point.h"
 
 namespace lowlux::isp {
 namespace {
+
+constexpr double max_electrons = 1e7;
 
 struct SiteScale {
   PerSite<float> black;
@@ -92,7 +93,7 @@ std::optional<PerSite<double>> electrons_at_white(const RawDn& raw, const NoiseP
     const bool bayer = raw.layout == SensorLayout::bayer;
     const int colour = bayer ? static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)) : 0;
     electrons[site] = 1.0 / noise.scale[colour];
-    if (!(noise.scale[colour] > 0) || !std::isfinite(electrons[site])) return std::nullopt;
+    if (!(electrons[site] >= 1 && electrons[site] <= max_electrons)) return std::nullopt;
   }
   return electrons;
 }

@@ -19,7 +19,8 @@ void to_fraction(const RawDn& raw, const BlackPoint& black, PlaneView<float> out
 void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, RgbView<float> out, Executor& executor);
 
 /// Electrons that one FractionOfWhite stands for, per CFA site. With shot noise alone the variance of a fraction x is
-/// x / electrons, so this is 1 / NoiseProfile::scale. Nullopt where a scale is not positive and finite.
+/// x / electrons, so this is 1 / NoiseProfile::scale. Nullopt where that is not within 1 to 1e7:
+/// the deepest wells hold some 1e6.
 std::optional<PerSite<double>> electrons_at_white(const RawDn& raw, const NoiseProfile& noise);
 
 /// Fractions counted in electrons.

@@ -59,6 +59,7 @@ TEST(Command, WrongCommandLinesExitWithTwoAndOneLine) {
       {"develop", dog, "-o", png, "--space", "adobe"},
       {"develop", dog, "-o", png, "--space", "camera"},
       {"develop", dog, "-o", png, "--space", "xyz"},
+      {"develop", dog, "-o", png, "--format", "jpg"},
       {"develop", dog, "-o", png, "--bits", "12"},
       {"develop", dog, "-o", png, "--bits", "32"},
       {"develop", dog, "-o", scratch.file("x.jpg"), "--bits", "16"},
@@ -204,6 +205,12 @@ TEST(Command, OrientationIsAppliedToThePixels) {
   const Json report = Json::parse(result.out)[0];
   EXPECT_EQ(report["width"], 48);
   EXPECT_EQ(report["height"], 64);
+}
+
+TEST(Command, AFullStandardOutputIsAFailure) {
+  EXPECT_EQ(
+      test::run_process({"sh", "-c", std::string(LOWLUX_COMMAND) + " info " + dog + " --json > /dev/full"}).exit_code,
+      1);
 }
 
 TEST(Command, TimingsNameTheStages) {

@@ -216,6 +216,17 @@ TEST(Develop, MissingColourIsAnErrorThatNamesTheWayOut) {
   EXPECT_TRUE(develop(frame, camera_float, executor));
 }
 
+TEST(Develop, MatricesThatMakeNoLightOfTheWhiteAreErrorsThatNameTheWayOut) {
+  RawFrame frame = sample_frame();
+  frame.colour.calibrations[0].xyz_to_camera = diagonal3({1, -1, 1});  // every camera RGB becomes a negative luminance
+  for (const auto mode : {WhiteBalanceChoice::Mode::as_shot, WhiteBalanceChoice::Mode::automatic}) {
+    const auto developed = develop(frame, {.white_balance = {mode}}, executor);
+    ASSERT_FALSE(developed);
+    EXPECT_NE(developed.error().message.find("--space camera"), std::string::npos) << developed.error().message;
+  }
+  EXPECT_TRUE(develop(frame, camera_float, executor));
+}
+
 TEST(Develop, OptionsThatContradictEachOtherAreErrors) {
   EXPECT_FALSE(develop(sample_frame(),
                        {.tone = ToneCurve::standard, .space = OutputSpace::linear_srgb, .samples = SampleType::f32},

@@ -88,6 +88,18 @@ TEST(MaskedBlack, RefusesUnstatedBordersFarFromTheTag) {
   EXPECT_TRUE(measure_masked_black(raw).black);
 }
 
+TEST(MaskedBlack, RefusesUnstatedBordersThatArePaddingOrCannotBeChecked) {
+  RawDn raw = frame_with_masked_columns(4);
+  raw.masked_is_stated = false;
+  raw.black_tag.reset();
+  EXPECT_FALSE(measure_masked_black(raw).black);
+  raw = frame_with_masked_columns(4);
+  raw.masked_is_stated = false;
+  for (int y = 0; y < side; ++y) std::fill_n(raw.dn.row(y), border, std::uint16_t{0});
+  raw.black_tag->pattern_dn = {10};
+  EXPECT_FALSE(measure_masked_black(raw).black);
+}
+
 TEST(MaskedBlack, RefusesTooFewPixels) {
   RawDn raw = frame_with_masked_columns(5);
   raw.masked = {{border - 8, 0, 8, side}};
@@ -133,6 +145,14 @@ TEST(BlackPoint, NeitherTagNorMaskedPixelsIsRefusedAndNotGuessed) {
   raw = frame_with_masked_columns(10);
   raw.masked.clear();
   EXPECT_FALSE(choose_black(raw, {BlackChoice::masked}));  // asked for, so the tag does not stand in
+}
+
+TEST(BlackPoint, FramesOfOneColumnHaveOneColumnOffset) {
+  RawDn raw = test::bayer_frame(1, 4, BayerPhase::rggb, [](int, int) { return 600; });
+  raw.black_tag = BlackLevel{.pattern_dn = {500}, .column_dn = {3}, .row_dn = {1, 2, 3, 4}};
+  const auto black = choose_black(raw, {BlackChoice::automatic});
+  ASSERT_TRUE(black);
+  EXPECT_EQ(black->pedestal_dn, (PerSite<double>{505, 505, 506, 506}));  // means over the rows of each parity
 }
 
 TEST(BlackPoint, GivenFiguresAreTakenAsTheyAre) {

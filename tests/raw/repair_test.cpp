@@ -94,6 +94,7 @@ TEST(NamedDefects, AreClippedToTheFrameSortedAndEachOnce) {
   const RawDn raw = test::bayer_frame(8, 8, BayerPhase::rggb, [](int, int) { return 0; });
   EXPECT_EQ(named_defects(raw, {{6, 6, 4, 1}, {1, 2, 1, 1}, {6, 6, 1, 1}, {-3, -3, 2, 2}, {100, 0, 1, 1}}),
             (std::vector<Pixel>{{1, 2}, {6, 6}, {7, 6}}));
+  EXPECT_FALSE(named_defects(raw, {{0, 0, 8, 8}}));  // a source that names everything is at fault
 }
 
 Plane<float> ramp(int width, int height) {
