@@ -41,12 +41,6 @@ std::vector<Pixel> all_defects(const RawFrame& frame, DevelopPlan& plan, double 
   return merged(defects, found);
 }
 
-double mean_range_dn(const RawDn& raw, const BlackPoint& black) {
-  double range = 0;
-  for (int site = 0; site < 4; ++site) range += (white_at(raw, site) - black.pedestal_dn[site]) / 4;
-  return range;
-}
-
 Result<WhiteBalance> choose_white(const RawFrame& frame, const DevelopOptions& o, const Thumbnail& thumbnail) {
   using Mode = WhiteBalanceChoice::Mode;
   if (frame.raw.layout == SensorLayout::monochrome) return WhiteBalance{};

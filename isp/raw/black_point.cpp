@@ -76,6 +76,12 @@ double white_at(const RawDn& raw, int site) {
   return raw.white_dn[static_cast<int>(colour_at(raw.phase, site & 1, site >> 1))];
 }
 
+double mean_range_dn(const RawDn& raw, const BlackPoint& black) {
+  double range = 0;
+  for (int site = 0; site < 4; ++site) range += (white_at(raw, site) - black.pedestal_dn[site]) / 4;
+  return range;
+}
+
 Result<BlackPoint> choose_black(const RawDn& raw, const BlackRequest& request) {
   Result<BlackPoint> black = requested_black(raw, request);
   if (!black) return black;

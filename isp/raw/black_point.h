@@ -25,4 +25,7 @@ Result<BlackPoint> choose_black(const RawDn& raw, const BlackRequest& request);
 /// White level of the site's colour [DN]; for SensorLayout::linear_rgb sites 0 to 3 are R, G, B and B.
 double white_at(const RawDn& raw, int site);
 
+/// White level above black [DN], mean of the four sites.
+double mean_range_dn(const RawDn& raw, const BlackPoint& black);
+
 }  // namespace lowlux::isp

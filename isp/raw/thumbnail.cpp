@@ -105,12 +105,6 @@ std::array<double, 3> colour_means(const RawDn& raw, const BlackPoint& black, co
   return sum;
 }
 
-double mean_range_dn(const RawDn& raw, const BlackPoint& black) {
-  double range = 0;
-  for (int site = 0; site < 4; ++site) range += (white_at(raw, site) - black.pedestal_dn[site]) / 4;
-  return range;
-}
-
 double black_noise(const RawFrame& frame, const BlackPoint& black, std::vector<double> block_differences_dn) {
   const double range = mean_range_dn(frame.raw, black);
   const double measured = *std::max_element(black.noise_std_dn.begin(), black.noise_std_dn.end());
