@@ -146,16 +146,13 @@ Thumbnail make_thumbnail(const RawFrame& frame, const BlackPoint& black, Executo
       sum_block_row(raw, l, r, &blocks[static_cast<std::size_t>(r) * l.columns]);
   });
 
-  Thumbnail out{CameraRgb(l.columns, l.rows), Plane<float>(l.columns, l.rows), 0};
+  Thumbnail out{CameraRgb(l.columns, l.rows), 0};
   std::vector<double> differences;
   for (int y = 0; y < l.rows; ++y) {
     for (int x = 0; x < l.columns; ++x) {
       const BlockSums& block = blocks[static_cast<std::size_t>(y) * l.columns + x];
       const std::array<double, 3> mean = colour_means(raw, black, block);
       for (int c = 0; c < 3; ++c) out.mean.plane[c].at(x, y) = static_cast<float>(mean[c]);
-      const std::int64_t n = block.n[0] + block.n[1] + block.n[2] + block.n[3];
-      out.clipped_fraction.at(x, y) =
-          static_cast<float>(static_cast<double>(block.clipped) / static_cast<double>(std::max<std::int64_t>(n, 1)));
       if (block.difference > 0 && block.clipped == 0)
         differences.push_back(static_cast<double>(block.difference) / static_cast<double>(block.differences));
     }

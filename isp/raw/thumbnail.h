@@ -10,9 +10,8 @@ namespace lowlux::isp {
 
 /// A frame as means over square blocks, for the decisions that look at the whole picture.
 struct Thumbnail {
-  CameraRgb mean;                 // block means, fraction of white, signed, not white balanced; at most 256 x 256
-  Plane<float> clipped_fraction;  // share of each block's samples at or above the lowest white level
-  double black_noise_std = 0;     // of one raw pixel without light, fraction of white; 0 if nothing tells
+  CameraRgb mean;              // block means, fraction of white, signed, not white balanced; at most 256 x 256
+  double black_noise_std = 0;  // of one raw pixel without light, fraction of white; 0 if nothing tells
 };
 
 /// Block means of the active area, saturated samples included; sums are integers, so any thread count gives the same.
