@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "isp/base/spectrum.h"
+
+namespace lowlux {
+
+/// How the converter makes a code of a voltage: the nearest one, or the one below (thesis Eq. 4.10).
+enum class Quantisation : std::uint8_t { round, floor };
+
+/// An image sensor at one gain setting, in the terms of EMVA 1288. Figures of three are those of R, G and B.
+/// What is 0 by default is an effect the sensor does not have. Checked by isp::check_sensor.
+struct SensorModel {
+  std::string name;
+  double system_gain_dn_per_e = 1;  // K
+  double read_noise_e = 0;          // temporal dark noise without dark current's
+  double full_well_e = 0;           // saturation capacity: the charge at which a pixel is full
+  int bits = 12;                    // of the converter
+  double black_level_dn = 0;        // pedestal: the mean code of no charge
+  double white_level_dn = 4095;     // largest code the converter gives
+  Quantisation quantisation = Quantisation::round;
+
+  /// Mean dark current at dark_temperature_c; it doubles every dark_doubling_c degrees.
+  std::array<double, 3> dark_current_e_per_s{};
+  double dark_temperature_c = 20;
+  double dark_doubling_c = 7;
+
+  double prnu = 0;                // standard deviation of the pixels' sensitivity, relative to its mean
+  double dsnu = 0;                // standard deviation of the pixels' dark current, relative to its mean
+  double hot_pixel_fraction = 0;  // of all pixels
+  double hot_pixel_current_e_per_s =
+      0;                      // mean of their extra dark current, exponentially distributed; same temperature law
+  double row_noise_e = 0;     // standard deviation of an offset drawn for each row of each frame
+  double column_noise_e = 0;  // the same for each column, fixed
+};
+
+/// What light does to the sensor: electrons in one pixel for radiance in front of the camera.
+///     mu_k [e-] = exposure_s * etendue_m2_sr * integral of photons(nm) * quantum_efficiency[k](nm)
+/// with photons in s-1 m-2 sr-1 nm-1 (isp/model/photon.h).
+struct SpectralResponse {
+  std::string name;
+  std::array<Spectrum, 3> quantum_efficiency;  // of R, G, B [e- per photon]; filters and optics included
+  double etendue_m2_sr = 0;                    // pixel area times solid angle
+};
+
+}  // namespace lowlux
