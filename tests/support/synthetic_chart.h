@@ -11,7 +11,7 @@
 
 namespace lowlux::test {
 
-/// What to photograph with what. Names are those of the tables in testdata/spectra and of isp::light_named.
+/// What to photograph with what. Names are those of isp::camera_names and isp::light_named.
 struct ChartSetup {
   std::string camera = "Nikon_D5100";
   std::string light = "D65";
@@ -30,13 +30,13 @@ struct SyntheticChart {
 };
 
 /// The 24 patches from Ohta's reflectances. Camera RGB and XYZ are integrals over the light's nodes.
-/// ColorMatrix (and ForwardMatrix) come from least squares on training_reflectances(), which hold no patch of a chart.
+/// ColorMatrix (and ForwardMatrix) come from least squares on isp::training_reflectances(), which hold no patch of a chart.
 Result<SyntheticChart> photograph_chart(const ChartSetup& setup);
 
 /// Each training reflectance seen under the setup's light: for scenes that are not the chart.
 Result<std::vector<Vector3>> photograph_training_set(const ChartSetup& setup);
 
-/// The cameras of testdata/spectra.
+/// All cameras there are.
 std::vector<std::string> chart_cameras();
 
 }  // namespace lowlux::test
