@@ -33,6 +33,11 @@ Xyz xyz_of(const Spectrum& power) {
   return xyz_of(sum);
 }
 
+Xyz xyz_cd_m2(const Spectrum& radiance) {
+  const Xyz sum = xyz_of(radiance);
+  return {luminous_efficacy_lm_w * sum.x, luminous_efficacy_lm_w * sum.y, luminous_efficacy_lm_w * sum.z};
+}
+
 std::optional<Xyz> xyz_of_reflectance(const Spectrum& reflectance, const Spectrum& light) {
   const double white_y = xyz_of(light).y;
   if (!(white_y > 0)) return std::nullopt;

@@ -22,8 +22,14 @@ std::optional<Spectrum> light_named(std::string_view name);
 /// All names light_named() knows.
 std::vector<std::string_view> light_names();
 
+/// Maximum luminous efficacy K_m of photopic vision (CIE 018:2019), in the rounding all of photometry uses.
+inline constexpr double luminous_efficacy_lm_w = 683;
+
 /// XYZ of a spectral power, the integral of power times colour-matching function [power x nm], on its own nodes.
 Xyz xyz_of(const Spectrum& power);
+
+/// XYZ in absolute terms of a spectral radiance [W m-2 sr-1 nm-1]: Y is its luminance [cd/m2].
+Xyz xyz_cd_m2(const Spectrum& radiance);
 
 /// XYZ of a reflectance (0..1) under a light, Y = 1 for the perfect diffuser; nullopt if the light has no luminance.
 /// The nodes are the light's.

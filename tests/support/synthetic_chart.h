@@ -36,7 +36,7 @@ Result<SyntheticChart> photograph_chart(const ChartSetup& setup);
 /// Each training reflectance seen under the setup's light: for scenes that are not the chart.
 Result<std::vector<Vector3>> photograph_training_set(const ChartSetup& setup);
 
-/// All cameras there are.
+/// All still cameras there are. (The thesis' video camera is a rough instrument: its fitted curves have flat floors.)
 std::vector<std::string> chart_cameras();
 
 }  // namespace lowlux::test

@@ -1,0 +1,143 @@
+#include "isp/model/noise_budget.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <initializer_list>
+#include <numbers>
+#include <string>
+
+namespace lowlux::isp {
+namespace {
+
+struct Named {
+  const char* name;
+  double value;
+};
+
+std::string text_of(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
+Result<void> check_not_negative(const SensorModel& s) {
+  for (const Named& figure : std::initializer_list<Named>{{"read noise", s.read_noise_e},
+                                                          {"dark current of red", s.dark_current_e_per_s[0]},
+                                                          {"dark current of green", s.dark_current_e_per_s[1]},
+                                                          {"dark current of blue", s.dark_current_e_per_s[2]},
+                                                          {"photo response non-uniformity", s.prnu},
+                                                          {"dark signal non-uniformity", s.dsnu},
+                                                          {"fraction of hot pixels", s.hot_pixel_fraction},
+                                                          {"dark current of hot pixels", s.hot_pixel_current_e_per_s},
+                                                          {"row noise", s.row_noise_e},
+                                                          {"column noise", s.column_noise_e}}) {
+    if (!(figure.value >= 0) || !(figure.value <= 1e9)) {
+      return fail(ErrorCode::invalid_argument,
+                  std::string("the ") + figure.name + " must lie between 0 and 1e9, found " + text_of(figure.value),
+                  s.name);
+    }
+  }
+  return {};
+}
+
+double density(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi); }
+
+/// Probability that a standard normal variable lies between a and b, without cancellation in either tail.
+double probability(double a, double b) {
+  if (a > 0) return probability(-b, -a);
+  return 0.5 * (std::erfc(-b / std::numbers::sqrt2) - std::erfc(-a / std::numbers::sqrt2));
+}
+
+}  // namespace
+
+Result<void> check_sensor(const SensorModel& s) {
+  if (const auto good = check_not_negative(s); !good) return good;
+  const auto wrong = [&](const std::string& what) { return fail(ErrorCode::invalid_argument, what, s.name); };
+  if (!(s.system_gain_dn_per_e > 0) || !(s.system_gain_dn_per_e <= 1e6)) {
+    return wrong("the system gain must be above 0 and at most 1e6 DN/e-, found " + text_of(s.system_gain_dn_per_e));
+  }
+  if (!(s.full_well_e > 0) || !(s.full_well_e <= largest_full_well_e)) {
+    return wrong("the full well must be above 0 and at most 990000 e-, found " + text_of(s.full_well_e));
+  }
+  if (s.bits < 1 || s.bits > 16) return wrong("a converter has 1 to 16 bits, found " + std::to_string(s.bits));
+  const double largest_code = (1 << s.bits) - 1;
+  if (!(s.black_level_dn >= 0) || !(s.white_level_dn <= largest_code) || !(s.black_level_dn < s.white_level_dn)) {
+    return wrong("black and white level must be 0 <= black < white <= " + text_of(largest_code) + ", found " +
+                 text_of(s.black_level_dn) + " and " + text_of(s.white_level_dn));
+  }
+  if (s.hot_pixel_fraction > 1 || s.prnu > 1 || s.dsnu > 1) {
+    return wrong("non-uniformities and the fraction of hot pixels are at most 1");
+  }
+  if (!(s.dark_doubling_c >= 1) || !(s.dark_doubling_c <= 1e3) || !(std::fabs(s.dark_temperature_c) <= 200)) {
+    return wrong("the dark current must double every 1 to 1000 degrees, found " + text_of(s.dark_doubling_c));
+  }
+  return {};
+}
+
+Result<void> check_exposure(const Exposure& exposure) {
+  if (!(exposure.time_s >= 0) || !(exposure.time_s <= 1e6)) {
+    return fail(ErrorCode::invalid_argument,
+                "the exposure time must lie between 0 and 1e6 s, found " + text_of(exposure.time_s));
+  }
+  if (!(exposure.temperature_c >= -100) || !(exposure.temperature_c <= 150)) {
+    return fail(ErrorCode::invalid_argument,
+                "the sensor's temperature must lie between -100 and 150 C, found " + text_of(exposure.temperature_c));
+  }
+  return {};
+}
+
+double dark_current_factor(const SensorModel& sensor, double temperature_c) {
+  return std::exp2((temperature_c - sensor.dark_temperature_c) / sensor.dark_doubling_c);
+}
+
+std::array<double, 3> dark_mean_e(const SensorModel& sensor, const Exposure& exposure) {
+  const double factor = exposure.time_s * dark_current_factor(sensor, exposure.temperature_c);
+  std::array<double, 3> mean{};
+  for (int k = 0; k < 3; ++k) mean[k] = sensor.dark_current_e_per_s[k] * factor;
+  return mean;
+}
+
+double saturation_charge_e(const SensorModel& sensor) {
+  return std::min(sensor.full_well_e, (sensor.white_level_dn - sensor.black_level_dn) / sensor.system_gain_dn_per_e);
+}
+
+double variance_dn2(const SensorModel& sensor, const MeanCharge& charge) {
+  const double variance_e2 = charge.signal_e + charge.dark_e + sensor.read_noise_e * sensor.read_noise_e;
+  return sensor.system_gain_dn_per_e * sensor.system_gain_dn_per_e * variance_e2 + 1.0 / 12;
+}
+
+double snr(const SensorModel& sensor, const MeanCharge& charge) {
+  const double signal_dn = sensor.system_gain_dn_per_e * charge.signal_e;
+  return signal_dn * signal_dn / variance_dn2(sensor, charge);
+}
+
+Moments clamped_normal(const Moments& normal, double low, double high) {
+  const double s = std::sqrt(std::max(normal.variance, 0.0));
+  const double centre = std::clamp(normal.mean, low, high);
+  if (s == 0) return {centre, 0};
+  // Moments about `centre`, so that a variable far outside its bounds keeps its digits.
+  const double a = (low - normal.mean) / s, b = (high - normal.mean) / s;
+  const double below = probability(-INFINITY, a), inside = probability(a, b), above = probability(b, INFINITY);
+  const double phi_a = std::isinf(a) ? 0 : density(a), phi_b = std::isinf(b) ? 0 : density(b);
+  const double a_phi_a = std::isinf(a) ? 0 : a * phi_a, b_phi_b = std::isinf(b) ? 0 : b * phi_b;
+  const double shift = normal.mean - centre;
+  const double first = inside * shift + s * (phi_a - phi_b);  // E[(X - centre) inside]
+  const double second =
+      inside * (shift * shift + s * s) + 2 * shift * s * (phi_a - phi_b) + s * s * (a_phi_a - b_phi_b);
+  const double to_low = below > 0 ? low - centre : 0, to_high = above > 0 ? high - centre : 0;
+  const double mean = first + below * to_low + above * to_high;
+  const double square = second + below * to_low * to_low + above * to_high * to_high;
+  return {centre + mean, std::max(square - mean * mean, 0.0)};
+}
+
+QuantisationBounds quantisation_bounds(double std_dn) {
+  const double s2 = std_dn * std_dn;
+  const double first = std::exp(-2 * std::numbers::pi * std::numbers::pi * s2);
+  const double tail = first < 1 ? 1 / (1 - first) : INFINITY;  // of the series, geometric at worst
+  const double mean = std::min(0.5, first * tail / std::numbers::pi);
+  const double variance = (4 * s2 + 1 / (std::numbers::pi * std::numbers::pi)) * first * tail + mean * mean;
+  return {mean, std::min(variance, s2 + 0.25)};
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,124 @@
+#include "isp/model/spectral_response.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "isp/base/near_match.h"
+#include "isp/model/cie_data.h"
+#include "isp/model/noise_budget.h"
+#include "isp/model/spectral_data.h"
+
+namespace lowlux::isp {
+namespace {
+
+Spectrum mapped(const Spectrum& spectrum, const auto& value) {
+  const auto nm = spectrum.wavelengths_nm();
+  std::vector<double> out(nm.size());
+  for (std::size_t i = 0; i < nm.size(); ++i) out[i] = value(nm[i], spectrum.values()[i]);
+  return *Spectrum::of({nm.begin(), nm.end()}, std::move(out));
+}
+
+/// Quantum efficiency of R, G, B up to a factor: response per joule divided by photons per joule, largest value 1.
+Result<std::array<Spectrum, 3>> relative_quantum_efficiency(const std::string& camera) {
+  auto sensitivity = camera_sensitivity(camera);
+  if (!sensitivity) {
+    const auto names = camera_names();
+    std::string near;
+    for (const std::string_view name : near_matches(camera, names))
+      near += (near.empty() ? "" : ", ") + std::string(name);
+    return fail(ErrorCode::not_found, "there are no spectral sensitivities of a '" + camera + "'" +
+                                          (near.empty() ? "" : "; near it: " + near));
+  }
+  double peak = 0;
+  for (Spectrum& channel : *sensitivity) {
+    channel = mapped(channel, [](double nm, double value) { return value / nm; });
+    peak = std::max(peak, std::ranges::max(channel.values()));
+  }
+  for (Spectrum& channel : *sensitivity) {
+    channel = mapped(channel, [&](double, double value) { return value / peak; });
+  }
+  return *std::move(sensitivity);
+}
+
+/// The etendue at which a white of this luminance under D65 gives `charge_e` to the most sensitive channel in 1 s.
+double etendue_for(const SpectralResponse& response, double luminance_cd_m2, double charge_e) {
+  SpectralResponse unit = response;
+  unit.etendue_m2_sr = 1;
+  const Vector3 rate = electron_rate(unit, *radiance_of(*light_named("D65"), luminance_cd_m2));
+  return charge_e / *std::max_element(rate.begin(), rate.end());
+}
+
+}  // namespace
+
+Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Optics& optics) {
+  if (!(optics.f_number >= 0.5) || !(optics.f_number <= 1000)) {
+    return fail(ErrorCode::invalid_argument, "the f-number must lie between 0.5 and 1000");
+  }
+  auto efficiency = relative_quantum_efficiency(sensor.camera);
+  if (!efficiency) return tl::make_unexpected(efficiency.error());
+  const double peak = sensor.peak_quantum_efficiency.value_or(assumed_peak_quantum_efficiency);
+  if (!(peak > 0) || !(peak <= 1)) {
+    return fail(ErrorCode::invalid_argument, "a peak quantum efficiency lies above 0 and at most at 1");
+  }
+  for (Spectrum& channel : *efficiency) channel = mapped(channel, [&](double, double value) { return peak * value; });
+  SpectralResponse out{sensor.model.name + " through the filters of " + sensor.camera, *std::move(efficiency), 0};
+
+  auto white = optics.white_luminance_cd_m2;
+  if (!white && sensor.model.name == thesis_sensor) white = thesis_white_luminance_cd_m2;
+  const double n2 = optics.f_number * optics.f_number;
+  if (white) {
+    if (!(*white > 0) || !(*white <= 1e12)) {
+      return fail(ErrorCode::invalid_argument,
+                  "the luminance that fills a pixel must lie above 0 and below 1e12 cd/m2");
+    }
+    out.etendue_m2_sr = etendue_for(out, *white, saturation_charge_e(sensor.model));
+  } else if (sensor.pixel_pitch_um && sensor.peak_quantum_efficiency) {
+    if (!(*sensor.pixel_pitch_um > 0) || !(*sensor.pixel_pitch_um <= 1000)) {
+      return fail(ErrorCode::invalid_argument, "a pixel pitch lies above 0 and at most at 1000 um");
+    }
+    const double pitch_m = *sensor.pixel_pitch_um * 1e-6;
+    out.etendue_m2_sr = pitch_m * pitch_m * std::numbers::pi / (4 * n2);
+  } else if (sensor.iso) {
+    if (!(*sensor.iso > 0)) return fail(ErrorCode::invalid_argument, "an ISO speed is positive");
+    out.etendue_m2_sr = etendue_for(out, 78 * n2 / (0.65 * *sensor.iso), saturation_charge_e(sensor.model));
+  } else {
+    return fail(
+        ErrorCode::insufficient,
+        "no source tells how much light the sensor " + sensor.model.name +
+            " needs; give --pixel-pitch and --peak-qe, or --iso, or --white-luminance (the luminance that fills "
+            "a pixel in 1 s)");
+  }
+  return out;
+}
+
+Vector3 electron_rate(const SpectralResponse& response, const Spectrum& radiance) {
+  Vector3 rate{};
+  for (int k = 0; k < 3; ++k) {
+    rate[k] = response.etendue_m2_sr * integrate(radiance, [&](double nm) {
+                return photons_per_joule(nm) * response.quantum_efficiency[k].at(nm);
+              });
+  }
+  return rate;
+}
+
+double photons_per_joule(double wavelength_nm) {
+  constexpr double planck_j_s = 6.62607015e-34, light_m_s = 299792458;  // exact: SI, 9th edition, 2019
+  return wavelength_nm * 1e-9 / (planck_j_s * light_m_s);
+}
+
+std::optional<Spectrum> radiance_of(const Spectrum& light, double luminance_cd_m2) {
+  const double y = luminous_efficacy_lm_w * xyz_of(light).y;
+  if (!(y > 0)) return std::nullopt;
+  return mapped(light, [&](double, double value) { return value * luminance_cd_m2 / y; });
+}
+
+double saturation_luminance_cd_m2(const SensorModel& sensor, const SpectralResponse& response, double time_s) {
+  const Vector3 rate = electron_rate(response, *radiance_of(*light_named("D65"), 1));
+  return saturation_charge_e(sensor) / (time_s * *std::max_element(rate.begin(), rate.end()));
+}
+
+}  // namespace lowlux::isp
