@@ -1,0 +1,137 @@
+#include "capture/synthetic/exposed_scene.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "isp/model/cie_data.h"
+#include "isp/model/spectral_response.h"
+
+namespace lowlux::capture {
+namespace {
+
+/// A chromaticity inside the triangle of the Rec.709 primaries can always be lifted; the others are looked at closely.
+bool inside_rec709(float x, float y) {
+  // Edges blue-red, red-green, green-blue of (0.15, 0.06), (0.64, 0.33), (0.30, 0.60).
+  return 0.49f * (y - 0.06f) - 0.27f * (x - 0.15f) >= 0 && -0.34f * (y - 0.33f) - 0.27f * (x - 0.64f) >= 0 &&
+         -0.15f * (y - 0.60f) + 0.54f * (x - 0.30f) >= 0;
+}
+
+struct LiftPlace {
+  float sum, x, y;  // X + Y + Z and a liftable chromaticity
+  bool moved;
+};
+
+LiftPlace place_of(float x, float y, float z) {
+  const float sum = x + y + z;
+  if (!(sum > 0)) return {0, 1 / 3.0f, 1 / 3.0f, false};
+  const float cx = x / sum, cy = y / sum;
+  if (inside_rec709(cx, cy)) return {sum, cx, cy, false};
+  const isp::Xy near = isp::liftable({cx, cy});
+  const bool moved = std::hypot(near.x - cx, near.y - cy) > 1e-6;
+  return {sum, static_cast<float>(near.x), static_cast<float>(near.y), moved};
+}
+
+std::vector<Vector3> patch_rates(const Scene& scene, const SpectralResponse& response) {
+  std::vector<Vector3> rates;
+  rates.reserve(scene.radiances.size());
+  for (const Spectrum& radiance : scene.radiances) rates.push_back(isp::electron_rate(response, radiance));
+  return rates;
+}
+
+/// Share of a Gaussian of standard deviation `spread` that falls on the pixel `offset` away from its centre.
+double share_of(double offset, double spread) {
+  const double unit = spread * std::numbers::sqrt2;
+  return 0.5 * (std::erf((offset + 0.5) / unit) - std::erf((offset - 0.5) / unit));
+}
+
+/// Calls add(x, y, share) for the pixels a point falls on.
+template <class Add>
+void spread_point(const PointSource& point, int width, int height, const Add& add) {
+  const int reach = static_cast<int>(std::ceil(6 * point.spread_px)) + 1;
+  const int cx = static_cast<int>(std::lround(point.x_px)), cy = static_cast<int>(std::lround(point.y_px));
+  for (int y = std::max(0, cy - reach); y <= std::min(height - 1, cy + reach); ++y) {
+    const double row_share = share_of(y - point.y_px, point.spread_px);
+    for (int x = std::max(0, cx - reach); x <= std::min(width - 1, cx + reach); ++x) {
+      add(x, y, row_share * share_of(x - point.x_px, point.spread_px));
+    }
+  }
+}
+
+/// Calls put(x, y, rates) for every pixel, where rates(k) gives channel k without the points.
+/// @return how many colours had to be moved
+template <class Put>
+std::int64_t for_each_pixel(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
+                            Executor& executor, const Put& put) {
+  const std::vector<Vector3> patches = patch_rates(scene, response);
+  const int width = scene.xyz_cd_m2.width();
+  std::atomic<std::int64_t> moved{0};
+  for_each_band(executor, scene.xyz_cd_m2.height(), [&](RowBand band, int) {
+    std::int64_t moved_here = 0;
+    for (int y = band.first; y < band.last; ++y) {
+      const float* row[3] = {scene.xyz_cd_m2.plane[0].row(y), scene.xyz_cd_m2.plane[1].row(y),
+                             scene.xyz_cd_m2.plane[2].row(y)};
+      const std::uint16_t* patch = scene.patch.empty() ? nullptr : scene.patch.row(y);
+      for (int x = 0; x < width; ++x) {
+        if (patch != nullptr && patch[x] > 0) {
+          put(x, y, [&](int k) { return static_cast<float>(patches[patch[x] - 1][k]); });
+        } else {
+          const LiftPlace p = place_of(row[0][x], row[1][x], row[2][x]);
+          moved_here += p.moved;
+          put(x, y, [&](int k) { return p.sum * table.response(k, p.x, p.y); });
+        }
+      }
+    }
+    moved += moved_here;
+  });
+  return moved;
+}
+
+}  // namespace
+
+ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
+                       BayerPhase phase, Executor& executor) {
+  const int width = scene.xyz_cd_m2.width(), height = scene.xyz_cd_m2.height();
+  ChargeRate out{Plane<float>(width, height), 0};
+  out.moved_pixels = for_each_pixel(scene, response, table, executor, [&](int x, int y, const auto& rate) {
+    out.e_per_s.row(y)[x] = rate(static_cast<int>(colour_at(phase, x, y)));
+  });
+  for (const PointSource& point : scene.points) {
+    const Vector3 rate = isp::electron_rate(response, point.radiance);
+    spread_point(point, width, height, [&](int x, int y, double share) {
+      out.e_per_s.at(x, y) += static_cast<float>(share * rate[static_cast<int>(colour_at(phase, x, y))]);
+    });
+  }
+  return out;
+}
+
+CameraRgb charge_rate_rgb(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
+                          Executor& executor) {
+  const int width = scene.xyz_cd_m2.width(), height = scene.xyz_cd_m2.height();
+  CameraRgb out(width, height);
+  for_each_pixel(scene, response, table, executor, [&](int x, int y, const auto& rate) {
+    for (int k = 0; k < 3; ++k) out.plane[k].row(y)[x] = rate(k);
+  });
+  for (const PointSource& point : scene.points) {
+    const Vector3 rate = isp::electron_rate(response, point.radiance);
+    spread_point(point, width, height, [&](int x, int y, double share) {
+      for (int k = 0; k < 3; ++k) out.plane[k].at(x, y) += static_cast<float>(share * rate[k]);
+    });
+  }
+  return out;
+}
+
+void add_points(const Scene& scene, SceneLinear& xyz_cd_m2) {
+  for (const PointSource& point : scene.points) {
+    const Vector3 xyz = isp::vector_of(isp::xyz_cd_m2(point.radiance));
+    spread_point(point, xyz_cd_m2.width(), xyz_cd_m2.height(), [&](int x, int y, double share) {
+      for (int k = 0; k < 3; ++k) {
+        xyz_cd_m2.plane[k].at(x, y) += static_cast<float>(share * xyz[k]);
+      }
+    });
+  }
+}
+
+}  // namespace lowlux::capture

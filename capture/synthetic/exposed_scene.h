@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+
+#include "capture/synthetic/scene.h"
+#include "isp/base/cfa.h"
+#include "isp/base/executor.h"
+#include "isp/base/image.h"
+#include "isp/base/sensor.h"
+#include "isp/model/spectral_lift.h"
+
+namespace lowlux::capture {
+
+/// What the light of a scene does in a sensor, before any noise.
+struct ChargeRate {
+  Plane<float> e_per_s;           // height x width: mean electrons per second under each pixel's own filter
+  std::int64_t moved_pixels = 0;  // of a colour no light can have: moved towards white until one could
+};
+
+/// Patches and points by the integrals of their spectra, other pixels by the table.
+ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
+                       BayerPhase phase, Executor& executor);
+
+/// The same under all three filters at every pixel: the noise-free truth of a demosaiced, black-subtracted frame
+/// [e- per s].
+CameraRgb charge_rate_rgb(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
+                          Executor& executor);
+
+/// Adds the point sources to the scene's colours: the truth as XYZ [cd/m2].
+void add_points(const Scene& scene, SceneLinear& xyz_cd_m2);
+
+}  // namespace lowlux::capture

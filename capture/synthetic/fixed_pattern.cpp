@@ -1,0 +1,53 @@
+#include "capture/synthetic/fixed_pattern.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "isp/base/random.h"
+
+namespace lowlux::capture {
+namespace {
+
+constexpr int prnu_word = 0, dsnu_word = 1, is_hot_word = 2, how_hot_word = 3;
+
+void multiply(const PatternRow& row, int word, float deviation, std::span<float> values, std::span<float> scratch) {
+  const auto z = scratch.first(values.size());
+  normal_row({row.seed, 0, draw_purpose::fixed_pattern}, row.x0, row.y, word, z);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] *= std::max(0.0f, 1.0f + deviation * z[i]);
+}
+
+}  // namespace
+
+void apply_prnu(const PatternRow& row, float deviation, std::span<float> values, std::span<float> scratch) {
+  multiply(row, prnu_word, deviation, values, scratch);
+}
+
+void apply_dsnu(const PatternRow& row, float deviation, std::span<float> values, std::span<float> scratch) {
+  multiply(row, dsnu_word, deviation, values, scratch);
+}
+
+void add_hot_pixels(const PatternRow& row, double fraction, double mean_e, std::span<float> charge_e,
+                    std::span<std::uint32_t> scratch) {
+  const DrawStream stream{row.seed, 0, draw_purpose::fixed_pattern};
+  const auto is_hot = scratch.first(charge_e.size());
+  words_row(stream, row.x0, row.y, is_hot_word, is_hot);
+  const double threshold = fraction * 0x1p32;
+  for (std::size_t i = 0; i < charge_e.size(); ++i) {
+    if (is_hot[i] + 0.5 >= threshold) continue;
+    const PhiloxWords words = words_at(stream, row.x0 + static_cast<std::uint32_t>(i), row.y);
+    charge_e[i] += static_cast<float>(-mean_e * std::log((words[how_hot_word] + 0.5) * 0x1p-32));
+  }
+}
+
+void add_column_pattern(const PatternRow& row, float deviation_e, std::span<float> offset_e, std::span<float> scratch) {
+  const auto z = scratch.first(offset_e.size());
+  normal_row({row.seed, 0, draw_purpose::column_noise}, row.x0, 0, 0, z);
+  for (std::size_t i = 0; i < offset_e.size(); ++i) offset_e[i] += deviation_e * z[i];
+}
+
+float row_offset_e(std::uint64_t seed, std::uint32_t frame, std::uint32_t y, float deviation_e) {
+  return deviation_e * normal_of_word(words_at({seed, frame, draw_purpose::row_noise}, 0, y)[0]);
+}
+
+}  // namespace lowlux::capture

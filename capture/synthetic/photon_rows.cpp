@@ -1,0 +1,103 @@
+#include "capture/synthetic/photon_rows.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "isp/base/random.h"
+#include "isp/model/cie_data.h"
+#include "isp/model/spectral_response.h"
+
+namespace lowlux::capture {
+namespace {
+
+/// Weight of node i in the trapezium rule [nm].
+double weight_nm(std::span<const double> nm, std::size_t i) {
+  const double left = i > 0 ? nm[i] - nm[i - 1] : 0, right = i + 1 < nm.size() ? nm[i + 1] - nm[i] : 0;
+  return (left + right) / 2;
+}
+
+}  // namespace
+
+PhotonRows::PhotonRows(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
+                       BayerPhase phase)
+    : scene_(scene), table_(table), phase_(phase) {
+  const auto bins_of = [&](const Spectrum& radiance) {
+    std::vector<Bin> bins;
+    const auto nm = radiance.wavelengths_nm();
+    for (std::size_t i = 0; i < nm.size(); ++i) {
+      Bin bin{};
+      bin.photons_per_s = static_cast<float>(radiance.values()[i] * weight_nm(nm, i) * isp::photons_per_joule(nm[i]) *
+                                             response.etendue_m2_sr);
+      for (int k = 0; k < 3; ++k) bin.efficiency[k] = static_cast<float>(response.quantum_efficiency[k].at(nm[i]));
+      bins.push_back(bin);
+    }
+    return bins;
+  };
+  for (const Spectrum& radiance : scene.radiances) patches_.push_back(bins_of(radiance));
+  std::vector<double> nm, ones;
+  for (int i = 0; i < isp::lift_nodes; ++i) {
+    nm.push_back(isp::lift_wavelength_nm(i));
+    ones.push_back(1);
+  }
+  lifted_ = bins_of(*Spectrum::of(std::move(nm), std::move(ones)));
+}
+
+void PhotonRows::collect(std::uint64_t seed, std::uint32_t frame, int x0, int y, double time_s,
+                         std::span<float> charge_e) const {
+  const std::uint16_t* patch = scene_.patch.empty() ? nullptr : scene_.patch.row(y);
+  const int count = static_cast<int>(charge_e.size());
+  for (int begin = 0; begin < count;) {
+    const int index = patch == nullptr ? 0 : patch[x0 + begin];
+    int end = begin + 1;
+    while (end < count && (patch == nullptr ? 0 : patch[x0 + end]) == index) ++end;
+    const auto run = charge_e.subspan(begin, end - begin);
+    if (index > 0) {
+      collect_patch(patches_[index - 1], seed, frame, x0 + begin, y, time_s, run);
+    } else {
+      collect_lifted(seed, frame, x0 + begin, y, time_s, run);
+    }
+    begin = end;
+  }
+}
+
+void PhotonRows::collect_patch(const std::vector<Bin>& bins, std::uint64_t seed, std::uint32_t frame, int x0, int y,
+                               double time_s, std::span<float> charge_e) const {
+  std::vector<float> photons(charge_e.size());
+  std::fill(charge_e.begin(), charge_e.end(), 0.0f);
+  for (std::size_t bin = 0; bin < bins.size(); ++bin) {
+    std::fill(photons.begin(), photons.end(), static_cast<float>(bins[bin].photons_per_s * time_s));
+    poisson_row({seed, frame, draw_purpose::wavelength_bin + static_cast<std::uint32_t>(bin)},
+                static_cast<std::uint32_t>(x0), static_cast<std::uint32_t>(y), photons, photons);
+    for (std::size_t i = 0; i < charge_e.size(); ++i) {
+      charge_e[i] +=
+          photons[i] * bins[bin].efficiency[static_cast<int>(colour_at(phase_, x0 + static_cast<int>(i), y))];
+    }
+  }
+}
+
+void PhotonRows::collect_lifted(std::uint64_t seed, std::uint32_t frame, int x0, int y, double time_s,
+                                std::span<float> charge_e) const {
+  const std::size_t count = charge_e.size();
+  std::vector<float> power(isp::lift_nodes * count), photons(count);  // radiance by bin, then by pixel
+  for (std::size_t i = 0; i < count; ++i) {
+    const int x = x0 + static_cast<int>(i);
+    const auto colour =
+        isp::lifted_power(table_, {scene_.xyz_cd_m2.plane[0].row(y)[x], scene_.xyz_cd_m2.plane[1].row(y)[x],
+                                   scene_.xyz_cd_m2.plane[2].row(y)[x]});
+    for (int bin = 0; bin < isp::lift_nodes; ++bin) power[bin * count + i] = colour[bin];
+  }
+  std::fill(charge_e.begin(), charge_e.end(), 0.0f);
+  for (int bin = 0; bin < isp::lift_nodes; ++bin) {
+    const auto scale = static_cast<float>(lifted_[bin].photons_per_s * time_s);
+    for (std::size_t i = 0; i < count; ++i) photons[i] = scale * power[bin * count + i];
+    poisson_row({seed, frame, draw_purpose::wavelength_bin + static_cast<std::uint32_t>(bin)},
+                static_cast<std::uint32_t>(x0), static_cast<std::uint32_t>(y), photons, photons);
+    for (std::size_t i = 0; i < count; ++i) {
+      charge_e[i] +=
+          photons[i] * lifted_[bin].efficiency[static_cast<int>(colour_at(phase_, x0 + static_cast<int>(i), y))];
+    }
+  }
+}
+
+}  // namespace lowlux::capture

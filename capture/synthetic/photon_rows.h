@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "capture/synthetic/scene.h"
+#include "isp/base/cfa.h"
+#include "isp/base/sensor.h"
+#include "isp/model/spectral_lift.h"
+
+namespace lowlux::capture {
+
+/// Photons sampled by wavelength, as the thesis publishes it (Eq. 4.4 to 4.6): X_i ~ Poisson(x_i) photons fall on a
+/// pixel in bin i, and sum X_i Qe_k(i) electrons are collected. The mean is right, the variance is sum x_i Qe_k(i)^2
+/// instead of sum x_i Qe_k(i): too small, because each photon is taken to give a fraction of an electron.
+/// Kept to reproduce the thesis; about a hundred draws for each pixel instead of one.
+class PhotonRows {
+ public:
+  PhotonRows(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table, BayerPhase phase);
+
+  /// Charge of the pixels (x0 + i, y) in `time_s` [e-], fractions included.
+  void collect(std::uint64_t seed, std::uint32_t frame, int x0, int y, double time_s, std::span<float> charge_e) const;
+
+ private:
+  /// What one bin of wavelengths contributes: photons per second, and electrons per photon in R, G, B.
+  struct Bin {
+    float photons_per_s;
+    std::array<float, 3> efficiency;
+  };
+  void collect_patch(const std::vector<Bin>& bins, std::uint64_t seed, std::uint32_t frame, int x0, int y,
+                     double time_s, std::span<float> charge_e) const;
+  void collect_lifted(std::uint64_t seed, std::uint32_t frame, int x0, int y, double time_s,
+                      std::span<float> charge_e) const;
+
+  const Scene& scene_;
+  const isp::LiftTable& table_;
+  BayerPhase phase_;
+  std::vector<std::vector<Bin>> patches_;
+  std::vector<Bin> lifted_;  // for a radiance of 1 W m-2 sr-1 nm-1
+};
+
+}  // namespace lowlux::capture

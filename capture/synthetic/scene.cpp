@@ -1,0 +1,151 @@
+#include "capture/synthetic/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "isp/base/random.h"
+#include "isp/model/cie_data.h"
+#include "isp/model/spectral_lift.h"
+#include "isp/model/spectral_response.h"
+
+namespace lowlux::capture {
+namespace {
+
+constexpr double most_pixels = 1 << 28;
+constexpr double brightest_cd_m2 = 1e12;
+constexpr double gap = 0.08;  // of a patch's pitch: the frame around it
+
+tl::unexpected<Error> wrong(const std::string& what, const std::string& where = {}) {
+  return fail(ErrorCode::invalid_argument, what, where);
+}
+
+Result<void> check_luminance(double luminance_cd_m2) {
+  if (luminance_cd_m2 >= 0 && luminance_cd_m2 <= brightest_cd_m2) return {};
+  return wrong("the luminance of a scene must lie between 0 and 1e12 cd/m2, found " + std::to_string(luminance_cd_m2));
+}
+
+/// A scene of one size without light, and the radiance of its white.
+Result<Scene> empty_scene(const SceneSetup& setup) {
+  if (setup.width < 1 || setup.height < 1 || static_cast<double>(setup.width) * setup.height > most_pixels) {
+    return wrong("a scene has 1 to 2^28 pixels, found " + std::to_string(setup.width) + " x " +
+                 std::to_string(setup.height));
+  }
+  if (const auto good = check_luminance(setup.luminance_cd_m2); !good) return tl::make_unexpected(good.error());
+  if (*std::min_element(setup.light.values().begin(), setup.light.values().end()) < 0) {
+    return wrong("a light has no negative power", setup.light_name);
+  }
+  auto white = isp::radiance_of(setup.light, setup.luminance_cd_m2);
+  if (!white) return wrong("a light without power between 380 and 780 nm lights nothing", setup.light_name);
+  Scene scene{SceneLinear(setup.width, setup.height), {}, {}, {}, *std::move(white), {}};
+  for (Plane<float>& plane : scene.xyz_cd_m2.plane) std::fill_n(plane.data(), plane.size(), 0.0f);
+  return scene;
+}
+
+void fill(Scene& scene, int x0, int y0, int x1, int y1, int radiance) {
+  const isp::Xyz xyz = isp::xyz_cd_m2(scene.radiances[radiance]);
+  const float colour[3] = {static_cast<float>(xyz.x), static_cast<float>(xyz.y), static_cast<float>(xyz.z)};
+  for (int y = y0; y < y1; ++y) {
+    std::fill(scene.patch.row(y) + x0, scene.patch.row(y) + x1, static_cast<std::uint16_t>(radiance + 1));
+    for (int c = 0; c < 3; ++c) {
+      float* row = scene.xyz_cd_m2.plane[c].row(y);
+      std::fill(row + x0, row + x1, colour[c]);
+    }
+  }
+}
+
+Spectrum reflected(const Spectrum& white, const Spectrum& reflectance) {
+  const auto nm = white.wavelengths_nm();
+  std::vector<double> value(nm.size());
+  for (std::size_t i = 0; i < nm.size(); ++i) value[i] = white.values()[i] * reflectance.at(nm[i]);
+  return *Spectrum::of({nm.begin(), nm.end()}, std::move(value));
+}
+
+double unit_of(std::uint32_t word) { return (word + 0.5) * 0x1p-32; }
+
+}  // namespace
+
+Result<Scene> dark_scene(const SceneSetup& setup) {
+  auto scene = empty_scene(setup);
+  if (scene) scene->description = "dark";
+  return scene;
+}
+
+Result<Scene> flat_scene(const SceneSetup& setup) {
+  auto scene = empty_scene(setup);
+  if (!scene) return scene;
+  scene->patch = Plane<std::uint16_t>(setup.width, setup.height);
+  scene->radiances.push_back(scene->white);
+  fill(*scene, 0, 0, setup.width, setup.height, 0);
+  scene->description = "a white diffuser under " + setup.light_name;
+  return scene;
+}
+
+Result<Scene> chart_scene(const SceneSetup& setup, const std::vector<isp::NamedSpectrum>& reflectances) {
+  const int count = static_cast<int>(reflectances.size());
+  if (count < 1 || count > 4096) return wrong("a chart has 1 to 4096 patches, found " + std::to_string(count));
+  for (const isp::NamedSpectrum& patch : reflectances) {
+    for (const double value : patch.spectrum.values()) {
+      if (value < 0)
+        return wrong("a reflectance is never negative, found " + std::to_string(value), std::string(patch.name));
+    }
+  }
+  auto scene = empty_scene(setup);
+  if (!scene) return scene;
+  scene->patch = Plane<std::uint16_t>(setup.width, setup.height);
+  for (const isp::NamedSpectrum& patch : reflectances) {
+    scene->radiances.push_back(reflected(scene->white, patch.spectrum));
+  }
+  scene->radiances.push_back(reflected(scene->white, *Spectrum::of({380, 780}, {0, 0})));
+  fill(*scene, 0, 0, setup.width, setup.height, count);
+  int columns = 1;
+  while (columns * ((static_cast<long>(columns) * setup.height + setup.width - 1) / setup.width) < count) ++columns;
+  const int rows = (count + columns - 1) / columns;
+  const auto edge = [](int index, int of, int size, double inset) {
+    return std::clamp(static_cast<int>(std::lround((index + inset) * size / of)), 0, size);
+  };
+  for (int i = 0; i < count; ++i) {
+    const int column = i % columns, row = i / columns;
+    fill(*scene, edge(column, columns, setup.width, gap), edge(row, rows, setup.height, gap),
+         edge(column, columns, setup.width, 1 - gap), edge(row, rows, setup.height, 1 - gap), i);
+  }
+  scene->description = std::to_string(count) + " patches under " + setup.light_name;
+  return scene;
+}
+
+Result<Scene> picture_scene(SceneLinear xyz, double luminance_cd_m2) {
+  if (xyz.width() < 1 || xyz.height() < 1) return wrong("a scene has at least one pixel");
+  if (const auto good = check_luminance(luminance_cd_m2); !good) return tl::make_unexpected(good.error());
+  const auto factor = static_cast<float>(luminance_cd_m2);
+  for (Plane<float>& plane : xyz.plane) {
+    for (std::size_t i = 0; i < plane.size(); ++i) {
+      float& value = plane.data()[i];
+      value *= factor;
+      if (!(value >= 0) || !(value <= brightest_cd_m2)) {
+        const auto at = static_cast<int>(i);
+        return wrong("pixel (" + std::to_string(at % xyz.width()) + ", " + std::to_string(at / xyz.width()) +
+                     ") is negative, not a number or brighter than 1e12 cd/m2");
+      }
+    }
+  }
+  const isp::Xyz d65 = *isp::xyz_of(isp::white_d65, luminance_cd_m2 > 0 ? luminance_cd_m2 : 1);
+  return Scene{std::move(xyz), {}, {}, {}, *isp::lift(d65), "a picture"};
+}
+
+Result<void> add_stars(Scene& scene, int count, double faintest_cd_m2, std::uint64_t seed) {
+  if (count < 0 || count > 1000000) return wrong("there are 0 to 1000000 stars, found " + std::to_string(count));
+  if (const auto good = check_luminance(faintest_cd_m2); !good) return good;
+  constexpr const char* lights[] = {"A", "D50", "D65", "D75"};
+  constexpr double brightest = 1e6;  // in units of the faintest
+  const int width = scene.xyz_cd_m2.width(), height = scene.xyz_cd_m2.height();
+  for (int i = 0; i < count; ++i) {
+    const PhiloxWords w = words_at({seed, 0, draw_purpose::scene}, static_cast<std::uint32_t>(i), 0);
+    const double flux = faintest_cd_m2 * std::min(brightest, std::pow(unit_of(w[2]), -2.0 / 3));
+    scene.points.push_back({unit_of(w[0]) * width - 0.5, unit_of(w[1]) * height - 0.5,
+                            *isp::radiance_of(*isp::light_named(lights[w[3] >> 30]), flux)});
+  }
+  return {};
+}
+
+}  // namespace lowlux::capture

@@ -1,0 +1,223 @@
+#include "capture/synthetic/sensor_sim.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "capture/synthetic/fixed_pattern.h"
+#include "capture/synthetic/readout.h"
+#include "isp/base/random.h"
+
+namespace lowlux::capture {
+namespace {
+
+using isp::Effect;
+using isp::EffectSet;
+
+int blocks_across(int pixels) { return (pixels + isp::effect_block - 1) / isp::effect_block; }
+
+/// Rows of one thread.
+struct Scratch {
+  explicit Scratch(int width) : signal(width), mean(width), offset(width), normal(width), words(width) {}
+  std::vector<float> signal, mean, offset, normal;
+  std::vector<std::uint32_t> words;
+};
+
+/// Pixels x0 to x1 of one row, all of one region.
+struct Run {
+  int x0, x1, y;
+  std::size_t size() const { return static_cast<std::size_t>(x1 - x0); }
+};
+
+class RowReadout {
+ public:
+  explicit RowReadout(const SensorFrame& frame) : frame_(frame), dark_(isp::dark_mean_e(frame.sensor, frame.exposure)) {
+    hot_mean_e_ = frame.sensor.hot_pixel_current_e_per_s * frame.exposure.time_s *
+                  isp::dark_current_factor(frame.sensor, frame.exposure.temperature_c);
+  }
+
+  template <class Code>
+  void operator()(const Run& run, EffectSet kept, Scratch& s, Code* out) const {
+    const std::size_t n = run.size();
+    const auto signal = std::span(s.signal).first(n), mean = std::span(s.mean).first(n);
+    fill_signal(run, kept, s, signal);
+    fill_dark(run, kept, s, mean);
+    const bool steady = frame_.photons != nullptr || !kept.has(Effect::photon_noise);
+    if (!steady) {
+      for (std::size_t i = 0; i < n; ++i) mean[i] += signal[i];
+    }
+    for (float& value : mean) value = std::min(value, poisson_max_mean);
+    RowCharge charge{mean, steady ? std::span<const float>(signal) : std::span<const float>(),
+                     fill_offset(run, kept, s)};
+    read_out_row({frame_.seed, frame_.frame, draw_purpose::electrons}, static_cast<std::uint32_t>(run.x0),
+                 static_cast<std::uint32_t>(run.y), charge, parameters(kept, steady), std::span<Code>(out + run.x0, n));
+  }
+
+ private:
+  PatternRow pattern(const Run& run) const {
+    return {frame_.seed, static_cast<std::uint32_t>(run.x0), static_cast<std::uint32_t>(run.y)};
+  }
+
+  void fill_signal(const Run& run, EffectSet kept, Scratch& s, std::span<float> signal) const {
+    const auto time = static_cast<float>(frame_.exposure.time_s);
+    if (frame_.photons != nullptr && kept.has(Effect::photon_noise)) {
+      frame_.photons->collect(frame_.seed, frame_.frame, run.x0, run.y, frame_.exposure.time_s, signal);
+    } else {
+      const float* rate = frame_.rate_e_per_s.row(run.y) + run.x0;
+      for (std::size_t i = 0; i < signal.size(); ++i) signal[i] = rate[i] * time;
+    }
+    if (kept.has(Effect::prnu)) apply_prnu(pattern(run), static_cast<float>(frame_.sensor.prnu), signal, s.normal);
+  }
+
+  void fill_dark(const Run& run, EffectSet kept, Scratch& s, std::span<float> mean) const {
+    std::array<float, 2> dark{};
+    if (kept.has(Effect::dark_current)) {
+      for (int i = 0; i < 2; ++i) {
+        dark[i] = static_cast<float>(dark_[static_cast<int>(colour_at(frame_.phase, run.x0 + i, run.y))]);
+      }
+    }
+    for (std::size_t i = 0; i < mean.size(); ++i) mean[i] = dark[i & 1];
+    if (kept.has(Effect::dsnu)) apply_dsnu(pattern(run), static_cast<float>(frame_.sensor.dsnu), mean, s.normal);
+    if (kept.has(Effect::hot_pixels)) {
+      add_hot_pixels(pattern(run), frame_.sensor.hot_pixel_fraction, hot_mean_e_, mean, s.words);
+    }
+  }
+
+  std::span<const float> fill_offset(const Run& run, EffectSet kept, Scratch& s) const {
+    if (!kept.has(Effect::row_noise) && !kept.has(Effect::column_noise)) return {};
+    const auto offset = std::span(s.offset).first(run.size());
+    const float row = kept.has(Effect::row_noise)
+                          ? row_offset_e(frame_.seed, frame_.frame, static_cast<std::uint32_t>(run.y),
+                                         static_cast<float>(frame_.sensor.row_noise_e))
+                          : 0;
+    std::fill(offset.begin(), offset.end(), row);
+    if (kept.has(Effect::column_noise)) {
+      add_column_pattern(pattern(run), static_cast<float>(frame_.sensor.column_noise_e), offset, s.normal);
+    }
+    return offset;
+  }
+
+  ReadoutParameters parameters(EffectSet kept, bool steady) const {
+    const SensorModel& sensor = frame_.sensor;
+    ReadoutParameters p;
+    p.full_well_e =
+        kept.has(Effect::clipping) ? static_cast<float>(sensor.full_well_e) : std::numeric_limits<float>::infinity();
+    p.read_noise_e = kept.has(Effect::read_noise) ? static_cast<float>(sensor.read_noise_e) : 0;
+    p.gain_dn_per_e = static_cast<float>(sensor.system_gain_dn_per_e);
+    p.black_dn = static_cast<float>(sensor.black_level_dn);
+    p.max_dn = static_cast<float>(sensor.white_level_dn);
+    p.quantisation = sensor.quantisation;
+    p.photon_noise = !steady || kept.has(Effect::dark_current) || kept.has(Effect::hot_pixels);
+    p.quantise = kept.has(Effect::quantisation);
+    p.clip = kept.has(Effect::clipping);
+    return p;
+  }
+
+  const SensorFrame& frame_;
+  std::array<double, 3> dark_;
+  double hot_mean_e_ = 0;
+};
+
+/// Rows first to last, in runs of one region.
+template <class Code>
+void read_out_rows(const SensorFrame& frame, const isp::EffectPlan& plan, RowBand band, PlaneView<Code> dn) {
+  const int width = frame.rate_e_per_s.width, across = blocks_across(width);
+  const RowReadout readout(frame);
+  Scratch scratch(width);
+  for (int y = band.first; y < band.last; ++y) {
+    const std::uint8_t* region = plan.region_of_block.data() + static_cast<std::size_t>(y / isp::effect_block) * across;
+    for (int block = 0; block < across;) {
+      int end = block + 1;
+      while (end < across && region[end] == region[block]) ++end;
+      const Run run{block * isp::effect_block, std::min(width, end * isp::effect_block), y};
+      readout(run, plan.regions[region[block]].kept, scratch, dn.row(y));
+      block = end;
+    }
+  }
+}
+
+template <class Code>
+void read_out_bands(const SensorFrame& frame, const isp::EffectPlan& plan, Executor& executor, PlaneView<Code> dn) {
+  for_each_band(executor, dn.height, [&](RowBand band, int) { read_out_rows(frame, plan, band, dn); });
+}
+
+/// The best of three [ms].
+double time_rows(const SensorFrame& frame, const isp::EffectPlan& plan, Plane<float>& dn) {
+  double best = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    read_out_rows(frame, plan, {0, dn.height()}, dn.view());
+    const std::chrono::duration<double, std::milli> taken = std::chrono::steady_clock::now() - start;
+    best = std::min(best, taken.count());
+  }
+  return best;
+}
+
+}  // namespace
+
+void read_out(const SensorFrame& frame, const isp::EffectPlan& plan, Executor& executor, PlaneView<float> dn) {
+  read_out_bands(frame, plan, executor, dn);
+}
+
+void read_out(const SensorFrame& frame, const isp::EffectPlan& plan, Executor& executor, PlaneView<std::uint16_t> dn) {
+  read_out_bands(frame, plan, executor, dn);
+}
+
+std::vector<Vector3> block_signals(PlaneView<const float> rate_e_per_s, BayerPhase phase, double time_s) {
+  std::vector<Vector3> blocks;
+  for (int y0 = 0; y0 < rate_e_per_s.height; y0 += isp::effect_block) {
+    for (int x0 = 0; x0 < rate_e_per_s.width; x0 += isp::effect_block) {
+      Vector3 sum{};
+      std::array<int, 3> count{};
+      for (int y = y0; y < std::min(rate_e_per_s.height, y0 + isp::effect_block); ++y) {
+        const float* row = rate_e_per_s.row(y);
+        for (int x = x0; x < std::min(rate_e_per_s.width, x0 + isp::effect_block); ++x) {
+          const int k = static_cast<int>(colour_at(phase, x, y));
+          sum[k] += row[x];
+          ++count[k];
+        }
+      }
+      const double whole = (sum[0] + sum[1] + sum[2]) / (count[0] + count[1] + count[2]);
+      for (int k = 0; k < 3; ++k) sum[k] = time_s * (count[k] > 0 ? sum[k] / count[k] : whole);
+      blocks.push_back(sum);
+    }
+  }
+  return blocks;
+}
+
+EffectCost measure_cost(const SensorFrame& frame, const isp::EffectPlan& plan) {
+  constexpr int measured_rows = 128;
+  SensorFrame top = frame;
+  top.rate_e_per_s.height = std::min(frame.rate_e_per_s.height, measured_rows);
+  const double scale = static_cast<double>(frame.rate_e_per_s.height) / top.rate_e_per_s.height;
+  Plane<float> dn(top.rate_e_per_s.width, top.rate_e_per_s.height);
+  isp::EffectPlan all = plan;
+  const auto keep = [&](EffectSet kept) {
+    for (isp::RegionPlan& region : all.regions) region.kept = kept;
+  };
+  EffectSet present;
+  for (const isp::EffectDecision& d : plan.regions.front().decisions) {
+    if (d.reason != isp::EffectDecision::Reason::absent) present = present.with(d.effect);
+  }
+  EffectCost cost;
+  keep(present);
+  cost.all_ms = scale * time_rows(top, all, dn);
+  for (int i = 0; i < isp::effect_count; ++i) {
+    const auto effect = static_cast<Effect>(i);
+    int without = 0, blocks = 0;
+    for (const isp::RegionPlan& region : plan.regions) {
+      blocks += region.blocks;
+      if (!region.kept.has(effect)) without += region.blocks;
+    }
+    if (without == 0 || !present.has(effect)) continue;
+    keep(present.without(effect));
+    const double share = static_cast<double>(without) / blocks;
+    cost.saved_ms[i] = share * (cost.all_ms - scale * time_rows(top, all, dn));
+  }
+  return cost;
+}
+
+}  // namespace lowlux::capture
