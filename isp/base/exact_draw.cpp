@@ -1,0 +1,125 @@
+#include "isp/base/exact_draw.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+namespace lowlux {
+namespace {
+
+double probability(double r) { return (r + 0.5) * 0x1p-32; }
+
+/// ln k! - ln(sqrt(2 pi k) (k/e)^k), for k >= 1: Stirling's series, Abramowitz and Stegun 6.1.41, whose next term is
+/// below 2e-18 from 16 on; below that, a table.
+double stirling_error(double k) {
+  constexpr std::array<double, 15> table{
+      0.081061466795327258, 0.041340695955409294, 0.027677925684998339, 0.020790672103765093, 0.016644691189821193,
+      0.013876128823070748, 0.011896709945891770, 0.010411265261972096, 0.009255462182712733, 0.008330563433362871,
+      0.007573675487951841, 0.006942840107209530, 0.006408994188004207, 0.005951370112758848, 0.005554733551962801};
+  if (k < 16) return table[static_cast<std::size_t>(k) - 1];
+  const double x = 1 / (k * k);
+  return (1.0 / 12 - x * (1.0 / 360 - x * (1.0 / 1260 - x * (1.0 / 1680 - x * (1.0 / 1188 - x * 691.0 / 360360))))) / k;
+}
+
+/// k ln(k / mean) + mean - k without cancellation where k is close to mean.
+double deviance(double k, double mean) {
+  const double difference = k - mean;
+  if (std::abs(difference) >= 0.1 * (k + mean)) return k * std::log(k / mean) - difference;
+  const double v = difference / (k + mean);
+  // ln(k / mean) = 2 artanh(v), so the deviance is difference * v + 2 k (v^3/3 + v^5/5 + ...).
+  double sum = difference * v, power = 2 * k * v;
+  for (int i = 3;; i += 2) {
+    power *= v * v;
+    const double next = sum + power / i;
+    if (next == sum) return sum;
+    sum = next;
+  }
+}
+
+/// Saddle-point form of the Poisson probabilities (Loader, "Fast and accurate computation of binomial
+/// probabilities", 2000).
+double poisson_probability(double k, double mean) {
+  if (k == 0) return std::exp(-mean);
+  return std::exp(-stirling_error(k) - deviance(k, mean)) / std::sqrt(2 * std::numbers::pi * k);
+}
+
+constexpr double negligible = 1e-18;  // of a sum, relative
+
+/// F(k; mean): the sum of the tail that does not hold the mean, from its largest term outwards.
+double poisson_cdf(double k, double mean) {
+  double term = 1, sum = 0;
+  if (k <= mean) {
+    for (double j = k; term > negligible * sum; --j) {
+      sum += term;
+      term *= j / mean;
+    }
+    return poisson_probability(k, mean) * sum;
+  }
+  for (double j = k + 2; term > negligible * sum; ++j) {
+    sum += term;
+    term *= mean / j;
+  }
+  return 1 - poisson_probability(k + 1, mean) * sum;
+}
+
+/// Steps from `k` to the smallest count whose CDF reaches u.
+double search(double k, double u, double mean) {
+  double reached = poisson_cdf(k, mean);
+  while (reached < u) reached += poisson_probability(++k, mean);
+  while (k > 0) {
+    const double before = reached - poisson_probability(k, mean);
+    if (before < u) break;
+    reached = before;
+    --k;
+  }
+  return k;
+}
+
+double sum_up(double u, double mean) {
+  double term = std::exp(-mean), reached = term, k = 0;
+  while (reached < u) {  // ends: rounding keeps the sum within 1e-14 of 1, and u is 1e-10 below
+    term *= mean / ++k;
+    reached += term;
+  }
+  return k;
+}
+
+}  // namespace
+
+double exact_normal(std::uint32_t r) {
+  const bool lower = r < 0x80000000U;
+  const double p = probability(lower ? r : ~r);  // in (0, 1/2]
+  const double w = -std::log(4 * p * (1 - p));
+  // The fit of random-inl.h, good to 2e-7, with its coefficients.
+  constexpr std::array<double, 7> numerator{1.2533143486,   0.4561067969,   0.09001050883,  0.01174568395,
+                                            9.613080260e-4, 1.811735737e-5, -6.952822006e-8};
+  constexpr std::array<double, 5> denominator{1, 0.1021253798, 0.03203324291, 2.312946387e-3, 1.412146501e-4};
+  double above = 0, below = 0;
+  for (auto c = numerator.rbegin(); c != numerator.rend(); ++c) above = above * w + *c;
+  for (auto c = denominator.rbegin(); c != denominator.rend(); ++c) below = below * w + *c;
+  double x = (2 * p - 1) * above / below;
+  // One step of Halley's method, whose error is of third order: 2e-7 becomes less than rounding.
+  const double excess = 0.5 * std::erfc(-x / std::numbers::sqrt2) - p;
+  const double newton = excess * std::sqrt(2 * std::numbers::pi) * std::exp(0.5 * x * x);
+  x -= newton / (1 + 0.5 * x * newton);
+  return lower ? x : -x;
+}
+
+double exact_poisson(std::uint32_t r, double mean) {
+  assert(mean >= 0 && mean <= 1e6);
+  const double u = probability(r);
+  if (mean < 12) return sum_up(u, mean);
+  // Cornish-Fisher, as in random-inl.h: the bound of its error decides whether it has to be checked.
+  const double w = exact_normal(r), s = std::sqrt(mean), w2 = w * w, w4 = w2 * w2;
+  const double t =
+      mean + s * w + (1.0 / 3 + w2 / 6) - w * (1.0 / 36 + w2 / 72) / s + (-8.0 / 405 + 7 * w2 / 810 + w4 / 270) / mean;
+  const double bound = (0.02 + w4 * (0.004 + 0.001 * w2)) / (mean * s) + 1e-13 * (mean + s * std::abs(w));
+  const double k = std::floor(t - bound);
+  if (k >= 0 && k == std::floor(t + bound)) return k;
+  return search(std::max(0.0, std::floor(t)), u, mean);
+}
+
+}  // namespace lowlux
