@@ -6,29 +6,20 @@
 
 #include "isp/base/random.h"
 #include "isp/model/cie_data.h"
-#include "isp/model/spectral_response.h"
+#include "isp/model/photon.h"
 
 namespace lowlux::capture {
-namespace {
-
-/// Weight of node i in the trapezium rule [nm].
-double weight_nm(std::span<const double> nm, std::size_t i) {
-  const double left = i > 0 ? nm[i] - nm[i - 1] : 0, right = i + 1 < nm.size() ? nm[i + 1] - nm[i] : 0;
-  return (left + right) / 2;
-}
-
-}  // namespace
-
 PhotonRows::PhotonRows(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
                        BayerPhase phase)
     : scene_(scene), table_(table), phase_(phase) {
   const auto bins_of = [&](const Spectrum& radiance) {
     std::vector<Bin> bins;
     const auto nm = radiance.wavelengths_nm();
+    const std::vector<double> width_nm = isp::bin_widths_nm(radiance);
     for (std::size_t i = 0; i < nm.size(); ++i) {
       Bin bin{};
-      bin.photons_per_s = static_cast<float>(radiance.values()[i] * weight_nm(nm, i) * isp::photons_per_joule(nm[i]) *
-                                             response.etendue_m2_sr);
+      bin.photons_per_s =
+          static_cast<float>(radiance.values()[i] * width_nm[i] / isp::photon_energy_j(nm[i]) * response.etendue_m2_sr);
       for (int k = 0; k < 3; ++k) bin.efficiency[k] = static_cast<float>(response.quantum_efficiency[k].at(nm[i]));
       bins.push_back(bin);
     }

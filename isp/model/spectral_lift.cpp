@@ -7,7 +7,7 @@
 
 #include "isp/model/cie_data.h"
 #include "isp/model/max_entropy.h"
-#include "isp/model/spectral_response.h"
+#include "isp/model/photon.h"
 
 namespace lowlux::isp {
 namespace {
@@ -115,7 +115,7 @@ LiftTable::LiftTable(const SpectralResponse& response) : nodes_(static_cast<std:
     const double nm = lift_wavelength_nm(i);
     for (int k = 0; k < 3; ++k) {
       charge_per_power[i][k] =
-          response.etendue_m2_sr * nodes().weight_nm[i] * photons_per_joule(nm) * response.quantum_efficiency[k].at(nm);
+          response.etendue_m2_sr * nodes().weight_nm[i] / photon_energy_j(nm) * response.quantum_efficiency[k].at(nm);
     }
   }
   for (int row = 0; row < rows; ++row) {

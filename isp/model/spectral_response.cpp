@@ -10,6 +10,7 @@
 #include "isp/base/near_match.h"
 #include "isp/model/cie_data.h"
 #include "isp/model/noise_budget.h"
+#include "isp/model/photon.h"
 #include "isp/model/spectral_data.h"
 
 namespace lowlux::isp {
@@ -99,15 +100,10 @@ Vector3 electron_rate(const SpectralResponse& response, const Spectrum& radiance
   Vector3 rate{};
   for (int k = 0; k < 3; ++k) {
     rate[k] = response.etendue_m2_sr * integrate(radiance, [&](double nm) {
-                return photons_per_joule(nm) * response.quantum_efficiency[k].at(nm);
+                return response.quantum_efficiency[k].at(nm) / photon_energy_j(nm);
               });
   }
   return rate;
-}
-
-double photons_per_joule(double wavelength_nm) {
-  constexpr double planck_j_s = 6.62607015e-34, light_m_s = 299792458;  // exact: SI, 9th edition, 2019
-  return wavelength_nm * 1e-9 / (planck_j_s * light_m_s);
 }
 
 std::optional<Spectrum> radiance_of(const Spectrum& light, double luminance_cd_m2) {

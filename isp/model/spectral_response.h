@@ -37,9 +37,6 @@ Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Opti
 /// Electrons per second in a pixel of R, G and B that sees a radiance [W m-2 sr-1 nm-1], integrated over its nodes.
 Vector3 electron_rate(const SpectralResponse& response, const Spectrum& radiance);
 
-/// Photons in one joule of light, lambda / (h c), with the exact h and c of the SI.
-double photons_per_joule(double wavelength_nm);
-
 /// A light scaled to radiance: a perfect white diffuser under it has this luminance. nullopt if it has no luminance.
 std::optional<Spectrum> radiance_of(const Spectrum& light, double luminance_cd_m2);
 
