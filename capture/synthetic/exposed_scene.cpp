@@ -63,7 +63,7 @@ void spread_point(const PointSource& point, int width, int height, const Add& ad
 /// Calls put(x, y, rates) for every pixel, where rates(k) gives channel k without the points.
 /// @return how many colours had to be moved
 template <class Put>
-std::int64_t for_each_pixel(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
+std::int64_t for_each_pixel(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
                             Executor& executor, const Put& put) {
   const std::vector<Vector3> patches = patch_rates(scene, response);
   const int width = scene.xyz_cd_m2.width();
@@ -75,12 +75,12 @@ std::int64_t for_each_pixel(const Scene& scene, const SpectralResponse& response
                              scene.xyz_cd_m2.plane[2].row(y)};
       const std::uint16_t* patch = scene.patch.empty() ? nullptr : scene.patch.row(y);
       for (int x = 0; x < width; ++x) {
-        if (patch != nullptr && patch[x] > 0) {
-          put(x, y, [&](int k) { return static_cast<float>(patches[patch[x] - 1][k]); });
+        if (patch != nullptr) {
+          put(x, y, [&](int k) { return static_cast<float>(patches[patch[x]][k]); });
         } else {
           const LiftPlace p = place_of(row[0][x], row[1][x], row[2][x]);
           moved_here += p.moved;
-          put(x, y, [&](int k) { return p.sum * table.response(k, p.x, p.y); });
+          put(x, y, [&](int k) { return p.sum * table->response(k, p.x, p.y); });
         }
       }
     }
@@ -91,7 +91,7 @@ std::int64_t for_each_pixel(const Scene& scene, const SpectralResponse& response
 
 }  // namespace
 
-ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
+ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
                        BayerPhase phase, Executor& executor) {
   const int width = scene.xyz_cd_m2.width(), height = scene.xyz_cd_m2.height();
   ChargeRate out{Plane<float>(width, height), 0};
@@ -107,7 +107,7 @@ ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, con
   return out;
 }
 
-CameraRgb charge_rate_rgb(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
+CameraRgb charge_rate_rgb(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
                           Executor& executor) {
   const int width = scene.xyz_cd_m2.width(), height = scene.xyz_cd_m2.height();
   CameraRgb out(width, height);

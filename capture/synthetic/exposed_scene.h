@@ -17,13 +17,14 @@ struct ChargeRate {
   std::int64_t moved_pixels = 0;  // of a colour no light can have: moved towards white until one could
 };
 
-/// Patches and points by the integrals of their spectra, other pixels by the table.
-ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
+/// Patches and points by the integrals of their spectra, lifted colours by the table.
+/// @param table of the response; may be null for a scene of patches
+ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
                        BayerPhase phase, Executor& executor);
 
 /// The same under all three filters at every pixel: the noise-free truth of a demosaiced, black-subtracted frame
 /// [e- per s].
-CameraRgb charge_rate_rgb(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
+CameraRgb charge_rate_rgb(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
                           Executor& executor);
 
 /// Adds the point sources to the scene's colours: the truth as XYZ [cd/m2].

@@ -9,9 +9,9 @@
 #include "isp/model/photon.h"
 
 namespace lowlux::capture {
-PhotonRows::PhotonRows(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table,
-                       BayerPhase phase)
-    : scene_(scene), table_(table), phase_(phase) {
+PhotonRows::PhotonRows(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
+                       BayerPhase phase, int masked_columns)
+    : scene_(scene), table_(table), phase_(phase), masked_columns_(masked_columns) {
   const auto bins_of = [&](const Spectrum& radiance) {
     std::vector<Bin> bins;
     const auto nm = radiance.wavelengths_nm();
@@ -36,18 +36,19 @@ PhotonRows::PhotonRows(const Scene& scene, const SpectralResponse& response, con
 
 void PhotonRows::collect(std::uint64_t seed, std::uint32_t frame, int x0, int y, double time_s,
                          std::span<float> charge_e) const {
-  const std::uint16_t* patch = scene_.patch.empty() ? nullptr : scene_.patch.row(y);
+  const std::uint16_t* patches = scene_.patch.empty() ? nullptr : scene_.patch.row(y);
   const int count = static_cast<int>(charge_e.size());
-  for (int begin = 0; begin < count;) {
-    const int index = patch == nullptr ? 0 : patch[x0 + begin];
+  const int masked = std::clamp(masked_columns_ - x0, 0, count);
+  std::fill_n(charge_e.begin(), masked, 0.0f);
+  if (patches == nullptr) {
+    collect_lifted(seed, frame, x0 + masked, y, time_s, charge_e.subspan(masked));
+    return;
+  }
+  const auto patch_at = [&](int i) { return patches[x0 + i - masked_columns_]; };
+  for (int begin = masked; begin < count;) {
     int end = begin + 1;
-    while (end < count && (patch == nullptr ? 0 : patch[x0 + end]) == index) ++end;
-    const auto run = charge_e.subspan(begin, end - begin);
-    if (index > 0) {
-      collect_patch(patches_[index - 1], seed, frame, x0 + begin, y, time_s, run);
-    } else {
-      collect_lifted(seed, frame, x0 + begin, y, time_s, run);
-    }
+    while (end < count && patch_at(end) == patch_at(begin)) ++end;
+    collect_patch(patches_[patch_at(begin)], seed, frame, x0 + begin, y, time_s, charge_e.subspan(begin, end - begin));
     begin = end;
   }
 }
@@ -72,10 +73,10 @@ void PhotonRows::collect_lifted(std::uint64_t seed, std::uint32_t frame, int x0,
   const std::size_t count = charge_e.size();
   std::vector<float> power(isp::lift_nodes * count), photons(count);  // radiance by bin, then by pixel
   for (std::size_t i = 0; i < count; ++i) {
-    const int x = x0 + static_cast<int>(i);
+    const int x = x0 + static_cast<int>(i) - masked_columns_;
     const auto colour =
-        isp::lifted_power(table_, {scene_.xyz_cd_m2.plane[0].row(y)[x], scene_.xyz_cd_m2.plane[1].row(y)[x],
-                                   scene_.xyz_cd_m2.plane[2].row(y)[x]});
+        isp::lifted_power(*table_, {scene_.xyz_cd_m2.plane[0].row(y)[x], scene_.xyz_cd_m2.plane[1].row(y)[x],
+                                    scene_.xyz_cd_m2.plane[2].row(y)[x]});
     for (int bin = 0; bin < isp::lift_nodes; ++bin) power[bin * count + i] = colour[bin];
   }
   std::fill(charge_e.begin(), charge_e.end(), 0.0f);

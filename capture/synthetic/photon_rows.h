@@ -18,9 +18,12 @@ namespace lowlux::capture {
 /// Kept to reproduce the thesis; about a hundred draws for each pixel instead of one.
 class PhotonRows {
  public:
-  PhotonRows(const Scene& scene, const SpectralResponse& response, const isp::LiftTable& table, BayerPhase phase);
+  /// @param table          of the response; may be null for a scene of patches
+  /// @param masked_columns dark columns of the sensor left of the scene
+  PhotonRows(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table, BayerPhase phase,
+             int masked_columns);
 
-  /// Charge of the pixels (x0 + i, y) in `time_s` [e-], fractions included.
+  /// Charge of the pixels (x0 + i, y) of the sensor in `time_s` [e-], fractions included.
   void collect(std::uint64_t seed, std::uint32_t frame, int x0, int y, double time_s, std::span<float> charge_e) const;
 
  private:
@@ -35,8 +38,9 @@ class PhotonRows {
                       std::span<float> charge_e) const;
 
   const Scene& scene_;
-  const isp::LiftTable& table_;
+  const isp::LiftTable* table_;
   BayerPhase phase_;
+  int masked_columns_;
   std::vector<std::vector<Bin>> patches_;
   std::vector<Bin> lifted_;  // for a radiance of 1 W m-2 sr-1 nm-1
 };

@@ -47,7 +47,7 @@ void fill(Scene& scene, int x0, int y0, int x1, int y1, int radiance) {
   const isp::Xyz xyz = isp::xyz_cd_m2(scene.radiances[radiance]);
   const float colour[3] = {static_cast<float>(xyz.x), static_cast<float>(xyz.y), static_cast<float>(xyz.z)};
   for (int y = y0; y < y1; ++y) {
-    std::fill(scene.patch.row(y) + x0, scene.patch.row(y) + x1, static_cast<std::uint16_t>(radiance + 1));
+    std::fill(scene.patch.row(y) + x0, scene.patch.row(y) + x1, static_cast<std::uint16_t>(radiance));
     for (int c = 0; c < 3; ++c) {
       float* row = scene.xyz_cd_m2.plane[c].row(y);
       std::fill(row + x0, row + x1, colour[c]);

@@ -24,7 +24,7 @@ struct PointSource {
 /// What is in front of the camera: one radiance for each pixel, as a colour or as a spectrum.
 struct Scene {
   SceneLinear xyz_cd_m2;            // CIE 1931 XYZ of each pixel, without the point sources
-  Plane<std::uint16_t> patch;       // empty, or for each pixel 1 + the index of its radiance; 0: lifted from its colour
+  Plane<std::uint16_t> patch;       // index of each pixel's radiance; empty: spectra are lifted from the colours
   std::vector<Spectrum> radiances;  // of patches [W m-2 sr-1 nm-1]
   std::vector<PointSource> points;
   Spectrum white;  // radiance of a white diffuser in the scene: what the camera balances to

@@ -166,23 +166,25 @@ void read_out(const SensorFrame& frame, const isp::EffectPlan& plan, Executor& e
   read_out_bands(frame, plan, executor, dn);
 }
 
-std::vector<Vector3> block_signals(PlaneView<const float> rate_e_per_s, BayerPhase phase, double time_s) {
-  std::vector<Vector3> blocks;
+std::vector<isp::BlockLevel> block_levels(PlaneView<const float> rate_e_per_s, BayerPhase phase, double time_s) {
+  std::vector<isp::BlockLevel> blocks;
   for (int y0 = 0; y0 < rate_e_per_s.height; y0 += isp::effect_block) {
     for (int x0 = 0; x0 < rate_e_per_s.width; x0 += isp::effect_block) {
       Vector3 sum{};
       std::array<int, 3> count{};
+      float peak = 0;
       for (int y = y0; y < std::min(rate_e_per_s.height, y0 + isp::effect_block); ++y) {
         const float* row = rate_e_per_s.row(y);
         for (int x = x0; x < std::min(rate_e_per_s.width, x0 + isp::effect_block); ++x) {
           const int k = static_cast<int>(colour_at(phase, x, y));
           sum[k] += row[x];
           ++count[k];
+          peak = std::max(peak, row[x]);
         }
       }
       const double whole = (sum[0] + sum[1] + sum[2]) / (count[0] + count[1] + count[2]);
       for (int k = 0; k < 3; ++k) sum[k] = time_s * (count[k] > 0 ? sum[k] / count[k] : whole);
-      blocks.push_back(sum);
+      blocks.push_back({sum, time_s * peak});
     }
   }
   return blocks;

@@ -32,9 +32,9 @@ void read_out(const SensorFrame& frame, const isp::EffectPlan& plan, Executor& e
 /// The same as codes, where every region of the plan keeps quantisation and clipping.
 void read_out(const SensorFrame& frame, const isp::EffectPlan& plan, Executor& executor, PlaneView<std::uint16_t> dn);
 
-/// Mean signal of R, G and B in each block [e-], row by row: what the planner asks for. A block that a channel does not
-/// reach (frames one pixel wide) has the mean of the others there.
-std::vector<Vector3> block_signals(PlaneView<const float> rate_e_per_s, BayerPhase phase, double time_s);
+/// What each block gives to the sensor in a time, row by row: what the planner asks for. A block that a channel does
+/// not reach (frames one pixel wide) has the mean of the others there.
+std::vector<isp::BlockLevel> block_levels(PlaneView<const float> rate_e_per_s, BayerPhase phase, double time_s);
 
 /// How long reading out takes with all effects, and without each that the plan leaves out [ms per frame], measured on
 /// up to 128 rows and scaled to the frame; nullopt for effects the plan keeps everywhere or the sensor has not.

@@ -15,6 +15,11 @@ constexpr std::array<std::string_view, effect_count> names{"photon-noise", "dark
                                                            "clipping",     "prnu",         "dsnu",       "hot-pixels",
                                                            "row-noise",    "column-noise"};
 
+/// Share of the tolerance that predictions may use up. They take all laws for normal ones, which near saturation and
+/// at a few electrons they are not: over 3000 scenes drawn as in effect_promise_test the worst change came to 98 % of
+/// the tolerance.
+constexpr double usable_share = 0.5;
+
 constexpr int most_samples = 48;  // blocks of one region that are evaluated: its extremes and others evenly among them
 
 /// Whether the sensor and exposure have the effect at all.
@@ -44,21 +49,23 @@ bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
   return true;
 }
 
-double level_of(const Vector3& block) { return *std::max_element(block.begin(), block.end()); }
+double level_of(const BlockLevel& block) { return *std::max_element(block.signal_e.begin(), block.signal_e.end()); }
 
 /// Decade of a level; what no frame can tell apart is one: below a thousandth of an electron, above 1e9.
 int decade_of(double level_e) { return static_cast<int>(std::floor(std::log10(std::clamp(level_e, 1e-3, 1e9)))); }
 
 /// The blocks a region is judged by: sorted by level, its extremes and others between, and the extremes of each
 /// channel.
-std::vector<Vector3> samples_of(std::span<const Vector3> blocks, std::vector<std::size_t> members) {
+std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vector<std::size_t> members) {
   const auto by = [&](auto key) {
     return [&blocks, key](std::size_t a, std::size_t b) { return key(blocks[a]) < key(blocks[b]); };
   };
-  std::vector<Vector3> samples;
+  std::vector<BlockLevel> samples;
+  samples.push_back(
+      blocks[*std::max_element(members.begin(), members.end(), by([](const BlockLevel& b) { return b.peak_e; }))]);
   for (int c = 0; c < 3; ++c) {
     const auto [low, high] =
-        std::minmax_element(members.begin(), members.end(), by([c](const Vector3& v) { return v[c]; }));
+        std::minmax_element(members.begin(), members.end(), by([c](const BlockLevel& b) { return b.signal_e[c]; }));
     samples.push_back(blocks[*low]);
     samples.push_back(blocks[*high]);
   }
@@ -74,12 +81,12 @@ std::vector<Vector3> samples_of(std::span<const Vector3> blocks, std::vector<std
 class Region {
  public:
   Region(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-         std::vector<Vector3> samples)
+         std::vector<BlockLevel> samples)
       : sensor_(sensor), exposure_(exposure), developing_(developing), samples_(std::move(samples)) {}
 
   PredictedChange change(EffectSet kept) const {
     PredictedChange worst;
-    for (const Vector3& block : samples_) {
+    for (const BlockLevel& block : samples_) {
       const PredictedChange one = predict_change(sensor_, exposure_, developing_, block, kept);
       worst.delta_e = std::max(worst.delta_e, one.delta_e);
       worst.relative_variance = std::max(worst.relative_variance, one.relative_variance);
@@ -92,7 +99,7 @@ class Region {
   const SensorModel& sensor_;
   const Exposure& exposure_;
   const Developing& developing_;
-  std::vector<Vector3> samples_;
+  std::vector<BlockLevel> samples_;
 };
 
 /// Each effect by itself.
@@ -122,10 +129,10 @@ void drop_negligible(const Region& region, const Tolerance& tolerance, RegionPla
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size(a) < size(b); });
   for (const int i : order) {
     EffectDecision& d = plan.decisions[i];
-    if (!d.kept || size(i) >= 1) continue;
+    if (!d.kept || size(i) >= usable_share) continue;
     if (d.effect == Effect::dark_current && plan.kept.has(Effect::dsnu)) continue;  // it multiplies dark current
     const PredictedChange together = region.change(plan.kept.without(d.effect));
-    if (size_of(together, tolerance) >= 1) continue;
+    if (size_of(together, tolerance) >= usable_share) continue;
     plan.kept = plan.kept.without(d.effect);
     plan.left_out_together = together;
     d.kept = false;
@@ -134,7 +141,7 @@ void drop_negligible(const Region& region, const Tolerance& tolerance, RegionPla
 }
 
 /// Regions by decade.
-std::vector<std::vector<std::size_t>> group(std::span<const Vector3> blocks) {
+std::vector<std::vector<std::size_t>> group(std::span<const BlockLevel> blocks) {
   std::map<int, std::vector<std::size_t>> decades;
   for (std::size_t i = 0; i < blocks.size(); ++i) decades[decade_of(level_of(blocks[i]))].push_back(i);
   std::vector<std::vector<std::size_t>> regions;
@@ -144,7 +151,7 @@ std::vector<std::vector<std::size_t>> group(std::span<const Vector3> blocks) {
 
 template <class Decide>
 EffectPlan plan_regions(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                        std::span<const Vector3> blocks, const Decide& decide) {
+                        std::span<const BlockLevel> blocks, const Decide& decide) {
   EffectPlan plan;
   plan.region_of_block.resize(blocks.size());
   for (const std::vector<std::size_t>& members : group(blocks)) {
@@ -172,16 +179,16 @@ EffectPlan plan_regions(const SensorModel& sensor, const Exposure& exposure, con
 std::span<const std::string_view> effect_names() { return names; }
 
 EffectPlan plan_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                        std::span<const Vector3> block_signal_e, const Tolerance& tolerance) {
-  EffectPlan plan = plan_regions(sensor, exposure, developing, block_signal_e,
+                        std::span<const BlockLevel> blocks, const Tolerance& tolerance) {
+  EffectPlan plan = plan_regions(sensor, exposure, developing, blocks,
                                  [&](const Region& region, RegionPlan& r) { drop_negligible(region, tolerance, r); });
   plan.tolerance = tolerance;
   return plan;
 }
 
 EffectPlan fixed_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                         std::span<const Vector3> block_signal_e, EffectSet wanted) {
-  return plan_regions(sensor, exposure, developing, block_signal_e, [&](const Region& region, RegionPlan& r) {
+                         std::span<const BlockLevel> blocks, EffectSet wanted) {
+  return plan_regions(sensor, exposure, developing, blocks, [&](const Region& region, RegionPlan& r) {
     for (EffectDecision& d : r.decisions) {
       if (d.reason == EffectDecision::Reason::absent) continue;
       d.kept = wanted.has(d.effect) && (d.effect != Effect::dsnu || wanted.has(Effect::dark_current));

@@ -60,6 +60,12 @@ inline constexpr int effect_block = 32;
 /// Changes of variance below this are not looked at [DN^2]: a block of whole codes cannot show them.
 inline constexpr double variance_floor_dn2 = 0.01;
 
+/// What a block of the scene gives to the sensor.
+struct BlockLevel {
+  Vector3 signal_e{};  // mean signal of its R, G and B pixels
+  double peak_e = 0;   // of its brightest pixel
+};
+
 /// How block means become colours: what the tolerance is measured in.
 struct Developing {
   Matrix3 camera_to_xyz = identity3();  // (white_e) / white_e -> XYZ of D65 at Y = 1
@@ -70,7 +76,7 @@ struct Developing {
 /// of a black frame, and no more than saturation (the rules of isp/render/exposure).
 /// @param neutral camera RGB of a neutral, largest 1
 Developing developing_of(const SensorModel& sensor, const Exposure& exposure, const Matrix3& camera_to_xyz,
-                         const Vector3& neutral, std::span<const Vector3> block_signal_e);
+                         const Vector3& neutral, std::span<const BlockLevel> blocks);
 
 /// What is predicted to change in a block if effects are left out: bounds that one block in a million exceeds.
 struct PredictedChange {
@@ -78,9 +84,9 @@ struct PredictedChange {
   double relative_variance = 0;
 };
 
-/// @param signal_e mean signal of the block's R, G and B pixels
+/// Hot pixels come by the piece: a block may hold none, so they widen no other effect's tolerance, or several.
 PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                               const Vector3& signal_e, EffectSet kept);
+                               const BlockLevel& block, EffectSet kept);
 
 /// One effect in one region: its size if it alone were left out, and what was decided.
 struct EffectDecision {
@@ -114,12 +120,12 @@ struct EffectPlan {
 
 /// Decides by the closed forms. Blocks whose levels differ by decades are different regions; in each, effects are left
 /// out smallest first as long as all that is left out together is predicted to stay below the tolerance.
-/// @param block_signal_e one for each block, row by row; not empty
+/// @param blocks of the frame, row by row; not empty
 EffectPlan plan_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                        std::span<const Vector3> block_signal_e, const Tolerance& tolerance);
+                        std::span<const BlockLevel> blocks, const Tolerance& tolerance);
 
 /// The plan of a caller who wants these effects and no others, with the predictions all the same.
 EffectPlan fixed_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                         std::span<const Vector3> block_signal_e, EffectSet wanted);
+                         std::span<const BlockLevel> blocks, EffectSet wanted);
 
 }  // namespace lowlux::isp

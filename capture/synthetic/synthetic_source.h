@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "capture/synthetic/exposed_scene.h"
+#include "capture/synthetic/scene.h"
+#include "capture/synthetic/sensor_sim.h"
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+#include "isp/model/effect_plan.h"
+#include "isp/model/sensor_db.h"
+
+namespace lowlux::capture {
+
+/// How photons become electrons: as physics has it (Poisson(mu), one draw for each pixel), or wavelength by wavelength
+/// as the thesis publishes it (see PhotonRows).
+enum class PhotonSampling : std::uint8_t { physical, published };
+
+/// Which effects are simulated: those a tolerance calls for, or those given.
+struct EffectChoice {
+  std::optional<isp::Tolerance> tolerance;         // set: the planner decides
+  isp::EffectSet effects = isp::EffectSet::all();  // else these
+};
+
+struct SyntheticOptions {
+  isp::Exposure exposure;
+  double f_number = 2;
+  BayerPhase phase = BayerPhase::rggb;
+  int masked_columns = 0;  // light-shielded, left of the picture; even
+  PhotonSampling sampling = PhotonSampling::physical;
+  EffectChoice effects;
+  std::uint64_t seed = 1;
+};
+
+/// A camera in front of a scene. What does not change from frame to frame is worked out once, by of().
+class SyntheticSource {
+ public:
+  /// Errors: an exposure that cannot be; a mean charge beyond the sampler's limit where no full well holds it; point
+  /// sources with published sampling; masked columns that are odd, negative or more than 4096.
+  static Result<SyntheticSource> of(Scene scene, isp::NamedSensor sensor, SpectralResponse response,
+                                    const SyntheticOptions& options, Executor& executor);
+
+  /// Frame number `index`: the same scene and fixed pattern, its own noise. Any index, in any order.
+  RawFrame frame(std::uint32_t index, Executor& executor) const;
+
+  /// The same in DN as floats, before anything is stored: what the converter would give.
+  Plane<float> frame_dn(std::uint32_t index, Executor& executor) const;
+
+  /// Noise-free truth: mean signal electrons of R, G, B at every pixel, and the scene's XYZ [cd/m2].
+  CameraRgb signal_e(Executor& executor) const;
+  SceneLinear xyz_cd_m2() const;
+
+  const isp::EffectPlan& plan() const { return plan_; }
+  const Plane<float>& rate_e_per_s() const { return rate_.e_per_s; }
+  std::int64_t moved_pixels() const { return rate_.moved_pixels; }
+  const isp::Developing& developing() const { return developing_; }
+  EffectCost measure_cost() const;
+
+ private:
+  /// How codes are stored: code = round(scale * (dn + offset_dn)). Anything but 1 and 0 only where the plan leaves
+  /// quantisation or clipping out: then 16 bits keep the fractions, and the pedestal is raised to keep negative values.
+  struct Storage {
+    int scale = 1;
+    double offset_dn = 0;
+    bool codes = true;  // the readout gives whole codes
+  };
+
+  SyntheticSource(Scene scene, isp::NamedSensor sensor, SpectralResponse response, const SyntheticOptions& options);
+  Result<void> expose(Executor& executor);
+  Result<void> check_means(const std::vector<isp::BlockLevel>& blocks) const;
+  void choose_storage();
+  template <class Code>
+  void read_out_frame(std::uint32_t index, Executor& executor, PlaneView<Code> out) const;
+  SensorFrame sensor_frame(std::uint32_t index, const PhotonRows* photons) const;
+  std::optional<PhotonRows> photon_rows() const;
+  Plane<std::uint16_t> stored_codes(std::uint32_t index, Executor& executor) const;
+  RawFrame described(Plane<std::uint16_t> codes) const;
+
+  Scene scene_;
+  isp::NamedSensor sensor_;
+  SpectralResponse response_;
+  SyntheticOptions options_;
+  std::unique_ptr<isp::LiftTable> table_;  // for scenes whose spectra are lifted
+  CameraColour colour_;
+  ChargeRate rate_;
+  isp::Developing developing_;
+  isp::EffectPlan plan_;
+  Storage storage_;
+};
+
+}  // namespace lowlux::capture
