@@ -10,6 +10,14 @@
 namespace lowlux {
 namespace {
 
+/// c[0] + c[1] x + c[2] x^2 ...
+template <std::size_t kCount>
+double polynomial(const std::array<double, kCount>& c, double x) {
+  double sum = 0;
+  for (std::size_t i = kCount; i-- > 0;) sum = sum * x + c[i];
+  return sum;
+}
+
 double probability(double r) { return (r + 0.5) * 0x1p-32; }
 
 /// ln k! - ln(sqrt(2 pi k) (k/e)^k), for k >= 1: Stirling's series, Abramowitz and Stegun 6.1.41, whose next term is
@@ -94,13 +102,11 @@ double exact_normal(std::uint32_t r) {
   const double p = probability(lower ? r : ~r);  // in (0, 1/2]
   const double w = -std::log(4 * p * (1 - p));
   // The fit of random-inl.h, good to 1e-8, with its coefficients.
-  constexpr std::array<double, 7> numerator{1.2533141251,    0.44745332857,   0.091010784584, 0.012525197581,
-                                            1.1383759937e-3, 5.9378103919e-5, 1.9161539078e-7};
-  constexpr std::array<double, 6> denominator{
-      1, 0.095216431109, 0.034657760061, 2.3120644624e-3, 2.4859308607e-4, 3.7440786095e-6};
-  double above = 0, below = 0;
-  for (auto c = numerator.rbegin(); c != numerator.rend(); ++c) above = above * w + *c;
-  for (auto c = denominator.rbegin(); c != denominator.rend(); ++c) below = below * w + *c;
+  const double above = polynomial(std::array{1.2533141251, 0.44745332857, 0.091010784584, 0.012525197581,
+                                             1.1383759937e-3, 5.9378103919e-5, 1.9161539078e-7},
+                                  w);
+  const double below =
+      polynomial(std::array{1.0, 0.095216431109, 0.034657760061, 2.3120644624e-3, 2.4859308607e-4, 3.7440786095e-6}, w);
   double x = (2 * p - 1) * above / below;
   // One step of Halley's method, whose error is of third order: 1e-8 becomes less than rounding.
   const double excess = 0.5 * std::erfc(-x / std::numbers::sqrt2) - p;

@@ -189,14 +189,16 @@ HWY_INLINE Bracket bracket_small(VU r, VF mean, MF small) {
   const VF lambda = hn::IfThenElseZero(small, mean);
   VF term = exp_of_minus(lambda), reached = term;
   VI least = hn::Zero(s32), most = least;
-  for (int k = 1; k < 49 && !hn::AllFalse(f, hn::Gt(upper, reached)); k += 4) {
+  int k = 1;
+  do {  // four terms at once, and always the first four: whether they are needed is hard to predict
     for (int j = k; j < k + 4; ++j) {
       least = hn::Sub(least, hn::VecFromMask(s32, hn::RebindMask(s32, hn::Gt(lower, reached))));
       most = hn::Sub(most, hn::VecFromMask(s32, hn::RebindMask(s32, hn::Gt(upper, reached))));
       term = hn::Mul(term, hn::Mul(lambda, constant(reciprocals.of[j])));
       reached = hn::Add(reached, term);
     }
-  }
+    k += 4;
+  } while (k < 49 && !hn::AllFalse(f, hn::Gt(upper, reached)));
   return {hn::ConvertTo(f, least), hn::ConvertTo(f, most)};
 }
 

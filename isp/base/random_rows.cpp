@@ -80,6 +80,8 @@ void PoissonOfWords(const std::uint32_t* r, const float* mean, std::size_t count
 
 bool ProductsAreRounded() { return rounds_products(); }
 
+const char* TargetName() { return hwy::TargetName(HWY_TARGET); }
+
 }  // namespace lowlux::draws::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -92,6 +94,7 @@ HWY_EXPORT(PutPoisson);
 HWY_EXPORT(NormalsOfWords);
 HWY_EXPORT(PoissonOfWords);
 HWY_EXPORT(ProductsAreRounded);
+HWY_EXPORT(TargetName);
 
 void put_words(const Row& row, int word, std::size_t count, std::uint32_t* out) {
   HWY_DYNAMIC_DISPATCH(PutWords)(row, word, count, out);
@@ -108,6 +111,7 @@ void normals_of_words(const std::uint32_t* r, std::size_t count, float* out) {
 void poisson_of_words(const std::uint32_t* r, const float* mean, std::size_t count, float* out) {
   HWY_DYNAMIC_DISPATCH(PoissonOfWords)(r, mean, count, out);
 }
+const char* target_name() { return HWY_DYNAMIC_DISPATCH(TargetName)(); }
 bool products_are_rounded() { return HWY_DYNAMIC_DISPATCH(ProductsAreRounded)(); }
 
 }  // namespace lowlux::draws

@@ -40,6 +40,7 @@ TEST(RandomTargets, AllGiveTheSameBits) {
   ASSERT_FALSE(test::kernel_targets().empty());
   for (const std::int64_t target : test::kernel_targets()) {
     const test::OnlyTarget only(target);
+    EXPECT_STREQ(draws::target_name(), hwy::TargetName(target));
     EXPECT_TRUE(hashes() == best) << hwy::TargetName(target);
     EXPECT_TRUE(draws::products_are_rounded()) << hwy::TargetName(target);
   }
