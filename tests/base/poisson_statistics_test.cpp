@@ -2,8 +2,10 @@
 // what passes once passes always.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "isp/base/random.h"

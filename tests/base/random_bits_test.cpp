@@ -1,7 +1,9 @@
 // What has to hold on every processor and compiler, and so is run on Arm too (scripts/cross-aarch64).
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "isp/base/executor.h"

@@ -1,8 +1,10 @@
 // What has to hold on every processor and compiler, and so is run on Arm too (scripts/cross-aarch64).
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "capture/synthetic/readout.h"
