@@ -17,19 +17,17 @@ namespace lowlux::capture::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using namespace draws::HWY_NAMESPACE;
 
-/// Electrons of one vector of pixels, read noise and offset included.
-HWY_INLINE VF electrons(const draws::Row& row, VU x, const ChargePointers& at, const ReadoutParameters& p,
+/// Electrons of the vector of pixels at index i, read noise and offset included.
+HWY_INLINE VF electrons(VU r, VF z, const ChargePointers& at, const ReadoutParameters& p, std::size_t i,
                         std::size_t left) {
   const Floats f;
-  const bool any_draw = p.photon_noise || p.read_noise_e != 0;
-  const FourWords r = any_draw ? words_of(row, x) : FourWords{{x, x, x, x}};
-  VF n = load(f, at.mean_e, left);
-  if (p.photon_noise) n = poisson_of(r.word[0], n);
-  if (at.steady_e != nullptr) n = hn::Add(n, load(f, at.steady_e, left));
+  VF n = load(f, at.mean_e + i, left);
+  if (p.photon_noise) n = poisson_of(r, n);
+  if (at.steady_e != nullptr) n = hn::Add(n, load(f, at.steady_e + i, left));
   const VF full = constant(p.full_well_e);
   VF e = hn::IfThenElse(hn::Gt(n, full), full, n);  // not Min, which differs between processors at NaN
-  if (p.read_noise_e != 0) e = hn::Add(e, hn::Mul(constant(p.read_noise_e), normal_of(r.word[1])));
-  if (at.offset_e != nullptr) e = hn::Add(e, load(f, at.offset_e, left));
+  if (p.read_noise_e != 0) e = hn::Add(e, hn::Mul(constant(p.read_noise_e), z));
+  if (at.offset_e != nullptr) e = hn::Add(e, load(f, at.offset_e + i, left));
   return e;
 }
 
@@ -48,19 +46,28 @@ HWY_INLINE void put(VF v, std::uint16_t* to, std::size_t left) {
 }
 
 template <class T>
-HWY_INLINE void read_out(const draws::Row& from, const ChargePointers& charge, const ReadoutParameters& parameters,
+HWY_INLINE void read_out(const draws::Row& from, const ChargePointers& from_charge, const ReadoutParameters& parameters,
                          std::size_t count, T* dn) {
   const draws::Row row = from;  // copies, so that no store can change them
   const ReadoutParameters p = parameters;
-  ChargePointers at = charge;
-  const std::size_t lanes = hn::Lanes(Floats());
-  VU x = first_columns(row);
-  for (std::size_t i = 0; i < count; i += lanes) {
-    put(dn_of(electrons(row, x, at, p, count - i), p), dn + i, count - i);
-    x = hn::Add(x, hn::Set(Words(), static_cast<std::uint32_t>(lanes)));
-    at.mean_e += lanes;
-    if (at.steady_e != nullptr) at.steady_e += lanes;
-    if (at.offset_e != nullptr) at.offset_e += lanes;
+  const ChargePointers charge = from_charge;
+  const std::size_t lanes = hn::Lanes(Words());
+  const bool any_draw = p.photon_noise || p.read_noise_e != 0;
+  HWY_ALIGN std::uint32_t words[2][block_pixels] = {};
+  HWY_ALIGN float normals[block_pixels] = {};
+  for (std::size_t first = 0; first < count; first += block_pixels) {
+    const std::size_t size = HWY_MIN(count - first, block_pixels);
+    if (any_draw) put_block<0, 2>(row, first, size, words);
+    if (p.read_noise_e != 0) {
+      for (std::size_t i = 0; i < size; i += lanes) {
+        hn::Store(normal_of(hn::Load(Words(), words[1] + i)), Floats(), normals + i);
+      }
+    }
+    for (std::size_t i = 0; i < size; i += lanes) {
+      const std::size_t at = first + i, left = count - at;
+      const VF e = electrons(hn::Load(Words(), words[0] + i), hn::Load(Floats(), normals + i), charge, p, at, left);
+      put(dn_of(e, p), dn + at, left);
+    }
   }
 }
 

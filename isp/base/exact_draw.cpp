@@ -10,6 +10,14 @@
 namespace lowlux {
 namespace {
 
+/// c[0] + c[1] x + c[2] x^2 ...
+template <std::size_t kCount>
+double polynomial(const std::array<double, kCount>& c, double x) {
+  double sum = 0;
+  for (std::size_t i = kCount; i-- > 0;) sum = sum * x + c[i];
+  return sum;
+}
+
 double probability(double r) { return (r + 0.5) * 0x1p-32; }
 
 /// ln k! - ln(sqrt(2 pi k) (k/e)^k), for k >= 1: Stirling's series, Abramowitz and Stegun 6.1.41, whose next term is
@@ -48,39 +56,43 @@ double poisson_probability(double k, double mean) {
 
 constexpr double negligible = 1e-18;  // of a sum, relative
 
-/// F(k; mean): the sum of the tail that does not hold the mean, from its largest term outwards.
-double poisson_cdf(double k, double mean) {
+/// F(k; mean) for k not much above the mean, from its largest term outwards.
+double lower_tail(double k, double mean) {
   double term = 1, sum = 0;
-  if (k <= mean) {
-    for (double j = k; term > negligible * sum; --j) {
-      sum += term;
-      term *= j / mean;
-    }
-    return poisson_probability(k, mean) * sum;
+  for (double j = k; term > negligible * sum; --j) {
+    sum += term;
+    term *= j / mean;
   }
+  return poisson_probability(k, mean) * sum;
+}
+
+/// 1 - F(k; mean) for k not much below the mean.
+double upper_tail(double k, double mean) {
+  double term = 1, sum = 0;
   for (double j = k + 2; term > negligible * sum; ++j) {
     sum += term;
     term *= mean / j;
   }
-  return 1 - poisson_probability(k + 1, mean) * sum;
+  return poisson_probability(k + 1, mean) * sum;
 }
 
-/// Steps from `k` to the smallest count whose CDF reaches u.
-double search(double k, double u, double mean) {
-  double reached = poisson_cdf(k, mean);
-  while (reached < u) reached += poisson_probability(++k, mean);
-  while (k > 0) {
-    const double before = reached - poisson_probability(k, mean);
-    if (before < u) break;
-    reached = before;
-    --k;
-  }
+/// Whether F(k; mean) >= u. Above 1/2 the complements are compared: F itself has too few digits near 1.
+bool reaches(double k, std::uint32_t r, double mean) {
+  if (r < 0x80000000U) return lower_tail(k, mean) >= probability(r);
+  return upper_tail(k, mean) <= probability(~r);
+}
+
+/// Steps from `k`, which is close, to the smallest count that reaches u.
+double search(double k, std::uint32_t r, double mean) {
+  while (!reaches(k, r, mean)) ++k;
+  while (k > 0 && reaches(k - 1, r, mean)) --k;
   return k;
 }
 
+/// The quantile, or at worst a neighbour of it. Ends: rounding keeps the sum within 1e-14 of 1, and u is 1e-10 below.
 double sum_up(double u, double mean) {
   double term = std::exp(-mean), reached = term, k = 0;
-  while (reached < u) {  // ends: rounding keeps the sum within 1e-14 of 1, and u is 1e-10 below
+  while (reached < u) {
     term *= mean / ++k;
     reached += term;
   }
@@ -93,15 +105,14 @@ double exact_normal(std::uint32_t r) {
   const bool lower = r < 0x80000000U;
   const double p = probability(lower ? r : ~r);  // in (0, 1/2]
   const double w = -std::log(4 * p * (1 - p));
-  // The fit of random-inl.h, good to 2e-7, with its coefficients.
-  constexpr std::array<double, 7> numerator{1.2533143486,   0.4561067969,   0.09001050883,  0.01174568395,
-                                            9.613080260e-4, 1.811735737e-5, -6.952822006e-8};
-  constexpr std::array<double, 5> denominator{1, 0.1021253798, 0.03203324291, 2.312946387e-3, 1.412146501e-4};
-  double above = 0, below = 0;
-  for (auto c = numerator.rbegin(); c != numerator.rend(); ++c) above = above * w + *c;
-  for (auto c = denominator.rbegin(); c != denominator.rend(); ++c) below = below * w + *c;
+  // The fit of random-inl.h, good to 1e-8, with its coefficients.
+  const double above = polynomial(std::array{1.2533141251, 0.44745332857, 0.091010784584, 0.012525197581,
+                                             1.1383759937e-3, 5.9378103919e-5, 1.9161539078e-7},
+                                  w);
+  const double below =
+      polynomial(std::array{1.0, 0.095216431109, 0.034657760061, 2.3120644624e-3, 2.4859308607e-4, 3.7440786095e-6}, w);
   double x = (2 * p - 1) * above / below;
-  // One step of Halley's method, whose error is of third order: 2e-7 becomes less than rounding.
+  // One step of Halley's method, whose error is of third order: 1e-8 becomes less than rounding.
   const double excess = 0.5 * std::erfc(-x / std::numbers::sqrt2) - p;
   const double newton = excess * std::sqrt(2 * std::numbers::pi) * std::exp(0.5 * x * x);
   x -= newton / (1 + 0.5 * x * newton);
@@ -110,8 +121,8 @@ double exact_normal(std::uint32_t r) {
 
 double exact_poisson(std::uint32_t r, double mean) {
   assert(mean >= 0 && mean <= 1e6);
-  const double u = probability(r);
-  if (mean < 12) return sum_up(u, mean);
+  if (mean == 0) return 0;
+  if (mean < 12) return search(sum_up(probability(r), mean), r, mean);
   // Cornish-Fisher, as in random-inl.h: the bound of its error decides whether it has to be checked.
   const double w = exact_normal(r), s = std::sqrt(mean), w2 = w * w, w4 = w2 * w2;
   const double t =
@@ -119,7 +130,7 @@ double exact_poisson(std::uint32_t r, double mean) {
   const double bound = (0.02 + w4 * (0.004 + 0.001 * w2)) / (mean * s) + 1e-13 * (mean + s * std::abs(w));
   const double k = std::floor(t - bound);
   if (k >= 0 && k == std::floor(t + bound)) return k;
-  return search(std::max(0.0, std::floor(t)), u, mean);
+  return search(std::max(0.0, std::floor(t)), r, mean);
 }
 
 }  // namespace lowlux

@@ -13,29 +13,35 @@
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::draws::HWY_NAMESPACE {
 
-/// Calls put(the four words, index, how many are left) for each vector of pixels.
-template <class Put>
-HWY_INLINE void for_each_draw(const Row& from, std::size_t count, const Put& put) {
+template <int kWord>
+HWY_INLINE void put_one_word(const Row& from, std::size_t count, std::uint32_t* out) {
   const Row row = from;  // a copy, so that no store can change it and its products stay out of the loop
-  const std::size_t lanes = hn::Lanes(Words());
-  VU x = first_columns(row);
-  for (std::size_t i = 0; i < count; i += lanes) {
-    put(words_of(row, x), i, count - i);
-    x = hn::Add(x, hn::Set(Words(), static_cast<std::uint32_t>(lanes)));
+  const Words w;
+  VU x = hn::Iota(w, row.x0);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(w)) {
+    store(w, words_of(row, x).word[kWord], out + i, count - i);
+    x = hn::Add(x, hn::Set(w, static_cast<std::uint32_t>(hn::Lanes(w))));
+  }
+}
+
+/// Calls put(words, index, how many are left) for each vector of pixels.
+template <int kWord, class Put>
+HWY_INLINE void for_each_draw(const Row& from, std::size_t count, const Put& put) {
+  const Row row = from;
+  HWY_ALIGN std::uint32_t words[1][block_pixels];
+  for (std::size_t first = 0; first < count; first += block_pixels) {
+    const std::size_t end = HWY_MIN(count, first + block_pixels);
+    put_block<kWord, 1>(row, first, end - first, words);
+    for (std::size_t i = first; i < end; i += hn::Lanes(Words())) {
+      put(hn::Load(Words(), words[0] + (i - first)), i, count - i);
+    }
   }
 }
 
 template <int kWord>
-HWY_INLINE void put_one_word(const Row& row, std::size_t count, std::uint32_t* out) {
-  for_each_draw(row, count, [out](const FourWords& r, std::size_t i, std::size_t left) HWY_ATTR {
-    store(Words(), r.word[kWord], out + i, left);
-  });
-}
-
-template <int kWord>
 HWY_INLINE void put_one_normal(const Row& row, std::size_t count, float* out) {
-  for_each_draw(row, count, [out](const FourWords& r, std::size_t i, std::size_t left) HWY_ATTR {
-    store(Floats(), normal_of(r.word[kWord]), out + i, left);
+  for_each_draw<kWord>(row, count, [out](VU r, std::size_t i, std::size_t left) HWY_ATTR {
+    store(Floats(), normal_of(r), out + i, left);
   });
 }
 
@@ -54,8 +60,8 @@ void PutNormals(const Row& row, int word, std::size_t count, float* out) {
 }
 
 void PutPoisson(const Row& row, const float* mean, std::size_t count, float* out) {
-  for_each_draw(row, count, [mean, out](const FourWords& r, std::size_t i, std::size_t left) HWY_ATTR {
-    store(Floats(), poisson_of(r.word[0], load(Floats(), mean + i, left)), out + i, left);
+  for_each_draw<0>(row, count, [mean, out](VU r, std::size_t i, std::size_t left) HWY_ATTR {
+    store(Floats(), poisson_of(r, load(Floats(), mean + i, left)), out + i, left);
   });
 }
 
@@ -74,6 +80,8 @@ void PoissonOfWords(const std::uint32_t* r, const float* mean, std::size_t count
 
 bool ProductsAreRounded() { return rounds_products(); }
 
+const char* TargetName() { return hwy::TargetName(HWY_TARGET); }
+
 }  // namespace lowlux::draws::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -86,6 +94,7 @@ HWY_EXPORT(PutPoisson);
 HWY_EXPORT(NormalsOfWords);
 HWY_EXPORT(PoissonOfWords);
 HWY_EXPORT(ProductsAreRounded);
+HWY_EXPORT(TargetName);
 
 void put_words(const Row& row, int word, std::size_t count, std::uint32_t* out) {
   HWY_DYNAMIC_DISPATCH(PutWords)(row, word, count, out);
@@ -102,6 +111,7 @@ void normals_of_words(const std::uint32_t* r, std::size_t count, float* out) {
 void poisson_of_words(const std::uint32_t* r, const float* mean, std::size_t count, float* out) {
   HWY_DYNAMIC_DISPATCH(PoissonOfWords)(r, mean, count, out);
 }
+const char* target_name() { return HWY_DYNAMIC_DISPATCH(TargetName)(); }
 bool products_are_rounded() { return HWY_DYNAMIC_DISPATCH(ProductsAreRounded)(); }
 
 }  // namespace lowlux::draws

@@ -33,4 +33,7 @@ void poisson_of_words(const std::uint32_t* r, const float* mean, std::size_t cou
 /// Whether this build rounds products before it adds to them, which equal draws everywhere depend on.
 bool products_are_rounded();
 
+/// The instruction set in use, for reports and tests.
+const char* target_name();
+
 }  // namespace lowlux::draws

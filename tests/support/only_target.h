@@ -1,0 +1,34 @@
+#pragma once
+
+#include <hwy/highway.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace lowlux::test {
+
+/// Lets vector kernels use one instruction set only, for the life of the object.
+class OnlyTarget {
+ public:
+  explicit OnlyTarget(std::int64_t target) { choose(target); }
+  ~OnlyTarget() { choose(0); }
+  OnlyTarget(const OnlyTarget&) = delete;
+  OnlyTarget& operator=(const OnlyTarget&) = delete;
+
+ private:
+  static void choose(std::int64_t target) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  }
+};
+
+/// Those of the processor that the kernels are compiled for: SSSE3 and better on x86.
+inline std::vector<std::int64_t> kernel_targets() {
+  std::vector<std::int64_t> out;
+  for (const std::int64_t target : {HWY_AVX3, HWY_AVX2, HWY_SSE4, HWY_SSSE3}) {
+    if ((hwy::SupportedTargets() & target) != 0) out.push_back(target);
+  }
+  return out;
+}
+
+}  // namespace lowlux::test
