@@ -1,15 +1,9 @@
 #include "capture/file/dng_source.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <new>
 #include <optional>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -17,14 +11,13 @@
 #include "capture/file/decoder_process.h"
 #include "capture/file/dng_file.h"
 #include "capture/file/dng_frame.h"
+#include "capture/file/file_bytes.h"
 #include "capture/file/libraw_decoder.h"
 #include "capture/file/pass_on.h"
 #include "capture/file/tiff_directory.h"
 
 namespace lowlux::capture {
 namespace {
-
-std::string mebibytes(std::uint64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; }
 
 /// Whether the first bytes are text: no raw format begins with 64 characters that can be printed. Bytes from 128 on
 /// are taken for UTF-8, which has none from 0xF5 on.
@@ -85,10 +78,7 @@ Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, 
 
 Result<RawFrame> read_bytes(std::span<const std::byte> bytes, const ReadLimits& limits) {
   if (bytes.empty()) return fail(ErrorCode::malformed, "the file is empty");
-  if (bytes.size() > limits.max_file_bytes) {
-    return fail(ErrorCode::too_large,
-                "the file has " + mebibytes(bytes.size()) + ", over the limit of " + mebibytes(limits.max_file_bytes));
-  }
+  if (bytes.size() > limits.max_file_bytes) return too_many_bytes(bytes.size(), limits.max_file_bytes);
   auto dng = open_dng(bytes);
   if (!dng) return pass_on(dng);
   if (*dng) return read_dng(**dng, bytes, limits);
@@ -100,50 +90,11 @@ Result<RawFrame> read_bytes(std::span<const std::byte> bytes, const ReadLimits& 
   return frame_of_decoder(*std::move(decoded));
 }
 
-Error system_error(ErrorCode code, const char* what) {
-  return {code, std::string(what) + ": " + std::system_category().message(errno), {}};
-}
-
-Result<std::vector<std::byte>> load(int fd, const ReadLimits& limits) {
-  struct stat status {};
-  if (fstat(fd, &status) != 0) return tl::make_unexpected(system_error(ErrorCode::unreadable, "cannot be read"));
-  if (S_ISDIR(status.st_mode)) return fail(ErrorCode::unreadable, "is a directory, not a raw file");
-  if (!S_ISREG(status.st_mode)) return fail(ErrorCode::unreadable, "is not a regular file");
-  const auto size = static_cast<std::uint64_t>(status.st_size);
-  if (size > limits.max_file_bytes) {
-    return fail(ErrorCode::too_large,
-                "the file has " + mebibytes(size) + ", over the limit of " + mebibytes(limits.max_file_bytes));
-  }
-  std::vector<std::byte> bytes(size);
-  std::size_t have = 0;
-  while (have < bytes.size()) {
-    const ssize_t got = read(fd, bytes.data() + have, bytes.size() - have);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return tl::make_unexpected(system_error(ErrorCode::unreadable, "cannot be read"));
-    if (got == 0) break;
-    have += static_cast<std::size_t>(got);
-  }
-  bytes.resize(have);
-  return bytes;
-}
-
 }  // namespace
 
 Result<RawFrame> read_raw(const std::filesystem::path& file, const ReadLimits& limits) {
-  const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) {
-    const bool missing = errno == ENOENT || errno == ENOTDIR;
-    Error error = missing ? Error{ErrorCode::not_found, "no such file", {}}
-                          : system_error(ErrorCode::unreadable, "cannot be opened");
-    error.where = file.string();
-    return tl::make_unexpected(std::move(error));
-  }
-  auto bytes = load(fd, limits);
-  close(fd);
-  if (!bytes) {
-    bytes.error().where = file.string();
-    return pass_on(bytes);
-  }
+  auto bytes = read_file_bytes(file, limits.max_file_bytes);
+  if (!bytes) return pass_on(bytes);
   return read_raw(*bytes, file.string(), limits);
 }
 

@@ -131,7 +131,7 @@ void add_rendering(CLI::App& app, DevelopArgs& args) {
       [&args](isp::ToneCurve tone) { args.tone = tone; }, "tone curve (default: standard, in linear spaces none)");
   add_choice<OutputSpace>(
       app, "--space", space_names(), [&args](OutputSpace space) { args.space = space; },
-      "what the numbers mean (default: srgb; linear-srgb for OpenEXR)");
+      "what the numbers mean (default: srgb; linear-srgb for OpenEXR and PFM)");
   app.add_option_function<std::string>(
          "--black", [&o](const std::string& text) { set_black(text, o.black); },
          "black point: measured on masked pixels where there are any, else the file's figure (auto, default); one of "
@@ -146,11 +146,11 @@ void add_rendering(CLI::App& app, DevelopArgs& args) {
 
 void add_output(CLI::App& app, DevelopArgs& args) {
   app.add_option("-o,--output", args.output,
-                 "picture to write (.png .jpg .tif .exr), or a folder for several (made if it ends with /)")
+                 "picture to write (.png .jpg .tif .exr .pfm), or a folder for several (made if it ends with /)")
       ->required()
       ->type_name("OUT");
-  app.add_option("--format", args.format, "format of pictures written to a folder: png (default), jpg, tif or exr")
-      ->check(CLI::IsMember({"png", "jpg", "tif", "exr"}));
+  app.add_option("--format", args.format, "format of pictures written to a folder: png (default), jpg, tif, exr or pfm")
+      ->check(CLI::IsMember({"png", "jpg", "tif", "exr", "pfm"}));
   app.add_option("--bits", args.bits, "bits per sample: 8, 16 or 32 (float; for OpenEXR 16 is half float)")
       ->check(CLI::IsMember({8, 16, 32}));
   app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));

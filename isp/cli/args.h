@@ -16,7 +16,7 @@ struct DevelopArgs {
   std::string format;                  // extension of files in an output folder, without dot
   std::optional<int> bits;             // 8, 16 or 32; absent: the format's default
   std::optional<isp::ToneCurve> tone;  // absent: standard, or none for linear spaces
-  std::optional<OutputSpace> space;    // absent: srgb, or linear-srgb for OpenEXR
+  std::optional<OutputSpace> space;    // absent: srgb, or linear-srgb for OpenEXR and PFM
   bool exposure_given = false;
   isp::DevelopOptions options;  // white balance, black, half, defects, exposure
   int jpeg_quality = 92;

@@ -26,6 +26,8 @@ int default_bits(FileFormat format, OutputSpace space) {
       return 8;
     case FileFormat::tiff:
       return space == OutputSpace::camera || space == OutputSpace::xyz ? 32 : 16;
+    case FileFormat::pfm:
+      return 32;
     case FileFormat::exr:
       break;
   }
@@ -71,7 +73,8 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args) {
 
 Result<isp::DevelopOptions> complete_options(const DevelopArgs& args, FileFormat format) {
   isp::DevelopOptions o = args.options;
-  o.space = args.space.value_or(format == FileFormat::exr ? OutputSpace::linear_srgb : OutputSpace::srgb);
+  o.space = args.space.value_or(format == FileFormat::exr || format == FileFormat::pfm ? OutputSpace::linear_srgb
+                                                                                       : OutputSpace::srgb);
   const int bits = args.bits.value_or(default_bits(format, o.space));
   if (format == FileFormat::exr && bits == 8)
     return fail(ErrorCode::invalid_argument, "OpenEXR holds 16 or 32 bits", "--bits");

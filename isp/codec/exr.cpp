@@ -95,6 +95,9 @@ Imf::Header header_of(const SceneLinear& picture, const FileMetadata& metadata, 
   if (const auto& c = metadata.chromaticities) {
     Imf::addChromaticities(header, {to_v2f(c->red), to_v2f(c->green), to_v2f(c->blue), to_v2f(c->white)});
   }
+  if (usable(metadata.white_luminance_cd_m2)) {
+    Imf::addWhiteLuminance(header, static_cast<float>(*metadata.white_luminance_cd_m2));
+  }
   const FrameInfo& info = metadata.info;
   if (usable(info.exposure_s)) Imf::addExpTime(header, static_cast<float>(*info.exposure_s));
   if (usable(info.f_number)) Imf::addAperture(header, static_cast<float>(*info.f_number));
@@ -163,6 +166,7 @@ FileMetadata metadata_of(const Imf::Header& header) {
     const auto& c = Imf::chromaticities(header);
     metadata.chromaticities = Chromaticities{to_xy(c.red), to_xy(c.green), to_xy(c.blue), to_xy(c.white)};
   }
+  if (Imf::hasWhiteLuminance(header)) metadata.white_luminance_cd_m2 = Imf::whiteLuminance(header);
   if (Imf::hasExpTime(header)) info.exposure_s = Imf::expTime(header);
   if (Imf::hasAperture(header)) info.f_number = Imf::aperture(header);
   if (Imf::hasIsoSpeed(header)) info.iso = Imf::isoSpeed(header);

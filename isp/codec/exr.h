@@ -17,8 +17,9 @@ struct ExrOptions {
   enum class Compression : std::uint8_t { none, piz } compression = Compression::none;
 };
 
-/// Writes scene-linear R, G, B channels. `metadata.chromaticities` and the exposure time, f-number,
-/// ISO, camera and time of `metadata.info` become attributes; an OpenEXR file has no place for an ICC profile.
+/// Writes scene-linear R, G, B channels. `metadata.chromaticities`, `white_luminance_cd_m2` where it is
+/// positive, and the exposure time, f-number, ISO, camera and time of `metadata.info` become attributes; an OpenEXR
+/// file has no place for an ICC profile.
 /// @param file open for writing, at its start
 Result<void> encode_exr(const SceneLinear& picture, const FileMetadata& metadata, const ExrOptions& options,
                         std::FILE* file);

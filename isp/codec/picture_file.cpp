@@ -17,6 +17,7 @@ Result<void> check_size(std::int64_t width, std::int64_t height, const DecodeLim
 }
 
 Result<void> write_bytes(std::FILE* file, std::span<const std::byte> bytes) {
+  if (bytes.empty()) return {};  // fwrite takes no null pointer, even for nothing
   errno = 0;
   if (std::fwrite(bytes.data(), 1, bytes.size(), file) != bytes.size()) return write_failure();
   return {};

@@ -31,6 +31,7 @@ struct FileMetadata {
   std::vector<std::byte> exif;  // EXIF block from its TIFF header on, without "Exif\0\0"; empty: none (PNG, JPEG)
   FrameInfo info;               // as fields of the format's own (TIFF, OpenEXR)
   std::optional<Chromaticities> chromaticities;  // OpenEXR
+  std::optional<double> white_luminance_cd_m2;   // luminance of RGB (1, 1, 1) (OpenEXR whiteLuminance)
 };
 
 struct DecodedPicture {

@@ -1,95 +1,18 @@
 #include <tiffio.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <limits>
-#include <memory>
 #include <new>
 #include <type_traits>
 #include <vector>
 
 #include "isp/codec/tiff.h"
-#include "isp/codec/tiff_client.h"
 #include "isp/codec/tiff_info.h"
+#include "isp/codec/tiff_output.h"
 
 namespace lowlux::isp {
 namespace {
-
-constexpr std::size_t strip_bytes = std::size_t{1} << 20;
-constexpr std::uint64_t classic_limit = 3'900'000'000;  // offsets of 32 bits, with room for directories
-
-/// The caller's stream as libtiff sees it. C wants a seek between reading and writing.
-struct Output {
-  std::FILE* file;
-  int write_errno = 0;
-  TiffMessages messages;
-};
-
-Output* output_of(thandle_t handle) { return static_cast<Output*>(handle); }
-
-tmsize_t read_file(thandle_t handle, void* data, tmsize_t size) {
-  std::FILE* file = output_of(handle)->file;
-  if (fseeko(file, 0, SEEK_CUR) != 0) return -1;
-  const auto count = std::fread(data, 1, static_cast<std::size_t>(size), file);
-  return fseeko(file, 0, SEEK_CUR) == 0 ? static_cast<tmsize_t>(count) : -1;
-}
-
-void keep_errno(Output& output) {
-  if (output.write_errno == 0) output.write_errno = errno == 0 ? EIO : errno;
-}
-
-tmsize_t write_file(thandle_t handle, void* data, tmsize_t size) {
-  errno = 0;
-  const auto count = std::fwrite(data, 1, static_cast<std::size_t>(size), output_of(handle)->file);
-  if (count != static_cast<std::size_t>(size)) keep_errno(*output_of(handle));
-  return static_cast<tmsize_t>(count);
-}
-
-toff_t seek_file(thandle_t handle, toff_t offset, int whence) {
-  errno = 0;
-  std::FILE* file = output_of(handle)->file;
-  if (fseeko(file, static_cast<off_t>(offset), whence) != 0) {  // it flushes first, and so may find the disk full
-    keep_errno(*output_of(handle));
-    return static_cast<toff_t>(-1);
-  }
-  return static_cast<toff_t>(ftello(file));
-}
-
-toff_t size_of_file(thandle_t handle) {
-  std::FILE* file = output_of(handle)->file;
-  const off_t here = ftello(file);
-  if (fseeko(file, 0, SEEK_END) != 0) return 0;
-  const off_t size = ftello(file);
-  return fseeko(file, here, SEEK_SET) == 0 ? static_cast<toff_t>(size) : 0;
-}
-
-int keep_open(thandle_t /*handle*/) { return 0; }
-
-int keep_error(TIFF* /*tiff*/, void* user, const char* /*module*/, const char* format, va_list arguments) {
-  static_cast<Output*>(user)->messages.keep(format, arguments);
-  return 1;
-}
-
-int ignore_warning(TIFF* /*tiff*/, void* /*user*/, const char* /*module*/, const char* /*format*/, va_list /*list*/) {
-  return 1;
-}
-
-struct CloseTiff {
-  void operator()(TIFF* tiff) const { TIFFClose(tiff); }
-};
-using TiffHandle = std::unique_ptr<TIFF, CloseTiff>;
-
-TiffHandle open_output(Output& output, bool big) {
-  TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
-  if (options == nullptr) return nullptr;
-  TIFFOpenOptionsSetErrorHandlerExtR(options, keep_error, &output);
-  TIFFOpenOptionsSetWarningHandlerExtR(options, ignore_warning, nullptr);
-  TIFF* tiff = TIFFClientOpenExt("picture", big ? "w8" : "w", &output, read_file, write_file, seek_file, keep_open,
-                                 size_of_file, nullptr, nullptr, options);
-  TIFFOpenOptionsFree(options);
-  return TiffHandle(tiff);
-}
 
 struct Layout {
   int width = 0;
@@ -162,22 +85,15 @@ Result<void> encode(const Image& picture, const FileMetadata& metadata, const Ti
   if (auto size = check_size(picture.width(), picture.height(), any_number); !size) return size;
   constexpr std::size_t sample_bytes = sizeof(typename SampleOf<Image>::Type);
   const std::size_t row_bytes = 3 * sample_bytes * picture.width();
-  const int rows = static_cast<int>(std::clamp<std::size_t>(strip_bytes / row_bytes, 1, picture.height()));
+  const int rows = static_cast<int>(std::clamp<std::size_t>(tiff_strip_bytes / row_bytes, 1, picture.height()));
   const Layout layout{picture.width(), picture.height(), 8 * static_cast<int>(sample_bytes), rows};
-  Output output{file, 0, {}};
-  TiffHandle tiff = open_output(output, row_bytes * picture.height() > classic_limit);
-  bool written = tiff != nullptr;
-  if (written) {
-    const std::uint64_t exif = write_tiff_exif(tiff.get(), metadata.info);
-    set_tags(tiff.get(), layout, metadata, options);
-    if (exif != 0) TIFFSetField(tiff.get(), TIFFTAG_EXIFIFD, exif);
-    written = write_strips(tiff.get(), picture, layout) && TIFFWriteDirectory(tiff.get()) != 0;
-  }
-  tiff.reset();  // libtiff writes its last bytes here
-  if (written && output.write_errno == 0 && output.messages.first_error.empty()) return {};
-  errno = output.write_errno;
-  if (errno != 0) return write_failure();
-  return fail(ErrorCode::unwritable, "libtiff: " + output.messages.first_error);
+  TiffOutput output(file, row_bytes * picture.height() > tiff_classic_limit);
+  TIFF* tiff = output.handle();
+  if (tiff == nullptr) return output.finish(false);
+  const std::uint64_t exif = write_tiff_exif(tiff, metadata.info);
+  set_tags(tiff, layout, metadata, options);
+  if (exif != 0) TIFFSetField(tiff, TIFFTAG_EXIFIFD, exif);
+  return output.finish(write_strips(tiff, picture, layout) && TIFFWriteDirectory(tiff) != 0);
 }
 
 }  // namespace

@@ -11,6 +11,8 @@
 namespace lowlux::isp {
 namespace {
 
+constexpr double hottest_c = 200;  // beyond it no camera has been, and a file that says so is not believed
+
 void set_positive(TIFF* tiff, std::uint32_t tag, const std::optional<double>& number) {
   if (number && std::isfinite(*number) && *number > 0) TIFFSetField(tiff, tag, *number);
 }
@@ -30,12 +32,7 @@ void set_sensitivity(TIFF* tiff, const std::optional<double>& iso) {
   TIFFSetField(tiff, EXIFTAG_RECOMMENDEDEXPOSUREINDEX, exact);
 }
 
-std::string text_of(TIFF* tiff, std::uint32_t tag) {
-  const char* text = nullptr;
-  return TIFFGetField(tiff, tag, &text) != 0 && text != nullptr ? text : "";
-}
-
-/// A positive rational; libtiff hands some tags out as float and some as double.
+/// A number as libtiff hands it out: some tags as float and some as double.
 std::optional<double> number_of(TIFF* tiff, std::uint32_t tag) {
   const TIFFField* field = TIFFFindField(tiff, tag, TIFF_ANY);
   if (field == nullptr) return std::nullopt;
@@ -44,8 +41,17 @@ std::optional<double> number_of(TIFF* tiff, std::uint32_t tag) {
   const bool is_wide = TIFFFieldSetGetSize(field) == sizeof(double);
   const bool found = is_wide ? TIFFGetField(tiff, tag, &wide) != 0 : TIFFGetField(tiff, tag, &narrow) != 0;
   const double number = is_wide ? wide : narrow;
-  if (!found || !std::isfinite(number) || number <= 0) return std::nullopt;
+  if (!found || !std::isfinite(number)) return std::nullopt;
   return number;
+}
+
+std::optional<double> positive(const std::optional<double>& number) {
+  return number && *number > 0 ? number : std::nullopt;
+}
+
+std::string text_of(TIFF* tiff, std::uint32_t tag) {
+  const char* text = nullptr;
+  return TIFFGetField(tiff, tag, &text) != 0 && text != nullptr ? text : "";
 }
 
 std::optional<double> sensitivity_of(TIFF* tiff) {
@@ -76,6 +82,9 @@ std::uint64_t write_tiff_exif(TIFF* file, const FrameInfo& info) {
   set_positive(file, EXIFTAG_FNUMBER, info.f_number);
   set_positive(file, EXIFTAG_FOCALLENGTH, info.focal_length_mm);
   set_sensitivity(file, info.iso);
+  if (info.temperature_c && std::fabs(*info.temperature_c) <= hottest_c) {
+    TIFFSetField(file, EXIFTAG_TEMPERATURE, *info.temperature_c);
+  }
   if (info.date_time.size() == 19) set_text(file, EXIFTAG_DATETIMEORIGINAL, info.date_time);
   std::uint64_t place = 0;
   const bool written = TIFFWriteCustomDirectory(file, &place) != 0;
@@ -95,9 +104,10 @@ FrameInfo read_tiff_info(TIFF* file) {
   if (orientation >= 1 && orientation <= 8) info.orientation = static_cast<Orientation>(orientation);
   std::uint64_t exif = 0;
   if (TIFFGetField(file, TIFFTAG_EXIFIFD, &exif) == 0 || TIFFReadEXIFDirectory(file, exif) == 0) return info;
-  info.exposure_s = number_of(file, EXIFTAG_EXPOSURETIME);
-  info.f_number = number_of(file, EXIFTAG_FNUMBER);
-  info.focal_length_mm = number_of(file, EXIFTAG_FOCALLENGTH);
+  info.exposure_s = positive(number_of(file, EXIFTAG_EXPOSURETIME));
+  info.f_number = positive(number_of(file, EXIFTAG_FNUMBER));
+  info.focal_length_mm = positive(number_of(file, EXIFTAG_FOCALLENGTH));
+  info.temperature_c = number_of(file, EXIFTAG_TEMPERATURE);
   info.iso = sensitivity_of(file);
   if (auto taken = text_of(file, EXIFTAG_DATETIMEORIGINAL); !taken.empty()) info.date_time = std::move(taken);
   return info;

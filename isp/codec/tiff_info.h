@@ -8,8 +8,8 @@ struct tiff;  // libtiff's open file
 
 namespace lowlux::isp {
 
-/// Writes an EXIF directory (exposure, aperture, focal length, sensitivity, time) and leaves `file` at a fresh main
-/// directory. @return its place in the file, for TIFFTAG_EXIFIFD; 0 if it could not be written
+/// Writes an EXIF directory (exposure, aperture, focal length, sensitivity, temperature, time) and leaves `file` at a
+/// fresh main directory. @return its place in the file, for TIFFTAG_EXIFIFD; 0 if it could not be written
 std::uint64_t write_tiff_exif(tiff* file, const FrameInfo& info);
 
 /// Sets Make, Model, Software, DateTime and Orientation of the main directory.

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "isp/codec/pfm.h"
 #include "isp/codec/png.h"
 #include "isp/output/icc.h"
 #include "isp/output/metadata.h"
@@ -16,12 +17,13 @@ struct Extension {
   std::string_view text;
   FileFormat format;
 };
-constexpr std::array<Extension, 6> extensions{{{".png", FileFormat::png},
+constexpr std::array<Extension, 7> extensions{{{".png", FileFormat::png},
                                                {".jpg", FileFormat::jpeg},
                                                {".jpeg", FileFormat::jpeg},
                                                {".tif", FileFormat::tiff},
                                                {".tiff", FileFormat::tiff},
-                                               {".exr", FileFormat::exr}}};
+                                               {".exr", FileFormat::exr},
+                                               {".pfm", FileFormat::pfm}}};
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
@@ -34,9 +36,11 @@ const char* name_of(FileFormat format) {
     case FileFormat::tiff:
       return "TIFF";
     case FileFormat::exr:
+      return "OpenEXR";
+    case FileFormat::pfm:
       break;
   }
-  return "OpenEXR";
+  return "PFM";
 }
 
 const char* name_of(SampleType type) {
@@ -60,6 +64,7 @@ const char* samples_held(FileFormat format) {
     case FileFormat::tiff:
       return "8 or 16 bits or floats";
     case FileFormat::exr:
+    case FileFormat::pfm:
       break;
   }
   return "floats";
@@ -92,9 +97,11 @@ Result<void> encode(const Picture& picture, FileFormat format, const FileMetadat
     case FileFormat::tiff:
       return encode_tiff(picture, metadata, o.tiff, file);
     case FileFormat::exr:
+      return encode_exr(std::get<SceneLinear>(picture), metadata, o.exr, file);
+    case FileFormat::pfm:
       break;
   }
-  return encode_exr(std::get<SceneLinear>(picture), metadata, o.exr, file);
+  return encode_pfm(std::get<SceneLinear>(picture), file);
 }
 
 }  // namespace
@@ -113,7 +120,7 @@ Result<FileFormat> format_of(const std::string& path) {
     if (ending == known.text) return known.format;
   }
   return fail(ErrorCode::invalid_argument,
-              "cannot tell the format of " + path + ": name it .png, .jpg, .jpeg, .tif, .tiff or .exr", path);
+              "cannot tell the format of " + path + ": name it .png, .jpg, .jpeg, .tif, .tiff, .exr or .pfm", path);
 }
 
 bool supported(FileFormat format, SampleType type) {
@@ -125,6 +132,7 @@ bool supported(FileFormat format, SampleType type) {
     case FileFormat::tiff:
       return true;
     case FileFormat::exr:
+    case FileFormat::pfm:
       break;
   }
   return type == SampleType::f32;

@@ -14,14 +14,14 @@
 
 namespace lowlux::isp {
 
-enum class FileFormat : std::uint8_t { png, jpeg, tiff, exr };
+enum class FileFormat : std::uint8_t { png, jpeg, tiff, exr, pfm };
 
 SampleType sample_type(const Picture& picture);
 
-/// By the end of the name, in any case: .png .jpg .jpeg .tif .tiff .exr; others are an error that lists these.
+/// By the end of the name, in any case: .png .jpg .jpeg .tif .tiff .exr .pfm; others are an error that lists these.
 Result<FileFormat> format_of(const std::string& path);
 
-/// PNG: u8, u16. JPEG: u8. TIFF: all. OpenEXR: f32.
+/// PNG: u8, u16. JPEG: u8. TIFF: all. OpenEXR, PFM: f32.
 bool supported(FileFormat format, SampleType type);
 
 /// What can be known before the work: the format holds the samples, and floats are scene-linear.
@@ -36,8 +36,8 @@ struct WriteOptions {
 };
 
 /// Writes the picture whole or not at all, with the ICC profile or chromaticities of `space` and what `info` tells of
-/// the exposure. Pixels are written as they lie: turn them first (orient.h); the file says orientation 1.
-/// The executor's threads compress PNG.
+/// the exposure; PFM has a place for neither. Pixels are written as they lie: turn them first (orient.h); the file says
+/// orientation 1. The executor's threads compress PNG.
 Result<void> write_picture(const Picture& picture, OutputSpace space, const FrameInfo& info, const std::string& path,
                            const WriteOptions& options, Executor& executor);
 

@@ -13,6 +13,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr ExifByteOrder order = EXIF_BYTE_ORDER_INTEL;
+constexpr std::size_t longest_text = 255;
 constexpr std::size_t prefix_size = 6;  // "Exif\0\0", which belongs to JPEG's segment
 
 struct Unref {
@@ -96,14 +97,6 @@ class Block {
   std::unique_ptr<ExifData, Unref> data_;
 };
 
-std::string printable(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c >= ' ' && c <= '~' && out.size() < 255) out.push_back(c);
-  }
-  return out;
-}
-
 /// "YYYY:MM:DD hh:mm:ss"
 bool is_time(const std::string& text) {
   constexpr std::string_view shape = "dddd:dd:dd dd:dd:dd";
@@ -128,11 +121,19 @@ void add_sensitivity(Block& block, const std::optional<double>& iso) {
 
 }  // namespace
 
+std::string printable_ascii(const std::string& text, std::size_t limit) {
+  std::string out;
+  for (const char c : text) {
+    if (c >= ' ' && c <= '~' && out.size() < limit) out.push_back(c);
+  }
+  return out;
+}
+
 FrameInfo written_info(const FrameInfo& info, const std::string& software) {
   FrameInfo out = info;
-  out.make = printable(info.make);
-  out.model = printable(info.model);
-  out.software = printable(software);
+  out.make = printable_ascii(info.make, longest_text);
+  out.model = printable_ascii(info.model, longest_text);
+  out.software = printable_ascii(software, longest_text);
   out.date_time = is_time(info.date_time) ? info.date_time : "";
   out.orientation = Orientation::normal;
   return out;

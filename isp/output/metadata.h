@@ -22,6 +22,9 @@ struct ExifPicture {
 /// that are not positive are left out; text keeps its printable ASCII, at most 255 characters.
 std::vector<std::byte> exif_block(const FrameInfo& info, const ExifPicture& picture);
 
+/// The printable ASCII of a text, at most `limit` characters: what EXIF and TIFF fields may hold.
+std::string printable_ascii(const std::string& text, std::size_t limit);
+
 /// `info` as it holds for the finished picture: upright, made by `software`, with clean text.
 FrameInfo written_info(const FrameInfo& info, const std::string& software);
 

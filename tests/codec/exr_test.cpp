@@ -96,11 +96,23 @@ TEST(Exr, ChromaticitiesAndExposureComeBack) {
   EXPECT_EQ(read.info.date_time, "2024:02:03 04:05:06");
 }
 
+TEST(Exr, TheLuminanceOfWhiteComesBackIfItIsOne) {
+  const auto read_back = [](double cd_m2) {
+    FileMetadata metadata;
+    metadata.white_luminance_cd_m2 = cd_m2;
+    const auto decoded = decode_exr(exr_of(noisy_linear(5, 4), Depth::half, metadata));
+    return decoded ? decoded->metadata.white_luminance_cd_m2 : std::optional<double>(-1);
+  };
+  EXPECT_EQ(read_back(0.125), 0.125);  // an exact float
+  for (const double none : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) EXPECT_FALSE(read_back(none));
+}
+
 TEST(Exr, WhatIsUnknownStaysAbsent) {
   const auto decoded = decode_exr(exr_of(noisy_linear(5, 4), Depth::half));
   ASSERT_TRUE(decoded);
   EXPECT_FALSE(decoded->metadata.chromaticities);
   EXPECT_FALSE(decoded->metadata.info.exposure_s || decoded->metadata.info.iso || decoded->metadata.info.f_number);
+  EXPECT_FALSE(decoded->metadata.white_luminance_cd_m2);
 }
 
 TEST(Exr, AFullDiskIsAnErrorThatSaysSo) {

@@ -7,6 +7,7 @@
 #include "isp/codec/exr.h"
 #include "isp/codec/exr_header.h"
 #include "isp/codec/jpeg.h"
+#include "isp/codec/pfm.h"
 #include "isp/codec/png.h"
 #include "isp/codec/tiff.h"
 #include "tests/codec/pictures.h"
@@ -49,6 +50,7 @@ std::vector<Format> formats() {
        bytes([&](std::FILE* f) { return encode_tiff(deep, metadata, {TiffOptions::Compression::deflate}, f); })},
       {"tifff", decode_tiff,
        bytes([&](std::FILE* f) { return encode_tiff(floats, metadata, {TiffOptions::Compression::none}, f); })},
+      {"pfm", decode_pfm, bytes([&](std::FILE* f) { return encode_pfm(linear, f); })},
       {"piz", decode_exr, bytes([&](std::FILE* f) {
          return encode_exr(linear, metadata, {ExrOptions::Depth::half, ExrOptions::Compression::piz}, f);
        })},

@@ -60,6 +60,7 @@ FrameInfo camera_info() {
   info.iso = 3200;
   info.f_number = 1.8;
   info.focal_length_mm = 35;
+  info.temperature_c = -12.5;
   info.orientation = Orientation::rotate_90;
   return info;
 }
@@ -77,6 +78,7 @@ TEST(Tiff, ProfileAndExposureComeBack) {
   EXPECT_EQ(info.software, "lowlux 1");
   EXPECT_EQ(info.date_time, "2024:02:03 04:05:06");
   EXPECT_EQ(info.orientation, Orientation::rotate_90);
+  EXPECT_EQ(info.temperature_c, -12.5);
   EXPECT_NEAR(info.exposure_s.value_or(0), 1.0 / 30, 1e-8);  // float in libtiff's interface
   EXPECT_NEAR(info.f_number.value_or(0), 1.8, 1e-6);
   EXPECT_EQ(info.iso, 3200);

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "isp/codec/pfm.h"
 #include "isp/codec/png.h"
 #include "isp/output/icc.h"
 #include "tests/codec/pictures.h"
@@ -69,9 +70,11 @@ Result<DecodedPicture> read(const std::string& path, const std::string& bytes) {
     case FileFormat::tiff:
       return decode_tiff(data);
     case FileFormat::exr:
+      return decode_exr(data);
+    case FileFormat::pfm:
       break;
   }
-  return decode_exr(data);
+  return decode_pfm(data);
 }
 
 TEST(WritePicture, EveryFormatComesBackWithItsProfileAndExposure) {
@@ -149,6 +152,18 @@ TEST(WritePicture, PixelsOfLosslessFormatsComeBackBitExact) {
         },
         original);
   }
+}
+
+TEST(WritePicture, PfmHoldsTheFloatsAndNothingElse) {
+  const ScratchDirectory scratch;
+  ASSERT_TRUE(write({"", floats, OutputSpace::linear_srgb}, scratch.file("a.pfm")));
+  const auto decoded = read("a.pfm", scratch.read("a.pfm"));
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  EXPECT_TRUE(test::same_bits(test::noisy_linear(80, 60), std::get<SceneLinear>(decoded->picture)));
+  const auto codes = write({"", codes8, OutputSpace::srgb}, scratch.file("b.pfm"));
+  ASSERT_FALSE(codes);
+  EXPECT_NE(codes.error().message.find("PFM files hold floats, the picture is 8-bit"), std::string::npos);
+  EXPECT_FALSE(scratch.holds("b.pfm"));
 }
 
 TEST(WritePicture, XyzAndCameraNumbersGetNoRgbProfile) {
@@ -234,6 +249,7 @@ TEST(FormatOf, TellsByTheEndOfTheNameInAnyCase) {
   EXPECT_EQ(format_of("x.TIF").value(), FileFormat::tiff);
   EXPECT_EQ(format_of("x.y.tiff").value(), FileFormat::tiff);
   EXPECT_EQ(format_of("x.Exr").value(), FileFormat::exr);
+  EXPECT_EQ(format_of("x.PFM").value(), FileFormat::pfm);
 }
 
 TEST(FormatOf, OtherNamesAreAnErrorThatListsTheFormats) {
@@ -241,7 +257,7 @@ TEST(FormatOf, OtherNamesAreAnErrorThatListsTheFormats) {
     const auto format = format_of(path);
     ASSERT_FALSE(format) << path;
     EXPECT_EQ(format.error().code, ErrorCode::invalid_argument);
-    EXPECT_NE(format.error().message.find(".png, .jpg, .jpeg, .tif, .tiff or .exr"), std::string::npos);
+    EXPECT_NE(format.error().message.find(".png, .jpg, .jpeg, .tif, .tiff, .exr or .pfm"), std::string::npos);
   }
 }
 
@@ -257,6 +273,7 @@ TEST(CheckWritable, FormatsHoldTheSamplesTheyCan) {
   EXPECT_EQ(held(FileFormat::jpeg), "ynn");
   EXPECT_EQ(held(FileFormat::tiff), "yyy");
   EXPECT_EQ(held(FileFormat::exr), "nny");
+  EXPECT_EQ(held(FileFormat::pfm), "nny");
 }
 
 TEST(CheckWritable, RefusalsSayWhatWouldDo) {

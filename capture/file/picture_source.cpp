@@ -1,0 +1,155 @@
+#include "capture/file/picture_source.h"
+
+#include <cmath>
+#include <cstdint>
+#include <new>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include "capture/file/dng_tags.h"
+#include "capture/file/file_bytes.h"
+#include "capture/file/number_text.h"
+#include "capture/file/pass_on.h"
+#include "capture/file/picture_colour.h"
+#include "capture/file/picture_light.h"
+#include "isp/codec/exr.h"
+#include "isp/codec/jpeg.h"
+#include "isp/codec/pfm.h"
+#include "isp/codec/png.h"
+#include "isp/codec/tiff.h"
+#include "isp/model/colorimetry.h"
+
+namespace lowlux::capture {
+namespace {
+
+constexpr std::uint64_t bytes_per_pixel = 16;  // four floats, the most a file needs for one
+constexpr std::uint64_t bytes_of_metadata = std::uint64_t{64} << 20;
+constexpr int curve_points = 1025;                // at which the curve of a profile for floats is compared with a line
+constexpr float linear_tolerance = 1.0F / 65535;  // a 16-bit step, in which profiles state curves
+
+using Decoder = Result<isp::DecodedPicture> (*)(std::span<const std::byte>, const isp::DecodeLimits&);
+
+bool starts_with(std::span<const std::byte> bytes, std::string_view magic) {
+  return std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()).starts_with(magic);
+}
+
+bool is_dng(std::span<const std::byte> bytes) {
+  const auto tiff = TiffFile::open(bytes);
+  if (!tiff) return false;
+  const auto first = tiff->directory(tiff->first_directory());
+  return first && first->find(tag::dng_version) != nullptr;
+}
+
+Result<Decoder> decoder_of(std::span<const std::byte> bytes) {
+  using std::string_view_literals::operator""sv;
+  if (bytes.empty()) return fail(ErrorCode::malformed, "the file is empty");
+  if (starts_with(bytes, "\x89PNG\r\n\x1a\n"sv)) return isp::decode_png;
+  if (starts_with(bytes, "\xFF\xD8\xFF"sv)) return isp::decode_jpeg;
+  if (starts_with(bytes, "\x76\x2F\x31\x01"sv)) return isp::decode_exr;
+  if (starts_with(bytes, "PF"sv) || starts_with(bytes, "Pf"sv)) return isp::decode_pfm;
+  if (is_dng(bytes)) return fail(ErrorCode::unsupported, "this is a raw file (DNG), not a picture: develop it first");
+  for (const std::string_view magic : {"II\x2A\0"sv, "MM\0\x2A"sv, "II\x2B\0"sv, "MM\0\x2B"sv}) {
+    if (starts_with(bytes, magic)) return isp::decode_tiff;
+  }
+  return fail(ErrorCode::unsupported,
+              "this is no picture that lowlux reads: convert it to PNG, JPEG, TIFF, OpenEXR or PFM");
+}
+
+/// Orientation of the EXIF block, or of the format's own field where there is no block.
+Orientation orientation_of(const isp::FileMetadata& metadata) {
+  if (metadata.exif.empty()) return metadata.info.orientation;
+  const auto tiff = TiffFile::open(metadata.exif);
+  if (!tiff) return Orientation::normal;
+  const auto directory = tiff->directory(tiff->first_directory());
+  if (!directory) return Orientation::normal;
+  const auto stated = directory->whole(tag::orientation);
+  if (!stated || !*stated || **stated < 1 || **stated > 8) return Orientation::normal;
+  return static_cast<Orientation>(**stated);
+}
+
+template <class Code>
+Result<SceneLinear> light_of_display(const Encoded<Code>& picture, const isp::FileMetadata& metadata,
+                                     Executor& executor) {
+  constexpr int codes = 1 << (8 * sizeof(Code));
+  auto colour = metadata.icc.empty() ? Result<DisplayColour>(srgb_colour(codes)) : icc_colour(metadata.icc, codes);
+  if (!colour) return pass_on(colour);
+  return light_of(picture, *colour, orientation_of(metadata), executor);
+}
+
+bool is_linear(const DisplayColour& colour) {
+  for (const std::vector<float>& curve : colour.curve) {
+    for (int i = 0; i < curve_points; ++i) {
+      if (std::fabs(curve[i] - static_cast<float>(i) / (curve_points - 1)) > linear_tolerance) return false;
+    }
+  }
+  return true;
+}
+
+Result<Matrix3> matrix_of_floats(const isp::FileMetadata& metadata) {
+  if (metadata.chromaticities) return primaries_to_xyz(*metadata.chromaticities);
+  if (metadata.icc.empty()) return *isp::rgb_to_xyz(isp::primaries_rec709);
+  auto colour = icc_colour(metadata.icc, curve_points);
+  if (!colour) return pass_on(colour);
+  if (!is_linear(*colour)) {
+    return fail(ErrorCode::unsupported,
+                "the picture has floats and an ICC profile with a curve: convert it to a linear profile");
+  }
+  return colour->to_xyz;
+}
+
+void read_luminance(const isp::FileMetadata& metadata, ScenePicture& scene) {
+  if (!metadata.white_luminance_cd_m2) return;
+  const double stated = *metadata.white_luminance_cd_m2;
+  if (std::isfinite(stated) && stated > 0) {
+    scene.absolute = true;
+    scene.white_luminance_cd_m2 = stated;
+  } else {
+    scene.warnings.push_back("whiteLuminance says " + number_text(stated) + " cd/m2, which is not used");
+  }
+}
+
+Result<SceneLinear> light_of_picture(const isp::DecodedPicture& decoded, Executor& executor,
+                                     std::vector<std::string>& warnings) {
+  const isp::FileMetadata& metadata = decoded.metadata;
+  if (const auto* codes = std::get_if<Encoded8>(&decoded.picture)) return light_of_display(*codes, metadata, executor);
+  if (const auto* codes = std::get_if<Encoded16>(&decoded.picture)) return light_of_display(*codes, metadata, executor);
+  auto matrix = matrix_of_floats(metadata);
+  if (!matrix) return pass_on(matrix);
+  return light_of(std::get<SceneLinear>(decoded.picture), *matrix, orientation_of(metadata), executor, warnings);
+}
+
+Result<ScenePicture> read_bytes(std::span<const std::byte> bytes, Executor& executor, const isp::DecodeLimits& limits) {
+  auto decode = decoder_of(bytes);
+  if (!decode) return pass_on(decode);
+  auto decoded = (*decode)(bytes, limits);
+  if (!decoded) return pass_on(decoded);
+  ScenePicture scene;
+  auto xyz = light_of_picture(*decoded, executor, scene.warnings);
+  if (!xyz) return pass_on(xyz);
+  scene.xyz = *std::move(xyz);
+  read_luminance(decoded->metadata, scene);
+  return scene;
+}
+
+}  // namespace
+
+Result<ScenePicture> read_picture(const std::string& path, Executor& executor, const isp::DecodeLimits& limits) try {
+  const auto pixels = static_cast<std::uint64_t>(limits.max_pixels);
+  auto bytes = read_file_bytes(path, bytes_per_pixel * pixels + bytes_of_metadata);
+  if (!bytes) return pass_on(bytes);
+  return read_picture(*bytes, path, executor, limits);
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::too_large, "there is not enough memory for this file", path);
+}
+
+Result<ScenePicture> read_picture(std::span<const std::byte> bytes, const std::string& name, Executor& executor,
+                                  const isp::DecodeLimits& limits) try {
+  auto scene = read_bytes(bytes, executor, limits);
+  if (!scene) scene.error().where = name;
+  return scene;
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::too_large, "there is not enough memory for this file", name);
+}
+
+}  // namespace lowlux::capture
