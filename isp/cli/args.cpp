@@ -1,13 +1,11 @@
 #include "isp/cli/args.h"
 
-#include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "isp/cli/exit_code.h"
+#include "isp/cli/option_values.h"
 #include "isp/model/correlated_colour_temperature.h"
 #include "isp/render/output_space.h"
 #include "isp/render/tone.h"
@@ -17,45 +15,10 @@ namespace {
 
 constexpr double max_exposure_ev = 12;  // the tone curve's range
 
-template <class Enum>
-using Names = std::map<std::string, Enum>;
-
 Names<OutputSpace> space_names() {
   Names<OutputSpace> names;
   for (const isp::NamedOutputSpace& named : isp::output_spaces) names.emplace(named.name, named.space);
   return names;
-}
-
-template <class Enum>
-std::string joined(const Names<Enum>& names) {
-  std::string text;
-  for (const auto& [name, value] : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
-// An option whose values are names; the message for any other lists them.
-template <class Enum, class Store>
-CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum>& names, Store store,
-                        const std::string& help) {
-  return app
-      .add_option_function<std::string>(
-          flag,
-          [names, store, flag](const std::string& name) {
-            const auto found = names.find(name);
-            if (found == names.end()) {
-              throw CLI::ValidationError(flag, fmt::format("'{}' is none of {}", name, joined(names)));
-            }
-            store(found->second);
-          },
-          fmt::format("{} ({})", help, joined(names)))
-      ->type_name("NAME");
-}
-
-std::optional<double> number_of(const std::string& text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
 }
 
 void set_white_balance(const std::string& text, isp::WhiteBalanceChoice& choice) {
@@ -76,17 +39,10 @@ void set_white_balance(const std::string& text, isp::WhiteBalanceChoice& choice)
 
 // One figure for all sites or four; nullopt if it is neither.
 std::optional<PerSite<double>> site_figures(const std::string& text) {
-  std::vector<double> figures;
-  for (std::size_t start = 0; start <= text.size();) {
-    const std::size_t end = std::min(text.find(',', start), text.size());
-    const auto figure = number_of(text.substr(start, end - start));
-    if (!figure || figures.size() == 4) return std::nullopt;
-    figures.push_back(*figure);
-    start = end + 1;
-  }
-  if (figures.size() == 1) figures.resize(4, figures.front());
-  if (figures.size() != 4) return std::nullopt;
-  return PerSite<double>{figures[0], figures[1], figures[2], figures[3]};
+  const auto figures = numbers_of(text, 4);
+  if (!figures || (figures->size() != 1 && figures->size() != 4)) return std::nullopt;
+  const auto& f = *figures;
+  return f.size() == 1 ? PerSite<double>{f[0], f[0], f[0], f[0]} : PerSite<double>{f[0], f[1], f[2], f[3]};
 }
 
 void set_black(const std::string& text, isp::BlackRequest& request) {
@@ -161,22 +117,9 @@ void add_output(CLI::App& app, DevelopArgs& args) {
   app.add_flag("--quiet", args.quiet, "no warnings and no progress");
 }
 
-// What CLI11 says, as one line; 0 after help.
-int report(const CLI::App& app, const CLI::ParseError& error) {
-  if (error.get_exit_code() == 0) return app.exit(error);
-  std::string text = error.what();
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  fmt::print(stderr, "{}: {}; --help lists the options\n", app.get_name(), text);
-  return exit_usage;
-}
-
 template <class Args>
 Parsed<Args> parse(CLI::App& app, const std::vector<std::string>& words, const Args& args) {
-  try {
-    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // CLI11 takes them last first
-  } catch (const CLI::ParseError& error) {
-    return report(app, error);
-  }
+  if (const auto code = parse_words(app, words)) return *code;
   return args;
 }
 

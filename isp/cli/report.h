@@ -24,7 +24,7 @@ struct DevelopOutcome {
 /// One JSON object.
 std::string develop_json(const DevelopOutcome& outcome);
 /// Stage times as text, one line for each and their sum.
-std::string timings_text(const DevelopOutcome& outcome);
+std::string times_text(const std::vector<isp::StageTime>& times);
 
 /// What a raw file says and what was measured on it: text for people, or one JSON object.
 std::string info_text(const std::string& file, const RawFrame& frame);

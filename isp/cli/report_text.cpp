@@ -119,10 +119,10 @@ void add_colour(Lines& out, const CameraColour& colour) {
 
 }  // namespace
 
-std::string timings_text(const DevelopOutcome& outcome) {
+std::string times_text(const std::vector<isp::StageTime>& times) {
   std::string text;
   double total = 0;
-  for (const isp::StageTime& time : outcome.times) {
+  for (const isp::StageTime& time : times) {
     text += fmt::format("  {:<20} {:8.1f} ms\n", time.stage, 1e3 * time.seconds);
     total += time.seconds;
   }

@@ -106,7 +106,7 @@ void print_outcome(const Task& task, const DevelopOutcome& outcome) {
       fmt::print(stderr, "{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome.input, warning)));
     }
   }
-  if (task.args.timings && !task.args.json) fmt::print("{}\n{}", outcome.input, timings_text(outcome));
+  if (task.args.timings && !task.args.json) fmt::print("{}\n{}", outcome.input, times_text(outcome.times));
 }
 
 DevelopOutcome failed(const Job& job, const std::string& why) {

@@ -83,6 +83,7 @@ FileMetadata metadata_for(const Picture& picture, OutputSpace space, const Frame
   metadata.exif = exif_block(info, {width_of(picture), height_of(picture), space, o.software});
   metadata.info = written_info(info, o.software);
   metadata.chromaticities = chromaticities_of(space);
+  metadata.white_luminance_cd_m2 = o.white_luminance_cd_m2;
   return metadata;
 }
 

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "isp/base/result.h"
+#include "isp/base/spectrum.h"
+
+namespace lowlux::capture {
+
+/// A named column of a table of spectra.
+struct SpectrumColumn {
+  std::string name;
+  Spectrum spectrum;
+};
+
+/// Reads a table of spectra: lines starting with '#' are comments; then a row of names, the first column being the
+/// wavelength [nm]; then rows of numbers parted by commas. At most 16 MB, 4096 columns and 100000 rows.
+/// Errors name the line: a cell that is not a finite number, a row of another length, wavelengths that do not rise.
+Result<std::vector<SpectrumColumn>> read_spectra(const std::string& path);
+
+/// The same from text; `name` is what errors call it.
+Result<std::vector<SpectrumColumn>> parse_spectra(const std::string& text, const std::string& name);
+
+}  // namespace lowlux::capture

@@ -1,0 +1,105 @@
+#include "isp/cli/scene_argument.h"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "capture/file/picture_source.h"
+#include "capture/file/spectra_file.h"
+#include "isp/base/near_match.h"
+#include "isp/cli/option_values.h"
+#include "isp/model/cie_data.h"
+#include "isp/model/spectral_response.h"
+
+namespace lowlux::cli {
+namespace {
+
+bool names_table(const std::string& text) { return text.ends_with(".csv"); }
+
+Result<Spectrum> light_of(const std::string& name) {
+  if (names_table(name)) {
+    auto table = capture::read_spectra(name);
+    if (!table) return tl::make_unexpected(table.error());
+    if (table->size() != 1) {
+      return fail(ErrorCode::malformed, fmt::format("a light is one spectrum, the table has {}", table->size()), name);
+    }
+    return std::move(table->front().spectrum);
+  }
+  if (auto light = isp::light_named(name)) return *std::move(light);
+  const auto near = near_matches(name, isp::light_names());
+  return fail(ErrorCode::not_found,
+              fmt::format("there is no light '{}'; {}", name,
+                          near.empty() ? "--list names them" : fmt::format("near it: {}", fmt::join(near, ", "))),
+              "--light");
+}
+
+Result<capture::SceneSetup> setup_of(const SceneArgs& args) {
+  auto light = light_of(args.light);
+  if (!light) return tl::make_unexpected(light.error());
+  return capture::SceneSetup{args.width, args.height, *std::move(light), args.light, args.luminance_cd_m2};
+}
+
+Result<capture::Scene> chart_of(const SceneArgs& args, const capture::SceneSetup& setup) {
+  const std::string which = args.what == "chart" ? "colorchecker" : args.what.substr(6);
+  if (names_table(which)) {
+    const auto table = capture::read_spectra(which);
+    if (!table) return tl::make_unexpected(table.error());
+    std::vector<isp::NamedSpectrum> patches;
+    for (const capture::SpectrumColumn& column : *table) patches.push_back({column.name, column.spectrum});
+    return capture::chart_scene(setup, patches);
+  }
+  static const Names<isp::SpectrumSet> charts{{"colorchecker", isp::SpectrumSet::colorchecker},
+                                              {"macbeth", isp::SpectrumSet::macbeth},
+                                              {"munsell", isp::SpectrumSet::munsell_ten}};
+  const auto found = charts.find(which);
+  if (found == charts.end()) {
+    return fail(ErrorCode::not_found,
+                fmt::format("there is no chart '{}': there are {}, and tables (chart:FILE.csv)", which, joined(charts)),
+                "SCENE");
+  }
+  return capture::chart_scene(setup, isp::spectra_of(found->second));
+}
+
+Result<SceneOfArgs> picture_of(const SceneArgs& args, Executor& executor) {
+  auto picture = capture::read_picture(args.what, executor);
+  if (!picture) return tl::make_unexpected(picture.error());
+  const double luminance =
+      picture->absolute && !args.luminance_given ? picture->white_luminance_cd_m2 : args.luminance_cd_m2;
+  auto scene = capture::picture_scene(std::move(picture->xyz), luminance);
+  if (!scene) return tl::make_unexpected(scene.error());
+  return SceneOfArgs{*std::move(scene), luminance, std::move(picture->warnings)};
+}
+
+Result<SceneOfArgs> extended_scene(const SceneArgs& args, Executor& executor) {
+  const bool made =
+      args.what == "dark" || args.what == "flat" || args.what == "chart" || args.what.starts_with("chart:");
+  if (!made) return picture_of(args, executor);
+  const auto setup = setup_of(args);
+  if (!setup) return tl::make_unexpected(setup.error());
+  auto scene = args.what == "dark"   ? capture::dark_scene(*setup)
+               : args.what == "flat" ? capture::flat_scene(*setup)
+                                     : chart_of(args, *setup);
+  if (!scene) return tl::make_unexpected(scene.error());
+  return SceneOfArgs{*std::move(scene), args.luminance_cd_m2, {}};
+}
+
+}  // namespace
+
+Result<SceneOfArgs> scene_of(const SceneArgs& args, std::uint64_t seed, Executor& executor) {
+  auto out = extended_scene(args, executor);
+  if (!out) return out;
+  for (const LampArgs& lamp : args.lamps) {
+    const auto light = light_of(lamp.light);
+    if (!light) return tl::make_unexpected(light.error());
+    auto radiance = isp::radiance_of(*light, lamp.luminance_cd_m2);
+    if (!radiance) return fail(ErrorCode::invalid_argument, "the lamp's light has no luminance", "--lamp");
+    out->scene.points.push_back({lamp.x_px, lamp.y_px, *std::move(radiance)});
+  }
+  const double faintest = args.star_luminance_cd_m2.value_or(args.luminance_cd_m2 / 10);
+  if (const auto stars = capture::add_stars(out->scene, args.stars, faintest, seed); !stars) {
+    return tl::make_unexpected(stars.error());
+  }
+  return out;
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "capture/synthetic/scene.h"
+#include "isp/base/executor.h"
+#include "isp/base/result.h"
+#include "isp/cli/simulate_args.h"
+
+namespace lowlux::cli {
+
+/// The scene a command line asks for, and what its source warned of.
+struct SceneOfArgs {
+  capture::Scene scene;
+  double white_luminance_cd_m2 = 1;  // of the truth's (1, 1, 1)
+  std::vector<std::string> warnings;
+};
+
+/// Errors: a file that cannot be read, an unknown light or chart (near matches are offered), a scene that cannot be.
+Result<SceneOfArgs> scene_of(const SceneArgs& args, std::uint64_t seed, Executor& executor);
+
+}  // namespace lowlux::cli
