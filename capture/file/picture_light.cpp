@@ -13,7 +13,7 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr double small_part = 1e-2;     // of the bright end: below it, negative values are a filter's ringing
+constexpr double small_part = 2e-2;     // of the bright end: below it, negative values are a filter's ringing
 constexpr double bright_share = 0.999;  // of the pixels are not brighter than the bright end
 constexpr std::array<const char*, 3> channel_names{"red", "green", "blue"};
 

@@ -31,7 +31,7 @@ struct ScenePicture {
 /// ICC profile, else Rec. 709. Alpha is dropped.
 ///
 /// Errors: the file or its format (codec); NaN, infinite, or negative values that are not small, with their pixel;
-/// profiles of other kinds. Components above -0.01 of what 99.9 % of the pixels stay below are taken for the ringing
+/// profiles of other kinds. Components above -0.02 of what 99.9 % of the pixels stay below are taken for the ringing
 /// of a filter: they become 0, with a warning that counts them.
 /// @param executor  its threads share the rows
 Result<ScenePicture> read_picture(const std::string& path, Executor& executor, const isp::DecodeLimits& limits = {});

@@ -27,7 +27,7 @@ Result<Spectrum> light_of(const std::string& name) {
   }
   if (auto light = isp::light_named(name)) return *std::move(light);
   const auto near = near_matches(name, isp::light_names());
-  return fail(ErrorCode::not_found,
+  return fail(ErrorCode::invalid_argument,
               fmt::format("there is no light '{}'; {}", name,
                           near.empty() ? "--list names them" : fmt::format("near it: {}", fmt::join(near, ", "))),
               "--light");
@@ -53,7 +53,7 @@ Result<capture::Scene> chart_of(const SceneArgs& args, const capture::SceneSetup
                                               {"munsell", isp::SpectrumSet::munsell_ten}};
   const auto found = charts.find(which);
   if (found == charts.end()) {
-    return fail(ErrorCode::not_found,
+    return fail(ErrorCode::invalid_argument,
                 fmt::format("there is no chart '{}': there are {}, and tables (chart:FILE.csv)", which, joined(charts)),
                 "SCENE");
   }

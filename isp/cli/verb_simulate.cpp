@@ -238,6 +238,10 @@ int run_simulate(const std::vector<std::string>& words) {
   if (const std::string wrong = wrong_files(args); !wrong.empty()) return usage_error(wrong);
   const Result<SimulateOutcome> outcome = Simulation(args).run();
   if (!outcome) {
+    if (outcome.error().code == ErrorCode::invalid_argument) {
+      return usage_error(outcome.error().message +
+                         (outcome.error().where.empty() ? "" : " (" + outcome.error().where + ")"));
+    }
     fmt::print(stderr, "{}\n", error_line(args.scene.what, outcome.error()));
     return exit_failed;
   }

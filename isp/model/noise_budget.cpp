@@ -57,14 +57,14 @@ Result<void> check_sensor(const SensorModel& s) {
   if (!(s.system_gain_dn_per_e > 0) || !(s.system_gain_dn_per_e <= 1e6)) {
     return wrong("the system gain must be above 0 and at most 1e6 DN/e-, found " + text_of(s.system_gain_dn_per_e));
   }
-  if (!(s.full_well_e > 0) || !(s.full_well_e <= largest_full_well_e)) {
-    return wrong("the full well must be above 0 and at most 990000 e-, found " + text_of(s.full_well_e));
-  }
   if (s.bits < 1 || s.bits > 16) return wrong("a converter has 1 to 16 bits, found " + std::to_string(s.bits));
   const double largest_code = (1 << s.bits) - 1;
   if (!(s.black_level_dn >= 0) || !(s.white_level_dn <= largest_code) || !(s.black_level_dn < s.white_level_dn)) {
     return wrong("black and white level must be 0 <= black < white <= " + text_of(largest_code) + ", found " +
                  text_of(s.black_level_dn) + " and " + text_of(s.white_level_dn));
+  }
+  if (!(s.full_well_e > 0) || !(s.full_well_e <= largest_full_well_e)) {
+    return wrong("the full well must be above 0 and at most 990000 e-, found " + text_of(s.full_well_e));
   }
   if (s.hot_pixel_fraction > 1 || s.prnu > 1 || s.dsnu > 1) {
     return wrong("non-uniformities and the fraction of hot pixels are at most 1");

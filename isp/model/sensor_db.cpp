@@ -97,15 +97,16 @@ Result<int> find_row(std::string_view name, std::string_view gain) {
   if (rows.empty()) {
     const auto names = sensor_names();
     const auto near = near_matches(name, names);
-    return fail(ErrorCode::not_found, "there is no sensor '" + std::string(name) + "'; " +
-                                          (near.empty() ? "there are " + list(names) : "near it: " + list(near)));
+    return fail(ErrorCode::invalid_argument,
+                "there is no sensor '" + std::string(name) + "'; " +
+                    (near.empty() ? "there are " + list(names) : "near it: " + list(near)));
   }
   if (gain.empty() || name == thesis_sensor) return rows.front();
   for (const int row : rows) {
     if (is_setting(sensors().text(row, "gain_setting"), gain)) return row;
   }
-  return fail(ErrorCode::not_found, "the sensor " + std::string(name) + " has no figures for gain '" +
-                                        std::string(gain) + "', but for " + list(gain_settings(name)));
+  return fail(ErrorCode::invalid_argument, "the sensor " + std::string(name) + " has no figures for gain '" +
+                                               std::string(gain) + "', but for " + list(gain_settings(name)));
 }
 
 void take_electronics(NamedSensor& out, int row, const SensorFigures& given) {

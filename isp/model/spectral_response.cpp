@@ -31,8 +31,8 @@ Result<std::array<Spectrum, 3>> relative_quantum_efficiency(const std::string& c
     std::string near;
     for (const std::string_view name : near_matches(camera, names))
       near += (near.empty() ? "" : ", ") + std::string(name);
-    return fail(ErrorCode::not_found, "there are no spectral sensitivities of a '" + camera + "'" +
-                                          (near.empty() ? "" : "; near it: " + near));
+    return fail(ErrorCode::invalid_argument, "there are no spectral sensitivities of a '" + camera + "'" +
+                                                 (near.empty() ? "" : "; near it: " + near));
   }
   double peak = 0;
   for (Spectrum& channel : *sensitivity) {

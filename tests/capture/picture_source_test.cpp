@@ -397,7 +397,7 @@ SceneLinear mostly_half(float one_value) {
 }
 
 TEST(ReadPicture, SmallNegativeValuesBecomeZeroWithAWarningThatCountsThem) {
-  SceneLinear picture = mostly_half(-0.0049F);
+  SceneLinear picture = mostly_half(-0.0099F);
   picture.plane[1].at(9, 0) = -1e-6F;
   const ScenePicture scene = read_good(exr_of(picture));
   ASSERT_EQ(scene.warnings.size(), 1u);
@@ -406,7 +406,7 @@ TEST(ReadPicture, SmallNegativeValuesBecomeZeroWithAWarningThatCountsThem) {
 }
 
 TEST(ReadPicture, LargerNegativeValuesAreRefusedWithTheirPixel) {
-  for (const float value : {-0.0051F, -1.0F}) {
+  for (const float value : {-0.0101F, -1.0F}) {
     EXPECT_TRUE(has(refused(exr_of(mostly_half(value))), "blue of the pixel at column 9, row 0 is -"));
   }
   EXPECT_TRUE(has(refused(exr_of(linear_row({{-1e-6F, 0, 0}, {0, 0, 0}}))), "red"));  // nothing is bright here
