@@ -13,6 +13,7 @@
 #include "isp/model/cie_data.h"
 #include "isp/model/colorimetry.h"
 #include "isp/model/correlated_colour_temperature.h"
+#include "isp/model/photon.h"
 #include "isp/model/spectral_data.h"
 
 namespace lowlux::isp {
@@ -79,12 +80,27 @@ struct TrainingSet {
 };
 
 TrainingSet photograph(const std::array<Spectrum, 3>& sensitivity, const Spectrum& light, const Vector3& neutral) {
+  // What each node of the light contributes to camera R, G, B and to X, Y, Z, so that a reflectance costs one pass.
+  const auto nm = light.wavelengths_nm();
+  const double white_y = xyz_of(light).y;
+  std::vector<std::array<double, 6>> weight(nm.size());
+  const std::vector<double> width_nm = bin_widths_nm(light);
+  for (std::size_t i = 0; i < nm.size(); ++i) {
+    const double power = light.values()[i] * width_nm[i];
+    for (int c = 0; c < 3; ++c) {
+      weight[i][c] = power * sensitivity[c].at(nm[i]) / neutral[c];
+      weight[i][c + 3] = power * cie_1931_observer()[c].at(nm[i]) / white_y;
+    }
+  }
   TrainingSet out;
   for (const Spectrum& reflectance : training_reflectances()) {
-    Vector3 rgb = camera_response(sensitivity, light, reflectance);
-    for (int c = 0; c < 3; ++c) rgb[c] /= neutral[c];
-    out.camera_rgb.push_back(rgb);
-    out.xyz.push_back(vector_of(*xyz_of_reflectance(reflectance, light)));
+    std::array<double, 6> sum{};
+    for (std::size_t i = 0; i < nm.size(); ++i) {
+      const double value = reflectance.at(nm[i]);
+      for (int k = 0; k < 6; ++k) sum[k] += value * weight[i][k];
+    }
+    out.camera_rgb.push_back({sum[0], sum[1], sum[2]});
+    out.xyz.push_back({sum[3], sum[4], sum[5]});
   }
   return out;
 }

@@ -20,7 +20,7 @@ constexpr std::array<std::string_view, effect_count> names{"photon-noise", "dark
 /// the tolerance.
 constexpr double usable_share = 0.5;
 
-constexpr int most_samples = 48;  // blocks of one region that are evaluated: its extremes and others evenly among them
+constexpr int most_samples = 24;  // blocks of one region that are evaluated: its extremes and others evenly among them
 
 /// Whether the sensor and exposure have the effect at all.
 bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
