@@ -142,4 +142,21 @@ Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
   return parse(app, words, args);
 }
 
+Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words) {
+  CLI::App app("Runs the published experiments and prints each finding beside ours.", "lowlux reproduce");
+  ReproduceArgs args;
+  app.add_option("ID", args.experiments, "experiments (default: all); --list names them");
+  app.add_flag("--list", args.list, "the experiments, one line each");
+  app.add_option("-o,--output", args.output,
+                 "folder, made if need be, for findings.csv, the plots' data and report.html")
+      ->type_name("DIR");
+  app.add_flag("--quick", args.quick, "fewer samples: wider confidence intervals");
+  app.add_option("--seed", args.seed, "of the random numbers (default 1)")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N");
+  app.add_flag("--json", args.json, "JSON instead of a table");
+  app.add_flag("--force", args.force, "overwrite files that exist");
+  return parse(app, words, args);
+}
+
 }  // namespace lowlux::cli

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <variant>
@@ -32,11 +33,22 @@ struct InfoArgs {
   bool json = false;
 };
 
+struct ReproduceArgs {
+  std::vector<std::string> experiments;  // by id; empty: all
+  std::string output;                    // folder for tables, plots and the report; empty: none
+  std::uint64_t seed = 1;
+  bool list = false;
+  bool quick = false;
+  bool json = false;
+  bool force = false;
+};
+
 /// The parsed arguments; or the exit code, help or error having been printed.
 template <class Args>
 using Parsed = std::variant<Args, int>;
 
 Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words);
 Parsed<InfoArgs> parse_info(const std::vector<std::string>& words);
+Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words);
 
 }  // namespace lowlux::cli

@@ -1,0 +1,52 @@
+#include "isp/bench/reproduce.h"
+
+#include <array>
+
+#include "isp/base/near_match.h"
+#include "isp/bench/experiments.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr std::array registry{
+    Experiment{"few-photons", "Spectra seen through few photons (section 3.2, Fig. 3-1 and 3-2)", run_few_photons},
+    Experiment{"chromaticity-clouds", "Chromaticities of ideal cones (section 3.3, Fig. 3-3 onwards)",
+               run_chromaticity_clouds},
+    Experiment{"frequency-of-seeing", "Seeing a flash of few photons (Eq. 2.1 to 2.7)", run_frequency_of_seeing},
+    Experiment{"sensor-scenarios", "Noise of the image sensor (section 4, scenarios I to III)", run_sensor_scenarios},
+    Experiment{"dark-desaturation", "Dark current desaturates (Eq. 4.16 to 4.24)", run_dark_desaturation},
+    Experiment{"snr-sensitivity", "What the signal-to-noise ratio depends on (Eq. 4.12, 4.13)", run_snr_sensitivity},
+};
+
+}  // namespace
+
+std::span<const Experiment> experiments() { return registry; }
+
+Result<Experiment> experiment_named(std::string_view id) {
+  std::vector<std::string_view> ids;
+  for (const Experiment& experiment : registry) {
+    if (experiment.id == id) return experiment;
+    ids.push_back(experiment.id);
+  }
+  std::string near;
+  for (const std::string_view match : near_matches(id, ids)) {
+    near += near.empty() ? ", did you mean " : " or ";
+    near += match;
+  }
+  return fail(
+      ErrorCode::not_found,
+      "there is no experiment '" + std::string(id) + "'" + near + (near.empty() ? "" : "?") + "; --list names all",
+      std::string(id));
+}
+
+Table table_of(std::span<const Finding> findings) {
+  Table table{{"finding", "claim", "published", "ours", "holds", "note"}, {}};
+  for (const Finding& f : findings) {
+    table.rows.push_back({f.id, f.claim, f.published, f.ours, std::string(verdict_of(f)), f.note});
+  }
+  return table;
+}
+
+std::string_view verdict_of(const Finding& finding) { return finding.holds ? "holds" : "does not hold"; }
+
+}  // namespace lowlux::isp

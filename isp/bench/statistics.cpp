@@ -1,0 +1,101 @@
+#include "isp/bench/statistics.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+namespace lowlux::isp {
+namespace {
+
+// Twice the area of the triangle o, a, b; positive if it turns left.
+double turn(const Xy& o, const Xy& a, const Xy& b) { return (a.x - o.x) * (b.y - o.y) - (a.y - o.y) * (b.x - o.x); }
+
+// One chain of Andrew's algorithm over points in order; its last point is left to the other chain.
+template <class Points>
+void add_chain(const Points& points, std::vector<Xy>& hull) {
+  const std::size_t start = hull.size();
+  for (const Xy& p : points) {
+    while (hull.size() >= start + 2 && turn(hull[hull.size() - 2], hull.back(), p) <= 0) hull.pop_back();
+    hull.push_back(p);
+  }
+  hull.pop_back();
+}
+
+}  // namespace
+
+Estimate mean_of(std::span<const double> samples) {
+  assert(samples.size() > 1);
+  const double n = static_cast<double>(samples.size());
+  double mean = 0, squares = 0;
+  for (const double s : samples) mean += s / n;
+  for (const double s : samples) squares += (s - mean) * (s - mean);
+  return {mean, std::sqrt(squares / (n - 1) / n)};
+}
+
+Estimate power_law_exponent(std::span<const double> x, std::span<const Estimate> log_y) {
+  assert(x.size() == log_y.size() && x.size() > 1);
+  double weights = 0, mean_x = 0, mean_y = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double w = 1 / (log_y[i].standard_error * log_y[i].standard_error);
+    weights += w;
+    mean_x += w * std::log(x[i]);
+    mean_y += w * log_y[i].value;
+  }
+  mean_x /= weights;
+  mean_y /= weights;
+  double xx = 0, xy = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double w = 1 / (log_y[i].standard_error * log_y[i].standard_error);
+    const double dx = std::log(x[i]) - mean_x;
+    xx += w * dx * dx;
+    xy += w * dx * (log_y[i].value - mean_y);
+  }
+  return {xy / xx, 1 / std::sqrt(xx)};
+}
+
+Estimate log_size_of(const XyCovariance& c, std::size_t n) {
+  const double trace = c.xx + c.yy;
+  const double trace_of_square = c.xx * c.xx + 2 * c.xy * c.xy + c.yy * c.yy;
+  const double relative = std::sqrt(2 * trace_of_square / static_cast<double>(n - 1)) / trace;
+  return {0.5 * std::log(trace), 0.5 * relative};
+}
+
+double orientation_error(const XyCovariance& s, const XyCovariance& c, double inclination_deg, std::size_t n) {
+  const double twice = 2 * inclination_deg * std::numbers::pi / 180;
+  const double between_axes = 0.5 * (s.yy - s.xx) * std::sin(twice) + s.xy * std::cos(twice);
+  return std::fabs(between_axes) / std::sqrt((c.xx * c.yy - c.xy * c.xy) / static_cast<double>(n - 1));
+}
+
+double worst_covariance_error(const XyCovariance& sampled, const XyCovariance& c, std::size_t n) {
+  const double root = std::sqrt(static_cast<double>(n - 1));
+  const double xx = std::fabs(sampled.xx - c.xx) / (std::numbers::sqrt2 * c.xx);
+  const double yy = std::fabs(sampled.yy - c.yy) / (std::numbers::sqrt2 * c.yy);
+  const double xy = std::fabs(sampled.xy - c.xy) / std::sqrt(c.xx * c.yy + c.xy * c.xy);
+  return root * std::max({xx, yy, xy});
+}
+
+double mean_error(const Xy& sampled, const Xy& expected, const XyCovariance& c, std::size_t n) {
+  const double determinant = c.xx * c.yy - c.xy * c.xy;
+  if (!(determinant > 0)) return std::numeric_limits<double>::infinity();
+  const double dx = sampled.x - expected.x, dy = sampled.y - expected.y;
+  return std::sqrt(static_cast<double>(n) * (c.yy * dx * dx - 2 * c.xy * dx * dy + c.xx * dy * dy) / determinant);
+}
+
+double hull_area(std::span<const Xy> points) {
+  if (points.size() < 3) return 0;
+  std::vector<Xy> sorted(points.begin(), points.end());
+  std::sort(sorted.begin(), sorted.end(),
+            [](const Xy& a, const Xy& b) { return a.x < b.x || (a.x == b.x && a.y < b.y); });
+  std::vector<Xy> hull;
+  add_chain(sorted, hull);
+  std::reverse(sorted.begin(), sorted.end());
+  add_chain(sorted, hull);
+  double area = 0;
+  for (std::size_t i = 0; i < hull.size(); ++i) area += 0.5 * turn({}, hull[i], hull[(i + 1) % hull.size()]);
+  return area;
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "isp/bench/reproduce.h"
+
+namespace lowlux::cli {
+
+/// The findings as a table for a terminal: finding, published, ours, verdict, wrapped to about 110 columns; the note
+/// follows where a finding does not hold. A last line counts.
+std::string findings_text(std::span<const isp::Finding> findings);
+
+/// One JSON array of objects.
+std::string findings_json(std::span<const isp::Finding> findings);
+
+}  // namespace lowlux::cli

@@ -1,0 +1,24 @@
+# Turns a text file into a C++ source that defines a function of chart_js.h, which returns it.
+#   cmake -DIN=<in> -DOUT=<out> -DNAME=<function> -P embed_text.cmake
+# As bytes: compilers limit the length of string literals.
+file(READ "${IN}" bytes HEX)
+string(REGEX REPLACE "([0-9a-f][0-9a-f])" "'\\\\x\\1'," bytes "${bytes}")
+string(REGEX REPLACE "(('[^']*',)('[^']*',)('[^']*',)('[^']*',)('[^']*',)('[^']*',)('[^']*',)('[^']*',))" "\\1\n" bytes
+  "${bytes}")
+file(WRITE "${OUT}.new" "// Generated from ${NAME}'s file.
+#include \"isp/output/chart_js.h\"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr char text[] = {
+${bytes}
+};
+
+}  // namespace
+
+std::string_view ${NAME}() { return {text, sizeof(text)}; }
+
+}  // namespace lowlux::isp
+")
+file(RENAME "${OUT}.new" "${OUT}")

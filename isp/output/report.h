@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "isp/base/result.h"
+#include "isp/output/atomic_file.h"
+
+namespace lowlux::isp {
+
+enum class AxisScale : std::uint8_t { linear, logarithmic };
+enum class Mark : std::uint8_t { line, dashed, points };
+
+/// Numbers to draw: y over x, as many. A y that is not finite interrupts a line.
+struct Series {
+  std::string name;
+  std::vector<double> x;
+  std::vector<double> y;
+  Mark mark = Mark::line;
+};
+
+struct Plot {
+  std::string id;  // letters, digits, - and _: it names the CSV file
+  std::string title;
+  std::string x_label;  // with unit
+  std::string y_label;
+  AxisScale x_scale = AxisScale::linear;
+  AxisScale y_scale = AxisScale::linear;
+  bool equal_scales = false;  // one unit is as long on both axes: chromaticity diagrams
+  std::vector<Series> series;
+  std::string caption;
+};
+
+struct Table {
+  std::vector<std::string> columns;
+  std::vector<std::vector<std::string>> rows;  // each as long as columns
+};
+
+struct ReportSection {
+  std::string title;
+  std::string text;
+  Table table;  // left out if it has no columns
+  std::vector<Plot> plots;
+};
+
+struct Report {
+  std::string title;
+  std::string text;
+  std::vector<ReportSection> sections;
+};
+
+/// One self-contained HTML page: tables as text, plots drawn by Chart.js, which is in the page. Nothing is fetched. Any
+/// text is shown as it is: it cannot become markup or script. Bytes that are no UTF-8 become replacement characters.
+std::string html_of(const Report& report);
+
+/// Comma-separated values (RFC 4180, lines end with \n): the header, then the rows.
+std::string csv_of(const Table& table);
+
+/// One line for each point: series, x, y, with all digits; y is empty where it is not finite.
+std::string csv_of(const Plot& plot);
+
+/// A text file whole or not at all. Errors: those of AtomicFile; a full disk.
+Result<void> write_text(const std::string& path, std::string_view text, Overwrite overwrite);
+
+}  // namespace lowlux::isp

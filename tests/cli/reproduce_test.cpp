@@ -1,0 +1,111 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/process.h"
+#include "tests/support/scratch_directory.h"
+
+namespace lowlux {
+namespace {
+
+using Json = nlohmann::json;
+
+test::ProcessResult reproduce(std::vector<std::string> args) {
+  args.insert(args.begin(), {LOWLUX_COMMAND, "reproduce"});
+  return test::run_process(args);
+}
+
+TEST(Reproduce, ListNamesTheExperimentsAndRunsNone) {
+  const auto list = reproduce({"--list"});
+  EXPECT_EQ(list.exit_code, 0);
+  EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), 6);
+  for (const char* id : {"few-photons", "chromaticity-clouds", "frequency-of-seeing", "sensor-scenarios",
+                         "dark-desaturation", "snr-sensitivity"}) {
+    EXPECT_NE(list.out.find(id), std::string::npos);
+  }
+}
+
+TEST(Reproduce, PrintsFindingPublishedOursAndVerdict) {
+  const auto result = reproduce({"snr-sensitivity", "--quick"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;  // also though a finding does not hold
+  for (const char* word : {"finding", "published", "ours", "verdict", "snr-sensitivity/signal", "about 9 e-", "9.0 e-",
+                           "does not hold", "volts squared", " findings hold"}) {
+    EXPECT_NE(result.out.find(word), std::string::npos) << word;
+  }
+  EXPECT_EQ(result.err, "");
+}
+
+TEST(Reproduce, JsonHasTheFindingsOfTheChosenExperimentsInTheirOrder) {
+  const auto result = reproduce({"frequency-of-seeing", "few-photons", "--quick", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json findings = Json::parse(result.out);
+  ASSERT_GT(findings.size(), 5u);
+  EXPECT_TRUE(findings.front()["id"].get<std::string>().starts_with("frequency-of-seeing/"));
+  EXPECT_TRUE(findings.back()["id"].get<std::string>().starts_with("few-photons/"));
+  EXPECT_TRUE(findings.front()["holds"].is_boolean());
+}
+
+TEST(Reproduce, SeedsGiveSamplesThatDifferAndRepeat) {
+  const auto run = [](const char* seed) { return reproduce({"few-photons", "--quick", "--json", "--seed", seed}).out; };
+  const std::string seven = run("7");
+  EXPECT_EQ(seven, run("7"));
+  EXPECT_NE(seven, run("8"));
+}
+
+TEST(Reproduce, WritesTableDataAndReportAndOverwritesNothing) {
+  const test::ScratchDirectory scratch;
+  const std::string folder = scratch.file("a/b");
+  const std::vector<std::string> args{"dark-desaturation", "--quick", "-o", folder};
+  ASSERT_EQ(reproduce(args).exit_code, 0);
+  for (const char* name :
+       {"/findings.csv", "/dark-desaturation-paths.csv", "/dark-desaturation-gamut.csv", "/report.html"}) {
+    EXPECT_FALSE(scratch.read(std::string("a/b") + name).empty()) << name;
+  }
+  const std::string before = scratch.read("a/b/findings.csv");
+  EXPECT_TRUE(before.starts_with("finding,claim,published,ours,holds,note\n"));
+
+  const auto again = reproduce({"dark-desaturation", "--quick", "-o", folder, "--seed", "2"});
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_NE(again.err.find("--force"), std::string::npos) << again.err;
+  EXPECT_EQ(std::count(again.err.begin(), again.err.end(), '\n'), 1);
+  EXPECT_EQ(scratch.read("a/b/findings.csv"), before);
+
+  EXPECT_EQ(reproduce({"dark-desaturation", "--quick", "-o", folder, "--seed", "2", "--force"}).exit_code, 0);
+  EXPECT_NE(scratch.read("a/b/findings.csv"), before);
+}
+
+TEST(Reproduce, APlotsFileInTheWayStopsAllWriting) {
+  const test::ScratchDirectory scratch;
+  scratch.write("snr-sensitivity.csv", "mine");
+  const auto result = reproduce({"snr-sensitivity", "--quick", "-o", scratch.path()});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(scratch.names().size(), 1u);
+  EXPECT_EQ(scratch.read("snr-sensitivity.csv"), "mine");
+}
+
+TEST(Reproduce, AFolderThatCannotBeMadeIsAFailureInOneLine) {
+  const test::ScratchDirectory scratch;
+  scratch.write("file", "x");
+  const auto result = reproduce({"snr-sensitivity", "--quick", "-o", scratch.file("file/sub")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+}
+
+TEST(Reproduce, WrongCommandLinesExitWithTwoAndOfferNearNames) {
+  const auto near = reproduce({"few-photon"});
+  EXPECT_EQ(near.exit_code, 2);
+  EXPECT_NE(near.err.find("did you mean few-photons?"), std::string::npos) << near.err;
+  const std::vector<std::vector<std::string>> wrong{{"zzz"}, {"--seed", "x"}, {"--seed", "-1"}, {"--fast"}, {"-o"}};
+  for (const auto& args : wrong) {
+    const auto result = reproduce(args);
+    EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(args);
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_EQ(result.out, "");
+  }
+}
+
+}  // namespace
+}  // namespace lowlux
