@@ -12,6 +12,10 @@
 
 namespace lowlux::capture {
 
+/// How photons become electrons: as physics has it (Poisson(mu), one draw for each pixel), or wavelength by wavelength
+/// as the thesis publishes it (see PhotonRows).
+enum class PhotonSampling : std::uint8_t { physical, published };
+
 /// Photons sampled by wavelength, as the thesis publishes it (Eq. 4.4 to 4.6): X_i ~ Poisson(x_i) photons fall on a
 /// pixel in bin i, and sum X_i Qe_k(i) electrons are collected. The mean is right, the variance is sum x_i Qe_k(i)^2
 /// instead of sum x_i Qe_k(i): too small, because each photon is taken to give a fraction of an electron.

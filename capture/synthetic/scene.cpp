@@ -55,13 +55,6 @@ void fill(Scene& scene, int x0, int y0, int x1, int y1, int radiance) {
   }
 }
 
-Spectrum reflected(const Spectrum& white, const Spectrum& reflectance) {
-  const auto nm = white.wavelengths_nm();
-  std::vector<double> value(nm.size());
-  for (std::size_t i = 0; i < nm.size(); ++i) value[i] = white.values()[i] * reflectance.at(nm[i]);
-  return *Spectrum::of({nm.begin(), nm.end()}, std::move(value));
-}
-
 double unit_of(std::uint32_t word) { return (word + 0.5) * 0x1p-32; }
 
 }  // namespace

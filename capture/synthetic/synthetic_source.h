@@ -16,10 +16,6 @@
 
 namespace lowlux::capture {
 
-/// How photons become electrons: as physics has it (Poisson(mu), one draw for each pixel), or wavelength by wavelength
-/// as the thesis publishes it (see PhotonRows).
-enum class PhotonSampling : std::uint8_t { physical, published };
-
 /// Which effects are simulated: those a tolerance calls for, or those given.
 struct EffectChoice {
   std::optional<isp::Tolerance> tolerance;         // set: the planner decides

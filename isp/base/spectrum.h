@@ -41,6 +41,14 @@ class Spectrum {
   std::span<const double> values() const { return values_; }
   std::size_t size() const { return values_.size(); }
 
+  /// The spectrum with each value multiplied by factor(wavelength_nm), which must be finite.
+  template <class Factor>
+  Spectrum times(const Factor& factor) const {
+    std::vector<double> values(values_);
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] *= factor(wavelengths_nm_[i]);
+    return Spectrum(wavelengths_nm_, std::move(values));
+  }
+
   /// Value at a wavelength: linear between nodes, 0 outside the tabulated range.
   double at(double wavelength_nm) const {
     if (!(wavelength_nm >= wavelengths_nm_.front() && wavelength_nm <= wavelengths_nm_.back())) return 0;
@@ -65,6 +73,11 @@ inline Result<Spectrum> resample(const Spectrum& spectrum, std::span<const doubl
   std::transform(wavelengths_nm.begin(), wavelengths_nm.end(), values.begin(),
                  [&](double nm) { return spectrum.at(nm); });
   return Spectrum::of({wavelengths_nm.begin(), wavelengths_nm.end()}, std::move(values));
+}
+
+/// Light reflected by a surface, at the nodes of the light.
+inline Spectrum reflected(const Spectrum& light, const Spectrum& reflectance) {
+  return light.times([&](double nm) { return reflectance.at(nm); });
 }
 
 /// Integral of spectrum(nm) * weight(nm) by the trapezium rule on the nodes of `spectrum` [value x nm].

@@ -24,16 +24,6 @@ std::vector<double> draw_photons(const PhotonMeans& means, const DrawPlace& plac
   return counts;
 }
 
-Spectrum reflected(const Spectrum& light, const Spectrum& reflectance) {
-  std::vector<double> values;
-  for (std::size_t i = 0; i < light.size(); ++i) {
-    values.push_back(light.values()[i] * reflectance.at(light.wavelengths_nm()[i]));
-  }
-  auto out = Spectrum::of({light.wavelengths_nm().begin(), light.wavelengths_nm().end()}, std::move(values));
-  assert(out && "products of finite tables are finite");
-  return *std::move(out);
-}
-
 std::vector<double> photon_levels_w() { return {1, 1e-3, 1e-6, 1e-9, 1e-12, 1e-13, 1e-14, 6e-15}; }
 
 Series spectral_locus() {

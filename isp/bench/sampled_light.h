@@ -32,9 +32,6 @@ struct DrawPlace {
 /// Counts of the bins of `means`, drawn for each wavelength.
 std::vector<double> draw_photons(const PhotonMeans& means, const DrawPlace& place);
 
-/// Light reflected by a surface, at the nodes of the light.
-Spectrum reflected(const Spectrum& light, const Spectrum& reflectance);
-
 /// Levels of the thesis' section 3: 1 W down to 6e-15 W.
 std::vector<double> photon_levels_w();
 

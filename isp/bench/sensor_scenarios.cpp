@@ -180,7 +180,7 @@ Result<Finding> published_sampling(const ThesisCamera& camera, const RunOptions&
   if (!patches) return tl::make_unexpected(patches.error());
   const Patch& white = patches->back();
   const int samples = options.quick ? 500 : 4000;
-  const Noises noises{.sampling = PhotonSampling::published};
+  const Noises noises{.sampling = capture::PhotonSampling::published};
   const auto drawn = photograph(camera, white, 0.1, noises, {options.seed, frames_of_sensor + 0x50, 0}, samples);
   double worst = 0;
   Vector3 ratio{};

@@ -63,7 +63,7 @@ double saturation_dn(const SensorModel& sensor) {
 
 PatchSamples photograph(const ThesisCamera& camera, const Patch& patch, double level, const Noises& noises,
                         const PatchPlace& place, int samples) {
-  const bool published = noises.sampling == PhotonSampling::published;
+  const bool published = noises.sampling == capture::PhotonSampling::published;
   const Vector3 dark_e = noises.dark ? dark_charge_e(camera) : Vector3{};
   const capture::ReadoutParameters readout = readout_of(camera.sensor, noises);
   std::array<Row, 3> steady, dn;

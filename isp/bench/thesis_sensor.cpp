@@ -1,7 +1,6 @@
 #include "isp/bench/thesis_sensor.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -11,62 +10,20 @@
 #include "isp/model/camera_matrix.h"
 #include "isp/model/cie_data.h"
 #include "isp/model/cie_table.h"
+#include "isp/model/photon.h"
+#include "isp/model/sensor_db.h"
 #include "isp/model/spectral_data.h"
+#include "isp/model/spectral_response.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double efficacy_lm_per_w = 683;  // K_m of the CIE 1931 luminance
-constexpr double bright_cd_m2 = 100;       // F = 1
-
-SensorModel thesis_sensor() {
-  SensorModel out;
-  out.name = "thesis Table 4-1";
-  out.system_gain_dn_per_e = thesis_dn_per_volt * thesis_volt_per_e;
-  out.read_noise_e = 4;
-  out.full_well_e = 9000;
-  out.bits = 8;
-  out.black_level_dn = 0;
-  out.white_level_dn = 255;
-  out.quantisation = Quantisation::floor;
-  out.dark_current_e_per_s = {195, 230, 218};
-  return out;
-}
-
-Spectrum scaled(const Spectrum& spectrum, double factor) {
-  std::vector<double> values(spectrum.values().begin(), spectrum.values().end());
-  for (double& value : values) value *= factor;
-  auto out = Spectrum::of({spectrum.wavelengths_nm().begin(), spectrum.wavelengths_nm().end()}, std::move(values));
-  assert(out);
-  return *std::move(out);
-}
-
-// Qe per photon is response per joule times joules per photon; the largest of all is made 1.
-std::array<Spectrum, 3> quantum_efficiency(const std::array<Spectrum, 3>& per_joule) {
-  std::array<Spectrum, 3> out = per_joule;
-  double peak = 0;
-  for (Spectrum& channel : out) {
-    std::vector<double> values;
-    for (std::size_t i = 0; i < channel.size(); ++i) {
-      values.push_back(channel.values()[i] * photon_energy_j(channel.wavelengths_nm()[i]));
-      peak = std::max(peak, values.back());
-    }
-    channel = *Spectrum::of({channel.wavelengths_nm().begin(), channel.wavelengths_nm().end()}, std::move(values));
-  }
-  for (Spectrum& channel : out) channel = scaled(channel, 1 / peak);
-  return out;
-}
-
 // Codes per radiance and nanometre: what Eq. 4.14 calls C.
 std::array<Spectrum, 3> energy_response(const ThesisCamera& camera) {
   std::array<Spectrum, 3> out = camera.response.quantum_efficiency;
+  const double dn_per_photon = camera.exposure_s * camera.response.etendue_m2_sr * camera.sensor.system_gain_dn_per_e;
   for (Spectrum& channel : out) {
-    std::vector<double> values;
-    for (std::size_t i = 0; i < channel.size(); ++i) {
-      values.push_back(channel.values()[i] / photon_energy_j(channel.wavelengths_nm()[i]) * camera.exposure_s *
-                       camera.response.etendue_m2_sr * camera.sensor.system_gain_dn_per_e);
-    }
-    channel = *Spectrum::of({channel.wavelengths_nm().begin(), channel.wavelengths_nm().end()}, std::move(values));
+    channel = channel.times([&](double nm) { return dn_per_photon / photon_energy_j(nm); });
   }
   return out;
 }
@@ -90,33 +47,26 @@ std::vector<Patch> all_patches(const ThesisCamera& camera) {
 }  // namespace
 
 std::optional<Spectrum> at_full_level(const Spectrum& light) {
-  const double y = efficacy_lm_per_w * xyz_of(light).y;
-  if (!(y > 0)) return std::nullopt;
-  return scaled(light, bright_cd_m2 / y);
+  return radiance_of(light, thesis_white_luminance_cd_m2);
 }
 
 Vector3 signal_charge_e(const ThesisCamera& camera, const Spectrum& radiance) {
-  const auto photons = photon_radiance(radiance);
-  assert(photons && "a radiance is that of a light");
-  Vector3 out{};
-  for (int k = 0; k < 3; ++k) {
-    const Spectrum& qe = camera.response.quantum_efficiency[k];
-    out[k] =
-        camera.exposure_s * camera.response.etendue_m2_sr * integrate(*photons, [&](double nm) { return qe.at(nm); });
-  }
+  Vector3 out = electron_rate(camera.response, radiance);
+  for (double& charge : out) charge *= camera.exposure_s;
   return out;
 }
 
 Result<ThesisCamera> thesis_camera() {
-  const auto sensitivity = camera_sensitivity("Sony_DXC-930");
-  const auto white = light_named("D65");
-  assert(sensitivity && white && "compiled-in tables");
-  ThesisCamera out{thesis_sensor(), {"Sony DXC-930", quantum_efficiency(*sensitivity), 1}, 1, {}, 0};
-  const Vector3 unscaled = signal_charge_e(out, *at_full_level(*white));
-  out.response.etendue_m2_sr = out.sensor.full_well_e / std::ranges::max(unscaled);
+  SensorFigures figures;
+  figures.peak_quantum_efficiency = 1;
+  const auto sensor = sensor_named(thesis_sensor, {}, figures);
+  if (!sensor) return tl::make_unexpected(sensor.error());
+  auto response = spectral_response(*sensor, {});
+  if (!response) return tl::make_unexpected(response.error());
+  ThesisCamera out{sensor->model, *std::move(response), 1, {}, 0};
   const auto matrix = spectral_matrix(energy_response(out));
   if (!matrix) return tl::make_unexpected(matrix.error());
-  out.dn_to_xyz = efficacy_lm_per_w * matrix->camera_to_xyz;
+  out.dn_to_xyz = luminous_efficacy_lm_w * matrix->camera_to_xyz;
   out.condition_number = matrix->condition_number;
   return out;
 }

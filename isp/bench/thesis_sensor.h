@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/synthetic/photon_rows.h"
 #include "isp/base/matrix3.h"
 #include "isp/base/result.h"
 #include "isp/base/sensor.h"
@@ -61,18 +62,14 @@ Xyz xyz_of_charge(const ThesisCamera& camera, const Vector3& charge_e);
 std::optional<ChromaticityCloud> sensor_cloud(const ThesisCamera& camera, const Vector3& mean_e,
                                               const Vector3& variance_e2);
 
-/// How photons become electrons: a thinned Poisson process, one draw for each pixel, or the published way, where
-/// photons are drawn for each wavelength and weighted by Qe: too little variance, and equal photons in all three
-/// channels.
-enum class PhotonSampling : std::uint8_t { physical, published };
-
 /// Which noises are on.
 struct Noises {
   bool dark = false;
   bool read = false;
   bool converter = false;  // full well, quantisation and the ends of the code range
   Quantisation quantisation = Quantisation::floor;
-  PhotonSampling sampling = PhotonSampling::physical;
+  // Published sampling draws the same photons for all three channels here: the thesis' camera has three sensors.
+  capture::PhotonSampling sampling = capture::PhotonSampling::physical;
 };
 
 /// Pictures of one patch at one level.

@@ -30,17 +30,11 @@ CieTable table_of(SpectrumSet set) {
   return munsell_ten_chips_1nm_table();
 }
 
-Spectrum scaled(const Spectrum& spectrum, double factor) {
-  std::vector<double> values(spectrum.values().begin(), spectrum.values().end());
-  for (double& value : values) value *= factor;
-  return *Spectrum::of({spectrum.wavelengths_nm().begin(), spectrum.wavelengths_nm().end()}, std::move(values));
-}
-
 /// The three, so that the largest value of all is 1.
 std::array<Spectrum, 3> peak_one(std::array<Spectrum, 3> rgb) {
   double peak = 0;
   for (const Spectrum& channel : rgb) peak = std::max(peak, std::ranges::max(channel.values()));
-  for (Spectrum& channel : rgb) channel = scaled(channel, 1 / peak);
+  for (Spectrum& channel : rgb) channel = channel.times([&](double) { return 1 / peak; });
   return rgb;
 }
 

@@ -16,13 +16,6 @@
 namespace lowlux::isp {
 namespace {
 
-Spectrum mapped(const Spectrum& spectrum, const auto& value) {
-  const auto nm = spectrum.wavelengths_nm();
-  std::vector<double> out(nm.size());
-  for (std::size_t i = 0; i < nm.size(); ++i) out[i] = value(nm[i], spectrum.values()[i]);
-  return *Spectrum::of({nm.begin(), nm.end()}, std::move(out));
-}
-
 /// Quantum efficiency of R, G, B up to a factor: response per joule divided by photons per joule, largest value 1.
 Result<std::array<Spectrum, 3>> relative_quantum_efficiency(const std::string& camera) {
   auto sensitivity = camera_sensitivity(camera);
@@ -36,11 +29,11 @@ Result<std::array<Spectrum, 3>> relative_quantum_efficiency(const std::string& c
   }
   double peak = 0;
   for (Spectrum& channel : *sensitivity) {
-    channel = mapped(channel, [](double nm, double value) { return value / nm; });
+    channel = channel.times([](double nm) { return 1 / nm; });
     peak = std::max(peak, std::ranges::max(channel.values()));
   }
   for (Spectrum& channel : *sensitivity) {
-    channel = mapped(channel, [&](double, double value) { return value / peak; });
+    channel = channel.times([&](double) { return 1 / peak; });
   }
   return *std::move(sensitivity);
 }
@@ -65,7 +58,7 @@ Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Opti
   if (!(peak > 0) || !(peak <= 1)) {
     return fail(ErrorCode::invalid_argument, "a peak quantum efficiency lies above 0 and at most at 1");
   }
-  for (Spectrum& channel : *efficiency) channel = mapped(channel, [&](double, double value) { return peak * value; });
+  for (Spectrum& channel : *efficiency) channel = channel.times([&](double) { return peak; });
   SpectralResponse out{sensor.model.name + " through the filters of " + sensor.camera, *std::move(efficiency), 0};
 
   auto white = optics.white_luminance_cd_m2;
@@ -76,7 +69,7 @@ Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Opti
       return fail(ErrorCode::invalid_argument,
                   "the luminance that fills a pixel must lie above 0 and below 1e12 cd/m2");
     }
-    out.etendue_m2_sr = etendue_for(out, *white, saturation_charge_e(sensor.model));
+    out.etendue_m2_sr = etendue_for(out, *white, sensor.model.full_well_e);
   } else if (sensor.pixel_pitch_um && sensor.peak_quantum_efficiency) {
     if (!(*sensor.pixel_pitch_um > 0) || !(*sensor.pixel_pitch_um <= 1000)) {
       return fail(ErrorCode::invalid_argument, "a pixel pitch lies above 0 and at most at 1000 um");
@@ -109,7 +102,7 @@ Vector3 electron_rate(const SpectralResponse& response, const Spectrum& radiance
 std::optional<Spectrum> radiance_of(const Spectrum& light, double luminance_cd_m2) {
   const double y = luminous_efficacy_lm_w * xyz_of(light).y;
   if (!(y > 0)) return std::nullopt;
-  return mapped(light, [&](double, double value) { return value * luminance_cd_m2 / y; });
+  return light.times([&](double) { return luminance_cd_m2 / y; });
 }
 
 double saturation_luminance_cd_m2(const SensorModel& sensor, const SpectralResponse& response, double time_s) {

@@ -116,7 +116,8 @@ TEST(Photographs, PhysicalElectronsArePoissonAndChannelsIndependent) {
 TEST(Photographs, PublishedSamplingHasTooLittleVarianceAndCorrelatesTheChannels) {
   const Patch white = white_patch();
   const int n = 4000;
-  const auto samples = photograph(camera(), white, 0.01, {.sampling = PhotonSampling::published}, {3, 0, 0}, n);
+  const auto samples =
+      photograph(camera(), white, 0.01, {.sampling = capture::PhotonSampling::published}, {3, 0, 0}, n);
   const auto photons = *photon_radiance(white.radiance);
   const auto& qe = camera().response.quantum_efficiency;
   const double scale = 0.01 * camera().response.etendue_m2_sr;
