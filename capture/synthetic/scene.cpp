@@ -128,7 +128,7 @@ Result<Scene> picture_scene(SceneLinear xyz, double luminance_cd_m2) {
 
 Result<void> add_stars(Scene& scene, int count, double faintest_cd_m2, std::uint64_t seed) {
   if (count < 0 || count > 1000000) return wrong("there are 0 to 1000000 stars, found " + std::to_string(count));
-  if (const auto good = check_luminance(faintest_cd_m2); !good) return good;
+  if (auto good = check_luminance(faintest_cd_m2); !good) return good;
   constexpr const char* lights[] = {"A", "D50", "D65", "D75"};
   constexpr double brightest = 1e6;  // in units of the faintest
   const int width = scene.xyz_cd_m2.width(), height = scene.xyz_cd_m2.height();

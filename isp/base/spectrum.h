@@ -46,7 +46,7 @@ class Spectrum {
   Spectrum times(const Factor& factor) const {
     std::vector<double> values(values_);
     for (std::size_t i = 0; i < values.size(); ++i) values[i] *= factor(wavelengths_nm_[i]);
-    return Spectrum(wavelengths_nm_, std::move(values));
+    return {wavelengths_nm_, std::move(values)};
   }
 
   /// Value at a wavelength: linear between nodes, 0 outside the tabulated range.

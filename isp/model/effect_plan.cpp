@@ -61,6 +61,7 @@ std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vect
     return [&blocks, key](std::size_t a, std::size_t b) { return key(blocks[a]) < key(blocks[b]); };
   };
   std::vector<BlockLevel> samples;
+  samples.reserve(7 + most_samples);
   samples.push_back(
       blocks[*std::max_element(members.begin(), members.end(), by([](const BlockLevel& b) { return b.peak_e; }))]);
   for (int c = 0; c < 3; ++c) {

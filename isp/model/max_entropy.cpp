@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -20,8 +21,8 @@ class Dual {
   using Vector = Eigen::Matrix<double, static_cast<int>(N), 1>;
   using Matrix = Eigen::Matrix<double, static_cast<int>(N), static_cast<int>(N)>;
 
-  Dual(const SpectralBasis<N>& basis, const Vector& eta, const Matrix& ridge)
-      : basis_(basis), eta_(eta), ridge_(ridge), power_(basis.f.size()) {}
+  Dual(const SpectralBasis<N>& basis, Vector eta, Matrix ridge)
+      : basis_(basis), eta_(std::move(eta)), ridge_(std::move(ridge)), power_(basis.f.size()) {}
 
   /// Moves to theta; all members below are those of the new place.
   void move(const Vector& theta) {

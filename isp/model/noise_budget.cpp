@@ -52,7 +52,7 @@ double probability(double a, double b) {
 }  // namespace
 
 Result<void> check_sensor(const SensorModel& s) {
-  if (const auto good = check_not_negative(s); !good) return good;
+  if (auto good = check_not_negative(s); !good) return good;
   const auto wrong = [&](const std::string& what) { return fail(ErrorCode::invalid_argument, what, s.name); };
   if (!(s.system_gain_dn_per_e > 0) || !(s.system_gain_dn_per_e <= 1e6)) {
     return wrong("the system gain must be above 0 and at most 1e6 DN/e-, found " + text_of(s.system_gain_dn_per_e));

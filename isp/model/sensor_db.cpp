@@ -228,7 +228,8 @@ Result<NamedSensor> sensor_named(std::string_view name, std::string_view gain, c
   take_electronics(out, *row, figures);
   take_dark_current(out, *row, figures);
   take_fixed_pattern(out, figures);
-  const auto own = std::find_if(cameras.begin(), cameras.end(), [&](const CameraOf& c) { return c.sensor == name; });
+  const auto* const own =
+      std::find_if(cameras.begin(), cameras.end(), [&](const CameraOf& c) { return c.sensor == name; });
   out.camera = own == cameras.end() ? stand_in_camera : own->camera;
   if (own == cameras.end() || !own->own) out.assumptions.push_back("the colours of a " + out.camera);
   if (const auto possible = check_sensor(out.model); !possible) return tl::make_unexpected(possible.error());

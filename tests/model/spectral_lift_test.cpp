@@ -13,9 +13,7 @@
 namespace lowlux::isp {
 namespace {
 
-Xyz of_linear_srgb(double r, double g, double b) {
-  return xyz_of(*rgb_to_xyz(primaries_rec709) * Vector3{r, g, b});
-}
+Xyz of_linear_srgb(double r, double g, double b) { return xyz_of(*rgb_to_xyz(primaries_rec709) * Vector3{r, g, b}); }
 
 /// Calls use(XYZ) for a lattice of linear sRGB colours with the corners and edges of the gamut.
 template <class Use>

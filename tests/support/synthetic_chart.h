@@ -30,7 +30,8 @@ struct SyntheticChart {
 };
 
 /// The 24 patches from Ohta's reflectances. Camera RGB and XYZ are integrals over the light's nodes.
-/// ColorMatrix (and ForwardMatrix) come from least squares on isp::training_reflectances(), which hold no patch of a chart.
+/// ColorMatrix (and ForwardMatrix) come from least squares on isp::training_reflectances(), which hold no patch of a
+/// chart.
 Result<SyntheticChart> photograph_chart(const ChartSetup& setup);
 
 /// Each training reflectance seen under the setup's light: for scenes that are not the chart.
