@@ -146,6 +146,7 @@ std::vector<std::vector<std::size_t>> group(std::span<const BlockLevel> blocks) 
   std::map<int, std::vector<std::size_t>> decades;
   for (std::size_t i = 0; i < blocks.size(); ++i) decades[decade_of(level_of(blocks[i]))].push_back(i);
   std::vector<std::vector<std::size_t>> regions;
+  regions.reserve(decades.size());
   for (auto& decade : decades) regions.push_back(std::move(decade.second));
   return regions;
 }
