@@ -108,8 +108,13 @@ Vector3 electron_rate(const SpectralResponse& response, const Spectrum& radiance
 
 std::optional<Spectrum> radiance_of(const Spectrum& light, double luminance_cd_m2) {
   const double y = luminous_efficacy_lm_w * xyz_of(light).y;
-  if (!(y > 0)) return std::nullopt;
-  return mapped(light, [&](double, double value) { return value * luminance_cd_m2 / y; });
+  if (!(y > 0) || !std::isfinite(y)) return std::nullopt;
+  // Divided first: the scale of a light is anything.
+  const auto scaled = [&](double value) { return value / y * luminance_cd_m2; };
+  if (!std::ranges::all_of(light.values(), [&](double value) { return std::isfinite(scaled(value)); })) {
+    return std::nullopt;
+  }
+  return mapped(light, [&](double, double value) { return scaled(value); });
 }
 
 double saturation_luminance_cd_m2(const SensorModel& sensor, const SpectralResponse& response, double time_s) {
