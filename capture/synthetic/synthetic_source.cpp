@@ -56,10 +56,13 @@ Result<CameraColour> colour_of(const isp::NamedSensor& sensor, const SpectralRes
   return colour;
 }
 
+/// Mean code at which a pixel saturates, above black [DN]: the full well's, where that is less than the converter's.
+double range_dn(const SensorModel& s) { return s.system_gain_dn_per_e * isp::saturation_charge_e(s); }
+
 /// Variance of codes in 0..1 of the range above black (DNG NoiseProfile): K / range * x + (K^2 sigma^2 + 1/12) /
 /// range^2.
 NoiseProfile noise_profile(const SensorModel& s) {
-  const double range = s.white_level_dn - s.black_level_dn, k = s.system_gain_dn_per_e;
+  const double range = range_dn(s), k = s.system_gain_dn_per_e;
   const double steady_e2 = s.read_noise_e * s.read_noise_e + s.row_noise_e * s.row_noise_e;
   NoiseProfile out;
   out.scale.fill(k / range);
@@ -196,7 +199,7 @@ RawFrame SyntheticSource::described(Plane<std::uint16_t> codes) const {
   }
   const double scale = storage_.scale, offset = storage_.offset_dn;
   out.raw.black_tag = BlackLevel{1, 1, 1, {scale * (s.black_level_dn + offset)}, {}, {}};
-  out.raw.white_dn.fill(std::min(65535.0, scale * (s.white_level_dn + offset)));
+  out.raw.white_dn.fill(std::min(65535.0, scale * (s.black_level_dn + range_dn(s) + offset)));
   FrameInfo& info = out.raw.info;
   info.make = "lowlux";
   info.model = s.name + (sensor_.gain_setting.empty() ? "" : " " + sensor_.gain_setting);
