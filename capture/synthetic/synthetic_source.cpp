@@ -85,6 +85,9 @@ Result<SyntheticSource> SyntheticSource::of(Scene scene, isp::NamedSensor sensor
   if (options.masked_columns < 0 || options.masked_columns > 4096 || options.masked_columns % 2 != 0) {
     return fail(ErrorCode::invalid_argument, "masked columns are an even number between 0 and 4096");
   }
+  if (const auto& t = options.effects.tolerance; t && (!(t->delta_e > 0) || !(t->relative_variance > 0))) {
+    return fail(ErrorCode::invalid_argument, "a tolerance must be above 0: ask for all effects to leave none out");
+  }
   if (options.sampling == PhotonSampling::published && !scene.points.empty()) {
     return fail(ErrorCode::invalid_argument, "published photon sampling draws pixels, not points: leave the stars out");
   }
