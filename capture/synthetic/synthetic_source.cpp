@@ -17,7 +17,9 @@ namespace {
 
 using isp::Effect;
 
-constexpr double pedestal_sigmas = 8;  // of the noise, below a stored pedestal
+constexpr double pedestal_sigmas = 8;    // of the noise, below a stored pedestal
+constexpr double largest_deviate = 6.5;  // no normal deviate of isp/base/random.h is larger
+constexpr double hottest = 23;           // no hot pixel has more than 33 log(2) times their mean
 
 template <class Predicate>
 bool every_region(const isp::EffectPlan& plan, const Predicate& predicate) {
@@ -114,22 +116,48 @@ Result<void> SyntheticSource::expose(Executor& executor) {
   plan_ = choice.tolerance ? isp::plan_effects(sensor, options_.exposure, developing_, blocks, *choice.tolerance)
                            : isp::fixed_effects(sensor, options_.exposure, developing_, blocks, choice.effects);
   choose_storage();
+  if (const auto good = check_photons(executor); !good) return good;
   return check_means(blocks);
+}
+
+double SyntheticSource::largest_mean_e(const isp::BlockLevel& block, isp::EffectSet kept) const {
+  const SensorModel& s = sensor_.model;
+  const auto dark = isp::dark_mean_e(s, options_.exposure);
+  const double dark_e = kept.has(Effect::dark_current) ? *std::max_element(dark.begin(), dark.end()) : 0;
+  // The planner has weighed what the few extreme pixels lose; a caller who sets effects has not.
+  if (options_.effects.tolerance) return block.peak_e + dark_e;
+  const double prnu = kept.has(Effect::prnu) ? s.prnu : 0, dsnu = kept.has(Effect::dsnu) ? s.dsnu : 0;
+  const double hot_e = kept.has(Effect::hot_pixels) && s.hot_pixel_fraction > 0
+                           ? s.hot_pixel_current_e_per_s * options_.exposure.time_s *
+                                 isp::dark_current_factor(s, options_.exposure.temperature_c)
+                           : 0;
+  return block.peak_e * (1 + largest_deviate * prnu) + dark_e * (1 + largest_deviate * dsnu) + hottest * hot_e;
 }
 
 Result<void> SyntheticSource::check_means(const std::vector<isp::BlockLevel>& blocks) const {
   double mean_e = 0;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
-    if (!plan_.regions[plan_.region_of_block[i]].kept.has(Effect::clipping))
-      mean_e = std::max(mean_e, blocks[i].peak_e);
+    const isp::EffectSet kept = plan_.regions[plan_.region_of_block[i]].kept;
+    if (!kept.has(Effect::clipping)) mean_e = std::max(mean_e, largest_mean_e(blocks[i], kept));
   }
   if (mean_e <= poisson_max_mean) return {};
-  char text[160];
-  std::snprintf(
-      text, sizeof text,
-      "the brightest pixel collects %.3g e-, above the sampler's limit of 1e6, and clipping is left out: keep "
-      "it, or expose less",
-      mean_e);
+  char text[176];
+  std::snprintf(text, sizeof text,
+                "a pixel may collect %.3g e- on average, above the sampler's limit of 1e6, and clipping is left out: "
+                "keep it, or expose less",
+                mean_e);
+  return fail(ErrorCode::invalid_argument, text);
+}
+
+Result<void> SyntheticSource::check_photons(Executor& executor) const {
+  const std::optional<PhotonRows> rows = photon_rows();
+  const double photons = rows ? rows->largest_mean_per_s(executor) * options_.exposure.time_s : 0;
+  if (photons <= poisson_max_mean) return {};
+  char text[176];
+  std::snprintf(text, sizeof text,
+                "published photon sampling expects %.3g photons in one bin of wavelengths, above the sampler's limit "
+                "of 1e6: sample physically, or expose less",
+                photons);
   return fail(ErrorCode::invalid_argument, text);
 }
 
