@@ -102,6 +102,16 @@ double saturation_charge_e(const SensorModel& sensor) {
   return std::min(sensor.full_well_e, (sensor.white_level_dn - sensor.black_level_dn) / sensor.system_gain_dn_per_e);
 }
 
+std::array<bool, 3> saturated_channels(const SensorModel& sensor, const std::array<double, 3>& largest_dn) {
+  const double k = sensor.system_gain_dn_per_e;
+  const double noise_e = std::hypot(sensor.read_noise_e, std::hypot(sensor.row_noise_e, sensor.column_noise_e));
+  const double full_dn = std::floor(sensor.black_level_dn + k * (sensor.full_well_e - 5 * noise_e));
+  const double saturated_dn = std::min(sensor.white_level_dn, full_dn);
+  std::array<bool, 3> flags{};
+  for (int c = 0; c < 3; ++c) flags[c] = !(largest_dn[c] < saturated_dn);
+  return flags;
+}
+
 double variance_dn2(const SensorModel& sensor, const MeanCharge& charge) {
   const double variance_e2 = charge.signal_e + charge.dark_e + sensor.read_noise_e * sensor.read_noise_e;
   return sensor.system_gain_dn_per_e * sensor.system_gain_dn_per_e * variance_e2 + 1.0 / 12;
