@@ -84,7 +84,9 @@ Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Opti
     const double pitch_m = *sensor.pixel_pitch_um * 1e-6;
     out.etendue_m2_sr = pitch_m * pitch_m * std::numbers::pi / (4 * n2);
   } else if (sensor.iso) {
-    if (!(*sensor.iso > 0)) return fail(ErrorCode::invalid_argument, "an ISO speed is positive");
+    if (!(*sensor.iso > 0) || !std::isfinite(*sensor.iso)) {
+      return fail(ErrorCode::invalid_argument, "an ISO speed is positive and finite");
+    }
     out.etendue_m2_sr = etendue_for(out, 78 * n2 / (0.65 * *sensor.iso), saturation_charge_e(sensor.model));
   } else {
     return fail(
