@@ -72,6 +72,30 @@ NoiseProfile noise_profile(const SensorModel& s) {
   return out;
 }
 
+/// What of() promises of its options, and of points that no function of scene.h made.
+Result<void> check_options(const SyntheticOptions& options, const Scene& scene) {
+  if (options.masked_columns < 0 || options.masked_columns > 4096 || options.masked_columns % 2 != 0) {
+    return fail(ErrorCode::invalid_argument, "masked columns are an even number between 0 and 4096");
+  }
+  if (const auto& t = options.effects.tolerance; t && (!(t->delta_e > 0) || !(t->relative_variance > 0))) {
+    return fail(ErrorCode::invalid_argument, "a tolerance must be above 0: ask for all effects to leave none out");
+  }
+  if (options.sampling == PhotonSampling::published && !scene.points.empty()) {
+    return fail(ErrorCode::invalid_argument, "published photon sampling draws pixels, not points: leave the stars out");
+  }
+  if (!(options.f_number >= 0.5) || !(options.f_number <= 1000)) {
+    return fail(ErrorCode::invalid_argument, "the f-number must lie between 0.5 and 1000");
+  }
+  for (const PointSource& p : scene.points) {
+    const bool near = std::fabs(p.x_px) <= 1e6 && std::fabs(p.y_px) <= 1e6;
+    if (!near || !(p.spread_px > 0) || !(p.spread_px <= 1000)) {
+      return fail(ErrorCode::invalid_argument,
+                  "a point source lies within a million pixels and spreads over more than 0 and at most 1000");
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 SyntheticSource::SyntheticSource(Scene scene, isp::NamedSensor sensor, SpectralResponse response,
@@ -84,15 +108,7 @@ Result<SyntheticSource> SyntheticSource::of(Scene scene, isp::NamedSensor sensor
                                             const SyntheticOptions& options, Executor& executor) {
   if (const auto good = isp::check_sensor(sensor.model); !good) return tl::make_unexpected(good.error());
   if (const auto good = isp::check_exposure(options.exposure); !good) return tl::make_unexpected(good.error());
-  if (options.masked_columns < 0 || options.masked_columns > 4096 || options.masked_columns % 2 != 0) {
-    return fail(ErrorCode::invalid_argument, "masked columns are an even number between 0 and 4096");
-  }
-  if (const auto& t = options.effects.tolerance; t && (!(t->delta_e > 0) || !(t->relative_variance > 0))) {
-    return fail(ErrorCode::invalid_argument, "a tolerance must be above 0: ask for all effects to leave none out");
-  }
-  if (options.sampling == PhotonSampling::published && !scene.points.empty()) {
-    return fail(ErrorCode::invalid_argument, "published photon sampling draws pixels, not points: leave the stars out");
-  }
+  if (const auto good = check_options(options, scene); !good) return tl::make_unexpected(good.error());
   SyntheticSource source(std::move(scene), std::move(sensor), std::move(response), options);
   if (const auto good = source.expose(executor); !good) return tl::make_unexpected(good.error());
   return source;

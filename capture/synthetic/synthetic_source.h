@@ -41,7 +41,8 @@ class SyntheticSource {
  public:
   /// Errors: an exposure that cannot be; a mean charge beyond the sampler's limit where no full well holds it; point
   /// sources with published sampling, or more photons in one of its bins than the sampler's limit; masked columns that
-  /// are odd, negative or more than 4096; a tolerance that is not above 0.
+  /// are odd, negative or more than 4096; a tolerance that is not above 0; an f-number outside of 0.5..1000; point
+  /// sources without place or spread.
   static Result<SyntheticSource> of(Scene scene, isp::NamedSensor sensor, SpectralResponse response,
                                     const SyntheticOptions& options, Executor& executor);
 
