@@ -34,6 +34,31 @@ PhotonRows::PhotonRows(const Scene& scene, const SpectralResponse& response, con
   lifted_ = bins_of(*Spectrum::of(std::move(nm), std::move(ones)));
 }
 
+double PhotonRows::largest_mean_per_s(Executor& executor) const {
+  double largest = 0;
+  for (const std::vector<Bin>& bins : patches_) {
+    for (const Bin& bin : bins) largest = std::max<double>(largest, bin.photons_per_s);
+  }
+  if (!scene_.patch.empty()) return largest;
+  std::vector<float> of_band(static_cast<std::size_t>(executor.width()), 0.0f);
+  for_each_band(executor, scene_.xyz_cd_m2.height(), [&](RowBand band, int index) {
+    for (int y = band.first; y < band.last; ++y) {
+      for (int x = 0; x < scene_.xyz_cd_m2.width(); ++x) {
+        const auto power = power_at(x, y);
+        for (int bin = 0; bin < isp::lift_nodes; ++bin) {
+          of_band[index] = std::max(of_band[index], lifted_[bin].photons_per_s * power[bin]);
+        }
+      }
+    }
+  });
+  return *std::max_element(of_band.begin(), of_band.end());
+}
+
+std::array<float, isp::lift_nodes> PhotonRows::power_at(int x, int y) const {
+  return isp::lifted_power(*table_, {scene_.xyz_cd_m2.plane[0].row(y)[x], scene_.xyz_cd_m2.plane[1].row(y)[x],
+                                     scene_.xyz_cd_m2.plane[2].row(y)[x]});
+}
+
 void PhotonRows::collect(std::uint64_t seed, std::uint32_t frame, int x0, int y, double time_s,
                          std::span<float> charge_e) const {
   const std::uint16_t* patches = scene_.patch.empty() ? nullptr : scene_.patch.row(y);
@@ -74,9 +99,7 @@ void PhotonRows::collect_lifted(std::uint64_t seed, std::uint32_t frame, int x0,
   std::vector<float> power(isp::lift_nodes * count), photons(count);  // radiance by bin, then by pixel
   for (std::size_t i = 0; i < count; ++i) {
     const int x = x0 + static_cast<int>(i) - masked_columns_;
-    const auto colour =
-        isp::lifted_power(*table_, {scene_.xyz_cd_m2.plane[0].row(y)[x], scene_.xyz_cd_m2.plane[1].row(y)[x],
-                                    scene_.xyz_cd_m2.plane[2].row(y)[x]});
+    const auto colour = power_at(x, y);
     for (int bin = 0; bin < isp::lift_nodes; ++bin) power[bin * count + i] = colour[bin];
   }
   std::fill(charge_e.begin(), charge_e.end(), 0.0f);

@@ -7,6 +7,7 @@
 
 #include "capture/synthetic/scene.h"
 #include "isp/base/cfa.h"
+#include "isp/base/executor.h"
 #include "isp/base/sensor.h"
 #include "isp/model/spectral_lift.h"
 
@@ -27,6 +28,9 @@ class PhotonRows {
   PhotonRows(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table, BayerPhase phase,
              int masked_columns);
 
+  /// The largest mean of any pixel and bin [photons per s]: collect() is right up to the sampler's limit.
+  double largest_mean_per_s(Executor& executor) const;
+
   /// Charge of the pixels (x0 + i, y) of the sensor in `time_s` [e-], fractions included.
   void collect(std::uint64_t seed, std::uint32_t frame, int x0, int y, double time_s, std::span<float> charge_e) const;
 
@@ -40,6 +44,7 @@ class PhotonRows {
                      double time_s, std::span<float> charge_e) const;
   void collect_lifted(std::uint64_t seed, std::uint32_t frame, int x0, int y, double time_s,
                       std::span<float> charge_e) const;
+  std::array<float, isp::lift_nodes> power_at(int x, int y) const;
 
   const Scene& scene_;
   const isp::LiftTable* table_;

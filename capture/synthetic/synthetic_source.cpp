@@ -17,7 +17,9 @@ namespace {
 
 using isp::Effect;
 
-constexpr double pedestal_sigmas = 8;  // of the noise, below a stored pedestal
+constexpr double pedestal_sigmas = 8;    // of the noise, below a stored pedestal
+constexpr double largest_deviate = 6.5;  // no normal deviate of isp/base/random.h is larger
+constexpr double hottest = 23;           // no hot pixel has more than 33 log(2) times their mean
 
 template <class Predicate>
 bool every_region(const isp::EffectPlan& plan, const Predicate& predicate) {
@@ -56,15 +58,42 @@ Result<CameraColour> colour_of(const isp::NamedSensor& sensor, const SpectralRes
   return colour;
 }
 
+/// Mean code at which a pixel saturates, above black [DN]: the full well's, where that is less than the converter's.
+double range_dn(const SensorModel& s) { return s.system_gain_dn_per_e * isp::saturation_charge_e(s); }
+
 /// Variance of codes in 0..1 of the range above black (DNG NoiseProfile): K / range * x + (K^2 sigma^2 + 1/12) /
 /// range^2.
 NoiseProfile noise_profile(const SensorModel& s) {
-  const double range = s.white_level_dn - s.black_level_dn, k = s.system_gain_dn_per_e;
+  const double range = range_dn(s), k = s.system_gain_dn_per_e;
   const double steady_e2 = s.read_noise_e * s.read_noise_e + s.row_noise_e * s.row_noise_e;
   NoiseProfile out;
   out.scale.fill(k / range);
   out.offset.fill((k * k * steady_e2 + 1.0 / 12) / (range * range));
   return out;
+}
+
+/// What of() promises of its options, and of points that no function of scene.h made.
+Result<void> check_options(const SyntheticOptions& options, const Scene& scene) {
+  if (options.masked_columns < 0 || options.masked_columns > 4096 || options.masked_columns % 2 != 0) {
+    return fail(ErrorCode::invalid_argument, "masked columns are an even number between 0 and 4096");
+  }
+  if (const auto& t = options.effects.tolerance; t && (!(t->delta_e > 0) || !(t->relative_variance > 0))) {
+    return fail(ErrorCode::invalid_argument, "a tolerance must be above 0: ask for all effects to leave none out");
+  }
+  if (options.sampling == PhotonSampling::published && !scene.points.empty()) {
+    return fail(ErrorCode::invalid_argument, "published photon sampling draws pixels, not points: leave the stars out");
+  }
+  if (!(options.f_number >= 0.5) || !(options.f_number <= 1000)) {
+    return fail(ErrorCode::invalid_argument, "the f-number must lie between 0.5 and 1000");
+  }
+  for (const PointSource& p : scene.points) {
+    const bool near = std::fabs(p.x_px) <= 1e6 && std::fabs(p.y_px) <= 1e6;
+    if (!near || !(p.spread_px > 0) || !(p.spread_px <= 1000)) {
+      return fail(ErrorCode::invalid_argument,
+                  "a point source lies within a million pixels and spreads over more than 0 and at most 1000");
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -79,12 +108,7 @@ Result<SyntheticSource> SyntheticSource::of(Scene scene, isp::NamedSensor sensor
                                             const SyntheticOptions& options, Executor& executor) {
   if (const auto good = isp::check_sensor(sensor.model); !good) return tl::make_unexpected(good.error());
   if (const auto good = isp::check_exposure(options.exposure); !good) return tl::make_unexpected(good.error());
-  if (options.masked_columns < 0 || options.masked_columns > 4096 || options.masked_columns % 2 != 0) {
-    return fail(ErrorCode::invalid_argument, "masked columns are an even number between 0 and 4096");
-  }
-  if (options.sampling == PhotonSampling::published && !scene.points.empty()) {
-    return fail(ErrorCode::invalid_argument, "published photon sampling draws pixels, not points: leave the stars out");
-  }
+  if (const auto good = check_options(options, scene); !good) return tl::make_unexpected(good.error());
   SyntheticSource source(std::move(scene), std::move(sensor), std::move(response), options);
   if (const auto good = source.expose(executor); !good) return tl::make_unexpected(good.error());
   return source;
@@ -108,22 +132,48 @@ Result<void> SyntheticSource::expose(Executor& executor) {
   plan_ = choice.tolerance ? isp::plan_effects(sensor, options_.exposure, developing_, blocks, *choice.tolerance)
                            : isp::fixed_effects(sensor, options_.exposure, developing_, blocks, choice.effects);
   choose_storage();
+  if (const auto good = check_photons(executor); !good) return good;
   return check_means(blocks);
+}
+
+double SyntheticSource::largest_mean_e(const isp::BlockLevel& block, isp::EffectSet kept) const {
+  const SensorModel& s = sensor_.model;
+  const auto dark = isp::dark_mean_e(s, options_.exposure);
+  const double dark_e = kept.has(Effect::dark_current) ? *std::max_element(dark.begin(), dark.end()) : 0;
+  // The planner has weighed what the few extreme pixels lose; a caller who sets effects has not.
+  if (options_.effects.tolerance) return block.peak_e + dark_e;
+  const double prnu = kept.has(Effect::prnu) ? s.prnu : 0, dsnu = kept.has(Effect::dsnu) ? s.dsnu : 0;
+  const double hot_e = kept.has(Effect::hot_pixels) && s.hot_pixel_fraction > 0
+                           ? s.hot_pixel_current_e_per_s * options_.exposure.time_s *
+                                 isp::dark_current_factor(s, options_.exposure.temperature_c)
+                           : 0;
+  return block.peak_e * (1 + largest_deviate * prnu) + dark_e * (1 + largest_deviate * dsnu) + hottest * hot_e;
 }
 
 Result<void> SyntheticSource::check_means(const std::vector<isp::BlockLevel>& blocks) const {
   double mean_e = 0;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
-    if (!plan_.regions[plan_.region_of_block[i]].kept.has(Effect::clipping))
-      mean_e = std::max(mean_e, blocks[i].peak_e);
+    const isp::EffectSet kept = plan_.regions[plan_.region_of_block[i]].kept;
+    if (!kept.has(Effect::clipping)) mean_e = std::max(mean_e, largest_mean_e(blocks[i], kept));
   }
   if (mean_e <= poisson_max_mean) return {};
-  char text[160];
-  std::snprintf(
-      text, sizeof text,
-      "the brightest pixel collects %.3g e-, above the sampler's limit of 1e6, and clipping is left out: keep "
-      "it, or expose less",
-      mean_e);
+  char text[176];
+  std::snprintf(text, sizeof text,
+                "a pixel may collect %.3g e- on average, above the sampler's limit of 1e6, and clipping is left out: "
+                "keep it, or expose less",
+                mean_e);
+  return fail(ErrorCode::invalid_argument, text);
+}
+
+Result<void> SyntheticSource::check_photons(Executor& executor) const {
+  const std::optional<PhotonRows> rows = photon_rows();
+  const double photons = rows ? rows->largest_mean_per_s(executor) * options_.exposure.time_s : 0;
+  if (photons <= poisson_max_mean) return {};
+  char text[176];
+  std::snprintf(text, sizeof text,
+                "published photon sampling expects %.3g photons in one bin of wavelengths, above the sampler's limit "
+                "of 1e6: sample physically, or expose less",
+                photons);
   return fail(ErrorCode::invalid_argument, text);
 }
 
@@ -196,7 +246,7 @@ RawFrame SyntheticSource::described(Plane<std::uint16_t> codes) const {
   }
   const double scale = storage_.scale, offset = storage_.offset_dn;
   out.raw.black_tag = BlackLevel{1, 1, 1, {scale * (s.black_level_dn + offset)}, {}, {}};
-  out.raw.white_dn.fill(std::min(65535.0, scale * (s.white_level_dn + offset)));
+  out.raw.white_dn.fill(std::min(65535.0, scale * (s.black_level_dn + range_dn(s) + offset)));
   FrameInfo& info = out.raw.info;
   info.make = "lowlux";
   info.model = s.name + (sensor_.gain_setting.empty() ? "" : " " + sensor_.gain_setting);

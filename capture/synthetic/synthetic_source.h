@@ -36,7 +36,9 @@ struct SyntheticOptions {
 class SyntheticSource {
  public:
   /// Errors: an exposure that cannot be; a mean charge beyond the sampler's limit where no full well holds it; point
-  /// sources with published sampling; masked columns that are odd, negative or more than 4096.
+  /// sources with published sampling, or more photons in one of its bins than the sampler's limit; masked columns that
+  /// are odd, negative or more than 4096; a tolerance that is not above 0; an f-number outside of 0.5..1000; point
+  /// sources without place or spread.
   static Result<SyntheticSource> of(Scene scene, isp::NamedSensor sensor, SpectralResponse response,
                                     const SyntheticOptions& options, Executor& executor);
 
@@ -67,7 +69,10 @@ class SyntheticSource {
 
   SyntheticSource(Scene scene, isp::NamedSensor sensor, SpectralResponse response, const SyntheticOptions& options);
   Result<void> expose(Executor& executor);
+  /// Of a block's pixels, fixed pattern included [e-].
+  double largest_mean_e(const isp::BlockLevel& block, isp::EffectSet kept) const;
   Result<void> check_means(const std::vector<isp::BlockLevel>& blocks) const;
+  Result<void> check_photons(Executor& executor) const;
   void choose_storage();
   template <class Code>
   void read_out_frame(std::uint32_t index, Executor& executor, PlaneView<Code> out) const;

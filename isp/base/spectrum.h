@@ -41,11 +41,11 @@ class Spectrum {
   std::span<const double> values() const { return values_; }
   std::size_t size() const { return values_.size(); }
 
-  /// The spectrum with each value multiplied by factor(wavelength_nm), which must be finite.
-  template <class Factor>
-  Spectrum times(const Factor& factor) const {
+  /// The spectrum with each value replaced by change(wavelength_nm, value), which must be finite.
+  template <class Change>
+  Spectrum mapped(const Change& change) const {
     std::vector<double> values(values_);
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] *= factor(wavelengths_nm_[i]);
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = change(wavelengths_nm_[i], values[i]);
     return {wavelengths_nm_, std::move(values)};
   }
 
@@ -77,7 +77,7 @@ inline Result<Spectrum> resample(const Spectrum& spectrum, std::span<const doubl
 
 /// Light reflected by a surface, at the nodes of the light.
 inline Spectrum reflected(const Spectrum& light, const Spectrum& reflectance) {
-  return light.times([&](double nm) { return reflectance.at(nm); });
+  return light.mapped([&](double nm, double power) { return power * reflectance.at(nm); });
 }
 
 /// Integral of spectrum(nm) * weight(nm) by the trapezium rule on the nodes of `spectrum` [value x nm].

@@ -23,7 +23,8 @@ std::array<Spectrum, 3> energy_response(const ThesisCamera& camera) {
   std::array<Spectrum, 3> out = camera.response.quantum_efficiency;
   const double dn_per_photon = camera.exposure_s * camera.response.etendue_m2_sr * camera.sensor.system_gain_dn_per_e;
   for (Spectrum& channel : out) {
-    channel = channel.times([&](double nm) { return dn_per_photon / photon_energy_j(nm); });
+    channel =
+        channel.mapped([&](double nm, double efficiency) { return efficiency * dn_per_photon / photon_energy_j(nm); });
   }
   return out;
 }

@@ -125,7 +125,7 @@ double size_of(const PredictedChange& change, const Tolerance& tolerance) {
 
 void drop_negligible(const Region& region, const Tolerance& tolerance, RegionPlan& plan) {
   std::array<int, effect_count> order{};
-  std::iota(order.begin(), order.end(), 0);
+  std::iota(order.rbegin(), order.rend(), 0);  // among equals DSNU goes before dark current, which waits for it
   const auto size = [&](int i) { return size_of(plan.decisions[i].alone, tolerance); };
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size(a) < size(b); });
   for (const int i : order) {

@@ -11,7 +11,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr int most_iterations = 60;
-constexpr double settled = 1e-10;  // of the gradient, in units of the moments
+constexpr double largest_gradient = 1e-10;  // of a fit that has settled, in units of the moments
 constexpr double smallest_gamma = 1e-12;
 constexpr double smallest_step = 1e-9;
 
@@ -43,6 +43,12 @@ class Dual {
     total_ = sum;
     gradient = moments - eta_ + 2 * ridge_ * theta;
     value = psi - theta.dot(eta_) + theta.dot(ridge_ * theta);
+  }
+
+  /// False where anything is not a number.
+  bool settled() const {
+    return std::isfinite(value) && gradient.allFinite() &&
+           gradient.template lpNorm<Eigen::Infinity>() <= largest_gradient;
   }
 
   Matrix hessian() const {
@@ -85,7 +91,7 @@ std::optional<MaxEntropyFit<N>> fit_max_entropy(const SpectralBasis<N>& basis, c
   Vector theta(start.data());
   here.move(theta);
   int iteration = 0;
-  for (; here.gradient.template lpNorm<Eigen::Infinity>() > settled; ++iteration) {
+  for (; !here.settled(); ++iteration) {
     if (iteration == most_iterations || !std::isfinite(here.value)) return std::nullopt;
     const Vector direction = here.hessian().llt().solve(-here.gradient);
     const double slope = here.gradient.dot(direction);

@@ -66,11 +66,18 @@ Result<void> check_sensor(const SensorModel& s) {
   if (!(s.full_well_e > 0) || !(s.full_well_e <= largest_full_well_e)) {
     return wrong("the full well must be above 0 and at most 990000 e-, found " + text_of(s.full_well_e));
   }
-  if (s.hot_pixel_fraction > 1 || s.prnu > 1 || s.dsnu > 1) {
-    return wrong("non-uniformities and the fraction of hot pixels are at most 1");
+  for (const Named& share : std::initializer_list<Named>{{"photo response non-uniformity", s.prnu},
+                                                         {"dark signal non-uniformity", s.dsnu},
+                                                         {"fraction of hot pixels", s.hot_pixel_fraction}}) {
+    if (share.value > 1)
+      return wrong(std::string("the ") + share.name + " is at most 1, found " + text_of(share.value));
   }
-  if (!(s.dark_doubling_c >= 1) || !(s.dark_doubling_c <= 1e3) || !(std::fabs(s.dark_temperature_c) <= 200)) {
+  if (!(s.dark_doubling_c >= 1) || !(s.dark_doubling_c <= 1e3)) {
     return wrong("the dark current must double every 1 to 1000 degrees, found " + text_of(s.dark_doubling_c));
+  }
+  if (!(std::fabs(s.dark_temperature_c) <= 200)) {
+    return wrong("the temperature of the dark current must lie between -200 and 200 C, found " +
+                 text_of(s.dark_temperature_c));
   }
   return {};
 }
@@ -100,6 +107,16 @@ std::array<double, 3> dark_mean_e(const SensorModel& sensor, const Exposure& exp
 
 double saturation_charge_e(const SensorModel& sensor) {
   return std::min(sensor.full_well_e, (sensor.white_level_dn - sensor.black_level_dn) / sensor.system_gain_dn_per_e);
+}
+
+std::array<bool, 3> saturated_channels(const SensorModel& sensor, const std::array<double, 3>& largest_dn) {
+  const double k = sensor.system_gain_dn_per_e;
+  const double noise_e = std::hypot(sensor.read_noise_e, std::hypot(sensor.row_noise_e, sensor.column_noise_e));
+  const double full_dn = std::floor(sensor.black_level_dn + k * (sensor.full_well_e - 5 * noise_e));
+  const double saturated_dn = std::min(sensor.white_level_dn, full_dn);
+  std::array<bool, 3> flags{};
+  for (int c = 0; c < 3; ++c) flags[c] = !(largest_dn[c] < saturated_dn);
+  return flags;
 }
 
 double variance_dn2(const SensorModel& sensor, const MeanCharge& charge) {
@@ -132,12 +149,17 @@ Moments clamped_normal(const Moments& normal, double low, double high) {
 }
 
 QuantisationBounds quantisation_bounds(double std_dn) {
+  constexpr int terms = 20;  // what they leave out matters below 0.05 DN only, where both bounds are at their limit
+  constexpr double pi = std::numbers::pi;
   const double s2 = std_dn * std_dn;
-  const double first = std::exp(-2 * std::numbers::pi * std::numbers::pi * s2);
-  const double tail = first < 1 ? 1 / (1 - first) : INFINITY;  // of the series, geometric at worst
-  const double mean = std::min(0.5, first * tail / std::numbers::pi);
-  const double variance = (4 * s2 + 1 / (std::numbers::pi * std::numbers::pi)) * first * tail + mean * mean;
-  return {mean, std::min(variance, s2 + 0.25)};
+  double mean = 0, variance = 0;
+  for (int n = 1; n <= terms; ++n) {
+    const double share = std::exp(-2 * pi * pi * n * n * s2);
+    mean += share / (pi * n);
+    variance += (4 * s2 + 1 / (pi * pi * n * n)) * share;
+  }
+  mean = std::min(mean, 0.5);
+  return {mean, std::min(variance + mean * mean, s2 + 0.25)};
 }
 
 }  // namespace lowlux::isp

@@ -34,6 +34,12 @@ std::array<double, 3> dark_mean_e(const SensorModel& sensor, const Exposure& exp
 /// Charge at which a pixel reads the largest code: its full well or the converter's range, whichever is less [e-].
 double saturation_charge_e(const SensorModel& sensor);
 
+/// Which of R, G and B are saturated: where one is, the colour of the pixels is not that of the light, and means of
+/// noisy pixels hide it. A pixel is taken for full from five standard deviations of the noise after collection below
+/// the code at which it saturates.
+/// @param largest_dn the largest code of each channel; one that is not a number is flagged too
+std::array<bool, 3> saturated_channels(const SensorModel& sensor, const std::array<double, 3>& largest_dn);
+
 /// Mean charge of one pixel.
 struct MeanCharge {
   double signal_e = 0;

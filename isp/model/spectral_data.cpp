@@ -34,7 +34,7 @@ CieTable table_of(SpectrumSet set) {
 std::array<Spectrum, 3> peak_one(std::array<Spectrum, 3> rgb) {
   double peak = 0;
   for (const Spectrum& channel : rgb) peak = std::max(peak, std::ranges::max(channel.values()));
-  for (Spectrum& channel : rgb) channel = channel.times([&](double) { return 1 / peak; });
+  for (Spectrum& channel : rgb) channel = channel.mapped([&](double, double value) { return value / peak; });
   return rgb;
 }
 

@@ -29,11 +29,11 @@ Result<std::array<Spectrum, 3>> relative_quantum_efficiency(const std::string& c
   }
   double peak = 0;
   for (Spectrum& channel : *sensitivity) {
-    channel = channel.times([](double nm) { return 1 / nm; });
+    channel = channel.mapped([](double nm, double value) { return value / nm; });
     peak = std::max(peak, std::ranges::max(channel.values()));
   }
   for (Spectrum& channel : *sensitivity) {
-    channel = channel.times([&](double) { return 1 / peak; });
+    channel = channel.mapped([&](double, double value) { return value / peak; });
   }
   return *std::move(sensitivity);
 }
@@ -58,7 +58,7 @@ Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Opti
   if (!(peak > 0) || !(peak <= 1)) {
     return fail(ErrorCode::invalid_argument, "a peak quantum efficiency lies above 0 and at most at 1");
   }
-  for (Spectrum& channel : *efficiency) channel = channel.times([&](double) { return peak; });
+  for (Spectrum& channel : *efficiency) channel = channel.mapped([&](double, double value) { return peak * value; });
   SpectralResponse out{sensor.model.name + " through the filters of " + sensor.camera, *std::move(efficiency), 0};
 
   auto white = optics.white_luminance_cd_m2;
@@ -77,7 +77,9 @@ Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Opti
     const double pitch_m = *sensor.pixel_pitch_um * 1e-6;
     out.etendue_m2_sr = pitch_m * pitch_m * std::numbers::pi / (4 * n2);
   } else if (sensor.iso) {
-    if (!(*sensor.iso > 0)) return fail(ErrorCode::invalid_argument, "an ISO speed is positive");
+    if (!(*sensor.iso > 0) || !std::isfinite(*sensor.iso)) {
+      return fail(ErrorCode::invalid_argument, "an ISO speed is positive and finite");
+    }
     out.etendue_m2_sr = etendue_for(out, 78 * n2 / (0.65 * *sensor.iso), saturation_charge_e(sensor.model));
   } else {
     return fail(
@@ -101,8 +103,13 @@ Vector3 electron_rate(const SpectralResponse& response, const Spectrum& radiance
 
 std::optional<Spectrum> radiance_of(const Spectrum& light, double luminance_cd_m2) {
   const double y = luminous_efficacy_lm_w * xyz_of(light).y;
-  if (!(y > 0)) return std::nullopt;
-  return light.times([&](double) { return luminance_cd_m2 / y; });
+  if (!(y > 0) || !std::isfinite(y)) return std::nullopt;
+  // Divided first: the scale of a light is anything.
+  const auto scaled = [&](double value) { return value / y * luminance_cd_m2; };
+  if (!std::ranges::all_of(light.values(), [&](double value) { return std::isfinite(scaled(value)); })) {
+    return std::nullopt;
+  }
+  return light.mapped([&](double, double value) { return scaled(value); });
 }
 
 double saturation_luminance_cd_m2(const SensorModel& sensor, const SpectralResponse& response, double time_s) {

@@ -37,7 +37,8 @@ Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Opti
 /// Electrons per second in a pixel of R, G and B that sees a radiance [W m-2 sr-1 nm-1], integrated over its nodes.
 Vector3 electron_rate(const SpectralResponse& response, const Spectrum& radiance);
 
-/// A light scaled to radiance: a perfect white diffuser under it has this luminance. nullopt if it has no luminance.
+/// A light scaled to radiance: a perfect white diffuser under it has this luminance. nullopt if it has no luminance, or
+/// one beyond double.
 std::optional<Spectrum> radiance_of(const Spectrum& light, double luminance_cd_m2);
 
 /// The luminance [cd/m2] at which a white under D65 saturates the sensor in a time.
