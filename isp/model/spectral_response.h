@@ -31,13 +31,14 @@ inline constexpr double assumed_peak_quantum_efficiency = 0.5;
 ///     pixel pitch p and peak quantum efficiency: etendue = p^2 pi / (4 N^2) for an ideal lens of f-number N;
 ///     the ISO speed S of the gain setting: white at L = 78 N^2 / (0.65 S t) saturates (isp/model/scene_luminance.h).
 /// Errors: none of them is known (the message says what to give); an unknown camera (near matches are offered); an
-/// f-number or luminance that is not positive.
+/// f-number, luminance, pixel pitch or ISO speed that is not positive or out of all proportion, used or not.
 Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Optics& optics);
 
 /// Electrons per second in a pixel of R, G and B that sees a radiance [W m-2 sr-1 nm-1], integrated over its nodes.
 Vector3 electron_rate(const SpectralResponse& response, const Spectrum& radiance);
 
-/// A light scaled to radiance: a perfect white diffuser under it has this luminance. nullopt if it has no luminance.
+/// A light scaled to radiance: a perfect white diffuser under it has this luminance. nullopt if it has none, or one
+/// beyond the range of numbers.
 std::optional<Spectrum> radiance_of(const Spectrum& light, double luminance_cd_m2);
 
 /// The luminance [cd/m2] at which a white under D65 saturates the sensor in a time.
