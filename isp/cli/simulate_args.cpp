@@ -32,10 +32,11 @@ Wrong set_size(const std::string& text, SceneArgs& scene) {
 
 Wrong add_lamp(const std::string& text, SceneArgs& scene) {
   const auto words = words_of(text);
-  if (words.size() != 4) return "is no X,Y,LIGHT,LUMINANCE";
+  constexpr const char* expected = "is no X,Y,LIGHT,LUMINANCE with a luminance of 0 to 1e12 cd/m2";
+  if (words.size() != 4) return expected;
   const auto x = number_of(words[0]), y = number_of(words[1]), luminance = number_of(words[3]);
-  if (!x || !y || !luminance || std::fabs(*x) > 1e6 || std::fabs(*y) > 1e6 || *luminance < 0) {
-    return "is no X,Y,LIGHT,LUMINANCE";
+  if (!x || !y || !luminance || std::fabs(*x) > 1e6 || std::fabs(*y) > 1e6 || *luminance < 0 || *luminance > 1e12) {
+    return expected;
   }
   scene.lamps.push_back({*x, *y, words[2], *luminance});
   return std::nullopt;
