@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <system_error>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -79,6 +82,13 @@ Wrong set_tolerance(const std::string& text, isp::Tolerance& tolerance) {
   }
   tolerance.delta_e = (*numbers)[0];
   if (numbers->size() == 2) tolerance.relative_variance = (*numbers)[1];
+  return std::nullopt;
+}
+
+Wrong set_seed(const std::string& text, std::uint64_t& seed) {
+  const char* end = text.data() + text.size();
+  const auto read = std::from_chars(text.data(), end, seed);
+  if (read.ec != std::errc() || read.ptr != end) return "is no whole number of 0 to 18446744073709551615";
   return std::nullopt;
 }
 
@@ -176,8 +186,8 @@ void add_work(CLI::App& app, SimulateArgs& args) {
       {{"physical", capture::PhotonSampling::physical}, {"published", capture::PhotonSampling::published}},
       [&o](capture::PhotonSampling sampling) { o.sampling = sampling; },
       "photons: one Poisson draw for each pixel (default), or one for each wavelength as the thesis has it");
-  app.add_option("--seed", o.seed, "of the random numbers; the sensor's fixed pattern hangs on it too (default 1)")
-      ->type_name("N");
+  add_text(app, "--seed", "N", "of the random numbers; the sensor's fixed pattern hangs on it too (default 1)",
+           [&o](const std::string& text) { return set_seed(text, o.seed); });
   app.add_option("--frames", args.frames, "frames of the same scene, OUT_0000.dng and on (default 1)")
       ->check(CLI::Range(1, 10000))
       ->type_name("N");
