@@ -196,10 +196,11 @@ void add_work(CLI::App& app, SimulateArgs& args) {
 
 void add_files(CLI::App& app, SimulateArgs& args) {
   app.add_option("-o,--output", args.output, "raw file to write (.dng)")->type_name("OUT.dng");
-  app.add_option("--truth", args.truth,
-                 "the noise-free scene, linear, white at --luminance (.exr, .pfm, .tif; default OUT.truth.exr)")
-      ->type_name("FILE");
-  app.add_flag("--no-truth", args.no_truth, "do not write it");
+  auto* truth =
+      app.add_option("--truth", args.truth,
+                     "the noise-free scene, linear, white at --luminance (.exr, .pfm, .tif; default OUT.truth.exr)")
+          ->type_name("FILE");
+  app.add_flag("--no-truth", args.no_truth, "do not write it")->excludes(truth);
   app.add_option("--truth-electrons", args.truth_electrons,
                  "also write the noise-free electrons of R, G and B at every pixel (.exr, .pfm, .tif)")
       ->type_name("FILE");

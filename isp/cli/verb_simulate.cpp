@@ -36,24 +36,6 @@ std::string frame_file(const SimulateArgs& args, int index) {
   return fmt::format("{}_{:04}.dng", args.output.substr(0, args.output.size() - 4), index);
 }
 
-/// What is wrong with the files that would be written; empty if nothing.
-std::string wrong_files(const SimulateArgs& args) {
-  if (args.scene.what.empty()) return "SCENE is required: a picture, or dark, flat, chart; --help lists the options";
-  if (args.output.empty()) return "-o is required: the raw file to write";
-  if (!args.output.ends_with(".dng")) return fmt::format("-o: raw files are written as .dng, not as {}", args.output);
-  std::vector<std::string> pictures;
-  if (!args.truth.empty()) pictures.push_back(args.truth);
-  if (!args.truth_electrons.empty()) pictures.push_back(args.truth_electrons);
-  for (const std::string& picture : pictures) {
-    const auto format = isp::format_of(picture);
-    if (!format) return format.error().message;
-    if (const auto fits = isp::check_writable(*format, SampleType::f32, OutputSpace::linear_srgb); !fits) {
-      return fits.error().message;
-    }
-  }
-  return {};
-}
-
 /// The files of a run: all frames, then the truths.
 struct Files {
   std::vector<std::string> frames;
@@ -71,13 +53,55 @@ Files files_of(const SimulateArgs& args) {
   return files;
 }
 
-/// Files that exist are known to be in the way before any work is done; the writers look again.
+bool same_name(const std::string& a, const std::string& b) {
+  std::error_code ignored;
+  return a == b || fs::weakly_canonical(a, ignored) == fs::weakly_canonical(b, ignored);
+}
+
+/// What is wrong with the files that would be written; empty if nothing.
+std::string wrong_files(const SimulateArgs& args) {
+  if (args.scene.what.empty()) return "SCENE is required: a picture, or dark, flat, chart; --help lists the options";
+  if (args.output.empty()) return "-o is required: the raw file to write";
+  if (!args.output.ends_with(".dng")) return fmt::format("-o: raw files are written as .dng, not as {}", args.output);
+  std::vector<std::string> pictures;
+  if (!args.truth.empty()) pictures.push_back(args.truth);
+  if (!args.truth_electrons.empty()) pictures.push_back(args.truth_electrons);
+  for (const std::string& picture : pictures) {
+    const auto format = isp::format_of(picture);
+    if (!format) return format.error().message;
+    if (const auto fits = isp::check_writable(*format, SampleType::f32, OutputSpace::linear_srgb); !fits) {
+      return fits.error().message;
+    }
+  }
+  const Files files = files_of(args);
+  if (!files.truth.empty() && same_name(files.truth, files.truth_electrons)) {
+    return fmt::format("--truth-electrons: {} is the name of the truth too", files.truth_electrons);
+  }
+  return {};
+}
+
+/// What would keep a file from being written is known before any work is done, so that a run leaves all of its files or
+/// none; the writers look again.
+Result<void> check_place(const std::string& file) {
+  std::error_code ignored;
+  const fs::path folder = fs::path(file).parent_path();
+  if (!folder.empty() && !fs::is_directory(folder, ignored)) {
+    return fail(ErrorCode::unwritable,
+                fmt::format("cannot write {}: there is no directory {}, create it first", file, folder.string()), file);
+  }
+  if (fs::is_directory(file, ignored)) {
+    return fail(ErrorCode::unwritable, fmt::format("cannot write {}: it is a directory", file), file);
+  }
+  return {};
+}
+
 Result<void> check_free(const Files& files, const SimulateArgs& args) {
   std::vector<std::string> all = files.frames;
   for (const std::string& truth : {files.truth, files.truth_electrons}) {
     if (!truth.empty()) all.push_back(truth);
   }
   for (const std::string& file : all) {
+    if (auto place = check_place(file); !place) return place;
     std::error_code ignored;
     if (fs::equivalent(file, args.scene.what, ignored)) {
       return fail(ErrorCode::exists, fmt::format("{} would replace its own scene", file), file);
