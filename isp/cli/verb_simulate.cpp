@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <system_error>
@@ -128,6 +129,14 @@ void to_relative_srgb(SceneLinear& picture, double white_cd_m2, Executor& execut
   });
 }
 
+/// Half floats are finer than any noise, but end at 65504: a lamp in a dark scene goes beyond.
+bool fits_half(const SceneLinear& picture) {
+  constexpr float largest = 65504;
+  return std::all_of(picture.plane.begin(), picture.plane.end(), [](const Plane<float>& plane) {
+    return std::all_of(plane.data(), plane.data() + plane.size(), [](float v) { return std::fabs(v) <= largest; });
+  });
+}
+
 class Simulation {
  public:
   explicit Simulation(const SimulateArgs& args)
@@ -204,6 +213,7 @@ class Simulation {
       SceneLinear truth = source.xyz_cd_m2();
       to_relative_srgb(truth, out_.white_cd_m2, executor_);
       if (out_.white_cd_m2 > 0) write.white_luminance_cd_m2 = out_.white_cd_m2;
+      write.exr.depth = fits_half(truth) ? isp::ExrOptions::Depth::half : isp::ExrOptions::Depth::full;
       const auto written =
           isp::write_picture(std::move(truth), OutputSpace::linear_srgb, {}, files_.truth, write, executor_);
       if (!written) return written;
