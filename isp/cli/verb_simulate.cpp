@@ -174,6 +174,7 @@ class Simulation {
     out_.saturation_cd_m2 =
         isp::saturation_luminance_cd_m2(sensor->model, *response, std::max(args_.options.exposure.time_s, 1e-12));
     description_ = scene->scene.description;
+    warn_of_size(scene->scene.xyz_cd_m2);
     auto source = capture::SyntheticSource::of(std::move(scene->scene), *std::move(sensor), *std::move(response),
                                                args_.options, executor_);
     clock.lap("exposure and plan");
@@ -182,6 +183,15 @@ class Simulation {
           fmt::format("{} pixels have colours no light can have: moved towards white", source->moved_pixels()));
     }
     return source;
+  }
+
+  /// LibRaw, and with it most raw developers, takes a smaller image for a thumbnail; masked columns do not count.
+  void warn_of_size(const SceneLinear& picture) {
+    constexpr int least = 22;
+    if (picture.width() >= least && picture.height() >= least) return;
+    out_.warnings.push_back(
+        fmt::format("raw developers take a picture of {} x {} pixels for no raw file: {} x {} are the least",
+                    picture.width(), picture.height(), least, least));
   }
 
   Result<void> write_frames(const capture::SyntheticSource& source) {
