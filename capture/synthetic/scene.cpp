@@ -37,7 +37,8 @@ Result<Scene> empty_scene(const SceneSetup& setup) {
     return wrong("a light has no negative power", setup.light_name);
   }
   auto white = isp::radiance_of(setup.light, setup.luminance_cd_m2);
-  if (!white) return wrong("a light without power between 380 and 780 nm lights nothing", setup.light_name);
+  if (!white)
+    return wrong("a light needs power between 380 and 780 nm that adds up to a finite number", setup.light_name);
   Scene scene{SceneLinear(setup.width, setup.height), {}, {}, {}, *std::move(white), {}};
   for (Plane<float>& plane : scene.xyz_cd_m2.plane) std::fill_n(plane.data(), plane.size(), 0.0f);
   return scene;
@@ -53,6 +54,20 @@ void fill(Scene& scene, int x0, int y0, int x1, int y1, int radiance) {
       std::fill(row + x0, row + x1, colour[c]);
     }
   }
+}
+
+/// What a patch of a reflectance sends to the camera. Errors: it is brighter than a scene may be.
+Result<Spectrum> patch_radiance(const Spectrum& white, const isp::NamedSpectrum& patch) {
+  bool finite = true;
+  Spectrum radiance = white.mapped([&](double nm, double power) {
+    const double value = power * patch.spectrum.at(nm);
+    finite = finite && std::isfinite(value);
+    return finite ? value : 0;
+  });
+  if (!finite || !(isp::xyz_cd_m2(radiance).y <= brightest_cd_m2)) {
+    return wrong("a patch is brighter than 1e12 cd/m2: reflectances are ratios, 1 is white", std::string(patch.name));
+  }
+  return radiance;
 }
 
 double unit_of(std::uint32_t word) { return (word + 0.5) * 0x1p-32; }
@@ -88,9 +103,11 @@ Result<Scene> chart_scene(const SceneSetup& setup, const std::vector<isp::NamedS
   if (!scene) return scene;
   scene->patch = Plane<std::uint16_t>(setup.width, setup.height);
   for (const isp::NamedSpectrum& patch : reflectances) {
-    scene->radiances.push_back(reflected(scene->white, patch.spectrum));
+    auto radiance = patch_radiance(scene->white, patch);
+    if (!radiance) return tl::make_unexpected(radiance.error());
+    scene->radiances.push_back(*std::move(radiance));
   }
-  scene->radiances.push_back(reflected(scene->white, *Spectrum::of({380, 780}, {0, 0})));
+  scene->radiances.push_back(scene->white.mapped([](double, double) { return 0.0; }));
   fill(*scene, 0, 0, setup.width, setup.height, count);
   int columns = 1;
   while (columns * ((static_cast<long>(columns) * setup.height + setup.width - 1) / setup.width) < count) ++columns;

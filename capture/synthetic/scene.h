@@ -50,7 +50,7 @@ Result<Scene> dark_scene(const SceneSetup& setup);
 Result<Scene> flat_scene(const SceneSetup& setup);
 
 /// Reflectances under the light as a chart of patches, as square as their number allows, parted by a black frame.
-/// Errors: none or more than 4096, a reflectance below 0.
+/// Errors: none or more than 4096, a reflectance below 0, a patch above 1e12 cd/m2.
 Result<Scene> chart_scene(const SceneSetup& setup, const std::vector<isp::NamedSpectrum>& reflectances);
 
 /// A picture whose Y = 1 is given a luminance. Its spectra are lifted from its colours (isp/model/spectral_lift.h).

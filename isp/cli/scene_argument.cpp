@@ -1,5 +1,8 @@
 #include "isp/cli/scene_argument.h"
 
+#include <algorithm>
+#include <array>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -16,12 +19,16 @@ namespace {
 
 bool names_table(const std::string& text) { return text.ends_with(".csv"); }
 
-Result<Spectrum> light_of(const std::string& name) {
+Result<Spectrum> light_of(const std::string& name, const char* option) {
   if (names_table(name)) {
     auto table = capture::read_spectra(name);
     if (!table) return tl::make_unexpected(table.error());
     if (table->size() != 1) {
       return fail(ErrorCode::malformed, fmt::format("a light is one spectrum, the table has {}", table->size()), name);
+    }
+    const auto power = table->front().spectrum.values();
+    if (*std::min_element(power.begin(), power.end()) < 0) {
+      return fail(ErrorCode::malformed, "a light has no negative power", name);
     }
     return std::move(table->front().spectrum);
   }
@@ -30,11 +37,11 @@ Result<Spectrum> light_of(const std::string& name) {
   return fail(ErrorCode::invalid_argument,
               fmt::format("there is no light '{}'; {}", name,
                           near.empty() ? "--list names them" : fmt::format("near it: {}", fmt::join(near, ", "))),
-              "--light");
+              option);
 }
 
 Result<capture::SceneSetup> setup_of(const SceneArgs& args) {
-  auto light = light_of(args.light);
+  auto light = light_of(args.light, "--light");
   if (!light) return tl::make_unexpected(light.error());
   return capture::SceneSetup{args.width, args.height, *std::move(light), args.light, args.luminance_cd_m2};
 }
@@ -62,7 +69,15 @@ Result<capture::Scene> chart_of(const SceneArgs& args, const capture::SceneSetup
 
 Result<SceneOfArgs> picture_of(const SceneArgs& args, Executor& executor) {
   auto picture = capture::read_picture(args.what, executor);
-  if (!picture) return tl::make_unexpected(picture.error());
+  if (!picture) {
+    Error error = picture.error();
+    static constexpr std::array<std::string_view, 5> made{"dark", "flat", "chart", "chart:macbeth", "chart:munsell"};
+    const auto near = near_matches(args.what, made);
+    if (error.code == ErrorCode::not_found && !near.empty()) {
+      error.message += fmt::format("; scenes near it: {}", fmt::join(near, ", "));
+    }
+    return tl::make_unexpected(std::move(error));
+  }
   const double luminance =
       picture->absolute && !args.luminance_given ? picture->white_luminance_cd_m2 : args.luminance_cd_m2;
   auto scene = capture::picture_scene(std::move(picture->xyz), luminance);
@@ -89,7 +104,7 @@ Result<SceneOfArgs> scene_of(const SceneArgs& args, std::uint64_t seed, Executor
   auto out = extended_scene(args, executor);
   if (!out) return out;
   for (const LampArgs& lamp : args.lamps) {
-    const auto light = light_of(lamp.light);
+    const auto light = light_of(lamp.light, "--lamp");
     if (!light) return tl::make_unexpected(light.error());
     auto radiance = isp::radiance_of(*light, lamp.luminance_cd_m2);
     if (!radiance) return fail(ErrorCode::invalid_argument, "the lamp's light has no luminance", "--lamp");

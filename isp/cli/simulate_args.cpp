@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <system_error>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -32,10 +35,11 @@ Wrong set_size(const std::string& text, SceneArgs& scene) {
 
 Wrong add_lamp(const std::string& text, SceneArgs& scene) {
   const auto words = words_of(text);
-  if (words.size() != 4) return "is no X,Y,LIGHT,LUMINANCE";
+  constexpr const char* expected = "is no X,Y,LIGHT,LUMINANCE with a luminance of 0 to 1e12 cd/m2";
+  if (words.size() != 4) return expected;
   const auto x = number_of(words[0]), y = number_of(words[1]), luminance = number_of(words[3]);
-  if (!x || !y || !luminance || std::fabs(*x) > 1e6 || std::fabs(*y) > 1e6 || *luminance < 0) {
-    return "is no X,Y,LIGHT,LUMINANCE";
+  if (!x || !y || !luminance || std::fabs(*x) > 1e6 || std::fabs(*y) > 1e6 || *luminance < 0 || *luminance > 1e12) {
+    return expected;
   }
   scene.lamps.push_back({*x, *y, words[2], *luminance});
   return std::nullopt;
@@ -78,6 +82,13 @@ Wrong set_tolerance(const std::string& text, isp::Tolerance& tolerance) {
   }
   tolerance.delta_e = (*numbers)[0];
   if (numbers->size() == 2) tolerance.relative_variance = (*numbers)[1];
+  return std::nullopt;
+}
+
+Wrong set_seed(const std::string& text, std::uint64_t& seed) {
+  const char* end = text.data() + text.size();
+  const auto read = std::from_chars(text.data(), end, seed);
+  if (read.ec != std::errc() || read.ptr != end) return "is no whole number of 0 to 18446744073709551615";
   return std::nullopt;
 }
 
@@ -175,8 +186,8 @@ void add_work(CLI::App& app, SimulateArgs& args) {
       {{"physical", capture::PhotonSampling::physical}, {"published", capture::PhotonSampling::published}},
       [&o](capture::PhotonSampling sampling) { o.sampling = sampling; },
       "photons: one Poisson draw for each pixel (default), or one for each wavelength as the thesis has it");
-  app.add_option("--seed", o.seed, "of the random numbers; the sensor's fixed pattern hangs on it too (default 1)")
-      ->type_name("N");
+  add_text(app, "--seed", "N", "of the random numbers; the sensor's fixed pattern hangs on it too (default 1)",
+           [&o](const std::string& text) { return set_seed(text, o.seed); });
   app.add_option("--frames", args.frames, "frames of the same scene, OUT_0000.dng and on (default 1)")
       ->check(CLI::Range(1, 10000))
       ->type_name("N");
@@ -185,10 +196,11 @@ void add_work(CLI::App& app, SimulateArgs& args) {
 
 void add_files(CLI::App& app, SimulateArgs& args) {
   app.add_option("-o,--output", args.output, "raw file to write (.dng)")->type_name("OUT.dng");
-  app.add_option("--truth", args.truth,
-                 "the noise-free scene, linear, white at --luminance (.exr, .pfm, .tif; default OUT.truth.exr)")
-      ->type_name("FILE");
-  app.add_flag("--no-truth", args.no_truth, "do not write it");
+  auto* truth =
+      app.add_option("--truth", args.truth,
+                     "the noise-free scene, linear, white at --luminance (.exr, .pfm, .tif; default OUT.truth.exr)")
+          ->type_name("FILE");
+  app.add_flag("--no-truth", args.no_truth, "do not write it")->excludes(truth);
   app.add_option("--truth-electrons", args.truth_electrons,
                  "also write the noise-free electrons of R, G and B at every pixel (.exr, .pfm, .tif)")
       ->type_name("FILE");

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <system_error>
@@ -36,24 +37,6 @@ std::string frame_file(const SimulateArgs& args, int index) {
   return fmt::format("{}_{:04}.dng", args.output.substr(0, args.output.size() - 4), index);
 }
 
-/// What is wrong with the files that would be written; empty if nothing.
-std::string wrong_files(const SimulateArgs& args) {
-  if (args.scene.what.empty()) return "SCENE is required: a picture, or dark, flat, chart; --help lists the options";
-  if (args.output.empty()) return "-o is required: the raw file to write";
-  if (!args.output.ends_with(".dng")) return fmt::format("-o: raw files are written as .dng, not as {}", args.output);
-  std::vector<std::string> pictures;
-  if (!args.truth.empty()) pictures.push_back(args.truth);
-  if (!args.truth_electrons.empty()) pictures.push_back(args.truth_electrons);
-  for (const std::string& picture : pictures) {
-    const auto format = isp::format_of(picture);
-    if (!format) return format.error().message;
-    if (const auto fits = isp::check_writable(*format, SampleType::f32, OutputSpace::linear_srgb); !fits) {
-      return fits.error().message;
-    }
-  }
-  return {};
-}
-
 /// The files of a run: all frames, then the truths.
 struct Files {
   std::vector<std::string> frames;
@@ -71,13 +54,55 @@ Files files_of(const SimulateArgs& args) {
   return files;
 }
 
-/// Files that exist are known to be in the way before any work is done; the writers look again.
+bool same_name(const std::string& a, const std::string& b) {
+  std::error_code ignored;
+  return a == b || fs::weakly_canonical(a, ignored) == fs::weakly_canonical(b, ignored);
+}
+
+/// What is wrong with the files that would be written; empty if nothing.
+std::string wrong_files(const SimulateArgs& args) {
+  if (args.scene.what.empty()) return "SCENE is required: a picture, or dark, flat, chart; --help lists the options";
+  if (args.output.empty()) return "-o is required: the raw file to write";
+  if (!args.output.ends_with(".dng")) return fmt::format("-o: raw files are written as .dng, not as {}", args.output);
+  std::vector<std::string> pictures;
+  if (!args.truth.empty()) pictures.push_back(args.truth);
+  if (!args.truth_electrons.empty()) pictures.push_back(args.truth_electrons);
+  for (const std::string& picture : pictures) {
+    const auto format = isp::format_of(picture);
+    if (!format) return format.error().message;
+    if (const auto fits = isp::check_writable(*format, SampleType::f32, OutputSpace::linear_srgb); !fits) {
+      return fits.error().message;
+    }
+  }
+  const Files files = files_of(args);
+  if (!files.truth.empty() && same_name(files.truth, files.truth_electrons)) {
+    return fmt::format("--truth-electrons: {} is the name of the truth too", files.truth_electrons);
+  }
+  return {};
+}
+
+/// What would keep a file from being written is known before any work is done, so that a run leaves all of its files or
+/// none; the writers look again.
+Result<void> check_place(const std::string& file) {
+  std::error_code ignored;
+  const fs::path folder = fs::path(file).parent_path();
+  if (!folder.empty() && !fs::is_directory(folder, ignored)) {
+    return fail(ErrorCode::unwritable,
+                fmt::format("cannot write {}: there is no directory {}, create it first", file, folder.string()), file);
+  }
+  if (fs::is_directory(file, ignored)) {
+    return fail(ErrorCode::unwritable, fmt::format("cannot write {}: it is a directory", file), file);
+  }
+  return {};
+}
+
 Result<void> check_free(const Files& files, const SimulateArgs& args) {
   std::vector<std::string> all = files.frames;
   for (const std::string& truth : {files.truth, files.truth_electrons}) {
     if (!truth.empty()) all.push_back(truth);
   }
   for (const std::string& file : all) {
+    if (auto place = check_place(file); !place) return place;
     std::error_code ignored;
     if (fs::equivalent(file, args.scene.what, ignored)) {
       return fail(ErrorCode::exists, fmt::format("{} would replace its own scene", file), file);
@@ -101,6 +126,14 @@ void to_relative_srgb(SceneLinear& picture, double white_cd_m2, Executor& execut
         for (int c = 0; c < 3; ++c) row[c][x] = static_cast<float>(rgb[c]);
       }
     }
+  });
+}
+
+/// Half floats are finer than any noise, but end at 65504: a lamp in a dark scene goes beyond.
+bool fits_half(const SceneLinear& picture) {
+  constexpr float largest = 65504;
+  return std::all_of(picture.plane.begin(), picture.plane.end(), [](const Plane<float>& plane) {
+    return std::all_of(plane.data(), plane.data() + plane.size(), [](float v) { return std::fabs(v) <= largest; });
   });
 }
 
@@ -141,6 +174,7 @@ class Simulation {
     out_.saturation_cd_m2 =
         isp::saturation_luminance_cd_m2(sensor->model, *response, std::max(args_.options.exposure.time_s, 1e-12));
     description_ = scene->scene.description;
+    warn_of_size(scene->scene.xyz_cd_m2);
     auto source = capture::SyntheticSource::of(std::move(scene->scene), *std::move(sensor), *std::move(response),
                                                args_.options, executor_);
     clock.lap("exposure and plan");
@@ -149,6 +183,15 @@ class Simulation {
           fmt::format("{} pixels have colours no light can have: moved towards white", source->moved_pixels()));
     }
     return source;
+  }
+
+  /// LibRaw, and with it most raw developers, takes a smaller image for a thumbnail; masked columns do not count.
+  void warn_of_size(const SceneLinear& picture) {
+    constexpr int least = 22;
+    if (picture.width() >= least && picture.height() >= least) return;
+    out_.warnings.push_back(
+        fmt::format("raw developers take a picture of {} x {} pixels for no raw file: {} x {} are the least",
+                    picture.width(), picture.height(), least, least));
   }
 
   Result<void> write_frames(const capture::SyntheticSource& source) {
@@ -180,6 +223,7 @@ class Simulation {
       SceneLinear truth = source.xyz_cd_m2();
       to_relative_srgb(truth, out_.white_cd_m2, executor_);
       if (out_.white_cd_m2 > 0) write.white_luminance_cd_m2 = out_.white_cd_m2;
+      write.exr.depth = fits_half(truth) ? isp::ExrOptions::Depth::half : isp::ExrOptions::Depth::full;
       const auto written =
           isp::write_picture(std::move(truth), OutputSpace::linear_srgb, {}, files_.truth, write, executor_);
       if (!written) return written;

@@ -252,7 +252,7 @@ Result<DecodedPicture> decode_exr(std::span<const std::byte> bytes, const Decode
 } catch (const std::bad_alloc&) {
   return fail(ErrorCode::too_large, "no memory for the pixels of the OpenEXR file");
 } catch (const std::exception& error) {
-  return fail(ErrorCode::malformed, std::string("not a readable OpenEXR file: ") + error.what());
+  return not_readable("OpenEXR file", error.what());
 }
 
 }  // namespace lowlux::isp

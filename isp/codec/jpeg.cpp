@@ -173,9 +173,7 @@ FileMetadata metadata_of(Decompressor& decompressor) {
   return metadata;
 }
 
-tl::unexpected<Error> malformed(const Failure& failure) {
-  return fail(ErrorCode::malformed, std::string("not a readable JPEG: ") + failure.message.data());
-}
+tl::unexpected<Error> malformed(const Failure& failure) { return not_readable("JPEG", failure.message.data()); }
 
 Result<void> check_encodable(const Encoded8& picture, const FileMetadata& metadata, const JpegOptions& options) {
   if (picture.width() < 1 || picture.height() < 1 || picture.width() > JPEG_MAX_DIMENSION ||

@@ -1,5 +1,6 @@
 #include "isp/codec/picture_file.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 
@@ -21,6 +22,12 @@ Result<void> write_bytes(std::FILE* file, std::span<const std::byte> bytes) {
   errno = 0;
   if (std::fwrite(bytes.data(), 1, bytes.size(), file) != bytes.size()) return write_failure();
   return {};
+}
+
+tl::unexpected<Error> not_readable(const std::string& what, std::string said) {
+  std::replace_if(
+      said.begin(), said.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
+  return fail(ErrorCode::malformed, "not a readable " + what + ": " + said);
 }
 
 tl::unexpected<Error> write_failure() {

@@ -49,6 +49,10 @@ Result<void> check_size(std::int64_t width, std::int64_t height, const DecodeLim
 /// Writes all of `bytes` at the position of `file`; an error names what the system said.
 Result<void> write_bytes(std::FILE* file, std::span<const std::byte> bytes);
 
+/// The error of a file that a library cannot read, ending with what the library says of it, on one line: it may quote
+/// the file, whose names hold any bytes.
+tl::unexpected<Error> not_readable(const std::string& what, std::string said);
+
 /// The error of a failed write, from errno.
 tl::unexpected<Error> write_failure();
 

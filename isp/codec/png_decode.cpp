@@ -109,9 +109,7 @@ FileMetadata metadata_of(png_structp png, png_infop info) {
   return metadata;
 }
 
-tl::unexpected<Error> malformed(const Source& source) {
-  return fail(ErrorCode::malformed, std::string("not a readable PNG: ") + source.message.data());
-}
+tl::unexpected<Error> malformed(const Source& source) { return not_readable("PNG", source.message.data()); }
 
 template <class Code>
 Result<DecodedPicture> read_picture(Reader& reader, const Source& source, const Header& header) {

@@ -121,7 +121,7 @@ Result<void> check_layout(const Layout& layout, const DecodeLimits& limits) {
 
 tl::unexpected<Error> malformed(const Input& input) {
   const std::string& why = input.messages.first_error;
-  return fail(ErrorCode::malformed, "not a readable TIFF: " + (why.empty() ? "the pixels do not decode" : why));
+  return not_readable("TIFF", why.empty() ? "the pixels do not decode" : why);
 }
 
 /// `count` samples of one colour, from pixel (x, y) on.

@@ -25,7 +25,7 @@ Result<std::array<Spectrum, 3>> relative_quantum_efficiency(const std::string& c
     for (const std::string_view name : near_matches(camera, names))
       near += (near.empty() ? "" : ", ") + std::string(name);
     return fail(ErrorCode::invalid_argument, "there are no spectral sensitivities of a '" + camera + "'" +
-                                                 (near.empty() ? "" : "; near it: " + near));
+                                                 (near.empty() ? "; --list names them" : "; near it: " + near));
   }
   double peak = 0;
   for (Spectrum& channel : *sensitivity) {
@@ -46,18 +46,34 @@ double etendue_for(const SpectralResponse& response, double luminance_cd_m2, dou
   return charge_e / *std::max_element(rate.begin(), rate.end());
 }
 
+/// Checked whether used or not: nobody gives a pitch below 0 to be ignored.
+Result<void> check_figures(const NamedSensor& sensor, const Optics& optics) {
+  const auto wrong = [](const char* what) { return fail(ErrorCode::invalid_argument, what); };
+  if (!(optics.f_number >= 0.5) || !(optics.f_number <= 1000)) {
+    return wrong("the f-number must lie between 0.5 and 1000");
+  }
+  if (const auto peak = sensor.peak_quantum_efficiency; peak && (!(*peak > 0) || !(*peak <= 1))) {
+    return wrong("a peak quantum efficiency lies above 0 and at most at 1");
+  }
+  if (const auto pitch = sensor.pixel_pitch_um; pitch && (!(*pitch > 0) || !(*pitch <= 1000))) {
+    return wrong("a pixel pitch lies above 0 and at most at 1000 um");
+  }
+  if (const auto iso = sensor.iso; iso && (!(*iso >= 1e-3) || !(*iso <= 1e9))) {
+    return wrong("an ISO speed lies between 0.001 and 1e9");
+  }
+  if (const auto white = optics.white_luminance_cd_m2; white && (!(*white > 0) || !(*white <= 1e12))) {
+    return wrong("the luminance that fills a pixel must lie above 0 and below 1e12 cd/m2");
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Optics& optics) {
-  if (!(optics.f_number >= 0.5) || !(optics.f_number <= 1000)) {
-    return fail(ErrorCode::invalid_argument, "the f-number must lie between 0.5 and 1000");
-  }
+  if (const auto good = check_figures(sensor, optics); !good) return tl::make_unexpected(good.error());
   auto efficiency = relative_quantum_efficiency(sensor.camera);
   if (!efficiency) return tl::make_unexpected(efficiency.error());
   const double peak = sensor.peak_quantum_efficiency.value_or(assumed_peak_quantum_efficiency);
-  if (!(peak > 0) || !(peak <= 1)) {
-    return fail(ErrorCode::invalid_argument, "a peak quantum efficiency lies above 0 and at most at 1");
-  }
   for (Spectrum& channel : *efficiency) channel = channel.mapped([&](double, double value) { return peak * value; });
   SpectralResponse out{sensor.model.name + " through the filters of " + sensor.camera, *std::move(efficiency), 0};
 
@@ -65,21 +81,11 @@ Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Opti
   if (!white && sensor.model.name == thesis_sensor) white = thesis_white_luminance_cd_m2;
   const double n2 = optics.f_number * optics.f_number;
   if (white) {
-    if (!(*white > 0) || !(*white <= 1e12)) {
-      return fail(ErrorCode::invalid_argument,
-                  "the luminance that fills a pixel must lie above 0 and below 1e12 cd/m2");
-    }
     out.etendue_m2_sr = etendue_for(out, *white, sensor.model.full_well_e);
   } else if (sensor.pixel_pitch_um && sensor.peak_quantum_efficiency) {
-    if (!(*sensor.pixel_pitch_um > 0) || !(*sensor.pixel_pitch_um <= 1000)) {
-      return fail(ErrorCode::invalid_argument, "a pixel pitch lies above 0 and at most at 1000 um");
-    }
     const double pitch_m = *sensor.pixel_pitch_um * 1e-6;
     out.etendue_m2_sr = pitch_m * pitch_m * std::numbers::pi / (4 * n2);
   } else if (sensor.iso) {
-    if (!(*sensor.iso > 0) || !std::isfinite(*sensor.iso)) {
-      return fail(ErrorCode::invalid_argument, "an ISO speed is positive and finite");
-    }
     out.etendue_m2_sr = etendue_for(out, 78 * n2 / (0.65 * *sensor.iso), saturation_charge_e(sensor.model));
   } else {
     return fail(

@@ -31,7 +31,7 @@ inline constexpr double assumed_peak_quantum_efficiency = 0.5;
 ///     pixel pitch p and peak quantum efficiency: etendue = p^2 pi / (4 N^2) for an ideal lens of f-number N;
 ///     the ISO speed S of the gain setting: white at L = 78 N^2 / (0.65 S t) saturates (isp/model/scene_luminance.h).
 /// Errors: none of them is known (the message says what to give); an unknown camera (near matches are offered); an
-/// f-number or luminance that is not positive.
+/// f-number, luminance, pixel pitch or ISO speed that is not positive or out of all proportion, used or not.
 Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Optics& optics);
 
 /// Electrons per second in a pixel of R, G and B that sees a radiance [W m-2 sr-1 nm-1], integrated over its nodes.

@@ -141,6 +141,12 @@ TEST(HostileBytes, AFileOfAnotherFormatIsAnError) {
   }
 }
 
+TEST(HostileBytes, WhatALibrarySaysOfThemIsOneLine) {
+  EXPECT_EQ(not_readable("picture", "no channel 'a\nb\x7f\x01' is 4 \xC2\xB5m wide").value().message,
+            "not a readable picture: no channel 'a b  ' is 4 \xC2\xB5m wide");
+  EXPECT_EQ(not_readable("picture", "").value().code, ErrorCode::malformed);
+}
+
 std::vector<std::byte> exr_header(const std::string& attributes, char flags = 0) {
   const std::string all = std::string("\x76\x2F\x31\x01\x02", 5) + flags + std::string(2, '\0') + attributes;
   const auto bytes = std::as_bytes(std::span(all));
