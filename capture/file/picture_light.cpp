@@ -13,7 +13,7 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr double small_part = 2e-2;     // of the bright end: below it, negative values are a filter's ringing
+constexpr double small_part = 5e-2;     // of the bright end: below it, negative values are a filter's ringing
 constexpr double bright_share = 0.999;  // of the pixels are not brighter than the bright end
 constexpr std::array<const char*, 3> channel_names{"red", "green", "blue"};
 
@@ -199,7 +199,7 @@ Result<SceneLinear> light_of(const SceneLinear& picture, const Matrix3& to_xyz, 
         for (int c = 0; c < 3; ++c) rgb[c] = std::max(0.0F, picture.plane[c].row(y)[x]);
         const Vector3 v = to_xyz * rgb;
         for (int i = 0; i < 3; ++i) {
-          xyz.plane[i].data()[at] = static_cast<float>(v[i]);
+          xyz.plane[i].data()[at] = static_cast<float>(std::max(0.0, v[i]));  // beyond AP0, Y can be below 0
           const bool fits = std::fabs(v[i]) <= std::numeric_limits<float>::max();
           if (!fits && !beyond[index].found()) beyond[index].index = 3 * (std::int64_t{y} * picture.width() + x);
         }

@@ -15,8 +15,8 @@ namespace lowlux::capture {
 /// A picture as light: what a scene looks like that sends it to the camera.
 struct ScenePicture {
   /// CIE 1931 X, Y, Z under the picture's own white, upright. Display pictures have their white at D65 and Y = 1;
-  /// scene-linear pictures have RGB (1, 1, 1) at Y = 1 and go beyond it. Y is never below 0 unless a primary lies below
-  /// the colours, as the blue of ACES AP0 does.
+  /// scene-linear pictures have RGB (1, 1, 1) at Y = 1 and go beyond it. Never below 0: X, Y or Z that a primary
+  /// below the colours (the blue of ACES AP0) makes negative is 0.
   SceneLinear xyz;
   /// The file states what luminance Y = 1 stands for (OpenEXR whiteLuminance).
   bool absolute = false;
@@ -31,7 +31,7 @@ struct ScenePicture {
 /// ICC profile, else Rec. 709. Alpha is dropped.
 ///
 /// Errors: the file or its format (codec); NaN, infinite, or negative values that are not small, with their pixel;
-/// profiles of other kinds. Components above -0.02 of what 99.9 % of the pixels stay below are taken for the ringing
+/// profiles of other kinds. Components above -0.05 of what 99.9 % of the pixels stay below are taken for the ringing
 /// of a filter: they become 0, with a warning that counts them.
 /// @param executor  its threads share the rows
 Result<ScenePicture> read_picture(const std::string& path, Executor& executor, const isp::DecodeLimits& limits = {});

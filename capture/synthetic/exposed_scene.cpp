@@ -60,6 +60,14 @@ void spread_point(const PointSource& point, int width, int height, const Add& ad
   }
 }
 
+/// Rates of each point light at 1 cd/m2.
+std::vector<Vector3> point_rates(const Scene& scene, const SpectralResponse& response) {
+  std::vector<Vector3> rates;
+  rates.reserve(scene.point_lights.size());
+  for (const Spectrum& light : scene.point_lights) rates.push_back(isp::electron_rate(response, light));
+  return rates;
+}
+
 /// Calls put(x, y, rates) for every pixel, where rates(k) gives channel k without the points.
 /// @return how many colours had to be moved
 template <class Put>
@@ -98,10 +106,12 @@ ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, con
   out.moved_pixels = for_each_pixel(scene, response, table, executor, [&](int x, int y, const auto& rate) {
     out.e_per_s.row(y)[x] = rate(static_cast<int>(colour_at(phase, x, y)));
   });
+  const std::vector<Vector3> lights = point_rates(scene, response);
   for (const PointSource& point : scene.points) {
-    const Vector3 rate = isp::electron_rate(response, point.radiance);
+    const Vector3& rate = lights[point.light];
     spread_point(point, width, height, [&](int x, int y, double share) {
-      out.e_per_s.at(x, y) += static_cast<float>(share * rate[static_cast<int>(colour_at(phase, x, y))]);
+      out.e_per_s.at(x, y) +=
+          static_cast<float>(point.luminance_cd_m2 * share * rate[static_cast<int>(colour_at(phase, x, y))]);
     });
   }
   return out;
@@ -114,21 +124,25 @@ CameraRgb charge_rate_rgb(const Scene& scene, const SpectralResponse& response, 
   for_each_pixel(scene, response, table, executor, [&](int x, int y, const auto& rate) {
     for (int k = 0; k < 3; ++k) out.plane[k].row(y)[x] = rate(k);
   });
+  const std::vector<Vector3> lights = point_rates(scene, response);
   for (const PointSource& point : scene.points) {
-    const Vector3 rate = isp::electron_rate(response, point.radiance);
+    const Vector3& rate = lights[point.light];
     spread_point(point, width, height, [&](int x, int y, double share) {
-      for (int k = 0; k < 3; ++k) out.plane[k].at(x, y) += static_cast<float>(share * rate[k]);
+      for (int k = 0; k < 3; ++k) out.plane[k].at(x, y) += static_cast<float>(point.luminance_cd_m2 * share * rate[k]);
     });
   }
   return out;
 }
 
 void add_points(const Scene& scene, SceneLinear& xyz_cd_m2) {
+  std::vector<Vector3> lights;
+  lights.reserve(scene.point_lights.size());
+  for (const Spectrum& light : scene.point_lights) lights.push_back(isp::vector_of(isp::xyz_cd_m2(light)));
   for (const PointSource& point : scene.points) {
-    const Vector3 xyz = isp::vector_of(isp::xyz_cd_m2(point.radiance));
+    const Vector3& xyz = lights[point.light];
     spread_point(point, xyz_cd_m2.width(), xyz_cd_m2.height(), [&](int x, int y, double share) {
       for (int k = 0; k < 3; ++k) {
-        xyz_cd_m2.plane[k].at(x, y) += static_cast<float>(share * xyz[k]);
+        xyz_cd_m2.plane[k].at(x, y) += static_cast<float>(point.luminance_cd_m2 * share * xyz[k]);
       }
     });
   }

@@ -39,7 +39,7 @@ Result<Scene> empty_scene(const SceneSetup& setup) {
   auto white = isp::radiance_of(setup.light, setup.luminance_cd_m2);
   if (!white)
     return wrong("a light needs power between 380 and 780 nm that adds up to a finite number", setup.light_name);
-  Scene scene{SceneLinear(setup.width, setup.height), {}, {}, {}, *std::move(white), {}};
+  Scene scene{SceneLinear(setup.width, setup.height), {}, {}, {}, {}, *std::move(white), {}};
   for (Plane<float>& plane : scene.xyz_cd_m2.plane) std::fill_n(plane.data(), plane.size(), 0.0f);
   return scene;
 }
@@ -76,7 +76,11 @@ double unit_of(std::uint32_t word) { return (word + 0.5) * 0x1p-32; }
 
 Result<Scene> dark_scene(const SceneSetup& setup) {
   auto scene = empty_scene(setup);
-  if (scene) scene->description = "dark";
+  if (!scene) return scene;
+  scene->patch = Plane<std::uint16_t>(setup.width, setup.height);
+  scene->radiances.push_back(scene->white.mapped([](double, double) { return 0.0; }));
+  fill(*scene, 0, 0, setup.width, setup.height, 0);
+  scene->description = "dark";
   return scene;
 }
 
@@ -140,20 +144,32 @@ Result<Scene> picture_scene(SceneLinear xyz, double luminance_cd_m2) {
     }
   }
   const isp::Xyz d65 = *isp::xyz_of(isp::white_d65, luminance_cd_m2 > 0 ? luminance_cd_m2 : 1);
-  return Scene{std::move(xyz), {}, {}, {}, *isp::lift(d65), "a picture"};
+  return Scene{std::move(xyz), {}, {}, {}, {}, *isp::lift(d65), "a picture"};
+}
+
+Result<void> add_lamp(Scene& scene, double x_px, double y_px, const Spectrum& light, double luminance_cd_m2) {
+  if (auto good = check_luminance(luminance_cd_m2); !good) return good;
+  auto unit = isp::radiance_of(light, 1);
+  if (!unit) return wrong("the lamp's light has no luminance");
+  scene.points.push_back({x_px, y_px, static_cast<int>(scene.point_lights.size()), luminance_cd_m2});
+  scene.point_lights.push_back(*std::move(unit));
+  return {};
 }
 
 Result<void> add_stars(Scene& scene, int count, double faintest_cd_m2, std::uint64_t seed) {
   if (count < 0 || count > 1000000) return wrong("there are 0 to 1000000 stars, found " + std::to_string(count));
   if (auto good = check_luminance(faintest_cd_m2); !good) return good;
-  constexpr const char* lights[] = {"A", "D50", "D65", "D75"};
   constexpr double brightest = 1e6;  // in units of the faintest
   const int width = scene.xyz_cd_m2.width(), height = scene.xyz_cd_m2.height();
+  const int first_light = static_cast<int>(scene.point_lights.size());
+  for (const char* light : {"A", "D50", "D65", "D75"}) {
+    scene.point_lights.push_back(*isp::radiance_of(*isp::light_named(light), 1));
+  }
   for (int i = 0; i < count; ++i) {
     const PhiloxWords w = words_at({seed, 0, draw_purpose::scene}, static_cast<std::uint32_t>(i), 0);
     const double flux = faintest_cd_m2 * std::min(brightest, std::pow(unit_of(w[2]), -2.0 / 3));
-    scene.points.push_back({unit_of(w[0]) * width - 0.5, unit_of(w[1]) * height - 0.5,
-                            *isp::radiance_of(*isp::light_named(lights[w[3] >> 30]), flux)});
+    scene.points.push_back(
+        {unit_of(w[0]) * width - 0.5, unit_of(w[1]) * height - 0.5, first_light + static_cast<int>(w[3] >> 30), flux});
   }
   return {};
 }

@@ -17,8 +17,9 @@ namespace lowlux::capture {
 struct PointSource {
   double x_px = 0;  // in the picture; whole numbers are centres of pixels
   double y_px = 0;
-  Spectrum radiance;       // of a pixel it would fill evenly: the light of one pixel's area
-  double spread_px = 0.7;  // standard deviation
+  int light = 0;               // index in Scene::point_lights
+  double luminance_cd_m2 = 0;  // of a pixel it would fill evenly: the light of one pixel's area
+  double spread_px = 0.7;      // standard deviation
 };
 
 /// What is in front of the camera: one radiance for each pixel, as a colour or as a spectrum.
@@ -27,6 +28,7 @@ struct Scene {
   Plane<std::uint16_t> patch;       // index of each pixel's radiance; empty: spectra are lifted from the colours
   std::vector<Spectrum> radiances;  // of patches [W m-2 sr-1 nm-1]
   std::vector<PointSource> points;
+  std::vector<Spectrum> point_lights;  // radiance at 1 cd/m2
   Spectrum white;  // radiance of a white diffuser in the scene: what the camera balances to
   std::string description;
 };
@@ -55,6 +57,9 @@ Result<Scene> chart_scene(const SceneSetup& setup, const std::vector<isp::NamedS
 
 /// A picture whose Y = 1 is given a luminance. Its spectra are lifted from its colours (isp/model/spectral_lift.h).
 Result<Scene> picture_scene(SceneLinear xyz, double luminance_cd_m2);
+
+/// Adds a distant lamp. Errors: a light without luminance.
+Result<void> add_lamp(Scene& scene, double x_px, double y_px, const Spectrum& light, double luminance_cd_m2);
 
 /// Adds stars: evenly spread places, fluxes falling as their power -1.5 above the faintest, lights between A and D75.
 /// @param faintest luminance of the faintest star's light spread over one pixel [cd/m2]

@@ -58,7 +58,7 @@ class RowReadout {
 
  private:
   PatternRow pattern(const Run& run) const {
-    return {frame_.seed, static_cast<std::uint32_t>(run.x0), static_cast<std::uint32_t>(run.y)};
+    return {frame_.pattern_seed, static_cast<std::uint32_t>(run.x0), static_cast<std::uint32_t>(run.y)};
   }
 
   void fill_signal(const Run& run, EffectSet kept, Scratch& s, std::span<float> signal) const {
@@ -144,8 +144,9 @@ void read_out_bands(const SensorFrame& frame, const isp::EffectPlan& plan, Execu
   for_each_band(executor, dn.height, [&](RowBand band, int) { read_out_rows(frame, plan, band, dn); });
 }
 
-/// The best of three [ms].
-double time_rows(const SensorFrame& frame, const isp::EffectPlan& plan, Plane<float>& dn) {
+/// The best of three [ms], writing what a file would get: codes where the converter is kept.
+template <class Code>
+double time_rows(const SensorFrame& frame, const isp::EffectPlan& plan, Plane<Code>& dn) {
   double best = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 3; ++i) {
     const auto start = std::chrono::steady_clock::now();
@@ -173,6 +174,8 @@ std::vector<isp::BlockLevel> block_levels(PlaneView<const float> rate_e_per_s, B
       Vector3 sum{};
       std::array<int, 3> count{};
       float peak = 0;
+      std::array<float, 3> darkest;
+      darkest.fill(std::numeric_limits<float>::infinity());
       for (int y = y0; y < std::min(rate_e_per_s.height, y0 + isp::effect_block); ++y) {
         const float* row = rate_e_per_s.row(y);
         for (int x = x0; x < std::min(rate_e_per_s.width, x0 + isp::effect_block); ++x) {
@@ -180,11 +183,17 @@ std::vector<isp::BlockLevel> block_levels(PlaneView<const float> rate_e_per_s, B
           sum[k] += row[x];
           ++count[k];
           peak = std::max(peak, row[x]);
+          darkest[k] = std::min(darkest[k], row[x]);
         }
       }
       const double whole = (sum[0] + sum[1] + sum[2]) / (count[0] + count[1] + count[2]);
-      for (int k = 0; k < 3; ++k) sum[k] = time_s * (count[k] > 0 ? sum[k] / count[k] : whole);
-      blocks.push_back({sum, time_s * peak});
+      isp::BlockLevel block;
+      block.peak_e = time_s * peak;
+      for (int k = 0; k < 3; ++k) {
+        block.signal_e[k] = time_s * (count[k] > 0 ? sum[k] / count[k] : whole);
+        block.darkest_e[k] = count[k] > 0 ? time_s * darkest[k] : block.signal_e[k];
+      }
+      blocks.push_back(block);
     }
   }
   return blocks;
@@ -196,17 +205,19 @@ EffectCost measure_cost(const SensorFrame& frame, const isp::EffectPlan& plan) {
   top.rate_e_per_s.height = std::min(frame.rate_e_per_s.height, measured_rows);
   const double scale = static_cast<double>(frame.rate_e_per_s.height) / top.rate_e_per_s.height;
   Plane<float> dn(top.rate_e_per_s.width, top.rate_e_per_s.height);
-  isp::EffectPlan all = plan;
-  const auto keep = [&](EffectSet kept) {
-    for (isp::RegionPlan& region : all.regions) region.kept = kept;
+  Plane<std::uint16_t> codes(dn.width(), dn.height());
+  isp::EffectPlan timed = plan;
+  const auto time_with = [&](EffectSet kept) {
+    for (isp::RegionPlan& region : timed.regions) region.kept = kept;
+    const bool whole = kept.has(Effect::quantisation) && kept.has(Effect::clipping);
+    return scale * (whole ? time_rows(top, timed, codes) : time_rows(top, timed, dn));
   };
   EffectSet present;
   for (const isp::EffectDecision& d : plan.regions.front().decisions) {
     if (d.reason != isp::EffectDecision::Reason::absent) present = present.with(d.effect);
   }
   EffectCost cost;
-  keep(present);
-  cost.all_ms = scale * time_rows(top, all, dn);
+  cost.all_ms = time_with(present);
   for (int i = 0; i < isp::effect_count; ++i) {
     const auto effect = static_cast<Effect>(i);
     int without = 0, blocks = 0;
@@ -215,9 +226,8 @@ EffectCost measure_cost(const SensorFrame& frame, const isp::EffectPlan& plan) {
       if (!region.kept.has(effect)) without += region.blocks;
     }
     if (without == 0 || !present.has(effect)) continue;
-    keep(present.without(effect));
     const double share = static_cast<double>(without) / blocks;
-    cost.saved_ms[i] = share * (cost.all_ms - scale * time_rows(top, all, dn));
+    cost.saved_ms[i] = share * (cost.all_ms - time_with(present.without(effect)));
   }
   return cost;
 }

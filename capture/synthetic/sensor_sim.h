@@ -19,7 +19,8 @@ struct SensorFrame {
   BayerPhase phase = BayerPhase::rggb;
   PlaneView<const float> rate_e_per_s;  // height x width, see charge_rate
   const PhotonRows* photons = nullptr;  // set: published photon sampling, else physical
-  std::uint64_t seed = 0;
+  std::uint64_t seed = 0;               // of what is drawn anew for each frame
+  std::uint64_t pattern_seed = 0;       // of what the sensor keeps: PRNU, DSNU, hot pixels, columns
   std::uint32_t frame = 0;
 };
 

@@ -61,15 +61,17 @@ Result<CameraColour> colour_of(const isp::NamedSensor& sensor, const SpectralRes
 /// Mean code at which a pixel saturates, above black [DN]: the full well's, where that is less than the converter's.
 double range_dn(const SensorModel& s) { return s.system_gain_dn_per_e * isp::saturation_charge_e(s); }
 
-/// Variance of codes in 0..1 of the range above black (DNG NoiseProfile): K / range * x + (K^2 sigma^2 + 1/12) /
-/// range^2.
-NoiseProfile noise_profile(const SensorModel& s) {
-  const double range = range_dn(s), k = s.system_gain_dn_per_e;
-  const double steady_e2 = s.read_noise_e * s.read_noise_e + s.row_noise_e * s.row_noise_e;
-  NoiseProfile out;
-  out.scale.fill(k / range);
-  out.offset.fill((k * k * steady_e2 + 1.0 / 12) / (range * range));
-  return out;
+/// The plan of a file: the planner's, with the converter, which costs nothing and makes files of one sensor alike.
+isp::EffectPlan with_converter(isp::EffectPlan plan) {
+  for (isp::RegionPlan& region : plan.regions) {
+    for (const Effect effect : {Effect::quantisation, Effect::clipping}) {
+      region.kept = region.kept.with(effect);
+      isp::EffectDecision& d = region.decisions[static_cast<int>(effect)];
+      if (!d.kept) d.reason = isp::EffectDecision::Reason::free;
+      d.kept = true;
+    }
+  }
+  return plan;
 }
 
 /// What of() promises of its options, and of points that no function of scene.h made.
@@ -80,6 +82,10 @@ Result<void> check_options(const SyntheticOptions& options, const Scene& scene) 
   if (const auto& t = options.effects.tolerance; t && (!(t->delta_e > 0) || !(t->relative_variance > 0))) {
     return fail(ErrorCode::invalid_argument, "a tolerance must be above 0: ask for all effects to leave none out");
   }
+  if (options.sampling == PhotonSampling::published && options.effects.tolerance) {
+    return fail(ErrorCode::invalid_argument,
+                "the planner knows the variance of physical photons only: name the effects of published sampling");
+  }
   if (options.sampling == PhotonSampling::published && !scene.points.empty()) {
     return fail(ErrorCode::invalid_argument, "published photon sampling draws pixels, not points: leave the stars out");
   }
@@ -88,7 +94,8 @@ Result<void> check_options(const SyntheticOptions& options, const Scene& scene) 
   }
   for (const PointSource& p : scene.points) {
     const bool near = std::fabs(p.x_px) <= 1e6 && std::fabs(p.y_px) <= 1e6;
-    if (!near || !(p.spread_px > 0) || !(p.spread_px <= 1000)) {
+    const bool lit = p.light >= 0 && p.light < static_cast<int>(scene.point_lights.size()) && p.luminance_cd_m2 >= 0;
+    if (!near || !lit || !(p.spread_px > 0) || !(p.spread_px <= 1000)) {
       return fail(ErrorCode::invalid_argument,
                   "a point source lies within a million pixels and spreads over more than 0 and at most 1000");
     }
@@ -131,6 +138,7 @@ Result<void> SyntheticSource::expose(Executor& executor) {
   const EffectChoice& choice = options_.effects;
   plan_ = choice.tolerance ? isp::plan_effects(sensor, options_.exposure, developing_, blocks, *choice.tolerance)
                            : isp::fixed_effects(sensor, options_.exposure, developing_, blocks, choice.effects);
+  file_plan_ = choice.tolerance ? with_converter(plan_) : plan_;
   choose_storage();
   if (const auto good = check_photons(executor); !good) return good;
   return check_means(blocks);
@@ -179,8 +187,8 @@ Result<void> SyntheticSource::check_photons(Executor& executor) const {
 
 void SyntheticSource::choose_storage() {
   const SensorModel& s = sensor_.model;
-  const bool quantised = every_region(plan_, [](const auto& r) { return r.kept.has(Effect::quantisation); });
-  const bool clipped = every_region(plan_, [](const auto& r) { return r.kept.has(Effect::clipping); });
+  const bool quantised = every_region(file_plan_, [](const auto& r) { return r.kept.has(Effect::quantisation); });
+  const bool clipped = every_region(file_plan_, [](const auto& r) { return r.kept.has(Effect::clipping); });
   storage_ = {1, 0, quantised && clipped};
   if (!clipped) {
     const double steady =
@@ -192,7 +200,8 @@ void SyntheticSource::choose_storage() {
 }
 
 SensorFrame SyntheticSource::sensor_frame(std::uint32_t index, const PhotonRows* photons) const {
-  return {sensor_.model, options_.exposure, options_.phase, rate_.e_per_s.view(), photons, options_.seed, index};
+  return {sensor_.model, options_.exposure, options_.phase,       rate_.e_per_s.view(),
+          photons,       options_.seed,     options_.sensor_seed, index};
 }
 
 std::optional<PhotonRows> SyntheticSource::photon_rows() const {
@@ -201,34 +210,58 @@ std::optional<PhotonRows> SyntheticSource::photon_rows() const {
 }
 
 template <class Code>
-void SyntheticSource::read_out_frame(std::uint32_t index, Executor& executor, PlaneView<Code> out) const {
+void SyntheticSource::read_out_frame(std::uint32_t index, const isp::EffectPlan& plan, Executor& executor,
+                                     PlaneView<Code> out) const {
   const std::optional<PhotonRows> photons = photon_rows();
-  read_out(sensor_frame(index, photons ? &*photons : nullptr), plan_, executor, out);
+  read_out(sensor_frame(index, photons ? &*photons : nullptr), plan, executor, out);
 }
 
 Plane<float> SyntheticSource::frame_dn(std::uint32_t index, Executor& executor) const {
   Plane<float> dn(rate_.e_per_s.width(), rate_.e_per_s.height());
-  read_out_frame(index, executor, dn.view());
+  read_out_frame(index, plan_, executor, dn.view());
   return dn;
 }
 
 Plane<std::uint16_t> SyntheticSource::stored_codes(std::uint32_t index, Executor& executor) const {
   Plane<std::uint16_t> codes(rate_.e_per_s.width(), rate_.e_per_s.height());
   if (storage_.codes) {
-    read_out_frame(index, executor, codes.view());
+    read_out_frame(index, file_plan_, executor, codes.view());
     return codes;
   }
   const Plane<float> dn = frame_dn(index, executor);
   const auto scale = static_cast<float>(storage_.scale), offset = static_cast<float>(storage_.offset_dn);
-  for (std::size_t i = 0; i < dn.size(); ++i) {
-    const float code = std::nearbyint(scale * (dn.data()[i] + offset));
-    codes.data()[i] = static_cast<std::uint16_t>(std::clamp(code, 0.0f, 65535.0f));
-  }
+  for_each_band(executor, dn.height(), [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      const float* from = dn.row(y);
+      std::uint16_t* to = codes.row(y);
+      for (int x = 0; x < dn.width(); ++x) {
+        to[x] = static_cast<std::uint16_t>(std::clamp(std::nearbyint(scale * (from[x] + offset)), 0.0f, 65535.0f));
+      }
+    }
+  });
   return codes;
 }
 
 RawFrame SyntheticSource::frame(std::uint32_t index, Executor& executor) const {
   return described(stored_codes(index, executor));
+}
+
+/// Variance of codes in 0..1 of the range above black (DNG NoiseProfile): K / range * x + (K^2 sigma^2 + 1/12) /
+/// range^2, of what is simulated. Without the photons' Poisson law no line in x describes the noise: then there is
+/// none.
+std::optional<NoiseProfile> SyntheticSource::noise_profile() const {
+  const isp::EffectSet kept =
+      options_.effects.tolerance ? isp::EffectSet::all() : file_plan_.regions.front().kept;  // one set for all regions
+  if (options_.sampling == PhotonSampling::published || !kept.has(Effect::photon_noise)) return std::nullopt;
+  const SensorModel& s = sensor_.model;
+  const double range = range_dn(s), k = s.system_gain_dn_per_e;
+  double offset_dn2 = kept.has(Effect::quantisation) ? 1.0 / 12 : 0;
+  if (kept.has(Effect::read_noise)) offset_dn2 += k * k * s.read_noise_e * s.read_noise_e;
+  if (kept.has(Effect::row_noise)) offset_dn2 += k * k * s.row_noise_e * s.row_noise_e;
+  NoiseProfile out;
+  out.scale.fill(k / range);
+  out.offset.fill(offset_dn2 / (range * range));
+  return out;
 }
 
 RawFrame SyntheticSource::described(Plane<std::uint16_t> codes) const {
@@ -257,7 +290,7 @@ RawFrame SyntheticSource::described(Plane<std::uint16_t> codes) const {
   const double saturation_cd_m2 = isp::saturation_luminance_cd_m2(s, response_, 1);
   info.iso = 78 * options_.f_number * options_.f_number / (0.65 * saturation_cd_m2);
   out.colour = colour_;
-  out.noise = noise_profile(s);
+  out.noise = noise_profile();
   return out;
 }
 
@@ -279,7 +312,7 @@ SceneLinear SyntheticSource::xyz_cd_m2() const {
 
 EffectCost SyntheticSource::measure_cost() const {
   const std::optional<PhotonRows> photons = photon_rows();
-  return capture::measure_cost(sensor_frame(0, photons ? &*photons : nullptr), plan_);
+  return capture::measure_cost(sensor_frame(0, photons ? &*photons : nullptr), file_plan_);
 }
 
 }  // namespace lowlux::capture

@@ -29,7 +29,8 @@ struct SyntheticOptions {
   int masked_columns = 0;  // light-shielded, left of the picture; even
   PhotonSampling sampling = PhotonSampling::physical;
   EffectChoice effects;
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;         // of the noise: frames of one seed and index have the same, whatever the scene
+  std::uint64_t sensor_seed = 1;  // of the fixed pattern: which specimen of the sensor it is
 };
 
 /// A camera in front of a scene. What does not change from frame to frame is worked out once, by of().
@@ -37,12 +38,15 @@ class SyntheticSource {
  public:
   /// Errors: an exposure that cannot be; a mean charge beyond the sampler's limit where no full well holds it; point
   /// sources with published sampling, or more photons in one of its bins than the sampler's limit; masked columns that
-  /// are odd, negative or more than 4096; a tolerance that is not above 0; an f-number outside of 0.5..1000; point
+  /// are odd, negative or more than 4096; a tolerance that is not above 0, or with published sampling, which
+  /// the planner does not know; an f-number outside of 0.5..1000; point
   /// sources without place or spread.
   static Result<SyntheticSource> of(Scene scene, isp::NamedSensor sensor, SpectralResponse response,
                                     const SyntheticOptions& options, Executor& executor);
 
   /// Frame number `index`: the same scene and fixed pattern, its own noise. Any index, in any order.
+  /// A file holds the converter's whole codes, which cost nothing: quantisation and clipping that the planner would
+  /// leave out stay (file_plan). Where a caller leaves them out, see Storage.
   RawFrame frame(std::uint32_t index, Executor& executor) const;
 
   /// The same in DN as floats, before anything is stored: what the converter would give.
@@ -52,14 +56,16 @@ class SyntheticSource {
   CameraRgb signal_e(Executor& executor) const;
   SceneLinear xyz_cd_m2() const;
 
+  /// What frame_dn() simulates, and what frame() does.
   const isp::EffectPlan& plan() const { return plan_; }
+  const isp::EffectPlan& file_plan() const { return file_plan_; }
   const Plane<float>& rate_e_per_s() const { return rate_.e_per_s; }
   std::int64_t moved_pixels() const { return rate_.moved_pixels; }
   const isp::Developing& developing() const { return developing_; }
   EffectCost measure_cost() const;
 
  private:
-  /// How codes are stored: code = round(scale * (dn + offset_dn)). Anything but 1 and 0 only where the plan leaves
+  /// How codes are stored: code = round(scale * (dn + offset_dn)). Anything but 1 and 0 only where a caller leaves
   /// quantisation or clipping out: then 16 bits keep the fractions, and the pedestal is raised to keep negative values.
   struct Storage {
     int scale = 1;
@@ -74,8 +80,9 @@ class SyntheticSource {
   Result<void> check_means(const std::vector<isp::BlockLevel>& blocks) const;
   Result<void> check_photons(Executor& executor) const;
   void choose_storage();
+  std::optional<NoiseProfile> noise_profile() const;
   template <class Code>
-  void read_out_frame(std::uint32_t index, Executor& executor, PlaneView<Code> out) const;
+  void read_out_frame(std::uint32_t index, const isp::EffectPlan& plan, Executor& executor, PlaneView<Code> out) const;
   SensorFrame sensor_frame(std::uint32_t index, const PhotonRows* photons) const;
   std::optional<PhotonRows> photon_rows() const;
   Plane<std::uint16_t> stored_codes(std::uint32_t index, Executor& executor) const;
@@ -90,6 +97,7 @@ class SyntheticSource {
   ChargeRate rate_;
   isp::Developing developing_;
   isp::EffectPlan plan_;
+  isp::EffectPlan file_plan_;
   Storage storage_;
 };
 

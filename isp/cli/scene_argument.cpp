@@ -106,9 +106,8 @@ Result<SceneOfArgs> scene_of(const SceneArgs& args, std::uint64_t seed, Executor
   for (const LampArgs& lamp : args.lamps) {
     const auto light = light_of(lamp.light, "--lamp");
     if (!light) return tl::make_unexpected(light.error());
-    auto radiance = isp::radiance_of(*light, lamp.luminance_cd_m2);
-    if (!radiance) return fail(ErrorCode::invalid_argument, "the lamp's light has no luminance", "--lamp");
-    out->scene.points.push_back({lamp.x_px, lamp.y_px, *std::move(radiance)});
+    const auto lit = capture::add_lamp(out->scene, lamp.x_px, lamp.y_px, *light, lamp.luminance_cd_m2);
+    if (!lit) return fail(lit.error().code, lit.error().message, "--lamp");
   }
   const double faintest = args.star_luminance_cd_m2.value_or(args.luminance_cd_m2 / 10);
   if (const auto stars = capture::add_stars(out->scene, args.stars, faintest, seed); !stars) {

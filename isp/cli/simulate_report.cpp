@@ -21,6 +21,8 @@ const char* reason_of(const isp::EffectDecision& decision) {
       return "below the tolerance with all that is left out";
     case isp::EffectDecision::Reason::asked_for:
       return "as asked";
+    case isp::EffectDecision::Reason::free:
+      return "negligible, but leaving it out saves nothing";
     case isp::EffectDecision::Reason::needed:
       break;
   }

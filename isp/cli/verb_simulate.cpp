@@ -153,7 +153,7 @@ class Simulation {
     isp::StageClock finish(out_.times);
     if (const auto written = write_truth(*source); !written) return tl::make_unexpected(written.error());
     finish.lap("truth");
-    out_.plan = source->plan();
+    out_.plan = source->file_plan();
     if (args_.explain) out_.cost = source->measure_cost();
     return std::move(out_);
   }

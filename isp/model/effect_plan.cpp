@@ -61,10 +61,12 @@ std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vect
     return [&blocks, key](std::size_t a, std::size_t b) { return key(blocks[a]) < key(blocks[b]); };
   };
   std::vector<BlockLevel> samples;
-  samples.reserve(7 + most_samples);
+  samples.reserve(10 + most_samples);
   samples.push_back(
       blocks[*std::max_element(members.begin(), members.end(), by([](const BlockLevel& b) { return b.peak_e; }))]);
   for (int c = 0; c < 3; ++c) {
+    samples.push_back(blocks[*std::min_element(members.begin(), members.end(),
+                                               by([c](const BlockLevel& b) { return b.darkest_e[c]; }))]);
     const auto [low, high] =
         std::minmax_element(members.begin(), members.end(), by([c](const BlockLevel& b) { return b.signal_e[c]; }));
     samples.push_back(blocks[*low]);

@@ -62,8 +62,9 @@ inline constexpr double variance_floor_dn2 = 0.01;
 
 /// What a block of the scene gives to the sensor.
 struct BlockLevel {
-  Vector3 signal_e{};  // mean signal of its R, G and B pixels
-  double peak_e = 0;   // of its brightest pixel
+  Vector3 signal_e{};   // mean signal of its R, G and B pixels
+  Vector3 darkest_e{};  // of its darkest R, G and B pixels: a star's block is dark around it
+  double peak_e = 0;    // of its brightest pixel
 };
 
 /// How block means become colours: what the tolerance is measured in.
@@ -78,7 +79,7 @@ struct Developing {
 Developing developing_of(const SensorModel& sensor, const Exposure& exposure, const Matrix3& camera_to_xyz,
                          const Vector3& neutral, std::span<const BlockLevel> blocks);
 
-/// What is predicted to change in a block if effects are left out: bounds that one block in a million exceeds.
+/// What is predicted to change in a block if effects are left out: bounds at five standard deviations of normal laws.
 struct PredictedChange {
   double delta_e = 0;
   double relative_variance = 0;
@@ -96,6 +97,7 @@ struct EffectDecision {
     negligible,  // left out, all that is left out together staying below the tolerance
     needed,      // above the tolerance, alone or together with what is left out already
     asked_for,   // kept or left out because the caller said so
+    free,        // kept because leaving it out saves nothing
   } reason = Reason::needed;
   bool kept = true;
   PredictedChange alone;

@@ -7,7 +7,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double sigmas = 5;            // of a bound: one block in a million exceeds it
+constexpr double sigmas = 5;            // of a bound
 constexpr double channel_pixels = 256;  // of R or B in a block; G has twice as many
 constexpr double block_lines = 16;      // rows, or columns, of a block that hold one channel
 constexpr double hottest = 14;          // of an exponential law, in units of its mean: exceeded once in a million
@@ -195,6 +195,10 @@ Lab lab_of_dn(const SensorModel& s, const Developing& developing, const Vector3&
   return lab_of(xyz_of(developing.camera_to_xyz * rgb), *xyz_of(white_d65));
 }
 
+PredictedChange larger(const PredictedChange& a, const PredictedChange& b) {
+  return {std::max(a.delta_e, b.delta_e), std::max(a.relative_variance, b.relative_variance)};
+}
+
 /// The largest colour difference between a mean and where shift and scatter may take it [DN].
 double farthest(const SensorModel& s, const Developing& developing, const Vector3& mean, const Vector3& shift,
                 const Vector3& scatter) {
@@ -251,12 +255,13 @@ Developing developing_of(const SensorModel& sensor, const Exposure& exposure, co
 
 PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
                                const BlockLevel& block, EffectSet kept) {
-  PredictedChange out = change_at(sensor, exposure, developing, block.signal_e, kept);
+  PredictedChange out = larger(change_at(sensor, exposure, developing, block.signal_e, kept),
+                               change_at(sensor, exposure, developing, block.darkest_e, kept));
   if (kept.has(Effect::clipping)) return out;
   // The mean of a block does not tell what its brightest pixel loses: look at a block as bright as that.
   const PredictedChange peak = change_at(sensor, exposure, developing, {block.peak_e, block.peak_e, block.peak_e},
                                          EffectSet::all().without(Effect::clipping));
-  return {std::max(out.delta_e, peak.delta_e), std::max(out.relative_variance, peak.relative_variance)};
+  return larger(out, peak);
 }
 
 }  // namespace lowlux::isp

@@ -98,7 +98,7 @@ Scene draw_scene(Draws& draws) {
 Scene copy_of(const Scene& scene) {
   SceneLinear xyz;
   for (int c = 0; c < 3; ++c) xyz.plane[c] = scene.xyz_cd_m2.plane[c].clone();
-  return {std::move(xyz), scene.patch.clone(), scene.radiances, scene.points, scene.white, scene.description};
+  return {std::move(xyz), scene.patch.clone(), scene.radiances, {}, {}, scene.white, scene.description};
 }
 
 /// Mean and variance of R, G and B in one block [DN].

@@ -31,7 +31,8 @@ double total(const Plane<float>& plane) {
 
 Scene with_point(int width, int height, double x_px, double y_px, double spread_px = 0.7) {
   Scene scene = *dark_scene(test::setup_of(width, height, 1));
-  scene.points.push_back({x_px, y_px, *isp::radiance_of(*isp::light_named("D65"), 3), spread_px});
+  EXPECT_TRUE(add_lamp(scene, x_px, y_px, *isp::light_named("D65"), 3));
+  scene.points.back().spread_px = spread_px;
   return scene;
 }
 
@@ -54,7 +55,7 @@ TEST(ExposedScene, APatchGivesTheIntegralOfItsSpectrumUnderEachFilterInEveryPhas
 TEST(ExposedScene, TheMosaicIsTheTruthSeenThroughTheFilters) {
   PoolExecutor executor(3);
   Scene scene = *picture_scene(test::even_picture(33, 17, {0.3, 0.25, 0.4}), 5);
-  scene.points.push_back({4.3, 7.9, *isp::radiance_of(*isp::light_named("A"), 30)});
+  ASSERT_TRUE(add_lamp(scene, 4.3, 7.9, *isp::light_named("A"), 30));
   const CameraRgb truth = charge_rate_rgb(scene, response(), &table(), executor);
   const ChargeRate rate = charge_rate(scene, response(), &table(), BayerPhase::grbg, executor);
   for (int y = 0; y < 17; ++y) {
@@ -125,7 +126,7 @@ TEST(ExposedScene, StarsAddToTheLightThatIsThere) {
   InlineExecutor executor;
   Scene scene = *flat_scene(test::setup_of(9, 9, 1));
   const Plane<float> before = charge_rate(scene, response(), nullptr, BayerPhase::rggb, executor).e_per_s;
-  scene.points = with_point(9, 9, 4, 4).points;
+  ASSERT_TRUE(add_lamp(scene, 4, 4, *isp::light_named("D65"), 3));
   const Plane<float> after = charge_rate(scene, response(), nullptr, BayerPhase::rggb, executor).e_per_s;
   EXPECT_GT(after.at(4, 4), before.at(4, 4));
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_GE(after.data()[i], before.data()[i]);

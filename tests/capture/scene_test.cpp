@@ -48,7 +48,8 @@ TEST(SyntheticScene, ADarkSceneHasNoLightButKnowsItsWhite) {
   for (const Plane<float>& plane : scene.xyz_cd_m2.plane) {
     EXPECT_EQ(std::count(plane.data(), plane.data() + plane.size(), 0.0f), 36);
   }
-  EXPECT_TRUE(scene.patch.empty());
+  EXPECT_EQ(scene.radiances.size(), 1u);
+  EXPECT_EQ(std::count(scene.patch.data(), scene.patch.data() + scene.patch.size(), 0), 36);
   EXPECT_NEAR(isp::xyz_cd_m2(scene.white).y, 2, 1e-14);
 }
 
@@ -133,11 +134,11 @@ TEST(SyntheticScene, LightsThatCannotLightAreRefused) {
   setup.light = *Spectrum::of({400, 500, 600}, {1, -0.1, 1});
   expect_refused(flat_scene(setup), "negative");
   setup.light = *Spectrum::of({400, 600}, {0, 0});
-  expect_refused(flat_scene(setup), "without power");
+  expect_refused(flat_scene(setup), "needs power");
   setup.light = *Spectrum::of({900, 1000}, {1, 1});
-  expect_refused(flat_scene(setup), "without power");
+  expect_refused(flat_scene(setup), "needs power");
   setup.light = *Spectrum::of({400, 700}, {1e308, 1e308});  // its luminance is beyond double
-  expect_refused(flat_scene(setup), "without power");
+  expect_refused(flat_scene(setup), "needs power");
   setup.light = *Spectrum::of({400, 700}, {1e300, 1e300});  // this one is not, and scale does not matter
   setup.luminance_cd_m2 = 1e12;
   EXPECT_TRUE(flat_scene(setup));
@@ -171,7 +172,7 @@ TEST(Stars, FollowTheirBrightnessLawAndAreSpreadEvenly) {
   const auto share = [&](const auto& is) {
     return std::count_if(scene.points.begin(), scene.points.end(), is) / static_cast<double>(count);
   };
-  const auto flux = [](const PointSource& p) { return isp::xyz_cd_m2(p.radiance).y; };
+  const auto flux = [](const PointSource& p) { return p.luminance_cd_m2; };
   EXPECT_EQ(share([&](const PointSource& p) { return flux(p) < 0.5 * (1 - 1e-9); }), 0) << "the faintest";
   for (const double ratio : {1.5, 4.0, 20.0, 100.0}) {
     const double p = std::pow(ratio, -1.5);  // more than `ratio` times the faintest

@@ -67,7 +67,7 @@ TEST(ReadOut, GivesEachRegionItsOwnEffects) {
   plan.regions[1].kept = {Effect::read_noise};
   plan.region_of_block = {0, 1, 0, 1, 1, 0};
   Plane<float> dn(96, 40), noisy(96, 40);
-  const SensorFrame frame{sensor, {}, BayerPhase::rggb, std::as_const(rate).view(), nullptr, 3, 4};
+  const SensorFrame frame{sensor, {}, BayerPhase::rggb, std::as_const(rate).view(), nullptr, 3, 3, 4};
   read_out(frame, plan, executor, dn.view());
   read_out(frame, test::plan_of(96, 40, {Effect::read_noise}), executor, noisy.view());
   for (int y = 0; y < 40; ++y) {

@@ -61,6 +61,7 @@ bool same(const Plane<T>& a, const Plane<T>& b) {
 TEST(SyntheticSource, GivesTheSameCodesForEveryNumberOfThreads) {
   for (const PhotonSampling sampling : {PhotonSampling::physical, PhotonSampling::published}) {
     for (const bool planned : {false, true}) {
+      if (planned && sampling == PhotonSampling::published) continue;  // refused
       SyntheticOptions options;
       options.sampling = sampling;
       options.masked_columns = 6;
@@ -94,7 +95,44 @@ TEST(SyntheticSource, FramesDependOnSeedAndIndexAndOnNothingElse) {
   EXPECT_TRUE(same(made(picture(40, 30), rich_sensor(), options).frame(5, executor).raw.dn, fifth));
   options.seed = 2;
   EXPECT_FALSE(same(made(picture(40, 30), rich_sensor(), options).frame(5, executor).raw.dn, fifth));
+  options.seed = 1;
+  options.sensor_seed = 2;
+  EXPECT_FALSE(same(made(picture(40, 30), rich_sensor(), options).frame(5, executor).raw.dn, fifth));
   EXPECT_FALSE(same(source.frame(0xffffffff, executor).raw.dn, fifth)) << "the last index there is";
+}
+
+/// Covariance of two frames over their pixels [DN^2].
+double covariance(const Plane<float>& a, const Plane<float>& b) {
+  double mean_a = 0, mean_b = 0, sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    mean_a += a.data()[i] / static_cast<double>(a.size());
+    mean_b += b.data()[i] / static_cast<double>(b.size());
+  }
+  for (std::size_t i = 0; i < a.size(); ++i) sum += (a.data()[i] - mean_a) * (b.data()[i] - mean_b);
+  return sum / static_cast<double>(a.size());
+}
+
+// A dark and a light of one specimen share its pattern, and nothing else if their seeds differ.
+TEST(SyntheticSource, DarksAndLightsOfOneSensorShareItsPatternAndNotTheirNoise) {
+  InlineExecutor executor;
+  isp::NamedSensor sensor = test::plain_sensor();
+  sensor.model.read_noise_e = 6;
+  const auto frame = [&](const Scene& like, std::uint64_t seed) {
+    SyntheticOptions options;
+    options.seed = seed;
+    options.effects.effects = {isp::Effect::read_noise, isp::Effect::column_noise};
+    SceneLinear xyz;
+    for (int c = 0; c < 3; ++c) xyz.plane[c] = like.xyz_cd_m2.plane[c].clone();
+    return made({std::move(xyz), like.patch.clone(), like.radiances, {}, {}, like.white, ""}, sensor, options)
+        .frame_dn(0, executor);
+  };
+  const Scene dark = *dark_scene(test::setup_of(128, 128, 1)), light = *flat_scene(test::setup_of(128, 128, 1e-9));
+  const double variance = 9, standard_error = variance / 128;  // 0.5 DN/e- times 6 e-, squared; 128^2 pixels
+  EXPECT_NEAR(covariance(frame(dark, 1), frame(light, 1)), variance, 0.5) << "the same seed is the same noise";
+  EXPECT_NEAR(covariance(frame(dark, 1), frame(light, 2)), 0, 5 * standard_error);
+  sensor.model.read_noise_e = 0;
+  sensor.model.column_noise_e = 6;
+  EXPECT_NEAR(covariance(frame(dark, 1), frame(light, 2)), variance, 5 * variance * std::sqrt(2.0 / 128));
 }
 
 void expect_frame(Scene scene, const SyntheticOptions& options) {
@@ -114,6 +152,7 @@ TEST(SyntheticSource, MosaicsOfOneOrOddPixelsAreMade) {
     expect_frame(picture(width, height), options);
     options.effects.tolerance = isp::Tolerance{};
     expect_frame(*flat_scene(test::setup_of(width, height, 20)), options);
+    options.effects.tolerance.reset();
     options.sampling = PhotonSampling::published;
     expect_frame(*flat_scene(test::setup_of(width, height, 20)), options);
     expect_frame(picture(width, height), options);
@@ -174,7 +213,7 @@ TEST(SyntheticSource, TheMosaicIsTheTruthTimesTheExposurePlusNothingWhereAllIsLe
 
 TEST(SyntheticSource, TheTruthInXyzIsTheSceneWithItsStars) {
   Scene scene = *picture_scene(test::even_picture(21, 21, {0.3, 0.25, 0.4}), 2);
-  scene.points.push_back({10, 10, *isp::radiance_of(*isp::light_named("A"), 7), 0.7});
+  ASSERT_TRUE(add_lamp(scene, 10, 10, *isp::light_named("A"), 7));
   const SyntheticSource source = made(std::move(scene), test::plain_sensor());
   const SceneLinear truth = source.xyz_cd_m2();
   EXPECT_FLOAT_EQ(truth.plane[1].at(0, 0), 0.5f);
@@ -219,10 +258,10 @@ TEST(SyntheticSource, OptionsThatCannotBeAreRefused) {
 
 TEST(SyntheticSource, PointsWithoutPlaceOrSpreadAreRefused) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  const Spectrum light = *isp::radiance_of(*isp::light_named("A"), 1);
   const auto made_with = [&](double x_px, double y_px, double spread_px) {
     Scene scene = *flat_scene(test::setup_of(4, 4, 1));
-    scene.points.push_back({x_px, y_px, light, spread_px});
+    EXPECT_TRUE(add_lamp(scene, x_px, y_px, *isp::light_named("A"), 1));
+    scene.points.back().spread_px = spread_px;
     return static_cast<bool>(test::source_of(std::move(scene), test::plain_sensor()));
   };
   EXPECT_TRUE(made_with(1, 1, 0.01));

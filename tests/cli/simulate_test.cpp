@@ -116,7 +116,7 @@ TEST_F(Simulate, TheListNamesWhatTheOptionsTake) {
 }
 
 TEST_F(Simulate, JsonHoldsWhatExplainPrints) {
-  const Words options{"--light", "A", "--explain"};
+  const Words options{"--light", "A", "--explain", "--luminance", "0.001", "--prnu", "0.005"};
   const auto text = simulated("chart", "text.dng", options);
   Words with_json = options;
   with_json.emplace_back("--json");

@@ -67,7 +67,7 @@ inline Plane<float> flat_dn(const SensorModel& sensor, isp::EffectSet kept, cons
   const Plane<float> rate = filled(flat.width, flat.height, static_cast<float>(flat.rate_e_per_s));
   Plane<float> dn(flat.width, flat.height);
   capture::read_out(capture::SensorFrame{sensor, flat.exposure, BayerPhase::rggb, std::as_const(rate).view(), nullptr,
-                                         flat.seed, flat.frame},
+                                         flat.seed, flat.seed, flat.frame},
                     plan_of(flat.width, flat.height, kept), executor, dn.view());
   return dn;
 }
