@@ -38,7 +38,7 @@ SensorModel rich_sensor() {
   return m;
 }
 
-BlockLevel grey(double level_e) { return {{level_e, level_e, level_e}, level_e}; }
+BlockLevel grey(double level_e) { return {{level_e, level_e, level_e}, {level_e, level_e, level_e}, level_e}; }
 
 struct Case {
   SensorModel sensor = rich_sensor();
@@ -154,7 +154,7 @@ TEST(EffectPlan, DarkNonUniformityIsNothingWithoutDarkCurrent) {
 
 TEST(EffectPlan, BlocksOfADecadeMakeARegion) {
   Case c;
-  c.blocks = {grey(55), grey(0.5), grey(5), grey(50), {{2, 90, 1}, 95}, grey(0), grey(5.5)};
+  c.blocks = {grey(55), grey(0.5), grey(5), grey(50), {{2, 90, 1}, {2, 90, 1}, 95}, grey(0), grey(5.5)};
   const EffectPlan plan = c.plan({});
   ASSERT_EQ(plan.regions.size(), 4u);
   EXPECT_EQ(plan.region_of_block, (std::vector<std::uint8_t>{3, 1, 2, 3, 3, 0, 2}));
