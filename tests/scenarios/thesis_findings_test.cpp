@@ -11,7 +11,7 @@
 namespace lowlux::isp {
 namespace {
 
-// Published findings that do not hold, and why: their notes say the same. All others do.
+// Findings of either kind that do not hold, and why: their notes say the same. All others do.
 const std::set<std::string> known_not_to_hold{
     "chromaticity-clouds/blue-and-red-each",  // a purple is larger than an orange
     "frequency-of-seeing/tail",               // 1 - sum cancels
