@@ -119,7 +119,8 @@ Finding covariance(const std::vector<Colour>& colours, const std::string& scenar
           "0 standard errors",
           fmt::format("{:.1f} standard errors at most", worst),
           worst <= confidence_errors,
-          "each entry of each covariance against the first-order prediction"};
+          "each entry of each covariance against the first-order prediction",
+          Finding::Kind::check};
 }
 
 bool is_one_of(const std::string& name, std::initializer_list<std::string_view> families) {

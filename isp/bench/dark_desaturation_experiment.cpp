@@ -168,7 +168,7 @@ std::vector<Finding> findings_on_undoing(const Law& law, double sampled) {
            "what rounding leaves grows by 1 / alpha"},
           {"dark-desaturation/undo-sampled", "the same on means of samples: less the mean dark, the colour is back",
            "-", fmt::format("{:.1f} standard errors at most", sampled), sampled <= confidence_errors,
-           "patches and levels where the sum's own relative error is below 2 %"}};
+           "patches and levels where the sum's own relative error is below 2 %", Finding::Kind::check}};
 }
 
 }  // namespace

@@ -82,7 +82,8 @@ Finding distance_law(const std::vector<Level>& levels) {
           "F^-0.5",
           fmt::format("F^{:.4f} +- {:.4f}", fit.value, fit.standard_error),
           std::fabs(fit.value + 0.5) <= confidence_errors * fit.standard_error,
-          "exponent of the root mean square distance from 1e-9 to 6e-15 W; -0.5 follows from Poisson counts"};
+          "exponent of the root mean square distance from 1e-9 to 6e-15 W; -0.5 follows from Poisson counts",
+          Finding::Kind::check};
 }
 
 Finding distance_predicted(const std::vector<Level>& levels) {
@@ -97,7 +98,8 @@ Finding distance_predicted(const std::vector<Level>& levels) {
           "0 standard errors",
           fmt::format("{:.1f} standard errors at most", worst),
           worst <= confidence_errors,
-          "against the first-order expectation of E[D^2]"};
+          "against the first-order expectation of E[D^2]",
+          Finding::Kind::check};
 }
 
 Finding no_photon(const std::vector<Level>& levels, std::uint32_t samples) {
@@ -115,7 +117,8 @@ Finding no_photon(const std::vector<Level>& levels, std::uint32_t samples) {
           fmt::format("{:.1f} of {} samples at {:.0e} W", std::exp(-last.photons) * samples, samples, last.power_w),
           fmt::format("{} of {}", last.without_photon, samples),
           worst <= confidence_errors,
-          fmt::format("expected exp(-{:.2f} photons); such samples are reported, not replaced", last.photons)};
+          fmt::format("expected exp(-{:.2f} photons); such samples are reported, not replaced", last.photons),
+          Finding::Kind::check};
 }
 
 std::vector<Plot> plots_of(const Spectrum& light, const std::vector<Level>& levels) {

@@ -72,7 +72,8 @@ Result<Finding> drawn_flashes(const RunOptions& options) {
                  "0 standard errors",
                  fmt::format("{:.1f} standard errors at most", worst),
                  worst <= confidence_errors,
-                 fmt::format("{} drawn flashes for each of {} combinations of K and N", flashes, place)};
+                 fmt::format("{} drawn flashes for each of {} combinations of K and N", flashes, place),
+                 Finding::Kind::check};
 }
 
 Result<Finding> tail() {
@@ -93,7 +94,8 @@ Result<Finding> tail() {
       fmt::format("{:.4e} by the gamma function", *exact),
       agrees,
       fmt::format("K = 20, x = 0.1: the sum loses all digits where P is small; ours {} the bounds of its series",
-                  bounded ? "keeps" : "breaks")};
+                  bounded ? "keeps" : "breaks"),
+      Finding::Kind::check};
 }
 
 Result<Plot> curves() {

@@ -40,11 +40,16 @@ Result<Experiment> experiment_named(std::string_view id) {
 }
 
 Table table_of(std::span<const Finding> findings) {
-  Table table{{"finding", "claim", "published", "ours", "holds", "note"}, {}};
+  Table table{{"finding", "kind", "claim", "published", "ours", "holds", "note"}, {}};
   for (const Finding& f : findings) {
-    table.rows.push_back({f.id, f.claim, f.published, f.ours, std::string(verdict_of(f)), f.note});
+    table.rows.push_back(
+        {f.id, std::string(kind_of(f)), f.claim, f.published, f.ours, std::string(verdict_of(f)), f.note});
   }
   return table;
+}
+
+std::string_view kind_of(const Finding& finding) {
+  return finding.kind == Finding::Kind::published ? "published" : "check";
 }
 
 std::string_view verdict_of(const Finding& finding) { return finding.holds ? "holds" : "does not hold"; }

@@ -11,14 +11,18 @@
 
 namespace lowlux::isp {
 
-/// One published finding beside ours.
+/// One finding, published or our own, beside what is computed here.
 struct Finding {
+  /// Whether its authors published the claim, or whether it is a check of ours: of their equations, or of the sampling.
+  enum class Kind : std::uint8_t { published, check };
+
   std::string id;         // EXPERIMENT/what
-  std::string claim;      // what was published, with its figure, equation or section
-  std::string published;  // the figure in it; "-" where the claim has none
+  std::string claim;      // what was published or is checked, with its figure, equation or section
+  std::string published;  // the figure in it, of a check what is expected; "-" where the claim has none
   std::string ours;       // the same quantity, computed
   bool holds = false;
   std::string note;  // how it was computed; why it does not hold
+  Kind kind = Kind::published;
 };
 
 /// What one experiment yields.
@@ -45,8 +49,11 @@ std::span<const Experiment> experiments();
 /// The experiment of an id. Error: there is none; the message names near ones.
 Result<Experiment> experiment_named(std::string_view id);
 
-/// Findings as a table: finding, claim, published, ours, holds, note.
+/// Findings as a table: finding, kind, claim, published, ours, holds, note.
 Table table_of(std::span<const Finding> findings);
+
+/// "published" or "check".
+std::string_view kind_of(const Finding& finding);
 
 /// "holds" or "does not hold".
 std::string_view verdict_of(const Finding& finding);

@@ -97,12 +97,10 @@ Finding photons_matter_later(const Scenarios& s) {
 
 Finding means_stay(const Scenarios& s) {
   const double worst = worst_mean_error(s.photons);
-  return {"sensor-scenarios/photons-scatter",
-          "photon noise scatters chromaticities and does not move them (scenario I)",
-          "0 standard errors",
-          fmt::format("{:.1f} standard errors at most", worst),
-          worst <= confidence_errors,
-          "chromaticity of the mean code, 20 patches at 7 levels"};
+  return {
+      "sensor-scenarios/photons-scatter", "photon noise scatters chromaticities and does not move them (scenario I)",
+      "scatters, does not move",          fmt::format("{:.1f} standard errors at most", worst),
+      worst <= confidence_errors,         "chromaticity of the mean code, 20 patches at 7 levels"};
 }
 
 Finding means_on_line(const Scenarios& s) {
@@ -164,7 +162,8 @@ Finding saturation(const Scenarios& s) {
           fmt::format("{} of {} samples flagged and left out, {} of them at 10 cd/m2 or below", flagged, total, dim),
           dim == 0,
           "a channel at a code that a full pixel may have (254 or 255); the bluest patches fill blue more than a white "
-          "fills any channel"};
+          "fills any channel",
+          Finding::Kind::check};
 }
 
 /// Variance over mean of the electrons of one channel by the published sampling: sum x Qe^2 / sum x Qe.
@@ -202,7 +201,8 @@ Result<Finding> published_sampling(const ThesisCamera& camera, const RunOptions&
                  fmt::format("R, G, B with the peak of Qe at 1, its most favourable; {:.1f} standard errors from sum x "
                              "Qe^2 / sum x Qe. Detected photons are a thinned Poisson process, with 1: the other "
                              "findings are drawn so",
-                             worst)};
+                             worst),
+                 Finding::Kind::check};
 }
 
 Plot shift_plot(const Scenarios& s) {

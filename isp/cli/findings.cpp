@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include <fmt/format.h>
@@ -10,7 +11,7 @@
 namespace lowlux::cli {
 namespace {
 
-constexpr std::array<std::size_t, 4> widths{40, 24, 32, 13};  // finding, published, ours, verdict
+constexpr std::array<std::size_t, 5> widths{40, 9, 24, 32, 13};  // finding, kind, published, ours, verdict
 constexpr std::size_t note_width = 104;
 
 // Broken at blanks; a word that is longer than the width has its own line.
@@ -27,8 +28,8 @@ std::vector<std::string> wrapped(const std::string& text, std::size_t width) {
   return lines;
 }
 
-std::string table_row(const std::array<std::string, 4>& cells) {
-  std::array<std::vector<std::string>, 4> columns;
+std::string table_row(const std::array<std::string, 5>& cells) {
+  std::array<std::vector<std::string>, 5> columns;
   std::size_t height = 1;
   for (std::size_t c = 0; c < cells.size(); ++c) {
     columns[c] = wrapped(cells[c], widths[c]);
@@ -46,26 +47,37 @@ std::string table_row(const std::array<std::string, 4>& cells) {
   return out;
 }
 
+/// Those of a kind, and those of them that hold.
+struct Count {
+  std::ptrdiff_t all;
+  std::ptrdiff_t holding;
+};
+
+Count count_of(std::span<const isp::Finding> findings, isp::Finding::Kind kind) {
+  return {std::ranges::count(findings, kind, &isp::Finding::kind),
+          std::ranges::count_if(findings, [kind](const isp::Finding& f) { return f.kind == kind && f.holds; })};
+}
+
 }  // namespace
 
 std::string findings_text(std::span<const isp::Finding> findings) {
-  std::string out = table_row({"finding", "published", "ours", "verdict"});
-  std::size_t holding = 0;
+  std::string out = table_row({"finding", "kind", "published", "ours", "verdict"});
   for (const isp::Finding& f : findings) {
-    out += table_row({f.id, f.published, f.ours, std::string(isp::verdict_of(f))});
-    if (f.holds) {
-      ++holding;
-      continue;
-    }
+    out += table_row({f.id, std::string(isp::kind_of(f)), f.published, f.ours, std::string(isp::verdict_of(f))});
+    if (f.holds) continue;
     for (const std::string& line : wrapped(f.claim + ": " + f.note, note_width)) out += fmt::format("    {}\n", line);
   }
-  return out + fmt::format("{} of {} findings hold\n", holding, findings.size());
+  const Count published = count_of(findings, isp::Finding::Kind::published);
+  const Count checks = count_of(findings, isp::Finding::Kind::check);
+  return out + fmt::format("{} of {} published findings hold; {} of {} checks of our own\n", published.holding,
+                           published.all, checks.holding, checks.all);
 }
 
 std::string findings_json(std::span<const isp::Finding> findings) {
   auto out = nlohmann::ordered_json::array();
   for (const isp::Finding& f : findings) {
     out.push_back({{"id", f.id},
+                   {"kind", isp::kind_of(f)},
                    {"claim", f.claim},
                    {"published", f.published},
                    {"ours", f.ours},

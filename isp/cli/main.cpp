@@ -1,6 +1,7 @@
 #include <array>
 #include <cstdio>
 #include <exception>
+#include <new>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -70,7 +71,10 @@ int main(int argc, char** argv) {
     if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
     std::fprintf(stderr, "lowlux: cannot write to standard output\n");
     return lowlux::cli::exit_failed;
-  } catch (const std::exception& failure) {  // out of memory, above all
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "lowlux: not enough memory\n");
+    return lowlux::cli::exit_failed;
+  } catch (const std::exception& failure) {
     std::fprintf(stderr, "lowlux: %s\n", failure.what());
     return lowlux::cli::exit_failed;
   }

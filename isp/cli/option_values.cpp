@@ -63,6 +63,11 @@ CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::strin
                   });
 }
 
+int refuse(const CLI::App& app, const std::string& wrong) {
+  fmt::print(stderr, "{}: {}; --help lists the options\n", app.get_name(), wrong);
+  return exit_usage;
+}
+
 std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words) {
   try {
     app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // CLI11 takes them last first
@@ -70,8 +75,7 @@ std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& wo
     if (error.get_exit_code() == 0) return app.exit(error);  // help
     std::string text = error.what();
     std::replace(text.begin(), text.end(), '\n', ' ');
-    fmt::print(stderr, "{}: {}; --help lists the options\n", app.get_name(), text);
-    return exit_usage;
+    return refuse(app, text);
   }
   return std::nullopt;
 }

@@ -53,6 +53,9 @@ CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum
                   });
 }
 
+/// Prints what is wrong with a command line. @return the exit code
+int refuse(const CLI::App& app, const std::string& wrong);
+
 /// Parses the words after a verb. @return nullopt if they are good, else the exit code, help or error having been
 /// printed
 std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
@@ -19,6 +20,22 @@ namespace {
 
 bool names_table(const std::string& text) { return text.ends_with(".csv"); }
 
+/// With nodes at most 5 nm apart where sensors and eyes may see: at a light's own nodes alone is it integrated over.
+Result<Spectrum> finely_sampled(const Spectrum& light) {
+  constexpr double step_nm = 5, least_nm = 200, most_nm = 2500;
+  std::vector<double> nodes;
+  for (const double node : light.wavelengths_nm()) {
+    if (!nodes.empty() && node - nodes.back() > step_nm) {
+      const double end = std::min(node, most_nm);
+      for (double nm = step_nm * std::floor(std::max(nodes.back(), least_nm) / step_nm); nm < end; nm += step_nm) {
+        if (nm > nodes.back()) nodes.push_back(nm);
+      }
+    }
+    nodes.push_back(node);
+  }
+  return resample(light, nodes);
+}
+
 Result<Spectrum> light_of(const std::string& name, const char* option) {
   if (names_table(name)) {
     auto table = capture::read_spectra(name);
@@ -30,7 +47,7 @@ Result<Spectrum> light_of(const std::string& name, const char* option) {
     if (*std::min_element(power.begin(), power.end()) < 0) {
       return fail(ErrorCode::malformed, "a light has no negative power", name);
     }
-    return std::move(table->front().spectrum);
+    return finely_sampled(table->front().spectrum);
   }
   if (auto light = isp::light_named(name)) return *std::move(light);
   const auto near = near_matches(name, isp::light_names());
@@ -46,10 +63,27 @@ Result<capture::SceneSetup> setup_of(const SceneArgs& args) {
   return capture::SceneSetup{args.width, args.height, *std::move(light), args.light, args.luminance_cd_m2};
 }
 
+Result<std::vector<capture::SpectrumColumn>> read_reflectances(const std::string& file) {
+  constexpr double largest = 2;  // fluorescence and highlights reach beyond 1, percentages far beyond
+  auto table = capture::read_spectra(file);
+  if (!table) return table;
+  for (const capture::SpectrumColumn& column : *table) {
+    const auto values = column.spectrum.values();
+    if (const double most = *std::max_element(values.begin(), values.end()); most > largest) {
+      return fail(
+          ErrorCode::malformed,
+          fmt::format("the reflectance of {} is {:g}, and at most {:g} is taken for one: is the table in percent?",
+                      column.name, most, largest),
+          file);
+    }
+  }
+  return table;
+}
+
 Result<capture::Scene> chart_of(const SceneArgs& args, const capture::SceneSetup& setup) {
   const std::string which = args.what == "chart" ? "colorchecker" : args.what.substr(6);
   if (names_table(which)) {
-    const auto table = capture::read_spectra(which);
+    const auto table = read_reflectances(which);
     if (!table) return tl::make_unexpected(table.error());
     std::vector<isp::NamedSpectrum> patches;
     for (const capture::SpectrumColumn& column : *table) patches.push_back({column.name, column.spectrum});
@@ -78,6 +112,8 @@ Result<SceneOfArgs> picture_of(const SceneArgs& args, Executor& executor) {
     }
     return tl::make_unexpected(std::move(error));
   }
+  if (args.size_given) return fail(ErrorCode::invalid_argument, "a picture has its own size", "--size");
+  if (args.light_given) return fail(ErrorCode::invalid_argument, "a picture has its own light", "--light");
   const double luminance =
       picture->absolute && !args.luminance_given ? picture->white_luminance_cd_m2 : args.luminance_cd_m2;
   auto scene = capture::picture_scene(std::move(picture->xyz), luminance);

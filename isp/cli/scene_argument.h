@@ -18,7 +18,10 @@ struct SceneOfArgs {
   std::vector<std::string> warnings;
 };
 
-/// Errors: a file that cannot be read, an unknown light or chart (near matches are offered), a scene that cannot be.
+/// Lights from tables are resampled to steps of at most 5 nm in 200 to 2500 nm: they are linear between their nodes,
+/// and what is integrated over them is not. Errors: a file that cannot be read, an unknown light or chart (near matches
+/// are offered), a chart's reflectance above 2 (a table in percent), a scene that cannot be; a size or a light for a
+/// picture, which has its own.
 Result<SceneOfArgs> scene_of(const SceneArgs& args, std::uint64_t seed, Executor& executor);
 
 }  // namespace lowlux::cli

@@ -27,6 +27,7 @@ int side_of(const std::string& text) {
 
 Wrong set_size(const std::string& text, SceneArgs& scene) {
   const std::size_t x = std::min(text.find('x'), text.size());
+  scene.size_given = true;
   scene.width = side_of(text.substr(0, x));
   scene.height = side_of(text.substr(std::min(x + 1, text.size())));
   if (scene.width == 0 || scene.height == 0) return "is no WIDTHxHEIGHT of 1 to 65535 pixels";
@@ -45,30 +46,42 @@ Wrong add_lamp(const std::string& text, SceneArgs& scene) {
   return std::nullopt;
 }
 
-/// auto, all, none, or a list of names; photon-noise,dark-current... or all but some: all,-prnu.
+std::string no_effect(const std::string& word) {
+  const auto names = isp::effect_names();
+  const auto near = near_matches(word, names);
+  return fmt::format("holds '{}', which is none of auto, all, none, {}{}", word, fmt::join(names, ", "),
+                     near.empty() ? "" : fmt::format("; near it: {}", fmt::join(near, ", ")));
+}
+
+/// auto, all, none, or a list of names; photon-noise,dark-current... or all but some: all,-prnu or -prnu.
 Wrong set_effects(const std::string& text, capture::EffectChoice& choice) {
   if (text == "auto") {
     choice.tolerance = choice.tolerance.value_or(isp::Tolerance{});
     return std::nullopt;
   }
   const auto names = isp::effect_names();
-  isp::EffectSet effects;
+  isp::EffectSet effects = text.starts_with('-') ? isp::EffectSet::all() : isp::EffectSet();
+  isp::EffectSet named;
   for (std::string word : words_of(text)) {
     const bool without = word.starts_with('-');
     if (without) word.erase(0, 1);
     const auto found = std::find(names.begin(), names.end(), word);
+    if (word == "auto") return "holds auto, which decides on every effect and cannot be combined";
     if (word == "all" && !without) {
       effects = isp::EffectSet::all();
     } else if (word == "none" && !without) {
-      effects = {};
+      effects = named = {};
     } else if (found != names.end()) {
       const auto effect = static_cast<isp::Effect>(found - names.begin());
       effects = without ? effects.without(effect) : effects.with(effect);
+      named = without ? named.without(effect) : named.with(effect);
     } else {
-      const auto near = near_matches(word, names);
-      return fmt::format("holds '{}', which is none of auto, all, none, {}{}", word, fmt::join(names, ", "),
-                         near.empty() ? "" : fmt::format("; near it: {}", fmt::join(near, ", ")));
+      return no_effect(word);
     }
+  }
+  // Of all effects but dark current DSNU is quietly left out; who names it expects it to do something.
+  if (named.has(isp::Effect::dsnu) && !effects.has(isp::Effect::dark_current)) {
+    return "names dsnu without dark-current: dsnu multiplies the dark current";
   }
   choice.tolerance.reset();
   choice.effects = effects;
@@ -99,10 +112,13 @@ void add_scene(CLI::App& app, SceneArgs& s) {
       ->type_name("");
   add_text(app, "--size", "WxH", "of a scene that is no picture (default 1200x800)",
            [&s](const std::string& text) { return set_size(text, s); });
-  app.add_option("--light", s.light,
-                 "of charts and flats: a CIE illuminant or a lamp (--list), or a table's file "
-                 "(default D65)")
-      ->type_name("NAME|FILE.csv");
+  add_text(app, "--light", "NAME|FILE.csv",
+           "of charts and flats: a CIE illuminant or a lamp (--list), or a table's file (default D65)",
+           [&s](const std::string& text) -> Wrong {
+             s.light = text;
+             s.light_given = true;
+             return std::nullopt;
+           });
   add_number(app, "--luminance", "CD_M2",
              "of a white diffuser in the scene, in pictures of their white (default 1, or what the picture states)",
              [&s](double value) {
@@ -161,7 +177,7 @@ void add_camera(CLI::App& app, SimulateArgs& args) {
   capture::SyntheticOptions& o = args.options;
   app.add_option("--sensor", args.sensor, "by name (--list; default ELD_NikonD850)")->type_name("NAME");
   app.add_option("--gain", args.gain, "gain setting of the sensor, as ISO 1600 or its number")->type_name("SETTING");
-  app.add_option("--camera", args.camera,
+  app.add_option("--camera", args.figures.camera,
                  "whose spectral sensitivities (--list; default: the sensor's own or a stand-in)")
       ->type_name("NAME");
   add_number(app, "--exposure", "S", "exposure time (default 0.1)", [&o](double s) { o.exposure.time_s = s; });
@@ -178,8 +194,8 @@ void add_camera(CLI::App& app, SimulateArgs& args) {
 void add_work(CLI::App& app, SimulateArgs& args) {
   capture::SyntheticOptions& o = args.options;
   add_text(app, "--effects", "auto|all|none|LIST",
-           "what is simulated: what the scene calls for (auto, default), or names parted by commas (all,-prnu is all "
-           "but one)",
+           "what is simulated: what the scene calls for (auto, default), or names parted by commas (-prnu is all but "
+           "one)",
            [&o](const std::string& text) { return set_effects(text, o.effects); });
   add_choice<capture::PhotonSampling>(
       app, "--sampling",
@@ -229,7 +245,10 @@ Parsed<SimulateArgs> parse_simulate(const std::vector<std::string>& words) {
            [&tolerance](const std::string& text) { return set_tolerance(text, tolerance.emplace()); });
   add_figures(app, args);
   if (const auto code = parse_words(app, words)) return *code;
-  if (tolerance && args.options.effects.tolerance) args.options.effects.tolerance = tolerance;
+  if (tolerance) {
+    if (!args.options.effects.tolerance) return refuse(app, "--tolerance: it is for --effects auto, not for a list");
+    args.options.effects.tolerance = tolerance;
+  }
   args.options.f_number = args.optics.f_number;
   return args;
 }

@@ -23,7 +23,9 @@ struct SceneArgs {
   std::string what;  // a picture's file, or dark, flat, chart, chart:macbeth, chart:munsell, chart:FILE.csv
   int width = 1200;
   int height = 800;
+  bool size_given = false;
   std::string light = "D65";  // by name, or a table's file
+  bool light_given = false;
   double luminance_cd_m2 = 1;
   bool luminance_given = false;
   int stars = 0;
@@ -39,7 +41,6 @@ struct SimulateArgs {
   std::string truth_electrons;  // empty: not written
   std::string sensor = "ELD_NikonD850";
   std::string gain;
-  std::string camera;  // whose sensitivities; empty: the sensor's
   isp::SensorFigures figures;
   isp::Optics optics;
   capture::SyntheticOptions options;

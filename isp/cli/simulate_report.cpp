@@ -13,14 +13,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const char* reason_of(const isp::EffectDecision& decision) {
+const char* reason_of(const isp::EffectDecision& decision, isp::EffectSet wanted) {
   switch (decision.reason) {
     case isp::EffectDecision::Reason::absent:
       return "the sensor has none";
     case isp::EffectDecision::Reason::negligible:
       return "below the tolerance with all that is left out";
     case isp::EffectDecision::Reason::asked_for:
-      return "as asked";
+      return wanted.has(decision.effect) && !decision.kept ? "nothing without dark current" : "as asked";
     case isp::EffectDecision::Reason::free:
       return "negligible, but leaving it out saves nothing";
     case isp::EffectDecision::Reason::needed:
@@ -31,12 +31,12 @@ const char* reason_of(const isp::EffectDecision& decision) {
 
 std::string name_of(isp::Effect effect) { return std::string(isp::effect_names()[static_cast<int>(effect)]); }
 
-Json region_json(const isp::RegionPlan& region) {
+Json region_json(const isp::RegionPlan& region, isp::EffectSet wanted) {
   Json decisions = Json::array();
   for (const isp::EffectDecision& d : region.decisions) {
     decisions.push_back({{"effect", name_of(d.effect)},
                          {"kept", d.kept},
-                         {"reason", reason_of(d)},
+                         {"reason", reason_of(d, wanted)},
                          {"predicted_delta_e", d.alone.delta_e},
                          {"predicted_relative_variance", d.alone.relative_variance}});
   }
@@ -82,7 +82,7 @@ Json cost_json(const capture::EffectCost& cost) {
 
 }  // namespace
 
-std::string explain_text(const SimulateOutcome& outcome) {
+std::string explain_text(const SimulateArgs& args, const SimulateOutcome& outcome) {
   const isp::EffectPlan& plan = *outcome.plan;
   std::string text;
   auto out = std::back_inserter(text);
@@ -91,7 +91,8 @@ std::string explain_text(const SimulateOutcome& outcome) {
     fmt::format_to(out, "  {:<13} {:>10} {:>12}  {:<9} {}\n", "effect", "delta E", "variance", "decision", "because");
     for (const isp::EffectDecision& d : region.decisions) {
       fmt::format_to(out, "  {:<13} {:>10.3g} {:>12.3g}  {:<9} {}\n", name_of(d.effect), d.alone.delta_e,
-                     d.alone.relative_variance, d.kept ? "simulate" : "leave out", reason_of(d));
+                     d.alone.relative_variance, d.kept ? "simulate" : "leave out",
+                     reason_of(d, args.options.effects.effects));
     }
     fmt::format_to(out, "  {:<13} {:>10.3g} {:>12.3g}  of {:g} and {:g} tolerated\n", "left out",
                    region.left_out_together.delta_e, region.left_out_together.relative_variance, plan.tolerance.delta_e,
@@ -117,38 +118,46 @@ std::string simulate_text(const SimulateArgs& args, const SimulateOutcome& o) {
   for (const std::string& assumption : o.sensor.assumptions) {
     fmt::format_to(out, "  not sourced     taken as: {}\n", assumption);
   }
-  fmt::format_to(out, "  exposure        {:g} s at f/{:g}, {:g} C; white {:g} cd/m2, saturates at {:.3g} cd/m2\n",
-                 args.options.exposure.time_s, args.options.f_number, args.options.exposure.temperature_c,
-                 o.white_cd_m2, o.saturation_cd_m2);
+  fmt::format_to(out, "  exposure        {:g} s at f/{:g}, {:g} C; white {:g} cd/m2{}\n", args.options.exposure.time_s,
+                 args.options.f_number, args.options.exposure.temperature_c, o.white_cd_m2,
+                 o.saturation_cd_m2 ? fmt::format(", saturates at {:.3g} cd/m2 of D65", *o.saturation_cd_m2) : "");
   for (std::size_t i = 1; i < o.files.size(); ++i) fmt::format_to(out, "  also            {}\n", o.files[i]);
   return text;
 }
 
 std::string simulate_json(const SimulateArgs& args, const SimulateOutcome& o) {
   Json regions = Json::array();
-  for (const isp::RegionPlan& region : o.plan->regions) regions.push_back(region_json(region));
+  for (const isp::RegionPlan& region : o.plan->regions)
+    regions.push_back(region_json(region, args.options.effects.effects));
   Json json{{"files", o.files},
             {"sensor", sensor_json(o.sensor)},
             {"exposure_s", args.options.exposure.time_s},
             {"temperature_c", args.options.exposure.temperature_c},
             {"f_number", args.options.f_number},
             {"white_luminance_cd_m2", o.white_cd_m2},
-            {"saturation_luminance_cd_m2", o.saturation_cd_m2},
             {"seed", args.options.seed},
             {"tolerance",
              {{"delta_e", o.plan->tolerance.delta_e}, {"relative_variance", o.plan->tolerance.relative_variance}}},
             {"regions", regions},
             {"warnings", o.warnings}};
+  if (o.saturation_cd_m2) json["saturation_luminance_cd_m2"] = *o.saturation_cd_m2;  // of D65
   if (o.cost) json["cost"] = cost_json(*o.cost);
   for (const isp::StageTime& time : o.times) json["times_s"][time.stage] = time.seconds;
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
 std::string simulate_list() {
-  std::string text = "sensors, with their gain settings\n";
+  std::string text =
+      "sensors, with their gain settings and the options that must be given where no source has the figure\n"
+      "(--iso or --white-luminance in place of --pixel-pitch and --peak-qe)\n";
   auto out = std::back_inserter(text);
   for (const std::string_view name : isp::sensor_names()) {
-    const auto settings = isp::gain_settings(name);
+    std::vector<std::string> settings;
+    for (const std::string_view gain : isp::gain_settings(name)) {
+      const auto needed = isp::options_needed(name, gain);
+      settings.push_back(fmt::format("{}{}{}", gain, gain.empty() || needed.empty() ? "" : " ",
+                                     needed.empty() ? "" : fmt::format("(needs {})", fmt::join(needed, ", "))));
+    }
     fmt::format_to(out, "  {:<26} {}\n", name, fmt::join(settings, "; "));
   }
   fmt::format_to(out, "lights\n");

@@ -64,8 +64,9 @@ std::vector<isp::Finding> findings_of(const std::vector<Done>& done) {
 std::vector<OutputFile> files_of(const std::vector<Done>& done, const ReproduceArgs& args) {
   std::vector<OutputFile> out{{"findings.csv", isp::csv_of(isp::table_of(findings_of(done)))}};
   isp::Report report{"lowlux reproduce: published experiments and ours",
-                     fmt::format("Seed {}{}. Each published finding stands beside the same quantity computed here; a "
-                                 "sampled figure agrees within five standard errors.",
+                     fmt::format("Seed {}{}. Each published finding stands beside the same quantity computed here, "
+                                 "each check of our own beside what is expected; a sampled figure agrees within five "
+                                 "standard errors.",
                                  args.seed, args.quick ? ", quick: fewer samples" : ""),
                      {}};
   for (const Done& d : done) {

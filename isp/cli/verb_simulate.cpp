@@ -18,6 +18,7 @@
 #include "isp/cli/verbs.h"
 #include "isp/cli/version.h"
 #include "isp/model/colorimetry.h"
+#include "isp/model/given_figures.h"
 #include "isp/output/dng_writer.h"
 #include "isp/output/image_writer.h"
 #include "isp/pipeline/stage_clock.h"
@@ -162,17 +163,19 @@ class Simulation {
   Result<capture::SyntheticSource> make_source(isp::StageClock& clock) {
     auto sensor = isp::sensor_named(args_.sensor, args_.gain, args_.figures);
     if (!sensor) return tl::make_unexpected(sensor.error());
-    if (!args_.camera.empty()) sensor->camera = args_.camera;
     auto response = isp::spectral_response(*sensor, args_.optics);
     if (!response) return tl::make_unexpected(response.error());
+    const auto used = isp::check_given_figures(args_.figures, *sensor, args_.optics);
+    if (!used) return tl::make_unexpected(used.error());
     auto scene = scene_of(args_.scene, args_.options.seed, executor_);
     if (!scene) return tl::make_unexpected(scene.error());
     clock.lap("scene");
     out_.sensor = *sensor;
     out_.white_cd_m2 = scene->white_luminance_cd_m2;
     out_.warnings = scene->warnings;
-    out_.saturation_cd_m2 =
-        isp::saturation_luminance_cd_m2(sensor->model, *response, std::max(args_.options.exposure.time_s, 1e-12));
+    if (const double time_s = args_.options.exposure.time_s; time_s > 0) {
+      out_.saturation_cd_m2 = isp::saturation_luminance_cd_m2(sensor->model, *response, time_s);
+    }
     description_ = scene->scene.description;
     warn_of_size(scene->scene.xyz_cd_m2);
     auto source = capture::SyntheticSource::of(std::move(scene->scene), *std::move(sensor), *std::move(response),
@@ -265,7 +268,7 @@ void print_outcome(const SimulateArgs& args, const SimulateOutcome& outcome) {
     return;
   }
   if (!args.quiet) fmt::print("{}", simulate_text(args, outcome));
-  if (args.explain) fmt::print("{}", explain_text(outcome));
+  if (args.explain) fmt::print("{}", explain_text(args, outcome));
   if (args.timings) fmt::print("{}", times_text(outcome.times));
 }
 

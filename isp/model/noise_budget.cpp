@@ -38,6 +38,13 @@ Result<void> check_not_negative(const SensorModel& s) {
                   s.name);
     }
   }
+  for (const Named& noise : std::initializer_list<Named>{
+           {"read noise", s.read_noise_e}, {"row noise", s.row_noise_e}, {"column noise", s.column_noise_e}}) {
+    if (noise.value > largest_noise_e) {
+      return fail(ErrorCode::invalid_argument,
+                  std::string("the ") + noise.name + " is at most 1e6 e-, found " + text_of(noise.value), s.name);
+    }
+  }
   return {};
 }
 
@@ -62,6 +69,9 @@ Result<void> check_sensor(const SensorModel& s) {
   if (!(s.black_level_dn >= 0) || !(s.white_level_dn <= largest_code) || !(s.black_level_dn < s.white_level_dn)) {
     return wrong("black and white level must be 0 <= black < white <= " + text_of(largest_code) + ", found " +
                  text_of(s.black_level_dn) + " and " + text_of(s.white_level_dn));
+  }
+  if (s.white_level_dn != std::floor(s.white_level_dn)) {
+    return wrong("the white level is a code, a whole number, found " + text_of(s.white_level_dn));
   }
   if (!(s.full_well_e > 0) || !(s.full_well_e <= largest_full_well_e)) {
     return wrong("the full well must be above 0 and at most 990000 e-, found " + text_of(s.full_well_e));

@@ -7,10 +7,13 @@
 
 namespace lowlux::isp {
 
-/// An error unless the sensor can exist: figures finite and not negative, gain and full well positive, 1 to 16 bits,
-/// 0 <= black < white <= 2^bits - 1, a dark current that doubles every 1 to 1000 degrees, a full well the
-/// sampler can draw.
+/// An error unless the sensor can exist: figures finite and not negative, gain and full well positive, read, row and
+/// column noise of at most largest_noise_e, 1 to 16 bits, 0 <= black < white <= 2^bits - 1, a white level that is a
+/// whole number, a dark current that doubles every 1 to 1000 degrees, a full well the sampler can draw.
 Result<void> check_sensor(const SensorModel& sensor);
+
+/// The largest standard deviation check_sensor() lets pass [e-]: more than any full well.
+inline constexpr double largest_noise_e = 1e6;
 
 /// The largest full well check_sensor() lets pass [e-]: seven standard deviations below the sampler's limit, so that
 /// a mean beyond the limit fills the pixel in any case.

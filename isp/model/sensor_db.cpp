@@ -47,7 +47,7 @@ bool is_setting(std::string_view setting, std::string_view wanted) {
   const std::string whole = lower(setting), word = lower(wanted);
   if (whole == word) return true;
   for (std::size_t at = whole.find(word); at != std::string::npos; at = whole.find(word, at + 1)) {
-    const bool begins = at == 0 || whole[at - 1] == ' ';
+    const bool begins = at == 0 || whole[at - 1] == ' ' || whole[at - 1] == '=';
     const std::size_t end = at + word.size();
     if (begins && (end == whole.size() || whole[end] == ' ')) return true;
   }
@@ -101,7 +101,7 @@ Result<int> find_row(std::string_view name, std::string_view gain) {
                 "there is no sensor '" + std::string(name) + "'; " +
                     (near.empty() ? "there are " + list(names) : "near it: " + list(near)));
   }
-  if (gain.empty() || name == thesis_sensor) return rows.front();
+  if (gain.empty()) return rows.front();
   for (const int row : rows) {
     if (is_setting(sensors().text(row, "gain_setting"), gain)) return row;
   }
@@ -170,25 +170,49 @@ void take_fixed_pattern(NamedSensor& out, const SensorFigures& given) {
   if (!absent.empty()) out.assumptions.push_back(absent);
 }
 
-/// What no frame can be simulated without.
-Result<void> check_sourced(std::string_view name, int row, const SensorFigures& given) {
-  const struct {
-    bool known;
-    const char* what;
-    const char* option;
-  } needed[] = {
-      {given.bits || sensors().number(row, "bits"), "the converter's bits", "--bits"},
-      {given.system_gain_dn_per_e || sensors().number(row, "conversion_gain_DN_per_e"), "its gain", "--system-gain"},
-      {given.read_noise_e || sensors().number(row, "read_noise_e"), "its read noise", "--read-noise"},
+struct UnknownFigure {
+  std::string_view what;
+  std::string_view option;
+};
+
+/// What no frame can be simulated without, as far as it is not known.
+std::vector<UnknownFigure> unknown_electronics(int row, const SensorFigures& given) {
+  std::vector<UnknownFigure> unknown;
+  const auto need = [&](bool known, const UnknownFigure& figure) {
+    if (!known) unknown.push_back(figure);
   };
+  const TextTable& t = sensors();
+  need(given.bits || t.number(row, "bits"), {"the converter's bits", "--bits"});
+  need(given.system_gain_dn_per_e || t.number(row, "conversion_gain_DN_per_e"), {"its gain", "--system-gain"});
+  need(given.read_noise_e || t.number(row, "read_noise_e"), {"its read noise", "--read-noise"});
+  return unknown;
+}
+
+Result<void> check_sourced(std::string_view name, int row, const SensorFigures& given) {
   std::string what, options;
-  for (const auto& figure : needed) {
-    if (figure.known) continue;
+  for (const UnknownFigure& figure : unknown_electronics(row, given)) {
     what += (what.empty() ? "" : ", ") + std::string(figure.what);
     options += (options.empty() ? "" : ", ") + std::string(figure.option);
   }
   if (what.empty()) return {};
   return fail(ErrorCode::insufficient, "no source gives " + what + "; give " + options, std::string(name));
+}
+
+/// The speed in the name of a gain setting.
+std::optional<double> iso_of(const std::string& gain_setting) {
+  double iso = 0;
+  return std::sscanf(gain_setting.c_str(), "ISO %lf", &iso) == 1 ? std::optional(iso) : std::nullopt;
+}
+
+void take_camera(NamedSensor& out, const SensorFigures& given) {
+  if (given.camera) {
+    out.camera = *given.camera;
+    return;
+  }
+  const auto* const own =
+      std::find_if(cameras.begin(), cameras.end(), [&](const CameraOf& c) { return c.sensor == out.model.name; });
+  out.camera = own == cameras.end() ? stand_in_camera : own->camera;
+  if (own == cameras.end() || !own->own) out.assumptions.push_back("the colours of a " + out.camera);
 }
 
 }  // namespace
@@ -210,6 +234,18 @@ std::vector<std::string_view> gain_settings(std::string_view name) {
   return settings;
 }
 
+std::vector<std::string_view> options_needed(std::string_view name, std::string_view gain) {
+  const Result<int> row = find_row(name, gain);
+  if (!row) return {};
+  std::vector<std::string_view> options;
+  for (const UnknownFigure& figure : unknown_electronics(*row, {})) options.push_back(figure.option);
+  // The thesis' sensor has a scale of its own.
+  if (name == thesis_sensor || iso_of(std::string(sensors().text(*row, "gain_setting")))) return options;
+  if (!sensors().number(*row, "pixel_pitch_um")) options.emplace_back("--pixel-pitch");
+  if (!sensors().number(*row, "peak_qe")) options.emplace_back("--peak-qe");
+  return options;
+}
+
 Result<NamedSensor> sensor_named(std::string_view name, std::string_view gain, const SensorFigures& figures) {
   const Result<int> row = find_row(name, gain);
   if (!row) return tl::make_unexpected(row.error());
@@ -223,15 +259,12 @@ Result<NamedSensor> sensor_named(std::string_view name, std::string_view gain, c
   out.pixel_pitch_um = figures.pixel_pitch_um ? figures.pixel_pitch_um : sensors().number(*row, "pixel_pitch_um");
   out.peak_quantum_efficiency =
       figures.peak_quantum_efficiency ? figures.peak_quantum_efficiency : sensors().number(*row, "peak_qe");
-  out.iso = figures.iso;
-  if (double iso = 0; !out.iso && std::sscanf(out.gain_setting.c_str(), "ISO %lf", &iso) == 1) out.iso = iso;
+  out.iso_given = figures.iso.has_value();
+  out.iso = out.iso_given ? figures.iso : iso_of(out.gain_setting);
   take_electronics(out, *row, figures);
   take_dark_current(out, *row, figures);
   take_fixed_pattern(out, figures);
-  const auto* const own =
-      std::find_if(cameras.begin(), cameras.end(), [&](const CameraOf& c) { return c.sensor == name; });
-  out.camera = own == cameras.end() ? stand_in_camera : own->camera;
-  if (own == cameras.end() || !own->own) out.assumptions.push_back("the colours of a " + out.camera);
+  take_camera(out, figures);
   if (const auto possible = check_sensor(out.model); !possible) return tl::make_unexpected(possible.error());
   return out;
 }

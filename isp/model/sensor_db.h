@@ -32,6 +32,7 @@ struct SensorFigures {
   std::optional<double> peak_quantum_efficiency;
   std::optional<double> iso;
   std::optional<Quantisation> quantisation;
+  std::optional<std::string> camera;  // whose spectral sensitivities
 };
 
 /// A sensor by name, complete enough to be simulated, and what of it nobody has measured.
@@ -43,6 +44,7 @@ struct NamedSensor {
   std::optional<double> pixel_pitch_um;
   std::optional<double> peak_quantum_efficiency;
   std::optional<double> iso;             // of the gain setting
+  bool iso_given = false;                // by the user: it comes before pitch and efficiency
   std::vector<std::string> assumptions;  // one line each: a figure no source gives, and what was taken instead
 };
 
@@ -54,6 +56,10 @@ std::vector<std::string_view> sensor_names();
 
 /// The gain settings of a sensor, as its source calls them.
 std::vector<std::string_view> gain_settings(std::string_view name);
+
+/// The options without which a sensor at a gain setting cannot be simulated, none if its sources suffice: what
+/// sensor_named() and spectral_response() would ask for. Of an unknown sensor or setting there are none.
+std::vector<std::string_view> options_needed(std::string_view name, std::string_view gain);
 
 /// A sensor of data/sensors.csv at a gain setting.
 /// @param gain     a gain setting or its number ("ISO 1600", "1600"); empty: the first of the table

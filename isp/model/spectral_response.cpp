@@ -67,6 +67,14 @@ Result<void> check_figures(const NamedSensor& sensor, const Optics& optics) {
   return {};
 }
 
+tl::unexpected<Error> no_scale(const NamedSensor& sensor) {
+  std::string missing = sensor.pixel_pitch_um ? "" : "--pixel-pitch";
+  if (!sensor.peak_quantum_efficiency) missing += missing.empty() ? "--peak-qe" : " and --peak-qe";
+  return fail(ErrorCode::insufficient,
+              "no source tells how much light the sensor " + sensor.model.name + " needs; give " + missing +
+                  ", or --iso, or --white-luminance (the luminance that fills a pixel in 1 s)");
+}
+
 }  // namespace
 
 Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Optics& optics) {
@@ -77,22 +85,19 @@ Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Opti
   for (Spectrum& channel : *efficiency) channel = channel.mapped([&](double, double value) { return peak * value; });
   SpectralResponse out{sensor.model.name + " through the filters of " + sensor.camera, *std::move(efficiency), 0};
 
-  auto white = optics.white_luminance_cd_m2;
-  if (!white && sensor.model.name == thesis_sensor) white = thesis_white_luminance_cd_m2;
+  const bool lens = sensor.pixel_pitch_um && sensor.peak_quantum_efficiency;
   const double n2 = optics.f_number * optics.f_number;
-  if (white) {
-    out.etendue_m2_sr = etendue_for(out, *white, sensor.model.full_well_e);
-  } else if (sensor.pixel_pitch_um && sensor.peak_quantum_efficiency) {
+  if (optics.white_luminance_cd_m2) {
+    out.etendue_m2_sr = etendue_for(out, *optics.white_luminance_cd_m2, sensor.model.full_well_e);
+  } else if (sensor.iso && (sensor.iso_given || !lens)) {
+    out.etendue_m2_sr = etendue_for(out, 78 * n2 / (0.65 * *sensor.iso), saturation_charge_e(sensor.model));
+  } else if (lens) {
     const double pitch_m = *sensor.pixel_pitch_um * 1e-6;
     out.etendue_m2_sr = pitch_m * pitch_m * std::numbers::pi / (4 * n2);
-  } else if (sensor.iso) {
-    out.etendue_m2_sr = etendue_for(out, 78 * n2 / (0.65 * *sensor.iso), saturation_charge_e(sensor.model));
+  } else if (sensor.model.name == thesis_sensor) {
+    out.etendue_m2_sr = etendue_for(out, thesis_white_luminance_cd_m2, sensor.model.full_well_e);
   } else {
-    return fail(
-        ErrorCode::insufficient,
-        "no source tells how much light the sensor " + sensor.model.name +
-            " needs; give --pixel-pitch and --peak-qe, or --iso, or --white-luminance (the luminance that fills "
-            "a pixel in 1 s)");
+    return no_scale(sensor);
   }
   return out;
 }

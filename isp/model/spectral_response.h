@@ -27,10 +27,12 @@ inline constexpr double assumed_peak_quantum_efficiency = 0.5;
 
 /// The sensor behind a lens, looking through the filters of sensor.camera. The scale of its quantum efficiency is the
 /// first of these that is known:
-///     Optics::white_luminance_cd_m2, or thesis_white_luminance_cd_m2 for the thesis' sensor;
+///     Optics::white_luminance_cd_m2;
+///     an ISO speed S given by the user: white at L = 78 N^2 / (0.65 S t) saturates (isp/model/scene_luminance.h);
 ///     pixel pitch p and peak quantum efficiency: etendue = p^2 pi / (4 N^2) for an ideal lens of f-number N;
-///     the ISO speed S of the gain setting: white at L = 78 N^2 / (0.65 S t) saturates (isp/model/scene_luminance.h).
-/// Errors: none of them is known (the message says what to give); an unknown camera (near matches are offered); an
+///     the ISO speed of the table's gain setting;
+///     thesis_white_luminance_cd_m2 for the thesis' sensor.
+/// Errors: none of them is known (the message names what is missing); an unknown camera (near matches are offered); an
 /// f-number, luminance, pixel pitch or ISO speed that is not positive or out of all proportion, used or not.
 Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Optics& optics);
 

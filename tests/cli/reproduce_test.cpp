@@ -46,6 +46,21 @@ TEST(Reproduce, JsonHasTheFindingsOfTheChosenExperimentsInTheirOrder) {
   EXPECT_TRUE(findings.front()["id"].get<std::string>().starts_with("frequency-of-seeing/"));
   EXPECT_TRUE(findings.back()["id"].get<std::string>().starts_with("few-photons/"));
   EXPECT_TRUE(findings.front()["holds"].is_boolean());
+  for (const Json& finding : findings) {
+    const std::string id = finding["id"];
+    if (id == "frequency-of-seeing/shape") {
+      EXPECT_EQ(finding["kind"], "published");
+    }
+    if (id == "frequency-of-seeing/tail") {
+      EXPECT_EQ(finding["kind"], "check");
+    }
+  }
+}
+
+TEST(Reproduce, CountsPublishedFindingsAndChecksApart) {
+  const auto result = reproduce({"frequency-of-seeing", "--quick"});
+  EXPECT_NE(result.out.find("\n1 of 1 published findings hold; 1 of 2 checks of our own\n"), std::string::npos)
+      << result.out;
 }
 
 TEST(Reproduce, SeedsGiveSamplesThatDifferAndRepeat) {
@@ -65,7 +80,7 @@ TEST(Reproduce, WritesTableDataAndReportAndOverwritesNothing) {
     EXPECT_FALSE(scratch.read(std::string("a/b") + name).empty()) << name;
   }
   const std::string before = scratch.read("a/b/findings.csv");
-  EXPECT_TRUE(before.starts_with("finding,claim,published,ours,holds,note\n"));
+  EXPECT_TRUE(before.starts_with("finding,kind,claim,published,ours,holds,note\n"));
 
   const auto again = reproduce({"dark-desaturation", "--quick", "-o", folder, "--seed", "2"});
   EXPECT_EQ(again.exit_code, 1);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -19,10 +20,10 @@ class SimulateCommand : public testing::Test {
     return run_process(args);
   }
 
-  /// `scene`, the output NAME.dng and a size that takes no time, then `more`.
+  /// `scene`, the output NAME.dng and, unless it is a file, a size that takes no time, then `more`.
   ProcessResult simulate(const std::string& scene, const std::string& name, const std::vector<std::string>& more = {}) {
     std::vector<std::string> args{"simulate", scene, "-o", file(name)};
-    if (std::find(more.begin(), more.end(), "--size") == more.end()) {
+    if (!std::filesystem::exists(scene) && std::find(more.begin(), more.end(), "--size") == more.end()) {
       args.insert(args.end(), {"--size", "64x48"});
     }
     args.insert(args.end(), more.begin(), more.end());

@@ -94,11 +94,41 @@ TEST_F(SimulateInput, ImpossibleSensorsAreRefused) {
                 {{"--row-noise", "-1"}, "row noise"},
                 {{"--column-noise", "inf"}, "--column-noise"},
                 {{"--pixel-pitch", "-4"}, "pixel pitch"},
+                {{"--read-noise", "2e6"}, "at most 1e6 e-"},
+                {{"--white-level", "4000.5"}, "whole number"},
                 {{"--peak-qe", "1.5"}, "quantum efficiency"},
                 {{"--iso", "0"}, "ISO"},
                 {{"--iso", "1e-300"}, "ISO"},
                 {{"--white-luminance", "0"}, "fills a pixel"},
                 {{"--quantise", "up"}, "floor, round"}});
+}
+
+TEST_F(SimulateInput, OptionsThatWouldDoNothingNameTheOneThatIsMissing) {
+  expect_usage({{{"--hot-pixels", "0.001"}, "--hot-pixels does nothing without --hot-current"},
+                {{"--hot-current", "100"}, "--hot-current does nothing without --hot-pixels"},
+                {{"--dsnu", "0.1"}, "--dsnu does nothing without --dark-current"},
+                {{"--dark-temperature", "5"}, "--dark-temperature does nothing without --dark-current"},
+                {{"--dark-doubling", "6"}, "--dark-doubling does nothing without --dark-current"},
+                {{"--pixel-pitch", "4"}, "--pixel-pitch does nothing without --peak-qe"},
+                {{"--tolerance", "1", "--effects", "all"}, "--tolerance: it is for --effects auto"},
+                {{"--effects", "none", "--tolerance", "1"}, "--tolerance: it is for --effects auto"}});
+  simulate("flat", "a.dng", {"--tolerance", "1", "--effects", "auto"});
+  EXPECT_TRUE(scratch_.holds("a.dng"));
+}
+
+TEST_F(SimulateInput, PicturesHaveTheirOwnSizeAndLight) {
+  const std::string scene = picture("scene.pfm", pfm_of(grey(0.5F)));
+  expect_refused(scene, {"--size", "32x24"}, 2, "own size (--size)");
+  expect_refused(scene, {"--light", "D65"}, 2, "own light (--light)");
+  EXPECT_EQ(simulate(scene, "a.dng").exit_code, 0);
+}
+
+TEST_F(SimulateInput, ListsOfEffectsThatContradictThemselvesAreRefused) {
+  expect_usage({{{"--effects", "auto,-prnu"}, "cannot be combined"},
+                {{"--effects", "prnu,auto"}, "cannot be combined"},
+                {{"--effects", "photon-noise,dsnu"}, "dsnu multiplies the dark current"},
+                {{"--effects", "all,-dark-current,dsnu"}, "dsnu multiplies the dark current"},
+                {{"--effects", "dsnu,dark-current,-dark-current"}, "dsnu multiplies the dark current"}});
 }
 
 TEST_F(SimulateInput, ImpossibleExposuresAndScenesAreRefused) {
@@ -133,6 +163,7 @@ TEST_F(SimulateInput, UnknownNamesAreRefusedWithTheNearest) {
   expect_usage({{{"--sensor", "ELD_NikonD85O"}, "near it: ELD_NikonD850"},
                 {{"--sensor", "qqqqqqqq"}, "there are thesis, "},
                 {{"--gain", "12345"}, "ISO 100, ISO 400"},
+                {{"--sensor", "thesis", "--gain", "99"}, "but for G=141.67"},
                 {{"--light", "D66"}, "near it: D65 (--light)"},
                 {{"--light", "qqqqqqqq"}, "--list"},
                 {{"--lamp", "3,3,D66,1"}, "near it: D65 (--lamp)"},
@@ -152,6 +183,7 @@ TEST_F(SimulateInput, UnknownNamesAreRefusedWithTheNearest) {
 TEST_F(SimulateInput, SensorsWithoutSourcedFiguresSayWhatToGive) {
   expect_refused("flat", {"--sensor", "ZWO_ASI290MM"}, 1, "--read-noise");
   expect_refused("flat", {"--sensor", "ZWO_ASI290MM", "--read-noise", "3"}, 1, "--white-luminance");
+  expect_refused("flat", {"--sensor", "RaspberryPi_HQ"}, 1, "give --peak-qe, or --iso");
 }
 
 TEST_F(SimulateInput, TablesThatAreNoneAreRefusedByLine) {
@@ -194,9 +226,11 @@ TEST_F(SimulateInput, LightsThatCannotBeAreRefused) {
   }
 }
 
-TEST_F(SimulateInput, ReflectancesBelowZeroOrBeyondAllLightAreRefused) {
+TEST_F(SimulateInput, ReflectancesBelowZeroOrAboveTwoAreRefused) {
   expect_refused("chart:" + table("negative", "nm,a\n380,1\n780,-0.1\n"), {}, 2, "never negative");
-  expect_refused("chart:" + table("endless", "nm,a\n380,1e305\n780,1e305\n"), {"--luminance", "1e12"}, 2, "(a)");
+  expect_refused("chart:" + table("percent", "nm,a,b\n380,0.1,5\n780,2,90\n"), {}, 1, "reflectance of b is 90");
+  expect_refused("chart:" + table("above", "nm,a\n380,2.001\n780,1\n"), {}, 1, "is the table in percent?");
+  EXPECT_EQ(simulate("chart:" + table("largest", "nm,a\n380,2\n780,2\n"), "a.dng").exit_code, 0);
 }
 
 TEST_F(SimulateInput, PicturesThatAreNoLightAreRefused) {
@@ -204,7 +238,9 @@ TEST_F(SimulateInput, PicturesThatAreNoLightAreRefused) {
   nan.plane[1].at(3, 2) = std::numeric_limits<float>::quiet_NaN();
   negative.plane[0].at(5, 7) = -0.5F;
   infinite.plane[2].at(1, 1) = std::numeric_limits<float>::infinity();
-  for (const auto& [scene, clue] : {std::pair{&nan, "green of the pixel at column 3, row 2"}, {&negative, "red of the pixel at column 5, row 7"}, {&infinite, "blue of the pixel at column 1, row 1"}}) {
+  for (const auto& [scene, clue] : {std::pair{&nan, "green of the pixel at column 3, row 2"},
+                                    {&negative, "red of the pixel at column 5, row 7"},
+                                    {&infinite, "blue of the pixel at column 1, row 1"}}) {
     expect_refused(picture("in.pfm", pfm_of(*scene)), {}, 1, clue);
     const auto exr = test::encoded([&, from = scene](std::FILE* out) { return isp::encode_exr(*from, {}, {}, out); });
     if (scene != &infinite) expect_refused(picture("in.exr", exr), {}, 1, clue);  // half floats hold 65504 instead

@@ -70,20 +70,21 @@ struct Figure {
 };
 
 TEST(CheckSensor, PassesBothEndsOfEveryRangeAndNothingBeyond) {
-  const std::vector<double> good_noise{0, 1e-300, 1e9}, bad_noise{-1e-300, 1.0000001e9, nan, inf, -inf};
+  const std::vector<double> good_noise{0, 1e-300, 1e6}, bad_noise{-1e-300, 1.0000001e6, nan, inf, -inf};
+  const std::vector<double> good_current{0, 1e-300, 1e9}, bad_current{-1e-300, 1.0000001e9, nan, inf, -inf};
   const std::vector<double> good_share{0, 1}, bad_share{-1e-9, 1.0000001, nan, inf};
   const Figure figures[] = {
       {"system gain", &SensorModel::system_gain_dn_per_e, {1e-300, 1e6}, {0, -1, 1.0000001e6, nan, inf}},
       {"read noise", &SensorModel::read_noise_e, good_noise, bad_noise},
       {"full well", &SensorModel::full_well_e, {1e-300, largest_full_well_e}, {0, -1, 990001, nan, inf}},
       {"black level", &SensorModel::black_level_dn, {0, 4094.999}, {-1e-9, 4095, 5000, nan, inf, -inf}},
-      {"white level", &SensorModel::white_level_dn, {256.001, 4095}, {256, 100, 4095.001, nan, inf, -inf}},
+      {"white level", &SensorModel::white_level_dn, {257, 4095}, {256, 100, 4094.5, 4095.001, nan, inf, -inf}},
       {"dark temperature", &SensorModel::dark_temperature_c, {-200, 200}, {-200.1, 200.1, nan, inf}},
       {"dark doubling", &SensorModel::dark_doubling_c, {1, 1000}, {0.999, 1000.1, 0, -7, nan, inf}},
       {"prnu", &SensorModel::prnu, good_share, bad_share},
       {"dsnu", &SensorModel::dsnu, good_share, bad_share},
       {"hot pixel fraction", &SensorModel::hot_pixel_fraction, good_share, bad_share},
-      {"hot pixel current", &SensorModel::hot_pixel_current_e_per_s, good_noise, bad_noise},
+      {"hot pixel current", &SensorModel::hot_pixel_current_e_per_s, good_current, bad_current},
       {"row noise", &SensorModel::row_noise_e, good_noise, bad_noise},
       {"column noise", &SensorModel::column_noise_e, good_noise, bad_noise},
   };
@@ -131,6 +132,8 @@ TEST(CheckSensor, NamesWhatIsWrongAndWhatItFound) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
   };
   expect_part(message(&SensorModel::read_noise_e, -2), "found -2");
+  expect_part(message(&SensorModel::row_noise_e, 2e6), "the row noise is at most 1e6 e-, found 2e+06");
+  expect_part(message(&SensorModel::white_level_dn, 4000.5), "whole number, found 4000.5");
   expect_part(message(&SensorModel::prnu, 3), "found 3");
   expect_part(message(&SensorModel::dark_temperature_c, 300), "temperature");
   expect_part(message(&SensorModel::dark_temperature_c, 300), "found 300");

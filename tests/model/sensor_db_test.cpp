@@ -12,6 +12,7 @@
 
 #include "isp/model/noise_budget.h"
 #include "isp/model/spectral_data.h"
+#include "isp/model/spectral_response.h"
 
 namespace lowlux::isp {
 namespace {
@@ -62,6 +63,7 @@ TEST(SensorDb, WhatIsNotSourcedIsAnAssumptionThatSaysSo) {
   EXPECT_DOUBLE_EQ(m.full_well_e, (16383 - 1024) / 6.641);
   EXPECT_DOUBLE_EQ(m.row_noise_e, 0.058297);
   EXPECT_EQ(sensor->iso, 1600);
+  EXPECT_FALSE(sensor->iso_given);
   EXPECT_TRUE(assumes(*sensor, "black level 1024 DN"));
   EXPECT_TRUE(assumes(*sensor, "full well"));
   EXPECT_TRUE(assumes(*sensor, "no dark current"));
@@ -90,6 +92,7 @@ TEST(SensorDb, FiguresGivenTakeThePlaceOfTheTablesAndOfAssumptions) {
   given.peak_quantum_efficiency = 0.7;
   given.iso = 333;
   given.quantisation = Quantisation::floor;
+  given.camera = "Canon_EOS_600D";
   const auto sensor = sensor_named("ELD_NikonD850", "ISO 100", given);
   ASSERT_TRUE(sensor);
   const SensorModel& m = sensor->model;
@@ -112,6 +115,8 @@ TEST(SensorDb, FiguresGivenTakeThePlaceOfTheTablesAndOfAssumptions) {
   EXPECT_EQ(sensor->pixel_pitch_um, 3.3);
   EXPECT_EQ(sensor->peak_quantum_efficiency, 0.7);
   EXPECT_EQ(sensor->iso, 333);
+  EXPECT_TRUE(sensor->iso_given);
+  EXPECT_EQ(sensor->camera, "Canon_EOS_600D");
   EXPECT_TRUE(sensor->assumptions.empty()) << sensor->assumptions.front();
 }
 
@@ -122,6 +127,26 @@ TEST(SensorDb, SettingsAreFoundByTheirNumberInAnyCase) {
   EXPECT_FALSE(sensor_named("ELD_NikonD850", "16", {})) << "part of a number is none";
   EXPECT_FALSE(sensor_named("ELD_NikonD850", "600", {}));
   EXPECT_EQ(sensor_named("ZWO_ASI294MC_Pro", "120", {})->gain_setting, "gain 120 (0.1 dB units)");
+}
+
+TEST(SensorDb, TheThesisSensorHasOneSettingAndNoOther) {
+  for (const char* gain : {"", "G=141.67", "141.67"}) EXPECT_TRUE(sensor_named("thesis", gain, {})) << gain;
+  for (const char* gain : {"99", "141", "1.67"}) {
+    const auto refused = sensor_named("thesis", gain, {});
+    ASSERT_FALSE(refused) << gain;
+    EXPECT_EQ(refused.error().code, ErrorCode::invalid_argument);
+    EXPECT_NE(refused.error().message.find("but for G=141.67"), std::string::npos) << refused.error().message;
+  }
+}
+
+TEST(SensorDb, ColoursAreAnAssumptionUnlessTheyAreTheSensorsOwnOrChosen) {
+  EXPECT_TRUE(assumes(*sensor_named("HWK4123_low_gain", "", {}), "the colours of a Nikon_D5100"));
+  SensorFigures chosen;
+  chosen.camera = "Nikon_D5100";
+  const auto sensor = sensor_named("HWK4123_low_gain", "", chosen);
+  ASSERT_TRUE(sensor);
+  EXPECT_EQ(sensor->camera, "Nikon_D5100");
+  EXPECT_FALSE(assumes(*sensor, "colours"));
 }
 
 TEST(SensorDb, DarkCurrentOfTheTableHasItsOwnTemperatureAndDoubling) {
@@ -159,6 +184,38 @@ TEST(SensorDb, FiguresWithoutWhichNothingCanBeSimulatedAreAskedFor) {
   given.system_gain_dn_per_e = 1;
   given.read_noise_e = 2;
   EXPECT_TRUE(sensor_named("QHY600", "", given));
+}
+
+bool simulates(std::string_view name, std::string_view gain, const SensorFigures& figures) {
+  const auto sensor = sensor_named(name, gain, figures);
+  return sensor && spectral_response(*sensor, {});
+}
+
+TEST(SensorDb, TheOptionsNeededAreThoseThatMakeASensorComplete) {
+  int needing = 0;
+  for (const std::string_view name : sensor_names()) {
+    for (const std::string_view gain : gain_settings(name)) {
+      const auto options = options_needed(name, gain);
+      EXPECT_EQ(simulates(name, gain, {}), options.empty()) << name << " " << gain;
+      SensorFigures given;
+      const auto give = [&](std::string_view option, auto& figure, auto value) {
+        if (std::find(options.begin(), options.end(), option) != options.end()) figure = value;
+      };
+      give("--bits", given.bits, 12);
+      give("--system-gain", given.system_gain_dn_per_e, 1.0);
+      give("--read-noise", given.read_noise_e, 2.0);
+      give("--pixel-pitch", given.pixel_pitch_um, 4.0);
+      give("--peak-qe", given.peak_quantum_efficiency, 0.5);
+      EXPECT_TRUE(simulates(name, gain, given)) << name << " " << gain;
+      if (!options.empty()) ++needing;
+    }
+  }
+  EXPECT_GT(needing, 0);
+  EXPECT_EQ(options_needed("RaspberryPi_HQ", "analog gain 1"), std::vector<std::string_view>{"--peak-qe"});
+  EXPECT_EQ(options_needed("ZWO_ASI290MM", ""),
+            (std::vector<std::string_view>{"--read-noise", "--pixel-pitch", "--peak-qe"}));
+  EXPECT_TRUE(options_needed("thesis", "").empty());
+  EXPECT_TRUE(options_needed("no such sensor", "").empty());
 }
 
 TEST(SensorDb, FiguresThatCannotBeAreRefused) {

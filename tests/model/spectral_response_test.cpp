@@ -78,6 +78,34 @@ TEST(SpectralResponse, TheSpeedSaysWhatSaturatesAndTheLuminanceGivenComesBeforeA
   EXPECT_NEAR(saturation_luminance_cd_m2(sensor.model, *spectral_response(sensor, {2, 17.0}), 1), 17, 1e-10);
 }
 
+TEST(SpectralResponse, ASpeedThatIsGivenComesBeforePitchAndEfficiencyOneOfTheTableAfter) {
+  NamedSensor sensor = nikon();
+  sensor.pixel_pitch_um = 4;
+  sensor.peak_quantum_efficiency = 0.5;
+  const double by_speed_cd_m2 = 78 * 4 / (0.65 * 1600);
+  const auto saturation = [&] { return saturation_luminance_cd_m2(sensor.model, *spectral_response(sensor, {}), 1); };
+  EXPECT_GT(std::fabs(saturation() / by_speed_cd_m2 - 1), 0.01) << "the lens decides";
+  sensor.iso_given = true;
+  EXPECT_NEAR(saturation() / by_speed_cd_m2, 1, 1e-12);  // roundings
+  NamedSensor thesis = *sensor_named("thesis", "", {});
+  thesis.iso = 200;
+  thesis.iso_given = true;
+  EXPECT_NEAR(saturation_luminance_cd_m2(thesis.model, *spectral_response(thesis, {}), 1) / (78 * 4 / (0.65 * 200)), 1,
+              1e-12);
+}
+
+TEST(SpectralResponse, WithoutAScaleOnlyWhatIsMissingIsAskedFor) {
+  NamedSensor sensor = nikon();
+  sensor.iso = std::nullopt;
+  const auto asked = [&] { return spectral_response(sensor, {}).error().message; };
+  EXPECT_NE(asked().find("give --pixel-pitch and --peak-qe, or --iso"), std::string::npos) << asked();
+  sensor.pixel_pitch_um = 4;
+  EXPECT_NE(asked().find("give --peak-qe, or --iso"), std::string::npos) << asked();
+  sensor.pixel_pitch_um = std::nullopt;
+  sensor.peak_quantum_efficiency = 0.5;
+  EXPECT_NE(asked().find("give --pixel-pitch, or --iso"), std::string::npos) << asked();
+}
+
 TEST(SpectralResponse, ElectronsOfALineAreItsPhotonsTimesItsEfficiency) {
   SpectralResponse response{"test",
                             {*Spectrum::of({400, 700}, {0.1, 0.4}), *Spectrum::of({400, 700}, {0.3, 0.3}),
