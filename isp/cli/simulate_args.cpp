@@ -194,16 +194,24 @@ void add_camera(CLI::App& app, SimulateArgs& args) {
 void add_work(CLI::App& app, SimulateArgs& args) {
   capture::SyntheticOptions& o = args.options;
   add_text(app, "--effects", "auto|all|none|LIST",
-           "what is simulated: what the scene calls for (auto, default), or names parted by commas (-prnu is all but "
-           "one)",
-           [&o](const std::string& text) { return set_effects(text, o.effects); });
+           "what is simulated: what the scene calls for (auto; default, but with --sampling published all), or names "
+           "parted by commas (-prnu is all but one)",
+           [&args](const std::string& text) {
+             args.effects = text;
+             return set_effects(text, args.options.effects);
+           });
   add_choice<capture::PhotonSampling>(
       app, "--sampling",
       {{"physical", capture::PhotonSampling::physical}, {"published", capture::PhotonSampling::published}},
       [&o](capture::PhotonSampling sampling) { o.sampling = sampling; },
       "photons: one Poisson draw for each pixel (default), or one for each wavelength as the thesis has it");
-  add_text(app, "--seed", "N", "of the random numbers; the sensor's fixed pattern hangs on it too (default 1)",
-           [&o](const std::string& text) { return set_seed(text, o.seed); });
+  add_text(
+      app, "--seed", "N",
+      "of the noise, and of where stars are (default 1); darks and lights that are to have noise of their own need "
+      "seeds of their own",
+      [&o](const std::string& text) { return set_seed(text, o.seed); });
+  add_text(app, "--sensor-seed", "N", "of the fixed pattern: which specimen of the sensor it is (default 1)",
+           [&o](const std::string& text) { return set_seed(text, o.sensor_seed); });
   app.add_option("--frames", args.frames, "frames of the same scene, OUT_0000.dng and on (default 1)")
       ->check(CLI::Range(1, 10000))
       ->type_name("N");
@@ -248,6 +256,9 @@ Parsed<SimulateArgs> parse_simulate(const std::vector<std::string>& words) {
   if (tolerance) {
     if (!args.options.effects.tolerance) return refuse(app, "--tolerance: it is for --effects auto, not for a list");
     args.options.effects.tolerance = tolerance;
+  }
+  if (args.effects.empty() && args.options.sampling == capture::PhotonSampling::published) {
+    args.options.effects.tolerance.reset();  // the planner knows physical photons only
   }
   args.options.f_number = args.optics.f_number;
   return args;

@@ -45,6 +45,7 @@ struct SimulateArgs {
   isp::Optics optics;
   capture::SyntheticOptions options;
   int frames = 1;
+  std::string effects;  // as asked for; empty: auto, or all for published sampling
   bool list = false;
   bool explain = false;
   bool force = false;

@@ -245,9 +245,12 @@ class Simulation {
 
   std::string describe() const {
     return fmt::format(
-        "simulated: {}, white {:g} cd/m2, {:g} s, f/{:g}, {:g} C, {} photons, seed {}", description_, out_.white_cd_m2,
-        args_.options.exposure.time_s, args_.options.f_number, args_.options.exposure.temperature_c,
-        args_.options.sampling == capture::PhotonSampling::physical ? "physical" : "published", args_.options.seed);
+        "simulated: {}, white {:g} cd/m2, {:g} s, f/{:g}, {:g} C, {} photons, effects {}, seed {}, sensor {}",
+        description_, out_.white_cd_m2, args_.options.exposure.time_s, args_.options.f_number,
+        args_.options.exposure.temperature_c,
+        args_.options.sampling == capture::PhotonSampling::physical ? "physical" : "published",
+        args_.effects.empty() ? (args_.options.effects.tolerance ? "auto" : "all") : args_.effects.c_str(),
+        args_.options.seed, args_.options.sensor_seed);
   }
 
   const SimulateArgs& args_;
