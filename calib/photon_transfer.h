@@ -48,9 +48,10 @@ struct PhotonTransfer {
 /// of the measured variances, which would draw the line towards points that came out low.
 /// @param darks  at least one pair, all of one exposure time, as short as may be
 /// @param flats  pairs at four or more levels; several pairs of a level are several points
-/// Errors: no darks or too few levels left in the linear range; pairs of different cameras, sizes or gains; darks of
-/// different times; darks that are clipped at code 0; light that drifts by more than 1 % within a pair; flats that are
-/// not brighter than the darks; a gain that comes out negative or with a standard error above 5 %.
+/// Errors: no darks, fewer than 1000 pixels of a site, or too few levels left in the linear range; pairs of different
+/// cameras, sizes or gains; darks of different times; darks that are clipped at code 0; light that drifts by more than
+/// 1 % within a pair; flats that are not brighter than the darks; a gain that comes out negative or with a standard
+/// error above 5 %.
 Result<PhotonTransfer> fit_photon_transfer(std::span<const PairStatistics> darks, std::span<const PairStatistics> flats,
                                            const PhotonTransferOptions& options = {});
 

@@ -15,6 +15,7 @@ constexpr double clipped_share = 1e-3;   // clipping 0.1 % of a normal law takes
 constexpr double fallen_variance = 0.8;  // of the largest: no scatter of a variance from 1000 pixels falls so far
 constexpr double same_level = 1.05;      // ratio of signals below which two pairs are one level
 constexpr int fewest_levels = 4;
+constexpr int fewest_pixels = 1000;  // of a site: variances then scatter by 4.5 %
 constexpr double dithered_variance_dn2 = 0.25;
 
 using Points = std::vector<TransferPoint>;
@@ -28,6 +29,12 @@ Result<void> check_darks(Pairs darks) {
     const auto what = fmt::format("pair {} of the darks", i + 1);
     if (auto same = check_same_setting(darks.front().setting, darks[i].setting, what); !same) return same;
     for (const SiteStatistics& s : darks[i].site) {
+      if (s.pixels < fewest_pixels) {
+        return fail(ErrorCode::insufficient,
+                    fmt::format("a CFA site has {} pixels, photon transfer needs {}; use a larger "
+                                "part of the frame",
+                                s.pixels, fewest_pixels));
+      }
       if (s.share_at_zero <= clipped_share) continue;
       return fail(ErrorCode::insufficient,
                   fmt::format("{:.2g} % of the samples of {} are at code 0, so their noise is cut off; raise the "

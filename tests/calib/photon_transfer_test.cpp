@@ -175,6 +175,8 @@ TEST(PhotonTransfer, RefusesTooLittle) {
   EXPECT_NE(refusal(without).find("1 levels"), std::string::npos);
   shots.flats.resize(4);
   EXPECT_EQ(refusal(shots), "");
+  const Shots small = shoot({.sensor = test::modern_small(), .width = 62, .height = 64}, 1);
+  EXPECT_NE(refusal(small).find("992 pixels"), std::string::npos);
 }
 
 TEST(PhotonTransfer, RefusesSaturatedFlatsOnly) {
