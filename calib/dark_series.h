@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "calib/dark_stack.h"
+#include "isp/base/cfa.h"
+#include "isp/base/estimate.h"
+#include "isp/base/result.h"
+
+namespace lowlux::calib {
+
+/// Dark current of R, G and B pixels that are not hot, at one temperature. Negative values are scatter about none.
+struct DarkCurrent {
+  std::optional<double> temperature_c;  // none if the frames do not state it
+  std::array<Estimate, 3> current_e_per_s{};
+};
+
+/// D(T) = current * 2^((T - temperature) / doubling), one doubling for the three channels.
+struct DarkTemperatureLaw {
+  double temperature_c = 0;
+  std::array<Estimate, 3> current_e_per_s{};
+  Estimate doubling_c;
+  double reduced_chi_square = 0;
+  int degrees_of_freedom = 0;
+};
+
+/// A pixel whose mean lies more than 8 standard deviations of one frame above its site's median.
+struct HotPixel {
+  int x = 0;  // active pixels
+  int y = 0;
+  double excess_e_per_s = 0;
+};
+
+/// Figures of one gain setting from darks of several exposures.
+struct DarkSeries {
+  PerSite<Estimate> pedestal_dn{};    // mean code of no charge
+  std::vector<DarkCurrent> currents;  // by rising temperature
+  std::optional<DarkTemperatureLaw> law;
+  /// R : G : B of the dark current where it is largest, sum 1. None if their sum is below five of its standard errors.
+  std::optional<std::array<Estimate, 3>> chromaticity;
+  double dsnu = 0;            // deviation of the pixels' dark current relative to its mean; 0 if there is no current
+  double row_noise_e = 0;     // temporal
+  double column_noise_e = 0;  // fixed
+  std::vector<HotPixel> hot;  // row by row, found in the group with most dark charge
+  double hot_group_exposure_s = 0;
+  double excluded_share = 0;         // of all pixels, from all means
+  double largest_correction_dn = 0;  // of a mean, for what excluding pixels does to it
+};
+
+/// Fits mean = pedestal + K * current * time for each site, the pedestal being common to all temperatures.
+/// Pixels that lie more than 5 standard deviations from their site's median in any group are left out of all; what that
+/// does to the mean of a Poisson + normal law is computed (poisson_gauss.h) and taken back. Standard errors are those
+/// of the fitted estimate made pixel by pixel, so that patterns common to all groups count once, and cancel where they
+/// do.
+/// @param groups  two exposure times at one temperature at least
+/// @param gain    K [DN/e-] with its standard error, from fit_photon_transfer
+/// Errors: groups of different cameras, sizes or gains; temperatures stated by some only; too few exposure times;
+/// darks cut off at code 0; codes too coarse to give means (scatter below half a code); more than 5 % of the pixels
+/// excluded; a mean that is not linear in time, or dark charge that changes by more than a tenth across the frame:
+/// light gets in, or the sensor glows.
+Result<DarkSeries> fit_dark_series(std::span<const DarkGroup> groups, const Estimate& gain_dn_per_e);
+
+}  // namespace lowlux::calib

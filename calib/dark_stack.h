@@ -1,0 +1,48 @@
+#pragma once
+
+#include <vector>
+
+#include "calib/frame_setting.h"
+#include "isp/base/cfa.h"
+#include "isp/base/frame.h"
+#include "isp/base/plane.h"
+#include "isp/base/result.h"
+
+namespace lowlux::calib {
+
+/// Dark frames of one exposure time and temperature, reduced to two planes of the active area.
+struct DarkGroup {
+  FrameSetting setting;
+  int frames = 0;
+  Plane<float> mean_dn;                // of the frames, pixel by pixel
+  Plane<float> variance_dn2;           // temporal, pixel by pixel, quantisation included; unbiased
+  PerSite<double> row_variance_dn2{};  // temporal, of what whole rows have in common; unbiased, may be negative
+  PerSite<double> share_at_zero{};     // of the samples
+};
+
+/// Adds dark frames up as they come: 10 bytes for each pixel, however many frames.
+class DarkStack {
+ public:
+  /// Adds a frame. Errors: those of setting_of; no exposure time; a frame that differs from the first in camera, size,
+  /// mosaic, white level, gain, exposure time, or by more than a degree; more than 32,768 frames.
+  Result<void> add(const RawDn& raw);
+
+  /// What was added. Errors: fewer than two frames, which tell nothing about noise.
+  Result<DarkGroup> group() const;
+
+  int frames() const { return frames_; }
+
+ private:
+  Result<void> begin(const RawDn& raw, FrameSetting setting);
+  void add_row(const RawDn& raw, int y);
+
+  FrameSetting setting_;
+  int frames_ = 0;
+  Plane<std::uint16_t> first_;  // what is added up is the difference to it, so that nothing cancels
+  Plane<std::int32_t> sum_;
+  Plane<float> squares_;
+  std::vector<double> row_sum_, row_squares_;  // of row means, two for each row: even and odd columns
+  PerSite<std::int64_t> at_zero_{};
+};
+
+}  // namespace lowlux::calib

@@ -1,0 +1,84 @@
+#include "calib/frame_setting.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace lowlux::calib {
+namespace {
+
+constexpr int smallest_side = 16;
+
+tl::unexpected<Error> differs(const std::string& what, const std::string& found, const std::string& expected) {
+  return fail(ErrorCode::invalid_argument,
+              fmt::format("{} {}, the first frame {}; frames of one calibration must agree", what, found, expected));
+}
+
+std::string text_of(const std::optional<double>& value) { return value ? fmt::format("{:g}", *value) : "not stated"; }
+
+}  // namespace
+
+Result<FrameSetting> setting_of(const RawDn& raw) {
+  if (raw.layout == SensorLayout::linear_rgb) {
+    return fail(ErrorCode::unsupported,
+                "the frame is already demosaiced; calibration needs the mosaic as the sensor gave it");
+  }
+  const Rect& a = raw.active;
+  if (a.width < smallest_side || a.height < smallest_side) {
+    return fail(ErrorCode::insufficient, fmt::format("the active area is {} x {} pixels, calibration needs {} x {}",
+                                                     a.width, a.height, smallest_side, smallest_side));
+  }
+  if (a.x < 0 || a.y < 0 || a.width > raw.dn.width() - a.x || a.height > raw.dn.height() - a.y) {
+    return fail(ErrorCode::malformed, "the active area lies outside of the readout");
+  }
+  for (const double white : raw.white_dn) {
+    if (!(white > 0)) return fail(ErrorCode::malformed, fmt::format("the white level is {:g} DN, not positive", white));
+  }
+  const auto& time = raw.info.exposure_s;
+  if (time && !(*time >= 0 && std::isfinite(*time))) {
+    return fail(ErrorCode::malformed, fmt::format("the exposure time is {:g} s, not a time", *time));
+  }
+  if (raw.info.temperature_c && !std::isfinite(*raw.info.temperature_c)) {
+    return fail(ErrorCode::malformed, "the temperature is not a finite number");
+  }
+  return FrameSetting{raw.info.make, raw.info.model, raw.layout,   raw.phase,           a.width,
+                      a.height,      raw.white_dn,   raw.info.iso, raw.info.exposure_s, raw.info.temperature_c};
+}
+
+Result<void> check_same_camera(const FrameSetting& first, const FrameSetting& second, const std::string& what) {
+  if (first.make != second.make || first.model != second.model) {
+    return differs(what, fmt::format("is of camera \"{} {}\"", second.make, second.model),
+                   fmt::format("of \"{} {}\"", first.make, first.model));
+  }
+  if (first.width != second.width || first.height != second.height) {
+    return differs(what, fmt::format("has {} x {} pixels", second.width, second.height),
+                   fmt::format("{} x {}", first.width, first.height));
+  }
+  if (first.layout != second.layout || (first.layout == SensorLayout::bayer && first.phase != second.phase)) {
+    return differs(what, "has another mosaic", "starts with another colour");
+  }
+  if (first.white_dn != second.white_dn) {
+    return differs(what, fmt::format("has white at {:g} DN", second.white_dn[1]),
+                   fmt::format("at {:g} DN", first.white_dn[1]));
+  }
+  if (first.iso != second.iso) {
+    return differs(what, fmt::format("has ISO {}", text_of(second.iso)), fmt::format("ISO {}", text_of(first.iso)));
+  }
+  return {};
+}
+
+Result<void> check_same_setting(const FrameSetting& first, const FrameSetting& second, const std::string& what) {
+  if (auto same = check_same_camera(first, second, what); !same) return same;
+  if (first.exposure_s != second.exposure_s) {
+    return differs(what, fmt::format("is exposed {} s", text_of(second.exposure_s)),
+                   fmt::format("{} s", text_of(first.exposure_s)));
+  }
+  return {};
+}
+
+int channel_of_site(const FrameSetting& setting, int site) {
+  if (setting.layout != SensorLayout::bayer) return 1;
+  return static_cast<int>(colour_at(setting.phase, site & 1, site >> 1));
+}
+
+}  // namespace lowlux::calib

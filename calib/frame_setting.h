@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+
+namespace lowlux::calib {
+
+/// What frames must have in common before their figures may be put together, and how each was exposed.
+struct FrameSetting {
+  std::string make;
+  std::string model;
+  SensorLayout layout = SensorLayout::bayer;
+  BayerPhase phase = BayerPhase::rggb;
+  int width = 0;  // of the active area
+  int height = 0;
+  std::array<double, 3> white_dn{};  // of R, G, B
+  std::optional<double> iso;
+  std::optional<double> exposure_s;
+  std::optional<double> temperature_c;
+};
+
+/// The setting of a frame.
+/// Errors: a layout that is not a mosaic, an active area below 16 x 16 or outside the readout, a white level that is
+/// not positive, an exposure time that is negative or no number.
+Result<FrameSetting> setting_of(const RawDn& raw);
+
+/// An error unless both are of the same camera, size, mosaic, white level and gain; `what` names the second.
+Result<void> check_same_camera(const FrameSetting& first, const FrameSetting& second, const std::string& what);
+
+/// The same, and of the same exposure time.
+Result<void> check_same_setting(const FrameSetting& first, const FrameSetting& second, const std::string& what);
+
+/// Colour of a site, 0..2 for R, G, B; 1 for a sensor without filters.
+int channel_of_site(const FrameSetting& setting, int site);
+
+}  // namespace lowlux::calib

@@ -1,0 +1,253 @@
+#include <array>
+#include <cmath>
+#include <initializer_list>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "calib/profile_io.h"
+#include "calib/profile_schema.h"
+
+namespace lowlux::calib {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Names = std::initializer_list<const char*>;
+
+constexpr int deepest = 8;  // a profile has six levels
+
+/// Reads one JSON object; finish() complains about keys nobody asked for.
+class Reader {
+ public:
+  Reader(const Json& node, std::string path, ProfileFailure& failure)
+      : node_(node), path_(std::move(path)), failure_(failure) {
+    if (!node.is_object()) wrong_type(path_, "an object", node);
+  }
+
+  void finish() {
+    if (failure_.error) return;
+    for (const auto& [key, value] : node_.items()) {
+      if (!asked_.contains(key)) {
+        failure_.set(ErrorCode::malformed, joined(path_, key), "this key is not known; is a unit or a letter wrong?");
+      }
+    }
+  }
+
+  void text(const char* key, std::string& out) {
+    const Json* value = member(key);
+    if (value == nullptr) return;
+    if (!value->is_string()) return wrong_type(joined(path_, key), "text", *value);
+    out = value->get<std::string>();
+  }
+
+  void number(const char* key, double& out, const Range& range) {
+    const Json* value = member(key);
+    if (value == nullptr) return;
+    if (!value->is_number()) return wrong_type(joined(path_, key), "a number", *value);
+    const auto found = value->get<double>();
+    if (check_range(found, range, joined(path_, key), failure_)) out = found;
+  }
+
+  void integer(const char* key, int& out, const Range& range) {
+    double found = 0;
+    number(key, found, range);
+    if (failure_.error) return;
+    if (found != std::floor(found)) {
+      return failure_.set(ErrorCode::malformed, joined(path_, key),
+                          fmt::format("found {:g}, not a whole number", found));
+    }
+    out = static_cast<int>(found);
+  }
+
+  void optional_number(const char* key, std::optional<double>& out, const Range& range) {
+    if (failure_.error) return;
+    asked_.insert(key);
+    if (!node_.contains(key)) return;
+    out.emplace();
+    number(key, *out, range);
+  }
+
+  void estimate(const char* key, double& value, double& error, const Range& range) {
+    object(key, [&](Reader& inner) {
+      inner.number("value", value, range);
+      inner.number("standard_error", error, {});
+    });
+  }
+
+  template <class Enum>
+  void choice(const char* key, Enum& out, Names names) {
+    std::string found;
+    text(key, found);
+    if (failure_.error) return;
+    int index = 0;
+    std::string possible;
+    for (const char* name : names) {
+      if (found == name) {
+        out = static_cast<Enum>(index);
+        return;
+      }
+      possible += possible.empty() ? name : std::string(", ") + name;
+      ++index;
+    }
+    failure_.set(ErrorCode::malformed, joined(path_, key),
+                 fmt::format("found \"{}\", possible are {}", found, possible));
+  }
+
+  template <class Visit>
+  void object(const char* key, const Visit& visit) {
+    const Json* value = member(key);
+    if (value == nullptr) return;
+    Reader inner(*value, joined(path_, key), failure_);
+    visit(inner);
+    inner.finish();
+  }
+
+  template <class T, class Visit>
+  void list(const char* key, std::vector<T>& out, std::size_t most, const Visit& visit) {
+    const Json* value = array(key, 0, most);
+    if (value == nullptr) return;
+    out.resize(value->size());
+    elements(*value, key, out, visit);
+  }
+
+  template <class T, std::size_t kCount, class Visit>
+  void fixed_list(const char* key, std::array<T, kCount>& out, const Visit& visit) {
+    const Json* value = array(key, kCount, kCount);
+    if (value != nullptr) elements(*value, key, out, visit);
+  }
+
+  void texts(const char* key, std::vector<std::string>& out, std::size_t most) {
+    const Json* value = array(key, 0, most);
+    if (value == nullptr) return;
+    for (std::size_t i = 0; i < value->size(); ++i) {
+      if (!(*value)[i].is_string()) return wrong_type(indexed(joined(path_, key), i), "text", (*value)[i]);
+      out.push_back((*value)[i].get<std::string>());
+    }
+  }
+
+ private:
+  const Json* member(const char* key) {
+    if (failure_.error) return nullptr;
+    asked_.insert(key);
+    const auto found = node_.find(key);
+    if (found != node_.end()) return &*found;
+    failure_.set(ErrorCode::malformed, joined(path_, key), "this key is missing");
+    return nullptr;
+  }
+
+  const Json* array(const char* key, std::size_t least, std::size_t most) {
+    const Json* value = member(key);
+    if (value == nullptr) return nullptr;
+    if (!value->is_array()) {
+      wrong_type(joined(path_, key), "a list", *value);
+      return nullptr;
+    }
+    if (value->size() >= least && value->size() <= most) return value;
+    failure_.set(ErrorCode::malformed, joined(path_, key),
+                 fmt::format("found {} entries, possible are {} to {}", value->size(), least, most));
+    return nullptr;
+  }
+
+  template <class Container, class Visit>
+  void elements(const Json& value, const char* key, Container& out, const Visit& visit) {
+    for (std::size_t i = 0; i < out.size() && !failure_.error; ++i) {
+      Reader inner(value[i], indexed(joined(path_, key), i), failure_);
+      visit(inner, out[i]);
+      inner.finish();
+    }
+  }
+
+  void wrong_type(const std::string& path, const char* expected, const Json& found) {
+    failure_.set(ErrorCode::malformed, path, fmt::format("expected {}, found {}", expected, found.type_name()));
+  }
+
+  const Json& node_;
+  std::string path_;
+  ProfileFailure& failure_;
+  std::set<std::string> asked_;
+};
+
+/// JSON allows a key twice and leaves open which counts: here neither does.
+class KeyCheck {
+ public:
+  explicit KeyCheck(ProfileFailure& failure) : failure_(failure) {}
+
+  /// Whether the value is to be kept.
+  bool operator()(int depth, Json::parse_event_t event, const Json& value) {
+    if (depth > deepest) {
+      failure_.set(ErrorCode::malformed, "", "nested deeper than a profile is");
+      return false;
+    }
+    if (event == Json::parse_event_t::object_start) levels_.emplace_back();
+    if (event == Json::parse_event_t::object_end) levels_.pop_back();
+    if (event == Json::parse_event_t::key) add(value.get<std::string>());
+    return true;
+  }
+
+ private:
+  struct Level {
+    std::set<std::string> keys;
+    std::string last;
+  };
+
+  void add(const std::string& key) {
+    levels_.back().last = key;
+    if (levels_.back().keys.insert(key).second) return;
+    std::string path;
+    for (const Level& level : levels_) path = joined(path, level.last);
+    failure_.set(ErrorCode::malformed, path, "this key is there twice");
+  }
+
+  ProfileFailure& failure_;
+  std::vector<Level> levels_;
+};
+
+Result<Json> parsed(std::string_view text) {
+  if (text.size() > largest_profile_bytes) {
+    return fail(ErrorCode::too_large,
+                fmt::format("the profile has {} bytes, at most {} are read", text.size(), largest_profile_bytes));
+  }
+  try {
+    ProfileFailure failure;
+    Json document =
+        Json::parse(text, [check = KeyCheck(failure)](int depth, Json::parse_event_t event, Json& value) mutable {
+          return check(depth, event, value);
+        });
+    if (failure.error) return tl::make_unexpected(*failure.error);
+    return document;
+  } catch (const Json::exception& e) {
+    return fail(ErrorCode::malformed, fmt::format("the profile is not JSON: {}", e.what()));
+  }
+}
+
+}  // namespace
+
+Result<CameraProfile> parse_profile(std::string_view text) {
+  const auto document = parsed(text);
+  if (!document) return tl::make_unexpected(document.error());
+  ProfileFailure failure;
+  CameraProfile out;
+  Reader reader(*document, "", failure);
+  std::string format;
+  int version = 0;
+  reader.text("format", format);
+  if (!failure.error && format != profile_format) {
+    failure.set(ErrorCode::malformed, "format", fmt::format("found \"{}\", expected \"{}\"", format, profile_format));
+  }
+  reader.integer("version", version, {1, 1e9});
+  if (!failure.error && version > profile_version) {
+    failure.set(ErrorCode::unsupported, "version",
+                fmt::format("found {}, this program reads up to {}; use a newer one", version, profile_version));
+  }
+  visit_profile(reader, out);
+  reader.finish();
+  if (!failure.error) check_together(out, failure);
+  if (failure.error) return tl::make_unexpected(*failure.error);
+  return out;
+}
+
+}  // namespace lowlux::calib

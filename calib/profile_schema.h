@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "isp/base/camera_profile.h"
+#include "isp/base/result.h"
+
+namespace lowlux::calib {
+
+inline constexpr const char* profile_format = "lowlux camera profile";
+
+/// The first thing that went wrong; what follows is skipped.
+struct ProfileFailure {
+  std::optional<Error> error;
+  void set(ErrorCode code, const std::string& path, const std::string& what);
+};
+
+/// "path.key" and "path[i]".
+std::string joined(const std::string& path, const std::string& key);
+std::string indexed(const std::string& path, std::size_t i);
+
+/// Values a key may have, ends included.
+struct Range {
+  double low = 0;
+  double high = 1e9;
+};
+
+/// Whether the value lies in the range; if not, or if it is no number, `failure` says so.
+bool check_range(double value, const Range& range, const std::string& path, ProfileFailure& failure);
+
+/// What no single key can tell: figures of a sensor that contradict each other.
+void check_together(const CameraProfile& profile, ProfileFailure& failure);
+
+inline constexpr double tiny = 1e-12;  // stands for "above 0"
+inline constexpr std::size_t most_gains = 256, most_hot_pixels = 100000, most_files = 10000, most_provenance = 64;
+
+/// The profile's keys, in order, once for reading and writing. A visitor offers
+///     text(key, string)               number(key, double, range)       integer(key, int, range)
+///     optional_number(key, optional)  estimate(key, value, standard error, range)
+///     choice(key, enum, names)        object(key, fn)                  list(key, container, most, fn), fixed_list(...)
+/// each of which does nothing once something has failed.
+template <class Visitor, class Sensor, class Errors>
+void visit_sensor(Visitor& v, Sensor& s, Errors& e) {
+  v.text("name", s.name);
+  v.estimate("system_gain_dn_per_e", s.system_gain_dn_per_e, e.system_gain_dn_per_e, {tiny, 1e6});
+  v.estimate("read_noise_e", s.read_noise_e, e.read_noise_e, {});
+  v.estimate("full_well_e", s.full_well_e, e.full_well_e, {tiny, 1e6});
+  v.integer("bits", s.bits, {1, 16});
+  v.number("black_level_dn", s.black_level_dn, {0, 65535});
+  v.number("white_level_dn", s.white_level_dn, {0, 65535});
+  v.choice("quantisation", s.quantisation, {"round", "floor"});
+  v.estimate("dark_current_red_e_per_s", s.dark_current_e_per_s[0], e.dark_current_e_per_s[0], {});
+  v.estimate("dark_current_green_e_per_s", s.dark_current_e_per_s[1], e.dark_current_e_per_s[1], {});
+  v.estimate("dark_current_blue_e_per_s", s.dark_current_e_per_s[2], e.dark_current_e_per_s[2], {});
+  v.number("dark_temperature_c", s.dark_temperature_c, {-200, 200});
+  v.estimate("dark_doubling_c", s.dark_doubling_c, e.dark_doubling_c, {1, 1000});
+  v.estimate("prnu", s.prnu, e.prnu, {0, 1});
+  v.estimate("dsnu", s.dsnu, e.dsnu, {0, 1});
+  v.number("hot_pixel_fraction", s.hot_pixel_fraction, {0, 1});
+  v.number("hot_pixel_current_e_per_s", s.hot_pixel_current_e_per_s, {});
+  v.number("row_noise_e", s.row_noise_e, {});
+  v.number("column_noise_e", s.column_noise_e, {});
+}
+
+template <class Visitor, class Source>
+void visit_provenance(Visitor& v, Source& p) {
+  v.choice("kind", p.kind, {"measured", "quoted"});
+  v.text("figures", p.figures);
+  v.text("source", p.source);
+  v.text("date", p.date);
+  v.texts("files", p.files, most_files);
+  v.number("reduced_chi_square", p.reduced_chi_square, {});
+  v.integer("degrees_of_freedom", p.degrees_of_freedom, {0, 1e9});
+}
+
+template <class Visitor, class Gain>
+void visit_gain(Visitor& v, Gain& g) {
+  v.text("gain_setting", g.gain_setting);
+  v.optional_number("iso", g.iso, {tiny, 1e9});
+  v.object("sensor", [&](Visitor& inner) { visit_sensor(inner, g.sensor, g.errors); });
+  v.fixed_list("pedestal_dn", g.pedestal_dn, [](Visitor& inner, auto& pedestal) {
+    inner.number("value", pedestal.value, {0, 65535});
+    inner.number("standard_error", pedestal.standard_error, {});
+  });
+  v.list("hot_pixels", g.hot_pixels, most_hot_pixels, [](Visitor& inner, auto& hot) {
+    inner.integer("x_px", hot.x, {0, 1e6});
+    inner.integer("y_px", hot.y, {0, 1e6});
+    inner.number("excess_e_per_s", hot.excess_e_per_s, {});
+  });
+  v.list("provenance", g.provenance, most_provenance, [](Visitor& inner, auto& p) { visit_provenance(inner, p); });
+}
+
+template <class Visitor, class Profile>
+void visit_profile(Visitor& v, Profile& p) {
+  v.text("make", p.make);
+  v.text("model", p.model);
+  v.list("gains", p.gains, most_gains, [](Visitor& inner, auto& gain) { visit_gain(inner, gain); });
+}
+
+}  // namespace lowlux::calib

@@ -1,0 +1,12 @@
+#pragma once
+
+namespace lowlux {
+
+/// A measured figure and its standard error, both in the unit of the name that holds them.
+struct Estimate {
+  double value = 0;
+  double standard_error = 0;  // at least 0
+  friend bool operator==(const Estimate&, const Estimate&) = default;
+};
+
+}  // namespace lowlux
