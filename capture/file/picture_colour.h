@@ -25,7 +25,7 @@ DisplayColour srgb_colour(int codes);
 /// An ICC profile of the matrix kind (three curves, three colorants) or of grey: relative colorimetric, PCS D50 adapted
 /// to D65 by Bradford. Others, those that hold tables only among them, are refused.
 /// @param codes  2 or more
-Result<DisplayColour> icc_colour(std::span<const std::byte> profile, int codes);
+Result<DisplayColour> icc_colour(std::span<const std::byte> bytes, int codes);
 
 /// Matrix from linear RGB to XYZ with RGB (1, 1, 1) at Y = 1 (SMPTE RP 177). Unlike isp::rgb_to_xyz it takes primaries
 /// that are no colours, as ACES AP0 and the axes of XYZ are. Refused if they lie on one line, or white has no XYZ.

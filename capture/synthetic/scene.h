@@ -29,7 +29,7 @@ struct Scene {
   std::vector<Spectrum> radiances;  // of patches [W m-2 sr-1 nm-1]
   std::vector<PointSource> points;
   std::vector<Spectrum> point_lights;  // radiance at 1 cd/m2
-  Spectrum white;  // radiance of a white diffuser in the scene: what the camera balances to
+  Spectrum white;                      // radiance of a white diffuser in the scene: what the camera balances to
   std::string description;
 };
 

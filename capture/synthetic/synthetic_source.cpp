@@ -140,7 +140,7 @@ Result<void> SyntheticSource::expose(Executor& executor) {
                            : isp::fixed_effects(sensor, options_.exposure, developing_, blocks, choice.effects);
   file_plan_ = choice.tolerance ? with_converter(plan_) : plan_;
   choose_storage();
-  if (const auto good = check_photons(executor); !good) return good;
+  if (auto good = check_photons(executor); !good) return good;
   return check_means(blocks);
 }
 

@@ -170,8 +170,8 @@ HWY_INLINE Bracket bracket_large(VF w, VF mean) {
 }
 
 struct Reciprocals {
-  float of[52];
-  constexpr Reciprocals() : of() {
+  float of[52] = {};
+  constexpr Reciprocals() {
     for (int k = 1; k < 52; ++k) of[k] = 1.0f / static_cast<float>(k);
   }
 };

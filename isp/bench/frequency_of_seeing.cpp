@@ -84,7 +84,8 @@ Result<Finding> tail() {
   double term = std::exp(-x), sum = 0;
   for (int m = 0; m < k; ++m, term *= x / m) sum += term;
   // The first term of the series of P(K, x) and its bound: x^K e^-x / K! (1 + x / (K + 1) + ...).
-  const double first = std::exp(k * std::log(x) - x - std::lgamma(k + 1.0));
+  int sign = 0;  // of the gamma function, for the form that threads may share
+  const double first = std::exp(k * std::log(x) - x - ::lgamma_r(k + 1.0, &sign));
   const bool agrees = std::fabs((1 - sum) / *exact - 1) < 1e-6;
   const bool bounded = *exact >= first * (1 - 1e-12) && *exact <= first / (1 - x / (k + 1)) * (1 + 1e-12);
   return Finding{

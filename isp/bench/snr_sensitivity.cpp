@@ -153,7 +153,7 @@ Plot curves(const ThesisCamera& camera, const std::vector<Patch>& patches) {
 
 }  // namespace
 
-Result<Outcome> run_snr_sensitivity(const RunOptions&) {
+Result<Outcome> run_snr_sensitivity(const RunOptions& /*nothing is drawn*/) {
   const auto camera = thesis_camera();
   if (!camera) return tl::make_unexpected(camera.error());
   const auto patches = thesis_patches(*camera, scenario_iii_patches);

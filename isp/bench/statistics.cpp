@@ -28,7 +28,7 @@ void add_chain(const Points& points, std::vector<Xy>& hull) {
 
 Estimate mean_of(std::span<const double> samples) {
   assert(samples.size() > 1);
-  const double n = static_cast<double>(samples.size());
+  const auto n = static_cast<double>(samples.size());
   double mean = 0, squares = 0;
   for (const double s : samples) mean += s / n;
   for (const double s : samples) squares += (s - mean) * (s - mean);
@@ -63,17 +63,20 @@ Estimate log_size_of(const XyCovariance& c, std::size_t n) {
   return {0.5 * std::log(trace), 0.5 * relative};
 }
 
-double orientation_error(const XyCovariance& s, const XyCovariance& c, double inclination_deg, std::size_t n) {
+double orientation_error(const XyCovariance& sampled, const XyCovariance& expected, double inclination_deg,
+                         std::size_t n) {
   const double twice = 2 * inclination_deg * std::numbers::pi / 180;
-  const double between_axes = 0.5 * (s.yy - s.xx) * std::sin(twice) + s.xy * std::cos(twice);
-  return std::fabs(between_axes) / std::sqrt((c.xx * c.yy - c.xy * c.xy) / static_cast<double>(n - 1));
+  const double between_axes = 0.5 * (sampled.yy - sampled.xx) * std::sin(twice) + sampled.xy * std::cos(twice);
+  return std::fabs(between_axes) /
+         std::sqrt((expected.xx * expected.yy - expected.xy * expected.xy) / static_cast<double>(n - 1));
 }
 
-double worst_covariance_error(const XyCovariance& sampled, const XyCovariance& c, std::size_t n) {
+double worst_covariance_error(const XyCovariance& sampled, const XyCovariance& expected, std::size_t n) {
   const double root = std::sqrt(static_cast<double>(n - 1));
-  const double xx = std::fabs(sampled.xx - c.xx) / (std::numbers::sqrt2 * c.xx);
-  const double yy = std::fabs(sampled.yy - c.yy) / (std::numbers::sqrt2 * c.yy);
-  const double xy = std::fabs(sampled.xy - c.xy) / std::sqrt(c.xx * c.yy + c.xy * c.xy);
+  const double xx = std::fabs(sampled.xx - expected.xx) / (std::numbers::sqrt2 * expected.xx);
+  const double yy = std::fabs(sampled.yy - expected.yy) / (std::numbers::sqrt2 * expected.yy);
+  const double xy =
+      std::fabs(sampled.xy - expected.xy) / std::sqrt(expected.xx * expected.yy + expected.xy * expected.xy);
   return root * std::max({xx, yy, xy});
 }
 

@@ -79,6 +79,7 @@ Result<std::vector<Patch>> thesis_patches(const ThesisCamera& camera, int count)
                                                  std::to_string(count) + " were asked for");
   }
   std::vector<double> distance;
+  distance.reserve(left.size());
   for (const Patch& patch : left) distance.push_back(squared_distance(patch.xy, white_e));
   std::vector<Patch> chosen;
   while (std::ssize(chosen) < count) {

@@ -27,8 +27,9 @@ Result<Spectrum> finely_sampled(const Spectrum& light) {
   for (const double node : light.wavelengths_nm()) {
     if (!nodes.empty() && node - nodes.back() > step_nm) {
       const double end = std::min(node, most_nm);
-      for (double nm = step_nm * std::floor(std::max(nodes.back(), least_nm) / step_nm); nm < end; nm += step_nm) {
-        if (nm > nodes.back()) nodes.push_back(nm);
+      const int last = static_cast<int>(std::ceil(end / step_nm));
+      for (int i = static_cast<int>(std::max(nodes.back(), least_nm) / step_nm); i < last; ++i) {
+        if (i * step_nm > nodes.back()) nodes.push_back(i * step_nm);
       }
     }
     nodes.push_back(node);

@@ -105,7 +105,7 @@ Result<void> write_all(const std::vector<OutputFile>& files, const ReproduceArgs
   }
   const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
   for (const OutputFile& file : files) {
-    if (const auto written = isp::write_text((folder / file.name).string(), file.text, overwrite); !written) {
+    if (auto written = isp::write_text((folder / file.name).string(), file.text, overwrite); !written) {
       return written;
     }
   }

@@ -206,7 +206,7 @@ class Simulation {
       isp::StageClock clock(times);
       const RawFrame frame = source.frame(static_cast<std::uint32_t>(i), executor_);
       clock.lap("readout");
-      if (const auto written = isp::write_dng(frame, files_.frames[i], write); !written) return written;
+      if (auto written = isp::write_dng(frame, files_.frames[i], write); !written) return written;
       clock.lap("raw file");
       read_out_s += times[0].seconds;
       write_s += times[1].seconds;
@@ -227,8 +227,7 @@ class Simulation {
       to_relative_srgb(truth, out_.white_cd_m2, executor_);
       if (out_.white_cd_m2 > 0) write.white_luminance_cd_m2 = out_.white_cd_m2;
       write.exr.depth = fits_half(truth) ? isp::ExrOptions::Depth::half : isp::ExrOptions::Depth::full;
-      const auto written =
-          isp::write_picture(std::move(truth), OutputSpace::linear_srgb, {}, files_.truth, write, executor_);
+      auto written = isp::write_picture(std::move(truth), OutputSpace::linear_srgb, {}, files_.truth, write, executor_);
       if (!written) return written;
       out_.files.push_back(files_.truth);
     }

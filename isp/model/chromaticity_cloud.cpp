@@ -25,7 +25,7 @@ Vector3 weight_of(double wavelength_nm) {
 
 std::optional<ChromaticityCloud> cloud_of(std::span<const Xy> samples) {
   if (samples.size() < 2) return std::nullopt;
-  const double n = static_cast<double>(samples.size());
+  const auto n = static_cast<double>(samples.size());
   ChromaticityCloud out;
   for (const Xy& xy : samples) {
     if (!std::isfinite(xy.x) || !std::isfinite(xy.y)) return std::nullopt;

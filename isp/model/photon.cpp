@@ -67,7 +67,7 @@ Result<Spectrum> normalised(const Spectrum& power) {
   // By the largest value first: the integral of values near the ends of double's range would leave it.
   std::vector<double> shares(power.values().begin(), power.values().end());
   for (double& share : shares) share /= largest;
-  const auto scaled = with_values(power, shares);
+  auto scaled = with_values(power, shares);
   if (!scaled) return scaled;
   const double total = integrate(*scaled);
   for (double& share : shares) share /= total;

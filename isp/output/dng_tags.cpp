@@ -25,6 +25,7 @@ constexpr std::uint32_t opcode_list1 = 51008, opcode_list2 = 51009, noise_profil
 template <class Numbers>
 std::vector<float> floats_of(const Numbers& numbers) {
   std::vector<float> out;
+  out.reserve(std::size(numbers));
   for (const double number : numbers) out.push_back(static_cast<float>(number));
   return out;
 }

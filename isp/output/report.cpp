@@ -169,7 +169,7 @@ std::string html_of(const Report& report) {
   for (const ReportSection& section : report.sections) {
     body += "<h2>" + escaped(section.title) + "</h2>\n" + paragraph(section.text) + html_of(section.table);
     for (const Plot& plot : section.plots) {
-      body += "<figure><canvas id=\"plot" + std::to_string(plots.size()) + "\" role=\"img\" aria-label=\"" +
+      body += R"(<figure><canvas id="plot)" + std::to_string(plots.size()) + R"(" role="img" aria-label=")" +
               escaped(plot.title) + "\"></canvas><figcaption>" + escaped(plot.caption) + "</figcaption></figure>\n";
       plots.push_back(json_of(plot));
     }

@@ -58,7 +58,8 @@ Vector3 patch_centre(const SceneLinear& picture, int patch) {
   return mean;
 }
 
-// Half a step of half floats, which have 11 significant bits and steps of 2^-24 below 2^-14; and the floats before them.
+// Half a step of half floats, which have 11 significant bits and steps of 2^-24 below 2^-14; and the floats before
+// them.
 double half_tolerance(double value) { return std::fabs(value) * 0x1p-11 + 0x1p-25 + 1e-6; }
 
 TEST_F(SimulateTruth, HoldsTheColoursOfTheChart) {
