@@ -7,35 +7,12 @@
 
 #include "isp/raw/raw_to_rgb.h"
 #include "tests/raw/raw_to_rgb_support.h"
+#include "tests/support/only_target.h"
 
 namespace lowlux {
 namespace {
 
 using namespace raw_to_rgb_testing;
-
-/// Lets the kernels use one instruction set only, for the life of the object.
-class OnlyTarget {
- public:
-  explicit OnlyTarget(std::int64_t target) { choose(target); }
-  ~OnlyTarget() { choose(0); }
-  OnlyTarget(const OnlyTarget&) = delete;
-  OnlyTarget& operator=(const OnlyTarget&) = delete;
-
- private:
-  static void choose(std::int64_t target) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
-
-/// Those of the processor that the kernels are compiled for: SSSE3 and better on x86.
-std::vector<std::int64_t> targets() {
-  std::vector<std::int64_t> out;
-  for (const std::int64_t target : {HWY_AVX3, HWY_AVX2, HWY_SSE4, HWY_SSSE3}) {
-    if ((hwy::SupportedTargets() & target) != 0) out.push_back(target);
-  }
-  return out;
-}
 
 struct Pictures {
   std::vector<std::uint8_t> codes8;
@@ -75,9 +52,9 @@ TEST(RawToRgbTargets, AgreeWithinOneCode) {
   const auto dn = random_dn(203, 61, 9);
   const isp::DnMosaic in{dn.view(), BayerPhase::bggr, uneven_levels()};
   const Pictures best = pictures_of(in);
-  ASSERT_FALSE(targets().empty());
-  for (const std::int64_t target : targets()) {
-    const OnlyTarget only(target);
+  ASSERT_FALSE(test::kernel_targets().empty());
+  for (const std::int64_t target : test::kernel_targets()) {
+    const test::OnlyTarget only(target);
     ASSERT_STREQ(isp::raw_to_rgb_target(), hwy::TargetName(target));
     const Pictures pictures = pictures_of(in);
     EXPECT_LE(largest_difference(pictures.codes8, best.codes8), 1) << hwy::TargetName(target);
@@ -88,7 +65,7 @@ TEST(RawToRgbTargets, AgreeWithinOneCode) {
 }
 
 TEST(RawToRgbTargets, ChooseTheBestTheProcessorHas) {
-  EXPECT_STREQ(isp::raw_to_rgb_target(), hwy::TargetName(targets().front()));
+  EXPECT_STREQ(isp::raw_to_rgb_target(), hwy::TargetName(test::kernel_targets().front()));
   EXPECT_TRUE(isp::cpu_runs_raw_to_rgb());
 }
 
