@@ -55,12 +55,12 @@ TEST_P(DarkSeriesOf, FindsPedestalAndDarkCurrent) {
   ASSERT_TRUE(found->chromaticity);
   for (int k = 0; k < 3; ++k) {
     const Estimate& current = found->currents[0].current_e_per_s[k];
-    EXPECT_NEAR(current.value, truth.dark_current_e_per_s[k], 3 * current.standard_error) << "RGB"[k];  // the issue's
+    EXPECT_NEAR(current.value, truth.dark_current_e_per_s[k], 3 * current.standard_error) << "RGB"[k];
     const Estimate& share = (*found->chromaticity)[k];
     EXPECT_NEAR(share.value, truth.dark_current_e_per_s[k] / sum, 5 * share.standard_error);
   }
   for (const Estimate& pedestal : found->pedestal_dn) {
-    EXPECT_NEAR(pedestal.value, truth.black_level_dn, 3.5 * pedestal.standard_error);  // the issue's
+    EXPECT_NEAR(pedestal.value, truth.black_level_dn, 3.5 * pedestal.standard_error);
     // 50,000 pixels of 6 frames: read noise, quantisation, and the columns, which do not average over rows.
     const double gain = truth.system_gain_dn_per_e;
     const double white2 = (std::pow(gain * truth.read_noise_e, 2) + 1.0 / 12) / (6 * 50176);
@@ -132,7 +132,7 @@ TEST(DarkSeries, IntervalsHoldTheTruthAndMeansHaveNoBias) {
   for (const Tally& t : {pedestal, current}) {
     EXPECT_GE(t.held, 0.9 * seeds);
     EXPECT_LE(t.held, 0.995 * seeds);
-    // The issue allows a bias of a fifth of 3.5 errors; five errors of the mean over the seeds are half of that.
+    // A bias of a fifth of 3.5 errors would still do; five errors of the mean over the seeds are half of that.
     EXPECT_LT(std::fabs(t.off), 5 * t.error / std::sqrt(seeds));
   }
   RecordProperty("pedestal_held", pedestal.held);

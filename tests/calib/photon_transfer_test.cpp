@@ -48,7 +48,7 @@ void expect_square(const Estimate& found, double truth, double truth_error_of_sq
   EXPECT_NEAR(found.value * found.value, truth * truth, 5 * (error_of_square(found) + truth_error_of_square));
 }
 
-// The limits; and five of the fit's own errors.
+// What a calibration has to reach; and five of the fit's own errors.
 void expect_estimate(const Estimate& found, double truth, double relative) {
   EXPECT_NEAR(found.value, truth, relative * truth);
   EXPECT_NEAR(found.value, truth, 5 * found.standard_error);

@@ -27,6 +27,7 @@ RawDn SensorBench::frame(const isp::Exposure& exposure, std::uint32_t index) con
                      .phase = phase,
                      .rate_e_per_s = rate.view(),
                      .seed = seed,
+                     .pattern_seed = seed,
                      .frame = index},
                     plan, executor, raw.dn.view());
   raw.phase = phase;
