@@ -36,6 +36,6 @@ Result<void> finish_fit(DarkFit& fit);
 
 /// Weighted sum over the groups of a site's means; corrections included.
 /// @param weights one for each group
-Estimate estimate(const DarkFit& fit, const std::vector<double>& weights, int site);
+Estimate estimate(const DarkFit& s, const std::vector<double>& weights, int site);
 
 }  // namespace lowlux::calib

@@ -67,9 +67,9 @@ std::optional<DarkTemperatureLaw> law_of(std::span<const LogPoint> points, doubl
   }
   const double doubling = std::numbers::ln2 / found[3].value;
   law.doubling_c = {doubling, doubling * found[3].standard_error / found[3].value};
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const double fitted = found[points[k].channel].value + found[3].value * (points[k].temperature_c - reference_c);
-    law.reduced_chi_square += std::pow((points[k].log_dn - fitted) / points[k].error, 2);
+  for (const auto& point : points) {
+    const double fitted = found[point.channel].value + found[3].value * (point.temperature_c - reference_c);
+    law.reduced_chi_square += std::pow((point.log_dn - fitted) / point.error, 2);
   }
   law.degrees_of_freedom = static_cast<int>(points.size()) - 4;
   law.reduced_chi_square /= std::max(1, law.degrees_of_freedom);

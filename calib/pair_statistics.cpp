@@ -79,7 +79,7 @@ void close_blocks(SiteBlocks& blocks, PerSite<SiteSums>& sums) {
 // Analysis of variance with rows as groups of equal size.
 SiteStatistics statistics_of(const SiteSums& s) {
   const auto n = static_cast<double>(s.pixels), rows = static_cast<double>(s.rows);
-  const double difference = static_cast<double>(s.b - s.a);
+  const auto difference = static_cast<double>(s.b - s.a);
   const double total = static_cast<double>(s.difference_squared) - difference * difference / n;
   const double between = s.row_squares - difference * difference / n;
   const double within = (total - between) / (n - rows);

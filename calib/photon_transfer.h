@@ -52,7 +52,8 @@ struct PhotonTransfer {
 /// cameras, sizes or gains; darks of different times; darks that are clipped at code 0; light that drifts by more than
 /// 1 % within a pair; flats that are not brighter than the darks; a gain that comes out negative or with a standard
 /// error above 5 %.
-Result<PhotonTransfer> fit_photon_transfer(std::span<const PairStatistics> darks, std::span<const PairStatistics> flats,
+Result<PhotonTransfer> fit_photon_transfer(std::span<const PairStatistics> dark_pairs,
+                                           std::span<const PairStatistics> flat_pairs,
                                            const PhotonTransferOptions& options = {});
 
 }  // namespace lowlux::calib

@@ -16,8 +16,9 @@ template <class Visit>
 void for_each_count(double mean, const Visit& visit) {
   const double reach = 10 * std::sqrt(mean) + 40;
   const double first = std::max(0.0, std::floor(mean - reach)), last = std::ceil(mean + reach);
+  int sign = 0;  // of the gamma function, for the form that threads may share
   for (double k = first; k <= last; ++k) {
-    visit(k, mean > 0 ? std::exp(k * std::log(mean) - mean - std::lgamma(k + 1)) : (k == 0 ? 1.0 : 0.0));
+    visit(k, mean > 0 ? std::exp(k * std::log(mean) - mean - ::lgamma_r(k + 1, &sign)) : (k == 0 ? 1.0 : 0.0));
   }
 }
 

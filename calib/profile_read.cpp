@@ -236,7 +236,7 @@ Result<CameraProfile> parse_profile(std::string_view text) {
   int version = 0;
   reader.text("format", format);
   if (!failure.error && format != profile_format) {
-    failure.set(ErrorCode::malformed, "format", fmt::format("found \"{}\", expected \"{}\"", format, profile_format));
+    failure.set(ErrorCode::malformed, "format", fmt::format(R"(found "{}", expected "{}")", format, profile_format));
   }
   reader.integer("version", version, {1, 1e9});
   if (!failure.error && version > profile_version) {

@@ -39,7 +39,7 @@ struct TransferCurve {
 Result<JoinedDarks> join_darks(std::span<const PairStatistics> darks);
 
 /// Variance against mean. Errors: see fit_photon_transfer.
-Result<TransferCurve> curve_of(std::span<const PairStatistics> darks, std::span<const PairStatistics> flats,
-                               const JoinedDarks& joined, bool under_dithered);
+Result<TransferCurve> curve_of(std::span<const PairStatistics> dark_pairs, std::span<const PairStatistics> flats,
+                               const JoinedDarks& darks, bool under_dithered);
 
 }  // namespace lowlux::calib
