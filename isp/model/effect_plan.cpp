@@ -16,8 +16,7 @@ constexpr std::array<std::string_view, effect_count> names{"photon-noise", "dark
                                                            "row-noise",    "column-noise"};
 
 /// Share of the tolerance that predictions may use up. They take all laws for normal ones, which near saturation and
-/// at a few electrons they are not: over 3000 scenes drawn as in effect_promise_test the worst change came to 98 % of
-/// the tolerance.
+/// at a few electrons they are not.
 constexpr double usable_share = 0.5;
 
 constexpr int most_samples = 24;  // blocks of one region that are evaluated: its extremes and others evenly among them

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <optional>
 #include <string>
 #include <utility>
@@ -23,7 +24,6 @@ namespace {
 
 using isp::Effect;
 
-constexpr int scenes = 300;
 constexpr int blocks_across = 4, blocks_down = 3;
 constexpr std::uint32_t draws_purpose = 77;  // of this test's own choices
 
@@ -156,7 +156,9 @@ isp::PredictedChange observed_change(const SyntheticSource& planned, const Synth
   return worst;
 }
 
+// 300 scenes; 3000 in scripts/nightly.
 TEST(EffectPromise, WhatIsLeftOutStaysBelowTheToleranceOver300Scenes) {
+  const std::uint32_t scenes = std::getenv("LOWLUX_NIGHTLY") == nullptr ? 300 : 3000;
   std::array<int, isp::effect_count> kept{}, left_out{};
   InlineExecutor inline_executor;
   const isp::Tolerance tolerance;
