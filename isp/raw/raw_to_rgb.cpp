@@ -152,12 +152,16 @@ void run_bands(Executor& executor, int threads, int height, const Work& work) {
   return tone.bins >= 1 && tone.bins <= ToneTable::capacity && tone.bin_of(1.0f) == tone.bins - 1;
 }
 
+/// Floats that a run of scratch samples takes for pictures `width` pixels wide.
+std::size_t run_of(int width) {
+  return rows::padding_before + (static_cast<std::size_t>(width) + 1) / 2 + rows::padding_after;
+}
+
 }  // namespace
 
-RawToRgb::RawToRgb(int max_width, int threads) : max_width_(max_width), threads_(threads) {
+RawToRgb::RawToRgb(int max_width, int threads) : threads_(threads) {
   assert(max_width >= 1 && threads >= 1);
-  const std::size_t samples =
-      rows::padding_before + (static_cast<std::size_t>(max_width) + 1) / 2 + rows::padding_after;
+  const std::size_t samples = run_of(max_width);
   // Runs start on a cache line, and an odd number of lines apart: an even number could put the live rows of a column
   // into the same few sets of the first-level cache.
   const std::size_t lines = ((samples + line_floats - 1) / line_floats) | 1U;
@@ -177,7 +181,7 @@ void RawToRgb::convert(const RgbInput& in, const RgbTransform& transform, const 
                        Executor& executor) {
   std::visit(
       [&](const auto& input) {
-        assert(width_of(input) <= max_width_);
+        assert(run_of(width_of(input)) <= run_stride_);
         if (width_of(input) == 0) return;
         run_bands(executor, threads_, height_of(input), [&](RowBand band, int thread) {
           convert_band(input, transform, band, Ring{scratch(thread), run_stride_}, sink_of_row);
@@ -219,7 +223,7 @@ void RawToRgb::linear(const RgbInput& in, const RgbTransform& transform, RgbView
 
 template <class Mosaic>
 void RawToRgb::bin(const Mosaic& in, RgbView<float> out, Executor& executor) {
-  assert(width_of(in) <= max_width_);
+  assert(run_of(width_of(in)) <= run_stride_);
   const int width = width_of(in) / 2, height = height_of(in) / 2;
   assert(out[0].width == width && out[0].height == height);
   if (width == 0) return;

@@ -85,7 +85,6 @@ class RawToRgb {
   void convert(const RgbInput& in, const RgbTransform& transform, const SinkOfRow& sink_of_row, Executor& executor);
   float* scratch(int thread) const;
 
-  int max_width_;
   int threads_;
   std::size_t run_stride_;  // floats from one run of scratch samples to the next
   std::unique_ptr<float[]> memory_;
