@@ -20,7 +20,7 @@ inline constexpr std::size_t largest_profile_bytes = std::size_t{16} << 20;
 /// UTF-8.
 Result<std::string> profile_text(const CameraProfile& profile);
 
-/// A profile from JSON. Every key must be there ("iso" excepted) and none besides.
+/// A profile from JSON. Every key must be there, those of figures that may be unknown excepted, and none besides.
 /// Errors, each one with the path of the key, as "gains[0].sensor.bits": a key that is missing, unknown or there twice
 /// (the path then without positions in lists);
 /// a value of another type; a value that cannot be; a version that is not known; and text that is no JSON or too long.

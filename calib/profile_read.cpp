@@ -107,6 +107,30 @@ class Reader {
   }
 
   template <class T, class Visit>
+  void optional_object(const char* key, std::optional<T>& out, const Visit& visit) {
+    if (failure_.error) return;
+    asked_.insert(key);
+    if (!node_.contains(key)) return;
+    out.emplace();
+    object(key, [&](Reader& inner) { visit(inner, *out); });
+  }
+
+  /// Three rows of three.
+  void matrix(const char* key, Matrix3& out) {
+    const Json* rows = array(key, 3, 3);
+    for (std::size_t i = 0; rows != nullptr && i < 9 && !failure_.error; ++i) {
+      const std::string path = indexed(joined(path_, key), i / 3);
+      const Json& row = (*rows)[i / 3];
+      if (!row.is_array() || row.size() != 3) {
+        return failure_.set(ErrorCode::malformed, path, "expected a list of 3 numbers");
+      }
+      if (!row[i % 3].is_number()) return wrong_type(indexed(path, i % 3), "a number", row[i % 3]);
+      const auto found = row[i % 3].get<double>();
+      if (check_range(found, matrix_entries, indexed(path, i % 3), failure_)) out[i / 3][i % 3] = found;
+    }
+  }
+
+  template <class T, class Visit>
   void list(const char* key, std::vector<T>& out, std::size_t most, const Visit& visit) {
     const Json* value = array(key, 0, most);
     if (value == nullptr) return;

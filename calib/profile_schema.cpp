@@ -21,10 +21,32 @@ bool check_range(double value, const Range& range, const std::string& path, Prof
   return false;
 }
 
+namespace {
+
+void check_gain(const GainProfile& gain, const std::string& path, ProfileFailure& failure) {
+  if (gain.sensor) {
+    const auto good = isp::check_sensor(*gain.sensor);
+    if (!good) failure.set(ErrorCode::malformed, path + ".sensor", good.error().message);
+  }
+  const auto check_rising = [&](const std::optional<MeasuredRange>& range, const char* key) {
+    if (range && range->low > range->high) {
+      failure.set(ErrorCode::malformed, joined(path, key),
+                  fmt::format("{:g} to {:g} is no range", range->low, range->high));
+    }
+  };
+  check_rising(gain.dark_exposure_s, "dark_exposure_s");
+  check_rising(gain.dark_temperature_c, "dark_temperature_c");
+}
+
+}  // namespace
+
 void check_together(const CameraProfile& profile, ProfileFailure& failure) {
   for (std::size_t i = 0; i < profile.gains.size() && !failure.error; ++i) {
-    const auto good = isp::check_sensor(profile.gains[i].sensor);
-    if (!good) failure.set(ErrorCode::malformed, indexed("gains", i) + ".sensor", good.error().message);
+    check_gain(profile.gains[i], indexed("gains", i), failure);
+  }
+  for (std::size_t i = 0; i < profile.colours.size() && !failure.error; ++i) {
+    if (inverse(profile.colours[i].calibration.xyz_to_camera)) continue;
+    failure.set(ErrorCode::malformed, indexed("colours", i) + ".xyz_to_camera", "the matrix is singular");
   }
 }
 

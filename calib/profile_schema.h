@@ -34,12 +34,15 @@ bool check_range(double value, const Range& range, const std::string& path, Prof
 void check_together(const CameraProfile& profile, ProfileFailure& failure);
 
 inline constexpr double tiny = 1e-12;  // stands for "above 0"
-inline constexpr std::size_t most_gains = 256, most_hot_pixels = 100000, most_files = 10000, most_provenance = 64;
+inline constexpr std::size_t most_gains = 256, most_hot_pixels = 100000, most_files = 10000, most_provenance = 64,
+                             most_colours = 64;
+inline constexpr Range matrix_entries{-1e3, 1e3};
 
 /// The profile's keys, in order, once for reading and writing. A visitor offers
 ///     text(key, string)               number(key, double, range)       integer(key, int, range)
 ///     optional_number(key, optional)  estimate(key, value, standard error, range)
-///     choice(key, enum, names)        object(key, fn)                  list(key, container, most, fn), fixed_list(...)
+///     choice(key, enum, names)        object(key, fn)                  optional_object(key, optional, fn)
+///     matrix(key, Matrix3)            list(key, container, most, fn)   fixed_list(key, array, fn)
 /// each of which does nothing once something has failed.
 template <class Visitor, class Sensor, class Errors>
 void visit_sensor(Visitor& v, Sensor& s, Errors& e) {
@@ -75,14 +78,32 @@ void visit_provenance(Visitor& v, Source& p) {
   v.integer("degrees_of_freedom", p.degrees_of_freedom, {0, 1e9});
 }
 
+template <class Visitor, class Measured>
+void visit_range(Visitor& v, Measured& r, const Range& possible) {
+  v.number("low", r.low, possible);
+  v.number("high", r.high, possible);
+}
+
 template <class Visitor, class Gain>
 void visit_gain(Visitor& v, Gain& g) {
+  const auto visit_estimate = [](Visitor& inner, auto& e) {
+    inner.number("value", e.value, {0, 65535});
+    inner.number("standard_error", e.standard_error, {});
+  };
   v.text("gain_setting", g.gain_setting);
   v.optional_number("iso", g.iso, {tiny, 1e9});
-  v.object("sensor", [&](Visitor& inner) { visit_sensor(inner, g.sensor, g.errors); });
-  v.fixed_list("pedestal_dn", g.pedestal_dn, [](Visitor& inner, auto& pedestal) {
-    inner.number("value", pedestal.value, {0, 65535});
-    inner.number("standard_error", pedestal.standard_error, {});
+  v.optional_object("sensor", g.sensor, [&](Visitor& inner, auto& sensor) { visit_sensor(inner, sensor, g.errors); });
+  v.fixed_list("pedestal_dn", g.pedestal_dn, visit_estimate);
+  v.choice("pedestal_holds", g.pedestal_holds, {"pedestal", "pedestal and dark"});
+  v.optional_object("dark_exposure_s", g.dark_exposure_s,
+                    [](Visitor& inner, auto& range) { visit_range(inner, range, {}); });
+  v.optional_object("dark_temperature_c", g.dark_temperature_c, [](Visitor& inner, auto& range) {
+    visit_range(inner, range, {-200, 200});
+  });
+  v.optional_object("dark_chromaticity", g.dark_chromaticity, [](Visitor& inner, auto& share) {
+    inner.estimate("red", share[0].value, share[0].standard_error, {-10, 10});
+    inner.estimate("green", share[1].value, share[1].standard_error, {-10, 10});
+    inner.estimate("blue", share[2].value, share[2].standard_error, {-10, 10});
   });
   v.list("hot_pixels", g.hot_pixels, most_hot_pixels, [](Visitor& inner, auto& hot) {
     inner.integer("x_px", hot.x, {0, 1e6});
@@ -92,11 +113,25 @@ void visit_gain(Visitor& v, Gain& g) {
   v.list("provenance", g.provenance, most_provenance, [](Visitor& inner, auto& p) { visit_provenance(inner, p); });
 }
 
+template <class Visitor, class Colour>
+void visit_colour(Visitor& v, Colour& c) {
+  v.text("illuminant", c.illuminant);
+  v.number("cct_k", c.calibration.cct_k, {0, 1e6});
+  v.matrix("xyz_to_camera", c.calibration.xyz_to_camera);
+  v.optional_object("forward", c.calibration.forward,
+                    [](Visitor& inner, auto& forward) { inner.matrix("balanced_camera_to_xyz_d50", forward); });
+  v.optional_number("patches_ciede2000", c.patches_ciede2000, {});
+  v.optional_number("cross_validated_ciede2000", c.cross_validated_ciede2000, {});
+  v.optional_number("condition_number", c.condition_number, {1, 1e300});
+  v.object("provenance", [&](Visitor& inner) { visit_provenance(inner, c.provenance); });
+}
+
 template <class Visitor, class Profile>
 void visit_profile(Visitor& v, Profile& p) {
   v.text("make", p.make);
   v.text("model", p.model);
   v.list("gains", p.gains, most_gains, [](Visitor& inner, auto& gain) { visit_gain(inner, gain); });
+  v.list("colours", p.colours, most_colours, [](Visitor& inner, auto& colour) { visit_colour(inner, colour); });
 }
 
 }  // namespace lowlux::calib

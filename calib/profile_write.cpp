@@ -50,6 +50,19 @@ class Writer {
     Writer inner(node_[key], joined(path_, key), failure_);
     visit(inner);
   }
+  template <class T, class Visit>
+  void optional_object(const char* key, const std::optional<T>& value, const Visit& visit) {
+    if (value) object(key, [&](Writer& inner) { visit(inner, *value); });
+  }
+  void matrix(const char* key, const Matrix3& value) {
+    Json& rows = node_[key] = Json::array();
+    for (std::size_t i = 0; i < 9; ++i) {
+      const std::string path = indexed(indexed(joined(path_, key), i / 3), i % 3);
+      check_range(value[i / 3][i % 3], matrix_entries, path, failure_);
+      if (i % 3 == 0) rows.push_back(Json::array());
+      rows.back().push_back(value[i / 3][i % 3]);
+    }
+  }
   template <class Container, class Visit>
   void list(const char* key, const Container& values, std::size_t most, const Visit& visit) {
     Json& array = node_[key] = Json::array();

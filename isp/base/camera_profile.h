@@ -8,6 +8,7 @@
 
 #include "isp/base/cfa.h"
 #include "isp/base/estimate.h"
+#include "isp/base/frame.h"
 #include "isp/base/sensor.h"
 
 namespace lowlux {
@@ -41,15 +42,36 @@ struct Provenance {
   int degrees_of_freedom = 0;
 };
 
+/// What figures were measured over, ends included.
+struct MeasuredRange {
+  double low = 0;
+  double high = 0;
+  friend bool operator==(const MeasuredRange&, const MeasuredRange&) = default;
+};
+
 /// A camera at one gain setting.
 struct GainProfile {
   std::string gain_setting;  // as the camera calls it
   std::optional<double> iso;
-  SensorModel sensor;
+  std::optional<SensorModel> sensor;  // absent where the system gain is unknown: then nothing is known in electrons
   SensorErrors errors;
-  PerSite<Estimate> pedestal_dn{};  // the model's black level, site by site
+  PerSite<Estimate> pedestal_dn{};                                      // the model's black level, site by site
+  BlackPoint::Holds pedestal_holds = BlackPoint::Holds::pedestal_only;  // with the dark charge if it was not told apart
+  std::optional<MeasuredRange> dark_exposure_s;                         // of the darks; absent if there were none
+  std::optional<MeasuredRange> dark_temperature_c;                      // of the darks, where they state it
+  std::optional<std::array<Estimate, 3>> dark_chromaticity{};           // R : G : B of the dark current, sum 1
   std::vector<HotPixelFigure> hot_pixels;
   std::vector<Provenance> provenance;
+};
+
+/// A camera's colours under one light, and how well the matrix gives them: mean CIEDE2000 over the patches.
+struct ColourProfile {
+  std::string illuminant;
+  ColourCalibration calibration;                    // camera_calibration is the identity
+  std::optional<double> patches_ciede2000;          // of the patches the matrix was fitted to
+  std::optional<double> cross_validated_ciede2000;  // of patches left out of the fit
+  std::optional<double> condition_number;           // of the equations solved
+  Provenance provenance;
 };
 
 /// What has been measured of a camera; written and read by calib/profile_io.h.
@@ -57,6 +79,7 @@ struct CameraProfile {
   std::string make;
   std::string model;
   std::vector<GainProfile> gains;
+  std::vector<ColourProfile> colours;
 };
 
 }  // namespace lowlux
