@@ -1,10 +1,13 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "calib/dark_image.h"
+#include "calib/dark_series.h"
 #include "calib/dark_stack.h"
 #include "calib/linear_estimators.h"
 #include "isp/base/cfa.h"
@@ -37,5 +40,18 @@ Result<void> finish_fit(DarkFit& fit);
 /// Weighted sum over the groups of a site's means; corrections included.
 /// @param weights one for each group
 Estimate estimate(const DarkFit& s, const std::vector<double>& weights, int site);
+
+/// Every site's mean in every group, and how far it lies from the fit.
+/// @param parameters  pedestal, then one slope for each temperature
+std::vector<DarkPoint> points_of(const DarkFit& fit, std::span<const PerSite<Estimate>> parameters);
+
+/// Temporal noise of a pixel about its row, without dark charge and quantisation [e-]; none if nothing is left of it.
+/// @param group  with little dark charge
+/// @param dark_charge_dn  of each site, in that group
+std::optional<Estimate> read_noise_of(const DarkFit& fit, std::size_t group, const PerSite<double>& dark_charge_dn);
+
+/// A parameter pixel by pixel: the groups' means weighted by the estimators `parameter` of their sites, divided by
+/// `unit`.
+Plane<float> map_of(const DarkFit& fit, std::size_t parameter, double unit);
 
 }  // namespace lowlux::calib

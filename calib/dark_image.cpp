@@ -110,6 +110,7 @@ ImageFigures figures_of(const WeightedImage& image, const PixelMask& mask, int s
   out.standard_error =
       std::sqrt(std::max(white, row_means.variance() / row_means.n + column_means.variance() / column_means.n - white));
   out.column_variance = column_means.variance() - out.variance * column_means.n / all.n;
+  out.row_variance = row_means.variance() - out.variance * row_means.n / all.n;
   const Change across = change_over(columns), down = change_over(rows);
   out.change_x = across.value;
   out.error_x = across.error;

@@ -36,6 +36,7 @@ struct ImageFigures {
   double temporal_variance = 0;  // of it what follows from the groups' temporal noise
   /// A straight line through the means of columns (x) and of rows (y): its change from edge to edge.
   double change_x = 0, change_y = 0, error_x = 0, error_y = 0;
+  double row_variance = 0;  // as column_variance, of whole rows
 };
 ImageFigures figures_of(const WeightedImage& image, const PixelMask& mask, int site);
 

@@ -57,28 +57,35 @@ double dark_charge_dn(const DarkFit& s, const std::vector<PerSite<Estimate>>& pa
   return parameters[1 + s.temperature_of[g]][site].value * *s.groups[g].setting.exposure_s;
 }
 
-Result<void> check_linear(const DarkFit& s, const std::vector<PerSite<Estimate>>& parameters) {
-  for (int site = 0; site < 4; ++site) {
-    double most = 0;
-    for (std::size_t g = 0; g < s.groups.size(); ++g) most = std::max(most, dark_charge_dn(s, parameters, g, site));
-    for (std::size_t g = 0; g < s.groups.size(); ++g) {
-      std::vector<double> residual(s.groups.size());
-      for (std::size_t i = 0; i < residual.size(); ++i) {
-        for (std::size_t p = 0; p < parameters.size(); ++p) residual[i] -= s.design[g][p] * s.estimators[site][p][i];
-      }
-      residual[g] += 1;
-      const Estimate off = estimate(s, residual, site);
-      if (std::fabs(off.value) > certain * off.standard_error && std::fabs(off.value) > least_misfit * most) {
-        return fail(
-            ErrorCode::malformed,
-            fmt::format("the darks are not linear in time: at {:g} s the mean is off by {:.3g} +- {:.2g} DN of "
-                        "{:.3g} DN; light gets in, or the temperature changes; cover the camera and let it settle",
-                        *s.groups[g].setting.exposure_s, off.value, off.standard_error,
-                        dark_charge_dn(s, parameters, g, site)));
-      }
-    }
+Result<void> check_linear(const DarkFit& s, const std::vector<PerSite<Estimate>>& parameters,
+                          std::span<const DarkPoint> points) {
+  PerSite<double> most{};
+  for (const DarkPoint& p : points) {
+    most[p.site] = std::max(most[p.site], dark_charge_dn(s, parameters, p.group, p.site));
+  }
+  for (const DarkPoint& p : points) {
+    const Estimate& off = p.residual_dn;
+    if (std::fabs(off.value) <= certain * off.standard_error) continue;
+    if (std::fabs(off.value) <= least_misfit * most[p.site]) continue;
+    return fail(ErrorCode::malformed,
+                fmt::format("the darks are not linear in time: at {:g} s the mean is off by {:.3g} +- {:.2g} DN of "
+                            "{:.3g} DN; light gets in, or the temperature changes; cover the camera and let it settle",
+                            *s.groups[p.group].setting.exposure_s, off.value, off.standard_error,
+                            dark_charge_dn(s, parameters, p.group, p.site)));
   }
   return {};
+}
+
+void put_quality(const DarkFit& s, const std::vector<PerSite<Estimate>>& parameters, DarkSeries& out) {
+  double sum = 0;
+  int judged = 0;
+  for (const DarkPoint& p : out.points) {
+    if (!(p.residual_dn.standard_error > 0)) continue;
+    sum += std::pow(p.residual_dn.value / p.residual_dn.standard_error, 2);
+    ++judged;
+  }
+  out.degrees_of_freedom = 4 * static_cast<int>(s.groups.size() - parameters.size());
+  out.reduced_chi_square = out.degrees_of_freedom > 0 && judged > 0 ? sum / judged : 0;
 }
 
 Result<void> check_even(const DarkFit& s) {
@@ -156,17 +163,30 @@ void list_hot_pixels(const DarkFit& s, std::size_t darkest, DarkSeries& out) {
   }
 }
 
-std::size_t darkest_group(const DarkFit& s) {
-  std::size_t darkest = 0;
-  const auto level = [&](std::size_t g) {
-    double sum = 0;
-    for (const SiteSpread& spread : s.spread[g]) sum += spread.median;
-    return sum;
-  };
+double level_of(const DarkFit& s, std::size_t g) {
+  double sum = 0;
+  for (const SiteSpread& spread : s.spread[g]) sum += spread.median;
+  return sum;
+}
+
+struct Extremes {
+  std::size_t least = 0, most = 0;  // dark charge
+};
+
+Extremes extremes_of(const DarkFit& s) {
+  Extremes out;
   for (std::size_t g = 1; g < s.groups.size(); ++g) {
-    if (level(g) > level(darkest)) darkest = g;
+    if (level_of(s, g) > level_of(s, out.most)) out.most = g;
+    if (level_of(s, g) < level_of(s, out.least)) out.least = g;
   }
-  return darkest;
+  return out;
+}
+
+void put_read_noise(const DarkFit& s, const std::vector<PerSite<Estimate>>& parameters, std::size_t least,
+                    DarkSeries& out) {
+  PerSite<double> charge{};
+  for (int site = 0; site < 4; ++site) charge[site] = std::max(0.0, dark_charge_dn(s, parameters, least, site));
+  out.read_noise_e = read_noise_of(s, least, charge);
 }
 
 }  // namespace
@@ -190,16 +210,21 @@ Result<DarkSeries> fit_dark_series(Groups groups, const Estimate& gain) {
   for (std::size_t p = 0; p < parameters.size(); ++p) {
     for (int site = 0; site < 4; ++site) parameters[p][site] = estimate(s, s.estimators[site][p], site);
   }
-  if (auto good = check_linear(s, parameters); !good) return tl::make_unexpected(good.error());
+  out.points = points_of(s, parameters);
+  if (auto good = check_linear(s, parameters, out.points); !good) return tl::make_unexpected(good.error());
   if (auto good = check_even(s); !good) return tl::make_unexpected(good.error());
   out.pedestal_dn = parameters[0];
   std::vector<std::array<Estimate, 3>> slopes_dn;
   const FrameSetting& setting = groups.front().setting;
   for (std::size_t t = 0; t < s.temperature_c.size(); ++t) slopes_dn.push_back(channels_of(setting, parameters[1 + t]));
   put_currents(s.temperature_c, slopes_dn, setting.temperature_c.has_value(), gain, out);
-  const std::size_t darkest = darkest_group(s);
-  put_patterns(s, darkest, out);
-  list_hot_pixels(s, darkest, out);
+  const Extremes extremes = extremes_of(s);
+  put_patterns(s, extremes.most, out);
+  list_hot_pixels(s, extremes.most, out);
+  put_read_noise(s, parameters, extremes.least, out);
+  put_quality(s, parameters, out);
+  out.pedestal_map_dn = map_of(s, 0, 1);
+  out.current_map_e_per_s = map_of(s, 1 + s.temperature_of[extremes.most], gain.value);
   return out;
 }
 

@@ -8,6 +8,7 @@
 #include "calib/dark_stack.h"
 #include "isp/base/cfa.h"
 #include "isp/base/estimate.h"
+#include "isp/base/plane.h"
 #include "isp/base/result.h"
 
 namespace lowlux::calib {
@@ -34,6 +35,14 @@ struct HotPixel {
   double excess_e_per_s = 0;
 };
 
+/// Mean of one site's pixels in one group, and how far it lies from the fit.
+struct DarkPoint {
+  int group = 0;
+  int site = 0;
+  double mean_dn = 0;
+  Estimate residual_dn;  // its error is that of the residual, made pixel by pixel
+};
+
 /// Figures of one gain setting from darks of several exposures.
 struct DarkSeries {
   PerSite<Estimate> pedestal_dn{};    // mean code of no charge
@@ -48,6 +57,13 @@ struct DarkSeries {
   double hot_group_exposure_s = 0;
   double excluded_share = 0;         // of all pixels, from all means
   double largest_correction_dn = 0;  // of a mean, for what excluding pixels does to it
+  std::optional<Estimate>
+      read_noise_e;               // of a pixel about its row, from the group with least dark charge; none if lost
+  std::vector<DarkPoint> points;  // four for each group
+  double reduced_chi_square = 0;  // mean square of residual / error: about 1 where mean is linear in time
+  int degrees_of_freedom = 0;
+  Plane<float> pedestal_map_dn;      // every pixel's own, outliers included
+  Plane<float> current_map_e_per_s;  // at the temperature where the dark current is largest
 };
 
 /// Fits mean = pedestal + K * current * time for each site, the pedestal being common to all temperatures.

@@ -72,6 +72,17 @@ void put_dark_noise(const Darks& darks, Pairs pairs, const TransferLine& line, P
   out.dsnu_e = scaled(dsnu_dn.value, dsnu_dn.standard_error, out.system_gain_dn_per_e);
 }
 
+void put_black(const Darks& darks, Pairs pairs, PhotonTransfer& out) {
+  out.black_dn = darks.mean_dn;
+  const double frames = 2 * darks.scatter.pairs;
+  for (int site = 0; site < 4; ++site) {
+    const SiteStatistics& s = pairs.front().site[site];
+    const double of_pixels =
+        (darks.variance_dn2 / frames + std::max(0.0, darks.spatial_dn2[site])) / static_cast<double>(s.pixels);
+    out.black_standard_error_dn[site] = std::sqrt(of_pixels + darks.scatter.row_variance_dn2 / (frames * s.rows));
+  }
+}
+
 void put_prnu(const Curve& curve, Pairs pairs, const Darks& darks, PhotonTransfer& out) {
   double weights = 0, sum = 0;
   for (int site = 0; site < 4; ++site) {
@@ -169,7 +180,7 @@ Result<PhotonTransfer> fit_photon_transfer(Pairs dark_pairs, Pairs flat_pairs, c
   const auto curve = curve_of(dark_pairs, flat_pairs, darks, out.under_dithered);
   if (!curve) return tl::make_unexpected(curve.error());
   const TransferLine line = fit_line(curve->linear, darks.scatter);
-  out.black_dn = darks.mean_dn;
+  put_black(darks, dark_pairs, out);
   out.levels = curve->levels;
   out.degrees_of_freedom = line.degrees_of_freedom;
   out.reduced_chi_square = line.chi_square / line.degrees_of_freedom;

@@ -39,7 +39,8 @@ struct PhotonTransfer {
   std::optional<double> linearity_error;  // EMVA LE: mean relative deviation from the line, 5 to 95 % of range
   double reduced_chi_square = 0;          // of variance against mean
   int degrees_of_freedom = 0;
-  int levels = 0;  // of light, in the linear range of the site that has fewest
+  int levels = 0;                             // of light, in the linear range of the site that has fewest
+  PerSite<double> black_standard_error_dn{};  // of noise and rows; columns and other patterns are part of the black
 };
 
 /// Fits variance against mean over the linear range, up to 70 % of the mean where the variance is largest:

@@ -96,7 +96,7 @@ struct BlackPoint {
   PerSite<double> dark_mean_e{};                 // left in the data once the pedestal is off; 0 if unknown
   PerSite<double> noise_std_dn{};                // of masked pixels; 0 where nothing was measured
   enum class Holds : std::uint8_t { pedestal_only, pedestal_and_dark } holds = Holds::pedestal_only;
-  enum class Source : std::uint8_t { masked_pixels, tag, given } source = Source::tag;
+  enum class Source : std::uint8_t { masked_pixels, tag, given, profile } source = Source::tag;
   std::optional<BlackLevel> pattern;  // set when `source` is tag and four figures cannot express it
 };
 
@@ -120,7 +120,7 @@ struct CameraColour {
   Vector3 analog_balance{1, 1, 1};
   std::optional<Vector3> as_shot_neutral;  // camera RGB of a neutral, largest 1
   std::optional<std::array<double, 2>> as_shot_white_xy;
-  enum class Source : std::uint8_t { none, file_tags, decoder_table } source = Source::none;
+  enum class Source : std::uint8_t { none, file_tags, decoder_table, profile } source = Source::none;
 };
 
 /// A frame with all its source tells about it: what capture hands to the pipeline.

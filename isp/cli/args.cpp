@@ -45,17 +45,22 @@ std::optional<PerSite<double>> site_figures(const std::string& text) {
   return f.size() == 1 ? PerSite<double>{f[0], f[0], f[0], f[0]} : PerSite<double>{f[0], f[1], f[2], f[3]};
 }
 
-void set_black(const std::string& text, isp::BlackRequest& request) {
+void set_black(const std::string& text, DevelopArgs& args) {
+  isp::BlackRequest& request = args.options.black;
   static const Names<isp::BlackChoice> names{{"auto", isp::BlackChoice::automatic},
                                              {"metadata", isp::BlackChoice::metadata},
                                              {"masked", isp::BlackChoice::masked}};
   if (const auto named = names.find(text); named != names.end()) {
     request.choice = named->second;
   } else if (const auto figures = site_figures(text)) {
-    request = {isp::BlackChoice::given, *figures};
+    request.choice = isp::BlackChoice::given;
+    request.given_dn = *figures;
+  } else if (text.ends_with(".json")) {
+    args.black_profile = text;
   } else {
-    throw CLI::ValidationError("--black",
-                               fmt::format("'{}' is neither {} nor one or four figures in DN", text, joined(names)));
+    throw CLI::ValidationError("--black", fmt::format("'{}' is neither {} nor one or four figures in DN nor a profile "
+                                                      "(PROFILE.json)",
+                                                      text, joined(names)));
   }
 }
 
@@ -89,11 +94,16 @@ void add_rendering(CLI::App& app, DevelopArgs& args) {
       app, "--space", space_names(), [&args](OutputSpace space) { args.space = space; },
       "what the numbers mean (default: srgb; linear-srgb for OpenEXR and PFM)");
   app.add_option_function<std::string>(
-         "--black", [&o](const std::string& text) { set_black(text, o.black); },
+         "--black", [&args](const std::string& text) { set_black(text, args); },
          "black point: measured on masked pixels where there are any, else the file's figure (auto, default); one of "
-         "the "
-         "two; or given in DN, for all pixels or for the four sites of the 2x2 cell")
-      ->type_name("auto|metadata|masked|DN[,DN,DN,DN]");
+         "the two; given in DN, for all pixels or for the four sites of the 2x2 cell; or a camera's profile, whose "
+         "noise "
+         "and hot pixels are used too")
+      ->type_name("auto|metadata|masked|DN[,DN,DN,DN]|PROFILE.json");
+  app.add_option("--profile", args.profile,
+                 "a camera's profile (see calibrate): black point, noise and hot pixels, and its colour matrices if it "
+                 "holds any")
+      ->type_name("PROFILE.json");
   add_choice<bool>(
       app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
       "hot and dead pixels: look for them (default), or repair only those the file names");

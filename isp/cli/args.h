@@ -20,6 +20,8 @@ struct DevelopArgs {
   std::optional<OutputSpace> space;    // absent: srgb, or linear-srgb for OpenEXR and PFM
   bool exposure_given = false;
   isp::DevelopOptions options;  // white balance, black, half, defects, exposure
+  std::string black_profile;    // a camera's profile to take black and noise from; empty: none
+  std::string profile;          // to take everything from it, colour too; empty: none
   int jpeg_quality = 92;
   int jobs = 0;  // files at a time; 0: one for each processor
   bool force = false;

@@ -29,6 +29,8 @@ const char* name_of(BlackPoint::Source source) {
       return "tag";
     case BlackPoint::Source::given:
       return "given";
+    case BlackPoint::Source::profile:
+      return "profile";
   }
   return "";
 }
@@ -61,7 +63,7 @@ Json white_json(const isp::DevelopPlan& plan) {
 }
 
 Json colour_json(const CameraColour& colour) {
-  static constexpr const char* sources[] = {"none", "file-tags", "decoder-table"};
+  static constexpr const char* sources[] = {"none", "file-tags", "decoder-table", "profile"};
   Json json{{"source", sources[static_cast<int>(colour.source)]}, {"calibrations", Json::array()}};
   for (const ColourCalibration& c : colour.calibrations) {
     json["calibrations"].push_back(

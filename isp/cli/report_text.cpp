@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include <fmt/format.h>
 
+#include "isp/cli/lines.h"
 #include "isp/cli/report.h"
 #include "isp/model/camera_colour.h"
 #include "isp/model/scene_luminance.h"
@@ -12,17 +12,6 @@
 
 namespace lowlux::cli {
 namespace {
-
-class Lines {
- public:
-  template <class... T>
-  void add(const char* label, fmt::format_string<T...> format, T&&... values) {
-    fmt::format_to(std::back_inserter(text_), "  {:<15}", label);
-    fmt::format_to(std::back_inserter(text_), format, std::forward<T>(values)...);
-    text_ += '\n';
-  }
-  std::string text_;
-};
 
 std::string rect_text(const Rect& r) { return fmt::format("{} x {} at ({}, {})", r.width, r.height, r.x, r.y); }
 
@@ -98,7 +87,7 @@ void add_exposure(Lines& out, const FrameInfo& info) {
 }
 
 void add_colour(Lines& out, const CameraColour& colour) {
-  static constexpr const char* sources[] = {"none", "from the file", "from the decoder's table"};
+  static constexpr const char* sources[] = {"none", "from the file", "from the decoder's table", "from the profile"};
   out.add("colour", "{} calibration{} {}", colour.calibrations.size(), colour.calibrations.size() == 1 ? "" : "s",
           sources[static_cast<int>(colour.source)]);
   for (const ColourCalibration& c : colour.calibrations) {
@@ -143,7 +132,7 @@ std::string info_text(const std::string& file, const RawFrame& frame) {
   out.add("corrections", "{} gain maps, {} radial gains, {} named defects", c.gain_maps.size(), c.radial_gains.size(),
           c.defects.size());
   for (const std::string& warning : frame.warnings) out.add("warning", "{}", warning);
-  return file + "\n" + out.text_;
+  return file + "\n" + out.text();
 }
 
 std::string one_line(std::string text) {

@@ -14,6 +14,8 @@
 #include "isp/cli/args.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/outputs.h"
+#include "isp/cli/profile_file.h"
+#include "isp/cli/profile_option.h"
 #include "isp/cli/progress.h"
 #include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
@@ -30,6 +32,7 @@ struct Task {
   isp::DevelopOptions options;
   isp::WriteOptions write;
   std::vector<Job> jobs;
+  std::optional<CameraProfile> profile;
 };
 
 Error with_place(Error error, const std::string& where) {
@@ -67,14 +70,22 @@ DevelopOutcome develop_file(const Task& task, const Job& job, Executor& executor
   FileProgress done(progress, job.input);
   isp::StageClock clock(out.times);
   if ((out.error = in_the_way(job.output, task.args.force))) return out;
-  const Result<RawFrame> frame = capture::read_raw(job.input);
+  Result<RawFrame> frame = capture::read_raw(job.input);
   clock.lap("read and decode");
   done.reach(0.3);
+  isp::DevelopOptions options = task.options;
+  if (frame && task.profile) {
+    const bool colour = !task.args.profile.empty();
+    if (const auto used = use_profile(*task.profile, colour, *frame, options.black); !used) {
+      out.error = with_place(used.error(), job.input);
+      return out;
+    }
+  }
   if (!frame) {
     out.error = with_place(frame.error(), job.input);
     return out;
   }
-  Result<isp::Developed> developed = isp::develop(*frame, task.options, executor);
+  Result<isp::Developed> developed = isp::develop(*frame, options, executor);
   if (!developed) {
     out.error = with_place(developed.error(), job.input);
     return out;
@@ -182,7 +193,15 @@ int run_develop(const std::vector<std::string>& words) {
   const Result<isp::DevelopOptions> options = complete_options(args, *format);
   if (!options) return usage_error(options.error());
 
-  Task task{args, *options, {}, std::move(*jobs)};
+  Task task{args, *options, {}, std::move(*jobs), {}};
+  if (const std::string& file = args.profile.empty() ? args.black_profile : args.profile; !file.empty()) {
+    auto profile = read_profile(file);
+    if (!profile) {
+      fmt::print(stderr, "{}\n", error_line(file, profile.error()));
+      return exit_failed;
+    }
+    task.profile = std::move(*profile);
+  }
   task.write.overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
   task.write.software = "lowlux " + version_number();
   task.write.jpeg.quality = args.jpeg_quality;

@@ -85,16 +85,21 @@ void put_row(const std::vector<std::uint32_t>& row, int samples, int y, SceneLin
 
 }  // namespace
 
-Result<void> encode_pfm(const SceneLinear& picture, std::FILE* file) try {
+namespace {
+
+/// @param sample_at  value of sample i of row y
+template <class SampleAt>
+Result<void> encode(const char* kind, int samples, int width, int height, const SampleAt& sample_at,
+                    std::FILE* file) try {
   constexpr DecodeLimits any_number{std::numeric_limits<std::int64_t>::max()};
-  if (auto size = check_size(picture.width(), picture.height(), any_number); !size) return size;
+  if (auto size = check_size(width, height, any_number); !size) return size;
   const std::string header =
-      "PF\n" + std::to_string(picture.width()) + " " + std::to_string(picture.height()) + "\n-1.0\n";
+      std::string(kind) + "\n" + std::to_string(width) + " " + std::to_string(height) + "\n-1.0\n";
   if (auto written = write_bytes(file, std::as_bytes(std::span(header))); !written) return written;
-  std::vector<std::uint32_t> row(3 * static_cast<std::size_t>(picture.width()));
-  for (int y = picture.height() - 1; y >= 0; --y) {
+  std::vector<std::uint32_t> row(static_cast<std::size_t>(samples) * width);
+  for (int y = height - 1; y >= 0; --y) {
     for (std::size_t i = 0; i < row.size(); ++i) {
-      const auto word = std::bit_cast<std::uint32_t>(picture.plane[i % 3].row(y)[i / 3]);
+      const auto word = std::bit_cast<std::uint32_t>(sample_at(y, i));
       row[i] = std::endian::native == std::endian::little ? word : swapped(word);
     }
     if (auto written = write_bytes(file, std::as_bytes(std::span(row))); !written) return written;
@@ -102,6 +107,19 @@ Result<void> encode_pfm(const SceneLinear& picture, std::FILE* file) try {
   return {};
 } catch (const std::bad_alloc&) {
   return fail(ErrorCode::too_large, "no memory to write the PFM");
+}
+
+}  // namespace
+
+Result<void> encode_pfm(const SceneLinear& picture, std::FILE* file) {
+  return encode(
+      "PF", 3, picture.width(), picture.height(),
+      [&](int y, std::size_t i) { return picture.plane[i % 3].row(y)[i / 3]; }, file);
+}
+
+Result<void> encode_pfm(PlaneView<const float> plane, std::FILE* file) {
+  return encode(
+      "Pf", 1, plane.width, plane.height, [&](int y, std::size_t i) { return plane.row(y)[i]; }, file);
 }
 
 Result<DecodedPicture> decode_pfm(std::span<const std::byte> bytes, const DecodeLimits& limits) try {

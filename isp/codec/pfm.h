@@ -16,6 +16,9 @@ namespace lowlux::isp {
 /// metadata.
 Result<void> encode_pfm(const SceneLinear& picture, std::FILE* file);
 
+/// Writes one plane as grey.
+Result<void> encode_pfm(PlaneView<const float> plane, std::FILE* file);
+
 /// Reads RGB, and grey as three equal planes, of either byte order. Bytes after the last row are ignored.
 /// A scale other than 1 and -1 is refused: writers disagree on whether values are to be multiplied or divided by it.
 Result<DecodedPicture> decode_pfm(std::span<const std::byte> bytes, const DecodeLimits& limits = {});

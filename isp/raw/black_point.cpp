@@ -59,6 +59,7 @@ Result<BlackPoint> requested_black(const RawDn& raw, const BlackRequest& request
   if (request.choice == BlackChoice::given) {
     return BlackPoint{.pedestal_dn = request.given_dn, .source = BlackPoint::Source::given};
   }
+  if (request.choice == BlackChoice::measured) return request.measured;
   if (request.choice == BlackChoice::metadata) return black_from_tag(raw, "");
   // A tag that is finer than four figures is not replaced by four.
   const bool tag_is_finer = raw.black_tag && !four_figures_do(*raw.black_tag);

@@ -11,11 +11,13 @@ enum class BlackChoice {
   metadata,   // the tag only
   masked,     // the masked pixels only
   given,      // figures of the user's
+  measured,   // a black point measured before, as a camera's profile holds it
 };
 
 struct BlackRequest {
   BlackChoice choice = BlackChoice::automatic;
   PerSite<double> given_dn{};  // for BlackChoice::given
+  BlackPoint measured;         // for BlackChoice::measured
 };
 
 /// The black point as requested. Errors: insufficient when the source has neither masked pixels nor a tag (black is

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <span>
+
+#include "calib/dark_stack.h"
+#include "isp/base/estimate.h"
+#include "isp/base/result.h"
+
+namespace lowlux::calib {
+
+/// System gain [DN/e-] from darks alone: dark charge is Poisson as photons are, so that the temporal variance rises
+/// with the mean by K. One K for all sites; each has its own noise at no charge. Row noise is the same in all groups
+/// and drops out.
+/// @param groups  of one gain setting
+/// Errors: fewer than two groups, or so little dark charge that the standard error would be above 5 %.
+Result<Estimate> gain_of_darks(std::span<const DarkGroup> groups);
+
+}  // namespace lowlux::calib

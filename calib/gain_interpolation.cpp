@@ -1,0 +1,90 @@
+#include "calib/gain_interpolation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <fmt/format.h>
+
+namespace lowlux::calib {
+namespace {
+
+constexpr double same_iso = 1e-3;  // relative
+
+double between(double a, double b, double share) { return a + share * (b - a); }
+
+double between_logs(double a, double b, double share) {
+  return a > 0 && b > 0 ? std::exp(between(std::log(a), std::log(b), share)) : between(a, b, share);
+}
+
+/// Figures of `share` of the way from a to b; patterns and hot pixels are those of the nearer one.
+GainProfile between(const GainProfile& a, const GainProfile& b, double share) {
+  GainProfile out = share < 0.5 ? a : b;
+  for (int site = 0; site < 4; ++site) {
+    out.pedestal_dn[site] = {between(a.pedestal_dn[site].value, b.pedestal_dn[site].value, share),
+                             std::max(a.pedestal_dn[site].standard_error, b.pedestal_dn[site].standard_error)};
+  }
+  if (!a.sensor || !b.sensor) {
+    out.sensor.reset();
+    return out;
+  }
+  SensorModel& s = *out.sensor;
+  s.system_gain_dn_per_e = between_logs(a.sensor->system_gain_dn_per_e, b.sensor->system_gain_dn_per_e, share);
+  s.read_noise_e = between_logs(a.sensor->read_noise_e, b.sensor->read_noise_e, share);
+  s.full_well_e = between_logs(a.sensor->full_well_e, b.sensor->full_well_e, share);
+  s.black_level_dn = between(a.sensor->black_level_dn, b.sensor->black_level_dn, share);
+  return out;
+}
+
+/// Beyond the measured settings: the gain follows the ISO, electrons stay electrons.
+GainProfile beyond(const GainProfile& nearest, double ratio) {
+  GainProfile out = nearest;
+  if (!out.sensor) return out;
+  SensorModel& s = *out.sensor;
+  s.system_gain_dn_per_e *= ratio;
+  s.full_well_e = std::min(s.full_well_e, (s.white_level_dn - s.black_level_dn) / s.system_gain_dn_per_e);
+  return out;
+}
+
+std::string names_of(const std::vector<const GainProfile*>& gains) {
+  std::string text;
+  for (const GainProfile* g : gains) text += fmt::format("{}{:g}", text.empty() ? "" : ", ", *g->iso);
+  return text;
+}
+
+}  // namespace
+
+Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<double>& iso) {
+  if (profile.gains.empty()) return fail(ErrorCode::insufficient, "the profile holds no gain setting");
+  if (profile.gains.size() == 1 && !(iso && profile.gains[0].iso)) {
+    const GainProfile& only = profile.gains[0];
+    if (!only.iso) return GainAtIso{only, ""};
+    return GainAtIso{only,
+                     fmt::format("the frame states no ISO: the profile's only setting, ISO {:g}, is taken", *only.iso)};
+  }
+  std::vector<const GainProfile*> stated;
+  for (const GainProfile& g : profile.gains) {
+    if (g.iso) stated.push_back(&g);
+  }
+  if (stated.empty() || !iso) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("the {} states no ISO, and the profile has {} gain settings to choose from",
+                            iso ? "profile" : "frame", profile.gains.size()));
+  }
+  std::sort(stated.begin(), stated.end(), [](const auto* a, const auto* b) { return *a->iso < *b->iso; });
+  for (const GainProfile* g : stated) {
+    if (std::fabs(*iso / *g->iso - 1) <= same_iso) return GainAtIso{*g, ""};
+  }
+  const auto above = std::find_if(stated.begin(), stated.end(), [&](const auto* g) { return *g->iso > *iso; });
+  if (above == stated.begin() || above == stated.end()) {
+    const GainProfile& nearest = above == stated.begin() ? *stated.front() : *stated.back();
+    return GainAtIso{beyond(nearest, *iso / *nearest.iso),
+                     fmt::format("ISO {:g} lies beyond the profile's ({}): the gain is extrapolated from ISO {:g}",
+                                 *iso, names_of(stated), *nearest.iso)};
+  }
+  const GainProfile &low = **(above - 1), &high = **above;
+  const double share = std::log(*iso / *low.iso) / std::log(*high.iso / *low.iso);
+  return GainAtIso{between(low, high, share), ""};
+}
+
+}  // namespace lowlux::calib

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "isp/base/camera_profile.h"
+#include "isp/base/result.h"
+
+namespace lowlux::calib {
+
+/// A gain setting's figures at an ISO, and what to tell of how they came about.
+struct GainAtIso {
+  GainProfile gain;
+  std::string warning;  // empty if none
+};
+
+/// @param iso  of the frame; none if it states none
+/// Errors: see profile_at.
+Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<double>& iso);
+
+}  // namespace lowlux::calib

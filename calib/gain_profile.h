@@ -1,0 +1,42 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/black_figures.h"
+#include "calib/dark_series.h"
+#include "calib/dark_stack.h"
+#include "calib/photon_transfer.h"
+#include "isp/base/camera_profile.h"
+
+namespace lowlux::calib {
+
+/// Where the figures come from: files, date and program; the functions below add what was fitted and how well.
+struct Measured {
+  std::string source;
+  std::string date;  // YYYY-MM-DD
+  std::vector<std::string> files;
+};
+
+/// The gain setting of a frame, as a camera calls it: "ISO 1600", or "" if it states none.
+std::string gain_setting_of(const FrameSetting& setting);
+
+/// Puts what flats and darks say into a gain setting's profile; dark currents it has stay.
+/// A full well that the flats do not reach is taken as the charge at the white level, and provenance says so.
+void put_photon_transfer(const PhotonTransfer& transfer, const FrameSetting& setting, const Measured& measured,
+                         GainProfile& out);
+
+/// Puts what a dark series says into it: pedestal, dark current and its temperature law, patterns, hot pixels. A read
+/// noise and a full well that it has from flats stay. Without a stated temperature the dark current is said to be that
+/// of 20 C, and without a second temperature the doubling figure stays what it was.
+void put_dark_series(const DarkSeries& series, std::span<const DarkGroup> groups, const Estimate& gain_dn_per_e,
+                     const Measured& measured, GainProfile& out);
+
+/// Puts a black level of one exposure time into it, dark charge included.
+void put_black(const BlackFigures& black, const FrameSetting& setting, const Measured& measured, GainProfile& out);
+
+/// The profile of a gain setting in a camera's profile; a new one if there is none yet.
+GainProfile& gain_at(CameraProfile& profile, const FrameSetting& setting);
+
+}  // namespace lowlux::calib

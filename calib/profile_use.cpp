@@ -1,0 +1,166 @@
+#include "calib/profile_use.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "calib/frame_setting.h"
+#include "calib/gain_interpolation.h"
+
+namespace lowlux::calib {
+namespace {
+
+constexpr double hot_deviations = 6;
+constexpr double same_exposure = 0.01;  // relative
+constexpr double same_temperature_c = 1;
+constexpr double telling_charge_e = 0.2;  // dark charge below this moves no black point that can be measured
+constexpr double quantisation_dn2 = 1.0 / 12;
+
+Result<void> check_camera(const CameraProfile& profile, const FrameInfo& info) {
+  const auto differs = [](const std::string& a, const std::string& b) { return !a.empty() && !b.empty() && a != b; };
+  if (!differs(profile.make, info.make) && !differs(profile.model, info.model)) return {};
+  return fail(ErrorCode::invalid_argument, fmt::format("the profile is of \"{} {}\", the frame of \"{} {}\"",
+                                                       profile.make, profile.model, info.make, info.model));
+}
+
+/// By how much dark current differs from that at the profile's temperature.
+double temperature_factor(const GainProfile& gain, const FrameInfo& info, double charge_e,
+                          std::vector<std::string>& warnings) {
+  const SensorModel& sensor = *gain.sensor;
+  const bool matters = charge_e > telling_charge_e;
+  if (!info.temperature_c) {
+    if (matters && gain.dark_temperature_c) {
+      warnings.push_back(fmt::format("the frame states no temperature: dark current is taken as at {:g} C",
+                                     sensor.dark_temperature_c));
+    }
+    return 1;
+  }
+  const double celsius = *info.temperature_c;
+  if (matters && gain.dark_temperature_c &&
+      (celsius < gain.dark_temperature_c->low - same_temperature_c ||
+       celsius > gain.dark_temperature_c->high + same_temperature_c)) {
+    warnings.push_back(
+        fmt::format("the sensor was at {:g} C, the profile's darks at {:g} to {:g} C: dark current is "
+                    "extrapolated, doubling every {:.2g} C{}",
+                    celsius, gain.dark_temperature_c->low, gain.dark_temperature_c->high, sensor.dark_doubling_c,
+                    gain.errors.dark_doubling_c > 0 ? "" : ", a figure that was not measured"));
+  }
+  return std::exp2((celsius - sensor.dark_temperature_c) / sensor.dark_doubling_c);
+}
+
+void warn_of_exposure(const GainProfile& gain, double exposure_s, bool scaled, std::vector<std::string>& warnings) {
+  if (!gain.dark_exposure_s) return;
+  const auto& [low, high] = *gain.dark_exposure_s;
+  if (exposure_s > high * (1 + same_exposure)) {
+    warnings.push_back(
+        fmt::format("the exposure of {:g} s is longer than the profile's darks, {:g} to {:g} s: the dark "
+                    "charge is {}",
+                    exposure_s, low, high, scaled ? "extrapolated" : "that of the darks"));
+  } else if (!scaled && exposure_s < low * (1 - same_exposure)) {
+    warnings.push_back(
+        fmt::format("the exposure of {:g} s is shorter than the profile's darks, {:g} s: the dark charge "
+                    "is that of the darks",
+                    exposure_s, low));
+  }
+}
+
+/// Dark charge told apart from the pedestal, at the frame's exposure and temperature.
+Result<void> add_dark_charge(const GainProfile& gain, const RawDn& frame, ProfileAtFrame& out) {
+  SensorModel& sensor = *out.sensor;
+  const double fastest = *std::max_element(sensor.dark_current_e_per_s.begin(), sensor.dark_current_e_per_s.end());
+  if (fastest == 0) return {};
+  if (!frame.info.exposure_s) {
+    return fail(ErrorCode::insufficient,
+                "the frame does not state its exposure time, which the profile's dark current needs");
+  }
+  const double time_s = *frame.info.exposure_s;
+  const double factor = temperature_factor(gain, frame.info, fastest * time_s, out.warnings);
+  if (fastest * factor * time_s > telling_charge_e) warn_of_exposure(gain, time_s, true, out.warnings);
+  for (double& current : sensor.dark_current_e_per_s) current *= factor;
+  if (frame.info.temperature_c) sensor.dark_temperature_c = *frame.info.temperature_c;
+  const FrameSetting setting{.layout = frame.layout, .phase = frame.phase};
+  for (int site = 0; site < 4; ++site) {
+    const int k = channel_of_site(setting, site);
+    const double error_e = gain.errors.dark_current_e_per_s[k] * factor * time_s;
+    out.dark_mean_e[site] = sensor.dark_current_e_per_s[k] * time_s;
+    out.black.pedestal_dn[site] += sensor.system_gain_dn_per_e * out.dark_mean_e[site];
+    out.black.pedestal_standard_error_dn[site] =
+        std::hypot(out.black.pedestal_standard_error_dn[site], sensor.system_gain_dn_per_e * error_e);
+  }
+  return {};
+}
+
+double dark_variance_dn2(const SensorModel& s, double dark_mean_e) {
+  const double k = s.system_gain_dn_per_e;
+  return k * k * (s.read_noise_e * s.read_noise_e + dark_mean_e) + quantisation_dn2;
+}
+
+/// A sensor without filters has one figure for the three channels.
+void add_noise(const RawDn& frame, ProfileAtFrame& out) {
+  const SensorModel& sensor = *out.sensor;
+  const FrameSetting setting{.layout = frame.layout, .phase = frame.phase};
+  NoiseProfile sum;
+  std::array<double, 3> sites{};
+  for (int site = 0; site < 4; ++site) {
+    const int k = channel_of_site(setting, site);
+    const double range_dn = frame.white_dn[k] - out.black.pedestal_dn[site];
+    const double variance = dark_variance_dn2(sensor, out.dark_mean_e[site]);
+    out.black.noise_std_dn[site] = std::sqrt(variance);
+    if (!(range_dn > 0)) return;  // choose_black refuses such a frame
+    sum.scale[k] += sensor.system_gain_dn_per_e / range_dn;
+    sum.offset[k] += variance / (range_dn * range_dn);
+    ++sites[k];
+  }
+  out.noise.emplace();
+  for (int k = 0; k < 3; ++k) {
+    const int own = sites[k] > 0 ? k : 1;
+    out.noise->scale[k] = sum.scale[own] / sites[own];
+    out.noise->offset[k] = sum.offset[own] / sites[own];
+  }
+}
+
+/// Excess currents are those at the profile's temperature, as the dark current is.
+void list_hot_pixels(const GainProfile& gain, const RawDn& frame, ProfileAtFrame& out) {
+  const double time_s = frame.info.exposure_s.value_or(0);
+  const double reference = gain.sensor->dark_current_e_per_s[1], now = out.sensor->dark_current_e_per_s[1];
+  const double factor = reference > 0 ? now / reference : 1;
+  for (const HotPixelFigure& hot : gain.hot_pixels) {
+    if (hot.x >= frame.active.width || hot.y >= frame.active.height) continue;
+    const double noise_dn = std::sqrt(dark_variance_dn2(*out.sensor, out.dark_mean_e[site_of(hot.x, hot.y)]));
+    const double excess_dn = hot.excess_e_per_s * factor * time_s * out.sensor->system_gain_dn_per_e;
+    if (excess_dn > hot_deviations * noise_dn) out.hot_pixels.push_back({hot.x, hot.y, 1, 1});
+  }
+}
+
+}  // namespace
+
+Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame) {
+  if (frame.layout == SensorLayout::linear_rgb) {
+    return fail(ErrorCode::unsupported, "the frame is already demosaiced: a profile tells of the mosaic");
+  }
+  if (const auto same = check_camera(profile, frame.info); !same) return tl::make_unexpected(same.error());
+  auto found = gain_at_iso(profile, frame.info.iso);
+  if (!found) return tl::make_unexpected(found.error());
+  const GainProfile& gain = found->gain;
+  ProfileAtFrame out;
+  if (!found->warning.empty()) out.warnings.push_back(found->warning);
+  out.sensor = gain.sensor;
+  out.black.source = BlackPoint::Source::profile;
+  out.black.holds = BlackPoint::Holds::pedestal_and_dark;
+  for (int site = 0; site < 4; ++site) {
+    out.black.pedestal_dn[site] = gain.pedestal_dn[site].value;
+    out.black.pedestal_standard_error_dn[site] = gain.pedestal_dn[site].standard_error;
+  }
+  if (gain.pedestal_holds == BlackPoint::Holds::pedestal_and_dark) {
+    if (frame.info.exposure_s) warn_of_exposure(gain, *frame.info.exposure_s, false, out.warnings);
+  } else if (gain.sensor) {
+    if (const auto added = add_dark_charge(gain, frame, out); !added) return tl::make_unexpected(added.error());
+  }
+  if (!out.sensor) return out;
+  add_noise(frame, out);
+  list_hot_pixels(gain, frame, out);
+  return out;
+}
+
+}  // namespace lowlux::calib

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isp/base/camera_profile.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+
+namespace lowlux::calib {
+
+/// What a camera's profile says about one frame.
+struct ProfileAtFrame {
+  BlackPoint black;                    // at the frame's gain, exposure and temperature; the dark charge is in it
+  std::optional<SensorModel> sensor;   // at the frame's gain and temperature; absent if the gain is unknown
+  PerSite<double> dark_mean_e{};       // that the black point holds; 0 if unknown
+  std::optional<NoiseProfile> noise;   // of the sensor, dark charge's noise included
+  std::vector<DefectRect> hot_pixels;  // those whose excess charge is above 6 standard deviations in this frame
+  std::vector<std::string> warnings;   // what was extrapolated or assumed
+};
+
+/// The profile at a frame's setting.
+/// Gain: between two measured ISO settings gain and read noise follow straight lines in log-log, levels in the
+/// logarithm of the ISO; beyond them the gain follows the ISO, with a warning. Exposure: pedestal + K D t. Temperature:
+/// the profile's doubling figure. Warnings for exposures and temperatures beyond those of the darks. Errors: another
+/// camera; a frame that states no ISO where the profile has several; no exposure time where dark current needs it; an
+/// empty profile.
+Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame);
+
+}  // namespace lowlux::calib

@@ -1,0 +1,237 @@
+#include "isp/cli/black_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "isp/cli/lines.h"
+
+namespace lowlux::cli {
+namespace {
+
+constexpr const char* channels[] = {"red", "green", "blue"};
+constexpr const char* sites[] = {"site 00", "site 01", "site 10", "site 11"};
+
+std::string with_error(const Estimate& e) {
+  return e.standard_error > 0 ? fmt::format("{:.4g} +- {:.2g}", e.value, e.standard_error)
+                              : fmt::format("{:.4g}", e.value);
+}
+
+template <class Values, class Text>
+std::string joined(const Values& values, const Text& text) {
+  std::string out;
+  for (const auto& v : values) out += fmt::format("{:>20}", text(v));
+  return out;
+}
+
+void add_pedestal(const PerSite<Estimate>& level, Lines& out) {
+  out.add("", "{}", joined(sites, [](const char* name) { return std::string(name); }));
+  out.add("black [DN]", "{}", joined(level, with_error));
+}
+
+isp::Table table_of(const GainProfile& gain) {
+  isp::Table table{{"figure", "value", "standard error", "unit"}, {}};
+  const auto add = [&table](std::string name, double value, double error, const char* unit) {
+    table.rows.push_back({std::move(name), fmt::format("{:.5g}", value), fmt::format("{:.2g}", error), unit});
+  };
+  for (int site = 0; site < 4; ++site) {
+    const Estimate& e = gain.pedestal_dn[site];
+    add(fmt::format("pedestal, {}", sites[site]), e.value, e.standard_error, "DN");
+  }
+  const SensorModel& s = *gain.sensor;
+  add("system gain", s.system_gain_dn_per_e, gain.errors.system_gain_dn_per_e, "DN/e-");
+  add("read noise", s.read_noise_e, gain.errors.read_noise_e, "e-");
+  for (int k = 0; k < 3; ++k) {
+    add(fmt::format("dark current at {:g} C, {}", s.dark_temperature_c, channels[k]), s.dark_current_e_per_s[k],
+        gain.errors.dark_current_e_per_s[k], "e-/s");
+  }
+  for (int k = 0; gain.dark_chromaticity && k < 3; ++k) {
+    const Estimate& share = (*gain.dark_chromaticity)[k];
+    add(fmt::format("black point, {}", channels[k]), share.value, share.standard_error, "of the dark current");
+  }
+  if (gain.errors.dark_doubling_c > 0) add("doubling", s.dark_doubling_c, gain.errors.dark_doubling_c, "C");
+  add("DSNU", s.dsnu, gain.errors.dsnu, "of the dark current");
+  add("row noise", s.row_noise_e, 0, "e-");
+  add("column noise", s.column_noise_e, 0, "e-");
+  add("hot pixels", static_cast<double>(gain.hot_pixels.size()), 0, "");
+  return table;
+}
+
+std::string celsius_of(const calib::DarkGroup& group) {
+  return group.setting.temperature_c ? fmt::format("{:g} C, ", *group.setting.temperature_c) : "";
+}
+
+/// Series by temperature and site that `value` gives of a point.
+template <class Value>
+std::vector<isp::Series> by_site(const calib::DarkSeries& series, std::span<const calib::DarkGroup> groups,
+                                 isp::Mark mark, const Value& value) {
+  std::vector<isp::Series> out;
+  for (const calib::DarkPoint& p : series.points) {
+    const calib::DarkGroup& group = groups[static_cast<std::size_t>(p.group)];
+    const std::string name = celsius_of(group) + sites[p.site];
+    auto own = std::find_if(out.begin(), out.end(), [&](const isp::Series& s) { return s.name == name; });
+    if (own == out.end()) own = out.insert(out.end(), isp::Series{.name = name, .mark = mark});
+    own->x.push_back(*group.setting.exposure_s);
+    own->y.push_back(value(p));
+  }
+  return out;
+}
+
+isp::Plot plot_of_charge(const calib::DarkSeries& series, std::span<const calib::DarkGroup> groups,
+                         const std::string& id) {
+  isp::Plot plot{.id = id + "-dark-charge",
+                 .title = "Dark charge against time",
+                 .x_label = "exposure time [s]",
+                 .y_label = "mean above the pedestal [DN]"};
+  const auto above = [&](const calib::DarkPoint& p) { return p.mean_dn - series.pedestal_dn[p.site].value; };
+  plot.series = by_site(series, groups, isp::Mark::points, above);
+  std::vector<isp::Series> fit = by_site(series, groups, isp::Mark::line,
+                                         [&](const calib::DarkPoint& p) { return above(p) - p.residual_dn.value; });
+  for (isp::Series& s : fit) {
+    s.name += ", fit";
+    plot.series.push_back(std::move(s));
+  }
+  return plot;
+}
+
+isp::Plot plot_of_residuals(const calib::DarkSeries& series, std::span<const calib::DarkGroup> groups,
+                            const std::string& id) {
+  return {.id = id + "-dark-residuals",
+          .title = "Residuals",
+          .x_label = "exposure time [s]",
+          .y_label = "residual / standard error",
+          .series = by_site(series, groups, isp::Mark::points,
+                            [](const calib::DarkPoint& p) {
+                              const Estimate& off = p.residual_dn;
+                              return off.standard_error > 0 ? off.value / off.standard_error : 0;
+                            }),
+          .caption = fmt::format("Mean square {:.3g}, {} degrees of freedom.", series.reduced_chi_square,
+                                 series.degrees_of_freedom)};
+}
+
+isp::Plot plot_of_temperature(const calib::DarkSeries& series, const std::string& id) {
+  isp::Plot plot{.id = id + "-dark-temperature",
+                 .title = "Dark current against temperature",
+                 .x_label = "temperature [C]",
+                 .y_label = "dark current [e-/s]",
+                 .y_scale = isp::AxisScale::logarithmic};
+  for (int k = 0; k < 3; ++k) {
+    isp::Series points{.name = channels[k], .mark = isp::Mark::points};
+    isp::Series fit{.name = std::string(channels[k]) + ", fit"};
+    for (const calib::DarkCurrent& c : series.currents) {
+      if (!c.temperature_c) continue;
+      points.x.push_back(*c.temperature_c);
+      points.y.push_back(c.current_e_per_s[k].value);
+      if (!series.law) continue;
+      fit.x.push_back(*c.temperature_c);
+      fit.y.push_back(series.law->current_e_per_s[k].value *
+                      std::exp2((*c.temperature_c - series.law->temperature_c) / series.law->doubling_c.value));
+    }
+    plot.series.push_back(std::move(points));
+    if (!fit.x.empty()) plot.series.push_back(std::move(fit));
+  }
+  return plot;
+}
+
+/// R and G shares of the dark current with their standard errors as a cross; light of equal charge is at 1/3, 1/3.
+isp::Plot plot_of_black_point(const std::array<Estimate, 3>& share, const std::string& id) {
+  const auto& [r, g, b] = share;
+  isp::Series cross{
+      .name = "black point +- 1 standard error",
+      .x = {r.value - r.standard_error, r.value, r.value + r.standard_error, NAN, r.value, r.value, r.value},
+      .y = {g.value, g.value, g.value, NAN, g.value - g.standard_error, g.value, g.value + g.standard_error}};
+  return {.id = id + "-black-point",
+          .title = "Black point: chromaticity of the dark current",
+          .x_label = "R / (R + G + B)",
+          .y_label = "G / (R + G + B)",
+          .equal_scales = true,
+          .series = {{.name = "equal charge", .x = {1.0 / 3}, .y = {1.0 / 3}, .mark = isp::Mark::points}, cross},
+          .caption = "Camera RGB. What is measured in the dark is drawn towards this point (Eq. 4.23)."};
+}
+
+std::string id_of(const calib::FrameSetting& setting) {
+  return setting.iso ? fmt::format("iso{:.0f}", *setting.iso) : "gain";
+}
+
+}  // namespace
+
+std::string name_of_gain(const calib::FrameSetting& setting) {
+  return setting.iso ? fmt::format("ISO {:g}", *setting.iso) : "gain not stated";
+}
+
+void show_black(const calib::BlackFigures& black, const calib::FrameSetting& setting, Calibration& found) {
+  Lines out;
+  add_pedestal(black.level_dn, out);
+  out.add("deviation [DN]", "{}", joined(black.deviation_dn, [](double v) { return fmt::format("{:.4g}", v); }));
+  const auto scatter = [](const calib::LineScatter& s) {
+    return fmt::format("{:.3g} ({:.3g})", s.found_dn, s.white_dn);
+  };
+  out.add("row means", "{}", joined(black.rows, scatter));
+  out.add("column means", "{}", joined(black.columns, scatter));
+  out.add("", "standard deviation in DN; in brackets what white noise alone would give");
+  out.add("row noise", "{:.3g} DN, column noise {:.3g} DN beyond white noise", black.row_noise_dn,
+          black.column_noise_dn);
+  out.add("pixels", "{} in {} frame{}, {:.2g} % left out", black.pixels, black.frames, black.frames == 1 ? "" : "s",
+          100 * black.excluded_share);
+  out.add("holds", "pedestal and dark charge in one{}: a second exposure time would tell them apart",
+          setting.exposure_s ? fmt::format(", at {:g} s", *setting.exposure_s) : "");
+  found.text += name_of_gain(setting) + "\n" + out.text();
+
+  isp::Table table{{"site", "black [DN]", "standard error [DN]", "deviation [DN]"}, {}};
+  for (int site = 0; site < 4; ++site) {
+    table.rows.push_back({sites[site], fmt::format("{:.3f}", black.level_dn[site].value),
+                          fmt::format("{:.3f}", black.level_dn[site].standard_error),
+                          fmt::format("{:.3f}", black.deviation_dn[site])});
+  }
+  found.report.sections.push_back(
+      {name_of_gain(setting),
+       fmt::format("Row noise {:.3g} DN, column noise {:.3g} DN.", black.row_noise_dn, black.column_noise_dn),
+       table,
+       {}});
+}
+
+void show_dark_series(const calib::DarkSeries& series, std::span<const calib::DarkGroup> groups,
+                      const GainProfile& gain, const std::string& gain_source, Calibration& found) {
+  const calib::FrameSetting& setting = groups.front().setting;
+  Lines out;
+  int frames = 0;
+  for (const calib::DarkGroup& g : groups) frames += g.frames;
+  out.add("darks", "{} frames of {} settings, {:.2g} % of the pixels left out", frames, groups.size(),
+          100 * series.excluded_share);
+  out.add("system gain", "{} DN/e-, {}",
+          with_error({gain.sensor->system_gain_dn_per_e, gain.errors.system_gain_dn_per_e}), gain_source);
+  add_pedestal(series.pedestal_dn, out);
+  out.add("", "{}", joined(channels, [](const char* name) { return std::string(name); }));
+  for (const calib::DarkCurrent& c : series.currents) {
+    out.add("dark [e-/s]", "{}{}", joined(c.current_e_per_s, with_error),
+            c.temperature_c ? fmt::format("  at {:g} C", *c.temperature_c) : std::string());
+  }
+  if (series.chromaticity) {
+    out.add("black point", "{}  of the dark current", joined(*series.chromaticity, with_error));
+  } else {
+    out.add("black point", "the dark current is too small to tell its colour");
+  }
+  if (series.law) out.add("doubling", "every {} C", with_error(series.law->doubling_c));
+  out.add("read noise", "{}",
+          series.read_noise_e ? with_error(*series.read_noise_e) + " e-"
+                              : std::string("lost in quantisation and dark charge"));
+  out.add("patterns", "DSNU {:.3g} of the dark current, row noise {:.3g} e-, column noise {:.3g} e-", series.dsnu,
+          series.row_noise_e, series.column_noise_e);
+  out.add("hot pixels", "{}", series.hot.size());
+  out.add("fit", "mean square of residual / error {:.3g}, {} degrees of freedom", series.reduced_chi_square,
+          series.degrees_of_freedom);
+  found.text += name_of_gain(setting) + "\n" + out.text();
+
+  const std::string id = id_of(setting);
+  isp::ReportSection section{name_of_gain(setting), fmt::format("System gain: {}.", gain_source), table_of(gain), {}};
+  section.plots = {plot_of_charge(series, groups, id), plot_of_residuals(series, groups, id)};
+  if (series.currents.front().temperature_c) section.plots.push_back(plot_of_temperature(series, id));
+  if (series.chromaticity) section.plots.push_back(plot_of_black_point(*series.chromaticity, id));
+  found.report.sections.push_back(std::move(section));
+}
+
+}  // namespace lowlux::cli

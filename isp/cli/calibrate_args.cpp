@@ -1,0 +1,99 @@
+#include "isp/cli/calibrate_args.h"
+
+#include <CLI/CLI.hpp>
+
+#include "isp/cli/option_values.h"
+
+namespace lowlux::cli {
+namespace {
+
+void add_output(CLI::App& app, CalibrateArgs& args) {
+  app.add_option("-o,--output", args.output, "profile to write (JSON)")->required()->type_name("PROFILE.json");
+  app.add_option("--add-to", args.add_to, "start from this profile: what is measured now takes the place of its own")
+      ->type_name("PROFILE.json");
+  app.add_option("--report", args.report, "page with tables and plots")->type_name("PAGE.html");
+  app.add_flag("--force", args.force, "overwrite files that exist");
+  app.add_flag("--json", args.json, "JSON instead of text");
+  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+}
+
+void add_settings(CLI::App& app, CalibrateArgs& args) {
+  const auto setting = [&app](const char* flag, const char* type, const char* help, std::optional<double>& out) {
+    add_number(app, flag, type, help, [&out](double value) { out = value; })->group("of frames that do not say");
+  };
+  setting("--iso", "ISO", "gain setting of all frames", args.iso);
+  setting("--exposure-time", "S", "exposure time of all frames", args.exposure_s);
+  setting("--temperature", "C", "temperature of the sensor, for all frames", args.temperature_c);
+}
+
+/// The command line is wrong; nothing of that is seen by the option parser.
+std::optional<std::string> wrong_settings(const CalibrateArgs& args) {
+  if (args.iso && *args.iso <= 0) return "--iso must be above 0";
+  if (args.exposure_s && *args.exposure_s < 0) return "--exposure-time must not be negative";
+  if (args.temperature_c && (*args.temperature_c < -200 || *args.temperature_c > 200)) {
+    return "--temperature must be from -200 to 200 C";
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>& words) {
+  CLI::App app("Pedestal, dark current, its temperature law and hot pixels from dark frames.",
+               "lowlux calibrate black");
+  app.footer(
+      "Frames are put together by gain, exposure time and temperature. Two exposure times tell dark current from the\n"
+      "pedestal, two temperatures give its law; with one exposure time, or one frame, both stay in one figure. The\n"
+      "system gain comes from --system-gain, else from --add-to, else from the noise of the dark charge itself.");
+  CalibrateBlackArgs args;
+  app.add_option("FRAMES", args.common.frames, "dark frames: lens covered; with --masked any frames")->required();
+  add_output(app, args.common);
+  add_settings(app, args.common);
+  add_number(app, "--system-gain", "DN_PER_E", "codes per electron",
+             [&args](double value) { args.system_gain_dn_per_e = value; });
+  app.add_flag("--masked", args.masked, "measure the masked pixels of the frames in place of the picture");
+  app.add_option("--map", args.map,
+                 "write each pixel's pedestal and dark current to PREFIX_pedestal.pfm [DN] and "
+                 "PREFIX_current.pfm [e-/s] (with the ISO in the name if there are several)")
+      ->type_name("PREFIX");
+  if (const auto code = parse_words(app, words)) return *code;
+  if (args.system_gain_dn_per_e && *args.system_gain_dn_per_e <= 0) return refuse(app, "--system-gain must be above 0");
+  if (const auto wrong = wrong_settings(args.common)) return refuse(app, *wrong);
+  return args;
+}
+
+Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>& words) {
+  CLI::App app("System gain, read noise, full well, PRNU and linearity by photon transfer (EMVA 1288).",
+               "lowlux calibrate noise");
+  app.footer(
+      "Two flats of the same light make a pair, and four pairs of different light a curve; frames are paired by\n"
+      "gain, exposure time and level, in the order given. Darks are of one exposure time, the shorter the better.\n"
+      "Without --darks there is one ordinary picture: noise is then measured in its even parts.");
+  CalibrateNoiseArgs args;
+  app.add_option("FRAMES", args.common.frames, "flats in pairs, or one ordinary picture")->required();
+  app.add_option("--darks", args.darks, "two or more dark frames")->type_name("FRAMES");
+  add_output(app, args.common);
+  add_settings(app, args.common);
+  app.add_flag("--steady-light", args.steady_light,
+               "the lamp never changed, so that the flats' exposure times tell how linear the sensor is");
+  if (const auto code = parse_words(app, words)) return *code;
+  if (args.darks.empty() && args.common.frames.size() > 1) {
+    return refuse(app, "several flats need --darks; without darks one picture is measured");
+  }
+  if (const auto wrong = wrong_settings(args.common)) return refuse(app, *wrong);
+  return args;
+}
+
+Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string>& words) {
+  CLI::App app("The profile of a sensor whose figures are published; `lowlux simulate --list` names them.",
+               "lowlux calibrate quoted");
+  CalibrateQuotedArgs args;
+  app.add_option("SENSOR", args.common.frames, "its name")->required()->expected(1);
+  app.add_option("-o,--output", args.common.output, "profile to write (JSON)")->required()->type_name("PROFILE.json");
+  app.add_flag("--force", args.common.force, "overwrite files that exist");
+  app.add_flag("--json", args.common.json, "JSON instead of text");
+  if (const auto code = parse_words(app, words)) return *code;
+  return args;
+}
+
+}  // namespace lowlux::cli

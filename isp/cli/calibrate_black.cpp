@@ -1,0 +1,178 @@
+#include <cstdio>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "calib/dark_gain.h"
+#include "calib/dark_series.h"
+#include "calib/dark_sorter.h"
+#include "isp/cli/black_report.h"
+#include "isp/cli/calibration.h"
+#include "isp/cli/progress.h"
+#include "isp/codec/pfm.h"
+#include "isp/output/atomic_file.h"
+#include "isp/raw/black_point.h"
+#include "isp/raw/masked_black.h"
+
+namespace lowlux::cli {
+namespace {
+
+constexpr double light_of_range = 0.005;  // how far the picture may lie above the masked pixels
+constexpr double light_of_noise = 10;     // or in standard deviations of these
+
+Error at(Error error, const std::string& file) {
+  error.where = file;
+  return error;
+}
+
+double active_mean_dn(const RawDn& raw) {
+  double sum = 0;
+  for (int y = 0; y < raw.active.height; ++y) {
+    const std::uint16_t* row = raw.dn.row(raw.active.y + y) + raw.active.x;
+    for (int x = 0; x < raw.active.width; ++x) sum += row[x];
+  }
+  return sum / (static_cast<double>(raw.active.width) * raw.active.height);
+}
+
+double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
+
+/// A dark frame is as dark as its own masked pixels, where it has some.
+Result<void> check_dark(const RawDn& raw) {
+  const isp::MaskedBlack masked = isp::measure_masked_black(raw);
+  if (!masked.black) return {};
+  const double black = mean_of(masked.black->pedestal_dn), mean = active_mean_dn(raw);
+  const double tolerated = std::max(light_of_noise * mean_of(masked.black->noise_std_dn),
+                                    light_of_range * isp::mean_range_dn(raw, *masked.black));
+  if (mean - black <= tolerated) return {};
+  return fail(ErrorCode::invalid_argument,
+              fmt::format("light reaches this frame: its mean is {:.1f} DN, that of its masked pixels {:.1f} DN; cover "
+                          "the lens, or measure the masked pixels with --masked",
+                          mean, black));
+}
+
+Result<RawDn> dark_part(RawDn raw, const CalibrateBlackArgs& args) {
+  if (!args.masked) {
+    if (const auto dark = check_dark(raw); !dark) return tl::make_unexpected(dark.error());
+    return raw;
+  }
+  const isp::MaskedBlack masked = isp::measure_masked_black(raw);
+  if (!masked.black) return fail(ErrorCode::insufficient, masked.refusal);
+  return calib::part_of(raw, masked.region);
+}
+
+/// What was read: the darks by setting, and the camera.
+struct Darks {
+  std::vector<calib::DarkSet> sets;
+  FrameInfo camera;
+};
+
+Result<Darks> read_darks(const CalibrateBlackArgs& args) {
+  calib::DarkSorter sorter;
+  Darks out;
+  Progress progress(static_cast<int>(args.common.frames.size()), !args.common.quiet);
+  for (const std::string& file : args.common.frames) {
+    auto frame = read_calibration_frame(file, args.common);
+    if (!frame) return tl::make_unexpected(frame.error());
+    out.camera = frame->raw.info;
+    const auto dark = dark_part(std::move(frame->raw), args);
+    if (!dark) return tl::make_unexpected(at(dark.error(), file));
+    if (const auto added = sorter.add(*dark); !added) return tl::make_unexpected(at(added.error(), file));
+    progress.advance(1, file);
+  }
+  auto sets = sorter.sets();
+  if (!sets) return tl::make_unexpected(sets.error());
+  out.sets = std::move(*sets);
+  return out;
+}
+
+struct Gain {
+  Estimate dn_per_e;
+  std::string source;
+};
+
+Result<Gain> gain_of(const calib::DarkSet& set, const CalibrateBlackArgs& args, const CameraProfile& profile) {
+  if (args.system_gain_dn_per_e) return Gain{{*args.system_gain_dn_per_e, 0}, "given"};
+  for (const GainProfile& g : profile.gains) {
+    if (g.iso == set.iso && g.sensor) {
+      return Gain{{g.sensor->system_gain_dn_per_e, g.errors.system_gain_dn_per_e}, "from " + args.common.add_to};
+    }
+  }
+  const auto gain = calib::gain_of_darks(set.groups);
+  if (!gain) return tl::make_unexpected(gain.error());
+  return Gain{*gain, "from the noise of the dark charge"};
+}
+
+bool tells_dark_current(const calib::DarkSet& set) {
+  for (const calib::DarkGroup& g : set.groups) {
+    if (g.setting.exposure_s != set.groups.front().setting.exposure_s) return true;
+  }
+  return false;
+}
+
+std::string map_name(const CalibrateBlackArgs& args, const calib::DarkSet& set, bool several, const char* what) {
+  const std::string iso = several && set.iso ? fmt::format("_iso{:g}", *set.iso) : "";
+  return fmt::format("{}{}_{}.pfm", args.map, iso, what);
+}
+
+Result<void> write_map(const std::string& path, const Plane<float>& map, bool force) {
+  auto file = isp::AtomicFile::create(path, force ? isp::Overwrite::yes : isp::Overwrite::no);
+  if (!file) return tl::make_unexpected(file.error());
+  if (auto written = isp::encode_pfm(map.view(), file->file()); !written) return written;
+  return file->commit();
+}
+
+/// One gain setting: fits what its frames can tell.
+Result<void> calibrate_set(const calib::DarkSet& set, const CalibrateBlackArgs& args, bool several,
+                           Calibration& found) {
+  const calib::Measured measured = measured_today(args.common.frames);
+  if (!tells_dark_current(set)) {
+    const calib::FrameSetting& setting = set.single ? *set.single_setting : set.groups.front().setting;
+    auto black = set.single ? Result<calib::BlackFigures>(*set.single) : calib::measure_black(set.groups.front());
+    if (!black) return tl::make_unexpected(black.error());
+    GainProfile& gain = calib::gain_at(found.profile, setting);
+    calib::put_black(*black, setting, measured, gain);
+    show_black(*black, setting, found);
+    return {};
+  }
+  const auto gain = gain_of(set, args, found.profile);
+  if (!gain) return tl::make_unexpected(gain.error());
+  const auto series = calib::fit_dark_series(set.groups, gain->dn_per_e);
+  if (!series) return tl::make_unexpected(series.error());
+  GainProfile& profile = calib::gain_at(found.profile, set.groups.front().setting);
+  calib::put_dark_series(*series, set.groups, gain->dn_per_e, measured, profile);
+  if (args.masked) profile.hot_pixels.clear();  // they are none of the picture's
+  show_dark_series(*series, set.groups, profile, gain->source, found);
+  if (args.map.empty()) return {};
+  const auto pedestal = write_map(map_name(args, set, several, "pedestal"), series->pedestal_map_dn, args.common.force);
+  if (!pedestal) return pedestal;
+  return write_map(map_name(args, set, several, "current"), series->current_map_e_per_s, args.common.force);
+}
+
+Result<Calibration> calibrate(const CalibrateBlackArgs& args) {
+  if (const auto good = check_outputs(args.common); !good) return tl::make_unexpected(good.error());
+  auto profile = starting_profile(args.common);
+  if (!profile) return tl::make_unexpected(profile.error());
+  const auto darks = read_darks(args);
+  if (!darks) return tl::make_unexpected(darks.error());
+  Calibration found;
+  found.profile = std::move(*profile);
+  found.report.title = fmt::format("{} {}: black point", darks->camera.make, darks->camera.model);
+  if (const auto same = put_camera(darks->camera, found.profile); !same) return tl::make_unexpected(same.error());
+  for (const calib::DarkSet& set : darks->sets) {
+    const auto done = calibrate_set(set, args, darks->sets.size() > 1, found);
+    if (!done) return tl::make_unexpected(done.error());
+  }
+  return found;
+}
+
+}  // namespace
+
+int run_calibrate_black(const std::vector<std::string>& words) {
+  const auto parsed = parse_calibrate_black(words);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& args = std::get<CalibrateBlackArgs>(parsed);
+  const auto found = calibrate(args);
+  return found ? finish(args.common, *found) : calibration_failed(found.error());
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,112 @@
+#include "isp/cli/calibration.h"
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "calib/profile_io.h"
+#include "capture/file/dng_source.h"
+#include "isp/cli/exit_code.h"
+#include "isp/cli/profile_file.h"
+#include "isp/cli/report.h"
+#include "isp/cli/version.h"
+
+namespace lowlux::cli {
+namespace {
+
+Result<void> check_place(const std::string& file, bool force) {
+  std::error_code ignored;
+  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder, ignored)) {
+    return fail(ErrorCode::unwritable, "the folder does not exist", file);
+  }
+  if (force || !std::filesystem::exists(file, ignored)) return {};
+  return fail(ErrorCode::exists, "the file exists: use --force to overwrite it", file);
+}
+
+Error with_file(Error error, const std::string& file) {
+  if (error.where.empty()) error.where = file;
+  return error;
+}
+
+}  // namespace
+
+Result<void> check_outputs(const CalibrateArgs& args, const std::vector<std::string>& more) {
+  std::vector<std::string> files{args.output};
+  if (!args.report.empty()) files.push_back(args.report);
+  files.insert(files.end(), more.begin(), more.end());
+  for (const std::string& file : files) {
+    if (auto good = check_place(file, args.force); !good) return good;
+  }
+  return {};
+}
+
+Result<CameraProfile> starting_profile(const CalibrateArgs& args) {
+  return args.add_to.empty() ? CameraProfile{} : read_profile(args.add_to);
+}
+
+Result<RawFrame> read_calibration_frame(const std::string& file, const CalibrateArgs& args) {
+  Result<RawFrame> frame = capture::read_raw(file);
+  if (!frame) return tl::make_unexpected(with_file(std::move(frame.error()), file));
+  FrameInfo& info = frame->raw.info;
+  if (args.iso) info.iso = args.iso;
+  if (args.exposure_s) info.exposure_s = args.exposure_s;
+  if (args.temperature_c) info.temperature_c = args.temperature_c;
+  return frame;
+}
+
+Result<void> put_camera(const FrameInfo& info, CameraProfile& profile) {
+  if (profile.make.empty() && profile.model.empty()) {
+    profile.make = info.make;
+    profile.model = info.model;
+    return {};
+  }
+  if (profile.make == info.make && profile.model == info.model) return {};
+  return fail(ErrorCode::invalid_argument, fmt::format("the profile to add to is of \"{} {}\", the frames of \"{} {}\"",
+                                                       profile.make, profile.model, info.make, info.model));
+}
+
+calib::Measured measured_today(std::vector<std::string> files) {
+  const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  for (std::string& file : files) file = std::filesystem::path(file).filename().string();
+  return {"lowlux " + version_number(), fmt::format("{:%Y-%m-%d}", fmt::gmtime(now)), std::move(files)};
+}
+
+int calibration_failed(const Error& error) {
+  fmt::print(stderr, "{}\n", error_line(error.where.empty() ? "calibrate" : error.where, error));
+  return exit_failed;
+}
+
+int finish(const CalibrateArgs& args, const Calibration& found) {
+  const auto text = calib::profile_text(found.profile);
+  if (!text) return calibration_failed(with_file(text.error(), args.output));
+  const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
+  if (!args.report.empty()) {
+    const auto written = isp::write_text(args.report, isp::html_of(found.report), overwrite);
+    if (!written) return calibration_failed(with_file(written.error(), args.report));
+  }
+  if (const auto written = isp::write_text(args.output, *text, overwrite); !written) {
+    return calibration_failed(with_file(written.error(), args.output));
+  }
+  if (!args.quiet) {
+    for (const std::string& warning : found.warnings) {
+      fmt::print(stderr, "{}\n", one_line("lowlux: warning: " + warning));
+    }
+  }
+  if (args.json) {
+    const nlohmann::ordered_json json{
+        {"output", args.output}, {"warnings", found.warnings}, {"profile", nlohmann::ordered_json::parse(*text)}};
+    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  } else {
+    fmt::print("{}", found.text);
+  }
+  return exit_done;
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/gain_profile.h"
+#include "isp/base/camera_profile.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+#include "isp/cli/calibrate_args.h"
+#include "isp/output/report.h"
+
+namespace lowlux::cli {
+
+/// What a calibration found, and how it is shown.
+struct Calibration {
+  CameraProfile profile;
+  std::string text;
+  isp::Report report;
+  std::vector<std::string> warnings;
+};
+
+/// What would keep files from being written is known before any work: they exist, or their folder is missing.
+Result<void> check_outputs(const CalibrateArgs& args, const std::vector<std::string>& more = {});
+
+/// The profile to start from: --add-to's, or an empty one.
+Result<CameraProfile> starting_profile(const CalibrateArgs& args);
+
+/// A raw file, with what the options say in place of what it states. Errors name the file.
+Result<RawFrame> read_calibration_frame(const std::string& file, const CalibrateArgs& args);
+
+/// Makes the profile one of this camera. Error: it is another one's.
+Result<void> put_camera(const FrameInfo& info, CameraProfile& profile);
+
+/// Source and date of what is measured today.
+calib::Measured measured_today(std::vector<std::string> files);
+
+/// Writes the report and the profile, prints the text or JSON. @return the exit code
+int finish(const CalibrateArgs& args, const Calibration& found);
+
+/// Prints an error. @return the exit code
+int calibration_failed(const Error& error);
+
+int run_calibrate_black(const std::vector<std::string>& words);
+int run_calibrate_noise(const std::vector<std::string>& words);
+int run_calibrate_quoted(const std::vector<std::string>& words);
+
+}  // namespace lowlux::cli

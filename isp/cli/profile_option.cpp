@@ -1,0 +1,38 @@
+#include "isp/cli/profile_option.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "calib/profile_use.h"
+
+namespace lowlux::cli {
+namespace {
+
+/// At most two, as DNG has them: the lights of lowest and highest temperature.
+void use_colours(const CameraProfile& profile, RawFrame& frame) {
+  if (profile.colours.empty()) return;
+  std::vector<ColourCalibration> calibrations;
+  for (const ColourProfile& c : profile.colours) calibrations.push_back(c.calibration);
+  std::stable_sort(calibrations.begin(), calibrations.end(),
+                   [](const auto& a, const auto& b) { return a.cct_k < b.cct_k; });
+  if (calibrations.size() > 2) calibrations = {calibrations.front(), calibrations.back()};
+  frame.colour.calibrations = std::move(calibrations);
+  frame.colour.source = CameraColour::Source::profile;
+}
+
+}  // namespace
+
+Result<void> use_profile(const CameraProfile& profile, bool colour, RawFrame& frame, isp::BlackRequest& black) {
+  auto found = calib::profile_at(profile, frame.raw);
+  if (!found) return tl::make_unexpected(found.error());
+  black.choice = isp::BlackChoice::measured;
+  black.measured = found->black;
+  if (found->noise) frame.noise = found->noise;
+  auto& defects = frame.corrections.defects;
+  defects.insert(defects.end(), found->hot_pixels.begin(), found->hot_pixels.end());
+  frame.warnings.insert(frame.warnings.end(), found->warnings.begin(), found->warnings.end());
+  if (colour) use_colours(profile, frame);
+  return {};
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "isp/base/camera_profile.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+#include "isp/raw/black_point.h"
+
+namespace lowlux::cli {
+
+/// Puts what a camera's profile says of a frame into the frame, in place of what its file says: noise, hot pixels to be
+/// repaired, warnings, and with `colour` the profile's matrices if it holds any. The black point goes into `black`.
+/// Errors: those of calib::profile_at.
+Result<void> use_profile(const CameraProfile& profile, bool colour, RawFrame& frame, isp::BlackRequest& black);
+
+}  // namespace lowlux::cli
