@@ -20,9 +20,11 @@ double between_logs(double a, double b, double share) {
 /// Figures of `share` of the way from a to b; patterns and hot pixels are those of the nearer one.
 GainProfile between(const GainProfile& a, const GainProfile& b, double share) {
   GainProfile out = share < 0.5 ? a : b;
-  for (int site = 0; site < 4; ++site) {
-    out.pedestal_dn[site] = {between(a.pedestal_dn[site].value, b.pedestal_dn[site].value, share),
-                             std::max(a.pedestal_dn[site].standard_error, b.pedestal_dn[site].standard_error)};
+  if (!a.pedestal_dn || !b.pedestal_dn) out.pedestal_dn.reset();
+  for (int site = 0; out.pedestal_dn && site < 4; ++site) {
+    const Estimate &low = (*a.pedestal_dn)[site], &high = (*b.pedestal_dn)[site];
+    (*out.pedestal_dn)[site] = {between(low.value, high.value, share),
+                                std::max(low.standard_error, high.standard_error)};
   }
   if (!a.sensor || !b.sensor) {
     out.sensor.reset();

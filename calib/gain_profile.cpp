@@ -125,8 +125,9 @@ GainProfile& gain_at(CameraProfile& profile, const FrameSetting& setting) {
 
 void put_photon_transfer(const PhotonTransfer& transfer, const FrameSetting& setting, const Measured& measured,
                          GainProfile& out) {
-  const bool had_darks = out.sensor && out.dark_exposure_s && out.pedestal_holds == BlackPoint::Holds::pedestal_only;
-  const double black = had_darks ? mean_of(values_of(out.pedestal_dn)) : mean_of(transfer.black_dn);
+  const bool had_darks =
+      out.sensor && out.pedestal_dn && out.dark_exposure_s && out.pedestal_holds == BlackPoint::Holds::pedestal_only;
+  const double black = had_darks ? mean_of(values_of(*out.pedestal_dn)) : mean_of(transfer.black_dn);
   SensorModel& sensor = begin_sensor(setting, transfer.system_gain_dn_per_e, black, measured, out);
   if (transfer.read_noise_e) {
     sensor.read_noise_e = pixel_noise(transfer.read_noise_e->value, transfer.row_noise_e);
@@ -141,8 +142,9 @@ void put_photon_transfer(const PhotonTransfer& transfer, const FrameSetting& set
     note(measured_figures("full well", measured, 0, 0), out);
   }
   if (!had_darks) {
+    out.pedestal_dn.emplace();
     for (int site = 0; site < 4; ++site) {
-      out.pedestal_dn[site] = {transfer.black_dn[site], transfer.black_standard_error_dn[site]};
+      (*out.pedestal_dn)[site] = {transfer.black_dn[site], transfer.black_standard_error_dn[site]};
     }
     out.pedestal_holds = BlackPoint::Holds::pedestal_and_dark;
   }

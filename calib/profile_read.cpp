@@ -138,12 +138,6 @@ class Reader {
     elements(*value, key, out, visit);
   }
 
-  template <class T, std::size_t kCount, class Visit>
-  void fixed_list(const char* key, std::array<T, kCount>& out, const Visit& visit) {
-    const Json* value = array(key, kCount, kCount);
-    if (value != nullptr) elements(*value, key, out, visit);
-  }
-
   void texts(const char* key, std::vector<std::string>& out, std::size_t most) {
     const Json* value = array(key, 0, most);
     if (value == nullptr) return;

@@ -42,7 +42,7 @@ inline constexpr Range matrix_entries{-1e3, 1e3};
 ///     text(key, string)               number(key, double, range)       integer(key, int, range)
 ///     optional_number(key, optional)  estimate(key, value, standard error, range)
 ///     choice(key, enum, names)        object(key, fn)                  optional_object(key, optional, fn)
-///     matrix(key, Matrix3)            list(key, container, most, fn)   fixed_list(key, array, fn)
+///     matrix(key, Matrix3)            list(key, container, most, fn)
 /// each of which does nothing once something has failed.
 template <class Visitor, class Sensor, class Errors>
 void visit_sensor(Visitor& v, Sensor& s, Errors& e) {
@@ -86,14 +86,15 @@ void visit_range(Visitor& v, Measured& r, const Range& possible) {
 
 template <class Visitor, class Gain>
 void visit_gain(Visitor& v, Gain& g) {
-  const auto visit_estimate = [](Visitor& inner, auto& e) {
-    inner.number("value", e.value, {0, 65535});
-    inner.number("standard_error", e.standard_error, {});
-  };
   v.text("gain_setting", g.gain_setting);
   v.optional_number("iso", g.iso, {tiny, 1e9});
   v.optional_object("sensor", g.sensor, [&](Visitor& inner, auto& sensor) { visit_sensor(inner, sensor, g.errors); });
-  v.fixed_list("pedestal_dn", g.pedestal_dn, visit_estimate);
+  v.optional_object("pedestal_dn", g.pedestal_dn, [](Visitor& inner, auto& pedestal) {
+    inner.estimate("site_00", pedestal[0].value, pedestal[0].standard_error, {0, 65535});
+    inner.estimate("site_01", pedestal[1].value, pedestal[1].standard_error, {0, 65535});
+    inner.estimate("site_10", pedestal[2].value, pedestal[2].standard_error, {0, 65535});
+    inner.estimate("site_11", pedestal[3].value, pedestal[3].standard_error, {0, 65535});
+  });
   v.choice("pedestal_holds", g.pedestal_holds, {"pedestal", "pedestal and dark"});
   v.optional_object("dark_exposure_s", g.dark_exposure_s,
                     [](Visitor& inner, auto& range) { visit_range(inner, range, {}); });

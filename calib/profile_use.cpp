@@ -148,9 +148,12 @@ Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& fra
   out.sensor = gain.sensor;
   out.black.source = BlackPoint::Source::profile;
   out.black.holds = BlackPoint::Holds::pedestal_and_dark;
+  if (!gain.pedestal_dn) {
+    return fail(ErrorCode::insufficient, "the profile holds no black level; add one with `calibrate black --add-to`");
+  }
   for (int site = 0; site < 4; ++site) {
-    out.black.pedestal_dn[site] = gain.pedestal_dn[site].value;
-    out.black.pedestal_standard_error_dn[site] = gain.pedestal_dn[site].standard_error;
+    out.black.pedestal_dn[site] = (*gain.pedestal_dn)[site].value;
+    out.black.pedestal_standard_error_dn[site] = (*gain.pedestal_dn)[site].standard_error;
   }
   if (gain.pedestal_holds == BlackPoint::Holds::pedestal_and_dark) {
     if (frame.info.exposure_s) warn_of_exposure(gain, *frame.info.exposure_s, false, out.warnings);

@@ -76,10 +76,6 @@ class Writer {
       visit(inner, values[i]);
     }
   }
-  template <class Container, class Visit>
-  void fixed_list(const char* key, const Container& values, const Visit& visit) {
-    list(key, values, values.size(), visit);
-  }
   void texts(const char* key, const std::vector<std::string>& values, std::size_t most) {
     if (values.size() > most) {
       failure_.set(ErrorCode::too_large, joined(path_, key),

@@ -19,7 +19,10 @@ GainProfile gain_of(const isp::NamedSensor& named) {
   out.gain_setting = named.gain_setting;
   out.iso = named.iso;
   out.sensor = named.model;
-  out.pedestal_dn.fill({named.model.black_level_dn, 0});
+  if (named.black_level_is_sourced) {
+    const Estimate level{named.model.black_level_dn, 0};
+    out.pedestal_dn = PerSite<Estimate>{level, level, level, level};
+  }
   out.provenance.push_back(quoted("sensor", named.source));
   for (const std::string& assumption : named.assumptions) {
     out.provenance.push_back(quoted("not measured by anyone", assumption));

@@ -55,7 +55,7 @@ struct GainProfile {
   std::optional<double> iso;
   std::optional<SensorModel> sensor;  // absent where the system gain is unknown: then nothing is known in electrons
   SensorErrors errors;
-  PerSite<Estimate> pedestal_dn{};                                      // the model's black level, site by site
+  std::optional<PerSite<Estimate>> pedestal_dn;  // the model's black level, site by site; absent if it was not measured
   BlackPoint::Holds pedestal_holds = BlackPoint::Holds::pedestal_only;  // with the dark charge if it was not told apart
   std::optional<MeasuredRange> dark_exposure_s;                         // of the darks; absent if there were none
   std::optional<MeasuredRange> dark_temperature_c;                      // of the darks, where they state it

@@ -38,8 +38,8 @@ isp::Table table_of(const GainProfile& gain) {
   const auto add = [&table](std::string name, double value, double error, const char* unit) {
     table.rows.push_back({std::move(name), fmt::format("{:.5g}", value), fmt::format("{:.2g}", error), unit});
   };
-  for (int site = 0; site < 4; ++site) {
-    const Estimate& e = gain.pedestal_dn[site];
+  for (int site = 0; gain.pedestal_dn && site < 4; ++site) {
+    const Estimate& e = (*gain.pedestal_dn)[site];
     add(fmt::format("pedestal, {}", sites[site]), e.value, e.standard_error, "DN");
   }
   const SensorModel& s = *gain.sensor;

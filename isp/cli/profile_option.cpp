@@ -25,8 +25,10 @@ void use_colours(const CameraProfile& profile, RawFrame& frame) {
 Result<void> use_profile(const CameraProfile& profile, bool colour, RawFrame& frame, isp::BlackRequest& black) {
   auto found = calib::profile_at(profile, frame.raw);
   if (!found) return tl::make_unexpected(found.error());
-  black.choice = isp::BlackChoice::measured;
-  black.measured = found->black;
+  if (black.choice == isp::BlackChoice::automatic) {
+    black.choice = isp::BlackChoice::measured;
+    black.measured = found->black;
+  }
   if (found->noise) frame.noise = found->noise;
   auto& defects = frame.corrections.defects;
   defects.insert(defects.end(), found->hot_pixels.begin(), found->hot_pixels.end());

@@ -73,17 +73,17 @@ DevelopOutcome develop_file(const Task& task, const Job& job, Executor& executor
   Result<RawFrame> frame = capture::read_raw(job.input);
   clock.lap("read and decode");
   done.reach(0.3);
+  if (!frame) {
+    out.error = with_place(frame.error(), job.input);
+    return out;
+  }
   isp::DevelopOptions options = task.options;
-  if (frame && task.profile) {
+  if (task.profile) {
     const bool colour = !task.args.profile.empty();
     if (const auto used = use_profile(*task.profile, colour, *frame, options.black); !used) {
       out.error = with_place(used.error(), job.input);
       return out;
     }
-  }
-  if (!frame) {
-    out.error = with_place(frame.error(), job.input);
-    return out;
   }
   Result<isp::Developed> developed = isp::develop(*frame, options, executor);
   if (!developed) {

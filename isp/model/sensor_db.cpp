@@ -116,6 +116,7 @@ void take_electronics(NamedSensor& out, int row, const SensorFigures& given) {
   const double largest_code = std::exp2(m.bits) - 1;
   const auto black = given.black_level_dn ? given.black_level_dn : t.number(row, "black_level_DN");
   m.black_level_dn = black.value_or(std::exp2(m.bits - 4));
+  out.black_level_is_sourced = black.has_value();
   if (!black) out.assumptions.push_back("black level " + number_text(m.black_level_dn) + " DN");
   m.white_level_dn = given.white_level_dn.value_or(t.number(row, "white_level_DN").value_or(largest_code));
   m.system_gain_dn_per_e =

@@ -46,6 +46,7 @@ struct NamedSensor {
   std::optional<double> iso;             // of the gain setting
   bool iso_given = false;                // by the user: it comes before pitch and efficiency
   std::vector<std::string> assumptions;  // one line each: a figure no source gives, and what was taken instead
+  bool black_level_is_sourced = false;   // by the table or the user
 };
 
 /// The thesis' camera of Table 4-1: in the table as three rows, one for each channel.

@@ -42,7 +42,7 @@ CameraProfile awkward_profile() {
                  .dark_doubling_c = 0.05,
                  .prnu = 1e-5,
                  .dsnu = 1e-3};
-  for (int site = 0; site < 4; ++site) gain.pedestal_dn[site] = {512 + site / 7.0, 0.01 * site / 3};
+  gain.pedestal_dn = PerSite<Estimate>{{{512, 0}, {512 + 1.0 / 7, 0.01 / 3}, {512 + 2.0 / 7, 0.02 / 3}, {513, 0.01}}};
   gain.hot_pixels = {{3, 4, 100.1}, {6000, 5999, 1e-7}};
   Provenance provenance{Provenance::Kind::measured, "photon transfer", "a program", "2026-01-02",
                         {"a.dng", "b/c.dng"},       1.0 / 9,           17};
@@ -63,6 +63,7 @@ CameraProfile awkward_profile() {
   profile.gains[0].dark_chromaticity = std::array<Estimate, 3>{{{0.3, 0.1 / 3}, {1.0 / 3, 0}, {-0.01, 0.2}}};
   profile.gains[1].iso.reset();
   profile.gains[1].sensor.reset();
+  profile.gains[1].pedestal_dn.reset();
   profile.gains[1].hot_pixels.clear();
   profile.gains[1].provenance.clear();
   return profile;
@@ -121,6 +122,7 @@ TEST(ProfileIo, ReadingBackGivesTheSameBits) {
   EXPECT_EQ(found.dark_chromaticity, truth.dark_chromaticity);
   EXPECT_FALSE(read->gains[1].iso);
   EXPECT_FALSE(read->gains[1].sensor);
+  EXPECT_FALSE(read->gains[1].pedestal_dn);
   ASSERT_EQ(read->colours.size(), 2U);
   const ColourProfile &colour = read->colours[0], &expected = profile.colours[0];
   EXPECT_EQ(colour.illuminant, "tungsten");
@@ -176,8 +178,8 @@ TEST(ProfileIo, EveryErrorNamesTheKeysPath) {
       {"gains[0].sensor.quantisation", [](Json& j) { j["gains"][0]["sensor"]["quantisation"] = "ceil"; }},
       {"gains[0].sensor.name", [](Json& j) { j["gains"][0]["sensor"]["name"] = 7; }},
       {"gains[0].sensor", [](Json& j) { j["gains"][0]["sensor"]["black_level_dn"] = 16383; }},  // black at white
-      {"gains[0].pedestal_dn", [](Json& j) { j["gains"][0]["pedestal_dn"].erase(3); }},
-      {"gains[0].pedestal_dn[2].value", [](Json& j) { j["gains"][0]["pedestal_dn"][2]["value"] = 70000; }},
+      {"gains[0].pedestal_dn.site_11", [](Json& j) { j["gains"][0]["pedestal_dn"].erase("site_11"); }},
+      {"gains[0].pedestal_dn.site_10.value", [](Json& j) { j["gains"][0]["pedestal_dn"]["site_10"]["value"] = 70000; }},
       {"gains[0].pedestal_holds", [](Json& j) { j["gains"][0]["pedestal_holds"] = "dark"; }},
       {"gains[0].dark_exposure_s", [](Json& j) { j["gains"][0]["dark_exposure_s"]["low"] = 1e6; }},
       {"gains[0].dark_temperature_c.high", [](Json& j) { j["gains"][0]["dark_temperature_c"]["high"] = 201; }},

@@ -1,0 +1,149 @@
+#include "calib/black_figures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/sensor_bench/sensor_bench.h"
+
+namespace lowlux::calib {
+namespace {
+
+using test::SensorBench;
+
+/// Codes of a frame moved by `dn(x, y)`.
+template <class Move>
+RawDn moved(RawDn raw, const Move& dn) {
+  for (int y = 0; y < raw.dn.height(); ++y) {
+    for (int x = 0; x < raw.dn.width(); ++x) {
+      raw.dn.at(x, y) = static_cast<std::uint16_t>(std::clamp(raw.dn.at(x, y) + dn(x, y), 0, 65535));
+    }
+  }
+  return raw;
+}
+
+/// 200 e- of dark charge and 4 e- of read noise, without patterns.
+SensorModel dark_200() {
+  SensorModel s = test::modern_small();
+  s.read_noise_e = 4;
+  s.system_gain_dn_per_e = 2;
+  s.full_well_e = 1800;
+  s.dark_current_e_per_s = {200, 200, 200};
+  s.prnu = 0;
+  return s;
+}
+
+double law_of_mean(const SensorModel& s, double time_s) {
+  return s.black_level_dn + s.system_gain_dn_per_e * s.dark_current_e_per_s[1] * time_s;
+}
+
+TEST(BlackFigures, OfOneFrameHaveTheErrorOfTheLaw) {
+  const SensorBench bench{.sensor = dark_200(), .width = 448, .height = 448};  // 50,176 pixels of each site
+  const auto found = measure_black(bench.frame({1, 20}, 0));
+  ASSERT_TRUE(found) << found.error().message;
+  // (d + sigma^2) / M of denoise.md 3.4: 0.066 e- here.
+  const double law_error_dn = 2 * std::sqrt((200 + 16.0 + 1.0 / 48) / 50176);
+  for (int site = 0; site < 4; ++site) {
+    const Estimate& level = found->level_dn[site];
+    EXPECT_NEAR(level.standard_error, law_error_dn, 0.15 * law_error_dn) << site;  // of 448 row and column means
+    EXPECT_NEAR(level.value, law_of_mean(bench.sensor, 1), 3.5 * law_error_dn) << site;
+    EXPECT_NEAR(found->deviation_dn[site], 2 * std::sqrt(216), 0.5);
+  }
+  EXPECT_EQ(found->frames, 1);
+  EXPECT_LT(found->excluded_share, 1e-4);
+}
+
+TEST(BlackFigures, OverManySeedsHaveNoBiasBeyondAFifthOfTheirError) {
+  SensorBench bench{.sensor = dark_200(), .width = 128, .height = 128};
+  constexpr int seeds = 100;
+  double sum = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    bench.seed = static_cast<std::uint64_t>(seed);
+    const auto found = measure_black(bench.frame({1, 20}, 0));
+    ASSERT_TRUE(found);
+    for (const Estimate& level : found->level_dn) sum += (level.value - law_of_mean(bench.sensor, 1)) / (4 * seeds);
+  }
+  const double one_error = 2 * std::sqrt(216.0 / 4096);
+  EXPECT_LT(std::fabs(sum), 0.2 * one_error);  // its own deviation is a twentieth of the error
+}
+
+TEST(BlackFigures, TellRowsFromColumnsAndBothFromPixels) {
+  const SensorBench bench{.sensor = dark_200(), .width = 400, .height = 300};
+  const RawDn plain = bench.frame({1, 20}, 0);
+  const auto white = measure_black(plain);
+  ASSERT_TRUE(white);
+  // A deviation of 29.4 DN in 200 columns: row means of a site scatter by 2.1 DN; 5 deviations of that variance's root.
+  EXPECT_LT(white->row_noise_dn, 0.9);
+  EXPECT_LT(white->column_noise_dn, 0.9);
+  const auto rows = measure_black(moved(bench.frame({1, 20}, 0), [](int, int y) { return (y / 2) % 2 == 0 ? 5 : -5; }));
+  ASSERT_TRUE(rows);
+  EXPECT_NEAR(rows->row_noise_dn, 5, 0.5);
+  EXPECT_LT(rows->column_noise_dn, 0.9);
+  for (int site = 0; site < 4; ++site) {
+    EXPECT_NEAR(rows->rows[site].white_dn, 2 * std::sqrt(216.0 / 200), 0.05);
+    EXPECT_NEAR(rows->rows[site].found_dn, std::hypot(5, rows->rows[site].white_dn), 0.6);
+    EXPECT_GT(rows->level_dn[site].standard_error, 5 / std::sqrt(150.0));  // rows count, not pixels
+  }
+}
+
+TEST(BlackFigures, KeepTheParityOfRowsApart) {
+  const SensorBench bench{.sensor = dark_200(), .width = 256, .height = 256};
+  const auto found = measure_black(moved(bench.frame({1, 20}, 0), [](int, int y) { return y % 2 == 0 ? 0 : 6; }));
+  ASSERT_TRUE(found);
+  const double odd = (found->level_dn[2].value + found->level_dn[3].value) / 2;
+  const double even = (found->level_dn[0].value + found->level_dn[1].value) / 2;
+  EXPECT_NEAR(odd - even, 6, 5 * 2 * std::sqrt(216.0 / 32768) * std::sqrt(2));
+}
+
+TEST(BlackFigures, LeaveHotPixelsOut) {
+  const SensorBench bench{.sensor = dark_200(), .width = 256, .height = 256};
+  const auto plain = measure_black(bench.frame({1, 20}, 0));
+  const auto hot =
+      measure_black(moved(bench.frame({1, 20}, 0), [](int x, int y) { return x % 31 == 3 && y % 17 == 5 ? 3000 : 0; }));
+  ASSERT_TRUE(plain && hot);
+  for (int site = 0; site < 4; ++site) {
+    EXPECT_NEAR(hot->level_dn[site].value, plain->level_dn[site].value, plain->level_dn[site].standard_error);
+  }
+  EXPECT_GT(hot->excluded_share, 1.0 / (32 * 18));
+}
+
+TEST(BlackFigures, RefuseWhatIsNoBlack) {
+  const SensorBench bench{.sensor = dark_200(), .width = 128, .height = 128};
+  const auto at_zero =
+      measure_black(moved(bench.frame({1, 20}, 0), [](int x, int) { return x % 64 == 0 ? -9999 : 0; }));
+  ASSERT_FALSE(at_zero);
+  EXPECT_NE(at_zero.error().message.find("code 0"), std::string::npos);
+  const auto at_white = measure_black(moved(bench.frame({1, 20}, 0), [](int, int) { return 9999; }));
+  ASSERT_FALSE(at_white);
+  EXPECT_NE(at_white.error().message.find("white level"), std::string::npos);
+  const auto scattered =
+      measure_black(moved(bench.frame({1, 20}, 0), [](int x, int) { return x % 9 == 0 ? 2000 : 0; }));
+  ASSERT_FALSE(scattered);
+  EXPECT_NE(scattered.error().message.find("far from the others"), std::string::npos);
+  const SensorBench tiny{.sensor = dark_200(), .width = 40, .height = 40};
+  const auto few = measure_black(tiny.frame({1, 20}, 0));
+  ASSERT_FALSE(few);
+  EXPECT_NE(few.error().message.find("400 dark pixels"), std::string::npos) << few.error().message;
+}
+
+TEST(PartOf, KeepsThePixelsAndTheirColours) {
+  const SensorBench bench{.sensor = dark_200(), .width = 64, .height = 48, .phase = BayerPhase::gbrg};
+  RawDn raw = bench.frame({1, 20}, 0);
+  raw.active = {7, 5, 50, 40};
+  const auto part = part_of(raw, {0, 6, 7, 30});  // columns -7.. of the active area: one is left out
+  ASSERT_TRUE(part);
+  EXPECT_EQ(part->active, (Rect{0, 0, 6, 29}));
+  EXPECT_EQ(part->phase, BayerPhase::gbrg);
+  for (int y = 0; y < 29; ++y) {
+    for (int x = 0; x < 6; ++x) EXPECT_EQ(part->dn.at(x, y), raw.dn.at(x + 1, y + 7));
+  }
+  EXPECT_FALSE(part_of(raw, {60, 0, 10, 10}));
+  EXPECT_FALSE(part_of(raw, {-3, 1, 10, 10}));
+  EXPECT_FALSE(part_of(raw, {8, 5, 1, 10}));  // nothing is left of it
+}
+
+}  // namespace
+}  // namespace lowlux::calib

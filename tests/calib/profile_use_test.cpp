@@ -1,0 +1,211 @@
+#include "calib/profile_use.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "calib/profile_io.h"
+#include "calib/quoted_profile.h"
+#include "isp/model/sensor_db.h"
+
+namespace lowlux::calib {
+namespace {
+
+GainProfile gain_at(double iso, double k_dn_per_e, double read_noise_e, double pedestal_dn) {
+  GainProfile out;
+  out.iso = iso;
+  out.sensor = SensorModel{.name = "S",
+                           .system_gain_dn_per_e = k_dn_per_e,
+                           .read_noise_e = read_noise_e,
+                           .full_well_e = 3000,
+                           .bits = 14,
+                           .black_level_dn = pedestal_dn,
+                           .white_level_dn = 16383,
+                           .dark_current_e_per_s = {2, 4, 6},
+                           .dark_temperature_c = 20,
+                           .dark_doubling_c = 6};
+  out.errors.dark_current_e_per_s = {0.1, 0.1, 0.1};
+  out.errors.dark_doubling_c = 0.1;
+  out.pedestal_dn.emplace();
+  for (int site = 0; site < 4; ++site) (*out.pedestal_dn)[site] = {pedestal_dn + site, 0.3};
+  out.dark_exposure_s = MeasuredRange{0, 10};
+  out.dark_temperature_c = MeasuredRange{15, 30};
+  out.hot_pixels = {{3, 2, 100}, {5, 1, 1}, {900, 1, 1000}};
+  return out;
+}
+
+CameraProfile two_gains() { return {"M", "C", {gain_at(100, 1, 4, 500), gain_at(400, 4, 2, 516)}, {}}; }
+
+RawDn frame(std::optional<double> iso, std::optional<double> time_s, std::optional<double> celsius) {
+  RawDn raw;
+  raw.dn = Plane<std::uint16_t>(16, 16);
+  raw.active = raw.default_crop = {0, 0, 16, 16};
+  raw.phase = BayerPhase::grbg;
+  raw.white_dn = {16383, 16383, 16383};
+  raw.info.make = "M";
+  raw.info.model = "C";
+  raw.info.iso = iso;
+  raw.info.exposure_s = time_s;
+  raw.info.temperature_c = celsius;
+  return raw;
+}
+
+TEST(ProfileUse, AddsDarkChargeOfTheExposureAndTemperature) {
+  const auto found = profile_at(two_gains(), frame(100, 5, 26));  // one doubling above 20 C
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_TRUE(found->warnings.empty());
+  // GRBG: sites are G, R, B, G; 2 D t electrons at 1 DN/e-.
+  const PerSite<double> charge{40, 20, 60, 40};
+  for (int site = 0; site < 4; ++site) {
+    EXPECT_NEAR(found->dark_mean_e[site], charge[site], 1e-12);
+    EXPECT_NEAR(found->black.pedestal_dn[site], 500 + site + charge[site], 1e-12);
+    EXPECT_NEAR(found->black.pedestal_standard_error_dn[site], std::hypot(0.3, 0.1 * 2 * 5), 1e-12);
+    EXPECT_NEAR(found->black.noise_std_dn[site], std::sqrt(16 + charge[site] + 1.0 / 12), 1e-12);
+  }
+  EXPECT_EQ(found->black.holds, BlackPoint::Holds::pedestal_and_dark);
+  EXPECT_EQ(found->black.source, BlackPoint::Source::profile);
+  EXPECT_NEAR(found->sensor->dark_current_e_per_s[2], 12, 1e-12);
+}
+
+TEST(ProfileUse, NoiseIsTheSensorsInSharesOfTheRange) {
+  const auto found = profile_at(two_gains(), frame(100, 5, 20));
+  ASSERT_TRUE(found && found->noise);
+  const double range = 16383 - (501 + 10);  // red: one site
+  EXPECT_NEAR(found->noise->scale[0], 1 / range, 1e-15);
+  EXPECT_NEAR(found->noise->offset[0], (16 + 10 + 1.0 / 12) / (range * range), 1e-15);
+  const double ranges[] = {16383 - 520.0, 16383 - 523.0};  // green: two sites
+  EXPECT_NEAR(found->noise->scale[1], (1 / ranges[0] + 1 / ranges[1]) / 2, 1e-15);
+}
+
+TEST(ProfileUse, BetweenTwoGainsLinesAreStraightInLogarithms) {
+  const auto found = profile_at(two_gains(), frame(200, 0, 20));  // half way in the logarithm
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(found->warnings.empty());
+  EXPECT_NEAR(found->sensor->system_gain_dn_per_e, 2, 1e-12);
+  EXPECT_NEAR(found->sensor->read_noise_e, std::sqrt(8.0), 1e-12);
+  EXPECT_NEAR(found->black.pedestal_dn[0], 508, 1e-9);
+}
+
+TEST(ProfileUse, BeyondTheGainsTheIsoCountsAndItSaysSo) {
+  const auto found = profile_at(two_gains(), frame(1600, 0, 20));
+  ASSERT_TRUE(found);
+  ASSERT_EQ(found->warnings.size(), 1U);
+  EXPECT_NE(found->warnings[0].find("ISO 1600 lies beyond the profile's (100, 400)"), std::string::npos);
+  EXPECT_NEAR(found->sensor->system_gain_dn_per_e, 16, 1e-12);
+  EXPECT_NEAR(found->sensor->full_well_e, (16383 - 516) / 16.0, 1e-9);
+  const auto below = profile_at(two_gains(), frame(50, 0, 20));
+  ASSERT_TRUE(below);
+  EXPECT_NEAR(below->sensor->system_gain_dn_per_e, 0.5, 1e-12);
+  EXPECT_EQ(below->warnings.size(), 1U);
+}
+
+TEST(ProfileUse, ExtrapolationInTimeAndTemperatureIsSaid) {
+  const auto warnings = [](std::optional<double> time_s, std::optional<double> celsius) {
+    const auto found = profile_at(two_gains(), frame(100, time_s, celsius));
+    EXPECT_TRUE(found);
+    return found->warnings;
+  };
+  EXPECT_TRUE(warnings(10, 30).empty());
+  ASSERT_EQ(warnings(20, 30).size(), 1U);
+  EXPECT_NE(warnings(20, 30)[0].find("longer than the profile's darks, 0 to 10 s"), std::string::npos);
+  ASSERT_EQ(warnings(10, 40).size(), 1U);
+  EXPECT_NE(warnings(10, 40)[0].find("15 to 30 C"), std::string::npos);
+  EXPECT_EQ(warnings(10, std::nullopt).size(), 1U);
+  EXPECT_TRUE(warnings(1e-3, 60).empty());  // there is no charge to speak of
+  EXPECT_TRUE(warnings(1e-3, std::nullopt).empty());
+}
+
+TEST(ProfileUse, APedestalThatHoldsDarkIsNotScaled) {
+  CameraProfile profile = two_gains();
+  profile.gains.pop_back();
+  profile.gains[0].pedestal_holds = BlackPoint::Holds::pedestal_and_dark;
+  profile.gains[0].dark_exposure_s = MeasuredRange{2, 2};
+  const auto same = profile_at(profile, frame(100, 2, 20));
+  ASSERT_TRUE(same);
+  EXPECT_TRUE(same->warnings.empty());
+  EXPECT_EQ(same->black.pedestal_dn[3], 503);
+  EXPECT_EQ(profile_at(profile, frame(100, 4, 20))->warnings.size(), 1U);
+  EXPECT_EQ(profile_at(profile, frame(100, 1, 20))->warnings.size(), 1U);
+  EXPECT_TRUE(profile_at(profile, frame(100, std::nullopt, 20)));
+}
+
+TEST(ProfileUse, WithoutAKnownGainThereIsABlackPointAlone) {
+  CameraProfile profile = two_gains();
+  profile.gains.pop_back();
+  profile.gains[0].sensor.reset();
+  const auto found = profile_at(profile, frame(100, 2, 20));
+  ASSERT_TRUE(found);
+  EXPECT_FALSE(found->sensor);
+  EXPECT_FALSE(found->noise);
+  EXPECT_EQ(found->black.pedestal_dn[0], 500);
+  EXPECT_TRUE(found->hot_pixels.empty());
+}
+
+TEST(ProfileUse, NamesHotPixelsThatStandOutInThisExposure) {
+  // At 4 s 100 e-/s are 400 e-, 1 e-/s is 4 e-: 6 deviations of sqrt(16 + 16) e- lie between. (900, 1) is outside.
+  const auto found = profile_at(two_gains(), frame(100, 4, 20));
+  ASSERT_EQ(found->hot_pixels.size(), 1U);
+  EXPECT_EQ(found->hot_pixels[0].x, 3);
+  EXPECT_EQ(found->hot_pixels[0].y, 2);
+  EXPECT_TRUE(profile_at(two_gains(), frame(100, 0, 20))->hot_pixels.empty());
+}
+
+TEST(ProfileUse, RefusesWhatItCannotTell) {
+  const auto message = [](const CameraProfile& profile, const RawDn& raw) {
+    const auto found = profile_at(profile, raw);
+    return found ? std::string() : found.error().message;
+  };
+  EXPECT_NE(message(two_gains(), frame(std::nullopt, 1, 20)).find("states no ISO"), std::string::npos);
+  EXPECT_NE(message(two_gains(), frame(100, std::nullopt, 20)).find("exposure time"), std::string::npos);
+  EXPECT_NE(message({}, frame(100, 1, 20)).find("no gain setting"), std::string::npos);
+  RawDn other = frame(100, 1, 20);
+  other.info.model = "D";
+  EXPECT_NE(message(two_gains(), other).find("\"M D\""), std::string::npos);
+  other.info.model = "C";
+  other.layout = SensorLayout::linear_rgb;
+  EXPECT_NE(message(two_gains(), other).find("demosaiced"), std::string::npos);
+  CameraProfile unmeasured = two_gains();
+  unmeasured.gains[0].pedestal_dn.reset();
+  EXPECT_NE(message(unmeasured, frame(100, 1, 20)).find("no black level"), std::string::npos);
+  CameraProfile one = two_gains();
+  one.gains.pop_back();
+  const auto only = profile_at(one, frame(std::nullopt, 1, 20));
+  ASSERT_TRUE(only);
+  EXPECT_EQ(only->warnings.size(), 1U);  // that the only setting is taken
+}
+
+TEST(ProfileUse, MonochromeSensorsHaveTheMiddleChannel) {
+  RawDn raw = frame(100, 1, 20);
+  raw.layout = SensorLayout::monochrome;
+  const auto found = profile_at(two_gains(), raw);
+  ASSERT_TRUE(found && found->noise);
+  for (int site = 0; site < 4; ++site) EXPECT_EQ(found->dark_mean_e[site], 4);
+  EXPECT_EQ(found->noise->scale[0], found->noise->scale[1]);
+  EXPECT_EQ(found->noise->scale[2], found->noise->scale[1]);
+}
+
+TEST(QuotedProfile, OfEverySensorThatSufficesIsAProfile) {
+  int made = 0;
+  for (const std::string_view name : isp::sensor_names()) {
+    const auto profile = quoted_profile(name);
+    if (!profile) {
+      EXPECT_FALSE(profile.error().message.empty());
+      continue;
+    }
+    ++made;
+    const auto text = profile_text(*profile);
+    ASSERT_TRUE(text) << name << ": " << text.error().message;
+    EXPECT_TRUE(parse_profile(*text));
+    for (const GainProfile& gain : profile->gains) {
+      for (const Provenance& p : gain.provenance) EXPECT_EQ(p.kind, Provenance::Kind::quoted);
+      EXPECT_FALSE(gain.provenance.empty());
+    }
+  }
+  EXPECT_GE(made, 10);
+  EXPECT_FALSE(quoted_profile("no such sensor"));
+}
+
+}  // namespace
+}  // namespace lowlux::calib

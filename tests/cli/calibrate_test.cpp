@@ -1,0 +1,271 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/process.h"
+#include "tests/support/scratch_directory.h"
+
+namespace lowlux {
+namespace {
+
+using Json = nlohmann::json;
+using Words = std::vector<std::string>;
+
+constexpr const char* site_names[] = {"site_00", "site_01", "site_10", "site_11"};
+
+bool holds(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
+
+/// A simulated camera's darks and flats as files, and the command that measures them.
+class Calibrate : public testing::Test {
+ protected:
+  std::string file(const std::string& name) const { return scratch_.file(name); }
+  bool exists(const std::string& name) const { return scratch_.holds(name); }
+
+  static test::ProcessResult lowlux(const Words& words) {
+    Words command{LOWLUX_COMMAND};
+    command.insert(command.end(), words.begin(), words.end());
+    return test::run_process(command);
+  }
+
+  /// Frames NAME_0000.dng..., 0.5 DN/e-, 2 e- of read noise, 20 e-/s of dark current at 20 C.
+  Words shoot(const std::string& name, const std::string& scene, const std::string& time_s, int frames,
+              const Words& more = {}) {
+    Words words{"simulate",
+                scene,
+                "-o",
+                file(name + ".dng"),
+                "--size",
+                "128x128",
+                "--sensor",
+                "ELD_NikonD850",
+                "--gain",
+                "ISO 1600",
+                "--system-gain",
+                "0.5",
+                "--read-noise",
+                "2",
+                "--full-well",
+                "20000",
+                "--dark-current",
+                "20,30,25",
+                "--dark-doubling",
+                "6",
+                "--exposure",
+                time_s,
+                "--frames",
+                std::to_string(frames),
+                "--no-truth",
+                "--quiet",
+                "--effects",
+                "all",
+                "--seed",
+                std::to_string(++seed_)};
+    words.insert(words.end(), more.begin(), more.end());
+    const auto done = lowlux(words);
+    EXPECT_EQ(done.exit_code, 0) << done.err;
+    Words out;
+    for (int i = 0; i < frames; ++i) {
+      char text[8];
+      std::snprintf(text, sizeof text, "_%04d", i);
+      out.push_back(file(name + (frames == 1 ? "" : text) + ".dng"));
+    }
+    return out;
+  }
+
+  static Words joined(Words a, const Words& b) {
+    a.insert(a.end(), b.begin(), b.end());
+    return a;
+  }
+
+  Json profile(const std::string& name) { return Json::parse(scratch_.read(name)); }
+
+  test::ScratchDirectory scratch_;
+  int seed_ = 0;
+};
+
+TEST_F(Calibrate, BlackFindsWhatTheSensorHas) {
+  Words darks = joined(shoot("a", "dark", "0.001", 4), shoot("b", "dark", "10", 4));
+  darks = joined(darks, shoot("c", "dark", "10", 4, {"--temperature", "32"}));
+  const auto done = lowlux(joined({"calibrate", "black", "-o", file("p.json"), "--system-gain", "0.5", "--report",
+                                   file("p.html"), "--map", file("map")},
+                                  darks));
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_TRUE(holds(done.out, "black point"));
+  EXPECT_TRUE(holds(done.out, "doubling"));
+  const Json gain = profile("p.json")["gains"][0];
+  EXPECT_EQ(gain["iso"], 1600);
+  EXPECT_EQ(gain["pedestal_holds"], "pedestal");
+  const Json& sensor = gain["sensor"];
+  const auto near = [&](const char* key, double truth, double factor) {
+    const double value = sensor[key]["value"], error = sensor[key]["standard_error"];
+    EXPECT_NEAR(value / factor, truth, 5 * error / factor) << key;
+    EXPECT_LT(error, 0.05 * value) << key;
+  };
+  const double factor = std::exp2((sensor["dark_temperature_c"].get<double>() - 20) / 6);
+  near("dark_current_red_e_per_s", 20, factor);
+  near("dark_current_green_e_per_s", 30, factor);
+  near("dark_current_blue_e_per_s", 25, factor);
+  near("dark_doubling_c", 6, 1);
+  near("read_noise_e", 2, 1);
+  EXPECT_EQ(gain["provenance"].size(), 2U);  // the full well was not measured
+  const std::string page = scratch_.read("p.html");
+  for (const char* plot :
+       {"Dark charge against time", "Dark current against temperature", "Residuals", "Black point"}) {
+    EXPECT_TRUE(holds(page, plot)) << plot;
+  }
+  EXPECT_TRUE(exists("map_pedestal.pfm") && exists("map_current.pfm"));
+}
+
+TEST_F(Calibrate, BlackTakesTheGainFromTheDarkChargeOrSaysThatItCannot) {
+  const Words shorts = shoot("a", "dark", "0.001", 6), longs = shoot("b", "dark", "10", 6);
+  const auto done = lowlux(joined({"calibrate", "black", "-o", file("p.json")}, joined(shorts, longs)));
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_TRUE(holds(done.out, "from the noise of the dark charge"));
+  const Json gain = profile("p.json")["gains"][0]["sensor"]["system_gain_dn_per_e"];
+  EXPECT_NEAR(gain["value"], 0.5, 5 * gain["standard_error"].get<double>());
+  const auto refused =
+      lowlux(joined({"calibrate", "black", "-o", file("q.json")}, joined(shorts, shoot("c", "dark", "0.002", 6))));
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_TRUE(holds(refused.err, "--system-gain"));
+  EXPECT_FALSE(exists("q.json"));
+}
+
+TEST_F(Calibrate, NoiseFindsGainReadNoiseAndFullWell) {
+  const Words darks = shoot("d", "dark", "0.001", 4);
+  Words flats;
+  int n = 0;
+  for (const char* luminance : {"2", "5", "10", "20", "30", "40", "300"}) {
+    flats = joined(flats, shoot("f" + std::to_string(n++), "flat", "0.1", 2, {"--luminance", luminance}));
+  }
+  Words words = joined({"calibrate", "noise", "-o", file("p.json"), "--report", file("p.html"), "--json"}, flats);
+  words.emplace_back("--darks");
+  const auto done = lowlux(joined(words, darks));
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const Json out = Json::parse(done.out);
+  EXPECT_EQ(out["profile"], profile("p.json"));
+  const Json& sensor = out["profile"]["gains"][0]["sensor"];
+  EXPECT_NEAR(sensor["system_gain_dn_per_e"]["value"], 0.5,
+              5 * sensor["system_gain_dn_per_e"]["standard_error"].get<double>());
+  EXPECT_NEAR(sensor["read_noise_e"]["value"], 2, 5 * sensor["read_noise_e"]["standard_error"].get<double>());
+  EXPECT_TRUE(holds(scratch_.read("p.html"), "Photon transfer curve"));
+
+  // The black point of darks is added to it, with its gain.
+  const auto added = lowlux(joined({"calibrate", "black", "-o", file("p.json"), "--force", "--add-to", file("p.json")},
+                                   joined(darks, shoot("l", "dark", "10", 4))));
+  ASSERT_EQ(added.exit_code, 0) << added.err;
+  const Json both = profile("p.json");
+  ASSERT_EQ(both["gains"].size(), 1U);
+  EXPECT_EQ(both["gains"][0]["sensor"]["full_well_e"], sensor["full_well_e"]);
+  EXPECT_GT(both["gains"][0]["sensor"]["dark_current_red_e_per_s"]["value"], 10);
+}
+
+TEST_F(Calibrate, MaskedPixelsOfAnOrdinaryFrameServe) {
+  const std::string canon = std::string(LOWLUX_TESTDATA) + "/raws/canon_kissx4_ml_colorchart.dng";
+  const auto light = lowlux({"calibrate", "black", canon, "-o", file("p.json")});
+  EXPECT_EQ(light.exit_code, 1);
+  EXPECT_TRUE(holds(light.err, "light reaches this frame") && holds(light.err, "--masked")) << light.err;
+  const auto done = lowlux({"calibrate", "black", "--masked", canon, "-o", file("p.json")});
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const Json gain = profile("p.json")["gains"][0];
+  // testdata/README.md: 2047.4 DN in even rows and 2050.4 in odd ones.
+  const auto level = [&](int site) { return gain["pedestal_dn"][site_names[site]]["value"].get<double>(); };
+  EXPECT_NEAR(level(0), 2047.4, 0.5);
+  EXPECT_NEAR(level(1), 2047.4, 0.5);
+  EXPECT_NEAR(level(2), 2050.4, 0.5);
+  EXPECT_NEAR(level(3), 2050.4, 0.5);
+  EXPECT_FALSE(gain.contains("sensor"));
+  EXPECT_EQ(gain["pedestal_holds"], "pedestal and dark");
+
+  // The profile's black is the one that the picture's own masked pixels give.
+  const auto developed = lowlux({"develop", canon, "-o", file("p.png"), "--half", "--json", "--black", file("p.json")});
+  ASSERT_EQ(developed.exit_code, 0) << developed.err;
+  const Json black = Json::parse(developed.out)[0]["black"];
+  EXPECT_EQ(black["source"], "profile");
+  EXPECT_NEAR(black["pedestal_dn"][2].get<double>(), level(2), 1e-9);
+}
+
+TEST_F(Calibrate, DevelopTakesBlackNoiseAndHotPixelsFromTheProfile) {
+  const Words hot{"--hot-pixels", "0.002", "--hot-pixel-current", "2000", "--sensor-seed", "5"};
+  const Words darks = joined(shoot("a", "dark", "0.001", 4, hot), shoot("b", "dark", "2", 16, hot));
+  ASSERT_EQ(lowlux(joined({"calibrate", "black", "-o", file("p.json"), "--system-gain", "0.5"}, darks)).exit_code, 0);
+  ASSERT_GT(profile("p.json")["gains"][0]["hot_pixels"].size(), 20U);
+  const Words night = shoot("n", "flat", "2", 1, joined(hot, {"--luminance", "0.02"}));
+  const auto developed =
+      lowlux({"develop", night[0], "-o", file("n.png"), "--json", "--black", file("p.json"), "--repair", "off"});
+  ASSERT_EQ(developed.exit_code, 0) << developed.err;
+  const Json out = Json::parse(developed.out)[0];
+  EXPECT_EQ(out["black"]["source"], "profile");
+  EXPECT_GT(out["defects_repaired"], 20);
+  // 2 s at 20 to 30 e-/s and 0.5 DN/e- above the pedestal.
+  const double pedestal = profile("p.json")["gains"][0]["pedestal_dn"]["site_00"]["value"];
+  EXPECT_NEAR(out["black"]["pedestal_dn"][0].get<double>() - pedestal, 25, 6);
+  const auto longer = shoot("m", "flat", "20", 1, {"--luminance", "0.02"});
+  const auto warned = lowlux({"develop", longer[0], "-o", file("m.png"), "--black", file("p.json")});
+  EXPECT_EQ(warned.exit_code, 0);
+  EXPECT_TRUE(holds(warned.err, "extrapolated")) << warned.err;
+}
+
+TEST_F(Calibrate, BadFramesAreOneErrorAndNoProfile) {
+  const Words dark = shoot("d", "dark", "1", 2);
+  const Words wide = shoot("w", "dark", "1", 1, {"--size", "130x128"});
+  const std::string canon = std::string(LOWLUX_TESTDATA) + "/raws/canon_kissx4_ml_colorchart.dng";
+  const auto refused = [&](Words words, const std::string& why) {
+    words.insert(words.end(), {"-o", file("p.json")});
+    const auto done = lowlux(words);
+    EXPECT_EQ(done.exit_code, 1) << why;
+    EXPECT_TRUE(holds(done.err, why)) << done.err;
+    EXPECT_EQ(std::count(done.err.begin(), done.err.end(), '\n'), 1) << done.err;
+    EXPECT_FALSE(exists("p.json"));
+  };
+  refused({"calibrate", "black", dark[0], wide[0]}, "130 x 128 pixels");
+  refused({"calibrate", "black", dark[0], canon}, "light reaches this frame");
+  refused({"calibrate", "black", file("missing.dng")}, "missing.dng");
+  refused({"calibrate", "black", dark[0], dark[1], shoot("e", "dark", "2", 1)[0]}, "one dark frame at 2 s");
+  refused({"calibrate", "black", dark[0], "--add-to", file("missing.json")}, "missing.json");
+  refused({"calibrate", "noise", dark[0], dark[1], "--darks", dark[0], dark[1]}, "not brighter than the darks");
+  refused({"calibrate", "noise", dark[0], wide[0], "--darks", dark[0], dark[1]}, "no two flats make a pair");
+  refused({"calibrate", "quoted", "nosuch"}, "nosuch");
+  scratch_.write("future.json", R"({"format": "lowlux camera profile", "version": 9})");
+  refused({"calibrate", "black", dark[0], "--add-to", file("future.json")}, "version");
+}
+
+TEST_F(Calibrate, WrongCommandLinesAreSaid) {
+  const auto usage = [&](const Words& words, const std::string& why) {
+    const auto done = lowlux(words);
+    EXPECT_EQ(done.exit_code, 2) << why;
+    EXPECT_TRUE(holds(done.err, why)) << done.err;
+  };
+  usage({"calibrate"}, "what to calibrate is missing");
+  usage({"calibrate", "grey"}, "no kind 'grey'");
+  usage({"calibrate", "black", "-o", file("p.json")}, "FRAMES");
+  usage({"calibrate", "black", "a.dng"}, "--output");
+  usage({"calibrate", "black", "a.dng", "-o", file("p.json"), "--system-gain", "0"}, "above 0");
+  usage({"calibrate", "noise", "a.dng", "b.dng", "-o", file("p.json")}, "--darks");
+  usage({"calibrate", "black", "a.dng", "-o", file("p.json"), "--temperature", "999"}, "-200 to 200");
+  for (const char* kind : {"black", "noise", "quoted"}) {
+    const auto help = lowlux({"calibrate", kind, "--help"});
+    EXPECT_EQ(help.exit_code, 0);
+    EXPECT_TRUE(holds(help.out, "PROFILE.json"));
+  }
+  EXPECT_TRUE(holds(lowlux({"calibrate", "--help"}).out, "quoted"));
+}
+
+TEST_F(Calibrate, NothingIsOverwrittenWithoutForce) {
+  ASSERT_EQ(lowlux({"calibrate", "quoted", "thesis", "-o", file("p.json")}).exit_code, 0);
+  const std::string before = scratch_.read("p.json");
+  const auto again = lowlux({"calibrate", "quoted", "ELD_NikonD850", "-o", file("p.json")});
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_TRUE(holds(again.err, "--force"));
+  EXPECT_EQ(scratch_.read("p.json"), before);
+  EXPECT_EQ(lowlux({"calibrate", "quoted", "ELD_NikonD850", "-o", file("p.json"), "--force"}).exit_code, 0);
+  EXPECT_NE(scratch_.read("p.json"), before);
+}
+
+}  // namespace
+}  // namespace lowlux
