@@ -35,10 +35,7 @@ GainProfile gain_of(const isp::NamedSensor& named) {
 Result<CameraProfile> quoted_profile(std::string_view sensor) {
   CameraProfile out;
   for (const std::string_view setting : isp::gain_settings(sensor)) {
-    if (!isp::options_needed(sensor, setting).empty()) continue;
-    const auto named = isp::sensor_named(sensor, setting, {});
-    if (!named) return tl::make_unexpected(named.error());
-    out.gains.push_back(gain_of(*named));
+    if (const auto named = isp::sensor_named(sensor, setting, {})) out.gains.push_back(gain_of(*named));
   }
   if (!out.gains.empty()) return out;
   if (const auto known = isp::sensor_named(sensor, "", {}); !known) return tl::make_unexpected(known.error());

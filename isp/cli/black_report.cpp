@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/cli/estimate_text.h"
 #include "isp/cli/lines.h"
 
 namespace lowlux::cli {
@@ -15,11 +16,6 @@ namespace {
 
 constexpr const char* channels[] = {"red", "green", "blue"};
 constexpr const char* sites[] = {"site 00", "site 01", "site 10", "site 11"};
-
-std::string with_error(const Estimate& e) {
-  return e.standard_error > 0 ? fmt::format("{:.4g} +- {:.2g}", e.value, e.standard_error)
-                              : fmt::format("{:.4g}", e.value);
-}
 
 template <class Values, class Text>
 std::string joined(const Values& values, const Text& text) {
@@ -30,7 +26,7 @@ std::string joined(const Values& values, const Text& text) {
 
 void add_pedestal(const PerSite<Estimate>& level, Lines& out) {
   out.add("", "{}", joined(sites, [](const char* name) { return std::string(name); }));
-  out.add("black [DN]", "{}", joined(level, with_error));
+  out.add("black [DN]", "{}", joined(level, text_of));
 }
 
 isp::Table table_of(const GainProfile& gain) {
@@ -202,22 +198,22 @@ void show_dark_series(const calib::DarkSeries& series, std::span<const calib::Da
   for (const calib::DarkGroup& g : groups) frames += g.frames;
   out.add("darks", "{} frames of {} settings, {:.2g} % of the pixels left out", frames, groups.size(),
           100 * series.excluded_share);
-  out.add("system gain", "{} DN/e-, {}",
-          with_error({gain.sensor->system_gain_dn_per_e, gain.errors.system_gain_dn_per_e}), gain_source);
+  out.add("system gain", "{} DN/e-, {}", text_of({gain.sensor->system_gain_dn_per_e, gain.errors.system_gain_dn_per_e}),
+          gain_source);
   add_pedestal(series.pedestal_dn, out);
   out.add("", "{}", joined(channels, [](const char* name) { return std::string(name); }));
   for (const calib::DarkCurrent& c : series.currents) {
-    out.add("dark [e-/s]", "{}{}", joined(c.current_e_per_s, with_error),
+    out.add("dark [e-/s]", "{}{}", joined(c.current_e_per_s, text_of),
             c.temperature_c ? fmt::format("  at {:g} C", *c.temperature_c) : std::string());
   }
   if (series.chromaticity) {
-    out.add("black point", "{}  of the dark current", joined(*series.chromaticity, with_error));
+    out.add("black point", "{}  of the dark current", joined(*series.chromaticity, text_of));
   } else {
     out.add("black point", "the dark current is too small to tell its colour");
   }
-  if (series.law) out.add("doubling", "every {} C", with_error(series.law->doubling_c));
+  if (series.law) out.add("doubling", "every {} C", text_of(series.law->doubling_c));
   out.add("read noise", "{}",
-          series.read_noise_e ? with_error(*series.read_noise_e) + " e-"
+          series.read_noise_e ? text_of(*series.read_noise_e) + " e-"
                               : std::string("lost in quantisation and dark charge"));
   out.add("patterns", "DSNU {:.3g} of the dark current, row noise {:.3g} e-, column noise {:.3g} e-", series.dsnu,
           series.row_noise_e, series.column_noise_e);

@@ -10,6 +10,7 @@
 
 #include "calib/transfer_curve.h"
 #include "isp/cli/black_report.h"
+#include "isp/cli/estimate_text.h"
 #include "isp/cli/lines.h"
 
 namespace lowlux::cli {
@@ -19,10 +20,8 @@ constexpr const char* sites[] = {"site 00", "site 01", "site 10", "site 11"};
 
 using Pairs = std::span<const calib::PairStatistics>;
 
-std::string with_error(const Estimate& e) { return fmt::format("{:.5g} +- {:.2g}", e.value, e.standard_error); }
-
 std::string optional_text(const std::optional<Estimate>& e, const char* unit, const char* none) {
-  return e ? with_error(*e) + unit : std::string(none);
+  return e ? text_of(*e) + unit : std::string(none);
 }
 
 std::string saturation_text(const calib::PhotonTransfer& t) {
@@ -32,7 +31,7 @@ std::string saturation_text(const calib::PhotonTransfer& t) {
                : "not reached by the flats";
   }
   const bool well = t.saturation->limited_by == calib::Saturation::LimitedBy::full_well;
-  return fmt::format("{} e-, {}", with_error(t.saturation->charge_e),
+  return fmt::format("{} e-, {}", text_of(t.saturation->charge_e),
                      well ? "the pixels are full" : "the converter's range ends");
 }
 
@@ -40,7 +39,7 @@ std::string saturation_text(const calib::PhotonTransfer& t) {
 std::vector<std::pair<const char*, std::string>> figures_of(const calib::PhotonTransfer& t) {
   const auto& b = t.black_dn;
   return {
-      {"system gain", with_error(t.system_gain_dn_per_e) + " DN/e-"},
+      {"system gain", text_of(t.system_gain_dn_per_e) + " DN/e-"},
       {"of each site",
        fmt::format("{:.5g} {:.5g} {:.5g} {:.5g} DN/e-, reduced chi square {:.3g}", t.gain_of_site_dn_per_e[0].value,
                    t.gain_of_site_dn_per_e[1].value, t.gain_of_site_dn_per_e[2].value, t.gain_of_site_dn_per_e[3].value,

@@ -46,14 +46,30 @@ TEST(BlackFigures, OfOneFrameHaveTheErrorOfTheLaw) {
   ASSERT_TRUE(found) << found.error().message;
   // (d + sigma^2) / M of denoise.md 3.4: 0.066 e- here.
   const double law_error_dn = 2 * std::sqrt((200 + 16.0 + 1.0 / 48) / 50176);
+  // Its square is the sum of two variances, of 224 row and 224 column means, each with a relative error of sqrt(2 /
+  // 223).
+  const double error_of_error = std::sqrt(2 * 2.0 / 223) / 2;
   for (int site = 0; site < 4; ++site) {
     const Estimate& level = found->level_dn[site];
-    EXPECT_NEAR(level.standard_error, law_error_dn, 0.15 * law_error_dn) << site;  // of 448 row and column means
+    EXPECT_NEAR(level.standard_error, law_error_dn, 5 * error_of_error * law_error_dn) << site;
     EXPECT_NEAR(level.value, law_of_mean(bench.sensor, 1), 3.5 * law_error_dn) << site;
     EXPECT_NEAR(found->deviation_dn[site], 2 * std::sqrt(216), 0.5);
   }
   EXPECT_EQ(found->frames, 1);
   EXPECT_LT(found->excluded_share, 1e-4);
+}
+
+TEST(BlackFigures, OfADimDarkAreAsGood) {
+  SensorModel sensor = dark_200();
+  sensor.read_noise_e = 1.5;
+  sensor.dark_current_e_per_s = {2, 2, 2};
+  const SensorBench bench{.sensor = sensor, .width = 448, .height = 448};
+  const auto found = measure_black(bench.frame({1, 20}, 0));
+  ASSERT_TRUE(found) << found.error().message;
+  const double law_error_e = std::sqrt((2 + 2.25 + 1.0 / 48) / 50176);  // 0.009 e-
+  for (const Estimate& level : found->level_dn) {
+    EXPECT_NEAR((level.value - sensor.black_level_dn) / 2, 2, 3.5 * law_error_e);
+  }
 }
 
 TEST(BlackFigures, OverManySeedsHaveNoBiasBeyondAFifthOfTheirError) {

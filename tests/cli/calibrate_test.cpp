@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -35,13 +36,13 @@ class Calibrate : public testing::Test {
 
   /// Frames NAME_0000.dng..., 0.5 DN/e-, 2 e- of read noise, 20 e-/s of dark current at 20 C.
   Words shoot(const std::string& name, const std::string& scene, const std::string& time_s, int frames,
-              const Words& more = {}) {
+              const Words& more = {}, const std::string& size = "128x128") {
     Words words{"simulate",
                 scene,
                 "-o",
                 file(name + ".dng"),
                 "--size",
-                "128x128",
+                size,
                 "--sensor",
                 "ELD_NikonD850",
                 "--gain",
@@ -71,7 +72,7 @@ class Calibrate : public testing::Test {
     EXPECT_EQ(done.exit_code, 0) << done.err;
     Words out;
     for (int i = 0; i < frames; ++i) {
-      char text[8];
+      char text[16];
       std::snprintf(text, sizeof text, "_%04d", i);
       out.push_back(file(name + (frames == 1 ? "" : text) + ".dng"));
     }
@@ -140,7 +141,7 @@ TEST_F(Calibrate, NoiseFindsGainReadNoiseAndFullWell) {
   const Words darks = shoot("d", "dark", "0.001", 4);
   Words flats;
   int n = 0;
-  for (const char* luminance : {"2", "5", "10", "20", "30", "40", "300"}) {
+  for (const char* luminance : {"0.05", "0.1", "0.2", "0.4", "0.7", "1", "1.4", "20"}) {
     flats = joined(flats, shoot("f" + std::to_string(n++), "flat", "0.1", 2, {"--luminance", luminance}));
   }
   Words words = joined({"calibrate", "noise", "-o", file("p.json"), "--report", file("p.html"), "--json"}, flats);
@@ -191,7 +192,7 @@ TEST_F(Calibrate, MaskedPixelsOfAnOrdinaryFrameServe) {
 }
 
 TEST_F(Calibrate, DevelopTakesBlackNoiseAndHotPixelsFromTheProfile) {
-  const Words hot{"--hot-pixels", "0.002", "--hot-pixel-current", "2000", "--sensor-seed", "5"};
+  const Words hot{"--hot-pixels", "0.002", "--hot-current", "2000", "--sensor-seed", "5"};
   const Words darks = joined(shoot("a", "dark", "0.001", 4, hot), shoot("b", "dark", "2", 16, hot));
   ASSERT_EQ(lowlux(joined({"calibrate", "black", "-o", file("p.json"), "--system-gain", "0.5"}, darks)).exit_code, 0);
   ASSERT_GT(profile("p.json")["gains"][0]["hot_pixels"].size(), 20U);
@@ -213,7 +214,7 @@ TEST_F(Calibrate, DevelopTakesBlackNoiseAndHotPixelsFromTheProfile) {
 
 TEST_F(Calibrate, BadFramesAreOneErrorAndNoProfile) {
   const Words dark = shoot("d", "dark", "1", 2);
-  const Words wide = shoot("w", "dark", "1", 1, {"--size", "130x128"});
+  const Words wide = shoot("w", "dark", "1", 1, {}, "130x128");
   const std::string canon = std::string(LOWLUX_TESTDATA) + "/raws/canon_kissx4_ml_colorchart.dng";
   const auto refused = [&](Words words, const std::string& why) {
     words.insert(words.end(), {"-o", file("p.json")});
@@ -229,7 +230,8 @@ TEST_F(Calibrate, BadFramesAreOneErrorAndNoProfile) {
   refused({"calibrate", "black", dark[0], dark[1], shoot("e", "dark", "2", 1)[0]}, "one dark frame at 2 s");
   refused({"calibrate", "black", dark[0], "--add-to", file("missing.json")}, "missing.json");
   refused({"calibrate", "noise", dark[0], dark[1], "--darks", dark[0], dark[1]}, "not brighter than the darks");
-  refused({"calibrate", "noise", dark[0], wide[0], "--darks", dark[0], dark[1]}, "no two flats make a pair");
+  refused({"calibrate", "noise", dark[0], wide[0], "--darks", dark[0], dark[1]}, "130 x 128 pixels");
+  refused({"calibrate", "noise", dark[0], "--darks", dark[0], dark[1]}, "no two flats make a pair");
   refused({"calibrate", "quoted", "nosuch"}, "nosuch");
   scratch_.write("future.json", R"({"format": "lowlux camera profile", "version": 9})");
   refused({"calibrate", "black", dark[0], "--add-to", file("future.json")}, "version");
@@ -254,6 +256,18 @@ TEST_F(Calibrate, WrongCommandLinesAreSaid) {
     EXPECT_TRUE(holds(help.out, "PROFILE.json"));
   }
   EXPECT_TRUE(holds(lowlux({"calibrate", "--help"}).out, "quoted"));
+}
+
+TEST_F(Calibrate, ShippedProfilesAreWhatTheQuotedFiguresGive) {
+  int shipped = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(LOWLUX_PROFILES)) {
+    const std::string name = entry.path().stem();
+    const auto done = lowlux({"calibrate", "quoted", name, "-o", file("p.json"), "--force"});
+    ASSERT_EQ(done.exit_code, 0) << name << done.err;
+    EXPECT_EQ(scratch_.read("p.json"), test::read_file(entry.path())) << name << ": see scripts/make-profiles";
+    ++shipped;
+  }
+  EXPECT_GT(shipped, 10);
 }
 
 TEST_F(Calibrate, NothingIsOverwrittenWithoutForce) {

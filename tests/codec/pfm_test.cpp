@@ -69,6 +69,15 @@ TEST(Pfm, BothByteOrdersAndGreyAreRead) {
   }
 }
 
+TEST(Pfm, OnePlaneIsWrittenAsGrey) {
+  Plane<float> plane(1, 2);
+  plane.at(0, 0) = 0.25F;
+  plane.at(0, 1) = -0.5F;
+  const Plane<float>& map = plane;
+  const auto bytes = test::encoded([&](std::FILE* file) { return encode_pfm(map.view(), file); });
+  EXPECT_EQ(bytes, file_of("Pf\n1 2\n-1.0\n", {-0.5F, 0.25F}, false));
+}
+
 TEST(Pfm, HeadersThatLieAreRefused) {
   EXPECT_EQ(refused("").code, ErrorCode::malformed);
   EXPECT_EQ(refused("PF").code, ErrorCode::malformed);
