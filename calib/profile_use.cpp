@@ -24,6 +24,10 @@ Result<void> check_camera(const CameraProfile& profile, const FrameInfo& info) {
                                                        profile.make, profile.model, info.make, info.model));
 }
 
+int channel_of(const RawDn& frame, int site) {
+  return channel_of_site({.layout = frame.layout, .phase = frame.phase}, site);
+}
+
 /// By how much dark current differs from that at the profile's temperature.
 double temperature_factor(const GainProfile& gain, const FrameInfo& info, double charge_e,
                           std::vector<std::string>& warnings) {
@@ -65,11 +69,12 @@ void warn_of_exposure(const GainProfile& gain, double exposure_s, bool scaled, s
   }
 }
 
-/// Dark charge told apart from the pedestal, at the frame's exposure and temperature.
-Result<void> add_dark_charge(const GainProfile& gain, const RawDn& frame, ProfileAtFrame& out) {
+/// Dark charge at the frame's exposure and temperature, where the profile tells it apart from the pedestal.
+/// @return the standard errors of the charge
+Result<PerSite<double>> find_dark_charge(const GainProfile& gain, const RawDn& frame, ProfileAtFrame& out) {
   SensorModel& sensor = *out.sensor;
   const double fastest = *std::max_element(sensor.dark_current_e_per_s.begin(), sensor.dark_current_e_per_s.end());
-  if (fastest == 0) return {};
+  if (fastest == 0) return PerSite<double>{};
   if (!frame.info.exposure_s) {
     return fail(ErrorCode::insufficient,
                 "the frame does not state its exposure time, which the profile's dark current needs");
@@ -79,16 +84,26 @@ Result<void> add_dark_charge(const GainProfile& gain, const RawDn& frame, Profil
   if (fastest * factor * time_s > telling_charge_e) warn_of_exposure(gain, time_s, true, out.warnings);
   for (double& current : sensor.dark_current_e_per_s) current *= factor;
   if (frame.info.temperature_c) sensor.dark_temperature_c = *frame.info.temperature_c;
-  const FrameSetting setting{.layout = frame.layout, .phase = frame.phase};
+  PerSite<double> errors{};
   for (int site = 0; site < 4; ++site) {
-    const int k = channel_of_site(setting, site);
-    const double error_e = gain.errors.dark_current_e_per_s[k] * factor * time_s;
+    const int k = channel_of(frame, site);
     out.dark_mean_e[site] = sensor.dark_current_e_per_s[k] * time_s;
-    out.black.pedestal_dn[site] += sensor.system_gain_dn_per_e * out.dark_mean_e[site];
-    out.black.pedestal_standard_error_dn[site] =
-        std::hypot(out.black.pedestal_standard_error_dn[site], sensor.system_gain_dn_per_e * error_e);
+    errors[site] = gain.errors.dark_current_e_per_s[k] * factor * time_s;
   }
-  return {};
+  return errors;
+}
+
+void set_black(const GainProfile& gain, const PerSite<double>& dark_error_e, ProfileAtFrame& out) {
+  if (!gain.pedestal_dn) return;
+  BlackPoint& black = out.black.emplace();
+  black.source = BlackPoint::Source::profile;
+  black.holds = BlackPoint::Holds::pedestal_and_dark;
+  const double k = out.sensor ? out.sensor->system_gain_dn_per_e : 0;
+  for (int site = 0; site < 4; ++site) {
+    const Estimate& pedestal = (*gain.pedestal_dn)[site];
+    black.pedestal_dn[site] = pedestal.value + k * out.dark_mean_e[site];
+    black.pedestal_standard_error_dn[site] = std::hypot(pedestal.standard_error, k * dark_error_e[site]);
+  }
 }
 
 double dark_variance_dn2(const SensorModel& s, double dark_mean_e) {
@@ -96,17 +111,21 @@ double dark_variance_dn2(const SensorModel& s, double dark_mean_e) {
   return k * k * (s.read_noise_e * s.read_noise_e + dark_mean_e) + quantisation_dn2;
 }
 
+double black_of(const RawDn& frame, int site, const ProfileAtFrame& out) {
+  if (out.black) return out.black->pedestal_dn[site];
+  return frame.black_tag ? frame.black_tag->at(site & 1, site >> 1) : out.sensor->black_level_dn;
+}
+
 /// A sensor without filters has one figure for the three channels.
 void add_noise(const RawDn& frame, ProfileAtFrame& out) {
   const SensorModel& sensor = *out.sensor;
-  const FrameSetting setting{.layout = frame.layout, .phase = frame.phase};
   NoiseProfile sum;
   std::array<double, 3> sites{};
   for (int site = 0; site < 4; ++site) {
-    const int k = channel_of_site(setting, site);
-    const double range_dn = frame.white_dn[k] - out.black.pedestal_dn[site];
+    const int k = channel_of(frame, site);
+    const double range_dn = frame.white_dn[k] - black_of(frame, site, out);
     const double variance = dark_variance_dn2(sensor, out.dark_mean_e[site]);
-    out.black.noise_std_dn[site] = std::sqrt(variance);
+    if (out.black) out.black->noise_std_dn[site] = std::sqrt(variance);
     if (!(range_dn > 0)) return;  // choose_black refuses such a frame
     sum.scale[k] += sensor.system_gain_dn_per_e / range_dn;
     sum.offset[k] += variance / (range_dn * range_dn);
@@ -146,20 +165,15 @@ Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& fra
   ProfileAtFrame out;
   if (!found->warning.empty()) out.warnings.push_back(found->warning);
   out.sensor = gain.sensor;
-  out.black.source = BlackPoint::Source::profile;
-  out.black.holds = BlackPoint::Holds::pedestal_and_dark;
-  if (!gain.pedestal_dn) {
-    return fail(ErrorCode::insufficient, "the profile holds no black level; add one with `calibrate black --add-to`");
-  }
-  for (int site = 0; site < 4; ++site) {
-    out.black.pedestal_dn[site] = (*gain.pedestal_dn)[site].value;
-    out.black.pedestal_standard_error_dn[site] = (*gain.pedestal_dn)[site].standard_error;
-  }
+  PerSite<double> dark_error_e{};
   if (gain.pedestal_holds == BlackPoint::Holds::pedestal_and_dark) {
     if (frame.info.exposure_s) warn_of_exposure(gain, *frame.info.exposure_s, false, out.warnings);
   } else if (gain.sensor) {
-    if (const auto added = add_dark_charge(gain, frame, out); !added) return tl::make_unexpected(added.error());
+    const auto errors = find_dark_charge(gain, frame, out);
+    if (!errors) return tl::make_unexpected(errors.error());
+    dark_error_e = *errors;
   }
+  set_black(gain, dark_error_e, out);
   if (!out.sensor) return out;
   add_noise(frame, out);
   list_hot_pixels(gain, frame, out);

@@ -12,9 +12,10 @@ namespace lowlux::calib {
 
 /// What a camera's profile says about one frame.
 struct ProfileAtFrame {
-  BlackPoint black;                    // at the frame's gain, exposure and temperature; the dark charge is in it
+  std::optional<BlackPoint> black;     // at the frame's gain, exposure and temperature; the dark charge is in it.
+                                       // Absent if the profile knows none: then the frame's own holds
   std::optional<SensorModel> sensor;   // at the frame's gain and temperature; absent if the gain is unknown
-  PerSite<double> dark_mean_e{};       // that the black point holds; 0 if unknown
+  PerSite<double> dark_mean_e{};       // of the frame; 0 if unknown
   std::optional<NoiseProfile> noise;   // of the sensor, dark charge's noise included
   std::vector<DefectRect> hot_pixels;  // those whose excess charge is above 6 standard deviations in this frame
   std::vector<std::string> warnings;   // what was extrapolated or assumed

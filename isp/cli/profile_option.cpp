@@ -22,18 +22,23 @@ void use_colours(const CameraProfile& profile, RawFrame& frame) {
 
 }  // namespace
 
-Result<void> use_profile(const CameraProfile& profile, bool colour, RawFrame& frame, isp::BlackRequest& black) {
+Result<void> use_profile(const CameraProfile& profile, bool everything, RawFrame& frame, isp::BlackRequest& black) {
   auto found = calib::profile_at(profile, frame.raw);
   if (!found) return tl::make_unexpected(found.error());
-  if (black.choice == isp::BlackChoice::automatic) {
+  if (!found->black && !everything) {
+    return fail(ErrorCode::insufficient,
+                "the profile holds no black level: add one with `calibrate black --add-to`, or use what else it holds "
+                "with --profile");
+  }
+  if (found->black && black.choice == isp::BlackChoice::automatic) {
     black.choice = isp::BlackChoice::measured;
-    black.measured = found->black;
+    black.measured = *found->black;
   }
   if (found->noise) frame.noise = found->noise;
   auto& defects = frame.corrections.defects;
   defects.insert(defects.end(), found->hot_pixels.begin(), found->hot_pixels.end());
   frame.warnings.insert(frame.warnings.end(), found->warnings.begin(), found->warnings.end());
-  if (colour) use_colours(profile, frame);
+  if (everything) use_colours(profile, frame);
   return {};
 }
 

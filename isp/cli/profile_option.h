@@ -8,8 +8,9 @@
 namespace lowlux::cli {
 
 /// Puts what a camera's profile says of a frame into the frame, in place of what its file says: noise, hot pixels to be
-/// repaired, warnings, and with `colour` the profile's matrices if it holds any. The black point goes into `black`
-/// unless that asks for another. Errors: those of calib::profile_at.
-Result<void> use_profile(const CameraProfile& profile, bool colour, RawFrame& frame, isp::BlackRequest& black);
+/// repaired, warnings, and with `everything` the profile's matrices if it holds any. The black point goes into `black`
+/// unless that asks for another.
+/// Errors: those of calib::profile_at; without `everything` a profile that knows no black level.
+Result<void> use_profile(const CameraProfile& profile, bool everything, RawFrame& frame, isp::BlackRequest& black);
 
 }  // namespace lowlux::cli

@@ -79,8 +79,8 @@ DevelopOutcome develop_file(const Task& task, const Job& job, Executor& executor
   }
   isp::DevelopOptions options = task.options;
   if (task.profile) {
-    const bool colour = !task.args.profile.empty();
-    if (const auto used = use_profile(*task.profile, colour, *frame, options.black); !used) {
+    const bool everything = !task.args.profile.empty();
+    if (const auto used = use_profile(*task.profile, everything, *frame, options.black); !used) {
       out.error = with_place(used.error(), job.input);
       return out;
     }

@@ -60,12 +60,12 @@ TEST(ProfileUse, AddsDarkChargeOfTheExposureAndTemperature) {
   const PerSite<double> charge{40, 20, 60, 40};
   for (int site = 0; site < 4; ++site) {
     EXPECT_NEAR(found->dark_mean_e[site], charge[site], 1e-12);
-    EXPECT_NEAR(found->black.pedestal_dn[site], 500 + site + charge[site], 1e-12);
-    EXPECT_NEAR(found->black.pedestal_standard_error_dn[site], std::hypot(0.3, 0.1 * 2 * 5), 1e-12);
-    EXPECT_NEAR(found->black.noise_std_dn[site], std::sqrt(16 + charge[site] + 1.0 / 12), 1e-12);
+    EXPECT_NEAR(found->black->pedestal_dn[site], 500 + site + charge[site], 1e-12);
+    EXPECT_NEAR(found->black->pedestal_standard_error_dn[site], std::hypot(0.3, 0.1 * 2 * 5), 1e-12);
+    EXPECT_NEAR(found->black->noise_std_dn[site], std::sqrt(16 + charge[site] + 1.0 / 12), 1e-12);
   }
-  EXPECT_EQ(found->black.holds, BlackPoint::Holds::pedestal_and_dark);
-  EXPECT_EQ(found->black.source, BlackPoint::Source::profile);
+  EXPECT_EQ(found->black->holds, BlackPoint::Holds::pedestal_and_dark);
+  EXPECT_EQ(found->black->source, BlackPoint::Source::profile);
   EXPECT_NEAR(found->sensor->dark_current_e_per_s[2], 12, 1e-12);
 }
 
@@ -85,7 +85,7 @@ TEST(ProfileUse, BetweenTwoGainsLinesAreStraightInLogarithms) {
   EXPECT_TRUE(found->warnings.empty());
   EXPECT_NEAR(found->sensor->system_gain_dn_per_e, 2, 1e-12);
   EXPECT_NEAR(found->sensor->read_noise_e, std::sqrt(8.0), 1e-12);
-  EXPECT_NEAR(found->black.pedestal_dn[0], 508, 1e-9);
+  EXPECT_NEAR(found->black->pedestal_dn[0], 508, 1e-9);
 }
 
 TEST(ProfileUse, BeyondTheGainsTheIsoCountsAndItSaysSo) {
@@ -125,7 +125,7 @@ TEST(ProfileUse, APedestalThatHoldsDarkIsNotScaled) {
   const auto same = profile_at(profile, frame(100, 2, 20));
   ASSERT_TRUE(same);
   EXPECT_TRUE(same->warnings.empty());
-  EXPECT_EQ(same->black.pedestal_dn[3], 503);
+  EXPECT_EQ(same->black->pedestal_dn[3], 503);
   EXPECT_EQ(profile_at(profile, frame(100, 4, 20))->warnings.size(), 1U);
   EXPECT_EQ(profile_at(profile, frame(100, 1, 20))->warnings.size(), 1U);
   EXPECT_TRUE(profile_at(profile, frame(100, std::nullopt, 20)));
@@ -139,7 +139,7 @@ TEST(ProfileUse, WithoutAKnownGainThereIsABlackPointAlone) {
   ASSERT_TRUE(found);
   EXPECT_FALSE(found->sensor);
   EXPECT_FALSE(found->noise);
-  EXPECT_EQ(found->black.pedestal_dn[0], 500);
+  EXPECT_EQ(found->black->pedestal_dn[0], 500);
   EXPECT_TRUE(found->hot_pixels.empty());
 }
 
@@ -168,7 +168,13 @@ TEST(ProfileUse, RefusesWhatItCannotTell) {
   EXPECT_NE(message(two_gains(), other).find("demosaiced"), std::string::npos);
   CameraProfile unmeasured = two_gains();
   unmeasured.gains[0].pedestal_dn.reset();
-  EXPECT_NE(message(unmeasured, frame(100, 1, 20)).find("no black level"), std::string::npos);
+  const auto noise_only = profile_at(unmeasured, frame(100, 1, 20));
+  ASSERT_TRUE(noise_only && noise_only->noise);
+  EXPECT_FALSE(noise_only->black);
+  EXPECT_NEAR(noise_only->noise->scale[0], 1.0 / (16383 - 500), 1e-15);
+  RawDn tagged = frame(100, 1, 20);
+  tagged.black_tag = BlackLevel{.pattern_dn = {383}};
+  EXPECT_NEAR(profile_at(unmeasured, tagged)->noise->scale[0], 1.0 / 16000, 1e-15);
   CameraProfile one = two_gains();
   one.gains.pop_back();
   const auto only = profile_at(one, frame(std::nullopt, 1, 20));

@@ -270,6 +270,17 @@ TEST_F(Calibrate, ShippedProfilesAreWhatTheQuotedFiguresGive) {
   EXPECT_GT(shipped, 10);
 }
 
+TEST_F(Calibrate, AProfileWithoutBlackGivesItsNoise) {
+  ASSERT_EQ(lowlux({"calibrate", "quoted", "ELD_NikonD850", "-o", file("p.json")}).exit_code, 0);
+  const std::string night = shoot("n", "flat", "0.1", 1)[0];
+  const auto refused = lowlux({"develop", night, "-o", file("n.png"), "--black", file("p.json")});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_TRUE(holds(refused.err, "no black level") && holds(refused.err, "--profile")) << refused.err;
+  const auto used = lowlux({"develop", night, "-o", file("n.png"), "--profile", file("p.json"), "--json"});
+  ASSERT_EQ(used.exit_code, 0) << used.err;
+  EXPECT_NE(Json::parse(used.out)[0]["black"]["source"], "profile");
+}
+
 TEST_F(Calibrate, NothingIsOverwrittenWithoutForce) {
   ASSERT_EQ(lowlux({"calibrate", "quoted", "thesis", "-o", file("p.json")}).exit_code, 0);
   const std::string before = scratch_.read("p.json");
