@@ -23,6 +23,7 @@ struct Verb {
 };
 
 constexpr std::array verbs{
+    Verb{"calibrate", "a camera's profile from frames made for it", run_calibrate},
     Verb{"develop", "raw files to pictures", run_develop},
     Verb{"info", "what a raw file says, and what was measured on it", run_info},
     Verb{"reproduce", "the published experiments, each finding beside ours", run_reproduce},
