@@ -37,27 +37,6 @@ Result<Spectrum> finely_sampled(const Spectrum& light) {
   return resample(light, nodes);
 }
 
-Result<Spectrum> light_of(const std::string& name, const char* option) {
-  if (names_table(name)) {
-    auto table = capture::read_spectra(name);
-    if (!table) return tl::make_unexpected(table.error());
-    if (table->size() != 1) {
-      return fail(ErrorCode::malformed, fmt::format("a light is one spectrum, the table has {}", table->size()), name);
-    }
-    const auto power = table->front().spectrum.values();
-    if (*std::min_element(power.begin(), power.end()) < 0) {
-      return fail(ErrorCode::malformed, "a light has no negative power", name);
-    }
-    return finely_sampled(table->front().spectrum);
-  }
-  if (auto light = isp::light_named(name)) return *std::move(light);
-  const auto near = near_matches(name, isp::light_names());
-  return fail(ErrorCode::invalid_argument,
-              fmt::format("there is no light '{}'; {}", name,
-                          near.empty() ? "--list names them" : fmt::format("near it: {}", fmt::join(near, ", "))),
-              option);
-}
-
 Result<capture::SceneSetup> setup_of(const SceneArgs& args) {
   auto light = light_of(args.light, "--light");
   if (!light) return tl::make_unexpected(light.error());
@@ -136,6 +115,28 @@ Result<SceneOfArgs> extended_scene(const SceneArgs& args, Executor& executor) {
 }
 
 }  // namespace
+
+Result<Spectrum> light_of(const std::string& name, const std::string& option) {
+  if (names_table(name)) {
+    auto table = capture::read_spectra(name);
+    if (!table) return tl::make_unexpected(table.error());
+    if (table->size() != 1) {
+      return fail(ErrorCode::malformed, fmt::format("a light is one spectrum, the table has {}", table->size()), name);
+    }
+    const auto power = table->front().spectrum.values();
+    if (*std::min_element(power.begin(), power.end()) < 0) {
+      return fail(ErrorCode::malformed, "a light has no negative power", name);
+    }
+    return finely_sampled(table->front().spectrum);
+  }
+  if (auto light = isp::light_named(name)) return *std::move(light);
+  const auto near = near_matches(name, isp::light_names());
+  return fail(ErrorCode::invalid_argument,
+              fmt::format("there is no light '{}'; {}", name,
+                          near.empty() ? "`lowlux simulate --list` names them"
+                                       : fmt::format("near it: {}", fmt::join(near, ", "))),
+              option);
+}
 
 Result<SceneOfArgs> scene_of(const SceneArgs& args, std::uint64_t seed, Executor& executor) {
   auto out = extended_scene(args, executor);

@@ -7,6 +7,7 @@
 #include "capture/synthetic/scene.h"
 #include "isp/base/executor.h"
 #include "isp/base/result.h"
+#include "isp/base/spectrum.h"
 #include "isp/cli/simulate_args.h"
 
 namespace lowlux::cli {
@@ -23,5 +24,9 @@ struct SceneOfArgs {
 /// are offered), a chart's reflectance above 2 (a table in percent), a scene that cannot be; a size or a light for a
 /// picture, which has its own.
 Result<SceneOfArgs> scene_of(const SceneArgs& args, std::uint64_t seed, Executor& executor);
+
+/// A light by name, or from a table's file (.csv) with one spectrum, sampled as scene_of says. Errors, with the option:
+/// those of lights in scene_of.
+Result<Spectrum> light_of(const std::string& name, const std::string& option);
 
 }  // namespace lowlux::cli

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "calib/quoted_profile.h"
+#include "isp/cli/calibrate_colour.h"
 #include "isp/cli/calibration.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/report.h"
@@ -21,6 +22,7 @@ struct Kind {
 
 constexpr std::array kinds{
     Kind{"black", "pedestal, dark current and hot pixels from dark frames, or from masked pixels", run_calibrate_black},
+    Kind{"colour", "colour matrices from a photographed chart or spectral sensitivities", run_calibrate_colour},
     Kind{"noise", "gain, read noise, full well from flats, or noise from one picture", run_calibrate_noise},
     Kind{"quoted", "the profile of a sensor whose figures are published", run_calibrate_quoted},
 };

@@ -1,0 +1,124 @@
+#include "isp/cli/calibrate_colour.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/base/executor.h"
+#include "isp/cli/calibrate_colour_args.h"
+#include "isp/cli/calibrate_colour_report.h"
+#include "isp/cli/calibrate_colour_work.h"
+#include "isp/cli/exit_code.h"
+#include "isp/cli/profile_file.h"
+#include "isp/cli/report.h"
+#include "isp/cli/version.h"
+#include "isp/output/image_writer.h"
+
+namespace lowlux::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What would keep a file from being written is known before any work is done.
+Result<void> check_places(const CalibrateColourArgs& args) {
+  for (const std::string& file : {args.output, args.report, args.overlay}) {
+    if (file.empty()) continue;
+    std::error_code ignored;
+    const fs::path folder = fs::path(file).parent_path();
+    if (!folder.empty() && !fs::is_directory(folder, ignored)) {
+      return fail(ErrorCode::unwritable,
+                  fmt::format("cannot write {}: there is no directory {}, create it first", file, folder.string()),
+                  file);
+    }
+    if (fs::is_directory(file, ignored)) {
+      return fail(ErrorCode::unwritable, fmt::format("cannot write {}: it is a directory", file), file);
+    }
+    if (!args.force && fs::exists(file, ignored)) {
+      return fail(ErrorCode::exists, fmt::format("{} exists: use --force to overwrite it", file), file);
+    }
+  }
+  return {};
+}
+
+/// A profile with the new colours: they replace those under the same illuminant.
+Result<CameraProfile> profile_of(const CalibrateColourArgs& args, const ColourOutcome& outcome) {
+  CameraProfile profile{outcome.make, outcome.model, {}, {}};
+  if (!args.add_to.empty()) {
+    auto before = read_profile(args.add_to);
+    if (!before) return before;
+    const bool same = outcome.make.empty() || (before->make == outcome.make && before->model == outcome.model);
+    if (!same) {
+      return fail(ErrorCode::invalid_argument,
+                  fmt::format("the profile is of {} {}, the chart was taken by {} {}", before->make, before->model,
+                              outcome.make, outcome.model),
+                  args.add_to);
+    }
+    profile = *std::move(before);
+  }
+  std::erase_if(profile.colours,
+                [&](const ColourProfile& colour) { return colour.illuminant == outcome.colour.illuminant; });
+  profile.colours.push_back(outcome.colour);
+  std::stable_sort(profile.colours.begin(), profile.colours.end(),
+                   [](const auto& a, const auto& b) { return a.calibration.cct_k < b.calibration.cct_k; });
+  return profile;
+}
+
+Result<void> write_files(const CalibrateColourArgs& args, const ColourOutcome& outcome, Executor& executor) {
+  const auto profile = profile_of(args, outcome);
+  if (!profile) return tl::make_unexpected(profile.error());
+  const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
+  if (!args.overlay.empty() && outcome.chart) {
+    isp::WriteOptions write;
+    write.overwrite = overwrite;
+    write.software = "lowlux " + version_number();
+    auto written =
+        isp::write_picture(colour_overlay(*outcome.chart), OutputSpace::srgb, {}, args.overlay, write, executor);
+    if (!written) return written;
+  }
+  if (!args.report.empty()) {
+    auto written = isp::write_text(args.report, isp::html_of(colour_report(outcome)), overwrite);
+    if (!written) return written;
+  }
+  return write_profile(args.output, *profile, overwrite);
+}
+
+Result<ColourOutcome> calibrated(const CalibrateColourArgs& args, Executor& executor) {
+  if (auto free = check_places(args); !free) return tl::make_unexpected(free.error());
+  auto outcome = args.chart.empty() ? colour_from_spectra(args) : colour_from_chart(args, executor);
+  if (!outcome) return outcome;
+  if (auto written = write_files(args, *outcome, executor); !written) return tl::make_unexpected(written.error());
+  return outcome;
+}
+
+}  // namespace
+
+int run_calibrate_colour(const std::vector<std::string>& words) {
+  const Parsed<CalibrateColourArgs> parsed = parse_calibrate_colour(words);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& args = std::get<CalibrateColourArgs>(parsed);
+  PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));
+  const auto outcome = calibrated(args, executor);
+  if (!outcome) {
+    const std::string& input = args.chart.empty() ? args.camera : args.chart;
+    const std::string& where = outcome.error().where;
+    fmt::print(stderr, "{}\n", error_line(where.empty() ? input : where, outcome.error()));
+    if (args.json) fmt::print("{}\n", error_json(input, outcome.error()));
+    return exit_failed;
+  }
+  for (const std::string& warning : outcome->warnings) {
+    fmt::print(stderr, "{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome->input, warning)));
+  }
+  if (args.json) {
+    fmt::print("{}\n", colour_json(*outcome, args.output));
+  } else {
+    fmt::print("{}", colour_text(*outcome));
+  }
+  return exit_done;
+}
+
+}  // namespace lowlux::cli
