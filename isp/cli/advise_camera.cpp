@@ -27,6 +27,19 @@ std::string cure_of(const std::vector<std::string_view>& near) {
   return fmt::format("near it: {}", fmt::join(near, ", "));
 }
 
+void add_note(std::vector<std::string>& notes, std::string note) {
+  if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(std::move(note));
+}
+
+/// What of a sensor the advice does not know.
+void note_unknown(const isp::GainSetting& gain, std::vector<std::string>& notes) {
+  const double noise_e = std::hypot(gain.sensor.row_noise_e, gain.sensor.column_noise_e);
+  if (noise_e > 0) {
+    add_note(notes,
+             fmt::format("row and column noise of {:.2g} e- at {} are not in the prediction", noise_e, gain.name));
+  }
+}
+
 Result<Spectrum> light_of(const std::string& name) {
   if (auto light = isp::light_named(name)) return *std::move(light);
   return fail(ErrorCode::invalid_argument,
@@ -72,10 +85,6 @@ bool has_figures(const isp::SensorFigures& f) {
          f.pixel_pitch_um || f.peak_quantum_efficiency;
 }
 
-void add_note(std::vector<std::string>& notes, std::string note) {
-  if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(std::move(note));
-}
-
 /// Gains that lack a figure are left out and named; if all do, the first one's error is the answer.
 Result<void> take_named(const AdviseArgs& args, const Spectrum& light, const isp::Optics& optics, AdviceCase& out) {
   const auto radiance = isp::radiance_of(light, 1);
@@ -99,6 +108,7 @@ Result<void> take_named(const AdviseArgs& args, const Spectrum& light, const isp
     camera = sensor->camera;
     const std::string& name = sensor->gain_setting.empty() ? args.sensor : sensor->gain_setting;
     out.request.gains.push_back({name, sensor->model, isp::electron_rate(*response, *radiance)});
+    note_unknown(out.request.gains.back(), out.notes);
   }
   if (out.request.gains.empty()) return tl::make_unexpected(*first_error);
   const auto matrix = matrix_of(camera, light);
@@ -120,6 +130,7 @@ Result<CameraColour> colour_of(const CameraProfile& profile, const std::string& 
     return fail(ErrorCode::insufficient,
                 fmt::format("the profile has no colours for {}; give --illuminant one of {}", light, names));
   }
+  colour.calibrations.reserve(profile.colours.size());
   for (const ColourProfile& c : profile.colours) colour.calibrations.push_back(c.calibration);
   std::ranges::sort(colour.calibrations, {}, &ColourCalibration::cct_k);
   return colour;
@@ -182,6 +193,7 @@ Result<void> take_profile(const AdviseArgs& args, const Spectrum& light, const i
     Vector3 rate{};
     for (int k = 0; k < 3; ++k) rate[k] = colour->neutral[k] * wall_e / *saturation_cd_m2;
     out.request.gains.push_back({gain.gain_setting, *gain.sensor, rate});
+    note_unknown(out.request.gains.back(), out.notes);
   }
   if (out.request.gains.empty()) {
     return fail(ErrorCode::insufficient,

@@ -51,6 +51,7 @@ const std::vector<std::string> columns{"gain",      "exposure [s]",          "SN
 isp::Table gains_table(const AdviceCase& asked, const isp::ExposureAdvice& advice) {
   isp::Table table{columns, {}};
   table.columns.emplace_back("largest noise");
+  table.rows.reserve(advice.gains.size());
   for (const isp::GainAdvice& gain : advice.gains) {
     std::vector<std::string> row = cells_of(gain.at);
     row.insert(row.begin(), asked.request.gains[gain.at.gain].name);
@@ -64,6 +65,7 @@ isp::Table gains_table(const AdviceCase& asked, const isp::ExposureAdvice& advic
 isp::Table curve_table(const AdviceCase& asked, const isp::ExposureAdvice& advice) {
   isp::Table table{columns, {}};
   table.columns.back() = "exceeds";
+  table.rows.reserve(advice.curve.size());
   for (const isp::AdvicePoint& point : advice.curve) {
     std::vector<std::string> row = cells_of(point);
     row.insert(row.begin(), asked.request.gains[point.gain].name);
@@ -76,6 +78,7 @@ isp::Table curve_table(const AdviceCase& asked, const isp::ExposureAdvice& advic
 /// Columns as wide as their widest cell.
 std::string text_of(const isp::Table& table) {
   std::vector<std::size_t> widths;
+  widths.reserve(table.columns.size());
   for (const std::string& column : table.columns) widths.push_back(column.size());
   for (const auto& row : table.rows) {
     for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
@@ -144,6 +147,7 @@ isp::Plot plot_of(const AdviceCase& asked, const isp::ExposureAdvice& advice, bo
     if (!p.midtone) return nan;
     return chromaticity ? p.midtone->uv_std : isp::decibel(p.midtone->snr);
   };
+  plot.series.reserve(2 * advice.gains.size() + 1);
   for (std::size_t gain = 0; gain < advice.gains.size(); ++gain) {
     isp::Series allowed{asked.request.gains[gain].name, {}, {}, isp::Mark::line};
     isp::Series beyond{asked.request.gains[gain].name + ", highlight clipped", {}, {}, isp::Mark::dashed};

@@ -81,6 +81,7 @@ TEST_F(Advise, SaysGainExposureAndWhyAndDrawsTheCurveAsATable) {
   EXPECT_TRUE(holds(result.out, "advice            ISO 6400, 0.05 s: SNR 12.8 dB")) << result.out;
   EXPECT_TRUE(holds(result.out, "because         motion limits the exposure to 0.05 s")) << result.out;
   EXPECT_TRUE(holds(result.out, "mid tone 0.05 cd/m2, highlight 1 cd/m2, at most 0.05 s, 20 C")) << result.out;
+  EXPECT_TRUE(holds(result.out, "row and column noise of")) << result.out;
   EXPECT_GT(std::count(result.out.begin(), result.out.end(), '\n'), 100);
 }
 
