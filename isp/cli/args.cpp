@@ -147,9 +147,13 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
 Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
   CLI::App app("Prints what raw files say, and what was measured on them.", "lowlux info");
   InfoArgs args;
-  app.add_option("RAW", args.inputs, "raw files")->required();
+  app.add_option("RAW", args.inputs, "raw files; with --advise one or none");
   app.add_flag("--json", args.json, "JSON instead of text");
-  return parse(app, words, args);
+  add_advise(app, args.advise);
+  if (const auto code = parse_words(app, words)) return *code;
+  const std::string wrong = wrong_advise(args.advise, args.inputs.size());
+  if (!wrong.empty()) return refuse(app, wrong);
+  return args;
 }
 
 Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words) {

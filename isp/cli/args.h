@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "isp/cli/advise_args.h"
 #include "isp/pipeline/plan.h"
 
 namespace lowlux::cli {
@@ -31,8 +32,9 @@ struct DevelopArgs {
 };
 
 struct InfoArgs {
-  std::vector<std::string> inputs;
+  std::vector<std::string> inputs;  // may be empty with advice
   bool json = false;
+  AdviseArgs advise;
 };
 
 struct ReproduceArgs {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "capture/file/dng_source.h"
+#include "isp/cli/advise.h"
 #include "isp/cli/args.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/report.h"
@@ -14,6 +15,7 @@ int run_info(const std::vector<std::string>& words) {
   const Parsed<InfoArgs> parsed = parse_info(words);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<InfoArgs>(parsed);
+  if (args.advise.wanted) return run_advise(args);
 
   int code = exit_done;
   std::string json;

@@ -1,0 +1,56 @@
+#include "isp/cli/advise.h"
+
+#include <cstdio>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "capture/file/dng_source.h"
+#include "isp/cli/advise_camera.h"
+#include "isp/cli/advise_report.h"
+#include "isp/cli/exit_code.h"
+#include "isp/cli/report.h"
+#include "isp/output/report.h"
+
+namespace lowlux::cli {
+namespace {
+
+int failed(const std::string& file, const Error& error) {
+  if (error.code == ErrorCode::invalid_argument) {
+    fmt::print(stderr, "{}\n",
+               one_line("lowlux info: " + error.message + (error.where.empty() ? "" : " (" + error.where + ")")));
+    return exit_usage;
+  }
+  fmt::print(stderr, "{}\n", error_line(file, error));
+  return exit_failed;
+}
+
+}  // namespace
+
+int run_advise(const InfoArgs& args) {
+  const std::string subject = args.inputs.empty() ? args.advise.sensor : args.inputs.front();
+  std::optional<RawFrame> frame;
+  if (!args.inputs.empty()) {
+    auto read = capture::read_raw(args.inputs.front());
+    if (!read) return failed(subject, read.error());
+    frame = *std::move(read);
+  }
+  const auto asked = advice_case(args.advise, frame ? &*frame : nullptr);
+  if (!asked) return failed(subject, asked.error());
+  const auto advice = isp::advise_exposure(asked->request);
+  if (!advice) return failed(subject, advice.error());
+  if (!args.advise.report.empty()) {
+    const auto overwrite = args.advise.force ? isp::Overwrite::yes : isp::Overwrite::no;
+    const auto written = isp::write_text(args.advise.report, isp::html_of(advice_page(*asked, *advice)), overwrite);
+    if (!written) return failed(args.advise.report, written.error());
+  }
+  if (args.json) {
+    fmt::print("{}\n", advice_json(*asked, *advice));
+  } else {
+    fmt::print("{}", advice_text(*asked, *advice));
+  }
+  return exit_done;
+}
+
+}  // namespace lowlux::cli
