@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
-#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -14,6 +12,7 @@
 #include "isp/cli/calibrate_colour_report.h"
 #include "isp/cli/calibrate_colour_work.h"
 #include "isp/cli/exit_code.h"
+#include "isp/cli/output_place.h"
 #include "isp/cli/profile_file.h"
 #include "isp/cli/report.h"
 #include "isp/cli/version.h"
@@ -22,25 +21,10 @@
 namespace lowlux::cli {
 namespace {
 
-namespace fs = std::filesystem;
-
-/// What would keep a file from being written is known before any work is done.
 Result<void> check_places(const CalibrateColourArgs& args) {
   for (const std::string& file : {args.output, args.report, args.overlay}) {
     if (file.empty()) continue;
-    std::error_code ignored;
-    const fs::path folder = fs::path(file).parent_path();
-    if (!folder.empty() && !fs::is_directory(folder, ignored)) {
-      return fail(ErrorCode::unwritable,
-                  fmt::format("cannot write {}: there is no directory {}, create it first", file, folder.string()),
-                  file);
-    }
-    if (fs::is_directory(file, ignored)) {
-      return fail(ErrorCode::unwritable, fmt::format("cannot write {}: it is a directory", file), file);
-    }
-    if (!args.force && fs::exists(file, ignored)) {
-      return fail(ErrorCode::exists, fmt::format("{} exists: use --force to overwrite it", file), file);
-    }
+    if (auto place = check_place(file, args.force); !place) return place;
   }
   return {};
 }

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <system_error>
 #include <utility>
 
 #include <fmt/chrono.h>
@@ -13,22 +12,13 @@
 #include "calib/profile_io.h"
 #include "capture/file/dng_source.h"
 #include "isp/cli/exit_code.h"
+#include "isp/cli/output_place.h"
 #include "isp/cli/profile_file.h"
 #include "isp/cli/report.h"
 #include "isp/cli/version.h"
 
 namespace lowlux::cli {
 namespace {
-
-Result<void> check_place(const std::string& file, bool force) {
-  std::error_code ignored;
-  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
-  if (!folder.empty() && !std::filesystem::is_directory(folder, ignored)) {
-    return fail(ErrorCode::unwritable, "the folder does not exist", file);
-  }
-  if (force || !std::filesystem::exists(file, ignored)) return {};
-  return fail(ErrorCode::exists, "the file exists: use --force to overwrite it", file);
-}
 
 Error with_file(Error error, const std::string& file) {
   if (error.where.empty()) error.where = file;

@@ -10,6 +10,7 @@
 
 #include "isp/base/executor.h"
 #include "isp/cli/exit_code.h"
+#include "isp/cli/output_place.h"
 #include "isp/cli/progress.h"
 #include "isp/cli/report.h"
 #include "isp/cli/scene_argument.h"
@@ -82,35 +83,18 @@ std::string wrong_files(const SimulateArgs& args) {
   return {};
 }
 
-/// What would keep a file from being written is known before any work is done, so that a run leaves all of its files or
-/// none; the writers look again.
-Result<void> check_place(const std::string& file) {
-  std::error_code ignored;
-  const fs::path folder = fs::path(file).parent_path();
-  if (!folder.empty() && !fs::is_directory(folder, ignored)) {
-    return fail(ErrorCode::unwritable,
-                fmt::format("cannot write {}: there is no directory {}, create it first", file, folder.string()), file);
-  }
-  if (fs::is_directory(file, ignored)) {
-    return fail(ErrorCode::unwritable, fmt::format("cannot write {}: it is a directory", file), file);
-  }
-  return {};
-}
-
+/// A run leaves all of its files or none.
 Result<void> check_free(const Files& files, const SimulateArgs& args) {
   std::vector<std::string> all = files.frames;
   for (const std::string& truth : {files.truth, files.truth_electrons}) {
     if (!truth.empty()) all.push_back(truth);
   }
   for (const std::string& file : all) {
-    if (auto place = check_place(file); !place) return place;
     std::error_code ignored;
     if (fs::equivalent(file, args.scene.what, ignored)) {
       return fail(ErrorCode::exists, fmt::format("{} would replace its own scene", file), file);
     }
-    if (!args.force && fs::exists(file, ignored)) {
-      return fail(ErrorCode::exists, fmt::format("{} exists: use --force to overwrite it", file), file);
-    }
+    if (auto place = check_place(file, args.force); !place) return place;
   }
   return {};
 }
