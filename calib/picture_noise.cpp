@@ -102,6 +102,13 @@ Result<void> check_fit(const NoiseLine& line) {
                             "limit): take a picture with flat parts both dark and bright",
                             gain.value, gain.standard_error));
   }
+  const Estimate& offset = line.offset_dn2;
+  if (offset.value + 3 * offset.standard_error < 0) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("variance without light comes out as {:.3g} +- {:.2g} DN^2, below 0: give the right black "
+                            "level, or a picture with more of it above black",
+                            offset.value, offset.standard_error));
+  }
   if (line.reduced_chi_square > largest_chi_square) {
     return fail(ErrorCode::insufficient,
                 fmt::format("variance against mean is no straight line (reduced chi square {:.1f}, at most 5): give "

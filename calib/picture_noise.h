@@ -50,7 +50,8 @@ struct PictureNoise {
 /// @param black_dn of each site
 /// Errors: a layout other than Bayer or monochrome; black that is not below white; options outside their range; fewer
 /// than 100 samples; more than 90 % of the pixels clipped; too few flat samples; levels too alike to tell gain from
-/// offset (a gain that is not positive, or known to less than 15 %); a reduced chi square above 5.
+/// offset (a gain that is not positive, or known to less than 15 %); an offset below 0 by three standard errors; a
+/// reduced chi square above 5.
 Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& black_dn,
                                        const PictureNoiseOptions& options, Executor& executor);
 

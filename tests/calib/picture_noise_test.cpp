@@ -172,6 +172,10 @@ TEST(PictureNoise, RefusesOneLevel) {
   expect_refused(fit(raw, 100), ErrorCode::insufficient, "levels too alike");
 }
 
+TEST(PictureNoise, RefusesAVarianceBelowZeroWithoutLight) {  // as a black level 40 DN too low makes it: 6 - 0.8 * 40
+  expect_refused(fit(stairs(1024, 0.8, 6, 100, white_noise), 60), ErrorCode::insufficient, "below 0");
+}
+
 TEST(PictureNoise, RefusesTextureWithoutFlatParts) {
   std::mt19937 engine(1);
   std::uniform_int_distribution<int> block(100, 3000);
