@@ -1,0 +1,48 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "isp/base/estimate.h"
+
+namespace lowlux::calib {
+
+/// Between which values a pixel is read, counted from black [DN].
+struct ClipRange {
+  double low_dn = 0;
+  double high_dn = 0;
+};
+
+/// Mean and variance of pixels that see about the same light, as read: clipping included.
+struct NoisePoint {
+  double mean_dn = 0;  // above black
+  double variance_dn2 = 0;
+  double degrees_of_freedom = 0;  // of the variance; above 0
+  ClipRange clip;
+};
+
+/// variance = gain * mean + offset, of pixels that are not clipped.
+struct NoiseLine {
+  Estimate gain_dn_per_e;
+  Estimate offset_dn2;
+  double covariance = 0;  // of the two
+  double reduced_chi_square = 0;
+  int degrees_of_freedom = 0;
+};
+
+/// Variance of pixels whose clipped mean is `mean_dn`, as read:
+///     m, V: mean and variance of clamp(N(mu, gain mu + offset)), mu such that m = mean_dn
+/// (Foi et al., IEEE TIP 17(10), 2008, section IV, there as the functions E_m and S_m). Never below 0.
+double read_variance_dn2(const NoiseLine& line, double mean_dn, const ClipRange& clip);
+
+/// What share of pixels whose clipped mean is `mean_dn` is clipped, by the line.
+double clipped_share(const NoiseLine& line, double mean_dn, const ClipRange& clip);
+
+/// The line that is most likely, by iterated weighted least squares. A point's variance is 2 V^2 / degrees of freedom,
+/// V being that of the line and not that measured, which would favour points that came out low. Points that are off by
+/// several standard deviations weigh less (Cauchy's weights). Standard errors are multiplied by sqrt(reduced chi
+/// square) where that exceeds 1.
+/// nullopt: fewer than three points, or means that do not tell gain from offset.
+std::optional<NoiseLine> fit_noise_line(std::span<const NoisePoint> points);
+
+}  // namespace lowlux::calib

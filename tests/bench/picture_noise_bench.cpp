@@ -1,0 +1,115 @@
+// Noise of single pictures, simulated at four levels, against the sensor's own figures; both methods, and time against
+// accuracy when samples are left out. Tuned on the first four pictures; the other four are for the figures only.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <initializer_list>
+#include <utility>
+#include <vector>
+
+#include "calib/picture_noise.h"
+#include "isp/base/executor.h"
+#include "tests/sensor_bench/picture_raw.h"
+#include "tests/sensor_bench/sensor_bench.h"
+
+namespace {
+
+using namespace lowlux;
+
+struct Tally {
+  int cases = 0;
+  int refused = 0;
+  int gain_missed = 0;    // by more than 10 %
+  int offset_missed = 0;  // by more than 10 % and three standard errors
+  double gain_square = 0;
+  double ms = 0;
+  double megapixels = 0;
+};
+
+struct Row {
+  const test::PictureLight& light;
+  const SensorModel& sensor;
+  double mean_e = 0;
+  bool print = true;
+};
+
+void measure(const Row& row, const calib::PictureNoiseOptions& options, Executor& executor, Tally& tally) {
+  const SensorModel& sensor = row.sensor;
+  const RawDn raw = test::take_picture(row.light, sensor, {.mean_green_e = row.mean_e, .seed = 7}, executor);
+  const double black = sensor.black_level_dn;
+  const auto start = std::chrono::steady_clock::now();
+  const auto found = calib::fit_picture_noise(raw, {black, black, black, black}, options, executor);
+  tally.ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  tally.megapixels += 1e-6 * static_cast<double>(raw.dn.size());
+  ++tally.cases;
+  if (!found) {
+    ++tally.refused;
+    if (row.print)
+      std::printf("%-15s %5g  refused: %s\n", row.light.name.c_str(), row.mean_e, found.error().message.c_str());
+    return;
+  }
+  const double gain = sensor.system_gain_dn_per_e, read_dn = gain * sensor.read_noise_e;
+  const double offset = read_dn * read_dn + 1.0 / 12;
+  const double a = found->gain_dn_per_e.value / gain - 1, b = found->offset_dn2.value / offset - 1;
+  const double b_error = found->offset_dn2.standard_error / offset;
+  tally.gain_missed += std::abs(a) > 0.1 ? 1 : 0;
+  tally.offset_missed += std::abs(b) > 0.1 && std::abs(b) > 3 * b_error ? 1 : 0;
+  tally.gain_square += a * a;
+  if (!row.print) return;
+  std::printf("%-15s %5g  a %+6.1f %% +- %4.1f   b %+6.1f %% +- %5.1f   chi2 %4.2f  flat %4.2f  fine/coarse %4.2f\n",
+              row.light.name.c_str(), row.mean_e, 100 * a, 100 * found->gain_dn_per_e.standard_error / gain, 100 * b,
+              100 * b_error, found->reduced_chi_square, found->flat_share, found->traces.fine_to_coarse);
+}
+
+void print(const char* what, const Tally& t) {
+  std::printf(
+      "%s: %d cases, %d refused, a off by > 10 %% in %d, b by > 10 %% and 3 s.e. in %d, rms of a %.1f %%, "
+      "%.0f ms/MP\n",
+      what, t.cases, t.refused, t.gain_missed, t.offset_missed,
+      100 * std::sqrt(t.gain_square / std::max(t.cases - t.refused, 1)), t.ms / t.megapixels);
+}
+
+}  // namespace
+
+int main() {
+  PoolExecutor executor(1);
+  SensorModel clipping = test::modern_small();
+  clipping.name = "clipped at black";
+  clipping.black_level_dn = 0;
+  clipping.system_gain_dn_per_e = 1.6;
+  clipping.read_noise_e = 2.2;
+  std::vector<test::PictureLight> lights;
+  for (const char* name : test::clean_pictures) {
+    auto light = test::picture_light(name, executor);
+    if (!light) return std::fprintf(stderr, "%s\n", light.error().message.c_str()), 1;
+    lights.push_back(*std::move(light));
+  }
+  using calib::PictureNoiseMethod;
+  const auto run = [&](const char* what, const SensorModel& sensor, const calib::PictureNoiseOptions& options,
+                       bool rows, std::initializer_list<double> levels = {4.0, 10.0, 25.0, 60.0}) {
+    Tally tally;
+    for (const auto& light : lights) {
+      for (const double mean_e : levels) measure({light, sensor, mean_e, rows}, options, executor, tally);
+    }
+    print(what, tally);
+  };
+  for (const SensorModel& sensor : {test::modern_small(), test::modern_large(), clipping}) {
+    std::printf("\n%s\n", sensor.name.c_str());
+    run("ponomarenko", sensor, {}, true);
+    run("foi", sensor, {.method = PictureNoiseMethod::foi}, false);
+  }
+  std::printf("\nbrighter, modern small\n");
+  run("ponomarenko", test::modern_small(), {}, true, {250.0});
+  std::printf("\nmodern small, fewer samples\n");
+  for (const std::int64_t samples : {16'000, 4000, 2000, 1000}) {
+    std::printf("%6d ", static_cast<int>(samples));
+    run("ponomarenko", test::modern_small(), {.most_samples = samples}, false);
+  }
+  for (const std::int64_t samples : {100'000, 30'000, 10'000}) {
+    std::printf("%6d ", static_cast<int>(samples));
+    run("foi", test::modern_small(), {.method = PictureNoiseMethod::foi, .most_samples = samples}, false);
+  }
+  return 0;
+}

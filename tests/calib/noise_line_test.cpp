@@ -1,0 +1,123 @@
+#include "calib/noise_line.h"
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "calib/flat_samples.h"
+
+namespace lowlux::calib {
+namespace {
+
+constexpr ClipRange wide{-1e6, 1e6};
+
+TEST(FitNoiseLine, GivesBackAnExactLine) {
+  std::vector<NoisePoint> points;
+  for (const double mean : {0.0, 10.0, 50.0, 200.0}) points.push_back({mean, 0.7 * mean + 5, 1000, wide});
+  const auto line = fit_noise_line(points);
+  ASSERT_TRUE(line);
+  EXPECT_NEAR(line->gain_dn_per_e.value, 0.7, 1e-6);  // the fit stops at 1e-4 standard errors
+  EXPECT_NEAR(line->offset_dn2.value, 5, 1e-5);
+  EXPECT_NEAR(line->reduced_chi_square, 0, 1e-6);
+}
+
+TEST(FitNoiseLine, HasErrorsAsLargeAsItsScatter) {
+  std::mt19937 engine(4);
+  constexpr int trials = 400;
+  double square = 0;
+  for (int t = 0; t < trials; ++t) {
+    std::vector<NoisePoint> points;
+    for (int i = 0; i < 20; ++i) {
+      std::chi_squared_distribution<double> chi(600);
+      points.push_back({10.0 * i, (0.7 * 10 * i + 5) * chi(engine) / 600, 600, wide});
+    }
+    const auto line = fit_noise_line(points);
+    ASSERT_TRUE(line);
+    const double pull = (line->gain_dn_per_e.value - 0.7) / line->gain_dn_per_e.standard_error;
+    square += pull * pull / trials;
+  }
+  // 5 standard errors of a mean of squares; errors are scaled up and never down: pulls may be smaller by a fifth.
+  EXPECT_LT(square, 1.05 + 5 * std::sqrt(2.0 / trials));
+  EXPECT_GT(square, 0.64 - 5 * 0.64 * std::sqrt(2.0 / trials));
+}
+
+TEST(FitNoiseLine, IsNotMovedFarByATexturedPoint) {
+  std::vector<NoisePoint> points;
+  for (int i = 0; i < 20; ++i) points.push_back({10.0 * i, 7.0 * i + 5, 600, wide});
+  points[10].variance_dn2 *= 3;
+  const auto line = fit_noise_line(points);
+  ASSERT_TRUE(line);
+  EXPECT_NEAR(line->gain_dn_per_e.value, 0.7, 0.02 * 0.7);  // without weights it would be off by a tenth
+}
+
+TEST(FitNoiseLine, RefusesPointsThatDoNotTellGainFromOffset) {
+  EXPECT_FALSE(fit_noise_line({}));
+  const std::vector<NoisePoint> two{{1, 2, 100, wide}, {2, 3, 100, wide}};
+  EXPECT_FALSE(fit_noise_line(two));
+  const std::vector<NoisePoint> one_mean(5, {10, 5, 100, wide});
+  EXPECT_FALSE(fit_noise_line(one_mean));
+}
+
+TEST(ReadVariance, OfPixelsAtBlackIsThatOfHalfANormalLaw) {
+  NoiseLine line;
+  line.offset_dn2.value = 400;  // 20 DN: quantisation does not matter
+  const double pi = 3.14159265358979;
+  const double mean = 20 / std::sqrt(2 * pi);
+  EXPECT_NEAR(read_variance_dn2(line, mean, {0, 1e6}), 400 * (0.5 - 0.5 / pi), 0.1);  // 1/12 of half the pixels
+  EXPECT_NEAR(clipped_share(line, mean, {0, 1e6}), 0.5, 1e-6);
+  EXPECT_EQ(clipped_share(line, mean, wide), 0);
+  EXPECT_EQ(read_variance_dn2(line, 1000, wide), 400);
+  EXPECT_NEAR(read_variance_dn2(line, 4000 - mean, {-1e6, 4000}), 400 * (0.5 - 0.5 / pi), 0.1);
+}
+
+TEST(ReadVariance, FollowsSimulatedPixelsClippedAtBlack) {
+  std::mt19937 engine(8);
+  std::normal_distribution<double> read(0, 2.2);
+  NoiseLine line;
+  line.gain_dn_per_e.value = 1.6;
+  line.offset_dn2.value = 1.6 * 1.6 * 2.2 * 2.2 + 1.0 / 12;
+  constexpr int n = 400'000;
+  for (const double mean_e : {0.2, 1.0, 3.0, 10.0}) {
+    std::poisson_distribution<int> photons(mean_e);
+    double sum = 0, square = 0;
+    for (int i = 0; i < n; ++i) {
+      const double code = std::max(0.0, std::round(1.6 * (photons(engine) + read(engine))));
+      sum += code;
+      square += code * code;
+    }
+    const double mean = sum / n, variance = square / n - mean * mean;
+    // Five standard errors of a variance, twice that of a normal law's, and 3 %: skewness is taken to first order.
+    EXPECT_NEAR(read_variance_dn2(line, mean, {0, 4095}), variance, (10 * std::sqrt(2.0 / n) + 0.03) * variance)
+        << mean_e;
+  }
+}
+
+TEST(ChiSquare, HasThePublishedQuantiles) {
+  // Abramowitz & Stegun, table 26.8
+  EXPECT_NEAR(chi_square_quantile(1, 0.95), 3.84146, 1e-5);
+  EXPECT_NEAR(chi_square_quantile(2, 0.5), 1.38629, 1e-5);
+  EXPECT_NEAR(chi_square_quantile(8, 0.9), 13.3616, 1e-4);
+  EXPECT_NEAR(chi_square_quantile(30, 0.99), 50.8922, 1e-4);
+  EXPECT_EQ(chi_square_probability(5, 0), 0);
+  EXPECT_EQ(chi_square_probability(5, -1), 0);
+  EXPECT_NEAR(chi_square_probability(24, 1000), 1, 1e-12);
+}
+
+TEST(ChiSquare, MeanBelowALimitIsThatOfDraws) {
+  std::mt19937 engine(2);
+  std::chi_squared_distribution<double> chi(24);
+  const double limit = chi_square_quantile(24, 0.8);
+  double sum = 0, n = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    const double x = chi(engine);
+    sum += x < limit ? x / 24 : 0;
+    n += x < limit ? 1 : 0;
+  }
+  EXPECT_NEAR(chi_square_mean_below(24, limit), sum / n, 5 * std::sqrt(2.0 / 24 / n));
+  EXPECT_NEAR(chi_square_mean_below(24, 1000), 1, 1e-12);
+}
+
+}  // namespace
+}  // namespace lowlux::calib

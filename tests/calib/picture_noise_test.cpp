@@ -1,0 +1,318 @@
+#include "calib/picture_noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "calib/flat_samples.h"
+#include "calib/noise_samples.h"
+#include "capture/file/dng_source.h"
+#include "tests/sensor_bench/picture_raw.h"
+#include "tests/sensor_bench/sensor_bench.h"
+#include "tests/support/frames.h"
+
+namespace lowlux::calib {
+namespace {
+
+Result<PictureNoise> fit(const RawDn& raw, double black_dn, const PictureNoiseOptions& options = {}) {
+  PoolExecutor executor(2);
+  return fit_picture_noise(raw, {black_dn, black_dn, black_dn, black_dn}, options, executor);
+}
+
+double offset_of(const SensorModel& sensor) {
+  const double read_dn = sensor.system_gain_dn_per_e * sensor.read_noise_e;
+  return read_dn * read_dn + 1.0 / 12;
+}
+
+/// A sensor that clips at black: code 0 is both.
+SensorModel clipping_sensor() {
+  SensorModel out = test::modern_small();
+  out.black_level_dn = 0;
+  out.system_gain_dn_per_e = 1.6;
+  out.read_noise_e = 2.2;
+  return out;
+}
+
+/// Sixteen steps of light in both directions (not in step with blocks of 8) with normal noise of a line, filtered by
+/// `filter` before it is added.
+RawDn stairs(int side, double gain, double offset_dn2, double black_dn,
+             const std::function<double(const std::function<double()>&)>& noise_of) {
+  std::mt19937 engine(5);
+  std::normal_distribution<double> normal;
+  const std::function<double()> draw = [&] { return normal(engine); };
+  return test::bayer_frame(side, side, BayerPhase::rggb, [&](int x, int y) {
+    const double mean = 20.0 * ((x / 70 + y / 70) % 16);
+    const double v = black_dn + mean + std::sqrt(gain * mean + offset_dn2) * noise_of(draw);
+    return std::clamp(static_cast<int>(std::lround(v)), 0, 4095);
+  });
+}
+
+double white_noise(const std::function<double()>& draw) { return draw(); }
+
+TEST(PictureNoiseOfStairs, IsTheLineTheyWereMadeWith) {
+  const RawDn raw = stairs(1024, 0.8, 6, 100, white_noise);
+  for (const PictureNoiseMethod method : {PictureNoiseMethod::ponomarenko, PictureNoiseMethod::foi}) {
+    const auto found = fit(raw, 100, {.method = method});
+    ASSERT_TRUE(found) << found.error().message;
+    const double offset = 6 + 1.0 / 12;
+    // Five standard errors and 1 % for what the choice of flat samples leaves (chosen shares are not corrected).
+    EXPECT_NEAR(found->gain_dn_per_e.value, 0.8, 5 * found->gain_dn_per_e.standard_error + 0.008);
+    EXPECT_NEAR(found->offset_dn2.value, offset, 5 * found->offset_dn2.standard_error + 0.01 * offset);
+    EXPECT_LT(found->gain_dn_per_e.standard_error, 0.02 * 0.8);
+    EXPECT_LT(found->reduced_chi_square, 2);
+    EXPECT_TRUE(found->reasons.empty()) << found->reasons.front();
+    EXPECT_TRUE(found->converged);
+  }
+}
+
+TEST(PictureNoiseOfStairs, DoesNotDependOnTheNumberOfThreads) {
+  const RawDn raw = stairs(512, 0.8, 6, 100, white_noise);
+  InlineExecutor one;
+  const auto a = fit(raw, 100), b = fit_picture_noise(raw, {100, 100, 100, 100}, {}, one);
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->gain_dn_per_e, b->gain_dn_per_e);
+  EXPECT_EQ(a->offset_dn2, b->offset_dn2);
+}
+
+TEST(PictureNoiseOfStairs, IsFoundFromAPartOfTheSamples) {
+  const auto found = fit(stairs(1024, 0.8, 6, 100, white_noise), 100, {.most_samples = 4000});
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_NEAR(found->gain_dn_per_e.value, 0.8, 5 * found->gain_dn_per_e.standard_error + 0.008);
+}
+
+/// The gain within 10 %, the offset within 10 % or three standard errors.
+void expect_found(const test::PictureLight& light, const SensorModel& sensor, double mean_green_e) {
+  PoolExecutor executor(2);
+  const RawDn raw = test::take_picture(light, sensor, {.mean_green_e = mean_green_e, .seed = 7}, executor);
+  const auto found = fit(raw, sensor.black_level_dn);
+  const std::string what = light.name + " at " + std::to_string(mean_green_e);
+  ASSERT_TRUE(found) << what << ": " << found.error().message;
+  const double gain = sensor.system_gain_dn_per_e, offset = offset_of(sensor);
+  EXPECT_NEAR(found->gain_dn_per_e.value, gain, 0.1 * gain) << what;
+  EXPECT_NEAR(found->offset_dn2.value, offset, std::max(0.1 * offset, 3 * found->offset_dn2.standard_error)) << what;
+  EXPECT_FALSE(found->traces.denoised) << what << ": " << found->traces.fine_to_coarse;
+  EXPECT_FALSE(found->traces.companded) << what;
+  EXPECT_FALSE(found->traces.block_grid) << what << ": " << found->traces.grid_excess;
+}
+
+TEST(PictureNoiseOfPictures, IsThatOfTheSensorAtFourLevels) {
+  PoolExecutor executor(2);
+  const auto light = test::picture_light("kodim15.png", executor);
+  ASSERT_TRUE(light) << light.error().message;
+  for (const double mean_e : {4.0, 10.0, 25.0, 60.0}) {
+    expect_found(*light, test::modern_small(), mean_e);
+    expect_found(*light, test::modern_large(), mean_e);
+  }
+}
+
+TEST(PictureNoiseOfPictures, SurvivesClippingAtBlack) {
+  PoolExecutor executor(2);
+  const auto light = test::picture_light("GoldenGate.exr", executor);
+  ASSERT_TRUE(light) << light.error().message;
+  for (const double mean_e : {4.0, 25.0}) expect_found(*light, clipping_sensor(), mean_e);
+}
+
+TEST(PictureNoiseOfPictures, OfAllEightIsFoundOrRefused) {
+  if (std::getenv("LOWLUX_NIGHTLY") == nullptr) GTEST_SKIP() << "runs nightly: LOWLUX_NIGHTLY is not set";
+  PoolExecutor executor(2);
+  const SensorModel sensor = test::modern_small();
+  int refused = 0, missed = 0;
+  for (const char* name : test::clean_pictures) {
+    const auto light = test::picture_light(name, executor);
+    ASSERT_TRUE(light) << light.error().message;
+    for (const double mean_e : {4.0, 10.0, 25.0, 60.0}) {
+      const auto found =
+          fit(test::take_picture(*light, sensor, {.mean_green_e = mean_e, .seed = 7}, executor), sensor.black_level_dn);
+      if (!found) {
+        ++refused;
+        continue;
+      }
+      const double off = found->gain_dn_per_e.value / sensor.system_gain_dn_per_e - 1;
+      missed += std::abs(off) > 0.1 ? 1 : 0;
+      EXPECT_LT(std::abs(off), 0.3) << name << " at " << mean_e;  // fine texture that no coarser detail betrays
+    }
+  }
+  EXPECT_LE(refused, 3);
+  // Measured, not wished for: none should be missed.
+  EXPECT_LE(missed, 6);  // kodim05 at 4 and 10 e-, kodim08 at 25 and 60, StillLife and kodim23 at 60: calib/README.md
+}
+
+void expect_refused(const Result<PictureNoise>& found, ErrorCode code, const std::string& words) {
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().code, code);
+  EXPECT_NE(found.error().message.find(words), std::string::npos) << found.error().message;
+}
+
+TEST(PictureNoise, RefusesWhatIsTooSmall) {
+  const auto constant = [](int, int) { return 100; };
+  for (const int side : {0, 1, 2, 30, 60}) {
+    expect_refused(fit(test::bayer_frame(side, side, BayerPhase::rggb, constant), 0), ErrorCode::insufficient,
+                   "larger picture");
+  }
+}
+
+TEST(PictureNoise, RefusesPicturesOfOneCode) {
+  for (const int code : {0, 100, 4095, 65535}) {
+    expect_refused(fit(test::bayer_frame(512, 512, BayerPhase::rggb, [&](int, int) { return code; }), 0),
+                   ErrorCode::insufficient, "clipped");
+  }
+}
+
+TEST(PictureNoise, RefusesOneLevel) {
+  test::NormalDn noise(3);
+  const RawDn raw = test::bayer_frame(512, 512, BayerPhase::rggb, [&](int, int) { return noise(500, 5); });
+  expect_refused(fit(raw, 100), ErrorCode::insufficient, "levels too alike");
+}
+
+TEST(PictureNoise, RefusesAVarianceBelowZeroWithoutLight) {  // as a black level 40 DN too low makes it: 6 - 0.8 * 40
+  expect_refused(fit(stairs(1024, 0.8, 6, 100, white_noise), 60), ErrorCode::insufficient, "below 0");
+}
+
+TEST(PictureNoise, RefusesTextureWithoutFlatParts) {
+  std::mt19937 engine(1);
+  std::uniform_int_distribution<int> block(100, 3000);
+  std::vector<int> of(300 * 300);
+  for (int& v : of) v = block(engine);
+  const RawDn raw =  // patches of 6 x 6 pixels: no block of 16 x 16 is flat
+      test::bayer_frame(512, 512, BayerPhase::rggb, [&](int x, int y) { return of[y / 6 * 300 + x / 6]; });
+  EXPECT_FALSE(fit(raw, 50));
+}
+
+TEST(PictureNoise, RefusesArgumentsOutOfRange) {
+  const RawDn raw = stairs(512, 0.8, 6, 100, white_noise);
+  expect_refused(fit(raw, 5000), ErrorCode::invalid_argument, "black");
+  expect_refused(fit(raw, -1), ErrorCode::invalid_argument, "black");
+  expect_refused(fit(raw, NAN), ErrorCode::invalid_argument, "black");
+  expect_refused(fit(raw, 100, {.most_samples = 0}), ErrorCode::invalid_argument, "most_samples");
+  expect_refused(fit(raw, 100, {.most_samples = 10'000'001}), ErrorCode::invalid_argument, "most_samples");
+  RawDn rgb = stairs(512, 0.8, 6, 100, white_noise);
+  rgb.layout = SensorLayout::linear_rgb;
+  expect_refused(fit(rgb, 100), ErrorCode::unsupported, "demosaiced");
+}
+
+TEST(PictureNoise, TellsFilteredNoise) {
+  RawDn raw = stairs(1024, 0.8, 20, 100, white_noise);
+  RawDn smooth = stairs(1024, 0.8, 20, 100, white_noise);
+  for (int y = 2; y < 1022; ++y) {  // the mean of each pixel and its neighbours of the same site
+    for (int x = 2; x < 1022; ++x) {
+      const int sum =
+          4 * raw.dn.at(x, y) + raw.dn.at(x - 2, y) + raw.dn.at(x + 2, y) + raw.dn.at(x, y - 2) + raw.dn.at(x, y + 2);
+      smooth.dn.at(x, y) = static_cast<std::uint16_t>((sum + 4) / 8);
+    }
+  }
+  PoolExecutor executor(2);
+  for (const bool filtered : {false, true}) {
+    NoiseSamples blocks = block_samples(filtered ? smooth : raw, {{100, 100, 100, 100}, 400'000}, executor);
+    sort_by_surroundings(blocks);
+    RawTraces traces;
+    add_filter_trace(blocks, traces);
+    EXPECT_EQ(traces.denoised, filtered) << traces.fine_to_coarse;
+  }
+}
+
+TEST(CodeTraces, TellTheStepOfTheCodes) {
+  const RawDn raw = stairs(1024, 0.8, 6, 100, white_noise);
+  EXPECT_EQ(code_traces(raw).code_step_dn, 1);
+  RawDn coarse = stairs(1024, 0.8, 6, 100, white_noise);
+  for (std::size_t i = 0; i < coarse.dn.size(); ++i) coarse.dn.data()[i] &= 0xfffc;
+  const RawTraces traces = code_traces(coarse);
+  EXPECT_EQ(traces.code_step_dn, 4);
+  EXPECT_FALSE(traces.companded);
+}
+
+TEST(CodeTraces, TellStepsThatGrow) {
+  RawDn raw = stairs(1024, 0.8, 6, 100, white_noise);
+  EXPECT_FALSE(code_traces(raw).companded);
+  for (std::size_t i = 0; i < raw.dn.size(); ++i) {
+    std::uint16_t& code = raw.dn.data()[i];
+    if (code >= 256) code &= 0xfffc;
+  }
+  const RawTraces traces = code_traces(raw);
+  EXPECT_TRUE(traces.companded);
+  EXPECT_EQ(traces.code_step_dn, 1);
+  EXPECT_EQ(traces.largest_step_dn, 4);
+}
+
+TEST(CodeTraces, TellTheGridOfBlocks) {
+  RawDn raw = stairs(1024, 0.8, 6, 100, white_noise);
+  EXPECT_FALSE(code_traces(raw).block_grid);
+  test::NormalDn level(9);
+  std::vector<int> of(128 * 128);
+  for (int& v : of) v = level(60, 15);
+  for (int y = 0; y < 1024; ++y) {
+    for (int x = 0; x < 1024; ++x) {  // each block of 16 x 16 pixels has a level of its own
+      raw.dn.at(x, y) = static_cast<std::uint16_t>(raw.dn.at(x, y) + of[y / 16 * 128 + x / 16]);
+    }
+  }
+  const RawTraces traces = code_traces(raw);
+  EXPECT_TRUE(traces.block_grid) << traces.grid_excess;
+}
+
+TEST(PictureNoise, TellsThatCodesAreTooCoarseForTheNoise) {
+  const auto fine = fit(stairs(1024, 0.05, 0.6, 100, white_noise), 100);
+  ASSERT_TRUE(fine) << fine.error().message;
+  EXPECT_FALSE(fine->under_dithered) << fine->darkest_noise_steps;
+  const auto coarse = fit(stairs(1024, 0.05, 0.08, 100, white_noise), 100);
+  ASSERT_TRUE(coarse) << coarse.error().message;
+  EXPECT_TRUE(coarse->under_dithered) << coarse->darkest_noise_steps;
+  EXPECT_NE(coarse->reasons.front().find("under-dithered"), std::string::npos);
+}
+
+TEST(CompareWith, PutsTheProfileInOurUnits) {
+  PictureNoise noise;
+  noise.gain_dn_per_e = {0.5, 0.01};
+  noise.offset_dn2 = {4, 0.1};
+  const double range = 4000;
+  const NoiseProfile same{{0.5 / range, 0.5 / range, 1.0 / range},
+                          {4 / (range * range), 6 / (range * range), 4 / (range * range)}};
+  const auto found = compare_with(same, noise, range);
+  EXPECT_NEAR(found[0].gain_ratio, 1, 1e-12);
+  EXPECT_NEAR(found[0].offset_ratio, 1, 1e-12);
+  EXPECT_NEAR(found[0].chi_square, 0, 1e-12);
+  EXPECT_TRUE(found[0].agrees);
+  EXPECT_NEAR(found[1].chi_square, 400, 1e-6);  // 2 DN^2 at 0.1
+  EXPECT_FALSE(found[1].agrees);
+  EXPECT_NEAR(found[2].gain_ratio, 0.5, 1e-12);
+  EXPECT_FALSE(found[2].agrees);
+  EXPECT_EQ(compare_with({}, noise, range)[0].gain_ratio, 0);
+  EXPECT_FALSE(compare_with({}, noise, range)[0].agrees);
+}
+
+TEST(PictureNoiseOfRealRaws, IsSaneOrRefused) {
+  for (const char* name : {"canon_kissx4_ml_colorchart.dng", "nikon_dsc1339_crop_rggb14.dng", "openisp_test_rggb10.dng",
+                           "infiniteisp_indoor1_grbg8.dng", "n900_dog_small_grbg10in16.dng"}) {
+    const auto frame = capture::read_raw(std::string(LOWLUX_TESTDATA "/raws/") + name);
+    ASSERT_TRUE(frame) << frame.error().message;
+    ASSERT_TRUE(frame->raw.black_tag);
+    const auto found = fit(frame->raw, frame->raw.black_tag->at(0, 0));
+    if (!found) {
+      EXPECT_EQ(found.error().code, ErrorCode::insufficient) << name;
+      EXPECT_EQ(found.error().message.find('\n'), std::string::npos);
+      std::printf("%s: refused: %s\n", name, found.error().message.c_str());
+      continue;
+    }
+    EXPECT_GT(found->gain_dn_per_e.value, 0) << name;
+    EXPECT_TRUE(std::isfinite(found->offset_dn2.value)) << name;
+    std::printf("%s: gain %.4f +- %.4f offset %.3f +- %.3f chi2 %.2f flat %.2f\n", name, found->gain_dn_per_e.value,
+                found->gain_dn_per_e.standard_error, found->offset_dn2.value, found->offset_dn2.standard_error,
+                found->reduced_chi_square, found->flat_share);
+    for (const std::string& reason : found->reasons) std::printf("  %s\n", reason.c_str());
+  }
+}
+
+TEST(CodeTracesOfRealRaws, FindTheStepOfFourInTheOpenIspRaw) {
+  const auto frame = capture::read_raw(LOWLUX_TESTDATA "/raws/openisp_test_rggb10.dng");
+  ASSERT_TRUE(frame) << frame.error().message;
+  EXPECT_EQ(code_traces(frame->raw).code_step_dn, 4);
+}
+
+}  // namespace
+}  // namespace lowlux::calib
