@@ -184,4 +184,23 @@ void put_black(const BlackFigures& black, const FrameSetting& setting, const Mea
   note(measured_figures("black level", measured, 0, 0), out);
 }
 
+void put_picture_noise(const PictureNoise& noise, const BlackPoint& black, const FrameSetting& setting,
+                       const Measured& measured, GainProfile& out) {
+  const Estimate& gain = noise.gain_dn_per_e;
+  SensorModel& sensor = begin_sensor(setting, gain, mean_of(black.pedestal_dn), measured, out);
+  const double step = noise.traces.code_step_dn;
+  const double without_codes_dn2 = std::max(0.0, noise.offset_dn2.value - step * step / 12);
+  sensor.read_noise_e = std::sqrt(without_codes_dn2) / gain.value;
+  const double smallest = std::max(sensor.read_noise_e, std::sqrt(noise.offset_dn2.standard_error) / gain.value);
+  out.errors.read_noise_e =
+      smallest > 0 ? noise.offset_dn2.standard_error / (2 * smallest * gain.value * gain.value) : 0;
+  out.pedestal_dn.emplace();
+  for (int site = 0; site < 4; ++site) {
+    (*out.pedestal_dn)[site] = {black.pedestal_dn[site], black.pedestal_standard_error_dn[site]};
+  }
+  out.pedestal_holds = black.holds;
+  put_ranges({&setting, 1}, out);
+  note(measured_figures("noise of one picture", measured, noise.reduced_chi_square, noise.degrees_of_freedom), out);
+}
+
 }  // namespace lowlux::calib

@@ -8,6 +8,7 @@
 #include "calib/dark_series.h"
 #include "calib/dark_stack.h"
 #include "calib/photon_transfer.h"
+#include "calib/picture_noise.h"
 #include "isp/base/camera_profile.h"
 
 namespace lowlux::calib {
@@ -35,6 +36,11 @@ void put_dark_series(const DarkSeries& series, std::span<const DarkGroup> groups
 
 /// Puts a black level of one exposure time into it, dark charge included.
 void put_black(const BlackFigures& black, const FrameSetting& setting, const Measured& measured, GainProfile& out);
+
+/// Puts the noise of one ordinary picture into it, and the black point it was measured above. The read noise holds all
+/// that is there without light: row noise, and dark charge where the black holds that.
+void put_picture_noise(const PictureNoise& noise, const BlackPoint& black, const FrameSetting& setting,
+                       const Measured& measured, GainProfile& out);
 
 /// The profile of a gain setting in a camera's profile; a new one if there is none yet.
 GainProfile& gain_at(CameraProfile& profile, const FrameSetting& setting);

@@ -76,6 +76,11 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
   add_settings(app, args.common);
   app.add_flag("--steady-light", args.steady_light,
                "the lamp never changed, so that the flats' exposure times tell how linear the sensor is");
+  using Method = calib::PictureNoiseMethod;
+  add_choice<Method>(
+      app, "--method", {{"ponomarenko", Method::ponomarenko}, {"foi", Method::foi}},
+      [&args](Method method) { args.method = method; },
+      "for one picture: blocks, or single details (default ponomarenko)");
   if (const auto code = parse_words(app, words)) return *code;
   if (args.darks.empty() && args.common.frames.size() > 1) {
     return refuse(app, "several flats need --darks; without darks one picture is measured");

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/picture_noise.h"
 #include "isp/cli/args.h"
 
 namespace lowlux::cli {
@@ -33,6 +34,7 @@ struct CalibrateNoiseArgs {
   CalibrateArgs common;
   std::vector<std::string> darks;
   bool steady_light = false;
+  calib::PictureNoiseMethod method = calib::PictureNoiseMethod::ponomarenko;  // for one picture
 };
 
 struct CalibrateQuotedArgs {

@@ -1,15 +1,19 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "calib/pair_statistics.h"
 #include "calib/photon_transfer.h"
+#include "isp/base/executor.h"
 #include "isp/cli/calibration.h"
 #include "isp/cli/noise_report.h"
+#include "isp/cli/picture_noise_report.h"
 #include "isp/cli/progress.h"
+#include "isp/raw/black_point.h"
 
 namespace lowlux::cli {
 namespace {
@@ -140,6 +144,30 @@ Result<Calibration> calibrate_flats(const CalibrateNoiseArgs& args) {
   return found;
 }
 
+Result<Calibration> calibrate_picture(const CalibrateNoiseArgs& args) {
+  const std::string& file = args.common.frames.front();
+  auto profile = starting_profile(args.common);
+  if (!profile) return tl::make_unexpected(profile.error());
+  const auto frame = read_calibration_frame(file, args.common);
+  if (!frame) return tl::make_unexpected(frame.error());
+  const auto at = [&file](const Error& error) { return fail(error.code, error.message, file); };
+  const auto setting = calib::setting_of(frame->raw);
+  if (!setting) return at(setting.error());
+  const auto black = isp::choose_black(frame->raw, {});
+  if (!black) return at(black.error());
+  PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));
+  const auto noise = calib::fit_picture_noise(frame->raw, black->pedestal_dn, {.method = args.method}, executor);
+  if (!noise) return at(noise.error());
+  Calibration found;
+  found.profile = std::move(*profile);
+  found.report.title = fmt::format("{} {}: noise of one picture", frame->raw.info.make, frame->raw.info.model);
+  if (const auto same = put_camera(frame->raw.info, found.profile); !same) return at(same.error());
+  for (const std::string& reason : noise->reasons) found.warnings.push_back(file + ": " + reason);
+  calib::put_picture_noise(*noise, *black, *setting, measured_today({file}), calib::gain_at(found.profile, *setting));
+  show_picture_noise(*noise, *frame, *black, found);
+  return found;
+}
+
 }  // namespace
 
 int run_calibrate_noise(const std::vector<std::string>& words) {
@@ -147,7 +175,7 @@ int run_calibrate_noise(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<CalibrateNoiseArgs>(parsed);
   if (const auto good = check_outputs(args.common); !good) return calibration_failed(good.error());
-  const auto found = calibrate_flats(args);
+  const auto found = args.darks.empty() ? calibrate_picture(args) : calibrate_flats(args);
   return found ? finish(args.common, *found) : calibration_failed(found.error());
 }
 

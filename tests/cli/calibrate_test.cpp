@@ -166,6 +166,42 @@ TEST_F(Calibrate, NoiseFindsGainReadNoiseAndFullWell) {
   EXPECT_GT(both["gains"][0]["sensor"]["dark_current_red_e_per_s"]["value"], 10);
 }
 
+TEST_F(Calibrate, OnePictureTellsItsNoiseAndIsHeldAgainstItsFile) {
+  const std::string night = file("n.dng");
+  const auto made = lowlux({"simulate",
+                            std::string(LOWLUX_TESTDATA) + "/pictures/kodim15.png",
+                            "-o",
+                            night,
+                            "--sensor",
+                            "ELD_NikonD850",
+                            "--gain",
+                            "ISO 1600",
+                            "--system-gain",
+                            "2",
+                            "--read-noise",
+                            "2",
+                            "--full-well",
+                            "7000",
+                            "--exposure",
+                            "0.1",
+                            "--luminance",
+                            "0.03",
+                            "--no-truth",
+                            "--quiet"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto done = lowlux({"calibrate", "noise", night, "-o", file("p.json"), "--report", file("p.html")});
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_TRUE(holds(done.out, "file, green")) << done.out;
+  const Json gain = profile("p.json")["gains"][0];
+  EXPECT_NEAR(gain["sensor"]["system_gain_dn_per_e"]["value"], 2, 0.2);
+  EXPECT_EQ(gain["provenance"].back()["figures"], "noise of one picture");
+  EXPECT_TRUE(holds(scratch_.read("p.html"), "file, green"));
+  const auto flat = lowlux({"calibrate", "noise", shoot("d", "dark", "0.1", 1)[0], "-o", file("q.json")});
+  EXPECT_EQ(flat.exit_code, 1);
+  EXPECT_EQ(std::count(flat.err.begin(), flat.err.end(), '\n'), 1) << flat.err;
+  EXPECT_FALSE(exists("q.json"));
+}
+
 TEST_F(Calibrate, MaskedPixelsOfAnOrdinaryFrameServe) {
   const std::string canon = std::string(LOWLUX_TESTDATA) + "/raws/canon_kissx4_ml_colorchart.dng";
   const auto light = lowlux({"calibrate", "black", canon, "-o", file("p.json")});
