@@ -12,6 +12,7 @@
 #include "capture/file/dng_source.h"
 #include "isp/base/executor.h"
 #include "isp/cli/args.h"
+#include "isp/cli/dark_files.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/outputs.h"
 #include "isp/cli/progress.h"
@@ -30,6 +31,7 @@ struct Task {
   isp::DevelopOptions options;
   isp::WriteOptions write;
   std::vector<Job> jobs;
+  std::optional<DarkSource> darks;
 };
 
 Error with_place(Error error, const std::string& where) {
@@ -74,7 +76,17 @@ DevelopOutcome develop_file(const Task& task, const Job& job, Executor& executor
     out.error = with_place(frame.error(), job.input);
     return out;
   }
-  Result<isp::Developed> developed = isp::develop(*frame, task.options, executor);
+  isp::DevelopOptions options = task.options;
+  if (task.darks) {
+    Result<std::shared_ptr<const DarkFrame>> dark = dark_frame_of(*task.darks, frame->raw);
+    if (!dark) {
+      out.error = with_place(dark.error(), job.input);
+      return out;
+    }
+    options.dark_frame = std::move(*dark);
+    clock.lap("dark frame's making");
+  }
+  Result<isp::Developed> developed = isp::develop(*frame, options, executor);
   if (!developed) {
     out.error = with_place(developed.error(), job.input);
     return out;
@@ -182,7 +194,10 @@ int run_develop(const std::vector<std::string>& words) {
   const Result<isp::DevelopOptions> options = complete_options(args, *format);
   if (!options) return usage_error(options.error());
 
-  Task task{args, *options, {}, std::move(*jobs)};
+  const Result<std::vector<std::string>> darks = dark_files(args);
+  if (!darks) return usage_error(darks.error());
+
+  Task task{args, *options, {}, std::move(*jobs), std::nullopt};
   task.write.overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
   task.write.software = "lowlux " + version_number();
   task.write.jpeg.quality = args.jpeg_quality;
@@ -194,6 +209,14 @@ int run_develop(const std::vector<std::string>& words) {
       fmt::print(stderr, "lowlux: {}: the folder cannot be made: {}\n", args.output, error.message());
       return exit_failed;
     }
+  }
+  if (!darks->empty()) {
+    Result<DarkSource> source = read_darks(*darks, args.dark);
+    if (!source) {
+      fmt::print(stderr, "{}\n", error_line(source.error().where, source.error()));
+      return exit_failed;
+    }
+    task.darks = *std::move(source);
   }
   return summarise(task, develop_all(task));
 }
