@@ -12,6 +12,15 @@ constexpr double far_out = 5;  // standard deviations: left out of means
 constexpr double hot = 8;      // standard deviations
 constexpr std::size_t fewest_hot = 16;
 
+double noise_of_differences(const Plane<float>& dn, int site) {
+  Plane<float> difference(dn.width() - 2, dn.height());
+  for (int y = 0; y < difference.height(); ++y) {
+    for (int x = 0; x < difference.width(); ++x) difference.at(x, y) = dn.at(x + 2, y) - dn.at(x, y);
+  }
+  const double deviation = spread_of(difference, site, least_deviation_dn).deviation;
+  return deviation * deviation / 2;
+}
+
 }  // namespace
 
 PerSite<DarkSite> sites_of(const DarkGroup& group) {
@@ -26,7 +35,7 @@ PerSite<DarkSite> sites_of(const DarkGroup& group) {
         ++n;
       }
     }
-    out[site] = {spread, group.frames > 1 && n > 0 ? sum / n : spread.deviation * spread.deviation};
+    out[site] = {spread, group.frames > 1 && n > 0 ? sum / n : noise_of_differences(group.mean_dn, site)};
   }
   return out;
 }

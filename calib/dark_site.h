@@ -9,10 +9,11 @@ namespace lowlux::calib {
 /// Figures of one site of a group of darks.
 struct DarkSite {
   SiteSpread spread;     // of the means
-  double noise_dn2 = 0;  // temporal, of one frame; of a single frame: with its pattern, so too large
+  double noise_dn2 = 0;  // temporal, of one frame
 };
 
-/// Pixels beyond five deviations of the means are left out of the noise.
+/// Pixels beyond five deviations of the means are left out of the noise. Of a single frame it is half the variance of
+/// the differences of neighbours: the pattern is in it, so that it is too large, but a glow or a scene is not.
 PerSite<DarkSite> sites_of(const DarkGroup& group);
 
 /// How much variance a hot pixel has for each DN it is above its site: the system gain [DN/e-], as the median over
