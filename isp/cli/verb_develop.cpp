@@ -64,6 +64,15 @@ class FileProgress {
   double reached_ = 0;
 };
 
+Result<isp::DevelopOptions> options_for(const Task& task, const RawFrame& frame) {
+  isp::DevelopOptions options = task.options;
+  if (!task.darks) return options;
+  Result<std::shared_ptr<const DarkFrame>> dark = dark_frame_of(*task.darks, frame.raw);
+  if (!dark) return tl::make_unexpected(dark.error());
+  options.dark_frame = std::move(*dark);
+  return options;
+}
+
 DevelopOutcome develop_file(const Task& task, const Job& job, Executor& executor, Progress& progress) {
   DevelopOutcome out{job.input, job.output};
   FileProgress done(progress, job.input);
@@ -76,17 +85,13 @@ DevelopOutcome develop_file(const Task& task, const Job& job, Executor& executor
     out.error = with_place(frame.error(), job.input);
     return out;
   }
-  isp::DevelopOptions options = task.options;
-  if (task.darks) {
-    Result<std::shared_ptr<const DarkFrame>> dark = dark_frame_of(*task.darks, frame->raw);
-    if (!dark) {
-      out.error = with_place(dark.error(), job.input);
-      return out;
-    }
-    options.dark_frame = std::move(*dark);
-    clock.lap("dark frame's making");
+  const Result<isp::DevelopOptions> options = options_for(task, *frame);
+  if (!options) {
+    out.error = with_place(options.error(), job.input);
+    return out;
   }
-  Result<isp::Developed> developed = isp::develop(*frame, options, executor);
+  if (task.darks) clock.lap("dark frame's making");
+  Result<isp::Developed> developed = isp::develop(*frame, *options, executor);
   if (!developed) {
     out.error = with_place(developed.error(), job.input);
     return out;

@@ -145,6 +145,22 @@ void decide_exposure(DevelopPlan& plan, const Thumbnail& thumbnail, const Vector
   plan.exposure_rule = name_of(automatic.rule);
 }
 
+void set_white(DevelopPlan& plan, const WhiteBalance& balance) {
+  plan.neutral = balance.neutral;
+  plan.white = balance.white;
+  plan.white_balance_rule = name_of(balance.source);
+  if (!balance.reason.empty()) plan.warnings.push_back(balance.reason);
+  for (int c = 0; c < 3; ++c) plan.white_gain[c] = static_cast<float>(1 / plan.neutral[c]);
+}
+
+// Nothing has to be repaired, multiplied, or taken off pixel by pixel.
+bool goes_from_codes(const RawFrame& frame, const DevelopPlan& plan) {
+  return frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.black.pattern &&
+         !plan.options.dark_frame && plan.black.dark_mean_e == PerSite<double>{} &&
+         frame.corrections.radial_gains.empty() &&
+         std::none_of(frame.corrections.gain_maps.begin(), frame.corrections.gain_maps.end(), has_effect);
+}
+
 void set_size(DevelopPlan& plan, const Rect& crop) {
   plan.width = plan.options.half ? crop.width / 2 : crop.width;
   plan.height = plan.options.half ? crop.height / 2 : crop.height;
@@ -198,21 +214,14 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   if (options.space != OutputSpace::camera)
     balance = with_white(choose_white(frame, options, thumbnail), frame, options);
   if (!balance) return tl::make_unexpected(std::move(balance.error()));
-  plan.neutral = balance->neutral;
-  plan.white = balance->white;
-  plan.white_balance_rule = name_of(balance->source);
-  if (!balance->reason.empty()) plan.warnings.push_back(balance->reason);
-  for (int c = 0; c < 3; ++c) plan.white_gain[c] = static_cast<float>(1 / plan.neutral[c]);
+  set_white(plan, *balance);
 
   const Result<Matrix3> balanced = balanced_to_output(frame, options, *balance);
   if (!balanced) return tl::make_unexpected(balanced.error());
   const Vector3 luminance = luminance_weights(options.space).value_or(Vector3{0, 1, 0});
   decide_exposure(plan, thumbnail, luminance_of_balanced(luminance, *balanced));
   set_transform(plan, *balanced, luminance);
-  plan.from_codes = frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.black.pattern &&
-                    dark == nullptr && plan.black.dark_mean_e == PerSite<double>{} &&
-                    frame.corrections.radial_gains.empty() &&
-                    std::none_of(frame.corrections.gain_maps.begin(), frame.corrections.gain_maps.end(), has_effect);
+  plan.from_codes = goes_from_codes(frame, plan);
   if (plan.from_codes || frame.raw.layout != SensorLayout::bayer) plan.electrons_at_white.reset();
   clock.lap("white and exposure");
   return plan;
