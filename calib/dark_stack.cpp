@@ -1,6 +1,7 @@
 #include "calib/dark_stack.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <utility>
 
@@ -10,7 +11,6 @@ namespace lowlux::calib {
 namespace {
 
 constexpr int most_frames = 32768;  // times 65535 stays within 32 bits
-constexpr double same_temperature_c = 1;
 
 std::int64_t pixels_of_site(const FrameSetting& s, int site) {
   return static_cast<std::int64_t>((s.width + 1 - (site & 1)) / 2) * ((s.height + 1 - (site >> 1)) / 2);
@@ -86,24 +86,29 @@ Result<DarkGroup> DarkStack::group() const {
   if (frames_ < 2) {
     return fail(ErrorCode::insufficient, fmt::format("found {} dark frames of one setting; noise needs two", frames_));
   }
+  return average();
+}
+
+DarkGroup DarkStack::average() const {
+  assert(frames_ > 0);
   DarkGroup out;
   out.setting = setting_;
   out.frames = frames_;
   out.mean_dn = Plane<float>(setting_.width, setting_.height);
   out.variance_dn2 = Plane<float>(setting_.width, setting_.height);
-  const double n = frames_;
+  const double n = frames_, degrees = std::max(1, frames_ - 1);
   PerSite<double> variance{}, row_variance{};
   for (int y = 0; y < setting_.height; ++y) {
     for (int x = 0; x < setting_.width; ++x) {
       const double sum = sum_.at(x, y);
-      const double pixel = std::max(0.0, (squares_.at(x, y) - sum * sum / n) / (n - 1));
+      const double pixel = std::max(0.0, (squares_.at(x, y) - sum * sum / n) / degrees);
       out.mean_dn.at(x, y) = static_cast<float>(first_.at(x, y) + sum / n);
       out.variance_dn2.at(x, y) = static_cast<float>(pixel);
       variance[site_of(x, y)] += pixel;
     }
     for (int parity = 0; parity < 2; ++parity) {
       const double sum = row_sum_[2 * y + parity];
-      row_variance[site_of(parity, y)] += (row_squares_[2 * y + parity] - sum * sum / n) / (n - 1);
+      row_variance[site_of(parity, y)] += (row_squares_[2 * y + parity] - sum * sum / n) / degrees;
     }
   }
   for (int site = 0; site < 4; ++site) {

@@ -10,6 +10,9 @@
 
 namespace lowlux::calib {
 
+/// Frames this close in temperature are of one setting.
+inline constexpr double same_temperature_c = 1;
+
 /// Dark frames of one exposure time and temperature, reduced to two planes of the active area.
 struct DarkGroup {
   FrameSetting setting;
@@ -30,7 +33,12 @@ class DarkStack {
   /// What was added. Errors: fewer than two frames, which tell nothing about noise.
   Result<DarkGroup> group() const;
 
+  /// The same of one frame or more. Of a single frame the variances are 0 and mean nothing.
+  DarkGroup average() const;
+
   int frames() const { return frames_; }
+  /// Of the first frame; there must be one.
+  const FrameSetting& setting() const { return setting_; }
 
  private:
   Result<void> begin(const RawDn& raw, FrameSetting setting);

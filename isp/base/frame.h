@@ -88,15 +88,16 @@ struct RawDn {
 };
 
 /// Black point of one frame, per CFA site. The pedestal [DN] is what is subtracted, or its mean where `pattern` is set;
-/// when it was measured on masked pixels it holds the dark charge too, and the dark mean left to subtract is 0.
-/// For SensorLayout::linear_rgb the four figures are those of R, G, B and B.
+/// when it was measured on masked pixels or dark frames it holds the dark charge too, and the dark mean left to
+/// subtract is 0. Of a dark frame it is the mean: what is subtracted is the frame itself (dark_frame.h). For
+/// SensorLayout::linear_rgb the four figures are those of R, G, B and B.
 struct BlackPoint {
   PerSite<double> pedestal_dn{};
   PerSite<double> pedestal_standard_error_dn{};  // 0 where it is quoted and not measured
   PerSite<double> dark_mean_e{};                 // left in the data once the pedestal is off; 0 if unknown
   PerSite<double> noise_std_dn{};                // of masked pixels; 0 where nothing was measured
   enum class Holds : std::uint8_t { pedestal_only, pedestal_and_dark } holds = Holds::pedestal_only;
-  enum class Source : std::uint8_t { masked_pixels, tag, given, profile } source = Source::tag;
+  enum class Source : std::uint8_t { masked_pixels, tag, given, profile, dark_frame } source = Source::tag;
   std::optional<BlackLevel> pattern;  // set when `source` is tag and four figures cannot express it
 };
 

@@ -110,6 +110,39 @@ void add_rendering(CLI::App& app, DevelopArgs& args) {
   app.add_flag("--half", o.half, "half size: exact 2x2 binning in place of demosaicing");
 }
 
+void add_darks(CLI::App& app, DarkArgs& dark) {
+  CLI::Option* frames =
+      app.add_option("--dark-frame", dark.words,
+                     "dark frames to take off in place of the black point: files or folders, many and of several "
+                     "exposure times if need be; may be repeated")
+          ->type_name("FILE[,FILE...]")
+          ->expected(1)
+          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  add_text(app, "--dark-noise", "SHARE",
+           "most that the dark frames may add to a picture's own variance in the dark (default 0.1)",
+           [&dark](const std::string& text) -> std::optional<std::string> {
+             const auto share = number_of(text);
+             if (!share || !(*share > 0 && *share <= 1)) return "is no share above 0 and at most 1";
+             dark.noise_share = *share;
+             return std::nullopt;
+           })
+      ->needs(frames);
+  add_text(app, "--dark-doubling", "C|PROFILE.json",
+           "degrees over which dark current doubles, for darks of another temperature, or a profile that tells "
+           "(default: as the darks themselves tell)",
+           [&dark](const std::string& text) -> std::optional<std::string> {
+             dark.doubling_c = number_of(text);
+             if (!dark.doubling_c) {
+               if (!text.ends_with(".json")) return "is neither a number of degrees nor a profile (.json)";
+               dark.doubling_profile = text;
+             } else if (!(*dark.doubling_c >= 2 && *dark.doubling_c <= 30)) {
+               return "is not within 2 to 30 degrees";
+             }
+             return std::nullopt;
+           })
+      ->needs(frames);
+}
+
 void add_output(CLI::App& app, DevelopArgs& args) {
   app.add_option("-o,--output", args.output,
                  "picture to write (.png .jpg .tif .exr .pfm), or a folder for several (made if it ends with /)")
@@ -141,6 +174,7 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   app.add_option("RAW", args.inputs, "raw files")->required();
   add_output(app, args);
   add_rendering(app, args);
+  add_darks(app, args.dark);
   return parse(app, words, args);
 }
 

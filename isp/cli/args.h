@@ -11,6 +11,14 @@
 
 namespace lowlux::cli {
 
+/// Dark frames: --dark-frame, --dark-noise, --dark-doubling.
+struct DarkArgs {
+  std::vector<std::string> words;    // files, files parted by commas, folders; empty: none are taken off
+  double noise_share = 0.1;          // most that they may add to a picture's variance in the dark
+  std::optional<double> doubling_c;  // given as a number
+  std::string doubling_profile;      // or as a profile's file
+};
+
 /// `develop`: what the command line asks for, checked as far as that is possible without opening a file.
 struct DevelopArgs {
   std::vector<std::string> inputs;
@@ -29,6 +37,7 @@ struct DevelopArgs {
   bool json = false;
   bool timings = false;
   bool quiet = false;
+  DarkArgs dark;
 };
 
 struct InfoArgs {

@@ -31,6 +31,8 @@ const char* name_of(BlackPoint::Source source) {
       return "given";
     case BlackPoint::Source::profile:
       return "profile";
+    case BlackPoint::Source::dark_frame:
+      return "dark-frame";
   }
   return "";
 }
@@ -41,6 +43,18 @@ Json black_json(const BlackPoint& black) {
           {"standard_error_dn", black.pedestal_standard_error_dn},
           {"noise_std_dn", black.noise_std_dn},
           {"holds_dark", black.holds == BlackPoint::Holds::pedestal_and_dark}};
+}
+
+Json dark_json(const DarkFrame* dark) {
+  if (dark == nullptr) return nullptr;
+  return {{"frames", dark->frames},
+          {"settings", dark->settings},
+          {"scale", dark->scale},
+          {"doubling_c", dark->doubling_c > 0 ? Json(dark->doubling_c) : Json(nullptr)},
+          {"noise_share", dark->noise_share},
+          {"pattern_share", dark->pattern_share},
+          {"added_variance_dn2", dark->added_variance_dn2},
+          {"unknown_pixels", dark->unknown.size()}};
 }
 
 Json tag_json(const std::optional<BlackLevel>& tag) {
@@ -101,6 +115,7 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"width", outcome.width},
             {"height", outcome.height},
             {"black", black_json(plan.black)},
+            {"dark_frame", dark_json(plan.options.dark_frame.get())},
             {"unit", plan.electrons_at_white ? "electrons" : "fraction-of-white"},
             {"white_balance", white_json(plan)},
             {"exposure", {{"ev", plan.exposure_ev}, {"rule", plan.exposure_rule}}},

@@ -12,6 +12,7 @@
 #include "capture/file/dng_source.h"
 #include "isp/base/executor.h"
 #include "isp/cli/args.h"
+#include "isp/cli/dark_files.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/outputs.h"
 #include "isp/cli/profile_file.h"
@@ -33,6 +34,7 @@ struct Task {
   isp::WriteOptions write;
   std::vector<Job> jobs;
   std::optional<CameraProfile> profile;
+  std::optional<DarkSource> darks;
 };
 
 Error with_place(Error error, const std::string& where) {
@@ -65,6 +67,22 @@ class FileProgress {
   double reached_ = 0;
 };
 
+// What holds for one frame: profile and darks; what the profile says goes into the frame.
+Result<isp::DevelopOptions> options_for(const Task& task, RawFrame& frame) {
+  isp::DevelopOptions options = task.options;
+  if (task.profile) {
+    const bool everything = !task.args.profile.empty();
+    const auto used = use_profile(*task.profile, everything, frame, options.black);
+    if (!used) return tl::make_unexpected(used.error());
+  }
+  if (!task.darks) return options;
+  Result<std::shared_ptr<const DarkFrame>> dark = dark_frame_of(*task.darks, frame.raw);
+  if (!dark) return tl::make_unexpected(dark.error());
+  options.dark_frame = std::move(*dark);
+  options.black = task.options.black;  // the darks hold it
+  return options;
+}
+
 DevelopOutcome develop_file(const Task& task, const Job& job, Executor& executor, Progress& progress) {
   DevelopOutcome out{job.input, job.output};
   FileProgress done(progress, job.input);
@@ -77,15 +95,13 @@ DevelopOutcome develop_file(const Task& task, const Job& job, Executor& executor
     out.error = with_place(frame.error(), job.input);
     return out;
   }
-  isp::DevelopOptions options = task.options;
-  if (task.profile) {
-    const bool everything = !task.args.profile.empty();
-    if (const auto used = use_profile(*task.profile, everything, *frame, options.black); !used) {
-      out.error = with_place(used.error(), job.input);
-      return out;
-    }
+  const Result<isp::DevelopOptions> options = options_for(task, *frame);
+  if (!options) {
+    out.error = with_place(options.error(), job.input);
+    return out;
   }
-  Result<isp::Developed> developed = isp::develop(*frame, options, executor);
+  if (task.darks) clock.lap("dark frame's making");
+  Result<isp::Developed> developed = isp::develop(*frame, *options, executor);
   if (!developed) {
     out.error = with_place(developed.error(), job.input);
     return out;
@@ -193,7 +209,10 @@ int run_develop(const std::vector<std::string>& words) {
   const Result<isp::DevelopOptions> options = complete_options(args, *format);
   if (!options) return usage_error(options.error());
 
-  Task task{args, *options, {}, std::move(*jobs), {}};
+  const Result<std::vector<std::string>> darks = dark_files(args);
+  if (!darks) return usage_error(darks.error());
+
+  Task task{args, *options, {}, std::move(*jobs), std::nullopt, std::nullopt};
   if (const std::string& file = args.profile.empty() ? args.black_profile : args.profile; !file.empty()) {
     auto profile = read_profile(file);
     if (!profile) {
@@ -213,6 +232,14 @@ int run_develop(const std::vector<std::string>& words) {
       fmt::print(stderr, "lowlux: {}: the folder cannot be made: {}\n", args.output, error.message());
       return exit_failed;
     }
+  }
+  if (!darks->empty()) {
+    Result<DarkSource> source = read_darks(*darks, args.dark);
+    if (!source) {
+      fmt::print(stderr, "{}\n", error_line(source.error().where, source.error()));
+      return exit_failed;
+    }
+    task.darks = *std::move(source);
   }
   return summarise(task, develop_all(task));
 }

@@ -6,6 +6,7 @@
 
 #include "isp/raw/bin_plane.h"
 #include "isp/raw/corrections.h"
+#include "isp/raw/subtract_dark_frame.h"
 #include "isp/raw/to_linear.h"
 
 namespace lowlux::isp {
@@ -48,13 +49,22 @@ DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
           {of_crop(plan.black.pedestal_dn, crop), of_crop(site_gain(raw, plan, range), crop)}};
 }
 
+// Black and dark off: a dark frame holds both.
+void take_black_off(const RawDn& raw, const DevelopPlan& plan, PlaneView<float> out, Executor& executor) {
+  if (plan.options.dark_frame) {
+    to_fraction(raw, *plan.options.dark_frame, plan.black, out, executor);
+  } else {
+    to_fraction(raw, plan.black, out, executor);
+  }
+}
+
 }  // namespace
 
 // Bayer frames that have to be repaired or multiplied first: in electrons where the gain is known.
 PerSite<float> Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& plan) {
   const RawDn& raw = frame.raw;
   fit(mosaic_, raw.active.width, raw.active.height);
-  to_fraction(raw, plan.black, mosaic_.view(), executor_);
+  take_black_off(raw, plan, mosaic_.view(), executor_);
   PerSite<double> units_at_white{1, 1, 1, 1};
   if (plan.electrons_at_white) {
     units_at_white = *plan.electrons_at_white;
@@ -87,7 +97,7 @@ RgbInput Pipeline::prepare_planes(const RawFrame& frame, const DevelopPlan& plan
   const int planes = monochrome ? 1 : 3;
   for (int c = 0; c < planes; ++c) fit(planes_[c], raw.active.width, raw.active.height);
   if (monochrome) {
-    to_fraction(raw, plan.black, planes_[0].view(), executor_);
+    take_black_off(raw, plan, planes_[0].view(), executor_);
     repair(planes_[0].view(), plan.defects, 1);
     apply_gains(frame.corrections, planes_[0].view(), executor_);
   } else {

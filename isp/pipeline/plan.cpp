@@ -6,6 +6,7 @@
 
 #include "isp/pipeline/stage_clock.h"
 #include "isp/raw/corrections.h"
+#include "isp/raw/subtract_dark_frame.h"
 #include "isp/raw/thumbnail.h"
 #include "isp/raw/to_linear.h"
 #include "isp/render/output_space.h"
@@ -30,14 +31,23 @@ Result<void> check(const RawFrame& frame, const DevelopOptions& o) {
   return {};
 }
 
-// Defects the source names and, if asked for, those that stand out.
-std::vector<Pixel> all_defects(const RawFrame& frame, DevelopPlan& plan, double black_noise_dn, Executor& executor) {
+// Defects the source names, those whose dark is unknown and, if asked for, those that stand out of what is measured.
+std::vector<Pixel> all_defects(const RawFrame& frame, const RawDn& measured, DevelopPlan& plan, double black_noise_dn,
+                               Executor& executor) {
   const auto named = named_defects(frame.raw, frame.corrections.defects);
   if (!named)
     plan.warnings.emplace_back("the file names a large part of its pixels as defective: these are not repaired");
   std::vector<Pixel> defects = named.value_or(std::vector<Pixel>{});
+  if (plan.options.dark_frame) {
+    defects = merged(defects, *named_defects(frame.raw, plan.options.dark_frame->unknown));
+  }
   if (!plan.options.find_defects) return defects;
-  const std::vector<Pixel> found = find_defects(frame.raw, plan.black, black_noise_dn, executor);
+  DefectNoise noise{black_noise_dn};
+  // A variance of scale * x at the fraction x of white is scale * range for each DN.
+  if (frame.noise) {
+    noise.shot_dn = *std::ranges::max_element(frame.noise->scale) * mean_range_dn(frame.raw, plan.black);
+  }
+  const std::vector<Pixel> found = find_defects(measured, plan.black, noise, executor);
   return merged(defects, found);
 }
 
@@ -135,6 +145,22 @@ void decide_exposure(DevelopPlan& plan, const Thumbnail& thumbnail, const Vector
   plan.exposure_rule = name_of(automatic.rule);
 }
 
+void set_white(DevelopPlan& plan, const WhiteBalance& balance) {
+  plan.neutral = balance.neutral;
+  plan.white = balance.white;
+  plan.white_balance_rule = name_of(balance.source);
+  if (!balance.reason.empty()) plan.warnings.push_back(balance.reason);
+  for (int c = 0; c < 3; ++c) plan.white_gain[c] = static_cast<float>(1 / plan.neutral[c]);
+}
+
+// Nothing has to be repaired, multiplied, or taken off pixel by pixel.
+bool goes_from_codes(const RawFrame& frame, const DevelopPlan& plan) {
+  return frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.black.pattern &&
+         !plan.options.dark_frame && plan.black.dark_mean_e == PerSite<double>{} &&
+         frame.corrections.radial_gains.empty() &&
+         std::none_of(frame.corrections.gain_maps.begin(), frame.corrections.gain_maps.end(), has_effect);
+}
+
 void set_size(DevelopPlan& plan, const Rect& crop) {
   plan.width = plan.options.half ? crop.width / 2 : crop.width;
   plan.height = plan.options.half ? crop.height / 2 : crop.height;
@@ -164,35 +190,38 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   set_size(plan, frame.raw.default_crop);
   StageClock clock(plan.times);
 
-  Result<BlackPoint> black = choose_black(frame.raw, options.black);
+  const DarkFrame* dark = options.dark_frame.get();
+  Result<BlackPoint> black = dark != nullptr ? black_of(frame.raw, *dark) : choose_black(frame.raw, options.black);
   if (!black) return tl::make_unexpected(std::move(black.error()));
   plan.black = std::move(*black);
   if (frame.noise) plan.electrons_at_white = electrons_at_white(frame.raw, *frame.noise);
   clock.lap("black point");
 
-  const Thumbnail thumbnail = make_thumbnail(frame, plan.black, executor);
+  std::optional<RawFrame> without_dark;
+  if (dark != nullptr) {
+    plan.warnings.insert(plan.warnings.end(), dark->warnings.begin(), dark->warnings.end());
+    without_dark = measurable_without_dark(frame, *dark, plan.black, executor);
+    clock.lap("dark frame");
+  }
+  const RawFrame& measured = without_dark ? *without_dark : frame;
+  const Thumbnail thumbnail = make_thumbnail(measured, plan.black, executor);
   clock.lap("thumbnail");
-  plan.defects = all_defects(frame, plan, thumbnail.black_noise_std * mean_range_dn(frame.raw, plan.black), executor);
+  plan.defects = all_defects(frame, measured.raw, plan,
+                             thumbnail.black_noise_std * mean_range_dn(frame.raw, plan.black), executor);
   clock.lap("defects");
 
   Result<WhiteBalance> balance{};
   if (options.space != OutputSpace::camera)
     balance = with_white(choose_white(frame, options, thumbnail), frame, options);
   if (!balance) return tl::make_unexpected(std::move(balance.error()));
-  plan.neutral = balance->neutral;
-  plan.white = balance->white;
-  plan.white_balance_rule = name_of(balance->source);
-  if (!balance->reason.empty()) plan.warnings.push_back(balance->reason);
-  for (int c = 0; c < 3; ++c) plan.white_gain[c] = static_cast<float>(1 / plan.neutral[c]);
+  set_white(plan, *balance);
 
   const Result<Matrix3> balanced = balanced_to_output(frame, options, *balance);
   if (!balanced) return tl::make_unexpected(balanced.error());
   const Vector3 luminance = luminance_weights(options.space).value_or(Vector3{0, 1, 0});
   decide_exposure(plan, thumbnail, luminance_of_balanced(luminance, *balanced));
   set_transform(plan, *balanced, luminance);
-  plan.from_codes = frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.black.pattern &&
-                    plan.black.dark_mean_e == PerSite<double>{} && frame.corrections.radial_gains.empty() &&
-                    std::none_of(frame.corrections.gain_maps.begin(), frame.corrections.gain_maps.end(), has_effect);
+  plan.from_codes = goes_from_codes(frame, plan);
   if (plan.from_codes || frame.raw.layout != SensorLayout::bayer) plan.electrons_at_white.reset();
   clock.lap("white and exposure");
   return plan;

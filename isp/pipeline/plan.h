@@ -1,9 +1,11 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
 
+#include "isp/base/dark_frame.h"
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
 #include "isp/base/image.h"
@@ -33,7 +35,8 @@ struct DevelopOptions {
   SampleType samples = SampleType::u8;  // f32 is scene-linear: signed, unbounded, without tone
   bool half = false;                    // exact 2x2 binning in place of demosaicing
   BlackRequest black;
-  bool find_defects = true;  // hot and dead pixels beyond those the source names
+  bool find_defects = true;                     // hot and dead pixels beyond those the source names
+  std::shared_ptr<const DarkFrame> dark_frame;  // set: taken off pixel by pixel in place of `black`
 };
 
 /// Time one step took.
@@ -71,9 +74,10 @@ struct DevelopPlan {
 /// with float samples. Error: invalid_argument.
 Result<void> check_options(const DevelopOptions& options);
 
-/// Measures black, noise, exposure and white of a frame, and decides how to develop it. Errors: no black point
-/// (insufficient), no colour calibration for a space other than `camera` (insufficient), white not above black,
-/// matrices that cannot be (malformed), options that do not fit together or the frame (invalid_argument).
+/// Measures black, noise, exposure and white of a frame, and decides how to develop it. With a dark frame, all is
+/// measured on what is left when it is off. Errors: no black point (insufficient), those of black_of, no colour
+/// calibration for a space other than `camera` (insufficient), white not above black, matrices that cannot be
+/// (malformed), options that do not fit together or the frame (invalid_argument).
 Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
 
 }  // namespace lowlux::isp

@@ -14,7 +14,14 @@ namespace {
 constexpr double range_factor = 4;
 constexpr double noise_factor = 8;
 constexpr double floor_of_white = 0.01;
-constexpr double max_shared = 0.1;
+constexpr double known_noise_factor = 5, detail_factor = 12;
+constexpr double noise_range = 4.5;  // of eight normal deviates: one in a hundred has more
+constexpr double max_shared = 0.1, max_shared_green = 0.07;
+// A Gaussian of 1.5 pixels FWHM, centred: exp(-1/2 / 0.637^2) less a quarter of it for the neighbour across. At green
+// sites the mean of red and blue counts, which cameras see half as strong.
+constexpr double star_share = 0.2187, star_share_green = 0.11;
+constexpr double shared_deviation = 0.44;  // of the neighbours' mean excess, in standard deviations of a pixel
+constexpr double certain = 3.5;            // standard deviations
 constexpr std::int64_t max_named_share = 16;
 
 struct Neighbours {
@@ -30,16 +37,21 @@ Neighbours eight_same_colour(const PlaneView<const std::uint16_t>& dn, int x, in
   return {*std::min_element(v.begin(), v.end()), *std::max_element(v.begin(), v.end())};
 }
 
-// How far a pixel stands out of the mean of its four nearest neighbours of the same colour that lie inside the plane.
+// How far a pixel stands out of the median of its four nearest neighbours of the same colour that lie inside the plane:
+// a star beside them reaches one or two.
 double excess(const PlaneView<const std::uint16_t>& dn, int x, int y) {
-  double sum = 0;
-  int n = 0;
+  int sum = 0, n = 0, low = 65535, high = 0;
   for (const auto [dx, dy] : {std::array{-2, 0}, {2, 0}, {0, -2}, {0, 2}}) {
     if (x + dx < 0 || x + dx >= dn.width || y + dy < 0 || y + dy >= dn.height) continue;
-    sum += dn.at(x + dx, y + dy);
+    const int value = dn.at(x + dx, y + dy);
+    sum += value;
+    low = std::min(low, value);
+    high = std::max(high, value);
     ++n;
   }
-  return n > 0 ? dn.at(x, y) - sum / n : 0.0;
+  if (n == 0) return 0;
+  const double median = n > 2 ? static_cast<double>(sum - low - high) / (n - 2) : static_cast<double>(sum) / n;
+  return dn.at(x, y) - median;
 }
 
 // The direct neighbours' mean excess in the direction of this pixel's own.
@@ -47,23 +59,58 @@ double shared_excess(const PlaneView<const std::uint16_t>& dn, int x, int y) {
   return (excess(dn, x - 1, y) + excess(dn, x + 1, y) + excess(dn, x, y - 1) + excess(dn, x, y + 1)) / 4;
 }
 
-bool is_defect(const PlaneView<const std::uint16_t>& dn, int x, int y, double floor_dn) {
-  const Neighbours n = eight_same_colour(dn, x, y);
-  const int value = dn.at(x, y);
-  const double beyond = value > n.high ? value - n.high : n.low - value;
-  if (beyond <= range_factor * (n.high - n.low) + floor_dn) return false;
-  const double own = excess(dn, x, y);
-  return shared_excess(dn, x, y) * (own > 0 ? 1 : -1) < max_shared * std::fabs(own);
+// What of a defect's surroundings depends on the frame, not on the pixel.
+struct Judge {
+  PlaneView<const std::uint16_t> dn;
+  BayerPhase phase;
+  PerSite<double> black_dn;
+  DefectNoise noise;
+  double floor_dn;  // least distance from the neighbours
+
+  double variance(int x, int y, double dn_value) const {
+    const double level = std::max(0.0, dn_value - black_dn[site_of(x, y)]);
+    return noise.black_std_dn * noise.black_std_dn + noise.shot_dn * level;
+  }
+  bool noise_is_known() const { return noise.shot_dn > 0 && noise.black_std_dn > 0; }
+};
+
+double least_distance(const Judge& judge, int x, int y, const Neighbours& n, int nearer) {
+  const double range = n.high - n.low;
+  if (!judge.noise_is_known()) return range_factor * range + judge.floor_dn;
+  const double sigma = std::sqrt(judge.variance(x, y, nearer));
+  return detail_factor * std::max(0.0, range - noise_range * sigma) + known_noise_factor * sigma;
+}
+
+double most_shared(const Judge& judge, int x, int y, double own) {
+  const bool green = colour_at(judge.phase, x, y) == CfaColour::green;
+  const double cap = (green ? max_shared_green : max_shared) * own;
+  if (!judge.noise_is_known()) return cap;
+  double variance = 0;
+  for (const auto [dx, dy] : {std::array{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+    variance += judge.variance(x + dx, y + dy, judge.dn.at(x + dx, y + dy)) / 4;
+  }
+  const double scatter = shared_deviation * std::sqrt(variance);
+  return std::min(cap, (green ? star_share_green : star_share) * own - certain * scatter);
+}
+
+bool is_defect(const Judge& judge, int x, int y) {
+  const Neighbours n = eight_same_colour(judge.dn, x, y);
+  const int value = judge.dn.at(x, y);
+  const bool hot = value > n.high;
+  const double beyond = hot ? value - n.high : n.low - value;
+  if (beyond <= least_distance(judge, x, y, n, hot ? n.high : n.low)) return false;
+  const double own = excess(judge.dn, x, y);
+  return shared_excess(judge.dn, x, y) * (own > 0 ? 1 : -1) < most_shared(judge, x, y, std::fabs(own));
 }
 
 // Cheap first test of a whole row, so that the careful one runs on few pixels: out of the range of left and right.
-void judge_row(const PlaneView<const std::uint16_t>& dn, int y, double floor_dn, std::vector<Pixel>& found) {
-  const std::uint16_t* row = dn.row(y);
-  const int floor = static_cast<int>(std::min(floor_dn, 65536.0));
-  for (int x = 2; x < dn.width - 2; ++x) {
+void judge_row(const Judge& judge, int y, std::vector<Pixel>& found) {
+  const std::uint16_t* row = judge.dn.row(y);
+  const int floor = static_cast<int>(std::min(judge.floor_dn, 65536.0));
+  for (int x = 2; x < judge.dn.width - 2; ++x) {
     const int left = row[x - 2], right = row[x + 2], value = row[x];
     const bool outside = value > std::max(left, right) + floor || value < std::min(left, right) - floor;
-    if (outside && is_defect(dn, x, y, floor_dn)) found.push_back({x, y});
+    if (outside && is_defect(judge, x, y)) found.push_back({x, y});
   }
 }
 
@@ -71,17 +118,19 @@ bool before(const Pixel& a, const Pixel& b) { return a.y != b.y ? a.y < b.y : a.
 
 }  // namespace
 
-std::vector<Pixel> find_defects(const RawDn& raw, const BlackPoint& black, double noise_std_dn, Executor& executor) {
+std::vector<Pixel> find_defects(const RawDn& raw, const BlackPoint& black, const DefectNoise& noise,
+                                Executor& executor) {
   const Rect& a = raw.active;
   if (raw.layout != SensorLayout::bayer || a.width < 5 || a.height < 5) return {};
   const PlaneView<const std::uint16_t> dn = raw.dn.view().crop(a.x, a.y, a.width, a.height);
   double range = 0;
   for (int site = 0; site < 4; ++site) range = std::max(range, white_at(raw, site) - black.pedestal_dn[site]);
-  const double floor_dn = noise_factor * noise_std_dn + floor_of_white * range;
+  Judge judge{dn, raw.phase, black.pedestal_dn, noise, noise_factor * noise.black_std_dn + floor_of_white * range};
+  if (judge.noise_is_known()) judge.floor_dn = known_noise_factor * noise.black_std_dn;
   std::vector<std::vector<Pixel>> found(executor.width());
   for_each_band(executor, a.height, [&](RowBand band, int index) {
     const int last = std::min(band.last, a.height - 2);
-    for (int y = std::max(band.first, 2); y < last; ++y) judge_row(dn, y, floor_dn, found[index]);
+    for (int y = std::max(band.first, 2); y < last; ++y) judge_row(judge, y, found[index]);
   });
   std::vector<Pixel> all;
   for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());

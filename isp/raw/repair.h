@@ -15,16 +15,25 @@ struct Pixel {
   friend bool operator==(const Pixel&, const Pixel&) = default;
 };
 
+/// Temporal variance of a code v DN above black: black_std_dn^2 + shot_dn * v.
+struct DefectNoise {
+  double black_std_dn = 0;  // 0 if unknown
+  double shot_dn = 0;       // the system gain [DN/e-]; 0 if unknown
+};
+
 /// Finds hot and dead pixels of a Bayer frame by one fact of optics: a point of light passes a lens and so never lands
 /// in a single pixel, while a defect does. A pixel is defective when both hold (all in DN above black):
 ///   1. it lies outside the range of its eight nearest neighbours of the same colour, beyond the nearer end by more
 ///   than
-///      4 ranges + 8 noise_std_dn + 1 % of the range from black to white;
-///   2. its four direct neighbours, against their own same-colour surroundings, share less than a tenth of its excess
-///      (a star of 1.5 pixels FWHM gives them two fifths).
-/// @param noise_std_dn  standard deviation of black pixels, 0 if unknown
+///      4 ranges + 8 black_std_dn + 1 % of the range from black to white;
+///      where the noise is known at every level (sigma), 12 times what of the range noise does not explain + 5 sigma;
+///   2. its four direct neighbours, against the median of their own same-colour surroundings, share less than a tenth
+///   of its excess, at
+///      green sites 7 %, and so little that 3.5 standard deviations of noise do not make it of a star's. A star of 1.5
+///      pixels FWHM, in the middle of the pixel, gives them a fifth; at green sites a ninth, red and blue being weaker.
 /// @return ascending by row, then column. Pixels within two of the border are not judged.
-std::vector<Pixel> find_defects(const RawDn& raw, const BlackPoint& black, double noise_std_dn, Executor& executor);
+std::vector<Pixel> find_defects(const RawDn& raw, const BlackPoint& black, const DefectNoise& noise,
+                                Executor& executor);
 
 /// The pixels a source names as defective that lie in the active area, ascending, each once; nullopt if it names more
 /// than a sixteenth of them (repeats counted), which is a fault of the source and would take memory without bound.

@@ -181,6 +181,33 @@ TEST(DarkSeries, ListsTheHotPixelsAndNoOthers) {
   EXPECT_EQ(found->hot_group_exposure_s, time_s);
 }
 
+TEST(DarkSeries, SixteenDarksTellTheDefectsAboveEightDeviationsOfOneFramesTemporalNoise) {
+  SensorBench bench{.sensor = test::modern_small(), .width = 512, .height = 512};
+  bench.sensor.hot_pixel_fraction = 0.002;
+  bench.sensor.hot_pixel_current_e_per_s = 100;
+  const SensorModel& s = bench.sensor;
+  const auto found = fit_dark_series(groups_at(bench, {{0, 20}, {10, 20}}, 16), exact_gain(bench));
+  ASSERT_TRUE(found) << found.error().message;
+  double truth = 0, both = 0;
+  for (int y = 0; y < bench.height; ++y) {
+    std::vector<float> charge(bench.width, 0);
+    std::vector<std::uint32_t> scratch(bench.width);
+    capture::add_hot_pixels({bench.seed, 0, static_cast<std::uint32_t>(y)}, s.hot_pixel_fraction,
+                            s.hot_pixel_current_e_per_s * 10, charge, scratch);
+    for (int x = 0; x < bench.width; ++x) {
+      const double dark_e = 10 * s.dark_current_e_per_s[static_cast<int>(colour_at(bench.phase, x, y))];
+      if (charge[x] <= 8 * std::sqrt(dark_e + std::pow(s.read_noise_e, 2) + 1 / (12 * 0.47 * 0.47))) continue;
+      ++truth;
+      both += std::ranges::any_of(found->hot, [&](const HotPixel& hot) { return hot.x == x && hot.y == y; });
+    }
+  }
+  ASSERT_GT(truth, 400);
+  // Only what lies within 1.25 deviations (4 e-) of the threshold, five standard errors of a mean of 16, may fall on
+  // either side: of charges of 1000 e- in the mean that is less than a hundredth.
+  EXPECT_GT(both, 0.98 * truth);
+  EXPECT_GT(both, 0.98 * static_cast<double>(found->hot.size()));
+}
+
 std::string refusal(std::vector<DarkGroup> groups, const Estimate& gain = {0.47, 0.001}) {
   const auto found = fit_dark_series(groups, gain);
   return found ? "" : found.error().message;

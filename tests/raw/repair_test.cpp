@@ -38,7 +38,7 @@ void add_star(RawDn& raw, double cx, double cy, double fwhm, double peak_dn) {
 
 std::vector<Pixel> defects_of(const RawDn& raw, int threads = 1) {
   PoolExecutor pool(threads);
-  return find_defects(raw, *choose_black(raw, {BlackChoice::metadata}), read_noise_dn, pool);
+  return find_defects(raw, *choose_black(raw, {BlackChoice::metadata}), {read_noise_dn}, pool);
 }
 
 TEST(FindDefects, FindsHotAndDeadPixelsAndNothingElse) {

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "calib/dark_stack.h"
+#include "isp/base/dark_frame.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+
+namespace lowlux::calib {
+
+/// How darks become the dark frame of a picture.
+struct DarkRequest {
+  double noise_share = 0.1;                    // most that may be added to the picture's own variance in the dark, 0..1
+  std::optional<double> doubling_c;            // degrees over which dark charge doubles, 2..30; absent: fitted
+  std::optional<PerSite<double>> masked_dn;    // the picture's masked pixels: pedestal and dark charge in one
+  std::optional<PerSite<double>> pedestal_dn;  // the file's tag: level of no charge
+};
+
+/// The dark frame of a picture: see weigh_darks for how times and temperatures are scaled, limit_noise for what is kept
+/// of a mean of few darks. Pixels are `unknown` whose darks come within 5 % of the range to white, or whose temporal
+/// noise in the picture is more than 5 times that of their site.
+/// A pedestal follows from masked pixels where there are any: that with which the scaled darks have their level.
+/// @param groups  of DarkLibrary
+/// Errors: those of weigh_darks; a request out of its range; a picture without exposure time; darks of another camera,
+/// size, mosaic or gain; darks that hold light (one side brighter than the other by more than one frame's noise and a
+/// quarter of the dark charge; a level that is not the masked pixels'; more than 1 % of the picture's pixels four
+/// standard deviations below them); more than a sixteenth of the pixels unknown.
+Result<DarkFrame> make_dark_frame(std::span<const DarkGroup> groups, const RawDn& picture, const DarkRequest& request);
+
+}  // namespace lowlux::calib

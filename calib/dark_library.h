@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calib/dark_stack.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+
+namespace lowlux::calib {
+
+/// Dark frames of one camera, sorted by exposure time and temperature as they come: one DarkStack for each setting.
+class DarkLibrary {
+ public:
+  /// Adds a frame to the stack of its exposure time whose first frame is within a degree. Errors: those of DarkStack;
+  /// another camera, size, mosaic, white level or gain than the first frame's; more than 8 settings, which take 10
+  /// bytes for each pixel each.
+  Result<void> add(const RawDn& raw);
+
+  /// What was added, in the order of first frames. Of a single frame the variances are 0 and mean nothing.
+  std::vector<DarkGroup> groups() const;
+
+ private:
+  std::vector<DarkStack> stacks_;
+};
+
+}  // namespace lowlux::calib

@@ -1,0 +1,92 @@
+#include "calib/light_in_darks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace lowlux::calib {
+namespace {
+
+constexpr double certain = 5;             // standard errors
+constexpr double least_gradient = 0.25;   // of the dark charge, from edge to edge
+constexpr double far_off = 2, off = 0.5;  // standard deviations of a pixel
+constexpr double far_off_range = 1e-3;
+constexpr double below = 4;  // standard deviations
+constexpr double most_below = 0.01;
+
+PixelMask outliers_of(const DarkGroup& group, const PerSite<DarkSite>& sites) {
+  PixelMask mask(group.mean_dn.width(), group.mean_dn.height());
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) {
+      const SiteSpread& s = sites[site_of(x, y)].spread;
+      // A gradient widens the spread itself; what lies far out of it is a hot pixel.
+      mask.at(x, y) = std::fabs(group.mean_dn.at(x, y) - s.median) > certain * std::max(s.deviation, 0.5) ? 1 : 0;
+    }
+  }
+  return mask;
+}
+
+}  // namespace
+
+Result<void> check_even_dark(const DarkGroup& group, const PerSite<DarkSite>& sites,
+                             const std::optional<PerSite<double>>& pedestal_dn) {
+  const double one = 1;
+  const PixelMask mask = outliers_of(group, sites);
+  for (int site = 0; site < 4; ++site) {
+    const ImageFigures f = figures_of({{&group, 1}, {&one, 1}}, mask, site);
+    const double charge = pedestal_dn ? std::max(0.0, f.mean - (*pedestal_dn)[site]) : 0;
+    const double floor = std::max(std::sqrt(sites[site].noise_dn2), least_gradient * charge);
+    for (const auto& [change, error] : {std::pair(f.change_x, f.error_x), std::pair(f.change_y, f.error_y)}) {
+      if (std::fabs(change) <= std::max(certain * error, floor)) continue;
+      return fail(ErrorCode::malformed,
+                  fmt::format("the darks of {:g} s change by {:.3g} DN across the frame, at most {:.3g} DN are dark "
+                              "current's; light gets in, or the sensor glows; cover camera and viewfinder and take "
+                              "them again",
+                              *group.setting.exposure_s, std::fabs(change), floor));
+    }
+  }
+  return {};
+}
+
+Result<void> check_masked_level(const RawDn& picture, const PerSite<double>& masked_dn, DarkFrame& dark) {
+  double worst = 0;
+  for (int site = 0; site < 4; ++site) {
+    const double distance = dark.mean_dn[site] - masked_dn[site];
+    const double range = *std::ranges::min_element(picture.white_dn) - masked_dn[site];
+    if (std::fabs(distance) > std::max(far_off * dark.noise_std_dn[site], far_off_range * range)) {
+      return fail(
+          ErrorCode::malformed,
+          fmt::format("the darks lie {:.3g} DN {} the picture's masked pixels; {}; take them again, covered, as "
+                      "warm as the picture",
+                      std::fabs(distance), distance > 0 ? "above" : "below",
+                      distance > 0 ? "light gets in, or they are warmer" : "they are colder"));
+    }
+    if (std::fabs(distance) > off * dark.noise_std_dn[site] && std::fabs(distance) > std::fabs(worst)) worst = distance;
+  }
+  if (worst != 0) {
+    dark.warnings.push_back(fmt::format("the darks lie {:+.3g} DN off the picture's masked pixels", worst));
+  }
+  return {};
+}
+
+Result<void> check_below_picture(const RawDn& picture, const DarkFrame& dark) {
+  std::int64_t count = 0;
+  PerSite<double> margin{};
+  for (int site = 0; site < 4; ++site) margin[site] = below * dark.noise_std_dn[site] + 1;
+  for (int y = 0; y < dark.dn.height(); ++y) {
+    const std::uint16_t* codes = picture.dn.row(picture.active.y + y) + picture.active.x;
+    for (int x = 0; x < dark.dn.width(); ++x) count += codes[x] < dark.dn.at(x, y) - margin[site_of(x, y)];
+  }
+  const double share = static_cast<double>(count) / static_cast<double>(dark.dn.size());
+  if (share <= most_below) return {};
+  return fail(ErrorCode::malformed,
+              fmt::format("{:.2g} % of the picture's pixels lie more than {:g} standard deviations below the darks, at "
+                          "most {:g} % may; the darks hold light or are warmer than the picture; take them again, "
+                          "covered, as warm as the picture",
+                          100 * share, below, 100 * most_below));
+}
+
+}  // namespace lowlux::calib

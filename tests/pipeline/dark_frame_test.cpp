@@ -1,0 +1,123 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "isp/pipeline/develop.h"
+#include "tests/support/frames.h"
+#include "tests/support/raw_frames.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr int width = 62, height = 46;
+
+const DevelopOptions camera_float{
+    .exposure_ev = 0, .tone = ToneCurve::none, .space = OutputSpace::camera, .samples = SampleType::f32};
+
+// A smooth scene on black 256.
+RawFrame scene(SensorLayout layout) {
+  RawFrame frame = test::plain_frame(width, height, layout, BayerPhase::gbrg);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) frame.raw.dn.at(x, y) = static_cast<std::uint16_t>(300 + 20 * x + 15 * y);
+  }
+  return frame;
+}
+
+// Columns, a glow and a hot pixel.
+int pattern_dn(int x, int y) { return 3 * (x % 4) + y / 4 + (x == 20 && y == 21 ? 4000 : 0); }
+
+std::shared_ptr<DarkFrame> dark_of(int pedestal_dn, bool with_pattern) {
+  auto dark = std::make_shared<DarkFrame>();
+  dark->dn = Plane<float>(width, height);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      dark->dn.at(x, y) = static_cast<float>(pedestal_dn + (with_pattern ? pattern_dn(x, y) : 0));
+    }
+  }
+  dark->mean_dn.fill(pedestal_dn);
+  dark->noise_std_dn.fill(2);
+  return dark;
+}
+
+double largest_difference(const Picture& a, const Picture& b) {
+  double worst = 0;
+  const auto& p = std::get<SceneLinear>(a);
+  const auto& q = std::get<SceneLinear>(b);
+  for (int c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < p.plane[c].size(); ++i) {
+      worst = std::max<double>(worst, std::fabs(p.plane[c].data()[i] - q.plane[c].data()[i]));
+    }
+  }
+  return worst;
+}
+
+TEST(DevelopWithDarkFrame, AnEvenDarkIsAGivenBlackPoint) {
+  InlineExecutor executor;
+  for (const SensorLayout layout : {SensorLayout::bayer, SensorLayout::monochrome}) {
+    DevelopOptions given = camera_float, dark = camera_float;
+    given.black = {BlackChoice::given, {256, 256, 256, 256}};
+    dark.dark_frame = dark_of(256, false);
+    const auto a = develop(scene(layout), given, executor), b = develop(scene(layout), dark, executor);
+    ASSERT_TRUE(a && b);
+    EXPECT_LT(largest_difference(a->picture, b->picture), 2e-6);  // float rounding near 1
+    EXPECT_EQ(a->plan.from_codes, layout == SensorLayout::bayer);
+    EXPECT_FALSE(b->plan.from_codes);
+  }
+}
+
+TEST(DevelopWithDarkFrame, ThePatternGoesAndThePictureStays) {
+  InlineExecutor executor;
+  for (const bool electrons : {false, true}) {
+    RawFrame clean = scene(SensorLayout::bayer), patterned = scene(SensorLayout::bayer);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        patterned.raw.dn.at(x, y) = static_cast<std::uint16_t>(patterned.raw.dn.at(x, y) + pattern_dn(x, y));
+      }
+    }
+    DevelopOptions without = camera_float, with = camera_float;
+    without.dark_frame = dark_of(256, false);
+    with.dark_frame = dark_of(256, true);
+    if (electrons) {
+      clean.noise = patterned.noise = NoiseProfile{.scale = {1e-4, 2e-4, 3e-4}, .offset = {1e-9, 1e-9, 1e-9}};
+    }
+    const auto a = develop(clean, without, executor), b = develop(patterned, with, executor);
+    ASSERT_TRUE(a && b);
+    EXPECT_LT(largest_difference(a->picture, b->picture), 2e-6);
+    // The hot pixel is no defect once its dark is off; without a dark frame it is.
+    EXPECT_TRUE(b->plan.defects.empty());
+    EXPECT_EQ(plan_develop(patterned, camera_float, executor)->defects, (std::vector<Pixel>{{20, 21}}));
+  }
+}
+
+TEST(DevelopWithDarkFrame, PixelsWhoseDarkIsUnknownAreRepairedAndWarningsPassedOn) {
+  InlineExecutor executor;
+  RawFrame broken = scene(SensorLayout::bayer);
+  broken.raw.dn.at(20, 21) = 65535;
+  DevelopOptions options = camera_float;
+  options.find_defects = false;
+  auto dark = dark_of(256, false);
+  dark->unknown = {{20, 21, 1, 1}};
+  dark->warnings = {"so it is"};
+  options.dark_frame = dark;
+  const auto repaired = develop(broken, options, executor);
+  ASSERT_TRUE(repaired);
+  EXPECT_EQ(repaired->plan.defects, (std::vector<Pixel>{{20, 21}}));
+  EXPECT_EQ(repaired->plan.warnings.back(), "so it is");
+  EXPECT_EQ(repaired->plan.black.source, BlackPoint::Source::dark_frame);
+  const auto sound = develop(scene(SensorLayout::bayer), options, executor);
+  ASSERT_TRUE(sound);
+  EXPECT_LT(largest_difference(repaired->picture, sound->picture), 2e-6);
+}
+
+TEST(DevelopWithDarkFrame, ADarkOfAnotherSizeIsAnError) {
+  InlineExecutor executor;
+  DevelopOptions options = camera_float;
+  auto dark = dark_of(256, false);
+  dark->dn = Plane<float>(width, height - 1);
+  options.dark_frame = dark;
+  EXPECT_EQ(plan_develop(scene(SensorLayout::bayer), options, executor).error().code, ErrorCode::invalid_argument);
+}
+
+}  // namespace
+}  // namespace lowlux::isp
