@@ -85,25 +85,9 @@ Result<BlackFigures> measure_black(const DarkGroup& group) {
 }
 
 Result<BlackFigures> measure_black(const RawDn& frame) {
-  auto setting = setting_of(frame);
-  if (!setting) return tl::make_unexpected(setting.error());
-  DarkGroup group;
-  group.setting = std::move(*setting);
-  group.frames = 1;
-  group.mean_dn = Plane<float>(frame.active.width, frame.active.height);
-  group.variance_dn2 = Plane<float>(frame.active.width, frame.active.height);
-  PerSite<double> zeros{}, all{};
-  for (int y = 0; y < frame.active.height; ++y) {
-    for (int x = 0; x < frame.active.width; ++x) {
-      const std::uint16_t code = frame.dn.at(frame.active.x + x, frame.active.y + y);
-      group.mean_dn.at(x, y) = code;
-      group.variance_dn2.at(x, y) = 0;  // one frame does not tell temporal from spatial noise
-      zeros[site_of(x, y)] += code == 0;
-      ++all[site_of(x, y)];
-    }
-  }
-  for (int site = 0; site < 4; ++site) group.share_at_zero[site] = zeros[site] / all[site];
-  return measure_black(group);
+  DarkStack stack;
+  if (auto added = stack.add(frame); !added) return tl::make_unexpected(added.error());
+  return measure_black(stack.average());
 }
 
 Result<RawDn> part_of(const RawDn& frame, const Rect& part) {

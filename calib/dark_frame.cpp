@@ -55,6 +55,9 @@ Result<FrameSetting> check_frames(Groups groups, const RawDn& picture) {
     return fail(ErrorCode::insufficient, "the picture does not state its exposure time, which darks are matched by");
   }
   for (const DarkGroup& group : groups) {
+    if (!group.setting.exposure_s) {
+      return fail(ErrorCode::insufficient, "a dark frame does not state its exposure time, which darks are matched by");
+    }
     auto same = check_same_camera(*setting, group.setting, "the dark frame");
     if (same) continue;
     same.error().message += "; the first frame is the picture: take darks with its camera, size and ISO";

@@ -50,6 +50,9 @@ tl::unexpected<Error> too_little(const std::string& found) {
 
 Result<Estimate> gain_of_darks(std::span<const DarkGroup> groups) {
   if (groups.size() < 2) return too_little("one exposure time");
+  for (const DarkGroup& group : groups) {
+    if (auto known = check_noise_is_known(group); !known) return tl::make_unexpected(known.error());
+  }
   const DarkFit fit = begin_fit(groups, {1, 0});
   const Points points = points_of(groups, fit.mask);
   const auto estimators = linear_estimators(points.design, points.weights);

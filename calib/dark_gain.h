@@ -12,7 +12,8 @@ namespace lowlux::calib {
 /// with the mean by K. One K for all sites; each has its own noise at no charge. Row noise is the same in all groups
 /// and drops out.
 /// @param groups  of one gain setting
-/// Errors: fewer than two groups, or so little dark charge that the standard error would be above 5 %.
+/// Errors: fewer than two groups; a single frame of a setting; so little dark charge that the standard error would be
+/// above 5 %.
 Result<Estimate> gain_of_darks(std::span<const DarkGroup> groups);
 
 }  // namespace lowlux::calib

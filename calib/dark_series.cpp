@@ -28,6 +28,10 @@ Result<void> check_groups(Groups groups) {
     const auto what = fmt::format("group {} of the darks", g + 1);
     const FrameSetting& first = groups.front().setting;
     if (auto same = check_same_camera(first, groups[g].setting, what); !same) return same;
+    if (!groups[g].setting.exposure_s) {
+      return fail(ErrorCode::insufficient, what + " states no exposure time, which dark current needs");
+    }
+    if (auto known = check_noise_is_known(groups[g]); !known) return known;
     if (first.temperature_c.has_value() != groups[g].setting.temperature_c.has_value()) {
       return fail(ErrorCode::invalid_argument,
                   "some darks state their temperature and some do not; use frames of one kind");

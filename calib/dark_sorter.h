@@ -3,39 +3,34 @@
 #include <optional>
 #include <vector>
 
-#include "calib/black_figures.h"
+#include "calib/dark_library.h"
 #include "calib/dark_stack.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 
 namespace lowlux::calib {
 
-/// Dark frames of one gain setting.
+/// Dark frames of one gain setting, by rising temperature and exposure time.
 struct DarkSet {
   std::optional<double> iso;
-  std::vector<DarkGroup> groups;               // of two frames or more, by rising temperature and exposure time
-  std::optional<BlackFigures> single;          // where there is but one frame
-  std::optional<FrameSetting> single_setting;  // likewise
+  std::vector<DarkGroup> groups;
 };
 
-/// Puts dark frames together by gain, exposure time and temperature as they come: 10 bytes for each pixel of each
-/// setting, however many frames.
+/// Dark frames of one camera, sorted by gain, exposure time and temperature as they come.
 class DarkSorter {
  public:
-  /// Errors: those of DarkStack::add; another camera or size than the first frame; more than 64 settings.
+  /// Errors: those of DarkLibrary::add; more than 16 gain settings.
   Result<void> add(const RawDn& frame);
 
-  /// By rising ISO. Errors: one frame of a setting where there are others of that gain; those of measure_black for a
-  /// single frame.
-  Result<std::vector<DarkSet>> sets() const;
+  /// By rising ISO.
+  std::vector<DarkSet> sets() const;
 
  private:
-  struct Entry {
-    FrameSetting setting;
-    DarkStack stack;
-    Result<BlackFigures> first;  // of the first frame
+  struct Gain {
+    FrameSetting first;
+    DarkLibrary darks;
   };
-  std::vector<Entry> entries_;
+  std::vector<Gain> gains_;
 };
 
 }  // namespace lowlux::calib

@@ -18,10 +18,14 @@ std::int64_t pixels_of_site(const FrameSetting& s, int site) {
 
 }  // namespace
 
+Result<void> check_noise_is_known(const DarkGroup& group) {
+  if (group.frames >= 2) return {};
+  return fail(ErrorCode::insufficient,
+              fmt::format("there is one dark frame at {:g} s; noise needs two of each exposure time",
+                          group.setting.exposure_s.value_or(0)));
+}
+
 Result<void> DarkStack::begin(const RawDn& raw, FrameSetting setting) {
-  if (!setting.exposure_s) {
-    return fail(ErrorCode::insufficient, "a dark frame does not state its exposure time, which dark current needs");
-  }
   setting_ = std::move(setting);
   const int width = setting_.width, height = setting_.height;
   first_ = Plane<std::uint16_t>(width, height);

@@ -23,10 +23,13 @@ struct DarkGroup {
   PerSite<double> share_at_zero{};     // of the samples
 };
 
+/// An error where there is but one frame, which tells nothing about noise.
+Result<void> check_noise_is_known(const DarkGroup& group);
+
 /// Adds dark frames up as they come: 10 bytes for each pixel, however many frames.
 class DarkStack {
  public:
-  /// Adds a frame. Errors: those of setting_of; no exposure time; a frame that differs from the first in camera, size,
+  /// Adds a frame. Errors: those of setting_of; a frame that differs from the first in camera, size,
   /// mosaic, white level, gain, exposure time, or by more than a degree; more than 32,768 frames.
   Result<void> add(const RawDn& raw);
 

@@ -79,9 +79,7 @@ Result<Darks> read_darks(const CalibrateBlackArgs& args) {
     if (const auto added = sorter.add(*dark); !added) return tl::make_unexpected(at(added.error(), file));
     progress.advance(1, file);
   }
-  auto sets = sorter.sets();
-  if (!sets) return tl::make_unexpected(sets.error());
-  out.sets = std::move(*sets);
+  out.sets = sorter.sets();
   return out;
 }
 
@@ -121,19 +119,27 @@ Result<void> write_map(const std::string& path, const Plane<float>& map, bool fo
   return file->commit();
 }
 
+/// Of one exposure time: what can be told is the black level with the dark charge in it.
+Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measured& measured, Calibration& found) {
+  if (set.groups.size() > 1) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("the darks have one exposure time at {} temperatures: dark current needs a second exposure "
+                            "time, a black level frames of one temperature",
+                            set.groups.size()));
+  }
+  const calib::DarkGroup& group = set.groups.front();
+  const auto black = calib::measure_black(group);
+  if (!black) return tl::make_unexpected(black.error());
+  calib::put_black(*black, group.setting, measured, calib::gain_at(found.profile, group.setting));
+  show_black(*black, group.setting, found);
+  return {};
+}
+
 /// One gain setting: fits what its frames can tell.
 Result<void> calibrate_set(const calib::DarkSet& set, const CalibrateBlackArgs& args, bool several,
                            Calibration& found) {
   const calib::Measured measured = measured_today(args.common.frames);
-  if (!tells_dark_current(set)) {
-    const calib::FrameSetting& setting = set.single ? *set.single_setting : set.groups.front().setting;
-    auto black = set.single ? Result<calib::BlackFigures>(*set.single) : calib::measure_black(set.groups.front());
-    if (!black) return tl::make_unexpected(black.error());
-    GainProfile& gain = calib::gain_at(found.profile, setting);
-    calib::put_black(*black, setting, measured, gain);
-    show_black(*black, setting, found);
-    return {};
-  }
+  if (!tells_dark_current(set)) return calibrate_black_level(set, measured, found);
   const auto gain = gain_of(set, args, found.profile);
   if (!gain) return tl::make_unexpected(gain.error());
   const auto series = calib::fit_dark_series(set.groups, gain->dn_per_e);

@@ -237,6 +237,17 @@ TEST(DarkSeries, SeesDarksThatAreNotLinearInTime) {
   EXPECT_NE(with_light(1).find("not linear"), std::string::npos);
 }
 
+TEST(DarkSeries, RefusesSingleFramesAndFramesWithoutTime) {
+  const SensorBench bench{.sensor = test::modern_small(), .width = 64, .height = 64};
+  auto groups = groups_at(bench, {{0, 20}, {60, 20}}, 2);
+  groups[0].frames = 1;
+  EXPECT_NE(fit_dark_series(groups, exact_gain(bench)).error().message.find("one dark frame at 0 s"),
+            std::string::npos);
+  groups[0].frames = 2;
+  groups[1].setting.exposure_s.reset();
+  EXPECT_NE(fit_dark_series(groups, exact_gain(bench)).error().message.find("no exposure time"), std::string::npos);
+}
+
 TEST(DarkSeries, RefusesTooFewExposures) {
   const SensorBench bench = small_bench();
   EXPECT_NE(refusal({}).find("no dark frames"), std::string::npos);
