@@ -68,10 +68,12 @@ Result<BlackFigures> measure_black(const DarkGroup& group) {
                   fmt::format("a CFA site has {:g} dark pixels, a black level needs {:g}", f.pixels, fewest_pixels));
     }
     out.level_dn[site] = {f.mean, f.standard_error};
-    out.deviation_dn[site] = std::sqrt(f.variance);
+    // The mean of the frames has less noise than one of them.
+    const double averaged_away = 1 - 1.0 / group.frames, temporal = f.temporal_variance * group.frames;
+    out.deviation_dn[site] = std::sqrt(f.variance + averaged_away * temporal);
     out.rows[site] = scatter_of(f.row_variance, f.variance, f.pixels, lines_of(mask.height(), site >> 1));
     out.columns[site] = scatter_of(f.column_variance, f.variance, f.pixels, lines_of(mask.width(), site & 1));
-    row += f.row_variance / 4;
+    row += (f.row_variance + averaged_away * group.row_variance_dn2[site]) / 4;
     column += f.column_variance / 4;
     out.pixels += static_cast<std::int64_t>(f.pixels);
   }

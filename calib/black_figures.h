@@ -19,12 +19,12 @@ struct LineScatter {
 /// What dark pixels of one exposure time say: the pedestal with the dark charge in it.
 struct BlackFigures {
   PerSite<Estimate> level_dn{};    // row and column terms are in the errors
-  PerSite<double> deviation_dn{};  // of the pixels that were kept
-  PerSite<LineScatter> rows{};
+  PerSite<double> deviation_dn{};  // of the pixels that were kept, in one frame
+  PerSite<LineScatter> rows{};     // of the mean of the frames
   PerSite<LineScatter> columns{};
-  double row_noise_dn = 0;  // what whole rows have in common beyond white noise, mean of the sites
-  double column_noise_dn = 0;
-  std::int64_t pixels = 0;  // kept, of all sites
+  double row_noise_dn = 0;     // what whole rows of one frame have in common beyond white noise, mean of the sites
+  double column_noise_dn = 0;  // fixed
+  std::int64_t pixels = 0;     // kept, of all sites
   double excluded_share = 0;
   int frames = 0;
 };

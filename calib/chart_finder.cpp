@@ -58,7 +58,7 @@ std::vector<std::uint8_t> codes_of(const CameraRgb& picture, double gain) {
     const float scale = static_cast<float>(gain) / bright_value(picture.plane[c]);
     for (std::size_t i = 0; i < picture.plane[c].size(); ++i) {
       const float code = 255 * std::sqrt(std::clamp(scale * value[i], 0.0F, 1.0F));
-      out[3 * i + 2 - c] = static_cast<std::uint8_t>(code + 0.5F);
+      out[3 * i + 2 - c] = static_cast<std::uint8_t>(std::lround(code));
     }
   }
   return out;
@@ -206,9 +206,9 @@ std::vector<ColourSample> samples_of(const std::array<ChartPatch, chart_patch_co
   out.reserve(patches.size());
   for (std::size_t i = 0; i < patches.size(); ++i) {
     if (!usable(patches[i])) continue;
-    const auto column = static_cast<double>(i % chart_columns), row = static_cast<double>(i / chart_columns);
-    out.push_back({patches[i].camera_rgb, reference[i], 2 * (column + 0.5) / chart_columns - 1,
-                   2 * (row + 0.5) / chart_rows - 1});
+    const std::size_t column = i % chart_columns, row = i / chart_columns;
+    out.push_back({patches[i].camera_rgb, reference[i], 2 * (static_cast<double>(column) + 0.5) / chart_columns - 1,
+                   2 * (static_cast<double>(row) + 0.5) / chart_rows - 1});
   }
   return out;
 }
@@ -217,7 +217,7 @@ std::optional<Vector3> chart_neutral(const std::array<ChartPatch, chart_patch_co
                                      const LightGradient& light) {
   Vector3 sum{};
   for (int column = 0; column < chart_columns; ++column) {
-    const ChartPatch& patch = patches[static_cast<std::size_t>((chart_rows - 1) * chart_columns + column)];
+    const ChartPatch& patch = patches[chart_patch_count - chart_columns + static_cast<std::size_t>(column)];
     const double x = 2 * (column + 0.5) / chart_columns - 1, y = 2 * (chart_rows - 0.5) / chart_rows - 1;
     for (std::size_t c = 0; c < 3 && usable(patch); ++c) sum[c] += patch.camera_rgb[c] / light.at(x, y);
   }

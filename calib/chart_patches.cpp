@@ -102,8 +102,9 @@ ChartPatch measure(const ChartPicture& picture, const PatchCorners& corner) {
 
 }  // namespace
 
-std::array<PicturePoint, 4> measured_corners(const ChartGrid& grid, int index) {
-  const double u = index % chart_columns + 0.5, v = static_cast<double>(index / chart_columns) + 0.5, h = middle / 2;
+std::array<PicturePoint, 4> measured_corners(const ChartGrid& grid, int patch) {
+  const int column = patch % chart_columns, row = patch / chart_columns;
+  const double u = column + 0.5, v = row + 0.5, h = middle / 2;
   return {grid.at(u - h, v - h), grid.at(u + h, v - h), grid.at(u + h, v + h), grid.at(u - h, v + h)};
 }
 

@@ -49,8 +49,8 @@ Unknowns unknowns_of(const ColourFitOptions& options) {
   const Matrix3 unit = identity3();
   const Vector3& n = options.neutral;
   if (n == Vector3{}) {
-    for (const Vector3& row : unit) {
-      for (const Vector3& column : unit) out.basis.push_back(outer(row, column));
+    for (const Vector3& to : unit) {
+      for (const Vector3& from : unit) out.basis.push_back(outer(to, from));
     }
     return out;
   }

@@ -55,6 +55,7 @@ Result<Estimate> gain_of_darks(std::span<const DarkGroup> groups) {
   }
   const DarkFit fit = begin_fit(groups, {1, 0});
   const Points points = points_of(groups, fit.mask);
+  if (points.variance.empty()) return too_little("frames of a setting are equal; was one file given twice?");
   const auto estimators = linear_estimators(points.design, points.weights);
   if (!estimators) return too_little("all means are alike");
   std::vector<double> parameters(5);

@@ -8,8 +8,6 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr std::size_t most_settings = 8;
-
 bool belongs_to(const FrameSetting& stack, const FrameSetting& frame) {
   if (stack.exposure_s != frame.exposure_s) return false;
   if (stack.temperature_c.has_value() != frame.temperature_c.has_value()) return false;
@@ -27,11 +25,11 @@ Result<void> DarkLibrary::add(const RawDn& raw) {
   for (DarkStack& stack : stacks_) {
     if (belongs_to(stack.setting(), *setting)) return stack.add(raw);
   }
-  if (stacks_.size() == most_settings) {
+  if (stacks_.size() == most_settings_) {
     return fail(ErrorCode::too_large,
-                fmt::format("the dark frames have more than {} exposure times and temperatures; give those nearest to "
-                            "the picture's",
-                            most_settings));
+                fmt::format("the dark frames have more than {} exposure times and temperatures, which would take too "
+                            "much memory; give fewer",
+                            most_settings_));
   }
   DarkStack stack;
   if (auto added = stack.add(raw); !added) return added;

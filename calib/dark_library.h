@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -9,18 +10,22 @@
 
 namespace lowlux::calib {
 
-/// Dark frames of one camera, sorted by exposure time and temperature as they come: one DarkStack for each setting.
+/// Dark frames of one camera and gain, sorted by exposure time and temperature as they come: one DarkStack for each
+/// setting.
 class DarkLibrary {
  public:
+  /// @param most_settings  of exposure time and temperature; each takes 10 bytes for each pixel
+  explicit DarkLibrary(std::size_t most_settings = 8) : most_settings_(most_settings) {}
+
   /// Adds a frame to the stack of its exposure time whose first frame is within a degree. Errors: those of DarkStack;
-  /// another camera, size, mosaic, white level or gain than the first frame's; more than 8 settings, which take 10
-  /// bytes for each pixel each.
+  /// another camera, size, mosaic, white level or gain than the first frame's; more settings than allowed.
   Result<void> add(const RawDn& raw);
 
   /// What was added, in the order of first frames. Of a single frame the variances are 0 and mean nothing.
   std::vector<DarkGroup> groups() const;
 
  private:
+  std::size_t most_settings_;
   std::vector<DarkStack> stacks_;
 };
 

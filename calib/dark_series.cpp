@@ -14,6 +14,7 @@ namespace lowlux::calib {
 namespace {
 
 constexpr double hot_deviations = 8;
+constexpr double full_share = 0.95;  // of the white level: above it a pixel may be full
 constexpr double most_excluded = 0.05;
 constexpr double clipped_share = 1e-3;
 constexpr double least_misfit = 0.02;   // of the dark charge: what is called not linear
@@ -134,24 +135,47 @@ std::array<Estimate, 3> channels_of(const FrameSetting& setting, const PerSite<E
 }
 
 void put_patterns(const DarkFit& s, std::size_t darkest, DarkSeries& out) {
-  double row = 0, column = 0, spread = 0, slope = 0;
+  double row = 0, column = 0, spread = 0, slope = 0, error2 = 0;
   for (int site = 0; site < 4; ++site) {
     const auto pedestal = figures_of({s.groups, s.estimators[site][0]}, s.mask, site);
     const auto current = figures_of({s.groups, s.estimators[site][1 + s.temperature_of[darkest]]}, s.mask, site);
     column += pedestal.column_variance / 4;
     spread += (current.variance - current.temporal_variance) / 4;
     slope += current.mean / 4;
+    error2 += 2 * current.variance * current.variance / current.pixels / 16;
     for (const DarkGroup& g : s.groups) row += g.row_variance_dn2[site] / (4 * static_cast<double>(s.groups.size()));
   }
   out.row_noise_e = std::sqrt(std::max(0.0, row)) / s.gain.value;
   out.column_noise_e = std::sqrt(std::max(0.0, column)) / s.gain.value;
-  out.dsnu = slope > 0 ? std::sqrt(std::max(0.0, spread)) / slope : 0;
+  if (!(slope > 0)) return;
+  const double deviation = std::sqrt(std::max(0.0, spread)), error_of_square = std::sqrt(error2);
+  const double smallest = std::max(deviation, std::sqrt(error_of_square));  // near 0 the square is what is normal
+  out.dsnu = {deviation / slope, error_of_square > 0 ? error_of_square / (2 * smallest * slope) : 0};
+}
+
+/// Excess of one pixel in the longest darks of that temperature in which it is not full; if it always is, in the
+/// shortest: then it has at least that.
+double excess_e_per_s(const DarkFit& s, std::size_t darkest, int x, int y) {
+  const auto& white = s.groups[darkest].setting.white_dn;
+  const double full_dn = full_share * *std::min_element(white.begin(), white.end());
+  const auto time_of = [&](std::size_t g) { return *s.groups[g].setting.exposure_s; };
+  std::optional<std::size_t> longest;
+  std::size_t shortest = darkest;
+  for (std::size_t g = 0; g < s.groups.size(); ++g) {
+    if (s.temperature_of[g] != s.temperature_of[darkest] || !(time_of(g) > 0)) continue;
+    if (time_of(g) < time_of(shortest)) shortest = g;
+    const bool is_full = s.groups[g].mean_dn.at(x, y) > full_dn;
+    if (!is_full && (!longest || time_of(g) > time_of(*longest))) longest = g;
+  }
+  const std::size_t group = longest.value_or(shortest);
+  const double excess_dn = s.groups[group].mean_dn.at(x, y) - s.spread[group][site_of(x, y)].median;
+  return excess_dn / s.gain.value / time_of(group);
 }
 
 void list_hot_pixels(const DarkFit& s, std::size_t darkest, DarkSeries& out) {
   const DarkGroup& group = s.groups[darkest];
-  out.hot_group_exposure_s = *group.setting.exposure_s;
-  if (!(out.hot_group_exposure_s > 0)) return;
+  out.hot_temperature_c = group.setting.temperature_c;
+  if (!(*group.setting.exposure_s > 0)) return;
   PerSite<double> limit{};
   for (int site = 0; site < 4; ++site) {
     const double deviation = s.spread[darkest][site].deviation, noise = s.noise_dn2[darkest][site];
@@ -162,7 +186,7 @@ void list_hot_pixels(const DarkFit& s, std::size_t darkest, DarkSeries& out) {
     for (int x = 0; x < s.mask.width(); ++x) {
       const int site = site_of(x, y);
       const double excess = group.mean_dn.at(x, y) - s.spread[darkest][site].median;
-      if (excess > limit[site]) out.hot.push_back({x, y, excess / s.gain.value / out.hot_group_exposure_s});
+      if (excess > limit[site]) out.hot.push_back({x, y, excess_e_per_s(s, darkest, x, y)});
     }
   }
 }

@@ -50,13 +50,13 @@ struct DarkSeries {
   std::optional<DarkTemperatureLaw> law;
   /// R : G : B of the dark current where it is largest, sum 1. None if their sum is below five of its standard errors.
   std::optional<std::array<Estimate, 3>> chromaticity;
-  double dsnu = 0;            // deviation of the pixels' dark current relative to its mean; 0 if there is no current
+  Estimate dsnu;              // deviation of the pixels' dark current relative to its mean; 0 if there is no current
   double row_noise_e = 0;     // temporal
   double column_noise_e = 0;  // fixed
   std::vector<HotPixel> hot;  // row by row, found in the group with most dark charge
-  double hot_group_exposure_s = 0;
-  double excluded_share = 0;         // of all pixels, from all means
-  double largest_correction_dn = 0;  // of a mean, for what excluding pixels does to it
+  std::optional<double> hot_temperature_c;  // of that group, where it is stated
+  double excluded_share = 0;                // of all pixels, from all means
+  double largest_correction_dn = 0;         // of a mean, for what excluding pixels does to it
   std::optional<Estimate>
       read_noise_e;               // of a pixel about its row, from the group with least dark charge; none if lost
   std::vector<DarkPoint> points;  // four for each group

@@ -9,7 +9,7 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr std::size_t most_gains = 16;
+constexpr std::size_t most_gains = 16, most_settings = 32;
 
 auto order_of(const DarkGroup& g) {
   return std::tuple(g.setting.temperature_c.value_or(0), g.setting.exposure_s.value_or(0));
@@ -33,7 +33,7 @@ Result<void> DarkSorter::add(const RawDn& frame) {
         ErrorCode::too_large,
         fmt::format("the darks have more than {} gain settings; calibrate them in parts with --add-to", most_gains));
   }
-  Gain added{std::move(*setting), {}};
+  Gain added{std::move(*setting), DarkLibrary(most_settings)};
   if (auto stacked = added.darks.add(frame); !stacked) return stacked;
   gains_.push_back(std::move(added));
   return {};

@@ -57,17 +57,15 @@ std::string names_of(const std::vector<const GainProfile*>& gains) {
 }  // namespace
 
 Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<double>& iso) {
-  if (profile.gains.empty()) return fail(ErrorCode::insufficient, "the profile holds no gain setting");
   if (profile.gains.size() == 1 && !(iso && profile.gains[0].iso)) {
     const GainProfile& only = profile.gains[0];
     if (!only.iso) return GainAtIso{only, ""};
     return GainAtIso{only,
                      fmt::format("the frame states no ISO: the profile's only setting, ISO {:g}, is taken", *only.iso)};
   }
-  std::vector<const GainProfile*> stated;
-  for (const GainProfile& g : profile.gains) {
-    if (g.iso) stated.push_back(&g);
-  }
+  std::vector<const GainProfile*> stated, unstated;
+  for (const GainProfile& g : profile.gains) (g.iso ? stated : unstated).push_back(&g);
+  if (!iso && unstated.size() == 1) return GainAtIso{*unstated.front(), ""};
   if (stated.empty() || !iso) {
     return fail(ErrorCode::insufficient,
                 fmt::format("the {} states no ISO, and the profile has {} gain settings to choose from",
@@ -86,6 +84,14 @@ Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<
   }
   const GainProfile &low = **(above - 1), &high = **above;
   const double share = std::log(*iso / *low.iso) / std::log(*high.iso / *low.iso);
+  if (low.pedestal_holds != high.pedestal_holds || low.sensor.has_value() != high.sensor.has_value()) {
+    const GainProfile& nearer = share < 0.5 ? low : high;
+    return GainAtIso{
+        beyond(nearer, *iso / *nearer.iso),
+        fmt::format("ISO {:g} and ISO {:g} of the profile were not measured alike: ISO {:g} is extrapolated "
+                    "from ISO {:g}",
+                    *low.iso, *high.iso, *iso, *nearer.iso)};
+  }
   return GainAtIso{between(low, high, share), ""};
 }
 

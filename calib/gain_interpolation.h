@@ -15,6 +15,7 @@ struct GainAtIso {
 };
 
 /// @param iso  of the frame; none if it states none
+/// @param profile  has gain settings
 /// Errors: see profile_at.
 Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<double>& iso);
 

@@ -37,8 +37,9 @@ void put_dark_series(const DarkSeries& series, std::span<const DarkGroup> groups
 /// Puts a black level of one exposure time into it, dark charge included.
 void put_black(const BlackFigures& black, const FrameSetting& setting, const Measured& measured, GainProfile& out);
 
-/// Puts the noise of one ordinary picture into it, and the black point it was measured above. The read noise holds all
-/// that is there without light: row noise, and dark charge where the black holds that.
+/// Puts the noise of one ordinary picture into it, and the black point it was measured above unless the pedestal was
+/// measured on darks. The read noise holds all that is there without light: row noise, and dark charge where the black
+/// holds that.
 void put_picture_noise(const PictureNoise& noise, const BlackPoint& black, const FrameSetting& setting,
                        const Measured& measured, GainProfile& out);
 

@@ -22,25 +22,7 @@ void for_each_count(double mean, const Visit& visit) {
   }
 }
 
-double share_below(const PoissonGauss& law, double value_e) {
-  const double deviation = std::sqrt(law.normal_variance_e2);
-  double sum = 0;
-  for_each_count(law.poisson_mean_e, [&](double k, double p) { sum += p * below((value_e - k) / deviation); });
-  return sum;
-}
-
 }  // namespace
-
-double median_of(const PoissonGauss& law) {
-  assert(law.normal_variance_e2 > 0);
-  const double deviation = std::sqrt(law.poisson_mean_e + law.normal_variance_e2);
-  double low = law.poisson_mean_e - deviation, high = law.poisson_mean_e + deviation;  // holds for every law
-  while (high - low > 1e-9 * deviation) {
-    const double middle = (low + high) / 2;
-    (share_below(law, middle) < 0.5 ? low : high) = middle;
-  }
-  return (low + high) / 2;
-}
 
 double truncation_bias_e(const PoissonGauss& law, double low_e, double high_e) {
   assert(law.normal_variance_e2 > 0);

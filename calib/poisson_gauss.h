@@ -8,9 +8,6 @@ struct PoissonGauss {
   double normal_variance_e2 = 0;  // above 0
 };
 
-/// Median of the law [e-], to 1e-9 of its standard deviation.
-double median_of(const PoissonGauss& law);
-
 /// Mean of the values between low and high, less the mean of all [e-]: what leaving out the others does to a mean.
 /// Exact sum over the Poisson counts within ten standard deviations. 0 if nothing lies between.
 double truncation_bias_e(const PoissonGauss& law, double low_e, double high_e);

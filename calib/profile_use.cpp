@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/dark_stack.h"
 #include "calib/frame_setting.h"
 #include "calib/gain_interpolation.h"
 
@@ -12,8 +13,7 @@ namespace lowlux::calib {
 namespace {
 
 constexpr double hot_deviations = 6;
-constexpr double same_exposure = 0.01;  // relative
-constexpr double same_temperature_c = 1;
+constexpr double same_exposure = 0.01;    // relative
 constexpr double telling_charge_e = 0.2;  // dark charge below this moves no black point that can be measured
 constexpr double quantisation_dn2 = 1.0 / 12;
 
@@ -33,11 +33,16 @@ double temperature_factor(const GainProfile& gain, const FrameInfo& info, double
                           std::vector<std::string>& warnings) {
   const SensorModel& sensor = *gain.sensor;
   const bool matters = charge_e > telling_charge_e;
+  const bool was_measured = gain.dark_exposure_s.has_value();
   if (!info.temperature_c) {
     if (matters && gain.dark_temperature_c) {
       warnings.push_back(fmt::format("the frame states no temperature: dark current is taken as at {:g} C",
                                      sensor.dark_temperature_c));
     }
+    return 1;
+  }
+  if (was_measured && !gain.dark_temperature_c) {
+    if (matters) warnings.emplace_back("the profile's darks state no temperature: dark current is taken as theirs");
     return 1;
   }
   const double celsius = *info.temperature_c;
@@ -74,7 +79,10 @@ void warn_of_exposure(const GainProfile& gain, double exposure_s, bool scaled, s
 Result<PerSite<double>> find_dark_charge(const GainProfile& gain, const RawDn& frame, ProfileAtFrame& out) {
   SensorModel& sensor = *out.sensor;
   const double fastest = *std::max_element(sensor.dark_current_e_per_s.begin(), sensor.dark_current_e_per_s.end());
-  if (fastest == 0) return PerSite<double>{};
+  if (fastest == 0) {
+    if (!gain.dark_exposure_s) out.warnings.emplace_back("the profile knows no dark current: its charge stays in");
+    return PerSite<double>{};
+  }
   if (!frame.info.exposure_s) {
     return fail(ErrorCode::insufficient,
                 "the frame does not state its exposure time, which the profile's dark current needs");
@@ -88,7 +96,10 @@ Result<PerSite<double>> find_dark_charge(const GainProfile& gain, const RawDn& f
   for (int site = 0; site < 4; ++site) {
     const int k = channel_of(frame, site);
     out.dark_mean_e[site] = sensor.dark_current_e_per_s[k] * time_s;
-    errors[site] = gain.errors.dark_current_e_per_s[k] * factor * time_s;
+    // What is subtracted are codes: the system gain's error is in the current, and cancels.
+    const double of_gain = gain.errors.system_gain_dn_per_e / gain.sensor->system_gain_dn_per_e;
+    const double all = gain.errors.dark_current_e_per_s[k], shared = of_gain * gain.sensor->dark_current_e_per_s[k];
+    errors[site] = std::sqrt(std::max(0.0, all * all - shared * shared)) * factor * time_s;
   }
   return errors;
 }
@@ -97,7 +108,10 @@ void set_black(const GainProfile& gain, const PerSite<double>& dark_error_e, Pro
   if (!gain.pedestal_dn) return;
   BlackPoint& black = out.black.emplace();
   black.source = BlackPoint::Source::profile;
-  black.holds = BlackPoint::Holds::pedestal_and_dark;
+  const bool knows_dark = gain.dark_exposure_s.has_value() || out.dark_mean_e != PerSite<double>{};
+  black.holds = knows_dark || gain.pedestal_holds == BlackPoint::Holds::pedestal_and_dark
+                    ? BlackPoint::Holds::pedestal_and_dark
+                    : BlackPoint::Holds::pedestal_only;
   const double k = out.sensor ? out.sensor->system_gain_dn_per_e : 0;
   for (int site = 0; site < 4; ++site) {
     const Estimate& pedestal = (*gain.pedestal_dn)[site];
@@ -159,10 +173,11 @@ Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& fra
     return fail(ErrorCode::unsupported, "the frame is already demosaiced: a profile tells of the mosaic");
   }
   if (const auto same = check_camera(profile, frame.info); !same) return tl::make_unexpected(same.error());
+  ProfileAtFrame out;
+  if (profile.gains.empty()) return out;
   auto found = gain_at_iso(profile, frame.info.iso);
   if (!found) return tl::make_unexpected(found.error());
   const GainProfile& gain = found->gain;
-  ProfileAtFrame out;
   if (!found->warning.empty()) out.warnings.push_back(found->warning);
   out.sensor = gain.sensor;
   PerSite<double> dark_error_e{};

@@ -16,7 +16,7 @@ struct ProfileAtFrame {
                                        // Absent if the profile knows none: then the frame's own holds
   std::optional<SensorModel> sensor;   // at the frame's gain and temperature; absent if the gain is unknown
   PerSite<double> dark_mean_e{};       // of the frame; 0 if unknown
-  std::optional<NoiseProfile> noise;   // of the sensor, dark charge's noise included
+  std::optional<NoiseProfile> noise;   // of the sensor, with that of the dark charge in `dark_mean_e`
   std::vector<DefectRect> hot_pixels;  // those whose excess charge is above 6 standard deviations in this frame
   std::vector<std::string> warnings;   // what was extrapolated or assumed
 };
@@ -25,8 +25,8 @@ struct ProfileAtFrame {
 /// Gain: between two measured ISO settings gain and read noise follow straight lines in log-log, levels in the
 /// logarithm of the ISO; beyond them the gain follows the ISO, with a warning. Exposure: pedestal + K D t. Temperature:
 /// the profile's doubling figure. Warnings for exposures and temperatures beyond those of the darks. Errors: another
-/// camera; a frame that states no ISO where the profile has several; no exposure time where dark current needs it; an
-/// empty profile.
+/// camera; a frame that states no ISO where the profile has several; no exposure time where dark current
+/// needs it. A profile without gain settings says nothing about a frame.
 Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame);
 
 }  // namespace lowlux::calib

@@ -175,7 +175,11 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   add_output(app, args);
   add_rendering(app, args);
   add_darks(app, args.dark);
-  return parse(app, words, args);
+  Parsed<DevelopArgs> parsed = parse(app, words, args);
+  if (!args.profile.empty() && !args.black_profile.empty()) {
+    return refuse(app, "--black and --profile name a profile each: --profile uses all that is in one");
+  }
+  return parsed;
 }
 
 Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {

@@ -168,7 +168,8 @@ void show_black(const calib::BlackFigures& black, const calib::FrameSetting& set
   };
   out.add("row means", "{}", joined(black.rows, scatter));
   out.add("column means", "{}", joined(black.columns, scatter));
-  out.add("", "standard deviation in DN; in brackets what white noise alone would give");
+  out.add("", "standard deviation in DN{}; in brackets what white noise alone would give",
+          black.frames == 1 ? "" : " of the mean of the frames");
   out.add("row noise", "{:.3g} DN, column noise {:.3g} DN beyond white noise", black.row_noise_dn,
           black.column_noise_dn);
   out.add("pixels", "{} in {} frame{}, {:.2g} % left out", black.pixels, black.frames, black.frames == 1 ? "" : "s",
@@ -215,7 +216,7 @@ void show_dark_series(const calib::DarkSeries& series, std::span<const calib::Da
   out.add("read noise", "{}",
           series.read_noise_e ? text_of(*series.read_noise_e) + " e-"
                               : std::string("lost in quantisation and dark charge"));
-  out.add("patterns", "DSNU {:.3g} of the dark current, row noise {:.3g} e-, column noise {:.3g} e-", series.dsnu,
+  out.add("patterns", "DSNU {:.3g} of the dark current, row noise {:.3g} e-, column noise {:.3g} e-", series.dsnu.value,
           series.row_noise_e, series.column_noise_e);
   out.add("hot pixels", "{}", series.hot.size());
   out.add("fit", "mean square of residual / error {:.3g}, {} degrees of freedom", series.reduced_chi_square,

@@ -18,7 +18,7 @@ void show_black(const calib::BlackFigures& black, const calib::FrameSetting& set
 /// point's chromaticity.
 /// @param gain_source  where the system gain comes from
 void show_dark_series(const calib::DarkSeries& series, std::span<const calib::DarkGroup> groups,
-                      const GainProfile& profile, const std::string& gain_source, Calibration& found);
+                      const GainProfile& gain, const std::string& gain_source, Calibration& found);
 
 /// "ISO 1600", "one gain" if the frames state none.
 std::string name_of_gain(const calib::FrameSetting& setting);

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "isp/cli/option_values.h"
+#include "isp/cli/output_place.h"
 
 namespace lowlux::cli {
 namespace {
@@ -26,14 +27,16 @@ void add_settings(CLI::App& app, CalibrateArgs& args) {
   setting("--temperature", "C", "temperature of the sensor, for all frames", args.temperature_c);
 }
 
-/// The command line is wrong; nothing of that is seen by the option parser.
-std::optional<std::string> wrong_settings(const CalibrateArgs& args) {
+/// What is wrong with the command line beyond single options; empty if nothing.
+std::string wrong(const CalibrateArgs& args, const std::vector<std::string>& inputs) {
   if (args.iso && *args.iso <= 0) return "--iso must be above 0";
   if (args.exposure_s && *args.exposure_s < 0) return "--exposure-time must not be negative";
   if (args.temperature_c && (*args.temperature_c < -200 || *args.temperature_c > 200)) {
     return "--temperature must be from -200 to 200 C";
   }
-  return std::nullopt;
+  if (!args.output.ends_with(".json")) return "-o: profiles are .json, not " + args.output;
+  if (!args.report.empty() && !args.report.ends_with(".html")) return "--report: reports are .html, not " + args.report;
+  return wrong_names({args.output, args.report}, inputs);
 }
 
 }  // namespace
@@ -58,7 +61,7 @@ Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>&
       ->type_name("PREFIX");
   if (const auto code = parse_words(app, words)) return *code;
   if (args.system_gain_dn_per_e && *args.system_gain_dn_per_e <= 0) return refuse(app, "--system-gain must be above 0");
-  if (const auto wrong = wrong_settings(args.common)) return refuse(app, *wrong);
+  if (const std::string what = wrong(args.common, args.common.frames); !what.empty()) return refuse(app, what);
   return args;
 }
 
@@ -85,7 +88,11 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
   if (args.darks.empty() && args.common.frames.size() > 1) {
     return refuse(app, "several flats need --darks; without darks one picture is measured");
   }
-  if (const auto wrong = wrong_settings(args.common)) return refuse(app, *wrong);
+  if (args.darks.empty() && args.steady_light) return refuse(app, "--steady-light: it is for flats");
+  if (!args.darks.empty() && args.method) return refuse(app, "--method: it is for one picture, without --darks");
+  std::vector<std::string> inputs = args.common.frames;
+  inputs.insert(inputs.end(), args.darks.begin(), args.darks.end());
+  if (const std::string what = wrong(args.common, inputs); !what.empty()) return refuse(app, what);
   return args;
 }
 
@@ -98,6 +105,7 @@ Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string
   app.add_flag("--force", args.common.force, "overwrite files that exist");
   app.add_flag("--json", args.common.json, "JSON instead of text");
   if (const auto code = parse_words(app, words)) return *code;
+  if (const std::string what = wrong(args.common, {}); !what.empty()) return refuse(app, what);
   return args;
 }
 

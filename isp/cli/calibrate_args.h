@@ -15,7 +15,7 @@ struct CalibrateArgs {
   std::string output;         // the profile
   std::string add_to;         // a profile to start from; empty: none
   std::string report;         // a page; empty: none
-  std::optional<double> iso;  // of frames, in place of what they state
+  std::optional<double> iso;  // of frames that do not state theirs
   std::optional<double> exposure_s;
   std::optional<double> temperature_c;
   bool force = false;
@@ -34,7 +34,7 @@ struct CalibrateNoiseArgs {
   CalibrateArgs common;
   std::vector<std::string> darks;
   bool steady_light = false;
-  calib::PictureNoiseMethod method = calib::PictureNoiseMethod::ponomarenko;  // for one picture
+  std::optional<calib::PictureNoiseMethod> method;  // for one picture; absent: ponomarenko
 };
 
 struct CalibrateQuotedArgs {

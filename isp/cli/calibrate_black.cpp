@@ -1,4 +1,5 @@
-#include <cstdio>
+#include <algorithm>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -9,8 +10,6 @@
 #include "isp/cli/black_report.h"
 #include "isp/cli/calibration.h"
 #include "isp/cli/progress.h"
-#include "isp/codec/pfm.h"
-#include "isp/output/atomic_file.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/masked_black.h"
 
@@ -63,8 +62,17 @@ Result<RawDn> dark_part(RawDn raw, const CalibrateBlackArgs& args) {
 /// What was read: the darks by setting, and the camera.
 struct Darks {
   std::vector<calib::DarkSet> sets;
+  std::vector<std::pair<std::optional<double>, std::string>> files;  // with their ISO
   FrameInfo camera;
 };
+
+calib::Measured measured_on(const Darks& darks, const std::optional<double>& iso) {
+  std::vector<std::string> files;
+  for (const auto& [own, file] : darks.files) {
+    if (own == iso) files.push_back(file);
+  }
+  return measured_today(std::move(files));
+}
 
 Result<Darks> read_darks(const CalibrateBlackArgs& args) {
   calib::DarkSorter sorter;
@@ -74,6 +82,7 @@ Result<Darks> read_darks(const CalibrateBlackArgs& args) {
     auto frame = read_calibration_frame(file, args.common);
     if (!frame) return tl::make_unexpected(frame.error());
     out.camera = frame->raw.info;
+    out.files.emplace_back(frame->raw.info.iso, file);
     const auto dark = dark_part(std::move(frame->raw), args);
     if (!dark) return tl::make_unexpected(at(dark.error(), file));
     if (const auto added = sorter.add(*dark); !added) return tl::make_unexpected(at(added.error(), file));
@@ -101,10 +110,9 @@ Result<Gain> gain_of(const calib::DarkSet& set, const CalibrateBlackArgs& args, 
 }
 
 bool tells_dark_current(const calib::DarkSet& set) {
-  for (const calib::DarkGroup& g : set.groups) {
-    if (g.setting.exposure_s != set.groups.front().setting.exposure_s) return true;
-  }
-  return false;
+  return std::ranges::any_of(set.groups, [&](const calib::DarkGroup& g) {
+    return g.setting.exposure_s != set.groups.front().setting.exposure_s;
+  });
 }
 
 std::string map_name(const CalibrateBlackArgs& args, const calib::DarkSet& set, bool several, const char* what) {
@@ -112,20 +120,17 @@ std::string map_name(const CalibrateBlackArgs& args, const calib::DarkSet& set, 
   return fmt::format("{}{}_{}.pfm", args.map, iso, what);
 }
 
-Result<void> write_map(const std::string& path, const Plane<float>& map, bool force) {
-  auto file = isp::AtomicFile::create(path, force ? isp::Overwrite::yes : isp::Overwrite::no);
-  if (!file) return tl::make_unexpected(file.error());
-  if (auto written = isp::encode_pfm(map.view(), file->file()); !written) return written;
-  return file->commit();
-}
-
 /// Of one exposure time: what can be told is the black level with the dark charge in it.
-Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measured& measured, Calibration& found) {
+Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measured& measured,
+                                   const CalibrateBlackArgs& args, Calibration& found) {
   if (set.groups.size() > 1) {
     return fail(ErrorCode::insufficient,
                 fmt::format("the darks have one exposure time at {} temperatures: dark current needs a second exposure "
                             "time, a black level frames of one temperature",
                             set.groups.size()));
+  }
+  if (!args.map.empty() || args.system_gain_dn_per_e) {
+    found.warnings.emplace_back("one exposure time does not tell dark current: --map and --system-gain do nothing");
   }
   const calib::DarkGroup& group = set.groups.front();
   const auto black = calib::measure_black(group);
@@ -136,22 +141,23 @@ Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measu
 }
 
 /// One gain setting: fits what its frames can tell.
-Result<void> calibrate_set(const calib::DarkSet& set, const CalibrateBlackArgs& args, bool several,
+Result<void> calibrate_set(const calib::DarkSet& set, const Darks& darks, const CalibrateBlackArgs& args,
                            Calibration& found) {
-  const calib::Measured measured = measured_today(args.common.frames);
-  if (!tells_dark_current(set)) return calibrate_black_level(set, measured, found);
+  const calib::Measured measured = measured_on(darks, set.iso);
+  if (!tells_dark_current(set)) return calibrate_black_level(set, measured, args, found);
   const auto gain = gain_of(set, args, found.profile);
   if (!gain) return tl::make_unexpected(gain.error());
-  const auto series = calib::fit_dark_series(set.groups, gain->dn_per_e);
+  auto series = calib::fit_dark_series(set.groups, gain->dn_per_e);
   if (!series) return tl::make_unexpected(series.error());
   GainProfile& profile = calib::gain_at(found.profile, set.groups.front().setting);
   calib::put_dark_series(*series, set.groups, gain->dn_per_e, measured, profile);
   if (args.masked) profile.hot_pixels.clear();  // they are none of the picture's
   show_dark_series(*series, set.groups, profile, gain->source, found);
   if (args.map.empty()) return {};
-  const auto pedestal = write_map(map_name(args, set, several, "pedestal"), series->pedestal_map_dn, args.common.force);
-  if (!pedestal) return pedestal;
-  return write_map(map_name(args, set, several, "current"), series->current_map_e_per_s, args.common.force);
+  const bool several = darks.sets.size() > 1;
+  found.maps.push_back({map_name(args, set, several, "pedestal"), std::move(series->pedestal_map_dn)});
+  found.maps.push_back({map_name(args, set, several, "current"), std::move(series->current_map_e_per_s)});
+  return {};
 }
 
 Result<Calibration> calibrate(const CalibrateBlackArgs& args) {
@@ -165,7 +171,7 @@ Result<Calibration> calibrate(const CalibrateBlackArgs& args) {
   found.report.title = fmt::format("{} {}: black point", darks->camera.make, darks->camera.model);
   if (const auto same = put_camera(darks->camera, found.profile); !same) return tl::make_unexpected(same.error());
   for (const calib::DarkSet& set : darks->sets) {
-    const auto done = calibrate_set(set, args, darks->sets.size() > 1, found);
+    const auto done = calibrate_set(set, *darks, args, found);
     if (!done) return tl::make_unexpected(done.error());
   }
   return found;
@@ -178,7 +184,7 @@ int run_calibrate_black(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<CalibrateBlackArgs>(parsed);
   const auto found = calibrate(args);
-  return found ? finish(args.common, *found) : calibration_failed(found.error());
+  return found ? finish(args.common, *found) : calibration_failed(args.common, found.error());
 }
 
 }  // namespace lowlux::cli

@@ -11,6 +11,7 @@
 #include "isp/cli/calibrate_colour_args.h"
 #include "isp/cli/calibrate_colour_report.h"
 #include "isp/cli/calibrate_colour_work.h"
+#include "isp/cli/calibration.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/output_place.h"
 #include "isp/cli/profile_file.h"
@@ -31,18 +32,17 @@ Result<void> check_places(const CalibrateColourArgs& args) {
 
 /// A profile with the new colours: they replace those under the same illuminant.
 Result<CameraProfile> profile_of(const CalibrateColourArgs& args, const ColourOutcome& outcome) {
-  CameraProfile profile{outcome.make, outcome.model, {}, {}};
+  CameraProfile profile;
   if (!args.add_to.empty()) {
     auto before = read_profile(args.add_to);
     if (!before) return before;
-    const bool same = outcome.make.empty() || (before->make == outcome.make && before->model == outcome.model);
-    if (!same) {
-      return fail(ErrorCode::invalid_argument,
-                  fmt::format("the profile is of {} {}, the chart was taken by {} {}", before->make, before->model,
-                              outcome.make, outcome.model),
-                  args.add_to);
-    }
     profile = *std::move(before);
+  }
+  FrameInfo camera;
+  camera.make = outcome.make;
+  camera.model = outcome.model;
+  if (const auto same = put_camera(camera, profile); !same) {
+    return fail(same.error().code, same.error().message, args.add_to);
   }
   std::erase_if(profile.colours,
                 [&](const ColourProfile& colour) { return colour.illuminant == outcome.colour.illuminant; });

@@ -1,25 +1,14 @@
 #include "isp/cli/calibrate_colour_args.h"
 
-#include <array>
-#include <cstddef>
-#include <filesystem>
-#include <system_error>
-
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "isp/cli/option_values.h"
+#include "isp/cli/output_place.h"
 #include "isp/output/image_writer.h"
 
 namespace lowlux::cli {
 namespace {
-
-namespace fs = std::filesystem;
-
-bool same_name(const std::string& a, const std::string& b) {
-  std::error_code ignored;
-  return a == b || fs::weakly_canonical(a, ignored) == fs::weakly_canonical(b, ignored);
-}
 
 /// What is wrong with the files that would be written; empty if nothing.
 std::string wrong_files(const CalibrateColourArgs& args) {
@@ -34,17 +23,7 @@ std::string wrong_files(const CalibrateColourArgs& args) {
     const auto fits = isp::check_writable(*format, SampleType::u8, OutputSpace::srgb);
     if (!fits) return fits.error().message;
   }
-  const std::array files{&args.output, &args.report, &args.overlay};
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    if (files[i]->empty()) continue;
-    for (std::size_t j = 0; j < i; ++j) {
-      if (same_name(*files[i], *files[j])) return fmt::format("two outputs have the name {}", *files[i]);
-    }
-    if (!args.chart.empty() && same_name(*files[i], args.chart)) {
-      return fmt::format("{} would replace its own chart", *files[i]);
-    }
-  }
-  return {};
+  return wrong_names({args.output, args.report, args.overlay}, {args.chart});
 }
 
 std::string wrong(const CalibrateColourArgs& args) {

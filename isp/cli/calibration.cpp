@@ -16,6 +16,8 @@
 #include "isp/cli/profile_file.h"
 #include "isp/cli/report.h"
 #include "isp/cli/version.h"
+#include "isp/codec/pfm.h"
+#include "isp/output/atomic_file.h"
 
 namespace lowlux::cli {
 namespace {
@@ -25,16 +27,25 @@ Error with_file(Error error, const std::string& file) {
   return error;
 }
 
+/// JSON holds UTF-8 only; names of files hold any bytes.
+std::string readable(const std::string& name) {
+  using Json = nlohmann::ordered_json;
+  return Json::parse(Json(name).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
+}
+
+Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite) {
+  auto file = isp::AtomicFile::create(map.path, overwrite);
+  if (!file) return tl::make_unexpected(file.error());
+  if (auto written = isp::encode_pfm(map.value.view(), file->file()); !written) return written;
+  return file->commit();
+}
+
 }  // namespace
 
-Result<void> check_outputs(const CalibrateArgs& args, const std::vector<std::string>& more) {
-  std::vector<std::string> files{args.output};
-  if (!args.report.empty()) files.push_back(args.report);
-  files.insert(files.end(), more.begin(), more.end());
-  for (const std::string& file : files) {
-    if (auto good = check_place(file, args.force); !good) return good;
-  }
-  return {};
+Result<void> check_outputs(const CalibrateArgs& args) {
+  if (auto place = check_place(args.output, args.force); !place) return place;
+  if (args.report.empty()) return {};
+  return check_place(args.report, args.force);
 }
 
 Result<CameraProfile> starting_profile(const CalibrateArgs& args) {
@@ -45,44 +56,54 @@ Result<RawFrame> read_calibration_frame(const std::string& file, const Calibrate
   Result<RawFrame> frame = capture::read_raw(file);
   if (!frame) return tl::make_unexpected(with_file(std::move(frame.error()), file));
   FrameInfo& info = frame->raw.info;
-  if (args.iso) info.iso = args.iso;
-  if (args.exposure_s) info.exposure_s = args.exposure_s;
-  if (args.temperature_c) info.temperature_c = args.temperature_c;
+  if (!info.iso) info.iso = args.iso;
+  if (!info.exposure_s) info.exposure_s = args.exposure_s;
+  if (!info.temperature_c) info.temperature_c = args.temperature_c;
   return frame;
 }
 
 Result<void> put_camera(const FrameInfo& info, CameraProfile& profile) {
-  if (profile.make.empty() && profile.model.empty()) {
-    profile.make = info.make;
-    profile.model = info.model;
-    return {};
+  const auto differs = [](const std::string& a, const std::string& b) { return !a.empty() && !b.empty() && a != b; };
+  if (differs(profile.make, info.make) || differs(profile.model, info.model)) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("the profile is of \"{} {}\", what is to be added of \"{} {}\"", profile.make,
+                            profile.model, info.make, info.model));
   }
-  if (profile.make == info.make && profile.model == info.model) return {};
-  return fail(ErrorCode::invalid_argument, fmt::format("the profile to add to is of \"{} {}\", the frames of \"{} {}\"",
-                                                       profile.make, profile.model, info.make, info.model));
+  if (profile.make.empty()) profile.make = info.make;
+  if (profile.model.empty()) profile.model = info.model;
+  return {};
 }
 
 calib::Measured measured_today(std::vector<std::string> files) {
   const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-  for (std::string& file : files) file = std::filesystem::path(file).filename().string();
+  for (std::string& file : files) file = readable(std::filesystem::path(file).filename().string());
   return {"lowlux " + version_number(), fmt::format("{:%Y-%m-%d}", fmt::gmtime(now)), std::move(files)};
 }
 
-int calibration_failed(const Error& error) {
-  fmt::print(stderr, "{}\n", error_line(error.where.empty() ? "calibrate" : error.where, error));
+int calibration_failed(const CalibrateArgs& args, const Error& error) {
+  const std::string what = error.where.empty() ? "calibrate" : error.where;
+  fmt::print(stderr, "{}\n", error_line(what, error));
+  if (args.json) fmt::print("{}\n", error_json(what, error));
   return exit_failed;
 }
 
 int finish(const CalibrateArgs& args, const Calibration& found) {
   const auto text = calib::profile_text(found.profile);
-  if (!text) return calibration_failed(with_file(text.error(), args.output));
+  if (!text) return calibration_failed(args, with_file(text.error(), args.output));
   const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
+  for (const PixelMap& map : found.maps) {
+    if (const auto free = check_place(map.path, args.force); !free) return calibration_failed(args, free.error());
+  }
+  for (const PixelMap& map : found.maps) {
+    const auto written = write_map(map, overwrite);
+    if (!written) return calibration_failed(args, with_file(written.error(), map.path));
+  }
   if (!args.report.empty()) {
     const auto written = isp::write_text(args.report, isp::html_of(found.report), overwrite);
-    if (!written) return calibration_failed(with_file(written.error(), args.report));
+    if (!written) return calibration_failed(args, with_file(written.error(), args.report));
   }
   if (const auto written = isp::write_text(args.output, *text, overwrite); !written) {
-    return calibration_failed(with_file(written.error(), args.output));
+    return calibration_failed(args, with_file(written.error(), args.output));
   }
   if (!args.quiet) {
     for (const std::string& warning : found.warnings) {

@@ -7,11 +7,18 @@
 #include "calib/gain_profile.h"
 #include "isp/base/camera_profile.h"
 #include "isp/base/frame.h"
+#include "isp/base/plane.h"
 #include "isp/base/result.h"
 #include "isp/cli/calibrate_args.h"
 #include "isp/output/report.h"
 
 namespace lowlux::cli {
+
+/// A figure of each pixel, and its file.
+struct PixelMap {
+  std::string path;
+  Plane<float> value;
+};
 
 /// What a calibration found, and how it is shown.
 struct Calibration {
@@ -19,28 +26,30 @@ struct Calibration {
   std::string text;
   isp::Report report;
   std::vector<std::string> warnings;
+  std::vector<PixelMap> maps;
 };
 
 /// What would keep files from being written is known before any work: they exist, or their folder is missing.
-Result<void> check_outputs(const CalibrateArgs& args, const std::vector<std::string>& more = {});
+Result<void> check_outputs(const CalibrateArgs& args);
 
 /// The profile to start from: --add-to's, or an empty one.
 Result<CameraProfile> starting_profile(const CalibrateArgs& args);
 
-/// A raw file, with what the options say in place of what it states. Errors name the file.
+/// A raw file, with what the options say where it states nothing. Errors name the file.
 Result<RawFrame> read_calibration_frame(const std::string& file, const CalibrateArgs& args);
 
-/// Makes the profile one of this camera. Error: it is another one's.
+/// Makes the profile one of this camera; a profile or a frame without a camera's name fits any.
+/// Error: it is another one's.
 Result<void> put_camera(const FrameInfo& info, CameraProfile& profile);
 
 /// Source and date of what is measured today.
 calib::Measured measured_today(std::vector<std::string> files);
 
-/// Writes the report and the profile, prints the text or JSON. @return the exit code
+/// Writes maps, report and profile, prints the text or JSON. @return the exit code
 int finish(const CalibrateArgs& args, const Calibration& found);
 
 /// Prints an error. @return the exit code
-int calibration_failed(const Error& error);
+int calibration_failed(const CalibrateArgs& args, const Error& error);
 
 int run_calibrate_black(const std::vector<std::string>& words);
 int run_calibrate_noise(const std::vector<std::string>& words);

@@ -8,8 +8,7 @@
 
 namespace lowlux::cli {
 
-/// Adds a photon transfer to a calibration's text and report: figures, the curve, its residuals, and signal against
-/// time.
+/// Adds a photon transfer to a calibration's text and report: figures, the curve and its residuals.
 void show_photon_transfer(const calib::PhotonTransfer& transfer, std::span<const calib::PairStatistics> darks,
                           std::span<const calib::PairStatistics> flats, Calibration& found);
 

@@ -17,6 +17,7 @@ void use_colours(const CameraProfile& profile, RawFrame& frame) {
                    [](const auto& a, const auto& b) { return a.cct_k < b.cct_k; });
   if (calibrations.size() > 2) calibrations = {calibrations.front(), calibrations.back()};
   frame.colour.calibrations = std::move(calibrations);
+  frame.colour.analog_balance = {1, 1, 1};  // the matrices were fitted to the camera's values as they are
   frame.colour.source = CameraColour::Source::profile;
 }
 

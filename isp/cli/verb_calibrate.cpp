@@ -56,9 +56,9 @@ int run_calibrate_quoted(const std::vector<std::string>& words) {
   const auto parsed = parse_calibrate_quoted(words);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<CalibrateQuotedArgs>(parsed);
-  if (const auto good = check_outputs(args.common); !good) return calibration_failed(good.error());
+  if (const auto good = check_outputs(args.common); !good) return calibration_failed(args.common, good.error());
   const auto profile = calib::quoted_profile(args.common.frames.front());
-  if (!profile) return calibration_failed(profile.error());
+  if (!profile) return calibration_failed(args.common, profile.error());
   Calibration found;
   found.profile = *profile;
   found.text = profile_text(*profile);

@@ -191,6 +191,30 @@ int summarise(const Task& task, const std::vector<DevelopOutcome>& outcomes) {
   return failed > 0 ? exit_failed : exit_done;
 }
 
+// What all files share: profile, darks, and how pictures are written. Errors name their file.
+Result<void> prepare(const std::vector<std::string>& darks, Task& task) {
+  const DevelopArgs& args = task.args;
+  if (const std::string& file = args.profile.empty() ? args.black_profile : args.profile; !file.empty()) {
+    auto profile = read_profile(file);
+    if (!profile) return tl::make_unexpected(with_place(profile.error(), file));
+    task.profile = std::move(*profile);
+  }
+  task.write.overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
+  task.write.software = "lowlux " + version_number();
+  task.write.jpeg.quality = args.jpeg_quality;
+  task.write.exr.depth = args.bits.value_or(16) == 16 ? isp::ExrOptions::Depth::half : isp::ExrOptions::Depth::full;
+  if (args.output.ends_with('/')) {
+    std::error_code error;
+    std::filesystem::create_directories(args.output, error);
+    if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
+  }
+  if (darks.empty()) return {};
+  Result<DarkSource> source = read_darks(darks, args.dark);
+  if (!source) return tl::make_unexpected(source.error());
+  task.darks = *std::move(source);
+  return {};
+}
+
 }  // namespace
 
 int run_develop(const std::vector<std::string>& words) {
@@ -213,33 +237,9 @@ int run_develop(const std::vector<std::string>& words) {
   if (!darks) return usage_error(darks.error());
 
   Task task{args, *options, {}, std::move(*jobs), std::nullopt, std::nullopt};
-  if (const std::string& file = args.profile.empty() ? args.black_profile : args.profile; !file.empty()) {
-    auto profile = read_profile(file);
-    if (!profile) {
-      fmt::print(stderr, "{}\n", error_line(file, profile.error()));
-      return exit_failed;
-    }
-    task.profile = std::move(*profile);
-  }
-  task.write.overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
-  task.write.software = "lowlux " + version_number();
-  task.write.jpeg.quality = args.jpeg_quality;
-  task.write.exr.depth = args.bits.value_or(16) == 16 ? isp::ExrOptions::Depth::half : isp::ExrOptions::Depth::full;
-  if (args.output.ends_with('/')) {
-    std::error_code error;
-    std::filesystem::create_directories(args.output, error);
-    if (error) {
-      fmt::print(stderr, "lowlux: {}: the folder cannot be made: {}\n", args.output, error.message());
-      return exit_failed;
-    }
-  }
-  if (!darks->empty()) {
-    Result<DarkSource> source = read_darks(*darks, args.dark);
-    if (!source) {
-      fmt::print(stderr, "{}\n", error_line(source.error().where, source.error()));
-      return exit_failed;
-    }
-    task.darks = *std::move(source);
+  if (const Result<void> ready = prepare(*darks, task); !ready) {
+    fmt::print(stderr, "{}\n", error_line(ready.error().where, ready.error()));
+    return exit_failed;
   }
   return summarise(task, develop_all(task));
 }

@@ -56,11 +56,6 @@ Files files_of(const SimulateArgs& args) {
   return files;
 }
 
-bool same_name(const std::string& a, const std::string& b) {
-  std::error_code ignored;
-  return a == b || fs::weakly_canonical(a, ignored) == fs::weakly_canonical(b, ignored);
-}
-
 /// What is wrong with the files that would be written; empty if nothing.
 std::string wrong_files(const SimulateArgs& args) {
   if (args.scene.what.empty()) return "SCENE is required: a picture, or dark, flat, chart; --help lists the options";

@@ -48,8 +48,8 @@ TEST(DarkSorter, HoldsABoundedNumberOfSettings) {
   DarkSorter sorter;
   for (int i = 1; i <= 16; ++i) ASSERT_TRUE(sorter.add(dark(100 * i, 1, 20)));
   EXPECT_EQ(sorter.add(dark(1700, 1, 20)).error().code, ErrorCode::too_large);
-  for (int i = 2; i <= 8; ++i) ASSERT_TRUE(sorter.add(dark(100, i, 20)));
-  EXPECT_EQ(sorter.add(dark(100, 9, 20)).error().code, ErrorCode::too_large);
+  for (int i = 2; i <= 32; ++i) ASSERT_TRUE(sorter.add(dark(100, i, 20)));
+  EXPECT_EQ(sorter.add(dark(100, 33, 20)).error().code, ErrorCode::too_large);
 }
 
 }  // namespace

@@ -159,7 +159,9 @@ TEST(ProfileUse, RefusesWhatItCannotTell) {
   };
   EXPECT_NE(message(two_gains(), frame(std::nullopt, 1, 20)).find("states no ISO"), std::string::npos);
   EXPECT_NE(message(two_gains(), frame(100, std::nullopt, 20)).find("exposure time"), std::string::npos);
-  EXPECT_NE(message({}, frame(100, 1, 20)).find("no gain setting"), std::string::npos);
+  const auto nothing = profile_at({}, frame(100, 1, 20));  // colours alone, perhaps
+  ASSERT_TRUE(nothing);
+  EXPECT_FALSE(nothing->black || nothing->sensor || nothing->noise);
   RawDn other = frame(100, 1, 20);
   other.info.model = "D";
   EXPECT_NE(message(two_gains(), other).find("\"M D\""), std::string::npos);
@@ -180,6 +182,48 @@ TEST(ProfileUse, RefusesWhatItCannotTell) {
   const auto only = profile_at(one, frame(std::nullopt, 1, 20));
   ASSERT_TRUE(only);
   EXPECT_EQ(only->warnings.size(), 1U);  // that the only setting is taken
+}
+
+TEST(ProfileUse, GainsThatWereNotMeasuredAlikeAreNotMixed) {
+  CameraProfile profile = two_gains();
+  profile.gains[1].pedestal_holds = BlackPoint::Holds::pedestal_and_dark;
+  const auto near_low = profile_at(profile, frame(150, 5, 20));
+  ASSERT_TRUE(near_low);
+  ASSERT_EQ(near_low->warnings.size(), 1U);
+  EXPECT_NE(near_low->warnings[0].find("not measured alike"), std::string::npos);
+  EXPECT_NEAR(near_low->black->pedestal_dn[0], 500 + 1.5 * 20, 1e-9);  // gain by the ISO, charge in electrons
+}
+
+TEST(ProfileUse, WithoutDarksTheDarkChargeStaysInAndItSaysSo) {
+  CameraProfile profile = two_gains();
+  for (GainProfile& gain : profile.gains) {
+    gain.sensor->dark_current_e_per_s = {};
+    gain.dark_exposure_s.reset();
+    gain.dark_temperature_c.reset();
+  }
+  const auto found = profile_at(profile, frame(100, 5, 20));
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->black->holds, BlackPoint::Holds::pedestal_only);
+  EXPECT_EQ(found->warnings.size(), 1U);
+}
+
+TEST(ProfileUse, DarksWithoutTemperatureAreNotScaled) {
+  CameraProfile profile = two_gains();
+  for (GainProfile& gain : profile.gains) gain.dark_temperature_c.reset();
+  const auto found = profile_at(profile, frame(100, 5, -10));
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->dark_mean_e[0], 20, 1e-12);
+  EXPECT_EQ(found->warnings.size(), 1U);
+}
+
+TEST(ProfileUse, AGainWithoutIsoIsThatOfFramesWithoutIso) {
+  CameraProfile profile = two_gains();
+  profile.gains.push_back(profile.gains[0]);
+  profile.gains[2].iso.reset();
+  (*profile.gains[2].pedestal_dn)[0].value = 600;
+  const auto found = profile_at(profile, frame(std::nullopt, 0, 20));
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->black->pedestal_dn[0], 600);
 }
 
 TEST(ProfileUse, MonochromeSensorsHaveTheMiddleChannel) {

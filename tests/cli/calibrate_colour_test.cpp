@@ -132,7 +132,7 @@ TEST_F(CalibrateColour, AddsToAProfileAndReplacesTheSameIlluminant) {
   EXPECT_EQ(profile("two.json").colours.size(), 2U);
   const auto other = calibrate({kiss_x4, "-o", file("three.json"), "--add-to", file("one.json")});
   EXPECT_EQ(other.exit_code, 1);
-  EXPECT_NE(other.err.find("the profile is of Maker Model 1"), std::string::npos) << other.err;
+  EXPECT_NE(other.err.find("the profile is of \"Maker Model 1\""), std::string::npos) << other.err;
   EXPECT_FALSE(std::filesystem::exists(file("three.json")));
 }
 

@@ -265,9 +265,10 @@ TEST_F(Calibrate, BadFramesAreOneErrorAndNoProfile) {
   refused({"calibrate", "black", file("missing.dng")}, "missing.dng");
   refused({"calibrate", "black", dark[0], dark[1], shoot("e", "dark", "2", 1)[0]}, "one dark frame at 2 s");
   refused({"calibrate", "black", dark[0], "--add-to", file("missing.json")}, "missing.json");
-  refused({"calibrate", "noise", dark[0], dark[1], "--darks", dark[0], dark[1]}, "not brighter than the darks");
-  refused({"calibrate", "noise", dark[0], wide[0], "--darks", dark[0], dark[1]}, "130 x 128 pixels");
-  refused({"calibrate", "noise", dark[0], "--darks", dark[0], dark[1]}, "no two flats make a pair");
+  const Words more = shoot("m", "dark", "1", 2);
+  refused({"calibrate", "noise", more[0], more[1], "--darks", dark[0], dark[1]}, "not brighter than the darks");
+  refused({"calibrate", "noise", more[0], wide[0], "--darks", dark[0], dark[1]}, "130 x 128 pixels");
+  refused({"calibrate", "noise", more[0], "--darks", dark[0], dark[1]}, "no two flats make a pair");
   refused({"calibrate", "quoted", "nosuch"}, "nosuch");
   scratch_.write("future.json", R"({"format": "lowlux camera profile", "version": 9})");
   refused({"calibrate", "black", dark[0], "--add-to", file("future.json")}, "version");
@@ -304,6 +305,63 @@ TEST_F(Calibrate, ShippedProfilesAreWhatTheQuotedFiguresGive) {
     ++shipped;
   }
   EXPECT_GT(shipped, 10);
+}
+
+TEST_F(Calibrate, NoInputAndNoOutputIsReplacedByAnother) {
+  const Words dark = shoot("d", "dark", "1", 2);
+  const std::string before = scratch_.read("d_0000.dng");
+  const auto usage = [&](const Words& words, const std::string& why) {
+    const auto done = lowlux(words);
+    EXPECT_EQ(done.exit_code, 2) << why;
+    EXPECT_TRUE(holds(done.err, why)) << done.err;
+  };
+  usage({"calibrate", "black", dark[0], dark[1], "-o", dark[0], "--force"}, "profiles are .json");
+  usage({"calibrate", "black", dark[0], dark[0], "-o", file("p.json")}, "given twice");
+  usage({"calibrate", "noise", dark[0], "--darks", dark[1], dark[0], "-o", file("p.json")}, "given twice");
+  usage({"calibrate", "black", dark[0], "-o", file("p.json"), "--report", file("p.json")}, ".html");
+  usage({"calibrate", "noise", dark[0], "-o", file("p.json"), "--steady-light"}, "for flats");
+  usage({"calibrate", "noise", dark[0], "--darks", dark[1], "-o", file("p.json"), "--method", "foi"}, "one picture");
+  usage({"develop", dark[0], "-o", file("p.png"), "--black", "a.json", "--profile", "b.json"}, "a profile each");
+  EXPECT_EQ(scratch_.read("d_0000.dng"), before);
+}
+
+TEST_F(Calibrate, MapsAreWrittenWithTheProfileOrNotAtAll) {
+  const Words good = joined(shoot("a", "dark", "0.1", 2), shoot("b", "dark", "10", 2));
+  const Words bad =
+      joined(shoot("c", "dark", "0.1", 2, {"--iso", "100"}), shoot("d", "dark", "10", 1, {"--iso", "100"}));
+  const Words words{"calibrate", "black", "-o", file("p.json"), "--system-gain", "0.5", "--map", file("m")};
+  const auto refused = lowlux(joined(words, joined(good, bad)));
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_TRUE(holds(refused.err, "one dark frame")) << refused.err;
+  for (const std::string& name : scratch_.names()) EXPECT_FALSE(name.ends_with(".pfm")) << name;
+  scratch_.write("m_current.pfm", "mine");
+  const auto in_the_way = lowlux(joined(words, good));
+  EXPECT_EQ(in_the_way.exit_code, 1);
+  EXPECT_EQ(scratch_.read("m_current.pfm"), "mine");
+  EXPECT_FALSE(exists("m_pedestal.pfm") || exists("p.json"));
+}
+
+TEST_F(Calibrate, ErrorsAreJsonToo) {
+  const auto done = lowlux({"calibrate", "black", file("missing.dng"), "-o", file("p.json"), "--json"});
+  EXPECT_EQ(done.exit_code, 1);
+  EXPECT_EQ(Json::parse(done.out)["ok"], false);
+}
+
+TEST_F(Calibrate, NamesThatAreNoUtf8AreWrittenReadable) {
+  const Words dark = shoot("d", "dark", "1", 2);
+  const std::string odd = file("odd\xff.dng");
+  std::filesystem::rename(dark[0], odd);
+  const auto done = lowlux({"calibrate", "black", odd, dark[1], "-o", file("p.json")});
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_TRUE(holds(profile("p.json")["gains"][0]["provenance"][0]["files"][0], "odd"));
+}
+
+TEST_F(Calibrate, ColoursAloneAreAProfileToDevelopWith) {
+  const std::string canon = std::string(LOWLUX_TESTDATA) + "/raws/canon_kissx4_ml_colorchart.dng";
+  ASSERT_EQ(lowlux({"calibrate", "colour", canon, "-o", file("p.json")}).exit_code, 0);
+  const auto done = lowlux({"develop", canon, "-o", file("p.png"), "--half", "--profile", file("p.json")});
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_EQ(lowlux({"develop", canon, "-o", file("q.png"), "--half", "--black", file("p.json")}).exit_code, 1);
 }
 
 TEST_F(Calibrate, AProfileWithoutBlackGivesItsNoise) {
