@@ -25,8 +25,8 @@ std::string joined(const Values& values, const Text& text) {
 }
 
 void add_pedestal(const PerSite<Estimate>& level, Lines& out) {
-  out.add("", "{}", joined(sites, [](const char* name) { return std::string(name); }));
-  out.add("black [DN]", "{}", joined(level, text_of));
+  out.add("", joined(sites, [](const char* name) { return std::string(name); }));
+  out.add("black [DN]", joined(level, text_of));
 }
 
 isp::Table table_of(const GainProfile& gain) {
@@ -162,20 +162,20 @@ std::string name_of_gain(const calib::FrameSetting& setting) {
 void show_black(const calib::BlackFigures& black, const calib::FrameSetting& setting, Calibration& found) {
   Lines out;
   add_pedestal(black.level_dn, out);
-  out.add("deviation [DN]", "{}", joined(black.deviation_dn, [](double v) { return fmt::format("{:.4g}", v); }));
+  out.add("deviation [DN]", joined(black.deviation_dn, [](double v) { return fmt::format("{:.4g}", v); }));
   const auto scatter = [](const calib::LineScatter& s) {
     return fmt::format("{:.3g} ({:.3g})", s.found_dn, s.white_dn);
   };
-  out.add("row means", "{}", joined(black.rows, scatter));
-  out.add("column means", "{}", joined(black.columns, scatter));
-  out.add("", "standard deviation in DN{}; in brackets what white noise alone would give",
-          black.frames == 1 ? "" : " of the mean of the frames");
-  out.add("row noise", "{:.3g} DN, column noise {:.3g} DN beyond white noise", black.row_noise_dn,
-          black.column_noise_dn);
-  out.add("pixels", "{} in {} frame{}, {:.2g} % left out", black.pixels, black.frames, black.frames == 1 ? "" : "s",
-          100 * black.excluded_share);
-  out.add("holds", "pedestal and dark charge in one{}: a second exposure time would tell them apart",
-          setting.exposure_s ? fmt::format(", at {:g} s", *setting.exposure_s) : "");
+  out.add("row means", joined(black.rows, scatter));
+  out.add("column means", joined(black.columns, scatter));
+  out.add("", fmt::format("standard deviation in DN{}; in brackets what white noise alone would give",
+                          black.frames == 1 ? "" : " of the mean of the frames"));
+  out.add("row noise", fmt::format("{:.3g} DN, column noise {:.3g} DN beyond white noise", black.row_noise_dn,
+                                   black.column_noise_dn));
+  out.add("pixels", fmt::format("{} in {} frame{}, {:.2g} % left out", black.pixels, black.frames,
+                                black.frames == 1 ? "" : "s", 100 * black.excluded_share));
+  out.add("holds", fmt::format("pedestal and dark charge in one{}: a second exposure time would tell them apart",
+                               setting.exposure_s ? fmt::format(", at {:g} s", *setting.exposure_s) : ""));
   found.text += name_of_gain(setting) + "\n" + out.text();
 
   isp::Table table{{"site", "black [DN]", "standard error [DN]", "deviation [DN]"}, {}};
@@ -197,30 +197,30 @@ void show_dark_series(const calib::DarkSeries& series, std::span<const calib::Da
   Lines out;
   int frames = 0;
   for (const calib::DarkGroup& g : groups) frames += g.frames;
-  out.add("darks", "{} frames of {} settings, {:.2g} % of the pixels left out", frames, groups.size(),
-          100 * series.excluded_share);
-  out.add("system gain", "{} DN/e-, {}", text_of({gain.sensor->system_gain_dn_per_e, gain.errors.system_gain_dn_per_e}),
-          gain_source);
+  out.add("darks", fmt::format("{} frames of {} settings, {:.2g} % of the pixels left out", frames, groups.size(),
+                               100 * series.excluded_share));
+  out.add("system gain",
+          fmt::format("{} DN/e-, {}", text_of({gain.sensor->system_gain_dn_per_e, gain.errors.system_gain_dn_per_e}),
+                      gain_source));
   add_pedestal(series.pedestal_dn, out);
-  out.add("", "{}", joined(channels, [](const char* name) { return std::string(name); }));
+  out.add("", joined(channels, [](const char* name) { return std::string(name); }));
   for (const calib::DarkCurrent& c : series.currents) {
-    out.add("dark [e-/s]", "{}{}", joined(c.current_e_per_s, text_of),
-            c.temperature_c ? fmt::format("  at {:g} C", *c.temperature_c) : std::string());
+    out.add("dark [e-/s]", fmt::format("{}{}", joined(c.current_e_per_s, text_of),
+                                       c.temperature_c ? fmt::format("  at {:g} C", *c.temperature_c) : std::string()));
   }
   if (series.chromaticity) {
-    out.add("black point", "{}  of the dark current", joined(*series.chromaticity, text_of));
+    out.add("black point", fmt::format("{}  of the dark current", joined(*series.chromaticity, text_of)));
   } else {
     out.add("black point", "the dark current is too small to tell its colour");
   }
-  if (series.law) out.add("doubling", "every {} C", text_of(series.law->doubling_c));
-  out.add("read noise", "{}",
-          series.read_noise_e ? text_of(*series.read_noise_e) + " e-"
-                              : std::string("lost in quantisation and dark charge"));
-  out.add("patterns", "DSNU {:.3g} of the dark current, row noise {:.3g} e-, column noise {:.3g} e-", series.dsnu.value,
-          series.row_noise_e, series.column_noise_e);
-  out.add("hot pixels", "{}", series.hot.size());
-  out.add("fit", "mean square of residual / error {:.3g}, {} degrees of freedom", series.reduced_chi_square,
-          series.degrees_of_freedom);
+  if (series.law) out.add("doubling", fmt::format("every {} C", text_of(series.law->doubling_c)));
+  out.add("read noise", series.read_noise_e ? text_of(*series.read_noise_e) + " e-"
+                                            : std::string("lost in quantisation and dark charge"));
+  out.add("patterns", fmt::format("DSNU {:.3g} of the dark current, row noise {:.3g} e-, column noise {:.3g} e-",
+                                  series.dsnu.value, series.row_noise_e, series.column_noise_e));
+  out.add("hot pixels", std::to_string(series.hot.size()));
+  out.add("fit", fmt::format("mean square of residual / error {:.3g}, {} degrees of freedom", series.reduced_chi_square,
+                             series.degrees_of_freedom));
   found.text += name_of_gain(setting) + "\n" + out.text();
 
   const std::string id = id_of(setting);

@@ -1,21 +1,17 @@
 #pragma once
 
-#include <iterator>
+#include <algorithm>
 #include <string>
-#include <utility>
-
-#include <fmt/format.h>
+#include <string_view>
 
 namespace lowlux::cli {
 
 /// Text of labelled lines.
 class Lines {
  public:
-  template <class... T>
-  void add(const char* label, fmt::format_string<T...> format, T&&... values) {
-    fmt::format_to(std::back_inserter(text_), "  {:<15}", label);
-    fmt::format_to(std::back_inserter(text_), format, std::forward<T>(values)...);
-    text_ += '\n';
+  void add(std::string_view label, std::string_view text) {
+    constexpr std::size_t width = 15;
+    text_.append("  ").append(label).append(width - std::min(width, label.size()), ' ').append(text).append("\n");
   }
   const std::string& text() const { return text_; }
 

@@ -113,7 +113,7 @@ void show_photon_transfer(const calib::PhotonTransfer& transfer, Pairs darks, Pa
   Lines out;
   isp::ReportSection section{name, "", {{"figure", "value"}, {}}, {}};
   for (const auto& [label, value] : figures_of(transfer)) {
-    out.add(label, "{}", value);
+    out.add(label, value);
     section.table.rows.push_back({label, value});
   }
   found.text += name + "\n" + out.text();

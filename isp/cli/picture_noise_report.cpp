@@ -62,7 +62,7 @@ void show_picture_noise(const calib::PictureNoise& noise, const RawFrame& frame,
   const std::string name = name_of_gain(*calib::setting_of(frame.raw));
   isp::ReportSection section{name, "", {{"figure", "value"}, {}}, {}};
   for (const auto& [label, value] : figures_of(noise, frame, black)) {
-    out.add(label, "{}", value);
+    out.add(label, value);
     section.table.rows.push_back({label, value});
   }
   for (const std::string& reason : noise.reasons) section.text += reason + ". ";

@@ -2,20 +2,26 @@
 // truth over several seeds, the standard error the estimator itself reports, and the processor time of the estimate
 // (reading frames from files excluded). Errors fall with the root of the pixels, time grows with them.
 //   calibration_bench [--seeds N, at least 4]
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "calib/black_figures.h"
+#include "calib/colour_fit.h"
 #include "calib/dark_gain.h"
 #include "calib/dark_series.h"
 #include "calib/dark_stack.h"
 #include "calib/pair_statistics.h"
 #include "calib/photon_transfer.h"
+#include "capture/synthetic/fixed_pattern.h"
+#include "isp/model/cie_data.h"
+#include "isp/model/colorimetry.h"
 #include "tests/sensor_bench/sensor_bench.h"
 
 namespace {
@@ -143,6 +149,79 @@ void transfer_rows(int seeds) {
   }
 }
 
+/// Pixels 8 standard deviations of one frame above the others: share of them that is found, and of those found that
+/// are.
+void hot_rows() {
+  SensorModel sensor = test::modern_small();
+  sensor.hot_pixel_fraction = 0.002;
+  sensor.hot_pixel_current_e_per_s = 100;
+  std::printf("\n%-26s %-34s %11s %11s %-6s %9s\n", "finder", "cost", "recall", "precision", "", "cpu ms");
+  for (const int frames : {2, 4, 16}) {
+    const SensorBench bench{.sensor = sensor, .width = 512, .height = 512};
+    std::vector<calib::DarkGroup> groups;
+    double ms = 0;
+    std::uint32_t index = 0;
+    for (const double time_s : {0.0, 10.0}) {
+      calib::DarkStack stack;
+      for (int i = 0; i < frames; ++i) {
+        const RawDn frame = bench.frame({time_s, 20}, index++);
+        timed(ms, [&] { return stack.add(frame); });
+      }
+      groups.push_back(timed(ms, [&] { return std::move(*stack.group()); }));
+    }
+    const auto found = timed(ms, [&] { return *calib::fit_dark_series(groups, {sensor.system_gain_dn_per_e, 0}); });
+    double truth = 0, both = 0;
+    for (int y = 0; y < bench.height; ++y) {
+      std::vector<float> charge(bench.width, 0);
+      std::vector<std::uint32_t> scratch(bench.width);
+      capture::add_hot_pixels({bench.seed, 0, static_cast<std::uint32_t>(y)}, sensor.hot_pixel_fraction,
+                              sensor.hot_pixel_current_e_per_s * 10, charge, scratch);
+      for (int x = 0; x < bench.width; ++x) {
+        const double dark_e = 10 * sensor.dark_current_e_per_s[static_cast<int>(colour_at(bench.phase, x, y))];
+        if (charge[x] <= 8 * std::sqrt(dark_e + sensor.read_noise_e * sensor.read_noise_e + 0.38)) continue;
+        ++truth;
+        both += std::ranges::any_of(found.hot, [&](const calib::HotPixel& hot) { return hot.x == x && hot.y == y; });
+      }
+    }
+    const std::string cost = "512 x 512, 2 x " + std::to_string(frames) + " darks";
+    std::printf("%-26s %-34s %11.4f %11.4f %-6s %9.2f\n", "hot pixels", cost.c_str(), both / truth,
+                both / static_cast<double>(found.hot.size()), "", ms);
+  }
+}
+
+/// A linear camera and a ColorChecker under D65: mean CIEDE2000 of noise-free patches under a matrix fitted to noisy
+/// ones.
+void colour_rows(int seeds) {
+  const Spectrum light = *isp::light_named("D65");
+  const auto references = *calib::chart_reference(light);
+  const Matrix3 to_camera{{{0.83, 0.32, -0.12}, {-0.42, 1.23, 0.21}, {-0.04, 0.16, 0.67}}};
+  const auto white = *isp::xyz_of(isp::white_d65);
+  std::printf("\n%-26s %-34s %11s %11s %-6s %9s\n", "fit", "cost", "mean error", "left out", "unit", "cpu ms");
+  for (const double relative : {0.03, 0.01, 0.003}) {
+    double error = 0, left_out = 0, ms = 0;
+    for (int seed = 1; seed <= seeds; ++seed) {
+      std::mt19937_64 engine(static_cast<std::uint64_t>(seed));
+      std::normal_distribution<double> normal(0, relative);
+      std::vector<calib::ColourSample> clean, noisy;
+      for (std::size_t i = 0; i < references.size(); ++i) {
+        const Vector3 camera = to_camera * isp::vector_of(references[i]);
+        const double x = static_cast<double>(i % 6) / 2.5 - 1, y = static_cast<double>(i / 6) / 1.5 - 1;
+        clean.push_back({camera, references[i], x, y});
+        const Vector3 off{camera[0] * (1 + normal(engine)), camera[1] * (1 + normal(engine)),
+                          camera[2] * (1 + normal(engine))};
+        noisy.push_back({off, references[i], x, y});
+      }
+      const calib::ColourFitOptions options{.white = white};
+      const auto fit = timed(ms, [&] { return *calib::fit_colour(noisy, options); });
+      error += calib::summary_of(calib::colour_errors(fit, clean, white)).mean / seeds;
+      left_out += calib::summary_of(*calib::cross_validated(noisy, options)).mean / seeds;
+    }
+    char cost[40];
+    std::snprintf(cost, sizeof cost, "24 patches known to %.1f %%", 100 * relative);
+    std::printf("%-26s %-34s %11.3f %11.3f %-6s %9.2f\n", "colour matrix", cost, error, left_out, "dE00", ms / seeds);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -156,5 +235,7 @@ int main(int argc, char** argv) {
   black_rows(seeds);
   dark_rows(seeds);
   transfer_rows(seeds);
+  hot_rows();
+  colour_rows(seeds);
   return 0;
 }
