@@ -124,12 +124,12 @@ TEST(Risk, OfALinearFilterIsTheTrueErrorInTheMean) {
 }
 
 TEST(Risk, OfHardThresholdsIsWithinTenPercentOfTheTrueError) {
-  const std::vector<double> mean_e = scene(256), v = variances(mean_e);
+  const std::vector<double> mean_e = scene(128), v = variances(mean_e);
   double v_mean = 0;
-  for (const double one : v) v_mean += one / 256;
+  for (const double one : v) v_mean += one / 128;
   const Filter filter = [&](std::span<const double> in, std::span<double> out) { threshold(in, out, v_mean); };
   MeanOf error, normal_difference, exact_difference, coarse;
-  for (std::uint32_t draw = 0; draw < 400; ++draw) {
+  for (std::uint32_t draw = 0; draw < 600; ++draw) {
     const std::vector<double> y = drawn(mean_e, draw);
     std::vector<double> filtered(y.size());
     filter(y, filtered);
