@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <functional>
 #include <limits>
 #include <vector>
@@ -142,9 +143,11 @@ TEST(LineNoise, EdgesOfTheSceneDoNotBecomeLines) {
     EXPECT_LT(left_over(truth, *found, 180, 280), 1.3 * found->residual_std_e)
         << &scene - scenes;                                        // 100 lines: 5 errors are 0.35
     EXPECT_LT(worst_line(truth, *found), 3.5) << &scene - scenes;  // no more than there was: the largest of 512
-    const auto quiet = line_offsets_of_frame(frame_of(512, 512, scene, none).view(), Lines::rows);
+    std::printf("  %.2f e- left of 1, predicted %.2f\n", left_over(truth, *found), found->residual_std_e);
+    // Without line noise, and yet with the gain for it, no more than errors of measurement may be found.
+    const auto quiet = line_offsets_of_frame(frame_of(512, 512, scene, none).view(), Lines::rows, {.known_std_e = 1.0});
     ASSERT_TRUE(quiet);
-    EXPECT_LT(worst_line(none, *quiet), 1) << &scene - scenes;  // of edges of 5 to 280 e-
+    EXPECT_LT(worst_line(none, *quiet), 5 * quiet->measured_std_e) << &scene - scenes;  // of edges of 5 to 280 e-
   }
 }
 
