@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <limits>
 #include <numbers>
-#include <span>
 #include <string>
+#include <utility>
 
 namespace lowlux::denoise {
 namespace {
@@ -136,6 +136,7 @@ Result<Measured> measured(PlaneView<const float> pixels, Lines lines) {
 /// What all lines of a parity have in common in each group.
 std::vector<double> common_of(const Plane<double>& means, int parity) {
   std::vector<double> out(groups), values;
+  values.reserve(static_cast<std::size_t>(means.height()) / 2 + 1);
   for (int g = 0; g < groups; ++g) {
     values.clear();
     for (int line = parity; line < means.height(); line += 2) values.push_back(means.at(g, line));
