@@ -10,8 +10,6 @@
 namespace lowlux::denoise {
 namespace {
 
-constexpr std::uint32_t probe_purpose = 8;  // none of draw_purpose: independent of a simulated frame of the same seed
-
 /// n . (F(x + eps n) - F(x)) / eps, of one draw.
 double probed_divergence(std::span<const double> noisy, std::span<const double> variance, const Filter& filter,
                          const std::vector<double>& filtered, const DrawStream& stream, double step) {
@@ -42,7 +40,7 @@ Estimate estimated_risk(std::span<const double> noisy, std::span<const double> v
   }
   double sum = 0, squares = 0;
   for (int draw = 0; draw < probe.draws; ++draw) {
-    const DrawStream stream{probe.seed, static_cast<std::uint32_t>(draw), probe_purpose};
+    const DrawStream stream{probe.seed, static_cast<std::uint32_t>(draw), draw_purpose::risk_probe};
     const double term = 2 * probed_divergence(noisy, variance, filter, filtered, stream, probe.step) / count;
     sum += term;
     squares += term * term;
