@@ -23,9 +23,11 @@ struct Measured {
 /// The gain setting of a frame, as a camera calls it: "ISO 1600", or "" if it states none.
 std::string gain_setting_of(const FrameSetting& setting);
 
-/// Puts what flats and darks say into a gain setting's profile; dark currents it has stay.
-/// A full well that the flats do not reach is taken as the charge at the white level, and provenance says so.
-void put_photon_transfer(const PhotonTransfer& transfer, const FrameSetting& setting, const Measured& measured,
+/// Puts what flats and darks say into a gain setting's profile. What it has in electrons is counted anew with the new
+/// system gain; a pedestal that was measured on darks stays. A full well that the flats do not reach is taken as the
+/// charge at the white level, and provenance says so; so is a read noise that is lost in the codes.
+/// @param darks  setting of the darks
+void put_photon_transfer(const PhotonTransfer& transfer, const FrameSetting& darks, const Measured& measured,
                          GainProfile& out);
 
 /// Puts what a dark series says into it: pedestal, dark current and its temperature law, patterns, hot pixels. A read
