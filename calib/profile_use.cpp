@@ -20,7 +20,7 @@ constexpr double quantisation_dn2 = 1.0 / 12;
 Result<void> check_camera(const CameraProfile& profile, const FrameInfo& info) {
   const auto differs = [](const std::string& a, const std::string& b) { return !a.empty() && !b.empty() && a != b; };
   if (!differs(profile.make, info.make) && !differs(profile.model, info.model)) return {};
-  return fail(ErrorCode::invalid_argument, fmt::format("the profile is of \"{} {}\", the frame of \"{} {}\"",
+  return fail(ErrorCode::invalid_argument, fmt::format(R"(the profile is of "{} {}", the frame of "{} {}")",
                                                        profile.make, profile.model, info.make, info.model));
 }
 
