@@ -40,6 +40,17 @@ TEST(BlockSamples, KeepColoursApartInEveryPhase) {
   }
 }
 
+TEST(BlockSamples, OfAMonochromeSensorAreThoseOfFourSites) {
+  RawDn raw = test::bayer_frame(96, 96, BayerPhase::rggb, [](int x, int y) { return 100 * (1 + site_of(x, y)); });
+  raw.layout = SensorLayout::monochrome;
+  PerSite<int> samples{};
+  for (const NoiseSample& s : blocks_of(raw).sample) {
+    EXPECT_EQ(s.mean_dn, 100 * (1 + s.site));
+    ++samples[s.site];
+  }
+  for (const int n : samples) EXPECT_EQ(n, 25);  // 48 sites less twice the border of 2 hold 5 blocks of 8
+}
+
 TEST(BlockSamples, SubtractTheBlackOfEachGreen) {
   const RawDn raw = test::bayer_frame(96, 96, BayerPhase::rggb, [](int x, int y) { return 500 + 10 * site_of(x, y); });
   for (const NoiseSample& s : blocks_of(raw, {{100, 110, 120, 130}, 1'000'000}).sample) {
