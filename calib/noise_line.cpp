@@ -16,7 +16,8 @@ constexpr double far_sigmas = 6;  // a bound further off than this clips one pix
 /// A normal law before clipping.
 isp::Moments law_at(const NoiseLine& line, double mu_dn) {
   const double floor_dn2 = 1e-3 * std::abs(line.offset_dn2.value) + 1e-9;
-  return {mu_dn, std::max(line.gain_dn_per_e.value * mu_dn + line.offset_dn2.value, floor_dn2)};
+  const double light = std::max(mu_dn, 0.0), texture = line.contrast_squared * light * light;
+  return {mu_dn, std::max(line.gain_dn_per_e.value * mu_dn + line.offset_dn2.value + texture, floor_dn2)};
 }
 
 bool is_far(const isp::Moments& law, const ClipRange& clip) {
@@ -67,44 +68,89 @@ double share_beyond(const isp::Moments& law, const ClipRange& clip) {
   return upper_tail((law.mean - clip.low_dn) / s) + upper_tail((clip.high_dn - law.mean) / s);
 }
 
-/// The parameters' information: J^T W J of a model of two parameters, and J^T W r.
+/// By how much a line moves.
+struct Step {
+  double gain = 0, offset = 0, contrast_squared = 0;
+};
+
+/// The parameters' information: J^T W J of gain (a), offset (b) and contrast squared (c), and J^T W r.
 struct Normal {
-  double aa = 0, ab = 0, bb = 0;
-  double ra = 0, rb = 0;
+  double aa = 0, ab = 0, bb = 0, ac = 0, bc = 0, cc = 0;
+  double ra = 0, rb = 0, rc = 0;
   double chi_square = 0, weight = 0;
 
   double determinant() const { return aa * bb - ab * ab; }
   bool solvable() const { return determinant() > 1e-9 * aa * bb && std::isfinite(determinant()); }
+
+  /// Of gain and offset where c is whatever suits them (Schur's complement). Without information on c: fixed.
+  Normal without_contrast() const {
+    if (!(cc > 0)) return *this;
+    Normal out = *this;
+    out.aa -= ac * ac / cc;
+    out.ab -= ac * bc / cc;
+    out.bb -= bc * bc / cc;
+    out.ra -= ac * rc / cc;
+    out.rb -= bc * rc / cc;
+    return out;
+  }
+
+  /// To the best gain and offset where c moves by so much.
+  Step solved_for(double by_c) const {
+    const double a = ra - ac * by_c, b = rb - bc * by_c;
+    return {(bb * a - ab * b) / determinant(), (aa * b - ab * a) / determinant(), by_c};
+  }
+
+  /// To the best of all, c staying at least 0.
+  Step solved(double c) const {
+    if (!(cc > 0)) return solved_for(0);
+    const Step free = without_contrast().solved_for(0);
+    const double by_c = (rc - ac * free.gain - bc * free.offset) / cc;
+    return solved_for(std::max(by_c, -c));
+  }
 };
 
 /// Cauchy's weight with the constant that costs 5 % of efficiency where errors are normal.
 double robust_weight(double residual) { return 1 / (1 + residual * residual / (2.385 * 2.385)); }
 
-NoiseLine moved(const NoiseLine& line, double by_gain, double by_offset) {
+NoiseLine moved(const NoiseLine& line, const Step& by) {
   NoiseLine out = line;
-  out.gain_dn_per_e.value += by_gain;
-  out.offset_dn2.value += by_offset;
+  out.gain_dn_per_e.value += by.gain;
+  out.offset_dn2.value += by.offset;
+  out.contrast_squared += by.contrast_squared;
   return out;
 }
 
-Normal normal_equations(std::span<const NoisePoint> points, const NoiseLine& line) {
+/// @param expected  standard deviation of the contrast squared before anything is measured; 0: none is fitted
+Normal normal_equations(std::span<const NoisePoint> points, const NoiseLine& line, double expected) {
   Normal out;
   for (const NoisePoint& p : points) {
     const double model = read_variance_dn2(line, p.mean_dn, p.clip);
     if (!(model > 0)) continue;
-    const double step_b = 1e-4 * model, step_a = step_b / std::max(std::abs(p.mean_dn), std::sqrt(model));
-    const double by_a = (read_variance_dn2(moved(line, step_a, 0), p.mean_dn, p.clip) - model) / step_a;
-    const double by_b = (read_variance_dn2(moved(line, 0, step_b), p.mean_dn, p.clip) - model) / step_b;
-    const double information = p.degrees_of_freedom / (2 * model * model);
-    const double residual = (p.variance_dn2 - model) * std::sqrt(information);
+    const double step_b = 1e-4 * model, reach = std::max(std::abs(p.mean_dn), std::sqrt(model));
+    const double step_a = step_b / reach, step_c = step_a / reach;
+    const auto slope = [&](const Step& step, double length) {
+      return (read_variance_dn2(moved(line, step), p.mean_dn, p.clip) - model) / length;
+    };
+    const double by_a = slope({step_a, 0, 0}, step_a), by_b = slope({0, step_b, 0}, step_b);
+    const double by_c = expected > 0 ? slope({0, 0, step_c}, step_c) : 0;
+    const double information = p.degrees_of_freedom / (2 * model * model), off = p.variance_dn2 - model;
+    const double residual = off * std::sqrt(information);
     const double robust = robust_weight(residual), w = information * robust;
     out.aa += w * by_a * by_a;
     out.ab += w * by_a * by_b;
     out.bb += w * by_b * by_b;
-    out.ra += w * by_a * (p.variance_dn2 - model);
-    out.rb += w * by_b * (p.variance_dn2 - model);
+    out.ac += w * by_a * by_c;
+    out.bc += w * by_b * by_c;
+    out.cc += w * by_c * by_c;
+    out.ra += w * by_a * off;
+    out.rb += w * by_b * off;
+    out.rc += w * by_c * off;
     out.chi_square += robust * residual * residual;
     out.weight += robust;
+  }
+  if (expected > 0) {
+    out.cc += 1 / (expected * expected);
+    out.rc -= line.contrast_squared / (expected * expected);
   }
   return out;
 }
@@ -131,7 +177,10 @@ NoiseLine first_line(std::span<const NoisePoint> points) {
 /// Whether every point keeps a variance: steps that lose one are halved.
 bool is_lawful(std::span<const NoisePoint> points, const NoiseLine& line) {
   return std::all_of(points.begin(), points.end(), [&](const NoisePoint& p) {
-    return line.gain_dn_per_e.value * std::max(p.mean_dn, 0.0) + line.offset_dn2.value > 0.05 * p.variance_dn2;
+    const double mean = std::max(p.mean_dn, 0.0);
+    const double variance =
+        line.gain_dn_per_e.value * mean + line.offset_dn2.value + line.contrast_squared * mean * mean;
+    return variance > 0.05 * p.variance_dn2;
   });
 }
 
@@ -150,21 +199,21 @@ double clipped_share(const NoiseLine& line, double mean_dn, const ClipRange& cli
   return share_beyond(law_seen_as(line, mean_dn, clip), clip);
 }
 
-std::optional<NoiseLine> fit_noise_line(std::span<const NoisePoint> points) {
+std::optional<NoiseLine> fit_noise_line(std::span<const NoisePoint> points, double expected_contrast) {
   if (points.size() < 3) return std::nullopt;
+  const double expected = expected_contrast * expected_contrast;
   NoiseLine line = first_line(points);
   Normal n;
   for (int i = 0; i < 40; ++i) {
-    n = normal_equations(points, line);
+    const Normal all = normal_equations(points, line, expected);
+    n = all.without_contrast();
     if (!n.solvable()) return std::nullopt;
-    double by_gain = (n.bb * n.ra - n.ab * n.rb) / n.determinant();
-    double by_offset = (n.aa * n.rb - n.ab * n.ra) / n.determinant();
-    for (int halving = 0; halving < 30 && !is_lawful(points, moved(line, by_gain, by_offset)); ++halving) {
-      by_gain /= 2;
-      by_offset /= 2;
+    Step by = all.solved(line.contrast_squared);
+    for (int halving = 0; halving < 30 && !is_lawful(points, moved(line, by)); ++halving) {
+      by = {by.gain / 2, by.offset / 2, by.contrast_squared / 2};
     }
-    line = moved(line, by_gain, by_offset);
-    if (by_gain * by_gain * n.aa + by_offset * by_offset * n.bb < 1e-8) break;
+    line = moved(line, by);
+    if (by.gain * by.gain * n.aa + by.offset * by.offset * n.bb < 1e-8) break;
   }
   line.degrees_of_freedom = static_cast<int>(points.size()) - 2;
   line.reduced_chi_square = n.chi_square / n.weight * static_cast<double>(points.size()) / line.degrees_of_freedom;

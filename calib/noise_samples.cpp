@@ -29,9 +29,12 @@ const std::array<std::array<float, side>, side>& cosines() {
 
 enum class Band : std::uint8_t { none, low, middle, high };
 
+/// Bands by u + v and not by the smaller of the two: a lens leaves the less of the scene the finer a detail is, and so
+/// the middle ones betray texture that is as strong in the high ones. The finest of all holds most of a difference
+/// between the two greens of a mosaic, which is no noise.
 constexpr Band band_of(int u, int v) {
-  if (u + v <= 1 || (u == 3 && v == 3)) return Band::none;
-  if (u >= 3 && v >= 3) return Band::high;
+  if (u + v <= 1 || u + v == 2 * (side - 1)) return Band::none;
+  if (u + v >= side) return Band::high;
   return u + v <= 3 ? Band::low : Band::middle;
 }
 
@@ -43,24 +46,20 @@ constexpr int count_of(Band band) {
   return count;
 }
 
-/// The pixels of one site, counted from black.
-struct SitePlane {
+/// A square lattice of pixels of one colour: pixel (u, v) lies at (x + u ux + v vx, y + u uy + v vy) of the active
+/// area.
+struct Lattice {
   const RawDn& raw;
-  int site;
-  float black_dn;
-  int width;
-  int height;
+  PerSite<float> black_dn;
+  std::uint8_t site;  // the lowest of those it holds
+  int ux, uy, vx, vy;
 
-  float at(int x, int y) const {
-    const int column = raw.active.x + 2 * x + (site & 1), row = raw.active.y + 2 * y + (site >> 1);
-    return static_cast<float>(raw.dn.at(column, row)) - black_dn;
+  /// Counted from black.
+  float at(int x, int y, int u, int v) const {
+    const int column = x + u * ux + v * vx, row = y + u * uy + v * vy;
+    return static_cast<float>(raw.dn.at(raw.active.x + column, raw.active.y + row)) - black_dn[site_of(column, row)];
   }
 };
-
-SitePlane site_plane(const RawDn& raw, const SamplePlan& plan, int site) {
-  return {raw, site, static_cast<float>(plan.black_dn[site]), (raw.active.width - (site & 1) + 1) / 2,
-          (raw.active.height - (site >> 1) + 1) / 2};
-}
 
 void transform(const Block& in, Block& out) {
   const auto& c = cosines();
@@ -83,12 +82,12 @@ void transform(const Block& in, Block& out) {
 constexpr int block_window = side + 2 * noise_border;
 constexpr double block_step_share = 1.0 / (side * side) + 1.0 / (block_window * block_window - side * side);
 
-NoiseSample block_sample(const SitePlane& plane, int x0, int y0) {
+NoiseSample block_sample(const Lattice& lattice, int x0, int y0) {
   Block pixels, details;
   float all = 0, inside = 0;
   for (int y = -noise_border; y < side + noise_border; ++y) {
     for (int x = -noise_border; x < side + noise_border; ++x) {
-      const float value = plane.at(x0 + x, y0 + y);
+      const float value = lattice.at(x0, y0, x, y);
       all += value;
       if (x < 0 || x >= side || y < 0 || y >= side) continue;
       inside += value;
@@ -97,7 +96,7 @@ NoiseSample block_sample(const SitePlane& plane, int x0, int y0) {
   }
   NoiseSample out{.mean_dn = inside / (side * side),
                   .around_dn = (all - inside) / (block_window * block_window - side * side),
-                  .site = static_cast<std::uint8_t>(plane.site)};
+                  .site = lattice.site};
   for (float& p : pixels) p -= out.mean_dn;
   transform(pixels, details);
   std::array<float, 4> energy{};
@@ -119,14 +118,14 @@ constexpr int detail_reach = 3;  // sites on each side of the middle one
 /// Sums of the eight parts of the 7 x 7 sites about the middle 3 x 3: corners of 2 x 2, sides of 3 x 2.
 using Parts = std::array<float, 9>;
 
-NoiseSample detail_sample(const SitePlane& plane, int x0, int y0) {
+NoiseSample detail_sample(const Lattice& lattice, int x0, int y0) {
   constexpr std::array<int, 7> part{0, 0, 1, 1, 1, 2, 2};
   constexpr std::array<float, 3> second_difference{1, -2, 1};
   Parts sum{};
   float detail = 0;
   for (int y = 0; y < 7; ++y) {
     for (int x = 0; x < 7; ++x) {
-      const float value = plane.at(x0 + x - detail_reach, y0 + y - detail_reach);
+      const float value = lattice.at(x0, y0, x - detail_reach, y - detail_reach);
       sum[3 * part[y] + part[x]] += value;
       if (part[x] == 1 && part[y] == 1) detail += second_difference[x - 2] * second_difference[y - 2] * value;
     }
@@ -144,48 +143,84 @@ NoiseSample detail_sample(const SitePlane& plane, int x0, int y0) {
           .around_dn = ring / 40,
           .low_dn2 = low / 6,
           .high_dn2 = detail * detail / 36,
-          .site = static_cast<std::uint8_t>(plane.site)};
+          .site = lattice.site};
 }
 
-/// Where samples of a site lie: at first + i * step, their pixels within the plane.
-struct Lattice {
-  int first = 0;
+/// The greens of a Bayer mosaic as the one lattice they are, at 45 degrees: the details of one of its two halves, whose
+/// pixels lie two apart, would be mixed with those of the scene that are finer. The other sites each for itself.
+std::vector<Lattice> lattices_of(const RawDn& raw, const PerSite<double>& black_dn) {
+  PerSite<float> black;
+  for (int site = 0; site < 4; ++site) black[site] = static_cast<float>(black_dn[site]);
+  std::vector<Lattice> out;
+  for (int site = 0; site < 4; ++site) {
+    const bool green =
+        raw.layout == SensorLayout::bayer && colour_at(raw.phase, site & 1, site >> 1) == CfaColour::green;
+    const auto index = static_cast<std::uint8_t>(site);
+    if (!green) {
+      out.push_back({raw, black, index, 2, 0, 0, 2});
+    } else if (site < 2) {
+      out.push_back({raw, black, index, 1, 1, 1, -1});
+    }
+  }
+  return out;
+}
+
+/// How far a sample reaches from its first pixel, and how far the next one is off: [pixels of the lattice].
+struct Reach {
+  int before = 0;
+  int after = 0;
   int step = 1;
-  int columns = 0;
-  int rows = 0;
 };
 
-Lattice lattice_of(const SitePlane& plane, int before, int after, int step) {
-  const auto places = [&](int length) {
-    return length < before + after + 1 ? 0 : (length - before - after - 1) / step + 1;
-  };
-  return {before, step, places(plane.width), places(plane.height)};
+/// Where samples of a lattice lie: rows of them, every second one shifted where the lattice is turned.
+struct Places {
+  int x = 0, y = 0;
+  int step_x = 1, step_y = 1;
+  int shift = 0;
+  int columns = 0, rows = 0;
+};
+
+Places places_of(const Lattice& l, const Reach& reach) {
+  const auto count = [](int room, int step) { return room < 0 ? 0 : room / step + 1; };
+  const int site_x = l.site & 1, site_y = l.site >> 1;
+  const int width = l.raw.active.width, height = l.raw.active.height, long_side = reach.before + reach.after;
+  Places out;
+  if (l.vx == 0) {
+    out = {site_x + 2 * reach.before, site_y + 2 * reach.before, 2 * reach.step, 2 * reach.step};
+    out.columns = count(width - 1 - out.x - 2 * reach.after, out.step_x);
+    out.rows = count(height - 1 - out.y - 2 * reach.after, out.step_y);
+    return out;
+  }
+  out = {2 * reach.before + site_x, long_side + (long_side & 1), 2 * reach.step, reach.step, reach.step};
+  out.columns = count(width - 1 - out.x - out.shift - 2 * reach.after, out.step_x);
+  out.rows = count(height - 1 - out.y - long_side, out.step_y);
+  return out;
 }
 
 template <class Sampler>
-std::vector<NoiseSample> samples_of(const RawDn& raw, const SamplePlan& plan, Executor& executor,
-                                    const std::array<int, 3>& before_after_step, const Sampler& sampler) {
+std::vector<NoiseSample> samples_of(const RawDn& raw, const SamplePlan& plan, Executor& executor, const Reach& reach,
+                                    const Sampler& sampler) {
   assert(raw.layout != SensorLayout::linear_rgb && plan.most_samples > 0);
-  PerSite<Lattice> lattice;
+  const std::vector<Lattice> lattices = lattices_of(raw, plan.black_dn);
   std::int64_t all = 0;
-  for (int site = 0; site < 4; ++site) {
-    const auto& [before, after, step] = before_after_step;
-    lattice[site] = lattice_of(site_plane(raw, plan, site), before, after, step);
-    all += static_cast<std::int64_t>(lattice[site].columns) * lattice[site].rows;
+  for (const Lattice& lattice : lattices) {
+    const Places places = places_of(lattice, reach);
+    all += static_cast<std::int64_t>(places.columns) * places.rows;
   }
   const int every = static_cast<int>((all + plan.most_samples - 1) / plan.most_samples);
   std::vector<NoiseSample> out;
-  for (int site = 0; site < 4 && every > 0; ++site) {
-    const Lattice& l = lattice[site];
-    const SitePlane plane = site_plane(raw, plan, site);
-    const int rows = (l.rows + every - 1) / every;
+  for (const Lattice& lattice : lattices) {
+    if (every == 0) break;
+    const Places p = places_of(lattice, reach);
+    const int rows = (p.rows + every - 1) / every;
     const std::size_t start = out.size();
-    out.resize(start + static_cast<std::size_t>(rows) * l.columns);
+    out.resize(start + static_cast<std::size_t>(rows) * p.columns);
     for_each_band(executor, rows, [&](const RowBand& band, int) {
       for (int i = band.first; i < band.last; ++i) {
-        for (int j = 0; j < l.columns; ++j) {
-          out[start + static_cast<std::size_t>(i) * l.columns + j] =
-              sampler(plane, l.first + j * l.step, l.first + i * every * l.step);
+        const int row = i * every, x = p.x + (row % 2) * p.shift;
+        for (int j = 0; j < p.columns; ++j) {
+          out[start + static_cast<std::size_t>(i) * p.columns + j] =
+              sampler(lattice, x + j * p.step_x, p.y + row * p.step_y);
         }
       }
     });

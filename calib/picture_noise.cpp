@@ -17,6 +17,7 @@ constexpr std::size_t least_samples = 100;
 constexpr double first_share = 0.05;  // of each group: the quietest, to begin with
 constexpr int most_rounds = 30;
 constexpr double settled = 1e-3;             // relative change of the gain
+constexpr double expected_contrast = 0.015;  // of PRNU, grain and texture as fine as pixels, in flat samples
 constexpr double most_clipped_share = 0.9;   // of the pixels
 constexpr double largest_gain_error = 0.15;  // relative: beyond, the levels were too alike
 constexpr double largest_chi_square = 5;
@@ -52,6 +53,15 @@ SiteRange range_of(const RawDn& raw, double black_dn, int site) {
   return {{smallest - black_dn, white_dn - black_dn}, static_cast<double>(clipped), static_cast<double>(pixels)};
 }
 
+/// Greens are one lattice of samples: both get the range that holds both.
+void join_greens(const RawDn& raw, PerSite<ClipRange>& clip) {
+  if (raw.layout != SensorLayout::bayer) return;
+  const int upper = colour_at(raw.phase, 0, 0) == CfaColour::green ? 0 : 1, lower = 3 - upper;
+  const ClipRange both{std::min(clip[upper].low_dn, clip[lower].low_dn),
+                       std::max(clip[upper].high_dn, clip[lower].high_dn)};
+  clip[upper] = clip[lower] = both;
+}
+
 Result<void> check(const RawDn& raw, const PerSite<double>& black_dn, const PictureNoiseOptions& options) {
   if (raw.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported,
@@ -84,7 +94,7 @@ std::optional<Fit> settle(const NoiseSamples& samples, const PerSite<ClipRange>&
   Fit out{*first, {}, false};
   for (int i = 0; i < most_rounds && !out.converged; ++i) {
     out.flat = flat_points(samples, out.line, clip, {});
-    const auto next = fit_noise_line(out.flat.points);
+    const auto next = fit_noise_line(out.flat.points, expected_contrast);
     if (!next) return std::nullopt;
     const double gain = out.line.gain_dn_per_e.value;
     out.converged = std::abs(next->gain_dn_per_e.value - gain) < settled * std::abs(gain);
@@ -159,7 +169,8 @@ PictureNoise described(const Fit& fit, double samples, const RawTraces& traces) 
                    .brightest_dn = brightest->mean_dn,
                    .flat_share = fit.flat.samples / samples,
                    .converged = fit.converged,
-                   .traces = traces};
+                   .traces = traces,
+                   .contrast_squared = fit.line.contrast_squared};
   judge(out);
   return out;
 }
@@ -192,6 +203,7 @@ Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& 
     clipped += range.clipped;
     pixels += range.pixels;
   }
+  join_greens(raw, clip);
   if (clipped > most_clipped_share * pixels) {
     return fail(ErrorCode::insufficient,
                 fmt::format("{:.0f} % of the pixels are clipped: change the exposure", 100 * clipped / pixels));

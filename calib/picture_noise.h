@@ -19,16 +19,19 @@ enum class PictureNoiseMethod : std::uint8_t { ponomarenko, foi };
 
 struct PictureNoiseOptions {
   PictureNoiseMethod method = PictureNoiseMethod::ponomarenko;  // foi is misled by texture more easily
-  std::int64_t most_samples = 400'000;  // 1..1e7; of blocks (256 pixels of the raw each) or details (16 pixels)
+  std::int64_t most_samples =
+      400'000;  // 1..1e7; of blocks (128 pixels of the raw each, 256 in red and blue) or details (8, 16)
 };
 
 /// The noise of one ordinary picture.
-///     variance = gain * (mean - black) + offset      [DN^2], of pixels that are not clipped
+///     variance = gain * (mean - black) + offset + contrast_squared * (mean - black)^2      [DN^2], before clipping
 /// `offset` holds all that is there without light: K^2 sigma_r^2, row noise, quantisation (step^2 / 12), and K^2 times
 /// the dark charge where `black` holds that charge; where black is the pedestal alone, dark charge counts as signal.
-/// What stays from frame to frame (PRNU, DSNU) and grain or noise in the scene itself cannot be told from noise in one
-/// frame and counts as such. Standard errors are those of the scatter of the samples; texture finer than the details
-/// that find it raises the gain without showing in them (calib/README.md has figures).
+/// contrast_squared takes what is proportional to the light: PRNU, grain, texture as fine as pixels. It is expected to
+/// be small (1.5 %), so that gain and offset are left what the data do not call for, and are less certain by it. DSNU,
+/// and noise in the scene itself that is not proportional to its light, cannot be told from noise in one frame and
+/// count as such. Standard errors are those of the scatter of the samples, and of the contrast; texture finer than the
+/// details that find it raises the gain without showing in them (calib/README.md has figures).
 struct PictureNoise {
   Estimate gain_dn_per_e;
   Estimate offset_dn2;
@@ -43,9 +46,10 @@ struct PictureNoise {
   bool under_dithered = false;       // the darkest samples scatter less than half a code step
   double darkest_noise_steps = 0;    // their standard deviation, quantisation taken off, in code steps
   std::vector<std::string> reasons;  // to doubt the figures, one line each; none: nothing was found
+  double contrast_squared = 0;       // at least 0
 };
 
-/// Fits gain and offset to the active area: one of each for all sites, each site measured on its own pixels. Clipping
+/// Fits gain and offset to the active area: one of each for all sites, each colour measured on its own pixels. Clipping
 /// at the smallest code in use and at white is modelled (noise_line.h).
 /// @param black_dn of each site
 /// Errors: a layout other than Bayer or monochrome; black that is not below white; options outside their range; fewer

@@ -1,10 +1,12 @@
-// Noise of single pictures, simulated at four levels, against the sensor's own figures; both methods, and time against
-// accuracy when samples are left out. Tuned on the first four pictures; the other four are for the figures only.
+// Noise of single pictures, simulated at four levels, against the sensor's own figures: behind a lens that spreads each
+// point over a Gaussian, behind a sharper one and without any; both methods, and time against accuracy when samples are
+// left out. Tuned on the first four pictures; the other four are for the figures only.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <initializer_list>
 #include <utility>
 #include <vector>
@@ -33,11 +35,12 @@ struct Row {
   const SensorModel& sensor;
   double mean_e = 0;
   bool print = true;
+  std::uint64_t seed = 7;
 };
 
 void measure(const Row& row, const calib::PictureNoiseOptions& options, Executor& executor, Tally& tally) {
   const SensorModel& sensor = row.sensor;
-  const RawDn raw = test::take_picture(row.light, sensor, {.mean_green_e = row.mean_e, .seed = 7}, executor);
+  const RawDn raw = test::take_picture(row.light, sensor, {.mean_green_e = row.mean_e, .seed = row.seed}, executor);
   const double black = sensor.black_level_dn;
   const auto start = std::chrono::steady_clock::now();
   const auto found = calib::fit_picture_noise(raw, {black, black, black, black}, options, executor);
@@ -71,45 +74,70 @@ void print(const char* what, const Tally& t) {
       100 * std::sqrt(t.gain_square / std::max(t.cases - t.refused, 1)), t.ms / t.megapixels);
 }
 
+using Lights = std::vector<test::PictureLight>;
+
+Lights lights_behind(double lens_sigma_px, Executor& executor) {
+  Lights out;
+  for (const char* name : test::clean_pictures) {
+    auto light = test::picture_light(name, executor, lens_sigma_px);
+    if (!light) {
+      std::fprintf(stderr, "%s\n", light.error().message.c_str());
+      std::exit(1);
+    }
+    out.push_back(*std::move(light));
+  }
+  return out;
+}
+
+struct Run {
+  const char* what = "";
+  const Lights& lights;
+  SensorModel sensor;
+  calib::PictureNoiseOptions options{};
+  bool rows = false;
+  std::uint64_t seed = 7;
+};
+
+void run(const Run& r, Executor& executor) {
+  Tally tally;
+  for (const auto& light : r.lights) {
+    for (const double mean_e : {4.0, 10.0, 25.0, 100.0}) {
+      measure({light, r.sensor, mean_e, r.rows, r.seed}, r.options, executor, tally);
+    }
+  }
+  print(r.what, tally);
+}
+
 }  // namespace
 
 int main() {
   PoolExecutor executor(1);
+  using calib::PictureNoiseMethod;
   SensorModel clipping = test::modern_small();
   clipping.name = "clipped at black";
   clipping.black_level_dn = 0;
   clipping.system_gain_dn_per_e = 1.6;
   clipping.read_noise_e = 2.2;
-  std::vector<test::PictureLight> lights;
-  for (const char* name : test::clean_pictures) {
-    auto light = test::picture_light(name, executor);
-    if (!light) return std::fprintf(stderr, "%s\n", light.error().message.c_str()), 1;
-    lights.push_back(*std::move(light));
-  }
-  using calib::PictureNoiseMethod;
-  const auto run = [&](const char* what, const SensorModel& sensor, const calib::PictureNoiseOptions& options,
-                       bool rows, std::initializer_list<double> levels = {4.0, 10.0, 25.0, 60.0}) {
-    Tally tally;
-    for (const auto& light : lights) {
-      for (const double mean_e : levels) measure({light, sensor, mean_e, rows}, options, executor, tally);
+  const std::initializer_list<SensorModel> sensors{test::modern_small(), test::modern_large(), clipping};
+  for (const double sigma_px : {0.9, 0.6, 0.0}) {
+    const Lights lights = lights_behind(sigma_px, executor);
+    std::printf("\nlens of sigma %g px\n", sigma_px);
+    for (const SensorModel& sensor : sensors) {
+      std::printf("\n%s\n", sensor.name.c_str());
+      run({"ponomarenko", lights, sensor, {}, true}, executor);
+      if (sigma_px == 0.6) continue;
+      run({"foi", lights, sensor, {.method = PictureNoiseMethod::foi}}, executor);
     }
-    print(what, tally);
-  };
-  for (const SensorModel& sensor : {test::modern_small(), test::modern_large(), clipping}) {
-    std::printf("\n%s\n", sensor.name.c_str());
-    run("ponomarenko", sensor, {}, true);
-    run("foi", sensor, {.method = PictureNoiseMethod::foi}, false);
   }
-  std::printf("\nbrighter, modern small\n");
-  run("ponomarenko", test::modern_small(), {}, true, {250.0});
-  std::printf("\nmodern small, fewer samples\n");
-  for (const std::int64_t samples : {16'000, 4000, 2000, 1000}) {
-    std::printf("%6d ", static_cast<int>(samples));
-    run("ponomarenko", test::modern_small(), {.most_samples = samples}, false);
+  const Lights lights = lights_behind(0.9, executor);
+  std::printf("\nlens of sigma 0.9 px, other draws\n");
+  for (const std::uint64_t seed : {8, 9}) {
+    for (const SensorModel& sensor : sensors) run({sensor.name.c_str(), lights, sensor, {}, false, seed}, executor);
   }
-  for (const std::int64_t samples : {100'000, 30'000, 10'000}) {
+  std::printf("\nlens of sigma 0.9 px, modern small, fewer samples\n");
+  for (const std::int64_t samples : {4000, 2000, 1000}) {
     std::printf("%6d ", static_cast<int>(samples));
-    run("foi", test::modern_small(), {.method = PictureNoiseMethod::foi, .most_samples = samples}, false);
+    run({"ponomarenko", lights, test::modern_small(), {.most_samples = samples}}, executor);
   }
   return 0;
 }

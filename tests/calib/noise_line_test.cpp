@@ -52,6 +52,43 @@ TEST(FitNoiseLine, IsNotMovedFarByATexturedPoint) {
   EXPECT_NEAR(line->gain_dn_per_e.value, 0.7, 0.02 * 0.7);  // without weights it would be off by a tenth
 }
 
+/// A line with grain of so much contrast, up to 400 DN.
+std::vector<NoisePoint> grained(double contrast) {
+  std::vector<NoisePoint> points;
+  for (int i = 0; i <= 20; ++i) {
+    const double mean = 20.0 * i;
+    points.push_back({mean, 0.7 * mean + 5 + contrast * std::abs(contrast) * mean * mean, 2000, wide});
+  }
+  return points;
+}
+
+TEST(FitNoiseLine, TakesNoGrainForAGain) {
+  const auto plain = fit_noise_line(grained(0.02)), fitted = fit_noise_line(grained(0.02), 0.1);
+  ASSERT_TRUE(plain && fitted);
+  EXPECT_EQ(plain->contrast_squared, 0);
+  EXPECT_GT(plain->gain_dn_per_e.value, 0.7 * 1.05);
+  // The prior, 0.1^2, is 25 times what is there and a hundred times what the points leave open: 1 % for what it draws.
+  EXPECT_NEAR(fitted->gain_dn_per_e.value, 0.7, 0.01 * 0.7);
+  EXPECT_NEAR(fitted->offset_dn2.value, 5, 0.01 * 5);
+  EXPECT_NEAR(fitted->contrast_squared, 4e-4, 0.05 * 4e-4);
+  EXPECT_GT(fitted->gain_dn_per_e.standard_error, plain->gain_dn_per_e.standard_error);
+}
+
+TEST(FitNoiseLine, ExpectsSmallContrastsMoreThanLargeOnes) {
+  const auto wary = fit_noise_line(grained(0.02), 0.005), open = fit_noise_line(grained(0.02), 0.1);
+  ASSERT_TRUE(wary && open);
+  EXPECT_GT(wary->contrast_squared, 0);
+  EXPECT_LT(wary->contrast_squared, 0.9 * open->contrast_squared);
+  EXPECT_LT(wary->gain_dn_per_e.standard_error, open->gain_dn_per_e.standard_error);
+}
+
+TEST(FitNoiseLine, HasNoContrastBelowZero) {  // a variance that bends down: the line is that without contrast
+  const auto plain = fit_noise_line(grained(-0.02)), fitted = fit_noise_line(grained(-0.02), 0.1);
+  ASSERT_TRUE(plain && fitted);
+  EXPECT_EQ(fitted->contrast_squared, 0);
+  EXPECT_NEAR(fitted->gain_dn_per_e.value, plain->gain_dn_per_e.value, 1e-3 * 0.7);  // a tenth of a standard error
+}
+
 TEST(FitNoiseLine, RefusesPointsThatDoNotTellGainFromOffset) {
   EXPECT_FALSE(fit_noise_line({}));
   const std::vector<NoisePoint> two{{1, 2, 100, wide}, {2, 3, 100, wide}};
@@ -70,6 +107,14 @@ TEST(ReadVariance, OfPixelsAtBlackIsThatOfHalfANormalLaw) {
   EXPECT_EQ(clipped_share(line, mean, wide), 0);
   EXPECT_EQ(read_variance_dn2(line, 1000, wide), 400);
   EXPECT_NEAR(read_variance_dn2(line, 4000 - mean, {-1e6, 4000}), 400 * (0.5 - 0.5 / pi), 0.1);
+}
+
+TEST(ReadVariance, HoldsTheContrast) {
+  NoiseLine line;
+  line.gain_dn_per_e.value = 0.5;
+  line.offset_dn2.value = 4;
+  line.contrast_squared = 1e-4;
+  EXPECT_DOUBLE_EQ(read_variance_dn2(line, 1000, wide), 500 + 4 + 100);
 }
 
 TEST(ReadVariance, FollowsSimulatedPixelsClippedAtBlack) {

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <functional>
 #include <random>
 #include <string>
@@ -15,8 +13,6 @@
 #include "calib/flat_samples.h"
 #include "calib/noise_samples.h"
 #include "capture/file/dng_source.h"
-#include "tests/sensor_bench/picture_raw.h"
-#include "tests/sensor_bench/sensor_bench.h"
 #include "tests/support/frames.h"
 
 namespace lowlux::calib {
@@ -25,20 +21,6 @@ namespace {
 Result<PictureNoise> fit(const RawDn& raw, double black_dn, const PictureNoiseOptions& options = {}) {
   PoolExecutor executor(2);
   return fit_picture_noise(raw, {black_dn, black_dn, black_dn, black_dn}, options, executor);
-}
-
-double offset_of(const SensorModel& sensor) {
-  const double read_dn = sensor.system_gain_dn_per_e * sensor.read_noise_e;
-  return read_dn * read_dn + 1.0 / 12;
-}
-
-/// A sensor that clips at black: code 0 is both.
-SensorModel clipping_sensor() {
-  SensorModel out = test::modern_small();
-  out.black_level_dn = 0;
-  out.system_gain_dn_per_e = 1.6;
-  out.read_noise_e = 2.2;
-  return out;
 }
 
 /// Sixteen steps of light in both directions (not in step with blocks of 8) with normal noise of a line, filtered by
@@ -86,63 +68,6 @@ TEST(PictureNoiseOfStairs, IsFoundFromAPartOfTheSamples) {
   const auto found = fit(stairs(1024, 0.8, 6, 100, white_noise), 100, {.most_samples = 4000});
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_NEAR(found->gain_dn_per_e.value, 0.8, 5 * found->gain_dn_per_e.standard_error + 0.008);
-}
-
-/// The gain within 10 %, the offset within 10 % or three standard errors.
-void expect_found(const test::PictureLight& light, const SensorModel& sensor, double mean_green_e) {
-  PoolExecutor executor(2);
-  const RawDn raw = test::take_picture(light, sensor, {.mean_green_e = mean_green_e, .seed = 7}, executor);
-  const auto found = fit(raw, sensor.black_level_dn);
-  const std::string what = light.name + " at " + std::to_string(mean_green_e);
-  ASSERT_TRUE(found) << what << ": " << found.error().message;
-  const double gain = sensor.system_gain_dn_per_e, offset = offset_of(sensor);
-  EXPECT_NEAR(found->gain_dn_per_e.value, gain, 0.1 * gain) << what;
-  EXPECT_NEAR(found->offset_dn2.value, offset, std::max(0.1 * offset, 3 * found->offset_dn2.standard_error)) << what;
-  EXPECT_FALSE(found->traces.denoised) << what << ": " << found->traces.fine_to_coarse;
-  EXPECT_FALSE(found->traces.companded) << what;
-  EXPECT_FALSE(found->traces.block_grid) << what << ": " << found->traces.grid_excess;
-}
-
-TEST(PictureNoiseOfPictures, IsThatOfTheSensorAtFourLevels) {
-  PoolExecutor executor(2);
-  const auto light = test::picture_light("kodim15.png", executor);
-  ASSERT_TRUE(light) << light.error().message;
-  for (const double mean_e : {4.0, 10.0, 25.0, 60.0}) {
-    expect_found(*light, test::modern_small(), mean_e);
-    expect_found(*light, test::modern_large(), mean_e);
-  }
-}
-
-TEST(PictureNoiseOfPictures, SurvivesClippingAtBlack) {
-  PoolExecutor executor(2);
-  const auto light = test::picture_light("GoldenGate.exr", executor);
-  ASSERT_TRUE(light) << light.error().message;
-  for (const double mean_e : {4.0, 25.0}) expect_found(*light, clipping_sensor(), mean_e);
-}
-
-TEST(PictureNoiseOfPictures, OfAllEightIsFoundOrRefused) {
-  if (std::getenv("LOWLUX_NIGHTLY") == nullptr) GTEST_SKIP() << "runs nightly: LOWLUX_NIGHTLY is not set";
-  PoolExecutor executor(2);
-  const SensorModel sensor = test::modern_small();
-  int refused = 0, missed = 0;
-  for (const char* name : test::clean_pictures) {
-    const auto light = test::picture_light(name, executor);
-    ASSERT_TRUE(light) << light.error().message;
-    for (const double mean_e : {4.0, 10.0, 25.0, 60.0}) {
-      const auto found =
-          fit(test::take_picture(*light, sensor, {.mean_green_e = mean_e, .seed = 7}, executor), sensor.black_level_dn);
-      if (!found) {
-        ++refused;
-        continue;
-      }
-      const double off = found->gain_dn_per_e.value / sensor.system_gain_dn_per_e - 1;
-      missed += std::abs(off) > 0.1 ? 1 : 0;
-      EXPECT_LT(std::abs(off), 0.3) << name << " at " << mean_e;  // fine texture that no coarser detail betrays
-    }
-  }
-  EXPECT_LE(refused, 3);
-  // Measured, not wished for: none should be missed.
-  EXPECT_LE(missed, 6);  // kodim05 at 4 and 10 e-, kodim08 at 25 and 60, StillLife and kodim23 at 60: calib/README.md
 }
 
 void expect_refused(const Result<PictureNoise>& found, ErrorCode code, const std::string& words) {
@@ -284,28 +209,6 @@ TEST(CompareWith, PutsTheProfileInOurUnits) {
   EXPECT_FALSE(found[2].agrees);
   EXPECT_EQ(compare_with({}, noise, range)[0].gain_ratio, 0);
   EXPECT_FALSE(compare_with({}, noise, range)[0].agrees);
-}
-
-TEST(PictureNoiseOfRealRaws, IsSaneOrRefused) {
-  for (const char* name : {"canon_kissx4_ml_colorchart.dng", "nikon_dsc1339_crop_rggb14.dng", "openisp_test_rggb10.dng",
-                           "infiniteisp_indoor1_grbg8.dng", "n900_dog_small_grbg10in16.dng"}) {
-    const auto frame = capture::read_raw(std::string(LOWLUX_TESTDATA "/raws/") + name);
-    ASSERT_TRUE(frame) << frame.error().message;
-    ASSERT_TRUE(frame->raw.black_tag);
-    const auto found = fit(frame->raw, frame->raw.black_tag->at(0, 0));
-    if (!found) {
-      EXPECT_EQ(found.error().code, ErrorCode::insufficient) << name;
-      EXPECT_EQ(found.error().message.find('\n'), std::string::npos);
-      std::printf("%s: refused: %s\n", name, found.error().message.c_str());
-      continue;
-    }
-    EXPECT_GT(found->gain_dn_per_e.value, 0) << name;
-    EXPECT_TRUE(std::isfinite(found->offset_dn2.value)) << name;
-    std::printf("%s: gain %.4f +- %.4f offset %.3f +- %.3f chi2 %.2f flat %.2f\n", name, found->gain_dn_per_e.value,
-                found->gain_dn_per_e.standard_error, found->offset_dn2.value, found->offset_dn2.standard_error,
-                found->reduced_chi_square, found->flat_share);
-    for (const std::string& reason : found->reasons) std::printf("  %s\n", reason.c_str());
-  }
 }
 
 TEST(CodeTracesOfRealRaws, FindTheStepOfFourInTheOpenIspRaw) {

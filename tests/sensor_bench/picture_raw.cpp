@@ -1,6 +1,8 @@
 #include "tests/sensor_bench/picture_raw.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <span>
@@ -49,11 +51,42 @@ Result<SceneLinear> picture_xyz(const std::string& path, Executor& executor) {
   return capture::light_of(linear, *to_xyz, Orientation::normal, executor, warnings);
 }
 
+/// Each row of `in` blurred, as a column of the result; the picture goes on as its mirror image beyond its sides.
+Plane<float> blurred_and_turned(const Plane<float>& in, std::span<const double> kernel) {
+  const int reach = static_cast<int>(kernel.size()) - 1, width = in.width();
+  Plane<float> out(in.height(), width);
+  for (int y = 0; y < in.height(); ++y) {
+    for (int x = 0; x < width; ++x) {
+      double sum = kernel[0] * in.at(x, y);
+      for (int i = 1; i <= reach; ++i) {
+        const int left = std::abs(x - i), right = std::min(x + i, 2 * (width - 1) - x - i);
+        sum += kernel[i] * (in.at(std::min(left, width - 1), y) + in.at(std::max(right, 0), y));
+      }
+      out.at(y, x) = static_cast<float>(sum);
+    }
+  }
+  return out;
+}
+
+/// A lens that spreads every point over a Gaussian.
+void blur(SceneLinear& picture, double sigma_px) {
+  std::vector<double> kernel(static_cast<std::size_t>(std::ceil(4 * sigma_px)) + 1);
+  double sum = 0;
+  for (std::size_t i = 0; i < kernel.size(); ++i) {
+    const double z = static_cast<double>(i) / sigma_px;
+    kernel[i] = std::exp(-z * z / 2);
+    sum += (i == 0 ? 1 : 2) * kernel[i];
+  }
+  for (double& k : kernel) k /= sum;
+  for (Plane<float>& plane : picture.plane) plane = blurred_and_turned(blurred_and_turned(plane, kernel), kernel);
+}
+
 }  // namespace
 
-Result<PictureLight> picture_light(const std::string& name, Executor& executor) {
+Result<PictureLight> picture_light(const std::string& name, Executor& executor, double lens_sigma_px) {
   auto xyz = picture_xyz(std::string(LOWLUX_TESTDATA "/pictures/") + name, executor);
   if (!xyz) return tl::make_unexpected(xyz.error());
+  if (lens_sigma_px > 0) blur(*xyz, lens_sigma_px);
   auto scene = capture::picture_scene(*std::move(xyz), 1);
   if (!scene) return tl::make_unexpected(scene.error());
   const auto response = nikon_response();

@@ -24,8 +24,10 @@ struct PictureLight {
   Plane<float> rate_e;  // mean electrons of each pixel; those of the green pixels have the mean 1
 };
 
+/// @param lens_sigma_px  standard deviation of the Gaussian that a lens spreads each point over, before the mosaic
+///                       samples the light; 0: none, as sharp as the picture
 /// Errors: those of reading the file and of making a scene of it.
-Result<PictureLight> picture_light(const std::string& name, Executor& executor);
+Result<PictureLight> picture_light(const std::string& name, Executor& executor, double lens_sigma_px = 0);
 
 /// How a picture is taken.
 struct PictureShot {
