@@ -37,6 +37,8 @@ Figures figures_of(const calib::PictureNoise& n, const RawFrame& frame, const Bl
       {"system gain", text_of(n.gain_dn_per_e) + " DN/e-"},
       {"offset", fmt::format("{} DN^2: {:.3g} e- of noise without light", text_of(n.offset_dn2),
                              read_dn / n.gain_dn_per_e.value)},
+      {"contrast", fmt::format("{:.2g} % of the light: sensitivities of the pixels, grain, fine texture",
+                               100 * std::sqrt(n.contrast_squared))},
       {"fit",
        fmt::format("reduced chi square {:.3g}, {} degrees of freedom, {:.3g} % of the picture is flat, {:.4g} to "
                    "{:.4g} DN above black",
