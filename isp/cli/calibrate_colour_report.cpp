@@ -104,7 +104,10 @@ std::string facts(const ColourOutcome& o) {
   return text;
 }
 
-Json matrix_json(const Matrix3& m) { return Json(m); }
+Json matrix_json(const Matrix3& m) {
+  Json json = m;
+  return json;
+}
 
 Json errors_json(const MatrixErrors& errors) {
   const calib::ErrorSummary summary = summary_of(errors);

@@ -119,7 +119,7 @@ Result<Calibration> calibrate_picture(const CalibrateNoiseArgs& args) {
   found.profile = std::move(*profile);
   found.report.title = fmt::format("{} {}: noise of one picture", frame->raw.info.make, frame->raw.info.model);
   if (const auto same = put_camera(frame->raw.info, found.profile); !same) return at(same.error());
-  for (const std::string& reason : noise->reasons) found.warnings.push_back(file + ": " + reason);
+  for (const std::string& reason : noise->reasons) found.warnings.push_back(fmt::format("{}: {}", file, reason));
   calib::put_picture_noise(*noise, *black, *setting, measured_today({file}), calib::gain_at(found.profile, *setting));
   show_picture_noise(*noise, *frame, *black, found);
   return found;

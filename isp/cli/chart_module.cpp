@@ -25,7 +25,7 @@ Result<calib::DetectCharts*> load_chart_detector() {
   for (const std::filesystem::path& place : {folder, folder / LOWLUX_MODULE_FOLDER}) {
     void* module = dlopen((place / module_name).c_str(), RTLD_NOW | RTLD_LOCAL);
     if (module == nullptr) {
-      const char* reason = dlerror();
+      const char* reason = dlerror();  // NOLINT(concurrency-mt-unsafe): glibc keeps one for each thread
       said += fmt::format("{}{}", said.empty() ? "" : "; ", reason != nullptr ? reason : "no reason given");
       continue;
     }

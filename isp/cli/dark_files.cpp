@@ -13,6 +13,7 @@
 #include "calib/dark_frame.h"
 #include "calib/dark_library.h"
 #include "capture/file/dng_source.h"
+#include "isp/cli/calibration.h"
 #include "isp/cli/option_values.h"
 #include "isp/cli/profile_file.h"
 #include "isp/raw/black_point.h"
@@ -56,13 +57,13 @@ std::vector<std::string> names_of(const std::string& word) {
 }
 
 Result<double> doubling_of_profile(const std::string& file, const calib::FrameSetting& setting) {
-  const Result<CameraProfile> profile = read_profile(file);
+  Result<CameraProfile> profile = read_profile(file);
   if (!profile) return tl::make_unexpected(profile.error());
-  if (profile->make != setting.make || profile->model != setting.model) {
-    return fail(ErrorCode::invalid_argument,
-                fmt::format("the profile is of camera \"{} {}\", the darks of \"{} {}\"", profile->make, profile->model,
-                            setting.make, setting.model),
-                file);
+  FrameInfo camera;
+  camera.make = setting.make;
+  camera.model = setting.model;
+  if (const auto same = put_camera(camera, *profile); !same) {
+    return fail(same.error().code, same.error().message, file);
   }
   for (const GainProfile& gain : profile->gains) {
     if (gain.sensor && gain.errors.dark_doubling_c > 0) return gain.sensor->dark_doubling_c;

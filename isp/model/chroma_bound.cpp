@@ -38,7 +38,7 @@ Counts counts_of(double mean) {
   Counts out;
   out.first = static_cast<int>(std::max(0.0, std::floor(mean - reach - 4)));
   const int last = static_cast<int>(std::ceil(mean + reach + 12));
-  out.log_probability.reserve(static_cast<std::size_t>(last - out.first + 1));
+  out.log_probability.reserve(static_cast<std::size_t>(last) + 1 - static_cast<std::size_t>(out.first));
   for (int j = out.first; j <= last; ++j) {
     out.log_probability.push_back(j * std::log(mean) - mean - log_factorial(j));
   }
