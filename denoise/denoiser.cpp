@@ -10,6 +10,7 @@
 #include "denoise/chroma_start.h"
 #include "denoise/frame_memory.h"
 #include "denoise/passes.h"
+#include "denoise/point_sources.h"
 #include "denoise/rows.h"
 
 namespace lowlux::denoise {
@@ -27,7 +28,8 @@ struct Run {
   int columns;
   int rows;
   int levels;
-  std::array<double, 3> dark_e;  // R, G, B
+  std::array<double, 3> dark_e;     // R, G, B
+  PlaneView<std::uint8_t> sources;  // no data: none are looked for
 
   Run(FrameMemory& m, const RawElectronsView& r, const RawNoise& n, const DenoiseOptions& o, Executor& executor)
       : memory(m),
@@ -47,11 +49,35 @@ struct Run {
     }
   }
 
+  void find_sources();
+  /// Calls work(x, raw value - background) for the sites of raw row y that belong to point sources.
+  template <class Work>
+  void for_each_source_site(int y, const Work& work) const;
   ChromaStarts starts() const;
   void pack(int virtual_row, bool planes, const ThreadMemory& m) const;
   void front() const;
   void unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const;
 };
+
+void Run::find_sources() {
+  if (!options.keep_point_sources) return;
+  sources = memory.sources.view().crop(0, 0, columns, rows);
+  find_point_sources(raw, noise, workers, memory.search.data(), sources);
+}
+
+template <class Work>
+void Run::for_each_source_site(int y, const Work& work) const {
+  if (sources.data == nullptr) return;
+  const std::uint8_t *const cells = sources.row(y / 2), *const end = cells + columns;
+  for (const std::uint8_t* at = std::find(cells, end, 1); at != end; at = std::find(at + 1, end, 1)) {
+    const auto x = static_cast<int>(2 * (at - cells));
+    for (int i = x; i < std::min(x + 2, raw.value.width); ++i) {
+      const float e = raw.value.at(i, y);
+      const double value = std::isnan(e) ? 0 : std::clamp(static_cast<double>(e), -largest_e, largest_e);
+      work(i, static_cast<float>(value - background_e(raw, sources, i, y)));
+    }
+  }
+}
 
 /// Starts for each tile, one thread for each row of tiles so that sums are the same for every number of threads.
 ChromaStarts Run::starts() const {
@@ -87,9 +113,10 @@ void Run::pack(int virtual_row, bool planes, const ThreadMemory& m) const {
   const int row = mirrored(virtual_row, rows), width = raw.value.width;
   const int red_y = red_row(raw.phase), slot = (virtual_row + 16) % 16, padded_columns = memory.level[0].width;
   for (int i = 0; i < 2; ++i) {
-    const float* const from = raw.value.row(raw_of(row, i == 0 ? red_y : 1 - red_y, raw.value.height));
-    std::memcpy(m.raw[i], from, width * sizeof(float));
-    if (width % 2 != 0) m.raw[i][width] = from[width - 2];
+    const int raw_y = raw_of(row, i == 0 ? red_y : 1 - red_y, raw.value.height);
+    std::memcpy(m.raw[i], raw.value.row(raw_y), width * sizeof(float));
+    for_each_source_site(raw_y, [&](int x, float excess) { m.raw[i][x] -= excess; });
+    if (width % 2 != 0) m.raw[i][width] = m.raw[i][width - 2];
   }
   rows::PackRow in{};
   rows::PackedRow out{};
@@ -167,7 +194,9 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
       rows::unpack_row(in, {{m.row[5], m.row[6]}, m.row[7]});
       for (int i = 0; i < 2; ++i) {
         const int raw_y = 2 * y + (i == 0 ? red_row(raw.phase) : 1 - red_row(raw.phase));
-        if (raw_y < signal_e.height) std::memcpy(signal_e.row(raw_y), m.row[5 + i], signal_e.width * sizeof(float));
+        if (raw_y >= signal_e.height) continue;
+        for_each_source_site(raw_y, [&](int x, float excess) { m.row[5 + i][x] += excess; });
+        std::memcpy(signal_e.row(raw_y), m.row[5 + i], signal_e.width * sizeof(float));
       }
       const auto put = [&](PlaneView<float> map, const float* from) {
         if (map.data != nullptr) std::memcpy(map.row(y), from, columns * sizeof(float));
@@ -201,8 +230,9 @@ void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const Den
   assert(raw.value.width >= 2 && raw.value.height >= 2);
   assert(signal_e.width == raw.value.width && signal_e.height == raw.value.height);
   assert(usable(noise, options));
-  const Run run(state_->memory, raw, noise, options, executor);
+  Run run(state_->memory, raw, noise, options, executor);
   assert(run.columns <= state_->memory.columns && run.rows <= state_->memory.rows);
+  run.find_sources();
   const ChromaStarts starts = run.starts();
   const PassFrame frame{state_->memory, starts, run.levels, run.workers};
   run.front();

@@ -59,6 +59,11 @@ void lay_out_thread(Rows& from, int width, ThreadMemory& out) {
   out.blocks = from.take(rows::block_scratch(width) + row, 1);
 }
 
+void lay_out_search(Rows& from, int width, SearchMemory& out) {
+  for (float*& r : out.pair) r = from.take(row_size(2 * width), 1);
+  for (float*& r : out.sums) r = from.take(row_size(2 * width), 1);
+}
+
 void lay_out(Rows& from, int width, int height, int levels, FrameMemory& out) {
   for (int l = 0; l < levels; ++l) {
     PyramidLevel& level = out.level[l];
@@ -70,12 +75,18 @@ void lay_out(Rows& from, int width, int height, int levels, FrameMemory& out) {
   }
   out.difference = from.planes(width / 2, height / 2);
   for (ThreadMemory& thread : out.thread) lay_out_thread(from, width, thread);
+  for (SearchMemory& search : out.search) lay_out_search(from, width, search);
 }
 
 }  // namespace
 
 FrameMemory::FrameMemory(int max_width, int max_height, int threads)
-    : columns((max_width + 1) / 2), rows((max_height + 1) / 2), thread(static_cast<std::size_t>(threads)) {
+    : columns((max_width + 1) / 2),
+      rows((max_height + 1) / 2),
+      thread(static_cast<std::size_t>(threads)),
+      search(static_cast<std::size_t>(threads)),
+      sources(columns, rows),
+      found_(static_cast<std::size_t>(threads) * max_width) {
   assert(max_width >= 2 && max_height >= 2 && threads >= 1);
   const int levels = levels_of(columns, rows), width = padded(columns, levels), height = padded(rows, levels);
   Rows counted(nullptr);
@@ -84,6 +95,7 @@ FrameMemory::FrameMemory(int max_width, int max_height, int threads)
   memory_ = std::make_unique<float[]>(counted.used() + 2 * lead + rows::padding);
   Rows real(memory_.get());
   lay_out(real, width, height, levels, *this);
+  for (int i = 0; i < threads; ++i) search[i].found = found_.data() + static_cast<std::ptrdiff_t>(i) * max_width;
   const auto tiles = static_cast<std::size_t>(tiles_of(columns)) * static_cast<std::size_t>(tiles_of(rows));
   starts.resize(tiles);
   has_chroma.resize(tiles * most_levels);

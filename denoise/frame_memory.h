@@ -2,10 +2,13 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "denoise/layout.h"
+#include "denoise/point_sources.h"
+#include "isp/base/plane.h"
 
 /// The memory of a Denoiser: everything a frame needs, laid out for the largest.
 namespace lowlux::denoise {
@@ -47,11 +50,14 @@ struct FrameMemory {
   std::array<PyramidLevel, most_levels> level{};
   PlaneSet difference;  // of the size of level 1
   std::vector<ThreadMemory> thread;
+  std::vector<SearchMemory> search;       // of each thread
+  Plane<std::uint8_t> sources;            // cells that hold point sources
   std::vector<float> starts;              // chroma start level of each tile
   std::vector<unsigned char> has_chroma;  // for each level, each tile
 
  private:
   std::unique_ptr<float[]> memory_;
+  std::vector<std::int32_t> found_;
 };
 
 }  // namespace lowlux::denoise
