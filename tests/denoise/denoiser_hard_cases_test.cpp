@@ -77,7 +77,7 @@ TEST(DenoiserHardCases, WhollySaturatedFramesAreNeutralAndHaveNoConfidence) {
       ASSERT_NEAR(out.signal.at(x, y) * gain, 2000, 0.02);  // the largest of its cell; float, relative 1e-5
     }
   }
-  EXPECT_LT(*std::max_element(out.confidence.data(), out.confidence.data() + out.confidence.size()), 1e-6);
+  EXPECT_LT(*std::max_element(out.confidence.data(), out.confidence.data() + out.confidence.size()), 1e-5);
 }
 
 TEST(DenoiserHardCases, SamplesThatAreNoNumbersStayWhereTheyAre) {
@@ -100,16 +100,17 @@ TEST(DenoiserHardCases, SamplesThatAreNoNumbersStayWhereTheyAre) {
   EXPECT_NEAR(out.signal.at(20, 20), clean.signal.at(20, 20), 0.1);
 }
 
+// Means change a little because cells near the border are in fewer blocks: by 0.21 standard errors of the noise, see
+// denoiser_properties_test.cpp; five times that. L has 0.26 of a site's variance.
 TEST(DenoiserHardCases, NegativeLumaIsNotRectified) {
   const Camera camera{.dark_e = {200, 200, 200, 200}, .read_noise_e = 4};
-  const auto raw = exposed(camera, flat(0.3, 0.3, 0.3), 512, 384, 52);
+  const auto raw = exposed(camera, flat(0.3, 0.3, 0.3), 1792, 1280, 52);
   const auto out = denoised(raw, camera.phase, camera.noise(), {});
   expect_numbers(out);
   const auto before = colour_means(raw.view(), camera.phase), after = colour_means(out.signal.view(), camera.phase);
   const double luma = 0.2 * (before[0] + before[2]) + 0.6 * before[1] - 200;
   const double kept = 0.2 * (after[0] + after[2]) + 0.6 * after[1];
-  // 0.3 standard errors of the mean of L, whose variance is 0.26 of a site's.
-  EXPECT_NEAR(kept, luma, 0.3 * std::sqrt(0.26 * 216 / (512 * 384 / 4.0)));
+  EXPECT_NEAR(kept, luma, 5 * 0.21 * std::sqrt(0.26 * 216 / (896 * 640)));
   EXPECT_LT(*std::min_element(out.signal.data(), out.signal.data() + out.signal.size()), 0);
 }
 
@@ -120,7 +121,8 @@ TEST(DenoiserHardCases, AnOversubtractedPedestalMovesTheMeanAndNothingElse) {
   const auto out = denoised(raw, camera.phase, camera.noise(), {.rho = std::numeric_limits<double>::infinity()});
   expect_numbers(out);
   const auto before = colour_means(raw.view(), camera.phase), after = colour_means(out.signal.view(), camera.phase);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(after[c], before[c] - 2, 0.3 * std::sqrt(5.25 / (256 * 256 / 4.0)));
+  // One standard error of the mean of a colour.
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(after[c], before[c] - 2, std::sqrt(5.25 / (256 * 256 / 4.0)));
 }
 
 TEST(DenoiserHardCases, ALightBesideTheDarkLeavesTheDarkNoNoisierThanItWas) {
@@ -142,6 +144,8 @@ TEST(DenoiserHardCases, ALightBesideTheDarkLeavesTheDarkNoNoisierThanItWas) {
   }
 }
 
+// Of coefficients of noise, 6.3e-5 lie beyond four standard deviations, with a mean square of 18 variances: they leave
+// sqrt(6.3e-5 * 18) = 0.034 of the noise.
 TEST(DenoiserHardCases, FlatFieldsShowNoMaze) {
   const Camera camera{.dark_e = {20, 20, 20, 20}};
   const auto raw = exposed(camera, flat(20, 20, 20), 512, 384, 55);
@@ -153,7 +157,7 @@ TEST(DenoiserHardCases, FlatFieldsShowNoMaze) {
     }
   }
   // G1 - G2 of one cell has a standard deviation of sqrt(2 * 42.25) e- before.
-  EXPECT_LT(std::sqrt(sum / (256 * 192)), 0.03 * std::sqrt(2 * 42.25));
+  EXPECT_LT(std::sqrt(sum / (256 * 192)), 0.05 * std::sqrt(2 * 42.25));
 }
 
 TEST(DenoiserHardCases, DifferentDarkOfTheGreensIsSharedByBoth) {
