@@ -54,6 +54,7 @@ struct Run {
   template <class Work>
   void for_each_source_site(int y, const Work& work) const;
   ChromaStarts starts() const;
+  rows::PackRow packing(const ThreadMemory& m) const;
   void pack(int virtual_row, bool planes, const ThreadMemory& m) const;
   void front() const;
   void unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const;
@@ -108,6 +109,22 @@ ChromaStarts Run::starts() const {
   return out;
 }
 
+rows::PackRow Run::packing(const ThreadMemory& m) const {
+  rows::PackRow in{};
+  for (int i = 0; i < 2; ++i) in.raw[i] = m.raw[i];
+  in.red_is_odd = red_column(raw.phase) == 1;
+  in.cells = columns;
+  const double saturation_e = std::min(noise.saturation_e, largest_e);
+  const double most = *std::max_element(options.white_gain.begin(), options.white_gain.end()) * saturation_e;
+  in.saturation_e = static_cast<float>(noise.saturation_e);
+  in.blind_variance = static_cast<float>(1e9 * most * most);  // no coefficient exceeds its threshold, on any level
+  for (int k = 0; k < 3; ++k) {
+    in.dark_e[k] = static_cast<float>(dark_e[k]);
+    in.gain[k] = static_cast<float>(options.white_gain[k]);
+  }
+  return in;
+}
+
 /// One row of cells, beyond the ends of the frame mirrored, into the window, and if asked for into level 0.
 void Run::pack(int virtual_row, bool planes, const ThreadMemory& m) const {
   const int row = mirrored(virtual_row, rows), width = raw.value.width;
@@ -118,25 +135,13 @@ void Run::pack(int virtual_row, bool planes, const ThreadMemory& m) const {
     for_each_source_site(raw_y, [&](int x, float excess) { m.raw[i][x] -= excess; });
     if (width % 2 != 0) m.raw[i][width] = m.raw[i][width - 2];
   }
-  rows::PackRow in{};
   rows::PackedRow out{};
-  for (int i = 0; i < 2; ++i) in.raw[i] = m.raw[i];
-  in.red_is_odd = red_column(raw.phase) == 1;
-  in.cells = columns;
-  const double saturation_e = std::min(noise.saturation_e, largest_e);
-  const double most = *std::max_element(options.white_gain.begin(), options.white_gain.end()) * saturation_e;
-  in.saturation_e = static_cast<float>(noise.saturation_e);
-  in.blind_variance = static_cast<float>(1e9 * most * most);
-  for (int k = 0; k < 3; ++k) {
-    in.dark_e[k] = static_cast<float>(dark_e[k]);
-    in.gain[k] = static_cast<float>(options.white_gain[k]);
-    out.raw_e[k] = m.window[k][slot];
-  }
+  for (int k = 0; k < 3; ++k) out.raw_e[k] = m.window[k][slot];
   out.blind = m.window[3][slot];
   if (planes) {
     for (int p = 0; p < 4; ++p) out.plane[p] = memory.level[0].noisy.row(p, virtual_row);
   }
-  rows::pack_row(in, out);
+  rows::pack_row(packing(m), out);
   const auto mirror = [&](float* cells, int before, int after) {
     for (int i = 1; i <= before; ++i) cells[-i] = cells[mirrored(-i, columns)];
     for (int i = columns; i < padded_columns + after; ++i) cells[i] = cells[mirrored(i, columns)];

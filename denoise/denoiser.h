@@ -62,7 +62,8 @@ struct DenoiseMaps {
 /// bit, for every number of threads.
 class Denoiser {
  public:
-  /// For mosaics of up to max_width x max_height pixels, and up to `threads` of an executor's threads.
+  /// For mosaics of up to max_width x max_height pixels, each 2..65536, and up to `threads` of an executor's threads.
+  /// Takes about 22 bytes for each pixel, and 2 MB for each thread of a mosaic 4000 wide.
   Denoiser(int max_width, int max_height, int threads);
   ~Denoiser();
   Denoiser(const Denoiser&) = delete;

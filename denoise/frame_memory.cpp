@@ -88,6 +88,7 @@ FrameMemory::FrameMemory(int max_width, int max_height, int threads)
       sources(columns, rows),
       found_(static_cast<std::size_t>(threads) * max_width) {
   assert(max_width >= 2 && max_height >= 2 && threads >= 1);
+  assert(max_width <= largest_side && max_height <= largest_side);
   const int levels = levels_of(columns, rows), width = padded(columns, levels), height = padded(rows, levels);
   Rows counted(nullptr);
   lay_out(counted, width, height, levels, *this);

@@ -70,11 +70,11 @@ HWY_INLINE VF nine(const float* from) {
   return sum;
 }
 
-void VarianceCells(const VarianceRow& in, float* scratch, float* const out[4]) {
-  const Floats f;
-  const int n = lanes(), row = (in.cells + padding) / 16 * 16;
+/// Variances of R, G, B of each column of two rows, summed over the rows and divided by 16.
+/// @param scratch two rows
+HWY_INLINE void colour_variances(const VarianceRow& in, float* scratch, int row, float* const (&variance)[3]) {
+  const int n = lanes();
   float* const sums[2] = {scratch + 16, scratch + 16 + row};
-  float* const variance[3] = {scratch + 2 * row, scratch + 3 * row, scratch + 4 * row};  // of two rows
   for (int k = 0; k < 3; ++k) {
     for (int i = -16; i < in.cells + 4; i += n) {
       VF shared = load(in.raw_e[k][1] + i);
@@ -82,34 +82,36 @@ void VarianceCells(const VarianceRow& in, float* scratch, float* const out[4]) {
       store(hn::Add(shared, load(in.raw_e[k][0] + i)), sums[0] + i);
       store(hn::Add(shared, load(in.raw_e[k][9] + i)), sums[1] + i);
     }
-    const float square = in.gain[k] * in.gain[k];
-    const VF least = constant(in.least_e[k]), steady = constant(in.variance_e2);
+    const VF scale = constant(in.gain[k] * in.gain[k] / 16), steady = constant(in.variance_e2);
+    const VF least = constant(in.least_e[k]);
     for (int i = 0; i < in.cells; i += n) {
-      VF both = hn::Zero(f);
+      VF both = hn::Zero(Floats());
       for (const float* const sum : sums) {
         both = hn::Add(both, hn::Add(hn::Max(hn::Mul(constant(1.0F / 81), nine(sum + i)), least), steady));
       }
-      store(hn::Mul(constant(square / 16), both), variance[k] + i);
+      store(hn::Mul(scale, both), variance[k] + i);
     }
   }
-  for (int i = 0; i < in.cells / 2; i += n) {
-    VF v[3];
-    for (int k = 0; k < 3; ++k) {
-      VF odd;
-      hn::LoadInterleaved2(f, variance[k] + 2 * i, v[k], odd);
-      v[k] = hn::Add(v[k], odd);
-    }
-    VF blind[2], odd;
-    for (int y = 0; y < 2; ++y) {
-      hn::LoadInterleaved2(f, in.blind[y] + 2 * i, blind[y], odd);
-      blind[y] = hn::Add(blind[y], odd);
-    }
-    const VF unseen = hn::Mul(constant(1.0F / 16), hn::Add(blind[0], blind[1]));
-    const VF other = hn::Add(v[0], v[2]);
-    store(hn::MulAdd(constant(0.18F), v[1], hn::Mul(constant(0.04F), other)), out[0] + i);
-    store(hn::MulAdd(constant(0.5F), v[1], hn::MulAdd(constant(0.25F), other, unseen)), out[1] + i);
+}
+
+/// Sums of cells 2 i and 2 i + 1.
+HWY_INLINE VF pairs(const float* from, int i) {
+  VF even, odd;
+  hn::LoadInterleaved2(Floats(), from + 2 * i, even, odd);
+  return hn::Add(even, odd);
+}
+
+void VarianceCells(const VarianceRow& in, float* scratch, float* const out[4]) {
+  const int row = (in.cells + padding) / 16 * 16;
+  float* const variance[3] = {scratch + 2 * row, scratch + 3 * row, scratch + 4 * row};
+  colour_variances(in, scratch, row, variance);
+  for (int i = 0; i < in.cells / 2; i += lanes()) {
+    const VF green = pairs(variance[1], i), other = hn::Add(pairs(variance[0], i), pairs(variance[2], i));
+    const VF unseen = hn::Mul(constant(1.0F / 16), hn::Add(pairs(in.blind[0], i), pairs(in.blind[1], i)));
+    store(hn::MulAdd(constant(0.18F), green, hn::Mul(constant(0.04F), other)), out[0] + i);
+    store(hn::MulAdd(constant(0.5F), green, hn::MulAdd(constant(0.25F), other, unseen)), out[1] + i);
     store(hn::MulAdd(constant(0.5F), other, unseen), out[2] + i);
-    store(hn::MulAdd(constant(2), v[1], unseen), out[3] + i);
+    store(hn::MulAdd(constant(2), green, unseen), out[3] + i);
   }
 }
 

@@ -7,9 +7,10 @@
 /// Sizes and places that the denoiser and its reference have to agree on: integers only.
 namespace lowlux::denoise {
 
-inline constexpr int block = 8;        // cells, each way
-inline constexpr int most_levels = 5;  // of the pyramid
-inline constexpr int tile = 64;        // cells at the finest level, each way
+inline constexpr int block = 8;             // cells, each way
+inline constexpr int most_levels = 5;       // of the pyramid
+inline constexpr int largest_side = 65536;  // sites
+inline constexpr int tile = 64;             // cells at the finest level, each way
 
 /// Pyramid levels of a mosaic of columns x rows cells: the coarsest holds one block at least.
 constexpr int levels_of(int columns, int rows) {

@@ -1,7 +1,6 @@
 #include "denoise/passes.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cstdint>
 #include <cstring>
 
@@ -92,8 +91,7 @@ struct Shrink {
   void band(int first, int last, const ThreadMemory& m) const {
     const int height = level().height;
     for (int y = 0; y < block; y += 2) finish(m, y, false);
-    std::uint8_t chroma[1 + 65536 / rows::strip_blocks];
-    assert(level().width / step / rows::strip_blocks < static_cast<int>(sizeof chroma));
+    std::uint8_t chroma[1 + largest_side / 2 / 2 / rows::strip_blocks];  // blocks 2 cells apart, cells of 2 sites
     for (int y0 = std::max(0, first - block + step); y0 <= std::min(height - block, last - step); y0 += step) {
       wanted(y0, chroma);
       rows::shrink_block_row(block_row(y0, chroma), m.blocks, sums(m, y0));
