@@ -15,8 +15,8 @@ struct Place {
 
 /// Tiles around the centre of cell i of level `grid`, linear between the centres of tiles.
 Place place_of(int i, int grid, int tiles) {
-  const float at = (static_cast<float>(i) + 0.5F) * static_cast<float>(1 << grid) / tile - 0.5F;
-  const float inside = std::clamp(at, 0.0F, static_cast<float>(tiles - 1));
+  const float at = (static_cast<float>(i) + 0.5f) * static_cast<float>(1 << grid) / tile - 0.5f;
+  const float inside = std::clamp(at, 0.0f, static_cast<float>(tiles - 1));
   const int first = static_cast<int>(inside);
   return {first, std::min(first + 1, tiles - 1), inside - static_cast<float>(first)};
 }
@@ -56,7 +56,7 @@ void share_row(const ChromaStarts& starts, int level, int grid, int y, std::span
   for (std::size_t x = 0; x < out.size(); ++x) {
     const Place u = place_of(static_cast<int>(x), grid, starts.columns);
     const float left = start(u.first), between = left + u.fraction * (start(u.second) - left);
-    out[x] = std::clamp(between - static_cast<float>(level), 0.0F, 1.0F);
+    out[x] = std::clamp(between - static_cast<float>(level), 0.0f, 1.0f);
   }
 }
 

@@ -22,8 +22,8 @@ HWY_INLINE void store(VF v, float* to) { hn::StoreU(v, Floats(), to); }
 HWY_INLINE int lanes() { return static_cast<int>(hn::Lanes(Floats())); }
 
 // cos(k pi / 16) / 2, and 1 / sqrt(8)
-constexpr float c1 = 0.490392640202F, c2 = 0.461939766256F, c3 = 0.415734806151F, c5 = 0.277785116510F;
-constexpr float c6 = 0.191341716183F, c7 = 0.0975451610081F, c0 = 0.353553390593F;
+constexpr float c1 = 0.490392640202f, c2 = 0.461939766256f, c3 = 0.415734806151f, c5 = 0.277785116510f;
+constexpr float c6 = 0.191341716183f, c7 = 0.0975451610081f, c0 = 0.353553390593f;
 
 /// a x + b y + c z + d w
 HWY_INLINE VF dot4(float a, VF x, float b, VF y, float c, VF z, float d, VF w) {

@@ -193,7 +193,7 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
         in.residual[p] = m.row[p];
       }
       in.cells = columns;
-      in.rho = std::isinf(options.rho) ? -1.0F : static_cast<float>(options.rho);
+      in.rho = std::isinf(options.rho) ? -1.0f : static_cast<float>(options.rho);
       for (int k = 0; k < 3; ++k) in.per_gain[k] = static_cast<float>(1 / options.white_gain[k]);
       in.red_is_odd = red_column(raw.phase) == 1;
       rows::unpack_row(in, {{m.row[5], m.row[6]}, m.row[7]});

@@ -15,12 +15,12 @@
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::denoise::rows::HWY_NAMESPACE {
 
-constexpr float per_root2 = 0.707106781187F;
+constexpr float per_root2 = 0.707106781187f;
 
 /// What is not a number to 0, the rest to +-1e9.
 HWY_INLINE VF usable(VF x) {
   const VF number = hn::IfThenElseZero(hn::Eq(x, x), x);
-  return hn::Min(hn::Max(number, constant(-1e9F)), constant(1e9F));
+  return hn::Min(hn::Max(number, constant(-1e9f)), constant(1e9f));
 }
 
 /// The sites of a vector of cells: R, G beside it, G beside B, B.
@@ -41,10 +41,10 @@ void PackCells(const PackRow& in, const PackedRow& out) {
   for (int i = 0; i < in.cells; i += lanes()) {
     const Sites y = sites_of_cells(in, i);
     store(y.e[0], out.raw_e[0] + i);
-    store(hn::Mul(constant(0.5F), hn::Add(y.e[1], y.e[2])), out.raw_e[1] + i);
+    store(hn::Mul(constant(0.5f), hn::Add(y.e[1], y.e[2])), out.raw_e[1] + i);
     store(y.e[3], out.raw_e[2] + i);
     if (out.plane[0] == nullptr) continue;
-    VF x[4], most = constant(-1e30F), blind = hn::Zero(f);
+    VF x[4], most = constant(-1e30f), blind = hn::Zero(f);
     for (int k = 0; k < 4; ++k) {
       x[k] = hn::Mul(constant(gain[k]), hn::Sub(y.e[k], constant(dark[k])));
       most = hn::Max(most, x[k]);
@@ -56,8 +56,8 @@ void PackCells(const PackRow& in, const PackedRow& out) {
     }
     const VF green = hn::Add(x[1], x[2]), other = hn::Add(x[0], x[3]);
     store(blind, out.blind + i);
-    store(hn::MulAdd(constant(0.3F), green, hn::Mul(constant(0.2F), other)), out.plane[0] + i);
-    store(hn::Mul(constant(0.5F), hn::Sub(other, green)), out.plane[1] + i);
+    store(hn::MulAdd(constant(0.3f), green, hn::Mul(constant(0.2f), other)), out.plane[0] + i);
+    store(hn::Mul(constant(0.5f), hn::Sub(other, green)), out.plane[1] + i);
     store(hn::Mul(constant(per_root2), hn::Sub(x[0], x[3])), out.plane[2] + i);
     store(hn::Sub(x[1], x[2]), out.plane[3] + i);
   }
@@ -87,7 +87,7 @@ HWY_INLINE void colour_variances(const VarianceRow& in, float* scratch, int row,
     for (int i = 0; i < in.cells; i += n) {
       VF both = hn::Zero(Floats());
       for (const float* const sum : sums) {
-        both = hn::Add(both, hn::Add(hn::Max(hn::Mul(constant(1.0F / 81), nine(sum + i)), least), steady));
+        both = hn::Add(both, hn::Add(hn::Max(hn::Mul(constant(1.0f / 81), nine(sum + i)), least), steady));
       }
       store(hn::Mul(scale, both), variance[k] + i);
     }
@@ -107,10 +107,10 @@ void VarianceCells(const VarianceRow& in, float* scratch, float* const out[4]) {
   colour_variances(in, scratch, row, variance);
   for (int i = 0; i < in.cells / 2; i += lanes()) {
     const VF green = pairs(variance[1], i), other = hn::Add(pairs(variance[0], i), pairs(variance[2], i));
-    const VF unseen = hn::Mul(constant(1.0F / 16), hn::Add(pairs(in.blind[0], i), pairs(in.blind[1], i)));
-    store(hn::MulAdd(constant(0.18F), green, hn::Mul(constant(0.04F), other)), out[0] + i);
-    store(hn::MulAdd(constant(0.5F), green, hn::MulAdd(constant(0.25F), other, unseen)), out[1] + i);
-    store(hn::MulAdd(constant(0.5F), other, unseen), out[2] + i);
+    const VF unseen = hn::Mul(constant(1.0f / 16), hn::Add(pairs(in.blind[0], i), pairs(in.blind[1], i)));
+    store(hn::MulAdd(constant(0.18f), green, hn::Mul(constant(0.04f), other)), out[0] + i);
+    store(hn::MulAdd(constant(0.5f), green, hn::MulAdd(constant(0.25f), other, unseen)), out[1] + i);
+    store(hn::MulAdd(constant(0.5f), other, unseen), out[2] + i);
     store(hn::MulAdd(constant(2), green, unseen), out[3] + i);
   }
 }
@@ -141,12 +141,12 @@ void UnpackCells(const UnpackRow& in, const UnpackedRow& out) {
     };
     VF c[4], residual[4];
     for (int p = 1; p < 4; ++p) {
-      residual[p] = hn::Max(load(in.residual[p] + i), constant(1e-30F));
+      residual[p] = hn::Max(load(in.residual[p] + i), constant(1e-30f));
       c[p] = hn::Mul(load(in.plane[p] + i), factor(residual[p]));
     }
-    store(factor(hn::Mul(constant(0.5F), hn::Add(residual[1], residual[2]))), out.confidence + i);
-    const VF half = hn::MulAdd(constant(0.6F), c[1], luma), skew = hn::Mul(constant(per_root2), c[2]);
-    const VF green = hn::MulAdd(constant(-0.4F), c[1], luma), maze = hn::Mul(constant(0.5F), c[3]);
+    store(factor(hn::Mul(constant(0.5f), hn::Add(residual[1], residual[2]))), out.confidence + i);
+    const VF half = hn::MulAdd(constant(0.6f), c[1], luma), skew = hn::Mul(constant(per_root2), c[2]);
+    const VF green = hn::MulAdd(constant(-0.4f), c[1], luma), maze = hn::Mul(constant(0.5f), c[3]);
     const VF r = hn::Mul(constant(in.per_gain[0]), hn::Add(half, skew));
     const VF g1 = hn::Mul(constant(in.per_gain[1]), hn::Add(green, maze));
     const VF g2 = hn::Mul(constant(in.per_gain[1]), hn::Sub(green, maze));

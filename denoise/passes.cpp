@@ -172,7 +172,7 @@ void build_pyramid(const PassFrame& frame) {
         }
         for (int y = first; y < last; ++y) {
           const float* const both[2] = {fine.variance.row(p, 2 * y), fine.variance.row(p, 2 * y + 1)};
-          rows::down2_row(both, coarse.width / 2, 0.25F, coarse.variance.row(p, y));
+          rows::down2_row(both, coarse.width / 2, 0.25f, coarse.variance.row(p, y));
         }
       }
     });
@@ -196,7 +196,7 @@ void add_residuals(const PassFrame& frame) {
         for (int p = 0; p < 4; ++p) {
           float* const own = fine.residual.row(p, y);
           rows::smooth_row(up_row(coarse.residual, p, y, width / 2, height / 2), m.row[1], m.row[2]);
-          std::fill(m.row[3], m.row[3] + width, p == 0 ? 0.0F : 1.0F);
+          std::fill(m.row[3], m.row[3] + width, p == 0 ? 0.0f : 1.0f);
           if (p != 0 && !frame.starts.nowhere(l)) {
             share_row(frame.starts, l, l + 1, y, {m.row[3], static_cast<std::size_t>(width)});
           }

@@ -24,12 +24,12 @@ HWY_INLINE VF sum4(const float* const rows[2], int i) {
 }
 
 void Down2(const float* const in[2], int out_cells, float scale, float* out) {
-  for (int i = 0; i < out_cells; i += lanes()) store(hn::Mul(constant(0.25F * scale), sum4(in, i)), out + i);
+  for (int i = 0; i < out_cells; i += lanes()) store(hn::Mul(constant(0.25f * scale), sum4(in, i)), out + i);
 }
 
 void Difference(const float* const fine[2], const float* coarse, int cells, float* out) {
   for (int i = 0; i < cells; i += lanes()) {
-    store(hn::NegMulAdd(constant(0.25F), sum4(fine, i), load(coarse + i)), out + i);
+    store(hn::NegMulAdd(constant(0.25f), sum4(fine, i), load(coarse + i)), out + i);
   }
 }
 
@@ -44,7 +44,7 @@ template <bool kAdd>
 HWY_INLINE void up_columns(const float* row, int cells, float* out) {
   const Floats f;
   for (int i = 0; i < cells; i += lanes()) {
-    const VF three = hn::Mul(constant(0.75F), load(row + i)), quarter = constant(0.25F);
+    const VF three = hn::Mul(constant(0.75f), load(row + i)), quarter = constant(0.25f);
     VF even = hn::MulAdd(quarter, load(row + i - 1), three), odd = hn::MulAdd(quarter, load(row + i + 1), three);
     if constexpr (kAdd) {
       VF even_before, odd_before;
@@ -57,7 +57,7 @@ HWY_INLINE void up_columns(const float* row, int cells, float* out) {
 }
 
 HWY_INLINE VF binomial(VF before, VF at, VF after) {
-  return hn::MulAdd(constant(0.5F), at, hn::Mul(constant(0.25F), hn::Add(before, after)));
+  return hn::MulAdd(constant(0.5f), at, hn::Mul(constant(0.25f), hn::Add(before, after)));
 }
 
 void AddCorrection(const UpRow& in, float* scratch, float* inout) {
@@ -67,7 +67,7 @@ void AddCorrection(const UpRow& in, float* scratch, float* inout) {
   for (int i = 0; i < n; i += lanes()) {
     const VF near = binomial(load(in.near[0] + i), load(in.near[1] + i), load(in.near[2] + i));
     const VF far = binomial(load(in.far[0] + i), load(in.far[1] + i), load(in.far[2] + i));
-    store(hn::MulAdd(constant(0.75F), near, hn::Mul(constant(0.25F), far)), vertical + i);
+    store(hn::MulAdd(constant(0.75f), near, hn::Mul(constant(0.25f), far)), vertical + i);
   }
   repeat_ends(vertical, n);
   for (int i = 0; i < n; i += lanes()) {
@@ -80,7 +80,7 @@ void AddCorrection(const UpRow& in, float* scratch, float* inout) {
 void Smooth(const UpRow& in, float* scratch, float* out) {
   float* const vertical = scratch + 16;
   for (int i = 0; i < in.coarse_cells; i += lanes()) {
-    store(hn::MulAdd(constant(0.75F), load(in.near[1] + i), hn::Mul(constant(0.25F), load(in.far[1] + i))),
+    store(hn::MulAdd(constant(0.75f), load(in.near[1] + i), hn::Mul(constant(0.25f), load(in.far[1] + i))),
           vertical + i);
   }
   repeat_ends(vertical, in.coarse_cells);

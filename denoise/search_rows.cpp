@@ -18,7 +18,7 @@ namespace lowlux::denoise::rows::HWY_NAMESPACE {
 
 HWY_INLINE VF number(VF x) {
   const VF v = hn::IfThenElseZero(hn::Eq(x, x), x);
-  return hn::Min(hn::Max(v, constant(-1e9F)), constant(1e9F));
+  return hn::Min(hn::Max(v, constant(-1e9f)), constant(1e9f));
 }
 
 void PairRow(const float* upper, const float* lower, int width, float* out) {
@@ -49,11 +49,11 @@ int BrightWindows(const WindowRow& in, std::int32_t* columns) {
       ring = hn::Add(ring, load(in.outer + x + i));
       if (i < -2 || i > 2) ring = hn::Add(ring, load(in.inner + x + i));
     }
-    const VF mean = hn::Mul(constant(1.0F / 40), ring);
+    const VF mean = hn::Mul(constant(1.0f / 40), ring);
     const VF own = hn::Add(load(in.pair[3] + x), load(in.pair[3] + x + 1));
     const VF one = hn::Add(hn::Max(mean, constant(in.floor_e)), constant(in.variance_e2));
     const VF excess = hn::Max(hn::Sub(own, mean), hn::Zero(f));
-    const auto bright = hn::Ge(hn::Mul(excess, excess), hn::Mul(constant(2 * 1.025F * in.significance), one));
+    const auto bright = hn::Ge(hn::Mul(excess, excess), hn::Mul(constant(2 * 1.025f * in.significance), one));
     if (HWY_LIKELY(hn::AllFalse(f, bright))) continue;
     HWY_ALIGN float is_bright[hn::MaxLanes(Floats())];
     hn::Store(hn::IfThenElseZero(bright, constant(1)), f, is_bright);

@@ -55,7 +55,7 @@ HWY_INLINE void block_variances(const float* from, std::ptrdiff_t stride, int bl
       four = hn::Add(hn::Add(even0, odd0), hn::Add(even1, odd1));
     }
     // Places after the last block hold anything; 1e-30 keeps every quotient finite there.
-    store(hn::Max(hn::Mul(constant(0.25F), four), constant(1e-30F)), m.variance + i);
+    store(hn::Max(hn::Mul(constant(0.25f), four), constant(1e-30f)), m.variance + i);
   }
 }
 
@@ -88,7 +88,7 @@ HWY_INLINE void shrink_strip(const BlockRow& in, int plane, int first, int count
     const VF weight = hn::Div(per_power, variance);
     store(weight, s.weight + lead + i);
     store(weight, m.weight + first + i);
-    store(hn::Mul(hn::Mul(constant(1.0F / 64), per_power), left), m.residual + first + i);
+    store(hn::Mul(hn::Mul(constant(1.0f / 64), per_power), left), m.residual + first + i);
   }
   add_columns<kStep>(s, count, kStep * first, sums.value[plane]);
 }
@@ -129,8 +129,8 @@ HWY_INLINE void shrink_row(const BlockRow& in, const RowMemory& m, std::size_t r
   };
   for (int plane = 0; plane < planes; ++plane) {
     const RowMemory own = of_plane(plane);
-    std::fill(own.weight - 16, own.weight + in.blocks + 48, 0.0F);
-    std::fill(own.residual - 16, own.residual + in.blocks + 48, 0.0F);
+    std::fill(own.weight - 16, own.weight + in.blocks + 48, 0.0f);
+    std::fill(own.residual - 16, own.residual + in.blocks + 48, 0.0f);
     block_variances<kStep>(in.variance[plane], in.variance_stride, in.blocks, own);
   }
   for (int strip = 0; strip < strips; ++strip) {

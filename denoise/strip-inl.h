@@ -89,7 +89,7 @@ struct HardLuma {
 struct HardChroma {
   VF least, least_beside_luma;
   HWY_INLINE explicit HardChroma(VF variance)
-      : least(hn::Mul(constant(16), variance)), least_beside_luma(hn::Mul(constant(6.25F), variance)) {}
+      : least(hn::Mul(constant(16), variance)), least_beside_luma(hn::Mul(constant(6.25f), variance)) {}
   HWY_INLINE VF gain(VF x, const float* luma) const {
     const VF enough = hn::IfThenElse(hn::Gt(load(luma), hn::Zero(Floats())), least_beside_luma, least);
     return hn::IfThenElseZero(hn::Gt(hn::Mul(x, x), enough), constant(1));

@@ -83,6 +83,7 @@ void print_times(int rounds) {
   denoise::Denoiser denoiser(width, height, 1);
   InlineExecutor one;
   std::vector<Task> tasks;
+  tasks.reserve(1 + 4 * levels.size());
   tasks.push_back({"memcpy", 3, [&] { std::memcpy(out.data(), raw.data(), raw.size() * sizeof(float)); }});
   for (const Level level : levels) {
     const DenoiseOptions options{.level = level, .chroma_start = 0};
@@ -226,6 +227,7 @@ void print_quality() {
   const std::array pictures{"kodim05.png", "kodim23.png"};
   std::printf("PSNR [dB] of white-balanced sites, linear / sRGB-encoded; mean of");
   std::vector<Shot> shots;
+  shots.reserve(pictures.size());
   for (const char* const name : pictures) {
     std::printf(" %s", name);
     shots.push_back(shot_of(name));

@@ -47,7 +47,7 @@ Plane<float> filled(int width, int height, float e) {
 
 TEST(DenoiserHardCases, FramesOfOneValueGiveThatValue) {
   for (const Level level : {Level::draft, Level::standard, Level::high}) {
-    for (const float e : {0.0F, -50.0F, 4095.0F, 1e9F, -1e9F}) {
+    for (const float e : {0.0f, -50.0f, 4095.0f, 1e9f, -1e9f}) {
       for (const double variance_e2 : {0.0, 4.0}) {
         const auto out = denoised(filled(150, 97, e), BayerPhase::gbrg, {.variance_e2 = variance_e2},
                                   {.level = level, .rho = std::numeric_limits<double>::infinity()});

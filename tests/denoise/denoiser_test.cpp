@@ -112,7 +112,7 @@ TEST(Denoiser, AgreesWithTheReferenceWhereSitesAreSaturated) {
   Camera camera{.dark_e = {2, 2, 2, 2}};
   auto raw = exposed(camera, waves(60), 200, 120, 12);
   for (int y = 50; y < 70; ++y) {
-    for (int x = 90; x < 130; ++x) raw.at(x, y) = std::min(raw.at(x, y) + 100, 150.0F);
+    for (int x = 90; x < 130; ++x) raw.at(x, y) = std::min(raw.at(x, y) + 100, 150.0f);
   }
   compare(camera, raw, {.white_gain = {2, 1, 1.5}, .keep_point_sources = false});
   auto noise = camera.noise();

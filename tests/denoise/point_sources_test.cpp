@@ -102,7 +102,7 @@ TEST(PointSources, AreFoundAtAnyPlaceOfTheMosaicAndOnlyThere) {
 TEST(PointSources, AreNotLookedForInFramesSmallerThanTheirSurroundings) {
   const Camera camera;
   Plane<float> raw(13, 9);
-  std::fill(raw.data(), raw.data() + raw.size(), 0.0F);
+  std::fill(raw.data(), raw.data() + raw.size(), 0.0f);
   raw.at(6, 4) = raw.at(7, 4) = 1000;
   EXPECT_EQ(marked(Searcher(13)(raw, camera)), 0);
 }

@@ -159,6 +159,8 @@ Four total_residual(const std::vector<Four>& levels, const Image& starts) {
 
 /// Pyramid of the planes, and of their variances.
 void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, int levels) {
+  x.reserve(static_cast<std::size_t>(levels));
+  variance.reserve(static_cast<std::size_t>(levels));
   while (static_cast<int>(x.size()) < levels) {
     Four half, half_variance;
     for (int p = 0; p < 4; ++p) {
