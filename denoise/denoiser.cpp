@@ -1,0 +1,257 @@
+#include "denoise/denoiser.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstring>
+#include <span>
+
+#include "denoise/bands.h"
+#include "denoise/chroma_start.h"
+#include "denoise/frame_memory.h"
+#include "denoise/passes.h"
+#include "denoise/point_sources.h"
+#include "denoise/rows.h"
+
+namespace lowlux::denoise {
+namespace {
+
+constexpr double largest_e = 1e9;
+
+/// One call of Denoiser::run.
+struct Run {
+  FrameMemory& memory;
+  const RawElectronsView& raw;
+  const RawNoise& noise;
+  const DenoiseOptions& options;
+  Workers workers;
+  int columns;
+  int rows;
+  int levels;
+  std::array<double, 3> dark_e;     // R, G, B
+  PlaneView<std::uint8_t> sources;  // no data: none are looked for
+
+  Run(FrameMemory& m, const RawElectronsView& r, const RawNoise& n, const DenoiseOptions& o, Executor& executor)
+      : memory(m),
+        raw(r),
+        noise(n),
+        options(o),
+        workers{executor, static_cast<int>(m.thread.size())},
+        columns((r.value.width + 1) / 2),
+        rows((r.value.height + 1) / 2),
+        levels(levels_of(columns, rows)) {
+    const PerSite<int> site = sites_of(r.phase);
+    dark_e = {n.dark_mean_e[site[0]], (n.dark_mean_e[site[1]] + n.dark_mean_e[site[2]]) / 2, n.dark_mean_e[site[3]]};
+    const int width = padded(columns, levels), height = padded(rows, levels);
+    for (int l = 0; l < levels; ++l) {
+      m.level[l].width = width >> l;
+      m.level[l].height = height >> l;
+    }
+  }
+
+  void find_sources();
+  /// Calls work(x, raw value - background) for the sites of raw row y that belong to point sources.
+  template <class Work>
+  void for_each_source_site(int y, const Work& work) const;
+  ChromaStarts starts() const;
+  rows::PackRow packing(const ThreadMemory& m) const;
+  void pack(int virtual_row, bool planes, const ThreadMemory& m) const;
+  void front() const;
+  void unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const;
+};
+
+void Run::find_sources() {
+  if (!options.keep_point_sources) return;
+  sources = memory.sources.view().crop(0, 0, columns, rows);
+  find_point_sources(raw, noise, workers, memory.search.data(), sources);
+}
+
+template <class Work>
+void Run::for_each_source_site(int y, const Work& work) const {
+  if (sources.data == nullptr) return;
+  const std::uint8_t *const cells = sources.row(y / 2), *const end = cells + columns;
+  for (const std::uint8_t* at = std::find(cells, end, 1); at != end; at = std::find(at + 1, end, 1)) {
+    const auto x = static_cast<int>(2 * (at - cells));
+    for (int i = x; i < std::min(x + 2, raw.value.width); ++i) {
+      const float e = raw.value.at(i, y);
+      const double value = std::isnan(e) ? 0 : std::clamp(static_cast<double>(e), -largest_e, largest_e);
+      work(i, static_cast<float>(value - background_e(raw, sources, i, y)));
+    }
+  }
+}
+
+/// Starts for each tile, one thread for each row of tiles so that sums are the same for every number of threads.
+ChromaStarts Run::starts() const {
+  ChromaStarts out;
+  out.columns = tiles_of(columns);
+  out.rows = tiles_of(rows);
+  const auto tiles = static_cast<std::size_t>(out.columns) * static_cast<std::size_t>(out.rows);
+  out.start = std::span(memory.starts).first(tiles);
+  out.has_chroma = std::span(memory.has_chroma).first(tiles * most_levels);
+  const double dark = (dark_e[0] + 2 * dark_e[1] + dark_e[2]) / 4;
+  const auto edge = [](int i, int count, int size) { return i == count ? size : std::min(size, 2 * tile * i); };
+  in_bands(workers, out.rows, [&](int first, int last, int) {
+    for (int i = first * out.columns; i < last * out.columns; ++i) {
+      int start = options.chroma_start.value_or(0);
+      if (!options.chroma_start) {
+        const int x = i % out.columns, y = i / out.columns;
+        const int left = edge(x, out.columns, raw.value.width), right = edge(x + 1, out.columns, raw.value.width);
+        const int top = edge(y, out.rows, raw.value.height), bottom = edge(y + 1, out.rows, raw.value.height);
+        double sum = 0;
+        for (int row = top; row < bottom; ++row) sum += rows::sum_of(raw.value.row(row) + left, right - left);
+        const double mean = sum / (static_cast<double>(right - left) * (bottom - top));
+        start = start_of(mean - dark, dark, noise.variance_e2);
+      }
+      out.start[i] = static_cast<float>(std::min(start, levels - 1));
+    }
+  });
+  complete(out);
+  return out;
+}
+
+rows::PackRow Run::packing(const ThreadMemory& m) const {
+  rows::PackRow in{};
+  for (int i = 0; i < 2; ++i) in.raw[i] = m.raw[i];
+  in.red_is_odd = red_column(raw.phase) == 1;
+  in.cells = columns;
+  const double saturation_e = std::min(noise.saturation_e, largest_e);
+  const double most = *std::max_element(options.white_gain.begin(), options.white_gain.end()) * saturation_e;
+  in.saturation_e = static_cast<float>(noise.saturation_e);
+  in.blind_variance = static_cast<float>(1e9 * most * most);  // no coefficient exceeds its threshold, on any level
+  for (int k = 0; k < 3; ++k) {
+    in.dark_e[k] = static_cast<float>(dark_e[k]);
+    in.gain[k] = static_cast<float>(options.white_gain[k]);
+  }
+  return in;
+}
+
+/// One row of cells, beyond the ends of the frame mirrored, into the window, and if asked for into level 0.
+void Run::pack(int virtual_row, bool planes, const ThreadMemory& m) const {
+  const int row = mirrored(virtual_row, rows), width = raw.value.width;
+  const int red_y = red_row(raw.phase), slot = (virtual_row + 16) % 16, padded_columns = memory.level[0].width;
+  for (int i = 0; i < 2; ++i) {
+    const int raw_y = raw_of(row, i == 0 ? red_y : 1 - red_y, raw.value.height);
+    std::memcpy(m.raw[i], raw.value.row(raw_y), width * sizeof(float));
+    for_each_source_site(raw_y, [&](int x, float excess) { m.raw[i][x] -= excess; });
+    if (width % 2 != 0) m.raw[i][width] = m.raw[i][width - 2];
+  }
+  rows::PackedRow out{};
+  for (int k = 0; k < 3; ++k) out.raw_e[k] = m.window[k][slot];
+  out.blind = m.window[3][slot];
+  if (planes) {
+    for (int p = 0; p < 4; ++p) out.plane[p] = memory.level[0].noisy.row(p, virtual_row);
+  }
+  rows::pack_row(packing(m), out);
+  const auto mirror = [&](float* cells, int before, int after) {
+    for (int i = 1; i <= before; ++i) cells[-i] = cells[mirrored(-i, columns)];
+    for (int i = columns; i < padded_columns + after; ++i) cells[i] = cells[mirrored(i, columns)];
+  };
+  for (float* const raw_e : out.raw_e) mirror(raw_e, 4, 4);
+  if (!planes) return;
+  mirror(out.blind, 0, 0);
+  for (float* const plane : out.plane) mirror(plane, 0, 0);
+}
+
+/// Planes and variances of level 0.
+void Run::front() const {
+  const PyramidLevel& level = memory.level[0];
+  in_bands(workers, level.height / 2, [&](int first, int last, int thread) {
+    const ThreadMemory& m = memory.thread[thread];
+    int packed = 2 * first - 4;
+    for (int pair = first; pair < last; ++pair) {
+      for (; packed < 2 * pair + 6; ++packed) pack(packed, packed >= 2 * first && packed < 2 * last, m);
+      rows::VarianceRow in{};
+      for (int k = 0; k < 3; ++k) {
+        for (int y = 0; y < 10; ++y) in.raw_e[k][y] = m.window[k][(2 * pair - 4 + y + 16) % 16];
+        in.least_e[k] = static_cast<float>(0.3 * dark_e[k] + 0.02);
+        in.gain[k] = static_cast<float>(options.white_gain[k]);
+      }
+      for (int y = 0; y < 2; ++y) in.blind[y] = m.window[3][(2 * pair + y) % 16];
+      in.cells = level.width;
+      in.variance_e2 = static_cast<float>(noise.variance_e2);
+      float* const out[4] = {level.variance.row(0, pair), level.variance.row(1, pair), level.variance.row(2, pair),
+                             level.variance.row(3, pair)};
+      rows::variance_row(in, m.blocks, out);
+    }
+  });
+}
+
+/// Planes of level 0 back to a mosaic.
+void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const {
+  const PyramidLevel& level = memory.level[0];
+  in_bands(workers, rows, [&](int first, int last, int thread) {
+    const ThreadMemory& m = memory.thread[thread];
+    for (int y = first; y < last; ++y) {
+      rows::UnpackRow in{};
+      const int half = level.height / 2, far = std::clamp(y % 2 == 0 ? y / 2 - 1 : y / 2 + 1, 0, half - 1);
+      for (int p = 0; p < 4; ++p) {
+        rows::smooth_row({{nullptr, level.residual.row(p, y / 2), nullptr},
+                          {nullptr, level.residual.row(p, far), nullptr},
+                          level.width / 2},
+                         m.row[4], m.row[p]);
+        in.plane[p] = planes.row(p, y);
+        in.residual[p] = m.row[p];
+      }
+      in.cells = columns;
+      in.rho = std::isinf(options.rho) ? -1.0f : static_cast<float>(options.rho);
+      for (int k = 0; k < 3; ++k) in.per_gain[k] = static_cast<float>(1 / options.white_gain[k]);
+      in.red_is_odd = red_column(raw.phase) == 1;
+      rows::unpack_row(in, {{m.row[5], m.row[6]}, m.row[7]});
+      for (int i = 0; i < 2; ++i) {
+        const int raw_y = 2 * y + (i == 0 ? red_row(raw.phase) : 1 - red_row(raw.phase));
+        if (raw_y >= signal_e.height) continue;
+        for_each_source_site(raw_y, [&](int x, float excess) { m.row[5 + i][x] += excess; });
+        std::memcpy(signal_e.row(raw_y), m.row[5 + i], signal_e.width * sizeof(float));
+      }
+      const auto put = [&](PlaneView<float> map, const float* from) {
+        if (map.data != nullptr) std::memcpy(map.row(y), from, columns * sizeof(float));
+      };
+      put(maps.residual_variance, m.row[0]);
+      put(maps.chroma_confidence, m.row[7]);
+    }
+  });
+}
+
+[[maybe_unused]] bool usable(const RawNoise& noise, const DenoiseOptions& options) {
+  const auto within = [](double x, double least, double most) { return x >= least && x <= most; };
+  bool good = within(noise.variance_e2, 0, largest_e) && noise.saturation_e > 0 && options.rho > 0;
+  for (const double dark : noise.dark_mean_e) good = good && within(dark, 0, largest_e);
+  for (const double gain : options.white_gain) good = good && within(gain, 1e-3, 1e3);
+  return good && within(options.chroma_start.value_or(0), 0, 2);
+}
+
+}  // namespace
+
+struct Denoiser::State {
+  FrameMemory memory;
+};
+
+Denoiser::Denoiser(int max_width, int max_height, int threads)
+    : state_(new State{FrameMemory(max_width, max_height, threads)}) {}
+Denoiser::~Denoiser() = default;
+
+void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const DenoiseOptions& options,
+                   PlaneView<float> signal_e, const DenoiseMaps& maps, Executor& executor) {
+  assert(raw.value.width >= 2 && raw.value.height >= 2);
+  assert(signal_e.width == raw.value.width && signal_e.height == raw.value.height);
+  assert(usable(noise, options));
+  Run run(state_->memory, raw, noise, options, executor);
+  assert(run.columns <= state_->memory.columns && run.rows <= state_->memory.rows);
+  run.find_sources();
+  const ChromaStarts starts = run.starts();
+  const PassFrame frame{state_->memory, starts, run.levels, run.workers};
+  run.front();
+  build_pyramid(frame);
+  run_pass(frame, 0, 4);
+  int last = 0;
+  if (options.level != Level::draft) {
+    run_pass(frame, 1, options.level == Level::high ? 2 : 4);
+    last = 1;
+  }
+  add_residuals(frame);
+  run.unpack(state_->memory.level[0].value[last], signal_e, maps);
+}
+
+const char* denoiser_target() { return rows::target_name(); }
+
+}  // namespace lowlux::denoise

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "denoise/layout.h"
+#include "denoise/point_sources.h"
+#include "isp/base/plane.h"
+
+/// The memory of a Denoiser: everything a frame needs, laid out for the largest.
+namespace lowlux::denoise {
+
+/// Four planes of one size: L, C1, C2, C3.
+struct PlaneSet {
+  std::array<float*, 4> plane{};
+  std::ptrdiff_t stride = 0;
+
+  float* row(int p, int y) const { return plane[p] + y * stride; }
+};
+
+/// One pyramid level. `variance` and `residual` are of half its size.
+struct PyramidLevel {
+  int width = 0;  // of the frame at hand
+  int height = 0;
+  PlaneSet noisy;
+  PlaneSet value[2];  // of pass 1 and of pass 2
+  PlaneSet variance;  // mean over 2x2 cells, divided by 4
+  PlaneSet residual;
+};
+
+/// Rows of one thread. All are of the widest level and its padding.
+struct ThreadMemory {
+  std::array<float*, 2> raw{};                     // one row of raw samples each
+  std::array<std::array<float*, 16>, 4> window{};  // R, G, B with dark and blind, last 16 rows
+  std::array<std::array<float*, 8>, 4> value{};    // sums of blocks, of 8 rows
+  std::array<std::array<float*, 4>, 4> weight{};   // of 4 rows of half size
+  std::array<std::array<float*, 4>, 4> residual{};
+  std::array<float*, 8> row{};
+  float* blocks = nullptr;
+};
+
+struct FrameMemory {
+  FrameMemory(int max_width, int max_height, int threads);
+
+  int columns;  // cells of the largest frame
+  int rows;
+  std::array<PyramidLevel, most_levels> level{};
+  PlaneSet difference;  // of the size of level 1
+  std::vector<ThreadMemory> thread;
+  std::vector<SearchMemory> search;       // of each thread
+  Plane<std::uint8_t> sources;            // cells that hold point sources
+  std::vector<float> starts;              // chroma start level of each tile
+  std::vector<unsigned char> has_chroma;  // for each level, each tile
+
+ private:
+  std::unique_ptr<float[]> memory_;
+  std::vector<std::int32_t> found_;
+};
+
+}  // namespace lowlux::denoise

@@ -1,0 +1,140 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+/// The row kernels under Denoiser, dispatched at run time. Plain types only: their sources are compiled for several
+/// instruction sets, and shared inline code must not be. Rows are of cells (2x2 sites) of some pyramid level.
+namespace lowlux::denoise::rows {
+
+/// Floats that may be read and written after the last of a row.
+inline constexpr int padding = 192;
+
+/// Blocks of one row that are transformed together: their coefficients stay in the first-level cache.
+inline constexpr int strip_blocks = 32;
+
+/// One row of cells from two raw rows, which hold an even number of samples each (see raw_of).
+struct PackRow {
+  const float* raw[2];  // the row with red, the row with blue
+  bool red_is_odd;      // red lies in odd columns
+  int cells;
+  float dark_e[3];  // R, G, B
+  float gain[3];
+  float saturation_e;
+  float blind_variance;  // of chroma where a site is saturated
+};
+struct PackedRow {
+  float* raw_e[3];  // R, mean of both greens, B, dark in, as measured
+  float* blind;     // blind_variance or 0
+  float* plane[4];  // L, C1, C2, C3; null: not wanted
+};
+void pack_row(const PackRow& in, const PackedRow& out);
+
+/// Variances of the four planes in one row of half size, from the ten rows of R, G, B around its two rows of cells.
+struct VarianceRow {
+  const float* raw_e[3][10];  // read from 4 cells before to 4 cells after
+  const float* blind[2];
+  int cells;
+  float least_e[3];  // floor of the local mean
+  float variance_e2;
+  float gain[3];
+};
+/// @param scratch 5 rows of cells + padding
+void variance_row(const VarianceRow& in, float* scratch, float* const out[4]);
+
+/// Sum of `count` samples, those that are not a number as 0, limited to +-1e9.
+double sum_of(const float* in, int count);
+
+/// Means of 2x2 cells times `scale`.
+void down2_row(const float* const in[2], int out_cells, float scale, float* out);
+
+/// coarse - mean of 2x2 cells.
+void difference_row(const float* const fine[2], const float* coarse, int cells, float* out);
+
+/// Bilinear upsampling of one row, `near` and `far` being the coarse rows at 1/4 and 3/4 of a cell's distance.
+struct UpRow {
+  const float* near[3];  // only the middle one is read by smooth_row
+  const float* far[3];
+  int coarse_cells;
+};
+/// inout += up2 of the 3x3 binomial mean of the rows. @param scratch 2 rows + 2 padding
+void add_correction_row(const UpRow& in, float* scratch, float* inout);
+/// out = up2 of near[1], far[1]. @param scratch 1 row + padding
+void smooth_row(const UpRow& in, float* scratch, float* out);
+
+/// inout = (1 - share) inout + share coarse.
+void blend_row(const float* coarse, const float* share, int cells, float* inout);
+/// inout = (1 - share) own + inout.
+void add_residual_row(const float* own, const float* share, int cells, float* inout);
+
+/// All blocks with their corner on one row of cells.
+struct BlockRow {
+  const float* noisy[4];     // L, C1, C2, C3
+  const float* pilot[4];     // null: hard thresholds
+  std::ptrdiff_t stride;     // of both
+  const float* variance[4];  // of half size
+  std::ptrdiff_t variance_stride;
+  int blocks;
+  int step;                    // cells from one block to the next, 2 or 4
+  bool coarsest;               // whether the variance of the mean remains
+  const std::uint8_t* chroma;  // for each strip, whether C1, C2, C3 are wanted; null: nowhere
+};
+/// What blocks add up to: 8 rows of cells, 4 rows of half size.
+struct BlockSums {
+  float* value[4][8];
+  float* weight[4][4];
+  float* residual[4][4];
+};
+/// Floats of scratch memory for rows of up to `cells` cells.
+std::size_t block_scratch(int cells);
+void shrink_block_row(const BlockRow& in, float* scratch, const BlockSums& sums);
+
+/// Divides two rows of sums, and one of half size, by their weight; nothing where there is none.
+struct SumRows {
+  const float* value[2];
+  const float* weight;
+  const float* residual;
+  int cells;
+};
+struct FinishedRows {
+  float* value[2];
+  float* residual;
+};
+void finish_rows(const SumRows& in, float* scratch, const FinishedRows& out);
+
+/// One row of cells back to two raw rows of 2 cells samples.
+struct UnpackRow {
+  const float* plane[4];
+  const float* residual[4];
+  int cells;
+  float rho;  // < 0: no prior
+  float per_gain[3];
+  bool red_is_odd;
+};
+struct UnpackedRow {
+  float* signal_e[2];  // the row with red, the row with blue
+  float* confidence;
+};
+void unpack_row(const UnpackRow& in, const UnpackedRow& out);
+
+/// Sums of two raw rows, samples as in sum_of.
+void pair_row(const float* upper, const float* lower, int width, float* out);
+
+/// Windows of 2x2 sites in one row of them: pair[3] is the sum of the window's rows, pair[i] that 2 (i - 3) rows below.
+struct WindowRow {
+  const float* pair[7];
+  int first;  // column of the first window, at least 6
+  int last;   // one beyond the last; 8 columns more are read
+  float floor_e;
+  float variance_e2;
+  float significance;
+  float* inner;  // scratch, as long as a row and its padding
+  float* outer;
+};
+/// Columns of windows whose excess t over the mean around has t > 0, t^2 / (2 V) >= significance: a necessary condition
+/// of that in point_sources.h. Gives how many.
+int bright_windows(const WindowRow& in, std::int32_t* columns);
+
+const char* target_name();
+
+}  // namespace lowlux::denoise::rows

@@ -1,0 +1,171 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "denoise/denoiser.h"
+#include "tests/denoise/frames.h"
+
+namespace lowlux {
+namespace {
+
+using namespace denoise_testing;
+using denoise::DenoiseOptions;
+using denoise::Level;
+
+struct Outputs {
+  Plane<float> signal, residual, confidence;
+};
+
+Outputs denoised(const Plane<float>& raw, BayerPhase phase, const denoise::RawNoise& noise,
+                 const DenoiseOptions& options) {
+  const int columns = (raw.width() + 1) / 2, rows = (raw.height() + 1) / 2;
+  Outputs out{Plane<float>(raw.width(), raw.height()), Plane<float>(columns, rows), Plane<float>(columns, rows)};
+  InlineExecutor one;
+  denoise::Denoiser(raw.width(), raw.height(), 1)
+      .run({raw.view(), phase}, noise, options, out.signal.view(), {out.residual.view(), out.confidence.view()}, one);
+  return out;
+}
+
+void expect_numbers(const Outputs& out) {
+  for (std::size_t i = 0; i < out.signal.size(); ++i) ASSERT_TRUE(std::isfinite(out.signal.data()[i]));
+  for (std::size_t i = 0; i < out.residual.size(); ++i) {
+    ASSERT_TRUE(std::isfinite(out.residual.data()[i]));
+    ASSERT_GE(out.residual.data()[i], 0);
+    ASSERT_GE(out.confidence.data()[i], 0);
+    ASSERT_LE(out.confidence.data()[i], 1);
+  }
+}
+
+Plane<float> filled(int width, int height, float e) {
+  Plane<float> raw(width, height);
+  std::fill(raw.data(), raw.data() + raw.size(), e);
+  return raw;
+}
+
+TEST(DenoiserHardCases, FramesOfOneValueGiveThatValue) {
+  for (const Level level : {Level::draft, Level::standard, Level::high}) {
+    for (const float e : {0.0f, -50.0f, 4095.0f, 1e9f, -1e9f}) {
+      for (const double variance_e2 : {0.0, 4.0}) {
+        const auto out = denoised(filled(150, 97, e), BayerPhase::gbrg, {.variance_e2 = variance_e2},
+                                  {.level = level, .rho = std::numeric_limits<double>::infinity()});
+        expect_numbers(out);
+        // [e-]: float, relative; see denoiser_test.cpp
+        for (std::size_t i = 0; i < out.signal.size(); ++i) {
+          ASSERT_NEAR(out.signal.data()[i], e, 5e-6 * std::abs(static_cast<double>(e)));
+        }
+      }
+    }
+  }
+}
+
+TEST(DenoiserHardCases, FramesWithoutSignalHaveNoColour) {
+  const auto out = denoised(filled(64, 64, -3), BayerPhase::rggb, {.variance_e2 = 1}, {});
+  expect_numbers(out);
+  EXPECT_EQ(*std::max_element(out.confidence.data(), out.confidence.data() + out.confidence.size()), 0);
+}
+
+TEST(DenoiserHardCases, WhollySaturatedFramesAreNeutralAndHaveNoConfidence) {
+  const DenoiseOptions options{.white_gain = {2, 1, 1.5}};
+  const auto out = denoised(filled(150, 97, 1000), BayerPhase::rggb, {.variance_e2 = 4, .saturation_e = 1000}, options);
+  expect_numbers(out);
+  for (int y = 0; y < 97; ++y) {
+    for (int x = 0; x < 150; ++x) {
+      const double gain = options.white_gain[static_cast<std::size_t>(colour_at(BayerPhase::rggb, x, y))];
+      ASSERT_NEAR(out.signal.at(x, y) * gain, 2000, 0.02);  // the largest of its cell; float, relative 1e-5
+    }
+  }
+  EXPECT_LT(*std::max_element(out.confidence.data(), out.confidence.data() + out.confidence.size()), 1e-5);
+}
+
+TEST(DenoiserHardCases, SamplesThatAreNoNumbersStayWhereTheyAre) {
+  const Camera camera{.dark_e = {5, 5, 5, 5}};
+  auto raw = exposed(camera, flat(20, 20, 20), 300, 200, 51);
+  const auto clean = denoised(raw, camera.phase, camera.noise(), {});
+  constexpr float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
+  raw.at(0, 0) = nan;
+  raw.at(299, 199) = -inf;
+  raw.at(150, 100) = nan;
+  raw.at(20, 150) = inf;
+  for (const bool keep : {false, true}) {
+    const auto out = denoised(raw, camera.phase, camera.noise(), {.keep_point_sources = keep});
+    expect_numbers(out);
+  }
+  // One dead site: beyond the coarsest blocks, nothing; far from it, little.
+  auto dead = exposed(camera, flat(20, 20, 20), 300, 200, 51);
+  dead.at(150, 100) = nan;
+  const auto out = denoised(dead, camera.phase, camera.noise(), {});
+  EXPECT_NEAR(out.signal.at(20, 20), clean.signal.at(20, 20), 0.1);
+}
+
+// Means change a little because cells near the border are in fewer blocks: by 0.21 standard errors of the noise, see
+// denoiser_properties_test.cpp; five times that. L has 0.26 of a site's variance.
+TEST(DenoiserHardCases, NegativeLumaIsNotRectified) {
+  const Camera camera{.dark_e = {200, 200, 200, 200}, .read_noise_e = 4};
+  const auto raw = exposed(camera, flat(0.3, 0.3, 0.3), 1792, 1280, 52);
+  const auto out = denoised(raw, camera.phase, camera.noise(), {});
+  expect_numbers(out);
+  const auto before = colour_means(raw.view(), camera.phase), after = colour_means(out.signal.view(), camera.phase);
+  const double luma = 0.2 * (before[0] + before[2]) + 0.6 * before[1] - 200;
+  const double kept = 0.2 * (after[0] + after[2]) + 0.6 * after[1];
+  EXPECT_NEAR(kept, luma, 5 * 0.21 * std::sqrt(0.26 * 216 / (896 * 640)));
+  EXPECT_LT(*std::min_element(out.signal.data(), out.signal.data() + out.signal.size()), 0);
+}
+
+TEST(DenoiserHardCases, AnOversubtractedPedestalMovesTheMeanAndNothingElse) {
+  const Camera camera{.dark_e = {2, 2, 2, 2}};
+  auto raw = exposed(camera, flat(1, 1, 1), 256, 256, 53);
+  for (std::size_t i = 0; i < raw.size(); ++i) raw.data()[i] -= 60;  // the local mean is below 0 everywhere
+  const auto out = denoised(raw, camera.phase, camera.noise(), {.rho = std::numeric_limits<double>::infinity()});
+  expect_numbers(out);
+  const auto before = colour_means(raw.view(), camera.phase), after = colour_means(out.signal.view(), camera.phase);
+  // One standard error of the mean of a colour.
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(after[c], before[c] - 2, std::sqrt(5.25 / (256 * 256 / 4.0)));
+}
+
+TEST(DenoiserHardCases, ALightBesideTheDarkLeavesTheDarkNoNoisierThanItWas) {
+  const Camera camera{.dark_e = {2, 2, 2, 2}};
+  const Scene edge = [](int x, int) {
+    const double e = x < 128 ? 5 : 5000;  // variances 1 : 540 within a block
+    return std::array{e, e, e};
+  };
+  const auto raw = exposed(camera, edge, 256, 256, 54);
+  for (const Level level : {Level::draft, Level::standard, Level::high}) {
+    const auto out = denoised(raw, camera.phase, camera.noise(), {.level = level});
+    double near = 0, far = 0;
+    for (int y = 0; y < 256; ++y) {
+      for (int x = 0; x < 96; ++x) far += std::pow(static_cast<double>(out.signal.at(x, y)) - 5, 2) / (256 * 96);
+      for (int x = 96; x < 128; ++x) near += std::pow(static_cast<double>(out.signal.at(x, y)) - 5, 2) / (256 * 32);
+    }
+    EXPECT_LT(std::sqrt(far), 0.3 * std::sqrt(9.25));
+    EXPECT_LT(std::sqrt(near), std::sqrt(5002.0)) << "the noise of the light";
+  }
+}
+
+// Of coefficients of noise, 6.3e-5 lie beyond four standard deviations, with a mean square of 18 variances: they leave
+// sqrt(6.3e-5 * 18) = 0.034 of the noise.
+TEST(DenoiserHardCases, FlatFieldsShowNoMaze) {
+  const Camera camera{.dark_e = {20, 20, 20, 20}};
+  const auto raw = exposed(camera, flat(20, 20, 20), 512, 384, 55);
+  const auto out = denoised(raw, camera.phase, camera.noise(), {});
+  double sum = 0;
+  for (int y = 0; y < 384; y += 2) {
+    for (int x = 0; x < 512; x += 2) {
+      sum += std::pow(static_cast<double>(out.signal.at(x + 1, y)) - static_cast<double>(out.signal.at(x, y + 1)), 2);
+    }
+  }
+  // G1 - G2 of one cell has a standard deviation of sqrt(2 * 42.25) e- before.
+  EXPECT_LT(std::sqrt(sum / (256 * 192)), 0.05 * std::sqrt(2 * 42.25));
+}
+
+TEST(DenoiserHardCases, DifferentDarkOfTheGreensIsSharedByBoth) {
+  Camera camera{.dark_e = {5, 4, 6, 5}};
+  const auto raw = filled(64, 64, 25);
+  const auto out = denoised(raw, camera.phase, camera.noise(), {.rho = std::numeric_limits<double>::infinity()});
+  for (std::size_t i = 0; i < out.signal.size(); ++i) ASSERT_NEAR(out.signal.data()[i], 20, 1e-4);  // float
+}
+
+}  // namespace
+}  // namespace lowlux

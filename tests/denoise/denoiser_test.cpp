@@ -1,0 +1,124 @@
+#include "denoise/denoiser.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <tuple>
+
+#include "tests/denoise/frames.h"
+#include "tests/reference/denoise_ref.h"
+
+namespace lowlux {
+namespace {
+
+using namespace denoise_testing;
+using denoise::DenoiseOptions;
+using denoise::Level;
+
+struct Size {
+  int width;
+  int height;
+};
+
+class DenoiserAgainstReference : public testing::TestWithParam<std::tuple<Size, BayerPhase, Level>> {};
+
+double scale_of(const Plane<float>& raw) {
+  double most = 1;
+  for (std::size_t i = 0; i < raw.size(); ++i) most = std::max(most, std::abs(static_cast<double>(raw.data()[i])));
+  return most;
+}
+
+void expect_near(PlaneView<const float> got, PlaneView<const double> expected, double tolerance,
+                 const std::string& what) {
+  double worst = 0;
+  int at_x = 0, at_y = 0;
+  for (int y = 0; y < got.height; ++y) {
+    for (int x = 0; x < got.width; ++x) {
+      const double difference = std::abs(static_cast<double>(got.at(x, y)) - expected.at(x, y));
+      if (!(difference <= worst)) {
+        worst = difference;
+        at_x = x;
+        at_y = y;
+      }
+    }
+  }
+  EXPECT_LE(worst, tolerance) << what << " at " << at_x << ", " << at_y;
+}
+
+// A sample passes through some 600 float operations in two passes and five levels, each with a relative error of at
+// most 2^-24 of the largest value there is. They add up like a random walk, sqrt(600) 2^-24 = 1.5e-6; three times that
+// for the worst of 1e5 samples. Confidence is the ratio of squares of luma, whose relative error is larger where it is
+// dark.
+void compare(const Camera& camera, const denoise::RawNoise& noise, const Plane<float>& raw,
+             const DenoiseOptions& options) {
+  const int columns = (raw.width() + 1) / 2, rows = (raw.height() + 1) / 2;
+  Plane<float> signal(raw.width(), raw.height()), residual(columns, rows), confidence(columns, rows);
+  InlineExecutor one;
+  denoise::Denoiser denoiser(raw.width(), raw.height(), 1);
+  denoiser.run({raw.view(), camera.phase}, noise, options, signal.view(), {residual.view(), confidence.view()}, one);
+  const auto expected = reference::denoise({raw.view(), camera.phase}, noise, options);
+  const double scale = scale_of(raw) * *std::max_element(options.white_gain.begin(), options.white_gain.end());
+  expect_near(signal.view(), expected.signal_e.view(), 5e-6 * scale, "signal");
+  expect_near(residual.view(), expected.residual_variance.view(), 5e-6 * scale, "residual");
+  expect_near(confidence.view(), expected.chroma_confidence.view(), 1e-4, "confidence");
+}
+
+void compare(const Camera& camera, const Plane<float>& raw, const DenoiseOptions& options) {
+  compare(camera, camera.noise(), raw, options);
+}
+
+TEST_P(DenoiserAgainstReference, AgreesWithinFloatRounding) {
+  const auto [size, phase, level] = GetParam();
+  const Camera camera{.phase = phase, .dark_e = {10, 12, 11, 9}, .read_noise_e = 1.5};
+  const auto raw = exposed(camera, waves(20), size.width, size.height, 7);
+  compare(camera, raw, {.level = level, .white_gain = {1.9, 1, 1.4}, .keep_point_sources = false});
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, DenoiserAgainstReference,
+                         testing::Combine(testing::Values(Size{64, 48}, Size{2, 2}, Size{3, 5}, Size{131, 37}),
+                                          testing::Values(BayerPhase::rggb, BayerPhase::gbrg),
+                                          testing::Values(Level::draft, Level::standard, Level::high)));
+INSTANTIATE_TEST_SUITE_P(Phases, DenoiserAgainstReference,
+                         testing::Combine(testing::Values(Size{47, 33}),
+                                          testing::Values(BayerPhase::grbg, BayerPhase::bggr),
+                                          testing::Values(Level::standard)));
+INSTANTIATE_TEST_SUITE_P(AllLevels, DenoiserAgainstReference,
+                         testing::Combine(testing::Values(Size{600, 280}), testing::Values(BayerPhase::grbg),
+                                          testing::Values(Level::standard, Level::high)));
+
+/// Dark on the left, bright on the right: tiles of every chroma start.
+Scene dark_to_bright() {
+  return [](int x, int y) {
+    const double level = 0.2 * std::pow(1000.0, x / 1100.0), wave = 1 + 0.5 * std::sin(0.05 * (x + 2 * y));
+    return std::array{level * wave, level, level * (2 - wave)};
+  };
+}
+
+class DenoiserChromaStart : public testing::TestWithParam<std::optional<int>> {};
+
+TEST_P(DenoiserChromaStart, AgreesWithTheReferenceThatLeavesNothingOut) {
+  const Camera camera{.dark_e = {2, 2, 2, 2}};
+  const auto raw = exposed(camera, dark_to_bright(), 1100, 290, 11);
+  compare(camera, raw, {.level = Level::standard, .chroma_start = GetParam(), .keep_point_sources = false});
+}
+
+INSTANTIATE_TEST_SUITE_P(Starts, DenoiserChromaStart, testing::Values(std::nullopt, 0, 1, 2));
+
+TEST(Denoiser, AgreesWithTheReferenceWhereSitesAreSaturated) {
+  Camera camera{.dark_e = {2, 2, 2, 2}};
+  auto raw = exposed(camera, waves(60), 200, 120, 12);
+  for (int y = 50; y < 70; ++y) {
+    for (int x = 90; x < 130; ++x) raw.at(x, y) = std::min(raw.at(x, y) + 100, 150.0f);
+  }
+  compare(camera, raw, {.white_gain = {2, 1, 1.5}, .keep_point_sources = false});
+  auto noise = camera.noise();
+  noise.saturation_e = 149;
+  compare(camera, noise, raw, {.white_gain = {2, 1, 1.5}, .keep_point_sources = false});
+}
+
+}  // namespace
+}  // namespace lowlux

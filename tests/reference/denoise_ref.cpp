@@ -1,0 +1,234 @@
+#include "tests/reference/denoise_ref.h"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "denoise/layout.h"
+#include "tests/reference/denoise_ref_blocks.h"
+
+namespace lowlux::reference {
+namespace {
+
+using namespace denoise;
+using namespace denoising;
+
+struct Frame {
+  const RawElectronsView& raw;
+  const RawNoise& noise;
+  const DenoiseOptions& options;
+  PerSite<int> site;
+  int columns, rows, levels;
+  std::array<double, 4> dark_e, gain;
+
+  Frame(const RawElectronsView& r, const RawNoise& n, const DenoiseOptions& o)
+      : raw(r), noise(n), options(o), site(sites_of(r.phase)) {
+    columns = (raw.value.width + 1) / 2;
+    rows = (raw.value.height + 1) / 2;
+    levels = levels_of(columns, rows);
+    for (int k = 0; k < 4; ++k) dark_e[k] = noise.dark_mean_e[site[k]];
+    dark_e[1] = dark_e[2] = (dark_e[1] + dark_e[2]) / 2;
+    gain = {o.white_gain[0], o.white_gain[1], o.white_gain[1], o.white_gain[2]};
+  }
+
+  double y(int k, int cell_x, int cell_y) const {
+    const int cx = mirrored(cell_x, columns), cy = mirrored(cell_y, rows);
+    const float e = raw.value.at(raw_of(cx, site[k] & 1, raw.value.width), raw_of(cy, site[k] >> 1, raw.value.height));
+    return std::isnan(e) ? 0 : std::clamp(static_cast<double>(e), -1e9, 1e9);
+  }
+
+  double variance(int k, int cell_x, int cell_y) const {
+    double sum = 0;
+    for (int j = -4; j <= 4; ++j) {
+      for (int i = -4; i <= 4; ++i) {
+        sum += k == 1 || k == 2 ? (y(1, cell_x + i, cell_y + j) + y(2, cell_x + i, cell_y + j)) / 2
+                                : y(k, cell_x + i, cell_y + j);
+      }
+    }
+    return gain[k] * gain[k] * (std::max(sum / 81, 0.3 * dark_e[k] + 0.02) + noise.variance_e2);
+  }
+
+  /// Chroma start level at each tile.
+  Image starts() const {
+    Image out(tiles_of(columns), tiles_of(rows));
+    Image sum = out, count = out;
+    const double dark = (dark_e[0] + dark_e[1] + dark_e[2] + dark_e[3]) / 4;
+    for (int cy = 0; cy < rows; ++cy) {
+      for (int cx = 0; cx < columns; ++cx) {
+        const int tx = tile_of(cx, out.width), ty = tile_of(cy, out.height);
+        for (int k = 0; k < 4; ++k) sum.at(tx, ty) += y(k, cx, cy) - dark_e[k];
+        count.at(tx, ty) += 4;
+      }
+    }
+    for (std::size_t i = 0; i < out.v.size(); ++i) {
+      const double s = sum.v[i] / count.v[i];
+      const double q = s > 0 ? s / std::sqrt(s + dark + noise.variance_e2) : 0;
+      out.v[i] = options.chroma_start ? *options.chroma_start : q >= 3 ? 0 : q >= 0.7 ? 1 : 2;
+    }
+    for (double& start : out.v) start = std::min<double>(start, levels - 1);
+    return out;
+  }
+};
+
+/// Share of coarser levels in the chroma of `level`, at the place of cell (x, y) of level `grid`.
+double coarser_share(const Image& starts, int level, int grid, int x, int y) {
+  const auto place = [grid](int i, int tiles) {
+    return std::clamp((i + 0.5) * (1 << grid) / tile - 0.5, 0.0, static_cast<double>(tiles - 1));
+  };
+  const double u = place(x, starts.width), v = place(y, starts.height);
+  const int i = static_cast<int>(u), j = static_cast<int>(v);
+  const double fx = u - i, fy = v - j;
+  const double start = (1 - fy) * ((1 - fx) * starts.near(i, j) + fx * starts.near(i + 1, j)) +
+                       fy * ((1 - fx) * starts.near(i, j + 1) + fx * starts.near(i + 1, j + 1));
+  return std::clamp(start - level, 0.0, 1.0);
+}
+
+Four decorrelated(const Frame& frame, Four& variance) {
+  const int w = padded(frame.columns, frame.levels), h = padded(frame.rows, frame.levels);
+  Four out;
+  out.fill(Image(w, h));
+  variance = out;
+  double largest = 0;
+  for (const double g : frame.gain) largest = std::max(largest, g * std::min(frame.noise.saturation_e, 1e9));
+  for (int cy = 0; cy < h; ++cy) {
+    for (int cx = 0; cx < w; ++cx) {
+      std::array<double, 4> x{}, v{};
+      double most = -1e30;
+      for (int k = 0; k < 4; ++k) {
+        x[k] = frame.gain[k] * (frame.y(k, cx, cy) - frame.dark_e[k]);
+        v[k] = frame.variance(k, mirrored(cx, frame.columns), mirrored(cy, frame.rows));
+        most = std::max(most, x[k]);
+      }
+      double blind = 0;
+      for (int k = 0; k < 4; ++k) {
+        if (frame.y(k, cx, cy) < static_cast<float>(frame.noise.saturation_e)) continue;
+        x[k] = most;
+        blind = 1e9 * largest * largest;
+      }
+      out[0].at(cx, cy) = 0.2 * x[0] + 0.3 * x[1] + 0.3 * x[2] + 0.2 * x[3];
+      out[1].at(cx, cy) = 0.5 * (x[0] + x[3] - x[1] - x[2]);
+      out[2].at(cx, cy) = (x[0] - x[3]) / std::numbers::sqrt2;
+      out[3].at(cx, cy) = x[1] - x[2];
+      variance[0].at(cx, cy) = 0.04 * (v[0] + v[3]) + 0.09 * (v[1] + v[2]);
+      variance[1].at(cx, cy) = 0.25 * (v[0] + v[1] + v[2] + v[3]) + blind;
+      variance[2].at(cx, cy) = 0.5 * (v[0] + v[3]) + blind;
+      variance[3].at(cx, cy) = v[1] + v[2] + blind;
+    }
+  }
+  return out;
+}
+
+/// Levels from coarse to fine, in place: what was shrunk becomes the picture at that level.
+void recompose(std::vector<Four>& levels, const Image& starts) {
+  for (int l = static_cast<int>(levels.size()) - 2; l >= 0; --l) {
+    for (int p = 0; p < 4; ++p) {
+      Image& fine = levels[l][p];
+      const Image& coarse = levels[l + 1][p];
+      Image difference = down2(fine);
+      for (std::size_t i = 0; i < difference.v.size(); ++i) difference.v[i] = coarse.v[i] - difference.v[i];
+      const Image correction = up2(binomial3(difference)), smooth = up2(coarse);
+      for (int y = 0; y < fine.height; ++y) {
+        for (int x = 0; x < fine.width; ++x) {
+          const double share = p == 0 ? 0 : coarser_share(starts, l, l, x, y);
+          fine.at(x, y) = (1 - share) * (fine.at(x, y) + correction.at(x, y)) + share * smooth.at(x, y);
+        }
+      }
+    }
+  }
+}
+
+/// Residual variances added up over levels, at the finest.
+Four total_residual(const std::vector<Four>& levels, const Image& starts) {
+  Four total;
+  for (int l = static_cast<int>(levels.size()) - 1; l >= 0; --l) {
+    for (int p = 0; p < 4; ++p) {
+      const Image own = down2(levels[l][p]);
+      Image sum = total[p].v.empty() ? Image(own.width, own.height) : up2(total[p]);
+      for (int y = 0; y < own.height; ++y) {
+        for (int x = 0; x < own.width; ++x) {
+          sum.at(x, y) += (1 - (p == 0 ? 0 : coarser_share(starts, l, l + 1, x, y))) * own.at(x, y);
+        }
+      }
+      total[p] = sum;
+    }
+  }
+  for (Image& image : total) image = up2(image);
+  return total;
+}
+
+/// Pyramid of the planes, and of their variances.
+void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, int levels) {
+  x.reserve(static_cast<std::size_t>(levels));
+  variance.reserve(static_cast<std::size_t>(levels));
+  while (static_cast<int>(x.size()) < levels) {
+    Four half, half_variance;
+    for (int p = 0; p < 4; ++p) {
+      half[p] = down2(x.back()[p]);
+      half_variance[p] = down2(variance.back()[p]);
+      for (double& v : half_variance[p].v) v /= 4;
+    }
+    x.push_back(std::move(half));
+    variance.push_back(std::move(half_variance));
+  }
+}
+
+struct Pictures {
+  Four value;
+  Four residual;
+};
+
+Pictures both_passes(const Frame& frame, const Image& starts) {
+  std::vector<Four> x(1), variance(1);
+  x[0] = decorrelated(frame, variance[0]);
+  add_coarser(x, variance, frame.levels);
+  std::vector<Four> value(frame.levels), residual(frame.levels);
+  const auto pass = [&](const std::vector<Four>* pilot, int stride) {
+    std::vector<Four> out(frame.levels);
+    for (int l = 0; l < frame.levels; ++l) {
+      Shrunk shrunk =
+          shrink(x[l], variance[l], pilot == nullptr ? nullptr : &(*pilot)[l], stride, l + 1 == frame.levels);
+      out[l] = std::move(shrunk.value);
+      residual[l] = std::move(shrunk.residual);
+    }
+    recompose(out, starts);
+    value = std::move(out);
+  };
+  pass(nullptr, 4);
+  if (frame.options.level != Level::draft) {
+    const std::vector<Four> pilot = value;
+    pass(&pilot, frame.options.level == Level::high ? 2 : 4);
+  }
+  return {value[0], total_residual(residual, starts)};
+}
+
+}  // namespace
+
+Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const DenoiseOptions& options) {
+  const Frame frame(raw, noise, options);
+  const Pictures p = both_passes(frame, frame.starts());
+  Denoised out{Plane<double>(raw.value.width, raw.value.height), Plane<double>(frame.columns, frame.rows),
+               Plane<double>(frame.columns, frame.rows)};
+  for (int cy = 0; cy < frame.rows; ++cy) {
+    for (int cx = 0; cx < frame.columns; ++cx) {
+      const double luma = p.value[0].at(cx, cy), prior = std::max(luma, 0.0) * options.rho;
+      const auto factor = [&](double residual) {
+        return std::isinf(options.rho) ? 1.0 : prior * prior / (prior * prior + residual);
+      };
+      std::array<double, 4> c{};
+      for (int i = 1; i < 4; ++i) c[i] = p.value[i].at(cx, cy) * factor(p.residual[i].at(cx, cy));
+      const double a = 2 * luma + 1.2 * c[1], g = 2 * luma - 0.8 * c[1];  // R + B and G1 + G2
+      const std::array<double, 4> x{a / 2 + c[2] / std::numbers::sqrt2, (g + c[3]) / 2, (g - c[3]) / 2,
+                                    a / 2 - c[2] / std::numbers::sqrt2};
+      for (int k = 0; k < 4; ++k) {
+        const int at_x = 2 * cx + (frame.site[k] & 1), at_y = 2 * cy + (frame.site[k] >> 1);
+        if (at_x < raw.value.width && at_y < raw.value.height) out.signal_e.at(at_x, at_y) = x[k] / frame.gain[k];
+      }
+      out.residual_variance.at(cx, cy) = p.residual[0].at(cx, cy);
+      out.chroma_confidence.at(cx, cy) = factor((p.residual[1].at(cx, cy) + p.residual[2].at(cx, cy)) / 2);
+    }
+  }
+  return out;
+}
+
+}  // namespace lowlux::reference

@@ -1,0 +1,17 @@
+#pragma once
+
+#include "denoise/denoiser.h"
+
+namespace lowlux::reference {
+
+struct Denoised {
+  Plane<double> signal_e;
+  Plane<double> residual_variance;
+  Plane<double> chroma_confidence;
+};
+
+/// What denoise::Denoiser does, in double and one block at a time, without its treatment of point sources.
+Denoised denoise(const denoise::RawElectronsView& raw, const denoise::RawNoise& noise,
+                 const denoise::DenoiseOptions& options);
+
+}  // namespace lowlux::reference

@@ -1,0 +1,160 @@
+#include "tests/reference/denoise_ref_blocks.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "denoise/layout.h"
+
+namespace lowlux::reference::denoising {
+
+Image down2(const Image& in) {
+  Image out(in.width / 2, in.height / 2);
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      out.at(x, y) =
+          (in.at(2 * x, 2 * y) + in.at(2 * x + 1, 2 * y) + in.at(2 * x, 2 * y + 1) + in.at(2 * x + 1, 2 * y + 1)) / 4;
+    }
+  }
+  return out;
+}
+
+Image up2(const Image& in) {
+  Image out(2 * in.width, 2 * in.height);
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      const int cx = x / 2, cy = y / 2, sx = 2 * (x % 2) - 1, sy = 2 * (y % 2) - 1;
+      out.at(x, y) =
+          (9 * in.near(cx, cy) + 3 * in.near(cx + sx, cy) + 3 * in.near(cx, cy + sy) + in.near(cx + sx, cy + sy)) / 16;
+    }
+  }
+  return out;
+}
+
+Image binomial3(const Image& in) {
+  constexpr std::array weight{0.25, 0.5, 0.25};
+  Image out(in.width, in.height);
+  for (int y = 0; y < in.height; ++y) {
+    for (int x = 0; x < in.width; ++x) {
+      for (int j = 0; j < 3; ++j) {
+        for (int i = 0; i < 3; ++i) out.at(x, y) += weight[j] * weight[i] * in.near(x + i - 1, y + j - 1);
+      }
+    }
+  }
+  return out;
+}
+
+namespace {
+
+using denoise::block;
+
+struct Transform {
+  double c[block][block];  // c[k][i]: orthonormal DCT-II
+  Transform() {
+    for (int k = 0; k < block; ++k) {
+      for (int i = 0; i < block; ++i) {
+        c[k][i] = std::sqrt((k == 0 ? 1.0 : 2.0) / block) * std::cos((2 * i + 1) * k * std::numbers::pi / (2 * block));
+      }
+    }
+  }
+};
+
+using Block = std::array<std::array<double, block>, block>;
+
+Block dct(const Image& in, int x0, int y0) {
+  static const Transform t;
+  Block rows{}, out{};
+  for (int v = 0; v < block; ++v) {
+    for (int x = 0; x < block; ++x) {
+      for (int y = 0; y < block; ++y) rows[v][x] += t.c[v][y] * in.at(x0 + x, y0 + y);
+    }
+    for (int u = 0; u < block; ++u) {
+      for (int x = 0; x < block; ++x) out[v][u] += t.c[u][x] * rows[v][x];
+    }
+  }
+  return out;
+}
+
+Block inverse_dct(const Block& in) {
+  static const Transform t;
+  Block rows{}, out{};
+  for (int v = 0; v < block; ++v) {
+    for (int x = 0; x < block; ++x) {
+      for (int u = 0; u < block; ++u) rows[v][x] += t.c[u][x] * in[v][u];
+    }
+  }
+  for (int y = 0; y < block; ++y) {
+    for (int x = 0; x < block; ++x) {
+      for (int v = 0; v < block; ++v) out[y][x] += t.c[v][y] * rows[v][x];
+    }
+  }
+  return out;
+}
+
+/// Gains of the coefficients of plane p, 0 or 1 (section "pass 1" of denoise/README.md).
+Block hard_gains(int p, const std::array<Block, 4>& f, const std::array<double, 4>& variance) {
+  Block gain{};
+  for (int v = 0; v < block; ++v) {
+    for (int u = 0; u < block; ++u) {
+      const double power = f[p][v][u] * f[p][v][u];
+      const bool luma = f[0][v][u] * f[0][v][u] > 9 * variance[0];
+      const double least = p == 0 ? 9 : luma ? 6.25 : 16;
+      gain[v][u] = (u == 0 && v == 0) || power > least * variance[p] ? 1 : 0;
+    }
+  }
+  return gain;
+}
+
+Block wiener_gains(const Block& pilot, double variance) {
+  Block gain{};
+  for (int v = 0; v < block; ++v) {
+    for (int u = 0; u < block; ++u) gain[v][u] = pilot[v][u] * pilot[v][u] / (pilot[v][u] * pilot[v][u] + variance);
+  }
+  gain[0][0] = 1;
+  return gain;
+}
+
+}  // namespace
+
+Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride, bool coarsest) {
+  const int w = x[0].width, h = x[0].height;
+  Shrunk out;
+  Four weight;
+  for (Four* four : {&out.value, &out.residual, &weight}) four->fill(Image(w, h));
+  for (int y0 = 0; y0 + block <= h; y0 += stride) {
+    for (int x0 = 0; x0 + block <= w; x0 += stride) {
+      std::array<Block, 4> f;
+      std::array<double, 4> v{};
+      for (int p = 0; p < 4; ++p) {
+        f[p] = dct(x[p], x0, y0);
+        for (int i = 0; i < block * block; ++i) v[p] += variance[p].at(x0 + i % block, y0 + i / block) / 64;
+      }
+      for (int p = 0; p < 4; ++p) {
+        const Block gain = pilot == nullptr ? hard_gains(p, f, v) : wiener_gains(dct((*pilot)[p], x0, y0), v[p]);
+        Block kept{};
+        double power = 0;
+        for (int i = 0; i < block * block; ++i) {
+          const double g = gain[i / block][i % block];
+          power += g * g;
+          kept[i / block][i % block] = g * f[p][i / block][i % block];
+        }
+        const Block value = inverse_dct(kept);
+        const double share = 1 / (v[p] * power), residual = v[p] * (power - (coarsest ? 0 : 1)) / 64;
+        for (int i = 0; i < block * block; ++i) {
+          const int at_x = x0 + i % block, at_y = y0 + i / block;
+          out.value[p].at(at_x, at_y) += share * value[i / block][i % block];
+          out.residual[p].at(at_x, at_y) += share * residual;
+          weight[p].at(at_x, at_y) += share;
+        }
+      }
+    }
+  }
+  for (int p = 0; p < 4; ++p) {
+    for (std::size_t i = 0; i < weight[p].v.size(); ++i) {
+      out.value[p].v[i] /= weight[p].v[i];
+      out.residual[p].v[i] /= weight[p].v[i];
+    }
+  }
+  return out;
+}
+
+}  // namespace lowlux::reference::denoising

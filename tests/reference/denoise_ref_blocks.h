@@ -1,0 +1,34 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace lowlux::reference::denoising {
+
+struct Image {
+  int width = 0, height = 0;
+  std::vector<double> v{};
+
+  Image() = default;
+  Image(int w, int h) : width(w), height(h), v(static_cast<std::size_t>(w) * h) {}
+  double& at(int x, int y) { return v[static_cast<std::size_t>(y) * width + x]; }
+  double at(int x, int y) const { return v[static_cast<std::size_t>(y) * width + x]; }
+  double near(int x, int y) const { return at(std::clamp(x, 0, width - 1), std::clamp(y, 0, height - 1)); }
+};
+using Four = std::array<Image, 4>;  // R G1 G2 B, then L C1 C2 C3
+
+Image down2(const Image& in);      // 2x2 means
+Image up2(const Image& in);        // bilinear, edges repeated
+Image binomial3(const Image& in);  // 3x3 weights 1 2 1, edges repeated
+
+struct Shrunk {
+  Four value;
+  Four residual;  // variance
+};
+
+/// One level of one pass: every block, `stride` apart. `pilot` is null in the first pass.
+Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride, bool coarsest);
+
+}  // namespace lowlux::reference::denoising
