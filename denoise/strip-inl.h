@@ -122,12 +122,12 @@ HWY_INLINE VF wiener(Strip& s, int place, VF variance) {
   for (int v = 0; v < 8; ++v) {
     VF gain[8], x[8];
     coefficients<kStep>(s.pilot[v], place, gain);
-    for (int u = 0; u < 8; ++u) {
-      const VF square = hn::Mul(gain[u], gain[u]);
-      gain[u] = hn::Div(square, hn::Add(square, variance));
+    for (VF& g : gain) {
+      const VF square = hn::Mul(g, g);
+      g = hn::Div(square, hn::Add(square, variance));
     }
     if (v == 0) gain[0] = constant(1);
-    for (int u = 0; u < 8; ++u) power = hn::MulAdd(gain[u], gain[u], power);
+    for (const VF& g : gain) power = hn::MulAdd(g, g, power);
     coefficients<kStep>(s.noisy[v], place, x);
     for (int u = 0; u < 8; ++u) x[u] = hn::Mul(x[u], gain[u]);
     inverse8(x);
