@@ -76,6 +76,15 @@ Result<void> check_same_setting(const FrameSetting& first, const FrameSetting& s
   return {};
 }
 
+double mean_dn(const RawDn& raw) {
+  double sum = 0;
+  for (int y = 0; y < raw.active.height; ++y) {
+    const std::uint16_t* row = raw.dn.row(raw.active.y + y) + raw.active.x;
+    for (int x = 0; x < raw.active.width; ++x) sum += row[x];
+  }
+  return sum / (static_cast<double>(raw.active.width) * raw.active.height);
+}
+
 int channel_of_site(const FrameSetting& setting, int site) {
   if (setting.layout != SensorLayout::bayer) return 1;
   return static_cast<int>(colour_at(setting.phase, site & 1, site >> 1));

@@ -34,6 +34,9 @@ Result<void> check_same_camera(const FrameSetting& first, const FrameSetting& se
 /// The same, and of the same exposure time.
 Result<void> check_same_setting(const FrameSetting& first, const FrameSetting& second, const std::string& what);
 
+/// Mean code of the active area.
+double mean_dn(const RawDn& raw);
+
 /// Colour of a site, 0..2 for R, G, B; 1 for a sensor without filters.
 int channel_of_site(const FrameSetting& setting, int site);
 

@@ -24,22 +24,13 @@ Error at(Error error, const std::string& file) {
   return error;
 }
 
-double active_mean_dn(const RawDn& raw) {
-  double sum = 0;
-  for (int y = 0; y < raw.active.height; ++y) {
-    const std::uint16_t* row = raw.dn.row(raw.active.y + y) + raw.active.x;
-    for (int x = 0; x < raw.active.width; ++x) sum += row[x];
-  }
-  return sum / (static_cast<double>(raw.active.width) * raw.active.height);
-}
-
 double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
 
 /// A dark frame is as dark as its own masked pixels, where it has some.
 Result<void> check_dark(const RawDn& raw) {
   const isp::MaskedBlack masked = isp::measure_masked_black(raw);
   if (!masked.black) return {};
-  const double black = mean_of(masked.black->pedestal_dn), mean = active_mean_dn(raw);
+  const double black = mean_of(masked.black->pedestal_dn), mean = calib::mean_dn(raw);
   const double tolerated = std::max(light_of_noise * mean_of(masked.black->noise_std_dn),
                                     light_of_range * isp::mean_range_dn(raw, *masked.black));
   if (mean - black <= tolerated) return {};

@@ -6,21 +6,14 @@
 
 #include <fmt/format.h>
 
+#include "calib/frame_setting.h"
+
 namespace lowlux::cli {
 namespace {
 
 constexpr double same_level = 0.02;  // of the light; what drifts by more than 1 % is refused later
 constexpr double same_level_dn = 0.5;
 constexpr std::size_t most_waiting = 32;
-
-double mean_of(const RawDn& raw) {
-  double sum = 0;
-  for (int y = 0; y < raw.active.height; ++y) {
-    const std::uint16_t* row = raw.dn.row(raw.active.y + y) + raw.active.x;
-    for (int x = 0; x < raw.active.width; ++x) sum += row[x];
-  }
-  return sum / (static_cast<double>(raw.active.width) * raw.active.height);
-}
 
 }  // namespace
 
@@ -49,7 +42,7 @@ std::vector<FramePairs::Waiting>::iterator FramePairs::partner_of(const RawDn& f
 }
 
 Result<void> FramePairs::add(RawDn frame, const std::string& file) {
-  const double mean = mean_of(frame);
+  const double mean = calib::mean_dn(frame);
   const auto partner = partner_of(frame, mean);
   if (partner == waiting_.end()) {
     if (waiting_.size() == most_waiting) {

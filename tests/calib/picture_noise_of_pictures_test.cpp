@@ -82,9 +82,13 @@ TEST(PictureNoiseOfPictures, IsThatOfTheSensorWithoutALensWhereTheyAreSmooth) {
 }
 
 TEST(PictureNoiseOfPictures, OfAllEightAtFourLevelsIsThatOfTheSensor) {
-  if (std::getenv("LOWLUX_NIGHTLY") == nullptr) GTEST_SKIP() << "runs nightly: LOWLUX_NIGHTLY is not set";
   PoolExecutor executor(2);
-  for (const SensorModel& sensor : {test::modern_small(), test::modern_large(), clipping_sensor()}) {
+  std::vector<SensorModel> sensors{test::modern_small()};
+  if (std::getenv("LOWLUX_NIGHTLY") != nullptr) {
+    sensors.push_back(test::modern_large());
+    sensors.push_back(clipping_sensor());
+  }
+  for (const SensorModel& sensor : sensors) {
     Outcome outcome;
     for (const char* name : test::clean_pictures) {
       const auto light = test::picture_light(name, executor, lens_sigma_px);

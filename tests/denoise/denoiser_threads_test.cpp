@@ -1,33 +1,11 @@
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
 #include <cstring>
-#include <new>
 
 #include "denoise/denoiser.h"
 #include "tests/denoise/frames.h"
+#include "tests/support/count_allocations.h"
 #include "tests/support/only_target.h"
-
-namespace {
-
-std::atomic<long> allocations{0};
-
-void* counted(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-
-}  // namespace
-
-// Every allocation of this program, of any thread, passes here.
-void* operator new(std::size_t size) { return counted(size); }
-void* operator new[](std::size_t size) { return counted(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
 
 namespace lowlux {
 namespace {
@@ -97,15 +75,15 @@ TEST(DenoiserMemory, IsAllocatedByTheConstructorOnly) {
   const auto raw = night(500, 300);
   Plane<float> out(500, 300), residual(250, 150), confidence(250, 150);
   PoolExecutor two(2);
-  const long at_first = allocations;
+  const long at_first = test::allocations;
   denoise::Denoiser denoiser(500, 300, 2);
-  EXPECT_GT(allocations, at_first);
-  const long before = allocations;
+  EXPECT_GT(test::allocations, at_first);
+  const long before = test::allocations;
   for (const Level level : {Level::draft, Level::standard, Level::high}) {
     denoiser.run({raw.view(), camera.phase}, camera.noise(), {.level = level}, out.view(),
                  {residual.view(), confidence.view()}, two);
   }
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(test::allocations, before);
 }
 
 TEST(DenoiserTargets, AgreeWithinFloatRounding) {

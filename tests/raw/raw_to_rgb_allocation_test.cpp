@@ -1,31 +1,9 @@
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
 
 #include "isp/raw/raw_to_rgb.h"
 #include "tests/raw/raw_to_rgb_support.h"
-
-namespace {
-
-std::atomic<long> allocations{0};
-
-void* counted(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-
-}  // namespace
-
-// Every allocation of this program, of any thread, passes here.
-void* operator new(std::size_t size) { return counted(size); }
-void* operator new[](std::size_t size) { return counted(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
+#include "tests/support/count_allocations.h"
 
 namespace lowlux {
 namespace {
@@ -33,9 +11,9 @@ namespace {
 using namespace raw_to_rgb_testing;
 
 TEST(RawToRgbAllocation, CountsItsOwnAllocations) {
-  const long before = allocations;
+  const long before = test::allocations;
   const isp::RawToRgb kernel(64, 1);
-  EXPECT_GT(allocations, before);
+  EXPECT_GT(test::allocations, before);
 }
 
 TEST(RawToRgbAllocation, IsZeroForTenFramesAfterTheFirst) {
@@ -60,9 +38,9 @@ TEST(RawToRgbAllocation, IsZeroForTenFramesAfterTheFirst) {
         {r.view().crop(0, 0, w / 2, h / 2), g.view().crop(0, 0, w / 2, h / 2), b.view().crop(0, 0, w / 2, h / 2)}, two);
   };
   frame();
-  const long before = allocations;
+  const long before = test::allocations;
   for (int i = 0; i < 10; ++i) frame();
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(test::allocations, before);
 }
 
 }  // namespace

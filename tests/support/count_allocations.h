@@ -1,0 +1,27 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdlib>
+#include <new>
+
+/// Counts what a program allocates. To be included by one file of it: operator new can be replaced once.
+namespace lowlux::test {
+
+inline std::atomic<long> allocations{0};
+
+inline void* counted(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+
+}  // namespace lowlux::test
+
+// Every allocation of the program, of any thread, passes here.
+void* operator new(std::size_t size) { return lowlux::test::counted(size); }
+void* operator new[](std::size_t size) { return lowlux::test::counted(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
