@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-
 #include "isp/raw/raw_to_rgb.h"
 #include "tests/raw/raw_to_rgb_support.h"
 #include "tests/support/count_allocations.h"
