@@ -89,6 +89,7 @@ ChromaStarts Run::starts() const {
   out.start = std::span(memory.starts).first(tiles);
   out.has_chroma = std::span(memory.has_chroma).first(tiles * most_levels);
   const double dark = (dark_e[0] + 2 * dark_e[1] + dark_e[2]) / 4;
+  const double variance = (noise.variance_e2[0] + 2 * noise.variance_e2[1] + noise.variance_e2[2]) / 4;
   const auto edge = [](int i, int count, int size) { return i == count ? size : std::min(size, 2 * tile * i); };
   in_bands(workers, out.rows, [&](int first, int last, int) {
     for (int i = first * out.columns; i < last * out.columns; ++i) {
@@ -100,7 +101,7 @@ ChromaStarts Run::starts() const {
         double sum = 0;
         for (int row = top; row < bottom; ++row) sum += rows::sum_of(raw.value.row(row) + left, right - left);
         const double mean = sum / (static_cast<double>(right - left) * (bottom - top));
-        start = start_of(mean - dark, dark, noise.variance_e2);
+        start = start_of(mean - dark, dark, variance);
       }
       out.start[i] = static_cast<float>(std::min(start, levels - 1));
     }
@@ -165,10 +166,10 @@ void Run::front() const {
         for (int y = 0; y < 10; ++y) in.raw_e[k][y] = m.window[k][(2 * pair - 4 + y + 16) % 16];
         in.least_e[k] = static_cast<float>(0.3 * dark_e[k] + 0.02);
         in.gain[k] = static_cast<float>(options.white_gain[k]);
+        in.variance_e2[k] = static_cast<float>(noise.variance_e2[k]);
       }
       for (int y = 0; y < 2; ++y) in.blind[y] = m.window[3][(2 * pair + y) % 16];
       in.cells = level.width;
-      in.variance_e2 = static_cast<float>(noise.variance_e2);
       float* const out[4] = {level.variance.row(0, pair), level.variance.row(1, pair), level.variance.row(2, pair),
                              level.variance.row(3, pair)};
       rows::variance_row(in, m.blocks, out);
@@ -214,7 +215,8 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
 
 [[maybe_unused]] bool usable(const RawNoise& noise, const DenoiseOptions& options) {
   const auto within = [](double x, double least, double most) { return x >= least && x <= most; };
-  bool good = within(noise.variance_e2, 0, largest_e) && noise.saturation_e > 0 && options.rho > 0;
+  bool good = noise.saturation_e > 0 && options.rho > 0;
+  for (const double variance : noise.variance_e2) good = good && within(variance, 0, largest_e);
   for (const double dark : noise.dark_mean_e) good = good && within(dark, 0, largest_e);
   for (const double gain : options.white_gain) good = good && within(gain, 1e-3, 1e3);
   return good && within(options.chroma_start.value_or(0), 0, 2);
@@ -250,6 +252,11 @@ void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const Den
   }
   add_residuals(frame);
   run.unpack(state_->memory.level[0].value[last], signal_e, maps);
+}
+
+std::string_view name_of(Level level) {
+  constexpr std::array<std::string_view, all_levels.size()> names{"draft", "standard", "high"};
+  return names[static_cast<std::size_t>(level)];
 }
 
 const char* denoiser_target() { return rows::target_name(); }

@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 #include "isp/base/cfa.h"
 #include "isp/base/executor.h"
@@ -19,6 +20,11 @@ enum class Level : std::uint8_t {
   high,      // the same with blocks every 2 quads
 };
 
+inline constexpr std::array all_levels{Level::draft, Level::standard, Level::high};  // least work first
+
+/// "draft" and so on.
+std::string_view name_of(Level level);
+
 /// A mosaic in electrons, pedestal removed, dark charge still in, signed. Sites that are not a number count as 0, and
 /// values beyond +-1e9 as +-1e9.
 struct RawElectronsView {
@@ -26,11 +32,11 @@ struct RawElectronsView {
   BayerPhase phase = BayerPhase::rggb;
 };
 
-/// Var[y] = max(E[y], 0) + variance_e2 of a raw value y [e-]. All >= 0 and finite, but for saturation_e.
+/// Var[y] = max(E[y], 0) + variance_e2 of a raw value y [e-] of one colour. All >= 0 and finite, but for saturation_e.
 struct RawNoise {
   PerSite<double>
-      dark_mean_e{};       // subtracted, sites as in site_of(); both greens get the mean of theirs, or mazes show
-  double variance_e2 = 0;  // read noise^2 + quantisation step^2 / 12
+      dark_mean_e{};  // subtracted, sites as in site_of(); both greens get the mean of theirs, or mazes show
+  std::array<double, 3> variance_e2{};  // of R, G, B: read noise^2 + quantisation step^2 / 12; both greens share theirs
   /// Values from here on are saturated: they count as the largest white-balanced value of their 2x2 cell, and cannot
   /// give colour to their surroundings.
   double saturation_e = std::numeric_limits<double>::infinity();

@@ -82,7 +82,7 @@ HWY_INLINE void colour_variances(const VarianceRow& in, float* scratch, int row,
       store(hn::Add(shared, load(in.raw_e[k][0] + i)), sums[0] + i);
       store(hn::Add(shared, load(in.raw_e[k][9] + i)), sums[1] + i);
     }
-    const VF scale = constant(in.gain[k] * in.gain[k] / 16), steady = constant(in.variance_e2);
+    const VF scale = constant(in.gain[k] * in.gain[k] / 16), steady = constant(in.variance_e2[k]);
     const VF least = constant(in.least_e[k]);
     for (int i = 0; i < in.cells; i += n) {
       VF both = hn::Zero(Floats());

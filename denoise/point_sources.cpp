@@ -117,7 +117,7 @@ void find_point_sources(const RawElectronsView& raw, const RawNoise& noise, cons
                         const SearchMemory* memory, PlaneView<std::uint8_t> cells) {
   double floor_e = 0;
   for (const double dark : noise.dark_mean_e) floor_e += 0.3 * dark + 0.02;
-  const Search search{raw.value, floor_e, 4 * noise.variance_e2};
+  const Search search{raw.value, floor_e, noise.variance_e2[0] + 2 * noise.variance_e2[1] + noise.variance_e2[2]};
   in_bands(workers, cells.height, [&](int first, int last, int thread) {
     Band{search, memory[thread], cells}.run(first, last);
   });

@@ -36,7 +36,7 @@ struct VarianceRow {
   const float* blind[2];
   int cells;
   float least_e[3];  // floor of the local mean
-  float variance_e2;
+  float variance_e2[3];
   float gain[3];
 };
 /// @param scratch 5 rows of cells + padding

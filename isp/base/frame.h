@@ -105,6 +105,7 @@ struct BlackPoint {
 struct NoiseProfile {
   std::array<double, 3> scale{};
   std::array<double, 3> offset{};
+  enum class Source : std::uint8_t { file, profile, picture } source = Source::file;  // who says so
 };
 
 /// One colour calibration of a camera (DNG ColorMatrixN, CameraCalibrationN, ForwardMatrixN).

@@ -35,7 +35,10 @@ Result<void> use_profile(const CameraProfile& profile, bool everything, RawFrame
     black.choice = isp::BlackChoice::measured;
     black.measured = *found->black;
   }
-  if (found->noise) frame.noise = found->noise;
+  if (found->noise) {
+    frame.noise = found->noise;
+    frame.noise->source = NoiseProfile::Source::profile;
+  }
   auto& defects = frame.corrections.defects;
   defects.insert(defects.end(), found->hot_pixels.begin(), found->hot_pixels.end());
   frame.warnings.insert(frame.warnings.end(), found->warnings.begin(), found->warnings.end());

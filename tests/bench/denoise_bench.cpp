@@ -27,8 +27,7 @@ using denoise::Level;
 using denoise_testing::Camera;
 using denoise_testing::exposed;
 
-constexpr std::array levels{Level::draft, Level::standard, Level::high};
-constexpr std::array level_names{"draft", "standard", "high"};
+using denoise::all_levels;
 
 double cpu_clock_ms() {
   timespec now{};
@@ -83,20 +82,18 @@ void print_times(int rounds) {
   denoise::Denoiser denoiser(width, height, 1);
   InlineExecutor one;
   std::vector<Task> tasks;
-  tasks.reserve(1 + 4 * levels.size());
+  tasks.reserve(1 + 4 * all_levels.size());
   tasks.push_back({"memcpy", 3, [&] { std::memcpy(out.data(), raw.data(), raw.size() * sizeof(float)); }});
-  for (const Level level : levels) {
+  for (const Level level : all_levels) {
     const DenoiseOptions options{.level = level, .chroma_start = 0};
     tasks.push_back({"reference", small * small * 1e-6, [&, options] {
                        reference::denoise({part.view(), camera.phase}, camera.noise(), options);
                      }});
     for (const int start : {0, 1, 2}) {
       const DenoiseOptions with{.level = level, .chroma_start = start};
-      tasks.push_back(
-          {std::string(level_names[static_cast<std::size_t>(level)]) + ", chroma from " + std::to_string(start), 3,
-           [&, with] {
-             denoiser.run({raw.view(), camera.phase}, camera.noise(), with, out.view(), {}, one);
-           }});
+      tasks.push_back({std::string(denoise::name_of(level)) + ", chroma from " + std::to_string(start), 3, [&, with] {
+                         denoiser.run({raw.view(), camera.phase}, camera.noise(), with, out.view(), {}, one);
+                       }});
     }
   }
   time_interleaved(tasks, rounds);
@@ -236,12 +233,13 @@ void print_quality() {
   for (const Light& light : lights) std::printf(" %6g/%-6g", light.mean_e, light.dark_e);
   std::printf("\n");
   for (int i = -1; i < 3; ++i) {
-    std::printf("%-10s", i < 0 ? "none" : level_names[static_cast<std::size_t>(i)]);
+    std::printf("%-10s",
+                i < 0 ? "none" : std::string(denoise::name_of(all_levels[static_cast<std::size_t>(i)])).c_str());
     for (const Light& light : lights) {
       Quality mean;
       for (Shot& shot : shots) {
         const Quality q =
-            quality_at(shot, light, i < 0 ? std::nullopt : std::optional(levels[static_cast<std::size_t>(i)]));
+            quality_at(shot, light, i < 0 ? std::nullopt : std::optional(all_levels[static_cast<std::size_t>(i)]));
         mean.linear_db += q.linear_db / static_cast<double>(shots.size());
         mean.encoded_db += q.encoded_db / static_cast<double>(shots.size());
       }

@@ -49,8 +49,9 @@ TEST(DenoiserHardCases, FramesOfOneValueGiveThatValue) {
   for (const Level level : {Level::draft, Level::standard, Level::high}) {
     for (const float e : {0.0f, -50.0f, 4095.0f, 1e9f, -1e9f}) {
       for (const double variance_e2 : {0.0, 4.0}) {
-        const auto out = denoised(filled(150, 97, e), BayerPhase::gbrg, {.variance_e2 = variance_e2},
-                                  {.level = level, .rho = std::numeric_limits<double>::infinity()});
+        const auto out =
+            denoised(filled(150, 97, e), BayerPhase::gbrg, {.variance_e2 = {variance_e2, variance_e2, variance_e2}},
+                     {.level = level, .rho = std::numeric_limits<double>::infinity()});
         expect_numbers(out);
         // [e-]: float, relative; see denoiser_test.cpp
         for (std::size_t i = 0; i < out.signal.size(); ++i) {
@@ -62,14 +63,15 @@ TEST(DenoiserHardCases, FramesOfOneValueGiveThatValue) {
 }
 
 TEST(DenoiserHardCases, FramesWithoutSignalHaveNoColour) {
-  const auto out = denoised(filled(64, 64, -3), BayerPhase::rggb, {.variance_e2 = 1}, {});
+  const auto out = denoised(filled(64, 64, -3), BayerPhase::rggb, {.variance_e2 = {1, 1, 1}}, {});
   expect_numbers(out);
   EXPECT_EQ(*std::max_element(out.confidence.data(), out.confidence.data() + out.confidence.size()), 0);
 }
 
 TEST(DenoiserHardCases, WhollySaturatedFramesAreNeutralAndHaveNoConfidence) {
   const DenoiseOptions options{.white_gain = {2, 1, 1.5}};
-  const auto out = denoised(filled(150, 97, 1000), BayerPhase::rggb, {.variance_e2 = 4, .saturation_e = 1000}, options);
+  const auto out =
+      denoised(filled(150, 97, 1000), BayerPhase::rggb, {.variance_e2 = {4, 4, 4}, .saturation_e = 1000}, options);
   expect_numbers(out);
   for (int y = 0; y < 97; ++y) {
     for (int x = 0; x < 150; ++x) {

@@ -111,10 +111,10 @@ TEST(DenoiserProperties, DarkChargeActsThroughTheVarianceOnly) {
   for (std::size_t i = 0; i < more.size(); ++i) more.data()[i] += 64;
   auto noise = camera.noise();
   for (double& dark : noise.dark_mean_e) dark += 64;
-  noise.variance_e2 -= 64;
+  for (double& variance : noise.variance_e2) variance -= 64;
   const auto one = denoised(raw, camera.phase, camera.noise(), {});
   EXPECT_LT(largest_difference(one, denoised(more, camera.phase, noise, {})), 1e-3);  // [e-]: float, values up to 300
-  noise.variance_e2 += 64;
+  for (double& variance : noise.variance_e2) variance += 64;
   EXPECT_GT(largest_difference(one, denoised(more, camera.phase, noise, {})), 0.1);
 }
 

@@ -17,7 +17,10 @@ struct Camera {
   double read_noise_e = 1.5;
   std::array<double, 3> white_gain{1, 1, 1};
 
-  denoise::RawNoise noise() const { return {.dark_mean_e = dark_e, .variance_e2 = read_noise_e * read_noise_e}; }
+  denoise::RawNoise noise() const {
+    const double read_e2 = read_noise_e * read_noise_e;
+    return {.dark_mean_e = dark_e, .variance_e2 = {read_e2, read_e2, read_e2}};
+  }
 };
 
 /// Mean signal [e-] of R, G, B at pixel (x, y).

@@ -20,7 +20,7 @@ struct Frame {
   const DenoiseOptions& options;
   PerSite<int> site;
   int columns, rows, levels;
-  std::array<double, 4> dark_e, gain;
+  std::array<double, 4> dark_e, gain, variance_e2;
 
   Frame(const RawElectronsView& r, const RawNoise& n, const DenoiseOptions& o)
       : raw(r), noise(n), options(o), site(sites_of(r.phase)) {
@@ -30,6 +30,7 @@ struct Frame {
     for (int k = 0; k < 4; ++k) dark_e[k] = noise.dark_mean_e[site[k]];
     dark_e[1] = dark_e[2] = (dark_e[1] + dark_e[2]) / 2;
     gain = {o.white_gain[0], o.white_gain[1], o.white_gain[1], o.white_gain[2]};
+    variance_e2 = {noise.variance_e2[0], noise.variance_e2[1], noise.variance_e2[1], noise.variance_e2[2]};
   }
 
   double y(int k, int cell_x, int cell_y) const {
@@ -46,7 +47,7 @@ struct Frame {
                                 : y(k, cell_x + i, cell_y + j);
       }
     }
-    return gain[k] * gain[k] * (std::max(sum / 81, 0.3 * dark_e[k] + 0.02) + noise.variance_e2);
+    return gain[k] * gain[k] * (std::max(sum / 81, 0.3 * dark_e[k] + 0.02) + variance_e2[k]);
   }
 
   /// Chroma start level at each tile.
@@ -54,6 +55,7 @@ struct Frame {
     Image out(tiles_of(columns), tiles_of(rows));
     Image sum = out, count = out;
     const double dark = (dark_e[0] + dark_e[1] + dark_e[2] + dark_e[3]) / 4;
+    const double steady = (variance_e2[0] + variance_e2[1] + variance_e2[2] + variance_e2[3]) / 4;
     for (int cy = 0; cy < rows; ++cy) {
       for (int cx = 0; cx < columns; ++cx) {
         const int tx = tile_of(cx, out.width), ty = tile_of(cy, out.height);
@@ -63,7 +65,7 @@ struct Frame {
     }
     for (std::size_t i = 0; i < out.v.size(); ++i) {
       const double s = sum.v[i] / count.v[i];
-      const double q = s > 0 ? s / std::sqrt(s + dark + noise.variance_e2) : 0;
+      const double q = s > 0 ? s / std::sqrt(s + dark + steady) : 0;
       out.v[i] = options.chroma_start ? *options.chroma_start : q >= 3 ? 0 : q >= 0.7 ? 1 : 2;
     }
     for (double& start : out.v) start = std::min<double>(start, levels - 1);
