@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "denoise/denoiser.h"
 #include "isp/cli/option_values.h"
 #include "isp/model/correlated_colour_temperature.h"
 #include "isp/render/output_space.h"
@@ -143,6 +144,26 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
       ->needs(frames);
 }
 
+void add_denoise(CLI::App& app, DevelopArgs& args) {
+  isp::DenoiseChoice& choice = args.options.denoise;
+  using Mode = isp::DenoiseChoice::Mode;
+  choice.mode = Mode::automatic;
+  Names<isp::DenoiseChoice> names{{"auto", {.mode = Mode::automatic}}, {"off", {.mode = Mode::off}}};
+  for (const denoise::Level level : denoise::all_levels) {
+    names.emplace(denoise::name_of(level), isp::DenoiseChoice{Mode::level, level});
+  }
+  add_choice<isp::DenoiseChoice>(
+      app, "--denoise", names,
+      [&choice](const isp::DenoiseChoice& named) {
+        choice.mode = named.mode;
+        choice.level = named.level;
+      },
+      "noise reduction, by how much work it is; auto (default) chooses by the signal to noise ratio");
+  add_choice<bool>(
+      app, "--line-noise", {{"auto", true}, {"off", false}}, [&choice](bool lines) { choice.line_noise = lines; },
+      "noise that whole rows or columns share: take it off where it stands out (default) or leave it");
+}
+
 void add_output(CLI::App& app, DevelopArgs& args) {
   app.add_option("-o,--output", args.output,
                  "picture to write (.png .jpg .tif .exr .pfm), or a folder for several (made if it ends with /)")
@@ -174,6 +195,12 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   app.add_option("RAW", args.inputs, "raw files")->required();
   add_output(app, args);
   add_rendering(app, args);
+  add_denoise(app, args);
+  app.add_flag(
+      "--maps", args.options.denoise.maps,
+      "also write what is left of the noise [e-^2] and how far colour can be believed (0 to 1), for each 2x2 cell: "
+      "OUT.noise.pfm and OUT.confidence.pfm");
+  app.add_flag("--explain", args.explain, "what was decided for each file, and why");
   add_darks(app, args.dark);
   Parsed<DevelopArgs> parsed = parse(app, words, args);
   if (!args.profile.empty() && !args.black_profile.empty()) {

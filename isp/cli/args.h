@@ -36,6 +36,7 @@ struct DevelopArgs {
   bool force = false;
   bool json = false;
   bool timings = false;
+  bool explain = false;
   bool quiet = false;
   DarkArgs dark;
 };

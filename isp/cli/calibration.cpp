@@ -16,7 +16,6 @@
 #include "isp/cli/profile_file.h"
 #include "isp/cli/report.h"
 #include "isp/cli/version.h"
-#include "isp/codec/pfm.h"
 #include "isp/output/atomic_file.h"
 
 namespace lowlux::cli {
@@ -31,13 +30,6 @@ Error with_file(Error error, const std::string& file) {
 std::string readable(const std::string& name) {
   using Json = nlohmann::ordered_json;
   return Json::parse(Json(name).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
-}
-
-Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite) {
-  auto file = isp::AtomicFile::create(map.path, overwrite);
-  if (!file) return tl::make_unexpected(file.error());
-  if (auto written = isp::encode_pfm(map.value.view(), file->file()); !written) return written;
-  return file->commit();
 }
 
 }  // namespace
@@ -95,7 +87,7 @@ int finish(const CalibrateArgs& args, const Calibration& found) {
   }
   for (const PixelMap& map : found.maps) {
     const auto written = write_map(map, overwrite);
-    if (!written) return calibration_failed(args, with_file(written.error(), map.path));
+    if (!written) return calibration_failed(args, written.error());
   }
   if (!args.report.empty()) {
     const auto written = isp::write_text(args.report, isp::html_of(found.report), overwrite);

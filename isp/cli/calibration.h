@@ -7,18 +7,12 @@
 #include "calib/gain_profile.h"
 #include "isp/base/camera_profile.h"
 #include "isp/base/frame.h"
-#include "isp/base/plane.h"
 #include "isp/base/result.h"
 #include "isp/cli/calibrate_args.h"
+#include "isp/cli/pixel_map.h"
 #include "isp/output/report.h"
 
 namespace lowlux::cli {
-
-/// A figure of each pixel, and its file.
-struct PixelMap {
-  std::string path;
-  Plane<float> value;
-};
 
 /// What a calibration found, and how it is shown.
 struct Calibration {

@@ -23,6 +23,8 @@ struct DevelopOutcome {
 
 /// One JSON object.
 std::string develop_json(const DevelopOutcome& outcome);
+/// What was decided for a frame, and why, as text.
+std::string explain_text(const isp::DevelopPlan& plan);
 /// Stage times as text, one line for each and their sum.
 std::string times_text(const std::vector<isp::StageTime>& times);
 

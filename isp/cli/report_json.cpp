@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/cli/report.h"
+#include "isp/cli/source_names.h"
 #include "isp/model/camera_colour.h"
 #include "isp/model/scene_luminance.h"
 #include "isp/raw/masked_black.h"
@@ -19,22 +20,6 @@ Json rect_json(const Rect& r) { return {{"x", r.x}, {"y", r.y}, {"width", r.widt
 template <class T>
 Json optional_json(const std::optional<T>& value) {
   return value ? Json(*value) : Json(nullptr);
-}
-
-const char* name_of(BlackPoint::Source source) {
-  switch (source) {
-    case BlackPoint::Source::masked_pixels:
-      return "masked-pixels";
-    case BlackPoint::Source::tag:
-      return "tag";
-    case BlackPoint::Source::given:
-      return "given";
-    case BlackPoint::Source::profile:
-      return "profile";
-    case BlackPoint::Source::dark_frame:
-      return "dark-frame";
-  }
-  return "";
 }
 
 Json black_json(const BlackPoint& black) {
@@ -73,6 +58,24 @@ Json white_json(const isp::DevelopPlan& plan) {
     json["duv"] = plan.white->duv;
     json["xy"] = {plan.white->xy.x, plan.white->xy.y};
   }
+  return json;
+}
+
+Json lines_json(const denoise::LineOffsets& lines) {
+  return {{"lines", lines.lines == denoise::Lines::rows ? "rows" : "columns"},
+          {"std_e", lines.line_std_e},
+          {"residual_std_e", lines.residual_std_e}};
+}
+
+Json noise_json(const isp::NoiseReduction& noise) {
+  Json json{{"level", noise.level ? Json(denoise::name_of(*noise.level)) : Json("off")}, {"reason", noise.reason}};
+  if (!noise.snr) return json;
+  json["snr"] = *noise.snr;
+  json["noise_source"] = name_of(noise.source);
+  json["variance_e2"] = noise.noise.variance_e2;
+  json["dark_mean_e"] = noise.noise.dark_mean_e;
+  json["lines"] = Json::array();
+  for (const denoise::LineOffsets& lines : noise.lines) json["lines"].push_back(lines_json(lines));
   return json;
 }
 
@@ -120,6 +123,7 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"white_balance", white_json(plan)},
             {"exposure", {{"ev", plan.exposure_ev}, {"rule", plan.exposure_rule}}},
             {"defects_repaired", plan.defects.size()},
+            {"denoise", noise_json(plan.noise_reduction)},
             {"warnings", plan.warnings}};
   for (const isp::StageTime& time : outcome.times) json["timings_s"][std::string(time.stage)] = time.seconds;
   return dumped(json);

@@ -14,6 +14,8 @@
 #include "isp/cli/args.h"
 #include "isp/cli/dark_files.h"
 #include "isp/cli/exit_code.h"
+#include "isp/cli/noise_maps.h"
+#include "isp/cli/noise_source.h"
 #include "isp/cli/outputs.h"
 #include "isp/cli/profile_file.h"
 #include "isp/cli/profile_option.h"
@@ -88,6 +90,11 @@ DevelopOutcome develop_file(const Task& task, const Job& job, Executor& executor
   FileProgress done(progress, job.input);
   isp::StageClock clock(out.times);
   if ((out.error = in_the_way(job.output, task.args.force))) return out;
+  if (task.options.denoise.maps) {
+    for (const std::string& map : noise_map_names(job.output)) {
+      if ((out.error = in_the_way(map, task.args.force))) return out;
+    }
+  }
   Result<RawFrame> frame = capture::read_raw(job.input);
   clock.lap("read and decode");
   done.reach(0.3);
@@ -101,6 +108,11 @@ DevelopOutcome develop_file(const Task& task, const Job& job, Executor& executor
     return out;
   }
   if (task.darks) clock.lap("dark frame's making");
+  if (const Result<void> found = find_noise(*options, *frame, executor); !found) {
+    out.error = with_place(found.error(), job.input);
+    return out;
+  }
+  if (frame->noise && frame->noise->source == NoiseProfile::Source::picture) clock.lap("noise of the picture");
   Result<isp::Developed> developed = isp::develop(*frame, *options, executor);
   if (!developed) {
     out.error = with_place(developed.error(), job.input);
@@ -111,9 +123,12 @@ DevelopOutcome develop_file(const Task& task, const Job& job, Executor& executor
   isp::StageClock finish(out.times);
   const Picture upright = isp::oriented(std::move(developed->picture), frame->raw.info.orientation, executor);
   finish.lap("orientation");
-  const Result<void> written =
+  Result<void> written =
       isp::write_picture(upright, task.options.space, frame->raw.info, job.output, task.write, executor);
   finish.lap("encode and write");
+  for (const PixelMap& map : noise_map_files(std::move(developed->noise_maps), frame->raw, job.output, executor)) {
+    if (written) written = write_map(map, task.write.overwrite);
+  }
   if (!written) {
     out.error = with_place(written.error(), job.output);
     return out;
@@ -133,6 +148,7 @@ void print_outcome(const Task& task, const DevelopOutcome& outcome) {
       fmt::print(stderr, "{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome.input, warning)));
     }
   }
+  if (task.args.explain && !task.args.json) fmt::print("{}\n{}", outcome.input, explain_text(*outcome.plan));
   if (task.args.timings && !task.args.json) fmt::print("{}\n{}", outcome.input, times_text(outcome.times));
 }
 

@@ -10,10 +10,12 @@ namespace lowlux::isp {
 Result<Developed> develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
   Result<DevelopPlan> plan = plan_develop(frame, options, executor);
   if (!plan) return tl::make_unexpected(std::move(plan.error()));
-  Developed out{Picture{}, std::move(*plan)};
+  Developed out{Picture{}, std::move(*plan), {}};
   StageClock clock(out.plan.times);
   out.picture = make_picture(out.plan);
-  Pipeline(executor).render(frame, out.plan, out.picture);
+  Pipeline pipeline(executor);
+  pipeline.render(frame, out.plan, out.picture);
+  out.noise_maps = pipeline.take_noise_maps();
   clock.lap("render");
   return out;
 }

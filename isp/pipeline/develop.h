@@ -12,6 +12,7 @@ namespace lowlux::isp {
 struct Developed {
   Picture picture;
   DevelopPlan plan;
+  NoiseMaps noise_maps;  // of the active area; empty unless its noise was reduced and maps were asked for
 };
 
 /// One frame from raw to picture: plan_develop, then Pipeline::render.

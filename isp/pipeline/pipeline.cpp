@@ -4,9 +4,9 @@
 #include <type_traits>
 #include <utility>
 
+#include "isp/pipeline/electron_mosaic.h"
 #include "isp/raw/bin_plane.h"
 #include "isp/raw/corrections.h"
-#include "isp/raw/subtract_dark_frame.h"
 #include "isp/raw/to_linear.h"
 
 namespace lowlux::isp {
@@ -49,29 +49,32 @@ DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
           {of_crop(plan.black.pedestal_dn, crop), of_crop(site_gain(raw, plan, range), crop)}};
 }
 
-// Black and dark off: a dark frame holds both.
-void take_black_off(const RawDn& raw, const DevelopPlan& plan, PlaneView<float> out, Executor& executor) {
-  if (plan.options.dark_frame) {
-    to_fraction(raw, *plan.options.dark_frame, plan.black, out, executor);
-  } else {
-    to_fraction(raw, plan.black, out, executor);
-  }
-}
-
 }  // namespace
 
-// Bayer frames that have to be repaired or multiplied first: in electrons where the gain is known.
+// Dark charge off, and noise if so decided.
+SignalElectrons Pipeline::signal_electrons(const RawFrame& frame, const DevelopPlan& plan) {
+  if (!plan.noise_reduction.level) {
+    return subtract_dark(raw_electrons(frame, plan, std::move(mosaic_), executor_), plan.black, executor_);
+  }
+  RawElectrons raw = raw_electrons(frame, plan, std::move(noisy_), executor_);
+  SignalElectrons out = noise_reducer_.run(raw, plan.noise_reduction, std::move(mosaic_),
+                                           plan.options.denoise.maps ? &noise_maps_ : nullptr);
+  noisy_ = std::move(raw.value);
+  return out;
+}
+
+// Bayer frames that have to be repaired, multiplied or denoised first: in electrons where the gain is known.
 PerSite<float> Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& plan) {
   const RawDn& raw = frame.raw;
-  fit(mosaic_, raw.active.width, raw.active.height);
-  take_black_off(raw, plan, mosaic_.view(), executor_);
   PerSite<double> units_at_white{1, 1, 1, 1};
   if (plan.electrons_at_white) {
     units_at_white = *plan.electrons_at_white;
-    RawElectrons electrons = to_electrons(RawFraction{std::move(mosaic_), raw.phase}, units_at_white, executor_);
-    mosaic_ = subtract_dark(std::move(electrons), plan.black, executor_).value;
+    mosaic_ = signal_electrons(frame, plan).value;
+  } else {
+    fit(mosaic_, raw.active.width, raw.active.height);
+    take_black_off(raw, plan, mosaic_.view(), executor_);
+    repair(mosaic_.view(), plan.defects, 2);
   }
-  repair(mosaic_.view(), plan.defects, 2);
   apply_gains(frame.corrections, mosaic_.view(), executor_);
   return of_crop(site_gain(raw, plan, units_at_white), raw.default_crop);
 }
@@ -129,6 +132,7 @@ void Pipeline::reserve(const RawFrame& frame, const DevelopPlan& plan) {
 }
 
 void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
+  if (!plan.noise_reduction.level || !plan.options.denoise.maps) noise_maps_ = {};
   reserve(frame, plan);
   const RgbInput in =
       frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);

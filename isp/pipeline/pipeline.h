@@ -2,10 +2,12 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
 #include "isp/base/image.h"
+#include "isp/pipeline/noise_reducer.h"
 #include "isp/pipeline/plan.h"
 
 namespace lowlux::isp {
@@ -14,21 +16,28 @@ namespace lowlux::isp {
 /// allocates them, later ones of that size allocate nothing. One frame at a time.
 class Pipeline {
  public:
-  explicit Pipeline(Executor& executor) : executor_(executor) {}
+  explicit Pipeline(Executor& executor) : executor_(executor), noise_reducer_(executor) {}
 
   /// `out` holds a picture of plan.width x plan.height of the planned sample type: see make_picture().
   void render(const RawFrame& frame, const DevelopPlan& plan, Picture& out);
+
+  /// Of the active area of the frame rendered last; empty unless its noise was reduced and maps were asked for.
+  NoiseMaps take_noise_maps() { return std::move(noise_maps_); }
 
  private:
   void reserve(const RawFrame& frame, const DevelopPlan& plan);
   RgbInput prepare_bayer(const RawFrame& frame, const DevelopPlan& plan);
   RgbInput prepare_planes(const RawFrame& frame, const DevelopPlan& plan);
+  SignalElectrons signal_electrons(const RawFrame& frame, const DevelopPlan& plan);
   PerSite<float> float_mosaic(const RawFrame& frame, const DevelopPlan& plan);
 
   Executor& executor_;
+  NoiseReducer noise_reducer_;
   std::unique_ptr<RawToRgb> kernel_;
   int kernel_width_ = 0;
-  Plane<float> mosaic_;                 // active area, black and dark off
+  Plane<float> mosaic_;  // active area, black and dark off
+  Plane<float> noisy_;   // before noise was reduced
+  NoiseMaps noise_maps_;
   std::array<Plane<float>, 3> planes_;  // camera RGB of frames that need no demosaicing
   std::array<Plane<float>, 3> half_planes_;
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "isp/pipeline/plan_noise.h"
 #include "isp/pipeline/stage_clock.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/subtract_dark_frame.h"
@@ -153,10 +154,10 @@ void set_white(DevelopPlan& plan, const WhiteBalance& balance) {
   for (int c = 0; c < 3; ++c) plan.white_gain[c] = static_cast<float>(1 / plan.neutral[c]);
 }
 
-// Nothing has to be repaired, multiplied, or taken off pixel by pixel.
+// Nothing has to be repaired, multiplied, denoised, or taken off pixel by pixel.
 bool goes_from_codes(const RawFrame& frame, const DevelopPlan& plan) {
-  return frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.black.pattern &&
-         !plan.options.dark_frame && plan.black.dark_mean_e == PerSite<double>{} &&
+  return frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.noise_reduction.level &&
+         !plan.black.pattern && !plan.options.dark_frame && plan.black.dark_mean_e == PerSite<double>{} &&
          frame.corrections.radial_gains.empty() &&
          std::none_of(frame.corrections.gain_maps.begin(), frame.corrections.gain_maps.end(), has_effect);
 }
@@ -221,9 +222,14 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   const Vector3 luminance = luminance_weights(options.space).value_or(Vector3{0, 1, 0});
   decide_exposure(plan, thumbnail, luminance_of_balanced(luminance, *balanced));
   set_transform(plan, *balanced, luminance);
+  clock.lap("white and exposure");
+
+  Result<NoiseReduction> noise = plan_noise(frame, thumbnail, plan, executor);
+  if (!noise) return tl::make_unexpected(std::move(noise.error()));
+  plan.noise_reduction = *std::move(noise);
   plan.from_codes = goes_from_codes(frame, plan);
   if (plan.from_codes || frame.raw.layout != SensorLayout::bayer) plan.electrons_at_white.reset();
-  clock.lap("white and exposure");
+  clock.lap("noise model");
   return plan;
 }
 

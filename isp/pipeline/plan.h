@@ -12,6 +12,7 @@
 #include "isp/base/result.h"
 #include "isp/base/tone_table.h"
 #include "isp/model/camera_colour.h"
+#include "isp/pipeline/noise_reduction.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/raw_to_rgb.h"
 #include "isp/raw/repair.h"
@@ -37,6 +38,7 @@ struct DevelopOptions {
   BlackRequest black;
   bool find_defects = true;                     // hot and dead pixels beyond those the source names
   std::shared_ptr<const DarkFrame> dark_frame;  // set: taken off pixel by pixel in place of `black`
+  DenoiseChoice denoise;
 };
 
 /// Time one step took.
@@ -56,13 +58,14 @@ struct DevelopPlan {
   std::string_view white_balance_rule;
   double exposure_ev = 0;
   std::string_view exposure_rule;
+  NoiseReduction noise_reduction;
   std::vector<std::string> warnings;
 
   // for the kernels
   DevelopOptions options;
   int width = 0;  // of the picture, before orientation
   int height = 0;
-  bool from_codes = false;  // straight from 16-bit codes: nothing has to be repaired or multiplied on the way
+  bool from_codes = false;  // straight from 16-bit codes: nothing has to be repaired, multiplied or denoised on the way
   RgbTransform transform;
   std::array<float, 3> white_gain{1, 1, 1};
   ToneTable tone;
@@ -77,7 +80,7 @@ Result<void> check_options(const DevelopOptions& options);
 /// Measures black, noise, exposure and white of a frame, and decides how to develop it. With a dark frame, all is
 /// measured on what is left when it is off. Errors: no black point (insufficient), those of black_of, no colour
 /// calibration for a space other than `camera` (insufficient), white not above black, matrices that cannot be
-/// (malformed), options that do not fit together or the frame (invalid_argument).
+/// (malformed), options that do not fit together or the frame (invalid_argument), those of plan_noise.
 Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
 
 }  // namespace lowlux::isp

@@ -1,0 +1,42 @@
+#include <cmath>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "isp/cli/lines.h"
+#include "isp/cli/report.h"
+#include "isp/cli/source_names.h"
+
+namespace lowlux::cli {
+namespace {
+
+void add_noise(Lines& out, const isp::NoiseReduction& noise) {
+  if (noise.snr) {
+    const auto& variance = noise.noise.variance_e2;
+    out.add("noise", fmt::format("from {}; without light {:.3g} {:.3g} {:.3g} e- (R, G, B)", name_of(noise.source),
+                                 std::sqrt(variance[0]), std::sqrt(variance[1]), std::sqrt(variance[2])));
+  }
+  out.add("denoise", fmt::format("{}: {}", noise.level ? denoise::name_of(*noise.level) : "off", noise.reason));
+  for (const denoise::LineOffsets& lines : noise.lines) {
+    out.add("", fmt::format("{} noise {:.3g} e- taken off, {:.3g} e- left",
+                            lines.lines == denoise::Lines::rows ? "row" : "column", lines.line_std_e,
+                            lines.residual_std_e));
+  }
+}
+
+}  // namespace
+
+std::string explain_text(const isp::DevelopPlan& plan) {
+  Lines out;
+  out.add("black [DN]",
+          fmt::format("{:.2f} from {}{}", fmt::join(plan.black.pedestal_dn, " "), name_of(plan.black.source),
+                      plan.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", dark charge in it" : ""));
+  out.add("defects", fmt::format("{} pixels repaired", plan.defects.size()));
+  add_noise(out, plan.noise_reduction);
+  out.add("white", plan.white ? fmt::format("{}, {:.0f} K", plan.white_balance_rule, plan.white->cct_k)
+                              : std::string(plan.white_balance_rule));
+  out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.exposure_ev, plan.exposure_rule));
+  return out.text();
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+#include "isp/pipeline/plan.h"
+
+namespace lowlux::cli {
+
+/// Gives a Bayer frame whose noise is to be reduced, and whose noise neither a profile nor its file states, the noise
+/// measured on the picture itself, with a warning that says so. Where it cannot be measured the warning says why, and
+/// the frame stays without: for DenoiseChoice::automatic. Errors: those of the black point, and for a level that was
+/// asked for those of calib::fit_picture_noise.
+Result<void> find_noise(const isp::DevelopOptions& options, RawFrame& frame, Executor& executor);
+
+}  // namespace lowlux::cli

@@ -1,0 +1,159 @@
+#include "isp/pipeline/plan_noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/pipeline/electron_mosaic.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double saturated = 0.99;  // of white: a little below, because pixels do not all saturate at one code
+
+int colour_of(const RawDn& raw, int site) { return static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)); }
+
+/// Why the noise of a frame cannot be reduced at all.
+std::optional<Error> obstacle(const RawFrame& frame, const DevelopPlan& plan) {
+  if (frame.raw.layout != SensorLayout::bayer) {
+    return Error{ErrorCode::unsupported, "noise is reduced on Bayer mosaics, and this is none: use --denoise off"};
+  }
+  if (frame.raw.active.width < 2 || frame.raw.active.height < 2) {
+    return Error{ErrorCode::invalid_argument, "the picture is too small to tell noise from detail: use --denoise off"};
+  }
+  if (!plan.electrons_at_white) {
+    return Error{ErrorCode::insufficient,
+                 "the noise is unknown: the file has no usable NoiseProfile; give a profile (--profile, see calibrate "
+                 "and calib/profiles), or use --denoise off"};
+  }
+  return std::nullopt;
+}
+
+/// Of a raw value without light, as the noise model has it; at least that of rounding to codes.
+std::array<double, 3> black_variance_e2(const RawFrame& frame, const DevelopPlan& plan) {
+  std::array<double, 3> out{};
+  for (int site = 0; site < 4; ++site) {
+    const int colour = colour_of(frame.raw, site);
+    const double electrons = (*plan.electrons_at_white)[site];
+    const double e_per_dn = electrons / (white_at(frame.raw, site) - plan.black.pedestal_dn[site]);
+    double variance = std::max(frame.noise->offset[colour] * electrons * electrons, e_per_dn * e_per_dn / 12);
+    if (plan.options.dark_frame) variance += plan.options.dark_frame->added_variance_dn2[site] * e_per_dn * e_per_dn;
+    out[colour] += variance * (colour == 1 ? 0.5 : 1);
+  }
+  return out;
+}
+
+denoise::RawNoise noise_of(const RawFrame& frame, const DevelopPlan& plan) {
+  denoise::RawNoise out;
+  out.dark_mean_e = plan.black.dark_mean_e;
+  out.variance_e2 = black_variance_e2(frame, plan);
+  const auto& electrons = *plan.electrons_at_white;
+  out.saturation_e = saturated * *std::min_element(electrons.begin(), electrons.end());
+  return out;
+}
+
+/// Gains that make a neutral equal in R, G and B [e-], G's 1.
+std::array<double, 3> balance_of(const RawFrame& frame, const DevelopPlan& plan) {
+  std::array<double, 3> gain{plan.white_gain[0], plan.white_gain[1], plan.white_gain[2]};
+  if (plan.options.space == OutputSpace::camera && frame.colour.as_shot_neutral) {
+    for (int c = 0; c < 3; ++c) gain[c] = 1 / (*frame.colour.as_shot_neutral)[c];
+  }
+  for (int site = 0; site < 4; ++site) {
+    const int colour = colour_of(frame.raw, site);
+    gain[colour] /= std::pow((*plan.electrons_at_white)[site], colour == 1 ? 0.5 : 1.0);
+  }
+  const double green = gain[1];
+  for (double& g : gain) g = std::clamp(g / green, 1e-3, 1e3);
+  return gain;
+}
+
+/// Signal to noise ratio of a mean pixel of the block in the middle of all, dark blocks first.
+double middle_snr(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
+                  const Thumbnail& thumbnail) {
+  constexpr std::array share{0.25, 0.5, 0.25};
+  std::array<double, 3> electrons{};
+  for (int site = 0; site < 4; ++site) electrons[colour_of(frame.raw, site)] = (*plan.electrons_at_white)[site];
+  double dark = 0, variance = 0;
+  for (const double d : noise.dark_mean_e) dark += d / 4;
+  for (int c = 0; c < 3; ++c) variance += share[c] * noise.variance_e2[c];
+  std::vector<double> snr(thumbnail.mean.plane[0].size());
+  for (std::size_t i = 0; i < snr.size(); ++i) {
+    double charge = 0;
+    for (int c = 0; c < 3; ++c) charge += share[c] * electrons[c] * thumbnail.mean.plane[c].data()[i];
+    snr[i] = std::max(charge - dark, 0.0) / std::sqrt(std::max(charge, 0.0) + variance);
+  }
+  const auto middle = snr.begin() + static_cast<std::ptrdiff_t>(snr.size() / 2);
+  std::nth_element(snr.begin(), middle, snr.end());
+  return *middle;
+}
+
+/// Lines stand out where their own noise is more than the error of its measurement, and seen beside a pixel's: its sum
+/// over a line is what the eye follows. More than a pixel's noise is no readout, but a blind or a fence.
+void add_lines(const Result<denoise::LineOffsets>& found, double pixel_std_e,
+               std::vector<denoise::LineOffsets>& lines) {
+  constexpr double seen = 0.03;
+  if (!found || found->gain < 0.5) return;
+  if (found->line_std_e > seen * pixel_std_e && found->line_std_e < pixel_std_e) lines.push_back(*found);
+}
+
+std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, Plane<float>& charge_e) {
+  const auto& v = plan.noise.variance_e2;
+  const double dark = plan.noise.dark_mean_e[0];
+  const double pixel_std_e = std::sqrt(dark + (v[0] + 2 * v[1] + v[2]) / 4);
+  std::vector<denoise::LineOffsets> lines;
+  for (const auto kind : {denoise::Lines::rows, denoise::Lines::columns}) {
+    add_lines(denoise::line_offsets_of_frame(charge_e.view(), kind), pixel_std_e, lines);
+  }
+  return lines;
+}
+
+NoiseReduction left_alone(std::string reason) {
+  NoiseReduction out;
+  out.reason = std::move(reason);
+  return out;
+}
+
+void choose_level(const DenoiseChoice& choice, NoiseReduction& out) {
+  if (choice.mode == DenoiseChoice::Mode::level) {
+    out.level = choice.level;
+    out.reason = "given";
+    return;
+  }
+  out.level = level_for(*out.snr);
+  out.reason = fmt::format("signal to noise ratio {:.3g} of a pixel in the middle block", *out.snr);
+}
+
+}  // namespace
+
+std::optional<denoise::Level> level_for(double snr) {
+  if (snr >= 60) return std::nullopt;
+  if (snr >= 20) return denoise::Level::draft;
+  return snr >= 3 ? denoise::Level::standard : denoise::Level::high;
+}
+
+Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan,
+                                  Executor& executor) {
+  const DenoiseChoice& choice = plan.options.denoise;
+  if (choice.mode == DenoiseChoice::Mode::off) return left_alone("not asked for");
+  if (auto error = obstacle(frame, plan)) {
+    if (choice.mode == DenoiseChoice::Mode::level) return tl::make_unexpected(*std::move(error));
+    return left_alone(std::move(error->message));
+  }
+  NoiseReduction out;
+  out.source = frame.noise->source;
+  out.noise = noise_of(frame, plan);
+  out.snr = middle_snr(frame, plan, out.noise, thumbnail);
+  choose_level(choice, out);
+  if (!out.level) return out;
+  out.options.level = *out.level;
+  out.options.white_gain = balance_of(frame, plan);
+  if (choice.line_noise) {
+    RawElectrons charge = raw_electrons(frame, plan, {}, executor);
+    out.lines = lines_of(out, charge.value);
+  }
+  return out;
+}
+
+}  // namespace lowlux::isp
