@@ -23,6 +23,7 @@ inline constexpr std::uint32_t row_noise = 3;        // x = 0, word 0
 inline constexpr std::uint32_t column_noise = 4;     // y = 0, frame 0, word 0: a fixed pattern
 inline constexpr std::uint32_t scene = 5;            // where the scene itself is drawn: stars
 inline constexpr std::uint32_t risk_probe = 8;       // what a denoiser is disturbed by, to see how it answers
+inline constexpr std::uint32_t code_dither = 9;      // word 0: rounds electrons to codes without bias
 inline constexpr std::uint32_t wavelength_bin = 16;  // + i, for photons sampled by wavelength
 }  // namespace draw_purpose
 

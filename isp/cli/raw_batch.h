@@ -1,0 +1,72 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isp/base/camera_profile.h"
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+#include "isp/cli/args.h"
+#include "isp/cli/dark_files.h"
+#include "isp/cli/outputs.h"
+#include "isp/cli/pixel_map.h"
+#include "isp/cli/progress.h"
+#include "isp/cli/report.h"
+#include "isp/output/atomic_file.h"
+#include "isp/pipeline/stage_clock.h"
+
+/// Raw files one after the other, several at a time, each to a file of its own: `develop` and `denoise`.
+namespace lowlux::cli {
+
+/// What all files share.
+struct RawBatch {
+  const DevelopArgs& args;
+  isp::DevelopOptions options;
+  std::vector<Job> jobs;
+  std::optional<CameraProfile> profile;
+  std::optional<DarkSource> darks;
+  isp::Overwrite overwrite = isp::Overwrite::no;
+};
+
+/// Reads profile and darks and makes the output folder. Errors name their file.
+Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& options, std::vector<Job> jobs,
+                            const std::vector<std::string>& darks);
+
+/// A raw file ready to be worked on, with what holds for it: profile, darks, the noise of its picture.
+struct ReadyFrame {
+  RawFrame frame;
+  isp::DevelopOptions options;
+};
+
+/// Reads one file. Existing outputs, maps' too, are an error before any work is done.
+Result<ReadyFrame> ready_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock);
+
+/// Writes the maps beside the output; nothing if there are none.
+Result<void> write_noise_maps(const RawBatch& batch, const Job& job, isp::NoiseMaps maps, const RawDn& raw,
+                              Executor& executor);
+
+/// One file's part of the progress bar: roughly how much of its time is over, all of it in the end.
+class FileProgress {
+ public:
+  FileProgress(Progress& whole, const std::string& file) : whole_(whole), file_(file) {}
+  ~FileProgress() { reach(1); }
+  FileProgress(const FileProgress&) = delete;
+  FileProgress& operator=(const FileProgress&) = delete;
+  void reach(double share);
+
+ private:
+  Progress& whole_;
+  const std::string& file_;
+  double reached_ = 0;
+};
+
+/// Fills the outcome of one job; an error without a place is the input file's.
+using RawWork = std::function<Result<void>(const Job&, Executor&, FileProgress&, DevelopOutcome&)>;
+
+/// Does the work for every job and prints what became of it. @return the exit code
+int run_batch(const RawBatch& batch, const RawWork& work);
+
+}  // namespace lowlux::cli

@@ -1,0 +1,89 @@
+#include <cstdio>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/cli/args.h"
+#include "isp/cli/exit_code.h"
+#include "isp/cli/outputs.h"
+#include "isp/cli/raw_batch.h"
+#include "isp/cli/source_names.h"
+#include "isp/cli/verbs.h"
+#include "isp/cli/version.h"
+#include "isp/output/dng_writer.h"
+#include "isp/pipeline/clean_raw.h"
+
+namespace lowlux::cli {
+namespace {
+
+std::string description_of(const isp::NoiseReduction& how) {
+  return fmt::format("noise reduced by lowlux, level {}, noise from the {}", denoise::name_of(*how.level),
+                     name_of(how.source));
+}
+
+Result<void> denoise_file(const RawBatch& batch, const Job& job, Executor& executor, FileProgress& progress,
+                          DevelopOutcome& out) {
+  isp::StageClock clock(out.times);
+  Result<ReadyFrame> ready = ready_frame(batch, job, executor, clock);
+  progress.reach(0.2);
+  if (!ready) return tl::make_unexpected(ready.error());
+  Result<isp::CleanRaw> clean = isp::clean_raw(ready->frame, ready->options, executor);
+  if (!clean) return tl::make_unexpected(clean.error());
+  out.times.insert(out.times.end(), clean->plan.times.begin(), clean->plan.times.end());
+  progress.reach(0.8);
+  isp::StageClock finish(out.times);
+  const Result<void> written =
+      isp::write_dng(clean->frame, job.output,
+                     {.overwrite = batch.overwrite,
+                      .software = "lowlux " + version_number(),
+                      .description = description_of(clean->plan.noise_reduction)});
+  finish.lap("write");
+  if (!written) return fail(written.error().code, written.error().message, job.output);
+  out.width = clean->frame.raw.default_crop.width;
+  out.height = clean->frame.raw.default_crop.height;
+  out.plan = std::move(clean->plan);
+  return write_noise_maps(batch, job, std::move(clean->maps), ready->frame.raw, executor);
+}
+
+int usage_error(const Error& error) {
+  const std::string place = error.where.empty() ? "" : error.where + ": ";
+  fmt::print(stderr, "{}\n", one_line("lowlux denoise: " + place + error.message));
+  return exit_usage;
+}
+
+/// Nothing is rendered: what a plan decides of colour and tone is not used.
+isp::DevelopOptions without_rendering(isp::DevelopOptions o) {
+  o.space = OutputSpace::camera;
+  o.samples = SampleType::f32;
+  o.tone = isp::ToneCurve::none;
+  o.exposure_ev = 0;
+  o.denoise.always = true;
+  return o;
+}
+
+}  // namespace
+
+int run_denoise(const std::vector<std::string>& words) {
+  Parsed<DevelopArgs> parsed = parse_denoise(words);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& args = std::get<DevelopArgs>(parsed);
+
+  Result<std::vector<Job>> jobs = plan_outputs(args, "dng");
+  if (!jobs) return usage_error(jobs.error());
+  if (!isp::names_dng(jobs->front().output)) {
+    return usage_error({ErrorCode::invalid_argument, "a clean raw is a DNG: its name ends with .dng", "-o"});
+  }
+  const Result<std::vector<std::string>> darks = dark_files(args);
+  if (!darks) return usage_error(darks.error());
+
+  const Result<RawBatch> batch = make_batch(args, without_rendering(args.options), *std::move(jobs), *darks);
+  if (!batch) {
+    fmt::print(stderr, "{}\n", error_line(batch.error().where, batch.error()));
+    return exit_failed;
+  }
+  return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {
+    return denoise_file(*batch, job, executor, progress, out);
+  });
+}
+
+}  // namespace lowlux::cli
