@@ -118,7 +118,10 @@ rows::PackRow Run::packing(const ThreadMemory& m) const {
   const double saturation_e = std::min(noise.saturation_e, largest_e);
   const double most = *std::max_element(options.white_gain.begin(), options.white_gain.end()) * saturation_e;
   in.saturation_e = static_cast<float>(noise.saturation_e);
-  in.blind_variance = static_cast<float>(1e9 * most * most);  // no coefficient exceeds its threshold, on any level
+  // No coefficient exceeds its threshold, on any level: what unsees is not scaled down with the noise.
+  const auto& scale = options.variance_scale;
+  const auto [least, largest] = std::minmax_element(scale.begin(), scale.end());
+  in.blind_variance = static_cast<float>(scale[0] * std::min(1e9 * most * most / *least, 1e33 / *largest));
   for (int k = 0; k < 3; ++k) {
     in.dark_e[k] = static_cast<float>(dark_e[k]);
     in.gain[k] = static_cast<float>(options.white_gain[k]);
@@ -165,7 +168,7 @@ void Run::front() const {
       for (int k = 0; k < 3; ++k) {
         for (int y = 0; y < 10; ++y) in.raw_e[k][y] = m.window[k][(2 * pair - 4 + y + 16) % 16];
         in.least_e[k] = static_cast<float>(0.3 * dark_e[k] + 0.02);
-        in.gain[k] = static_cast<float>(options.white_gain[k]);
+        in.gain[k] = static_cast<float>(options.white_gain[k] * std::sqrt(options.variance_scale[0]));
         in.variance_e2[k] = static_cast<float>(noise.variance_e2[k]);
       }
       for (int y = 0; y < 2; ++y) in.blind[y] = m.window[3][(2 * pair + y) % 16];
@@ -197,7 +200,7 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
       in.rho = std::isinf(options.rho) ? -1.0f : static_cast<float>(options.rho);
       for (int k = 0; k < 3; ++k) in.per_gain[k] = static_cast<float>(1 / options.white_gain[k]);
       in.red_is_odd = red_column(raw.phase) == 1;
-      rows::unpack_row(in, {{m.row[5], m.row[6]}, m.row[7]});
+      rows::unpack_row(in, {{m.row[5], m.row[6]}, m.row[7], {m.row[8], m.row[9], m.row[10]}});
       for (int i = 0; i < 2; ++i) {
         const int raw_y = 2 * y + (i == 0 ? red_row(raw.phase) : 1 - red_row(raw.phase));
         if (raw_y >= signal_e.height) continue;
@@ -209,6 +212,7 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
       };
       put(maps.residual_variance, m.row[0]);
       put(maps.chroma_confidence, m.row[7]);
+      for (int k = 0; k < 3; ++k) put(maps.site_variance[k], m.row[8 + k]);
     }
   });
 }
@@ -219,6 +223,7 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
   for (const double variance : noise.variance_e2) good = good && within(variance, 0, largest_e);
   for (const double dark : noise.dark_mean_e) good = good && within(dark, 0, largest_e);
   for (const double gain : options.white_gain) good = good && within(gain, 1e-3, 1e3);
+  for (const double scale : options.variance_scale) good = good && within(scale, 0.01, 100);
   return good && within(options.chroma_start.value_or(0), 0, 2);
 }
 
@@ -241,7 +246,7 @@ void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const Den
   assert(run.columns <= state_->memory.columns && run.rows <= state_->memory.rows);
   run.find_sources();
   const ChromaStarts starts = run.starts();
-  const PassFrame frame{state_->memory, starts, run.levels, run.workers};
+  const PassFrame frame{state_->memory, starts, run.levels, run.workers, options.variance_scale};
   run.front();
   build_pyramid(frame);
   run_pass(frame, 0, 4);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string_view>
 
+#include "denoise/layout.h"
 #include "isp/base/cfa.h"
 #include "isp/base/executor.h"
 #include "isp/base/plane.h"
@@ -52,12 +53,21 @@ struct DenoiseOptions {
   /// 64 x 64 cells, blended.
   std::optional<int> chroma_start;
   bool keep_point_sources = true;  // stars pass as they were measured: see point_sources.h
+  /// Variance of the noise over that of RawNoise, on each pyramid level, finest first; 0.01..100. Not 1 where noise is
+  /// not white, as in raws that were denoised or compressed with loss before: see noise_check.h. The search for point
+  /// sources goes by RawNoise alone.
+  std::array<double, most_levels> variance_scale{1, 1, 1, 1, 1};
 };
 
 /// Optional outputs for each 2x2 cell, ceil(height / 2) x ceil(width / 2); views without data are left out.
 struct DenoiseMaps {
   PlaneView<float> residual_variance;  // of white-balanced luma 0.2 R + 0.3 G1 + 0.3 G2 + 0.2 B [e-^2]
   PlaneView<float> chroma_confidence;  // 0..1, the factor above for the mean variance of the two colour differences
+  /// Predicted variance of the noise that is left in R, in the mean of both greens and in B [e-^2], white balance
+  /// undone: with the planes' residual variances r and the factors f of their confidence,
+  ///     (r_L + 0.36 f1^2 r_C1 + f2^2 r_C2 / 2) / gain^2 of R and B,  (r_L + 0.16 f1^2 r_C1) / gain^2 of G.
+  /// What rho takes from colour is not in it, nor is that point sources are left as noisy as they were.
+  std::array<PlaneView<float>, 3> site_variance;
 };
 
 /// Reduces the noise of a Bayer mosaic: joint multi-scale DCT on cells, with hard thresholds and empirical Wiener

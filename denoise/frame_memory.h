@@ -38,7 +38,7 @@ struct ThreadMemory {
   std::array<std::array<float*, 8>, 4> value{};    // sums of blocks, of 8 rows
   std::array<std::array<float*, 4>, 4> weight{};   // of 4 rows of half size
   std::array<std::array<float*, 4>, 4> residual{};
-  std::array<float*, 8> row{};
+  std::array<float*, 11> row{};
   float* blocks = nullptr;
 };
 

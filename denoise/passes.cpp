@@ -164,6 +164,7 @@ struct Recompose {
 void build_pyramid(const PassFrame& frame) {
   for (int l = 0; l + 1 < frame.levels; ++l) {
     const PyramidLevel &fine = frame.memory.level[l], &coarse = frame.memory.level[l + 1];
+    const auto scale = static_cast<float>(0.25 * frame.variance_scale[l + 1] / frame.variance_scale[l]);
     in_bands(frame.workers, coarse.height / 2, [&](int first, int last, int) {
       for (int p = 0; p < 4; ++p) {
         for (int y = 2 * first; y < 2 * last; ++y) {
@@ -172,7 +173,7 @@ void build_pyramid(const PassFrame& frame) {
         }
         for (int y = first; y < last; ++y) {
           const float* const both[2] = {fine.variance.row(p, 2 * y), fine.variance.row(p, 2 * y + 1)};
-          rows::down2_row(both, coarse.width / 2, 0.25f, coarse.variance.row(p, y));
+          rows::down2_row(both, coarse.width / 2, scale, coarse.variance.row(p, y));
         }
       }
     });

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "denoise/bands.h"
 #include "denoise/chroma_start.h"
 #include "denoise/frame_memory.h"
@@ -12,6 +14,7 @@ struct PassFrame {
   const ChromaStarts& starts;
   int levels;
   Workers workers;
+  std::array<double, most_levels> variance_scale{1, 1, 1, 1, 1};  // see DenoiseOptions
 };
 
 /// Coarser planes and variances from those of level 0.

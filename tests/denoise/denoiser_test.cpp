@@ -59,12 +59,18 @@ void compare(const Camera& camera, const denoise::RawNoise& noise, const Plane<f
   Plane<float> signal(raw.width(), raw.height()), residual(columns, rows), confidence(columns, rows);
   InlineExecutor one;
   denoise::Denoiser denoiser(raw.width(), raw.height(), 1);
-  denoiser.run({raw.view(), camera.phase}, noise, options, signal.view(), {residual.view(), confidence.view()}, one);
+  std::array<Plane<float>, 3> site;
+  for (auto& plane : site) plane = Plane<float>(columns, rows);
+  denoiser.run({raw.view(), camera.phase}, noise, options, signal.view(),
+               {residual.view(), confidence.view(), {site[0].view(), site[1].view(), site[2].view()}}, one);
   const auto expected = reference::denoise({raw.view(), camera.phase}, noise, options);
   const double scale = scale_of(raw) * *std::max_element(options.white_gain.begin(), options.white_gain.end());
   expect_near(signal.view(), expected.signal_e.view(), 5e-6 * scale, "signal");
   expect_near(residual.view(), expected.residual_variance.view(), 5e-6 * scale, "residual");
   expect_near(confidence.view(), expected.chroma_confidence.view(), 1e-4, "confidence");
+  for (int k = 0; k < 3; ++k) {
+    expect_near(site[k].view(), expected.site_variance[k].view(), 5e-6 * scale, "variance of " + std::to_string(k));
+  }
 }
 
 void compare(const Camera& camera, const Plane<float>& raw, const DenoiseOptions& options) {
@@ -107,6 +113,44 @@ TEST_P(DenoiserChromaStart, AgreesWithTheReferenceThatLeavesNothingOut) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Starts, DenoiserChromaStart, testing::Values(std::nullopt, 0, 1, 2));
+
+TEST(Denoiser, AgreesWithTheReferenceWhereNoiseIsNotWhite) {
+  const Camera camera{.dark_e = {2, 2, 2, 2}};
+  const auto raw = exposed(camera, waves(20), 300, 200, 13);
+  for (const Level level : denoise::all_levels) {
+    compare(camera, raw,
+            {.level = level,
+             .white_gain = {1.9, 1, 1.4},
+             .keep_point_sources = false,
+             .variance_scale = {0.2, 0.5, 1, 3, 1.5}});
+  }
+}
+
+// Twice the noise on all levels is twice the variance: gain 2 on values and variances is the same as no gain.
+TEST(Denoiser, TakesOneScaleOfAllLevelsForThatOfTheNoise) {
+  const Camera camera{.dark_e = {0, 0, 0, 0}, .read_noise_e = 6};
+  const auto raw = exposed(camera, flat(0, 0, 0), 200, 150, 14);
+  auto twice = camera.noise();
+  for (double& variance : twice.variance_e2) variance = 2 * (0.02 + variance) - 0.02;
+  Plane<float> one(200, 150), other(200, 150);
+  auto negative = raw.clone();  // local means below the floor: variances are 0.02 + read noise^2
+  for (std::size_t i = 0; i < negative.size(); ++i) negative.data()[i] -= 50;
+  InlineExecutor executor;
+  denoise::Denoiser denoiser(200, 150, 1);
+  DenoiseOptions options{.keep_point_sources = false};
+  denoiser.run({negative.view(), camera.phase}, twice, options, one.view(), {}, executor);
+  options.variance_scale.fill(2);
+  denoiser.run({negative.view(), camera.phase}, camera.noise(), options, other.view(), {}, executor);
+  expect_near(
+      one.view(),
+      [&] {
+        Plane<double> out(200, 150);
+        for (std::size_t i = 0; i < out.size(); ++i) out.data()[i] = static_cast<double>(other.data()[i]);
+        return out;
+      }()
+          .view(),
+      1e-3, "one scale for all");  // [e-]: float, values of 100; a coefficient on its threshold would be 2
+}
 
 TEST(Denoiser, AgreesWithTheReferenceWhereSitesAreSaturated) {
   Camera camera{.dark_e = {2, 2, 2, 2}};

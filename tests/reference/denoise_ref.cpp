@@ -1,5 +1,6 @@
 #include "tests/reference/denoise_ref.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -47,7 +48,8 @@ struct Frame {
                                 : y(k, cell_x + i, cell_y + j);
       }
     }
-    return gain[k] * gain[k] * (std::max(sum / 81, 0.3 * dark_e[k] + 0.02) + variance_e2[k]);
+    return options.variance_scale[0] * gain[k] * gain[k] *
+           (std::max(sum / 81, 0.3 * dark_e[k] + 0.02) + variance_e2[k]);
   }
 
   /// Chroma start level at each tile.
@@ -92,6 +94,8 @@ Four decorrelated(const Frame& frame, Four& variance) {
   out.fill(Image(w, h));
   variance = out;
   double largest = 0;
+  const auto& scale = frame.options.variance_scale;
+  const auto [least_scale, largest_scale] = std::minmax_element(scale.begin(), scale.end());
   for (const double g : frame.gain) largest = std::max(largest, g * std::min(frame.noise.saturation_e, 1e9));
   for (int cy = 0; cy < h; ++cy) {
     for (int cx = 0; cx < w; ++cx) {
@@ -106,7 +110,7 @@ Four decorrelated(const Frame& frame, Four& variance) {
       for (int k = 0; k < 4; ++k) {
         if (frame.y(k, cx, cy) < static_cast<float>(frame.noise.saturation_e)) continue;
         x[k] = most;
-        blind = 1e9 * largest * largest;
+        blind = scale[0] * std::min(1e9 * largest * largest / *least_scale, 1e33 / *largest_scale);
       }
       out[0].at(cx, cy) = 0.2 * x[0] + 0.3 * x[1] + 0.3 * x[2] + 0.2 * x[3];
       out[1].at(cx, cy) = 0.5 * (x[0] + x[3] - x[1] - x[2]);
@@ -160,7 +164,9 @@ Four total_residual(const std::vector<Four>& levels, const Image& starts) {
 }
 
 /// Pyramid of the planes, and of their variances.
-void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, int levels) {
+void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, const Frame& frame) {
+  const int levels = frame.levels;
+  const auto& scale = frame.options.variance_scale;
   x.reserve(static_cast<std::size_t>(levels));
   variance.reserve(static_cast<std::size_t>(levels));
   while (static_cast<int>(x.size()) < levels) {
@@ -168,7 +174,7 @@ void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, int levels) 
     for (int p = 0; p < 4; ++p) {
       half[p] = down2(x.back()[p]);
       half_variance[p] = down2(variance.back()[p]);
-      for (double& v : half_variance[p].v) v /= 4;
+      for (double& v : half_variance[p].v) v *= scale[x.size()] / scale[x.size() - 1] / 4;
     }
     x.push_back(std::move(half));
     variance.push_back(std::move(half_variance));
@@ -183,7 +189,7 @@ struct Pictures {
 Pictures both_passes(const Frame& frame, const Image& starts) {
   std::vector<Four> x(1), variance(1);
   x[0] = decorrelated(frame, variance[0]);
-  add_coarser(x, variance, frame.levels);
+  add_coarser(x, variance, frame);
   std::vector<Four> value(frame.levels), residual(frame.levels);
   const auto pass = [&](const std::vector<Four>* pilot, int stride) {
     std::vector<Four> out(frame.levels);
@@ -209,16 +215,23 @@ Pictures both_passes(const Frame& frame, const Image& starts) {
 Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const DenoiseOptions& options) {
   const Frame frame(raw, noise, options);
   const Pictures p = both_passes(frame, frame.starts());
-  Denoised out{Plane<double>(raw.value.width, raw.value.height), Plane<double>(frame.columns, frame.rows),
-               Plane<double>(frame.columns, frame.rows)};
+  Denoised out{Plane<double>(raw.value.width, raw.value.height),
+               Plane<double>(frame.columns, frame.rows),
+               Plane<double>(frame.columns, frame.rows),
+               {}};
+  for (auto& plane : out.site_variance) plane = Plane<double>(frame.columns, frame.rows);
   for (int cy = 0; cy < frame.rows; ++cy) {
     for (int cx = 0; cx < frame.columns; ++cx) {
       const double luma = p.value[0].at(cx, cy), prior = std::max(luma, 0.0) * options.rho;
       const auto factor = [&](double residual) {
         return std::isinf(options.rho) ? 1.0 : prior * prior / (prior * prior + residual);
       };
-      std::array<double, 4> c{};
-      for (int i = 1; i < 4; ++i) c[i] = p.value[i].at(cx, cy) * factor(p.residual[i].at(cx, cy));
+      std::array<double, 4> c{}, left{};
+      for (int i = 1; i < 4; ++i) {
+        const double residual = p.residual[i].at(cx, cy), share = factor(residual);
+        c[i] = p.value[i].at(cx, cy) * share;
+        left[i] = share * share * residual;
+      }
       const double a = 2 * luma + 1.2 * c[1], g = 2 * luma - 0.8 * c[1];  // R + B and G1 + G2
       const std::array<double, 4> x{a / 2 + c[2] / std::numbers::sqrt2, (g + c[3]) / 2, (g - c[3]) / 2,
                                     a / 2 - c[2] / std::numbers::sqrt2};
@@ -226,7 +239,12 @@ Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const Denoi
         const int at_x = 2 * cx + (frame.site[k] & 1), at_y = 2 * cy + (frame.site[k] >> 1);
         if (at_x < raw.value.width && at_y < raw.value.height) out.signal_e.at(at_x, at_y) = x[k] / frame.gain[k];
       }
-      out.residual_variance.at(cx, cy) = p.residual[0].at(cx, cy);
+      const double kept = out.residual_variance.at(cx, cy) = p.residual[0].at(cx, cy);
+      const std::array<double, 3> of_colour{kept + 0.36 * left[1] + 0.5 * left[2], kept + 0.16 * left[1],
+                                            kept + 0.36 * left[1] + 0.5 * left[2]};
+      for (int k = 0; k < 3; ++k) {
+        out.site_variance[k].at(cx, cy) = of_colour[k] / std::pow(frame.options.white_gain[k], 2);
+      }
       out.chroma_confidence.at(cx, cy) = factor((p.residual[1].at(cx, cy) + p.residual[2].at(cx, cy)) / 2);
     }
   }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "denoise/denoiser.h"
 
 namespace lowlux::reference {
@@ -8,6 +10,7 @@ struct Denoised {
   Plane<double> signal_e;
   Plane<double> residual_variance;
   Plane<double> chroma_confidence;
+  std::array<Plane<double>, 3> site_variance;
 };
 
 /// What denoise::Denoiser does, in double and one block at a time, without its treatment of point sources.
