@@ -94,6 +94,12 @@ void add_rendering(CLI::App& app, DevelopArgs& args) {
   add_choice<OutputSpace>(
       app, "--space", space_names(), [&args](OutputSpace space) { args.space = space; },
       "what the numbers mean (default: srgb; linear-srgb for OpenEXR and PFM)");
+  app.add_flag("--half", o.half, "half size: exact 2x2 binning in place of demosaicing");
+}
+
+/// What is known of the camera, and what is repaired by it.
+void add_camera(CLI::App& app, DevelopArgs& args) {
+  isp::DevelopOptions& o = args.options;
   app.add_option_function<std::string>(
          "--black", [&args](const std::string& text) { set_black(text, args); },
          "black point: measured on masked pixels where there are any, else the file's figure (auto, default); one of "
@@ -108,7 +114,6 @@ void add_rendering(CLI::App& app, DevelopArgs& args) {
   add_choice<bool>(
       app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
       "hot and dead pixels: look for them (default), or repair only those the file names");
-  app.add_flag("--half", o.half, "half size: exact 2x2 binning in place of demosaicing");
 }
 
 void add_darks(CLI::App& app, DarkArgs& dark) {
@@ -164,6 +169,20 @@ void add_denoise(CLI::App& app, DevelopArgs& args) {
       "noise that whole rows or columns share: take it off where it stands out (default) or leave it");
 }
 
+/// What every verb that takes raw files one by one has.
+void add_batch(CLI::App& app, DevelopArgs& args) {
+  app.add_option("RAW", args.inputs, "raw files")->required();
+  app.add_flag("--maps", args.options.denoise.maps,
+               "also write what is left of the noise [e-^2] and how far colour can be believed (0 to 1), for each 2x2 "
+               "cell: OUT.noise.pfm and OUT.confidence.pfm");
+  app.add_flag("--force", args.force, "overwrite files that exist");
+  app.add_option("--jobs", args.jobs, "files at a time (default: one for each processor)")->check(CLI::Range(1, 256));
+  app.add_flag("--explain", args.explain, "what was decided for each file, and why");
+  app.add_flag("--json", args.json, "one JSON object for each file on stdout, as an array");
+  app.add_flag("--timings", args.timings, "time of each stage");
+  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+}
+
 void add_output(CLI::App& app, DevelopArgs& args) {
   app.add_option("-o,--output", args.output,
                  "picture to write (.png .jpg .tif .exr .pfm), or a folder for several (made if it ends with /)")
@@ -174,11 +193,6 @@ void add_output(CLI::App& app, DevelopArgs& args) {
   app.add_option("--bits", args.bits, "bits per sample: 8, 16 or 32 (float; for OpenEXR 16 is half float)")
       ->check(CLI::IsMember({8, 16, 32}));
   app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
-  app.add_flag("--force", args.force, "overwrite pictures that exist");
-  app.add_option("--jobs", args.jobs, "files at a time (default: one for each processor)")->check(CLI::Range(1, 256));
-  app.add_flag("--json", args.json, "one JSON object for each file on stdout, as an array");
-  app.add_flag("--timings", args.timings, "time of each stage");
-  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
 }
 
 template <class Args>
@@ -187,24 +201,43 @@ Parsed<Args> parse(CLI::App& app, const std::vector<std::string>& words, const A
   return args;
 }
 
+Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& words, const DevelopArgs& args) {
+  Parsed<DevelopArgs> parsed = parse(app, words, args);
+  if (std::holds_alternative<DevelopArgs>(parsed) && !args.profile.empty() && !args.black_profile.empty()) {
+    return refuse(app, "--black and --profile name a profile each: --profile uses all that is in one");
+  }
+  return parsed;
+}
+
 }  // namespace
 
 Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   CLI::App app("Develops raw files to pictures.", "lowlux develop");
   DevelopArgs args;
-  app.add_option("RAW", args.inputs, "raw files")->required();
   add_output(app, args);
   add_rendering(app, args);
+  add_camera(app, args);
   add_denoise(app, args);
-  app.add_flag(
-      "--maps", args.options.denoise.maps,
-      "also write what is left of the noise [e-^2] and how far colour can be believed (0 to 1), for each 2x2 cell: "
-      "OUT.noise.pfm and OUT.confidence.pfm");
-  app.add_flag("--explain", args.explain, "what was decided for each file, and why");
   add_darks(app, args.dark);
-  Parsed<DevelopArgs> parsed = parse(app, words, args);
-  if (!args.profile.empty() && !args.black_profile.empty()) {
-    return refuse(app, "--black and --profile name a profile each: --profile uses all that is in one");
+  add_batch(app, args);
+  return parse_batch(app, words, args);
+}
+
+Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
+  CLI::App app("Takes noise, dark charge and defects off raw files and writes raw files for any raw developer.",
+               "lowlux denoise");
+  DevelopArgs args;
+  app.add_option("-o,--output", args.output,
+                 "raw file to write (.dng), or a folder for several (made if it ends with /)")
+      ->required()
+      ->type_name("CLEAN.dng");
+  add_camera(app, args);
+  add_denoise(app, args);
+  add_darks(app, args.dark);
+  add_batch(app, args);
+  Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
+  if (args.options.denoise.mode == isp::DenoiseChoice::Mode::off && std::holds_alternative<DevelopArgs>(parsed)) {
+    return refuse(app, "--denoise off leaves nothing to do: name a level, or auto");
   }
   return parsed;
 }

@@ -19,7 +19,8 @@ struct DarkArgs {
   std::string doubling_profile;      // or as a profile's file
 };
 
-/// `develop`: what the command line asks for, checked as far as that is possible without opening a file.
+/// `develop`, and `denoise` where it has the option: what the command line asks for, checked as far as that is possible
+/// without opening a file.
 struct DevelopArgs {
   std::vector<std::string> inputs;
   std::string output;                  // a file, or a folder
@@ -62,6 +63,7 @@ template <class Args>
 using Parsed = std::variant<Args, int>;
 
 Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words);
+Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words);
 Parsed<InfoArgs> parse_info(const std::vector<std::string>& words);
 Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words);
 

@@ -24,6 +24,7 @@ struct Verb {
 
 constexpr std::array verbs{
     Verb{"calibrate", "a camera's black point, noise and colour, measured", run_calibrate},
+    Verb{"denoise", "raw files without noise, for any raw developer", run_denoise},
     Verb{"develop", "raw files to pictures", run_develop},
     Verb{"info", "what a raw file says, and what was measured on it", run_info},
     Verb{"reproduce", "the published experiments, each finding beside ours", run_reproduce},

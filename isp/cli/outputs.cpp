@@ -46,7 +46,7 @@ bool names_folder(const DevelopArgs& args) {
   return args.output.ends_with('/') || fs::is_directory(args.output, ignored);
 }
 
-Result<std::vector<Job>> plan_outputs(const DevelopArgs& args) {
+Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string& extension) {
   const bool folder = names_folder(args);
   if (args.inputs.size() > 1 && !folder) {
     return fail(ErrorCode::invalid_argument,
@@ -57,14 +57,14 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args) {
   for (const std::string& input : args.inputs) {
     std::string output = args.output;
     if (folder) {
-      const std::string extension = args.format.empty() ? "png" : args.format;
-      output = (fs::path(args.output) / fs::path(input).stem()).string() + "." + extension;
+      output = (fs::path(args.output) / fs::path(input).stem()).string() + "." +
+               (args.format.empty() ? extension : args.format);
     }
     if (!taken.insert(output).second) {
       return fail(ErrorCode::invalid_argument, fmt::format("two raw files would become {}", output), "-o");
     }
     if (same_file(input, output)) {
-      return fail(ErrorCode::invalid_argument, fmt::format("{} would be replaced by its own picture", input), "-o");
+      return fail(ErrorCode::invalid_argument, fmt::format("{} would be replaced by what is made of it", input), "-o");
     }
     jobs.push_back({input, output});
   }

@@ -15,10 +15,10 @@ struct Job {
   std::string output;
 };
 
-/// The picture of each input: `output` itself for one, files in it where it is a folder (it exists as one or ends
-/// with /). Errors (command line wrong): several inputs and no folder, an unknown extension, two
-/// inputs for one picture, a picture that would replace its own raw file.
-Result<std::vector<Job>> plan_outputs(const DevelopArgs& args);
+/// The output of each input: `output` itself for one, files in it where it is a folder (it exists as one or ends
+/// with /), with `extension` unless the arguments name a format. Errors (command line wrong): several inputs and no
+/// folder, an unknown extension, two inputs for one picture, a picture that would replace its own raw file.
+Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string& extension);
 
 /// Whether the output is a folder.
 bool names_folder(const DevelopArgs& args);

@@ -32,11 +32,10 @@ Result<void> denoise_file(const RawBatch& batch, const Job& job, Executor& execu
   out.times.insert(out.times.end(), clean->plan.times.begin(), clean->plan.times.end());
   progress.reach(0.8);
   isp::StageClock finish(out.times);
-  const Result<void> written =
-      isp::write_dng(clean->frame, job.output,
-                     {.overwrite = batch.overwrite,
-                      .software = "lowlux " + version_number(),
-                      .description = description_of(clean->plan.noise_reduction)});
+  const Result<void> written = isp::write_dng(clean->frame, job.output,
+                                              {.overwrite = batch.overwrite,
+                                               .software = "lowlux " + version_number(),
+                                               .description = description_of(clean->plan.noise_reduction)});
   finish.lap("write");
   if (!written) return fail(written.error().code, written.error().message, job.output);
   out.width = clean->frame.raw.default_crop.width;
@@ -70,7 +69,7 @@ int run_denoise(const std::vector<std::string>& words) {
 
   Result<std::vector<Job>> jobs = plan_outputs(args, "dng");
   if (!jobs) return usage_error(jobs.error());
-  if (!isp::names_dng(jobs->front().output)) {
+  if (!jobs->front().output.ends_with(".dng")) {
     return usage_error({ErrorCode::invalid_argument, "a clean raw is a DNG: its name ends with .dng", "-o"});
   }
   const Result<std::vector<std::string>> darks = dark_files(args);

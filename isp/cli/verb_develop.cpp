@@ -61,7 +61,7 @@ int run_develop(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<DevelopArgs>(parsed);
 
-  Result<std::vector<Job>> jobs = plan_outputs(args);
+  Result<std::vector<Job>> jobs = plan_outputs(args, "png");
   if (!jobs) return usage_error(jobs.error());
   const Result<isp::FileFormat> format = isp::format_of(jobs->front().output);
   if (!format) return usage_error(format.error());

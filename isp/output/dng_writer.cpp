@@ -75,6 +75,14 @@ bool write_strips(TIFF* tiff, const Plane<std::uint16_t>& dn, int rows_per_strip
   return true;
 }
 
+/// dcraw and its descendants read 512 bytes where a description begins, and call the end of the file an error.
+Result<void> pad(std::FILE* file) {
+  constexpr std::array<char, 512> zeros{};
+  const bool padded = std::fseek(file, 0, SEEK_END) == 0 && std::fwrite(zeros.data(), zeros.size(), 1, file) == 1;
+  if (!padded) return fail(ErrorCode::unwritable, "the file's end could not be written: is the disk full?");
+  return {};
+}
+
 Result<void> encode(const RawFrame& frame, const DngWriteOptions& options, std::FILE* file) {
   FrameInfo info = written_info(frame.raw.info, options.software);
   info.orientation = frame.raw.info.orientation;
@@ -92,7 +100,9 @@ Result<void> encode(const RawFrame& frame, const DngWriteOptions& options, std::
   TIFFSetField(tiff, TIFFTAG_BASELINEEXPOSURE, 0.0);
   set_dng_noise_and_opcodes(tiff, frame);
   if (exif != 0) TIFFSetField(tiff, TIFFTAG_EXIFIFD, exif);
-  return output.finish(write_strips(tiff, frame.raw.dn, rows) && TIFFWriteDirectory(tiff) != 0);
+  return output.finish(write_strips(tiff, frame.raw.dn, rows) && TIFFWriteDirectory(tiff) != 0).and_then([&] {
+    return pad(file);
+  });
 }
 
 }  // namespace

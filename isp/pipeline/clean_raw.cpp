@@ -92,8 +92,8 @@ Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options,
   out.frame.corrections = frame.corrections;
   out.frame.corrections.defects.clear();
   const double step = 1 / levels.range_dn;
-  out.frame.noise = residual_profile(signal, out.maps.site_variance_e2, *out.plan.electrons_at_white,
-                                     rounding_dn2 * step * step);
+  out.frame.noise =
+      residual_profile(signal, out.maps.site_variance_e2, *out.plan.electrons_at_white, rounding_dn2 * step * step);
   if (!options.denoise.maps) out.maps = {};
   clock.lap("codes");
   return out;

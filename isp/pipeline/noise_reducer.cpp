@@ -28,6 +28,10 @@ SignalElectrons NoiseReducer::run(RawElectrons& raw, const NoiseReduction& how, 
     fit(maps->chroma_confidence, (width + 1) / 2, (height + 1) / 2);
     views.residual_variance = maps->residual_variance_e2.view();
     views.chroma_confidence = maps->chroma_confidence.view();
+    for (int c = 0; c < 3; ++c) {
+      fit(maps->site_variance_e2[c], (width + 1) / 2, (height + 1) / 2);
+      views.site_variance[c] = maps->site_variance_e2[c].view();
+    }
   }
   denoiser_->run({raw.value.view(), raw.phase}, how.noise, how.options, memory.view(), views, executor_);
   return {std::move(memory), raw.phase};

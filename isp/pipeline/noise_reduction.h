@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -22,6 +23,7 @@ struct DenoiseChoice {
   denoise::Level level = denoise::Level::standard;  // for Mode::level
   bool line_noise = true;                           // rows and columns too, where theirs stands out
   bool maps = false;                                // keep NoiseMaps
+  bool always = false;                              // automatic: draft at least
 };
 
 /// What was decided: everything that reducing the noise of one frame takes. Sites as in the active area.
@@ -43,6 +45,7 @@ std::optional<denoise::Level> level_for(double snr);
 struct NoiseMaps {
   Plane<float> residual_variance_e2;
   Plane<float> chroma_confidence;
+  std::array<Plane<float>, 3> site_variance_e2;  // of R, G, B
 };
 
 }  // namespace lowlux::isp

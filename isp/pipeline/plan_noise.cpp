@@ -122,6 +122,7 @@ void choose_level(const DenoiseChoice& choice, NoiseReduction& out) {
     return;
   }
   out.level = level_for(*out.snr);
+  if (!out.level && choice.always) out.level = denoise::Level::draft;
   out.reason = fmt::format("signal to noise ratio {:.3g} of a pixel in the middle block", *out.snr);
 }
 
