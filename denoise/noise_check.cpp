@@ -160,17 +160,23 @@ void Check::halve(int columns, int rows) {
   }
 }
 
+/// Mean of `wanted` over the tenth of the blocks, 8 at least, with the smallest `flatness`.
+double mean_of_flattest(std::vector<BlockDetail>& found, double BlockDetail::*flatness, double BlockDetail::*wanted) {
+  const std::size_t count = std::max(least_blocks, found.size() / 10);
+  const auto last = found.begin() + static_cast<std::ptrdiff_t>(count);
+  std::nth_element(found.begin(), last - 1, found.end(),
+                   [flatness](const BlockDetail& a, const BlockDetail& b) { return a.*flatness < b.*flatness; });
+  double sum = 0;
+  for (auto at = found.begin(); at != last; ++at) sum += (*at).*wanted;
+  return sum / static_cast<double>(count);
+}
+
 void Check::finish() {
   for (int l = 0; l < most_levels; ++l) {
     auto& found = blocks[l];
     if (found.size() < least_blocks) continue;
-    const std::size_t count = std::max(least_blocks, found.size() / 10);
-    const auto last = found.begin() + static_cast<std::ptrdiff_t>(count);
-    std::nth_element(found.begin(), last - 1, found.end(),
-                     [](const BlockDetail& a, const BlockDetail& b) { return a.across < b.across; });
-    double sum = 0;
-    for (auto at = found.begin(); at != last; ++at) sum += at->diagonal;
-    out.measured_over_model[l] = sum / static_cast<double>(count);
+    out.measured_over_model[l] = mean_of_flattest(found, &BlockDetail::across, &BlockDetail::diagonal);
+    out.across_over_model[l] = mean_of_flattest(found, &BlockDetail::diagonal, &BlockDetail::across);
   }
   const auto share = [](long long of, long long all) {
     return all == 0 ? 0 : static_cast<double>(of) / static_cast<double>(all);
@@ -203,10 +209,14 @@ NoiseCheck check_noise(const RawElectronsView& raw, const RawNoise& noise) {
 }
 
 std::array<double, most_levels> variance_scale_of(const NoiseCheck& check) {
+  const auto ratio = [&check](int l) {
+    return std::max(check.measured_over_model[l].value_or(1), check.across_over_model[l].value_or(1));
+  };
   std::array<double, most_levels> scale{};
   for (int l = 0; l < most_levels; ++l) {
-    const double ratio = check.measured_over_model[l].value_or(1);
-    scale[l] = ratio < least_ratio ? std::max(ratio, 0.01) : 1;
+    const double own = ratio(l), coarser = l + 1 < most_levels ? std::min(1.0, ratio(l + 1)) : own;
+    const double both = (own + std::max(own, coarser)) / 2;
+    scale[l] = both < least_ratio ? std::max(both, 0.01) : 1;
   }
   return scale;
 }

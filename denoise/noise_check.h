@@ -23,6 +23,9 @@ struct NoiseCheck {
   std::array<std::optional<double>, most_levels> measured_over_model;
   /// Share of windows whose mean signal (dark subtracted) is below 0 by more than 4 standard deviations; R, G, B. The
   /// standard deviation is the larger of the model's and the window's own.
+  /// The same of horizontal and vertical details, on the tenth of the blocks with the smallest diagonal ones. Nearer to
+  /// the mean of a level where noise is not white: what was averaged before has least noise in its diagonals.
+  std::array<std::optional<double>, most_levels> across_over_model;
   std::array<double, 3> share_negative{};
   double share_without_signal = 0;  // of windows in which no colour is above 0 by more than 4 standard deviations
   double share_saturated = 0;       // of sites
@@ -38,7 +41,9 @@ inline constexpr double least_ratio = 0.7;
 /// Above on all levels, the gain is suspected.
 inline constexpr double largest_ratio = 1.5;
 
-/// For DenoiseOptions: measured_over_model where it is below least_ratio, 0.01 at least; else 1, also where absent.
+/// For DenoiseOptions. A level's noise is as measured, the larger of the two ratios, at its upper end; at its lower end
+/// it is that of the next level, 1 at most. The mean of both where it is below least_ratio, 0.01 at least; else 1, also
+/// where nothing was measured.
 std::array<double, most_levels> variance_scale_of(const NoiseCheck& check);
 
 enum class NoiseFinding : std::uint8_t {

@@ -41,6 +41,7 @@ TEST(NoiseCheck, FindsNothingInTheModelsOwnNoiseAndOneForItsRatio) {
     for (int l = 0; l < denoise::most_levels; ++l) {
       // 0.002: the model's mean is that of 64 cells, and 1 / (1 + error) is in the mean above 1 by the error's square.
       EXPECT_NEAR(check.measured_over_model[l].value(), 1, 5 * ratio_error(raw, l) + 0.002) << l;
+      EXPECT_NEAR(check.across_over_model[l].value(), 1, 5 * ratio_error(raw, l) + 0.002) << l;
     }
     // Flatness and detail share the fourth moment: see the header.
     EXPECT_LT(std::abs(check.measured_over_model[0].value() - 1), 0.03);
@@ -97,9 +98,18 @@ TEST(NoiseCheck, SpeaksFromTheStatedThresholdsOn) {
   EXPECT_EQ(denoise::variance_scale_of(check)[3], 1);
   check.measured_over_model[3] = 0.69;
   EXPECT_TRUE(has(check, NoiseFinding::noise_below_model));
+  EXPECT_EQ(denoise::variance_scale_of(check)[3], 1);  // by the other details
+  check.across_over_model = {1, 1, 1, 0.2, 0.9};
+  EXPECT_EQ(denoise::variance_scale_of(check)[3], 1) << "0.795, with the next level";
+  check.measured_over_model[4] = 0.69;
+  check.across_over_model[4] = 0.6;
   EXPECT_EQ(denoise::variance_scale_of(check)[3], 0.69);
-  check.measured_over_model[3] = 0;
-  EXPECT_EQ(denoise::variance_scale_of(check)[3], 0.01);
+  EXPECT_EQ(denoise::variance_scale_of(check)[4], 0.69);
+  check.measured_over_model[3] = 0.2;
+  EXPECT_EQ(denoise::variance_scale_of(check)[3], (0.2 + 0.69) / 2);
+  check.measured_over_model[4] = check.across_over_model[4] = 0;
+  EXPECT_EQ(denoise::variance_scale_of(check)[3], 0.2) << "never below its own";
+  EXPECT_EQ(denoise::variance_scale_of(check)[4], 0.01);
   for (auto& ratio : check.measured_over_model) ratio = 1.51;
   EXPECT_TRUE(has(check, NoiseFinding::noise_above_model));
   check.measured_over_model[2] = 1.49;  // texture is on some levels, a wrong gain on all
@@ -126,7 +136,8 @@ TEST(NoiseCheck, FindsRawsThatWereDenoisedBeforeAndTakesTheirNoiseAsMeasured) {
   EXPECT_LT(check.measured_over_model[0].value(), 0.05);
   EXPECT_GT(check.measured_over_model[4].value(), 0.7);
   const auto scale = denoise::variance_scale_of(check);
-  EXPECT_EQ(scale[0], std::max(0.01, check.measured_over_model[0].value()));
+  EXPECT_EQ(scale[0], (check.across_over_model[0].value() + check.across_over_model[1].value()) / 2);
+  EXPECT_LT(scale[0], 0.3);
   EXPECT_EQ(scale[4], 1);
 }
 
