@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <span>
 
+#include "denoise/residual_shares.h"
 #include "denoise/rows.h"
 
 namespace lowlux::denoise {
@@ -51,7 +53,10 @@ struct Shrink {
     in.variance_stride = at.variance.stride;
     in.blocks = (at.width - block) / step + 1;
     in.step = step;
-    in.coarsest = l + 1 == frame.levels;
+    for (const PlaneKind kind : {PlaneKind::luma, PlaneKind::chroma}) {
+      const ResidualShares shares = residual_shares(kind, pass, step, l, frame.levels);
+      in.left[kind == PlaneKind::luma ? 0 : 1] = {shares.kept, shares.other, shares.mean};
+    }
     in.chroma = planes_of(frame, l) == 4 ? chroma : nullptr;
     return in;
   }
@@ -159,6 +164,15 @@ struct Recompose {
   }
 };
 
+/// share_row of residual variances. @param finer as long as `share`
+void residual_share_row(const ChromaStarts& starts, int level, int y, std::span<float> share, float* finer) {
+  share_row(starts, level, level + 1, y, share);
+  if (level == 0) return;
+  share_row(starts, level - 1, level + 1, y, {finer, share.size()});
+  constexpr auto more = static_cast<float>(as_finest - 1);
+  for (std::size_t x = 0; x < share.size(); ++x) share[x] = 1 - (1 - share[x]) * (1 + more * finer[x]);
+}
+
 }  // namespace
 
 void build_pyramid(const PassFrame& frame) {
@@ -199,7 +213,7 @@ void add_residuals(const PassFrame& frame) {
           rows::smooth_row(up_row(coarse.residual, p, y, width / 2, height / 2), m.row[1], m.row[2]);
           std::fill(m.row[3], m.row[3] + width, p == 0 ? 0.0f : 1.0f);
           if (p != 0 && !frame.starts.nowhere(l)) {
-            share_row(frame.starts, l, l + 1, y, {m.row[3], static_cast<std::size_t>(width)});
+            residual_share_row(frame.starts, l, y, {m.row[3], static_cast<std::size_t>(width)}, m.row[4]);
           }
           if (p == 0 || !frame.starts.nowhere(l)) rows::add_residual_row(own, m.row[3], width, m.row[2]);
           std::memcpy(own, m.row[2], width * sizeof(float));

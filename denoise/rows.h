@@ -67,6 +67,13 @@ void blend_row(const float* coarse, const float* share, int cells, float* inout)
 /// inout = (1 - share) own + inout.
 void add_residual_row(const float* own, const float* share, int cells, float* inout);
 
+/// See residual_shares.h.
+struct ResidualOfBlocks {
+  float kept;
+  float other;
+  float mean;
+};
+
 /// All blocks with their corner on one row of cells.
 struct BlockRow {
   const float* noisy[4];     // L, C1, C2, C3
@@ -76,7 +83,7 @@ struct BlockRow {
   std::ptrdiff_t variance_stride;
   int blocks;
   int step;                    // cells from one block to the next, 2 or 4
-  bool coarsest;               // whether the variance of the mean remains
+  ResidualOfBlocks left[2];    // luma, chroma
   const std::uint8_t* chroma;  // for each strip, whether C1, C2, C3 are wanted; null: nowhere
 };
 /// What blocks add up to: 8 rows of cells, 4 rows of half size.

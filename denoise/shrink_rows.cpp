@@ -84,11 +84,13 @@ HWY_INLINE void shrink_strip(const BlockRow& in, int plane, int first, int count
     const VF exists = hn::IfThenElseZero(
         hn::Lt(hn::Iota(f, static_cast<float>(i)), constant(static_cast<float>(count))), constant(1));
     const VF per_power = hn::Div(exists, power);
-    const VF left = in.coarsest ? power : hn::Sub(power, constant(1));
+    const rows::ResidualOfBlocks& shares = in.left[plane == 0 ? 0 : 1];
+    const VF rest = hn::MulAdd(constant(shares.other), hn::Sub(constant(64), power), constant(shares.mean));
+    const VF left = hn::MulAdd(constant(shares.kept), hn::Sub(power, constant(1)), rest);
     const VF weight = hn::Div(per_power, variance);
     store(weight, s.weight + lead + i);
     store(weight, m.weight + first + i);
-    store(hn::Mul(hn::Mul(constant(1.0f / 64), per_power), left), m.residual + first + i);
+    store(hn::Mul(per_power, left), m.residual + first + i);
   }
   add_columns<kStep>(s, count, kStep * first, sums.value[plane]);
 }

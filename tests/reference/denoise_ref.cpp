@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "denoise/layout.h"
+#include "denoise/residual_shares.h"
 #include "tests/reference/denoise_ref_blocks.h"
 
 namespace lowlux::reference {
@@ -153,7 +154,10 @@ Four total_residual(const std::vector<Four>& levels, const Image& starts) {
       Image sum = total[p].v.empty() ? Image(own.width, own.height) : up2(total[p]);
       for (int y = 0; y < own.height; ++y) {
         for (int x = 0; x < own.width; ++x) {
-          sum.at(x, y) += (1 - (p == 0 ? 0 : coarser_share(starts, l, l + 1, x, y))) * own.at(x, y);
+          const double coarser = p == 0 ? 0 : coarser_share(starts, l, l + 1, x, y);
+          const bool between = l > 0 && l + 1 < static_cast<int>(levels.size());  // the coarsest counts as it is
+          const double finer = p != 0 && between ? coarser_share(starts, l - 1, l + 1, x, y) : 0;
+          sum.at(x, y) += (1 - coarser) * (1 + (as_finest - 1) * finer) * own.at(x, y);
         }
       }
       total[p] = sum;
@@ -194,8 +198,7 @@ Pictures both_passes(const Frame& frame, const Image& starts) {
   const auto pass = [&](const std::vector<Four>* pilot, int stride) {
     std::vector<Four> out(frame.levels);
     for (int l = 0; l < frame.levels; ++l) {
-      Shrunk shrunk =
-          shrink(x[l], variance[l], pilot == nullptr ? nullptr : &(*pilot)[l], stride, l + 1 == frame.levels);
+      Shrunk shrunk = shrink(x[l], variance[l], pilot == nullptr ? nullptr : &(*pilot)[l], stride, l, frame.levels);
       out[l] = std::move(shrunk.value);
       residual[l] = std::move(shrunk.residual);
     }

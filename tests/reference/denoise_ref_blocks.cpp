@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "denoise/layout.h"
+#include "denoise/residual_shares.h"
 
 namespace lowlux::reference::denoising {
 
@@ -115,7 +116,7 @@ Block wiener_gains(const Block& pilot, double variance) {
 
 }  // namespace
 
-Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride, bool coarsest) {
+Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride, int level, int levels) {
   const int w = x[0].width, h = x[0].height;
   Shrunk out;
   Four weight;
@@ -138,7 +139,10 @@ Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride
           kept[i / block][i % block] = g * f[p][i / block][i % block];
         }
         const Block value = inverse_dct(kept);
-        const double share = 1 / (v[p] * power), residual = v[p] * (power - (coarsest ? 0 : 1)) / 64;
+        const auto left = denoise::residual_shares(p == 0 ? denoise::PlaneKind::luma : denoise::PlaneKind::chroma,
+                                                   pilot == nullptr ? 0 : 1, stride, level, levels);
+        const double share = 1 / (v[p] * power);
+        const double residual = v[p] * (left.kept * (power - 1) + left.other * (64 - power) + left.mean);
         for (int i = 0; i < block * block; ++i) {
           const int at_x = x0 + i % block, at_y = y0 + i / block;
           out.value[p].at(at_x, at_y) += share * value[i / block][i % block];

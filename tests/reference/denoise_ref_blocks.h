@@ -29,6 +29,6 @@ struct Shrunk {
 };
 
 /// One level of one pass: every block, `stride` apart. `pilot` is null in the first pass.
-Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride, bool coarsest);
+Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride, int level, int levels);
 
 }  // namespace lowlux::reference::denoising
