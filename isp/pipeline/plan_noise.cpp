@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "denoise/noise_check.h"
 #include "isp/pipeline/electron_mosaic.h"
 
 namespace lowlux::isp {
@@ -98,7 +99,7 @@ void add_lines(const Result<denoise::LineOffsets>& found, double pixel_std_e,
   if (found->line_std_e > seen * pixel_std_e && found->line_std_e < pixel_std_e) lines.push_back(*found);
 }
 
-std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, Plane<float>& charge_e) {
+std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, const Plane<float>& charge_e) {
   const auto& v = plan.noise.variance_e2;
   const double dark = plan.noise.dark_mean_e[0];
   const double pixel_std_e = std::sqrt(dark + (v[0] + 2 * v[1] + v[2]) / 4);
@@ -150,10 +151,11 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   if (!out.level) return out;
   out.options.level = *out.level;
   out.options.white_gain = balance_of(frame, plan);
-  if (choice.line_noise) {
-    RawElectrons charge = raw_electrons(frame, plan, {}, executor);
-    out.lines = lines_of(out, charge.value);
-  }
+  const RawElectrons charge = raw_electrons(frame, plan, {}, executor);
+  const denoise::NoiseCheck check = denoise::check_noise({charge.value.view(), charge.phase}, out.noise);
+  for (const denoise::NoiseRemark& remark : denoise::remarks_on(check)) plan.warnings.push_back(remark.text);
+  out.options.variance_scale = denoise::variance_scale_of(check);
+  if (choice.line_noise) out.lines = lines_of(out, charge.value);
   return out;
 }
 
