@@ -71,16 +71,25 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
   return jobs;
 }
 
+Result<PictureKind> picture_kind(FileFormat format, std::optional<int> bits, std::optional<OutputSpace> space) {
+  const bool linear = format == FileFormat::exr || format == FileFormat::pfm;
+  PictureKind kind;
+  kind.space = space.value_or(linear ? OutputSpace::linear_srgb : OutputSpace::srgb);
+  const int depth = bits.value_or(default_bits(format, kind.space));
+  if (format == FileFormat::exr && depth == 8)
+    return fail(ErrorCode::invalid_argument, "OpenEXR holds 16 or 32 bits", "--bits");
+  kind.samples = sample_type_of(format, depth);
+  if (const auto fits = isp::check_writable(format, kind.samples, kind.space); !fits)
+    return tl::make_unexpected(fits.error());
+  return kind;
+}
+
 Result<isp::DevelopOptions> complete_options(const DevelopArgs& args, FileFormat format) {
   isp::DevelopOptions o = args.options;
-  o.space = args.space.value_or(format == FileFormat::exr || format == FileFormat::pfm ? OutputSpace::linear_srgb
-                                                                                       : OutputSpace::srgb);
-  const int bits = args.bits.value_or(default_bits(format, o.space));
-  if (format == FileFormat::exr && bits == 8)
-    return fail(ErrorCode::invalid_argument, "OpenEXR holds 16 or 32 bits", "--bits");
-  o.samples = sample_type_of(format, bits);
-  if (const auto fits = isp::check_writable(format, o.samples, o.space); !fits)
-    return tl::make_unexpected(fits.error());
+  const Result<PictureKind> kind = picture_kind(format, args.bits, args.space);
+  if (!kind) return tl::make_unexpected(kind.error());
+  o.space = kind->space;
+  o.samples = kind->samples;
   o.tone = args.tone.value_or(is_linear(o.space) ? isp::ToneCurve::none : isp::ToneCurve::standard);
   if (!args.exposure_given && is_linear(o.space)) o.exposure_ev = 0;
   if (const auto fits = isp::check_options(o); !fits) return tl::make_unexpected(fits.error());

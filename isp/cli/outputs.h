@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,15 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
 
 /// Whether the output is a folder.
 bool names_folder(const DevelopArgs& args);
+
+/// Space and samples of a picture file.
+struct PictureKind {
+  OutputSpace space = OutputSpace::srgb;
+  SampleType samples = SampleType::u8;
+};
+
+/// What a format holds by default, or as asked for. Errors: it cannot hold that.
+Result<PictureKind> picture_kind(isp::FileFormat format, std::optional<int> bits, std::optional<OutputSpace> space);
 
 /// Completes space, samples, tone and exposure by what the format of the output can hold. Errors: they do not fit.
 Result<isp::DevelopOptions> complete_options(const DevelopArgs& args, isp::FileFormat format);

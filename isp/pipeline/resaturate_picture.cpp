@@ -1,0 +1,126 @@
+#include "isp/pipeline/resaturate_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "denoise/box_mean.h"
+#include "denoise/resaturate.h"
+#include "isp/pipeline/pipeline.h"
+#include "isp/raw/raw_to_rgb.h"
+#include "isp/render/output_space.h"
+#include "isp/render/tone.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double saturated_from = 0.995;  // of white: the highest code of 8 bits, rounding off
+
+double intensity_at(const RgbView<const float>& xyz, int x, int y) {
+  return static_cast<double>(xyz[0].at(x, y)) + xyz[1].at(x, y) + xyz[2].at(x, y);
+}
+
+/// 1 where a channel of the space is at white.
+Plane<std::uint8_t> saturated_pixels(const RgbView<const float>& xyz, const Matrix3& to_rgb) {
+  Plane<std::uint8_t> out(xyz[0].width, xyz[0].height);
+  for (int y = 0; y < out.height(); ++y) {
+    for (int x = 0; x < out.width(); ++x) {
+      const Vector3 rgb = to_rgb * Vector3{xyz[0].at(x, y), xyz[1].at(x, y), xyz[2].at(x, y)};
+      out.at(x, y) = std::ranges::max(rgb) >= saturated_from ? 1 : 0;
+    }
+  }
+  return out;
+}
+
+double share_of_dark(const RgbView<const float>& xyz, double dark, int radius) {
+  Plane<double> sum(xyz[0].width, xyz[0].height);
+  for (int y = 0; y < sum.height(); ++y) {
+    for (int x = 0; x < sum.width(); ++x) sum.at(x, y) = intensity_at(xyz, x, y);
+  }
+  const Plane<double> mean = denoise::box_mean(sum, radius);
+  const auto below = std::count_if(mean.data(), mean.data() + mean.size(), [&](double s) { return s <= dark; });
+  return static_cast<double>(below) / static_cast<double>(mean.size());
+}
+
+/// Linear XYZ to the codes of a space; what is outside of its gamut moves towards the neutral.
+Picture encoded(const SceneLinear& xyz, const ResaturateOptions& options, Executor& executor) {
+  DevelopPlan size;
+  size.options.samples = options.samples;
+  size.width = xyz.width();
+  size.height = xyz.height();
+  Picture out = make_picture(size);
+  RgbTransform transform;
+  const Matrix3 matrix = *xyz_to_output(options.space);
+  const Vector3 weights = *luminance_weights(options.space);
+  for (int i = 0; i < 9; ++i) transform.matrix[i] = static_cast<float>(matrix[i / 3][i % 3]);
+  for (int c = 0; c < 3; ++c) transform.luminance[c] = static_cast<float>(weights[c]);
+  transform.clip = INFINITY;
+  transform.move_into_gamut = options.samples != SampleType::f32;
+  RawToRgb kernel(xyz.width(), executor.width());
+  const CameraPlanes in{xyz.view()};
+  std::visit(
+      [&](auto& picture) {
+        using P = std::remove_reference_t<decltype(picture)>;
+        if constexpr (std::is_same_v<P, SceneLinear>) {
+          kernel.linear(in, transform, picture.view(), executor);
+        } else {
+          const ToneTable tone = make_tone_table(ToneCurve::none, options.space, 1);
+          if constexpr (std::is_same_v<P, Encoded8>) kernel.rgb8(in, transform, tone, picture.codes.view(), executor);
+          if constexpr (std::is_same_v<P, Encoded16>) kernel.rgb16(in, transform, tone, picture.codes.view(), executor);
+        }
+      },
+      out);
+  return out;
+}
+
+}  // namespace
+
+double chroma_noise_of(const RgbView<const float>& xyz) {
+  std::array<std::vector<double>, 2> details;
+  const Vector3 white = vector_of(*xyz_of(white_d65));
+  const double sum = white[0] + white[1] + white[2];
+  for (int y = 0; y + 1 < xyz[0].height; y += 2) {
+    for (int x = 0; x + 1 < xyz[0].width; x += 2) {
+      for (int k = 0; k < 2; ++k) {
+        const auto chroma = [&](int i, int j) {
+          return xyz[k].at(x + i, y + j) - white[k] / sum * intensity_at(xyz, x + i, y + j);
+        };
+        const double detail = (chroma(0, 0) - chroma(1, 0) - chroma(0, 1) + chroma(1, 1)) / 2;
+        if (std::isfinite(detail)) details[k].push_back(std::abs(detail));
+      }
+    }
+  }
+  double mean = 0;
+  for (std::vector<double>& d : details) {
+    if (d.empty()) return 0;
+    const auto middle = d.begin() + static_cast<std::ptrdiff_t>(d.size() / 2);
+    std::nth_element(d.begin(), middle, d.end());
+    mean += 1.4826 * *middle / 2;
+  }
+  return mean;
+}
+
+Resaturated resaturate_picture(SceneLinear xyz, const ResaturateOptions& options, Executor& executor) {
+  const Matrix3 to_rgb = *xyz_to_output(options.space == OutputSpace::xyz ? OutputSpace::linear_srgb : options.space);
+  const Plane<std::uint8_t> saturated = saturated_pixels(std::as_const(xyz).view(), to_rgb);
+  denoise::Resaturation how;
+  how.dark = options.black;
+  how.chroma_noise = options.chroma_noise ? *options.chroma_noise : chroma_noise_of(std::as_const(xyz).view());
+  how.prior_std = options.prior_std;
+  how.radius = options.radius;
+  how.xyz_to_rgb = to_rgb;
+  how.saturated = saturated.view();
+  Resaturated out;
+  out.chroma_noise = how.chroma_noise;
+  const double dark = options.black.x + options.black.y + options.black.z;
+  out.share_dark = share_of_dark(std::as_const(xyz).view(), dark, options.radius);
+  const auto at_white = std::count(saturated.data(), saturated.data() + saturated.size(), std::uint8_t{1});
+  out.share_saturated = static_cast<double>(at_white) / static_cast<double>(saturated.size());
+  denoise::resaturate(std::as_const(xyz).view(), how, xyz.view());
+  out.picture = encoded(xyz, options, executor);
+  return out;
+}
+
+}  // namespace lowlux::isp
