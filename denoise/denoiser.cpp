@@ -12,6 +12,7 @@
 #include "denoise/passes.h"
 #include "denoise/point_sources.h"
 #include "denoise/rows.h"
+#include "denoise/site_slopes.h"
 
 namespace lowlux::denoise {
 namespace {
@@ -183,6 +184,7 @@ void Run::front() const {
 /// Planes of level 0 back to a mosaic.
 void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const {
   const PyramidLevel& level = memory.level[0];
+  const SiteSlopes slopes = site_slopes(raw.phase);
   in_bands(workers, rows, [&](int first, int last, int thread) {
     const ThreadMemory& m = memory.thread[thread];
     for (int y = first; y < last; ++y) {
@@ -200,6 +202,10 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
       in.rho = std::isinf(options.rho) ? -1.0f : static_cast<float>(options.rho);
       for (int k = 0; k < 3; ++k) in.per_gain[k] = static_cast<float>(1 / options.white_gain[k]);
       in.red_is_odd = red_column(raw.phase) == 1;
+      const LumaRows luma = luma_rows(planes, y, columns, rows);
+      in.luma_beside[0] = luma.above;
+      in.luma_beside[1] = luma.below;
+      in.slopes = {slopes.c2_x, slopes.c2_y, slopes.c3_x, slopes.c3_y};
       rows::unpack_row(in, {{m.row[5], m.row[6]}, m.row[7], {m.row[8], m.row[9], m.row[10]}});
       for (int i = 0; i < 2; ++i) {
         const int raw_y = 2 * y + (i == 0 ? red_row(raw.phase) : 1 - red_row(raw.phase));
@@ -248,6 +254,7 @@ void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const Den
   const ChromaStarts starts = run.starts();
   const PassFrame frame{state_->memory, starts, run.levels, run.workers, options.variance_scale};
   run.front();
+  take_slopes_off(state_->memory.level[0], raw.phase, run.columns, run.rows, run.workers);
   build_pyramid(frame);
   run_pass(frame, 0, 4);
   int last = 0;

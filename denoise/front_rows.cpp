@@ -141,6 +141,33 @@ HWY_INLINE void site_variances(const UnpackRow& in, const UnpackedRow& out, int 
   }
 }
 
+/// Of the steps before and after a cell: their harmonic mean, 0 where they differ in sign (van Leer).
+HWY_INLINE VF slope(VF before, VF after) {
+  const Floats f;
+  const VF product = hn::Mul(before, after), sum = hn::Add(before, after);
+  const VF safe = hn::IfThenElse(hn::Gt(product, hn::Zero(f)), sum, constant(1));
+  return hn::Div(hn::Mul(constant(2), hn::Max(product, hn::Zero(f))), safe);
+}
+
+/// Slopes of the luma at cell i: to C2 and C3.
+HWY_INLINE void add_slopes(const float* above, const float* own, const float* below, const Slopes& s, int i,
+                           VF& blue_red, VF& greens) {
+  const VF here = load(own + i);
+  const VF gx = slope(hn::Sub(here, load(own + i - 1)), hn::Sub(load(own + i + 1), here));
+  const VF gy = slope(hn::Sub(here, load(above + i)), hn::Sub(load(below + i), here));
+  blue_red = hn::MulAdd(constant(s.c2_x), gx, hn::MulAdd(constant(s.c2_y), gy, blue_red));
+  greens = hn::MulAdd(constant(s.c3_x), gx, hn::MulAdd(constant(s.c3_y), gy, greens));
+}
+
+void AddSlopes(const float* const (&luma)[3], int cells, const Slopes& slopes, float* const (&chroma)[2]) {
+  for (int i = 0; i < cells; i += lanes()) {
+    VF blue_red = load(chroma[0] + i), greens = load(chroma[1] + i);
+    add_slopes(luma[0], luma[1], luma[2], slopes, i, blue_red, greens);
+    store(blue_red, chroma[0] + i);
+    store(greens, chroma[1] + i);
+  }
+}
+
 void UnpackCells(const UnpackRow& in, const UnpackedRow& out) {
   const Floats f;
   const bool prior = in.rho >= 0;
@@ -160,6 +187,7 @@ void UnpackCells(const UnpackRow& in, const UnpackedRow& out) {
     const VF left1 = hn::Mul(hn::Mul(share[1], share[1]), residual[1]);
     const VF left2 = hn::Mul(hn::Mul(share[2], share[2]), residual[2]);
     site_variances(in, out, i, left1, left2);
+    add_slopes(in.luma_beside[0], in.plane[0], in.luma_beside[1], in.slopes, i, c[2], c[3]);
     const VF half = hn::MulAdd(constant(0.6f), c[1], luma), skew = hn::Mul(constant(per_root2), c[2]);
     const VF green = hn::MulAdd(constant(-0.4f), c[1], luma), maze = hn::Mul(constant(0.5f), c[3]);
     const VF r = hn::Mul(constant(in.per_gain[0]), hn::Add(half, skew));
@@ -187,6 +215,7 @@ namespace lowlux::denoise::rows {
 HWY_EXPORT(PackCells);
 HWY_EXPORT(VarianceCells);
 HWY_EXPORT(SumOf);
+HWY_EXPORT(AddSlopes);
 HWY_EXPORT(UnpackCells);
 HWY_EXPORT(TargetName);
 
@@ -195,6 +224,9 @@ void variance_row(const VarianceRow& in, float* scratch, float* const out[4]) {
   HWY_DYNAMIC_DISPATCH(VarianceCells)(in, scratch, out);
 }
 double sum_of(const float* in, int count) { return HWY_DYNAMIC_DISPATCH(SumOf)(in, count); }
+void add_slope_row(const float* const (&luma)[3], int cells, const Slopes& slopes, float* const (&chroma)[2]) {
+  HWY_DYNAMIC_DISPATCH(AddSlopes)(luma, cells, slopes, chroma);
+}
 void unpack_row(const UnpackRow& in, const UnpackedRow& out) { HWY_DYNAMIC_DISPATCH(UnpackCells)(in, out); }
 const char* target_name() { return HWY_DYNAMIC_DISPATCH(TargetName)(); }
 

@@ -109,6 +109,13 @@ struct FinishedRows {
 };
 void finish_rows(const SumRows& in, float* scratch, const FinishedRows& out);
 
+/// Factors of the slopes gx and gy, as in SiteSlopes.
+struct Slopes {
+  float c2_x, c2_y, c3_x, c3_y;
+};
+/// Adds the slopes of a row of luma, given with those above and below and read one cell beyond both ends, to C2 and C3.
+void add_slope_row(const float* const (&luma)[3], int cells, const Slopes& slopes, float* const (&chroma)[2]);
+
 /// One row of cells back to two raw rows of 2 cells samples.
 struct UnpackRow {
   const float* plane[4];
@@ -117,6 +124,8 @@ struct UnpackRow {
   float rho;  // < 0: no prior
   float per_gain[3];
   bool red_is_odd;
+  const float* luma_beside[2];  // above and below
+  Slopes slopes;
 };
 struct UnpackedRow {
   float* signal_e[2];  // the row with red, the row with blue

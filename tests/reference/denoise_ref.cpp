@@ -185,6 +185,27 @@ void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, const Frame&
   }
 }
 
+/// Harmonic mean of two steps of one sign, else 0.
+double slope(double before, double after) { return before * after > 0 ? 2 * before * after / (before + after) : 0; }
+
+/// Adds `sign` times what the slopes of the luma, over the cells of the frame, make of C2 and C3; mirrored beyond.
+void add_slopes(const Frame& frame, double sign, const Image& luma, Four& planes) {
+  const double sx = red_column(frame.raw.phase) == 0 ? -1 : 1, sy = red_row(frame.raw.phase) == 0 ? -1 : 1;
+  const auto at = [&](int x, int y) {
+    return luma.at(std::clamp(x, 0, frame.columns - 1), std::clamp(y, 0, frame.rows - 1));
+  };
+  for (int y = 0; y < planes[2].height; ++y) {
+    for (int x = 0; x < planes[2].width; ++x) {
+      const int cx = mirrored(x, frame.columns), cy = mirrored(y, frame.rows);
+      const double here = at(cx, cy);
+      const double gx = slope(here - at(cx - 1, cy), at(cx + 1, cy) - here);
+      const double gy = slope(here - at(cx, cy - 1), at(cx, cy + 1) - here);
+      planes[2].at(x, y) += sign * (sx * gx + sy * gy) / (2 * std::numbers::sqrt2);
+      planes[3].at(x, y) += sign * (sy * gy - sx * gx) / 2;
+    }
+  }
+}
+
 struct Pictures {
   Four value;
   Four residual;
@@ -193,6 +214,7 @@ struct Pictures {
 Pictures both_passes(const Frame& frame, const Image& starts) {
   std::vector<Four> x(1), variance(1);
   x[0] = decorrelated(frame, variance[0]);
+  add_slopes(frame, -1, x[0][0], x[0]);
   add_coarser(x, variance, frame);
   std::vector<Four> value(frame.levels), residual(frame.levels);
   const auto pass = [&](const std::vector<Four>* pilot, int stride) {
@@ -223,6 +245,9 @@ Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const Denoi
                Plane<double>(frame.columns, frame.rows),
                {}};
   for (auto& plane : out.site_variance) plane = Plane<double>(frame.columns, frame.rows);
+  Four slopes;
+  slopes.fill(Image(p.value[0].width, p.value[0].height));
+  add_slopes(frame, 1, p.value[0], slopes);
   for (int cy = 0; cy < frame.rows; ++cy) {
     for (int cx = 0; cx < frame.columns; ++cx) {
       const double luma = p.value[0].at(cx, cy), prior = std::max(luma, 0.0) * options.rho;
@@ -235,6 +260,7 @@ Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const Denoi
         c[i] = p.value[i].at(cx, cy) * share;
         left[i] = share * share * residual;
       }
+      for (int i = 2; i < 4; ++i) c[i] += slopes[i].at(cx, cy);
       const double a = 2 * luma + 1.2 * c[1], g = 2 * luma - 0.8 * c[1];  // R + B and G1 + G2
       const std::array<double, 4> x{a / 2 + c[2] / std::numbers::sqrt2, (g + c[3]) / 2, (g - c[3]) / 2,
                                     a / 2 - c[2] / std::numbers::sqrt2};
