@@ -18,9 +18,10 @@ enum class Level : std::uint8_t {
   draft,     // hard thresholds, blocks every 4 quads
   standard,  // then empirical Wiener weights from that result, blocks every 4 quads
   high,      // the same with blocks every 2 quads
+  best,      // both passes with blocks every 2 quads, then non-local Bayes
 };
 
-inline constexpr std::array all_levels{Level::draft, Level::standard, Level::high};  // least work first
+inline constexpr std::array all_levels{Level::draft, Level::standard, Level::high, Level::best};  // least work first
 
 /// "draft" and so on.
 std::string_view name_of(Level level);
@@ -70,7 +71,8 @@ class Denoiser {
  public:
   /// For mosaics of up to max_width x max_height pixels, each 2..65536, and up to `threads` of an executor's threads.
   /// Takes about 22 bytes for each pixel, and 2 MB for each thread of a mosaic 4000 wide.
-  Denoiser(int max_width, int max_height, int threads);
+  /// @param most  no frame may ask for more; Level::best takes 6 MB more for each such thread
+  Denoiser(int max_width, int max_height, int threads, Level most = Level::high);
   ~Denoiser();
   Denoiser(const Denoiser&) = delete;
   Denoiser& operator=(const Denoiser&) = delete;

@@ -161,6 +161,8 @@ struct Recompose {
 
 }  // namespace
 
+void recompose(const PassFrame& frame, int level, int pass) { Recompose{frame, level, pass}.run(); }
+
 void build_pyramid(const PassFrame& frame) {
   for (int l = 0; l + 1 < frame.levels; ++l) {
     const PyramidLevel &fine = frame.memory.level[l], &coarse = frame.memory.level[l + 1];
@@ -182,7 +184,7 @@ void build_pyramid(const PassFrame& frame) {
 void run_pass(const PassFrame& frame, int pass, int step) {
   for (int l = frame.levels - 1; l >= 0; --l) {
     Shrink{frame, l, pass, step}.run();
-    if (l + 1 < frame.levels) Recompose{frame, l, pass}.run();
+    if (l + 1 < frame.levels) recompose(frame, l, pass);
   }
 }
 

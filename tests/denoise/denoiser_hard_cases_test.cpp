@@ -24,7 +24,7 @@ Outputs denoised(const Plane<float>& raw, BayerPhase phase, const denoise::RawNo
   const int columns = (raw.width() + 1) / 2, rows = (raw.height() + 1) / 2;
   Outputs out{Plane<float>(raw.width(), raw.height()), Plane<float>(columns, rows), Plane<float>(columns, rows)};
   InlineExecutor one;
-  denoise::Denoiser(raw.width(), raw.height(), 1)
+  denoise::Denoiser(raw.width(), raw.height(), 1, options.level)
       .run({raw.view(), phase}, noise, options, out.signal.view(), {out.residual.view(), out.confidence.view()}, one);
   return out;
 }
@@ -46,7 +46,7 @@ Plane<float> filled(int width, int height, float e) {
 }
 
 TEST(DenoiserHardCases, FramesOfOneValueGiveThatValue) {
-  for (const Level level : {Level::draft, Level::standard, Level::high}) {
+  for (const Level level : denoise::all_levels) {
     for (const float e : {0.0f, -50.0f, 4095.0f, 1e9f, -1e9f}) {
       for (const double variance_e2 : {0.0, 4.0}) {
         const auto out =
@@ -134,7 +134,7 @@ TEST(DenoiserHardCases, ALightBesideTheDarkLeavesTheDarkNoNoisierThanItWas) {
     return std::array{e, e, e};
   };
   const auto raw = exposed(camera, edge, 256, 256, 54);
-  for (const Level level : {Level::draft, Level::standard, Level::high}) {
+  for (const Level level : denoise::all_levels) {
     const auto out = denoised(raw, camera.phase, camera.noise(), {.level = level});
     double near = 0, far = 0;
     for (int y = 0; y < 256; ++y) {

@@ -58,7 +58,7 @@ void compare(const Camera& camera, const denoise::RawNoise& noise, const Plane<f
   const int columns = (raw.width() + 1) / 2, rows = (raw.height() + 1) / 2;
   Plane<float> signal(raw.width(), raw.height()), residual(columns, rows), confidence(columns, rows);
   InlineExecutor one;
-  denoise::Denoiser denoiser(raw.width(), raw.height(), 1);
+  denoise::Denoiser denoiser(raw.width(), raw.height(), 1, options.level);
   denoiser.run({raw.view(), camera.phase}, noise, options, signal.view(), {residual.view(), confidence.view()}, one);
   const auto expected = reference::denoise({raw.view(), camera.phase}, noise, options);
   const double scale = scale_of(raw) * *std::max_element(options.white_gain.begin(), options.white_gain.end());
