@@ -8,7 +8,7 @@ namespace lowlux::denoise::rows {
 
 inline constexpr int patch = 4;         // cells, each way
 inline constexpr int search_reach = 8;  // rows above and below, columns to the left; one less to the right
-inline constexpr int group = 48;        // patches filtered together
+inline constexpr int group = 32;        // patches filtered together, a multiple of 4
 inline constexpr int ring = 32;         // rows of sums: those that patches found from one row lie in, rounded up
 
 /// Patches with their corner on one row of cells, 2 cells apart.

@@ -261,6 +261,10 @@ HWY_INLINE Gains to_filter(float variance, float (*m)[cells]) {
   return out;
 }
 
+/// Noise that the filter leaves, over v |filter|^2: the pilot that made the filter has seen the same noise. Measured on
+/// flat frames (tests/denoise/nl_bayes_test.cpp).
+constexpr float correlated = 0.21f, independent = 0.5f;
+
 /// noisy <- m + C (C + V)^-1 (noisy - mean of noisy), C the covariance of the pilot's patches. m is the pilot's mean
 /// where little is kept, and the noisy one where much is: there the pilot may have lost as much as the noise adds.
 HWY_INLINE Filtered filter(int count, float variance, Patches& at) {
@@ -276,7 +280,7 @@ HWY_INLINE Filtered filter(int count, float variance, Patches& at) {
   const float trust = std::min(1.0f, n * gains.trace / cells);
   for (int k = 0; k < cells; ++k) mean[k] = pilot_mean[k] + trust * (mean[k] - pilot_mean[k]);
   apply(at.matrix, mean, count, at.noisy);
-  return {1 / (v * (gains.squares + 1)), v * gains.squares / cells};
+  return {1 / (v * (gains.squares + 1)), v / cells * (correlated * gains.trace + independent * gains.squares)};
 }
 
 }  // namespace lowlux::denoise::rows::HWY_NAMESPACE

@@ -51,7 +51,7 @@ class NlBayesAgainstReference : public testing::TestWithParam<Case> {};
 
 // Float rounding as in denoiser_test.cpp, 5e-6 of the largest value; the inverse loses up to its condition's root,
 // which is the ratio of the signal's spread to the noise, below 10 here. The frames have no two patches whose distances
-// differ by less than rounding: a group of 48 would change by one.
+// differ by less than rounding: a group of 32 would change by one.
 TEST_P(NlBayesAgainstReference, AgreesWithinFloatRounding) {
   const Case c = GetParam();
   const Camera camera{.phase = c.phase, .dark_e = {10, 12, 11, 9}, .read_noise_e = 1.5};
@@ -114,28 +114,31 @@ TEST(NlBayes, KeepsTheMeansOfConstantFrames) {
   }
 }
 
-/// Predicted over true root mean square of luma's error on a flat frame.
-double predicted_over_true(double signal_e, double dark_e, Level level) {
-  const Camera camera{.dark_e = {dark_e, dark_e, dark_e, dark_e}};
-  const auto raw = exposed(camera, flat(signal_e, signal_e, signal_e), 768, 512, 73);
-  const auto out = denoised(camera, raw, {.level = level});
+/// Predicted over true root mean square of luma's error on flat frames.
+double predicted_over_true(const Camera& camera, double signal_e) {
   double predicted = 0, square = 0;
-  for (int y = 0; y < 256; ++y) {
-    for (int x = 0; x < 384; ++x) {
-      const auto at = [&](int i, int j) { return static_cast<double>(out.signal.at(2 * x + i, 2 * y + j)); };
-      square += std::pow(0.2 * (at(0, 0) + at(1, 1)) + 0.3 * (at(1, 0) + at(0, 1)) - signal_e, 2);
-      predicted += static_cast<double>(out.residual.at(x, y));
+  for (const std::uint64_t seed : {73, 74}) {
+    const auto raw = exposed(camera, flat(signal_e, signal_e, signal_e), 768, 384, seed);
+    const auto out = denoised(camera, raw, {.level = Level::best});
+    for (int y = 0; y < 192; ++y) {
+      for (int x = 0; x < 384; ++x) {
+        const auto at = [&](int i, int j) { return static_cast<double>(out.signal.at(2 * x + i, 2 * y + j)); };
+        square += std::pow(0.2 * (at(0, 0) + at(1, 1)) + 0.3 * (at(1, 0) + at(0, 1)) - signal_e, 2);
+        predicted += static_cast<double>(out.residual.at(x, y));
+      }
     }
   }
   return std::sqrt(predicted / square);
 }
 
+// What is left are some hundred independent blotches, a few of them by far the largest: the true error differs by a
+// quarter from one frame to the next.
 TEST(NlBayes, KnowsWhatItLeavesOfTheNoiseOfFlatFrames) {
-  for (const auto& [signal_e, dark_e] : {std::array{0.2, 2.0}, {2.0, 2.0}, {20.0, 2.0}, {200.0, 2.0}, {20.0, 200.0}}) {
-    for (const Level level : denoise::all_levels) {
-      const double ratio = predicted_over_true(signal_e, dark_e, level);
-      std::printf("%s %g/%g %.3f\n", std::string(denoise::name_of(level)).c_str(), signal_e, dark_e, ratio);
-    }
+  for (const auto& [signal_e, dark_e] : {std::array{0.2, 2.0}, {20.0, 200.0}}) {
+    const Camera camera{.dark_e = {dark_e, dark_e, dark_e, dark_e}};
+    const double ratio = predicted_over_true(camera, signal_e);
+    EXPECT_GT(ratio, 0.75) << signal_e << " over " << dark_e;
+    EXPECT_LT(ratio, 1.25) << signal_e << " over " << dark_e;
   }
 }
 

@@ -33,19 +33,23 @@ double variance_at(const Image& in, Place at) {
 
 /// The patch itself and the nearest others, by squared distance of the pilot over the noise's variance.
 std::vector<Place> nearest(const Four& pilot, const Four& variance, Place own) {
+  std::array<double, 4> v{};
+  for (int p = 0; p < 4; ++p) v[p] = variance_at(variance[p], own);
   std::vector<std::pair<double, Place>> found;
+  found.reserve(17 * 16);
   for (int y = std::max(0, own.y - 8); y <= std::min(pilot[0].height - side, own.y + 8); ++y) {
     for (int x = std::max(0, own.x - 8); x <= std::min(pilot[0].width - side, own.x + 7); ++x) {
       double distance = 0;
       for (int p = 0; p < 4; ++p) {
         const Patch a = patch_at(pilot[p], own), b = patch_at(pilot[p], {x, y});
-        for (int i = 0; i < dims; ++i) distance += (a[i] - b[i]) * (a[i] - b[i]) / variance_at(variance[p], own);
+        for (int i = 0; i < dims; ++i) distance += (a[i] - b[i]) * (a[i] - b[i]) / v[p];
       }
       found.push_back({x == own.x && y == own.y ? -1 : distance, {x, y}});
     }
   }
   std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<Place> out;
+  out.reserve(most);
   for (std::size_t i = 0; i < std::min<std::size_t>(most, found.size()); ++i) out.push_back(found[i].second);
   return out;
 }
@@ -115,6 +119,8 @@ void add_group(const Four& x, const Four& variance, const Four& pilot, int p, co
                Sums& out) {
   std::vector<Patch> noisy, clean;
   double v = 0;
+  noisy.reserve(places.size());
+  clean.reserve(places.size());
   for (const Place at : places) {
     noisy.push_back(patch_at(x[p], at));
     clean.push_back(patch_at(pilot[p], at));
@@ -139,7 +145,7 @@ void add_group(const Four& x, const Four& variance, const Four& pilot, int p, co
       out.weight[p].at(at_x, at_y) += weight;
     }
   }
-  const double residual = v * (kept / dims + trust * trust / n);
+  const double residual = v / dims * (0.21 * kept + 0.5 * squares);
   for (int i = 0; i < dims; ++i) {
     out.sum.residual[p].at(places[0].x + i % side, places[0].y + i / side) += weight * residual;
     out.own_weight[p].at(places[0].x + i % side, places[0].y + i / side) += weight;
