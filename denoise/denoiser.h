@@ -50,7 +50,7 @@ struct DenoiseOptions {
   /// > 0; infinity leaves chroma as it is.
   double rho = 1.5;
   /// Finest pyramid level on which chroma is estimated, 0..2; absent: from the signal to noise ratio of each tile of
-  /// 64 x 64 cells, blended.
+  /// 64 x 64 cells, blended; with Level::best 0 or 2 only.
   std::optional<int> chroma_start;
   bool keep_point_sources = true;  // stars pass as they were measured: see point_sources.h
 };
@@ -71,7 +71,7 @@ class Denoiser {
  public:
   /// For mosaics of up to max_width x max_height pixels, each 2..65536, and up to `threads` of an executor's threads.
   /// Takes about 22 bytes for each pixel, and 2 MB for each thread of a mosaic 4000 wide.
-  /// @param most  no frame may ask for more; Level::best takes 6 MB more for each such thread
+  /// @param most  no frame may ask for more; Level::best takes 2.4 MB more for each thread of a mosaic 4000 wide
   Denoiser(int max_width, int max_height, int threads, Level most = Level::high);
   ~Denoiser();
   Denoiser(const Denoiser&) = delete;

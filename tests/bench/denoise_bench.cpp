@@ -27,12 +27,11 @@
 namespace {
 
 using namespace lowlux;
+using denoise::all_levels;
 using denoise::DenoiseOptions;
 using denoise::Level;
 using denoise_testing::Camera;
 using denoise_testing::exposed;
-
-using denoise::all_levels;
 
 double cpu_clock_ms() {
   timespec now{};
@@ -140,21 +139,22 @@ Plane<float> blurred(const Plane<float>& in, int dx, int dy) {
   return out;
 }
 
+[[noreturn]] void refuse(const Error& error) {
+  std::fprintf(stderr, "%s\n", error.message.c_str());
+  std::exit(1);
+}
+
 /// The channels as they are, what lies below black set to it: capture::read_picture takes so much of it for no
 /// radiance.
 Shot clipped_shot_of(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   const std::string bytes(std::istreambuf_iterator<char>(file), {});
   const auto picture = isp::decode_exr(std::as_bytes(std::span(bytes)));
-  if (!picture) {
-    std::fprintf(stderr, "%s: %s\n", path.c_str(), picture.error().message.c_str());
-    std::exit(1);
-  }
-  const auto& linear = std::get<SceneLinear>(picture->picture);
+  if (!picture) refuse(picture.error());
   Shot shot;
   for (std::size_t c = 0; c < 3; ++c) {
-    shot.rgb[c] = linear.plane[c].clone();
-    for (std::size_t i = 0; i < shot.rgb[c].size(); ++i) shot.rgb[c].data()[i] = std::max(0.0f, shot.rgb[c].data()[i]);
+    shot.rgb[c] = std::get<SceneLinear>(picture->picture).plane[c].clone();
+    for (float& e : std::span(shot.rgb[c].data(), shot.rgb[c].size())) e = std::max(0.0f, e);
     shot.rgb[c] = blurred(blurred(shot.rgb[c], 1, 0), 0, 1);
   }
   return shot;
@@ -164,10 +164,7 @@ Shot shot_of(const std::string& name) {
   if (name.ends_with(".exr")) return clipped_shot_of(std::string(LOWLUX_TESTDATA) + "/pictures/" + name);
   InlineExecutor one;
   const auto picture = capture::read_picture(std::string(LOWLUX_TESTDATA) + "/pictures/" + name, one);
-  if (!picture) {
-    std::fprintf(stderr, "%s\n", picture.error().message.c_str());
-    std::exit(1);
-  }
+  if (!picture) refuse(picture.error());
   // IEC 61966-2-1
   constexpr Matrix3 from_xyz{{{3.2406, -1.5372, -0.4986}, {-0.9689, 1.8758, 0.0415}, {0.0557, -0.2040, 1.0570}}};
   const auto& xyz = picture->xyz.plane;

@@ -4,7 +4,7 @@
 
 namespace lowlux::reference::denoising {
 
-/// Non-local Bayes on one level (denoise/README.md, step 9), in double and one group of patches at a time.
+/// Non-local Bayes on one level (denoise/README.md, step 8), in double and one group of patches at a time.
 /// @param variance  of each cell, as the level's own noise has it
 Shrunk nl_bayes(const Four& x, const Four& variance, const Four& pilot);
 
