@@ -114,6 +114,33 @@ TEST(NlBayes, KeepsTheMeansOfConstantFrames) {
   }
 }
 
+TEST(NlBayes, GivesNumbersForWhateverValues) {
+  const Camera camera{.dark_e = {2, 2, 2, 2}, .read_noise_e = 0};
+  auto raw = exposed(camera, cloth(5), 83, 70, 74);
+  for (int y = 0; y < 70; ++y) {
+    for (int x = 40; x < 83; ++x) raw.at(x, y) = raw.at(x, y) > 6 ? 1e30f : -1e30f;
+  }
+  raw.at(60, 30) = std::numeric_limits<float>::quiet_NaN();
+  const int columns = 42, rows = 35;
+  for (const double saturation_e : {4.0, 1e8, std::numeric_limits<double>::infinity()}) {
+    for (const auto& gain : {std::array{1e3, 1e-3, 1.0}, std::array{1e-3, 1e3, 1e3}}) {
+      auto noise = camera.noise();
+      noise.saturation_e = saturation_e;
+      Plane<float> signal(83, 70), residual(columns, rows), confidence(columns, rows);
+      InlineExecutor one;
+      denoise::Denoiser(83, 70, 1, Level::best)
+          .run({raw.view(), camera.phase}, noise, {.level = Level::best, .white_gain = gain}, signal.view(),
+               {residual.view(), confidence.view()}, one);
+      for (std::size_t i = 0; i < signal.size(); ++i) ASSERT_TRUE(std::isfinite(signal.data()[i]));
+      for (std::size_t i = 0; i < residual.size(); ++i) {
+        ASSERT_TRUE(std::isfinite(residual.data()[i]));
+        ASSERT_GE(residual.data()[i], 0);
+        ASSERT_TRUE(confidence.data()[i] >= 0 && confidence.data()[i] <= 1);
+      }
+    }
+  }
+}
+
 /// Predicted over true root mean square of luma's error on flat frames.
 double predicted_over_true(const Camera& camera, double signal_e) {
   double predicted = 0, square = 0;
