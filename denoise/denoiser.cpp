@@ -9,6 +9,7 @@
 #include "denoise/bands.h"
 #include "denoise/chroma_start.h"
 #include "denoise/frame_memory.h"
+#include "denoise/nl_bayes.h"
 #include "denoise/passes.h"
 #include "denoise/point_sources.h"
 #include "denoise/rows.h"
@@ -103,6 +104,7 @@ ChromaStarts Run::starts() const {
         for (int row = top; row < bottom; ++row) sum += rows::sum_of(raw.value.row(row) + left, right - left);
         const double mean = sum / (static_cast<double>(right - left) * (bottom - top));
         start = start_of(mean - dark, dark, variance);
+        if (options.level == Level::best && start == 1) start = 0;
       }
       out.start[i] = static_cast<float>(std::min(start, levels - 1));
     }
@@ -239,8 +241,8 @@ struct Denoiser::State {
   FrameMemory memory;
 };
 
-Denoiser::Denoiser(int max_width, int max_height, int threads)
-    : state_(new State{FrameMemory(max_width, max_height, threads)}) {}
+Denoiser::Denoiser(int max_width, int max_height, int threads, Level most)
+    : state_(new State{FrameMemory(max_width, max_height, threads, most == Level::best)}) {}
 Denoiser::~Denoiser() = default;
 
 void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const DenoiseOptions& options,
@@ -248,6 +250,7 @@ void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const Den
   assert(raw.value.width >= 2 && raw.value.height >= 2);
   assert(signal_e.width == raw.value.width && signal_e.height == raw.value.height);
   assert(usable(noise, options));
+  assert(options.level != Level::best || !state_->memory.patches.empty());
   Run run(state_->memory, raw, noise, options, executor);
   assert(run.columns <= state_->memory.columns && run.rows <= state_->memory.rows);
   run.find_sources();
@@ -256,18 +259,22 @@ void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const Den
   run.front();
   take_slopes_off(state_->memory.level[0], raw.phase, run.columns, run.rows, run.workers);
   build_pyramid(frame);
-  run_pass(frame, 0, 4);
+  run_pass(frame, 0, options.level == Level::best ? 2 : 4);
   int last = 0;
   if (options.level != Level::draft) {
-    run_pass(frame, 1, options.level == Level::high ? 2 : 4);
+    run_pass(frame, 1, options.level >= Level::high ? 2 : 4);
     last = 1;
+  }
+  if (options.level == Level::best) {
+    nl_bayes(frame);
+    last = 0;
   }
   add_residuals(frame);
   run.unpack(state_->memory.level[0].value[last], signal_e, maps);
 }
 
 std::string_view name_of(Level level) {
-  constexpr std::array<std::string_view, all_levels.size()> names{"draft", "standard", "high"};
+  constexpr std::array<std::string_view, all_levels.size()> names{"draft", "standard", "high", "best"};
   return names[static_cast<std::size_t>(level)];
 }
 

@@ -19,9 +19,10 @@ enum class Level : std::uint8_t {
   draft,     // hard thresholds, blocks every 4 quads
   standard,  // then empirical Wiener weights from that result, blocks every 4 quads
   high,      // the same with blocks every 2 quads
+  best,      // both passes with blocks every 2 quads, then non-local Bayes
 };
 
-inline constexpr std::array all_levels{Level::draft, Level::standard, Level::high};  // least work first
+inline constexpr std::array all_levels{Level::draft, Level::standard, Level::high, Level::best};  // least work first
 
 /// "draft" and so on.
 std::string_view name_of(Level level);
@@ -50,7 +51,7 @@ struct DenoiseOptions {
   /// > 0; infinity leaves chroma as it is.
   double rho = 1.5;
   /// Finest pyramid level on which chroma is estimated, 0..2; absent: from the signal to noise ratio of each tile of
-  /// 64 x 64 cells, blended.
+  /// 64 x 64 cells, blended; with Level::best 0 or 2 only.
   std::optional<int> chroma_start;
   bool keep_point_sources = true;  // stars pass as they were measured: see point_sources.h
   /// Variance of the noise over that of RawNoise, on each pyramid level, finest first; 0.01..100. Not 1 where noise is
@@ -80,7 +81,8 @@ class Denoiser {
  public:
   /// For mosaics of up to max_width x max_height pixels, each 2..65536, and up to `threads` of an executor's threads.
   /// Takes about 22 bytes for each pixel, and 2 MB for each thread of a mosaic 4000 wide.
-  Denoiser(int max_width, int max_height, int threads);
+  /// @param most  no frame may ask for more; Level::best takes 2.4 MB more for each thread of a mosaic 4000 wide
+  Denoiser(int max_width, int max_height, int threads, Level most = Level::high);
   ~Denoiser();
   Denoiser(const Denoiser&) = delete;
   Denoiser& operator=(const Denoiser&) = delete;

@@ -64,6 +64,20 @@ void lay_out_search(Rows& from, int width, SearchMemory& out) {
   for (float*& r : out.sums) r = from.take(row_size(2 * width), 1);
 }
 
+void lay_out_patches(Rows& from, int width, PatchMemory& out) {
+  for (auto* sums : {&out.change, &out.weight}) {
+    for (auto& plane : *sums) {
+      for (float*& r : plane) r = from.take(row_size(width), 1);
+    }
+  }
+  for (auto* sums : {&out.residual, &out.residual_weight}) {
+    for (auto& plane : *sums) {
+      for (float*& r : plane) r = from.take(row_size(width / 2), 1);
+    }
+  }
+  out.scratch = from.take(rows::patch_scratch(), 1);
+}
+
 void lay_out(Rows& from, int width, int height, int levels, FrameMemory& out) {
   for (int l = 0; l < levels; ++l) {
     PyramidLevel& level = out.level[l];
@@ -76,15 +90,17 @@ void lay_out(Rows& from, int width, int height, int levels, FrameMemory& out) {
   out.difference = from.planes(width / 2, height / 2);
   for (ThreadMemory& thread : out.thread) lay_out_thread(from, width, thread);
   for (SearchMemory& search : out.search) lay_out_search(from, width, search);
+  for (PatchMemory& patches : out.patches) lay_out_patches(from, width, patches);
 }
 
 }  // namespace
 
-FrameMemory::FrameMemory(int max_width, int max_height, int threads)
+FrameMemory::FrameMemory(int max_width, int max_height, int threads, bool best)
     : columns((max_width + 1) / 2),
       rows((max_height + 1) / 2),
       thread(static_cast<std::size_t>(threads)),
       search(static_cast<std::size_t>(threads)),
+      patches(best ? static_cast<std::size_t>(threads) : 0),
       sources(columns, rows),
       found_(static_cast<std::size_t>(threads) * max_width) {
   assert(max_width >= 2 && max_height >= 2 && threads >= 1);
@@ -97,6 +113,9 @@ FrameMemory::FrameMemory(int max_width, int max_height, int threads)
   Rows real(memory_.get());
   lay_out(real, width, height, levels, *this);
   for (int i = 0; i < threads; ++i) search[i].found = found_.data() + static_cast<std::ptrdiff_t>(i) * max_width;
+  chroma_.resize(patches.size() * static_cast<std::size_t>(width));
+  for (std::size_t i = 0; i < patches.size(); ++i)
+    patches[i].chroma = chroma_.data() + i * static_cast<std::size_t>(width);
   const auto tiles = static_cast<std::size_t>(tiles_of(columns)) * static_cast<std::size_t>(tiles_of(rows));
   starts.resize(tiles);
   has_chroma.resize(tiles * most_levels);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "denoise/layout.h"
+#include "denoise/nl_bayes_rows.h"
 #include "denoise/point_sources.h"
 #include "isp/base/plane.h"
 
@@ -42,8 +43,19 @@ struct ThreadMemory {
   float* blocks = nullptr;
 };
 
+/// Sums of patches of one thread, for Level::best only.
+struct PatchMemory {
+  std::array<std::array<float*, rows::ring>, 4> change{};
+  std::array<std::array<float*, rows::ring>, 4> weight{};
+  std::array<std::array<float*, 2>, 4> residual{};  // of half size
+  std::array<std::array<float*, 2>, 4> residual_weight{};
+  float* scratch = nullptr;
+  std::uint8_t* chroma = nullptr;  // of each patch of a row
+};
+
 struct FrameMemory {
-  FrameMemory(int max_width, int max_height, int threads);
+  /// @param best  whether Level::best is wanted too
+  FrameMemory(int max_width, int max_height, int threads, bool best);
 
   int columns;  // cells of the largest frame
   int rows;
@@ -51,6 +63,7 @@ struct FrameMemory {
   PlaneSet difference;  // of the size of level 1
   std::vector<ThreadMemory> thread;
   std::vector<SearchMemory> search;       // of each thread
+  std::vector<PatchMemory> patches;       // of each thread, or empty
   Plane<std::uint8_t> sources;            // cells that hold point sources
   std::vector<float> starts;              // chroma start level of each tile
   std::vector<unsigned char> has_chroma;  // for each level, each tile
@@ -58,6 +71,7 @@ struct FrameMemory {
  private:
   std::unique_ptr<float[]> memory_;
   std::vector<std::int32_t> found_;
+  std::vector<std::uint8_t> chroma_;
 };
 
 }  // namespace lowlux::denoise

@@ -175,6 +175,8 @@ void residual_share_row(const ChromaStarts& starts, int level, int y, std::span<
 
 }  // namespace
 
+void recompose(const PassFrame& frame, int level, int pass) { Recompose{frame, level, pass}.run(); }
+
 void build_pyramid(const PassFrame& frame) {
   for (int l = 0; l + 1 < frame.levels; ++l) {
     const PyramidLevel &fine = frame.memory.level[l], &coarse = frame.memory.level[l + 1];
@@ -197,7 +199,7 @@ void build_pyramid(const PassFrame& frame) {
 void run_pass(const PassFrame& frame, int pass, int step) {
   for (int l = frame.levels - 1; l >= 0; --l) {
     Shrink{frame, l, pass, step}.run();
-    if (l + 1 < frame.levels) Recompose{frame, l, pass}.run();
+    if (l + 1 < frame.levels) recompose(frame, l, pass);
   }
 }
 

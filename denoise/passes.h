@@ -25,6 +25,9 @@ void build_pyramid(const PassFrame& frame);
 /// @param step cells from one block to the next, 2 or 4
 void run_pass(const PassFrame& frame, int pass, int step);
 
+/// value[pass] of `level`, as its blocks or patches left it, on top of that of the next coarser level.
+void recompose(const PassFrame& frame, int level, int pass);
+
 /// Adds the residual variances of coarser levels to those of finer ones.
 void add_residuals(const PassFrame& frame);
 

@@ -15,11 +15,12 @@ void fit(Plane<float>& plane, int width, int height) {
 SignalElectrons NoiseReducer::run(RawElectrons& raw, const NoiseReduction& how, Plane<float> memory, NoiseMaps* maps) {
   const int width = raw.value.width(), height = raw.value.height();
   fit(memory, width, height);
-  if (!denoiser_ || width > width_ || height > height_) {
+  if (!denoiser_ || width > width_ || height > height_ || how.options.level > most_) {
     width_ = std::max(width, width_);
     height_ = std::max(height, height_);
+    most_ = std::max(how.options.level, most_);
     denoiser_.reset();  // before the next one takes its memory
-    denoiser_ = std::make_unique<denoise::Denoiser>(width_, height_, executor_.width());
+    denoiser_ = std::make_unique<denoise::Denoiser>(width_, height_, executor_.width(), most_);
   }
   for (const denoise::LineOffsets& lines : how.lines) subtract_lines(lines, raw.value.view());
   denoise::DenoiseMaps views;

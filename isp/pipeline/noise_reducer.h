@@ -26,6 +26,7 @@ class NoiseReducer {
   std::unique_ptr<denoise::Denoiser> denoiser_;
   int width_ = 0;
   int height_ = 0;
+  denoise::Level most_ = denoise::Level::high;  // that there is memory for
 };
 
 }  // namespace lowlux::isp

@@ -116,7 +116,7 @@ TEST(DenoiserColour, OfSingleCellsScattersAsTheBoundOfTheirEffectiveNumberHasIt)
       for (const auto& [name, colour] : colours) {
         const Vector3 signal_e = times(mean_e, colour);
         const auto raw = exposed(camera, flat(signal_e), 640, 512, 301);
-        for (const Level level : denoise::all_levels) {
+        for (const Level level : levels_for_flats()) {
           const PixelSpread got = spread_of(Denoised(raw, camera, {.level = level, .rho = no_prior}), camera, signal_e);
           const auto bound = isp::chroma_crb(test::table_camera, patch_of(camera, signal_e, got.effective_cells));
           const double one = rss_std(bound->uv_covariance);
@@ -154,7 +154,7 @@ TEST(DenoiserColour, OfTheMeanIsUnbiasedWithoutPriorHoweverMuchDarkIsSubtracted)
     std::array<Bias, denoise::all_levels.size()> bias;
     for (int i = 0; i < frames; ++i) {
       const auto raw = exposed(camera, flat(signal_e), 512, 512, 400 + static_cast<std::uint64_t>(i));
-      for (const Level level : denoise::all_levels) {
+      for (const Level level : levels_for_flats()) {
         const Denoised out(raw, camera, {.level = level, .rho = no_prior});
         const auto uv = uv_of(colour_means(out.signal.view(), camera.phase));
         bias[static_cast<std::size_t>(level)].u.add(uv.u);
@@ -162,7 +162,7 @@ TEST(DenoiserColour, OfTheMeanIsUnbiasedWithoutPriorHoweverMuchDarkIsSubtracted)
       }
     }
     const double bound = rss_std(isp::chroma_crb(test::table_camera, patch_of(camera, signal_e, 4096))->uv_covariance);
-    for (const Level level : denoise::all_levels) {
+    for (const Level level : levels_for_flats()) {
       const double largest = bias[static_cast<std::size_t>(level)].largest(truth);
       std::printf("dark %.0f e-  %-8s bias of u'v' %.6f, %.3f of the bound at 4096 cells\n", dark_e,
                   named(level).c_str(), largest, largest / bound);
@@ -185,7 +185,7 @@ TEST(DenoiserColour, OfANaiveMeanIsOffByWhatAlphaPredicts) {
         isp::desaturated(*isp::xy_of(signal), *isp::xy_of(dark), *isp::signal_share(signal, dark));
     const auto patch = patch_of(camera, signal_e, 65536);
     const double error = rss_std(isp::chroma_crb(test::table_camera, patch)->xy_covariance);
-    for (const Level level : denoise::all_levels) {
+    for (const Level level : levels_for_flats()) {
       const Denoised out(raw, unaware, {.level = level, .rho = no_prior});
       const isp::Xy got = *isp::xy_of(isp::xyz_of(test::table_camera * colour_means(out.signal.view(), camera.phase)));
       // The sum is (S + n) / S times as large and its noise the same: this error is above the true one.
@@ -242,7 +242,7 @@ TEST(DenoiserColour, LosesSaturationByThePriorAsItsConfidenceSaysAndNotOtherwise
       const double site = 2 * light.signal_e + light.dark_e + camera.read_noise_e * camera.read_noise_e;
       const auto truth = chroma_of(camera, signal_e);
       const double error = 1.1 * gain * std::sqrt(site / 65536) / std::hypot(truth[0], truth[1]);
-      for (const Level level : denoise::all_levels) {
+      for (const Level level : levels_for_flats()) {
         const Saturation got = saturation_of(raw, camera, signal_e, level);
         std::printf("%5.1f over %3.0f e-  %-5s %-8s %.4f  %.4f  %.4f\n", light.signal_e, light.dark_e, name,
                     named(level).c_str(), got.free, got.kept, got.predicted);

@@ -43,7 +43,7 @@ TEST(DenoiserFlats, PredictedResidualIsTheErrorInEveryDecade) {
   std::printf("predicted standard deviation over error, of luma, R, G, B\n");
   for (const double dark_e : {2.0, 200.0}) {
     for (const double signal_e : {1.0, 10.0, 100.0, 1000.0, 10000.0}) {
-      for (const Level level : denoise::all_levels) {
+      for (const Level level : levels_for_flats()) {
         const auto sum = calibration_of(level, signal_e, dark_e);
         std::printf("%6.0f over %3.0f e-  %-8s %.3f  %.3f %.3f %.3f\n", signal_e, dark_e,
                     std::string(name_of(level)).c_str(), sum.ratio(0), sum.ratio(1), sum.ratio(2), sum.ratio(3));
@@ -96,7 +96,7 @@ TEST(DenoiserFlats, PredictedResidualIsTheErrorInsideThePatchesOfAChart) {
     const Camera camera = camera_over(dark_e);
     for (const double mean_e : chart_levels()) {
       const auto raw = exposed(camera, chart(mean_e), 8 * patch, 6 * patch, 211);
-      for (const Level level : denoise::all_levels) {
+      for (const Level level : levels_for_flats()) {
         const Denoised out(raw, camera, {.level = level, .rho = no_prior});
         std::array<Calibration, 12> sum;
         constexpr int rim = 24;

@@ -24,7 +24,7 @@ Outputs denoised(const Plane<float>& raw, BayerPhase phase, const denoise::RawNo
   const int columns = (raw.width() + 1) / 2, rows = (raw.height() + 1) / 2;
   Outputs out{Plane<float>(raw.width(), raw.height()), Plane<float>(columns, rows), Plane<float>(columns, rows)};
   InlineExecutor one;
-  denoise::Denoiser(raw.width(), raw.height(), 1)
+  denoise::Denoiser(raw.width(), raw.height(), 1, options.level)
       .run({raw.view(), phase}, noise, options, out.signal.view(), {out.residual.view(), out.confidence.view()}, one);
   return out;
 }
@@ -46,7 +46,7 @@ Plane<float> filled(int width, int height, float e) {
 }
 
 TEST(DenoiserHardCases, FramesOfOneValueGiveThatValue) {
-  for (const Level level : {Level::draft, Level::standard, Level::high}) {
+  for (const Level level : denoise::all_levels) {
     for (const float e : {0.0f, -50.0f, 4095.0f, 1e9f, -1e9f}) {
       for (const double variance_e2 : {0.0, 4.0}) {
         const auto out =
@@ -69,17 +69,19 @@ TEST(DenoiserHardCases, FramesWithoutSignalHaveNoColour) {
 }
 
 TEST(DenoiserHardCases, WhollySaturatedFramesAreNeutralAndHaveNoConfidence) {
-  const DenoiseOptions options{.white_gain = {2, 1, 1.5}};
-  const auto out =
-      denoised(filled(150, 97, 1000), BayerPhase::rggb, {.variance_e2 = {4, 4, 4}, .saturation_e = 1000}, options);
-  expect_numbers(out);
-  for (int y = 0; y < 97; ++y) {
-    for (int x = 0; x < 150; ++x) {
-      const double gain = options.white_gain[static_cast<std::size_t>(colour_at(BayerPhase::rggb, x, y))];
-      ASSERT_NEAR(out.signal.at(x, y) * gain, 2000, 0.02);  // the largest of its cell; float, relative 1e-5
+  for (const Level level : {Level::standard, Level::best}) {
+    const DenoiseOptions options{.level = level, .white_gain = {2, 1, 1.5}};
+    const auto out =
+        denoised(filled(150, 97, 1000), BayerPhase::rggb, {.variance_e2 = {4, 4, 4}, .saturation_e = 1000}, options);
+    expect_numbers(out);
+    for (int y = 0; y < 97; ++y) {
+      for (int x = 0; x < 150; ++x) {
+        const double gain = options.white_gain[static_cast<std::size_t>(colour_at(BayerPhase::rggb, x, y))];
+        ASSERT_NEAR(out.signal.at(x, y) * gain, 2000, 0.02);  // the largest of its cell; float, relative 1e-5
+      }
     }
+    EXPECT_LT(*std::max_element(out.confidence.data(), out.confidence.data() + out.confidence.size()), 1e-5);
   }
-  EXPECT_LT(*std::max_element(out.confidence.data(), out.confidence.data() + out.confidence.size()), 1e-5);
 }
 
 TEST(DenoiserHardCases, SamplesThatAreNoNumbersStayWhereTheyAre) {
@@ -92,7 +94,8 @@ TEST(DenoiserHardCases, SamplesThatAreNoNumbersStayWhereTheyAre) {
   raw.at(150, 100) = nan;
   raw.at(20, 150) = inf;
   for (const bool keep : {false, true}) {
-    const auto out = denoised(raw, camera.phase, camera.noise(), {.keep_point_sources = keep});
+    const auto out = denoised(raw, camera.phase, camera.noise(),
+                              {.level = keep ? Level::best : Level::standard, .keep_point_sources = keep});
     expect_numbers(out);
   }
   // One dead site: beyond the coarsest blocks, nothing; far from it, little.
@@ -134,7 +137,7 @@ TEST(DenoiserHardCases, ALightBesideTheDarkLeavesTheDarkNoNoisierThanItWas) {
     return std::array{e, e, e};
   };
   const auto raw = exposed(camera, edge, 256, 256, 54);
-  for (const Level level : {Level::draft, Level::standard, Level::high}) {
+  for (const Level level : denoise::all_levels) {
     const auto out = denoised(raw, camera.phase, camera.noise(), {.level = level});
     double near = 0, far = 0;
     for (int y = 0; y < 256; ++y) {

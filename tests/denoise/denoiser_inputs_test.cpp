@@ -91,7 +91,7 @@ TEST(DenoiserInputs, ThatAreSaturatedGiveNoColourToTheirSurroundings) {
   for (const Level level : denoise::all_levels) {
     Plane<float> out(384, 320);
     InlineExecutor one;
-    denoise::Denoiser(384, 320, 1)
+    denoise::Denoiser(384, 320, 1, level)
         .run({raw.view(), camera.phase}, noise, {.level = level, .white_gain = camera.white_gain}, out.view(), {}, one);
     double chroma = 0, cells = 0, inside = 0;
     for (int y = 0; y < 320; y += 2) {

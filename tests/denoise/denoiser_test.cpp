@@ -58,7 +58,7 @@ void compare(const Camera& camera, const denoise::RawNoise& noise, const Plane<f
   const int columns = (raw.width() + 1) / 2, rows = (raw.height() + 1) / 2;
   Plane<float> signal(raw.width(), raw.height()), residual(columns, rows), confidence(columns, rows);
   InlineExecutor one;
-  denoise::Denoiser denoiser(raw.width(), raw.height(), 1);
+  denoise::Denoiser denoiser(raw.width(), raw.height(), 1, options.level);
   std::array<Plane<float>, 3> site;
   for (auto& plane : site) plane = Plane<float>(columns, rows);
   denoiser.run({raw.view(), camera.phase}, noise, options, signal.view(),

@@ -31,13 +31,13 @@ Plane<float> night(int width, int height) {
 }
 
 TEST(DenoiserThreads, GiveTheSameBits) {
-  const int width = 901, height = 403;
-  const auto raw = night(width, height);
-  for (const Level level : {Level::draft, Level::standard, Level::high}) {
+  for (const Level level : denoise::all_levels) {
+    const int width = level == Level::best ? 301 : 901, height = level == Level::best ? 203 : 403;
+    const auto raw = night(width, height);
     Plane<float> first;
     for (const int threads : {1, 2, 3, 7}) {
       PoolExecutor pool(threads);
-      denoise::Denoiser denoiser(width, height, threads);
+      denoise::Denoiser denoiser(width, height, threads, level);
       Plane<float> out(width, height);
       denoiser.run({raw.view(), camera.phase}, camera.noise(), {.level = level}, out.view(), {}, pool);
       if (threads == 1) first = out.clone();
@@ -60,10 +60,10 @@ TEST(DenoiserThreads, MayBeMoreThanThereIsMemoryFor) {
 // What an earlier, larger frame left in the buffers must not be seen by a smaller one.
 TEST(DenoiserMemory, OfEarlierFramesDoesNotShow) {
   const auto large = night(700, 300), small = night(333, 127);
-  denoise::Denoiser used(700, 300, 1), fresh(333, 127, 1);
+  denoise::Denoiser used(700, 300, 1, Level::best), fresh(333, 127, 1, Level::best);
   Plane<float> out_large(700, 300), after(333, 127), before(333, 127);
   InlineExecutor one;
-  for (const Level level : {Level::high, Level::standard}) {
+  for (const Level level : {Level::best, Level::high, Level::standard}) {
     used.run({large.view(), camera.phase}, camera.noise(), {.level = level}, out_large.view(), {}, one);
     used.run({small.view(), camera.phase}, camera.noise(), {.level = level}, after.view(), {}, one);
     fresh.run({small.view(), camera.phase}, camera.noise(), {.level = level}, before.view(), {}, one);
@@ -76,10 +76,10 @@ TEST(DenoiserMemory, IsAllocatedByTheConstructorOnly) {
   Plane<float> out(500, 300), residual(250, 150), confidence(250, 150);
   PoolExecutor two(2);
   const long at_first = test::allocations;
-  denoise::Denoiser denoiser(500, 300, 2);
+  denoise::Denoiser denoiser(500, 300, 2, Level::best);
   EXPECT_GT(test::allocations, at_first);
   const long before = test::allocations;
-  for (const Level level : {Level::draft, Level::standard, Level::high}) {
+  for (const Level level : denoise::all_levels) {
     denoiser.run({raw.view(), camera.phase}, camera.noise(), {.level = level}, out.view(),
                  {residual.view(), confidence.view()}, two);
   }
@@ -88,23 +88,26 @@ TEST(DenoiserMemory, IsAllocatedByTheConstructorOnly) {
 
 TEST(DenoiserTargets, AgreeWithinFloatRounding) {
   const auto raw = night(300, 200);
-  const auto run = [&] {
-    Plane<float> out(300, 200);
-    InlineExecutor one;
-    denoise::Denoiser(300, 200, 1).run({raw.view(), camera.phase}, camera.noise(), {}, out.view(), {}, one);
-    return out;
-  };
-  const auto best = run();
-  EXPECT_STREQ(denoise::denoiser_target(), hwy::TargetName(test::kernel_targets().front()));
-  for (const std::int64_t target : test::kernel_targets()) {
-    const test::OnlyTarget only(target);
-    ASSERT_STREQ(denoise::denoiser_target(), hwy::TargetName(target));
-    const auto out = run();
-    double worst = 0;
-    for (std::size_t i = 0; i < out.size(); ++i) {
-      worst = std::max(worst, std::abs(static_cast<double>(out.data()[i]) - static_cast<double>(best.data()[i])));
+  for (const Level level : {Level::standard, Level::best}) {
+    const auto run = [&] {
+      Plane<float> out(300, 200);
+      InlineExecutor one;
+      denoise::Denoiser(300, 200, 1, level)
+          .run({raw.view(), camera.phase}, camera.noise(), {.level = level}, out.view(), {}, one);
+      return out;
+    };
+    const auto best = run();
+    EXPECT_STREQ(denoise::denoiser_target(), hwy::TargetName(test::kernel_targets().front()));
+    for (const std::int64_t target : test::kernel_targets()) {
+      const test::OnlyTarget only(target);
+      ASSERT_STREQ(denoise::denoiser_target(), hwy::TargetName(target));
+      const auto out = run();
+      double worst = 0;
+      for (std::size_t i = 0; i < out.size(); ++i) {
+        worst = std::max(worst, std::abs(static_cast<double>(out.data()[i]) - static_cast<double>(best.data()[i])));
+      }
+      EXPECT_LT(worst, 1e-3) << hwy::TargetName(target);  // [e-]: 5e-6 of the largest value, 200 e-
     }
-    EXPECT_LT(worst, 1e-3) << hwy::TargetName(target);  // [e-]: 5e-6 of the largest value, 200 e-
   }
 }
 

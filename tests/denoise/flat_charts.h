@@ -3,7 +3,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
+#include <span>
 
 #include "denoise/denoiser.h"
 #include "tests/denoise/frames.h"
@@ -17,6 +19,12 @@ inline Camera camera_over(double dark_e) {
   return {.dark_e = {dark_e, dark_e, dark_e, dark_e}, .read_noise_e = dark_e >= 100 ? 4.0 : 1.5};
 }
 
+/// Levels that many megapixels of flats go through: `best`, which takes a second for each, only at night.
+inline std::span<const denoise::Level> levels_for_flats() {
+  const std::span<const denoise::Level> all(denoise::all_levels);
+  return std::getenv("LOWLUX_NIGHTLY") != nullptr ? all : all.first(all.size() - 1);
+}
+
 /// A frame with all there is of it.
 struct Denoised {
   Plane<float> signal, residual, confidence;
@@ -25,7 +33,7 @@ struct Denoised {
   Denoised(const Plane<float>& raw, const Camera& camera, denoise::DenoiseOptions options) : Denoised(raw, camera) {
     options.white_gain = camera.white_gain;
     InlineExecutor one;
-    denoise::Denoiser(raw.width(), raw.height(), 1)
+    denoise::Denoiser(raw.width(), raw.height(), 1, options.level)
         .run({raw.view(), camera.phase}, camera.noise(), options, signal.view(),
              {residual.view(),
               confidence.view(),

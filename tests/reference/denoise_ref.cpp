@@ -9,6 +9,7 @@
 #include "denoise/layout.h"
 #include "denoise/residual_shares.h"
 #include "tests/reference/denoise_ref_blocks.h"
+#include "tests/reference/nl_bayes_ref.h"
 
 namespace lowlux::reference {
 namespace {
@@ -70,6 +71,7 @@ struct Frame {
       const double s = sum.v[i] / count.v[i];
       const double q = s > 0 ? s / std::sqrt(s + dark + steady) : 0;
       out.v[i] = options.chroma_start ? *options.chroma_start : q >= 3 ? 0 : q >= 0.7 ? 1 : 2;
+      if (!options.chroma_start && options.level == Level::best && q >= 0.7) out.v[i] = 0;
     }
     for (double& start : out.v) start = std::min<double>(start, levels - 1);
     return out;
@@ -227,10 +229,20 @@ Pictures both_passes(const Frame& frame, const Image& starts) {
     recompose(out, starts);
     value = std::move(out);
   };
-  pass(nullptr, 4);
+  pass(nullptr, frame.options.level == Level::best ? 2 : 4);
   if (frame.options.level != Level::draft) {
     const std::vector<Four> pilot = value;
-    pass(&pilot, frame.options.level == Level::high ? 2 : 4);
+    pass(&pilot, frame.options.level == Level::standard ? 4 : 2);
+  }
+  if (frame.options.level == Level::best) {
+    const auto finest = static_cast<std::size_t>(std::min(4, frame.levels - 1));
+    value.resize(finest + 1);
+    for (std::size_t l = 0; l < finest; ++l) {
+      Shrunk shrunk = nl_bayes(x[l], variance[l], value[l]);
+      value[l] = std::move(shrunk.value);
+      residual[l] = std::move(shrunk.residual);
+    }
+    recompose(value, starts);
   }
   return {value[0], total_residual(residual, starts)};
 }

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "tests/reference/denoise_ref_blocks.h"
+
+namespace lowlux::reference::denoising {
+
+/// Non-local Bayes on one level (denoise/README.md, step 8), in double and one group of patches at a time.
+/// @param variance  of each cell, as the level's own noise has it
+Shrunk nl_bayes(const Four& x, const Four& variance, const Four& pilot);
+
+}  // namespace lowlux::reference::denoising
