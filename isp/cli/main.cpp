@@ -23,6 +23,7 @@ struct Verb {
 };
 
 constexpr std::array verbs{
+    Verb{"bench", "accuracy against time, beside other methods", run_bench},
     Verb{"calibrate", "a camera's black point, noise and colour, measured", run_calibrate},
     Verb{"develop", "raw files to pictures", run_develop},
     Verb{"info", "what a raw file says, and what was measured on it", run_info},
