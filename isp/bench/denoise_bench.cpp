@@ -17,9 +17,14 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr int rounds = 5;
-constexpr int part_width = 192, part_height = 128;  // of a picture, where a part is enough
-constexpr int crop_px = 192;                        // side of a picture's part in the report
-constexpr double search_share = 0.6;                // of the whole's time
+/// The middle of a picture, where a part is enough: to tune others, and to be quick.
+struct Part {
+  int width;
+  int height;
+};
+constexpr Part tuning_part{256, 160}, quick_part{192, 128};
+constexpr int crop_px = 192;          // side of a picture's part in the report
+constexpr double search_share = 0.6;  // of the whole's time
 
 /// What is measured: pictures in lights.
 struct Work {
@@ -39,15 +44,22 @@ std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light) {
   return 1000 * place + static_cast<std::uint64_t>(light.mean_e) + (light.dark_e > 2 ? 100000 : 0);
 }
 
-Result<std::vector<BenchPicture>> read_all(const BenchOptions& options, PictureSet set, bool parts,
+/// Which pictures are read, and how much of each.
+struct Selection {
+  PictureSet set;
+  Part part;
+  bool only_two = false;
+};
+
+Result<std::vector<BenchPicture>> read_all(const BenchOptions& options, const Selection& selection,
                                            Executor& executor) {
   std::vector<BenchPicture> out;
-  auto files = files_of(set);
-  if (options.quick && set != PictureSet::tuning) files = files.subspan(files.size() - 3, 2);
+  auto files = files_of(selection.set);
+  if (selection.only_two) files = files.subspan(files.size() - 3, 2);
   out.reserve(files.size());
   for (const std::string_view file : files) {
     const std::string path = (std::filesystem::path(options.pictures_folder) / file).string();
-    auto picture = read_bench_picture(path, parts ? part_width : 0, parts ? part_height : 0, executor);
+    auto picture = read_bench_picture(path, selection.part.width, selection.part.height, executor);
     if (!picture) return tl::make_unexpected(picture.error());
     out.push_back(*std::move(picture));
   }
@@ -176,11 +188,12 @@ class LightRows {
 };
 
 std::vector<std::string> remarks_of(const Work& work) {
-  std::vector<std::string> out{
-      fmt::format("{} pictures ({}) behind a lens of {} px, RGGB, white gains 2, 1, 1.5; means over the pictures, CPU "
-                  "time of one thread, median of {} rounds",
-                  work.pictures.size(), work.options.quick ? "quick: parts of two" : name_of(work.options.pictures),
-                  bench_lens_px, rounds)};
+  std::vector<std::string> out{fmt::format(
+      "{} pictures ({}) behind a lens of {} px, RGGB, white gains 2, 1, 1.5; means over the pictures, CPU "
+      "time of one thread, median of {} rounds",
+      work.pictures.size(),
+      fmt::format("{}{}", name_of(work.options.pictures), work.options.quick ? ", quick: parts of them" : ""),
+      bench_lens_px, rounds)};
   for (std::size_t i = 0; i < work.lights.size(); ++i) {
     const TunedParameters& tuned = work.tuned[i];
     std::string line = fmt::format(
@@ -229,9 +242,10 @@ Result<std::vector<DenoiseRow>> measure_all(const Work& work, Executor& executor
 
 Result<BenchOutcome> run_denoise_bench(const BenchOptions& options) {
   PoolExecutor executor(options.threads);
-  auto pictures = read_all(options, options.pictures, options.quick, executor);
+  const bool quick = options.quick;
+  auto pictures = read_all(options, {options.pictures, quick ? quick_part : Part{0, 0}, quick}, executor);
   if (!pictures) return tl::make_unexpected(pictures.error());
-  const auto tuning = read_all(options, PictureSet::tuning, true, executor);
+  const auto tuning = read_all(options, {PictureSet::tuning, quick ? quick_part : tuning_part}, executor);
   if (!tuning) return tl::make_unexpected(tuning.error());
   Work work{options, *std::move(pictures), denoise_lights(options.quick), {}, {}};
   work.tuned.reserve(work.lights.size());
