@@ -13,7 +13,7 @@ namespace {
 
 constexpr int last_step = 27;  // strength 2^(i / 3 - 1), up to 256
 constexpr int octave = 3;
-constexpr int part_columns = 384, part_rows = 256;  // of the middle, where a part is enough
+constexpr int part_columns = 256, part_rows = 192;  // of the middle, where a part is enough
 using Steps = std::array<int, 2>;                   // of lightness, of colour
 using Bytes = std::vector<std::uint8_t>;
 
@@ -89,23 +89,23 @@ class Search {
   std::map<Steps, double> errors_;
 };
 
-/// The best of all octaves of both, whatever lies between.
+/// The best of all pairs of every second octave, whatever lies between.
 Steps best_octaves(Search& search) {
   Steps best{0, 0};
-  for (int lightness = 0; lightness <= last_step; lightness += octave) {
-    for (int colour = 0; colour <= last_step; colour += octave) {
+  for (int lightness = 0; lightness <= last_step; lightness += 2 * octave) {
+    for (int colour = 0; colour <= last_step; colour += 2 * octave) {
       if (search.error({lightness, colour}) < search.error(best)) best = {lightness, colour};
     }
   }
   return best;
 }
 
-/// Up or down by single steps, in one and in the other, until none helps.
-Steps climbed(Search& search, Steps at) {
+/// Up or down by equal strides, in one and in the other, until none helps.
+Steps climbed(Search& search, Steps at, int stride) {
   for (bool moved = true; moved;) {
     moved = false;
     for (std::size_t which = 0; which < 2; ++which) {
-      for (const int direction : {-1, 1}) {
+      for (const int direction : {-stride, stride}) {
         for (Steps next = at;; at = next, moved = true) {
           next[which] += direction;
           if (!(search.error(next) < search.error(at))) break;
@@ -172,10 +172,10 @@ StrengthSearch search_strength(const NlMeans& filter, const Encoded8& noisy, con
   }
   Search in_part(filter, part_of(noisy, columns, rows), middle);
   if (!in_part.works()) return {};
-  const Steps start = climbed(in_part, best_octaves(in_part));
+  const Steps start = climbed(in_part, climbed(in_part, best_octaves(in_part), octave), 1);
   if (columns == noisy.width() && rows == noisy.height()) return found(in_part, start);
   Search in_whole(filter, noisy, whole);
-  return in_part.works() && in_whole.works() ? found(in_whole, climbed(in_whole, start)) : StrengthSearch{};
+  return in_part.works() && in_whole.works() ? found(in_whole, climbed(in_whole, start, 1)) : StrengthSearch{};
 }
 
 }  // namespace lowlux::isp

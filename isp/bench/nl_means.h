@@ -53,8 +53,8 @@ struct StrengthSearch {
 };
 
 /// The two strengths whose result is closest to the truth in PSNR, found on the truth itself, as nobody could who has
-/// only the noisy picture: of powers of 2^(1/3) from 1/2 to 256 first the best of all pairs of octaves in the middle of
-/// the picture, then uphill by single steps there, and from there in the whole picture.
+/// only the noisy picture: of powers of 2^(1/3) from 1/2 to 256 first the best of all pairs of every second octave in
+/// the middle of the picture, then uphill by octaves and by single steps there, and from there in the whole picture.
 StrengthSearch search_strength(const NlMeans& filter, const Encoded8& noisy, const PictureTruth& truth);
 
 }  // namespace lowlux::isp
