@@ -1,0 +1,49 @@
+#include "isp/bench/bench_stages.h"
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/bench/denoise_bench.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr std::array registry{
+    BenchStage{"denoise", "Noise reduction on the mosaic: error against time, beside other methods", run_denoise_bench},
+};
+
+std::string text_of(const BenchCell& cell, int digits) {
+  if (const auto* text = std::get_if<std::string>(&cell)) return *text;
+  const double value = std::get<double>(cell);
+  return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : std::string();
+}
+
+}  // namespace
+
+std::span<const BenchStage> bench_stages() { return registry; }
+
+Result<BenchStage> bench_stage_named(std::string_view id) {
+  std::string names;
+  for (const BenchStage& stage : registry) {
+    if (stage.id == id) return stage;
+    names += (names.empty() ? "" : ", ") + std::string(stage.id);
+  }
+  return fail(ErrorCode::not_found, fmt::format("there is no stage '{}' to measure; there is: {}", id, names));
+}
+
+Table table_of(const BenchTable& table, int digits) {
+  Table out{table.columns, {}};
+  out.rows.reserve(table.rows.size());
+  for (const auto& row : table.rows) {
+    std::vector<std::string> cells;
+    cells.reserve(row.size());
+    for (const BenchCell& cell : row) cells.push_back(text_of(cell, digits));
+    out.rows.push_back(std::move(cells));
+  }
+  return out;
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,268 @@
+#include "isp/bench/denoise_bench.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/base/executor.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr int rounds = 5;
+/// The middle of a picture, where a part is enough: to tune others, and to be quick.
+struct Part {
+  int width;
+  int height;
+};
+constexpr Part tuning_part{256, 160}, quick_part{192, 128};
+constexpr int crop_px = 192;          // side of a picture's part in the report
+constexpr double search_share = 0.6;  // of the whole's time
+
+/// What is measured: pictures in lights.
+struct Work {
+  const BenchOptions& options;
+  std::vector<BenchPicture> pictures;
+  std::vector<DenoiseLight> lights;
+  std::vector<TunedParameters> tuned;     // for each light
+  std::vector<StrengthSearch> strengths;  // for each picture in each light, picture by picture
+
+  std::size_t shots() const { return pictures.size() * lights.size(); }
+};
+
+// Of the picture's place among all, so that a picture is taken the same way in any set.
+std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light) {
+  const auto all = files_of(PictureSet::all);
+  const auto place = static_cast<std::uint64_t>(std::find(all.begin(), all.end(), picture.name) - all.begin());
+  return 1000 * place + static_cast<std::uint64_t>(light.mean_e) + (light.dark_e > 2 ? 100000 : 0);
+}
+
+/// Which pictures are read, and how much of each.
+struct Selection {
+  PictureSet set;
+  Part part;
+  bool only_two = false;
+};
+
+Result<std::vector<BenchPicture>> read_all(const BenchOptions& options, const Selection& selection,
+                                           Executor& executor) {
+  std::vector<BenchPicture> out;
+  auto files = files_of(selection.set);
+  if (selection.only_two) files = files.subspan(files.size() - 3, 2);
+  out.reserve(files.size());
+  for (const std::string_view file : files) {
+    const std::string path = (std::filesystem::path(options.pictures_folder) / file).string();
+    auto picture = read_bench_picture(path, selection.part.width, selection.part.height, executor);
+    if (!picture) return tl::make_unexpected(picture.error());
+    out.push_back(*std::move(picture));
+  }
+  return out;
+}
+
+StrengthSearch searched(const Work& work, std::size_t picture, std::size_t light) {
+  InlineExecutor one;
+  const BenchPicture& of = work.pictures[picture];
+  const DenoiseShot shot = take(of, work.lights[light], seed_of(of, work.lights[light]));
+  MethodMemory memory(of.linear.width(), of.linear.height(), one);
+  const std::vector<DenoiseMethod> methods = denoise_methods(false);
+  const auto none = std::find_if(methods.begin(), methods.end(),
+                                 [](const DenoiseMethod& method) { return method.name == name_of_none; });
+  const auto result = none->run({of, shot, work.tuned[light]}, none->level, memory);
+  return search_strength(*work.options.nl_means, codes_of(result->picture.display.view()),
+                         PictureTruth(of.linear.view(), one));
+}
+
+/// Shared by the executor's threads, one shot each.
+Result<void> search_all(Work& work, Executor& executor) {
+  work.strengths.resize(work.shots());
+  executor.run(
+      static_cast<int>(work.shots()),
+      [](void* context, int index) {
+        Work& w = *static_cast<Work*>(context);
+        const auto i = static_cast<std::size_t>(index);
+        const std::size_t picture = i / w.lights.size(), light = i % w.lights.size();
+        w.strengths[i] = searched(w, picture, light);
+        w.options.advance(search_share / static_cast<double>(w.shots()),
+                          fmt::format("strengths for {} at {}", w.pictures[picture].name, name_of(w.lights[light])));
+      },
+      &work);
+  const bool failed = std::any_of(work.strengths.begin(), work.strengths.end(),
+                                  [](const StrengthSearch& search) { return search.runs == 0; });
+  if (failed) return fail(ErrorCode::unreadable, "OpenCV's fastNlMeansDenoising failed: not enough memory?");
+  return {};
+}
+
+void add(PictureError& sum, const PictureError& error, double share) {
+  sum.psnr_db += share * error.psnr_db;
+  sum.ciede2000 += share * error.ciede2000;
+  sum.chroma_rmse += share * error.chroma_rmse;
+  sum.box_chroma_rmse += share * error.box_chroma_rmse;
+  sum.uv_shift += share * error.uv_shift;
+  sum.saturation_ratio += share * error.saturation_ratio;
+}
+
+Encoded8 side_by_side(const std::vector<Encoded8>& parts) {
+  const int width = parts.front().width(), height = parts.front().height();
+  Encoded8 out{Plane<std::uint8_t>(3 * width * static_cast<int>(parts.size()), height)};
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    for (int y = 0; y < height; ++y) {
+      std::copy_n(parts[i].codes.row(y), 3 * width, out.codes.row(y) + 3 * width * static_cast<int>(i));
+    }
+  }
+  return out;
+}
+
+Encoded8 middle_codes(const SceneLinear& display) {
+  const int width = std::min(crop_px, display.width()), height = std::min(crop_px, display.height());
+  RgbView<const float> part = display.view();
+  for (auto& plane : part) plane = plane.crop((plane.width - width) / 2, (plane.height - height) / 2, width, height);
+  return codes_of(part);
+}
+
+/// The picture of a light for the report: parts of what the methods make of the first picture.
+struct Strip {
+  std::vector<Encoded8> parts;
+  std::string names;
+
+  void add(const std::string& name, const SceneLinear& display) {
+    parts.push_back(middle_codes(display));
+    names += (names.empty() ? "" : ", ") + name;
+  }
+};
+
+/// Rows of one light.
+class LightRows {
+ public:
+  LightRows(const Work& work, std::size_t light, const std::vector<DenoiseMethod>& methods)
+      : work_(work), light_(light), methods_(methods) {
+    rows_.reserve(methods.size());
+    for (const DenoiseMethod& method : methods) {
+      rows_.push_back({.method = method.name, .kind = method.kind, .light = work.lights[light]});
+    }
+  }
+
+  Result<void> measure(std::size_t index, MethodMemory& memory, Executor& executor) {
+    const BenchPicture& picture = work_.pictures[index];
+    const DenoiseShot shot = take(picture, work_.lights[light_], seed_of(picture, work_.lights[light_]));
+    const PictureTruth truth(picture.linear.view(), executor);
+    if (index == 0) strip.add("truth", picture.linear);
+    MethodInput input{picture, shot, work_.tuned[light_], work_.options.nl_means};
+    if (!work_.strengths.empty()) input.strength = work_.strengths[index * work_.lights.size() + light_].best;
+    input.rounds = rounds;
+    const double share = 1 / static_cast<double>(work_.pictures.size());
+    const double megapixels = 1e-6 * static_cast<double>(shot.raw_e.size());
+    for (std::size_t m = 0; m < methods_.size(); ++m) {
+      const auto result = methods_[m].run(input, methods_[m].level, memory);
+      if (!result) return tl::make_unexpected(result.error());
+      add(rows_[m].error, picture_error(result->picture, truth, executor), share);
+      rows_[m].s_per_mp += share * result->cpu_s / megapixels;
+      rows_[m].times_memcpy += share * result->cpu_s / result->memcpy_s;
+      if (index == 0) strip.add(methods_[m].name, result->picture.display);
+    }
+    return {};
+  }
+
+  std::vector<DenoiseRow> finished() {
+    const auto nl_means =
+        std::find_if(rows_.begin(), rows_.end(), [](const DenoiseRow& row) { return row.method == name_of_nl_means; });
+    const double nl_means_s = nl_means == rows_.end() ? nan : nl_means->s_per_mp;
+    for (DenoiseRow& row : rows_) row.speed_of_nlm = nl_means_s / row.s_per_mp;
+    mark_undominated(rows_);
+    return std::move(rows_);
+  }
+
+  Strip strip;
+
+ private:
+  const Work& work_;
+  std::size_t light_;
+  const std::vector<DenoiseMethod>& methods_;
+  std::vector<DenoiseRow> rows_;
+};
+
+std::vector<std::string> remarks_of(const Work& work) {
+  std::vector<std::string> out{fmt::format(
+      "{} pictures ({}) behind a lens of {} px, RGGB, white gains 2, 1, 1.5; means over the pictures, CPU "
+      "time of one thread, median of {} rounds",
+      work.pictures.size(),
+      fmt::format("{}{}", name_of(work.options.pictures), work.options.quick ? ", quick: parts of them" : ""),
+      bench_lens_px, rounds)};
+  for (std::size_t i = 0; i < work.lights.size(); ++i) {
+    const TunedParameters& tuned = work.tuned[i];
+    std::string line = fmt::format(
+        "{}: on the tuning set, chromatic has radii {} (chroma) and {} (luminance), gat gains {:.2f}, {:.2f}, {:.2f}",
+        name_of(work.lights[i]), tuned.windows.chroma_radius, tuned.windows.luminance_radius, tuned.stabilised_gain[0],
+        tuned.stabilised_gain[1], tuned.stabilised_gain[2]);
+    if (!work.strengths.empty()) line += "; opencv-nlm's strengths (lightness, colour), found on the truth:";
+    for (std::size_t p = 0; p < work.pictures.size() && !work.strengths.empty(); ++p) {
+      const NlMeansStrength& best = work.strengths[p * work.lights.size() + i].best;
+      line += fmt::format(" {} {:.1f}, {:.1f};", work.pictures[p].name, best.lightness, best.colour);
+    }
+    out.push_back(std::move(line));
+  }
+  if (work.options.nl_means == nullptr) out.push_back("opencv-nlm is left out: " + work.options.why_no_nl_means);
+  return out;
+}
+
+Result<std::vector<DenoiseRow>> measure_all(const Work& work, Executor& executor, BenchOutcome& outcome) {
+  int width = 0, height = 0;
+  for (const BenchPicture& picture : work.pictures) {
+    width = std::max(width, picture.linear.width());
+    height = std::max(height, picture.linear.height());
+  }
+  MethodMemory memory(width, height, executor);
+  const std::vector<DenoiseMethod> methods = denoise_methods(work.options.nl_means != nullptr);
+  std::vector<DenoiseRow> rows;
+  for (std::size_t light = 0; light < work.lights.size(); ++light) {
+    LightRows of_light(work, light, methods);
+    for (std::size_t picture = 0; picture < work.pictures.size(); ++picture) {
+      if (const auto done = of_light.measure(picture, memory, executor); !done) {
+        return tl::make_unexpected(done.error());
+      }
+      work.options.advance((1 - search_share) / static_cast<double>(work.shots()),
+                           fmt::format("{} at {}", work.pictures[picture].name, name_of(work.lights[light])));
+    }
+    for (DenoiseRow& row : of_light.finished()) rows.push_back(std::move(row));
+    const DenoiseLight& l = work.lights[light];
+    outcome.images.push_back(
+        {fmt::format("denoise-{:g}-{:g}", l.mean_e, l.dark_e), side_by_side(of_light.strip.parts)});
+    if (light == 0) outcome.remarks.push_back("pictures show, from left to right: " + of_light.strip.names);
+  }
+  return rows;
+}
+
+}  // namespace
+
+Result<BenchOutcome> run_denoise_bench(const BenchOptions& options) {
+  PoolExecutor executor(options.threads);
+  const bool quick = options.quick;
+  auto pictures = read_all(options, {options.pictures, quick ? quick_part : Part{0, 0}, quick}, executor);
+  if (!pictures) return tl::make_unexpected(pictures.error());
+  const auto tuning = read_all(options, {PictureSet::tuning, quick ? quick_part : tuning_part}, executor);
+  if (!tuning) return tl::make_unexpected(tuning.error());
+  Work work{options, *std::move(pictures), denoise_lights(options.quick), {}, {}};
+  work.tuned.reserve(work.lights.size());
+  for (const DenoiseLight& light : work.lights) {
+    options.advance(0, "parameters of other methods at " + name_of(light));
+    work.tuned.push_back(tune(*tuning, light, executor));
+  }
+  if (options.nl_means != nullptr) {
+    if (const auto done = search_all(work, executor); !done) return tl::make_unexpected(done.error());
+  }
+  BenchOutcome out{.remarks = remarks_of(work)};
+  const auto rows = measure_all(work, executor, out);
+  if (!rows) return tl::make_unexpected(rows.error());
+  out.table = denoise_table(*rows);
+  out.findings = denoise_findings(*rows);
+  out.plots = denoise_plots(*rows);
+  return out;
+}
+
+}  // namespace lowlux::isp

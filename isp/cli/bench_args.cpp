@@ -1,0 +1,40 @@
+#include "isp/cli/bench_args.h"
+
+#include <CLI/CLI.hpp>
+
+#include "isp/cli/option_values.h"
+
+namespace lowlux::cli {
+
+Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
+  CLI::App app("Measures accuracy against time: each stage at each of its levels, beside other methods.",
+               "lowlux bench");
+  BenchArgs args;
+  app.add_option("--stage", args.stages, "stages to measure (default: all); --list names them")
+      ->type_name("ID[,ID...]")
+      ->delimiter(',')
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_flag("--list", args.list, "the stages, one line each");
+  app.add_option("-o,--output", args.output,
+                 "folder, made if need be, for STAGE.csv, STAGE.json, STAGE.html and parts of pictures (PNG)")
+      ->type_name("DIR");
+  add_choice<isp::PictureSet>(
+      app, "--pictures",
+      {{"held-out", isp::PictureSet::held_out}, {"tuning", isp::PictureSet::tuning}, {"all", isp::PictureSet::all}},
+      [&args](isp::PictureSet set) { args.pictures = set; },
+      "which of the clean pictures; parameters are chosen on the tuning set (default: held-out)");
+  app.add_option("--pictures-folder", args.pictures_folder,
+                 "where the clean pictures are (default: testdata/pictures of the source tree)")
+      ->type_name("DIR");
+  app.add_flag("--quick", args.quick, "parts of two pictures in two lights: seconds, and no final figures");
+  app.add_option("--threads", args.threads, "for all but what is timed (default: one for each processor)")
+      ->check(CLI::Range(1, 256))
+      ->type_name("N");
+  app.add_flag("--json", args.json, "JSON instead of tables");
+  app.add_flag("--force", args.force, "overwrite files that exist");
+  if (const auto code = parse_words(app, words)) return *code;
+  return args;
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,151 @@
+#include "isp/cli/bench_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "isp/cli/findings.h"
+#include "isp/output/image_writer.h"
+
+namespace lowlux::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+constexpr int shown_digits = 4;
+
+/// Columns as wide as their widest cell, figures to the right.
+std::string table_text(const isp::BenchTable& bench) {
+  const isp::Table table = isp::table_of(bench, shown_digits);
+  std::vector<std::size_t> width;
+  width.reserve(table.columns.size());
+  for (const std::string& column : table.columns) width.push_back(column.size());
+  for (const auto& row : table.rows) {
+    for (std::size_t c = 0; c < row.size(); ++c) width[c] = std::max(width[c], row[c].size());
+  }
+  std::string out;
+  const auto line = [&](const std::vector<std::string>& cells) {
+    std::string text;
+    for (std::size_t c = 0; c < cells.size(); ++c) text += fmt::format("{:>{}}  ", cells[c], width[c]);
+    text.erase(text.find_last_not_of(' ') + 1);
+    out += text + '\n';
+  };
+  line(table.columns);
+  for (const auto& row : table.rows) line(row);
+  return out;
+}
+
+Json json_of(const isp::BenchCell& cell) {
+  if (const auto* text = std::get_if<std::string>(&cell)) return *text;
+  const double value = std::get<double>(cell);
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json json_of(const MeasuredStage& measured) {
+  Json rows = Json::array();
+  for (const auto& cells : measured.outcome.table.rows) {
+    Json row = Json::object();
+    for (std::size_t c = 0; c < cells.size(); ++c) row[measured.outcome.table.columns[c]] = json_of(cells[c]);
+    rows.push_back(std::move(row));
+  }
+  return {{"stage", measured.stage.id},
+          {"remarks", measured.outcome.remarks},
+          {"rows", std::move(rows)},
+          {"findings", Json::parse(findings_json(measured.outcome.findings))}};
+}
+
+std::string page_of(const MeasuredStage& measured) {
+  const isp::BenchOutcome& outcome = measured.outcome;
+  std::string remarks;
+  for (const std::string& remark : outcome.remarks) remarks += remark + ". ";
+  return isp::html_of({.title = "lowlux bench: " + std::string(measured.stage.title),
+                       .text = remarks,
+                       .sections = {{"Error against time", {}, {}, outcome.plots},
+                                    {"What was measured", {}, isp::table_of(outcome.table, shown_digits), {}},
+                                    {"What it must show", {}, isp::table_of(outcome.findings), {}}}});
+}
+
+struct OutputFile {
+  std::string name;
+  std::string text;
+};
+
+std::vector<OutputFile> text_files(const MeasuredStage& measured) {
+  constexpr int all_digits = 17;
+  const std::string id(measured.stage.id);
+  return {{id + ".csv", isp::csv_of(isp::table_of(measured.outcome.table, all_digits))},
+          {id + ".json", json_of(measured).dump(2) + "\n"},
+          {id + ".html", page_of(measured)}};
+}
+
+Result<void> check_free(const std::string& name, const BenchArgs& args) {
+  const std::filesystem::path file = std::filesystem::path(args.output) / name;
+  std::error_code ignored;
+  if (args.force || !std::filesystem::exists(file, ignored)) return {};
+  return fail(ErrorCode::exists, "the file exists: use --force to overwrite it", file.string());
+}
+
+Result<void> check_texts_free(const isp::BenchStage& stage, const BenchArgs& args) {
+  for (const char* end : {".csv", ".json", ".html"}) {
+    if (auto free = check_free(std::string(stage.id) + end, args); !free) return free;
+  }
+  return {};
+}
+
+Result<void> check_all_free(const std::vector<MeasuredStage>& measured, const BenchArgs& args) {
+  for (const MeasuredStage& m : measured) {
+    if (auto free = check_texts_free(m.stage, args); !free) return free;
+    for (const isp::BenchImage& image : m.outcome.images) {
+      if (auto free = check_free(image.id + ".png", args); !free) return free;
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string bench_text(const MeasuredStage& measured) {
+  std::string out = fmt::format("{}\n\n", measured.stage.title);
+  for (const std::string& remark : measured.outcome.remarks) out += remark + '\n';
+  return out + '\n' + table_text(measured.outcome.table) + '\n' + findings_text(measured.outcome.findings);
+}
+
+std::string bench_json(const std::vector<MeasuredStage>& measured) {
+  Json out = Json::array();
+  for (const MeasuredStage& m : measured) out.push_back(json_of(m));
+  return out.dump(2);
+}
+
+Result<void> check_bench_files(const std::vector<isp::BenchStage>& stages, const BenchArgs& args) {
+  if (args.output.empty()) return {};
+  for (const isp::BenchStage& stage : stages) {
+    if (auto free = check_texts_free(stage, args); !free) return free;
+  }
+  return {};
+}
+
+Result<void> write_bench_files(const std::vector<MeasuredStage>& measured, const BenchArgs& args, Executor& executor) {
+  std::error_code error;
+  const std::filesystem::path folder(args.output);
+  std::filesystem::create_directories(folder, error);
+  if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
+  if (auto free = check_all_free(measured, args); !free) return free;
+  const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
+  for (const MeasuredStage& m : measured) {
+    for (const OutputFile& file : text_files(m)) {
+      auto written = isp::write_text((folder / file.name).string(), file.text, overwrite);
+      if (!written) return written;
+    }
+    for (const isp::BenchImage& image : m.outcome.images) {
+      auto written = isp::write_picture(Encoded8{image.codes.codes.clone()}, OutputSpace::srgb, {},
+                                        (folder / (image.id + ".png")).string(), {.overwrite = overwrite}, executor);
+      if (!written) return written;
+    }
+  }
+  return {};
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,119 @@
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "isp/bench/bench_stages.h"
+#include "isp/cli/bench_args.h"
+#include "isp/cli/bench_report.h"
+#include "isp/cli/exit_code.h"
+#include "isp/cli/module.h"
+#include "isp/cli/progress.h"
+#include "isp/cli/report.h"
+#include "isp/cli/verbs.h"
+
+namespace lowlux::cli {
+namespace {
+
+Result<std::vector<isp::BenchStage>> chosen(const std::vector<std::string>& ids) {
+  if (ids.empty()) return std::vector<isp::BenchStage>(isp::bench_stages().begin(), isp::bench_stages().end());
+  std::vector<isp::BenchStage> out;
+  out.reserve(ids.size());
+  for (const std::string& id : ids) {
+    const auto stage = isp::bench_stage_named(id);
+    if (!stage) return tl::make_unexpected(stage.error());
+    out.push_back(*stage);
+  }
+  return out;
+}
+
+/// Where the clean pictures are: as given, else in the tree the command was built from.
+Result<std::string> pictures_folder(const BenchArgs& args) {
+  const std::string folder = args.pictures_folder.empty() ? LOWLUX_PICTURES : args.pictures_folder;
+  std::error_code ignored;
+  if (std::filesystem::is_directory(folder, ignored)) return folder;
+  return fail(ErrorCode::not_found,
+              "there is no such folder of pictures: --pictures-folder names the testdata/pictures of lowlux's sources",
+              folder);
+}
+
+Result<const isp::NlMeans*> load_nl_means() {
+  const auto found = load_module({.file = "liblowlux_nlm.so",
+                                  .function = isp::nl_means_name,
+                                  .purpose = "OpenCV's non-local means",
+                                  .needs = "OpenCV's photo module (Debian: libopencv-photo406)"});
+  if (!found) return tl::make_unexpected(found.error());
+  return reinterpret_cast<isp::GetNlMeans*>(*found)();
+}
+
+/// Stages that fail are told of at once; the others go on.
+std::vector<MeasuredStage> run_each(const std::vector<isp::BenchStage>& stages, const isp::BenchOptions& options) {
+  std::vector<MeasuredStage> out;
+  Progress progress(static_cast<int>(stages.size()), true);
+  for (const isp::BenchStage& stage : stages) {
+    isp::BenchOptions with = options;
+    with.advance = [&progress](double share, const std::string& what) { progress.advance(share, what); };
+    auto outcome = stage.run(with);
+    if (outcome) {
+      out.push_back({stage, *std::move(outcome)});
+    } else {
+      const Error& error = outcome.error();
+      const std::string where = error.where.empty() ? std::string(stage.id) : error.where;
+      progress.print([&] { fmt::print(stderr, "{}\n", error_line(where, error)); });
+    }
+  }
+  return out;
+}
+
+isp::BenchOptions options_of(const BenchArgs& args, const std::string& folder) {
+  isp::BenchOptions options{.pictures_folder = folder, .pictures = args.pictures, .quick = args.quick};
+  options.threads =
+      args.threads > 0 ? args.threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  if (const auto nl_means = load_nl_means()) {
+    options.nl_means = *nl_means;
+  } else {
+    options.why_no_nl_means = nl_means.error().message;
+  }
+  return options;
+}
+
+int failed(const Error& error) {
+  fmt::print(stderr, "{}\n", error_line(error.where, error));
+  return exit_failed;
+}
+
+}  // namespace
+
+int run_bench(const std::vector<std::string>& words) {
+  const Parsed<BenchArgs> parsed = parse_bench(words);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& args = std::get<BenchArgs>(parsed);
+  if (args.list) {
+    for (const isp::BenchStage& stage : isp::bench_stages()) fmt::print("{:<10} {}\n", stage.id, stage.title);
+    return exit_done;
+  }
+  const auto stages = chosen(args.stages);
+  if (!stages) {
+    fmt::print(stderr, "{}\n", one_line("lowlux bench: " + stages.error().message));
+    return exit_usage;
+  }
+  const auto folder = pictures_folder(args);
+  if (!folder) return failed(folder.error());
+  if (const auto free = check_bench_files(*stages, args); !free) return failed(free.error());
+  const isp::BenchOptions options = options_of(args, *folder);
+  const std::vector<MeasuredStage> measured = run_each(*stages, options);
+  if (!args.output.empty() && !measured.empty()) {
+    PoolExecutor executor(options.threads);
+    if (const auto written = write_bench_files(measured, args, executor); !written) return failed(written.error());
+  }
+  if (args.json) {
+    fmt::print("{}\n", bench_json(measured));
+  } else {
+    for (const MeasuredStage& stage : measured) fmt::print("{}", bench_text(stage));
+  }
+  return measured.size() == stages->size() ? exit_done : exit_failed;
+}
+
+}  // namespace lowlux::cli

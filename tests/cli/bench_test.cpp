@@ -1,0 +1,101 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/process.h"
+#include "tests/support/scratch_directory.h"
+
+namespace lowlux {
+namespace {
+
+using Json = nlohmann::json;
+
+test::ProcessResult bench(std::vector<std::string> args) {
+  args.insert(args.begin(), {LOWLUX_COMMAND, "bench"});
+  return test::run_process(args);
+}
+
+const std::string pictures = LOWLUX_TESTDATA "/pictures";
+
+TEST(Bench, ListNamesTheStagesAndMeasuresNone) {
+  const auto list = bench({"--list"});
+  EXPECT_EQ(list.exit_code, 0);
+  EXPECT_TRUE(list.out.starts_with("denoise "));
+  EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), 1);
+}
+
+TEST(Bench, HelpNamesTheOptions) {
+  const auto help = bench({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  for (const char* option : {"--stage", "--quick", "--json", "--pictures", "--threads", "--force", "--output"}) {
+    EXPECT_NE(help.out.find(option), std::string::npos) << option;
+  }
+}
+
+TEST(Bench, MeasuresEveryMethodInEveryLightAndWritesAllFiles) {
+  const test::ScratchDirectory scratch;
+  const std::string folder = scratch.file("a/b");
+  const auto result = bench({"--stage", "denoise", "--quick", "--json", "--pictures-folder", pictures, "-o", folder});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  const Json stage = Json::parse(result.out).at(0);
+  EXPECT_EQ(stage["stage"], "denoise");
+  std::set<std::string> methods;
+  for (const Json& row : stage["rows"]) {
+    methods.insert(row["method"].get<std::string>());
+    EXPECT_GT(row["psnr_db"].get<double>(), 0);
+    EXPECT_EQ(row["s_per_mp"].is_null(), row["method"] == "noise-free");
+  }
+  for (const char* method :
+       {"noise-free", "none", "dark-left-in", "chromatic", "opencv-nlm", "gat-standard", "draft", "standard", "high"}) {
+    EXPECT_EQ(methods.count(method), 1u) << method;
+  }
+  EXPECT_EQ(stage["rows"].size(), 2 * methods.size());
+  EXPECT_TRUE(std::any_of(stage["findings"].begin(), stage["findings"].end(),
+                          [](const Json& f) { return f["id"] == "denoise/nlm-psnr-20/2" && f["holds"].is_boolean(); }));
+  EXPECT_EQ(Json::parse(scratch.read("a/b/denoise.json")), stage);
+  EXPECT_TRUE(scratch.read("a/b/denoise.csv").starts_with("mean_e,dark_e,read_noise_e,method,psnr_db,"));
+  EXPECT_NE(scratch.read("a/b/denoise.html").find("<canvas"), std::string::npos);
+  EXPECT_EQ(scratch.read("a/b/denoise-20-2.png").substr(1, 3), "PNG");
+  EXPECT_FALSE(scratch.read("a/b/denoise-4-200.png").empty());
+}
+
+TEST(Bench, AFileInTheWayStopsItBeforeTheWork) {
+  const test::ScratchDirectory scratch;
+  scratch.write("denoise.html", "mine");
+  const auto result = bench({"--pictures-folder", pictures, "-o", scratch.path()});  // not quick: it would take minutes
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_NE(result.err.find("--force"), std::string::npos) << result.err;
+  EXPECT_EQ(scratch.read("denoise.html"), "mine");
+  EXPECT_EQ(scratch.names().size(), 1u);
+}
+
+TEST(Bench, WithoutPicturesItSaysWhereTheyAre) {
+  const test::ScratchDirectory scratch;
+  const auto missing = bench({"--pictures-folder", scratch.file("none")});
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_NE(missing.err.find("--pictures-folder"), std::string::npos) << missing.err;
+  EXPECT_EQ(std::count(missing.err.begin(), missing.err.end(), '\n'), 1);
+  const auto empty = bench({"--quick", "--pictures-folder", scratch.path()});
+  EXPECT_EQ(empty.exit_code, 1);
+  EXPECT_NE(empty.err.find(".png"), std::string::npos) << empty.err;
+}
+
+TEST(Bench, WrongCommandLinesExitWithTwo) {
+  const std::vector<std::vector<std::string>> wrong{
+      {"--stage", "zzz"}, {"--stage"}, {"--pictures", "none"}, {"--threads", "0"}, {"--threads", "x"},
+      {"denoise"},        {"-o"}};
+  for (const auto& args : wrong) {
+    const auto result = bench(args);
+    EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(args);
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_EQ(result.out, "");
+  }
+}
+
+}  // namespace
+}  // namespace lowlux
