@@ -147,6 +147,8 @@ Encoded8 codes_of(const RgbView<const float>& display) {
   return out;
 }
 
+Encoded8 nl_means_input(const RenderedPicture& picture) { return codes_of(picture.light.view()); }
+
 SceneLinear linear_of(const Encoded8& codes) {
   std::array<float, 256> linear{};
   for (std::size_t i = 0; i < linear.size(); ++i) {

@@ -42,6 +42,10 @@ using GetNlMeans = const NlMeans*() noexcept;
 /// Interleaved 8-bit sRGB codes of display values, rounded.
 Encoded8 codes_of(const RgbView<const float>& display);
 
+/// What non-local means start from: codes with each channel clipped by itself, which serves them better in the dark
+/// than moving noise into the gamut, by some 2 dB at 4 e- over 200 e-.
+Encoded8 nl_means_input(const RenderedPicture& picture);
+
 /// The way back: linear display values of codes.
 SceneLinear linear_of(const Encoded8& codes);
 
