@@ -64,9 +64,10 @@ struct DenoiseOptions {
 struct DenoiseMaps {
   PlaneView<float> residual_variance;  // of white-balanced luma 0.2 R + 0.3 G1 + 0.3 G2 + 0.2 B [e-^2]
   PlaneView<float> chroma_confidence;  // 0..1, the factor above for the mean variance of the two colour differences
-  /// Predicted variance of the noise that is left in R, in the mean of both greens and in B [e-^2], white balance
-  /// undone: with the planes' residual variances r and the factors f of their confidence,
-  ///     (r_L + 0.36 f1^2 r_C1 + f2^2 r_C2 / 2) / gain^2 of R and B,  (r_L + 0.16 f1^2 r_C1) / gain^2 of G.
+  /// Predicted variance of the noise that is left in a site of R, G and B [e-^2], white balance undone: with the
+  /// planes' residual variances r and the factors f of their confidence,
+  ///     (r_L + 0.36 f1^2 r_C1 + f2^2 r_C2 / 2) / gain^2 of R and B,  (r_L + 0.16 f1^2 r_C1 + f3^2 r_C3 / 4) / gain^2
+  /// of G.
   /// What rho takes from colour is not in it, nor is that point sources are left as noisy as they were.
   std::array<PlaneView<float>, 3> site_variance;
 };

@@ -131,10 +131,11 @@ double SumOf(const float* in, int count) {
 }
 
 /// Variance left in R, G and B, from that left in C1 and C2.
-HWY_INLINE void site_variances(const UnpackRow& in, const UnpackedRow& out, int i, VF left1, VF left2) {
+HWY_INLINE void site_variances(const UnpackRow& in, const UnpackedRow& out, int i, const VF (&left)[4]) {
   const VF luma = load(in.residual[0] + i);
-  const VF other = hn::MulAdd(constant(0.5f), left2, hn::MulAdd(constant(0.36f), left1, luma));
-  const VF of_colour[3] = {other, hn::MulAdd(constant(0.16f), left1, luma), other};
+  const VF other = hn::MulAdd(constant(0.5f), left[2], hn::MulAdd(constant(0.36f), left[1], luma));
+  const VF green = hn::MulAdd(constant(0.25f), left[3], hn::MulAdd(constant(0.16f), left[1], luma));
+  const VF of_colour[3] = {other, green, other};
   for (int k = 0; k < 3; ++k) {
     if (out.variance_e2[k] == nullptr) continue;
     store(hn::Mul(constant(in.per_gain[k] * in.per_gain[k]), of_colour[k]), out.variance_e2[k] + i);
@@ -177,16 +178,15 @@ void UnpackCells(const UnpackRow& in, const UnpackedRow& out) {
     const auto factor = [&](VF residual) HWY_ATTR {  // residual > 0
       return prior ? hn::Div(power, hn::Add(power, residual)) : constant(1);
     };
-    VF c[4], residual[4], share[4];
+    VF c[4], residual[4], share[4], left[4];
     for (int p = 1; p < 4; ++p) {
       residual[p] = hn::Max(load(in.residual[p] + i), constant(1e-30f));
       share[p] = factor(residual[p]);
       c[p] = hn::Mul(load(in.plane[p] + i), share[p]);
+      left[p] = hn::Mul(hn::Mul(share[p], share[p]), residual[p]);
     }
     store(factor(hn::Mul(constant(0.5f), hn::Add(residual[1], residual[2]))), out.confidence + i);
-    const VF left1 = hn::Mul(hn::Mul(share[1], share[1]), residual[1]);
-    const VF left2 = hn::Mul(hn::Mul(share[2], share[2]), residual[2]);
-    site_variances(in, out, i, left1, left2);
+    site_variances(in, out, i, left);
     add_slopes(in.luma_beside[0], in.plane[0], in.luma_beside[1], in.slopes, i, c[2], c[3]);
     const VF half = hn::MulAdd(constant(0.6f), c[1], luma), skew = hn::Mul(constant(per_root2), c[2]);
     const VF green = hn::MulAdd(constant(-0.4f), c[1], luma), maze = hn::Mul(constant(0.5f), c[3]);

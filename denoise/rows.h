@@ -130,7 +130,7 @@ struct UnpackRow {
 struct UnpackedRow {
   float* signal_e[2];  // the row with red, the row with blue
   float* confidence;
-  float* variance_e2[3];  // of R, the mean of both greens, B; null: not wanted
+  float* variance_e2[3];  // of sites of R, G, B; null: not wanted
 };
 void unpack_row(const UnpackRow& in, const UnpackedRow& out);
 

@@ -68,7 +68,8 @@ struct Calibration {
     squared[0] += std::pow(luma_of(got) - luma_of(truth), 2);
     for (int k = 0; k < 3; ++k) {
       predicted[k + 1] += static_cast<double>(out.site_variance[k].at(x, y));
-      squared[k + 1] += std::pow(got[k] - truth[k], 2);
+      const double site = k == 1 ? static_cast<double>(out.signal.at(2 * x + 1, 2 * y)) : got[k];
+      squared[k + 1] += std::pow(site - truth[k], 2);
     }
     ++count;
   }

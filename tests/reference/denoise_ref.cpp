@@ -281,7 +281,8 @@ Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const Denoi
         if (at_x < raw.value.width && at_y < raw.value.height) out.signal_e.at(at_x, at_y) = x[k] / frame.gain[k];
       }
       const double kept = out.residual_variance.at(cx, cy) = p.residual[0].at(cx, cy);
-      const std::array<double, 3> of_colour{kept + 0.36 * left[1] + 0.5 * left[2], kept + 0.16 * left[1],
+      const std::array<double, 3> of_colour{kept + 0.36 * left[1] + 0.5 * left[2],
+                                            kept + 0.16 * left[1] + 0.25 * left[3],
                                             kept + 0.36 * left[1] + 0.5 * left[2]};
       for (int k = 0; k < 3; ++k) {
         out.site_variance[k].at(cx, cy) = of_colour[k] / std::pow(frame.options.white_gain[k], 2);

@@ -1,0 +1,230 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include "isp/pipeline/develop.h"
+#include "isp/pipeline/pipeline.h"
+#include "tests/pipeline/night_frames.h"
+
+namespace lowlux::isp {
+namespace {
+
+using denoise::Level;
+using denoise_testing::Camera;
+using denoise_testing::flat;
+using Mode = DenoiseChoice::Mode;
+
+InlineExecutor executor;
+
+DevelopOptions linear(const DenoiseChoice& choice) {
+  DevelopOptions options{
+      .exposure_ev = 0, .tone = ToneCurve::none, .space = OutputSpace::linear_srgb, .samples = SampleType::f32};
+  options.find_defects = false;
+  options.denoise = choice;
+  return options;
+}
+
+DevelopPlan planned(const RawFrame& frame, const DenoiseChoice& choice) {
+  Result<DevelopPlan> plan = plan_develop(frame, linear(choice), executor);
+  EXPECT_TRUE(plan) << plan.error().message;
+  return *std::move(plan);
+}
+
+Developed developed(const RawFrame& frame, const DenoiseChoice& choice) {
+  Result<Developed> out = develop(frame, linear(choice), executor);
+  EXPECT_TRUE(out) << out.error().message;
+  return *std::move(out);
+}
+
+// A neutral of so many electrons of green; red and blue get what the camera's neutral leaves them.
+denoise_testing::Scene grey(double green_e) { return flat(0.5 * green_e, green_e, 0.625 * green_e); }
+
+/// Root mean square distance of green from that of the scene, away from the borders.
+double green_error(const Developed& out, double expected) {
+  const auto& green = std::get<SceneLinear>(out.picture).plane[1];
+  double sum = 0;
+  int count = 0;
+  for (int y = 16; y < green.height() - 16; ++y) {
+    for (int x = 16; x < green.width() - 16; ++x, ++count) sum += std::pow(green.at(x, y) - expected, 2);
+  }
+  return std::sqrt(sum / count);
+}
+
+TEST(NoiseReduction, LevelsGoByTheSignalToNoiseRatio) {
+  EXPECT_EQ(level_for(0), Level::high);
+  EXPECT_EQ(level_for(2.99), Level::high);
+  EXPECT_EQ(level_for(3), Level::standard);
+  EXPECT_EQ(level_for(19.9), Level::standard);
+  EXPECT_EQ(level_for(20), Level::draft);
+  EXPECT_EQ(level_for(59.9), Level::draft);
+  EXPECT_EQ(level_for(60), std::nullopt);
+}
+
+TEST(NoiseReduction, ThePredictedRatioIsThatOfAPixel) {
+  const Camera camera{.read_noise_e = 3};
+  const auto plan = planned(test::night_frame(camera, flat(20, 40, 30), 256, 256), {.mode = Mode::automatic});
+  const double variance = 32.5 + 9 + 1.0 / 12 / 16;  // mean of the four sites, and what the model says beyond it
+  ASSERT_TRUE(plan.noise_reduction.snr);
+  // Of the middle block; blocks are single pixels of the thumbnail, means of at least one cell.
+  EXPECT_NEAR(*plan.noise_reduction.snr, 32.5 / std::sqrt(variance), 0.5);
+  EXPECT_EQ(plan.noise_reduction.level, Level::standard);
+  EXPECT_EQ(plan.noise_reduction.source, NoiseProfile::Source::file);
+}
+
+TEST(NoiseReduction, GainsMakeANeutralEqualInElectrons) {
+  RawFrame frame = test::night_frame({}, grey(50), 64, 64);
+  const auto same = planned(frame, {.mode = Mode::level}).noise_reduction.options.white_gain;
+  EXPECT_NEAR(same[0], 2, 1e-6);
+  EXPECT_NEAR(same[1], 1, 1e-6);
+  EXPECT_NEAR(same[2], 1.6, 1e-6);
+  frame.noise->scale[0] /= 2;  // red counts two electrons for each of the others'
+  EXPECT_NEAR(planned(frame, {.mode = Mode::level}).noise_reduction.options.white_gain[0], 1, 1e-6);
+}
+
+TEST(NoiseReduction, EveryLevelBringsAFlatCloserToTheSceneAndAutomaticDoesToo) {
+  const double green_e = 20, expected = green_e / test::night_full_e();
+  const RawFrame frame = test::night_frame({}, grey(green_e), 160, 128);
+  const double before = green_error(developed(frame, {}), expected);
+  for (const Level level : denoise::all_levels) {
+    const Developed out = developed(frame, {Mode::level, level});
+    EXPECT_EQ(out.plan.noise_reduction.level, level);
+    EXPECT_LT(green_error(out, expected), 0.2 * before) << name_of(level);  // a mean of some hundred cells
+  }
+  EXPECT_LT(green_error(developed(frame, {.mode = Mode::automatic}), expected), 0.2 * before);
+}
+
+TEST(NoiseReduction, DarkChargeThatTheBlackPointKnowsIsTakenOffWithItsNoise) {
+  const Camera camera{.dark_e = {200, 200, 200, 200}, .read_noise_e = 4};
+  RawFrame frame = test::night_frame(camera, grey(40), 160, 128);
+  DevelopOptions options = linear({Mode::level, Level::standard});
+  options.black.choice = BlackChoice::measured;
+  options.black.measured.pedestal_dn.fill(test::night_black_dn);
+  options.black.measured.dark_mean_e = camera.dark_e;
+  const auto out = develop(frame, options, executor);
+  ASSERT_TRUE(out);
+  EXPECT_EQ(out->plan.noise_reduction.noise.dark_mean_e, camera.dark_e);
+  // 15.5 e- of noise, a twentieth of it left
+  EXPECT_LT(green_error(*out, 40 / test::night_full_e()), 1.5 / test::night_full_e());
+}
+
+TEST(NoiseReduction, UnknownNoiseIsLeftOrAnErrorIfALevelWasAskedFor) {
+  RawFrame frame = test::night_frame({}, grey(20), 64, 64);
+  frame.noise.reset();
+  const Developed off = developed(frame, {}), automatic = developed(frame, {.mode = Mode::automatic});
+  EXPECT_EQ(automatic.plan.noise_reduction.level, std::nullopt);
+  EXPECT_NE(automatic.plan.noise_reduction.reason.find("NoiseProfile"), std::string::npos);
+  const auto &a = std::get<SceneLinear>(off.picture).plane[0], &b = std::get<SceneLinear>(automatic.picture).plane[0];
+  EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(float)), 0);
+  const auto asked = plan_develop(frame, linear({Mode::level, Level::draft}), executor);
+  ASSERT_FALSE(asked);
+  EXPECT_EQ(asked.error().code, ErrorCode::insufficient);
+}
+
+TEST(NoiseReduction, FramesWithoutMosaicAreLeftOrAnErrorIfALevelWasAskedFor) {
+  RawFrame frame = test::night_frame({}, grey(20), 64, 64);
+  frame.raw.layout = SensorLayout::monochrome;
+  EXPECT_EQ(planned(frame, {.mode = Mode::automatic}).noise_reduction.level, std::nullopt);
+  const auto asked = plan_develop(frame, linear({Mode::level, Level::draft}), executor);
+  ASSERT_FALSE(asked);
+  EXPECT_EQ(asked.error().code, ErrorCode::unsupported);
+}
+
+TEST(NoiseReduction, ABrightFrameIsLeftUnlessItIsAlwaysToBeReduced) {
+  const RawFrame frame = test::night_frame({}, grey(3900), 128, 96);
+  const auto plan = planned(frame, {.mode = Mode::automatic});
+  EXPECT_EQ(plan.noise_reduction.level, level_for(*plan.noise_reduction.snr));
+  RawFrame brighter = test::night_frame({}, grey(3900), 128, 96);
+  for (auto& s : brighter.noise->scale) s /= 4;
+  for (auto& o : brighter.noise->offset) o /= 16;
+  const auto bright = planned(brighter, {.mode = Mode::automatic});
+  EXPECT_EQ(bright.noise_reduction.level, std::nullopt);
+  EXPECT_TRUE(bright.from_codes);
+  EXPECT_EQ(planned(brighter, {.mode = Mode::automatic, .always = true}).noise_reduction.level, Level::draft);
+}
+
+TEST(NoiseReduction, AGainThatIsFourTimesOffIsWarnedOf) {
+  const RawFrame right = test::night_frame({}, grey(100), 256, 256);
+  EXPECT_TRUE(planned(right, {.mode = Mode::level}).warnings.empty());
+  for (const double factor : {0.25, 4.0}) {
+    RawFrame wrong = test::night_frame({}, grey(100), 256, 256);
+    for (auto& s : wrong.noise->scale) s *= factor;
+    for (auto& o : wrong.noise->offset) o *= factor;
+    const auto warnings = planned(wrong, {.mode = Mode::level}).warnings;
+    ASSERT_FALSE(warnings.empty()) << factor;
+    EXPECT_NE(warnings.back().find("noise is suspicious"), std::string::npos) << warnings.back();
+  }
+}
+
+TEST(NoiseReduction, APedestalThatIsTooHighIsWarnedOf) {
+  const RawFrame frame = test::night_frame({}, grey(1), 256, 256);
+  DevelopOptions options = linear({.mode = Mode::level});
+  options.black.choice = BlackChoice::given;
+  options.black.given_dn.fill(test::night_black_dn + 20);
+  const auto plan = plan_develop(frame, options, executor);
+  ASSERT_TRUE(plan);
+  ASSERT_FALSE(plan->warnings.empty());
+  EXPECT_NE(plan->warnings.front().find("black level is suspicious"), std::string::npos) << plan->warnings.front();
+}
+
+RawFrame with_row_noise(double std_e) {
+  RawFrame frame = test::night_frame({}, grey(20), 256, 256);
+  std::vector<float> normal(256);
+  normal_row({.seed = 7}, 0, 0, 2, normal);
+  for (int y = 0; y < 256; ++y) {
+    const auto shift =
+        static_cast<int>(std::lround(test::night_gain_dn_per_e * std_e * static_cast<double>(normal[y])));
+    for (int x = 0; x < 256; ++x) frame.raw.dn.at(x, y) = static_cast<std::uint16_t>(frame.raw.dn.at(x, y) + shift);
+  }
+  return frame;
+}
+
+TEST(NoiseReduction, RowNoiseIsTakenOffWhereItStandsOut) {
+  const auto lines = planned(with_row_noise(1), {.mode = Mode::level}).noise_reduction.lines;
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_EQ(lines[0].lines, denoise::Lines::rows);
+  EXPECT_NEAR(lines[0].line_std_e, 1, 5 / std::sqrt(2.0 * 256) + 0.1);  // of 256 rows, and of their measurement
+  EXPECT_TRUE(planned(with_row_noise(0), {.mode = Mode::level}).noise_reduction.lines.empty());
+  EXPECT_TRUE(planned(with_row_noise(1), {.mode = Mode::level, .line_noise = false}).noise_reduction.lines.empty());
+}
+
+TEST(NoiseReduction, MapsAreThoseOfTheActiveAreaIfAskedFor) {
+  RawFrame frame = test::night_frame({}, grey(20), 97, 63);
+  frame.raw.default_crop = {8, 8, 64, 32};
+  EXPECT_TRUE(developed(frame, {.mode = Mode::level}).noise_maps.chroma_confidence.empty());
+  const Developed out = developed(frame, {.mode = Mode::level, .maps = true});
+  EXPECT_EQ(out.noise_maps.chroma_confidence.width(), 49);
+  EXPECT_EQ(out.noise_maps.residual_variance_e2.height(), 32);
+  EXPECT_GT(out.noise_maps.residual_variance_e2.at(20, 20), 0);
+  EXPECT_LE(out.noise_maps.chroma_confidence.at(20, 20), 1);
+  EXPECT_EQ(std::get<SceneLinear>(out.picture).width(), 64);
+}
+
+TEST(NoiseReduction, OnePipelineTakesFramesOfAnySizeAndLevelOneAfterTheOther) {
+  Pipeline pipeline(executor);
+  for (const Level level : {Level::draft, Level::best, Level::high}) {
+    for (const int width : {96, 40, 122}) {
+      const RawFrame frame = test::night_frame({}, grey(20), width, 70);
+      const DevelopPlan plan = planned(frame, {Mode::level, level});
+      Picture again = make_picture(plan);
+      pipeline.render(frame, plan, again);
+      const Developed fresh = developed(frame, {Mode::level, level});
+      const auto &a = std::get<SceneLinear>(again).plane[1], &b = std::get<SceneLinear>(fresh.picture).plane[1];
+      EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(float)), 0) << width;
+    }
+  }
+}
+
+TEST(NoiseReduction, FramesOfAFewPixelsAreDeveloped) {
+  for (const int size : {2, 3, 5, 9, 17}) {
+    const Developed out = developed(test::night_frame({}, grey(20), size, size), {.mode = Mode::level, .maps = true});
+    for (const float value : {std::get<SceneLinear>(out.picture).plane[1].at(size - 1, size - 1),
+                              out.noise_maps.residual_variance_e2.at(0, 0)}) {
+      EXPECT_TRUE(std::isfinite(value)) << size;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lowlux::isp
