@@ -131,6 +131,7 @@ template <class Visitor, class Profile>
 void visit_profile(Visitor& v, Profile& p) {
   v.text("make", p.make);
   v.text("model", p.model);
+  v.text("mosaic", p.mosaic);
   v.list("gains", p.gains, most_gains, [](Visitor& inner, auto& gain) { visit_gain(inner, gain); });
   v.list("colours", p.colours, most_colours, [](Visitor& inner, auto& colour) { visit_colour(inner, colour); });
 }

@@ -12,6 +12,7 @@
 namespace lowlux::calib {
 namespace {
 
+constexpr const char* monochrome = "monochrome";
 constexpr double hot_deviations = 6;
 constexpr double same_exposure = 0.01;    // relative
 constexpr double telling_charge_e = 0.2;  // dark charge below this moves no black point that can be measured
@@ -22,6 +23,22 @@ Result<void> check_camera(const CameraProfile& profile, const FrameInfo& info) {
   if (!differs(profile.make, info.make) && !differs(profile.model, info.model)) return {};
   return fail(ErrorCode::invalid_argument, fmt::format(R"(the profile is of "{} {}", the frame of "{} {}")",
                                                        profile.make, profile.model, info.make, info.model));
+}
+
+/// A mode of the sensor or a crop may begin at another site.
+Result<void> check_mosaic(const CameraProfile& profile, const RawDn& frame, std::vector<std::string>& warnings) {
+  const std::string mosaic = mosaic_of(frame);
+  if (profile.mosaic.empty() || profile.mosaic == mosaic) return {};
+  if (profile.mosaic == monochrome || mosaic == monochrome) {
+    return fail(
+        ErrorCode::invalid_argument,
+        fmt::format("the profile was measured on a sensor that is {}, the frame is {}", profile.mosaic, mosaic));
+  }
+  warnings.push_back(
+      fmt::format("the profile was measured on a {} mosaic, the frame is {}: what it says of sites may "
+                  "be that of others; calibrate in the mode the picture was taken in",
+                  profile.mosaic, mosaic));
+  return {};
 }
 
 int channel_of(const RawDn& frame, int site) {
@@ -168,12 +185,20 @@ void list_hot_pixels(const GainProfile& gain, const RawDn& frame, ProfileAtFrame
 
 }  // namespace
 
+std::string mosaic_of(const RawDn& frame) {
+  if (frame.layout == SensorLayout::linear_rgb) return "";
+  if (frame.layout == SensorLayout::monochrome) return monochrome;
+  constexpr std::array phases{"RGGB", "GRBG", "GBRG", "BGGR"};
+  return phases[static_cast<std::size_t>(frame.phase)];
+}
+
 Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame) {
   if (frame.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported, "the frame is already demosaiced: a profile tells of the mosaic");
   }
   if (const auto same = check_camera(profile, frame.info); !same) return tl::make_unexpected(same.error());
   ProfileAtFrame out;
+  if (const auto fits = check_mosaic(profile, frame, out.warnings); !fits) return tl::make_unexpected(fits.error());
   if (profile.gains.empty()) return out;
   auto found = gain_at_iso(profile, frame.info.iso);
   if (!found) return tl::make_unexpected(found.error());

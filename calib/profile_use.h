@@ -10,6 +10,9 @@
 
 namespace lowlux::calib {
 
+/// RGGB, GRBG, GBRG, BGGR, or monochrome; empty for frames that are demosaiced.
+std::string mosaic_of(const RawDn& frame);
+
 /// What a camera's profile says about one frame.
 struct ProfileAtFrame {
   std::optional<BlackPoint> black;     // at the frame's gain, exposure and temperature; the dark charge is in it.
@@ -24,9 +27,10 @@ struct ProfileAtFrame {
 /// The profile at a frame's setting.
 /// Gain: between two measured ISO settings gain and read noise follow straight lines in log-log, levels in the
 /// logarithm of the ISO; beyond them the gain follows the ISO, with a warning. Exposure: pedestal + K D t. Temperature:
-/// the profile's doubling figure. Warnings for exposures and temperatures beyond those of the darks. Errors: another
-/// camera; a frame that states no ISO where the profile has several; no exposure time where dark current
-/// needs it. A profile without gain settings says nothing about a frame.
+/// the profile's doubling figure. Errors and warnings of the mosaic: one is a mosaic and the other monochrome (error);
+/// the phases differ (warning: levels of sites may belong to others). Warnings for exposures and temperatures beyond
+/// those of the darks. Errors: another camera; a frame that states no ISO where the profile has several; no exposure
+/// time where dark current needs it. A profile without gain settings says nothing about a frame.
 Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame);
 
 }  // namespace lowlux::calib

@@ -80,6 +80,7 @@ struct CameraProfile {
   std::string model;
   std::vector<GainProfile> gains;
   std::vector<ColourProfile> colours;
+  std::string mosaic;  // of the frames that were measured: RGGB, GRBG, GBRG, BGGR or monochrome; empty if unknown
 };
 
 }  // namespace lowlux

@@ -7,6 +7,7 @@
 #include "calib/dark_gain.h"
 #include "calib/dark_series.h"
 #include "calib/dark_sorter.h"
+#include "calib/profile_use.h"
 #include "isp/cli/black_report.h"
 #include "isp/cli/calibration.h"
 #include "isp/cli/progress.h"
@@ -55,6 +56,7 @@ struct Darks {
   std::vector<calib::DarkSet> sets;
   std::vector<std::pair<std::optional<double>, std::string>> files;  // with their ISO
   FrameInfo camera;
+  std::string mosaic;
 };
 
 calib::Measured measured_on(const Darks& darks, const std::optional<double>& iso) {
@@ -73,6 +75,7 @@ Result<Darks> read_darks(const CalibrateBlackArgs& args) {
     auto frame = read_calibration_frame(file, args.common);
     if (!frame) return tl::make_unexpected(frame.error());
     out.camera = frame->raw.info;
+    out.mosaic = calib::mosaic_of(frame->raw);
     out.files.emplace_back(frame->raw.info.iso, file);
     const auto dark = dark_part(std::move(frame->raw), args);
     if (!dark) return tl::make_unexpected(at(dark.error(), file));
@@ -161,6 +164,7 @@ Result<Calibration> calibrate(const CalibrateBlackArgs& args) {
   found.profile = std::move(*profile);
   found.report.title = fmt::format("{} {}: black point", darks->camera.make, darks->camera.model);
   if (const auto same = put_camera(darks->camera, found.profile); !same) return tl::make_unexpected(same.error());
+  if (const auto same = put_mosaic(darks->mosaic, found.profile); !same) return tl::make_unexpected(same.error());
   for (const calib::DarkSet& set : darks->sets) {
     const auto done = calibrate_set(set, *darks, args, found);
     if (!done) return tl::make_unexpected(done.error());

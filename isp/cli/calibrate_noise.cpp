@@ -7,6 +7,7 @@
 
 #include "calib/pair_statistics.h"
 #include "calib/photon_transfer.h"
+#include "calib/profile_use.h"
 #include "isp/base/executor.h"
 #include "isp/cli/black_report.h"
 #include "isp/cli/calibration.h"
@@ -26,6 +27,9 @@ Result<void> read_pairs(const std::vector<std::string>& files, const CalibrateAr
     auto frame = read_calibration_frame(file, args);
     if (!frame) return tl::make_unexpected(frame.error());
     if (const auto same = put_camera(frame->raw.info, profile); !same) {
+      return fail(same.error().code, same.error().message, file);
+    }
+    if (const auto same = put_mosaic(calib::mosaic_of(frame->raw), profile); !same) {
       return fail(same.error().code, same.error().message, file);
     }
     if (auto added = pairs.add(std::move(frame->raw), file); !added) return added;
@@ -119,6 +123,7 @@ Result<Calibration> calibrate_picture(const CalibrateNoiseArgs& args) {
   found.profile = std::move(*profile);
   found.report.title = fmt::format("{} {}: noise of one picture", frame->raw.info.make, frame->raw.info.model);
   if (const auto same = put_camera(frame->raw.info, found.profile); !same) return at(same.error());
+  if (const auto same = put_mosaic(calib::mosaic_of(frame->raw), found.profile); !same) return at(same.error());
   for (const std::string& reason : noise->reasons) found.warnings.push_back(fmt::format("{}: {}", file, reason));
   calib::put_picture_noise(*noise, *black, *setting, measured_today({file}), calib::gain_at(found.profile, *setting));
   show_picture_noise(*noise, *frame, *black, found);

@@ -65,6 +65,16 @@ Result<void> put_camera(const FrameInfo& info, CameraProfile& profile) {
   return {};
 }
 
+Result<void> put_mosaic(const std::string& mosaic, CameraProfile& profile) {
+  if (!profile.mosaic.empty() && !mosaic.empty() && profile.mosaic != mosaic) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("the profile is of a sensor that is {}, what is to be added of one that is {}",
+                            profile.mosaic, mosaic));
+  }
+  if (profile.mosaic.empty()) profile.mosaic = mosaic;
+  return {};
+}
+
 calib::Measured measured_today(std::vector<std::string> files) {
   const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   for (std::string& file : files) file = readable(std::filesystem::path(file).filename().string());

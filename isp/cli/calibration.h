@@ -36,6 +36,9 @@ Result<RawFrame> read_calibration_frame(const std::string& file, const Calibrate
 /// Error: it is another one's.
 Result<void> put_camera(const FrameInfo& info, CameraProfile& profile);
 
+/// Makes the profile one of this mosaic; a profile without one fits any. Error: it is another.
+Result<void> put_mosaic(const std::string& mosaic, CameraProfile& profile);
+
 /// Source and date of what is measured today.
 calib::Measured measured_today(std::vector<std::string> files);
 

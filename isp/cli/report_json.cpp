@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "calib/profile_use.h"
 #include "isp/cli/report.h"
 #include "isp/cli/source_names.h"
 #include "isp/model/camera_colour.h"
@@ -144,10 +145,7 @@ std::string info_json(const std::string& file, const RawFrame& frame) {
       {"default_crop", rect_json(raw.default_crop)},
       {"orientation", static_cast<int>(raw.info.orientation)},
       {"white_dn", raw.white_dn}};
-  if (raw.layout == SensorLayout::bayer) {
-    static constexpr const char* phases[] = {"RGGB", "GRBG", "GBRG", "BGGR"};
-    json["cfa"] = phases[static_cast<int>(raw.phase)];
-  }
+  if (raw.layout == SensorLayout::bayer) json["cfa"] = calib::mosaic_of(raw);
   json["masked"] = Json::array();
   for (const Rect& r : raw.masked) json["masked"].push_back(rect_json(r));
   json["masked_is_stated"] = raw.masked_is_stated;

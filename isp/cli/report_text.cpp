@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/profile_use.h"
 #include "isp/cli/lines.h"
 #include "isp/cli/report.h"
 #include "isp/model/camera_colour.h"
@@ -16,11 +17,8 @@ namespace {
 std::string rect_text(const Rect& r) { return fmt::format("{} x {} at ({}, {})", r.width, r.height, r.x, r.y); }
 
 void add_layout(Lines& out, const RawDn& raw) {
-  static constexpr const char* phases[] = {"RGGB", "GRBG", "GBRG", "BGGR"};
   const bool rgb = raw.layout == SensorLayout::linear_rgb;
-  const char* layout = raw.layout == SensorLayout::bayer ? phases[static_cast<int>(raw.phase)]
-                       : rgb                             ? "demosaiced RGB"
-                                                         : "monochrome";
+  const std::string layout = rgb ? "demosaiced RGB" : calib::mosaic_of(raw);
   out.add("readout", fmt::format("{} x {}, {}", raw.dn.width() / (rgb ? 3 : 1), raw.dn.height(), layout));
   out.add("active area", rect_text(raw.active));
   if (raw.default_crop != Rect{0, 0, raw.active.width, raw.active.height})
