@@ -118,14 +118,14 @@ rows::PackRow Run::packing(const ThreadMemory& m) const {
   for (int i = 0; i < 2; ++i) in.raw[i] = m.raw[i];
   in.red_is_odd = red_column(raw.phase) == 1;
   in.cells = columns;
-  const double saturation_e = std::min(noise.saturation_e, largest_e);
-  const double most = *std::max_element(options.white_gain.begin(), options.white_gain.end()) * saturation_e;
-  in.saturation_e = static_cast<float>(noise.saturation_e);
+  double most = 0;
+  for (int k = 0; k < 3; ++k) most = std::max(most, options.white_gain[k] * std::min(noise.saturation_e[k], largest_e));
   // No coefficient exceeds its threshold, on any level: what unsees is not scaled down with the noise.
   const auto& scale = options.variance_scale;
   const auto [least, largest] = std::minmax_element(scale.begin(), scale.end());
   in.blind_variance = static_cast<float>(scale[0] * std::min(1e9 * most * most / *least, 1e33 / *largest));
   for (int k = 0; k < 3; ++k) {
+    in.saturation_e[k] = static_cast<float>(noise.saturation_e[k]);
     in.dark_e[k] = static_cast<float>(dark_e[k]);
     in.gain[k] = static_cast<float>(options.white_gain[k]);
   }
@@ -227,7 +227,8 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
 
 [[maybe_unused]] bool usable(const RawNoise& noise, const DenoiseOptions& options) {
   const auto within = [](double x, double least, double most) { return x >= least && x <= most; };
-  bool good = noise.saturation_e > 0 && options.rho > 0;
+  bool good = options.rho > 0;
+  for (const double saturation : noise.saturation_e) good = good && saturation > 0;
   for (const double variance : noise.variance_e2) good = good && within(variance, 0, largest_e);
   for (const double dark : noise.dark_mean_e) good = good && within(dark, 0, largest_e);
   for (const double gain : options.white_gain) good = good && within(gain, 1e-3, 1e3);

@@ -34,6 +34,8 @@ struct RawElectronsView {
   BayerPhase phase = BayerPhase::rggb;
 };
 
+inline constexpr double unsaturated_e = std::numeric_limits<double>::infinity();
+
 /// Var[y] = max(E[y], 0) + variance_e2 of a raw value y [e-] of one colour. All >= 0 and finite, but for saturation_e.
 struct RawNoise {
   PerSite<double>
@@ -41,7 +43,7 @@ struct RawNoise {
   std::array<double, 3> variance_e2{};  // of R, G, B: read noise^2 + quantisation step^2 / 12; both greens share theirs
   /// Values from here on are saturated: they count as the largest white-balanced value of their 2x2 cell, and cannot
   /// give colour to their surroundings.
-  double saturation_e = std::numeric_limits<double>::infinity();
+  std::array<double, 3> saturation_e{unsaturated_e, unsaturated_e, unsaturated_e};  // of R, G, B
 };
 
 struct DenoiseOptions {

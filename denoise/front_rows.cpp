@@ -38,6 +38,7 @@ void PackCells(const PackRow& in, const PackedRow& out) {
   const Floats f;
   const float dark[4] = {in.dark_e[0], in.dark_e[1], in.dark_e[1], in.dark_e[2]};
   const float gain[4] = {in.gain[0], in.gain[1], in.gain[1], in.gain[2]};
+  const float saturation[4] = {in.saturation_e[0], in.saturation_e[1], in.saturation_e[1], in.saturation_e[2]};
   for (int i = 0; i < in.cells; i += lanes()) {
     const Sites y = sites_of_cells(in, i);
     store(y.e[0], out.raw_e[0] + i);
@@ -50,7 +51,7 @@ void PackCells(const PackRow& in, const PackedRow& out) {
       most = hn::Max(most, x[k]);
     }
     for (int k = 0; k < 4; ++k) {
-      const auto saturated = hn::Ge(y.e[k], constant(in.saturation_e));
+      const auto saturated = hn::Ge(y.e[k], constant(saturation[k]));
       x[k] = hn::IfThenElse(saturated, most, x[k]);
       blind = hn::IfThenElse(saturated, constant(in.blind_variance), blind);
     }

@@ -26,6 +26,7 @@ struct ColourModel {
   double dark_e;
   double variance_e2;
   double sites;
+  float saturation_e;
 
   /// Variance of a cell whose mean, dark in, is mean_e.
   double variance_of(double mean_e) const { return (std::max(mean_e, 0.3 * dark_e + 0.02) + variance_e2) / sites; }
@@ -34,7 +35,6 @@ struct ColourModel {
 struct Check {
   const RawElectronsView& raw;
   std::array<ColourModel, 3> model;
-  float saturation_e;
   std::array<std::vector<float>, 3> cells;  // of one part, part x part, dark in
   std::array<std::vector<BlockDetail>, most_levels> blocks;
   NoiseCheck out;
@@ -42,13 +42,13 @@ struct Check {
   long without_signal = 0;
   long long saturated = 0;
 
-  Check(const RawElectronsView& r, const RawNoise& noise)
-      : raw(r), saturation_e(static_cast<float>(noise.saturation_e)) {
+  Check(const RawElectronsView& r, const RawNoise& noise) : raw(r) {
     const PerSite<int> site = sites_of(raw.phase);
     const auto& d = noise.dark_mean_e;
-    model = {{{d[site[0]], noise.variance_e2[0], 1},
-              {(d[site[1]] + d[site[2]]) / 2, noise.variance_e2[1], 2},
-              {d[site[3]], noise.variance_e2[2], 1}}};
+    const std::array dark_e{d[site[0]], (d[site[1]] + d[site[2]]) / 2, d[site[3]]};
+    for (int k = 0; k < 3; ++k) {
+      model[k] = {dark_e[k], noise.variance_e2[k], k == 1 ? 2.0 : 1.0, static_cast<float>(noise.saturation_e[k])};
+    }
     for (auto& colour : cells) colour.resize(static_cast<std::size_t>(part) * part);
     const auto of_level0 = static_cast<std::size_t>(raw.value.width / (2 * block)) * (raw.value.height / (2 * block));
     for (int l = 0; l < most_levels; ++l) blocks[l].reserve(of_level0 >> (2 * l));
@@ -65,8 +65,8 @@ struct Check {
 
 /// Cells of the part whose first is (x0, y0). Saturated sites and those that are no numbers make cells no numbers.
 void Check::load(int x0, int y0, int columns, int rows) {
-  const auto usable = [this](float e) {
-    if (e >= saturation_e) {
+  const auto usable = [this](float e, int colour) {
+    if (e >= model[colour].saturation_e) {
       ++saturated;
       return none;
     }
@@ -78,9 +78,9 @@ void Check::load(int x0, int y0, int columns, int rows) {
     const float* const with_blue = raw.value.row(2 * (y0 + y) + 1 - red_y) + std::ptrdiff_t{2} * x0;
     const std::size_t at = static_cast<std::size_t>(y) * part;
     for (int x = 0; x < columns; ++x) {
-      cells[0][at + x] = usable(with_red[2 * x + red_x]);
-      cells[1][at + x] = 0.5f * (usable(with_red[2 * x + 1 - red_x]) + usable(with_blue[2 * x + red_x]));
-      cells[2][at + x] = usable(with_blue[2 * x + 1 - red_x]);
+      cells[0][at + x] = usable(with_red[2 * x + red_x], 0);
+      cells[1][at + x] = 0.5f * (usable(with_red[2 * x + 1 - red_x], 1) + usable(with_blue[2 * x + red_x], 1));
+      cells[2][at + x] = usable(with_blue[2 * x + 1 - red_x], 2);
     }
   }
 }

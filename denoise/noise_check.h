@@ -21,11 +21,11 @@ struct NoiseCheck {
   /// details of one place share what few electrons do to the fourth moment: 2 % too low at 0.5 e-^2. Absent where there
   /// are fewer than 8 blocks without saturated sites.
   std::array<std::optional<double>, most_levels> measured_over_model;
-  /// Share of windows whose mean signal (dark subtracted) is below 0 by more than 4 standard deviations; R, G, B. The
-  /// standard deviation is the larger of the model's and the window's own.
   /// The same of horizontal and vertical details, on the tenth of the blocks with the smallest diagonal ones. Nearer to
   /// the mean of a level where noise is not white: what was averaged before has least noise in its diagonals.
   std::array<std::optional<double>, most_levels> across_over_model;
+  /// Share of windows whose mean signal (dark subtracted) is below 0 by more than 4 standard deviations; R, G, B. The
+  /// standard deviation is the larger of the model's and the window's own.
   std::array<double, 3> share_negative{};
   double share_without_signal = 0;  // of windows in which no colour is above 0 by more than 4 standard deviations
   double share_saturated = 0;       // of sites

@@ -20,7 +20,7 @@ struct PackRow {
   int cells;
   float dark_e[3];  // R, G, B
   float gain[3];
-  float saturation_e;
+  float saturation_e[3];
   float blind_variance;  // of chroma where a site is saturated
 };
 struct PackedRow {

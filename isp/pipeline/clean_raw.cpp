@@ -43,7 +43,7 @@ std::uint16_t rounded(double dn, std::uint32_t word) {
 Plane<std::uint16_t> coded(const SignalElectrons& signal, const RawElectrons& raw, const DevelopPlan& plan,
                            const Levels& levels, Executor& executor) {
   const int width = signal.value.width(), height = signal.value.height();
-  const double saturation_e = plan.noise_reduction.noise.saturation_e;
+  const std::array<double, 3>& saturation_e = plan.noise_reduction.noise.saturation_e;
   Plane<std::uint16_t> out(width, height);
   PerSite<double> dn_per_e{};
   for (int site = 0; site < 4; ++site) dn_per_e[site] = levels.range_dn / (*plan.electrons_at_white)[site];
@@ -52,7 +52,8 @@ Plane<std::uint16_t> coded(const SignalElectrons& signal, const RawElectrons& ra
     for (int y = band.first; y < band.last; ++y) {
       words_row({.purpose = draw_purpose::code_dither}, 0, y, 0, words);
       for (int x = 0; x < width; ++x) {
-        const bool saturated = static_cast<double>(raw.value.at(x, y)) >= saturation_e;
+        const auto colour = static_cast<std::size_t>(colour_at(raw.phase, x, y));
+        const bool saturated = static_cast<double>(raw.value.at(x, y)) >= saturation_e[colour];
         const double dn = levels.black_dn + signal.value.at(x, y) * dn_per_e[site_of(x, y)];
         out.at(x, y) = saturated ? static_cast<std::uint16_t>(most_dn) : rounded(dn, words[x]);
       }

@@ -27,7 +27,8 @@ struct CleanRaw {
 Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
 
 /// The straight line variance = scale x + offset that is nearest, relative to the variances, to what is left of the
-/// noise at each site; x and variances in fractions of white. Scales are at least 1e-9, offsets at least 0.
+/// noise at each site; x and variances in fractions of white. Scales are at least what
+/// electrons_at_white accepts, offsets at least 0.
 /// @param signal_e         the clean mosaic
 /// @param site_variance_e2 of R, G, B in each 2x2 cell
 /// @param added            variance of the codes' rounding, in fractions of white squared

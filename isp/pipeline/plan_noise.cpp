@@ -32,7 +32,8 @@ std::optional<Error> obstacle(const RawFrame& frame, const DevelopPlan& plan) {
   return std::nullopt;
 }
 
-/// Of a raw value without light, as the noise model has it; at least that of rounding to codes.
+/// Of a raw value without light, by the noise model or, if that is more, as the black point's pixels had it; at least
+/// that of rounding to codes.
 std::array<double, 3> black_variance_e2(const RawFrame& frame, const DevelopPlan& plan) {
   std::array<double, 3> out{};
   for (int site = 0; site < 4; ++site) {
@@ -40,6 +41,8 @@ std::array<double, 3> black_variance_e2(const RawFrame& frame, const DevelopPlan
     const double electrons = (*plan.electrons_at_white)[site];
     const double e_per_dn = electrons / (white_at(frame.raw, site) - plan.black.pedestal_dn[site]);
     double variance = std::max(frame.noise->offset[colour] * electrons * electrons, e_per_dn * e_per_dn / 12);
+    // What was measured in the dark holds the noise of the dark charge, of which a noise profile may know nothing.
+    variance = std::max(variance, std::pow(plan.black.noise_std_dn[site] * e_per_dn, 2));
     if (plan.options.dark_frame) variance += plan.options.dark_frame->added_variance_dn2[site] * e_per_dn * e_per_dn;
     out[colour] += variance * (colour == 1 ? 0.5 : 1);
   }
@@ -50,8 +53,10 @@ denoise::RawNoise noise_of(const RawFrame& frame, const DevelopPlan& plan) {
   denoise::RawNoise out;
   out.dark_mean_e = plan.black.dark_mean_e;
   out.variance_e2 = black_variance_e2(frame, plan);
-  const auto& electrons = *plan.electrons_at_white;
-  out.saturation_e = saturated * *std::min_element(electrons.begin(), electrons.end());
+  for (int site = 0; site < 4; ++site) {
+    double& saturation_e = out.saturation_e[colour_of(frame.raw, site)];
+    saturation_e = std::min(saturation_e, saturated * (*plan.electrons_at_white)[site]);
+  }
   return out;
 }
 

@@ -1,14 +1,16 @@
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "isp/pipeline/clean_raw.h"
+#include "isp/raw/to_linear.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double least_scale = 1e-9;
-constexpr std::size_t most_samples = 100'000;  // of each colour
+constexpr double least_scale = 1 / most_electrons_at_white;
+constexpr std::int64_t most_cells = 100'000;
 
 struct Sample {
   double x;  // fraction of white
@@ -46,18 +48,17 @@ Line fitted(const std::vector<Sample>& samples) {
 NoiseProfile residual_profile(const SignalElectrons& signal_e, const std::array<Plane<float>, 3>& site_variance_e2,
                               const PerSite<double>& electrons_at_white, double added) {
   std::array<std::vector<Sample>, 3> samples;
-  const int width = signal_e.value.width(), height = signal_e.value.height();
-  const std::size_t step = std::max<std::size_t>(1, signal_e.value.size() / 4 / most_samples);
-  std::size_t seen = 0;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      if (seen++ % step != 0) continue;
-      const int site = site_of(x, y);
+  const int columns = signal_e.value.width() / 2, rows = signal_e.value.height() / 2;
+  const std::int64_t cells = static_cast<std::int64_t>(columns) * rows;
+  const std::int64_t step = std::max<std::int64_t>(1, cells / most_cells);
+  for (std::int64_t cell = 0; cell < cells; cell += step) {
+    const auto cell_x = static_cast<int>(cell % columns), cell_y = static_cast<int>(cell / columns);
+    for (int site = 0; site < 4; ++site) {
+      const int x = 2 * cell_x + (site & 1), y = 2 * cell_y + (site >> 1);
       const auto colour = static_cast<std::size_t>(colour_at(signal_e.phase, x, y));
       const double unit = 1 / electrons_at_white[site];
-      const double variance = site_variance_e2[colour].at(x / 2, y / 2) * unit * unit + added;
-      const double level = std::max(0.0, signal_e.value.at(x, y) * unit);
-      if (variance > 0) samples[colour].push_back({level, variance});
+      const double variance = site_variance_e2[colour].at(cell_x, cell_y) * unit * unit + added;
+      if (variance > 0) samples[colour].push_back({std::max(0.0, signal_e.value.at(x, y) * unit), variance});
     }
   }
   NoiseProfile out;

@@ -18,9 +18,12 @@ void to_fraction(const RawDn& raw, const BlackPoint& black, PlaneView<float> out
 /// The same for SensorLayout::linear_rgb: three planes of active height x width.
 void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, RgbView<float> out, Executor& executor);
 
+/// The deepest wells hold some 1e6; raws whose noise was reduced count as if they held a thousand times as many.
+inline constexpr double most_electrons_at_white = 1e9;
+
 /// Electrons that one FractionOfWhite stands for, per CFA site. With shot noise alone the variance of a fraction x is
-/// x / electrons, so this is 1 / NoiseProfile::scale. Nullopt where that is not within 1 to 1e7:
-/// the deepest wells hold some 1e6.
+/// x / electrons, so this is 1 / NoiseProfile::scale. Nullopt where that is not within 1 to
+/// most_electrons_at_white.
 std::optional<PerSite<double>> electrons_at_white(const RawDn& raw, const NoiseProfile& noise);
 
 /// Fractions counted in electrons.

@@ -71,8 +71,8 @@ TEST(DenoiserHardCases, FramesWithoutSignalHaveNoColour) {
 TEST(DenoiserHardCases, WhollySaturatedFramesAreNeutralAndHaveNoConfidence) {
   for (const Level level : {Level::standard, Level::best}) {
     const DenoiseOptions options{.level = level, .white_gain = {2, 1, 1.5}};
-    const auto out =
-        denoised(filled(150, 97, 1000), BayerPhase::rggb, {.variance_e2 = {4, 4, 4}, .saturation_e = 1000}, options);
+    const auto out = denoised(filled(150, 97, 1000), BayerPhase::rggb,
+                              {.variance_e2 = {4, 4, 4}, .saturation_e = {1000, 1000, 1000}}, options);
     expect_numbers(out);
     for (int y = 0; y < 97; ++y) {
       for (int x = 0; x < 150; ++x) {

@@ -87,7 +87,7 @@ TEST(DenoiserInputs, ThatAreSaturatedGiveNoColourToTheirSurroundings) {
   camera.white_gain = {2, 1, 2};
   const auto raw = lamp(camera, 1000);
   auto noise = camera.noise();
-  noise.saturation_e = 1000;
+  noise.saturation_e = {1000, 1000, 1000};
   for (const Level level : denoise::all_levels) {
     Plane<float> out(384, 320);
     InlineExecutor one;

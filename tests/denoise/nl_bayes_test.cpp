@@ -125,7 +125,7 @@ TEST(NlBayes, GivesNumbersForWhateverValues) {
   for (const double saturation_e : {4.0, 1e8, std::numeric_limits<double>::infinity()}) {
     for (const auto& gain : {std::array{1e3, 1e-3, 1.0}, std::array{1e-3, 1e3, 1e3}}) {
       auto noise = camera.noise();
-      noise.saturation_e = saturation_e;
+      noise.saturation_e = {saturation_e, saturation_e, saturation_e};
       Plane<float> signal(83, 70), residual(columns, rows), confidence(columns, rows);
       InlineExecutor one;
       denoise::Denoiser(83, 70, 1, Level::best)

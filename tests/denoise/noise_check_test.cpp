@@ -191,7 +191,7 @@ TEST(NoiseCheck, CountsSaturatedSites) {
   const Camera camera{.dark_e = {2, 2, 2, 2}};
   auto raw = exposed(camera, flat(100, 100, 100), 512, 400, 98);
   auto noise = camera.noise();
-  noise.saturation_e = 1000;
+  noise.saturation_e = {1000, 1000, 1000};
   for (int y = 0; y < 200; ++y) std::fill(raw.row(y), raw.row(y) + 512, 1000.0f);
   const auto half = check_noise({raw.view(), camera.phase}, noise);
   EXPECT_EQ(half.share_saturated, 0.5);

@@ -99,7 +99,9 @@ Four decorrelated(const Frame& frame, Four& variance) {
   double largest = 0;
   const auto& scale = frame.options.variance_scale;
   const auto [least_scale, largest_scale] = std::minmax_element(scale.begin(), scale.end());
-  for (const double g : frame.gain) largest = std::max(largest, g * std::min(frame.noise.saturation_e, 1e9));
+  const auto& s = frame.noise.saturation_e;
+  const std::array saturation_e{s[0], s[1], s[1], s[2]};
+  for (int k = 0; k < 4; ++k) largest = std::max(largest, frame.gain[k] * std::min(saturation_e[k], 1e9));
   for (int cy = 0; cy < h; ++cy) {
     for (int cx = 0; cx < w; ++cx) {
       std::array<double, 4> x{}, v{};
@@ -111,7 +113,7 @@ Four decorrelated(const Frame& frame, Four& variance) {
       }
       double blind = 0;
       for (int k = 0; k < 4; ++k) {
-        if (frame.y(k, cx, cy) < static_cast<float>(frame.noise.saturation_e)) continue;
+        if (frame.y(k, cx, cy) < static_cast<float>(saturation_e[k])) continue;
         x[k] = most;
         blind = scale[0] * std::min(1e9 * largest * largest / *least_scale, 1e33 / *largest_scale);
       }
