@@ -89,10 +89,10 @@ void Check::add_window(int x0, int y0) {
   std::array<double, 3> deviations{};  // of the mean signal from 0, in standard deviations
   for (int c = 0; c < 3; ++c) {
     double sum = 0, squares = 0;
-    const double about = static_cast<double>(cells[c][static_cast<std::size_t>(y0) * part + x0]);
+    const auto about = static_cast<double>(cells[c][static_cast<std::size_t>(y0) * part + x0]);
     for (int y = y0; y < y0 + window; ++y) {
       for (int x = x0; x < x0 + window; ++x) {
-        const double e = static_cast<double>(cells[c][static_cast<std::size_t>(y) * part + x]) - about;
+        const auto e = static_cast<double>(cells[c][static_cast<std::size_t>(y) * part + x]) - about;
         sum += e;
         squares += e * e;
       }

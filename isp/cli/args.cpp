@@ -203,6 +203,10 @@ Parsed<Args> parse(CLI::App& app, const std::vector<std::string>& words, const A
 
 Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& words, const DevelopArgs& args) {
   Parsed<DevelopArgs> parsed = parse(app, words, args);
+  const isp::DenoiseChoice& choice = args.options.denoise;
+  if (std::holds_alternative<DevelopArgs>(parsed) && choice.maps && choice.mode == isp::DenoiseChoice::Mode::off) {
+    return refuse(app, "--maps are of what --denoise leaves: they do not go with off");
+  }
   if (std::holds_alternative<DevelopArgs>(parsed) && !args.profile.empty() && !args.black_profile.empty()) {
     return refuse(app, "--black and --profile name a profile each: --profile uses all that is in one");
   }

@@ -121,6 +121,9 @@ std::string bench_json(const std::vector<MeasuredStage>& measured) {
 
 Result<void> check_bench_files(const std::vector<isp::BenchStage>& stages, const BenchArgs& args) {
   if (args.output.empty()) return {};
+  std::error_code error;
+  std::filesystem::create_directories(args.output, error);
+  if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
   for (const isp::BenchStage& stage : stages) {
     if (auto free = check_texts_free(stage, args); !free) return free;
   }
@@ -128,10 +131,7 @@ Result<void> check_bench_files(const std::vector<isp::BenchStage>& stages, const
 }
 
 Result<void> write_bench_files(const std::vector<MeasuredStage>& measured, const BenchArgs& args, Executor& executor) {
-  std::error_code error;
   const std::filesystem::path folder(args.output);
-  std::filesystem::create_directories(folder, error);
-  if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
   if (auto free = check_all_free(measured, args); !free) return free;
   const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
   for (const MeasuredStage& m : measured) {

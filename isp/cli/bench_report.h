@@ -24,7 +24,8 @@ std::string bench_text(const MeasuredStage& measured);
 /// no figure), findings.
 std::string bench_json(const std::vector<MeasuredStage>& measured);
 
-/// Before the work: what keeps STAGE.csv, STAGE.json and STAGE.html from being written to the folder `output`.
+/// Before the work: makes the folder, and sees what keeps STAGE.csv, STAGE.json and STAGE.html from being written to
+/// the folder `output`.
 Result<void> check_bench_files(const std::vector<isp::BenchStage>& stages, const BenchArgs& args);
 
 /// Writes all files of all stages; nothing if one is in the way.

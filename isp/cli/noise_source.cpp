@@ -50,8 +50,8 @@ Result<void> find_noise(const isp::DevelopOptions& options, RawFrame& frame, Exe
   }
   const std::string why =
       "the noise is neither in a profile nor in the file, and the picture does not tell: " + noise.error().message;
-  if (options.denoise.mode == Mode::level) {
-    return fail(noise.error().code, why + "; give a profile (--profile), or use --denoise off");
+  if (options.denoise.mode == Mode::level || options.denoise.always) {
+    return fail(noise.error().code, why + "; give a profile (--profile)");
   }
   frame.warnings.push_back(why + "; it is left as it is");
   return {};

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/cli/noise_maps.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::cli {
@@ -60,8 +61,14 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
       output = (fs::path(args.output) / fs::path(input).stem()).string() + "." +
                (args.format.empty() ? extension : args.format);
     }
-    if (!taken.insert(output).second) {
-      return fail(ErrorCode::invalid_argument, fmt::format("two raw files would become {}", output), "-o");
+    std::vector<std::string> files{output};
+    if (args.options.denoise.maps) {
+      for (std::string& map : noise_map_names(output)) files.push_back(std::move(map));
+    }
+    for (const std::string& file : files) {
+      if (!taken.insert(file).second) {
+        return fail(ErrorCode::invalid_argument, fmt::format("{} would be written twice", file), "-o");
+      }
     }
     if (same_file(input, output)) {
       return fail(ErrorCode::invalid_argument, fmt::format("{} would be replaced by what is made of it", input), "-o");
@@ -69,6 +76,17 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
     jobs.push_back({input, output});
   }
   return jobs;
+}
+
+Result<void> check_unharmed(const std::vector<Job>& jobs, const std::vector<std::string>& read) {
+  for (const Job& job : jobs) {
+    for (const std::string& file : read) {
+      if (!file.empty() && (job.output == file || same_file(job.output, file))) {
+        return fail(ErrorCode::invalid_argument, fmt::format("{} would replace a file that is read", job.output), "-o");
+      }
+    }
+  }
+  return {};
 }
 
 Result<PictureKind> picture_kind(FileFormat format, std::optional<int> bits, std::optional<OutputSpace> space) {

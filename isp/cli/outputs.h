@@ -21,6 +21,9 @@ struct Job {
 /// folder, an unknown extension, two inputs for one picture, a picture that would replace its own raw file.
 Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string& extension);
 
+/// Error (command line wrong): an output that would replace one of the files that are only read.
+Result<void> check_unharmed(const std::vector<Job>& jobs, const std::vector<std::string>& read);
+
 /// Whether the output is a folder.
 bool names_folder(const DevelopArgs& args);
 

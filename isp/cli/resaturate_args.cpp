@@ -49,12 +49,21 @@ Parsed<ResaturateArgs> parse_resaturate(const std::vector<std::string>& words) {
            [&args](const std::string& text) { return set_codes(text, args); });
   add_text(app, "--black-area", "X,Y,WIDTH,HEIGHT", "black point: the mean of this part of the picture, in pixels",
            [&args](const std::string& text) { return set_area(text, args); });
-  app.add_option("--chroma-noise", args.chroma_noise,
-                 "standard deviation of a pixel's chroma, of white (default: measured on the picture): the larger, the "
-                 "less is colour believed in the dark")
-      ->check(CLI::Range(0.0, 1.0));
-  app.add_option("--prior", args.prior_std, "how colourful scenes are: standard deviation of x and y (default 0.065)")
-      ->check(CLI::Range(0.001, 1.0));
+  add_text(
+      app, "--chroma-noise", "SHARE",
+      "standard deviation of a pixel's chroma, of white (default: measured on the picture): the larger, the less is "
+      "colour believed in the dark",
+      [&args](const std::string& text) -> std::optional<std::string> {
+        args.chroma_noise = number_of(text);
+        if (!args.chroma_noise || *args.chroma_noise < 0 || *args.chroma_noise > 1) return "is not within 0 to 1";
+        return std::nullopt;
+      });
+  add_text(app, "--prior", "STD", "how colourful scenes are: standard deviation of x and y (default 0.065)",
+           [&args](const std::string& text) -> std::optional<std::string> {
+             args.prior_std = number_of(text).value_or(0);
+             if (args.prior_std < 0.001 || args.prior_std > 1) return "is not within 0.001 to 1";
+             return std::nullopt;
+           });
   app.add_option("--radius", args.radius, "pixels around one over which its brightness is averaged (default 4)")
       ->check(CLI::Range(0, 64));
   app.add_option("--bits", args.bits, "bits per sample: 8, 16 or 32 (float; for OpenEXR 16 is half float)")

@@ -24,7 +24,8 @@ Result<std::vector<isp::BenchStage>> chosen(const std::vector<std::string>& ids)
   for (const std::string& id : ids) {
     const auto stage = isp::bench_stage_named(id);
     if (!stage) return tl::make_unexpected(stage.error());
-    out.push_back(*stage);
+    const bool again = std::ranges::any_of(out, [&](const isp::BenchStage& other) { return other.id == stage->id; });
+    if (!again) out.push_back(*stage);
   }
   return out;
 }
@@ -104,14 +105,14 @@ int run_bench(const std::vector<std::string>& words) {
   if (const auto free = check_bench_files(*stages, args); !free) return failed(free.error());
   const isp::BenchOptions options = options_of(args, *folder);
   const std::vector<MeasuredStage> measured = run_each(*stages, options);
-  if (!args.output.empty() && !measured.empty()) {
-    PoolExecutor executor(options.threads);
-    if (const auto written = write_bench_files(measured, args, executor); !written) return failed(written.error());
-  }
   if (args.json) {
     fmt::print("{}\n", bench_json(measured));
   } else {
     for (const MeasuredStage& stage : measured) fmt::print("{}", bench_text(stage));
+  }
+  if (!args.output.empty() && !measured.empty()) {
+    PoolExecutor executor(options.threads);
+    if (const auto written = write_bench_files(measured, args, executor); !written) return failed(written.error());
   }
   return measured.size() == stages->size() ? exit_done : exit_failed;
 }

@@ -74,6 +74,9 @@ int run_denoise(const std::vector<std::string>& words) {
   }
   const Result<std::vector<std::string>> darks = dark_files(args);
   if (!darks) return usage_error(darks.error());
+  std::vector<std::string> only_read = *darks;
+  only_read.insert(only_read.end(), {args.profile, args.black_profile, args.dark.doubling_profile});
+  if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed) return usage_error(unharmed.error());
 
   const Result<RawBatch> batch = make_batch(args, without_rendering(args.options), *std::move(jobs), *darks);
   if (!batch) {

@@ -45,6 +45,9 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
   if (!written) return fail(written.error().code, written.error().message, job.output);
   std::visit([&](const auto& picture) { out.width = picture.width(), out.height = picture.height(); }, upright);
   out.plan = std::move(developed->plan);
+  if (ready->options.denoise.maps && !out.plan->noise_reduction.level) {
+    out.plan->warnings.emplace_back("no maps were written: the noise is left as it is");
+  }
   return write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);
 }
 
@@ -74,6 +77,9 @@ int run_develop(const std::vector<std::string>& words) {
 
   const Result<std::vector<std::string>> darks = dark_files(args);
   if (!darks) return usage_error(darks.error());
+  std::vector<std::string> only_read = *darks;
+  only_read.insert(only_read.end(), {args.profile, args.black_profile, args.dark.doubling_profile});
+  if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed) return usage_error(unharmed.error());
 
   const Result<RawBatch> batch = make_batch(args, *options, *std::move(jobs), *darks);
   if (!batch) {

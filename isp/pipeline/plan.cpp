@@ -154,6 +154,23 @@ void set_white(DevelopPlan& plan, const WhiteBalance& balance) {
   for (int c = 0; c < 3; ++c) plan.white_gain[c] = static_cast<float>(1 / plan.neutral[c]);
 }
 
+/// White balance, exposure, and what the kernels need of both.
+Result<void> decide_rendering(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan) {
+  const DevelopOptions& options = plan.options;
+  Result<WhiteBalance> balance{};
+  if (options.space != OutputSpace::camera)
+    balance = with_white(choose_white(frame, options, thumbnail), frame, options);
+  if (!balance) return tl::make_unexpected(std::move(balance.error()));
+  set_white(plan, *balance);
+
+  const Result<Matrix3> balanced = balanced_to_output(frame, options, *balance);
+  if (!balanced) return tl::make_unexpected(balanced.error());
+  const Vector3 luminance = luminance_weights(options.space).value_or(Vector3{0, 1, 0});
+  decide_exposure(plan, thumbnail, luminance_of_balanced(luminance, *balanced));
+  set_transform(plan, *balanced, luminance);
+  return {};
+}
+
 // Nothing has to be repaired, multiplied, denoised, or taken off pixel by pixel.
 bool goes_from_codes(const RawFrame& frame, const DevelopPlan& plan) {
   return frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.noise_reduction.level &&
@@ -211,17 +228,9 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
                              thumbnail.black_noise_std * mean_range_dn(frame.raw, plan.black), executor);
   clock.lap("defects");
 
-  Result<WhiteBalance> balance{};
-  if (options.space != OutputSpace::camera)
-    balance = with_white(choose_white(frame, options, thumbnail), frame, options);
-  if (!balance) return tl::make_unexpected(std::move(balance.error()));
-  set_white(plan, *balance);
-
-  const Result<Matrix3> balanced = balanced_to_output(frame, options, *balance);
-  if (!balanced) return tl::make_unexpected(balanced.error());
-  const Vector3 luminance = luminance_weights(options.space).value_or(Vector3{0, 1, 0});
-  decide_exposure(plan, thumbnail, luminance_of_balanced(luminance, *balanced));
-  set_transform(plan, *balanced, luminance);
+  if (const Result<void> decided = decide_rendering(frame, thumbnail, plan); !decided) {
+    return tl::make_unexpected(decided.error());
+  }
   clock.lap("white and exposure");
 
   Result<NoiseReduction> noise = plan_noise(frame, thumbnail, plan, executor);

@@ -19,15 +19,15 @@ int colour_of(const RawDn& raw, int site) { return static_cast<int>(colour_at(ra
 /// Why the noise of a frame cannot be reduced at all.
 std::optional<Error> obstacle(const RawFrame& frame, const DevelopPlan& plan) {
   if (frame.raw.layout != SensorLayout::bayer) {
-    return Error{ErrorCode::unsupported, "noise is reduced on Bayer mosaics, and this is none: use --denoise off"};
+    return Error{ErrorCode::unsupported, "noise is reduced on Bayer mosaics, and this is none"};
   }
   if (frame.raw.active.width < 2 || frame.raw.active.height < 2) {
-    return Error{ErrorCode::invalid_argument, "the picture is too small to tell noise from detail: use --denoise off"};
+    return Error{ErrorCode::invalid_argument, "the picture is too small to tell noise from detail"};
   }
   if (!plan.electrons_at_white) {
     return Error{ErrorCode::insufficient,
                  "the noise is unknown: the file has no usable NoiseProfile; give a profile (--profile, see calibrate "
-                 "and calib/profiles), or use --denoise off"};
+                 "and calib/profiles)"};
   }
   return std::nullopt;
 }
@@ -115,6 +115,16 @@ std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, const Pla
   return lines;
 }
 
+/// What lines took part in the noise of a pixel goes with them.
+void take_lines_off(RawElectrons& charge, NoiseReduction& out) {
+  out.lines = lines_of(out, charge.value);
+  for (const denoise::LineOffsets& lines : out.lines) {
+    subtract_lines(lines, charge.value.view());
+    const double gone_e2 = lines.line_std_e * lines.line_std_e - lines.residual_std_e * lines.residual_std_e;
+    for (double& variance : out.noise.variance_e2) variance = std::max(variance - gone_e2, 0.25 * variance);
+  }
+}
+
 NoiseReduction left_alone(std::string reason) {
   NoiseReduction out;
   out.reason = std::move(reason);
@@ -156,11 +166,11 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   if (!out.level) return out;
   out.options.level = *out.level;
   out.options.white_gain = balance_of(frame, plan);
-  const RawElectrons charge = raw_electrons(frame, plan, {}, executor);
+  RawElectrons charge = raw_electrons(frame, plan, {}, executor);
+  if (choice.line_noise) take_lines_off(charge, out);
   const denoise::NoiseCheck check = denoise::check_noise({charge.value.view(), charge.phase}, out.noise);
   for (const denoise::NoiseRemark& remark : denoise::remarks_on(check)) plan.warnings.push_back(remark.text);
   out.options.variance_scale = denoise::variance_scale_of(check);
-  if (choice.line_noise) out.lines = lines_of(out, charge.value);
   return out;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -34,14 +35,49 @@ Plane<std::uint8_t> saturated_pixels(const RgbView<const float>& xyz, const Matr
   return out;
 }
 
-double share_of_dark(const RgbView<const float>& xyz, double dark, int radius) {
+/// Of the pixels that are not saturated.
+double share_of_dark(const RgbView<const float>& xyz, const Plane<std::uint8_t>& saturated, double dark, int radius) {
   Plane<double> sum(xyz[0].width, xyz[0].height);
   for (int y = 0; y < sum.height(); ++y) {
-    for (int x = 0; x < sum.width(); ++x) sum.at(x, y) = intensity_at(xyz, x, y);
+    for (int x = 0; x < sum.width(); ++x) {
+      sum.at(x, y) = saturated.at(x, y) != 0 ? std::numeric_limits<double>::quiet_NaN() : intensity_at(xyz, x, y);
+    }
   }
   const Plane<double> mean = denoise::box_mean(sum, radius);
-  const auto below = std::count_if(mean.data(), mean.data() + mean.size(), [&](double s) { return s <= dark; });
+  std::size_t below = 0;
+  for (std::size_t i = 0; i < mean.size(); ++i) below += saturated.data()[i] == 0 && mean.data()[i] <= dark ? 1 : 0;
   return static_cast<double>(below) / static_cast<double>(mean.size());
+}
+
+/// X - x0 S (k = 0) or Y - y0 S (k = 1), mean over the square of `side` pixels at (x, y).
+double chroma_at(const RgbView<const float>& xyz, int k, int x, int y, int side) {
+  const Vector3 white = vector_of(*xyz_of(white_d65));
+  const double share = white[k] / (white[0] + white[1] + white[2]);
+  double sum = 0;
+  for (int j = y; j < y + side; ++j) {
+    for (int i = x; i < x + side; ++i) sum += xyz[k].at(i, j) - share * intensity_at(xyz, i, j);
+  }
+  return sum / (side * side);
+}
+
+/// 1.4826 times the median of the absolute diagonal Haar details of means over squares; the mean of both chromas.
+double median_detail(const RgbView<const float>& xyz, int side) {
+  double mean = 0;
+  for (int k = 0; k < 2; ++k) {
+    std::vector<double> details;
+    for (int y = 0; y + 2 * side <= xyz[0].height; y += 2 * side) {
+      for (int x = 0; x + 2 * side <= xyz[0].width; x += 2 * side) {
+        const double detail = chroma_at(xyz, k, x, y, side) - chroma_at(xyz, k, x + side, y, side) -
+                              chroma_at(xyz, k, x, y + side, side) + chroma_at(xyz, k, x + side, y + side, side);
+        if (std::isfinite(detail)) details.push_back(std::abs(detail / 2));
+      }
+    }
+    if (details.empty()) return 0;
+    const auto middle = details.begin() + static_cast<std::ptrdiff_t>(details.size() / 2);
+    std::nth_element(details.begin(), middle, details.end());
+    mean += 1.4826 * *middle / 2;
+  }
+  return mean;
 }
 
 /// Linear XYZ to the codes of a space; what is outside of its gamut moves towards the neutral.
@@ -78,28 +114,9 @@ Picture encoded(const SceneLinear& xyz, const ResaturateOptions& options, Execut
 }  // namespace
 
 double chroma_noise_of(const RgbView<const float>& xyz) {
-  std::array<std::vector<double>, 2> details;
-  const Vector3 white = vector_of(*xyz_of(white_d65));
-  const double sum = white[0] + white[1] + white[2];
-  for (int y = 0; y + 1 < xyz[0].height; y += 2) {
-    for (int x = 0; x + 1 < xyz[0].width; x += 2) {
-      for (int k = 0; k < 2; ++k) {
-        const auto chroma = [&](int i, int j) {
-          return xyz[k].at(x + i, y + j) - white[k] / sum * intensity_at(xyz, x + i, y + j);
-        };
-        const double detail = (chroma(0, 0) - chroma(1, 0) - chroma(0, 1) + chroma(1, 1)) / 2;
-        if (std::isfinite(detail)) details[k].push_back(std::abs(detail));
-      }
-    }
-  }
-  double mean = 0;
-  for (std::vector<double>& d : details) {
-    if (d.empty()) return 0;
-    const auto middle = d.begin() + static_cast<std::ptrdiff_t>(d.size() / 2);
-    std::nth_element(d.begin(), middle, d.end());
-    mean += 1.4826 * *middle / 2;
-  }
-  return mean;
+  double largest = 0;
+  for (const int side : {1, 2, 4}) largest = std::max(largest, side * median_detail(xyz, side));
+  return largest;
 }
 
 Resaturated resaturate_picture(SceneLinear xyz, const ResaturateOptions& options, Executor& executor) {
@@ -115,7 +132,7 @@ Resaturated resaturate_picture(SceneLinear xyz, const ResaturateOptions& options
   Resaturated out;
   out.chroma_noise = how.chroma_noise;
   const double dark = options.black.x + options.black.y + options.black.z;
-  out.share_dark = share_of_dark(std::as_const(xyz).view(), dark, options.radius);
+  out.share_dark = share_of_dark(std::as_const(xyz).view(), saturated, dark, options.radius);
   const auto at_white = std::count(saturated.data(), saturated.data() + saturated.size(), std::uint8_t{1});
   out.share_saturated = static_cast<double>(at_white) / static_cast<double>(saturated.size());
   denoise::resaturate(std::as_const(xyz).view(), how, xyz.view());

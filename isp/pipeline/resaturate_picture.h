@@ -21,12 +21,14 @@ struct ResaturateOptions {
 struct Resaturated {
   Picture picture;
   double chroma_noise = 0;
-  double share_dark = 0;       // of the pixels whose surroundings are no brighter than black: they become neutral
+  double share_dark = 0;       // of pixels, not saturated, whose surroundings are no brighter than black: grey now
   double share_saturated = 0;  // left as they are
 };
 
-/// Standard deviation of X - x0 S and of Y - y0 S (S = X + Y + Z, neutral D65) in flat parts: 1.4826 times the median
-/// of diagonal Haar details' absolute values, the mean of both. 0 for pictures of fewer than 2 x 2 pixels.
+/// Standard deviation of X - x0 S and of Y - y0 S (S = X + Y + Z, neutral D65) in flat parts, the mean of both: 1.4826
+/// times the median of diagonal Haar details' absolute values. Demosaicing and JPEG leave little of it between
+/// neighbours, so means over squares of 2 and 4 pixels are asked too, times 2 and 4, and the largest counts. 0 for
+/// pictures of fewer than 2 x 2 pixels.
 double chroma_noise_of(const RgbView<const float>& xyz);
 
 /// denoise::resaturate on a picture in XYZ, and the result in an output space without tone curve. Pixels with a channel
