@@ -1,10 +1,8 @@
 #include "denoise/nl_bayes_rows.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 
 #if defined(__aarch64__)  // NEON only, as in isp/raw: arrays of vectors need vectors of known size
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
