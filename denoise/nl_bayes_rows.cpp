@@ -58,7 +58,9 @@ void NlBayesRow(const PatchRow& in, float* scratch, const PatchSums& sums) {
     const int planes = in.chroma != nullptr && in.chroma[x0 / 2] != 0 ? 4 : 1;
     for (int p = 0; p < planes; ++p) {
       gather(in, p, s.members, s.patches);
-      add_group(in, p, s, filter(s.members.count, group_variance(in, p, s.members), s.patches), x0, sums);
+      const float variance = group_variance(in, p, s.members);
+      const ResidualOfPatches& left = in.left[p != 0 ? 1 : planes == 4 ? 0 : 2];
+      add_group(in, p, s, filter(s.members.count, variance, left, s.patches), x0, sums);
     }
   }
 }

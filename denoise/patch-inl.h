@@ -267,13 +267,9 @@ HWY_INLINE Gains to_filter(float variance, float (*m)[cells]) {
   return out;
 }
 
-/// Noise that the filter leaves, over v |filter|^2: the pilot that made the filter has seen the same noise. Measured on
-/// flat frames (tests/denoise/nl_bayes_test.cpp).
-constexpr float correlated = 0.21f, independent = 0.5f;
-
 /// noisy <- m + C (C + V)^-1 (noisy - mean of noisy), C the covariance of the pilot's patches. m is the pilot's mean
 /// where little is kept, and the noisy one where much is: there the pilot may have lost as much as the noise adds.
-HWY_INLINE Filtered filter(int count, float variance, Patches& at) {
+HWY_INLINE Filtered filter(int count, float variance, const ResidualOfPatches& left, Patches& at) {
   HWY_ALIGN float mean[cells], pilot_mean[cells];
   centre(at.noisy, count, mean);
   centre(at.pilot, count, pilot_mean);
@@ -286,7 +282,8 @@ HWY_INLINE Filtered filter(int count, float variance, Patches& at) {
   const float trust = std::min(1.0f, n * gains.trace / cells);
   for (int k = 0; k < cells; ++k) mean[k] = pilot_mean[k] + trust * (mean[k] - pilot_mean[k]);
   apply(at.matrix, mean, count, at.noisy);
-  return {1 / (v * (gains.squares + 1)), v / cells * (correlated * gains.trace + independent * gains.squares)};
+  const float residual = v * ((left.trace * gains.trace + left.squares * gains.squares) / cells + left.other);
+  return {1 / (v * (gains.squares + 1)), residual};
 }
 
 }  // namespace lowlux::denoise::rows::HWY_NAMESPACE
