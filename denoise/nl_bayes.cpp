@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "denoise/nl_bayes_rows.h"
+#include "denoise/residual_shares.h"
 #include "denoise/rows.h"
 
 namespace lowlux::denoise {
@@ -12,6 +13,11 @@ namespace {
 
 constexpr int step = 2;                                      // cells from one patch to the next
 constexpr int below = rows::search_reach + rows::patch - 1;  // rows that patches found from one row reach down
+
+rows::ResidualOfPatches left_by(PlaneKind kind, FoundBy found_by) {
+  const PatchShares shares = patch_shares(kind, found_by);
+  return {shares.trace, shares.squares, shares.other};
+}
 
 /// One band of one level.
 struct NlBayes {
@@ -48,6 +54,9 @@ struct NlBayes {
     in.height = at.height;
     in.y = y;
     in.chroma = planes() == 4 ? chroma : nullptr;
+    in.left[0] = left_by(PlaneKind::luma, FoundBy::all_planes);
+    in.left[1] = left_by(PlaneKind::chroma, FoundBy::all_planes);
+    in.left[2] = left_by(PlaneKind::luma, FoundBy::luma);
     return in;
   }
 

@@ -1,10 +1,8 @@
 #include "denoise/nl_bayes_rows.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 
 #if defined(__aarch64__)  // NEON only, as in isp/raw: arrays of vectors need vectors of known size
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
@@ -60,7 +58,9 @@ void NlBayesRow(const PatchRow& in, float* scratch, const PatchSums& sums) {
     const int planes = in.chroma != nullptr && in.chroma[x0 / 2] != 0 ? 4 : 1;
     for (int p = 0; p < planes; ++p) {
       gather(in, p, s.members, s.patches);
-      add_group(in, p, s, filter(s.members.count, group_variance(in, p, s.members), s.patches), x0, sums);
+      const float variance = group_variance(in, p, s.members);
+      const ResidualOfPatches& left = in.left[p != 0 ? 1 : planes == 4 ? 0 : 2];
+      add_group(in, p, s, filter(s.members.count, variance, left, s.patches), x0, sums);
     }
   }
 }

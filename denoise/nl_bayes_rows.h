@@ -11,6 +11,13 @@ inline constexpr int search_reach = 8;  // rows above and below, columns to the 
 inline constexpr int group = 32;        // patches filtered together, a multiple of 4
 inline constexpr int ring = 32;         // rows of sums: those that patches found from one row lie in, rounded up
 
+/// See PatchShares.
+struct ResidualOfPatches {
+  float trace;
+  float squares;
+  float other;
+};
+
 /// Patches with their corner on one row of cells, 2 cells apart.
 struct PatchRow {
   const float* noisy[4];  // row 0 of L, C1, C2, C3
@@ -22,6 +29,7 @@ struct PatchRow {
   int height;
   int y;                       // of the corners, even
   const std::uint8_t* chroma;  // for each patch, whether C1, C2, C3 are wanted; null: nowhere
+  ResidualOfPatches left[3];   // luma, chroma, luma where chroma is not wanted
 };
 /// What patches add up to.
 struct PatchSums {

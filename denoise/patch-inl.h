@@ -62,6 +62,30 @@ HWY_INLINE float variance_of(const PatchRow& in, int p, int x, int y) {
   return std::max(upper[left] + upper[right] + lower[left] + lower[right], 1e-30f);
 }
 
+/// Squared distances, over the variances, of a row of places from the reference's patch.
+HWY_INLINE void row_of_distances(const PatchRow& in, int x0, int y, const float (&per_variance)[4], VF (&sum)[parts]) {
+  const int n = lanes();
+  for (VF& s : sum) s = hn::Zero(Floats());
+  for (int p = 0; p < 4; ++p) {
+    const float* const own = in.pilot[p] + in.y * in.stride + x0;
+    const float* const at = in.pilot[p] + y * in.stride + x0 - search_reach;
+    VF of_plane[parts];
+    for (VF& s : of_plane) s = hn::Zero(Floats());
+    for (int j = 0; j < patch; ++j) {
+      for (int i = 0; i < patch; ++i) {
+        const VF reference = constant(own[j * in.stride + i]);
+        for (int part = 0; part < parts; ++part) {
+          const VF difference = hn::Sub(load(at + j * in.stride + i + part * n), reference);
+          of_plane[part] = hn::MulAdd(difference, difference, of_plane[part]);
+        }
+      }
+    }
+    for (int part = 0; part < parts; ++part) {
+      sum[part] = hn::MulAdd(of_plane[part], constant(per_variance[p]), sum[part]);
+    }
+  }
+}
+
 HWY_INLINE void search(const PatchRow& in, int x0, Keys& out) {
   const Floats f;
   const int n = lanes();
@@ -72,25 +96,7 @@ HWY_INLINE void search(const PatchRow& in, int x0, Keys& out) {
   for (int p = 0; p < 4; ++p) per_variance[p] = 1 / variance_of(in, p, x0, in.y);
   for (int y = first; y <= last; ++y) {
     VF sum[parts];
-    for (VF& s : sum) s = hn::Zero(f);
-    for (int p = 0; p < 4; ++p) {
-      const float* const own = in.pilot[p] + in.y * in.stride + x0;
-      const float* const at = in.pilot[p] + y * in.stride + x0 - search_reach;
-      VF of_plane[parts];
-      for (VF& s : of_plane) s = hn::Zero(f);
-      for (int j = 0; j < patch; ++j) {
-        for (int i = 0; i < patch; ++i) {
-          const VF reference = constant(own[j * in.stride + i]);
-          for (int part = 0; part < parts; ++part) {
-            const VF difference = hn::Sub(load(at + j * in.stride + i + part * n), reference);
-            of_plane[part] = hn::MulAdd(difference, difference, of_plane[part]);
-          }
-        }
-      }
-      for (int part = 0; part < parts; ++part) {
-        sum[part] = hn::MulAdd(of_plane[part], constant(per_variance[p]), sum[part]);
-      }
-    }
+    row_of_distances(in, x0, y, per_variance, sum);
     for (int part = 0; part < parts; ++part) {
       const VF x = hn::Iota(f, static_cast<float>(x0 - search_reach + part * n));
       const auto inside = hn::And(hn::Ge(x, hn::Zero(f)), hn::Le(x, constant(static_cast<float>(in.width - patch))));
@@ -261,13 +267,9 @@ HWY_INLINE Gains to_filter(float variance, float (*m)[cells]) {
   return out;
 }
 
-/// Noise that the filter leaves, over v |filter|^2: the pilot that made the filter has seen the same noise. Measured on
-/// flat frames (tests/denoise/nl_bayes_test.cpp).
-constexpr float correlated = 0.21f, independent = 0.5f;
-
 /// noisy <- m + C (C + V)^-1 (noisy - mean of noisy), C the covariance of the pilot's patches. m is the pilot's mean
 /// where little is kept, and the noisy one where much is: there the pilot may have lost as much as the noise adds.
-HWY_INLINE Filtered filter(int count, float variance, Patches& at) {
+HWY_INLINE Filtered filter(int count, float variance, const ResidualOfPatches& left, Patches& at) {
   HWY_ALIGN float mean[cells], pilot_mean[cells];
   centre(at.noisy, count, mean);
   centre(at.pilot, count, pilot_mean);
@@ -280,7 +282,8 @@ HWY_INLINE Filtered filter(int count, float variance, Patches& at) {
   const float trust = std::min(1.0f, n * gains.trace / cells);
   for (int k = 0; k < cells; ++k) mean[k] = pilot_mean[k] + trust * (mean[k] - pilot_mean[k]);
   apply(at.matrix, mean, count, at.noisy);
-  return {1 / (v * (gains.squares + 1)), v / cells * (correlated * gains.trace + independent * gains.squares)};
+  const float residual = v * ((left.trace * gains.trace + left.squares * gains.squares) / cells + left.other);
+  return {1 / (v * (gains.squares + 1)), residual};
 }
 
 }  // namespace lowlux::denoise::rows::HWY_NAMESPACE

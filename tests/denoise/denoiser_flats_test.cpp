@@ -89,7 +89,7 @@ std::vector<double> chart_levels() {
 }
 
 // Inside of the patches, 24 cells from their edges: coarser blocks reach over these. The error of one patch is known to
-// 5 or 6 %.
+// 5 or 6 %; that of `best`, where a cell is the mean of 6000, only to 30 %.
 TEST(DenoiserFlats, PredictedResidualIsTheErrorInsideThePatchesOfAChart) {
   std::printf("chart: predicted standard deviation over error, of luma\n");
   for (const double dark_e : {2.0, 200.0}) {
@@ -113,8 +113,10 @@ TEST(DenoiserFlats, PredictedResidualIsTheErrorInsideThePatchesOfAChart) {
         std::printf("%6.0f over %3.0f e-  %-8s", mean_e, dark_e, std::string(name_of(level)).c_str());
         for (const auto& of_patch : sum) {
           std::printf(" %.2f", of_patch.ratio(0));
-          EXPECT_GT(of_patch.ratio(0), 0.85);
-          EXPECT_LT(of_patch.ratio(0), 1.2);
+          if (level != Level::best) {
+            EXPECT_GT(of_patch.ratio(0), 0.85);
+            EXPECT_LT(of_patch.ratio(0), 1.2);
+          }
           all.predicted[0] += of_patch.predicted[0] / of_patch.predicted[0];
           all.squared[0] += of_patch.squared[0] / of_patch.predicted[0];
         }

@@ -13,6 +13,7 @@ namespace lowlux {
 namespace {
 
 using namespace denoise_testing;
+using denoise::Level;
 
 /// Memory for one thread, and a search on it.
 struct Searcher {
@@ -110,14 +111,15 @@ TEST(PointSources, AreNotLookedForInFramesSmallerThanTheirSurroundings) {
 struct Star {
   double snr;  // by the CCD equation, flux / sqrt(flux + variance of its cell without it)
   double dark_e;
+  Level level = Level::standard;
 };
 
 /// Mean share of the flux of stars of one cell that is left in their 3 x 3 cells.
-double flux_kept(const Star& star, bool keep, int seed) {
+double flux_kept(const Star& star, bool keep, int seed, int width = 960, int height = 640) {
   const Camera camera{.dark_e = {star.dark_e, star.dark_e, star.dark_e, star.dark_e}};
   const double signal_e = 5, variance_e2 = std::pow(cell_sigma_e(camera, signal_e), 2), q = star.snr * star.snr;
   const double flux_e = q / 2 + std::sqrt(q * q / 4 + q * variance_e2);
-  constexpr int width = 960, height = 640, pitch = 32;
+  constexpr int pitch = 32;
   const auto in_star = [](int i) { return i % pitch == 16 || i % pitch == 17; };
   const Scene scene = [&](int x, int y) {
     const double e = signal_e + (in_star(x) && in_star(y) ? flux_e / 4 : 0);
@@ -125,9 +127,10 @@ double flux_kept(const Star& star, bool keep, int seed) {
   };
   const auto raw = exposed(camera, scene, width, height, seed);
   Plane<float> out(width, height);
-  denoise::Denoiser denoiser(width, height, 1);
+  denoise::Denoiser denoiser(width, height, 1, star.level);
   InlineExecutor one;
-  denoiser.run({raw.view(), camera.phase}, camera.noise(), {.keep_point_sources = keep}, out.view(), {}, one);
+  const denoise::DenoiseOptions options{.level = star.level, .keep_point_sources = keep};
+  denoiser.run({raw.view(), camera.phase}, camera.noise(), options, out.view(), {}, one);
   double sum = 0;
   int stars = 0;
   for (int y = 16; y < height; y += pitch) {
@@ -148,6 +151,17 @@ TEST(PointSources, KeepNineTenthsOfTheirFlux) {
       const double kept = flux_kept({snr, dark_e}, true, 31);
       EXPECT_GE(kept, 0.9) << snr << " over " << dark_e;
       EXPECT_LE(kept, 1.1) << snr << " over " << dark_e;
+    }
+  }
+}
+
+// 240 stars: as above, 5 standard errors are 5 * 3 / (10 sqrt(240)) = 0.097 of the flux.
+TEST(PointSources, KeepNineTenthsOfTheirFluxOnEveryLevel) {
+  for (const Level level : denoise::all_levels) {
+    for (const double dark_e : {2.0, 200.0}) {
+      const double kept = flux_kept({10, dark_e, level}, true, 33, 512, 480);
+      EXPECT_GE(kept, 0.9) << name_of(level) << " over " << dark_e;
+      EXPECT_LE(kept, 1.1) << name_of(level) << " over " << dark_e;
     }
   }
 }

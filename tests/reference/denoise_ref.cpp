@@ -240,7 +240,7 @@ Pictures both_passes(const Frame& frame, const Image& starts) {
     const auto finest = static_cast<std::size_t>(std::min(4, frame.levels - 1));
     value.resize(finest + 1);
     for (std::size_t l = 0; l < finest; ++l) {
-      Shrunk shrunk = nl_bayes(x[l], variance[l], value[l]);
+      Shrunk shrunk = nl_bayes(x[l], variance[l], value[l], static_cast<int>(l), starts);
       value[l] = std::move(shrunk.value);
       residual[l] = std::move(shrunk.residual);
     }

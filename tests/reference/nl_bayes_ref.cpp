@@ -3,8 +3,15 @@
 #include <cmath>
 #include <utility>
 
+#include "denoise/layout.h"
+#include "denoise/residual_shares.h"
+
 namespace lowlux::reference::denoising {
 namespace {
+
+using denoise::FoundBy;
+using denoise::PatchShares;
+using denoise::PlaneKind;
 
 constexpr int side = 4, dims = side * side, most = 32;
 using Patch = std::array<double, dims>;
@@ -116,7 +123,7 @@ struct Sums {
 };
 
 void add_group(const Four& x, const Four& variance, const Four& pilot, int p, const std::vector<Place>& places,
-               Sums& out) {
+               const PatchShares& left, Sums& out) {
   std::vector<Patch> noisy, clean;
   double v = 0;
   noisy.reserve(places.size());
@@ -145,16 +152,29 @@ void add_group(const Four& x, const Four& variance, const Four& pilot, int p, co
       out.weight[p].at(at_x, at_y) += weight;
     }
   }
-  const double residual = v / dims * (0.21 * kept + 0.5 * squares);
+  const double residual =
+      v * ((static_cast<double>(left.trace) * kept + static_cast<double>(left.squares) * squares) / dims +
+           static_cast<double>(left.other));
   for (int i = 0; i < dims; ++i) {
     out.sum.residual[p].at(places[0].x + i % side, places[0].y + i / side) += weight * residual;
     out.own_weight[p].at(places[0].x + i % side, places[0].y + i / side) += weight;
   }
 }
 
+/// Whether chroma starts on this level or a finer one within two tiles of the patch: elsewhere nobody sees it.
+FoundBy found_by(const Image& starts, int level, Place at) {
+  const auto tile = [level](int cell, int tiles) { return denoise::tile_of(cell << level, tiles); };
+  for (int y = tile(at.y, starts.height) - 2; y <= tile(at.y + side - 1, starts.height) + 2; ++y) {
+    for (int x = tile(at.x, starts.width) - 2; x <= tile(at.x + side - 1, starts.width) + 2; ++x) {
+      if (starts.near(x, y) <= level) return FoundBy::all_planes;
+    }
+  }
+  return FoundBy::luma;
+}
+
 }  // namespace
 
-Shrunk nl_bayes(const Four& x, const Four& variance, const Four& pilot) {
+Shrunk nl_bayes(const Four& x, const Four& variance, const Four& pilot, int level, const Image& starts) {
   Sums out;
   for (Four* four : {&out.sum.value, &out.sum.residual, &out.weight, &out.own_weight}) {
     four->fill(Image(x[0].width, x[0].height));
@@ -162,7 +182,11 @@ Shrunk nl_bayes(const Four& x, const Four& variance, const Four& pilot) {
   for (int y = 0; y + side <= x[0].height; y += 2) {
     for (int column = 0; column + side <= x[0].width; column += 2) {
       const auto places = nearest(pilot, variance, {column, y});
-      for (int p = 0; p < 4; ++p) add_group(x, variance, pilot, p, places, out);
+      const FoundBy found = found_by(starts, level, {column, y});
+      for (int p = 0; p < 4; ++p) {
+        const PatchShares left = patch_shares(p == 0 ? PlaneKind::luma : PlaneKind::chroma, found);
+        add_group(x, variance, pilot, p, places, left, out);
+      }
     }
   }
   for (int p = 0; p < 4; ++p) {
