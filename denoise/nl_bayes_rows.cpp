@@ -50,8 +50,9 @@ HWY_INLINE void add_group(const PatchRow& in, int p, const Scratch& s, const Fil
 std::size_t PatchScratch() { return (sizeof(Scratch) + alignof(Scratch)) / sizeof(float); }
 
 void NlBayesRow(const PatchRow& in, float* scratch, const PatchSums& sums) {
-  const std::size_t beyond = reinterpret_cast<std::uintptr_t>(scratch) % alignof(Scratch);
-  Scratch& s = *reinterpret_cast<Scratch*>(reinterpret_cast<char*>(scratch) + (alignof(Scratch) - beyond));
+  auto* const bytes = reinterpret_cast<std::byte*>(scratch);
+  const std::size_t beyond = reinterpret_cast<std::uintptr_t>(bytes) % alignof(Scratch);
+  Scratch& s = *reinterpret_cast<Scratch*>(bytes + (alignof(Scratch) - beyond));
   for (int x0 = 0; x0 + patch <= in.width; x0 += 2) {
     search(in, x0, s.keys);
     choose(in, x0, s.keys, s.members);

@@ -58,7 +58,7 @@ struct Check {
   void add_windows(int columns, int rows);
   void add_window(int x0, int y0);
   void add_blocks(int level, int columns, int rows);
-  std::optional<BlockDetail> detail(int x0, int y0, double cells_in_mean) const;
+  std::optional<BlockDetail> detail(int x0, int y0, double averaged) const;
   void halve(int columns, int rows);
   void finish();
 };

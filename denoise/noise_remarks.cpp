@@ -8,7 +8,7 @@ namespace lowlux::denoise {
 
 std::vector<NoiseRemark> remarks_on(const NoiseCheck& check) {
   std::vector<NoiseRemark> out;
-  const auto negative = std::max_element(check.share_negative.begin(), check.share_negative.end());
+  const auto* const negative = std::max_element(check.share_negative.begin(), check.share_negative.end());
   if (*negative > 0.01) {
     constexpr std::array<const char*, 3> names{"red", "green", "blue"};
     out.push_back({NoiseFinding::black_suspicious,

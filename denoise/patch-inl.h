@@ -131,7 +131,7 @@ HWY_INLINE void choose(const PatchRow& in, int x0, const Keys& keys, Members& ou
     limit = lower;
     reached = count;
   }
-  const float most = std::bit_cast<float>(std::min(limit, largest));
+  const auto most = std::bit_cast<float>(std::min(limit, largest));
   out.x[0] = x0;
   out.y[0] = in.y;
   out.count = 1;

@@ -113,9 +113,9 @@ Plane<float> lens_blurred(const PlaneView<const float>& plane, double sigma_px) 
   const int reach = static_cast<int>(std::ceil(5 * sigma_px));
   std::vector<double> weight(static_cast<std::size_t>(2 * reach) + 1, 1.0);
   double sum = 0;
-  for (int i = -reach; i <= reach; ++i) {
-    const double z = i == 0 ? 0 : i / sigma_px;
-    sum += weight[static_cast<std::size_t>(i + reach)] = std::exp(-z * z / 2);
+  for (std::size_t k = 0; k < weight.size(); ++k) {
+    const double i = static_cast<double>(k) - reach, z = i == 0 ? 0 : i / sigma_px;
+    sum += weight[k] = std::exp(-z * z / 2);
   }
   // Along the rows, turned; twice, and the picture is upright again.
   const auto along_rows = [&](const PlaneView<const float>& in) {
@@ -123,8 +123,8 @@ Plane<float> lens_blurred(const PlaneView<const float>& plane, double sigma_px) 
     for (int y = 0; y < in.height; ++y) {
       for (int x = 0; x < in.width; ++x) {
         double value = 0;
-        for (int i = -reach; i <= reach; ++i) {
-          value += weight[static_cast<std::size_t>(i + reach)] * in.at(std::clamp(x + i, 0, in.width - 1), y);
+        for (std::size_t k = 0; k < weight.size(); ++k) {
+          value += weight[k] * in.at(std::clamp(x + static_cast<int>(k) - reach, 0, in.width - 1), y);
         }
         out.at(y, x) = static_cast<float>(value / sum);
       }

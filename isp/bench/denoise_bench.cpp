@@ -75,8 +75,7 @@ StrengthSearch searched(const Work& work, std::size_t picture, std::size_t light
   const auto none = std::find_if(methods.begin(), methods.end(),
                                  [](const DenoiseMethod& method) { return method.name == name_of_none; });
   const auto result = none->run({of, shot, work.tuned[light]}, none->level, memory);
-  return search_strength(*work.options.nl_means, nl_means_input(result->picture),
-                         PictureTruth(of.linear.view(), one));
+  return search_strength(*work.options.nl_means, nl_means_input(result->picture), PictureTruth(of.linear.view(), one));
 }
 
 /// Shared by the executor's threads, one shot each.

@@ -29,7 +29,7 @@ std::vector<DenoiseLight> denoise_lights(bool quick);
 void mark_undominated(std::span<DenoiseRow> rows);
 
 /// What the denoiser must show, beside what it shows: those findings whose rows are there. Needs rows marked.
-std::vector<Finding> denoise_findings(std::span<const DenoiseRow> rows);
+std::vector<Finding> denoise_findings(std::span<const DenoiseRow> all);
 
 /// The rows as a table.
 BenchTable denoise_table(std::span<const DenoiseRow> rows);
