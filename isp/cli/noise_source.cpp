@@ -8,6 +8,7 @@
 #include "calib/picture_noise.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/subtract_dark_frame.h"
+#include "isp/raw/to_linear.h"
 
 namespace lowlux::cli {
 namespace {
@@ -27,7 +28,7 @@ NoiseProfile profile_of(const calib::PictureNoise& noise, const RawDn& raw, cons
 std::string found_text(const calib::PictureNoise& noise) {
   const double gain = noise.gain_dn_per_e.value;
   std::string text = fmt::format(
-      "the noise is neither in a profile nor in the file: measured on the picture itself, {:.3g} DN/e-, "
+      "neither a profile nor the file states usable noise: measured on the picture itself, {:.3g} DN/e-, "
       "{:.2g} e- without light",
       gain, std::sqrt(std::max(noise.offset_dn2.value, 0.0)) / gain);
   for (const std::string& doubt : noise.reasons) text += "; " + doubt;
@@ -38,7 +39,8 @@ std::string found_text(const calib::PictureNoise& noise) {
 
 Result<void> find_noise(const isp::DevelopOptions& options, RawFrame& frame, Executor& executor) {
   using Mode = isp::DenoiseChoice::Mode;
-  if (options.denoise.mode == Mode::off || frame.noise || frame.raw.layout != SensorLayout::bayer) return {};
+  if (options.denoise.mode == Mode::off || frame.raw.layout != SensorLayout::bayer) return {};
+  if (frame.noise && isp::electrons_at_white(frame.raw, *frame.noise)) return {};
   const auto black =
       options.dark_frame ? isp::black_of(frame.raw, *options.dark_frame) : isp::choose_black(frame.raw, options.black);
   if (!black) return tl::make_unexpected(black.error());
@@ -49,7 +51,7 @@ Result<void> find_noise(const isp::DevelopOptions& options, RawFrame& frame, Exe
     return {};
   }
   const std::string why =
-      "the noise is neither in a profile nor in the file, and the picture does not tell: " + noise.error().message;
+      "neither a profile nor the file states usable noise, and the picture does not tell: " + noise.error().message;
   if (options.denoise.mode == Mode::level || options.denoise.always) {
     return fail(noise.error().code, why + "; give a profile (--profile)");
   }
