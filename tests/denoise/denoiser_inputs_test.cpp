@@ -217,7 +217,6 @@ TEST(DenoiserInputs, AreSummedWithoutLossOfDigits) {
 }
 
 TEST(DenoiserInputs, OfTwelveMegapixelsKeepTheirMean) {
-  if (std::getenv("LOWLUX_NIGHTLY") == nullptr) GTEST_SKIP() << "takes 400 MB; set LOWLUX_NIGHTLY";
   Plane<float> raw(4000, 3000);
   std::fill(raw.data(), raw.data() + raw.size(), 1234.5678f);
   const Denoised out(raw, {.read_noise_e = 2}, {.level = Level::draft, .rho = no_prior});
