@@ -109,6 +109,11 @@ struct FinishedRows {
 };
 void finish_rows(const SumRows& in, float* scratch, const FinishedRows& out);
 
+/// Most that a chroma plane's variance is of the luma's, by their coefficients: 0.5 (R + B) of 0.04 (R + B). What is
+/// above comes of saturated sites, whose chroma is blind on every level: it says nothing of the noise that is left
+/// beside them.
+inline constexpr float most_chroma_of_luma = 12.5f;
+
 /// Factors of the slopes gx and gy, as in SiteSlopes.
 struct Slopes {
   float c2_x, c2_y, c3_x, c3_y;

@@ -171,6 +171,22 @@ Four total_residual(const std::vector<Four>& levels, const Image& starts) {
   return total;
 }
 
+/// Blind cells count as if they were seen, unless all four of a coarser one are blind.
+void see(const Image& luma, Image& chroma) {
+  for (int y = 0; y + 1 < chroma.height; y += 2) {
+    for (int x = 0; x + 1 < chroma.width; x += 2) {
+      bool blind = true;
+      for (int i = 0; i < 4; ++i) {
+        blind = blind && chroma.at(x + i % 2, y + i / 2) > 12.5 * luma.at(x + i % 2, y + i / 2);
+      }
+      for (int i = 0; !blind && i < 4; ++i) {
+        double& v = chroma.at(x + i % 2, y + i / 2);
+        v = std::min(v, 12.5 * luma.at(x + i % 2, y + i / 2));
+      }
+    }
+  }
+}
+
 /// Pyramid of the planes, and of their variances.
 void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, const Frame& frame) {
   const int levels = frame.levels;
@@ -182,6 +198,7 @@ void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, const Frame&
     for (int p = 0; p < 4; ++p) {
       half[p] = down2(x.back()[p]);
       half_variance[p] = down2(variance.back()[p]);
+      if (p != 0) see(down2(variance.back()[0]), half_variance[p]);
       for (double& v : half_variance[p].v) v *= scale[x.size()] / scale[x.size() - 1] / 4;
     }
     x.push_back(std::move(half));
