@@ -22,6 +22,7 @@ std::optional<Spectrum> column_named(const CieTable& table, std::string_view nam
 
 CieTable camera_ssf_5nm_table();
 CieTable cie1931_2deg_cmf_1nm_table();
+CieTable cie1951_scotopic_1nm_table();
 CieTable colorchecker_ohta_reflectance_5nm_table();
 CieTable cones_smith_pokorny_1975_5nm_table();
 CieTable cones_stockman_sharpe_2deg_1nm_table();
