@@ -9,6 +9,7 @@
 #include "isp/base/cfa.h"
 #include "isp/base/executor.h"
 #include "isp/base/image.h"
+#include "isp/base/look_grid.h"
 #include "isp/base/plane.h"
 #include "isp/base/tone_table.h"
 
@@ -53,6 +54,7 @@ struct RgbTransform {
   std::array<float, 3> luminance{};  // weights of Y, >= 0, sum 1; only read when colours are moved into the gamut
   float clip = 1;                    // 1 makes clipped highlights neutral; +infinity keeps all
   bool move_into_gamut = true;       // false: encoders clamp each channel, linear() leaves values as they are
+  const LookGrid* look = nullptr;    // if set, changes `out` before it is moved into the gamut
 };
 
 /// Mosaic or camera RGB to a picture in one pass over row bands: Malvar-He-Cutler demosaic (ICASSP 2004, the
@@ -78,15 +80,22 @@ class RawToRgb {
   void bin2x2(const DnMosaic& in, RgbView<float> out, Executor& executor);
   void bin2x2(const SignedMosaic& in, RgbView<float> out, Executor& executor);
 
+  /// Mean camera RGB, gains applied, of each square of 4 x 4 pixels, where the picture ends mirrored: `out` is
+  /// ceil(height / 4) x ceil(width / 4).
+  void quarter(const RgbInput& in, RgbView<float> out, Executor& executor);
+
  private:
   template <class Mosaic>
   void bin(const Mosaic& in, RgbView<float> out, Executor& executor);
+  /// Scratch of one thread.
+  struct Bench;
+  Bench bench(int thread) const;
   template <class SinkOfRow>
   void convert(const RgbInput& in, const RgbTransform& transform, const SinkOfRow& sink_of_row, Executor& executor);
-  float* scratch(int thread) const;
 
   int threads_;
-  std::size_t run_stride_;  // floats from one run of scratch samples to the next
+  std::size_t run_stride_;   // floats from one run of scratch samples to the next
+  std::size_t look_stride_;  // floats from one part of a look's row to the next
   std::unique_ptr<float[]> memory_;
 };
 

@@ -13,6 +13,7 @@
 #include <hwy/highway.h>
 
 #include "isp/raw/raw_to_rgb_demosaic-inl.h"
+#include "isp/raw/raw_to_rgb_look-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::isp::rows::HWY_NAMESPACE {
@@ -179,14 +180,15 @@ struct ToPlanes {
   }
 };
 
-template <class Source, class Sink>
-HWY_INLINE void convert(const Source& source, const Colour& colour, int width, const Sink& sink) {
+template <class Source, class Look, class Sink>
+HWY_INLINE void convert(const Source& source, const Colour& colour, const Look& look, int width, const Sink& sink) {
   const ColourVectors vectors(colour);
   const bool move = colour.move_into_gamut;
   const auto lanes = static_cast<int>(hn::Lanes(Floats()));
   for (int i = 0; 2 * i < width; i += lanes) {
     SitePair v = source.at(i);
     v = {vectors.transform(v.even), vectors.transform(v.odd)};
+    look(v, i);
     if (move) {
       vectors.move_into_gamut(v);
     } else if (Sink::clamps) {
@@ -194,6 +196,15 @@ HWY_INLINE void convert(const Source& source, const Colour& colour, int width, c
       clamp(v.odd);
     }
     sink.write(v, 2 * i, width - 2 * i);
+  }
+}
+
+template <class Source, class Sink>
+HWY_INLINE void convert(const Source& source, const Colour& colour, int width, const Sink& sink) {
+  if (colour.look != nullptr) {
+    convert(source, colour, LookVectors(*colour.look), width, sink);
+  } else {
+    convert(source, colour, AsItIs(), width, sink);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "isp/base/look_grid.h"
 #include "isp/base/tone_table.h"
 
 /// The row kernels under RawToRgb, dispatched at run time. Plain types only: their sources are compiled for several
@@ -43,12 +44,24 @@ struct PlaneRows {
   const float* odd[3];
 };
 
+/// LookGrid on one row of pixels: the parts interpolated between rows of cells, with one cell repeated before the first
+/// and look_padding after the last.
+struct LookRow {
+  const float* part[LookGrid::parts];
+  float luminance[3];
+  float rods[3];
+  float tint[3];
+  float dark;
+};
+inline constexpr int look_padding = 24;
+
 /// RgbTransform for one order of the camera channels: (own, green, other) of a mosaic row, (R, G, B) of planes.
 struct Colour {
   float column[3][3];  // column[c][j]: what camera channel c adds to output j
   float luminance[3];
   float clip;
   bool move_into_gamut;
+  const LookRow* look;  // null: none
 };
 
 struct Codes8 {
@@ -75,6 +88,18 @@ struct CellRow {
   const float* site[4];
 };
 void bin_row(const CellRow& in, int cells, const Planes& out);
+
+/// Runs of samples whose means over four columns of pixels are wanted: out[j] = factor * the sum of samples 2j and
+/// 2j + 1 of all runs.
+struct QuarterRuns {
+  const float* run[8];
+  int runs;
+  float factor;
+};
+void quarter_row(const QuarterRuns& in, int cells, float* out);
+
+/// out = a + t (b - a), samples 0 to n - 1.
+void blend_row(const float* a, const float* b, float t, int n, float* out);
 
 const char* target_name();
 

@@ -100,6 +100,36 @@ void BinRow(const CellRow& in, int cells, const Planes& out) {
   }
 }
 
+void QuarterRow(const QuarterRuns& in, int cells, float* out) {
+  const Floats f;
+  const auto lanes = static_cast<int>(hn::Lanes(f));
+  const VF factor = hn::Set(f, in.factor);
+  HWY_ALIGN float last[hn::MaxLanes(Floats())];
+  for (int j = 0; j < cells; j += lanes) {
+    VF low = hn::Zero(f), high = hn::Zero(f);
+    for (int k = 0; k < in.runs; ++k) {
+      low = hn::Add(low, hn::LoadU(f, in.run[k] + 2 * j));
+      high = hn::Add(high, hn::LoadU(f, in.run[k] + 2 * j + lanes));
+    }
+    const VF mean = hn::Mul(factor, hn::Add(hn::ConcatEven(f, high, low), hn::ConcatOdd(f, high, low)));
+    const bool whole = j + lanes <= cells;
+    hn::StoreU(mean, f, whole ? out + j : last);
+    if (!whole) std::memcpy(out + j, last, static_cast<std::size_t>(cells - j) * sizeof(float));
+  }
+}
+
+void BlendRow(const float* a, const float* b, float t, int n, float* out) {
+  const Floats f;
+  const auto lanes = static_cast<int>(hn::Lanes(f));
+  const VF way = hn::Set(f, t);
+  int i = 0;
+  for (; i + lanes <= n; i += lanes) {
+    const VF from = hn::LoadU(f, a + i);
+    hn::StoreU(hn::MulAdd(way, hn::Sub(hn::LoadU(f, b + i), from), from), f, out + i);
+  }
+  for (; i < n; ++i) out[i] = a[i] + t * (b[i] - a[i]);
+}
+
 }  // namespace lowlux::isp::rows::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -109,6 +139,8 @@ namespace lowlux::isp::rows {
 HWY_EXPORT(SplitDn);
 HWY_EXPORT(SplitFloat);
 HWY_EXPORT(BinRow);
+HWY_EXPORT(QuarterRow);
+HWY_EXPORT(BlendRow);
 
 void split_dn(const std::uint16_t* in, int width, const RowLevels& levels, const SplitRow& out) {
   HWY_DYNAMIC_DISPATCH(SplitDn)(in, width, levels, out);
@@ -117,6 +149,10 @@ void split_float(const float* in, int width, const RowLevels& levels, const Spli
   HWY_DYNAMIC_DISPATCH(SplitFloat)(in, width, levels, out);
 }
 void bin_row(const CellRow& in, int cells, const Planes& out) { HWY_DYNAMIC_DISPATCH(BinRow)(in, cells, out); }
+void quarter_row(const QuarterRuns& in, int cells, float* out) { HWY_DYNAMIC_DISPATCH(QuarterRow)(in, cells, out); }
+void blend_row(const float* a, const float* b, float t, int n, float* out) {
+  HWY_DYNAMIC_DISPATCH(BlendRow)(a, b, t, n, out);
+}
 
 }  // namespace lowlux::isp::rows
 #endif

@@ -84,6 +84,35 @@ Rgb moved_into_gamut(const Rgb& v, const std::array<float, 3>& luminance) {
   return {y + t * (v[0] - y), y + t * (v[1] - y), y + t * (v[2] - y)};
 }
 
+Rgb seen(const Rgb& v, const LookGrid& look, int x, int y) {
+  const auto interpolated = [&](LookGrid::Part part) {
+    const PlaneView<const float>& cells = look.part[part];
+    const auto at = [&](int column, int row) -> double {
+      return cells.at(std::clamp(column, 0, cells.width - 1), std::clamp(row, 0, cells.height - 1));
+    };
+    const double u = (x + 0.5) / LookGrid::cell - 0.5, w = (y + 0.5) / LookGrid::cell - 0.5;
+    const int column = static_cast<int>(std::floor(u)), row = static_cast<int>(std::floor(w));
+    const double right = u - column, down = w - row;
+    return (1 - down) * ((1 - right) * at(column, row) + right * at(column + 1, row)) +
+           down * ((1 - right) * at(column, row + 1) + right * at(column + 1, row + 1));
+  };
+  double light = 0, rods = 0;
+  for (int c = 0; c < 3; ++c) {
+    light += look.luminance[c] * v[c];
+    rods += look.rods[c] * v[c];
+  }
+  const double perceived = light + interpolated(LookGrid::rod_share) * (rods - light);
+  const double chroma =
+      interpolated(LookGrid::chroma) * (std::max(perceived, 0.0) + look.dark) / (std::max(light, 0.0) + look.dark);
+  Rgb out{};
+  for (int c = 0; c < 3; ++c) {
+    out[c] = (interpolated(LookGrid::base) + interpolated(LookGrid::detail) * perceived) *
+                 (1 + interpolated(LookGrid::blue) * look.tint[c]) +
+             chroma * (v[c] - light);
+  }
+  return out;
+}
+
 Rgb transformed(const Rgb& camera, const isp::RgbTransform& transform) {
   Rgb out{};
   for (int j = 0; j < 3; ++j) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "isp/base/cfa.h"
+#include "isp/base/look_grid.h"
 #include "isp/base/tone_table.h"
 #include "isp/raw/raw_to_rgb.h"
 
@@ -31,6 +32,9 @@ Rgb malvar(const LinearisedMosaic& mosaic, int x, int y);
 
 /// Camera RGB of one pixel of planes, gains applied.
 Rgb camera_rgb(const isp::CameraPlanes& in, int x, int y);
+
+/// LookGrid at pixel (x, y).
+Rgb seen(const Rgb& v, const LookGrid& look, int x, int y);
 
 /// min(c, clip), matrix, and the move into the gamut where it is asked for.
 Rgb transformed(const Rgb& camera, const isp::RgbTransform& transform);

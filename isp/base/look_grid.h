@@ -1,0 +1,27 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "isp/base/plane.h"
+
+namespace lowlux {
+
+/// How a look changes linear RGB, on a grid with one cell for 4 x 4 pixels, interpolated linearly between the cells'
+/// middles. With v a pixel, Y = luminance . v, S = rods . v and the five parts of the grid at the pixel:
+///     E   = Y + rod_share (S - Y)                               what is seen of its light
+///     out = (base + detail E) (1 + blue tint) + chroma (max(E, 0) + dark) / (max(Y, 0) + dark) (v - Y)
+/// rod_share 0, chroma 1, blue 0, detail 1, base 0 leave v as it is, up to rounding.
+struct LookGrid {
+  static constexpr int cell = 4;
+  enum Part : std::uint8_t { rod_share, chroma, blue, detail, base };
+  static constexpr int parts = 5;
+
+  std::array<PlaneView<const float>, parts> part;  // ceil(height / 4) x ceil(width / 4), finite
+  std::array<float, 3> luminance{};                // sum 1
+  std::array<float, 3> rods{};                     // sum 1: relative to white
+  std::array<float, 3> tint{};                     // luminance . tint = 0
+  float dark = 1e-6f;                              // > 0: below it, chromaticity is held back, not amplified
+};
+
+}  // namespace lowlux
