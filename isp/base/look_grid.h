@@ -7,6 +7,9 @@
 
 namespace lowlux {
 
+/// Cells of 4 pixels along a side of so many.
+constexpr int cells_along(int pixels) { return (pixels + 3) / 4; }
+
 /// How a look changes linear RGB, on a grid with one cell for 4 x 4 pixels, interpolated linearly between the cells'
 /// middles. With v a pixel, Y = luminance . v, S = rods . v and the five parts of the grid at the pixel:
 ///     E   = Y + rod_share (S - Y)                               what is seen of its light

@@ -25,7 +25,7 @@ struct Step {
 Step step_at(double m, const LuminancePair& field) {
   const double numerator = m * field.photopic + (1 - m) * field.scotopic * v0;
   const double denominator = m + (1 - m) * v0;
-  const double h = a + b * std::log10(numerator / denominator) - m;
+  const double h = mes2_response(numerator / denominator) - m;
   return {h, b / std::numbers::ln10 * v0 * (field.photopic - field.scotopic) / (numerator * denominator) - 1};
 }
 
@@ -45,6 +45,8 @@ double root(const LuminancePair& field) {
 }
 
 }  // namespace
+
+double mes2_response(double luminance_cd_m2) { return a + b * std::log10(luminance_cd_m2); }
 
 double rod_share(double m) { return (1 - m) * v0 / (m + (1 - m) * v0); }
 

@@ -35,6 +35,9 @@ struct MesopicState {
 ///     both 0: m = 0, luminance 0
 MesopicState mesopic_state(const LuminancePair& adaptation);
 
+/// a + b log10 L above, not held to 0..1. @param luminance_cd_m2  above 0
+double mes2_response(double luminance_cd_m2);
+
 /// L(m) above: the mesopic luminance of a stimulus for an eye in state m, 0..1. Linear in the stimulus, so signed
 /// figures are allowed.
 double mesopic_luminance_cd_m2(double m, const LuminancePair& stimulus);

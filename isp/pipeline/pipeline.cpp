@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "isp/pipeline/electron_mosaic.h"
+#include "isp/pipeline/look_noise.h"
 #include "isp/raw/bin_plane.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/to_linear.h"
@@ -40,6 +41,10 @@ void fit(Plane<T>& plane, int width, int height) {
   if (plane.width() != width || plane.height() != height) plane = Plane<T>(width, height);
 }
 
+bool bounds_noise(const DevelopPlan& plan) { return plan.look && plan.look->noise_limit && noise_is_known(plan); }
+
+bool keeps_maps(const DevelopPlan& plan) { return plan.options.denoise.maps || bounds_noise(plan); }
+
 DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
   const Rect& crop = raw.default_crop;
   PerSite<double> range{};
@@ -57,8 +62,8 @@ SignalElectrons Pipeline::signal_electrons(const RawFrame& frame, const DevelopP
     return subtract_dark(raw_electrons(frame, plan, std::move(mosaic_), executor_), plan.black, executor_);
   }
   RawElectrons raw = raw_electrons(frame, plan, std::move(noisy_), executor_);
-  SignalElectrons out = noise_reducer_.run(raw, plan.noise_reduction, std::move(mosaic_),
-                                           plan.options.denoise.maps ? &noise_maps_ : nullptr);
+  SignalElectrons out =
+      noise_reducer_.run(raw, plan.noise_reduction, std::move(mosaic_), keeps_maps(plan) ? &noise_maps_ : nullptr);
   noisy_ = std::move(raw.value);
   return out;
 }
@@ -131,20 +136,47 @@ void Pipeline::reserve(const RawFrame& frame, const DevelopPlan& plan) {
   }
 }
 
+// From means of the frame that is rendered.
+LookGrid Pipeline::look_grid(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan) {
+  if (!look_ || look_width_ < plan.width || look_height_ < plan.height) {
+    look_width_ = std::max(plan.width, look_width_);
+    look_height_ = std::max(plan.height, look_height_);
+    look_.reset();  // before the next one takes its memory
+    look_ = std::make_unique<NightLookGrid>(look_width_, look_height_);
+  }
+  const int width = cells_along(plan.width), height = cells_along(plan.height);
+  for (Plane<float>& plane : quarter_) fit(plane, width, height);
+  kernel_->quarter(in, {quarter_[0].view(), quarter_[1].view(), quarter_[2].view()}, executor_);
+  const RgbView<const float> quarter{quarter_[0].view(), quarter_[1].view(), quarter_[2].view()};
+  std::optional<NoiseLimit> limit;
+  if (bounds_noise(plan)) {
+    fit(luminance_noise_, width, height);
+    noise_of_luminance(plan, frame.raw.default_crop, noise_maps_, quarter, luminance_noise_.view(), executor_);
+    limit = {*plan.look->noise_limit, tone_limit(plan.options.tone, plan.exposure_ev), luminance_noise_.view()};
+  }
+  return look_->make(quarter, plan.transform.matrix, plan.transform.clip, plan.look->look, limit, executor_);
+}
+
 void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
-  if (!plan.noise_reduction.level || !plan.options.denoise.maps) noise_maps_ = {};
+  if (!plan.noise_reduction.level || !keeps_maps(plan)) noise_maps_ = {};
   reserve(frame, plan);
   const RgbInput in =
       frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);
+  RgbTransform transform = plan.transform;
+  LookGrid look;
+  if (plan.look) {
+    look = look_grid(in, frame, plan);
+    transform.look = &look;
+  }
   std::visit(
       [&](auto& picture) {
         using P = std::remove_reference_t<decltype(picture)>;
         if constexpr (std::is_same_v<P, Encoded8>) {
-          kernel_->rgb8(in, plan.transform, plan.tone, picture.codes.view(), executor_);
+          kernel_->rgb8(in, transform, plan.tone, picture.codes.view(), executor_);
         } else if constexpr (std::is_same_v<P, Encoded16>) {
-          kernel_->rgb16(in, plan.transform, plan.tone, picture.codes.view(), executor_);
+          kernel_->rgb16(in, transform, plan.tone, picture.codes.view(), executor_);
         } else {
-          kernel_->linear(in, plan.transform, picture.view(), executor_);
+          kernel_->linear(in, transform, picture.view(), executor_);
         }
       },
       out);

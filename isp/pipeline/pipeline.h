@@ -28,6 +28,7 @@ class Pipeline {
   void reserve(const RawFrame& frame, const DevelopPlan& plan);
   RgbInput prepare_bayer(const RawFrame& frame, const DevelopPlan& plan);
   RgbInput prepare_planes(const RawFrame& frame, const DevelopPlan& plan);
+  LookGrid look_grid(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan);
   SignalElectrons signal_electrons(const RawFrame& frame, const DevelopPlan& plan);
   PerSite<float> float_mosaic(const RawFrame& frame, const DevelopPlan& plan);
 
@@ -38,6 +39,11 @@ class Pipeline {
   Plane<float> mosaic_;  // active area, black and dark off
   Plane<float> noisy_;   // before noise was reduced
   NoiseMaps noise_maps_;
+  std::unique_ptr<NightLookGrid> look_;
+  int look_width_ = 0;
+  int look_height_ = 0;
+  std::array<Plane<float>, 3> quarter_;  // for the look: means of 4 x 4 pixels
+  Plane<float> luminance_noise_;
   std::array<Plane<float>, 3> planes_;  // camera RGB of frames that need no demosaicing
   std::array<Plane<float>, 3> half_planes_;
 };

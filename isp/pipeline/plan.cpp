@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "isp/pipeline/plan_look.h"
 #include "isp/pipeline/plan_noise.h"
 #include "isp/pipeline/stage_clock.h"
 #include "isp/raw/corrections.h"
@@ -133,15 +134,13 @@ void set_transform(DevelopPlan& plan, const Matrix3& balanced, const Vector3& lu
     plan.tone = make_tone_table(plan.options.tone, plan.options.space, limit);
 }
 
-void decide_exposure(DevelopPlan& plan, const Thumbnail& thumbnail, const Vector3& weights) {
+void decide_exposure(DevelopPlan& plan, std::span<const float> luminance, double black_noise_std) {
   if (plan.options.exposure_ev) {
     plan.exposure_ev = *plan.options.exposure_ev;
     plan.exposure_rule = "given";
     return;
   }
-  const std::vector<float> luminance = rendered_luminance(thumbnail.mean, weights, plan.white_gain);
-  const double gain = *std::max_element(plan.white_gain.begin(), plan.white_gain.end());
-  const AutoExposure automatic = auto_exposure(luminance, thumbnail.black_noise_std * gain);
+  const AutoExposure automatic = auto_exposure(luminance, black_noise_std);
   plan.exposure_ev = automatic.ev;
   plan.exposure_rule = name_of(automatic.rule);
 }
@@ -166,7 +165,11 @@ Result<void> decide_rendering(const RawFrame& frame, const Thumbnail& thumbnail,
   const Result<Matrix3> balanced = balanced_to_output(frame, options, *balance);
   if (!balanced) return tl::make_unexpected(balanced.error());
   const Vector3 luminance = luminance_weights(options.space).value_or(Vector3{0, 1, 0});
-  decide_exposure(plan, thumbnail, luminance_of_balanced(luminance, *balanced));
+  const std::vector<float> blocks =
+      rendered_luminance(thumbnail.mean, luminance_of_balanced(luminance, *balanced), plan.white_gain);
+  const double gain = *std::max_element(plan.white_gain.begin(), plan.white_gain.end());
+  decide_exposure(plan, blocks, thumbnail.black_noise_std * gain);
+  if (auto look = plan_look(frame, {blocks, thumbnail.black_noise_std * gain}, plan); !look) return look;
   set_transform(plan, *balanced, luminance);
   return {};
 }

@@ -12,6 +12,7 @@
 #include "isp/base/result.h"
 #include "isp/base/tone_table.h"
 #include "isp/model/camera_colour.h"
+#include "isp/pipeline/look.h"
 #include "isp/pipeline/noise_reduction.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/raw_to_rgb.h"
@@ -39,6 +40,7 @@ struct DevelopOptions {
   bool find_defects = true;                     // hot and dead pixels beyond those the source names
   std::shared_ptr<const DarkFrame> dark_frame;  // set: taken off pixel by pixel in place of `black`
   DenoiseChoice denoise;
+  LookChoice look;
 };
 
 /// Time one step took.
@@ -59,6 +61,7 @@ struct DevelopPlan {
   double exposure_ev = 0;
   std::string_view exposure_rule;
   NoiseReduction noise_reduction;
+  std::optional<LookPlan> look;  // absent: as the camera has it
   std::vector<std::string> warnings;
 
   // for the kernels
@@ -80,7 +83,7 @@ Result<void> check_options(const DevelopOptions& options);
 /// Measures black, noise, exposure and white of a frame, and decides how to develop it. With a dark frame, all is
 /// measured on what is left when it is off. Errors: no black point (insufficient), those of black_of, no colour
 /// calibration for a space other than `camera` (insufficient), white not above black, matrices that cannot be
-/// (malformed), options that do not fit together or the frame (invalid_argument), those of plan_noise.
+/// (malformed), options that do not fit together or the frame (invalid_argument), those of plan_look and plan_noise.
 Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
 
 }  // namespace lowlux::isp

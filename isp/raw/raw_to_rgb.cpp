@@ -171,9 +171,6 @@ void convert_band(const CameraPlanes& in, const RgbTransform& transform, RowBand
   }
 }
 
-/// Cells of 4 pixels along a side.
-int cells_along(int pixels) { return (pixels + LookGrid::cell - 1) / LookGrid::cell; }
-
 [[maybe_unused]] bool fits(const LookGrid& look, int width, int height) {
   return std::ranges::all_of(look.part, [&](const PlaneView<const float>& part) {
     return part.width == cells_along(width) && part.height == cells_along(height);

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "isp/base/result.h"
+#include "isp/model/night_eye.h"
+#include "isp/render/night_look.h"
+
+namespace lowlux::isp {
+
+/// How the scene is to look: as a camera in daylight has it, or as an eye that stood there.
+enum class Look : std::uint8_t { camera, eye };
+
+/// What is asked for.
+struct LookChoice {
+  Look look = Look::camera;
+  std::optional<double> scene_luminance_cd_m2;  // mean over the picture; absent: from how it was exposed
+  /// Which effects: those that are seen, all, or these.
+  enum class Which : std::uint8_t { automatic, all, listed } which = Which::automatic;
+  NightEffects listed;
+  double tolerance = 0.5;         // CIEDE2000: effects below it are left out by Which::automatic
+  double dimming = 0.4;           // share of the darkness that the picture keeps, 0..1; see apparent_dimming_ev
+  double field_of_view_deg = 50;  // of the picture's longer side
+  /// CIE L* that noise may reach, see NoiseLimit; absent: no limit.
+  std::optional<double> noise_limit;
+};
+
+/// One effect's part in a decision.
+struct LookEffect {
+  std::string_view name;
+  double size = 0;  // predicted for the darkest place of the frame: largest CIEDE2000 of any displayable colour
+  bool used = false;
+};
+
+/// What was decided.
+struct LookPlan {
+  NightLook look;
+  bool eye = false;  // false: only noise is bounded
+  double mean_cd_m2 = 0;
+  std::string_view luminance_rule;  // "given" or "exposure"
+  MesopicState state;               // of an eye adapted to the mean
+  double dimming_ev = 0;
+  std::vector<LookEffect> effects;
+  std::optional<double> noise_limit;
+};
+
+/// "purkinje", "chroma", "hue", "acuity", "glare", "visual-noise", in this order.
+inline constexpr std::array<std::string_view, 6> night_effect_names{"purkinje", "chroma", "hue",
+                                                                    "acuity",   "glare",  "visual-noise"};
+/// The switch of an effect by its name; null for another name.
+bool* effect_named(NightEffects& effects, std::string_view name);
+
+/// Size of each effect for an eye in a state: the largest CIEDE2000 between what is shown with it alone and without
+/// any, over the primaries, secondaries and the white of Rec. 709; for acuity, of a grating of black and white at a
+/// quarter of the pixels' frequency. Glare and visual noise are a matter of taste: not a number.
+std::vector<LookEffect> predict_effects(const NightEye& darkest, double scotopic_ratio_of_white,
+                                        double pixels_per_degree);
+
+}  // namespace lowlux::isp

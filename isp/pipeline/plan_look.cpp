@@ -1,0 +1,157 @@
+#include "isp/pipeline/plan_look.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "isp/model/night_eye.h"
+#include "isp/model/scene_luminance.h"
+#include "isp/render/output_space.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double least_mean = 1e-6;   // of the white level: blacker frames are taken for this
+constexpr double most_cd_m2 = 1e9;    // the sun
+constexpr double least_cd_m2 = 1e-7;  // below a starless night
+constexpr double least_dark = 1e-5;   // of LookGrid, in the pixels' unit
+
+Result<void> check(const LookChoice& o, OutputSpace space) {
+  const auto wrong = [](const std::string& message) { return fail(ErrorCode::invalid_argument, message); };
+  if ((o.look == Look::eye || o.noise_limit) && (space == OutputSpace::camera || space == OutputSpace::xyz)) {
+    return wrong(
+        "the look of the eye and the limit of noise need a space with red, green and blue: srgb, p3, rec2020, "
+        "linear-srgb or "
+        "linear-rec2020");
+  }
+  if (o.scene_luminance_cd_m2 && !(*o.scene_luminance_cd_m2 >= least_cd_m2 && *o.scene_luminance_cd_m2 <= most_cd_m2)) {
+    return wrong(fmt::format("a scene's luminance lies between {} and {} cd/m2, not at {}", least_cd_m2, most_cd_m2,
+                             *o.scene_luminance_cd_m2));
+  }
+  if (!(o.dimming >= 0 && o.dimming <= 1)) return wrong("the share of darkness that is kept lies between 0 and 1");
+  if (!(o.field_of_view_deg >= 0.1 && o.field_of_view_deg <= 180))
+    return wrong("a field of view has 0.1 to 180 degrees");
+  if (!(o.tolerance > 0 && o.tolerance <= 100)) return wrong("a tolerance lies above 0 and at most at 100");
+  if (o.noise_limit && !(*o.noise_limit > 0 && *o.noise_limit <= 100)) {
+    return wrong("the limit of noise is a CIE lightness above 0 and at most 100");
+  }
+  return {};
+}
+
+double mean_of(std::span<const float> values) {
+  double sum = 0;
+  for (const float v : values) sum += std::isfinite(v) ? v : 0;
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
+// Luminance of the white level [cd/m2]: from the exposure, or so that the mean is as given.
+Result<double> white_level_cd_m2(const RawFrame& frame, double mean, LookPlan& look, const LookChoice& choice) {
+  if (choice.scene_luminance_cd_m2) {
+    look.luminance_rule = "given";
+    look.mean_cd_m2 = *choice.scene_luminance_cd_m2;
+    return look.mean_cd_m2 / mean;
+  }
+  const std::optional<double> saturation = saturation_luminance_cd_m2(frame.raw.info);
+  if (!saturation) {
+    return fail(ErrorCode::insufficient,
+                "the luminance of the scene is unknown: it takes exposure time, f-number and ISO to estimate it, and "
+                "the file lacks one; give its mean with --scene-luminance, in cd/m2");
+  }
+  look.luminance_rule = "exposure";
+  look.mean_cd_m2 = mean * *saturation;
+  return *saturation;
+}
+
+// Weights of scotopic luminance relative to white, and the rods' tint, in the primaries of the pixels.
+void set_primaries(OutputSpace space, NightLook& look) {
+  const Matrix3 from_xyz = *xyz_to_output(space), to_xyz = *inverse(from_xyz);
+  const Vector3 luminance = *luminance_weights(space);
+  const Vector3 tint = from_xyz * (*rgb_to_xyz(primaries_rec709) * rod_tint);
+  double sum = 0;
+  Vector3 rods{};
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 3; ++i) rods[j] += scotopic_weights[i] * to_xyz[i][j];
+    sum += rods[j];
+  }
+  for (int j = 0; j < 3; ++j) {
+    look.luminance[j] = static_cast<float>(luminance[j]);
+    look.rods[j] = static_cast<float>(rods[j] / sum);
+    look.tint[j] = static_cast<float>(tint[j]);
+  }
+}
+
+double ratio_of_white(const std::optional<WhitePoint>& white) {
+  const std::optional<Xyz> colour = xyz_of(white ? white->xy : output_white);
+  return std::clamp(colour ? scotopic_luminance(*colour) : 0.0, 0.1, 60.0);
+}
+
+// The darkest place an eye adapts to, by blocks of the frame.
+LuminancePair darkest_field(std::span<const float> blocks, double white_cd_m2, const LookPlan& look) {
+  float darkest = INFINITY;
+  for (const float v : blocks) darkest = std::min(darkest, std::isfinite(v) ? std::max(v, 0.0f) : INFINITY);
+  const double own = std::isfinite(darkest) ? darkest * white_cd_m2 : 0;
+  const double field = (1 - adaptation_share_of_mean) * own + adaptation_share_of_mean * look.mean_cd_m2;
+  return {field, field * look.look.scotopic_ratio_of_white};
+}
+
+void decide_effects(const LookChoice& choice, const NightEye& darkest, LookPlan& look) {
+  look.effects = predict_effects(darkest, look.look.scotopic_ratio_of_white, look.look.pixels_per_degree);
+  NightEffects listed = choice.listed;
+  for (LookEffect& effect : look.effects) {
+    switch (choice.which) {
+      case LookChoice::Which::automatic:
+        effect.used = effect.size > choice.tolerance;
+        break;
+      case LookChoice::Which::all:
+        effect.used = true;
+        break;
+      case LookChoice::Which::listed:
+        effect.used = *effect_named(listed, effect.name);
+        break;
+    }
+    *effect_named(look.look.effects, effect.name) = effect.used;
+  }
+}
+
+void decide_eye(const FrameLight& light, double white_cd_m2, DevelopPlan& plan, LookPlan& look) {
+  const LookChoice& choice = plan.options.look;
+  NightLook& eye = look.look;
+  look.eye = true;
+  const LuminancePair mean{look.mean_cd_m2, look.mean_cd_m2 * eye.scotopic_ratio_of_white};
+  look.state = mesopic_state(mean);
+  decide_effects(choice, night_eye(darkest_field(light.block_luminance, white_cd_m2, look)), look);
+  if (plan.options.exposure_ev) return;
+  look.dimming_ev = choice.dimming * apparent_dimming_ev(look.state.luminance_cd_m2);
+  plan.exposure_ev += look.dimming_ev;
+}
+
+}  // namespace
+
+Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPlan& plan) {
+  const LookChoice& choice = plan.options.look;
+  if (auto checked = check(choice, plan.options.space); !checked) return checked;
+  if (choice.look == Look::camera && !choice.noise_limit) return {};
+  LookPlan look;
+  look.noise_limit = choice.noise_limit;
+  NightLook& eye = look.look;
+  eye.effects = {false, false, false, false, false, false};
+  eye.scotopic_ratio_of_white = ratio_of_white(plan.white);
+  eye.pixels_per_degree = std::max(plan.width, plan.height) / choice.field_of_view_deg;
+  double white_cd_m2 = 100;
+  if (choice.look == Look::eye) {
+    const Result<double> found =
+        white_level_cd_m2(frame, std::max(mean_of(light.block_luminance), least_mean), look, choice);
+    if (!found) return tl::make_unexpected(found.error());
+    white_cd_m2 = *found;
+    decide_eye(light, white_cd_m2, plan, look);
+  }
+  const double units = std::exp2(plan.exposure_ev) / tone_limit(plan.options.tone, plan.exposure_ev);
+  eye.cd_m2_per_unit = white_cd_m2 / units;
+  eye.dark = static_cast<float>(std::clamp(light.black_noise_std * units, least_dark, 1.0));
+  set_primaries(plan.options.space, eye);
+  plan.look = std::move(look);
+  return {};
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,343 @@
+#include "isp/render/night_look.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+
+#include "isp/model/mesopic.h"
+#include "isp/model/night_eye.h"
+#include "isp/render/eye_rows.h"
+#include "isp/render/grid.h"
+
+namespace lowlux::isp {
+namespace {
+
+using rows::EyeTables;
+
+// Of a cell of 4 pixels: box and linear interpolation blur it by half its side, 2 pixels.
+constexpr double cell_variance_px2 = 0.25 * LookGrid::cell * LookGrid::cell;
+
+double node(int i, int nodes, double first, double last) { return first + (last - first) * i / (nodes - 1); }
+
+// The root before it is held to 0..1, so that the ends are lines too.
+double unheld_coefficient(double log2_light, double log2_ratio) {
+  const LuminancePair field{std::exp2(log2_light), std::exp2(log2_light + log2_ratio)};
+  const double m = mesopic_state(field).m;
+  const double end = mes2_response(m == 0 ? field.scotopic : field.photopic);
+  return m == 0 || m == 1 ? end : m;
+}
+
+EyeTables make_tables() {
+  EyeTables t{};
+  for (int j = 0; j < t.ratios; ++j) {
+    for (int i = 0; i < t.lights; ++i) {
+      t.m[static_cast<std::size_t>(j) * t.lights + i] =
+          static_cast<float>(unheld_coefficient(node(i, t.lights, t.first_log2_light, t.last_log2_light),
+                                                node(j, t.ratios, t.first_log2_ratio, t.last_log2_ratio)));
+    }
+  }
+  for (int i = 0; i < t.lights; ++i) {
+    const double light = std::exp2(node(i, t.lights, t.first_log2_light, t.last_log2_light));
+    const double blur_deg = blur_std_deg(light);
+    t.blue[i] = static_cast<float>(rod_blue(light));
+    t.variance_deg2[i] = static_cast<float>(blur_deg * blur_deg);
+  }
+  t.half_saturation_cd_m2 = static_cast<float>(half_saturation_cd_m2);
+  t.chroma_scale = static_cast<float>(1 + half_saturation_cd_m2 / 100);
+  return t;
+}
+
+const EyeTables& shared_tables() {
+  static const EyeTables tables = make_tables();
+  return tables;
+}
+
+/// A plane and its halvings, for the largest frame; frames take the upper left corner.
+class Pyramid {
+ public:
+  Pyramid(int width, int height, int levels) {
+    for (int k = 0; k < levels; ++k, width = halved(width), height = halved(height)) level_.emplace_back(width, height);
+  }
+  void fit(int width, int height) {
+    width_ = width;
+    height_ = height;
+  }
+  PlaneView<float> operator[](int level) {
+    int width = width_, height = height_;
+    for (int k = 0; k < level; ++k) width = halved(width), height = halved(height);
+    return level_[level].view().crop(0, 0, width, height);
+  }
+  void halve_to(int last, Executor& executor) {
+    for (int k = 0; k < last; ++k) halve((*this)[k], (*this)[k + 1], executor);
+  }
+  void interpolate_from(int first, Executor& executor) {
+    for (int k = first; k > 0; --k) interpolate_twice((*this)[k], (*this)[k - 1], executor);
+  }
+
+ private:
+  std::vector<Plane<float>> level_;
+  int width_ = 0;
+  int height_ = 0;
+};
+
+template <class Work>
+void for_each_row(Executor& executor, int height, const Work& work) {
+  for_each_band(executor, height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) work(y);
+  });
+}
+
+int levels_of(int width, int height) {
+  int levels = 1;
+  for (int side = std::max(width, height); side > 1; side = halved(side)) ++levels;
+  return levels;
+}
+
+double mean_of(const PlaneView<const float>& plane) {
+  double sum = 0;
+  for (int y = 0; y < plane.height; ++y) {
+    double row = 0;
+    for (int x = 0; x < plane.width; ++x) row += plane.row(y)[x];
+    sum += row;
+  }
+  return sum / plane.width / plane.height;
+}
+
+float largest_of(const PlaneView<const float>& plane) {
+  float largest = 0;
+  for (int y = 0; y < plane.height; ++y) {
+    for (int x = 0; x < plane.width; ++x) largest = std::max(largest, plane.row(y)[x]);
+  }
+  return largest;
+}
+
+rows::LightWeights weights_of(const NightLook& look, const std::array<float, 9>& matrix, float clip) {
+  rows::LightWeights out{{}, {}, clip};
+  for (int c = 0; c < 3; ++c) {
+    for (int j = 0; j < 3; ++j) {
+      out.photopic[c] += look.luminance[j] * matrix[3 * j + c];
+      out.scotopic[c] += look.rods[j] * matrix[3 * j + c];
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+float gain_within_noise_limit(double y, double noise_std, double lightness) {
+  const double allowed = lightness / (1.3 * std::max(noise_std, 1e-12));
+  const double in_line = allowed / 903.3;
+  // 116/3 (0.7 g y)^(-2/3) g = allowed
+  const double root = allowed * 3 / 116 * std::cbrt(0.49 * std::max(y, 0.0) * std::max(y, 0.0));
+  return static_cast<float>(std::clamp(std::max(in_line, root * root * root), 0.0, 1.0));
+}
+
+struct NightLookGrid::State {
+  State(int width, int height)
+      : levels(levels_of(width, height)),
+        photopic(width, height, levels),
+        scotopic(width, height, levels),
+        seen(width, height, levels),
+        variance(width, height, levels),
+        between(width, height, levels) {
+    for (Plane<float>& plane : part) plane = Plane<float>(width, height);
+  }
+
+  void fit(int width, int height) {
+    for (Pyramid* p : {&photopic, &scotopic, &seen, &variance, &between}) p->fit(width, height);
+  }
+  PlaneView<float> part_view(int k) {
+    const PlaneView<float> cells = seen[0];
+    return part[k].view().crop(0, 0, cells.width, cells.height);
+  }
+
+  void take_light(const RgbView<const float>& camera, const rows::LightWeights& weights, const NightLook& look,
+                  Executor& executor);
+  void adapt(const NightLook& look, Executor& executor);
+  void see(const NightLook& look, Executor& executor);
+  void soften(Executor& executor);
+  void scatter(const NightLook& look, Executor& executor);
+  void add_veil(Executor& executor);
+  void bound_noise(const NoiseLimit& limit, Executor& executor);
+
+  int levels;
+  Pyramid photopic, scotopic;  // light, then the field of adaptation [cd/m2]
+  Pyramid seen;                // E of LookGrid
+  Pyramid variance;            // of the blur [px^2]
+  Pyramid between;
+  std::array<Plane<float>, LookGrid::parts> part;
+};
+
+// Light in the pixels' unit: photopic into `seen`, scotopic into `variance`; as fields [cd/m2], not negative, into the
+// two pyramids.
+void NightLookGrid::State::take_light(const RgbView<const float>& camera, const rows::LightWeights& weights,
+                                      const NightLook& look, Executor& executor) {
+  const PlaneView<float> y = seen[0], s = variance[0], field_y = photopic[0], field_s = scotopic[0];
+  const auto cones = static_cast<float>(look.cd_m2_per_unit);
+  const auto rods = static_cast<float>(look.cd_m2_per_unit * look.scotopic_ratio_of_white);
+  for_each_row(executor, y.height, [&](int row) {
+    rows::light_row({{camera[0].row(row), camera[1].row(row), camera[2].row(row)}}, weights, y.width, y.row(row),
+                    s.row(row));
+    for (int x = 0; x < y.width; ++x) {
+      field_y.row(row)[x] = std::clamp(cones * y.row(row)[x], 0.0f, 1e9f);
+      field_s.row(row)[x] = std::clamp(rods * s.row(row)[x], 0.0f, 1e9f);
+    }
+  });
+}
+
+// The field of adaptation of each cell: blurred where cells are as large as a half to a whole of the Gaussian.
+void NightLookGrid::State::adapt(const NightLook& look, Executor& executor) {
+  double std_cells = adaptation_field_std_deg * look.pixels_per_degree / LookGrid::cell;
+  int level = 0;
+  for (; std_cells > 2 && level + 1 < levels; ++level) std_cells /= 2;
+  for (Pyramid* field : {&photopic, &scotopic}) {
+    field->halve_to(level, executor);
+    const PlaneView<float> coarse = (*field)[level];
+    const auto mean = static_cast<float>(adaptation_share_of_mean * mean_of(coarse));
+    blur(coarse, std::min(std_cells, 8.0), between[level], executor);
+    for_each_row(executor, coarse.height, [&](int row) {
+      for (int x = 0; x < coarse.width; ++x) {
+        float& light = coarse.row(row)[x];
+        light = mean + static_cast<float>(1 - adaptation_share_of_mean) * light;
+      }
+    });
+    field->interpolate_from(level, executor);
+  }
+}
+
+// What the eye makes of each cell: three parts of the look, E in place of the light, the blur in place of the rods'.
+void NightLookGrid::State::see(const NightLook& look, Executor& executor) {
+  const PlaneView<float> e = seen[0], v = variance[0], cones = photopic[0], rods = scotopic[0];
+  const auto part_row = [&](int k, int y) { return part[k].row(y); };
+  const auto white = static_cast<float>(look.scotopic_ratio_of_white);
+  const auto px2_per_deg2 =
+      static_cast<float>(look.effects.acuity ? look.pixels_per_degree * look.pixels_per_degree : 0);
+  for_each_row(executor, e.height, [&](int y) {
+    float* const share = part_row(LookGrid::rod_share, y);
+    float* const blur_deg2 = part_row(LookGrid::base, y);
+    rows::eye_row(shared_tables(), white, cones.row(y), rods.row(y), e.width,
+                  {share, part_row(LookGrid::chroma, y), part_row(LookGrid::blue, y), blur_deg2});
+    if (!look.effects.purkinje) std::fill_n(share, e.width, 0.0f);
+    if (!look.effects.chroma) std::fill_n(part_row(LookGrid::chroma, y), e.width, 1.0f);
+    if (!look.effects.hue) std::fill_n(part_row(LookGrid::blue, y), e.width, 0.0f);
+    for (int x = 0; x < e.width; ++x) {
+      e.row(y)[x] += share[x] * (v.row(y)[x] - e.row(y)[x]);
+      v.row(y)[x] = px2_per_deg2 * blur_deg2[x];
+    }
+  });
+}
+
+// detail and base: what is left of the pixels' own light, and what takes its place, blurred as far as each cell asks.
+// Coarser cells stand for wider Gaussians; between two of them variances are met.
+void NightLookGrid::State::soften(Executor& executor) {
+  const float widest = largest_of(variance[0]);
+  int last = 0;
+  while (last + 1 < levels && widest > cell_variance_px2 * std::exp2(2.0 * last)) ++last;
+  seen.halve_to(last, executor);
+  variance.halve_to(last, executor);
+  for (int k = last; k-- > 0;) {
+    const PlaneView<float> fine = seen[k], wide = between[k], wanted = variance[k];
+    interpolate_twice(seen[k + 1], wide, executor);
+    const auto own = static_cast<float>(1 / (cell_variance_px2 * std::exp2(2.0 * k)));
+    for_each_row(executor, fine.height, [&](int y) {
+      for (int x = 0; x < fine.width; ++x) {
+        const float share = std::clamp((wanted.row(y)[x] * own - 1) / 3, 0.0f, 1.0f);
+        fine.row(y)[x] += share * (wide.row(y)[x] - fine.row(y)[x]);
+      }
+    });
+  }
+  for_each_row(executor, variance[0].height, [&](int y) {
+    for (int x = 0; x < variance[0].width; ++x) {
+      const float share = std::min(1.0f, variance[0].row(y)[x] * static_cast<float>(1 / cell_variance_px2));
+      part[LookGrid::detail].row(y)[x] = 1 - share;
+      part[LookGrid::base].row(y)[x] = share * seen[0].row(y)[x];
+    }
+  });
+}
+
+// Light scattered in the eye, 10 / angle^2 per lux and degree^2 (Stiles & Holladay), from 1 degree on: Gaussians of 1,
+// 2, 4... degrees, each with what its octave of angles scatters. Into `photopic`.
+void NightLookGrid::State::scatter(const NightLook& look, Executor& executor) {
+  constexpr int octaves = 5;
+  constexpr double steradians_per_deg2 = (std::numbers::pi / 180) * (std::numbers::pi / 180);
+  constexpr auto share = static_cast<float>(10 * steradians_per_deg2 * 2 * std::numbers::pi * std::numbers::ln2);
+  double std_cells = look.pixels_per_degree / LookGrid::cell;
+  int first = 0;
+  for (; std_cells > 2 && first + 1 < levels; ++first) std_cells /= 2;
+  const int last = std::min(first + octaves, levels) - 1;
+  for_each_row(executor, seen[0].height, [&](int y) {
+    for (int x = 0; x < seen[0].width; ++x) between[0].row(y)[x] = std::max(0.0f, seen[0].row(y)[x]);
+  });
+  between.halve_to(last, executor);
+  for (int k = last; k >= 0; --k) {
+    const PlaneView<float> veil = photopic[k], light = between[k];
+    if (k == last) {
+      for_each_row(executor, veil.height, [&](int y) { std::fill_n(veil.row(y), veil.width, 0.0f); });
+    } else {
+      interpolate_twice(photopic[k + 1], veil, executor);
+    }
+    if (k < first) continue;
+    blur(light, std::min(std_cells, 8.0), scotopic[k], executor);
+    for_each_row(executor, veil.height, [&](int y) {
+      for (int x = 0; x < veil.width; ++x) veil.row(y)[x] += share * light.row(y)[x];
+    });
+  }
+}
+
+void NightLookGrid::State::add_veil(Executor& executor) {
+  for_each_row(executor, photopic[0].height, [&](int y) {
+    for (int x = 0; x < photopic[0].width; ++x) part[LookGrid::base].row(y)[x] += photopic[0].row(y)[x];
+  });
+}
+
+// Gain, found on cells of 16 pixels, so that it cannot follow the noise.
+void NightLookGrid::State::bound_noise(const NoiseLimit& limit, Executor& executor) {
+  const int level = std::min(2, levels - 1);
+  const PlaneView<float> e = between[0], v = variance[0];
+  for_each_row(executor, e.height, [&](int y) {
+    std::copy_n(seen[0].row(y), e.width, e.row(y));
+    for (int x = 0; x < e.width; ++x) {
+      const float noise = limit.variance.row(y)[x];
+      v.row(y)[x] = noise >= 0 && noise < 1e9f ? noise : 0.0f;
+    }
+  });
+  between.halve_to(level, executor);
+  variance.halve_to(level, executor);
+  const PlaneView<float> light = between[level], noise = variance[level];
+  for_each_row(executor, light.height, [&](int y) {
+    for (int x = 0; x < light.width; ++x) {
+      light.row(y)[x] = gain_within_noise_limit(limit.display_per_unit * light.row(y)[x],
+                                                limit.display_per_unit * std::sqrt(noise.row(y)[x]), limit.lightness);
+    }
+  });
+  between.interpolate_from(level, executor);
+  for_each_row(executor, e.height, [&](int y) {
+    for (const int k : {LookGrid::base, LookGrid::detail, LookGrid::chroma}) {
+      for (int x = 0; x < e.width; ++x) part[k].row(y)[x] *= e.row(y)[x];
+    }
+  });
+}
+
+NightLookGrid::NightLookGrid(int max_width, int max_height)
+    : state_(std::make_unique<State>(cells_along(max_width), cells_along(max_height))) {}
+NightLookGrid::~NightLookGrid() = default;
+
+LookGrid NightLookGrid::make(const RgbView<const float>& camera, const std::array<float, 9>& matrix, float clip,
+                             const NightLook& look, const std::optional<NoiseLimit>& limit, Executor& executor) {
+  State& s = *state_;
+  assert(camera[0].width <= s.part[0].width() && camera[0].height <= s.part[0].height());
+  s.fit(camera[0].width, camera[0].height);
+  s.take_light(camera, weights_of(look, matrix, clip), look, executor);
+  s.adapt(look, executor);
+  s.see(look, executor);
+  if (look.effects.glare) s.scatter(look, executor);
+  s.soften(executor);
+  if (look.effects.glare) s.add_veil(executor);
+  if (limit) s.bound_noise(*limit, executor);
+  LookGrid out{{}, look.luminance, look.rods, look.tint, look.dark};
+  for (int k = 0; k < LookGrid::parts; ++k) out.part[k] = s.part_view(k);
+  return out;
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,297 @@
+#include "isp/render/night_look.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "isp/base/executor.h"
+#include "isp/model/night_eye.h"
+#include "isp/render/eye_rows.h"
+#include "isp/render/grid.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr std::array<float, 9> as_it_is{1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+NightLook rec709_look(double cd_m2) {
+  NightLook look;
+  look.cd_m2_per_unit = cd_m2;
+  look.luminance = {0.2126f, 0.7152f, 0.0722f};
+  look.rods = {-0.0126f, 0.6204f, 0.3922f};
+  look.tint = {static_cast<float>(rod_tint[0]), static_cast<float>(rod_tint[1]), static_cast<float>(rod_tint[2])};
+  return look;
+}
+
+CameraRgb flat(int width, int height, const std::array<float, 3>& rgb) {
+  CameraRgb out(width, height);
+  for (int c = 0; c < 3; ++c) std::fill_n(out.plane[c].data(), out.plane[c].size(), rgb[c]);
+  return out;
+}
+
+float part_at(const LookGrid& grid, LookGrid::Part part, int x, int y) { return grid.part[part].at(x, y); }
+
+TEST(NightLook, OfAnEvenFieldIsWhatTheEyeMakesOfIt) {
+  InlineExecutor executor;
+  NightLookGrid maker(256, 192);
+  for (const double light : {1e-5, 0.001, 0.01, 0.1, 0.7, 3.0, 30.0}) {
+    const CameraRgb camera = flat(64, 48, {0.6f, 0.5f, 0.3f});
+    const NightLook look = rec709_look(light);
+    const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1, look, std::nullopt, executor);
+    double y = 0, s = 0;
+    for (int c = 0; c < 3; ++c) {
+      y += look.luminance[c] * camera.plane[c].at(0, 0);
+      s += look.rods[c] * camera.plane[c].at(0, 0);
+    }
+    const NightEye eye = night_eye({y * light, s * light * look.scotopic_ratio_of_white});
+    const double rods = (1 - eye.state.m) * scotopic_at_555_nm * look.scotopic_ratio_of_white;
+    for (const auto& [column, row] : {std::pair{0, 0}, {63, 47}, {31, 20}}) {
+      // Linear between 256 nodes of luminance and 32 of S/P.
+      EXPECT_NEAR(part_at(grid, LookGrid::rod_share, column, row), rods / (eye.state.m + rods), 0.004) << light;
+      EXPECT_NEAR(part_at(grid, LookGrid::chroma, column, row), eye.chroma, 0.003) << light;
+      EXPECT_NEAR(part_at(grid, LookGrid::blue, column, row), eye.blue, 0.003) << light;
+      const double e = y + part_at(grid, LookGrid::rod_share, column, row) * (s - y);
+      EXPECT_NEAR(part_at(grid, LookGrid::base, column, row) + part_at(grid, LookGrid::detail, column, row) * e, e,
+                  2e-6)
+          << "an even field has no detail to lose";
+    }
+  }
+}
+
+TEST(NightLook, LeavesOutWhatIsNotAskedFor) {
+  InlineExecutor executor;
+  NightLookGrid maker(128, 128);
+  NightLook look = rec709_look(0.01);
+  look.effects = {false, false, false, false, false, false};
+  const CameraRgb camera = flat(32, 32, {0.2f, 0.5f, 0.9f});
+  const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1, look, std::nullopt, executor);
+  const std::array<float, LookGrid::parts> nothing{0, 1, 0, 1, 0};
+  for (int k = 0; k < LookGrid::parts; ++k) {
+    for (int y = 0; y < 32; ++y) {
+      for (int x = 0; x < 32; ++x) ASSERT_EQ(grid.part[k].at(x, y), nothing[k]);
+    }
+  }
+}
+
+// A grating of so many cycles per degree, and its contrast after the coarse part of the look.
+TEST(NightLook, BlursGratingsAsMuchAsTheAcuityAsks) {
+  constexpr int side = 512;
+  InlineExecutor executor;
+  NightLookGrid maker(4 * side, 4 * side);
+  for (const double light : {0.05, 0.002, 0.0002}) {
+    NightLook look = rec709_look(light);
+    look.pixels_per_degree = 200;
+    const double wanted = blur_std_deg(mesopic_state({0.5 * light, 1.23 * light}).luminance_cd_m2);
+    const double cycles_per_deg = 0.5 / (M_PI * wanted);  // contrast exp(-1/2) after the Gaussian
+    const double per_cell = cycles_per_deg * LookGrid::cell / look.pixels_per_degree;
+    CameraRgb camera(side, side);
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < side; ++x) {
+        const auto v = static_cast<float>(0.5 + 0.05 * std::cos(2 * M_PI * per_cell * (x + 0.5)));
+        for (Plane<float>& plane : camera.plane) plane.at(x, y) = v;
+      }
+    }
+    const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1, look, std::nullopt, executor);
+    double least = 1, most = 0;
+    for (int x = side / 4; x < 3 * side / 4; ++x) {
+      const double seen = part_at(grid, LookGrid::base, x, side / 2) +
+                          part_at(grid, LookGrid::detail, x, side / 2) * camera.plane[0].at(x, side / 2);
+      least = std::min(least, seen);
+      most = std::max(most, seen);
+    }
+    // The pyramid's kernel is no Gaussian: its variance is right, its shape is not quite.
+    EXPECT_NEAR((most - least) / 0.1, std::exp(-0.5), 0.12) << light;
+  }
+}
+
+TEST(NightLook, HasNoSeamsAlongARampThroughAllOfVision) {
+  constexpr int width = 600;
+  InlineExecutor executor;
+  NightLookGrid maker(4 * width, 16);
+  CameraRgb camera(width, 4);
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double light = std::pow(10.0, -6 + 8.0 * x / (width - 1));  // relative to 100 cd/m2: 1e-4 to 1e4
+      camera.plane[0].at(x, y) = static_cast<float>(0.9 * light);
+      camera.plane[1].at(x, y) = static_cast<float>(0.4 * light);
+      camera.plane[2].at(x, y) = static_cast<float>(0.2 * light);
+    }
+  }
+  NightLook look = rec709_look(100);
+  look.pixels_per_degree = 4;  // no pooling to speak of
+  const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1e9f, look, std::nullopt, executor);
+  for (const LookGrid::Part part : {LookGrid::rod_share, LookGrid::chroma, LookGrid::blue}) {
+    for (int x = 1; x < width; ++x) {
+      ASSERT_LT(std::fabs(part_at(grid, part, x, 2) - part_at(grid, part, x - 1, 2)), 0.02) << part << " " << x;
+    }
+  }
+}
+
+TEST(NightLook, GlareSpreadsTheLightOfALampAndAddsNothingFarAway) {
+  constexpr int side = 256;
+  InlineExecutor executor;
+  NightLookGrid maker(4 * side, 4 * side);
+  CameraRgb camera = flat(side, side, {0, 0, 0});
+  for (Plane<float>& plane : camera.plane) plane.at(side / 2, side / 2) = 1000;
+  NightLook look = rec709_look(1);
+  look.effects = {false, false, false, false, true, false};
+  look.pixels_per_degree = 40;  // ten cells
+  const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1e9f, look, std::nullopt, executor);
+  const auto veil = [&](int cells) { return part_at(grid, LookGrid::base, side / 2 + cells, side / 2); };
+  // 10 / angle^2 times the illuminance: 1000 in a cell of 0.01 deg^2.
+  const double deg2_sr = (M_PI / 180) * (M_PI / 180);
+  for (const double angle : {1.5, 3.0, 6.0}) {
+    const double expected = 10 * 1000 * 0.01 * deg2_sr / (angle * angle);
+    const double found = veil(static_cast<int>(std::lround(angle * 10)));
+    EXPECT_GT(found, 0.5 * expected) << angle;
+    EXPECT_LT(found, 2.0 * expected) << angle;
+  }
+}
+
+TEST(NightLook, KeepsNoiseBelowItsLimit) {
+  InlineExecutor executor;
+  NightLookGrid maker(256, 256);
+  const CameraRgb camera = flat(64, 64, {0.004f, 0.004f, 0.004f});
+  Plane<float> variance(64, 64);
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) variance.at(x, y) = x < 32 ? 1e-10f : 1e-4f;
+  }
+  NightLook look = rec709_look(100);
+  look.effects = {false, false, false, false, false, false};
+  const LookGrid grid =
+      maker.make(std::as_const(camera).view(), as_it_is, 1, look, NoiseLimit{2, 1, variance.view()}, executor);
+  EXPECT_NEAR(part_at(grid, LookGrid::detail, 4, 30), 1, 1e-6) << "clean: as it was";
+  const double gain = part_at(grid, LookGrid::detail, 60, 30);
+  EXPECT_LT(gain, 0.5);
+  EXPECT_NEAR(part_at(grid, LookGrid::chroma, 60, 30), gain, 1e-6) << "colours keep their hue";
+}
+
+// L* and tone curves as they are, against the bound's closed form.
+TEST(GainWithinNoiseLimit, HoldsForTheToneCurvesOfTheHouse) {
+  const auto lightness_slope = [](double y) { return y > 216.0 / 24389 ? 116 / 3.0 * std::pow(y, -2 / 3.0) : 903.3; };
+  for (int i = 0; i < 40; ++i) {
+    const double y = i == 0 ? 0 : 0.18 * std::pow(10.0, -0.1 * i);
+    for (int j = 0; j < 40; ++j) {
+      const double noise = 0.1 * std::pow(10.0, -0.1 * j);
+      const double gain = gain_within_noise_limit(y, noise, 2);
+      ASSERT_TRUE(gain >= 0 && gain <= 1);
+      const double x = gain * y;
+      const double toe = x * (0.7 + 0.3 * x / 0.18), slope = 0.7 + 0.6 * x / 0.18;
+      ASSERT_LE(lightness_slope(toe) * slope * gain * noise, 2 * (1 + 1e-5)) << y << " " << noise;
+      ASSERT_LE(lightness_slope(x) * gain * noise, 2 * (1 + 1e-5));
+    }
+  }
+  EXPECT_EQ(gain_within_noise_limit(0.1, 0, 2), 1);
+}
+
+TEST(NightLook, IsFiniteForAnyLight) {
+  InlineExecutor executor;
+  NightLookGrid maker(64, 64);
+  std::mt19937 random(1);
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
+  const std::array<float, 8> values{0, -1, 1, 1e30f, -1e30f, nan, infinity, -infinity};
+  CameraRgb camera(16, 16);
+  for (Plane<float>& plane : camera.plane) {
+    for (std::size_t i = 0; i < plane.size(); ++i) plane.data()[i] = values[random() % values.size()];
+  }
+  NightLook look = rec709_look(1);
+  look.effects.glare = true;
+  const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1, look, std::nullopt, executor);
+  for (const PlaneView<const float>& part : grid.part) {
+    for (int y = 0; y < 16; ++y) {
+      for (int x = 0; x < 16; ++x) ASSERT_TRUE(std::isfinite(part.at(x, y)));
+    }
+  }
+}
+
+TEST(NightLook, GivesTheSameGridWithAnyNumberOfThreads) {
+  CameraRgb camera(61, 47);
+  std::mt19937 random(2);
+  std::uniform_real_distribution<float> value(-0.1f, 1);
+  for (Plane<float>& plane : camera.plane) {
+    for (std::size_t i = 0; i < plane.size(); ++i) plane.data()[i] = value(random);
+  }
+  NightLook look = rec709_look(0.02);
+  look.effects.glare = true;
+  std::vector<float> first;
+  for (const int threads : {1, 2, 3, 7}) {
+    PoolExecutor executor(threads);
+    NightLookGrid maker(300, 200);
+    const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1, look, std::nullopt, executor);
+    std::vector<float> all;
+    for (const PlaneView<const float>& part : grid.part) {
+      for (int y = 0; y < part.height; ++y) all.insert(all.end(), part.row(y), part.row(y) + part.width);
+    }
+    if (first.empty()) first = all;
+    ASSERT_EQ(all, first) << threads;
+  }
+}
+
+// The kernel's table against the model in double, over all the light and all the S/P there is.
+TEST(EyeRow, EqualsTheModelAtEverySP) {
+  InlineExecutor executor;
+  NightLookGrid maker(4, 4);
+  double worst_share = 0, worst_chroma = 0;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> exponent(-5, 3), log_ratio(std::log(0.3), std::log(60.0));
+  for (int i = 0; i < 2000; ++i) {
+    const double light = std::pow(10.0, exponent(random)), ratio = std::exp(log_ratio(random));
+    NightLook look = rec709_look(light);
+    look.scotopic_ratio_of_white = ratio;
+    const CameraRgb camera = flat(1, 1, {1, 1, 1});
+    const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1, look, std::nullopt, executor);
+    const NightEye eye = night_eye({light, ratio * light});
+    const double rods = (1 - eye.state.m) * scotopic_at_555_nm * ratio;
+    worst_share =
+        std::max(worst_share, std::fabs(part_at(grid, LookGrid::rod_share, 0, 0) - rods / (eye.state.m + rods)));
+    worst_chroma = std::max(worst_chroma, std::fabs(part_at(grid, LookGrid::chroma, 0, 0) - eye.chroma));
+  }
+  RecordProperty("worst_share", std::to_string(worst_share));
+  EXPECT_LT(worst_share, 0.02);
+  EXPECT_LT(worst_chroma, 0.01);
+}
+
+TEST(Grid, HalvesAndInterpolatesWithoutAnEdge) {
+  InlineExecutor executor;
+  for (const int width : {1, 2, 5, 8}) {
+    Plane<float> fine(width, 3), coarse(halved(width), 2), back(width, 3);
+    std::fill_n(fine.data(), fine.size(), 2.5f);
+    halve(fine.view(), coarse.view(), executor);
+    interpolate_twice(coarse.view(), back.view(), executor);
+    for (std::size_t i = 0; i < back.size(); ++i) EXPECT_EQ(back.data()[i], 2.5f);
+  }
+  Plane<float> ramp(16, 2), half(8, 1), again(16, 2);
+  for (int y = 0; y < 2; ++y) {
+    for (int x = 0; x < 16; ++x) ramp.at(x, y) = static_cast<float>(x);
+  }
+  halve(ramp.view(), half.view(), executor);
+  interpolate_twice(half.view(), again.view(), executor);
+  for (int x = 1; x < 15; ++x) EXPECT_FLOAT_EQ(again.at(x, 0), static_cast<float>(x)) << "lines stay lines";
+}
+
+TEST(Grid, BlursToTheVarianceAskedForAndKeepsTheSum) {
+  InlineExecutor executor;
+  for (const double std_cells : {0.7, 2.0, 5.0}) {
+    Plane<float> plane(101, 101), scratch(101, 101);
+    std::fill_n(plane.data(), plane.size(), 0.0f);
+    plane.at(50, 50) = 1;
+    blur(plane.view(), std_cells, scratch.view(), executor);
+    double sum = 0, second = 0;
+    for (int y = 0; y < 101; ++y) {
+      for (int x = 0; x < 101; ++x) {
+        sum += plane.at(x, y);
+        second += plane.at(x, y) * (x - 50) * (x - 50);
+      }
+    }
+    EXPECT_NEAR(sum, 1, 1e-5);
+    EXPECT_NEAR(second, std_cells * std_cells, 0.04 * std_cells * std_cells) << "cut at three standard deviations";
+  }
+}
+
+}  // namespace
+}  // namespace lowlux::isp
