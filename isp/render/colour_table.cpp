@@ -19,6 +19,7 @@ constexpr int first_cells = 32, first_cells_of_levels = 16, most_cells = 256, mo
 constexpr int octaves = 18;  // one level in each: 86 KiB
 constexpr int floats_per_node = 4;
 constexpr double widest_margin = 1.0 / 16;
+constexpr double largest_answer = 1e30;  // for a sum of 1, as the kernel's largest input
 
 Vector3 scaled(const Vector3& v, double s) { return {s * v[0], s * v[1], s * v[2]}; }
 
@@ -91,7 +92,9 @@ table_rows::Table view_of(const ColourTable& t) {
   return out;
 }
 
-/// Fills the nodes that cells with colours in them use; the others stay 0. False if the map's answer is not finite.
+bool fits_floats(const Vector3& v) { return std::fabs(v[0]) + std::fabs(v[1]) + std::fabs(v[2]) <= largest_answer; }
+
+/// Fills the nodes that cells with colours in them use; the others stay 0. False if the map's answer fits no float.
 bool fill(ColourTable& t, const RgbMap& map, double brightest_sum) {
   t.node.assign(nodes_of(t.cells, t.levels) * floats_per_node, 0.0f);
   float* to = t.node.data();
@@ -102,7 +105,7 @@ bool fill(ColourTable& t, const RgbMap& map, double brightest_sum) {
         if (x + y > t.cells + 1) continue;
         const double red = share_at(t, x), green = share_at(t, y);
         const Vector3 seen = map.per_sum({red, green, 1 - red - green}, sum);
-        if (!std::isfinite(seen[0] + seen[1] + seen[2])) return false;
+        if (!fits_floats(seen)) return false;
         for (int c = 0; c < 3; ++c) to[c] = static_cast<float>(seen[c]);
       }
     }
@@ -150,8 +153,10 @@ ColourTableError measure(const ColourTable& t, const RgbMap& map, const Samples&
   for (std::size_t i = 0; i < count; ++i) {
     const Vector3 rgb{in.channel[0][i], in.channel[1][i], in.channel[2][i]};
     const Vector3 shown{out.channel[0][i], out.channel[1][i], out.channel[2][i]};
-    difference[i] =
-        ciede2000(lab_of(xyz_of(map.to_xyz * shown), white), lab_of(map.map(xyz_of(map.to_xyz * rgb)), white));
+    const Lab exact = lab_of(map.map(xyz_of(map.to_xyz * rgb)), white);
+    // ciede2000 takes what is not a number for equal.
+    const bool usable = std::isfinite(exact.l + exact.a + exact.b);
+    difference[i] = usable ? ciede2000(lab_of(xyz_of(map.to_xyz * shown), white), exact) : INFINITY;
   }
   std::sort(difference.begin(), difference.end());
   ColourTableError error{.colours = static_cast<int>(count)};
@@ -217,10 +222,11 @@ Result<ColourTable> make_colour_table(const ColourMap& map, const ColourTableReq
   }
   for (std::optional<ColourTable> next = std::move(table); next;) {
     table = std::move(*next);
-    if (!fill(table, rgb_map, brightest_sum)) {
-      return fail(ErrorCode::invalid_argument, "the map of colours gives figures that are not finite");
+    const bool filled = fits_floats(table.grey) && fill(table, rgb_map, brightest_sum);
+    if (filled) table.error = measure(table, rgb_map, middles(table, request.limit, 0.5));
+    if (!filled || !std::isfinite(table.error.largest)) {
+      return fail(ErrorCode::invalid_argument, "the map of colours gives figures that are not finite, or beyond 1e30");
     }
-    table.error = measure(table, rgb_map, middles(table, request.limit, 0.5));
     table.within_bound = table.error.p99 <= request.error_bound;
     if (table.within_bound) break;
     next = finer(table, rgb_map, request);

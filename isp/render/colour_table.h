@@ -21,8 +21,8 @@ struct ColourTableRequest {
   std::size_t largest_bytes = std::size_t{8} << 20;  // 512 KiB to 256 MiB
 };
 
-/// CIEDE2000 between table and map at the middle of cells: of the brightest colour of its chromaticity within the
-/// limit, or, if the table has levels, of the colours midway between them.
+/// CIEDE2000 between table and map at the middle of cells inside of the gamut: of the brightest colour of its
+/// chromaticity within the limit, or, if the table has levels, of the colours midway between them.
 struct ColourTableError {
   double mean = 0;
   double p99 = 0;  // 99 % of the colours are no farther off

@@ -77,6 +77,7 @@ const Xyz white = xyz_of(rec709 * Vector3{1, 1, 1});
 
 double difference(const ColourMap& map, const std::array<float, 3>& in, const std::array<float, 3>& out) {
   const Xyz exact = map(xyz_of(rec709 * Vector3{in[0], in[1], in[2]}));
+  EXPECT_TRUE(std::isfinite(out[0] + out[1] + out[2]) && std::isfinite(exact.x + exact.y + exact.z));  // else 0
   return ciede2000(lab_of(xyz_of(rec709 * Vector3{out[0], out[1], out[2]}), white), lab_of(exact, white));
 }
 
@@ -290,6 +291,17 @@ TEST(ColourTable, RefusesWhatNoTableCanBeMadeOf) {
   const auto bad = make_colour_table([](const Xyz&) { return Xyz{std::nan(""), 0, 0}; }, {});
   ASSERT_FALSE(bad);
   EXPECT_EQ(bad.error().code, ErrorCode::invalid_argument);
+  EXPECT_FALSE(make_colour_table([](const Xyz& c) { return Xyz{1e200 * c.x, c.y, c.z}; }, {})) << "no float";
+  const Matrix3 to_rgb = *inverse(rec709);
+  const auto holed = make_colour_table(
+      [&](const Xyz& c) {  // not a number at the middle of one cell, fine at all nodes
+        const Vector3 rgb = to_rgb * vector_of(c);
+        const double red = rgb[0] / (rgb[0] + rgb[1] + rgb[2]), green = rgb[1] / (rgb[0] + rgb[1] + rgb[2]);
+        const double middle = 10.5 * (1 + 3.0 / 16) / 32 - 1.0 / 16;
+        return std::fabs(red - middle) + std::fabs(green - middle) < 1e-3 ? Xyz{std::nan(""), 0, 0} : c;
+      },
+      {});
+  EXPECT_FALSE(holed);
   for (const double limit : {1e-6, 30.0, 1e6}) {
     const auto table = make_colour_table(identity, {.rgb_to_xyz = *rgb_to_xyz(primaries_rec2020), .limit = limit});
     ASSERT_TRUE(table);
