@@ -3,6 +3,7 @@
 
 #include "isp/model/appearance/appearance_model.h"
 #include "isp/model/appearance/cao.h"
+#include "isp/model/appearance/entropy_model.h"
 #include "isp/model/appearance/hunt.h"
 #include "isp/model/appearance/icam06.h"
 #include "isp/model/appearance/khan_pattanaik.h"
@@ -15,10 +16,10 @@
 namespace lowlux::isp {
 
 std::span<const AppearanceModel> appearance_models() {
-  static const std::array models{hunt_appearance(),         kwak_appearance(),     khan_pattanaik_appearance(),
-                                 shin_appearance(),         icam06_appearance(),   cao_appearance(),
-                                 kirk_obrien_appearance(),  filament_appearance(), mikamo_appearance(),
-                                 wanat_mantiuk_appearance()};
+  static const std::array models{hunt_appearance(),   kwak_appearance(),         khan_pattanaik_appearance(),
+                                 shin_appearance(),   icam06_appearance(),       entropy_appearance(),
+                                 cao_appearance(),    kirk_obrien_appearance(),  filament_appearance(),
+                                 mikamo_appearance(), wanat_mantiuk_appearance()};
   return models;
 }
 

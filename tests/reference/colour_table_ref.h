@@ -1,0 +1,11 @@
+#pragma once
+
+#include "isp/base/matrix3.h"
+#include "isp/render/colour_table.h"
+
+namespace lowlux::reference {
+
+/// One pixel through a ColourTable, in double.
+Vector3 through_colour_table(const isp::ColourTable& table, const Vector3& rgb);
+
+}  // namespace lowlux::reference
