@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "isp/model/colour_difference.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {
