@@ -1,5 +1,6 @@
 #include "isp/model/colour_difference.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -36,6 +37,19 @@ double chroma_ratio(double c) {
 }
 
 }  // namespace
+
+double delta_e_ab(const Lab& first, const Lab& second) {
+  const double l = first.l - second.l, a = first.a - second.a, b = first.b - second.b;
+  return std::sqrt(l * l + a * a + b * b);  // std::hypot of three loses NaN in libstdc++ 12
+}
+
+double delta_e_94c(const Lab& reference, const Lab& test) {
+  const double chroma = std::hypot(reference.a, reference.b);
+  const double delta_c = chroma - std::hypot(test.a, test.b);
+  const double delta_a = reference.a - test.a, delta_b = reference.b - test.b;
+  const double delta_h2 = std::max(delta_a * delta_a + delta_b * delta_b - delta_c * delta_c, 0.0);  // NaN stays NaN
+  return std::hypot(delta_c / (1 + 0.045 * chroma), std::sqrt(delta_h2) / (1 + 0.015 * chroma));
+}
 
 double ciede2000(const Lab& first, const Lab& second) {
   const double mean_c = 0.5 * (std::hypot(first.a, first.b) + std::hypot(second.a, second.b));

@@ -2,10 +2,52 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <iterator>
+#include <limits>
 
 namespace lowlux::isp {
 namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(DeltaEab, IsTheDistance) {
+  EXPECT_DOUBLE_EQ(delta_e_ab({50, 1, 2}, {53, 5, 14}), 13);
+  EXPECT_DOUBLE_EQ(delta_e_ab({53, 5, 14}, {50, 1, 2}), 13);
+  EXPECT_EQ(delta_e_ab({50, 1, 2}, {50, 1, 2}), 0);
+  EXPECT_TRUE(std::isnan(delta_e_ab({50, 1, nan}, {50, 1, 2})));
+}
+
+TEST(DeltaE94c, HasItsCheckValuesAndKnowsTheReference) {
+  // dC = 10 alone: 10 / (1 + 0.045 C) with C of the first.
+  EXPECT_NEAR(delta_e_94c({60, 20, 0}, {60, 10, 0}), 10 / 1.9, 1e-12);
+  EXPECT_NEAR(delta_e_94c({60, 10, 0}, {60, 20, 0}), 10 / 1.45, 1e-12);
+  EXPECT_NEAR(delta_e_94c({60, 0, 0}, {60, 3, 4}), 5, 1e-12);
+  // Of an independent program, six decimals.
+  EXPECT_NEAR(delta_e_94c({60, 20, 10}, {60, 5, 12}), 10.052239, 1e-6);
+  // colour-science 0.4 delta_E_CIE1994 at equal lightness prints 83.7792255.
+  EXPECT_NEAR(delta_e_94c({60, 21.57210357, 272.22819350}, {60, 426.67945353, 72.39590835}), 83.7792255, 1e-6);
+}
+
+TEST(DeltaE94c, LightnessDoesNotCount) {
+  EXPECT_EQ(delta_e_94c({10, 20, 10}, {90, 5, 12}), delta_e_94c({60, 20, 10}, {60, 5, 12}));
+  EXPECT_EQ(delta_e_94c({10, 20, 10}, {90, 20, 10}), 0);
+}
+
+TEST(DeltaE94c, OfOneHueIsChromaAloneWhateverTheRounding) {
+  // dH^2 is 0, its three terms are up to 1e4: what rounding leaves of it is 1e-12 either way, which as dH is 1e-6.
+  for (int degrees = 0; degrees < 360; ++degrees) {
+    const double h = degrees * std::acos(-1.0) / 180;
+    const double found =
+        delta_e_94c({50, 100 * std::cos(h), 100 * std::sin(h)}, {50, 7 * std::cos(h), 7 * std::sin(h)});
+    EXPECT_NEAR(found, 93 / 5.5, 1e-6) << degrees;
+  }
+}
+
+TEST(DeltaE94c, WithoutANumberThereIsNoDifference) {
+  EXPECT_TRUE(std::isnan(delta_e_94c({50, nan, 0}, {50, 1, 1})));
+  EXPECT_TRUE(std::isnan(delta_e_94c({50, 1, 1}, {50, 0, nan})));
+}
 
 struct SharmaPair {
   Lab first;
