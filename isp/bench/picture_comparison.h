@@ -31,9 +31,9 @@ struct DifferenceSummary {
 /// Of finite values, whose order it changes.
 DifferenceSummary summary_of(std::span<float> differences);
 
-/// A pixel is outside of the display's range if linear R, G or B of Rec. 709 is this far from 0..1: more than rounding
-/// to float does, and less than a 16-bit code at white.
-inline constexpr double display_tolerance = 1e-5;
+/// A pixel is outside of the display's range if linear R, G or B of Rec. 709 is this far from 0..1: more than the
+/// rounding of ICC profiles does, whose colorants have steps of 1/65536, and less than half an 8-bit code anywhere.
+inline constexpr double display_tolerance = 1e-4;
 
 /// How far a picture is from a reference.
 struct PictureComparison {

@@ -125,6 +125,8 @@ TEST(PictureComparison, WhatADisplayHasNotIsClippedAndCounted) {
   EXPECT_EQ(found.test_outside, 0U) << "white itself is inside";
   EXPECT_GT(found.psnr_db, 80) << "shown, both are white";
   EXPECT_NEAR(found.delta_e_ab.largest, 50, 1e-3) << "the difference of colour is not clipped";
+  const double a_step = 116 * std::cbrt(1.0002) - 16;  // Y = 1.0002
+  EXPECT_EQ(compared(b, picture_of([&](int, int) { return Lab{a_step, 0, 0}; })).test_outside, found.pixels);
   const SceneLinear green = picture_of([](int, int) { return Lab{60, -150, 60}; });
   EXPECT_EQ(compared(a, green).test_outside, found.pixels);
 }

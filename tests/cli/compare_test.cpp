@@ -28,7 +28,7 @@ constexpr Codes paint{90, 120, 70}, other_paint{94, 120, 70};
 class CompareCommand : public test::SimulateCommand {
  protected:
   void write(const std::string& name, const Codes& last, int width = 48) {
-    const std::array<Codes, 3> field{{{200, 60, 60}, {60, 60, 200}, last}};
+    const std::array<Codes, 3> field{{{255, 60, 60}, {60, 60, 200}, last}};
     Encoded8 picture{Plane<std::uint8_t>(3 * width, 32)};
     for (int y = 0; y < 32; ++y) {
       for (int i = 0; i < 3 * width; ++i) {
@@ -85,13 +85,14 @@ TEST_F(CompareCommand, AKnownShiftHasItsFigures) {
   // 4 of 255 codes in one channel of one field of three.
   EXPECT_NEAR(json["psnr_db"].get<double>(), -10 * std::log10(16 / (255.0 * 255) / 9), 1e-3);
   EXPECT_EQ(json["identical_codes"], false);
+  EXPECT_EQ(json["outside_display_a"], 0) << "rounded colorants of the ICC profile do not count";
 }
 
 TEST_F(CompareCommand, LinearFloatsAreTheSamePictureAsTheCodesTheyStandFor) {
   write("a.png", paint);
   InlineExecutor one;
   SceneLinear light(48, 32);
-  const std::array<Codes, 3> field{{{200, 60, 60}, {60, 60, 200}, paint}};
+  const std::array<Codes, 3> field{{{255, 60, 60}, {60, 60, 200}, paint}};
   for (int y = 0; y < 32; ++y) {
     for (int x = 0; x < 48; ++x) {
       for (std::size_t c = 0; c < 3; ++c) {
