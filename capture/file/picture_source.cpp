@@ -34,11 +34,27 @@ bool starts_with(std::span<const std::byte> bytes, std::string_view magic) {
   return std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()).starts_with(magic);
 }
 
-bool is_dng(std::span<const std::byte> bytes) {
+bool is_dng(const TiffDirectory& first) { return first.find(tag::dng_version) != nullptr; }
+
+/// Cameras' own raw files in TIFF's form (NEF, ARW) show a thumbnail first, and say so.
+bool is_thumbnail(const TiffDirectory& first) {
+  const auto kind = first.whole(tag::new_subfile_type);
+  return kind && *kind && (**kind & 1U) != 0;  // TIFF 6.0: a reduced version of another image of the file
+}
+
+Result<Decoder> tiff_decoder_of(std::span<const std::byte> bytes) {
   const auto tiff = TiffFile::open(bytes);
-  if (!tiff) return false;
+  if (!tiff) return isp::decode_tiff;
   const auto first = tiff->directory(tiff->first_directory());
-  return first && first->find(tag::dng_version) != nullptr;
+  if (!first) return isp::decode_tiff;
+  if (is_dng(*first)) {
+    return fail(ErrorCode::unsupported, "this is a raw file (DNG), not a picture: develop it first");
+  }
+  if (is_thumbnail(*first)) {
+    return fail(ErrorCode::unsupported,
+                "this file begins with a thumbnail, as raw files of cameras do (NEF, ARW): develop it first");
+  }
+  return isp::decode_tiff;
 }
 
 Result<Decoder> decoder_of(std::span<const std::byte> bytes) {
@@ -48,9 +64,8 @@ Result<Decoder> decoder_of(std::span<const std::byte> bytes) {
   if (starts_with(bytes, "\xFF\xD8\xFF"sv)) return isp::decode_jpeg;
   if (starts_with(bytes, "\x76\x2F\x31\x01"sv)) return isp::decode_exr;
   if (starts_with(bytes, "PF"sv) || starts_with(bytes, "Pf"sv)) return isp::decode_pfm;
-  if (is_dng(bytes)) return fail(ErrorCode::unsupported, "this is a raw file (DNG), not a picture: develop it first");
   for (const std::string_view magic : {"II\x2A\0"sv, "MM\0\x2A"sv, "II\x2B\0"sv, "MM\0\x2B"sv}) {
-    if (starts_with(bytes, magic)) return isp::decode_tiff;
+    if (starts_with(bytes, magic)) return tiff_decoder_of(bytes);
   }
   return fail(ErrorCode::unsupported,
               "this is no picture that lowlux reads: convert it to PNG, JPEG, TIFF, OpenEXR or PFM");
