@@ -162,14 +162,15 @@ Result<SpectralMatrix> spectral_matrix(const std::array<Spectrum, 3>& sensitivit
     tt += t * t.transpose();
     ct += c * t.transpose();
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(ct, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double condition = svd.singularValues()[0] / svd.singularValues()[2];
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(ct, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const bool solved = svd.info() == Eigen::Success;  // not where a sensitivity is infinite
+  const double condition = solved ? svd.singularValues()[0] / svd.singularValues()[2] : HUGE_VAL;
   if (!(condition <= worst_condition_number)) {
     return fail(ErrorCode::insufficient,
                 "the sensitivities see fewer than three dimensions of colour: C T^t has the condition number " +
                     std::to_string(condition));
   }
-  const Eigen::Matrix3d m = tt * svd.solve(Eigen::MatrixXd::Identity(3, 3));
+  const Eigen::Matrix3d m = tt * svd.solve(Eigen::Matrix3d::Identity());
   SpectralMatrix out{{}, condition};
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) out.camera_to_xyz[i][j] = m(i, j);
