@@ -220,11 +220,16 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   DevelopArgs args;
   add_output(app, args);
   add_rendering(app, args);
+  add_look(app, args.look);
   add_camera(app, args);
   add_denoise(app, args);
   add_darks(app, args.dark);
   add_batch(app, args);
-  return parse_batch(app, words, args);
+  Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
+  if (auto* const good = std::get_if<DevelopArgs>(&parsed)) {
+    if (const auto wrong = complete_look(good->look, good->options.look)) return refuse(app, *wrong);
+  }
+  return parsed;
 }
 
 Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "isp/cli/advise_args.h"
+#include "isp/cli/look_args.h"
 #include "isp/pipeline/plan.h"
 
 namespace lowlux::cli {
@@ -40,6 +41,7 @@ struct DevelopArgs {
   bool explain = false;
   bool quiet = false;
   DarkArgs dark;
+  LookArgs look;
 };
 
 struct InfoArgs {

@@ -24,6 +24,19 @@ void add_noise(Lines& out, const isp::NoiseReduction& noise) {
   }
 }
 
+void add_look(Lines& out, const isp::LookPlan& look) {
+  if (look.eye) {
+    out.add("look", fmt::format("eye; scene {:.3g} cd/m2 ({}), adaptation m {:.2f}, {:+.2f} EV of darkness kept",
+                                look.mean_cd_m2, look.luminance_rule, look.state.m, look.dimming_ev));
+    for (const isp::LookEffect& effect : look.effects) {
+      const std::string size = std::isfinite(effect.size) ? fmt::format("up to {:.2g} CIEDE2000", effect.size)
+                                                          : std::string("a matter of taste");
+      out.add("", fmt::format("{} {}: {}", effect.name, effect.used ? "shown" : "left out", size));
+    }
+  }
+  if (look.noise_limit) out.add("noise limit", fmt::format("{:.3g} CIE L*", *look.noise_limit));
+}
+
 }  // namespace
 
 std::string explain_text(const isp::DevelopPlan& plan) {
@@ -36,6 +49,7 @@ std::string explain_text(const isp::DevelopPlan& plan) {
   out.add("white", plan.white ? fmt::format("{}, {:.0f} K", plan.white_balance_rule, plan.white->cct_k)
                               : std::string(plan.white_balance_rule));
   out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.exposure_ev, plan.exposure_rule));
+  if (plan.look) add_look(out, *plan.look);
   return out.text();
 }
 

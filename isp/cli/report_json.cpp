@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include <nlohmann/json.hpp>
 
 #include "calib/profile_use.h"
@@ -80,6 +82,24 @@ Json noise_json(const isp::NoiseReduction& noise) {
   return json;
 }
 
+Json look_json(const isp::LookPlan& look) {
+  Json json{{"eye", look.eye}, {"noise_limit_lightness", optional_json(look.noise_limit)}};
+  if (!look.eye) return json;
+  json["scene_luminance_cd_m2"] = look.mean_cd_m2;
+  json["luminance_rule"] = look.luminance_rule;
+  json["adaptation_m"] = look.state.m;
+  json["mesopic_luminance_cd_m2"] = look.state.luminance_cd_m2;
+  json["white_scotopic_ratio"] = look.look.scotopic_ratio_of_white;
+  json["dimming_ev"] = look.dimming_ev;
+  json["effects"] = Json::array();
+  for (const isp::LookEffect& effect : look.effects) {
+    json["effects"].push_back({{"name", effect.name},
+                               {"ciede2000", std::isfinite(effect.size) ? Json(effect.size) : Json(nullptr)},
+                               {"shown", effect.used}});
+  }
+  return json;
+}
+
 Json colour_json(const CameraColour& colour) {
   static constexpr const char* sources[] = {"none", "file-tags", "decoder-table", "profile"};
   Json json{{"source", sources[static_cast<int>(colour.source)]}, {"calibrations", Json::array()}};
@@ -125,6 +145,7 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"exposure", {{"ev", plan.exposure_ev}, {"rule", plan.exposure_rule}}},
             {"defects_repaired", plan.defects.size()},
             {"denoise", noise_json(plan.noise_reduction)},
+            {"look", plan.look ? look_json(*plan.look) : Json(nullptr)},
             {"warnings", plan.warnings}};
   for (const isp::StageTime& time : outcome.times) json["timings_s"][std::string(time.stage)] = time.seconds;
   return dumped(json);

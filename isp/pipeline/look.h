@@ -46,6 +46,7 @@ struct LookPlan {
   double dimming_ev = 0;
   std::vector<LookEffect> effects;
   std::optional<double> noise_limit;
+  std::optional<double> electrons_at_white;  // of a pixel, mean; absent: the noise is not known, and not limited
 };
 
 /// "purkinje", "chroma", "hue", "acuity", "glare", "visual-noise", in this order.

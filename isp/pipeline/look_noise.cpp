@@ -18,15 +18,13 @@ std::array<float, 3> weights_of(const DevelopPlan& plan) {
   return weights;
 }
 
-float mean_of(const PerSite<double>& sites) {
-  return static_cast<float>(0.25 * (sites[0] + sites[1] + sites[2] + sites[3]));
-}
+float white_e(const DevelopPlan& plan) { return static_cast<float>(*plan.look->electrons_at_white); }
 
 // Luma that is left noisy, over the cells of 2 x 2 that lie in those of the grid.
 void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const float>& residual, PlaneView<float> out,
              Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
-  const float unit = (weights[0] + weights[1] + weights[2]) / mean_of(*plan.electrons_at_white);
+  const float unit = (weights[0] + weights[1] + weights[2]) / white_e(plan);
   const int cells = plan.options.half ? 4 : 2;  // of the map along a side of the grid's
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
@@ -45,13 +43,13 @@ void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const fl
 // Var = signal + variance without light, of each channel, as if each pixel had its own three.
 void of_model(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
-  const float white_e = mean_of(*plan.electrons_at_white);
+  const float full_e = white_e(plan);
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       for (int x = 0; x < out.width; ++x) {
         float sum = 0;
         for (int c = 0; c < 3; ++c) {
-          const float e_per_unit = white_e / plan.white_gain[c];
+          const float e_per_unit = full_e / plan.white_gain[c];
           const float variance_e2 = std::max(quarter[c].row(y)[x], 0.0f) * e_per_unit +
                                     static_cast<float>(plan.noise_reduction.noise.variance_e2[c]);
           const float scale = weights[c] / e_per_unit;
@@ -64,10 +62,6 @@ void of_model(const DevelopPlan& plan, const RgbView<const float>& quarter, Plan
 }
 
 }  // namespace
-
-bool noise_is_known(const DevelopPlan& plan) {
-  return plan.electrons_at_white.has_value() && plan.noise_reduction.snr.has_value();
-}
 
 void noise_of_luminance(const DevelopPlan& plan, const Rect& crop, const NoiseMaps& maps,
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {

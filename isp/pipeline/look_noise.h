@@ -6,11 +6,9 @@
 
 namespace lowlux::isp {
 
-/// Whether the noise of a frame's pixels is known, so that it can be bounded.
-bool noise_is_known(const DevelopPlan& plan);
-
 /// Variance of the noise in the luminance of the picture's pixels, in their unit (that of plan.transform), one figure
 /// for each cell of 4 x 4: what the denoiser says it left, or what the noise model says of what came in.
+/// Needs a look that knows electrons_at_white.
 /// @param maps  of the active area; read where noise was reduced
 /// @param quarter  means of camera RGB (RawToRgb::quarter), read where it was not
 /// @param out  ceil(plan.height / 4) x ceil(plan.width / 4)

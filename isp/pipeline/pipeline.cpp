@@ -41,7 +41,9 @@ void fit(Plane<T>& plane, int width, int height) {
   if (plane.width() != width || plane.height() != height) plane = Plane<T>(width, height);
 }
 
-bool bounds_noise(const DevelopPlan& plan) { return plan.look && plan.look->noise_limit && noise_is_known(plan); }
+bool bounds_noise(const DevelopPlan& plan) {
+  return plan.look && plan.look->noise_limit && plan.look->electrons_at_white;
+}
 
 bool keeps_maps(const DevelopPlan& plan) { return plan.options.denoise.maps || bounds_noise(plan); }
 

@@ -1,0 +1,132 @@
+#include "isp/cli/look_args.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "isp/cli/option_values.h"
+
+namespace lowlux::cli {
+namespace {
+
+constexpr double eye_noise_limit = 2;  // CIE L*
+
+using Wrong = std::optional<std::string>;
+
+/// A number with its range in the message.
+struct Range {
+  double least;
+  double most;
+  const char* is_not;
+};
+
+Wrong store_number(const std::string& text, const Range& range, double& out) {
+  const std::optional<double> number = number_of(text);
+  if (!number || !(*number >= range.least && *number <= range.most)) {
+    return fmt::format("{} from {} to {}", range.is_not, range.least, range.most);
+  }
+  out = *number;
+  return std::nullopt;
+}
+
+Wrong set_effects(const std::string& text, isp::LookChoice& choice) {
+  using Which = isp::LookChoice::Which;
+  if (text == "auto" || text == "all") {
+    choice.which = text == "all" ? Which::all : Which::automatic;
+    return std::nullopt;
+  }
+  choice.which = Which::listed;
+  choice.listed = {false, false, false, false, false, false};
+  if (text == "none") return std::nullopt;
+  for (const std::string& word : words_of(text)) {
+    bool* const effect = isp::effect_named(choice.listed, word);
+    if (effect == nullptr) {
+      return fmt::format("names '{}', which is none of {}", word, fmt::join(isp::night_effect_names, ", "));
+    }
+    *effect = true;
+  }
+  return std::nullopt;
+}
+
+void add_scene(CLI::App& app, LookArgs& args) {
+  add_text(
+      app, "--scene-luminance", "auto|CD_M2",
+      "mean luminance of the scene, for --look eye: from f-number, exposure time and ISO (auto, default), or given",
+      [&args](const std::string& text) -> Wrong {
+        args.eye_option = "--scene-luminance";
+        args.choice.scene_luminance_cd_m2.reset();
+        if (text == "auto") return std::nullopt;
+        double luminance = 0;
+        if (auto wrong = store_number(text, {1e-7, 1e9, "is neither auto nor a luminance in cd/m2"}, luminance)) {
+          return wrong;
+        }
+        args.choice.scene_luminance_cd_m2 = luminance;
+        return std::nullopt;
+      });
+  add_text(app, "--field-of-view", "DEGREES",
+           "that the longer side of the picture covers in the scene, for what detail the eye makes out (default 50)",
+           [&args](const std::string& text) {
+             args.eye_option = "--field-of-view";
+             return store_number(text, {0.1, 180, "is no angle in degrees"}, args.choice.field_of_view_deg);
+           });
+}
+
+void add_effects(CLI::App& app, LookArgs& args) {
+  add_text(app, "--effects", "auto|all|none|LIST",
+           fmt::format("what --look eye shows of the dark: those effects that can be seen here (auto, default; never "
+                       "glare and visual-noise), or those listed, parted by commas ({})",
+                       fmt::join(isp::night_effect_names, ", ")),
+           [&args](const std::string& text) {
+             args.eye_option = "--effects";
+             return set_effects(text, args.choice);
+           });
+  add_text(app, "--tolerance", "DELTA_E",
+           "CIEDE2000 from which on --effects auto takes an effect for seen (default 0.5)",
+           [&args](const std::string& text) {
+             args.eye_option = "--tolerance";
+             return store_number(text, {1e-3, 100, "is no colour difference"}, args.choice.tolerance);
+           });
+  add_text(
+      app, "--dimming", "SHARE",
+      "how much of its darkness the picture keeps: 0 is as bright as by day, 1 as dark as it was beside a room with "
+      "100 cd/m2 (default 0.4; automatic exposure only)",
+      [&args](const std::string& text) {
+        args.eye_option = "--dimming";
+        return store_number(text, {0, 1, "is no share"}, args.choice.dimming);
+      });
+}
+
+}  // namespace
+
+void add_look(CLI::App& app, LookArgs& args) {
+  add_choice<isp::Look>(
+      app, "--look", {{"camera", isp::Look::camera}, {"eye", isp::Look::eye}},
+      [&args](isp::Look look) { args.choice.look = look; },
+      "as a camera in daylight would have it (default), or as an eye saw it that stood there: reds darken, colours "
+      "fade, "
+      "detail softens");
+  add_scene(app, args);
+  add_effects(app, args);
+  add_text(app, "--noise-limit", "off|LIGHTNESS",
+           "CIE L* that noise may reach in even parts of the picture: shadows whose noise would exceed it are lifted "
+           "less (default: off, with --look eye 2)",
+           [&args](const std::string& text) -> Wrong {
+             args.noise_limit_given = true;
+             args.choice.noise_limit.reset();
+             if (text == "off") return std::nullopt;
+             double limit = 0;
+             if (auto wrong = store_number(text, {1e-3, 100, "is neither off nor a lightness"}, limit)) return wrong;
+             args.choice.noise_limit = limit;
+             return std::nullopt;
+           });
+}
+
+std::optional<std::string> complete_look(const LookArgs& args, isp::LookChoice& choice) {
+  choice = args.choice;
+  if (choice.look == isp::Look::camera && !args.eye_option.empty()) {
+    return args.eye_option + " goes with --look eye";
+  }
+  if (choice.look == isp::Look::eye && !args.noise_limit_given) choice.noise_limit = eye_noise_limit;
+  return std::nullopt;
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,224 @@
+#include "isp/pipeline/look.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "isp/model/night_eye.h"
+#include "isp/pipeline/develop.h"
+#include "tests/pipeline/night_frames.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr int width = 192, height = 128;
+
+// White, grey, red, green and blue fields, and a fine grating below.
+RawFrame coloured_frame() {
+  denoise_testing::Camera camera;
+  const denoise_testing::Scene scene = [](double x, double y) -> std::array<double, 3> {
+    if (y > 96)
+      return {500 + 400 * std::cos(2 * M_PI * x / 6), 1000 + 800 * std::cos(2 * M_PI * x / 6),
+              625 + 500 * std::cos(2 * M_PI * x / 6)};
+    const int field = static_cast<int>(x * 4 / width);
+    const std::array<std::array<double, 3>, 4> rgb{
+        {{0.5, 0.5, 0.5}, {0.8, 0.1, 0.1}, {0.1, 0.8, 0.1}, {0.1, 0.1, 0.8}}};
+    return {1000 * rgb[field][0], 2000 * rgb[field][1], 1250 * rgb[field][2]};
+  };
+  return test::night_frame(camera, scene, width, height);
+}
+
+DevelopOptions eye_at(double cd_m2) {
+  DevelopOptions o{.tone = ToneCurve::none, .space = OutputSpace::linear_srgb, .samples = SampleType::f32};
+  o.exposure_ev = 0;
+  o.look.look = Look::eye;
+  o.look.scene_luminance_cd_m2 = cd_m2;
+  o.look.field_of_view_deg = 4;
+  return o;
+}
+
+SceneLinear seen(const DevelopOptions& options) {
+  InlineExecutor executor;
+  Result<Developed> developed = develop(coloured_frame(), options, executor);
+  EXPECT_TRUE(developed) << developed.error().message;
+  return std::get<SceneLinear>(std::move(developed->picture));
+}
+
+// Mean RGB of the middle of one of the four fields.
+std::array<double, 3> field_of(const SceneLinear& picture, int field) {
+  std::array<double, 3> sum{};
+  for (int y = 32; y < 64; ++y) {
+    for (int x = 0; x < 16; ++x) {
+      for (int c = 0; c < 3; ++c) sum[c] += picture.plane[c].at(field * width / 4 + 16 + x, y) / (32.0 * 16);
+    }
+  }
+  return sum;
+}
+
+double luminance(const std::array<double, 3>& rgb) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; }
+
+double saturation(const std::array<double, 3>& rgb) {
+  const double y = luminance(rgb);
+  return std::hypot(std::hypot(rgb[0] - y, rgb[1] - y), rgb[2] - y) / y;
+}
+
+TEST(EyeLook, OfABrightSceneIsThatOfTheCamera) {
+  DevelopOptions camera = eye_at(1000);
+  camera.look = {};
+  const SceneLinear bright = seen(eye_at(1000)), plain = seen(camera);
+  for (int c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < plain.plane[c].size(); ++i) {
+      ASSERT_NEAR(bright.plane[c].data()[i], plain.plane[c].data()[i], 1e-5);
+    }
+  }
+}
+
+TEST(EyeLook, DarkensRedsAndFadesColoursAsTheLightGoes) {
+  double red_share = 10, red_saturation = 10, green_saturation = 10;
+  for (const double cd_m2 : {100.0, 1.0, 0.1, 0.01, 0.001}) {
+    const SceneLinear picture = seen(eye_at(cd_m2));
+    const auto red = field_of(picture, 1), green = field_of(picture, 2), blue = field_of(picture, 3);
+    EXPECT_LT(luminance(red) / luminance(blue), red_share) << cd_m2 << ": Purkinje";
+    EXPECT_LT(saturation(red), red_saturation);
+    EXPECT_LT(saturation(green), green_saturation);
+    red_share = luminance(red) / luminance(blue);
+    red_saturation = saturation(red);
+    green_saturation = saturation(green);
+  }
+  EXPECT_LT(red_share, 1) << "by night the blue is brighter";
+  EXPECT_LT(red_saturation, 0.05) << "and both are grey";
+}
+
+TEST(EyeLook, SoftensDetailOfADarkScene) {
+  const auto contrast = [](const SceneLinear& picture) {
+    float least = 1e9f, most = -1e9f;
+    for (int x = 60; x < 130; ++x) {
+      least = std::min(least, picture.plane[1].at(x, 115));
+      most = std::max(most, picture.plane[1].at(x, 115));
+    }
+    return (most - least) / (most + least);
+  };
+  EXPECT_LT(contrast(seen(eye_at(0.001))), 0.3 * contrast(seen(eye_at(1000))));
+}
+
+// What --effects auto leaves out changes no pixel by more than the tolerance.
+TEST(EyeLook, LeavesOutOnlyWhatCannotBeSeen) {
+  const Xyz white = *xyz_of(white_d65);
+  const Matrix3 to_xyz = *rgb_to_xyz(primaries_rec709);
+  for (const double cd_m2 : {300.0, 30.0, 8.0, 2.0, 0.05}) {
+    DevelopOptions all = eye_at(cd_m2), automatic = eye_at(cd_m2);
+    all.look.which = LookChoice::Which::listed;
+    all.look.listed = {};
+    const SceneLinear with = seen(all), chosen = seen(automatic);
+    double largest = 0;
+    for (int y = 0; y < 92; y += 3) {
+      for (int x = 0; x < width; x += 3) {
+        const auto lab = [&](const SceneLinear& picture) {
+          Vector3 rgb{};
+          for (int c = 0; c < 3; ++c) rgb[c] = std::max(0.0f, picture.plane[c].at(x, y));
+          return lab_of(xyz_of(to_xyz * rgb), white);
+        };
+        largest = std::max(largest, ciede2000(lab(with), lab(chosen)));
+      }
+    }
+    EXPECT_LE(largest, 4 * automatic.look.tolerance) << cd_m2 << ": four effects, each below the tolerance";
+  }
+}
+
+TEST(EyeLook, SaysWhatItIsMissing) {
+  InlineExecutor executor;
+  DevelopOptions options = eye_at(1);
+  options.look.scene_luminance_cd_m2.reset();
+  RawFrame frame = coloured_frame();
+  const auto unknown = develop(frame, options, executor);
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::insufficient);
+  EXPECT_NE(unknown.error().message.find("--scene-luminance"), std::string::npos);
+  frame.raw.info.exposure_s = 0.1;
+  frame.raw.info.iso = 1600;
+  frame.raw.info.f_number = 2;
+  const auto known = develop(frame, options, executor);
+  ASSERT_TRUE(known) << known.error().message;
+  EXPECT_EQ(known->plan.look->luminance_rule, "exposure");
+  // 78 N^2 / (0.65 S t) is 3 cd/m2 at saturation.
+  EXPECT_LT(known->plan.look->mean_cd_m2, 3);
+  EXPECT_GT(known->plan.look->mean_cd_m2, 0.1);
+}
+
+TEST(EyeLook, RefusesFiguresThatCannotBe) {
+  InlineExecutor executor;
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const RawFrame frame = coloured_frame();
+  const auto refused = [&](const auto& change) {
+    DevelopOptions options = eye_at(1);
+    change(options);
+    const auto developed = develop(frame, options, executor);
+    return !developed && developed.error().code == ErrorCode::invalid_argument;
+  };
+  for (const double bad : {0.0, -1.0, 1e10, nan}) {
+    EXPECT_TRUE(refused([&](DevelopOptions& o) { o.look.scene_luminance_cd_m2 = bad; })) << bad;
+  }
+  EXPECT_TRUE(refused([&](DevelopOptions& o) { o.look.dimming = nan; }));
+  EXPECT_TRUE(refused([&](DevelopOptions& o) { o.look.field_of_view_deg = 0; }));
+  EXPECT_TRUE(refused([&](DevelopOptions& o) { o.look.tolerance = 0; }));
+  EXPECT_TRUE(refused([&](DevelopOptions& o) { o.look.noise_limit = -1; }));
+  EXPECT_TRUE(refused([&](DevelopOptions& o) { o.space = OutputSpace::xyz; }));
+  EXPECT_TRUE(refused([&](DevelopOptions& o) { o.space = OutputSpace::camera; }));
+}
+
+TEST(EyeLook, DimsOnlyAnAutomaticExposure) {
+  InlineExecutor executor;
+  DevelopOptions options = eye_at(0.01);
+  const auto given = develop(coloured_frame(), options, executor);
+  EXPECT_EQ(given->plan.exposure_ev, 0);
+  options.exposure_ev.reset();
+  const auto dimmed = develop(coloured_frame(), options, executor);
+  options.look.dimming = 0;
+  const auto bright = develop(coloured_frame(), options, executor);
+  EXPECT_LT(dimmed->plan.look->dimming_ev, -0.5);
+  EXPECT_NEAR(dimmed->plan.exposure_ev, bright->plan.exposure_ev + dimmed->plan.look->dimming_ev, 1e-12);
+}
+
+// A grey in the dark, by codes and by what the noise model says: its noise as it comes out, in L*.
+TEST(NoiseLimit, HoldsInThePicture) {
+  InlineExecutor executor;
+  denoise_testing::Camera camera;
+  camera.read_noise_e = 3;
+  const RawFrame frame = test::night_frame(
+      camera,
+      [](double, double) {
+        return std::array<double, 3>{6, 12, 7.5};
+      },
+      256, 256);
+  for (const auto mode : {DenoiseChoice::Mode::off, DenoiseChoice::Mode::level}) {
+    DevelopOptions options{.exposure_ev = 7};
+    options.denoise.mode = mode;
+    options.denoise.level = denoise::Level::draft;
+    const auto noise_of = [&](const DevelopOptions& o) {
+      const auto developed = develop(frame, o, executor);
+      EXPECT_TRUE(developed);
+      const Encoded8& picture = std::get<Encoded8>(developed->picture);
+      double sum = 0, squares = 0;
+      int n = 0;
+      for (int y = 32; y < 224; ++y) {
+        for (int x = 32; x < 224; ++x, ++n) {
+          Vector3 rgb{};
+          for (int c = 0; c < 3; ++c)
+            rgb[c] = decode_transfer(OutputSpace::srgb, picture.codes.at(3 * x + c, y) / 255.0);
+          const double l = lab_of({0, luminance({rgb[0], rgb[1], rgb[2]}), 0}, {1, 1, 1}).l;
+          sum += l;
+          squares += l * l;
+        }
+      }
+      return std::sqrt(squares / n - sum / n * (sum / n));
+    };
+    const double free_noise = noise_of(options);
+    options.look.noise_limit = 0.4 * free_noise;
+    EXPECT_LT(noise_of(options), 1.1 * 0.4 * free_noise) << "up to a twentieth for 8-bit codes, and statistics";
+  }
+}
+
+}  // namespace
+}  // namespace lowlux::isp
