@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -45,11 +46,11 @@ struct AppearanceModel {
   double valid_from_cd_m2 = 0;  // of the scene's white; beyond, the answer is an extrapolation
   double valid_to_cd_m2 = 0;
   /// Everything that does not depend on the colour is done here, once. Errors: invalid_argument for conditions that
-  /// are not positive and finite, or a white without a colour.
+  /// are not positive and finite (luminances within 1e-12..1e12 cd/m2), or a white that leaves a cone or the rods dark.
   Result<ColourMap> (*at)(const ViewingConditions& conditions);
 };
 
-/// All of them, ordered by year.
+/// All of them, ordered by year of their source.
 std::span<const AppearanceModel> appearance_models();
 
 /// One by its name. Error: invalid_argument; the message names those there are.

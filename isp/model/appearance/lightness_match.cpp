@@ -1,0 +1,53 @@
+#include "isp/model/appearance/lightness_match.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "isp/model/appearance/bracketed_root.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double most_octaves = 10;
+constexpr double tolerance = 1e-12;  // of the signal, white's being 1
+
+struct Excitation {
+  Vector3 cones;
+  double rods;
+};
+
+Excitation times(const Excitation& e, double scale) {
+  return {{scale * e.cones[0], scale * e.cones[1], scale * e.cones[2]}, scale * e.rods};
+}
+
+/// The octaves that bring `signal` to the target, as far as they go; it rises all the way.
+double octaves_to(double target, const Excitation& e, const AchromaticSignal& signal) {
+  const auto excess = [&](double octaves) {
+    const Excitation scaled = times(e, std::exp2(octaves));
+    return signal(scaled.cones, scaled.rods) - target;
+  };
+  const Evaluated here{0, excess(0)};
+  if (std::fabs(here.f) <= tolerance) return 0;
+  const double farthest = here.f < 0 ? most_octaves : -most_octaves;
+  const Evaluated end{farthest, excess(farthest)};
+  if ((end.f > 0) == (here.f > 0)) return farthest;
+  return bracketed_root(excess, here, end, tolerance);
+}
+
+}  // namespace
+
+ColourMap lightness_match(const SeenScene& scene, AchromaticSignal dark, AchromaticSignal daylight) {
+  const Vector3 white = xyz_to_hpe * scene.white;
+  return colour_map([scene, white, dark = std::move(dark), daylight = std::move(daylight)](const Vector3& xyz) {
+    const double sign = xyz[1] < 0 ? -1 : 1;
+    const Vector3 positive{sign * xyz[0], sign * xyz[1], sign * xyz[2]};
+    const Vector3 response = xyz_to_hpe * positive;
+    Excitation e{{}, relative_scotopic(scene, positive)};
+    for (int i = 0; i < 3; ++i) e.cones[i] = std::max(0.0, response[i] / white[i]);
+    const double scale = std::exp2(octaves_to(dark(e.cones, e.rods), e, daylight));
+    return Vector3{scale * xyz[0], scale * xyz[1], scale * xyz[2]};
+  });
+}
+
+}  // namespace lowlux::isp

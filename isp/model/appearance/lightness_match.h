@@ -1,0 +1,21 @@
+#pragma once
+
+#include <functional>
+
+#include "isp/model/appearance/seen_scene.h"
+
+namespace lowlux::isp {
+
+/// Luminance of adaptation of daylight: a white of 1000 lx / pi in a room a fifth as bright. From there up the
+/// models that match lightness leave colours as they are.
+inline constexpr double daylight_adaptation_cd_m2 = 318.31;
+
+/// The achromatic signal above that of black, relative to white's: of cone responses relative to white's (not
+/// negative) and of the rods' (likewise). Rises with each.
+using AchromaticSignal = std::function<double(const Vector3& cones, double rods)>;
+
+/// A map that scales a colour until it gives in daylight the signal that it gives in the dark. Chromaticities are kept,
+/// the sign of a luminance too; scales are kept within 1/1024 and 1024.
+ColourMap lightness_match(const SeenScene& scene, AchromaticSignal dark, AchromaticSignal daylight);
+
+}  // namespace lowlux::isp
