@@ -10,6 +10,7 @@
 #include <Eigen/Dense>
 
 #include "isp/model/cie_data.h"
+#include "isp/model/colour_difference.h"
 #include "isp/model/correlated_colour_temperature.h"
 #include "isp/model/spectral_data.h"
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "isp/model/colour_difference.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {
@@ -19,7 +20,7 @@ const Matrix3& to_xyz() {
   return matrix;
 }
 
-double display_value(float v) { return v >= 0 ? std::min(static_cast<double>(v), 1.0) : 0.0; }
+double display_value(double v) { return v >= 0 ? std::min(v, 1.0) : 0.0; }
 
 /// Sums of what each row gives, in the order of the rows whatever the bands.
 template <class Sums, class OfRow>
@@ -41,9 +42,8 @@ SceneLinear encoded_of(const RgbView<const float>& linear, Executor& executor) {
     for (std::size_t c = 0; c < 3; ++c) {
       for (int y = band.first; y < band.last; ++y) {
         const float* from = linear[c].row(y);
-        std::transform(from, from + out.width(), out.plane[c].row(y), [](float v) {
-          return static_cast<float>(encode_transfer(OutputSpace::srgb, display_value(v)));
-        });
+        std::transform(from, from + out.width(), out.plane[c].row(y),
+                       [](float v) { return srgb_code(static_cast<double>(v)); });
       }
     }
   });
@@ -52,8 +52,8 @@ SceneLinear encoded_of(const RgbView<const float>& linear, Executor& executor) {
 
 Lab lab_at(const RgbView<const float>& display, int x, int y) {
   static const Xyz white = xyz_of(to_xyz() * Vector3{1, 1, 1});
-  const Vector3 rgb{display_value(display[0].at(x, y)), display_value(display[1].at(x, y)),
-                    display_value(display[2].at(x, y))};
+  const auto value = [&](std::size_t c) { return display_value(static_cast<double>(display[c].at(x, y))); };
+  const Vector3 rgb{value(0), value(1), value(2)};
   return lab_of(xyz_of(to_xyz() * rgb), white);
 }
 
@@ -173,19 +173,27 @@ double median_uv_shift(const std::vector<Xyz>& patches, const std::vector<Xyz>& 
   return *middle;
 }
 
-double encoded_psnr_db(const RgbView<const float>& display, const PictureTruth& truth, Executor& executor) {
-  const SceneLinear encoded = encoded_of(display, executor);
+float srgb_code(double display) {
+  return static_cast<float>(encode_transfer(OutputSpace::srgb, display_value(display)));
+}
+
+double codes_psnr_db(const SceneLinear& codes, const SceneLinear& truth, Executor& executor) {
+  assert(codes.width() == truth.width() && codes.height() == truth.height());
   const auto sum = sum_of_rows<std::array<double, 1>>(truth.height(), executor, [&](int y) {
     double row = 0;
     for (std::size_t c = 0; c < 3; ++c) {
       for (int x = 0; x < truth.width(); ++x) {
-        const double difference = encoded.plane[c].at(x, y) - truth.encoded().plane[c].at(x, y);
+        const double difference = codes.plane[c].at(x, y) - truth.plane[c].at(x, y);
         row += difference * difference;
       }
     }
     return std::array{row};
   });
   return -10 * std::log10(sum[0] / (3.0 * truth.width() * truth.height()));
+}
+
+double encoded_psnr_db(const RgbView<const float>& display, const PictureTruth& truth, Executor& executor) {
+  return codes_psnr_db(encoded_of(display, executor), truth.encoded(), executor);
 }
 
 PictureError picture_error(const RenderedPicture& picture, const PictureTruth& truth, Executor& executor) {

@@ -65,6 +65,12 @@ double saturation_ratio(const std::vector<Xyz>& patches, const std::vector<Xyz>&
 /// Median distance in u'v' of patches from the truth's, over the patches whose truth has a chromaticity.
 double median_uv_shift(const std::vector<Xyz>& patches, const std::vector<Xyz>& truth);
 
+/// sRGB code value, 0..1, of a display value of linear light; what is not in 0..1 counts as the nearest, NaN as 0.
+float srgb_code(double display);
+
+/// -10 log10(mean squared difference) of code values [dB], all channels; infinite if they are equal.
+double codes_psnr_db(const SceneLinear& codes, const SceneLinear& truth, Executor& executor);
+
 /// -10 log10(mean squared difference) of sRGB code values [dB], all channels; display values as in picture_error.
 double encoded_psnr_db(const RgbView<const float>& display, const PictureTruth& truth, Executor& executor);
 

@@ -1,45 +1,16 @@
 #include "isp/model/colorimetry.h"
 
 #include <cmath>
-#include <numbers>
 
 namespace lowlux::isp {
 namespace {
 
 constexpr Matrix3 bradford{{{0.8951, 0.2664, -0.1614}, {-0.7502, 1.7135, 0.0367}, {0.0389, -0.0685, 1.0296}}};
-constexpr double degree = std::numbers::pi / 180.0;
 
 /// CIE 15:2018 Eq. 8.6: cube root above (24/116)^3, a line of equal value and slope below.
 double lab_f(double ratio) {
   constexpr double knee = (24.0 / 116.0) * (24.0 / 116.0) * (24.0 / 116.0);
   return ratio > knee ? std::cbrt(ratio) : (841.0 / 108.0) * ratio + 16.0 / 116.0;
-}
-
-/// Hue angle in [0, 360) degrees; 0 for a grey.
-double hue_degrees(double a, double b) {
-  if (a == 0 && b == 0) return 0;
-  const double h = std::atan2(b, a) / degree;
-  return h < 0 ? h + 360 : h;
-}
-
-struct HuePair {
-  double difference;  // degrees, -180..180
-  double mean;        // degrees, on the shorter arc
-};
-
-/// Sharma et al. 2005, Eq. 10 and 14.
-HuePair compare_hues(double h1, double h2, bool one_is_grey) {
-  if (one_is_grey) return {0, h1 + h2};
-  const double d = h2 - h1;
-  if (std::fabs(d) <= 180) return {d, 0.5 * (h1 + h2)};
-  const double sum = h1 + h2;
-  return {d > 180 ? d - 360 : d + 360, 0.5 * (sum < 360 ? sum + 360 : sum - 360)};
-}
-
-/// c^7 / (c^7 + 25^7)
-double chroma_ratio(double c) {
-  const double c7 = std::pow(c, 7);
-  return c7 / (c7 + 6103515625.0);
 }
 
 }  // namespace
@@ -101,36 +72,6 @@ Lab lab_of(const Xyz& colour, const Xyz& white) {
   const double fy = lab_f(colour.y / white.y);
   const double fz = lab_f(colour.z / white.z);
   return {116 * fy - 16, 500 * (fx - fy), 200 * (fy - fz)};
-}
-
-double ciede2000(const Lab& first, const Lab& second) {
-  const double mean_c = 0.5 * (std::hypot(first.a, first.b) + std::hypot(second.a, second.b));
-  const double g = 0.5 * (1 - std::sqrt(chroma_ratio(mean_c)));
-  const double a1 = (1 + g) * first.a;
-  const double a2 = (1 + g) * second.a;
-  const double c1 = std::hypot(a1, first.b);
-  const double c2 = std::hypot(a2, second.b);
-  const HuePair hue = compare_hues(hue_degrees(a1, first.b), hue_degrees(a2, second.b), c1 * c2 == 0);
-
-  const double delta_l = second.l - first.l;
-  const double delta_c = c2 - c1;
-  const double delta_h = 2 * std::sqrt(c1 * c2) * std::sin(0.5 * hue.difference * degree);
-
-  const double l_offset = 0.5 * (first.l + second.l) - 50;
-  const double mean_c_prime = 0.5 * (c1 + c2);
-  const double t = 1 - 0.17 * std::cos((hue.mean - 30) * degree) + 0.24 * std::cos(2 * hue.mean * degree) +
-                   0.32 * std::cos((3 * hue.mean + 6) * degree) - 0.20 * std::cos((4 * hue.mean - 63) * degree);
-  const double s_l = 1 + 0.015 * l_offset * l_offset / std::sqrt(20 + l_offset * l_offset);
-  const double s_c = 1 + 0.045 * mean_c_prime;
-  const double s_h = 1 + 0.015 * mean_c_prime * t;
-  const double blue_angle = (hue.mean - 275) / 25;
-  const double delta_theta = 30 * std::exp(-blue_angle * blue_angle);
-  const double r_t = -2 * std::sqrt(chroma_ratio(mean_c_prime)) * std::sin(2 * delta_theta * degree);
-
-  const double l = delta_l / s_l;
-  const double c = delta_c / s_c;
-  const double h = delta_h / s_h;
-  return std::sqrt(std::fmax(0, l * l + c * c + h * h + r_t * c * h));
 }
 
 }  // namespace lowlux::isp

@@ -83,8 +83,4 @@ std::optional<Matrix3> rgb_to_xyz(const RgbPrimaries& primaries);
 /// CIELAB of `colour` relative to `white` (CIE 15:2018 Eq. 8.3 to 8.10, exact fractions); white must be positive.
 Lab lab_of(const Xyz& colour, const Xyz& white);
 
-/// Colour difference CIEDE2000 with k_L = k_C = k_H = 1 (ISO/CIE 11664-6:2014, in the form of Sharma, Wu & Dalal,
-/// Color Res. Appl. 30 (2005) 21-30, which settles the mean hue of opposite and of grey colours).
-double ciede2000(const Lab& first, const Lab& second);
-
 }  // namespace lowlux::isp

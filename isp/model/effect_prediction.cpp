@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "isp/model/colorimetry.h"
+#include "isp/model/colour_difference.h"
 #include "isp/model/effect_plan.h"
 
 namespace lowlux::isp {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "isp/model/colorimetry.h"
+#include "isp/model/colour_difference.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {

@@ -14,6 +14,7 @@
 #include "capture/synthetic/synthetic_source.h"
 #include "isp/base/random.h"
 #include "isp/model/cie_data.h"
+#include "isp/model/colour_difference.h"
 #include "isp/model/spectral_data.h"
 #include "isp/model/spectral_response.h"
 

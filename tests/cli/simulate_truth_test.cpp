@@ -12,6 +12,7 @@
 #include "isp/codec/pfm.h"
 #include "isp/model/cie_data.h"
 #include "isp/model/colorimetry.h"
+#include "isp/model/colour_difference.h"
 #include "isp/model/spectral_data.h"
 #include "tests/cli/simulate_command.h"
 #include "tests/codec/pictures.h"

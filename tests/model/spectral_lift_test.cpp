@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "isp/model/cie_data.h"
+#include "isp/model/colour_difference.h"
 #include "isp/model/sensor_db.h"
 #include "isp/model/spectral_response.h"
 

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "isp/model/colorimetry.h"
+#include "isp/model/colour_difference.h"
 #include "isp/pipeline/develop.h"
 #include "isp/render/output_space.h"
 #include "tests/support/synthetic_chart.h"

@@ -9,6 +9,7 @@
 
 #include "isp/model/camera_colour.h"
 #include "isp/model/colorimetry.h"
+#include "isp/model/colour_difference.h"
 #include "tests/support/synthetic_chart.h"
 
 namespace lowlux::isp {
