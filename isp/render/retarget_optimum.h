@@ -7,12 +7,12 @@ namespace lowlux::isp {
 
 /// What a difference in appearance weighs, in the units of CIE 116-1995 (Delta E 94, the source as reference, S_L = 1).
 struct MatchWeights {
-  double lightness = 0.7;
+  double lightness = 0.6;
   double chroma = 1;
   double hue = 1;
   /// Of the same difference as an eye adapted to daylight sees it, squared: what keeps colours from leaving the
   /// picture's own for the sake of a gain nobody sees, and the optimum unique and continuous.
-  double faithfulness = 0.002;
+  double faithfulness = 0.0015;
 };
 
 /// How a picture's colours are seen, and how a display's are.
