@@ -24,6 +24,7 @@ inline constexpr std::uint32_t column_noise = 4;     // y = 0, frame 0, word 0: 
 inline constexpr std::uint32_t scene = 5;            // where the scene itself is drawn: stars
 inline constexpr std::uint32_t risk_probe = 8;       // what a denoiser is disturbed by, to see how it answers
 inline constexpr std::uint32_t code_dither = 9;      // word 0: rounds electrons to codes without bias
+inline constexpr std::uint32_t visual_noise = 10;    // word 0: the eye's own grain, by cells of 4 pixels
 inline constexpr std::uint32_t wavelength_bin = 16;  // + i, for photons sampled by wavelength
 }  // namespace draw_purpose
 

@@ -9,6 +9,7 @@
 #include "isp/raw/bin_plane.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/to_linear.h"
+#include "isp/render/retarget_rows.h"
 
 namespace lowlux::isp {
 namespace {
@@ -46,6 +47,16 @@ bool bounds_noise(const DevelopPlan& plan) {
 }
 
 bool keeps_maps(const DevelopPlan& plan) { return plan.options.denoise.maps || bounds_noise(plan); }
+
+CodeChange change_by(const RetargetTable& table) {
+  return {[](const void* context, const std::uint16_t* rgb, int width, std::uint8_t* out) {
+            apply(*static_cast<const RetargetTable*>(context), rgb, width, out);
+          },
+          [](const void* context, const std::uint16_t* rgb, int width, std::uint16_t* out) {
+            apply(*static_cast<const RetargetTable*>(context), rgb, width, out);
+          },
+          &table};
+}
 
 DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
   const Rect& crop = raw.default_crop;
@@ -170,13 +181,15 @@ void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& o
     look = look_grid(in, frame, plan);
     transform.look = &look;
   }
+  const CodeChange retarget = plan.options.retarget ? change_by(*plan.options.retarget) : CodeChange{};
+  const CodeChange* const change = plan.options.retarget ? &retarget : nullptr;
   std::visit(
       [&](auto& picture) {
         using P = std::remove_reference_t<decltype(picture)>;
         if constexpr (std::is_same_v<P, Encoded8>) {
-          kernel_->rgb8(in, transform, plan.tone, picture.codes.view(), executor_);
+          kernel_->rgb8(in, transform, plan.tone, picture.codes.view(), executor_, change);
         } else if constexpr (std::is_same_v<P, Encoded16>) {
-          kernel_->rgb16(in, transform, plan.tone, picture.codes.view(), executor_);
+          kernel_->rgb16(in, transform, plan.tone, picture.codes.view(), executor_, change);
         } else {
           kernel_->linear(in, transform, picture.view(), executor_);
         }

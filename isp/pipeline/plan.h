@@ -18,6 +18,7 @@
 #include "isp/raw/raw_to_rgb.h"
 #include "isp/raw/repair.h"
 #include "isp/render/exposure.h"
+#include "isp/render/retarget_table.h"
 #include "isp/render/tone.h"
 #include "isp/render/white_balance.h"
 
@@ -41,6 +42,7 @@ struct DevelopOptions {
   std::shared_ptr<const DarkFrame> dark_frame;  // set: taken off pixel by pixel in place of `black`
   DenoiseChoice denoise;
   LookChoice look;
+  std::shared_ptr<const RetargetTable> retarget;  // set: sRGB codes are changed by it, for a dimmer display
 };
 
 /// Time one step took.

@@ -57,6 +57,14 @@ struct RgbTransform {
   const LookGrid* look = nullptr;    // if set, changes `out` before it is moved into the gamut
 };
 
+/// What becomes of display codes before they are stored: each call turns one row of interleaved 16-bit codes, as rgb16
+/// makes them, into what is written. Called from several threads at once.
+struct CodeChange {
+  void (*to8)(const void* context, const std::uint16_t* rgb, int width, std::uint8_t* out) = nullptr;
+  void (*to16)(const void* context, const std::uint16_t* rgb, int width, std::uint16_t* out) = nullptr;
+  const void* context = nullptr;
+};
+
 /// Mosaic or camera RGB to a picture in one pass over row bands: Malvar-He-Cutler demosaic (ICASSP 2004, the
 /// 5x5 filters of its figure 2; borders mirrored without repeating the edge), RgbTransform, tone.
 ///
@@ -68,11 +76,12 @@ class RawToRgb {
   RawToRgb(int max_width, int threads);
 
   /// Interleaved display codes: `out` is height x 3 width. The tone table must reach its last bin at 1.
+  /// @param change  of codes, row by row; null: none
   void rgb8(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, PlaneView<std::uint8_t> out,
-            Executor& executor);
+            Executor& executor, const CodeChange* change = nullptr);
   /// The same with round(65535 tone), linear between the edges of a bin.
   void rgb16(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, PlaneView<std::uint16_t> out,
-             Executor& executor);
+             Executor& executor, const CodeChange* change = nullptr);
   /// Planar float, no tone.
   void linear(const RgbInput& in, const RgbTransform& transform, RgbView<float> out, Executor& executor);
 
@@ -87,16 +96,20 @@ class RawToRgb {
  private:
   template <class Mosaic>
   void bin(const Mosaic& in, RgbView<float> out, Executor& executor);
-  /// Scratch of one thread.
   struct Bench;
   Bench bench(int thread) const;
-  template <class SinkOfRow>
-  void convert(const RgbInput& in, const RgbTransform& transform, const SinkOfRow& sink_of_row, Executor& executor);
+  template <class MakeSink>
+  void convert(const RgbInput& in, const RgbTransform& transform, const MakeSink& make_sink, Executor& executor);
+  template <class Codes, class Code>
+  void to_codes(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, PlaneView<Code> out,
+                Executor& executor, const CodeChange* change);
 
   int threads_;
   std::size_t run_stride_;   // floats from one run of scratch samples to the next
   std::size_t look_stride_;  // floats from one part of a look's row to the next
+  std::size_t codes_stride_;
   std::unique_ptr<float[]> memory_;
+  std::unique_ptr<std::uint16_t[]> codes_;  // rows on their way through a CodeChange
 };
 
 /// The vector instruction set the kernels use on this machine, as Highway names it.

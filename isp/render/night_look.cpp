@@ -4,95 +4,19 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <span>
 
-#include "isp/model/mesopic.h"
-#include "isp/model/night_eye.h"
+#include "isp/base/random.h"
 #include "isp/render/eye_rows.h"
+#include "isp/render/eye_tables.h"
 #include "isp/render/grid.h"
+#include "isp/render/pyramid.h"
 
 namespace lowlux::isp {
 namespace {
 
-using rows::EyeTables;
-
 // Of a cell of 4 pixels: box and linear interpolation blur it by half its side, 2 pixels.
 constexpr double cell_variance_px2 = 0.25 * LookGrid::cell * LookGrid::cell;
-
-double node(int i, int nodes, double first, double last) { return first + (last - first) * i / (nodes - 1); }
-
-// The root before it is held to 0..1, so that the ends are lines too.
-double unheld_coefficient(double log2_light, double log2_ratio) {
-  const LuminancePair field{std::exp2(log2_light), std::exp2(log2_light + log2_ratio)};
-  const double m = mesopic_state(field).m;
-  const double end = mes2_response(m == 0 ? field.scotopic : field.photopic);
-  return m == 0 || m == 1 ? end : m;
-}
-
-EyeTables make_tables() {
-  EyeTables t{};
-  for (int j = 0; j < t.ratios; ++j) {
-    for (int i = 0; i < t.lights; ++i) {
-      t.m[static_cast<std::size_t>(j) * t.lights + i] =
-          static_cast<float>(unheld_coefficient(node(i, t.lights, t.first_log2_light, t.last_log2_light),
-                                                node(j, t.ratios, t.first_log2_ratio, t.last_log2_ratio)));
-    }
-  }
-  for (int i = 0; i < t.lights; ++i) {
-    const double light = std::exp2(node(i, t.lights, t.first_log2_light, t.last_log2_light));
-    const double blur_deg = blur_std_deg(light);
-    t.blue[i] = static_cast<float>(rod_blue(light));
-    t.variance_deg2[i] = static_cast<float>(blur_deg * blur_deg);
-  }
-  t.half_saturation_cd_m2 = static_cast<float>(half_saturation_cd_m2);
-  t.chroma_scale = static_cast<float>(1 + half_saturation_cd_m2 / 100);
-  return t;
-}
-
-const EyeTables& shared_tables() {
-  static const EyeTables tables = make_tables();
-  return tables;
-}
-
-/// A plane and its halvings, for the largest frame; frames take the upper left corner.
-class Pyramid {
- public:
-  Pyramid(int width, int height, int levels) {
-    for (int k = 0; k < levels; ++k, width = halved(width), height = halved(height)) level_.emplace_back(width, height);
-  }
-  void fit(int width, int height) {
-    width_ = width;
-    height_ = height;
-  }
-  PlaneView<float> operator[](int level) {
-    int width = width_, height = height_;
-    for (int k = 0; k < level; ++k) width = halved(width), height = halved(height);
-    return level_[level].view().crop(0, 0, width, height);
-  }
-  void halve_to(int last, Executor& executor) {
-    for (int k = 0; k < last; ++k) halve((*this)[k], (*this)[k + 1], executor);
-  }
-  void interpolate_from(int first, Executor& executor) {
-    for (int k = first; k > 0; --k) interpolate_twice((*this)[k], (*this)[k - 1], executor);
-  }
-
- private:
-  std::vector<Plane<float>> level_;
-  int width_ = 0;
-  int height_ = 0;
-};
-
-template <class Work>
-void for_each_row(Executor& executor, int height, const Work& work) {
-  for_each_band(executor, height, [&](RowBand band, int) {
-    for (int y = band.first; y < band.last; ++y) work(y);
-  });
-}
-
-int levels_of(int width, int height) {
-  int levels = 1;
-  for (int side = std::max(width, height); side > 1; side = halved(side)) ++levels;
-  return levels;
-}
 
 double mean_of(const PlaneView<const float>& plane) {
   double sum = 0;
@@ -142,6 +66,7 @@ struct NightLookGrid::State {
         variance(width, height, levels),
         between(width, height, levels) {
     for (Plane<float>& plane : part) plane = Plane<float>(width, height);
+    grain = Plane<float>(width, height);
   }
 
   void fit(int width, int height) {
@@ -159,6 +84,8 @@ struct NightLookGrid::State {
   void soften(Executor& executor);
   void scatter(const NightLook& look, Executor& executor);
   void add_veil(Executor& executor);
+  void draw_grain(const NightLook& look, Executor& executor);
+  void add_grain(Executor& executor);
   void bound_noise(const NoiseLimit& limit, Executor& executor);
 
   int levels;
@@ -167,6 +94,7 @@ struct NightLookGrid::State {
   Pyramid variance;            // of the blur [px^2]
   Pyramid between;
   std::array<Plane<float>, LookGrid::parts> part;
+  Plane<float> grain;
 };
 
 // Light in the pixels' unit: photopic into `seen`, scotopic into `variance`; as fields [cd/m2], not negative, into the
@@ -216,7 +144,7 @@ void NightLookGrid::State::see(const NightLook& look, Executor& executor) {
   for_each_row(executor, e.height, [&](int y) {
     float* const share = part_row(LookGrid::rod_share, y);
     float* const blur_deg2 = part_row(LookGrid::base, y);
-    rows::eye_row(shared_tables(), white, cones.row(y), rods.row(y), e.width,
+    rows::eye_row(eye_tables(), white, cones.row(y), rods.row(y), e.width,
                   {share, part_row(LookGrid::chroma, y), part_row(LookGrid::blue, y), blur_deg2});
     if (!look.effects.purkinje) std::fill_n(share, e.width, 0.0f);
     if (!look.effects.chroma) std::fill_n(part_row(LookGrid::chroma, y), e.width, 1.0f);
@@ -291,6 +219,26 @@ void NightLookGrid::State::add_veil(Executor& executor) {
   });
 }
 
+// Normal deviates of as much contrast as is just seen in the field of adaptation.
+void NightLookGrid::State::draw_grain(const NightLook& look, Executor& executor) {
+  const PlaneView<float> field = photopic[0];
+  const DrawStream stream{.seed = look.seed, .frame = 0, .purpose = draw_purpose::visual_noise};
+  for_each_row(executor, field.height, [&](int y) {
+    const std::span<float> row(grain.row(y), static_cast<std::size_t>(field.width));
+    normal_row(stream, 0, static_cast<std::uint32_t>(y), 0, row);
+    for (int x = 0; x < field.width; ++x) {
+      const float light = field.row(y)[x];
+      row[x] *= tabulated_threshold_contrast(light) * light / static_cast<float>(look.cd_m2_per_unit);
+    }
+  });
+}
+
+void NightLookGrid::State::add_grain(Executor& executor) {
+  for_each_row(executor, seen[0].height, [&](int y) {
+    for (int x = 0; x < seen[0].width; ++x) part[LookGrid::base].row(y)[x] += grain.row(y)[x];
+  });
+}
+
 // Gain, found on cells of 16 pixels, so that it cannot follow the noise.
 void NightLookGrid::State::bound_noise(const NoiseLimit& limit, Executor& executor) {
   const int level = std::min(2, levels - 1);
@@ -331,9 +279,11 @@ LookGrid NightLookGrid::make(const RgbView<const float>& camera, const std::arra
   s.take_light(camera, weights_of(look, matrix, clip), look, executor);
   s.adapt(look, executor);
   s.see(look, executor);
+  if (look.effects.visual_noise) s.draw_grain(look, executor);
   if (look.effects.glare) s.scatter(look, executor);
   s.soften(executor);
   if (look.effects.glare) s.add_veil(executor);
+  if (look.effects.visual_noise) s.add_grain(executor);
   if (limit) s.bound_noise(*limit, executor);
   LookGrid out{{}, look.luminance, look.rods, look.tint, look.dark};
   for (int k = 0; k < LookGrid::parts; ++k) out.part[k] = s.part_view(k);

@@ -4,15 +4,18 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "isp/base/executor.h"
+#include "isp/model/contrast_sensitivity.h"
 #include "isp/model/night_eye.h"
 #include "isp/render/eye_rows.h"
 #include "isp/render/grid.h"
+#include "tests/reference/night_look_ref.h"
 
 namespace lowlux::isp {
 namespace {
@@ -59,6 +62,40 @@ TEST(NightLook, OfAnEvenFieldIsWhatTheEyeMakesOfIt) {
       EXPECT_NEAR(part_at(grid, LookGrid::base, column, row) + part_at(grid, LookGrid::detail, column, row) * e, e,
                   2e-6)
           << "an even field has no detail to lose";
+    }
+  }
+}
+
+// A lamp and its surroundings over five decades, with noise below zero, at sizes odd and even.
+TEST(NightLook, EqualsTheReference) {
+  InlineExecutor executor;
+  for (const auto& [width, height, pixels_per_degree] :
+       {std::tuple{61, 47, 5.0}, {96, 64, 60.0}, {7, 1, 30.0}, {1, 9, 2.0}, {130, 75, 400.0}}) {
+    CameraRgb camera(width, height);
+    std::mt19937 random(4);
+    std::normal_distribution<float> noise(0, 1e-5f);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const double distance = std::hypot(x - 0.3 * width, y - 0.6 * height) / width;
+        const double light = std::pow(10.0, -5 * std::min(1.0, 1.5 * distance));
+        for (int c = 0; c < 3; ++c) {
+          camera.plane[c].at(x, y) = static_cast<float>(light * (c == 0 ? 1 : 0.5 * c)) + noise(random);
+        }
+      }
+    }
+    NightLook look = rec709_look(3);
+    look.pixels_per_degree = pixels_per_degree;
+    NightLookGrid maker(4 * width, 4 * height);
+    const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1, look, std::nullopt, executor);
+    const auto expected = reference::night_look(std::as_const(camera).view(), as_it_is, 1, look);
+    for (int k = 0; k < LookGrid::parts; ++k) {
+      for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+          // Tables of 256 luminances and 32 S/P; the base is in units of light, of which there is up to 1.
+          ASSERT_NEAR(grid.part[k].at(x, y), expected[k].clamped(x, y), k == LookGrid::detail ? 0.012 : 0.005)
+              << k << " at " << x << "," << y << " of " << width;
+        }
+      }
     }
   }
 }
@@ -150,6 +187,29 @@ TEST(NightLook, GlareSpreadsTheLightOfALampAndAddsNothingFarAway) {
     const double found = veil(static_cast<int>(std::lround(angle * 10)));
     EXPECT_GT(found, 0.5 * expected) << angle;
     EXPECT_LT(found, 2.0 * expected) << angle;
+  }
+}
+
+TEST(NightLook, GrainHasTheContrastThatIsJustSeen) {
+  constexpr int side = 128;
+  InlineExecutor executor;
+  NightLookGrid maker(4 * side, 4 * side);
+  for (const double light : {0.003, 0.3, 30.0}) {
+    NightLook look = rec709_look(light);
+    look.effects = {false, false, false, false, false, true};
+    const CameraRgb camera = flat(side, side, {0.5f, 0.5f, 0.5f});
+    const LookGrid grid = maker.make(camera.view(), as_it_is, 1, look, std::nullopt, executor);
+    double sum = 0, squares = 0;
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < side; ++x) {
+        sum += part_at(grid, LookGrid::base, x, y);
+        squares += part_at(grid, LookGrid::base, x, y) * part_at(grid, LookGrid::base, x, y);
+      }
+    }
+    constexpr double n = side * side;
+    const double expected = 0.5 * threshold_contrast(0.5 * light);
+    EXPECT_NEAR(sum / n, 0, 5 * expected / std::sqrt(n));
+    EXPECT_NEAR(std::sqrt(squares / n), expected, 5 * expected / std::sqrt(2 * n) + 0.003 * expected) << light;
   }
 }
 

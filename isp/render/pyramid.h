@@ -1,0 +1,55 @@
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/base/plane.h"
+#include "isp/render/grid.h"
+
+namespace lowlux::isp {
+
+/// A plane and its halvings, for the largest frame; frames take the upper left corner.
+class Pyramid {
+ public:
+  Pyramid(int width, int height, int levels) {
+    for (int k = 0; k < levels; ++k, width = halved(width), height = halved(height)) level_.emplace_back(width, height);
+  }
+  void fit(int width, int height) {
+    width_ = width;
+    height_ = height;
+  }
+  PlaneView<float> operator[](int level) {
+    int width = width_, height = height_;
+    for (int k = 0; k < level; ++k) width = halved(width), height = halved(height);
+    return level_[level].view().crop(0, 0, width, height);
+  }
+  void halve_to(int last, Executor& executor) {
+    for (int k = 0; k < last; ++k) halve((*this)[k], (*this)[k + 1], executor);
+  }
+  void interpolate_from(int first, Executor& executor) {
+    for (int k = first; k > 0; --k) interpolate_twice((*this)[k], (*this)[k - 1], executor);
+  }
+
+ private:
+  std::vector<Plane<float>> level_;
+  int width_ = 0;
+  int height_ = 0;
+};
+
+/// Calls work(y) for each row, on several threads.
+template <class Work>
+void for_each_row(Executor& executor, int height, const Work& work) {
+  for_each_band(executor, height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) work(y);
+  });
+}
+
+/// Levels down to one cell.
+inline int levels_of(int width, int height) {
+  int levels = 1;
+  for (int side = std::max(width, height); side > 1; side = halved(side)) ++levels;
+  return levels;
+}
+
+}  // namespace lowlux::isp
