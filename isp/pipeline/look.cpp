@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "isp/model/colorimetry.h"
+#include "isp/model/colour_difference.h"
 #include "isp/model/night_eye.h"
 
 namespace lowlux::isp {

@@ -1,4 +1,5 @@
 #include "isp/model/appearance/entropy_model.h"
+#include "isp/model/colour_difference.h"
 
 #include <gtest/gtest.h>
 

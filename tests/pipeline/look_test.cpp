@@ -1,4 +1,5 @@
 #include "isp/pipeline/look.h"
+#include "isp/model/colour_difference.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,5 @@
 #include "isp/render/colour_table.h"
+#include "isp/model/colour_difference.h"
 
 #include <gtest/gtest.h>
 
