@@ -46,6 +46,7 @@ std::vector<Vector3> codes_of(const BenchPicture& picture) {
   std::vector<Vector3> out;
   const auto& plane = picture.linear.plane;
   const std::size_t every = std::max<std::size_t>(1, plane[0].size() / colours_of_a_picture);
+  out.reserve(plane[0].size() / every + 1);
   for (std::size_t i = 0; i < plane[0].size(); i += every) {
     Vector3 code{};
     for (std::size_t c = 0; c < 3; ++c) {
@@ -120,6 +121,7 @@ void compare_methods(const std::string& folder, double display_cd_m2, ShinUnits 
   for (const char* judge : judges) std::printf("| %-20s ", judge);
   std::printf("\n");
   std::vector<RetargetTable> tables;
+  tables.reserve(retarget_methods.size());
   for (const auto& named : retarget_methods) {
     tables.push_back(tabulated(code_map(options_for(named.method, display_cd_m2, units)), 33, executor));
   }
@@ -127,9 +129,11 @@ void compare_methods(const std::string& folder, double display_cd_m2, ShinUnits 
     const auto picture = value_of(read_bench_picture(folder + "/" + std::string(file), 0, 0, executor));
     const std::vector<Vector3> codes = codes_of(picture);
     std::vector<std::vector<Lab>> originals;
+    originals.reserve(std::size(judges));
     for (const char* judge : judges) originals.push_back(seen(codes, eye_of(judge, source_cd_m2, units)));
     for (std::size_t m = 0; m < tables.size(); ++m) {
       std::vector<Vector3> shown;
+      shown.reserve(codes.size());
       for (const Vector3& code : codes) shown.push_back(looked_up(tables[m], code));
       std::printf("%-17s%-17s", std::string(file).c_str(), std::string(retarget_methods[m].name).c_str());
       for (std::size_t j = 0; j < originals.size(); ++j) {
@@ -162,8 +166,10 @@ double ns_per_pixel(const RetargetTable& table, const std::vector<std::uint16_t>
 
 void compare_tables(const std::string& folder, double display_cd_m2, Executor& executor) {
   const auto picture = value_of(read_bench_picture(folder + "/kodim23.png", 0, 0, executor));
+  const std::vector<Vector3> codes = codes_of(picture);
   std::vector<std::uint16_t> rgb;
-  for (const Vector3& code : codes_of(picture)) {
+  rgb.reserve(3 * codes.size());
+  for (const Vector3& code : codes) {
     for (const double v : code) rgb.push_back(static_cast<std::uint16_t>(65535 * v + 0.5));
   }
   std::printf(
