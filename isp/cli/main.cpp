@@ -31,6 +31,7 @@ constexpr std::array verbs{
     Verb{"info", "what a raw file says, and what was measured on it", run_info},
     Verb{"reproduce", "the published experiments, each finding beside ours", run_reproduce},
     Verb{"resaturate", "pictures whose colours dark current took", run_resaturate},
+    Verb{"retarget", "pictures made to look right on dim displays", run_retarget},
     Verb{"simulate", "raw files of scenes of known truth", run_simulate},
 };
 

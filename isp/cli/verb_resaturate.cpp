@@ -1,7 +1,4 @@
-#include <algorithm>
-#include <cstdio>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -10,26 +7,16 @@
 
 #include "capture/file/picture_source.h"
 #include "isp/base/executor.h"
-#include "isp/cli/exit_code.h"
 #include "isp/cli/lines.h"
-#include "isp/cli/output_place.h"
 #include "isp/cli/outputs.h"
-#include "isp/cli/report.h"
+#include "isp/cli/picture_verb.h"
 #include "isp/cli/resaturate_args.h"
 #include "isp/cli/verbs.h"
-#include "isp/cli/version.h"
-#include "isp/output/image_writer.h"
 #include "isp/pipeline/resaturate_picture.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::cli {
 namespace {
-
-struct Work {
-  const ResaturateArgs& args;
-  isp::FileFormat format;
-  PictureKind kind;
-};
 
 struct Outcome {
   isp::Xyz black;
@@ -72,8 +59,11 @@ void add_warnings(Outcome& out) {
   }
 }
 
-Result<Outcome> worked(const Work& work, Executor& executor) {
-  const ResaturateArgs& args = work.args;
+PictureVerb verb_of(const ResaturateArgs& args) {
+  return {"resaturate", {args.input}, args.output, args.bits, args.jpeg_quality, args.force, args.json, args.quiet};
+}
+
+Result<Outcome> worked(const ResaturateArgs& args, const PictureKind& kind, Executor& executor) {
   auto picture = capture::read_picture(args.input, executor);
   if (!picture) return tl::make_unexpected(picture.error());
   Outcome out;
@@ -89,26 +79,16 @@ Result<Outcome> worked(const Work& work, Executor& executor) {
                                  .chroma_noise = args.chroma_noise,
                                  .prior_std = args.prior_std,
                                  .radius = args.radius,
-                                 .space = work.kind.space,
-                                 .samples = work.kind.samples};
+                                 .space = kind.space,
+                                 .samples = kind.samples};
   out.made = isp::resaturate_picture(std::move(picture->xyz), options, executor);
   add_warnings(out);
-  isp::WriteOptions write;
-  write.overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
-  write.software = "lowlux " + version_number();
-  write.jpeg.quality = args.jpeg_quality;
-  write.exr.depth = args.bits.value_or(16) == 16 ? isp::ExrOptions::Depth::half : isp::ExrOptions::Depth::full;
-  const auto written = isp::write_picture(out.made.picture, work.kind.space, {}, args.output, write, executor);
-  if (!written) return fail(written.error().code, written.error().message, args.output);
+  const auto written = write_made(verb_of(args), out.made.picture, kind.space, executor);
+  if (!written) return tl::make_unexpected(written.error());
   return out;
 }
 
 void print(const ResaturateArgs& args, const Outcome& done) {
-  if (!args.quiet) {
-    for (const std::string& warning : done.warnings) {
-      fmt::print(stderr, "{}\n", one_line(fmt::format("lowlux: {}: warning: {}", args.input, warning)));
-    }
-  }
   const isp::Xyz& b = done.black;
   if (args.json) {
     const nlohmann::ordered_json json{{"file", args.input},
@@ -131,38 +111,18 @@ void print(const ResaturateArgs& args, const Outcome& done) {
   }
 }
 
-int usage_error(const Error& error) {
-  const std::string place = error.where.empty() ? "" : error.where + ": ";
-  fmt::print(stderr, "{}\n", one_line("lowlux resaturate: " + place + error.message));
-  return exit_usage;
-}
-
-int failed(const ResaturateArgs& args, Error error) {
-  if (error.where.empty()) error.where = args.input;
-  fmt::print(stderr, "{}\n", error_line(args.input, error));
-  if (args.json) fmt::print("{}\n", error_json(args.input, error));
-  return exit_failed;
-}
-
 }  // namespace
 
 int run_resaturate(const std::vector<std::string>& words) {
   const Parsed<ResaturateArgs> parsed = parse_resaturate(words);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<ResaturateArgs>(parsed);
-  const Result<isp::FileFormat> format = isp::format_of(args.output);
-  if (!format) return usage_error(format.error());
-  const Result<PictureKind> kind = picture_kind(*format, args.bits, std::nullopt);
-  if (!kind) return usage_error(kind.error());
-  if (const std::string wrong = wrong_names({args.output}, {args.input}); !wrong.empty()) {
-    return usage_error({ErrorCode::invalid_argument, wrong, "-o"});
-  }
-  if (const auto place = check_place(args.output, args.force); !place) return failed(args, place.error());
-  PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));
-  const Result<Outcome> done = worked({args, *format, *kind}, executor);
-  if (!done) return failed(args, done.error());
-  print(args, *done);
-  return exit_done;
+  return run_picture_verb(verb_of(args), [&args](const PictureKind& kind, Executor& executor) {
+    return worked(args, kind, executor).map([&args](const Outcome& done) {
+      print(args, done);
+      return done.warnings;
+    });
+  });
 }
 
 }  // namespace lowlux::cli

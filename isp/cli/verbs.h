@@ -14,6 +14,7 @@ int run_develop(const std::vector<std::string>& words);
 int run_info(const std::vector<std::string>& words);
 int run_reproduce(const std::vector<std::string>& words);
 int run_resaturate(const std::vector<std::string>& words);
+int run_retarget(const std::vector<std::string>& words);
 int run_simulate(const std::vector<std::string>& words);
 
 }  // namespace lowlux::cli

@@ -3,16 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "denoise/box_mean.h"
 #include "denoise/resaturate.h"
-#include "isp/pipeline/pipeline.h"
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/pipeline/encode_picture.h"
 #include "isp/render/output_space.h"
-#include "isp/render/tone.h"
 
 namespace lowlux::isp {
 namespace {
@@ -80,37 +77,6 @@ double median_detail(const RgbView<const float>& xyz, int side) {
   return mean;
 }
 
-/// Linear XYZ to the codes of a space; what is outside of its gamut moves towards the neutral.
-Picture encoded(const SceneLinear& xyz, const ResaturateOptions& options, Executor& executor) {
-  DevelopPlan size;
-  size.options.samples = options.samples;
-  size.width = xyz.width();
-  size.height = xyz.height();
-  Picture out = make_picture(size);
-  RgbTransform transform;
-  const Matrix3 matrix = *xyz_to_output(options.space);
-  const Vector3 weights = *luminance_weights(options.space);
-  for (int i = 0; i < 9; ++i) transform.matrix[i] = static_cast<float>(matrix[i / 3][i % 3]);
-  for (int c = 0; c < 3; ++c) transform.luminance[c] = static_cast<float>(weights[c]);
-  transform.clip = INFINITY;
-  transform.move_into_gamut = options.samples != SampleType::f32;
-  RawToRgb kernel(xyz.width(), executor.width());
-  const CameraPlanes in{xyz.view()};
-  std::visit(
-      [&](auto& picture) {
-        using P = std::remove_reference_t<decltype(picture)>;
-        if constexpr (std::is_same_v<P, SceneLinear>) {
-          kernel.linear(in, transform, picture.view(), executor);
-        } else {
-          const ToneTable tone = make_tone_table(ToneCurve::none, options.space, 1);
-          if constexpr (std::is_same_v<P, Encoded8>) kernel.rgb8(in, transform, tone, picture.codes.view(), executor);
-          if constexpr (std::is_same_v<P, Encoded16>) kernel.rgb16(in, transform, tone, picture.codes.view(), executor);
-        }
-      },
-      out);
-  return out;
-}
-
 }  // namespace
 
 double chroma_noise_of(const RgbView<const float>& xyz) {
@@ -136,7 +102,7 @@ Resaturated resaturate_picture(SceneLinear xyz, const ResaturateOptions& options
   const auto at_white = std::count(saturated.data(), saturated.data() + saturated.size(), std::uint8_t{1});
   out.share_saturated = static_cast<double>(at_white) / static_cast<double>(saturated.size());
   denoise::resaturate(std::as_const(xyz).view(), how, xyz.view());
-  out.picture = encoded(xyz, options, executor);
+  out.picture = encode_picture(xyz, options.space, options.samples, executor);
   return out;
 }
 

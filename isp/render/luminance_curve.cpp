@@ -101,9 +101,9 @@ Result<LuminanceCurve> luminance_curve(const LuminanceRange& range) {
     const double own = curve.first_log + static_cast<double>(i) * LuminanceCurve::spacing();
     curve.shown_log[i] = std::clamp(own, bounds.low, bounds.high);
   }
-  for (double step = first_step; step > last_step; step /= 2) {
-    while (improve(curve, step, bounds)) {
-    }
+  double step = first_step;
+  while (step > last_step) {
+    if (!improve(curve, step, bounds)) step /= 2;
   }
   return curve;
 }

@@ -29,8 +29,11 @@ Vector3 node(const RetargetTable& table, std::size_t number) {
 
 /// Van der Corput's sequence: the digits of i in a base, mirrored at the point.
 double mirrored_digits(int i, int base) {
-  double value = 0;
-  for (double weight = 1.0 / base; i > 0; i /= base, weight /= base) value += (i % base) * weight;
+  double value = 0, weight = 1;
+  for (; i > 0; i /= base) {
+    weight /= base;
+    value += (i % base) * weight;
+  }
   return value;
 }
 

@@ -21,7 +21,8 @@ LuminanceCurve curve_for(double source, double display, double black = 0) {
 TEST(ContrastSensitivity, HasTheThresholdItIsScaledTo) {
   EXPECT_NEAR(threshold_contrast(100), 0.0041, 1e-15);
   double before = 1;
-  for (double log = -8; log <= 5; log += 0.1) {
+  for (int tenths = -80; tenths <= 50; ++tenths) {
+    const double log = 0.1 * tenths;
     const double now = threshold_contrast(std::pow(10.0, log));
     EXPECT_LE(now, before) << log;
     EXPECT_LE(now, 0.999);
@@ -51,13 +52,14 @@ TEST(LuminanceCurve, EqualDisplaysChangeNothing) {
 TEST(LuminanceCurve, RisesAndKeepsWithinTheDisplay) {
   for (const double black : {0.0, 0.02}) {
     const LuminanceCurve curve = curve_for(250, 2, black);
-    double before = -1;
-    for (double y = 0; y <= 300; y = y * 1.05 + 1e-4) {
+    double before = -1, y = 0;
+    while (y <= 300) {
       const double shown = retargeted_luminance(curve, y);
       EXPECT_GE(shown, before - 1e-12) << y;
       EXPECT_GE(shown, black * (1 - 1e-12)) << y;
       EXPECT_LE(shown, 2 * (1 + 1e-12)) << y;
       before = shown;
+      y = y * 1.05 + 1e-4;
     }
     EXPECT_EQ(retargeted_luminance(curve, 0), black);
     EXPECT_NEAR(retargeted_luminance(curve, 250), 2, 0.02) << "the display's white is used";

@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "isp/model/appearance/shin.h"
 #include "isp/model/colorimetry.h"
 #include "isp/render/output_space.h"
 
@@ -88,20 +89,35 @@ TEST(ClosestDisplayable, MatchesWhatCanBeMatchedWhereFaithfulnessIsNotAskedFor) 
   }
 }
 
+void expect_best_of_grids(const AppearanceMatch& match, unsigned seed, int colours) {
+  std::mt19937 draw(seed);
+  for (int i = 0; i < colours; ++i) {
+    const Vector3 code = random_code(draw);
+    const MatchedColour found = closest_displayable(match, code);
+    const Vector3 grid = best_of_grids(match, code);
+    EXPECT_TRUE(found.converged);
+    // Lab has slopes of 500 or so per code range, squared and times (1e-5)^2: 3e-5.
+    EXPECT_LE(found.cost, match_cost(match, code, grid) + 1e-6);
+    EXPECT_LT(largest_difference(found.code, grid), 0.02)
+        << "codes near 0 matter least: the cost differs by " << match_cost(match, code, grid) - found.cost;
+  }
+}
+
 TEST(ClosestDisplayable, IsTheBestOfAFineGrid) {
-  std::mt19937 draw(3);
-  for (const double chroma : {0.25, 0.6, 1.5}) {
-    const AppearanceMatch match = match_for(chroma, 0.95);
-    for (int i = 0; i < 12; ++i) {
-      const Vector3 code = random_code(draw);
-      const MatchedColour found = closest_displayable(match, code);
-      const Vector3 grid = best_of_grids(match, code);
-      EXPECT_TRUE(found.converged);
-      // Lab has slopes of 500 or so per code range, squared and times (1e-5)^2: 3e-5.
-      EXPECT_LE(found.cost, match_cost(match, code, grid) + 1e-6);
-      EXPECT_LT(largest_difference(found.code, grid), 0.02)
-          << "codes near 0 matter least: the cost differs by " << match_cost(match, code, grid) - found.cost;
-    }
+  for (const double chroma : {0.25, 0.6, 1.5}) expect_best_of_grids(match_for(chroma, 0.95), 3, 12);
+}
+
+TEST(ClosestDisplayable, IsTheBestOfAFineGridAsShinsModelSees) {
+  ViewingConditions source, display;
+  source.white = display.white = white();
+  source.shin_units = display.shin_units = ShinUnits::luminance_as_is;
+  source.white_cd_m2 = 250;
+  const AppearanceModel model = shin_appearance();
+  for (const double white_cd_m2 : {1.0, 2.0, 10.0}) {
+    display.white_cd_m2 = white_cd_m2;
+    const auto seen_source = model.at(source), seen_display = model.at(display);
+    ASSERT_TRUE(seen_source && seen_display);
+    expect_best_of_grids({*seen_source, *seen_display, 0, {}}, 8, 12);
   }
 }
 
@@ -133,7 +149,8 @@ TEST(ClosestDisplayable, MovesContinuouslyWithTheColour) {
         light[c] = decode_transfer(OutputSpace::srgb, one[c]);
         light_near[c] = decode_transfer(OutputSpace::srgb, other[c]);
       }
-      // 1/0.3 for the chroma, 2.3 for the slope of light over codes, 3 for what luminance a hue gives up.
+      // Chroma is given 1/0.3 times over, light has a slope of up to 2.3 over codes: 7.6, and 3 times that as L* and
+      // hue make room for one another where a face of the cube is met.
       EXPECT_LT(largest_difference(light, light_near), 25 * step);
     }
   }

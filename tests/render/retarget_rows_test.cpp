@@ -105,6 +105,7 @@ TEST(RetargetTable, TheIdentityIsKeptAndGreysStayGrey) {
   InlineExecutor one;
   const RetargetTable table = tabulated([](const Vector3& code) { return code; }, 33, one);
   std::vector<std::uint16_t> rgb;
+  rgb.reserve(3 * std::size_t{256});
   for (int v = 0; v <= 255; ++v) rgb.insert(rgb.end(), 3, static_cast<std::uint16_t>(257 * v));
   std::vector<std::uint8_t> out(rgb.size());
   apply(table, rgb.data(), 256, out.data());

@@ -1,0 +1,64 @@
+#include "isp/cli/picture_verb.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "isp/cli/exit_code.h"
+#include "isp/cli/output_place.h"
+#include "isp/cli/report.h"
+#include "isp/cli/version.h"
+#include "isp/output/image_writer.h"
+
+namespace lowlux::cli {
+namespace {
+
+int usage_error(const PictureVerb& verb, const Error& error) {
+  const std::string place = error.where.empty() ? "" : error.where + ": ";
+  fmt::print(stderr, "{}\n", one_line("lowlux " + verb.name + ": " + place + error.message));
+  return exit_usage;
+}
+
+int failed(const PictureVerb& verb, Error error) {
+  const std::string& input = verb.inputs.front();
+  if (error.where.empty()) error.where = input;
+  fmt::print(stderr, "{}\n", error_line(input, error));
+  if (verb.json) fmt::print("{}\n", error_json(input, error));
+  return exit_failed;
+}
+
+}  // namespace
+
+Result<void> write_made(const PictureVerb& verb, const Picture& picture, OutputSpace space, Executor& executor) {
+  isp::WriteOptions write;
+  write.overwrite = verb.force ? isp::Overwrite::yes : isp::Overwrite::no;
+  write.software = "lowlux " + version_number();
+  write.jpeg.quality = verb.jpeg_quality;
+  write.exr.depth = verb.bits.value_or(16) == 16 ? isp::ExrOptions::Depth::half : isp::ExrOptions::Depth::full;
+  const auto written = isp::write_picture(picture, space, {}, verb.output, write, executor);
+  if (!written) return fail(written.error().code, written.error().message, verb.output);
+  return {};
+}
+
+int run_picture_verb(const PictureVerb& verb, const PictureWork& work) {
+  const Result<isp::FileFormat> format = isp::format_of(verb.output);
+  if (!format) return usage_error(verb, format.error());
+  const Result<PictureKind> kind = picture_kind(*format, verb.bits, std::nullopt);
+  if (!kind) return usage_error(verb, kind.error());
+  if (const std::string wrong = wrong_names({verb.output}, verb.inputs); !wrong.empty()) {
+    return usage_error(verb, {ErrorCode::invalid_argument, wrong, "-o"});
+  }
+  if (const auto place = check_place(verb.output, verb.force); !place) return failed(verb, place.error());
+  PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));
+  const Result<std::vector<std::string>> warnings = work(*kind, executor);
+  if (!warnings) return failed(verb, warnings.error());
+  if (verb.quiet) return exit_done;
+  for (const std::string& warning : *warnings) {
+    fmt::print(stderr, "{}\n", one_line(fmt::format("lowlux: {}: warning: {}", verb.inputs.front(), warning)));
+  }
+  return exit_done;
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,213 @@
+// Retargeting to dim displays: how alike pictures look by several models, what tables cost in accuracy and time.
+//   retarget_bench PICTURES [--display CD_M2] [--tables]
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "isp/bench/bench_picture.h"
+#include "isp/bench/gamut_ratio.h"
+#include "isp/model/appearance/appearance_model.h"
+#include "isp/model/colour_difference.h"
+#include "isp/render/output_space.h"
+#include "isp/render/retarget.h"
+#include "isp/render/retarget_rows.h"
+#include "isp/render/retarget_table.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double source_cd_m2 = 250;
+constexpr std::size_t colours_of_a_picture = 60000;
+constexpr const char* judges[]{"shin", "wanat_mantiuk", "mikamo", "icam06"};
+
+[[noreturn]] void give_up(const Error& error) {
+  std::fprintf(stderr, "%s: %s\n", error.where.c_str(), error.message.c_str());
+  std::exit(1);
+}
+
+template <class T>
+T value_of(Result<T> result) {
+  if (!result) give_up(result.error());
+  return std::move(*result);
+}
+
+struct Space {
+  Matrix3 to_xyz = rgb_to_xyz(primaries_rec709).value();
+  Xyz white = xyz_of(to_xyz * Vector3{1, 1, 1});
+};
+
+/// sRGB codes of pixels spread over a picture, one in so many rows and columns.
+std::vector<Vector3> codes_of(const BenchPicture& picture) {
+  std::vector<Vector3> out;
+  const auto& plane = picture.linear.plane;
+  const std::size_t every = std::max<std::size_t>(1, plane[0].size() / colours_of_a_picture);
+  out.reserve(plane[0].size() / every + 1);
+  for (std::size_t i = 0; i < plane[0].size(); i += every) {
+    Vector3 code{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      code[c] = encode_transfer(OutputSpace::srgb, std::clamp(static_cast<double>(plane[c].data()[i]), 0.0, 1.0));
+    }
+    out.push_back(code);
+  }
+  return out;
+}
+
+struct Eye {
+  ColourMap map;
+  Xyz white;  // colours are relative to
+};
+
+std::vector<Lab> seen(const std::vector<Vector3>& codes, const Eye& eye) {
+  static const Space space;
+  std::vector<Lab> out;
+  out.reserve(codes.size());
+  for (const Vector3& code : codes) {
+    Vector3 light{};
+    for (std::size_t c = 0; c < 3; ++c) light[c] = decode_transfer(OutputSpace::srgb, code[c]);
+    out.push_back(lab_of(eye.map(xyz_of(space.to_xyz * light)), eye.white));
+  }
+  return out;
+}
+
+/// Mikamo's neutrals are coloured in the dark: its colours are taken relative to its own white.
+Eye eye_of(const char* model, double white_cd_m2, ShinUnits units) {
+  ViewingConditions conditions;
+  conditions.white_cd_m2 = white_cd_m2;
+  conditions.white = Space().white;
+  conditions.shin_units = units;
+  Eye eye{value_of(value_of(appearance_model_named(model)).at(conditions)), conditions.white};
+  if (std::strcmp(model, "mikamo") == 0) eye.white = eye.map(conditions.white);
+  return eye;
+}
+
+RetargetOptions options_for(RetargetMethod method, double display_cd_m2, ShinUnits units) {
+  RetargetOptions options;
+  options.method = method;
+  options.source_cd_m2 = source_cd_m2;
+  options.display_cd_m2 = display_cd_m2;
+  options.units = units;
+  return options;
+}
+
+CodeMap code_map(const RetargetOptions& options) {
+  return [map = value_of(retargeting(options))](const Vector3& code) { return map(code).code; };
+}
+
+struct Score {
+  double delta_e_94c = 0;
+  double lightness = 0;
+  GamutRatio gamut;
+};
+
+Score score(const std::vector<Lab>& original, const std::vector<Lab>& test) {
+  Score out;
+  for (std::size_t i = 0; i < original.size(); ++i) {
+    out.delta_e_94c += delta_e_94c(original[i], test[i]) / static_cast<double>(original.size());
+    out.lightness += std::abs(original[i].l - test[i].l) / static_cast<double>(original.size());
+  }
+  out.gamut = gamut_ratio(original, test, lowlux_measure_hulls);
+  return out;
+}
+
+/// Rows: pictures and methods; for each judge mean Delta E 94c, EGR (convex) [%] and mean |Delta L*|.
+void compare_methods(const std::string& folder, double display_cd_m2, ShinUnits units, Executor& executor) {
+  std::printf("\n%g -> %g cd/m2, coefficients by %s\n%-17s%-17s", source_cd_m2, display_cd_m2,
+              units == ShinUnits::lux ? "lux" : "luminance", "picture", "method");
+  for (const char* judge : judges) std::printf("| %-20s ", judge);
+  std::printf("\n");
+  std::vector<RetargetTable> tables;
+  tables.reserve(retarget_methods.size());
+  for (const auto& named : retarget_methods) {
+    tables.push_back(tabulated(code_map(options_for(named.method, display_cd_m2, units)), 33, executor));
+  }
+  for (const std::string_view file : files_of(PictureSet::all)) {
+    const auto picture = value_of(read_bench_picture(folder + "/" + std::string(file), 0, 0, executor));
+    const std::vector<Vector3> codes = codes_of(picture);
+    std::vector<std::vector<Lab>> originals;
+    originals.reserve(std::size(judges));
+    for (const char* judge : judges) originals.push_back(seen(codes, eye_of(judge, source_cd_m2, units)));
+    for (std::size_t m = 0; m < tables.size(); ++m) {
+      std::vector<Vector3> shown;
+      shown.reserve(codes.size());
+      for (const Vector3& code : codes) shown.push_back(looked_up(tables[m], code));
+      std::printf("%-17s%-17s", std::string(file).c_str(), std::string(retarget_methods[m].name).c_str());
+      for (std::size_t j = 0; j < originals.size(); ++j) {
+        const Score s = score(originals[j], seen(shown, eye_of(judges[j], display_cd_m2, units)));
+        std::printf("| %6.2f %6.1f %6.2f ", s.delta_e_94c, s.gamut.convex_percent.value_or(0), s.lightness);
+      }
+      std::printf("\n");
+      std::fflush(stdout);
+    }
+  }
+}
+
+double seconds(const auto& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Nanoseconds for a pixel of a natural row, the best of some rounds; on one thread.
+template <class Code>
+double ns_per_pixel(const RetargetTable& table, const std::vector<std::uint16_t>& rgb) {
+  const auto width = static_cast<int>(rgb.size() / 3);
+  std::vector<Code> out(rgb.size());
+  double best = 1e9;
+  for (int round = 0; round < 20; ++round) {
+    best = std::min(best, seconds([&] { apply(table, rgb.data(), width, out.data()); }));
+  }
+  return 1e9 * best / width;
+}
+
+void compare_tables(const std::string& folder, double display_cd_m2, Executor& executor) {
+  const auto picture = value_of(read_bench_picture(folder + "/kodim23.png", 0, 0, executor));
+  const std::vector<Vector3> codes = codes_of(picture);
+  std::vector<std::uint16_t> rgb;
+  rgb.reserve(3 * codes.size());
+  for (const Vector3& code : codes) {
+    for (const double v : code) rgb.push_back(static_cast<std::uint16_t>(65535 * v + 0.5));
+  }
+  std::printf(
+      "\nmethod           levels | CIEDE2000 mean, max | steps of 255 mean, max | build s | ns/px to 8, 16 bits\n");
+  for (const RetargetMethod method : {RetargetMethod::constrained, RetargetMethod::shin, RetargetMethod::wanat}) {
+    const CodeMap map = code_map(options_for(method, display_cd_m2, ShinUnits::lux));
+    for (const int levels : {17, 33, 65}) {
+      RetargetTable table;
+      const double build_s = seconds([&] { table = tabulated(map, levels, executor); });
+      const TableError error = table_error(table, map, 4096, executor);
+      std::printf("%-17s%6d | %8.3f %8.2f   | %8.3f %8.2f       | %7.2f | %5.2f %5.2f\n",
+                  std::string(name_of(method)).c_str(), levels, error.mean_ciede2000, error.max_ciede2000,
+                  error.mean_steps, error.max_steps, build_s, ns_per_pixel<std::uint8_t>(table, rgb),
+                  ns_per_pixel<std::uint16_t>(table, rgb));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lowlux::isp
+
+int main(int argc, char** argv) {
+  using namespace lowlux;
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: retarget_bench PICTURES [--display CD_M2] [--tables]\n");
+    return 2;
+  }
+  double display_cd_m2 = 2;
+  bool only_tables = false;
+  for (int i = 2; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--display") == 0 && i + 1 < argc) display_cd_m2 = std::atof(argv[++i]);
+    only_tables = only_tables || std::strcmp(argv[i], "--tables") == 0;
+  }
+  PoolExecutor executor(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+  isp::compare_tables(argv[1], display_cd_m2, executor);
+  if (only_tables) return 0;
+  for (const isp::ShinUnits units : {isp::ShinUnits::luminance_as_is, isp::ShinUnits::lux}) {
+    isp::compare_methods(argv[1], display_cd_m2, units, executor);
+  }
+  return 0;
+}
