@@ -13,6 +13,7 @@
 #include "denoise/passes.h"
 #include "denoise/point_sources.h"
 #include "denoise/rows.h"
+#include "denoise/saturated_chroma.h"
 #include "denoise/site_slopes.h"
 
 namespace lowlux::denoise {
@@ -118,12 +119,6 @@ rows::PackRow Run::packing(const ThreadMemory& m) const {
   for (int i = 0; i < 2; ++i) in.raw[i] = m.raw[i];
   in.red_is_odd = red_column(raw.phase) == 1;
   in.cells = columns;
-  double most = 0;
-  for (int k = 0; k < 3; ++k) most = std::max(most, options.white_gain[k] * std::min(noise.saturation_e[k], largest_e));
-  // No coefficient exceeds its threshold, on any level: what unsees is not scaled down with the noise.
-  const auto& scale = options.variance_scale;
-  const auto [least, largest] = std::minmax_element(scale.begin(), scale.end());
-  in.blind_variance = static_cast<float>(scale[0] * std::min(1e9 * most * most / *least, 1e33 / *largest));
   for (int k = 0; k < 3; ++k) {
     in.saturation_e[k] = static_cast<float>(noise.saturation_e[k]);
     in.dark_e[k] = static_cast<float>(dark_e[k]);
@@ -144,7 +139,7 @@ void Run::pack(int virtual_row, bool planes, const ThreadMemory& m) const {
   }
   rows::PackedRow out{};
   for (int k = 0; k < 3; ++k) out.raw_e[k] = m.window[k][slot];
-  out.blind = m.window[3][slot];
+  out.saturated = m.row[0];
   if (planes) {
     for (int p = 0; p < 4; ++p) out.plane[p] = memory.level[0].noisy.row(p, virtual_row);
   }
@@ -155,8 +150,10 @@ void Run::pack(int virtual_row, bool planes, const ThreadMemory& m) const {
   };
   for (float* const raw_e : out.raw_e) mirror(raw_e, 4, 4);
   if (!planes) return;
-  mirror(out.blind, 0, 0);
+  mirror(out.saturated, 0, 0);
   for (float* const plane : out.plane) mirror(plane, 0, 0);
+  std::uint8_t* const saturated = memory.saturated.row(virtual_row);
+  for (int i = 0; i < padded_columns; ++i) saturated[i] = out.saturated[i] != 0 ? 1 : 0;
 }
 
 /// Planes and variances of level 0.
@@ -174,7 +171,6 @@ void Run::front() const {
         in.gain[k] = static_cast<float>(options.white_gain[k] * std::sqrt(options.variance_scale[0]));
         in.variance_e2[k] = static_cast<float>(noise.variance_e2[k]);
       }
-      for (int y = 0; y < 2; ++y) in.blind[y] = m.window[3][(2 * pair + y) % 16];
       in.cells = level.width;
       float* const out[4] = {level.variance.row(0, pair), level.variance.row(1, pair), level.variance.row(2, pair),
                              level.variance.row(3, pair)};
@@ -200,6 +196,9 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
         in.plane[p] = planes.row(p, y);
         in.residual[p] = m.row[p];
       }
+      const std::uint8_t* const saturated = memory.saturated.row(y);
+      for (int x = 0; x < columns; ++x) m.row[4][x] = saturated[x] != 0 ? 0.0f : 1.0f;
+      in.seen = m.row[4];
       in.cells = columns;
       in.rho = std::isinf(options.rho) ? -1.0f : static_cast<float>(options.rho);
       for (int k = 0; k < 3; ++k) in.per_gain[k] = static_cast<float>(1 / options.white_gain[k]);
@@ -259,6 +258,7 @@ void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const Den
   const PassFrame frame{state_->memory, starts, run.levels, run.workers, options.variance_scale};
   run.front();
   take_slopes_off(state_->memory.level[0], raw.phase, run.columns, run.rows, run.workers);
+  fill_saturated_chroma(state_->memory, run.levels, run.workers);
   build_pyramid(frame);
   run_pass(frame, 0, options.level == Level::best ? 2 : 4);
   int last = 0;

@@ -41,8 +41,8 @@ struct RawNoise {
   PerSite<double>
       dark_mean_e{};  // subtracted, sites as in site_of(); both greens get the mean of theirs, or mazes show
   std::array<double, 3> variance_e2{};  // of R, G, B: read noise^2 + quantisation step^2 / 12; both greens share theirs
-  /// Values from here on are saturated: they count as the largest white-balanced value of their 2x2 cell, and cannot
-  /// give colour to their surroundings.
+  /// Values from here on are saturated: they count as the largest white-balanced value of their 2x2 cell, which becomes
+  /// neutral, whatever DenoiseOptions::rho, and gives no colour to its surroundings.
   std::array<double, 3> saturation_e{unsaturated_e, unsaturated_e, unsaturated_e};  // of R, G, B
 };
 
@@ -65,7 +65,8 @@ struct DenoiseOptions {
 /// Optional outputs for each 2x2 cell, ceil(height / 2) x ceil(width / 2); views without data are left out.
 struct DenoiseMaps {
   PlaneView<float> residual_variance;  // of white-balanced luma 0.2 R + 0.3 G1 + 0.3 G2 + 0.2 B [e-^2]
-  PlaneView<float> chroma_confidence;  // 0..1, the factor above for the mean variance of the two colour differences
+  /// 0..1, the factor above for the mean variance of the two colour differences; 0 where a site is saturated.
+  PlaneView<float> chroma_confidence;
   /// Predicted variance of the noise that is left in a site of R, G and B [e-^2], white balance undone: with the
   /// planes' residual variances r and the factors f of their confidence,
   ///     (r_L + 0.36 f1^2 r_C1 + f2^2 r_C2 / 2) / gain^2 of R and B,  (r_L + 0.16 f1^2 r_C1 + f3^2 r_C3 / 4) / gain^2

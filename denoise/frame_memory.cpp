@@ -106,6 +106,7 @@ FrameMemory::FrameMemory(int max_width, int max_height, int threads, bool best)
   assert(max_width >= 2 && max_height >= 2 && threads >= 1);
   assert(max_width <= largest_side && max_height <= largest_side);
   const int levels = levels_of(columns, rows), width = padded(columns, levels), height = padded(rows, levels);
+  saturated = Plane<std::uint8_t>(width, height);
   Rows counted(nullptr);
   lay_out(counted, width, height, levels, *this);
   // Zeros: what lies beside rows is read, and must be numbers.

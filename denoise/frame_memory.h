@@ -35,7 +35,7 @@ struct PyramidLevel {
 /// Rows of one thread. All are of the widest level and its padding.
 struct ThreadMemory {
   std::array<float*, 2> raw{};                     // one row of raw samples each
-  std::array<std::array<float*, 16>, 4> window{};  // R, G, B with dark and blind, last 16 rows
+  std::array<std::array<float*, 16>, 3> window{};  // R, G, B with dark, last 16 rows
   std::array<std::array<float*, 8>, 4> value{};    // sums of blocks, of 8 rows
   std::array<std::array<float*, 4>, 4> weight{};   // of 4 rows of half size
   std::array<std::array<float*, 4>, 4> residual{};
@@ -65,6 +65,7 @@ struct FrameMemory {
   std::vector<SearchMemory> search;       // of each thread
   std::vector<PatchMemory> patches;       // of each thread, or empty
   Plane<std::uint8_t> sources;            // cells that hold point sources
+  Plane<std::uint8_t> saturated;          // cells of level 0 that hold saturated sites: 1
   std::vector<float> starts;              // chroma start level of each tile
   std::vector<unsigned char> has_chroma;  // for each level, each tile
 

@@ -45,7 +45,7 @@ void PackCells(const PackRow& in, const PackedRow& out) {
     store(hn::Mul(constant(0.5f), hn::Add(y.e[1], y.e[2])), out.raw_e[1] + i);
     store(y.e[3], out.raw_e[2] + i);
     if (out.plane[0] == nullptr) continue;
-    VF x[4], most = constant(-1e30f), blind = hn::Zero(f);
+    VF x[4], most = constant(-1e30f), any = hn::Zero(f);
     for (int k = 0; k < 4; ++k) {
       x[k] = hn::Mul(constant(gain[k]), hn::Sub(y.e[k], constant(dark[k])));
       most = hn::Max(most, x[k]);
@@ -53,10 +53,10 @@ void PackCells(const PackRow& in, const PackedRow& out) {
     for (int k = 0; k < 4; ++k) {
       const auto saturated = hn::Ge(y.e[k], constant(saturation[k]));
       x[k] = hn::IfThenElse(saturated, most, x[k]);
-      blind = hn::IfThenElse(saturated, constant(in.blind_variance), blind);
+      any = hn::IfThenElse(saturated, constant(1), any);
     }
     const VF green = hn::Add(x[1], x[2]), other = hn::Add(x[0], x[3]);
-    store(blind, out.blind + i);
+    store(any, out.saturated + i);
     store(hn::MulAdd(constant(0.3f), green, hn::Mul(constant(0.2f), other)), out.plane[0] + i);
     store(hn::Mul(constant(0.5f), hn::Sub(other, green)), out.plane[1] + i);
     store(hn::Mul(constant(per_root2), hn::Sub(x[0], x[3])), out.plane[2] + i);
@@ -108,11 +108,10 @@ void VarianceCells(const VarianceRow& in, float* scratch, float* const out[4]) {
   colour_variances(in, scratch, row, variance);
   for (int i = 0; i < in.cells / 2; i += lanes()) {
     const VF green = pairs(variance[1], i), other = hn::Add(pairs(variance[0], i), pairs(variance[2], i));
-    const VF unseen = hn::Mul(constant(1.0f / 16), hn::Add(pairs(in.blind[0], i), pairs(in.blind[1], i)));
     store(hn::MulAdd(constant(0.18f), green, hn::Mul(constant(0.04f), other)), out[0] + i);
-    store(hn::MulAdd(constant(0.5f), green, hn::MulAdd(constant(0.25f), other, unseen)), out[1] + i);
-    store(hn::MulAdd(constant(0.5f), other, unseen), out[2] + i);
-    store(hn::MulAdd(constant(2), green, unseen), out[3] + i);
+    store(hn::MulAdd(constant(0.5f), green, hn::Mul(constant(0.25f), other)), out[1] + i);
+    store(hn::Mul(constant(0.5f), other), out[2] + i);
+    store(hn::Mul(constant(2), green), out[3] + i);
   }
 }
 
@@ -176,8 +175,9 @@ void UnpackCells(const UnpackRow& in, const UnpackedRow& out) {
   for (int i = 0; i < in.cells; i += lanes()) {
     const VF luma = load(in.plane[0] + i);
     const VF root = hn::Mul(constant(in.rho), hn::Max(luma, hn::Zero(f))), power = hn::Mul(root, root);
+    const VF seen = load(in.seen + i);
     const auto factor = [&](VF residual) HWY_ATTR {  // residual > 0
-      return prior ? hn::Div(power, hn::Add(power, residual)) : constant(1);
+      return prior ? hn::Mul(seen, hn::Div(power, hn::Add(power, residual))) : seen;
     };
     VF c[4], residual[4], share[4], left[4];
     for (int p = 1; p < 4; ++p) {

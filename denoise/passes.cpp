@@ -177,43 +177,18 @@ void residual_share_row(const ChromaStarts& starts, int level, int y, std::span<
 
 void recompose(const PassFrame& frame, int level, int pass) { Recompose{frame, level, pass}.run(); }
 
-namespace {
-
-/// Blind sites are filled with what is around them: on coarser levels they count as if they were seen, unless all four
-/// cells of a coarser one are blind.
-void see(const float* const (&luma)[2], const float* const (&chroma)[2], int cells, float* const (&out)[2]) {
-  for (int x = 0; x < cells; x += 2) {
-    const auto most = [&](int i) { return rows::most_chroma_of_luma * luma[i / 2][x + i % 2]; };
-    bool blind = true;
-    for (int i = 0; i < 4; ++i) blind = blind && chroma[i / 2][x + i % 2] > most(i);
-    for (int i = 0; i < 4; ++i) {
-      const float v = chroma[i / 2][x + i % 2];
-      out[i / 2][x + i % 2] = blind ? v : std::min(v, most(i));
-    }
-  }
-}
-
-}  // namespace
-
 void build_pyramid(const PassFrame& frame) {
   for (int l = 0; l + 1 < frame.levels; ++l) {
     const PyramidLevel &fine = frame.memory.level[l], &coarse = frame.memory.level[l + 1];
     const auto scale = static_cast<float>(0.25 * frame.variance_scale[l + 1] / frame.variance_scale[l]);
-    in_bands(frame.workers, coarse.height / 2, [&](int first, int last, int thread) {
-      const ThreadMemory& m = frame.memory.thread[thread];
+    in_bands(frame.workers, coarse.height / 2, [&](int first, int last, int) {
       for (int p = 0; p < 4; ++p) {
         for (int y = 2 * first; y < 2 * last; ++y) {
           const float* const both[2] = {fine.noisy.row(p, 2 * y), fine.noisy.row(p, 2 * y + 1)};
           rows::down2_row(both, coarse.width, 1, coarse.noisy.row(p, y));
         }
         for (int y = first; y < last; ++y) {
-          const float* both[2] = {fine.variance.row(p, 2 * y), fine.variance.row(p, 2 * y + 1)};
-          if (p != 0) {
-            const float* const luma[2] = {fine.variance.row(0, 2 * y), fine.variance.row(0, 2 * y + 1)};
-            see(luma, {both[0], both[1]}, fine.width / 2, {m.row[0], m.row[1]});
-            both[0] = m.row[0];
-            both[1] = m.row[1];
-          }
+          const float* const both[2] = {fine.variance.row(p, 2 * y), fine.variance.row(p, 2 * y + 1)};
           rows::down2_row(both, coarse.width / 2, scale, coarse.variance.row(p, y));
         }
       }

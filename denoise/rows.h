@@ -21,19 +21,17 @@ struct PackRow {
   float dark_e[3];  // R, G, B
   float gain[3];
   float saturation_e[3];
-  float blind_variance;  // of chroma where a site is saturated
 };
 struct PackedRow {
-  float* raw_e[3];  // R, mean of both greens, B, dark in, as measured
-  float* blind;     // blind_variance or 0
-  float* plane[4];  // L, C1, C2, C3; null: not wanted
+  float* raw_e[3];   // R, mean of both greens, B, dark in, as measured
+  float* saturated;  // 1 where a site is, else 0
+  float* plane[4];   // L, C1, C2, C3; null: not wanted, nor is `saturated`
 };
 void pack_row(const PackRow& in, const PackedRow& out);
 
 /// Variances of the four planes in one row of half size, from the ten rows of R, G, B around its two rows of cells.
 struct VarianceRow {
   const float* raw_e[3][10];  // read from 4 cells before to 4 cells after
-  const float* blind[2];
   int cells;
   float least_e[3];  // floor of the local mean
   float variance_e2[3];
@@ -109,11 +107,6 @@ struct FinishedRows {
 };
 void finish_rows(const SumRows& in, float* scratch, const FinishedRows& out);
 
-/// Most that a chroma plane's variance is of the luma's, by their coefficients: 0.5 (R + B) of 0.04 (R + B). What is
-/// above comes of saturated sites, whose chroma is blind on every level: it says nothing of the noise that is left
-/// beside them.
-inline constexpr float most_chroma_of_luma = 12.5f;
-
 /// Factors of the slopes gx and gy, as in SiteSlopes.
 struct Slopes {
   float c2_x, c2_y, c3_x, c3_y;
@@ -125,6 +118,7 @@ void add_slope_row(const float* const (&luma)[3], int cells, const Slopes& slope
 struct UnpackRow {
   const float* plane[4];
   const float* residual[4];
+  const float* seen;  // 0 where a site is saturated: no chroma and no confidence; else 1
   int cells;
   float rho;  // < 0: no prior
   float per_gain[3];

@@ -164,5 +164,30 @@ TEST(Denoiser, AgreesWithTheReferenceWhereSitesAreSaturated) {
   compare(camera, noise, raw, {.white_gain = {2, 1, 1.5}, .keep_point_sources = false});
 }
 
+// On the coarsest level: holes within rows, at both their ends, whole rows above, between and below, and nothing else;
+// on one level and on four.
+TEST(Denoiser, AgreesWithTheReferenceWhereNothingElseIsNear) {
+  const Camera camera{.dark_e = {2, 2, 2, 2}};
+  const auto within = [](int at, int size, double from, double to) { return at >= from * size && at < to * size; };
+  auto noise = camera.noise();
+  noise.saturation_e.fill(500);
+  for (const Size size : {Size{61, 27}, Size{300, 160}}) {
+    const auto raw = exposed(camera, waves(60), size.width, size.height, 15);
+    for (const bool all : {false, true}) {
+      auto lit = raw.clone();
+      for (int y = 0; y < size.height; ++y) {
+        for (int x = 0; x < size.width; ++x) {
+          const bool rows =
+              within(y, size.height, 0, 0.22) || within(y, size.height, 0.4, 0.6) || within(y, size.height, 0.9, 1);
+          const bool columns =
+              within(x, size.width, 0, 0.2) || within(x, size.width, 0.4, 0.7) || within(x, size.width, 0.95, 1);
+          if (all || rows || (columns && y > size.height / 2)) lit.at(x, y) = 500;
+        }
+      }
+      compare(camera, noise, lit, {.white_gain = {2, 1, 1.5}, .keep_point_sources = false});
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lowlux

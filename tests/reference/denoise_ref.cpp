@@ -42,6 +42,16 @@ struct Frame {
     return std::isnan(e) ? 0 : std::clamp(static_cast<double>(e), -1e9, 1e9);
   }
 
+  bool saturated(int k, int cell_x, int cell_y) const {
+    const auto colour = static_cast<std::size_t>((k + 1) / 2);  // both greens are 1
+    return y(k, cell_x, cell_y) >= static_cast<float>(noise.saturation_e[colour]);
+  }
+
+  bool saturated(int cell_x, int cell_y) const {
+    return saturated(0, cell_x, cell_y) || saturated(1, cell_x, cell_y) || saturated(2, cell_x, cell_y) ||
+           saturated(3, cell_x, cell_y);
+  }
+
   double variance(int k, int cell_x, int cell_y) const {
     double sum = 0;
     for (int j = -4; j <= 4; ++j) {
@@ -96,12 +106,6 @@ Four decorrelated(const Frame& frame, Four& variance) {
   Four out;
   out.fill(Image(w, h));
   variance = out;
-  double largest = 0;
-  const auto& scale = frame.options.variance_scale;
-  const auto [least_scale, largest_scale] = std::minmax_element(scale.begin(), scale.end());
-  const auto& s = frame.noise.saturation_e;
-  const std::array saturation_e{s[0], s[1], s[1], s[2]};
-  for (int k = 0; k < 4; ++k) largest = std::max(largest, frame.gain[k] * std::min(saturation_e[k], 1e9));
   for (int cy = 0; cy < h; ++cy) {
     for (int cx = 0; cx < w; ++cx) {
       std::array<double, 4> x{}, v{};
@@ -111,20 +115,17 @@ Four decorrelated(const Frame& frame, Four& variance) {
         v[k] = frame.variance(k, mirrored(cx, frame.columns), mirrored(cy, frame.rows));
         most = std::max(most, x[k]);
       }
-      double blind = 0;
       for (int k = 0; k < 4; ++k) {
-        if (frame.y(k, cx, cy) < static_cast<float>(saturation_e[k])) continue;
-        x[k] = most;
-        blind = scale[0] * std::min(1e9 * largest * largest / *least_scale, 1e33 / *largest_scale);
+        if (frame.saturated(k, cx, cy)) x[k] = most;
       }
       out[0].at(cx, cy) = 0.2 * x[0] + 0.3 * x[1] + 0.3 * x[2] + 0.2 * x[3];
       out[1].at(cx, cy) = 0.5 * (x[0] + x[3] - x[1] - x[2]);
       out[2].at(cx, cy) = (x[0] - x[3]) / std::numbers::sqrt2;
       out[3].at(cx, cy) = x[1] - x[2];
       variance[0].at(cx, cy) = 0.04 * (v[0] + v[3]) + 0.09 * (v[1] + v[2]);
-      variance[1].at(cx, cy) = 0.25 * (v[0] + v[1] + v[2] + v[3]) + blind;
-      variance[2].at(cx, cy) = 0.5 * (v[0] + v[3]) + blind;
-      variance[3].at(cx, cy) = v[1] + v[2] + blind;
+      variance[1].at(cx, cy) = 0.25 * (v[0] + v[1] + v[2] + v[3]);
+      variance[2].at(cx, cy) = 0.5 * (v[0] + v[3]);
+      variance[3].at(cx, cy) = v[1] + v[2];
     }
   }
   return out;
@@ -171,20 +172,17 @@ Four total_residual(const std::vector<Four>& levels, const Image& starts) {
   return total;
 }
 
-/// Blind cells count as if they were seen, unless all four of a coarser one are blind.
-void see(const Image& luma, Image& chroma) {
-  for (int y = 0; y + 1 < chroma.height; y += 2) {
-    for (int x = 0; x + 1 < chroma.width; x += 2) {
-      bool blind = true;
-      for (int i = 0; i < 4; ++i) {
-        blind = blind && chroma.at(x + i % 2, y + i / 2) > 12.5 * luma.at(x + i % 2, y + i / 2);
-      }
-      for (int i = 0; !blind && i < 4; ++i) {
-        double& v = chroma.at(x + i % 2, y + i / 2);
-        v = std::min(v, 12.5 * luma.at(x + i % 2, y + i / 2));
-      }
-    }
+/// Saturated cells have the chroma of their surroundings.
+void fill_saturated(const Frame& frame, Four& x) {
+  Image seen(x[0].width, x[0].height);
+  for (int cy = 0; cy < seen.height; ++cy) {
+    for (int cx = 0; cx < seen.width; ++cx) seen.at(cx, cy) = frame.saturated(cx, cy) ? 0 : 1;
   }
+  if (std::find(seen.v.begin(), seen.v.end(), 1) == seen.v.end()) {
+    for (int p = 1; p < 4; ++p) std::fill(x[p].v.begin(), x[p].v.end(), 0);
+    return;
+  }
+  for (int p = 1; p < 4; ++p) fill_unseen(seen, x[p], frame.levels);
 }
 
 /// Pyramid of the planes, and of their variances.
@@ -198,7 +196,6 @@ void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, const Frame&
     for (int p = 0; p < 4; ++p) {
       half[p] = down2(x.back()[p]);
       half_variance[p] = down2(variance.back()[p]);
-      if (p != 0) see(down2(variance.back()[0]), half_variance[p]);
       for (double& v : half_variance[p].v) v *= scale[x.size()] / scale[x.size() - 1] / 4;
     }
     x.push_back(std::move(half));
@@ -236,6 +233,7 @@ Pictures both_passes(const Frame& frame, const Image& starts) {
   std::vector<Four> x(1), variance(1);
   x[0] = decorrelated(frame, variance[0]);
   add_slopes(frame, -1, x[0][0], x[0]);
+  fill_saturated(frame, x[0]);
   add_coarser(x, variance, frame);
   std::vector<Four> value(frame.levels), residual(frame.levels);
   const auto pass = [&](const std::vector<Four>* pilot, int stride) {
@@ -283,6 +281,7 @@ Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const Denoi
     for (int cx = 0; cx < frame.columns; ++cx) {
       const double luma = p.value[0].at(cx, cy), prior = std::max(luma, 0.0) * options.rho;
       const auto factor = [&](double residual) {
+        if (frame.saturated(cx, cy)) return 0.0;
         return std::isinf(options.rho) ? 1.0 : prior * prior / (prior * prior + residual);
       };
       std::array<double, 4> c{}, left{};

@@ -1,7 +1,9 @@
 #include "tests/reference/denoise_ref_blocks.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "denoise/layout.h"
 #include "denoise/residual_shares.h"
@@ -42,6 +44,62 @@ Image binomial3(const Image& in) {
     }
   }
   return out;
+}
+
+namespace {
+
+/// What is not seen: linear between the cells before and after it, or that of the only one.
+std::vector<double> interpolated(std::vector<double> value, const std::vector<bool>& seen) {
+  const int n = static_cast<int>(value.size());
+  const std::vector<double> in = value;
+  for (int i = 0; i < n; ++i) {
+    int before = i, after = i;
+    while (before >= 0 && !seen[before]) --before;
+    while (after < n && !seen[after]) ++after;
+    if (before < 0 && after == n) continue;
+    if (before < 0) before = after;
+    if (after == n) after = before;
+    value[i] = before == after ? in[before] : in[before] + (in[after] - in[before]) * (i - before) / (after - before);
+  }
+  return value;
+}
+
+void fill_coarsest(const Image& seen, Image& value) {
+  std::vector<bool> row_seen;
+  row_seen.reserve(static_cast<std::size_t>(value.height));
+  for (int y = 0; y < value.height; ++y) {
+    std::vector<double> row;
+    std::vector<bool> there;
+    for (int x = 0; x < value.width; ++x) {
+      row.push_back(value.at(x, y));
+      there.push_back(seen.at(x, y) > 0);
+    }
+    row = interpolated(row, there);
+    for (int x = 0; x < value.width; ++x) value.at(x, y) = row[x];
+    row_seen.push_back(std::find(there.begin(), there.end(), true) != there.end());
+  }
+  for (int x = 0; x < value.width; ++x) {
+    std::vector<double> column;
+    for (int y = 0; y < value.height; ++y) column.push_back(value.at(x, y));
+    column = interpolated(column, row_seen);
+    for (int y = 0; y < value.height; ++y) value.at(x, y) = column[y];
+  }
+}
+
+}  // namespace
+
+void fill_unseen(const Image& seen, Image& value, int levels) {
+  if (levels == 1) return fill_coarsest(seen, value);
+  const Image half_seen = down2(seen);
+  Image weighted = value;
+  for (std::size_t i = 0; i < value.v.size(); ++i) weighted.v[i] *= seen.v[i];
+  Image half = down2(weighted);
+  for (std::size_t i = 0; i < half.v.size(); ++i) half.v[i] = half_seen.v[i] > 0 ? half.v[i] / half_seen.v[i] : 0;
+  fill_unseen(half_seen, half, levels - 1);
+  const Image around = up2(half);
+  for (std::size_t i = 0; i < value.v.size(); ++i) {
+    if (seen.v[i] == 0) value.v[i] = around.v[i];
+  }
 }
 
 namespace {

@@ -23,6 +23,10 @@ Image down2(const Image& in);      // 2x2 means
 Image up2(const Image& in);        // bilinear, edges repeated
 Image binomial3(const Image& in);  // 3x3 weights 1 2 1, edges repeated
 
+/// Gives one plane, where nothing is seen (0), the mean of the smallest square of 2, 4 ... cells of which something is,
+/// bilinear between squares; on the last of `levels` linear along rows, then from row to row.
+void fill_unseen(const Image& seen, Image& value, int levels);
+
 struct Shrunk {
   Four value;
   Four residual;  // variance
