@@ -50,6 +50,11 @@ std::string explain_text(const isp::DevelopPlan& plan) {
                               : std::string(plan.white_balance_rule));
   out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.exposure_ev, plan.exposure_rule));
   if (plan.look) add_look(out, *plan.look);
+  if (plan.options.display) {
+    const isp::DisplayTarget& display = *plan.options.display;
+    out.add("display", fmt::format("{:g} to {:g} cd/m2, coefficients {}", display.source_cd_m2, display.display_cd_m2,
+                                   display.coefficients));
+  }
   return out.text();
 }
 

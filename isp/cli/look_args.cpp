@@ -118,6 +118,15 @@ void add_look(CLI::App& app, LookArgs& args) {
              args.choice.noise_limit = limit;
              return std::nullopt;
            });
+  add_text(app, "--display-luminance", "CD_M2",
+           "white of the display the picture is made for: colours are made up for what the eye misses there, against "
+           "displays of 250 cd/m2 (default: no change)",
+           [&args](const std::string& text) -> Wrong {
+             double luminance = 0;
+             if (auto wrong = store_number(text, {1e-3, 1e5, "is no luminance in cd/m2"}, luminance)) return wrong;
+             args.display_cd_m2 = luminance;
+             return std::nullopt;
+           });
 }
 
 std::optional<std::string> complete_look(const LookArgs& args, isp::LookChoice& choice) {

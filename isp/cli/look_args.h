@@ -15,7 +15,8 @@ namespace lowlux::cli {
 struct LookArgs {
   isp::LookChoice choice;
   bool noise_limit_given = false;
-  std::string eye_option;  // the first option given that only --look eye has; empty: none
+  std::optional<double> display_cd_m2;  // white of the display pictures are made for
+  std::string eye_option;               // the first option given that only --look eye has; empty: none
 };
 
 void add_look(CLI::App& app, LookArgs& args);

@@ -110,6 +110,9 @@ Result<isp::DevelopOptions> complete_options(const DevelopArgs& args, FileFormat
   o.samples = kind->samples;
   o.tone = args.tone.value_or(is_linear(o.space) ? isp::ToneCurve::none : isp::ToneCurve::standard);
   if (!args.exposure_given && is_linear(o.space)) o.exposure_ev = 0;
+  if (args.look.display_cd_m2 && (o.space != OutputSpace::srgb || o.samples == SampleType::f32)) {
+    return fail(ErrorCode::invalid_argument, "makes sRGB pictures of 8 or 16 bits", "--display-luminance");
+  }
   if (const auto fits = isp::check_options(o); !fits) return tl::make_unexpected(fits.error());
   return o;
 }

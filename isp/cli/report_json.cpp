@@ -147,6 +147,12 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"denoise", noise_json(plan.noise_reduction)},
             {"look", plan.look ? look_json(*plan.look) : Json(nullptr)},
             {"warnings", plan.warnings}};
+  if (plan.options.display) {
+    const isp::DisplayTarget& display = *plan.options.display;
+    json["display"] = {{"source_cd_m2", display.source_cd_m2},
+                       {"display_cd_m2", display.display_cd_m2},
+                       {"coefficients", display.coefficients}};
+  }
   for (const isp::StageTime& time : outcome.times) json["timings_s"][std::string(time.stage)] = time.seconds;
   return dumped(json);
 }

@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <memory>
 #include <utility>
 
 #include <fmt/format.h>
@@ -51,6 +52,16 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
   return write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);
 }
 
+// The table is made once for all files.
+Result<void> make_for_display(const DevelopArgs& args, isp::DevelopOptions& options) {
+  if (!args.look.display_cd_m2) return {};
+  PoolExecutor executor(2);
+  auto target = isp::display_target({.display_cd_m2 = *args.look.display_cd_m2}, executor);
+  if (!target) return fail(target.error().code, target.error().message, "--display-luminance");
+  options.display = std::make_shared<const isp::DisplayTarget>(*std::move(target));
+  return {};
+}
+
 int usage_error(const Error& error) {
   const std::string place = error.where.empty() ? "" : error.where + ": ";
   fmt::print(stderr, "{}\n", one_line("lowlux develop: " + place + error.message));
@@ -72,7 +83,7 @@ int run_develop(const std::vector<std::string>& words) {
     return usage_error(
         {ErrorCode::invalid_argument, "goes with a folder as output; a file's name says its format", "--format"});
   }
-  const Result<isp::DevelopOptions> options = complete_options(args, *format);
+  Result<isp::DevelopOptions> options = complete_options(args, *format);
   if (!options) return usage_error(options.error());
 
   const Result<std::vector<std::string>> darks = dark_files(args);
@@ -81,6 +92,7 @@ int run_develop(const std::vector<std::string>& words) {
   only_read.insert(only_read.end(), {args.profile, args.black_profile, args.dark.doubling_profile});
   if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed) return usage_error(unharmed.error());
 
+  if (const auto made = make_for_display(args, *options); !made) return usage_error(made.error());
   const Result<RawBatch> batch = make_batch(args, *options, *std::move(jobs), *darks);
   if (!batch) {
     fmt::print(stderr, "{}\n", error_line(batch.error().where, batch.error()));

@@ -181,8 +181,8 @@ void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& o
     look = look_grid(in, frame, plan);
     transform.look = &look;
   }
-  const CodeChange retarget = plan.options.retarget ? change_by(*plan.options.retarget) : CodeChange{};
-  const CodeChange* const change = plan.options.retarget ? &retarget : nullptr;
+  const CodeChange retarget = plan.options.display ? change_by(plan.options.display->made.table) : CodeChange{};
+  const CodeChange* const change = plan.options.display ? &retarget : nullptr;
   std::visit(
       [&](auto& picture) {
         using P = std::remove_reference_t<decltype(picture)>;

@@ -210,7 +210,7 @@ Result<void> check_options(const DevelopOptions& o) {
     return fail(ErrorCode::invalid_argument,
                 "float samples are scene-linear: they go with a linear space and --tone none");
   }
-  if (o.retarget && (o.space != OutputSpace::srgb || o.samples == SampleType::f32)) {
+  if (o.display && (o.space != OutputSpace::srgb || o.samples == SampleType::f32)) {
     return fail(ErrorCode::invalid_argument, "pictures for another display are sRGB of 8 or 16 bits");
   }
   return {};

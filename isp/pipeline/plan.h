@@ -12,13 +12,13 @@
 #include "isp/base/result.h"
 #include "isp/base/tone_table.h"
 #include "isp/model/camera_colour.h"
+#include "isp/pipeline/display_target.h"
 #include "isp/pipeline/look.h"
 #include "isp/pipeline/noise_reduction.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/raw_to_rgb.h"
 #include "isp/raw/repair.h"
 #include "isp/render/exposure.h"
-#include "isp/render/retarget_table.h"
 #include "isp/render/tone.h"
 #include "isp/render/white_balance.h"
 
@@ -42,7 +42,7 @@ struct DevelopOptions {
   std::shared_ptr<const DarkFrame> dark_frame;  // set: taken off pixel by pixel in place of `black`
   DenoiseChoice denoise;
   LookChoice look;
-  std::shared_ptr<const RetargetTable> retarget;  // set: sRGB codes are changed by it, for a dimmer display
+  std::shared_ptr<const DisplayTarget> display;  // set: sRGB codes are changed for it
 };
 
 /// Time one step took.

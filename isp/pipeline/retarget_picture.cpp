@@ -5,6 +5,7 @@
 #include <variant>
 #include <vector>
 
+#include "isp/pipeline/display_target.h"
 #include "isp/pipeline/encode_picture.h"
 #include "isp/render/output_space.h"
 #include "isp/render/retarget_rows.h"

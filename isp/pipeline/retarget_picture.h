@@ -8,9 +8,6 @@
 
 namespace lowlux::isp {
 
-/// Mean error [CIEDE2000] a table of colours may have; a larger table is made where one has more.
-inline constexpr double retarget_table_tolerance = 0.5;
-
 /// A picture for another display.
 struct RetargetedPicture {
   Picture picture;        // sRGB codes, or floats of linear sRGB
