@@ -62,19 +62,35 @@ struct NightLookGrid::State {
       : levels(levels_of(width, height)),
         photopic(width, height, levels),
         scotopic(width, height, levels),
+        rod_share(width, height, levels),
+        chroma(width, height, levels),
+        blue(width, height, levels),
         seen(width, height, levels),
         variance(width, height, levels),
-        between(width, height, levels) {
-    for (Plane<float>& plane : part) plane = Plane<float>(width, height);
-    grain = Plane<float>(width, height);
-  }
+        between(width, height, levels),
+        base(width, height),
+        detail(width, height),
+        grain(width, height) {}
 
   void fit(int width, int height) {
-    for (Pyramid* p : {&photopic, &scotopic, &seen, &variance, &between}) p->fit(width, height);
+    for (Pyramid* p : {&photopic, &scotopic, &rod_share, &chroma, &blue, &seen, &variance, &between}) {
+      p->fit(width, height);
+    }
   }
-  PlaneView<float> part_view(int k) {
-    const PlaneView<float> cells = seen[0];
-    return part[k].view().crop(0, 0, cells.width, cells.height);
+  PlaneView<float> part(LookGrid::Part part) {
+    switch (part) {
+      case LookGrid::rod_share:
+        return rod_share[0];
+      case LookGrid::chroma:
+        return chroma[0];
+      case LookGrid::blue:
+        return blue[0];
+      case LookGrid::detail:
+        return detail.view().crop(0, 0, seen[0].width, seen[0].height);
+      case LookGrid::base:
+        break;
+    }
+    return base.view().crop(0, 0, seen[0].width, seen[0].height);
   }
 
   void take_light(const RgbView<const float>& camera, const rows::LightWeights& weights, const NightLook& look,
@@ -90,10 +106,12 @@ struct NightLookGrid::State {
 
   int levels;
   Pyramid photopic, scotopic;  // light, then the field of adaptation [cd/m2]
-  Pyramid seen;                // E of LookGrid
-  Pyramid variance;            // of the blur [px^2]
+  int smooth = 0;              // level on which that field is still smooth
+  Pyramid rod_share, chroma, blue;
+  Pyramid seen;      // E of LookGrid
+  Pyramid variance;  // of the blur [px^2]
   Pyramid between;
-  std::array<Plane<float>, LookGrid::parts> part;
+  Plane<float> base, detail;
   Plane<float> grain;
 };
 
@@ -114,11 +132,13 @@ void NightLookGrid::State::take_light(const RgbView<const float>& camera, const 
   });
 }
 
-// The field of adaptation of each cell: blurred where cells are as large as a half to a whole of the Gaussian.
+// The field of adaptation: blurred where cells are as large as a half to a whole of its Gaussian, and taken from there
+// to cells of half that size, between which it is a line.
 void NightLookGrid::State::adapt(const NightLook& look, Executor& executor) {
   double std_cells = adaptation_field_std_deg * look.pixels_per_degree / LookGrid::cell;
   int level = 0;
   for (; std_cells > 2 && level + 1 < levels; ++level) std_cells /= 2;
+  smooth = std::max(0, level - 1);
   for (Pyramid* field : {&photopic, &scotopic}) {
     field->halve_to(level, executor);
     const PlaneView<float> coarse = (*field)[level];
@@ -130,28 +150,37 @@ void NightLookGrid::State::adapt(const NightLook& look, Executor& executor) {
         light = mean + static_cast<float>(1 - adaptation_share_of_mean) * light;
       }
     });
-    field->interpolate_from(level, executor);
+    field->interpolate(level, smooth, executor);
   }
 }
 
-// What the eye makes of each cell: three parts of the look, E in place of the light, the blur in place of the rods'.
+// What the eye makes of each place, on the smooth level and from there on every cell; then E in place of the light.
 void NightLookGrid::State::see(const NightLook& look, Executor& executor) {
-  const PlaneView<float> e = seen[0], v = variance[0], cones = photopic[0], rods = scotopic[0];
-  const auto part_row = [&](int k, int y) { return part[k].row(y); };
+  const PlaneView<float> cones = photopic[smooth], rods = scotopic[smooth];
   const auto white = static_cast<float>(look.scotopic_ratio_of_white);
-  const auto px2_per_deg2 =
-      static_cast<float>(look.effects.acuity ? look.pixels_per_degree * look.pixels_per_degree : 0);
+  const PlaneView<float> blur_deg2 = between[smooth];
+  for_each_row(executor, cones.height, [&](int y) {
+    rows::eye_row(eye_tables(), white, cones.row(y), rods.row(y), cones.width,
+                  {rod_share[smooth].row(y), chroma[smooth].row(y), blue[smooth].row(y), blur_deg2.row(y)});
+  });
+  const auto everywhere = [&](Pyramid& part, bool wanted, float without) {
+    if (wanted) {
+      part.interpolate(smooth, 0, executor);
+    } else {
+      for_each_row(executor, part[0].height, [&](int y) { std::fill_n(part[0].row(y), part[0].width, without); });
+    }
+  };
+  everywhere(rod_share, look.effects.purkinje, 0);
+  everywhere(chroma, look.effects.chroma, 1);
+  everywhere(blue, look.effects.hue, 0);
+  const PlaneView<float> e = seen[0], s = variance[0], share = rod_share[0];
   for_each_row(executor, e.height, [&](int y) {
-    float* const share = part_row(LookGrid::rod_share, y);
-    float* const blur_deg2 = part_row(LookGrid::base, y);
-    rows::eye_row(eye_tables(), white, cones.row(y), rods.row(y), e.width,
-                  {share, part_row(LookGrid::chroma, y), part_row(LookGrid::blue, y), blur_deg2});
-    if (!look.effects.purkinje) std::fill_n(share, e.width, 0.0f);
-    if (!look.effects.chroma) std::fill_n(part_row(LookGrid::chroma, y), e.width, 1.0f);
-    if (!look.effects.hue) std::fill_n(part_row(LookGrid::blue, y), e.width, 0.0f);
-    for (int x = 0; x < e.width; ++x) {
-      e.row(y)[x] += share[x] * (v.row(y)[x] - e.row(y)[x]);
-      v.row(y)[x] = px2_per_deg2 * blur_deg2[x];
+    for (int x = 0; x < e.width; ++x) e.row(y)[x] += share.row(y)[x] * (s.row(y)[x] - e.row(y)[x]);
+  });
+  const double px_per_deg = look.effects.acuity ? look.pixels_per_degree : 0;
+  for_each_row(executor, blur_deg2.height, [&](int y) {
+    for (int x = 0; x < blur_deg2.width; ++x) {
+      variance[smooth].row(y)[x] = static_cast<float>(px_per_deg * px_per_deg) * blur_deg2.row(y)[x];
     }
   });
 }
@@ -159,7 +188,8 @@ void NightLookGrid::State::see(const NightLook& look, Executor& executor) {
 // detail and base: what is left of the pixels' own light, and what takes its place, blurred as far as each cell asks.
 // Coarser cells stand for wider Gaussians; between two of them variances are met.
 void NightLookGrid::State::soften(Executor& executor) {
-  const float widest = largest_of(variance[0]);
+  const float widest = largest_of(variance[smooth]);
+  variance.interpolate(smooth, 0, executor);
   int last = 0;
   while (last + 1 < levels && widest > cell_variance_px2 * std::exp2(2.0 * last)) ++last;
   seen.halve_to(last, executor);
@@ -175,11 +205,14 @@ void NightLookGrid::State::soften(Executor& executor) {
       }
     });
   }
-  for_each_row(executor, variance[0].height, [&](int y) {
-    for (int x = 0; x < variance[0].width; ++x) {
-      const float share = std::min(1.0f, variance[0].row(y)[x] * static_cast<float>(1 / cell_variance_px2));
-      part[LookGrid::detail].row(y)[x] = 1 - share;
-      part[LookGrid::base].row(y)[x] = share * seen[0].row(y)[x];
+  const PlaneView<float> wanted = variance[0], light = seen[0];
+  for_each_row(executor, light.height, [&](int y) {
+    float* const own = detail.row(y);
+    float* const wide = base.row(y);
+    for (int x = 0; x < light.width; ++x) {
+      const float share = std::min(1.0f, wanted.row(y)[x] * static_cast<float>(1 / cell_variance_px2));
+      own[x] = 1 - share;
+      wide[x] = share * light.row(y)[x];
     }
   });
 }
@@ -215,12 +248,13 @@ void NightLookGrid::State::scatter(const NightLook& look, Executor& executor) {
 
 void NightLookGrid::State::add_veil(Executor& executor) {
   for_each_row(executor, photopic[0].height, [&](int y) {
-    for (int x = 0; x < photopic[0].width; ++x) part[LookGrid::base].row(y)[x] += photopic[0].row(y)[x];
+    for (int x = 0; x < photopic[0].width; ++x) base.row(y)[x] += photopic[0].row(y)[x];
   });
 }
 
 // Normal deviates of as much contrast as is just seen in the field of adaptation.
 void NightLookGrid::State::draw_grain(const NightLook& look, Executor& executor) {
+  photopic.interpolate(smooth, 0, executor);
   const PlaneView<float> field = photopic[0];
   const DrawStream stream{.seed = look.seed, .frame = 0, .purpose = draw_purpose::visual_noise};
   for_each_row(executor, field.height, [&](int y) {
@@ -235,7 +269,7 @@ void NightLookGrid::State::draw_grain(const NightLook& look, Executor& executor)
 
 void NightLookGrid::State::add_grain(Executor& executor) {
   for_each_row(executor, seen[0].height, [&](int y) {
-    for (int x = 0; x < seen[0].width; ++x) part[LookGrid::base].row(y)[x] += grain.row(y)[x];
+    for (int x = 0; x < seen[0].width; ++x) base.row(y)[x] += grain.row(y)[x];
   });
 }
 
@@ -259,10 +293,10 @@ void NightLookGrid::State::bound_noise(const NoiseLimit& limit, Executor& execut
                                                 limit.display_per_unit * std::sqrt(noise.row(y)[x]), limit.lightness);
     }
   });
-  between.interpolate_from(level, executor);
+  between.interpolate(level, 0, executor);
   for_each_row(executor, e.height, [&](int y) {
-    for (const int k : {LookGrid::base, LookGrid::detail, LookGrid::chroma}) {
-      for (int x = 0; x < e.width; ++x) part[k].row(y)[x] *= e.row(y)[x];
+    for (float* const part_row : {base.row(y), detail.row(y), chroma[0].row(y)}) {
+      for (int x = 0; x < e.width; ++x) part_row[x] *= e.row(y)[x];
     }
   });
 }
@@ -274,7 +308,7 @@ NightLookGrid::~NightLookGrid() = default;
 LookGrid NightLookGrid::make(const RgbView<const float>& camera, const std::array<float, 9>& matrix, float clip,
                              const NightLook& look, const std::optional<NoiseLimit>& limit, Executor& executor) {
   State& s = *state_;
-  assert(camera[0].width <= s.part[0].width() && camera[0].height <= s.part[0].height());
+  assert(camera[0].width <= s.base.width() && camera[0].height <= s.base.height());
   s.fit(camera[0].width, camera[0].height);
   s.take_light(camera, weights_of(look, matrix, clip), look, executor);
   s.adapt(look, executor);
@@ -286,7 +320,7 @@ LookGrid NightLookGrid::make(const RgbView<const float>& camera, const std::arra
   if (look.effects.visual_noise) s.add_grain(executor);
   if (limit) s.bound_noise(*limit, executor);
   LookGrid out{{}, look.luminance, look.rods, look.tint, look.dark};
-  for (int k = 0; k < LookGrid::parts; ++k) out.part[k] = s.part_view(k);
+  for (int k = 0; k < LookGrid::parts; ++k) out.part[k] = s.part(static_cast<LookGrid::Part>(k));
   return out;
 }
 

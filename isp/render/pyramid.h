@@ -27,8 +27,9 @@ class Pyramid {
   void halve_to(int last, Executor& executor) {
     for (int k = 0; k < last; ++k) halve((*this)[k], (*this)[k + 1], executor);
   }
-  void interpolate_from(int first, Executor& executor) {
-    for (int k = first; k > 0; --k) interpolate_twice((*this)[k], (*this)[k - 1], executor);
+  /// From a coarser level down to a finer one.
+  void interpolate(int from, int to, Executor& executor) {
+    for (int k = from; k > to; --k) interpolate_twice((*this)[k], (*this)[k - 1], executor);
   }
 
  private:

@@ -9,6 +9,7 @@
 
 #include "isp/model/night_eye.h"
 #include "isp/pipeline/develop.h"
+#include "isp/render/output_space.h"
 #include "tests/pipeline/night_frames.h"
 
 namespace lowlux::isp {

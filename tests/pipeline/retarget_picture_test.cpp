@@ -1,4 +1,5 @@
 #include "isp/pipeline/retarget_picture.h"
+#include "isp/pipeline/display_target.h"
 
 #include <gtest/gtest.h>
 

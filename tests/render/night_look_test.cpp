@@ -91,8 +91,9 @@ TEST(NightLook, EqualsTheReference) {
     for (int k = 0; k < LookGrid::parts; ++k) {
       for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
-          // Tables of 256 luminances and 32 S/P; the base is in units of light, of which there is up to 1.
-          ASSERT_NEAR(grid.part[k].at(x, y), expected[k].clamped(x, y), k == LookGrid::detail ? 0.012 : 0.005)
+          // Tables of 256 luminances and 32 S/P, and states that are lines between cells where the field is smooth.
+          // Detail is 0..1, and so steep where blur sets in that such a line misses it by more.
+          ASSERT_NEAR(grid.part[k].at(x, y), expected[k].clamped(x, y), k == LookGrid::detail ? 0.03 : 0.005)
               << k << " at " << x << "," << y << " of " << width;
         }
       }
