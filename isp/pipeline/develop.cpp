@@ -15,7 +15,7 @@ Result<Developed> develop(const RawFrame& frame, const DevelopOptions& options, 
   out.picture = make_picture(out.plan);
   Pipeline pipeline(executor);
   pipeline.render(frame, out.plan, out.picture);
-  out.noise_maps = pipeline.take_noise_maps();
+  if (options.denoise.maps) out.noise_maps = pipeline.take_noise_maps();
   clock.lap("render");
   return out;
 }

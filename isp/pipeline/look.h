@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "isp/base/frame.h"
 #include "isp/base/result.h"
 #include "isp/model/night_eye.h"
 #include "isp/render/night_look.h"
@@ -46,7 +47,7 @@ struct LookPlan {
   double dimming_ev = 0;
   std::vector<LookEffect> effects;
   std::optional<double> noise_limit;
-  std::optional<double> electrons_at_white;  // of a pixel, mean; absent: the noise is not known, and not limited
+  std::optional<NoiseProfile> noise;  // of the raw; absent: not known
 };
 
 /// "purkinje", "chroma", "hue", "acuity", "glare", "visual-noise", in this order.

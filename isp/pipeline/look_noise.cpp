@@ -18,13 +18,15 @@ std::array<float, 3> weights_of(const DevelopPlan& plan) {
   return weights;
 }
 
-float white_e(const DevelopPlan& plan) { return static_cast<float>(*plan.look->electrons_at_white); }
+float mean_of(const PerSite<double>& sites) {
+  return static_cast<float>(0.25 * (sites[0] + sites[1] + sites[2] + sites[3]));
+}
 
 // Luma that is left noisy, over the cells of 2 x 2 that lie in those of the grid.
 void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const float>& residual, PlaneView<float> out,
              Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
-  const float unit = (weights[0] + weights[1] + weights[2]) / white_e(plan);
+  const float unit = (weights[0] + weights[1] + weights[2]) / mean_of(*plan.electrons_at_white);
   const int cells = plan.options.half ? 4 : 2;  // of the map along a side of the grid's
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
@@ -40,20 +42,19 @@ void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const fl
   });
 }
 
-// Var = signal + variance without light, of each channel, as if each pixel had its own three.
+// The raw's variance at the fraction x of white, scale x + offset, of each channel, as if each pixel had its own three.
 void of_model(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
-  const float full_e = white_e(plan);
+  const NoiseProfile& noise = *plan.look->noise;
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       for (int x = 0; x < out.width; ++x) {
         float sum = 0;
         for (int c = 0; c < 3; ++c) {
-          const float e_per_unit = full_e / plan.white_gain[c];
-          const float variance_e2 = std::max(quarter[c].row(y)[x], 0.0f) * e_per_unit +
-                                    static_cast<float>(plan.noise_reduction.noise.variance_e2[c]);
-          const float scale = weights[c] / e_per_unit;
-          sum += scale * scale * variance_e2;
+          const float gain = plan.white_gain[c];
+          const float fraction = std::max(quarter[c].row(y)[x], 0.0f) / gain;
+          const float variance = static_cast<float>(noise.scale[c]) * fraction + static_cast<float>(noise.offset[c]);
+          sum += weights[c] * weights[c] * gain * gain * variance;
         }
         out.row(y)[x] = sum;
       }

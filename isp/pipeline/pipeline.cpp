@@ -43,7 +43,7 @@ void fit(Plane<T>& plane, int width, int height) {
 }
 
 bool bounds_noise(const DevelopPlan& plan) {
-  return plan.look && plan.look->noise_limit && plan.look->electrons_at_white;
+  return plan.look && plan.look->noise_limit && (plan.look->noise || plan.noise_reduction.level);
 }
 
 bool keeps_maps(const DevelopPlan& plan) { return plan.options.denoise.maps || bounds_noise(plan); }

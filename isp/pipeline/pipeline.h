@@ -21,7 +21,8 @@ class Pipeline {
   /// `out` holds a picture of plan.width x plan.height of the planned sample type: see make_picture().
   void render(const RawFrame& frame, const DevelopPlan& plan, Picture& out);
 
-  /// Of the active area of the frame rendered last; empty unless its noise was reduced and maps were asked for.
+  /// Of the active area of the frame rendered last; empty unless its noise was reduced and maps were asked for or a
+  /// look needed them.
   NoiseMaps take_noise_maps() { return std::move(noise_maps_); }
 
  private:

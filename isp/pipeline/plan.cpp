@@ -182,16 +182,6 @@ bool goes_from_codes(const RawFrame& frame, const DevelopPlan& plan) {
          std::none_of(frame.corrections.gain_maps.begin(), frame.corrections.gain_maps.end(), has_effect);
 }
 
-// For the look's limit.
-void know_noise(DevelopPlan& plan) {
-  if (plan.electrons_at_white && plan.noise_reduction.snr) {
-    const PerSite<double>& sites = *plan.electrons_at_white;
-    plan.look->electrons_at_white = 0.25 * (sites[0] + sites[1] + sites[2] + sites[3]);
-  } else {
-    plan.warnings.emplace_back("the noise of the frame is not known, so it is not held to a limit");
-  }
-}
-
 void set_size(DevelopPlan& plan, const Rect& crop) {
   plan.width = plan.options.half ? crop.width / 2 : crop.width;
   plan.height = plan.options.half ? crop.height / 2 : crop.height;
@@ -252,7 +242,9 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   Result<NoiseReduction> noise = plan_noise(frame, thumbnail, plan, executor);
   if (!noise) return tl::make_unexpected(std::move(noise.error()));
   plan.noise_reduction = *std::move(noise);
-  if (plan.look && plan.look->noise_limit) know_noise(plan);
+  if (plan.look && plan.look->noise_limit && !plan.look->noise && !plan.noise_reduction.level) {
+    plan.warnings.emplace_back("the noise of the frame is not known, so it is not held to a limit");
+  }
   plan.from_codes = goes_from_codes(frame, plan);
   if (plan.from_codes || frame.raw.layout != SensorLayout::bayer) plan.electrons_at_white.reset();
   clock.lap("noise model");

@@ -134,6 +134,7 @@ Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPl
   if (choice.look == Look::camera && !choice.noise_limit) return {};
   LookPlan look;
   look.noise_limit = choice.noise_limit;
+  look.noise = frame.noise;
   NightLook& eye = look.look;
   eye.effects = {false, false, false, false, false, false};
   eye.scotopic_ratio_of_white = ratio_of_white(plan.white);

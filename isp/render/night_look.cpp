@@ -273,9 +273,10 @@ void NightLookGrid::State::add_grain(Executor& executor) {
   });
 }
 
-// Gain, found on cells of 16 pixels, so that it cannot follow the noise.
+// Gain, found on cells of 64 pixels: it rises with the square of the light, and so would lift what noise of it is left
+// in smaller ones.
 void NightLookGrid::State::bound_noise(const NoiseLimit& limit, Executor& executor) {
-  const int level = std::min(2, levels - 1);
+  const int level = std::min(4, levels - 1);
   const PlaneView<float> e = between[0], v = variance[0];
   for_each_row(executor, e.height, [&](int y) {
     std::copy_n(seen[0].row(y), e.width, e.row(y));
