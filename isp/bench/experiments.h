@@ -13,5 +13,6 @@ Result<Outcome> run_dark_desaturation(const RunOptions& options);
 Result<Outcome> run_snr_sensitivity(const RunOptions& options);
 Result<Outcome> run_mesopic_tracks(const RunOptions& options);
 Result<Outcome> run_mesopic_fixed_gamma(const RunOptions& options);
+Result<Outcome> run_retargeting(const RunOptions& options);
 
 }  // namespace lowlux::isp

@@ -20,6 +20,7 @@ constexpr std::array registry{
                run_mesopic_tracks},
     Experiment{"mesopic-fixed-gamma", "The spectral model without adaptation, gamma = 2 (Table 5-2)",
                run_mesopic_fixed_gamma},
+    Experiment{"retargeting", "Pictures made for dim displays (section 5.3, Eq. 5.13 to 5.16)", run_retargeting, true},
 };
 
 }  // namespace
