@@ -16,6 +16,11 @@ constexpr std::array registry{
     Experiment{"sensor-scenarios", "Noise of the image sensor (section 4, scenarios I to III)", run_sensor_scenarios},
     Experiment{"dark-desaturation", "Dark current desaturates (Eq. 4.16 to 4.24)", run_dark_desaturation},
     Experiment{"snr-sensitivity", "What the signal-to-noise ratio depends on (Eq. 4.12, 4.13)", run_snr_sensitivity},
+    Experiment{"mesopic-tracks", "Colours under falling light by all models (section 5.2, Table 5-1)",
+               run_mesopic_tracks},
+    Experiment{"mesopic-fixed-gamma", "The spectral model without adaptation, gamma = 2 (Table 5-2)",
+               run_mesopic_fixed_gamma},
+    Experiment{"retargeting", "Pictures made for dim displays (section 5.3, Eq. 5.13 to 5.16)", run_retargeting, true},
 };
 
 }  // namespace

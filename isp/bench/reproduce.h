@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "isp/base/result.h"
+#include "isp/bench/gamut_hull.h"
 #include "isp/output/report.h"
 
 namespace lowlux::isp {
@@ -33,14 +34,19 @@ struct Outcome {
 
 struct RunOptions {
   std::uint64_t seed = 1;
-  bool quick = false;  // fewer samples: the same findings with wider confidence intervals
+  bool quick = false;                     // fewer samples: the same findings with wider confidence intervals
+  std::string pictures_folder;            // that of testdata/pictures, for the experiments that look at pictures
+  MeasureHulls* measure_hulls = nullptr;  // for their gamut ratios; absent: those are no numbers
+  std::string why_no_hulls;               // then
 };
 
-/// A published experiment: its result depends on the options only. Errors: what it computes cannot be computed.
+/// A published experiment: its result depends on the options only. Errors: what it computes cannot be computed, the
+/// pictures it looks at are not there.
 struct Experiment {
   std::string_view id;
   std::string_view title;
   Result<Outcome> (*run)(const RunOptions& options);
+  bool looks_at_pictures = false;  // those of RunOptions::pictures_folder
 };
 
 /// All of them, in the order of the thesis.

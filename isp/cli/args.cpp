@@ -271,6 +271,9 @@ Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words) {
   app.add_option("-o,--output", args.output,
                  "folder, made if need be, for findings.csv, the plots' data and report.html")
       ->type_name("DIR");
+  app.add_option("--pictures-folder", args.pictures_folder,
+                 "where the pictures of `retargeting` are (default: testdata/pictures of the source tree)")
+      ->type_name("DIR");
   app.add_flag("--quick", args.quick, "fewer samples: wider confidence intervals");
   app.add_option("--seed", args.seed, "of the random numbers (default 1)")
       ->check(CLI::NonNegativeNumber)

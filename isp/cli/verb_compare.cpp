@@ -13,21 +13,12 @@
 #include "isp/cli/compare_args.h"
 #include "isp/cli/compare_report.h"
 #include "isp/cli/exit_code.h"
-#include "isp/cli/module.h"
+#include "isp/cli/hull_module.h"
 #include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
 
 namespace lowlux::cli {
 namespace {
-
-Result<isp::MeasureHulls*> load_hulls() {
-  const auto found = load_module({.file = "liblowlux_hull.so",
-                                  .function = isp::measure_hulls_name,
-                                  .purpose = "the convex gamut ratio",
-                                  .needs = "OpenCV's imgproc module (Debian: libopencv-imgproc406)"});
-  if (!found) return tl::make_unexpected(found.error());
-  return reinterpret_cast<isp::MeasureHulls*>(*found);
-}
 
 Result<capture::ScenePicture> read(const std::string& file, Executor& executor, CompareOutcome& out) {
   auto picture = capture::read_picture(file, executor);

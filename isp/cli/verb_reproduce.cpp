@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -8,6 +9,7 @@
 #include "isp/cli/args.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/findings.h"
+#include "isp/cli/hull_module.h"
 #include "isp/cli/progress.h"
 #include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
@@ -37,18 +39,34 @@ Result<std::vector<isp::Experiment>> chosen(const std::vector<std::string>& ids)
   return out;
 }
 
+isp::RunOptions options_of(const std::vector<isp::Experiment>& experiments, const ReproduceArgs& args) {
+  isp::RunOptions options{.seed = args.seed, .quick = args.quick};
+  options.pictures_folder = args.pictures_folder.empty() ? LOWLUX_PICTURES : args.pictures_folder;
+  if (!std::ranges::any_of(experiments, &isp::Experiment::looks_at_pictures)) return options;
+  if (const auto hulls = load_hulls()) {
+    options.measure_hulls = *hulls;
+  } else {
+    options.why_no_hulls = hulls.error().message;
+  }
+  return options;
+}
+
 // Experiments whose computation fails are told of at once; the others go on.
 std::vector<Done> run_each(const std::vector<isp::Experiment>& experiments, const ReproduceArgs& args) {
   std::vector<Done> out;
   Progress progress(static_cast<int>(experiments.size()), true);
+  const isp::RunOptions options = options_of(experiments, args);
   for (const isp::Experiment& experiment : experiments) {
     const std::string id(experiment.id);
     progress.advance(0, id);
-    auto outcome = experiment.run({args.seed, args.quick});
+    auto outcome = experiment.run(options);
     if (outcome) {
       out.push_back({experiment, *std::move(outcome)});
     } else {
-      progress.print([&] { fmt::print(stderr, "{}\n", error_line(id, outcome.error())); });
+      progress.print([&] {
+        const Error& error = outcome.error();
+        fmt::print(stderr, "{}\n", error_line(error.where.empty() ? id : error.where, error));
+      });
     }
     progress.advance(1, id);
   }

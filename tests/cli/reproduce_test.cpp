@@ -21,9 +21,10 @@ test::ProcessResult reproduce(std::vector<std::string> args) {
 TEST(Reproduce, ListNamesTheExperimentsAndRunsNone) {
   const auto list = reproduce({"--list"});
   EXPECT_EQ(list.exit_code, 0);
-  EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), 6);
-  for (const char* id : {"few-photons", "chromaticity-clouds", "frequency-of-seeing", "sensor-scenarios",
-                         "dark-desaturation", "snr-sensitivity"}) {
+  EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), 9);
+  for (const char* id :
+       {"few-photons", "chromaticity-clouds", "frequency-of-seeing", "sensor-scenarios", "dark-desaturation",
+        "snr-sensitivity", "mesopic-tracks", "mesopic-fixed-gamma", "retargeting"}) {
     EXPECT_NE(list.out.find(id), std::string::npos);
   }
 }
@@ -107,6 +108,16 @@ TEST(Reproduce, AFolderThatCannotBeMadeIsAFailureInOneLine) {
   const auto result = reproduce({"snr-sensitivity", "--quick", "-o", scratch.file("file/sub")});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+}
+
+TEST(Reproduce, PicturesThatAreNotThereAreAFailureInOneLineAndTheOthersRun) {
+  const test::ScratchDirectory scratch;
+  const std::string none = scratch.file("none");
+  const auto result = reproduce({"retargeting", "mesopic-fixed-gamma", "--quick", "--pictures-folder", none});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_NE(result.err.find(none), std::string::npos) << result.err;
+  EXPECT_NE(result.out.find("mesopic-fixed-gamma/less-icam06"), std::string::npos) << result.out;
 }
 
 TEST(Reproduce, WrongCommandLinesExitWithTwoAndOfferNearNames) {
