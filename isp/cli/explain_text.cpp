@@ -6,6 +6,7 @@
 #include "isp/cli/lines.h"
 #include "isp/cli/report.h"
 #include "isp/cli/source_names.h"
+#include "isp/model/appearance/shin_table.h"
 
 namespace lowlux::cli {
 namespace {
@@ -24,15 +25,26 @@ void add_noise(Lines& out, const isp::NoiseReduction& noise) {
   }
 }
 
-void add_look(Lines& out, const isp::LookPlan& look) {
-  if (look.eye) {
-    out.add("look", fmt::format("eye; scene {:.3g} cd/m2 ({}), adaptation m {:.2f}, {:+.2f} EV of darkness kept",
+std::string look_name(const isp::DevelopPlan& plan) {
+  return plan.look->kind == isp::Look::model ? plan.options.look.model : "eye";
+}
+
+void add_look(Lines& out, const isp::LookPlan& look, const std::string& name) {
+  if (look.kind != isp::Look::camera) {
+    out.add("look", fmt::format("{}; scene {:.3g} cd/m2 ({}), adaptation m {:.2f}, {:+.2f} EV of darkness kept", name,
                                 look.mean_cd_m2, look.luminance_rule, look.state.m, look.dimming_ev));
     for (const isp::LookEffect& effect : look.effects) {
       const std::string size = std::isfinite(effect.size) ? fmt::format("up to {:.2g} CIEDE2000", effect.size)
                                                           : std::string("a matter of taste");
       out.add("", fmt::format("{} {}: {}", effect.name, effect.used ? "shown" : "left out", size));
     }
+  }
+  if (look.table) {
+    out.add("", fmt::format(
+                    "table of {0} x {0} chromaticities, {1} levels: off by {2:.2f} CIEDE2000 in the mean, {3:.2f} at "
+                    "most",
+                    look.table->cells, look.table->levels, look.table->error.mean, look.table->error.largest));
+    if (name == "shin") out.add("", fmt::format("coefficients = {}", isp::shin_substitute_name));
   }
   if (look.noise_limit) out.add("noise limit", fmt::format("{:.3g} CIE L*", *look.noise_limit));
 }
@@ -49,7 +61,7 @@ std::string explain_text(const isp::DevelopPlan& plan) {
   out.add("white", plan.white ? fmt::format("{}, {:.0f} K", plan.white_balance_rule, plan.white->cct_k)
                               : std::string(plan.white_balance_rule));
   out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.exposure_ev, plan.exposure_rule));
-  if (plan.look) add_look(out, *plan.look);
+  if (plan.look) add_look(out, *plan.look, look_name(plan));
   if (plan.options.display) {
     const isp::DisplayTarget& display = *plan.options.display;
     out.add("display", fmt::format("{:g} to {:g} cd/m2, coefficients {}", display.source_cd_m2, display.display_cd_m2,

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include "isp/cli/option_values.h"
+#include "isp/model/appearance/appearance_model.h"
 
 namespace lowlux::cli {
 namespace {
@@ -98,12 +99,25 @@ void add_effects(CLI::App& app, LookArgs& args) {
 }  // namespace
 
 void add_look(CLI::App& app, LookArgs& args) {
-  add_choice<isp::Look>(
-      app, "--look", {{"camera", isp::Look::camera}, {"eye", isp::Look::eye}},
-      [&args](isp::Look look) { args.choice.look = look; },
-      "as a camera in daylight would have it (default), or as an eye saw it that stood there: reds darken, colours "
-      "fade, "
-      "detail softens");
+  std::string models;
+  for (const isp::AppearanceModel& model : isp::appearance_models()) {
+    models += (models.empty() ? "" : ", ") + std::string(model.name);
+  }
+  add_text(app, "--look", "camera|eye|MODEL",
+           "as a camera in daylight would have it (default), as an eye saw it that stood there (reds darken, colours "
+           "fade, detail softens), or its colours by one published model (" +
+               models + ")",
+           [&args, models](const std::string& text) -> Wrong {
+             args.choice.model.clear();
+             if (text == "camera" || text == "eye") {
+               args.choice.look = text == "eye" ? isp::Look::eye : isp::Look::camera;
+               return std::nullopt;
+             }
+             if (!isp::appearance_model_named(text)) return "is none of camera, eye, " + models;
+             args.choice.look = isp::Look::model;
+             args.choice.model = text;
+             return std::nullopt;
+           });
   add_scene(app, args);
   add_effects(app, args);
   add_text(app, "--noise-limit", "off|LIGHTNESS",
@@ -131,7 +145,9 @@ void add_look(CLI::App& app, LookArgs& args) {
 
 std::optional<std::string> complete_look(const LookArgs& args, isp::LookChoice& choice) {
   choice = args.choice;
-  if (choice.look == isp::Look::camera && !args.eye_option.empty()) {
+  const bool only_eye =
+      args.eye_option == "--effects" || args.eye_option == "--tolerance" || args.eye_option == "--field-of-view";
+  if (!args.eye_option.empty() && (choice.look == isp::Look::camera || (choice.look == isp::Look::model && only_eye))) {
     return args.eye_option + " goes with --look eye";
   }
   if (choice.look == isp::Look::eye && !args.noise_limit_given) choice.noise_limit = eye_noise_limit;

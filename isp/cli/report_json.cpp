@@ -5,6 +5,7 @@
 #include "calib/profile_use.h"
 #include "isp/cli/report.h"
 #include "isp/cli/source_names.h"
+#include "isp/model/appearance/shin_table.h"
 #include "isp/model/camera_colour.h"
 #include "isp/model/scene_luminance.h"
 #include "isp/raw/masked_black.h"
@@ -82,9 +83,18 @@ Json noise_json(const isp::NoiseReduction& noise) {
   return json;
 }
 
-Json look_json(const isp::LookPlan& look) {
-  Json json{{"eye", look.eye}, {"noise_limit_lightness", optional_json(look.noise_limit)}};
-  if (!look.eye) return json;
+Json look_json(const isp::DevelopPlan& plan) {
+  if (!plan.look) return nullptr;
+  const isp::LookPlan& look = *plan.look;
+  const std::string& model = plan.options.look.model;
+  const std::string name = look.kind == isp::Look::model ? model : look.kind == isp::Look::eye ? "eye" : "camera";
+  Json json{{"name", name}, {"noise_limit_lightness", optional_json(look.noise_limit)}};
+  if (look.kind == isp::Look::camera) return json;
+  if (look.table) {
+    json["table_mean_ciede2000"] = look.table->error.mean;
+    json["table_max_ciede2000"] = look.table->error.largest;
+    if (model == "shin") json["coefficients"] = isp::shin_substitute_name;
+  }
   json["scene_luminance_cd_m2"] = look.mean_cd_m2;
   json["luminance_rule"] = look.luminance_rule;
   json["adaptation_m"] = look.state.m;
@@ -145,7 +155,7 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"exposure", {{"ev", plan.exposure_ev}, {"rule", plan.exposure_rule}}},
             {"defects_repaired", plan.defects.size()},
             {"denoise", noise_json(plan.noise_reduction)},
-            {"look", plan.look ? look_json(*plan.look) : Json(nullptr)},
+            {"look", look_json(plan)},
             {"warnings", plan.warnings}};
   if (plan.options.display) {
     const isp::DisplayTarget& display = *plan.options.display;

@@ -9,16 +9,19 @@
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 #include "isp/model/night_eye.h"
+#include "isp/render/colour_table.h"
 #include "isp/render/night_look.h"
 
 namespace lowlux::isp {
 
-/// How the scene is to look: as a camera in daylight has it, or as an eye that stood there.
-enum class Look : std::uint8_t { camera, eye };
+/// How the scene is to look: as a camera in daylight has it, as an eye saw it that stood there, or as one published
+/// model of appearance has it.
+enum class Look : std::uint8_t { camera, eye, model };
 
 /// What is asked for.
 struct LookChoice {
   Look look = Look::camera;
+  std::string model;                            // for Look::model: a name of appearance_models()
   std::optional<double> scene_luminance_cd_m2;  // mean over the picture; absent: from how it was exposed
   /// Which effects: those that are seen, all, or these.
   enum class Which : std::uint8_t { automatic, all, listed } which = Which::automatic;
@@ -39,8 +42,10 @@ struct LookEffect {
 
 /// What was decided.
 struct LookPlan {
+  Look kind = Look::camera;  // then only noise is bounded
   NightLook look;
-  bool eye = false;  // false: only noise is bounded
+  std::optional<ColourTable> table;  // of a model, on light after exposure, white 1
+  double white_cd_m2 = 0;            // luminance that light of 1 had in the scene, before dimming
   double mean_cd_m2 = 0;
   std::string_view luminance_rule;  // "given" or "exposure"
   MesopicState state;               // of an eye adapted to the mean

@@ -1,6 +1,7 @@
 #include "isp/pipeline/pipeline.h"
 
 #include <algorithm>
+#include <cmath>
 #include <type_traits>
 #include <utility>
 
@@ -46,7 +47,19 @@ bool bounds_noise(const DevelopPlan& plan) {
   return plan.look && plan.look->noise_limit && (plan.look->noise || plan.noise_reduction.level);
 }
 
+bool needs_grid(const DevelopPlan& plan) { return plan.look && (plan.look->kind == Look::eye || bounds_noise(plan)); }
+
 bool keeps_maps(const DevelopPlan& plan) { return plan.options.denoise.maps || bounds_noise(plan); }
+
+// What is left to do with planes that are already light in the picture's primaries.
+RgbTransform of_modelled(const DevelopPlan& plan, const LookGrid* look) {
+  RgbTransform out;
+  out.luminance = plan.transform.luminance;
+  out.clip = INFINITY;
+  out.move_into_gamut = plan.transform.move_into_gamut;
+  out.look = look;
+  return out;
+}
 
 CodeChange change_by(const RetargetTable& table) {
   return {[](const void* context, const std::uint16_t* rgb, int width, std::uint8_t* out) {
@@ -177,10 +190,31 @@ void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& o
       frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);
   RgbTransform transform = plan.transform;
   LookGrid look;
-  if (plan.look) {
+  if (needs_grid(plan)) {
     look = look_grid(in, frame, plan);
     transform.look = &look;
   }
+  if (plan.look && plan.look->table) {
+    encode(as_modelled(in, plan), of_modelled(plan, transform.look), plan, out);
+  } else {
+    encode(in, transform, plan, out);
+  }
+}
+
+// Light after exposure, white 1, through the model's table; in planes of the picture's own primaries.
+CameraPlanes Pipeline::as_modelled(const RgbInput& in, const DevelopPlan& plan) {
+  for (Plane<float>& plane : modelled_) fit(plane, plan.width, plan.height);
+  const RgbView<float> planes{modelled_[0].view(), modelled_[1].view(), modelled_[2].view()};
+  const auto limit = static_cast<float>(tone_limit(plan.options.tone, plan.exposure_ev));
+  RgbTransform to_light = plan.transform;
+  for (float& coefficient : to_light.matrix) coefficient *= limit;
+  to_light.move_into_gamut = false;
+  kernel_->linear(in, to_light, planes, executor_);
+  apply_colour_table(*plan.look->table, {planes[0], planes[1], planes[2]}, planes, executor_);
+  return {{planes[0], planes[1], planes[2]}, {1 / limit, 1 / limit, 1 / limit}};
+}
+
+void Pipeline::encode(const RgbInput& in, const RgbTransform& transform, const DevelopPlan& plan, Picture& out) {
   const CodeChange retarget = plan.options.display ? change_by(plan.options.display->made.table) : CodeChange{};
   const CodeChange* const change = plan.options.display ? &retarget : nullptr;
   std::visit(

@@ -30,6 +30,8 @@ class Pipeline {
   RgbInput prepare_bayer(const RawFrame& frame, const DevelopPlan& plan);
   RgbInput prepare_planes(const RawFrame& frame, const DevelopPlan& plan);
   LookGrid look_grid(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan);
+  CameraPlanes as_modelled(const RgbInput& in, const DevelopPlan& plan);
+  void encode(const RgbInput& in, const RgbTransform& transform, const DevelopPlan& plan, Picture& out);
   SignalElectrons signal_electrons(const RawFrame& frame, const DevelopPlan& plan);
   PerSite<float> float_mosaic(const RawFrame& frame, const DevelopPlan& plan);
 
@@ -45,7 +47,8 @@ class Pipeline {
   int look_height_ = 0;
   std::array<Plane<float>, 3> quarter_;  // for the look: means of 4 x 4 pixels
   Plane<float> luminance_noise_;
-  std::array<Plane<float>, 3> planes_;  // camera RGB of frames that need no demosaicing
+  std::array<Plane<float>, 3> modelled_;  // light, where a model of appearance changes it
+  std::array<Plane<float>, 3> planes_;    // camera RGB of frames that need no demosaicing
   std::array<Plane<float>, 3> half_planes_;
 };
 

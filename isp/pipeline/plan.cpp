@@ -171,7 +171,7 @@ Result<void> decide_rendering(const RawFrame& frame, const Thumbnail& thumbnail,
   decide_exposure(plan, blocks, thumbnail.black_noise_std * gain);
   if (auto look = plan_look(frame, {blocks, thumbnail.black_noise_std * gain}, plan); !look) return look;
   set_transform(plan, *balanced, luminance);
-  return {};
+  return plan_model(plan);
 }
 
 // Nothing has to be repaired, multiplied, denoised, or taken off pixel by pixel.

@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "isp/model/appearance/appearance_model.h"
+#include "isp/model/appearance/entropy_model.h"
 #include "isp/model/night_eye.h"
 #include "isp/model/scene_luminance.h"
 #include "isp/render/output_space.h"
@@ -19,9 +21,10 @@ constexpr double least_dark = 1e-5;   // of LookGrid, in the pixels' unit
 
 Result<void> check(const LookChoice& o, OutputSpace space) {
   const auto wrong = [](const std::string& message) { return fail(ErrorCode::invalid_argument, message); };
-  if ((o.look == Look::eye || o.noise_limit) && (space == OutputSpace::camera || space == OutputSpace::xyz)) {
+  if ((o.look != Look::camera || o.noise_limit) && (space == OutputSpace::camera || space == OutputSpace::xyz)) {
     return wrong(
-        "the look of the eye and the limit of noise need a space with red, green and blue: srgb, p3, rec2020, "
+        "looks other than the camera's and the limit of noise need a space with red, green and blue: srgb, p3, "
+        "rec2020, "
         "linear-srgb or "
         "linear-rec2020");
   }
@@ -114,16 +117,32 @@ void decide_effects(const LookChoice& choice, const NightEye& darkest, LookPlan&
   }
 }
 
+// The state of the eye, what it calls for, and how much darker the picture gets.
 void decide_eye(const FrameLight& light, double white_cd_m2, DevelopPlan& plan, LookPlan& look) {
   const LookChoice& choice = plan.options.look;
-  NightLook& eye = look.look;
-  look.eye = true;
-  const LuminancePair mean{look.mean_cd_m2, look.mean_cd_m2 * eye.scotopic_ratio_of_white};
-  look.state = mesopic_state(mean);
-  decide_effects(choice, night_eye(darkest_field(light.block_luminance, white_cd_m2, look)), look);
+  const double ratio = look.look.scotopic_ratio_of_white;
+  look.state = mesopic_state({look.mean_cd_m2, look.mean_cd_m2 * ratio});
+  look.white_cd_m2 = white_cd_m2 / std::exp2(plan.exposure_ev);
+  if (choice.look == Look::eye) {
+    decide_effects(choice, night_eye(darkest_field(light.block_luminance, white_cd_m2, look)), look);
+  }
   if (plan.options.exposure_ev) return;
   look.dimming_ev = choice.dimming * apparent_dimming_ev(look.state.luminance_cd_m2);
   plan.exposure_ev += look.dimming_ev;
+}
+
+// Covariance of what cones see of the noise of a pixel of mid-grey, up to a factor.
+Matrix3 noise_of_cones(const NoiseProfile& noise, const DevelopPlan& plan, const Matrix3& rgb_to_xyz) {
+  ChannelNoise channels;
+  Matrix3 balanced_to_rgb{};
+  for (int c = 0; c < 3; ++c) {
+    const double gain = plan.white_gain[c];
+    channels.variance_e2[c] = noise.scale[c] * 0.18 / std::exp2(plan.exposure_ev) / gain + noise.offset[c];
+    channels.rgb_per_e[c] = gain;
+    for (int j = 0; j < 3; ++j) balanced_to_rgb[j][c] = plan.transform.matrix[3 * j + c];
+  }
+  channels.camera_to_xyz = rgb_to_xyz * balanced_to_rgb;
+  return noise_covariance_of_cones(channels);
 }
 
 }  // namespace
@@ -133,6 +152,7 @@ Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPl
   if (auto checked = check(choice, plan.options.space); !checked) return checked;
   if (choice.look == Look::camera && !choice.noise_limit) return {};
   LookPlan look;
+  look.kind = choice.look;
   look.noise_limit = choice.noise_limit;
   look.noise = frame.noise;
   NightLook& eye = look.look;
@@ -140,7 +160,7 @@ Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPl
   eye.scotopic_ratio_of_white = ratio_of_white(plan.white);
   eye.pixels_per_degree = std::max(plan.width, plan.height) / choice.field_of_view_deg;
   double white_cd_m2 = 100;
-  if (choice.look == Look::eye) {
+  if (choice.look != Look::camera) {
     const Result<double> found =
         white_level_cd_m2(frame, std::max(mean_of(light.block_luminance), least_mean), look, choice);
     if (!found) return tl::make_unexpected(found.error());
@@ -152,6 +172,26 @@ Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPl
   eye.dark = static_cast<float>(std::clamp(light.black_noise_std * units, least_dark, 1.0));
   set_primaries(plan.options.space, eye);
   plan.look = std::move(look);
+  return {};
+}
+
+Result<void> plan_model(DevelopPlan& plan) {
+  if (!plan.look || plan.look->kind != Look::model) return {};
+  LookPlan& look = *plan.look;
+  const Result<AppearanceModel> model = appearance_model_named(plan.options.look.model);
+  if (!model) return tl::make_unexpected(model.error());
+  const Matrix3 rgb_to_xyz = *inverse(*xyz_to_output(plan.options.space));
+  ViewingConditions scene{.white_cd_m2 = look.white_cd_m2};
+  scene.adaptation_cd_m2 = look.mean_cd_m2;
+  scene.scotopic_ratio = look.look.scotopic_ratio_of_white;
+  if (plan.white) scene.colour_temperature_k = plan.white->cct_k;
+  if (look.noise) scene.noise_covariance = noise_of_cones(*look.noise, plan, rgb_to_xyz);
+  const Result<ColourMap> map = model->at(scene);
+  if (!map) return tl::make_unexpected(map.error());
+  Result<ColourTable> table =
+      make_colour_table(*map, {.rgb_to_xyz = rgb_to_xyz, .limit = tone_limit(plan.options.tone, plan.exposure_ev)});
+  if (!table) return tl::make_unexpected(table.error());
+  look.table = *std::move(table);
   return {};
 }
 

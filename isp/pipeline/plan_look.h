@@ -21,4 +21,8 @@ struct FrameLight {
 /// of range, or a space without RGB primaries (camera, xyz).
 Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPlan& plan);
 
+/// Tabulates the model of a look that has one, for the scene's white, adaptation, light and noise. Needs
+/// plan.transform. Errors: no such model (invalid_argument), those of the model and of make_colour_table.
+Result<void> plan_model(DevelopPlan& plan);
+
 }  // namespace lowlux::isp

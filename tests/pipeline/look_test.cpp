@@ -1,4 +1,5 @@
 #include "isp/pipeline/look.h"
+#include "isp/model/appearance/appearance_model.h"
 #include "isp/model/colour_difference.h"
 
 #include <cmath>
@@ -127,6 +128,36 @@ TEST(EyeLook, LeavesOutOnlyWhatCannotBeSeen) {
     }
     EXPECT_LE(largest, 4 * automatic.look.tolerance) << cd_m2 << ": four effects, each below the tolerance";
   }
+}
+
+TEST(ModelLook, GivesFinitePicturesByEveryModelAndFadesByTheSpectralOne) {
+  for (const AppearanceModel& model : appearance_models()) {
+    DevelopOptions options = eye_at(0.05);
+    options.look.look = Look::model;
+    options.look.model = model.name;
+    const SceneLinear picture = seen(options);
+    for (const Plane<float>& plane : picture.plane) {
+      for (std::size_t i = 0; i < plane.size(); ++i) ASSERT_TRUE(std::isfinite(plane.data()[i])) << model.name;
+    }
+  }
+  DevelopOptions dark = eye_at(0.05), bright = eye_at(1000);
+  dark.look.look = bright.look.look = Look::model;
+  dark.look.model = bright.look.model = "entropy";
+  const SceneLinear by_night = seen(dark), by_day = seen(bright);
+  for (const int field : {1, 2, 3}) {
+    EXPECT_LT(saturation(field_of(by_night, field)), 0.6 * saturation(field_of(by_day, field))) << field;
+  }
+}
+
+TEST(ModelLook, RefusesAnUnknownName) {
+  InlineExecutor executor;
+  DevelopOptions options = eye_at(1);
+  options.look.look = Look::model;
+  options.look.model = "owl";
+  const auto developed = develop(coloured_frame(), options, executor);
+  ASSERT_FALSE(developed);
+  EXPECT_EQ(developed.error().code, ErrorCode::invalid_argument);
+  EXPECT_NE(developed.error().message.find("shin"), std::string::npos);
 }
 
 TEST(EyeLook, SaysWhatItIsMissing) {
