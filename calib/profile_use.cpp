@@ -205,6 +205,7 @@ Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& fra
   const GainProfile& gain = found->gain;
   if (!found->warning.empty()) out.warnings.push_back(found->warning);
   out.sensor = gain.sensor;
+  out.iso = gain.iso;
   PerSite<double> dark_error_e{};
   if (gain.pedestal_holds == BlackPoint::Holds::pedestal_and_dark) {
     if (frame.info.exposure_s) warn_of_exposure(gain, *frame.info.exposure_s, false, out.warnings);

@@ -22,6 +22,7 @@ struct ProfileAtFrame {
   std::optional<NoiseProfile> noise;   // of the sensor, with that of the dark charge in `dark_mean_e`
   std::vector<DefectRect> hot_pixels;  // those whose excess charge is above 6 standard deviations in this frame
   std::vector<std::string> warnings;   // what was extrapolated or assumed
+  std::optional<double> iso;           // of the setting, where the profile knows it
 };
 
 /// The profile at a frame's setting.

@@ -49,20 +49,20 @@ Wrong set_effects(const std::string& text, isp::LookChoice& choice) {
 }
 
 void add_scene(CLI::App& app, LookArgs& args) {
-  add_text(
-      app, "--scene-luminance", "auto|CD_M2",
-      "mean luminance of the scene, for --look eye: from f-number, exposure time and ISO (auto, default), or given",
-      [&args](const std::string& text) -> Wrong {
-        args.eye_option = "--scene-luminance";
-        args.choice.scene_luminance_cd_m2.reset();
-        if (text == "auto") return std::nullopt;
-        double luminance = 0;
-        if (auto wrong = store_number(text, {1e-7, 1e9, "is neither auto nor a luminance in cd/m2"}, luminance)) {
-          return wrong;
-        }
-        args.choice.scene_luminance_cd_m2 = luminance;
-        return std::nullopt;
-      });
+  add_text(app, "--scene-luminance", "auto|CD_M2",
+           "mean luminance of the scene, for --look eye: from f-number, exposure time and ISO, of the file or its "
+           "camera's profile (auto, default), or given",
+           [&args](const std::string& text) -> Wrong {
+             args.eye_option = "--scene-luminance";
+             args.choice.scene_luminance_cd_m2.reset();
+             if (text == "auto") return std::nullopt;
+             double luminance = 0;
+             if (auto wrong = store_number(text, {1e-7, 1e9, "is neither auto nor a luminance in cd/m2"}, luminance)) {
+               return wrong;
+             }
+             args.choice.scene_luminance_cd_m2 = luminance;
+             return std::nullopt;
+           });
   add_text(app, "--field-of-view", "DEGREES",
            "that the longer side of the picture covers in the scene, for what detail the eye makes out (default 50)",
            [&args](const std::string& text) {

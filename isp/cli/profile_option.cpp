@@ -23,7 +23,8 @@ void use_colours(const CameraProfile& profile, RawFrame& frame) {
 
 }  // namespace
 
-Result<void> use_profile(const CameraProfile& profile, bool everything, RawFrame& frame, isp::BlackRequest& black) {
+Result<void> use_profile(const CameraProfile& profile, bool everything, RawFrame& frame, isp::DevelopOptions& options) {
+  isp::BlackRequest& black = options.black;
   auto found = calib::profile_at(profile, frame.raw);
   if (!found) return tl::make_unexpected(found.error());
   if (!found->black && !everything) {
@@ -35,6 +36,7 @@ Result<void> use_profile(const CameraProfile& profile, bool everything, RawFrame
     black.choice = isp::BlackChoice::measured;
     black.measured = *found->black;
   }
+  options.look.profile_iso = found->iso;
   if (found->noise) {
     frame.noise = found->noise;
     frame.noise->source = NoiseProfile::Source::profile;

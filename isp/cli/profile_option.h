@@ -3,14 +3,14 @@
 #include "isp/base/camera_profile.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
-#include "isp/raw/black_point.h"
+#include "isp/pipeline/plan.h"
 
 namespace lowlux::cli {
 
 /// Puts what a camera's profile says of a frame into the frame, in place of what its file says: noise, hot pixels to be
-/// repaired, warnings, and with `everything` the profile's matrices if it holds any. The black point goes into `black`
-/// unless that asks for another.
-/// Errors: those of calib::profile_at; without `everything` a profile that knows no black level.
-Result<void> use_profile(const CameraProfile& profile, bool everything, RawFrame& frame, isp::BlackRequest& black);
+/// repaired, warnings, and with `everything` the profile's matrices if it holds any. The black point goes into the
+/// options unless they ask for another, and the ISO speed of the setting for looks that need the luminance of the
+/// scene. Errors: those of calib::profile_at; without `everything` a profile that knows no black level.
+Result<void> use_profile(const CameraProfile& profile, bool everything, RawFrame& frame, isp::DevelopOptions& options);
 
 }  // namespace lowlux::cli

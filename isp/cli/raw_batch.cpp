@@ -38,7 +38,7 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
   isp::DevelopOptions options = batch.options;
   if (batch.profile) {
     const bool everything = !batch.args.profile.empty();
-    const auto used = use_profile(*batch.profile, everything, frame, options.black);
+    const auto used = use_profile(*batch.profile, everything, frame, options);
     if (!used) return tl::make_unexpected(used.error());
   }
   if (!batch.darks) return options;

@@ -23,6 +23,7 @@ struct LookChoice {
   Look look = Look::camera;
   std::string model;                            // for Look::model: a name of appearance_models()
   std::optional<double> scene_luminance_cd_m2;  // mean over the picture; absent: from how it was exposed
+  std::optional<double> profile_iso;            // ISO speed by the camera's profile, where the frame tells none
   /// Which effects: those that are seen, all, or these.
   enum class Which : std::uint8_t { automatic, all, listed } which = Which::automatic;
   NightEffects listed;
@@ -47,7 +48,7 @@ struct LookPlan {
   std::optional<ColourTable> table;  // of a model, on light after exposure, white 1
   double white_cd_m2 = 0;            // luminance that light of 1 had in the scene, before dimming
   double mean_cd_m2 = 0;
-  std::string_view luminance_rule;  // "given" or "exposure"
+  std::string_view luminance_rule;  // "given", "exposure", or "profile" for its ISO speed
   MesopicState state;               // of an eye adapted to the mean
   double dimming_ev = 0;
   std::vector<LookEffect> effects;

@@ -55,13 +55,16 @@ Result<double> white_level_cd_m2(const RawFrame& frame, double mean, LookPlan& l
     look.mean_cd_m2 = *choice.scene_luminance_cd_m2;
     return look.mean_cd_m2 / mean;
   }
-  const std::optional<double> saturation = saturation_luminance_cd_m2(frame.raw.info);
+  FrameInfo info = frame.raw.info;
+  const bool by_profile = !info.iso && choice.profile_iso;
+  if (by_profile) info.iso = choice.profile_iso;
+  const std::optional<double> saturation = saturation_luminance_cd_m2(info);
   if (!saturation) {
     return fail(ErrorCode::insufficient,
                 "the luminance of the scene is unknown: it takes exposure time, f-number and ISO to estimate it, and "
                 "the file lacks one; give its mean with --scene-luminance, in cd/m2");
   }
-  look.luminance_rule = "exposure";
+  look.luminance_rule = by_profile ? "profile" : "exposure";
   look.mean_cd_m2 = mean * *saturation;
   return *saturation;
 }

@@ -175,6 +175,13 @@ TEST(EyeLook, SaysWhatItIsMissing) {
   const auto known = develop(frame, options, executor);
   ASSERT_TRUE(known) << known.error().message;
   EXPECT_EQ(known->plan.look->luminance_rule, "exposure");
+  frame.raw.info.iso.reset();
+  EXPECT_FALSE(develop(frame, options, executor));
+  options.look.profile_iso = 1600;
+  const auto profiled = develop(frame, options, executor);
+  ASSERT_TRUE(profiled);
+  EXPECT_EQ(profiled->plan.look->luminance_rule, "profile");
+  EXPECT_EQ(profiled->plan.look->mean_cd_m2, known->plan.look->mean_cd_m2);
   // 78 N^2 / (0.65 S t) is 3 cd/m2 at saturation.
   EXPECT_LT(known->plan.look->mean_cd_m2, 3);
   EXPECT_GT(known->plan.look->mean_cd_m2, 0.1);
