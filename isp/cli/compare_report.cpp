@@ -39,6 +39,12 @@ std::string occupancy_text(const isp::GamutRatio& gamut) {
                      gamut.test_bins);
 }
 
+std::string spectra_text(const isp::SpectralDifference& d) {
+  if (d.pixels == 0) return "none: no pixel has a chromaticity in both";
+  return fmt::format("Kullback-Leibler {:.4g} nat, Jeffreys {:.4g} nat: smoothest spectra of {} pixels, mean",
+                     d.kullback_leibler, d.jeffreys, d.pixels);
+}
+
 Json json_of(const isp::DifferenceSummary& d) {
   return {{"mean", d.mean}, {"median", d.median}, {"percentile_95", d.percentile_95}, {"largest", d.largest}};
 }
@@ -63,6 +69,7 @@ std::string compare_text(const CompareOutcome& outcome) {
   lines.add("CIEDE2000", text_of(c.ciede2000));
   lines.add("EGR convex", convex_text(outcome));
   lines.add("EGR occupancy", occupancy_text(c.gamut));
+  lines.add("spectra", spectra_text(outcome.spectra));
   lines.add("PSNR", std::isinf(c.psnr_db) ? "identical codes" : fmt::format("{:.3f} dB", c.psnr_db));
   lines.add("SSIM", c.ssim ? fmt::format("{:.5f}", *c.ssim)
                            : fmt::format("none: it needs {} x {} pixels", isp::ssim_window_px, isp::ssim_window_px));
@@ -87,6 +94,10 @@ std::string compare_json(const CompareArgs& args, const CompareOutcome& outcome)
                   {"delta_e_94c", json_of(c.delta_e_94c)},
                   {"ciede2000", json_of(c.ciede2000)},
                   {"egr", egr_json(outcome)},
+                  {"spectra",
+                   {{"kullback_leibler_nat", outcome.spectra.kullback_leibler},
+                    {"jeffreys_nat", outcome.spectra.jeffreys},
+                    {"pixels", outcome.spectra.pixels}}},
                   {"identical_codes", std::isinf(c.psnr_db)},
                   {"psnr_db", c.psnr_db},  // infinite: null
                   {"ssim", c.ssim ? Json(*c.ssim) : Json(nullptr)},

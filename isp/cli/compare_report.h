@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "isp/bench/picture_comparison.h"
+#include "isp/bench/spectral_difference.h"
 #include "isp/cli/compare_args.h"
 
 namespace lowlux::cli {
@@ -11,6 +12,7 @@ namespace lowlux::cli {
 /// What `compare` has to say.
 struct CompareOutcome {
   isp::PictureComparison found;
+  isp::SpectralDifference spectra;
   int width = 0;
   int height = 0;
   std::string why_no_hull;            // set where the module that finds convex hulls is missing

@@ -56,6 +56,7 @@ Result<CompareOutcome> compared(const CompareArgs& args) {
   warn_of_whites(*a, *b, out);
   const auto hulls = load_hulls();
   if (!hulls) out.why_no_hull = hulls.error().message;
+  out.spectra = isp::spectral_difference(a->xyz, b->xyz, executor);
   out.found = isp::compare_pictures(a->xyz, b->xyz, hulls.value_or(nullptr), executor);
   return out;
 }

@@ -58,6 +58,7 @@ TEST_F(CompareCommand, OfAPictureWithItselfFindsNoDifference) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
   const Json json = Json::parse(result.out);
+  EXPECT_NEAR(json["spectra"]["jeffreys_nat"].get<double>(), 0, 1e-9);
   for (const char* name : {"delta_e_ab", "delta_e_94c", "ciede2000"}) EXPECT_EQ(json[name]["largest"], 0) << name;
   EXPECT_TRUE(json["psnr_db"].is_null());
   EXPECT_EQ(json["identical_codes"], true);
