@@ -57,7 +57,7 @@ Finding fades_by_day(const AppearanceTracks& fixed, const AppearanceTracks& adap
 
 }  // namespace
 
-Result<Outcome> run_mesopic_fixed_gamma(const RunOptions&) {
+Result<Outcome> run_mesopic_fixed_gamma(const RunOptions& /*options*/) {
   const auto adaptive = agreements(adaptive_pairs, std::nullopt);
   const auto fixed = agreements(table_5_2, fixed_gamma);
   if (!adaptive || !fixed) return tl::make_unexpected(adaptive ? fixed.error() : adaptive.error());

@@ -133,7 +133,7 @@ Result<std::vector<AppearanceTracks>> tracks_by_all(const std::vector<NamedSpect
 
 }  // namespace
 
-Result<Outcome> run_mesopic_tracks(const RunOptions&) {
+Result<Outcome> run_mesopic_tracks(const RunOptions& /*options*/) {
   const auto all = agreements(table_5_1, std::nullopt);
   if (!all) return tl::make_unexpected(all.error());
   const auto chips = track_chips();

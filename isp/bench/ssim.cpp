@@ -15,9 +15,10 @@ constexpr double sigma_px = 1.5;
 using Window = std::array<double, ssim_window_px>;
 
 Window gaussian() {
+  constexpr int middle = ssim_window_px / 2;
   Window w{};
   for (int i = 0; i < ssim_window_px; ++i) {
-    const double z = (i - ssim_window_px / 2) / sigma_px;
+    const double z = (i - middle) / sigma_px;
     w[static_cast<std::size_t>(i)] = std::exp(-z * z / 2);
   }
   const double sum = std::accumulate(w.begin(), w.end(), 0.0);

@@ -29,7 +29,7 @@ std::string look_name(const isp::DevelopPlan& plan) {
   return plan.look->kind == isp::Look::model ? plan.options.look.model : "eye";
 }
 
-void add_look(Lines& out, const isp::LookPlan& look, const std::string& name) {
+void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, bool noise_known) {
   if (look.kind != isp::Look::camera) {
     out.add("look", fmt::format("{}; scene {:.3g} cd/m2 ({}), adaptation m {:.2f}, {:+.2f} EV of darkness kept", name,
                                 look.mean_cd_m2, look.luminance_rule, look.state.m, look.dimming_ev));
@@ -46,7 +46,10 @@ void add_look(Lines& out, const isp::LookPlan& look, const std::string& name) {
                     look.table->cells, look.table->levels, look.table->error.mean, look.table->error.largest));
     if (name == "shin") out.add("", fmt::format("coefficients = {}", isp::shin_substitute_name));
   }
-  if (look.noise_limit) out.add("noise limit", fmt::format("{:.3g} CIE L*", *look.noise_limit));
+  if (look.noise_limit) {
+    out.add("noise limit",
+            noise_known ? fmt::format("{:.3g} CIE L*", *look.noise_limit) : "none: the noise is not known");
+  }
 }
 
 }  // namespace
@@ -61,11 +64,12 @@ std::string explain_text(const isp::DevelopPlan& plan) {
   out.add("white", plan.white ? fmt::format("{}, {:.0f} K", plan.white_balance_rule, plan.white->cct_k)
                               : std::string(plan.white_balance_rule));
   out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.exposure_ev, plan.exposure_rule));
-  if (plan.look) add_look(out, *plan.look, look_name(plan));
+  if (plan.look) add_look(out, *plan.look, look_name(plan), plan.look->noise || plan.noise_reduction.level);
   if (plan.options.display) {
     const isp::DisplayTarget& display = *plan.options.display;
-    out.add("display", fmt::format("{:g} to {:g} cd/m2, coefficients {}", display.source_cd_m2, display.display_cd_m2,
-                                   display.coefficients));
+    out.add("display", fmt::format("{:g} to {:g} cd/m2, coefficients {}, table off by {:.2f} CIEDE2000 in the mean",
+                                   display.source_cd_m2, display.display_cd_m2, display.coefficients,
+                                   display.made.error.mean_ciede2000));
   }
   return out.text();
 }

@@ -1,5 +1,8 @@
 #include "isp/cli/look_args.h"
 
+#include <algorithm>
+#include <array>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -50,10 +53,11 @@ Wrong set_effects(const std::string& text, isp::LookChoice& choice) {
 
 void add_scene(CLI::App& app, LookArgs& args) {
   add_text(app, "--scene-luminance", "auto|CD_M2",
-           "mean luminance of the scene, for --look eye: from f-number, exposure time and ISO, of the file or its "
+           "mean luminance of the scene, for --look eye and models: from f-number, exposure time and ISO, of the file "
+           "or its "
            "camera's profile (auto, default), or given",
            [&args](const std::string& text) -> Wrong {
-             args.eye_option = "--scene-luminance";
+             args.given.emplace_back("--scene-luminance");
              args.choice.scene_luminance_cd_m2.reset();
              if (text == "auto") return std::nullopt;
              double luminance = 0;
@@ -66,7 +70,7 @@ void add_scene(CLI::App& app, LookArgs& args) {
   add_text(app, "--field-of-view", "DEGREES",
            "that the longer side of the picture covers in the scene, for what detail the eye makes out (default 50)",
            [&args](const std::string& text) {
-             args.eye_option = "--field-of-view";
+             args.given.emplace_back("--field-of-view");
              return store_number(text, {0.1, 180, "is no angle in degrees"}, args.choice.field_of_view_deg);
            });
 }
@@ -77,13 +81,13 @@ void add_effects(CLI::App& app, LookArgs& args) {
                        "glare and visual-noise), or those listed, parted by commas ({})",
                        fmt::join(isp::night_effect_names, ", ")),
            [&args](const std::string& text) {
-             args.eye_option = "--effects";
+             args.given.emplace_back("--effects");
              return set_effects(text, args.choice);
            });
   add_text(app, "--tolerance", "DELTA_E",
            "CIEDE2000 from which on --effects auto takes an effect for seen (default 0.5)",
            [&args](const std::string& text) {
-             args.eye_option = "--tolerance";
+             args.given.emplace_back("--tolerance");
              return store_number(text, {1e-3, 100, "is no colour difference"}, args.choice.tolerance);
            });
   add_text(
@@ -91,7 +95,7 @@ void add_effects(CLI::App& app, LookArgs& args) {
       "how much of its darkness the picture keeps: 0 is as bright as by day, 1 as dark as it was beside a room with "
       "100 cd/m2 (default 0.4; automatic exposure only)",
       [&args](const std::string& text) {
-        args.eye_option = "--dimming";
+        args.given.emplace_back("--dimming");
         return store_number(text, {0, 1, "is no share"}, args.choice.dimming);
       });
 }
@@ -145,10 +149,12 @@ void add_look(CLI::App& app, LookArgs& args) {
 
 std::optional<std::string> complete_look(const LookArgs& args, isp::LookChoice& choice) {
   choice = args.choice;
-  const bool only_eye =
-      args.eye_option == "--effects" || args.eye_option == "--tolerance" || args.eye_option == "--field-of-view";
-  if (!args.eye_option.empty() && (choice.look == isp::Look::camera || (choice.look == isp::Look::model && only_eye))) {
-    return args.eye_option + " goes with --look eye";
+  constexpr std::array only_eye{"--effects", "--tolerance", "--field-of-view"};
+  for (const std::string& option : args.given) {
+    const bool for_models = std::ranges::find(only_eye, option) == only_eye.end();
+    if (choice.look == isp::Look::camera || (choice.look == isp::Look::model && !for_models)) {
+      return option + (for_models ? " goes with --look eye or a model" : " goes with --look eye");
+    }
   }
   if (choice.look == isp::Look::eye && !args.noise_limit_given) choice.noise_limit = eye_noise_limit;
   return std::nullopt;

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "isp/pipeline/look.h"
 
@@ -16,7 +17,7 @@ struct LookArgs {
   isp::LookChoice choice;
   bool noise_limit_given = false;
   std::optional<double> display_cd_m2;  // white of the display pictures are made for
-  std::string eye_option;               // the first option given that only --look eye has; empty: none
+  std::vector<std::string> given;       // options that do not go with every look
 };
 
 void add_look(CLI::App& app, LookArgs& args);

@@ -87,8 +87,9 @@ Json look_json(const isp::DevelopPlan& plan) {
   if (!plan.look) return nullptr;
   const isp::LookPlan& look = *plan.look;
   const std::string& model = plan.options.look.model;
+  const bool noise_known = look.noise || plan.noise_reduction.level;
   const std::string name = look.kind == isp::Look::model ? model : look.kind == isp::Look::eye ? "eye" : "camera";
-  Json json{{"name", name}, {"noise_limit_lightness", optional_json(look.noise_limit)}};
+  Json json{{"name", name}, {"noise_limit_lightness", noise_known ? optional_json(look.noise_limit) : Json(nullptr)}};
   if (look.kind == isp::Look::camera) return json;
   if (look.table) {
     json["table_mean_ciede2000"] = look.table->error.mean;
@@ -161,7 +162,9 @@ std::string develop_json(const DevelopOutcome& outcome) {
     const isp::DisplayTarget& display = *plan.options.display;
     json["display"] = {{"source_cd_m2", display.source_cd_m2},
                        {"display_cd_m2", display.display_cd_m2},
-                       {"coefficients", display.coefficients}};
+                       {"coefficients", display.coefficients},
+                       {"table_mean_ciede2000", display.made.error.mean_ciede2000},
+                       {"table_max_ciede2000", display.made.error.max_ciede2000}};
   }
   for (const isp::StageTime& time : outcome.times) json["timings_s"][std::string(time.stage)] = time.seconds;
   return dumped(json);

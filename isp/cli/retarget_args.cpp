@@ -53,8 +53,9 @@ Parsed<RetargetArgs> parse_retarget(const std::vector<std::string>& words) {
   app.add_flag("--quiet", args.quiet, "no warnings and no text");
   if (const auto code = parse_words(app, words)) return *code;
   if (const auto possible = isp::retargeting(args.options); !possible) return refuse(app, possible.error().message);
-  if (!args.coefficients.empty() && isp::coefficients_name(args.options).empty()) {
-    return refuse(app, "--coefficients: the model " + std::string(isp::name_of(args.options.method)) + " has none");
+  if (isp::coefficients_name(args.options).empty() && (!args.coefficients.empty() || app.count("--units") > 0)) {
+    return refuse(app, "--coefficients and --units: the model " + std::string(isp::name_of(args.options.method)) +
+                           " has no coefficients");
   }
   return args;
 }

@@ -20,8 +20,8 @@ const Matrix3& to_xyz() {
 // LookGrid for one colour, without blur.
 Vector3 seen(const Vector3& rgb, double rod_share, double chroma, double blue) {
   const Xyz xyz = xyz_of(to_xyz() * rgb);
-  const double white = scotopic_luminance(*xyz_of(white_d65));
-  const double e = xyz.y + rod_share * (scotopic_luminance(xyz) / white - xyz.y);
+  const double rods = scotopic_luminance(xyz) / scotopic_luminance(*xyz_of(white_d65));
+  const double e = xyz.y + rod_share * (std::max(rods, LookGrid::least_rods * xyz.y) - xyz.y);
   Vector3 out{};
   for (int c = 0; c < 3; ++c) {
     out[c] = e * (1 + blue * rod_tint[c]) + chroma * std::max(e, 0.0) / xyz.y * (rgb[c] - xyz.y);

@@ -41,12 +41,15 @@ struct LookEffect {
   bool used = false;
 };
 
+/// Share of white that the mean of a scene has.
+inline constexpr double scene_mean_of_white = 0.18;
+
 /// What was decided.
 struct LookPlan {
   Look kind = Look::camera;  // then only noise is bounded
   NightLook look;
-  std::optional<ColourTable> table;  // of a model, on light after exposure, white 1
-  double white_cd_m2 = 0;            // luminance that light of 1 had in the scene, before dimming
+  std::optional<ColourTable> table;  // of a model, on light relative to white_cd_m2
+  double white_cd_m2 = 0;            // of a white in the scene, whose mean is taken for mid-grey
   double mean_cd_m2 = 0;
   std::string_view luminance_rule;  // "given", "exposure", or "profile" for its ISO speed
   MesopicState state;               // of an eye adapted to the mean

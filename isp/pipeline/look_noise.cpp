@@ -42,19 +42,23 @@ void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const fl
   });
 }
 
-// The raw's variance at the fraction x of white, scale x + offset, of each channel, as if each pixel had its own three.
+// The raw's variance at the fraction x of white, scale x + offset, of each channel, as if each pixel had its own three,
+// but for monochrome frames.
 void of_model(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
   const NoiseProfile& noise = *plan.look->noise;
+  const bool monochrome = !plan.white;  // one plane serves for all three
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       for (int x = 0; x < out.width; ++x) {
-        float sum = 0;
+        float sum = 0, weight = 0;
         for (int c = 0; c < 3; ++c) {
           const float gain = plan.white_gain[c];
           const float fraction = std::max(quarter[c].row(y)[x], 0.0f) / gain;
           const float variance = static_cast<float>(noise.scale[c]) * fraction + static_cast<float>(noise.offset[c]);
           sum += weights[c] * weights[c] * gain * gain * variance;
+          weight += weights[c] * gain;
+          if (monochrome) sum = weight * weight * variance;
         }
         out.row(y)[x] = sum;
       }

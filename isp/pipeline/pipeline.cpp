@@ -201,11 +201,11 @@ void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& o
   }
 }
 
-// Light after exposure, white 1, through the model's table; in planes of the picture's own primaries.
+// Light relative to the scene's white through the model's table; in planes of the picture's own primaries.
 CameraPlanes Pipeline::as_modelled(const RgbInput& in, const DevelopPlan& plan) {
   for (Plane<float>& plane : modelled_) fit(plane, plan.width, plan.height);
   const RgbView<float> planes{modelled_[0].view(), modelled_[1].view(), modelled_[2].view()};
-  const auto limit = static_cast<float>(tone_limit(plan.options.tone, plan.exposure_ev));
+  const auto limit = static_cast<float>(plan.look->look.cd_m2_per_unit / plan.look->white_cd_m2);
   RgbTransform to_light = plan.transform;
   for (float& coefficient : to_light.matrix) coefficient *= limit;
   to_light.move_into_gamut = false;

@@ -101,8 +101,11 @@ LuminancePair darkest_field(std::span<const float> blocks, double white_cd_m2, c
   return {field, field * look.look.scotopic_ratio_of_white};
 }
 
-void decide_effects(const LookChoice& choice, const NightEye& darkest, LookPlan& look) {
+void decide_effects(const LookChoice& choice, const NightEye& darkest, bool monochrome, LookPlan& look) {
   look.effects = predict_effects(darkest, look.look.scotopic_ratio_of_white, look.look.pixels_per_degree);
+  if (monochrome) {
+    for (int k = 0; k < 3; ++k) look.effects[static_cast<std::size_t>(k)].size = 0;  // those of colours
+  }
   NightEffects listed = choice.listed;
   for (LookEffect& effect : look.effects) {
     switch (choice.which) {
@@ -125,9 +128,9 @@ void decide_eye(const FrameLight& light, double white_cd_m2, DevelopPlan& plan, 
   const LookChoice& choice = plan.options.look;
   const double ratio = look.look.scotopic_ratio_of_white;
   look.state = mesopic_state({look.mean_cd_m2, look.mean_cd_m2 * ratio});
-  look.white_cd_m2 = white_cd_m2 / std::exp2(plan.exposure_ev);
+  look.white_cd_m2 = look.mean_cd_m2 / scene_mean_of_white;
   if (choice.look == Look::eye) {
-    decide_effects(choice, night_eye(darkest_field(light.block_luminance, white_cd_m2, look)), look);
+    decide_effects(choice, night_eye(darkest_field(light.block_luminance, white_cd_m2, look)), !plan.white, look);
   }
   if (plan.options.exposure_ev) return;
   look.dimming_ev = choice.dimming * apparent_dimming_ev(look.state.luminance_cd_m2);
@@ -140,7 +143,8 @@ Matrix3 noise_of_cones(const NoiseProfile& noise, const DevelopPlan& plan, const
   Matrix3 balanced_to_rgb{};
   for (int c = 0; c < 3; ++c) {
     const double gain = plan.white_gain[c];
-    channels.variance_e2[c] = noise.scale[c] * 0.18 / std::exp2(plan.exposure_ev) / gain + noise.offset[c];
+    channels.variance_e2[c] =
+        noise.scale[c] * scene_mean_of_white / std::exp2(plan.exposure_ev) / gain + noise.offset[c];
     channels.rgb_per_e[c] = gain;
     for (int j = 0; j < 3; ++j) balanced_to_rgb[j][c] = plan.transform.matrix[3 * j + c];
   }
@@ -188,13 +192,22 @@ Result<void> plan_model(DevelopPlan& plan) {
   scene.adaptation_cd_m2 = look.mean_cd_m2;
   scene.scotopic_ratio = look.look.scotopic_ratio_of_white;
   if (plan.white) scene.colour_temperature_k = plan.white->cct_k;
-  if (look.noise) scene.noise_covariance = noise_of_cones(*look.noise, plan, rgb_to_xyz);
+  if (look.noise && plan.white) scene.noise_covariance = noise_of_cones(*look.noise, plan, rgb_to_xyz);
   const Result<ColourMap> map = model->at(scene);
   if (!map) return tl::make_unexpected(map.error());
-  Result<ColourTable> table =
-      make_colour_table(*map, {.rgb_to_xyz = rgb_to_xyz, .limit = tone_limit(plan.options.tone, plan.exposure_ev)});
+  const double limit = std::clamp(look.look.cd_m2_per_unit / look.white_cd_m2, 1e-6, 1e6);
+  Result<ColourTable> table = make_colour_table(*map, {.rgb_to_xyz = rgb_to_xyz, .limit = limit});
   if (!table) return tl::make_unexpected(table.error());
   look.table = *std::move(table);
+  if (!(look.white_cd_m2 >= model->valid_from_cd_m2 && look.white_cd_m2 <= model->valid_to_cd_m2)) {
+    plan.warnings.push_back(
+        fmt::format("the model {} is known for whites of {:g} to {:g} cd/m2; this scene's has {:.3g}", model->name,
+                    model->valid_from_cd_m2, model->valid_to_cd_m2, look.white_cd_m2));
+  }
+  if (!look.table->within_bound) {
+    plan.warnings.push_back(fmt::format("the table of the model {} is off by up to {:.2g} CIEDE2000", model->name,
+                                        look.table->error.largest));
+  }
   return {};
 }
 

@@ -36,7 +36,7 @@ struct CodeRows {
   const ToneTable* tone;
   PlaneView<Code> out;
   Codes operator()(int y) const { return {tone, out.row(y)}; }
-  void finish(int) const {}
+  void finish(int /*y*/) const {}
 };
 
 void change_row(const CodeChange& change, const std::uint16_t* rgb, int width, std::uint8_t* out) {
@@ -53,14 +53,14 @@ struct ChangedCodeRows {
   PlaneView<Code> out;
   const CodeChange* change;
   std::uint16_t* row;
-  rows::Codes16 operator()(int) const { return {tone, row}; }
+  rows::Codes16 operator()(int /*y*/) const { return {tone, row}; }
   void finish(int y) const { change_row(*change, row, out.width / 3, out.row(y)); }
 };
 
 struct PlaneRowsOut {
   RgbView<float> out;
   rows::Planes operator()(int y) const { return {{out[0].row(y), out[1].row(y), out[2].row(y)}}; }
-  void finish(int) const {}
+  void finish(int /*y*/) const {}
 };
 
 /// A look on one row after another.

@@ -22,7 +22,7 @@ using LaneIndices = decltype(hn::SetTableIndices(Floats(), static_cast<const std
 
 /// No look: pixels stay as they are.
 struct AsItIs {
-  HWY_INLINE void operator()(SitePair&, int) const {}
+  HWY_INLINE void operator()(SitePair& /*pixels*/, int /*i*/) const {}
 };
 
 /// LookGrid on a vector of pairs. Seen from the cells' middles, pixel pair i lies between cells j - 1 and j, j = i / 2:
@@ -80,7 +80,8 @@ struct LookVectors {
   HWY_INLINE Site seen(const Site& v, const VF (&part)[LookGrid::parts]) const {
     const VF zero = constant(0), one = constant(1);
     const VF y = weighted(luminance, v);
-    const VF e = hn::MulAdd(part[LookGrid::rod_share], hn::Sub(weighted(rods, v), y), y);
+    const VF s = hn::Max(weighted(rods, v), hn::Min(hn::Mul(constant(LookGrid::least_rods), y), y));
+    const VF e = hn::MulAdd(part[LookGrid::rod_share], hn::Sub(s, y), y);
     const VF chroma =
         hn::Div(hn::Mul(part[LookGrid::chroma], hn::Add(hn::Max(e, zero), dark)), hn::Add(hn::Max(y, zero), dark));
     const VF light = hn::MulAdd(part[LookGrid::detail], e, part[LookGrid::base]);

@@ -221,7 +221,7 @@ Result<ColourTable> make_colour_table(const ColourMap& map, const ColourTableReq
     table.levels = octaves + 1;
     table.cells = first_cells_of_levels;
   }
-  for (std::optional<ColourTable> next = std::move(table); next;) {
+  for (std::optional<ColourTable> next = table; next;) {
     table = std::move(*next);
     const bool filled = fits_floats(table.grey) && fill(table, rgb_map, brightest_sum);
     if (filled) table.error = measure(table, rgb_map, middles(table, request.limit, 0.5));

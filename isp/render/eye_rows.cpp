@@ -105,12 +105,12 @@ void LightRowOf(const LightRow& in, const LightWeights& weights, int n, float* p
 }
 
 HWY_INLINE VF adaptation_coefficient(const EyeTables& t, VF log2_light, VF log2_ratio) {
-  const Place light = place_on(log2_light, t.first_log2_light, t.last_log2_light, t.lights);
-  const Place ratio = place_on(log2_ratio, t.first_log2_ratio, t.last_log2_ratio, t.ratios);
+  const Place light = place_on(log2_light, EyeTables::first_log2_light, EyeTables::last_log2_light, EyeTables::lights);
+  const Place ratio = place_on(log2_ratio, EyeTables::first_log2_ratio, EyeTables::last_log2_ratio, EyeTables::ratios);
   const VI node = hn::Add(hn::ShiftLeft<8>(ratio.node), light.node);
   static_assert(EyeTables::lights == 1 << 8);
   const VF low = between(t.m.data(), node, light.way);
-  const VF high = between(t.m.data() + t.lights, node, light.way);
+  const VF high = between(t.m.data() + EyeTables::lights, node, light.way);
   const VF m = hn::MulAdd(ratio.way, hn::Sub(high, low), low);
   return hn::Min(hn::Max(m, constant(0)), constant(1));
 }
@@ -128,7 +128,8 @@ HWY_INLINE void eye(const EyeTables& t, VF white_ratio, VF photopic, VF scotopic
   const VF chroma = hn::Div(hn::Mul(seen, constant(t.chroma_scale)), hn::Add(seen, constant(t.half_saturation_cd_m2)));
   hn::StoreU(hn::Min(chroma, constant(1)), f, out.chroma + i);
 
-  const Place light = place_on(log2_of(seen), t.first_log2_light, t.last_log2_light, t.lights);
+  const Place light =
+      place_on(log2_of(seen), EyeTables::first_log2_light, EyeTables::last_log2_light, EyeTables::lights);
   const VF blue = between(t.blue.data(), light.node, light.way);
   hn::StoreU(hn::Mul(hn::Sub(constant(1), m), blue), f, out.blue + i);
   hn::StoreU(between(t.variance_deg2.data(), light.node, light.way), f, out.variance_deg2 + i);

@@ -26,15 +26,15 @@ double unheld_coefficient(double log2_light, double log2_ratio) {
 
 EyeTables make_tables() {
   EyeTables t{};
-  for (int j = 0; j < t.ratios; ++j) {
-    for (int i = 0; i < t.lights; ++i) {
-      t.m[static_cast<std::size_t>(j) * t.lights + i] =
-          static_cast<float>(unheld_coefficient(node(i, t.lights, t.first_log2_light, t.last_log2_light),
-                                                node(j, t.ratios, t.first_log2_ratio, t.last_log2_ratio)));
+  for (int j = 0; j < EyeTables::ratios; ++j) {
+    for (int i = 0; i < EyeTables::lights; ++i) {
+      t.m[static_cast<std::size_t>(j) * EyeTables::lights + i] = static_cast<float>(
+          unheld_coefficient(node(i, EyeTables::lights, EyeTables::first_log2_light, EyeTables::last_log2_light),
+                             node(j, EyeTables::ratios, EyeTables::first_log2_ratio, EyeTables::last_log2_ratio)));
     }
   }
-  for (int i = 0; i < t.lights; ++i) {
-    const double light = std::exp2(node(i, t.lights, t.first_log2_light, t.last_log2_light));
+  for (int i = 0; i < EyeTables::lights; ++i) {
+    const double light = std::exp2(node(i, EyeTables::lights, EyeTables::first_log2_light, EyeTables::last_log2_light));
     const double blur_deg = blur_std_deg(light);
     t.blue[i] = static_cast<float>(rod_blue(light));
     t.variance_deg2[i] = static_cast<float>(blur_deg * blur_deg);

@@ -18,6 +18,9 @@ namespace {
 // Of a cell of 4 pixels: box and linear interpolation blur it by half its side, 2 pixels.
 constexpr double cell_variance_px2 = 0.25 * LookGrid::cell * LookGrid::cell;
 
+// Of a field of adaptation: below an S/P of 0.265 CIE 191 has several answers and jumps between them.
+constexpr float least_field_ratio = 0.27f;
+
 double mean_of(const PlaneView<const float>& plane) {
   double sum = 0;
   for (int y = 0; y < plane.height; ++y) {
@@ -126,8 +129,10 @@ void NightLookGrid::State::take_light(const RgbView<const float>& camera, const 
     rows::light_row({{camera[0].row(row), camera[1].row(row), camera[2].row(row)}}, weights, y.width, y.row(row),
                     s.row(row));
     for (int x = 0; x < y.width; ++x) {
-      field_y.row(row)[x] = std::clamp(cones * y.row(row)[x], 0.0f, 1e9f);
-      field_s.row(row)[x] = std::clamp(rods * s.row(row)[x], 0.0f, 1e9f);
+      const float light = y.row(row)[x];
+      s.row(row)[x] = std::max(s.row(row)[x], std::min(LookGrid::least_rods * light, light));
+      field_y.row(row)[x] = std::clamp(cones * light, 0.0f, 1e9f);
+      field_s.row(row)[x] = std::clamp(rods * s.row(row)[x], least_field_ratio * field_y.row(row)[x], 1e9f);
     }
   });
 }

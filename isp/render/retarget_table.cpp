@@ -55,7 +55,8 @@ RetargetTable tabulated(const CodeMap& map, int levels, Executor& executor) {
     for (int row = band.first; row < band.last; ++row) {
       for (int b = 0; b < levels; ++b) {
         const double step = 1.0 / (levels - 1);
-        const Vector3 out = map({step * (row / levels), step * (row % levels), step * b});
+        const int r = row / levels, g = row % levels;
+        const Vector3 out = map({step * r, step * g, step * b});
         const std::size_t number = static_cast<std::size_t>(row) * n + static_cast<std::size_t>(b);
         table.nodes[2 * number] = packed(out[0], out[1]);
         table.nodes[2 * number + 1] = packed(out[2], 0);

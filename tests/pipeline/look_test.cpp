@@ -149,6 +149,19 @@ TEST(ModelLook, GivesFinitePicturesByEveryModelAndFadesByTheSpectralOne) {
   }
 }
 
+// The scene is what it is, however the picture is exposed or dimmed.
+TEST(ModelLook, DoesNotDependOnTheExposureOfThePicture) {
+  const auto at_ev = [](double ev) {
+    DevelopOptions options = eye_at(0.5);
+    options.look.look = Look::model;
+    options.look.model = "shin";
+    options.exposure_ev = ev;
+    return field_of(seen(options), 1);
+  };
+  const auto plain = at_ev(0), brighter = at_ev(2);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(brighter[c], 4 * plain[c], 0.02 * plain[0]) << "0.5 CIEDE2000 of tables";
+}
+
 TEST(ModelLook, RefusesAnUnknownName) {
   InlineExecutor executor;
   DevelopOptions options = eye_at(1);

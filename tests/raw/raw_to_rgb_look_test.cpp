@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -89,6 +90,25 @@ TEST(RawToRgbLook, OfDaylightChangesNothing) {
       ASSERT_NEAR(seen.plane[c].data()[i], plain.plane[c].data()[i], 3e-6);  // rounding of values to 5
     }
   }
+}
+
+TEST(RawToRgbLook, LeavesTheReddestRedsWhatSodiumLightLeaves) {
+  InlineExecutor executor;
+  Plane<float> red(4, 4), none(4, 4);
+  std::fill_n(red.data(), 16, 0.5f);
+  std::fill_n(none.data(), 16, 0.0f);
+  RandomLook look(4, 4, 9);
+  const std::array<float, LookGrid::parts> night{1, 0, 0, 1, 0};
+  for (int k = 0; k < LookGrid::parts; ++k) std::ranges::fill(look.parts[k].memory, night[k]);
+  isp::RgbTransform transform;
+  transform.luminance = look.grid.luminance;
+  transform.move_into_gamut = false;
+  transform.look = &look.grid;
+  SceneLinear out(4, 4);
+  isp::RawToRgb(4, 1).linear(isp::CameraPlanes{{red.view(), none.view(), none.view()}, {1, 1, 1}}, transform,
+                             out.view(), executor);
+  const float expected = 0.5f * look.grid.luminance[0] * LookGrid::least_rods;
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(out.plane[c].at(1, 1), expected, 1e-7) << "grey, and not black";
 }
 
 TEST(RawToRgbLook, GivesTheSameBytesWithAnyNumberOfThreads) {

@@ -109,8 +109,10 @@ std::vector<Field> night_look(const RgbView<const float>& camera, const std::arr
         light.at(x, y) += look.luminance[j] * v;
         rods.at(x, y) += look.rods[j] * v;
       }
+      rods.at(x, y) = std::max(rods.at(x, y), std::min(LookGrid::least_rods * light.at(x, y), light.at(x, y)));
       photopic.at(x, y) = std::clamp(look.cd_m2_per_unit * light.at(x, y), 0.0, 1e9);
-      scotopic.at(x, y) = std::clamp(look.cd_m2_per_unit * look.scotopic_ratio_of_white * rods.at(x, y), 0.0, 1e9);
+      scotopic.at(x, y) =
+          std::clamp(look.cd_m2_per_unit * look.scotopic_ratio_of_white * rods.at(x, y), 0.27 * photopic.at(x, y), 1e9);
     }
   }
   const Field cones_field = adapted(photopic, look), rods_field = adapted(scotopic, look);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "isp/model/appearance/entropy_model.h"
+#include "isp/model/appearance/seen_scene.h"
 #include "isp/model/cie_data.h"
 #include "isp/model/mesopic.h"
 #include "isp/model/spectral_lift.h"
@@ -95,20 +96,12 @@ struct EntropyMap {
 
 bool positive(double value) { return value > 0 && std::isfinite(value); }
 
-Result<double> adaptation_of(const ViewingConditions& c) {
-  if (!positive(c.white_cd_m2) || !positive(c.adaptation()) || !positive(c.scotopic_ratio)) {
-    return fail(ErrorCode::invalid_argument,
-                "luminances of white and adaptation and S/P must be positive, found " + std::to_string(c.white_cd_m2) +
-                    " cd/m2, " + std::to_string(c.adaptation()) + " cd/m2 and " + std::to_string(c.scotopic_ratio));
-  }
-  return mesopic_state({c.adaptation(), c.adaptation() * c.scotopic_ratio}).m;
-}
-
 }  // namespace
 
 Result<ColourMap> entropy_colour_map(const ViewingConditions& conditions, const EntropyOptions& options) {
-  const Result<double> m = adaptation_of(conditions);
-  if (!m) return tl::make_unexpected(m.error());
+  const Result<SeenScene> scene = seen_scene(conditions);
+  if (!scene) return tl::make_unexpected(scene.error());
+  const double m = scene->adaptation_m;
   const auto no_white = [] {
     return fail(ErrorCode::invalid_argument, "the white has a chromaticity no light can have; give its X, Y and Z");
   };
@@ -116,10 +109,10 @@ Result<ColourMap> entropy_colour_map(const ViewingConditions& conditions, const 
   if (!positive(conditions.white.y) || !white_xy || !(liftable(*white_xy) == *white_xy)) return no_white();
   const std::optional<NodePower> white = power_of(scaled(conditions.white, 1 / conditions.white.y));
   if (!white) return no_white();
-  Result<EntropyModel> model = entropy_model(*m, *white, options);
+  Result<EntropyModel> model = entropy_model(m, *white, options);
   if (!model) return tl::make_unexpected(model.error());
-  EntropyMap map{.model = std::move(*model), .power = options.power, .m = *m};
-  map.white_luminance = mesopic_luminance_cd_m2(*m, {1, scotopic_of(*white)});
+  EntropyMap map{.model = std::move(*model), .power = options.power, .m = m};
+  map.white_luminance = mesopic_luminance_cd_m2(m, {1, scotopic_of(*white)});
   const std::optional<Xyz> seen = map.appearance(*white, 1);
   const std::optional<Xy> from = seen ? xy_of(*seen) : std::nullopt;
   const auto to_display = from ? bradford_adaptation(*from, *xy_of(display_white)) : std::nullopt;

@@ -4,11 +4,11 @@
 #include <cmath>
 
 #include "isp/model/appearance/seen_scene.h"
+#include "isp/model/night_eye.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double k3_cd_m2 = 0.108;
 constexpr double most_exponent = 4;
 constexpr double reference_cd_m2 = 200;
 
@@ -18,7 +18,7 @@ Vector3 scaled(double scale, const Vector3& v) { return {scale * v[0], scale * v
 
 }  // namespace
 
-double wanat_saturation(double luminance_cd_m2) { return luminance_cd_m2 / (luminance_cd_m2 + k3_cd_m2); }
+double wanat_saturation(double luminance_cd_m2) { return luminance_cd_m2 / (luminance_cd_m2 + half_saturation_cd_m2); }
 
 double wanat_exponent(double from_cd_m2, double to_cd_m2) {
   const double from = wanat_saturation(from_cd_m2), to = wanat_saturation(to_cd_m2);
