@@ -6,7 +6,6 @@
 #include "isp/cli/lines.h"
 #include "isp/cli/report.h"
 #include "isp/cli/source_names.h"
-#include "isp/model/appearance/shin_table.h"
 
 namespace lowlux::cli {
 namespace {
@@ -29,7 +28,8 @@ std::string look_name(const isp::DevelopPlan& plan) {
   return plan.look->kind == isp::Look::model ? plan.options.look.model : "eye";
 }
 
-void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, bool noise_known) {
+void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, const std::string& coefficients,
+              bool noise_known) {
   if (look.kind != isp::Look::camera) {
     out.add("look", fmt::format("{}; scene {:.3g} cd/m2 ({}), adaptation m {:.2f}, {:+.2f} EV of darkness kept", name,
                                 look.mean_cd_m2, look.luminance_rule, look.state.m, look.dimming_ev));
@@ -44,7 +44,7 @@ void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, bo
                     "table of {0} x {0} chromaticities, {1} levels: off by {2:.2f} CIEDE2000 in the mean, {3:.2f} at "
                     "most",
                     look.table->cells, look.table->levels, look.table->error.mean, look.table->error.largest));
-    if (name == "shin") out.add("", fmt::format("coefficients = {}", isp::shin_substitute_name));
+    if (name == "shin") out.add("", fmt::format("coefficients = {}", coefficients));
   }
   if (look.noise_limit) {
     out.add("noise limit",
@@ -64,7 +64,9 @@ std::string explain_text(const isp::DevelopPlan& plan) {
   out.add("white", plan.white ? fmt::format("{}, {:.0f} K", plan.white_balance_rule, plan.white->cct_k)
                               : std::string(plan.white_balance_rule));
   out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.exposure_ev, plan.exposure_rule));
-  if (plan.look) add_look(out, *plan.look, look_name(plan), plan.look->noise || plan.noise_reduction.level);
+  if (plan.look)
+    add_look(out, *plan.look, look_name(plan), coefficients_of(plan.options.look),
+             plan.look->noise || plan.noise_reduction.level);
   if (plan.options.display) {
     const isp::DisplayTarget& display = *plan.options.display;
     out.add("display", fmt::format("{:g} to {:g} cd/m2, coefficients {}, table off by {:.2f} CIEDE2000 in the mean",

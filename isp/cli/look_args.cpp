@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
 
 #include "isp/cli/option_values.h"
 #include "isp/model/appearance/appearance_model.h"
@@ -136,6 +137,11 @@ void add_look(CLI::App& app, LookArgs& args) {
              args.choice.noise_limit = limit;
              return std::nullopt;
            });
+  app.add_option(
+         "--coefficients", args.coefficients,
+         "coefficients of Shin's model for --look shin and --display-luminance: lines of E, alpha, beta, l, a, m, b "
+         "(default: SHIN-SUB-1, a substitute)")
+      ->type_name("FILE");
   add_text(app, "--display-luminance", "CD_M2",
            "white of the display the picture is made for: colours are made up for what the eye misses there, against "
            "displays of 250 cd/m2 (default: no change)",
@@ -149,6 +155,9 @@ void add_look(CLI::App& app, LookArgs& args) {
 
 std::optional<std::string> complete_look(const LookArgs& args, isp::LookChoice& choice) {
   choice = args.choice;
+  if (!args.coefficients.empty() && choice.model != "shin" && !args.display_cd_m2) {
+    return "--coefficients go with --look shin or --display-luminance";
+  }
   constexpr std::array only_eye{"--effects", "--tolerance", "--field-of-view"};
   for (const std::string& option : args.given) {
     const bool for_models = std::ranges::find(only_eye, option) == only_eye.end();

@@ -16,6 +16,7 @@ namespace lowlux::cli {
 struct LookArgs {
   isp::LookChoice choice;
   bool noise_limit_given = false;
+  std::string coefficients;             // file of a table for Shin's model; empty: the substitute
   std::optional<double> display_cd_m2;  // white of the display pictures are made for
   std::vector<std::string> given;       // options that do not go with every look
 };

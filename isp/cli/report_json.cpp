@@ -5,7 +5,6 @@
 #include "calib/profile_use.h"
 #include "isp/cli/report.h"
 #include "isp/cli/source_names.h"
-#include "isp/model/appearance/shin_table.h"
 #include "isp/model/camera_colour.h"
 #include "isp/model/scene_luminance.h"
 #include "isp/raw/masked_black.h"
@@ -94,7 +93,7 @@ Json look_json(const isp::DevelopPlan& plan) {
   if (look.table) {
     json["table_mean_ciede2000"] = look.table->error.mean;
     json["table_max_ciede2000"] = look.table->error.largest;
-    if (model == "shin") json["coefficients"] = isp::shin_substitute_name;
+    if (model == "shin") json["coefficients"] = coefficients_of(plan.options.look);
   }
   json["scene_luminance_cd_m2"] = look.mean_cd_m2;
   json["luminance_rule"] = look.luminance_rule;

@@ -8,6 +8,7 @@
 #include "isp/cli/exit_code.h"
 #include "isp/cli/outputs.h"
 #include "isp/cli/raw_batch.h"
+#include "isp/cli/shin_file.h"
 #include "isp/cli/verbs.h"
 #include "isp/cli/version.h"
 #include "isp/output/image_writer.h"
@@ -52,11 +53,17 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
   return write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);
 }
 
-// The table is made once for all files.
+// What all files share of looks and displays: the table is made once.
 Result<void> make_for_display(const DevelopArgs& args, isp::DevelopOptions& options) {
+  if (const std::string& file = args.look.coefficients; !file.empty()) {
+    auto table = read_shin_file(file);
+    if (!table) return tl::make_unexpected(table.error());
+    options.look.shin = std::make_shared<const isp::ShinTable>(*std::move(table));
+  }
   if (!args.look.display_cd_m2) return {};
   PoolExecutor executor(2);
-  auto target = isp::display_target({.display_cd_m2 = *args.look.display_cd_m2}, executor);
+  auto target =
+      isp::display_target({.display_cd_m2 = *args.look.display_cd_m2, .shin = options.look.shin.get()}, executor);
   if (!target) return fail(target.error().code, target.error().message, "--display-luminance");
   options.display = std::make_shared<const isp::DisplayTarget>(*std::move(target));
   return {};
@@ -89,10 +96,14 @@ int run_develop(const std::vector<std::string>& words) {
   const Result<std::vector<std::string>> darks = dark_files(args);
   if (!darks) return usage_error(darks.error());
   std::vector<std::string> only_read = *darks;
-  only_read.insert(only_read.end(), {args.profile, args.black_profile, args.dark.doubling_profile});
+  only_read.insert(only_read.end(),
+                   {args.profile, args.black_profile, args.dark.doubling_profile, args.look.coefficients});
   if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed) return usage_error(unharmed.error());
 
-  if (const auto made = make_for_display(args, *options); !made) return usage_error(made.error());
+  if (const auto made = make_for_display(args, *options); !made) {
+    fmt::print(stderr, "{}\n", error_line(made.error().where, made.error()));
+    return exit_failed;
+  }
   const Result<RawBatch> batch = make_batch(args, *options, *std::move(jobs), *darks);
   if (!batch) {
     fmt::print(stderr, "{}\n", error_line(batch.error().where, batch.error()));

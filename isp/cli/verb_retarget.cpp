@@ -1,4 +1,3 @@
-#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -6,12 +5,12 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "capture/file/file_bytes.h"
 #include "capture/file/picture_source.h"
 #include "isp/base/executor.h"
 #include "isp/cli/lines.h"
 #include "isp/cli/picture_verb.h"
 #include "isp/cli/retarget_args.h"
+#include "isp/cli/shin_file.h"
 #include "isp/cli/verbs.h"
 #include "isp/model/appearance/shin_table.h"
 #include "isp/pipeline/retarget_picture.h"
@@ -36,11 +35,8 @@ Result<Outcome> worked(const RetargetArgs& args, const PictureKind& kind, Execut
   isp::RetargetOptions options = args.options;
   Result<isp::ShinTable> table = isp::shin_substitute();
   if (!args.coefficients.empty()) {
-    constexpr std::size_t most_bytes = 1 << 20;
-    const auto bytes = capture::read_file_bytes(args.coefficients, most_bytes);
-    if (!bytes) return tl::make_unexpected(bytes.error());
-    table = isp::read_shin_table({reinterpret_cast<const char*>(bytes->data()), bytes->size()}, args.coefficients);
-    if (!table) return fail(table.error().code, table.error().message, args.coefficients);
+    table = read_shin_file(args.coefficients);
+    if (!table) return tl::make_unexpected(table.error());
     options.shin = &*table;
   }
   auto picture = capture::read_picture(args.input, executor);

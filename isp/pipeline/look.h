@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -8,6 +9,7 @@
 
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
+#include "isp/model/appearance/shin_table.h"
 #include "isp/model/night_eye.h"
 #include "isp/render/colour_table.h"
 #include "isp/render/night_look.h"
@@ -22,6 +24,7 @@ enum class Look : std::uint8_t { camera, eye, model };
 struct LookChoice {
   Look look = Look::camera;
   std::string model;                            // for Look::model: a name of appearance_models()
+  std::shared_ptr<const ShinTable> shin;        // of the model shin; absent: the substitute
   std::optional<double> scene_luminance_cd_m2;  // mean over the picture; absent: from how it was exposed
   std::optional<double> profile_iso;            // ISO speed by the camera's profile, where the frame tells none
   /// Which effects: those that are seen, all, or these.
@@ -33,6 +36,11 @@ struct LookChoice {
   /// CIE L* that noise may reach, see NoiseLimit; absent: no limit.
   std::optional<double> noise_limit;
 };
+
+/// Where the coefficients of Shin's model come from.
+inline std::string coefficients_of(const LookChoice& choice) {
+  return choice.shin ? choice.shin->name : std::string(shin_substitute_name);
+}
 
 /// One effect's part in a decision.
 struct LookEffect {

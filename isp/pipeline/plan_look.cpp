@@ -190,6 +190,7 @@ Result<void> plan_model(DevelopPlan& plan) {
   const Matrix3 rgb_to_xyz = *inverse(*xyz_to_output(plan.options.space));
   ViewingConditions scene{.white_cd_m2 = look.white_cd_m2};
   scene.adaptation_cd_m2 = look.mean_cd_m2;
+  scene.shin = plan.options.look.shin.get();
   scene.scotopic_ratio = look.look.scotopic_ratio_of_white;
   if (plan.white) scene.colour_temperature_k = plan.white->cct_k;
   if (look.noise && plan.white) scene.noise_covariance = noise_of_cones(*look.noise, plan, rgb_to_xyz);

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -65,7 +66,22 @@ TEST_F(LookCommand, OfAModelNamesItsTableAndCoefficients) {
   EXPECT_EQ(dim["display"]["display_cd_m2"], 2);
 }
 
+TEST_F(LookCommand, TakesCoefficientsFromAFile) {
+  std::ofstream(file("shin.csv")) << "0.01,0.2,0.8,0.1,0,0.1,0\n1000,1,0,1,0,1,0\n";
+  std::ofstream(file("bad.csv")) << "0.01,0.2,0.8\n";
+  const Json shin = look_of({"--look", "shin", "--coefficients", file("shin.csv")})["look"];
+  EXPECT_EQ(shin["coefficients"], file("shin.csv"));
+  const Json dim = look_of({"--display-luminance", "2", "--coefficients", file("shin.csv")});
+  EXPECT_EQ(dim["display"]["coefficients"], file("shin.csv"));
+  std::filesystem::remove(file("seen.png"));
+  const auto bad = developed({"--look", "shin", "--coefficients", file("bad.csv")}, file("night.dng"));
+  EXPECT_EQ(bad.exit_code, 1);
+  EXPECT_NE(bad.err.find("bad.csv"), std::string::npos) << bad.err;
+  EXPECT_FALSE(std::filesystem::exists(file("seen.png")));
+}
+
 TEST_F(LookCommand, RefusesWhatDoesNotFit) {
+  refused({"--coefficients", "shin.csv"}, "--look shin");
   refused({"--look", "owl"}, "is none of camera, eye, ");
   refused({"--scene-luminance", "1"}, "--look eye");
   refused({"--look", "shin", "--effects", "all"}, "--look eye");

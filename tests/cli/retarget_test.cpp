@@ -98,7 +98,8 @@ TEST_F(RetargetCommand, CoefficientsAreReadFromAFile) {
   std::ofstream(file("bad.csv")) << "1,2,3\n";
   refused({"--coefficients", file("bad.csv")}, 1, "bad.csv");
   refused({"--coefficients", file("missing.csv")}, 1, "missing.csv");
-  refused({"--coefficients", file("mine.csv"), "--model", "wanat"}, 2, "the model wanat has none");
+  refused({"--coefficients", file("mine.csv"), "--model", "wanat"}, 2, "the model wanat has no coefficients");
+  refused({"--units", "luminance", "--model", "cao"}, 2, "the model cao has no coefficients");
 }
 
 TEST_F(RetargetCommand, WrongCommandLinesAreTold) {
