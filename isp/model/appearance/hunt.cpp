@@ -51,23 +51,15 @@ namespace {
 AchromaticSignal signal_at(double adaptation_cd_m2, std::optional<double> colour_temperature_k) {
   const double level = luminance_level_factor(adaptation_cd_m2), bleaching = 1e7 / (1e7 + 5 * adaptation_cd_m2);
   const RodAdaptation rods = rod_adaptation(scotopic_adaptation(adaptation_cd_m2, colour_temperature_k));
-  const auto achromatic = [=](const Vector3& cones, double s) {
+  return [=](const Vector3& cones, double s) {
     Vector3 response{};
     for (int i = 0; i < 3; ++i) response[i] = bleaching * hunt_response(level * cones[i]) + 1;
     const double cone_signal = 2 * response[0] + response[1] + response[2] / 20 - 3.05 + 1;
     return hunt_achromatic(cone_signal, rod_signal(rods, s), 1);  // N_bb falls out of the ratio
   };
-  const double black = achromatic({}, 0), white = achromatic({1, 1, 1}, 1) - black;
-  return [=](const Vector3& cones, double s) { return (achromatic(cones, s) - black) / white; };
 }
 
-Result<ColourMap> hunt_map(const ViewingConditions& conditions) {
-  const auto scene = seen_scene(conditions);
-  if (!scene) return tl::make_unexpected(scene.error());
-  const double adaptation = std::min(scene->adaptation_cd_m2, daylight_adaptation_cd_m2);
-  return lightness_match(*scene, signal_at(adaptation, conditions.colour_temperature_k),
-                         signal_at(daylight_adaptation_cd_m2, conditions.colour_temperature_k));
-}
+Result<ColourMap> hunt_map(const ViewingConditions& conditions) { return lightness_match(conditions, signal_at); }
 
 }  // namespace
 

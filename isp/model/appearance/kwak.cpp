@@ -28,20 +28,12 @@ namespace {
 AchromaticSignal signal_at(double adaptation_cd_m2, std::optional<double> colour_temperature_k) {
   const double level = luminance_level_factor(adaptation_cd_m2);
   const RodAdaptation rods = rod_adaptation(scotopic_adaptation(adaptation_cd_m2, colour_temperature_k));
-  const auto achromatic = [=](const Vector3& cones, double s) {
+  return [=](const Vector3& cones, double s) {
     return kwak_achromatic(level, {100 * cones[0], 100 * cones[1], 100 * cones[2]}, rod_signal(rods, s));
   };
-  const double black = achromatic({}, 0), white = achromatic({1, 1, 1}, 1) - black;
-  return [=](const Vector3& cones, double s) { return (achromatic(cones, s) - black) / white; };
 }
 
-Result<ColourMap> kwak_map(const ViewingConditions& conditions) {
-  const auto scene = seen_scene(conditions);
-  if (!scene) return tl::make_unexpected(scene.error());
-  const double adaptation = std::min(scene->adaptation_cd_m2, daylight_adaptation_cd_m2);
-  return lightness_match(*scene, signal_at(adaptation, conditions.colour_temperature_k),
-                         signal_at(daylight_adaptation_cd_m2, conditions.colour_temperature_k));
-}
+Result<ColourMap> kwak_map(const ViewingConditions& conditions) { return lightness_match(conditions, signal_at); }
 
 }  // namespace
 

@@ -35,6 +35,11 @@ double octaves_to(double target, const Excitation& e, const AchromaticSignal& si
   return bracketed_root(excess, here, end, tolerance);
 }
 
+AchromaticSignal above_black(const AchromaticSignal& signal) {
+  const double black = signal({}, 0), white = signal({1, 1, 1}, 1) - black;
+  return [=](const Vector3& cones, double rods) { return (signal(cones, rods) - black) / white; };
+}
+
 }  // namespace
 
 ColourMap lightness_match(const SeenScene& scene, AchromaticSignal dark, AchromaticSignal daylight) {
@@ -48,6 +53,16 @@ ColourMap lightness_match(const SeenScene& scene, AchromaticSignal dark, Achroma
     const double scale = std::exp2(octaves_to(dark(e.cones, e.rods), e, daylight));
     return Vector3{scale * xyz[0], scale * xyz[1], scale * xyz[2]};
   });
+}
+
+Result<ColourMap> lightness_match(const ViewingConditions& conditions, AchromaticModel model) {
+  const auto scene = seen_scene(conditions);
+  if (!scene) return tl::make_unexpected(scene.error());
+  const auto signal_at = [&](double adaptation_cd_m2) {
+    return above_black(model(adaptation_cd_m2, conditions.colour_temperature_k));
+  };
+  return lightness_match(*scene, signal_at(std::min(scene->adaptation_cd_m2, daylight_adaptation_cd_m2)),
+                         signal_at(daylight_adaptation_cd_m2));
 }
 
 }  // namespace lowlux::isp

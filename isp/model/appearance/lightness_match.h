@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "isp/model/appearance/seen_scene.h"
 
@@ -17,5 +18,11 @@ using AchromaticSignal = std::function<double(const Vector3& cones, double rods)
 /// A map that scales a colour until it gives in daylight the signal that it gives in the dark. Chromaticities are kept,
 /// the sign of a luminance too; scales are kept within 1/1024 and 1024.
 ColourMap lightness_match(const SeenScene& scene, AchromaticSignal dark, AchromaticSignal daylight);
+
+/// A model's signal in one state of adaptation, on any scale.
+using AchromaticModel = AchromaticSignal (*)(double adaptation_cd_m2, std::optional<double> colour_temperature_k);
+
+/// lightness_match() of a model in the scene and in daylight. Errors: those of seen_scene().
+Result<ColourMap> lightness_match(const ViewingConditions& conditions, AchromaticModel model);
 
 }  // namespace lowlux::isp
