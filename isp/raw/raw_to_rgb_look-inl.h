@@ -56,21 +56,16 @@ struct LookVectors {
     dark = constant(from.dark);
   }
 
-  struct Parts {
-    VF even[LookGrid::parts];
-    VF odd[LookGrid::parts];
-  };
-
-  HWY_INLINE Parts parts_at(int i) const {
-    Parts out;
+  /// The parts at the even and at the odd pixels of pairs i and on. No struct holds them: its constructor would be
+  /// compiled for another target.
+  HWY_INLINE void parts_at(int i, VF (&even)[LookGrid::parts], VF (&odd)[LookGrid::parts]) const {
     for (int k = 0; k < LookGrid::parts; ++k) {
       const VF cells = load(row.part[k] + i / 2 - 1);
       const VF a = hn::TableLookupLanes(cells, before);
       const VF step = hn::Sub(hn::TableLookupLanes(cells, after), a);
-      out.even[k] = hn::MulAdd(even_way, step, a);
-      out.odd[k] = hn::MulAdd(odd_way, step, a);
+      even[k] = hn::MulAdd(even_way, step, a);
+      odd[k] = hn::MulAdd(odd_way, step, a);
     }
-    return out;
   }
 
   static HWY_INLINE VF weighted(const VF (&weight)[3], const Site& v) {
@@ -93,8 +88,9 @@ struct LookVectors {
   }
 
   HWY_INLINE void operator()(SitePair& v, int i) const {
-    const Parts parts = parts_at(i);
-    v = {seen(v.even, parts.even), seen(v.odd, parts.odd)};
+    VF even[LookGrid::parts], odd[LookGrid::parts];
+    parts_at(i, even, odd);
+    v = {seen(v.even, even), seen(v.odd, odd)};
   }
 };
 
