@@ -47,7 +47,11 @@ bool bounds_noise(const DevelopPlan& plan) {
   return plan.look && plan.look->noise_limit && (plan.look->noise || plan.noise_reduction.level);
 }
 
-bool needs_grid(const DevelopPlan& plan) { return plan.look && (plan.look->kind == Look::eye || bounds_noise(plan)); }
+bool shows_effects(const LookPlan& look) {
+  return std::ranges::any_of(look.effects, [](const LookEffect& effect) { return effect.used; });
+}
+
+bool needs_grid(const DevelopPlan& plan) { return plan.look && (shows_effects(*plan.look) || bounds_noise(plan)); }
 
 bool keeps_maps(const DevelopPlan& plan) { return plan.options.denoise.maps || bounds_noise(plan); }
 

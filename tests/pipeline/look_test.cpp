@@ -78,6 +78,19 @@ TEST(EyeLook, OfABrightSceneIsThatOfTheCamera) {
   }
 }
 
+TEST(EyeLook, WithoutEffectsChangesNoBit) {
+  DevelopOptions none = eye_at(0.01), camera = eye_at(0.01);
+  none.look.which = LookChoice::Which::listed;
+  none.look.listed = {false, false, false, false, false, false};
+  camera.look = {};
+  const SceneLinear seen_so = seen(none), plain = seen(camera);
+  for (int c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < plain.plane[c].size(); ++i) {
+      ASSERT_EQ(seen_so.plane[c].data()[i], plain.plane[c].data()[i]);
+    }
+  }
+}
+
 TEST(EyeLook, DarkensRedsAndFadesColoursAsTheLightGoes) {
   double red_share = 10, red_saturation = 10, green_saturation = 10;
   for (const double cd_m2 : {100.0, 1.0, 0.1, 0.01, 0.001}) {
