@@ -35,14 +35,17 @@ void halve_row(const float* upper, const float* lower, int width, float* out) {
 
 void interpolate_row(const float* near_row, const float* far_row, int cells, int width, float* out) {
   const auto at = [&](int x) { return 0.75f * near_row[x] + 0.25f * far_row[x]; };
-  float before = at(0), here = before;
-  for (int x = 0; x < cells; ++x) {
-    const float after = x + 1 < cells ? at(x + 1) : here;
-    out[2 * x] = 0.75f * here + 0.25f * before;
-    if (2 * x + 1 < width) out[2 * x + 1] = 0.75f * here + 0.25f * after;
-    before = here;
-    here = after;
+  const auto cell = [&](int x, int before, int after) {
+    out[2 * x] = 0.75f * at(x) + 0.25f * at(before);
+    if (2 * x + 1 < width) out[2 * x + 1] = 0.75f * at(x) + 0.25f * at(after);
+  };
+  cell(0, 0, std::min(1, cells - 1));
+  for (int x = 1; x + 1 < cells; ++x) {  // each on its own, so that vectors can be made of them
+    const float here = 0.75f * at(x);
+    out[2 * x] = here + 0.25f * at(x - 1);
+    out[2 * x + 1] = here + 0.25f * at(x + 1);
   }
+  if (cells > 1) cell(cells - 1, cells - 2, cells - 1);
 }
 
 void blur_row(const float* in, int width, const Gaussian& g, float* out) {

@@ -128,11 +128,16 @@ void NightLookGrid::State::take_light(const RgbView<const float>& camera, const 
   for_each_row(executor, y.height, [&](int row) {
     rows::light_row({{camera[0].row(row), camera[1].row(row), camera[2].row(row)}}, weights, y.width, y.row(row),
                     s.row(row));
+    const float* const light = y.row(row);
+    float* const own_rods = s.row(row);
+    float* const cones_field = field_y.row(row);
+    float* const rods_field = field_s.row(row);
     for (int x = 0; x < y.width; ++x) {
-      const float light = y.row(row)[x];
-      s.row(row)[x] = std::max(s.row(row)[x], std::min(LookGrid::least_rods * light, light));
-      field_y.row(row)[x] = std::clamp(cones * light, 0.0f, 1e9f);
-      field_s.row(row)[x] = std::clamp(rods * s.row(row)[x], least_field_ratio * field_y.row(row)[x], 1e9f);
+      own_rods[x] = std::max(own_rods[x], std::min(LookGrid::least_rods * light[x], light[x]));
+    }
+    for (int x = 0; x < y.width; ++x) cones_field[x] = std::min(std::max(cones * light[x], 0.0f), 1e9f);
+    for (int x = 0; x < y.width; ++x) {
+      rods_field[x] = std::min(std::max(rods * own_rods[x], least_field_ratio * cones_field[x]), 1e9f);
     }
   });
 }
