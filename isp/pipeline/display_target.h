@@ -20,6 +20,9 @@ struct DisplayTarget {
   MeasuredTable made;
 };
 
+/// A map as the smallest table within retarget_table_tolerance. Takes up to seconds.
+MeasuredTable retarget_table(const RetargetMap& map, Executor& executor);
+
 /// Tabulates retargeting(options). Takes up to seconds. Errors: those of retargeting().
 Result<DisplayTarget> display_target(const RetargetOptions& options, Executor& executor);
 

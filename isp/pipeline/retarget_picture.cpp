@@ -58,8 +58,7 @@ Result<RetargetedPicture> retarget_picture(const SceneLinear& xyz, const Retarge
                                            Executor& executor) {
   const auto map = retargeting(options);
   if (!map) return tl::make_unexpected(map.error());
-  const CodeMap codes = [&map](const Vector3& code) { return (*map)(code).code; };
-  const MeasuredTable made = tabulated_to(codes, retarget_table_tolerance, executor);
+  const MeasuredTable made = retarget_table(*map, executor);
   const Picture picture = encode_picture(xyz, OutputSpace::srgb, SampleType::u16, executor);
   const auto& in = std::get<Encoded16>(picture);
   RetargetedPicture out;
