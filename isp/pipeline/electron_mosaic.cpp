@@ -20,8 +20,14 @@ RawElectrons raw_electrons(const RawFrame& frame, const DevelopPlan& plan, Plane
   if (memory.width() != raw.active.width || memory.height() != raw.active.height) {
     memory = Plane<float>(raw.active.width, raw.active.height);
   }
-  take_black_off(raw, plan, memory.view(), executor);
-  RawElectrons out = to_electrons(RawFraction{std::move(memory), raw.phase}, *plan.electrons_at_white, executor);
+  RawElectrons out;
+  if (plan.options.dark_frame) {
+    take_black_off(raw, plan, memory.view(), executor);
+    out = to_electrons(RawFraction{std::move(memory), raw.phase}, *plan.electrons_at_white, executor);
+  } else {
+    to_electrons(raw, plan.black, *plan.electrons_at_white, memory.view(), executor);
+    out = {std::move(memory), raw.phase};
+  }
   repair(out.value.view(), plan.defects, 2);
   return out;
 }

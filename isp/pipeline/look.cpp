@@ -60,8 +60,8 @@ bool* effect_named(NightEffects& effects, std::string_view name) {
   return found == night_effect_names.end() ? nullptr : switches[found - night_effect_names.begin()];
 }
 
-std::vector<LookEffect> predict_effects(const NightEye& darkest, double scotopic_ratio_of_white,
-                                        double pixels_per_degree) {
+std::array<LookEffect, 6> predict_effects(const NightEye& darkest, double scotopic_ratio_of_white,
+                                          double pixels_per_degree) {
   const double rods = (1 - darkest.state.m) * scotopic_at_555_nm * scotopic_ratio_of_white;
   const double share = rods / (darkest.state.m + rods);
   constexpr double taste = std::numeric_limits<double>::quiet_NaN();
@@ -71,8 +71,8 @@ std::vector<LookEffect> predict_effects(const NightEye& darkest, double scotopic
                                    lost_contrast(darkest.blur_std_deg * pixels_per_degree),
                                    taste,
                                    taste};
-  std::vector<LookEffect> out;
-  for (std::size_t k = 0; k < size.size(); ++k) out.push_back({night_effect_names[k], size[k], false});
+  std::array<LookEffect, 6> out;
+  for (std::size_t k = 0; k < size.size(); ++k) out[k] = {night_effect_names[k], size[k], false};
   return out;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -76,7 +77,7 @@ bool* effect_named(NightEffects& effects, std::string_view name);
 /// Size of each effect for an eye in a state: the largest CIEDE2000 between what is shown with it alone and without
 /// any, over the primaries, secondaries and the white of Rec. 709; for acuity, of a grating of black and white at a
 /// quarter of the pixels' frequency. Glare and visual noise are a matter of taste: not a number.
-std::vector<LookEffect> predict_effects(const NightEye& darkest, double scotopic_ratio_of_white,
-                                        double pixels_per_degree);
+std::array<LookEffect, 6> predict_effects(const NightEye& darkest, double scotopic_ratio_of_white,
+                                          double pixels_per_degree);
 
 }  // namespace lowlux::isp

@@ -102,7 +102,8 @@ LuminancePair darkest_field(std::span<const float> blocks, double white_cd_m2, c
 }
 
 void decide_effects(const LookChoice& choice, const NightEye& darkest, bool monochrome, LookPlan& look) {
-  look.effects = predict_effects(darkest, look.look.scotopic_ratio_of_white, look.look.pixels_per_degree);
+  const auto predicted = predict_effects(darkest, look.look.scotopic_ratio_of_white, look.look.pixels_per_degree);
+  look.effects.assign(predicted.begin(), predicted.end());
   if (monochrome) {
     for (int k = 0; k < 3; ++k) look.effects[static_cast<std::size_t>(k)].size = 0;  // those of colours
   }
@@ -158,7 +159,7 @@ Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPl
   const LookChoice& choice = plan.options.look;
   if (auto checked = check(choice, plan.options.space); !checked) return checked;
   if (choice.look == Look::camera && !choice.noise_limit) return {};
-  LookPlan look;
+  LookPlan& look = plan.look ? *plan.look : plan.look.emplace();
   look.kind = choice.look;
   look.noise_limit = choice.noise_limit;
   look.noise = frame.noise;
@@ -178,7 +179,6 @@ Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPl
   eye.cd_m2_per_unit = white_cd_m2 / units;
   eye.dark = static_cast<float>(std::clamp(light.black_noise_std * units, least_dark, 1.0));
   set_primaries(plan.options.space, eye);
-  plan.look = std::move(look);
   return {};
 }
 

@@ -15,10 +15,10 @@ struct FrameLight {
 };
 
 /// Decides the look: how bright the scene was, how an eye adapted to it sees it, which effects that calls for. Sets
-/// plan.look where one is asked for, and lowers an automatic exposure by the share of the darkness that is kept. Needs
-/// the plan's white balance and exposure.
-/// Errors: insufficient where the luminance is neither given nor told by the exposure; invalid_argument for figures out
-/// of range, or a space without RGB primaries (camera, xyz).
+/// plan.look where one is asked for (into the memory of one that is there), and lowers an automatic exposure by the
+/// share of the darkness that is kept. Needs the plan's white balance and exposure. Errors: insufficient where the
+/// luminance is neither given nor told by the exposure; invalid_argument for figures out of range, or a space without
+/// RGB primaries (camera, xyz).
 Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPlan& plan);
 
 /// Tabulates the model of a look that has one, for the scene's white, adaptation, light and noise. Needs

@@ -75,26 +75,6 @@ std::array<double, 3> balance_of(const RawFrame& frame, const DevelopPlan& plan)
   return gain;
 }
 
-/// Signal to noise ratio of a mean pixel of the block in the middle of all, dark blocks first.
-double middle_snr(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
-                  const Thumbnail& thumbnail) {
-  constexpr std::array share{0.25, 0.5, 0.25};
-  std::array<double, 3> electrons{};
-  for (int site = 0; site < 4; ++site) electrons[colour_of(frame.raw, site)] = (*plan.electrons_at_white)[site];
-  double dark = 0, variance = 0;
-  for (const double d : noise.dark_mean_e) dark += d / 4;
-  for (int c = 0; c < 3; ++c) variance += share[c] * noise.variance_e2[c];
-  std::vector<double> snr(thumbnail.mean.plane[0].size());
-  for (std::size_t i = 0; i < snr.size(); ++i) {
-    double charge = 0;
-    for (int c = 0; c < 3; ++c) charge += share[c] * electrons[c] * thumbnail.mean.plane[c].data()[i];
-    snr[i] = std::max(charge - dark, 0.0) / std::sqrt(std::max(charge, 0.0) + variance);
-  }
-  const auto middle = snr.begin() + static_cast<std::ptrdiff_t>(snr.size() / 2);
-  std::nth_element(snr.begin(), middle, snr.end());
-  return *middle;
-}
-
 /// Lines stand out where their own noise is more than the error of its measurement, and seen beside a pixel's: its sum
 /// over a line is what the eye follows. More than a pixel's noise is no readout, but a blind or a fence.
 void add_lines(const Result<denoise::LineOffsets>& found, double pixel_std_e,
@@ -150,6 +130,31 @@ std::optional<denoise::Level> level_for(double snr) {
   return snr >= 3 ? denoise::Level::standard : denoise::Level::high;
 }
 
+void set_noise_model(const RawFrame& frame, const DevelopPlan& plan, NoiseReduction& out) {
+  out.source = frame.noise->source;
+  out.noise = noise_of(frame, plan);
+  out.options.white_gain = balance_of(frame, plan);
+}
+
+double middle_snr(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
+                  const Thumbnail& thumbnail, std::vector<double>& snr) {
+  constexpr std::array share{0.25, 0.5, 0.25};
+  std::array<double, 3> electrons{};
+  for (int site = 0; site < 4; ++site) electrons[colour_of(frame.raw, site)] = (*plan.electrons_at_white)[site];
+  double dark = 0, variance = 0;
+  for (const double d : noise.dark_mean_e) dark += d / 4;
+  for (int c = 0; c < 3; ++c) variance += share[c] * noise.variance_e2[c];
+  snr.resize(thumbnail.mean.plane[0].size());
+  for (std::size_t i = 0; i < snr.size(); ++i) {
+    double charge = 0;
+    for (int c = 0; c < 3; ++c) charge += share[c] * electrons[c] * thumbnail.mean.plane[c].data()[i];
+    snr[i] = std::max(charge - dark, 0.0) / std::sqrt(std::max(charge, 0.0) + variance);
+  }
+  const auto middle = snr.begin() + static_cast<std::ptrdiff_t>(snr.size() / 2);
+  std::nth_element(snr.begin(), middle, snr.end());
+  return *middle;
+}
+
 Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan,
                                   Executor& executor) {
   const DenoiseChoice& choice = plan.options.denoise;
@@ -159,13 +164,12 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
     return left_alone(std::move(error->message));
   }
   NoiseReduction out;
-  out.source = frame.noise->source;
-  out.noise = noise_of(frame, plan);
-  out.snr = middle_snr(frame, plan, out.noise, thumbnail);
+  set_noise_model(frame, plan, out);
+  std::vector<double> memory;
+  out.snr = middle_snr(frame, plan, out.noise, thumbnail, memory);
   choose_level(choice, out);
   if (!out.level) return out;
   out.options.level = *out.level;
-  out.options.white_gain = balance_of(frame, plan);
   RawElectrons charge = raw_electrons(frame, plan, {}, executor);
   if (choice.line_noise) take_lines_off(charge, out);
   const denoise::NoiseCheck check = denoise::check_noise({charge.value.view(), charge.phase}, out.noise);

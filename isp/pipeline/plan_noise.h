@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
@@ -14,5 +16,16 @@ namespace lowlux::isp {
 /// For an automatic one these are reasons to leave the noise.
 Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan,
                                   Executor& executor);
+
+// Its steps that allocate nothing.
+
+/// The noise of a frame's raw values and the balance its chroma is counted in. Needs frame.noise, and of the plan
+/// black, electrons at white and white gains.
+void set_noise_model(const RawFrame& frame, const DevelopPlan& plan, NoiseReduction& out);
+
+/// Signal to noise ratio of a mean pixel of the block in the middle of all, dark blocks first.
+/// @param memory  grows to as many figures as there are blocks
+double middle_snr(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
+                  const Thumbnail& thumbnail, std::vector<double>& memory);
 
 }  // namespace lowlux::isp

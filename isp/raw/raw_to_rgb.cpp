@@ -57,6 +57,17 @@ struct ChangedCodeRows {
   void finish(int y) const { change_row(*change, row, out.width / 3, out.row(y)); }
 };
 
+/// Through a row of codes of this thread's own, to a sink.
+struct SunkRows {
+  const ToneTable* tone;
+  const RowSink* sink;
+  std::uint8_t* row;
+  int thread;
+  int width;
+  rows::Codes8 operator()(int /*y*/) const { return {tone, row}; }
+  void finish(int y) const { sink->row(sink->context, thread, y, row, width); }
+};
+
 struct PlaneRowsOut {
   RgbView<float> out;
   rows::Planes operator()(int y) const { return {{out[0].row(y), out[1].row(y), out[2].row(y)}}; }
@@ -179,7 +190,8 @@ RawToRgb::Bench RawToRgb::bench(int thread) const {
   const std::size_t misaligned = address / sizeof(float) % line_floats;
   float* const start = memory_.get() + (line_floats - misaligned) % line_floats;
   const std::size_t runs = run_stride_ * runs_per_thread;
-  return {{start + rows::padding_before + runs * static_cast<std::size_t>(thread), run_stride_},
+  return {thread,
+          {start + rows::padding_before + runs * static_cast<std::size_t>(thread), run_stride_},
           start + runs * static_cast<std::size_t>(threads_) +
               look_stride_ * LookGrid::parts * static_cast<std::size_t>(thread),
           codes_.get() + codes_stride_ * static_cast<std::size_t>(thread)};
@@ -231,6 +243,18 @@ void RawToRgb::rgb8(const RgbInput& in, const RgbTransform& transform, const Ton
 void RawToRgb::rgb16(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone,
                      PlaneView<std::uint16_t> out, Executor& executor, const CodeChange* change) {
   to_codes<rows::Codes16>(in, transform, tone, out, executor, change);
+}
+
+void RawToRgb::rows8(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, const RowSink& sink,
+                     Executor& executor) {
+  assert(reaches_one(tone));
+  const int width = std::visit([](const auto& input) { return width_of(input); }, in);
+  convert(
+      in, transform,
+      [&](const Bench& own) {
+        return SunkRows{&tone, &sink, reinterpret_cast<std::uint8_t*>(own.codes), own.thread, width};
+      },
+      executor);
 }
 
 void RawToRgb::linear(const RgbInput& in, const RgbTransform& transform, RgbView<float> out, Executor& executor) {

@@ -65,6 +65,13 @@ struct CodeChange {
   const void* context = nullptr;
 };
 
+/// Takes rows of interleaved 8-bit codes R G B as they are made. A thread's rows come in rising order and without gaps,
+/// from an even one on; called from several threads at once, each for rows of its own. Must not throw.
+struct RowSink {
+  void (*row)(void* context, int thread, int y, const std::uint8_t* rgb, int width) = nullptr;
+  void* context = nullptr;
+};
+
 /// Mosaic or camera RGB to a picture in one pass over row bands: Malvar-He-Cutler demosaic (ICASSP 2004, the
 /// 5x5 filters of its figure 2; borders mirrored without repeating the edge), RgbTransform, tone.
 ///
@@ -82,6 +89,9 @@ class RawToRgb {
   /// The same with round(65535 tone), linear between the edges of a bin.
   void rgb16(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, PlaneView<std::uint16_t> out,
              Executor& executor, const CodeChange* change = nullptr);
+  /// The codes of rgb8, row by row to a sink; `thread` is below the number of threads.
+  void rows8(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, const RowSink& sink,
+             Executor& executor);
   /// Planar float, no tone.
   void linear(const RgbInput& in, const RgbTransform& transform, RgbView<float> out, Executor& executor);
 
@@ -109,7 +119,7 @@ class RawToRgb {
   std::size_t look_stride_;  // floats from one part of a look's row to the next
   std::size_t codes_stride_;
   std::unique_ptr<float[]> memory_;
-  std::unique_ptr<std::uint16_t[]> codes_;  // rows on their way through a CodeChange
+  std::unique_ptr<std::uint16_t[]> codes_;  // rows on their way to a CodeChange or a RowSink
 };
 
 /// The vector instruction set the kernels use on this machine, as Highway names it.

@@ -101,6 +101,7 @@ inline std::size_t run_of(int width) {
 
 /// Scratch of one thread.
 struct RawToRgb::Bench {
+  int thread;
   Ring ring;
   float* look;
   std::uint16_t* codes;  // 3 for each pixel of a row

@@ -1,9 +1,8 @@
 #include "isp/raw/thumbnail.h"
 
 #include <algorithm>
-#include <array>
+#include <cassert>
 #include <cmath>
-#include <cstdint>
 #include <cstdlib>
 
 #include "isp/raw/black_point.h"
@@ -15,35 +14,29 @@ constexpr int max_blocks = 256;  // in either direction
 constexpr double difference_to_std =
     0.886226925452758;  // sqrt(pi) / 2: mean |a - b| of two normals is 2 std / sqrt(pi)
 
-// Sums of one block, per colour sample: site of a Bayer cell, or R, G, B of linear_rgb.
-struct BlockSums {
-  std::array<std::int64_t, 4> sum{};
-  std::array<std::int64_t, 4> n{};
-  std::int64_t clipped = 0;
-  std::int64_t difference = 0;
-  std::int64_t differences = 0;
-};
-
-struct Layout {
-  int block = 2;    // side in pixels, even
-  int samples = 1;  // per pixel
-  int columns = 0;
-  int rows = 0;
-};
-
-Layout layout_of(const RawDn& raw) {
-  Layout l;
-  const int side = std::max(raw.active.width, raw.active.height);
-  l.block = std::max(4, (side + max_blocks - 1) / max_blocks);
-  l.block += l.block & 1;
-  l.samples = raw.layout == SensorLayout::linear_rgb ? 3 : 1;
-  l.columns = (raw.active.width + l.block - 1) / l.block;
-  l.rows = (raw.active.height + l.block - 1) / l.block;
-  return l;
+int block_of(const Rect& active) {
+  const int side = std::max(active.width, active.height);
+  const int block = std::max(4, (side + max_blocks - 1) / max_blocks);
+  return block + (block & 1);
 }
 
+}  // namespace
+
+ThumbnailSums::ThumbnailSums(const RawDn& raw)
+    : block_(block_of(raw.active)),
+      samples_(raw.layout == SensorLayout::linear_rgb ? 3 : 1),
+      width_(raw.active.width),
+      columns_((raw.active.width + block_ - 1) / block_),
+      rows_((raw.active.height + block_ - 1) / block_),
+      white_dn_(raw.white_dn),
+      blocks_(static_cast<std::size_t>(columns_) * rows_) {
+  differences_dn_.reserve(blocks_.size());
+}
+
+void ThumbnailSums::clear() { std::ranges::fill(blocks_, Block{}); }
+
 // One row of one block: sums of the even and of the odd columns.
-void add_row(const std::uint16_t* dn, int width, int y, std::uint16_t white, BlockSums& block) {
+void ThumbnailSums::add_mosaic(const std::uint16_t* dn, int width, int y, std::uint16_t white, Block& block) {
   std::uint32_t even = 0, odd = 0, clipped = 0, difference = 0;
   for (int x = 0; x + 1 < width; x += 2) {
     even += dn[x];
@@ -65,20 +58,34 @@ void add_row(const std::uint16_t* dn, int width, int y, std::uint16_t white, Blo
   block.differences += width / 4;
 }
 
-void add_rgb_row(const std::uint16_t* dn, int width, const std::array<double, 3>& white, BlockSums& block) {
+void ThumbnailSums::add_rgb(const std::uint16_t* dn, int width, Block& block) const {
   for (int x = 0; x < width; ++x) {
     if (x + 1 < width) block.difference += std::abs(dn[3 * x + 1] - dn[3 * x + 4]);
     for (int c = 0; c < 3; ++c) {
       block.sum[c] += dn[3 * x + c];
-      block.clipped += dn[3 * x + c] >= white[c];
+      block.clipped += dn[3 * x + c] >= white_dn_[c];
     }
   }
   block.differences += width - 1;
   for (int c = 0; c < 3; ++c) block.n[c] += width;
 }
 
+void ThumbnailSums::add_row(const std::uint16_t* dn, int y) {
+  const auto white = static_cast<std::uint16_t>(std::min(65535.0, *std::ranges::min_element(white_dn_)));
+  Block* const blocks = &blocks_[static_cast<std::size_t>(y / block_) * columns_];
+  for (int b = 0; b < columns_; ++b) {
+    const int x = b * block_;
+    const int width = std::min(block_, width_ - x);
+    if (samples_ == 3) {
+      add_rgb(dn + 3 * x, width, blocks[b]);
+    } else {
+      add_mosaic(dn + x, width, y, white, blocks[b]);
+    }
+  }
+}
+
 // Fraction of white of each colour, mean over the block.
-std::array<double, 3> colour_means(const RawDn& raw, const BlackPoint& black, const BlockSums& block) {
+std::array<double, 3> ThumbnailSums::colour_means(const RawDn& raw, const BlackPoint& black, const Block& block) const {
   std::array<double, 3> sum{};
   std::array<int, 3> n{};
   for (int i = 0; i < 4; ++i) {
@@ -105,59 +112,44 @@ std::array<double, 3> colour_means(const RawDn& raw, const BlackPoint& black, co
   return sum;
 }
 
-double black_noise(const RawFrame& frame, const BlackPoint& black, std::vector<double> block_differences_dn) {
+double ThumbnailSums::black_noise(const RawFrame& frame, const BlackPoint& black) {
   const double range = mean_range_dn(frame.raw, black);
   const double measured = *std::max_element(black.noise_std_dn.begin(), black.noise_std_dn.end());
   if (measured > 0) return measured / range;
   if (frame.noise && frame.noise->offset[1] > 0) return std::sqrt(frame.noise->offset[1]);
-  if (block_differences_dn.empty()) return 0;
-  const auto low = block_differences_dn.begin() + static_cast<std::ptrdiff_t>(block_differences_dn.size() / 20);
-  std::nth_element(block_differences_dn.begin(), low, block_differences_dn.end());
+  if (differences_dn_.empty()) return 0;
+  const auto low = differences_dn_.begin() + static_cast<std::ptrdiff_t>(differences_dn_.size() / 20);
+  std::nth_element(differences_dn_.begin(), low, differences_dn_.end());
   return difference_to_std * *low / range;
 }
 
-void sum_block_row(const RawDn& raw, const Layout& l, int block_row, BlockSums* blocks) {
-  const Rect& a = raw.active;
-  const auto white =
-      static_cast<std::uint16_t>(std::min(65535.0, *std::min_element(raw.white_dn.begin(), raw.white_dn.end())));
-  const int y_end = std::min((block_row + 1) * l.block, a.height);
-  for (int y = block_row * l.block; y < y_end; ++y) {
-    const std::uint16_t* row = raw.dn.row(a.y + y) + a.x * l.samples;
-    for (int b = 0; b < l.columns; ++b) {
-      const int x = b * l.block;
-      const int width = std::min(l.block, a.width - x);
-      if (l.samples == 3) {
-        add_rgb_row(row + 3 * x, width, raw.white_dn, blocks[b]);
-      } else {
-        add_row(row + x, width, y, white, blocks[b]);
-      }
+void ThumbnailSums::make(const RawFrame& frame, const BlackPoint& black, Thumbnail& out) {
+  if (out.mean.width() != columns_ || out.mean.height() != rows_) out.mean = CameraRgb(columns_, rows_);
+  differences_dn_.clear();
+  for (int y = 0; y < rows_; ++y) {
+    for (int x = 0; x < columns_; ++x) {
+      const Block& block = blocks_[static_cast<std::size_t>(y) * columns_ + x];
+      const std::array<double, 3> mean = colour_means(frame.raw, black, block);
+      for (int c = 0; c < 3; ++c) out.mean.plane[c].at(x, y) = static_cast<float>(mean[c]);
+      if (block.difference > 0 && block.clipped == 0)
+        differences_dn_.push_back(static_cast<double>(block.difference) / static_cast<double>(block.differences));
     }
   }
+  out.black_noise_std = black_noise(frame, black);
 }
-
-}  // namespace
 
 Thumbnail make_thumbnail(const RawFrame& frame, const BlackPoint& black, Executor& executor) {
   const RawDn& raw = frame.raw;
-  const Layout l = layout_of(raw);
-  std::vector<BlockSums> blocks(static_cast<std::size_t>(l.columns) * l.rows);
-  for_each_band(executor, l.rows, [&](RowBand band, int) {
-    for (int r = band.first; r < band.last; ++r)
-      sum_block_row(raw, l, r, &blocks[static_cast<std::size_t>(r) * l.columns]);
-  });
-
-  Thumbnail out{CameraRgb(l.columns, l.rows), 0};
-  std::vector<double> differences;
-  for (int y = 0; y < l.rows; ++y) {
-    for (int x = 0; x < l.columns; ++x) {
-      const BlockSums& block = blocks[static_cast<std::size_t>(y) * l.columns + x];
-      const std::array<double, 3> mean = colour_means(raw, black, block);
-      for (int c = 0; c < 3; ++c) out.mean.plane[c].at(x, y) = static_cast<float>(mean[c]);
-      if (block.difference > 0 && block.clipped == 0)
-        differences.push_back(static_cast<double>(block.difference) / static_cast<double>(block.differences));
+  ThumbnailSums sums(raw);
+  for_each_band(executor, sums.block_rows(), [&](RowBand band, int) {
+    const int end = std::min(band.last * sums.block(), raw.active.height);
+    for (int y = band.first * sums.block(); y < end; ++y) {
+      const int samples = raw.layout == SensorLayout::linear_rgb ? 3 : 1;
+      sums.add_row(raw.dn.row(raw.active.y + y) + raw.active.x * samples, y);
     }
-  }
-  out.black_noise_std = black_noise(frame, black, std::move(differences));
+  });
+  Thumbnail out;
+  sums.make(frame, black, out);
   return out;
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <vector>
 
 #include "isp/base/executor.h"
@@ -12,6 +14,45 @@ namespace lowlux::isp {
 struct Thumbnail {
   CameraRgb mean;              // block means, fraction of white, signed, not white balanced; at most 256 x 256
   double black_noise_std = 0;  // of one raw pixel without light, fraction of white; 0 if nothing tells
+};
+
+/// The sums behind a thumbnail, row by row, so that they can be taken while a frame comes in. Reserves its memory in
+/// the constructor; allocates nothing after.
+class ThumbnailSums {
+ public:
+  /// Of active areas of the size of `raw`'s, in its layout; of `raw` only layout, active area and white level are read.
+  explicit ThumbnailSums(const RawDn& raw);
+
+  /// Rows that belong together: a multiple of them starts with row 0.
+  int block() const { return block_; }
+  int block_rows() const { return rows_; }
+  void clear();
+  /// Row y of the active area, samples interleaved. Rows of one block of rows come from one thread.
+  void add_row(const std::uint16_t* dn, int y);
+  /// `frame` as in the constructor. Makes `out` of the right size where it is not.
+  void make(const RawFrame& frame, const BlackPoint& black, Thumbnail& out);
+
+ private:
+  struct Block {
+    std::array<std::int64_t, 4> sum{};  // per colour sample: site of a Bayer cell, or R, G, B of linear_rgb
+    std::array<std::int64_t, 4> n{};
+    std::int64_t clipped = 0;
+    std::int64_t difference = 0;
+    std::int64_t differences = 0;
+  };
+  static void add_mosaic(const std::uint16_t* dn, int width, int y, std::uint16_t white, Block& block);
+  void add_rgb(const std::uint16_t* dn, int width, Block& block) const;
+  double black_noise(const RawFrame& frame, const BlackPoint& black);
+  std::array<double, 3> colour_means(const RawDn& raw, const BlackPoint& black, const Block& block) const;
+
+  int block_ = 2;    // side in pixels, even
+  int samples_ = 1;  // per pixel
+  int width_ = 0;    // of the active area
+  int columns_ = 0;
+  int rows_ = 0;
+  std::array<double, 3> white_dn_{};
+  std::vector<Block> blocks_;
+  std::vector<double> differences_dn_;
 };
 
 /// Block means of the active area, saturated samples included; sums are integers, so any thread count gives the same.

@@ -1,5 +1,6 @@
 #include "isp/raw/to_linear.h"
 
+#include <array>
 #include <utility>
 
 #include "isp/raw/black_point.h"
@@ -38,6 +39,14 @@ void row_by_site(const RawDn& raw, const SiteScale& scale, int y, float* out) {
   for (int x = 0; x < raw.active.width; ++x) out[x] = (static_cast<float>(dn[x]) - black[x & 1]) * gain[x & 1];
 }
 
+void row_of(const RawDn& raw, const BlackPoint& black, const SiteScale& scale, int y, float* out) {
+  if (black.pattern) {
+    row_by_pattern(raw, *black.pattern, y, out);
+  } else {
+    row_by_site(raw, scale, y, out);
+  }
+}
+
 // Multiplies (or shifts) each site by its own figure.
 template <class Apply>
 void for_each_site(Plane<float>& plane, Executor& executor, const Apply& apply) {
@@ -54,13 +63,7 @@ void for_each_site(Plane<float>& plane, Executor& executor, const Apply& apply) 
 void to_fraction(const RawDn& raw, const BlackPoint& black, PlaneView<float> out, Executor& executor) {
   const SiteScale scale = site_scale(raw, black);
   for_each_band(executor, raw.active.height, [&](RowBand band, int) {
-    for (int y = band.first; y < band.last; ++y) {
-      if (black.pattern) {
-        row_by_pattern(raw, *black.pattern, y, out.row(y));
-      } else {
-        row_by_site(raw, scale, y, out.row(y));
-      }
-    }
+    for (int y = band.first; y < band.last; ++y) row_of(raw, black, scale, y, out.row(y));
   });
 }
 
@@ -100,6 +103,21 @@ RawElectrons to_electrons(RawFraction fraction, const PerSite<double>& electrons
   for_each_site(fraction.value, executor,
                 [&](float v, int site) { return v * static_cast<float>(electrons_at_white[site]); });
   return {std::move(fraction.value), fraction.phase};
+}
+
+void to_electrons(const RawDn& raw, const BlackPoint& black, const PerSite<double>& electrons_at_white,
+                  PlaneView<float> out, Executor& executor) {
+  const SiteScale scale = site_scale(raw, black);
+  for_each_band(executor, raw.active.height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      float* const row = out.row(y);
+      row_of(raw, black, scale, y, row);
+      const int left = site_of(0, y);
+      const std::array electrons{static_cast<float>(electrons_at_white[left]),
+                                 static_cast<float>(electrons_at_white[left + 1])};
+      for (int x = 0; x < raw.active.width; ++x) row[x] *= electrons[x & 1];
+    }
+  });
 }
 
 SignalElectrons subtract_dark(RawElectrons raw, const BlackPoint& black, Executor& executor) {

@@ -28,6 +28,9 @@ std::optional<PerSite<double>> electrons_at_white(const RawDn& raw, const NoiseP
 
 /// Fractions counted in electrons.
 RawElectrons to_electrons(RawFraction fraction, const PerSite<double>& electrons_at_white, Executor& executor);
+/// to_fraction and to_electrons of a Bayer frame in one pass: the same bits.
+void to_electrons(const RawDn& raw, const BlackPoint& black, const PerSite<double>& electrons_at_white,
+                  PlaneView<float> out, Executor& executor);
 
 /// Takes the mean dark charge off. Where the black point already held it (masked pixels) nothing is left to take.
 SignalElectrons subtract_dark(RawElectrons raw, const BlackPoint& black, Executor& executor);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
 
 namespace lowlux::isp {
 
@@ -19,23 +18,24 @@ std::vector<float> block_luminance(const RgbView<const float>& blocks, const Vec
   return luminance;
 }
 
-std::vector<float> block_values(const PlaneView<const float>& plane) {
-  std::vector<float> values;
-  values.reserve(static_cast<std::size_t>(plane.width) * plane.height);
-  for (int y = 0; y < plane.height; ++y) values.insert(values.end(), plane.row(y), plane.row(y) + plane.width);
-  return values;
+std::optional<double> quantile(std::span<const float> values, double share) {
+  std::vector<float> copy(values.begin(), values.end());
+  return quantile_reordering(copy, share);
 }
 
-std::optional<double> quantile(std::span<const float> values, double share) {
-  std::vector<float> finite;
-  finite.reserve(values.size());
-  std::copy_if(values.begin(), values.end(), std::back_inserter(finite), [](float v) { return std::isfinite(v); });
-  if (finite.empty()) return std::nullopt;
-  const auto rank = finite.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(finite.size() - 1));
-  std::nth_element(finite.begin(), rank, finite.end());
+std::optional<double> quantile_reordering(std::span<float> values, double share) {
+  const auto end = std::partition(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
+  const auto finite = end - values.begin();
+  if (finite == 0) return std::nullopt;
+  const auto rank = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(finite - 1));
+  std::nth_element(values.begin(), rank, end);
   return *rank;
 }
 
 double black_scatter(std::span<const float> values) { return std::fmax(0, -quantile(values, 0.01).value_or(0)); }
+
+double black_scatter_reordering(std::span<float> values) {
+  return std::fmax(0, -quantile_reordering(values, 0.01).value_or(0));
+}
 
 }  // namespace lowlux::isp

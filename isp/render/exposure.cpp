@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "isp/render/block_statistics.h"
 
@@ -34,9 +35,15 @@ std::string_view name_of(ExposureRule rule) {
 }
 
 AutoExposure auto_exposure(std::span<const float> luminance, double noise_floor, const AutoExposureOptions& options) {
-  const double bright = quantile(luminance, 0.99).value_or(0);
-  const double median = quantile(luminance, 0.5).value_or(0);
-  if (bright <= 0 || bright <= options.signal_to_scatter * black_scatter(luminance)) {
+  std::vector<float> copy(luminance.begin(), luminance.end());
+  return auto_exposure_reordering(copy, noise_floor, options);
+}
+
+AutoExposure auto_exposure_reordering(std::span<float> luminance, double noise_floor,
+                                      const AutoExposureOptions& options) {
+  const double bright = quantile_reordering(luminance, 0.99).value_or(0);
+  const double median = quantile_reordering(luminance, 0.5).value_or(0);
+  if (bright <= 0 || bright <= options.signal_to_scatter * black_scatter_reordering(luminance)) {
     return {0, ExposureRule::no_signal};
   }
   AutoExposure chosen{ev_to_reach(options.mid_grey, median), ExposureRule::mid_grey};

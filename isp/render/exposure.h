@@ -44,5 +44,8 @@ struct AutoExposureOptions {
 /// @param noise_floor  standard deviation of the black noise of one pixel, same unit; 0 if unknown
 AutoExposure auto_exposure(std::span<const float> luminance, double noise_floor,
                            const AutoExposureOptions& options = {});
+/// The same; allocates nothing and leaves the blocks in another order.
+AutoExposure auto_exposure_reordering(std::span<float> luminance, double noise_floor,
+                                      const AutoExposureOptions& options = {});
 
 }  // namespace lowlux::isp

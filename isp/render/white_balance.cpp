@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "isp/model/correlated_colour_temperature.h"
 #include "isp/render/block_statistics.h"
@@ -39,10 +41,13 @@ struct GreyEstimate {
 };
 
 /// Shades of grey over the blocks that qualify. The values are at most 1, so their powers sum without care.
-GreyEstimate shades_of_grey(const RgbView<const float>& blocks, double block_noise, const AutoWhiteOptions& options) {
+GreyEstimate shades_of_grey(const RgbView<const float>& blocks, double block_noise, const AutoWhiteOptions& options,
+                            std::span<float> memory) {
   std::array<double, 3> floor{};
   for (int c = 0; c < 3; ++c) {
-    floor[c] = std::fmax(options.signal_to_scatter * black_scatter(block_values(blocks[c])),
+    auto end = memory.begin();
+    for (int y = 0; y < blocks[c].height; ++y) end = std::copy_n(blocks[c].row(y), blocks[c].width, end);
+    floor[c] = std::fmax(options.signal_to_scatter * black_scatter_reordering({memory.begin(), end}),
                          options.signal_to_noise * block_noise);
   }
   GreyEstimate estimate;
@@ -132,29 +137,38 @@ Result<WhiteBalance> white_balance_of_temperature(const CameraColour& colour, do
   return balance_of_white(colour, *xy, WhiteSource::temperature);
 }
 
+WhiteEstimate estimate_white(const RgbView<const float>& blocks, double block_noise, const CameraColour& colour,
+                             const AutoWhiteOptions& options, std::span<float> memory) {
+  const GreyEstimate estimate = shades_of_grey(blocks, block_noise, options, memory);
+  WhiteEstimate out{.blocks = estimate.blocks};
+  if (estimate.blocks < options.min_blocks) return out;
+  out.balance = balance_of(colour, estimate.neutral, WhiteSource::estimated);
+  if (!out.balance.white) {
+    out.remark = "no usable colour matrix: the estimate is not held to the whites of lights";
+    return out;
+  }
+  const auto held = held_to_lights(*out.balance.white, options);
+  if (!held) return out;
+  if (auto limited = balance_of_white(colour, *held, WhiteSource::estimated)) {
+    out.balance = *std::move(limited);
+    out.remark = "the estimate was moved to the nearest white of a light";
+  } else {
+    out.remark = "the colour matrices do not reach the nearest light: the estimate is not held to the whites of lights";
+  }
+  return out;
+}
+
 WhiteBalance auto_white_balance(const RgbView<const float>& blocks, double block_noise, const CameraColour& colour,
                                 const AutoWhiteOptions& options) {
-  const GreyEstimate estimate = shades_of_grey(blocks, block_noise, options);
-  if (estimate.blocks < options.min_blocks) {
-    return fallback(colour, "only " + std::to_string(estimate.blocks) +
+  std::vector<float> memory(static_cast<std::size_t>(blocks[0].width) * blocks[0].height);
+  WhiteEstimate found = estimate_white(blocks, block_noise, colour, options, memory);
+  if (found.blocks < options.min_blocks) {
+    return fallback(colour, "only " + std::to_string(found.blocks) +
                                 " of the picture's blocks are neither black nor "
                                 "clipped, too few to tell the white");
   }
-  WhiteBalance found = balance_of(colour, estimate.neutral, WhiteSource::estimated);
-  if (!found.white) {
-    found.reason = "no usable colour matrix: the estimate is not held to the whites of lights";
-    return found;
-  }
-  const auto held = held_to_lights(*found.white, options);
-  if (!held) return found;
-  auto limited = balance_of_white(colour, *held, WhiteSource::estimated);
-  if (!limited) {
-    found.reason =
-        "the colour matrices do not reach the nearest light: the estimate is not held to the whites of lights";
-    return found;
-  }
-  limited->reason = "the estimate was moved to the nearest white of a light";
-  return *std::move(limited);
+  found.balance.reason = found.remark;
+  return std::move(found.balance);
 }
 
 }  // namespace lowlux::isp

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -43,6 +44,18 @@ struct AutoWhiteOptions {
   double max_k = 12000;          // ... to blue shade
   double max_duv = 0.01;         // distance to white_of_temperature in CIE 1960 uv
 };
+
+/// What auto_white_balance found before it fell back on anything.
+struct WhiteEstimate {
+  WhiteBalance balance;     // without a reason
+  int blocks = 0;           // that qualified; below AutoWhiteOptions::min_blocks there is no balance
+  std::string_view remark;  // what became of the estimate, one line; empty if there is nothing to say
+};
+
+/// auto_white_balance without its fallbacks; allocates nothing.
+/// @param memory  for as many values as there are blocks
+WhiteEstimate estimate_white(const RgbView<const float>& blocks, double block_noise, const CameraColour& colour,
+                             const AutoWhiteOptions& options, std::span<float> memory);
 
 /// Automatic white balance by shades of grey (Finlayson & Trezzi, Color Imaging Conf. 12 (2004) 37-41): the neutral is
 /// proportional to (mean of c^norm)^(1/norm) of each channel c, over the blocks that are neither clipped nor near the

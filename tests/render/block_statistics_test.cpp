@@ -42,7 +42,9 @@ TEST(BlockLuminance, WeighsTheChannelsRowByRowThroughTheStride) {
   RgbView<const float> cropped;
   for (int c = 0; c < 3; ++c) cropped[c] = read.plane[c].view().crop(1, 0, 2, 2);
   EXPECT_EQ(block_luminance(cropped, {1, 0.5, 0.25}), (std::vector<float>{101.75f, 103.5f, 119.25f, 121}));
-  EXPECT_EQ(block_values(cropped[1]), (std::vector<float>{101, 102, 111, 112}));
+  std::vector<float> values{3, NAN, 1, 2, INFINITY};
+  EXPECT_EQ(quantile_reordering(values, 1), 3);
+  EXPECT_EQ(quantile_reordering(values, 0.5), 2);
 }
 
 }  // namespace
