@@ -192,6 +192,15 @@ std::string mosaic_of(const RawDn& frame) {
   return phases[static_cast<std::size_t>(frame.phase)];
 }
 
+std::vector<ColourCalibration> calibrations_of(const CameraProfile& profile) {
+  std::vector<ColourCalibration> out;
+  out.reserve(profile.colours.size());
+  for (const ColourProfile& c : profile.colours) out.push_back(c.calibration);
+  std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.cct_k < b.cct_k; });
+  if (out.size() > 2) out = {out.front(), out.back()};
+  return out;
+}
+
 Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame) {
   if (frame.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported, "the frame is already demosaiced: a profile tells of the mosaic");

@@ -34,4 +34,8 @@ struct ProfileAtFrame {
 /// time where dark current needs it. A profile without gain settings says nothing about a frame.
 Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame);
 
+/// A profile's colours as a frame has them: at most two, as in a DNG, those of the lights of lowest and highest
+/// temperature; by rising temperature.
+std::vector<ColourCalibration> calibrations_of(const CameraProfile& profile);
+
 }  // namespace lowlux::calib

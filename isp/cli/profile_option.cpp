@@ -1,6 +1,5 @@
 #include "isp/cli/profile_option.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "calib/profile_use.h"
@@ -8,15 +7,9 @@
 namespace lowlux::cli {
 namespace {
 
-/// At most two, as DNG has them: the lights of lowest and highest temperature.
 void use_colours(const CameraProfile& profile, RawFrame& frame) {
   if (profile.colours.empty()) return;
-  std::vector<ColourCalibration> calibrations;
-  for (const ColourProfile& c : profile.colours) calibrations.push_back(c.calibration);
-  std::stable_sort(calibrations.begin(), calibrations.end(),
-                   [](const auto& a, const auto& b) { return a.cct_k < b.cct_k; });
-  if (calibrations.size() > 2) calibrations = {calibrations.front(), calibrations.back()};
-  frame.colour.calibrations = std::move(calibrations);
+  frame.colour.calibrations = calib::calibrations_of(profile);
   frame.colour.analog_balance = {1, 1, 1};  // the matrices were fitted to the camera's values as they are
   frame.colour.source = CameraColour::Source::profile;
 }

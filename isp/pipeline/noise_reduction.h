@@ -8,6 +8,7 @@
 
 #include "denoise/denoiser.h"
 #include "denoise/line_noise.h"
+#include "denoise/temporal.h"
 #include "isp/base/frame.h"
 #include "isp/base/plane.h"
 
@@ -26,6 +27,13 @@ struct DenoiseChoice {
   bool always = false;                              // automatic: draft at least
 };
 
+/// Frames of a stream before this one take part: see denoise::TemporalMean.
+struct TemporalReduction {
+  denoise::TemporalOptions options;
+  double light = 1;     // on this frame over that on the one before, by exposure time
+  bool restart = true;  // nothing is known of frames before
+};
+
 /// What was decided: everything that reducing the noise of one frame takes. Sites as in the active area.
 struct NoiseReduction {
   std::optional<denoise::Level> level;  // absent: values stay as they are
@@ -35,6 +43,9 @@ struct NoiseReduction {
   denoise::RawNoise noise;
   denoise::DenoiseOptions options;
   std::vector<denoise::LineOffsets> lines;  // taken off before
+  std::optional<TemporalReduction> temporal;
+
+  bool reduces() const { return level || temporal; }
 };
 
 /// The level for the signal to noise ratio of one pixel. None from 60 on, where no difference can be seen; draft from

@@ -88,7 +88,7 @@ DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
 
 // Dark charge off, and noise if so decided.
 SignalElectrons Pipeline::signal_electrons(const RawFrame& frame, const DevelopPlan& plan) {
-  if (!plan.noise_reduction.level) {
+  if (!plan.noise_reduction.reduces()) {
     return subtract_dark(raw_electrons(frame, plan, std::move(mosaic_), executor_), plan.black, executor_);
   }
   RawElectrons raw = raw_electrons(frame, plan, std::move(noisy_), executor_);
@@ -187,7 +187,8 @@ LookGrid Pipeline::look_grid(const RgbInput& in, const RawFrame& frame, const De
   return look_->make(quarter, plan.transform.matrix, plan.transform.clip, plan.look->look, limit, executor_);
 }
 
-void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
+template <class Encode>
+void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const Encode& encode) {
   if (!plan.noise_reduction.level || !keeps_maps(plan)) noise_maps_ = {};
   reserve(frame, plan);
   const RgbInput in =
@@ -199,10 +200,32 @@ void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& o
     transform.look = &look;
   }
   if (plan.look && plan.look->table) {
-    encode(as_modelled(in, plan), of_modelled(plan, transform.look), plan, out);
+    encode(as_modelled(in, plan), of_modelled(plan, transform.look));
   } else {
-    encode(in, transform, plan, out);
+    encode(in, transform);
   }
+}
+
+void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
+  render_to(frame, plan,
+            [&](const RgbInput& in, const RgbTransform& transform) { this->encode(in, transform, plan, out); });
+}
+
+void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, const RowSink& out) {
+  render_to(frame, plan, [&](const RgbInput& in, const RgbTransform& transform) {
+    kernel_->rows8(in, transform, plan.tone, out, executor_);
+  });
+}
+
+void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, PlaneView<std::uint16_t> out) {
+  render_to(frame, plan, [&](const RgbInput& in, const RgbTransform& transform) {
+    kernel_->rgb16(in, transform, plan.tone, out, executor_);
+  });
+}
+
+PlaneView<const float> Pipeline::signal(const RawFrame& frame, const DevelopPlan& plan) {
+  mosaic_ = signal_electrons(frame, plan).value;
+  return std::as_const(mosaic_).view();
 }
 
 // Light relative to the scene's white through the model's table; in planes of the picture's own primaries.

@@ -52,7 +52,7 @@ std::vector<Pixel> all_defects(const RawFrame& frame, const RawDn& measured, Dev
 
 // Nothing has to be repaired, multiplied, denoised, or taken off pixel by pixel.
 bool goes_from_codes(const RawFrame& frame, const DevelopPlan& plan) {
-  return frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.noise_reduction.level &&
+  return frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.noise_reduction.reduces() &&
          !plan.black.pattern && !plan.options.dark_frame && plan.black.dark_mean_e == PerSite<double>{} &&
          frame.corrections.radial_gains.empty() &&
          std::none_of(frame.corrections.gain_maps.begin(), frame.corrections.gain_maps.end(), has_effect);

@@ -1,0 +1,277 @@
+/* lowlux as a stage of a camera pipeline: raw frames in, pictures or clean raw frames out.
+ *
+ * A C interface without types of libcamera or V4L2, to be linked or loaded by name (dlopen of liblowlux_stage.so.0, or
+ * dlsym of each function). It keeps these promises:
+ *   - No exception leaves it. lowlux_stage_process allocates nothing, takes no lock while it works on pixels, and starts
+ *     no threads; lowlux_stage_configure takes all memory.
+ *   - Every call on one stage comes from one thread at a time; stages do not know of one another.
+ *   - The bytes of a result do not depend on the number of threads.
+ *   - Input rows are read once, from first to last: they may lie in uncached memory.
+ *   - Every struct begins with its size, which the caller sets. Members a caller does not know are taken as absent, and
+ *     those lowlux does not know are ignored: structs grow at their end within one version.
+ * Functions return LOWLUX_STAGE_OK, LOWLUX_STAGE_ADJUSTED, or an error below 0; lowlux_stage_last_error says more. After
+ * an error in lowlux_stage_process the output planes are not touched or hold part of a picture; the stage goes on.
+ */
+#ifndef LOWLUX_STAGE_H
+#define LOWLUX_STAGE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define LOWLUX_STAGE_VERSION 1
+
+#if defined(__GNUC__)
+#define LOWLUX_STAGE_EXPORT __attribute__((visibility("default")))
+#else
+#define LOWLUX_STAGE_EXPORT
+#endif
+
+typedef struct lowlux_stage lowlux_stage;
+
+enum {
+  LOWLUX_STAGE_OK = 0,
+  LOWLUX_STAGE_ADJUSTED = 1,           /* configured, but not as asked: read the formats again */
+  LOWLUX_STAGE_BAD_ARGUMENT = -1,      /* a null pointer, a size of no struct, a figure out of range */
+  LOWLUX_STAGE_UNSUPPORTED = -2,       /* the format, or this output for this input */
+  LOWLUX_STAGE_TOO_LARGE = -3,         /* more memory than the limit */
+  LOWLUX_STAGE_NO_MEMORY = -4,
+  LOWLUX_STAGE_NOT_CONFIGURED = -5,
+  LOWLUX_STAGE_SHORT_BUFFER = -6,      /* a plane ends before the picture does */
+  LOWLUX_STAGE_BAD_STRIDE = -7,        /* rows would overlap */
+  LOWLUX_STAGE_MISSING_PLANE = -8,
+  LOWLUX_STAGE_BAD_PARAMETER = -9,     /* not a number, or absurd */
+  LOWLUX_STAGE_BAD_PROFILE = -10,      /* cannot be read, or is of no use for these frames */
+  LOWLUX_STAGE_UNKNOWN_LIGHT = -11,    /* the look of the eye needs the luminance of the scene */
+  LOWLUX_STAGE_INTERNAL = -12
+};
+
+/* How a four-character code is meant. */
+enum { LOWLUX_STAGE_DRM = 0 /* and libcamera, with its modifier */, LOWLUX_STAGE_V4L2 = 1 };
+
+/* Outputs, by their DRM codes; the order of bytes in memory is: */
+#define LOWLUX_STAGE_FOURCC(a, b, c, d) \
+  ((uint32_t)(a) | ((uint32_t)(b) << 8) | ((uint32_t)(c) << 16) | ((uint32_t)(d) << 24))
+#define LOWLUX_STAGE_XBGR8888 LOWLUX_STAGE_FOURCC('X', 'B', '2', '4') /* R G B 255 */
+#define LOWLUX_STAGE_XRGB8888 LOWLUX_STAGE_FOURCC('X', 'R', '2', '4') /* B G R 255 */
+#define LOWLUX_STAGE_BGR888 LOWLUX_STAGE_FOURCC('B', 'G', '2', '4')   /* R G B */
+#define LOWLUX_STAGE_RGB888 LOWLUX_STAGE_FOURCC('R', 'G', '2', '4')   /* B G R */
+#define LOWLUX_STAGE_NV12 LOWLUX_STAGE_FOURCC('N', 'V', '1', '2')     /* plane 0: Y; plane 1: Cb Cr of 2x2 pixels */
+#define LOWLUX_STAGE_RGB48 LOWLUX_STAGE_FOURCC('B', 'G', '4', '8')    /* R G B of 16 bits, little endian */
+/* The clean mosaic in 16 bits, little endian, in the order of the picture's own corner; the largest code of the input is
+ * the largest of 16 bits' high end: black is at the input's black times 2^(16 - bits). */
+#define LOWLUX_STAGE_BAYER16 LOWLUX_STAGE_FOURCC('B', 'Y', '1', '6')
+
+enum { LOWLUX_STAGE_MAX_PLANES = 3 };
+
+typedef struct {
+  int32_t x, y, width, height;
+} lowlux_stage_rect;
+
+/* Frames that come in. */
+typedef struct {
+  size_t size;
+  int32_t api; /* LOWLUX_STAGE_DRM or LOWLUX_STAGE_V4L2 */
+  uint32_t fourcc;
+  uint64_t modifier; /* of DRM codes; else 0 */
+  int32_t width;     /* of whole frames, 2..65536 */
+  int32_t height;
+  size_t stride;            /* bytes from one row to the next, at least; each frame states its own */
+  lowlux_stage_rect crop;   /* that becomes the picture; all 0: the whole frame */
+  lowlux_stage_rect masked; /* light-shielded pixels; all 0: there are none */
+  double white_level;       /* code at which a pixel is saturated; 0: the largest of the format */
+} lowlux_stage_input;
+
+/* Pictures that go out. Width and height are those of the crop. */
+typedef struct {
+  size_t size;
+  uint32_t fourcc; /* one of those above */
+  int32_t width;
+  int32_t height;
+  int32_t planes;                        /* lowlux_stage_configure says how many */
+  size_t stride[LOWLUX_STAGE_MAX_PLANES]; /* least, or as asked; in bytes */
+  size_t bytes[LOWLUX_STAGE_MAX_PLANES];  /* a plane of that stride takes */
+  int32_t yuv_matrix; /* of NV12: 601 or 709; 0: 709 from 720 rows on, 601 below. Video range, chroma in the middle */
+} lowlux_stage_output;
+
+/* What a raw format is. */
+typedef struct {
+  size_t size;
+  int32_t bits;
+  int32_t packed;
+  int32_t mosaic; /* 0 RGGB, 1 GRBG, 2 GBRG, 3 BGGR, -1 monochrome */
+  int32_t group_pixels;
+  int32_t group_bytes;
+  int32_t alignment; /* of the buffer that is asked for: 1, none */
+  int32_t margin;    /* pixels that are lost at each edge: 0, none */
+  int32_t outputs;   /* in use of: */
+  uint32_t output[8];
+} lowlux_stage_format_info;
+
+enum {
+  LOWLUX_STAGE_DENOISE_OFF = 0,
+  LOWLUX_STAGE_DENOISE_FAST = 1,         /* draft */
+  LOWLUX_STAGE_DENOISE_HIGH_QUALITY = 2, /* standard, or high where it is the most that was asked for */
+  LOWLUX_STAGE_DENOISE_MINIMAL = 3,      /* frames before alone, where they take part; else draft */
+  LOWLUX_STAGE_DENOISE_AUTO = 5          /* by the signal to noise ratio of the frame */
+};
+enum { LOWLUX_STAGE_LOOK_CAMERA = 0, LOWLUX_STAGE_LOOK_EYE = 1 };
+enum { LOWLUX_STAGE_LEVEL_NONE = 0, LOWLUX_STAGE_LEVEL_DRAFT = 1, LOWLUX_STAGE_LEVEL_STANDARD = 2,
+       LOWLUX_STAGE_LEVEL_HIGH = 3 };
+
+/* What holds from lowlux_stage_open to lowlux_stage_release. */
+typedef struct {
+  size_t size;
+  int32_t threads;          /* 1..8, the caller's among them; 0: 2 */
+  uint64_t memory_limit;    /* bytes; 0: 1 GiB */
+  const char* profile_file; /* of `lowlux calibrate`, JSON; null: none */
+  int32_t most_denoise;     /* LOWLUX_STAGE_LEVEL_... that there is memory for; 0 as every level: none */
+  int32_t temporal;         /* 1: frames before take part */
+  int32_t look;             /* LOWLUX_STAGE_LOOK_... */
+  int32_t tone;             /* 1: the standard curve; 0: none, linear light in sRGB's coding */
+  double field_of_view_deg; /* of the picture's longer side; 0: 50 */
+} lowlux_stage_settings;
+
+/* Validity of the members of lowlux_stage_params, and which of them took effect. */
+enum {
+  LOWLUX_STAGE_HAS_BLACK = 1 << 0,
+  LOWLUX_STAGE_HAS_EXPOSURE = 1 << 1,
+  LOWLUX_STAGE_HAS_ANALOGUE_GAIN = 1 << 2,
+  LOWLUX_STAGE_HAS_DIGITAL_GAIN = 1 << 3,
+  LOWLUX_STAGE_HAS_COLOUR_GAINS = 1 << 4,
+  LOWLUX_STAGE_HAS_COLOUR_MATRIX = 1 << 5,
+  LOWLUX_STAGE_HAS_LUX = 1 << 6,
+  LOWLUX_STAGE_HAS_TEMPERATURE = 1 << 7,
+  LOWLUX_STAGE_HAS_DENOISE = 1 << 8,
+  LOWLUX_STAGE_HAS_SEQUENCE = 1 << 9,
+  LOWLUX_STAGE_HAS_TIMESTAMP = 1 << 10,
+  LOWLUX_STAGE_HAS_GAMMA = 1 << 11,
+  LOWLUX_STAGE_HAS_CONTRAST = 1 << 12,
+  LOWLUX_STAGE_HAS_SATURATION = 1 << 13,
+  LOWLUX_STAGE_HAS_SHARPNESS = 1 << 14,
+  LOWLUX_STAGE_HAS_EXPOSURE_VALUE = 1 << 15,
+  LOWLUX_STAGE_HAS_NOISE = 1 << 16,
+  LOWLUX_STAGE_HAS_F_NUMBER = 1 << 17,
+  LOWLUX_STAGE_HAS_SCENE_LUMINANCE = 1 << 18,
+  LOWLUX_STAGE_HAS_ALL = (1 << 19) - 1
+};
+
+/* What is known of one frame, of the frame that is exposed and not of the one before. What is not valid comes from the
+ * profile, else from the frame itself, else it is left out. */
+typedef struct {
+  size_t size;
+  uint32_t valid;               /* LOWLUX_STAGE_HAS_... */
+  float black_level[4];         /* R, Gr, Gb, B, in codes of the input; libcamera's 16-bit figure is v 2^bits / 65536 */
+  double exposure_s;            /* 1e-7..1e5 */
+  float analogue_gain;          /* 0.1..1e4; 1 is ISO 100 of the profile */
+  float digital_gain;           /* already in the codes, 0.1..1e3; noise goes with it */
+  float colour_gains[2];        /* R and B, with G's 1; 1e-3..1e3 */
+  float colour_matrix[9];       /* rows; white-balanced camera RGB to linear sRGB; each within 1e3 */
+  float lux;                    /* of the scene: for its luminance, where nothing better tells */
+  float temperature_c;          /* of the sensor, -100..200 */
+  int32_t denoise;              /* LOWLUX_STAGE_DENOISE_...; libcamera's ZSL (4) counts as MINIMAL */
+  uint32_t sequence;            /* a gap or a step back forgets the frames before */
+  uint64_t timestamp_ns;        /* a step back, or of more than two seconds, does the same */
+  float gamma;                  /* accepted, without effect: the curve is the stage's own */
+  float contrast;               /* the same */
+  float saturation;             /* 0..4 */
+  float sharpness;              /* accepted, without effect */
+  float exposure_ev;            /* gain 2^EV of the picture, -10..20; absent: automatic */
+  float noise_gain;             /* DN for each electron, at this frame's gain; with: */
+  float noise_read;             /* standard deviation of a pixel without light [DN] */
+  float f_number;
+  double scene_luminance_cd_m2; /* mean over the picture */
+} lowlux_stage_params;
+
+typedef struct {
+  const void* data;
+  size_t length; /* bytes there are */
+  size_t stride;
+  int fd; /* of a dma-buf, whose access is then bracketed by DMA_BUF_IOCTL_SYNC; else -1 */
+} lowlux_stage_source;
+
+typedef struct {
+  void* data;
+  size_t length;
+  size_t stride;
+} lowlux_stage_plane;
+
+typedef struct {
+  size_t size;
+  int32_t planes; /* that follow */
+  lowlux_stage_plane plane[LOWLUX_STAGE_MAX_PLANES];
+} lowlux_stage_picture;
+
+enum { LOWLUX_STAGE_FROM_NOTHING = 0, LOWLUX_STAGE_FROM_PARAMS = 1, LOWLUX_STAGE_FROM_PROFILE = 2,
+       LOWLUX_STAGE_FROM_MASKED = 3, LOWLUX_STAGE_FROM_FRAME = 4 };
+
+/* What was done to the frame. */
+typedef struct {
+  size_t size;
+  uint32_t applied;     /* LOWLUX_STAGE_HAS_... of the parameters that took effect */
+  int32_t black_from;   /* LOWLUX_STAGE_FROM_... */
+  int32_t noise_from;
+  int32_t white_from;
+  float black_level[4]; /* R, Gr, Gb, B that was taken off, dark charge in it */
+  float noise_gain;     /* DN for each electron; 0: not known */
+  float noise_read;     /* DN */
+  float colour_gains[2];
+  float exposure_ev;
+  int32_t level;        /* LOWLUX_STAGE_LEVEL_... of noise reduction */
+  int32_t temporal;     /* 1: frames before took part */
+  float moved;          /* share of the picture that was found to move */
+  float scene_luminance_cd_m2; /* 0: not known */
+  float adaptation;     /* m of CIE 191, 0 scotopic to 1 photopic; 1 without the look of the eye */
+} lowlux_stage_result;
+
+/* Of the frame as it came in, before anything was taken off or denoised: for exposure and white balance of the next. */
+typedef struct {
+  size_t size;
+  uint64_t sum[3]; /* of the codes of R, G, B */
+  uint64_t count[3];
+  float clipped;                 /* share of the pixels at white or above */
+  float zero;                    /* share at code 0 */
+  uint32_t luma[1024];           /* 2x2 cells by (77 R + 75 Gr + 75 Gb + 29 B) / 256, even bins over all codes */
+  uint32_t luma64[64];           /* the same, as libcamera's SwIspStats has it */
+  float measured_black[4];       /* R, Gr, Gb, B: of masked pixels, else of the darkest hundredth of the picture */
+  int32_t measured_black_masked; /* 1: of masked pixels */
+  float measured_noise_gain;     /* DN for each electron, from the frame alone; 0: it does not tell */
+  float measured_noise_read;     /* DN */
+} lowlux_stage_statistics;
+
+LOWLUX_STAGE_EXPORT uint32_t lowlux_stage_version(void);
+
+/* What an input format is and what can be made of it. Needs no stage. */
+LOWLUX_STAGE_EXPORT int lowlux_stage_query(int32_t api, uint32_t fourcc, uint64_t modifier,
+                                           lowlux_stage_format_info* info);
+
+/* settings may be null. *stage is null after an error. message, if not null, gets why it failed. */
+LOWLUX_STAGE_EXPORT int lowlux_stage_open(const lowlux_stage_settings* settings, lowlux_stage** stage, char* message,
+                                          size_t message_size);
+
+/* Takes all memory. out->fourcc is asked for, the rest is answered; out->stride of 0 is filled in, one that is too small
+ * is adjusted. A stage that was configured before and fails stays unconfigured. */
+LOWLUX_STAGE_EXPORT int lowlux_stage_configure(lowlux_stage* stage, const lowlux_stage_input* in,
+                                               lowlux_stage_output* out);
+
+/* params, result and statistics may be null. */
+LOWLUX_STAGE_EXPORT int lowlux_stage_process(lowlux_stage* stage, const lowlux_stage_source* in,
+                                             const lowlux_stage_picture* out, const lowlux_stage_params* params,
+                                             lowlux_stage_result* result, lowlux_stage_statistics* statistics);
+
+/* Forgets the frames before: for the start of a stream or a change of mode. */
+LOWLUX_STAGE_EXPORT int lowlux_stage_reset(lowlux_stage* stage);
+
+/* Ends threads and gives memory back; null is allowed. */
+LOWLUX_STAGE_EXPORT void lowlux_stage_release(lowlux_stage* stage);
+
+/* Of the last call on this stage that failed; one line. Valid until the next call. */
+LOWLUX_STAGE_EXPORT const char* lowlux_stage_last_error(const lowlux_stage* stage);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "isp/adapter/lowlux_stage.h"
+#include "isp/adapter/stage_profile.h"
+#include "isp/base/cfa.h"
+#include "isp/pipeline/live_plan.h"
+
+namespace lowlux::isp {
+
+/// What is wrong with the parameters of a frame; null if nothing is. Only valid members are looked at.
+const char* fault_of(const lowlux_stage_params& params);
+
+/// What parameters and profile say of one frame.
+struct StageFacts {
+  LiveFacts live;
+  std::uint32_t applied = 0;  // LOWLUX_STAGE_HAS_... that took effect
+  std::int32_t black_from = LOWLUX_STAGE_FROM_NOTHING;
+  std::int32_t noise_from = LOWLUX_STAGE_FROM_NOTHING;
+};
+
+/// What the facts are made for.
+struct StageStream {
+  RawFormat format;
+  BayerPhase phase = BayerPhase::rggb;  // of the active area
+  double white_dn = 0;
+  denoise::Level most = denoise::Level::draft;
+  bool has_level = true;   // there is memory for one
+  bool has_masked = false;
+  bool temporal = false;
+};
+
+/// Parameters of which fault_of finds none. What they do not tell the profile does, if there is one.
+StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream, const StageProfile* profile);
+
+/// Follows frames by sequence and time.
+class StageHistory {
+ public:
+  /// Whether this frame comes right after the one before.
+  bool follows(const lowlux_stage_params& params);
+  void reset();
+
+ private:
+  std::optional<std::uint32_t> sequence_;
+  std::optional<std::uint64_t> timestamp_ns_;
+};
+
+/// Four figures in the order R, Gr, Gb, B, to and from sites.
+PerSite<double> sites_of(const float (&channels)[4], BayerPhase phase);
+void to_channels(const PerSite<double>& sites, BayerPhase phase, float (&channels)[4]);
+
+}  // namespace lowlux::isp

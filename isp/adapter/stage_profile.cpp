@@ -1,0 +1,142 @@
+#include "isp/adapter/stage_profile.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "calib/gain_interpolation.h"
+#include "calib/profile_io.h"
+#include "calib/profile_use.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double unit_iso = 100;  // of an analogue gain of 1
+constexpr double shortest_frame_s = 0.04;
+constexpr double hot_deviations = 6;
+
+double between(double a, double b, double share) { return a + share * (b - a); }
+double between_logs(double a, double b, double share) {
+  return a > 0 && b > 0 ? std::exp(between(std::log(a), std::log(b), share)) : between(a, b, share);
+}
+
+/// Four for each octave from 2^-3 to 2^14 times 100, and the profile's own.
+std::vector<double> iso_grid(const CameraProfile& profile) {
+  std::vector<double> out;
+  out.reserve(69 + profile.gains.size());
+  for (int quarter = -12; quarter <= 56; ++quarter) out.push_back(unit_iso * std::exp2(quarter / 4.0));
+  for (const GainProfile& gain : profile.gains) {
+    if (gain.iso) out.push_back(*gain.iso);
+  }
+  std::ranges::sort(out);
+  return out;
+}
+
+}  // namespace
+
+Result<StageProfile> StageProfile::read(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return fail(ErrorCode::unreadable, "the profile cannot be read", file);
+  std::string text(calib::largest_profile_bytes + 1, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  auto profile = calib::parse_profile(text);
+  if (!profile) return fail(profile.error().code, profile.error().message, file);
+  auto out = of(*std::move(profile));
+  if (!out) out.error().where = file;
+  return out;
+}
+
+Result<StageProfile> StageProfile::of(CameraProfile profile) {
+  StageProfile out;
+  out.profile_ = std::move(profile);
+  return out;
+}
+
+Result<void> StageProfile::prepare(const RawFormat& format, BayerPhase phase) {
+  const bool monochrome = profile_.mosaic == "monochrome";
+  const bool mono_stream = format.layout == SensorLayout::monochrome;
+  if (!profile_.mosaic.empty() && monochrome != mono_stream) {
+    return fail(ErrorCode::invalid_argument, fmt::format("the profile was measured on a sensor that is {}, the stream is {}",
+                                                         profile_.mosaic, mono_stream ? "monochrome" : "a mosaic"));
+  }
+  format_ = format;
+  phase_ = phase;
+  rows_.clear();
+  if (profile_.gains.empty()) return {};
+  const std::vector<double> grid = iso_grid(profile_);
+  rows_.reserve(grid.size());
+  for (const double iso : grid) {
+    const auto found = calib::gain_at_iso(profile_, iso);
+    if (!found) return tl::make_unexpected(found.error());
+    const GainProfile& gain = found->gain;
+    if (!gain.sensor) {
+      rows_.clear();
+      return {};
+    }
+    Row row{.iso = iso,
+            .gain_dn_per_e = gain.sensor->system_gain_dn_per_e,
+            .read_noise_e = gain.sensor->read_noise_e,
+            .dark_current_e_per_s = gain.sensor->dark_current_e_per_s,
+            .dark_temperature_c = gain.sensor->dark_temperature_c,
+            .dark_doubling_c = gain.sensor->dark_doubling_c,
+            .codes = std::exp2(format.bits - gain.sensor->bits)};
+    if (gain.pedestal_dn) {
+      row.pedestal_dn.emplace();
+      for (int site = 0; site < 4; ++site) (*row.pedestal_dn)[site] = (*gain.pedestal_dn)[site].value;
+    }
+    rows_.push_back(row);
+  }
+  return {};
+}
+
+std::optional<StageSensor> StageProfile::at(std::optional<double> analogue_gain, std::optional<double> exposure_s,
+                                            std::optional<double> temperature_c) const {
+  if (rows_.empty()) return std::nullopt;
+  const double iso = std::clamp(unit_iso * analogue_gain.value_or(1), rows_.front().iso, rows_.back().iso);
+  auto above = std::ranges::upper_bound(rows_, iso, {}, &Row::iso);
+  if (above == rows_.end()) --above;
+  const Row &b = *above, &a = above == rows_.begin() ? b : *(above - 1);
+  const double share = b.iso > a.iso ? std::log(iso / a.iso) / std::log(b.iso / a.iso) : 0;
+  const Row& nearer = share < 0.5 ? a : b;
+  const double codes = nearer.codes;
+  StageSensor out{.gain_dn_per_e = codes * between_logs(a.gain_dn_per_e, b.gain_dn_per_e, share)};
+  out.read_noise_dn = out.gain_dn_per_e * between_logs(a.read_noise_e, b.read_noise_e, share);
+  const double warmer_c = temperature_c.value_or(nearer.dark_temperature_c) - nearer.dark_temperature_c;
+  const double charge_s = exposure_s.value_or(0) * std::exp2(warmer_c / nearer.dark_doubling_c);
+  for (int site = 0; site < 4; ++site) {
+    const bool bayer = format_.layout == SensorLayout::bayer;
+    const auto colour = bayer ? static_cast<std::size_t>(colour_at(phase_, site & 1, site >> 1)) : 1;
+    out.dark_e[site] = nearer.dark_current_e_per_s[colour] * charge_s;
+  }
+  if (a.pedestal_dn && b.pedestal_dn) {
+    out.pedestal_dn.emplace();
+    for (int site = 0; site < 4; ++site) {
+      (*out.pedestal_dn)[site] = codes * between((*a.pedestal_dn)[site], (*b.pedestal_dn)[site], share);
+    }
+  }
+  return out;
+}
+
+std::vector<ColourCalibration> StageProfile::calibrations() const { return calib::calibrations_of(profile_); }
+
+std::vector<HotPixelFigure> StageProfile::hot_pixels() const {
+  std::vector<HotPixelFigure> out;
+  for (const GainProfile& gain : profile_.gains) {
+    if (!gain.sensor) continue;
+    for (const HotPixelFigure& hot : gain.hot_pixels) {
+      if (hot.excess_e_per_s * shortest_frame_s > hot_deviations * gain.sensor->read_noise_e) out.push_back(hot);
+    }
+  }
+  const auto place = [](const HotPixelFigure& hot) { return std::pair(hot.y, hot.x); };
+  std::ranges::sort(out, {}, place);
+  const auto repeated = std::ranges::unique(out, {}, place);
+  out.erase(repeated.begin(), repeated.end());
+  return out;
+}
+
+}  // namespace lowlux::isp

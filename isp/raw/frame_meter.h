@@ -1,0 +1,71 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/raw_format.h"
+#include "isp/raw/thumbnail.h"
+#include "isp/raw/tile_noise.h"
+
+namespace lowlux::isp {
+
+/// What the codes of one frame's active area tell before anything is done to them: for exposure and white balance of
+/// the next frames. Black is in all of it.
+struct FrameStatistics {
+  static constexpr int bins = 1024;
+  std::array<std::uint64_t, 3> sum{};    // of the codes of R, G, B; of monochrome frames all three are the same
+  std::array<std::uint64_t, 3> count{};  // of the sites in it
+  std::uint64_t pixels = 0;
+  std::uint64_t clipped = 0;  // codes of white or more
+  std::uint64_t zero = 0;     // codes 0
+  /// Whole 2x2 cells by luma (77 R + 75 G1 + 75 G2 + 29 B) / 256 (Rec. 601), even bins from 0 to 2^bits.
+  std::array<std::uint32_t, bins> luma{};
+};
+
+/// Reads frames from a camera's memory, each row once and in order, and measures them on the way. All memory is taken
+/// in the constructor. Sums are integers: the result is the same for every number of threads.
+class FrameMeter {
+ public:
+  /// @param raw  the frames that come: layout, phase, active area, white; its plane is as large as a camera's frame
+  FrameMeter(const RawDn& raw, const RawFormat& format, int threads);
+
+  /// @param bytes  rows from its first byte on, `stride` apart; large enough for raw.dn's rows
+  /// @param raw    as in the constructor; its plane gets the codes
+  void read(std::span<const std::byte> bytes, std::size_t stride, RawDn& raw, Executor& executor);
+
+  const FrameStatistics& statistics() const { return statistics_; }
+  ThumbnailSums& thumbnail() { return thumbnail_; }
+  TileNoise& tiles() { return tiles_; }
+  /// Mean codes of the sites (of the active area's cells) on the masked pixels; nullopt if there are none.
+  std::optional<PerSite<double>> masked_dn() const;
+
+ private:
+  struct Tally {
+    PerSite<std::uint64_t> sum{};
+    PerSite<std::uint64_t> masked_sum{};
+    PerSite<std::uint64_t> masked_count{};
+    std::uint64_t clipped = 0;
+    std::uint64_t zero = 0;
+    std::array<std::uint32_t, FrameStatistics::bins> luma{};
+  };
+  void read_rows(std::span<const std::byte> bytes, std::size_t stride, RawDn& raw, RowBand rows, Tally& tally);
+  void count_row(const RawDn& raw, int y, Tally& tally) const;
+  void count_cells(const RawDn& raw, int y, Tally& tally) const;
+  static void count_masked(const RawDn& raw, int y, Tally& tally);
+  void add_up(const RawDn& raw);
+
+  RawFormat format_;
+  ThumbnailSums thumbnail_;
+  TileNoise tiles_;
+  std::vector<Tally> tallies_;  // of the threads
+  Tally total_;
+  FrameStatistics statistics_;
+};
+
+}  // namespace lowlux::isp

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "isp/base/cfa.h"
+#include "isp/base/plane.h"
+
+namespace lowlux::isp {
+
+/// Temporal variance of a code v DN above black: offset_dn2 + gain_dn * v.
+struct NoiseLine {
+  double gain_dn = 0;  // the system gain [DN/e-]
+  double offset_dn2 = 0;
+  double gain_error_dn = 0;  // standard errors
+  double offset_error_dn2 = 0;
+};
+
+/// Means and variances of the four sites in square tiles of a mosaic, taken row by row, and what they tell of its noise
+/// and its black. Memory is reserved in the constructor.
+///
+/// Variances are of differences between neighbours of one site, d^2 / 2, so that slopes add little. Detail only adds:
+/// of the tiles of one level the lowest fifth, divided by what chi-square has there, is taken for the noise.
+class TileNoise {
+ public:
+  /// @param tile  side in pixels, even, at least 8
+  TileNoise(int width, int height, int tile);
+
+  int tile() const { return tile_; }
+  int tile_rows() const { return rows_; }
+  void clear();
+  /// Row y of the mosaic. Rows of one row of tiles come from one thread.
+  void add_row(const std::uint16_t* dn, int y);
+
+  /// The straight line of variance over level. Nullopt where the levels of the frame lie too close together to tell
+  /// gain from offset (the gain is not four standard errors above 0), or too few tiles are whole and not clipped.
+  /// @param black_dn  of the sites
+  /// @param white_dn  tiles whose mean is above 0.9 of it do not count
+  std::optional<NoiseLine> line(const PerSite<double>& black_dn, double white_dn) const;
+
+  /// Means of the darkest hundredth of the tiles, site by site: what black is at most, where the scene has a black
+  /// place.
+  PerSite<double> darkest_dn();
+
+ private:
+  struct Tile {
+    PerSite<std::uint32_t> sum{};
+    PerSite<std::uint64_t> square{};  // of differences
+  };
+  double mean_of(const Tile& tile, int site) const;
+  double variance_of(const Tile& tile, int site) const;
+
+  int width_, height_, tile_;
+  int columns_, rows_;  // whole tiles
+  double low_share_;    // of the variance, that the lowest fifth of estimates lies below
+  std::vector<Tile> tiles_;
+  std::vector<float> memory_;
+};
+
+}  // namespace lowlux::isp
