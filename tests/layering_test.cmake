@@ -12,7 +12,7 @@ set(allowed_isp/render isp/model isp/base)
 set(allowed_isp/output isp/model isp/codec isp/base)
 set(allowed_isp/pipeline isp/raw denoise isp/render isp/model isp/base)
 set(allowed_isp/bench isp/pipeline capture calib isp/output isp/raw denoise isp/render isp/model isp/codec isp/base)
-set(allowed_isp/adapter isp/pipeline isp/base)
+set(allowed_isp/adapter isp/pipeline calib isp/raw isp/render isp/model isp/base)
 set(allowed_isp/cli isp/bench isp/adapter isp/pipeline capture calib isp/output isp/raw denoise isp/render isp/model
                     isp/codec isp/base)
 set(folders isp/base isp/model isp/codec capture calib denoise isp/raw isp/render isp/output isp/pipeline isp/bench

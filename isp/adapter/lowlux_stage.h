@@ -2,15 +2,16 @@
  *
  * A C interface without types of libcamera or V4L2, to be linked or loaded by name (dlopen of liblowlux_stage.so.0, or
  * dlsym of each function). It keeps these promises:
- *   - No exception leaves it. lowlux_stage_process allocates nothing, takes no lock while it works on pixels, and starts
- *     no threads; lowlux_stage_configure takes all memory.
+ *   - No exception leaves it. lowlux_stage_process allocates nothing, takes no lock while it works on pixels, and
+ * starts no threads; lowlux_stage_configure takes all memory.
  *   - Every call on one stage comes from one thread at a time; stages do not know of one another.
  *   - The bytes of a result do not depend on the number of threads.
  *   - Input rows are read once, from first to last: they may lie in uncached memory.
  *   - Every struct begins with its size, which the caller sets. Members a caller does not know are taken as absent, and
  *     those lowlux does not know are ignored: structs grow at their end within one version.
- * Functions return LOWLUX_STAGE_OK, LOWLUX_STAGE_ADJUSTED, or an error below 0; lowlux_stage_last_error says more. After
- * an error in lowlux_stage_process the output planes are not touched or hold part of a picture; the stage goes on.
+ * Functions return LOWLUX_STAGE_OK, LOWLUX_STAGE_ADJUSTED, or an error below 0; lowlux_stage_last_error says more.
+ * After an error in lowlux_stage_process the output planes are not touched or hold part of a picture; the stage goes
+ * on.
  */
 #ifndef LOWLUX_STAGE_H
 #define LOWLUX_STAGE_H
@@ -34,18 +35,18 @@ typedef struct lowlux_stage lowlux_stage;
 
 enum {
   LOWLUX_STAGE_OK = 0,
-  LOWLUX_STAGE_ADJUSTED = 1,           /* configured, but not as asked: read the formats again */
-  LOWLUX_STAGE_BAD_ARGUMENT = -1,      /* a null pointer, a size of no struct, a figure out of range */
-  LOWLUX_STAGE_UNSUPPORTED = -2,       /* the format, or this output for this input */
-  LOWLUX_STAGE_TOO_LARGE = -3,         /* more memory than the limit */
+  LOWLUX_STAGE_ADJUSTED = 1,      /* configured, but not as asked: read the formats again */
+  LOWLUX_STAGE_BAD_ARGUMENT = -1, /* a null pointer, a size of no struct, a figure out of range */
+  LOWLUX_STAGE_UNSUPPORTED = -2,  /* the format, or this output for this input */
+  LOWLUX_STAGE_TOO_LARGE = -3,    /* more memory than the limit */
   LOWLUX_STAGE_NO_MEMORY = -4,
   LOWLUX_STAGE_NOT_CONFIGURED = -5,
-  LOWLUX_STAGE_SHORT_BUFFER = -6,      /* a plane ends before the picture does */
-  LOWLUX_STAGE_BAD_STRIDE = -7,        /* rows would overlap */
+  LOWLUX_STAGE_SHORT_BUFFER = -6, /* a plane ends before the picture does */
+  LOWLUX_STAGE_BAD_STRIDE = -7,   /* rows would overlap */
   LOWLUX_STAGE_MISSING_PLANE = -8,
-  LOWLUX_STAGE_BAD_PARAMETER = -9,     /* not a number, or absurd */
-  LOWLUX_STAGE_BAD_PROFILE = -10,      /* cannot be read, or is of no use for these frames */
-  LOWLUX_STAGE_UNKNOWN_LIGHT = -11,    /* the look of the eye needs the luminance of the scene */
+  LOWLUX_STAGE_BAD_PARAMETER = -9,  /* not a number, or absurd */
+  LOWLUX_STAGE_BAD_PROFILE = -10,   /* cannot be read, or is of no use for these frames */
+  LOWLUX_STAGE_UNKNOWN_LIGHT = -11, /* the look of the eye needs the luminance of the scene */
   LOWLUX_STAGE_INTERNAL = -12
 };
 
@@ -61,8 +62,8 @@ enum { LOWLUX_STAGE_DRM = 0 /* and libcamera, with its modifier */, LOWLUX_STAGE
 #define LOWLUX_STAGE_RGB888 LOWLUX_STAGE_FOURCC('R', 'G', '2', '4')   /* B G R */
 #define LOWLUX_STAGE_NV12 LOWLUX_STAGE_FOURCC('N', 'V', '1', '2')     /* plane 0: Y; plane 1: Cb Cr of 2x2 pixels */
 #define LOWLUX_STAGE_RGB48 LOWLUX_STAGE_FOURCC('B', 'G', '4', '8')    /* R G B of 16 bits, little endian */
-/* The clean mosaic in 16 bits, little endian, in the order of the picture's own corner; the largest code of the input is
- * the largest of 16 bits' high end: black is at the input's black times 2^(16 - bits). */
+/* The clean mosaic in 16 bits, little endian, in the order of the picture's own corner; the largest code of the input
+ * is the largest of 16 bits' high end: black is at the input's black times 2^(16 - bits). */
 #define LOWLUX_STAGE_BAYER16 LOWLUX_STAGE_FOURCC('B', 'Y', '1', '6')
 
 enum { LOWLUX_STAGE_MAX_PLANES = 3 };
@@ -91,7 +92,7 @@ typedef struct {
   uint32_t fourcc; /* one of those above */
   int32_t width;
   int32_t height;
-  int32_t planes;                        /* lowlux_stage_configure says how many */
+  int32_t planes;                         /* lowlux_stage_configure says how many */
   size_t stride[LOWLUX_STAGE_MAX_PLANES]; /* least, or as asked; in bytes */
   size_t bytes[LOWLUX_STAGE_MAX_PLANES];  /* a plane of that stride takes */
   int32_t yuv_matrix; /* of NV12: 601 or 709; 0: 709 from 720 rows on, 601 below. Video range, chroma in the middle */
@@ -119,8 +120,12 @@ enum {
   LOWLUX_STAGE_DENOISE_AUTO = 5          /* by the signal to noise ratio of the frame */
 };
 enum { LOWLUX_STAGE_LOOK_CAMERA = 0, LOWLUX_STAGE_LOOK_EYE = 1 };
-enum { LOWLUX_STAGE_LEVEL_NONE = 0, LOWLUX_STAGE_LEVEL_DRAFT = 1, LOWLUX_STAGE_LEVEL_STANDARD = 2,
-       LOWLUX_STAGE_LEVEL_HIGH = 3 };
+enum {
+  LOWLUX_STAGE_LEVEL_NONE = 0,
+  LOWLUX_STAGE_LEVEL_DRAFT = 1,
+  LOWLUX_STAGE_LEVEL_STANDARD = 2,
+  LOWLUX_STAGE_LEVEL_HIGH = 3
+};
 
 /* What holds from lowlux_stage_open to lowlux_stage_release. */
 typedef struct {
@@ -163,25 +168,25 @@ enum {
  * profile, else from the frame itself, else it is left out. */
 typedef struct {
   size_t size;
-  uint32_t valid;               /* LOWLUX_STAGE_HAS_... */
-  float black_level[4];         /* R, Gr, Gb, B, in codes of the input; libcamera's 16-bit figure is v 2^bits / 65536 */
-  double exposure_s;            /* 1e-7..1e5 */
-  float analogue_gain;          /* 0.1..1e4; 1 is ISO 100 of the profile */
-  float digital_gain;           /* already in the codes, 0.1..1e3; noise goes with it */
-  float colour_gains[2];        /* R and B, with G's 1; 1e-3..1e3 */
-  float colour_matrix[9];       /* rows; white-balanced camera RGB to linear sRGB; each within 1e3 */
-  float lux;                    /* of the scene: for its luminance, where nothing better tells */
-  float temperature_c;          /* of the sensor, -100..200 */
-  int32_t denoise;              /* LOWLUX_STAGE_DENOISE_...; libcamera's ZSL (4) counts as MINIMAL */
-  uint32_t sequence;            /* a gap or a step back forgets the frames before */
-  uint64_t timestamp_ns;        /* a step back, or of more than two seconds, does the same */
-  float gamma;                  /* accepted, without effect: the curve is the stage's own */
-  float contrast;               /* the same */
-  float saturation;             /* 0..4 */
-  float sharpness;              /* accepted, without effect */
-  float exposure_ev;            /* gain 2^EV of the picture, -10..20; absent: automatic */
-  float noise_gain;             /* DN for each electron, at this frame's gain; with: */
-  float noise_read;             /* standard deviation of a pixel without light [DN] */
+  uint32_t valid;         /* LOWLUX_STAGE_HAS_... */
+  float black_level[4];   /* R, Gr, Gb, B, in codes of the input; libcamera's 16-bit figure is v 2^bits / 65536 */
+  double exposure_s;      /* 1e-7..1e5 */
+  float analogue_gain;    /* 0.1..1e4; 1 is ISO 100 of the profile */
+  float digital_gain;     /* already in the codes, 0.1..1e3; noise goes with it */
+  float colour_gains[2];  /* R and B, with G's 1; 1e-3..1e3 */
+  float colour_matrix[9]; /* rows; white-balanced camera RGB to linear sRGB; each within 1e3 */
+  float lux;              /* of the scene: for its luminance, where nothing better tells */
+  float temperature_c;    /* of the sensor, -100..200 */
+  int32_t denoise;        /* LOWLUX_STAGE_DENOISE_...; libcamera's ZSL (4) counts as MINIMAL */
+  uint32_t sequence;      /* a gap or a step back forgets the frames before */
+  uint64_t timestamp_ns;  /* a step back, or of more than two seconds, does the same */
+  float gamma;            /* accepted, without effect: the curve is the stage's own */
+  float contrast;         /* the same */
+  float saturation;       /* 0..4 */
+  float sharpness;        /* accepted, without effect */
+  float exposure_ev;      /* gain 2^EV of the picture, -10..20; absent: automatic */
+  float noise_gain;       /* DN for each electron, at this frame's gain; with: */
+  float noise_read;       /* standard deviation of a pixel without light [DN] */
   float f_number;
   double scene_luminance_cd_m2; /* mean over the picture */
 } lowlux_stage_params;
@@ -205,14 +210,19 @@ typedef struct {
   lowlux_stage_plane plane[LOWLUX_STAGE_MAX_PLANES];
 } lowlux_stage_picture;
 
-enum { LOWLUX_STAGE_FROM_NOTHING = 0, LOWLUX_STAGE_FROM_PARAMS = 1, LOWLUX_STAGE_FROM_PROFILE = 2,
-       LOWLUX_STAGE_FROM_MASKED = 3, LOWLUX_STAGE_FROM_FRAME = 4 };
+enum {
+  LOWLUX_STAGE_FROM_NOTHING = 0,
+  LOWLUX_STAGE_FROM_PARAMS = 1,
+  LOWLUX_STAGE_FROM_PROFILE = 2,
+  LOWLUX_STAGE_FROM_MASKED = 3,
+  LOWLUX_STAGE_FROM_FRAME = 4
+};
 
 /* What was done to the frame. */
 typedef struct {
   size_t size;
-  uint32_t applied;     /* LOWLUX_STAGE_HAS_... of the parameters that took effect */
-  int32_t black_from;   /* LOWLUX_STAGE_FROM_... */
+  uint32_t applied;   /* LOWLUX_STAGE_HAS_... of the parameters that took effect */
+  int32_t black_from; /* LOWLUX_STAGE_FROM_... */
   int32_t noise_from;
   int32_t white_from;
   float black_level[4]; /* R, Gr, Gb, B that was taken off, dark charge in it */
@@ -220,11 +230,11 @@ typedef struct {
   float noise_read;     /* DN */
   float colour_gains[2];
   float exposure_ev;
-  int32_t level;        /* LOWLUX_STAGE_LEVEL_... of noise reduction */
-  int32_t temporal;     /* 1: frames before took part */
-  float moved;          /* share of the picture that was found to move */
+  int32_t level;               /* LOWLUX_STAGE_LEVEL_... of noise reduction */
+  int32_t temporal;            /* 1: frames before took part */
+  float moved;                 /* share of the picture that was found to move */
   float scene_luminance_cd_m2; /* 0: not known */
-  float adaptation;     /* m of CIE 191, 0 scotopic to 1 photopic; 1 without the look of the eye */
+  float adaptation;            /* m of CIE 191, 0 scotopic to 1 photopic; 1 without the look of the eye */
 } lowlux_stage_result;
 
 /* Of the frame as it came in, before anything was taken off or denoised: for exposure and white balance of the next. */
@@ -252,8 +262,8 @@ LOWLUX_STAGE_EXPORT int lowlux_stage_query(int32_t api, uint32_t fourcc, uint64_
 LOWLUX_STAGE_EXPORT int lowlux_stage_open(const lowlux_stage_settings* settings, lowlux_stage** stage, char* message,
                                           size_t message_size);
 
-/* Takes all memory. out->fourcc is asked for, the rest is answered; out->stride of 0 is filled in, one that is too small
- * is adjusted. A stage that was configured before and fails stays unconfigured. */
+/* Takes all memory. out->fourcc is asked for, the rest is answered; out->stride of 0 is filled in, one that is too
+ * small is adjusted. A stage that was configured before and fails stays unconfigured. */
 LOWLUX_STAGE_EXPORT int lowlux_stage_configure(lowlux_stage* stage, const lowlux_stage_input* in,
                                                lowlux_stage_output* out);
 

@@ -34,29 +34,6 @@ int channel_of(int site, BayerPhase phase) {
   return y == red_row(phase) ? 1 : 2;
 }
 
-/// As calib::profile_at has it for frames of files.
-NoiseProfile noise_of(const StageStream& stream, const PerSite<double>& black_dn, const PerSite<double>& dark_e,
-                      double gain_dn, double read_dn) {
-  NoiseProfile out{.source = NoiseProfile::Source::profile};
-  std::array<int, 3> sites{};
-  for (int site = 0; site < 4; ++site) {
-    const bool bayer = stream.format.layout == SensorLayout::bayer;
-    const double range_dn = stream.white_dn - black_dn[site];
-    const double offset_dn2 = read_dn * read_dn + gain_dn * gain_dn * dark_e[site] + 1.0 / 12;
-    for (int c = 0; c < 3; ++c) {
-      if (bayer && static_cast<int>(colour_at(stream.phase, site & 1, site >> 1)) != c) continue;
-      out.scale[c] += gain_dn / range_dn;
-      out.offset[c] += offset_dn2 / (range_dn * range_dn);
-      ++sites[c];
-    }
-  }
-  for (int c = 0; c < 3; ++c) {
-    out.scale[c] /= sites[c];
-    out.offset[c] /= sites[c];
-  }
-  return out;
-}
-
 void set_levels(const lowlux_stage_params& params, const StageStream& stream, const StageProfile* profile,
                 StageFacts& out) {
   const auto given = [&](std::uint32_t bit, double value) {
@@ -94,9 +71,13 @@ void set_levels(const lowlux_stage_params& params, const StageStream& stream, co
   }
   // A level of the sensor's driver is the pedestal; masked pixels hold the dark charge already.
   for (int site = 0; site < 4; ++site) black_dn[site] += gain_dn * dark_e[site];
-  const bool has_black = out.black_from != LOWLUX_STAGE_FROM_NOTHING;
-  if (has_black) out.live.black_dn = black_dn;
-  if (gain_dn > 0) out.live.noise = noise_of(stream, has_black ? black_dn : PerSite<double>{}, dark_e, gain_dn, read_dn);
+  if (out.black_from != LOWLUX_STAGE_FROM_NOTHING) out.live.black_dn = black_dn;
+  if (gain_dn <= 0) return;
+  LiveNoise& noise = out.live.noise.emplace();
+  noise.gain_dn = gain_dn;
+  for (int site = 0; site < 4; ++site) {
+    noise.black_variance_dn2[site] = read_dn * read_dn + gain_dn * gain_dn * dark_e[site] + 1.0 / 12;
+  }
 }
 
 void set_light(const lowlux_stage_params& params, StageFacts& out) {
@@ -144,9 +125,8 @@ LiveDenoise denoise_of(const lowlux_stage_params& params, const StageStream& str
       out = {.mode = Mode::level, .level = denoise::Level::draft, .temporal = stream.temporal};
       break;
     case LOWLUX_STAGE_DENOISE_HIGH_QUALITY:
-      out = {.mode = Mode::level,
-             .level = std::max(stream.most, denoise::Level::standard),
-             .temporal = stream.temporal};
+      out = {
+          .mode = Mode::level, .level = std::max(stream.most, denoise::Level::standard), .temporal = stream.temporal};
       break;
     case LOWLUX_STAGE_DENOISE_AUTO:
       break;
@@ -220,8 +200,7 @@ StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream
     out.applied |= LOWLUX_STAGE_HAS_EXPOSURE_VALUE;
   }
   if (out.live.denoise.temporal) {
-    out.applied |=
-        params.valid & (LOWLUX_STAGE_HAS_SEQUENCE | LOWLUX_STAGE_HAS_TIMESTAMP | LOWLUX_STAGE_HAS_EXPOSURE);
+    out.applied |= params.valid & (LOWLUX_STAGE_HAS_SEQUENCE | LOWLUX_STAGE_HAS_TIMESTAMP | LOWLUX_STAGE_HAS_EXPOSURE);
   }
   return out;
 }

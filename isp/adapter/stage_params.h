@@ -25,9 +25,8 @@ struct StageFacts {
 struct StageStream {
   RawFormat format;
   BayerPhase phase = BayerPhase::rggb;  // of the active area
-  double white_dn = 0;
   denoise::Level most = denoise::Level::draft;
-  bool has_level = true;   // there is memory for one
+  bool has_level = true;  // there is memory for one
   bool has_masked = false;
   bool temporal = false;
 };

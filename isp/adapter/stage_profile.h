@@ -16,7 +16,7 @@ namespace lowlux::isp {
 struct StageSensor {
   double gain_dn_per_e = 0;
   double read_noise_dn = 0;
-  PerSite<double> dark_e{};                       // mean charge at the frame's exposure and temperature
+  PerSite<double> dark_e{};  // mean charge at the frame's exposure and temperature
   std::optional<PerSite<double>> pedestal_dn;
 };
 

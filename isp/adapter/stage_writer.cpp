@@ -9,8 +9,8 @@ StageWriter::StageWriter(StageOutput kind, YuvStandard standard, int width, int 
       matrix_(yuv_matrix(standard)),
       width_(width),
       height_(height),
-      above_(std::make_unique<std::uint8_t[]>(3 * static_cast<std::size_t>(width) *
-                                              static_cast<std::size_t>(threads))) {}
+      above_(
+          std::make_unique<std::uint8_t[]>(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(threads))) {}
 
 RowSink StageWriter::sink(const lowlux_stage_plane* planes) {
   planes_ = planes;

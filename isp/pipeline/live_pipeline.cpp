@@ -91,13 +91,14 @@ Result<void> LivePipeline::warm_up() {
   }
   const auto black = static_cast<double>(largest_code(setup_.format)) / 16;
   LiveFacts facts{.black_dn = PerSite<double>{black, black, black, black},
-                  .noise = NoiseProfile{.scale = {1e-3, 1e-3, 1e-3}, .offset = {1e-5, 1e-5, 1e-5}},
+                  .noise = LiveNoise{.gain_dn = 1, .black_variance_dn2 = {4, 4, 4, 4}},
                   .scene_luminance_cd_m2 = 1};
   const bool bayer = setup_.format.layout == SensorLayout::bayer;
   for (const bool reduces : {false, true}) {
     if (reduces && !bayer) continue;
-    facts.denoise = {
-        .mode = reduces ? LiveDenoise::Mode::level : LiveDenoise::Mode::off, .level = setup_.most, .temporal = reduces};
+    facts.denoise = {.mode = reduces && setup_.levels ? LiveDenoise::Mode::level : LiveDenoise::Mode::off,
+                     .level = setup_.most,
+                     .temporal = reduces};
     if (Result<void> planned = plan(facts); !planned) return planned;
     if (setup_.samples == SampleType::u16) {
       Plane<std::uint16_t> rgb(3 * setup_.active.width, setup_.active.height);

@@ -41,6 +41,7 @@ class LivePipeline {
   const LiveDecision& decision() const { return planner_.decision(); }
   FrameMeter& meter() { return meter_; }
   const RawFrame& frame() const { return frame_; }
+  double moved() const { return pipeline_.moved(); }  // share of the picture, in the frame rendered last
 
   /// The picture in display codes, active area, row by row.
   void render(const RowSink& sink) { pipeline_.render(frame_, plan_, sink); }

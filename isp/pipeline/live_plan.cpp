@@ -26,12 +26,30 @@ NoiseLine blended(const NoiseLine& before, const NoiseLine& now) {
   return out;
 }
 
-NoiseProfile profile_of(const NoiseLine& line, const RawFrame& frame, const BlackPoint& black) {
-  const double range = mean_range_dn(frame.raw, black);
-  NoiseProfile out{.source = NoiseProfile::Source::picture};
-  out.scale.fill(line.gain_dn / range);
-  out.offset.fill(line.offset_dn2 / (range * range));
+/// As calib::profile_at has it: means over the sites of a colour. Monochrome frames have one for all.
+NoiseProfile profile_of(const LiveNoise& noise, const RawDn& raw, const BlackPoint& black) {
+  NoiseProfile out{.source = NoiseProfile::Source::profile};
+  std::array<int, 3> sites{};
+  for (int site = 0; site < 4; ++site) {
+    const double range_dn = white_at(raw, site) - black.pedestal_dn[site];
+    for (int c = 0; c < 3; ++c) {
+      if (raw.layout == SensorLayout::bayer && static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)) != c)
+        continue;
+      out.scale[c] += noise.gain_dn / range_dn;
+      out.offset[c] += noise.black_variance_dn2[site] / (range_dn * range_dn);
+      ++sites[c];
+    }
+  }
+  for (int c = 0; c < 3; ++c) {
+    out.scale[c] /= sites[c];
+    out.offset[c] /= sites[c];
+  }
   return out;
+}
+
+LiveNoise noise_of(const NoiseLine& line) {
+  const double variance = line.offset_dn2;
+  return {line.gain_dn, {variance, variance, variance, variance}};
 }
 
 /// Moves linear colours away from the neutral of their luminance, or to it.
@@ -80,12 +98,12 @@ void LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, DevelopPl
 void LivePlanner::set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan) {
   decision_.measured = meter.tiles().line(plan.black.pedestal_dn, frame.raw.white_dn[1]);
   if (facts.noise) {
-    frame.noise = *facts.noise;
+    frame.noise = profile_of(*facts.noise, frame.raw, plan.black);
     decision_.noise = LiveSource::given;
   } else {
     if (decision_.measured) line_ = line_ ? blended(*line_, *decision_.measured) : *decision_.measured;
     frame.noise.reset();
-    if (line_) frame.noise = profile_of(*line_, frame, plan.black);
+    if (line_) frame.noise = profile_of(noise_of(*line_), frame.raw, plan.black);
     decision_.noise = line_ ? LiveSource::frame : LiveSource::none;
   }
   plan.electrons_at_white.reset();
@@ -100,8 +118,9 @@ WhiteBalance LivePlanner::choose_white(const LiveFacts& facts, RawFrame& frame) 
     frame.colour.as_shot_neutral = scaled_to_one(*facts.neutral);
   } else {
     memory_.resize(thumbnail_.mean.plane[0].size());
-    const WhiteEstimate found = estimate_white(thumbnail_.mean.view(), block_noise_std(frame.raw, thumbnail_),
-                                               frame.colour, AutoWhiteOptions{}, memory_);
+    const WhiteEstimate found =
+        estimate_white(std::as_const(thumbnail_).mean.view(), block_noise_std(frame.raw, thumbnail_), frame.colour,
+                       AutoWhiteOptions{}, memory_);
     decision_.white = LiveSource::frame;
     if (found.blocks >= AutoWhiteOptions{}.min_blocks) {
       const Vector3& now = found.balance.neutral;

@@ -28,7 +28,8 @@ struct LiveSetup {
   ToneCurve tone = ToneCurve::standard;
   SampleType samples = SampleType::u8;
   LookChoice look;                                 // of the eye or the camera
-  denoise::Level most = denoise::Level::standard;  // that frames may ask for
+  bool levels = true;                              // frames may be denoised one by one ...
+  denoise::Level most = denoise::Level::standard;  // ... up to this level
   bool temporal = false;                           // frames before take part
 };
 
@@ -39,10 +40,16 @@ struct LiveDenoise {
   bool temporal = true;                          // where the setup has it
 };
 
+/// Temporal noise in codes: a code v DN above black has the variance gain_dn v + black_variance_dn2 of its site.
+struct LiveNoise {
+  double gain_dn = 0;  // the system gain [DN/e-]
+  PerSite<double> black_variance_dn2{};
+};
+
 /// What is known of one frame. What is absent is measured on it or left out.
 struct LiveFacts {
   std::optional<PerSite<double>> black_dn;  // of the active area's sites, mean dark charge in it
-  std::optional<NoiseProfile> noise;
+  std::optional<LiveNoise> noise;
   std::optional<double> exposure_s;
   std::optional<double> iso;
   std::optional<double> f_number;

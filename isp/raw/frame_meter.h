@@ -42,6 +42,7 @@ class FrameMeter {
   const FrameStatistics& statistics() const { return statistics_; }
   ThumbnailSums& thumbnail() { return thumbnail_; }
   TileNoise& tiles() { return tiles_; }
+  const TileNoise& tiles() const { return tiles_; }
   /// Mean codes of the sites (of the active area's cells) on the masked pixels; nullopt if there are none.
   std::optional<PerSite<double>> masked_dn() const;
 

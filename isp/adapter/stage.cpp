@@ -1,0 +1,318 @@
+#include "isp/adapter/stage.h"
+
+#include <linux/dma-buf.h>
+#include <sys/ioctl.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace lowlux::isp {
+namespace {
+
+constexpr int default_threads = 2, most_threads = 8;
+constexpr std::uint64_t default_memory_limit = std::uint64_t{1} << 30;
+constexpr std::size_t longest_stride = std::size_t{1} << 24;
+
+bool is_empty(const lowlux_stage_rect& r) { return r.x == 0 && r.y == 0 && r.width == 0 && r.height == 0; }
+
+int code_of(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::unsupported:
+      return LOWLUX_STAGE_UNSUPPORTED;
+    case ErrorCode::insufficient:
+      return LOWLUX_STAGE_UNKNOWN_LIGHT;
+    case ErrorCode::too_large:
+      return LOWLUX_STAGE_TOO_LARGE;
+    case ErrorCode::malformed:
+      return LOWLUX_STAGE_BAD_PARAMETER;
+    default:
+      return LOWLUX_STAGE_BAD_ARGUMENT;
+  }
+}
+
+/// Brackets what the processor reads of a dma-buf; other descriptors refuse, which does no harm.
+class DmaAccess {
+ public:
+  explicit DmaAccess(int fd) : fd_(fd) { sync(DMA_BUF_SYNC_START); }
+  ~DmaAccess() { sync(DMA_BUF_SYNC_END); }
+  DmaAccess(const DmaAccess&) = delete;
+  DmaAccess& operator=(const DmaAccess&) = delete;
+
+ private:
+  void sync(std::uint64_t step) const {
+    if (fd_ < 0) return;
+    dma_buf_sync request{};
+    request.flags = step | DMA_BUF_SYNC_READ;
+    for (int tries = 0; tries < 8; ++tries) {
+      if (ioctl(fd_, DMA_BUF_IOCTL_SYNC, &request) == 0 || (errno != EINTR && errno != EAGAIN)) return;
+    }
+  }
+  int fd_;
+};
+
+Result<void> check(const lowlux_stage_settings& s) {
+  const auto wrong = [](const char* message) { return fail(ErrorCode::invalid_argument, message); };
+  if (s.threads < 0 || s.threads > most_threads) return wrong("a stage has 1 to 8 threads, or 0 for 2");
+  if (s.most_denoise < 0 || s.most_denoise > LOWLUX_STAGE_LEVEL_HIGH) return wrong("no such level of noise reduction");
+  if (s.look != LOWLUX_STAGE_LOOK_CAMERA && s.look != LOWLUX_STAGE_LOOK_EYE) return wrong("no such look");
+  if (s.tone != 0 && s.tone != 1) return wrong("no such tone curve");
+  if (s.temporal != 0 && s.temporal != 1) return wrong("temporal is 0 or 1");
+  if (!(s.field_of_view_deg == 0 || (s.field_of_view_deg >= 0.1 && s.field_of_view_deg <= 180))) {
+    return wrong("a field of view has 0.1 to 180 degrees");
+  }
+  return {};
+}
+
+denoise::Level level_of(std::int32_t level) {
+  return level <= LOWLUX_STAGE_LEVEL_DRAFT ? denoise::Level::draft : static_cast<denoise::Level>(level - 1);
+}
+
+Rect rect_of(const lowlux_stage_rect& r) { return {r.x, r.y, r.width, r.height}; }
+
+std::vector<Pixel> defects_of(const StageProfile& profile, const Rect& active) {
+  std::vector<Pixel> out;
+  for (const HotPixelFigure& hot : profile.hot_pixels()) {
+    const Pixel pixel{hot.x - active.x, hot.y - active.y};
+    if (pixel.x >= 0 && pixel.y >= 0 && pixel.x < active.width && pixel.y < active.height) out.push_back(pixel);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::uint64_t stage_memory_bytes(const LiveSetup& setup, int threads) {
+  const auto area = [](int width, int height) {
+    return static_cast<std::uint64_t>(std::max(width, 0)) * static_cast<std::uint64_t>(std::max(height, 0));
+  };
+  const std::uint64_t rounded = area(setup.active.width + 128, setup.active.height + 16);
+  std::uint64_t for_each = 12;         // mosaics in electrons, statistics
+  if (setup.levels) for_each += 24;    // Denoiser
+  if (setup.temporal) for_each += 16;  // TemporalMean, its mean, maps
+  if (setup.look.look == Look::eye) for_each += 8;
+  const auto row = static_cast<std::uint64_t>(setup.width) + 4096;
+  // A made-up frame of the stream's own size runs through once.
+  return 2 * area(setup.width, setup.height) +
+         row_bytes(setup.format, setup.width) * static_cast<std::uint64_t>(setup.height) + for_each * rounded +
+         static_cast<std::uint64_t>(threads) * row * 700 + (std::uint64_t{4} << 20);
+}
+
+Stage::Stage(const lowlux_stage_settings& settings, std::optional<StageProfile> profile)
+    : settings_(settings),
+      profile_(std::move(profile)),
+      executor_(settings.threads == 0 ? default_threads : settings.threads) {
+  settings_.profile_file = nullptr;  // the caller's
+}
+
+Result<std::unique_ptr<Stage>> Stage::open(const lowlux_stage_settings& settings) {
+  if (Result<void> checked = check(settings); !checked) return tl::make_unexpected(checked.error());
+  std::optional<StageProfile> profile;
+  if (settings.profile_file != nullptr) {
+    Result<StageProfile> read = StageProfile::read(settings.profile_file);
+    if (!read) return tl::make_unexpected(read.error());
+    profile = *std::move(read);
+  }
+  return std::unique_ptr<Stage>(new Stage(settings, std::move(profile)));
+}
+
+int Stage::say(int code, const char* message) {
+  std::strncpy(message_, message, sizeof message_ - 1);
+  return code;
+}
+
+Result<LiveSetup> Stage::setup_for(const lowlux_stage_input& in, const RawFormat& format, StageOutput kind) {
+  LiveSetup setup{.format = format, .width = in.width, .height = in.height};
+  setup.active = is_empty(in.crop) ? Rect{0, 0, in.width, in.height} : rect_of(in.crop);
+  if (!is_empty(in.masked)) setup.masked = {rect_of(in.masked)};
+  setup.white_dn = in.white_level;
+  setup.tone = settings_.tone == 1 ? ToneCurve::standard : ToneCurve::none;
+  setup.samples = kind == StageOutput::rgb48 ? SampleType::u16 : SampleType::u8;
+  if (settings_.look == LOWLUX_STAGE_LOOK_EYE) setup.look.look = Look::eye;
+  if (settings_.field_of_view_deg > 0) setup.look.field_of_view_deg = settings_.field_of_view_deg;
+  setup.levels = settings_.most_denoise != LOWLUX_STAGE_LEVEL_NONE;
+  setup.most = level_of(settings_.most_denoise);
+  setup.temporal = settings_.temporal == 1;
+  if (!profile_) return setup;
+  const BayerPhase phase = phase_of_crop(format.phase, setup.active.x & 1, setup.active.y & 1);
+  if (Result<void> fits = profile_->prepare(format, phase); !fits) return tl::make_unexpected(fits.error());
+  setup.colour.calibrations = profile_->calibrations();
+  setup.defects = defects_of(*profile_, setup.active);
+  return setup;
+}
+
+Result<int> Stage::configure(const lowlux_stage_input& in, lowlux_stage_output& out) {
+  stream_.reset();
+  history_.reset();
+  const auto format = stage_input(in.api, in.fourcc, in.modifier);
+  if (!format) return fail(ErrorCode::unsupported, "the input is no raw format that lowlux reads");
+  const auto kind = stage_output(out.fourcc);
+  if (!kind) return fail(ErrorCode::unsupported, "the output is none that lowlux writes");
+  if (*kind == StageOutput::mosaic && format->layout != SensorLayout::bayer) {
+    return fail(ErrorCode::unsupported, "a monochrome input has no mosaic to give");
+  }
+  if (out.yuv_matrix != 0 && out.yuv_matrix != 601 && out.yuv_matrix != 709) {
+    return fail(ErrorCode::invalid_argument, "the matrix of NV12 is 601 or 709, or 0 for the usual one");
+  }
+  Result<LiveSetup> setup = setup_for(in, *format, *kind);
+  if (!setup) return tl::make_unexpected(setup.error());
+  if (in.width < 2 || in.height < 2 || in.width > 65536 || in.height > 65536) {
+    return fail(ErrorCode::invalid_argument, "frames have 2 to 65536 pixels each way");
+  }
+  const std::uint64_t limit = settings_.memory_limit == 0 ? default_memory_limit : settings_.memory_limit;
+  if (const std::uint64_t wanted = stage_memory_bytes(*setup, executor_.width()); wanted > limit) {
+    return fail(ErrorCode::too_large, fmt::format("frames of {} x {} take {} MiB, more than the limit of {}", in.width,
+                                                  in.height, wanted >> 20U, limit >> 20U));
+  }
+  Stream made;
+  made.kind = *kind;
+  made.width = in.width;
+  made.height = in.height;
+  const Rect active = setup->active;
+  made.stream = {.format = *format,
+                 .phase = phase_of_crop(format->phase, active.x & 1, active.y & 1),
+                 .most = setup->most,
+                 .has_level = setup->levels,
+                 .has_masked = !setup->masked.empty(),
+                 .temporal = setup->temporal};
+  Result<std::unique_ptr<LivePipeline>> pipeline = LivePipeline::make(*std::move(setup), executor_);
+  if (!pipeline) return tl::make_unexpected(pipeline.error());
+  made.pipeline = *std::move(pipeline);
+  const bool hd = out.yuv_matrix == 709 || (out.yuv_matrix == 0 && active.height >= 720);
+  made.writer = std::make_unique<StageWriter>(*kind, hd ? YuvStandard::bt709 : YuvStandard::bt601, active.width,
+                                              active.height, executor_.width());
+  const bool adjusted = lay_out(*kind, active.width, active.height, out);
+  made.layout = out;
+  stream_ = std::move(made);
+  return adjusted ? LOWLUX_STAGE_ADJUSTED : LOWLUX_STAGE_OK;
+}
+
+int Stage::check_source(const lowlux_stage_source& in) {
+  if (in.data == nullptr) return say(LOWLUX_STAGE_MISSING_PLANE, "there is no input");
+  const std::size_t row = row_bytes(stream_->stream.format, stream_->width);
+  if (in.stride < row || in.stride > longest_stride) {
+    return say(LOWLUX_STAGE_BAD_STRIDE, "the input's stride is shorter than a row, or absurd");
+  }
+  if (in.length < in.stride * static_cast<std::size_t>(stream_->height - 1) + row) {
+    return say(LOWLUX_STAGE_SHORT_BUFFER, "the input ends before the frame does");
+  }
+  return LOWLUX_STAGE_OK;
+}
+
+int Stage::check_picture(const lowlux_stage_picture& out) {
+  const lowlux_stage_output& layout = stream_->layout;
+  if (out.planes < layout.planes) return say(LOWLUX_STAGE_MISSING_PLANE, "the output has too few planes");
+  for (int i = 0; i < layout.planes; ++i) {
+    const lowlux_stage_plane& plane = out.plane[i];
+    if (plane.data == nullptr) return say(LOWLUX_STAGE_MISSING_PLANE, "a plane of the output is missing");
+    const std::size_t row = plane_row_bytes(stream_->kind, layout.width, i);
+    const bool wide = stream_->kind == StageOutput::rgb48 || stream_->kind == StageOutput::mosaic;
+    const bool even = !wide || (plane.stride % 2 == 0 && reinterpret_cast<std::uintptr_t>(plane.data) % 2 == 0);
+    if (plane.stride < row || plane.stride > longest_stride || !even) {
+      return say(LOWLUX_STAGE_BAD_STRIDE, "a stride of the output is shorter than a row, odd for 16 bits, or absurd");
+    }
+    const auto rows = static_cast<std::size_t>(plane_rows(stream_->kind, layout.height, i));
+    if (plane.length < plane.stride * (rows - 1) + row) {
+      return say(LOWLUX_STAGE_SHORT_BUFFER, "a plane of the output ends before the picture does");
+    }
+  }
+  return LOWLUX_STAGE_OK;
+}
+
+void Stage::render(const lowlux_stage_picture& out) {
+  const lowlux_stage_plane& first = out.plane[0];
+  const PlaneView<std::uint16_t> wide{static_cast<std::uint16_t*>(first.data), stream_->layout.width,
+                                      stream_->layout.height, static_cast<std::ptrdiff_t>(first.stride / 2)};
+  switch (stream_->kind) {
+    case StageOutput::rgb48:
+      stream_->pipeline->render({wide.data, 3 * wide.width, wide.height, wide.stride});
+      return;
+    case StageOutput::mosaic:
+      stream_->pipeline->render_mosaic(wide);
+      return;
+    default:
+      stream_->pipeline->render(stream_->writer->sink(out.plane));
+  }
+}
+
+int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& out, const lowlux_stage_params& params,
+                   const Answers& answers) {
+  if (!stream_) return say(LOWLUX_STAGE_NOT_CONFIGURED, "the stage has no format yet");
+  if (const int wrong = check_source(in); wrong != LOWLUX_STAGE_OK) return wrong;
+  if (const int wrong = check_picture(out); wrong != LOWLUX_STAGE_OK) return wrong;
+  if (const char* fault = fault_of(params); fault != nullptr) return say(LOWLUX_STAGE_BAD_PARAMETER, fault);
+  LivePipeline& pipeline = *stream_->pipeline;
+  {
+    const DmaAccess access(in.fd);
+    pipeline.read({static_cast<const std::byte*>(in.data), in.length}, in.stride);
+  }
+  StageFacts facts = facts_of(params, stream_->stream, profile_ ? &*profile_ : nullptr);
+  facts.live.follows = history_.follows(params);
+  if (const Result<void> planned = pipeline.plan(facts.live); !planned) {
+    return say(code_of(planned.error()), planned.error().message.c_str());
+  }
+  render(out);
+  if (answers.result != nullptr) tell(facts, *answers.result);
+  if (answers.statistics != nullptr) count(*answers.statistics);
+  return LOWLUX_STAGE_OK;
+}
+
+void Stage::reset() {
+  history_.reset();
+  if (stream_) stream_->pipeline->reset();
+}
+
+void Stage::tell(const StageFacts& facts, lowlux_stage_result& out) const {
+  const LivePipeline& pipeline = *stream_->pipeline;
+  const DevelopPlan& plan = pipeline.decided();
+  const LiveDecision& decision = pipeline.decision();
+  const auto source = [](LiveSource from, std::int32_t given) {
+    if (from == LiveSource::given) return given;
+    if (from == LiveSource::masked_pixels) return static_cast<std::int32_t>(LOWLUX_STAGE_FROM_MASKED);
+    return static_cast<std::int32_t>(from == LiveSource::frame ? LOWLUX_STAGE_FROM_FRAME : LOWLUX_STAGE_FROM_NOTHING);
+  };
+  out.applied = facts.applied;
+  out.black_from = source(decision.black, facts.black_from);
+  out.noise_from = source(decision.noise, facts.noise_from);
+  out.white_from = source(decision.white, LOWLUX_STAGE_FROM_PARAMS);
+  to_channels(plan.black.pedestal_dn, stream_->stream.phase, out.black_level);
+  out.noise_gain = out.noise_read = 0;
+  if (const auto& noise = pipeline.frame().noise; noise) {
+    const double range = pipeline.frame().raw.white_dn[1] - plan.black.pedestal_dn[0];
+    out.noise_gain = static_cast<float>(noise->scale[1] * range);
+    out.noise_read = static_cast<float>(std::sqrt(noise->offset[1]) * range);
+  }
+  out.colour_gains[0] = plan.white_gain[0] / plan.white_gain[1];
+  out.colour_gains[1] = plan.white_gain[2] / plan.white_gain[1];
+  out.exposure_ev = static_cast<float>(plan.exposure_ev);
+  const auto& level = plan.noise_reduction.level;
+  out.level = level ? static_cast<std::int32_t>(*level) + 1 : LOWLUX_STAGE_LEVEL_NONE;
+  out.temporal = plan.noise_reduction.temporal ? 1 : 0;
+  out.moved = static_cast<float>(pipeline.moved());
+  out.scene_luminance_cd_m2 = plan.look ? static_cast<float>(plan.look->mean_cd_m2) : 0;
+  out.adaptation = plan.look ? static_cast<float>(plan.look->state.m) : 1;
+}
+
+void Stage::count(lowlux_stage_statistics& out) const {
+  LivePipeline& pipeline = *stream_->pipeline;
+  const FrameStatistics& statistics = pipeline.meter().statistics();
+  std::ranges::copy(statistics.sum, out.sum);
+  std::ranges::copy(statistics.count, out.count);
+  const auto pixels = static_cast<double>(statistics.pixels);
+  out.clipped = static_cast<float>(static_cast<double>(statistics.clipped) / pixels);
+  out.zero = static_cast<float>(static_cast<double>(statistics.zero) / pixels);
+  std::ranges::copy(statistics.luma, out.luma);
+  std::ranges::fill(out.luma64, 0U);
+  for (std::size_t i = 0; i < statistics.luma.size(); ++i) out.luma64[i / 16] += statistics.luma[i];
+  const auto masked = pipeline.meter().masked_dn();
+  to_channels(masked ? *masked : pipeline.meter().tiles().darkest_dn(), stream_->stream.phase, out.measured_black);
+  out.measured_black_masked = masked ? 1 : 0;
+  const auto& noise = pipeline.decision().measured;
+  out.measured_noise_gain = noise ? static_cast<float>(noise->gain_dn) : 0;
+  out.measured_noise_read = noise ? static_cast<float>(std::sqrt(noise->offset_dn2)) : 0;
+}
+
+}  // namespace lowlux::isp

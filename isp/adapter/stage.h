@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "isp/adapter/lowlux_stage.h"
+#include "isp/adapter/stage_formats.h"
+#include "isp/adapter/stage_params.h"
+#include "isp/adapter/stage_profile.h"
+#include "isp/adapter/stage_writer.h"
+#include "isp/base/executor.h"
+#include "isp/base/result.h"
+#include "isp/pipeline/live_pipeline.h"
+
+namespace lowlux::isp {
+
+/// The stage behind lowlux_stage.h: formats and buffers of the caller's around a LivePipeline. Structs are whole here.
+class Stage {
+ public:
+  /// Errors: settings out of range (invalid_argument), those of StageProfile::read.
+  static Result<std::unique_ptr<Stage>> open(const lowlux_stage_settings& settings);
+
+  /// @return LOWLUX_STAGE_OK or LOWLUX_STAGE_ADJUSTED
+  Result<int> configure(const lowlux_stage_input& in, lowlux_stage_output& out);
+
+  struct Answers {
+    lowlux_stage_result* result = nullptr;
+    lowlux_stage_statistics* statistics = nullptr;
+  };
+  /// Allocates nothing but for a message where LivePipeline::plan fails. @return a code of lowlux_stage.h
+  int process(const lowlux_stage_source& in, const lowlux_stage_picture& out, const lowlux_stage_params& params,
+              const Answers& answers);
+
+  void reset();
+  const char* last_error() const { return message_; }
+  /// Keeps as much of a message as there is room for; @return `code`
+  int say(int code, const char* message);
+
+ private:
+  explicit Stage(const lowlux_stage_settings& settings, std::optional<StageProfile> profile);
+  Result<LiveSetup> setup_for(const lowlux_stage_input& in, const RawFormat& format, StageOutput kind);
+  int check_source(const lowlux_stage_source& in);
+  int check_picture(const lowlux_stage_picture& out);
+  void render(const lowlux_stage_picture& out);
+  void tell(const StageFacts& facts, lowlux_stage_result& out) const;
+  void count(lowlux_stage_statistics& out) const;
+
+  /// All that is there only between configure and the next.
+  struct Stream {
+    StageStream stream;
+    lowlux_stage_output layout{};
+    StageOutput kind = StageOutput::rgb;
+    int width = 0;
+    int height = 0;  // of whole frames
+    std::unique_ptr<LivePipeline> pipeline;
+    std::unique_ptr<StageWriter> writer;
+  };
+
+  lowlux_stage_settings settings_{};
+  std::optional<StageProfile> profile_;
+  PoolExecutor executor_;
+  StageHistory history_;
+  std::optional<Stream> stream_;
+  char message_[256] = "";
+};
+
+/// Bytes that a stage takes for a stream, a little more than what it really does.
+std::uint64_t stage_memory_bytes(const LiveSetup& setup, int threads);
+
+}  // namespace lowlux::isp
