@@ -39,6 +39,11 @@ struct CameraFormat {
   std::optional<double> frame_rate_hz;
 };
 
+/// Bytes from the first of a frame to the last of its last row.
+inline std::size_t frame_bytes(const CameraFormat& format) {
+  return format.stride_bytes * static_cast<std::size_t>(format.height - 1) + row_bytes(format.raw, format.width);
+}
+
 /// What the source tells about how one frame was taken; all optional, never guessed.
 struct FrameFacts {
   std::optional<double> exposure_s;

@@ -148,8 +148,4 @@ Result<CameraFormat> agreed_format(const AgreedStream& agreed, const RawStreamCh
   });
 }
 
-std::size_t frame_bytes(const CameraFormat& format) {
-  return format.stride_bytes * static_cast<std::size_t>(format.height - 1) + row_bytes(format.raw, format.width);
-}
-
 }  // namespace lowlux::capture

@@ -61,7 +61,4 @@ struct AgreedStream {
 Result<CameraFormat> agreed_format(const AgreedStream& agreed, const RawStreamChoice& choice,
                                    const CameraRequest& request, std::vector<std::string>& warnings);
 
-/// Bytes from the first of a frame to the last that holds a sample.
-std::size_t frame_bytes(const CameraFormat& format);
-
 }  // namespace lowlux::capture

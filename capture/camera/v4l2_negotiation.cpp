@@ -120,10 +120,6 @@ Result<CameraFormat> checked(const V4l2Device& device, const V4l2Layout& got, co
 
 }  // namespace
 
-std::size_t frame_bytes(const CameraFormat& format) {
-  return format.stride_bytes * static_cast<std::size_t>(format.height - 1) + row_bytes(format.raw, format.width);
-}
-
 Result<V4l2Agreement> negotiate(V4l2Device& device, const CameraRequest& request) {
   auto current = read_layout(device);
   if (!current) return pass_on(current);

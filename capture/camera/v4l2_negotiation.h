@@ -23,9 +23,6 @@ struct V4l2Agreement {
 /// all buffers (too_large), and those of the device.
 Result<V4l2Agreement> negotiate(V4l2Device& device, const CameraRequest& request);
 
-/// Bytes from a frame's first to its last one: whole strides, and of the last row what its samples take.
-std::size_t frame_bytes(const CameraFormat& format);
-
 /// Memory of all buffers of a camera [bytes] at most.
 inline constexpr std::size_t most_buffer_bytes = std::size_t{2} << 30;
 
