@@ -15,7 +15,7 @@ constexpr std::uint64_t ipu3_packed = std::uint64_t{0x01} << 56 | 13;  // IPU3_F
 constexpr std::uint32_t big_endian = 1U << 31;                         // of V4L2 codes, v4l2_fourcc_be
 
 /// "" is no code.
-constexpr std::uint32_t code(std::string_view four) {
+constexpr std::uint32_t code_of(std::string_view four) {
   return four.empty() ? 0 : fourcc(four[0], four[1], four[2], four[3]);
 }
 
@@ -26,14 +26,14 @@ struct Codes {
 
 constexpr RawFormatNames bayer(int bits, RawPacking packing, BayerPhase phase, Codes codes, std::uint64_t modifier,
                                std::string_view libcamera) {
-  return {{bits, packing, SensorLayout::bayer, phase}, code(codes.v4l2), code(codes.drm), modifier, libcamera};
+  return {{bits, packing, SensorLayout::bayer, phase}, code_of(codes.v4l2), code_of(codes.drm), modifier, libcamera};
 }
 
 constexpr RawFormatNames mono(int bits, RawPacking packing, Codes codes, std::uint64_t modifier = linear,
                               std::string_view libcamera = {}) {
   return {{bits, packing, SensorLayout::monochrome, BayerPhase::rggb},
-          code(codes.v4l2),
-          code(codes.drm),
+          code_of(codes.v4l2),
+          code_of(codes.drm),
           modifier,
           libcamera};
 }
@@ -47,7 +47,7 @@ constexpr RawFormatNames big_endian_y16() {
 using enum RawPacking;
 using enum BayerPhase;
 
-// V4L2 codes: linux/videodev2.h (Y12P, Y14P from Linux 5.19). DRM codes and names: libcamera's formats.yaml and
+// V4L2 codes: linux/videodev2.h (Y12P and Y14P in newer ones). DRM codes and names: libcamera's formats.yaml and
 // drm_fourcc.h. The two agree up to 12 bits and part above: RG16 is raw in V4L2 and RGB565 in DRM.
 constexpr std::array formats{
     bayer(8, byte, bggr, {"BA81", "BA81"}, linear, "SBGGR8"),

@@ -64,7 +64,7 @@ struct RawGroup {
 };
 RawGroup group_of(const RawFormat& format);
 
-/// Bytes that a row of `width` samples takes, the last group whole; without what a stride adds.
+/// Bytes that a row of `width` samples takes, the last group whole; without what a stride adds. 0 below 1.
 std::size_t row_bytes(const RawFormat& format, int width);
 
 /// Largest code: 2^bits - 1.

@@ -5,6 +5,7 @@
 #endif
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "isp/base/unpack_rows.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>  // compiles this file once more for each instruction set
 #include <hwy/highway.h>
 
@@ -55,8 +56,9 @@ HWY_INLINE void store(VC codes, std::uint16_t* out, std::size_t left) {
   std::memcpy(out, rest, left * sizeof(*out));
 }
 
-constexpr std::size_t stage_pixels = 1600;  // whole vectors and whole groups of any layout
+constexpr std::size_t stage_pixels = 800;  // whole vectors and whole groups of any layout
 constexpr std::size_t stage_bytes = stage_pixels * 14 / 8;
+static_assert(stage_pixels % 25 == 0 && stage_pixels % (widest_bytes / 2) == 0);
 
 /// Eight codes are made of `bytes` bytes: 16-bit lane i is
 ///     high[i] << (bits - 8)  |  (the two bytes low[i] as little endian, times factor[i], modulo 2^16) >> low_shift
@@ -186,7 +188,7 @@ HWY_INLINE VC codes_of(const Registers& r, const std::uint8_t* in) {
 }
 
 /// By way of a small buffer: the vectors at its end may read on, those of the row may not, and where they overlap they
-/// would read slow memory of a camera twice.
+/// would read slow memory of a camera twice. Memory is kept busy meanwhile by fetching ahead.
 template <class Packing>
 HWY_INLINE void put_packed(const std::uint8_t* in, std::size_t width, std::uint16_t* out) {
   constexpr Layout layout = Packing::layout;
@@ -203,7 +205,9 @@ HWY_INLINE void put_packed(const std::uint8_t* in, std::size_t width, std::uint1
     const std::uint8_t* run = stage;
     for (std::size_t x = first; x < end; x += layout.run_pixels, run += layout.run_bytes) {
       for (std::size_t i = 0; i < layout.run_pixels && x + i < end; i += vector_codes) {
-        store(codes_of<Packing>(r, run + i / 8 * layout.bytes), out + x + i, width - x - i);
+        const std::size_t at = i / 8 * layout.bytes;
+        hwy::Prefetch(in + (run - stage) + at);  // of the next stage, or row: harmless where there is none
+        store(codes_of<Packing>(r, run + at), out + x + i, width - x - i);
       }
     }
   }

@@ -29,11 +29,11 @@ inline std::vector<RawFormat> layouts() {
   return out;
 }
 
-/// Every remainder of groups and vectors, both sides of the kernels' pieces of 1600, and common sensors.
+/// Every remainder of groups and vectors, both sides of the kernels' pieces of 800, and common sensors.
 inline std::vector<int> widths() {
   std::vector<int> out;
   for (int width = 1; width <= 70; ++width) out.push_back(width);
-  for (const int width : {1575, 1599, 1600, 1601, 1624, 1640, 3201, 3280, 4056}) out.push_back(width);
+  for (const int width : {775, 799, 800, 801, 824, 1601, 1640, 3280, 4056}) out.push_back(width);
   return out;
 }
 

@@ -5,9 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <functional>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "isp/base/unpack.h"
@@ -30,7 +28,7 @@ constexpr RawFormat mono(int bits, RawPacking packing) { return {bits, packing, 
 
 constexpr Packing packings[] = {{"8", mono(8, RawPacking::byte)},
                                 {"16, little endian", mono(16, RawPacking::little16)},
-                                {"16, big endian", {mono(16, RawPacking::big16)}},
+                                {"16, big endian", mono(16, RawPacking::big16)},
                                 {"10P", mono(10, RawPacking::csi2)},
                                 {"12P", mono(12, RawPacking::csi2)},
                                 {"14P", mono(14, RawPacking::csi2)},
