@@ -86,29 +86,28 @@ Result<std::unique_ptr<V4l2Buffers>> V4l2Buffers::request(V4l2Device& device, V4
                 device.path());
   }
   out->buffers_.reserve(had);
-  std::size_t total_bytes = 0;
+  const std::size_t most_bytes = most_buffer_bytes / had;
   for (std::uint32_t index = 0; index < had; ++index) {
-    if (auto added = out->add(index, frame_bytes); !added) return pass_on(added);
-    total_bytes += out->buffers_.back().bytes;
-    if (total_bytes > most_buffer_bytes) {
-      return fail(ErrorCode::too_large,
-                  std::to_string(had) + " buffers of the driver take more than " + std::to_string(most_buffer_bytes) +
-                      " bytes: ask for fewer, or for a smaller size",
-                  device.path());
-    }
+    if (auto added = out->add(index, frame_bytes, most_bytes); !added) return pass_on(added);
   }
   return out;
 }
 
-Result<void> V4l2Buffers::add(std::uint32_t index, std::size_t frame_bytes) {
+Result<void> V4l2Buffers::add(std::uint32_t index, std::size_t frame_bytes, std::size_t most_bytes) {
   BufferCall told(device_, index);
   if (const int code = device_.call(VIDIOC_QUERYBUF, &told.buffer)) {
     return tl::make_unexpected(device_.error(code, "the driver does not describe its buffer"));
   }
-  if (told.bytes() < frame_bytes || told.bytes() > most_buffer_bytes) {
+  if (told.bytes() < frame_bytes) {
     return fail(ErrorCode::malformed,
                 "a buffer of the driver has " + std::to_string(told.bytes()) + " bytes, a frame takes " +
                     std::to_string(frame_bytes) + ": ask for another format",
+                device_.path());
+  }
+  if (told.bytes() > most_bytes) {
+    return fail(ErrorCode::too_large,
+                "a buffer of the driver has " + std::to_string(told.bytes()) + " bytes, the limit for each is " +
+                    std::to_string(most_bytes) + ": ask for fewer buffers, or for a smaller size",
                 device_.path());
   }
   Buffer buffer{.at = nullptr, .bytes = told.bytes(), .file = -1, .queued = false};

@@ -25,7 +25,8 @@ struct V4l2Taken {
 /// The driver's buffers, mapped. Streaming is ended, and all is unmapped, closed and returned, on destruction.
 class V4l2Buffers {
  public:
-  /// Asks for `count` buffers (the driver may give fewer or more), each of at least `frame_bytes`. None is queued.
+  /// Asks for `count` buffers (the driver may give fewer or more), each of at least `frame_bytes`, all of
+  /// them at most most_buffer_bytes. None is queued.
   static Result<std::unique_ptr<V4l2Buffers>> request(V4l2Device& device, V4l2Memory memory, int count,
                                                       std::size_t frame_bytes);
   ~V4l2Buffers();
@@ -57,7 +58,7 @@ class V4l2Buffers {
     bool accessed = false;  // begin_access without end_access
   };
   V4l2Buffers(V4l2Device& device, V4l2Memory memory) : device_(device), memory_(memory) {}
-  Result<void> add(std::uint32_t index, std::size_t frame_bytes);
+  Result<void> add(std::uint32_t index, std::size_t frame_bytes, std::size_t most_bytes);
   Result<int> exported(std::uint32_t index);
   int synchronise(std::size_t index, std::uint64_t flags);
 

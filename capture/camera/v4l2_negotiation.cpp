@@ -35,7 +35,7 @@ std::string asked_text(const RawFormat& format) {
   const RawFormatNames* names = names_of(format);
   if (names != nullptr && !names->libcamera.empty()) return std::string(names->libcamera);
   if (names != nullptr && names->v4l2_fourcc != 0) return format_text(names->v4l2_fourcc);
-  return "the format asked for";
+  return "such raw format";
 }
 
 /// Best last: Bayer before monochrome, then depth; among equals what is in force, then the mosaic's order in force.

@@ -178,6 +178,9 @@ TEST(V4l2Start, MemoryIsMappedWholeAndBoundedOrNotAtAll) {
   FakeV4l2 fake;
   fake.buffer_length = 72 * 23 + 63;  // a byte less than a frame
   EXPECT_EQ(not_started(fake).code, ErrorCode::malformed);
+  fake.length_told = (2u << 30) / 4 + 1;  // four of them are over 2 GiB
+  EXPECT_EQ(not_started(fake).code, ErrorCode::too_large);
+  fake.length_told.reset();
   fake.buffer_length = 72 * 23 + 64;
   fake.buffers_given = 32;
   fake.frames = {{}};

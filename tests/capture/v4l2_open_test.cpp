@@ -79,6 +79,10 @@ TEST(V4l2Open, WhatIsAskedForIsHadExactlyOrIsAnErrorThatNamesWhatThereIs) {
   EXPECT_TRUE(has(format, "has no SRGGB12_CSI2P: it offers SRGGB8 32x24 16x12, SRGGB10 16x12 32x24, R12 16x12"))
       << format.message;
 
+  EXPECT_TRUE(has(refused(other, {.request = {.format = RawFormat{16, RawPacking::big16, SensorLayout::monochrome}}}),
+                  "has no Y16-BE: "));
+  EXPECT_TRUE(has(refused(other, {.request = {.format = RawFormat{9}}}), "has no such raw format: "));
+
   other.on_set_format = [](FakeV4l2::Layout& layout) { layout.width = 32, layout.stride_bytes = 64; };
   const Error size = refused(other, {.request = {.format = srggb10, .width = 17, .height = 12}});
   EXPECT_EQ(size.code, ErrorCode::unsupported);

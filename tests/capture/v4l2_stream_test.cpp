@@ -5,9 +5,11 @@
 
 #include <cerrno>
 #include <chrono>
+#include <string>
 
 #include "capture/camera/v4l2_negotiation.h"
 #include "tests/capture/v4l2_opened.h"
+#include "tests/support/scratch_directory.h"
 
 namespace lowlux::test {
 namespace {
@@ -144,6 +146,16 @@ TEST(V4l2Stream, ATimeOutComesInTimeAndTheStreamGoesOn) {
   EXPECT_EQ(camera->next(milliseconds::max()).value().sequence, 3u);
 }
 
+TEST(V4l2Stream, ASignalDoesNotEndAWaitAndAnotherFailureOfItDoes) {
+  FakeV4l2 fake;
+  const auto camera = started(fake);
+  fake.poll_errno = EINTR;
+  EXPECT_EQ(camera->next(milliseconds(1000)).error().code, ErrorCode::insufficient);
+  EXPECT_GE(fake.now_ms, 1000);
+  fake.poll_errno = ENOMEM;
+  EXPECT_TRUE(has(camera->next(second).error(), "waiting for a frame failed"));
+}
+
 TEST(V4l2Stream, AFrameThatIsAnnouncedAndNotThereIsWaitedForWithoutSpinning) {
   FakeV4l2 fake;
   const auto camera = started(fake);
@@ -215,6 +227,26 @@ TEST(V4l2DmaBuf, SynchronisationIsRepeatedWhereTheKernelAsksForItAndItsFailureIs
   EXPECT_TRUE(has(camera->next(second).error(), "DMA buffer"));
   EXPECT_EQ(fake.queued(), 3u);
   EXPECT_TRUE(camera->next(second));
+}
+
+TEST(V4l2System, OfThisMachineMapsWaitsAndTellsTime) {
+  const ScratchDirectory scratch;
+  scratch.write("bytes", "seven");
+  const capture::V4l2System system = capture::v4l2_system();
+  const int file = system.open(nullptr, scratch.file("bytes").c_str());
+  ASSERT_GE(file, 0);
+  void* at = system.map(nullptr, file, 5, 0);
+  ASSERT_NE(at, nullptr);
+  EXPECT_EQ(std::string(static_cast<const char*>(at), 5), "seven");
+  EXPECT_EQ(system.unmap(nullptr, at, 5), 0);
+  EXPECT_EQ(system.map(nullptr, file, 5, 1), nullptr);  // not at a page
+  EXPECT_EQ(errno, EINVAL);
+  short happened = 0;
+  EXPECT_EQ(system.poll(nullptr, file, POLLIN, 0, &happened), 1);  // files are always ready
+  EXPECT_EQ(happened, POLLIN);
+  EXPECT_EQ(system.close(nullptr, file), 0);
+  const auto before = system.now(nullptr);
+  EXPECT_GE(system.now(nullptr), before);
 }
 
 }  // namespace

@@ -178,6 +178,11 @@ int FakeV4l2::unmap(void* at, std::size_t bytes) {
 
 int FakeV4l2::poll(int file, short events, int timeout_ms, short* happened) {
   if (!files_.contains(file) || timeout_ms < 0) ++misuses;
+  errno = poll_errno;
+  if (poll_errno != 0) {
+    now_ms += std::max(timeout_ms / 100, 1);  // the time until the signal
+    return -1;
+  }
   *happened = poll_answer;
   if (unplugged && wakes_on_unplugging) *happened = POLLERR | POLLHUP;
   *happened = static_cast<short>(*happened & (events | POLLERR | POLLHUP | POLLNVAL));

@@ -76,6 +76,7 @@ class FakeV4l2 {
   std::function<void(std::uint32_t id)> on_set_control;
   std::optional<std::uint32_t> buffers_given;
   std::optional<std::uint32_t> buffer_length;
+  std::optional<std::uint32_t> length_told;  // a lie
   int map_errno = 0;
 
   // Faults: errno of the open or of one request; for so many calls, after so many good ones.
@@ -85,6 +86,7 @@ class FakeV4l2 {
   int calls_before_unplugging = 1 << 30;
   bool unplugged = false;
   bool wakes_on_unplugging = true;
+  int poll_errno = 0;
   short poll_answer = 0;  // bits that come at once, whatever is waited for
 
   // The stream.
