@@ -36,10 +36,12 @@ bool same_but_for_phase(const RawFormat& a, const RawFormat& b) {
   return a.bits == b.bits && a.packing == b.packing && a.layout == b.layout;
 }
 
+std::int64_t area_of(const FrameSize& size) { return std::int64_t{size.width} * size.height; }
+
 FrameSize largest_of(const std::vector<FrameSize>& sizes) {
   FrameSize largest;
   for (const FrameSize& size : sizes) {
-    if (std::int64_t{size.width} * size.height > std::int64_t{largest.width} * largest.height) largest = size;
+    if (area_of(size) > area_of(largest)) largest = size;
   }
   return largest;
 }
@@ -110,7 +112,8 @@ Result<RawStreamChoice> choose_raw_stream(std::span<const OfferedStream> offered
   const OfferedStream* best = nullptr;
   std::optional<RawFormat> best_format;
   const auto rank = [&](const OfferedStream& stream, const RawFormat& format) {
-    return std::tuple(lists(stream, request), format.layout == SensorLayout::bayer, format.bits);
+    return std::tuple(lists(stream, request), format.layout == SensorLayout::bayer, format.bits,
+                      area_of(largest_of(stream.sizes)));
   };
   for (const OfferedStream& stream : offered) {
     const auto format = raw_format_of_drm(stream.drm_fourcc, stream.drm_modifier);

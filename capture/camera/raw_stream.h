@@ -36,9 +36,9 @@ struct RawStreamChoice {
 /// The raw formats among those offered: "SRGGB10_CSI2P 1920x1080 3280x2464".
 std::vector<std::string> raw_stream_texts(std::span<const OfferedStream> offered);
 
-/// Chooses among what a camera offers, for a request that passed check_camera_request: the format asked for, else the
-/// deepest that lists the size asked for, else the deepest; Bayer before monochrome, of equals the first. The size is
-/// the one asked for, else the largest.
+/// Chooses among what a camera offers, for a request that passed check_camera_request: the format asked for, else one
+/// that lists the size asked for, else any; Bayer before monochrome, then the deepest, then the one with the largest
+/// size, then the first. The size is the one asked for, else the largest.
 /// Errors: unsupported (no raw stream at all: processed pictures are never taken for raw; or not in that format).
 Result<RawStreamChoice> choose_raw_stream(std::span<const OfferedStream> offered, const CameraRequest& request,
                                           const std::string& camera);

@@ -96,6 +96,15 @@ TEST(RawStream, MonochromeIsTakenWhereThereIsNoBayer) {
   EXPECT_EQ(choice->format.layout, SensorLayout::monochrome);
 }
 
+TEST(RawStream, OfEqualDepthsTheLargestSizeDecidesAndThenTheOrder) {
+  std::vector<OfferedStream> offered{{.drm_fourcc = fourcc('B', 'A', '1', '0'), .sizes = {{640, 480}}},
+                                     {.drm_fourcc = fourcc('R', 'G', '1', '0'), .sizes = {{640, 480}, {1332, 990}}}};
+  EXPECT_EQ(choose_raw_stream(offered, {}, "camera")->format.phase, BayerPhase::rggb);
+  EXPECT_EQ(choose_raw_stream(offered, {.width = 640, .height = 480}, "camera")->format.phase, BayerPhase::rggb);
+  offered[1].sizes.pop_back();
+  EXPECT_EQ(choose_raw_stream(offered, {}, "camera")->format.phase, BayerPhase::grbg);
+}
+
 TEST(RawStream, ASizeAskedForDecidesBeforeTheDepth) {
   const auto listed = choose_raw_stream(a_camera(), {.width = 1332, .height = 990}, "camera");
   ASSERT_TRUE(listed) << listed.error().message;
