@@ -20,7 +20,7 @@ webcam() {
   control osd_text_mode=2
 }
 
-# cable FOURCC SIZE FRAME: video0 sees, over HDMI, what a program sends to video1 again and again: that plain frame
+# cable FOURCC SIZE FRAME: video0 sees, over HDMI, what v4l2-ctl sends to video1: that plain frame, again and again
 cable() {
   vivid node_types=0x101 num_inputs=1 input_types=3 num_outputs=1 output_types=1 multiplanar=1
   # The first progressive timings of that size: kernels number them differently.
@@ -33,6 +33,7 @@ cable() {
   control loop_video=1 || control hdmi_000_0_is_connected_to=2  # before and after Linux 6.11
   v4l2-ctl -d /dev/video1 --stream-out-mmap=4 --stream-count=100000 --stream-from="$3" --stream-loop >sender.log 2>&1 &
   wait_for "frames on the cable" grep -q '>>>>' sender.log
+  killall -STOP v4l2-ctl  # the driver repeats the last frame it has, at less work
 }
 
 # uncable: ends what cable began
@@ -55,6 +56,20 @@ wait_for() {
 
 # capture OPTION...: the program that is tested; one that hangs is killed, which its exit code, 137, tells
 capture() { timeout -s KILL 40 lowlux capture --v4l2 /dev/video0 "$@"; }
+
+# wait_for_files FOLDER: for the first that an endless capture writes there
+wait_for_files() { wait_for "frames in $1" has_files "$1"; }
+has_files() { [ -n "$(ls "$1" 2>&- | grep '\.dng$')" ]; }
+
+# whole_files FOLDER: nothing but DNGs of 640x480, all of one size, of which the last is read
+whole_files() {
+  sizes=$(stat -c %s "$1"/* | sort -u)
+  [ "$(echo "$sizes" | wc -l)" -eq 1 ] || fail "$1: files of $(echo $sizes) bytes"
+  last=$(ls -A "$1" | sort | tail -n 1)
+  ls -A "$1" | grep -qv '^[^.].*\.dng$' && fail "$1: left $(ls -A "$1" | grep -v '^[^.].*\.dng$' | head -n 1)"
+  /guest/frame_of_dng "$1/$last" whole.raw
+  [ "$(wc -c <whole.raw)" -eq 614400 ] || fail "$1/$last holds $(wc -c <whole.raw) bytes, not 640x480 of 16 bits"
+}
 
 # frame FOURCC SIZE OUT.raw OPTION...: the samples of one captured frame
 frame() {
