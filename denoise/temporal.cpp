@@ -4,11 +4,13 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <numeric>
 #include <vector>
 
 #include "denoise/bands.h"
+#include "denoise/temporal_noise.h"
 #include "denoise/temporal_rows.h"
 #include "denoise/temporal_thresholds.h"
 
@@ -19,8 +21,8 @@ using rows::blocks_of_strip;
 using rows::motion_block;
 using rows::sites_of_strip;
 
-constexpr double largest_e = 1e9;
 constexpr double largest_share = 1e6;  // a history that is worth nothing
+constexpr double most_light = 1e6;     // up or down, beyond which it is
 
 constexpr int rounded_up(int n, int unit) { return (n + unit - 1) / unit * unit; }
 
@@ -31,33 +33,12 @@ struct StripMemory {
   float sums[2][sites_of_strip]{};
 };
 
-/// Var[y] of a raw value of one colour with this mean signal. The floor allows for means that scatter below 0.
-double variance_of(const rows::SiteNoise& noise, std::size_t colour, double signal_e) {
-  const double told =
-      signal_e + static_cast<double>(noise.dark_e[colour]) + static_cast<double>(noise.variance_e2[colour]);
-  return std::max(told, static_cast<double>(noise.least_e2[colour]));
-}
-
-rows::SiteNoise site_noise(const RawNoise& noise, BayerPhase phase) {
-  const PerSite<int> site = sites_of(phase);
-  const auto& dark = noise.dark_mean_e;
-  const std::array dark_e{dark[site[0]], (dark[site[1]] + dark[site[2]]) / 2, dark[site[3]]};
-  rows::SiteNoise out{};
-  for (int c = 0; c < 3; ++c) {
-    out.dark_e[c] = static_cast<float>(dark_e[c]);
-    out.variance_e2[c] = static_cast<float>(noise.variance_e2[c]);
-    out.least_e2[c] = static_cast<float>(0.5 * noise.variance_e2[c] + 0.3 * dark_e[c] + 0.02);
-    out.saturation_e[c] = static_cast<float>(std::min(noise.saturation_e[c], largest_e)) - out.dark_e[c];
-  }
-  return out;
-}
-
 [[maybe_unused]] bool usable(const RawNoise& noise, double light, const TemporalOptions& options) {
   const auto within = [](double x, double least, double most) { return x >= least && x <= most; };
   bool good = light > 0 && std::isfinite(light) && within(options.false_alarm, 1e-6, 0.5);
   for (const double saturation : noise.saturation_e) good = good && saturation > 0;
-  for (const double variance : noise.variance_e2) good = good && within(variance, 0, largest_e);
-  for (const double dark : noise.dark_mean_e) good = good && within(dark, 0, largest_e);
+  for (const double variance : noise.variance_e2) good = good && within(variance, 0, largest_value_e);
+  for (const double dark : noise.dark_mean_e) good = good && within(dark, 0, largest_value_e);
   return good && within(options.most_frames, 2, 256);
 }
 
@@ -106,6 +87,7 @@ struct Frame {
   bool has_moved(int x, int y) const;
   long long update(int y, PlaneView<float> out, StripMemory& strip) const;
   void put_shares(int y, PlaneView<float> map) const;
+  void take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const;
 };
 
 /// Eight rows of a strip, those beyond the frame being its last. Where the frame ends before the strip does, a copy.
@@ -137,7 +119,7 @@ double Frame::share_now(double share, const std::array<const float*, 2>& sums, i
   double before = 0, now = 0;
   for (std::size_t c = 0; c < 3; ++c) {
     if (count[c] == 0) continue;
-    before += count[c] * variance_of(memory.noise, c, std::min(sum[c] / count[c] / light, largest_e));
+    before += count[c] * variance_of(memory.noise, c, std::min(sum[c] / count[c] / light, largest_value_e));
     now += count[c] * variance_of(noise, c, sum[c] / count[c]);
   }
   return std::min(share * light * light * before / now, largest_share);
@@ -240,6 +222,32 @@ void Frame::put_shares(int y, PlaneView<float> map) const {
   }
 }
 
+/// Counts blocks that move in memory.count.
+void Frame::take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const {
+  const bool same = light == 1 && noise == memory.noise;
+  const MotionThresholds at = motion_thresholds(options.false_alarm);
+  const auto compare = [&](int y, StripMemory& strip) {
+    if (!same) rescale(y, strip);
+    find(y, at, strip);
+  };
+  // The ends of bands first, for those beside them. Inside of a band the rest follows where it is still in the cache.
+  if (!first) {
+    in_bands(workers, rows, [&](int top, int bottom, int thread) {
+      compare(top, memory.strip[thread]);
+      if (bottom - 1 > top) compare(bottom - 1, memory.strip[thread]);
+    });
+  }
+  std::fill(memory.count.begin(), memory.count.end(), 0);
+  in_bands(workers, rows, [&](int top, int bottom, int thread) {
+    StripMemory& strip = memory.strip[thread];
+    for (int y = top; y < bottom; ++y) {
+      if (!first && y + 1 < bottom - 1) compare(y + 1, strip);
+      memory.count[thread] += update(y, out, strip);
+      if (shares.data != nullptr) put_shares(y, shares);
+    }
+  });
+}
+
 }  // namespace
 
 struct TemporalMean::State {
@@ -260,34 +268,14 @@ double TemporalMean::run(const RawElectronsView& raw, const RawNoise& noise, dou
                          Executor& executor) {
   Memory& memory = state_->memory;
   assert(raw.value.width >= 2 && raw.value.height >= 2);
-  assert(rounded_up(raw.value.width, motion_block) <= memory.mean_e.width());
-  assert(raw.value.height <= memory.mean_e.height());
+  assert(raw.value.width <= memory.share.width() * motion_block);
+  assert(raw.value.height <= memory.share.height() * motion_block);
   assert(mean_e.width == raw.value.width && mean_e.height == raw.value.height);
   assert(usable(noise, light, options));
   const bool known = memory.width == raw.value.width && memory.height == raw.value.height && memory.phase == raw.phase;
-  const Frame frame{memory, raw, site_noise(noise, raw.phase), light, options, memory.empty || !known};
-  std::fill(memory.count.begin(), memory.count.end(), 0);
-  const Workers workers{executor, static_cast<int>(memory.strip.size())};
-  const bool same = light == 1 && std::memcmp(&frame.noise, &memory.noise, sizeof(frame.noise)) == 0;
-  const MotionThresholds at = motion_thresholds(options.false_alarm);
-  const auto find = [&](int y, int thread) {
-    if (!same) frame.rescale(y, memory.strip[thread]);
-    frame.find(y, at, memory.strip[thread]);
-  };
-  // The ends of bands first, for those beside them. Inside of a band the rest follows where it is still in the cache.
-  if (!frame.first) {
-    in_bands(workers, frame.rows, [&](int first, int last, int thread) {
-      find(first, thread);
-      if (last - 1 > first) find(last - 1, thread);
-    });
-  }
-  in_bands(workers, frame.rows, [&](int first, int last, int thread) {
-    for (int y = first; y < last; ++y) {
-      if (!frame.first && y + 1 < last - 1) find(y + 1, thread);
-      memory.count[thread] += frame.update(y, mean_e, memory.strip[thread]);
-      if (variance_share.data != nullptr) frame.put_shares(y, variance_share);
-    }
-  });
+  const bool worthless = light > most_light || light < 1 / most_light;
+  const Frame frame{memory, raw, site_noise(noise, raw.phase), light, options, memory.empty || !known || worthless};
+  frame.take_in({executor, static_cast<int>(memory.strip.size())}, mean_e, variance_share);
   memory.empty = false;
   memory.width = raw.value.width;
   memory.height = raw.value.height;

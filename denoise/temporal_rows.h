@@ -15,6 +15,8 @@ struct SiteNoise {
   float variance_e2[3];
   float least_e2[3];      // floor of the variance that a mean tells
   float saturation_e[3];  // without dark charge; at most 1e9, where values end
+
+  bool operator==(const SiteNoise&) const = default;
 };
 
 /// As MotionThreshold.
