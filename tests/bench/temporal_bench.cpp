@@ -1,5 +1,5 @@
-// Times the temporal mean against memcpy, and measures what it gains on a still scene and how often it takes one to
-// move: see denoise/README.md.
+// Times the temporal mean against memcpy, and measures what it gains on a still scene, how often it takes one to move,
+// and what moving things leave behind: see denoise/README.md.
 //   temporal_bench [ROUNDS, at least 5]
 #include <algorithm>
 #include <array>
@@ -120,6 +120,66 @@ void print_alarms() {
   }
 }
 
+/// Squares of fourfold light, and lamps of one site that are 20 and 200 times brighter than what is around them.
+void print_alarms_of_structure() {
+  constexpr int width = 1600, height = 1200, frames = 8;
+  const Camera camera{.read_noise_e = 2};
+  Plane<float> out(width, height);
+  InlineExecutor one;
+  std::printf("\nthe same of a scene of small squares and lamps, at 0.001, mean of frames 2 to 8\n");
+  for (const double dark_e : {2.0, 20.0, 200.0}) {
+    const auto scene = [dark_e](int x, int y) {
+      const double lamp = x % 37 != 5 ? 0 : y % 41 == 7 ? 200 : y % 41 == 9 ? 20 : 0;
+      const double e = dark_e * (lamp + ((x / 13 + y / 17) % 2 == 0 ? 1 : 4));
+      return std::array{0.5 * e, e, 0.7 * e};
+    };
+    denoise::TemporalMean temporal(width, height, 1);
+    double moved = 0;
+    for (int n = 0; n < frames; ++n) {
+      const auto raw = exposed(camera, scene, width, height, 300 + static_cast<std::uint64_t>(n));
+      const double share = temporal.run({raw.view(), camera.phase}, camera.noise(), 1, {}, out.view(), {}, one);
+      if (n > 0) moved += share / (frames - 1);
+    }
+    std::printf("%6g e- %5.2f\n", dark_e, moved / 1e-3);
+  }
+}
+
+/// What a bar of 60 sites that moves by 3 for each frame leaves behind, over the deviation of a raw value.
+void print_trails() {
+  constexpr int width = 640, height = 480, first = 40, frames = 80;
+  constexpr std::array behind{1, 6, 11, 21};
+  const Camera camera{.read_noise_e = 2};
+  Plane<float> out(width, height);
+  InlineExecutor one;
+  std::printf(
+      "\nleft behind a moving bar, over the standard deviation of a raw value; light, contrast over the same\n%-12s",
+      "");
+  for (const int sites : behind) std::printf(" %6d", sites);
+  std::printf(" sites behind\n");
+  for (const double mean_e : {4.0, 100.0}) {
+    for (const double contrast : {0.5, 1.0, 2.0, 4.0}) {
+      const double deviation_e = std::sqrt(mean_e + 4);
+      denoise::TemporalMean temporal(width, height, 1);
+      std::array<double, behind.size()> left{};
+      for (int n = 0; n < frames; ++n) {
+        const int right = 100 + 3 * n;
+        const auto scene = [&](int x, int) {
+          const double e = mean_e + (x >= right - 60 && x < right ? contrast * deviation_e : 0);
+          return std::array{e, e, e};
+        };
+        const auto raw = exposed(camera, scene, width, height, 500 + static_cast<std::uint64_t>(n));
+        temporal.run({raw.view(), camera.phase}, camera.noise(), 1, {}, out.view(), {}, one);
+        for (std::size_t i = 0; n >= first && i < behind.size(); ++i) {
+          for (int y = 0; y < height; ++y) left[i] += static_cast<double>(out.at(right - 60 - behind[i], y)) - mean_e;
+        }
+      }
+      std::printf("%3g e-, %-4g", mean_e, contrast);
+      for (const double sum : left) std::printf(" %6.2f", sum / (height * (frames - first)) / deviation_e);
+      std::printf("\n");
+    }
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -131,5 +191,7 @@ int main(int argc, char** argv) {
   print_times(rounds);
   print_gain();
   print_alarms();
+  print_alarms_of_structure();
+  print_trails();
   return 0;
 }
