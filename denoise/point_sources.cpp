@@ -82,6 +82,22 @@ struct Band {
     }
   }
 
+  /// A necessary condition of is_peak in single precision, from rows of sums of two: no neighbour is clearly brighter.
+  static bool may_be_peak(const std::array<const float*, 3>& pairs, int x) {
+    const auto window = [&](int i, int j) {
+      return pairs[static_cast<std::size_t>(j)][i] + pairs[static_cast<std::size_t>(j)][i + 1];
+    };
+    constexpr float rounding = 1e-5f;
+    const float own = window(x, 1), limit = own + rounding * std::fabs(own);
+    for (int j = 0; j < 3; ++j) {
+      for (int i = x - 1; i <= x + 1; ++i) {
+        const float other = window(i, j);
+        if (other - rounding * std::fabs(other) > limit) return false;
+      }
+    }
+    return true;
+  }
+
   void run(int first, int last) const {
     const int width = search.raw.width, height = search.raw.height;
     for (int y = first; y < last; ++y) std::memset(cells.row(y), 0, static_cast<std::size_t>(cells.width));
@@ -104,8 +120,10 @@ struct Band {
       in.outer = memory.sums[1];
       in.significance = static_cast<float>(0.999 * least_significance);  // rounding: is_source decides in double
       const int found = rows::bright_windows(in, memory.found);
+      const std::array<const float*, 3> pairs{memory.pair[slot(y - 1)], memory.pair[slot(y)], memory.pair[slot(y + 1)]};
       for (int i = 0; i < found; ++i) {
-        if (search.is_source(memory.found[i], y)) mark(memory.found[i], y, first, last);
+        if (may_be_peak(pairs, memory.found[i]) && search.is_source(memory.found[i], y))
+          mark(memory.found[i], y, first, last);
       }
     }
   }
