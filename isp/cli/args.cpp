@@ -1,120 +1,12 @@
 #include "isp/cli/args.h"
 
-#include <cmath>
-
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "denoise/denoiser.h"
+#include "isp/cli/develop_args.h"
 #include "isp/cli/option_values.h"
-#include "isp/model/correlated_colour_temperature.h"
-#include "isp/render/output_space.h"
-#include "isp/render/tone.h"
 
 namespace lowlux::cli {
 namespace {
-
-constexpr double max_exposure_ev = 12;  // the tone curve's range
-
-Names<OutputSpace> space_names() {
-  Names<OutputSpace> names;
-  for (const isp::NamedOutputSpace& named : isp::output_spaces) names.emplace(named.name, named.space);
-  return names;
-}
-
-void set_white_balance(const std::string& text, isp::WhiteBalanceChoice& choice) {
-  using Mode = isp::WhiteBalanceChoice::Mode;
-  if (text == "as-shot") {
-    choice.mode = Mode::as_shot;
-  } else if (text == "auto") {
-    choice.mode = Mode::automatic;
-  } else if (const auto kelvin = number_of(text);
-             kelvin && *kelvin >= isp::white_min_k && *kelvin <= isp::white_max_k) {
-    choice = {Mode::temperature, *kelvin};
-  } else {
-    throw CLI::ValidationError(
-        "--wb", fmt::format("'{}' is neither as-shot nor auto nor a temperature from {:.0f} to {:.0f} K", text,
-                            isp::white_min_k, isp::white_max_k));
-  }
-}
-
-// One figure for all sites or four; nullopt if it is neither.
-std::optional<PerSite<double>> site_figures(const std::string& text) {
-  const auto figures = numbers_of(text, 4);
-  if (!figures || (figures->size() != 1 && figures->size() != 4)) return std::nullopt;
-  const auto& f = *figures;
-  return f.size() == 1 ? PerSite<double>{f[0], f[0], f[0], f[0]} : PerSite<double>{f[0], f[1], f[2], f[3]};
-}
-
-void set_black(const std::string& text, DevelopArgs& args) {
-  isp::BlackRequest& request = args.options.black;
-  static const Names<isp::BlackChoice> names{{"auto", isp::BlackChoice::automatic},
-                                             {"metadata", isp::BlackChoice::metadata},
-                                             {"masked", isp::BlackChoice::masked}};
-  if (const auto named = names.find(text); named != names.end()) {
-    request.choice = named->second;
-  } else if (const auto figures = site_figures(text)) {
-    request.choice = isp::BlackChoice::given;
-    request.given_dn = *figures;
-  } else if (text.ends_with(".json")) {
-    args.black_profile = text;
-  } else {
-    throw CLI::ValidationError("--black", fmt::format("'{}' is neither {} nor one or four figures in DN nor a profile "
-                                                      "(PROFILE.json)",
-                                                      text, joined(names)));
-  }
-}
-
-void set_exposure(const std::string& text, DevelopArgs& args) {
-  args.exposure_given = true;
-  if (text == "auto") {
-    args.options.exposure_ev.reset();
-  } else if (const auto ev = number_of(text); ev && std::fabs(*ev) <= max_exposure_ev) {
-    args.options.exposure_ev = *ev;
-  } else {
-    throw CLI::ValidationError("--exposure", fmt::format("'{}' is neither auto nor a number of EV from -{} to {}", text,
-                                                         max_exposure_ev, max_exposure_ev));
-  }
-}
-
-void add_rendering(CLI::App& app, DevelopArgs& args) {
-  isp::DevelopOptions& o = args.options;
-  app.add_option_function<std::string>(
-         "--exposure", [&args](const std::string& text) { set_exposure(text, args); },
-         "gain in EV; auto brings the middle of the picture to mid-grey without lifting the black noise "
-         "(default: auto, in linear spaces 0)")
-      ->type_name("auto|EV");
-  app.add_option_function<std::string>(
-         "--wb", [&o](const std::string& text) { set_white_balance(text, o.white_balance); },
-         "white balance: as the camera chose (default), estimated from the picture, or by colour temperature")
-      ->type_name("as-shot|auto|KELVIN");
-  add_choice<isp::ToneCurve>(
-      app, "--tone", {{"standard", isp::ToneCurve::standard}, {"none", isp::ToneCurve::none}},
-      [&args](isp::ToneCurve tone) { args.tone = tone; }, "tone curve (default: standard, in linear spaces none)");
-  add_choice<OutputSpace>(
-      app, "--space", space_names(), [&args](OutputSpace space) { args.space = space; },
-      "what the numbers mean (default: srgb; linear-srgb for OpenEXR and PFM)");
-  app.add_flag("--half", o.half, "half size: exact 2x2 binning in place of demosaicing");
-}
-
-/// What is known of the camera, and what is repaired by it.
-void add_camera(CLI::App& app, DevelopArgs& args) {
-  isp::DevelopOptions& o = args.options;
-  app.add_option_function<std::string>(
-         "--black", [&args](const std::string& text) { set_black(text, args); },
-         "black point: measured on masked pixels where there are any, else the file's figure (auto, default); one of "
-         "the two; given in DN, for all pixels or for the four sites of the 2x2 cell; or a camera's profile, whose "
-         "noise "
-         "and hot pixels are used too")
-      ->type_name("auto|metadata|masked|DN[,DN,DN,DN]|PROFILE.json");
-  app.add_option("--profile", args.profile,
-                 "a camera's profile (see calibrate): black point, noise and hot pixels, and its colour matrices if it "
-                 "holds any")
-      ->type_name("PROFILE.json");
-  add_choice<bool>(
-      app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
-      "hot and dead pixels: look for them (default), or repair only those the file names");
-}
 
 void add_darks(CLI::App& app, DarkArgs& dark) {
   CLI::Option* frames =
@@ -149,26 +41,6 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
       ->needs(frames);
 }
 
-void add_denoise(CLI::App& app, DevelopArgs& args) {
-  isp::DenoiseChoice& choice = args.options.denoise;
-  using Mode = isp::DenoiseChoice::Mode;
-  choice.mode = Mode::automatic;
-  Names<isp::DenoiseChoice> names{{"auto", {.mode = Mode::automatic}}, {"off", {.mode = Mode::off}}};
-  for (const denoise::Level level : denoise::all_levels) {
-    names.emplace(denoise::name_of(level), isp::DenoiseChoice{Mode::level, level});
-  }
-  add_choice<isp::DenoiseChoice>(
-      app, "--denoise", names,
-      [&choice](const isp::DenoiseChoice& named) {
-        choice.mode = named.mode;
-        choice.level = named.level;
-      },
-      "noise reduction, by how much work it is; auto (default) chooses by the signal to noise ratio");
-  add_choice<bool>(
-      app, "--line-noise", {{"auto", true}, {"off", false}}, [&choice](bool lines) { choice.line_noise = lines; },
-      "noise that whole rows or columns share: take it off where it stands out (default) or leave it");
-}
-
 /// What every verb that takes raw files one by one has.
 void add_batch(CLI::App& app, DevelopArgs& args) {
   app.add_option("RAW", args.inputs, "raw files")->required();
@@ -190,9 +62,7 @@ void add_output(CLI::App& app, DevelopArgs& args) {
       ->type_name("OUT");
   app.add_option("--format", args.format, "format of pictures written to a folder: png (default), jpg, tif, exr or pfm")
       ->check(CLI::IsMember({"png", "jpg", "tif", "exr", "pfm"}));
-  app.add_option("--bits", args.bits, "bits per sample: 8, 16 or 32 (float; for OpenEXR 16 is half float)")
-      ->check(CLI::IsMember({8, 16, 32}));
-  app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
+  add_samples(app, args);
 }
 
 template <class Args>

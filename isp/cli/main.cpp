@@ -25,6 +25,7 @@ struct Verb {
 constexpr std::array verbs{
     Verb{"bench", "accuracy against time, beside other methods", run_bench},
     Verb{"calibrate", "a camera's black point, noise and colour, measured", run_calibrate},
+    Verb{"capture", "frames of a camera to pictures, raw files or a film", run_capture},
     Verb{"compare", "how far one picture is from another", run_compare},
     Verb{"denoise", "raw files without noise, for any raw developer", run_denoise},
     Verb{"develop", "raw files to pictures", run_develop},

@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <memory>
 #include <utility>
 
 #include <fmt/format.h>
@@ -7,25 +6,15 @@
 #include "isp/cli/args.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/outputs.h"
+#include "isp/cli/picture_options.h"
 #include "isp/cli/raw_batch.h"
-#include "isp/cli/shin_file.h"
 #include "isp/cli/verbs.h"
-#include "isp/cli/version.h"
 #include "isp/output/image_writer.h"
 #include "isp/output/orient.h"
 #include "isp/pipeline/develop.h"
 
 namespace lowlux::cli {
 namespace {
-
-isp::WriteOptions write_options(const DevelopArgs& args) {
-  isp::WriteOptions write;
-  write.overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
-  write.software = "lowlux " + version_number();
-  write.jpeg.quality = args.jpeg_quality;
-  write.exr.depth = args.bits.value_or(16) == 16 ? isp::ExrOptions::Depth::half : isp::ExrOptions::Depth::full;
-  return write;
-}
 
 Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& executor, FileProgress& progress,
                           DevelopOutcome& out) {
@@ -51,22 +40,6 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
     out.plan->warnings.emplace_back("no maps were written: the noise is left as it is");
   }
   return write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);
-}
-
-// What all files share of looks and displays: the table is made once.
-Result<void> make_for_display(const DevelopArgs& args, isp::DevelopOptions& options) {
-  if (const std::string& file = args.look.coefficients; !file.empty()) {
-    auto table = read_shin_file(file);
-    if (!table) return tl::make_unexpected(table.error());
-    options.look.shin = std::make_shared<const isp::ShinTable>(*std::move(table));
-  }
-  if (!args.look.display_cd_m2) return {};
-  PoolExecutor executor(2);
-  auto target =
-      isp::display_target({.display_cd_m2 = *args.look.display_cd_m2, .shin = options.look.shin.get()}, executor);
-  if (!target) return fail(target.error().code, target.error().message, "--display-luminance");
-  options.display = std::make_shared<const isp::DisplayTarget>(*std::move(target));
-  return {};
 }
 
 int usage_error(const Error& error) {

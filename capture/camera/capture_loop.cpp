@@ -1,0 +1,126 @@
+#include "capture/camera/capture_loop.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace lowlux::capture {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds longest_wait{100};
+
+double seconds_between(steady_clock::time_point from, steady_clock::time_point to) {
+  return std::chrono::duration<double>(to - from).count();
+}
+
+/// A camera that runs, and stops on every way out.
+class Running {
+ public:
+  explicit Running(Camera& camera) : camera_(camera) {}
+  ~Running() { camera_.stop(); }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+
+ private:
+  Camera& camera_;
+};
+
+class Loop {
+ public:
+  Loop(Camera& camera, const LoopLimits& limits, const std::atomic<bool>& stop, LoopCount& count)
+      : camera_(camera), limits_(limits), stop_(stop), count_(count) {}
+
+  Result<void> run(const FrameWork& work, const LoopWatch& watch) {
+    last_whole_ = steady_clock::now();
+    for (bool wanted = true; wanted;) {
+      if (stop_) {
+        count_.stopped = true;
+        return {};
+      }
+      auto frame = wait();
+      if (!frame) return tl::make_unexpected(frame.error());
+      if (*frame) {
+        const Result<bool> more = take(**frame, work);
+        camera_.give_back(**frame);
+        if (!more) return tl::make_unexpected(more.error());
+        wanted = *more;
+      }
+      watch(count_);
+    }
+    return {};
+  }
+
+ private:
+  /// nullopt: none has come for a while, and there is time left.
+  Result<std::optional<CameraFrame>> wait() {
+    const auto start = steady_clock::now();
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(last_whole_ + limits_.timeout - start);
+    Result<CameraFrame> frame = camera_.next(std::clamp(left, std::chrono::milliseconds(0), longest_wait));
+    const auto now = steady_clock::now();
+    if (first_) {
+      count_.wait_s += seconds_between(start, now);
+      count_.seconds = seconds_between(*first_, now);
+    }
+    if (frame) {
+      if (!first_) first_ = now;
+      count_.lost += frame->lost_before;
+      if (frame->damaged) ++count_.damaged;
+      return std::optional(*std::move(frame));
+    }
+    if (frame.error().code != ErrorCode::insufficient) return tl::make_unexpected(frame.error());
+    if (now - last_whole_ < limits_.timeout) return std::nullopt;
+    return tl::make_unexpected(none_in_time(frame.error()));
+  }
+
+  Error none_in_time(const Error& last) const {
+    std::array<char, 32> limit_s{};
+    std::snprintf(limit_s.data(), limit_s.size(), "%g", std::chrono::duration<double>(limits_.timeout).count());
+    std::string text = count_.damaged > 0 ? "no whole frame" : "no frame";
+    text += std::string(" came within ") + limit_s.data() + " s: " + last.message;
+    if (count_.damaged > 0) text += ", " + std::to_string(count_.damaged) + " were damaged";
+    return {ErrorCode::insufficient, text + "; --timeout allows for longer exposures", last.where};
+  }
+
+  Result<bool> take(const CameraFrame& frame, const FrameWork& work) {
+    if (frame.damaged) {
+      const bool late = steady_clock::now() - last_whole_ >= limits_.timeout;
+      if (!late) return true;
+      return tl::make_unexpected(
+          none_in_time({ErrorCode::insufficient, "the device says that what it delivers is damaged", {}}));
+    }
+    Result<bool> more = true;
+    if (count_.skipped < limits_.skip) {
+      ++count_.skipped;
+    } else {
+      more = work(frame);
+      if (more && *more) ++count_.taken;
+    }
+    last_whole_ = steady_clock::now();
+    count_.seconds = seconds_between(*first_, last_whole_);
+    const bool all = limits_.frames > 0 && count_.taken == limits_.frames;
+    return more.map([&](bool wanted) { return wanted && !all; });
+  }
+
+  Camera& camera_;
+  const LoopLimits& limits_;
+  const std::atomic<bool>& stop_;
+  LoopCount& count_;
+  std::optional<steady_clock::time_point> first_;
+  steady_clock::time_point last_whole_;  // or the start
+};
+
+}  // namespace
+
+Result<void> capture_frames(Camera& camera, const LoopLimits& limits, const std::atomic<bool>& stop,
+                            const FrameWork& work, const LoopWatch& watch, LoopCount& count) {
+  const Running running(camera);
+  if (auto started = camera.start(); !started) return started;
+  return Loop(camera, limits, stop, count).run(work, watch);
+}
+
+}  // namespace lowlux::capture
