@@ -21,6 +21,12 @@ Place place_of(int i, int grid, int tiles) {
   return {first, std::min(first + 1, tiles - 1), inside - static_cast<float>(first)};
 }
 
+/// The first cell of level `grid` at or beyond the centre of a tile.
+int next_centre(int column, int grid) {
+  const int cells = tile >> grid;  // of a tile: a power of two
+  return column * cells + cells / 2;
+}
+
 }  // namespace
 
 int start_of(double mean_signal_e, double mean_dark_e, double variance_e2) {
@@ -53,10 +59,18 @@ void share_row(const ChromaStarts& starts, int level, int grid, int y, std::span
   const float* const upper = starts.start.data() + v.first * starts.columns;
   const float* const lower = starts.start.data() + v.second * starts.columns;
   const auto start = [&](int i) { return upper[i] + v.fraction * (lower[i] - upper[i]); };
-  for (std::size_t x = 0; x < out.size(); ++x) {
-    const Place u = place_of(static_cast<int>(x), grid, starts.columns);
-    const float left = start(u.first), between = left + u.fraction * (start(u.second) - left);
-    out[x] = std::clamp(between - static_cast<float>(level), 0.0f, 1.0f);
+  const int width = static_cast<int>(out.size());
+  // Between the centres of two tiles everything is linear: one run of cells after the other.
+  for (int x = 0; x < width;) {
+    const Place u = place_of(x, grid, starts.columns);
+    const int end = u.second == u.first ? width : std::min(width, next_centre(u.first + 1, grid));
+    const float left = start(u.first), step = start(u.second) - left;
+    const float cell = static_cast<float>(1 << grid) / tile, origin = static_cast<float>(u.first);
+    for (; x < end; ++x) {
+      const float at = (static_cast<float>(x) + 0.5f) * cell - 0.5f;
+      const float fraction = u.second == u.first ? 0.0f : std::max(at, 0.0f) - origin;
+      out[x] = std::clamp(left + fraction * step - static_cast<float>(level), 0.0f, 1.0f);
+    }
   }
 }
 

@@ -157,7 +157,9 @@ struct Recompose {
     in_bands(frame.workers, fine.height, [&](int first, int last, int thread) {
       const ThreadMemory& m = frame.memory.thread[thread];
       for (int y = first; y < last; ++y) {
-        share_row(frame.starts, l, l, y, {m.row[3], static_cast<std::size_t>(fine.width)});
+        if (!frame.starts.everywhere(l) && !frame.starts.nowhere(l)) {
+          share_row(frame.starts, l, l, y, {m.row[3], static_cast<std::size_t>(fine.width)});
+        }
         for (int p = 0; p < 4; ++p) row(p, y, m.row[3], m);
       }
     });

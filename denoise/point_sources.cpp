@@ -11,6 +11,9 @@ namespace {
 
 constexpr int ring_windows = 40;  // 14 x 14 sites less 6 x 6, in windows of 4
 
+/// Sum of the squares of 40 Poisson-like windows over their variance: five standard deviations above its mean.
+double most_spread(double variance_e2) { return ring_windows + 5 * std::sqrt(ring_windows * (2 + 1 / variance_e2)); }
+
 struct Search {
   PlaneView<const float> raw;
   double floor_e;      // least mean of a window
@@ -62,8 +65,7 @@ struct Search {
     const double one = std::max(s.mean, floor_e) + variance_e2;
     const double variance = one * (1 + 1.0 / ring_windows), excess = own - s.mean, u = excess / variance;
     if (!(excess > 0) || variance * ((1 + u) * std::log1p(u) - u) < least_significance) return false;
-    // Five standard deviations of the sum of 40 squares of Poisson-like windows.
-    if (s.spread / one > ring_windows + 5 * std::sqrt(ring_windows * (2 + 1 / one))) return false;
+    if (s.spread / one > most_spread(one)) return false;
     double brightest = value(x, y) - s.site[0];
     for (int i = 1; i < 4; ++i) brightest = std::max(brightest, value(x + i % 2, y + i / 2) - s.site[i]);
     return excess - brightest > 2.5 * std::sqrt(0.75 * variance);
@@ -82,6 +84,23 @@ struct Band {
     }
   }
 
+  /// A necessary condition of is_source, in single precision: the surroundings are clearly not more uneven than noise.
+  bool may_be_alone(const rows::WindowRow& in, int x) const {
+    std::array<float, ring_windows> windows{};
+    double mean = 0, spread = 0;
+    int count = 0;
+    for (int j = 0; j < 7; ++j) {
+      for (int i = -6; i <= 6; i += 2) {
+        if (std::abs(i) <= 2 && j >= 2 && j <= 4) continue;
+        windows[static_cast<std::size_t>(count++)] = in.pair[j][x + i] + in.pair[j][x + i + 1];
+      }
+    }
+    for (const float w : windows) mean += static_cast<double>(w) / ring_windows;
+    for (const float w : windows) spread += (w - mean) * (w - mean);
+    const double one = std::max(mean, search.floor_e) + search.variance_e2;
+    return spread / one <= 1.001 * most_spread(one) + 1;
+  }
+
   void run(int first, int last) const {
     const int width = search.raw.width, height = search.raw.height;
     for (int y = first; y < last; ++y) std::memset(cells.row(y), 0, static_cast<std::size_t>(cells.width));
@@ -96,6 +115,8 @@ struct Band {
       }
       rows::WindowRow in{};
       for (int j = 0; j < 7; ++j) in.pair[j] = memory.pair[slot(y - 6 + 2 * j)];
+      in.above = memory.pair[slot(y - 1)];
+      in.below = memory.pair[slot(y + 1)];
       in.first = source_margin;
       in.last = width - 1 - source_margin;
       in.floor_e = static_cast<float>(search.floor_e);
@@ -105,7 +126,8 @@ struct Band {
       in.significance = static_cast<float>(0.999 * least_significance);  // rounding: is_source decides in double
       const int found = rows::bright_windows(in, memory.found);
       for (int i = 0; i < found; ++i) {
-        if (search.is_source(memory.found[i], y)) mark(memory.found[i], y, first, last);
+        if (may_be_alone(in, memory.found[i]) && search.is_source(memory.found[i], y))
+          mark(memory.found[i], y, first, last);
       }
     }
   }

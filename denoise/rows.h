@@ -139,6 +139,8 @@ void pair_row(const float* upper, const float* lower, int width, float* out);
 /// Windows of 2x2 sites in one row of them: pair[3] is the sum of the window's rows, pair[i] that 2 (i - 3) rows below.
 struct WindowRow {
   const float* pair[7];
+  const float* above;  // sums of two rows one row above the windows, and one below
+  const float* below;
   int first;  // column of the first window, at least 6
   int last;   // one beyond the last; 8 columns more are read
   float floor_e;
@@ -147,8 +149,8 @@ struct WindowRow {
   float* inner;  // scratch, as long as a row and its padding
   float* outer;
 };
-/// Columns of windows whose excess t over the mean around has t > 0, t^2 / (2 V) >= significance: a necessary condition
-/// of that in point_sources.h. Gives how many.
+/// Columns of windows whose excess t over the mean around has t > 0, t^2 / (2 V) >= significance, and that no window
+/// one site away clearly exceeds: necessary conditions of those in point_sources.h. Gives how many.
 int bright_windows(const WindowRow& in, std::int32_t* columns);
 
 const char* target_name();

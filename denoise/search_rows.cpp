@@ -35,6 +35,18 @@ void PairRow(const float* upper, const float* lower, int width, float* out) {
   store(hn::Add(number(hn::Load(f, last[0])), number(hn::Load(f, last[1]))), out + i);
 }
 
+/// The largest of the eight windows one site away from those of columns x and on.
+HWY_INLINE VF brightest_beside(const WindowRow& in, int x) {
+  VF most = constant(-4e9f);
+  for (const float* row : {in.above, in.pair[3], in.below}) {
+    for (int i = -1; i <= 1; ++i) {
+      if (row == in.pair[3] && i == 0) continue;
+      most = hn::Max(most, hn::Add(load(row + x + i), load(row + x + i + 1)));
+    }
+  }
+  return most;
+}
+
 int BrightWindows(const WindowRow& in, std::int32_t* columns) {
   const Floats f;
   for (int x = in.first - 6; x < in.last + 6; x += lanes()) {  // windows above each other: the inner three, the others
@@ -55,8 +67,12 @@ int BrightWindows(const WindowRow& in, std::int32_t* columns) {
     const VF excess = hn::Max(hn::Sub(own, mean), hn::Zero(f));
     const auto bright = hn::Ge(hn::Mul(excess, excess), hn::Mul(constant(2 * 1.025f * in.significance), one));
     if (HWY_LIKELY(hn::AllFalse(f, bright))) continue;
+    // Rounding of single precision is no difference: who calls decides in double.
+    const auto slack = [](VF v) HWY_ATTR { return hn::Mul(constant(1e-5f), hn::Abs(v)); };
+    const VF beside = brightest_beside(in, x);
+    const auto peak = hn::Ge(hn::Add(own, slack(own)), hn::Sub(beside, slack(beside)));
     HWY_ALIGN float is_bright[hn::MaxLanes(Floats())];
-    hn::Store(hn::IfThenElseZero(bright, constant(1)), f, is_bright);
+    hn::Store(hn::IfThenElseZero(hn::And(bright, peak), constant(1)), f, is_bright);
     for (int k = 0; k < lanes() && x + k < in.last; ++k) {
       if (is_bright[k] != 0) columns[found++] = x + k;
     }

@@ -4,11 +4,13 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <numeric>
 #include <vector>
 
 #include "denoise/bands.h"
+#include "denoise/temporal_noise.h"
 #include "denoise/temporal_rows.h"
 #include "denoise/temporal_thresholds.h"
 
@@ -19,8 +21,8 @@ using rows::blocks_of_strip;
 using rows::motion_block;
 using rows::sites_of_strip;
 
-constexpr double largest_e = 1e9;
 constexpr double largest_share = 1e6;  // a history that is worth nothing
+constexpr double most_light = 1e6;     // up or down, beyond which it is
 
 constexpr int rounded_up(int n, int unit) { return (n + unit - 1) / unit * unit; }
 
@@ -28,35 +30,15 @@ constexpr int rounded_up(int n, int unit) { return (n + unit - 1) / unit * unit;
 struct StripMemory {
   std::array<std::array<float, sites_of_strip>, motion_block> raw{};
   std::array<std::array<float, sites_of_strip>, motion_block> out{};
+  float sums[2][sites_of_strip]{};
 };
-
-/// Var[y] of a raw value of one colour with this mean signal. The floor allows for means that scatter below 0.
-double variance_of(const rows::SiteNoise& noise, int colour, double signal_e) {
-  const double told =
-      signal_e + static_cast<double>(noise.dark_e[colour]) + static_cast<double>(noise.variance_e2[colour]);
-  return std::max(told, static_cast<double>(noise.least_e2[colour]));
-}
-
-rows::SiteNoise site_noise(const RawNoise& noise, BayerPhase phase) {
-  const PerSite<int> site = sites_of(phase);
-  const auto& dark = noise.dark_mean_e;
-  const std::array dark_e{dark[site[0]], (dark[site[1]] + dark[site[2]]) / 2, dark[site[3]]};
-  rows::SiteNoise out{};
-  for (int c = 0; c < 3; ++c) {
-    out.dark_e[c] = static_cast<float>(dark_e[c]);
-    out.variance_e2[c] = static_cast<float>(noise.variance_e2[c]);
-    out.least_e2[c] = static_cast<float>(0.5 * noise.variance_e2[c] + 0.3 * dark_e[c] + 0.02);
-    out.saturation_e[c] = static_cast<float>(std::min(noise.saturation_e[c], 4 * largest_e) - dark_e[c]);
-  }
-  return out;
-}
 
 [[maybe_unused]] bool usable(const RawNoise& noise, double light, const TemporalOptions& options) {
   const auto within = [](double x, double least, double most) { return x >= least && x <= most; };
   bool good = light > 0 && std::isfinite(light) && within(options.false_alarm, 1e-6, 0.5);
   for (const double saturation : noise.saturation_e) good = good && saturation > 0;
-  for (const double variance : noise.variance_e2) good = good && within(variance, 0, largest_e);
-  for (const double dark : noise.dark_mean_e) good = good && within(dark, 0, largest_e);
+  for (const double variance : noise.variance_e2) good = good && within(variance, 0, largest_value_e);
+  for (const double dark : noise.dark_mean_e) good = good && within(dark, 0, largest_value_e);
   return good && within(options.most_frames, 2, 256);
 }
 
@@ -98,11 +80,14 @@ struct Frame {
 
   float least_weight() const { return 1 / static_cast<float>(options.most_frames); }
   std::array<const float*, motion_block> raw_rows(int x, int y, StripMemory& strip) const;
-  void rescale(int y) const;
+  std::size_t colour_of(int site) const { return static_cast<std::size_t>(colour_at(raw.phase, site % 2, site / 2)); }
+  double share_now(double share, const std::array<const float*, 2>& sums, int width, int height) const;
+  void rescale(int y, StripMemory& strip) const;
   void find(int y, const MotionThresholds& at, StripMemory& strip) const;
   bool has_moved(int x, int y) const;
   long long update(int y, PlaneView<float> out, StripMemory& strip) const;
   void put_shares(int y, PlaneView<float> map) const;
+  void take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const;
 };
 
 /// Eight rows of a strip, those beyond the frame being its last. Where the frame ends before the strip does, a copy.
@@ -118,37 +103,49 @@ std::array<const float*, motion_block> Frame::raw_rows(int x, int y, StripMemory
   return out;
 }
 
-/// Shares of a row of blocks where the light or the noise is no longer that of the mean: the mean's variance times
-/// light^2, over that of a raw value now. Both by the mean of each colour of the block: a site's own would let the
-/// weights of values depend on their noise.
-void Frame::rescale(int y) const {
-  const int bottom = std::min(motion_block * (y + 1), raw.value.height);
-  for (int x = 0; x < columns; ++x) {
-    const int right = std::min(motion_block * (x + 1), raw.value.width);
-    std::array<double, 3> sum{}, count{};
-    for (int v = motion_block * y; v < bottom; ++v) {
-      const float* const row = memory.mean_e.row(v);
-      for (int u = motion_block * x; u < right; ++u) {
-        const auto c = static_cast<std::size_t>(colour_at(raw.phase, u, v));
-        sum[c] += static_cast<double>(row[u]);
-        count[c] += 1;
-      }
+/// The mean's variance over that of a raw value, where neither light nor noise is that of the mean any more: it changes
+/// by light^2 times the raw value's variance before, over that now. Both by the block's mean of each colour: a site's
+/// own would let the weights of values depend on their noise.
+/// @param sums  of the block's columns over even and odd rows, in the light of now
+double Frame::share_now(double share, const std::array<const float*, 2>& sums, int width, int height) const {
+  std::array<double, 3> sum{}, count{};
+  for (int y = 0; y < 2; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto c = static_cast<std::size_t>(colour_at(raw.phase, x, y));
+      sum[c] += static_cast<double>(sums[y][x]);
+      count[c] += (height + 1 - y) / 2;
     }
-    double before = 0, now = 0;
-    for (int c = 0; c < 3; ++c) {
-      if (count[c] == 0) continue;
-      before += count[c] * variance_of(memory.noise, c, sum[c] / count[c]);
-      now += count[c] * variance_of(noise, c, std::clamp(light * sum[c] / count[c], -largest_e, largest_e));
+  }
+  double before = 0, now = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (count[c] == 0) continue;
+    before += count[c] * variance_of(memory.noise, c, std::min(sum[c] / count[c] / light, largest_value_e));
+    now += count[c] * variance_of(noise, c, sum[c] / count[c]);
+  }
+  return std::min(share * light * light * before / now, largest_share);
+}
+
+void Frame::rescale(int y, StripMemory& strip) const {
+  rows::ScaleStrip in{};
+  in.light = static_cast<float>(light);
+  in.rows = std::min(motion_block, raw.value.height - motion_block * y);
+  for (int site = 0; site < 4; ++site) in.saturation_e[site] = noise.saturation_e[colour_of(site)];
+  for (int x = 0; x < columns; ++x) {
+    const int left = motion_block * x, of_strip = left % sites_of_strip;
+    if (of_strip == 0) {
+      for (int r = 0; r < in.rows; ++r) in.mean_e[r] = memory.mean_e.row(motion_block * y + r) + left;
+      rows::scale_mean(in, strip.sums);
     }
     float& share = memory.share.at(x, y);
-    share = static_cast<float>(std::min(static_cast<double>(share) * light * light * before / now, largest_share));
+    share =
+        static_cast<float>(share_now(static_cast<double>(share), {strip.sums[0] + of_strip, strip.sums[1] + of_strip},
+                                     std::min(motion_block, raw.value.width - left), in.rows));
   }
 }
 
 void Frame::find(int y, const MotionThresholds& at, StripMemory& strip) const {
   rows::MotionStrip in{};
   in.red_is_odd = red_column(raw.phase) == 1;
-  in.light = static_cast<float>(light);
   in.least_weight = least_weight();
   in.noise = noise;
   in.alone = {static_cast<float>(at.alone.z), static_cast<float>(at.alone.few)};
@@ -184,12 +181,10 @@ bool Frame::has_moved(int x, int y) const {
 /// @return how many of them moved
 long long Frame::update(int y, PlaneView<float> out, StripMemory& strip) const {
   rows::UpdateStrip in{};
-  in.light = static_cast<float>(light);
   in.rows = std::min(motion_block, raw.value.height - motion_block * y);
   for (int site = 0; site < 4; ++site) {
-    const auto c = static_cast<std::size_t>(colour_at(raw.phase, site % 2, site / 2));
-    in.dark_e[site] = noise.dark_e[c];
-    in.saturation_e[site] = noise.saturation_e[c];
+    in.dark_e[site] = noise.dark_e[colour_of(site)];
+    in.saturation_e[site] = noise.saturation_e[colour_of(site)];
   }
   long long moved = 0;
   for (int x = 0; x < columns; x += blocks_of_strip) {
@@ -227,6 +222,32 @@ void Frame::put_shares(int y, PlaneView<float> map) const {
   }
 }
 
+/// Counts blocks that move in memory.count.
+void Frame::take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const {
+  const bool same = light == 1 && noise == memory.noise;
+  const MotionThresholds at = motion_thresholds(options.false_alarm);
+  const auto compare = [&](int y, StripMemory& strip) {
+    if (!same) rescale(y, strip);
+    find(y, at, strip);
+  };
+  // The ends of bands first, for those beside them. Inside of a band the rest follows where it is still in the cache.
+  if (!first) {
+    in_bands(workers, rows, [&](int top, int bottom, int thread) {
+      compare(top, memory.strip[thread]);
+      if (bottom - 1 > top) compare(bottom - 1, memory.strip[thread]);
+    });
+  }
+  std::fill(memory.count.begin(), memory.count.end(), 0);
+  in_bands(workers, rows, [&](int top, int bottom, int thread) {
+    StripMemory& strip = memory.strip[thread];
+    for (int y = top; y < bottom; ++y) {
+      if (!first && y + 1 < bottom - 1) compare(y + 1, strip);
+      memory.count[thread] += update(y, out, strip);
+      if (shares.data != nullptr) put_shares(y, shares);
+    }
+  });
+}
+
 }  // namespace
 
 struct TemporalMean::State {
@@ -247,30 +268,14 @@ double TemporalMean::run(const RawElectronsView& raw, const RawNoise& noise, dou
                          Executor& executor) {
   Memory& memory = state_->memory;
   assert(raw.value.width >= 2 && raw.value.height >= 2);
-  assert(rounded_up(raw.value.width, motion_block) <= memory.mean_e.width());
-  assert(raw.value.height <= memory.mean_e.height());
+  assert(raw.value.width <= memory.share.width() * motion_block);
+  assert(raw.value.height <= memory.share.height() * motion_block);
   assert(mean_e.width == raw.value.width && mean_e.height == raw.value.height);
   assert(usable(noise, light, options));
   const bool known = memory.width == raw.value.width && memory.height == raw.value.height && memory.phase == raw.phase;
-  const Frame frame{memory, raw, site_noise(noise, raw.phase), light, options, memory.empty || !known};
-  const Workers workers{executor, static_cast<int>(memory.strip.size())};
-  const bool same = light == 1 && std::memcmp(&frame.noise, &memory.noise, sizeof(frame.noise)) == 0;
-  if (!frame.first) {
-    const MotionThresholds at = motion_thresholds(options.false_alarm);
-    in_bands(workers, frame.rows, [&](int first, int last, int thread) {
-      for (int y = first; y < last; ++y) {
-        if (!same) frame.rescale(y);
-        frame.find(y, at, memory.strip[thread]);
-      }
-    });
-  }
-  std::fill(memory.count.begin(), memory.count.end(), 0);
-  in_bands(workers, frame.rows, [&](int first, int last, int thread) {
-    for (int y = first; y < last; ++y) {
-      memory.count[thread] += frame.update(y, mean_e, memory.strip[thread]);
-      if (variance_share.data != nullptr) frame.put_shares(y, variance_share);
-    }
-  });
+  const bool worthless = light > most_light || light < 1 / most_light;
+  const Frame frame{memory, raw, site_noise(noise, raw.phase), light, options, memory.empty || !known || worthless};
+  frame.take_in({executor, static_cast<int>(memory.strip.size())}, mean_e, variance_share);
   memory.empty = false;
   memory.width = raw.value.width;
   memory.height = raw.value.height;

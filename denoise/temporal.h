@@ -25,7 +25,7 @@ struct TemporalOptions {
 class TemporalMean {
  public:
   /// For mosaics of up to max_width x max_height pixels, each 2..65536, and up to `threads` of an executor's threads.
-  /// Takes 4.1 bytes for each pixel, rows rounded up to 128 pixels, and 8 KB for each thread.
+  /// Takes 4.1 bytes for each pixel, rows rounded up to 128 pixels, and 9 KB for each thread.
   TemporalMean(int max_width, int max_height, int threads);
   ~TemporalMean();
   TemporalMean(const TemporalMean&) = delete;
@@ -38,7 +38,7 @@ class TemporalMean {
   /// @param raw  at least 2 x 2 pixels; any phase, odd sizes too
   /// @param noise  of this frame; the dark charge and the variance may change from frame to frame
   /// @param light  how many times the signal [e-] of the frame before the same scene gives in this one: the ratio of
-  /// exposure times, where only they change. > 0 and finite
+  /// exposure times, where only they change. > 0 and finite; beyond 1e-6..1e6 the frame is the first
   /// @param mean_e  as large as `raw`: the mean scaled to this frame's light, with this frame's dark charge in it, as
   /// `raw` has. Sites that are saturated in this frame, and blocks that moved, are as in `raw`. May not overlap `raw`
   /// @param variance_share  variance of mean_e over that of `raw`, for each 2x2 cell, ceil(width / 2) x

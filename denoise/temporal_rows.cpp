@@ -50,25 +50,24 @@ struct Sums {
 struct OfColour {
   VF squares;
   VF change;
-  VF mean;
+  VF before;
   VF count;
 };
 
 /// One site of each cell. Where it is saturated both in the frame and in the mean, it does not count.
-HWY_INLINE void add_site(VF raw, VF before, VF weight, float dark_e, float saturation_e, MF there, OfColour& sum) {
+HWY_INLINE void add_site(VF raw, VF before, float dark_e, float saturation_e, MF there, OfColour& sum) {
   const VF most = constant(saturation_e), y = hn::Min(hn::Sub(usable(raw), constant(dark_e)), most);
-  const VF x = hn::Min(before, most);
-  const MF counts = hn::And(there, hn::Lt(hn::Min(y, x), most));
-  const VF change = hn::IfThenElseZero(counts, hn::Sub(y, x));
+  const MF counts = hn::And(there, hn::Lt(hn::Min(y, before), most));
+  const VF change = hn::IfThenElseZero(counts, hn::Sub(y, before));
   sum.squares = hn::Add(sum.squares, hn::Mul(change, change));
   sum.change = hn::Add(sum.change, change);
-  sum.mean = hn::Add(sum.mean, hn::IfThenElseZero(counts, hn::Add(x, hn::Mul(weight, change))));
+  sum.before = hn::Add(sum.before, hn::IfThenElseZero(counts, before));
   sum.count = hn::Add(sum.count, hn::IfThenElseZero(counts, constant(1)));
 }
 
 template <bool kRedIsOdd>
-HWY_INLINE void add_cells(const MotionStrip& in, int pair, int i, VF weight, OfColour (&sum)[3]) {
-  const VF at = hn::Iota(Floats(), static_cast<float>(i)), light = constant(in.light);
+HWY_INLINE void add_cells(const MotionStrip& in, int pair, int i, OfColour (&sum)[3]) {
+  const VF at = hn::Iota(Floats(), static_cast<float>(i));
   const MF even_there = hn::Lt(at, constant(static_cast<float>((in.width + 1) / 2)));
   const MF odd_there = hn::Lt(at, constant(static_cast<float>(in.width / 2)));
   for (int r = 0; r < 2; ++r) {
@@ -77,44 +76,45 @@ HWY_INLINE void add_cells(const MotionStrip& in, int pair, int i, VF weight, OfC
     VF even, odd, even_before, odd_before;
     hn::LoadInterleaved2(Floats(), in.raw[row] + 2 * i, even, odd);
     hn::LoadInterleaved2(Floats(), in.mean_e[row] + 2 * i, even_before, odd_before);
-    add_site(even, limited(hn::Mul(light, even_before)), weight, in.noise.dark_e[even_colour],
-             in.noise.saturation_e[even_colour], even_there, sum[even_colour]);
-    add_site(odd, limited(hn::Mul(light, odd_before)), weight, in.noise.dark_e[odd_colour],
-             in.noise.saturation_e[odd_colour], odd_there, sum[odd_colour]);
+    add_site(even, even_before, in.noise.dark_e[even_colour], in.noise.saturation_e[even_colour], even_there,
+             sum[even_colour]);
+    add_site(odd, odd_before, in.noise.dark_e[odd_colour], in.noise.saturation_e[odd_colour], odd_there,
+             sum[odd_colour]);
   }
 }
 
-/// Groups of 2 x 2 cells share a variance x of their raw values, told by their updated mean, which a change does not
-/// correlate with. Their sums of squares weigh 1 / x.
+/// Adds the figures of one colour in groups of 2 x 2 cells. They share a variance x of their raw values, told by the
+/// updated mean, which a change does not correlate with. Changes weigh 1 / x, their squares too.
+HWY_INLINE void add_group(const SiteNoise& noise, int c, VF weight, const OfColour& own, VF (&sum)[Sums::all]) {
+  const Floats f;
+  const VF steady = constant(noise.variance_e2[c]), mean = hn::Add(own.before, hn::Mul(weight, own.change));
+  const VF sites = hn::Add(own.count, hn::Reverse2(f, own.count));
+  const VF told =
+      hn::Add(hn::Add(mean, hn::Reverse2(f, mean)), hn::Mul(sites, constant(noise.dark_e[c] + noise.variance_e2[c])));
+  const VF least = constant(noise.least_e2[c]), all = hn::Max(told, hn::Mul(hn::Max(sites, constant(1)), least));
+  const VF by_all = hn::Div(constant(1), all), by_x = hn::Mul(sites, by_all);
+  const VF weights = hn::Mul(own.count, by_x), counted = hn::Mul(weights, by_x);
+  const VF read = hn::Mul(steady, counted);
+  const auto add = [&sum](int figure, VF more) HWY_ATTR { sum[figure] = hn::Add(sum[figure], more); };
+  add(Sums::squares, hn::Mul(by_x, own.squares));
+  add(Sums::bias, hn::Mul(hn::Mul(steady, weights), by_all));
+  add(Sums::steady, read);
+  add(Sums::change + c, hn::Mul(by_x, own.change));
+  add(Sums::weight + c, weights);
+  add(Sums::poisson + c, hn::Max(hn::Sub(weights, read), hn::Zero(f)));  // (x - steady) / x^2
+  add(Sums::count + c, own.count);
+}
+
 template <bool kRedIsOdd>
 HWY_INLINE void sum_cells(const MotionStrip& in, const float* weights, Sums& out) {
-  const Floats f;
+  const VF zero = hn::Zero(Floats());
   for (int i = 0; i < cells_of_strip; i += lanes()) {
     VF sum[Sums::all];
-    for (VF& s : sum) s = hn::Zero(f);
-    const VF weight = load(weights + i);
+    for (VF& s : sum) s = zero;
     for (int group = 0; group < 2; ++group) {
-      OfColour colour[3];
-      for (OfColour& c : colour) c = {hn::Zero(f), hn::Zero(f), hn::Zero(f), hn::Zero(f)};
-      for (int pair = 2 * group; pair < 2 * group + 2; ++pair) add_cells<kRedIsOdd>(in, pair, i, weight, colour);
-      for (int c = 0; c < 3; ++c) {
-        const OfColour& own = colour[c];
-        const VF steady = constant(in.noise.variance_e2[c]);
-        const VF sites = hn::Max(hn::Add(own.count, hn::Reverse2(f, own.count)), constant(1));
-        const VF mean = hn::Div(hn::Add(own.mean, hn::Reverse2(f, own.mean)), sites);
-        const VF told = hn::Add(mean, constant(in.noise.dark_e[c] + in.noise.variance_e2[c]));
-        const VF x = hn::Max(told, constant(in.noise.least_e2[c]));
-        const VF by_x = hn::Div(constant(1), x), counted = hn::Mul(own.count, hn::Mul(by_x, by_x));
-        const VF read = hn::Mul(steady, counted);
-        sum[Sums::squares] = hn::Add(sum[Sums::squares], hn::Mul(by_x, own.squares));
-        sum[Sums::bias] = hn::Add(sum[Sums::bias], hn::Div(read, sites));
-        sum[Sums::steady] = hn::Add(sum[Sums::steady], read);
-        sum[Sums::change + c] = hn::Add(sum[Sums::change + c], hn::Mul(by_x, own.change));
-        sum[Sums::weight + c] = hn::Add(sum[Sums::weight + c], hn::Mul(by_x, own.count));
-        const VF electrons = hn::Max(hn::Sub(x, steady), hn::Zero(f));
-        sum[Sums::poisson + c] = hn::Add(sum[Sums::poisson + c], hn::Mul(electrons, counted));
-        sum[Sums::count + c] = hn::Add(sum[Sums::count + c], own.count);
-      }
+      OfColour colour[3] = {{zero, zero, zero, zero}, {zero, zero, zero, zero}, {zero, zero, zero, zero}};
+      for (int pair = 2 * group; pair < 2 * group + 2; ++pair) add_cells<kRedIsOdd>(in, pair, i, colour);
+      for (int c = 0; c < 3; ++c) add_group(in.noise, c, load(weights + i), colour[c], sum);
     }
     for (int k = 0; k < Sums::all; ++k) store(sum[k], out.figure[k] + i);
   }
@@ -209,20 +209,33 @@ HWY_INLINE VF alternating(float even, float odd) { return hn::OddEven(constant(o
 void UpdateMean(const UpdateStrip& in) {
   HWY_ALIGN float weights[sites_of_strip];
   for (int i = 0; i < sites_of_strip; ++i) weights[i] = in.weight[i / motion_block];
-  const VF light = constant(in.light);
   for (int row = 0; row < in.rows; ++row) {
     const int site = 2 * (row % 2);
     const VF dark = alternating(in.dark_e[site], in.dark_e[site + 1]);
     const VF most = alternating(in.saturation_e[site], in.saturation_e[site + 1]);
     for (int i = 0; i < sites_of_strip; i += lanes()) {
-      const VF raw = usable(load(in.raw[row] + i)), weight = load(weights + i);
+      const VF raw = usable(load(in.raw[row] + i)), weight = load(weights + i), before = load(in.mean_e[row] + i);
       const VF signal = hn::Sub(raw, dark), y = hn::Min(signal, most);
-      const VF before = hn::Min(limited(hn::Mul(light, load(in.mean_e[row] + i))), most);
       const MF starts = hn::Ge(weight, constant(1));
       const VF mean = hn::IfThenElse(starts, y, hn::Add(before, hn::Mul(weight, hn::Sub(y, before))));
       store(mean, in.mean_e[row] + i);
       store(hn::IfThenElse(hn::Or(starts, hn::Ge(signal, most)), raw, hn::Add(mean, dark)), in.out[row] + i);
     }
+  }
+}
+
+void ScaleMean(const ScaleStrip& in, float (*sums)[sites_of_strip]) {
+  const VF light = constant(in.light);
+  for (int i = 0; i < sites_of_strip; i += lanes()) {
+    VF sum[2] = {hn::Zero(Floats()), hn::Zero(Floats())};
+    for (int row = 0; row < in.rows; ++row) {
+      const int site = 2 * (row % 2);
+      const VF most = alternating(in.saturation_e[site], in.saturation_e[site + 1]);
+      const VF mean = hn::Min(limited(hn::Mul(light, load(in.mean_e[row] + i))), most);
+      store(mean, in.mean_e[row] + i);
+      sum[row % 2] = hn::Add(sum[row % 2], mean);
+    }
+    for (int r = 0; r < 2; ++r) store(sum[r], sums[r] + i);
   }
 }
 
@@ -233,9 +246,11 @@ HWY_AFTER_NAMESPACE();
 namespace lowlux::denoise::rows {
 
 HWY_EXPORT(FindMotion);
+HWY_EXPORT(ScaleMean);
 HWY_EXPORT(UpdateMean);
 
 void find_motion(const MotionStrip& in, std::uint8_t* moved) { HWY_DYNAMIC_DISPATCH(FindMotion)(in, moved); }
+void scale_mean(const ScaleStrip& in, float (*sums)[sites_of_strip]) { HWY_DYNAMIC_DISPATCH(ScaleMean)(in, sums); }
 void update_mean(const UpdateStrip& in) { HWY_DYNAMIC_DISPATCH(UpdateMean)(in); }
 
 }  // namespace lowlux::denoise::rows

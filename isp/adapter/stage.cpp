@@ -245,12 +245,13 @@ int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& ou
   if (const int wrong = check_picture(out); wrong != LOWLUX_STAGE_OK) return wrong;
   if (const char* fault = fault_of(params); fault != nullptr) return say(LOWLUX_STAGE_BAD_PARAMETER, fault);
   LivePipeline& pipeline = *stream_->pipeline;
-  {
-    const DmaAccess access(in.fd);
-    pipeline.read({static_cast<const std::byte*>(in.data), in.length}, in.stride);
-  }
   StageFacts facts = facts_of(params, stream_->stream, profile_ ? &*profile_ : nullptr);
   facts.live.follows = history_.follows(params);
+  {
+    const DmaAccess access(in.fd);
+    pipeline.read({static_cast<const std::byte*>(in.data), in.length}, in.stride, facts.live,
+                  answers.statistics != nullptr);
+  }
   if (const Result<void> planned = pipeline.plan(facts.live); !planned) {
     return say(code_of(planned.error()), planned.error().message.c_str());
   }

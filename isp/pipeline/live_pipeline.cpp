@@ -84,15 +84,15 @@ Result<std::unique_ptr<LivePipeline>> LivePipeline::make(LiveSetup setup, Execut
 
 /// A made-up frame through every step, so that all of them have their memory.
 Result<void> LivePipeline::warm_up() {
-  const std::size_t stride = row_bytes(setup_.format, setup_.width);
-  {
-    const std::vector<std::byte> zeros(stride * static_cast<std::size_t>(setup_.height));
-    read(zeros, stride);
-  }
   const auto black = static_cast<double>(largest_code(setup_.format)) / 16;
   LiveFacts facts{.black_dn = PerSite<double>{black, black, black, black},
                   .noise = LiveNoise{.gain_dn = 1, .black_variance_dn2 = {4, 4, 4, 4}},
                   .scene_luminance_cd_m2 = 1};
+  {
+    const std::size_t stride = row_bytes(setup_.format, setup_.width);
+    const std::vector<std::byte> zeros(stride * static_cast<std::size_t>(setup_.height));
+    read(zeros, stride, facts, true);
+  }
   const bool bayer = setup_.format.layout == SensorLayout::bayer;
   for (const bool reduces : {false, true}) {
     if (reduces && !bayer) continue;
@@ -107,15 +107,15 @@ Result<void> LivePipeline::warm_up() {
       render(RowSink{[](void*, int, int, const std::uint8_t*, int) {}, nullptr});
     }
   }
-  // Without neutral and noise the frame is asked; that has memory of its own.
+  // Automatic levels have memory of their own.
   facts.denoise.mode = LiveDenoise::Mode::automatic;
   if (Result<void> planned = plan(facts); !planned) return planned;
   reset();
   return {};
 }
 
-void LivePipeline::read(std::span<const std::byte> bytes, std::size_t stride) {
-  meter_.read(bytes, stride, frame_.raw, executor_);
+void LivePipeline::read(std::span<const std::byte> bytes, std::size_t stride, const LiveFacts& facts, bool statistics) {
+  meter_.read(bytes, stride, frame_.raw, executor_, planner_.wants(facts, statistics));
 }
 
 Result<void> LivePipeline::plan(const LiveFacts& facts) { return planner_.plan(facts, meter_, frame_, plan_); }

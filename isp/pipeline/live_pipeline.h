@@ -31,7 +31,9 @@ class LivePipeline {
   static Result<std::unique_ptr<LivePipeline>> make(LiveSetup setup, Executor& executor);
 
   /// @param bytes  rows from its first byte on, `stride` apart, for the whole frame; may lie in uncached memory
-  void read(std::span<const std::byte> bytes, std::size_t stride);
+  /// @param facts  that plan() gets: what they tell is not measured
+  /// @param statistics  whether meter().statistics() and the noise of the frame are wanted
+  void read(std::span<const std::byte> bytes, std::size_t stride, const LiveFacts& facts, bool statistics);
 
   /// Decides about the frame that was read. Errors: colours that lead to no picture (malformed), a look whose luminance
   /// is not known (insufficient).

@@ -77,6 +77,17 @@ void LivePlanner::reset() {
   first_ = true;
 }
 
+bool LivePlanner::needs_light(const LiveFacts& facts) const {
+  const bool colour = setup_.format.layout == SensorLayout::bayer;
+  return !facts.exposure_ev || (colour && !facts.neutral) || setup_.look.look == Look::eye ||
+         facts.denoise.mode == LiveDenoise::Mode::automatic;
+}
+
+MeterWants LivePlanner::wants(const LiveFacts& facts, bool statistics) const {
+  const bool finds_black = !facts.black_dn && setup_.masked.empty();
+  return {.light = needs_light(facts), .noise = statistics || finds_black || !facts.noise, .statistics = statistics};
+}
+
 void LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, DevelopPlan& plan) {
   BlackPoint& black = plan.black;
   black.holds = BlackPoint::Holds::pedestal_and_dark;
@@ -96,7 +107,9 @@ void LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, DevelopPl
 }
 
 void LivePlanner::set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan) {
-  decision_.measured = meter.tiles().line(plan.black.pedestal_dn, frame.raw.white_dn[1]);
+  if (meter.wanted().noise) {
+    decision_.measured = meter.tiles().line(plan.black.pedestal_dn, frame.raw.white_dn[1]);
+  }
   if (facts.noise) {
     frame.noise = profile_of(*facts.noise, frame.raw, plan.black);
     decision_.noise = LiveSource::given;
@@ -167,7 +180,7 @@ Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame,
   set_white(plan, balance);
   const Result<Matrix3> balanced = balanced_matrix(facts, frame, plan, balance);
   if (!balanced) return tl::make_unexpected(balanced.error());
-  blocks_.resize(thumbnail_.mean.plane[0].size());
+  blocks_.resize(needs_light(facts) ? thumbnail_.mean.plane[0].size() : 0);
   rendered_luminance(thumbnail_.mean, plan, *balanced, blocks_);
   const double gain = *std::ranges::max_element(plan.white_gain);
   const double noise_std = thumbnail_.black_noise_std * gain;
@@ -242,7 +255,7 @@ Result<void> LivePlanner::plan(const LiveFacts& facts, FrameMeter& meter, RawFra
       facts.scene_luminance_cd_m2 ? facts.scene_luminance_cd_m2 : setup_.look.scene_luminance_cd_m2;
   set_black(facts, meter, plan);
   set_noise(facts, meter, frame, plan);
-  meter.thumbnail().make(frame, plan.black, thumbnail_);
+  if (needs_light(facts)) meter.thumbnail().make(frame, plan.black, thumbnail_);
   if (Result<void> rendering = set_rendering(facts, frame, plan); !rendering) return rendering;
   choose_level(facts.denoise, frame, plan);
   set_temporal(facts, frame, plan);

@@ -70,7 +70,7 @@ struct LiveDecision {
   LiveSource black = LiveSource::none;
   LiveSource noise = LiveSource::none;
   LiveSource white = LiveSource::none;
-  std::optional<NoiseLine> measured;  // the noise that the frame itself shows
+  std::optional<NoiseLine> measured;  // the noise that the frame itself shows, where it was measured
 };
 
 /// Decides about one frame after the other, into the same plan. Allocates nothing after the first frame but to say what
@@ -81,11 +81,14 @@ class LivePlanner {
 
   /// @param frame  gets the noise, colour and exposure that the facts tell
   Result<void> plan(const LiveFacts& facts, FrameMeter& meter, RawFrame& frame, DevelopPlan& plan);
+  /// What has to be measured of the frame that comes, if these are its facts.
+  MeterWants wants(const LiveFacts& facts, bool statistics) const;
   const LiveDecision& decision() const { return decision_; }
   void reset();
 
  private:
   void set_black(const LiveFacts& facts, FrameMeter& meter, DevelopPlan& plan);
+  bool needs_light(const LiveFacts& facts) const;
   void set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan);
   WhiteBalance choose_white(const LiveFacts& facts, RawFrame& frame);
   Result<Matrix3> balanced_matrix(const LiveFacts& facts, const RawFrame& frame, const DevelopPlan& plan,

@@ -84,14 +84,44 @@ void ThumbnailSums::add_row(const std::uint16_t* dn, int y) {
   }
 }
 
+void ThumbnailSums::add_columns(const std::array<const std::uint32_t*, 2>& columns, int block_row, int rows) {
+  Block* const blocks = &blocks_[static_cast<std::size_t>(block_row) * columns_];
+  for (int b = 0; b < columns_; ++b) {
+    const int first = b * block_, width = std::min(block_, width_ - first);
+    for (int parity = 0; parity < 2; ++parity) {
+      const std::uint32_t* const column = columns[parity] + first;
+      std::int64_t even = 0, odd = 0;
+      for (int x = 0; x + 1 < width; x += 2) {
+        even += column[x];
+        odd += column[x + 1];
+      }
+      if ((width & 1) != 0) even += column[width - 1];
+      const int of_parity = (rows + 1 - parity) / 2;
+      blocks[b].sum[2 * parity] += even;
+      blocks[b].sum[2 * parity + 1] += odd;
+      blocks[b].n[2 * parity] += static_cast<std::int64_t>(of_parity) * ((width + 1) / 2);
+      blocks[b].n[2 * parity + 1] += static_cast<std::int64_t>(of_parity) * (width / 2);
+    }
+  }
+}
+
+PerSite<std::uint64_t> ThumbnailSums::sums() const {
+  PerSite<std::uint64_t> out{};
+  for (const Block& block : blocks_) {
+    for (int site = 0; site < 4; ++site) out[site] += static_cast<std::uint64_t>(block.sum[site]);
+  }
+  return out;
+}
+
 // Fraction of white of each colour, mean over the block.
-std::array<double, 3> ThumbnailSums::colour_means(const RawDn& raw, const BlackPoint& black, const Block& block) const {
+std::array<double, 3> ThumbnailSums::colour_means(const RawDn& raw, const BlackPoint& black,
+                                                  const PerSite<double>& per_dn, const Block& block) {
   std::array<double, 3> sum{};
   std::array<int, 3> n{};
   for (int i = 0; i < 4; ++i) {
     if (block.n[i] == 0) continue;
     const double mean = static_cast<double>(block.sum[i]) / static_cast<double>(block.n[i]);
-    const double fraction = (mean - black.pedestal_dn[i]) / (white_at(raw, i) - black.pedestal_dn[i]);
+    const double fraction = (mean - black.pedestal_dn[i]) * per_dn[i];
     const auto add = [&](int c) {
       sum[c] += fraction;
       ++n[c];
@@ -126,10 +156,12 @@ double ThumbnailSums::black_noise(const RawFrame& frame, const BlackPoint& black
 void ThumbnailSums::make(const RawFrame& frame, const BlackPoint& black, Thumbnail& out) {
   if (out.mean.width() != columns_ || out.mean.height() != rows_) out.mean = CameraRgb(columns_, rows_);
   differences_dn_.clear();
+  PerSite<double> per_dn{};
+  for (int i = 0; i < 4; ++i) per_dn[i] = 1 / (white_at(frame.raw, i) - black.pedestal_dn[i]);
   for (int y = 0; y < rows_; ++y) {
     for (int x = 0; x < columns_; ++x) {
       const Block& block = blocks_[static_cast<std::size_t>(y) * columns_ + x];
-      const std::array<double, 3> mean = colour_means(frame.raw, black, block);
+      const std::array<double, 3> mean = colour_means(frame.raw, black, per_dn, block);
       for (int c = 0; c < 3; ++c) out.mean.plane[c].at(x, y) = static_cast<float>(mean[c]);
       if (block.difference > 0 && block.clipped == 0)
         differences_dn_.push_back(static_cast<double>(block.difference) / static_cast<double>(block.differences));

@@ -29,6 +29,11 @@ class ThumbnailSums {
   void clear();
   /// Row y of the active area, samples interleaved. Rows of one block of rows come from one thread.
   void add_row(const std::uint16_t* dn, int y);
+  /// A whole block of rows of a mosaic at once, from sums of its columns, of even and of odd rows apart. Tells no
+  /// noise.
+  /// @param rows  in it: block() but for the last
+  void add_columns(const std::array<const std::uint32_t*, 2>& columns, int block_row, int rows);
+  PerSite<std::uint64_t> sums() const;  // of all codes of a mosaic
   /// `frame` as in the constructor. Makes `out` of the right size where it is not.
   void make(const RawFrame& frame, const BlackPoint& black, Thumbnail& out);
 
@@ -43,7 +48,8 @@ class ThumbnailSums {
   static void add_mosaic(const std::uint16_t* dn, int width, int y, std::uint16_t white, Block& block);
   void add_rgb(const std::uint16_t* dn, int width, Block& block) const;
   double black_noise(const RawFrame& frame, const BlackPoint& black);
-  std::array<double, 3> colour_means(const RawDn& raw, const BlackPoint& black, const Block& block) const;
+  static std::array<double, 3> colour_means(const RawDn& raw, const BlackPoint& black, const PerSite<double>& per_dn,
+                                            const Block& block);
 
   int block_ = 2;    // side in pixels, even
   int samples_ = 1;  // per pixel

@@ -15,19 +15,29 @@ constexpr int levels = 32;          // half octaves of DN above black
 constexpr int variance_bins = 256;  // eighths of an octave
 constexpr int least_samples = 40;   // of a level
 
-/// Of one level: a histogram of log2(variance), eight bins for each octave from 2^-8 on, and the sum of means.
+/// Of one level: a histogram of variances, and the sum of means.
 struct Level {
   std::array<std::uint32_t, variance_bins> bin{};
   std::uint32_t samples = 0;
   double sum = 0;
 };
 
-int bin_of_variance(double v) {
-  return std::clamp(static_cast<int>(8 * (std::log2(std::max(v, 1e-9)) + 8)), 0, variance_bins - 1);
+/// Eight bins for each octave, even within it: the high bits of a float.
+constexpr int bin_shift = 20;
+constexpr std::uint32_t lowest_bin = std::bit_cast<std::uint32_t>(0x1p-8F) >> bin_shift;
+
+int bin_of_variance(float v) {
+  const std::uint32_t bin = std::bit_cast<std::uint32_t>(std::max(v, 0x1p-8F)) >> bin_shift;
+  return std::min(static_cast<int>(bin - lowest_bin), variance_bins - 1);
 }
 
-int level_of(double above_black_dn) {
-  return std::clamp(static_cast<int>(2 * (std::log2(std::max(above_black_dn, 0.125)) + 3)), 0, levels - 1);
+/// The lower edge of a bin.
+double edge_of(int bin) { return std::bit_cast<float>((lowest_bin + static_cast<std::uint32_t>(bin)) << bin_shift); }
+
+/// Two for each octave from an eighth of a code on.
+int level_of(float above_black_dn) {
+  const std::uint32_t octaves = std::bit_cast<std::uint32_t>(std::max(above_black_dn, 0x1p-3F)) >> 22U;
+  return std::min(static_cast<int>(octaves - (std::bit_cast<std::uint32_t>(0x1p-3F) >> 22U)), levels - 1);
 }
 
 /// The variance below which a share of the samples lies, by straight lines within bins.
@@ -37,7 +47,7 @@ double low_quantile(const Level& level, double share) {
   for (int i = 0; i < variance_bins; ++i) {
     if (below + level.bin[i] >= wanted) {
       const double part = (wanted - below) / std::max(1U, level.bin[i]);
-      return std::exp2((i + part) / 8 - 8);
+      return edge_of(i) + part * (edge_of(i + 1) - edge_of(i));
     }
     below += level.bin[i];
   }
@@ -69,25 +79,22 @@ TileNoise::TileNoise(int width, int height, int tile)
 
 void TileNoise::clear() { std::ranges::fill(tiles_, Tile{}); }
 
-void TileNoise::add_row(const std::uint16_t* dn, int y) {
-  if (y / tile_ >= rows_) return;
-  Tile* const tiles = &tiles_[static_cast<std::size_t>(y / tile_) * columns_];
-  const int left = site_of(0, y);
+void TileNoise::add_columns(const std::array<const std::uint32_t*, 2>& sums,
+                            const std::array<const std::uint32_t*, 2>& squares, int tile_row) {
+  if (tile_row >= rows_) return;
+  Tile* const tiles = &tiles_[static_cast<std::size_t>(tile_row) * columns_];
   for (int i = 0; i < columns_; ++i) {
-    const std::uint16_t* const in = dn + static_cast<std::ptrdiff_t>(i) * tile_;
-    std::uint32_t even = 0, odd = 0;
-    std::uint64_t even_square = 0, odd_square = 0;
-    for (int x = 0; x + 3 < tile_; x += 4) {
-      even += in[x] + in[x + 2];
-      odd += in[x + 1] + in[x + 3];
-      const std::int64_t a = in[x] - in[x + 2], b = in[x + 1] - in[x + 3];
-      even_square += static_cast<std::uint64_t>(a * a);
-      odd_square += static_cast<std::uint64_t>(b * b);
+    for (int parity = 0; parity < 2; ++parity) {
+      const std::uint32_t* const sum = sums[parity] + static_cast<std::ptrdiff_t>(i) * tile_;
+      const std::uint32_t* const square = squares[parity] + static_cast<std::ptrdiff_t>(i) * tile_;
+      Tile& tile = tiles[i];
+      for (int x = 0; x + 3 < tile_; x += 4) {  // pairs that do not overlap: columns x and x + 2, x + 1 and x + 3
+        tile.sum[2 * parity] += sum[x] + sum[x + 2];
+        tile.sum[2 * parity + 1] += sum[x + 1] + sum[x + 3];
+        tile.square[2 * parity] += square[x];
+        tile.square[2 * parity + 1] += square[x + 1];
+      }
     }
-    tiles[i].sum[left] += even;
-    tiles[i].sum[left + 1] += odd;
-    tiles[i].square[left] += even_square;
-    tiles[i].square[left + 1] += odd_square;
   }
 }
 
@@ -107,8 +114,8 @@ std::optional<NoiseLine> TileNoise::line(const PerSite<double>& black_dn, double
     for (int site = 0; site < 4; ++site) {
       const double mean = mean_of(tile, site), variance = variance_of(tile, site);
       if (mean > 0.9 * white_dn || variance == 0) continue;
-      Level& level = found[level_of(mean - black_dn[site])];
-      ++level.bin[bin_of_variance(variance)];
+      Level& level = found[level_of(static_cast<float>(mean - black_dn[site]))];
+      ++level.bin[bin_of_variance(static_cast<float>(variance))];
       ++level.samples;
       level.sum += mean - black_dn[site];
     }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -17,8 +18,8 @@ struct NoiseLine {
   double offset_error_dn2 = 0;
 };
 
-/// Means and variances of the four sites in square tiles of a mosaic, taken row by row, and what they tell of its noise
-/// and its black. Memory is reserved in the constructor.
+/// Means and variances of the four sites in square tiles of a mosaic, taken from sums of columns, and what they tell of
+/// its noise and its black. Memory is reserved in the constructor.
 ///
 /// Variances are of differences between neighbours of one site, d^2 / 2, so that slopes add little. Detail only adds:
 /// of the tiles of one level the lowest fifth, divided by what chi-square has there, is taken for the noise.
@@ -30,8 +31,10 @@ class TileNoise {
   int tile() const { return tile_; }
   int tile_rows() const { return rows_; }
   void clear();
-  /// Row y of the mosaic. Rows of one row of tiles come from one thread.
-  void add_row(const std::uint16_t* dn, int y);
+  /// Sums of the columns of some rows of one row of tiles, of even and of odd rows apart: of the codes, and of the
+  /// squares of their differences from the code two columns on. One thread for each row of tiles.
+  void add_columns(const std::array<const std::uint32_t*, 2>& sums, const std::array<const std::uint32_t*, 2>& squares,
+                   int tile_row);
 
   /// The straight line of variance over level. Nullopt where the levels of the frame lie too close together to tell
   /// gain from offset (the gain is not four standard errors above 0), or too few tiles are whole and not clipped.

@@ -1,6 +1,7 @@
 // How fast the stage of isp/adapter is, by the protocol of libcamera's software ISP: 30 frames to warm up, the mean of
 // the next 30, lowlux_stage_process alone; and what its levels gain on a night scene that stands still.
-//   stage_bench PICTURE [--small]      PICTURE: a name of testdata/pictures; --small: 1920 x 1080 alone
+//   stage_bench PICTURE [--small] [--mode NAME] [--threads N] [--look camera|eye]
+// PICTURE: a name of testdata/pictures; --small: 1920 x 1080 alone; the others: these alone.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -113,6 +114,7 @@ class Bench {
     out.size = sizeof out;
     out.fourcc = LOWLUX_STAGE_XBGR8888;
     check(lowlux_stage_configure(stage_, &in, &out));
+    statistics_.size = sizeof statistics_;
     picture_.resize(out.bytes[0]);
     stride_ = out.stride[0];
   }
@@ -128,7 +130,7 @@ class Bench {
     out.plane[0] = {picture_.data(), picture_.size(), stride_};
     const lowlux_stage_params p = params(mode_.denoise, sequence_++);
     const auto start = Clock::now();
-    check(lowlux_stage_process(stage_, &in, &out, &p, nullptr, nullptr));
+    check(lowlux_stage_process(stage_, &in, &out, &p, nullptr, &statistics_));
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   }
   const std::vector<std::uint8_t>& picture() const { return picture_; }
@@ -143,6 +145,7 @@ class Bench {
   Size size_;
   lowlux_stage* stage_ = nullptr;
   std::vector<std::uint8_t> picture_;
+  lowlux_stage_statistics statistics_{};
   std::size_t stride_ = 0;
   unsigned sequence_ = 0;
 };
@@ -170,7 +173,19 @@ double memcpy_ms(std::size_t bytes) {
   return times[7];
 }
 
-void bench_size(const Plane<float>& light, double mean_e, Size size) {
+/// What is asked for; empty or 0: all.
+struct Choice {
+  std::string mode, look;
+  int threads = 0;
+  bool small = false;
+};
+
+bool wanted(const Choice& choice, const Mode& mode, bool eye, int threads) {
+  return (choice.mode.empty() || choice.mode == mode.name) && (choice.threads == 0 || choice.threads == threads) &&
+         (choice.look.empty() || choice.look == (eye ? "eye" : "camera"));
+}
+
+void bench_size(const Plane<float>& light, double mean_e, Size size, const Choice& choice) {
   std::vector<Codes> frames;
   const Codes clean = frame_of(light, mean_e, size.width, size.height, 0);
   for (unsigned i = 1; i <= distinct; ++i) frames.push_back(frame_of(light, mean_e, size.width, size.height, i));
@@ -187,6 +202,7 @@ void bench_size(const Plane<float>& light, double mean_e, Size size) {
     truth.process_ms(clean);
     for (const Mode& mode : modes) {
       for (const int threads : {1, 2}) {
+        if (!wanted(choice, mode, eye, threads)) continue;
         Bench bench(mode, eye, threads, size);
         for (int i = 0; i < warm_up; ++i) bench.process_ms(frames[static_cast<std::size_t>(i % distinct)]);
         double sum = 0, least = 1e9;
@@ -209,7 +225,14 @@ void bench_size(const Plane<float>& light, double mean_e, Size size) {
 
 int main(int argc, char** argv) {
   const std::string picture = argc > 1 ? argv[1] : "kodim19.png";
-  const bool small = argc > 2 && std::strcmp(argv[2], "--small") == 0;
+  Choice choice;
+  for (int i = 2; i < argc; ++i) {
+    const std::string option = argv[i], value = i + 1 < argc ? argv[i + 1] : "";
+    choice.small = choice.small || option == "--small";
+    if (option == "--mode") choice.mode = value;
+    if (option == "--look") choice.look = value;
+    if (option == "--threads") choice.threads = std::atoi(value.c_str());
+  }
   PoolExecutor executor(2);
   const auto light = test::picture_light(picture, executor, 0.6);
   if (!light) {
@@ -217,7 +240,7 @@ int main(int argc, char** argv) {
     return 1;
   }
   std::printf("lowlux stage, vectors: %s\n", unpack_target());
-  bench_size(light->rate_e, 20, {1920, 1080});
-  if (!small) bench_size(light->rate_e, 20, {3280, 2464});
+  bench_size(light->rate_e, 20, {1920, 1080}, choice);
+  if (!choice.small) bench_size(light->rate_e, 20, {3280, 2464}, choice);
   return 0;
 }

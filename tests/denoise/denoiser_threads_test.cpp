@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "denoise/denoiser.h"
+#include "denoise/temporal.h"
 #include "tests/denoise/frames.h"
 #include "tests/support/count_allocations.h"
 #include "tests/support/only_target.h"
@@ -90,6 +91,21 @@ TEST(DenoiserMemory, IsAllocatedByTheConstructorOnly) {
     denoiser.run({raw.view(), camera.phase}, noise(), {.level = level}, out.view(),
                  {residual.view(), confidence.view()}, two);
   }
+  EXPECT_EQ(test::allocations, before);
+}
+
+TEST(TemporalMemory, IsAllocatedByTheConstructorOnly) {
+  const auto raw = night(500, 300);
+  Plane<float> out(500, 300), share(250, 150);
+  PoolExecutor two(2);
+  const long at_first = test::allocations;
+  denoise::TemporalMean temporal(500, 300, 2);
+  EXPECT_GT(test::allocations, at_first);
+  const long before = test::allocations;
+  for (const double light : {1.0, 1.0, 2.0}) {
+    temporal.run({raw.view(), camera.phase}, noise(), light, {}, out.view(), share.view(), two);
+  }
+  temporal.reset();
   EXPECT_EQ(test::allocations, before);
 }
 

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+/// The row kernels under FrameMeter, dispatched at run time; `width` samples, nothing beyond is read or written.
+namespace lowlux::isp::meter {
+
+/// column[x] += dn[x].
+void add_row(const std::uint16_t* dn, int width, std::uint32_t* column);
+
+/// column[x] += min(|dn[x] - dn[x + 2]|, 8191)^2 for x < width - 2: 64 rows cannot overflow it.
+void add_squares(const std::uint16_t* dn, int width, std::uint32_t* column);
+
+struct Extremes {
+  std::uint32_t clipped = 0;  // white or more
+  std::uint32_t zero = 0;
+};
+Extremes count_extremes(const std::uint16_t* dn, int width, std::uint16_t white);
+
+/// Luma of the whole 2x2 cells of two rows, (weight . sites) / 256, in bins: bin[i] of cell i, at most `last`.
+struct LumaBins {
+  std::array<std::uint16_t, 4> weight{};  // of the sites; their sum is 256
+  int shift = 0;                          // bits off a code to make it a bin; negative: on
+  std::uint16_t last = 0;
+};
+void luma_bins(const std::uint16_t* upper, const std::uint16_t* lower, int width, const LumaBins& how,
+               std::uint16_t* bin);
+
+}  // namespace lowlux::isp::meter

@@ -1,0 +1,171 @@
+#include "tests/reference/temporal_ref.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace lowlux::reference {
+namespace {
+
+constexpr int side = 8;
+
+double usable(float e) { return std::isnan(e) ? 0 : std::clamp(static_cast<double>(e), -1e9, 1e9); }
+
+bool above(double x, double mean, double variance, double z, double few) {
+  if (mean <= 0) return false;
+  const double by_shape = variance / (mean * mean);
+  return x > few * mean * std::pow(std::max(0.0, 1 - by_shape / 9 + z / 3 * std::sqrt(by_shape)), 3);
+}
+
+}  // namespace
+
+/// A frame and its noise by colour.
+struct TemporalMean::Now {
+  const denoise::RawElectronsView& raw;
+  const denoise::RawNoise& noise;
+  double least_weight;
+
+  std::size_t colour(int x, int y) const { return static_cast<std::size_t>(colour_at(raw.phase, x, y)); }
+  static double dark_e(const denoise::RawNoise& of, BayerPhase phase, std::size_t colour) {
+    double sum = 0, count = 0;
+    for (int site = 0; site < 4; ++site) {
+      if (static_cast<std::size_t>(colour_at(phase, site % 2, site / 2)) != colour) continue;
+      sum += of.dark_mean_e[site];
+      count += 1;
+    }
+    return sum / count;
+  }
+  static double variance(const denoise::RawNoise& of, BayerPhase phase, std::size_t colour, double signal_e) {
+    const double dark = dark_e(of, phase, colour), read = of.variance_e2[colour];
+    return std::max(signal_e + dark + read, 0.5 * read + 0.3 * dark + 0.02);
+  }
+  double dark_e(std::size_t colour) const { return dark_e(noise, raw.phase, colour); }
+  double variance(std::size_t colour, double signal_e) const { return variance(noise, raw.phase, colour, signal_e); }
+  double most_e(std::size_t colour) const { return std::min(noise.saturation_e[colour], 1e9) - dark_e(colour); }
+  double value_e(int x, int y) const { return usable(raw.value.at(x, y)) - dark_e(colour(x, y)); }
+  template <class Work>
+  void each_site(int x, int y, int size, const Work& work) const {
+    for (int v = y; v < std::min(y + size, raw.value.height); ++v) {
+      for (int u = x; u < std::min(x + size, raw.value.width); ++u) work(u, v, colour(u, v));
+    }
+  }
+};
+
+void TemporalMean::rescale(const Now& now, double light, int x, int y) {
+  std::array<double, 3> sum{}, count{};
+  now.each_site(side * x, side * y, side, [&](int u, int v, std::size_t c) {
+    double& mean = signal_e_.at(u, v);
+    mean = std::min(std::clamp(light * mean, -1e9, 1e9), now.most_e(c));
+    sum[c] += mean;
+    count[c] += 1;
+  });
+  double before = 0, after = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (count[c] == 0) continue;
+    before += count[c] * Now::variance(noise_, phase_, c, std::min(sum[c] / count[c] / light, 1e9));
+    after += count[c] * now.variance(c, sum[c] / count[c]);
+  }
+  double& share = blocks_.at(x, y).share;
+  share = std::min(share * light * light * before / after, 1e6);
+}
+
+int TemporalMean::level_of(const Now& now, int x, int y, const denoise::MotionThresholds& at) const {
+  const double s = blocks_.at(x, y).share, weight = std::max(s / (1 + s), now.least_weight), fresh = s / (1 + s);
+  double squares = 0, bias = 0, steady = 0, poisson = 0, sites = 0;
+  std::array<double, 3> change{}, weights{}, electrons{}, count{};
+  for (int group = 0; group < 4; ++group) {
+    std::array<double, 3> of_squares{}, of_change{}, of_mean{}, n{};
+    now.each_site(side * x + 4 * (group % 2), side * y + 4 * (group / 2), 4, [&](int u, int v, std::size_t c) {
+      const double most = now.most_e(c), value = std::min(now.value_e(u, v), most), mean = signal_e_.at(u, v);
+      if (std::min(value, mean) >= most) return;
+      of_squares[c] += std::pow(value - mean, 2);
+      of_change[c] += value - mean;
+      of_mean[c] += mean + weight * (value - mean);
+      n[c] += 1;
+    });
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (n[c] == 0) continue;
+      const double variance = now.variance(c, of_mean[c] / n[c]), read = now.noise.variance_e2[c];
+      squares += of_squares[c] / variance;
+      bias += read / (variance * variance);
+      steady += n[c] * read / (variance * variance);
+      change[c] += of_change[c] / variance;
+      weights[c] += n[c] / variance;
+      electrons[c] += std::max(0.0, n[c] * (variance - read) / (variance * variance));
+      count[c] += n[c];
+    }
+  }
+  double step = 0, colours = 0, excess = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (count[c] == 0) continue;
+    step += change[c] * change[c] / weights[c] / (1 + s);
+    excess += electrons[c] / (count[c] * count[c]) * (1 - s + s * s) / (1 + s);
+    poisson += electrons[c];
+    sites += count[c];
+    colours += 1;
+  }
+  const double spread = squares / (1 + s) - step, free = sites - colours;
+  const double mean = free > 0 ? free + fresh * bias : 0;
+  const double variance = 2 * free + (1 - s) * (1 - s) / (1 + s) * poisson + fresh * steady;
+  const auto moved = [&](const denoise::MotionThreshold& t) {
+    return above(spread, mean, variance, t.z, 1) || above(step, colours, 2 * colours + excess, t.z, t.few);
+  };
+  if (moved(at.alone)) return 2;
+  return moved(at.beside) ? 1 : 0;
+}
+
+bool TemporalMean::has_moved(int x, int y) const {
+  bool beside = false;
+  for (int v = std::max(y - 1, 0); v <= std::min(y + 1, blocks_.height() - 1); ++v) {
+    for (int u = std::max(x - 1, 0); u <= std::min(x + 1, blocks_.width() - 1); ++u) {
+      beside = beside || blocks_.at(u, v).level == 2;
+    }
+  }
+  const int own = blocks_.at(x, y).level;
+  return own == 2 || (own == 1 && beside);
+}
+
+double TemporalMean::run(const denoise::RawElectronsView& raw, const denoise::RawNoise& noise, double light,
+                         const denoise::TemporalOptions& options) {
+  const Now now{raw, noise, 1.0 / options.most_frames};
+  const int width = raw.value.width, height = raw.value.height;
+  const bool first = blocks_.empty() || mean_e.width() != width || mean_e.height() != height || phase_ != raw.phase;
+  if (first) {
+    mean_e = Plane<double>(width, height);
+    signal_e_ = Plane<double>(width, height);
+    variance_share = Plane<double>((width + 1) / 2, (height + 1) / 2);
+    blocks_ = Plane<Block>((width + side - 1) / side, (height + side - 1) / side);
+    std::fill(blocks_.data(), blocks_.data() + blocks_.size(), Block{});
+  } else {
+    const auto at = denoise::motion_thresholds(options.false_alarm);
+    for (int y = 0; y < blocks_.height(); ++y) {
+      for (int x = 0; x < blocks_.width(); ++x) {
+        rescale(now, light, x, y);
+        blocks_.at(x, y).level = level_of(now, x, y, at);
+      }
+    }
+  }
+  double moved = 0;
+  for (int y = 0; y < blocks_.height(); ++y) {
+    for (int x = 0; x < blocks_.width(); ++x) {
+      const bool starts = first || has_moved(x, y);
+      double& share = blocks_.at(x, y).share;
+      const double weight = starts ? 1 : std::max(share / (1 + share), now.least_weight);
+      share = starts ? 1 : (1 - weight) * (1 - weight) * share + weight * weight;
+      moved += starts ? 1 : 0;
+      now.each_site(side * x, side * y, side, [&](int u, int v, std::size_t c) {
+        double& mean = signal_e_.at(u, v);
+        const double value = std::min(now.value_e(u, v), now.most_e(c));
+        mean = starts ? value : mean + weight * (value - mean);
+        const bool as_measured = starts || now.value_e(u, v) >= now.most_e(c);
+        mean_e.at(u, v) = as_measured ? usable(raw.value.at(u, v)) : mean + now.dark_e(c);
+        variance_share.at(u / 2, v / 2) = share;
+      });
+    }
+  }
+  noise_ = noise;
+  phase_ = raw.phase;
+  return moved / static_cast<double>(blocks_.size());
+}
+
+}  // namespace lowlux::reference

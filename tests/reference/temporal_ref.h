@@ -1,0 +1,34 @@
+#pragma once
+
+#include "denoise/temporal.h"
+#include "denoise/temporal_thresholds.h"
+
+namespace lowlux::reference {
+
+/// What denoise::TemporalMean does, in double, one site at a time.
+class TemporalMean {
+ public:
+  void reset() { blocks_ = Plane<Block>(); }
+  double run(const denoise::RawElectronsView& raw, const denoise::RawNoise& noise, double light,
+             const denoise::TemporalOptions& options);
+
+  Plane<double> mean_e;          // with dark charge
+  Plane<double> variance_share;  // of each 2x2 cell
+
+ private:
+  struct Block {
+    double share = 1;
+    int level = 2;  // 2 moved, 1 if one beside it has
+  };
+  struct Now;
+  void rescale(const Now& now, double light, int x, int y);
+  int level_of(const Now& now, int x, int y, const denoise::MotionThresholds& at) const;
+  bool has_moved(int x, int y) const;
+
+  Plane<double> signal_e_;  // the mean without dark charge
+  Plane<Block> blocks_;
+  denoise::RawNoise noise_;
+  BayerPhase phase_ = BayerPhase::rggb;
+};
+
+}  // namespace lowlux::reference
