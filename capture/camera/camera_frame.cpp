@@ -113,7 +113,8 @@ void set_info(const FrameFacts& facts, const std::string& camera, FrameInfo& out
     return value && std::isfinite(*value) && *value > 0 ? value : std::nullopt;
   };
   out.model = camera;
-  out.exposure_s = positive(facts.exposure_s);
+  // As DNGs have it: libtiff takes rationals as floats.
+  if (const auto time_s = positive(facts.exposure_s)) out.exposure_s = static_cast<float>(*time_s);
   if (const auto gain = positive(facts.analogue_gain)) out.iso = std::round(iso_of_unit_gain * *gain);
   if (facts.temperature_c && std::isfinite(*facts.temperature_c)) out.temperature_c = facts.temperature_c;
 }

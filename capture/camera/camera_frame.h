@@ -20,7 +20,7 @@ std::size_t black_channel_of(int site, BayerPhase phase);
 /// A camera's frame as one that pictures and raw files are made of; `frame.bytes` holds frame_bytes(format) at least
 /// and is read once, row by row. White is the largest code. Facts go where a DNG has a place for them:
 ///     black_level_dn             black_tag, a pattern of 2 x 2 in the mosaic's order (R, Gr, Gb, B for monochrome)
-///     exposure_s, temperature_c  FrameInfo
+///     exposure_s, temperature_c  FrameInfo, the time rounded to a float
 ///     analogue_gain              FrameInfo::iso, 100 for a gain of 1, in whole numbers
 ///     colour_gains               as_shot_neutral (1/R, 1, 1/B), largest 1; without them none is stated
 ///     colour_matrix              one calibration: forward = Bradford(D65 -> D50) sRGB->XYZ M, and its inverse under

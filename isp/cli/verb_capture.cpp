@@ -125,7 +125,8 @@ class Capture {
     if (error != nullptr) {
       const std::string taken = state_.count.taken > 0 ? fmt::format(" (after {} frames)", state_.count.taken) : "";
       const std::string camera = args_.v4l2.empty() ? "libcamera " + args_.libcamera : args_.v4l2;
-      const std::string& place = error->where.empty() ? camera : error->where;
+      const bool of_camera = error->where.empty() || error->where == args_.libcamera;
+      const std::string& place = of_camera ? camera : error->where;
       fmt::print(stderr, "{}\n", error_line(place, {error->code, error->message + taken, {}}));
     } else if (!args_.develop.quiet) {
       print_warnings();

@@ -81,7 +81,7 @@ TEST_F(CameraFrames, SayHowTheyWereTaken) {
   frame_.facts.analogue_gain = 2.004;
   frame_.facts.temperature_c = -3.5;
   const FrameInfo info = converted(format_of(12)).raw.info;
-  EXPECT_EQ(info.exposure_s, 0.02);
+  EXPECT_EQ(info.exposure_s, static_cast<double>(0.02F));
   EXPECT_EQ(info.iso, 200);
   EXPECT_EQ(info.temperature_c, -3.5);
 }
@@ -127,7 +127,8 @@ TEST_F(CameraFrames, TakeUnknownColoursForThoseOfSrgbAndSaySo) {
   const Matrix3 expected = *isp::rgb_to_xyz(isp::primaries_rec709);
   ASSERT_TRUE(to_xyz);
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) EXPECT_NEAR((*to_xyz)[i][j], expected[i][j], 1e-4) << i << j;  // of 2^-16 for each figure
+    for (int j = 0; j < 3; ++j)
+      EXPECT_NEAR((*to_xyz)[i][j], expected[i][j], 1e-4) << i << j;  // of 2^-16 for each figure
   }
 }
 

@@ -29,7 +29,8 @@ struct Picture420 {
 Picture420 numbered(int width, int height, int seed) {
   Picture420 out(width, height);
   for (std::size_t i = 0; i < out.luma.size(); ++i) out.luma.data()[i] = static_cast<std::uint8_t>(7 * i + seed);
-  for (std::size_t i = 0; i < out.chroma.size(); ++i) out.chroma.data()[i] = static_cast<std::uint8_t>(5 * i + seed + 1);
+  for (std::size_t i = 0; i < out.chroma.size(); ++i)
+    out.chroma.data()[i] = static_cast<std::uint8_t>(5 * i + seed + 1);
   return out;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <functional>
@@ -60,6 +61,7 @@ class FakeCamera final : public capture::Camera {
  private:
   capture::CameraFormat format_;
   std::vector<std::byte> memory_;
+  std::size_t at_ = 0;  // of events
   std::string name_ = "fake camera";
   std::vector<std::string> warnings_;
 };
