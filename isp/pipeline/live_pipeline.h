@@ -33,8 +33,8 @@ class LivePipeline {
   /// @param bytes  rows from its first byte on, `stride` apart, for the whole frame; may lie in uncached memory
   void read(std::span<const std::byte> bytes, std::size_t stride);
 
-  /// Decides about the frame that was read. Errors: colours that lead to no picture (malformed), a look whose luminance
-  /// is not known (insufficient).
+  /// Decides about the frame that was read. Errors: black not below white, colours that lead to no picture (malformed),
+  /// a look whose luminance is not known (insufficient).
   Result<void> plan(const LiveFacts& facts);
 
   const DevelopPlan& decided() const { return plan_; }

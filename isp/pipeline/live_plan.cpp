@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "isp/pipeline/plan_look.h"
 #include "isp/pipeline/plan_noise.h"
 #include "isp/pipeline/plan_rendering.h"
@@ -14,8 +16,10 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double still_ev = 0.1;     // exposure stays where it is for targets nearer than this ...
-constexpr double step = 0.15;        // ... else goes this share of the way with each frame
+constexpr double still_ev = 0.1;  // exposure stays where it is for targets nearer than this ...
+constexpr double step = 0.15;     // ... else goes this share of the way with each frame
+// Of white. A frame that is bright everywhere shows no black; pedestals of cameras are an eighth of white at most.
+constexpr double highest_black = 0.25;
 constexpr double level_slack = 1.2;  // a level of noise reduction is left only this far beyond its edge
 
 /// Noise that was measured follows the frames slowly: one of them is a rough measurement.
@@ -77,7 +81,8 @@ void LivePlanner::reset() {
   first_ = true;
 }
 
-void LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, DevelopPlan& plan) {
+Result<void> LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, const RawFrame& frame,
+                                    DevelopPlan& plan) {
   BlackPoint& black = plan.black;
   black.holds = BlackPoint::Holds::pedestal_and_dark;
   if (facts.black_dn) {
@@ -90,9 +95,20 @@ void LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, DevelopPl
     decision_.black = LiveSource::masked_pixels;
   } else {
     black.pedestal_dn = meter.tiles().darkest_dn();
+    for (int site = 0; site < 4; ++site) {
+      black.pedestal_dn[site] = std::min(black.pedestal_dn[site], highest_black * white_at(frame.raw, site));
+    }
     black.source = BlackPoint::Source::given;
     decision_.black = LiveSource::frame;
   }
+  for (int site = 0; site < 4; ++site) {
+    const double white = white_at(frame.raw, site);
+    if (white > black.pedestal_dn[site]) continue;
+    return fail(ErrorCode::malformed,
+                fmt::format("the white level {:g} DN is not above black {:g} DN, dark charge in it", white,
+                            black.pedestal_dn[site]));
+  }
+  return {};
 }
 
 void LivePlanner::set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan) {
@@ -240,7 +256,7 @@ Result<void> LivePlanner::plan(const LiveFacts& facts, FrameMeter& meter, RawFra
   frame.raw.info.f_number = facts.f_number;
   plan.options.look.scene_luminance_cd_m2 =
       facts.scene_luminance_cd_m2 ? facts.scene_luminance_cd_m2 : setup_.look.scene_luminance_cd_m2;
-  set_black(facts, meter, plan);
+  if (Result<void> black = set_black(facts, meter, frame, plan); !black) return black;
   set_noise(facts, meter, frame, plan);
   meter.thumbnail().make(frame, plan.black, thumbnail_);
   if (Result<void> rendering = set_rendering(facts, frame, plan); !rendering) return rendering;

@@ -80,12 +80,14 @@ class LivePlanner {
   explicit LivePlanner(const LiveSetup& setup) : setup_(setup) {}
 
   /// @param frame  gets the noise, colour and exposure that the facts tell
+  /// Errors: black not below white, colours that lead to no picture (malformed), a look whose luminance is not known
+  /// (insufficient).
   Result<void> plan(const LiveFacts& facts, FrameMeter& meter, RawFrame& frame, DevelopPlan& plan);
   const LiveDecision& decision() const { return decision_; }
   void reset();
 
  private:
-  void set_black(const LiveFacts& facts, FrameMeter& meter, DevelopPlan& plan);
+  Result<void> set_black(const LiveFacts& facts, FrameMeter& meter, const RawFrame& frame, DevelopPlan& plan);
   void set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan);
   WhiteBalance choose_white(const LiveFacts& facts, RawFrame& frame);
   Result<Matrix3> balanced_matrix(const LiveFacts& facts, const RawFrame& frame, const DevelopPlan& plan,
