@@ -111,7 +111,12 @@ std::uint64_t stage_memory_bytes(const LiveSetup& setup, int threads) {
     return static_cast<std::uint64_t>(std::max(width, 0)) * static_cast<std::uint64_t>(std::max(height, 0));
   };
   const std::uint64_t rounded = area(setup.active.width + 128, setup.active.height + 16);
-  std::uint64_t for_each = 12;         // mosaics in electrons, statistics
+  std::uint64_t for_each = 0;  // bytes of a pixel; from codes straight to the picture none
+  if (setup.levels || setup.temporal) {
+    for_each = 12;  // mosaics in electrons
+  } else if (!setup.defects.empty() || setup.format.layout == SensorLayout::monochrome) {
+    for_each = 4;  // the repaired mosaic, or its plane
+  }
   if (setup.levels) for_each += 24;    // Denoiser
   if (setup.temporal) for_each += 16;  // TemporalMean, its mean, maps
   if (setup.look.look == Look::eye) for_each += 8;

@@ -65,6 +65,13 @@ Matrix3 saturated(double saturation, const Vector3& luminance) {
   return out;
 }
 
+/// Camera RGB of daylight; equal channels where no calibration tells it.
+Vector3 daylight_of(const CameraColour& colour) {
+  if (colour.calibrations.empty()) return {1, 1, 1};
+  const auto daylight = neutral_of_white(colour, white_d65);
+  return daylight ? *daylight : Vector3{1, 1, 1};
+}
+
 Vector3 scaled_to_one(const Vector3& v) {
   const double largest = *std::ranges::max_element(v);
   return {v[0] / largest, v[1] / largest, v[2] / largest};
@@ -145,14 +152,20 @@ WhiteBalance LivePlanner::choose_white(const LiveFacts& facts, RawFrame& frame) 
     }
     if (!neutral_) {
       decision_.white = LiveSource::none;
-      const auto daylight = neutral_of_white(frame.colour, white_d65);
-      frame.colour.as_shot_neutral = daylight ? *daylight : Vector3{1, 1, 1};
+      frame.colour.as_shot_neutral = daylight_of(frame.colour);
     } else {
       frame.colour.as_shot_neutral = scaled_to_one(*neutral_);
     }
   }
   WhiteBalance out{.neutral = *frame.colour.as_shot_neutral, .source = WhiteSource::as_shot};
-  if (const auto white = white_of_neutral(frame.colour, out.neutral)) out.white = *white;
+  if (frame.colour.calibrations.empty()) return out;
+  if (const auto white = white_of_neutral(frame.colour, out.neutral)) {
+    out.white = *white;
+  } else if (!facts.neutral) {  // an estimate that is no colour of a light gives way to daylight
+    decision_.white = LiveSource::none;
+    frame.colour.as_shot_neutral = out.neutral = daylight_of(frame.colour);
+    if (const auto daylight = white_of_neutral(frame.colour, out.neutral)) out.white = *daylight;
+  }
   return out;
 }
 
