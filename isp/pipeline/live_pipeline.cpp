@@ -95,6 +95,7 @@ Result<void> LivePipeline::warm_up() {
       .black_dn = PerSite<double>{black, black, black, black},
       .noise = LiveNoise{.gain_dn = gain_dn, .black_variance_dn2 = {variance, variance, variance, variance}},
       .scene_luminance_cd_m2 = 1};
+  plan_.options.look.which = LookChoice::Which::all;  // which of them is called for, each frame tells anew
   const bool bayer = setup_.format.layout == SensorLayout::bayer;
   for (const bool reduces : {false, true}) {
     if (reduces && !bayer) continue;
@@ -112,6 +113,7 @@ Result<void> LivePipeline::warm_up() {
   // Without neutral and noise the frame is asked; that has memory of its own.
   facts.denoise.mode = LiveDenoise::Mode::automatic;
   if (Result<void> planned = plan(facts); !planned) return planned;
+  plan_.options.look.which = setup_.look.which;
   reset();
   return {};
 }
