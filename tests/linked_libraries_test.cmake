@@ -1,5 +1,6 @@
 cmake_minimum_required(VERSION 3.25)
-# Fails if one of FILES links OpenCV or libcamera, at first or at second hand. Each of MODULES, FILE=LIBRARY, must link that
+# Fails if one of FILES links OpenCV or libcamera, at first or at second hand, or one of STAGES what reads or writes
+# files. Each of MODULES, FILE=LIBRARY, must link that
 # library, or ldd told us nothing.
 function(libraries_of file out)
   execute_process(COMMAND ldd ${file} OUTPUT_VARIABLE text RESULT_VARIABLE code)
@@ -13,6 +14,12 @@ foreach(file IN LISTS FILES)
   libraries_of(${file} text)
   if(text MATCHES "[\t\n ](libopencv[^ ]*|libcamera[^ ]*)")
     message(FATAL_ERROR "${file} links ${CMAKE_MATCH_1}: only the modules may")
+  endif()
+endforeach()
+foreach(file IN LISTS STAGES)
+  libraries_of(${file} text)
+  if(text MATCHES "[\t\n ](lib(raw|tiff|png|jpeg|OpenEXR|lcms)[^ ]*)")
+    message(FATAL_ERROR "${file} links ${CMAKE_MATCH_1}: a stage has no files")
   endif()
 endforeach()
 if(NOT MODULES)

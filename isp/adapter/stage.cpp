@@ -72,6 +72,27 @@ denoise::Level level_of(std::int32_t level) {
   return level <= LOWLUX_STAGE_LEVEL_DRAFT ? denoise::Level::draft : static_cast<denoise::Level>(level - 1);
 }
 
+struct InverseRange {
+  double mean = 0;
+  double mean_square = 0;
+};
+
+/// One over white less black [1/DN], of the sites that a noise profile's green stands for.
+InverseRange green_range(const RawDn& raw, const BlackPoint& black) {
+  InverseRange out;
+  int sites = 0;
+  for (int site = 0; site < 4; ++site) {
+    if (raw.layout == SensorLayout::bayer && colour_at(raw.phase, site & 1, site >> 1) != CfaColour::green) continue;
+    const double inverse = 1 / (raw.white_dn[1] - black.pedestal_dn[site]);
+    out.mean += inverse;
+    out.mean_square += inverse * inverse;
+    ++sites;
+  }
+  out.mean /= sites;
+  out.mean_square /= sites;
+  return out;
+}
+
 Rect rect_of(const lowlux_stage_rect& r) { return {r.x, r.y, r.width, r.height}; }
 
 std::vector<Pixel> defects_of(const StageProfile& profile, const Rect& active) {
@@ -90,7 +111,12 @@ std::uint64_t stage_memory_bytes(const LiveSetup& setup, int threads) {
     return static_cast<std::uint64_t>(std::max(width, 0)) * static_cast<std::uint64_t>(std::max(height, 0));
   };
   const std::uint64_t rounded = area(setup.active.width + 128, setup.active.height + 16);
-  std::uint64_t for_each = 12;         // mosaics in electrons, statistics
+  std::uint64_t for_each = 0;  // bytes of a pixel; from codes straight to the picture none
+  if (setup.levels || setup.temporal) {
+    for_each = 12;  // mosaics in electrons
+  } else if (!setup.defects.empty() || setup.format.layout == SensorLayout::monochrome) {
+    for_each = 4;  // the repaired mosaic, or its plane
+  }
   if (setup.levels) for_each += 24;    // Denoiser
   if (setup.temporal) for_each += 16;  // TemporalMean, its mean, maps
   if (setup.look.look == Look::eye) for_each += 8;
@@ -255,6 +281,7 @@ int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& ou
   if (const Result<void> planned = pipeline.plan(facts.live); !planned) {
     return say(code_of(planned.error()), planned.error().message.c_str());
   }
+  history_.take(params);
   render(out);
   if (answers.result != nullptr) tell(facts, *answers.result);
   if (answers.statistics != nullptr) count(*answers.statistics);
@@ -282,9 +309,9 @@ void Stage::tell(const StageFacts& facts, lowlux_stage_result& out) const {
   to_channels(plan.black.pedestal_dn, stream_->stream.phase, out.black_level);
   out.noise_gain = out.noise_read = 0;
   if (const auto& noise = pipeline.frame().noise; noise) {
-    const double range = pipeline.frame().raw.white_dn[1] - plan.black.pedestal_dn[0];
-    out.noise_gain = static_cast<float>(noise->scale[1] * range);
-    out.noise_read = static_cast<float>(std::sqrt(noise->offset[1]) * range);
+    const auto [inverse, square] = green_range(pipeline.frame().raw, plan.black);
+    out.noise_gain = static_cast<float>(noise->scale[1] / inverse);
+    out.noise_read = static_cast<float>(std::sqrt(noise->offset[1] / square));
   }
   out.colour_gains[0] = plan.white_gain[0] / plan.white_gain[1];
   out.colour_gains[1] = plan.white_gain[2] / plan.white_gain[1];

@@ -174,7 +174,7 @@ const char* fault_of(const lowlux_stage_params& p) {
       {LOWLUX_STAGE_HAS_SATURATION, within(p.saturation, 0, 4), "saturation lies between 0 and 4"},
       {LOWLUX_STAGE_HAS_SHARPNESS, within(p.sharpness, 0, 100), "sharpness lies between 0 and 100"},
       {LOWLUX_STAGE_HAS_EXPOSURE_VALUE, within(p.exposure_ev, -10, 20), "an exposure value lies between -10 and 20"},
-      {LOWLUX_STAGE_HAS_NOISE, within(p.noise_gain, 1e-6, 65535) && within(p.noise_read, 0, 65535),
+      {LOWLUX_STAGE_HAS_NOISE, within(p.noise_gain, 1e-6f, 65535) && within(p.noise_read, 0, 65535),
        "a system gain lies between 1e-6 and 65535 DN for each electron, read noise between 0 and 65535 DN"},
       {LOWLUX_STAGE_HAS_F_NUMBER, within(p.f_number, 0.1, 1e3), "an f-number lies between 0.1 and 1000"},
       {LOWLUX_STAGE_HAS_SCENE_LUMINANCE, within(p.scene_luminance_cd_m2, 1e-7, 1e9),
@@ -205,18 +205,16 @@ StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream
   return out;
 }
 
-bool StageHistory::follows(const lowlux_stage_params& params) {
-  bool follows = true;
-  if (has(params, LOWLUX_STAGE_HAS_SEQUENCE)) {
-    if (sequence_) follows = params.sequence == *sequence_ + 1;
-    sequence_ = params.sequence;
-  }
-  if (has(params, LOWLUX_STAGE_HAS_TIMESTAMP)) {
-    // Unsigned: a step back is a long one too.
-    if (timestamp_ns_) follows = follows && params.timestamp_ns - *timestamp_ns_ <= longest_step_ns;
-    timestamp_ns_ = params.timestamp_ns;
-  }
-  return follows;
+bool StageHistory::follows(const lowlux_stage_params& params) const {
+  if (sequence_ && has(params, LOWLUX_STAGE_HAS_SEQUENCE) && params.sequence != *sequence_ + 1) return false;
+  // Unsigned: a step back is a long one too.
+  return !timestamp_ns_ || !has(params, LOWLUX_STAGE_HAS_TIMESTAMP) ||
+         params.timestamp_ns - *timestamp_ns_ <= longest_step_ns;
+}
+
+void StageHistory::take(const lowlux_stage_params& params) {
+  if (has(params, LOWLUX_STAGE_HAS_SEQUENCE)) sequence_ = params.sequence;
+  if (has(params, LOWLUX_STAGE_HAS_TIMESTAMP)) timestamp_ns_ = params.timestamp_ns;
 }
 
 void StageHistory::reset() { *this = {}; }

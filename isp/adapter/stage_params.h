@@ -37,8 +37,9 @@ StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream
 /// Follows frames by sequence and time.
 class StageHistory {
  public:
-  /// Whether this frame comes right after the one before.
-  bool follows(const lowlux_stage_params& params);
+  /// Whether this frame comes right after the one that was taken last.
+  bool follows(const lowlux_stage_params& params) const;
+  void take(const lowlux_stage_params& params);
   void reset();
 
  private:

@@ -135,8 +135,8 @@ std::vector<HotPixelFigure> StageProfile::hot_pixels() const {
   }
   const auto place = [](const HotPixelFigure& hot) { return std::pair(hot.y, hot.x); };
   std::ranges::sort(out, {}, place);
-  const auto repeated = std::ranges::unique(out, {}, place);
-  out.erase(repeated.begin(), repeated.end());
+  const auto same = [&](const HotPixelFigure& a, const HotPixelFigure& b) { return place(a) == place(b); };
+  out.erase(std::unique(out.begin(), out.end(), same), out.end());
   return out;
 }
 

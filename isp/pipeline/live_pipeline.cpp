@@ -84,15 +84,18 @@ Result<std::unique_ptr<LivePipeline>> LivePipeline::make(LiveSetup setup, Execut
 
 /// A made-up frame through every step, so that all of them have their memory.
 Result<void> LivePipeline::warm_up() {
-  const auto black = static_cast<double>(largest_code(setup_.format)) / 16;
-  LiveFacts facts{.black_dn = PerSite<double>{black, black, black, black},
-                  .noise = LiveNoise{.gain_dn = 1, .black_variance_dn2 = {4, 4, 4, 4}},
-                  .scene_luminance_cd_m2 = 1};
+  const double black = frame_.raw.white_dn[0] / 16, gain_dn = frame_.raw.white_dn[0] / 1000,
+               variance = 4 * gain_dn * gain_dn;
+  LiveFacts facts{
+      .black_dn = PerSite<double>{black, black, black, black},
+      .noise = LiveNoise{.gain_dn = gain_dn, .black_variance_dn2 = {variance, variance, variance, variance}},
+      .scene_luminance_cd_m2 = 1};
   {
     const std::size_t stride = row_bytes(setup_.format, setup_.width);
     const std::vector<std::byte> zeros(stride * static_cast<std::size_t>(setup_.height));
     read(zeros, stride, facts, true);
   }
+  plan_.options.look.which = LookChoice::Which::all;  // which of them is called for, each frame tells anew
   const bool bayer = setup_.format.layout == SensorLayout::bayer;
   for (const bool reduces : {false, true}) {
     if (reduces && !bayer) continue;
@@ -110,6 +113,7 @@ Result<void> LivePipeline::warm_up() {
   // Automatic levels have memory of their own.
   facts.denoise.mode = LiveDenoise::Mode::automatic;
   if (Result<void> planned = plan(facts); !planned) return planned;
+  plan_.options.look.which = setup_.look.which;
   reset();
   return {};
 }
@@ -124,12 +128,15 @@ void LivePipeline::reset() { planner_.reset(); }
 
 void LivePipeline::render_mosaic(PlaneView<std::uint16_t> codes) {
   const Rect& active = frame_.raw.active;
-  const int shift = 16 - setup_.format.bits;
+  const int shift = 16 - setup_.format.bits, largest = largest_code(setup_.format);
   if (!plan_.electrons_at_white) {
     for_each_band(executor_, active.height, [&](RowBand band, int) {
       for (int y = band.first; y < band.last; ++y) {
         const std::uint16_t* const dn = frame_.raw.dn.row(active.y + y) + active.x;
-        for (int x = 0; x < active.width; ++x) codes.at(x, y) = static_cast<std::uint16_t>(dn[x] << shift);
+        // Words of 16 bits may hold more than the format's bits, which would come out dark.
+        for (int x = 0; x < active.width; ++x) {
+          codes.at(x, y) = static_cast<std::uint16_t>(std::min<int>(dn[x], largest) << shift);
+        }
       }
     });
     return;

@@ -35,8 +35,8 @@ class LivePipeline {
   /// @param statistics  whether meter().statistics() and the noise of the frame are wanted
   void read(std::span<const std::byte> bytes, std::size_t stride, const LiveFacts& facts, bool statistics);
 
-  /// Decides about the frame that was read. Errors: colours that lead to no picture (malformed), a look whose luminance
-  /// is not known (insufficient).
+  /// Decides about the frame that was read. Errors: black not below white, colours that lead to no picture (malformed),
+  /// a look whose luminance is not known (insufficient).
   Result<void> plan(const LiveFacts& facts);
 
   const DevelopPlan& decided() const { return plan_; }

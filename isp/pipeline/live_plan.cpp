@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "isp/pipeline/plan_look.h"
 #include "isp/pipeline/plan_noise.h"
 #include "isp/pipeline/plan_rendering.h"
@@ -14,8 +16,10 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double still_ev = 0.1;     // exposure stays where it is for targets nearer than this ...
-constexpr double step = 0.15;        // ... else goes this share of the way with each frame
+constexpr double still_ev = 0.1;  // exposure stays where it is for targets nearer than this ...
+constexpr double step = 0.15;     // ... else goes this share of the way with each frame
+// Of white. A frame that is bright everywhere shows no black; pedestals of cameras are an eighth of white at most.
+constexpr double highest_black = 0.25;
 constexpr double level_slack = 1.2;  // a level of noise reduction is left only this far beyond its edge
 
 /// Noise that was measured follows the frames slowly: one of them is a rough measurement.
@@ -61,6 +65,13 @@ Matrix3 saturated(double saturation, const Vector3& luminance) {
   return out;
 }
 
+/// Camera RGB of daylight; equal channels where no calibration tells it.
+Vector3 daylight_of(const CameraColour& colour) {
+  if (colour.calibrations.empty()) return {1, 1, 1};
+  const auto daylight = neutral_of_white(colour, white_d65);
+  return daylight ? *daylight : Vector3{1, 1, 1};
+}
+
 Vector3 scaled_to_one(const Vector3& v) {
   const double largest = *std::ranges::max_element(v);
   return {v[0] / largest, v[1] / largest, v[2] / largest};
@@ -88,7 +99,8 @@ MeterWants LivePlanner::wants(const LiveFacts& facts, bool statistics) const {
   return {.light = needs_light(facts), .noise = statistics || finds_black || !facts.noise, .statistics = statistics};
 }
 
-void LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, DevelopPlan& plan) {
+Result<void> LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, const RawFrame& frame,
+                                    DevelopPlan& plan) {
   BlackPoint& black = plan.black;
   black.holds = BlackPoint::Holds::pedestal_and_dark;
   if (facts.black_dn) {
@@ -101,9 +113,20 @@ void LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, DevelopPl
     decision_.black = LiveSource::masked_pixels;
   } else {
     black.pedestal_dn = meter.tiles().darkest_dn();
+    for (int site = 0; site < 4; ++site) {
+      black.pedestal_dn[site] = std::min(black.pedestal_dn[site], highest_black * white_at(frame.raw, site));
+    }
     black.source = BlackPoint::Source::given;
     decision_.black = LiveSource::frame;
   }
+  for (int site = 0; site < 4; ++site) {
+    const double white = white_at(frame.raw, site);
+    if (white > black.pedestal_dn[site]) continue;
+    return fail(ErrorCode::malformed,
+                fmt::format("the white level {:g} DN is not above black {:g} DN, dark charge in it", white,
+                            black.pedestal_dn[site]));
+  }
+  return {};
 }
 
 void LivePlanner::set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan) {
@@ -142,14 +165,20 @@ WhiteBalance LivePlanner::choose_white(const LiveFacts& facts, RawFrame& frame) 
     }
     if (!neutral_) {
       decision_.white = LiveSource::none;
-      const auto daylight = neutral_of_white(frame.colour, white_d65);
-      frame.colour.as_shot_neutral = daylight ? *daylight : Vector3{1, 1, 1};
+      frame.colour.as_shot_neutral = daylight_of(frame.colour);
     } else {
       frame.colour.as_shot_neutral = scaled_to_one(*neutral_);
     }
   }
   WhiteBalance out{.neutral = *frame.colour.as_shot_neutral, .source = WhiteSource::as_shot};
-  if (const auto white = white_of_neutral(frame.colour, out.neutral)) out.white = *white;
+  if (frame.colour.calibrations.empty()) return out;
+  if (const auto white = white_of_neutral(frame.colour, out.neutral)) {
+    out.white = *white;
+  } else if (!facts.neutral) {  // an estimate that is no colour of a light gives way to daylight
+    decision_.white = LiveSource::none;
+    frame.colour.as_shot_neutral = out.neutral = daylight_of(frame.colour);
+    if (const auto daylight = white_of_neutral(frame.colour, out.neutral)) out.white = *daylight;
+  }
   return out;
 }
 
@@ -253,7 +282,7 @@ Result<void> LivePlanner::plan(const LiveFacts& facts, FrameMeter& meter, RawFra
   frame.raw.info.f_number = facts.f_number;
   plan.options.look.scene_luminance_cd_m2 =
       facts.scene_luminance_cd_m2 ? facts.scene_luminance_cd_m2 : setup_.look.scene_luminance_cd_m2;
-  set_black(facts, meter, plan);
+  if (Result<void> black = set_black(facts, meter, frame, plan); !black) return black;
   set_noise(facts, meter, frame, plan);
   if (needs_light(facts)) meter.thumbnail().make(frame, plan.black, thumbnail_);
   if (Result<void> rendering = set_rendering(facts, frame, plan); !rendering) return rendering;

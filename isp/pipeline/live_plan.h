@@ -80,6 +80,8 @@ class LivePlanner {
   explicit LivePlanner(const LiveSetup& setup) : setup_(setup) {}
 
   /// @param frame  gets the noise, colour and exposure that the facts tell
+  /// Errors: black not below white, colours that lead to no picture (malformed), a look whose luminance is not known
+  /// (insufficient).
   Result<void> plan(const LiveFacts& facts, FrameMeter& meter, RawFrame& frame, DevelopPlan& plan);
   /// What has to be measured of the frame that comes, if these are its facts.
   MeterWants wants(const LiveFacts& facts, bool statistics) const;
@@ -87,7 +89,7 @@ class LivePlanner {
   void reset();
 
  private:
-  void set_black(const LiveFacts& facts, FrameMeter& meter, DevelopPlan& plan);
+  Result<void> set_black(const LiveFacts& facts, FrameMeter& meter, const RawFrame& frame, DevelopPlan& plan);
   bool needs_light(const LiveFacts& facts) const;
   void set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan);
   WhiteBalance choose_white(const LiveFacts& facts, RawFrame& frame);

@@ -189,7 +189,7 @@ LookGrid Pipeline::look_grid(const RgbInput& in, const RawFrame& frame, const De
 
 template <class Encode>
 void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const Encode& encode) {
-  if (!plan.noise_reduction.level || !keeps_maps(plan)) noise_maps_ = {};
+  has_noise_maps_ = plan.noise_reduction.level && keeps_maps(plan);
   reserve(frame, plan);
   const RgbInput in =
       frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);

@@ -34,7 +34,7 @@ class Pipeline {
 
   /// Of the active area of the frame rendered last; empty unless its noise was reduced and maps were asked for or a
   /// look needed them.
-  NoiseMaps take_noise_maps() { return std::move(noise_maps_); }
+  NoiseMaps take_noise_maps() { return std::exchange(has_noise_maps_, false) ? std::move(noise_maps_) : NoiseMaps{}; }
 
  private:
   template <class Encode>
@@ -54,7 +54,8 @@ class Pipeline {
   int kernel_width_ = 0;
   Plane<float> mosaic_;  // active area, black and dark off
   Plane<float> noisy_;   // before noise was reduced
-  NoiseMaps noise_maps_;
+  NoiseMaps noise_maps_;  // their memory stays for frames that have them again
+  bool has_noise_maps_ = false;
   std::unique_ptr<NightLookGrid> look_;
   int look_width_ = 0;
   int look_height_ = 0;

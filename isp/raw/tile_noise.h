@@ -54,7 +54,7 @@ class TileNoise {
   double mean_of(const Tile& tile, int site) const;
   double variance_of(const Tile& tile, int site) const;
 
-  int width_, height_, tile_;
+  int tile_;
   int columns_, rows_;  // whole tiles
   double low_share_;    // of the variance, that the lowest fifth of estimates lies below
   std::vector<Tile> tiles_;

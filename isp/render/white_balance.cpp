@@ -22,6 +22,7 @@ Vector3 scaled_to_one(const Vector3& v) {
 
 WhiteBalance balance_of(const CameraColour& colour, const Vector3& neutral, WhiteSource source) {
   WhiteBalance out{scaled_to_one(neutral), std::nullopt, source, {}};
+  if (colour.calibrations.empty()) return out;  // asked in vain, it would have words for it, which take memory
   if (const auto white = white_of_neutral(colour, neutral)) out.white = *white;
   return out;
 }

@@ -1,0 +1,341 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "calib/profile_io.h"
+#include "isp/adapter/stage_profile.h"
+#include "isp/pipeline/develop.h"
+#include "isp/pipeline/pipeline.h"
+#include "tests/adapter/stage_frames.h"
+#include "tests/support/scratch_directory.h"
+
+namespace lowlux {
+namespace {
+
+using namespace stage_testing;
+
+constexpr int width = 200, height = 148;
+
+CameraProfile coloured_profile() {
+  CameraProfile profile;
+  profile.mosaic = "GRBG";
+  for (const auto& [cct_k, red] : {std::pair{2856.0, 0.9}, {6504.0, 0.7}}) {
+    ColourProfile colour;
+    colour.illuminant = "a light";
+    colour.calibration.cct_k = cct_k;
+    colour.calibration.xyz_to_camera = {{{red, -0.2, -0.1}, {-0.4, 1.2, 0.2}, {-0.1, 0.2, 0.6}}};
+    profile.colours.push_back(colour);
+  }
+  return profile;
+}
+
+/// The same frame as a file would give it, with the noise of the parameters.
+RawFrame raw_frame(const RawFormat& format, const Codes& codes, const lowlux_stage_params& params) {
+  RawFrame frame;
+  RawDn& raw = frame.raw;
+  raw.dn = Plane<std::uint16_t>(width, height);
+  std::copy(codes.begin(), codes.end(), raw.dn.data());
+  raw.phase = format.phase;
+  raw.active = raw.default_crop = {0, 0, width, height};
+  raw.masked_is_stated = true;
+  raw.white_dn.fill(largest_code(format));
+  frame.colour.calibrations = isp::StageProfile::of(coloured_profile())->calibrations();
+  frame.colour.as_shot_neutral = Vector3{1.0 / params.colour_gains[0], 1, 1.0 / params.colour_gains[1]};
+  const double range = raw.white_dn[0] - params.black_level[0], gain = params.noise_gain, read = params.noise_read;
+  frame.noise.emplace();
+  frame.noise->scale.fill(gain / range);
+  frame.noise->offset.fill((read * read + 1.0 / 12) / (range * range));
+  return frame;
+}
+
+struct Way {
+  std::int32_t denoise;
+  isp::DenoiseChoice choice;
+  bool automatic;  // exposure and white
+};
+
+/// The picture that `lowlux develop` makes where it is asked for the same. What it measures of noise beyond the model
+/// (lines, its scale) live frames do not.
+std::vector<std::uint8_t> developed(const RawFrame& frame, const Way& way, const lowlux_stage_params& params) {
+  isp::DevelopOptions options;
+  options.black = {.choice = isp::BlackChoice::given, .given_dn = {}};
+  options.black.given_dn.fill(params.black_level[0]);
+  options.find_defects = false;
+  options.denoise = way.choice;
+  options.denoise.line_noise = false;
+  if (way.automatic) {
+    options.white_balance.mode = isp::WhiteBalanceChoice::Mode::automatic;
+  } else {
+    options.exposure_ev = params.exposure_ev;
+  }
+  PoolExecutor executor(2);
+  Result<isp::DevelopPlan> plan = isp::plan_develop(frame, options, executor);
+  EXPECT_TRUE(plan) << plan.error().message;
+  plan->noise_reduction.options.variance_scale.fill(1);
+  isp::Pipeline pipeline(executor);
+  Picture picture = isp::make_picture(*plan);
+  pipeline.render(frame, *plan, picture);
+  const Plane<std::uint8_t>& rgb = std::get<Encoded8>(picture).codes;
+  return {rgb.data(), rgb.data() + rgb.size()};
+}
+
+TEST(Stage, DevelopsAFirstFrameAsFilesAreDeveloped) {
+  const test::ScratchDirectory scratch;
+  scratch.write("colours.json", *calib::profile_text(coloured_profile()));
+  const std::string file = scratch.file("colours.json");
+  auto settings = plain_settings(3);
+  settings.profile_file = file.c_str();
+  settings.most_denoise = LOWLUX_STAGE_LEVEL_HIGH;
+  using Mode = isp::DenoiseChoice::Mode;
+  const RawFormatNames& names = names_of_bayer(12, BayerPhase::grbg);
+  const Codes codes = scene(names.format, width, height);
+  for (const bool automatic : {false, true}) {
+    for (const Way& way : {Way{LOWLUX_STAGE_DENOISE_OFF, {Mode::off}, automatic},
+                           Way{LOWLUX_STAGE_DENOISE_FAST, {Mode::level, denoise::Level::draft}, automatic},
+                           Way{LOWLUX_STAGE_DENOISE_HIGH_QUALITY, {Mode::level, denoise::Level::high}, automatic},
+                           Way{LOWLUX_STAGE_DENOISE_AUTO, {Mode::automatic}, automatic}}) {
+      Rig rig(settings, names, width, height, LOWLUX_STAGE_BGR888);
+      ASSERT_EQ(rig.configured, LOWLUX_STAGE_OK) << rig.error();
+      auto params = fixed_params(names.format);
+      params.denoise = way.denoise;
+      if (automatic) params.valid &= ~(LOWLUX_STAGE_HAS_COLOUR_GAINS | LOWLUX_STAGE_HAS_EXPOSURE_VALUE);
+      ASSERT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK) << rig.error();
+      const auto expected = developed(raw_frame(names.format, codes, params), way, params);
+      EXPECT_EQ(rig.result.level == 0, way.denoise == LOWLUX_STAGE_DENOISE_OFF);
+      std::size_t differ = 0;
+      for (std::size_t i = 0; i < expected.size(); ++i) differ += rig.planes[0][i] != expected[i] ? 1 : 0;
+      EXPECT_EQ(differ, 0U) << "denoise " << way.denoise << (automatic ? " automatic" : " given");
+    }
+  }
+}
+
+/// Of the most that takes part: frames before, levels by the frame, exposure and white of the frame's own.
+lowlux_stage_settings everything() {
+  auto out = plain_settings(2);
+  out.most_denoise = LOWLUX_STAGE_LEVEL_HIGH;
+  out.temporal = 1;
+  return out;
+}
+
+lowlux_stage_params numbered(const RawFormat& format, std::uint32_t sequence) {
+  auto out = fixed_params(format);
+  out.valid |= LOWLUX_STAGE_HAS_SEQUENCE;
+  out.denoise = LOWLUX_STAGE_DENOISE_FAST;
+  out.sequence = sequence;
+  return out;
+}
+
+TEST(Stage, AfterAGapOrAStepBackStartsLikeAFreshOne) {
+  const RawFormatNames& names = names_of_bayer(10);
+  const auto frame = [&](std::uint32_t seed) { return scene(names.format, width, height, seed); };
+  const std::uint64_t second = 1'000'000'000;
+  struct Step {
+    std::uint32_t sequence;
+    std::uint64_t timestamp_ns;
+    bool follows;
+  };
+  for (const Step& step : {Step{8, 3 * second, true}, Step{9, 3 * second, false}, Step{7, 3 * second, false},
+                           Step{6, 3 * second, false}, Step{0, 3 * second, false}, Step{8, 5 * second, true},
+                           Step{8, 5 * second + 1, false}, Step{8, 3 * second - 1, false}}) {
+    Rig rig(everything(), names, width, height, LOWLUX_STAGE_BAYER16),
+        fresh(everything(), names, width, height, LOWLUX_STAGE_BAYER16);
+    for (std::uint32_t i = 5; i <= 7; ++i) {
+      auto params = numbered(names.format, i);
+      params.valid |= LOWLUX_STAGE_HAS_TIMESTAMP;
+      params.timestamp_ns = 3 * second;
+      ASSERT_EQ(rig.process(frame(i), params), LOWLUX_STAGE_OK) << rig.error();
+    }
+    auto params = numbered(names.format, step.sequence);
+    params.valid |= LOWLUX_STAGE_HAS_TIMESTAMP;
+    params.timestamp_ns = step.timestamp_ns;
+    ASSERT_EQ(rig.process(frame(9), params), LOWLUX_STAGE_OK);
+    ASSERT_EQ(fresh.process(frame(9), params), LOWLUX_STAGE_OK);
+    EXPECT_EQ(rig.planes != fresh.planes, step.follows) << step.sequence << ' ' << step.timestamp_ns;
+  }
+}
+
+TEST(Stage, CountsSequencesAcross2To32) {
+  const RawFormatNames& names = names_of_bayer(10);
+  Rig rig(everything(), names, width, height, LOWLUX_STAGE_BAYER16),
+      fresh(everything(), names, width, height, LOWLUX_STAGE_BAYER16);
+  const Codes first = scene(names.format, width, height, 1), second = scene(names.format, width, height, 2);
+  ASSERT_EQ(rig.process(first, numbered(names.format, UINT32_MAX)), LOWLUX_STAGE_OK);
+  ASSERT_EQ(rig.process(second, numbered(names.format, 0)), LOWLUX_STAGE_OK);
+  ASSERT_EQ(fresh.process(second, numbered(names.format, 0)), LOWLUX_STAGE_OK);
+  EXPECT_NE(rig.planes, fresh.planes);
+}
+
+TEST(Stage, TakesARefusedFrameForAGap) {
+  const RawFormatNames& names = names_of_bayer(10);
+  Rig rig(everything(), names, width, height, LOWLUX_STAGE_BAYER16),
+      fresh(everything(), names, width, height, LOWLUX_STAGE_BAYER16);
+  const Codes first = scene(names.format, width, height, 1), third = scene(names.format, width, height, 3);
+  ASSERT_EQ(rig.process(first, numbered(names.format, 1)), LOWLUX_STAGE_OK);
+  auto wrong = numbered(names.format, 2);
+  wrong.black_level[0] = 1023;
+  ASSERT_EQ(rig.process(first, wrong), LOWLUX_STAGE_BAD_PARAMETER);
+  ASSERT_EQ(rig.process(third, numbered(names.format, 3)), LOWLUX_STAGE_OK);
+  ASSERT_EQ(fresh.process(third, numbered(names.format, 3)), LOWLUX_STAGE_OK);
+  EXPECT_EQ(rig.planes, fresh.planes);
+}
+
+TEST(Stage, AfterResetOrConfigureIsAFreshOneInAllItDecides) {
+  const RawFormatNames& names = names_of_bayer(10);
+  const Codes bright = scene(names.format, width, height, 1);
+  Codes dark = bright;
+  for (std::uint16_t& code : dark) code = static_cast<std::uint16_t>(64 + (code > 64 ? (code - 64) / 8 : 0));
+  for (const bool resets : {true, false}) {
+    Rig rig(everything(), names, width, height, LOWLUX_STAGE_BGR888),
+        fresh(everything(), names, width, height, LOWLUX_STAGE_BGR888);
+    for (int i = 0; i < 5; ++i) ASSERT_EQ(rig.process(bright, no_params()), LOWLUX_STAGE_OK);
+    const auto before = rig.result;
+    ASSERT_EQ(rig.process(dark, no_params()), LOWLUX_STAGE_OK);
+    const float followed_ev = rig.result.exposure_ev;
+    ASSERT_EQ(resets ? lowlux_stage_reset(rig.stage.get()) : lowlux_stage_configure(rig.stage.get(), &rig.in, &rig.out),
+              LOWLUX_STAGE_OK);
+    ASSERT_EQ(rig.process(dark, no_params()), LOWLUX_STAGE_OK);
+    ASSERT_EQ(fresh.process(dark, no_params()), LOWLUX_STAGE_OK);
+    EXPECT_EQ(rig.planes, fresh.planes);
+    EXPECT_EQ(rig.result.exposure_ev, fresh.result.exposure_ev);
+    EXPECT_GT(followed_ev, before.exposure_ev) << "exposure follows the scene ...";
+    EXPECT_LT(followed_ev, fresh.result.exposure_ev) << "... slowly";
+  }
+}
+
+// A still scene: the noise of clean mosaics falls with the number of frames.
+TEST(Stage, FramesBeforeLowerTheNoiseOfAStillScene) {
+  const RawFormatNames& names = names_of_bayer(10);
+  Rig rig(everything(), names, width, height, LOWLUX_STAGE_BAYER16);
+  const auto scatter = [&] {
+    double sum = 0;
+    int n = 0;
+    for (int y = 0; y < height; ++y) {  // differences along columns of the flat left edge
+      for (int x = 0; x + 2 < 60; ++x, ++n) {
+        const std::size_t i = static_cast<std::size_t>(y) * width + x;
+        const double d = rig.wide(i + 2) - rig.wide(i);
+        sum += d * d;
+      }
+    }
+    return sum / n;
+  };
+  double first = 0;
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    auto params = numbered(names.format, i);
+    params.denoise = LOWLUX_STAGE_DENOISE_MINIMAL;  // by frames before alone
+    ASSERT_EQ(rig.process(scene(names.format, width, height, i), params), LOWLUX_STAGE_OK);
+    if (i == 0) first = scatter();
+    EXPECT_EQ(rig.result.level, LOWLUX_STAGE_LEVEL_NONE);
+    EXPECT_EQ(rig.result.temporal, 1);
+  }
+  EXPECT_LT(scatter(), first / 3) << "of twelve frames; slopes stay";
+  EXPECT_LT(rig.result.moved, 0.1);
+}
+
+TEST(Stage, StatisticsAreThoseOfAPlainLoop) {
+  for (const int bits : {8, 10, 16}) {
+    const RawFormatNames& names = names_of_bayer(bits, BayerPhase::gbrg);
+    Codes codes = scene(names.format, 75, 46);
+    const int largest = largest_code(names.format);
+    codes[3] = codes[80] = 0;
+    codes[17] = codes[90] = codes[95] = static_cast<std::uint16_t>(largest);
+    Rig rig(plain_settings(3), names, 75, 46, LOWLUX_STAGE_BGR888);
+    ASSERT_EQ(rig.process(codes, fixed_params(names.format)), LOWLUX_STAGE_OK);
+    std::uint64_t sum[3]{}, count[3]{}, clipped = 0, zero = 0;
+    std::uint32_t luma[1024]{}, luma64[64]{};
+    for (int y = 0; y < 46; ++y) {
+      for (int x = 0; x < 75; ++x) {
+        const int code = codes[y * 75 + x];
+        const auto colour = static_cast<std::size_t>(colour_at(names.format.phase, x & 1, y & 1));
+        sum[colour] += code;
+        ++count[colour];
+        clipped += code >= largest ? 1 : 0;
+        zero += code == 0 ? 1 : 0;
+        if (x % 2 != 0 || y % 2 != 0 || x + 1 >= 75) continue;
+        int weighted = 0;
+        for (int site = 0; site < 4; ++site) {
+          const auto c = static_cast<std::size_t>(colour_at(names.format.phase, site & 1, site >> 1));
+          const int weight[] = {77, 75, 29};
+          weighted += weight[c] * codes[(y + (site >> 1)) * 75 + x + (site & 1)];
+        }
+        const int bin = (weighted / 256) * 1024 / (largest + 1);
+        ++luma[bin];
+        ++luma64[bin / 16];
+      }
+    }
+    const lowlux_stage_statistics& s = rig.statistics;
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_EQ(s.sum[c], sum[c]);
+      EXPECT_EQ(s.count[c], count[c]);
+    }
+    EXPECT_FLOAT_EQ(s.clipped, static_cast<float>(clipped) / (75 * 46));
+    EXPECT_FLOAT_EQ(s.zero, static_cast<float>(zero) / (75 * 46));
+    EXPECT_TRUE(std::equal(std::begin(luma), std::end(luma), s.luma)) << bits;
+    EXPECT_TRUE(std::equal(std::begin(luma64), std::end(luma64), s.luma64)) << bits;
+  }
+}
+
+/// Steps of even light, each 64 columns wide, of a sensor of known gain and read noise.
+Codes even_steps(int steps, int rows, double gain_dn, double read_dn, double black_dn, unsigned seed) {
+  std::mt19937 engine(seed);
+  std::normal_distribution<double> normal;
+  Codes out;
+  out.reserve(static_cast<std::size_t>(steps) * 64 * rows);
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < 64 * steps; ++x) {
+      const double e = 40.0 * (x / 64);
+      std::poisson_distribution<int> poisson(std::max(e, 1e-9));
+      const double dn = black_dn + gain_dn * (e > 0 ? poisson(engine) : 0) + read_dn * normal(engine);
+      out.push_back(static_cast<std::uint16_t>(std::clamp(std::round(dn), 0.0, 4095.0)));
+    }
+  }
+  return out;
+}
+
+TEST(Stage, MeasuresBlackAndNoiseOfSimulatedSteps) {
+  constexpr double gain_dn = 2.5, read_dn = 6, black_dn = 200;
+  constexpr int steps = 8, rows = 256, frames = 8;
+  const RawFormatNames& names = names_of_bayer(12);
+  std::vector<double> gains, reads;
+  for (unsigned seed = 1; seed <= frames; ++seed) {
+    const Codes codes = even_steps(steps, rows, gain_dn, read_dn, black_dn, seed);
+    Rig rig(plain_settings(2), names, 64 * steps, rows, LOWLUX_STAGE_BGR888);
+    auto params = no_params();
+    params.valid = LOWLUX_STAGE_HAS_BLACK;
+    std::ranges::fill(params.black_level, static_cast<float>(black_dn));
+    ASSERT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK);
+    gains.push_back(rig.statistics.measured_noise_gain);
+    reads.push_back(rig.statistics.measured_noise_read);
+    // The darkest hundredth of tiles is below the mean of the dark step, by no more than the scatter of a tile's mean,
+    // which has 64 samples of a site at least (tiles are 16 pixels wide or more).
+    for (const float black : rig.statistics.measured_black) EXPECT_NEAR(black, black_dn, 5 * read_dn / 8) << seed;
+  }
+  const auto expect_mean = [](const std::vector<double>& v, double expected, double also) {
+    const double mean = std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
+    double square = 0;
+    for (const double x : v) square += (x - mean) * (x - mean);
+    const auto n = static_cast<double>(v.size());
+    EXPECT_NEAR(mean, expected, 5 * std::sqrt(square / (n - 1) / n) + also);
+  };
+  // Five standard errors of the mean over the frames, and the hundredth that TileNoise leaves to detail.
+  expect_mean(gains, gain_dn, 0.01 * gain_dn);
+  expect_mean(reads, std::sqrt(read_dn * read_dn + 1.0 / 12), 0.01 * read_dn);
+}
+
+TEST(Stage, OfFramesWithoutABlackPlaceTakesNoMoreThanAQuarterOfWhiteForBlack) {
+  const RawFormatNames& names = names_of_bayer(10);
+  for (const std::uint16_t code : {std::uint16_t{1023}, std::uint16_t{700}, std::uint16_t{200}}) {
+    Rig rig(plain_settings(), names, 64, 48, LOWLUX_STAGE_BGR888);
+    ASSERT_EQ(rig.process(Codes(64 * 48, code), no_params()), LOWLUX_STAGE_OK) << rig.error();
+    EXPECT_EQ(rig.result.black_from, LOWLUX_STAGE_FROM_FRAME);
+    EXPECT_FLOAT_EQ(rig.result.black_level[0], code == 200 ? 200 : 1023 / 4.0F);
+    EXPECT_EQ(rig.statistics.measured_black[0], code) << "what was measured is told as it is";
+    if (code == 1023) {
+      EXPECT_EQ(rig.planes[0], std::vector<std::uint8_t>(rig.planes[0].size(), 255)) << "white is white";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lowlux
