@@ -39,8 +39,8 @@ class TileNoise {
   /// @param white_dn  tiles whose mean is above 0.9 of it do not count
   std::optional<NoiseLine> line(const PerSite<double>& black_dn, double white_dn) const;
 
-  /// Means of the darkest hundredth of the tiles, site by site: what black is at most, where the scene has a black
-  /// place.
+  /// The mean that a hundredth of the tiles lie below, site by site: what black is at most, where the scene has a black
+  /// place. 0 without whole tiles.
   PerSite<double> darkest_dn();
 
  private:
