@@ -10,38 +10,60 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double low_rank = 0.2;
-constexpr int levels = 32;          // half octaves of DN above black
-constexpr int variance_bins = 256;  // eighths of an octave
-constexpr int least_samples = 40;   // of a level
+constexpr double low_rank = 0.05;
+constexpr int least_samples = 60;  // of a level
+/// Noise of half a code and more, rounded to codes, has the variance of both; of less, it depends on where the mean
+/// lies between two codes.
+constexpr double least_variance_dn2 = 0.25 + 1.0 / 12;
 
-/// Of one level: a histogram of log2(variance), eight bins for each octave from 2^-8 on, and the sum of means.
+/// Counts of positive floats by their leading bits: 2^mantissa_bits bins for each octave, from 2^low_octave on.
+template <int mantissa_bits, int low_octave>
+struct FloatBins {
+  static constexpr int shift = 23 - mantissa_bits;
+  static constexpr int first = (127 + low_octave) << mantissa_bits;
+  static int bin_of(double v, int bins) {
+    const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(std::max(v, 1e-30)));
+    return std::clamp(static_cast<int>(bits >> shift) - first, 0, bins - 1);
+  }
+  static double edge(int bin) {
+    return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(bin + first) << shift));
+  }
+};
+using LevelBins = FloatBins<1, -3>;  // of DN above black
+using RatioBins = FloatBins<3, -8>;  // of variances over those expected
+constexpr int levels = 40;
+constexpr int ratio_bins = 256;
+
+/// Of one level: variances over those expected, and the sum of means.
 struct Level {
-  std::array<std::uint32_t, variance_bins> bin{};
+  std::array<std::uint32_t, ratio_bins> bin{};
   std::uint32_t samples = 0;
   double sum = 0;
 };
 
-int bin_of_variance(double v) {
-  return std::clamp(static_cast<int>(8 * (std::log2(std::max(v, 1e-9)) + 8)), 0, variance_bins - 1);
-}
-
-int level_of(double above_black_dn) {
-  return std::clamp(static_cast<int>(2 * (std::log2(std::max(above_black_dn, 0.125)) + 3)), 0, levels - 1);
-}
-
-/// The variance below which a share of the samples lies, by straight lines within bins.
+/// What a share of the samples lies below, by straight lines within bins.
 double low_quantile(const Level& level, double share) {
   const double wanted = share * level.samples;
   double below = 0;
-  for (int i = 0; i < variance_bins; ++i) {
+  for (int i = 0; i < ratio_bins; ++i) {
     if (below + level.bin[i] >= wanted) {
       const double part = (wanted - below) / std::max(1U, level.bin[i]);
-      return std::exp2((i + part) / 8 - 8);
+      return RatioBins::edge(i) + part * (RatioBins::edge(i + 1) - RatioBins::edge(i));
     }
     below += level.bin[i];
   }
   return 0;
+}
+
+double variance_at(const NoiseLine& line, double above_black_dn) {
+  return std::max(line.offset_dn2 + line.gain_dn * above_black_dn, least_variance_dn2);
+}
+
+/// Four samples of one site without their mean and slope: the two that are left, (1, -1, -1, 1) / 2 and
+/// (1, -3, 3, -1) / sqrt(20), each squared, times 20.
+std::uint64_t contrast(const std::uint16_t* dn) {
+  const std::int64_t ends = dn[0] - dn[6], bend = dn[0] + dn[6] - dn[2] - dn[4], twist = ends - 3 * (dn[2] - dn[4]);
+  return static_cast<std::uint64_t>(5 * bend * bend + twist * twist);
 }
 
 struct Sums {
@@ -62,9 +84,11 @@ TileNoise::TileNoise(int width, int height, int tile)
       rows_(height / tile),
       tiles_(static_cast<std::size_t>(columns_) * rows_),
       memory_(tiles_.size()) {
-  const double pairs = (tile / 2) * (tile / 4);
-  const boost::math::chi_squared law(pairs);
-  low_share_ = boost::math::quantile(law, low_rank) / pairs;
+  const boost::math::chi_squared law(freedom());
+  const double low = boost::math::quantile(law, low_rank);
+  low_share_ = low / freedom();
+  const double of_density = low * boost::math::pdf(law, low);
+  low_error2_ = low_rank * (1 - low_rank) / (of_density * of_density);
 }
 
 void TileNoise::clear() { std::ranges::fill(tiles_, Tile{}); }
@@ -77,12 +101,11 @@ void TileNoise::add_row(const std::uint16_t* dn, int y) {
     const std::uint16_t* const in = dn + static_cast<std::ptrdiff_t>(i) * tile_;
     std::uint32_t even = 0, odd = 0;
     std::uint64_t even_square = 0, odd_square = 0;
-    for (int x = 0; x + 3 < tile_; x += 4) {
-      even += in[x] + in[x + 2];
-      odd += in[x + 1] + in[x + 3];
-      const std::int64_t a = in[x] - in[x + 2], b = in[x + 1] - in[x + 3];
-      even_square += static_cast<std::uint64_t>(a * a);
-      odd_square += static_cast<std::uint64_t>(b * b);
+    for (int x = 0; x + 7 < tile_; x += 8) {
+      even += in[x] + in[x + 2] + in[x + 4] + in[x + 6];
+      odd += in[x + 1] + in[x + 3] + in[x + 5] + in[x + 7];
+      even_square += contrast(in + x);
+      odd_square += contrast(in + x + 1);
     }
     tiles[i].sum[left] += even;
     tiles[i].sum[left + 1] += odd;
@@ -91,38 +114,34 @@ void TileNoise::add_row(const std::uint16_t* dn, int y) {
   }
 }
 
-double TileNoise::mean_of(const Tile& tile, int site) const {
-  const double samples = (tile_ / 2) * 2 * (tile_ / 4);
-  return tile.sum[site] / samples;
-}
+double TileNoise::mean_of(const Tile& tile, int site) const { return tile.sum[site] / (2 * freedom()); }
 
 double TileNoise::variance_of(const Tile& tile, int site) const {
-  const double pairs = (tile_ / 2) * (tile_ / 4);
-  return static_cast<double>(tile.square[site]) / (2 * pairs);
+  return static_cast<double>(tile.square[site]) / (20 * freedom());
 }
 
-std::optional<NoiseLine> TileNoise::line(const PerSite<double>& black_dn, double white_dn) const {
+std::optional<NoiseLine> TileNoise::line_by(const NoiseLine& expected, const PerSite<double>& black_dn,
+                                            double white_dn) const {
   std::array<Level, levels> found{};
   for (const Tile& tile : tiles_) {
     for (int site = 0; site < 4; ++site) {
       const double mean = mean_of(tile, site), variance = variance_of(tile, site);
       if (mean > 0.9 * white_dn || variance == 0) continue;
-      Level& level = found[level_of(mean - black_dn[site])];
-      ++level.bin[bin_of_variance(variance)];
+      const double above = mean - black_dn[site];
+      Level& level = found[LevelBins::bin_of(above, levels)];
+      ++level.bin[RatioBins::bin_of(variance / variance_at(expected, above), ratio_bins)];
       ++level.samples;
-      level.sum += mean - black_dn[site];
+      level.sum += above;
     }
   }
-  // Relative error of the quantile of n chi-squares of k pairs: sqrt(2 / k) / (share's density), about 1.4 times that
-  // of their mean.
-  const double pairs = (tile_ / 2) * (tile_ / 4);
   Sums sums;
   for (const Level& level : found) {
     if (level.samples < least_samples) continue;
-    const double variance = low_quantile(level, low_rank) / low_share_;
-    if (!(variance > 0)) continue;
-    const double relative2 = 2 * 2 / (pairs * level.samples) + 1e-4;  // and what detail adds: a hundredth
-    sums.add(1 / (relative2 * variance * variance), level.sum / level.samples, variance);
+    const double mean = level.sum / level.samples;
+    const double variance = variance_at(expected, mean) * low_quantile(level, low_rank) / low_share_;
+    if (!(variance > least_variance_dn2)) continue;
+    const double relative2 = low_error2_ / level.samples + 1e-4;  // and a hundredth for what detail adds
+    sums.add(1 / (relative2 * variance * variance), mean, variance);
   }
   const double determinant = sums.w * sums.xx - sums.x * sums.x;
   if (!(determinant > 1e-9 * sums.w * sums.xx)) return std::nullopt;
@@ -131,7 +150,14 @@ std::optional<NoiseLine> TileNoise::line(const PerSite<double>& black_dn, double
                 .gain_error_dn = std::sqrt(sums.w / determinant),
                 .offset_error_dn2 = std::sqrt(sums.xx / determinant)};
   if (!(out.gain_dn > 4 * out.gain_error_dn)) return std::nullopt;
-  out.offset_dn2 = std::max(out.offset_dn2, 1.0 / 12);  // that of rounding to codes
+  return out;
+}
+
+std::optional<NoiseLine> TileNoise::line(const PerSite<double>& black_dn, double white_dn) const {
+  // Levels are half an octave wide. Once a first line tells how variance changes within them, that no longer matters.
+  std::optional<NoiseLine> out = line_by({.offset_dn2 = 1}, black_dn, white_dn);
+  if (out) out = line_by(*out, black_dn, white_dn);
+  if (out) out->offset_dn2 = std::max(out->offset_dn2, 1.0 / 12);  // that of rounding to codes
   return out;
 }
 

@@ -13,15 +13,16 @@ namespace lowlux::isp {
 struct NoiseLine {
   double gain_dn = 0;  // the system gain [DN/e-]
   double offset_dn2 = 0;
-  double gain_error_dn = 0;  // standard errors
+  double gain_error_dn = 0;  // standard errors; of each level a hundredth is taken for what detail adds
   double offset_error_dn2 = 0;
 };
 
 /// Means and variances of the four sites in square tiles of a mosaic, taken row by row, and what they tell of its noise
 /// and its black. Memory is reserved in the constructor.
 ///
-/// Variances are of differences between neighbours of one site, d^2 / 2, so that slopes add little. Detail only adds:
-/// of the tiles of one level the lowest fifth, divided by what chi-square has there, is taken for the noise.
+/// Variances are of four neighbours of one site along a row about a straight line through them, so that slopes add
+/// nothing. Detail only adds: of the tiles of one level the lowest fifth, divided by what chi-square has there, is
+/// taken for the noise. Levels whose noise is less than half a code do not count: rounding hides it.
 class TileNoise {
  public:
   /// @param tile  side in pixels, even, at least 8
@@ -46,14 +47,18 @@ class TileNoise {
  private:
   struct Tile {
     PerSite<std::uint32_t> sum{};
-    PerSite<std::uint64_t> square{};  // of differences
+    PerSite<std::uint64_t> square{};  // 20 times those of what four neighbours have beside mean and slope
   };
+  /// Of a tile's variance: two for each eight columns of each row.
+  double freedom() const { return (tile_ / 2) * (tile_ / 8) * 2; }
+  std::optional<NoiseLine> line_by(const NoiseLine& expected, const PerSite<double>& black_dn, double white_dn) const;
   double mean_of(const Tile& tile, int site) const;
   double variance_of(const Tile& tile, int site) const;
 
   int width_, height_, tile_;
   int columns_, rows_;  // whole tiles
-  double low_share_;    // of the variance, that the lowest fifth of estimates lies below
+  double low_share_;    // of the variance, that the lowest twentieth of estimates lies below
+  double low_error2_;   // relative, of that quantile of one estimate: p (1 - p) / (density at it times it)^2
   std::vector<Tile> tiles_;
   std::vector<float> memory_;
 };
