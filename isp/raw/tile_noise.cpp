@@ -59,13 +59,6 @@ double variance_at(const NoiseLine& line, double above_black_dn) {
   return std::max(line.offset_dn2 + line.gain_dn * above_black_dn, least_variance_dn2);
 }
 
-/// Four samples of one site without their mean and slope: the two that are left, (1, -1, -1, 1) / 2 and
-/// (1, -3, 3, -1) / sqrt(20), each squared, times 20.
-std::uint64_t contrast(const std::uint16_t* dn) {
-  const std::int64_t ends = dn[0] - dn[6], bend = dn[0] + dn[6] - dn[2] - dn[4], twist = ends - 3 * (dn[2] - dn[4]);
-  return static_cast<std::uint64_t>(5 * bend * bend + twist * twist);
-}
-
 struct Sums {
   double w = 0, x = 0, y = 0, xx = 0, xy = 0;
   void add(double weight, double at, double value) {
@@ -100,24 +93,31 @@ void TileNoise::add_row(const std::uint16_t* dn, int y) {
   for (int i = 0; i < columns_; ++i) {
     const std::uint16_t* const in = dn + static_cast<std::ptrdiff_t>(i) * tile_;
     std::uint32_t even = 0, odd = 0;
+    std::int32_t even_difference = 0, odd_difference = 0;
     std::uint64_t even_square = 0, odd_square = 0;
-    for (int x = 0; x + 7 < tile_; x += 8) {
-      even += in[x] + in[x + 2] + in[x + 4] + in[x + 6];
-      odd += in[x + 1] + in[x + 3] + in[x + 5] + in[x + 7];
-      even_square += contrast(in + x);
-      odd_square += contrast(in + x + 1);
+    for (int x = 0; x + 3 < tile_; x += 4) {
+      even += in[x] + in[x + 2];
+      odd += in[x + 1] + in[x + 3];
+      const std::int64_t a = in[x] - in[x + 2], b = in[x + 1] - in[x + 3];
+      even_difference += static_cast<std::int32_t>(a);
+      odd_difference += static_cast<std::int32_t>(b);
+      even_square += static_cast<std::uint64_t>(a * a);
+      odd_square += static_cast<std::uint64_t>(b * b);
     }
     tiles[i].sum[left] += even;
     tiles[i].sum[left + 1] += odd;
+    tiles[i].difference[left] += even_difference;
+    tiles[i].difference[left + 1] += odd_difference;
     tiles[i].square[left] += even_square;
     tiles[i].square[left + 1] += odd_square;
   }
 }
 
-double TileNoise::mean_of(const Tile& tile, int site) const { return tile.sum[site] / (2 * freedom()); }
+double TileNoise::mean_of(const Tile& tile, int site) const { return tile.sum[site] / (2 * pairs()); }
 
 double TileNoise::variance_of(const Tile& tile, int site) const {
-  return static_cast<double>(tile.square[site]) / (20 * freedom());
+  const double of_slope = static_cast<double>(tile.difference[site]) * tile.difference[site] / pairs();
+  return (static_cast<double>(tile.square[site]) - of_slope) / (2 * freedom());
 }
 
 std::optional<NoiseLine> TileNoise::line_by(const NoiseLine& expected, const PerSite<double>& black_dn,
@@ -126,7 +126,7 @@ std::optional<NoiseLine> TileNoise::line_by(const NoiseLine& expected, const Per
   for (const Tile& tile : tiles_) {
     for (int site = 0; site < 4; ++site) {
       const double mean = mean_of(tile, site), variance = variance_of(tile, site);
-      if (mean > 0.9 * white_dn || variance == 0) continue;
+      if (mean > 0.9 * white_dn || variance <= 0) continue;
       const double above = mean - black_dn[site];
       Level& level = found[LevelBins::bin_of(above, levels)];
       ++level.bin[RatioBins::bin_of(variance / variance_at(expected, above), ratio_bins)];

@@ -20,9 +20,9 @@ struct NoiseLine {
 /// Means and variances of the four sites in square tiles of a mosaic, taken row by row, and what they tell of its noise
 /// and its black. Memory is reserved in the constructor.
 ///
-/// Variances are of four neighbours of one site along a row about a straight line through them, so that slopes add
-/// nothing. Detail only adds: of the tiles of one level the lowest fifth, divided by what chi-square has there, is
-/// taken for the noise. Levels whose noise is less than half a code do not count: rounding hides it.
+/// Variances are of differences between neighbours of one site about the tile's mean difference, halved, so that slopes
+/// add nothing. Detail only adds: of the tiles of one level the lowest twentieth, divided by what chi-square has there,
+/// is taken for the noise. Levels whose noise is less than half a code do not count: rounding hides it.
 class TileNoise {
  public:
   /// @param tile  side in pixels, even, at least 8
@@ -47,10 +47,11 @@ class TileNoise {
  private:
   struct Tile {
     PerSite<std::uint32_t> sum{};
-    PerSite<std::uint64_t> square{};  // 20 times those of what four neighbours have beside mean and slope
+    PerSite<std::int32_t> difference{};  // sums of differences between neighbours
+    PerSite<std::uint64_t> square{};     // and of their squares
   };
-  /// Of a tile's variance: two for each eight columns of each row.
-  double freedom() const { return (tile_ / 2) * (tile_ / 8) * 2; }
+  double pairs() const { return (tile_ / 2) * (tile_ / 4); }  // of neighbours of one site
+  double freedom() const { return pairs() - 1; }              // of a tile's variance
   std::optional<NoiseLine> line_by(const NoiseLine& expected, const PerSite<double>& black_dn, double white_dn) const;
   double mean_of(const Tile& tile, int site) const;
   double variance_of(const Tile& tile, int site) const;

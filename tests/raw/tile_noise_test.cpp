@@ -135,7 +135,7 @@ TEST(TileNoise, FramesOfFewTilesTellNothing) {
   EXPECT_EQ(measured(small).darkest_dn(), (PerSite<double>{}));
 }
 
-// A slope has no noise: four neighbours lie on a straight line.
+// A slope has no noise: all differences are the same.
 TEST(TileNoise, ASlopeAddsNothing) {
   Plane<std::uint16_t> noisy = frame_of(twelve_bits, {1, 400, 8}, 512, 9);
   const auto flat = line_of(twelve_bits, noisy);
