@@ -242,10 +242,11 @@ typedef struct {
   size_t size;
   uint64_t sum[3]; /* of the codes of R, G, B */
   uint64_t count[3];
-  float clipped;                 /* share of the pixels at white or above */
-  float zero;                    /* share at code 0 */
-  uint32_t luma[1024];           /* 2x2 cells by (77 R + 75 Gr + 75 Gb + 29 B) / 256, even bins over all codes */
-  uint32_t luma64[64];           /* the same, as libcamera's SwIspStats has it */
+  float clipped;       /* share of the pixels at white or above */
+  float zero;          /* share at code 0 */
+  uint32_t luma[1024]; /* 2x2 cells of every second row of them, by (77 R + 75 Gr + 75 Gb + 29 B) / 256, even bins over
+                          all codes */
+  uint32_t luma64[64]; /* the same, as libcamera's SwIspStats has it */
   float measured_black[4];       /* R, Gr, Gb, B: of masked pixels, else of the darkest hundredth of the picture */
   int32_t measured_black_masked; /* 1: of masked pixels */
   float measured_noise_gain;     /* DN for each electron, from the frame alone; 0: it does not tell */

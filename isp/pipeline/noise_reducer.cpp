@@ -35,7 +35,7 @@ void blend_sites(const BlendSites& in, int sites, float* signal_e) {
   for (int i = 0; i < sites; ++i) {
     const float mean_e = in.mean_e[2 * i];
     const float time_e2 = in.share[i] * (std::max(mean_e, 0.0f) + in.variance_e2);
-    const float level_e2 = NoiseReducer::level_doubt * in.level_e2[i];
+    const float level_e2 = NoiseReducer::doubt_of(in.share[i]) * in.level_e2[i];
     const float way = level_e2 / (level_e2 + time_e2);
     signal_e[2 * i] += way * (mean_e - in.dark_e - signal_e[2 * i]);
   }

@@ -15,7 +15,7 @@ namespace lowlux::isp {
 ///
 /// Where a level and frames before both take part, each site is the mean of both results, weighted by the inverse of
 /// their predicted variances: what moves is left to the level, what stands still to the frames before. That of the
-/// level counts `level_doubt` times, because what it takes from detail is not in it.
+/// level counts doubt_of() times, because what it takes from detail is not in it.
 class NoiseReducer {
  public:
   explicit NoiseReducer(Executor& executor) : executor_(executor) {}
@@ -25,7 +25,11 @@ class NoiseReducer {
   /// Precondition: how.reduces().
   SignalElectrons run(RawElectrons& raw, const NoiseReduction& how, Plane<float> memory, NoiseMaps* maps);
 
-  static constexpr float level_doubt = 4;  // chosen on the scenes of tests/bench/stage_bench
+  /// 1 where only this frame is known, 4 where many before it are: noise of one frame that comes back is seen, and a
+  /// mean of few frames may be of something that moved too little to be found. Chosen on the pictures of
+  /// tests/scenarios/temporal_blend_test.cpp, which prints what others give.
+  /// @param share  variance of the mean over frames, of a raw value's, 0..1
+  static constexpr float doubt_of(float share) { return 1 + 3 * (1 - share) * (1 - share); }
 
   /// Share of the blocks that moved in the last frame; 0 where frames before took no part.
   double moved() const { return moved_; }

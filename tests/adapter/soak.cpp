@@ -29,8 +29,8 @@ using namespace stage_testing;
 constexpr int most_width = 128, most_height = 96, stages = 2;
 constexpr std::size_t canary = 64;
 constexpr double longest_call_s = 2;
-// Resident memory may still grow after a fifth of the frames, while rare settings come for the first time. Sanitizers keep
-// what was given back for a while.
+// Resident memory may still grow after a fifth of the frames, while rare settings come for the first time. Sanitizers
+// keep what was given back for a while.
 #ifdef LOWLUX_SANITIZED
 constexpr double most_growth_mib = 64;
 #else

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <random>
 #include <vector>
@@ -197,6 +199,42 @@ TEST(RawToRgb, GivesTheSameBytesWithAnyNumberOfThreads) {
         kernel.rgb8(in, typical_transform(), tone(), out.view(), pool);
         EXPECT_EQ(out.memory, expected.memory) << w << " x " << h << ", " << threads << " threads";
       }
+    }
+  }
+}
+
+/// Takes rows, and how each thread's came.
+struct TakenRows {
+  std::vector<std::uint8_t> codes;
+  std::vector<std::vector<int>> rows;  // of each thread
+
+  static void take(void* context, int thread, int y, const std::uint8_t* rgb, int width) {
+    auto& self = *static_cast<TakenRows*>(context);
+    std::copy_n(rgb, 3 * width, self.codes.data() + static_cast<std::ptrdiff_t>(3) * width * y);
+    self.rows[static_cast<std::size_t>(thread)].push_back(y);
+  }
+};
+
+TEST(RawToRgb, HandsOutTheRowsOfRgb8InOrderFromAnEvenOne) {
+  for (const auto [w, h] : {std::array{101, 75}, {64, 2}, {7, 1}, {129, 13}}) {
+    const auto dn = random_dn(w, h, 8);
+    const isp::DnMosaic in{dn.view(), BayerPhase::grbg, uneven_levels()};
+    InlineExecutor one;
+    Strided<std::uint8_t> expected(3 * w, h, 0, 0);
+    isp::RawToRgb(w, 1).rgb8(in, typical_transform(), tone(), expected.view(), one);
+    for (const int threads : {1, 2, 3, 7}) {
+      PoolExecutor pool(threads);
+      isp::RawToRgb kernel(w, threads);
+      TakenRows taken{std::vector<std::uint8_t>(expected.memory.size()), std::vector<std::vector<int>>(threads)};
+      kernel.rows8(in, typical_transform(), tone(), {TakenRows::take, &taken}, pool);
+      EXPECT_EQ(taken.codes, expected.memory) << w << " x " << h << ", " << threads << " threads";
+      std::size_t all = 0;
+      for (const std::vector<int>& rows : taken.rows) {
+        all += rows.size();
+        EXPECT_TRUE(rows.empty() || rows.front() % 2 == 0);
+        for (std::size_t i = 1; i < rows.size(); ++i) EXPECT_EQ(rows[i], rows[i - 1] + 1);
+      }
+      EXPECT_EQ(all, static_cast<std::size_t>(h));
     }
   }
 }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
+
 #include "isp/raw/black_point.h"
 #include "tests/support/frames.h"
 
@@ -25,6 +27,23 @@ TEST(ToFraction, KeepsValuesBelowBlackAndAboveWhite) {
   }
   EXPECT_LT(out.value.at(0, 0), 0);
   EXPECT_GT(out.value.at(5, 4), 1);
+}
+
+TEST(ToElectrons, InOnePassHasTheBitsOfBothSteps) {
+  RawDn raw = test::bayer_frame(43, 31, BayerPhase::gbrg, [](int x, int y) { return (977 * x + 331 * y) % 4096; });
+  raw.active = {3, 2, 37, 27};
+  raw.white_dn = {4000, 4010, 4020};
+  const PerSite<double> electrons{1234.5, 777.7, 778.9, 2001.1};
+  BlackPoint black;
+  black.pedestal_dn = {150.25, 151, 152.5, 149.9};
+  PoolExecutor three(3);
+  for (const bool pattern : {false, true}) {
+    if (pattern) black.pattern = BlackLevel{.rows = 1, .columns = 3, .pattern_dn = {150, 151.5, 149}};
+    const RawElectrons expected = to_electrons(to_fraction(raw, black, executor), electrons, executor);
+    Plane<float> found(37, 27);
+    to_electrons(raw, black, electrons, found.view(), three);
+    EXPECT_EQ(std::memcmp(found.data(), expected.value.data(), found.size() * sizeof(float)), 0);
+  }
 }
 
 TEST(ToFraction, FourByFourPatternsAndRowOffsetsReachEveryPixel) {

@@ -1,0 +1,217 @@
+// What frames before and a level of noise reduction make together, on pictures that stand still and that move.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "isp/pipeline/noise_reducer.h"
+#include "tests/sensor_bench/picture_raw.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double gain_dn_per_e = 4, black_dn = 400, read_noise_e = 2, read_e2 = read_noise_e * read_noise_e;
+constexpr BayerPhase phase = BayerPhase::rggb;
+
+SensorModel sensor() {
+  return {.name = "temporal blend",
+          .system_gain_dn_per_e = gain_dn_per_e,
+          .read_noise_e = read_noise_e,
+          .full_well_e = 15000,
+          .bits = 16,
+          .black_level_dn = black_dn,
+          .white_level_dn = 65535};
+}
+
+/// Part of a picture, which moves by so many pixels (an even number) from frame to frame.
+struct Film {
+  const test::PictureLight& light;
+  double mean_e;
+  int shift_px = 0;
+  int side = 256;
+
+  test::PictureLight rates(int frame) const {
+    const int left = (((light.rate_e.width() - side) / 2 - 4 * shift_px) & ~1) + shift_px * frame;
+    const int top = ((light.rate_e.height() - side) / 2) & ~1;
+    test::PictureLight out{light.name, Plane<float>(side, side)};
+    for (int y = 0; y < side; ++y) std::copy_n(light.rate_e.row(top + y) + left, side, out.rate_e.row(y));
+    return out;
+  }
+  RawElectrons raw(int frame, Executor& executor) const {
+    const auto seed = static_cast<std::uint64_t>(frame);
+    const RawDn dn = test::take_picture(rates(frame), sensor(), {.mean_green_e = mean_e, .seed = seed}, executor);
+    RawElectrons out{Plane<float>(side, side), phase};
+    for (std::size_t i = 0; i < dn.dn.size(); ++i) {
+      out.value.data()[i] = static_cast<float>((dn.dn.data()[i] - black_dn) / gain_dn_per_e);
+    }
+    return out;
+  }
+};
+
+/// Mean squared difference of codes with a gamma of 2.2, white at five times the mean of green [dB].
+double psnr_db(const Plane<float>& signal_e, const Film& film, int frame) {
+  const Plane<float> rate = film.rates(frame).rate_e;
+  const auto code = [](double of_white) { return std::pow(std::clamp(of_white, 0.0, 1.0), 1 / 2.2); };
+  double sum = 0;
+  for (std::size_t i = 0; i < rate.size(); ++i) {
+    const double d = code(static_cast<double>(signal_e.data()[i]) / (5 * film.mean_e)) -
+                     code(static_cast<double>(rate.data()[i]) / 5);
+    sum += d * d;
+  }
+  return -10 * std::log10(sum / static_cast<double>(rate.size()));
+}
+
+NoiseReduction how(bool level, bool temporal, bool restart) {
+  NoiseReduction out;
+  if (level) out.level = denoise::Level::draft;
+  out.options.level = denoise::Level::draft;
+  out.options.white_gain = {1.9, 1, 1.5};
+  out.noise.variance_e2 = {read_e2, read_e2, read_e2};
+  if (temporal) out.temporal.emplace().restart = restart;
+  return out;
+}
+
+/// A site's mean of both with a doubt of one's own.
+template <class Doubt>
+Plane<float> blended(const Plane<float>& level, const Plane<float>& mean, const Plane<float>& share,
+                     const NoiseMaps& maps, const Doubt& doubt) {
+  Plane<float> out(level.width(), level.height());
+  for (int y = 0; y < out.height(); ++y) {
+    for (int x = 0; x < out.width(); ++x) {
+      const auto colour = static_cast<std::size_t>(colour_at(phase, x, y));
+      const auto s = static_cast<double>(share.at(x / 2, y / 2));
+      const auto m = static_cast<double>(mean.at(x, y)), l = static_cast<double>(level.at(x, y));
+      const double time_e2 = s * (std::max(m, 0.0) + read_e2);
+      const double level_e2 = doubt(s) * static_cast<double>(maps.site_variance_e2[colour].at(x / 2, y / 2));
+      out.at(x, y) = static_cast<float>((level_e2 * m + time_e2 * l) / (level_e2 + time_e2));
+    }
+  }
+  return out;
+}
+
+/// One film through all that is compared.
+class Reducers {
+ public:
+  explicit Reducers(const Film& film)
+      : film_(film), mean_of_frames_(film.side, film.side, 1), share_(film.side / 2, film.side / 2) {}
+
+  void next() {
+    ++frame_;
+    RawElectrons raw = film_.raw(frame_, one_);
+    Plane<float> mean(film_.side, film_.side);
+    mean_of_frames_.run({std::as_const(raw.value).view(), phase}, how(false, true, false).noise, 1, {}, mean.view(),
+                        share_.view(), one_);
+    time_ = time_only_.run(raw, how(false, true, frame_ == 1), std::move(time_.value), nullptr);
+    both_ = together_.run(raw, how(true, true, frame_ == 1), std::move(both_.value), nullptr);
+    level_ = level_only_.run(raw, how(true, false, false), std::move(level_.value), &maps_);
+  }
+  double time_db() const { return psnr_db(time_.value, film_, frame_); }
+  double level_db() const { return psnr_db(level_.value, film_, frame_); }
+  double both_db() const { return psnr_db(both_.value, film_, frame_); }
+  template <class Doubt>
+  Plane<float> with(const Doubt& doubt) const {
+    return blended(level_.value, time_.value, share_, maps_, doubt);
+  }
+  template <class Doubt>
+  double db_with(const Doubt& doubt) const {
+    return psnr_db(with(doubt), film_, frame_);
+  }
+  const Plane<float>& both() const { return both_.value; }
+  double moved() const { return together_.moved(); }
+
+ private:
+  const Film& film_;
+  InlineExecutor one_;
+  denoise::TemporalMean mean_of_frames_;  // for its shares
+  Plane<float> share_;
+  NoiseReducer time_only_{one_}, level_only_{one_}, together_{one_};
+  SignalElectrons time_, level_, both_;
+  NoiseMaps maps_;
+  int frame_ = 0;
+};
+
+double chosen(double share) { return 1 + 3 * std::pow(1 - share, 2); }
+
+test::PictureLight light_of(const char* name, double lens_sigma_px = 0.9) {
+  InlineExecutor one;
+  auto light = test::picture_light(name, one, lens_sigma_px);
+  EXPECT_TRUE(light) << name;
+  return light ? *std::move(light) : test::PictureLight{};
+}
+
+TEST(TemporalBlend, EachSiteIsTheMeanOfBothByTheInverseOfTheirVariances) {
+  const test::PictureLight light = light_of("kodim19.png");
+  const Film film{light, 20, 2, 128};
+  Reducers reducers(film);
+  for (int i = 0; i < 3; ++i) reducers.next();
+  const Plane<float> expected = reducers.with(chosen);
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const float tolerance = 1e-4f + 1e-5f * std::fabs(expected.data()[i]);  // e-: floats of some 100 e-
+    ASSERT_NEAR(reducers.both().data()[i], expected.data()[i], tolerance) << i;
+  }
+}
+
+TEST(TemporalBlend, OfASceneThatStandsStillIsAboveBothAlone) {
+  for (const char* name : {"kodim19.png", "kodim05.png"}) {
+    const test::PictureLight light = light_of(name);
+    const Film film{light, 20};
+    Reducers reducers(film);
+    for (int frame = 1; frame <= 30; ++frame) {
+      reducers.next();
+      if (frame != 4 && frame != 8 && frame != 30) continue;
+      EXPECT_GT(reducers.both_db(), std::max(reducers.time_db(), reducers.level_db())) << name << " frame " << frame;
+      EXPECT_LT(reducers.moved(), 0.01) << name;  // a false alarm in 1000 blocks is meant
+    }
+  }
+}
+
+// What moves shows no more noise than a frame by itself: 0.3 dB is less than can be seen.
+TEST(TemporalBlend, OfASceneThatMovesIsNotWorseThanTheLevelAlone) {
+  for (const char* name : {"kodim19.png", "kodim05.png", "StillLife.exr"}) {
+    const test::PictureLight light = light_of(name);
+    const Film film{light, 20, 2};
+    Reducers reducers(film);
+    for (int frame = 1; frame <= 6; ++frame) reducers.next();
+    EXPECT_GT(reducers.both_db(), reducers.level_db() - 0.3) << name;
+  }
+}
+
+// Nightly: the table behind NoiseReducer::doubt_of, PSNR [dB] as means over all pictures.
+TEST(TemporalBlend, OtherDoubtsAreNotBetterByAQuarterDecibel) {
+  if (std::getenv("LOWLUX_NIGHTLY") == nullptr) GTEST_SKIP() << "runs with LOWLUX_NIGHTLY";
+  constexpr std::array constant{1.0, 2.0, 4.0, 8.0, 16.0};
+  struct Case {
+    int shift_px;
+    int frames;
+  };
+  std::printf("   e-  px  frame   time  level   both | doubt 1      2      4      8     16\n");
+  for (const double mean_e : {5.0, 20.0, 100.0}) {
+    for (const Case of : {Case{0, 2}, Case{0, 8}, Case{0, 30}, Case{2, 8}}) {
+      std::array<double, 8> db{};
+      for (const char* name : test::clean_pictures) {
+        const test::PictureLight light = light_of(name);
+        const Film film{light, mean_e, of.shift_px};
+        Reducers reducers(film);
+        for (int frame = 1; frame <= of.frames; ++frame) reducers.next();
+        db[0] += reducers.time_db(), db[1] += reducers.level_db(), db[2] += reducers.both_db();
+        for (std::size_t i = 0; i < constant.size(); ++i) {
+          db[3 + i] += reducers.db_with([&](double) { return constant[i]; });
+        }
+      }
+      for (double& sum : db) sum /= static_cast<double>(test::clean_pictures.size());
+      std::printf("%5.0f %3d %6d", mean_e, of.shift_px, of.frames);
+      for (const double mean : db) std::printf(" %6.2f", mean);
+      std::printf("\n");
+      EXPECT_GT(db[2], *std::max_element(db.begin() + 3, db.end()) - 0.25);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lowlux::isp
