@@ -45,7 +45,7 @@ inline std::unique_ptr<LivePipeline> live_of(LiveSetup setup, Executor& executor
 
 inline void read(LivePipeline& live, const RawFrame& frame) {
   live.read(std::as_bytes(std::span(frame.raw.dn.data(), frame.raw.dn.size())),
-            2 * static_cast<std::size_t>(frame.raw.dn.width()));
+            2 * static_cast<std::size_t>(frame.raw.dn.width()), {}, true);
 }
 
 inline RawFrame night(const denoise_testing::Scene& scene, std::uint64_t seed = 1, int width = 130, int height = 94) {
