@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -34,6 +34,18 @@ std::vector<double> iso_grid(const CameraProfile& profile) {
   }
   std::ranges::sort(out);
   return out;
+}
+
+/// As calib::profile_at has it: none beside a pedestal that holds it.
+std::array<double, 3> dark_current_of(const GainProfile& gain) {
+  const bool in_pedestal = gain.pedestal_holds == BlackPoint::Holds::pedestal_and_dark;
+  return in_pedestal ? std::array<double, 3>{} : gain.sensor->dark_current_e_per_s;
+}
+
+/// The same: of darks that state no temperature the charge is taken at every one.
+double dark_doubling_of(const GainProfile& gain) {
+  const bool temperature_unknown = gain.dark_exposure_s && !gain.dark_temperature_c;
+  return temperature_unknown ? std::numeric_limits<double>::infinity() : gain.sensor->dark_doubling_c;
 }
 
 }  // namespace
@@ -82,9 +94,9 @@ Result<void> StageProfile::prepare(const RawFormat& format, BayerPhase phase) {
     Row row{.iso = iso,
             .gain_dn_per_e = gain.sensor->system_gain_dn_per_e,
             .read_noise_e = gain.sensor->read_noise_e,
-            .dark_current_e_per_s = gain.sensor->dark_current_e_per_s,
+            .dark_current_e_per_s = dark_current_of(gain),
             .dark_temperature_c = gain.sensor->dark_temperature_c,
-            .dark_doubling_c = gain.sensor->dark_doubling_c,
+            .dark_doubling_c = dark_doubling_of(gain),
             .codes = std::exp2(format.bits - gain.sensor->bits)};
     if (gain.pedestal_dn) {
       row.pedestal_dn.emplace();
