@@ -68,7 +68,7 @@ TileNoise::TileNoise(int width, int height, int tile)
 void TileNoise::clear() { std::ranges::fill(tiles_, Tile{}); }
 
 void TileNoise::add_row(const std::uint16_t* dn, int y) {
-  if (y / tile_ >= rows_) return;
+  if (columns_ == 0 || y / tile_ >= rows_) return;
   Tile* const tiles = &tiles_[static_cast<std::size_t>(y / tile_) * columns_];
   const int left = site_of(0, y);
   for (int i = 0; i < columns_; ++i) {
