@@ -86,7 +86,7 @@ void TileNoise::clear() { std::ranges::fill(tiles_, Tile{}); }
 
 void TileNoise::add_columns(const std::array<const std::uint32_t*, 2>& sums,
                             const std::array<const std::uint32_t*, 2>& squares, int tile_row) {
-  if (tile_row >= rows_) return;
+  if (columns_ == 0 || tile_row >= rows_) return;
   Tile* const tiles = &tiles_[static_cast<std::size_t>(tile_row) * columns_];
   for (int i = 0; i < columns_; ++i) {
     for (int site = 0; site < 4; ++site) {
