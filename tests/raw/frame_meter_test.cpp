@@ -156,7 +156,8 @@ TEST(FrameMeter, AgreesWithPlainLoopsAndThumbnailsForEveryNumberOfThreads) {
       meter.thumbnail().make(frame, black, found);
       const Thumbnail alone = make_thumbnail(frame, black, executor);
       EXPECT_TRUE(same_bits(found.mean, alone.mean));
-      EXPECT_EQ(found.black_noise_std, alone.black_noise_std);
+      EXPECT_EQ(found.black_noise_std,
+                0);  // sums of columns tell no noise; a live frame has it from its facts or its tiles
     }
   }
 }
