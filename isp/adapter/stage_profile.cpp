@@ -147,8 +147,8 @@ std::vector<HotPixelFigure> StageProfile::hot_pixels() const {
   }
   const auto place = [](const HotPixelFigure& hot) { return std::pair(hot.y, hot.x); };
   std::ranges::sort(out, {}, place);
-  const auto repeated = std::ranges::unique(out, {}, place);
-  out.erase(repeated.begin(), repeated.end());
+  const auto same_place = [&](const HotPixelFigure& a, const HotPixelFigure& b) { return place(a) == place(b); };
+  out.erase(std::unique(out.begin(), out.end(), same_place), out.end());
   return out;
 }
 

@@ -70,9 +70,7 @@ struct Sums {
 }  // namespace
 
 TileNoise::TileNoise(int width, int height, int tile)
-    : width_(width),
-      height_(height),
-      tile_(tile),
+    : tile_(tile),
       columns_(width / tile),
       rows_(height / tile),
       tiles_(static_cast<std::size_t>(columns_) * rows_),

@@ -56,7 +56,7 @@ class TileNoise {
   double mean_of(const Tile& tile, int site) const;
   double variance_of(const Tile& tile, int site) const;
 
-  int width_, height_, tile_;
+  int tile_;
   int columns_, rows_;  // whole tiles
   double low_share_;    // of the variance, that the lowest twentieth of estimates lies below
   double low_error2_;   // relative, of that quantile of one estimate: p (1 - p) / (density at it times it)^2
