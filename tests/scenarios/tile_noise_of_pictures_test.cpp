@@ -1,9 +1,10 @@
 // What live frames tell of their sensor's noise, on pictures behind a lens.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include "isp/raw/tile_noise.h"
@@ -13,7 +14,8 @@ namespace lowlux::isp {
 namespace {
 
 // A sensor of 10 bits as phones have it: 0.24 DN/e-, 2 e-. Detail only adds. Half a megapixel full of texture (a wall
-// of shingles, leaves) has no flat place of each level; the bounds are what the pictures give, and half as much again.
+// of shingles, leaves) has no flat place of each level; the bounds were set above what the pictures give: they guard
+// against worse.
 TEST(TileNoiseOfPictures, GainIsWithinAFifthButWhereTextureIsEverywhere) {
   constexpr double gain_dn = 0.24, black_dn = 64;
   const SensorModel sensor{.name = "tile noise",
@@ -28,8 +30,9 @@ TEST(TileNoiseOfPictures, GainIsWithinAFifthButWhereTextureIsEverywhere) {
     if (name == "kodim08.png") return mean_e > 50 ? 0.7 : 0.4;
     return name == "StillLife.exr" ? 0.4 : 0.2;
   };
+  const bool nightly = std::getenv("LOWLUX_NIGHTLY") != nullptr;
   InlineExecutor one;
-  for (const char* name : test::clean_pictures) {
+  for (const char* name : std::span(test::clean_pictures).first(nightly ? test::clean_pictures.size() : 3)) {
     const auto light = test::picture_light(name, one, 0.9);
     ASSERT_TRUE(light) << light.error().message;
     for (const double mean_e : {20.0, 100.0}) {
