@@ -8,6 +8,7 @@
 
 #include "isp/base/plane.h"
 #include "isp/base/random.h"
+#include "tests/support/tile_columns.h"
 
 namespace lowlux::isp {
 namespace {
@@ -54,26 +55,9 @@ Plane<std::uint16_t> frame_of(const Camera& camera, const Light& light, int side
   return out;
 }
 
-/// By plain loops, a row of tiles at a time.
-void measure(const Plane<std::uint16_t>& frame, TileNoise& tiles) {
-  for (int row = 0; row < tiles.tile_rows(); ++row) {
-    const auto width = static_cast<std::size_t>(frame.width());
-    std::array<std::vector<std::uint32_t>, 2> sum{std::vector<std::uint32_t>(width), std::vector<std::uint32_t>(width)};
-    auto square = sum;
-    for (int y = row * tiles.tile(); y < (row + 1) * tiles.tile(); ++y) {
-      for (int x = 0; x < frame.width(); ++x) sum[y & 1][x] += frame.at(x, y);
-      for (int x = 0; x + 2 < frame.width(); ++x) {
-        const int difference = frame.at(x, y) - frame.at(x + 2, y);
-        square[y & 1][x] += static_cast<std::uint32_t>(difference * difference);
-      }
-    }
-    tiles.add_columns({sum[0].data(), sum[1].data()}, {square[0].data(), square[1].data()}, row);
-  }
-}
-
 TileNoise measured(const Plane<std::uint16_t>& frame, int tile = 16) {
   TileNoise out(frame.width(), frame.height(), tile);
-  measure(frame, out);
+  test::measure(frame, out);
   return out;
 }
 
@@ -188,7 +172,7 @@ TEST(TileNoise, ClearForgetsTheFrameBefore) {
   TileNoise tiles = measured(frame);
   const auto once = tiles.line({64, 64, 64, 64}, 1023);
   tiles.clear();
-  measure(frame, tiles);
+  test::measure(frame, tiles);
   const auto again = tiles.line({64, 64, 64, 64}, 1023);
   ASSERT_TRUE(once && again);
   EXPECT_EQ(once->gain_dn, again->gain_dn);

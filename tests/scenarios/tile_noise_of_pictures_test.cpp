@@ -9,6 +9,7 @@
 
 #include "isp/raw/tile_noise.h"
 #include "tests/sensor_bench/picture_raw.h"
+#include "tests/support/tile_columns.h"
 
 namespace lowlux::isp {
 namespace {
@@ -38,7 +39,8 @@ TEST(TileNoiseOfPictures, GainIsWithinAFifthButWhereTextureIsEverywhere) {
     for (const double mean_e : {20.0, 100.0}) {
       const RawDn raw = test::take_picture(*light, sensor, {.mean_green_e = mean_e}, one);
       TileNoise tiles(raw.active.width, raw.active.height, 16);
-      for (int y = 0; y < raw.active.height; ++y) tiles.add_row(raw.dn.row(y), y);
+      ASSERT_TRUE(raw.active.width == raw.dn.width() && raw.active.height == raw.dn.height());
+      test::measure(raw.dn, tiles);
       const std::optional<NoiseLine> line = tiles.line({black_dn, black_dn, black_dn, black_dn}, 1023);
       ASSERT_TRUE(line) << name;
       std::printf("%-14s %4.0f e-: gain %+5.1f %%, offset %.3f DN^2\n", name, mean_e,
