@@ -98,8 +98,9 @@ Rect rect_of(const lowlux_stage_rect& r) { return {r.x, r.y, r.width, r.height};
 std::vector<Pixel> defects_of(const StageProfile& profile, const Rect& active) {
   std::vector<Pixel> out;
   for (const HotPixelFigure& hot : profile.hot_pixels()) {
-    const Pixel pixel{hot.x - active.x, hot.y - active.y};
-    if (pixel.x >= 0 && pixel.y >= 0 && pixel.x < active.width && pixel.y < active.height) out.push_back(pixel);
+    const std::int64_t x = std::int64_t{hot.x} - active.x, y = std::int64_t{hot.y} - active.y;
+    if (x < 0 || y < 0 || x >= active.width || y >= active.height) continue;
+    out.push_back({static_cast<int>(x), static_cast<int>(y)});
   }
   return out;
 }
@@ -110,7 +111,9 @@ std::uint64_t stage_memory_bytes(const LiveSetup& setup, int threads) {
   const auto area = [](int width, int height) {
     return static_cast<std::uint64_t>(std::max(width, 0)) * static_cast<std::uint64_t>(std::max(height, 0));
   };
-  const std::uint64_t rounded = area(setup.active.width + 128, setup.active.height + 16);
+  // A crop beyond the frame is refused later.
+  const std::uint64_t rounded =
+      area(std::min(setup.active.width, setup.width) + 128, std::min(setup.active.height, setup.height) + 16);
   std::uint64_t for_each = 0;  // bytes of a pixel; from codes straight to the picture none
   if (setup.levels || setup.temporal) {
     for_each = 12;  // mosaics in electrons
