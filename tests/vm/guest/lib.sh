@@ -5,14 +5,26 @@ fail() {
   exit 1
 }
 
+# unload DRIVER...: those that are loaded
+unload() {
+  for driver in "$@"; do if [ -e "/sys/module/$driver" ]; then rmmod "$driver"; fi; done
+}
+
 # vivid OPTION...: the kernel's test camera, anew
 vivid() {
-  if [ -e /sys/module/vivid ]; then rmmod vivid; fi
+  unload vivid vimc
   modprobe vivid n_devs=1 "$@"
 }
 
 # control NAME=VALUE
 control() { v4l2-ctl -d /dev/video0 -c "$1"; }
+
+# vimc: the kernel's test camera behind the media controller, anew: video0 has what its Sensor A reads out
+vimc() {
+  unload vivid vimc
+  modprobe vimc
+  [ "$(cat /sys/class/video4linux/video0/name)" = "Raw Capture 0" ] || fail "video0 is $(cat /sys/class/video4linux/video0/name)"
+}
 
 # webcam API: video0, of the single-planar (1) or the multi-planar (2) kind; no text in its picture
 webcam() {
@@ -79,6 +91,9 @@ frame() {
   capture --format "$fourcc" --size "$size" --frames 1 -o frame.dng "$@" 2>frame.log || fail "$fourcc $size: $(tail -n 1 frame.log)"
   /guest/frame_of_dng frame.dng "$out"
 }
+
+# codes FRAME: each value its samples have
+codes() { od -An -t u2 -w32 "$1" | tr -d '*' | tr -s ' ' '\n' | sort -u | tr -d '\n'; }
 
 # same A B WHAT
 same() { cmp -s "$1" "$2" || fail "$3"; }
