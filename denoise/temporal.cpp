@@ -113,7 +113,8 @@ double Frame::share_now(double share, const std::array<const float*, 2>& sums, i
     for (int x = 0; x < width; ++x) {
       const auto c = static_cast<std::size_t>(colour_at(raw.phase, x, y));
       sum[c] += static_cast<double>(sums[y][x]);
-      count[c] += (height + 1 - y) / 2;
+      const int rows_of_parity = (height + 1 - y) / 2;
+      count[c] += rows_of_parity;
     }
   }
   double before = 0, now = 0;
@@ -257,7 +258,7 @@ struct TemporalMean::State {
 TemporalMean::TemporalMean(int max_width, int max_height, int threads) {
   assert(max_width >= 2 && max_height >= 2 && threads >= 1);
   assert(max_width <= largest_side && max_height <= largest_side);
-  state_.reset(new State{Memory(max_width, max_height, threads)});
+  state_ = std::make_unique<State>(State{Memory(max_width, max_height, threads)});
 }
 TemporalMean::~TemporalMean() = default;
 

@@ -68,8 +68,9 @@ HWY_INLINE void add_site(VF raw, VF before, float dark_e, float saturation_e, MF
 template <bool kRedIsOdd>
 HWY_INLINE void add_cells(const MotionStrip& in, int pair, int i, OfColour (&sum)[3]) {
   const VF at = hn::Iota(Floats(), static_cast<float>(i));
-  const MF even_there = hn::Lt(at, constant(static_cast<float>((in.width + 1) / 2)));
-  const MF odd_there = hn::Lt(at, constant(static_cast<float>(in.width / 2)));
+  const int even_sites = (in.width + 1) / 2, odd_sites = in.width / 2;
+  const MF even_there = hn::Lt(at, constant(static_cast<float>(even_sites)));
+  const MF odd_there = hn::Lt(at, constant(static_cast<float>(odd_sites)));
   for (int r = 0; r < 2; ++r) {
     const int row = 2 * pair + r, even_colour = kRedIsOdd ? 1 + r : r, odd_colour = kRedIsOdd ? r : 1 + r;
     if (!in.inside[row]) continue;

@@ -105,7 +105,7 @@ void set_colour(const FrameFacts& facts, RawFrame& out) {
     calibration = calibration_of(identity3(), neutral, facts.colour_temperature_k);
     out.warnings.emplace_back(colours_unknown);
   }
-  if (calibration) out.colour.calibrations.push_back(*std::move(calibration));
+  if (calibration) out.colour.calibrations.push_back(*calibration);
 }
 
 void set_info(const FrameFacts& facts, const std::string& camera, FrameInfo& out) {

@@ -52,6 +52,7 @@ class Loop {
       }
       watch(count_);
     }
+    count_.stopped = stop_;
     return {};
   }
 

@@ -23,7 +23,7 @@ LibcameraValues libcamera_values(const libcamera::ControlList& metadata);
 OfferedControls offered_controls(const libcamera::ControlInfoMap& infos);
 
 /// Adds what is to be set.
-void add_controls(const StartControls& controls, libcamera::ControlList& list);
+void add_controls(const StartControls& wanted, libcamera::ControlList& list);
 
 /// Asks for flips, before the configuration is validated. Where only one is given the other is off; none: as it is.
 void set_flips(const CameraRequest& request, libcamera::CameraConfiguration& configuration);

@@ -15,13 +15,15 @@ namespace lowlux::capture {
 namespace {
 
 constexpr std::size_t most_plane_bytes = std::size_t{2} << 30;
+constexpr int most_tries = 100;
 
 bool synchronise(int fd, std::uint64_t flags) {
   dma_buf_sync sync{.flags = flags};
-  int result = 0;
-  do {
+  int result = -1;
+  for (int tries = 0; tries < most_tries && result != 0; ++tries) {
     result = ioctl(fd, DMA_BUF_IOCTL_SYNC, &sync);
-  } while (result != 0 && (errno == EINTR || errno == EAGAIN));
+    if (result != 0 && errno != EINTR && errno != EAGAIN) break;
+  }
   return result == 0 || errno == ENOTTY;
 }
 

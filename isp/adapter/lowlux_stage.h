@@ -7,8 +7,9 @@
  *   - Every call on one stage comes from one thread at a time; stages do not know of one another.
  *   - The bytes of a result do not depend on the number of threads.
  *   - Input rows are read once, from first to last: they may lie in uncached memory.
- *   - Every struct begins with its size, which the caller sets. Members a caller does not know are taken as absent, and
- *     those lowlux does not know are ignored: structs grow at their end within one version.
+ *   - Structs begin with their size, which the caller sets, but for the small ones that never change: source, plane and
+ *     rect. Within one version structs grow at their end: a caller with a later header is served, and what lowlux does
+ *     not know there is ignored. Bits of `valid` that are not known refuse the frame.
  * Functions return LOWLUX_STAGE_OK, LOWLUX_STAGE_ADJUSTED, or an error below 0; lowlux_stage_last_error says more.
  * After an error in lowlux_stage_process the output planes are not touched or hold part of a picture; the stage goes
  * on.
@@ -16,6 +17,7 @@
 #ifndef LOWLUX_STAGE_H
 #define LOWLUX_STAGE_H
 
+/* NOLINTBEGIN(modernize-use-using,modernize-deprecated-headers): C */
 #include <stddef.h>
 #include <stdint.h>
 
@@ -132,7 +134,7 @@ typedef struct {
   size_t size;
   int32_t threads;          /* 1..8, the caller's among them; 0: 2 */
   uint64_t memory_limit;    /* bytes; 0: 1 GiB */
-  const char* profile_file; /* of `lowlux calibrate`, JSON; null: none */
+  const char* profile_file; /* of `lowlux calibrate`, JSON; its hot pixels are places in whole frames; null: none */
   int32_t most_denoise;     /* LOWLUX_STAGE_LEVEL_... that there is memory for; 0 as every level: none */
   int32_t temporal;         /* 1: frames before take part */
   int32_t look;             /* LOWLUX_STAGE_LOOK_... */
@@ -179,7 +181,7 @@ typedef struct {
   float temperature_c;    /* of the sensor, -100..200 */
   int32_t denoise;        /* LOWLUX_STAGE_DENOISE_...; libcamera's ZSL (4) counts as MINIMAL */
   uint32_t sequence;      /* a gap or a step back forgets the frames before */
-  uint64_t timestamp_ns;  /* a step back, or of more than two seconds, does the same */
+  uint64_t timestamp_ns;  /* a step back, or of more than two seconds and three exposures, does so too */
   float gamma;            /* accepted, without effect: the curve is the stage's own */
   float contrast;         /* the same */
   float saturation;       /* 0..4 */
@@ -221,7 +223,7 @@ enum {
 /* What was done to the frame. */
 typedef struct {
   size_t size;
-  uint32_t applied;   /* LOWLUX_STAGE_HAS_... of the parameters that took effect */
+  uint32_t applied;   /* LOWLUX_STAGE_HAS_... of those that were heeded, as far as look and output ask */
   int32_t black_from; /* LOWLUX_STAGE_FROM_... */
   int32_t noise_from;
   int32_t white_from;
@@ -264,7 +266,8 @@ LOWLUX_STAGE_EXPORT int lowlux_stage_open(const lowlux_stage_settings* settings,
                                           size_t message_size);
 
 /* Takes all memory. out->fourcc is asked for, the rest is answered; out->stride of 0 is filled in, one that is too
- * small is adjusted. A stage that was configured before and fails stays unconfigured. */
+ * small is adjusted. A stage that was configured before and fails stays
+ * unconfigured, but where a struct is missing or of no size: then nothing changes. */
 LOWLUX_STAGE_EXPORT int lowlux_stage_configure(lowlux_stage* stage, const lowlux_stage_input* in,
                                                lowlux_stage_output* out);
 
@@ -282,6 +285,7 @@ LOWLUX_STAGE_EXPORT void lowlux_stage_release(lowlux_stage* stage);
 /* Of the last call on this stage that failed; one line. Valid until the next call. */
 LOWLUX_STAGE_EXPORT const char* lowlux_stage_last_error(const lowlux_stage* stage);
 
+/* NOLINTEND(modernize-use-using,modernize-deprecated-headers) */
 #ifdef __cplusplus
 }
 #endif

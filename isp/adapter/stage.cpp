@@ -123,6 +123,7 @@ std::uint64_t stage_memory_bytes(const LiveSetup& setup, int threads) {
   if (setup.levels) for_each += 24;    // Denoiser
   if (setup.temporal) for_each += 16;  // TemporalMean, its mean, maps
   if (setup.look.look == Look::eye) for_each += 8;
+  if (setup.samples == SampleType::u16) for_each += 6;  // the made-up frame's picture
   const auto row = static_cast<std::uint64_t>(setup.width) + 4096;
   // A made-up frame of the stream's own size runs through once.
   return 2 * area(setup.width, setup.height) +
@@ -195,6 +196,9 @@ Result<int> Stage::configure(const lowlux_stage_input& in, lowlux_stage_output& 
   if (const std::uint64_t wanted = stage_memory_bytes(*setup, executor_.width()); wanted > limit) {
     return fail(ErrorCode::too_large, fmt::format("frames of {} x {} take {} MiB, more than the limit of {}", in.width,
                                                   in.height, wanted >> 20U, limit >> 20U));
+  }
+  if (in.stride != 0 && (in.stride < row_bytes(*format, in.width) || in.stride > longest_stride)) {
+    return fail(ErrorCode::invalid_argument, "the input's stride is shorter than a row, or absurd");
   }
   Stream made;
   made.kind = *kind;
@@ -321,8 +325,9 @@ void Stage::tell(const StageFacts& facts, lowlux_stage_result& out) const {
   out.exposure_ev = static_cast<float>(plan.exposure_ev);
   const auto& level = plan.noise_reduction.level;
   out.level = level ? static_cast<std::int32_t>(*level) + 1 : LOWLUX_STAGE_LEVEL_NONE;
-  out.temporal = plan.noise_reduction.temporal ? 1 : 0;
-  out.moved = static_cast<float>(pipeline.moved());
+  const auto& temporal = plan.noise_reduction.temporal;
+  out.temporal = temporal && !temporal->restart ? 1 : 0;
+  out.moved = out.temporal == 1 ? static_cast<float>(pipeline.moved()) : 0;
   out.scene_luminance_cd_m2 = plan.look ? static_cast<float>(plan.look->mean_cd_m2) : 0;
   out.adaptation = plan.look ? static_cast<float>(plan.look->state.m) : 1;
 }

@@ -68,7 +68,8 @@ int plane_rows(StageOutput kind, int height, int plane) {
 }
 
 bool lay_out(StageOutput kind, int width, int height, lowlux_stage_output& out) {
-  bool adjusted = false;
+  const auto differs = [](std::int32_t asked, std::int32_t had) { return asked != 0 && asked != had; };
+  bool adjusted = differs(out.width, width) || differs(out.height, height) || differs(out.planes, planes_of(kind));
   out.width = width;
   out.height = height;
   out.planes = planes_of(kind);

@@ -21,7 +21,8 @@ std::optional<RawFormat> stage_input(std::int32_t api, std::uint32_t fourcc, std
 /// What lowlux_stage_query answers, its size aside.
 void describe(const RawFormat& format, lowlux_stage_format_info& info);
 
-/// Fills in planes, strides that are 0 or too small, and bytes. @return whether a stride that was given was too small
+/// Fills in planes, strides that are 0 or too small, and bytes. @return whether something that was asked for (not 0) is
+/// not had
 bool lay_out(StageOutput kind, int width, int height, lowlux_stage_output& out);
 
 /// Bytes of a row of a plane, and rows of it.

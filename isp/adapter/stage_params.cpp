@@ -206,10 +206,12 @@ StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream
 }
 
 bool StageHistory::follows(const lowlux_stage_params& params) const {
+  const double exposure_ns = has(params, LOWLUX_STAGE_HAS_EXPOSURE) ? params.exposure_s * 1e9 : 0;
+  const std::uint64_t longest_ns = std::max(longest_step_ns, static_cast<std::uint64_t>(3 * exposure_ns));
   if (sequence_ && has(params, LOWLUX_STAGE_HAS_SEQUENCE) && params.sequence != *sequence_ + 1) return false;
   // Unsigned: a step back is a long one too.
   return !timestamp_ns_ || !has(params, LOWLUX_STAGE_HAS_TIMESTAMP) ||
-         params.timestamp_ns - *timestamp_ns_ <= longest_step_ns;
+         params.timestamp_ns - *timestamp_ns_ <= longest_ns;
 }
 
 void StageHistory::take(const lowlux_stage_params& params) {

@@ -48,7 +48,7 @@ void StageWriter::write(int thread, int y, const std::uint8_t* rgb) {
   const std::size_t bytes = 3 * static_cast<std::size_t>(width_);
   std::uint8_t* const above = above_.get() + bytes * static_cast<std::size_t>(thread);
   if ((y & 1) != 0) {
-    chroma_row(matrix_, above, rgb, width_, row(1, y / 2));
+    chroma_row(matrix_, above, rgb, width_, row(1, y / 2));  // NOLINT(readability-suspicious-call-argument)
   } else if (y + 1 == height_) {
     chroma_row(matrix_, rgb, rgb, width_, row(1, y / 2));
   } else {

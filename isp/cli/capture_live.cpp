@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstdio>
 #include <memory>
 #include <thread>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "isp/adapter/lowlux_stage.h"
 #include "isp/base/raw_format.h"
 #include "isp/cli/capture_sink.h"
+#include "isp/cli/report.h"
 #include "isp/output/y4m.h"
 
 namespace lowlux::cli {
@@ -52,7 +54,7 @@ lowlux_stage_settings settings_of(const CaptureArgs& args) {
 std::int32_t denoise_of(const isp::DenoiseChoice& choice) {
   using Mode = isp::DenoiseChoice::Mode;
   if (choice.mode == Mode::automatic) return LOWLUX_STAGE_DENOISE_AUTO;
-  if (choice.mode == Mode::off) return LOWLUX_STAGE_DENOISE_OFF;
+  if (choice.mode == Mode::off) return LOWLUX_STAGE_DENOISE_MINIMAL;  // frames before alone, if they take part
   return choice.level == denoise::Level::draft ? LOWLUX_STAGE_DENOISE_FAST : LOWLUX_STAGE_DENOISE_HIGH_QUALITY;
 }
 
@@ -74,7 +76,15 @@ void set_all_if(const std::optional<std::array<double, kCount>>& values, double 
   out.valid |= bit;
 }
 
-lowlux_stage_params params_of(const capture::CameraFrame& frame, const RawFormat& format, const CaptureArgs& args) {
+/// As the camera says, else as it was asked for: libcamera does not say.
+double rate_of(const CaptureArgs& args, const capture::CameraFormat& format) {
+  if (format.frame_rate_hz) return *format.frame_rate_hz;
+  return args.request.frame_rate_hz.value_or(usual_frame_rate_hz);
+}
+
+/// @param taken  frames before this one
+lowlux_stage_params params_of(const capture::CameraFrame& frame, const RawFormat& format, const CaptureArgs& args,
+                              std::uint32_t taken) {
   const capture::FrameFacts& facts = frame.facts;
   const isp::DevelopOptions& options = args.develop.options;
   lowlux_stage_params out{};
@@ -100,7 +110,7 @@ lowlux_stage_params params_of(const capture::CameraFrame& frame, const RawFormat
   set_if(options.look.scene_luminance_cd_m2, 1e-7, 1e9, LOWLUX_STAGE_HAS_SCENE_LUMINANCE, out.scene_luminance_cd_m2,
          out);
   out.denoise = denoise_of(options.denoise);
-  out.sequence = frame.sequence;
+  out.sequence = taken;  // frames that were lost are a pause, which is left to its length
   out.valid |= LOWLUX_STAGE_HAS_DENOISE | LOWLUX_STAGE_HAS_SEQUENCE;
   if (frame.timestamp.count() > 0) {
     out.timestamp_ns = static_cast<std::uint64_t>(frame.timestamp.count());
@@ -119,7 +129,7 @@ class LiveSink final : public CaptureSink {
         layout_(layout),
         luma_(static_cast<int>(layout.stride[0]), layout.height),
         chroma_(static_cast<int>(layout.stride[1]), (layout.height + 1) / 2),
-        writer_(out, {layout.width, layout.height, stream_.format.frame_rate_hz.value_or(usual_frame_rate_hz)}),
+        writer_(out, {layout.width, layout.height, rate_of(args, stream_.format)}),
         stop_(stop) {}
 
   Result<bool> take(const capture::CameraFrame& frame, CaptureWork& work) override {
@@ -143,14 +153,23 @@ class LiveSink final : public CaptureSink {
     out.planes = 2;
     out.plane[0] = {luma_.data(), luma_.size(), layout_.stride[0]};
     out.plane[1] = {chroma_.data(), chroma_.size(), layout_.stride[1]};
-    const lowlux_stage_params params = params_of(frame, stream_.format.raw, args_);
+    const lowlux_stage_params params = params_of(frame, stream_.format.raw, args_, taken_);
+    if (taken_++ == 0) warn_of_colours(params);
     if (lowlux_stage_process(stage_.get(), &in, &out, &params, nullptr, nullptr) >= 0) return {};
     return fail(ErrorCode::insufficient, lowlux_stage_last_error(stage_.get()));
+  }
+
+  void warn_of_colours(const lowlux_stage_params& params) const {
+    const bool known = !args_.develop.profile.empty() || (params.valid & LOWLUX_STAGE_HAS_COLOUR_MATRIX) != 0;
+    if (known || args_.develop.quiet || stream_.format.raw.layout != SensorLayout::bayer) return;
+    fmt::print(stderr, "{}\n",
+               one_line(fmt::format("lowlux: {}: warning: {}", stream_.camera, capture::colours_unknown)));
   }
 
   const CaptureArgs& args_;
   CaptureStream stream_;
   StageHandle stage_;
+  std::uint32_t taken_ = 0;
   lowlux_stage_output layout_;
   Plane<std::uint8_t> luma_, chroma_;
   isp::Y4mWriter writer_;

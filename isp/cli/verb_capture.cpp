@@ -36,7 +36,7 @@ namespace fs = std::filesystem;
 std::atomic<bool> stop_asked{false};
 static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler sets it
 
-void ask_to_stop(int) { stop_asked = true; }
+void ask_to_stop(int /*signal*/) { stop_asked = true; }
 
 /// The first SIGINT or SIGTERM asks for an end, a second one ends the process as ever.
 void listen_to_signals() {

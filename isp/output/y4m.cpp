@@ -93,6 +93,7 @@ Result<Y4mWriter::Written> Y4mWriter::write_all(const std::atomic<bool>& stop) {
     const ssize_t written = ::write(file_, bytes_.data() + done, std::min(piece_bytes_, bytes_.size() - done));
     if (written >= 0) {
       done += static_cast<std::size_t>(written);
+      if (written > 0) until.reset();
       continue;
     }
     if (errno == EPIPE) return Written::reader_left;

@@ -27,7 +27,9 @@ Result<void> check(const LiveSetup& setup) {
     return wrong("the picture's part of the frame lies inside it and has two pixels each way at least");
   }
   for (const Rect& masked : setup.masked) {
-    if (!inside(masked, setup.width, setup.height)) return wrong("masked pixels lie inside the frame");
+    if (!inside(masked, setup.width, setup.height) || masked.width < 2 || masked.height < 2) {
+      return wrong("masked pixels lie inside the frame, two each way at least");
+    }
   }
   if (!(setup.white_dn >= 0 && setup.white_dn <= 65535)) return wrong("white lies between 0 and 65535");
   if (setup.most == denoise::Level::best) return wrong("live frames are denoised by draft, standard or high");
@@ -142,6 +144,7 @@ void LivePipeline::render_mosaic(PlaneView<std::uint16_t> codes) {
     return;
   }
   const PlaneView<const float> signal_e = pipeline_.signal(frame_, plan_);
+  const auto most = static_cast<float>(largest << shift);
   PerSite<float> black{}, code_per_e{};
   for (int site = 0; site < 4; ++site) {
     const double black_dn = plan_.black.pedestal_dn[site];
@@ -157,7 +160,7 @@ void LivePipeline::render_mosaic(PlaneView<std::uint16_t> codes) {
       for (int x = 0; x < active.width; ++x) {
         const int site = left + (x & 1);
         const float code = black[site] + code_per_e[site] * in[x];
-        out[x] = static_cast<std::uint16_t>(std::clamp(code, 0.0f, 65535.0f));
+        out[x] = static_cast<std::uint16_t>(std::clamp(code, 0.0f, most));
       }
     }
   });

@@ -51,6 +51,17 @@ NoiseProfile profile_of(const LiveNoise& noise, const RawDn& raw, const BlackPoi
   return out;
 }
 
+/// 1 where one of them is not known.
+double ratio(const std::optional<double>& now, const std::optional<double>& before) {
+  return now && before ? *now / *before : 1;
+}
+
+/// A line at another gain of the sensor: codes for each electron go with it.
+NoiseLine at_gain(const NoiseLine& line, double factor) {
+  return {line.gain_dn * factor, line.offset_dn2 * factor * factor, line.gain_error_dn * factor,
+          line.offset_error_dn2 * factor * factor};
+}
+
 LiveNoise noise_of(const NoiseLine& line) {
   const double variance = line.offset_dn2;
   return {line.gain_dn, {variance, variance, variance, variance}};
@@ -84,7 +95,8 @@ void LivePlanner::reset() {
   neutral_.reset();
   line_.reset();
   has_level_ = false;
-  last_exposure_s_.reset();
+  noise_iso_.reset();
+  last_ = {};
   first_ = true;
 }
 
@@ -137,6 +149,9 @@ void LivePlanner::set_noise(const LiveFacts& facts, const FrameMeter& meter, Raw
     frame.noise = profile_of(*facts.noise, frame.raw, plan.black);
     decision_.noise = LiveSource::given;
   } else {
+    if (!facts.follows) line_.reset();
+    if (line_) line_ = at_gain(*line_, ratio(facts.iso, noise_iso_));
+    noise_iso_ = facts.iso;
     if (decision_.measured) line_ = line_ ? blended(*line_, *decision_.measured) : *decision_.measured;
     frame.noise.reset();
     if (line_) frame.noise = profile_of(noise_of(*line_), frame.raw, plan.black);
@@ -183,7 +198,7 @@ WhiteBalance LivePlanner::choose_white(const LiveFacts& facts, RawFrame& frame) 
 }
 
 Result<Matrix3> LivePlanner::balanced_matrix(const LiveFacts& facts, const RawFrame& frame, const DevelopPlan& plan,
-                                             const WhiteBalance& balance) const {
+                                             const WhiteBalance& balance) {
   const Vector3 luminance = *luminance_weights(plan.options.space);
   const Matrix3 colours = saturated(facts.saturation, luminance);
   if (facts.colour_matrix) return colours * *facts.colour_matrix;
@@ -192,7 +207,7 @@ Result<Matrix3> LivePlanner::balanced_matrix(const LiveFacts& facts, const RawFr
   if (coloured && !balance.white) {
     return fail(ErrorCode::malformed, "the white balance is no colour of a light under the camera's matrices");
   }
-  const Result<Matrix3> balanced = balanced_to_output(frame, plan.options, balance);
+  Result<Matrix3> balanced = balanced_to_output(frame, plan.options, balance);
   if (!balanced) return balanced;
   return coloured ? colours * *balanced : *balanced;
 }
@@ -262,16 +277,20 @@ void LivePlanner::set_temporal(const LiveFacts& facts, const RawFrame& frame, De
       setup_.temporal && facts.denoise.temporal && plan.electrons_at_white && frame.raw.layout == SensorLayout::bayer;
   if (!can) {
     temporal.reset();
-    last_exposure_s_.reset();
+    last_ = {};
     first_ = true;  // what comes after begins anew
     return;
   }
   temporal.emplace();
-  const bool both = facts.exposure_s && last_exposure_s_;
-  temporal->light = both ? *facts.exposure_s / *last_exposure_s_ : 1;
+  const double e_per_dn = (*plan.electrons_at_white)[0] / (white_at(frame.raw, 0) - plan.black.pedestal_dn[0]);
+  temporal->light = ratio(facts.exposure_s, last_.exposure_s);
+  if (decision_.noise == LiveSource::frame) {
+    // Electrons whose gain the frames tell are a unit that moves with its measurement.
+    temporal->light *= ratio(facts.iso, last_.iso) * ratio(e_per_dn, last_.e_per_dn);
+  }
   temporal->restart = first_ || !facts.follows;
   first_ = false;
-  last_exposure_s_ = facts.exposure_s;
+  last_ = {facts.exposure_s, facts.iso, e_per_dn};
 }
 
 Result<void> LivePlanner::plan(const LiveFacts& facts, FrameMeter& meter, RawFrame& frame, DevelopPlan& plan) {

@@ -58,7 +58,7 @@ struct LiveFacts {
   std::optional<Matrix3> colour_matrix;         // white-balanced camera RGB to linear sRGB, in place of calibrations
   std::optional<double> exposure_ev;            // absent: automatic
   double saturation = 1;                        // of the picture's colours, 0..4
-  bool follows = true;                          // on the frame before, of the same scene; false forgets it
+  bool follows = true;                          // on the frame before; false forgets frames and noise before
   LiveDenoise denoise;
 };
 
@@ -93,8 +93,8 @@ class LivePlanner {
   bool needs_light(const LiveFacts& facts) const;
   void set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan);
   WhiteBalance choose_white(const LiveFacts& facts, RawFrame& frame);
-  Result<Matrix3> balanced_matrix(const LiveFacts& facts, const RawFrame& frame, const DevelopPlan& plan,
-                                  const WhiteBalance& balance) const;
+  static Result<Matrix3> balanced_matrix(const LiveFacts& facts, const RawFrame& frame, const DevelopPlan& plan,
+                                         const WhiteBalance& balance);
   Result<void> set_rendering(const LiveFacts& facts, RawFrame& frame, DevelopPlan& plan);
   double smooth_exposure(double target_ev);
   void choose_level(const LiveDenoise& wanted, const RawFrame& frame, DevelopPlan& plan);
@@ -109,8 +109,12 @@ class LivePlanner {
   std::optional<Vector3> neutral_;     // the same, where it was estimated
   std::optional<NoiseLine> line_;      // of the frames before, where noise is not given
   std::optional<denoise::Level> level_;
-  bool has_level_ = false;  // level_ was decided for a frame before
-  std::optional<double> last_exposure_s_;
+  bool has_level_ = false;           // level_ was decided for a frame before
+  std::optional<double> noise_iso_;  // that line_ was measured at
+  /// Of the last frame that took part in a mean over frames.
+  struct Before {
+    std::optional<double> exposure_s, iso, e_per_dn;
+  } last_;
   double tone_limit_ = 0;  // of the plan's tone table; 0: none yet
   bool first_ = true;
 };

@@ -34,7 +34,9 @@ struct BlendSites {
 void blend_sites(const BlendSites& in, int sites, float* signal_e) {
   for (int i = 0; i < sites; ++i) {
     const float mean_e = in.mean_e[2 * i];
-    const float time_e2 = in.share[i] * (std::max(mean_e, 0.0f) + in.variance_e2);
+    // The charge by the level's result: by the noisy mean itself, low values would count more than high ones.
+    const float charge_e = std::max(signal_e[2 * i] + in.dark_e, 0.0f);
+    const float time_e2 = in.share[i] * (charge_e + in.variance_e2);
     const float level_e2 = NoiseReducer::doubt_of(in.share[i]) * in.level_e2[i];
     const float way = level_e2 / (level_e2 + time_e2);
     signal_e[2 * i] += way * (mean_e - in.dark_e - signal_e[2 * i]);
@@ -104,7 +106,7 @@ SignalElectrons NoiseReducer::run(RawElectrons& raw, const NoiseReduction& how, 
       for (int y = band.first; y < band.last; ++y) {
         const auto& dark = how.noise.dark_mean_e;
         const int left = site_of(0, y);
-        const float even = static_cast<float>(dark[left]), odd = static_cast<float>(dark[left + 1]);
+        const auto even = static_cast<float>(dark[left]), odd = static_cast<float>(dark[left + 1]);
         const float* const mean_e = mean_e_.row(y);
         float* const out = memory.row(y);
         for (int x = 0; x < width; ++x) out[x] = mean_e[x] - ((x & 1) != 0 ? odd : even);

@@ -24,8 +24,8 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
 void set_noise_model(const RawFrame& frame, const DevelopPlan& plan, NoiseReduction& out);
 
 /// Signal to noise ratio of a mean pixel of the block in the middle of all, dark blocks first.
-/// @param memory  grows to as many figures as there are blocks
+/// @param snr  memory; grows to as many figures as there are blocks
 double middle_snr(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
-                  const Thumbnail& thumbnail, std::vector<double>& memory);
+                  const Thumbnail& thumbnail, std::vector<double>& snr);
 
 }  // namespace lowlux::isp

@@ -20,7 +20,7 @@ using Sums = hn::ScalableTag<std::uint32_t>;
 using Codes = hn::Rebind<std::uint16_t, Sums>;  // as many, of half the width
 using Words = hn::ScalableTag<std::uint16_t>;
 
-constexpr int most_difference = 8191;
+constexpr int most_difference = 5792;
 
 void AddRow(const std::uint16_t* dn, int width, std::uint32_t* column) {
   const Sums s;

@@ -9,7 +9,7 @@ namespace lowlux::isp::meter {
 /// column[x] += dn[x].
 void add_row(const std::uint16_t* dn, int width, std::uint32_t* column);
 
-/// column[x] += min(|dn[x] - dn[x + 2]|, 8191)^2 for x < width - 2: 64 rows cannot overflow it.
+/// column[x] += min(|dn[x] - dn[x + 2]|, 5792)^2 for x < width - 2: 128 rows cannot overflow it.
 void add_squares(const std::uint16_t* dn, int width, std::uint32_t* column);
 
 struct Extremes {

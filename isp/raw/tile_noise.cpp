@@ -103,7 +103,9 @@ void TileNoise::add_columns(const std::array<const std::uint32_t*, 2>& sums,
   }
 }
 
-double TileNoise::mean_of(const Tile& tile, int site) const { return tile.sum[site] / (2 * pairs()); }
+double TileNoise::mean_of(const Tile& tile, int site) const {
+  return static_cast<double>(tile.sum[site]) / (2 * pairs());
+}
 
 double TileNoise::variance_of(const Tile& tile, int site) const {
   const double of_slope = static_cast<double>(tile.difference[site]) * tile.difference[site] / pairs();

@@ -53,8 +53,8 @@ class TileNoise {
     PerSite<std::int32_t> difference{};  // sums of differences between neighbours
     PerSite<std::uint64_t> square{};     // and of their squares
   };
-  double pairs() const { return (tile_ / 2) * (tile_ / 4); }  // of neighbours of one site
-  double freedom() const { return pairs() - 1; }              // of a tile's variance
+  int pairs() const { return (tile_ / 2) * (tile_ / 4); }  // of neighbours of one site
+  int freedom() const { return pairs() - 1; }              // of a tile's variance
   std::optional<NoiseLine> line_by(const NoiseLine& expected, const PerSite<double>& black_dn, double white_dn) const;
   double mean_of(const Tile& tile, int site) const;
   double variance_of(const Tile& tile, int site) const;

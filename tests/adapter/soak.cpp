@@ -186,7 +186,7 @@ class Soak {
       in_.crop.width = chance_.from(2, in_.width - in_.crop.x);
       in_.crop.height = chance_.from(2, in_.height - in_.crop.y);
     }
-    if (chance_.one_in(4)) in_.masked = {0, 0, in_.width, chance_.from(1, in_.height)};
+    if (chance_.one_in(4)) in_.masked = {0, 0, in_.width, chance_.from(2, in_.height)};
     if (chance_.one_in(4)) in_.white_level = chance_.from(1, largest_code(names_->format));
     constexpr std::uint32_t pictures[] = {LOWLUX_STAGE_XBGR8888, LOWLUX_STAGE_XRGB8888, LOWLUX_STAGE_BGR888,
                                           LOWLUX_STAGE_RGB888,   LOWLUX_STAGE_NV12,     LOWLUX_STAGE_RGB48,

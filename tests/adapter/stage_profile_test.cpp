@@ -145,7 +145,7 @@ TEST(StageProfile, RefusesSensorsOfAnotherKindAndSettingsWithoutIso) {
   auto bayer = StageProfile::of(made_up());
   const auto mono = bayer->prepare({.bits = 10, .layout = SensorLayout::monochrome}, BayerPhase::rggb);
   ASSERT_FALSE(mono);
-  EXPECT_EQ(mono.error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(mono.error().code, ErrorCode::malformed);
   CameraProfile of_mono = made_up();
   of_mono.mosaic = "monochrome";
   EXPECT_FALSE(StageProfile::of(of_mono)->prepare(stream, BayerPhase::rggb));
