@@ -183,6 +183,41 @@ TEST(LivePlanner, SaturationKeepsLuminanceAndTheGivenMatrixIsTaken) {
   for (std::size_t i = 3; i < 9; ++i) EXPECT_NEAR(grey[i], grey[i - 3], 1e-6);
 }
 
+TEST(LivePlanner, FramesBeforeKeepTheirScaleWhereTheUnitOfElectronsMoves) {
+  InlineExecutor one;
+  const Scene slope = [](int x, int) { return std::array{1 + 0.4 * x, 1 + 0.6 * x, 1 + 0.5 * x}; };
+  LiveSetup setup = setup_of(night(slope, 1, 320, 256));
+  setup.temporal = true;
+  const auto live = live_of(setup, one);
+  LiveFacts facts = known();
+  facts.noise.reset();  // measured on each frame, and followed slowly
+  const auto e_per_dn = [&] {
+    return (*live->decided().electrons_at_white)[0] / (test::night_white_dn - test::night_black_dn);
+  };
+  double before = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    read(*live, night(slope, seed, 320, 256));
+    ASSERT_TRUE(live->plan(facts));
+    const double light = live->decided().noise_reduction.temporal.value().light;
+    if (before > 0) {
+      EXPECT_NE(e_per_dn(), before);
+      EXPECT_NEAR(light, e_per_dn() / before, 1e-12);  // the scene and its codes are the same
+    }
+    before = e_per_dn();
+  }
+  // Four times the gain and a quarter of the exposure: the same codes, a quarter of the electrons.
+  facts.iso = 100;
+  facts.exposure_s = 0.04;
+  ASSERT_TRUE(live->plan(facts));
+  const double of_unit_gain = live->frame().noise->scale[1];
+  facts.iso = 400;
+  facts.exposure_s = 0.01;
+  ASSERT_TRUE(live->plan(facts));
+  EXPECT_NEAR(live->decided().noise_reduction.temporal->light, 0.25,
+              0.25 * 0.2);  // 15 % of the way back to what is measured
+  EXPECT_GT(live->frame().noise->scale[1], 3 * of_unit_gain);
+}
+
 TEST(LivePlanner, FramesBeforeAreForgottenWhereTheyTellNothing) {
   InlineExecutor one;
   const RawFrame frame = night(flat(20, 20, 20));
