@@ -12,7 +12,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace lowlux::isp::pixels::HWY_NAMESPACE {
+namespace lowlux::isp::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using Bytes = hn::CappedTag<std::uint8_t, 32>;
@@ -50,9 +50,9 @@ HWY_INLINE void reorder(Order order, const std::uint8_t* rgb, int width, std::ui
   }
 }
 
-void Rgbx(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Order::rgbx, rgb, width, out); }
-void Bgrx(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Order::bgrx, rgb, width, out); }
-void Bgr(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Order::bgr, rgb, width, out); }
+void RgbxRow(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Order::rgbx, rgb, width, out); }
+void BgrxRow(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Order::bgrx, rgb, width, out); }
+void BgrRow(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Order::bgr, rgb, width, out); }
 
 /// Sixteen pixels at once in 32 bits: what three channels weigh, rounded, `shift` bits off.
 using Pixels = hn::FixedTag<std::uint8_t, 16>;
@@ -85,7 +85,7 @@ std::uint8_t one(const std::int32_t* weight, const std::int32_t* rgb, std::int32
   return static_cast<std::uint8_t>(sum >> shift);
 }
 
-void Luma(const YuvMatrix& matrix, const std::uint8_t* rgb, int width, std::uint8_t* out) {
+void LumaRow(const YuvMatrix& matrix, const std::uint8_t* rgb, int width, std::uint8_t* out) {
   const Pixels d;
   int x = 0;
   for (; x + 16 <= width; x += 16) {
@@ -132,7 +132,8 @@ HWY_INLINE void split(const std::uint8_t* rgb, std::uint8_t (&channel)[3][32]) {
   }
 }
 
-void Chroma(const YuvMatrix& matrix, const std::uint8_t* rgb, const std::uint8_t* below, int width, std::uint8_t* out) {
+void ChromaRow(const YuvMatrix& matrix, const std::uint8_t* rgb, const std::uint8_t* below, int width,
+               std::uint8_t* out) {
   int x = 0;
   for (; x + 32 <= width; x += 32) {
     std::uint8_t upper[3][32], lower[3][32];
@@ -155,18 +156,16 @@ void Chroma(const YuvMatrix& matrix, const std::uint8_t* rgb, const std::uint8_t
   }
 }
 
-}  // namespace lowlux::isp::pixels::HWY_NAMESPACE
+}  // namespace lowlux::isp::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace lowlux::isp {
-namespace pixels {
-HWY_EXPORT(Rgbx);
-HWY_EXPORT(Bgrx);
-HWY_EXPORT(Bgr);
-HWY_EXPORT(Luma);
-HWY_EXPORT(Chroma);
-}  // namespace pixels
+HWY_EXPORT(RgbxRow);
+HWY_EXPORT(BgrxRow);
+HWY_EXPORT(BgrRow);
+HWY_EXPORT(LumaRow);
+HWY_EXPORT(ChromaRow);
 
 namespace {
 
@@ -189,21 +188,15 @@ YuvMatrix yuv_matrix(YuvStandard standard) {
           scaled({0.5, -kg * r, -kb * r}, 224, 0)};
 }
 
-void rgbx_row(const std::uint8_t* rgb, int width, std::uint8_t* out) {
-  HWY_DYNAMIC_DISPATCH(pixels::Rgbx)(rgb, width, out);
-}
-void bgrx_row(const std::uint8_t* rgb, int width, std::uint8_t* out) {
-  HWY_DYNAMIC_DISPATCH(pixels::Bgrx)(rgb, width, out);
-}
-void bgr_row(const std::uint8_t* rgb, int width, std::uint8_t* out) {
-  HWY_DYNAMIC_DISPATCH(pixels::Bgr)(rgb, width, out);
-}
+void rgbx_row(const std::uint8_t* rgb, int width, std::uint8_t* out) { HWY_DYNAMIC_DISPATCH(RgbxRow)(rgb, width, out); }
+void bgrx_row(const std::uint8_t* rgb, int width, std::uint8_t* out) { HWY_DYNAMIC_DISPATCH(BgrxRow)(rgb, width, out); }
+void bgr_row(const std::uint8_t* rgb, int width, std::uint8_t* out) { HWY_DYNAMIC_DISPATCH(BgrRow)(rgb, width, out); }
 void luma_row(const YuvMatrix& matrix, const std::uint8_t* rgb, int width, std::uint8_t* out) {
-  HWY_DYNAMIC_DISPATCH(pixels::Luma)(matrix, rgb, width, out);
+  HWY_DYNAMIC_DISPATCH(LumaRow)(matrix, rgb, width, out);
 }
 void chroma_row(const YuvMatrix& matrix, const std::uint8_t* rgb, const std::uint8_t* below, int width,
                 std::uint8_t* out) {
-  HWY_DYNAMIC_DISPATCH(pixels::Chroma)(matrix, rgb, below, width, out);
+  HWY_DYNAMIC_DISPATCH(ChromaRow)(matrix, rgb, below, width, out);
 }
 
 }  // namespace lowlux::isp
