@@ -52,8 +52,8 @@ class Pipeline {
   NoiseReducer noise_reducer_;
   std::unique_ptr<RawToRgb> kernel_;
   int kernel_width_ = 0;
-  Plane<float> mosaic_;  // active area, black and dark off
-  Plane<float> noisy_;   // before noise was reduced
+  Plane<float> mosaic_;   // active area, black and dark off
+  Plane<float> noisy_;    // before noise was reduced
   NoiseMaps noise_maps_;  // their memory stays for frames that have them again
   bool has_noise_maps_ = false;
   std::unique_ptr<NightLookGrid> look_;
