@@ -121,12 +121,6 @@ void set_info(const FrameFacts& facts, const std::string& camera, FrameInfo& out
 
 }  // namespace
 
-std::size_t black_channel_of(int site, BayerPhase phase) {
-  const int x = site & 1, y = site >> 1;
-  if (y == red_row(phase)) return x == red_column(phase) ? 0 : 1;
-  return x == red_column(phase) ? 2 : 3;
-}
-
 RawFrame raw_frame_of(const CameraFrame& frame, const CameraFormat& format, const std::string& camera) {
   assert(frame.bytes.size() >= frame_bytes(format));
   RawFrame out;

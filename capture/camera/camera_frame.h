@@ -14,9 +14,6 @@ namespace lowlux::capture {
 inline constexpr std::string_view colours_unknown =
     "the camera's colours are not known: taken for sRGB's; --profile has them";
 
-/// Place of a site (site_of) among R, Gr, Gb, B, the order in which cameras tell black levels.
-std::size_t black_channel_of(int site, BayerPhase phase);
-
 /// A camera's frame as one that pictures and raw files are made of; `frame.bytes` holds frame_bytes(format) at least
 /// and is read once, row by row. White is the largest code. Facts go where a DNG has a place for them:
 ///     black_level_dn             black_tag, a pattern of 2 x 2 in the mosaic's order (R, Gr, Gb, B for monochrome)

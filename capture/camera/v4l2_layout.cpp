@@ -97,18 +97,8 @@ std::vector<V4l2Offer> list_offers(V4l2Device& device) {
 }
 
 std::string format_text(std::uint32_t fourcc) {
-  if (const auto raw = raw_format_of_v4l2(fourcc)) {
-    const RawFormatNames* names = names_of(*raw);
-    if (names != nullptr && !names->libcamera.empty()) return std::string(names->libcamera);
-  }
-  constexpr std::uint32_t big_endian = std::uint32_t{1} << 31;
-  std::string text;
-  for (int byte = 0; byte < 4; ++byte) {
-    const auto c = static_cast<char>((fourcc & ~big_endian) >> (8 * byte) & 0xFF);
-    text += c >= ' ' && c <= '~' ? c : '?';
-  }
-  text.erase(text.find_last_not_of(' ') + 1);
-  return (fourcc & big_endian) != 0 ? text + "-BE" : text;
+  const auto raw = raw_format_of_v4l2(fourcc);
+  return raw ? text_of(*raw) : v4l2_text(fourcc);
 }
 
 std::string sizes_text(const V4l2Sizes& sizes) {

@@ -20,20 +20,6 @@ bool all_within(const float (&values)[kCount], double low, double high) {
   return std::ranges::all_of(values, [&](float value) { return within(value, low, high); });
 }
 
-/// Place of a site among R, Gr, Gb, B.
-int channel_of(int site, BayerPhase phase) {
-  const int x = site & 1, y = site >> 1;
-  switch (colour_at(phase, x, y)) {
-    case CfaColour::red:
-      return 0;
-    case CfaColour::blue:
-      return 3;
-    case CfaColour::green:
-      break;
-  }
-  return y == red_row(phase) ? 1 : 2;
-}
-
 void set_levels(const lowlux_stage_params& params, const StageStream& stream, const StageProfile* profile,
                 StageFacts& out) {
   const auto given = [&](std::uint32_t bit, double value) {
@@ -144,12 +130,12 @@ LiveDenoise denoise_of(const lowlux_stage_params& params, const StageStream& str
 
 PerSite<double> sites_of(const float (&channels)[4], BayerPhase phase) {
   PerSite<double> out{};
-  for (int site = 0; site < 4; ++site) out[site] = channels[channel_of(site, phase)];
+  for (int site = 0; site < 4; ++site) out[site] = channels[black_channel_of(site, phase)];
   return out;
 }
 
 void to_channels(const PerSite<double>& sites, BayerPhase phase, float (&channels)[4]) {
-  for (int site = 0; site < 4; ++site) channels[channel_of(site, phase)] = static_cast<float>(sites[site]);
+  for (int site = 0; site < 4; ++site) channels[black_channel_of(site, phase)] = static_cast<float>(sites[site]);
 }
 
 const char* fault_of(const lowlux_stage_params& p) {

@@ -152,4 +152,20 @@ std::size_t row_bytes(const RawFormat& format, int width) {
   return (static_cast<std::size_t>(width) + pixels - 1) / pixels * static_cast<std::size_t>(group.bytes);
 }
 
+std::string v4l2_text(std::uint32_t code) {
+  std::string text;
+  for (int byte = 0; byte < 4; ++byte) {
+    const auto c = static_cast<char>((code & ~big_endian) >> (8 * byte) & 0xFF);
+    text += c >= ' ' && c <= '~' ? c : '?';
+  }
+  text.erase(text.find_last_not_of(' ') + 1);
+  return (code & big_endian) != 0 ? text + "-BE" : text;
+}
+
+std::string text_of(const RawFormat& format) {
+  const RawFormatNames* const names = names_of(format);
+  if (names == nullptr) return "";
+  return names->libcamera.empty() ? v4l2_text(names->v4l2_fourcc) : std::string(names->libcamera);
+}
+
 }  // namespace lowlux

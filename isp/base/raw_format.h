@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "isp/base/cfa.h"
@@ -56,6 +57,19 @@ std::optional<RawFormat> raw_format_of_v4l2(std::uint32_t code);
 std::optional<RawFormat> raw_format_of_drm(std::uint32_t code, std::uint64_t modifier);
 /// The names of a format; null where it is none of raw_formats().
 const RawFormatNames* names_of(const RawFormat& format);
+
+/// A V4L2 code as v4l2-ctl writes it: no blanks at its end, "Y16-BE" for big endian, "?" for what cannot be printed.
+std::string v4l2_text(std::uint32_t code);
+/// libcamera's name of a format, else that of V4L2; empty where it is none of raw_formats().
+std::string text_of(const RawFormat& format);
+
+/// Place of a site of the 2x2 cell in figures of R, Gr, Gb and B, as cameras state their black levels. Gr lies in the
+/// row of red.
+constexpr std::size_t black_channel_of(int site, BayerPhase phase) {
+  const bool red_column_site = (site & 1) == red_column(phase);
+  if ((site >> 1) == red_row(phase)) return red_column_site ? 0 : 1;
+  return red_column_site ? 2 : 3;
+}
 
 /// Pixels and bytes of the smallest whole group of samples; a buffer's rows hold whole groups.
 struct RawGroup {

@@ -34,15 +34,6 @@ struct Words {
   std::optional<double> frames;
 };
 
-/// The four characters of a V4L2 code without blanks at their end; "Y16-BE" for big endian, as v4l2-ctl has it.
-std::string v4l2_text(std::uint32_t code) {
-  constexpr std::uint32_t big_endian = 0x80000000U;
-  std::string text;
-  for (int i = 0; i < 4; ++i) text += static_cast<char>((code & ~big_endian) >> (8 * i) & 0xFF);
-  text.erase(text.find_last_not_of(' ') + 1);
-  return (code & big_endian) != 0 ? text + "-BE" : text;
-}
-
 Wrong set_format(const std::string& text, capture::CameraRequest& request) {
   const auto formats = raw_formats();
   const auto found = std::ranges::find_if(formats, [&](const RawFormatNames& names) {

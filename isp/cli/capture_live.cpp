@@ -92,7 +92,7 @@ lowlux_stage_params params_of(const capture::CameraFrame& frame, const RawFormat
   set_all_if(facts.black_level_dn, 0, largest_code(format), LOWLUX_STAGE_HAS_BLACK, out.black_level, out);
   if (options.black.choice == isp::BlackChoice::given) {
     for (int site = 0; site < 4; ++site) {
-      out.black_level[capture::black_channel_of(site, format.phase)] = static_cast<float>(options.black.given_dn[site]);
+      out.black_level[black_channel_of(site, format.phase)] = static_cast<float>(options.black.given_dn[site]);
     }
     out.valid |= LOWLUX_STAGE_HAS_BLACK;
   }

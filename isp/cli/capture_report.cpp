@@ -15,15 +15,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string format_name(const RawFormat& format) {
-  const RawFormatNames* names = names_of(format);
-  if (names == nullptr) return "";
-  if (!names->libcamera.empty()) return std::string(names->libcamera);
-  std::string text;
-  for (int i = 0; i < 4; ++i) text += static_cast<char>(names->v4l2_fourcc >> (8 * i) & 0x7F);
-  return text;
-}
-
 double ms_for_each(double seconds, std::uint64_t frames) {
   return frames == 0 ? 0 : 1000 * seconds / static_cast<double>(frames);
 }
@@ -56,7 +47,7 @@ std::string capture_json(const CaptureState& state, const Error* error) {
   const auto& rate = stream.format.frame_rate_hz;
   const auto measured = rate_hz(count);
   json["camera"] = stream.camera;
-  json["format"] = format_name(stream.format.raw);
+  json["format"] = text_of(stream.format.raw);
   json["width"] = stream.format.width;
   json["height"] = stream.format.height;
   json["frame_rate_hz"] = rate ? Json(*rate) : Json(nullptr);

@@ -165,5 +165,14 @@ TEST(RawFormat, FillsRowsWithWholeGroups) {
 
 static_assert(largest_code({8}) == 255 && largest_code({14}) == 16383 && largest_code({16}) == 65535);
 
+TEST(RawFormat, IsWrittenAsTheApisWriteIt) {
+  EXPECT_EQ(v4l2_text(fourcc('Y', '1', '0', ' ')), "Y10");
+  EXPECT_EQ(v4l2_text(fourcc('Y', '1', '6', ' ') | std::uint32_t{1} << 31), "Y16-BE");
+  EXPECT_EQ(v4l2_text(0x01020304), "????");
+  EXPECT_EQ(text_of({.bits = 10, .packing = RawPacking::csi2}), "SRGGB10_CSI2P");
+  EXPECT_EQ(text_of({.bits = 14, .layout = SensorLayout::monochrome}), "Y14");
+  EXPECT_EQ(text_of({.bits = 9}), "");
+}
+
 }  // namespace
 }  // namespace lowlux
