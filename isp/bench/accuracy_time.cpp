@@ -1,0 +1,156 @@
+#include "isp/bench/accuracy_time.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <ctime>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/raw/raw_to_rgb.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr int most_repeats = 1000000;
+
+double now_s(bool wall_clock) {
+  timespec now{};
+  clock_gettime(wall_clock ? CLOCK_MONOTONIC : CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Seconds of one run of the work; short work is repeated.
+template <class Work>
+double time_of(const Work& work, const AccuracyTiming& timing) {
+  const double start = now_s(timing.wall_clock);
+  int repeats = 0;
+  double taken = 0;
+  do {
+    work();
+    ++repeats;
+    taken = now_s(timing.wall_clock) - start;
+  } while (taken < timing.least_s && repeats < most_repeats);
+  return taken / repeats;
+}
+
+double quantile(std::vector<double> values, double share) {
+  const auto at = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+bool dominates(const AccuracyRow& a, const AccuracyRow& b) {
+  return a.ms_per_mp <= b.ms_per_mp && a.error <= b.error && (a.ms_per_mp < b.ms_per_mp || a.error < b.error);
+}
+
+/// Rows of the group of `first`, which follow it.
+template <class Row>
+std::span<Row> group_from(std::span<Row> rows, std::size_t first) {
+  std::size_t last = first;
+  while (last < rows.size() && rows[last].group == rows[first].group) ++last;
+  return rows.subspan(first, last - first);
+}
+
+Plot plot_of(const std::string& stage, std::size_t number, std::span<const AccuracyRow> rows) {
+  Plot plot{.id = fmt::format("{}-{}", stage, number),
+            .title = rows.front().group,
+            .x_label = "time [ms/MP]",
+            .y_label = rows.front().error_of,
+            .x_scale = AxisScale::logarithmic,
+            .y_scale = AxisScale::linear};
+  std::vector<const AccuracyRow*> front;
+  for (const AccuracyRow& row : rows) {
+    plot.series.push_back({row.level, {row.ms_per_mp}, {row.error}, Mark::points});
+    if (row.undominated) front.push_back(&row);
+  }
+  std::ranges::sort(front, {}, [](const AccuracyRow* row) { return row->ms_per_mp; });
+  Series line{"undominated", {}, {}, Mark::line};
+  std::string names;
+  for (const AccuracyRow* row : front) {
+    line.x.push_back(row->ms_per_mp);
+    line.y.push_back(row->error);
+    names += (names.empty() ? "" : ", ") + row->level;
+  }
+  plot.series.push_back(std::move(line));
+  plot.caption = "No other level is faster and as good, or better and as fast: " + names;
+  return plot;
+}
+
+}  // namespace
+
+std::vector<AccuracyRow> measure(const AccuracyGroup& group, const AccuracyTiming& timing) {
+  assert(timing.rounds >= 1);
+  const std::size_t count = group.levels.size();
+  std::vector<std::vector<double>> s_per_mp(count), ratio(count);
+  double most_mp = 0;
+  for (const AccuracyLevel& level : group.levels) most_mp = std::max(most_mp, level.megapixels);
+  const std::vector<float> from(static_cast<std::size_t>(most_mp * 1e6) + 1, 1.0f);
+  std::vector<float> to(from.size());
+  const auto copy = [&] { std::memcpy(to.data(), from.data(), from.size() * sizeof(float)); };
+  for (int round = -1; round < timing.rounds; ++round) {
+    const double copy_s_per_mp = time_of(copy, timing) / (1e-6 * static_cast<double>(from.size()));
+    for (std::size_t i = 0; i < count; ++i) {
+      const double s = time_of(group.levels[i].run, timing) / group.levels[i].megapixels;
+      if (round < 0) continue;
+      s_per_mp[i].push_back(s);
+      ratio[i].push_back(s / copy_s_per_mp);
+    }
+  }
+  std::vector<AccuracyRow> rows;
+  rows.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double median_s = quantile(s_per_mp[i], 0.5);
+    rows.push_back({.group = group.name,
+                    .error_of = group.error_of,
+                    .level = group.levels[i].name,
+                    .error = group.levels[i].error,
+                    .ms_per_mp = 1e3 * median_s,
+                    .spread = (quantile(s_per_mp[i], 0.75) - quantile(s_per_mp[i], 0.25)) / (2 * median_s),
+                    .times_memcpy = quantile(ratio[i], 0.5)});
+  }
+  mark_undominated(rows);
+  return rows;
+}
+
+void mark_undominated(std::span<AccuracyRow> rows) {
+  for (std::size_t first = 0; first < rows.size();) {
+    const std::span<AccuracyRow> group = group_from(rows, first);
+    for (AccuracyRow& row : group) {
+      row.undominated = std::ranges::none_of(group, [&](const AccuracyRow& other) { return dominates(other, row); });
+    }
+    first += group.size();
+  }
+}
+
+BenchTable accuracy_table(std::span<const AccuracyRow> rows) {
+  BenchTable table{{"case", "level", "error", "error of", "time [ms/MP]", "spread [%]", "x memcpy", "undominated"}, {}};
+  table.rows.reserve(rows.size());
+  for (const AccuracyRow& row : rows) {
+    table.rows.push_back({row.group, row.level, row.error, row.error_of, row.ms_per_mp, 100 * row.spread,
+                          row.times_memcpy, std::string(row.undominated ? "yes" : "no")});
+  }
+  return table;
+}
+
+std::vector<Plot> accuracy_plots(const std::string& stage, std::span<const AccuracyRow> rows) {
+  std::vector<Plot> plots;
+  for (std::size_t first = 0; first < rows.size();) {
+    const std::span<const AccuracyRow> group = group_from(rows, first);
+    plots.push_back(plot_of(stage, plots.size() + 1, group));
+    first += group.size();
+  }
+  return plots;
+}
+
+std::string timing_remark(const AccuracyTiming& timing, int threads) {
+  return fmt::format("Times: median of {} rounds in which all levels of a case and memcpy took turns; {} of {}; {}",
+                     timing.rounds, timing.wall_clock ? "wall clock" : "CPU time",
+                     threads == 1 ? std::string("one thread") : fmt::format("{} threads", threads),
+                     raw_to_rgb_target());
+}
+
+}  // namespace lowlux::isp
