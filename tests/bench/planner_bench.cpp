@@ -1,0 +1,134 @@
+// What levels of noise reduction change in pictures, beside what the planner predicts of the noise: the table that
+// isp/pipeline/plan_effects.cpp holds, measured on the tuning pictures.
+//   planner_bench
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "isp/bench/bench_raw.h"
+#include "isp/bench/seen_difference.h"
+#include "isp/pipeline/pipeline.h"
+#include "isp/pipeline/plan.h"
+#include "isp/pipeline/visible_noise.h"
+
+namespace lowlux::isp {
+namespace {
+
+PoolExecutor executor(2);
+
+struct Reduction {
+  std::optional<denoise::Level> level;
+  std::optional<int> start;
+};
+
+Encoded8 developed(const BenchRaw& raw, const Reduction& how, const BenchPicture* truth_of = nullptr) {
+  (void)truth_of;
+  DevelopOptions options;
+  options.denoise.mode = how.level ? DenoiseChoice::Mode::level : DenoiseChoice::Mode::off;
+  options.denoise.level = how.level.value_or(denoise::Level::draft);
+  options.find_defects = false;
+  options.denoise.line_noise = false;
+  Result<DevelopPlan> plan = plan_develop(raw.frame, options, executor);
+  plan->noise_reduction.options.chroma_start = how.start;
+  Pipeline pipeline(executor);
+  Picture picture = make_picture(*plan);
+  pipeline.render(raw.frame, *plan, picture);
+  return std::get<Encoded8>(std::move(picture));
+}
+
+double predicted(const BenchRaw& raw, double& snr) {
+  DevelopOptions options;
+  options.denoise.mode = DenoiseChoice::Mode::level;
+  options.denoise.level = denoise::Level::draft;
+  options.find_defects = false;
+  const Result<DevelopPlan> plan = plan_develop(raw.frame, options, executor);
+  const Thumbnail thumbnail = make_thumbnail(raw.frame, plan->black, executor);
+  const auto blocks = seen_blocks(raw.frame, *plan, plan->noise_reduction.noise, thumbnail);
+  std::vector<float> rms;
+  for (const SeenBlock& b : blocks) rms.push_back(b.noise_delta_e);
+  snr = *plan->noise_reduction.snr;
+  return seen_percentile(rms);
+}
+
+/// The same camera without noise.
+BenchRaw noise_free(const DenoiseShot& shot) {
+  DenoiseShot mean{shot.light, shot.white_e, shot.signal_e.clone(), shot.signal_e.clone()};
+  for (std::size_t i = 0; i < mean.raw_e.size(); ++i) mean.raw_e.data()[i] += static_cast<float>(shot.light.dark_e);
+  return raw_of(mean, {}, 7);
+}
+
+int against_truth(PictureSet set) {
+  using denoise::Level;
+  std::printf("picture e-/dark pred | none draft standard high best: p95 and mean against the noise-free, over pred\n");
+  for (const std::string_view name : files_of(set)) {
+    const auto path = (std::filesystem::path(LOWLUX_TESTDATA) / "pictures" / name).string();
+    const auto picture = read_bench_picture(path, 384, 256, executor);
+    for (const DenoiseLight light : {DenoiseLight{2000, 2, 1.5}, DenoiseLight{200, 2, 1.5}, DenoiseLight{60, 2, 1.5},
+                                     DenoiseLight{20, 2, 1.5}, DenoiseLight{6, 2, 1.5}, DenoiseLight{2, 2, 1.5},
+                                     DenoiseLight{4, 200, 4}}) {
+      const DenoiseShot shot = take(*picture, light, 7);
+      const BenchRaw raw = raw_of(shot, {}, 7);
+      double snr = 0;
+      const double expected = predicted(raw, snr);
+      const Encoded8 truth = developed(noise_free(shot), {});
+      std::printf("%-12s %8s %6.2f | %6.2f", std::string(name).c_str(), name_of(light).c_str(), snr, expected);
+      for (const Reduction& way : {Reduction{}, Reduction{Level::draft, {}}, Reduction{Level::standard, {}},
+                                   Reduction{Level::high, {}}, Reduction{Level::best, {}}}) {
+        const SeenDifference seen = seen_difference(developed(raw, way), truth, executor);
+        std::printf(" %5.3f %5.3f,", seen.percentile95 / expected, seen.mean / expected);
+      }
+      std::printf("\n");
+    }
+  }
+  return 0;
+}
+
+int run(PictureSet set) {
+  using denoise::Level;
+  const std::array<Reduction, 9> ways{{{{}, {}},
+                                       {Level::draft, {}},
+                                       {Level::draft, 1},
+                                       {Level::draft, 2},
+                                       {Level::standard, {}},
+                                       {Level::standard, 1},
+                                       {Level::high, 1},
+                                       {Level::high, 2},
+                                       {Level::high, 0}}};
+  std::printf("%-12s %8s %6s | %6s %6s | none draft d1 d2 standard s1 h1 h2 h0 (p95 against high, over predicted)\n",
+              "picture", "e-/dark", "snr", "pred", "none");
+  for (const std::string_view name : files_of(set)) {
+    const auto path = (std::filesystem::path(LOWLUX_TESTDATA) / "pictures" / name).string();
+    const auto picture = read_bench_picture(path, 512, 384, executor);
+    for (const DenoiseLight light : {DenoiseLight{2000, 2, 1.5}, DenoiseLight{600, 2, 1.5}, DenoiseLight{200, 2, 1.5},
+                                     DenoiseLight{60, 2, 1.5}, DenoiseLight{20, 2, 1.5}, DenoiseLight{6, 2, 1.5},
+                                     DenoiseLight{2, 2, 1.5}, DenoiseLight{20, 200, 4}, DenoiseLight{4, 200, 4}}) {
+      const BenchRaw raw = raw_of(take(*picture, light, 7), {}, 7);
+      double snr = 0;
+      const double expected = predicted(raw, snr);
+      const Encoded8 best = developed(raw, {Level::high, {}});
+      std::printf("%-12s %8s %6.2f | %6.2f", std::string(name).c_str(), name_of(light).c_str(), snr, expected);
+      for (const Reduction& way : ways) {
+        const double seen = seen_difference(developed(raw, way), best, executor).percentile95;
+        if (!way.level) std::printf(" %6.2f |", seen);
+        std::printf(" %5.3f", seen / expected);
+      }
+      std::printf("\n");
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace lowlux::isp
+
+int main(int argc, char**) {
+  if (argc > 2) return lowlux::isp::against_truth(lowlux::isp::PictureSet::tuning);
+  return lowlux::isp::run(argc > 1 ? lowlux::isp::PictureSet::held_out : lowlux::isp::PictureSet::tuning);
+}
