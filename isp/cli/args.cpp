@@ -94,10 +94,17 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   add_camera(app, args);
   add_denoise(app, args);
   add_darks(app, args.dark);
+  add_budget(app, args.effects);
   add_batch(app, args);
   Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
   if (auto* const good = std::get_if<DevelopArgs>(&parsed)) {
-    if (const auto wrong = complete_look(good->look, good->options.look)) return refuse(app, *wrong);
+    if (const auto wrong = complete_look(good->look, Planner::of_everything, good->options.look)) {
+      return refuse(app, *wrong);
+    }
+    if (const auto wrong = complete_effects(good->look, good->effects)) return refuse(app, *wrong);
+    if (good->effects.budgeted() && good->jobs > 1) {
+      return refuse(app, "a budget is for one file at a time: leave --jobs out");
+    }
   }
   return parsed;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "isp/cli/advise_args.h"
+#include "isp/cli/effects_args.h"
 #include "isp/cli/look_args.h"
 #include "isp/pipeline/plan.h"
 
@@ -42,6 +43,7 @@ struct DevelopArgs {
   bool quiet = false;
   DarkArgs dark;
   LookArgs look;
+  EffectsArgs effects;
 };
 
 struct InfoArgs {

@@ -239,7 +239,7 @@ Wrong complete(const CLI::App& app, const Words& words, CaptureArgs& args) {
   if (!develop.profile.empty() && !develop.black_profile.empty()) {
     return "--black and --profile name a profile each: --profile uses all that is in one";
   }
-  if (auto wrong = complete_look(develop.look, develop.options.look)) return wrong;
+  if (auto wrong = complete_look(develop.look, Planner::of_look, develop.options.look)) return wrong;
   const bool endless = args.folder || args.kind == CaptureKind::live;
   args.limits.frames = static_cast<std::uint64_t>(words.frames.value_or(endless ? 0 : 1));
   if (args.kind == CaptureKind::raw) return wrong_for_raw(app, args);

@@ -24,6 +24,25 @@ void add_noise(Lines& out, const isp::NoiseReduction& noise) {
   }
 }
 
+void add_effects(Lines& out, const isp::EffectsPlan& effects, const isp::EffectsChoice& choice) {
+  out.add("effects", choice.all ? std::string("all")
+                     : choice.tolerance_delta_e
+                         ? fmt::format("auto, tolerance {:.2g} CIEDE2000", *choice.tolerance_delta_e)
+                         : std::string("auto, as accurate as the budget lets them be"));
+  for (const isp::PlannedEffect& effect : effects.effects) {
+    std::string text = fmt::format("{}: {}", effect.name, effect.used ? "reduced" : "left");
+    text += std::isfinite(effect.size)
+                ? fmt::format("; {:.2g} CIEDE2000, of which {:.2g} may stay", effect.size, effect.left)
+                : std::string("; size not predicted");
+    if (effect.seconds) text += fmt::format("; {:.1f} ms", 1e3 * *effect.seconds);
+    out.add("", text + " (" + effect.decision + ")");
+  }
+  if (effects.predicted_s) {
+    out.add("budget", fmt::format("{:.1f} ms; predicted {:.1f} ms", 1e3 * choice.budget_s.value_or(0),
+                                  1e3 * *effects.predicted_s));
+  }
+}
+
 std::string look_name(const isp::DevelopPlan& plan) {
   return plan.look->kind == isp::Look::model ? plan.options.look.model : "eye";
 }
@@ -59,6 +78,7 @@ std::string explain_text(const isp::DevelopPlan& plan) {
   out.add("black [DN]",
           fmt::format("{:.2f} from {}{}", fmt::join(plan.black.pedestal_dn, " "), name_of(plan.black.source),
                       plan.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", dark charge in it" : ""));
+  if (plan.effects) add_effects(out, *plan.effects, *plan.options.effects);
   out.add("defects", fmt::format("{} pixels repaired", plan.defects.size()));
   add_noise(out, plan.noise_reduction);
   out.add("white", plan.white ? fmt::format("{}, {:.0f} K", plan.white_balance_rule, plan.white->cct_k)

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,7 +24,11 @@ struct LookArgs {
 
 void add_look(CLI::App& app, LookArgs& args);
 
+/// Who decides what a frame calls for: the look alone, or a planner that also decides about corrections, to which
+/// --effects auto, --effects all and --tolerance belong whatever the look.
+enum class Planner : std::uint8_t { of_look, of_everything };
+
 /// The choice with defaults filled in. @return what is wrong with the options together, or nothing
-std::optional<std::string> complete_look(const LookArgs& args, isp::LookChoice& choice);
+std::optional<std::string> complete_look(const LookArgs& args, Planner planner, isp::LookChoice& choice);
 
 }  // namespace lowlux::cli

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "capture/file/dng_source.h"
+#include "isp/cli/cost_file.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/noise_maps.h"
 #include "isp/cli/noise_source.h"
@@ -36,6 +37,12 @@ Result<void> check_free(const std::string& output, bool force) {
 /// What holds for one frame: profile and darks; what the profile says goes into the frame.
 Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) {
   isp::DevelopOptions options = batch.options;
+  options.effects = batch.args.effects.effects;
+  if (batch.cost) {
+    const Rect& crop = frame.raw.default_crop;
+    options.effects->cost = batch.cost;
+    options.effects->budget_s = budget_s(batch.args.effects, 1e-6 * crop.width * crop.height);
+  }
   if (batch.profile) {
     const bool everything = !batch.args.profile.empty();
     const auto used = use_profile(*batch.profile, everything, frame, options);
@@ -78,16 +85,21 @@ DevelopOutcome outcome_of(const Job& job, const RawWork& work, Executor& executo
   return out;
 }
 
+int threads_of_each(int workers) {
+  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  return std::clamp(processors / workers, 1, 8);
+}
+
 /// Each worker takes the next file: while one reads, another renders or encodes.
 std::vector<DevelopOutcome> run_all(const RawBatch& batch, const RawWork& work) {
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int files = static_cast<int>(batch.jobs.size());
-  const int workers = std::min(files, batch.args.jobs > 0 ? batch.args.jobs : processors);
+  const int workers = batch.cost ? 1 : std::min(files, batch.args.jobs > 0 ? batch.args.jobs : processors);
   std::vector<DevelopOutcome> outcomes(batch.jobs.size());
   std::atomic<int> next{0};
   Progress progress(files, !batch.args.quiet);
   const auto worker = [&] {
-    PoolExecutor executor(std::clamp(processors / workers, 1, 8));
+    PoolExecutor executor(threads_of_each(workers));
     for (int i = next++; i < files; i = next++) {
       outcomes[i] = outcome_of(batch.jobs[i], work, executor, progress);
       progress.print([&] { print_outcome(batch.args, outcomes[i]); });
@@ -111,7 +123,7 @@ void FileProgress::reach(double share) {
 
 Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& options, std::vector<Job> jobs,
                             const std::vector<std::string>& darks) {
-  RawBatch batch{args, options, std::move(jobs), std::nullopt, std::nullopt};
+  RawBatch batch{args, options, std::move(jobs), std::nullopt, std::nullopt, isp::Overwrite::no, nullptr};
   if (const std::string& file = args.profile.empty() ? args.black_profile : args.profile; !file.empty()) {
     auto profile = read_profile(file);
     if (!profile) return tl::make_unexpected(with_place(profile.error(), file));
@@ -122,6 +134,11 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
     std::error_code error;
     std::filesystem::create_directories(args.output, error);
     if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
+  }
+  if (args.effects.budgeted()) {
+    auto cost = cost_of_this_machine(threads_of_each(1), args.quiet);
+    if (!cost) return tl::make_unexpected(cost.error());
+    batch.cost = std::make_shared<const isp::CostModel>(*std::move(cost));
   }
   if (darks.empty()) return batch;
   Result<DarkSource> source = read_darks(darks, args.dark);

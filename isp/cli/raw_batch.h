@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,7 @@ struct RawBatch {
   std::optional<CameraProfile> profile;
   std::optional<DarkSource> darks;
   isp::Overwrite overwrite = isp::Overwrite::no;
+  std::shared_ptr<const isp::CostModel> cost;  // with a budget
 };
 
 /// Reads profile and darks and makes the output folder. Errors name their file.

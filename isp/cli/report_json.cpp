@@ -82,6 +82,27 @@ Json noise_json(const isp::NoiseReduction& noise) {
   return json;
 }
 
+Json number_json(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json effects_json(const isp::DevelopPlan& plan) {
+  if (!plan.effects) return nullptr;
+  const isp::EffectsChoice& choice = *plan.options.effects;
+  Json json{{"mode", choice.all ? "all" : "auto"},
+            {"tolerance_ciede2000", optional_json(choice.tolerance_delta_e)},
+            {"budget_s", optional_json(choice.budget_s)},
+            {"predicted_s", optional_json(plan.effects->predicted_s)},
+            {"effects", Json::array()}};
+  for (const isp::PlannedEffect& effect : plan.effects->effects) {
+    json["effects"].push_back({{"name", effect.name},
+                               {"ciede2000", number_json(effect.size)},
+                               {"left_ciede2000", number_json(effect.left)},
+                               {"used", effect.used},
+                               {"decision", effect.decision},
+                               {"predicted_s", optional_json(effect.seconds)}});
+  }
+  return json;
+}
+
 Json look_json(const isp::DevelopPlan& plan) {
   if (!plan.look) return nullptr;
   const isp::LookPlan& look = *plan.look;
@@ -154,6 +175,7 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"white_balance", white_json(plan)},
             {"exposure", {{"ev", plan.exposure_ev}, {"rule", plan.exposure_rule}}},
             {"defects_repaired", plan.defects.size()},
+            {"effects", effects_json(plan)},
             {"denoise", noise_json(plan.noise_reduction)},
             {"look", look_json(plan)},
             {"warnings", plan.warnings}};

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "isp/pipeline/effect_sizes.h"
+#include "isp/pipeline/plan_effects.h"
 #include "isp/pipeline/plan_noise.h"
 #include "isp/pipeline/plan_rendering.h"
 #include "isp/pipeline/stage_clock.h"
@@ -31,8 +33,8 @@ Result<void> check(const RawFrame& frame, const DevelopOptions& o) {
 }
 
 // Defects the source names, those whose dark is unknown and, if asked for, those that stand out of what is measured.
-std::vector<Pixel> all_defects(const RawFrame& frame, const RawDn& measured, DevelopPlan& plan, double black_noise_dn,
-                               Executor& executor) {
+std::vector<Pixel> all_defects(const RawFrame& frame, const RawDn& measured, const Thumbnail& thumbnail,
+                               DevelopPlan& plan, Executor& executor) {
   const auto named = named_defects(frame.raw, frame.corrections.defects);
   if (!named)
     plan.warnings.emplace_back("the file names a large part of its pixels as defective: these are not repaired");
@@ -40,13 +42,8 @@ std::vector<Pixel> all_defects(const RawFrame& frame, const RawDn& measured, Dev
   if (plan.options.dark_frame) {
     defects = merged(defects, *named_defects(frame.raw, plan.options.dark_frame->unknown));
   }
-  if (!plan.options.find_defects) return defects;
-  DefectNoise noise{black_noise_dn};
-  // A variance of scale * x at the fraction x of white is scale * range for each DN.
-  if (frame.noise) {
-    noise.shot_dn = *std::ranges::max_element(frame.noise->scale) * mean_range_dn(frame.raw, plan.black);
-  }
-  const std::vector<Pixel> found = find_defects(measured, plan.black, noise, executor);
+  if (!plan.options.find_defects || (plan.effects && !plan.effects->find_defects)) return defects;
+  const std::vector<Pixel> found = find_defects(measured, plan.black, defect_noise(frame, plan, thumbnail), executor);
   return merged(defects, found);
 }
 
@@ -106,14 +103,18 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   const RawFrame& measured = without_dark ? *without_dark : frame;
   const Thumbnail thumbnail = make_thumbnail(measured, plan.black, executor);
   clock.lap("thumbnail");
-  plan.defects = all_defects(frame, measured.raw, plan,
-                             thumbnail.black_noise_std * mean_range_dn(frame.raw, plan.black), executor);
-  clock.lap("defects");
-
   if (const Result<void> decided = decide_rendering(frame, thumbnail, plan); !decided) {
     return tl::make_unexpected(decided.error());
   }
   clock.lap("white and exposure");
+  if (options.effects) {
+    if (auto decided = decide_effects(frame, thumbnail, plan, executor); !decided) {
+      return tl::make_unexpected(std::move(decided.error()));
+    }
+    clock.lap("effects");
+  }
+  plan.defects = all_defects(frame, measured.raw, thumbnail, plan, executor);
+  clock.lap("defects");
 
   Result<NoiseReduction> noise = plan_noise(frame, thumbnail, plan, executor);
   if (!noise) return tl::make_unexpected(std::move(noise.error()));

@@ -12,6 +12,7 @@
 #include "isp/base/result.h"
 #include "isp/base/tone_table.h"
 #include "isp/model/camera_colour.h"
+#include "isp/pipeline/cost_model.h"
 #include "isp/pipeline/display_target.h"
 #include "isp/pipeline/look.h"
 #include "isp/pipeline/noise_reduction.h"
@@ -29,6 +30,17 @@ struct WhiteBalanceChoice {
   double cct_k = 0;  // for Mode::temperature, white_min_k..white_max_k
 };
 
+/// How much is done of what options leave open: the search for defects, row and column noise, the level of noise
+/// reduction, dark charge, the change for a display. See plan_effects.h.
+struct EffectsChoice {
+  bool all = false;  // everything, with Level::high
+  /// CIEDE2000 that what is left out may change, as visible_noise.h measures it. With a budget it may be absent: then
+  /// the most accurate plan that fits is wanted, Level::best among them.
+  std::optional<double> tolerance_delta_e = 0.5;
+  std::optional<double> budget_s;         // for planning and rendering the frame; needs the cost
+  std::shared_ptr<const CostModel> cost;  // of this machine; absent: nothing is said of time
+};
+
 /// How a frame is to be developed.
 struct DevelopOptions {
   WhiteBalanceChoice white_balance;
@@ -43,12 +55,34 @@ struct DevelopOptions {
   DenoiseChoice denoise;
   LookChoice look;
   std::shared_ptr<const DisplayTarget> display;  // set: sRGB codes are changed for it
+  std::optional<EffectsChoice> effects;          // absent: each option above decides for itself
 };
 
 /// Time one step took.
 struct StageTime {
   std::string_view stage;
   double seconds;
+};
+
+/// One thing that may be left out of developing, or done with less work.
+struct PlannedEffect {
+  std::string_view name;
+  double size = 0;  // CIEDE2000 that leaving it out would change; not a number where that is not known
+  double left = 0;  // that the decision leaves of it, against everything that can be done
+  bool used = true;
+  std::string decision;           // in words
+  std::optional<double> seconds;  // it is predicted to take; what every plan begins with is none of them
+};
+
+/// What was decided of them together.
+struct EffectsPlan {
+  std::vector<PlannedEffect> effects;
+  std::optional<double> predicted_s;  // of planning and rendering
+  bool find_defects = true;
+  bool lines = true;
+  bool dark = true;
+  std::optional<denoise::Level> level;
+  bool level_decided = false;  // false: noise is left as options have it
 };
 
 /// Everything decided about one frame before a pixel is touched: what was measured, and what the kernels need.
@@ -76,6 +110,7 @@ struct DevelopPlan {
   ToneTable tone;
 
   std::vector<StageTime> times;
+  std::optional<EffectsPlan> effects;  // where DevelopOptions::effects asked for it
 };
 
 /// Whether the options fit together: float samples go with linear spaces and no tone curve, and XYZ and camera RGB

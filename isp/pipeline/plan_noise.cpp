@@ -8,6 +8,7 @@
 
 #include "denoise/noise_check.h"
 #include "isp/pipeline/electron_mosaic.h"
+#include "isp/pipeline/frame_sample.h"
 
 namespace lowlux::isp {
 namespace {
@@ -15,22 +16,6 @@ namespace {
 constexpr double saturated = 0.99;  // of white: a little below, because pixels do not all saturate at one code
 
 int colour_of(const RawDn& raw, int site) { return static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)); }
-
-/// Why the noise of a frame cannot be reduced at all.
-std::optional<Error> obstacle(const RawFrame& frame, const DevelopPlan& plan) {
-  if (frame.raw.layout != SensorLayout::bayer) {
-    return Error{ErrorCode::unsupported, "noise is reduced on Bayer mosaics, and this is none"};
-  }
-  if (frame.raw.active.width < 2 || frame.raw.active.height < 2) {
-    return Error{ErrorCode::invalid_argument, "the picture is too small to tell noise from detail"};
-  }
-  if (!plan.electrons_at_white) {
-    return Error{ErrorCode::insufficient,
-                 "the noise is unknown: the file has no usable NoiseProfile; give a profile (--profile, see calibrate "
-                 "and calib/profiles)"};
-  }
-  return std::nullopt;
-}
 
 /// Of a raw value without light, by the noise model or, if that is more, as the black point's pixels had it; at least
 /// that of rounding to codes.
@@ -75,22 +60,11 @@ std::array<double, 3> balance_of(const RawFrame& frame, const DevelopPlan& plan)
   return gain;
 }
 
-/// Lines stand out where their own noise is more than the error of its measurement, and seen beside a pixel's: its sum
-/// over a line is what the eye follows. More than a pixel's noise is no readout, but a blind or a fence.
-void add_lines(const Result<denoise::LineOffsets>& found, double pixel_std_e,
-               std::vector<denoise::LineOffsets>& lines) {
-  constexpr double seen = 0.03;
-  if (!found || found->gain < 0.5) return;
-  if (found->line_std_e > seen * pixel_std_e && found->line_std_e < pixel_std_e) lines.push_back(*found);
-}
-
 std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, const Plane<float>& charge_e) {
-  const auto& v = plan.noise.variance_e2;
-  const double dark = plan.noise.dark_mean_e[0];
-  const double pixel_std_e = std::sqrt(dark + (v[0] + 2 * v[1] + v[2]) / 4);
   std::vector<denoise::LineOffsets> lines;
   for (const auto kind : {denoise::Lines::rows, denoise::Lines::columns}) {
-    add_lines(denoise::line_offsets_of_frame(charge_e.view(), kind), pixel_std_e, lines);
+    auto found = denoise::line_offsets_of_frame(charge_e.view(), kind);
+    if (found && lines_stand_out(*found, plan.noise)) lines.push_back(*std::move(found));
   }
   return lines;
 }
@@ -111,10 +85,15 @@ NoiseReduction left_alone(std::string reason) {
   return out;
 }
 
-void choose_level(const DenoiseChoice& choice, NoiseReduction& out) {
+void choose_level(const DenoiseChoice& choice, const std::optional<EffectsPlan>& effects, NoiseReduction& out) {
   if (choice.mode == DenoiseChoice::Mode::level) {
     out.level = choice.level;
     out.reason = "given";
+    return;
+  }
+  if (effects && effects->level_decided) {
+    out.level = effects->level;
+    out.reason = fmt::format("what the frame calls for, at a signal to noise ratio of {:.3g}", *out.snr);
     return;
   }
   out.level = level_for(*out.snr);
@@ -122,7 +101,35 @@ void choose_level(const DenoiseChoice& choice, NoiseReduction& out) {
   out.reason = fmt::format("signal to noise ratio {:.3g} of a pixel in the middle block", *out.snr);
 }
 
+/// Everything of the frame, or a sample of it where that will do.
+RawElectrons charge_to_check(const RawFrame& frame, const DevelopPlan& plan, bool with_lines, Executor& executor) {
+  const std::vector<Rect> squares = with_lines ? std::vector<Rect>{} : sample_squares(frame, plan);
+  return squares.empty() ? raw_electrons(frame, plan, {}, executor) : sample_electrons(frame, plan, squares, executor);
+}
+
 }  // namespace
+
+std::optional<Error> noise_obstacle(const RawFrame& frame, const DevelopPlan& plan) {
+  if (frame.raw.layout != SensorLayout::bayer) {
+    return Error{ErrorCode::unsupported, "noise is reduced on Bayer mosaics, and this is none"};
+  }
+  if (frame.raw.active.width < 2 || frame.raw.active.height < 2) {
+    return Error{ErrorCode::invalid_argument, "the picture is too small to tell noise from detail"};
+  }
+  if (!plan.electrons_at_white) {
+    return Error{ErrorCode::insufficient,
+                 "the noise is unknown: the file has no usable NoiseProfile; give a profile (--profile, see calibrate "
+                 "and calib/profiles)"};
+  }
+  return std::nullopt;
+}
+
+bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise) {
+  constexpr double seen = 0.03;
+  const auto& v = noise.variance_e2;
+  const double pixel_std_e = std::sqrt(noise.dark_mean_e[0] + (v[0] + 2 * v[1] + v[2]) / 4);
+  return found.gain >= 0.5 && found.line_std_e > seen * pixel_std_e && found.line_std_e < pixel_std_e;
+}
 
 std::optional<denoise::Level> level_for(double snr) {
   if (snr >= 60) return std::nullopt;
@@ -159,7 +166,7 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
                                   Executor& executor) {
   const DenoiseChoice& choice = plan.options.denoise;
   if (choice.mode == DenoiseChoice::Mode::off) return left_alone("not asked for");
-  if (auto error = obstacle(frame, plan)) {
+  if (auto error = noise_obstacle(frame, plan)) {
     if (choice.mode == DenoiseChoice::Mode::level) return tl::make_unexpected(*std::move(error));
     return left_alone(std::move(error->message));
   }
@@ -167,11 +174,12 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   set_noise_model(frame, plan, out);
   std::vector<double> memory;
   out.snr = middle_snr(frame, plan, out.noise, thumbnail, memory);
-  choose_level(choice, out);
+  choose_level(choice, plan.effects, out);
   if (!out.level) return out;
   out.options.level = *out.level;
-  RawElectrons charge = raw_electrons(frame, plan, {}, executor);
-  if (choice.line_noise) take_lines_off(charge, out);
+  const bool with_lines = choice.line_noise && (!plan.effects || plan.effects->lines);
+  RawElectrons charge = charge_to_check(frame, plan, with_lines, executor);
+  if (with_lines) take_lines_off(charge, out);
   const denoise::NoiseCheck check = denoise::check_noise({charge.value.view(), charge.phase}, out.noise);
   for (const denoise::NoiseRemark& remark : denoise::remarks_on(check)) plan.warnings.push_back(remark.text);
   out.options.variance_scale = denoise::variance_scale_of(check);

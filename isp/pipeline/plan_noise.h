@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "isp/base/executor.h"
@@ -9,6 +10,15 @@
 #include "isp/raw/thumbnail.h"
 
 namespace lowlux::isp {
+
+/// Why the noise of a frame cannot be reduced at all; nullopt if it can. Errors: no Bayer mosaic (unsupported), too
+/// small (invalid_argument), unknown noise (insufficient).
+std::optional<Error> noise_obstacle(const RawFrame& frame, const DevelopPlan& plan);
+
+/// Row or column noise is taken off where it stands out: its own is more than the error of its measurement, and more
+/// than 3 % of a pixel's noise, as the eye follows its sum over a line. More than a pixel's noise is no readout, but a
+/// blind or a fence.
+bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise);
 
 /// Decides how noise is reduced. What contradicts the noise model becomes a warning of the plan.
 /// @param plan  with black, defects, electrons at white and white gains decided

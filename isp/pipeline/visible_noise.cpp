@@ -15,6 +15,7 @@ namespace {
 constexpr int most_blocks_along = 32;
 constexpr std::array<double, 3> samples_in_box{16, 32, 16};  // of R, G, B
 constexpr std::array<double, 3> share_of_sites{0.25, 0.5, 0.25};
+constexpr double least_variance_e2 = 1e-6;
 
 /// From camera RGB, a fraction of white with the black off, to what is displayed.
 class Display {
@@ -72,16 +73,24 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
     mean_variance += share_of_sites[c] * (std::max(charge_e[c], 0.0) + noise.variance_e2[c]);
   }
   const Lab lab = display.lab(signal);
-  Vector3 with_dark = signal;
+  Vector3 with_dark = signal, with_line = signal;
+  const double line_e = std::sqrt(std::max(mean_variance, least_variance_e2) / (seen_box_px * seen_box_px));
+  double point = 0;
   for (int c = 0; c < 3; ++c) {
     const double variance_e2 = std::max(charge_e[c], 0.0) + noise.variance_e2[c];
+    const double step_e = std::sqrt(std::max(variance_e2, least_variance_e2) / samples_in_box[c]);
     Vector3 moved = signal;
-    moved[c] += std::sqrt(variance_e2 / samples_in_box[c]) / channels.electrons_at_white[c];
-    squares += std::pow(ciede2000(lab, display.lab(moved)), 2);
+    moved[c] += step_e / channels.electrons_at_white[c];
+    const double difference = ciede2000(lab, display.lab(moved));
+    squares += difference * difference;
+    point = std::max(point, difference / (step_e * samples_in_box[c]));
     with_dark[c] += channels.dark_e[c] / channels.electrons_at_white[c];
+    with_line[c] += line_e / channels.electrons_at_white[c];
   }
   SeenBlock out;
-  out.snr = static_cast<float>(std::max(mean_signal, 0.0) / std::sqrt(std::max(mean_variance, 1e-12)));
+  out.line_delta_e = static_cast<float>(ciede2000(lab, display.lab(with_line)) / line_e);
+  out.point_delta_e = static_cast<float>(point);
+  out.snr = static_cast<float>(std::max(mean_signal, 0.0) / std::sqrt(std::max(mean_variance, least_variance_e2)));
   out.noise_delta_e = static_cast<float>(std::sqrt(squares));
   out.dark_delta_e = static_cast<float>(ciede2000(lab, display.lab(with_dark)));
   return out;

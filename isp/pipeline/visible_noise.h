@@ -21,6 +21,8 @@ struct SeenBlock {
   float snr = 0;            // of one mean pixel, dark charge off
   float noise_delta_e = 0;  // root mean square CIEDE2000 of the noise, in means over 8 x 8 pixels
   float dark_delta_e = 0;   // CIEDE2000 of its mean dark charge, were it left in
+  float line_delta_e = 0;   // CIEDE2000 for each electron that all its pixels have too much
+  float point_delta_e = 0;  // the same of one pixel alone, of the colour where that shows most
 };
 
 /// Up to some 1000 blocks, evenly spread over the frame. With C the colour as it will be displayed and s_c the standard

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "isp/base/result.h"
+#include "isp/pipeline/cost_model.h"
+
+/// What developing costs on this machine, kept between runs.
+namespace lowlux::cli {
+
+/// What times depend on: processor, instruction set, version of lowlux. Another machine's times are not believed.
+std::string machine_name();
+
+/// $XDG_CACHE_HOME/lowlux/cost-THREADS.json, or in ~/.cache; nullopt where neither variable is set.
+std::optional<std::string> cost_file(int threads);
+
+/// The cost model as JSON, and back. Error: it is none (malformed).
+std::string cost_text(const isp::CostModel& model);
+Result<isp::CostModel> parse_cost(std::string_view text);
+
+/// The model of this machine with so many threads: from its file or, where there is none, or one of another machine or
+/// version, measured now and written there. What keeps it from being written is told on stderr; it is used all the
+/// same. Errors: those of measuring.
+Result<isp::CostModel> cost_of_this_machine(int threads, bool quiet);
+
+/// Measures anew and writes the file. @return its name, empty where there is no place for one
+Result<isp::CostModel> calibrate_cost(int threads, bool quiet, std::string& written_to);
+
+}  // namespace lowlux::cli

@@ -1,0 +1,36 @@
+#include "isp/pipeline/cost_model.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace lowlux::isp {
+
+std::string_view name_of(CostPart part) {
+  static constexpr std::array<std::string_view, cost_parts> names{
+      "planning", "defects", "lines",      "check",      "codes",      "floats", "draft-0",
+      "draft-1",  "draft-2", "standard-0", "standard-1", "standard-2", "high-0", "high-1",
+      "high-2",   "best-0",  "best-2",     "codes-16",   "floats-32",  "look"};
+  return names[static_cast<std::size_t>(part)];
+}
+
+double CostModel::seconds(CostPart part, double megapixels) const {
+  assert(megapixels > 0);
+  const std::vector<CostPoint>& at = points[static_cast<std::size_t>(part)];
+  if (at.empty()) return 0;
+  const auto per_mp = [](const CostPoint& point) { return point.seconds / point.megapixels; };
+  const auto above = std::ranges::find_if(at, [&](const CostPoint& point) { return point.megapixels >= megapixels; });
+  if (above == at.begin()) return per_mp(at.front()) * megapixels;
+  if (above == at.end()) return per_mp(at.back()) * megapixels;
+  const CostPoint &low = *(above - 1), &high = *above;
+  const double way = std::log(megapixels / low.megapixels) / std::log(high.megapixels / low.megapixels);
+  return (per_mp(low) + way * (per_mp(high) - per_mp(low))) * megapixels;
+}
+
+double predicted_s(const CostModel& model, double megapixels, const std::vector<CostShare>& work) {
+  double sum = 0;
+  for (const CostShare& part : work) sum += part.share * model.seconds(part.part, megapixels);
+  return sum;
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "isp/base/image.h"
+
+/// How long developing takes on this machine.
+namespace lowlux::isp {
+
+/// Parts of the work that plans differ in.
+enum class CostPart : std::uint8_t {
+  planning,  // black point, thumbnail, white, exposure, samples: what every plan begins with
+  defects,   // the search in the whole frame
+  lines,     // row and column noise of the whole frame
+  check,     // of the noise model
+  codes,     // rendering straight from codes
+  floats,    // rendering from electrons
+  draft_0,   // the same with noise reduced, chroma starting on level 0, 1 or 2
+  draft_1,
+  draft_2,
+  standard_0,
+  standard_1,
+  standard_2,
+  high_0,
+  high_1,
+  high_2,
+  best_0,
+  best_2,
+  codes_16,  // what 16-bit codes take more than 8-bit ones
+  floats_32,
+  look,  // what the look of the eye takes more
+};
+inline constexpr int cost_parts = 20;
+
+/// "planning", "draft-1" and so on.
+std::string_view name_of(CostPart part);
+
+/// Measured at some sizes.
+struct CostPoint {
+  double megapixels = 0;
+  double seconds = 0;
+};
+
+/// Times of one machine with one number of threads.
+struct CostModel {
+  std::string machine;  // that was measured; see isp/cli/cost_file.h
+  int threads = 1;
+  std::array<std::vector<CostPoint>, cost_parts> points;  // of each part, by rising size; none: the part is free
+
+  /// Seconds of a part for a frame of this size: seconds per megapixel are linear in the logarithm of the size between
+  /// two points, and those of the nearest beyond them. @param megapixels  > 0
+  double seconds(CostPart part, double megapixels) const;
+};
+
+/// One part of a plan's work.
+struct CostShare {
+  CostPart part;
+  double share = 1;  // of the frame
+};
+
+/// The sum over parts.
+double predicted_s(const CostModel& model, double megapixels, const std::vector<CostShare>& work);
+
+}  // namespace lowlux::isp

@@ -1,0 +1,26 @@
+#pragma once
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+#include "isp/pipeline/plan.h"
+#include "isp/raw/thumbnail.h"
+
+namespace lowlux::isp {
+
+/// Decides what a frame calls for, by its levels, its noise and a sample of it: sets plan.effects, and takes dark
+/// charge and a display out of the plan where they are left out. Without a budget it leaves out what stays below the
+/// tolerance, all of it together; with one it takes the most accurate of all plans that are predicted to fit, or the
+/// cheapest of those within the tolerance, if one is given and one fits.
+/// Needs plan.options.effects, and of the plan black, electrons at white, rendering. Error: the budget is below the
+/// cheapest plan, whose time is told (insufficient).
+Result<void> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan, Executor& executor);
+
+/// Upper bound of what a level of noise reduction leaves of the visible noise, against Level::high, for blocks of this
+/// signal to noise ratio; nullopt is no reduction. Measured on the tuning pictures: tests/bench/planner_bench.cpp.
+double left_of_noise(std::optional<denoise::Level> level, double snr);
+
+/// What is left of it against the truth, for telling which of two plans is better.
+double error_share(std::optional<denoise::Level> level);
+
+}  // namespace lowlux::isp
