@@ -76,6 +76,7 @@ Plot plot_of(const std::string& stage, std::size_t number, std::span<const Accur
     names += (names.empty() ? "" : ", ") + row->level;
   }
   plot.series.push_back(std::move(line));
+  plot.name_points = true;
   plot.caption = "No other level is faster and as good, or better and as fast: " + names;
   return plot;
 }

@@ -31,6 +31,15 @@ struct BenchImage {
   Encoded8 codes;  // sRGB
 };
 
+/// Two of the pictures, of the same size, to be laid over each other.
+struct BenchComparison {
+  std::string title;
+  std::string before_id;
+  std::string before_label;
+  std::string after_id;
+  std::string after_label;
+};
+
 /// What one stage yields.
 struct BenchOutcome {
   BenchTable table;
@@ -38,6 +47,7 @@ struct BenchOutcome {
   std::vector<Plot> plots;
   std::vector<BenchImage> images;
   std::vector<std::string> remarks;  // how it was measured, and what was left out; one line each
+  std::vector<BenchComparison> comparisons = {};
 };
 
 struct BenchOptions {

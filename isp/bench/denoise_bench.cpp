@@ -23,8 +23,9 @@ struct Part {
   int height;
 };
 constexpr Part tuning_part{256, 160}, quick_part{192, 128};
-constexpr int crop_px = 192;          // side of a picture's part in the report
-constexpr double search_share = 0.6;  // of the whole's time
+constexpr int crop_px = 192;                        // side of a picture's part in the report
+constexpr const char* compared_level = "standard";  // with none
+constexpr double search_share = 0.6;                // of the whole's time
 
 /// What is measured: pictures in lights.
 struct Work {
@@ -107,14 +108,26 @@ void add(PictureError& sum, const PictureError& error, double share) {
   sum.saturation_ratio += share * error.saturation_ratio;
 }
 
-Encoded8 side_by_side(const std::vector<Encoded8>& parts) {
-  const int width = parts.front().width(), height = parts.front().height();
+/// What a method makes of the middle of a picture.
+struct NamedPart {
+  std::string name;
+  Encoded8 codes;
+};
+
+Encoded8 side_by_side(const std::vector<NamedPart>& parts) {
+  const int width = parts.front().codes.width(), height = parts.front().codes.height();
   Encoded8 out{Plane<std::uint8_t>(3 * width * static_cast<int>(parts.size()), height)};
   for (std::size_t i = 0; i < parts.size(); ++i) {
     for (int y = 0; y < height; ++y) {
-      std::copy_n(parts[i].codes.row(y), 3 * width, out.codes.row(y) + 3 * width * static_cast<int>(i));
+      std::copy_n(parts[i].codes.codes.row(y), 3 * width, out.codes.row(y) + 3 * width * static_cast<int>(i));
     }
   }
+  return out;
+}
+
+std::string names_of(const std::vector<NamedPart>& parts) {
+  std::string out;
+  for (const NamedPart& part : parts) out += (out.empty() ? "" : ", ") + part.name;
   return out;
 }
 
@@ -125,16 +138,20 @@ Encoded8 middle_codes(const SceneLinear& display) {
   return codes_of(part);
 }
 
-/// The picture of a light for the report: parts of what the methods make of the first picture.
-struct Strip {
-  std::vector<Encoded8> parts;
-  std::string names;
-
-  void add(const std::string& name, const SceneLinear& display) {
-    parts.push_back(middle_codes(display));
-    names += (names.empty() ? "" : ", ") + name;
+/// The pictures of a light for the report: all parts in a row, and two of them to be compared.
+void add_pictures(const DenoiseLight& light, std::vector<NamedPart> parts, BenchOutcome& outcome) {
+  const std::string id = fmt::format("denoise-{:g}-{:g}", light.mean_e, light.dark_e);
+  outcome.images.push_back({id, side_by_side(parts)});
+  for (NamedPart& part : parts) {
+    if (part.name != name_of_none && part.name != compared_level) continue;
+    outcome.images.push_back({id + "-" + part.name, std::move(part.codes)});
   }
-};
+  outcome.comparisons.push_back({.title = fmt::format("{:g} e- over {:g} e- of dark", light.mean_e, light.dark_e),
+                                 .before_id = fmt::format("{}-{}", id, name_of_none),
+                                 .before_label = "no noise reduction",
+                                 .after_id = fmt::format("{}-{}", id, compared_level),
+                                 .after_label = fmt::format("level {}", compared_level)});
+}
 
 /// Rows of one light.
 class LightRows {
@@ -151,7 +168,7 @@ class LightRows {
     const BenchPicture& picture = work_.pictures[index];
     const DenoiseShot shot = take(picture, work_.lights[light_], seed_of(picture, work_.lights[light_]));
     const PictureTruth truth(picture.linear.view(), executor);
-    if (index == 0) strip.add("truth", picture.linear);
+    if (index == 0) parts.push_back({"truth", middle_codes(picture.linear)});
     MethodInput input{picture, shot, work_.tuned[light_], work_.options.nl_means};
     if (!work_.strengths.empty()) input.strength = work_.strengths[index * work_.lights.size() + light_].best;
     input.rounds = rounds;
@@ -163,7 +180,7 @@ class LightRows {
       add(rows_[m].error, picture_error(result->picture, truth, executor), share);
       rows_[m].s_per_mp += share * result->cpu_s / megapixels;
       rows_[m].times_memcpy += share * result->cpu_s / result->memcpy_s;
-      if (index == 0) strip.add(methods_[m].name, result->picture.display);
+      if (index == 0) parts.push_back({methods_[m].name, middle_codes(result->picture.display)});
     }
     return {};
   }
@@ -177,7 +194,7 @@ class LightRows {
     return std::move(rows_);
   }
 
-  Strip strip;
+  std::vector<NamedPart> parts;  // of the first picture
 
  private:
   const Work& work_;
@@ -229,10 +246,8 @@ Result<std::vector<DenoiseRow>> measure_all(const Work& work, Executor& executor
                            fmt::format("{} at {}", work.pictures[picture].name, name_of(work.lights[light])));
     }
     for (DenoiseRow& row : of_light.finished()) rows.push_back(std::move(row));
-    const DenoiseLight& l = work.lights[light];
-    outcome.images.push_back(
-        {fmt::format("denoise-{:g}-{:g}", l.mean_e, l.dark_e), side_by_side(of_light.strip.parts)});
-    if (light == 0) outcome.remarks.push_back("pictures show, from left to right: " + of_light.strip.names);
+    if (light == 0) outcome.remarks.push_back("pictures show, from left to right: " + names_of(of_light.parts));
+    add_pictures(work.lights[light], std::move(of_light.parts), outcome);
   }
   return rows;
 }

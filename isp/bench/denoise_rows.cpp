@@ -52,6 +52,7 @@ Plot plot_of(std::span<const DenoiseRow> rows) {
     line.y.push_back(error);
   }
   plot.series.push_back(std::move(line));
+  plot.name_points = true;
   plot.caption = "No other row is faster and as good, or better and as fast: " + names;
   return plot;
 }

@@ -17,7 +17,7 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_flag("--list", args.list, "the stages, one line each");
   app.add_option("-o,--output", args.output,
-                 "folder, made if need be, for STAGE.csv, STAGE.json, STAGE.html and parts of pictures (PNG)")
+                 "folder, made if need be, for the page bench.html, STAGE.csv, STAGE.json and parts of pictures (PNG)")
       ->type_name("DIR");
   add_choice<isp::PictureSet>(
       app, "--pictures",

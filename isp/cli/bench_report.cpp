@@ -15,7 +15,7 @@ namespace lowlux::cli {
 namespace {
 
 using Json = nlohmann::ordered_json;
-constexpr int shown_digits = 4;
+constexpr const char* page_name = "bench.html";
 
 /// Columns as wide as their widest cell, figures to the right.
 std::string table_text(const isp::BenchTable& bench) {
@@ -44,7 +44,21 @@ Json json_of(const isp::BenchCell& cell) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
 
-Json json_of(const MeasuredStage& measured) {
+Json json_of(const Machine& machine) {
+  return {{"cpu", machine.cpu ? Json(*machine.cpu) : Json(nullptr)},
+          {"processors", machine.processors},
+          {"threads", machine.threads},
+          {"kernels", machine.kernels},
+          {"memory_gib", machine.memory_gib ? Json(*machine.memory_gib) : Json(nullptr)},
+          {"system", machine.system},
+          {"compiler", machine.compiler},
+          {"lowlux", machine.lowlux}};
+}
+
+/// Names of systems and processors may be of any bytes.
+std::string text_of(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
+
+Json json_of(const MeasuredStage& measured, const Machine& machine) {
   Json rows = Json::array();
   for (const auto& cells : measured.outcome.table.rows) {
     Json row = Json::object();
@@ -52,20 +66,10 @@ Json json_of(const MeasuredStage& measured) {
     rows.push_back(std::move(row));
   }
   return {{"stage", measured.stage.id},
+          {"machine", json_of(machine)},
           {"remarks", measured.outcome.remarks},
           {"rows", std::move(rows)},
           {"findings", Json::parse(findings_json(measured.outcome.findings))}};
-}
-
-std::string page_of(const MeasuredStage& measured) {
-  const isp::BenchOutcome& outcome = measured.outcome;
-  std::string remarks;
-  for (const std::string& remark : outcome.remarks) remarks += remark + ". ";
-  return isp::html_of({.title = "lowlux bench: " + std::string(measured.stage.title),
-                       .text = remarks,
-                       .sections = {{"Error against time", {}, {}, outcome.plots},
-                                    {"What was measured", {}, isp::table_of(outcome.table, shown_digits), {}},
-                                    {"What it must show", {}, isp::table_of(outcome.findings), {}}}});
 }
 
 struct OutputFile {
@@ -73,12 +77,11 @@ struct OutputFile {
   std::string text;
 };
 
-std::vector<OutputFile> text_files(const MeasuredStage& measured) {
+std::vector<OutputFile> text_files(const MeasuredStage& measured, const Machine& machine) {
   constexpr int all_digits = 17;
   const std::string id(measured.stage.id);
   return {{id + ".csv", isp::csv_of(isp::table_of(measured.outcome.table, all_digits))},
-          {id + ".json", json_of(measured).dump(2) + "\n"},
-          {id + ".html", page_of(measured)}};
+          {id + ".json", text_of(json_of(measured, machine)) + "\n"}};
 }
 
 Result<void> check_free(const std::string& name, const BenchArgs& args) {
@@ -89,13 +92,14 @@ Result<void> check_free(const std::string& name, const BenchArgs& args) {
 }
 
 Result<void> check_texts_free(const isp::BenchStage& stage, const BenchArgs& args) {
-  for (const char* end : {".csv", ".json", ".html"}) {
+  for (const char* end : {".csv", ".json"}) {
     if (auto free = check_free(std::string(stage.id) + end, args); !free) return free;
   }
   return {};
 }
 
 Result<void> check_all_free(const std::vector<MeasuredStage>& measured, const BenchArgs& args) {
+  if (auto free = check_free(page_name, args); !free) return free;
   for (const MeasuredStage& m : measured) {
     if (auto free = check_texts_free(m.stage, args); !free) return free;
     for (const isp::BenchImage& image : m.outcome.images) {
@@ -113,10 +117,10 @@ std::string bench_text(const MeasuredStage& measured) {
   return out + '\n' + table_text(measured.outcome.table) + '\n' + findings_text(measured.outcome.findings);
 }
 
-std::string bench_json(const std::vector<MeasuredStage>& measured) {
+std::string bench_json(const std::vector<MeasuredStage>& measured, const Machine& machine) {
   Json out = Json::array();
-  for (const MeasuredStage& m : measured) out.push_back(json_of(m));
-  return out.dump(2);
+  for (const MeasuredStage& m : measured) out.push_back(json_of(m, machine));
+  return text_of(out);
 }
 
 Result<void> check_bench_files(const std::vector<isp::BenchStage>& stages, const BenchArgs& args) {
@@ -124,28 +128,38 @@ Result<void> check_bench_files(const std::vector<isp::BenchStage>& stages, const
   std::error_code error;
   std::filesystem::create_directories(args.output, error);
   if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
+  if (auto free = check_free(page_name, args); !free) return free;
   for (const isp::BenchStage& stage : stages) {
     if (auto free = check_texts_free(stage, args); !free) return free;
   }
   return {};
 }
 
-Result<void> write_bench_files(const std::vector<MeasuredStage>& measured, const BenchArgs& args, Executor& executor) {
+Result<std::vector<std::string>> write_bench_files(const std::vector<MeasuredStage>& measured, const Machine& machine,
+                                                   const BenchArgs& args, Executor& executor) {
   const std::filesystem::path folder(args.output);
-  if (auto free = check_all_free(measured, args); !free) return free;
+  if (auto free = check_all_free(measured, args); !free) return tl::make_unexpected(free.error());
   const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
+  std::vector<std::string> out;
+  const auto write = [&](const OutputFile& file) {
+    out.push_back((folder / file.name).string());
+    return isp::write_text(out.back(), file.text, overwrite);
+  };
+  auto page = bench_page(measured, machine, executor);
+  if (!page) return tl::make_unexpected(page.error());
+  if (auto written = write({page_name, *std::move(page)}); !written) return tl::make_unexpected(written.error());
   for (const MeasuredStage& m : measured) {
-    for (const OutputFile& file : text_files(m)) {
-      auto written = isp::write_text((folder / file.name).string(), file.text, overwrite);
-      if (!written) return written;
+    for (const OutputFile& file : text_files(m, machine)) {
+      if (auto written = write(file); !written) return tl::make_unexpected(written.error());
     }
     for (const isp::BenchImage& image : m.outcome.images) {
-      auto written = isp::write_picture(Encoded8{image.codes.codes.clone()}, OutputSpace::srgb, {},
-                                        (folder / (image.id + ".png")).string(), {.overwrite = overwrite}, executor);
-      if (!written) return written;
+      out.push_back((folder / (image.id + ".png")).string());
+      auto written = isp::write_picture(Encoded8{image.codes.codes.clone()}, OutputSpace::srgb, {}, out.back(),
+                                        {.overwrite = overwrite}, executor);
+      if (!written) return tl::make_unexpected(written.error());
     }
   }
-  return {};
+  return out;
 }
 
 }  // namespace lowlux::cli

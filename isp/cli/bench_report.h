@@ -8,27 +8,24 @@
 #include "isp/base/result.h"
 #include "isp/bench/bench_stages.h"
 #include "isp/cli/bench_args.h"
+#include "isp/cli/bench_page.h"
+#include "isp/cli/machine.h"
 
 namespace lowlux::cli {
-
-/// A stage and what it yielded.
-struct MeasuredStage {
-  isp::BenchStage stage;
-  isp::BenchOutcome outcome;
-};
 
 /// For a terminal: how it was measured, the table, the findings.
 std::string bench_text(const MeasuredStage& measured);
 
-/// One JSON array, an object for each stage: stage, remarks, rows with the table's columns as keys (null where there is
-/// no figure), findings.
-std::string bench_json(const std::vector<MeasuredStage>& measured);
+/// One JSON array, an object for each stage: stage, machine, remarks, rows with the table's columns as keys (null where
+/// there is no figure), findings.
+std::string bench_json(const std::vector<MeasuredStage>& measured, const Machine& machine);
 
-/// Before the work: makes the folder, and sees what keeps STAGE.csv, STAGE.json and STAGE.html from being written to
+/// Before the work: makes the folder, and sees what keeps bench.html, STAGE.csv and STAGE.json from being written to
 /// the folder `output`.
 Result<void> check_bench_files(const std::vector<isp::BenchStage>& stages, const BenchArgs& args);
 
-/// Writes all files of all stages; nothing if one is in the way.
-Result<void> write_bench_files(const std::vector<MeasuredStage>& measured, const BenchArgs& args, Executor& executor);
+/// Writes bench.html and all files of all stages; nothing if one is in the way. Their paths, in the order of writing.
+Result<std::vector<std::string>> write_bench_files(const std::vector<MeasuredStage>& measured, const Machine& machine,
+                                                   const BenchArgs& args, Executor& executor);
 
 }  // namespace lowlux::cli

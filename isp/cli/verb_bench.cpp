@@ -9,6 +9,7 @@
 #include "isp/cli/bench_args.h"
 #include "isp/cli/bench_report.h"
 #include "isp/cli/exit_code.h"
+#include "isp/cli/machine.h"
 #include "isp/cli/module.h"
 #include "isp/cli/progress.h"
 #include "isp/cli/report.h"
@@ -105,14 +106,17 @@ int run_bench(const std::vector<std::string>& words) {
   if (const auto free = check_bench_files(*stages, args); !free) return failed(free.error());
   const isp::BenchOptions options = options_of(args, *folder);
   const std::vector<MeasuredStage> measured = run_each(*stages, options);
+  const Machine machine = this_machine(options.threads);
   if (args.json) {
-    fmt::print("{}\n", bench_json(measured));
+    fmt::print("{}\n", bench_json(measured, machine));
   } else {
     for (const MeasuredStage& stage : measured) fmt::print("{}", bench_text(stage));
   }
   if (!args.output.empty() && !measured.empty()) {
     PoolExecutor executor(options.threads);
-    if (const auto written = write_bench_files(measured, args, executor); !written) return failed(written.error());
+    const auto written = write_bench_files(measured, machine, args, executor);
+    if (!written) return failed(written.error());
+    if (!args.json) fmt::print("\nwritten:\n  {}\n", fmt::join(*written, "\n  "));
   }
   return measured.size() == stages->size() ? exit_done : exit_failed;
 }

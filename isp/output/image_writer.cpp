@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -166,6 +170,22 @@ Result<void> write_picture(const Picture& picture, OutputSpace space, const Fram
             .and_then([&] { return out.commit(); });
       })
       .map_error(located);
+}
+
+Result<std::vector<std::byte>> png_bytes(const Encoded8& picture, OutputSpace space, Executor& executor) {
+  char* bytes = nullptr;
+  std::size_t size = 0;
+  std::FILE* const file = open_memstream(&bytes, &size);
+  if (file == nullptr) return fail(ErrorCode::too_large, "no memory for the picture's file");
+  FileMetadata metadata;
+  metadata.icc = icc_profile(space);
+  const Result<void> written = encode_png(picture, metadata, executor, file);
+  const bool whole = std::fclose(file) == 0;  // only now `bytes` is what was written
+  const std::unique_ptr<char, decltype(&std::free)> owned(bytes, std::free);
+  if (!written) return tl::make_unexpected(written.error());
+  if (!whole) return fail(ErrorCode::too_large, "no memory for the picture's file");
+  const auto all = std::as_bytes(std::span(owned.get(), size));
+  return std::vector<std::byte>(all.begin(), all.end());
 }
 
 }  // namespace lowlux::isp

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
@@ -42,5 +44,8 @@ struct WriteOptions {
 /// orientation 1. The executor's threads compress PNG.
 Result<void> write_picture(const Picture& picture, OutputSpace space, const FrameInfo& info, const std::string& path,
                            const WriteOptions& options, Executor& executor);
+
+/// A PNG file in memory, with the ICC profile of `space`. Error: there is not enough memory; the size cannot be.
+Result<std::vector<std::byte>> png_bytes(const Encoded8& picture, OutputSpace space, Executor& executor);
 
 }  // namespace lowlux::isp

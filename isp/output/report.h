@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -31,28 +32,47 @@ struct Plot {
   bool equal_scales = false;  // one unit is as long on both axes: chromaticity diagrams
   std::vector<Series> series;
   std::string caption;
+  bool name_points =
+      false;  // names of series of one point stand beside it, in bold where a line goes through; no legend
 };
 
 struct Table {
   std::vector<std::string> columns;
   std::vector<std::vector<std::string>> rows;  // each as long as columns
+  std::vector<std::size_t> marked;             // rows on a tinted ground; the section's text says why
+};
+
+/// One side of a comparison.
+struct ComparedPicture {
+  std::string label;
+  std::vector<std::byte> png;  // a file's bytes
+};
+
+/// Two pictures of the same size, one over the other, and a slider that moves the edge between them.
+struct Comparison {
+  std::string title;
+  ComparedPicture before;  // left of the edge
+  ComparedPicture after;
 };
 
 struct ReportSection {
   std::string title;
-  std::string text;
-  Table table;  // left out if it has no columns
+  std::string text;  // a paragraph for each line
+  Table table;       // left out if it has no columns
   std::vector<Plot> plots;
+  std::vector<Comparison> comparisons = {};
+  bool is_part = false;  // of the section before it: a smaller heading, not in the contents
 };
 
 struct Report {
   std::string title;
-  std::string text;
+  std::string text;  // a paragraph for each line
   std::vector<ReportSection> sections;
 };
 
-/// One self-contained HTML page: tables as text, plots drawn by Chart.js, which is in the page. Nothing is fetched. Any
-/// text is shown as it is: it cannot become markup or script. Bytes that are no UTF-8 become replacement characters.
+/// One self-contained HTML page: contents where there are three sections and more, tables as text, plots drawn by
+/// Chart.js and pictures, which are in the page. Nothing is fetched: the page's own policy forbids it. Any text is
+/// shown as it is: it cannot become markup or script. Bytes of plots that are no UTF-8 become replacement characters.
 std::string html_of(const Report& report);
 
 /// Comma-separated values (RFC 4180, lines end with \n): the header, then the rows.

@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <iterator>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include <nlohmann/json.hpp>
 
@@ -17,6 +20,12 @@ using Json = nlohmann::json;
 test::ProcessResult bench(std::vector<std::string> args) {
   args.insert(args.begin(), {LOWLUX_COMMAND, "bench"});
   return test::run_process(args);
+}
+
+std::size_t count(const std::string& text, std::string_view what) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + what.size())) ++n;
+  return n;
 }
 
 const std::string pictures = LOWLUX_TESTDATA "/pictures";
@@ -59,19 +68,33 @@ TEST(Bench, MeasuresEveryMethodInEveryLightAndWritesAllFiles) {
                           [](const Json& f) { return f["id"] == "denoise/nlm-psnr-20/2" && f["holds"].is_boolean(); }));
   EXPECT_EQ(Json::parse(scratch.read("a/b/denoise.json")), stage);
   EXPECT_TRUE(scratch.read("a/b/denoise.csv").starts_with("mean_e,dark_e,read_noise_e,method,psnr_db,"));
-  EXPECT_NE(scratch.read("a/b/denoise.html").find("<canvas"), std::string::npos);
-  EXPECT_EQ(scratch.read("a/b/denoise-20-2.png").substr(1, 3), "PNG");
-  EXPECT_FALSE(scratch.read("a/b/denoise-4-200.png").empty());
+  const Json& machine = stage["machine"];
+  EXPECT_GE(machine["processors"].get<int>(), 1);
+  EXPECT_TRUE(machine["kernels"].is_string() && machine["compiler"].is_string());
+  const std::string page = scratch.read("a/b/bench.html");
+  for (const char* twice : {"<canvas", R"(<input type="range")"}) EXPECT_EQ(count(page, twice), 2u) << twice;
+  for (const auto& light : {"20-2", "4-200"}) {
+    for (const char* which : {"", "-none", "-standard"}) {
+      EXPECT_EQ(scratch.read(std::string("a/b/denoise-") + light + which + ".png").substr(1, 3), "PNG");
+    }
+  }
+  const auto entries = std::filesystem::directory_iterator(folder);
+  EXPECT_EQ(std::distance(begin(entries), end(entries)), 1 + 2 + 6);
 }
 
 TEST(Bench, AFileInTheWayStopsItBeforeTheWork) {
   const test::ScratchDirectory scratch;
-  scratch.write("denoise.html", "mine");
-  const auto result = bench({"--pictures-folder", pictures, "-o", scratch.path()});  // not quick: it would take minutes
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_NE(result.err.find("--force"), std::string::npos) << result.err;
-  EXPECT_EQ(scratch.read("denoise.html"), "mine");
-  EXPECT_EQ(scratch.names().size(), 1u);
+  for (const char* name : {"bench.html", "denoise.json"}) {
+    scratch.write(name, "mine");
+    const auto result =
+        bench({"--pictures-folder", pictures, "-o", scratch.path()});  // not quick: it would take minutes
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_NE(result.err.find("--force"), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find(name), std::string::npos) << result.err;
+    EXPECT_EQ(scratch.read(name), "mine");
+    EXPECT_EQ(scratch.names().size(), 1u);
+    std::filesystem::remove(scratch.file(name));
+  }
 }
 
 TEST(Bench, WithoutPicturesItSaysWhereTheyAre) {

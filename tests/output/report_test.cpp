@@ -37,9 +37,10 @@ TEST(Report, IsOnePageThatFetchesNothingAndHoldsChartJs) {
   EXPECT_EQ(count(page, "Chart.js v"), 1u);
   EXPECT_GE(count(page, "MIT License"), 1u);
   for (const char* fetched : {"<script src", "<link", "@import", "<img", "url("}) EXPECT_EQ(count(page, fetched), 0u);
+  EXPECT_EQ(count(page, "default-src 'none'"), 1u);
   EXPECT_EQ(count(page, "<canvas"), 1u);
   EXPECT_EQ(count(page, "<script>"), count(page, "</script>"));
-  EXPECT_NE(page.find("<td>1</td>"), std::string::npos);
+  EXPECT_NE(page.find(">1</td>"), std::string::npos);
 }
 
 TEST(Report, CarriesEveryPointAndItsGaps) {
@@ -52,14 +53,92 @@ TEST(Report, CarriesEveryPointAndItsGaps) {
   EXPECT_EQ(plots[1]["series"][0]["mark"], "dashed");
 }
 
+std::vector<std::byte> bytes_of(std::string_view text) {
+  std::vector<std::byte> out;
+  out.reserve(text.size());
+  for (const char c : text) out.push_back(static_cast<std::byte>(c));
+  return out;
+}
+
+std::string page_of(const ReportSection& section) { return html_of({"", "", {section}}); }
+
+TEST(Report, HoldsPicturesAsData) {
+  // The test vectors of RFC 4648, section 10.
+  const std::pair<const char*, const char*> vectors[] = {{"", ""},
+                                                         {"f", "Zg=="},
+                                                         {"fo", "Zm8="},
+                                                         {"foo", "Zm9v"},
+                                                         {"foob", "Zm9vYg=="},
+                                                         {"fooba", "Zm9vYmE="},
+                                                         {"foobar", "Zm9vYmFy"},
+                                                         {"\xff\xfe\xfb", "//77"}};
+  for (const auto& [plain, encoded] : vectors) {
+    const std::string page =
+        page_of({.title = "", .comparisons = {{"Title", {"left", bytes_of(plain)}, {"right", {}}}}});
+    EXPECT_EQ(count(page, "src=\"data:image/png;base64," + std::string(encoded) + "\">"), *plain == 0 ? 2u : 1u);
+  }
+}
+
+TEST(Report, HasASliderForEachComparisonAndNoneWithout) {
+  const Comparison comparison{"Title", {"left", {}}, {"right", {}}};
+  for (const std::size_t n : {0u, 1u, 3u}) {
+    const std::string page = page_of({.title = "", .comparisons = std::vector(n, comparison)});
+    EXPECT_EQ(count(page, R"(<input type="range")"), n);
+    EXPECT_EQ(count(page, R"(aria-label="How much is shown of left, the rest of right: Title")"), n);
+    EXPECT_EQ(count(page, "<img"), 2 * n);
+    EXPECT_EQ(count(page, "<canvas"), 0u);
+  }
+}
+
+TEST(Report, ListsItsSectionsFromThreeOnButNotTheirParts) {
+  const auto page = [](std::size_t sections) {
+    Report report;
+    for (std::size_t i = 0; i < sections; ++i) {
+      report.sections.push_back({.title = "S"});
+      report.sections.push_back({.title = "P", .is_part = true});
+    }
+    return html_of(report);
+  };
+  EXPECT_EQ(count(page(2), "<nav"), 0u);
+  const std::string three = page(3);
+  EXPECT_EQ(count(three, "<nav"), 1u);
+  EXPECT_EQ(count(three, "<li>"), 3u);
+  for (const char* id : {"section0\">S<", "section2\">S<", "section4\">S<"}) {
+    EXPECT_EQ(count(three, std::string("<a href=\"#") + id), 1u);
+    EXPECT_EQ(count(three, std::string("<h2 id=\"") + id), 1u);
+  }
+  EXPECT_EQ(count(three, "<h3"), 3u);
+}
+
+TEST(Report, SetsFiguresToTheRightAndMarksRows) {
+  const Table table{{"a", "b", "c", "d"},
+                    {{"1.5", "1.5", "", std::string(60, 'x')}, {"-2e-7", "two", "", "y"}, {"", "3", "", ""}},
+                    {1}};
+  const std::string page = page_of({"", "", table, {}});
+  EXPECT_EQ(count(page, R"(<td class="number">)"), 3u);
+  EXPECT_EQ(count(page, R"(<td class="text">)"), 6u);  // mixed, and empty
+  EXPECT_EQ(count(page, R"(<td class="long">)"), 3u);
+  EXPECT_EQ(count(page, R"(<tr class="marked"><td class="number">-2e-7)"), 1u);
+  EXPECT_EQ(count(page, R"(<tr class="marked">)"), 1u);
+}
+
+TEST(Report, MakesAParagraphOfEachLine) {
+  const std::string page = html_of({"", "one\ntwo\n\nthree\n", {}});
+  EXPECT_EQ(count(page, "<p>one</p>\n<p>two</p>\n<p>three</p>\n"), 1u);
+  EXPECT_EQ(count(page, "<p>"), 3u);
+}
+
 TEST(Report, NoTextBecomesMarkupOrScript) {
   const std::string evil = "</script><script>alert(\"1\")</script><!-- &";
   Plot plot = plot_of({3, 4});
   plot.title = plot.caption = plot.x_label = plot.series[0].name = evil;
-  const std::string page = html_of({evil, evil, {{evil, evil, {{evil}, {{evil}}}, {plot}}}});
+  const Comparison comparison{evil, {evil, {}}, {evil, {}}};
+  const ReportSection section{evil, evil, {{evil}, {{evil}}}, {plot}, {comparison}};
+  const std::string page = html_of({evil, evil, {section, section, section}});
   EXPECT_EQ(count(page, "<script>"), 2u);
   EXPECT_EQ(count(page, "</script>"), 2u);
   EXPECT_EQ(count(page, "<!--"), 0u);
+  EXPECT_EQ(count(page, "alert(\"1\")"), 0u);
   EXPECT_EQ(plots_in(page)[0]["title"], evil);
 }
 

@@ -1,0 +1,152 @@
+#include "isp/cli/bench_page.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "isp/cli/bench_report.h"
+#include "tests/support/scratch_directory.h"
+
+namespace lowlux::cli {
+namespace {
+
+bool holds(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
+
+/// As a stage yields it: a row that is undominated and one that is not, a finding that holds and one that does not.
+MeasuredStage stage_of(std::string_view id) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  MeasuredStage out{{id, id, nullptr}, {}};
+  out.outcome.table = {{"level", "error", "undominated"}, {{"fast", 2.0, "yes"}, {"slow", nan, ""}}};
+  out.outcome.findings = {{"a", "", "", "", true, ""}, {"b", "", "", "", false, ""}};
+  out.outcome.plots.push_back({.id = "p", .series = {{"fast", {1}, {2}}}});
+  out.outcome.remarks = {"one remark", "another"};
+  return out;
+}
+
+void add_pair(MeasuredStage& measured, const std::string& before, const std::string& after) {
+  for (const std::string& id : {before, after}) {
+    measured.outcome.images.push_back({id, Encoded8{Plane<std::uint8_t>(6, 2)}});
+  }
+  measured.outcome.comparisons.push_back({"Pair", before, "raw <", after, "done"});
+}
+
+std::string page_of(const std::vector<MeasuredStage>& measured, const Machine& machine = {}) {
+  InlineExecutor one;
+  auto page = bench_page(measured, machine, one);
+  EXPECT_TRUE(page);
+  return page ? *page : "";
+}
+
+TEST(BenchPage, PutsTheWholePipelineFirstAndTheOthersAsMeasured) {
+  const std::string page = page_of({stage_of("tone"), stage_of("simulate"), stage_of("alpha"), stage_of("develop")});
+  std::vector<std::size_t> places;
+  for (const char* title :
+       {"Machine</h2>", "At a glance</h2>", "develop</h2>", "simulate</h2>", "tone</h2>", "alpha</h2>"}) {
+    places.push_back(page.find(title));
+    EXPECT_NE(places.back(), std::string::npos) << title;
+  }
+  EXPECT_TRUE(std::ranges::is_sorted(places));
+}
+
+TEST(BenchPage, MarksWhatIsUndominatedAndWhatDoesNotHold) {
+  const std::string page = page_of({stage_of("tone")});
+  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="text">fast)"));
+  EXPECT_TRUE(holds(page, R"(<tr><td class="text">slow)"));
+  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="text">b<)"));
+  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="text">tone)"));  // at a glance
+  EXPECT_TRUE(holds(page, "1 of 2 hold"));
+  MeasuredStage good = stage_of("good");
+  good.outcome.findings.pop_back();
+  EXPECT_TRUE(holds(page_of({good}), R"(<tr><td class="text">good)"));
+  EXPECT_TRUE(holds(page_of({good}), "1 of 1 hold."));
+}
+
+TEST(BenchPage, HoldsBothPicturesOfAComparison) {
+  MeasuredStage measured = stage_of("tone");
+  EXPECT_FALSE(holds(page_of({measured}), "<img"));
+  add_pair(measured, "tone-raw", "tone-done");
+  const std::string page = page_of({measured});
+  EXPECT_TRUE(holds(page, R"(alt="raw &lt;" src="data:image/png;base64,iVBORw0KGgo)"));  // a PNG file's first bytes
+  EXPECT_TRUE(holds(page, R"(alt="done" src="data:image/png;base64,iVBORw0KGgo)"));
+  EXPECT_TRUE(holds(page, "tone-raw.png, tone-done.png"));
+}
+
+TEST(BenchPage, LeavesOutWhatAStageDoesNotHave) {
+  MeasuredStage measured = stage_of("tone");
+  measured.outcome.findings.clear();
+  measured.outcome.plots.clear();
+  measured.outcome.remarks.clear();
+  const std::string page = page_of({measured});
+  for (const char* part : {"Error against time", "Pictures", "What it must show", "How it was measured", "<canvas"}) {
+    EXPECT_FALSE(holds(page, part)) << part;
+  }
+  EXPECT_TRUE(holds(page, "none are stated"));
+}
+
+TEST(BenchPage, SaysWhatTheMachineIsAndWhatIsNotKnownOfIt) {
+  const std::string page = page_of({}, {.cpu = "Made <up>", .processors = 3, .memory_gib = 7.75, .system = "\xff"});
+  for (const char* part : {"Made &lt;up&gt;", ">3<", "7.8 GiB"}) EXPECT_TRUE(holds(page, part)) << part;
+  EXPECT_TRUE(holds(page_of({}), "the system does not say"));
+}
+
+TEST(BenchFiles, AreOnePageAndTwoFilesForEachStageAndNoneIfOneIsInTheWay) {
+  const test::ScratchDirectory scratch;
+  MeasuredStage first = stage_of("tone");
+  add_pair(first, "tone-raw", "tone-done");
+  const std::vector<MeasuredStage> measured{first, stage_of("alpha")};
+  BenchArgs args{.output = scratch.path()};
+  InlineExecutor one;
+  for (const char* name : {"bench.html", "tone.csv", "alpha.json", "tone-done.png"}) {
+    scratch.write(name, "mine");
+    const auto refused = write_bench_files(measured, {}, args, one);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::exists);
+    EXPECT_EQ(refused.error().where, scratch.file(name));
+    EXPECT_EQ(scratch.names().size(), 1u);
+    std::filesystem::remove(scratch.file(name));
+  }
+  scratch.write("bench.html", "old");
+  args.force = true;
+  const auto written = write_bench_files(measured, {.system = "\xff"}, args, one);
+  ASSERT_TRUE(written);
+  std::vector<std::string> names;
+  for (const std::string& path : *written) names.push_back(std::filesystem::path(path).filename());
+  EXPECT_EQ(names, (std::vector<std::string>{"bench.html", "tone.csv", "tone.json", "tone-raw.png", "tone-done.png",
+                                             "alpha.csv", "alpha.json"}));
+  EXPECT_EQ(scratch.names().size(), names.size());
+  EXPECT_TRUE(holds(scratch.read("bench.html"), "tone-raw.png"));
+}
+
+TEST(Machine, IsNamedByItsProcessorElseByItsBoard) {
+  EXPECT_EQ(cpu_model("processor\t: 0\nmodel\t\t: 85\nmodel name\t: Some CPU @ 2.0 GHz \nmodel name : second\n"),
+            "Some CPU @ 2.0 GHz");
+  EXPECT_EQ(cpu_model("processor : 0\nCPU part : 0xd08\n\nModel\t: Raspberry Pi 4 Model B Rev 1.4\r\n"),
+            "Raspberry Pi 4 Model B Rev 1.4");
+  EXPECT_EQ(cpu_model("Model : board\nmodel name : cpu"), "cpu");
+  for (const char* none : {"", "\n\n", "model name", "model name :", "model name : \nx", ":", "modelname : x"}) {
+    EXPECT_FALSE(cpu_model(none)) << none;
+  }
+}
+
+TEST(Machine, IsDescribedWithoutProcToo) {
+  const test::ScratchDirectory scratch;
+  for (const std::string& file : {scratch.file("none"), scratch.path()}) {
+    const Machine machine = this_machine(2, file);
+    EXPECT_FALSE(machine.cpu);
+    EXPECT_GE(machine.processors, 1);
+    EXPECT_EQ(machine.threads, 2);
+    EXPECT_GT(machine.memory_gib.value_or(0), 0.1);
+    for (const std::string& text : {machine.kernels, machine.system, machine.compiler, machine.lowlux}) {
+      EXPECT_FALSE(text.empty());
+    }
+  }
+  scratch.write("cpuinfo", "model name : made up\n" + std::string(1 << 20, 'x'));
+  EXPECT_EQ(this_machine(1, scratch.file("cpuinfo")).cpu, "made up");
+}
+
+}  // namespace
+}  // namespace lowlux::cli
