@@ -29,17 +29,33 @@ Vector3 seen(const Vector3& rgb, double rod_share, double chroma, double blue) {
   return out;
 }
 
-double largest_difference(double rod_share, double chroma, double blue) {
+/// What is shown of the three effects on colours; what is not is 0, 1 and 0.
+struct ColourEffects {
+  double rod_share = 0;
+  double chroma = 1;
+  double blue = 0;
+};
+
+double largest_difference(const ColourEffects& first, const ColourEffects& second) {
   const Xyz white = *xyz_of(white_d65);
+  const auto lab = [&](const Vector3& rgb, const ColourEffects& shown) {
+    return lab_of(xyz_of(to_xyz() * seen(rgb, shown.rod_share, shown.chroma, shown.blue)), white);
+  };
   double largest = 0;
   for (int colour = 1; colour < 8; ++colour) {
     const Vector3 rgb{static_cast<double>(colour & 1), static_cast<double>((colour >> 1) & 1),
                       static_cast<double>(colour >> 2)};
-    const Lab before = lab_of(xyz_of(to_xyz() * rgb), white);
-    const Lab after = lab_of(xyz_of(to_xyz() * seen(rgb, rod_share, chroma, blue)), white);
-    largest = std::max(largest, ciede2000(before, after));
+    largest = std::max(largest, ciede2000(lab(rgb, first), lab(rgb, second)));
   }
   return largest;
+}
+
+// What one of them changes, alone or with the others: faded colours show a tint that strong ones hide.
+double size_of(double ColourEffects::*effect, const ColourEffects& all) {
+  ColourEffects alone, others = all;
+  alone.*effect = all.*effect;
+  others.*effect = ColourEffects{}.*effect;
+  return std::max(largest_difference({}, alone), largest_difference(others, all));
 }
 
 double lost_contrast(double blur_px) {
@@ -60,15 +76,16 @@ bool* effect_named(NightEffects& effects, std::string_view name) {
   return found == night_effect_names.end() ? nullptr : switches[found - night_effect_names.begin()];
 }
 
-std::array<LookEffect, 6> predict_effects(const NightEye& darkest, double scotopic_ratio_of_white,
+std::array<LookEffect, 6> predict_effects(const NightEye& eye, double scotopic_ratio_of_white,
                                           double pixels_per_degree) {
-  const double rods = (1 - darkest.state.m) * scotopic_at_555_nm * scotopic_ratio_of_white;
-  const double share = rods / (darkest.state.m + rods);
+  const double rods = (1 - eye.state.m) * scotopic_at_555_nm * scotopic_ratio_of_white;
+  const double share = rods / (eye.state.m + rods);
   constexpr double taste = std::numeric_limits<double>::quiet_NaN();
-  const std::array<double, 6> size{largest_difference(share, 1, 0),
-                                   largest_difference(0, darkest.chroma, 0),
-                                   largest_difference(0, 1, darkest.blue),
-                                   lost_contrast(darkest.blur_std_deg * pixels_per_degree),
+  const ColourEffects all{share, eye.chroma, eye.blue};
+  const std::array<double, 6> size{size_of(&ColourEffects::rod_share, all),
+                                   size_of(&ColourEffects::chroma, all),
+                                   size_of(&ColourEffects::blue, all),
+                                   lost_contrast(eye.blur_std_deg * pixels_per_degree),
                                    taste,
                                    taste};
   std::array<LookEffect, 6> out;

@@ -46,7 +46,7 @@ inline std::string coefficients_of(const LookChoice& choice) {
 /// One effect's part in a decision.
 struct LookEffect {
   std::string_view name;
-  double size = 0;  // predicted for the darkest place of the frame: largest CIEDE2000 of any displayable colour
+  double size = 0;  // predicted: largest CIEDE2000 of any displayable colour anywhere in the frame
   bool used = false;
 };
 
@@ -74,10 +74,11 @@ inline constexpr std::array<std::string_view, 6> night_effect_names{"purkinje", 
 /// The switch of an effect by its name; null for another name.
 bool* effect_named(NightEffects& effects, std::string_view name);
 
-/// Size of each effect for an eye in a state: the largest CIEDE2000 between what is shown with it alone and without
-/// any, over the primaries, secondaries and the white of Rec. 709; for acuity, of a grating of black and white at a
-/// quarter of the pixels' frequency. Glare and visual noise are a matter of taste: not a number.
-std::array<LookEffect, 6> predict_effects(const NightEye& darkest, double scotopic_ratio_of_white,
+/// Size of each effect for an eye in a state: the largest CIEDE2000 that it alone makes, or that its absence makes of
+/// all three on colours together, over the primaries, secondaries and the white of Rec. 709; for acuity, of a grating
+/// of black and white at a quarter of the pixels' frequency. Glare and visual noise are a matter of taste: not a
+/// number.
+std::array<LookEffect, 6> predict_effects(const NightEye& eye, double scotopic_ratio_of_white,
                                           double pixels_per_degree);
 
 }  // namespace lowlux::isp

@@ -55,6 +55,22 @@ bool goes_from_codes(const RawFrame& frame, const DevelopPlan& plan) {
          std::none_of(frame.corrections.gain_maps.begin(), frame.corrections.gain_maps.end(), has_effect);
 }
 
+// Dark charge that is known and still in the codes is no light.
+Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const DevelopPlan& plan) {
+  Thumbnail out{CameraRgb(thumbnail.mean.width(), thumbnail.mean.height()), thumbnail.black_noise_std};
+  std::array<double, 3> dark{};
+  for (int site = 0; site < 4 && plan.electrons_at_white; ++site) {
+    const auto c = static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1));
+    dark[c] += plan.black.dark_mean_e[site] / (*plan.electrons_at_white)[site] * (c == 1 ? 0.5 : 1);
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    const Plane<float>& from = thumbnail.mean.plane[c];
+    std::transform(from.data(), from.data() + from.size(), out.mean.plane[c].data(),
+                   [&](float mean) { return mean - static_cast<float>(dark[c]); });
+  }
+  return out;
+}
+
 void set_size(DevelopPlan& plan, const Rect& crop) {
   plan.width = plan.options.half ? crop.width / 2 : crop.width;
   plan.height = plan.options.half ? crop.height / 2 : crop.height;
@@ -103,7 +119,7 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   const RawFrame& measured = without_dark ? *without_dark : frame;
   const Thumbnail thumbnail = make_thumbnail(measured, plan.black, executor);
   clock.lap("thumbnail");
-  if (const Result<void> decided = decide_rendering(frame, thumbnail, plan); !decided) {
+  if (const Result<void> decided = decide_rendering(frame, light_of(thumbnail, frame.raw, plan), plan); !decided) {
     return tl::make_unexpected(decided.error());
   }
   clock.lap("white and exposure");

@@ -17,9 +17,6 @@ namespace {
 
 using denoise::Level;
 
-/// Of the tolerance, for the level of noise reduction: the rest is for what else may be left out.
-constexpr double share_for_level = 0.8;
-
 /// One way to develop the frame.
 struct Candidate {
   std::optional<Level> level;
@@ -66,8 +63,8 @@ std::array<double, 3> start_shares(const std::vector<SeenBlock>& blocks) {
 std::vector<CostShare> work_of(const Facts& facts, const Candidate& plan) {
   std::vector<CostShare> work{{CostPart::planning}};
   if (plan.defects && facts.may_search) work.push_back({CostPart::defects});
-  if (plan.lines && facts.may_take_lines) work.push_back({CostPart::lines});
   if (plan.level) {
+    if (plan.lines && facts.may_take_lines) work.push_back({CostPart::lines});
     work.push_back({CostPart::check});
     const std::array<double, 3> share = start_shares(facts.blocks);
     for (int start = 0; start < 3; ++start) {
@@ -123,7 +120,7 @@ Candidate within_tolerance(const Facts& facts, double tolerance) {
   for (const std::optional<Level> level : levels_of(facts, false)) {
     Candidate tried{.level = level};
     rate(facts, tried);
-    if (tried.left >= share_for_level * tolerance) continue;
+    if (tried.left >= tolerance) continue;
     plan = tried;
     break;
   }

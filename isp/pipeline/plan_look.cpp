@@ -1,7 +1,9 @@
 #include "isp/pipeline/plan_look.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -92,36 +94,76 @@ double ratio_of_white(const std::optional<WhitePoint>& white) {
   return std::clamp(colour ? scotopic_luminance(*colour) : 0.0, 0.1, 60.0);
 }
 
-// The darkest place an eye adapts to, by blocks of the frame.
-LuminancePair darkest_field(std::span<const float> blocks, double white_cd_m2, const LookPlan& look) {
-  float darkest = INFINITY;
-  for (const float v : blocks) darkest = std::min(darkest, std::isfinite(v) ? std::max(v, 0.0f) : INFINITY);
-  const double own = std::isfinite(darkest) ? darkest * white_cd_m2 : 0;
-  const double field = (1 - adaptation_share_of_mean) * own + adaptation_share_of_mean * look.mean_cd_m2;
-  return {field, field * look.look.scotopic_ratio_of_white};
+// The darkest and the brightest place an eye adapts to, by blocks of the frame [cd/m2].
+std::array<double, 2> range_of_fields(std::span<const float> blocks, double white_cd_m2, const LookPlan& look) {
+  float darkest = INFINITY, brightest = 0;
+  for (const float v : blocks) {
+    if (!std::isfinite(v)) continue;
+    darkest = std::min(darkest, std::max(v, 0.0f));
+    brightest = std::max(brightest, v);
+  }
+  const auto field = [&](double own_cd_m2) {
+    return (1 - adaptation_share_of_mean) * own_cd_m2 + adaptation_share_of_mean * look.mean_cd_m2;
+  };
+  return {field(std::isfinite(darkest) ? darkest * white_cd_m2 : 0), field(brightest * white_cd_m2)};
 }
 
-void decide_effects(const LookChoice& choice, const NightEye& darkest, bool monochrome, LookPlan& look) {
-  const auto predicted = predict_effects(darkest, look.look.scotopic_ratio_of_white, look.look.pixels_per_degree);
+// The largest sizes anywhere in the frame: the tint of rods is strongest in between, not where it is darkest.
+std::array<LookEffect, 6> largest_effects(const std::array<double, 2>& fields_cd_m2, const NightLook& look) {
+  constexpr int steps = 12;
+  std::array<LookEffect, 6> out{};
+  const double least = std::max(fields_cd_m2[0], least_cd_m2), most = std::max(fields_cd_m2[1], least);
+  for (int i = 0; i <= steps; ++i) {
+    const double field = least * std::pow(most / least, static_cast<double>(i) / steps);
+    const auto here = predict_effects(night_eye({field, field * look.scotopic_ratio_of_white}),
+                                      look.scotopic_ratio_of_white, look.pixels_per_degree);
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      if (i == 0 || here[k].size > out[k].size) out[k] = here[k];
+    }
+  }
+  return out;
+}
+
+// The smallest first, as long as all that is left out together stays below the tolerance. What is a matter of taste has
+// no size, and is not called for.
+void leave_out(double tolerance, std::span<LookEffect> effects) {
+  std::array<LookEffect*, night_effect_names.size()> order{};
+  std::size_t count = 0;
+  for (LookEffect& effect : effects) {
+    effect.used = std::isfinite(effect.size);
+    if (effect.used) order[count++] = &effect;
+  }
+  const std::span sized(order.data(), count);
+  std::ranges::sort(sized, {}, [](const LookEffect* effect) { return effect->size; });
+  double together = 0;
+  for (LookEffect* const effect : sized) {
+    together += effect->size;
+    if (together > tolerance) break;
+    effect->used = false;
+  }
+}
+
+void decide_effects(const LookChoice& choice, const std::array<double, 2>& fields_cd_m2, bool monochrome,
+                    LookPlan& look) {
+  const auto predicted = largest_effects(fields_cd_m2, look.look);
   look.effects.assign(predicted.begin(), predicted.end());
   if (monochrome) {
     for (int k = 0; k < 3; ++k) look.effects[static_cast<std::size_t>(k)].size = 0;  // those of colours
   }
-  NightEffects listed = choice.listed;
-  for (LookEffect& effect : look.effects) {
-    switch (choice.which) {
-      case LookChoice::Which::automatic:
-        effect.used = effect.size > choice.tolerance;
-        break;
-      case LookChoice::Which::all:
-        effect.used = true;
-        break;
-      case LookChoice::Which::listed:
-        effect.used = *effect_named(listed, effect.name);
-        break;
+  switch (choice.which) {
+    case LookChoice::Which::automatic:
+      leave_out(choice.tolerance, look.effects);
+      break;
+    case LookChoice::Which::all:
+      for (LookEffect& effect : look.effects) effect.used = true;
+      break;
+    case LookChoice::Which::listed: {
+      NightEffects listed = choice.listed;
+      for (LookEffect& effect : look.effects) effect.used = *effect_named(listed, effect.name);
+      break;
     }
-    *effect_named(look.look.effects, effect.name) = effect.used;
   }
+  for (const LookEffect& effect : look.effects) *effect_named(look.look.effects, effect.name) = effect.used;
 }
 
 // The state of the eye, what it calls for, and how much darker the picture gets.
@@ -131,7 +173,7 @@ void decide_eye(const FrameLight& light, double white_cd_m2, DevelopPlan& plan, 
   look.state = mesopic_state({look.mean_cd_m2, look.mean_cd_m2 * ratio});
   look.white_cd_m2 = look.mean_cd_m2 / scene_mean_of_white;
   if (choice.look == Look::eye) {
-    decide_effects(choice, night_eye(darkest_field(light.block_luminance, white_cd_m2, look)), !plan.white, look);
+    decide_effects(choice, range_of_fields(light.block_luminance, white_cd_m2, look), !plan.white, look);
   }
   if (plan.options.exposure_ev) return;
   look.dimming_ev = choice.dimming * apparent_dimming_ev(look.state.luminance_cd_m2);

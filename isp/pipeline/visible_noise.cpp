@@ -12,7 +12,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int most_blocks_along = 32;
+constexpr int most_blocks_along = 20;
 constexpr std::array<double, 3> samples_in_box{16, 32, 16};  // of R, G, B
 constexpr std::array<double, 3> share_of_sites{0.25, 0.5, 0.25};
 constexpr double least_variance_e2 = 1e-6;
