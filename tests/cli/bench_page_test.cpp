@@ -54,14 +54,14 @@ TEST(BenchPage, PutsTheWholePipelineFirstAndTheOthersAsMeasured) {
 
 TEST(BenchPage, MarksWhatIsUndominatedAndWhatDoesNotHold) {
   const std::string page = page_of({stage_of("tone")});
-  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="text">fast)"));
-  EXPECT_TRUE(holds(page, R"(<tr><td class="text">slow)"));
-  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="text">b<)"));
-  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="text">tone)"));  // at a glance
+  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="short">fast)"));
+  EXPECT_TRUE(holds(page, R"(<tr><td class="short">slow)"));
+  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="short">b<)"));
+  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="short">tone)"));  // at a glance
   EXPECT_TRUE(holds(page, "1 of 2 hold"));
   MeasuredStage good = stage_of("good");
   good.outcome.findings.pop_back();
-  EXPECT_TRUE(holds(page_of({good}), R"(<tr><td class="text">good)"));
+  EXPECT_TRUE(holds(page_of({good}), R"(<tr><td class="short">good)"));
   EXPECT_TRUE(holds(page_of({good}), "1 of 1 hold."));
 }
 
