@@ -129,14 +129,16 @@ function namer(plot) {
     id: 'namer',
     afterDatasetsDraw(chart) {
       const ctx = chart.ctx, all = plot.series.map((s, i) => hasPlace(s) ? pointOf(chart)(s, i) : null).filter(p => p);
-      const taken = all.map(p => ({left: p.x - 5, right: p.x + 5, top: p.y - 5, bottom: p.y + 5}));
+      const around = (p, by) => ({left: p.x - by, right: p.x + by, top: p.y - by, bottom: p.y + by});
+      const taken = [];
       const lines = passages(chart, plot);
       let named = 0;
       ctx.save();
       ctx.textBaseline = 'middle';
       for (const point of [...all.filter(p => p.bold), ...all.filter(p => !p.bold)]) {
         ctx.font = fontOf(point.bold);
-        const free = box => inside(box, chart.chartArea) && !taken.some(other => overlap(box, other));
+        const free = box => inside(box, chart.chartArea) && !taken.some(other => overlap(box, other)) &&
+            !all.some(other => overlap(box, around(other, other === point ? 5 : 10)));
         const open = [...places(point, ctx.measureText(point.name).width)].filter(free);
         const box = open.find(place => !lines.some(line => overlap(place, line))) || open[0];
         if (!box) continue;
