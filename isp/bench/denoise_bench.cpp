@@ -219,7 +219,8 @@ std::vector<std::string> remarks_of(const Work& work) {
     if (!work.strengths.empty()) line += "; opencv-nlm's strengths (lightness, colour), found on the truth:";
     for (std::size_t p = 0; p < work.pictures.size() && !work.strengths.empty(); ++p) {
       const NlMeansStrength& best = work.strengths[p * work.lights.size() + i].best;
-      line += fmt::format(" {} {:.1f}, {:.1f};", work.pictures[p].name, best.lightness, best.colour);
+      line +=
+          fmt::format("{} {} {:.1f}, {:.1f}", p == 0 ? "" : ";", work.pictures[p].name, best.lightness, best.colour);
     }
     out.push_back(std::move(line));
   }
@@ -246,7 +247,9 @@ Result<std::vector<DenoiseRow>> measure_all(const Work& work, Executor& executor
                            fmt::format("{} at {}", work.pictures[picture].name, name_of(work.lights[light])));
     }
     for (DenoiseRow& row : of_light.finished()) rows.push_back(std::move(row));
-    if (light == 0) outcome.remarks.push_back("pictures show, from left to right: " + names_of(of_light.parts));
+    if (light == 0)
+      outcome.remarks.push_back("pictures denoise-LIGHT-DARK.png show, from left to right: " +
+                                names_of(of_light.parts));
     add_pictures(work.lights[light], std::move(of_light.parts), outcome);
   }
   return rows;

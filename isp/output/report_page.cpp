@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::json;
 constexpr std::size_t least_sections_with_contents = 3;
-constexpr std::size_t long_cell = 40;  // characters
+constexpr std::size_t short_cell = 20, long_cell = 40;  // characters
 
 // Whatever a text might become, the browser fetches nothing for it.
 constexpr std::string_view head = R"html(<!DOCTYPE html>
@@ -66,7 +66,7 @@ bool is_number(std::string_view cell) {
   return error == std::errc() && end == cell.data() + cell.size();
 }
 
-/// How a column is set: figures to the right, sentences wide enough to be read.
+/// How a column is set: figures to the right, names unbroken, sentences wide enough to be read.
 std::string_view class_of_column(const Table& table, std::size_t column) {
   bool any = false, numbers = true;
   std::size_t longest = 0;
@@ -78,6 +78,7 @@ std::string_view class_of_column(const Table& table, std::size_t column) {
     longest = std::max(longest, cell.size());
   }
   if (any && numbers) return "number";
+  if (longest <= short_cell) return "short";
   return longest >= long_cell ? "long" : "text";
 }
 

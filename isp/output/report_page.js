@@ -34,30 +34,33 @@ function dataset(plot, series, i) {
   };
 }
 
-// Room around named points, for their names.
-function padded(values, logarithmic) {
+// Room around what is drawn, more around named points, for their names.
+function padded(plot, values, logarithmic) {
   const positive = values.filter(v => v > 0);
-  if (!logarithmic || positive.length === 0) return {grace: '8%'};
+  if (!logarithmic || positive.length === 0) return plot.named ? {grace: '8%'} : {};
   const [least, most] = bounds(positive);
-  const factor = Math.max(1.5, (most / least) ** 0.1);
+  const factor = plot.named ? Math.max(1.5, (most / least) ** 0.1) : Math.max(1.05, (most / least) ** 0.03);
   return {min: least / factor, max: most * factor};
 }
 
 // Whole powers of ten; between them 2 and 5 where that is less than three decades, and all where it is less than one.
-function powerTick(value) {
-  const decades = Math.log10(this.max / this.min);
-  const leading = Math.round(value / 10 ** Math.floor(Math.log10(value) + 1e-9));
-  const shown = leading === 1 || decades < 1 || (decades < 3 && (leading === 2 || leading === 5));
-  return shown ? plain(value, 6) : '';
+function isPowerTick(scale, value) {
+  const decades = Math.log10(scale.max / scale.min);
+  const mantissa = value / 10 ** Math.floor(Math.log10(value) + 1e-9), leading = Math.round(mantissa);
+  if (Math.abs(mantissa - leading) > 1e-6) return false;
+  return leading === 1 || decades < 1 || (decades < 3 && (leading === 2 || leading === 5));
 }
 
 function axis(plot, key) {
   const logarithmic = plot[key + 'Log'];
   const options = {
     type: logarithmic ? 'logarithmic' : 'linear', title: {display: true, text: plot[key + 'Label']},
-    ticks: {callback: logarithmic ? powerTick : value => plain(value, 7), maxRotation: 0}
+    ticks: {includeBounds: !plot.equal, callback: value => plain(value, 7), maxRotation: 0}
   };
-  return plot.named ? {...options, ...padded(known(plot, key), logarithmic)} : options;
+  if (logarithmic) {
+    options.afterBuildTicks = scale => { scale.ticks = scale.ticks.filter(tick => isPowerTick(scale, tick.value)); };
+  }
+  return {...options, ...padded(plot, known(plot, key), logarithmic)};
 }
 
 const overlap = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
@@ -96,6 +99,24 @@ function drawName(ctx, name, point, box, bold) {
   ctx.fillText(name, box.left, y);
 }
 
+// Where the plot's lines pass, every few pixels.
+function passages(chart, plot) {
+  const out = [];
+  plot.series.forEach((series, i) => {
+    if (series.mark === 'points') return;
+    const corners = chart.getDatasetMeta(i).data;
+    for (let k = 1; k < corners.length; ++k) {
+      const [a, b] = [corners[k - 1], corners[k]];
+      const steps = Math.ceil(Math.hypot(b.x - a.x, b.y - a.y) / 4);
+      for (let t = 0; t <= steps; ++t) {
+        const x = a.x + (b.x - a.x) * t / steps, y = a.y + (b.y - a.y) * t / steps;
+        out.push({left: x - 1, right: x + 1, top: y - 1, bottom: y + 1});
+      }
+    }
+  });
+  return out;
+}
+
 // Writes the names of a plot's points beside them: first those on a line, in bold.
 function namer(plot) {
   const fontOf = bold => (bold ? 'bold ' : '') + '12px ' + Chart.defaults.font.family;
@@ -108,14 +129,18 @@ function namer(plot) {
     id: 'namer',
     afterDatasetsDraw(chart) {
       const ctx = chart.ctx, all = plot.series.map((s, i) => hasPlace(s) ? pointOf(chart)(s, i) : null).filter(p => p);
-      const taken = all.map(p => ({left: p.x - 5, right: p.x + 5, top: p.y - 5, bottom: p.y + 5}));
+      const around = (p, by) => ({left: p.x - by, right: p.x + by, top: p.y - by, bottom: p.y + by});
+      const taken = [];
+      const lines = passages(chart, plot);
       let named = 0;
       ctx.save();
       ctx.textBaseline = 'middle';
       for (const point of [...all.filter(p => p.bold), ...all.filter(p => !p.bold)]) {
         ctx.font = fontOf(point.bold);
-        const free = box => inside(box, chart.chartArea) && !taken.some(other => overlap(box, other));
-        const box = [...places(point, ctx.measureText(point.name).width)].find(free);
+        const free = box => inside(box, chart.chartArea) && !taken.some(other => overlap(box, other)) &&
+            !all.some(other => overlap(box, around(other, other === point ? 5 : 10)));
+        const open = [...places(point, ctx.measureText(point.name).width)].filter(free);
+        const box = open.find(place => !lines.some(line => overlap(place, line))) || open[0];
         if (!box) continue;
         taken.push(box);
         drawName(ctx, point.name, point, box, point.bold);
@@ -154,7 +179,7 @@ function draw(plot, i) {
       animation: false, maintainAspectRatio: false, scales: {x: axis(plot, 'x'), y: axis(plot, 'y')},
       plugins: {
         title: {display: true, text: plot.title, font: {size: 14}}, tooltip: tooltip(plot),
-        legend: {display: !plot.named, position: 'bottom', labels: {usePointStyle: true, boxWidth: 24, padding: 8}}
+        legend: {display: !plot.named, position: 'bottom', labels: {usePointStyle: true, boxHeight: 8, padding: 8}}
       }
     }
   });
@@ -166,12 +191,14 @@ function draw(plot, i) {
   return chart;
 }
 
-// Whole multiples of the picture's own size, where there is room for one.
+// As wide as there is room, and a whole multiple of the picture's own pixels where that is nearly as wide.
 function fit(pair) {
-  const own = pair.querySelector('img').naturalWidth;
-  const times = Math.floor(Math.min(576, pair.parentElement.clientWidth) / own);
-  pair.style.width = times >= 1 && isFinite(times) ? times * own + 'px' : '100%';
-  pair.classList.toggle('enlarged', times >= 1);
+  const picture = pair.querySelector('img'), frame = pair.closest('.comparison');
+  const room = Math.min(576, frame.parentElement.clientWidth), own = picture.naturalWidth / devicePixelRatio;
+  const whole = Math.floor(room / own) * own;
+  const exact = whole >= 0.75 * room;
+  frame.style.flexBasis = (exact ? whole : room) + 'px';
+  pair.classList.toggle('exact', exact);
 }
 
 function compare(pair) {

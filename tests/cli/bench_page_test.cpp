@@ -7,6 +7,8 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "isp/cli/bench_report.h"
 #include "tests/support/scratch_directory.h"
@@ -34,6 +36,14 @@ void add_pair(MeasuredStage& measured, const std::string& before, const std::str
   measured.outcome.comparisons.push_back({"Pair", before, "raw <", after, "done"});
 }
 
+/// Pictures are not copied, and so a list of stages has to be filled.
+template <class... Stage>
+std::vector<MeasuredStage> list_of(Stage... stages) {
+  std::vector<MeasuredStage> out;
+  (out.push_back(std::move(stages)), ...);
+  return out;
+}
+
 std::string page_of(const std::vector<MeasuredStage>& measured, const Machine& machine = {}) {
   InlineExecutor one;
   auto page = bench_page(measured, machine, one);
@@ -42,7 +52,8 @@ std::string page_of(const std::vector<MeasuredStage>& measured, const Machine& m
 }
 
 TEST(BenchPage, PutsTheWholePipelineFirstAndTheOthersAsMeasured) {
-  const std::string page = page_of({stage_of("tone"), stage_of("simulate"), stage_of("alpha"), stage_of("develop")});
+  const std::string page =
+      page_of(list_of(stage_of("tone"), stage_of("simulate"), stage_of("alpha"), stage_of("develop")));
   std::vector<std::size_t> places;
   for (const char* title :
        {"Machine</h2>", "At a glance</h2>", "develop</h2>", "simulate</h2>", "tone</h2>", "alpha</h2>"}) {
@@ -53,23 +64,24 @@ TEST(BenchPage, PutsTheWholePipelineFirstAndTheOthersAsMeasured) {
 }
 
 TEST(BenchPage, MarksWhatIsUndominatedAndWhatDoesNotHold) {
-  const std::string page = page_of({stage_of("tone")});
-  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="text">fast)"));
-  EXPECT_TRUE(holds(page, R"(<tr><td class="text">slow)"));
-  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="text">b<)"));
-  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="text">tone)"));  // at a glance
+  const std::string page = page_of(list_of(stage_of("tone")));
+  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="short">fast)"));
+  EXPECT_TRUE(holds(page, R"(<tr><td class="short">slow)"));
+  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="short">b<)"));
+  EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="short">tone)"));  // at a glance
   EXPECT_TRUE(holds(page, "1 of 2 hold"));
   MeasuredStage good = stage_of("good");
   good.outcome.findings.pop_back();
-  EXPECT_TRUE(holds(page_of({good}), R"(<tr><td class="text">good)"));
-  EXPECT_TRUE(holds(page_of({good}), "1 of 1 hold."));
+  const std::string without = page_of(list_of(std::move(good)));
+  EXPECT_TRUE(holds(without, R"(<tr><td class="short">good)"));
+  EXPECT_TRUE(holds(without, "1 of 1 hold."));
 }
 
 TEST(BenchPage, HoldsBothPicturesOfAComparison) {
-  MeasuredStage measured = stage_of("tone");
-  EXPECT_FALSE(holds(page_of({measured}), "<img"));
-  add_pair(measured, "tone-raw", "tone-done");
-  const std::string page = page_of({measured});
+  std::vector<MeasuredStage> measured = list_of(stage_of("tone"));
+  EXPECT_FALSE(holds(page_of(measured), "<img"));
+  add_pair(measured[0], "tone-raw", "tone-done");
+  const std::string page = page_of(measured);
   EXPECT_TRUE(holds(page, R"(alt="raw &lt;" src="data:image/png;base64,iVBORw0KGgo)"));  // a PNG file's first bytes
   EXPECT_TRUE(holds(page, R"(alt="done" src="data:image/png;base64,iVBORw0KGgo)"));
   EXPECT_TRUE(holds(page, "tone-raw.png, tone-done.png"));
@@ -80,7 +92,7 @@ TEST(BenchPage, LeavesOutWhatAStageDoesNotHave) {
   measured.outcome.findings.clear();
   measured.outcome.plots.clear();
   measured.outcome.remarks.clear();
-  const std::string page = page_of({measured});
+  const std::string page = page_of(list_of(std::move(measured)));
   for (const char* part : {"Error against time", "Pictures", "What it must show", "How it was measured", "<canvas"}) {
     EXPECT_FALSE(holds(page, part)) << part;
   }
@@ -95,9 +107,8 @@ TEST(BenchPage, SaysWhatTheMachineIsAndWhatIsNotKnownOfIt) {
 
 TEST(BenchFiles, AreOnePageAndTwoFilesForEachStageAndNoneIfOneIsInTheWay) {
   const test::ScratchDirectory scratch;
-  MeasuredStage first = stage_of("tone");
-  add_pair(first, "tone-raw", "tone-done");
-  const std::vector<MeasuredStage> measured{first, stage_of("alpha")};
+  std::vector<MeasuredStage> measured = list_of(stage_of("tone"), stage_of("alpha"));
+  add_pair(measured[0], "tone-raw", "tone-done");
   BenchArgs args{.output = scratch.path()};
   InlineExecutor one;
   for (const char* name : {"bench.html", "tone.csv", "alpha.json", "tone-done.png"}) {

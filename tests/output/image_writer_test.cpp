@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <cstdio>
@@ -240,6 +241,21 @@ TEST(WritePicture, AFailedWriteWithForceKeepsTheOldFile) {
   }
   EXPECT_EQ(scratch.read("a.exr"), "old");
   EXPECT_EQ(scratch.names().size(), 1U);
+}
+
+TEST(PngBytes, AreAFileWithTheCodesAndTheProfile) {
+  PoolExecutor executor(2);
+  const Encoded8 codes = test::noisy_codes<std::uint8_t>(80, 60);
+  const auto bytes = png_bytes(codes, OutputSpace::srgb, executor);
+  ASSERT_TRUE(bytes);
+  const auto back = decode_png(*bytes);
+  ASSERT_TRUE(back);
+  const auto* same = std::get_if<Encoded8>(&back->picture);
+  ASSERT_NE(same, nullptr);
+  for (int y = 0; y < 60; ++y)
+    EXPECT_TRUE(std::equal(codes.codes.row(y), codes.codes.row(y) + 240, same->codes.row(y)));
+  EXPECT_EQ(back->metadata.icc, icc_profile(OutputSpace::srgb));
+  EXPECT_FALSE(png_bytes(Encoded8{}, OutputSpace::srgb, executor));
 }
 
 TEST(FormatOf, TellsByTheEndOfTheNameInAnyCase) {

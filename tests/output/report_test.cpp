@@ -111,12 +111,14 @@ TEST(Report, ListsItsSectionsFromThreeOnButNotTheirParts) {
 }
 
 TEST(Report, SetsFiguresToTheRightAndMarksRows) {
-  const Table table{{"a", "b", "c", "d"},
-                    {{"1.5", "1.5", "", std::string(60, 'x')}, {"-2e-7", "two", "", "y"}, {"", "3", "", ""}},
+  const std::string name(30, 'x'), sentence(60, 'x');
+  const Table table{{"a", "b", "c", "d", "e"},
+                    {{"1.5", "1.5", "", name, sentence}, {"-2e-7", "two", "", "y", "y"}, {"", "3", "", "", ""}},
                     {1}};
   const std::string page = page_of({"", "", table, {}});
   EXPECT_EQ(count(page, R"(<td class="number">)"), 3u);
-  EXPECT_EQ(count(page, R"(<td class="text">)"), 6u);  // mixed, and empty
+  EXPECT_EQ(count(page, R"(<td class="short">)"), 6u);  // mixed, and empty
+  EXPECT_EQ(count(page, R"(<td class="text">)"), 3u);
   EXPECT_EQ(count(page, R"(<td class="long">)"), 3u);
   EXPECT_EQ(count(page, R"(<tr class="marked"><td class="number">-2e-7)"), 1u);
   EXPECT_EQ(count(page, R"(<tr class="marked">)"), 1u);

@@ -49,6 +49,5 @@ class Pages:
     def advice(self):
         page = self.path("advice.html")
         self.run("info", "--advise", "--sensor", "ELD_NikonD850", "--luminance", "0.05", "--highlight", "20x",
-                 "--max-exposure", "0.05",
-                 "--report", page)
+                 "--max-exposure", "0.05", "--report", page)
         return page
