@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "isp/bench/bench_stages.h"
 #include "tests/support/process.h"
 #include "tests/support/scratch_directory.h"
 
@@ -34,7 +35,7 @@ TEST(Bench, ListNamesTheStagesAndMeasuresNone) {
   const auto list = bench({"--list"});
   EXPECT_EQ(list.exit_code, 0);
   EXPECT_TRUE(list.out.starts_with("denoise "));
-  EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), 1);
+  EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), std::ssize(isp::bench_stages()));
 }
 
 TEST(Bench, HelpNamesTheOptions) {
