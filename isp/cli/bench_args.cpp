@@ -15,6 +15,9 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
       ->delimiter(',')
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_flag("--calibrate-cost", args.calibrate_cost,
+               "measure how fast this machine develops, for develop --budget-ms, and keep it; half a minute")
+      ->excludes("--stage");
   app.add_flag("--list", args.list, "the stages, one line each");
   app.add_option("-o,--output", args.output,
                  "folder, made if need be, for the page bench.html, STAGE.csv, STAGE.json and parts of pictures (PNG)")

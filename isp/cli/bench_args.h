@@ -16,6 +16,7 @@ struct BenchArgs {
   isp::PictureSet pictures = isp::PictureSet::held_out;
   int threads = 0;  // 0: one for each processor
   bool list = false;
+  bool calibrate_cost = false;  // nothing else then
   bool quick = false;
   bool json = false;
   bool force = false;

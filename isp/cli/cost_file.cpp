@@ -1,10 +1,12 @@
 #include "isp/cli/cost_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -65,6 +67,8 @@ Result<void> write_cost(const std::string& path, const isp::CostModel& model) {
 }
 
 }  // namespace
+
+int threads_for_one_file() { return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8); }
 
 std::string machine_name() {
   const Machine machine = this_machine(1);

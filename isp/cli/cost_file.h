@@ -10,6 +10,9 @@
 /// What developing costs on this machine, kept between runs.
 namespace lowlux::cli {
 
+/// Threads that work on one file where files are taken one at a time: one for each processor, up to 8.
+int threads_for_one_file();
+
 /// What times depend on: processor, instruction set, version of lowlux. Another machine's times are not believed.
 std::string machine_name();
 

@@ -136,7 +136,7 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
     if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
   }
   if (args.effects.budgeted()) {
-    auto cost = cost_of_this_machine(threads_of_each(1), args.quiet);
+    auto cost = cost_of_this_machine(threads_for_one_file(), args.quiet);
     if (!cost) return tl::make_unexpected(cost.error());
     batch.cost = std::make_shared<const isp::CostModel>(*std::move(cost));
   }

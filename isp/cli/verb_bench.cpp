@@ -8,6 +8,7 @@
 #include "isp/bench/bench_stages.h"
 #include "isp/cli/bench_args.h"
 #include "isp/cli/bench_report.h"
+#include "isp/cli/cost_file.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/machine.h"
 #include "isp/cli/module.h"
@@ -86,6 +87,25 @@ int failed(const Error& error) {
   return exit_failed;
 }
 
+/// Times of each part for a frame of 12 MP.
+int run_calibrate_cost(const BenchArgs& args) {
+  const int threads = args.threads > 0 ? args.threads : threads_for_one_file();
+  std::string file;
+  const auto model = calibrate_cost(threads, args.json, file);
+  if (!model) return failed(model.error());
+  if (args.json) {
+    fmt::print("{}", cost_text(*model));
+    return exit_done;
+  }
+  fmt::print("{}, {} threads; ms for a frame of 12 MP\n", model->machine, threads);
+  for (int i = 0; i < isp::cost_parts; ++i) {
+    const auto part = static_cast<isp::CostPart>(i);
+    fmt::print("  {:<12}{:10.1f}\n", name_of(part), 1e3 * model->seconds(part, 12));
+  }
+  fmt::print("{}\n", file.empty() ? "not kept" : "kept in " + file);
+  return exit_done;
+}
+
 }  // namespace
 
 int run_bench(const std::vector<std::string>& words) {
@@ -93,9 +113,10 @@ int run_bench(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<BenchArgs>(parsed);
   if (args.list) {
-    for (const isp::BenchStage& stage : isp::bench_stages()) fmt::print("{:<10} {}\n", stage.id, stage.title);
+    for (const isp::BenchStage& stage : isp::bench_stages()) fmt::print("{:<20} {}\n", stage.id, stage.title);
     return exit_done;
   }
+  if (args.calibrate_cost) return run_calibrate_cost(args);
   const auto stages = chosen(args.stages);
   if (!stages) {
     fmt::print(stderr, "{}\n", one_line("lowlux bench: " + stages.error().message));
