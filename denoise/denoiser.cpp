@@ -245,6 +245,10 @@ Denoiser::Denoiser(int max_width, int max_height, int threads, Level most)
     : state_(new State{FrameMemory(max_width, max_height, threads, most == Level::best)}) {}
 Denoiser::~Denoiser() = default;
 
+std::size_t Denoiser::bytes(int max_width, int max_height, int threads, Level most) {
+  return FrameMemory::bytes(max_width, max_height, threads, most == Level::best);
+}
+
 void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const DenoiseOptions& options,
                    PlaneView<float> signal_e, const DenoiseMaps& maps, Executor& executor) {
   assert(raw.value.width >= 2 && raw.value.height >= 2);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -87,6 +88,8 @@ class Denoiser {
   /// Takes about 22 bytes for each pixel, and 2 MB for each thread of a mosaic 4000 wide.
   /// @param most  no frame may ask for more; Level::best takes 2.4 MB more for each thread of a mosaic 4000 wide
   Denoiser(int max_width, int max_height, int threads, Level most = Level::high);
+  /// Of memory that one takes, to the last plane.
+  static std::size_t bytes(int max_width, int max_height, int threads, Level most = Level::high);
   ~Denoiser();
   Denoiser(const Denoiser&) = delete;
   Denoiser& operator=(const Denoiser&) = delete;

@@ -78,48 +78,77 @@ void lay_out_patches(Rows& from, int width, PatchMemory& out) {
   out.scratch = from.take(rows::patch_scratch(), 1);
 }
 
-void lay_out(Rows& from, int width, int height, int levels, FrameMemory& out) {
-  for (int l = 0; l < levels; ++l) {
-    PyramidLevel& level = out.level[l];
-    const int w = width >> l, h = height >> l;
-    level.noisy = from.planes(w, h);
-    for (PlaneSet& set : level.value) set = from.planes(w, h);
-    level.variance = from.planes(w / 2, h / 2);
-    level.residual = from.planes(w / 2, h / 2);
-  }
-  out.difference = from.planes(width / 2, height / 2);
-  for (ThreadMemory& thread : out.thread) lay_out_thread(from, width, thread);
-  for (SearchMemory& search : out.search) lay_out_search(from, width, search);
-  for (PatchMemory& patches : out.patches) lay_out_patches(from, width, patches);
+/// Cells of the largest frame, those that are appended with them.
+struct Extent {
+  int levels;
+  int width;
+  int height;
+  std::size_t starts;  // tiles of chroma's start
+};
+
+Extent extent_of(const FrameLayout& of) {
+  const int levels = levels_of(of.columns, of.rows);
+  return {levels, padded(of.columns, levels), padded(of.rows, levels),
+          static_cast<std::size_t>(tiles_of(of.columns)) * static_cast<std::size_t>(tiles_of(of.rows))};
 }
 
 }  // namespace
 
-FrameMemory::FrameMemory(int max_width, int max_height, int threads, bool best)
+FrameLayout::FrameLayout(int max_width, int max_height, int threads, bool best)
     : columns((max_width + 1) / 2),
       rows((max_height + 1) / 2),
       thread(static_cast<std::size_t>(threads)),
       search(static_cast<std::size_t>(threads)),
-      patches(best ? static_cast<std::size_t>(threads) : 0),
-      sources(columns, rows),
-      found_(static_cast<std::size_t>(threads) * max_width) {
+      patches(best ? static_cast<std::size_t>(threads) : 0) {
   assert(max_width >= 2 && max_height >= 2 && threads >= 1);
   assert(max_width <= largest_side && max_height <= largest_side);
-  const int levels = levels_of(columns, rows), width = padded(columns, levels), height = padded(rows, levels);
-  saturated = Plane<std::uint8_t>(width, height);
-  Rows counted(nullptr);
-  lay_out(counted, width, height, levels, *this);
+}
+
+std::size_t FrameLayout::lay_out(float* memory) {
+  const Extent extent = extent_of(*this);
+  Rows from(memory);
+  for (int l = 0; l < extent.levels; ++l) {
+    const int w = extent.width >> l, h = extent.height >> l;
+    level[l].noisy = from.planes(w, h);
+    for (PlaneSet& set : level[l].value) set = from.planes(w, h);
+    level[l].variance = from.planes(w / 2, h / 2);
+    level[l].residual = from.planes(w / 2, h / 2);
+  }
+  difference = from.planes(extent.width / 2, extent.height / 2);
+  for (ThreadMemory& own : thread) lay_out_thread(from, extent.width, own);
+  for (SearchMemory& own : search) lay_out_search(from, extent.width, own);
+  for (PatchMemory& own : patches) lay_out_patches(from, extent.width, own);
+  return from.used() + 2 * lead + denoise::rows::padding;
+}
+
+std::size_t FrameMemory::bytes(int max_width, int max_height, int threads, bool best) {
+  FrameLayout layout(max_width, max_height, threads, best);
+  const Extent extent = extent_of(layout);
+  const std::size_t cells = static_cast<std::size_t>(layout.columns) * static_cast<std::size_t>(layout.rows);
+  const std::size_t padded_cells = static_cast<std::size_t>(extent.width) * static_cast<std::size_t>(extent.height);
+  const auto workers = static_cast<std::size_t>(threads);
+  return sizeof(float) * layout.lay_out(nullptr) + cells + padded_cells +
+         sizeof(std::int32_t) * workers * static_cast<std::size_t>(max_width) +
+         layout.patches.size() * (sizeof(PatchMemory) + static_cast<std::size_t>(extent.width)) +
+         workers * (sizeof(ThreadMemory) + sizeof(SearchMemory)) + extent.starts * (sizeof(float) + most_levels) +
+         sizeof(FrameMemory);
+}
+
+FrameMemory::FrameMemory(int max_width, int max_height, int threads, bool best)
+    : FrameLayout(max_width, max_height, threads, best),
+      sources(columns, rows),
+      found_(static_cast<std::size_t>(threads) * max_width) {
+  const Extent extent = extent_of(*this);
+  saturated = Plane<std::uint8_t>(extent.width, extent.height);
   // Zeros: what lies beside rows is read, and must be numbers.
-  memory_ = std::make_unique<float[]>(counted.used() + 2 * lead + rows::padding);
-  Rows real(memory_.get());
-  lay_out(real, width, height, levels, *this);
+  memory_ = std::make_unique<float[]>(lay_out(nullptr));
+  lay_out(memory_.get());
   for (int i = 0; i < threads; ++i) search[i].found = found_.data() + static_cast<std::ptrdiff_t>(i) * max_width;
-  chroma_.resize(patches.size() * static_cast<std::size_t>(width));
-  for (std::size_t i = 0; i < patches.size(); ++i)
-    patches[i].chroma = chroma_.data() + i * static_cast<std::size_t>(width);
-  const auto tiles = static_cast<std::size_t>(tiles_of(columns)) * static_cast<std::size_t>(tiles_of(rows));
-  starts.resize(tiles);
-  has_chroma.resize(tiles * most_levels);
+  const auto width = static_cast<std::size_t>(extent.width);
+  chroma_.resize(patches.size() * width);
+  for (std::size_t i = 0; i < patches.size(); ++i) patches[i].chroma = chroma_.data() + i * width;
+  starts.resize(extent.starts);
+  has_chroma.resize(extent.starts * most_levels);
 }
 
 }  // namespace lowlux::denoise

@@ -53,17 +53,29 @@ struct PatchMemory {
   std::uint8_t* chroma = nullptr;  // of each patch of a row
 };
 
-struct FrameMemory {
+/// What lies in one stretch of floats.
+struct FrameLayout {
   /// @param best  whether Level::best is wanted too
-  FrameMemory(int max_width, int max_height, int threads, bool best);
+  FrameLayout(int max_width, int max_height, int threads, bool best);
 
   int columns;  // cells of the largest frame
   int rows;
   std::array<PyramidLevel, most_levels> level{};
   PlaneSet difference;  // of the size of level 1
   std::vector<ThreadMemory> thread;
-  std::vector<SearchMemory> search;       // of each thread
-  std::vector<PatchMemory> patches;       // of each thread, or empty
+  std::vector<SearchMemory> search;  // of each thread
+  std::vector<PatchMemory> patches;  // of each thread, or empty
+
+  /// Places everything from `memory` on; without memory it only counts.
+  /// @return the floats that takes
+  std::size_t lay_out(float* memory);
+};
+
+struct FrameMemory : FrameLayout {
+  FrameMemory(int max_width, int max_height, int threads, bool best);
+  /// Of memory that one takes.
+  static std::size_t bytes(int max_width, int max_height, int threads, bool best);
+
   Plane<std::uint8_t> sources;            // cells that hold point sources
   Plane<std::uint8_t> saturated;          // cells of level 0 that hold saturated sites: 1
   std::vector<float> starts;              // chroma start level of each tile

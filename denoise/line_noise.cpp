@@ -230,13 +230,14 @@ Result<LineOffsets> line_offsets_of_frame(PlaneView<const float> charge_e, Lines
   return out;
 }
 
-void subtract_lines(const LineOffsets& offsets, PlaneView<float> charge_e) {
+void subtract_lines(const LineOffsets& offsets, PlaneView<float> charge_e, int first) {
   const bool rows = offsets.lines == Lines::rows;
-  assert(offsets.offset_e.size() == static_cast<std::size_t>(rows ? charge_e.height : charge_e.width));
+  assert(first >= 0 &&
+         offsets.offset_e.size() >= static_cast<std::size_t>(first + (rows ? charge_e.height : charge_e.width)));
   for (int y = 0; y < charge_e.height; ++y) {
     for (int x = 0; x < charge_e.width; ++x) {
       charge_e.at(x, y) =
-          static_cast<float>(charge_e.at(x, y) - offsets.offset_e[static_cast<std::size_t>(rows ? y : x)]);
+          static_cast<float>(charge_e.at(x, y) - offsets.offset_e[static_cast<std::size_t>(first + (rows ? y : x))]);
     }
   }
 }

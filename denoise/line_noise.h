@@ -48,7 +48,8 @@ struct FrameLineOptions {
 Result<LineOffsets> line_offsets_of_frame(PlaneView<const float> charge_e, Lines lines,
                                           const FrameLineOptions& options = {});
 
-/// Subtracts each line's offset; as many lines as were measured.
-void subtract_lines(const LineOffsets& offsets, PlaneView<float> charge_e);
+/// Subtracts each line's offset; as many lines as were measured, or a piece of the frame.
+/// @param first  number of the piece's first line
+void subtract_lines(const LineOffsets& offsets, PlaneView<float> charge_e, int first = 0);
 
 }  // namespace lowlux::denoise

@@ -80,7 +80,7 @@ RawDn clean_readout(const RawDn& raw, Plane<std::uint16_t> codes, const Levels& 
 Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
   Result<DevelopPlan> plan = plan_develop(frame, options, executor);
   if (!plan) return tl::make_unexpected(std::move(plan.error()));
-  if (!plan->noise_reduction.level) return fail(ErrorCode::insufficient, plan->noise_reduction.reason);
+  if (!plan->noise_reduction.has_level()) return fail(ErrorCode::insufficient, plan->noise_reduction.reason);
   CleanRaw out;
   out.plan = *std::move(plan);
   StageClock clock(out.plan.times);

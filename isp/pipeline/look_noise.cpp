@@ -70,7 +70,7 @@ void of_model(const DevelopPlan& plan, const RgbView<const float>& quarter, Plan
 
 void noise_of_luminance(const DevelopPlan& plan, const Rect& crop, const NoiseMaps& maps,
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
-  if (plan.noise_reduction.level) {
+  if (plan.noise_reduction.has_level()) {
     of_maps(plan, crop, maps.residual_variance_e2.view(), out, executor);
   } else {
     of_model(plan, quarter, out, executor);

@@ -1,7 +1,12 @@
 #include "isp/pipeline/noise_reducer.h"
 
 #include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <cstring>
 #include <utility>
+
+#include "isp/pipeline/frame_tiles.h"
 
 namespace lowlux::isp {
 namespace {
@@ -10,16 +15,84 @@ void fit(Plane<float>& plane, int width, int height) {
   if (plane.width() != width || plane.height() != height) plane = Plane<float>(width, height);
 }
 
-/// Memory for the maps of a mosaic.
-denoise::DenoiseMaps views_of(NoiseMaps& maps, int width, int height) {
-  const int columns = (width + 1) / 2, rows = (height + 1) / 2;
-  fit(maps.residual_variance_e2, columns, rows);
-  fit(maps.chroma_confidence, columns, rows);
-  for (Plane<float>& plane : maps.site_variance_e2) fit(plane, columns, rows);
+denoise::DenoiseMaps views_of(NoiseMaps& maps) {
   return {.residual_variance = maps.residual_variance_e2.view(),
           .chroma_confidence = maps.chroma_confidence.view(),
           .site_variance = {maps.site_variance_e2[0].view(), maps.site_variance_e2[1].view(),
                             maps.site_variance_e2[2].view()}};
+}
+
+/// Memory for the maps of a mosaic.
+void fit(NoiseMaps& maps, int width, int height) {
+  const int columns = (width + 1) / 2, rows = (height + 1) / 2;
+  fit(maps.residual_variance_e2, columns, rows);
+  fit(maps.chroma_confidence, columns, rows);
+  for (Plane<float>& plane : maps.site_variance_e2) fit(plane, columns, rows);
+}
+
+/// Of the cells of a part; none where there are no maps.
+denoise::DenoiseMaps crop_of(const denoise::DenoiseMaps& maps, const Rect& sites) {
+  if (maps.residual_variance.data == nullptr) return {};
+  const auto cells = [&](const PlaneView<float>& map) {
+    return map.crop(sites.x / 2, sites.y / 2, (sites.width + 1) / 2, (sites.height + 1) / 2);
+  };
+  return {.residual_variance = cells(maps.residual_variance),
+          .chroma_confidence = cells(maps.chroma_confidence),
+          .site_variance = {cells(maps.site_variance[0]), cells(maps.site_variance[1]), cells(maps.site_variance[2])}};
+}
+
+void copy(const PlaneView<float>& from, const PlaneView<float>& to) {
+  for (int y = 0; y < to.height; ++y)
+    std::memcpy(to.row(y), from.row(y), static_cast<std::size_t>(to.width) * sizeof(float));
+}
+
+void copy(const denoise::DenoiseMaps& from, const denoise::DenoiseMaps& to) {
+  if (to.residual_variance.data == nullptr) return;
+  copy(from.residual_variance, to.residual_variance);
+  copy(from.chroma_confidence, to.chroma_confidence);
+  for (std::size_t c = 0; c < 3; ++c) copy(from.site_variance[c], to.site_variance[c]);
+}
+
+template <class T>
+PlaneView<T> crop_of(const PlaneView<T>& view, const Rect& part) {
+  return view.crop(part.x, part.y, part.width, part.height);
+}
+
+/// As seen from the corner of a piece.
+Rect seen_from(const Rect& piece, const Rect& part) {
+  return {part.x - piece.x, part.y - piece.y, part.width, part.height};
+}
+
+/// A core may begin one pixel behind an even column or row; what is before belongs to the margin then.
+Rect from_even_site(const Rect& core) {
+  return {core.x & ~1, core.y & ~1, core.width + (core.x & 1), core.height + (core.y & 1)};
+}
+
+void take_lines_off(const NoiseReduction& how, const Rect& piece, PlaneView<float> raw_e) {
+  for (const denoise::LineOffsets& lines : how.lines) {
+    subtract_lines(lines, raw_e, lines.lines == denoise::Lines::rows ? piece.y : piece.x);
+  }
+}
+
+/// What a part is reduced in.
+Rect with_own_margin(const LevelPart& part, const NoiseReducer::Piece& piece) {
+  return overlap(with_margin(part.core, {}, piece.frame_width, piece.frame_height), piece.whole);
+}
+
+/// Sides of the largest of the parts that have a level, each way; 0 where none has.
+struct PartSize {
+  int width = 0;
+  int height = 0;
+};
+
+PartSize largest(const std::vector<LevelPart>& parts, const NoiseReducer::Piece& piece) {
+  PartSize out;
+  for (const LevelPart& part : parts) {
+    if (!part.level) continue;
+    const Rect whole = with_own_margin(part, piece);
+    out = {std::max(out.width, whole.width), std::max(out.height, whole.height)};
+  }
+  return out;
 }
 
 /// One column parity of one row of mosaics: what a mean over frames and a level's result make together.
@@ -45,16 +118,16 @@ void blend_sites(const BlendSites& in, int sites, float* signal_e) {
 
 }  // namespace
 
-void NoiseReducer::reserve(int width, int height, const NoiseReduction& how) {
-  const bool small = width > width_ || height > height_ || how.options.level > most_;
-  if (how.level && (!denoiser_ || small)) {
-    width_ = std::max(width, width_);
-    height_ = std::max(height, height_);
-    most_ = std::max(how.options.level, most_);
-    denoiser_.reset();  // before the next one takes its memory
-    denoiser_ = std::make_unique<denoise::Denoiser>(width_, height_, executor_.width(), most_);
-  }
-  if (!how.temporal) return;
+void NoiseReducer::reserve_level(int width, int height, denoise::Level most) {
+  if (denoiser_ && width <= width_ && height <= height_ && most <= most_) return;
+  width_ = std::max(width, width_);
+  height_ = std::max(height, height_);
+  most_ = std::max(most, most_);
+  denoiser_.reset();  // before the next one takes its memory
+  denoiser_ = std::make_unique<denoise::Denoiser>(width_, height_, executor_.width(), most_);
+}
+
+void NoiseReducer::reserve_time(int width, int height) {
   if (!temporal_ || width != temporal_width_ || height != temporal_height_) {
     temporal_.reset();
     temporal_ = std::make_unique<denoise::TemporalMean>(width, height, executor_.width());
@@ -65,11 +138,68 @@ void NoiseReducer::reserve(int width, int height, const NoiseReduction& how) {
   fit(variance_share_, (width + 1) / 2, (height + 1) / 2);
 }
 
-void NoiseReducer::reduce_by_level(const RawElectrons& raw, const NoiseReduction& how, PlaneView<float> out,
-                                   NoiseMaps* maps) {
-  denoise::DenoiseMaps views;
-  if (maps != nullptr) views = views_of(*maps, out.width, out.height);
-  denoiser_->run({raw.value.view(), raw.phase}, how.noise, how.options, out, views, executor_);
+std::size_t NoiseReducer::maps_bytes(int width, int height) {
+  return 5 * sizeof(float) * static_cast<std::size_t>((width + 1) / 2) * static_cast<std::size_t>((height + 1) / 2);
+}
+
+std::size_t NoiseReducer::bytes(int width, int height, const NoiseReduction& how, bool maps, int threads) {
+  if (!how.has_level()) return 0;
+  const Piece frame{{0, 0, width, height}, {0, 0, width, height}, width, height};
+  std::vector<LevelPart> parts;
+  cut_by_level(how, frame.core, TileLimits{}.side_px, parts);
+  const PartSize most = largest(parts, frame);
+  const std::size_t denoiser = denoise::Denoiser::bytes(most.width, most.height, threads, most_of(how));
+  if (parts.size() == 1) return denoiser;
+  return denoiser + sizeof(float) * static_cast<std::size_t>(most.width) * static_cast<std::size_t>(most.height) +
+         (maps ? maps_bytes(most.width, most.height) : 0);
+}
+
+void NoiseReducer::reserve_pieces(int width, int height, const NoiseReduction& how) {
+  if (how.has_level()) reserve_level(width, height, most_of(how));
+}
+
+void NoiseReducer::reduce_part(const LevelPart& part, const Piece& piece, const NoiseReduction& how,
+                               PlaneView<const float> raw_e, PlaneView<float> signal_e,
+                               const denoise::DenoiseMaps& maps) {
+  const Rect core = seen_from(piece.whole, part.core), whole = with_own_margin(part, piece);
+  if (!part.level) {
+    const Rect even = from_even_site(core);
+    take_dark_off(crop_of(raw_e, even), how.noise, crop_of(signal_e, even), executor_);
+    const denoise::DenoiseMaps of_core = crop_of(maps, core);
+    if (of_core.residual_variance.data == nullptr) return;
+    return set_own_noise({crop_of(raw_e, core), piece.phase}, how, of_core);
+  }
+  denoise::DenoiseOptions options = how.options;
+  options.level = *part.level;
+  denoise::DenoiseMaps of_part;
+  if (maps.residual_variance.data != nullptr) {
+    of_part = crop_of(views_of(part_maps_), {0, 0, whole.width, whole.height});
+  }
+  const PlaneView<float> out = part_e_.view().crop(0, 0, whole.width, whole.height);
+  denoiser_->run({crop_of(raw_e, seen_from(piece.whole, whole)), piece.phase}, how.noise, options, out, of_part,
+                 executor_);
+  const Rect place = seen_from(whole, part.core);
+  copy(crop_of(out, place), crop_of(signal_e, core));
+  copy(crop_of(of_part, place), crop_of(maps, core));
+}
+
+void NoiseReducer::reduce_by_level(const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e,
+                                   PlaneView<float> signal_e, const denoise::DenoiseMaps& maps) {
+  cut_by_level(how, piece.core, TileLimits{}.side_px, parts_);
+  if (parts_.size() == 1 && parts_.front().level) {
+    reserve_level(piece.whole.width, piece.whole.height, *parts_.front().level);
+    denoise::DenoiseOptions options = how.options;
+    options.level = *parts_.front().level;
+    return denoiser_->run({raw_e, piece.phase}, how.noise, options, signal_e, maps, executor_);
+  }
+  if (const auto [width, height] = largest(parts_, piece); width > 0) {
+    reserve_level(width, height, most_of(how));
+    if (width > part_e_.width() || height > part_e_.height()) {
+      part_e_ = Plane<float>(std::max(width, part_e_.width()), std::max(height, part_e_.height()));
+    }
+    if (maps.residual_variance.data != nullptr) fit(part_maps_, part_e_.width(), part_e_.height());
+  }
+  for (const LevelPart& part : parts_) reduce_part(part, piece, how, raw_e, signal_e, maps);
 }
 
 void NoiseReducer::reduce_by_time(const RawElectrons& raw, const NoiseReduction& how) {
@@ -94,28 +224,35 @@ void NoiseReducer::blend(const RawElectrons& raw, const NoiseReduction& how, con
   });
 }
 
+void NoiseReducer::run_piece(const Piece& piece, const NoiseReduction& how, PlaneView<float> raw_e,
+                             PlaneView<float> signal_e) {
+  assert(how.reduces() && !how.temporal);
+  moved_ = 0;
+  take_lines_off(how, piece.whole, raw_e);
+  reduce_by_level(piece, how, raw_e, signal_e, {});
+}
+
 SignalElectrons NoiseReducer::run(RawElectrons& raw, const NoiseReduction& how, Plane<float> memory, NoiseMaps* maps) {
   const int width = raw.value.width(), height = raw.value.height();
+  const Rect whole{0, 0, width, height};
   fit(memory, width, height);
-  reserve(width, height, how);
-  for (const denoise::LineOffsets& lines : how.lines) subtract_lines(lines, raw.value.view());
+  take_lines_off(how, whole, raw.value.view());
   moved_ = 0;
-  if (how.temporal) reduce_by_time(raw, how);
-  if (!how.level) {
-    for_each_band(executor_, height, [&](RowBand band, int) {
-      for (int y = band.first; y < band.last; ++y) {
-        const auto& dark = how.noise.dark_mean_e;
-        const int left = site_of(0, y);
-        const auto even = static_cast<float>(dark[left]), odd = static_cast<float>(dark[left + 1]);
-        const float* const mean_e = mean_e_.row(y);
-        float* const out = memory.row(y);
-        for (int x = 0; x < width; ++x) out[x] = mean_e[x] - ((x & 1) != 0 ? odd : even);
-      }
-    });
+  if (how.temporal) {
+    reserve_time(width, height);
+    reduce_by_time(raw, how);
+  }
+  if (!how.has_level()) {
+    take_dark_off(std::as_const(mean_e_).view(), how.noise, memory.view(), executor_);
     return {std::move(memory), raw.phase};
   }
   NoiseMaps* const level_maps = maps != nullptr || !how.temporal ? maps : &level_maps_;
-  reduce_by_level(raw, how, memory.view(), level_maps);
+  denoise::DenoiseMaps views;
+  if (level_maps != nullptr) {
+    fit(*level_maps, width, height);
+    views = views_of(*level_maps);
+  }
+  reduce_by_level({whole, whole, width, height, raw.phase}, how, std::as_const(raw.value).view(), memory.view(), views);
   if (how.temporal) blend(raw, how, *level_maps, memory.view());
   return {std::move(memory), raw.phase};
 }

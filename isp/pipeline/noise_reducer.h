@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
-#include <optional>
+#include <vector>
 
 #include "denoise/denoiser.h"
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
+#include "isp/pipeline/level_parts.h"
 #include "isp/pipeline/noise_reduction.h"
 
 namespace lowlux::isp {
@@ -20,10 +22,32 @@ class NoiseReducer {
  public:
   explicit NoiseReducer(Executor& executor) : executor_(executor) {}
 
+  /// Where regions differ, each is reduced with a margin of tile_margin_px of its own, and the rest as it is.
   /// @param raw   as the frame the decision was made for; its lines are taken off in place
   /// @param maps  filled if not null
   /// Precondition: how.reduces().
   SignalElectrons run(RawElectrons& raw, const NoiseReduction& how, Plane<float> memory, NoiseMaps* maps);
+
+  /// A piece of a frame, in pixels of its active area. The corner of `whole` is on the lattice of frame_tiles.h.
+  struct Piece {
+    Rect core;   // what is asked for
+    Rect whole;  // what is known, the margin with it
+    int frame_width = 0;
+    int frame_height = 0;
+    BayerPhase phase = BayerPhase::rggb;  // of the frame
+  };
+  /// The same for a piece of a frame.
+  /// @param raw_e     `whole`; its lines are taken off in place
+  /// @param signal_e  as large; the core is set
+  /// Precondition: how.reduces(), without frames before.
+  void run_piece(const Piece& piece, const NoiseReduction& how, PlaneView<float> raw_e, PlaneView<float> signal_e);
+  /// Bytes for a frame of width x height pixels, without frames before.
+  /// @param maps  whether they are asked for; their own memory is not in it
+  static std::size_t bytes(int width, int height, const NoiseReduction& how, bool maps, int threads);
+  /// Of NoiseMaps.
+  static std::size_t maps_bytes(int width, int height);
+  /// Memory for pieces of up to width x height pixels, so that later ones need none.
+  void reserve_pieces(int width, int height, const NoiseReduction& how);
 
   /// 1 where only this frame is known, 4 where many before it are: noise of one frame that comes back is seen, and a
   /// mean of few frames may be of something that moved too little to be found. Chosen on the pictures of
@@ -35,8 +59,12 @@ class NoiseReducer {
   double moved() const { return moved_; }
 
  private:
-  void reserve(int width, int height, const NoiseReduction& how);
-  void reduce_by_level(const RawElectrons& raw, const NoiseReduction& how, PlaneView<float> out, NoiseMaps* maps);
+  void reserve_level(int width, int height, denoise::Level most);
+  void reserve_time(int width, int height);
+  void reduce_by_level(const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e,
+                       PlaneView<float> signal_e, const denoise::DenoiseMaps& maps);
+  void reduce_part(const LevelPart& part, const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e,
+                   PlaneView<float> signal_e, const denoise::DenoiseMaps& maps);
   void reduce_by_time(const RawElectrons& raw, const NoiseReduction& how);
   void blend(const RawElectrons& raw, const NoiseReduction& how, const NoiseMaps& maps, PlaneView<float> signal_e);
 
@@ -52,6 +80,9 @@ class NoiseReducer {
   NoiseMaps level_maps_;
   double moved_ = 0;
   denoise::Level most_ = denoise::Level::high;  // that there is memory for
+  std::vector<LevelPart> parts_;
+  Plane<float> part_e_;  // of a region and its margin
+  NoiseMaps part_maps_;
 };
 
 }  // namespace lowlux::isp

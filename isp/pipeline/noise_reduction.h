@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -34,6 +35,14 @@ struct TemporalReduction {
   bool restart = true;  // nothing is known of frames before
 };
 
+/// Levels of the parts of a frame: squares from the corner of the active area on, which cover it.
+struct NoiseRegions {
+  int size = 0;  // of a side [px]; a multiple of tile_lattice_px
+  int columns = 0;
+  int rows = 0;
+  std::vector<std::optional<denoise::Level>> level;  // rows x columns; absent: noise stays, lines and dark charge go
+};
+
 /// What was decided: everything that reducing the noise of one frame takes. Sites as in the active area.
 struct NoiseReduction {
   std::optional<denoise::Level> level;  // absent: values stay as they are
@@ -44,15 +53,22 @@ struct NoiseReduction {
   denoise::DenoiseOptions options;
   std::vector<denoise::LineOffsets> lines;  // taken off before
   std::optional<TemporalReduction> temporal;
+  std::optional<NoiseRegions> regions;  // set: their levels hold, and `level` does not
 
-  bool reduces() const { return level || temporal; }
+  /// Whether some part of the frame has a level.
+  bool has_level() const {
+    if (!regions) return level.has_value();
+    return std::ranges::any_of(regions->level, [](const auto& of_region) { return of_region.has_value(); });
+  }
+  bool reduces() const { return has_level() || temporal; }
 };
 
 /// The level for the signal to noise ratio of one pixel. None from 60 on, where no difference can be seen; draft from
 /// 20 on, standard from 3 on; high below, where chroma starts coarse, which makes it cheap.
 std::optional<denoise::Level> level_for(double snr);
 
-/// What is known of what is left, for each 2x2 cell of the picture: see denoise::DenoiseMaps.
+/// What is known of what is left, for each 2x2 cell of the picture: see denoise::DenoiseMaps. Where a region keeps its
+/// noise, that is what is left, by the mean of 8 x 8 cells, and colour is as it was: its confidence is 1.
 struct NoiseMaps {
   Plane<float> residual_variance_e2;
   Plane<float> chroma_confidence;

@@ -2,58 +2,28 @@
 
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
 #include <utility>
 
 #include "isp/pipeline/electron_mosaic.h"
+#include "isp/pipeline/frame_needs.h"
 #include "isp/pipeline/look_noise.h"
+#include "isp/pipeline/picture_view.h"
+#include "isp/pipeline/site_gains.h"
 #include "isp/raw/bin_plane.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/to_linear.h"
-#include "isp/render/retarget_rows.h"
 
 namespace lowlux::isp {
 namespace {
 
-// Figures of the active area's sites in the order of the sites of a crop of it.
-PerSite<float> of_crop(const PerSite<double>& active, const Rect& crop) {
-  PerSite<float> out{};
-  for (int site = 0; site < 4; ++site) {
-    out[site] = static_cast<float>(active[site_of(crop.x + (site & 1), crop.y + (site >> 1))]);
-  }
-  return out;
-}
-
 PlaneView<const float> crop_of(const Plane<float>& active, const Rect& crop) {
   return active.view().crop(crop.x, crop.y, crop.width, crop.height);
-}
-
-// White-balance gain of each site of the active area, divided by what one unit of the mosaic is worth.
-PerSite<double> site_gain(const RawDn& raw, const DevelopPlan& plan, const PerSite<double>& units_at_white) {
-  PerSite<double> gain{};
-  for (int site = 0; site < 4; ++site) {
-    const int colour = static_cast<int>(colour_at(raw.phase, site & 1, site >> 1));
-    gain[site] = plan.white_gain[colour] / units_at_white[site];
-  }
-  return gain;
 }
 
 template <class T>
 void fit(Plane<T>& plane, int width, int height) {
   if (plane.width() != width || plane.height() != height) plane = Plane<T>(width, height);
 }
-
-bool bounds_noise(const DevelopPlan& plan) {
-  return plan.look && plan.look->noise_limit && (plan.look->noise || plan.noise_reduction.level);
-}
-
-bool shows_effects(const LookPlan& look) {
-  return std::ranges::any_of(look.effects, [](const LookEffect& effect) { return effect.used; });
-}
-
-bool needs_grid(const DevelopPlan& plan) { return plan.look && (shows_effects(*plan.look) || bounds_noise(plan)); }
-
-bool keeps_maps(const DevelopPlan& plan) { return plan.options.denoise.maps || bounds_noise(plan); }
 
 // What is left to do with planes that are already light in the picture's primaries.
 RgbTransform of_modelled(const DevelopPlan& plan, const LookGrid* look) {
@@ -65,23 +35,13 @@ RgbTransform of_modelled(const DevelopPlan& plan, const LookGrid* look) {
   return out;
 }
 
-CodeChange change_by(const RetargetTable& table) {
-  return {[](const void* context, const std::uint16_t* rgb, int width, std::uint8_t* out) {
-            apply(*static_cast<const RetargetTable*>(context), rgb, width, out);
-          },
-          [](const void* context, const std::uint16_t* rgb, int width, std::uint16_t* out) {
-            apply(*static_cast<const RetargetTable*>(context), rgb, width, out);
-          },
-          &table};
-}
-
 DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
   const Rect& crop = raw.default_crop;
   PerSite<double> range{};
   for (int site = 0; site < 4; ++site) range[site] = white_at(raw, site) - plan.black.pedestal_dn[site];
   return {raw.dn.view().crop(raw.active.x + crop.x, raw.active.y + crop.y, crop.width, crop.height),
           phase_of_crop(raw.phase, crop.x, crop.y),
-          {of_crop(plan.black.pedestal_dn, crop), of_crop(site_gain(raw, plan, range), crop)}};
+          {of_crop(plan.black.pedestal_dn, crop), site_gains(raw, plan, range, crop)}};
 }
 
 }  // namespace
@@ -99,11 +59,9 @@ SignalElectrons Pipeline::signal_electrons(const RawFrame& frame, const DevelopP
 }
 
 // Bayer frames that have to be repaired, multiplied or denoised first: in electrons where the gain is known.
-PerSite<float> Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& plan) {
+void Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& plan) {
   const RawDn& raw = frame.raw;
-  PerSite<double> units_at_white{1, 1, 1, 1};
   if (plan.electrons_at_white) {
-    units_at_white = *plan.electrons_at_white;
     mosaic_ = signal_electrons(frame, plan).value;
   } else {
     fit(mosaic_, raw.active.width, raw.active.height);
@@ -111,7 +69,6 @@ PerSite<float> Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& 
     repair(mosaic_.view(), plan.defects, 2);
   }
   apply_gains(frame.corrections, mosaic_.view(), executor_);
-  return of_crop(site_gain(raw, plan, units_at_white), raw.default_crop);
 }
 
 RgbInput Pipeline::prepare_bayer(const RawFrame& frame, const DevelopPlan& plan) {
@@ -124,8 +81,9 @@ RgbInput Pipeline::prepare_bayer(const RawFrame& frame, const DevelopPlan& plan)
     return CameraPlanes{{half[0], half[1], half[2]}, {1, 1, 1}};
   };
   if (plan.from_codes) return half_or_whole(code_mosaic(raw, plan));
-  const PerSite<float> gain = float_mosaic(frame, plan);
-  return half_or_whole(SignedMosaic{crop_of(mosaic_, crop), phase_of_crop(raw.phase, crop.x, crop.y), gain});
+  float_mosaic(frame, plan);
+  return half_or_whole(
+      SignedMosaic{crop_of(mosaic_, crop), phase_of_crop(raw.phase, crop.x, crop.y), site_gains(raw, plan, crop)});
 }
 
 // Monochrome frames serve as R, G and B at once; demosaiced ones have three planes of their own.
@@ -189,7 +147,7 @@ LookGrid Pipeline::look_grid(const RgbInput& in, const RawFrame& frame, const De
 
 template <class Encode>
 void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const Encode& encode) {
-  has_noise_maps_ = plan.noise_reduction.level && keeps_maps(plan);
+  has_noise_maps_ = keeps_maps(plan);
   reserve(frame, plan);
   const RgbInput in =
       frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);
@@ -199,7 +157,7 @@ void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const E
     look = look_grid(in, frame, plan);
     transform.look = &look;
   }
-  if (plan.look && plan.look->table) {
+  if (needs_table(plan)) {
     encode(as_modelled(in, plan), of_modelled(plan, transform.look));
   } else {
     encode(in, transform);
@@ -207,8 +165,13 @@ void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const E
 }
 
 void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
-  render_to(frame, plan,
-            [&](const RgbInput& in, const RgbTransform& transform) { this->encode(in, transform, plan, out); });
+  if (goes_by_tiles(frame.raw, plan, limits_)) {
+    has_noise_maps_ = false;
+    return tiles_.render(frame, plan, noise_reducer_, out);
+  }
+  render_to(frame, plan, [&](const RgbInput& in, const RgbTransform& transform) {
+    encode(*kernel_, in, transform, plan, view_of(out), executor_);
+  });
 }
 
 void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, const RowSink& out) {
@@ -241,33 +204,6 @@ CameraPlanes Pipeline::as_modelled(const RgbInput& in, const DevelopPlan& plan) 
   return {{planes[0], planes[1], planes[2]}, {1 / limit, 1 / limit, 1 / limit}};
 }
 
-void Pipeline::encode(const RgbInput& in, const RgbTransform& transform, const DevelopPlan& plan, Picture& out) {
-  const CodeChange retarget = plan.options.display ? change_by(plan.options.display->made.table) : CodeChange{};
-  const CodeChange* const change = plan.options.display ? &retarget : nullptr;
-  std::visit(
-      [&](auto& picture) {
-        using P = std::remove_reference_t<decltype(picture)>;
-        if constexpr (std::is_same_v<P, Encoded8>) {
-          kernel_->rgb8(in, transform, plan.tone, picture.codes.view(), executor_, change);
-        } else if constexpr (std::is_same_v<P, Encoded16>) {
-          kernel_->rgb16(in, transform, plan.tone, picture.codes.view(), executor_, change);
-        } else {
-          kernel_->linear(in, transform, picture.view(), executor_);
-        }
-      },
-      out);
-}
-
-Picture make_picture(const DevelopPlan& plan) {
-  switch (plan.options.samples) {
-    case SampleType::u8:
-      return Encoded8{Plane<std::uint8_t>(3 * plan.width, plan.height)};
-    case SampleType::u16:
-      return Encoded16{Plane<std::uint16_t>(3 * plan.width, plan.height)};
-    case SampleType::f32:
-      break;
-  }
-  return SceneLinear(plan.width, plan.height);
-}
+Picture make_picture(const DevelopPlan& plan) { return make_picture(plan.options.samples, plan.width, plan.height); }
 
 }  // namespace lowlux::isp

@@ -9,6 +9,7 @@
 #include "isp/base/image.h"
 #include "isp/pipeline/noise_reducer.h"
 #include "isp/pipeline/plan.h"
+#include "isp/pipeline/tile_renderer.h"
 
 namespace lowlux::isp {
 
@@ -16,11 +17,14 @@ namespace lowlux::isp {
 /// allocates them, later ones of that size allocate nothing. One frame at a time.
 class Pipeline {
  public:
-  explicit Pipeline(Executor& executor) : executor_(executor), noise_reducer_(executor) {}
+  /// @param limits  from which size on frames go by tiles, which bounds their memory: see goes_by_tiles
+  explicit Pipeline(Executor& executor, const TileLimits& limits = {})
+      : executor_(executor), limits_(limits), noise_reducer_(executor), tiles_(executor, limits) {}
 
   /// `out` holds a picture of plan.width x plan.height of the planned sample type: see make_picture().
   void render(const RawFrame& frame, const DevelopPlan& plan, Picture& out);
-  /// The picture's 8-bit codes, row by row; plan.options.display is not asked.
+  /// The picture's 8-bit codes, row by row; plan.options.display is not asked. This and what follows works on whole
+  /// frames of any size.
   void render(const RawFrame& frame, const DevelopPlan& plan, const RowSink& out);
   /// The picture's 16-bit codes into memory of the caller's, height x 3 width; the same.
   void render(const RawFrame& frame, const DevelopPlan& plan, PlaneView<std::uint16_t> out);
@@ -34,7 +38,9 @@ class Pipeline {
 
   /// Of the active area of the frame rendered last; empty unless its noise was reduced and maps were asked for or a
   /// look needed them.
-  NoiseMaps take_noise_maps() { return std::exchange(has_noise_maps_, false) ? std::move(noise_maps_) : NoiseMaps{}; }
+  NoiseMaps take_noise_maps() {
+    return std::exchange(has_noise_maps_, false) ? std::exchange(noise_maps_, {}) : NoiseMaps{};
+  }
 
  private:
   template <class Encode>
@@ -44,12 +50,13 @@ class Pipeline {
   RgbInput prepare_planes(const RawFrame& frame, const DevelopPlan& plan);
   LookGrid look_grid(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan);
   CameraPlanes as_modelled(const RgbInput& in, const DevelopPlan& plan);
-  void encode(const RgbInput& in, const RgbTransform& transform, const DevelopPlan& plan, Picture& out);
   SignalElectrons signal_electrons(const RawFrame& frame, const DevelopPlan& plan);
-  PerSite<float> float_mosaic(const RawFrame& frame, const DevelopPlan& plan);
+  void float_mosaic(const RawFrame& frame, const DevelopPlan& plan);
 
   Executor& executor_;
+  TileLimits limits_;
   NoiseReducer noise_reducer_;
+  TileRenderer tiles_;
   std::unique_ptr<RawToRgb> kernel_;
   int kernel_width_ = 0;
   Plane<float> mosaic_;   // active area, black and dark off

@@ -82,7 +82,8 @@ struct EffectsPlan {
   bool lines = true;
   bool dark = true;
   std::optional<denoise::Level> level;
-  bool level_decided = false;  // false: noise is left as options have it
+  bool level_decided = false;           // false: noise is left as options have it
+  std::optional<NoiseRegions> regions;  // with levels of their own
 };
 
 /// Everything decided about one frame before a pixel is touched: what was measured, and what the kernels need.

@@ -10,6 +10,7 @@
 
 #include "isp/pipeline/effect_sizes.h"
 #include "isp/pipeline/plan_noise.h"
+#include "isp/pipeline/plan_regions.h"
 #include "isp/pipeline/visible_noise.h"
 
 namespace lowlux::isp {
@@ -45,6 +46,7 @@ struct Facts {
   bool from_codes = false;  // without reduction, repair and dark nothing keeps the frame from it
   bool look = false;
   SampleType samples = SampleType::u8;
+  Rect active;
   double megapixels = 0;
 };
 
@@ -201,6 +203,13 @@ std::string level_words(const Facts& facts, const Candidate& plan) {
                      100 * share[0], 100 * share[1], 100 * share[2]);
 }
 
+/// How many of the regions have which level.
+std::string region_words(const NoiseRegions& regions) {
+  const auto have = [&](std::optional<Level> level) { return std::ranges::count(regions.level, level); };
+  return fmt::format("; of {} regions {} none, {} draft, {} standard, {} high", regions.level.size(),
+                     have(std::nullopt), have(Level::draft), have(Level::standard), have(Level::high));
+}
+
 std::optional<double> cost_of(const Facts& facts, std::initializer_list<CostShare> parts) {
   if (!facts.choice.cost) return std::nullopt;
   return predicted_s(*facts.choice.cost, facts.megapixels, parts);
@@ -239,6 +248,12 @@ EffectsPlan told(const Facts& facts, const Candidate& plan) {
     add({"dark charge", facts.sizes.dark, left(used, facts.sizes.dark), used, used ? "subtracted" : "left in",
          std::nullopt});
   }
+  const bool by_tolerance = facts.choice.tolerance_delta_e && !facts.choice.all && !facts.choice.budget_s;
+  if (by_tolerance && plan.level && !facts.level_is_fixed) {
+    out.regions =
+        plan_regions(facts.active, facts.blocks, *plan.level, share_for_level * *facts.choice.tolerance_delta_e);
+  }
+  if (out.regions) out.effects.front().decision += region_words(*out.regions);
   if (facts.choice.cost) out.predicted_s = plan.seconds;
   out.find_defects = plan.defects;
   out.lines = plan.lines;
@@ -254,6 +269,7 @@ Facts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopP
   const Rect& crop = frame.raw.default_crop;
   facts.megapixels = 1e-6 * crop.width * crop.height;
   facts.samples = o.samples;
+  facts.active = frame.raw.active;
   facts.look = plan.look.has_value();
   NoiseReduction reduction;
   facts.has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !noise_obstacle(frame, plan);

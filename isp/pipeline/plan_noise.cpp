@@ -93,6 +93,7 @@ void choose_level(const DenoiseChoice& choice, const std::optional<EffectsPlan>&
   }
   if (effects && effects->level_decided) {
     out.level = effects->level;
+    out.regions = effects->regions;
     out.reason = fmt::format("what the frame calls for, at a signal to noise ratio of {:.3g}", *out.snr);
     return;
   }

@@ -34,34 +34,36 @@ int aligned_up(int start, int pitch, int at) {
   return at <= start ? start : start + (at - start + pitch - 1) / pitch * pitch;
 }
 
-void multiply(const GainMap& map, int plane, PlaneView<float> out, Executor& executor) {
+void multiply(const GainMap& map, int plane, const FramePlace& place, PlaneView<float> out, Executor& executor) {
   const int map_plane = std::min(plane - map.first_plane, map.map_planes - 1);
-  const int bottom = std::min(map.bottom, out.height);
-  const int right = std::min(map.right, out.width);
+  const int bottom = std::min(map.bottom, place.frame_height);
+  const int right = std::min({map.right, place.frame_width, place.x + out.width});
   for_each_band(executor, out.height, [&](RowBand band, int) {
-    for (int y = aligned_up(map.top, map.row_pitch, band.first); y < std::min(band.last, bottom); y += map.row_pitch) {
-      const GridPosition v = grid_position((y + 0.5) / out.height, map.origin_v, map.spacing_v, map.points_v);
-      float* row = out.row(y);
-      for (int x = map.left; x < right; x += map.column_pitch) {
-        const GridPosition h = grid_position((x + 0.5) / out.width, map.origin_h, map.spacing_h, map.points_h);
-        row[x] *= gain_at(map, v, h, map_plane);
+    const int end = std::min(place.y + band.last, bottom);
+    for (int y = aligned_up(map.top, map.row_pitch, place.y + band.first); y < end; y += map.row_pitch) {
+      const GridPosition v = grid_position((y + 0.5) / place.frame_height, map.origin_v, map.spacing_v, map.points_v);
+      float* row = out.row(y - place.y);
+      for (int x = aligned_up(map.left, map.column_pitch, place.x); x < right; x += map.column_pitch) {
+        const GridPosition h = grid_position((x + 0.5) / place.frame_width, map.origin_h, map.spacing_h, map.points_h);
+        row[x - place.x] *= gain_at(map, v, h, map_plane);
       }
     }
   });
 }
 
-void multiply(const RadialGain& gain, PlaneView<float> out, Executor& executor) {
-  const double centre_x = gain.centre_x * (out.width - 1);
-  const double centre_y = gain.centre_y * (out.height - 1);
-  const double far_x = std::max(centre_x, out.width - 1 - centre_x);
-  const double far_y = std::max(centre_y, out.height - 1 - centre_y);
+void multiply(const RadialGain& gain, const FramePlace& place, PlaneView<float> out, Executor& executor) {
+  const double centre_x = gain.centre_x * (place.frame_width - 1);
+  const double centre_y = gain.centre_y * (place.frame_height - 1);
+  const double far_x = std::max(centre_x, place.frame_width - 1 - centre_x);
+  const double far_y = std::max(centre_y, place.frame_height - 1 - centre_y);
   const double far2 = std::max(far_x * far_x + far_y * far_y, 1e-12);
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
-      const double dy2 = (y - centre_y) * (y - centre_y);
+      const double dy = place.y + y - centre_y;
       float* row = out.row(y);
       for (int x = 0; x < out.width; ++x) {
-        const double r2 = ((x - centre_x) * (x - centre_x) + dy2) / far2;
+        const double dx = place.x + x - centre_x;
+        const double r2 = (dx * dx + dy * dy) / far2;
         const double* k = gain.k;
         row[x] *= static_cast<float>(1 + r2 * (k[0] + r2 * (k[1] + r2 * (k[2] + r2 * (k[3] + r2 * k[4])))));
       }
@@ -69,23 +71,31 @@ void multiply(const RadialGain& gain, PlaneView<float> out, Executor& executor) 
   });
 }
 
+FramePlace whole_of(PlaneView<float> plane) { return {0, 0, plane.width, plane.height}; }
+
 }  // namespace
 
 bool has_effect(const GainMap& map) {
   return std::any_of(map.gain.begin(), map.gain.end(), [](float gain) { return gain != 1.0f; });
 }
 
+void apply_gains(const RawCorrections& corrections, const FramePlace& place, PlaneView<float> mosaic,
+                 Executor& executor) {
+  for (const GainMap& map : corrections.gain_maps) multiply(map, map.first_plane, place, mosaic, executor);
+  for (const RadialGain& gain : corrections.radial_gains) multiply(gain, place, mosaic, executor);
+}
+
 void apply_gains(const RawCorrections& corrections, PlaneView<float> mosaic, Executor& executor) {
-  for (const GainMap& map : corrections.gain_maps) multiply(map, map.first_plane, mosaic, executor);
-  for (const RadialGain& gain : corrections.radial_gains) multiply(gain, mosaic, executor);
+  apply_gains(corrections, whole_of(mosaic), mosaic, executor);
 }
 
 void apply_gains(const RawCorrections& corrections, RgbView<float> rgb, Executor& executor) {
   for (int plane = 0; plane < 3; ++plane) {
     for (const GainMap& map : corrections.gain_maps) {
-      if (plane >= map.first_plane && plane < map.first_plane + map.planes) multiply(map, plane, rgb[plane], executor);
+      if (plane < map.first_plane || plane >= map.first_plane + map.planes) continue;
+      multiply(map, plane, whole_of(rgb[plane]), rgb[plane], executor);
     }
-    for (const RadialGain& gain : corrections.radial_gains) multiply(gain, rgb[plane], executor);
+    for (const RadialGain& gain : corrections.radial_gains) multiply(gain, whole_of(rgb[plane]), rgb[plane], executor);
   }
 }
 

@@ -168,21 +168,31 @@ void convert_band(const CameraPlanes& in, const RgbTransform& transform, RowBand
 /// Floats that one part of a look's row takes.
 std::size_t look_run_of(int width) { return 1 + static_cast<std::size_t>(cells_along(width)) + rows::look_padding; }
 
+// Runs start on a cache line, and an odd number of lines apart: an even number could put the live rows of a column
+// into the same few sets of the first-level cache.
+std::size_t run_stride_of(int width) { return (((run_of(width) + line_floats - 1) / line_floats) | 1U) * line_floats; }
+
+// Of the scratch memory of all threads.
+std::size_t floats_of(int width, int threads) {
+  return (run_stride_of(width) * runs_per_thread + look_run_of(width) * LookGrid::parts) *
+             static_cast<std::size_t>(threads) +
+         line_floats;
+}
+
 }  // namespace
 
 RawToRgb::RawToRgb(int max_width, int threads) : threads_(threads) {
   assert(max_width >= 1 && threads >= 1);
-  const std::size_t samples = run_of(max_width);
-  // Runs start on a cache line, and an odd number of lines apart: an even number could put the live rows of a column
-  // into the same few sets of the first-level cache.
-  const std::size_t lines = ((samples + line_floats - 1) / line_floats) | 1U;
-  run_stride_ = lines * line_floats;
+  run_stride_ = run_stride_of(max_width);
   look_stride_ = look_run_of(max_width);
-  memory_ = std::make_unique<float[]>((run_stride_ * runs_per_thread + look_stride_ * LookGrid::parts) *
-                                          static_cast<std::size_t>(threads) +
-                                      line_floats);
   codes_stride_ = 3 * static_cast<std::size_t>(max_width);
+  memory_ = std::make_unique<float[]>(floats_of(max_width, threads));
   codes_ = std::make_unique_for_overwrite<std::uint16_t[]>(codes_stride_ * static_cast<std::size_t>(threads));
+}
+
+std::size_t RawToRgb::bytes(int max_width, int threads) {
+  return sizeof(float) * floats_of(max_width, threads) +
+         sizeof(std::uint16_t) * 3 * static_cast<std::size_t>(max_width) * static_cast<std::size_t>(threads);
 }
 
 RawToRgb::Bench RawToRgb::bench(int thread) const {

@@ -81,6 +81,8 @@ class RawToRgb {
  public:
   /// For pictures up to `max_width` pixels wide, and up to `threads` of an executor's threads.
   RawToRgb(int max_width, int threads);
+  /// Of memory that one takes.
+  static std::size_t bytes(int max_width, int threads);
 
   /// Interleaved display codes: `out` is height x 3 width. The tone table must reach its last bin at 1.
   /// @param change  of codes, row by row; null: none

@@ -165,20 +165,26 @@ std::vector<Pixel> merged(const std::vector<Pixel>& a, const std::vector<Pixel>&
   return all;
 }
 
-void repair(PlaneView<float> mosaic, const std::vector<Pixel>& defects, int step) {
+void repair(PlaneView<float> mosaic, const std::vector<Pixel>& defects, int step) { repair(mosaic, {}, defects, step); }
+
+void repair(PlaneView<float> piece, const Pixel& corner, const std::vector<Pixel>& defects, int step) {
+  const auto inside = [&](int x, int y) { return x >= 0 && x < piece.width && y >= 0 && y < piece.height; };
   const auto sound = [&](int x, int y) {
-    if (x < 0 || x >= mosaic.width || y < 0 || y >= mosaic.height) return false;
-    return !std::binary_search(defects.begin(), defects.end(), Pixel{x, y}, before);
+    return inside(x, y) &&
+           !std::binary_search(defects.begin(), defects.end(), Pixel{corner.x + x, corner.y + y}, before);
   };
-  for (const Pixel& p : defects) {
+  for (auto at = std::lower_bound(defects.begin(), defects.end(), corner, before);
+       at != defects.end() && at->y - corner.y < piece.height; ++at) {
+    const int x = at->x - corner.x, y = at->y - corner.y;
+    if (!inside(x, y)) continue;
     float best_difference = INFINITY;
-    float best = mosaic.at(p.x, p.y);
+    float best = piece.at(x, y);
     float sum = 0;
     int n = 0;
     for (const auto [dx, dy] : {std::array{step, 0}, {0, step}}) {
-      const bool low = sound(p.x - dx, p.y - dy), high = sound(p.x + dx, p.y + dy);
-      const float a = low ? mosaic.at(p.x - dx, p.y - dy) : 0.0f;
-      const float b = high ? mosaic.at(p.x + dx, p.y + dy) : 0.0f;
+      const bool low = sound(x - dx, y - dy), high = sound(x + dx, y + dy);
+      const float a = low ? piece.at(x - dx, y - dy) : 0.0f;
+      const float b = high ? piece.at(x + dx, y + dy) : 0.0f;
       sum += a + b;
       n += low + high;
       if (low && high && std::fabs(a - b) < best_difference) {
@@ -187,7 +193,7 @@ void repair(PlaneView<float> mosaic, const std::vector<Pixel>& defects, int step
       }
     }
     if (best_difference == INFINITY && n > 0) best = sum / static_cast<float>(n);
-    mosaic.at(p.x, p.y) = best;
+    piece.at(x, y) = best;
   }
 }
 

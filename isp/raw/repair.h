@@ -47,5 +47,8 @@ std::vector<Pixel> merged(const std::vector<Pixel>& a, const std::vector<Pixel>&
 /// @param defects  ascending
 /// @param step     distance of the same-colour neighbours: 2 for Bayer, 1 for monochrome
 void repair(PlaneView<float> mosaic, const std::vector<Pixel>& defects, int step);
+/// The same on a piece of a mosaic whose corner is at `corner` of it: its pixels `step` from the piece's border and
+/// farther in get the same values as there.
+void repair(PlaneView<float> piece, const Pixel& corner, const std::vector<Pixel>& defects, int step);
 
 }  // namespace lowlux::isp

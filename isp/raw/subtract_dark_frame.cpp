@@ -1,6 +1,7 @@
 #include "isp/raw/subtract_dark_frame.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 
@@ -31,15 +32,17 @@ float light_dn(std::uint16_t code, float dark, const Site& site) {
   return dn - (dn >= site.white ? site.mean : dark);
 }
 
+Rect whole_of(const RawDn& raw) { return {0, 0, raw.active.width, raw.active.height}; }
+
 template <class Put>
-void for_each_pixel(const RawDn& raw, const DarkFrame& dark, const BlackPoint& black, Executor& executor,
-                    const Put& put) {
+void for_each_pixel(const RawDn& raw, const DarkFrame& dark, const BlackPoint& black, const Rect& part,
+                    Executor& executor, const Put& put) {
   const PerSite<Site> sites = sites_of(raw, black);
-  for_each_band(executor, raw.active.height, [&](RowBand band, int) {
+  for_each_band(executor, part.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
-      const std::uint16_t* codes = raw.dn.row(raw.active.y + y) + raw.active.x;
-      const float* row = dark.dn.row(y);
-      for (int x = 0; x < raw.active.width; ++x) {
+      const std::uint16_t* codes = raw.dn.row(raw.active.y + part.y + y) + raw.active.x + part.x;
+      const float* row = dark.dn.row(part.y + y) + part.x;
+      for (int x = 0; x < part.width; ++x) {
         const Site& site = sites[site_of(x, y)];
         put(x, y, light_dn(codes[x], row[x], site), site);
       }
@@ -78,7 +81,13 @@ Result<BlackPoint> black_of(const RawDn& raw, const DarkFrame& dark) {
 
 void to_fraction(const RawDn& raw, const DarkFrame& dark, const BlackPoint& black, PlaneView<float> out,
                  Executor& executor) {
-  for_each_pixel(raw, dark, black, executor, [&](int x, int y, float light, const Site& site) {
+  to_fraction(raw, dark, black, whole_of(raw), out, executor);
+}
+
+void to_fraction(const RawDn& raw, const DarkFrame& dark, const BlackPoint& black, const Rect& part,
+                 PlaneView<float> out, Executor& executor) {
+  assert(part.x % 2 == 0 && part.y % 2 == 0 && out.width == part.width && out.height == part.height);
+  for_each_pixel(raw, dark, black, part, executor, [&](int x, int y, float light, const Site& site) {
     out.row(y)[x] = light / (site.white - site.mean);
   });
 }
@@ -94,7 +103,7 @@ RawFrame measurable_without_dark(const RawFrame& frame, const DarkFrame& dark, c
   out.raw.default_crop = raw.default_crop;
   out.raw.white_dn = raw.white_dn;
   out.noise = frame.noise;
-  for_each_pixel(raw, dark, black, executor, [&](int x, int y, float light, const Site& site) {
+  for_each_pixel(raw, dark, black, whole_of(raw), executor, [&](int x, int y, float light, const Site& site) {
     const float code = std::clamp(light + site.mean, 0.0f, 65535.0f);
     out.raw.dn.row(y)[x] = static_cast<std::uint16_t>(std::lround(code));
   });

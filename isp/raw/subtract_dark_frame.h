@@ -19,6 +19,10 @@ Result<BlackPoint> black_of(const RawDn& raw, const DarkFrame& dark);
 /// @param out    active height x width
 void to_fraction(const RawDn& raw, const DarkFrame& dark, const BlackPoint& black, PlaneView<float> out,
                  Executor& executor);
+/// The same of a part of the active area, its corner at an even column and row.
+/// @param out  part height x width
+void to_fraction(const RawDn& raw, const DarkFrame& dark, const BlackPoint& black, const Rect& part,
+                 PlaneView<float> out, Executor& executor);
 
 /// The active area with the dark frame off and the sites' means left in, in whole codes: for what is measured on a
 /// frame before a pixel is touched. What pictures are made of is to_fraction.

@@ -1,6 +1,7 @@
 #include "isp/raw/to_linear.h"
 
 #include <array>
+#include <cassert>
 #include <utility>
 
 #include "isp/raw/black_point.h"
@@ -22,21 +23,33 @@ SiteScale site_scale(const RawDn& raw, const BlackPoint& black) {
   return scale;
 }
 
+Rect whole_of(const RawDn& raw) { return {0, 0, raw.active.width, raw.active.height}; }
+
+[[maybe_unused]] bool keeps_sites(const RawDn& raw, const Rect& part, PlaneView<float> out) {
+  return part.x % 2 == 0 && part.y % 2 == 0 && part.x >= 0 && part.y >= 0 && part.x + part.width <= raw.active.width &&
+         part.y + part.height <= raw.active.height && out.width == part.width && out.height == part.height;
+}
+
+// Codes of row y of a part of the active area.
+const std::uint16_t* codes_of(const RawDn& raw, const Rect& part, int y) {
+  return raw.dn.row(raw.active.y + part.y + y) + raw.active.x + part.x;
+}
+
 // The pattern of a tag that four figures cannot express; white stays that of the site.
-void row_by_pattern(const RawDn& raw, const BlackLevel& pattern, int y, float* out) {
-  const std::uint16_t* dn = raw.dn.row(raw.active.y + y) + raw.active.x;
-  for (int x = 0; x < raw.active.width; ++x) {
-    const double black = pattern.at(x, y);
+void row_by_pattern(const RawDn& raw, const BlackLevel& pattern, const Rect& part, int y, float* out) {
+  const std::uint16_t* dn = codes_of(raw, part, y);
+  for (int x = 0; x < part.width; ++x) {
+    const double black = pattern.at(part.x + x, part.y + y);
     out[x] = static_cast<float>((dn[x] - black) / (white_at(raw, site_of(x, y)) - black));
   }
 }
 
-void row_by_site(const RawDn& raw, const SiteScale& scale, int y, float* out) {
-  const std::uint16_t* dn = raw.dn.row(raw.active.y + y) + raw.active.x;
+void row_by_site(const RawDn& raw, const SiteScale& scale, const Rect& part, int y, float* out) {
+  const std::uint16_t* dn = codes_of(raw, part, y);
   const int left = site_of(0, y);
   const float black[2] = {scale.black[left], scale.black[left + 1]};
   const float gain[2] = {scale.gain[left], scale.gain[left + 1]};
-  const int width = raw.active.width;
+  const int width = part.width;
   int x = 0;
   for (; x + 1 < width; x += 2) {  // whole pairs: what compilers make vectors of
     out[x] = (static_cast<float>(dn[x]) - black[0]) * gain[0];
@@ -45,32 +58,38 @@ void row_by_site(const RawDn& raw, const SiteScale& scale, int y, float* out) {
   if (x < width) out[x] = (static_cast<float>(dn[x]) - black[0]) * gain[0];
 }
 
-void row_of(const RawDn& raw, const BlackPoint& black, const SiteScale& scale, int y, float* out) {
+void row_of(const RawDn& raw, const BlackPoint& black, const SiteScale& scale, const Rect& part, int y, float* out) {
   if (black.pattern) {
-    row_by_pattern(raw, *black.pattern, y, out);
+    row_by_pattern(raw, *black.pattern, part, y, out);
   } else {
-    row_by_site(raw, scale, y, out);
+    row_by_site(raw, scale, part, y, out);
   }
 }
 
 // Multiplies (or shifts) each site by its own figure.
 template <class Apply>
-void for_each_site(Plane<float>& plane, Executor& executor, const Apply& apply) {
-  for_each_band(executor, plane.height(), [&](RowBand band, int) {
+void for_each_site(PlaneView<float> plane, Executor& executor, const Apply& apply) {
+  for_each_band(executor, plane.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       float* row = plane.row(y);
-      for (int x = 0; x < plane.width(); ++x) row[x] = apply(row[x], site_of(x, y));
+      for (int x = 0; x < plane.width; ++x) row[x] = apply(row[x], site_of(x, y));
     }
   });
 }
 
 }  // namespace
 
-void to_fraction(const RawDn& raw, const BlackPoint& black, PlaneView<float> out, Executor& executor) {
+void to_fraction(const RawDn& raw, const BlackPoint& black, const Rect& part, PlaneView<float> out,
+                 Executor& executor) {
+  assert(keeps_sites(raw, part, out));
   const SiteScale scale = site_scale(raw, black);
-  for_each_band(executor, raw.active.height, [&](RowBand band, int) {
-    for (int y = band.first; y < band.last; ++y) row_of(raw, black, scale, y, out.row(y));
+  for_each_band(executor, part.height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) row_of(raw, black, scale, part, y, out.row(y));
   });
+}
+
+void to_fraction(const RawDn& raw, const BlackPoint& black, PlaneView<float> out, Executor& executor) {
+  to_fraction(raw, black, whole_of(raw), out, executor);
 }
 
 RawFraction to_fraction(const RawDn& raw, const BlackPoint& black, Executor& executor) {
@@ -105,37 +124,49 @@ std::optional<PerSite<double>> electrons_at_white(const RawDn& raw, const NoiseP
   return electrons;
 }
 
-RawElectrons to_electrons(RawFraction fraction, const PerSite<double>& electrons_at_white, Executor& executor) {
-  for_each_site(fraction.value, executor,
+void count_electrons(PlaneView<float> fraction, const PerSite<double>& electrons_at_white, Executor& executor) {
+  for_each_site(fraction, executor,
                 [&](float v, int site) { return v * static_cast<float>(electrons_at_white[site]); });
+}
+
+RawElectrons to_electrons(RawFraction fraction, const PerSite<double>& electrons_at_white, Executor& executor) {
+  count_electrons(fraction.value.view(), electrons_at_white, executor);
   return {std::move(fraction.value), fraction.phase};
 }
 
 void to_electrons(const RawDn& raw, const BlackPoint& black, const PerSite<double>& electrons_at_white,
                   PlaneView<float> out, Executor& executor) {
+  to_electrons(raw, black, electrons_at_white, whole_of(raw), out, executor);
+}
+
+void to_electrons(const RawDn& raw, const BlackPoint& black, const PerSite<double>& electrons_at_white,
+                  const Rect& part, PlaneView<float> out, Executor& executor) {
+  assert(keeps_sites(raw, part, out));
   const SiteScale scale = site_scale(raw, black);
-  for_each_band(executor, raw.active.height, [&](RowBand band, int) {
+  for_each_band(executor, part.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       float* const row = out.row(y);
-      row_of(raw, black, scale, y, row);
+      row_of(raw, black, scale, part, y, row);
       const int left = site_of(0, y);
       const std::array electrons{static_cast<float>(electrons_at_white[left]),
                                  static_cast<float>(electrons_at_white[left + 1])};
       int x = 0;
-      for (; x + 1 < raw.active.width; x += 2) {
+      for (; x + 1 < part.width; x += 2) {
         row[x] *= electrons[0];
         row[x + 1] *= electrons[1];
       }
-      if (x < raw.active.width) row[x] *= electrons[0];
+      if (x < part.width) row[x] *= electrons[0];
     }
   });
 }
 
+void subtract_dark(PlaneView<float> raw_e, const PerSite<double>& dark_mean_e, Executor& executor) {
+  if (dark_mean_e == PerSite<double>{}) return;
+  for_each_site(raw_e, executor, [&](float v, int site) { return v - static_cast<float>(dark_mean_e[site]); });
+}
+
 SignalElectrons subtract_dark(RawElectrons raw, const BlackPoint& black, Executor& executor) {
-  if (black.dark_mean_e != PerSite<double>{}) {
-    for_each_site(raw.value, executor,
-                  [&](float v, int site) { return v - static_cast<float>(black.dark_mean_e[site]); });
-  }
+  subtract_dark(raw.value.view(), black.dark_mean_e, executor);
   return {std::move(raw.value), raw.phase};
 }
 

@@ -14,6 +14,9 @@ namespace lowlux::isp {
 RawFraction to_fraction(const RawDn& raw, const BlackPoint& black, Executor& executor);
 /// The same into the caller's plane, active height x width.
 void to_fraction(const RawDn& raw, const BlackPoint& black, PlaneView<float> out, Executor& executor);
+/// The same of a part of the active area, its corner at an even column and row: the same bits as there.
+/// @param out  part height x width
+void to_fraction(const RawDn& raw, const BlackPoint& black, const Rect& part, PlaneView<float> out, Executor& executor);
 
 /// The same for SensorLayout::linear_rgb: three planes of active height x width.
 void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, RgbView<float> out, Executor& executor);
@@ -28,12 +31,20 @@ std::optional<PerSite<double>> electrons_at_white(const RawDn& raw, const NoiseP
 
 /// Fractions counted in electrons.
 RawElectrons to_electrons(RawFraction fraction, const PerSite<double>& electrons_at_white, Executor& executor);
+/// The same in place; the corner of `fraction` is at an even column and row of the active area.
+void count_electrons(PlaneView<float> fraction, const PerSite<double>& electrons_at_white, Executor& executor);
 /// to_fraction and to_electrons of a Bayer frame in one pass: the same bits.
 void to_electrons(const RawDn& raw, const BlackPoint& black, const PerSite<double>& electrons_at_white,
                   PlaneView<float> out, Executor& executor);
+/// The same of a part of the active area, its corner at an even column and row.
+/// @param out  part height x width
+void to_electrons(const RawDn& raw, const BlackPoint& black, const PerSite<double>& electrons_at_white,
+                  const Rect& part, PlaneView<float> out, Executor& executor);
 
 /// Takes the mean dark charge off. Where the black point already held it (masked pixels) nothing is left to take.
 SignalElectrons subtract_dark(RawElectrons raw, const BlackPoint& black, Executor& executor);
+/// The same in place; the corner of `raw_e` is at an even column and row of the active area.
+void subtract_dark(PlaneView<float> raw_e, const PerSite<double>& dark_mean_e, Executor& executor);
 /// Without a known gain the dark charge is unknown too: what the pedestal did not hold stays, and only the type
 /// changes.
 SignalFraction subtract_dark(RawFraction raw);

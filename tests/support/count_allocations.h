@@ -1,18 +1,33 @@
 #pragma once
 
+#include <malloc.h>
+
 #include <atomic>
 #include <cstddef>
 #include <cstdlib>
 #include <new>
 
-/// Counts what a program allocates. To be included by one file of it: operator new can be replaced once.
+/// Counts what a program allocates, and the bytes it holds at once. To be included by one file of it: operator new can
+/// be replaced once.
 namespace lowlux::test {
 
 inline std::atomic<long> allocations{0};
+inline std::atomic<long> held_bytes{0};
+inline std::atomic<long> most_held_bytes{0};  // since it was last set
 
 inline void* counted_or_null(std::size_t size) noexcept {
   ++allocations;
-  return std::malloc(size);
+  void* const memory = std::malloc(size);
+  const auto bytes = static_cast<long>(malloc_usable_size(memory));
+  const long held = held_bytes.fetch_add(bytes) + bytes;
+  long most = most_held_bytes.load();
+  while (most < held && !most_held_bytes.compare_exchange_weak(most, held)) continue;
+  return memory;
+}
+
+inline void given_back(void* memory) noexcept {
+  held_bytes -= static_cast<long>(malloc_usable_size(memory));
+  std::free(memory);
 }
 
 inline void* counted(std::size_t size) {
@@ -31,7 +46,7 @@ void* operator new(std::size_t size, const std::nothrow_t& /*tag*/) noexcept {
 void* operator new[](std::size_t size, const std::nothrow_t& /*tag*/) noexcept {
   return lowlux::test::counted_or_null(size);
 }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
+void operator delete(void* memory) noexcept { lowlux::test::given_back(memory); }
+void operator delete[](void* memory) noexcept { lowlux::test::given_back(memory); }
+void operator delete(void* memory, std::size_t /*size*/) noexcept { lowlux::test::given_back(memory); }
+void operator delete[](void* memory, std::size_t /*size*/) noexcept { lowlux::test::given_back(memory); }

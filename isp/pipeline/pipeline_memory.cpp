@@ -1,0 +1,39 @@
+#include "isp/pipeline/pipeline_memory.h"
+
+#include <cassert>
+#include <vector>
+
+#include "isp/pipeline/frame_needs.h"
+#include "isp/pipeline/level_parts.h"
+#include "isp/pipeline/noise_reducer.h"
+#include "isp/pipeline/tile_renderer.h"
+#include "isp/raw/raw_to_rgb.h"
+
+namespace lowlux::isp {
+namespace {
+
+std::size_t area(int width, int height) { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
+
+std::size_t whole_frame_bytes(const RawDn& raw, const DevelopPlan& plan, int threads) {
+  const int width = raw.active.width, height = raw.active.height;
+  const std::size_t plane = sizeof(float) * area(width, height);
+  std::size_t out = RawToRgb::bytes(raw.default_crop.width, threads);
+  if (plan.options.half) out += 3 * sizeof(float) * area(plan.width, plan.height);
+  if (plan.from_codes) return out;
+  if (raw.layout == SensorLayout::linear_rgb) return out + 3 * plane;
+  out += plane;
+  if (!plan.noise_reduction.reduces()) return out;
+  const bool maps = keeps_maps(plan);
+  if (maps) out += NoiseReducer::maps_bytes(width, height);
+  return out + plane + NoiseReducer::bytes(width, height, plan.noise_reduction, maps, threads);
+}
+
+}  // namespace
+
+std::size_t pipeline_bytes(const RawDn& raw, const DevelopPlan& plan, int threads, const TileLimits& limits) {
+  assert(!needs_grid(plan) && !needs_table(plan) && !plan.noise_reduction.temporal);
+  if (goes_by_tiles(raw, plan, limits)) return TileRenderer::bytes(raw, plan, limits, threads);
+  return whole_frame_bytes(raw, plan, threads);
+}
+
+}  // namespace lowlux::isp

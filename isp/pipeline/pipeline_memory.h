@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstddef>
+
+#include "isp/base/frame.h"
+#include "isp/pipeline/frame_tiles.h"
+#include "isp/pipeline/plan.h"
+
+namespace lowlux::isp {
+
+/// Bytes a new Pipeline takes for a frame, to within a few kilobytes: frame and picture themselves left out, which
+/// their owners have. Of the frame only layout and rectangles are read.
+/// Precondition: the look of the camera, no frames before: NightLookGrid and TemporalMean say what they take.
+/// @param threads  of the executor
+std::size_t pipeline_bytes(const RawDn& raw, const DevelopPlan& plan, int threads, const TileLimits& limits = {});
+
+}  // namespace lowlux::isp
