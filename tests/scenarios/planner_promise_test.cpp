@@ -16,7 +16,7 @@
 #include "isp/bench/bench_raw.h"
 #include "isp/bench/seen_difference.h"
 #include "isp/pipeline/develop.h"
-#include "tests/scenarios/reference_cost.h"
+#include "tests/support/reference_cost.h"
 
 namespace lowlux::isp {
 namespace {
@@ -99,7 +99,7 @@ Developed developed(const Drawn& scene, bool all) {
   DevelopOptions options = scene.options;
   options.effects.emplace().all = all;
   options.effects->tolerance_delta_e = scene.tolerance;
-  options.effects->cost = isp::test::reference_cost();
+  options.effects->cost = test::reference_cost();
   options.look.tolerance = scene.tolerance;
   // Glare and the eye's own noise are a matter of taste: no tolerance calls for them.
   if (all && options.look.look == Look::eye) {

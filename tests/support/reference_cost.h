@@ -4,11 +4,11 @@
 
 #include "isp/pipeline/cost_model.h"
 
-namespace lowlux::isp::test {
+namespace lowlux::test {
 
 /// What one machine took (two cores of an AMD EPYC, `lowlux bench --calibrate-cost`): tests that compare plans by their
 /// predicted time are the same everywhere.
-inline std::shared_ptr<const CostModel> reference_cost() {
+inline std::shared_ptr<const isp::CostModel> reference_cost() {
   static const auto model = std::make_shared<const CostModel>(
       CostModel{"the reference of tests",
                 2,
@@ -37,4 +37,4 @@ inline std::shared_ptr<const CostModel> reference_cost() {
   return model;
 }
 
-}  // namespace lowlux::isp::test
+}  // namespace lowlux::test

@@ -1,0 +1,117 @@
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "isp/cli/cost_file.h"
+#include "tests/cli/simulate_command.h"
+#include "tests/support/reference_cost.h"
+
+namespace lowlux {
+namespace {
+
+using Json = nlohmann::json;
+
+/// `develop` of a simulated night, with a kept speed of this machine, so that none is measured.
+class EffectsCommand : public test::SimulateCommand {
+ protected:
+  void SetUp() override {
+    simulated("chart:macbeth", "night.dng", {"--luminance", "0.2", "--size", "160x120", "--no-truth"});
+    setenv("XDG_CACHE_HOME", file("cache").c_str(), 1);
+    isp::CostModel model = *test::reference_cost();
+    model.machine = cli::machine_name();
+    model.threads = cli::threads_for_one_file();
+    std::filesystem::create_directories(file("cache/lowlux"));
+    std::ofstream(*cli::cost_file(model.threads)) << cli::cost_text(model);
+  }
+  void TearDown() override { unsetenv("XDG_CACHE_HOME"); }
+  test::ProcessResult developed(const std::vector<std::string>& more) {
+    std::vector<std::string> args{"develop", file("night.dng"), "-o", file("out.png"), "--force"};
+    args.insert(args.end(), more.begin(), more.end());
+    return lowlux(args);
+  }
+  Json effects_of(std::vector<std::string> more) {
+    more.emplace_back("--json");
+    const auto result = developed(more);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    const Json json = Json::parse(result.out, nullptr, false);
+    return json.is_array() && !json.empty() ? json[0]["effects"] : Json();
+  }
+  void refused(const std::vector<std::string>& more, int code, const std::string& why) {
+    std::filesystem::remove(file("out.png"));
+    const auto result = developed(more);
+    EXPECT_EQ(result.exit_code, code) << result.err;
+    EXPECT_NE(result.err.find(why), std::string::npos) << why << "\n" << result.err;
+    EXPECT_FALSE(std::filesystem::exists(file("out.png")));
+  }
+};
+
+TEST_F(EffectsCommand, AreDecidedWithinATolerance) {
+  const Json strict = effects_of({"--tolerance", "0.01"}), loose = effects_of({"--tolerance", "90"});
+  EXPECT_EQ(strict["mode"], "auto");
+  EXPECT_EQ(strict["effects"][0]["name"], "noise");
+  EXPECT_EQ(strict["effects"][0]["used"], true);
+  EXPECT_EQ(loose["effects"][0]["used"], false);
+  EXPECT_LT(loose["effects"][0]["left_ciede2000"].get<double>(), 90);
+  EXPECT_EQ(effects_of({})["tolerance_ciede2000"], 0.5);
+  EXPECT_EQ(effects_of({"--effects", "all"})["mode"], "all");
+}
+
+TEST_F(EffectsCommand, FitABudgetThatIsToldWithThePrediction) {
+  const Json small = effects_of({"--budget-ms", "5"}), large = effects_of({"--budget-ms", "100000"});
+  EXPECT_EQ(small["budget_s"], 0.005);
+  EXPECT_LE(small["predicted_s"].get<double>(), 0.005);
+  EXPECT_GT(large["predicted_s"].get<double>(), small["predicted_s"].get<double>());
+  EXPECT_TRUE(large["effects"][0]["decision"].get<std::string>().starts_with("best"));
+  EXPECT_TRUE(small["tolerance_ciede2000"].is_null());
+  // 160 x 120 pixels at so many megapixels in a second.
+  EXPECT_NEAR(effects_of({"--budget-mpps", "1.92"})["budget_s"].get<double>(), 0.01, 1e-12);
+  const auto told = developed({"--budget-ms", "100000", "--explain"});
+  EXPECT_NE(told.out.find("predicted"), std::string::npos) << told.out;
+}
+
+TEST_F(EffectsCommand, RefuseWhatCannotBe) {
+  refused({"--budget-ms", "0.001"}, 1, "cheapest plan");
+  refused({"--budget-ms", "0"}, 2, "--budget-ms");
+  refused({"--budget-ms", "nan"}, 2, "--budget-ms");
+  refused({"--budget-ms", "5", "--budget-mpps", "5"}, 2, "give one");
+  refused({"--budget-ms", "5", "--jobs", "2"}, 2, "--jobs");
+  refused({"--effects", "all", "--tolerance", "1"}, 2, "--tolerance");
+  refused({"--effects", "all", "--budget-ms", "5"}, 2, "budget");
+  refused({"--effects", "hue"}, 2, "--look eye");
+  refused({"--tolerance", "0"}, 2, "--tolerance");
+}
+
+TEST(CostFile, TextComesBackAndFaultsAreNamed) {
+  const isp::CostModel& model = *test::reference_cost();
+  const auto back = cli::parse_cost(cli::cost_text(model));
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back->machine, model.machine);
+  EXPECT_EQ(back->threads, model.threads);
+  for (int i = 0; i < isp::cost_parts; ++i) {
+    const auto part = static_cast<isp::CostPart>(i);
+    EXPECT_DOUBLE_EQ(back->seconds(part, 3), model.seconds(part, 3)) << name_of(part);
+  }
+  const std::string good = cli::cost_text(model);
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    text.replace(text.find(from), from.size(), to);
+    return text;
+  };
+  for (const std::string& text :
+       {std::string(), std::string("[]"), std::string("{\"lowlux_cost_model\": 1}"), good.substr(0, good.size() / 2),
+        changed("\"lowlux_cost_model\": 1", "\"x\": 1"), changed("\"threads\": 2", "\"threads\": \"2\""),
+        changed("\"look\"", "\"loop\""), changed("0.301", "-1"), changed("0.301", "1e999")}) {
+    const auto wrong = cli::parse_cost(text);
+    ASSERT_FALSE(wrong) << text;
+    EXPECT_NE(wrong.error().message.find("--calibrate-cost"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace lowlux

@@ -1,0 +1,244 @@
+#include "isp/pipeline/plan_effects.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isp/pipeline/develop.h"
+#include "isp/pipeline/frame_sample.h"
+#include "isp/pipeline/plan_regions.h"
+#include "isp/pipeline/visible_noise.h"
+#include "tests/pipeline/night_frames.h"
+#include "tests/support/reference_cost.h"
+
+namespace lowlux::isp {
+namespace {
+
+using denoise::Level;
+using denoise_testing::Camera;
+using denoise_testing::flat;
+
+InlineExecutor executor;
+
+DevelopOptions planned_options(std::optional<double> tolerance, std::optional<double> budget_s = {}) {
+  DevelopOptions options;
+  options.denoise.mode = DenoiseChoice::Mode::automatic;
+  options.effects.emplace().tolerance_delta_e = tolerance;
+  options.effects->budget_s = budget_s;
+  options.effects->cost = test::reference_cost();
+  return options;
+}
+
+/// A grey of so many electrons of green.
+RawFrame grey(double green_e, int width = 320, int height = 256) {
+  return test::night_frame(Camera{}, flat(0.5 * green_e, green_e, 0.625 * green_e), width, height);
+}
+
+EffectsPlan effects_of(const RawFrame& frame, const DevelopOptions& options) {
+  const auto plan = plan_develop(frame, options, executor);
+  EXPECT_TRUE(plan) << (plan ? "" : plan.error().message);
+  return plan ? *plan->effects : EffectsPlan{};
+}
+
+const PlannedEffect& named(const EffectsPlan& plan, std::string_view name) {
+  return *std::ranges::find(plan.effects, name, &PlannedEffect::name);
+}
+
+TEST(CostModel, IsLinearInTheLogarithmOfTheSizeAndKeepsTheEndsSpeed) {
+  CostModel model;
+  model.points[static_cast<std::size_t>(CostPart::codes)] = {{1, 0.01}, {100, 3}};  // 10 and 30 ms/MP
+  EXPECT_DOUBLE_EQ(model.seconds(CostPart::codes, 1), 0.01);
+  EXPECT_DOUBLE_EQ(model.seconds(CostPart::codes, 100), 3);
+  EXPECT_NEAR(model.seconds(CostPart::codes, 10), 0.2, 1e-12);  // 20 ms/MP half way
+  EXPECT_DOUBLE_EQ(model.seconds(CostPart::codes, 0.5), 0.005);
+  EXPECT_DOUBLE_EQ(model.seconds(CostPart::codes, 200), 6);
+  EXPECT_EQ(model.seconds(CostPart::look, 5), 0) << "what was not measured is free";
+  EXPECT_DOUBLE_EQ(predicted_s(model, 100, {{CostPart::codes, 0.5}, {CostPart::look}}), 1.5);
+}
+
+TEST(VisibleNoise, PercentileIsThatOfNormalDifferences) {
+  EXPECT_EQ(seen_percentile({}), 0);
+  const std::vector<float> none(10, 0.0f), equal(10, 2.0f);
+  EXPECT_EQ(seen_percentile(none), 0);
+  EXPECT_NEAR(seen_percentile(equal), 2 * 1.959964, 1e-4);  // 95 % of a normal law lie within so many deviations
+  std::vector<float> few(100, 0.0f);
+  few[0] = few[1] = 50;
+  EXPECT_LT(seen_percentile(few), 1e-6) << "what two blocks of a hundred differ by is above the percentile";
+}
+
+// An even grey's means over 8 x 8 pixels, by the noise alone: the prediction against frames that were developed.
+TEST(VisibleNoise, OfAGreyIsWhatFramesDifferBy) {
+  const RawFrame frame = grey(400);
+  DevelopOptions options = planned_options(0.5);
+  const auto plan = plan_develop(frame, options, executor);
+  ASSERT_TRUE(plan);
+  const Thumbnail thumbnail = make_thumbnail(frame, plan->black, executor);
+  denoise::RawNoise noise = plan->noise_reduction.noise;
+  DevelopPlan with_electrons = *plan_develop(
+      frame,
+      [&] {
+        options.denoise = {DenoiseChoice::Mode::level, Level::draft};
+        return options;
+      }(),
+      executor);
+  noise = with_electrons.noise_reduction.noise;
+  const auto blocks = seen_blocks(frame, with_electrons, noise, thumbnail);
+  ASSERT_FALSE(blocks.empty());
+  for (const SeenBlock& block : blocks) {
+    EXPECT_NEAR(block.snr, 17, 1.5);  // mean of 200, 400, 400 and 250 e-, its noise and that of readout
+    EXPECT_GT(block.noise_delta_e, 0.3f);
+    EXPECT_LT(block.noise_delta_e, 3.0f);
+    EXPECT_EQ(block.dark_delta_e, 0);
+  }
+}
+
+TEST(PlanEffects, LevelsLeaveLessTheMoreTheyWork) {
+  for (const double snr : {0.0, 1.0, 5.0, 10.0, 100.0}) {
+    EXPECT_GT(left_of_noise(std::nullopt, snr), left_of_noise(Level::draft, snr));
+    EXPECT_GT(left_of_noise(Level::draft, snr), left_of_noise(Level::standard, snr));
+    EXPECT_GT(left_of_noise(Level::standard, snr), left_of_noise(Level::high, snr));
+    EXPECT_EQ(left_of_noise(Level::high, snr), 0);
+  }
+  EXPECT_GT(error_share(std::nullopt), error_share(Level::draft));
+  EXPECT_GT(error_share(Level::high), error_share(Level::best));
+}
+
+TEST(PlanEffects, MoreLightCallsForLessWork) {
+  std::optional<Level> before = Level::high;
+  for (const double green_e : {4.0, 40.0, 400.0, 3000.0}) {
+    const EffectsPlan plan = effects_of(grey(green_e), planned_options(0.5));
+    EXPECT_LE(plan.level, before) << green_e;
+    before = plan.level;
+  }
+  EXPECT_EQ(effects_of(grey(4), planned_options(0.5)).level, Level::high);
+  EXPECT_EQ(effects_of(grey(3000), planned_options(2)).level, std::nullopt);
+  EXPECT_EQ(effects_of(grey(4), planned_options(50)).level, std::nullopt) << "a tolerance above all there is";
+}
+
+TEST(PlanEffects, AllIsAllAndGivenLevelsStay) {
+  DevelopOptions options = planned_options(50);
+  options.effects->all = true;
+  EXPECT_EQ(effects_of(grey(3000), options).level, Level::high);
+  options = planned_options(50);
+  options.denoise = {DenoiseChoice::Mode::level, Level::draft};
+  EXPECT_EQ(effects_of(grey(4), options).level, Level::draft);
+  options.denoise.mode = DenoiseChoice::Mode::off;
+  const auto plan = plan_develop(grey(4), options, executor);
+  ASSERT_TRUE(plan);
+  EXPECT_FALSE(plan->noise_reduction.reduces());
+}
+
+TEST(PlanEffects, ABudgetTakesTheMostAccuratePlanThatFits) {
+  const RawFrame frame = grey(20);
+  double before = 0;
+  std::optional<Level> level_before;
+  for (const double budget_ms : {12.0, 14.0, 18.0, 30.0, 1e4}) {
+    const EffectsPlan plan = effects_of(frame, planned_options(std::nullopt, 1e-3 * budget_ms));
+    ASSERT_TRUE(plan.predicted_s);
+    EXPECT_LE(*plan.predicted_s, 1e-3 * budget_ms);
+    EXPECT_GE(plan.level, level_before);
+    EXPECT_GE(*plan.predicted_s, before);
+    before = *plan.predicted_s;
+    level_before = plan.level;
+  }
+  EXPECT_EQ(level_before, Level::best);
+  const EffectsPlan both = effects_of(frame, planned_options(50, 10));
+  EXPECT_EQ(both.level, std::nullopt) << "with a tolerance the cheapest plan within it";
+}
+
+TEST(PlanEffects, ABudgetBelowTheCheapestPlanIsRefusedWithItsTime) {
+  const auto refused = plan_develop(grey(20), planned_options(std::nullopt, 1e-6), executor);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::insufficient);
+  const double cheapest_s =
+      predicted_s(*test::reference_cost(), 1e-6 * 320 * 256, {{CostPart::planning}, {CostPart::codes}});
+  EXPECT_NE(refused.error().message.find("cheapest plan"), std::string::npos) << refused.error().message;
+  const double told_ms =
+      std::strtod(refused.error().message.c_str() + refused.error().message.find("take ") + 5, nullptr);
+  EXPECT_NEAR(told_ms, 1e3 * cheapest_s, 0.5 * 1e3 * cheapest_s) << refused.error().message;
+}
+
+// Dark charge that a profile knows: half of the signal changes the picture, a thousandth does not.
+TEST(PlanEffects, DarkChargeIsLeftInWhereItCannotBeSeen) {
+  const RawFrame frame = grey(2000);
+  DevelopOptions options = planned_options(2);
+  options.black.choice = BlackChoice::measured;
+  options.black.measured.pedestal_dn.fill(test::night_black_dn);
+  options.black.measured.dark_mean_e.fill(500);
+  const EffectsPlan large = effects_of(frame, options);
+  EXPECT_TRUE(large.dark);
+  EXPECT_GT(named(large, "dark charge").size, 2);
+  options.black.measured.dark_mean_e.fill(1);
+  const auto small = plan_develop(frame, options, executor);
+  ASSERT_TRUE(small);
+  EXPECT_FALSE(small->effects->dark);
+  EXPECT_EQ(small->black.dark_mean_e, PerSite<double>{});
+}
+
+// Known dark charge is no light: it must not darken the automatic exposure.
+TEST(PlanEffects, DarkChargeDoesNotCountForTheExposure) {
+  DevelopOptions options;
+  options.black.choice = BlackChoice::measured;
+  options.black.measured.pedestal_dn.fill(test::night_black_dn);
+  const auto with = [&](double signal_e, double dark_e) {
+    options.black.measured.dark_mean_e.fill(dark_e);
+    Camera camera;
+    camera.dark_e.fill(dark_e);
+    const RawFrame frame = test::night_frame(camera, flat(0.5 * signal_e, signal_e, 0.625 * signal_e), 256, 256);
+    return plan_develop(frame, options, executor)->exposure_ev;
+  };
+  EXPECT_NEAR(with(300, 300), with(300, 0), 0.05);
+}
+
+TEST(FrameSample, LargeFramesAreSampledAtEvenPlacesAndSmallOnesWhole) {
+  const RawFrame small = grey(40);
+  const auto plan = plan_develop(small, {}, executor);
+  ASSERT_TRUE(plan);
+  EXPECT_TRUE(sample_squares(small, *plan).empty());
+  RawFrame large;
+  large.raw.active = {3, 5, 4001, 3001};
+  const auto squares = sample_squares(large, *plan);
+  ASSERT_EQ(squares.size(), 6);
+  for (const Rect& square : squares) {
+    EXPECT_EQ(square.x % 2, 0);
+    EXPECT_EQ(square.y % 2, 0);
+    EXPECT_GE(square.x, 0);
+    EXPECT_LE(square.x + square.width, 4001);
+    EXPECT_LE(square.y + square.height, 3001);
+  }
+  EXPECT_EQ(squares.back().x, (4001 - 512) & ~1);
+}
+
+std::vector<SeenBlock> blocks_of(double left_delta_e, double right_delta_e) {
+  std::vector<SeenBlock> out;
+  for (int i = 0; i < 400; ++i) {
+    const float x = (static_cast<float>(i % 20) + 0.5f) / 20;
+    out.push_back({.x = x,
+                   .y = (static_cast<float>(i / 20) + 0.5f) / 20,
+                   .snr = 10,
+                   .noise_delta_e = static_cast<float>(x < 0.5f ? left_delta_e : right_delta_e)});
+  }
+  return out;
+}
+
+TEST(PlanRegions, BrightHalvesAreLeftAndDarkOnesGetTheLevel) {
+  const Rect active{0, 0, 8192, 6144};
+  const auto regions = plan_regions(active, blocks_of(0.05, 5), Level::high, 0.5);
+  ASSERT_TRUE(regions);
+  EXPECT_EQ(regions->columns, 8);
+  EXPECT_EQ(regions->rows, 6);
+  for (int i = 0; i < 48; ++i) {
+    EXPECT_EQ(regions->level[static_cast<std::size_t>(i)], i % 8 < 4 ? std::nullopt : std::optional(Level::high));
+  }
+  EXPECT_FALSE(plan_regions(active, blocks_of(5, 5), Level::high, 0.5)) << "nothing to save";
+  EXPECT_FALSE(plan_regions({0, 0, 900, 900}, blocks_of(0.05, 5), Level::high, 0.5)) << "one region";
+}
+
+}  // namespace
+}  // namespace lowlux::isp
