@@ -45,7 +45,7 @@ TEST(HardCaseDenoise2, AColourWhoseGainIsAboveThreeHasAThresholdOfItsOwn) {
   Camera camera = with_dark(2, 1.5);
   camera.white_gain = {1.6, 1, 4.5};
   const MosaicCase c = case_of(camera, flat(20 / 1.6, 20, 20 / 4.5), 256, 192, 62);
-  measure(row, c, {0.13, 0.13, 0.13, 0.13}, [&](PlaneView<const double> out) {
+  measure(row, c, {0.1, 0.1, 0.1, 0.1}, [&](PlaneView<const double> out) {
     const auto mean = denoise_testing::colour_means(out, c.phase);
     std::array<double, 3> square{}, sites{};
     for (int y = 0; y < out.height; ++y) {
@@ -65,9 +65,13 @@ TEST(HardCaseDenoise2, AColourWhoseGainIsAboveThreeHasAThresholdOfItsOwn) {
 
 TEST(HardCaseDenoise3, AnOversubtractedPedestalMovesTheMeanAndNothingElse) {
   MosaicCase c = case_of(with_dark(2, 1.5), flat(1, 1, 1), 256, 192, 63);
+  c.options.rho = inf;
   for (std::size_t i = 0; i < c.raw_e.size(); ++i) c.raw_e.data()[i] -= 60;
-  HardCase row({group, "9.3 local means below 0: 60 e- too much black", mean_oracle, "standard errors of the mean"});
-  measure(row, c, mean_bounds, change_of_means(c));
+  {
+    HardCase row({group, "9.3 local means below 0: 60 e- too much black", mean_oracle, "standard errors of the mean"});
+    // Without light the prior of streams makes colours neutral: each gets the mean of all, five standard errors more.
+    measure(row, c, {mean_bound, mean_bound, mean_bound, mean_bound + 5}, change_of_means(c));
+  }
   HardCase said({group, "9.3 the same is reported", "what was built in", "remarks that are missing"});
   said.on(Path::reference, 0, [&](Denormals m) {
     const auto check = in_mode(m, [&] { return denoise::check_noise({c.raw_e.view(), c.phase}, c.noise); });
@@ -204,9 +208,13 @@ TEST(HardCaseDenoise8, CodesOf35ElectronsKeepTheirMean) {
 }
 
 // The mean of 2 x 2 sites of one colour: (1 - z1)(1 - z2) / 2 times (1 + z1)(1 + z2) / 4 leaves 1/16 of the variance.
+// Details two cells apart go with each other by -1/2 each way, which makes the error of their mean square 3/2 of white
+// noise's, sqrt(2 / 48) for each block. They go with those by which the blocks are chosen, too: a twentieth less is
+// left.
 TEST(HardCaseDenoise8, WhatWasDenoisedBeforeIsFound) {
-  HardCase row({group, "9.8 denoised before: means of 2 x 2", "closed form: 1/16 of the diagonal variance",
-                "of that; five standard errors"});
+  HardCase row({group, "9.8 denoised before: means of 2 x 2",
+                "closed form: 1/16 of the diagonal variance; five standard errors, and how blocks are chosen",
+                "relative"});
   const MosaicCase white = case_of(with_dark(0, 20), flat(0, 0, 0), 512, 384, 69);
   MosaicCase c = case_of(with_dark(0, 20), flat(0, 0, 0), 510, 382, 69);
   for (int y = 0; y < 382; ++y) {
@@ -215,9 +223,8 @@ TEST(HardCaseDenoise8, WhatWasDenoisedBeforeIsFound) {
       c.raw_e.at(x, y) = (n.at(x, y) + n.at(x + 2, y) + n.at(x, y + 2) + n.at(x + 2, y + 2)) / 4;
     }
   }
-  // A tenth of 31 x 23 blocks of each of four sites, 64 details in each, of which one in four is independent.
-  const double error = std::sqrt(2 / (0.1 * 31 * 23 * 4 * 64 / 4));
-  row.on(Path::reference, 5 * error, [&](Denormals m) {
+  const double error = 1.5 * std::sqrt(2 / (48 * std::floor(0.1 * 31 * 23)));
+  row.on(Path::reference, 0.05 + 5 * error, [&](Denormals m) {
     const auto check = in_mode(m, [&] { return denoise::check_noise({c.raw_e.view(), c.phase}, c.noise); });
     return std::abs(check.measured_over_model[0].value_or(inf) * 16 - 1);
   });
@@ -254,66 +261,6 @@ TEST(HardCaseDenoise9, RowNoiseOfOneElectronIsTakenOffBefore) {
   measure(row, without, {bound, bound, -1, -1}, rms_of_rows);
   measure(row, c, {-1, -1, bound, -1}, rms_of_rows);
   row.none(Path::live, "lines of streams stay (live_pipeline.h)");
-}
-
-TEST(HardCaseDenoise11, ThreadsDoNotChangeABit) {
-  HardCase row({group, "9.11 one thread, two, three, seven", "the same on one thread", "samples that differ"});
-  const MosaicCase c = case_of(with_dark(5, 1.5), denoise_testing::waves(20), 203, 150, 72);
-  const auto differing = [&](const std::function<Plane<double>(int threads)>& run) {
-    const Plane<double> one = run(1);
-    double count = 0;
-    for (const int threads : {2, 3, 7}) {
-      const Plane<double> many = run(threads);
-      for (std::size_t i = 0; i < one.size(); ++i) count += one.data()[i] == many.data()[i] ? 0 : 1;
-    }
-    return count;
-  };
-  const auto fast = [&](denoise::Level level) {
-    return [&, level](Denormals m) { return differing([&](int n) { return by_denoiser(c, level, m, n); }); };
-  };
-  row.none(Path::reference, "has one thread only");
-  for (std::size_t i = 0; i < levels.size(); ++i) row.on(levels[i], 0, fast(denoise::all_levels[i]));
-  row.on_each_set(0, fast(denoise::Level::high));
-  row.on(Path::file, 0, [&](Denormals m) { return differing([&](int n) { return by_file(c, m, n); }); });
-  row.on(Path::live, 0, [&](Denormals m) { return differing([&](int n) { return by_live(c, m, n); }); });
-}
-
-TEST(HardCaseDenoise12, FramesOfOneValueGiveThatValue) {
-  HardCase row({group, "9.12 frames of one value: 0, -50, 4095, 1e9, -1e9 e-", "closed form: the value; float sums",
-                "relative"});
-  const auto of = [](const std::vector<float>& values) {
-    return [values](const PathRun& run) {
-      double worst = 0;
-      for (const float e : values) {
-        MosaicCase c = case_of(with_dark(0, 2), flat(0, 0, 0), 150, 97, 1);
-        c.options.rho = inf;
-        std::fill_n(c.raw_e.data(), c.raw_e.size(), e);
-        const double scale = std::max(1.0, std::abs(static_cast<double>(e)));
-        keep_worst(worst, distance_from(static_cast<double>(e))(run(c).view()) / scale);
-      }
-      return worst;
-    };
-  };
-  measure(row, {1e-12, 5e-6, -1, -1}, of({0, -50, 4095, 1e9f, -1e9f}));
-  measure(row, {-1, -1, 5e-6, 1.0 / 32}, of({0, -50, 3950}));  // what codes hold; a live code is 1/16 e-
-}
-
-TEST(HardCaseDenoise12, SitesThatAreNoNumbersLeaveNone) {
-  HardCase row(
-      {group, "9.12 sites that are NaN or infinite", "finite out for whatever is in", "sites that are not finite"});
-  MosaicCase c = case_of(with_dark(5, 1.5), flat(20, 20, 20), 150, 97, 73);
-  c.raw_e.at(0, 0) = std::numeric_limits<float>::quiet_NaN();
-  c.raw_e.at(149, 96) = -std::numeric_limits<float>::infinity();
-  c.raw_e.at(75, 50) = std::numeric_limits<float>::quiet_NaN();
-  c.raw_e.at(20, 60) = std::numeric_limits<float>::infinity();
-  measure(row, c, {0, 0, -1, -1}, [](PlaneView<const double> out) {
-    double count = 0;
-    for (int y = 0; y < out.height; ++y) {
-      for (int x = 0; x < out.width; ++x) count += std::isfinite(out.at(x, y)) ? 0 : 1;
-    }
-    return count;
-  });
-  row.none(pipelines, "codes are numbers");
 }
 
 }  // namespace

@@ -3,14 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <numbers>
 #include <utility>
+#include <vector>
 
 #include "denoise/temporal.h"
 #include "tests/hard_cases/mosaics.h"
 #include "tests/reference/temporal_ref.h"
 
-// Section 10 of the denoising specification.
+// Section 10 of the denoising specification, and what 9.11 and 9.12 ask of threads and of values.
 namespace lowlux::hard_cases {
 namespace {
 
@@ -18,7 +21,8 @@ using denoise_testing::Camera;
 using denoise_testing::flat;
 using denoise_testing::waves;
 
-constexpr std::string_view group = "Noise reduction: invariances";
+constexpr std::string_view group = "Noise reduction: invariances", hard_cases = "Noise reduction";
+constexpr double inf = std::numeric_limits<double>::infinity();
 
 // Values of some 200 e- in float sums of 600 terms, 5e-6 of them; codes of files are 1/8 e- off at most, so that
 // coefficients near their thresholds may pass in one and not in the other.
@@ -181,6 +185,66 @@ TEST(HardCaseTemporal, MeansOverFramesAreThoseOfTheReference) {
   row.none(levels, "frames before take part, not levels").on_each_set(bound, run);
   row.none(Path::file, "a file is one frame");
   row.on(Path::live, bound + 1.0 / 16, [&](Denormals mode) { return live_against_reference(camera, mode); });
+}
+
+TEST(HardCaseDenoise11, ThreadsDoNotChangeABit) {
+  HardCase row({hard_cases, "9.11 one thread, two, seven", "the same on one thread", "samples that differ"});
+  const MosaicCase c = case_of(with_dark(5, 1.5), denoise_testing::waves(20), 203, 150, 72);
+  const auto differing = [&](const std::function<Plane<double>(int threads)>& run) {
+    const Plane<double> one = run(1);
+    double count = 0;
+    for (const int threads : {2, 7}) {
+      const Plane<double> many = run(threads);
+      for (std::size_t i = 0; i < one.size(); ++i) count += one.data()[i] == many.data()[i] ? 0 : 1;
+    }
+    return count;
+  };
+  const auto fast = [&](denoise::Level level) {
+    return [&, level](Denormals m) { return differing([&](int n) { return by_denoiser(c, level, m, n); }); };
+  };
+  row.none(Path::reference, "has one thread only");
+  for (std::size_t i = 0; i < levels.size(); ++i) row.on(levels[i], 0, fast(denoise::all_levels[i]));
+  row.on_each_set(0, fast(denoise::Level::high));
+  row.on(Path::file, 0, [&](Denormals m) { return differing([&](int n) { return by_file(c, m, n); }); });
+  row.on(Path::live, 0, [&](Denormals m) { return differing([&](int n) { return by_live(c, m, n); }); });
+}
+
+TEST(HardCaseDenoise12, FramesOfOneValueGiveThatValue) {
+  HardCase row({hard_cases, "9.12 frames of one value: 0, -50, 4095, 1e9, -1e9 e-",
+                "closed form: the value; float sums", "relative"});
+  const auto of = [](const std::vector<float>& values) {
+    return [values](const PathRun& run) {
+      double worst = 0;
+      for (const float e : values) {
+        MosaicCase c = case_of(with_dark(0, 2), flat(0, 0, 0), 150, 97, 1);
+        c.options.rho = inf;
+        std::fill_n(c.raw_e.data(), c.raw_e.size(), e);
+        const double scale = std::max(1.0, std::abs(static_cast<double>(e)));
+        keep_worst(worst, distance_from(static_cast<double>(e))(run(c).view()) / scale);
+      }
+      return worst;
+    };
+  };
+  measure(row, {1e-12, 5e-6, -1, -1}, of({0, -50, 4095, 1e9f, -1e9f}));
+  measure(row, {-1, -1, 5e-6, 1.0 / 32}, of({0, -50, 3950}));  // what codes hold; a live code is 1/16 e-
+}
+
+TEST(HardCaseDenoise12, SitesThatAreNoNumbersLeaveNone) {
+  HardCase row({hard_cases, "9.12 sites that are NaN or infinite", "finite out for whatever is in",
+                "sites that are not finite"});
+  MosaicCase c = case_of(with_dark(5, 1.5), flat(20, 20, 20), 150, 97, 73);
+  c.raw_e.at(0, 0) = std::numeric_limits<float>::quiet_NaN();
+  c.raw_e.at(149, 96) = -std::numeric_limits<float>::infinity();
+  c.raw_e.at(75, 50) = std::numeric_limits<float>::quiet_NaN();
+  c.raw_e.at(20, 60) = std::numeric_limits<float>::infinity();
+  measure(row, c, {0, 0, -1, -1}, [](PlaneView<const double> out) {
+    double count = 0;
+    for (int y = 0; y < out.height; ++y) {
+      for (int x = 0; x < out.width; ++x) count += std::isfinite(out.at(x, y)) ? 0 : 1;
+    }
+    return count;
+  });
+  row.none(pipelines, "codes are numbers");
 }
 
 }  // namespace
