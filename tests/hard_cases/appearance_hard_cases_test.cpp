@@ -21,6 +21,7 @@
 #include "tests/hard_cases/hard_case.h"
 #include "tests/hard_cases/looks.h"
 #include "tests/reference/exact_ref.h"
+#include "tests/support/sweep.h"
 
 // Models of appearance: sections 2 to 4 of the mesopic specification.
 namespace lowlux::hard_cases {
@@ -53,7 +54,7 @@ TEST(HardCaseMesopic, HuntsRodSignal) {
                   return in_mode(m, [&] { return isp::rod_signal(isp::rod_adaptation(l_as), s); });
                 };
                 double worst = std::abs(found(0, 1) - 0.3) + std::abs(found(1, -3) - 0.3);
-                for (double l_as = 1e-9; l_as < 2e4; l_as *= 10) {
+                for (const double l_as : test::ratios(1e-9, 1e4, 10)) {
                   for (const double s : {1e-6, 0.2, 1.0, 10.0}) {
                     keep_worst(worst, relative(found(l_as, s), reference::hunt_rod_signal(l_as, s)) / (64 * eps));
                   }
@@ -83,7 +84,7 @@ TEST(HardCaseMesopic, KhansResponseAndItsInverse) {
               1, [](Denormals m) {
                 const auto rods = in_mode(m, [] { return isp::khan_rods(0.03); });
                 double worst = std::abs(in_mode(m, [&] { return isp::khan_response(rods, -1); }));
-                for (double i = 1e-12; i < 1e3; i *= 10) {
+                for (const double i : test::ratios(1e-12, 1e3, 10)) {
                   const double r = in_mode(m, [&] { return isp::khan_response(rods, i); });
                   keep_worst(worst, relative(r, reference::pattanaik_rods(0.03, i)) / (256 * eps));
                   // Near B an error of the response is B / (B - R) times that of the intensity, over n.
@@ -120,9 +121,9 @@ TEST(HardCaseMesopic, WanatsExponentAndLuminance) {
               1, [](Denormals m) {
                 const Vector3 weights{0.2126, 0.7152, 0.0722};
                 double worst = 0;
-                for (const auto& [from, to] :
+                for (const auto& light :
                      {std::pair{1e9, 1e-12}, {1e-12, 1e9}, {0.0, 0.0}, {0.0, 1.0}, {1.0, 0.0}, {0.1, 100.0}}) {
-                  const double e = in_mode(m, [&] { return isp::wanat_exponent(from, to); });
+                  const double e = in_mode(m, [&] { return isp::wanat_exponent(light.first, light.second); });
                   if (!(e >= 0 && e <= 4)) return inf;
                   for (const Vector3& rgb :
                        {Vector3{0.6, 0.3, 0.1}, {0.6, -0.05, 0.1}, {-0.3, -0.2, 0.1}, {1e-30, 1e-30, 2e-30}}) {
@@ -144,8 +145,8 @@ TEST(HardCaseMesopic, KirksNegativeCones) {
                "answers that are not"},
               0, [](Denormals m) {
                 double wrong = 0;
-                for (double l = -100; l <= 100; l += 12.5) {
-                  for (double s = -100; s <= 100; s += 12.5) {
+                for (const double l : test::steps(-100, 100, 12.5)) {
+                  for (const double s : test::steps(-100, 100, 12.5)) {
                     const auto gain = in_mode(m, [&] { return isp::kirk_opponent_gain({{l, -l, s}, 1}); });
                     const Vector3 change = in_mode(m, [&] { return isp::kirk_cone_change(gain); });
                     for (int i = 0; i < 3; ++i) wrong += std::isfinite(change[i]) && gain.gain[i] <= 1000 ? 0 : 1;

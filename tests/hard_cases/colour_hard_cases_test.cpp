@@ -21,6 +21,7 @@
 #include "tests/hard_cases/rendering.h"
 #include "tests/reference/exact_ref.h"
 #include "tests/reference/retarget_ref.h"
+#include "tests/support/sweep.h"
 
 // The state of adaptation, seeing, and what compares colours: section 4 of the sensor model; sections 0, 1, 4 and 5 of
 // the mesopic specification.
@@ -71,7 +72,7 @@ TEST(HardCaseMesopic, TheCycleOfTwo) {
            {.cd_m2 = 0.7, .rgb = {0.02f, 0.3f, 0.9f}, .scotopic_ratio = 25}, 1.1e-12, [](Denormals m) {
              double worst = 0;
              for (const double ratio : {18.0, 25.0, 30.0, 50.0, 60.0}) {
-               for (double light = 1e-3; light < 6; light *= 1.7) {
+               for (const double light : test::ratios(1e-3, 6, 1.7)) {
                  const auto state = in_mode(m, [&] { return isp::mesopic_state({light, ratio * light}); });
                  keep_worst(worst, std::abs(state.m - reference::mes2_root(light, ratio * light)));
                }
@@ -86,7 +87,7 @@ TEST(HardCaseMesopic, ThreeFixedPoints) {
            {.cd_m2 = 0.04, .rgb = {0.9f, 0.3f, 0.0f}, .scotopic_ratio = 0.2}, 1.1e-12, [](Denormals m) {
              double worst = 0;
              for (const double ratio : {0.05, 0.1, 0.2, 0.26}) {
-               for (double light = 1e-3; light < 6; light *= 1.3) {
+               for (const double light : test::ratios(1e-3, 6, 1.3)) {
                  const auto state = in_mode(m, [&] { return isp::mesopic_state({light, ratio * light}); });
                  const bool below = reference::mes2_residual(0, light, ratio * light) <= 0;
                  const bool above = reference::mes2_residual(1, light, ratio * light) >= 0;
@@ -159,6 +160,8 @@ TEST(HardCaseColour, Ciede2000AtItsBranches) {
                                                        {{0, 0, 0}, {100, 0, 0}},
                                                        {{22.7233, 20.0904, -46.694}, {23.0331, 14.973, -42.5619}}};
                 std::vector<Lab> colours;
+                colours.reserve(27);
+                colours.reserve(27);
                 for (const double l : {0.0, 40.0, 90.0}) {
                   for (const double a : {-70.0, 0.0, 55.0}) {
                     for (const double b : {-110.0, 0.0, 75.0}) colours.push_back({l, a, b});
@@ -246,6 +249,7 @@ TEST(HardCaseColour, RetargetingToADisplayThatIsNearlyDark) {
   const isp::RetargetTable table = isp::tabulated([&](const Vector3& code) { return map(code).code; }, 9, pool);
   const auto error = [&](Denormals m) {
     std::vector<std::uint16_t> in, out;
+    in.reserve(3 * 2197);
     for (int i = 0; i < 3 * 2197; ++i) in.push_back(static_cast<std::uint16_t>((i * 40503U) % 65536U));
     out.resize(in.size());
     in_mode(m, [&] { isp::apply(table, in.data(), static_cast<int>(in.size() / 3), out.data()); });

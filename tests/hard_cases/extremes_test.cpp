@@ -17,6 +17,7 @@
 #include "tests/hard_cases/rendering.h"
 #include "tests/hard_cases/simulated.h"
 #include "tests/reference/exact_ref.h"
+#include "tests/support/sweep.h"
 
 // What no specification names and every frame may hold.
 namespace lowlux::hard_cases {
@@ -26,7 +27,6 @@ using denoise_testing::flat;
 
 constexpr std::string_view group = "What the specifications do not name";
 constexpr std::string_view codes_are_whole = "codes are whole numbers";
-constexpr std::string_view no_pixels = "worked out once for a frame";
 constexpr double eps = std::numeric_limits<double>::epsilon();
 constexpr double inf = std::numeric_limits<double>::infinity();
 
@@ -194,7 +194,7 @@ TEST(HardCaseExtreme, TemperaturesOfMinus40To85) {
     double worst = 0;
     for (const double doubling : {6.0, 7.0, 8.0}) {
       sensor.dark_doubling_c = doubling;
-      for (double t = -40; t <= 85; t += 12.5) {
+      for (const double t : test::steps(-40, 85, 12.5)) {
         const double found = in_mode(m, [&] { return isp::dark_current_factor(sensor, t); });
         keep_worst(worst, std::abs(found / reference::doubled(t, 20, doubling) - 1) / (64 * eps));
       }
@@ -211,7 +211,7 @@ TEST(HardCaseExtreme, TemperaturesOfMinus40To85) {
   row.none(levels, "dark charge of 0.1 to 200 e-: see the invariances")
       .on_each_set(5, frames)
       .on(Path::file, 5, frames);
-  row.none(Path::live, no_pixels);
+  row.none(Path::live, "streams are told their black, dark charge in it");
 }
 
 }  // namespace

@@ -16,9 +16,10 @@ class HardCaseRow : public testing::Test {
  protected:
   HardCaseRow() {
     if (const char* const folder = std::getenv("LOWLUX_HARD_CASES")) folder_ = folder;
-    unsetenv("LOWLUX_HARD_CASES");
+    unsetenv("LOWLUX_HARD_CASES");  // NOLINT(concurrency-mt-unsafe): no other thread yet
   }
   ~HardCaseRow() override {
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): no other thread any more
     if (!folder_.empty()) setenv("LOWLUX_HARD_CASES", folder_.c_str(), 1);
   }
 
