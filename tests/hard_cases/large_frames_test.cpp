@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -138,6 +139,22 @@ TEST(HardCaseExtreme, FramesOfOneRowOrColumn) {
     }
     return taken;
   });
+}
+
+TEST(HardCaseSensor, MosaicsOfOnePixelAndOfOddSizes) {
+  HardCase row({"Sensor and photons", "mosaics of 1 x 1, 1 x 5, 5 x 1, 5 x 7, 33 x 31",
+                "closed form: mean of the greens there are", "standard errors"});
+  row.none(Path::reference, "is one pixel").none(levels, "9.7: borders");
+  const auto error = [](Denormals m) {
+    const RawFrame one = simulated({.luminance_cd_m2 = 1, .width = 1, .height = 1}, m);
+    if (one.raw.dn.size() != 1) return std::numeric_limits<double>::infinity();
+    double worst = 0;
+    for (const auto& [width, height] : {std::pair{1, 5}, {5, 1}, {5, 7}, {33, 31}}) {
+      keep_worst(worst, error_of_green({.green_e = 300, .width = width, .height = height}, m));
+    }
+    return worst;
+  };
+  row.on_each_set(5, error).on(Path::file, 5, error).none(Path::live, "1 x N: see the last table");
 }
 
 }  // namespace
