@@ -51,9 +51,13 @@ NoiseProfile profile_of(const LiveNoise& noise, const RawDn& raw, const BlackPoi
   return out;
 }
 
-/// 1 where one of them is not known.
+/// 1 where one of them is not known: absent, or no figure there can be. Held to what means over frames take for
+/// another light altogether.
 double ratio(const std::optional<double>& now, const std::optional<double>& before) {
-  return now && before ? *now / *before : 1;
+  const auto known = [](const std::optional<double>& figure) {
+    return figure && *figure > 0 && std::isfinite(*figure);
+  };
+  return known(now) && known(before) ? std::clamp(*now / *before, 1e-9, 1e9) : 1;
 }
 
 /// A line at another gain of the sensor: codes for each electron go with it.

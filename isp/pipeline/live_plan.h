@@ -46,7 +46,8 @@ struct LiveNoise {
   PerSite<double> black_variance_dn2{};
 };
 
-/// What is known of one frame. What is absent is measured on it or left out.
+/// What is known of one frame. What is absent is measured on it or left out; of exposure time and ISO speed, so is what
+/// is not positive and finite.
 struct LiveFacts {
   std::optional<PerSite<double>> black_dn;  // of the active area's sites, mean dark charge in it
   std::optional<LiveNoise> noise;

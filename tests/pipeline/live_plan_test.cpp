@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "isp/pipeline/noise_reduction.h"
@@ -249,6 +250,32 @@ TEST(LivePlanner, FramesBeforeAreForgottenWhereTheyTellNothing) {
   facts.exposure_s = 0.01;
   EXPECT_FALSE(restarts());
   EXPECT_DOUBLE_EQ(live->decided().noise_reduction.temporal->light, 0.25);
+}
+
+TEST(LivePlanner, ExposuresThatCannotBeTellNothingOfTheLight) {
+  InlineExecutor one;
+  const RawFrame frame = night(flat(20, 20, 20));
+  LiveSetup setup = setup_of(frame);
+  setup.temporal = true;
+  const auto live = live_of(setup, one);
+  read(*live, frame);
+  LiveFacts facts = known();
+  constexpr double inf = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double exposure_s : {0.0, -1.0, -2.0, inf, nan}) {
+    for (const double usual_s : {0.01, exposure_s}) {  // after and before one that can be, and twice
+      facts.exposure_s = usual_s;
+      ASSERT_TRUE(live->plan(facts));
+      facts.exposure_s = exposure_s;
+      ASSERT_TRUE(live->plan(facts));
+      EXPECT_EQ(live->decided().noise_reduction.temporal->light, 1) << exposure_s;
+    }
+  }
+  facts.exposure_s = 1e-300;
+  ASSERT_TRUE(live->plan(facts));
+  facts.exposure_s = 1e300;
+  ASSERT_TRUE(live->plan(facts));
+  const double light = live->decided().noise_reduction.temporal->light;
+  EXPECT_TRUE(std::isfinite(light) && light > 1e6) << light << ": what was before is worth nothing";
 }
 
 }  // namespace
