@@ -1,5 +1,6 @@
 #include "isp/bench/denoise_scene.h"
 
+#include <algorithm>
 #include <cassert>
 #include <limits>
 #include <span>
@@ -40,6 +41,12 @@ denoise::RawNoise DenoiseShot::noise() const {
   const double read_e2 = light.read_noise_e * light.read_noise_e;
   return {.dark_mean_e = {light.dark_e, light.dark_e, light.dark_e, light.dark_e},
           .variance_e2 = {read_e2, read_e2, read_e2}};
+}
+
+std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light) {
+  const auto all = files_of(PictureSet::all);
+  const auto place = static_cast<std::uint64_t>(std::find(all.begin(), all.end(), picture.name) - all.begin());
+  return 1000 * place + static_cast<std::uint64_t>(light.mean_e) + (light.dark_e > 2 ? 100000 : 0);
 }
 
 DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::uint64_t seed) {

@@ -13,8 +13,7 @@ namespace {
 
 constexpr int last_step = 27;  // strength 2^(i / 3 - 1), up to 256
 constexpr int octave = 3;
-constexpr int part_columns = 256, part_rows = 192;  // of the middle, where a part is enough
-using Steps = std::array<int, 2>;                   // of lightness, of colour
+using Steps = std::array<int, 2>;  // of lightness, of colour
 using Bytes = std::vector<std::uint8_t>;
 
 double strength_at(int step) { return std::exp2(step / 3.0 - 1); }
@@ -166,18 +165,14 @@ SceneLinear linear_of(const Encoded8& codes) {
 }
 
 StrengthSearch search_strength(const NlMeans& filter, const Encoded8& noisy, const PictureTruth& truth) {
-  const int columns = std::min(noisy.width(), part_columns), rows = std::min(noisy.height(), part_rows);
-  const RgbView<const float> whole = truth.encoded().view();
-  RgbView<const float> middle = whole;
+  const int columns = std::min(noisy.width(), search_columns), rows = std::min(noisy.height(), search_rows);
+  RgbView<const float> middle = truth.encoded().view();
   for (auto& plane : middle) {
     plane = plane.crop((plane.width - columns) / 2, (plane.height - rows) / 2, columns, rows);
   }
-  Search in_part(filter, part_of(noisy, columns, rows), middle);
-  if (!in_part.works()) return {};
-  const Steps start = climbed(in_part, climbed(in_part, best_octaves(in_part), octave), 1);
-  if (columns == noisy.width() && rows == noisy.height()) return found(in_part, start);
-  Search in_whole(filter, noisy, whole);
-  return in_part.works() && in_whole.works() ? found(in_whole, climbed(in_whole, start, 1)) : StrengthSearch{};
+  Search search(filter, part_of(noisy, columns, rows), middle);
+  if (!search.works()) return {};
+  return found(search, climbed(search, climbed(search, best_octaves(search), octave), 1));
 }
 
 }  // namespace lowlux::isp
