@@ -175,4 +175,13 @@ Result<std::vector<BenchPicture>> read_bench_pictures(const std::string& folder,
   return out;
 }
 
+PicturePart largest_of(std::span<const BenchPicture> pictures) {
+  PicturePart out;
+  for (const BenchPicture& picture : pictures) {
+    out.width = std::max(out.width, picture.linear.width());
+    out.height = std::max(out.height, picture.linear.height());
+  }
+  return out;
+}
+
 }  // namespace lowlux::isp

@@ -51,6 +51,9 @@ Result<std::vector<BenchPicture>> read_bench_pictures(const std::string& folder,
                                                       std::span<const std::string_view> names, const PicturePart& part,
                                                       Executor& executor);
 
+/// The width of the widest and the height of the highest; 0 of none.
+PicturePart largest_of(std::span<const BenchPicture> pictures);
+
 /// A plane behind a lens; the ends of rows and columns are repeated. @param sigma_px  0..100; 0: as it is
 Plane<float> lens_blurred(const PlaneView<const float>& plane, double sigma_px);
 

@@ -7,12 +7,19 @@
 #include <fmt/format.h>
 
 #include "isp/bench/denoise_bench.h"
+#include "isp/bench/developing_stages.h"
 
 namespace lowlux::isp {
 namespace {
 
 constexpr std::array registry{
     BenchStage{"denoise", "Noise reduction on the mosaic: error against time, beside other methods", run_denoise_bench},
+    BenchStage{"chroma-start", "Where the denoiser's chroma starts: error against time", run_chroma_start_bench},
+    BenchStage{"demosaic", "Demosaicing: error against time", run_demosaic_bench},
+    BenchStage{"mesopic", "Mesopic vision, exact and by tables: error against time", run_mesopic_bench},
+    BenchStage{"retarget", "Retargeting to a dim display, exact and by tables: error against time", run_retarget_bench},
+    BenchStage{"develop", "Whole plans of develop: error against time", run_develop_bench},
+    BenchStage{"scaling", "Developing over frame size and threads: time and memory", run_scaling_bench},
 };
 
 std::string text_of(const BenchCell& cell, int digits) {

@@ -164,9 +164,11 @@ std::vector<std::string> remarks_of(const Work& work) {
         "{}: on the tuning set, chromatic has radii {} (chroma) and {} (luminance), gat gains {:.2f}, {:.2f}, {:.2f}",
         name_of(work.lights[i]), tuned.windows.chroma_radius, tuned.windows.luminance_radius, tuned.stabilised_gain[0],
         tuned.stabilised_gain[1], tuned.stabilised_gain[2]);
-    if (!work.strengths.empty())
-      line += fmt::format("; opencv-nlm's strengths (lightness, colour), found on the truth of the middle {} x {}:",
-                          search_columns, search_rows);
+    if (!work.strengths.empty()) {
+      line += fmt::format(
+          "; opencv-nlm's strengths (lightness, colour), found on the truth (of large pictures on {} x {} of it):",
+          search_columns, search_rows);
+    }
     for (std::size_t p = 0; p < work.pictures.size() && !work.strengths.empty(); ++p) {
       const NlMeansStrength& best = work.strengths[p * work.lights.size() + i].best;
       line += fmt::format(" {} {:.1f}, {:.1f};", work.pictures[p].name, best.lightness, best.colour);
@@ -178,12 +180,8 @@ std::vector<std::string> remarks_of(const Work& work) {
 }
 
 Result<std::vector<DenoiseRow>> measure_all(const Work& work, Executor& executor, BenchOutcome& outcome) {
-  int width = 0, height = 0;
-  for (const BenchPicture& picture : work.pictures) {
-    width = std::max(width, picture.linear.width());
-    height = std::max(height, picture.linear.height());
-  }
-  MethodMemory memory(width, height, executor);
+  const PicturePart largest = largest_of(work.pictures);
+  MethodMemory memory(largest.width, largest.height, executor);
   const std::vector<DenoiseMethod> methods = denoise_methods(work.options.nl_means != nullptr);
   std::vector<DenoiseRow> rows;
   for (std::size_t light = 0; light < work.lights.size(); ++light) {

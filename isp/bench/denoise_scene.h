@@ -46,6 +46,10 @@ std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light);
 /// @param picture  not black; at most poisson_max_mean electrons anywhere
 DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::uint64_t seed);
 
+/// A mosaic [e-] as the renderer takes it: gains that bring white_e to 1 and make white neutral.
+/// @param exposure  1 brings white_e to display white
+SignedMosaic mosaic_of(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, double exposure = 1);
+
 /// Mosaics to pictures, for all methods alike: gains, Malvar-He-Cutler demosaicing, exposure that undoes the light.
 class BenchRenderer {
  public:
