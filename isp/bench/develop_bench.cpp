@@ -2,7 +2,9 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -25,8 +27,10 @@ using denoise::Level;
 
 constexpr PicturePart quick_part{192, 128};
 constexpr std::size_t pictures_used = 3;
+constexpr int rounds_by_one = 3;
 constexpr std::size_t least_undominated = 4;
 constexpr double least_span = 50;
+constexpr std::string_view light_of_images = "20 e-";
 
 /// What is asked of develop, beside the look.
 struct PlanChoice {
@@ -69,28 +73,38 @@ DevelopOptions options_of(const PlanChoice& choice, Look look, const DevelopLigh
 
 const Encoded8& codes_of(const Developed& developed) { return std::get<Encoded8>(developed.picture); }
 
-/// A picture taken in one light, and what is developed of it without noise.
-struct Scene {
-  SimulatedRaws raws;
-  double exposure_ev = 0;  // automatic, of the mean
-  PictureTruth truth;
-};
-
-Result<std::vector<Scene>> scenes_of(const std::vector<BenchPicture>& pictures, const DevelopLight& light, Look look,
-                                     Executor& executor) {
-  std::vector<Scene> out;
+Result<std::vector<SimulatedRaws>> raws_of(const std::vector<BenchPicture>& pictures, const DevelopLight& light,
+                                           Executor& executor) {
+  std::vector<SimulatedRaws> out;
   out.reserve(pictures.size());
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     auto raws = simulated_raws(pictures[i], light, i + 1, executor);
     if (!raws) return tl::make_unexpected(raws.error());
+    out.push_back(*std::move(raws));
+  }
+  return out;
+}
+
+/// A picture taken in one light, and what is developed of it without noise.
+struct Scene {
+  const RawFrame& noisy;
+  double exposure_ev = 0;  // automatic, of the mean
+  PictureTruth truth;
+};
+
+Result<std::vector<Scene>> scenes_of(const std::vector<SimulatedRaws>& raws, const DevelopLight& light, Look look,
+                                     Executor& executor) {
+  std::vector<Scene> out;
+  out.reserve(raws.size());
+  for (const SimulatedRaws& of : raws) {
     const PlanChoice untouched{.repairs = false};
-    const auto automatic = plan_develop(raws->mean, options_of(untouched, Look::camera, light, {}), executor);
+    const auto automatic = plan_develop(of.mean, options_of(untouched, Look::camera, light, {}), executor);
     if (!automatic) return tl::make_unexpected(automatic.error());
     const double ev = automatic->exposure_ev;
-    const auto truth = develop(raws->mean, options_of(untouched, look, light, ev), executor);
+    const auto truth = develop(of.mean, options_of(untouched, look, light, ev), executor);
     if (!truth) return tl::make_unexpected(truth.error());
     const SceneLinear light_of_truth = linear_of(codes_of(*truth));
-    out.push_back({*std::move(raws), ev, PictureTruth(light_of_truth.view(), executor)});
+    out.push_back({of.noisy, ev, PictureTruth(light_of_truth.view(), executor)});
   }
   return out;
 }
@@ -98,7 +112,7 @@ Result<std::vector<Scene>> scenes_of(const std::vector<BenchPicture>& pictures, 
 /// Adds a scene's share to the errors of a level.
 Result<void> add_error(const Scene& scene, const DevelopOptions& options, double share, AccuracyLevel& level,
                        Executor& executor) {
-  const auto developed = develop(scene.raws.noisy, options, executor);
+  const auto developed = develop(scene.noisy, options, executor);
   if (!developed) return tl::make_unexpected(developed.error());
   SceneLinear picture = linear_of(codes_of(*developed));
   if (options.half) picture = enlarged_twice(std::as_const(picture).view(), scene.truth.width(), scene.truth.height());
@@ -121,7 +135,7 @@ Result<MeasuredPlans> measured(const std::vector<Scene>& scenes, const DevelopLi
                       {}};
   InlineExecutor one;
   Executor* executor_in_use = &executor;
-  const RawFrame& timed = scenes.front().raws.noisy;
+  const RawFrame& timed = scenes.front().noisy;
   for (const PlanChoice& choice : plan_choices) {
     AccuracyLevel level{
         .name = choice.name(), .megapixels = 1e-6 * timed.raw.active.width * timed.raw.active.height, .largest = 0};
@@ -137,7 +151,7 @@ Result<MeasuredPlans> measured(const std::vector<Scene>& scenes, const DevelopLi
   }
   MeasuredPlans out{.by_all = measure(group, timing), .by_one = {}};
   executor_in_use = &one;
-  out.by_one = measure(group, timing);
+  out.by_one = measure(group, {.rounds = rounds_by_one, .wall_clock = true});
   return out;
 }
 
@@ -159,11 +173,9 @@ Finding undominated_finding(std::span<const AccuracyRow> rows) {
           Finding::Kind::check};
 }
 
-/// Pictures of one dark scene for the page, all as exposed automatically.
-Result<void> add_images(const BenchPicture& picture, const DevelopLight& light, Executor& executor,
-                        BenchOutcome& outcome) {
-  const auto raws = simulated_raws(picture, light, 1, executor);
-  if (!raws) return tl::make_unexpected(raws.error());
+/// Pictures of one dark frame for the page, all as exposed automatically.
+Result<void> add_images(const RawFrame& frame, const DevelopLight& light, Executor& executor,
+                        std::vector<BenchImage>& images) {
   struct Shown {
     const char* id;
     PlanChoice choice;
@@ -172,11 +184,36 @@ Result<void> add_images(const BenchPicture& picture, const DevelopLight& light, 
   const PlanChoice plain{}, reduced{.level = Level::standard};
   for (const Shown& shown : {Shown{"plain", plain, Look::camera}, Shown{"standard", reduced, Look::camera},
                              Shown{"camera", reduced, Look::camera}, Shown{"eye", reduced, Look::eye}}) {
-    auto developed = develop(raws->noisy, options_of(shown.choice, shown.look, light, {}), executor);
+    auto developed = develop(frame, options_of(shown.choice, shown.look, light, {}), executor);
     if (!developed) return tl::make_unexpected(developed.error());
-    outcome.images.push_back({std::string("develop-") + shown.id, std::get<Encoded8>(std::move(developed->picture))});
+    images.push_back({std::string("develop-") + shown.id, std::get<Encoded8>(std::move(developed->picture))});
   }
   return {};
+}
+
+/// What all lights add to.
+struct Gathered {
+  std::vector<AccuracyRow> rows;
+  std::vector<AccuracyRow> by_one;
+  std::vector<Finding> findings;
+  std::vector<BenchImage> images;
+};
+
+Result<void> gather(const std::vector<BenchPicture>& pictures, const DevelopLight& light, const AccuracyTiming& timing,
+                    Executor& executor, Gathered& out) {
+  const auto raws = raws_of(pictures, light, executor);
+  if (!raws) return tl::make_unexpected(raws.error());
+  for (const Look look : {Look::camera, Look::eye}) {
+    const auto scenes = scenes_of(*raws, light, look, executor);
+    if (!scenes) return tl::make_unexpected(scenes.error());
+    const auto plans = measured(*scenes, light, look, timing, executor);
+    if (!plans) return tl::make_unexpected(plans.error());
+    out.findings.push_back(undominated_finding(plans->by_all));
+    out.rows.insert(out.rows.end(), plans->by_all.begin(), plans->by_all.end());
+    out.by_one.insert(out.by_one.end(), plans->by_one.begin(), plans->by_one.end());
+  }
+  if (light.name != light_of_images) return {};
+  return add_images(raws->front().noisy, light, executor, out.images);
 }
 
 }  // namespace
@@ -192,34 +229,27 @@ Result<BenchOutcome> run_develop_bench(const BenchOptions& options) {
   if (!pictures) return tl::make_unexpected(pictures.error());
   const AccuracyTiming timing{.rounds = quick ? 3 : 5, .wall_clock = true};
   const std::vector<DevelopLight> lights = develop_lights(quick);
-  std::vector<AccuracyRow> rows, by_one;
-  std::vector<Finding> findings;
+  Gathered all_lights;
   for (const DevelopLight& light : lights) {
-    for (const Look look : {Look::camera, Look::eye}) {
-      const auto scenes = scenes_of(*pictures, light, look, executor);
-      if (!scenes) return tl::make_unexpected(scenes.error());
-      const auto plans = measured(*scenes, light, look, timing, executor);
-      if (!plans) return tl::make_unexpected(plans.error());
-      if (!quick) findings.push_back(undominated_finding(plans->by_all));
-      rows.insert(rows.end(), plans->by_all.begin(), plans->by_all.end());
-      by_one.insert(by_one.end(), plans->by_one.begin(), plans->by_one.end());
-      options.advance(0.5 / static_cast<double>(lights.size()), "plans at " + light.name);
-    }
+    const auto done = gather(*pictures, light, timing, executor, all_lights);
+    if (!done) return tl::make_unexpected(done.error());
+    options.advance(1 / static_cast<double>(lights.size()), "plans at " + light.name);
   }
-  BenchOutcome out = accuracy_outcome("develop", rows, timing, options.threads);
-  out.findings = std::move(findings);
+  BenchOutcome out = accuracy_outcome("develop", all_lights.rows, timing, options.threads);
+  if (!quick) out.findings = std::move(all_lights.findings);  // of parts, planning takes most of the time
+  out.images = std::move(all_lights.images);
   out.table.columns.emplace_back("one thread [ms/MP]");
-  for (std::size_t i = 0; i < rows.size(); ++i) out.table.rows[i].emplace_back(by_one[i].ms_per_mp);
-  if (const auto added = add_images(pictures->front(), lights.back(), executor, out); !added) {
-    return tl::make_unexpected(added.error());
+  for (std::size_t i = 0; i < out.table.rows.size(); ++i) {
+    out.table.rows[i].emplace_back(all_lights.by_one[i].ms_per_mp);
   }
   out.remarks.push_back(fmt::format(
       "{} pictures{} by a simulated camera of 14 bits, masked columns telling its dark; errors against what is "
       "developed "
       "of the mean of the signal, with the same exposure and look: demosaicing is in both, its noise in one; half "
       "sizes "
-      "are enlarged to be compared; megapixels are those of the mosaic; times of the first picture, planning included",
-      pictures->size(), quick ? ", quick: parts of them," : ""));
+      "are enlarged to be compared; megapixels are those of the mosaic; times of the first picture, planning included; "
+      "by one thread in {} rounds",
+      pictures->size(), quick ? ", quick: parts of them," : "", rounds_by_one));
   return out;
 }
 

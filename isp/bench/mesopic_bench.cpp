@@ -1,12 +1,9 @@
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <chrono>
 #include <cmath>
-#include <memory>
 #include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -31,6 +28,7 @@ constexpr PicturePart part{384, 256}, quick_part{96, 64};
 constexpr double pixels_of_cell = LookGrid::cell * LookGrid::cell;
 constexpr double least_field_ratio = 0.27;  // as of NightLookGrid
 constexpr float dark = 1e-6f;
+constexpr AccuracyTiming timing{.rounds = 5, .least_s = 1e-3};
 
 const Matrix3& to_xyz() {
   static const Matrix3 matrix = rgb_to_xyz(primaries_rec709).value();  // of constants
@@ -41,6 +39,8 @@ const Xyz& white() {
   static const Xyz xyz = xyz_of(to_xyz() * Vector3{1, 1, 1});
   return xyz;
 }
+
+double scotopic_ratio_of_white() { return scotopic_luminance(white()); }
 
 Lab lab_of_xyz(const Xyz& xyz) { return lab_of(xyz, white()); }
 
@@ -54,23 +54,25 @@ struct Colours {
   Vector3 at(std::size_t i) const { return {rgb.plane[0].data()[i], rgb.plane[1].data()[i], rgb.plane[2].data()[i]}; }
 };
 
-double scotopic_ratio_of_white() { return scotopic_luminance(white()); }
-
-Colours colours_of(const std::vector<BenchPicture>& pictures) {
-  std::size_t pixels = 0;
-  for (const BenchPicture& picture : pictures) pixels += picture.linear.plane[0].size();
-  Colours out{SceneLinear(static_cast<int>(pixels), 1), {}, {}};
-  for (std::size_t c = 0; c < 3; ++c) {
-    float* to = out.rgb.plane[c].data();
-    for (const BenchPicture& picture : pictures) {
-      to = std::copy_n(picture.linear.plane[c].data(), picture.linear.plane[c].size(), to);
+/// Every n-th, so that there are no more than so many.
+Colours colours_of(const std::vector<BenchPicture>& pictures, std::size_t most) {
+  std::vector<Vector3> all;
+  for (const BenchPicture& picture : pictures) {
+    const auto& plane = picture.linear.plane;
+    all.reserve(all.size() + plane[0].size());
+    for (std::size_t i = 0; i < plane[0].size(); ++i) {
+      all.push_back({plane[0].data()[i], plane[1].data()[i], plane[2].data()[i]});
     }
   }
-  out.cones.reserve(pixels);
-  out.rods.reserve(pixels);
-  for (std::size_t i = 0; i < pixels; ++i) {
-    const Xyz xyz = xyz_of(to_xyz() * out.at(i));
+  const std::size_t every = (all.size() + most - 1) / most, count = all.size() / every;
+  Colours out{SceneLinear(static_cast<int>(count), 1), {}, {}};
+  out.cones.reserve(count);
+  out.rods.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vector3& rgb = all[i * every];
+    const Xyz xyz = xyz_of(to_xyz() * rgb);
     const double own = scotopic_luminance(xyz) / scotopic_ratio_of_white();
+    for (std::size_t c = 0; c < 3; ++c) out.rgb.plane[c].data()[i] = static_cast<float>(rgb[c]);
     out.cones.push_back(static_cast<float>(xyz.y));
     out.rods.push_back(static_cast<float>(std::max(own, std::min(LookGrid::least_rods * xyz.y, xyz.y))));
   }
@@ -154,7 +156,7 @@ struct StateMethod {
 constexpr std::array state_methods{StateMethod{"one for the frame", solve_once}, StateMethod{"table", look_up_each},
                                    StateMethod{"exact", solve_each}};
 
-std::vector<AccuracyRow> state_rows(const Colours& colours, double white_cd_m2, const AccuracyTiming& timing) {
+std::vector<AccuracyRow> state_rows(const Colours& colours, double white_cd_m2) {
   States states = states_of(colours, white_cd_m2);
   solve_each(states);
   const std::vector<Lab> exact = seen(colours, states);
@@ -240,36 +242,20 @@ Result<std::vector<AccuracyRow>> model_rows(const Colours& colours, const ModelC
   const double megapixels = 1e-6 * static_cast<double>(colours.size());
   std::string made = group.name + ": tables made in";
   for (const MadeTable& each : *tables) {
-    const ColourTable& table = each.table;
-    apply_colour_table(table, colours.rgb.view(), out.view(), one);
+    const auto look_up = [&] { apply_colour_table(each.table, colours.rgb.view(), out.view(), one); };
+    look_up();
     const ColourDifference error = difference_of(lab_of_planes(out), exact);
-    group.levels.push_back(
-        {.name = fmt::format("table, {} cells x {} levels", table.cells, table.levels),
-         .error = error.mean,
-         .run = [&table, &colours, &out, &one] { apply_colour_table(table, colours.rgb.view(), out.view(), one); },
-         .megapixels = megapixels,
-         .largest = error.largest});
+    group.levels.push_back({.name = fmt::format("table, {} cells x {} levels", each.table.cells, each.table.levels),
+                            .error = error.mean,
+                            .run = look_up,
+                            .megapixels = megapixels,
+                            .largest = error.largest});
     made += fmt::format(" {:.0f}", 1e3 * each.made_s);
   }
   remarks.push_back(made + " ms");
-  group.levels.push_back(
-      {.name = "exact", .run = [&] { map_each(*map, colours.rgb, out); }, .megapixels = megapixels, .largest = 0});
-  return measure(group, {.rounds = 5, .least_s = 1e-3});
-}
-
-/// Every n-th colour, so that no more than so many are left.
-Colours some_of(const std::vector<BenchPicture>& pictures, std::size_t most) {
-  Colours all = colours_of(pictures);
-  const std::size_t every = (all.size() + most - 1) / most, count = all.size() / every;
-  Colours out{SceneLinear(static_cast<int>(count), 1), {}, {}};
-  out.cones.reserve(count);
-  out.rods.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t c = 0; c < 3; ++c) out.rgb.plane[c].data()[i] = all.rgb.plane[c].data()[i * every];
-    out.cones.push_back(all.cones[i * every]);
-    out.rods.push_back(all.rods[i * every]);
-  }
-  return out;
+  const auto solve = [&] { map_each(*map, colours.rgb, out); };
+  group.levels.push_back({.name = "exact", .run = solve, .megapixels = megapixels, .largest = 0});
+  return measure(group, timing);
 }
 
 }  // namespace
@@ -279,13 +265,12 @@ Result<BenchOutcome> run_mesopic_bench(const BenchOptions& options) {
   const auto pictures = read_bench_pictures(options.pictures_folder, files_of(options.pictures),
                                             options.quick ? quick_part : part, executor);
   if (!pictures) return tl::make_unexpected(pictures.error());
-  const Colours colours = some_of(*pictures, options.quick ? 3000 : 12000);
-  const AccuracyTiming timing{.rounds = 7, .least_s = 1e-3};
+  const Colours colours = colours_of(*pictures, options.quick ? 3000 : 12000);
   const auto models = std::span(model_cases).first(options.quick ? quick_models : model_cases.size());
   std::vector<AccuracyRow> rows;
   std::vector<std::string> remarks;
   for (const double white_cd_m2 : {100.0, 1.0, 0.01}) {
-    for (AccuracyRow& row : state_rows(colours, white_cd_m2, timing)) rows.push_back(std::move(row));
+    for (AccuracyRow& row : state_rows(colours, white_cd_m2)) rows.push_back(std::move(row));
   }
   for (const ModelCase& of : models) {
     const auto more =

@@ -29,6 +29,7 @@ constexpr std::array methods{RetargetMethod::constrained, RetargetMethod::shin, 
 constexpr std::array table_levels{17, 33, 65};
 constexpr std::size_t quick_tables = 2;
 constexpr double largest_code = 65535;
+constexpr AccuracyTiming timing{.rounds = 5, .least_s = 1e-3};
 
 /// Colours of all pictures as codes of 16 bits.
 std::vector<std::uint16_t> codes_of(const std::vector<PictureColours>& pictures) {
@@ -81,8 +82,8 @@ Result<std::vector<AccuracyRow>> rows_of(RetargetMethod method, Work& work, std:
   if (!map) return tl::make_unexpected(map.error());
   const CodeMap code_map = [&map](const Vector3& code) { return (*map)(code).code; };
   const auto pixels = static_cast<int>(work.exact.size());
-  const double megapixels = 1e-6 * pixels;
-  map_each(code_map, work.codes, work.exact);
+  const auto solve = [&] { map_each(code_map, work.codes, work.exact); };
+  solve();
   std::vector<Lab> expected;
   expected.reserve(work.exact.size());
   for (const Vector3& code : work.exact) expected.push_back(lab_of_code(code));
@@ -97,21 +98,14 @@ Result<std::vector<AccuracyRow>> rows_of(RetargetMethod method, Work& work, std:
     const RetargetTable& table = tables.emplace_back(tabulated(code_map, count, executor));
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     made += fmt::format(" {:.2f}", took.count());
-    apply(table, work.codes.data(), pixels, work.shown.data());
+    const auto look_up = [&work, &table, pixels] { apply(table, work.codes.data(), pixels, work.shown.data()); };
+    look_up();
     const ColourDifference error = difference_of(lab_of_codes(work.shown), expected);
-    group.levels.push_back(
-        {.name = fmt::format("table of {}", count),
-         .error = error.mean,
-         .run = [&work, &table, pixels] { apply(table, work.codes.data(), pixels, work.shown.data()); },
-         .megapixels = megapixels,
-         .largest = error.largest});
+    group.levels.push_back({fmt::format("table of {}", count), error.mean, look_up, 1e-6 * pixels, error.largest});
   }
   remarks.push_back(made + fmt::format(" s by {} threads", executor.width()));
-  group.levels.push_back({.name = "exact",
-                          .run = [&] { map_each(code_map, work.codes, work.exact); },
-                          .megapixels = megapixels,
-                          .largest = 0});
-  return measure(group, {.rounds = 5, .least_s = 1e-3});
+  group.levels.push_back({"exact", 0, solve, 1e-6 * pixels, 0});
+  return measure(group, timing);
 }
 
 }  // namespace
@@ -135,7 +129,7 @@ Result<BenchOutcome> run_retarget_bench(const BenchOptions& options) {
     rows.insert(rows.end(), more->begin(), more->end());
     options.advance(1 / static_cast<double>(methods.size()), "retargeting: " + std::string(name_of(method)));
   }
-  BenchOutcome out = accuracy_outcome("retarget", rows, {.rounds = 5}, 1);
+  BenchOutcome out = accuracy_outcome("retarget", rows, timing, 1);
   out.remarks.push_back(fmt::format(
       "{} colours spread over all {} pictures{}, sRGB codes of 16 bits; CIEDE2000 of codes as sRGB under D65",
       work.exact.size(), pictures->size(), quick ? ", quick: of their middle 96 x 96 pixels" : ""));

@@ -8,6 +8,8 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -227,22 +229,14 @@ Plot plot_over_size(const std::vector<ScalingRow>& rows, std::string id, std::st
   return out;
 }
 
-}  // namespace
-
-Result<BenchOutcome> run_scaling_bench(const BenchOptions& options) {
-  PoolExecutor executor(options.threads);
-  const auto picture =
-      read_bench_pictures(options.pictures_folder, files_of(options.pictures).first(1), {768, 512}, executor);
-  if (!picture) return tl::make_unexpected(picture.error());
-  const auto raws = simulated_raws(picture->front(), develop_lights(false)[1], 1, executor);
-  if (!raws) return tl::make_unexpected(raws.error());
+/// Frames of all sizes there is memory for.
+std::vector<ScalingRow> rows_over_size(const RawFrame& small, const BenchOptions& options, int rounds,
+                                       std::string& left_out) {
   std::vector<std::unique_ptr<Executor>> executors;
   for (const int threads : thread_counts(options.threads)) executors.push_back(std::make_unique<PoolExecutor>(threads));
-  const int rounds = options.quick ? 3 : 5;
-  std::vector<ScalingRow> rows;
-  std::string left_out;
-  const auto sizes = std::span(sizes_mp).first(options.quick ? quick_sizes : sizes_mp.size());
+  std::vector<ScalingRow> out;
   double most_bytes_per_pixel = 0;
+  const auto sizes = std::span(sizes_mp).first(options.quick ? quick_sizes : sizes_mp.size());
   for (const double megapixels : sizes) {
     options.advance(1 / static_cast<double>(sizes.size() + 1), fmt::format("frames of {:g} MP", megapixels));
     if (1e6 * megapixels * most_bytes_per_pixel > memory_share * physical_bytes()) {
@@ -250,30 +244,43 @@ Result<BenchOutcome> run_scaling_bench(const BenchOptions& options) {
       continue;
     }
     const int of_size = megapixels < few_rounds_from_mp ? rounds : few_rounds;
-    for (ScalingRow& row : rows_of(frame_of(raws->noisy, megapixels), executors, of_size)) {
-      if (std::isfinite(row.peak_bytes_per_pixel)) {
-        most_bytes_per_pixel = std::max(most_bytes_per_pixel, row.peak_bytes_per_pixel);
-      }
-      rows.push_back(std::move(row));
+    for (ScalingRow& row : rows_of(frame_of(small, megapixels), executors, of_size)) {
+      most_bytes_per_pixel = std::fmax(most_bytes_per_pixel, row.peak_bytes_per_pixel);
+      out.push_back(std::move(row));
     }
   }
-  auto of_files = rows_of_files(frame_of(raws->noisy, options.quick ? sizes_mp[0] : file_mp), options.threads,
-                                options.quick ? 1 : 3);
+  return out;
+}
+
+}  // namespace
+
+Result<BenchOutcome> run_scaling_bench(const BenchOptions& options) {
+  PoolExecutor executor(options.threads);
+  const auto picture =
+      read_bench_pictures(options.pictures_folder, files_of(options.pictures).first(1), {768, 512}, executor);
+  if (!picture) return tl::make_unexpected(picture.error());
+  const auto raws = simulated_raws(picture->front(), develop_lights(true).front(), 1, executor);
+  if (!raws) return tl::make_unexpected(raws.error());
+  const int rounds = options.quick ? 2 : 5;
+  std::string left_out;
+  std::vector<ScalingRow> rows = rows_over_size(raws->noisy, options, rounds, left_out);
+  const RawFrame of_file = frame_of(raws->noisy, options.quick ? sizes_mp[0] : file_mp);
+  auto of_files = rows_of_files(of_file, options.threads, options.quick ? 1 : 3);
   if (!of_files) return tl::make_unexpected(of_files.error());
   rows.insert(rows.end(), of_files->begin(), of_files->end());
-  options.advance(1 / static_cast<double>(sizes.size() + 1), "several files");
   BenchOutcome out{.table = table_of(rows)};
   out.plots = {plot_over_size(rows, "scaling-time", "time [ms/MP]", &ScalingRow::ms_per_mp),
                plot_over_size(rows, "scaling-memory", "peak memory [bytes/pixel]", &ScalingRow::peak_bytes_per_pixel)};
   out.remarks.push_back(
       timing_remark({.rounds = rounds, .wall_clock = true}, options.threads) +
-      fmt::format("; from {:g} MP on 2 rounds; threads as in their column{}", few_rounds_from_mp, left_out));
+      fmt::format("; from {:g} MP on {}; threads as in their column{}", few_rounds_from_mp, few_rounds, left_out));
   out.remarks.emplace_back(
       "frames are one of 20 e- repeated, planned and developed anew each time; peak memory is what a child process "
       "with "
       "one thread adds to its largest resident set, beyond the frame's 2 bytes for each pixel");
   out.remarks.push_back(fmt::format(
       "{} files: DNGs are read, developed and written as PNG, so many jobs at a time, which share the threads", files));
+  options.advance(1.0 / (options.quick ? quick_sizes + 1 : sizes_mp.size() + 1), "several files");
   return out;
 }
 

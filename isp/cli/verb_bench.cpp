@@ -92,7 +92,7 @@ int run_bench(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<BenchArgs>(parsed);
   if (args.list) {
-    for (const isp::BenchStage& stage : isp::bench_stages()) fmt::print("{:<10} {}\n", stage.id, stage.title);
+    for (const isp::BenchStage& stage : isp::bench_stages()) fmt::print("{:<18} {}\n", stage.id, stage.title);
     return exit_done;
   }
   const auto stages = chosen(args.stages);
