@@ -19,7 +19,7 @@ namespace {
 
 using denoise::Level;
 
-constexpr PicturePart quick_part{192, 128};
+constexpr PicturePart part{768, 512}, quick_part{192, 128};
 constexpr std::array fast_levels{Level::draft, Level::standard, Level::high};
 constexpr std::array best_level{Level::best};
 constexpr std::array<DenoiseLight, 4> lights{{{200, 2, 1.5}, {20, 2, 1.5}, {20, 200, 4}, {4, 200, 4}}};
@@ -109,7 +109,7 @@ Result<BenchOutcome> run_chroma_start_bench(const BenchOptions& options) {
   Bench small(*std::move(parts), executor);
   std::unique_ptr<Bench> whole;
   if (!options.quick) {
-    auto pictures = read_bench_pictures(options.pictures_folder, files_of(options.pictures), {}, executor);
+    auto pictures = read_bench_pictures(options.pictures_folder, files_of(options.pictures), part, executor);
     if (!pictures) return tl::make_unexpected(pictures.error());
     whole = std::make_unique<Bench>(*std::move(pictures), executor);
   }

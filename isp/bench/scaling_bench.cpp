@@ -35,8 +35,13 @@ using denoise::Level;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::array sizes_mp{0.3, 1.0, 3.0, 12.0, 25.0, 50.0, 100.0};
 constexpr std::size_t quick_sizes = 3;
-constexpr double few_rounds_from_mp = 25;
-constexpr int few_rounds = 2;
+/// Rounds of timing: fewer for large frames.
+struct Rounds {
+  int usual;
+  int few;
+  double few_from_mp;
+};
+constexpr Rounds full_rounds{5, 2, 25}, quick_rounds{2, 1, 3};
 constexpr double memory_share = 0.4;  // of the machine's, that a frame may ask for
 constexpr int files = 8;
 constexpr double file_mp = 1;
@@ -230,7 +235,7 @@ Plot plot_over_size(const std::vector<ScalingRow>& rows, std::string id, std::st
 }
 
 /// Frames of all sizes there is memory for.
-std::vector<ScalingRow> rows_over_size(const RawFrame& small, const BenchOptions& options, int rounds,
+std::vector<ScalingRow> rows_over_size(const RawFrame& small, const BenchOptions& options, const Rounds& rounds,
                                        std::string& left_out) {
   std::vector<std::unique_ptr<Executor>> executors;
   for (const int threads : thread_counts(options.threads)) executors.push_back(std::make_unique<PoolExecutor>(threads));
@@ -243,7 +248,7 @@ std::vector<ScalingRow> rows_over_size(const RawFrame& small, const BenchOptions
       left_out += fmt::format("; {:g} MP left out, for want of memory", megapixels);
       continue;
     }
-    const int of_size = megapixels < few_rounds_from_mp ? rounds : few_rounds;
+    const int of_size = megapixels < rounds.few_from_mp ? rounds.usual : rounds.few;
     for (ScalingRow& row : rows_of(frame_of(small, megapixels), executors, of_size)) {
       most_bytes_per_pixel = std::fmax(most_bytes_per_pixel, row.peak_bytes_per_pixel);
       out.push_back(std::move(row));
@@ -261,7 +266,7 @@ Result<BenchOutcome> run_scaling_bench(const BenchOptions& options) {
   if (!picture) return tl::make_unexpected(picture.error());
   const auto raws = simulated_raws(picture->front(), develop_lights(true).front(), 1, executor);
   if (!raws) return tl::make_unexpected(raws.error());
-  const int rounds = options.quick ? 2 : 5;
+  const Rounds rounds = options.quick ? quick_rounds : full_rounds;
   std::string left_out;
   std::vector<ScalingRow> rows = rows_over_size(raws->noisy, options, rounds, left_out);
   const RawFrame of_file = frame_of(raws->noisy, options.quick ? sizes_mp[0] : file_mp);
@@ -272,8 +277,8 @@ Result<BenchOutcome> run_scaling_bench(const BenchOptions& options) {
   out.plots = {plot_over_size(rows, "scaling-time", "time [ms/MP]", &ScalingRow::ms_per_mp),
                plot_over_size(rows, "scaling-memory", "peak memory [bytes/pixel]", &ScalingRow::peak_bytes_per_pixel)};
   out.remarks.push_back(
-      timing_remark({.rounds = rounds, .wall_clock = true}, options.threads) +
-      fmt::format("; from {:g} MP on {}; threads as in their column{}", few_rounds_from_mp, few_rounds, left_out));
+      timing_remark({.rounds = rounds.usual, .wall_clock = true}, options.threads) +
+      fmt::format("; from {:g} MP on {}; threads as in their column{}", rounds.few_from_mp, rounds.few, left_out));
   out.remarks.emplace_back(
       "frames are one of 20 e- repeated, planned and developed anew each time; peak memory is what a child process "
       "with "
