@@ -16,6 +16,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr int most_repeats = 1000000;
+constexpr double most_copied_mp = 16;  // 64 MB: beyond any cache
 
 double now_s(bool wall_clock) {
   timespec now{};
@@ -89,7 +90,7 @@ std::vector<AccuracyRow> measure(const AccuracyGroup& group, const AccuracyTimin
   std::vector<std::vector<double>> s_per_mp(count), ratio(count);
   double most_mp = 0;
   for (const AccuracyLevel& level : group.levels) most_mp = std::max(most_mp, level.megapixels);
-  const std::vector<float> from(static_cast<std::size_t>(most_mp * 1e6) + 1, 1.0f);
+  const std::vector<float> from(static_cast<std::size_t>(std::min(most_mp, most_copied_mp) * 1e6) + 1, 1.0f);
   std::vector<float> to(from.size());
   const auto copy = [&] { std::memcpy(to.data(), from.data(), from.size() * sizeof(float)); };
   for (int round = -1; round < timing.rounds; ++round) {
@@ -111,7 +112,8 @@ std::vector<AccuracyRow> measure(const AccuracyGroup& group, const AccuracyTimin
                     .error = group.levels[i].error,
                     .ms_per_mp = 1e3 * median_s,
                     .spread = (quantile(s_per_mp[i], 0.75) - quantile(s_per_mp[i], 0.25)) / (2 * median_s),
-                    .times_memcpy = quantile(ratio[i], 0.5)});
+                    .times_memcpy = quantile(ratio[i], 0.5),
+                    .largest = group.levels[i].largest});
   }
   mark_undominated(rows);
   return rows;
@@ -128,11 +130,13 @@ void mark_undominated(std::span<AccuracyRow> rows) {
 }
 
 BenchTable accuracy_table(std::span<const AccuracyRow> rows) {
-  BenchTable table{{"case", "level", "error", "error of", "time [ms/MP]", "spread [%]", "x memcpy", "undominated"}, {}};
+  BenchTable table{
+      {"case", "level", "error", "error of", "time [ms/MP]", "spread [%]", "x memcpy", "undominated", "largest error"},
+      {}};
   table.rows.reserve(rows.size());
   for (const AccuracyRow& row : rows) {
     table.rows.push_back({row.group, row.level, row.error, row.error_of, row.ms_per_mp, 100 * row.spread,
-                          row.times_memcpy, std::string(row.undominated ? "yes" : "no")});
+                          row.times_memcpy, std::string(row.undominated ? "yes" : "no"), row.largest});
   }
   return table;
 }
@@ -145,6 +149,12 @@ std::vector<Plot> accuracy_plots(const std::string& stage, std::span<const Accur
     first += group.size();
   }
   return plots;
+}
+
+BenchOutcome accuracy_outcome(const std::string& stage, std::span<const AccuracyRow> rows, const AccuracyTiming& timing,
+                              int threads) {
+  return {
+      .table = accuracy_table(rows), .plots = accuracy_plots(stage, rows), .remarks = {timing_remark(timing, threads)}};
 }
 
 std::string timing_remark(const AccuracyTiming& timing, int threads) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -16,6 +17,7 @@ struct AccuracyLevel {
   double error = 0;           // against the group's reference or truth; 0 is that itself
   std::function<void()> run;  // one round of the work, on the calling thread unless it has an executor of its own
   double megapixels = 0;      // or millions of samples, of one round; > 0
+  double largest = std::numeric_limits<double>::quiet_NaN();  // where `error` is a mean: the largest; else not a number
 };
 
 /// Ways of doing the same work on the same input: they compete.
@@ -33,8 +35,9 @@ struct AccuracyRow {
   double error = 0;
   double ms_per_mp = 0;      // median of the rounds
   double spread = 0;         // half the distance of the quartiles, over the median
-  double times_memcpy = 0;   // of the time that copying 4 bytes for each pixel takes in the same round
+  double times_memcpy = 0;   // of the time that copying 4 bytes for each pixel takes in the same round, 16 MP at most
   bool undominated = false;  // no other level of the group is faster and as good, or better and as fast
+  double largest = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// How levels are timed.
@@ -56,6 +59,10 @@ BenchTable accuracy_table(std::span<const AccuracyRow> rows);
 /// Error against time, one plot for each group: levels as points, the undominated joined by a line and named.
 /// @param stage  begins the plots' ids
 std::vector<Plot> accuracy_plots(const std::string& stage, std::span<const AccuracyRow> rows);
+
+/// Rows as an outcome: table, plots, and how the times were taken.
+BenchOutcome accuracy_outcome(const std::string& stage, std::span<const AccuracyRow> rows, const AccuracyTiming& timing,
+                              int threads);
 
 /// How the times were taken: rounds, clock, threads, the kernels' vector instructions. One line.
 std::string timing_remark(const AccuracyTiming& timing, int threads);

@@ -108,6 +108,11 @@ std::span<const std::string_view> files_of(PictureSet set) {
   return set == PictureSet::held_out ? all.subspan(tuning_files) : all;
 }
 
+std::span<const std::string_view> quick_files_of(PictureSet set) {
+  const std::span<const std::string_view> all = files_of(set);
+  return all.subspan(all.size() - 3, 2);
+}
+
 Plane<float> lens_blurred(const PlaneView<const float>& plane, double sigma_px) {
   assert(sigma_px >= 0 && sigma_px <= 100);
   const int reach = static_cast<int>(std::ceil(5 * sigma_px));
@@ -152,6 +157,29 @@ Result<BenchPicture> read_bench_picture(const std::string& path, int crop_width,
   BenchPicture out{std::filesystem::path(path).filename().string(), SceneLinear(width, height)};
   for (std::size_t c = 0; c < 3; ++c) {
     out.linear.plane[c] = lens_blurred(middle_of(display.plane[c].view(), width, height).view(), bench_lens_px);
+  }
+  return out;
+}
+
+Result<std::vector<BenchPicture>> read_bench_pictures(const std::string& folder,
+                                                      std::span<const std::string_view> names, const PicturePart& part,
+                                                      Executor& executor) {
+  std::vector<BenchPicture> out;
+  out.reserve(names.size());
+  for (const std::string_view name : names) {
+    auto picture =
+        read_bench_picture((std::filesystem::path(folder) / name).string(), part.width, part.height, executor);
+    if (!picture) return tl::make_unexpected(picture.error());
+    out.push_back(*std::move(picture));
+  }
+  return out;
+}
+
+PicturePart largest_of(std::span<const BenchPicture> pictures) {
+  PicturePart out;
+  for (const BenchPicture& picture : pictures) {
+    out.width = std::max(out.width, picture.linear.width());
+    out.height = std::max(out.height, picture.linear.height());
   }
   return out;
 }

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "isp/bench/denoise_bench.h"
+#include "isp/bench/developing_stages.h"
 #include "isp/bench/simulation_stages.h"
 
 namespace lowlux::isp {
@@ -19,6 +20,12 @@ constexpr std::array registry{
     BenchStage{"black-point", "Black by the number of dark pixels", run_black_point_bench},
     BenchStage{"noise-fit", "System gain and noise, of flats and of pictures", run_noise_fit_bench},
     BenchStage{"simulate", "Whole simulated files: photon sampling and effects", run_simulate_bench},
+    BenchStage{"chroma-start", "Where the denoiser's chroma starts: error against time", run_chroma_start_bench},
+    BenchStage{"demosaic", "Demosaicing: error against time", run_demosaic_bench},
+    BenchStage{"mesopic", "Mesopic vision, exact and by tables: error against time", run_mesopic_bench},
+    BenchStage{"retarget", "Retargeting to a dim display, exact and by tables: error against time", run_retarget_bench},
+    BenchStage{"develop", "Whole plans of develop: error against time", run_develop_bench},
+    BenchStage{"scaling", "Developing over frame size and threads: time and memory", run_scaling_bench},
 };
 
 std::string text_of(const BenchCell& cell, int digits) {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <filesystem>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -18,14 +16,10 @@ namespace {
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr int rounds = 5;
 /// The middle of a picture, where a part is enough: to tune others, and to be quick.
-struct Part {
-  int width;
-  int height;
-};
-constexpr Part tuning_part{256, 160}, quick_part{192, 128};
+constexpr PicturePart tuning_part{256, 160}, quick_part{192, 128};
 constexpr int crop_px = 192;                        // side of a picture's part in the report
 constexpr const char* compared_level = "standard";  // with none
-constexpr double search_share = 0.6;                // of the whole's time
+constexpr double search_share = 0.2;                // of the whole's time
 
 /// What is measured: pictures in lights.
 struct Work {
@@ -37,35 +31,6 @@ struct Work {
 
   std::size_t shots() const { return pictures.size() * lights.size(); }
 };
-
-// Of the picture's place among all, so that a picture is taken the same way in any set.
-std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light) {
-  const auto all = files_of(PictureSet::all);
-  const auto place = static_cast<std::uint64_t>(std::find(all.begin(), all.end(), picture.name) - all.begin());
-  return 1000 * place + static_cast<std::uint64_t>(light.mean_e) + (light.dark_e > 2 ? 100000 : 0);
-}
-
-/// Which pictures are read, and how much of each.
-struct Selection {
-  PictureSet set;
-  Part part;
-  bool only_two = false;
-};
-
-Result<std::vector<BenchPicture>> read_all(const BenchOptions& options, const Selection& selection,
-                                           Executor& executor) {
-  std::vector<BenchPicture> out;
-  auto files = files_of(selection.set);
-  if (selection.only_two) files = files.subspan(files.size() - 3, 2);
-  out.reserve(files.size());
-  for (const std::string_view file : files) {
-    const std::string path = (std::filesystem::path(options.pictures_folder) / file).string();
-    auto picture = read_bench_picture(path, selection.part.width, selection.part.height, executor);
-    if (!picture) return tl::make_unexpected(picture.error());
-    out.push_back(*std::move(picture));
-  }
-  return out;
-}
 
 StrengthSearch searched(const Work& work, std::size_t picture, std::size_t light) {
   InlineExecutor one;
@@ -216,7 +181,11 @@ std::vector<std::string> remarks_of(const Work& work) {
         "{}: on the tuning set, chromatic has radii {} (chroma) and {} (luminance), gat gains {:.2f}, {:.2f}, {:.2f}",
         name_of(work.lights[i]), tuned.windows.chroma_radius, tuned.windows.luminance_radius, tuned.stabilised_gain[0],
         tuned.stabilised_gain[1], tuned.stabilised_gain[2]);
-    if (!work.strengths.empty()) line += "; opencv-nlm's strengths (lightness, colour), found on the truth:";
+    if (!work.strengths.empty()) {
+      line += fmt::format(
+          "; opencv-nlm's strengths (lightness, colour), found on the truth (of large pictures on {} x {} of it):",
+          search_columns, search_rows);
+    }
     for (std::size_t p = 0; p < work.pictures.size() && !work.strengths.empty(); ++p) {
       const NlMeansStrength& best = work.strengths[p * work.lights.size() + i].best;
       line +=
@@ -229,12 +198,8 @@ std::vector<std::string> remarks_of(const Work& work) {
 }
 
 Result<std::vector<DenoiseRow>> measure_all(const Work& work, Executor& executor, BenchOutcome& outcome) {
-  int width = 0, height = 0;
-  for (const BenchPicture& picture : work.pictures) {
-    width = std::max(width, picture.linear.width());
-    height = std::max(height, picture.linear.height());
-  }
-  MethodMemory memory(width, height, executor);
+  const PicturePart largest = largest_of(work.pictures);
+  MethodMemory memory(largest.width, largest.height, executor);
   const std::vector<DenoiseMethod> methods = denoise_methods(work.options.nl_means != nullptr);
   std::vector<DenoiseRow> rows;
   for (std::size_t light = 0; light < work.lights.size(); ++light) {
@@ -260,9 +225,12 @@ Result<std::vector<DenoiseRow>> measure_all(const Work& work, Executor& executor
 Result<BenchOutcome> run_denoise_bench(const BenchOptions& options) {
   PoolExecutor executor(options.threads);
   const bool quick = options.quick;
-  auto pictures = read_all(options, {options.pictures, quick ? quick_part : Part{0, 0}, quick}, executor);
+  auto pictures = read_bench_pictures(options.pictures_folder,
+                                      quick ? quick_files_of(options.pictures) : files_of(options.pictures),
+                                      quick ? quick_part : PicturePart{}, executor);
   if (!pictures) return tl::make_unexpected(pictures.error());
-  const auto tuning = read_all(options, {PictureSet::tuning, quick ? quick_part : tuning_part}, executor);
+  const auto tuning = read_bench_pictures(options.pictures_folder, files_of(PictureSet::tuning),
+                                          quick ? quick_part : tuning_part, executor);
   if (!tuning) return tl::make_unexpected(tuning.error());
   Work work{options, *std::move(pictures), denoise_lights(options.quick), {}, {}};
   work.tuned.reserve(work.lights.size());

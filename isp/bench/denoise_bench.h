@@ -22,7 +22,7 @@ struct DenoiseRow {
       false;  // no other row of this light is better in one of (time, CIEDE2000) and not worse in the other
 };
 
-/// The lights: 2000 to 1 e- over 2 e- and over 200 e- of dark; quick: two of them.
+/// The lights: 2000 to 1 e- over 2 e- of dark, 20 to 1 e- over 200 e-; quick: two of them.
 std::vector<DenoiseLight> denoise_lights(bool quick);
 
 /// Sets `undominated` of all rows; those of kind ceiling compete with none.

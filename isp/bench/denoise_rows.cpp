@@ -61,11 +61,12 @@ Plot plot_of(std::span<const DenoiseRow> rows) {
 
 std::vector<DenoiseLight> denoise_lights(bool quick) {
   constexpr double small_dark_e = 2, small_read_e = 1.5, large_dark_e = 200, large_read_e = 4;
+  constexpr double most_over_large_dark_e = 20;  // with more light, that dark makes no other picture than little dark
   if (quick) return {{20, small_dark_e, small_read_e}, {4, large_dark_e, large_read_e}};
   std::vector<DenoiseLight> out;
   for (const double mean_e : {2000, 200, 20, 4, 1}) {
     out.push_back({mean_e, small_dark_e, small_read_e});
-    out.push_back({mean_e, large_dark_e, large_read_e});
+    if (mean_e <= most_over_large_dark_e) out.push_back({mean_e, large_dark_e, large_read_e});
   }
   return out;
 }

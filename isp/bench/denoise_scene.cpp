@@ -1,5 +1,6 @@
 #include "isp/bench/denoise_scene.h"
 
+#include <algorithm>
 #include <cassert>
 #include <limits>
 #include <span>
@@ -42,6 +43,12 @@ denoise::RawNoise DenoiseShot::noise() const {
           .variance_e2 = {read_e2, read_e2, read_e2}};
 }
 
+std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light) {
+  const auto all = files_of(PictureSet::all);
+  const auto place = static_cast<std::uint64_t>(std::find(all.begin(), all.end(), picture.name) - all.begin());
+  return 1000 * place + static_cast<std::uint64_t>(light.mean_e) + (light.dark_e > 2 ? 100000 : 0);
+}
+
 DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::uint64_t seed) {
   const int width = picture.linear.width(), height = picture.linear.height();
   DenoiseShot shot{.light = light, .signal_e = Plane<float>(width, height), .raw_e = Plane<float>(width, height)};
@@ -69,17 +76,22 @@ DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::ui
   return shot;
 }
 
+SignedMosaic mosaic_of(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, double exposure) {
+  SignedMosaic out{.value = mosaic_e, .phase = phase};
+  for (int y = 0; y < 2; ++y) {
+    for (int x = 0; x < 2; ++x) {
+      out.gain[static_cast<std::size_t>(site_of(x, y))] = static_cast<float>(gain_at(x, y) * exposure / shot.white_e);
+    }
+  }
+  return out;
+}
+
 BenchRenderer::BenchRenderer(int max_width, Executor& executor)
     : executor_(executor), kernel_(max_width, executor.width()) {}
 
 RenderedPicture BenchRenderer::render(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot,
                                       double exposure) {
-  SignedMosaic in{.value = mosaic_e, .phase = phase};
-  for (int y = 0; y < 2; ++y) {
-    for (int x = 0; x < 2; ++x) {
-      in.gain[static_cast<std::size_t>(site_of(x, y))] = static_cast<float>(gain_at(x, y) * exposure / shot.white_e);
-    }
-  }
+  const SignedMosaic in = mosaic_of(mosaic_e, shot, exposure);
   RenderedPicture out{SceneLinear(mosaic_e.width, mosaic_e.height), SceneLinear(mosaic_e.width, mosaic_e.height)};
   kernel_.linear(in, transform(true), out.display.view(), executor_);
   kernel_.linear(in, transform(false), out.light.view(), executor_);

@@ -37,10 +37,18 @@ struct DenoiseShot {
   denoise::RawNoise noise() const;
 };
 
+/// A seed for each picture in each light. Of the picture's place among all, so that it is taken the same way whatever
+/// set it is read with.
+std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light);
+
 /// Takes it. A site (x, y) of colour c receives linear_c * white_e / gain_c, with white_e such that the mean over the
 /// mosaic is light.mean_e. Equal input, equal shot.
 /// @param picture  not black; at most poisson_max_mean electrons anywhere
 DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::uint64_t seed);
+
+/// A mosaic [e-] as the renderer takes it: gains that bring white_e to 1 and make white neutral.
+/// @param exposure  1 brings white_e to display white
+SignedMosaic mosaic_of(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, double exposure = 1);
 
 /// Mosaics to pictures, for all methods alike: gains, Malvar-He-Cutler demosaicing, exposure that undoes the light.
 class BenchRenderer {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "isp/render/output_space.h"
@@ -13,8 +14,7 @@ namespace {
 
 constexpr int last_step = 27;  // strength 2^(i / 3 - 1), up to 256
 constexpr int octave = 3;
-constexpr int part_columns = 256, part_rows = 192;  // of the middle, where a part is enough
-using Steps = std::array<int, 2>;                   // of lightness, of colour
+using Steps = std::array<int, 2>;  // of lightness, of colour
 using Bytes = std::vector<std::uint8_t>;
 
 double strength_at(int step) { return std::exp2(step / 3.0 - 1); }
@@ -122,12 +122,22 @@ StrengthSearch found(Search& search, const Steps& at) {
   return {{strength_at(at[0]), strength_at(at[1])}, -10 * std::log10(error), search.runs()};
 }
 
-/// The middle of the picture.
-Encoded8 part_of(const Encoded8& codes, int columns, int rows) {
-  Encoded8 out{Plane<std::uint8_t>(3 * columns, rows)};
-  const auto part =
-      codes.codes.view().crop(3 * ((codes.width() - columns) / 2), (codes.height() - rows) / 2, 3 * columns, rows);
-  for (int y = 0; y < rows; ++y) std::copy_n(part.row(y), 3 * columns, out.codes.row(y));
+constexpr int tiles_across = 4, tiles_down = 3;
+constexpr int tile_columns = search_columns / tiles_across, tile_rows = search_rows / tiles_down;
+
+/// Tiles of a plane of `samples` for each pixel, from corner to corner of the picture, beside each other.
+template <class T>
+Plane<T> spread_tiles(const Plane<T>& plane, int samples) {
+  Plane<T> out(samples * search_columns, search_rows);
+  const int columns = plane.width() / samples - tile_columns, rows = plane.height() - tile_rows;
+  for (int tile = 0; tile < tiles_across * tiles_down; ++tile) {
+    const int across = tile % tiles_across, down = tile / tiles_across;
+    const int x = columns * across / (tiles_across - 1), y = rows * down / (tiles_down - 1);
+    for (int row = 0; row < tile_rows; ++row) {
+      std::copy_n(plane.row(y + row) + samples * x, samples * tile_columns,
+                  out.row(tile_rows * down + row) + samples * tile_columns * across);
+    }
+  }
   return out;
 }
 
@@ -166,18 +176,15 @@ SceneLinear linear_of(const Encoded8& codes) {
 }
 
 StrengthSearch search_strength(const NlMeans& filter, const Encoded8& noisy, const PictureTruth& truth) {
-  const int columns = std::min(noisy.width(), part_columns), rows = std::min(noisy.height(), part_rows);
-  const RgbView<const float> whole = truth.encoded().view();
-  RgbView<const float> middle = whole;
-  for (auto& plane : middle) {
-    plane = plane.crop((plane.width - columns) / 2, (plane.height - rows) / 2, columns, rows);
-  }
-  Search in_part(filter, part_of(noisy, columns, rows), middle);
-  if (!in_part.works()) return {};
-  const Steps start = climbed(in_part, climbed(in_part, best_octaves(in_part), octave), 1);
-  if (columns == noisy.width() && rows == noisy.height()) return found(in_part, start);
-  Search in_whole(filter, noisy, whole);
-  return in_part.works() && in_whole.works() ? found(in_whole, climbed(in_whole, start, 1)) : StrengthSearch{};
+  const auto search_in = [&filter](const Encoded8& codes, const RgbView<const float>& expected) {
+    Search search(filter, codes, expected);
+    if (!search.works()) return StrengthSearch{};
+    return found(search, climbed(search, climbed(search, best_octaves(search), octave), 1));
+  };
+  if (noisy.width() < search_columns || noisy.height() < search_rows) return search_in(noisy, truth.encoded().view());
+  SceneLinear expected;
+  for (std::size_t c = 0; c < 3; ++c) expected.plane[c] = spread_tiles(truth.encoded().plane[c], 1);
+  return search_in({spread_tiles(noisy.codes, 3)}, std::as_const(expected).view());
 }
 
 }  // namespace lowlux::isp

@@ -52,13 +52,17 @@ SceneLinear linear_of(const Encoded8& codes);
 /// What a search costs and finds.
 struct StrengthSearch {
   NlMeansStrength best;
-  double psnr_db = 0;  // with them
-  int runs = 0;        // of the filter at the last, on either plane; 0: it failed
+  double psnr_db = 0;  // with them, of what was looked at
+  int runs = 0;        // of the filter, on either plane; 0: it failed
 };
 
+/// Of a larger picture, parts that are spread evenly over it and put together are looked at: so many pixels. Whole ones
+/// took more than half of the time of `bench`.
+inline constexpr int search_columns = 512, search_rows = 288;
+
 /// The two strengths whose result is closest to the truth in PSNR, found on the truth itself, as nobody could who has
-/// only the noisy picture: of powers of 2^(1/3) from 1/2 to 256 first the best of all pairs of every second octave in
-/// the middle of the picture, then uphill by octaves and by single steps there, and from there in the whole picture.
+/// only the noisy picture: of powers of 2^(1/3) from 1/2 to 256 first the best of all pairs of every second octave,
+/// then uphill by octaves and by single steps, all on parts of the picture.
 StrengthSearch search_strength(const NlMeans& filter, const Encoded8& noisy, const PictureTruth& truth);
 
 }  // namespace lowlux::isp

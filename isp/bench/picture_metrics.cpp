@@ -196,6 +196,39 @@ double encoded_psnr_db(const RgbView<const float>& display, const PictureTruth& 
   return codes_psnr_db(encoded_of(display, executor), truth.encoded(), executor);
 }
 
+ColourDifference display_difference(const RgbView<const float>& display, const PictureTruth& truth,
+                                    Executor& executor) {
+  assert(display[0].width == truth.width() && display[0].height == truth.height());
+  std::vector<ColourDifference> rows(static_cast<std::size_t>(truth.height()));
+  for_each_band(executor, truth.height(), [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      ColourDifference& row = rows[static_cast<std::size_t>(y)];
+      for (int x = 0; x < truth.width(); ++x) {
+        const double difference = ciede2000(lab_in(truth.lab(), x, y), lab_at(display, x, y));
+        row.mean += difference;
+        row.largest = std::max(row.largest, difference);
+      }
+    }
+  });
+  ColourDifference out;
+  for (const ColourDifference& row : rows) {
+    out.mean += row.mean / (1.0 * truth.width() * truth.height());
+    out.largest = std::max(out.largest, row.largest);
+  }
+  return out;
+}
+
+ColourDifference difference_of(std::span<const Lab> got, std::span<const Lab> expected) {
+  assert(got.size() == expected.size() && !got.empty());
+  ColourDifference out;
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    const double difference = ciede2000(expected[i], got[i]);
+    out.mean += difference / static_cast<double>(got.size());
+    out.largest = std::max(out.largest, difference);
+  }
+  return out;
+}
+
 PictureError picture_error(const RenderedPicture& picture, const PictureTruth& truth, Executor& executor) {
   assert(picture.display.width() == truth.width() && picture.display.height() == truth.height());
   const SceneLinear lab = lab_picture(picture.display.view(), executor);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "isp/base/executor.h"
@@ -51,6 +52,18 @@ struct PictureError {
 
 /// All of them. `picture` is as large as the truth; display values that are not in 0..1 count as the nearest.
 PictureError picture_error(const RenderedPicture& picture, const PictureTruth& truth, Executor& executor);
+
+/// CIEDE2000 over pixels or colours.
+struct ColourDifference {
+  double mean = 0;
+  double largest = 0;
+};
+
+/// That of a picture alone; display values as in picture_error.
+ColourDifference display_difference(const RgbView<const float>& display, const PictureTruth& truth, Executor& executor);
+
+/// Of as many colours as there are expected ones, at least one.
+ColourDifference difference_of(std::span<const Lab> got, std::span<const Lab> expected);
 
 /// Mean X, Y, Z of each whole patch, row by row; the rest at the right and at the bottom is left out.
 std::vector<Xyz> patch_means(const RgbView<const float>& linear);

@@ -121,8 +121,8 @@ TEST(DenoiseRows, TableAndPlotsHoldWhatWasMeasured) {
   EXPECT_EQ(plots[0].series.back().y, (std::vector<double>{10, 4}));
 }
 
-TEST(DenoiseRows, LightsAreTenAndQuickOnesTwoOfThem) {
-  EXPECT_EQ(denoise_lights(false).size(), 10u);
+TEST(DenoiseRows, LightsAreEightAndQuickOnesTwoOfThem) {
+  EXPECT_EQ(denoise_lights(false).size(), 8u);
   const auto quick = denoise_lights(true);
   ASSERT_EQ(quick.size(), 2u);
   EXPECT_EQ(name_of(quick[0]), "20/2");

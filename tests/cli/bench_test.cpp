@@ -36,6 +36,9 @@ TEST(Bench, ListNamesTheStagesAndMeasuresNone) {
   EXPECT_EQ(list.exit_code, 0);
   EXPECT_TRUE(list.out.starts_with("denoise "));
   EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), std::ssize(isp::bench_stages()));
+  for (const char* stage : {"chroma-start", "demosaic", "mesopic", "retarget", "develop", "scaling"}) {
+    EXPECT_NE(list.out.find(std::string("\n") + stage + " "), std::string::npos) << stage;
+  }
 }
 
 TEST(Bench, HelpNamesTheOptions) {
@@ -104,7 +107,7 @@ TEST(Bench, WithoutPicturesItSaysWhereTheyAre) {
   EXPECT_EQ(missing.exit_code, 1);
   EXPECT_NE(missing.err.find("--pictures-folder"), std::string::npos) << missing.err;
   EXPECT_EQ(std::count(missing.err.begin(), missing.err.end(), '\n'), 1);
-  const auto empty = bench({"--quick", "--pictures-folder", scratch.path()});
+  const auto empty = bench({"--stage", "denoise", "--quick", "--pictures-folder", scratch.path()});
   EXPECT_EQ(empty.exit_code, 1);
   EXPECT_NE(empty.err.find(".png"), std::string::npos) << empty.err;
 }

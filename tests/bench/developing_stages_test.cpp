@@ -1,0 +1,254 @@
+#include "isp/bench/developing_stages.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/bench/accuracy_time.h"
+#include "isp/bench/develop_scene.h"
+#include "isp/bench/developing_memory.h"
+
+namespace lowlux::isp {
+namespace {
+
+BenchOptions quick() {
+  return {.pictures_folder = LOWLUX_TESTDATA "/pictures",
+          .quick = true,
+          .threads = 2,
+          .advance = [](double, const std::string&) {}};
+}
+
+/// Rows of an accuracy table by case and level.
+using Rows = std::map<std::pair<std::string, std::string>, std::map<std::string, double>>;
+
+Rows rows_of(const BenchTable& table) {
+  Rows out;
+  for (const auto& cells : table.rows) {
+    EXPECT_EQ(cells.size(), table.columns.size());
+    auto& row = out[{std::get<std::string>(cells[0]), std::get<std::string>(cells[1])}];
+    for (std::size_t c = 2; c < cells.size(); ++c) {
+      if (const double* figure = std::get_if<double>(&cells[c])) row[table.columns[c]] = *figure;
+    }
+    EXPECT_TRUE(std::isfinite(row["error"]) && row["error"] >= 0) << std::get<std::string>(cells[1]);
+    EXPECT_GT(row["time [ms/MP]"], 0) << std::get<std::string>(cells[1]);
+    EXPECT_GT(row["x memcpy"], 0);
+    EXPECT_GE(row["largest error"], row["error"]) << std::get<std::string>(cells[1]);
+  }
+  EXPECT_EQ(out.size(), table.rows.size()) << "two rows have one name";
+  return out;
+}
+
+double error_of(const Rows& rows, const std::string& group, const std::string& level) {
+  return rows.at({group, level}).at("error");
+}
+
+TEST(DevelopingStages, DemosaicingFallsBehindTheTruthAsItDoesLess) {
+  const auto outcome = run_demosaic_bench(quick());
+  ASSERT_TRUE(outcome.has_value());
+  const Rows rows = rows_of(outcome->table);
+  EXPECT_LT(error_of(rows, "no noise", "Malvar, kernel"), error_of(rows, "no noise", "bilinear, double"));
+  EXPECT_LT(error_of(rows, "no noise", "bilinear, double"), error_of(rows, "no noise", "half (2x2 means)"));
+  // CIEDE2000: float planes of values up to 1
+  EXPECT_NEAR(error_of(rows, "no noise", "Malvar, kernel"), error_of(rows, "no noise", "Malvar, double"), 1e-4);
+  EXPECT_GT(error_of(rows, "20 e-, noise left in", "Malvar, kernel"), error_of(rows, "no noise", "Malvar, kernel"));
+  EXPECT_EQ(error_of(rows, "rounding of the kernel", "Malvar, double"), 0);
+  EXPECT_GT(error_of(rows, "rounding of the kernel", "Malvar, kernel"), 0);
+  // Nine products of float, values up to 1 / the least gain: some 1e-7 each.
+  EXPECT_LT(rows.at({"rounding of the kernel", "Malvar, kernel"}).at("largest error"), 3);
+  EXPECT_EQ(outcome->plots.size(), 3u);
+}
+
+TEST(DevelopingStages, ChromaFromWhereTheSignalSaysIsAsGoodAsTheBetterStart) {
+  const auto outcome = run_chroma_start_bench(quick());
+  ASSERT_TRUE(outcome.has_value());
+  const Rows rows = rows_of(outcome->table);
+  for (const char* level : {"draft", "standard", "high"}) {
+    for (const char* light : {"20/2", "4/200"}) {
+      const auto error = [&](const char* start) { return error_of(rows, light, std::string(level) + ", " + start); };
+      // CIEDE2000: starts between levels are blended.
+      EXPECT_LE(error("auto"), std::min({error("0"), error("1"), error("2")}) + 0.02) << level << light;
+    }
+    EXPECT_GT(error_of(rows, "4/200", std::string(level) + ", 0"), error_of(rows, "4/200", std::string(level) + ", 2"));
+    EXPECT_LT(error_of(rows, "20/2", std::string(level) + ", 0"), error_of(rows, "20/2", std::string(level) + ", 2"));
+  }
+  EXPECT_TRUE(rows.contains({"20/2, best, on parts", "best, auto"}));
+  EXPECT_FALSE(rows.contains({"20/2, best, on parts", "best, 1"}));
+}
+
+TEST(DevelopingStages, TablesOfMesopicVisionAreNoBetterThanWhatTheyAreMadeOf) {
+  const auto outcome = run_mesopic_bench(quick());
+  ASSERT_TRUE(outcome.has_value());
+  const Rows rows = rows_of(outcome->table);
+  for (const auto& [name, row] : rows) {
+    if (name.second == "exact") {
+      EXPECT_EQ(row.at("largest error"), 0) << name.first;
+    } else {
+      EXPECT_GT(row.at("error"), 0) << name.first << name.second;
+    }
+  }
+  for (const char* white : {"100", "1", "0.01"}) {
+    const std::string group = std::string("state of the eye, white ") + white + " cd/m2";
+    EXPECT_LT(rows.at({group, "table"}).at("largest error"), 0.05) << white;  // CIEDE2000: not to be seen
+    EXPECT_GT(error_of(rows, group, "one for the frame"), 10 * error_of(rows, group, "table")) << white;
+  }
+}
+
+TEST(DevelopingStages, RetargetingTablesGainByTheirSize) {
+  const auto outcome = run_retarget_bench(quick());
+  ASSERT_TRUE(outcome.has_value());
+  const Rows rows = rows_of(outcome->table);
+  EXPECT_EQ(rows.size(), 9u);
+  for (const auto& [name, row] : rows) {
+    if (name.second != "exact") continue;
+    EXPECT_EQ(row.at("largest error"), 0) << name.first;
+    EXPECT_LT(error_of(rows, name.first, "table of 33"), error_of(rows, name.first, "table of 17")) << name.first;
+    EXPECT_GT(error_of(rows, name.first, "table of 33"), 0) << name.first;
+    EXPECT_GT(row.at("time [ms/MP]"), rows.at({name.first, "table of 33"}).at("time [ms/MP]")) << name.first;
+  }
+}
+
+TEST(DevelopingStages, PlansOfDevelopGainByWhatTheyDo) {
+  const auto outcome = run_develop_bench(quick());
+  ASSERT_TRUE(outcome.has_value()) << outcome.error().message;
+  const Rows rows = rows_of(outcome->table);
+  for (const char* group : {"20 e-, camera", "20 e-, eye"}) {
+    const auto error = [&](const char* plan) { return error_of(rows, group, plan); };
+    EXPECT_LT(error("best"), error("standard")) << group;
+    EXPECT_LT(error("standard"), error("draft")) << group;
+    EXPECT_LT(error("draft"), 0.5 * error("off")) << group;
+    EXPECT_LT(error("standard"), error("standard, no repairs")) << group;
+    EXPECT_LT(error("off, half"), error("off")) << group;
+    EXPECT_GT(rows.at({group, "best"}).at("one thread [ms/MP]"), 0);
+  }
+  ASSERT_EQ(outcome->images.size(), 4u);
+  std::vector<std::string> ids;
+  for (const BenchImage& image : outcome->images) {
+    ids.push_back(image.id);
+    EXPECT_EQ(image.codes.width(), outcome->images.front().codes.width());
+    EXPECT_EQ(image.codes.height(), outcome->images.front().codes.height());
+  }
+  EXPECT_EQ(ids, (std::vector<std::string>{"develop-plain", "develop-standard", "develop-camera", "develop-eye"}));
+  EXPECT_TRUE(outcome->findings.empty());  // parts of pictures are too small to tell of times
+}
+
+TEST(DevelopingStages, ScalingTellsTimeAndMemoryOfEachSizeAndPlan) {
+  BenchOptions options = quick();
+  options.threads = 1;  // the others take as long again
+  const auto outcome = run_scaling_bench(options);
+  ASSERT_TRUE(outcome.has_value()) << outcome.error().message;
+  const BenchTable& table = outcome->table;
+  const auto figure = [&](std::size_t row, std::size_t column) { return std::get<double>(table.rows[row][column]); };
+  constexpr std::size_t sizes_and_plans = 9, jobs = 2;
+  ASSERT_EQ(table.rows.size(), sizes_and_plans + jobs);
+  for (std::size_t row = 0; row < table.rows.size(); ++row) {
+    ASSERT_EQ(table.rows[row].size(), table.columns.size());
+    EXPECT_GT(figure(row, 1), 0.29);  // MP
+    EXPECT_GT(figure(row, 4), 0);     // ms/MP
+    const bool of_files = row >= sizes_and_plans;
+    EXPECT_EQ(std::isfinite(figure(row, 7)), !of_files) << row;
+    EXPECT_EQ(std::isfinite(figure(row, 8)), of_files) << row;
+    // 3 bytes of the picture at least; `standard` has two mosaics of float beside them
+    if (!of_files) {
+      EXPECT_GT(figure(row, 7), row % 3 == 2 ? 11 : 3) << row;
+    }
+  }
+  ASSERT_EQ(outcome->plots.size(), 2u);
+  for (const Plot& plot : outcome->plots) {
+    ASSERT_EQ(plot.series.size(), 3u);
+    for (const Series& series : plot.series) EXPECT_EQ(series.x.size(), 3u);
+  }
+}
+
+TEST(DevelopingStages, WithoutPicturesEachSaysWhichIsMissing) {
+  BenchOptions options = quick();
+  options.pictures_folder = "/nowhere";
+  for (const auto run : {run_chroma_start_bench, run_demosaic_bench, run_mesopic_bench, run_develop_bench,
+                         run_scaling_bench, run_retarget_bench}) {
+    const auto outcome = run(options);
+    ASSERT_FALSE(outcome.has_value());
+    EXPECT_NE((outcome.error().where + outcome.error().message).find("/nowhere"), std::string::npos);
+  }
+}
+
+TEST(DevelopScene, TheMeanIsThatOfTheNoisyFrameWithoutItsDark) {
+  InlineExecutor one;
+  const auto picture = read_bench_picture(LOWLUX_TESTDATA "/pictures/kodim23.png", 192, 128, one);
+  ASSERT_TRUE(picture.has_value());
+  const DevelopLight light = develop_lights(false).back();
+  const auto raws = simulated_raws(*picture, light, 1, one);
+  ASSERT_TRUE(raws.has_value());
+  const auto mean_e = [&](const RawFrame& frame) {
+    const Rect& area = frame.raw.active;
+    double sum = 0;
+    for (int y = 0; y < area.height; ++y) {
+      for (int x = 0; x < area.width; ++x) {
+        sum += frame.raw.dn.at(area.x + x, area.y + y) - frame.raw.black_tag->at(x, y);
+      }
+    }
+    const double range = frame.raw.white_dn[0] - frame.raw.black_tag->at(0, 0);
+    return sum / (area.width * area.height) / range * (15871 / light.gain_dn_per_e);
+  };
+  EXPECT_NEAR(mean_e(raws->mean), light.mean_e, 0.01);  // e-: codes of a 48th of one
+  // 5 standard errors: photons, read noise, DSNU, 128 rows, hot pixels of 320 e- at 2e-4 of the pixels
+  const double pixels = 192 * 128, rows_e = 0.2 * light.read_noise_e;
+  const double variance_e2 =
+      (light.mean_e + light.dark_e + 16 + 4 + 2e-4 * 2 * 320 * 320) / pixels + rows_e * rows_e / 128;
+  EXPECT_NEAR(mean_e(raws->noisy), light.mean_e + light.dark_e + 2e-4 * 320, 5 * std::sqrt(variance_e2));
+  EXPECT_EQ(raws->noisy.raw.masked.size(), 1u);
+  EXPECT_TRUE(raws->noisy.noise.has_value());
+}
+
+TEST(DevelopScene, TilesRepeatTheActiveArea) {
+  RawFrame frame;
+  frame.raw.dn = Plane<std::uint16_t>(6, 4);
+  for (int i = 0; i < 24; ++i) frame.raw.dn.data()[i] = static_cast<std::uint16_t>(i);
+  frame.raw.active = {2, 0, 4, 4};
+  const RawFrame tiles = tiled(frame, 10, 6);
+  EXPECT_EQ(tiles.raw.active, (Rect{0, 0, 10, 6}));
+  for (int y = 0; y < 6; ++y) {
+    for (int x = 0; x < 10; ++x) EXPECT_EQ(tiles.raw.dn.at(x, y), frame.raw.dn.at(2 + x % 4, y % 4));
+  }
+}
+
+TEST(PeakMemory, IsWhatTheWorkTouchesAndNotWhatWasFreedBefore) {
+  constexpr std::size_t bytes = 32 << 20;
+  { const std::vector<char> freed(2 * bytes, 1); }
+  const auto touch = [] {
+    std::vector<char> memory(bytes, 1);
+    return memory[bytes / 2] == 1;
+  };
+  const auto peak = peak_bytes_of(touch);
+  ASSERT_TRUE(peak.has_value());
+  EXPECT_GE(*peak, 0.98 * bytes);  // pages that were there already, of the allocator's own
+#if !defined(__SANITIZE_ADDRESS__)
+  EXPECT_LE(*peak, 1.25 * bytes);  // and what else a process touches
+#endif
+  EXPECT_FALSE(peak_bytes_of([] { return false; }).has_value());
+}
+
+TEST(AccuracyTime, OutcomeHoldsTableAndAPlotForEachCase) {
+  AccuracyRow fast{.group = "a", .error_of = "e", .level = "fast", .error = 2, .ms_per_mp = 1, .largest = 5};
+  AccuracyRow slow{.group = "a", .error_of = "e", .level = "slow", .error = 3, .ms_per_mp = 2};
+  std::vector<AccuracyRow> rows{fast, slow};
+  rows.push_back(slow);
+  rows.back().group = "b";
+  mark_undominated(rows);
+  const BenchOutcome out = accuracy_outcome("stage", rows, {.rounds = 3}, 1);
+  EXPECT_EQ(out.plots.size(), 2u);
+  const Table table = table_of(out.table, 4);
+  EXPECT_EQ(table.columns.back(), "largest error");
+  EXPECT_EQ(table.rows[0].back(), "5");
+  EXPECT_EQ(table.rows[1].back(), "");  // errors that are no means
+  EXPECT_EQ(table.rows[1][7], "no");
+  EXPECT_EQ(table.rows[2][7], "yes");
+  EXPECT_NE(out.remarks.front().find("3 rounds"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace lowlux::isp
