@@ -59,6 +59,10 @@ void set_identity(TIFF* tiff, const RawFrame& frame, const FrameInfo& info, cons
   TIFFSetField(tiff, TIFFTAG_DNGBACKWARDVERSION, backward.data());
   TIFFSetField(tiff, TIFFTAG_UNIQUECAMERAMODEL, unique_camera_model(info).c_str());
   set_tiff_info(tiff, info);
+  // Left blank, they are unknown (EXIF 2.32, 4.6.5.4); RawSpeed, and with it darktable, misses them if they are not
+  // there.
+  if (info.make.empty()) TIFFSetField(tiff, TIFFTAG_MAKE, "");
+  if (info.model.empty()) TIFFSetField(tiff, TIFFTAG_MODEL, "");
   const std::string description = printable_ascii(options.description, longest_description);
   if (!description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
 }

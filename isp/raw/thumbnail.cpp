@@ -115,7 +115,8 @@ PerSite<std::uint64_t> ThumbnailSums::sums() const {
 
 // Fraction of white of each colour, mean over the block.
 std::array<double, 3> ThumbnailSums::colour_means(const RawDn& raw, const BlackPoint& black,
-                                                  const PerSite<double>& per_dn, const Block& block) {
+                                                  const PerSite<double>& per_dn, const Block& block,
+                                                  const std::array<double, 3>& beside) {
   std::array<double, 3> sum{};
   std::array<int, 3> n{};
   for (int i = 0; i < 4; ++i) {
@@ -138,7 +139,7 @@ std::array<double, 3> ThumbnailSums::colour_means(const RawDn& raw, const BlackP
         break;
     }
   }
-  for (int c = 0; c < 3; ++c) sum[c] = n[c] > 0 ? sum[c] / n[c] : 0.0;
+  for (int c = 0; c < 3; ++c) sum[c] = n[c] > 0 ? sum[c] / n[c] : beside[c];
   return sum;
 }
 
@@ -161,7 +162,12 @@ void ThumbnailSums::make(const RawFrame& frame, const BlackPoint& black, Thumbna
   for (int y = 0; y < rows_; ++y) {
     for (int x = 0; x < columns_; ++x) {
       const Block& block = blocks_[static_cast<std::size_t>(y) * columns_ + x];
-      const std::array<double, 3> mean = colour_means(frame.raw, black, per_dn, block);
+      std::array<double, 3> beside{};
+      for (int c = 0; c < 3; ++c) {
+        const Plane<float>& plane = out.mean.plane[c];
+        if (x > 0 || y > 0) beside[c] = x > 0 ? plane.at(x - 1, y) : plane.at(x, y - 1);
+      }
+      const std::array<double, 3> mean = colour_means(frame.raw, black, per_dn, block, beside);
       for (int c = 0; c < 3; ++c) out.mean.plane[c].at(x, y) = static_cast<float>(mean[c]);
       if (block.difference > 0 && block.clipped == 0)
         differences_dn_.push_back(static_cast<double>(block.difference) / static_cast<double>(block.differences));

@@ -12,7 +12,8 @@ namespace lowlux::isp {
 
 /// A frame as means over square blocks, for the decisions that look at the whole picture.
 struct Thumbnail {
-  CameraRgb mean;              // block means, fraction of white, signed, not white balanced; at most 256 x 256
+  CameraRgb mean;  // block means, fraction of white, signed, not white balanced; at most 256 x 256. A colour
+                   // that a block at an odd edge has no pixel of is that of the block before
   double black_noise_std = 0;  // of one raw pixel without light, fraction of white; 0 if nothing tells
 };
 
@@ -49,7 +50,7 @@ class ThumbnailSums {
   void add_rgb(const std::uint16_t* dn, int width, Block& block) const;
   double black_noise(const RawFrame& frame, const BlackPoint& black);
   static std::array<double, 3> colour_means(const RawDn& raw, const BlackPoint& black, const PerSite<double>& per_dn,
-                                            const Block& block);
+                                            const Block& block, const std::array<double, 3>& beside);
 
   int block_ = 2;    // side in pixels, even
   int samples_ = 1;  // per pixel

@@ -64,7 +64,8 @@ struct RetargetedColour {
 /// sRGB code values, 0..1, of the picture to those of the display.
 using RetargetMap = std::function<RetargetedColour(const Vector3& code)>;
 
-/// Colours stay as they are where both luminances are the same and the display's black is 0; neutrals stay neutral.
+/// Colours stay as they are where both luminances are the same and the display's black is 0; neutrals stay neutral, but
+/// with `cao`, which adds the rods' own colour.
 /// Errors: invalid_argument for luminances that are not positive and finite, a black that is not below the display's
 /// white, coefficients the model cannot use.
 Result<RetargetMap> retargeting(const RetargetOptions& options);

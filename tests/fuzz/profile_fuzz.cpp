@@ -1,18 +1,12 @@
 // Camera profiles from arbitrary text: what is accepted can be written, and reading that gives the same text again.
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <string>
 
 #include "calib/profile_io.h"
+#include "tests/fuzz/input.h"
 
-namespace {
-
-void require(bool good) {
-  if (!good) std::abort();
-}
-
-}  // namespace
+using lowlux::test::require;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto profile = lowlux::calib::parse_profile({reinterpret_cast<const char*>(data), size});

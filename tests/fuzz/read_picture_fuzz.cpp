@@ -4,21 +4,19 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include "capture/file/picture_source.h"
 #include "isp/base/executor.h"
+#include "tests/fuzz/input.h"
 
 namespace {
 
-constexpr lowlux::isp::DecodeLimits limits{.max_pixels = 1 << 16};
+using lowlux::test::require;
 
-void require(bool good) {
-  if (!good) std::abort();
-}
+constexpr lowlux::isp::DecodeLimits limits{.max_pixels = 1 << 16};
 
 bool is_one_line(const std::string& text) { return !text.empty() && text.find('\n') == std::string::npos; }
 

@@ -4,20 +4,17 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <iterator>
 #include <string>
 #include <vector>
 
 #include "capture/file/spectra_file.h"
+#include "tests/fuzz/input.h"
 
 namespace {
 
+using lowlux::test::require;
 using Table = std::vector<lowlux::capture::SpectrumColumn>;
-
-void require(bool good) {
-  if (!good) std::abort();
-}
 
 void append(std::string& text, double value) {
   char digits[32];  // the shortest that reads back as the same number

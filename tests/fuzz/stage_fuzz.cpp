@@ -5,44 +5,30 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <vector>
 
 #include "isp/adapter/lowlux_stage.h"
 #include "isp/base/raw_format.h"
+#include "tests/fuzz/input.h"
 
 namespace {
 
+using lowlux::test::FuzzInput;
+
 constexpr int most_pixels = 64;  // each way
-
-struct Bytes {
-  const std::uint8_t* data;
-  std::size_t left;
-
-  template <class T>
-  T take() {
-    T out{};
-    const std::size_t n = std::min(left, sizeof out);
-    if (n > 0) std::memcpy(&out, data, n);
-    data += n;
-    left -= n;
-    return out;
-  }
-  int below(int n) { return take<std::uint8_t>() % n; }
-};
 
 void check(int code) {
   if (code > LOWLUX_STAGE_ADJUSTED || code <= LOWLUX_STAGE_INTERNAL) std::abort();
 }
 
-lowlux_stage_rect rect(Bytes& in) {
+lowlux_stage_rect rect(FuzzInput& in) {
   lowlux_stage_rect out{};
   if (in.below(2) == 0) return out;
   for (std::int32_t* const side : {&out.x, &out.y, &out.width, &out.height}) *side = in.take<std::int8_t>();
   return out;
 }
 
-lowlux_stage_input input(Bytes& in) {
+lowlux_stage_input input(FuzzInput& in) {
   lowlux_stage_input out{};
   out.size = sizeof out;
   const auto formats = lowlux::raw_formats();
@@ -59,7 +45,7 @@ lowlux_stage_input input(Bytes& in) {
   return out;
 }
 
-lowlux_stage_output output(Bytes& in) {
+lowlux_stage_output output(FuzzInput& in) {
   constexpr std::uint32_t pictures[] = {LOWLUX_STAGE_XBGR8888, LOWLUX_STAGE_XRGB8888, LOWLUX_STAGE_BGR888,
                                         LOWLUX_STAGE_RGB888,   LOWLUX_STAGE_NV12,     LOWLUX_STAGE_RGB48,
                                         LOWLUX_STAGE_BAYER16};
@@ -73,7 +59,7 @@ lowlux_stage_output output(Bytes& in) {
   return out;
 }
 
-void frame(lowlux_stage* stage, const lowlux_stage_input& in, const lowlux_stage_output& out, Bytes& bytes) {
+void frame(lowlux_stage* stage, const lowlux_stage_input& in, const lowlux_stage_output& out, FuzzInput& bytes) {
   auto params = bytes.take<lowlux_stage_params>();
   params.size = sizeof params;
   params.valid &= LOWLUX_STAGE_HAS_ALL;
@@ -99,7 +85,7 @@ void frame(lowlux_stage* stage, const lowlux_stage_input& in, const lowlux_stage
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  Bytes bytes{data, size};
+  FuzzInput bytes{data, size};
   lowlux_stage_settings settings{};
   settings.size = sizeof settings;
   settings.threads = 1 + bytes.below(2);

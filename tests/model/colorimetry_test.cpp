@@ -39,10 +39,20 @@ TEST(Chromaticity, RoundTripsThroughXyzAndUv) {
   }
 }
 
-TEST(Chromaticity, UvOfD65IsThePublishedOne) {
-  const UvPrime uv = *uv_prime_of(white_d65);
-  EXPECT_NEAR(uv.u, 0.1978, 5e-5);  // CIE 15:2018 table T.3, four digits
-  EXPECT_NEAR(uv.v, 0.4683, 5e-5);
+TEST(Chromaticity, UvOfTheIlluminantsIsThePublishedOne) {
+  struct Published {
+    Xy xy;
+    UvPrime uv;
+  };
+  constexpr Published illuminants[] = {// CIE 15:2018 table T.3, four digits of u'v': A, C, D50, D55, D65, D75
+                                       {{0.44758, 0.40745}, {0.2560, 0.5243}}, {{0.31006, 0.31616}, {0.2009, 0.4609}},
+                                       {{0.34567, 0.35851}, {0.2092, 0.4881}}, {{0.33243, 0.34744}, {0.2044, 0.4807}},
+                                       {{0.31272, 0.32903}, {0.1978, 0.4683}}, {{0.29903, 0.31488}, {0.1935, 0.4585}}};
+  for (const Published& light : illuminants) {
+    const UvPrime uv = *uv_prime_of(light.xy);
+    EXPECT_NEAR(uv.u, light.uv.u, 5.5e-5) << light.xy.x;  // half of their last digit, and what that of xy makes
+    EXPECT_NEAR(uv.v, light.uv.v, 5.5e-5) << light.xy.x;
+  }
 }
 
 TEST(RgbSpaces, MatricesAgreeWithTheStandardsRounding) {
@@ -117,6 +127,40 @@ TEST(Cielab, WhiteGreyAndPrimaryHaveTheirClosedFormValues) {
   EXPECT_NEAR(red.l, 53.24, 0.01);
   EXPECT_NEAR(red.a, 80.09, 0.02);
   EXPECT_NEAR(red.b, 67.20, 0.02);
+}
+
+struct ChartPatch {
+  Xy xy;
+  double y;
+  Lab lab;
+};
+
+// The ColorChecker under D50: xyY and CIELAB as D. Pascale, "RGB coordinates of the Macbeth ColorChecker" (BabelColor,
+// 2006) prints them, xyY to four digits.
+constexpr ChartPatch chart_patches[] = {
+    {{0.4316, 0.3777}, 0.1008, {37.986, 13.555, 14.059}},  {{0.4197, 0.3744}, 0.3495, {65.711, 18.130, 17.810}},
+    {{0.2760, 0.3016}, 0.1836, {49.927, -4.880, -21.925}}, {{0.3703, 0.4499}, 0.1325, {43.139, -13.095, 21.905}},
+    {{0.2999, 0.2856}, 0.2304, {55.112, 8.844, -25.399}},  {{0.2848, 0.3911}, 0.4178, {70.719, -33.397, -0.199}},
+    {{0.5295, 0.4055}, 0.3118, {62.661, 36.067, 57.096}},  {{0.2305, 0.2106}, 0.1126, {40.020, 10.410, -45.964}},
+    {{0.5012, 0.3273}, 0.1938, {51.124, 48.239, 16.248}},  {{0.3319, 0.2482}, 0.0637, {30.325, 22.976, -21.587}},
+    {{0.3984, 0.5008}, 0.4446, {72.532, -23.709, 57.255}}, {{0.4957, 0.4427}, 0.4357, {71.941, 19.363, 67.857}},
+    {{0.2018, 0.1692}, 0.0575, {28.778, 14.179, -50.297}}, {{0.3253, 0.5032}, 0.2318, {55.261, -38.342, 31.370}},
+    {{0.5686, 0.3303}, 0.1257, {42.101, 53.378, 28.190}},  {{0.4697, 0.4734}, 0.5981, {81.733, 4.039, 79.819}},
+    {{0.4159, 0.2688}, 0.2009, {51.935, 49.986, -14.574}}, {{0.2131, 0.3023}, 0.1930, {51.038, -28.631, -28.638}},
+    {{0.3469, 0.3608}, 0.9131, {96.539, -0.425, 1.186}},   {{0.3440, 0.3584}, 0.5894, {81.257, -0.638, -0.335}},
+    {{0.3432, 0.3581}, 0.3632, {66.766, -0.734, -0.504}},  {{0.3446, 0.3579}, 0.1915, {50.867, -0.153, -0.270}},
+    {{0.3401, 0.3548}, 0.0883, {35.656, -0.421, -1.231}},  {{0.3406, 0.3537}, 0.0311, {20.461, -0.079, -0.973}},
+};
+
+TEST(Cielab, OfTheColorCheckerIsThePublishedOne) {
+  const Xyz white = *xyz_of(white_d50);
+  for (const ChartPatch& patch : chart_patches) {
+    const Lab lab = lab_of(*xyz_of(patch.xy, patch.y), white);
+    // Half of the fourth digit of Y is 0.03 of L*, that of xy up to 0.1 of a* and b*.
+    EXPECT_NEAR(lab.l, patch.lab.l, 0.05) << patch.xy.x;
+    EXPECT_NEAR(lab.a, patch.lab.a, 0.1) << patch.xy.x;
+    EXPECT_NEAR(lab.b, patch.lab.b, 0.1) << patch.xy.x;
+  }
 }
 
 }  // namespace

@@ -49,6 +49,36 @@ TEST(ColourTemperature, OfLampsAndIlluminantsIsTheKnownOne) {
   }
 }
 
+// CIE 15:2018 tables T.8 (HP) and T.12 (LED): xy to four digits, CCT to 1 K.
+constexpr KnownLight cie_lamps[] = {
+    {{0.5330, 0.4150}, 1959, 0}, {{0.4778, 0.4158}, 2506, 0}, {{0.4302, 0.4075}, 3144, 0}, {{0.3812, 0.3797}, 4002, 0},
+    {{0.3776, 0.3713}, 4039, 0}, {{0.4560, 0.4078}, 2733, 0}, {{0.4357, 0.4012}, 2998, 0}, {{0.3756, 0.3723}, 4103, 0},
+    {{0.3422, 0.3502}, 5109, 0}, {{0.3118, 0.3236}, 6598, 0}, {{0.4474, 0.4066}, 2851, 0}, {{0.4557, 0.4211}, 2840, 0},
+    {{0.4548, 0.4044}, 2724, 0}, {{0.3781, 0.3775}, 4070, 0},
+};
+
+TEST(ColourTemperature, OfTheLampsOfCie15IsThePublishedOne) {
+  for (const KnownLight& lamp : cie_lamps) {
+    // K: half a unit of the fourth digit of x and y is 0.1 mired.
+    EXPECT_NEAR(colour_temperature_of(lamp.xy)->cct_k, lamp.cct_k, 0.5 + 0.15e-6 * lamp.cct_k * lamp.cct_k);
+  }
+}
+
+// ANSI C78.377-2008 table 1: the middles of the quadrangles white LEDs are sold by; Duv to three digits.
+constexpr KnownLight led_quadrangles[] = {
+    {{0.4578, 0.4101}, 2725, 0.000}, {{0.4338, 0.4030}, 3045, 0.000}, {{0.4073, 0.3917}, 3465, 0.000},
+    {{0.3818, 0.3797}, 3985, 0.001}, {{0.3611, 0.3658}, 4503, 0.001}, {{0.3447, 0.3553}, 5028, 0.002},
+    {{0.3287, 0.3417}, 5665, 0.002}, {{0.3123, 0.3282}, 6530, 0.003},
+};
+
+TEST(ColourTemperature, OfTheQuadranglesOfWhiteLedsIsThePublishedOne) {
+  for (const KnownLight& led : led_quadrangles) {
+    const ColourTemperature found = *colour_temperature_of(led.xy);
+    EXPECT_NEAR(found.cct_k, led.cct_k, 0.5 + 0.15e-6 * led.cct_k * led.cct_k);
+    EXPECT_NEAR(found.duv, led.duv, 5.5e-4);
+  }
+}
+
 TEST(PlanckianLocus, IsIlluminantAAt2855Point5K) {
   // CIE defines A as 2848 K with c2 = 1.435e-2, which is 2848 * 1.4388 / 1.435 with today's c2.
   const Xy a = *planckian_xy(2848 * 1.4388 / 1.435);

@@ -255,6 +255,21 @@ TEST(DngWriter, TextsAreCutDownToWhatTheFieldsHold) {
   EXPECT_EQ(said.out, "Maker 2\n" + endless.substr(0, 255) + "\n[2J" + endless.substr(0, 3997) + "\n");
 }
 
+TEST(DngWriter, AMakerThatIsNotKnownIsBlank) {
+  const ScratchDirectory scratch;
+  RawFrame frame = plain_frame(24, 24);
+  frame.raw.info.make = frame.raw.info.model = "";
+  ASSERT_TRUE(write_dng(frame, scratch.file("a.dng")));
+  TIFF* const tiff = TIFFOpen(scratch.file("a.dng").c_str(), "r");
+  ASSERT_NE(tiff, nullptr);
+  for (const std::uint32_t tag : {TIFFTAG_MAKE, TIFFTAG_MODEL}) {
+    const char* text = nullptr;
+    EXPECT_EQ(TIFFGetField(tiff, tag, &text), 1) << tag;
+    EXPECT_STREQ(text, "") << tag;
+  }
+  TIFFClose(tiff);
+}
+
 struct Fault {
   const char* tag;
   std::function<void(RawFrame&)> make;

@@ -177,6 +177,7 @@ TEST(LivePipeline, SetupsThatCannotBeAreRefused) {
   EXPECT_EQ(code_of([](LiveSetup& s) { s.active.height = 1; }), ErrorCode::invalid_argument);
   EXPECT_EQ(code_of([](LiveSetup& s) { s.masked = {{-1, 0, 2, 2}}; }), ErrorCode::invalid_argument);
   EXPECT_EQ(code_of([](LiveSetup& s) { s.white_dn = std::nan(""); }), ErrorCode::invalid_argument);
+  EXPECT_EQ(code_of([](LiveSetup& s) { s.white_dn = 1e-317; }), ErrorCode::invalid_argument);  // its square is 0
   EXPECT_EQ(code_of([](LiveSetup& s) { s.most = denoise::Level::best; }), ErrorCode::invalid_argument);
   EXPECT_EQ(code_of([](LiveSetup& s) { s.samples = SampleType::f32; }), ErrorCode::invalid_argument);
   EXPECT_EQ(code_of([](LiveSetup& s) { s.look.look = Look::model; }), ErrorCode::invalid_argument);

@@ -125,7 +125,7 @@ int FakeV4l2::exchange_control(void* argument, bool set) {
   Control& control = found->second;
   if (set) {
     if (one.value < control.minimum || one.value > control.maximum) return ERANGE;
-    if ((one.value - control.minimum) % control.step != 0) ++misuses;
+    if (control.step != 0 && (one.value - control.minimum) % control.step != 0) ++misuses;
     control.value = one.value;
     if (on_set_control) on_set_control(one.id);
   }
