@@ -167,13 +167,22 @@ Difference difference(const Picture& tiled, const Picture& whole, const DevelopP
 // between. What a level leaves of the noise of a pixel is 0.05 and more.
 constexpr double most_rms = 0.0008, most_anywhere = 0.012;
 
+/// A piece that took the lines of another place for its own would be seen.
+denoise::LineOffsets uneven_lines(denoise::Lines lines, int count) {
+  denoise::LineOffsets out{.lines = lines};
+  out.offset_e.reserve(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) out.offset_e.push_back(0.3 * std::sin(0.01 * i * i));
+  return out;
+}
+
 TEST(Tiles, WithNoiseReductionTheDifferenceIsFarBelowTheNoise) {
   constexpr std::pair<double, Level> cases[] = {
       {1, Level::standard}, {20, Level::standard}, {200, Level::standard}, {20, Level::draft}, {1, Level::high}};
   for (const auto& [mean_e, level] : cases) {
     RawFrame frame = test::night_frame({.phase = BayerPhase::grbg}, night_scene(mean_e), 1003, 741);
     frame.raw.default_crop = {5, 3, 990, 730};
-    const DevelopPlan plan = planned(frame, options_for({.mode = Mode::level, .level = level}));
+    DevelopPlan plan = planned(frame, options_for({.mode = Mode::level, .level = level}));
+    plan.noise_reduction.lines = {uneven_lines(denoise::Lines::rows, 741), uneven_lines(denoise::Lines::columns, 1003)};
     const Picture whole = rendered(frame, plan, never);
     const Difference found = difference(rendered(frame, plan, small_tiles), whole, plan, mean_e);
     EXPECT_LT(found.rms, most_rms) << mean_e << " e-, " << name_of(level);
