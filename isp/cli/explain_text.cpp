@@ -86,7 +86,7 @@ std::string explain_text(const isp::DevelopPlan& plan) {
   out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.exposure_ev, plan.exposure_rule));
   if (plan.look)
     add_look(out, *plan.look, look_name(plan), coefficients_of(plan.options.look),
-             plan.look->noise || plan.noise_reduction.level);
+             plan.look->noise || plan.noise_reduction.has_level());
   if (plan.options.display) {
     const isp::DisplayTarget& display = *plan.options.display;
     out.add("display", fmt::format("{:g} to {:g} cd/m2, coefficients {}, table off by {:.2f} CIEDE2000 in the mean",

@@ -107,7 +107,7 @@ Json look_json(const isp::DevelopPlan& plan) {
   if (!plan.look) return nullptr;
   const isp::LookPlan& look = *plan.look;
   const std::string& model = plan.options.look.model;
-  const bool noise_known = look.noise || plan.noise_reduction.level;
+  const bool noise_known = look.noise || plan.noise_reduction.has_level();
   const std::string name = look.kind == isp::Look::model ? model : look.kind == isp::Look::eye ? "eye" : "camera";
   Json json{{"name", name}, {"noise_limit_lightness", noise_known ? optional_json(look.noise_limit) : Json(nullptr)}};
   if (look.kind == isp::Look::camera) return json;

@@ -36,7 +36,7 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
   if (!written) return fail(written.error().code, written.error().message, job.output);
   std::visit([&](const auto& picture) { out.width = picture.width(), out.height = picture.height(); }, upright);
   out.plan = std::move(developed->plan);
-  if (ready->options.denoise.maps && !out.plan->noise_reduction.level) {
+  if (ready->options.denoise.maps && !out.plan->noise_reduction.has_level()) {
     out.plan->warnings.emplace_back("no maps were written: the noise is left as it is");
   }
   return write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);

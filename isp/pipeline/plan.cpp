@@ -135,7 +135,7 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   Result<NoiseReduction> noise = plan_noise(frame, thumbnail, plan, executor);
   if (!noise) return tl::make_unexpected(std::move(noise.error()));
   plan.noise_reduction = *std::move(noise);
-  if (plan.look && plan.look->noise_limit && !plan.look->noise && !plan.noise_reduction.level) {
+  if (plan.look && plan.look->noise_limit && !plan.look->noise && !plan.noise_reduction.has_level()) {
     plan.warnings.emplace_back("the noise of the frame is not known, so it is not held to a limit");
   }
   plan.from_codes = goes_from_codes(frame, plan);
