@@ -85,7 +85,7 @@ typedef struct {
   size_t stride;            /* bytes from one row to the next, at least; each frame states its own */
   lowlux_stage_rect crop;   /* that becomes the picture; all 0: the whole frame */
   lowlux_stage_rect masked; /* light-shielded pixels; all 0: there are none */
-  double white_level;       /* code at which a pixel is saturated, 1 to 65535; 0: the largest of the format */
+  double white_level;       /* code at which a pixel is saturated, 0.001 to 65535; 0: the largest of the format */
 } lowlux_stage_input;
 
 /* Pictures that go out. Width and height are those of the crop. */

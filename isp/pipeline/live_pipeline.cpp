@@ -31,8 +31,8 @@ Result<void> check(const LiveSetup& setup) {
       return wrong("masked pixels lie inside the frame, two each way at least");
     }
   }
-  if (setup.white_dn != 0 && !(setup.white_dn >= 1 && setup.white_dn <= 65535)) {
-    return wrong("white lies between 1 and 65535, or is 0 for the largest code");
+  if (setup.white_dn != 0 && !(setup.white_dn >= 0.001 && setup.white_dn <= 65535)) {
+    return wrong("white lies between 0.001 and 65535, or is 0 for the largest code");
   }
   if (setup.most == denoise::Level::best) return wrong("live frames are denoised by draft, standard or high");
   if (setup.look.look == Look::model) return wrong("live frames have the look of the camera or of the eye");

@@ -22,7 +22,7 @@ struct LiveSetup {
   int height = 0;
   Rect active;                 // the part that becomes the picture, from an even pixel on or not; at least 2 x 2
   std::vector<Rect> masked;    // light-shielded pixels of the frame, if any
-  double white_dn = 0;         // saturation, 1 to 65535; 0: the format's largest code
+  double white_dn = 0;         // saturation, 0.001 to 65535; 0: the format's largest code
   CameraColour colour;         // without calibrations the camera's colours are taken for those of the output
   std::vector<Pixel> defects;  // of the active area, ascending
   ToneCurve tone = ToneCurve::standard;
