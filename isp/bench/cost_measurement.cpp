@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <string_view>
@@ -107,8 +108,9 @@ DevelopOptions options_for(std::optional<Level> level) {
 /// All parts at one size.
 class Measurement {
  public:
-  Measurement(std::size_t size, CostModel& model, Executor& executor)
+  Measurement(std::size_t size, std::shared_ptr<const DisplayTarget> display, CostModel& model, Executor& executor)
       : size_(size),
+        display_(std::move(display)),
         megapixels_(1e-6 * sizes[size].width * sizes[size].height),
         model_(model),
         executor_(executor),
@@ -183,6 +185,13 @@ class Measurement {
     const auto look = steps(bright_, eye);
     if (!look) return tl::make_unexpected(look.error());
     add(CostPart::look, look->render_s() - codes_s);
+    DevelopOptions dim = options_for(std::nullopt);
+    dim.find_defects = false;
+    dim.effects->all = true;
+    dim.display = display_;
+    const auto changed = steps(bright_, dim);
+    if (!changed) return tl::make_unexpected(changed.error());
+    add(CostPart::display, changed->render_s() - codes_s);
     return {};
   }
   void add(CostPart part, double seconds) {
@@ -190,6 +199,7 @@ class Measurement {
   }
 
   std::size_t size_;
+  std::shared_ptr<const DisplayTarget> display_;
   double megapixels_;
   CostModel& model_;
   Executor& executor_;
@@ -199,11 +209,14 @@ class Measurement {
 }  // namespace
 
 Result<CostModel> measure_cost(Executor& executor, const std::function<void(double, const std::string&)>& advance) {
+  auto target = display_target({.display_cd_m2 = 5}, executor);
+  if (!target) return tl::make_unexpected(target.error());
+  const auto display = std::make_shared<const DisplayTarget>(*std::move(target));
   CostModel model;
   model.threads = executor.width();
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     const double share = std::array{0.05, 0.25, 0.7}[i] / 6;
-    Measurement at(i, model, executor);
+    Measurement at(i, display, model, executor);
     const std::string name = fmt::format("{:.1f} MP", 1e-6 * sizes[i].width * sizes[i].height);
     if (auto done = at.without_reduction(); !done) return tl::make_unexpected(done.error());
     advance(share, name + " without noise reduction");

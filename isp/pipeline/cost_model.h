@@ -32,9 +32,10 @@ enum class CostPart : std::uint8_t {
   best_2,
   codes_16,  // what 16-bit codes take more than 8-bit ones
   floats_32,
-  look,  // what the look of the eye takes more
+  look,     // what the look of the eye takes more
+  display,  // what the change for a display takes more
 };
-inline constexpr int cost_parts = 20;
+inline constexpr int cost_parts = 21;
 
 /// "planning", "draft-1" and so on.
 std::string_view name_of(CostPart part);

@@ -44,6 +44,17 @@ double median_of(std::span<const SeenBlock> blocks, const Figure& figure) {
   return *middle;
 }
 
+/// What 5 % of the blocks exceed.
+double percentile_of(std::span<const SeenBlock> blocks, float SeenBlock::*figure) {
+  if (blocks.empty()) return 0;
+  std::vector<float> values;
+  values.reserve(blocks.size());
+  for (const SeenBlock& block : blocks) values.push_back(block.*figure);
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(seen_share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return static_cast<double>(*at);
+}
+
 void set_defects(const RawFrame& frame, const DevelopPlan& plan, const DefectNoise& noise,
                  std::span<const Rect> squares, std::span<const SeenBlock> blocks, EffectSizes& out,
                  Executor& executor) {
@@ -132,16 +143,10 @@ EffectSizes effect_sizes(const RawFrame& frame, const DevelopPlan& plan, const T
   if (plan.options.find_defects) {
     set_defects(frame, plan, defect_noise(frame, plan, thumbnail), squares, blocks, out, executor);
   }
+  if (plan.options.display) out.display = noise == nullptr ? nan : percentile_of(blocks, &SeenBlock::display_delta_e);
   if (noise == nullptr) return out;
   if (plan.options.denoise.line_noise) set_lines(frame, plan, *noise, squares, blocks, out, executor);
-  std::vector<float> dark;
-  dark.reserve(blocks.size());
-  for (const SeenBlock& block : blocks) dark.push_back(block.dark_delta_e);
-  if (!dark.empty()) {
-    const auto at = dark.begin() + static_cast<std::ptrdiff_t>(seen_share * static_cast<double>(dark.size() - 1));
-    std::nth_element(dark.begin(), at, dark.end());
-    out.dark = static_cast<double>(*at);
-  }
+  out.dark = percentile_of(blocks, &SeenBlock::dark_delta_e);
   return out;
 }
 

@@ -21,7 +21,8 @@ struct EffectSizes {
   std::string defects_words;
   double lines = 0;  // of row and column noise
   std::string lines_words;
-  double dark = 0;  // of the mean dark charge that is known
+  double dark = 0;     // of the mean dark charge that is known
+  double display = 0;  // of the change for a display; not a number where the noise is not known
 };
 
 /// @param noise   of the frame; null where it is not known

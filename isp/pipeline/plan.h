@@ -81,6 +81,7 @@ struct EffectsPlan {
   bool find_defects = true;
   bool lines = true;
   bool dark = true;
+  bool display = true;
   std::optional<denoise::Level> level;
   bool level_decided = false;           // false: noise is left as options have it
   std::optional<NoiseRegions> regions;  // with levels of their own

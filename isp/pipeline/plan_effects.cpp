@@ -28,6 +28,7 @@ struct Candidate {
   bool defects = true;
   bool lines = true;
   bool dark = true;
+  bool display = true;
   double left = 0;   // against everything that can be done
   double error = 0;  // against the truth
   double seconds = 0;
@@ -45,6 +46,7 @@ struct Facts {
   bool may_take_lines = true;
   bool from_codes = false;  // without reduction, repair and dark nothing keeps the frame from it
   bool look = false;
+  bool display = false;
   SampleType samples = SampleType::u8;
   Rect active;
   double megapixels = 0;
@@ -83,6 +85,7 @@ std::vector<CostShare> work_of(const Facts& facts, const Candidate& plan) {
   if (facts.samples == SampleType::u16) work.push_back({CostPart::codes_16});
   if (facts.samples == SampleType::f32) work.push_back({CostPart::floats_32});
   if (facts.look) work.push_back({CostPart::look});
+  if (facts.display && plan.display) work.push_back({CostPart::display});
   return work;
 }
 
@@ -108,6 +111,7 @@ void rate(const Facts& facts, Candidate& plan) {
   leave(plan.defects, facts.sizes.defects);
   leave(plan.lines, facts.sizes.lines);
   leave(plan.dark || plan.level, facts.sizes.dark);
+  leave(plan.display, facts.sizes.display);
   plan.error = std::sqrt(squares);
   if (facts.choice.cost) plan.seconds = predicted_s(*facts.choice.cost, facts.megapixels, work_of(facts, plan));
 }
@@ -135,7 +139,7 @@ Candidate within_tolerance(const Facts& facts, double tolerance) {
     double size;
   };
   std::array options{Option{&Candidate::defects, facts.sizes.defects}, Option{&Candidate::lines, facts.sizes.lines},
-                     Option{&Candidate::dark, facts.sizes.dark}};
+                     Option{&Candidate::dark, facts.sizes.dark}, Option{&Candidate::display, facts.sizes.display}};
   std::ranges::sort(options, {}, &Option::size);
   for (const Option& option : options) {
     if (std::isnan(option.size)) continue;  // not predicted: it is done
@@ -155,6 +159,7 @@ std::vector<Candidate> candidates(const Facts& facts) {
     for (const bool defects : {false, true}) {
       for (const bool lines : {false, true}) {
         for (const bool dark : {false, true}) {
+          // A display that was asked for is left out by a tolerance only: no budget turns a wish down unsaid.
           Candidate plan{.level = level, .defects = defects, .lines = lines, .dark = dark};
           rate(facts, plan);
           out.push_back(plan);
@@ -248,6 +253,10 @@ EffectsPlan told(const Facts& facts, const Candidate& plan) {
     add({"dark charge", facts.sizes.dark, left(used, facts.sizes.dark), used, used ? "subtracted" : "left in",
          std::nullopt});
   }
+  if (facts.display) {
+    add({"change for the display", facts.sizes.display, left(plan.display, facts.sizes.display), plan.display,
+         plan.display ? "made" : "left out", plan.display ? cost_of(facts, {{CostPart::display}}) : std::nullopt});
+  }
   const bool by_tolerance = facts.choice.tolerance_delta_e && !facts.choice.all && !facts.choice.budget_s;
   if (by_tolerance && plan.level && !facts.level_is_fixed) {
     out.regions =
@@ -258,6 +267,7 @@ EffectsPlan told(const Facts& facts, const Candidate& plan) {
   out.find_defects = plan.defects;
   out.lines = plan.lines;
   out.dark = plan.dark || plan.level;
+  out.display = plan.display;
   out.level = plan.level;
   out.level_decided = facts.has_noise;
   return out;
@@ -271,6 +281,7 @@ Facts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopP
   facts.samples = o.samples;
   facts.active = frame.raw.active;
   facts.look = plan.look.has_value();
+  facts.display = o.display != nullptr;
   NoiseReduction reduction;
   facts.has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !noise_obstacle(frame, plan);
   if (facts.has_noise) {
@@ -317,6 +328,7 @@ Result<void> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, D
   if (!best) return tl::make_unexpected(best.error());
   plan.effects = told(facts, *best);
   if (!plan.effects->dark) plan.black.dark_mean_e = {};
+  if (!plan.effects->display) plan.options.display.reset();
   return {};
 }
 

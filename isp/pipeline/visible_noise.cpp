@@ -7,6 +7,7 @@
 #include "isp/model/colorimetry.h"
 #include "isp/model/colour_difference.h"
 #include "isp/render/output_space.h"
+#include "isp/render/retarget_rows.h"
 #include "isp/render/tone.h"
 
 namespace lowlux::isp {
@@ -26,21 +27,38 @@ class Display {
         to_xyz_(*inverse(*xyz_to_output(plan.options.space))),
         white_(*xyz_of(output_white)) {}
 
-  Lab lab(const Vector3& camera) const {
+  Lab lab(const Vector3& camera) const { return lab_of_shown(shown(camera)); }
+
+  /// What changing its code for the planned display makes of a colour, by the colours that codes stand for.
+  double changed_for_display(const Vector3& camera) const {
+    if (!plan_.options.display) return 0;
+    const Vector3 before = shown(camera);
+    std::array<std::uint16_t, 3> code{};
+    for (int i = 0; i < 3; ++i) {
+      code[i] = static_cast<std::uint16_t>(std::lround(65535 * encode_transfer(plan_.options.space, before[i])));
+    }
+    apply(plan_.options.display->made.table, code.data(), 1, code.data());
+    Vector3 after{};
+    for (int i = 0; i < 3; ++i) after[i] = decode_transfer(plan_.options.space, code[i] / 65535.0);
+    return ciede2000(lab_of_shown(before), lab_of_shown(after));
+  }
+
+ private:
+  Vector3 shown(const Vector3& camera) const {
     std::array<double, 3> balanced{};
     for (int c = 0; c < 3; ++c) {
       balanced[c] = std::min(camera[c] * static_cast<double>(plan_.white_gain[c]), 1.0);
     }
-    Vector3 shown{};
+    Vector3 out{};
     for (int i = 0; i < 3; ++i) {
       double v = 0;
       for (int c = 0; c < 3; ++c) v += static_cast<double>(plan_.transform.matrix[3 * i + c]) * balanced[c];
-      shown[i] = apply_tone(plan_.options.tone, std::clamp(v, 0.0, 1.0) * limit_, limit_);
+      out[i] = std::min(apply_tone(plan_.options.tone, std::clamp(v, 0.0, 1.0) * limit_, limit_), 1.0);
     }
-    return lab_of(xyz_of(to_xyz_ * shown), white_);
+    return out;
   }
+  Lab lab_of_shown(const Vector3& shown) const { return lab_of(xyz_of(to_xyz_ * shown), white_); }
 
- private:
   const DevelopPlan& plan_;
   double limit_;
   Matrix3 to_xyz_;
@@ -90,6 +108,7 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
   SeenBlock out;
   out.line_delta_e = static_cast<float>(ciede2000(lab, display.lab(with_line)) / line_e);
   out.point_delta_e = static_cast<float>(point);
+  out.display_delta_e = static_cast<float>(display.changed_for_display(signal));
   out.snr = static_cast<float>(std::max(mean_signal, 0.0) / std::sqrt(std::max(mean_variance, least_variance_e2)));
   out.noise_delta_e = static_cast<float>(std::sqrt(squares));
   out.dark_delta_e = static_cast<float>(ciede2000(lab, display.lab(with_dark)));

@@ -16,13 +16,14 @@ inline constexpr double seen_share = 0.95;  // of the pixels: the others may dif
 
 /// A part of the frame: what is known of its light and of what noise does there.
 struct SeenBlock {
-  float x = 0;              // of its middle, share of the width
-  float y = 0;              // of the height
-  float snr = 0;            // of one mean pixel, dark charge off
-  float noise_delta_e = 0;  // root mean square CIEDE2000 of the noise, in means over 8 x 8 pixels
-  float dark_delta_e = 0;   // CIEDE2000 of its mean dark charge, were it left in
-  float line_delta_e = 0;   // CIEDE2000 for each electron that all its pixels have too much
-  float point_delta_e = 0;  // the same of one pixel alone, of the colour where that shows most
+  float x = 0;                // of its middle, share of the width
+  float y = 0;                // of the height
+  float snr = 0;              // of one mean pixel, dark charge off
+  float noise_delta_e = 0;    // root mean square CIEDE2000 of the noise, in means over 8 x 8 pixels
+  float dark_delta_e = 0;     // CIEDE2000 of its mean dark charge, were it left in
+  float line_delta_e = 0;     // CIEDE2000 for each electron that all its pixels have too much
+  float point_delta_e = 0;    // the same of one pixel alone, of the colour where that shows most
+  float display_delta_e = 0;  // CIEDE2000 of the change for another display, if one is planned
 };
 
 /// Up to 400 blocks, evenly spread over the frame. With C the colour as it will be displayed and s_c the standard
