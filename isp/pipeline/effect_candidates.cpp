@@ -1,0 +1,157 @@
+#include "isp/pipeline/effect_candidates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/pipeline/plan_effects.h"
+
+namespace lowlux::isp {
+namespace {
+
+using denoise::Level;
+
+CostPart part_of(Level level, int start) {
+  if (level == Level::best) return start == 2 ? CostPart::best_2 : CostPart::best_0;
+  constexpr std::array first{CostPart::draft_0, CostPart::standard_0, CostPart::high_0};
+  return static_cast<CostPart>(static_cast<int>(first[static_cast<std::size_t>(level)]) + start);
+}
+
+std::vector<CostShare> work_of(const EffectFacts& facts, const EffectCandidate& plan) {
+  std::vector<CostShare> work{{CostPart::planning}};
+  if (plan.defects && facts.may_search) work.push_back({CostPart::defects});
+  if (plan.level) {
+    if (plan.lines && facts.may_take_lines) work.push_back({CostPart::lines});
+    work.push_back({CostPart::check});
+    const std::array<double, 3> share = start_shares(facts.blocks);
+    for (int start = 0; start < 3; ++start) {
+      if (share[start] > 0) work.push_back({part_of(*plan.level, start), share[start]});
+    }
+  } else {
+    const bool repairs = plan.defects && facts.sizes.has_defects;
+    const bool takes_dark = plan.dark && facts.sizes.dark > 0;
+    work.push_back({facts.from_codes && !repairs && !takes_dark ? CostPart::codes : CostPart::floats});
+  }
+  if (facts.samples == SampleType::u16) work.push_back({CostPart::codes_16});
+  if (facts.samples == SampleType::f32) work.push_back({CostPart::floats_32});
+  if (facts.look) work.push_back({CostPart::look});
+  if (facts.display && plan.display) work.push_back({CostPart::display});
+  return work;
+}
+
+std::vector<std::optional<Level>> levels_of(const EffectFacts& facts, bool with_best) {
+  if (facts.level_is_fixed) return {facts.fixed_level};
+  if (!facts.has_noise) return {std::nullopt};
+  std::vector<std::optional<Level>> out{std::nullopt, Level::draft, Level::standard, Level::high};
+  if (with_best) out.emplace_back(Level::best);
+  return out;
+}
+
+/// The least work that stays below the tolerance: the level first, which saves most, then smallest first.
+EffectCandidate within_tolerance(const EffectFacts& facts, double tolerance) {
+  EffectCandidate plan{.level = levels_of(facts, false).back()};
+  for (const std::optional<Level> level : levels_of(facts, false)) {
+    EffectCandidate tried{.level = level};
+    rate(facts, tried);
+    if (tried.left >= share_for_level * tolerance) continue;
+    plan = tried;
+    break;
+  }
+  struct Option {
+    bool EffectCandidate::*used;
+    double size;
+  };
+  std::array options{
+      Option{&EffectCandidate::defects, facts.sizes.defects}, Option{&EffectCandidate::lines, facts.sizes.lines},
+      Option{&EffectCandidate::dark, facts.sizes.dark}, Option{&EffectCandidate::display, facts.sizes.display}};
+  std::ranges::sort(options, {}, &Option::size);
+  for (const Option& option : options) {
+    if (std::isnan(option.size)) continue;  // not predicted: it is done
+    EffectCandidate tried = plan;
+    tried.*option.used = false;
+    rate(facts, tried);
+    if (tried.left < tolerance) plan = tried;
+  }
+  rate(facts, plan);
+  return plan;
+}
+
+/// All there are, the cheapest first.
+std::vector<EffectCandidate> candidates(const EffectFacts& facts) {
+  std::vector<EffectCandidate> out;
+  for (const std::optional<Level> level : levels_of(facts, true)) {
+    for (const bool defects : {false, true}) {
+      for (const bool lines : {false, true}) {
+        for (const bool dark : {false, true}) {
+          // A display that was asked for is left out by a tolerance only: no budget turns a wish down unsaid.
+          EffectCandidate plan{.level = level, .defects = defects, .lines = lines, .dark = dark};
+          rate(facts, plan);
+          out.push_back(plan);
+        }
+      }
+    }
+  }
+  std::ranges::sort(out, {}, &EffectCandidate::seconds);
+  return out;
+}
+
+Result<EffectCandidate> within_budget(const EffectFacts& facts, double budget_s) {
+  const std::vector<EffectCandidate> all = candidates(facts);
+  if (all.front().seconds > budget_s) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("the budget of {:.3g} ms is below the cheapest plan, which is predicted to take {:.3g} ms "
+                            "with {} {}: raise --budget-ms, or halve the picture (--half)",
+                            1e3 * budget_s, 1e3 * all.front().seconds, facts.choice.cost->threads,
+                            facts.choice.cost->threads == 1 ? "thread" : "threads"));
+  }
+  const double tolerance = facts.choice.tolerance_delta_e.value_or(0);
+  const EffectCandidate* best = nullptr;
+  for (const EffectCandidate& plan : all) {
+    if (plan.seconds > budget_s) break;
+    if (plan.left < tolerance) return plan;
+    if (best == nullptr || plan.error < best->error) best = &plan;
+  }
+  return *best;
+}
+
+}  // namespace
+
+std::array<double, 3> start_shares(const std::vector<SeenBlock>& blocks) {
+  std::array<double, 3> share{};
+  for (const SeenBlock& block : blocks) {
+    share[block.snr >= 3 ? 0 : block.snr >= 0.7f ? 1 : 2] += 1.0 / static_cast<double>(blocks.size());
+  }
+  if (blocks.empty()) share[0] = 1;
+  return share;
+}
+
+void rate(const EffectFacts& facts, EffectCandidate& plan) {
+  plan.left = facts.has_noise ? seen_noise(facts, [&](double snr) { return left_of_noise(plan.level, snr); }) : 0;
+  double squares =
+      facts.has_noise ? std::pow(seen_noise(facts, [&](double) { return error_share(plan.level); }), 2) : 0;
+  const auto leave = [&](bool used, double size) {
+    if (used || !(size > 0)) return;
+    plan.left += size;
+    squares += size * size;
+  };
+  leave(plan.defects, facts.sizes.defects);
+  leave(plan.lines, facts.sizes.lines);
+  leave(plan.dark || plan.level, facts.sizes.dark);
+  leave(plan.display, facts.sizes.display);
+  plan.error = std::sqrt(squares);
+  if (facts.choice.cost) plan.seconds = predicted_s(*facts.choice.cost, facts.megapixels, work_of(facts, plan));
+}
+
+Result<EffectCandidate> choose_candidate(const EffectFacts& facts) {
+  if (facts.choice.all) {
+    EffectCandidate everything{.level = levels_of(facts, false).back()};
+    rate(facts, everything);
+    return everything;
+  }
+  if (facts.choice.budget_s) return within_budget(facts, *facts.choice.budget_s);
+  return within_tolerance(facts, facts.choice.tolerance_delta_e.value_or(0));
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "isp/base/result.h"
+#include "isp/pipeline/effect_sizes.h"
+#include "isp/pipeline/plan.h"
+#include "isp/pipeline/visible_noise.h"
+
+/// The ways to develop one frame, what each leaves and takes, and which is chosen.
+namespace lowlux::isp {
+
+/// Of the tolerance, for the level of noise reduction: what is predicted of it is a bound of what was seen on the
+/// pictures it was tuned on, and others may exceed it by a little.
+constexpr double share_for_level = 0.9;
+
+/// One way to develop the frame.
+struct EffectCandidate {
+  std::optional<denoise::Level> level;
+  bool defects = true;
+  bool lines = true;
+  bool dark = true;
+  bool display = true;
+  double left = 0;   // against everything that can be done
+  double error = 0;  // against the truth
+  double seconds = 0;
+};
+
+/// What decisions rest on, of one frame.
+struct EffectFacts {
+  const EffectsChoice& choice;
+  EffectSizes sizes;
+  std::vector<SeenBlock> blocks;
+  bool has_noise = false;  // it is known, and may be reduced
+  std::optional<denoise::Level> fixed_level;
+  bool level_is_fixed = false;
+  bool may_search = true;
+  bool may_take_lines = true;
+  bool from_codes = false;  // without reduction, repair and dark nothing keeps the frame from it
+  bool look = false;
+  bool display = false;
+  SampleType samples = SampleType::u8;
+  Rect active;
+  double megapixels = 0;
+};
+
+/// Shares of the frame whose chroma starts on each level, as denoise/chroma_start.h decides it.
+std::array<double, 3> start_shares(const std::vector<SeenBlock>& blocks);
+
+/// The percentile of the noise of all blocks, each times share(its signal to noise ratio).
+template <class Share>
+double seen_noise(const EffectFacts& facts, const Share& share) {
+  std::vector<float> rms;
+  rms.reserve(facts.blocks.size());
+  for (const SeenBlock& block : facts.blocks) {
+    rms.push_back(static_cast<float>(share(static_cast<double>(block.snr))) * block.noise_delta_e);
+  }
+  return seen_percentile(rms);
+}
+
+/// Sets left, error and seconds (0 without a cost model).
+void rate(const EffectFacts& facts, EffectCandidate& plan);
+
+/// As EffectsChoice asks. Error: the budget is below the cheapest plan.
+Result<EffectCandidate> choose_candidate(const EffectFacts& facts);
+
+}  // namespace lowlux::isp
