@@ -1,6 +1,7 @@
 #include "isp/adapter/lowlux_stage.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
 #include <memory>
 #include <new>
@@ -22,12 +23,25 @@ using lowlux::isp::Stage;
 
 constexpr std::size_t largest_struct = 65536;
 
+// Sizes that structs had before they grew.
+template <class T>
+constexpr std::size_t first_size = sizeof(T);
+template <>
+constexpr std::size_t first_size<lowlux_stage_params> = offsetof(lowlux_stage_params, budget_ms);
+template <>
+constexpr std::size_t first_size<lowlux_stage_result> = offsetof(lowlux_stage_result, step);
+
+template <class T>
+bool is_of_a_version(const T& of_caller) {
+  return of_caller.size == first_size<T> || (of_caller.size >= sizeof(T) && of_caller.size <= largest_struct);
+}
+
 /// A caller's struct, as much of it as both know; false where its size is of none.
 template <class T>
 bool take(const T* from, T& to) {
   static_assert(std::is_trivially_copyable_v<T>);
-  if (from == nullptr || from->size < sizeof(T) || from->size > largest_struct) return false;
-  std::memcpy(&to, from, sizeof(T));
+  if (from == nullptr || !is_of_a_version(*from)) return false;
+  std::memcpy(&to, from, std::min(from->size, sizeof(T)));
   return true;
 }
 
@@ -36,12 +50,12 @@ template <class T>
 void give(T answer, T* to) {
   if (to == nullptr) return;
   answer.size = to->size;
-  std::memcpy(to, &answer, sizeof(T));
+  std::memcpy(to, &answer, std::min(to->size, sizeof(T)));
 }
 
 template <class T>
 bool is_null_or_whole(const T* answer) {
-  return answer == nullptr || (answer->size >= sizeof(T) && answer->size <= largest_struct);
+  return answer == nullptr || is_of_a_version(*answer);
 }
 
 int code_of_opening(const Error& error) {

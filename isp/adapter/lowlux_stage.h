@@ -5,11 +5,12 @@
  *   - No exception leaves it. lowlux_stage_process allocates nothing, takes no lock while it works on pixels, and
  * starts no threads; lowlux_stage_configure takes all memory.
  *   - Every call on one stage comes from one thread at a time; stages do not know of one another.
- *   - The bytes of a result do not depend on the number of threads.
+ *   - The bytes of a result do not depend on the number of threads, but for the times in it and what a budget makes
+ *     of them.
  *   - Input rows are read once, from first to last: they may lie in uncached memory.
  *   - Structs begin with their size, which the caller sets, but for the small ones that never change: source, plane and
- *     rect. Within one version structs grow at their end: a caller with a later header is served, and what lowlux does
- *     not know there is ignored. Bits of `valid` that are not known refuse the frame.
+ *     rect. Within one version structs grow at their end: a caller with a later or an earlier header is served, what
+ *     one of both does not know is left out. Bits of `valid` that are not known refuse the frame.
  * Functions return LOWLUX_STAGE_OK, LOWLUX_STAGE_ADJUSTED, or an error below 0; lowlux_stage_last_error says more.
  * After an error in lowlux_stage_process the output planes are not touched or hold part of a picture; the stage goes
  * on.
@@ -163,7 +164,8 @@ enum {
   LOWLUX_STAGE_HAS_NOISE = 1 << 16,
   LOWLUX_STAGE_HAS_F_NUMBER = 1 << 17,
   LOWLUX_STAGE_HAS_SCENE_LUMINANCE = 1 << 18,
-  LOWLUX_STAGE_HAS_ALL = (1 << 19) - 1
+  LOWLUX_STAGE_HAS_BUDGET = 1 << 19,
+  LOWLUX_STAGE_HAS_ALL = (1 << 20) - 1
 };
 
 /* What is known of one frame, of the frame that is exposed and not of the one before. What is not valid comes from the
@@ -191,7 +193,22 @@ typedef struct {
   float noise_read;       /* standard deviation of a pixel without light [DN] */
   float f_number;
   double scene_luminance_cd_m2; /* mean over the picture */
+  float budget_ms;              /* time that this frame may take, 0.01..1e6; what does not fit is left out: */
 } lowlux_stage_params;
+
+/* What a budget leaves of a frame. No frame is ever left out, and look and output are never changed: a budget that even
+ * the last step exceeds gives that step, and took_ms says so. Steps that are no less than what the frame gets without a
+ * budget are passed over. Times are those of frames before: the first frame after lowlux_stage_configure, of which none
+ * are known, goes at the last step. A better step is taken when it is expected to leave a tenth of its time spare, and
+ * left for one that fits when frames take longer. One that did not fit is tried again now and then, the sooner the less
+ * it lacked: isp/adapter/README.md. lowlux_stage_reset keeps what is known of times. */
+enum {
+  LOWLUX_STAGE_STEP_ALL = 0,           /* all that is asked for */
+  LOWLUX_STAGE_STEP_STANDARD = 1,      /* the level standard in place of high */
+  LOWLUX_STAGE_STEP_DRAFT = 2,         /* the level draft in place of a higher one */
+  LOWLUX_STAGE_STEP_FRAMES_BEFORE = 3, /* no level; frames before, where the settings have them */
+  LOWLUX_STAGE_STEP_PLAIN = 4          /* straight from codes */
+};
 
 typedef struct {
   const void* data;
@@ -237,6 +254,9 @@ typedef struct {
   float moved;                 /* share of the picture that was found to move */
   float scene_luminance_cd_m2; /* 0: not known */
   float adaptation;            /* m of CIE 191, 0 scotopic to 1 photopic; 1 without the look of the eye */
+  int32_t step;                /* LOWLUX_STAGE_STEP_...; without a budget 0 */
+  float predicted_ms;          /* time that was expected of what was done; 0: not known yet */
+  float took_ms;               /* the frame, from the first look at its rows to the last row of its picture */
 } lowlux_stage_result;
 
 /* Of the frame as it came in, before anything was taken off or denoised: for exposure and white balance of the next. */

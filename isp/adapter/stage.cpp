@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -13,6 +14,11 @@
 
 namespace lowlux::isp {
 namespace {
+
+static_assert(static_cast<int>(StageWork::standard) == LOWLUX_STAGE_STEP_STANDARD &&
+              static_cast<int>(StageWork::draft) == LOWLUX_STAGE_STEP_DRAFT &&
+              static_cast<int>(StageWork::frames_before) == LOWLUX_STAGE_STEP_FRAMES_BEFORE &&
+              static_cast<int>(StageWork::plain) == LOWLUX_STAGE_STEP_PLAIN);
 
 constexpr int default_threads = 2, most_threads = 8;
 constexpr std::uint64_t default_memory_limit = std::uint64_t{1} << 30;
@@ -217,6 +223,7 @@ Result<int> Stage::configure(const lowlux_stage_input& in, lowlux_stage_output& 
   const bool hd = out.yuv_matrix == 709 || (out.yuv_matrix == 0 && active.height >= 720);
   made.writer = std::make_unique<StageWriter>(*kind, hd ? YuvStandard::bt709 : YuvStandard::bt601, active.width,
                                               active.height, executor_.width());
+  made.budget = StageBudget(settings_.look == LOWLUX_STAGE_LOOK_EYE, made.stream.temporal);
   const bool adjusted = lay_out(*kind, active.width, active.height, out);
   made.layout = out;
   stream_ = std::move(made);
@@ -277,8 +284,12 @@ int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& ou
   if (const int wrong = check_source(in); wrong != LOWLUX_STAGE_OK) return wrong;
   if (const int wrong = check_picture(out); wrong != LOWLUX_STAGE_OK) return wrong;
   if (const char* fault = fault_of(params); fault != nullptr) return say(LOWLUX_STAGE_BAD_PARAMETER, fault);
+  const auto start = std::chrono::steady_clock::now();
   LivePipeline& pipeline = *stream_->pipeline;
-  StageFacts facts = facts_of(params, stream_->stream, profile_ ? &*profile_ : nullptr);
+  const StageWork asked = asked_of(params, stream_->stream);
+  const bool has_budget = (params.valid & LOWLUX_STAGE_HAS_BUDGET) != 0;
+  const StageWork most = has_budget ? stream_->budget.choose(params.budget_ms, asked) : asked;
+  StageFacts facts = facts_of(params, stream_->stream, profile_ ? &*profile_ : nullptr, most);
   facts.live.follows = history_.follows(params);
   {
     const DmaAccess access(in.fd);
@@ -290,7 +301,12 @@ int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& ou
   }
   history_.take(params);
   render(out);
-  if (answers.result != nullptr) tell(facts, *answers.result);
+  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+  if (answers.result != nullptr) {
+    tell(facts, *answers.result);
+    answers.result->took_ms = static_cast<float>(took.count());
+  }
+  stream_->budget.took(done(), took.count());
   if (answers.statistics != nullptr) count(*answers.statistics);
   return LOWLUX_STAGE_OK;
 }
@@ -298,6 +314,21 @@ int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& ou
 void Stage::reset() {
   history_.reset();
   if (stream_) stream_->pipeline->reset();
+}
+
+/// What the frame got.
+StageWork Stage::done() const {
+  const NoiseReduction& reduction = stream_->pipeline->decided().noise_reduction;
+  if (reduction.level) return work_of(*reduction.level);
+  return reduction.temporal ? StageWork::frames_before : StageWork::plain;
+}
+
+/// What it would have got of itself without a budget.
+StageWork Stage::asked_for(const StageFacts& facts) const {
+  const LiveDecision& decision = stream_->pipeline->decision();
+  if (decision.level) return work_of(*decision.level);
+  const bool averages = stream_->stream.temporal && facts.temporal_asked && decision.reducible;
+  return averages ? StageWork::frames_before : StageWork::plain;
 }
 
 void Stage::tell(const StageFacts& facts, lowlux_stage_result& out) const {
@@ -325,6 +356,8 @@ void Stage::tell(const StageFacts& facts, lowlux_stage_result& out) const {
   out.exposure_ev = static_cast<float>(plan.exposure_ev);
   const auto& level = plan.noise_reduction.level;
   out.level = level ? static_cast<std::int32_t>(*level) + 1 : LOWLUX_STAGE_LEVEL_NONE;
+  out.step = done() == asked_for(facts) ? LOWLUX_STAGE_STEP_ALL : static_cast<std::int32_t>(done());
+  out.predicted_ms = static_cast<float>(stream_->budget.predicted_ms(done()));
   const auto& temporal = plan.noise_reduction.temporal;
   out.temporal = temporal && !temporal->restart ? 1 : 0;
   out.moved = out.temporal == 1 ? static_cast<float>(pipeline.moved()) : 0;

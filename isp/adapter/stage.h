@@ -7,6 +7,7 @@
 #include <string>
 
 #include "isp/adapter/lowlux_stage.h"
+#include "isp/adapter/stage_budget.h"
 #include "isp/adapter/stage_formats.h"
 #include "isp/adapter/stage_params.h"
 #include "isp/adapter/stage_profile.h"
@@ -46,6 +47,8 @@ class Stage {
   int check_picture(const lowlux_stage_picture& out);
   void render(const lowlux_stage_picture& out);
   void tell(const StageFacts& facts, lowlux_stage_result& out) const;
+  StageWork done() const;
+  StageWork asked_for(const StageFacts& facts) const;
   void count(lowlux_stage_statistics& out) const;
 
   /// All that is there only between configure and the next.
@@ -57,6 +60,7 @@ class Stage {
     int height = 0;  // of whole frames
     std::unique_ptr<LivePipeline> pipeline;
     std::unique_ptr<StageWriter> writer;
+    StageBudget budget;
   };
 
   lowlux_stage_settings settings_{};

@@ -1,6 +1,7 @@
 #include "isp/adapter/stage_params.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <numbers>
 
@@ -126,7 +127,28 @@ LiveDenoise denoise_of(const lowlux_stage_params& params, const StageStream& str
   return out;
 }
 
+LiveDenoise limited(LiveDenoise asked, StageWork most) {
+  using denoise::Level;
+  if (most == StageWork::standard) asked.most = Level::standard;
+  if (most == StageWork::draft) asked.most = Level::draft;
+  if (most >= StageWork::frames_before) asked.most.reset();
+  asked.temporal = asked.temporal && most != StageWork::plain;
+  return asked;
+}
+
 }  // namespace
+
+StageWork work_of(denoise::Level level) {
+  assert(level <= denoise::Level::high);
+  return static_cast<StageWork>(static_cast<int>(denoise::Level::high) - static_cast<int>(level));
+}
+
+StageWork asked_of(const lowlux_stage_params& params, const StageStream& stream) {
+  const LiveDenoise asked = denoise_of(params, stream);
+  if (asked.mode == LiveDenoise::Mode::automatic) return work_of(stream.most);
+  if (asked.mode == LiveDenoise::Mode::level) return work_of(std::min(asked.level, stream.most));
+  return asked.temporal ? StageWork::frames_before : StageWork::plain;
+}
 
 PerSite<double> sites_of(const float (&channels)[4], BayerPhase phase) {
   PerSite<double> out{};
@@ -165,6 +187,8 @@ const char* fault_of(const lowlux_stage_params& p) {
       {LOWLUX_STAGE_HAS_F_NUMBER, within(p.f_number, 0.1, 1e3), "an f-number lies between 0.1 and 1000"},
       {LOWLUX_STAGE_HAS_SCENE_LUMINANCE, within(p.scene_luminance_cd_m2, 1e-7, 1e9),
        "a luminance lies between 1e-7 and 1e9 cd/m2"},
+      {LOWLUX_STAGE_HAS_BUDGET, within(p.budget_ms, 0.01F, 1e6),
+       "a budget lies between 0.01 and 1e6 ms for each frame"},
       {~static_cast<std::uint32_t>(LOWLUX_STAGE_HAS_ALL), false, "a validity bit that is not known"},
   };
   for (const Rule& rule : rules) {
@@ -173,14 +197,17 @@ const char* fault_of(const lowlux_stage_params& p) {
   return nullptr;
 }
 
-StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream, const StageProfile* profile) {
+StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream, const StageProfile* profile,
+                    StageWork most) {
   StageFacts out;
   if (has(params, LOWLUX_STAGE_HAS_EXPOSURE)) out.live.exposure_s = params.exposure_s;
   set_levels(params, stream, profile, out);
   set_light(params, out);
   set_colour(params, stream, out);
-  out.live.denoise = denoise_of(params, stream);
-  out.applied |= params.valid & LOWLUX_STAGE_HAS_DENOISE;
+  const LiveDenoise asked = denoise_of(params, stream);
+  out.live.denoise = limited(asked, most);
+  out.temporal_asked = asked.temporal;
+  out.applied |= params.valid & (LOWLUX_STAGE_HAS_DENOISE | LOWLUX_STAGE_HAS_BUDGET);
   if (has(params, LOWLUX_STAGE_HAS_EXPOSURE_VALUE)) {
     out.live.exposure_ev = params.exposure_ev;
     out.applied |= LOWLUX_STAGE_HAS_EXPOSURE_VALUE;

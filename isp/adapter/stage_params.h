@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "isp/adapter/lowlux_stage.h"
+#include "isp/adapter/stage_budget.h"
 #include "isp/adapter/stage_profile.h"
 #include "isp/base/cfa.h"
 #include "isp/pipeline/live_plan.h"
@@ -19,6 +20,7 @@ struct StageFacts {
   std::uint32_t applied = 0;  // LOWLUX_STAGE_HAS_... that took effect
   std::int32_t black_from = LOWLUX_STAGE_FROM_NOTHING;
   std::int32_t noise_from = LOWLUX_STAGE_FROM_NOTHING;
+  bool temporal_asked = false;  // whatever came of it
 };
 
 /// What the facts are made for.
@@ -31,8 +33,16 @@ struct StageStream {
   bool temporal = false;
 };
 
+/// The dearest work that the parameters ask for; frames by whose noise a level is chosen may come to less.
+StageWork asked_of(const lowlux_stage_params& params, const StageStream& stream);
+
 /// Parameters of which fault_of finds none. What they do not tell the profile does, if there is one.
-StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream, const StageProfile* profile);
+/// @param most  noise reduction stays within this
+StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream, const StageProfile* profile,
+                    StageWork most = StageWork::high);
+
+/// high, standard or draft, as a level up to high is.
+StageWork work_of(denoise::Level level);
 
 /// Follows frames by sequence and time.
 class StageHistory {

@@ -271,6 +271,9 @@ void LivePlanner::choose_level(const LiveDenoise& wanted, const RawFrame& frame,
     }
   }
   if (level) level = std::min(*level, setup_.most);
+  decision_.level = level;
+  decision_.reducible = can;
+  level = std::min(level, wanted.most);  // none is below every level
   out.level = level;
   out.options.level = level.value_or(denoise::Level::draft);
 }

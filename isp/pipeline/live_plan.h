@@ -38,6 +38,8 @@ struct LiveDenoise {
   enum class Mode : std::uint8_t { off, automatic, level } mode = Mode::automatic;
   denoise::Level level = denoise::Level::draft;  // for Mode::level; no higher than LiveSetup::most
   bool temporal = true;                          // where the setup has it
+  /// No level beyond this one, however it was come by; none: no level at all.
+  std::optional<denoise::Level> most = denoise::Level::best;
 };
 
 /// Temporal noise in codes: a code v DN above black has the variance gain_dn v + black_variance_dn2 of its site.
@@ -71,7 +73,9 @@ struct LiveDecision {
   LiveSource black = LiveSource::none;
   LiveSource noise = LiveSource::none;
   LiveSource white = LiveSource::none;
-  std::optional<NoiseLine> measured;  // the noise that the frame itself shows, where it was measured
+  std::optional<NoiseLine> measured;    // the noise that the frame itself shows, where it was measured
+  std::optional<denoise::Level> level;  // that LiveDenoise::most may have lowered
+  bool reducible = false;               // a mosaic whose noise is known
 };
 
 /// Decides about one frame after the other, into the same plan. Allocates nothing after the first frame but to say what

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <string>
 
@@ -131,6 +133,35 @@ TEST(LowluxStage, TakesTheStructsOfLaterCallersAndLeavesWhatItDoesNotKnow) {
             LOWLUX_STAGE_OK);
   EXPECT_TRUE(settings.is_untouched() && info.is_untouched() && in.is_untouched() && out.is_untouched() &&
               picture.is_untouched() && params.is_untouched() && result.is_untouched() && statistics.is_untouched());
+}
+
+// Callers that were compiled before there were budgets: what lies behind their structs is neither read nor written.
+TEST(LowluxStage, TakesTheStructsOfEarlierCallersAndWritesNoMoreThanTheyHave) {
+  Rig rig(plain_settings(), words10(), width, height, LOWLUX_STAGE_BGR888);
+  const Codes codes = scene(words10().format, width, height);
+  auto params = fixed_params(words10().format);
+  ASSERT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK);
+  const auto picture = rig.planes[0];
+  const auto whole = rig.result;
+  params.size = offsetof(lowlux_stage_params, budget_ms);
+  params.budget_ms = NAN;
+  std::memset(&rig.result, 0x77, sizeof rig.result);
+  rig.result.size = offsetof(lowlux_stage_result, step);
+  ASSERT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK) << rig.error();
+  EXPECT_EQ(rig.planes[0], picture);
+  EXPECT_EQ(rig.result.size, offsetof(lowlux_stage_result, step));
+  const auto members = offsetof(lowlux_stage_result, applied);
+  EXPECT_EQ(std::memcmp(&rig.result.applied, &whole.applied, offsetof(lowlux_stage_result, step) - members), 0);
+  EXPECT_EQ(rig.result.step, 0x77777777);
+  params.valid |= LOWLUX_STAGE_HAS_BUDGET;
+  EXPECT_EQ(rig.process(codes, params), LOWLUX_STAGE_BAD_PARAMETER) << "a bit whose member is not there";
+  // Of no version: half a member.
+  params.valid &= ~static_cast<std::uint32_t>(LOWLUX_STAGE_HAS_BUDGET);
+  params.size += 1;
+  EXPECT_EQ(rig.process(codes, params), LOWLUX_STAGE_BAD_ARGUMENT);
+  params.size -= 1;
+  rig.result.size += 4;
+  EXPECT_EQ(rig.process(codes, params), LOWLUX_STAGE_BAD_ARGUMENT);
 }
 
 TEST(LowluxStage, RefusesStructsOfASizeThatNoVersionHas) {

@@ -108,6 +108,8 @@ TEST(StageMemory, OfFramesIsNoneFromTheFirstOneOnInEveryMode) {
     for (std::uint32_t i = 0; i < 12; ++i) {
       auto params = params_of(mode, names.format, i < 8 ? i : i + 5);  // with a gap
       if (i == 2) params.scene_luminance_cd_m2 = 1e4;                  // nothing to see for eyes in the dark
+      if (i >= 5) params.valid |= LOWLUX_STAGE_HAS_BUDGET;
+      params.budget_ms = i % 2 == 0 ? 0.01F : 1e6F;  // down and up again
       if (i == 3 || i == 10) params.denoise = LOWLUX_STAGE_DENOISE_OFF;
       const int code = rig.process(frames[i % 6], stride, params);
       const long after = test::allocations;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <numeric>
 #include <random>
 
@@ -202,6 +203,81 @@ TEST(Stage, AfterResetOrConfigureIsAFreshOneInAllItDecides) {
     EXPECT_GT(followed_ev, before.exposure_ev) << "exposure follows the scene ...";
     EXPECT_LT(followed_ev, fresh.result.exposure_ev) << "... slowly";
   }
+}
+
+lowlux_stage_params budgeted(const lowlux_stage_params& params, float budget_ms) {
+  auto out = params;
+  out.valid |= LOWLUX_STAGE_HAS_BUDGET;
+  out.budget_ms = budget_ms;
+  return out;
+}
+
+TEST(Stage, OfABudgetThatNothingFitsGivesThePictureWithoutNoiseReduction) {
+  const RawFormatNames& names = names_of_bayer(10);
+  for (const std::int32_t denoise :
+       {LOWLUX_STAGE_DENOISE_FAST, LOWLUX_STAGE_DENOISE_HIGH_QUALITY, LOWLUX_STAGE_DENOISE_MINIMAL,
+        LOWLUX_STAGE_DENOISE_AUTO, LOWLUX_STAGE_DENOISE_OFF}) {
+    Rig rig(everything(), names, width, height, LOWLUX_STAGE_BGR888),
+        plain(everything(), names, width, height, LOWLUX_STAGE_BGR888);
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      const Codes codes = scene(names.format, width, height, i);
+      auto params = numbered(names.format, i);
+      params.denoise = LOWLUX_STAGE_DENOISE_OFF;
+      ASSERT_EQ(plain.process(codes, params), LOWLUX_STAGE_OK);
+      params.denoise = denoise;
+      ASSERT_EQ(rig.process(codes, budgeted(params, 0.01F)), LOWLUX_STAGE_OK) << rig.error();
+      EXPECT_EQ(rig.planes, plain.planes) << denoise << ' ' << i;
+      const bool asks = denoise != LOWLUX_STAGE_DENOISE_OFF;
+      EXPECT_EQ(rig.result.step, asks ? LOWLUX_STAGE_STEP_PLAIN : LOWLUX_STAGE_STEP_ALL) << denoise;
+      EXPECT_EQ(rig.result.level, LOWLUX_STAGE_LEVEL_NONE);
+      EXPECT_EQ(rig.result.temporal, 0);
+      EXPECT_EQ(rig.result.exposure_ev, plain.result.exposure_ev);
+      EXPECT_EQ(std::memcmp(&rig.statistics, &plain.statistics, sizeof rig.statistics), 0);
+      EXPECT_GT(rig.result.took_ms, 0.01) << "which is told";
+      EXPECT_EQ(rig.result.predicted_ms > 0, i > 0) << "no time is known of the first frame";
+    }
+  }
+}
+
+TEST(Stage, OfAnAmpleBudgetGivesTheSameBytesAsWithoutOneOnceItHasSeenAFrame) {
+  const RawFormatNames& names = names_of_bayer(10);
+  for (const std::int32_t denoise :
+       {LOWLUX_STAGE_DENOISE_HIGH_QUALITY, LOWLUX_STAGE_DENOISE_MINIMAL, LOWLUX_STAGE_DENOISE_AUTO}) {
+    Rig rig(everything(), names, width, height, LOWLUX_STAGE_BGR888),
+        free(everything(), names, width, height, LOWLUX_STAGE_BGR888);
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      auto params = numbered(names.format, i);
+      params.denoise = denoise;
+      const Codes codes = scene(names.format, width, height, i);
+      ASSERT_EQ(rig.process(codes, budgeted(params, 1e6F)), LOWLUX_STAGE_OK) << rig.error();
+      EXPECT_EQ(rig.result.step, i == 0 ? LOWLUX_STAGE_STEP_PLAIN : LOWLUX_STAGE_STEP_ALL) << denoise;
+      if (i == 0) continue;  // from here on frames before are the same for both
+      ASSERT_EQ(free.process(codes, params), LOWLUX_STAGE_OK);
+      EXPECT_EQ(rig.planes, free.planes) << denoise << ' ' << i;
+      EXPECT_EQ(rig.result.level, free.result.level);
+      EXPECT_EQ(rig.result.temporal, free.result.temporal);
+    }
+  }
+}
+
+TEST(Stage, KeepsWhatItKnowsOfTimesWhenResetAndForgetsItWhenConfigured) {
+  const RawFormatNames& names = names_of_bayer(10);
+  Rig rig(everything(), names, width, height, LOWLUX_STAGE_BGR888);
+  const Codes codes = scene(names.format, width, height);
+  const auto params = numbered(names.format, 0);
+  const auto step = [&](float budget_ms) {
+    EXPECT_EQ(rig.process(codes, budgeted(params, budget_ms)), LOWLUX_STAGE_OK) << rig.error();
+    return rig.result.step;
+  };
+  ASSERT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK);
+  EXPECT_EQ(rig.result.step, LOWLUX_STAGE_STEP_ALL) << "without a budget";
+  EXPECT_EQ(step(1e6F), LOWLUX_STAGE_STEP_ALL) << "times are known from frames without one too";
+  ASSERT_EQ(lowlux_stage_reset(rig.stage.get()), LOWLUX_STAGE_OK);
+  EXPECT_EQ(step(1e6F), LOWLUX_STAGE_STEP_ALL);
+  EXPECT_GT(rig.result.predicted_ms, 0);
+  ASSERT_EQ(lowlux_stage_configure(rig.stage.get(), &rig.in, &rig.out), LOWLUX_STAGE_OK);
+  EXPECT_EQ(step(1e6F), LOWLUX_STAGE_STEP_PLAIN);
+  EXPECT_EQ(rig.result.predicted_ms, 0);
 }
 
 // A still scene: the noise of clean mosaics falls with the number of frames.

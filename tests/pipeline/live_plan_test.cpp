@@ -93,6 +93,30 @@ TEST(LivePlanner, LevelsGoNoHigherThanTheSetupHasMemoryFor) {
   EXPECT_EQ(live->decided().noise_reduction.level, denoise::Level::standard);
 }
 
+TEST(LivePlanner, LevelsGoNoHigherThanAFrameMayHaveAndTellWhatTheyWouldHaveBeen) {
+  InlineExecutor one;
+  const RawFrame frame = night(flat(50, 50, 50));
+  const auto live = live_of(setup_of(frame), one), free = live_of(setup_of(frame), one);
+  read(*live, frame);
+  read(*free, frame);
+  for (const auto mode : {LiveDenoise::Mode::level, LiveDenoise::Mode::automatic}) {
+    LiveFacts facts = with_gain(4);
+    facts.denoise = {.mode = mode, .level = denoise::Level::high};
+    ASSERT_TRUE(free->plan(facts));
+    ASSERT_EQ(free->decided().noise_reduction.level, denoise::Level::standard);
+    for (const std::optional<denoise::Level> most :
+         {std::optional(denoise::Level::standard), std::optional(denoise::Level::draft),
+          std::optional<denoise::Level>{}, std::optional(denoise::Level::best)}) {
+      facts.denoise.most = most;
+      ASSERT_TRUE(live->plan(facts));
+      EXPECT_EQ(live->decided().noise_reduction.level, std::min(most, free->decided().noise_reduction.level));
+      EXPECT_EQ(live->decision().level, free->decided().noise_reduction.level) << "as if there were no bound";
+      EXPECT_TRUE(live->decision().reducible);
+      EXPECT_EQ(live->decided().exposure_ev, free->decided().exposure_ev);
+    }
+  }
+}
+
 TEST(LivePlanner, NoiseComesFromTheFramesWhereNothingIsGiven) {
   InlineExecutor one;
   const Scene slope = [](int x, int) { return std::array{1 + 0.4 * x, 1 + 0.6 * x, 1 + 0.5 * x}; };
@@ -122,6 +146,7 @@ TEST(LivePlanner, NoiseComesFromTheFramesWhereNothingIsGiven) {
   ASSERT_TRUE(live->plan(facts));
   EXPECT_EQ(live->decision().noise, LiveSource::none);
   EXPECT_FALSE(live->decided().noise_reduction.reduces());
+  EXPECT_FALSE(live->decision().reducible || live->decision().level);
 }
 
 TEST(LivePlanner, BlackIsGivenElseMaskedElseTheDarkestPlace) {
