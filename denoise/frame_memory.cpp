@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <new>
 
 #include "denoise/rows.h"
 
@@ -141,7 +142,8 @@ FrameMemory::FrameMemory(int max_width, int max_height, int threads, bool best)
   const Extent extent = extent_of(*this);
   saturated = Plane<std::uint8_t>(extent.width, extent.height);
   // Zeros: what lies beside rows is read, and must be numbers.
-  memory_ = std::make_unique<float[]>(lay_out(nullptr));
+  memory_.reset(static_cast<float*>(std::calloc(lay_out(nullptr), sizeof(float))));
+  if (!memory_) throw std::bad_alloc();
   lay_out(memory_.get());
   for (int i = 0; i < threads; ++i) search[i].found = found_.data() + static_cast<std::ptrdiff_t>(i) * max_width;
   const auto width = static_cast<std::size_t>(extent.width);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <vector>
 
@@ -82,7 +83,10 @@ struct FrameMemory : FrameLayout {
   std::vector<unsigned char> has_chroma;  // for each level, each tile
 
  private:
-  std::unique_ptr<float[]> memory_;
+  struct Free {
+    void operator()(float* memory) const { std::free(memory); }
+  };
+  std::unique_ptr<float[], Free> memory_;  // zeros of the system, which threads touch first
   std::vector<std::int32_t> found_;
   std::vector<std::uint8_t> chroma_;
 };

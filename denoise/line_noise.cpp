@@ -1,11 +1,13 @@
 #include "denoise/line_noise.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -23,12 +25,13 @@ double median_factor(double n) { return std::numbers::pi / 2 * n / (n + std::num
 constexpr double hodges_lehmann_factor = std::numbers::pi / 3;
 
 /// The median of what is finite; NaN if nothing is. Reorders.
-double median_of(std::vector<double>& values) {
-  std::erase_if(values, [](double v) { return !std::isfinite(v); });
-  if (values.empty()) return nan;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
+double median_of(std::span<double> values) {
+  const auto infinite = std::partition(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  const auto count = infinite - values.begin();
+  if (count == 0) return nan;
+  const auto middle = values.begin() + count / 2;
+  std::nth_element(values.begin(), middle, infinite);
+  if (count % 2 == 1) return *middle;
   return (*middle + *std::max_element(values.begin(), middle)) / 2;
 }
 
@@ -54,31 +57,38 @@ double robust_std(std::vector<double> values) {
 Plane<double> group_means(PlaneView<const float> pixels, Lines lines) {
   const bool rows = lines == Lines::rows;
   const int count = rows ? pixels.height : pixels.width, length = rows ? pixels.width : pixels.height;
-  Plane<double> out(groups, count);
+  Plane<double> sum(groups, count), number(groups, count);
+  std::fill_n(sum.data(), sum.size(), 0.0);
+  std::fill_n(number.data(), number.size(), 0.0);
   const int pairs = (length + 1) / 2;
-  for (int line = 0; line < count; ++line) {
-    double sum[groups] = {}, number[groups] = {};
-    for (int i = 0; i < length; ++i) {
-      const float value = rows ? pixels.at(i, line) : pixels.at(line, i);
-      if (!std::isfinite(value)) continue;
-      const int group = 2 * static_cast<int>(static_cast<long long>(i / 2) * segments / pairs) + i % 2;
-      sum[group] += value;
-      number[group] += 1;
+  const auto group_of = [&](int i) {
+    return 2 * static_cast<int>(static_cast<long long>(i / 2) * segments / pairs) + i % 2;
+  };
+  // Row by row for columns too, as memory lies; each group's sum has the same order either way.
+  for (int y = 0; y < pixels.height; ++y) {
+    const float* const row = pixels.row(y);
+    for (int x = 0; x < pixels.width; ++x) {
+      if (!std::isfinite(row[x])) continue;
+      const int line = rows ? y : x, group = rows ? group_of(x) : group_of(y);
+      sum.at(group, line) += static_cast<double>(row[x]);
+      number.at(group, line) += 1;
     }
-    for (int g = 0; g < groups; ++g) out.at(g, line) = number[g] > 0 ? sum[g] / number[g] : nan;
   }
-  return out;
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    sum.data()[i] = number.data()[i] > 0 ? sum.data()[i] / number.data()[i] : nan;
+  }
+  return sum;
 }
 
 /// Line i less line j, group by group.
-std::vector<double> differences(const Plane<double>& means, int i, int j) {
-  std::vector<double> out(groups);
+std::array<double, groups> differences(const Plane<double>& means, int i, int j) {
+  std::array<double, groups> out{};
   for (int g = 0; g < groups; ++g) out[static_cast<std::size_t>(g)] = means.at(g, i) - means.at(g, j);
   return out;
 }
 
 double line_difference(const Plane<double>& means, int i, int j) {
-  std::vector<double> by_group = differences(means, i, j);
+  std::array<double, groups> by_group = differences(means, i, j);
   return median_of(by_group);
 }
 
@@ -95,7 +105,7 @@ std::optional<Scatter> scatter_of(const Plane<double>& means) {
   within.reserve(means.size());
   between.reserve(static_cast<std::size_t>(means.height()));
   for (int line = 0; line + 2 < means.height(); ++line) {
-    std::vector<double> by_group = differences(means, line + 2, line);
+    const std::array<double, groups> by_group = differences(means, line + 2, line);
     const double common = line_difference(means, line + 2, line);
     if (!std::isfinite(common)) continue;
     between.push_back(common);
@@ -218,6 +228,10 @@ Result<LineOffsets> line_offsets_of_frame(PlaneView<const float> charge_e, Lines
   out.line_std_e = std::sqrt(line_e2);
   out.measured_std_e = std::sqrt(error_e2);
   out.gain = share(line_e2, line_e2 + error_e2);
+  if (options.least_std_e > 0 && (out.line_std_e < options.least_std_e || out.gain < 0.5)) {
+    out.residual_std_e = out.line_std_e;
+    return out;
+  }
   const double bound_e = 3 * std::sqrt(2 * (line_e2 + error_e2));
   double residual_e2 = 0;
   out.offset_e.reserve(static_cast<std::size_t>(of->means.height()));

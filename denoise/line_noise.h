@@ -34,6 +34,9 @@ struct FrameLineOptions {
   std::optional<double>
       known_std_e;  // line noise by calibration, >= 0; absent: measured, so that blinds look like noise
   int reach = 8;    // lines of the same colours to either side that a line is compared with, 1 to 64
+  /// Where less than this is measured, or the gain is below 0.5, no line is compared: no offsets are given, and the
+  /// residual is the lines' own noise. Comparing takes most of the time.
+  double least_std_e = 0;
 };
 
 /// From the picture itself: each line against its neighbours of the same colours,

@@ -45,7 +45,7 @@ RawFrame frame_of(const FrameSize& size, double mean_e) {
     for (int x = 0; x < size.width; ++x) {
       const int c = static_cast<int>(colour_at(raw.phase, x, y));
       const double wave = std::sin(2 * std::numbers::pi * (x * (3.0 + c) / size.width + y * 2.0 / size.height));
-      const double texture = ((x / 6) ^ (y / 6)) % 5 == 0 ? 1.2 : 0.95;
+      const double texture = ((x / 6) ^ (y / 6)) % 5 == 0 ? 1.04 : 0.99;
       const double e = mean_e * (1 + 0.3 * wave) * texture;
       const double noisy = e + std::sqrt(e + read_noise_e * read_noise_e) * static_cast<double>(normal[x]);
       raw.dn.at(x, y) = static_cast<std::uint16_t>(std::lround(std::clamp(black_dn + dn_per_e * noisy, 0.0, white_dn)));

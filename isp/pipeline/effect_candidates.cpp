@@ -137,7 +137,7 @@ void rate(const EffectFacts& facts, EffectCandidate& plan) {
     squares += size * size;
   };
   leave(plan.defects, facts.sizes.defects);
-  leave(plan.lines, facts.sizes.lines);
+  leave(plan.lines && plan.level, facts.sizes.lines);  // they go with the noise, or stay with it
   leave(plan.dark || plan.level, facts.sizes.dark);
   leave(plan.display, facts.sizes.display);
   plan.error = std::sqrt(squares);

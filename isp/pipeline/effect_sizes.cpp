@@ -19,6 +19,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double largest_delta_e = 100;
+constexpr double only_how_much = std::numeric_limits<double>::infinity();  // no line's own offset is asked
 
 double share_of(const RawFrame& frame, std::span<const Rect> squares) {
   const Rect& active = frame.raw.active;
@@ -91,7 +92,7 @@ double line_std_e(const RawElectrons& sample, int squares, denoise::Lines kind, 
   std::optional<denoise::LineOffsets> mean;
   for (int i = 0; i < squares; ++i) {
     const auto part = sample.value.view().crop(0, i * sample_side_px, sample_side_px, sample_side_px);
-    auto found = denoise::line_offsets_of_frame(part, kind);
+    auto found = denoise::line_offsets_of_frame(part, kind, {.least_std_e = only_how_much});
     if (!found) continue;
     squares_e2 += found->line_std_e * found->line_std_e;
     ++measured;

@@ -74,4 +74,13 @@ RawElectrons sample_electrons(const RawFrame& frame, const DevelopPlan& plan, st
   return out;
 }
 
+RawElectrons sample_of(const RawElectrons& charge, std::span<const Rect> squares) {
+  RawElectrons out{Plane<float>(sample_side_px, sample_side_px * static_cast<int>(squares.size())), charge.phase};
+  for (int y = 0; y < out.value.height(); ++y) {
+    const Rect& square = squares[static_cast<std::size_t>(y / sample_side_px)];
+    std::copy_n(charge.value.row(square.y + y % sample_side_px) + square.x, sample_side_px, out.value.row(y));
+  }
+  return out;
+}
+
 }  // namespace lowlux::isp

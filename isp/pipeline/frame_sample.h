@@ -25,4 +25,7 @@ RawDn square_codes(const RawDn& raw, const Rect& square);
 RawElectrons sample_electrons(const RawFrame& frame, const DevelopPlan& plan, std::span<const Rect> squares,
                               Executor& executor);
 
+/// The squares of a mosaic that is there already, one below the other.
+RawElectrons sample_of(const RawElectrons& charge, std::span<const Rect> squares);
+
 }  // namespace lowlux::isp

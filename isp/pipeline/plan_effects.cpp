@@ -61,8 +61,9 @@ EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
          facts.sizes.defects_words, plan.defects ? cost_of(facts, {{CostPart::defects}}) : std::nullopt});
   }
   if (facts.may_take_lines) {
-    add({"row and column noise", facts.sizes.lines, left(plan.lines, facts.sizes.lines), plan.lines,
-         facts.sizes.lines_words, plan.lines ? cost_of(facts, {{CostPart::lines}}) : std::nullopt});
+    const bool taken = plan.lines && plan.level;
+    add({"row and column noise", facts.sizes.lines, left(taken, facts.sizes.lines), taken, facts.sizes.lines_words,
+         taken ? cost_of(facts, {{CostPart::lines}}) : std::nullopt});
   }
   if (facts.sizes.dark > 0) {
     const bool used = plan.dark || plan.level;

@@ -60,10 +60,19 @@ std::array<double, 3> balance_of(const RawFrame& frame, const DevelopPlan& plan)
   return gain;
 }
 
+/// Of a pixel without light.
+double black_std_e(const denoise::RawNoise& noise) {
+  const auto& v = noise.variance_e2;
+  return std::sqrt(noise.dark_mean_e[0] + (v[0] + 2 * v[1] + v[2]) / 4);
+}
+
+/// What is seen of lines: the eye follows their sum.
+double least_line_std_e(const denoise::RawNoise& noise) { return 0.03 * black_std_e(noise); }
+
 std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, const Plane<float>& charge_e) {
   std::vector<denoise::LineOffsets> lines;
   for (const auto kind : {denoise::Lines::rows, denoise::Lines::columns}) {
-    auto found = denoise::line_offsets_of_frame(charge_e.view(), kind);
+    auto found = denoise::line_offsets_of_frame(charge_e.view(), kind, {.least_std_e = least_line_std_e(plan.noise)});
     if (found && lines_stand_out(*found, plan.noise)) lines.push_back(*std::move(found));
   }
   return lines;
@@ -102,10 +111,14 @@ void choose_level(const DenoiseChoice& choice, const std::optional<EffectsPlan>&
   out.reason = fmt::format("signal to noise ratio {:.3g} of a pixel in the middle block", *out.snr);
 }
 
-/// Everything of the frame, or a sample of it where that will do.
-RawElectrons charge_to_check(const RawFrame& frame, const DevelopPlan& plan, bool with_lines, Executor& executor) {
-  const std::vector<Rect> squares = with_lines ? std::vector<Rect>{} : sample_squares(frame, plan);
-  return squares.empty() ? raw_electrons(frame, plan, {}, executor) : sample_electrons(frame, plan, squares, executor);
+/// Lines need the whole frame; what noise is left is checked on a sample of it where there is one.
+RawElectrons charge_to_check(const RawFrame& frame, const DevelopPlan& plan, bool with_lines, NoiseReduction& out,
+                             Executor& executor) {
+  const std::vector<Rect> squares = sample_squares(frame, plan);
+  if (!with_lines && !squares.empty()) return sample_electrons(frame, plan, squares, executor);
+  RawElectrons charge = raw_electrons(frame, plan, {}, executor);
+  if (with_lines) take_lines_off(charge, out);
+  return squares.empty() ? std::move(charge) : sample_of(charge, squares);
 }
 
 }  // namespace
@@ -126,10 +139,7 @@ std::optional<Error> noise_obstacle(const RawFrame& frame, const DevelopPlan& pl
 }
 
 bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise) {
-  constexpr double seen = 0.03;
-  const auto& v = noise.variance_e2;
-  const double pixel_std_e = std::sqrt(noise.dark_mean_e[0] + (v[0] + 2 * v[1] + v[2]) / 4);
-  return found.gain >= 0.5 && found.line_std_e > seen * pixel_std_e && found.line_std_e < pixel_std_e;
+  return found.gain >= 0.5 && found.line_std_e > least_line_std_e(noise) && found.line_std_e < black_std_e(noise);
 }
 
 std::optional<denoise::Level> level_for(double snr) {
@@ -179,8 +189,7 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   if (!out.level) return out;
   out.options.level = *out.level;
   const bool with_lines = choice.line_noise && (!plan.effects || plan.effects->lines);
-  RawElectrons charge = charge_to_check(frame, plan, with_lines, executor);
-  if (with_lines) take_lines_off(charge, out);
+  const RawElectrons charge = charge_to_check(frame, plan, with_lines, out, executor);
   const denoise::NoiseCheck check = denoise::check_noise({charge.value.view(), charge.phase}, out.noise);
   for (const denoise::NoiseRemark& remark : denoise::remarks_on(check)) plan.warnings.push_back(remark.text);
   out.options.variance_scale = denoise::variance_scale_of(check);

@@ -155,7 +155,7 @@ class DevelopDenoise : public DenoiseCommand {
 TEST_F(DevelopDenoise, TheNoiseOfARealFileThatStatesNoneIsMeasuredAndTheCommandSaysSo) {
   const Json json = report(real("canon_kissx4_ml_colorchart.dng"), {});
   EXPECT_EQ(json["denoise"]["noise_source"], "picture");
-  EXPECT_EQ(json["denoise"]["level"], "standard");
+  EXPECT_EQ(json["denoise"]["level"], "high");
   const std::string warning = json["warnings"].dump();
   EXPECT_NE(warning.find("measured on the picture itself"), std::string::npos) << warning;
 }

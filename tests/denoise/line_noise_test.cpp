@@ -126,6 +126,19 @@ double worst_line(const std::vector<double>& truth, const LineOffsets& found) {
   return worst;
 }
 
+TEST(LineNoise, BelowTheLeastThatIsAskedForIsMeasuredAndLeft) {
+  const Plane<float> frame = frame_of(256, 256, no_light, row_offsets(256, 1));
+  const auto all = line_offsets_of_frame(frame.view(), Lines::rows);
+  const auto asked = line_offsets_of_frame(frame.view(), Lines::rows, {.least_std_e = 0.5});
+  const auto not_asked = line_offsets_of_frame(frame.view(), Lines::rows, {.least_std_e = 2});
+  ASSERT_TRUE(all && asked && not_asked);
+  EXPECT_EQ(asked->offset_e, all->offset_e);
+  EXPECT_TRUE(not_asked->offset_e.empty());
+  EXPECT_EQ(not_asked->line_std_e, all->line_std_e);
+  EXPECT_EQ(not_asked->gain, all->gain);
+  EXPECT_EQ(not_asked->residual_std_e, all->line_std_e);
+}
+
 TEST(LineNoise, EdgesOfTheSceneDoNotBecomeLines) {
   const Scene scenes[] = {
       [](int, int y) { return y < 256 ? 60.0 : 15.0; },               // a horizon
