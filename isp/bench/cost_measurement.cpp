@@ -26,9 +26,9 @@ struct FrameSize {
   int width;
   int height;
 };
-constexpr std::array<FrameSize, 3> sizes{{{672, 448}, {1728, 1152}, {3680, 2448}}};
-constexpr std::array<int, 3> rounds{5, 3, 3};
-constexpr std::size_t best_sizes = 1;  // what takes seconds for each megapixel is measured on the smallest, once
+constexpr std::array<FrameSize, 4> sizes{{{256, 192}, {672, 448}, {1728, 1152}, {3680, 2448}}};
+constexpr std::array<int, 4> rounds{9, 7, 5, 3};
+constexpr std::size_t best_sizes = 2;  // what takes seconds for each megapixel is measured on the smaller ones, once
 constexpr double black_dn = 512, white_dn = 16383, dn_per_e = 4, read_noise_e = 1.5;
 /// Mean electrons, so that the chroma of most of the frame starts on level 0, 1 and 2.
 constexpr std::array<double, 3> light_e{200, 2, 0.5};
@@ -215,7 +215,7 @@ Result<CostModel> measure_cost(Executor& executor, const std::function<void(doub
   CostModel model;
   model.threads = executor.width();
   for (std::size_t i = 0; i < sizes.size(); ++i) {
-    const double share = std::array{0.05, 0.25, 0.7}[i] / 6;
+    const double share = std::array{0.01, 0.09, 0.25, 0.65}[i] / 6;
     Measurement at(i, display, model, executor);
     const std::string name = fmt::format("{:.1f} MP", 1e-6 * sizes[i].width * sizes[i].height);
     if (auto done = at.without_reduction(); !done) return tl::make_unexpected(done.error());

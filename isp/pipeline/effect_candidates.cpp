@@ -13,6 +13,9 @@ namespace {
 
 using denoise::Level;
 
+/// CIEDE2000 that what is not predicted counts for where plans are compared: so that it is done where there is time.
+constexpr double size_of_unknown = 0.3;
+
 CostPart part_of(Level level, int start) {
   if (level == Level::best) return start == 2 ? CostPart::best_2 : CostPart::best_0;
   constexpr std::array first{CostPart::draft_0, CostPart::standard_0, CostPart::high_0};
@@ -118,6 +121,23 @@ Result<EffectCandidate> within_budget(const EffectFacts& facts, double budget_s)
 
 }  // namespace
 
+LevelNoise level_noise(const std::vector<SeenBlock>& blocks) {
+  std::vector<float> rms(blocks.size());
+  const auto percentile = [&](const auto& share) {
+    std::ranges::transform(blocks, rms.begin(), [&](const SeenBlock& block) {
+      return static_cast<float>(share(static_cast<double>(block.snr))) * block.noise_delta_e;
+    });
+    return seen_percentile(rms);
+  };
+  LevelNoise out;
+  out.all = percentile([](double) { return 1.0; });
+  out.without_level = left_of_noise(std::nullopt, 0) * out.all;
+  for (const Level level : {Level::draft, Level::standard}) {
+    out.left[static_cast<std::size_t>(level)] = percentile([&](double snr) { return left_of_noise(level, snr); });
+  }
+  return out;
+}
+
 std::array<double, 3> start_shares(const std::vector<SeenBlock>& blocks) {
   std::array<double, 3> share{};
   for (const SeenBlock& block : blocks) {
@@ -128,16 +148,15 @@ std::array<double, 3> start_shares(const std::vector<SeenBlock>& blocks) {
 }
 
 void rate(const EffectFacts& facts, EffectCandidate& plan) {
-  plan.left = facts.has_noise ? seen_noise(facts, [&](double snr) { return left_of_noise(plan.level, snr); }) : 0;
-  double squares =
-      facts.has_noise ? std::pow(seen_noise(facts, [&](double) { return error_share(plan.level); }), 2) : 0;
+  plan.left = facts.noise.left_by(plan.level);
+  double squares = std::pow(error_share(plan.level) * facts.noise.all, 2);
   const auto leave = [&](bool used, double size) {
-    if (used || !(size > 0)) return;
-    plan.left += size;
-    squares += size * size;
+    if (used || size == 0) return;
+    if (!std::isnan(size)) plan.left += size;
+    squares += std::pow(std::isnan(size) ? size_of_unknown : size, 2);
   };
-  leave(plan.defects, facts.sizes.defects);
-  leave(plan.lines && plan.level, facts.sizes.lines);  // they go with the noise, or stay with it
+  if (facts.may_search) leave(plan.defects, facts.sizes.defects);
+  if (facts.may_take_lines) leave(plan.lines && plan.level, facts.sizes.lines);  // they go with the noise, or stay
   leave(plan.dark || plan.level, facts.sizes.dark);
   leave(plan.display, facts.sizes.display);
   plan.error = std::sqrt(squares);

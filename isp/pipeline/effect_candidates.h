@@ -16,6 +16,18 @@ namespace lowlux::isp {
 /// pictures it was tuned on, and others may exceed it by a little.
 constexpr double share_for_level = 0.9;
 
+/// What is seen of the noise of a frame, and what levels leave of it: seen_percentile() over its blocks.
+struct LevelNoise {
+  double all = 0;
+  std::array<double, denoise::all_levels.size()> left{};  // by each level, against Level::high
+  double without_level = 0;                               // the same without any
+
+  double left_by(std::optional<denoise::Level> level) const {
+    return level ? left[static_cast<std::size_t>(*level)] : without_level;
+  }
+};
+LevelNoise level_noise(const std::vector<SeenBlock>& blocks);
+
 /// One way to develop the frame.
 struct EffectCandidate {
   std::optional<denoise::Level> level;
@@ -34,6 +46,7 @@ struct EffectFacts {
   EffectSizes sizes;
   std::vector<SeenBlock> blocks;
   bool has_noise = false;  // it is known, and may be reduced
+  LevelNoise noise;
   std::optional<denoise::Level> fixed_level;
   bool level_is_fixed = false;
   bool may_search = true;
@@ -48,17 +61,6 @@ struct EffectFacts {
 
 /// Shares of the frame whose chroma starts on each level, as denoise/chroma_start.h decides it.
 std::array<double, 3> start_shares(const std::vector<SeenBlock>& blocks);
-
-/// The percentile of the noise of all blocks, each times share(its signal to noise ratio).
-template <class Share>
-double seen_noise(const EffectFacts& facts, const Share& share) {
-  std::vector<float> rms;
-  rms.reserve(facts.blocks.size());
-  for (const SeenBlock& block : facts.blocks) {
-    rms.push_back(static_cast<float>(share(static_cast<double>(block.snr))) * block.noise_delta_e);
-  }
-  return seen_percentile(rms);
-}
 
 /// Sets left, error and seconds (0 without a cost model).
 void rate(const EffectFacts& facts, EffectCandidate& plan);

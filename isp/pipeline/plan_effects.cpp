@@ -42,8 +42,7 @@ EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
   const auto left = [](bool used, double size) { return used || !(size > 0) ? 0 : size; };
   const auto add = [&](PlannedEffect effect) { out.effects.push_back(std::move(effect)); };
   if (facts.has_noise) {
-    const double all = seen_noise(facts, [](double) { return 1.0; });
-    const double kept = seen_noise(facts, [&](double snr) { return left_of_noise(plan.level, snr); });
+    const double all = facts.noise.all, kept = facts.noise.left_by(plan.level);
     PlannedEffect noise{
         "noise", all, plan.level ? kept : std::min(kept, all), plan.level.has_value(), level_words(facts, plan), {}};
     if (facts.choice.cost) {
@@ -105,6 +104,7 @@ EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const De
     set_noise_model(frame, plan, reduction);
     facts.blocks = seen_blocks(frame, plan, reduction.noise, thumbnail);
     facts.has_noise = !facts.blocks.empty();
+    facts.noise = level_noise(facts.blocks);
   }
   facts.level_is_fixed = o.denoise.mode != DenoiseChoice::Mode::automatic;
   if (o.denoise.mode == DenoiseChoice::Mode::level) facts.fixed_level = o.denoise.level;

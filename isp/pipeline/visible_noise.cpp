@@ -13,7 +13,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int most_blocks_along = 20;
+constexpr int most_blocks_along = 16;
 constexpr std::array<double, 3> samples_in_box{16, 32, 16};  // of R, G, B
 constexpr std::array<double, 3> share_of_sites{0.25, 0.5, 0.25};
 constexpr double least_variance_e2 = 1e-6;
@@ -154,7 +154,7 @@ double seen_percentile(std::span<const float> rms_delta_e) {
   };
   double low = 0, high = 5 * static_cast<double>(*std::ranges::max_element(rms_delta_e));
   if (!(high > 0)) return 0;
-  for (int step = 0; step < 40; ++step) {
+  for (int step = 0; step < 24; ++step) {
     const double middle = (low + high) / 2;
     (share_above(middle) > 1 - seen_share ? low : high) = middle;
   }

@@ -26,7 +26,7 @@ struct SeenBlock {
   float display_delta_e = 0;  // CIEDE2000 of the change for another display, if one is planned
 };
 
-/// Up to 400 blocks, evenly spread over the frame. With C the colour as it will be displayed and s_c the standard
+/// Up to 256 blocks, evenly spread over the frame. With C the colour as it will be displayed and s_c the standard
 /// deviation of the mean of the 16, 32 and 16 samples of R, G and B that 64 pixels hold,
 ///     noise_delta_e^2 = sum over c of CIEDE2000(C(r), C(r + s_c))^2.
 /// Needs the plan's white balance, transform and electrons at white. Empty for spaces without primaries.
