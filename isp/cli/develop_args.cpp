@@ -131,7 +131,7 @@ void add_denoise(CLI::App& app, DevelopArgs& args) {
         choice.mode = named.mode;
         choice.level = named.level;
       },
-      "noise reduction, by how much work it is; auto (default) chooses by the signal to noise ratio");
+      "noise reduction, by how much work it is; auto (default) chooses by how much noise there is");
   add_choice<bool>(
       app, "--line-noise", {{"auto", true}, {"off", false}}, [&choice](bool lines) { choice.line_noise = lines; },
       "noise that whole rows or columns share: take it off where it stands out (default) or leave it");

@@ -30,7 +30,7 @@ void add_effects(Lines& out, const isp::EffectsPlan& effects, const isp::Effects
                          ? fmt::format("auto, tolerance {:.2g} CIEDE2000", *choice.tolerance_delta_e)
                          : std::string("auto, as accurate as the budget lets them be"));
   for (const isp::PlannedEffect& effect : effects.effects) {
-    std::string text = fmt::format("{}: {}", effect.name, effect.used ? "reduced" : "left");
+    std::string text = fmt::format("{}: {}", effect.name, effect.used ? "done" : "left out");
     text += std::isfinite(effect.size)
                 ? fmt::format("; {:.2g} CIEDE2000, of which {:.2g} may stay", effect.size, effect.left)
                 : std::string("; size not predicted");
