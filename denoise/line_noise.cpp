@@ -250,8 +250,9 @@ void subtract_lines(const LineOffsets& offsets, PlaneView<float> charge_e, int f
          offsets.offset_e.size() >= static_cast<std::size_t>(first + (rows ? charge_e.height : charge_e.width)));
   for (int y = 0; y < charge_e.height; ++y) {
     for (int x = 0; x < charge_e.width; ++x) {
-      charge_e.at(x, y) =
-          static_cast<float>(charge_e.at(x, y) - offsets.offset_e[static_cast<std::size_t>(first + (rows ? y : x))]);
+      charge_e.at(x, y) = static_cast<float>(
+          charge_e.at(x, y) -
+          offsets.offset_e[static_cast<std::size_t>(first) + static_cast<std::size_t>(rows ? y : x)]);
     }
   }
 }
