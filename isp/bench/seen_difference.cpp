@@ -34,11 +34,11 @@ class ColumnSums {
     for (int x = 0; x < picture_[0].width; ++x) {
       for (std::size_t c = 0; c < 3; ++c) {
         box[c] += sum_[c][static_cast<std::size_t>(x)];
-        if (x >= seen_box_px) box[c] -= sum_[c][static_cast<std::size_t>(x - seen_box_px)];
+        if (x >= seen_box_px) box[c] -= sum_[c][static_cast<std::size_t>(x) - seen_box_px];
       }
       if (x < seen_box_px - 1) continue;
       const Vector3 mean{box[0] / pixels, box[1] / pixels, box[2] / pixels};
-      out[static_cast<std::size_t>(x - seen_box_px + 1)] = lab_of(xyz_of(to_xyz * mean), white);
+      out[static_cast<std::size_t>(x) - (seen_box_px - 1)] = lab_of(xyz_of(to_xyz * mean), white);
     }
   }
 

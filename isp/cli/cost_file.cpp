@@ -77,8 +77,10 @@ std::string machine_name() {
 }
 
 std::optional<std::string> cost_file(int threads) {
+  // NOLINTBEGIN(concurrency-mt-unsafe): nothing here sets variables
   const char* const cache = std::getenv("XDG_CACHE_HOME");
   const char* const home = std::getenv("HOME");
+  // NOLINTEND(concurrency-mt-unsafe)
   std::filesystem::path folder;
   if (cache != nullptr && *cache == '/') {
     folder = cache;
