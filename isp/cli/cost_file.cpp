@@ -68,7 +68,9 @@ Result<void> write_cost(const std::string& path, const isp::CostModel& model) {
 
 }  // namespace
 
-int threads_for_one_file() { return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8); }
+int threads_of_each(int files) {
+  return std::clamp(static_cast<int>(std::thread::hardware_concurrency()) / files, 1, 8);
+}
 
 std::string machine_name() {
   const Machine machine = this_machine(1);

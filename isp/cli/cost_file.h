@@ -10,8 +10,8 @@
 /// What developing costs on this machine, kept between runs.
 namespace lowlux::cli {
 
-/// Threads that work on one file where files are taken one at a time: one for each processor, up to 8.
-int threads_for_one_file();
+/// Threads that work on one file where so many are taken at a time: the processors' share, up to 8.
+int threads_of_each(int files);
 
 /// What times depend on: processor, instruction set, version of lowlux. Another machine's times are not believed.
 std::string machine_name();

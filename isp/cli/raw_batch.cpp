@@ -85,11 +85,6 @@ DevelopOutcome outcome_of(const Job& job, const RawWork& work, Executor& executo
   return out;
 }
 
-int threads_of_each(int workers) {
-  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  return std::clamp(processors / workers, 1, 8);
-}
-
 /// Each worker takes the next file: while one reads, another renders or encodes.
 std::vector<DevelopOutcome> run_all(const RawBatch& batch, const RawWork& work) {
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -136,7 +131,7 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
     if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
   }
   if (args.effects.budgeted()) {
-    auto cost = cost_of_this_machine(threads_for_one_file(), args.quiet);
+    auto cost = cost_of_this_machine(threads_of_each(1), args.quiet);
     if (!cost) return tl::make_unexpected(cost.error());
     batch.cost = std::make_shared<const isp::CostModel>(*std::move(cost));
   }

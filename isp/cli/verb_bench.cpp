@@ -89,7 +89,7 @@ int failed(const Error& error) {
 
 /// Times of each part for a frame of 12 MP.
 int run_calibrate_cost(const BenchArgs& args) {
-  const int threads = args.threads > 0 ? args.threads : threads_for_one_file();
+  const int threads = args.threads > 0 ? args.threads : threads_of_each(1);
   std::string file;
   const auto model = calibrate_cost(threads, args.json, file);
   if (!model) return failed(model.error());

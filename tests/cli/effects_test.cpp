@@ -25,7 +25,7 @@ class EffectsCommand : public test::SimulateCommand {
     setenv("XDG_CACHE_HOME", file("cache").c_str(), 1);
     isp::CostModel model = *test::reference_cost();
     model.machine = cli::machine_name();
-    model.threads = cli::threads_for_one_file();
+    model.threads = cli::threads_of_each(1);
     std::filesystem::create_directories(file("cache/lowlux"));
     std::ofstream(*cli::cost_file(model.threads)) << cli::cost_text(model);
   }
