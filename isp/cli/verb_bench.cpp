@@ -15,6 +15,7 @@
 #include "isp/cli/progress.h"
 #include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
+#include "isp/pipeline/frame_sample.h"
 
 namespace lowlux::cli {
 namespace {
@@ -100,7 +101,8 @@ int run_calibrate_cost(const BenchArgs& args) {
   fmt::print("{}, {} threads; ms for a frame of 12 MP\n", model->machine, threads);
   for (int i = 0; i < isp::cost_parts; ++i) {
     const auto part = static_cast<isp::CostPart>(i);
-    fmt::print("  {:<12}{:10.1f}\n", name_of(part), 1e3 * model->seconds(part, 12));
+    const double megapixels = part == isp::CostPart::samples ? isp::sample_megapixels : 12;  // however large the frame
+    fmt::print("  {:<12}{:10.1f}\n", name_of(part), 1e3 * model->seconds(part, megapixels));
   }
   fmt::print("{}\n", file.empty() ? "not kept" : "kept in " + file);
   return exit_done;

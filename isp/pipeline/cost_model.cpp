@@ -8,9 +8,9 @@ namespace lowlux::isp {
 
 std::string_view name_of(CostPart part) {
   static constexpr std::array<std::string_view, cost_parts> names{
-      "planning", "defects", "lines",      "check",      "codes",      "floats", "draft-0",
-      "draft-1",  "draft-2", "standard-0", "standard-1", "standard-2", "high-0", "high-1",
-      "high-2",   "best-0",  "best-2",     "codes-16",   "floats-32",  "look",   "display"};
+      "planning", "samples", "defects", "lines",      "offsets",    "check",      "codes",  "floats",
+      "draft-0",  "draft-1", "draft-2", "standard-0", "standard-1", "standard-2", "high-0", "high-1",
+      "high-2",   "best-0",  "best-2",  "codes-16",   "floats-32",  "look",       "display"};
   return names[static_cast<std::size_t>(part)];
 }
 

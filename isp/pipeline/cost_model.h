@@ -13,9 +13,11 @@ namespace lowlux::isp {
 
 /// Parts of the work that plans differ in.
 enum class CostPart : std::uint8_t {
-  planning,  // black point, thumbnail, white, exposure, samples: what every plan begins with
+  planning,  // black point, thumbnail, white, exposure: what every plan begins with
+  samples,   // of the frame, looked into for hot pixels, row and column noise
   defects,   // the search in the whole frame
-  lines,     // row and column noise of the whole frame
+  lines,     // row and column noise looked for in the whole frame
+  offsets,   // what it takes more where it stands out
   check,     // of the noise model
   codes,     // rendering straight from codes
   floats,    // rendering from electrons
@@ -35,7 +37,7 @@ enum class CostPart : std::uint8_t {
   look,     // what the look of the eye takes more
   display,  // what the change for a display takes more
 };
-inline constexpr int cost_parts = 21;
+inline constexpr int cost_parts = 23;
 
 /// "planning", "draft-1" and so on.
 std::string_view name_of(CostPart part);

@@ -6,12 +6,22 @@
 
 #include <fmt/format.h>
 
+#include "denoise/layout.h"
 #include "isp/pipeline/plan_effects.h"
 
 namespace lowlux::isp {
 namespace {
 
 using denoise::Level;
+
+/// How much of what row and column noise takes is counted where it is not known whether there is any.
+constexpr double share_of_unknown = 0.5;
+
+/// How far from a tile another one lies at most whose chroma is worked on for its sake: two tiles
+/// (denoise/chroma_start.h) from its middle.
+constexpr float chroma_reach_px = 2.5f * 2 * denoise::tile;
+
+std::size_t start_of(const SeenBlock& block) { return block.snr >= 3 ? 0 : block.snr >= 0.7f ? 1 : 2; }
 
 /// CIEDE2000 that what is not predicted counts for where plans are compared: so that it is done where there is time.
 constexpr double size_of_unknown = 0.3;
@@ -24,13 +34,18 @@ CostPart part_of(Level level, int start) {
 
 std::vector<CostShare> work_of(const EffectFacts& facts, const EffectCandidate& plan) {
   std::vector<CostShare> work{{CostPart::planning}};
+  if (facts.sizes.sampled_share > 0) work.push_back({CostPart::samples, facts.sizes.sampled_share});
   if (plan.defects && facts.may_search) work.push_back({CostPart::defects});
   if (plan.level) {
-    if (plan.lines && facts.may_take_lines) work.push_back({CostPart::lines});
+    if (plan.lines && facts.may_take_lines) {
+      work.push_back({CostPart::lines});
+      const double size = facts.sizes.lines;
+      if (size != 0) work.push_back({CostPart::offsets, std::isnan(size) ? share_of_unknown : 1});
+    }
     work.push_back({CostPart::check});
-    const std::array<double, 3> share = start_shares(facts.blocks);
     for (int start = 0; start < 3; ++start) {
-      if (share[start] > 0) work.push_back({part_of(*plan.level, start), share[start]});
+      const double share = facts.chroma_work[static_cast<std::size_t>(start)];
+      if (share > 0) work.push_back({part_of(*plan.level, start), share});
     }
   } else {
     const bool repairs = plan.defects && facts.sizes.has_defects;
@@ -140,8 +155,21 @@ LevelNoise level_noise(const std::vector<SeenBlock>& blocks) {
 
 std::array<double, 3> start_shares(const std::vector<SeenBlock>& blocks) {
   std::array<double, 3> share{};
+  for (const SeenBlock& block : blocks) share[start_of(block)] += 1.0 / static_cast<double>(blocks.size());
+  if (blocks.empty()) share[0] = 1;
+  return share;
+}
+
+std::array<double, 3> chroma_work(const std::vector<SeenBlock>& blocks, const Rect& active) {
+  std::array<double, 3> share{};
   for (const SeenBlock& block : blocks) {
-    share[block.snr >= 3 ? 0 : block.snr >= 0.7f ? 1 : 2] += 1.0 / static_cast<double>(blocks.size());
+    std::size_t least = start_of(block);
+    for (const SeenBlock& other : blocks) {
+      const bool near = std::fabs(other.x - block.x) * static_cast<float>(active.width) <= chroma_reach_px &&
+                        std::fabs(other.y - block.y) * static_cast<float>(active.height) <= chroma_reach_px;
+      if (near) least = std::min(least, start_of(other));
+    }
+    share[least] += 1.0 / static_cast<double>(blocks.size());
   }
   if (blocks.empty()) share[0] = 1;
   return share;

@@ -141,12 +141,14 @@ EffectSizes effect_sizes(const RawFrame& frame, const DevelopPlan& plan, const T
   EffectSizes out;
   const std::vector<Rect> squares =
       frame.raw.layout == SensorLayout::bayer ? sample_squares(frame, plan) : std::vector<Rect>{};
+  const bool lines_asked = noise != nullptr && plan.options.denoise.line_noise;
+  if (plan.options.find_defects || lines_asked) out.sampled_share = share_of(frame, squares);
   if (plan.options.find_defects) {
     set_defects(frame, plan, defect_noise(frame, plan, thumbnail), squares, blocks, out, executor);
   }
   if (plan.options.display) out.display = noise == nullptr ? nan : percentile_of(blocks, &SeenBlock::display_delta_e);
   if (noise == nullptr) return out;
-  if (plan.options.denoise.line_noise) set_lines(frame, plan, *noise, squares, blocks, out, executor);
+  if (lines_asked) set_lines(frame, plan, *noise, squares, blocks, out, executor);
   out.dark = percentile_of(blocks, &SeenBlock::dark_delta_e);
   return out;
 }

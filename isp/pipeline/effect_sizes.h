@@ -16,7 +16,8 @@ namespace lowlux::isp {
 /// What leaving things out would change: CIEDE2000 as visible_noise.h measures it. Not a number: not known, because the
 /// frame is too small, or too uneven, for a sample to save anything.
 struct EffectSizes {
-  double defects = 0;  // of the 8 x 8 pixels around the strongest defect of the sample
+  double sampled_share = 0;  // of the frame
+  double defects = 0;        // of the 8 x 8 pixels around the strongest defect of the sample
   bool has_defects = false;
   std::string defects_words;
   double lines = 0;  // of row and column noise

@@ -8,7 +8,6 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int squares_along = 3, squares_down = 2;
 constexpr double least_gain = 2;  // a sample is of half the frame at most
 
 /// Even, and evenly spread.
@@ -31,18 +30,17 @@ std::vector<Pixel> inside(const std::vector<Pixel>& defects, const Rect& square)
 std::vector<Rect> sample_squares(const RawFrame& frame, const DevelopPlan& plan) {
   const Rect& active = frame.raw.active;
   const double pixels = static_cast<double>(active.width) * active.height;
-  constexpr double sampled = 1.0 * squares_along * squares_down * sample_side_px * sample_side_px;
   const bool even = !plan.black.pattern && !plan.options.dark_frame;
-  if (!even || pixels < least_gain * sampled || active.width < squares_along * sample_side_px ||
-      active.height < squares_down * sample_side_px) {
+  if (!even || 1e-6 * pixels < least_gain * sample_megapixels || active.width < sample_squares_along * sample_side_px ||
+      active.height < sample_squares_down * sample_side_px) {
     return {};
   }
   std::vector<Rect> out;
-  out.reserve(squares_along * squares_down);
-  for (int j = 0; j < squares_down; ++j) {
-    for (int i = 0; i < squares_along; ++i) {
-      out.push_back({place(i, squares_along, active.width), place(j, squares_down, active.height), sample_side_px,
-                     sample_side_px});
+  out.reserve(sample_squares_along * sample_squares_down);
+  for (int j = 0; j < sample_squares_down; ++j) {
+    for (int i = 0; i < sample_squares_along; ++i) {
+      out.push_back({place(i, sample_squares_along, active.width), place(j, sample_squares_down, active.height),
+                     sample_side_px, sample_side_px});
     }
   }
   return out;

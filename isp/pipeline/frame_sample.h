@@ -12,6 +12,9 @@
 namespace lowlux::isp {
 
 inline constexpr int sample_side_px = 512;  // of each square; whole blocks of every level of noise_check.h
+inline constexpr int sample_squares_along = 3, sample_squares_down = 2;
+inline constexpr double sample_megapixels =
+    1e-6 * sample_squares_along * sample_squares_down * sample_side_px * sample_side_px;
 
 /// Squares of the active area, evenly spread, even corners. Empty where the whole is hardly more than the sample would
 /// be, or where each place has a black of its own: then the whole has to be looked at.

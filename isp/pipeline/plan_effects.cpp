@@ -105,6 +105,7 @@ EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const De
     facts.blocks = seen_blocks(frame, plan, reduction.noise, thumbnail);
     facts.has_noise = !facts.blocks.empty();
     facts.noise = level_noise(facts.blocks);
+    facts.chroma_work = chroma_work(facts.blocks, facts.active);
   }
   facts.level_is_fixed = o.denoise.mode != DenoiseChoice::Mode::automatic;
   if (o.denoise.mode == DenoiseChoice::Mode::level) facts.fixed_level = o.denoise.level;

@@ -1,9 +1,7 @@
-// What the planner of developing rests on, and how well it keeps to what it says.
+// What the planner of developing rests on.
 //   planner_bench levels   what levels of noise reduction change, beside what is predicted of the noise, on the tuning
 //                          pictures: the figures of isp/pipeline/plan_effects.cpp
 //   planner_bench truth    what they leave against the noise-free picture, likewise
-//   planner_bench budget   40 frames and budgets: the plan's time against prediction and budget, its error against the
-//                          best of all plans that fit
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -134,140 +132,6 @@ int levels(PictureSet set) {
   return 0;
 }
 
-/// Numbers in 0..1, the same in each run.
-class Draws {
- public:
-  explicit Draws(std::uint32_t scene) : scene_(scene) {}
-  double uniform() { return (words_at({20261123, 0, 79}, scene_, next_++)[0] + 0.5) * 0x1p-32; }
-  double log_uniform(double low, double high) { return low * std::pow(high / low, uniform()); }
-
- private:
-  std::uint32_t scene_;
-  std::uint32_t next_ = 0;
-};
-
-/// One way of developing by hand, measured.
-struct Way {
-  std::optional<denoise::Level> level;
-  bool defects;
-  bool lines;
-  double seconds = 0;
-  double error = 0;
-};
-
-DevelopOptions by_hand(const Way& way) {
-  DevelopOptions options;
-  options.denoise.mode = way.level ? DenoiseChoice::Mode::level : DenoiseChoice::Mode::off;
-  options.denoise.level = way.level.value_or(denoise::Level::draft);
-  options.find_defects = way.defects;
-  options.denoise.line_noise = way.lines;
-  options.effects.emplace().all = true;
-  return options;
-}
-
-struct Measured {
-  double seconds = 0;  // median of three
-  Encoded8 picture;
-  std::optional<double> predicted_s;
-};
-
-Result<Measured> measured(const RawFrame& frame, const DevelopOptions& options) {
-  Measured out;
-  std::vector<double> taken;
-  for (int i = 0; i < 3; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    Result<Developed> developed = develop(frame, options, executor);
-    if (!developed) return tl::make_unexpected(developed.error());
-    taken.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-    if (i < 2) continue;
-    out.picture = std::get<Encoded8>(std::move(developed->picture));
-    if (developed->plan.effects) out.predicted_s = developed->plan.effects->predicted_s;
-  }
-  std::ranges::sort(taken);
-  out.seconds = taken[1];
-  return out;
-}
-
-double error_of(const Encoded8& picture, const PictureTruth& truth) {
-  RenderedPicture rendered{light_of_codes(picture), light_of_codes(picture)};
-  return picture_error(rendered, truth, executor).ciede2000;
-}
-
-/// Everything there is to choose from, measured.
-std::vector<Way> exhaustive(const RawFrame& frame, const PictureTruth& truth) {
-  std::vector<Way> out;
-  for (int level = 0; level <= 4; ++level) {
-    for (const bool defects : {false, true}) {
-      for (const bool lines : {false, true}) {
-        if (level == 0 && lines) continue;
-        Way way{level == 0 ? std::nullopt : std::optional(static_cast<denoise::Level>(level - 1)), defects, lines};
-        const auto done = measured(frame, by_hand(way));
-        way.seconds = done->seconds;
-        way.error = error_of(done->picture, truth);
-        out.push_back(way);
-      }
-    }
-  }
-  return out;
-}
-
-int budgets() {
-  const auto cost =
-      measure_cost(executor, [](double, const std::string& what) { std::fprintf(stderr, "%s\n", what.c_str()); });
-  const auto shared = std::make_shared<const CostModel>(*cost);
-  int over = 0, off = 0, worse = 0;
-  std::printf("  # picture        light    MP  budget predicted measured [ms]  error  best  level\n");
-  for (std::uint32_t i = 0; i < 40; ++i) {
-    Draws draws(i);
-    const auto names = files_of(PictureSet::held_out);
-    const std::string_view name = names[static_cast<std::size_t>(draws.uniform() * 4)];
-    const auto path = (std::filesystem::path(LOWLUX_TESTDATA) / "pictures" / name).string();
-    const double size = draws.log_uniform(0.5, 1);
-    const auto picture = read_bench_picture(path, static_cast<int>(768 * size), static_cast<int>(512 * size), executor);
-    const DenoiseLight light{draws.log_uniform(1, 2000), draws.log_uniform(0.1, 100), draws.log_uniform(1, 5)};
-    const SensorFlaws flaws{draws.log_uniform(0.01, 3), draws.log_uniform(0.01, 3), draws.log_uniform(1e-6, 1e-3),
-                            1000};
-    const DenoiseShot shot = take(*picture, light, i);
-    const BenchRaw raw = raw_of(shot, flaws, i);
-    const auto truth_codes = developed(noise_free(shot), {});
-    const SceneLinear truth_light = light_of_codes(truth_codes);
-    const PictureTruth truth(truth_light.view(), executor);
-    const std::vector<Way> ways = exhaustive(raw.frame, truth);
-    const auto [least, most] = std::ranges::minmax(ways, {}, &Way::seconds);
-    DevelopOptions options;
-    options.denoise.mode = DenoiseChoice::Mode::automatic;
-    options.effects.emplace().cost = shared;
-    options.effects->tolerance_delta_e.reset();
-    options.effects->budget_s = draws.log_uniform(1.3 * least.seconds, 1.3 * most.seconds);
-    const auto planned = measured(raw.frame, options);
-    if (!planned) {
-      std::printf("%3u refused: %s\n", i, planned.error().message.c_str());
-      continue;
-    }
-    const double error = error_of(planned->picture, truth);
-    double best = std::numeric_limits<double>::infinity();
-    for (const Way& way : ways) {
-      if (way.seconds <= *options.effects->budget_s) best = std::min(best, way.error);
-    }
-    const bool too_long = planned->seconds > 1.2 * *options.effects->budget_s;
-    const bool wrong = std::fabs(*planned->predicted_s / planned->seconds - 1) > 0.2;
-    const bool bad = error > 1.05 * best;
-    over += too_long ? 1 : 0;
-    off += wrong ? 1 : 0;
-    worse += bad ? 1 : 0;
-    std::printf("%3u %-12s %9s %5.2f %7.1f %8.1f %8.1f %12.3f %6.3f %s%s%s\n", i, std::string(name).c_str(),
-                name_of(DenoiseLight{std::round(light.mean_e), std::round(light.dark_e), 0}).c_str(),
-                1e-6 * picture->linear.width() * picture->linear.height(), 1e3 * *options.effects->budget_s,
-                1e3 * *planned->predicted_s, 1e3 * planned->seconds, error, best, too_long ? " over" : "",
-                wrong ? " prediction" : "", bad ? " error" : "");
-  }
-  std::printf(
-      "of 40: %d more than 20 %% over the budget, %d predicted more than 20 %% wrong, %d more than 5 %% worse than "
-      "the best that fits\n",
-      over, off, worse);
-  return 0;
-}
-
 }  // namespace
 }  // namespace lowlux::isp
 
@@ -276,7 +140,6 @@ int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   if (what == "levels") return lowlux::isp::levels(PictureSet::tuning);
   if (what == "truth") return lowlux::isp::against_truth(PictureSet::tuning);
-  if (what == "budget") return lowlux::isp::budgets();
-  std::fprintf(stderr, "usage: planner_bench levels|truth|budget\n");
+  std::fprintf(stderr, "usage: planner_bench levels|truth\n");
   return 2;
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "isp/pipeline/develop.h"
+#include "isp/pipeline/effect_candidates.h"
 #include "isp/pipeline/frame_sample.h"
 #include "isp/pipeline/plan_regions.h"
 #include "isp/pipeline/visible_noise.h"
@@ -96,6 +98,27 @@ TEST(VisibleNoise, OfAGreyIsWhatFramesDifferBy) {
     EXPECT_LT(block.noise_delta_e, 3.0f);
     EXPECT_EQ(block.dark_delta_e, 0);
   }
+}
+
+// Tiles are 128 px wide, and chroma is worked on for tiles up to two away: 320 px from a block's middle.
+TEST(ChromaWork, ReachesTwoTilesBeyondWhatStartsFine) {
+  std::vector<SeenBlock> blocks(10);
+  for (std::size_t i = 0; i < blocks.size(); ++i) blocks[i] = {.x = 0.05f + 0.1f * static_cast<float>(i), .snr = 0.5f};
+  const auto expect_shares = [&](int width, std::array<double, 3> shares) {
+    const std::array<double, 3> found = chroma_work(blocks, {0, 0, width, 100});
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(found[i], shares[i], 1e-12) << width << ", level " << i;
+  };
+  expect_shares(2000, {0, 0, 1});
+  blocks[0].snr = 3;
+  blocks[9].snr = 0.7f;
+  EXPECT_NEAR(start_shares(blocks)[0], 0.1, 1e-12);
+  expect_shares(2000, {0.2, 0.2, 0.6});  // blocks 200 px apart: the next one is near
+  expect_shares(4000, {0.1, 0.1, 0.8});  // 400 px: none is
+  expect_shares(320, {1, 0, 0});         // all are
+  blocks[0].y = 1;
+  const std::array<double, 3> apart = chroma_work(blocks, {0, 0, 2000, 1000});
+  EXPECT_NEAR(apart[0], 0.1, 1e-12) << "near across, far down";
+  EXPECT_NEAR(chroma_work({}, {0, 0, 100, 100})[0], 1, 0);
 }
 
 TEST(PlanEffects, LevelsLeaveLessTheMoreTheyWork) {

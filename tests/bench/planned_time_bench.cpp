@@ -1,0 +1,234 @@
+// What the planner says of time, beside the clock.
+//   planned_time_bench budget   40 frames of 0.3 to 4 MP and budgets: the plan's time against prediction and budget,
+//   its
+//                               error against the best of all plans that fit
+//   planned_time_bench saved    40 of the promise's scenes in 1.6 MP: time of the plan beside that of everything
+// Machines are slower at times. A fixed piece of work is timed before each run, and each time told is the median of its
+// ratio to that work, in milliseconds of the moment the machine was calibrated.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "isp/bench/bench_raw.h"
+#include "isp/bench/cost_measurement.h"
+#include "isp/bench/picture_metrics.h"
+#include "isp/bench/seen_difference.h"
+#include "isp/pipeline/develop.h"
+#include "isp/pipeline/plan.h"
+#include "tests/scenarios/planner_scene.h"
+
+namespace lowlux::isp {
+namespace {
+
+PoolExecutor executor(2);
+constexpr std::uint32_t frames = 40;
+
+double median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values[values.size() / 2];
+}
+
+double seconds_of(const RawFrame& frame, const DevelopOptions& options, Encoded8* picture = nullptr) {
+  const auto start = std::chrono::steady_clock::now();
+  Result<Developed> done = develop(frame, options, executor);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (!done) std::printf("failed: %s\n", done.error().message.c_str());
+  if (done && picture != nullptr) *picture = std::get<Encoded8>(std::move(done->picture));
+  return seconds;
+}
+
+/// The same work each time.
+class Reference {
+ public:
+  Reference() : scene_(test::planner_scene(0, 1024, 768, executor)) {
+    options_.denoise.mode = DenoiseChoice::Mode::level;
+    options_.denoise.level = denoise::Level::standard;
+  }
+  double seconds() const { return seconds_of(scene_.raw.frame, options_); }
+
+ private:
+  test::PlannerScene scene_;
+  DevelopOptions options_;
+};
+
+/// The machine when it is calibrated, and after.
+class Clock {
+ public:
+  Clock() {
+    std::vector<double> taken;
+    auto cost = measure_cost(executor, [&](double, const std::string&) { taken.push_back(reference_.seconds()); });
+    cost_ = std::make_shared<const CostModel>(*std::move(cost));
+    calibrated_s_ = median(taken);
+    std::ranges::sort(taken);
+    std::printf("calibrated; the fixed work took %.1f ms, %.1f to %.1f ms in 80 %% of the runs\n", 1e3 * calibrated_s_,
+                1e3 * taken[taken.size() / 10], 1e3 * taken[taken.size() * 9 / 10]);
+  }
+  const std::shared_ptr<const CostModel>& cost() const { return cost_; }
+
+  /// In seconds of then. @param rounds  how often @param picture  as developed
+  double seconds(const RawFrame& frame, const DevelopOptions& options, int rounds, Encoded8& picture) const {
+    std::vector<double> ratios;
+    for (int i = 0; i < rounds; ++i) {
+      const double reference_s = reference_.seconds();
+      ratios.push_back(seconds_of(frame, options, &picture) / reference_s);
+    }
+    return median(ratios) * calibrated_s_;
+  }
+
+ private:
+  Reference reference_;
+  std::shared_ptr<const CostModel> cost_;
+  double calibrated_s_ = 0;
+};
+
+struct Way {
+  std::optional<denoise::Level> level;
+  bool defects = false;
+  bool lines = false;
+  double seconds = 0;
+  double error = 0;
+};
+
+DevelopOptions by_hand(const Way& way) {
+  DevelopOptions options;
+  options.denoise.mode = way.level ? DenoiseChoice::Mode::level : DenoiseChoice::Mode::off;
+  options.denoise.level = way.level.value_or(denoise::Level::draft);
+  options.find_defects = way.defects;
+  options.denoise.line_noise = way.lines;
+  options.effects.emplace().all = true;
+  return options;
+}
+
+double error_of(const Encoded8& picture, const PictureTruth& truth) {
+  RenderedPicture rendered{light_of_codes(picture), light_of_codes(picture)};
+  return picture_error(rendered, truth, executor).ciede2000;
+}
+
+/// The same camera without noise.
+SceneLinear truth_of(const DenoiseShot& shot) {
+  DenoiseShot mean{shot.light, shot.white_e, shot.signal_e.clone(), shot.signal_e.clone()};
+  for (std::size_t i = 0; i < mean.raw_e.size(); ++i) mean.raw_e.data()[i] += static_cast<float>(shot.light.dark_e);
+  Encoded8 picture;
+  seconds_of(raw_of(mean, {}, 7).frame, by_hand({}), &picture);
+  return light_of_codes(picture);
+}
+
+/// Everything there is to choose from, measured.
+std::vector<Way> exhaustive(const Clock& clock, const RawFrame& frame, const PictureTruth& truth) {
+  std::vector<Way> out;
+  for (int level = 0; level <= 4; ++level) {
+    for (const bool defects : {false, true}) {
+      for (const bool lines : {false, true}) {
+        if (level == 0 && lines) continue;
+        Way way{level == 0 ? std::nullopt : std::optional(static_cast<denoise::Level>(level - 1)), defects, lines};
+        Encoded8 picture;
+        way.seconds = clock.seconds(frame, by_hand(way), way.level == denoise::Level::best ? 1 : 3, picture);
+        way.error = error_of(picture, truth);
+        out.push_back(way);
+      }
+    }
+  }
+  return out;
+}
+
+std::string words_of(const EffectsPlan& plan) {
+  std::string out(plan.level ? name_of(*plan.level) : "none");
+  if (plan.find_defects) out += ", defects";
+  if (plan.lines && plan.level) out += ", lines";
+  return out;
+}
+
+int budgets() {
+  const Clock clock;
+  int over = 0, off = 0, worse = 0, kept = 0, refused = 0;
+  std::printf("  # picture            light   MP   budget predicted  taken [ms]  error   best  plan\n");
+  for (std::uint32_t i = 0; i < frames; ++i) {
+    test::Draws draws(20261123, 79, i);
+    const BenchPicture& whole = test::held_out_picture(draws.below(4), executor);
+    const double megapixels = draws.log_uniform(0.3, 4);
+    const int width = 2 * static_cast<int>(std::sqrt(1.5e6 * megapixels) / 2), height = 2 * (width / 3);
+    const BenchPicture picture = test::drawn_part(whole, draws, width, height);
+    const DenoiseLight light{draws.log_uniform(1, 2000), draws.log_uniform(0.1, 100), draws.log_uniform(1, 5)};
+    const SensorFlaws flaws{draws.log_uniform(0.01, 3), draws.log_uniform(0.01, 3), draws.log_uniform(1e-6, 1e-3),
+                            1000};
+    const DenoiseShot shot = take(picture, light, i);
+    const BenchRaw raw = raw_of(shot, flaws, i);
+    const SceneLinear truth_light = truth_of(shot);
+    const PictureTruth truth(truth_light.view(), executor);
+    const std::vector<Way> ways = exhaustive(clock, raw.frame, truth);
+    const auto [least, most] = std::ranges::minmax(ways, {}, &Way::seconds);
+    DevelopOptions options;
+    options.denoise.mode = DenoiseChoice::Mode::automatic;
+    options.effects.emplace().cost = clock.cost();
+    options.effects->tolerance_delta_e.reset();
+    const double budget_s = draws.log_uniform(1.3 * least.seconds, 1.3 * most.seconds);
+    options.effects->budget_s = budget_s;
+    const Result<Developed> planned = develop(raw.frame, options, executor);
+    if (!planned) {
+      ++refused;
+      std::printf("%3u refused: %s\n", i, planned.error().message.c_str());
+      continue;
+    }
+    const EffectsPlan& plan = *planned->plan.effects;
+    Encoded8 made;
+    const double taken_s = clock.seconds(raw.frame, options, 5, made), error = error_of(made, truth);
+    double best = std::numeric_limits<double>::infinity();
+    for (const Way& way : ways) {
+      if (way.seconds <= budget_s) best = std::min(best, way.error);
+    }
+    const bool too_long = taken_s > 1.2 * budget_s, wrong = std::fabs(*plan.predicted_s / taken_s - 1) > 0.2;
+    const bool bad = error > 1.05 * best;
+    over += too_long ? 1 : 0;
+    off += wrong ? 1 : 0;
+    worse += bad ? 1 : 0;
+    kept += too_long || wrong || bad ? 0 : 1;
+    std::printf("%3u %-14s %9s %4.1f %8.1f %9.1f %11.1f %6.3f %6.3f  %s%s%s%s\n", i, picture.name.c_str(),
+                name_of(DenoiseLight{std::round(light.mean_e), std::round(light.dark_e), 0}).c_str(),
+                1e-6 * width * height, 1e3 * budget_s, 1e3 * *plan.predicted_s, 1e3 * taken_s, error, best,
+                words_of(plan).c_str(), too_long ? "; OVER" : "", wrong ? "; PREDICTION" : "", bad ? "; ERROR" : "");
+    std::fflush(stdout);
+  }
+  std::printf(
+      "of 40: %d refused, %d more than 20 %% over the budget, %d predicted more than 20 %% wrong, %d more than 5 %% "
+      "worse than the best that fits, %d without any of it\n",
+      refused, over, off, worse, kept);
+  return 0;
+}
+
+int saved() {
+  std::vector<double> shares;
+  for (std::uint32_t i = 0; i < frames; ++i) {
+    const test::PlannerScene scene = test::planner_scene(i, 1536, 1024, executor);
+    std::vector<double> planned, everything;
+    for (int round = 0; round < 3; ++round) {
+      planned.push_back(seconds_of(scene.raw.frame, scene.ways(false)));
+      everything.push_back(seconds_of(scene.raw.frame, scene.ways(true)));
+    }
+    shares.push_back(1 - median(planned) / median(everything));
+  }
+  std::ranges::sort(shares);
+  std::printf("time saved, 40 scenes of 1.6 MP: ");
+  for (const int percent : {0, 10, 25, 50, 75, 90, 100}) {
+    std::printf(" %d %% %.2f", percent, shares[(shares.size() - 1) * static_cast<std::size_t>(percent) / 100]);
+  }
+  std::printf("\n");
+  return 0;
+}
+
+}  // namespace
+}  // namespace lowlux::isp
+
+int main(int argc, char** argv) {
+  const std::string what = argc > 1 ? argv[1] : "";
+  if (what == "budget") return lowlux::isp::budgets();
+  if (what == "saved") return lowlux::isp::saved();
+  std::fprintf(stderr, "usage: planned_time_bench budget|saved\n");
+  return 2;
+}
