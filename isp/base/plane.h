@@ -5,6 +5,7 @@
 #include <cstring>
 #include <memory>
 #include <type_traits>
+#include <utility>
 
 namespace lowlux {
 
@@ -34,7 +35,8 @@ struct PlaneView {
   operator PlaneView<const T>() const requires(!std::is_const_v<T>) { return {data, width, height, stride}; }
 };
 
-/// Owned samples, rows end to end. Fresh planes are not initialised; copies are spelled clone().
+/// Owned samples, rows end to end. Fresh planes are not initialised; copies are spelled clone(); a plane moved from is
+/// empty.
 template <class T>
 class Plane {
  public:
@@ -44,6 +46,16 @@ class Plane {
         height_(height),
         samples_(std::make_unique_for_overwrite<T[]>(static_cast<std::size_t>(width) * height)) {
     assert(width >= 0 && height >= 0);
+  }
+  Plane(Plane&& other) noexcept
+      : width_(std::exchange(other.width_, 0)),
+        height_(std::exchange(other.height_, 0)),
+        samples_(std::move(other.samples_)) {}
+  Plane& operator=(Plane&& other) noexcept {
+    width_ = std::exchange(other.width_, 0);
+    height_ = std::exchange(other.height_, 0);
+    samples_ = std::move(other.samples_);
+    return *this;
   }
 
   int width() const { return width_; }

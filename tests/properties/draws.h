@@ -15,6 +15,10 @@
 namespace lowlux::properties {
 
 inline int size_between(int least, int most) { return *rc::gen::inRange(least, most + 1); }
+/// First to last, both included, in steps of a thousandth of it.
+inline double any_between(double first, double last) {
+  return first + (last - first) * *rc::gen::inRange(0, 1001) / 1000;
+}
 inline BayerPhase any_phase() { return static_cast<BayerPhase>(*rc::gen::inRange(0, 4)); }
 inline std::mt19937 any_random() { return std::mt19937(*rc::gen::arbitrary<std::uint32_t>()); }
 

@@ -2,27 +2,31 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
 #include <limits>
 #include <utility>
 #include <variant>
 #include <vector>
 
 #include "isp/base/executor.h"
+#include "isp/model/colorimetry.h"
 #include "isp/output/orient.h"
+#include "isp/pipeline/encode_picture.h"
 #include "isp/render/colour_table.h"
 #include "isp/render/exposure.h"
 #include "isp/render/night_look.h"
+#include "isp/render/output_space.h"
 #include "isp/render/retarget.h"
 #include "isp/render/tone.h"
+#include "isp/render/white_balance.h"
 #include "tests/properties/draws.h"
 
 namespace lowlux::isp {
 namespace {
 
 using namespace properties;
-
-/// First to last, both included, in steps of a thousandth of it.
-double any_between(double first, double last) { return first + (last - first) * *rc::gen::inRange(0, 1001) / 1000; }
 
 RC_GTEST_PROP(ExposureProperty, IsWithinItsRangeAndTheOrderOfBlocksDoesNotMatter, ()) {
   const auto blocks = any_plane(size_between(1, 60), 1, -0.1F, 1.5F, 9);
@@ -41,6 +45,67 @@ RC_GTEST_PROP(ExposureProperty, HalfTheLightGetsOneStopMore, ()) {
   const AutoExposure full = auto_exposure(luminance, 0);
   for (float& y : luminance) y /= 2;
   RC_ASSERT(std::abs(auto_exposure(luminance, 0).ev - full.ev - 1) < 1e-5);  // EV of floats
+}
+
+/// A camera whose sensitivities are Rec. 709's, each channel as sensitive as it may be.
+CameraColour any_camera() {
+  const Vector3 sensitivity{any_between(0.2, 1), any_between(0.2, 1), any_between(0.2, 1)};
+  CameraColour out;
+  out.calibrations = {
+      {.cct_k = 6504, .xyz_to_camera = diagonal3(sensitivity) * *xyz_to_output(OutputSpace::linear_srgb)}};
+  return out;
+}
+
+RC_GTEST_PROP(WhiteBalanceProperty, ANeutralIsTheTemperatureItWasMadeOf, ()) {
+  CameraColour camera = any_camera();
+  const double kelvin = any_between(2500, 12000);
+  const auto asked = white_balance_of_temperature(camera, kelvin);
+  RC_ASSERT(asked.has_value());
+  RC_ASSERT(std::abs(*std::ranges::max_element(asked->neutral) - 1) < 1e-12);
+  const double scale = any_between(0.1, 5);
+  camera.as_shot_neutral = {scale * asked->neutral[0], scale * asked->neutral[1], scale * asked->neutral[2]};
+  const auto found = as_shot_white_balance(camera);
+  RC_ASSERT(found.has_value());
+  for (std::size_t c = 0; c < 3; ++c) RC_ASSERT(std::abs(found->neutral[c] - asked->neutral[c]) < 1e-12);
+  RC_ASSERT(std::abs(found->white->cct_k / kelvin - 1) < 2e-3);  // daylight's own formula is that exact
+}
+
+RC_GTEST_PROP(WhiteBalanceProperty, TheOrderOfBlocksAndTheExposureDoNotMatter, ()) {
+  const CameraColour camera = any_camera();
+  const int blocks = size_between(32, 100);
+  std::array<Plane<float>, 3> light, turned;
+  const float exposure = *rc::gen::element(0.5F, 0.25F);  // exact in binary
+  for (std::size_t c = 0; c < 3; ++c) {
+    light[c] = any_plane(blocks, 1, 0.05F, 0.8F);
+    turned[c] = mirrored(light[c]);
+    for (int i = 0; i < blocks; ++i) turned[c].at(i, 0) *= exposure;
+  }
+  const auto view = [](const std::array<Plane<float>, 3>& planes) {
+    return RgbView<const float>{planes[0].view(), planes[1].view(), planes[2].view()};
+  };
+  const WhiteBalance a = auto_white_balance(view(light), 0, camera), b = auto_white_balance(view(turned), 0, camera);
+  RC_ASSERT(a.source == b.source);
+  for (std::size_t c = 0; c < 3; ++c) RC_ASSERT(std::abs(a.neutral[c] - b.neutral[c]) < 1e-9);
+}
+
+RC_GTEST_PROP(EncodeProperty, AnythingBecomesCodesAndGreysStayGrey, ()) {
+  const int width = size_between(1, 30), height = size_between(1, 20);
+  InlineExecutor executor;
+  SceneLinear xyz(width, height);
+  for (auto& plane : xyz.plane) plane = any_plane(width, height, -0.2F, 1.5F, 9);
+  const Matrix3 white = *rgb_to_xyz(primaries_rec709);
+  const auto grey = static_cast<float>(any_between(0, 1.2));
+  for (int c = 0; c < 3; ++c) {
+    const Vector3& row = white[static_cast<std::size_t>(c)];
+    xyz.plane[c].at(0, 0) = grey * static_cast<float>(row[0] + row[1] + row[2]);
+  }
+  for (const OutputSpace space : {OutputSpace::srgb, OutputSpace::display_p3, OutputSpace::rec2020}) {
+    const Picture picture = encode_picture(xyz, space, SampleType::u16, executor);
+    const auto& codes = std::get<Encoded16>(picture);
+    RC_ASSERT(codes.width() == width && codes.height() == height);
+    const std::uint16_t* const first = codes.codes.row(0);
+    for (int c = 1; c < 3; ++c) RC_ASSERT(std::abs(first[c] - first[0]) <= 1);
+  }
 }
 
 RC_GTEST_PROP(ToneProperty, RisesFromBlackToWhite, ()) {
