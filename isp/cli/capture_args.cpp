@@ -25,6 +25,7 @@ using Wrong = std::optional<std::string>;
 
 constexpr double longest_timeout_s = 86400;
 constexpr double most_frames = 1e9;
+constexpr double least_budget_ms = 0.01, most_budget_ms = 1e6;  // of the stage
 
 /// What the command line said that CaptureArgs holds in another form.
 struct Words {
@@ -143,6 +144,16 @@ void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
   app.add_flag("--raw", words.raw, "raw files: the same as --as dng");
   app.add_flag("--live", words.live, "a film on standard output instead: YUV4MPEG2, which ffplay and ffmpeg read");
   app.add_flag("--temporal", args.temporal, "with --live: frames before take part in noise reduction");
+  add_text(app, "--budget-ms", "MS",
+           "with --live: time for each frame; what does not fit is left out step by step: the level standard for high, "
+           "draft, no level, plain. No frame is",
+           [&args](const std::string& text) -> Wrong {
+             args.budget_ms = number_of(text);
+             if (args.budget_ms && *args.budget_ms >= least_budget_ms && *args.budget_ms <= most_budget_ms) {
+               return std::nullopt;
+             }
+             return "is no number of milliseconds from 0.01 to 1e6";
+           });
   app.add_flag("--force", args.develop.force, "overwrite files that exist");
   app.add_flag("--json", args.develop.json, "what was done, as JSON on stdout (with --live on stderr)");
   app.add_flag("--quiet", args.develop.quiet, "no warnings, no progress and no summary");
@@ -210,6 +221,7 @@ Wrong set_kind(const Words& words, CaptureArgs& args) {
     return std::nullopt;
   }
   if (args.temporal) return "--temporal goes with --live";
+  if (args.budget_ms) return "--budget-ms goes with --live; of files `develop` has it";
   if (output.empty()) return "say where frames go: -o OUT, or --live";
   std::error_code ignored;
   args.folder = output.ends_with('/') || fs::is_directory(output, ignored);

@@ -29,6 +29,7 @@ struct CaptureArgs {
   std::string extension;  // of files in a folder, without dot
   bool folder = false;    // develop.output is one
   bool temporal = false;
+  std::optional<double> budget_ms;  // of a film, for each frame
 };
 
 Parsed<CaptureArgs> parse_capture(const std::vector<std::string>& words);

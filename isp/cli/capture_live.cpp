@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstddef>
 #include <cstdio>
 #include <memory>
 #include <thread>
@@ -109,6 +110,7 @@ lowlux_stage_params params_of(const capture::CameraFrame& frame, const RawFormat
   set_if(options.exposure_ev, -10, 20, LOWLUX_STAGE_HAS_EXPOSURE_VALUE, out.exposure_ev, out);
   set_if(options.look.scene_luminance_cd_m2, 1e-7, 1e9, LOWLUX_STAGE_HAS_SCENE_LUMINANCE, out.scene_luminance_cd_m2,
          out);
+  set_if(args.budget_ms, 0.01, 1e6, LOWLUX_STAGE_HAS_BUDGET, out.budget_ms, out);
   out.denoise = denoise_of(options.denoise);
   out.sequence = taken;  // frames that were lost are a pause, which is left to its length
   out.valid |= LOWLUX_STAGE_HAS_DENOISE | LOWLUX_STAGE_HAS_SEQUENCE;
@@ -134,7 +136,7 @@ class LiveSink final : public CaptureSink {
 
   Result<bool> take(const capture::CameraFrame& frame, CaptureWork& work) override {
     auto start = steady_clock::now();
-    if (auto made = process(frame); !made) return tl::make_unexpected(made.error());
+    if (auto made = process(frame, work); !made) return tl::make_unexpected(made.error());
     work.process_s += seconds_since(start);
     start = steady_clock::now();
     const auto luma = luma_.view().crop(0, 0, layout_.width, layout_.height);
@@ -146,7 +148,7 @@ class LiveSink final : public CaptureSink {
   }
 
  private:
-  Result<void> process(const capture::CameraFrame& frame) {
+  Result<void> process(const capture::CameraFrame& frame, CaptureWork& work) {
     const lowlux_stage_source in{frame.bytes.data(), frame.bytes.size(), stream_.format.stride_bytes, -1};
     lowlux_stage_picture out{};
     out.size = sizeof out;
@@ -155,8 +157,16 @@ class LiveSink final : public CaptureSink {
     out.plane[1] = {chroma_.data(), chroma_.size(), layout_.stride[1]};
     const lowlux_stage_params params = params_of(frame, stream_.format.raw, args_, taken_);
     if (taken_++ == 0) warn_of_colours(params);
-    if (lowlux_stage_process(stage_.get(), &in, &out, &params, nullptr, nullptr) >= 0) return {};
-    return fail(ErrorCode::insufficient, lowlux_stage_last_error(stage_.get()));
+    lowlux_stage_result result{};
+    result.size = sizeof result;
+    if (lowlux_stage_process(stage_.get(), &in, &out, &params, &result, nullptr) < 0) {
+      return fail(ErrorCode::insufficient, lowlux_stage_last_error(stage_.get()));
+    }
+    if (args_.budget_ms) {
+      if (!work.steps) work.steps.emplace();
+      ++work.steps->at(static_cast<std::size_t>(result.step));
+    }
+    return {};
   }
 
   void warn_of_colours(const lowlux_stage_params& params) const {

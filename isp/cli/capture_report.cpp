@@ -2,6 +2,9 @@
 
 #include <unistd.h>
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <optional>
 
@@ -26,15 +29,29 @@ std::optional<double> rate_hz(const capture::LoopCount& count) {
   return static_cast<double>(came - 1) / count.seconds;
 }
 
+constexpr std::array step_names{"all", "standard", "draft", "frames_before", "plain"};  // LOWLUX_STAGE_STEP_...
+
+/// "; all 28, draft 2" of a budget.
+std::string step_text(const CaptureWork& work) {
+  std::string out;
+  if (!work.steps) return out;
+  for (std::size_t i = 0; i < step_names.size(); ++i) {
+    const std::uint64_t frames = (*work.steps)[i];
+    if (frames > 0) out += fmt::format("{} {} {}", out.empty() ? ";" : ",", step_names[i], frames);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::string progress_text(const CaptureState& state) {
   const capture::LoopCount& count = state.count;
   const auto rate = rate_hz(count);
-  return fmt::format("{}{} frames, {} lost, {} damaged; ms for each: wait {:.1f}, process {:.1f}, write {:.1f}",
+  return fmt::format("{}{} frames, {} lost, {} damaged; ms for each: wait {:.1f}, process {:.1f}, write {:.1f}{}",
                      rate ? fmt::format("{:.1f} frames/s, ", *rate) : std::string(), count.taken, count.lost,
                      count.damaged, ms_for_each(count.wait_s, count.taken),
-                     ms_for_each(state.work.process_s, count.taken), ms_for_each(state.work.write_s, count.taken));
+                     ms_for_each(state.work.process_s, count.taken), ms_for_each(state.work.write_s, count.taken),
+                     step_text(state.work));
 }
 
 std::string capture_json(const CaptureState& state, const Error* error) {
@@ -61,6 +78,9 @@ std::string capture_json(const CaptureState& state, const Error* error) {
   json["frame_ms"] = {{"wait", ms_for_each(count.wait_s, count.taken)},
                       {"process", ms_for_each(work.process_s, count.taken)},
                       {"write", ms_for_each(work.write_s, count.taken)}};
+  if (work.steps) {
+    for (std::size_t i = 0; i < step_names.size(); ++i) json["steps"][step_names[i]] = (*work.steps)[i];
+  }
   json["files"] = work.files;
   json["warnings"] = work.warnings;
   return json.dump(2, ' ', false, Json::error_handler_t::replace);

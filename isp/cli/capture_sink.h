@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +19,7 @@ namespace lowlux::cli {
 struct CaptureWork {
   double process_s = 0;  // reading a frame's memory and making a picture of it
   double write_s = 0;
+  std::optional<std::array<std::uint64_t, 5>> steps;  // frames at each LOWLUX_STAGE_STEP; none: without a budget
   std::vector<std::string> files;
   std::vector<std::string> warnings;  // each once
 };

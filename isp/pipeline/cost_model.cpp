@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 
 namespace lowlux::isp {
 
@@ -23,8 +22,8 @@ double CostModel::seconds(CostPart part, double megapixels) const {
   if (above == at.begin()) return per_mp(at.front()) * megapixels;
   if (above == at.end()) return per_mp(at.back()) * megapixels;
   const CostPoint &low = *(above - 1), &high = *above;
-  const double way = std::log(megapixels / low.megapixels) / std::log(high.megapixels / low.megapixels);
-  return (per_mp(low) + way * (per_mp(high) - per_mp(low))) * megapixels;
+  const double way = (megapixels - low.megapixels) / (high.megapixels - low.megapixels);
+  return low.seconds + way * (high.seconds - low.seconds);
 }
 
 double predicted_s(const CostModel& model, double megapixels, const std::vector<CostShare>& work) {

@@ -54,8 +54,8 @@ struct CostModel {
   int threads = 1;
   std::array<std::vector<CostPoint>, cost_parts> points;  // of each part, by rising size; none: the part is free
 
-  /// Seconds of a part for a frame of this size: seconds per megapixel are linear in the logarithm of the size between
-  /// two points, and those of the nearest beyond them. @param megapixels  > 0
+  /// Seconds of a part for a frame of this size: linear between two points, which is exact for a fixed time and one for
+  /// each pixel; beyond them the seconds per megapixel of the nearest. @param megapixels  > 0
   double seconds(CostPart part, double megapixels) const;
 };
 

@@ -5,8 +5,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <variant>
@@ -16,6 +18,7 @@
 #include "capture/file/dng_source.h"
 #include "isp/base/executor.h"
 #include "isp/cli/capture_args.h"
+#include "isp/cli/capture_report.h"
 #include "isp/codec/png.h"
 #include "tests/cli/simulate_command.h"
 #include "tests/support/fake_camera.h"
@@ -206,6 +209,24 @@ TEST_F(CapturedNight, IsTheSamePictureLiveAsDeveloped) {
   // values, may fall to its other side.
   EXPECT_LE(worst, 0.51 + 219.0 / 255);
   EXPECT_LE(beyond_rounding, static_cast<int>(expected.values.size() / 1000));
+}
+
+// No frame fits a hundredth of a millisecond, and every one fits ten minutes.
+TEST_F(CapturedNight, LiveFramesOfABudgetAreCountedByTheirStep) {
+  use_format(bayer(10));
+  const auto steps_of = [&](const char* budget_ms) {
+    const cli::CaptureArgs args = args_of({"--live", "--denoise", "draft", "--budget-ms", budget_ms});
+    const int film = open("/dev/null", O_WRONLY);
+    auto sink = cli::make_live_sink(args, stream(), film, stop_);
+    EXPECT_TRUE(sink);
+    cli::CaptureWork work;
+    for (int i = 0; i < 4; ++i) EXPECT_TRUE((*sink)->take(frame_, work));
+    close(film);
+    EXPECT_NE(cli::capture_json({stream(), {}, work}, nullptr).find("\"steps\""), std::string::npos);
+    return work.steps.value_or(std::array<std::uint64_t, 5>{});
+  };
+  EXPECT_EQ(steps_of("0.01"), (std::array<std::uint64_t, 5>{0, 0, 0, 0, 4}));
+  EXPECT_EQ(steps_of("600000"), (std::array<std::uint64_t, 5>{3, 0, 0, 0, 1})) << "the first one's time is not known";
 }
 
 TEST_F(CapturedNight, LeavesDamagedFramesOutOfFilesAndNumbersTheOthers) {

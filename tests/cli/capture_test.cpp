@@ -64,6 +64,8 @@ TEST_F(CaptureCommand, RefusesOptionsOfPicturesForRawFilesAndFilms) {
   refused({"--v4l2", "/dev/video0", "--live", "--wb", "5000"}, "--wb");
   refused({"--v4l2", "/dev/video0", "--live", "--denoise", "best"}, "best");
   refused({"--v4l2", "/dev/video0", "--live", "--look", "shin"}, "--look");
+  refused({"--v4l2", "/dev/video0", "--live", "--budget-ms", "0"}, "--budget-ms");
+  refused({"--v4l2", "/dev/video0", "-o", file("a.png"), "--budget-ms", "20"}, "goes with --live");
 }
 
 TEST_F(CaptureCommand, SaysInOneLineThatThereIsNoSuchCamera) {
