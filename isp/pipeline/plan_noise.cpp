@@ -34,10 +34,14 @@ std::array<double, 3> black_variance_e2(const RawFrame& frame, const DevelopPlan
   return out;
 }
 
+/// The denoiser takes no more. White levels of a thousandth of a code have it.
+constexpr double most_variance_e2 = 1e9;
+
 denoise::RawNoise noise_of(const RawFrame& frame, const DevelopPlan& plan) {
   denoise::RawNoise out;
   out.dark_mean_e = plan.black.dark_mean_e;
   out.variance_e2 = black_variance_e2(frame, plan);
+  for (double& variance : out.variance_e2) variance = std::min(variance, most_variance_e2);
   for (int site = 0; site < 4; ++site) {
     double& saturation_e = out.saturation_e[colour_of(frame.raw, site)];
     saturation_e = std::min(saturation_e, saturated * (*plan.electrons_at_white)[site]);
