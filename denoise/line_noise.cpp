@@ -1,39 +1,24 @@
 #include "denoise/line_noise.h"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numbers>
-#include <span>
 #include <string>
 #include <utility>
+
+#include "denoise/line_groups.h"
 
 namespace lowlux::denoise {
 namespace {
 
-constexpr int segments = 8;  // of a line, each in two groups: even and odd places, whose colours differ
-constexpr int groups = 2 * segments;
 constexpr int fewest_lines = 16, fewest_pixels = 4;
 constexpr double sigma_per_mad = 1.4826;  // of a normal law
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// Variances of the location of n normal values, in units of theirs over n.
 double median_factor(double n) { return std::numbers::pi / 2 * n / (n + std::numbers::pi / 2 - 1); }
 constexpr double hodges_lehmann_factor = std::numbers::pi / 3;
-
-/// The median of what is finite; NaN if nothing is. Reorders.
-double median_of(std::span<double> values) {
-  const auto infinite = std::partition(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-  const auto count = infinite - values.begin();
-  if (count == 0) return nan;
-  const auto middle = values.begin() + count / 2;
-  std::nth_element(values.begin(), middle, infinite);
-  if (count % 2 == 1) return *middle;
-  return (*middle + *std::max_element(values.begin(), middle)) / 2;
-}
 
 /// The median of all means of two values (Hodges & Lehmann, Ann. Math. Statist. 34 (1963) 598).
 double hodges_lehmann(const std::vector<double>& values) {
@@ -52,46 +37,6 @@ double robust_std(std::vector<double> values) {
   return sigma_per_mad * median_of(values);
 }
 
-/// Means of the groups of pixels of every line: `groups` wide, as high as there are lines. NaN for a group without
-/// values.
-Plane<double> group_means(PlaneView<const float> pixels, Lines lines) {
-  const bool rows = lines == Lines::rows;
-  const int count = rows ? pixels.height : pixels.width, length = rows ? pixels.width : pixels.height;
-  Plane<double> sum(groups, count), number(groups, count);
-  std::fill_n(sum.data(), sum.size(), 0.0);
-  std::fill_n(number.data(), number.size(), 0.0);
-  const int pairs = (length + 1) / 2;
-  const auto group_of = [&](int i) {
-    return 2 * static_cast<int>(static_cast<long long>(i / 2) * segments / pairs) + i % 2;
-  };
-  // Row by row for columns too, as memory lies; each group's sum has the same order either way.
-  for (int y = 0; y < pixels.height; ++y) {
-    const float* const row = pixels.row(y);
-    for (int x = 0; x < pixels.width; ++x) {
-      if (!std::isfinite(row[x])) continue;
-      const int line = rows ? y : x, group = rows ? group_of(x) : group_of(y);
-      sum.at(group, line) += static_cast<double>(row[x]);
-      number.at(group, line) += 1;
-    }
-  }
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    sum.data()[i] = number.data()[i] > 0 ? sum.data()[i] / number.data()[i] : nan;
-  }
-  return sum;
-}
-
-/// Line i less line j, group by group.
-std::array<double, groups> differences(const Plane<double>& means, int i, int j) {
-  std::array<double, groups> out{};
-  for (int g = 0; g < groups; ++g) out[static_cast<std::size_t>(g)] = means.at(g, i) - means.at(g, j);
-  return out;
-}
-
-double line_difference(const Plane<double>& means, int i, int j) {
-  std::array<double, groups> by_group = differences(means, i, j);
-  return median_of(by_group);
-}
-
 /// Scatter of neighbouring lines of the same colours.
 struct Scatter {
   double group_variance_e2 = 0;  // of one group's mean, about what its line has in common
@@ -101,19 +46,19 @@ struct Scatter {
 
 /// @return nullopt where too few lines can be compared
 std::optional<Scatter> scatter_of(const Plane<double>& means) {
+  const std::vector<double> common = differences(means, 2);
   std::vector<double> within, between;
   within.reserve(means.size());
-  between.reserve(static_cast<std::size_t>(means.height()));
-  for (int line = 0; line + 2 < means.height(); ++line) {
-    const std::array<double, groups> by_group = differences(means, line + 2, line);
-    const double common = line_difference(means, line + 2, line);
-    if (!std::isfinite(common)) continue;
-    between.push_back(common);
-    for (const double d : by_group) {
-      if (std::isfinite(d)) within.push_back(d - common);
+  between.reserve(common.size());
+  for (int line = 0; line + 2 < means.width(); ++line) {
+    if (!std::isfinite(common[line])) continue;
+    between.push_back(common[line]);
+    for (int g = 0; g < groups; ++g) {
+      const double d = means.at(line + 2, g) - means.at(line, g);
+      if (std::isfinite(d)) within.push_back(d - common[line]);
     }
   }
-  if (2 * between.size() < static_cast<std::size_t>(means.height())) return std::nullopt;
+  if (2 * between.size() < static_cast<std::size_t>(means.width())) return std::nullopt;
   const auto used = static_cast<double>(within.size()) / static_cast<double>(between.size());
   if (used < fewest_pixels) return std::nullopt;
   const double inside = robust_std(within), across = robust_std(between);
@@ -124,7 +69,7 @@ std::optional<Scatter> scatter_of(const Plane<double>& means) {
 tl::unexpected<Error> too_little(const Plane<double>& means, PlaneView<const float> pixels) {
   return fail(ErrorCode::insufficient,
               "line noise cannot be told from " + std::to_string(pixels.width) + " x " + std::to_string(pixels.height) +
-                  " pixels: expected 16 lines of 4 finite values at least, found " + std::to_string(means.height()) +
+                  " pixels: expected 16 lines of 4 finite values at least, found " + std::to_string(means.width()) +
                   " lines or too few values; use a larger area");
 }
 
@@ -136,7 +81,7 @@ struct Measured {
 
 Result<Measured> measured(PlaneView<const float> pixels, Lines lines) {
   Plane<double> means = group_means(pixels, lines);
-  if (means.height() < fewest_lines) return too_little(means, pixels);
+  if (means.width() < fewest_lines) return too_little(means, pixels);
   const auto scatter = scatter_of(means);
   if (!scatter) return too_little(means, pixels);
   return Measured{std::move(means), *scatter};
@@ -145,10 +90,10 @@ Result<Measured> measured(PlaneView<const float> pixels, Lines lines) {
 /// What all lines of a parity have in common in each group.
 std::vector<double> common_of(const Plane<double>& means, int parity) {
   std::vector<double> out(groups), values;
-  values.reserve(static_cast<std::size_t>(means.height()) / 2 + 1);
+  values.reserve(static_cast<std::size_t>(means.width()) / 2 + 1);
   for (int g = 0; g < groups; ++g) {
     values.clear();
-    for (int line = parity; line < means.height(); line += 2) values.push_back(means.at(g, line));
+    for (int line = parity; line < means.width(); line += 2) values.push_back(means.at(line, g));
     out[static_cast<std::size_t>(g)] = median_of(values);
   }
   return out;
@@ -171,13 +116,15 @@ struct Comparison {
   int lines = 1;
 };
 
-Comparison compared(const Plane<double>& means, int line, int reach, double bound_e) {
-  const int room = std::min({reach, line / 2, (means.height() - 1 - line) / 2});  // even to both sides: slopes cancel
+/// @param steps  differences of the lines from those 2, 4, 6 and so on before them
+Comparison compared(const std::vector<std::vector<double>>& steps, int line, int lines, double bound_e) {
+  const int reach = static_cast<int>(steps.size());
+  const int room = std::min({reach, line / 2, (lines - 1 - line) / 2});  // even to both sides: slopes cancel
   Comparison out;
   double sum = 0;
   for (int k = -room; k <= room; ++k) {
     if (k == 0) continue;
-    const double d = line_difference(means, line, line + 2 * k);
+    const double d = k < 0 ? steps[-k - 1][line + 2 * k] : -steps[k - 1][line];
     if (!(std::abs(d) <= bound_e)) continue;
     sum += d;
     ++out.lines;
@@ -195,12 +142,12 @@ Result<LineOffsets> line_offsets_of_masked(PlaneView<const float> masked_e, Line
   if (!of) return tl::make_unexpected(of.error());
   const std::vector<double> common[2] = {common_of(of->means, 0), common_of(of->means, 1)};
   LineOffsets out{.lines = lines};
-  out.offset_e.resize(static_cast<std::size_t>(of->means.height()));
-  for (int line = 0; line < of->means.height(); ++line) {
+  out.offset_e.resize(static_cast<std::size_t>(of->means.width()));
+  for (int line = 0; line < of->means.width(); ++line) {
     std::vector<double> values;
     values.reserve(groups);
     for (int g = 0; g < groups; ++g) {
-      const double d = of->means.at(g, line) - common[line % 2][static_cast<std::size_t>(g)];
+      const double d = of->means.at(line, g) - common[line % 2][static_cast<std::size_t>(g)];
       if (std::isfinite(d)) values.push_back(d);
     }
     out.offset_e[static_cast<std::size_t>(line)] = hodges_lehmann(values);
@@ -233,14 +180,17 @@ Result<LineOffsets> line_offsets_of_frame(PlaneView<const float> charge_e, Lines
     return out;
   }
   const double bound_e = 3 * std::sqrt(2 * (line_e2 + error_e2));
+  const int count = of->means.width();
+  std::vector<std::vector<double>> steps;
+  for (int k = 1; k <= options.reach; ++k) steps.push_back(differences(of->means, 2 * k));
   double residual_e2 = 0;
-  out.offset_e.reserve(static_cast<std::size_t>(of->means.height()));
-  for (int line = 0; line < of->means.height(); ++line) {
-    const Comparison with = compared(of->means, line, options.reach, bound_e);
+  out.offset_e.reserve(static_cast<std::size_t>(count));
+  for (int line = 0; line < count; ++line) {
+    const Comparison with = compared(steps, line, count, bound_e);
     out.offset_e.push_back(out.gain * with.offset_e);
     residual_e2 += line_e2 * (1 - out.gain * (1 - 1.0 / with.lines));
   }
-  out.residual_std_e = std::sqrt(residual_e2 / of->means.height());
+  out.residual_std_e = std::sqrt(residual_e2 / count);
   return out;
 }
 
@@ -248,11 +198,14 @@ void subtract_lines(const LineOffsets& offsets, PlaneView<float> charge_e, int f
   const bool rows = offsets.lines == Lines::rows;
   assert(first >= 0 &&
          offsets.offset_e.size() >= static_cast<std::size_t>(first + (rows ? charge_e.height : charge_e.width)));
+  const double* const offset = offsets.offset_e.data() + first;
   for (int y = 0; y < charge_e.height; ++y) {
-    for (int x = 0; x < charge_e.width; ++x) {
-      charge_e.at(x, y) = static_cast<float>(
-          charge_e.at(x, y) -
-          offsets.offset_e[static_cast<std::size_t>(first) + static_cast<std::size_t>(rows ? y : x)]);
+    float* const row = charge_e.row(y);
+    if (rows) {
+      const double of_row = offset[y];
+      for (int x = 0; x < charge_e.width; ++x) row[x] = static_cast<float>(static_cast<double>(row[x]) - of_row);
+    } else {
+      for (int x = 0; x < charge_e.width; ++x) row[x] = static_cast<float>(static_cast<double>(row[x]) - offset[x]);
     }
   }
 }
