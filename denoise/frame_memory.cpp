@@ -5,6 +5,7 @@
 #include <new>
 
 #include "denoise/rows.h"
+#include "isp/base/huge_pages.h"
 
 namespace lowlux::denoise {
 namespace {
@@ -142,8 +143,10 @@ FrameMemory::FrameMemory(int max_width, int max_height, int threads, bool best)
   const Extent extent = extent_of(*this);
   saturated = Plane<std::uint8_t>(extent.width, extent.height);
   // Zeros: what lies beside rows is read, and must be numbers.
-  memory_.reset(static_cast<float*>(std::calloc(lay_out(nullptr), sizeof(float))));
+  const std::size_t floats = lay_out(nullptr);
+  memory_.reset(static_cast<float*>(std::calloc(floats, sizeof(float))));
   if (!memory_) throw std::bad_alloc();
+  prefer_huge_pages(memory_.get(), floats * sizeof(float));
   lay_out(memory_.get());
   for (int i = 0; i < threads; ++i) search[i].found = found_.data() + static_cast<std::ptrdiff_t>(i) * max_width;
   const auto width = static_cast<std::size_t>(extent.width);

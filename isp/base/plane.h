@@ -7,6 +7,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "isp/base/huge_pages.h"
+
 namespace lowlux {
 
 /// Borrowed rows of samples: `height` rows of `width`, `stride` samples from one row to the next.
@@ -46,6 +48,7 @@ class Plane {
         height_(height),
         samples_(std::make_unique_for_overwrite<T[]>(static_cast<std::size_t>(width) * height)) {
     assert(width >= 0 && height >= 0);
+    prefer_huge_pages(samples_.get(), size() * sizeof(T));
   }
   Plane(Plane&& other) noexcept
       : width_(std::exchange(other.width_, 0)),

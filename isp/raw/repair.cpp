@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "isp/raw/black_point.h"
+#include "isp/raw/defect_rows.h"
 
 namespace lowlux::isp {
 namespace {
@@ -103,14 +104,37 @@ bool is_defect(const Judge& judge, int x, int y) {
   return shared_excess(judge.dn, x, y) * (own > 0 ? 1 : -1) < most_shared(judge, x, y, std::fabs(own));
 }
 
-// Cheap first test of a whole row, so that the careful one runs on few pixels: out of the range of left and right.
+// Distances that is_defect() asks at least, rounding allowed for.
+defect_rows::Bounds least_bounds(const Judge& judge, int x, int y) {
+  constexpr double nearly = 0.999;
+  defect_rows::Bounds bounds;
+  if (judge.noise_is_known()) {
+    constexpr double squared = nearly * known_noise_factor * known_noise_factor;
+    bounds.black_dn = {static_cast<float>(judge.black_dn[site_of(x, y)]),
+                       static_cast<float>(judge.black_dn[site_of(x + 1, y)])};
+    bounds.variance_dn2 = static_cast<float>(squared * judge.noise.black_std_dn * judge.noise.black_std_dn);
+    bounds.shot_dn = static_cast<float>(squared * judge.noise.shot_dn);
+  } else {
+    bounds.range_factor = static_cast<float>(nearly * range_factor);
+    bounds.floor_dn = static_cast<float>(nearly * judge.floor_dn);
+  }
+  return bounds;
+}
+
+// A quick test of a part of the row first, so that the careful one runs on few.
 void judge_row(const Judge& judge, int y, std::vector<Pixel>& found) {
-  const std::uint16_t* row = judge.dn.row(y);
-  const int floor = static_cast<int>(std::min(judge.floor_dn, 65536.0));
-  for (int x = 2; x < judge.dn.width - 2; ++x) {
-    const int left = row[x - 2], right = row[x + 2], value = row[x];
-    const bool outside = value > std::max(left, right) + floor || value < std::min(left, right) - floor;
-    if (outside && is_defect(judge, x, y)) found.push_back({x, y});
+  std::array<std::uint8_t, 512> marked;
+  constexpr int most = marked.size();
+  const defect_rows::Bounds bounds = least_bounds(judge, 2, y);
+  for (int first = 2; first < judge.dn.width - 2; first += most) {
+    const int count = std::min(most, judge.dn.width - 2 - first);
+    defect_rows::mark_outliers({judge.dn.row(y - 2) + first, judge.dn.row(y) + first, judge.dn.row(y + 2) + first},
+                               count, bounds, marked.data());
+    const auto end = marked.begin() + count;
+    for (auto at = std::find(marked.begin(), end, 1); at != end; at = std::find(at + 1, end, 1)) {
+      const int x = first + static_cast<int>(at - marked.begin());
+      if (is_defect(judge, x, y)) found.push_back({x, y});
+    }
   }
 }
 
