@@ -19,8 +19,6 @@
 namespace lowlux::denoise {
 namespace {
 
-constexpr double largest_e = 1e9;
-
 /// One call of Denoiser::run.
 struct Run {
   FrameMemory& memory;

@@ -28,8 +28,11 @@ inline constexpr std::array all_levels{Level::draft, Level::standard, Level::hig
 /// "draft" and so on.
 std::string_view name_of(Level level);
 
+/// The largest electrons that count, and the largest variance of noise that is taken [e-^2]. No sensor has them.
+inline constexpr double largest_e = 1e9;
+
 /// A mosaic in electrons, pedestal removed, dark charge still in, signed. Sites that are not a number count as 0, and
-/// values beyond +-1e9 as +-1e9.
+/// values beyond +-largest_e as +-largest_e.
 struct RawElectronsView {
   PlaneView<const float> value;
   BayerPhase phase = BayerPhase::rggb;
@@ -37,7 +40,7 @@ struct RawElectronsView {
 
 inline constexpr double unsaturated_e = std::numeric_limits<double>::infinity();
 
-/// Var[y] = max(E[y], 0) + variance_e2 of a raw value y [e-] of one colour. All >= 0 and finite, but for saturation_e.
+/// Var[y] = max(E[y], 0) + variance_e2 of a raw value y [e-] of one colour. All in 0..largest_e, but for saturation_e.
 struct RawNoise {
   PerSite<double>
       dark_mean_e{};  // subtracted, sites as in site_of(); both greens get the mean of theirs, or mazes show

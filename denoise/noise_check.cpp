@@ -60,6 +60,10 @@ struct Check {
   void add_blocks(int level, int columns, int rows);
   std::optional<BlockDetail> detail(int x0, int y0, double averaged) const;
   void halve(int columns, int rows);
+  /// Rows of parts, the last left out.
+  void measure(int first, int last);
+  /// What another one measured.
+  void add(const Check& other);
   void finish();
 };
 
@@ -160,6 +164,30 @@ void Check::halve(int columns, int rows) {
   }
 }
 
+void Check::measure(int first, int last) {
+  const int columns = raw.value.width / 2, rows = raw.value.height / 2;  // whole cells
+  for (int y = first * part; y < std::min(last * part, rows); y += part) {
+    for (int x = 0; x < columns; x += part) {
+      int width = std::min(part, columns - x), height = std::min(part, rows - y);
+      load(x, y, width, height);
+      add_windows(width, height);
+      for (int level = 0; level < most_levels; ++level, width /= 2, height /= 2) {
+        if (level > 0) halve(width, height);
+        add_blocks(level, width, height);
+      }
+    }
+  }
+}
+
+void Check::add(const Check& other) {
+  for (int l = 0; l < most_levels; ++l)
+    blocks[l].insert(blocks[l].end(), other.blocks[l].begin(), other.blocks[l].end());
+  for (int c = 0; c < 3; ++c) negative[c] += other.negative[c];
+  out.windows += other.out.windows;
+  without_signal += other.without_signal;
+  saturated += other.saturated;
+}
+
 /// Mean of `wanted` over the tenth of the blocks, 8 at least, with the smallest `flatness`.
 double mean_of_flattest(std::vector<BlockDetail>& found, double BlockDetail::*flatness, double BlockDetail::*wanted) {
   const std::size_t count = std::max(least_blocks, found.size() / 10);
@@ -189,23 +217,27 @@ void Check::finish() {
 
 }  // namespace
 
-NoiseCheck check_noise(const RawElectronsView& raw, const RawNoise& noise) {
+NoiseCheck check_noise(const RawElectronsView& raw, const RawNoise& noise, Executor& executor) {
   assert(raw.value.width >= 2 && raw.value.height >= 2);
-  Check check(raw, noise);
-  const int columns = raw.value.width / 2, rows = raw.value.height / 2;  // whole cells
-  for (int y = 0; y < rows; y += part) {
-    for (int x = 0; x < columns; x += part) {
-      int width = std::min(part, columns - x), height = std::min(part, rows - y);
-      check.load(x, y, width, height);
-      check.add_windows(width, height);
-      for (int level = 0; level < most_levels; ++level, width /= 2, height /= 2) {
-        if (level > 0) check.halve(width, height);
-        check.add_blocks(level, width, height);
-      }
-    }
-  }
-  check.finish();
-  return check.out;
+  const int rows = raw.value.height / 2;  // whole cells
+  struct Call {
+    std::vector<Check> band;
+    int parts;
+  } call{{}, (rows + part - 1) / part};
+  const int bands = std::min(executor.width(), call.parts);
+  call.band.reserve(static_cast<std::size_t>(bands));
+  for (int i = 0; i < bands; ++i) call.band.emplace_back(raw, noise);
+  executor.run(
+      bands,
+      [](void* context, int index) {
+        Call& c = *static_cast<Call*>(context);
+        const auto bands_of = static_cast<int>(c.band.size());
+        c.band[static_cast<std::size_t>(index)].measure(c.parts * index / bands_of, c.parts * (index + 1) / bands_of);
+      },
+      &call);
+  for (int i = 1; i < bands; ++i) call.band[0].add(call.band[static_cast<std::size_t>(i)]);
+  call.band[0].finish();
+  return call.band[0].out;
 }
 
 std::array<double, most_levels> variance_scale_of(const NoiseCheck& check) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "denoise/denoiser.h"
+#include "isp/base/executor.h"
 
 /// Whether a raw has the noise that is said of it. Denoising by a wrong model leaves noise or takes detail, so this is
 /// asked before.
@@ -34,7 +35,7 @@ struct NoiseCheck {
 
 /// Measures a frame of at least 2 x 2 sites. Sites that are not a number take their blocks and windows out, values
 /// beyond +-1e9 count as +-1e9. Takes up to 1/4 byte for each site.
-NoiseCheck check_noise(const RawElectronsView& raw, const RawNoise& noise);
+NoiseCheck check_noise(const RawElectronsView& raw, const RawNoise& noise, Executor& executor);
 
 /// Below, the noise of a level is taken as measured and not as the model has it.
 inline constexpr double least_ratio = 0.7;

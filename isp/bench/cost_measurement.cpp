@@ -28,17 +28,18 @@ struct FrameSize {
   int height;
 };
 constexpr std::array<FrameSize, 4> sizes{{{256, 192}, {672, 448}, {1728, 1152}, {3680, 2448}}};
-constexpr int passes = 3;  // over everything, so that a busy moment meets each part once
-constexpr std::array<int, 4> rounds{3, 3, 2, 1};
-constexpr std::size_t best_sizes = 2;  // what takes seconds for each megapixel is measured on the smaller ones
+constexpr int passes = 5;  // over everything, so that a busy moment meets each part once
+constexpr std::array<int, 4> rounds{5, 5, 3, 2};
+constexpr std::size_t best_sizes = 3;  // what takes most of a second for each megapixel is left out on the largest
 constexpr std::size_t sampled_size = sizes.size() - 1;  // large enough for a sample to save something
 constexpr double black_dn = 512, white_dn = 16383, dn_per_e = 4, read_noise_e = 1.5;
 /// Mean electrons, so that the chroma of most of the frame starts on level 0, 1 and 2.
 constexpr std::array<double, 3> light_e{200, 2, 0.5};
 
-/// Waves of light and colour with fine texture, as noisy as the camera says.
-/// @param row_noise_e  standard deviation of what each row has too much
-RawFrame frame_of(const FrameSize& size, double mean_e, double row_noise_e = 0) {
+/// Waves of light and colour with edges everywhere, as noisy as the camera says. Pictures take as long at every level;
+/// smooth frames take a tenth less, and with Level::best a fifth more.
+/// @param line_noise_e  standard deviation of what each row has too much, and each column
+RawFrame frame_of(const FrameSize& size, double mean_e, double line_noise_e = 0) {
   RawFrame frame;
   RawDn& raw = frame.raw;
   raw.dn = Plane<std::uint16_t>(size.width, size.height);
@@ -46,13 +47,14 @@ RawFrame frame_of(const FrameSize& size, double mean_e, double row_noise_e = 0) 
   const DrawStream stream{.seed = 8, .frame = 0, .purpose = draw_purpose::electrons};
   for (int y = 0; y < size.height; ++y) {
     normal_row(stream, 0, static_cast<std::uint32_t>(y), 1, normal);
-    const double row_e = row_noise_e * std::sqrt(2) * std::sin(12.9898 * y);
+    const double row_e = line_noise_e * std::sqrt(2) * std::sin(12.9898 * y);
     for (int x = 0; x < size.width; ++x) {
       const int c = static_cast<int>(colour_at(raw.phase, x, y));
       const double wave = std::sin(2 * std::numbers::pi * (x * (3.0 + c) / size.width + y * 2.0 / size.height));
-      const double texture = ((x / 6) ^ (y / 6)) % 5 == 0 ? 1.04 : 0.99;
+      const double texture = ((x / 6) ^ (y / 6)) % 5 == 0 ? 1.6 : 0.9;
+      const double line_e = row_e + line_noise_e * std::sqrt(2) * std::sin(78.233 * x);
       const double e = mean_e * (1 + 0.3 * wave) * texture;
-      const double noisy = e + row_e + std::sqrt(e + read_noise_e * read_noise_e) * static_cast<double>(normal[x]);
+      const double noisy = e + line_e + std::sqrt(e + read_noise_e * read_noise_e) * static_cast<double>(normal[x]);
       raw.dn.at(x, y) = static_cast<std::uint16_t>(std::lround(std::clamp(black_dn + dn_per_e * noisy, 0.0, white_dn)));
     }
   }
@@ -107,32 +109,29 @@ class Pace {
   std::vector<double> taken_s_;
 };
 
-/// Median time of each step of developing, in units of the pace around it.
+/// Median time of each step of developing, in units of the pace before it.
 class Steps {
  public:
   static Result<Steps> of(const RawFrame& frame, const DevelopOptions& options, int count, Pace& pace,
                           Executor& executor) {
     Steps out;
-    const auto before_s = pace.seconds();
-    if (!before_s) return tl::make_unexpected(before_s.error());
     for (int i = 0; i < count; ++i) {
+      const auto unit_s = pace.seconds();
+      if (!unit_s) return tl::make_unexpected(unit_s.error());
       const Result<Developed> developed = develop(frame, options, executor);
       if (!developed) return tl::make_unexpected(developed.error());
-      out.rounds_.push_back(developed->plan.times);
+      out.rounds_.push_back({*unit_s, developed->plan.times});
     }
-    const auto after_s = pace.seconds();
-    if (!after_s) return tl::make_unexpected(after_s.error());
-    out.pace_s_ = (*before_s + *after_s) / 2;
     return out;
   }
   double of_step(std::string_view step) const {
     std::vector<double> values;
-    for (const auto& round : rounds_) {
-      for (const StageTime& time : round) {
-        if (time.stage == step) values.push_back(time.seconds);
+    for (const Round& round : rounds_) {
+      for (const StageTime& time : round.times) {
+        if (time.stage == step) values.push_back(time.seconds / round.unit_s);
       }
     }
-    return median(std::move(values)) / pace_s_;
+    return median(std::move(values));
   }
   double planning() const {
     return of_step("black point") + of_step("thumbnail") + of_step("white and exposure") + of_step("effects");
@@ -140,8 +139,11 @@ class Steps {
   double render() const { return of_step("render"); }
 
  private:
-  std::vector<std::vector<StageTime>> rounds_;
-  double pace_s_ = 1;
+  struct Round {
+    double unit_s;
+    std::vector<StageTime> times;
+  };
+  std::vector<Round> rounds_;
 };
 
 double megapixels_of(const FrameSize& size) { return 1e-6 * size.width * size.height; }
@@ -189,7 +191,8 @@ class Measurement {
     add(CostPart::defects, (with_lines->of_step("defects") + dark->of_step("defects")) / 2);
     const auto uneven = steps(uneven_, careful);
     if (!uneven) return tl::make_unexpected(uneven.error());
-    add(CostPart::offsets, uneven->of_step("noise model") - with_lines->of_step("noise model"));
+    add(CostPart::offsets,
+        uneven->of_step("noise model") + uneven->render() - with_lines->of_step("noise model") - with_lines->render());
     careful.denoise.line_noise = false;
     const auto without = steps(frames_[0], careful);
     if (!without) return tl::make_unexpected(without.error());
@@ -212,8 +215,8 @@ class Measurement {
       DevelopOptions options = options_for(level);
       options.find_defects = false;
       options.denoise.line_noise = false;
-      const auto taken =
-          Steps::of(frames_[static_cast<std::size_t>(start)], options, best ? 1 : rounds[size_], pace_, executor_);
+      const int count = best && megapixels_of(sizes[size_]) > 1 ? 1 : rounds[size_];
+      const auto taken = Steps::of(frames_[static_cast<std::size_t>(start)], options, count, pace_, executor_);
       if (!taken) return tl::make_unexpected(taken.error());
       const int place = static_cast<int>(first[static_cast<std::size_t>(level)]) + (best ? start / 2 : start);
       add(static_cast<CostPart>(place), taken->render());
@@ -260,7 +263,7 @@ class Measurement {
   Executor& executor_;
   std::vector<RawFrame> frames_;  // of each light
   RawFrame defective_;
-  RawFrame uneven_;                                    // with row noise
+  RawFrame uneven_;                                    // with row and column noise
   std::array<std::vector<double>, cost_parts> taken_;  // in units of the pace
 };
 

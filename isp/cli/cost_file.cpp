@@ -25,7 +25,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int format_number = 2;  // counts up where other parts or sizes are measured
+constexpr int format_number = 3;  // counts up where other parts or sizes are measured
 constexpr std::size_t largest_file = 1 << 20;
 constexpr std::size_t most_points = 100;
 

@@ -85,23 +85,43 @@ void set_defects(const RawFrame& frame, const DevelopPlan& plan, const DefectNoi
   out.defects = std::min(electrons * each, largest_delta_e);
 }
 
+/// Of each square, the lines of one kind; what cannot be told is absent.
+std::vector<std::optional<denoise::LineOffsets>> lines_of_squares(const RawElectrons& sample, int squares,
+                                                                  denoise::Lines kind, Executor& executor) {
+  struct Call {
+    PlaneView<const float> pixels;
+    denoise::Lines kind;
+    std::vector<std::optional<denoise::LineOffsets>> found;
+  } call{sample.value.view(), kind,
+         std::vector<std::optional<denoise::LineOffsets>>(static_cast<std::size_t>(squares))};
+  executor.run(
+      squares,
+      [](void* context, int index) {
+        Call& c = *static_cast<Call*>(context);
+        const auto square = c.pixels.crop(0, index * sample_side_px, sample_side_px, sample_side_px);
+        auto found = denoise::line_offsets_of_frame(square, c.kind, {.least_std_e = only_how_much});
+        if (found) c.found[static_cast<std::size_t>(index)] = *std::move(found);
+      },
+      &call);
+  return std::move(call.found);
+}
+
 /// Standard deviation of what lines share, over the squares; 0 where it does not stand out.
-double line_std_e(const RawElectrons& sample, int squares, denoise::Lines kind, const denoise::RawNoise& noise) {
+double line_std_e(const RawElectrons& sample, int squares, denoise::Lines kind, const denoise::RawNoise& noise,
+                  Executor& executor) {
   double squares_e2 = 0;
   int measured = 0;
-  std::optional<denoise::LineOffsets> mean;
-  for (int i = 0; i < squares; ++i) {
-    const auto part = sample.value.view().crop(0, i * sample_side_px, sample_side_px, sample_side_px);
-    auto found = denoise::line_offsets_of_frame(part, kind, {.least_std_e = only_how_much});
+  denoise::LineOffsets mean;
+  for (auto& found : lines_of_squares(sample, squares, kind, executor)) {
     if (!found) continue;
     squares_e2 += found->line_std_e * found->line_std_e;
     ++measured;
     mean = *std::move(found);
   }
   if (measured == 0) return 0;
-  mean->line_std_e = std::sqrt(squares_e2 / measured);
-  mean->gain = squares_e2 / (squares_e2 + measured * mean->measured_std_e * mean->measured_std_e);
-  return lines_stand_out(*mean, noise) ? mean->line_std_e : 0;
+  mean.line_std_e = std::sqrt(squares_e2 / measured);
+  mean.gain = squares_e2 / (squares_e2 + measured * mean.measured_std_e * mean.measured_std_e);
+  return lines_stand_out(mean, noise) ? mean.line_std_e : 0;
 }
 
 void set_lines(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
@@ -113,8 +133,8 @@ void set_lines(const RawFrame& frame, const DevelopPlan& plan, const denoise::Ra
   }
   const RawElectrons sample = sample_electrons(frame, plan, squares, executor);
   const int count = static_cast<int>(squares.size());
-  const double rows_e = line_std_e(sample, count, denoise::Lines::rows, noise);
-  const double columns_e = line_std_e(sample, count, denoise::Lines::columns, noise);
+  const double rows_e = line_std_e(sample, count, denoise::Lines::rows, noise, executor);
+  const double columns_e = line_std_e(sample, count, denoise::Lines::columns, noise, executor);
   // A square of 8 x 8 pixels has the mean of eight of each.
   const double seen_e = std::sqrt((rows_e * rows_e + columns_e * columns_e) / seen_box_px);
   std::vector<float> rms;

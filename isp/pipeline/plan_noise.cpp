@@ -1,7 +1,9 @@
 #include "isp/pipeline/plan_noise.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -34,14 +36,12 @@ std::array<double, 3> black_variance_e2(const RawFrame& frame, const DevelopPlan
   return out;
 }
 
-/// The denoiser takes no more. White levels of a thousandth of a code have it.
-constexpr double most_variance_e2 = 1e9;
-
 denoise::RawNoise noise_of(const RawFrame& frame, const DevelopPlan& plan) {
   denoise::RawNoise out;
   out.dark_mean_e = plan.black.dark_mean_e;
   out.variance_e2 = black_variance_e2(frame, plan);
-  for (double& variance : out.variance_e2) variance = std::min(variance, most_variance_e2);
+  // White levels of a thousandth of a code make more.
+  for (double& variance : out.variance_e2) variance = std::min(variance, denoise::largest_e);
   for (int site = 0; site < 4; ++site) {
     double& saturation_e = out.saturation_e[colour_of(frame.raw, site)];
     saturation_e = std::min(saturation_e, saturated * (*plan.electrons_at_white)[site]);
@@ -73,18 +73,31 @@ double black_std_e(const denoise::RawNoise& noise) {
 /// What is seen of lines: the eye follows their sum.
 double least_line_std_e(const denoise::RawNoise& noise) { return 0.03 * black_std_e(noise); }
 
-std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, const Plane<float>& charge_e) {
+std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, PlaneView<const float> charge_e,
+                                           Executor& executor) {
+  struct Call {
+    PlaneView<const float> charge_e;
+    denoise::FrameLineOptions options;
+    std::array<std::optional<denoise::LineOffsets>, 2> found;
+  } call{charge_e, {.least_std_e = least_line_std_e(plan.noise)}, {}};
+  executor.run(
+      2,
+      [](void* context, int index) {
+        Call& c = *static_cast<Call*>(context);
+        auto found = denoise::line_offsets_of_frame(c.charge_e, static_cast<denoise::Lines>(index), c.options);
+        if (found) c.found[static_cast<std::size_t>(index)] = *std::move(found);
+      },
+      &call);
   std::vector<denoise::LineOffsets> lines;
-  for (const auto kind : {denoise::Lines::rows, denoise::Lines::columns}) {
-    auto found = denoise::line_offsets_of_frame(charge_e.view(), kind, {.least_std_e = least_line_std_e(plan.noise)});
+  for (auto& found : call.found) {
     if (found && lines_stand_out(*found, plan.noise)) lines.push_back(*std::move(found));
   }
   return lines;
 }
 
 /// What lines took part in the noise of a pixel goes with them.
-void take_lines_off(RawElectrons& charge, NoiseReduction& out) {
-  out.lines = lines_of(out, charge.value);
+void take_lines_off(RawElectrons& charge, NoiseReduction& out, Executor& executor) {
+  out.lines = lines_of(out, charge.value.view(), executor);
   for (const denoise::LineOffsets& lines : out.lines) {
     subtract_lines(lines, charge.value.view());
     const double gone_e2 = lines.line_std_e * lines.line_std_e - lines.residual_std_e * lines.residual_std_e;
@@ -121,7 +134,7 @@ RawElectrons charge_to_check(const RawFrame& frame, const DevelopPlan& plan, boo
   const std::vector<Rect> squares = sample_squares(frame, plan);
   if (!with_lines && !squares.empty()) return sample_electrons(frame, plan, squares, executor);
   RawElectrons charge = raw_electrons(frame, plan, {}, executor);
-  if (with_lines) take_lines_off(charge, out);
+  if (with_lines) take_lines_off(charge, out, executor);
   return squares.empty() ? std::move(charge) : sample_of(charge, squares);
 }
 
@@ -194,7 +207,7 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   out.options.level = *out.level;
   const bool with_lines = choice.line_noise && (!plan.effects || plan.effects->lines);
   const RawElectrons charge = charge_to_check(frame, plan, with_lines, out, executor);
-  const denoise::NoiseCheck check = denoise::check_noise({charge.value.view(), charge.phase}, out.noise);
+  const denoise::NoiseCheck check = denoise::check_noise({charge.value.view(), charge.phase}, out.noise, executor);
   for (const denoise::NoiseRemark& remark : denoise::remarks_on(check)) plan.warnings.push_back(remark.text);
   out.options.variance_scale = denoise::variance_scale_of(check);
   return out;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "isp/model/colorimetry.h"
 #include "isp/model/colour_difference.h"
@@ -81,6 +82,16 @@ Channels channels_of(const RawFrame& frame, const DevelopPlan& plan, const denoi
   return out;
 }
 
+/// What is seen of noise whose mean lies below black, as it does where dark charge is overestimated: sqrt(2) times the
+/// rms of what reaches above, which for a mean at black is all of it. Half the distance counts: the light of a block
+/// varies.
+double above_black_e(double mean_e, double std_e) {
+  const double below = std::max(-mean_e / (2 * std_e), 0.0);
+  const double reaching = 0.5 * std::erfc(below / std::numbers::sqrt2);
+  const double density = std::exp(-0.5 * below * below) * std::numbers::inv_sqrtpi / std::numbers::sqrt2;
+  return std_e * std::sqrt(std::max(2 * ((1 + below * below) * reaching - below * density), 0.0));
+}
+
 SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise::RawNoise& noise,
                const Display& display) {
   Vector3 signal{};
@@ -90,15 +101,17 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
     mean_signal += share_of_sites[c] * (charge_e[c] - channels.dark_e[c]);
     mean_variance += share_of_sites[c] * (std::max(charge_e[c], 0.0) + noise.variance_e2[c]);
   }
-  const Lab lab = display.lab(signal);
-  Vector3 with_dark = signal, with_line = signal;
+  Vector3 lit{};
+  for (int c = 0; c < 3; ++c) lit[c] = std::max(signal[c], 0.0);
+  const Lab lab = display.lab(lit);
+  Vector3 with_dark = signal, with_line = lit;
   const double line_e = std::sqrt(std::max(mean_variance, least_variance_e2) / (seen_box_px * seen_box_px));
   double point = 0;
   for (int c = 0; c < 3; ++c) {
     const double variance_e2 = std::max(charge_e[c], 0.0) + noise.variance_e2[c];
     const double step_e = std::sqrt(std::max(variance_e2, least_variance_e2) / samples_in_box[c]);
-    Vector3 moved = signal;
-    moved[c] += step_e / channels.electrons_at_white[c];
+    Vector3 moved = lit;
+    moved[c] += above_black_e(charge_e[c] - channels.dark_e[c], step_e) / channels.electrons_at_white[c];
     const double difference = ciede2000(lab, display.lab(moved));
     squares += difference * difference;
     point = std::max(point, difference / (step_e * samples_in_box[c]));
@@ -111,7 +124,7 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
   out.display_delta_e = static_cast<float>(display.changed_for_display(signal));
   out.snr = static_cast<float>(std::max(mean_signal, 0.0) / std::sqrt(std::max(mean_variance, least_variance_e2)));
   out.noise_delta_e = static_cast<float>(std::sqrt(squares));
-  out.dark_delta_e = static_cast<float>(ciede2000(lab, display.lab(with_dark)));
+  out.dark_delta_e = static_cast<float>(ciede2000(display.lab(signal), display.lab(with_dark)));
   return out;
 }
 

@@ -12,10 +12,13 @@
 #include "denoise/line_noise.h"
 #include "denoise/noise_check.h"
 #include "denoise/rows.h"
+#include "isp/base/executor.h"
 #include "tests/denoise/flat_charts.h"
 
 namespace lowlux {
 namespace {
+
+PoolExecutor executor(2);
 
 using namespace denoise_testing;
 using denoise::DenoiseOptions;
@@ -180,7 +183,7 @@ TEST(DenoiserInputs, ThatWereDenoisedBeforeKeepMoreDetailWithTheirNoiseAsMeasure
       raw.at(x, y) = sum / 9;
     }
   }
-  const auto check = denoise::check_noise({raw.view(), camera.phase}, camera.noise());
+  const auto check = denoise::check_noise({raw.view(), camera.phase}, camera.noise(), executor);
   DenoiseOptions aware;
   aware.variance_scale = denoise::variance_scale_of(check);
   EXPECT_LT(aware.variance_scale[0], 0.3);

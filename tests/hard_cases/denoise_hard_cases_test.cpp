@@ -11,11 +11,14 @@
 
 #include "denoise/line_noise.h"
 #include "denoise/noise_check.h"
+#include "isp/base/executor.h"
 #include "tests/hard_cases/mosaics.h"
 
 // Section 9 of the denoising specification, number by number.
 namespace lowlux::hard_cases {
 namespace {
+
+InlineExecutor executor;
 
 using denoise_testing::Camera;
 using denoise_testing::flat;
@@ -75,7 +78,7 @@ TEST(HardCaseDenoise3, AnOversubtractedPedestalMovesTheMeanAndNothingElse) {
   }
   HardCase said({group, "9.3 the same is reported", "what was built in", "remarks that are missing"});
   said.on(Path::reference, 0, [&](Denormals m) {
-    const auto check = in_mode(m, [&] { return denoise::check_noise({c.raw_e.view(), c.phase}, c.noise); });
+    const auto check = in_mode(m, [&] { return denoise::check_noise({c.raw_e.view(), c.phase}, c.noise, executor); });
     const auto remarks = denoise::remarks_on(check);
     return !remarks.empty() && remarks[0].finding == denoise::NoiseFinding::black_suspicious ? 0.0 : 1.0;
   });
@@ -227,7 +230,7 @@ TEST(HardCaseDenoise8, WhatWasDenoisedBeforeIsFound) {
   }
   const double error = 1.5 * std::sqrt(2 / (48 * std::floor(0.1 * 31 * 23)));
   row.on(Path::reference, 0.05 + 5 * error, [&](Denormals m) {
-    const auto check = in_mode(m, [&] { return denoise::check_noise({c.raw_e.view(), c.phase}, c.noise); });
+    const auto check = in_mode(m, [&] { return denoise::check_noise({c.raw_e.view(), c.phase}, c.noise, executor); });
     return std::abs(check.measured_over_model[0].value_or(inf) * 16 - 1);
   });
   row.none(levels, "checked before").none(instruction_sets, scalar_code);

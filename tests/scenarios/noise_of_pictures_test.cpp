@@ -6,10 +6,13 @@
 #include <span>
 
 #include "denoise/noise_check.h"
+#include "isp/base/executor.h"
 #include "tests/sensor_bench/picture_raw.h"
 
 namespace lowlux {
 namespace {
+
+PoolExecutor executor(2);
 
 using denoise::NoiseFinding;
 
@@ -31,7 +34,7 @@ denoise::NoiseCheck checked(const RawDn& raw, const SensorModel& sensor, double 
   const denoise::RawNoise noise{
       .dark_mean_e = {dark_e, dark_e, dark_e, dark_e},
       .variance_e2 = {read_noise_e * read_noise_e, read_noise_e * read_noise_e, read_noise_e * read_noise_e}};
-  return denoise::check_noise({electrons(raw, sensor, factor).view(), raw.phase}, noise);
+  return denoise::check_noise({electrons(raw, sensor, factor).view(), raw.phase}, noise, executor);
 }
 
 bool has(const denoise::NoiseCheck& check, NoiseFinding finding) {
