@@ -8,7 +8,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double scale = 1e6;
+constexpr double scale = 3e4;                 // its square, the variance, is within denoise::largest_e
 constexpr double fine_q = 3, middle_q = 0.7;  // denoise/README.md, chroma start
 
 int chroma_start(const DenoiseLight& light) {

@@ -91,7 +91,6 @@ Finding check_of(std::string what, std::string claim, std::string expected, std:
 
 std::vector<Finding> our_findings(const DisplayScores& at, const RetargetingWork& work) {
   const PictureScores &ours = at.of(RetargetMethod::constrained), &shin = at.of(RetargetMethod::shin);
-  const PictureScores& wanat = at.of(RetargetMethod::wanat);
   const Wins wins = wins_of(at);
   const std::string unit = at.units == ShinUnits::lux ? "-by-lux" : "";
   const std::string by = at.units == ShinUnits::lux ? ", coefficients by lux" : "";
@@ -109,7 +108,8 @@ std::vector<Finding> our_findings(const DisplayScores& at, const RetargetingWork
       check_of("ours-gamut" + unit, "ours beats Shin's inverse in EGR at 2 cd/m2" + by, least,
                fmt::format("{} of {}, mean {} for {}", wins.gamut, ours.size(), gamut_text(ours), gamut_text(shin)),
                wins.gamut >= enough_pictures, note)};
-  if (at.units == ShinUnits::lux) return out;
+  if (at.units == ShinUnits::lux) return out;  // where the others were not measured
+  const PictureScores& wanat = at.of(RetargetMethod::wanat);
   out.push_back(check_of("wanat", "Wanat & Mantiuk's own saturation and luminance curve is farther than Shin's inverse",
                          "farther", both(wanat, work.options), mean_delta_e(wanat) > mean_delta_e(shin),
                          "mean Delta E 94c and EGR; the thesis has Cao's model under that name"));

@@ -104,8 +104,8 @@ TEST(CostFile, TextComesBackAndFaultsAreNamed) {
     return text;
   };
   for (const std::string& text :
-       {std::string(), std::string("[]"), std::string("{\"lowlux_cost_model\": 2}"), good.substr(0, good.size() / 2),
-        changed("\"lowlux_cost_model\": 2", "\"x\": 1"), changed("\"threads\": 2", "\"threads\": \"2\""),
+       {std::string(), std::string("[]"), std::string("{\"lowlux_cost_model\": 3}"), good.substr(0, good.size() / 2),
+        changed("\"lowlux_cost_model\": 3", "\"x\": 1"), changed("\"threads\": 2", "\"threads\": \"2\""),
         changed("\"look\"", "\"loop\""), changed("0.301", "-1"), changed("0.301", "1e999")}) {
     const auto wrong = cli::parse_cost(text);
     ASSERT_FALSE(wrong) << text;
