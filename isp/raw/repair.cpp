@@ -130,9 +130,9 @@ void judge_row(const Judge& judge, int y, std::vector<Pixel>& found) {
     const int count = std::min(most, judge.dn.width - 2 - first);
     defect_rows::mark_outliers({judge.dn.row(y - 2) + first, judge.dn.row(y) + first, judge.dn.row(y + 2) + first},
                                count, bounds, marked.data());
-    const auto end = marked.begin() + count;
-    for (auto at = std::find(marked.begin(), end, 1); at != end; at = std::find(at + 1, end, 1)) {
-      const int x = first + static_cast<int>(at - marked.begin());
+    const std::uint8_t *const begin = marked.data(), *const end = begin + count;
+    for (const std::uint8_t* at = std::find(begin, end, 1); at != end; at = std::find(at + 1, end, 1)) {
+      const int x = first + static_cast<int>(at - begin);
       if (is_defect(judge, x, y)) found.push_back({x, y});
     }
   }
