@@ -181,6 +181,7 @@ void Run::front() const {
 void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const {
   const PyramidLevel& level = memory.level[0];
   const SiteSlopes slopes = site_slopes(raw.phase);
+  repeat_luma_edges(planes, columns, rows, workers);
   in_bands(workers, rows, [&](int first, int last, int thread) {
     const ThreadMemory& m = memory.thread[thread];
     for (int y = first; y < last; ++y) {
@@ -201,7 +202,7 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
       in.rho = std::isinf(options.rho) ? -1.0f : static_cast<float>(options.rho);
       for (int k = 0; k < 3; ++k) in.per_gain[k] = static_cast<float>(1 / options.white_gain[k]);
       in.red_is_odd = red_column(raw.phase) == 1;
-      const LumaRows luma = luma_rows(planes, y, columns, rows);
+      const LumaRows luma = luma_rows(planes, y, rows);
       in.luma_beside[0] = luma.above;
       in.luma_beside[1] = luma.below;
       in.slopes = {slopes.c2_x, slopes.c2_y, slopes.c3_x, slopes.c3_y};

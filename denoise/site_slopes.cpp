@@ -14,19 +14,27 @@ SiteSlopes site_slopes(BayerPhase phase) {
   return {x * per_root2, y * per_root2, -x, y};
 }
 
-LumaRows luma_rows(const PlaneSet& planes, int y, int columns, int rows) {
-  float* const own = planes.row(0, y);
-  own[-1] = own[0];
-  own[columns] = own[columns - 1];
-  return {planes.row(0, std::max(y - 1, 0)), own, planes.row(0, std::min(y + 1, rows - 1))};
+void repeat_luma_edges(const PlaneSet& planes, int columns, int rows, const Workers& workers) {
+  in_bands(workers, rows, [&](int first, int last, int) {
+    for (int y = first; y < last; ++y) {
+      float* const own = planes.row(0, y);
+      own[-1] = own[0];
+      own[columns] = own[columns - 1];
+    }
+  });
+}
+
+LumaRows luma_rows(const PlaneSet& planes, int y, int rows) {
+  return {planes.row(0, std::max(y - 1, 0)), planes.row(0, y), planes.row(0, std::min(y + 1, rows - 1))};
 }
 
 void take_slopes_off(const PyramidLevel& level, BayerPhase phase, int columns, int rows, const Workers& workers) {
   const SiteSlopes back = site_slopes(phase);
   const SiteSlopes off{-back.c2_x, -back.c2_y, -back.c3_x, -back.c3_y};
+  repeat_luma_edges(level.noisy, columns, rows, workers);
   in_bands(workers, rows, [&](int first, int last, int) {
     for (int y = first; y < last; ++y) {
-      const LumaRows luma = luma_rows(level.noisy, y, columns, rows);
+      const LumaRows luma = luma_rows(level.noisy, y, rows);
       float* const chroma[2] = {level.noisy.row(2, y), level.noisy.row(3, y)};
       rows::add_slope_row({luma.above, luma.own, luma.below}, columns, {off.c2_x, off.c2_y, off.c3_x, off.c3_y},
                           chroma);

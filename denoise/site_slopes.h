@@ -25,13 +25,17 @@ struct SiteSlopes {
 /// What puts slopes back; the negative takes them off.
 SiteSlopes site_slopes(BayerPhase phase);
 
-/// Rows of the luma around row y of `rows`, with the own row's edges repeated beside it.
+/// Repeats the luma's first and last column beside every row, before rows are read: each row is read by the threads of
+/// its neighbours too.
+void repeat_luma_edges(const PlaneSet& planes, int columns, int rows, const Workers& workers);
+
+/// Rows of the luma around row y of `rows`.
 struct LumaRows {
   const float* above;
   const float* own;
   const float* below;
 };
-LumaRows luma_rows(const PlaneSet& planes, int y, int columns, int rows);
+LumaRows luma_rows(const PlaneSet& planes, int y, int rows);
 
 /// Takes the slopes off the finest planes of a frame of columns x rows cells, and mirrors C2 and C3 anew beyond it.
 void take_slopes_off(const PyramidLevel& level, BayerPhase phase, int columns, int rows, const Workers& workers);
