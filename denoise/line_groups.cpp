@@ -13,6 +13,7 @@ namespace lowlux::denoise {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
 /// Sums of the finite pixels of one group of one line, and their number.
 struct GroupSum {
   double sum = 0;

@@ -36,8 +36,8 @@ constexpr double black_dn = 512, white_dn = 16383, dn_per_e = 4, read_noise_e = 
 /// Mean electrons, so that the chroma of most of the frame starts on level 0, 1 and 2.
 constexpr std::array<double, 3> light_e{200, 2, 0.5};
 
-/// Waves of light and colour with edges everywhere, as noisy as the camera says. Pictures take as long at every level;
-/// smooth frames take a tenth less, and with Level::best a fifth more.
+/// Waves of light and colour with edges everywhere, as pictures have them, as noisy as the camera says: on smooth
+/// frames the denoiser is faster, and Level::best slower.
 /// @param line_noise_e  standard deviation of what each row has too much, and each column
 RawFrame frame_of(const FrameSize& size, double mean_e, double line_noise_e = 0) {
   RawFrame frame;
