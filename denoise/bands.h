@@ -15,19 +15,9 @@ struct Workers {
 /// Calls work(first, last, thread) for contiguous parts of 0..count - 1, at most one part for each thread.
 template <class Work>
 void in_bands(const Workers& workers, int count, const Work& work) {
-  struct Call {
-    const Work& work;
-    long long count;
-    int parts;
-  } call{work, count, std::min({workers.executor.width(), workers.threads, std::max(1, count)})};
-  workers.executor.run(
-      call.parts,
-      [](void* context, int index) {
-        const Call& c = *static_cast<Call*>(context);
-        const auto edge = [&c](int i) { return static_cast<int>(c.count * i / c.parts); };
-        c.work(edge(index), edge(index + 1), index);
-      },
-      &call);
+  const int parts = std::min({workers.executor.width(), workers.threads, std::max(1, count)});
+  const auto edge = [&](int i) { return static_cast<int>(static_cast<long long>(count) * i / parts); };
+  for_each_index(workers.executor, parts, [&](int index) { work(edge(index), edge(index + 1), index); });
 }
 
 }  // namespace lowlux::denoise

@@ -220,24 +220,15 @@ void Check::finish() {
 NoiseCheck check_noise(const RawElectronsView& raw, const RawNoise& noise, Executor& executor) {
   assert(raw.value.width >= 2 && raw.value.height >= 2);
   const int rows = raw.value.height / 2;  // whole cells
-  struct Call {
-    std::vector<Check> band;
-    int parts;
-  } call{{}, (rows + part - 1) / part};
-  const int bands = std::min(executor.width(), call.parts);
-  call.band.reserve(static_cast<std::size_t>(bands));
-  for (int i = 0; i < bands; ++i) call.band.emplace_back(raw, noise);
-  executor.run(
-      bands,
-      [](void* context, int index) {
-        Call& c = *static_cast<Call*>(context);
-        const auto bands_of = static_cast<int>(c.band.size());
-        c.band[static_cast<std::size_t>(index)].measure(c.parts * index / bands_of, c.parts * (index + 1) / bands_of);
-      },
-      &call);
-  for (int i = 1; i < bands; ++i) call.band[0].add(call.band[static_cast<std::size_t>(i)]);
-  call.band[0].finish();
-  return call.band[0].out;
+  const int parts = (rows + part - 1) / part, bands = std::min(executor.width(), parts);
+  std::vector<Check> band;
+  band.reserve(static_cast<std::size_t>(bands));
+  for (int i = 0; i < bands; ++i) band.emplace_back(raw, noise);
+  for_each_index(executor, bands,
+                 [&](int i) { band[static_cast<std::size_t>(i)].measure(parts * i / bands, parts * (i + 1) / bands); });
+  for (int i = 1; i < bands; ++i) band[0].add(band[static_cast<std::size_t>(i)]);
+  band[0].finish();
+  return band[0].out;
 }
 
 std::array<double, most_levels> variance_scale_of(const NoiseCheck& check) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <type_traits>
 
 namespace lowlux {
 
@@ -20,8 +21,8 @@ class InlineExecutor final : public Executor {
   void run(int n, void (*fn)(void* context, int index), void* context) noexcept override;
 };
 
-/// The calling thread and up to threads - 1 workers (as many as the system gives) named "lowlux", which sleep between
-/// calls and end with the object.
+/// The calling thread and up to threads - 1 workers (as many as the system gives) named "lowlux". Between calls they
+/// look out for the next one for a moment, then sleep; they end with the object.
 class PoolExecutor final : public Executor {
  public:
   explicit PoolExecutor(int threads);
@@ -53,21 +54,18 @@ constexpr RowBand row_band(int height, int count, int index) {
   return {edge(index), edge(index + 1)};
 }
 
-/// Calls work(band) for executor.width() bands of `height` rows.
+/// Calls work(i) for each i in 0..count-1.
+template <class Work>
+void for_each_index(Executor& executor, int count, Work&& work) {
+  executor.run(
+      count, [](void* context, int index) { (*static_cast<std::remove_reference_t<Work>*>(context))(index); }, &work);
+}
+
+/// Calls work(band, index) for executor.width() bands of `height` rows.
 template <class Work>
 void for_each_band(Executor& executor, int height, const Work& work) {
-  struct Call {
-    const Work& work;
-    int height;
-    int count;
-  } call{work, height, executor.width()};
-  executor.run(
-      call.count,
-      [](void* context, int index) {
-        const Call& c = *static_cast<Call*>(context);
-        c.work(row_band(c.height, c.count, index), index);
-      },
-      &call);
+  const int count = executor.width();
+  for_each_index(executor, count, [&](int index) { work(row_band(height, count, index), index); });
 }
 
 }  // namespace lowlux

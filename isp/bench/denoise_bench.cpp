@@ -47,17 +47,14 @@ StrengthSearch searched(const Work& work, std::size_t picture, std::size_t light
 /// Shared by the executor's threads, one shot each.
 Result<void> search_all(Work& work, Executor& executor) {
   work.strengths.resize(work.shots());
-  executor.run(
-      static_cast<int>(work.shots()),
-      [](void* context, int index) {
-        Work& w = *static_cast<Work*>(context);
-        const auto i = static_cast<std::size_t>(index);
-        const std::size_t picture = i / w.lights.size(), light = i % w.lights.size();
-        w.strengths[i] = searched(w, picture, light);
-        w.options.advance(search_share / static_cast<double>(w.shots()),
-                          fmt::format("strengths for {} at {}", w.pictures[picture].name, name_of(w.lights[light])));
-      },
-      &work);
+  for_each_index(executor, static_cast<int>(work.shots()), [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    const std::size_t picture = i / work.lights.size(), light = i % work.lights.size();
+    work.strengths[i] = searched(work, picture, light);
+    work.options.advance(
+        search_share / static_cast<double>(work.shots()),
+        fmt::format("strengths for {} at {}", work.pictures[picture].name, name_of(work.lights[light])));
+  });
   const bool failed = std::any_of(work.strengths.begin(), work.strengths.end(),
                                   [](const StrengthSearch& search) { return search.runs == 0; });
   if (failed) return fail(ErrorCode::unreadable, "OpenCV's fastNlMeansDenoising failed: not enough memory?");

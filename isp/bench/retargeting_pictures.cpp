@@ -124,10 +124,8 @@ Result<std::vector<RetargetScore>> retarget_scores(const std::vector<PictureColo
   Scoring scoring{pictures,           *showing.shown,
                   *std::move(source), *std::move(display),
                   measure_hulls,      std::vector<RetargetScore>(pictures.size())};
-  executor.run(
-      static_cast<int>(pictures.size()),
-      [](void* context, int index) { static_cast<Scoring*>(context)->score(static_cast<std::size_t>(index)); },
-      &scoring);
+  for_each_index(executor, static_cast<int>(pictures.size()),
+                 [&](int index) { scoring.score(static_cast<std::size_t>(index)); });
   return std::move(scoring.scores);
 }
 

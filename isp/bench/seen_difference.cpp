@@ -87,9 +87,8 @@ SeenDifference seen_difference(const RgbView<const float>& first, const RgbView<
   assert(first[0].width == second[0].width && first[0].height == second[0].height);
   assert(first[0].width >= seen_box_px && first[0].height >= seen_box_px);
   Plane<float> difference(first[0].width - seen_box_px + 1, first[0].height - seen_box_px + 1);
-  Work work{first, second, difference, executor.width()};
-  executor.run(
-      work.bands, [](void* context, int band) { compare_band(*static_cast<Work*>(context), band); }, &work);
+  const Work work{first, second, difference, executor.width()};
+  for_each_index(executor, work.bands, [&](int band) { compare_band(work, band); });
   std::vector<float> sorted(difference.data(), difference.data() + difference.size());
   SeenDifference out;
   for (const float d : sorted) out.mean += static_cast<double>(d) / static_cast<double>(sorted.size());

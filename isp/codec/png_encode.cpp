@@ -155,11 +155,9 @@ Result<void> write_pixels(const Encoded<Code>& picture, Executor& executor, std:
   uLong adler = 1;
   for (int done = 0; done < stretches; done += parallel) {
     const int count = std::min(parallel, stretches - done);
-    auto work = [&](int i) {
+    for_each_index(executor, count, [&](int i) {
       compressor[i].compress((done + i) * rows, std::min((done + i + 1) * rows, picture.height()));
-    };
-    executor.run(
-        count, [](void* context, int i) { (*static_cast<decltype(work)*>(context))(i); }, &work);
+    });
     for (int i = 0; i < count; ++i) {
       const auto deflated = std::as_bytes(compressor[i].deflated());
       if (deflated.empty()) return fail(ErrorCode::too_large, "no memory to compress the picture");

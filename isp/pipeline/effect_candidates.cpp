@@ -138,18 +138,17 @@ Result<EffectCandidate> within_budget(const EffectFacts& facts, double budget_s)
 
 LevelNoise level_noise(const std::vector<SeenBlock>& blocks) {
   std::vector<float> rms(blocks.size());
-  const auto percentile = [&](const auto& share) {
-    std::ranges::transform(blocks, rms.begin(), [&](const SeenBlock& block) {
-      return static_cast<float>(share(static_cast<double>(block.snr))) * block.noise_delta_e;
-    });
+  const auto percentile = [&](const auto& delta_e) {
+    std::ranges::transform(blocks, rms.begin(), delta_e);
     return seen_percentile(rms);
   };
+  const auto left_by = [&](std::optional<Level> level) {
+    return percentile([level](const SeenBlock& block) { return left_delta_e(level, block); });
+  };
   LevelNoise out;
-  out.all = percentile([](double) { return 1.0; });
-  out.without_level = left_of_noise(std::nullopt, 0) * out.all;
-  for (const Level level : {Level::draft, Level::standard}) {
-    out.left[static_cast<std::size_t>(level)] = percentile([&](double snr) { return left_of_noise(level, snr); });
-  }
+  out.all = percentile([](const SeenBlock& block) { return block.noise_delta_e; });
+  out.without_level = left_by(std::nullopt);
+  for (const Level level : {Level::draft, Level::standard}) out.left[static_cast<std::size_t>(level)] = left_by(level);
   return out;
 }
 
@@ -165,9 +164,10 @@ std::array<double, 3> chroma_work(const std::vector<SeenBlock>& blocks, const Re
   for (const SeenBlock& block : blocks) {
     std::size_t least = start_of(block);
     for (const SeenBlock& other : blocks) {
+      if (start_of(other) >= least) continue;
       const bool near = std::fabs(other.x - block.x) * static_cast<float>(active.width) <= chroma_reach_px &&
                         std::fabs(other.y - block.y) * static_cast<float>(active.height) <= chroma_reach_px;
-      if (near) least = std::min(least, start_of(other));
+      if (near) least = start_of(other);
     }
     share[least] += 1.0 / static_cast<double>(blocks.size());
   }

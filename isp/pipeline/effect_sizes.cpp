@@ -88,22 +88,13 @@ void set_defects(const RawFrame& frame, const DevelopPlan& plan, const DefectNoi
 /// Of each square, the lines of one kind; what cannot be told is absent.
 std::vector<std::optional<denoise::LineOffsets>> lines_of_squares(const RawElectrons& sample, int squares,
                                                                   denoise::Lines kind, Executor& executor) {
-  struct Call {
-    PlaneView<const float> pixels;
-    denoise::Lines kind;
-    std::vector<std::optional<denoise::LineOffsets>> found;
-  } call{sample.value.view(), kind,
-         std::vector<std::optional<denoise::LineOffsets>>(static_cast<std::size_t>(squares))};
-  executor.run(
-      squares,
-      [](void* context, int index) {
-        Call& c = *static_cast<Call*>(context);
-        const auto square = c.pixels.crop(0, index * sample_side_px, sample_side_px, sample_side_px);
-        auto found = denoise::line_offsets_of_frame(square, c.kind, {.least_std_e = only_how_much});
-        if (found) c.found[static_cast<std::size_t>(index)] = *std::move(found);
-      },
-      &call);
-  return std::move(call.found);
+  std::vector<std::optional<denoise::LineOffsets>> of_square(static_cast<std::size_t>(squares));
+  for_each_index(executor, squares, [&](int i) {
+    const auto square = sample.value.view().crop(0, i * sample_side_px, sample_side_px, sample_side_px);
+    auto found = denoise::line_offsets_of_frame(square, kind, {.least_std_e = only_how_much});
+    if (found) of_square[static_cast<std::size_t>(i)] = *std::move(found);
+  });
+  return of_square;
 }
 
 /// Standard deviation of what lines share, over the squares; 0 where it does not stand out.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -102,7 +103,7 @@ EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const De
   facts.has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !noise_obstacle(frame, plan);
   if (facts.has_noise) {
     set_noise_model(frame, plan, reduction);
-    facts.blocks = seen_blocks(frame, plan, reduction.noise, thumbnail);
+    facts.blocks = seen_blocks(frame, plan, reduction.noise, thumbnail, executor);
     facts.has_noise = !facts.blocks.empty();
     facts.noise = level_noise(facts.blocks);
     facts.chroma_work = chroma_work(facts.blocks, facts.active);
@@ -121,18 +122,23 @@ EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const De
 }  // namespace
 
 double left_of_noise(std::optional<Level> level, double snr) {
-  const double bright = std::clamp(snr / 10, 0.0, 1.0);
-  if (!level) return 1.15;
-  switch (*level) {
-    case Level::draft:
-      return 0.14 + 0.33 * bright;
-    case Level::standard:
-      return 0.095 + 0.2 * bright;
-    case Level::high:
-    case Level::best:
-      break;
+  constexpr std::array at{0.2, 0.7, 1.5, 3.0, 6.0, 12.0};
+  constexpr std::array draft{0.12, 0.16, 0.185, 0.225, 0.28, 0.33};
+  constexpr std::array standard{0.08, 0.105, 0.12, 0.14, 0.165, 0.19};
+  if (!level) return 0.9;
+  if (*level >= Level::high) return 0;
+  const auto& left = *level == Level::draft ? draft : standard;
+  if (!(snr > at.front())) return left.front();
+  for (std::size_t i = 1; i < at.size(); ++i) {
+    if (snr < at[i]) return std::lerp(left[i - 1], left[i], std::log(snr / at[i - 1]) / std::log(at[i] / at[i - 1]));
   }
-  return 0;
+  return left.back();
+}
+
+float left_delta_e(std::optional<Level> level, const SeenBlock& block) {
+  const auto left = static_cast<float>(left_of_noise(level, static_cast<double>(block.snr)));
+  const float noise = left * block.surroundings * block.noise_delta_e;
+  return level ? noise : std::hypot(noise, block.clip_delta_e);
 }
 
 double error_share(std::optional<Level> level) {

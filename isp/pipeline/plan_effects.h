@@ -4,6 +4,7 @@
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 #include "isp/pipeline/plan.h"
+#include "isp/pipeline/visible_noise.h"
 #include "isp/raw/thumbnail.h"
 
 namespace lowlux::isp {
@@ -16,9 +17,14 @@ namespace lowlux::isp {
 /// cheapest plan, whose time is told (insufficient).
 Result<void> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan, Executor& executor);
 
-/// Upper bound of what a level of noise reduction leaves of the visible noise, against Level::high, for blocks of this
-/// signal to noise ratio; nullopt is no reduction. Measured on the tuning pictures: tests/bench/planner_bench.cpp.
+/// What a level of noise reduction leaves of the visible noise at most, against Level::high, for blocks of this signal
+/// to noise ratio in even surroundings; nullopt is no reduction. Measured on the tuning pictures:
+/// tests/bench/planner_bench.cpp.
 double left_of_noise(std::optional<denoise::Level> level, double snr);
+
+/// Root mean square CIEDE2000 of that: left_of_noise() of the noise of the surroundings, which thresholds go by, and
+/// without reduction what clipping at black makes of it.
+float left_delta_e(std::optional<denoise::Level> level, const SeenBlock& block);
 
 /// What is left of it against the truth, for telling which of two plans is better.
 double error_share(std::optional<denoise::Level> level);

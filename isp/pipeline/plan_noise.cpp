@@ -75,21 +75,14 @@ double least_line_std_e(const denoise::RawNoise& noise) { return 0.03 * black_st
 
 std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, PlaneView<const float> charge_e,
                                            Executor& executor) {
-  struct Call {
-    PlaneView<const float> charge_e;
-    denoise::FrameLineOptions options;
-    std::array<std::optional<denoise::LineOffsets>, 2> found;
-  } call{charge_e, {.least_std_e = least_line_std_e(plan.noise)}, {}};
-  executor.run(
-      2,
-      [](void* context, int index) {
-        Call& c = *static_cast<Call*>(context);
-        auto found = denoise::line_offsets_of_frame(c.charge_e, static_cast<denoise::Lines>(index), c.options);
-        if (found) c.found[static_cast<std::size_t>(index)] = *std::move(found);
-      },
-      &call);
+  const denoise::FrameLineOptions options{.least_std_e = least_line_std_e(plan.noise)};
+  std::array<std::optional<denoise::LineOffsets>, 2> of_kind;
+  for_each_index(executor, 2, [&](int kind) {
+    auto found = denoise::line_offsets_of_frame(charge_e, static_cast<denoise::Lines>(kind), options);
+    if (found) of_kind[static_cast<std::size_t>(kind)] = *std::move(found);
+  });
   std::vector<denoise::LineOffsets> lines;
-  for (auto& found : call.found) {
+  for (auto& found : of_kind) {
     if (found && lines_stand_out(*found, plan.noise)) lines.push_back(*std::move(found));
   }
   return lines;

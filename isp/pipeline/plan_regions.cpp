@@ -28,9 +28,7 @@ std::optional<Level> cheapest(const std::vector<SeenBlock>& blocks, Level most, 
     if (level && *level >= most) break;
     std::vector<float> rms;
     rms.reserve(blocks.size());
-    for (const SeenBlock& block : blocks) {
-      rms.push_back(static_cast<float>(left_of_noise(level, static_cast<double>(block.snr))) * block.noise_delta_e);
-    }
+    for (const SeenBlock& block : blocks) rms.push_back(left_delta_e(level, block));
     if (seen_percentile(rms) < tolerance_delta_e) return level;
   }
   return most;

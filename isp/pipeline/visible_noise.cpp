@@ -18,6 +18,17 @@ constexpr int most_blocks_along = 16;
 constexpr std::array<double, 3> samples_in_box{16, 32, 16};  // of R, G, B
 constexpr std::array<double, 3> share_of_sites{0.25, 0.5, 0.25};
 constexpr double least_variance_e2 = 1e-6;
+constexpr double surroundings_px = 12;  // of a block of the denoiser, whose thresholds are those of its mean variance
+constexpr double most_surroundings = 2;
+/// What pixels of the picture scatter by over what their raw values do: on the tuning pictures.
+constexpr double pixel_scatter = 1.3;
+
+/// Mean of what is above black of a normal law.
+double mean_above_black(double mean, double std) {
+  if (!(std > 0)) return std::max(mean, 0.0);
+  const double t = mean / std, density = std::exp(-0.5 * t * t) * std::numbers::inv_sqrtpi / std::numbers::sqrt2;
+  return std * density + mean * 0.5 * std::erfc(-t / std::numbers::sqrt2);
+}
 
 /// From camera RGB, a fraction of white with the black off, to what is displayed.
 class Display {
@@ -29,6 +40,27 @@ class Display {
         white_(*xyz_of(output_white)) {}
 
   Lab lab(const Vector3& camera) const { return lab_of_shown(shown(camera)); }
+
+  /// Of the mean of pixels that scatter. @param std  of each colour, a fraction of white
+  Lab lab_of_clipped(const Vector3& camera, const Vector3& std) const {
+    const Vector3 mean = linear(camera);
+    Vector3 lit{}, raised{};
+    double luminance = 0, too_bright = 0;
+    for (int i = 0; i < 3; ++i) {
+      double variance = 0;
+      for (int c = 0; c < 3; ++c) {
+        variance += std::pow(matrix(i, c) * static_cast<double>(plan_.white_gain[c]) * std[c], 2);
+      }
+      const auto weight = static_cast<double>(plan_.transform.luminance[i]);
+      lit[i] = std::max(mean[i], 0.0);
+      raised[i] = mean_above_black(mean[i], pixel_scatter * std::sqrt(variance));
+      luminance += weight * lit[i];
+      too_bright += weight * raised[i];
+    }
+    if (!(luminance > 0)) return lab_of_shown(toned(raised));
+    for (double& v : raised) v *= luminance / too_bright;
+    return lab_of_shown(toned(raised));
+  }
 
   /// What changing its code for the planned display makes of a colour, by the colours that codes stand for.
   double changed_for_display(const Vector3& camera) const {
@@ -45,19 +77,25 @@ class Display {
   }
 
  private:
-  Vector3 shown(const Vector3& camera) const {
-    std::array<double, 3> balanced{};
-    for (int c = 0; c < 3; ++c) {
-      balanced[c] = std::min(camera[c] * static_cast<double>(plan_.white_gain[c]), 1.0);
-    }
+  double matrix(int row, int column) const {
+    return static_cast<double>(plan_.transform.matrix[static_cast<std::size_t>(3 * row + column)]);
+  }
+  Vector3 linear(const Vector3& camera) const {
     Vector3 out{};
-    for (int i = 0; i < 3; ++i) {
-      double v = 0;
-      for (int c = 0; c < 3; ++c) v += static_cast<double>(plan_.transform.matrix[3 * i + c]) * balanced[c];
-      out[i] = std::min(apply_tone(plan_.options.tone, std::clamp(v, 0.0, 1.0) * limit_, limit_), 1.0);
+    for (int c = 0; c < 3; ++c) {
+      const double balanced = std::min(camera[c] * static_cast<double>(plan_.white_gain[c]), 1.0);
+      for (int i = 0; i < 3; ++i) out[i] += matrix(i, c) * balanced;
     }
     return out;
   }
+  Vector3 toned(const Vector3& linear) const {
+    Vector3 out{};
+    for (int i = 0; i < 3; ++i) {
+      out[i] = std::min(apply_tone(plan_.options.tone, std::clamp(linear[i], 0.0, 1.0) * limit_, limit_), 1.0);
+    }
+    return out;
+  }
+  Vector3 shown(const Vector3& camera) const { return toned(linear(camera)); }
   Lab lab_of_shown(const Vector3& shown) const { return lab_of(xyz_of(to_xyz_ * shown), white_); }
 
   const DevelopPlan& plan_;
@@ -107,6 +145,7 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
   Vector3 with_dark = signal, with_line = lit;
   const double line_e = std::sqrt(std::max(mean_variance, least_variance_e2) / (seen_box_px * seen_box_px));
   double point = 0;
+  Vector3 pixel_std{};
   for (int c = 0; c < 3; ++c) {
     const double variance_e2 = std::max(charge_e[c], 0.0) + noise.variance_e2[c];
     const double step_e = std::sqrt(std::max(variance_e2, least_variance_e2) / samples_in_box[c]);
@@ -115,6 +154,7 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
     const double difference = ciede2000(lab, display.lab(moved));
     squares += difference * difference;
     point = std::max(point, difference / (step_e * samples_in_box[c]));
+    pixel_std[c] = std::sqrt(std::max(variance_e2, 0.0)) / channels.electrons_at_white[c];
     with_dark[c] += channels.dark_e[c] / channels.electrons_at_white[c];
     with_line[c] += line_e / channels.electrons_at_white[c];
   }
@@ -124,35 +164,76 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
   out.display_delta_e = static_cast<float>(display.changed_for_display(signal));
   out.snr = static_cast<float>(std::max(mean_signal, 0.0) / std::sqrt(std::max(mean_variance, least_variance_e2)));
   out.noise_delta_e = static_cast<float>(std::sqrt(squares));
-  out.dark_delta_e = static_cast<float>(ciede2000(display.lab(signal), display.lab(with_dark)));
+  out.clip_delta_e = static_cast<float>(ciede2000(lab, display.lab_of_clipped(signal, pixel_std)));
+  if (with_dark != signal)
+    out.dark_delta_e = static_cast<float>(ciede2000(display.lab(signal), display.lab(with_dark)));
   return out;
 }
+
+/// The thumbnail in electrons.
+class Charge {
+ public:
+  Charge(const Thumbnail& thumbnail, const Channels& channels, const denoise::RawNoise& noise)
+      : mean_(thumbnail.mean), channels_(channels), noise_(noise) {}
+
+  Vector3 at(int x, int y) const {
+    Vector3 out{};
+    for (int c = 0; c < 3; ++c) {
+      const auto mean = static_cast<double>(mean_.plane[c].at(x, y));
+      out[c] = (std::isfinite(mean) ? mean : 0) * channels_.electrons_at_white[c];
+    }
+    return out;
+  }
+
+  /// See SeenBlock. @param reach  in blocks
+  double surroundings(int x, int y, int reach) const {
+    double sum = 0;
+    int count = 0;
+    for (int j = std::max(y - reach, 0); j <= std::min(y + reach, mean_.height() - 1); ++j) {
+      for (int i = std::max(x - reach, 0); i <= std::min(x + reach, mean_.width() - 1); ++i, ++count) {
+        sum += variance(i, j);
+      }
+    }
+    const double own = std::max(variance(x, y), least_variance_e2);
+    return std::clamp(std::sqrt(sum / count / own), 1.0, most_surroundings);
+  }
+
+ private:
+  double variance(int x, int y) const {
+    const Vector3 charge_e = at(x, y);
+    double out = 0;
+    for (int c = 0; c < 3; ++c) out += share_of_sites[c] * (std::max(charge_e[c], 0.0) + noise_.variance_e2[c]);
+    return out;
+  }
+
+  const CameraRgb& mean_;
+  const Channels& channels_;
+  const denoise::RawNoise& noise_;
+};
 
 }  // namespace
 
 std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
-                                   const Thumbnail& thumbnail) {
+                                   const Thumbnail& thumbnail, Executor& executor) {
   const OutputSpace space = plan.options.space;
   if (space == OutputSpace::camera || space == OutputSpace::xyz) return {};
   const Display display(plan);
   const Channels channels = channels_of(frame, plan, noise);
   const int columns = thumbnail.mean.width(), rows = thumbnail.mean.height();
   const int along = std::min(columns, most_blocks_along), down = std::min(rows, most_blocks_along);
-  std::vector<SeenBlock> out;
-  out.reserve(static_cast<std::size_t>(along) * static_cast<std::size_t>(down));
-  for (int j = 0; j < down; ++j) {
+  const Charge charge(thumbnail, channels, noise);
+  const int reach = static_cast<int>(std::ceil(surroundings_px * columns / frame.raw.active.width));
+  std::vector<SeenBlock> out(static_cast<std::size_t>(along) * static_cast<std::size_t>(down));
+  for_each_index(executor, down, [&](int j) {
     for (int i = 0; i < along; ++i) {
       const int x = (2 * i + 1) * columns / (2 * along), y = (2 * j + 1) * rows / (2 * down);
-      Vector3 charge_e{};
-      for (int c = 0; c < 3; ++c) {
-        const auto mean = static_cast<double>(thumbnail.mean.plane[c].at(x, y));
-        charge_e[c] = (std::isfinite(mean) ? mean : 0) * channels.electrons_at_white[c];
-      }
-      out.push_back(seen(charge_e, channels, noise, display));
-      out.back().x = (static_cast<float>(x) + 0.5f) / static_cast<float>(columns);
-      out.back().y = (static_cast<float>(y) + 0.5f) / static_cast<float>(rows);
+      SeenBlock& block = out[static_cast<std::size_t>(j * along + i)];
+      block = seen(charge.at(x, y), channels, noise, display);
+      block.surroundings = static_cast<float>(charge.surroundings(x, y, reach));
+      block.x = (static_cast<float>(x) + 0.5f) / static_cast<float>(columns);
+      block.y = (static_cast<float>(y) + 0.5f) / static_cast<float>(rows);
     }
-  }
+  });
   return out;
 }
 
@@ -167,11 +248,14 @@ double seen_percentile(std::span<const float> rms_delta_e) {
   };
   double low = 0, high = 5 * static_cast<double>(*std::ranges::max_element(rms_delta_e));
   if (!(high > 0)) return 0;
-  for (int step = 0; step < 24; ++step) {
-    const double middle = (low + high) / 2;
-    (share_above(middle) > 1 - seen_share ? low : high) = middle;
+  double above_low = 1, above_high = 0;
+  for (int step = 0; step < 16; ++step) {
+    const double middle = (low + high) / 2, above = share_above(middle);
+    const bool more = above > 1 - seen_share;
+    (more ? low : high) = middle;
+    (more ? above_low : above_high) = above;
   }
-  return (low + high) / 2;
+  return low + (high - low) * (above_low - (1 - seen_share)) / (above_low - above_high);
 }
 
 }  // namespace lowlux::isp

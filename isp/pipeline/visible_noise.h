@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "denoise/denoiser.h"
+#include "isp/base/executor.h"
 #include "isp/pipeline/plan.h"
 #include "isp/raw/thumbnail.h"
 
@@ -19,7 +20,9 @@ struct SeenBlock {
   float x = 0;                // of its middle, share of the width
   float y = 0;                // of the height
   float snr = 0;              // of one mean pixel, dark charge off
+  float surroundings = 1;     // standard deviation of the noise 16 px around over that of its own, 1..2
   float noise_delta_e = 0;    // root mean square CIEDE2000 of the noise, in means over 8 x 8 pixels
+  float clip_delta_e = 0;     // CIEDE2000 that clipping its noise at black makes of the means
   float dark_delta_e = 0;     // CIEDE2000 of its mean dark charge, were it left in
   float line_delta_e = 0;     // CIEDE2000 for each electron that all its pixels have too much
   float point_delta_e = 0;    // the same of one pixel alone, of the colour where that shows most
@@ -29,9 +32,11 @@ struct SeenBlock {
 /// Up to 256 blocks, evenly spread over the frame. With C the colour as it will be displayed and s_c the standard
 /// deviation of the mean of the 16, 32 and 16 samples of R, G and B that 64 pixels hold,
 ///     noise_delta_e^2 = sum over c of CIEDE2000(C(r), C(r + s_c))^2.
+/// Clipping raises the mean of a displayed primary p, whose pixels scatter by d around m, by d (phi(m / d) + m / d
+/// Phi(m / d)) - max(m, 0); the luminance is kept, as moving colours into the gamut does.
 /// Needs the plan's white balance, transform and electrons at white. Empty for spaces without primaries.
 std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
-                                   const Thumbnail& thumbnail);
+                                   const Thumbnail& thumbnail, Executor& executor);
 
 /// The difference that 5 % of the pixels exceed, each block's being normal with this root mean square.
 double seen_percentile(std::span<const float> rms_delta_e);

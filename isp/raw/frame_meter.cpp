@@ -25,7 +25,6 @@ std::array<std::uint16_t, 4> luma_weights(const RawDn& raw) {
 }  // namespace
 
 struct FrameMeter::Job {
-  FrameMeter& meter;
   std::span<const std::byte> bytes;
   std::size_t stride;
   RawDn& raw;
@@ -130,20 +129,16 @@ void FrameMeter::read(std::span<const std::byte> bytes, std::size_t stride, RawD
   wanted_ = wants;
   thumbnail_.clear();
   if (wants.noise) tiles_.clear();
-  Job job{*this, bytes, stride, raw, wants, std::min(executor.width(), static_cast<int>(tallies_.size()))};
-  executor.run(
-      job.bands,
-      [](void* context, int index) {
-        const Job& j = *static_cast<Job*>(context);
-        j.meter.tallies_[static_cast<std::size_t>(index)] = {};
-        // Bands of whole tiles of the active area; the first and the last have the rows above and below it.
-        const int tile = j.meter.tiles_.tile(), tiles = (j.raw.active.height + tile - 1) / tile;
-        const auto edge = [&](int i) { return j.raw.active.y + tile * (tiles * i / j.bands); };
-        const int first = index == 0 ? 0 : edge(index);
-        const int last = index + 1 == j.bands ? j.raw.dn.height() : edge(index + 1);
-        j.meter.read_rows(j, {first, last}, index);
-      },
-      &job);
+  const Job job{bytes, stride, raw, wants, std::min(executor.width(), static_cast<int>(tallies_.size()))};
+  for_each_index(executor, job.bands, [&](int index) {
+    tallies_[static_cast<std::size_t>(index)] = {};
+    // Bands of whole tiles of the active area; the first and the last have the rows above and below it.
+    const int tile = tiles_.tile(), tiles = (raw.active.height + tile - 1) / tile;
+    const auto edge = [&](int i) { return raw.active.y + tile * (tiles * i / job.bands); };
+    const int first = index == 0 ? 0 : edge(index);
+    const int last = index + 1 == job.bands ? raw.dn.height() : edge(index + 1);
+    read_rows(job, {first, last}, index);
+  });
   add_up(raw, job.bands, wants);
 }
 

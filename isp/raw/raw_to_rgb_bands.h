@@ -80,18 +80,8 @@ struct Ring {
 /// Calls work(band, thread) for at most `threads` bands of `height` rows.
 template <class Work>
 inline void run_bands(Executor& executor, int threads, int height, const Work& work) {
-  struct Call {
-    const Work& work;
-    int height;
-    int count;
-  } call{work, height, std::min(threads, executor.width())};
-  executor.run(
-      call.count,
-      [](void* context, int index) {
-        const Call& c = *static_cast<Call*>(context);
-        c.work(row_band(c.height, c.count, index), index);
-      },
-      &call);
+  const int count = std::min(threads, executor.width());
+  for_each_index(executor, count, [&](int index) { work(row_band(height, count, index), index); });
 }
 
 /// Floats that a run of scratch samples takes for pictures `width` pixels wide.

@@ -10,13 +10,14 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int max_blocks = 256;  // in either direction
+constexpr int max_blocks = 256;    // in either direction
+constexpr int enough_blocks = 64;  // along the longer side, to have them twice as large
 constexpr double difference_to_std =
     0.886226925452758;  // sqrt(pi) / 2: mean |a - b| of two normals is 2 std / sqrt(pi)
 
 int block_of(const Rect& active) {
   const int side = std::max(active.width, active.height);
-  const int block = std::max(4, (side + max_blocks - 1) / max_blocks);
+  const int block = std::max(side >= 8 * enough_blocks ? 8 : 4, (side + max_blocks - 1) / max_blocks);
   return block + (block & 1);
 }
 

@@ -13,16 +13,19 @@ namespace {
 constexpr double mid_grey = 0.18;
 constexpr double black_slope = 0.7;
 constexpr double mid_slope = 2 - black_slope;
-constexpr double shoulder_power = 1.5;
+
+/// The shoulder's p = 1.5, and its inverse.
+double to_power(double x) { return x * std::sqrt(x); }
+double root(double x) { return std::cbrt(x * x); }
 
 double toe(double x) { return x <= 0 ? black_slope * x : x * (black_slope + (1 - black_slope) * x / mid_grey); }
 
 double shoulder(double x, double limit) {
   const double range = limit - mid_grey;
-  const double needed = std::pow(mid_slope * range / (1 - mid_grey), shoulder_power) - 1;
+  const double needed = to_power(mid_slope * range / (1 - mid_grey)) - 1;
   const double t = x - mid_grey;
-  const double bend = needed * std::pow(t / range, shoulder_power);
-  return mid_grey + mid_slope * t / std::pow(1 + bend, 1 / shoulder_power);
+  const double bend = needed * to_power(t / range);
+  return mid_grey + mid_slope * t / root(1 + bend);
 }
 
 constexpr int mantissa_bits = 23;

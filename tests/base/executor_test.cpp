@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <set>
 #include <thread>
@@ -53,6 +55,21 @@ TEST(PoolExecutor, RunsEachTaskOnceOverManyRounds) {
           width + 2, [](void* context, int i) { ++(*static_cast<std::vector<std::atomic<int>>*>(context))[i]; }, &runs);
       for (const auto& count : runs) ASSERT_EQ(count, 1);
     }
+  }
+}
+
+// Threads look out for work for a moment and then sleep: calls come in both states, and on the way between them; slow
+// tasks make the caller and the other workers sleep.
+TEST(PoolExecutor, FindsItsThreadsAwakeAndAsleep) {
+  PoolExecutor pool(4);
+  for (int round = 0; round < 400; ++round) {
+    std::array<std::atomic<int>, 6> runs{};
+    for_each_index(pool, 6, [&](int i) {
+      if (round % 16 == 0 && i == round / 16 % 4) std::this_thread::sleep_for(std::chrono::microseconds(300));
+      ++runs[static_cast<std::size_t>(i)];
+    });
+    for (const auto& count : runs) ASSERT_EQ(count, 1) << round;
+    if (round % 4 == 0) std::this_thread::sleep_for(std::chrono::microseconds(round / 4));
   }
 }
 

@@ -2,7 +2,7 @@
 //   planned_time_bench budget [DRAW]   40 frames of 0.3 to 4 MP and budgets, others for each number DRAW (default 1):
 //                                      the plan's time against prediction and budget, its error against the best of
 //                                      all plans that fit
-//   planned_time_bench saved           100 of the promise's scenes in 6.3 MP: the plan's time beside everything's
+//   planned_time_bench saved           the 300 of the promise's scenes in 6.3 MP: the plan's time beside everything's
 // Machines are slower at times. A fixed piece of work is timed before each run, and each time told is the median of its
 // ratio to that work, in milliseconds of the moment the machine was calibrated. The column "wall" is the median
 // of the wall clock's times, and the last line counts by them too.
@@ -226,7 +226,7 @@ int budgets(std::uint64_t draw) {
 
 int saved() {
   std::vector<double> shares;
-  for (std::uint32_t i = 0; i < 100; ++i) {
+  for (std::uint32_t i = 0; i < 300; ++i) {
     const test::PlannerScene scene = test::planner_scene(i, 3072, 2048, executor);
     const Result<Developed> done = develop(scene.raw.frame, scene.ways(false), executor);
     if (!done) continue;

@@ -1,30 +1,27 @@
 // What the planner of developing rests on.
 //   planner_bench levels   what levels of noise reduction change, beside what is predicted of the noise, on the tuning
 //                          pictures: the figures of isp/pipeline/plan_effects.cpp
+//   planner_bench bounds   what they change over the bound that the planner has of it, in 300 drawn parts of the tuning
+//                          pictures at drawn lights, and likewise of the held-out ones
 //   planner_bench truth    what they leave against the noise-free picture, likewise
 #include <algorithm>
 #include <array>
-#include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <limits>
-#include <memory>
+#include <map>
 #include <optional>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "isp/base/random.h"
 #include "isp/bench/bench_raw.h"
-#include "isp/bench/cost_measurement.h"
-#include "isp/bench/picture_metrics.h"
 #include "isp/bench/seen_difference.h"
 #include "isp/pipeline/develop.h"
+#include "isp/pipeline/effect_candidates.h"
 #include "isp/pipeline/pipeline.h"
 #include "isp/pipeline/plan.h"
 #include "isp/pipeline/visible_noise.h"
+#include "tests/scenarios/planner_scene.h"
 
 namespace lowlux::isp {
 namespace {
@@ -50,18 +47,20 @@ Encoded8 developed(const BenchRaw& raw, const Reduction& how) {
   return std::get<Encoded8>(std::move(picture));
 }
 
-double predicted(const BenchRaw& raw, double& snr) {
+struct Predicted {
+  double snr = 0;
+  LevelNoise noise;
+};
+
+Predicted predicted(const BenchRaw& raw) {
   DevelopOptions options;
   options.denoise.mode = DenoiseChoice::Mode::level;
   options.denoise.level = denoise::Level::draft;
   options.find_defects = false;
   const Result<DevelopPlan> plan = plan_develop(raw.frame, options, executor);
   const Thumbnail thumbnail = make_thumbnail(raw.frame, plan->black, executor);
-  const auto blocks = seen_blocks(raw.frame, *plan, plan->noise_reduction.noise, thumbnail);
-  std::vector<float> rms;
-  for (const SeenBlock& b : blocks) rms.push_back(b.noise_delta_e);
-  snr = *plan->noise_reduction.snr;
-  return seen_percentile(rms);
+  const auto blocks = seen_blocks(raw.frame, *plan, plan->noise_reduction.noise, thumbnail, executor);
+  return {*plan->noise_reduction.snr, level_noise(blocks)};
 }
 
 /// The same camera without noise.
@@ -82,8 +81,8 @@ int against_truth(PictureSet set) {
           DenoiseLight{6, 2, 1.5}, DenoiseLight{2, 2, 1.5}, DenoiseLight{4, 200, 4}}) {
       const DenoiseShot shot = take(*picture, light, 7);
       const BenchRaw raw = raw_of(shot, {}, 7);
-      double snr = 0;
-      const double expected = predicted(raw, snr);
+      const auto [snr, noise] = predicted(raw);
+      const double expected = noise.all;
       const Encoded8 truth = developed(noise_free(shot), {});
       std::printf("%-12s %8s %6.2f | %6.2f", std::string(name).c_str(), name_of(light).c_str(), snr, expected);
       for (const Reduction& way : {Reduction{}, Reduction{Level::draft, {}}, Reduction{Level::standard, {}},
@@ -117,8 +116,8 @@ int levels(PictureSet set) {
                                      DenoiseLight{60, 2, 1.5}, DenoiseLight{20, 2, 1.5}, DenoiseLight{6, 2, 1.5},
                                      DenoiseLight{2, 2, 1.5}, DenoiseLight{20, 200, 4}, DenoiseLight{4, 200, 4}}) {
       const BenchRaw raw = raw_of(take(*picture, light, 7), {}, 7);
-      double snr = 0;
-      const double expected = predicted(raw, snr);
+      const auto [snr, noise] = predicted(raw);
+      const double expected = noise.all;
       const Encoded8 best = developed(raw, {Level::high, {}});
       std::printf("%-12s %8s %6.2f | %6.2f", std::string(name).c_str(), name_of(light).c_str(), snr, expected);
       for (const Reduction& way : ways) {
@@ -132,6 +131,41 @@ int levels(PictureSet set) {
   return 0;
 }
 
+double quantile(std::vector<double>& values, double share) {
+  std::ranges::sort(values);
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+int bounds(PictureSet set) {
+  using denoise::Level;
+  constexpr double least_delta_e = 0.22;  // nine tenths of the least tolerance of the planner's promise
+  constexpr std::array ways{std::optional<Level>(), std::optional(Level::draft), std::optional(Level::standard)};
+  std::vector<BenchPicture> pictures;
+  for (const std::string_view name : files_of(set)) {
+    const auto path = (std::filesystem::path(LOWLUX_TESTDATA) / "pictures" / name).string();
+    pictures.push_back(*read_bench_picture(path, 0, 0, executor));
+  }
+  std::map<std::pair<std::string, std::size_t>, std::vector<double>> found;
+  for (std::uint32_t i = 0; i < 300; ++i) {
+    test::Draws draws(set == PictureSet::tuning ? 777 : 778, 80, i);
+    const BenchPicture part = test::drawn_part(pictures[static_cast<std::size_t>(draws.below(4))], draws, 384, 256);
+    const DenoiseLight light{draws.log_uniform(1, 1e4), draws.log_uniform(0.01, 200), draws.log_uniform(0.5, 8)};
+    const BenchRaw raw = raw_of(take(part, light, i), {}, i);
+    const LevelNoise noise = predicted(raw).noise;
+    const Encoded8 best = developed(raw, {Level::high, {}});
+    for (std::size_t way = 0; way < ways.size(); ++way) {
+      const double seen = seen_difference(developed(raw, {ways[way], {}}), best, executor).percentile95;
+      if (seen >= least_delta_e) found[{part.name, way}].push_back(seen / noise.left_by(ways[way]));
+    }
+  }
+  constexpr std::array names{"none", "draft", "standard"};
+  for (auto& [of, ratios] : found) {
+    std::printf("%-14s %-8s of %3zu parts: median %.2f, 95 %% %.2f, largest %.2f\n", of.first.c_str(), names[of.second],
+                ratios.size(), quantile(ratios, 0.5), quantile(ratios, 0.95), quantile(ratios, 1));
+  }
+  return 0;
+}
+
 }  // namespace
 }  // namespace lowlux::isp
 
@@ -140,6 +174,10 @@ int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   if (what == "levels") return lowlux::isp::levels(PictureSet::tuning);
   if (what == "truth") return lowlux::isp::against_truth(PictureSet::tuning);
-  std::fprintf(stderr, "usage: planner_bench levels|truth\n");
+  if (what == "bounds") {
+    const int tuning = lowlux::isp::bounds(PictureSet::tuning);
+    return tuning == 0 ? lowlux::isp::bounds(PictureSet::held_out) : tuning;
+  }
+  std::fprintf(stderr, "usage: planner_bench levels|truth|bounds\n");
   return 2;
 }
