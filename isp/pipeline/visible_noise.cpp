@@ -18,7 +18,8 @@ constexpr int most_blocks_along = 16;
 constexpr std::array<double, 3> samples_in_box{16, 32, 16};  // of R, G, B
 constexpr std::array<double, 3> share_of_sites{0.25, 0.5, 0.25};
 constexpr double least_variance_e2 = 1e-6;
-constexpr double surroundings_px = 12;  // of a block of the denoiser, whose thresholds are those of its mean variance
+constexpr double surroundings_px =
+    12;  // each way: a block of the denoiser, whose thresholds are those of its mean variance
 constexpr double most_surroundings = 2;
 /// What pixels of the picture scatter by over what their raw values do: on the tuning pictures.
 constexpr double pixel_scatter = 1.3;
@@ -44,7 +45,7 @@ class Display {
   /// Of the mean of pixels that scatter. @param std  of each colour, a fraction of white
   Lab lab_of_clipped(const Vector3& camera, const Vector3& std) const {
     const Vector3 mean = linear(camera);
-    Vector3 lit{}, raised{};
+    Vector3 raised{};
     double luminance = 0, too_bright = 0;
     for (int i = 0; i < 3; ++i) {
       double variance = 0;
@@ -52,13 +53,13 @@ class Display {
         variance += std::pow(matrix(i, c) * static_cast<double>(plan_.white_gain[c]) * std[c], 2);
       }
       const auto weight = static_cast<double>(plan_.transform.luminance[i]);
-      lit[i] = std::max(mean[i], 0.0);
       raised[i] = mean_above_black(mean[i], pixel_scatter * std::sqrt(variance));
-      luminance += weight * lit[i];
+      luminance += weight * std::max(mean[i], 0.0);
       too_bright += weight * raised[i];
     }
-    if (!(luminance > 0)) return lab_of_shown(toned(raised));
-    for (double& v : raised) v *= luminance / too_bright;
+    if (luminance > 0) {
+      for (double& v : raised) v *= luminance / too_bright;
+    }
     return lab_of_shown(toned(raised));
   }
 

@@ -20,7 +20,7 @@ struct SeenBlock {
   float x = 0;                // of its middle, share of the width
   float y = 0;                // of the height
   float snr = 0;              // of one mean pixel, dark charge off
-  float surroundings = 1;     // standard deviation of the noise 16 px around over that of its own, 1..2
+  float surroundings = 1;     // standard deviation of the noise around it over that of its own, 1..2
   float noise_delta_e = 0;    // root mean square CIEDE2000 of the noise, in means over 8 x 8 pixels
   float clip_delta_e = 0;     // CIEDE2000 that clipping its noise at black makes of the means
   float dark_delta_e = 0;     // CIEDE2000 of its mean dark charge, were it left in

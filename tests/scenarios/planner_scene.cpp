@@ -24,16 +24,21 @@ int Draws::below(int count) { return static_cast<int>(uniform() * count); }
 BenchPicture drawn_part(const BenchPicture& picture, Draws& draws, int width, int height) {
   const int columns = picture.linear.width(), rows = picture.linear.height();
   const int x0 = draws.below(std::max(columns - width, 0) + 1), y0 = draws.below(std::max(rows - height, 0) + 1);
-  const auto mirrored = [](int at, int size) {
-    const int there = at % (2 * size);
-    return there < size ? there : 2 * size - 1 - there;
+  // Mirrored beyond an end in the direction across too: otherwise the same rows and columns would go through all of the
+  // frame, as row and column noise does.
+  const auto place = [](int along, int size, bool across_is_mirrored) {
+    const int in_picture = along % size;
+    const bool mirrored = (along / size % 2 == 1) != across_is_mirrored;
+    return mirrored ? size - 1 - in_picture : in_picture;
   };
   BenchPicture out{picture.name, SceneLinear(width, height)};
   for (int c = 0; c < 3; ++c) {
     for (int y = 0; y < height; ++y) {
-      const float* const from = picture.linear.plane[c].row(mirrored(y0 + y, rows));
-      float* const to = out.linear.plane[c].row(y);
-      for (int x = 0; x < width; ++x) to[x] = from[mirrored(x0 + x, columns)];
+      for (int x = 0; x < width; ++x) {
+        const bool right = (x0 + x) / columns % 2 == 1, below = (y0 + y) / rows % 2 == 1;
+        out.linear.plane[c].at(x, y) =
+            picture.linear.plane[c].at(place(x0 + x, columns, below), place(y0 + y, rows, right));
+      }
     }
   }
   return out;

@@ -25,7 +25,7 @@ class Draws {
   std::uint32_t next_ = 0;
 };
 
-/// A part of a picture behind the lens, from a place that is drawn; beyond its ends it is mirrored.
+/// A part of a picture behind the lens, from a place that is drawn; beyond its ends it is mirrored, both ways at once.
 isp::BenchPicture drawn_part(const isp::BenchPicture& picture, Draws& draws, int width, int height);
 
 /// One of the held-out pictures, which are read once.
