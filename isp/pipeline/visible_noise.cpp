@@ -78,9 +78,7 @@ class Display {
   }
 
  private:
-  double matrix(int row, int column) const {
-    return static_cast<double>(plan_.transform.matrix[static_cast<std::size_t>(3 * row + column)]);
-  }
+  double matrix(int row, int column) const { return static_cast<double>(plan_.transform.matrix[3 * row + column]); }
   Vector3 linear(const Vector3& camera) const {
     Vector3 out{};
     for (int c = 0; c < 3; ++c) {
@@ -228,7 +226,8 @@ std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopPlan& pla
   for_each_index(executor, down, [&](int j) {
     for (int i = 0; i < along; ++i) {
       const int x = (2 * i + 1) * columns / (2 * along), y = (2 * j + 1) * rows / (2 * down);
-      SeenBlock& block = out[static_cast<std::size_t>(j * along + i)];
+      SeenBlock& block =
+          out[static_cast<std::size_t>(j) * static_cast<std::size_t>(along) + static_cast<std::size_t>(i)];
       block = seen(charge.at(x, y), channels, noise, display);
       block.surroundings = static_cast<float>(charge.surroundings(x, y, reach));
       block.x = (static_cast<float>(x) + 0.5f) / static_cast<float>(columns);

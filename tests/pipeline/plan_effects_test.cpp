@@ -292,9 +292,10 @@ TEST(FrameSample, LargeFramesAreSampledAtEvenPlacesAndSmallOnesWhole) {
 std::vector<SeenBlock> blocks_of(double left_delta_e, double right_delta_e) {
   std::vector<SeenBlock> out;
   for (int i = 0; i < 400; ++i) {
-    const float x = (static_cast<float>(i % 20) + 0.5f) / 20;
+    const int column = i % 20, row = i / 20;
+    const float x = (static_cast<float>(column) + 0.5f) / 20;
     out.push_back({.x = x,
-                   .y = (static_cast<float>(i / 20) + 0.5f) / 20,
+                   .y = (static_cast<float>(row) + 0.5f) / 20,
                    .snr = 10,
                    .noise_delta_e = static_cast<float>(x < 0.5f ? left_delta_e : right_delta_e)});
   }
