@@ -159,7 +159,9 @@ int threads_in_the_end(int expected) {
 }
 
 TEST(StageThreads, AreAsManyAsAskedForAndGoneAfterRelease) {
-  const int before = threads_in_the_end(1);
+  std::thread([] {}).join();  // a sanitizer's own thread starts with the first of the program
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  const int before = threads_now();
   const RawFormatNames& names = names_of_bayer(10);
   for (const int threads : {0, 1, 2, 8}) {
     {
