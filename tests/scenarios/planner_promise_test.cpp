@@ -30,8 +30,8 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-// 300 scenes, none above its tolerance; 3000 in scripts/nightly, one in a thousand above by a tenth at most. The time is
-// that of frames too small for a sample to save anything: planned_time_bench measures large ones, which save more.
+// 300 scenes, none above its tolerance; 3000 in scripts/nightly, one in a thousand above by a tenth at most. The time
+// is that of frames too small for a sample to save anything: planned_time_bench measures large ones, which save more.
 TEST(PlannerPromise, WhatIsLeftOutStaysBelowTheToleranceOver300Scenes) {
   const std::uint32_t scenes = std::getenv("LOWLUX_NIGHTLY") == nullptr ? 300 : 3000;
   std::vector<double> saved, of_tolerance;
