@@ -12,11 +12,6 @@
 #include <vector>
 
 namespace lowlux {
-
-void InlineExecutor::run(int n, void (*fn)(void* context, int index), void* context) noexcept {
-  for (int i = 0; i < n; ++i) fn(context, i);
-}
-
 namespace {
 
 /// How long a thread looks for what it waits for before it sleeps. The pieces of one frame follow each other sooner,
@@ -45,8 +40,12 @@ bool waited_busily(const Done& done) {
 
 }  // namespace
 
+void InlineExecutor::run(int n, void (*fn)(void* context, int index), void* context) noexcept {
+  for (int i = 0; i < n; ++i) fn(context, i);
+}
+
 // Task i runs on worker i mod width, task 0 on the caller: the same split every time, so per-task scratch stays warm.
-// A new generation says that there is work; what it is was written before.
+// A new generation says that there is work; what it is, and the list of workers, were written before.
 struct PoolExecutor::State {
   std::mutex mutex;
   std::condition_variable work_ready;
@@ -86,7 +85,6 @@ struct PoolExecutor::State {
 
 PoolExecutor::PoolExecutor(int threads) : state_(std::make_unique<State>()) {
   assert(threads >= 1);
-  const std::lock_guard lock(state_->mutex);  // workers wait here until the list of them is whole
   try {
     for (int worker = 1; worker < threads; ++worker) {
       state_->workers.emplace_back([state = state_.get(), worker] { state->worker_loop(worker); });
