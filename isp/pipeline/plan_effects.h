@@ -17,9 +17,9 @@ namespace lowlux::isp {
 /// cheapest plan, whose time is told (insufficient).
 Result<void> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan, Executor& executor);
 
-/// What a level of noise reduction leaves of the visible noise at most, against Level::high, for blocks of this signal
-/// to noise ratio in even surroundings; nullopt is no reduction. Measured on the tuning pictures:
-/// tests/bench/planner_bench.cpp.
+/// What a level of noise reduction leaves of the visible noise, against Level::high, for blocks of this signal to noise
+/// ratio in even surroundings: about the most that pictures showed, but for lamps in the dark; nullopt is no reduction.
+/// tests/bench/planner_bench.cpp prints what was seen over it.
 double left_of_noise(std::optional<denoise::Level> level, double snr);
 
 /// Root mean square CIEDE2000 of that: left_of_noise() of the noise of the surroundings, which thresholds go by, and

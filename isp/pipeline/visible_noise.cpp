@@ -24,11 +24,13 @@ constexpr double most_surroundings = 2;
 /// What pixels of the picture scatter by over what their raw values do: on the tuning pictures.
 constexpr double pixel_scatter = 1.3;
 
+double normal_density(double t) { return std::exp(-0.5 * t * t) * std::numbers::inv_sqrtpi / std::numbers::sqrt2; }
+
 /// Mean of what is above black of a normal law.
 double mean_above_black(double mean, double std) {
   if (!(std > 0)) return std::max(mean, 0.0);
-  const double t = mean / std, density = std::exp(-0.5 * t * t) * std::numbers::inv_sqrtpi / std::numbers::sqrt2;
-  return std * density + mean * 0.5 * std::erfc(-t / std::numbers::sqrt2);
+  const double t = mean / std;
+  return std * normal_density(t) + mean * 0.5 * std::erfc(-t / std::numbers::sqrt2);
 }
 
 /// From camera RGB, a fraction of white with the black off, to what is displayed.
@@ -125,8 +127,7 @@ Channels channels_of(const RawFrame& frame, const DevelopPlan& plan, const denoi
 double above_black_e(double mean_e, double std_e) {
   const double below = std::max(-mean_e / (2 * std_e), 0.0);
   const double reaching = 0.5 * std::erfc(below / std::numbers::sqrt2);
-  const double density = std::exp(-0.5 * below * below) * std::numbers::inv_sqrtpi / std::numbers::sqrt2;
-  return std_e * std::sqrt(std::max(2 * ((1 + below * below) * reaching - below * density), 0.0));
+  return std_e * std::sqrt(std::max(2 * ((1 + below * below) * reaching - below * normal_density(below)), 0.0));
 }
 
 SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise::RawNoise& noise,
@@ -248,14 +249,11 @@ double seen_percentile(std::span<const float> rms_delta_e) {
   };
   double low = 0, high = 5 * static_cast<double>(*std::ranges::max_element(rms_delta_e));
   if (!(high > 0)) return 0;
-  double above_low = 1, above_high = 0;
-  for (int step = 0; step < 16; ++step) {
-    const double middle = (low + high) / 2, above = share_above(middle);
-    const bool more = above > 1 - seen_share;
-    (more ? low : high) = middle;
-    (more ? above_low : above_high) = above;
+  for (int step = 0; step < 24; ++step) {
+    const double middle = (low + high) / 2;
+    (share_above(middle) > 1 - seen_share ? low : high) = middle;
   }
-  return low + (high - low) * (above_low - (1 - seen_share)) / (above_low - above_high);
+  return (low + high) / 2;
 }
 
 }  // namespace lowlux::isp
