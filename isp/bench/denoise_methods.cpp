@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "isp/bench/gat_denoise.h"
+#include "isp/bench/median.h"
 
 namespace lowlux::isp {
 namespace {
@@ -23,11 +24,6 @@ double time_of(const Work& work) {
   const double start = cpu_s();
   work();
   return cpu_s() - start;
-}
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
 }
 
 /// Rounds of work and of memcpy in turn; with more than one, another goes before to warm up.

@@ -15,6 +15,7 @@
 #include "capture/file/file_bytes.h"
 #include "isp/base/executor.h"
 #include "isp/bench/cost_measurement.h"
+#include "isp/bench/pace.h"
 #include "isp/cli/machine.h"
 #include "isp/cli/progress.h"
 #include "isp/cli/report.h"
@@ -25,7 +26,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int format_number = 3;  // counts up where other parts or sizes are measured
+constexpr int format_number = 4;  // counts up where other parts or sizes are measured
 constexpr std::size_t largest_file = 1 << 20;
 constexpr std::size_t most_points = 100;
 
@@ -98,6 +99,7 @@ std::string cost_text(const isp::CostModel& model) {
   Json json{{"lowlux_cost_model", format_number},
             {"machine", model.machine},
             {"threads", model.threads},
+            {"pace_s", model.pace_s},
             {"megapixels_and_seconds", Json::object()}};
   for (int i = 0; i < isp::cost_parts; ++i) {
     Json points = Json::array();
@@ -115,13 +117,15 @@ Result<isp::CostModel> parse_cost(std::string_view text) {
     return malformed(fmt::format("it does not say \"lowlux_cost_model\": {}", format_number));
   }
   const Json machine = json.value("machine", Json()), threads = json.value("threads", Json());
-  const Json parts = json.value("megapixels_and_seconds", Json());
-  if (!machine.is_string() || !threads.is_number_integer() || !parts.is_object()) {
-    return malformed("machine, threads or megapixels_and_seconds is missing");
+  const Json parts = json.value("megapixels_and_seconds", Json()), pace = json.value("pace_s", Json());
+  if (!machine.is_string() || !threads.is_number_integer() || !pace.is_number() || !parts.is_object()) {
+    return malformed("machine, threads, pace_s or megapixels_and_seconds is missing");
   }
   isp::CostModel model;
   model.machine = machine.get<std::string>();
   model.threads = threads.get<int>();
+  model.pace_s = pace.get<double>();
+  if (!(model.pace_s >= 0) || !std::isfinite(model.pace_s)) return malformed("pace_s is no time");
   for (int i = 0; i < isp::cost_parts; ++i) {
     const std::string name(name_of(static_cast<isp::CostPart>(i)));
     auto points = points_of(parts.value(name, Json()));
@@ -161,6 +165,15 @@ Result<isp::CostModel> cost_of_this_machine(int threads, bool quiet) {
   }
   std::string ignored;
   return calibrate_cost(threads, quiet, ignored);
+}
+
+Result<std::shared_ptr<const isp::CostModel>> MachineSpeed::now(Executor& executor) {
+  auto model = std::make_shared<isp::CostModel>(calibrated_);
+  if (!(calibrated_.pace_s > 0)) return model;
+  const Result<double> seconds = isp::pace_now(pace_, executor);
+  if (!seconds) return tl::make_unexpected(seconds.error());
+  model->pace = *seconds / calibrated_.pace_s;
+  return model;
 }
 
 }  // namespace lowlux::cli

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
+#include "isp/base/executor.h"
 #include "isp/base/result.h"
+#include "isp/bench/pace.h"
 #include "isp/pipeline/cost_model.h"
 
 /// What developing costs on this machine, kept between runs.
@@ -27,6 +31,21 @@ Result<isp::CostModel> parse_cost(std::string_view text);
 /// version, measured now and written there. What keeps it from being written is told on stderr; it is used all the
 /// same. Errors: those of measuring.
 Result<isp::CostModel> cost_of_this_machine(int threads, bool quiet);
+
+/// What developing costs at the moment: a machine that has other work too, or is hot, is slower than when it was
+/// calibrated.
+class MachineSpeed {
+ public:
+  explicit MachineSpeed(isp::CostModel calibrated) : calibrated_(std::move(calibrated)) {}
+
+  /// The model with the pace of now; as it was calibrated where its own pace is not known. Takes less than a tenth of a
+  /// second, and with it goes what the first frame of a program takes more. Errors: those of isp::Pace.
+  Result<std::shared_ptr<const isp::CostModel>> now(Executor& executor);
+
+ private:
+  isp::CostModel calibrated_;
+  isp::Pace pace_;
+};
 
 /// Measures anew and writes the file. @return its name, empty where there is no place for one
 Result<isp::CostModel> calibrate_cost(int threads, bool quiet, std::string& written_to);

@@ -12,7 +12,6 @@
 #include <fmt/format.h>
 
 #include "capture/file/dng_source.h"
-#include "isp/cli/cost_file.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/noise_maps.h"
 #include "isp/cli/noise_source.h"
@@ -38,9 +37,8 @@ Result<void> check_free(const std::string& output, bool force) {
 Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) {
   isp::DevelopOptions options = batch.options;
   options.effects = batch.args.effects.effects;
-  if (batch.cost) {
+  if (batch.speed) {
     const Rect& crop = frame.raw.default_crop;
-    options.effects->cost = batch.cost;
     options.effects->budget_s = budget_s(batch.args.effects, 1e-6 * crop.width * crop.height);
   }
   if (batch.profile) {
@@ -89,7 +87,7 @@ DevelopOutcome outcome_of(const Job& job, const RawWork& work, Executor& executo
 std::vector<DevelopOutcome> run_all(const RawBatch& batch, const RawWork& work) {
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int files = static_cast<int>(batch.jobs.size());
-  const int workers = batch.cost ? 1 : std::min(files, batch.args.jobs > 0 ? batch.args.jobs : processors);
+  const int workers = batch.speed ? 1 : std::min(files, batch.args.jobs > 0 ? batch.args.jobs : processors);
   std::vector<DevelopOutcome> outcomes(batch.jobs.size());
   std::atomic<int> next{0};
   Progress progress(files, !batch.args.quiet);
@@ -133,7 +131,7 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
   if (args.effects.budgeted()) {
     auto cost = cost_of_this_machine(threads_of_each(1), args.quiet);
     if (!cost) return tl::make_unexpected(cost.error());
-    batch.cost = std::make_shared<const isp::CostModel>(*std::move(cost));
+    batch.speed = std::make_shared<MachineSpeed>(*std::move(cost));
   }
   if (darks.empty()) return batch;
   Result<DarkSource> source = read_darks(darks, args.dark);
@@ -160,6 +158,12 @@ Result<ReadyFrame> ready_frame(const RawBatch& batch, const Job& job, Executor& 
     return tl::make_unexpected(found.error());
   }
   if (frame->noise && frame->noise->source == NoiseProfile::Source::picture) clock.lap("noise of the picture");
+  if (batch.speed) {
+    auto cost = batch.speed->now(executor);
+    if (!cost) return tl::make_unexpected(cost.error());
+    options->effects->cost = *std::move(cost);
+    clock.lap("machine's pace");
+  }
   return ReadyFrame{*std::move(frame), *std::move(options)};
 }
 

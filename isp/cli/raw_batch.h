@@ -11,6 +11,7 @@
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 #include "isp/cli/args.h"
+#include "isp/cli/cost_file.h"
 #include "isp/cli/dark_files.h"
 #include "isp/cli/outputs.h"
 #include "isp/cli/pixel_map.h"
@@ -30,7 +31,7 @@ struct RawBatch {
   std::optional<CameraProfile> profile;
   std::optional<DarkSource> darks;
   isp::Overwrite overwrite = isp::Overwrite::no;
-  std::shared_ptr<const isp::CostModel> cost;  // with a budget
+  std::shared_ptr<MachineSpeed> speed;  // with a budget: files then come one after the other
 };
 
 /// Reads profile and darks and makes the output folder. Errors name their file.

@@ -101,8 +101,9 @@ int run_calibrate_cost(const BenchArgs& args) {
   fmt::print("{}, {} threads; ms for a frame of 12 MP\n", model->machine, threads);
   for (int i = 0; i < isp::cost_parts; ++i) {
     const auto part = static_cast<isp::CostPart>(i);
-    const double megapixels = part == isp::CostPart::samples ? isp::sample_megapixels : 12;  // however large the frame
-    fmt::print("  {:<12}{:10.1f}\n", name_of(part), 1e3 * model->seconds(part, megapixels));
+    const bool sampled = part == isp::CostPart::samples;  // it takes the same however large the frame
+    const isp::CostSize size = sampled ? isp::CostSize{isp::sample_megapixels} : isp::cost_size(4000, 3000);
+    fmt::print("  {:<12}{:10.1f}\n", name_of(part), 1e3 * model->seconds(part, size));
   }
   fmt::print("{}\n", file.empty() ? "not kept" : "kept in " + file);
   return exit_done;

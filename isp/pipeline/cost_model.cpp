@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cassert>
 
+#include "denoise/layout.h"
+
 namespace lowlux::isp {
 
 std::string_view name_of(CostPart part) {
@@ -13,22 +15,28 @@ std::string_view name_of(CostPart part) {
   return names[static_cast<std::size_t>(part)];
 }
 
-double CostModel::seconds(CostPart part, double megapixels) const {
+CostSize cost_size(int width, int height) {
+  const int columns = (width + 1) / 2, rows = (height + 1) / 2, levels = denoise::levels_of(columns, rows);
+  return {1e-6 * width * height, 4e-6 * denoise::padded(columns, levels) * denoise::padded(rows, levels)};
+}
+
+double CostModel::seconds(CostPart part, const CostSize& size) const {
+  const double megapixels = is_denoising(part) ? size.denoised_megapixels : size.megapixels;
   assert(megapixels > 0);
   const std::vector<CostPoint>& at = points[static_cast<std::size_t>(part)];
   if (at.empty()) return 0;
   const auto per_mp = [](const CostPoint& point) { return point.seconds / point.megapixels; };
   const auto above = std::ranges::find_if(at, [&](const CostPoint& point) { return point.megapixels >= megapixels; });
-  if (above == at.begin()) return per_mp(at.front()) * megapixels;
-  if (above == at.end()) return per_mp(at.back()) * megapixels;
+  if (above == at.begin()) return pace * per_mp(at.front()) * megapixels;
+  if (above == at.end()) return pace * per_mp(at.back()) * megapixels;
   const CostPoint &low = *(above - 1), &high = *above;
   const double way = (megapixels - low.megapixels) / (high.megapixels - low.megapixels);
-  return low.seconds + way * (high.seconds - low.seconds);
+  return pace * (low.seconds + way * (high.seconds - low.seconds));
 }
 
-double predicted_s(const CostModel& model, double megapixels, const std::vector<CostShare>& work) {
+double predicted_s(const CostModel& model, const CostSize& size, const std::vector<CostShare>& work) {
   double sum = 0;
-  for (const CostShare& part : work) sum += part.share * model.seconds(part.part, megapixels);
+  for (const CostShare& part : work) sum += part.share * model.seconds(part.part, size);
   return sum;
 }
 

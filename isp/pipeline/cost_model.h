@@ -41,10 +41,18 @@ inline constexpr int cost_parts = 23;
 
 /// "planning", "draft-1" and so on.
 std::string_view name_of(CostPart part);
+constexpr bool is_denoising(CostPart part) { return part >= CostPart::draft_0 && part <= CostPart::best_2; }
+
+/// Of a frame.
+struct CostSize {
+  double megapixels = 0;
+  double denoised_megapixels = 0;  // with the rows and columns that the denoiser appends: up to a third more
+};
+CostSize cost_size(int width, int height);
 
 /// Measured at some sizes.
 struct CostPoint {
-  double megapixels = 0;
+  double megapixels = 0;  // denoised ones for draft_0 to best_2
   double seconds = 0;
 };
 
@@ -52,11 +60,13 @@ struct CostPoint {
 struct CostModel {
   std::string machine;  // that was measured; see isp/cli/cost_file.h
   int threads = 1;
+  double pace_s = 0;  // what a fixed piece of work took meanwhile (isp/bench/pace.h); 0: not known
+  double pace = 1;    // what it takes at the moment, in units of that: factor of all times
   std::array<std::vector<CostPoint>, cost_parts> points;  // of each part, by rising size; none: the part is free
 
   /// Seconds of a part for a frame of this size: linear between two points, which is exact for a fixed time and one for
-  /// each pixel; beyond them the seconds per megapixel of the nearest. @param megapixels  > 0
-  double seconds(CostPart part, double megapixels) const;
+  /// each pixel; beyond them the seconds per megapixel of the nearest. @param size  > 0
+  double seconds(CostPart part, const CostSize& size) const;
 };
 
 /// One part of a plan's work.
@@ -66,6 +76,6 @@ struct CostShare {
 };
 
 /// The sum over parts.
-double predicted_s(const CostModel& model, double megapixels, const std::vector<CostShare>& work);
+double predicted_s(const CostModel& model, const CostSize& size, const std::vector<CostShare>& work);
 
 }  // namespace lowlux::isp

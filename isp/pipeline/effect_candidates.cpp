@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "denoise/layout.h"
 #include "isp/pipeline/plan_effects.h"
 
 namespace lowlux::isp {
@@ -16,12 +15,6 @@ using denoise::Level;
 
 /// How much of what row and column noise takes is counted where it is not known whether there is any.
 constexpr double share_of_unknown = 0.5;
-
-/// How far from a tile another one lies at most whose chroma is worked on for its sake: two tiles
-/// (denoise/chroma_start.h) from its middle.
-constexpr float chroma_reach_px = 2.5f * 2 * denoise::tile;
-
-std::size_t start_of(const SeenBlock& block) { return block.snr >= 3 ? 0 : block.snr >= 0.7f ? 1 : 2; }
 
 /// CIEDE2000 that what is not predicted counts for where plans are compared: so that it is done where there is time.
 constexpr double size_of_unknown = 0.3;
@@ -44,7 +37,7 @@ std::vector<CostShare> work_of(const EffectFacts& facts, const EffectCandidate& 
     }
     work.push_back({CostPart::check});
     for (int start = 0; start < 3; ++start) {
-      const double share = facts.chroma_work[static_cast<std::size_t>(start)];
+      const double share = facts.chroma.work[static_cast<std::size_t>(start)];
       if (share > 0) work.push_back({part_of(*plan.level, start), share});
     }
   } else {
@@ -152,29 +145,6 @@ LevelNoise level_noise(const std::vector<SeenBlock>& blocks) {
   return out;
 }
 
-std::array<double, 3> start_shares(const std::vector<SeenBlock>& blocks) {
-  std::array<double, 3> share{};
-  for (const SeenBlock& block : blocks) share[start_of(block)] += 1.0 / static_cast<double>(blocks.size());
-  if (blocks.empty()) share[0] = 1;
-  return share;
-}
-
-std::array<double, 3> chroma_work(const std::vector<SeenBlock>& blocks, const Rect& active) {
-  std::array<double, 3> share{};
-  for (const SeenBlock& block : blocks) {
-    std::size_t least = start_of(block);
-    for (const SeenBlock& other : blocks) {
-      if (start_of(other) >= least) continue;
-      const bool near = std::fabs(other.x - block.x) * static_cast<float>(active.width) <= chroma_reach_px &&
-                        std::fabs(other.y - block.y) * static_cast<float>(active.height) <= chroma_reach_px;
-      if (near) least = start_of(other);
-    }
-    share[least] += 1.0 / static_cast<double>(blocks.size());
-  }
-  if (blocks.empty()) share[0] = 1;
-  return share;
-}
-
 void rate(const EffectFacts& facts, EffectCandidate& plan) {
   plan.left = facts.noise.left_by(plan.level);
   double squares = std::pow(error_share(plan.level) * facts.noise.all, 2);
@@ -188,7 +158,7 @@ void rate(const EffectFacts& facts, EffectCandidate& plan) {
   leave(plan.dark || plan.level, facts.sizes.dark);
   leave(plan.display, facts.sizes.display);
   plan.error = std::sqrt(squares);
-  if (facts.choice.cost) plan.seconds = predicted_s(*facts.choice.cost, facts.megapixels, work_of(facts, plan));
+  if (facts.choice.cost) plan.seconds = predicted_s(*facts.choice.cost, facts.size, work_of(facts, plan));
 }
 
 Result<EffectCandidate> choose_candidate(const EffectFacts& facts) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "isp/base/result.h"
+#include "isp/pipeline/chroma_work.h"
 #include "isp/pipeline/effect_sizes.h"
 #include "isp/pipeline/plan.h"
 #include "isp/pipeline/visible_noise.h"
@@ -47,7 +48,7 @@ struct EffectFacts {
   std::vector<SeenBlock> blocks;
   bool has_noise = false;  // it is known, and may be reduced
   LevelNoise noise;
-  std::array<double, 3> chroma_work{1, 0, 0};
+  ChromaWork chroma;
   std::optional<denoise::Level> fixed_level;
   bool level_is_fixed = false;
   bool may_search = true;
@@ -57,14 +58,8 @@ struct EffectFacts {
   bool display = false;
   SampleType samples = SampleType::u8;
   Rect active;
-  double megapixels = 0;
+  CostSize size;
 };
-
-/// Shares of the frame whose chroma starts on each level, as denoise/chroma_start.h decides it.
-std::array<double, 3> start_shares(const std::vector<SeenBlock>& blocks);
-
-/// Shares of the frame where chroma is worked on from each level on: as start_shares, and around what starts finer.
-std::array<double, 3> chroma_work(const std::vector<SeenBlock>& blocks, const Rect& active);
 
 /// Sets left, error and seconds (0 without a cost model).
 void rate(const EffectFacts& facts, EffectCandidate& plan);

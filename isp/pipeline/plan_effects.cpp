@@ -19,7 +19,7 @@ using denoise::Level;
 
 std::string level_words(const EffectFacts& facts, const EffectCandidate& plan) {
   if (!facts.has_noise) return "the noise is not known, or not to be reduced";
-  const std::array<double, 3> share = start_shares(facts.blocks);
+  const std::array<double, 3>& share = facts.chroma.start;
   if (!plan.level) return "left as it is";
   return fmt::format("{}; chroma from level 0, 1, 2 in {:.0f}, {:.0f}, {:.0f} % of the frame", name_of(*plan.level),
                      100 * share[0], 100 * share[1], 100 * share[2]);
@@ -34,7 +34,7 @@ std::string region_words(const NoiseRegions& regions) {
 
 std::optional<double> cost_of(const EffectFacts& facts, std::initializer_list<CostShare> parts) {
   if (!facts.choice.cost) return std::nullopt;
-  return predicted_s(*facts.choice.cost, facts.megapixels, parts);
+  return predicted_s(*facts.choice.cost, facts.size, parts);
 }
 
 EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
@@ -94,7 +94,7 @@ EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const De
   const DevelopOptions& o = plan.options;
   EffectFacts facts{*o.effects, {}, {}};
   const Rect& crop = frame.raw.default_crop;
-  facts.megapixels = 1e-6 * crop.width * crop.height;
+  facts.size = cost_size(crop.width, crop.height);
   facts.samples = o.samples;
   facts.active = frame.raw.active;
   facts.look = plan.look.has_value();
@@ -106,7 +106,7 @@ EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const De
     facts.blocks = seen_blocks(frame, plan, reduction.noise, thumbnail, executor);
     facts.has_noise = !facts.blocks.empty();
     facts.noise = level_noise(facts.blocks);
-    facts.chroma_work = chroma_work(facts.blocks, facts.active);
+    facts.chroma = chroma_work(frame, plan, reduction.noise, thumbnail);
   }
   facts.level_is_fixed = o.denoise.mode != DenoiseChoice::Mode::automatic;
   if (o.denoise.mode == DenoiseChoice::Mode::level) facts.fixed_level = o.denoise.level;

@@ -3,9 +3,9 @@
 //                                      the plan's time against prediction and budget, its error against the best of
 //                                      all plans that fit
 //   planned_time_bench saved           the 300 of the promise's scenes in 6.3 MP: the plan's time beside everything's
-// Machines are slower at times. A fixed piece of work is timed before each run, and each time told is the median of its
-// ratio to that work, in milliseconds of the moment the machine was calibrated. The column "wall" is the median
-// of the wall clock's times, and the last line counts by them too.
+// Machines are slower at times. A fixed piece of work (isp/bench/pace.h) is timed before each run, and each time told
+// is the median of its ratio to that work, in milliseconds of the moment the frame was planned. The column "wall" is
+// the median of the wall clock's times, and the last line counts by them too.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -20,6 +20,8 @@
 
 #include "isp/bench/bench_raw.h"
 #include "isp/bench/cost_measurement.h"
+#include "isp/bench/median.h"
+#include "isp/bench/pace.h"
 #include "isp/bench/picture_metrics.h"
 #include "isp/bench/seen_difference.h"
 #include "isp/pipeline/develop.h"
@@ -32,11 +34,6 @@ namespace {
 PoolExecutor executor(2);
 constexpr std::uint32_t frames = 40;
 
-double median(std::vector<double> values) {
-  std::ranges::sort(values);
-  return values[values.size() / 2];
-}
-
 double seconds_of(const RawFrame& frame, const DevelopOptions& options, Encoded8* picture = nullptr) {
   const auto start = std::chrono::steady_clock::now();
   Result<Developed> done = develop(frame, options, executor);
@@ -46,54 +43,35 @@ double seconds_of(const RawFrame& frame, const DevelopOptions& options, Encoded8
   return seconds;
 }
 
-/// The same work each time.
-class Reference {
- public:
-  Reference() : scene_(test::planner_scene(0, 1024, 768, executor)) {
-    options_.denoise.mode = DenoiseChoice::Mode::level;
-    options_.denoise.level = denoise::Level::standard;
-  }
-  double seconds() const { return seconds_of(scene_.raw.frame, options_); }
-
- private:
-  test::PlannerScene scene_;
-  DevelopOptions options_;
-};
-
-struct Taken {
-  double seconds = 0;  // of the moment the machine was calibrated
-  double wall_s = 0;
-};
-
 /// The machine when it is calibrated, and after.
 class Clock {
  public:
-  Clock() {
-    std::vector<double> taken;
-    auto cost = measure_cost(executor, [&](double, const std::string&) { taken.push_back(reference_.seconds()); });
-    cost_ = std::make_shared<const CostModel>(*std::move(cost));
-    calibrated_s_ = median(taken);
-    std::ranges::sort(taken);
-    std::printf("calibrated; the fixed work took %.1f ms, %.1f to %.1f ms in 80 %% of the runs\n", 1e3 * calibrated_s_,
-                1e3 * taken[taken.size() / 10], 1e3 * taken[taken.size() * 9 / 10]);
+  Clock() : cost_(*measure_cost(executor, [](double, const std::string&) {})) {
+    std::printf("calibrated at a pace of %.1f ms\n", 1e3 * cost_.pace_s);
   }
-  const std::shared_ptr<const CostModel>& cost() const { return cost_; }
 
+  /// What things cost at the moment, as the command line takes it before each file.
+  std::shared_ptr<const CostModel> now() {
+    auto cost = std::make_shared<CostModel>(cost_);
+    cost->pace = *pace_now(pace_, executor) / cost_.pace_s;
+    return cost;
+  }
+  /// @param cost    of the moment whose pace is meant
   /// @param rounds  how often @param picture  as developed
-  Taken time(const RawFrame& frame, const DevelopOptions& options, int rounds, Encoded8& picture) const {
-    std::vector<double> ratios, walls;
+  /// @return seconds at that pace
+  double time(const CostModel& cost, const RawFrame& frame, const DevelopOptions& options, int rounds,
+              Encoded8& picture) {
+    std::vector<double> ratios;
     for (int i = 0; i < rounds; ++i) {
-      const double reference_s = reference_.seconds();
-      walls.push_back(seconds_of(frame, options, &picture));
-      ratios.push_back(walls.back() / reference_s);
+      const double unit_s = *pace_.seconds(executor);
+      ratios.push_back(seconds_of(frame, options, &picture) / unit_s);
     }
-    return {median(ratios) * calibrated_s_, median(walls)};
+    return median(ratios) * cost.pace * cost_.pace_s;
   }
 
  private:
-  Reference reference_;
-  std::shared_ptr<const CostModel> cost_;
-  double calibrated_s_ = 0;
+  Pace pace_;
+  CostModel cost_;
 };
 
 struct Way {
@@ -114,6 +92,14 @@ DevelopOptions by_hand(const Way& way) {
   return options;
 }
 
+/// The least that the planner has to do.
+DevelopOptions least_work() {
+  DevelopOptions options;
+  options.denoise.mode = DenoiseChoice::Mode::automatic;
+  options.effects.emplace().tolerance_delta_e = 1000;
+  return options;
+}
+
 double error_of(const Encoded8& picture, const PictureTruth& truth) {
   RenderedPicture rendered{light_of_codes(picture), light_of_codes(picture)};
   return picture_error(rendered, truth, executor).ciede2000;
@@ -129,7 +115,7 @@ SceneLinear truth_of(const DenoiseShot& shot) {
 }
 
 /// Everything there is to choose from, measured.
-std::vector<Way> exhaustive(const Clock& clock, const RawFrame& frame, const PictureTruth& truth) {
+std::vector<Way> exhaustive(Clock& clock, const CostModel& cost, const RawFrame& frame, const PictureTruth& truth) {
   std::vector<Way> out;
   for (int level = 0; level <= 4; ++level) {
     for (const bool defects : {false, true}) {
@@ -137,7 +123,8 @@ std::vector<Way> exhaustive(const Clock& clock, const RawFrame& frame, const Pic
         if (level == 0 && lines) continue;
         Way way{level == 0 ? std::nullopt : std::optional(static_cast<denoise::Level>(level - 1)), defects, lines};
         Encoded8 picture;
-        way.seconds = clock.time(frame, by_hand(way), way.level == denoise::Level::best ? 1 : 3, picture).seconds;
+        const int rounds = way.level == denoise::Level::best ? 1 : 5;
+        way.seconds = clock.time(cost, frame, by_hand(way), rounds, picture);
         way.error = error_of(picture, truth);
         out.push_back(way);
       }
@@ -162,10 +149,30 @@ Misses misses(double taken_s, double predicted_s, double budget_s) {
   return {taken_s > 1.2 * budget_s, std::fabs(predicted_s / taken_s - 1) > 0.2};
 }
 
+/// As the command line does it, by the wall clock: the machine's pace is taken, then the frame is planned and
+/// developed. Medians of the shares of budget and prediction that were taken.
+struct WallShares {
+  double of_budget = 0, of_prediction = 0;
+};
+
+WallShares by_the_wall(Clock& clock, const RawFrame& frame, DevelopOptions options) {
+  std::vector<double> of_budget, of_prediction;
+  for (int round = 0; round < 5; ++round) {
+    options.effects->cost = clock.now();
+    const auto start = std::chrono::steady_clock::now();
+    const Result<Developed> done = develop(frame, options, executor);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (!done) continue;  // refused at the pace of that moment
+    of_budget.push_back(seconds / *options.effects->budget_s);
+    of_prediction.push_back(seconds / *done->plan.effects->predicted_s);
+  }
+  return {median(of_budget), median(of_prediction)};
+}
+
 int budgets(std::uint64_t draw) {
-  const Clock clock;
+  Clock clock;
   int over = 0, off = 0, worse = 0, kept = 0, refused = 0, wall_over = 0, wall_off = 0;
-  std::printf("  # picture            light   MP   budget predicted  taken wall [ms]  error   best  plan\n");
+  std::printf("  # picture            light   MP   budget predicted  taken wall/pred  error   best  plan\n");
   for (std::uint32_t i = 0; i < frames; ++i) {
     test::Draws draws(20261123 + draw, 79, i);
     const BenchPicture& whole = test::held_out_picture(draws.below(4), executor);
@@ -179,13 +186,16 @@ int budgets(std::uint64_t draw) {
     const BenchRaw raw = raw_of(shot, flaws, i);
     const SceneLinear truth_light = truth_of(shot);
     const PictureTruth truth(truth_light.view(), executor);
-    const std::vector<Way> ways = exhaustive(clock, raw.frame, truth);
-    const auto [least, most] = std::ranges::minmax(ways, {}, &Way::seconds);
+    const auto cost = clock.now();
+    const std::vector<Way> ways = exhaustive(clock, *cost, raw.frame, truth);
+    Encoded8 made;
+    const double least_s = clock.time(*cost, raw.frame, least_work(), 5, made);
+    const double most_s = std::ranges::max(ways, {}, &Way::seconds).seconds;
     DevelopOptions options;
     options.denoise.mode = DenoiseChoice::Mode::automatic;
-    options.effects.emplace().cost = clock.cost();
+    options.effects.emplace().cost = cost;
     options.effects->tolerance_delta_e.reset();
-    const double budget_s = draws.log_uniform(1.3 * least.seconds, 1.3 * most.seconds);
+    const double budget_s = draws.log_uniform(1.3 * least_s, 1.3 * most_s);
     options.effects->budget_s = budget_s;
     const Result<Developed> planned = develop(raw.frame, options, executor);
     if (!planned) {
@@ -194,15 +204,15 @@ int budgets(std::uint64_t draw) {
       continue;
     }
     const EffectsPlan& plan = *planned->plan.effects;
-    Encoded8 made;
-    const Taken taken = clock.time(raw.frame, options, 5, made);
+    const double taken_s = clock.time(*cost, raw.frame, options, 9, made);
     const double error = error_of(made, truth);
     double best = std::numeric_limits<double>::infinity();
     for (const Way& way : ways) {
       if (way.seconds <= budget_s) best = std::min(best, way.error);
     }
-    const auto [too_long, wrong] = misses(taken.seconds, *plan.predicted_s, budget_s);
-    const Misses by_wall = misses(taken.wall_s, *plan.predicted_s, budget_s);
+    const auto [too_long, wrong] = misses(taken_s, *plan.predicted_s, budget_s);
+    const WallShares wall = by_the_wall(clock, raw.frame, options);
+    const Misses by_wall = misses(wall.of_budget, wall.of_budget / wall.of_prediction, 1);
     const bool bad = error > 1.05 * best;
     over += too_long ? 1 : 0;
     off += wrong ? 1 : 0;
@@ -210,9 +220,9 @@ int budgets(std::uint64_t draw) {
     wall_off += by_wall.off ? 1 : 0;
     worse += bad ? 1 : 0;
     kept += too_long || wrong || bad ? 0 : 1;
-    std::printf("%3u %-14s %9s %4.1f %8.1f %9.1f %6.1f %9.1f %6.3f %6.3f  %s%s%s%s\n", i, picture.name.c_str(),
+    std::printf("%3u %-14s %9s %4.1f %8.1f %9.1f %6.1f %9.2f %6.3f %6.3f  %s%s%s%s\n", i, picture.name.c_str(),
                 name_of(DenoiseLight{std::round(light.mean_e), std::round(light.dark_e), 0}).c_str(),
-                1e-6 * width * height, 1e3 * budget_s, 1e3 * *plan.predicted_s, 1e3 * taken.seconds, 1e3 * taken.wall_s,
+                1e-6 * width * height, 1e3 * budget_s, 1e3 * *plan.predicted_s, 1e3 * taken_s, wall.of_prediction,
                 error, best, words_of(plan).c_str(), too_long ? "; OVER" : "", wrong ? "; PREDICTION" : "",
                 bad ? "; ERROR" : "");
     std::fflush(stdout);

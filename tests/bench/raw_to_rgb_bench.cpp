@@ -17,6 +17,7 @@
 
 #include "isp/base/executor.h"
 #include "isp/base/image.h"
+#include "isp/bench/median.h"
 #include "isp/raw/raw_to_rgb.h"
 #include "tests/reference/raw_to_rgb_ref.h"
 
@@ -94,11 +95,6 @@ double share_outside(isp::RawToRgb& kernel, const isp::RgbInput& in, SceneLinear
   return static_cast<double>(outside) / (static_cast<double>(scratch.width()) * scratch.height());
 }
 
-double median(std::vector<double> figures) {
-  std::sort(figures.begin(), figures.end());
-  return figures[figures.size() / 2];
-}
-
 struct Task {
   std::string name;
   int threads;
@@ -106,8 +102,8 @@ struct Task {
   std::vector<double> wall_ms{};
   std::vector<double> cpu_ms{};  // of all threads together
 
-  double median_ms() const { return median(wall_ms); }
-  double median_cpu_ms() const { return median(cpu_ms); }
+  double median_ms() const { return isp::median(wall_ms); }
+  double median_cpu_ms() const { return isp::median(cpu_ms); }
   double minimum_ms() const { return *std::min_element(wall_ms.begin(), wall_ms.end()); }
 };
 

@@ -1,7 +1,6 @@
 // Times the temporal mean against memcpy, and measures what it gains on a still scene, how often it takes one to move,
 // and what moving things leave behind: see denoise/README.md.
 //   temporal_bench [ROUNDS, at least 5]
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "denoise/temporal.h"
+#include "isp/bench/median.h"
 #include "tests/denoise/frames.h"
 
 namespace {
@@ -23,11 +23,6 @@ double cpu_clock_ns() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
-}
-
-double median(std::vector<double>& of) {
-  std::sort(of.begin(), of.end());
-  return of[of.size() / 2];
 }
 
 /// Still frames, then the same with light that changes a little from frame to frame.
@@ -54,11 +49,11 @@ void print_times(int rounds) {
     time(still, [&] { run(1); });
     time(changing, [&] { run(round % 2 == 0 ? 1.01 : 1 / 1.01); });
   }
-  const double copy = median(copying);
+  const double copy = isp::median(copying);
   std::printf("one thread, %d rounds, median CPU time [ns/pixel], and of memcpy's\n", rounds);
   std::printf("%-22s %5.2f\n", "memcpy", copy);
   for (auto* const times : {&still, &changing}) {
-    const double ns = median(*times);
+    const double ns = isp::median(*times);
     std::printf("%-22s %5.2f %5.1f\n", times == &still ? "light as before" : "light that changes", ns, ns / copy);
   }
 }

@@ -1,6 +1,5 @@
 // Times unpack_row over whole frames against memcpy of as many bytes, in and out counted, in one run.
 //   unpack_bench [--rounds N, at least 15]
-#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "isp/base/unpack.h"
+#include "isp/bench/median.h"
 
 namespace {
 
@@ -41,11 +41,6 @@ double cpu_clock_ns() {
   return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
 }
 
-double median(std::vector<double> figures) {
-  std::sort(figures.begin(), figures.end());
-  return figures[figures.size() / 2];
-}
-
 /// One packing at one size, beside a copy that moves as many bytes.
 class Task {
  public:
@@ -75,7 +70,7 @@ class Task {
   void forget() { unpack_ns_.clear(), copy_ns_.clear(); }
 
   void print() const {
-    const double unpack_ns = median(unpack_ns_), copy_ns = median(copy_ns_);
+    const double unpack_ns = isp::median(unpack_ns_), copy_ns = isp::median(copy_ns_);
     const auto bytes = static_cast<double>(moved_bytes_);
     std::printf("%-18s %5d x %4d | %8.3f %8.2f %8.2f %8.2f\n", packing_.name, size_.width, size_.height,
                 1e-6 * unpack_ns, bytes / unpack_ns, bytes / copy_ns, unpack_ns / copy_ns);

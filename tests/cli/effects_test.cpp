@@ -88,14 +88,16 @@ TEST_F(EffectsCommand, RefuseWhatCannotBe) {
 }
 
 TEST(CostFile, TextComesBackAndFaultsAreNamed) {
-  const isp::CostModel& model = *test::reference_cost();
+  isp::CostModel model = *test::reference_cost();
+  model.pace_s = 0.0125;
   const auto back = cli::parse_cost(cli::cost_text(model));
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(back->machine, model.machine);
   EXPECT_EQ(back->threads, model.threads);
+  EXPECT_EQ(back->pace_s, model.pace_s);
   for (int i = 0; i < isp::cost_parts; ++i) {
     const auto part = static_cast<isp::CostPart>(i);
-    EXPECT_DOUBLE_EQ(back->seconds(part, 3), model.seconds(part, 3)) << name_of(part);
+    EXPECT_DOUBLE_EQ(back->seconds(part, {3, 3}), model.seconds(part, {3, 3})) << name_of(part);
   }
   const std::string good = cli::cost_text(model);
   const auto changed = [&](const std::string& from, const std::string& to) {
@@ -104,12 +106,31 @@ TEST(CostFile, TextComesBackAndFaultsAreNamed) {
     return text;
   };
   for (const std::string& text :
-       {std::string(), std::string("[]"), std::string("{\"lowlux_cost_model\": 3}"), good.substr(0, good.size() / 2),
-        changed("\"lowlux_cost_model\": 3", "\"x\": 1"), changed("\"threads\": 2", "\"threads\": \"2\""),
-        changed("\"look\"", "\"loop\""), changed("0.301", "-1"), changed("0.301", "1e999")}) {
+       {std::string(), std::string("[]"), std::string("{\"lowlux_cost_model\": 4}"), good.substr(0, good.size() / 2),
+        changed("\"lowlux_cost_model\": 4", "\"x\": 1"), changed("\"threads\": 2", "\"threads\": \"2\""),
+        changed("\"look\"", "\"loop\""), changed("9.009", "-1"), changed("9.009", "1e999"), changed("0.0125", "-1"),
+        changed("\"pace_s\"", "\"race_s\"")}) {
     const auto wrong = cli::parse_cost(text);
     ASSERT_FALSE(wrong) << text;
     EXPECT_NE(wrong.error().message.find("--calibrate-cost"), std::string::npos);
+  }
+}
+
+// A machine is as fast as it is now, not as it was when it was calibrated.
+TEST(MachineSpeed, GoesByThePaceOfNow) {
+  PoolExecutor executor(2);
+  isp::CostModel model = *test::reference_cost();
+  const auto unknown = cli::MachineSpeed(model).now(executor);
+  ASSERT_TRUE(unknown);
+  EXPECT_EQ((*unknown)->pace, 1);
+  for (const double calibrated_s : {1e-6, 1e3}) {
+    model.pace_s = calibrated_s;
+    const auto now = cli::MachineSpeed(model).now(executor);
+    ASSERT_TRUE(now);
+    EXPECT_EQ(calibrated_s<1, (*now)->pace> 1) << (*now)->pace;
+    EXPECT_GT((*now)->pace, 0);
+    const double calm = model.seconds(isp::CostPart::high_0, {2, 2});
+    EXPECT_NEAR((*now)->seconds(isp::CostPart::high_0, {2, 2}) / calm, (*now)->pace, 1e-12 * (*now)->pace);
   }
 }
 

@@ -55,14 +55,30 @@ const PlannedEffect& named(const EffectsPlan& plan, std::string_view name) {
 
 TEST(CostModel, IsLinearInTheSizeAndKeepsTheEndsSpeed) {
   CostModel model;
+  const auto codes_s = [&](double megapixels) { return model.seconds(CostPart::codes, {megapixels, 1000}); };
   model.points[static_cast<std::size_t>(CostPart::codes)] = {{1, 0.01}, {100, 3}};  // 10 and 30 ms/MP
-  EXPECT_DOUBLE_EQ(model.seconds(CostPart::codes, 1), 0.01);
-  EXPECT_DOUBLE_EQ(model.seconds(CostPart::codes, 100), 3);
-  EXPECT_NEAR(model.seconds(CostPart::codes, 50.5), 1.505, 1e-12);  // half way
-  EXPECT_DOUBLE_EQ(model.seconds(CostPart::codes, 0.5), 0.005);
-  EXPECT_DOUBLE_EQ(model.seconds(CostPart::codes, 200), 6);
-  EXPECT_EQ(model.seconds(CostPart::look, 5), 0) << "what was not measured is free";
-  EXPECT_DOUBLE_EQ(predicted_s(model, 100, {{CostPart::codes, 0.5}, {CostPart::look}}), 1.5);
+  EXPECT_DOUBLE_EQ(codes_s(1), 0.01);
+  EXPECT_DOUBLE_EQ(codes_s(100), 3);
+  EXPECT_NEAR(codes_s(50.5), 1.505, 1e-12);  // half way
+  EXPECT_DOUBLE_EQ(codes_s(0.5), 0.005);
+  EXPECT_DOUBLE_EQ(codes_s(200), 6);
+  EXPECT_EQ(model.seconds(CostPart::look, {5, 5}), 0) << "what was not measured is free";
+  EXPECT_DOUBLE_EQ(predicted_s(model, {100, 1000}, {{CostPart::codes, 0.5}, {CostPart::look}}), 1.5);
+  model.pace = 2;
+  EXPECT_DOUBLE_EQ(codes_s(0.5), 0.01);
+  EXPECT_NEAR(codes_s(50.5), 3.01, 1e-12);
+  EXPECT_DOUBLE_EQ(codes_s(200), 12);
+}
+
+// 64 cells are the unit of five levels: 672 x 448 pixels become 768 x 512.
+TEST(CostModel, DenoisingCountsWhatIsAppended) {
+  EXPECT_DOUBLE_EQ(cost_size(672, 448).megapixels, 0.301056);
+  EXPECT_DOUBLE_EQ(cost_size(672, 448).denoised_megapixels, 0.393216);
+  EXPECT_DOUBLE_EQ(cost_size(1728, 1152).denoised_megapixels, 4e-6 * 896 * 576);
+  EXPECT_DOUBLE_EQ(cost_size(1, 1).denoised_megapixels, 4e-6 * 8 * 8);
+  CostModel model;
+  model.points[static_cast<std::size_t>(CostPart::high_1)] = {{1, 0.01}};
+  EXPECT_DOUBLE_EQ(model.seconds(CostPart::high_1, {1, 1.5}), 0.015);
 }
 
 TEST(VisibleNoise, PercentileIsThatOfNormalDifferences) {
@@ -151,25 +167,41 @@ TEST(VisibleNoise, ClippingAtBlackIsSeenInTheDark) {
   }
 }
 
-// Tiles are 128 px wide, and chroma is worked on for tiles up to two away: 320 px from a block's middle.
+/// Left of an edge one grey, right of it another [e- of green].
+RawFrame two_greys(double left_e, double right_e, int edge_px, int width, int height) {
+  RawFrame out = grey(right_e, width, height);
+  const RawFrame left = grey(left_e, width, height);
+  for (int y = 0; y < height; ++y) std::copy_n(left.raw.dn.row(y), edge_px, out.raw.dn.row(y));
+  return out;
+}
+
+void expect_work(const RawFrame& frame, std::array<double, 3> start, std::array<double, 3> work) {
+  const DevelopPlan plan = exposed(frame, 0);
+  const Thumbnail thumbnail = make_thumbnail(frame, plan.black, executor);
+  const ChromaWork found = chroma_work(frame, plan, plan.noise_reduction.noise, thumbnail);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(found.start[i], start[i], 1e-12) << "level " << i;
+    EXPECT_NEAR(found.work[i], work[i], 1e-12) << "level " << i;
+  }
+}
+
+// Tiles are 128 px wide, and chroma is worked on for tiles up to two away. Camera's pixels have a signal to noise ratio
+// of 3 at some 20 electrons, of 0.7 at some 3.
 TEST(ChromaWork, ReachesTwoTilesBeyondWhatStartsFine) {
-  std::vector<SeenBlock> blocks(10);
-  for (std::size_t i = 0; i < blocks.size(); ++i) blocks[i] = {.x = 0.05f + 0.1f * static_cast<float>(i), .snr = 0.5f};
-  const auto expect_shares = [&](int width, std::array<double, 3> shares) {
-    const std::array<double, 3> found = chroma_work(blocks, {0, 0, width, 100});
-    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(found[i], shares[i], 1e-12) << width << ", level " << i;
-  };
-  expect_shares(2000, {0, 0, 1});
-  blocks[0].snr = 3;
-  blocks[9].snr = 0.7f;
-  EXPECT_NEAR(start_shares(blocks)[0], 0.1, 1e-12);
-  expect_shares(2000, {0.2, 0.2, 0.6});  // blocks 200 px apart: the next one is near
-  expect_shares(4000, {0.1, 0.1, 0.8});  // 400 px: none is
-  expect_shares(320, {1, 0, 0});         // all are
-  blocks[0].y = 1;
-  const std::array<double, 3> apart = chroma_work(blocks, {0, 0, 2000, 1000});
-  EXPECT_NEAR(apart[0], 0.1, 1e-12) << "near across, far down";
-  EXPECT_NEAR(chroma_work({}, {0, 0, 100, 100})[0], 1, 0);
+  expect_work(two_greys(300, 300, 0, 1280, 128), {1, 0, 0}, {1, 0, 0});
+  expect_work(two_greys(0.01, 0.01, 0, 1280, 128), {0, 0, 1}, {0, 0, 1});
+  expect_work(two_greys(300, 0.01, 128, 1280, 128), {0.1, 0, 0.9}, {0.3, 0, 0.7});
+  expect_work(two_greys(5, 0.01, 256, 1280, 128), {0, 0.2, 0.8}, {0, 0.4, 0.6});
+  expect_work(two_greys(300, 5, 384, 1280, 256), {0.3, 0.7, 0}, {0.5, 0.5, 0});
+  expect_work(two_greys(300, 0.01, 64, 100, 90), {1, 0, 0}, {1, 0, 0});  // one tile
+}
+
+// A lamp that fills a block does not make the mean of its tile bright.
+TEST(ChromaWork, GoesByTheMeansOfTiles) {
+  RawFrame frame = two_greys(300, 0.01, 8, 1280, 128);
+  const int dark = frame.raw.dn.at(1000, 100);
+  for (int y = 8; y < 128; ++y) std::fill_n(frame.raw.dn.row(y), 8, static_cast<std::uint16_t>(dark));
+  expect_work(frame, {0, 0, 1}, {0, 0, 1});
 }
 
 TEST(PlanEffects, LevelsLeaveLessTheMoreTheyWork) {
@@ -231,7 +263,7 @@ TEST(PlanEffects, ABudgetBelowTheCheapestPlanIsRefusedWithItsTime) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::insufficient);
   const double cheapest_s =
-      predicted_s(*test::reference_cost(), 1e-6 * 320 * 256, {{CostPart::planning}, {CostPart::codes}});
+      predicted_s(*test::reference_cost(), cost_size(320, 256), {{CostPart::planning}, {CostPart::codes}});
   EXPECT_NE(refused.error().message.find("cheapest plan"), std::string::npos) << refused.error().message;
   const double told_ms =
       std::strtod(refused.error().message.c_str() + refused.error().message.find("take ") + 5, nullptr);

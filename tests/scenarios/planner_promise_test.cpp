@@ -31,7 +31,7 @@ double quantile(std::vector<double> values, double share) {
 }
 
 // 300 scenes, none above its tolerance; 3000 in scripts/nightly, one in a thousand above by a tenth at most. The time
-// is that of frames too small for a sample to save anything: planned_time_bench measures large ones, which save more.
+// is that of large frames that are searched whole (reference_cost); planned_time_bench measures some.
 TEST(PlannerPromise, WhatIsLeftOutStaysBelowTheToleranceOver300Scenes) {
   const std::uint32_t scenes = std::getenv("LOWLUX_NIGHTLY") == nullptr ? 300 : 3000;
   std::vector<double> saved, of_tolerance;
@@ -60,7 +60,7 @@ TEST(PlannerPromise, WhatIsLeftOutStaysBelowTheToleranceOver300Scenes) {
   const auto above = std::ranges::count_if(of_tolerance, [](double ratio) { return ratio >= 1; });
   EXPECT_LE(above, scenes / 1000);
   EXPECT_LT(quantile(of_tolerance, 1), 1.1);
-  EXPECT_GE(quantile(saved, 0.5), 0.2);
+  EXPECT_GE(quantile(saved, 0.5), 0.25);
   for (const int count : levels) EXPECT_GT(count, 0) << "every level is called for by some scene";
 }
 

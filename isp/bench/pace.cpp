@@ -1,0 +1,36 @@
+#include "isp/bench/pace.h"
+
+#include "isp/bench/median.h"
+#include "isp/bench/timing_frame.h"
+#include "isp/pipeline/develop.h"
+
+namespace lowlux::isp {
+
+Pace::Pace() : frame_(timing_frame({1024, 768}, {20, 20})) {
+  options_.denoise.mode = DenoiseChoice::Mode::level;
+  options_.denoise.level = denoise::Level::standard;
+  options_.effects.emplace();
+}
+
+Result<double> Pace::seconds(Executor& executor) {
+  const Result<Developed> developed = develop(frame_, options_, executor);
+  if (!developed) return tl::make_unexpected(developed.error());
+  double sum = 0;
+  for (const StageTime& time : developed->plan.times) sum += time.seconds;
+  taken_s_.push_back(sum);
+  return sum;
+}
+
+double Pace::usual_s() const { return median(taken_s_); }
+
+Result<double> pace_now(Pace& pace, Executor& executor) {
+  std::vector<double> taken_s;
+  for (int run = 0; run < 8; ++run) {
+    const Result<double> seconds = pace.seconds(executor);
+    if (!seconds) return seconds;
+    if (run > 0) taken_s.push_back(*seconds);
+  }
+  return median(taken_s);
+}
+
+}  // namespace lowlux::isp
