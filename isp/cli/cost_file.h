@@ -38,7 +38,7 @@ class MachineSpeed {
  public:
   explicit MachineSpeed(isp::CostModel calibrated) : calibrated_(std::move(calibrated)) {}
 
-  /// The model with the pace of now; as it was calibrated where its own pace is not known. Takes less than a tenth of a
+  /// The model with the pace of now; as it was calibrated where its own pace is not known. Takes about a tenth of a
   /// second, and with it goes what the first frame of a program takes more. Errors: those of isp::Pace.
   Result<std::shared_ptr<const isp::CostModel>> now(Executor& executor);
 

@@ -26,11 +26,13 @@ void add_positive(CLI::App& app, const char* flag, const char* type, const char*
 }  // namespace
 
 void add_budget(CLI::App& app, EffectsArgs& args) {
-  add_positive(app, "--budget-ms", "MS",
-               "time for developing each frame, from decoded codes to a finished picture (files are read and written "
-               "besides): the most accurate way that is predicted to fit, or with --tolerance the fastest within it. "
-               "This machine's speed is measured once, see bench --calibrate-cost; one file at a time",
-               args.budget_ms);
+  add_positive(
+      app, "--budget-ms", "MS",
+      "time for developing each frame, from decoded codes to a finished picture (files are read and written "
+      "besides): the most accurate way that is predicted to fit, or with --tolerance the fastest within it. "
+      "This machine's speed is measured once, see bench --calibrate-cost, and before each file how busy it is, which "
+      "takes a tenth of a second or two more; one file at a time",
+      args.budget_ms);
   add_positive(app, "--budget-mpps", "MP_PER_S", "the same as megapixels in a second", args.budget_mpps);
 }
 

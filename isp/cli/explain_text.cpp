@@ -38,9 +38,13 @@ void add_effects(Lines& out, const isp::EffectsPlan& effects, const isp::Effects
     out.add("", text + " (" + effect.decision + ")");
   }
   if (effects.predicted_s) {
-    out.add("budget", fmt::format("{:.1f} ms; predicted {:.1f} ms, everything taking {:.2f} times what it took when "
-                                  "this machine was calibrated",
-                                  1e3 * choice.budget_s.value_or(0), 1e3 * *effects.predicted_s, choice.cost->pace));
+    std::string text =
+        fmt::format("{:.1f} ms; predicted {:.1f} ms", 1e3 * choice.budget_s.value_or(0), 1e3 * *effects.predicted_s);
+    if (choice.cost->pace_s > 0) {
+      text += fmt::format(", everything taking {:.2f} times what it took when this machine was calibrated",
+                          choice.cost->pace);
+    }
+    out.add("budget", text);
   }
 }
 

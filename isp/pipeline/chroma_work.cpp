@@ -22,35 +22,57 @@ double mean_of(const std::array<double, 3>& of_colour) {
 struct Tile {
   double charge_e = 0;  // sum over blocks
   int blocks = 0;
+  double share = 0;  // of the frame
 };
 
-/// The denoiser's, from left to right, from above.
-struct Tiles {
-  int columns = 0;
-  int rows = 0;
-  int levels = 0;
-  std::vector<Tile> all;
+/// One direction: the denoiser's tiles along cells; the last is the larger.
+struct Axis {
+  int cells;
+  int tiles;
+  int blocks;  // of the thumbnail
+
+  int tile_of_block(int block) const {
+    return denoise::tile_of(static_cast<int>((block + 0.5) / blocks * cells), tiles);
+  }
+  int block_in(int tile) const {
+    return std::min(static_cast<int>((tile + 0.5) * denoise::tile / cells * blocks), blocks - 1);
+  }
+  double share_of(int tile) const {
+    const int width = tile + 1 < tiles ? denoise::tile : cells - (tiles - 1) * denoise::tile;
+    return static_cast<double>(width) / cells;
+  }
 };
 
-int tile_of_block(int block, int blocks, int cells, int tiles) {
-  return denoise::tile_of(static_cast<int>((block + 0.5) / blocks * cells), tiles);
+Axis axis_of(int pixels, int blocks) {
+  const int cells = (pixels + 1) / 2;
+  return {cells, denoise::tiles_of(cells), blocks};
 }
 
-/// Each block counts where its middle lies.
-Tiles tiles_of(const Rect& active, const CameraRgb& mean, const std::array<double, 3>& electrons_at_white) {
-  const int across = (active.width + 1) / 2, down = (active.height + 1) / 2;
-  Tiles out{denoise::tiles_of(across), denoise::tiles_of(down), denoise::levels_of(across, down), {}};
-  out.all.resize(static_cast<std::size_t>(out.columns) * static_cast<std::size_t>(out.rows));
-  for (int y = 0; y < mean.height(); ++y) {
-    const int row = tile_of_block(y, mean.height(), down, out.rows);
-    for (int x = 0; x < mean.width(); ++x) {
-      const int column = tile_of_block(x, mean.width(), across, out.columns);
-      Tile& tile = out.all[static_cast<std::size_t>(row * out.columns + column)];
-      for (std::size_t c = 0; c < 3; ++c) {
-        const auto value = static_cast<double>(mean.plane[c].at(x, y));
-        if (std::isfinite(value)) tile.charge_e += share_of_sites[c] * electrons_at_white[c] * value;
-      }
+/// The denoiser's, from left to right, from above. A block counts where its middle lies; a tile that has no middle, as
+/// it is smaller than a block, goes by the one around it.
+std::vector<Tile> tiles_of(const Axis& across, const Axis& down, const CameraRgb& mean,
+                           const std::array<double, 3>& electrons_at_white) {
+  const auto charge_e = [&](int x, int y) {
+    double sum = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto value = static_cast<double>(mean.plane[c].at(x, y));
+      if (std::isfinite(value)) sum += share_of_sites[c] * electrons_at_white[c] * value;
+    }
+    return sum;
+  };
+  std::vector<Tile> out(static_cast<std::size_t>(across.tiles) * static_cast<std::size_t>(down.tiles));
+  for (int y = 0; y < down.blocks; ++y) {
+    for (int x = 0; x < across.blocks; ++x) {
+      Tile& tile = out[static_cast<std::size_t>(down.tile_of_block(y) * across.tiles + across.tile_of_block(x))];
+      tile.charge_e += charge_e(x, y);
       ++tile.blocks;
+    }
+  }
+  for (int y = 0; y < down.tiles; ++y) {
+    for (int x = 0; x < across.tiles; ++x) {
+      Tile& tile = out[static_cast<std::size_t>(y * across.tiles + x)];
+      tile.share = across.share_of(x) * down.share_of(y);
+      if (tile.blocks == 0) tile = {charge_e(across.block_in(x), down.block_in(y)), 1, tile.share};
     }
   }
   return out;
@@ -67,23 +89,25 @@ ChromaWork chroma_work(const RawFrame& frame, const DevelopPlan& plan, const den
   }
   double dark_e = 0;
   for (const double d : noise.dark_mean_e) dark_e += d / 4;
-  const Tiles tiles = tiles_of(frame.raw.active, thumbnail.mean, electrons_at_white);
-  const std::size_t count = tiles.all.size();
+  const Rect& active = frame.raw.active;
+  const Axis across = axis_of(active.width, thumbnail.mean.width());
+  const Axis down = axis_of(active.height, thumbnail.mean.height());
+  const std::vector<Tile> tiles = tiles_of(across, down, thumbnail.mean, electrons_at_white);
+  const int levels = denoise::levels_of(across.cells, down.cells);
+  const std::size_t count = tiles.size();
   std::vector<float> start(count);
   std::vector<unsigned char> has_chroma(count * denoise::most_levels);
   for (std::size_t i = 0; i < count; ++i) {
-    // A tile smaller than a block has none of its own: it is taken for dark.
-    const double mean_e = tiles.all[i].charge_e / std::max(tiles.all[i].blocks, 1);
+    const double mean_e = tiles[i].charge_e / tiles[i].blocks;
     const int level = denoise::start_of(mean_e - dark_e, dark_e, mean_of(noise.variance_e2));
-    start[i] = static_cast<float>(std::min(level, tiles.levels - 1));
+    start[i] = static_cast<float>(std::min(level, levels - 1));
   }
-  denoise::ChromaStarts starts{start, has_chroma, tiles.columns, tiles.rows};
+  denoise::ChromaStarts starts{start, has_chroma, across.tiles, down.tiles};
   denoise::complete(starts);
   ChromaWork out{{}, {}};
   for (std::size_t i = 0; i < count; ++i) {
-    const double share = 1.0 / static_cast<double>(count);
-    out.start[static_cast<std::size_t>(start[i])] += share;
-    out.work[has_chroma[i] != 0 ? 0 : has_chroma[count + i] != 0 ? 1 : 2] += share;
+    out.start[static_cast<std::size_t>(start[i])] += tiles[i].share;
+    out.work[has_chroma[i] != 0 ? 0 : has_chroma[count + i] != 0 ? 1 : 2] += tiles[i].share;
   }
   return out;
 }

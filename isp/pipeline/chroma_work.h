@@ -9,10 +9,10 @@
 
 namespace lowlux::isp {
 
-/// On which pyramid level the denoiser will start the chroma of a frame, as shares of its tiles for levels 0, 1 and 2.
+/// On which pyramid level the denoiser will start the chroma of a frame, as shares of it for levels 0, 1 and 2.
 struct ChromaWork {
-  std::array<double, 3> start{1, 0, 0};  // tiles that start there
-  std::array<double, 3> work{1, 0, 0};   // tiles where chroma is worked on from there: around what starts finer, too
+  std::array<double, 3> start{1, 0, 0};  // in tiles that start there
+  std::array<double, 3> work{1, 0, 0};   // in tiles where chroma is worked on from there: around what starts finer, too
 };
 
 /// As denoise/chroma_start.h decides it, from the means of a thumbnail's blocks. Needs the plan's electrons at white.

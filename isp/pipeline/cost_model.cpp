@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cstdint>
 
 #include "denoise/layout.h"
+#include "isp/pipeline/frame_tiles.h"
 
 namespace lowlux::isp {
 
@@ -18,6 +20,22 @@ std::string_view name_of(CostPart part) {
 CostSize cost_size(int width, int height) {
   const int columns = (width + 1) / 2, rows = (height + 1) / 2, levels = denoise::levels_of(columns, rows);
   return {1e-6 * width * height, 4e-6 * denoise::padded(columns, levels) * denoise::padded(rows, levels)};
+}
+
+CostSize cost_size(const RawDn& raw) {
+  constexpr TileLimits limits;
+  const Rect& active = raw.active;
+  CostSize out = cost_size(active.width, active.height);
+  if (static_cast<std::int64_t>(active.width) * active.height <= limits.most_whole_px) return out;
+  out.denoised_megapixels = 0;
+  const TileGrid grid(raw.default_crop, limits.side_px);
+  for (int i = 0; i < grid.count(); ++i) {
+    const Rect core = grid.core(i);
+    if (core.width <= 0 || core.height <= 0) continue;
+    const Rect piece = with_margin(core, {}, active.width, active.height);
+    out.denoised_megapixels += cost_size(piece.width, piece.height).denoised_megapixels;
+  }
+  return out;
 }
 
 double CostModel::seconds(CostPart part, const CostSize& size) const {

@@ -6,19 +6,19 @@
 #include <string_view>
 #include <vector>
 
-#include "isp/base/image.h"
+#include "isp/base/frame.h"
 
 /// How long developing takes on this machine.
 namespace lowlux::isp {
 
 /// Parts of the work that plans differ in.
 enum class CostPart : std::uint8_t {
-  planning,  // black point, thumbnail, white, exposure: what every plan begins with
+  planning,  // black point, thumbnail, white, exposure, effects, signal to noise ratio: what every plan begins with
   samples,   // of the frame, looked into for hot pixels, row and column noise
   defects,   // the search in the whole frame
   lines,     // row and column noise looked for in the whole frame
   offsets,   // what it takes more where it stands out
-  check,     // of the noise model
+  check,     // of the noise model, where noise is reduced
   codes,     // rendering straight from codes
   floats,    // rendering from electrons
   draft_0,   // the same with noise reduced, chroma starting on level 0, 1 or 2
@@ -43,12 +43,15 @@ inline constexpr int cost_parts = 23;
 std::string_view name_of(CostPart part);
 constexpr bool is_denoising(CostPart part) { return part >= CostPart::draft_0 && part <= CostPart::best_2; }
 
-/// Of a frame.
+/// Of the active area of a frame.
 struct CostSize {
   double megapixels = 0;
-  double denoised_megapixels = 0;  // with the rows and columns that the denoiser appends: up to a third more
+  double denoised_megapixels = 0;  // with what the denoiser appends, and what pieces of a large frame share
 };
+/// Of a frame that is worked on as a whole.
 CostSize cost_size(int width, int height);
+/// Of any, in pieces where TileLimits say so.
+CostSize cost_size(const RawDn& raw);
 
 /// Measured at some sizes.
 struct CostPoint {

@@ -113,7 +113,7 @@ Result<EffectCandidate> within_budget(const EffectFacts& facts, double budget_s)
   if (all.front().seconds > budget_s) {
     return fail(ErrorCode::insufficient,
                 fmt::format("the budget of {:.3g} ms is below the cheapest plan, which is predicted to take {:.3g} ms "
-                            "with {} {}: raise --budget-ms, or halve the picture (--half)",
+                            "with {} {}: raise --budget-ms",
                             1e3 * budget_s, 1e3 * all.front().seconds, facts.choice.cost->threads,
                             facts.choice.cost->threads == 1 ? "thread" : "threads"));
   }

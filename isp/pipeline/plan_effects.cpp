@@ -19,8 +19,9 @@ using denoise::Level;
 
 std::string level_words(const EffectFacts& facts, const EffectCandidate& plan) {
   if (!facts.has_noise) return "the noise is not known, or not to be reduced";
-  const std::array<double, 3>& share = facts.chroma.start;
   if (!plan.level) return "left as it is";
+  std::array<double, 3> share = facts.chroma.start;
+  if (*plan.level == Level::best) share = {share[0] + share[1], 0, share[2]};  // it starts level 1's on level 0
   return fmt::format("{}; chroma from level 0, 1, 2 in {:.0f}, {:.0f}, {:.0f} % of the frame", name_of(*plan.level),
                      100 * share[0], 100 * share[1], 100 * share[2]);
 }
@@ -93,8 +94,7 @@ EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
 EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopPlan& plan, Executor& executor) {
   const DevelopOptions& o = plan.options;
   EffectFacts facts{*o.effects, {}, {}};
-  const Rect& crop = frame.raw.default_crop;
-  facts.size = cost_size(crop.width, crop.height);
+  facts.size = cost_size(frame.raw);
   facts.samples = o.samples;
   facts.active = frame.raw.active;
   facts.look = plan.look.has_value();

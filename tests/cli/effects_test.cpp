@@ -23,9 +23,14 @@ class EffectsCommand : public test::SimulateCommand {
   void SetUp() override {
     simulated("chart:macbeth", "night.dng", {"--luminance", "0.2", "--size", "160x120", "--no-truth"});
     setenv("XDG_CACHE_HOME", file("cache").c_str(), 1);
+    keep_speed(0);
+  }
+  /// @param pace_s  0: it is not looked how busy the machine is
+  void keep_speed(double pace_s) {
     isp::CostModel model = *test::reference_cost();
     model.machine = cli::machine_name();
     model.threads = cli::threads_of_each(1);
+    model.pace_s = pace_s;
     std::filesystem::create_directories(file("cache/lowlux"));
     std::ofstream(*cli::cost_file(model.threads)) << cli::cost_text(model);
   }
@@ -85,6 +90,21 @@ TEST_F(EffectsCommand, RefuseWhatCannotBe) {
   refused({"--effects", "all", "--budget-ms", "5"}, 2, "budget");
   refused({"--effects", "hue"}, 2, "--look eye");
   refused({"--tolerance", "0"}, 2, "--tolerance");
+}
+
+// A machine calibrated when it took 1000 s for what takes it some hundredths now.
+TEST_F(EffectsCommand, GoByTheMachinesPace) {
+  const Json calibrated = effects_of({"--budget-ms", "1000"});
+  EXPECT_TRUE(calibrated["pace"].is_null());
+  keep_speed(1000);
+  const Json now = effects_of({"--budget-ms", "1000"});
+  EXPECT_GT(now["pace"].get<double>(), 0);
+  EXPECT_LT(now["pace"].get<double>(), 0.01);
+  EXPECT_LT(now["predicted_s"].get<double>(), 0.01 * calibrated["predicted_s"].get<double>());
+  const auto told = developed({"--budget-ms", "1000", "--explain"});
+  EXPECT_NE(told.out.find("times what it took when this machine was calibrated"), std::string::npos) << told.out;
+  keep_speed(0);
+  EXPECT_EQ(developed({"--budget-ms", "1000", "--explain"}).out.find("was calibrated"), std::string::npos);
 }
 
 TEST(CostFile, TextComesBackAndFaultsAreNamed) {

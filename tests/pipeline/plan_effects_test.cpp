@@ -53,34 +53,6 @@ const PlannedEffect& named(const EffectsPlan& plan, std::string_view name) {
   return *std::ranges::find(plan.effects, name, &PlannedEffect::name);
 }
 
-TEST(CostModel, IsLinearInTheSizeAndKeepsTheEndsSpeed) {
-  CostModel model;
-  const auto codes_s = [&](double megapixels) { return model.seconds(CostPart::codes, {megapixels, 1000}); };
-  model.points[static_cast<std::size_t>(CostPart::codes)] = {{1, 0.01}, {100, 3}};  // 10 and 30 ms/MP
-  EXPECT_DOUBLE_EQ(codes_s(1), 0.01);
-  EXPECT_DOUBLE_EQ(codes_s(100), 3);
-  EXPECT_NEAR(codes_s(50.5), 1.505, 1e-12);  // half way
-  EXPECT_DOUBLE_EQ(codes_s(0.5), 0.005);
-  EXPECT_DOUBLE_EQ(codes_s(200), 6);
-  EXPECT_EQ(model.seconds(CostPart::look, {5, 5}), 0) << "what was not measured is free";
-  EXPECT_DOUBLE_EQ(predicted_s(model, {100, 1000}, {{CostPart::codes, 0.5}, {CostPart::look}}), 1.5);
-  model.pace = 2;
-  EXPECT_DOUBLE_EQ(codes_s(0.5), 0.01);
-  EXPECT_NEAR(codes_s(50.5), 3.01, 1e-12);
-  EXPECT_DOUBLE_EQ(codes_s(200), 12);
-}
-
-// 64 cells are the unit of five levels: 672 x 448 pixels become 768 x 512.
-TEST(CostModel, DenoisingCountsWhatIsAppended) {
-  EXPECT_DOUBLE_EQ(cost_size(672, 448).megapixels, 0.301056);
-  EXPECT_DOUBLE_EQ(cost_size(672, 448).denoised_megapixels, 0.393216);
-  EXPECT_DOUBLE_EQ(cost_size(1728, 1152).denoised_megapixels, 4e-6 * 896 * 576);
-  EXPECT_DOUBLE_EQ(cost_size(1, 1).denoised_megapixels, 4e-6 * 8 * 8);
-  CostModel model;
-  model.points[static_cast<std::size_t>(CostPart::high_1)] = {{1, 0.01}};
-  EXPECT_DOUBLE_EQ(model.seconds(CostPart::high_1, {1, 1.5}), 0.015);
-}
-
 TEST(VisibleNoise, PercentileIsThatOfNormalDifferences) {
   EXPECT_EQ(seen_percentile({}), 0);
   const std::vector<float> none(10, 0.0f), equal(10, 2.0f);
@@ -193,7 +165,8 @@ TEST(ChromaWork, ReachesTwoTilesBeyondWhatStartsFine) {
   expect_work(two_greys(300, 0.01, 128, 1280, 128), {0.1, 0, 0.9}, {0.3, 0, 0.7});
   expect_work(two_greys(5, 0.01, 256, 1280, 128), {0, 0.2, 0.8}, {0, 0.4, 0.6});
   expect_work(two_greys(300, 5, 384, 1280, 256), {0.3, 0.7, 0}, {0.5, 0.5, 0});
-  expect_work(two_greys(300, 0.01, 64, 100, 90), {1, 0, 0}, {1, 0, 0});  // one tile
+  expect_work(two_greys(300, 0.01, 64, 100, 90), {1, 0, 0}, {1, 0, 0});                // one tile
+  expect_work(two_greys(300, 0.01, 256, 800, 100), {0.32, 0, 0.68}, {0.64, 0, 0.36});  // the last one is larger
 }
 
 // A lamp that fills a block does not make the mean of its tile bright.
