@@ -26,7 +26,7 @@ double Pace::usual_s() const { return median(taken_s_); }
 Result<double> pace_now(Pace& pace, Executor& executor) {
   std::vector<double> taken_s;
   for (int run = 0; run < 8; ++run) {
-    const Result<double> seconds = pace.seconds(executor);
+    Result<double> seconds = pace.seconds(executor);
     if (!seconds) return seconds;
     if (run > 0) taken_s.push_back(*seconds);
   }

@@ -60,17 +60,20 @@ std::vector<Tile> tiles_of(const Axis& across, const Axis& down, const CameraRgb
     }
     return sum;
   };
+  const auto index = [&](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(across.tiles) + static_cast<std::size_t>(x);
+  };
   std::vector<Tile> out(static_cast<std::size_t>(across.tiles) * static_cast<std::size_t>(down.tiles));
   for (int y = 0; y < down.blocks; ++y) {
     for (int x = 0; x < across.blocks; ++x) {
-      Tile& tile = out[static_cast<std::size_t>(down.tile_of_block(y) * across.tiles + across.tile_of_block(x))];
+      Tile& tile = out[index(across.tile_of_block(x), down.tile_of_block(y))];
       tile.charge_e += charge_e(x, y);
       ++tile.blocks;
     }
   }
   for (int y = 0; y < down.tiles; ++y) {
     for (int x = 0; x < across.tiles; ++x) {
-      Tile& tile = out[static_cast<std::size_t>(y * across.tiles + x)];
+      Tile& tile = out[index(x, y)];
       tile.share = across.share_of(x) * down.share_of(y);
       if (tile.blocks == 0) tile = {charge_e(across.block_in(x), down.block_in(y)), 1, tile.share};
     }
