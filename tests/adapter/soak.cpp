@@ -15,6 +15,7 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <thread>
 #include <type_traits>
 #include <utility>
 
@@ -100,6 +101,8 @@ class Soak {
   Soak(const Functions& functions, std::uint64_t seed) : f_(functions), chance_{seed} {}
 
   void run(int frames) {
+    std::thread([] {}).join();  // a sanitizer's own thread starts with the first of the program
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
     const int threads = threads_now();
     open();
     double warm_mib = 0;
