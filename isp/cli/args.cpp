@@ -49,7 +49,10 @@ void add_batch(CLI::App& app, DevelopArgs& args) {
                "cell: OUT.noise.pfm and OUT.confidence.pfm");
   app.add_flag("--force", args.force, "overwrite files that exist");
   app.add_option("--jobs", args.jobs, "files at a time (default: one for each processor)")->check(CLI::Range(1, 256));
-  app.add_flag("--explain", args.explain, "what was decided for each file, and why");
+  app.add_flag(
+      "--explain", args.explain,
+      "what was decided for each file, why, and, where this machine's speed is known (bench --calibrate-cost), what "
+      "it takes");
   app.add_flag("--json", args.json, "one JSON object for each file on stdout, as an array");
   app.add_flag("--timings", args.timings, "time of each stage");
   app.add_flag("--quiet", args.quiet, "no warnings and no progress");

@@ -135,6 +135,14 @@ Result<isp::CostModel> parse_cost(std::string_view text) {
   return model;
 }
 
+std::optional<isp::CostModel> known_cost(int threads) {
+  const auto path = cost_file(threads);
+  if (!path) return std::nullopt;
+  auto model = from_file(*path);
+  if (!model || model->threads != threads || model->machine != machine_name()) return std::nullopt;
+  return model;
+}
+
 Result<isp::CostModel> calibrate_cost(int threads, bool quiet, std::string& written_to) {
   PoolExecutor executor(threads);
   Progress progress(1, !quiet);
@@ -158,11 +166,7 @@ Result<isp::CostModel> calibrate_cost(int threads, bool quiet, std::string& writ
 }
 
 Result<isp::CostModel> cost_of_this_machine(int threads, bool quiet) {
-  if (const auto path = cost_file(threads)) {
-    if (auto model = from_file(*path); model && model->threads == threads && model->machine == machine_name()) {
-      return *std::move(model);
-    }
-  }
+  if (auto known = known_cost(threads)) return *std::move(known);
   std::string ignored;
   return calibrate_cost(threads, quiet, ignored);
 }

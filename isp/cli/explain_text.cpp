@@ -24,6 +24,24 @@ void add_noise(Lines& out, const isp::NoiseReduction& noise) {
   }
 }
 
+void add_time(Lines& out, const isp::EffectsPlan& effects, const isp::EffectsChoice& choice) {
+  if (!effects.predicted_s) {
+    out.add("time", "not predicted: bench --calibrate-cost measures this machine's speed, once");
+    return;
+  }
+  const double predicted_ms = 1e3 * *effects.predicted_s;
+  if (!choice.budget_s) {
+    out.add("time", fmt::format("predicted {:.1f} ms with this machine as it was calibrated", predicted_ms));
+    return;
+  }
+  std::string text = fmt::format("{:.1f} ms; predicted {:.1f} ms", 1e3 * *choice.budget_s, predicted_ms);
+  if (choice.cost->pace_s > 0) {
+    text += fmt::format(", everything taking {:.2f} times what it took when this machine was calibrated",
+                        choice.cost->pace);
+  }
+  out.add("budget", text);
+}
+
 void add_effects(Lines& out, const isp::EffectsPlan& effects, const isp::EffectsChoice& choice) {
   out.add("effects", choice.all ? std::string("all")
                      : choice.tolerance_delta_e
@@ -34,18 +52,10 @@ void add_effects(Lines& out, const isp::EffectsPlan& effects, const isp::Effects
     text += std::isfinite(effect.size)
                 ? fmt::format("; {:.2g} CIEDE2000, of which {:.2g} may stay", effect.size, effect.left)
                 : std::string("; size not predicted");
-    if (effect.seconds) text += fmt::format("; {:.1f} ms", 1e3 * *effect.seconds);
+    if (effect.seconds) text += fmt::format("; {}{:.1f} ms", effect.used ? "" : "would take ", 1e3 * *effect.seconds);
     out.add("", text + " (" + effect.decision + ")");
   }
-  if (effects.predicted_s) {
-    std::string text =
-        fmt::format("{:.1f} ms; predicted {:.1f} ms", 1e3 * choice.budget_s.value_or(0), 1e3 * *effects.predicted_s);
-    if (choice.cost->pace_s > 0) {
-      text += fmt::format(", everything taking {:.2f} times what it took when this machine was calibrated",
-                          choice.cost->pace);
-    }
-    out.add("budget", text);
-  }
+  add_time(out, effects, choice);
 }
 
 std::string look_name(const isp::DevelopPlan& plan) {

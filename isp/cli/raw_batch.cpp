@@ -37,6 +37,7 @@ Result<void> check_free(const std::string& output, bool force) {
 Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) {
   isp::DevelopOptions options = batch.options;
   options.effects = batch.args.effects.effects;
+  if (options.effects) options.effects->cost = batch.known_cost;
   if (batch.speed) {
     const Rect& crop = frame.raw.default_crop;
     options.effects->budget_s = budget_s(batch.args.effects, 1e-6 * crop.width * crop.height);
@@ -52,6 +53,13 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
   options.dark_frame = std::move(*dark);
   options.black = batch.options.black;  // the darks hold it
   return options;
+}
+
+/// Files that are worked on at a time.
+int workers_of(const RawBatch& batch) {
+  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int files = static_cast<int>(batch.jobs.size());
+  return batch.speed ? 1 : std::min(files, batch.args.jobs > 0 ? batch.args.jobs : processors);
 }
 
 void print_outcome(const DevelopArgs& args, const DevelopOutcome& outcome) {
@@ -85,9 +93,7 @@ DevelopOutcome outcome_of(const Job& job, const RawWork& work, Executor& executo
 
 /// Each worker takes the next file: while one reads, another renders or encodes.
 std::vector<DevelopOutcome> run_all(const RawBatch& batch, const RawWork& work) {
-  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  const int files = static_cast<int>(batch.jobs.size());
-  const int workers = batch.speed ? 1 : std::min(files, batch.args.jobs > 0 ? batch.args.jobs : processors);
+  const int files = static_cast<int>(batch.jobs.size()), workers = workers_of(batch);
   std::vector<DevelopOutcome> outcomes(batch.jobs.size());
   std::atomic<int> next{0};
   Progress progress(files, !batch.args.quiet);
@@ -116,7 +122,7 @@ void FileProgress::reach(double share) {
 
 Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& options, std::vector<Job> jobs,
                             const std::vector<std::string>& darks) {
-  RawBatch batch{args, options, std::move(jobs), std::nullopt, std::nullopt, isp::Overwrite::no, nullptr};
+  RawBatch batch{args, options, std::move(jobs), std::nullopt, std::nullopt, isp::Overwrite::no, nullptr, nullptr};
   if (const std::string& file = args.profile.empty() ? args.black_profile : args.profile; !file.empty()) {
     auto profile = read_profile(file);
     if (!profile) return tl::make_unexpected(with_place(profile.error(), file));
@@ -132,6 +138,10 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
     auto cost = cost_of_this_machine(threads_of_each(1), args.quiet);
     if (!cost) return tl::make_unexpected(cost.error());
     batch.speed = std::make_shared<MachineSpeed>(*std::move(cost));
+  } else if (args.explain || args.json) {
+    if (auto cost = known_cost(threads_of_each(workers_of(batch)))) {
+      batch.known_cost = std::make_shared<const isp::CostModel>(*std::move(cost));
+    }
   }
   if (darks.empty()) return batch;
   Result<DarkSource> source = read_darks(darks, args.dark);

@@ -91,7 +91,7 @@ Json effects_json(const isp::DevelopPlan& plan) {
             {"tolerance_ciede2000", optional_json(choice.tolerance_delta_e)},
             {"budget_s", optional_json(choice.budget_s)},
             {"predicted_s", optional_json(plan.effects->predicted_s)},
-            {"pace", choice.cost && choice.cost->pace_s > 0 ? Json(choice.cost->pace) : Json(nullptr)},
+            {"pace", choice.budget_s && choice.cost->pace_s > 0 ? Json(choice.cost->pace) : Json(nullptr)},
             {"effects", Json::array()}};
   for (const isp::PlannedEffect& effect : plan.effects->effects) {
     json["effects"].push_back({{"name", effect.name},

@@ -71,7 +71,7 @@ struct PlannedEffect {
   double left = 0;  // that the decision leaves of it, against everything that can be done
   bool used = true;
   std::string decision;           // in words
-  std::optional<double> seconds;  // it is predicted to take; what every plan begins with is none of them
+  std::optional<double> seconds;  // it is predicted to take, or would; what every plan begins with is none of them
 };
 
 /// What was decided of them together.

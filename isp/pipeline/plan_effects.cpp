@@ -38,6 +38,17 @@ std::optional<double> cost_of(const EffectFacts& facts, std::initializer_list<Co
   return predicted_s(*facts.choice.cost, facts.size, parts);
 }
 
+/// Of the plan's level, or of the most accurate where it has none.
+std::optional<double> cost_of_noise(const EffectFacts& facts, EffectCandidate plan) {
+  if (!facts.choice.cost) return std::nullopt;
+  if (!plan.level) plan.level = Level::high;
+  rate(facts, plan);
+  const double with_s = plan.seconds;
+  plan.level.reset();
+  rate(facts, plan);
+  return with_s - plan.seconds;
+}
+
 EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   EffectsPlan out;
@@ -47,24 +58,20 @@ EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
     const double all = facts.noise.all, kept = facts.noise.left_by(plan.level);
     PlannedEffect noise{
         "noise", all, plan.level ? kept : std::min(kept, all), plan.level.has_value(), level_words(facts, plan), {}};
-    if (facts.choice.cost) {
-      EffectCandidate without = plan;
-      without.level.reset();
-      rate(facts, without);
-      noise.seconds = plan.seconds - without.seconds;
-    }
+    noise.seconds = cost_of_noise(facts, plan);
     add(std::move(noise));
   } else {
     add({"noise", nan, 0, false, level_words(facts, plan), {}});
   }
   if (facts.may_search) {
     add({"hot pixels", facts.sizes.defects, left(plan.defects, facts.sizes.defects), plan.defects,
-         facts.sizes.defects_words, plan.defects ? cost_of(facts, {{CostPart::defects}}) : std::nullopt});
+         facts.sizes.defects_words, cost_of(facts, {{CostPart::defects}})});
   }
   if (facts.may_take_lines) {
     const bool taken = plan.lines && plan.level;
-    add({"row and column noise", facts.sizes.lines, left(taken, facts.sizes.lines), taken, facts.sizes.lines_words,
-         taken ? cost_of(facts, {{CostPart::lines}}) : std::nullopt});
+    add({"row and column noise", facts.sizes.lines, left(taken, facts.sizes.lines), taken,
+         plan.level ? facts.sizes.lines_words : "taken off with the noise or not at all",
+         cost_of(facts, {{CostPart::lines}})});
   }
   if (facts.sizes.dark > 0) {
     const bool used = plan.dark || plan.level;
@@ -73,7 +80,7 @@ EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
   }
   if (facts.display) {
     add({"change for the display", facts.sizes.display, left(plan.display, facts.sizes.display), plan.display,
-         plan.display ? "made" : "left out", plan.display ? cost_of(facts, {{CostPart::display}}) : std::nullopt});
+         plan.display ? "made" : "left out", cost_of(facts, {{CostPart::display}})});
   }
   const bool by_tolerance = facts.choice.tolerance_delta_e && !facts.choice.all && !facts.choice.budget_s;
   if (by_tolerance && plan.level && !facts.level_is_fixed) {

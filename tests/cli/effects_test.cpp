@@ -26,9 +26,9 @@ class EffectsCommand : public test::SimulateCommand {
     keep_speed(0);
   }
   /// @param pace_s  0: it is not looked how busy the machine is
-  void keep_speed(double pace_s) {
+  void keep_speed(double pace_s, const std::string& machine = cli::machine_name()) {
     isp::CostModel model = *test::reference_cost();
-    model.machine = cli::machine_name();
+    model.machine = machine;
     model.threads = cli::threads_of_each(1);
     model.pace_s = pace_s;
     std::filesystem::create_directories(file("cache/lowlux"));
@@ -78,6 +78,23 @@ TEST_F(EffectsCommand, FitABudgetThatIsToldWithThePrediction) {
   EXPECT_NEAR(effects_of({"--budget-mpps", "1.92"})["budget_s"].get<double>(), 0.01, 1e-12);
   const auto told = developed({"--budget-ms", "100000", "--explain"});
   EXPECT_NE(told.out.find("predicted"), std::string::npos) << told.out;
+}
+
+// Also of what is left out; another machine's times are not believed.
+TEST_F(EffectsCommand, TellWhatTheyTakeWithoutABudget) {
+  const Json strict = effects_of({"--tolerance", "0.01"}), loose = effects_of({"--tolerance", "90"});
+  EXPECT_TRUE(strict["pace"].is_null());
+  EXPECT_GT(strict["predicted_s"].get<double>(), loose["predicted_s"].get<double>());
+  EXPECT_EQ(loose["effects"][0]["used"], false);
+  EXPECT_GT(loose["effects"][0]["predicted_s"].get<double>(), 0);
+  EXPECT_DOUBLE_EQ(loose["effects"][0]["predicted_s"].get<double>(), strict["effects"][0]["predicted_s"].get<double>());
+  const std::string told = developed({"--tolerance", "90", "--explain"}).out;
+  EXPECT_NE(told.find("would take"), std::string::npos) << told;
+  EXPECT_NE(told.find("with this machine as it was calibrated"), std::string::npos) << told;
+  keep_speed(0, "another machine");
+  EXPECT_FALSE(cli::known_cost(cli::threads_of_each(1)));
+  EXPECT_TRUE(effects_of({})["predicted_s"].is_null());
+  EXPECT_NE(developed({"--explain"}).out.find("bench --calibrate-cost"), std::string::npos);
 }
 
 TEST_F(EffectsCommand, RefuseWhatCannotBe) {
