@@ -1,6 +1,7 @@
 #include "calib/chart_grid.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -156,9 +157,9 @@ std::optional<ChartGrid> refined(const ChartGrid& start, RgbView<const float> pi
   double best = unevenness(corners, picture);
   if (!std::isfinite(best)) return std::nullopt;
   const double cell_px = std::hypot(corners[1].x - corners[0].x, corners[1].y - corners[0].y) / chart_columns;
-  constexpr double first_step = 0.2, last_step = 0.01;  // cells
-  constexpr int most_rounds = 20;                       // of one step size
-  for (double step = first_step; step >= last_step; step /= 2) {
+  constexpr std::array steps_cells{0.2, 0.1, 0.05, 0.025, 0.0125};
+  constexpr int most_rounds = 20;  // of one step size
+  for (const double step : steps_cells) {
     bool better = true;
     for (int round = 0; better && round < most_rounds; ++round) {
       better = false;
