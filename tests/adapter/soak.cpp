@@ -4,21 +4,16 @@
 //   stage_soak LIBRARY FRAMES SEED
 // Ends with 1 and a line that says why when something is not as predicted: a code, a byte, an allocation, a call of
 // more than two seconds, a thread that is left, memory that grows.
-#include <dirent.h>
-#include <dlfcn.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <thread>
-#include <type_traits>
 #include <utility>
 
+#include "tests/adapter/soak_parts.h"
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/count_malloc.h"
 
@@ -37,64 +32,6 @@ constexpr double most_growth_mib = 64;
 #else
 constexpr double most_growth_mib = 16;
 #endif
-
-#define LOWLUX_FUNCTION(name) decltype(&lowlux_stage_##name) name = nullptr
-struct Functions {
-  LOWLUX_FUNCTION(open);
-  LOWLUX_FUNCTION(configure);
-  LOWLUX_FUNCTION(process);
-  LOWLUX_FUNCTION(reset);
-  LOWLUX_FUNCTION(release);
-  LOWLUX_FUNCTION(last_error);
-};
-#undef LOWLUX_FUNCTION
-
-Functions load(const char* file) {
-  void* const library = dlopen(file, RTLD_NOW | RTLD_LOCAL);
-  if (library == nullptr) std::fprintf(stderr, "%s\n", dlerror()), std::exit(2);
-  Functions f;
-  const auto find = [&](const char* name, auto& function) {
-    function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(dlsym(library, name));
-    if (function == nullptr) std::fprintf(stderr, "%s: no %s\n", file, name), std::exit(2);
-  };
-  find("lowlux_stage_open", f.open);
-  find("lowlux_stage_configure", f.configure);
-  find("lowlux_stage_process", f.process);
-  find("lowlux_stage_reset", f.reset);
-  find("lowlux_stage_release", f.release);
-  find("lowlux_stage_last_error", f.last_error);
-  return f;
-}
-
-/// splitmix64 (Steele, Lea and Flood 2014).
-struct Chance {
-  std::uint64_t state;
-  std::uint64_t next() {
-    std::uint64_t z = (state += 0x9e3779b97f4a7c15U);
-    z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9U;
-    z = (z ^ (z >> 27U)) * 0x94d049bb133111ebU;
-    return z ^ (z >> 31U);
-  }
-  int below(int n) { return static_cast<int>(next() % static_cast<std::uint64_t>(n)); }
-  int from(int low, int high) { return low + below(high - low + 1); }
-  bool one_in(int n) { return below(n) == 0; }
-  double share() { return static_cast<double>(next() >> 11U) * 0x1p-53; }
-};
-
-double resident_mib() {
-  std::ifstream file("/proc/self/statm");
-  double whole = 0, resident = 0;
-  file >> whole >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
-}
-
-int threads_now() {
-  DIR* const tasks = opendir("/proc/self/task");
-  int count = 0;
-  for (const dirent* entry = readdir(tasks); entry != nullptr; entry = readdir(tasks)) count += entry->d_name[0] != '.';
-  closedir(tasks);
-  return count;
-}
 
 class Soak {
  public:
