@@ -10,28 +10,25 @@
 
 #include "isp/bench/gamut_ratio.h"
 #include "isp/model/colour_difference.h"
-#include "isp/model/mesopic.h"
 #include "isp/model/seeing.h"
 #include "isp/model/spectral_divergence.h"
 #include "isp/render/retarget.h"
 #include "isp/render/retarget_rows.h"
 #include "isp/render/retarget_table.h"
 #include "tests/hard_cases/hard_case.h"
-#include "tests/hard_cases/looks.h"
 #include "tests/hard_cases/rendering.h"
 #include "tests/reference/exact_ref.h"
 #include "tests/reference/retarget_ref.h"
 #include "tests/support/sweep.h"
 
-// The state of adaptation, seeing, and what compares colours: section 4 of the sensor model; sections 0, 1, 4 and 5 of
-// the mesopic specification.
+// Seeing, and what compares colours: section 4 of the sensor model; sections 4 and 5 of the mesopic specification.
 namespace lowlux::hard_cases {
 namespace {
 
 using isp::Lab;
 using isp::Xyz;
 
-constexpr std::string_view group = "Colour and light", mesopic = "Mesopic vision";
+constexpr std::string_view group = "Colour and light";
 constexpr std::string_view no_picture = "a measure of pictures, none itself";
 constexpr double eps = std::numeric_limits<double>::epsilon();
 
@@ -39,96 +36,6 @@ void figures_row(const About& about, double bound, const Measure& measure, std::
   HardCase row(about);
   row.on(Path::reference, bound, measure);
   row.none(levels, reason).none(instruction_sets, reason).none(pipelines, reason);
-}
-
-double relative(double found, double expected) {
-  return std::abs(found - expected) / std::max(std::abs(expected), 1e-300);
-}
-
-/// A row of the eye's look, whose grids are made by vector kernels: of a field that is seen as given.
-void look_row(const About& about, const SeenField& field, double bound, const Measure& measure) {
-  HardCase row(about);
-  row.on(Path::reference, bound, measure).none(levels, "looks come after");
-  // Tables of 256 luminances and 32 S/P, and straight lines between cells: night_look_test.cpp.
-  row.on_each_set(0.03, [&](Denormals m) { return look_against_reference(field, m); });
-  row.on(Path::file, 0, [&](Denormals m) { return look_through_file(field, m); });
-  row.on(Path::live, 0, [&](Denormals m) { return look_through_live(field, m); });
-}
-
-constexpr std::string_view look_unit = "m (reference), parts of a grid of 0..1 (sets), wrong codes (file, live)";
-
-TEST(HardCaseMesopic, NoLightAtAll) {
-  look_row({mesopic, "1.1 both luminances 0", "closed form: m = 0, luminance 0, and code 0", look_unit},
-           {.cd_m2 = 1, .rgb = {0, 0, 0}}, 0, [](Denormals m) {
-             const auto state = in_mode(m, [] { return isp::mesopic_state({0, 0}); });
-             return std::abs(state.m) + std::abs(state.luminance_cd_m2);
-           });
-}
-
-// |h| of the answer is below 1e-12 (mesopic.cpp) and dh/dm is -1 or steeper where S/P is above 1.
-TEST(HardCaseMesopic, TheCycleOfTwo) {
-  look_row({mesopic, "1.1 S/P of 18 to 60, where the plain iteration never ends", "root by bisection in 50 digits",
-            look_unit},
-           {.cd_m2 = 0.7, .rgb = {0.02f, 0.3f, 0.9f}, .scotopic_ratio = 25}, 1.1e-12, [](Denormals m) {
-             double worst = 0;
-             for (const double ratio : {18.0, 25.0, 30.0, 50.0, 60.0}) {
-               for (const double light : test::ratios(1e-3, 6, 1.7)) {
-                 const auto state = in_mode(m, [&] { return isp::mesopic_state({light, ratio * light}); });
-                 keep_worst(worst, std::abs(state.m - reference::mes2_root(light, ratio * light)));
-               }
-             }
-             return worst;
-           });
-}
-
-TEST(HardCaseMesopic, ThreeFixedPoints) {
-  look_row({mesopic, "1.1 S/P of 0.05 to 0.26, where there may be three roots",
-            "a + b log10 L - m in 50 digits at the answer, or 0 where it is not positive at 0", look_unit},
-           {.cd_m2 = 0.04, .rgb = {0.9f, 0.3f, 0.0f}, .scotopic_ratio = 0.2}, 1.1e-12, [](Denormals m) {
-             double worst = 0;
-             for (const double ratio : {0.05, 0.1, 0.2, 0.26}) {
-               for (const double light : test::ratios(1e-3, 6, 1.3)) {
-                 const auto state = in_mode(m, [&] { return isp::mesopic_state({light, ratio * light}); });
-                 const bool below = reference::mes2_residual(0, light, ratio * light) <= 0;
-                 const bool above = reference::mes2_residual(1, light, ratio * light) >= 0;
-                 const double expected = below ? 0 : 1;
-                 keep_worst(worst, below || above ? std::abs(state.m - expected)
-                                                  : std::abs(reference::mes2_residual(state.m, light, ratio * light)));
-               }
-             }
-             return worst;
-           });
-}
-
-// By the weights, exactly: three products and two sums.
-TEST(HardCaseMesopic, NegativeScotopicLuminance) {
-  look_row({mesopic, "0.1 saturated reds: negative scotopic luminance",
-            "closed form: 0, and the weighted sum elsewhere", look_unit},
-           {.cd_m2 = 0.3, .rgb = {0.9f, -0.01f, -0.02f}}, 8 * eps, [](Denormals m) {
-             const auto found = [&](const Xyz& c) { return in_mode(m, [&] { return isp::scotopic_luminance(c); }); };
-             double worst = found({1, 0.3, 0}) + found({0.64, 0.33, 0.03});
-             for (const Xyz& c : {Xyz{0.95, 1, 1.09}, {0.2, 0.1, 1}}) {
-               keep_worst(worst, relative(found(c), -1.52356 * c.x + 2.71012 * c.y + 1.09735 * c.z));
-             }
-             return worst;
-           });
-}
-
-TEST(HardCaseMesopic, WardWithoutX) {
-  figures_row(
-      {mesopic, "0.1 Ward's formula where X vanishes", "closed form: the weighted sum from 1e-9 down", "relative"}, eps,
-      [](Denormals m) {
-        double worst = 0;
-        for (const double x : {1e-9, 1e-300, 0.0, -1.0}) {
-          const Xyz c{x, 0.4, 0.7};
-          const auto [ward, sum] = in_mode(m, [&] {
-            return std::pair{isp::scotopic_luminance_ward(c), isp::scotopic_luminance(c)};
-          });
-          keep_worst(worst, relative(ward, sum));
-        }
-        return worst;
-      },
-      no_image);
 }
 
 TEST(HardCaseColour, FrequencyOfSeeingWhereItIsTiny) {

@@ -7,63 +7,69 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <utility>
+#include <vector>
 
-#include "isp/model/appearance/appearance_model.h"
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/live_pipeline.h"
+#include "tests/hard_cases/rec709_camera.h"
 #include "tests/reference/night_look_ref.h"
+#include "tests/reference/raw_to_rgb_ref.h"
 
 namespace lowlux::hard_cases {
 namespace {
 
 constexpr int width = 64, height = 48;
-constexpr double black_dn = 512, range_dn = 15000;
 constexpr std::array<float, 9> as_it_is{1, 0, 0, 0, 1, 0, 0, 0, 1};
-
-RawFrame frame_of(const auto& rgb_at) {
-  RawFrame frame;
-  frame.raw.dn = Plane<std::uint16_t>(width, height);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const double value = rgb_at(x, y)[static_cast<std::size_t>(colour_at(BayerPhase::rggb, x, y))];
-      frame.raw.dn.at(x, y) = static_cast<std::uint16_t>(std::lround(black_dn + range_dn * value));
-    }
-  }
-  frame.raw.active = frame.raw.default_crop = {0, 0, width, height};
-  frame.raw.black_tag = BlackLevel{.pattern_dn = {black_dn}};
-  frame.raw.white_dn.fill(black_dn + range_dn);
-  const Matrix3 xyz_to_srgb{{{3.2406, -1.5372, -0.4986}, {-0.9689, 1.8758, 0.0415}, {0.0557, -0.2040, 1.0570}}};
-  frame.colour.calibrations = {{.cct_k = 6504, .xyz_to_camera = xyz_to_srgb}};
-  frame.colour.as_shot_neutral = Vector3{1, 1, 1};
-  frame.colour.source = CameraColour::Source::file_tags;
-  return frame;
-}
+// Photopic and scotopic luminance of linear Rec. 709, D65 white having Y = 1 (spec 0.1, R3).
+constexpr Vector3 photopic{0.2126, 0.7152, 0.0722}, scotopic{-0.03097, 1.52426, 0.96370};
+constexpr double scotopic_of_white = scotopic[0] + scotopic[1] + scotopic[2];
 
 RawFrame frame_of(const SeenField& field) {
-  return frame_of([&](int, int) { return field.rgb; });
-}
-
-isp::LookChoice eye_at(double cd_m2) {
-  isp::LookChoice look{.look = isp::Look::eye, .scene_luminance_cd_m2 = cd_m2};
-  look.which = isp::LookChoice::Which::listed;
-  return look;
+  return rec709_frame(
+      width, height, [&](int, int) { return field.rgb; }, field.light);
 }
 
 isp::NightLook rec709_look(const SeenField& field) {
   isp::NightLook look;
   look.cd_m2_per_unit = field.cd_m2;
-  look.scotopic_ratio_of_white = field.scotopic_ratio;
-  look.luminance = {0.2126f, 0.7152f, 0.0722f};
-  look.rods = {-0.0126f, 0.6204f, 0.3922f};
-  for (int c = 0; c < 3; ++c) look.tint[c] = static_cast<float>(isp::rod_tint[c]);
+  look.scotopic_ratio_of_white = -1.52356 * field.light.x + 2.71012 * field.light.y + 1.09735 * field.light.z;
+  for (int c = 0; c < 3; ++c) {
+    look.luminance[c] = static_cast<float>(photopic[c]);
+    look.rods[c] = static_cast<float>(scotopic[c] / scotopic_of_white);
+    look.tint[c] = static_cast<float>(isp::rod_tint[c]);
+  }
   return look;
 }
 
-}  // namespace
+double luminance_of(const SeenField& field) {
+  double y = 0;
+  for (int c = 0; c < 3; ++c) y += photopic[c] * static_cast<double>(field.rgb[c]);
+  return y;
+}
 
-double look_against_reference(const SeenField& field, Denormals mode) {
+/// Every effect that has a size, the field being as bright as it is; of black, white is told.
+isp::LookChoice eye_on(const SeenField& field) {
+  isp::LookChoice look{.look = isp::Look::eye,
+                       .scene_luminance_cd_m2 = field.cd_m2 * std::max(luminance_of(field), 1e-6)};
+  look.which = isp::LookChoice::Which::listed;
+  return look;
+}
+
+/// The field, as an eye adapted to it sees it: every pixel alike.
+reference::Rgb seen_of(const SeenField& field) {
+  CameraRgb camera(width / LookGrid::cell, height / LookGrid::cell);
+  for (int c = 0; c < 3; ++c) std::fill_n(camera.plane[c].data(), camera.plane[c].size(), field.rgb[c]);
+  isp::NightLook look = rec709_look(field);
+  look.pixels_per_degree = width / isp::LookChoice{}.field_of_view_deg;
+  look.dark = 1e-5f;  // the least of a look: an even frame shows no noise
+  std::vector<Plane<float>> memory;
+  const auto parts = reference::night_look(std::as_const(camera).view(), as_it_is, 1, look);
+  const LookGrid grid = reference::look_grid(parts, look, memory);
+  return reference::seen({field.rgb[0], field.rgb[1], field.rgb[2]}, grid, width / 2, height / 2);
+}
+
+double error_of_grid(const SeenField& field, Denormals mode) {
   CameraRgb camera(width, height);
   for (int c = 0; c < 3; ++c) {
     for (int y = 0; y < height; ++y) {
@@ -88,33 +94,30 @@ double look_against_reference(const SeenField& field, Denormals mode) {
   return worst;
 }
 
-double look_through_file(const SeenField& field, Denormals mode) {
+double error_of_file(const SeenField& field, Denormals mode) {
   isp::DevelopOptions options{.exposure_ev = 0,
                               .tone = isp::ToneCurve::none,
                               .space = OutputSpace::linear_srgb,
                               .samples = SampleType::f32,
                               .find_defects = false};
-  options.look = eye_at(field.cd_m2);
+  options.look = eye_on(field);
   PoolExecutor pool(2);
   test::ExecutorInMode executor(pool, mode);
   const auto developed = in_mode(mode, [&, frame = frame_of(field)] { return isp::develop(frame, options, executor); });
   EXPECT_TRUE(developed) << developed.error().message;
   if (!developed) return NAN;
-  const bool black = *std::max_element(field.rgb.begin(), field.rgb.end()) == 0;
-  double wrong = 0;
-  for (const Plane<float>& plane : std::get<SceneLinear>(developed->picture).plane) {
-    const auto expected = black ? 0.0 : static_cast<double>(plane.at(0, 0));
+  const reference::Rgb expected = seen_of(field);
+  double worst = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const Plane<float>& plane = std::get<SceneLinear>(developed->picture).plane[c];
     for (std::size_t i = 0; i < plane.size(); ++i) {
-      wrong += std::abs(static_cast<double>(plane.data()[i]) - expected) <= 1e-5 ? 0 : 1;
+      keep_worst(worst, std::abs(static_cast<double>(plane.data()[i]) - expected[c]));
     }
   }
-  return wrong;
+  return worst;
 }
 
-double look_through_live(const SeenField& field, Denormals mode) {
-  const RawFrame frame = frame_of(field);
-  isp::DevelopOptions options{.exposure_ev = 0, .find_defects = false};
-  options.look = eye_at(field.cd_m2);
+isp::LiveSetup setup_of(const RawFrame& frame, const isp::LookChoice& look) {
   isp::LiveSetup setup;
   setup.format = {.bits = 14, .phase = frame.raw.phase};
   setup.width = width;
@@ -122,62 +125,77 @@ double look_through_live(const SeenField& field, Denormals mode) {
   setup.active = frame.raw.active;
   setup.white_dn = frame.raw.white_dn[0];
   setup.colour = frame.colour;
-  setup.look = options.look;
-  isp::LiveFacts facts{.black_dn = PerSite<double>{black_dn, black_dn, black_dn, black_dn}};
-  facts.neutral = frame.colour.as_shot_neutral;
-  facts.exposure_ev = 0;
-  facts.scene_luminance_cd_m2 = field.cd_m2;
-  facts.denoise.mode = isp::LiveDenoise::Mode::off;
-  PoolExecutor pool(2);
-  test::ExecutorInMode executor(pool, mode);
-  return in_mode(mode, [&] {
-    const auto developed = isp::develop(frame, options, executor);
-    auto live = isp::LivePipeline::make(setup, executor);
-    EXPECT_TRUE(developed && live);
-    if (!developed || !live) return double{NAN};
-    const std::span dn(frame.raw.dn.data(), frame.raw.dn.size());
-    (*live)->read(std::as_bytes(dn), 2 * width, facts, true);
-    EXPECT_TRUE((*live)->plan(facts));
-    struct Count {
-      PlaneView<const std::uint8_t> expected;
-      std::array<double, 2> wrong{};  // of the threads
-    } count{std::get<Encoded8>(developed->picture).codes.view(), {}};
-    (*live)->render({[](void* context, int thread, int y, const std::uint8_t* rgb, int pixels) {
-                       auto& c = *static_cast<Count*>(context);
-                       for (int i = 0; i < 3 * pixels; ++i) c.wrong[thread] += rgb[i] == c.expected.at(i, y) ? 0 : 1;
-                     },
-                     &count});
-    return count.wrong[0] + count.wrong[1];
-  });
+  setup.tone = isp::ToneCurve::none;
+  setup.look = look;
+  return setup;
 }
 
-double models_through_file(Denormals mode) {
-  const RawFrame frame = frame_of([](int x, int y) -> std::array<double, 3> {
-    constexpr std::array<std::array<double, 3>, 4> fields{
-        {{0, 0, 0}, {-0.02, -0.01, -0.03}, {1, 1, 1}, {0.8, 0.01, 0}}};
-    return fields[static_cast<std::size_t>(2 * (y / 24) + x / 32)];
-  });
-  isp::DevelopOptions options{.exposure_ev = 0,
-                              .tone = isp::ToneCurve::none,
-                              .space = OutputSpace::linear_srgb,
-                              .samples = SampleType::f32,
-                              .find_defects = false};
-  options.look.look = isp::Look::model;
-  options.look.scene_luminance_cd_m2 = 0.05;
+isp::LiveFacts facts_of(const RawFrame& frame, const isp::LookChoice& look) {
+  isp::LiveFacts facts;
+  facts.black_dn.emplace().fill(rec709_black_dn);
+  facts.neutral = frame.colour.as_shot_neutral;
+  facts.exposure_ev = 0;
+  facts.scene_luminance_cd_m2 = look.scene_luminance_cd_m2;
+  facts.denoise.mode = isp::LiveDenoise::Mode::off;
+  return facts;
+}
+
+/// A picture that a stream left in codes.
+Plane<std::uint8_t> codes_of(const RawFrame& frame, const isp::LookChoice& look, Denormals mode) {
+  const isp::LiveFacts facts = facts_of(frame, look);
   PoolExecutor pool(2);
   test::ExecutorInMode executor(pool, mode);
-  double wrong = 0;
-  for (const isp::AppearanceModel& model : isp::appearance_models()) {
-    options.look.model = std::string(model.name);
-    const auto developed = in_mode(mode, [&] { return isp::develop(frame, options, executor); });
-    EXPECT_TRUE(developed) << developed.error().message;
-    if (!developed) return NAN;
-    for (const Plane<float>& plane : std::get<SceneLinear>(developed->picture).plane) {
-      wrong += static_cast<double>(
-          std::count_if(plane.data(), plane.data() + plane.size(), [](float v) { return !std::isfinite(v); }));
+  Plane<std::uint8_t> codes;
+  in_mode(mode, [&] {
+    auto live = isp::LivePipeline::make(setup_of(frame, look), executor);
+    EXPECT_TRUE(live) << live.error().message;
+    if (!live) return;
+    (*live)->read(std::as_bytes(std::span(frame.raw.dn.data(), frame.raw.dn.size())), 2 * width, facts, true);
+    EXPECT_TRUE((*live)->plan(facts));
+    codes = Plane<std::uint8_t>(3 * width, height);
+    (*live)->render({[](void* context, int, int y, const std::uint8_t* rgb, int pixels) {
+                       std::copy_n(rgb, 3 * pixels, static_cast<Plane<std::uint8_t>*>(context)->row(y));
+                     },
+                     &codes});
+  });
+  return codes;
+}
+
+double error_of_live(const SeenField& field, Denormals mode) {
+  const Plane<std::uint8_t> codes = codes_of(frame_of(field), eye_on(field), mode);
+  if (codes.size() == 0) return NAN;
+  const reference::Rgb shown = reference::moved_into_gamut(seen_of(field), rec709_look(field).luminance);
+  double worst = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < 3 * width; ++x) {
+      const double expected = 255 * reference::srgb_encoded(shown[static_cast<std::size_t>(x % 3)]);
+      keep_worst(worst, std::abs(codes.at(x, y) - expected));
     }
   }
-  return wrong;
+  return worst;
+}
+
+double worst_of(std::span<const SeenField> fields, Denormals mode, double (*error)(const SeenField&, Denormals)) {
+  double worst = 0;
+  for (SeenField field : fields) {
+    field.rgb = in_codes(field.rgb);
+    keep_worst(worst, error(field, mode));
+  }
+  return worst;
+}
+
+}  // namespace
+
+double look_against_reference(std::span<const SeenField> fields, Denormals mode) {
+  return worst_of(fields, mode, error_of_grid);
+}
+
+double look_through_file(std::span<const SeenField> fields, Denormals mode) {
+  return worst_of(fields, mode, error_of_file);
+}
+
+double look_through_live(std::span<const SeenField> fields, Denormals mode) {
+  return worst_of(fields, mode, error_of_live);
 }
 
 }  // namespace lowlux::hard_cases

@@ -1,29 +1,28 @@
 #pragma once
 
-#include <array>
+#include <span>
 
+#include "isp/model/colorimetry.h"
 #include "tests/hard_cases/hard_case.h"
+#include "tests/hard_cases/rec709_camera.h"
 
-/// What the eye's look and the models of appearance make of frames.
+/// What the eye's look makes of frames.
 namespace lowlux::hard_cases {
 
-/// A field in linear Rec. 709, white 1, under some luminance of white.
+/// An even field in linear Rec. 709, white 1, under some light.
 struct SeenField {
-  double cd_m2 = 1;
-  std::array<float, 3> rgb{};
-  double scotopic_ratio = 2.46;  // S/P of white
+  double cd_m2 = 1;  // luminance of white
+  Rec709 rgb{};
+  isp::Xyz light{0.95047, 1, 1.08883};  // of white, as it is in the scene; a camera sees it as 1, 1, 1
 };
 
 /// Largest difference of the parts of a grid from those in plain double; the field fades across the picture.
-double look_against_reference(const SeenField& field, Denormals mode);
+double look_against_reference(std::span<const SeenField> fields, Denormals mode);
 
-/// Pixels of a developed even field that are no numbers or not like the first one, to 1e-5; of black, not black.
-double look_through_file(const SeenField& field, Denormals mode);
+/// Largest difference of developed fields, without a tone curve, from what the look in plain double makes of them.
+double look_through_file(std::span<const SeenField> fields, Denormals mode);
 
-/// Codes of a stream of it that are not those of the developed file.
-double look_through_live(const SeenField& field, Denormals mode);
-
-/// Values that are no numbers in pictures of black, negative, saturated and coloured fields by every model.
-double models_through_file(Denormals mode);
+/// The same of streams in 8-bit codes, without rounding those expected.
+double look_through_live(std::span<const SeenField> fields, Denormals mode);
 
 }  // namespace lowlux::hard_cases

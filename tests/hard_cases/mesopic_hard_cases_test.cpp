@@ -1,0 +1,165 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "isp/model/mesopic.h"
+#include "tests/hard_cases/hard_case.h"
+#include "tests/hard_cases/looks.h"
+#include "tests/hard_cases/rec709_camera.h"
+#include "tests/reference/exact_ref.h"
+#include "tests/support/sweep.h"
+
+// The state of adaptation: sections 0 and 1 of the mesopic specification.
+namespace lowlux::hard_cases {
+namespace {
+
+using isp::Xyz;
+
+constexpr std::string_view group = "Mesopic vision";
+constexpr double eps = std::numeric_limits<double>::epsilon();
+
+double relative(double found, double expected) {
+  return std::abs(found - expected) / std::max(std::abs(expected), 1e-300);
+}
+
+constexpr std::string_view look_unit = "m (reference), parts of a grid of 0..1 (sets), of white (file), codes (live)";
+struct LookBounds {
+  // Tables of 256 luminances and 32 S/P, and straight lines between cells: night_look_test.cpp.
+  double sets = 0.03;
+  double file = 1.0 / 255;  // a code of 8 bits
+  double live = 1 + 0.6;    // the same beyond rounding and the table of tone.h
+};
+
+/// The columns of the eye's look: fields as they come, and through grids that vector kernels make.
+void measure_look(HardCase& row, const std::vector<SeenField>& fields, const LookBounds& bounds = {}) {
+  row.none(levels, "looks come after");
+  row.on_each_set(bounds.sets, [&](Denormals m) { return look_against_reference(fields, m); });
+  row.on(Path::file, bounds.file, [&](Denormals m) { return look_through_file(fields, m); });
+  row.on(Path::live, bounds.live, [&](Denormals m) { return look_through_live(fields, m); });
+}
+
+/// A row of figures that no image is made of.
+void figures_row(const About& about, double bound, const Measure& measure, std::string_view reason = no_image) {
+  HardCase row(about);
+  row.on(Path::reference, bound, measure);
+  row.none(levels, reason).none(instruction_sets, reason).none(pipelines, reason);
+}
+
+constexpr Xyz daylight{0.95047, 1, 1.08883};
+constexpr Xyz blue_light{1.9, 1, 11.2};    // S/P 12.1
+constexpr Xyz amber_light{1.66, 1, 0.02};  // S/P 0.203
+
+TEST(HardCaseMesopic, NoLightAtAll) {
+  HardCase row({group, "1.1 both luminances 0", "closed form: m = 0, luminance 0, and black", look_unit});
+  row.on(Path::reference, 0, [](Denormals m) {
+    const auto state = in_mode(m, [] { return isp::mesopic_state({0, 0}); });
+    return std::abs(state.m) + std::abs(state.luminance_cd_m2);
+  });
+  measure_look(row, {{1, {0, 0, 0}, daylight}}, {.file = 0, .live = 0});
+}
+
+// |h| of the answer is below 1e-12 (mesopic.cpp) and dh/dm is -1 or steeper where S/P is above 1.
+TEST(HardCaseMesopic, TheCycleOfTwo) {
+  HardCase row({group, "1.1 S/P of 18 to 60, where the plain iteration never ends",
+                "root by bisection in 50 digits (reference); the look in plain double and its formula (others)",
+                look_unit});
+  row.on(Path::reference, 1.1e-12, [](Denormals m) {
+    double worst = 0;
+    for (const double ratio : {18.0, 25.0, 30.0, 50.0, 60.0}) {
+      for (const double light : test::ratios(1e-3, 6, 1.7)) {
+        const auto state = in_mode(m, [&] { return isp::mesopic_state({light, ratio * light}); });
+        keep_worst(worst, std::abs(state.m - reference::mes2_root(light, ratio * light)));
+      }
+    }
+    return worst;
+  });
+  // S/P of 23 and 56; luminances of 0.02, 0.2 and 1.5 cd/m2.
+  constexpr Rec709 azure{0.02f, 0.3f, 0.9f}, blue{0, 0.02f, 0.9f};
+  measure_look(row, {{0.07, azure, blue_light},
+                     {0.7, azure, blue_light},
+                     {5, azure, blue_light},
+                     {0.25, blue, blue_light},
+                     {2.5, blue, blue_light},
+                     {19, blue, blue_light}});
+}
+
+TEST(HardCaseMesopic, ThreeFixedPoints) {
+  figures_row(
+      {group, "1.1 S/P of 0.05 to 0.26, where there may be three roots",
+       "a + b log10 L - m in 50 digits at the answer, or 0 where it is not positive at 0", "m"},
+      1.1e-12,
+      [](Denormals m) {
+        double worst = 0;
+        for (const double ratio : {0.05, 0.1, 0.2, 0.26}) {
+          for (const double light : test::ratios(1e-3, 6, 1.3)) {
+            const auto state = in_mode(m, [&] { return isp::mesopic_state({light, ratio * light}); });
+            const bool below = reference::mes2_residual(0, light, ratio * light) <= 0;
+            const bool above = reference::mes2_residual(1, light, ratio * light) >= 0;
+            const double expected = below ? 0 : 1;
+            keep_worst(worst, below || above ? std::abs(state.m - expected)
+                                             : std::abs(reference::mes2_residual(state.m, light, ratio * light)));
+          }
+        }
+        return worst;
+      },
+      "looks hold their fields at 0.27: see the next row");
+}
+
+// A lookup of m is off by 0.02 where m leaves 0 (spec 1.2). There the share of the rods falls 1 / (v0 S/P) = 12.3 times
+// as fast under this light: by 0.25, a quarter of what rods and cones differ by in orange, 0.23. Its channels keep a
+// fifth of their distance, and codes rise by at most 257 over the light that is left.
+TEST(HardCaseMesopic, FieldsOfALookAreHeldAboveTheThreeFixedPoints) {
+  HardCase row({group, "1.1 looks under lights of S/P 0.2, whose fields are held at 0.27",
+                "the look in plain double, and its formula", look_unit});
+  row.none(Path::reference, "is the oracle");
+  // Luminances of 0.01 to 0.2 cd/m2; at 0.0186 the table of m is farthest off.
+  constexpr Rec709 grey{0.5f, 0.5f, 0.5f}, orange{0.9f, 0.3f, 0};
+  measure_look(row,
+               {{0.02, grey, amber_light},
+                {0.0372, grey, amber_light},
+                {0.4, grey, amber_light},
+                {0.0458, orange, amber_light},
+                {0.1, orange, amber_light}},
+               {.sets = 0.25, .file = 0.07, .live = 257 * 0.07 + 0.6});
+}
+
+// By the weights, exactly: three products and two sums.
+TEST(HardCaseMesopic, NegativeScotopicLuminance) {
+  HardCase row({group, "0.1 saturated reds: negative scotopic luminance",
+                "closed form: 0, and the weighted sum elsewhere (reference); the look in plain double and its formula "
+                "(others)",
+                look_unit});
+  row.on(Path::reference, 8 * eps, [](Denormals m) {
+    const auto found = [&](const Xyz& c) { return in_mode(m, [&] { return isp::scotopic_luminance(c); }); };
+    double worst = found({1, 0.3, 0}) + found({0.64, 0.33, 0.03});
+    for (const Xyz& c : {Xyz{0.95, 1, 1.09}, {0.2, 0.1, 1}}) {
+      keep_worst(worst, relative(found(c), -1.52356 * c.x + 2.71012 * c.y + 1.09735 * c.z));
+    }
+    return worst;
+  });
+  measure_look(row, {{0.3, {0.9f, -0.01f, -0.02f}, daylight}, {0.01, {0.9f, 0, 0}, daylight}});
+}
+
+TEST(HardCaseMesopic, WardWithoutX) {
+  figures_row(
+      {group, "0.1 Ward's formula where X vanishes", "closed form: the weighted sum from 1e-9 down", "relative"}, eps,
+      [](Denormals m) {
+        double worst = 0;
+        for (const double x : {1e-9, 1e-300, 0.0, -1.0}) {
+          const Xyz c{x, 0.4, 0.7};
+          const auto [ward, sum] = in_mode(m, [&] {
+            return std::pair{isp::scotopic_luminance_ward(c), isp::scotopic_luminance(c)};
+          });
+          keep_worst(worst, relative(ward, sum));
+        }
+        return worst;
+      });
+}
+
+}  // namespace
+}  // namespace lowlux::hard_cases
