@@ -12,10 +12,8 @@
 #include "isp/model/appearance/hunt.h"
 #include "isp/model/appearance/icam06.h"
 #include "isp/model/appearance/khan_pattanaik.h"
-#include "isp/model/appearance/kirk_obrien.h"
 #include "isp/model/appearance/kwak.h"
 #include "isp/model/appearance/mikamo.h"
-#include "isp/model/appearance/shin.h"
 #include "isp/model/appearance/wanat_mantiuk.h"
 #include "isp/model/mesopic.h"
 #include "tests/hard_cases/hard_case.h"
@@ -35,74 +33,62 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double inf = std::numeric_limits<double>::infinity();
 const Matrix3 srgb_to_xyz{{{0.4124, 0.3576, 0.1805}, {0.2126, 0.7152, 0.0722}, {0.0193, 0.1192, 0.9505}}};
 
-constexpr std::string_view through_tables = "pictures go through a table of the model: see tables of models";
-constexpr std::string_view no_models = "streams have the look of the camera or the eye";
-
 double relative(double found, double expected) {
   return std::abs(found - expected) / std::max(std::abs(expected), 1e-300);
 }
 
-/// A row of a model's figures for one colour.
-void figures_row(const About& about, double bound, const Measure& measure) {
-  HardCase row(about);
-  row.on(Path::reference, bound, measure);
-  row.none(levels, "looks come after").none(instruction_sets, through_tables).none(Path::file, through_tables);
-  row.none(Path::live, no_models);
-}
-
 TEST(HardCaseMesopic, HuntsRodSignal) {
-  figures_row({group, "2.1 Hunt: L_AS of 1e-9 to 1e4, none, below 1600 K, S below 0",
-               "50 digits; 1 - j^2 cancels to 4 eps / (2 u / 1e-5), to the fourth", "relative to 64 eps"},
-              1, [](Denormals m) {
-                const auto found = [&](double l_as, double s) {
-                  return in_mode(m, [&] { return isp::rod_signal(isp::rod_adaptation(l_as), s); });
-                };
-                double worst = std::abs(found(0, 1) - 0.3) + std::abs(found(1, -3) - 0.3);
-                for (const double l_as : test::ratios(1e-9, 1e4, 10)) {
-                  for (const double s : {1e-6, 0.2, 1.0, 10.0}) {
-                    keep_worst(worst, relative(found(l_as, s), reference::hunt_rod_signal(l_as, s)) / (64 * eps));
-                  }
+  model_row({group, "2.1 Hunt: L_AS of 1e-9 to 1e4, none, below 1600 K, S below 0",
+             "50 digits; 1 - j^2 cancels to 4 eps / (2 u / 1e-5), to the fourth", "relative to 64 eps"},
+            1, [](Denormals m) {
+              const auto found = [&](double l_as, double s) {
+                return in_mode(m, [&] { return isp::rod_signal(isp::rod_adaptation(l_as), s); });
+              };
+              double worst = std::abs(found(0, 1) - 0.3) + std::abs(found(1, -3) - 0.3);
+              for (const double l_as : test::ratios(1e-9, 1e4, 10)) {
+                for (const double s : {1e-6, 0.2, 1.0, 10.0}) {
+                  keep_worst(worst, relative(found(l_as, s), reference::hunt_rod_signal(l_as, s)) / (64 * eps));
                 }
-                return worst + in_mode(m, [] { return isp::scotopic_adaptation(2, 1500); });
-              });
+              }
+              return worst + in_mode(m, [] { return isp::scotopic_adaptation(2, 1500); });
+            });
 }
 
 TEST(HardCaseMesopic, KwaksPower) {
-  figures_row(
-      {group, "2.2 Kwak: cones from -100 to 1e9, odd", "50 digits; power 0.42 of a double", "relative to 16 eps"}, 1,
-      [](Denormals m) {
-        double worst = 0;
-        for (const double cone : {-100.0, -1e-9, 0.0, 1e-30, 1e-9, 1.0, 100.0, 1e9}) {
-          const double found = in_mode(m, [&] { return isp::ciecam02_response(0.3, cone); });
-          const double expected = reference::ciecam02_response(0.3, cone);
-          keep_worst(worst, expected == 0 ? std::abs(found) : relative(found, expected) / (16 * eps));
-        }
-        const double dark = in_mode(m, [] { return isp::kwak_lightness(-1, 1, 0.2, 0.69); });
-        return worst + std::abs(dark);
-      });
+  model_row({group, "2.2 Kwak: cones from -100 to 1e9, odd", "50 digits; power 0.42 of a double", "relative to 16 eps"},
+            1, [](Denormals m) {
+              double worst = 0;
+              for (const double cone : {-100.0, -1e-9, 0.0, 1e-30, 1e-9, 1.0, 100.0, 1e9}) {
+                const double found = in_mode(m, [&] { return isp::ciecam02_response(0.3, cone); });
+                const double expected = reference::ciecam02_response(0.3, cone);
+                keep_worst(worst, expected == 0 ? std::abs(found) : relative(found, expected) / (16 * eps));
+              }
+              const double dark = in_mode(m, [] { return isp::kwak_lightness(-1, 1, 0.2, 0.69); });
+              return worst + std::abs(dark);
+            });
 }
 
 TEST(HardCaseMesopic, KhansResponseAndItsInverse) {
-  figures_row({group, "2.3 Khan: intensities of 1e-12 to 1e3, none, and back", "50 digits, and the intensity itself",
-               "relative to 256 eps"},
-              1, [](Denormals m) {
-                const auto rods = in_mode(m, [] { return isp::khan_rods(0.03); });
-                double worst = std::abs(in_mode(m, [&] { return isp::khan_response(rods, -1); }));
-                for (const double i : test::ratios(1e-12, 1e3, 10)) {
-                  const double r = in_mode(m, [&] { return isp::khan_response(rods, i); });
-                  keep_worst(worst, relative(r, reference::pattanaik_rods(0.03, i)) / (256 * eps));
-                  // Near B an error of the response is B / (B - R) times that of the intensity, over n.
-                  const double steep = 1 / (0.73 * (1 - r / rods.bleaching));
-                  const double back = in_mode(m, [&] { return isp::khan_intensity(rods, r); });
-                  keep_worst(worst, relative(back, i) / (256 * eps * steep));
-                }
-                return worst;
-              });
+  model_row({group, "2.3 Khan: intensities of 1e-12 to 1e3, none, and back", "50 digits, and the intensity itself",
+             "relative to 256 eps"},
+            1, [](Denormals m) {
+              const auto rods = in_mode(m, [] { return isp::khan_rods(0.03); });
+              double worst = std::abs(in_mode(m, [&] { return isp::khan_response(rods, -1); }));
+              for (const double i : test::ratios(1e-12, 1e3, 10)) {
+                const double r = in_mode(m, [&] { return isp::khan_response(rods, i); });
+                keep_worst(worst, relative(r, reference::pattanaik_rods(0.03, i)) / (256 * eps));
+                // Near B an error of the response is B / (B - R) times that of the intensity, over n.
+                const double steep = 1 / (0.73 * (1 - r / rods.bleaching));
+                const double back = in_mode(m, [&] { return isp::khan_intensity(rods, r); });
+                keep_worst(worst, relative(back, i) / (256 * eps * steep));
+              }
+              return worst;
+            });
 }
 
 // Conditions of 15 to 17 twice, and three products.
 TEST(HardCaseMesopic, CaosMatricesThereAndBack) {
-  figures_row(
+  model_row(
       {group, "2.4 Cao: 1e-4 to 100 cd/m2 and back, condition 17", "closed form: the identity", "largest element off"},
       17 * 17 * 8 * eps, [](Denormals m) {
         const auto receptors = isp::cao_receptors(srgb_to_xyz, isp::scotopic_weights);
@@ -120,91 +106,48 @@ TEST(HardCaseMesopic, CaosMatricesThereAndBack) {
 }
 
 TEST(HardCaseMesopic, WanatsExponentAndLuminance) {
-  figures_row({group, "2.5 Wanat: no light, negative channels, exponents held to 0..4", "closed form: luminance stays",
-               "relative to 16 eps"},
-              1, [](Denormals m) {
-                const Vector3 weights{0.2126, 0.7152, 0.0722};
-                double worst = 0;
-                for (const auto& light :
-                     {std::pair{1e9, 1e-12}, {1e-12, 1e9}, {0.0, 0.0}, {0.0, 1.0}, {1.0, 0.0}, {0.1, 100.0}}) {
-                  const double e = in_mode(m, [&] { return isp::wanat_exponent(light.first, light.second); });
-                  if (!(e >= 0 && e <= 4)) return inf;
-                  for (const Vector3& rgb :
-                       {Vector3{0.6, 0.3, 0.1}, {0.6, -0.05, 0.1}, {-0.3, -0.2, 0.1}, {1e-30, 1e-30, 2e-30}}) {
-                    const Vector3 out = in_mode(m, [&] { return isp::wanat_saturated(rgb, e, weights); });
-                    const auto luminance = [&](const Vector3& c) {
-                      return weights[0] * c[0] + weights[1] * c[1] + weights[2] * c[2];
-                    };
-                    keep_worst(worst, relative(luminance(out), luminance(rgb)) / (16 * eps));
-                  }
-                  const Vector3 black = in_mode(m, [&] { return isp::wanat_saturated({0, 0, 0}, e, weights); });
-                  keep_worst(worst, std::abs(black[0]) + std::abs(black[1]) + std::abs(black[2]));
+  model_row({group, "2.5 Wanat: no light, negative channels, exponents held to 0..4", "closed form: luminance stays",
+             "relative to 16 eps"},
+            1, [](Denormals m) {
+              const Vector3 weights{0.2126, 0.7152, 0.0722};
+              double worst = 0;
+              for (const auto& light :
+                   {std::pair{1e9, 1e-12}, {1e-12, 1e9}, {0.0, 0.0}, {0.0, 1.0}, {1.0, 0.0}, {0.1, 100.0}}) {
+                const double e = in_mode(m, [&] { return isp::wanat_exponent(light.first, light.second); });
+                if (!(e >= 0 && e <= 4)) return inf;
+                for (const Vector3& rgb :
+                     {Vector3{0.6, 0.3, 0.1}, {0.6, -0.05, 0.1}, {-0.3, -0.2, 0.1}, {1e-30, 1e-30, 2e-30}}) {
+                  const Vector3 out = in_mode(m, [&] { return isp::wanat_saturated(rgb, e, weights); });
+                  const auto luminance = [&](const Vector3& c) {
+                    return weights[0] * c[0] + weights[1] * c[1] + weights[2] * c[2];
+                  };
+                  keep_worst(worst, relative(luminance(out), luminance(rgb)) / (16 * eps));
                 }
-                return worst;
-              });
-}
-
-TEST(HardCaseMesopic, KirksNegativeCones) {
-  figures_row({group, "2.6 Kirk: the RGB cube to -100 Td, gain held", "finite, and gains of 1000 at most",
-               "answers that are not"},
-              0, [](Denormals m) {
-                double wrong = 0;
-                for (const double l : test::steps(-100, 100, 12.5)) {
-                  for (const double s : test::steps(-100, 100, 12.5)) {
-                    const auto gain = in_mode(m, [&] { return isp::kirk_opponent_gain({{l, -l, s}, 1}); });
-                    const Vector3 change = in_mode(m, [&] { return isp::kirk_cone_change(gain); });
-                    for (int i = 0; i < 3; ++i) wrong += std::isfinite(change[i]) && gain.gain[i] <= 1000 ? 0 : 1;
-                  }
-                }
-                return wrong;
-              });
-}
-
-isp::ShinCoefficients shin_at(double e) { return isp::shin_coefficients(isp::shin_substitute(), e); }
-
-// The smallest coefficient kept is 0.05: condition 20, 4.6 of the cones, a root to 1e-14.
-TEST(HardCaseMesopic, ShinForwardAndInverse) {
-  figures_row(
-      {group, "2.7, 4 Shin: 1e-3 to 1000 lx and back, reds, Y' below 0", "closed form: the colour itself",
-       "relative to white"},
-      1e-12, [](Denormals m) {
-        const isp::ShinEye eye = isp::shin_eye({});
-        double worst = 0;
-        for (const double e : {1e-3, 0.01, 0.1, 1.0, 7.0, 250.0, 1000.0}) {
-          for (const Vector3& rgb : {Vector3{0.5, 0.2, 0.1}, {1, 0, 0}, {0, 0, 1}, {1, 1, 1}, {1e-6, 1e-6, 1e-6}}) {
-            const Xyz c = isp::xyz_of(srgb_to_xyz * rgb);
-            const auto back =
-                in_mode(m, [&] { return isp::shin_inverse(isp::shin_forward(c, shin_at(e), eye), shin_at(e), eye); });
-            if (!back.exact && e >= 0.01) return inf;  // below, alpha is less than what the inverse keeps
-            if (!back.exact) continue;
-            const double off =
-                std::max({std::abs(back.colour.x - c.x), std::abs(back.colour.y - c.y), std::abs(back.colour.z - c.z)});
-            keep_worst(worst, off);
-          }
-        }
-        return worst;
-      });
+                const Vector3 black = in_mode(m, [&] { return isp::wanat_saturated({0, 0, 0}, e, weights); });
+                keep_worst(worst, std::abs(black[0]) + std::abs(black[1]) + std::abs(black[2]));
+              }
+              return worst;
+            });
 }
 
 TEST(HardCaseMesopic, MikamoInTheDark) {
-  figures_row(
-      {group, "2.8 Mikamo: 0 Td, powers of 0", "closed form: the coefficients of 1e-4 Td", "largest difference"}, 0,
-      [](Denormals m) {
-        const auto zero = in_mode(m, [] { return isp::mikamo_coefficients(0); });
-        const auto least = in_mode(m, [] { return isp::mikamo_coefficients(1e-4); });
-        double worst = 0;
-        for (int i = 0; i < 3; ++i) {
-          keep_worst(worst, std::abs(zero.shift_nm[i] - least.shift_nm[i]));
-          keep_worst(worst, std::abs(zero.red_green[i] - least.red_green[i]));
-          keep_worst(worst, std::abs(zero.blue_yellow[i] - least.blue_yellow[i]));
-        }
-        return worst;
-      });
+  model_row({group, "2.8 Mikamo: 0 Td, powers of 0", "closed form: the coefficients of 1e-4 Td", "largest difference"},
+            0, [](Denormals m) {
+              const auto zero = in_mode(m, [] { return isp::mikamo_coefficients(0); });
+              const auto least = in_mode(m, [] { return isp::mikamo_coefficients(1e-4); });
+              double worst = 0;
+              for (int i = 0; i < 3; ++i) {
+                keep_worst(worst, std::abs(zero.shift_nm[i] - least.shift_nm[i]));
+                keep_worst(worst, std::abs(zero.red_green[i] - least.red_green[i]));
+                keep_worst(worst, std::abs(zero.blue_yellow[i] - least.blue_yellow[i]));
+              }
+              return worst;
+            });
 }
 
 // Compression by the power 0.7 of what is near its floor: an error of R is that of I times R / (0.7 I).
 TEST(HardCaseMesopic, Icam06AndBack) {
-  figures_row(
+  model_row(
       {group, "2.9 iCAM06: white of 1e-6 to 1e4 cd/m2 and back", "closed form: the colour itself", "relative to white"},
       1e-9, [](Denormals m) {
         double worst = 0;
@@ -224,26 +167,26 @@ TEST(HardCaseMesopic, Icam06AndBack) {
 
 // The fit stops at a gradient of 1e-10 (spec 3.2).
 TEST(HardCaseMesopic, EntropyOfWhatNoSpectrumGives) {
-  figures_row({group, "3.2 largest entropy: moments outside the hull, rods alone, gamma 1e-4",
-               "its gradient in 50 digits", "gradient"},
-              1e-10, [](Denormals m) {
-                isp::NodePower even{};
-                even.fill(1);
-                double worst = 0;
-                for (const double adaptation : {0.0, 0.48, 1.0}) {
-                  const isp::EntropyModel model = *isp::entropy_model(adaptation, even, {});
-                  for (const Vector3& eta : {Vector3{0.1, 0.9, 0.1}, {0.6, 0.57, 0.1}, {0.0, 0.0, 1.0}}) {
-                    for (const double gamma : {2.0, 1e-2, 1e-4}) {
-                      const auto fit =
-                          in_mode(m, [&] { return isp::fit_max_entropy<3>(model.explained, eta, identity3(), gamma); });
-                      if (!fit) return nan;
-                      keep_worst(worst, reference::entropy_gradient(model.explained.f, model.explained.weight_nm,
-                                                                    fit->theta, eta, gamma));
-                    }
+  model_row({group, "3.2 largest entropy: moments outside the hull, rods alone, gamma 1e-4",
+             "its gradient in 50 digits", "gradient"},
+            1e-10, [](Denormals m) {
+              isp::NodePower even{};
+              even.fill(1);
+              double worst = 0;
+              for (const double adaptation : {0.0, 0.48, 1.0}) {
+                const isp::EntropyModel model = *isp::entropy_model(adaptation, even, {});
+                for (const Vector3& eta : {Vector3{0.1, 0.9, 0.1}, {0.6, 0.57, 0.1}, {0.0, 0.0, 1.0}}) {
+                  for (const double gamma : {2.0, 1e-2, 1e-4}) {
+                    const auto fit =
+                        in_mode(m, [&] { return isp::fit_max_entropy<3>(model.explained, eta, identity3(), gamma); });
+                    if (!fit) return nan;
+                    keep_worst(worst, reference::entropy_gradient(model.explained.f, model.explained.weight_nm,
+                                                                  fit->theta, eta, gamma));
                   }
                 }
-                return worst;
-              });
+              }
+              return worst;
+            });
 }
 
 TEST(HardCaseMesopic, EveryModelKeepsFiniteColoursFinite) {

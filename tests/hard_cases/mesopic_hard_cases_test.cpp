@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "isp/model/mesopic.h"
+#include "isp/render/eye_rows.h"
+#include "isp/render/eye_tables.h"
 #include "tests/hard_cases/hard_case.h"
 #include "tests/hard_cases/looks.h"
 #include "tests/hard_cases/rec709_camera.h"
@@ -35,12 +38,16 @@ struct LookBounds {
   double live = 1 + 0.6;    // the same beyond rounding and the table of tone.h
 };
 
-/// The columns of the eye's look: fields as they come, and through grids that vector kernels make.
-void measure_look(HardCase& row, const std::vector<SeenField>& fields, const LookBounds& bounds = {}) {
+void measure_pipelines(HardCase& row, const std::vector<SeenField>& fields, const LookBounds& bounds) {
   row.none(levels, "looks come after");
-  row.on_each_set(bounds.sets, [&](Denormals m) { return look_against_reference(fields, m); });
   row.on(Path::file, bounds.file, [&](Denormals m) { return look_through_file(fields, m); });
   row.on(Path::live, bounds.live, [&](Denormals m) { return look_through_live(fields, m); });
+}
+
+/// The columns of the eye's look: fields as they come, and through grids that vector kernels make.
+void measure_look(HardCase& row, const std::vector<SeenField>& fields, const LookBounds& bounds = {}) {
+  row.on_each_set(bounds.sets, [&](Denormals m) { return look_against_reference(fields, m); });
+  measure_pipelines(row, fields, bounds);
 }
 
 /// A row of figures that no image is made of.
@@ -126,6 +133,66 @@ TEST(HardCaseMesopic, FieldsOfALookAreHeldAboveTheThreeFixedPoints) {
                 {0.0458, orange, amber_light},
                 {0.1, orange, amber_light}},
                {.sets = 0.25, .file = 0.07, .live = 257 * 0.07 + 0.6});
+}
+
+struct KnownState {
+  isp::LuminancePair field;
+  double m;
+};
+
+/// Fields as far as a node of the look's table around those where m leaves 0 and reaches 1: L_s and L_p of these
+/// luminances.
+const std::vector<KnownState>& kinks() {
+  static const std::vector<KnownState> states = [] {
+    const double dark = std::pow(10, -0.7670 / 0.3334), bright = std::pow(10, (1 - 0.7670) / 0.3334);
+    std::vector<KnownState> out;
+    for (const double ratio : {0.27, 0.3, 0.5, 1.0, 2.46, 10.0, 18.0, 60.0}) {
+      for (const double kink : {dark / ratio, bright}) {
+        for (const double octaves : test::steps(-0.14, 0.14, 0.014)) {
+          const double light = kink * std::exp2(octaves);
+          out.push_back({{light, ratio * light}, reference::mes2_root(light, ratio * light)});
+        }
+      }
+    }
+    return out;
+  }();
+  return states;
+}
+
+/// By the look's table: with white's S/P 1 / v0 the share of the rods is 1 - m.
+double error_of_lookup(Denormals mode) {
+  std::vector<float> photopic, scotopic;
+  for (const KnownState& state : kinks()) {
+    photopic.push_back(static_cast<float>(state.field.photopic));
+    scotopic.push_back(static_cast<float>(state.field.scotopic));
+  }
+  const std::size_t n = photopic.size();
+  std::vector<float> share(n), chroma(n), blue(n), variance(n);
+  in_mode(mode, [&] {
+    isp::rows::eye_row(isp::eye_tables(), 1699.0f / 683.0f, photopic.data(), scotopic.data(), static_cast<int>(n),
+                       {share.data(), chroma.data(), blue.data(), variance.data()});
+  });
+  double worst = 0;
+  for (std::size_t i = 0; i < n; ++i) keep_worst(worst, std::abs(1 - static_cast<double>(share[i]) - kinks()[i].m));
+  return worst;
+}
+
+// The answer's |h| is below 1e-12, and dh/dm no nearer to 0 than 0.36 (1 / 0.27 - 1) - 1 = -0.027.
+TEST(HardCaseMesopic, KinksOfTheState) {
+  HardCase row({group, "1.2 kinks of m at 0 and 1, S/P of 0.27 to 60",
+                "root by bisection in 50 digits (reference, sets); the look in plain double and its formula (others)",
+                "m (reference, sets), of white (file), codes (live)"});
+  row.on(Path::reference, 1e-12 / 0.026, [](Denormals m) {
+    double worst = 0;
+    for (const KnownState& state : kinks()) {
+      keep_worst(worst, std::abs(in_mode(m, [&] { return isp::mesopic_state(state.field).m; }) - state.m));
+    }
+    return worst;
+  });
+  row.on_each_set(0.02, error_of_lookup);  // as the specification measured of a lookup
+  // An azure of S/P 4.67, of 0.00107 and 5 cd/m2.
+  constexpr Rec709 azure{0.02f, 0.3f, 0.9f};
+  measure_pipelines(row, {{0.00378, azure, daylight}, {17.61, azure, daylight}}, {});
 }
 
 // By the weights, exactly: three products and two sums.

@@ -114,6 +114,13 @@ const std::vector<isp::ColourTable>& tables_of_models() {
 
 }  // namespace
 
+void model_row(const About& about, double bound, const Measure& measure) {
+  HardCase row(about);
+  row.on(Path::reference, bound, measure);
+  row.none(levels, "looks come after").none(instruction_sets, through_tables).none(Path::file, through_tables);
+  row.none(Path::live, no_models);
+}
+
 double models_through_file(Denormals mode) {
   const RawFrame frame = rec709_frame(
       64, 48,

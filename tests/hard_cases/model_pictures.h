@@ -1,9 +1,17 @@
 #pragma once
 
+#include <string_view>
+
 #include "tests/hard_cases/hard_case.h"
 
 /// What models of appearance make of pictures, as `lowlux develop --look MODEL` has it.
 namespace lowlux::hard_cases {
+
+inline constexpr std::string_view through_tables = "pictures go through a table of the model: see tables of models";
+inline constexpr std::string_view no_models = "streams have the look of the camera or the eye";
+
+/// A row of a model's figures for one colour.
+void model_row(const About& about, double bound, const Measure& measure);
 
 /// Values that are no numbers in pictures of black, negative, saturated and coloured fields by every model.
 double models_through_file(Denormals mode);

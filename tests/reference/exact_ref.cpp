@@ -165,6 +165,23 @@ double ciecam02_response(double level, double cone) {
   return rounded(x < 0 ? Exact(-response) : response);
 }
 
+KirkChange kirk_change(const std::array<double, 3>& cones_td, double rods_td) {
+  const std::array<Exact, 3> k{Exact("0.25"), Exact("0.25"), Exact("0.4")};
+  const std::array<Exact, 3> peak{Exact("0.637"), Exact("0.392"), Exact("1.606")};
+  std::array<Exact, 3> g, relative;
+  for (int i = 0; i < 3; ++i) {
+    const Exact base = 1 + Exact("0.33") * (Exact(cones_td[i]) + k[i] * rods_td);
+    g[i] = 1 / sqrt(std::max(base, Exact("1e-6")));
+    relative[i] = g[i] / peak[i];
+  }
+  const Exact red = Exact("0.939") * relative[0], green = Exact("1.111") * relative[1];
+  const Exact blue = Exact("0.4") * relative[2], alpha = Exact("0.619");
+  const Exact w = alpha * relative[0] + (1 - alpha) * relative[1], yellow = Exact("0.15") * w, q = rods_td;
+  return {{rounded(g[0]), rounded(g[1]), rounded(g[2])},
+          {rounded(15 * k[0] * (green - red) * q), rounded(15 * (blue - yellow) * q), rounded(5 * w * q)},
+          {rounded(15 * k[0] * (green + red) * q), rounded(15 * (blue + yellow) * q), rounded(5 * w * q)}};
+}
+
 double pattanaik_rods(double g, double intensity) {
   const Exact j = 1 / (5e5 * Exact(g) + 1), rest = 1 - j * j;
   const Exact sigma = Exact("2.5874") * g /

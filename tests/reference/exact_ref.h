@@ -37,6 +37,12 @@ double doubled(double t, double t0, double doubling);
 double hunt_rod_signal(double l_as, double s);
 /// 400 x^0.42 / (x^0.42 + 27.13), odd, x = level * cone / 100.
 double ciecam02_response(double level, double cone);
+/// Gains of L, M and S and changes of M - L, S - L - M and L + M that rods make of cones (Kirk & O'Brien 2011, thesis
+/// Eq. 2.22 to 2.24 with the power 1/2), 1 + 0.33 (...) being 1e-6 at least; and the sum of magnitudes in each change.
+struct KirkChange {
+  std::array<double, 3> gain, opponent, magnitude;
+};
+KirkChange kirk_change(const std::array<double, 3>& cones_td, double rods_td);
 /// B I^n / (I^n + sigma^n), n = 0.73, of rods (Pattanaik et al. 2000) adapted to G.
 double pattanaik_rods(double g, double intensity);
 
