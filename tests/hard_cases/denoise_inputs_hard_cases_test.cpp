@@ -21,8 +21,8 @@ using denoise_testing::flat;
 constexpr double inf = std::numeric_limits<double>::infinity();
 constexpr std::string_view group = "Noise reduction";
 
-/// Lamps on grey that are saturated in green, in red and green, in green and blue, in all, and of another colour each. No
-/// noise; every value is a code of files.
+/// Lamps on grey that are saturated in green, in red and green, in green and blue, in all, and of another colour each.
+/// No noise; every value is a code of files.
 MosaicCase lamps() {
   MosaicCase c{.raw_e = Plane<float>(190, 98)};
   c.noise = {.variance_e2 = {4, 4, 4}, .saturation_e = {1000, 1000, 1000}};

@@ -22,14 +22,6 @@ namespace {
 
 constexpr std::string_view group = "What the specifications do not name";
 
-TEST(HardCaseExtreme, AHundredMegapixelsAtOnce) {
-  HardCase row({group, "100 megapixels: rendered in one call", "the same rows of a small picture", "rows that differ"});
-  row.none(Path::reference, "is plain loops").none(levels, "frames above 25 MP go by tiles: scripts/memory-peak");
-  row.on_each_set(0, codes_of_100_megapixels);
-  row.none(Path::file, "frames above 25 MP go by tiles: scripts/memory-peak");
-  row.none(Path::live, "its frame alone takes 200 MB");
-}
-
 /// Codes of a row, the largest among them.
 std::vector<std::uint16_t> row_of_codes(int width) {
   std::vector<std::uint16_t> dn(static_cast<std::size_t>(width));

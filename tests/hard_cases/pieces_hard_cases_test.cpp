@@ -1,0 +1,181 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <variant>
+
+#include "isp/pipeline/develop.h"
+#include "isp/pipeline/frame_tiles.h"
+#include "isp/pipeline/pipeline.h"
+#include "isp/pipeline/tile_renderer.h"
+#include "tests/hard_cases/rendering.h"
+#include "tests/pipeline/night_frames.h"
+
+// Frames above 25 megapixels, which are developed piece by piece. What large ones hold repeats itself, so that a small
+// frame, developed whole, is the truth for each of their parts.
+namespace lowlux::hard_cases {
+namespace {
+
+using denoise::Level;
+
+constexpr std::string_view group = "What the specifications do not name";
+constexpr int period = 512;  // px, a multiple of tile_lattice_px
+constexpr double mean_e = 20, read_noise_e = 1.5;
+
+/// Waves, an edge, a lamp, a star; its own noise, the same in every frame.
+RawFrame one_period() {
+  const auto scene = [](int x, int y) {
+    auto light = denoise_testing::waves(mean_e)(x, y);
+    const bool star = x / 2 == 127 && y / 2 == 60, lamp = std::hypot(x - 300, y - 200) < 9;
+    for (double& e : light) e = lamp ? 5000 : e + (star ? 150 : 0);
+    return light;
+  };
+  return test::night_frame({.read_noise_e = read_noise_e}, scene, period, period);
+}
+
+/// So many periods, a defect in each.
+RawFrame repeated(int columns, int rows) {
+  RawFrame frame = one_period();
+  const Plane<std::uint16_t> part = std::move(frame.raw.dn);
+  frame.raw.dn = Plane<std::uint16_t>(columns * period, rows * period);
+  frame.raw.active = frame.raw.default_crop = {0, 0, columns * period, rows * period};
+  for (int y = 0; y < rows * period; ++y) {
+    for (int i = 0; i < columns; ++i) {
+      std::copy_n(part.row(y % period), period, frame.raw.dn.row(y) + std::ptrdiff_t{i} * period);
+    }
+  }
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) frame.corrections.defects.push_back({i * period + 255, j * period + 256, 1, 1});
+  }
+  return frame;
+}
+
+isp::DevelopOptions options_for(const isp::DenoiseChoice& denoise, SampleType samples) {
+  isp::DevelopOptions options{.exposure_ev = 0, .samples = samples, .find_defects = false, .denoise = denoise};
+  if (samples == SampleType::f32) {
+    options.tone = isp::ToneCurve::none;
+    options.space = OutputSpace::camera;
+  }
+  return options;
+}
+
+isp::DenoiseChoice level_choice(Level level) {
+  return {.mode = isp::DenoiseChoice::Mode::level, .level = level, .line_noise = false};
+}
+
+/// Of a large frame, the rows of each inner period that differ from those of the middle of a small one.
+double rows_of_100_megapixels(Denormals mode) {
+  constexpr int columns = 20, rows = 19;
+  PoolExecutor pool(2);
+  test::ExecutorInMode executor(pool, mode);
+  const isp::DevelopOptions options = options_for({}, SampleType::u8);
+  const RawFrame large_frame = repeated(columns, rows);
+  const auto small = in_mode(mode, [&] { return isp::develop(repeated(3, 3), options, executor); });
+  const auto large = in_mode(mode, [&] { return isp::develop(large_frame, options, executor); });
+  EXPECT_TRUE(small && large);
+  if (!small || !large) return NAN;
+  EXPECT_TRUE(isp::goes_by_tiles(large_frame.raw, large->plan, {}));
+  const auto &few = std::get<Encoded8>(small->picture).codes, &all = std::get<Encoded8>(large->picture).codes;
+  double wrong = 0;
+  for (int y = period; y < (rows - 1) * period; ++y) {
+    const std::uint8_t* const expected = few.row(period + y % period) + 3 * period;
+    for (int i = 1; i < columns - 1; ++i) {
+      wrong += std::memcmp(all.row(y) + std::ptrdiff_t{3} * i * period, expected, 3 * period) == 0 ? 0 : 1;
+    }
+  }
+  return wrong;
+}
+
+TEST(HardCaseExtreme, AHundredMegapixelsAtOnce) {
+  HardCase row({group, "100 megapixels: rendered in one call, by pieces (file)", "the same rows of a small picture",
+                "rows that differ"});
+  row.none(Path::reference, "is plain loops").none(levels, "frames above 25 megapixels: see the next row");
+  row.on_each_set(0, codes_of_100_megapixels);
+  row.on(Path::file, 0, rows_of_100_megapixels);
+  row.none(Path::live, "its frame alone takes 200 MB");
+}
+
+/// Largest difference of parts of two float pictures, over the noise of a raw value of the mean light.
+struct Part {
+  const SceneLinear& picture;
+  int x;
+  int y;
+};
+double difference(const Part& a, const Part& b, int width, int height, const isp::DevelopPlan& plan) {
+  double worst = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double unit =
+        (*plan.electrons_at_white)[0] / plan.white_gain[c] / std::sqrt(mean_e + read_noise_e * read_noise_e);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const auto one = static_cast<double>(a.picture.plane[c].at(a.x + x, a.y + y));
+        keep_worst(worst, unit * std::abs(one - static_cast<double>(b.picture.plane[c].at(b.x + x, b.y + y))));
+      }
+    }
+  }
+  return worst;
+}
+
+/// A frame of 1.5 periods in cores of 256 px against the same as a whole.
+double error_of_pieces(Level level, Denormals mode) {
+  RawFrame frame = repeated(2, 1);
+  frame.raw.active = frame.raw.default_crop = {0, 0, 768, 256};
+  frame.corrections.defects.clear();
+  PoolExecutor pool(2);
+  test::ExecutorInMode executor(pool, mode);
+  return in_mode(mode, [&] {
+    const auto plan = isp::plan_develop(frame, options_for(level_choice(level), SampleType::f32), executor);
+    EXPECT_TRUE(plan);
+    if (!plan) return double{NAN};
+    const auto rendered = [&](const isp::TileLimits& limits) {
+      EXPECT_EQ(isp::goes_by_tiles(frame.raw, *plan, limits), limits.most_whole_px == 0);
+      Picture out = isp::make_picture(*plan);
+      isp::Pipeline(executor, limits).render(frame, *plan, out);
+      return std::get<SceneLinear>(std::move(out));
+    };
+    const SceneLinear pieces = rendered({.most_whole_px = 0, .side_px = 256}), whole = rendered({});
+    return difference({pieces, 0, 0}, {whole, 0, 0}, 768, 256, *plan);
+  });
+}
+
+/// Inner periods of 26 megapixels against the middle of 2.4.
+double error_of_26_megapixels(Denormals mode) {
+  constexpr int columns = 11, rows = 9;
+  PoolExecutor pool(2);
+  test::ExecutorInMode executor(pool, mode);
+  const isp::DevelopOptions options = options_for(level_choice(Level::standard), SampleType::f32);
+  const RawFrame large_frame = repeated(columns, rows);
+  const auto small = in_mode(mode, [&] { return isp::develop(repeated(3, 3), options, executor); });
+  const auto large = in_mode(mode, [&] { return isp::develop(large_frame, options, executor); });
+  EXPECT_TRUE(small && large);
+  if (!small || !large) return NAN;
+  EXPECT_TRUE(isp::goes_by_tiles(large_frame.raw, large->plan, {}));
+  const auto &few = std::get<SceneLinear>(small->picture), &all = std::get<SceneLinear>(large->picture);
+  double worst = 0;
+  for (int j = 1; j < rows - 1; ++j) {
+    for (int i = 1; i < columns - 1; ++i) {
+      keep_worst(worst, difference({all, i * period, j * period}, {few, period, period}, period, period, large->plan));
+    }
+  }
+  return worst;
+}
+
+// At most 3 % of the noise of a raw value (frame_tiles.h), of which the levels leave 5 % and more.
+TEST(HardCaseExtreme, AQuarterOfAHundredMegapixelsByPieces) {
+  HardCase row({group, "frames above 25 megapixels: 26 (file), cores of 256 px (others), denoised",
+                "the same developed whole: inner parts of 2.4 megapixels (file), all (others)",
+                "noise of a raw value"});
+  row.none(Path::reference, "has no pieces");
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    row.on(levels[i], 0.03, [&](Denormals m) { return error_of_pieces(denoise::all_levels[i], m); });
+  }
+  row.on_each_set(0.03, [](Denormals m) { return error_of_pieces(Level::standard, m); });
+  row.on(Path::file, 0.03, error_of_26_megapixels).none(Path::live, "frames of streams are not cut up");
+}
+
+}  // namespace
+}  // namespace lowlux::hard_cases
