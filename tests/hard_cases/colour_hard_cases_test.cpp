@@ -19,14 +19,12 @@
 #include "tests/hard_cases/rendering.h"
 #include "tests/reference/exact_ref.h"
 #include "tests/reference/retarget_ref.h"
-#include "tests/support/sweep.h"
 
 // Seeing, and what compares colours: section 4 of the sensor model; sections 4 and 5 of the mesopic specification.
 namespace lowlux::hard_cases {
 namespace {
 
 using isp::Lab;
-using isp::Xyz;
 
 constexpr std::string_view group = "Colour and light";
 constexpr std::string_view no_picture = "a measure of pictures, none itself";

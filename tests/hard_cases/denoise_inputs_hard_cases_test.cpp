@@ -15,7 +15,6 @@
 namespace lowlux::hard_cases {
 namespace {
 
-using denoise_testing::Camera;
 using denoise_testing::flat;
 
 constexpr double inf = std::numeric_limits<double>::infinity();

@@ -50,11 +50,11 @@ void measure_look(HardCase& row, const std::vector<SeenField>& fields, const Loo
   measure_pipelines(row, fields, bounds);
 }
 
-/// A row of figures that no image is made of.
-void figures_row(const About& about, double bound, const Measure& measure, std::string_view reason = no_image) {
+/// A row of figures, which reach no image for this reason.
+void figures_row(const About& about, double bound, const Measure& measure, std::string_view reason) {
   HardCase row(about);
   row.on(Path::reference, bound, measure);
-  row.none(levels, reason).none(instruction_sets, reason).none(pipelines, reason);
+  row.none(levels, "looks come after").none(instruction_sets, reason).none(pipelines, reason);
 }
 
 constexpr Xyz daylight{0.95047, 1, 1.08883};
@@ -225,7 +225,8 @@ TEST(HardCaseMesopic, WardWithoutX) {
           keep_worst(worst, relative(ward, sum));
         }
         return worst;
-      });
+      },
+      no_image);
 }
 
 }  // namespace

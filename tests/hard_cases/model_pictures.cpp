@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -60,7 +59,11 @@ std::vector<Rec709> patch_colours() {
 RawFrame frame_of(const std::vector<Rec709>& colours) {
   return rec709_frame(
       columns * patch_px, rows * patch_px,
-      [&](int x, int y) { return colours[static_cast<std::size_t>(y / patch_px * columns + x / patch_px)]; }, daylight);
+      [&](int x, int y) {
+        const int patch = y / patch_px * columns + x / patch_px;
+        return colours[static_cast<std::size_t>(patch)];
+      },
+      daylight);
 }
 
 double mean_luminance(const std::vector<Rec709>& colours) {
@@ -126,7 +129,8 @@ double models_through_file(Denormals mode) {
       64, 48,
       [](int x, int y) -> Rec709 {
         constexpr std::array<Rec709, 4> fields{{{0, 0, 0}, {-0.02f, -0.01f, -0.03f}, {1, 1, 1}, {0.8f, 0.01f, 0}}};
-        return fields[static_cast<std::size_t>(2 * (y / 24) + x / 32)];
+        const int quarter = 2 * (y / 24) + x / 32;
+        return fields[static_cast<std::size_t>(quarter)];
       },
       daylight);
   PoolExecutor pool(2);
