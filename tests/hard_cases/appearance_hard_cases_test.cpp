@@ -68,6 +68,33 @@ TEST(HardCaseMesopic, KwaksPower) {
             });
 }
 
+// Without rods both signals vanish with light, and their ratio does not.
+TEST(HardCaseMesopic, KwaksLightnessWithoutRods) {
+  model_row({group, "2.2 Kwak: lightness at alpha 0 and F_L of 1e-15 to 1, negative cones", "responses in 50 digits",
+             "relative to 64 eps"},
+            1, [](Denormals m) {
+              constexpr Vector3 white{95, 101, 108};
+              const double power = 0.69 * (1.48 + std::sqrt(0.2));
+              const auto signal = [](double level, const Vector3& c) {
+                return 2 * reference::ciecam02_response(level, c[0]) + reference::ciecam02_response(level, c[1]) +
+                       0.05 * reference::ciecam02_response(level, c[2]);
+              };
+              double worst = 0;
+              for (const double level : {1e-15, 1e-9, 1e-4, 1.0}) {
+                for (const Vector3& c : {Vector3{19, 20, 22}, {95, 101, 108}, {30, 15, -5}, {-40, -30, 2}}) {
+                  const double found = in_mode(m, [&] {
+                    return isp::kwak_lightness(isp::kwak_achromatic(level, c, 0, 0),
+                                               isp::kwak_achromatic(level, white, 0, 0), 0.2, 0.69);
+                  });
+                  const double ratio = signal(level, c) / signal(level, white);
+                  const double expected = ratio > 0 ? 100 * std::pow(ratio, power) : 0;
+                  keep_worst(worst, expected == 0 ? std::abs(found) : relative(found, expected) / (64 * eps));
+                }
+              }
+              return worst;
+            });
+}
+
 TEST(HardCaseMesopic, KhansResponseAndItsInverse) {
   model_row({group, "2.3 Khan: intensities of 1e-12 to 1e3, none, and back", "50 digits, and the intensity itself",
              "relative to 256 eps"},
