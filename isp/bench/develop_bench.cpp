@@ -26,6 +26,7 @@ namespace {
 using denoise::Level;
 
 constexpr PicturePart quick_part{192, 128};
+constexpr PicturePart shown_part{288, 192};  // of a picture in the report: twice as large it fills its column
 constexpr std::size_t pictures_used = 3;
 constexpr int rounds_by_one = 3;
 constexpr std::size_t least_undominated = 4;
@@ -173,31 +174,49 @@ Finding undominated_finding(std::span<const AccuracyRow> rows) {
           Finding::Kind::check};
 }
 
-/// Pictures of one dark frame for the page, all as exposed automatically.
-Result<void> add_images(const RawFrame& frame, const DevelopLight& light, Executor& executor,
-                        std::vector<BenchImage>& images) {
-  struct Shown {
-    const char* id;
-    PlanChoice choice;
-    Look look;
-  };
-  const PlanChoice plain{}, reduced{.level = Level::standard};
-  for (const Shown& shown : {Shown{"plain", plain, Look::camera}, Shown{"standard", reduced, Look::camera},
-                             Shown{"camera", reduced, Look::camera}, Shown{"eye", reduced, Look::eye}}) {
-    auto developed = develop(frame, options_of(shown.choice, shown.look, light, {}), executor);
-    if (!developed) return tl::make_unexpected(developed.error());
-    images.push_back({std::string("develop-") + shown.id, std::get<Encoded8>(std::move(developed->picture))});
-  }
-  return {};
-}
-
 /// What all lights add to.
 struct Gathered {
   std::vector<AccuracyRow> rows;
   std::vector<AccuracyRow> by_one;
   std::vector<Finding> findings;
   std::vector<BenchImage> images;
+  std::vector<BenchComparison> comparisons;
 };
+
+Encoded8 middle_of(const Encoded8& picture) {
+  const int width = std::min(shown_part.width, picture.width()), height = std::min(shown_part.height, picture.height());
+  Encoded8 out{Plane<std::uint8_t>(3 * width, height)};
+  const int left = (picture.width() - width) / 2, top = (picture.height() - height) / 2;
+  for (int y = 0; y < height; ++y) {
+    std::copy_n(picture.codes.row(top + y) + 3 * left, 3 * width, out.codes.row(y));
+  }
+  return out;
+}
+
+/// The middle of one dark frame by several plans for the page, each as exposed automatically.
+Result<void> add_pictures(const RawFrame& frame, const DevelopLight& light, Executor& executor, Gathered& out) {
+  struct Shown {
+    const char* id;
+    PlanChoice choice;
+    Look look;
+  };
+  const PlanChoice standard{.level = Level::standard};
+  for (const Shown& shown :
+       {Shown{"develop-plain", {}, Look::camera}, Shown{"develop-draft", {.level = Level::draft}, Look::camera},
+        Shown{"develop-standard", standard, Look::camera}, Shown{"develop-best", {.level = Level::best}, Look::camera},
+        Shown{"develop-eye", standard, Look::eye}}) {
+    const auto developed = develop(frame, options_of(shown.choice, shown.look, light, {}), executor);
+    if (!developed) return tl::make_unexpected(developed.error());
+    out.images.push_back({shown.id, middle_of(codes_of(*developed))});
+  }
+  out.comparisons = {
+      {"Noise, " + light.name, "develop-plain", "no noise reduction", "develop-standard", "level standard"},
+      {"Levels, " + light.name, "develop-draft", "level draft", "develop-best", "level best"},
+      {fmt::format("Looks, {}, level standard", light.name), "develop-standard", "camera", "develop-eye",
+       fmt::format("eye at {:g} cd/m2", light.scene_cd_m2)},
+  };
+  return {};
+}
 
 Result<void> gather(const std::vector<BenchPicture>& pictures, const DevelopLight& light, const AccuracyTiming& timing,
                     Executor& executor, Gathered& out) {
@@ -213,7 +232,7 @@ Result<void> gather(const std::vector<BenchPicture>& pictures, const DevelopLigh
     out.by_one.insert(out.by_one.end(), plans->by_one.begin(), plans->by_one.end());
   }
   if (light.name != light_of_images) return {};
-  return add_images(raws->front().noisy, light, executor, out.images);
+  return add_pictures(raws->front().noisy, light, executor, out);
 }
 
 }  // namespace
@@ -238,6 +257,7 @@ Result<BenchOutcome> run_develop_bench(const BenchOptions& options) {
   BenchOutcome out = accuracy_outcome("develop", all_lights.rows, timing, options.threads);
   if (!quick) out.findings = std::move(all_lights.findings);  // of parts, planning takes most of the time
   out.images = std::move(all_lights.images);
+  out.comparisons = std::move(all_lights.comparisons);
   out.table.columns.emplace_back("one thread [ms/MP]");
   for (std::size_t i = 0; i < out.table.rows.size(); ++i) {
     out.table.rows[i].emplace_back(all_lights.by_one[i].ms_per_mp);
