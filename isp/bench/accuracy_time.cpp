@@ -74,7 +74,7 @@ Plot plot_of(const std::string& stage, std::size_t number, std::span<const Accur
   for (const AccuracyRow* row : front) {
     line.x.push_back(row->ms_per_mp);
     line.y.push_back(row->error);
-    names += (names.empty() ? "" : ", ") + row->level;
+    names += (names.empty() ? "" : "; ") + row->level;
   }
   plot.series.push_back(std::move(line));
   plot.name_points = true;

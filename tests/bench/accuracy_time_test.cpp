@@ -99,6 +99,7 @@ TEST(AccuracyTime, TheTableHasALineForEachRowAndPlotsJoinTheUndominated) {
   ASSERT_EQ(plots[0].series.size(), 4u);
   EXPECT_EQ(plots[0].series.back().x, (std::vector<double>{1, 4}));
   EXPECT_EQ(plots[0].series.back().y, (std::vector<double>{2, 1}));
+  EXPECT_TRUE(plots[0].caption.ends_with(": fast; good")) << plots[0].caption;  // names may have commas
   EXPECT_EQ(plots[1].title, "b");
 }
 
