@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/bench/median.h"
 #include "isp/raw/raw_to_rgb.h"
 
 namespace lowlux::isp {
@@ -36,12 +37,6 @@ double time_of(const Work& work, const AccuracyTiming& timing) {
     taken = now_s(timing.wall_clock) - start;
   } while (taken < timing.least_s && repeats < most_repeats);
   return taken / repeats;
-}
-
-double quantile(std::vector<double> values, double share) {
-  const auto at = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 bool dominates(const AccuracyRow& a, const AccuracyRow& b) {
@@ -105,14 +100,13 @@ std::vector<AccuracyRow> measure(const AccuracyGroup& group, const AccuracyTimin
   std::vector<AccuracyRow> rows;
   rows.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const double median_s = quantile(s_per_mp[i], 0.5);
     rows.push_back({.group = group.name,
                     .error_of = group.error_of,
                     .level = group.levels[i].name,
                     .error = group.levels[i].error,
-                    .ms_per_mp = 1e3 * median_s,
-                    .spread = (quantile(s_per_mp[i], 0.75) - quantile(s_per_mp[i], 0.25)) / (2 * median_s),
-                    .times_memcpy = quantile(ratio[i], 0.5),
+                    .ms_per_mp = 1e3 * median(s_per_mp[i]),
+                    .spread = spread_of(s_per_mp[i]),
+                    .times_memcpy = median(ratio[i]),
                     .largest = group.levels[i].largest});
   }
   mark_undominated(rows);
@@ -155,8 +149,10 @@ std::vector<Plot> accuracy_plots(const std::string& stage, std::span<const Accur
 
 BenchOutcome accuracy_outcome(const std::string& stage, std::span<const AccuracyRow> rows, const AccuracyTiming& timing,
                               int threads) {
-  return {
-      .table = accuracy_table(rows), .plots = accuracy_plots(stage, rows), .remarks = {timing_remark(timing, threads)}};
+  return {.table = accuracy_table(rows),
+          .plots = accuracy_plots(stage, rows),
+          .remarks = {timing_remark(timing, threads)},
+          .threads = threads};
 }
 
 std::string timing_remark(const AccuracyTiming& timing, int threads) {

@@ -33,8 +33,9 @@ struct AccuracyRow {
   std::string error_of;
   std::string level;
   double error = 0;
-  double ms_per_mp = 0;      // median of the rounds
-  double spread = 0;         // half the distance of the quartiles, over the median
+  double ms_per_mp = 0;  // median of the rounds
+  /// Half the distance of the quartiles, over the median; not a number of one round.
+  double spread = std::numeric_limits<double>::quiet_NaN();
   double times_memcpy = 0;   // of the time that copying 4 bytes for each pixel takes in the same round, 16 MP at most
   bool undominated = false;  // no other level of the group is faster and as good, or better and as fast
   double largest = std::numeric_limits<double>::quiet_NaN();

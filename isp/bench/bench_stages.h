@@ -48,6 +48,7 @@ struct BenchOutcome {
   std::vector<BenchImage> images;
   std::vector<std::string> remarks;  // how it was measured, and what was left out; one line each
   std::vector<BenchComparison> comparisons = {};
+  int threads = 1;  // that did what was timed, where the table has no such column
 };
 
 struct BenchOptions {

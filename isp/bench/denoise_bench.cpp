@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -15,6 +16,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr int rounds = 5;
+constexpr int slow_rounds = 3;  // of slow methods, with the first picture alone
 /// The middle of a picture, where a part is enough: to tune others, and to be quick.
 constexpr PicturePart tuning_part{256, 160}, quick_part{192, 128};
 constexpr int crop_px = 192;                        // side of a picture's part in the report
@@ -121,6 +123,7 @@ class LightRows {
   LightRows(const Work& work, std::size_t light, const std::vector<DenoiseMethod>& methods)
       : work_(work), light_(light), methods_(methods) {
     rows_.reserve(methods.size());
+    spreads_.resize(methods.size());
     for (const DenoiseMethod& method : methods) {
       rows_.push_back({.method = method.name, .kind = method.kind, .light = work.lights[light]});
     }
@@ -134,6 +137,7 @@ class LightRows {
     MethodInput input{picture, shot, work_.tuned[light_], work_.options.nl_means};
     if (!work_.strengths.empty()) input.strength = work_.strengths[index * work_.lights.size() + light_].best;
     input.rounds = rounds;
+    input.slow_rounds = index == 0 ? slow_rounds : 1;
     const double share = 1 / static_cast<double>(work_.pictures.size());
     const double megapixels = 1e-6 * static_cast<double>(shot.raw_e.size());
     for (std::size_t m = 0; m < methods_.size(); ++m) {
@@ -142,6 +146,7 @@ class LightRows {
       add(rows_[m].error, picture_error(result->picture, truth, executor), share);
       rows_[m].s_per_mp += share * result->cpu_s / megapixels;
       rows_[m].times_memcpy += share * result->cpu_s / result->memcpy_s;
+      if (std::isfinite(result->spread)) spreads_[m].push_back(result->spread);
       if (index == 0) parts.push_back({methods_[m].name, middle_codes(result->picture.display)});
     }
     return {};
@@ -151,7 +156,11 @@ class LightRows {
     const auto nl_means =
         std::find_if(rows_.begin(), rows_.end(), [](const DenoiseRow& row) { return row.method == name_of_nl_means; });
     const double nl_means_s = nl_means == rows_.end() ? nan : nl_means->s_per_mp;
-    for (DenoiseRow& row : rows_) row.speed_of_nlm = nl_means_s / row.s_per_mp;
+    for (std::size_t m = 0; m < rows_.size(); ++m) {
+      rows_[m].speed_of_nlm = nl_means_s / rows_[m].s_per_mp;
+      if (spreads_[m].empty()) continue;
+      rows_[m].spread = std::reduce(spreads_[m].begin(), spreads_[m].end()) / static_cast<double>(spreads_[m].size());
+    }
     mark_undominated(rows_);
     return std::move(rows_);
   }
@@ -163,15 +172,20 @@ class LightRows {
   std::size_t light_;
   const std::vector<DenoiseMethod>& methods_;
   std::vector<DenoiseRow> rows_;
+  std::vector<std::vector<double>> spreads_;  // of each row, of the pictures that have one
 };
 
 std::vector<std::string> remarks_of(const Work& work) {
   std::vector<std::string> out{fmt::format(
-      "{} pictures ({}) behind a lens of {} px, RGGB, white gains 2, 1, 1.5; means over the pictures, CPU "
-      "time of one thread, median of {} rounds",
+      "{} pictures ({}) behind a lens of {} px, RGGB, white gains 2, 1, 1.5; means over the pictures",
       work.pictures.size(),
       fmt::format("{}{}", name_of(work.options.pictures), work.options.quick ? ", quick: parts of them" : ""),
-      bench_lens_px, rounds)};
+      bench_lens_px)};
+  out.push_back(fmt::format(
+      "Times: CPU time of one thread, median of {} rounds in turn with memcpy; of best and {} of {} with the first "
+      "picture, of one with the others; spread: half the distance of the quartiles over the median, mean of the "
+      "pictures with several rounds; {}",
+      rounds, name_of_nl_means, slow_rounds, denoise::denoiser_target()));
   for (std::size_t i = 0; i < work.lights.size(); ++i) {
     const TunedParameters& tuned = work.tuned[i];
     std::string line = fmt::format(

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,7 +16,9 @@ struct DenoiseRow {
   MethodKind kind = MethodKind::other;
   DenoiseLight light;
   PictureError error;
-  double s_per_mp = 0;      // CPU time of the denoising alone, one thread; not a number for what has none
+  double s_per_mp = 0;  // CPU time of the denoising alone, one thread; not a number for what has none
+  /// spread_of() the rounds, mean of the pictures that have several
+  double spread = std::numeric_limits<double>::quiet_NaN();
   double times_memcpy = 0;  // of that of copying the mosaic
   double speed_of_nlm = 0;  // how many times faster than opencv-nlm in this light; not a number without it
   bool undominated =

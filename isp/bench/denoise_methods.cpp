@@ -40,6 +40,7 @@ void time_rounds(const MethodInput& input, MethodResult& result, const Work& wor
     work_s.push_back(worked);
   }
   result.cpu_s = median(work_s);
+  result.spread = spread_of(work_s);
   result.memcpy_s = median(memcpy_s);
 }
 
@@ -93,9 +94,9 @@ Result<MethodResult> run_nl_means(const MethodInput& input, Level /*level*/, Met
   const NlMeansPicture from{noisy.codes.data(), noisy.width(), noisy.height()};
   const NlMeansPicture to{clean.codes.data(), clean.width(), clean.height()};
   bool works = true;
-  MethodInput once = input;
-  once.rounds = 1;  // a second and more for each megapixel
-  time_rounds(once, result,
+  MethodInput timed = input;
+  timed.rounds = input.slow_rounds;
+  time_rounds(timed, result,
               [&] { works = input.nl_means->denoise(from, to, input.strength.lightness, input.strength.colour); });
   if (!works) return fail(ErrorCode::unreadable, "OpenCV's fastNlMeansDenoisingColored failed: not enough memory?");
   result.picture.display = linear_of(clean);
@@ -118,7 +119,7 @@ Result<MethodResult> run_denoiser(const MethodInput& input, Level level, MethodM
   Plane<float> out = same_size(input);
   InlineExecutor one;
   MethodInput timed = input;
-  if (level == Level::best) timed.rounds = 1;  // seconds for each megapixel
+  if (level == Level::best) timed.rounds = input.slow_rounds;
   time_rounds(timed, result, [&] {
     memory.denoiser.run({input.shot.raw_e.view(), BayerPhase::rggb}, input.shot.noise(),
                         {.level = level, .white_gain = bench_white_gain}, out.view(), {}, one);

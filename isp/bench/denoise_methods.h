@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,13 +30,15 @@ struct MethodInput {
   const NlMeans* nl_means = nullptr;
   NlMeansStrength strength;  // the best there is
   int rounds = 1;            // of timing
+  int slow_rounds = 1;       // of methods that take a second and more for each megapixel
 };
 
-/// The result, and the CPU time of the denoising alone on one thread: the median of the rounds, and that of copying the
-/// mosaic in between.
+/// The result, and the CPU time of the denoising alone on one thread: the median of the rounds, their spread_of(), and
+/// the median of copying the mosaic in between.
 struct MethodResult {
   RenderedPicture picture;
   double cpu_s = 0;
+  double spread = std::numeric_limits<double>::quiet_NaN();
   double memcpy_s = 0;
 };
 

@@ -83,15 +83,16 @@ void mark_undominated(std::span<DenoiseRow> rows) {
 BenchTable denoise_table(std::span<const DenoiseRow> rows) {
   BenchTable table{
       {"mean_e", "dark_e", "read_noise_e", "method", "psnr_db", "ciede2000", "chroma_rmse", "box_chroma_rmse",
-       "uv_shift", "saturation_ratio", "s_per_mp", "times_memcpy", "speed_of_nlm", "undominated"},
+       "uv_shift", "saturation_ratio", "s_per_mp", "spread_percent", "times_memcpy", "speed_of_nlm", "undominated"},
       {}};
   table.rows.reserve(rows.size());
   for (const DenoiseRow& row : rows) {
     const PictureError& e = row.error;
     table.rows.push_back({row.light.mean_e, row.light.dark_e, row.light.read_noise_e, row.method, e.psnr_db,
                           e.ciede2000, e.chroma_rmse, e.box_chroma_rmse, e.uv_shift, e.saturation_ratio,
-                          if_ceiling_none(row, row.s_per_mp), if_ceiling_none(row, row.times_memcpy),
-                          if_ceiling_none(row, row.speed_of_nlm), std::string(row.undominated ? "yes" : "")});
+                          if_ceiling_none(row, row.s_per_mp), if_ceiling_none(row, 100 * row.spread),
+                          if_ceiling_none(row, row.times_memcpy), if_ceiling_none(row, row.speed_of_nlm),
+                          std::string(row.undominated ? "yes" : "")});
   }
   return table;
 }

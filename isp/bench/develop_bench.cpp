@@ -258,9 +258,10 @@ Result<BenchOutcome> run_develop_bench(const BenchOptions& options) {
   if (!quick) out.findings = std::move(all_lights.findings);  // of parts, planning takes most of the time
   out.images = std::move(all_lights.images);
   out.comparisons = std::move(all_lights.comparisons);
-  out.table.columns.emplace_back("one thread [ms/MP]");
+  out.table.columns.insert(out.table.columns.end(), {"one thread [ms/MP]", "its spread [%]"});
   for (std::size_t i = 0; i < out.table.rows.size(); ++i) {
     out.table.rows[i].emplace_back(all_lights.by_one[i].ms_per_mp);
+    out.table.rows[i].emplace_back(100 * all_lights.by_one[i].spread);
   }
   out.remarks.push_back(fmt::format(
       "{} pictures{} by a simulated camera of 14 bits, masked columns telling its dark; errors against what is "

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 namespace lowlux::isp {
@@ -12,6 +14,16 @@ inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// How far times are apart: half the distance of their quartiles, over the median. Not a number of fewer than two.
+inline double spread_of(std::vector<double> times) {
+  if (times.size() < 2) return std::numeric_limits<double>::quiet_NaN();
+  std::sort(times.begin(), times.end());
+  const auto quantile = [&times](double share) {
+    return times[static_cast<std::size_t>(std::lround(share * static_cast<double>(times.size() - 1)))];
+  };
+  return (quantile(0.75) - quantile(0.25)) / (2 * quantile(0.5));
 }
 
 }  // namespace lowlux::isp

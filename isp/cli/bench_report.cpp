@@ -77,10 +77,23 @@ struct OutputFile {
   std::string text;
 };
 
-std::vector<OutputFile> text_files(const MeasuredStage& measured, const Machine& machine) {
+/// The table with what its times are of, which stands beside it elsewhere: lines of a CSV are taken out of it.
+isp::Table self_contained_table(const MeasuredStage& measured, const Machine& machine) {
   constexpr int all_digits = 17;
+  isp::Table out = isp::table_of(measured.outcome.table, all_digits);
+  const auto add = [&out](const char* column, const std::string& cell) {
+    if (std::ranges::find(out.columns, column) != out.columns.end()) return;
+    out.columns.emplace_back(column);
+    for (auto& row : out.rows) row.push_back(cell);
+  };
+  add("threads", fmt::format("{}", measured.outcome.threads));
+  add("instruction set", machine.kernels);
+  return out;
+}
+
+std::vector<OutputFile> text_files(const MeasuredStage& measured, const Machine& machine) {
   const std::string id(measured.stage.id);
-  return {{id + ".csv", isp::csv_of(isp::table_of(measured.outcome.table, all_digits))},
+  return {{id + ".csv", isp::csv_of(self_contained_table(measured, machine))},
           {id + ".json", text_of(json_of(measured, machine)) + "\n"}};
 }
 

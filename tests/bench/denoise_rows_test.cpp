@@ -105,6 +105,7 @@ TEST(DenoiseRows, TableAndPlotsHoldWhatWasMeasured) {
   std::vector<DenoiseRow> rows{
       row("noise-free", MethodKind::ceiling, dim, 0, 40, 0.5), row("none", MethodKind::other, dim, 0.001, 20, 10),
       row("draft", MethodKind::ours, dim, 0.02, 28, 4), row("draft", MethodKind::ours, dark, 0.01, 23, 7)};
+  rows[2].spread = 0.03;
   mark_undominated(rows);
   const Table table = table_of(denoise_table(rows), 4);
   ASSERT_EQ(table.rows.size(), rows.size());
@@ -112,6 +113,9 @@ TEST(DenoiseRows, TableAndPlotsHoldWhatWasMeasured) {
   EXPECT_EQ(table.rows[2][3], "draft");
   EXPECT_EQ(table.rows[2][4], "28");
   EXPECT_EQ(table.rows[0][10], "");  // the ceiling takes no time
+  EXPECT_EQ(table.columns[11], "spread_percent");
+  EXPECT_EQ(table.rows[2][11], "3");
+  EXPECT_EQ(table.rows[1][11], "");
   EXPECT_EQ(table.rows[2].back(), "yes");
   const std::vector<Plot> plots = denoise_plots(rows);
   ASSERT_EQ(plots.size(), 2u);

@@ -132,6 +132,18 @@ TEST(BenchFiles, AreOnePageAndTwoFilesForEachStageAndNoneIfOneIsInTheWay) {
   EXPECT_TRUE(holds(scratch.read("bench.html"), "tone-raw.png"));
 }
 
+TEST(BenchFiles, EveryLineOfATableSaysThreadsAndInstructionSet) {
+  const test::ScratchDirectory scratch;
+  std::vector<MeasuredStage> measured = list_of(stage_of("tone"), stage_of("alpha"));
+  measured[0].outcome.threads = 3;
+  measured[1].outcome.table.columns = {"level", "error", "threads"};  // its rows differ in them
+  InlineExecutor one;
+  ASSERT_TRUE(write_bench_files(measured, {.kernels = "AVX9"}, {.output = scratch.path()}, one));
+  EXPECT_EQ(scratch.read("tone.csv"),
+            "level,error,undominated,threads,instruction set\nfast,2,yes,3,AVX9\nslow,,,3,AVX9\n");
+  EXPECT_EQ(scratch.read("alpha.csv"), "level,error,threads,instruction set\nfast,2,yes,AVX9\nslow,,,AVX9\n");
+}
+
 TEST(Machine, IsNamedByItsProcessorElseByItsBoard) {
   EXPECT_EQ(cpu_model("processor\t: 0\nmodel\t\t: 85\nmodel name\t: Some CPU @ 2.0 GHz \nmodel name : second\n"),
             "Some CPU @ 2.0 GHz");

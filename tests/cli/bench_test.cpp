@@ -62,6 +62,7 @@ TEST(Bench, MeasuresEveryMethodInEveryLightAndWritesAllFiles) {
     methods.insert(row["method"].get<std::string>());
     EXPECT_GT(row["psnr_db"].get<double>(), 0);
     EXPECT_EQ(row["s_per_mp"].is_null(), row["method"] == "noise-free");
+    EXPECT_EQ(row["spread_percent"].is_null(), row["method"] == "noise-free");
   }
   for (const char* method :
        {"noise-free", "none", "dark-left-in", "chromatic", "opencv-nlm", "gat-standard", "draft", "standard", "high"}) {
@@ -72,7 +73,11 @@ TEST(Bench, MeasuresEveryMethodInEveryLightAndWritesAllFiles) {
                           [](const Json& f) { return f["id"] == "denoise/nlm-psnr-20/2" && f["holds"].is_boolean(); }));
   EXPECT_EQ(Json::parse(scratch.read("a/b/denoise.json")), stage);
   EXPECT_TRUE(scratch.read("a/b/denoise.csv").starts_with("mean_e,dark_e,read_noise_e,method,psnr_db,"));
+  EXPECT_NE(scratch.read("a/b/denoise.csv").find(",threads,instruction set\n"), std::string::npos);
   const Json& machine = stage["machine"];
+  const std::string timing = stage["remarks"].at(1).get<std::string>();
+  EXPECT_NE(timing.find("one thread"), std::string::npos) << timing;
+  EXPECT_TRUE(timing.ends_with(machine["kernels"].get<std::string>())) << timing;
   EXPECT_GE(machine["processors"].get<int>(), 1);
   EXPECT_TRUE(machine["kernels"].is_string() && machine["compiler"].is_string());
   const std::string page = scratch.read("a/b/bench.html");
