@@ -7,8 +7,11 @@
 namespace lowlux::cli {
 
 Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
-  CLI::App app("Measures accuracy against time: each stage at each of its levels, beside other methods.",
-               "lowlux bench");
+  CLI::App app(
+      "Measures accuracy against time: each stage at each of its levels, beside other methods. All of it is made for "
+      "less "
+      "than 15 minutes on two cores, with --quick for less than one; how long it took is said at the end.",
+      "lowlux bench");
   BenchArgs args;
   app.add_option("--stage", args.stages, "stages to measure (default: all); --list names them")
       ->type_name("ID[,ID...]")
@@ -31,7 +34,9 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
   app.add_option("--pictures-folder", args.pictures_folder,
                  "where the clean pictures are (default: testdata/pictures of the source tree)")
       ->type_name("DIR");
-  app.add_flag("--quick", args.quick, "parts of two pictures in two lights: seconds, and no final figures");
+  app.add_flag("--quick", args.quick,
+               "parts of two pictures in two lights, to see that all of it works: less than a minute on two cores, no "
+               "final figures");
   app.add_option("--threads", args.threads, "for all but what is timed (default: one for each processor)")
       ->check(CLI::Range(1, 256))
       ->type_name("N");

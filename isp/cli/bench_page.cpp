@@ -50,7 +50,7 @@ isp::ReportSection overview(const std::vector<const MeasuredStage*>& stages) {
                              .text =
                                  "Findings are what a stage must show, beside what it shows. Rows whose findings "
                                  "do not all hold are on a tinted ground.",
-                             .table = {{"stage", "what", "rows measured", "findings"}, {}}};
+                             .table = {{"stage", "what", "rows measured", "findings", "took [s]"}, {}}};
   section.table.rows.reserve(stages.size());
   for (const MeasuredStage* m : stages) {
     const isp::BenchOutcome& outcome = m->outcome;
@@ -58,7 +58,8 @@ isp::ReportSection overview(const std::vector<const MeasuredStage*>& stages) {
       section.table.marked.push_back(section.table.rows.size());
     }
     section.table.rows.push_back({std::string(m->stage.id), std::string(m->stage.title),
-                                  fmt::format("{}", outcome.table.rows.size()), count_of_findings(outcome.findings)});
+                                  fmt::format("{}", outcome.table.rows.size()), count_of_findings(outcome.findings),
+                                  fmt::format("{:.1f}", m->took_s)});
   }
   return section;
 }
@@ -149,6 +150,12 @@ Result<void> add_stage(const MeasuredStage& measured, Executor& executor, isp::R
 
 }  // namespace
 
+std::string time_text(const std::vector<MeasuredStage>& measured) {
+  double sum_s = 0;
+  for (const MeasuredStage& m : measured) sum_s += m.took_s;
+  return fmt::format("{} stage{} took {:.1f} s", measured.size(), measured.size() == 1 ? "" : "s", sum_s);
+}
+
 Result<std::string> bench_page(const std::vector<MeasuredStage>& measured, const Machine& machine, Executor& executor) {
   const std::vector<const MeasuredStage*> stages = in_order_of_page(measured);
   isp::Report page{.title = "lowlux bench: accuracy against time",
@@ -156,6 +163,7 @@ Result<std::string> bench_page(const std::vector<MeasuredStage>& measured, const
                        "What each stage of the pipeline costs and what it gets right, at each of its levels and "
                        "beside other methods. Times are of the machine below; ratios carry over to others better.",
                    .sections = {machine_section(machine), overview(stages)}};
+  page.sections.back().text += '\n' + time_text(measured) + '.';
   for (const MeasuredStage* stage : stages) {
     if (auto added = add_stage(*stage, executor, page); !added) return tl::make_unexpected(added.error());
   }

@@ -14,7 +14,11 @@ namespace lowlux::cli {
 struct MeasuredStage {
   isp::BenchStage stage;
   isp::BenchOutcome outcome;
+  double took_s = 0;  // wall clock, of all its work and not only of what is timed
 };
+
+/// "2 stages took 12.3 s".
+std::string time_text(const std::vector<MeasuredStage>& measured);
 
 /// Significant digits of figures that are read.
 inline constexpr int shown_digits = 4;

@@ -65,11 +65,9 @@ Json json_of(const MeasuredStage& measured, const Machine& machine) {
     for (std::size_t c = 0; c < cells.size(); ++c) row[measured.outcome.table.columns[c]] = json_of(cells[c]);
     rows.push_back(std::move(row));
   }
-  return {{"stage", measured.stage.id},
-          {"machine", json_of(machine)},
-          {"remarks", measured.outcome.remarks},
-          {"rows", std::move(rows)},
-          {"findings", Json::parse(findings_json(measured.outcome.findings))}};
+  return {{"stage", measured.stage.id}, {"machine", json_of(machine)},
+          {"took_s", measured.took_s},  {"remarks", measured.outcome.remarks},
+          {"rows", std::move(rows)},    {"findings", Json::parse(findings_json(measured.outcome.findings))}};
 }
 
 struct OutputFile {

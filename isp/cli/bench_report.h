@@ -16,8 +16,8 @@ namespace lowlux::cli {
 /// For a terminal: how it was measured, the table, the findings.
 std::string bench_text(const MeasuredStage& measured);
 
-/// One JSON array, an object for each stage: stage, machine, remarks, rows with the table's columns as keys (null where
-/// there is no figure), findings.
+/// One JSON array, an object for each stage: stage, machine, took_s, remarks, rows with the table's columns as keys
+/// (null where there is no figure), findings.
 std::string bench_json(const std::vector<MeasuredStage>& measured, const Machine& machine);
 
 /// Before the work: makes the folder, and sees what keeps bench.html, STAGE.csv and STAGE.json from being written to

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <thread>
@@ -59,9 +60,11 @@ std::vector<MeasuredStage> run_each(const std::vector<isp::BenchStage>& stages, 
   for (const isp::BenchStage& stage : stages) {
     isp::BenchOptions with = options;
     with.advance = [&progress](double share, const std::string& what) { progress.advance(share, what); };
+    const auto start = std::chrono::steady_clock::now();
     auto outcome = stage.run(with);
     if (outcome) {
-      out.push_back({stage, *std::move(outcome)});
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+      out.push_back({stage, *std::move(outcome), took.count()});
     } else {
       const Error& error = outcome.error();
       const std::string where = error.where.empty() ? std::string(stage.id) : error.where;
@@ -142,6 +145,7 @@ int run_bench(const std::vector<std::string>& words) {
     if (!written) return failed(written.error());
     if (!args.json) fmt::print("\nwritten:\n  {}\n", fmt::join(*written, "\n  "));
   }
+  if (!args.json && !measured.empty()) fmt::print("\n{}\n", time_text(measured));
   return measured.size() == stages->size() ? exit_done : exit_failed;
 }
 

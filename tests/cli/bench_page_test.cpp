@@ -26,6 +26,7 @@ MeasuredStage stage_of(std::string_view id) {
   out.outcome.findings = {{"a", "", "", "", true, ""}, {"b", "", "", "", false, ""}};
   out.outcome.plots.push_back({.id = "p", .series = {{"fast", {1}, {2}}}});
   out.outcome.remarks = {"one remark", "another"};
+  out.took_s = 1.25;
   return out;
 }
 
@@ -61,6 +62,14 @@ TEST(BenchPage, PutsTheWholePipelineFirstAndTheOthersAsMeasured) {
     EXPECT_NE(places.back(), std::string::npos) << title;
   }
   EXPECT_TRUE(std::ranges::is_sorted(places));
+}
+
+TEST(BenchPage, SaysWhatEachStageTookAndWhatAllTook) {
+  const std::string page = page_of(list_of(stage_of("tone"), stage_of("alpha")));
+  EXPECT_TRUE(holds(page, R"(took [s]</th>)"));
+  EXPECT_TRUE(holds(page, "1.2</td></tr>"));  // to the even one
+  EXPECT_TRUE(holds(page, "<p>2 stages took 2.5 s.</p>"));
+  EXPECT_EQ(time_text(list_of(stage_of("tone"))), "1 stage took 1.2 s");
 }
 
 TEST(BenchPage, MarksWhatIsUndominatedAndWhatDoesNotHold) {

@@ -47,6 +47,9 @@ TEST(Bench, HelpNamesTheOptions) {
   for (const char* option : {"--stage", "--quick", "--json", "--pictures", "--threads", "--force", "--output"}) {
     EXPECT_NE(help.out.find(option), std::string::npos) << option;
   }
+  for (const char* made_for : {"less than 15 minutes on two cores", "less than a minute on two cores"}) {
+    EXPECT_NE(help.out.find(made_for), std::string::npos) << made_for;
+  }
 }
 
 TEST(Bench, MeasuresEveryMethodInEveryLightAndWritesAllFiles) {
@@ -57,6 +60,7 @@ TEST(Bench, MeasuresEveryMethodInEveryLightAndWritesAllFiles) {
   EXPECT_EQ(result.err, "");
   const Json stage = Json::parse(result.out).at(0);
   EXPECT_EQ(stage["stage"], "denoise");
+  EXPECT_GT(stage["took_s"].get<double>(), 0);
   std::set<std::string> methods;
   for (const Json& row : stage["rows"]) {
     methods.insert(row["method"].get<std::string>());
