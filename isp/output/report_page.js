@@ -66,9 +66,11 @@ function axis(plot, key) {
 const overlap = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
 const inside = (a, b) => a.left >= b.left && a.right <= b.right && a.top >= b.top && a.bottom <= b.bottom;
 
+const high = 14;  // a name
+const nameFont = bold => (bold ? 'bold ' : '') + '12px ' + Chart.defaults.font.family;
+
 // Where a name of this width can stand: beside the point, then farther and farther from it.
 function* places(point, width) {
-  const high = 14;
   for (let step = 0; step < 6; ++step) {
     const away = 8 + high * step;
     for (const [dx, dy] of [[1, 0], [-1, 0], [1, -1], [1, 1], [-1, -1], [-1, 1], [0, -1], [0, 1]]) {
@@ -81,22 +83,38 @@ function* places(point, width) {
   }
 }
 
-function drawName(ctx, name, point, box, bold) {
-  const x = Math.max(box.left, Math.min(point.x, box.right)), y = (box.top + box.bottom) / 2;
-  if (box.step > 0) {
-    ctx.strokeStyle = '#888';
-    ctx.lineWidth = 1;
-    ctx.beginPath();
-    ctx.moveTo(point.x, point.y);
-    ctx.lineTo(x, y < point.y ? box.bottom : box.top);
-    ctx.stroke();
+// Where that is all taken, as where many points are close together: anywhere, by how far it is.
+function placesAnywhere(point, width, area) {
+  const out = [], beyond = (from, to, at) => Math.max(from - at, 0, at - to);
+  for (let top = area.top; top + high <= area.bottom; top += high / 2) {
+    for (let left = area.left; left + width <= area.right; left += high) {
+      const away = Math.hypot(beyond(left, left + width, point.x), beyond(top, top + high, point.y));
+      out.push({left: left, right: left + width, top: top, bottom: top + high, step: away});
+    }
   }
+  return out.sort((a, b) => a.step - b.step);
+}
+
+// From a point to its name, where that does not stand beside it.
+function drawLeader(ctx, {point, box}) {
+  if (box.step === 0) return;
+  ctx.strokeStyle = '#888';
+  ctx.lineWidth = 1;
+  ctx.beginPath();
+  ctx.moveTo(point.x, point.y);
+  ctx.lineTo(Math.max(box.left, Math.min(point.x, box.right)), box.bottom <= point.y ? box.bottom : box.top);
+  ctx.stroke();
+}
+
+function drawName(ctx, {point, box}) {
+  const y = (box.top + box.bottom) / 2;
+  ctx.font = nameFont(point.bold);
   ctx.lineJoin = 'round';
   ctx.strokeStyle = '#fff';
   ctx.lineWidth = 3;
-  ctx.strokeText(name, box.left, y);
-  ctx.fillStyle = bold ? '#111' : '#555';
-  ctx.fillText(name, box.left, y);
+  ctx.strokeText(point.name, box.left, y);
+  ctx.fillStyle = point.bold ? '#111' : '#555';
+  ctx.fillText(point.name, box.left, y);
 }
 
 // Where the plot's lines pass, every few pixels.
@@ -119,7 +137,6 @@ function passages(chart, plot) {
 
 // Writes the names of a plot's points beside them: first those on a line, in bold.
 function namer(plot) {
-  const fontOf = bold => (bold ? 'bold ' : '') + '12px ' + Chart.defaults.font.family;
   const pointOf = chart => (series, i) => {
     const {x, y} = chart.getDatasetMeta(i).data[0];
     return {name: series.name, x: x, y: y, bold: isJoined(plot, series.x[0], series.y[0])};
@@ -130,24 +147,23 @@ function namer(plot) {
     afterDatasetsDraw(chart) {
       const ctx = chart.ctx, all = plot.series.map((s, i) => hasPlace(s) ? pointOf(chart)(s, i) : null).filter(p => p);
       const around = (p, by) => ({left: p.x - by, right: p.x + by, top: p.y - by, bottom: p.y + by});
-      const taken = [];
-      const lines = passages(chart, plot);
-      let named = 0;
+      const named = [], lines = passages(chart, plot);
       ctx.save();
       ctx.textBaseline = 'middle';
       for (const point of [...all.filter(p => p.bold), ...all.filter(p => !p.bold)]) {
-        ctx.font = fontOf(point.bold);
-        const free = box => inside(box, chart.chartArea) && !taken.some(other => overlap(box, other)) &&
+        ctx.font = nameFont(point.bold);
+        const width = ctx.measureText(point.name).width;
+        const free = box => inside(box, chart.chartArea) && !named.some(other => overlap(box, other.box)) &&
             !all.some(other => overlap(box, around(other, other === point ? 5 : 10)));
-        const open = [...places(point, ctx.measureText(point.name).width)].filter(free);
-        const box = open.find(place => !lines.some(line => overlap(place, line))) || open[0];
-        if (!box) continue;
-        taken.push(box);
-        drawName(ctx, point.name, point, box, point.bold);
-        ++named;
+        const open = [...places(point, width)].filter(free);
+        const box = open.find(place => !lines.some(line => overlap(place, line))) || open[0] ||
+            placesAnywhere(point, width, chart.chartArea).find(free);
+        if (box) named.push({point: point, box: box});
       }
+      named.forEach(name => drawLeader(ctx, name));
+      named.forEach(name => drawName(ctx, name));
       ctx.restore();
-      chart.canvas.dataset.unnamed = all.length - named;
+      chart.canvas.dataset.unnamed = all.length - named.length;
     }
   };
 }
