@@ -41,7 +41,7 @@ struct Rounds {
   int few;
   double few_from_mp;
 };
-constexpr Rounds full_rounds{5, 2, 25}, quick_rounds{2, 1, 3};
+constexpr Rounds full_rounds{5, 2, 25}, quick_rounds{2, 2, 3};
 constexpr double memory_share = 0.4;  // of the machine's, that a frame may ask for
 constexpr int files = 8;
 constexpr double file_mp = 1;
@@ -270,7 +270,7 @@ Result<BenchOutcome> run_scaling_bench(const BenchOptions& options) {
   std::string left_out;
   std::vector<ScalingRow> rows = rows_over_size(raws->noisy, options, rounds, left_out);
   const RawFrame of_file = frame_of(raws->noisy, options.quick ? sizes_mp[0] : file_mp);
-  auto of_files = rows_of_files(of_file, options.threads, options.quick ? 1 : 3);
+  auto of_files = rows_of_files(of_file, options.threads, options.quick ? 2 : 3);
   if (!of_files) return tl::make_unexpected(of_files.error());
   rows.insert(rows.end(), of_files->begin(), of_files->end());
   BenchOutcome out{.table = table_of(rows)};
