@@ -135,7 +135,7 @@ Result<void> add_stage(const MeasuredStage& measured, Executor& executor, isp::R
   const isp::BenchOutcome& outcome = measured.outcome;
   page.sections.push_back({.title = std::string(measured.stage.title)});
   if (!outcome.plots.empty()) {
-    page.sections.push_back({.title = "Error against time", .plots = outcome.plots, .is_part = true});
+    page.sections.push_back({.title = "Charts", .plots = outcome.plots, .is_part = true});
   }
   if (!outcome.images.empty()) {
     auto pictures = pictures_part(outcome, executor);

@@ -79,6 +79,7 @@ TEST(BenchPage, MarksWhatIsUndominatedAndWhatDoesNotHold) {
   EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="short">b<)"));
   EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="short">tone)"));  // at a glance
   EXPECT_TRUE(holds(page, "1 of 2 hold"));
+  EXPECT_TRUE(holds(page, ">Charts</h3>"));
   MeasuredStage good = stage_of("good");
   good.outcome.findings.pop_back();
   const std::string without = page_of(list_of(std::move(good)));
@@ -102,7 +103,7 @@ TEST(BenchPage, LeavesOutWhatAStageDoesNotHave) {
   measured.outcome.plots.clear();
   measured.outcome.remarks.clear();
   const std::string page = page_of(list_of(std::move(measured)));
-  for (const char* part : {"Error against time", "Pictures", "What it must show", "How it was measured", "<canvas"}) {
+  for (const char* part : {">Charts<", "Pictures", "What it must show", "How it was measured", "<canvas"}) {
     EXPECT_FALSE(holds(page, part)) << part;
   }
   EXPECT_TRUE(holds(page, "none are stated"));
