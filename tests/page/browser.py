@@ -9,6 +9,7 @@ import urllib.error
 import urllib.request
 
 ELEMENT = "element-6066-11e4-a52e-4f735466cecf"  # WebDriver's key of an element's id
+PIECE_PX = 4000  # high are screenshots of parts of a page
 ARROW_RIGHT, ARROW_LEFT, END = "\ue014", "\ue012", "\ue010"
 
 
@@ -103,22 +104,29 @@ class Browser:
     def run(self, script, *arguments):
         return self._post(self._session + "/execute/sync", {"script": script, "args": list(arguments)})
 
-    def type(self, selector, keys):
-        found = self._post(self._session + "/element", {"using": "css selector", "value": selector})
-        self._post(f"{self._session}/element/{found[ELEMENT]}/value", {"text": keys})
+    def type(self, selector, index, keys):
+        """Into one of the elements of a selector."""
+        found = self._post(self._session + "/elements", {"using": "css selector", "value": selector})
+        self._post(f"{self._session}/element/{found[index][ELEMENT]}/value", {"text": keys})
 
     def press(self, key):
         """To what has the focus."""
         actions = [{"type": "keyDown", "value": key}, {"type": "keyUp", "value": key}]
         self._post(self._session + "/actions", {"actions": [{"type": "key", "id": "keys", "actions": actions}]})
 
-    def screenshot(self, path):
-        """Of the whole page, not only of what the window shows."""
-        size = self.devtools("Page.getLayoutMetrics")["cssContentSize"]
-        clip = {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}
-        shot = self.devtools("Page.captureScreenshot", format="png", captureBeyondViewport=True, clip=clip)
-        with open(path, "wb") as out:
-            out.write(base64.b64decode(shot["data"]))
+    def screenshots(self, stem, width):
+        """Of the whole page, from its top: STEM-1.png and on. Chromium draws no charts far from what its window shows."""
+        self.resize(width, PIECE_PX)
+        height = self.devtools("Page.getLayoutMetrics")["cssContentSize"]["height"]
+        for piece, top in enumerate(range(0, height, PIECE_PX)):
+            self.run("scrollTo(0, arguments[0])", top)
+            with open(f"{stem}-{piece + 1}.png", "wb") as out:
+                out.write(self.png_of({"x": 0, "y": top, "width": width, "height": min(PIECE_PX, height - top)}))
+
+    def png_of(self, rectangle):
+        """Of a part of the page that the window shows; equal parts are equal bytes."""
+        shot = self.devtools("Page.captureScreenshot", format="png", clip={**rectangle, "scale": 1})
+        return base64.b64decode(shot["data"])
 
     def console(self):
         """What was said since it was asked last."""

@@ -1,5 +1,6 @@
 """The pages to be looked at, each made by the command."""
 import os
+import re
 import subprocess
 
 CAMERA = ["--sensor", "ELD_NikonD850", "--gain", "ISO 1600", "--system-gain", "0.5", "--read-noise", "2",
@@ -11,8 +12,8 @@ class Pages:
         self._lowlux = lowlux
         self._folder = folder
 
-    def run(self, *words):
-        done = subprocess.run([self._lowlux, *words], capture_output=True, text=True, timeout=100, check=False)
+    def run(self, *words, timeout_s=100):
+        done = subprocess.run([self._lowlux, *words], capture_output=True, text=True, timeout=timeout_s, check=False)
         if done.returncode != 0:
             raise RuntimeError(f"lowlux {' '.join(words)}: exit code {done.returncode}: {done.stderr.strip()}")
         return done.stdout
@@ -25,12 +26,17 @@ class Pages:
                  "--frames", "2", "--seed", str(seed), *CAMERA, *more)
         return [self.path(f"{name}_{i:04}.dng") for i in range(2)]
 
-    def bench(self):
-        said = self.run("bench", "--quick", "--stage", "denoise", "-o", self.path("bench"))
+    def stages(self):
+        """Titles of the stages of bench by their ids."""
+        return dict(re.split(" +", line, maxsplit=1) for line in self.run("bench", "--list").splitlines())
+
+    def bench(self, quick):
+        """The page of all stages, and how long it says they took."""
+        said = self.run("bench", *(["--quick"] if quick else []), "-o", self.path("bench"), timeout_s=200 if quick else 3600)
         page = self.path("bench", "bench.html")
         if page not in said.split():
             raise RuntimeError(f"bench does not say that it wrote {page}")
-        return page
+        return page, said.splitlines()[-1]
 
     def calibration(self):
         darks = self._shoot("dark", "dark", "0.001", 1)
