@@ -50,16 +50,6 @@ std::optional<std::vector<isp::CostPoint>> points_of(const Json& json) {
   return out;
 }
 
-std::optional<isp::CostModel> from_file(const std::string& path) {
-  std::error_code ignored;
-  if (!std::filesystem::exists(path, ignored)) return std::nullopt;
-  const auto bytes = capture::read_file_bytes(path, largest_file);
-  if (!bytes) return std::nullopt;
-  auto model = parse_cost(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()));
-  if (!model) return std::nullopt;
-  return *std::move(model);
-}
-
 Result<void> write_cost(const std::string& path, const isp::CostModel& model) {
   std::error_code error;
   std::filesystem::create_directories(std::filesystem::path(path).parent_path(), error);
@@ -135,11 +125,23 @@ Result<isp::CostModel> parse_cost(std::string_view text) {
   return model;
 }
 
-std::optional<isp::CostModel> known_cost(int threads) {
+Result<isp::CostModel> kept_cost(int threads) {
   const auto path = cost_file(threads);
-  if (!path) return std::nullopt;
-  auto model = from_file(*path);
-  if (!model || model->threads != threads || model->machine != machine_name()) return std::nullopt;
+  if (!path) return fail(ErrorCode::not_found, "without XDG_CACHE_HOME and HOME it is kept nowhere");
+  std::error_code ignored;
+  if (!std::filesystem::exists(*path, ignored)) return fail(ErrorCode::not_found, "it is not known yet", *path);
+  const auto bytes = capture::read_file_bytes(*path, largest_file);
+  if (!bytes) return tl::make_unexpected(bytes.error());
+  auto model = parse_cost(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()));
+  if (!model) return model;
+  if (const std::string machine = machine_name(); model->machine != machine) {
+    return fail(ErrorCode::unsupported,
+                fmt::format("what is kept is of another machine: {}, and this is {}", model->machine, machine), *path);
+  }
+  if (model->threads != threads) {
+    return fail(ErrorCode::unsupported, fmt::format("what is kept is of {} threads, not {}", model->threads, threads),
+                *path);
+  }
   return model;
 }
 
@@ -166,7 +168,13 @@ Result<isp::CostModel> calibrate_cost(int threads, bool quiet, std::string& writ
 }
 
 Result<isp::CostModel> cost_of_this_machine(int threads, bool quiet) {
-  if (auto known = known_cost(threads)) return *std::move(known);
+  auto kept = kept_cost(threads);
+  if (kept) return kept;
+  if (!quiet) {
+    fmt::print(stderr, "{}\n",
+               one_line("lowlux: this machine's speed is measured, which takes about a minute and a half: " +
+                        kept.error().message));
+  }
   std::string ignored;
   return calibrate_cost(threads, quiet, ignored);
 }

@@ -27,12 +27,12 @@ std::optional<std::string> cost_file(int threads);
 std::string cost_text(const isp::CostModel& model);
 Result<isp::CostModel> parse_cost(std::string_view text);
 
-/// The model of this machine with so many threads, from its file; nullopt where there is none, or one of another
-/// machine or version.
-std::optional<isp::CostModel> known_cost(int threads);
+/// The model of this machine with so many threads from its file. Errors: there is none, or it cannot be read; it is of
+/// another format, machine, instruction set, version of lowlux or number of threads.
+Result<isp::CostModel> kept_cost(int threads);
 
-/// The known model or, where there is none, one measured now and written to the file. What keeps it from being written
-/// is told on stderr; it is used all the same. Errors: those of measuring.
+/// The kept model or, where there is none, one that is measured now and kept. That it is measured, and why, and what
+/// keeps it from being written, are told on stderr; it is used all the same. Errors: those of measuring.
 Result<isp::CostModel> cost_of_this_machine(int threads, bool quiet);
 
 /// What developing costs at the moment: a machine that has other work too, or is hot, is slower than when it was

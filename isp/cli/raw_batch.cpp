@@ -139,7 +139,7 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
     if (!cost) return tl::make_unexpected(cost.error());
     batch.speed = std::make_shared<MachineSpeed>(*std::move(cost));
   } else if (args.explain || args.json) {
-    if (auto cost = known_cost(threads_of_each(workers_of(batch)))) {
+    if (auto cost = kept_cost(threads_of_each(workers_of(batch)))) {
       batch.known_cost = std::make_shared<const isp::CostModel>(*std::move(cost));
     }
   }

@@ -1,11 +1,16 @@
 #include <gtest/gtest.h>
+#include <sys/types.h>
 
+#include <array>
+#include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "isp/cli/cost_file.h"
@@ -92,7 +97,7 @@ TEST_F(EffectsCommand, TellWhatTheyTakeWithoutABudget) {
   EXPECT_NE(told.find("would take"), std::string::npos) << told;
   EXPECT_NE(told.find("with this machine as it was calibrated"), std::string::npos) << told;
   keep_speed(0, "another machine");
-  EXPECT_FALSE(cli::known_cost(cli::threads_of_each(1)));
+  EXPECT_FALSE(cli::kept_cost(cli::threads_of_each(1)));
   EXPECT_TRUE(effects_of({})["predicted_s"].is_null());
   EXPECT_NE(developed({"--explain"}).out.find("bench --calibrate-cost"), std::string::npos);
 }
@@ -122,6 +127,79 @@ TEST_F(EffectsCommand, GoByTheMachinesPace) {
   EXPECT_NE(told.out.find("times what it took when this machine was calibrated"), std::string::npos) << told.out;
   keep_speed(0);
   EXPECT_EQ(developed({"--budget-ms", "1000", "--explain"}).out.find("was calibrated"), std::string::npos);
+}
+
+/// The first line that a program says on stderr, empty if it ends without one. It is ended then.
+std::string first_complaint(const std::vector<std::string>& command) {
+  std::string words;
+  for (const std::string& word : command) words += " '" + word + "'";
+  FILE* const pipe = popen(("echo $$; exec" + words + " 2>&1 >&-").c_str(), "r");
+  std::array<char, 1000> line{};
+  const bool started = std::fgets(line.data(), line.size(), pipe) != nullptr;
+  const pid_t process = started ? std::atoi(line.data()) : 0;
+  const bool said = std::fgets(line.data(), line.size(), pipe) != nullptr;
+  if (process > 0) kill(process, SIGKILL);
+  pclose(pipe);
+  return said ? line.data() : "";
+}
+
+// Measuring takes a minute and more: it is seen to begin.
+TEST_F(EffectsCommand, MeasureTheMachineAnewWhereAnotherWasKept) {
+  const std::vector<std::string> command{LOWLUX_COMMAND,  "develop", file("night.dng"), "-o",
+                                         file("out.png"), "--force", "--budget-ms",     "1000"};
+  EXPECT_EQ(first_complaint(command), "");
+  std::filesystem::remove(file("out.png"));
+  isp::CostModel model = *cli::kept_cost(cli::threads_of_each(1));
+  model.machine = "another";
+  std::ofstream(*cli::cost_file(model.threads)) << cli::cost_text(model);
+  const std::string said = first_complaint(command);
+  EXPECT_NE(said.find("is measured"), std::string::npos) << said;
+  EXPECT_NE(said.find("another machine: another, and this is " + cli::machine_name()), std::string::npos) << said;
+  EXPECT_FALSE(std::filesystem::exists(file("out.png")));
+}
+
+TEST_F(EffectsCommand, GoByWhatWasCalibrated) {
+  if (std::getenv("LOWLUX_NIGHTLY") == nullptr) GTEST_SKIP() << "runs with LOWLUX_NIGHTLY";
+  std::filesystem::remove_all(file("cache"));
+  const auto calibrated = lowlux({"bench", "--calibrate-cost", "--json"});
+  ASSERT_EQ(calibrated.exit_code, 0) << calibrated.err;
+  const int threads = cli::threads_of_each(1);
+  EXPECT_EQ(test::read_file(*cli::cost_file(threads)), calibrated.out);
+  const auto kept = cli::kept_cost(threads);
+  ASSERT_TRUE(kept) << kept.error().message;
+  EXPECT_GT(kept->pace_s, 0);
+  for (int i = 0; i < isp::cost_parts; ++i) EXPECT_FALSE(kept->points[static_cast<std::size_t>(i)].empty()) << i;
+  const auto told = developed({"--budget-ms", "1000", "--json"});
+  EXPECT_EQ(told.err, "");  // not measured again
+  EXPECT_GT(Json::parse(told.out)[0]["effects"]["pace"].get<double>(), 0);
+}
+
+TEST_F(EffectsCommand, AKeptSpeedIsBelievedOfThisMachineFormatAndNumberOfThreadsAlone) {
+  const int threads = cli::threads_of_each(1);
+  const std::string path = *cli::cost_file(threads), good = test::read_file(path);
+  const auto kept = cli::kept_cost(threads);
+  ASSERT_TRUE(kept) << kept.error().message;
+  EXPECT_EQ(cli::cost_text(*kept), good);
+  const auto refused_with = [&](const std::string& from, const std::string& to, const std::string& why) {
+    std::string text = good;
+    ASSERT_NE(text.find(from), std::string::npos) << from;
+    text.replace(text.find(from), from.size(), to);
+    std::ofstream(path) << text;
+    const auto model = cli::kept_cost(threads);
+    ASSERT_FALSE(model) << to;
+    EXPECT_NE(model.error().message.find(why), std::string::npos) << model.error().message;
+  };
+  refused_with("\"lowlux_cost_model\": 4", "\"lowlux_cost_model\": 3", "lowlux_cost_model");
+  const Json machine = cli::machine_name();
+  refused_with(machine.dump(), "\"\"", "another machine");
+  refused_with(" processors", "0 processors", "another machine");
+  refused_with(", lowlux ", ", lowlux 9", "another machine");  // other versions may be faster
+  refused_with(fmt::format("\"threads\": {}", threads), fmt::format("\"threads\": {}", threads + 1), "threads");
+  refused_with(good, "", "no cost model");
+  std::filesystem::remove(path);
+  const auto none = cli::kept_cost(threads);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::not_found);
 }
 
 TEST(CostFile, TextComesBackAndFaultsAreNamed) {
