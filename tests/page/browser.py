@@ -115,7 +115,7 @@ class Browser:
         self._post(self._session + "/actions", {"actions": [{"type": "key", "id": "keys", "actions": actions}]})
 
     def screenshots(self, stem, width):
-        """Of the whole page, from its top: STEM-1.png and on. Chromium draws no charts far from what its window shows."""
+        """Of the whole page, from its top: STEM-1.png and on. Far from its window Chromium draws no charts."""
         self.resize(width, PIECE_PX)
         height = self.devtools("Page.getLayoutMetrics")["cssContentSize"]["height"]
         for piece, top in enumerate(range(0, height, PIECE_PX)):

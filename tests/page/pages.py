@@ -32,11 +32,15 @@ class Pages:
 
     def bench(self, quick):
         """The page of all stages, and how long it says they took."""
-        said = self.run("bench", *(["--quick"] if quick else []), "-o", self.path("bench"), timeout_s=200 if quick else 3600)
+        options, timeout_s = (["--quick"], 200) if quick else ([], 3600)
+        said = self.run("bench", *options, "-o", self.path("bench"), timeout_s=timeout_s)
         page = self.path("bench", "bench.html")
         if page not in said.split():
             raise RuntimeError(f"bench does not say that it wrote {page}")
-        return page, said.splitlines()[-1]
+        took = said.splitlines()[-1]
+        if not re.fullmatch(f"{len(self.stages())} stages took [0-9.]+ s", took):
+            raise RuntimeError(f"bench does not end with what it took: {took}")
+        return page, took
 
     def calibration(self):
         darks = self._shoot("dark", "dark", "0.001", 1)
