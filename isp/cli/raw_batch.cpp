@@ -37,7 +37,7 @@ Result<void> check_free(const std::string& output, bool force) {
 Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) {
   isp::DevelopOptions options = batch.options;
   options.effects = batch.args.effects.effects;
-  if (options.effects) options.effects->cost = batch.known_cost;
+  if (options.effects) options.effects->cost = batch.kept_cost;
   if (batch.speed) {
     const Rect& crop = frame.raw.default_crop;
     options.effects->budget_s = budget_s(batch.args.effects, 1e-6 * crop.width * crop.height);
@@ -140,7 +140,7 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
     batch.speed = std::make_shared<MachineSpeed>(*std::move(cost));
   } else if (args.explain || args.json) {
     if (auto cost = kept_cost(threads_of_each(workers_of(batch)))) {
-      batch.known_cost = std::make_shared<const isp::CostModel>(*std::move(cost));
+      batch.kept_cost = std::make_shared<const isp::CostModel>(*std::move(cost));
     }
   }
   if (darks.empty()) return batch;

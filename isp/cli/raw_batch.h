@@ -31,8 +31,8 @@ struct RawBatch {
   std::optional<CameraProfile> profile;
   std::optional<DarkSource> darks;
   isp::Overwrite overwrite = isp::Overwrite::no;
-  std::shared_ptr<MachineSpeed> speed;               // with a budget: files then come one after the other
-  std::shared_ptr<const isp::CostModel> known_cost;  // without one, where decisions are told and it is known
+  std::shared_ptr<MachineSpeed> speed;              // with a budget: files then come one after the other
+  std::shared_ptr<const isp::CostModel> kept_cost;  // without one, where decisions are told and it is known
 };
 
 /// Reads profile and darks and makes the output folder. Errors name their file.
