@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -113,7 +115,9 @@ Result<isp::CostModel> parse_cost(std::string_view text) {
   }
   isp::CostModel model;
   model.machine = machine.get<std::string>();
-  model.threads = threads.get<int>();
+  const auto count = threads.get<std::int64_t>();
+  if (count < 1 || count > std::numeric_limits<int>::max()) return malformed("no such number of threads");
+  model.threads = static_cast<int>(count);
   model.pace_s = pace.get<double>();
   if (!(model.pace_s >= 0) || !std::isfinite(model.pace_s)) return malformed("pace_s is no time");
   for (int i = 0; i < isp::cost_parts; ++i) {
