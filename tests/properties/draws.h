@@ -19,6 +19,8 @@ inline int size_between(int least, int most) { return *rc::gen::inRange(least, m
 inline double any_between(double first, double last) {
   return first + (last - first) * *rc::gen::inRange(0, 1001) / 1000;
 }
+/// 10^first to 10^last, evenly over the decades.
+inline double any_decade(double first, double last) { return std::pow(10, any_between(first, last)); }
 inline BayerPhase any_phase() { return static_cast<BayerPhase>(*rc::gen::inRange(0, 4)); }
 inline std::mt19937 any_random() { return std::mt19937(*rc::gen::arbitrary<std::uint32_t>()); }
 
