@@ -59,7 +59,7 @@ bool is_null_or_whole(const T* answer) {
 }
 
 int code_of_opening(const Error& error) {
-  return error.where.empty() ? LOWLUX_STAGE_BAD_ARGUMENT : LOWLUX_STAGE_BAD_PROFILE;
+  return error.code == ErrorCode::invalid_argument ? LOWLUX_STAGE_BAD_ARGUMENT : LOWLUX_STAGE_BAD_PROFILE;
 }
 
 int code_of_configuring(const Error& error) {

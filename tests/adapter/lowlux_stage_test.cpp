@@ -75,7 +75,8 @@ TEST(LowluxStage, NamesSettingsThatCannotBe) {
 TEST(LowluxStage, NamesProfilesThatCannotBeRead) {
   const test::ScratchDirectory scratch;
   scratch.write("broken.json", "{");
-  for (const std::string& file : {scratch.file("absent.json"), scratch.file("broken.json"), scratch.path()}) {
+  for (const std::string& file :
+       {scratch.file("absent.json"), scratch.file("broken.json"), scratch.path(), std::string()}) {
     auto settings = plain_settings();
     settings.profile_file = file.c_str();
     std::string message;
