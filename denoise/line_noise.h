@@ -22,8 +22,8 @@ struct LineOffsets {
   double residual_std_e = 0;     // predicted of the lines' noise once the offsets are subtracted
 };
 
-/// From light-shielded pixels beside the picture: each line's mean less that of all lines, times the Wiener gain. Lines
-/// of even and odd number have means of their own, as have columns. Left is V e^2 / (V + e^2). A line's mean is the
+/// From light-shielded pixels beside the picture: each line's mean less the median of all lines of even or of odd
+/// number, as it is, group by group, times the Wiener gain. Left is V e^2 / (V + e^2). A line's mean is the
 /// Hodges-Lehmann estimate over up to 16 groups of its pixels, which a quarter of groups with hot pixels do not move.
 /// @param masked_e  pedestal may be in; for rows as many rows as the picture has. Values that are not finite are left
 /// out
