@@ -60,11 +60,12 @@ double value_at(const SignedMosaic& in, int x, int y) {
 
 double filtered(const SignedMosaic& in, const Filter& filter, int x, int y) {
   double sum = 0;
-  for (int dy = -2; dy <= 2; ++dy) {
-    for (int dx = -2; dx <= 2; ++dx) {
-      const double weight = filter[static_cast<std::size_t>(dy + 2)][static_cast<std::size_t>(dx + 2)];
+  for (std::size_t row = 0; row < 5; ++row) {
+    for (std::size_t column = 0; column < 5; ++column) {
+      const double weight = filter[row][column];
       if (weight == 0) continue;
-      sum += weight * value_at(in, mirrored(x + dx, in.value.width), mirrored(y + dy, in.value.height));
+      const int at_x = x + static_cast<int>(column) - 2, at_y = y + static_cast<int>(row) - 2;
+      sum += weight * value_at(in, mirrored(at_x, in.value.width), mirrored(at_y, in.value.height));
     }
   }
   return sum;

@@ -79,8 +79,7 @@ std::vector<DevelopLight> develop_lights(bool quick) {
        .read_noise_e = 4,
        .gain_dn_per_e = 16,
        .scene_cd_m2 = 0.01}};
-  if (quick) return {all[1]};
-  return all;
+  return quick ? std::vector<DevelopLight>{all[1]} : all;
 }
 
 Result<SimulatedRaws> simulated_raws(const BenchPicture& picture, const DevelopLight& light, std::uint64_t seed,
