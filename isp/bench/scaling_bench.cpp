@@ -215,7 +215,7 @@ BenchTable table_of(const std::vector<ScalingRow>& rows) {
 }
 
 /// A figure over the frame's size, a line for each plan and number of threads that have it.
-Plot plot_over_size(const std::vector<ScalingRow>& rows, std::string id, std::string label,
+Plot plot_over_size(const std::vector<ScalingRow>& rows, std::string id, const std::string& label,
                     double ScalingRow::*figure) {
   Plot out{.id = std::move(id),
            .title = label + " over the size of the frame",
