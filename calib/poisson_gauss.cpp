@@ -16,8 +16,8 @@ template <class Visit>
 void for_each_count(double mean, const Visit& visit) {
   const double reach = 10 * std::sqrt(mean) + 40;
   const double first = std::max(0.0, std::floor(mean - reach)), last = std::ceil(mean + reach);
-  const int counts = static_cast<int>(last - first) + 1;
-  int sign = 0;  // of the gamma function, for the form that threads may share
+  const double counts = last - first + 1;  // none of a mean that is no number
+  int sign = 0;                            // of the gamma function, for the form that threads may share
   for (int i = 0; i < counts; ++i) {
     const double k = first + i;
     visit(k, mean > 0 ? std::exp(k * std::log(mean) - mean - ::lgamma_r(k + 1, &sign)) : (k == 0 ? 1.0 : 0.0));

@@ -42,17 +42,15 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
 }
 
 /// What every verb that takes raw files one by one has.
-void add_batch(CLI::App& app, DevelopArgs& args) {
+/// @param explained  help for --explain
+void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
   app.add_option("RAW", args.inputs, "raw files")->required();
   app.add_flag("--maps", args.options.denoise.maps,
                "also write what is left of the noise [e-^2] and how far colour can be believed (0 to 1), for each 2x2 "
                "cell: OUT.noise.pfm and OUT.confidence.pfm");
   app.add_flag("--force", args.force, "overwrite files that exist");
   app.add_option("--jobs", args.jobs, "files at a time (default: one for each processor)")->check(CLI::Range(1, 256));
-  app.add_flag(
-      "--explain", args.explain,
-      "what was decided for each file, why, and, where this machine's speed is known (bench --calibrate-cost), what "
-      "it takes");
+  app.add_flag("--explain", args.explain, explained);
   app.add_flag("--json", args.json, "one JSON object for each file on stdout, as an array");
   app.add_flag("--timings", args.timings, "time of each stage");
   app.add_flag("--quiet", args.quiet, "no warnings and no progress");
@@ -98,7 +96,11 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   add_denoise(app, args);
   add_darks(app, args.dark);
   add_budget(app, args.effects);
-  add_batch(app, args);
+  add_batch(
+      app,
+      "what was decided for each file, why, and, where this machine's speed is known (bench --calibrate-cost), what "
+      "it takes",
+      args);
   Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
   if (auto* const good = std::get_if<DevelopArgs>(&parsed)) {
     if (const auto wrong = complete_look(good->look, Planner::of_everything, good->options.look)) {
@@ -123,7 +125,7 @@ Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
   add_camera(app, args);
   add_denoise(app, args);
   add_darks(app, args.dark);
-  add_batch(app, args);
+  add_batch(app, "what was decided for each file, and why", args);
   Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
   if (args.options.denoise.mode == isp::DenoiseChoice::Mode::off && std::holds_alternative<DevelopArgs>(parsed)) {
     return refuse(app, "--denoise off leaves nothing to do: name a level, or auto");

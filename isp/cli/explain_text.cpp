@@ -31,7 +31,8 @@ void add_time(Lines& out, const isp::EffectsPlan& effects, const isp::EffectsCho
   }
   const double predicted_ms = 1e3 * *effects.predicted_s;
   if (!choice.budget_s) {
-    out.add("time", fmt::format("predicted {:.1f} ms with this machine as it was calibrated", predicted_ms));
+    out.add("time",
+            fmt::format("predicted {:.1f} ms, one file at a time on this machine as it was calibrated", predicted_ms));
     return;
   }
   std::string text = fmt::format("{:.1f} ms; predicted {:.1f} ms", 1e3 * *choice.budget_s, predicted_ms);

@@ -55,13 +55,6 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
   return options;
 }
 
-/// Files that are worked on at a time.
-int workers_of(const RawBatch& batch) {
-  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  const int files = static_cast<int>(batch.jobs.size());
-  return batch.speed ? 1 : std::min(files, batch.args.jobs > 0 ? batch.args.jobs : processors);
-}
-
 void print_outcome(const DevelopArgs& args, const DevelopOutcome& outcome) {
   if (outcome.error) {
     fmt::print(stderr, "{}\n", error_line(outcome.input, *outcome.error));
@@ -93,7 +86,9 @@ DevelopOutcome outcome_of(const Job& job, const RawWork& work, Executor& executo
 
 /// Each worker takes the next file: while one reads, another renders or encodes.
 std::vector<DevelopOutcome> run_all(const RawBatch& batch, const RawWork& work) {
-  const int files = static_cast<int>(batch.jobs.size()), workers = workers_of(batch);
+  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int files = static_cast<int>(batch.jobs.size());
+  const int workers = batch.speed ? 1 : std::min(files, batch.args.jobs > 0 ? batch.args.jobs : processors);
   std::vector<DevelopOutcome> outcomes(batch.jobs.size());
   std::atomic<int> next{0};
   Progress progress(files, !batch.args.quiet);
@@ -138,8 +133,8 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
     auto cost = cost_of_this_machine(threads_of_each(1), args.quiet);
     if (!cost) return tl::make_unexpected(cost.error());
     batch.speed = std::make_shared<MachineSpeed>(*std::move(cost));
-  } else if (args.explain || args.json) {
-    if (auto cost = kept_cost(threads_of_each(workers_of(batch)))) {
+  } else if (args.effects.effects && (args.explain || args.json)) {
+    if (auto cost = kept_cost(threads_of_each(1))) {
       batch.kept_cost = std::make_shared<const isp::CostModel>(*std::move(cost));
     }
   }

@@ -38,15 +38,28 @@ std::optional<double> cost_of(const EffectFacts& facts, std::initializer_list<Co
   return predicted_s(*facts.choice.cost, facts.size, parts);
 }
 
-/// Of the plan's level, or of the most accurate where it has none.
+double seconds_of(const EffectFacts& facts, EffectCandidate plan) {
+  rate(facts, plan);
+  return plan.seconds;
+}
+
+/// Of the plan's level, or of the most that a tolerance calls for where it has none; without lines.
 std::optional<double> cost_of_noise(const EffectFacts& facts, EffectCandidate plan) {
   if (!facts.choice.cost) return std::nullopt;
+  plan.lines = false;
   if (!plan.level) plan.level = Level::high;
-  rate(facts, plan);
-  const double with_s = plan.seconds;
-  plan.level.reset();
-  rate(facts, plan);
-  return with_s - plan.seconds;
+  EffectCandidate without = plan;
+  without.level.reset();
+  return seconds_of(facts, plan) - seconds_of(facts, without);
+}
+
+std::optional<double> cost_of_lines(const EffectFacts& facts, EffectCandidate plan) {
+  if (!facts.choice.cost) return std::nullopt;
+  plan.lines = true;
+  if (!plan.level) plan.level = Level::high;
+  EffectCandidate without = plan;
+  without.lines = false;
+  return seconds_of(facts, plan) - seconds_of(facts, without);
 }
 
 EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
@@ -70,8 +83,7 @@ EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
   if (facts.may_take_lines) {
     const bool taken = plan.lines && plan.level;
     add({"row and column noise", facts.sizes.lines, left(taken, facts.sizes.lines), taken,
-         plan.level ? facts.sizes.lines_words : "taken off with the noise or not at all",
-         cost_of(facts, {{CostPart::lines}})});
+         plan.level ? facts.sizes.lines_words : "taken off with the noise or not at all", cost_of_lines(facts, plan)});
   }
   if (facts.sizes.dark > 0) {
     const bool used = plan.dark || plan.level;

@@ -84,7 +84,8 @@ TEST(AccuracyTime, TheMedianLeavesAnOutlierToTheSpread) {
 
 TEST(AccuracyTime, SpreadIsHalfTheDistanceOfTheQuartilesOverTheMedian) {
   EXPECT_EQ(spread_of({5, 1, 4, 2, 3}), 1.0 / 3);  // (4 - 2) / (2 x 3)
-  EXPECT_EQ(spread_of({2, 1, 10}), 2);             // (10 - 2) / (2 x 2): no value is nearer to the upper quartile
+  EXPECT_EQ(spread_of({2, 1, 10}), 4.5 / 4);       // (6 - 1.5) / (2 x 2)
+  EXPECT_EQ(spread_of({9, 1, 10}), 4.5 / 18);      // (9.5 - 5) / (2 x 9)
   EXPECT_EQ(spread_of({7, 7}), 0);
   EXPECT_TRUE(std::isnan(spread_of({7})) && std::isnan(spread_of({})));
 }

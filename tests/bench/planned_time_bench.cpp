@@ -259,7 +259,10 @@ int saved() {
   for (std::uint32_t i = 0; i < 300; ++i) {
     const test::PlannerScene scene = test::planner_scene(i, 3072, 2048, executor);
     const Result<Developed> done = develop(scene.raw.frame, scene.ways(false), executor);
-    if (!done) continue;
+    if (!done) {
+      std::printf("%3u not developed: %s\n", i, done.error().message.c_str());
+      return 1;
+    }
     const EffectsPlan& plan = *done->plan.effects;
     std::vector<double> planned, everything;
     Encoded8 by_plan, with_everything;

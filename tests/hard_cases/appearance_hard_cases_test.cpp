@@ -1,11 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
-#include <vector>
 
 #include "isp/model/appearance/cao.h"
 #include "isp/model/appearance/entropy_model.h"

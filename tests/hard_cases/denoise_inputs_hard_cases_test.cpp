@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <limits>
 #include <numbers>
+#include <string_view>
 
 #include "denoise/noise_check.h"
 #include "isp/base/executor.h"

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <string_view>
 
 #include "isp/model/appearance/kirk_obrien.h"
 #include "isp/model/appearance/shin.h"

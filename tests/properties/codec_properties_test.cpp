@@ -7,10 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <limits>
 #include <utility>
 #include <variant>
-#include <vector>
 
 #include "isp/base/executor.h"
 #include "isp/codec/exr.h"

@@ -2,11 +2,10 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <variant>
-#include <vector>
 
 #include "isp/pipeline/live_pipeline.h"
 #include "tests/pipeline/live_frames.h"

@@ -1,12 +1,12 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "isp/adapter/stage_budget.h"
@@ -184,10 +184,7 @@ RC_GTEST_PROP(PlannerProperty, FramesArePlannedWithinTheirBudgetOrRefused, ()) {
   }
   RC_ASSERT(plan->effects->predicted_s.value() <= *options.effects->budget_s);
   options.effects->budget_s = *options.effects->budget_s * 2;
-  const auto larger = plan_develop(frame, options, one);
-  RC_ASSERT(larger.has_value());
-  const bool no_lower = larger->effects->level >= plan->effects->level;
-  RC_ASSERT(no_lower);
+  RC_ASSERT(plan_develop(frame, options, one).has_value());
 }
 
 // Of the same frames before, whatever they took.
