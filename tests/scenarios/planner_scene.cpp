@@ -21,7 +21,7 @@ double Draws::uniform() { return (words_at({stream_, 0, purpose_}, index_, next_
 double Draws::log_uniform(double low, double high) { return low * std::pow(high / low, uniform()); }
 int Draws::below(int count) { return static_cast<int>(uniform() * count); }
 
-BenchPicture drawn_part(const BenchPicture& picture, Draws& draws, int width, int height) {
+BenchPicture drawn_part(const BenchPicture& picture, Draws& draws, int width, int height, int shift_px) {
   const int columns = picture.linear.width(), rows = picture.linear.height();
   const int x0 = draws.below(std::max(columns - width, 0) + 1), y0 = draws.below(std::max(rows - height, 0) + 1);
   // Mirrored beyond an end in the direction across too: otherwise the same rows and columns would go through all of the
@@ -35,9 +35,10 @@ BenchPicture drawn_part(const BenchPicture& picture, Draws& draws, int width, in
   for (int c = 0; c < 3; ++c) {
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
-        const bool right = (x0 + x) / columns % 2 == 1, below = (y0 + y) / rows % 2 == 1;
+        const int in_x = x0 + x + shift_px * ((y0 + y) / rows), in_y = y0 + y + shift_px * ((x0 + x) / columns);
+        const bool right = in_x / columns % 2 == 1, below = in_y / rows % 2 == 1;
         out.linear.plane[c].at(x, y) =
-            picture.linear.plane[c].at(place(x0 + x, columns, below), place(y0 + y, rows, right));
+            picture.linear.plane[c].at(place(in_x, columns, below), place(in_y, rows, right));
       }
     }
   }
@@ -73,7 +74,8 @@ DevelopOptions PlannerScene::ways(bool all) const {
 
 PlannerScene planner_scene(std::uint32_t index, int width, int height, Executor& executor) {
   Draws draws(20261122, 78, index);
-  const BenchPicture picture = drawn_part(held_out_picture(draws.below(4), executor), draws, width, height);
+  constexpr int shift_px = 173;
+  const BenchPicture picture = drawn_part(held_out_picture(draws.below(4), executor), draws, width, height, shift_px);
   PlannerScene out;
   out.light = {draws.log_uniform(1, 1e4), draws.log_uniform(0.01, 200), draws.log_uniform(0.5, 8)};
   SensorFlaws flaws;

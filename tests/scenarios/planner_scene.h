@@ -26,7 +26,9 @@ class Draws {
 };
 
 /// A part of a picture behind the lens, from a place that is drawn; beyond its ends it is mirrored, both ways at once.
-isp::BenchPicture drawn_part(const isp::BenchPicture& picture, Draws& draws, int width, int height);
+/// @param shift_px  by which each copy lies lower, and farther right, than the one before: without, rows and columns go
+///                  through a frame of several copies several times, and look like row and column noise
+isp::BenchPicture drawn_part(const isp::BenchPicture& picture, Draws& draws, int width, int height, int shift_px = 0);
 
 /// One of the held-out pictures, which are read once.
 const isp::BenchPicture& held_out_picture(int index, Executor& executor);
