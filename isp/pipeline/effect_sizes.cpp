@@ -97,9 +97,11 @@ std::vector<std::optional<denoise::LineOffsets>> lines_of_squares(const RawElect
   return of_square;
 }
 
-/// Standard deviation of what lines share, over the squares; 0 where it does not stand out.
-double line_std_e(const RawElectrons& sample, int squares, denoise::Lines kind, const denoise::RawNoise& noise,
-                  Executor& executor) {
+/// Standard deviation of what lines share, over the squares; 0 where it would not stand out of whole lines either,
+/// whose offsets are measured better than a square's.
+/// @param length_px  of whole lines
+double line_std_e(const RawElectrons& sample, int squares, denoise::Lines kind, int length_px,
+                  const denoise::RawNoise& noise, Executor& executor) {
   double squares_e2 = 0;
   int measured = 0;
   denoise::LineOffsets mean;
@@ -111,6 +113,7 @@ double line_std_e(const RawElectrons& sample, int squares, denoise::Lines kind, 
   }
   if (measured == 0) return 0;
   mean.line_std_e = std::sqrt(squares_e2 / measured);
+  mean.measured_std_e *= std::sqrt(static_cast<double>(sample_side_px) / length_px);
   mean.gain = squares_e2 / (squares_e2 + measured * mean.measured_std_e * mean.measured_std_e);
   return lines_stand_out(mean, noise) ? mean.line_std_e : 0;
 }
@@ -124,8 +127,9 @@ void set_lines(const RawFrame& frame, const DevelopPlan& plan, const denoise::Ra
   }
   const RawElectrons sample = sample_electrons(frame, plan, squares, executor);
   const int count = static_cast<int>(squares.size());
-  const double rows_e = line_std_e(sample, count, denoise::Lines::rows, noise, executor);
-  const double columns_e = line_std_e(sample, count, denoise::Lines::columns, noise, executor);
+  const Rect& active = frame.raw.active;
+  const double rows_e = line_std_e(sample, count, denoise::Lines::rows, active.width, noise, executor);
+  const double columns_e = line_std_e(sample, count, denoise::Lines::columns, active.height, noise, executor);
   // A square of 8 x 8 pixels has the mean of eight of each.
   const double seen_e = std::sqrt((rows_e * rows_e + columns_e * columns_e) / seen_box_px);
   std::vector<float> rms;
