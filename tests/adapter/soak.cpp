@@ -10,12 +10,12 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
-#include <thread>
 #include <utility>
 
 #include "tests/adapter/soak_parts.h"
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/count_malloc.h"
+#include "tests/support/this_process.h"
 
 namespace lowlux {
 namespace {
@@ -38,15 +38,13 @@ class Soak {
   Soak(const Functions& functions, std::uint64_t seed) : f_(functions), chance_{seed} {}
 
   void run(int frames) {
-    std::thread([] {}).join();  // a sanitizer's own thread starts with the first of the program
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    const int threads = threads_now();
+    const int threads = test::threads_at_rest();
     open();
     double warm_mib = 0;
     for (frame_ = 0; frame_ < frames; ++frame_) {
       if (chance_.one_in(400)) {
         release();
-        if (threads_now() != threads) fail("threads are left after release");
+        if (test::settled_threads(threads) != threads) fail("threads are left after release");
         open();
       }
       if (chance_.one_in(25)) configure();
@@ -55,11 +53,11 @@ class Soak {
             "reset", [&](int s) { return f_.reset(stage_[s]); }, LOWLUX_STAGE_OK);
       if (chance_.one_in(5)) fault();
       one_frame();
-      const double now_mib = frame_ % 64 == 0 ? resident_mib() : 0;
+      const double now_mib = frame_ % 64 == 0 ? test::resident_bytes() / (1 << 20) : 0;
       (frame_ < frames / 5 ? warm_mib : most_mib_) = std::max(frame_ < frames / 5 ? warm_mib : most_mib_, now_mib);
     }
     release();
-    if (threads_now() != threads) fail("threads are left at the end");
+    if (test::settled_threads(threads) != threads) fail("threads are left at the end");
     if (most_mib_ > warm_mib + most_growth_mib) fail("memory grows");
     std::printf(
         "soak: %d frames, %d of them wrong on purpose, %d configurations, %.0f MiB after a fifth, %.0f at most, "

@@ -1,18 +1,15 @@
 #pragma once
 
-#include <dirent.h>
 #include <dlfcn.h>
-#include <unistd.h>
 
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <type_traits>
 
 #include "isp/adapter/lowlux_stage.h"
 
-/// What the soak stands on: the loaded functions, chance, and what the process holds.
+/// What the soak stands on: the loaded functions, and chance.
 namespace lowlux {
 
 #define LOWLUX_FUNCTION(name) decltype(&lowlux_stage_##name) name = nullptr
@@ -58,20 +55,5 @@ struct Chance {
   bool one_in(int n) { return below(n) == 0; }
   double share() { return static_cast<double>(next() >> 11U) * 0x1p-53; }
 };
-
-inline double resident_mib() {
-  std::ifstream file("/proc/self/statm");
-  double whole = 0, resident = 0;
-  file >> whole >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
-}
-
-inline int threads_now() {
-  DIR* const tasks = opendir("/proc/self/task");
-  int count = 0;
-  for (const dirent* entry = readdir(tasks); entry != nullptr; entry = readdir(tasks)) count += entry->d_name[0] != '.';
-  closedir(tasks);
-  return count;
-}
 
 }  // namespace lowlux

@@ -1,18 +1,14 @@
-#include <dirent.h>
 #include <gtest/gtest.h>
 #include <malloc.h>
-#include <unistd.h>
 
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <thread>
 
 #include "isp/adapter/stage.h"
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/count_malloc.h"
+#include "tests/support/this_process.h"
 
 namespace lowlux {
 namespace {
@@ -142,45 +138,20 @@ TEST(StageThreads, GiveTheSameBytesInEveryMode) {
   }
 }
 
-int threads_now() {
-  DIR* const tasks = opendir("/proc/self/task");
-  int count = 0;
-  for (const dirent* entry = readdir(tasks); entry != nullptr; entry = readdir(tasks)) count += entry->d_name[0] != '.';
-  closedir(tasks);
-  return count;
-}
-
-/// The kernel takes a thread that was joined off its list a moment later.
-int threads_in_the_end(int expected) {
-  for (int tries = 0; tries < 200 && threads_now() != expected; ++tries) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  return threads_now();
-}
-
 TEST(StageThreads, AreAsManyAsAskedForAndGoneAfterRelease) {
-  std::thread([] {}).join();  // a sanitizer's own thread starts with the first of the program
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  const int before = threads_now();
+  const int before = test::threads_at_rest();
   const RawFormatNames& names = names_of_bayer(10);
   for (const int threads : {0, 1, 2, 8}) {
     {
       Rig rig(plain_settings(threads), names, width, height, LOWLUX_STAGE_NV12);
       ASSERT_EQ(rig.process(scene(names.format, width, height), no_params()), LOWLUX_STAGE_OK);
-      EXPECT_EQ(threads_now(), before + (threads == 0 ? 2 : threads) - 1) << "the caller's is among them";
+      EXPECT_EQ(test::threads_now(), before + (threads == 0 ? 2 : threads) - 1) << "the caller's is among them";
     }
-    EXPECT_EQ(threads_in_the_end(before), before);
+    EXPECT_EQ(test::settled_threads(before), before);
   }
 }
 
 #ifdef LOWLUX_COUNTS_MALLOC
-
-double resident_bytes() {
-  std::ifstream file("/proc/self/statm");
-  double whole = 0, resident = 0;
-  file >> whole >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
-}
 
 /// What a stage's setup is, as far as its memory goes.
 isp::LiveSetup setup_of(const Mode& mode, const RawFormat& format, int w, int h) {
@@ -202,16 +173,16 @@ TEST(StageMemory, IsWhatTheLimitTakesItFor) {
     const auto settings = settings_of(mode, 2);
     Rig rig(settings, names_of_bayer(8), 16, 16, mode.fourcc);  // the stage, its threads and the pictures' memory
     std::vector<std::uint8_t> picture(std::size_t{w} * h * 6);
-    const double before = resident_bytes();
+    const double before = test::resident_bytes();
     rig.in = input_of(names, w, h);
     rig.out = {.size = sizeof rig.out, .fourcc = mode.fourcc};
     ASSERT_EQ(lowlux_stage_configure(rig.stage.get(), &rig.in, &rig.out), LOWLUX_STAGE_OK) << rig.error();
-    const double configured = resident_bytes() - before;
+    const double configured = test::resident_bytes() - before;
     for (int p = 0; p < rig.out.planes; ++p) {
       rig.picture.plane[p] = {picture.data() + (p == 0 ? 0 : rig.out.bytes[0]), rig.out.bytes[p], rig.out.stride[p]};
     }
     ASSERT_EQ(rig.process(bytes, stride, params_of(mode, names.format, 0)), LOWLUX_STAGE_OK) << rig.error();
-    const double used = resident_bytes() - before;
+    const double used = test::resident_bytes() - before;
     const auto said = static_cast<double>(isp::stage_memory_bytes(setup_of(mode, names.format, w, h), 2));
     RecordProperty(mode.name, std::to_string(configured / said));
     if (const char* const prints = std::getenv("LOWLUX_PRINT"); prints != nullptr) {

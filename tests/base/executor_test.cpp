@@ -5,27 +5,14 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <filesystem>
 #include <set>
 #include <thread>
 #include <vector>
 
+#include "tests/support/this_process.h"
+
 namespace lowlux {
 namespace {
-
-int threads_of_process() {
-  int n = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/task")) ++n;
-  return n;
-}
-
-// A joined thread can stay listed in /proc for a moment.
-int settled_threads(int expected) {
-  for (int tries = 0; tries < 200 && threads_of_process() != expected; ++tries) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  return threads_of_process();
-}
 
 TEST(RowBand, BandsCoverEveryRowOnceAndStartAtEvenRows) {
   for (int height = 0; height <= 40; ++height) {
@@ -82,13 +69,12 @@ TEST(PoolExecutor, RunsNothingForNoTasks) {
 }
 
 TEST(PoolExecutor, EndsItsThreadsWhenDestroyed) {
-  { const PoolExecutor first(2); }  // a sanitizer's own thread starts with the first of the program
-  const int before = settled_threads(threads_of_process());
+  const int before = test::threads_at_rest();
   {
     PoolExecutor pool(5);
-    EXPECT_EQ(threads_of_process(), before + 4);
+    EXPECT_EQ(test::threads_now(), before + 4);
   }
-  EXPECT_EQ(settled_threads(before), before);
+  EXPECT_EQ(test::settled_threads(before), before);
 }
 
 TEST(PoolExecutor, TaskIndexDecidesTheThread) {

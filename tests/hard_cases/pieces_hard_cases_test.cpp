@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <variant>
@@ -68,19 +69,30 @@ isp::DenoiseChoice level_choice(Level level) {
   return {.mode = isp::DenoiseChoice::Mode::level, .level = level, .line_noise = false};
 }
 
+struct FewAndMany {
+  isp::Developed few;
+  isp::Developed many;
+};
+/// 3 x 3 periods, developed whole, and so many that they go by pieces; nothing if either fails.
+std::optional<FewAndMany> few_and_many_periods(int columns, int rows, const isp::DevelopOptions& options,
+                                               Denormals mode) {
+  PoolExecutor pool(2);
+  test::ExecutorInMode executor(pool, mode);
+  const RawFrame many_periods = repeated(columns, rows);
+  auto few = in_mode(mode, [&] { return isp::develop(repeated(3, 3), options, executor); });
+  auto many = in_mode(mode, [&] { return isp::develop(many_periods, options, executor); });
+  EXPECT_TRUE(few && many);
+  if (!few || !many) return {};
+  EXPECT_TRUE(isp::goes_by_tiles(many_periods.raw, many->plan, {}));
+  return FewAndMany{std::move(*few), std::move(*many)};
+}
+
 /// Of a large frame, the rows of each inner period that differ from those of the middle of a small one.
 double rows_of_100_megapixels(Denormals mode) {
   constexpr int columns = 20, rows = 19;
-  PoolExecutor pool(2);
-  test::ExecutorInMode executor(pool, mode);
-  const isp::DevelopOptions options = options_for({}, SampleType::u8);
-  const RawFrame large_frame = repeated(columns, rows);
-  const auto small = in_mode(mode, [&] { return isp::develop(repeated(3, 3), options, executor); });
-  const auto large = in_mode(mode, [&] { return isp::develop(large_frame, options, executor); });
-  EXPECT_TRUE(small && large);
-  if (!small || !large) return NAN;
-  EXPECT_TRUE(isp::goes_by_tiles(large_frame.raw, large->plan, {}));
-  const auto &few = std::get<Encoded8>(small->picture).codes, &all = std::get<Encoded8>(large->picture).codes;
+  const auto both = few_and_many_periods(columns, rows, options_for({}, SampleType::u8), mode);
+  if (!both) return NAN;
+  const auto &few = std::get<Encoded8>(both->few.picture).codes, &all = std::get<Encoded8>(both->many.picture).codes;
   double wrong = 0;
   for (int y = period; y < (rows - 1) * period; ++y) {
     const std::uint8_t* const expected = few.row(period + y % period) + 3 * period;
@@ -146,20 +158,15 @@ double error_of_pieces(Level level, Denormals mode) {
 /// Inner periods of 26 megapixels against the middle of 2.4.
 double error_of_26_megapixels(Denormals mode) {
   constexpr int columns = 11, rows = 9;
-  PoolExecutor pool(2);
-  test::ExecutorInMode executor(pool, mode);
-  const isp::DevelopOptions options = options_for(level_choice(Level::standard), SampleType::f32);
-  const RawFrame large_frame = repeated(columns, rows);
-  const auto small = in_mode(mode, [&] { return isp::develop(repeated(3, 3), options, executor); });
-  const auto large = in_mode(mode, [&] { return isp::develop(large_frame, options, executor); });
-  EXPECT_TRUE(small && large);
-  if (!small || !large) return NAN;
-  EXPECT_TRUE(isp::goes_by_tiles(large_frame.raw, large->plan, {}));
-  const auto &few = std::get<SceneLinear>(small->picture), &all = std::get<SceneLinear>(large->picture);
+  const auto options = options_for(level_choice(Level::standard), SampleType::f32);
+  const auto both = few_and_many_periods(columns, rows, options, mode);
+  if (!both) return NAN;
+  const auto &few = std::get<SceneLinear>(both->few.picture), &all = std::get<SceneLinear>(both->many.picture);
   double worst = 0;
   for (int j = 1; j < rows - 1; ++j) {
     for (int i = 1; i < columns - 1; ++i) {
-      keep_worst(worst, difference({all, i * period, j * period}, {few, period, period}, period, period, large->plan));
+      keep_worst(worst,
+                 difference({all, i * period, j * period}, {few, period, period}, period, period, both->many.plan));
     }
   }
   return worst;
