@@ -7,17 +7,10 @@
 
 #include "denoise/chroma_start.h"
 #include "denoise/layout.h"
+#include "isp/pipeline/cell_figures.h"
 
 namespace lowlux::isp {
 namespace {
-
-constexpr std::array share_of_sites{0.25, 0.5, 0.25};
-
-double mean_of(const std::array<double, 3>& of_colour) {
-  double sum = 0;
-  for (std::size_t c = 0; c < 3; ++c) sum += share_of_sites[c] * of_colour[c];
-  return sum;
-}
 
 struct Tile {
   double charge_e = 0;  // sum over blocks
@@ -85,24 +78,18 @@ std::vector<Tile> tiles_of(const Axis& across, const Axis& down, const CameraRgb
 
 ChromaWork chroma_work(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
                        const Thumbnail& thumbnail) {
-  std::array<double, 3> electrons_at_white{};
-  for (int site = 0; site < 4; ++site) {
-    electrons_at_white[static_cast<std::size_t>(colour_at(frame.raw.phase, site & 1, site >> 1))] =
-        (*plan.electrons_at_white)[site];
-  }
-  double dark_e = 0;
-  for (const double d : noise.dark_mean_e) dark_e += d / 4;
+  const double dark_e = mean_of_sites(noise.dark_mean_e), variance_e2 = mean_of_colours(noise.variance_e2);
   const Rect& active = frame.raw.active;
   const Axis across = axis_of(active.width, thumbnail.mean.width());
   const Axis down = axis_of(active.height, thumbnail.mean.height());
-  const std::vector<Tile> tiles = tiles_of(across, down, thumbnail.mean, electrons_at_white);
+  const std::vector<Tile> tiles = tiles_of(across, down, thumbnail.mean, electrons_by_colour(frame.raw, plan));
   const int levels = denoise::levels_of(across.cells, down.cells);
   const std::size_t count = tiles.size();
   std::vector<float> start(count);
   std::vector<unsigned char> has_chroma(count * denoise::most_levels);
   for (std::size_t i = 0; i < count; ++i) {
     const double mean_e = tiles[i].charge_e / tiles[i].blocks;
-    const int level = denoise::start_of(mean_e - dark_e, dark_e, mean_of(noise.variance_e2));
+    const int level = denoise::start_of(mean_e - dark_e, dark_e, variance_e2);
     start[i] = static_cast<float>(std::min(level, levels - 1));
   }
   denoise::ChromaStarts starts{start, has_chroma, across.tiles, down.tiles};

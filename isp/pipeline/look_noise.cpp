@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "isp/base/look_grid.h"
+#include "isp/pipeline/cell_figures.h"
 
 namespace lowlux::isp {
 namespace {
@@ -18,15 +19,12 @@ std::array<float, 3> weights_of(const DevelopPlan& plan) {
   return weights;
 }
 
-float mean_of(const PerSite<double>& sites) {
-  return static_cast<float>(0.25 * (sites[0] + sites[1] + sites[2] + sites[3]));
-}
-
 // Luma that is left noisy, over the cells of 2 x 2 that lie in those of the grid.
 void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const float>& residual, PlaneView<float> out,
              Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
-  const float unit = (weights[0] + weights[1] + weights[2]) / mean_of(*plan.electrons_at_white);
+  const auto electrons = static_cast<float>(mean_of_sites(*plan.electrons_at_white));
+  const float unit = (weights[0] + weights[1] + weights[2]) / electrons;
   const int cells = plan.options.half ? 4 : 2;  // of the map along a side of the grid's
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {

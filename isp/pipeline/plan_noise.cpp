@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "denoise/noise_check.h"
+#include "isp/pipeline/cell_figures.h"
 #include "isp/pipeline/electron_mosaic.h"
 #include "isp/pipeline/frame_sample.h"
 
@@ -166,16 +167,12 @@ void set_noise_model(const RawFrame& frame, const DevelopPlan& plan, NoiseReduct
 
 double middle_snr(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
                   const Thumbnail& thumbnail, std::vector<double>& snr) {
-  constexpr std::array share{0.25, 0.5, 0.25};
-  std::array<double, 3> electrons{};
-  for (int site = 0; site < 4; ++site) electrons[colour_of(frame.raw, site)] = (*plan.electrons_at_white)[site];
-  double dark = 0, variance = 0;
-  for (const double d : noise.dark_mean_e) dark += d / 4;
-  for (int c = 0; c < 3; ++c) variance += share[c] * noise.variance_e2[c];
+  const std::array<double, 3> electrons = electrons_by_colour(frame.raw, plan);
+  const double dark = mean_of_sites(noise.dark_mean_e), variance = mean_of_colours(noise.variance_e2);
   snr.resize(thumbnail.mean.plane[0].size());
   for (std::size_t i = 0; i < snr.size(); ++i) {
     double charge = 0;
-    for (int c = 0; c < 3; ++c) charge += share[c] * electrons[c] * thumbnail.mean.plane[c].data()[i];
+    for (int c = 0; c < 3; ++c) charge += share_of_sites[c] * electrons[c] * thumbnail.mean.plane[c].data()[i];
     snr[i] = std::max(charge - dark, 0.0) / std::sqrt(std::max(charge, 0.0) + variance);
   }
   const auto middle = snr.begin() + static_cast<std::ptrdiff_t>(snr.size() / 2);

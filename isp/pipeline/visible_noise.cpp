@@ -7,6 +7,7 @@
 
 #include "isp/model/colorimetry.h"
 #include "isp/model/colour_difference.h"
+#include "isp/pipeline/cell_figures.h"
 #include "isp/render/output_space.h"
 #include "isp/render/retarget_rows.h"
 #include "isp/render/tone.h"
@@ -16,7 +17,6 @@ namespace {
 
 constexpr int most_blocks_along = 16;
 constexpr std::array<double, 3> samples_in_box{16, 32, 16};  // of R, G, B
-constexpr std::array<double, 3> share_of_sites{0.25, 0.5, 0.25};
 constexpr double least_variance_e2 = 1e-6;
 constexpr double surroundings_px =
     12;  // each way: a block of the denoiser, whose thresholds are those of its mean variance
@@ -112,10 +112,9 @@ struct Channels {
 };
 
 Channels channels_of(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise) {
-  Channels out;
+  Channels out{.electrons_at_white = electrons_by_colour(frame.raw, plan)};
   for (int site = 0; site < 4; ++site) {
     const auto c = static_cast<std::size_t>(colour_at(frame.raw.phase, site & 1, site >> 1));
-    out.electrons_at_white[c] = (*plan.electrons_at_white)[site];
     out.dark_e[c] += noise.dark_mean_e[site] * (c == 1 ? 0.5 : 1);
   }
   return out;

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "isp/base/frame.h"
+#include "isp/pipeline/plan.h"
+
+/// Figures of a Bayer cell, by colour or by site.
+namespace lowlux::isp {
+
+/// How many of its sites are red, green and blue, of all.
+inline constexpr std::array<double, 3> share_of_sites{0.25, 0.5, 0.25};
+
+/// Mean over the sites of a figure that each colour has.
+constexpr double mean_of_colours(const std::array<double, 3>& of_colour) {
+  double sum = 0;
+  for (std::size_t c = 0; c < 3; ++c) sum += share_of_sites[c] * of_colour[c];
+  return sum;
+}
+
+constexpr double mean_of_sites(const PerSite<double>& of_site) {
+  return (of_site[0] + of_site[1] + of_site[2] + of_site[3]) / 4;
+}
+
+/// Electrons at white of each colour; both greens have as many. Precondition: plan.electrons_at_white.
+inline std::array<double, 3> electrons_by_colour(const RawDn& raw, const DevelopPlan& plan) {
+  std::array<double, 3> out{};
+  for (int site = 0; site < 4; ++site) {
+    out[static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1))] = (*plan.electrons_at_white)[site];
+  }
+  return out;
+}
+
+}  // namespace lowlux::isp
