@@ -9,9 +9,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <limits>
 #include <utility>
 
+#include "tests/adapter/soak_faults.h"
 #include "tests/adapter/soak_parts.h"
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/count_malloc.h"
@@ -261,34 +261,7 @@ class Soak {
   void wrong_configuration() {
     auto in = in_;
     auto out = out_;
-    int expected = LOWLUX_STAGE_BAD_ARGUMENT;
-    switch (chance_.below(7)) {
-      case 0:
-        in.fourcc ^= 0x5a5a5a5a;
-        expected = LOWLUX_STAGE_UNSUPPORTED;
-        break;
-      case 1:
-        out.fourcc += 1;
-        expected = LOWLUX_STAGE_UNSUPPORTED;
-        break;
-      case 2:
-        in.width = in.height = 65536;
-        in.crop = in.masked = {};
-        expected = LOWLUX_STAGE_TOO_LARGE;
-        break;
-      case 3:
-        in.crop = {in.width - 1, 0, 2, 2};
-        break;
-      case 4:
-        in.white_level = std::numeric_limits<double>::quiet_NaN();
-        break;
-      case 5:
-        in.height = chance_.from(-5, 1);
-        break;
-      default:
-        out.size = static_cast<std::size_t>(chance_.below(8));
-        break;
-    }
+    const int expected = make_wrong(chance_, in, out);
     const bool looked_at = out.size == sizeof out;
     const auto asked = out;
     call(
@@ -311,65 +284,11 @@ class Soak {
     lowlux_stage_source source{frames_[0].data(), stride_ * static_cast<std::size_t>(in_.height - 1) + in_.stride,
                                stride_, -1};
     auto wanted = params();
-    auto& picture = planes_[0].picture;
-    const auto kept = picture;
-    lowlux_stage_plane& plane = picture.plane[chance_.below(out_.planes)];
-    int expected = LOWLUX_STAGE_BAD_ARGUMENT;
-    switch (chance_.below(12)) {
-      case 0:
-        source.data = nullptr;
-        expected = LOWLUX_STAGE_MISSING_PLANE;
-        break;
-      case 1:
-        source.length -= static_cast<std::size_t>(chance_.from(1, static_cast<int>(source.length)));
-        expected = LOWLUX_STAGE_SHORT_BUFFER;
-        break;
-      case 2:
-        source.stride = static_cast<std::size_t>(chance_.below(static_cast<int>(in_.stride)));
-        expected = LOWLUX_STAGE_BAD_STRIDE;
-        break;
-      case 3:
-        source.stride = SIZE_MAX - static_cast<std::size_t>(chance_.below(1000));
-        expected = LOWLUX_STAGE_BAD_STRIDE;
-        break;
-      case 4:
-        plane.data = nullptr;
-        expected = LOWLUX_STAGE_MISSING_PLANE;
-        break;
-      case 5:
-        plane.length -= static_cast<std::size_t>(chance_.from(1, static_cast<int>(plane.length)));
-        expected = LOWLUX_STAGE_SHORT_BUFFER;
-        break;
-      case 6:
-        plane.stride = chance_.one_in(2) ? 1 : SIZE_MAX / 2 + 1;
-        expected = LOWLUX_STAGE_BAD_STRIDE;
-        break;
-      case 7:
-        picture.planes = 0;
-        expected = LOWLUX_STAGE_MISSING_PLANE;
-        break;
-      case 8:
-        wanted.valid |= LOWLUX_STAGE_HAS_BLACK;
-        wanted.black_level[chance_.below(4)] = chance_.one_in(2) ? 65535.0F : std::numeric_limits<float>::quiet_NaN();
-        expected = LOWLUX_STAGE_BAD_PARAMETER;
-        break;
-      case 9:
-        wanted.valid |= LOWLUX_STAGE_HAS_EXPOSURE | 1U << chance_.from(20, 31);
-        wanted.exposure_s = -1;
-        expected = LOWLUX_STAGE_BAD_PARAMETER;
-        break;
-      case 10:
-        wanted.size = static_cast<std::size_t>(chance_.below(100));
-        break;
-      default:
-        picture.size = SIZE_MAX;
-        break;
-    }
-    const auto wrong = picture;
+    auto picture = planes_[0].picture;
+    const int expected = make_wrong(chance_, in_, source, picture, wanted);
     call(
-        "wrong process", [&](int s) { return f_.process(stage_[s], &source, &wrong, &wanted, nullptr, nullptr); },
+        "wrong process", [&](int s) { return f_.process(stage_[s], &source, &picture, &wanted, nullptr, nullptr); },
         expected);
-    picture = kept;
   }
 
   const Functions f_;
