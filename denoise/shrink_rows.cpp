@@ -70,7 +70,7 @@ HWY_INLINE void shrink_strip(const BlockRow& in, int plane, int first, int count
   if (in.pilot[0] != nullptr) {
     transform_columns<kStep>(in.pilot[plane] + kStep * first, in.stride, count, s.pilot);
   }
-  for (int i = 0; i < strip_blocks; i += n) store(hn::Zero(f), s.weight + lead + i);
+  std::fill(s.weight, s.weight + places, 0.0f);  // before the first block and after the last, too
   for (int i = 0; i < count; i += n) {
     const VF variance = load(m.variance + first + i);
     VF power;
