@@ -55,8 +55,8 @@ struct Run {
   template <class Work>
   void for_each_source_site(int y, const Work& work) const;
   ChromaStarts starts() const;
-  rows::PackRow packing(const ThreadMemory& m) const;
-  void pack(int virtual_row, bool planes, const ThreadMemory& m) const;
+  rows::PackRow packing(const FrontMemory& m) const;
+  void pack(int virtual_row, bool planes, const FrontMemory& m) const;
   void front() const;
   void unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const;
 };
@@ -112,7 +112,7 @@ ChromaStarts Run::starts() const {
   return out;
 }
 
-rows::PackRow Run::packing(const ThreadMemory& m) const {
+rows::PackRow Run::packing(const FrontMemory& m) const {
   rows::PackRow in{};
   for (int i = 0; i < 2; ++i) in.raw[i] = m.raw[i];
   in.red_is_odd = red_column(raw.phase) == 1;
@@ -126,7 +126,7 @@ rows::PackRow Run::packing(const ThreadMemory& m) const {
 }
 
 /// One row of cells, beyond the ends of the frame mirrored, into the window, and if asked for into level 0.
-void Run::pack(int virtual_row, bool planes, const ThreadMemory& m) const {
+void Run::pack(int virtual_row, bool planes, const FrontMemory& m) const {
   const int row = mirrored(virtual_row, rows), width = raw.value.width;
   const int red_y = red_row(raw.phase), slot = (virtual_row + 16) % 16, padded_columns = memory.level[0].width;
   for (int i = 0; i < 2; ++i) {
@@ -137,7 +137,7 @@ void Run::pack(int virtual_row, bool planes, const ThreadMemory& m) const {
   }
   rows::PackedRow out{};
   for (int k = 0; k < 3; ++k) out.raw_e[k] = m.window[k][slot];
-  out.saturated = m.row[0];
+  out.saturated = m.saturated;
   if (planes) {
     for (int p = 0; p < 4; ++p) out.plane[p] = memory.level[0].noisy.row(p, virtual_row);
   }
@@ -158,7 +158,8 @@ void Run::pack(int virtual_row, bool planes, const ThreadMemory& m) const {
 void Run::front() const {
   const PyramidLevel& level = memory.level[0];
   in_bands(workers, level.height / 2, [&](int first, int last, int thread) {
-    const ThreadMemory& m = memory.thread[thread];
+    const FrontMemory& m = memory.thread[thread].front;
+    const ScratchUse use(m.scratch);
     int packed = 2 * first - 4;
     for (int pair = first; pair < last; ++pair) {
       for (; packed < 2 * pair + 6; ++packed) pack(packed, packed >= 2 * first && packed < 2 * last, m);
@@ -172,7 +173,7 @@ void Run::front() const {
       in.cells = level.width;
       float* const out[4] = {level.variance.row(0, pair), level.variance.row(1, pair), level.variance.row(2, pair),
                              level.variance.row(3, pair)};
-      rows::variance_row(in, m.blocks, out);
+      rows::variance_row(in, m.variance, out);
     }
   });
 }
@@ -183,7 +184,8 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
   const SiteSlopes slopes = site_slopes(raw.phase);
   repeat_luma_edges(planes, columns, rows, workers);
   in_bands(workers, rows, [&](int first, int last, int thread) {
-    const ThreadMemory& m = memory.thread[thread];
+    const UnpackMemory& m = memory.thread[thread].unpack;
+    const ScratchUse use(m.scratch);
     for (int y = first; y < last; ++y) {
       rows::UnpackRow in{};
       const int half = level.height / 2, far = std::clamp(y % 2 == 0 ? y / 2 - 1 : y / 2 + 1, 0, half - 1);
@@ -191,13 +193,13 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
         rows::smooth_row({{nullptr, level.residual.row(p, y / 2), nullptr},
                           {nullptr, level.residual.row(p, far), nullptr},
                           level.width / 2},
-                         m.row[4], m.row[p]);
+                         m.up, m.residual[p]);
         in.plane[p] = planes.row(p, y);
-        in.residual[p] = m.row[p];
+        in.residual[p] = m.residual[p];
       }
       const std::uint8_t* const saturated = memory.saturated.row(y);
-      for (int x = 0; x < columns; ++x) m.row[4][x] = saturated[x] != 0 ? 0.0f : 1.0f;
-      in.seen = m.row[4];
+      for (int x = 0; x < columns; ++x) m.seen[x] = saturated[x] != 0 ? 0.0f : 1.0f;
+      in.seen = m.seen;
       in.cells = columns;
       in.rho = std::isinf(options.rho) ? -1.0f : static_cast<float>(options.rho);
       for (int k = 0; k < 3; ++k) in.per_gain[k] = static_cast<float>(1 / options.white_gain[k]);
@@ -206,19 +208,19 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
       in.luma_beside[0] = luma.above;
       in.luma_beside[1] = luma.below;
       in.slopes = {slopes.c2_x, slopes.c2_y, slopes.c3_x, slopes.c3_y};
-      rows::unpack_row(in, {{m.row[5], m.row[6]}, m.row[7], {m.row[8], m.row[9], m.row[10]}});
+      rows::unpack_row(in, {{m.signal[0], m.signal[1]}, m.confidence, {m.variance[0], m.variance[1], m.variance[2]}});
       for (int i = 0; i < 2; ++i) {
         const int raw_y = 2 * y + (i == 0 ? red_row(raw.phase) : 1 - red_row(raw.phase));
         if (raw_y >= signal_e.height) continue;
-        for_each_source_site(raw_y, [&](int x, float excess) { m.row[5 + i][x] += excess; });
-        std::memcpy(signal_e.row(raw_y), m.row[5 + i], signal_e.width * sizeof(float));
+        for_each_source_site(raw_y, [&](int x, float excess) { m.signal[i][x] += excess; });
+        std::memcpy(signal_e.row(raw_y), m.signal[i], signal_e.width * sizeof(float));
       }
       const auto put = [&](PlaneView<float> map, const float* from) {
         if (map.data != nullptr) std::memcpy(map.row(y), from, columns * sizeof(float));
       };
-      put(maps.residual_variance, m.row[0]);
-      put(maps.chroma_confidence, m.row[7]);
-      for (int k = 0; k < 3; ++k) put(maps.site_variance[k], m.row[8 + k]);
+      put(maps.residual_variance, m.residual[0]);
+      put(maps.chroma_confidence, m.confidence);
+      for (int k = 0; k < 3; ++k) put(maps.site_variance[k], m.variance[k]);
     }
   });
 }

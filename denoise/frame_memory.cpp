@@ -36,6 +36,21 @@ class Rows {
     for (float*& plane : set.plane) plane = take(row, static_cast<std::size_t>(height));
     return set;
   }
+  /// A row for a kernel's own use, of `floats` at least.
+  rows::RowScratch kernel(std::size_t floats) {
+    const std::size_t whole = (lead + floats + line_floats - 1) / line_floats * line_floats;
+    return {take(whole, 1), whole - lead};
+  }
+  /// What `lay_out` takes is one scratch memory.
+  template <class LayOut>
+  Scratch scratch(const LayOut& lay_out) {
+    const std::size_t first = used_;
+    lay_out();
+    const Scratch out{memory_ == nullptr ? nullptr : memory_ + first, (used_ - first) * sizeof(float)};
+    used_ += scratch_guard_bytes / sizeof(float);
+    if (memory_ != nullptr) close_scratch(out);
+    return out;
+  }
   std::size_t used() const { return used_; }
 
  private:
@@ -43,41 +58,70 @@ class Rows {
   std::size_t used_ = 0;
 };
 
-void lay_out_thread(Rows& from, int width, ThreadMemory& out) {
-  const std::size_t row = row_size(width), half = row_size(width / 2);
-  for (float*& r : out.raw) r = from.take(row_size(2 * width), 1);
-  for (auto& plane : out.window) {
-    for (float*& r : plane) r = from.take(row, 1);
-  }
-  for (auto& plane : out.value) {
-    for (float*& r : plane) r = from.take(row, 1);
-  }
-  for (auto* sums : {&out.weight, &out.residual}) {
-    for (auto& plane : *sums) {
-      for (float*& r : plane) r = from.take(half, 1);
-    }
-  }
-  for (float*& r : out.row) r = from.take(row_size(2 * width), 1);
-  out.blocks = from.take(rows::block_scratch(width) + row, 1);
-}
-
-void lay_out_search(Rows& from, int width, SearchMemory& out) {
-  for (float*& r : out.pair) r = from.take(row_size(2 * width), 1);
-  for (float*& r : out.sums) r = from.take(row_size(2 * width), 1);
-}
-
-void lay_out_patches(Rows& from, int width, PatchMemory& out) {
-  for (auto* sums : {&out.change, &out.weight}) {
-    for (auto& plane : *sums) {
+void lay_out(Rows& from, int width, FrontMemory& out) {
+  out.scratch = from.scratch([&] {
+    for (float*& r : out.raw) r = from.take(row_size(2 * width), 1);
+    for (auto& plane : out.window) {
       for (float*& r : plane) r = from.take(row_size(width), 1);
     }
-  }
-  for (auto* sums : {&out.residual, &out.residual_weight}) {
-    for (auto& plane : *sums) {
-      for (float*& r : plane) r = from.take(row_size(width / 2), 1);
+    out.saturated = from.take(row_size(width), 1);
+    out.variance = from.kernel(rows::variance_scratch(width));
+  });
+}
+
+void lay_out(Rows& from, int width, BlockMemory& out) {
+  out.scratch = from.scratch([&] {
+    for (auto& plane : out.value) {
+      for (float*& r : plane) r = from.take(row_size(width), 1);
     }
-  }
-  out.scratch = from.take(rows::patch_scratch(), 1);
+    for (auto* sums : {&out.weight, &out.residual}) {
+      for (auto& plane : *sums) {
+        for (float*& r : plane) r = from.take(row_size(width / 2), 1);
+      }
+    }
+    out.weights = from.kernel(rows::finish_scratch(width));
+    out.blocks = from.kernel(rows::block_scratch(width));
+  });
+}
+
+void lay_out(Rows& from, int width, UpMemory& out) {
+  out.scratch = from.scratch([&] {
+    out.up = from.kernel(rows::up_scratch(width / 2));
+    for (float** r : {&out.coarse, &out.share, &out.finer}) *r = from.take(row_size(width), 1);
+  });
+}
+
+void lay_out(Rows& from, int width, UnpackMemory& out) {
+  out.scratch = from.scratch([&] {
+    out.up = from.kernel(rows::up_scratch(width / 2));
+    for (float*& r : out.residual) r = from.take(row_size(width), 1);
+    for (float*& r : out.signal) r = from.take(row_size(2 * width), 1);
+    for (float** r : {&out.seen, &out.confidence}) *r = from.take(row_size(width), 1);
+    for (float*& r : out.variance) r = from.take(row_size(width), 1);
+  });
+}
+
+void lay_out(Rows& from, int width, SearchMemory& out) {
+  out.scratch = from.scratch([&] {
+    for (float*& r : out.pair) r = from.take(row_size(2 * width), 1);
+    for (float*& r : out.sums) r = from.take(row_size(2 * width), 1);
+  });
+}
+
+void lay_out(Rows& from, int width, PatchMemory& out) {
+  out.scratch = from.scratch([&] {
+    for (auto* sums : {&out.change, &out.weight}) {
+      for (auto& plane : *sums) {
+        for (float*& r : plane) r = from.take(row_size(width), 1);
+      }
+    }
+    for (auto* sums : {&out.residual, &out.residual_weight}) {
+      for (auto& plane : *sums) {
+        for (float*& r : plane) r = from.take(row_size(width / 2), 1);
+      }
+    }
+    out.patches = from.kernel(rows::patch_scratch());
+  });
 }
 
 /// Cells of the largest frame, those that are appended with them.
@@ -117,10 +161,15 @@ std::size_t FrameLayout::lay_out(float* memory) {
     level[l].residual = from.planes(w / 2, h / 2);
   }
   difference = from.planes(extent.width / 2, extent.height / 2);
-  for (ThreadMemory& own : thread) lay_out_thread(from, extent.width, own);
-  for (SearchMemory& own : search) lay_out_search(from, extent.width, own);
-  for (PatchMemory& own : patches) lay_out_patches(from, extent.width, own);
-  return from.used() + 2 * lead + denoise::rows::padding;
+  for (ThreadMemory& own : thread) {
+    denoise::lay_out(from, extent.width, own.front);
+    denoise::lay_out(from, extent.width, own.blocks);
+    denoise::lay_out(from, extent.width, own.up);
+    denoise::lay_out(from, extent.width, own.unpack);
+  }
+  for (SearchMemory& own : search) denoise::lay_out(from, extent.width, own);
+  for (PatchMemory& own : patches) denoise::lay_out(from, extent.width, own);
+  return from.used();
 }
 
 std::size_t FrameMemory::bytes(int max_width, int max_height, int threads, bool best) {

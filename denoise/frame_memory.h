@@ -10,7 +10,9 @@
 #include "denoise/layout.h"
 #include "denoise/nl_bayes_rows.h"
 #include "denoise/point_sources.h"
+#include "denoise/rows.h"
 #include "isp/base/plane.h"
+#include "isp/base/scratch.h"
 
 /// The memory of a Denoiser: everything a frame needs, laid out for the largest.
 namespace lowlux::denoise {
@@ -33,24 +35,61 @@ struct PyramidLevel {
   PlaneSet residual;
 };
 
-/// Rows of one thread. All are of the widest level and its padding.
-struct ThreadMemory {
-  std::array<float*, 2> raw{};                     // one row of raw samples each
+/// Rows of one thread while it makes planes and variances of level 0. Here and below, rows are of the widest level and
+/// its padding, those of raw samples twice as long.
+struct FrontMemory {
+  Scratch scratch;
+  std::array<float*, 2> raw{};                     // raw samples
   std::array<std::array<float*, 16>, 3> window{};  // R, G, B with dark, last 16 rows
-  std::array<std::array<float*, 8>, 4> value{};    // sums of blocks, of 8 rows
-  std::array<std::array<float*, 4>, 4> weight{};   // of 4 rows of half size
+  float* saturated = nullptr;
+  rows::RowScratch variance{};
+};
+
+/// Sums of blocks of one thread.
+struct BlockMemory {
+  Scratch scratch;
+  std::array<std::array<float*, 8>, 4> value{};   // of 8 rows
+  std::array<std::array<float*, 4>, 4> weight{};  // of 4 rows of half size
   std::array<std::array<float*, 4>, 4> residual{};
-  std::array<float*, 11> row{};
-  float* blocks = nullptr;
+  rows::RowScratch weights{};  // one row
+  rows::RowScratch blocks{};
+};
+
+/// Rows of one thread while it puts a level on top of the next coarser one.
+struct UpMemory {
+  Scratch scratch;
+  rows::RowScratch up{};
+  float* coarse = nullptr;
+  float* share = nullptr;  // of the coarse level
+  float* finer = nullptr;  // the same at the next finer level
+};
+
+/// Rows of one thread while it makes a mosaic of the planes of level 0.
+struct UnpackMemory {
+  Scratch scratch;
+  rows::RowScratch up{};
+  std::array<float*, 4> residual{};
+  float* seen = nullptr;
+  std::array<float*, 2> signal{};  // raw samples
+  float* confidence = nullptr;
+  std::array<float*, 3> variance{};
+};
+
+struct ThreadMemory {
+  FrontMemory front;
+  BlockMemory blocks;
+  UpMemory up;
+  UnpackMemory unpack;
 };
 
 /// Sums of patches of one thread, for Level::best only.
 struct PatchMemory {
+  Scratch scratch;
   std::array<std::array<float*, rows::ring>, 4> change{};
   std::array<std::array<float*, rows::ring>, 4> weight{};
   std::array<std::array<float*, 2>, 4> residual{};  // of half size
   std::array<std::array<float*, 2>, 4> residual_weight{};
-  float* scratch = nullptr;
+  rows::RowScratch patches{};
   std::uint8_t* chroma = nullptr;  // of each patch of a row
 };
 
@@ -67,7 +106,8 @@ struct FrameLayout {
   std::vector<SearchMemory> search;  // of each thread
   std::vector<PatchMemory> patches;  // of each thread, or empty
 
-  /// Places everything from `memory` on; without memory it only counts.
+  /// Places everything from `memory` on, each scratch memory with a guard of its own behind it; without memory it only
+  /// counts.
   /// @return the floats that takes
   std::size_t lay_out(float* memory);
 };

@@ -1,3 +1,4 @@
+#include <cassert>
 #include <cstddef>
 
 #include "denoise/rows.h"
@@ -221,8 +222,10 @@ HWY_EXPORT(UnpackCells);
 HWY_EXPORT(TargetName);
 
 void pack_row(const PackRow& in, const PackedRow& out) { HWY_DYNAMIC_DISPATCH(PackCells)(in, out); }
-void variance_row(const VarianceRow& in, float* scratch, float* const out[4]) {
-  HWY_DYNAMIC_DISPATCH(VarianceCells)(in, scratch, out);
+std::size_t variance_scratch(int cells) { return 5 * ((static_cast<std::size_t>(cells) + padding) / 16 * 16); }
+void variance_row(const VarianceRow& in, const RowScratch& scratch, float* const out[4]) {
+  assert(scratch.floats >= variance_scratch(in.cells));
+  HWY_DYNAMIC_DISPATCH(VarianceCells)(in, scratch.data, out);
 }
 double sum_of(const float* in, int count) { return HWY_DYNAMIC_DISPATCH(SumOf)(in, count); }
 void add_slope_row(const float* const (&luma)[3], int cells, const Slopes& slopes, float* const (&chroma)[2]) {

@@ -98,9 +98,8 @@ struct NlBayes {
 
   /// Rows first .. last - 1, even. Patches that reach in from beside the band are found again.
   void band(int first, int last, const PatchMemory& m) const {
+    const ScratchUse use(m.scratch);
     const int height = level().height;
-    for (int y = 0; y < rows::ring; ++y) finish(m, y, false);
-    for (int y = 0; y < 2; ++y) finish_residual(m, y, false);
     const int start = std::max(0, first - below + 1),
               end = std::min(height - rows::patch, last - step + rows::search_reach);
     int done = std::max(0, start - rows::search_reach);
@@ -109,7 +108,7 @@ struct NlBayes {
     };
     for (int y = start; y <= end; y += step) {
       wanted(y, m.chroma);
-      rows::nl_bayes_row(patch_row(y, m.chroma), m.scratch, sums(m, y));
+      rows::nl_bayes_row(patch_row(y, m.chroma), m.patches, sums(m, y));
       finish_residual(m, y / 2, y >= first && y < last);
       if (y == height - rows::patch) finish_residual(m, y / 2 + 1, y + 2 < last);
       finish_up_to(y == height - rows::patch ? height : y + step - rows::search_reach);

@@ -1,6 +1,7 @@
 #include "denoise/nl_bayes_rows.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 
@@ -86,8 +87,9 @@ HWY_EXPORT(NlBayesRow);
 HWY_EXPORT(AddMeanRow);
 
 std::size_t patch_scratch() { return HWY_DYNAMIC_DISPATCH(PatchScratch)(); }
-void nl_bayes_row(const PatchRow& in, float* scratch, const PatchSums& sums) {
-  HWY_DYNAMIC_DISPATCH(NlBayesRow)(in, scratch, sums);
+void nl_bayes_row(const PatchRow& in, const RowScratch& scratch, const PatchSums& sums) {
+  assert(scratch.floats >= patch_scratch());
+  HWY_DYNAMIC_DISPATCH(NlBayesRow)(in, scratch.data, sums);
 }
 void add_mean_row(const float* sum, const float* weight, int count, const float* to, float* out) {
   HWY_DYNAMIC_DISPATCH(AddMeanRow)(sum, weight, count, to, out);

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "denoise/rows.h"
+
 /// The kernel under nl_bayes.h: plain types only, as in rows.h.
 namespace lowlux::denoise::rows {
 
@@ -38,9 +40,8 @@ struct PatchSums {
   float* residual[4][2];  // rows of half size below the corners
   float* residual_weight[4][2];
 };
-/// Floats of scratch memory.
 std::size_t patch_scratch();
-void nl_bayes_row(const PatchRow& in, float* scratch, const PatchSums& sums);
+void nl_bayes_row(const PatchRow& in, const RowScratch& scratch, const PatchSums& sums);
 
 /// out = to + sum / weight, or `to` where there is no weight. Without `to`, it is 0.
 void add_mean_row(const float* sum, const float* weight, int count, const float* to, float* out);

@@ -61,7 +61,7 @@ struct Shrink {
     return in;
   }
 
-  static rows::BlockSums sums(const ThreadMemory& m, int y0) {
+  static rows::BlockSums sums(const BlockMemory& m, int y0) {
     rows::BlockSums out{};
     for (int p = 0; p < 4; ++p) {
       for (int y = 0; y < block; ++y) out.value[p][y] = m.value[p][(y0 + y) % block];
@@ -76,13 +76,13 @@ struct Shrink {
   static void clear(float* row, int cells) { std::memset(row, 0, (cells + rows::padding) * sizeof(float)); }
 
   /// Two rows whose sums are complete; their memory is made ready for the next.
-  void finish(const ThreadMemory& m, int y, bool inside) const {
+  void finish(const BlockMemory& m, int y, bool inside) const {
     const PyramidLevel& at = level();
     for (int p = 0; p < planes_of(frame, l); ++p) {
       float *const upper = m.value[p][y % block], *const lower = m.value[p][(y + 1) % block];
       float *const weight = m.weight[p][y / 2 % 4], *const residual = m.residual[p][y / 2 % 4];
       if (inside) {
-        rows::finish_rows({{upper, lower}, weight, residual, at.width}, m.row[0],
+        rows::finish_rows({{upper, lower}, weight, residual, at.width}, m.weights,
                           {{at.value[pass].row(p, y), at.value[pass].row(p, y + 1)}, at.residual.row(p, y / 2)});
       }
       clear(upper, at.width);
@@ -93,9 +93,9 @@ struct Shrink {
   }
 
   /// Rows first .. last - 1, multiples of 4. Blocks that reach in from beside the band are computed again.
-  void band(int first, int last, const ThreadMemory& m) const {
+  void band(int first, int last, const BlockMemory& m) const {
+    const ScratchUse use(m.scratch);
     const int height = level().height;
-    for (int y = 0; y < block; y += 2) finish(m, y, false);
     std::uint8_t chroma[1 + largest_side / 2 / 2 / rows::strip_blocks];  // blocks 2 cells apart, cells of 2 sites
     for (int y0 = std::max(0, first - block + step); y0 <= std::min(height - block, last - step); y0 += step) {
       wanted(y0, chroma);
@@ -106,8 +106,9 @@ struct Shrink {
   }
 
   void run() const {
-    in_bands(frame.workers, level().height / 4,
-             [this](int first, int last, int thread) { band(4 * first, 4 * last, frame.memory.thread[thread]); });
+    in_bands(frame.workers, level().height / 4, [this](int first, int last, int thread) {
+      band(4 * first, 4 * last, frame.memory.thread[thread].blocks);
+    });
   }
 };
 
@@ -140,27 +141,28 @@ struct Recompose {
     });
   }
 
-  void row(int p, int y, const float* share, const ThreadMemory& m) const {
+  void row(int p, int y, const UpMemory& m) const {
     const PyramidLevel &fine = frame.memory.level[l], &coarse = frame.memory.level[l + 1];
     float* const out = fine.value[pass].row(p, y);
     const rows::UpRow smooth = up_row(coarse.value[pass], p, y, coarse.width, coarse.height);
-    if (p != 0 && frame.starts.nowhere(l)) return rows::smooth_row(smooth, m.row[1], out);
-    rows::add_correction_row(up_row(frame.memory.difference, p, y, coarse.width, coarse.height), m.row[1], out);
+    if (p != 0 && frame.starts.nowhere(l)) return rows::smooth_row(smooth, m.up, out);
+    rows::add_correction_row(up_row(frame.memory.difference, p, y, coarse.width, coarse.height), m.up, out);
     if (p == 0 || frame.starts.everywhere(l)) return;
-    rows::smooth_row(smooth, m.row[1], m.row[2]);
-    rows::blend_row(m.row[2], share, fine.width, out);
+    rows::smooth_row(smooth, m.up, m.coarse);
+    rows::blend_row(m.coarse, m.share, fine.width, out);
   }
 
   void run() const {
     differences();
     const PyramidLevel& fine = frame.memory.level[l];
     in_bands(frame.workers, fine.height, [&](int first, int last, int thread) {
-      const ThreadMemory& m = frame.memory.thread[thread];
+      const UpMemory& m = frame.memory.thread[thread].up;
+      const ScratchUse use(m.scratch);
       for (int y = first; y < last; ++y) {
         if (!frame.starts.everywhere(l) && !frame.starts.nowhere(l)) {
-          share_row(frame.starts, l, l, y, {m.row[3], static_cast<std::size_t>(fine.width)});
+          share_row(frame.starts, l, l, y, {m.share, static_cast<std::size_t>(fine.width)});
         }
-        for (int p = 0; p < 4; ++p) row(p, y, m.row[3], m);
+        for (int p = 0; p < 4; ++p) row(p, y, m);
       }
     });
   }
@@ -210,17 +212,18 @@ void add_residuals(const PassFrame& frame) {
     const PyramidLevel &fine = frame.memory.level[l], &coarse = frame.memory.level[l + 1];
     const int width = fine.width / 2, height = fine.height / 2;
     in_bands(frame.workers, height, [&](int first, int last, int thread) {
-      const ThreadMemory& m = frame.memory.thread[thread];
+      const UpMemory& m = frame.memory.thread[thread].up;
+      const ScratchUse use(m.scratch);
       for (int y = first; y < last; ++y) {
         for (int p = 0; p < 4; ++p) {
           float* const own = fine.residual.row(p, y);
-          rows::smooth_row(up_row(coarse.residual, p, y, width / 2, height / 2), m.row[1], m.row[2]);
-          std::fill(m.row[3], m.row[3] + width, p == 0 ? 0.0f : 1.0f);
+          rows::smooth_row(up_row(coarse.residual, p, y, width / 2, height / 2), m.up, m.coarse);
+          std::fill(m.share, m.share + width, p == 0 ? 0.0f : 1.0f);
           if (p != 0 && !frame.starts.nowhere(l)) {
-            residual_share_row(frame.starts, l, y, {m.row[3], static_cast<std::size_t>(width)}, m.row[4]);
+            residual_share_row(frame.starts, l, y, {m.share, static_cast<std::size_t>(width)}, m.finer);
           }
-          if (p == 0 || !frame.starts.nowhere(l)) rows::add_residual_row(own, m.row[3], width, m.row[2]);
-          std::memcpy(own, m.row[2], width * sizeof(float));
+          if (p == 0 || !frame.starts.nowhere(l)) rows::add_residual_row(own, m.share, width, m.coarse);
+          std::memcpy(own, m.coarse, width * sizeof(float));
         }
       }
     });

@@ -141,6 +141,7 @@ void find_point_sources(const RawElectronsView& raw, const RawNoise& noise, cons
   for (const double dark : noise.dark_mean_e) floor_e += 0.3 * dark + 0.02;
   const Search search{raw.value, floor_e, noise.variance_e2[0] + 2 * noise.variance_e2[1] + noise.variance_e2[2]};
   in_bands(workers, cells.height, [&](int first, int last, int thread) {
+    const ScratchUse use(memory[thread].scratch);
     Band{search, memory[thread], cells}.run(first, last);
   });
 }

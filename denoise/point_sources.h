@@ -6,6 +6,7 @@
 #include "denoise/bands.h"
 #include "denoise/denoiser.h"
 #include "isp/base/plane.h"
+#include "isp/base/scratch.h"
 
 /// Stars and specular dots of a few pixels. A delta of one cell spreads over all 64 coefficients of a block, each below
 /// the thresholds at a signal to noise ratio of 10, so that shrinkage leaves a third of its flux: such sources are
@@ -22,6 +23,7 @@ inline constexpr int source_margin = 6;
 
 /// Memory of one thread.
 struct SearchMemory {
+  Scratch scratch;                // of the rows below
   std::array<float*, 14> pair{};  // sums of two rows; each as long as a row and its padding
   std::array<float*, 2> sums{};
   std::int32_t* found = nullptr;  // as many as the frame is wide

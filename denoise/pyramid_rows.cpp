@@ -1,3 +1,4 @@
+#include <cassert>
 #include <cstddef>
 
 #include "denoise/rows.h"
@@ -119,10 +120,15 @@ void down2_row(const float* const in[2], int out_cells, float scale, float* out)
 void difference_row(const float* const fine[2], const float* coarse, int cells, float* out) {
   HWY_DYNAMIC_DISPATCH(Difference)(fine, coarse, cells, out);
 }
-void add_correction_row(const UpRow& in, float* scratch, float* inout) {
-  HWY_DYNAMIC_DISPATCH(AddCorrection)(in, scratch, inout);
+std::size_t up_scratch(int coarse_cells) { return 16 + 2 * (static_cast<std::size_t>(coarse_cells) + padding); }
+void add_correction_row(const UpRow& in, const RowScratch& scratch, float* inout) {
+  assert(scratch.floats >= up_scratch(in.coarse_cells));
+  HWY_DYNAMIC_DISPATCH(AddCorrection)(in, scratch.data, inout);
 }
-void smooth_row(const UpRow& in, float* scratch, float* out) { HWY_DYNAMIC_DISPATCH(Smooth)(in, scratch, out); }
+void smooth_row(const UpRow& in, const RowScratch& scratch, float* out) {
+  assert(scratch.floats >= up_scratch(in.coarse_cells));
+  HWY_DYNAMIC_DISPATCH(Smooth)(in, scratch.data, out);
+}
 void blend_row(const float* coarse, const float* share, int cells, float* inout) {
   HWY_DYNAMIC_DISPATCH(Blend)(coarse, share, cells, inout);
 }

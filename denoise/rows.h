@@ -10,6 +10,13 @@ namespace lowlux::denoise::rows {
 /// Floats that may be read and written after the last of a row.
 inline constexpr int padding = 192;
 
+/// Memory for a kernel's own use, of at least as many floats as the kernel's ..._scratch() says. It begins as zeros
+/// (see ScratchUse), and no other kernel uses it in between.
+struct RowScratch {
+  float* data;
+  std::size_t floats;
+};
+
 /// Blocks of one row that are transformed together: their coefficients stay in the first-level cache.
 inline constexpr int strip_blocks = 32;
 
@@ -37,8 +44,8 @@ struct VarianceRow {
   float variance_e2[3];
   float gain[3];
 };
-/// @param scratch 5 rows of cells + padding
-void variance_row(const VarianceRow& in, float* scratch, float* const out[4]);
+std::size_t variance_scratch(int cells);
+void variance_row(const VarianceRow& in, const RowScratch& scratch, float* const out[4]);
 
 /// Sum of `count` samples, those that are not a number as 0, limited to +-1e9.
 double sum_of(const float* in, int count);
@@ -55,10 +62,11 @@ struct UpRow {
   const float* far[3];
   int coarse_cells;
 };
-/// inout += up2 of the 3x3 binomial mean of the rows. @param scratch 2 rows + 2 padding
-void add_correction_row(const UpRow& in, float* scratch, float* inout);
-/// out = up2 of near[1], far[1]. @param scratch 1 row + padding
-void smooth_row(const UpRow& in, float* scratch, float* out);
+std::size_t up_scratch(int coarse_cells);
+/// inout += up2 of the 3x3 binomial mean of the rows.
+void add_correction_row(const UpRow& in, const RowScratch& scratch, float* inout);
+/// out = up2 of near[1], far[1].
+void smooth_row(const UpRow& in, const RowScratch& scratch, float* out);
 
 /// inout = (1 - share) inout + share coarse.
 void blend_row(const float* coarse, const float* share, int cells, float* inout);
@@ -90,9 +98,9 @@ struct BlockSums {
   float* weight[4][4];
   float* residual[4][4];
 };
-/// Floats of scratch memory for rows of up to `cells` cells.
+/// For rows of up to `cells` cells.
 std::size_t block_scratch(int cells);
-void shrink_block_row(const BlockRow& in, float* scratch, const BlockSums& sums);
+void shrink_block_row(const BlockRow& in, const RowScratch& scratch, const BlockSums& sums);
 
 /// Divides two rows of sums, and one of half size, by their weight; nothing where there is none.
 struct SumRows {
@@ -105,7 +113,8 @@ struct FinishedRows {
   float* value[2];
   float* residual;
 };
-void finish_rows(const SumRows& in, float* scratch, const FinishedRows& out);
+std::size_t finish_scratch(int cells);
+void finish_rows(const SumRows& in, const RowScratch& scratch, const FinishedRows& out);
 
 /// Factors of the slopes gx and gy, as in SiteSlopes.
 struct Slopes {

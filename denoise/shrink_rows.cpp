@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 
@@ -70,7 +71,7 @@ HWY_INLINE void shrink_strip(const BlockRow& in, int plane, int first, int count
   if (in.pilot[0] != nullptr) {
     transform_columns<kStep>(in.pilot[plane] + kStep * first, in.stride, count, s.pilot);
   }
-  std::fill(s.weight, s.weight + places, 0.0f);  // before the first block and after the last, too
+  for (int i = 0; i < strip_blocks; i += n) store(hn::Zero(f), s.weight + lead + i);
   for (int i = 0; i < count; i += n) {
     const VF variance = load(m.variance + first + i);
     VF power;
@@ -187,11 +188,14 @@ HWY_EXPORT(ShrinkBlockRow);
 HWY_EXPORT(FinishRows);
 
 std::size_t block_scratch(int cells) { return HWY_DYNAMIC_DISPATCH(BlockScratch)(cells); }
-void shrink_block_row(const BlockRow& in, float* scratch, const BlockSums& sums) {
-  HWY_DYNAMIC_DISPATCH(ShrinkBlockRow)(in, scratch, sums);
+void shrink_block_row(const BlockRow& in, const RowScratch& scratch, const BlockSums& sums) {
+  assert(scratch.floats >= block_scratch(in.step * (in.blocks - 1) + 8));
+  HWY_DYNAMIC_DISPATCH(ShrinkBlockRow)(in, scratch.data, sums);
 }
-void finish_rows(const SumRows& in, float* scratch, const FinishedRows& out) {
-  HWY_DYNAMIC_DISPATCH(FinishRows)(in, scratch, out);
+std::size_t finish_scratch(int cells) { return static_cast<std::size_t>(cells) + padding; }
+void finish_rows(const SumRows& in, const RowScratch& scratch, const FinishedRows& out) {
+  assert(scratch.floats >= finish_scratch(in.cells));
+  HWY_DYNAMIC_DISPATCH(FinishRows)(in, scratch.data, out);
 }
 
 }  // namespace lowlux::denoise::rows

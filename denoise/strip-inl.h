@@ -24,7 +24,7 @@ constexpr int run = strip_blocks + 32;  // places of one run in a strip, those o
 constexpr int lead = 16;                // empty places before a strip's blocks, which shifted reads may touch
 constexpr int places = lead + run;
 
-/// Memory for one strip.
+/// Memory for one strip, zeros at first: what no strip writes, before the first block and after the last, stays 0.
 struct Strip {
   float noisy[8][4][run];  // vertical frequency, phase, place
   float pilot[8][4][run];

@@ -172,39 +172,58 @@ std::size_t look_run_of(int width) { return 1 + static_cast<std::size_t>(cells_a
 // into the same few sets of the first-level cache.
 std::size_t run_stride_of(int width) { return (((run_of(width) + line_floats - 1) / line_floats) | 1U) * line_floats; }
 
-// Of the scratch memory of all threads.
-std::size_t floats_of(int width, int threads) {
-  return (run_stride_of(width) * runs_per_thread + look_run_of(width) * LookGrid::parts) *
-             static_cast<std::size_t>(threads) +
-         line_floats;
+constexpr std::size_t line_bytes = line_floats * sizeof(float);
+
+std::size_t whole_lines(std::size_t bytes) { return (bytes + line_bytes - 1) / line_bytes * line_bytes; }
+
+/// What one thread's scratch memory holds, for pictures `width` pixels wide.
+struct ThreadBytes {
+  std::size_t ring;
+  std::size_t look;
+  std::size_t codes;  // a row on its way to a CodeChange or a RowSink
+
+  explicit ThreadBytes(int width)
+      : ring(run_stride_of(width) * runs_per_thread * sizeof(float)),
+        look(whole_lines(look_run_of(width) * LookGrid::parts * sizeof(float))),
+        codes(whole_lines(3 * static_cast<std::size_t>(width) * sizeof(std::uint16_t))) {}
+  std::size_t all() const { return ring + look + codes + 3 * scratch_guard_bytes; }
+};
+
+/// The scratch memory of one thread: ring, look, codes.
+std::array<Scratch, 3> scratch_at(std::byte* start, const ThreadBytes& bytes) {
+  std::byte* const look = start + bytes.ring + scratch_guard_bytes;
+  return {{{start, bytes.ring}, {look, bytes.look}, {look + bytes.look + scratch_guard_bytes, bytes.codes}}};
+}
+
+/// The first whole cache line of memory that has one to spare.
+std::byte* first_line(std::byte* memory) {
+  const auto beyond = reinterpret_cast<std::uintptr_t>(memory) % line_bytes;
+  return memory + (line_bytes - beyond) % line_bytes;
 }
 
 }  // namespace
 
-RawToRgb::RawToRgb(int max_width, int threads) : threads_(threads) {
+RawToRgb::RawToRgb(int max_width, int threads)
+    : threads_(threads), max_width_(max_width), memory_(std::make_unique<std::byte[]>(bytes(max_width, threads))) {
   assert(max_width >= 1 && threads >= 1);
-  run_stride_ = run_stride_of(max_width);
-  look_stride_ = look_run_of(max_width);
-  codes_stride_ = 3 * static_cast<std::size_t>(max_width);
-  memory_ = std::make_unique<float[]>(floats_of(max_width, threads));
-  codes_ = std::make_unique_for_overwrite<std::uint16_t[]>(codes_stride_ * static_cast<std::size_t>(threads));
+  const ThreadBytes each(max_width);
+  for (int i = 0; i < threads; ++i) {
+    for (const Scratch& scratch : scratch_at(first_line(memory_.get()) + i * each.all(), each)) close_scratch(scratch);
+  }
 }
 
 std::size_t RawToRgb::bytes(int max_width, int threads) {
-  return sizeof(float) * floats_of(max_width, threads) +
-         sizeof(std::uint16_t) * 3 * static_cast<std::size_t>(max_width) * static_cast<std::size_t>(threads);
+  return ThreadBytes(max_width).all() * static_cast<std::size_t>(threads) + line_bytes;
 }
 
-RawToRgb::Bench RawToRgb::bench(int thread) const {
-  const auto address = reinterpret_cast<std::uintptr_t>(memory_.get());
-  const std::size_t misaligned = address / sizeof(float) % line_floats;
-  float* const start = memory_.get() + (line_floats - misaligned) % line_floats;
-  const std::size_t runs = run_stride_ * runs_per_thread;
+RawToRgb::ThreadScratch RawToRgb::scratch_of(int thread) const {
+  const ThreadBytes each(max_width_);
+  const auto [ring, look, codes] = scratch_at(first_line(memory_.get()) + thread * each.all(), each);
   return {thread,
-          {start + rows::padding_before + runs * static_cast<std::size_t>(thread), run_stride_},
-          start + runs * static_cast<std::size_t>(threads_) +
-              look_stride_ * LookGrid::parts * static_cast<std::size_t>(thread),
-          codes_.get() + codes_stride_ * static_cast<std::size_t>(thread)};
+          {static_cast<float*>(ring.data) + rows::padding_before, run_stride_of(max_width_)},
+          static_cast<float*>(look.data),
+          static_cast<std::uint16_t*>(codes.data),
+          {ScratchUse(ring), ScratchUse(look), ScratchUse(codes)}};
 }
 
 template <class MakeSink>
@@ -212,12 +231,12 @@ void RawToRgb::convert(const RgbInput& in, const RgbTransform& transform, const 
                        Executor& executor) {
   std::visit(
       [&](const auto& input) {
-        assert(run_of(width_of(input)) <= run_stride_);
+        assert(width_of(input) <= max_width_);
         assert(transform.look == nullptr || fits(*transform.look, width_of(input), height_of(input)));
         if (width_of(input) == 0) return;
         run_bands(executor, threads_, height_of(input), [&](RowBand band, int thread) {
-          const Bench own = bench(thread);
-          convert_band(input, transform, band, own.ring, LookRows(transform.look, own.look, look_stride_),
+          const ThreadScratch own = scratch_of(thread);
+          convert_band(input, transform, band, own.ring, LookRows(transform.look, own.look, look_run_of(max_width_)),
                        make_sink(own));
         });
       },
@@ -231,14 +250,14 @@ void RawToRgb::to_codes(const RgbInput& in, const RgbTransform& transform, const
   if (change == nullptr) {
     convert(
         in, transform,
-        [&](const Bench&) {
+        [&](const ThreadScratch&) {
           return CodeRows<Codes, Code>{&tone, out};
         },
         executor);
   } else {
     convert(
         in, transform,
-        [&](const Bench& own) {
+        [&](const ThreadScratch& own) {
           return ChangedCodeRows<Code>{&tone, out, change, own.codes};
         },
         executor);
@@ -261,7 +280,7 @@ void RawToRgb::rows8(const RgbInput& in, const RgbTransform& transform, const To
   const int width = std::visit([](const auto& input) { return width_of(input); }, in);
   convert(
       in, transform,
-      [&](const Bench& own) {
+      [&](const ThreadScratch& own) {
         return SunkRows{&tone, &sink, reinterpret_cast<std::uint8_t*>(own.codes), own.thread, width};
       },
       executor);
@@ -269,7 +288,7 @@ void RawToRgb::rows8(const RgbInput& in, const RgbTransform& transform, const To
 
 void RawToRgb::linear(const RgbInput& in, const RgbTransform& transform, RgbView<float> out, Executor& executor) {
   convert(
-      in, transform, [&](const Bench&) { return PlaneRowsOut{out}; }, executor);
+      in, transform, [&](const ThreadScratch&) { return PlaneRowsOut{out}; }, executor);
 }
 
 const char* raw_to_rgb_target() { return rows::target_name(); }

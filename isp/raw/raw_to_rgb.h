@@ -108,8 +108,8 @@ class RawToRgb {
  private:
   template <class Mosaic>
   void bin(const Mosaic& in, RgbView<float> out, Executor& executor);
-  struct Bench;
-  Bench bench(int thread) const;
+  struct ThreadScratch;
+  ThreadScratch scratch_of(int thread) const;
   template <class MakeSink>
   void convert(const RgbInput& in, const RgbTransform& transform, const MakeSink& make_sink, Executor& executor);
   template <class Codes, class Code>
@@ -117,11 +117,8 @@ class RawToRgb {
                 Executor& executor, const CodeChange* change);
 
   int threads_;
-  std::size_t run_stride_;   // floats from one run of scratch samples to the next
-  std::size_t look_stride_;  // floats from one part of a look's row to the next
-  std::size_t codes_stride_;
-  std::unique_ptr<float[]> memory_;
-  std::unique_ptr<std::uint16_t[]> codes_;  // rows on their way to a CodeChange or a RowSink
+  int max_width_;
+  std::unique_ptr<std::byte[]> memory_;  // scratch of all threads
 };
 
 /// The vector instruction set the kernels use on this machine, as Highway names it.

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 
+#include "isp/base/scratch.h"
 #include "isp/raw/raw_to_rgb.h"
 #include "isp/raw/raw_to_rgb_rows.h"
 
@@ -89,12 +91,13 @@ inline std::size_t run_of(int width) {
   return rows::padding_before + (static_cast<std::size_t>(width) + 1) / 2 + rows::padding_after;
 }
 
-/// Scratch of one thread.
-struct RawToRgb::Bench {
+/// The scratch memory of one thread, for as long as it is used.
+struct RawToRgb::ThreadScratch {
   int thread;
   Ring ring;
   float* look;
   std::uint16_t* codes;  // 3 for each pixel of a row
+  std::array<ScratchUse, 3> use;
 };
 
 }  // namespace lowlux::isp

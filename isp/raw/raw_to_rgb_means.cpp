@@ -44,13 +44,14 @@ void quarter_row(const CameraPlanes& in, int y, const Ring& ring, const RgbView<
 
 template <class Mosaic>
 void RawToRgb::bin(const Mosaic& in, RgbView<float> out, Executor& executor) {
-  assert(run_of(width_of(in)) <= run_stride_);
+  assert(width_of(in) <= max_width_);
   const int width = width_of(in) / 2, height = height_of(in) / 2;
   assert(out[0].width == width && out[0].height == height);
   if (width == 0) return;
   const int red = 2 * red_row(in.phase) + red_column(in.phase);
   run_bands(executor, threads_, height, [&](RowBand band, int thread) {
-    const Ring ring = bench(thread).ring;
+    const ThreadScratch own = scratch_of(thread);
+    const Ring& ring = own.ring;
     const float* site[4] = {ring.row(0).even, ring.row(0).odd, ring.row(1).even, ring.row(1).odd};
     const rows::CellRow cells{{site[red], site[red ^ 1], site[red ^ 2], site[red ^ 3]}};
     for (int y = band.first; y < band.last; ++y) {
@@ -67,10 +68,11 @@ void RawToRgb::bin2x2(const SignedMosaic& in, RgbView<float> out, Executor& exec
 void RawToRgb::quarter(const RgbInput& in, RgbView<float> out, Executor& executor) {
   std::visit(
       [&](const auto& input) {
-        assert(run_of(width_of(input)) <= run_stride_);
+        assert(width_of(input) <= max_width_);
         assert(out[0].width == cells_along(width_of(input)) && out[0].height == cells_along(height_of(input)));
         run_bands(executor, threads_, out[0].height, [&](RowBand band, int thread) {
-          for (int y = band.first; y < band.last; ++y) quarter_row(input, y, bench(thread).ring, out);
+          const ThreadScratch own = scratch_of(thread);
+          for (int y = band.first; y < band.last; ++y) quarter_row(input, y, own.ring, out);
         });
       },
       in);

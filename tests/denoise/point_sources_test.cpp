@@ -17,9 +17,12 @@ using denoise::Level;
 
 /// Memory for one thread, and a search on it.
 struct Searcher {
-  explicit Searcher(int width) : rows(16, std::vector<float>(width + 512)), found(width) {
-    for (int i = 0; i < 14; ++i) memory.pair[i] = rows[i].data() + 32;
-    for (int i = 0; i < 2; ++i) memory.sums[i] = rows[14 + i].data() + 32;
+  explicit Searcher(int width) : rows(17 * (width + 512)), found(width) {
+    const auto row = [&](int i) { return rows.data() + static_cast<std::ptrdiff_t>(i) * (width + 512) + 32; };
+    for (int i = 0; i < 14; ++i) memory.pair[i] = row(i);
+    for (int i = 0; i < 2; ++i) memory.sums[i] = row(14 + i);
+    memory.scratch = {rows.data(), 16 * (width + 512) * sizeof(float)};
+    close_scratch(memory.scratch);
     memory.found = found.data();
   }
   Plane<std::uint8_t> operator()(const Plane<float>& raw, const Camera& camera) {
@@ -28,7 +31,7 @@ struct Searcher {
     denoise::find_point_sources({raw.view(), camera.phase}, camera.noise(), {one, 1}, &memory, cells.view());
     return cells;
   }
-  std::vector<std::vector<float>> rows;
+  std::vector<float> rows;
   std::vector<std::int32_t> found;
   denoise::SearchMemory memory;
 };

@@ -1,0 +1,56 @@
+#include "isp/base/scratch.h"
+
+#include <cassert>
+#include <cstring>
+
+#if defined(__SANITIZE_ADDRESS__)
+#define LOWLUX_POISONS_SCRATCH
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define LOWLUX_POISONS_SCRATCH
+#endif
+#endif
+#if defined(LOWLUX_POISONS_SCRATCH)
+#include <sanitizer/asan_interface.h>
+#endif
+
+namespace lowlux {
+namespace {
+
+#if defined(LOWLUX_POISONS_SCRATCH)
+void poison(const Scratch& s) { ASAN_POISON_MEMORY_REGION(s.data, s.bytes + scratch_guard_bytes); }
+void unpoison(const Scratch& s) { ASAN_UNPOISON_MEMORY_REGION(s.data, s.bytes); }
+void mark_guard(const Scratch&) {}
+[[maybe_unused]] bool is_guard_marked(const Scratch&) { return true; }
+#else
+constexpr unsigned char guard_mark = 0xA7;
+void poison(const Scratch&) {}
+void unpoison(const Scratch&) {}
+unsigned char* guard_of(const Scratch& s) { return static_cast<unsigned char*>(s.data) + s.bytes; }
+void mark_guard(const Scratch& s) { std::memset(guard_of(s), guard_mark, scratch_guard_bytes); }
+[[maybe_unused]] bool is_guard_marked(const Scratch& s) {
+  for (std::size_t i = 0; i < scratch_guard_bytes; ++i) {
+    if (guard_of(s)[i] != guard_mark) return false;
+  }
+  return true;
+}
+#endif
+
+}  // namespace
+
+void close_scratch(const Scratch& scratch) noexcept {
+  mark_guard(scratch);
+  poison(scratch);
+}
+
+ScratchUse::ScratchUse(const Scratch& scratch) noexcept : scratch_(scratch) {
+  unpoison(scratch);
+  std::memset(scratch.data, 0, scratch.bytes);
+}
+
+ScratchUse::~ScratchUse() {
+  assert(is_guard_marked(scratch_));
+  poison(scratch_);
+}
+
+}  // namespace lowlux
