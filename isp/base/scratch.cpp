@@ -20,12 +20,12 @@ namespace {
 #if defined(LOWLUX_POISONS_SCRATCH)
 void poison(const Scratch& s) { ASAN_POISON_MEMORY_REGION(s.data, s.bytes + scratch_guard_bytes); }
 void unpoison(const Scratch& s) { ASAN_UNPOISON_MEMORY_REGION(s.data, s.bytes); }
-void mark_guard(const Scratch&) {}
-[[maybe_unused]] bool is_guard_marked(const Scratch&) { return true; }
+void mark_guard(const Scratch& /*s*/) {}
+[[maybe_unused]] bool is_guard_marked(const Scratch& /*s*/) { return true; }
 #else
 constexpr unsigned char guard_mark = 0xA7;
-void poison(const Scratch&) {}
-void unpoison(const Scratch&) {}
+void poison(const Scratch& /*s*/) {}
+void unpoison(const Scratch& /*s*/) {}
 unsigned char* guard_of(const Scratch& s) { return static_cast<unsigned char*>(s.data) + s.bytes; }
 void mark_guard(const Scratch& s) { std::memset(guard_of(s), guard_mark, scratch_guard_bytes); }
 [[maybe_unused]] bool is_guard_marked(const Scratch& s) {
