@@ -37,15 +37,15 @@ double relative(double found, double expected) {
 
 TEST(HardCaseMesopic, HuntsRodSignal) {
   model_row({group, "2.1 Hunt: L_AS of 1e-9 to 1e4, none, below 1600 K, S below 0",
-             "50 digits; 1 - j^2 cancels to 4 eps / (2 u / 1e-5), to the fourth", "relative to 64 eps"},
-            1, [](Denormals m) {
+             "50 digits; 1 - j^2 cancels to 4 eps / (2 u / 1e-5), to the fourth", "relative to 16 eps"},
+            {1, rounding}, [](Denormals m) {
               const auto found = [&](double l_as, double s) {
                 return in_mode(m, [&] { return isp::rod_signal(isp::rod_adaptation(l_as), s); });
               };
               double worst = std::abs(found(0, 1) - 0.3) + std::abs(found(1, -3) - 0.3);
               for (const double l_as : test::ratios(1e-9, 1e4, 10)) {
                 for (const double s : {1e-6, 0.2, 1.0, 10.0}) {
-                  keep_worst(worst, relative(found(l_as, s), reference::hunt_rod_signal(l_as, s)) / (64 * eps));
+                  keep_worst(worst, relative(found(l_as, s), reference::hunt_rod_signal(l_as, s)) / (16 * eps));
                 }
               }
               return worst + in_mode(m, [] { return isp::scotopic_adaptation(2, 1500); });
@@ -54,7 +54,7 @@ TEST(HardCaseMesopic, HuntsRodSignal) {
 
 TEST(HardCaseMesopic, KwaksPower) {
   model_row({group, "2.2 Kwak: cones from -100 to 1e9, odd", "50 digits; power 0.42 of a double", "relative to 16 eps"},
-            1, [](Denormals m) {
+            {1, rounding}, [](Denormals m) {
               double worst = 0;
               for (const double cone : {-100.0, -1e-9, 0.0, 1e-30, 1e-9, 1.0, 100.0, 1e9}) {
                 const double found = in_mode(m, [&] { return isp::ciecam02_response(0.3, cone); });
@@ -69,8 +69,8 @@ TEST(HardCaseMesopic, KwaksPower) {
 // Without rods both signals vanish with light, and their ratio does not.
 TEST(HardCaseMesopic, KwaksLightnessWithoutRods) {
   model_row({group, "2.2 Kwak: lightness at alpha 0 and F_L of 1e-15 to 1, negative cones", "responses in 50 digits",
-             "relative to 64 eps"},
-            1, [](Denormals m) {
+             "relative to 16 eps"},
+            {1, rounding}, [](Denormals m) {
               constexpr Vector3 white{95, 101, 108};
               const double power = 0.69 * (1.48 + std::sqrt(0.2));
               const auto signal = [](double level, const Vector3& c) {
@@ -86,7 +86,7 @@ TEST(HardCaseMesopic, KwaksLightnessWithoutRods) {
                   });
                   const double ratio = signal(level, c) / signal(level, white);
                   const double expected = ratio > 0 ? 100 * std::pow(ratio, power) : 0;
-                  keep_worst(worst, expected == 0 ? std::abs(found) : relative(found, expected) / (64 * eps));
+                  keep_worst(worst, expected == 0 ? std::abs(found) : relative(found, expected) / (16 * eps));
                 }
               }
               return worst;
@@ -95,27 +95,27 @@ TEST(HardCaseMesopic, KwaksLightnessWithoutRods) {
 
 TEST(HardCaseMesopic, KhansResponseAndItsInverse) {
   model_row({group, "2.3 Khan: intensities of 1e-12 to 1e3, none, and back", "50 digits, and the intensity itself",
-             "relative to 256 eps"},
-            1, [](Denormals m) {
+             "relative to 64 eps"},
+            {1, rounding}, [](Denormals m) {
               const auto rods = in_mode(m, [] { return isp::khan_rods(0.03); });
               double worst = std::abs(in_mode(m, [&] { return isp::khan_response(rods, -1); }));
               for (const double i : test::ratios(1e-12, 1e3, 10)) {
                 const double r = in_mode(m, [&] { return isp::khan_response(rods, i); });
-                keep_worst(worst, relative(r, reference::pattanaik_rods(0.03, i)) / (256 * eps));
+                keep_worst(worst, relative(r, reference::pattanaik_rods(0.03, i)) / (64 * eps));
                 // Near B an error of the response is B / (B - R) times that of the intensity, over n.
                 const double steep = 1 / (0.73 * (1 - r / rods.bleaching));
                 const double back = in_mode(m, [&] { return isp::khan_intensity(rods, r); });
-                keep_worst(worst, relative(back, i) / (256 * eps * steep));
+                keep_worst(worst, relative(back, i) / (64 * eps * steep));
               }
               return worst;
             });
 }
 
-// Conditions of 15 to 17 twice, and three products.
+// Conditions of 15 to 17, twice, which add up: rounding seldom takes the worst direction of both.
 TEST(HardCaseMesopic, CaosMatricesThereAndBack) {
   model_row(
       {group, "2.4 Cao: 1e-4 to 100 cd/m2 and back, condition 17", "closed form: the identity", "largest element off"},
-      17 * 17 * 8 * eps, [](Denormals m) {
+      {17 * 2 * eps, rounding}, [](Denormals m) {
         const auto receptors = isp::cao_receptors(srgb_to_xyz, isp::scotopic_weights);
         double worst = 0;
         for (const double from : {1e-4, 0.1, 0.3, 2.0, 100.0}) {
@@ -132,8 +132,8 @@ TEST(HardCaseMesopic, CaosMatricesThereAndBack) {
 
 TEST(HardCaseMesopic, WanatsExponentAndLuminance) {
   model_row({group, "2.5 Wanat: no light, negative channels, exponents held to 0..4", "closed form: luminance stays",
-             "relative to 16 eps"},
-            1, [](Denormals m) {
+             "relative to 4 eps"},
+            {1, rounding}, [](Denormals m) {
               const Vector3 weights{0.2126, 0.7152, 0.0722};
               double worst = 0;
               for (const auto& light :
@@ -146,7 +146,7 @@ TEST(HardCaseMesopic, WanatsExponentAndLuminance) {
                   const auto luminance = [&](const Vector3& c) {
                     return weights[0] * c[0] + weights[1] * c[1] + weights[2] * c[2];
                   };
-                  keep_worst(worst, relative(luminance(out), luminance(rgb)) / (16 * eps));
+                  keep_worst(worst, relative(luminance(out), luminance(rgb)) / (4 * eps));
                 }
                 const Vector3 black = in_mode(m, [&] { return isp::wanat_saturated({0, 0, 0}, e, weights); });
                 keep_worst(worst, std::abs(black[0]) + std::abs(black[1]) + std::abs(black[2]));
@@ -174,7 +174,7 @@ TEST(HardCaseMesopic, MikamoInTheDark) {
 TEST(HardCaseMesopic, Icam06AndBack) {
   model_row(
       {group, "2.9 iCAM06: white of 1e-6 to 1e4 cd/m2 and back", "closed form: the colour itself", "relative to white"},
-      1e-9, [](Denormals m) {
+      {1.5e-11, rounding}, [](Denormals m) {
         double worst = 0;
         for (const double white : {1e-6, 1e-3, 0.1, 10.0, 1e4}) {
           const isp::Icam06State state{white, white};
@@ -194,7 +194,7 @@ TEST(HardCaseMesopic, Icam06AndBack) {
 TEST(HardCaseMesopic, EntropyOfWhatNoSpectrumGives) {
   model_row({group, "3.2 largest entropy: moments outside the hull, rods alone, gamma 1e-4",
              "its gradient in 50 digits", "gradient"},
-            1e-10, [](Denormals m) {
+            {1e-10, rounding}, [](Denormals m) {
               isp::NodePower even{};
               even.fill(1);
               double worst = 0;
@@ -248,9 +248,9 @@ TEST(HardCaseMesopic, PicturesAreWhatTheModelsSay) {
                 "the table in plain double (sets); the model itself, from which a hundredth may be farther off (file)",
                 "relative (sets), CIEDE2000 (file)"});
   row.none(Path::reference, "is the oracle").none(levels, "looks come after");
-  // Float: 2^-24 in each of ten steps and in the place within a cell, times the number of cells
+  // Float: 2^-24 in each of ten steps and in the place within a cell, times the number of cells, 32
   // (colour_table_test.cpp).
-  row.on_each_set(1e-5, tables_against_reference);
+  row.on_each_set({42 * 0x1p-24, rounding}, tables_against_reference);
   row.on(Path::file, 0.5, pictures_against_models);  // ColourTableRequest::error_bound
   row.none(Path::live, no_models);
 }

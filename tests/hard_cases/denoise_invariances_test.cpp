@@ -24,9 +24,8 @@ using denoise_testing::waves;
 constexpr std::string_view group = "Noise reduction: invariances", hard_cases = "Noise reduction";
 constexpr double inf = std::numeric_limits<double>::infinity();
 
-// Values of some 200 e- in float sums of 600 terms, 5e-6 of them; codes of files are 1/8 e- off at most, so that
-// coefficients near their thresholds may pass in one and not in the other.
-constexpr double sums_e = 1e-3;
+// Values of up to 200 e-.
+constexpr Bound double_sums_e{200 * double_sums.value, rounding}, float_sums_e{200 * float_sums.value, rounding};
 
 Camera with_dark(double dark_e, double read_noise_e) {
   return {.dark_e = {dark_e, dark_e, dark_e, dark_e}, .read_noise_e = read_noise_e};
@@ -36,7 +35,8 @@ TEST(HardCaseInvariance, ConstantFramesKeepTheirMeans) {
   HardCase row({group, "10 flats of 0.1 to 200 e- keep their means",
                 "closed form: the gain of a mean is 1; three standard errors, borders being counted twice",
                 "standard errors of the mean"});
-  measure(row, {3, 3, 3, 3}, [](const PathRun& run) {
+  constexpr Bound bound{3, any_draw};
+  measure(row, {bound, bound, bound, bound}, [](const PathRun& run) {
     double worst = 0;
     for (const auto& [signal_e, dark_e] : {std::array{0.1, 2.0}, {4.0, 200.0}, {200.0, 2.0}}) {
       const MosaicCase c = case_of(with_dark(dark_e, 1.5), flat(signal_e, signal_e, signal_e), 144, 112, 81);
@@ -62,8 +62,8 @@ TEST(HardCaseInvariance, OneUnitIsAsGoodAsAnother) {
   // A power of two changes no rounding.
   measure(row, {0, 0, -1, -1}, [&](const PathRun& run) { return change(run, 8, 1); });
   // Rounding to codes is in the variance: 1/12 DN^2 is 1.0e-3 e-^2 more in one of them, of 10 and more, which moves the
-  // weights by 1e-4 of the noise; live mosaics have codes of 1/32 and 1/16 e-.
-  measure(row, {-1, -1, 0.05, 0.05 + 1.0 / 32}, [&](const PathRun& run) { return change(run, 1, 0.5); });
+  // weights by 1e-4 of the noise of up to 8 e-; live mosaics have codes of 1/32 and 1/16 e-.
+  measure(row, {-1, -1, 8e-4, 8e-4 + 1.0 / 32}, [&](const PathRun& run) { return change(run, 1, 0.5); });
 }
 
 TEST(HardCaseInvariance, ExchangeOfRedAndBlueCommutes) {
@@ -74,7 +74,7 @@ TEST(HardCaseInvariance, ExchangeOfRedAndBlueCommutes) {
   MosaicCase other = c.with_values(c.raw_e.clone());
   other.phase = BayerPhase::bggr;
   other.options.white_gain = {1.5, 1, 2};
-  measure(row, {1e-9, sums_e, sums_e, 1.0 / 16},
+  measure(row, {double_sums_e, float_sums_e, float_sums_e, {1.0 / 16, "rounding: one code"}},
           [&](const PathRun& run) { return largest_difference(run(c), run(other)); });
 }
 
@@ -87,7 +87,8 @@ TEST(HardCaseInvariance, DarkChargeActsThroughTheVarianceOnly) {
   for (double& dark : more.noise.dark_mean_e) dark += 64;
   for (double& variance : more.noise.variance_e2) variance -= 64;
   // Raw values are float: 64 more, below 256, rounds by 7.6e-6 e-.
-  measure(row, {1e-5, sums_e, -1, -1}, [&](const PathRun& run) { return largest_difference(run(c), run(more)); });
+  measure(row, {{1e-5, rounding}, float_sums_e, -1, -1},
+          [&](const PathRun& run) { return largest_difference(run(c), run(more)); });
   // The pipelines' white moves with black, and with it the fraction that an electron is of it. Confidence is good to
   // 1e-4 in float, of chroma of 50 e-.
   measure(row, {-1, -1, 5e-3, 1.0 / 16}, [&](const PathRun& run) { return largest_difference(run(c), run(more)); });
@@ -225,8 +226,8 @@ TEST(HardCaseDenoise12, FramesOfOneValueGiveThatValue) {
       return worst;
     };
   };
-  measure(row, {1e-12, 5e-6, -1, -1}, of({0, -50, 4095, 1e9f, -1e9f}));
-  measure(row, {-1, -1, 5e-6, 1.0 / 32}, of({0, -50, 3950}));  // what codes hold; a live code is 1/16 e-
+  measure(row, {double_sums, float_sums, -1, -1}, of({0, -50, 4095, 1e9f, -1e9f}));
+  measure(row, {-1, -1, float_sums, 0}, of({0, -50, 3950}));  // what codes hold, those of streams exactly
 }
 
 TEST(HardCaseDenoise12, SitesThatAreNoNumbersLeaveNone) {

@@ -58,17 +58,17 @@ void HardCase::put(Path path, Cell cell) {
   place = std::move(cell);
 }
 
-HardCase& HardCase::on(Path path, double bound, const Measure& measure) {
+HardCase& HardCase::on(Path path, const Bound& bound, const Measure& measure) {
   const std::array error{measure(Denormals::kept), measure(Denormals::flushed)};
   for (const double& e : error) {
-    EXPECT_LE(e, bound) << about_.name << ", " << name_of(path) << " [" << about_.unit << "], denormals "
-                        << (&e == error.data() ? "kept" : "flushed");
+    EXPECT_LE(e, bound.value) << about_.name << ", " << name_of(path) << " [" << about_.unit << "], denormals "
+                              << (&e == error.data() ? "kept" : "flushed");
   }
-  put(path, {error, bound, {}});
+  put(path, {error, bound.value, std::string(bound.reason), {}});
   return *this;
 }
 
-HardCase& HardCase::on_each_set(double bound, const Measure& measure) {
+HardCase& HardCase::on_each_set(const Bound& bound, const Measure& measure) {
   const std::int64_t supported = hwy::SupportedTargets();
   for (const Path set : instruction_sets) {
     if ((supported & target_of(set)) == 0) {
@@ -83,7 +83,7 @@ HardCase& HardCase::on_each_set(double bound, const Measure& measure) {
 
 HardCase& HardCase::none(Path path, std::string_view reason) {
   EXPECT_FALSE(reason.empty()) << about_.name;
-  put(path, {{}, 0, std::string(reason)});
+  put(path, {{}, 0, {}, std::string(reason)});
   return *this;
 }
 
@@ -101,7 +101,7 @@ std::string HardCase::line() const {
     out += (out.back() == '{' ? "" : ",") + in_quotes(path_names[i]) + ":{";
     if (cell->reason.empty()) {
       out += "\"kept\":" + number(cell->error[0]) + ",\"flushed\":" + number(cell->error[1]) +
-             ",\"bound\":" + number(cell->bound) + "}";
+             ",\"bound\":" + number(cell->bound) + ",\"why\":" + in_quotes(cell->bound_reason) + "}";
     } else {
       out += "\"reason\":" + in_quotes(cell->reason) + "}";
     }

@@ -47,6 +47,15 @@ struct About {
   std::string_view unit;    // of errors and bounds
 };
 
+/// What an error is held to, in the row's unit. Where the bound is more than ten times the error, the page must show a
+/// reason.
+struct Bound {
+  constexpr Bound(double bound, std::string_view why = {}) : value(bound), reason(why) {}
+
+  double value;
+  std::string_view reason;
+};
+
 /// The error of one path, in one mode.
 using Measure = std::function<double(Denormals mode)>;
 
@@ -60,9 +69,9 @@ class HardCase {
   HardCase& operator=(const HardCase&) = delete;
 
   /// Measures a path, denormals kept and flushed.
-  HardCase& on(Path path, double bound, const Measure& measure);
+  HardCase& on(Path path, const Bound& bound, const Measure& measure);
   /// The same with each instruction set the processor has, and no other; those it lacks have that for a reason.
-  HardCase& on_each_set(double bound, const Measure& measure);
+  HardCase& on_each_set(const Bound& bound, const Measure& measure);
   /// Why a path has nothing to do with the case.
   HardCase& none(Path path, std::string_view reason);
   HardCase& none(std::span<const Path> paths, std::string_view reason);
@@ -71,6 +80,7 @@ class HardCase {
   struct Cell {
     std::array<double, 2> error{};  // denormals kept, flushed
     double bound = 0;
+    std::string bound_reason;
     std::string reason;  // empty: measured
   };
   void put(Path path, Cell cell);
@@ -89,5 +99,9 @@ inline void keep_worst(double& worst, double error) {
 inline constexpr std::string_view no_image = "figures of one field, no image";
 inline constexpr std::string_view not_denoised = "nothing to denoise";
 inline constexpr std::string_view scalar_code = "no vector code";
+
+/// Reasons of bounds. Errors of rounding differ among processors: scripts/hard-cases holds them to their bounds alone.
+inline constexpr std::string_view rounding = "rounding";
+inline constexpr std::string_view any_draw = "the bound holds for any draw of the noise: this draw is near the mean";
 
 }  // namespace lowlux::hard_cases

@@ -33,9 +33,9 @@ double relative(double found, double expected) {
 constexpr std::string_view look_unit = "m (reference), parts of a grid of 0..1 (sets), of white (file), codes (live)";
 struct LookBounds {
   // Tables of 256 luminances and 32 S/P, and straight lines between cells: night_look_test.cpp.
-  double sets = 0.03;
-  double file = 1.0 / 255;  // a code of 8 bits
-  double live = 1 + 0.6;    // the same beyond rounding and the table of tone.h
+  Bound sets{0.03, "the bound holds between the nodes of the look's tables: these fields are near one"};
+  Bound file{1.0 / 255, "the bound is a code of 8 bits, what can be seen of it"};
+  double live = 1 + 0.6;  // the same beyond rounding and the table of tone.h
 };
 
 void measure_pipelines(HardCase& row, const std::vector<SeenField>& fields, const LookBounds& bounds) {
@@ -51,7 +51,7 @@ void measure_look(HardCase& row, const std::vector<SeenField>& fields, const Loo
 }
 
 /// A row of figures, which reach no image for this reason.
-void figures_row(const About& about, double bound, const Measure& measure, std::string_view reason) {
+void figures_row(const About& about, const Bound& bound, const Measure& measure, std::string_view reason) {
   HardCase row(about);
   row.on(Path::reference, bound, measure);
   row.none(levels, "looks come after").none(instruction_sets, reason).none(pipelines, reason);
@@ -75,7 +75,7 @@ TEST(HardCaseMesopic, TheCycleOfTwo) {
   HardCase row({group, "1.1 S/P of 18 to 60, where the plain iteration never ends",
                 "root by bisection in 50 digits (reference); the look in plain double and its formula (others)",
                 look_unit});
-  row.on(Path::reference, 1.1e-12, [](Denormals m) {
+  row.on(Path::reference, {1.1e-12, rounding}, [](Denormals m) {
     double worst = 0;
     for (const double ratio : {18.0, 25.0, 30.0, 50.0, 60.0}) {
       for (const double light : test::ratios(1e-3, 6, 1.7)) {
@@ -99,7 +99,7 @@ TEST(HardCaseMesopic, ThreeFixedPoints) {
   figures_row(
       {group, "1.1 S/P of 0.05 to 0.26, where there may be three roots",
        "a + b log10 L - m in 50 digits at the answer, or 0 where it is not positive at 0", "m"},
-      1.1e-12,
+      {1.1e-12, rounding},
       [](Denormals m) {
         double worst = 0;
         for (const double ratio : {0.05, 0.1, 0.2, 0.26}) {
@@ -182,7 +182,7 @@ TEST(HardCaseMesopic, KinksOfTheState) {
   HardCase row({group, "1.2 kinks of m at 0 and 1, S/P of 0.27 to 60",
                 "root by bisection in 50 digits (reference, sets); the look in plain double and its formula (others)",
                 "m (reference, sets), of white (file), codes (live)"});
-  row.on(Path::reference, 1e-12 / 0.026, [](Denormals m) {
+  row.on(Path::reference, {1e-12 / 0.026, rounding}, [](Denormals m) {
     double worst = 0;
     for (const KnownState& state : kinks()) {
       keep_worst(worst, std::abs(in_mode(m, [&] { return isp::mesopic_state(state.field).m; }) - state.m));
@@ -201,7 +201,7 @@ TEST(HardCaseMesopic, NegativeScotopicLuminance) {
                 "closed form: 0, and the weighted sum elsewhere (reference); the look in plain double and its formula "
                 "(others)",
                 look_unit});
-  row.on(Path::reference, 8 * eps, [](Denormals m) {
+  row.on(Path::reference, {8 * eps, rounding}, [](Denormals m) {
     const auto found = [&](const Xyz& c) { return in_mode(m, [&] { return isp::scotopic_luminance(c); }); };
     double worst = found({1, 0.3, 0}) + found({0.64, 0.33, 0.03});
     for (const Xyz& c : {Xyz{0.95, 1, 1.09}, {0.2, 0.1, 1}}) {
@@ -214,7 +214,8 @@ TEST(HardCaseMesopic, NegativeScotopicLuminance) {
 
 TEST(HardCaseMesopic, WardWithoutX) {
   figures_row(
-      {group, "0.1 Ward's formula where X vanishes", "closed form: the weighted sum from 1e-9 down", "relative"}, eps,
+      {group, "0.1 Ward's formula where X vanishes", "closed form: the weighted sum from 1e-9 down", "relative"},
+      {eps, rounding},
       [](Denormals m) {
         double worst = 0;
         for (const double x : {1e-9, 1e-300, 0.0, -1.0}) {

@@ -118,7 +118,7 @@ const std::vector<isp::ColourTable>& tables_of_models() {
 
 }  // namespace
 
-void model_row(const About& about, double bound, const Measure& measure) {
+void model_row(const About& about, const Bound& bound, const Measure& measure) {
   HardCase row(about);
   row.on(Path::reference, bound, measure);
   row.none(levels, "looks come after").none(instruction_sets, through_tables).none(Path::file, through_tables);

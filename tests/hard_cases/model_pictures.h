@@ -11,7 +11,7 @@ inline constexpr std::string_view through_tables = "pictures go through a table 
 inline constexpr std::string_view no_models = "streams have the look of the camera or the eye";
 
 /// A row of a model's figures for one colour.
-void model_row(const About& about, double bound, const Measure& measure);
+void model_row(const About& about, const Bound& bound, const Measure& measure);
 
 /// Values that are no numbers in pictures of black, negative, saturated and coloured fields by every model.
 double models_through_file(Denormals mode);

@@ -13,20 +13,20 @@ void measure(HardCase& row, const MosaicBounds& bounds, const std::function<doub
     return
         [&error, level](Denormals m) { return error([=](const MosaicCase& c) { return by_denoiser(c, level, m); }); };
   };
-  if (bounds.reference >= 0) {
+  if (bounds.reference.value >= 0) {
     row.on(Path::reference, bounds.reference, [&](Denormals m) {
       return error([m](const MosaicCase& c) { return by_reference(c, Level::standard, m); });
     });
   }
-  if (bounds.fast >= 0) {
+  if (bounds.fast.value >= 0) {
     for (std::size_t i = 0; i < levels.size(); ++i) row.on(levels[i], bounds.fast, fast(denoise::all_levels[i]));
     row.on_each_set(bounds.fast, fast(Level::standard));
   }
-  if (bounds.file >= 0) {
+  if (bounds.file.value >= 0) {
     row.on(Path::file, bounds.file,
            [&](Denormals m) { return error([m](const MosaicCase& c) { return by_file(c, m); }); });
   }
-  if (bounds.live >= 0) {
+  if (bounds.live.value >= 0) {
     row.on(Path::live, bounds.live,
            [&](Denormals m) { return error([m](const MosaicCase& c) { return by_live(c, m); }); });
   }

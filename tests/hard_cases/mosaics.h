@@ -62,11 +62,15 @@ bool warns_of(const MosaicCase& c, Denormals mode, std::string_view word);
 using PathRun = std::function<Plane<double>(const MosaicCase&)>;
 
 struct MosaicBounds {
-  double reference;
-  double fast;  // of levels and instruction sets
-  double file;
-  double live;
+  Bound reference;
+  Bound fast;  // of levels and instruction sets
+  Bound file;
+  Bound live;
 };
+
+/// Roundings of 600 operations, which a value goes through, add up like noise: 2^-53 or 2^-24 times the root of their
+/// number, of the largest value.
+inline constexpr Bound double_sums{24.5 * 0x1p-53, rounding}, float_sums{24.5 * 0x1p-24, rounding};
 
 /// Every column but those whose bound is negative, which the caller fills. Reference and instruction sets go by
 /// `standard`.

@@ -178,11 +178,12 @@ TEST(HardCaseExtreme, AQuarterOfAHundredMegapixelsByPieces) {
                 "the same developed whole: inner parts of 2.4 megapixels (file), all (others)",
                 "noise of a raw value"});
   row.none(Path::reference, "has no pieces");
+  constexpr Bound bound{0.03, "the bound is that of any scene (frame_tiles.h)"};
   for (std::size_t i = 0; i < levels.size(); ++i) {
-    row.on(levels[i], 0.03, [&](Denormals m) { return error_of_pieces(denoise::all_levels[i], m); });
+    row.on(levels[i], bound, [&](Denormals m) { return error_of_pieces(denoise::all_levels[i], m); });
   }
-  row.on_each_set(0.03, [](Denormals m) { return error_of_pieces(Level::standard, m); });
-  row.on(Path::file, 0.03, error_of_26_megapixels).none(Path::live, "frames of streams are not cut up");
+  row.on_each_set(bound, [](Denormals m) { return error_of_pieces(Level::standard, m); });
+  row.on(Path::file, bound, error_of_26_megapixels).none(Path::live, "frames of streams are not cut up");
 }
 
 }  // namespace

@@ -74,7 +74,7 @@ TEST(HardCaseSensor, MeansFromOneInABillionToAMillionAreExact) {
       {group, "means of 1e-12 to 1e6 photons",
        "Poisson's distribution in 50 digits, to 1e5 (reference); its plain sum (sets); 5 standard errors (file)",
        "relative; counts that differ; standard errors"});
-  row.on(Path::reference, 1e-12, [](Denormals m) {
+  row.on(Path::reference, {4e-13, rounding}, [](Denormals m) {
     double worst = 0;
     for (const double mean : means_e) {
       const int most_likely = static_cast<int>(mean);
@@ -127,7 +127,8 @@ TEST(HardCaseSensor, AFrameWithoutLightStaysAtZero) {
   HardCase row({group, "an all-dark frame", "closed form: a mean of 0; five standard errors, and one that borders add",
                 "standard errors of the mean"});
   const MosaicCase c = without_light(3, 256, 192);
-  measure(row, c, {6, 6, 6, 6}, [&](PlaneView<const double> out) {
+  constexpr Bound bound{6, any_draw};
+  measure(row, c, {bound, bound, bound, bound}, [&](PlaneView<const double> out) {
     const auto mean = denoise_testing::colour_means(out, c.phase);
     double worst = 0;
     for (int k = 0; k < 3; ++k) {
@@ -158,7 +159,7 @@ TEST(HardCaseSensor, NegativeSumsHaveNoChromaticity) {
 TEST(HardCaseSensor, AsAlphaVanishesErrorsGrowByItsReciprocal) {
   HardCase row({group, "alpha from 0.1 to 1e-12", "closed form: rounding of 0.3, 2e-16 (float 6e-8), divided by alpha",
                 "error times alpha over rounding"});
-  row.on(Path::reference, 1, [](Denormals m) {
+  row.on(Path::reference, {1, rounding}, [](Denormals m) {
     const isp::Xy light{0.6, 0.3}, black{0.31, 0.33};
     double worst = 0;
     for (const double alpha : {1e-1, 1e-4, 1e-8, 1e-12}) {
@@ -169,10 +170,11 @@ TEST(HardCaseSensor, AsAlphaVanishesErrorsGrowByItsReciprocal) {
     return in_mode(m, [&] { return isp::resaturated(black, black, 0).has_value(); }) ? inf : worst;
   });
   row.none(levels, no_colour_yet).none(instruction_sets, no_colour_yet);
-  row.on(Path::file, 1, [](Denormals m) {  // `lowlux resaturate`, where confidence is 1/2: half of the way to (1, 0)
-    const isp::Xy out = resaturated_flat({0.031f, 0.03f, 0.03f}, {0.03, 0.03, 0.03}, 0.065e-3, m);
-    return std::abs(out.x - 2.0 / 3) * (0.001 / 0.091) / 6e-8;
-  });
+  row.on(Path::file, {0.1, rounding},
+         [](Denormals m) {  // `lowlux resaturate`, where confidence is 1/2: half of the way to (1, 0)
+           const isp::Xy out = resaturated_flat({0.031f, 0.03f, 0.03f}, {0.03, 0.03, 0.03}, 0.065e-3, m);
+           return std::abs(out.x - 2.0 / 3) * (0.001 / 0.091) / 6e-8;
+         });
   row.none(Path::live, "streams subtract dark before there are colours");
 }
 
@@ -270,7 +272,7 @@ TEST(HardCaseSensor, SingularSensitivitiesAreRefused) {
 void spectrum_row(std::string_view name, const Spectrum& light, const std::vector<double>& widths_nm) {
   HardCase row({group, name, "closed form: photons bin by bin (reference, relative), 5 standard errors (others)",
                 "relative to 1e-15; standard errors"});
-  row.on(Path::reference, 5, [&](Denormals m) {
+  row.on(Path::reference, {1, rounding}, [&](Denormals m) {
     const auto found = in_mode(m, [&] { return isp::bin_widths_nm(light); });
     double worst = 0;
     for (std::size_t i = 0; i < widths_nm.size(); ++i) keep_worst(worst, std::abs(found[i] / widths_nm[i] - 1) / 1e-15);
