@@ -121,7 +121,9 @@ Finding figure_of(const std::string& experiment, const std::string& table, const
           fmt::format("{:.2f}", pair.delta_e),
           fmt::format("{:.2f}, {:.2f} to {:.2f} in {} readings", agreement.ours.front(), least, most, readings),
           least <= pair.delta_e && pair.delta_e <= most,
-          note_on(agreement)};
+          note_on(agreement),
+          Finding::Kind::published,
+          !figures_agree({{pair.delta_e, agreement.ours.front()}})};
 }
 
 Plot track_plot(const std::string& id, const AppearanceTracks& tracks, const std::vector<NamedSpectrum>& chips) {

@@ -32,7 +32,9 @@ Finding agrees_less(std::span<const Agreement> fixed, std::span<const Agreement>
           fmt::format("{:.2f} for {:.2f}; less in {} of {} readings", without.ours.front(), with.ours.front(), less,
                       readings),
           less == readings,
-          note};
+          note,
+          Finding::Kind::published,
+          !figures_agree({{without.pair.delta_e, without.ours.front()}, {with.pair.delta_e, with.ours.front()}})};
 }
 
 double chroma(const Xyz& seen) {

@@ -1,6 +1,10 @@
 #include "isp/bench/reproduce.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+
+#include <fmt/format.h>
 
 #include "isp/base/near_match.h"
 #include "isp/bench/experiments.h"
@@ -45,7 +49,7 @@ Result<Experiment> experiment_named(std::string_view id) {
 }
 
 Table table_of(std::span<const Finding> findings) {
-  Table table{{"finding", "kind", "claim", "published", "ours", "holds", "note"}, {}};
+  Table table{{"finding", "kind", "claim", "published", "ours", "verdict", "note"}, {}};
   for (const Finding& f : findings) {
     table.rows.push_back(
         {f.id, std::string(kind_of(f)), f.claim, f.published, f.ours, std::string(verdict_of(f)), f.note});
@@ -57,6 +61,25 @@ std::string_view kind_of(const Finding& finding) {
   return finding.kind == Finding::Kind::published ? "published" : "check";
 }
 
-std::string_view verdict_of(const Finding& finding) { return finding.holds ? "holds" : "does not hold"; }
+std::string_view verdict_of(const Finding& finding) {
+  if (!finding.holds) return "does not hold";
+  return finding.direction_only ? "same direction" : "agrees";
+}
+
+bool figures_agree(std::initializer_list<FigurePair> figures) {
+  constexpr double tolerance = 0.1;  // of the published figure
+  return std::ranges::all_of(figures, [](const FigurePair& f) {
+    return std::fabs(f.ours - f.published) <= tolerance * std::fabs(f.published);
+  });
+}
+
+std::string count_of_verdicts(std::span<const Finding> findings, Finding::Kind kind) {
+  int agree = 0, same_direction = 0, failed = 0;
+  for (const Finding& f : findings) {
+    if (f.kind != kind) continue;
+    ++(!f.holds ? failed : f.direction_only ? same_direction : agree);
+  }
+  return fmt::format("{} agree, {} have the same direction, {} do not hold", agree, same_direction, failed);
+}
 
 }  // namespace lowlux::isp

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <string_view>
@@ -24,7 +25,17 @@ struct Finding {
   bool holds = false;
   std::string note;  // how it was computed; why it does not hold
   Kind kind = Kind::published;
+  bool direction_only = false;  // the claim holds, and its figures are not ours
 };
+
+/// A published figure and the same quantity, computed.
+struct FigurePair {
+  double published;
+  double ours;
+};
+
+/// Whether each of our figures is within a tenth of the published one.
+bool figures_agree(std::initializer_list<FigurePair> figures);
 
 /// What one experiment yields.
 struct Outcome {
@@ -55,13 +66,16 @@ std::span<const Experiment> experiments();
 /// The experiment of an id. Error: there is none; the message names near ones.
 Result<Experiment> experiment_named(std::string_view id);
 
-/// Findings as a table: finding, kind, claim, published, ours, holds, note.
+/// Findings as a table: finding, kind, claim, published, ours, verdict, note.
 Table table_of(std::span<const Finding> findings);
 
 /// "published" or "check".
 std::string_view kind_of(const Finding& finding);
 
-/// "holds" or "does not hold".
+/// "agrees", "same direction" (the claim holds, its figures do not) or "does not hold".
 std::string_view verdict_of(const Finding& finding);
+
+/// How many findings of a kind have each verdict: "20 agree, 10 have the same direction, 2 do not hold".
+std::string count_of_verdicts(std::span<const Finding> findings, Finding::Kind kind);
 
 }  // namespace lowlux::isp

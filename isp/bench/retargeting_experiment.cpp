@@ -41,6 +41,10 @@ std::string both(const PublishedMeans& means) {
   return fmt::format("{:.2f} and {:.1f} %", means.delta_e_94c, means.gamut_percent);
 }
 
+bool agree(const PublishedMeans& means, const PictureScores& scores) {
+  return figures_agree({{means.delta_e_94c, mean_delta_e(scores)}, {means.gamut_percent, mean_gamut(scores)}});
+}
+
 std::vector<Finding> published_findings(const DisplayScores& at, const RetargetingWork& work) {
   const PictureScores &none = at.of(RetargetMethod::none), &shin = at.of(RetargetMethod::shin);
   const PictureScores &cao = at.of(RetargetMethod::cao), &icam = at.of(RetargetMethod::icam06);
@@ -50,17 +54,21 @@ std::vector<Finding> published_findings(const DisplayScores& at, const Retargeti
        "Shin's inverse brings pictures at 2 cd/m2 closer to their look at 250: mean Delta E 94c (Table 5-6)",
        fmt::format("{:.2f} for {:.2f}", inverse.delta_e_94c, unprocessed.delta_e_94c),
        fmt::format("{:.2f} for {:.2f}", mean_delta_e(shin), mean_delta_e(none)),
-       mean_delta_e(shin) < mean_delta_e(none), measured_how(work)},
+       mean_delta_e(shin) < mean_delta_e(none), measured_how(work), Finding::Kind::published,
+       !figures_agree({{inverse.delta_e_94c, mean_delta_e(shin)}, {unprocessed.delta_e_94c, mean_delta_e(none)}})},
       {"retargeting/gamut", "and shows more of their gamut: mean EGR",
        fmt::format("{:.1f} % for {:.1f} %", inverse.gamut_percent, unprocessed.gamut_percent),
        fmt::format("{} for {}", percent_text(mean_gamut(shin), o), percent_text(mean_gamut(none), o)),
-       mean_gamut(shin) > mean_gamut(none), "convex hulls in a*, b*"},
+       mean_gamut(shin) > mean_gamut(none), "convex hulls in a*, b*", Finding::Kind::published,
+       !figures_agree({{inverse.gamut_percent, mean_gamut(shin)}, {unprocessed.gamut_percent, mean_gamut(none)}})},
       {"retargeting/cao", "Cao's model, which the thesis calls Wanat & Mantiuk's, gains less than Shin's in both",
        both(by_cao), both(cao, o), mean_delta_e(cao) > mean_delta_e(shin) && mean_gamut(cao) < mean_gamut(shin),
-       fmt::format("mean Delta E 94c and EGR; unprocessed {}", both(none, o))},
+       fmt::format("mean Delta E 94c and EGR; unprocessed {}", both(none, o)), Finding::Kind::published,
+       !agree(by_cao, cao)},
       {"retargeting/icam06", "iCAM06 leaves pictures farther than they were, with more of the gamut", both(by_icam06),
        both(icam, o), mean_delta_e(icam) > mean_delta_e(none) && mean_gamut(icam) > mean_gamut(none),
-       "here the displayable colour that looks most alike by iCAM06; how the thesis retargets by it is not told"}};
+       "here the displayable colour that looks most alike by iCAM06; how the thesis retargets by it is not published",
+       Finding::Kind::published, !agree(by_icam06, icam)}};
 }
 
 /// In how many pictures ours beats the published inverse.

@@ -11,7 +11,7 @@
 namespace lowlux::cli {
 namespace {
 
-constexpr std::array<std::size_t, 5> widths{40, 9, 24, 32, 13};  // finding, kind, published, ours, verdict
+constexpr std::array<std::size_t, 5> widths{40, 9, 24, 32, 14};  // finding, kind, published, ours, verdict
 constexpr std::size_t note_width = 104;
 
 // Broken at blanks; a word that is longer than the width has its own line.
@@ -47,30 +47,18 @@ std::string table_row(const std::array<std::string, 5>& cells) {
   return out;
 }
 
-/// Those of a kind, and those of them that hold.
-struct Count {
-  std::ptrdiff_t all;
-  std::ptrdiff_t holding;
-};
-
-Count count_of(std::span<const isp::Finding> findings, isp::Finding::Kind kind) {
-  return {std::ranges::count(findings, kind, &isp::Finding::kind),
-          std::ranges::count_if(findings, [kind](const isp::Finding& f) { return f.kind == kind && f.holds; })};
-}
-
 }  // namespace
 
 std::string findings_text(std::span<const isp::Finding> findings) {
   std::string out = table_row({"finding", "kind", "published", "ours", "verdict"});
   for (const isp::Finding& f : findings) {
     out += table_row({f.id, std::string(isp::kind_of(f)), f.published, f.ours, std::string(isp::verdict_of(f))});
-    if (f.holds) continue;
+    if (f.holds && !f.direction_only) continue;
     for (const std::string& line : wrapped(f.claim + ": " + f.note, note_width)) out += fmt::format("    {}\n", line);
   }
-  const Count published = count_of(findings, isp::Finding::Kind::published);
-  const Count checks = count_of(findings, isp::Finding::Kind::check);
-  return out + fmt::format("{} of {} published findings hold; {} of {} checks of our own\n", published.holding,
-                           published.all, checks.holding, checks.all);
+  return out + fmt::format("published findings: {}\nchecks of our own: {}\n",
+                           isp::count_of_verdicts(findings, isp::Finding::Kind::published),
+                           isp::count_of_verdicts(findings, isp::Finding::Kind::check));
 }
 
 std::string findings_json(std::span<const isp::Finding> findings) {
@@ -82,6 +70,7 @@ std::string findings_json(std::span<const isp::Finding> findings) {
                    {"published", f.published},
                    {"ours", f.ours},
                    {"holds", f.holds},
+                   {"verdict", isp::verdict_of(f)},
                    {"note", f.note}});
   }
   return out.dump(2);

@@ -100,14 +100,16 @@ TEST(MesopicAgreement, ShinAndCaoDifferAsComputedApart) {
   EXPECT_LT(least, most);  // the unit of Shin's coefficients and the adaptation count
 }
 
-TEST(MesopicAgreement, AFigureHoldsIfTheReadingsSpanIt) {
+TEST(MesopicAgreement, AFigureHoldsIfTheReadingsSpanItAndAgreesIfTheFirstIsWithinATenth) {
   Agreement a{.pair = {"shin", "icam06", 10}};
   a.ours.fill(12);
-  EXPECT_FALSE(figure_of("x", "Table", a).holds);
+  EXPECT_EQ(verdict_of(figure_of("x", "Table", a)), "does not hold");
   a.ours.back() = 9;
-  EXPECT_TRUE(figure_of("x", "Table", a).holds);
+  EXPECT_EQ(verdict_of(figure_of("x", "Table", a)), "same direction");
+  a.ours.front() = 10.9;
+  EXPECT_EQ(verdict_of(figure_of("x", "Table", a)), "agrees");
   a.pair.delta_e = 8.9;
-  EXPECT_FALSE(figure_of("x", "Table", a).holds);
+  EXPECT_EQ(verdict_of(figure_of("x", "Table", a)), "does not hold");
 }
 
 TEST(MesopicAgreement, PlotsLeaveOutWhatIsNoChromaticityAndSaySo) {

@@ -33,7 +33,7 @@ TEST(Reproduce, PrintsFindingPublishedOursAndVerdict) {
   const auto result = reproduce({"snr-sensitivity", "--quick"});
   EXPECT_EQ(result.exit_code, 0) << result.err;  // also though a finding does not hold
   for (const char* word : {"finding", "published", "ours", "verdict", "snr-sensitivity/signal", "about 9 e-", "9.0 e-",
-                           "does not hold", "volts squared", " findings hold"}) {
+                           "does not hold", "volts squared", "published findings: "}) {
     EXPECT_NE(result.out.find(word), std::string::npos) << word;
   }
   EXPECT_EQ(result.err, "");
@@ -60,8 +60,25 @@ TEST(Reproduce, JsonHasTheFindingsOfTheChosenExperimentsInTheirOrder) {
 
 TEST(Reproduce, CountsPublishedFindingsAndChecksApart) {
   const auto result = reproduce({"frequency-of-seeing", "--quick"});
-  EXPECT_NE(result.out.find("\n1 of 1 published findings hold; 1 of 2 checks of our own\n"), std::string::npos)
+  EXPECT_NE(result.out.find("\npublished findings: 1 agree, 0 have the same direction, 0 do not hold\n"
+                            "checks of our own: 1 agree, 0 have the same direction, 1 do not hold\n"),
+            std::string::npos)
       << result.out;
+}
+
+TEST(Reproduce, AnOrderWhoseFiguresAreOthersHasTheSameDirectionOnly) {
+  const auto result = reproduce({"mesopic-tracks", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json findings = Json::parse(result.out);
+  const auto verdict = [&](const std::string& what) {
+    const auto found = std::find_if(findings.begin(), findings.end(),
+                                    [&](const Json& f) { return f["id"] == "mesopic-tracks/" + what; });
+    return found == findings.end() ? "" : (*found)["verdict"].get<std::string>();
+  };
+  EXPECT_EQ(verdict("cao-from-shin"), "same direction");  // published 10.4 times as far, here 1.2 to 1.3
+  EXPECT_EQ(verdict("shin-spectral"), "same direction");  // published 9.14, here 12.88, 5.3 to 22.1 by readings
+  EXPECT_EQ(verdict("blue"), "agrees");
+  EXPECT_EQ(verdict("shin-cao"), "does not hold");
 }
 
 TEST(Reproduce, SeedsGiveSamplesThatDifferAndRepeat) {
@@ -81,7 +98,7 @@ TEST(Reproduce, WritesTableDataAndReportAndOverwritesNothing) {
     EXPECT_FALSE(scratch.read(std::string("a/b") + name).empty()) << name;
   }
   const std::string before = scratch.read("a/b/findings.csv");
-  EXPECT_TRUE(before.starts_with("finding,kind,claim,published,ours,holds,note\n"));
+  EXPECT_TRUE(before.starts_with("finding,kind,claim,published,ours,verdict,note\n"));
 
   const auto again = reproduce({"dark-desaturation", "--quick", "-o", folder, "--seed", "2"});
   EXPECT_EQ(again.exit_code, 1);
