@@ -238,7 +238,8 @@ std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopPlan& pla
 }
 
 double seen_percentile(std::span<const float> rms_delta_e) {
-  if (rms_delta_e.empty()) return 0;
+  const auto noisy = std::ranges::count_if(rms_delta_e, [](float rms) { return rms > 0; });
+  if (static_cast<double>(noisy) <= (1 - seen_share) * static_cast<double>(rms_delta_e.size())) return 0;
   const auto share_above = [&](double x) {
     double sum = 0;
     for (const float rms : rms_delta_e) {
@@ -247,7 +248,6 @@ double seen_percentile(std::span<const float> rms_delta_e) {
     return sum / static_cast<double>(rms_delta_e.size());
   };
   double low = 0, high = 5 * static_cast<double>(*std::ranges::max_element(rms_delta_e));
-  if (!(high > 0)) return 0;
   for (int step = 0; step < 24; ++step) {
     const double middle = (low + high) / 2;
     (share_above(middle) > 1 - seen_share ? low : high) = middle;

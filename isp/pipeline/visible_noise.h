@@ -38,7 +38,8 @@ struct SeenBlock {
 std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
                                    const Thumbnail& thumbnail, Executor& executor);
 
-/// The difference that 5 % of the pixels exceed, each block's being normal with this root mean square.
+/// The difference that 5 % of the pixels exceed, each block's being normal with this root mean square: to 1.5e-7 of the
+/// largest. 0 where no more than 5 % of the blocks have any.
 double seen_percentile(std::span<const float> rms_delta_e);
 
 }  // namespace lowlux::isp
