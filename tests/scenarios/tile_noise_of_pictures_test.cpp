@@ -1,10 +1,10 @@
 // What live frames tell of their sensor's noise, on pictures behind a lens.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdio>
-#include <cstdlib>
 #include <optional>
-#include <span>
+#include <string>
 #include <string_view>
 
 #include "isp/raw/tile_noise.h"
@@ -14,10 +14,27 @@
 namespace lowlux::isp {
 namespace {
 
-// A sensor of 10 bits as phones have it: 0.24 DN/e-, 2 e-. Detail only adds. Half a megapixel full of texture (a wall
-// of shingles, leaves) has no flat place of each level; the bounds were set above what the pictures give: they guard
-// against worse.
-TEST(TileNoiseOfPictures, GainIsWithinAFifthButWhereTextureIsEverywhere) {
+/// By how much the gain comes out too high, at most, at 20 and at 100 e-.
+struct Excess {
+  std::string_view picture;
+  double at_20_e;
+  double at_100_e;
+};
+
+// What was measured and a tenth of it, rounded up to a hundredth. Detail only adds: the gain is near where a picture
+// has flat places at every level of light, and up to 1.9 times too high where texture fills it (kodim05: motorcycles;
+// kodim08: facades; StillLife: fabric).
+constexpr std::array<Excess, 8> excesses{{{"kodim05.png", 0.53, 0.96},
+                                          {"kodim15.png", 0.07, 0.13},
+                                          {"GoldenGate.exr", 0.02, 0.03},
+                                          {"Carrots.exr", 0.05, 0.15},
+                                          {"StillLife.exr", 0.31, 0.38},
+                                          {"kodim08.png", 0.34, 0.61},
+                                          {"kodim19.png", 0.10, 0.12},
+                                          {"kodim23.png", 0.09, 0.14}}};
+
+// A sensor of 10 bits as phones have it: 0.24 DN/e-, 2 e-.
+TEST(TileNoiseOfPictures, GainIsAboveTheSensorsByWhatTextureAddsToEachOfThem) {
   constexpr double gain_dn = 0.24, black_dn = 64;
   const SensorModel sensor{.name = "tile noise",
                            .system_gain_dn_per_e = gain_dn,
@@ -26,14 +43,9 @@ TEST(TileNoiseOfPictures, GainIsWithinAFifthButWhereTextureIsEverywhere) {
                            .bits = 10,
                            .black_level_dn = black_dn,
                            .white_level_dn = 1023};
-  const auto most_of = [](std::string_view name, double mean_e) {
-    if (name == "kodim05.png") return mean_e > 50 ? 1.0 : 0.6;
-    if (name == "kodim08.png") return mean_e > 50 ? 0.7 : 0.4;
-    return name == "StillLife.exr" ? 0.4 : 0.2;
-  };
-  const bool nightly = std::getenv("LOWLUX_NIGHTLY") != nullptr;
   InlineExecutor one;
-  for (const char* name : std::span(test::clean_pictures).first(nightly ? test::clean_pictures.size() : 3)) {
+  for (const Excess& excess : excesses) {
+    const std::string name(excess.picture);
     const auto light = test::picture_light(name, one, 0.9);
     ASSERT_TRUE(light) << light.error().message;
     for (const double mean_e : {20.0, 100.0}) {
@@ -43,10 +55,11 @@ TEST(TileNoiseOfPictures, GainIsWithinAFifthButWhereTextureIsEverywhere) {
       test::measure(raw.dn, tiles);
       const std::optional<NoiseLine> line = tiles.line({black_dn, black_dn, black_dn, black_dn}, 1023);
       ASSERT_TRUE(line) << name;
-      std::printf("%-14s %4.0f e-: gain %+5.1f %%, offset %.3f DN^2\n", name, mean_e,
+      std::printf("%-14s %4.0f e-: gain %+5.1f %%, offset %.3f DN^2\n", name.c_str(), mean_e,
                   100 * (line->gain_dn / gain_dn - 1), line->offset_dn2);
       EXPECT_GT(line->gain_dn, 0.95 * gain_dn) << name << " at " << mean_e;
-      EXPECT_LT(line->gain_dn, (1 + most_of(name, mean_e)) * gain_dn) << name << " at " << mean_e;
+      EXPECT_LT(line->gain_dn, (1 + (mean_e < 50 ? excess.at_20_e : excess.at_100_e)) * gain_dn)
+          << name << " at " << mean_e;
     }
   }
 }
