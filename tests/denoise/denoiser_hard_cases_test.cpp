@@ -228,7 +228,8 @@ TEST(DenoiserHardCases, ALightBesideTheDarkLeavesTheDarkNoNoisierThanItWas) {
 }
 
 // Of coefficients of noise, 6.3e-5 lie beyond four standard deviations, with a mean square of 18 variances: they leave
-// sqrt(6.3e-5 * 18) = 0.034 of the noise.
+// sqrt(6.3e-5 * 18) = 0.034 of the noise. Of the 49 152 of G1 - G2 three are expected there, so that their number, and
+// the square, varies by more than half from draw to draw: a third more.
 TEST(DenoiserHardCases, FlatFieldsShowNoMaze) {
   const Camera camera{.dark_e = {20, 20, 20, 20}};
   const auto raw = exposed(camera, flat(20, 20, 20), 512, 384, 55);
@@ -240,7 +241,7 @@ TEST(DenoiserHardCases, FlatFieldsShowNoMaze) {
     }
   }
   // G1 - G2 of one cell has a standard deviation of sqrt(2 * 42.25) e- before.
-  EXPECT_LT(std::sqrt(sum / (256 * 192)), 0.05 * std::sqrt(2 * 42.25));
+  EXPECT_LT(std::sqrt(sum / (256 * 192)), 0.034 * (1 + 1.0 / 3) * std::sqrt(2 * 42.25));
 }
 
 TEST(DenoiserHardCases, DifferentDarkOfTheGreensIsSharedByBoth) {
