@@ -191,8 +191,9 @@ TEST(StageMemory, IsWhatTheLimitTakesItFor) {
     }
     EXPECT_LT(used, said) << mode.name;
     EXPECT_GT(configured, said / 3) << mode.name;
-    // But for pages that the made-up frame's light does not reach: chroma that starts on another level.
-    EXPECT_LT(used - configured, 3 << 20) << mode.name << ": a frame takes none";
+    // A frame allocates nothing. It touches pages of the denoiser that the warm-up frame's light does not reach, where
+    // chroma starts on another level: 0.5 MiB measured, twice that.
+    EXPECT_LT(used - configured, 1 << 20) << mode.name << ": a frame takes more than pages of one level";
   }
 }
 
