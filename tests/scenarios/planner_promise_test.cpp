@@ -30,8 +30,8 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-// 300 scenes, none above its tolerance; 3000 in scripts/nightly, one in a thousand above by a tenth at most. The time
-// is that of large frames that are searched whole (reference_cost); planned_time_bench measures some.
+// 300 scenes, 3000 in scripts/nightly, none above its tolerance: of the 3000 the nearest is at 0.93 of it. The time is
+// that of large frames that are searched whole (reference_cost); planned_time_bench measures some.
 TEST(PlannerPromise, WhatIsLeftOutStaysBelowTheToleranceOver300Scenes) {
   const std::uint32_t scenes = std::getenv("LOWLUX_NIGHTLY") == nullptr ? 300 : 3000;
   std::vector<double> saved, of_tolerance;
@@ -57,9 +57,7 @@ TEST(PlannerPromise, WhatIsLeftOutStaysBelowTheToleranceOver300Scenes) {
   std::printf("  time saved: 10 %% %.2f, 25 %% %.2f, median %.2f, 75 %% %.2f, 90 %% %.2f\n", quantile(saved, 0.1),
               quantile(saved, 0.25), quantile(saved, 0.5), quantile(saved, 0.75), quantile(saved, 0.9));
   std::printf("  noise left %d, draft %d, standard %d, high %d\n", levels[0], levels[1], levels[2], levels[3]);
-  const auto above = std::ranges::count_if(of_tolerance, [](double ratio) { return ratio >= 1; });
-  EXPECT_LE(above, scenes / 1000);
-  EXPECT_LT(quantile(of_tolerance, 1), 1.1);
+  EXPECT_LT(quantile(of_tolerance, 1), 1);
   EXPECT_GE(quantile(saved, 0.5), 0.25);
   for (const int count : levels) EXPECT_GT(count, 0) << "every level is called for by some scene";
 }
