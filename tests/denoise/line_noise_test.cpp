@@ -171,7 +171,7 @@ TEST(LineNoise, KnownByCalibrationKeepsBlindsInThePicture) {
   const auto found = line_offsets_of_frame(frame.view(), Lines::rows, {.known_std_e = 1.0});
   ASSERT_TRUE(found);
   EXPECT_EQ(found->line_std_e, 1);
-  EXPECT_LT(left_over(truth, *found), 0.6);
+  EXPECT_LT(left_over(truth, *found) / found->residual_std_e, 1 + five_errors(256)) << "its own prediction";
 }
 
 TEST(LineNoise, OfColumnsIsThatOfRowsOfTheTransposedPicture) {
