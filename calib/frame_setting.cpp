@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "isp/base/camera_name.h"
+
 namespace lowlux::calib {
 namespace {
 
@@ -47,8 +49,8 @@ Result<FrameSetting> setting_of(const RawDn& raw) {
 
 Result<void> check_same_camera(const FrameSetting& first, const FrameSetting& second, const std::string& what) {
   if (first.make != second.make || first.model != second.model) {
-    return differs(what, fmt::format("is of camera \"{} {}\"", second.make, second.model),
-                   fmt::format("of \"{} {}\"", first.make, first.model));
+    return differs(what, fmt::format("is of camera \"{}\"", camera_name(second.make, second.model)),
+                   fmt::format("of \"{}\"", camera_name(first.make, first.model)));
   }
   if (first.width != second.width || first.height != second.height) {
     return differs(what, fmt::format("has {} x {} pixels", second.width, second.height),

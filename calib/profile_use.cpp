@@ -8,6 +8,7 @@
 #include "calib/dark_stack.h"
 #include "calib/frame_setting.h"
 #include "calib/gain_interpolation.h"
+#include "isp/base/camera_name.h"
 
 namespace lowlux::calib {
 namespace {
@@ -21,8 +22,9 @@ constexpr double quantisation_dn2 = 1.0 / 12;
 Result<void> check_camera(const CameraProfile& profile, const FrameInfo& info) {
   const auto differs = [](const std::string& a, const std::string& b) { return !a.empty() && !b.empty() && a != b; };
   if (!differs(profile.make, info.make) && !differs(profile.model, info.model)) return {};
-  return fail(ErrorCode::invalid_argument, fmt::format(R"(the profile is of "{} {}", the frame of "{} {}")",
-                                                       profile.make, profile.model, info.make, info.model));
+  return fail(ErrorCode::invalid_argument,
+              fmt::format(R"(the profile is of "{}", the frame of "{}")", camera_name(profile.make, profile.model),
+                          camera_name(info.make, info.model)));
 }
 
 /// A mode of the sensor or a crop may begin at another site.

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/base/camera_name.h"
 #include "isp/base/near_match.h"
 #include "isp/cli/profile_file.h"
 #include "isp/cli/raw_luminance.h"
@@ -174,7 +175,7 @@ Result<void> take_profile(const AdviseArgs& args, const Spectrum& light, const i
   const auto colour = profile_colour(args, *profile, light);
   if (!colour) return tl::make_unexpected(colour.error());
   out.request.camera_to_xyz = colour->camera_to_xyz;
-  out.camera = fmt::format("{} {}, {}", profile->make, profile->model, args.sensor);
+  out.camera = fmt::format("{}, {}", camera_name(profile->make, profile->model), args.sensor);
   for (const GainProfile& gain : profile->gains) {
     if (!args.gain.empty() && gain.gain_setting != args.gain) continue;
     FrameInfo second;

@@ -11,6 +11,7 @@
 
 #include "calib/profile_io.h"
 #include "capture/file/dng_source.h"
+#include "isp/base/camera_name.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/output_place.h"
 #include "isp/cli/profile_file.h"
@@ -57,8 +58,9 @@ Result<RawFrame> read_calibration_frame(const std::string& file, const Calibrate
 Result<void> put_camera(const FrameInfo& info, CameraProfile& profile) {
   const auto differs = [](const std::string& a, const std::string& b) { return !a.empty() && !b.empty() && a != b; };
   if (differs(profile.make, info.make) || differs(profile.model, info.model)) {
-    return fail(ErrorCode::invalid_argument, fmt::format(R"(the profile is of "{} {}", what is to be added of "{} {}")",
-                                                         profile.make, profile.model, info.make, info.model));
+    return fail(ErrorCode::invalid_argument,
+                fmt::format(R"(the profile is of "{}", what is to be added of "{}")",
+                            camera_name(profile.make, profile.model), camera_name(info.make, info.model)));
   }
   if (profile.make.empty()) profile.make = info.make;
   if (profile.model.empty()) profile.model = info.model;

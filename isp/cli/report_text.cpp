@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include "calib/profile_use.h"
+#include "isp/base/camera_name.h"
+#include "isp/cli/frame_text.h"
 #include "isp/cli/lines.h"
 #include "isp/cli/report.h"
 #include "isp/model/camera_colour.h"
@@ -75,8 +77,9 @@ void add_exposure(Lines& out, const FrameInfo& info) {
   const auto value = [](const std::optional<double>& v, const char* unit) {
     return v ? fmt::format("{:g}{}", *v, unit) : std::string("not stated");
   };
-  out.add("exposure", fmt::format("{}, f-number {}, ISO {}", value(info.exposure_s, " s"), value(info.f_number, ""),
-                                  value(info.iso, "")));
+  out.add("exposure",
+          fmt::format("{}, {}, ISO {}", info.exposure_s ? exposure_text(*info.exposure_s) : "time not stated",
+                      info.f_number ? f_number_text(*info.f_number) : "f-number not stated", value(info.iso, "")));
   out.add("temperature", value(info.temperature_c, " C"));
   if (const auto luminance = isp::saturation_luminance_cd_m2(info)) {
     out.add("luminance", fmt::format("saturates at about {:.3g} cd/m2 (estimated from f-number, ISO and exposure time)",
@@ -123,7 +126,7 @@ std::string times_text(const std::vector<isp::StageTime>& times) {
 std::string info_text(const std::string& file, const RawFrame& frame) {
   Lines out;
   const FrameInfo& info = frame.raw.info;
-  out.add("camera", fmt::format("{} {}{}", info.make, info.model, info.date_time.empty() ? "" : ", " + info.date_time));
+  out.add("camera", camera_name(info.make, info.model) + (info.date_time.empty() ? "" : ", " + info.date_time));
   add_layout(out, frame.raw);
   add_black(out, frame.raw);
   out.add("white [DN]",

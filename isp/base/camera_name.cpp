@@ -1,0 +1,25 @@
+#include "isp/base/camera_name.h"
+
+#include <algorithm>
+
+namespace lowlux {
+namespace {
+
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+/// Whether the model begins with the first word of the make.
+bool repeats(std::string_view make, std::string_view model) {
+  const std::string_view word = make.substr(0, make.find(' '));
+  return model.size() > word.size() && model[word.size()] == ' ' &&
+         std::ranges::equal(word, model.substr(0, word.size()), {}, lower, lower);
+}
+
+}  // namespace
+
+std::string camera_name(std::string_view make, std::string_view model) {
+  if (make.empty() || repeats(make, model)) return std::string(model);
+  if (model.empty()) return std::string(make);
+  return std::string(make).append(" ").append(model);
+}
+
+}  // namespace lowlux
