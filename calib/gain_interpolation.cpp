@@ -1,7 +1,10 @@
 #include "calib/gain_interpolation.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <string_view>
+#include <system_error>
 #include <vector>
 
 #include <fmt/format.h>
@@ -48,6 +51,22 @@ GainProfile beyond(const GainProfile& nearest, double ratio) {
   return out;
 }
 
+std::string settings_of(const CameraProfile& profile) {
+  std::string text;
+  for (const GainProfile& g : profile.gains) text += fmt::format("{}'{}'", text.empty() ? "" : ", ", g.gain_setting);
+  return text;
+}
+
+/// "ISO 1600" or "1600"; nullopt if it is neither.
+std::optional<double> iso_named(std::string_view name) {
+  constexpr std::string_view prefix = "ISO ";
+  if (name.starts_with(prefix)) name.remove_prefix(prefix.size());
+  double iso = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), iso);
+  const bool whole = error == std::errc() && end == name.data() + name.size();
+  return whole && iso > 0 && std::isfinite(iso) ? std::optional(iso) : std::nullopt;
+}
+
 std::string names_of(const std::vector<const GainProfile*>& gains) {
   std::string text;
   for (const GainProfile* g : gains) text += fmt::format("{}{:g}", text.empty() ? "" : ", ", *g->iso);
@@ -68,8 +87,8 @@ Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<
   if (!iso && unstated.size() == 1) return GainAtIso{*unstated.front(), ""};
   if (stated.empty() || !iso) {
     return fail(ErrorCode::insufficient,
-                fmt::format("the {} states no ISO, and the profile has {} gain settings to choose from",
-                            iso ? "profile" : "frame", profile.gains.size()));
+                fmt::format("the {} states no ISO: choose one of the profile's gain settings with --gain-setting: {}",
+                            iso ? "profile" : "frame", settings_of(profile)));
   }
   std::sort(stated.begin(), stated.end(), [](const auto* a, const auto* b) { return *a->iso < *b->iso; });
   for (const GainProfile* g : stated) {
@@ -93,6 +112,15 @@ Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<
                     *low.iso, *high.iso, *iso, *nearer.iso)};
   }
   return GainAtIso{between(low, high, share), ""};
+}
+
+Result<GainAtIso> gain_named(const CameraProfile& profile, const std::string& name) {
+  const auto found = std::ranges::find(profile.gains, name, &GainProfile::gain_setting);
+  if (found != profile.gains.end()) return GainAtIso{*found, ""};
+  const bool has_iso = std::ranges::any_of(profile.gains, [](const GainProfile& g) { return g.iso.has_value(); });
+  if (const auto iso = iso_named(name); iso && has_iso) return gain_at_iso(profile, iso);
+  return fail(ErrorCode::invalid_argument,
+              fmt::format("the profile has no gain setting '{}', it has {}", name, settings_of(profile)));
 }
 
 }  // namespace lowlux::calib

@@ -19,4 +19,8 @@ struct GainAtIso {
 /// Errors: see profile_at.
 Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<double>& iso);
 
+/// @param name  of a setting, as the profile has it ("gain 120"), or an ISO ("ISO 1600", "1600"), measured or not
+/// Errors: the profile has no such setting; see profile_at.
+Result<GainAtIso> gain_named(const CameraProfile& profile, const std::string& name);
+
 }  // namespace lowlux::calib

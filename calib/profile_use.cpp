@@ -203,7 +203,7 @@ std::vector<ColourCalibration> calibrations_of(const CameraProfile& profile) {
   return out;
 }
 
-Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame) {
+Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame, const std::string& gain_setting) {
   if (frame.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported, "the frame is already demosaiced: a profile tells of the mosaic");
   }
@@ -211,7 +211,7 @@ Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& fra
   ProfileAtFrame out;
   if (const auto fits = check_mosaic(profile, frame, out.warnings); !fits) return tl::make_unexpected(fits.error());
   if (profile.gains.empty()) return out;
-  auto found = gain_at_iso(profile, frame.info.iso);
+  auto found = gain_setting.empty() ? gain_at_iso(profile, frame.info.iso) : gain_named(profile, gain_setting);
   if (!found) return tl::make_unexpected(found.error());
   const GainProfile& gain = found->gain;
   if (!found->warning.empty()) out.warnings.push_back(found->warning);

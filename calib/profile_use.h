@@ -32,7 +32,9 @@ struct ProfileAtFrame {
 /// the phases differ (warning: levels of sites may belong to others). Warnings for exposures and temperatures beyond
 /// those of the darks. Errors: another camera; a frame that states no ISO where the profile has several; no exposure
 /// time where dark current needs it. A profile without gain settings says nothing about a frame.
-Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame);
+/// @param gain_setting  of the profile, as gain_named has it; empty: by the frame's ISO
+Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame,
+                                  const std::string& gain_setting = {});
 
 /// A profile's colours as a frame has them: at most two, as in a DNG, those of the lights of lowest and highest
 /// temperature; by rising temperature.

@@ -78,8 +78,8 @@ Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& w
   if (std::holds_alternative<DevelopArgs>(parsed) && choice.maps && choice.mode == isp::DenoiseChoice::Mode::off) {
     return refuse(app, "--maps are of what --denoise leaves: they do not go with off");
   }
-  if (std::holds_alternative<DevelopArgs>(parsed) && !args.profile.empty() && !args.black_profile.empty()) {
-    return refuse(app, "--black and --profile name a profile each: --profile uses all that is in one");
+  if (std::holds_alternative<DevelopArgs>(parsed)) {
+    if (const auto wrong = wrong_profiles(args)) return refuse(app, *wrong);
   }
   return parsed;
 }

@@ -34,6 +34,7 @@ struct DevelopArgs {
   isp::DevelopOptions options;  // white balance, black, half, defects, exposure
   std::string black_profile;    // a camera's profile to take black and noise from; empty: none
   std::string profile;          // to take everything from it, colour too; empty: none
+  std::string gain_setting;     // of the profile; empty: by the frame's ISO
   int jpeg_quality = 92;
   int jobs = 0;  // files at a time; 0: one for each processor
   bool force = false;

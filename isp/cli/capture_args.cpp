@@ -160,9 +160,9 @@ void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
 }
 
 // These say nothing of a film, and the first list nothing of raw files either.
-constexpr std::array of_pictures{"--bits",    "--quality",     "--space",        "--half",
-                                 "--repair",  "--line-noise",  "--effects",      "--tolerance",
-                                 "--dimming", "--noise-limit", "--coefficients", "--display-luminance"};
+constexpr std::array of_pictures{"--bits",         "--quality",           "--space",       "--half",    "--repair",
+                                 "--line-noise",   "--effects",           "--tolerance",   "--dimming", "--noise-limit",
+                                 "--coefficients", "--display-luminance", "--gain-setting"};
 constexpr std::array of_pictures_and_films{"--exposure",      "--wb",      "--tone",   "--look", "--scene-luminance",
                                            "--field-of-view", "--profile", "--denoise"};
 
@@ -248,9 +248,7 @@ Wrong complete(const CLI::App& app, const Words& words, CaptureArgs& args) {
   if (auto wrong = wrong_camera(args)) return wrong;
   if (auto wrong = set_kind(words, args)) return wrong;
   DevelopArgs& develop = args.develop;
-  if (!develop.profile.empty() && !develop.black_profile.empty()) {
-    return "--black and --profile name a profile each: --profile uses all that is in one";
-  }
+  if (auto wrong = wrong_profiles(develop)) return wrong;
   if (auto wrong = complete_look(develop.look, Planner::of_look, develop.options.look)) return wrong;
   const bool endless = args.folder || args.kind == CaptureKind::live;
   args.limits.frames = static_cast<std::uint64_t>(words.frames.value_or(endless ? 0 : 1));

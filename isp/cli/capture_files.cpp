@@ -58,7 +58,8 @@ class PictureSink final : public CaptureSink {
     isp::DevelopOptions options = options_;
     if (profile_) {
       const bool everything = !args_.develop.profile.empty();
-      if (const auto used = use_profile(*profile_, everything, frame, options); !used) {
+      const ProfileChoice choice{everything, args_.develop.gain_setting};
+      if (const auto used = use_profile(*profile_, choice, frame, options); !used) {
         return tl::make_unexpected(at(used.error(), everything ? args_.develop.profile : args_.develop.black_profile));
       }
       if (everything && !profile_->colours.empty()) std::erase(frame.warnings, capture::colours_unknown);

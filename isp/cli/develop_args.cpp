@@ -107,11 +107,24 @@ void add_camera(CLI::App& app, DevelopArgs& args) {
          "the two; given in DN, for all pixels or for the four sites of the 2x2 cell; or a camera's profile, whose "
          "noise "
          "and hot pixels are used too")
+  app.add_option("--gain-setting", args.gain_setting,
+                 "gain setting of the profile to use: its name or an ISO (default: the raw's ISO)")
+      ->type_name("SETTING");
       ->type_name("auto|metadata|masked|DN[,DN,DN,DN]|PROFILE.json");
   app.add_option("--profile", args.profile,
                  "a camera's profile (see calibrate): black point, noise and hot pixels, and its colour matrices if it "
                  "holds any")
       ->type_name("PROFILE.json");
+std::optional<std::string> wrong_profiles(const DevelopArgs& args) {
+  if (!args.profile.empty() && !args.black_profile.empty()) {
+    return "--black and --profile name a profile each: --profile uses all that is in one";
+  }
+  if (!args.gain_setting.empty() && args.profile.empty() && args.black_profile.empty()) {
+    return "--gain-setting is one of a profile's: name the profile with --profile";
+  }
+  return std::nullopt;
+}
+
   add_choice<bool>(
       app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
       "hot and dead pixels: look for them (default), or repair only those the file names");

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "isp/cli/args.h"
 
 namespace CLI {
@@ -13,6 +16,8 @@ namespace lowlux::cli {
 void add_rendering(CLI::App& app, DevelopArgs& args);
 /// What is known of the camera, and what is repaired by it.
 void add_camera(CLI::App& app, DevelopArgs& args);
+/// What is wrong with the options of add_camera together, or nothing.
+std::optional<std::string> wrong_profiles(const DevelopArgs& args);
 void add_denoise(CLI::App& app, DevelopArgs& args);
 /// What picture files hold: bits, JPEG quality.
 void add_samples(CLI::App& app, DevelopArgs& args);

@@ -16,11 +16,12 @@ void use_colours(const CameraProfile& profile, RawFrame& frame) {
 
 }  // namespace
 
-Result<void> use_profile(const CameraProfile& profile, bool everything, RawFrame& frame, isp::DevelopOptions& options) {
+Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choice, RawFrame& frame,
+                         isp::DevelopOptions& options) {
   isp::BlackRequest& black = options.black;
-  auto found = calib::profile_at(profile, frame.raw);
+  auto found = calib::profile_at(profile, frame.raw, choice.gain_setting);
   if (!found) return tl::make_unexpected(found.error());
-  if (!found->black && !everything) {
+  if (!found->black && !choice.everything) {
     return fail(ErrorCode::insufficient,
                 "the profile holds no black level: add one with `calibrate black --add-to`, or use what else it holds "
                 "with --profile");
@@ -37,7 +38,7 @@ Result<void> use_profile(const CameraProfile& profile, bool everything, RawFrame
   auto& defects = frame.corrections.defects;
   defects.insert(defects.end(), found->hot_pixels.begin(), found->hot_pixels.end());
   frame.warnings.insert(frame.warnings.end(), found->warnings.begin(), found->warnings.end());
-  if (everything) use_colours(profile, frame);
+  if (choice.everything) use_colours(profile, frame);
   return {};
 }
 

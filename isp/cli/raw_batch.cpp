@@ -43,8 +43,8 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
     options.effects->budget_s = budget_s(batch.args.effects, 1e-6 * crop.width * crop.height);
   }
   if (batch.profile) {
-    const bool everything = !batch.args.profile.empty();
-    const auto used = use_profile(*batch.profile, everything, frame, options);
+    const ProfileChoice choice{!batch.args.profile.empty(), batch.args.gain_setting};
+    const auto used = use_profile(*batch.profile, choice, frame, options);
     if (!used) return tl::make_unexpected(used.error());
   }
   if (!batch.darks) return options;
