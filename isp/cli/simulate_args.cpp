@@ -19,10 +19,10 @@ namespace {
 
 using Wrong = std::optional<std::string>;
 
-/// A whole number of 1 to 65535; 0 if the text is none.
+/// A whole number of min_side to 65535; 0 if the text is none.
 int side_of(const std::string& text) {
   const double side = number_of(text).value_or(0);
-  return side >= 1 && side <= 65535 && side == std::floor(side) ? static_cast<int>(side) : 0;
+  return side >= min_side && side <= 65535 && side == std::floor(side) ? static_cast<int>(side) : 0;
 }
 
 Wrong set_size(const std::string& text, SceneArgs& scene) {
@@ -30,7 +30,9 @@ Wrong set_size(const std::string& text, SceneArgs& scene) {
   scene.size_given = true;
   scene.width = side_of(text.substr(0, x));
   scene.height = side_of(text.substr(std::min(x + 1, text.size())));
-  if (scene.width == 0 || scene.height == 0) return "is no WIDTHxHEIGHT of 1 to 65535 pixels";
+  if (scene.width == 0 || scene.height == 0) {
+    return fmt::format("is not WIDTHxHEIGHT of {} to 65535 pixels: raw developers read no smaller frames", min_side);
+  }
   return std::nullopt;
 }
 
@@ -220,10 +222,10 @@ void add_work(CLI::App& app, SimulateArgs& args) {
 
 void add_files(CLI::App& app, SimulateArgs& args) {
   app.add_option("-o,--output", args.output, "raw file to write (.dng)")->type_name("OUT.dng");
-  auto* truth =
-      app.add_option("--truth", args.truth,
-                     "the noise-free scene, linear, white at --luminance (.exr, .pfm, .tif; default OUT.truth.exr)")
-          ->type_name("FILE");
+  auto* truth = app.add_option("--truth", args.truth,
+                               "the noise-free scene, linear, white at --luminance (.exr, .pfm, .tif; default "
+                               "OUT.truth.exr, of a dark frame none)")
+                    ->type_name("FILE");
   app.add_flag("--no-truth", args.no_truth, "do not write it")->excludes(truth);
   app.add_option("--truth-electrons", args.truth_electrons,
                  "also write the noise-free electrons of R, G and B at every pixel (.exr, .pfm, .tif)")

@@ -11,6 +11,10 @@
 
 namespace lowlux::cli {
 
+/// Smallest width and height of a raw image: LibRaw, and with it most raw developers, takes smaller ones for
+/// thumbnails. Masked columns do not count.
+inline constexpr int min_side = 22;
+
 /// A distant lamp: --lamp X,Y,LIGHT,LUMINANCE.
 struct LampArgs {
   double x_px = 0, y_px = 0;

@@ -46,10 +46,16 @@ struct Files {
   std::string truth_electrons;
 };
 
+/// A dark frame's truth is black: it is written only where its file is named.
+bool writes_truth(const SimulateArgs& args) {
+  const bool black = args.scene.what == "dark" && args.scene.lamps.empty() && args.scene.stars == 0;
+  return !args.no_truth && (!black || !args.truth.empty());
+}
+
 Files files_of(const SimulateArgs& args) {
   Files files;
   for (int i = 0; i < args.frames; ++i) files.frames.push_back(frame_file(args, i));
-  if (!args.no_truth) {
+  if (writes_truth(args)) {
     files.truth = !args.truth.empty() ? args.truth : args.output.substr(0, args.output.size() - 4) + ".truth.exr";
   }
   files.truth_electrons = args.truth_electrons;
@@ -156,7 +162,7 @@ class Simulation {
       out_.saturation_cd_m2 = isp::saturation_luminance_cd_m2(sensor->model, *response, time_s);
     }
     description_ = scene->scene.description;
-    warn_of_size(scene->scene.xyz_cd_m2);
+    if (const auto fits = check_size(scene->scene.xyz_cd_m2); !fits) return tl::make_unexpected(fits.error());
     auto source = capture::SyntheticSource::of(std::move(scene->scene), *std::move(sensor), *std::move(response),
                                                args_.options, executor_);
     clock.lap("exposure and plan");
@@ -167,13 +173,12 @@ class Simulation {
     return source;
   }
 
-  /// LibRaw, and with it most raw developers, takes a smaller image for a thumbnail; masked columns do not count.
-  void warn_of_size(const SceneLinear& picture) {
-    constexpr int least = 22;
-    if (picture.width() >= least && picture.height() >= least) return;
-    out_.warnings.push_back(
-        fmt::format("raw developers take a picture of {} x {} pixels for no raw file: {} x {} are the least",
-                    picture.width(), picture.height(), least, least));
+  /// --size is checked with the command line; pictures have a size of their own.
+  static Result<void> check_size(const SceneLinear& picture) {
+    if (picture.width() >= min_side && picture.height() >= min_side) return {};
+    return fail(ErrorCode::insufficient,
+                fmt::format("the picture has {} x {} pixels, and raw developers read {} x {} and more: enlarge it",
+                            picture.width(), picture.height(), min_side, min_side));
   }
 
   Result<void> write_frames(const capture::SyntheticSource& source) {

@@ -231,19 +231,19 @@ TEST_F(Simulate, EveryFileIsReadAndDeveloped) {
   }
 }
 
-TEST_F(Simulate, PicturesTooSmallForRawDevelopersAreWrittenWithAWarning) {
+// The limit is that of `develop`: 22 x 22 is developed above.
+TEST_F(Simulate, FramesTooSmallForRawDevelopersAreRefused) {
   for (const char* size : {"21x22", "22x21", "1x1"}) {
-    const std::string name = std::string(size) + ".dng";
-    const auto result = simulate("flat", name, {"--size", size, "--masked-columns", "30"});
-    EXPECT_EQ(result.exit_code, 0);
-    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-    EXPECT_TRUE(holds(result.err, "warning") && holds(result.err, "22 x 22")) << result.err;
-    EXPECT_TRUE(scratch_.holds(name));
-    EXPECT_EQ(lowlux({"info", file(name)}).exit_code, 1) << "the warning would be wrong";
-    const auto json = simulate("flat", name, {"--size", size, "--force", "--json", "--quiet"});
-    EXPECT_EQ(json.err, "");
-    EXPECT_EQ(Json::parse(json.out)["warnings"].size(), 1U);
+    const auto result = simulate("flat", "small.dng", {"--size", size, "--masked-columns", "30"});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_TRUE(holds(result.err, "22 to 65535 pixels")) << result.err;
   }
+  simulated("flat", "f.dng", {"--size", "22x22", "--truth", file("small.exr")});
+  ASSERT_EQ(lowlux({"develop", file("f.dng"), "-o", file("half.exr"), "--half"}).exit_code, 0);
+  const auto picture = simulate(file("half.exr"), "small.dng");
+  EXPECT_EQ(picture.exit_code, 1);
+  EXPECT_TRUE(holds(picture.err, "11 x 11 pixels")) << picture.err;
+  EXPECT_FALSE(scratch_.holds("small.dng"));
 }
 
 TEST_F(Simulate, NothingIsOverwrittenWithoutForce) {
