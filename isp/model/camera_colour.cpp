@@ -230,7 +230,9 @@ Result<Matrix3> camera_to_xyz(const CameraColour& colour, const Xy& scene_white,
   const auto adaptation = bradford_adaptation(by_forward ? white_d50 : scene_white, output_white);
   if (!adaptation) {
     return fail(ErrorCode::malformed,
-                "no adaptation leads from " + text_of(scene_white) + " to " + text_of(output_white), "white");
+                "no chromatic adaptation leads from the white " + text_of(scene_white) + " to " +
+                    text_of(output_white) + ": use --wb auto or --wb 5500",
+                "white");
   }
   return *adaptation * *to_xyz;
 }

@@ -90,7 +90,8 @@ Result<BlackPoint> choose_black(const RawDn& raw, const BlackRequest& request) {
     const double white = white_at(raw, site);
     if (!(white > black->pedestal_dn[site])) {
       return fail(ErrorCode::malformed,
-                  fmt::format("the white level {:g} DN is not above black {:g} DN", white, black->pedestal_dn[site]));
+                  fmt::format("the white level {:g} DN is not above the black level {:g} DN: give it with --black DN",
+                              white, black->pedestal_dn[site]));
     }
   }
   return black;

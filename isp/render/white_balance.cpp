@@ -113,7 +113,8 @@ Result<WhiteBalance> as_shot_white_balance(const CameraColour& colour) {
     const Vector3& neutral = *colour.as_shot_neutral;
     for (const double channel : neutral) {
       if (!std::isfinite(channel) || channel <= 0) {
-        return fail(ErrorCode::malformed, "the neutral holds a figure that is not positive; choose a white balance",
+        return fail(ErrorCode::malformed,
+                    "the file's neutral holds a figure that is not positive: use --wb auto or --wb 5500",
                     "AsShotNeutral");
       }
     }
@@ -123,8 +124,7 @@ Result<WhiteBalance> as_shot_white_balance(const CameraColour& colour) {
     return balance_of_white(colour, {(*colour.as_shot_white_xy)[0], (*colour.as_shot_white_xy)[1]},
                             WhiteSource::as_shot);
   }
-  return fail(ErrorCode::insufficient,
-              "the file does not tell the camera's white balance; choose auto or a temperature", "AsShotNeutral");
+  return fail(ErrorCode::insufficient, "the file states no white balance: use --wb auto or --wb 5500", "AsShotNeutral");
 }
 
 Result<WhiteBalance> white_balance_of_temperature(const CameraColour& colour, double kelvin) {

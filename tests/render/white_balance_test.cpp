@@ -63,6 +63,7 @@ TEST(AsShotWhiteBalance, IsAnErrorWhereTheFileTellsNothingOrNonsense) {
   CameraColour colour = nikon("D65");
   colour.as_shot_neutral = Vector3{0, 1, 1};
   EXPECT_EQ(as_shot_white_balance(colour).error().code, ErrorCode::malformed);
+  EXPECT_NE(as_shot_white_balance(colour).error().message.find("--wb auto"), std::string::npos);
   colour.as_shot_neutral.reset();
   EXPECT_EQ(as_shot_white_balance(colour).error().code, ErrorCode::insufficient);
   colour.as_shot_white_xy = {0.3, 0};
