@@ -18,7 +18,7 @@ void add_optional(CLI::App& app, const char* flag, const char* type, const char*
 
 std::optional<std::string> set_highlight(const std::string& text, AdviseArgs& args) {
   const bool ratio = text.ends_with('x');
-  const auto value = number_of(ratio ? text.substr(0, text.size() - 1) : text);
+  const auto value = quantity_of(text, ratio ? "x" : "cd/m2");
   if (!value) return "is neither a luminance in cd/m2 nor, as 20x, a multiple of the mid tone's";
   (ratio ? args.highlight_ratio : args.highlight_cd_m2) = *value;
   return std::nullopt;
@@ -35,7 +35,7 @@ void add_camera(CLI::App& app, AdviseArgs& args) {
                  "whose spectral sensitivities (default: the sensor's own or a stand-in)")
       ->type_name("NAME")
       ->group(group);
-  add_optional(app, "--f-number", "N", "(default: the file's; without a file 2)", args.f_number);
+  add_optional(app, "--f-number", "f/N", "(default: the file's; without a file 2)", args.f_number);
   add_optional(app, "--temperature", "C", "of the sensor (default: the file's, or 20)", args.temperature_c);
 }
 
@@ -43,7 +43,7 @@ void add_figures(CLI::App& app, AdviseArgs& args) {
   isp::SensorFigures& f = args.figures;
   add_optional(app, "--system-gain", "DN_PER_E", "codes per electron; with --gain", f.system_gain_dn_per_e);
   add_optional(app, "--read-noise", "E", "standard deviation; with --gain", f.read_noise_e);
-  add_optional(app, "--iso", "S", "saturation-based speed; with --gain", f.iso);
+  add_optional(app, "--iso", "ISO", "saturation-based speed; with --gain", f.iso);
   add_optional(app, "--full-well", "E", "charge of a full pixel", f.full_well_e);
   app.add_option("--bits", f.bits, "of the converter")->type_name("N")->group(group);
   add_text(app, "--dark-current", "E_PER_S[,G,B]", "for all channels, or for red, green and blue",

@@ -29,7 +29,7 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
            "degrees over which dark current doubles, for darks of another temperature, or a profile that tells "
            "(default: as the darks themselves tell)",
            [&dark](const std::string& text) -> std::optional<std::string> {
-             dark.doubling_c = number_of(text);
+             dark.doubling_c = quantity_of(text, "C");
              if (!dark.doubling_c) {
                if (!text.ends_with(".json")) return "is neither a number of degrees nor a profile (.json)";
                dark.doubling_profile = text;

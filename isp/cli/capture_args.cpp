@@ -65,9 +65,9 @@ Wrong set_size(const std::string& text, capture::CameraRequest& request) {
 
 std::function<Wrong(const std::string&)> store_positive(std::optional<double>& out, double most, const char* unit) {
   return [&out, most, unit](const std::string& text) -> Wrong {
-    const auto number = number_of(text);
+    const auto number = quantity_of(text, unit);
     if (!number || !(*number > 0 && *number <= most))
-      return fmt::format("is not above 0 and at most {:g}{}", most, unit);
+      return fmt::format("is not above 0 and at most {:g} {}", most, unit);
     out = number;
     return std::nullopt;
   };
@@ -85,11 +85,11 @@ void add_source(CLI::App& app, CaptureArgs& args) {
   add_text(app, "--size", "WxH", "of the frames (default: the largest there is)",
            [&request](const std::string& text) { return set_size(text, request); });
   add_text(app, "--fps", "HZ", "frames in a second (default: as the camera has it)",
-           store_positive(request.frame_rate_hz, 1e5, " Hz"));
+           store_positive(request.frame_rate_hz, 1e5, "Hz"));
   add_text(app, "--exposure-time", "S", "of a frame (default: as the camera has it)",
-           store_positive(request.exposure_s, 1e5, " s"));
+           store_positive(request.exposure_s, 1e5, "s"));
   add_text(app, "--gain", "X", "analogue gain, a factor (default: as the camera has it)",
-           store_positive(request.analogue_gain, 1e6, ""));
+           store_positive(request.analogue_gain, 1e6, "x"));
   app.add_option("--gain-code", args.gain_code, "of a V4L2 camera, whose driver does not say what factor a code is")
       ->type_name("CODE");
   add_text(app, "--flip", "h|v|hv", "horizontally, vertically or both, on the sensor (default: as the camera has it)",
@@ -124,7 +124,7 @@ void add_frames(CLI::App& app, CaptureArgs& args, Words& words) {
   add_text(app, "--skip", "N", "frames to leave out first, while exposure settles (default 0)",
            store_whole([&args](double number) { args.limits.skip = static_cast<std::uint64_t>(number); }));
   add_text(app, "--timeout", "S", "to wait for a frame (default 5)", [&args](const std::string& text) -> Wrong {
-    const auto number = number_of(text);
+    const auto number = quantity_of(text, "s");
     if (!number || !(*number >= 0.001 && *number <= longest_timeout_s)) {
       return fmt::format("is not within 0.001 to {:g} s", longest_timeout_s);
     }
@@ -148,11 +148,11 @@ void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
            "with --live: time for each frame; what does not fit is left out step by step: the level standard for high, "
            "draft, no level, plain. No frame is",
            [&args](const std::string& text) -> Wrong {
-             args.budget_ms = number_of(text);
+             args.budget_ms = quantity_of(text, "ms");
              if (args.budget_ms && *args.budget_ms >= least_budget_ms && *args.budget_ms <= most_budget_ms) {
                return std::nullopt;
              }
-             return "is no number of milliseconds from 0.01 to 1e6";
+             return "is not a number of milliseconds from 0.01 to 1e6";
            });
   app.add_flag("--force", args.develop.force, "overwrite files that exist");
   app.add_flag("--json", args.develop.json, "what was done, as JSON on stdout (with --live on stderr)");

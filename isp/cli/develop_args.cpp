@@ -22,20 +22,20 @@ Names<OutputSpace> space_names() {
   return names;
 }
 
-void set_white_balance(const std::string& text, isp::WhiteBalanceChoice& choice) {
+std::optional<std::string> set_white_balance(const std::string& text, isp::WhiteBalanceChoice& choice) {
   using Mode = isp::WhiteBalanceChoice::Mode;
   if (text == "as-shot") {
     choice.mode = Mode::as_shot;
   } else if (text == "auto") {
     choice.mode = Mode::automatic;
-  } else if (const auto kelvin = number_of(text);
+  } else if (const auto kelvin = quantity_of(text, "K");
              kelvin && *kelvin >= isp::white_min_k && *kelvin <= isp::white_max_k) {
     choice = {Mode::temperature, *kelvin};
   } else {
-    throw CLI::ValidationError(
-        "--wb", fmt::format("'{}' is neither as-shot nor auto nor a temperature from {:.0f} to {:.0f} K", text,
-                            isp::white_min_k, isp::white_max_k));
+    return fmt::format("is neither as-shot nor auto nor a temperature from {:.0f} to {:.0f} K", isp::white_min_k,
+                       isp::white_max_k);
   }
+  return std::nullopt;
 }
 
 // One figure for all sites or four; nullopt if it is neither.
@@ -46,7 +46,7 @@ std::optional<PerSite<double>> site_figures(const std::string& text) {
   return f.size() == 1 ? PerSite<double>{f[0], f[0], f[0], f[0]} : PerSite<double>{f[0], f[1], f[2], f[3]};
 }
 
-void set_black(const std::string& text, DevelopArgs& args) {
+std::optional<std::string> set_black(const std::string& text, DevelopArgs& args) {
   isp::BlackRequest& request = args.options.black;
   static const Names<isp::BlackChoice> names{{"auto", isp::BlackChoice::automatic},
                                              {"metadata", isp::BlackChoice::metadata},
@@ -59,37 +59,34 @@ void set_black(const std::string& text, DevelopArgs& args) {
   } else if (text.ends_with(".json")) {
     args.black_profile = text;
   } else {
-    throw CLI::ValidationError("--black", fmt::format("'{}' is neither {} nor one or four figures in DN nor a profile "
-                                                      "(PROFILE.json)",
-                                                      text, joined(names)));
+    return fmt::format("is neither {} nor one or four figures in DN nor a profile (PROFILE.json)", joined(names));
   }
+  return std::nullopt;
 }
 
-void set_exposure(const std::string& text, DevelopArgs& args) {
+std::optional<std::string> set_exposure(const std::string& text, DevelopArgs& args) {
   args.exposure_given = true;
   if (text == "auto") {
     args.options.exposure_ev.reset();
-  } else if (const auto ev = number_of(text); ev && std::fabs(*ev) <= max_exposure_ev) {
+  } else if (const auto ev = quantity_of(text, "EV"); ev && std::fabs(*ev) <= max_exposure_ev) {
     args.options.exposure_ev = *ev;
   } else {
-    throw CLI::ValidationError("--exposure", fmt::format("'{}' is neither auto nor a number of EV from -{} to {}", text,
-                                                         max_exposure_ev, max_exposure_ev));
+    return fmt::format("is neither auto nor a number of EV from -{} to {}", max_exposure_ev, max_exposure_ev);
   }
+  return std::nullopt;
 }
 
 }  // namespace
 
 void add_rendering(CLI::App& app, DevelopArgs& args) {
   isp::DevelopOptions& o = args.options;
-  app.add_option_function<std::string>(
-         "--exposure", [&args](const std::string& text) { set_exposure(text, args); },
-         "gain in EV; auto brings the middle of the picture to mid-grey without lifting the black noise "
-         "(default: auto, in linear spaces 0)")
-      ->type_name("auto|EV");
-  app.add_option_function<std::string>(
-         "--wb", [&o](const std::string& text) { set_white_balance(text, o.white_balance); },
-         "white balance: as the camera chose (default), estimated from the picture, or by colour temperature")
-      ->type_name("as-shot|auto|KELVIN");
+  add_text(app, "--exposure", "auto|EV",
+           "gain in EV; auto brings the middle of the picture to mid-grey without lifting the black noise "
+           "(default: auto, in linear spaces 0)",
+           [&args](const std::string& text) { return set_exposure(text, args); });
+  add_text(app, "--wb", "as-shot|auto|KELVIN",
+           "white balance: as the camera chose (default), estimated from the picture, or by colour temperature",
+           [&o](const std::string& text) { return set_white_balance(text, o.white_balance); });
   add_choice<isp::ToneCurve>(
       app, "--tone", {{"standard", isp::ToneCurve::standard}, {"none", isp::ToneCurve::none}},
       [&args](isp::ToneCurve tone) { args.tone = tone; }, "tone curve (default: standard, in linear spaces none)");
@@ -101,20 +98,23 @@ void add_rendering(CLI::App& app, DevelopArgs& args) {
 
 void add_camera(CLI::App& app, DevelopArgs& args) {
   isp::DevelopOptions& o = args.options;
-  app.add_option_function<std::string>(
-         "--black", [&args](const std::string& text) { set_black(text, args); },
-         "black point: measured on masked pixels where there are any, else the file's figure (auto, default); one of "
-         "the two; given in DN, for all pixels or for the four sites of the 2x2 cell; or a camera's profile, whose "
-         "noise "
-         "and hot pixels are used too")
-  app.add_option("--gain-setting", args.gain_setting,
-                 "gain setting of the profile to use: its name or an ISO (default: the raw's ISO)")
-      ->type_name("SETTING");
-      ->type_name("auto|metadata|masked|DN[,DN,DN,DN]|PROFILE.json");
+  add_text(app, "--black", "auto|metadata|masked|DN[,DN,DN,DN]|PROFILE.json",
+           "black point: measured on masked pixels where there are any, else the file's figure (auto, default); one of "
+           "the two; given in DN, for all pixels or for the four sites of the 2x2 cell; or a camera's profile, whose "
+           "noise and hot pixels are used too",
+           [&args](const std::string& text) { return set_black(text, args); });
   app.add_option("--profile", args.profile,
                  "a camera's profile (see calibrate): black point, noise and hot pixels, and its colour matrices if it "
                  "holds any")
       ->type_name("PROFILE.json");
+  app.add_option("--gain-setting", args.gain_setting,
+                 "gain setting of the profile to use: its name or an ISO (default: the raw's ISO)")
+      ->type_name("SETTING");
+  add_choice<bool>(
+      app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
+      "hot and dead pixels: look for them (default), or repair only those the file names");
+}
+
 std::optional<std::string> wrong_profiles(const DevelopArgs& args) {
   if (!args.profile.empty() && !args.black_profile.empty()) {
     return "--black and --profile name a profile each: --profile uses all that is in one";
@@ -123,11 +123,6 @@ std::optional<std::string> wrong_profiles(const DevelopArgs& args) {
     return "--gain-setting is one of a profile's: name the profile with --profile";
   }
   return std::nullopt;
-}
-
-  add_choice<bool>(
-      app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
-      "hot and dead pixels: look for them (default), or repair only those the file names");
 }
 
 void add_denoise(CLI::App& app, DevelopArgs& args) {
@@ -151,8 +146,7 @@ void add_denoise(CLI::App& app, DevelopArgs& args) {
 }
 
 void add_samples(CLI::App& app, DevelopArgs& args) {
-  app.add_option("--bits", args.bits, "bits per sample: 8, 16 or 32 (float; for OpenEXR 16 is half float)")
-      ->check(CLI::IsMember({8, 16, 32}));
+  app.add_option("--bits", args.bits, bits_help)->check(CLI::IsMember({8, 16, 32}));
   app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
 }
 

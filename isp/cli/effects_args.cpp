@@ -15,11 +15,12 @@ bool is_given(const LookArgs& look, const char* option) {
   return std::ranges::find(look.given, option) != look.given.end();
 }
 
-void add_positive(CLI::App& app, const char* flag, const char* type, const char* help, std::optional<double>& out) {
-  add_text(app, flag, type, help, [&out](const std::string& text) -> std::optional<std::string> {
-    out = number_of(text);
+void add_positive(CLI::App& app, const char* flag, const char* type, const char* unit, const char* help,
+                  std::optional<double>& out) {
+  add_text(app, flag, type, help, [&out, unit](const std::string& text) -> std::optional<std::string> {
+    out = quantity_of(text, unit);
     if (out && *out >= least_budget && *out <= most_budget) return std::nullopt;
-    return "is no number from 0.001 to 1e9";
+    return "is not a number from 0.001 to 1e9";
   });
 }
 
@@ -27,13 +28,13 @@ void add_positive(CLI::App& app, const char* flag, const char* type, const char*
 
 void add_budget(CLI::App& app, EffectsArgs& args) {
   add_positive(
-      app, "--budget-ms", "MS",
+      app, "--budget-ms", "MS", "ms",
       "time for developing each frame, from decoded codes to a finished picture (files are read and written "
       "besides): the most accurate way that is predicted to fit, or with --tolerance the fastest within it. "
       "This machine's speed is measured once, see bench --calibrate-cost, and before each file how busy it is, which "
       "takes a tenth of a second or two more; one file at a time",
       args.budget_ms);
-  add_positive(app, "--budget-mpps", "MP_PER_S", "the same as megapixels in a second", args.budget_mpps);
+  add_positive(app, "--budget-mpps", "MP_PER_S", "MP/s", "the same as megapixels in a second", args.budget_mpps);
 }
 
 std::optional<std::string> complete_effects(const LookArgs& look, EffectsArgs& args) {

@@ -22,10 +22,11 @@ struct Range {
   double least;
   double most;
   const char* is_not;
+  const char* unit = "";
 };
 
 Wrong store_number(const std::string& text, const Range& range, double& out) {
-  const std::optional<double> number = number_of(text);
+  const std::optional<double> number = quantity_of(text, range.unit);
   if (!number || !(*number >= range.least && *number <= range.most)) {
     return fmt::format("{} from {} to {}", range.is_not, range.least, range.most);
   }
@@ -62,18 +63,20 @@ void add_scene(CLI::App& app, LookArgs& args) {
              args.choice.scene_luminance_cd_m2.reset();
              if (text == "auto") return std::nullopt;
              double luminance = 0;
-             if (auto wrong = store_number(text, {1e-7, 1e9, "is neither auto nor a luminance in cd/m2"}, luminance)) {
+             if (auto wrong =
+                     store_number(text, {1e-7, 1e9, "is neither auto nor a luminance in cd/m2", "cd/m2"}, luminance)) {
                return wrong;
              }
              args.choice.scene_luminance_cd_m2 = luminance;
              return std::nullopt;
            });
-  add_text(app, "--field-of-view", "DEGREES",
-           "that the longer side of the picture covers in the scene, for what detail the eye makes out (default 50)",
-           [&args](const std::string& text) {
-             args.given.emplace_back("--field-of-view");
-             return store_number(text, {0.1, 180, "is no angle in degrees"}, args.choice.field_of_view_deg);
-           });
+  add_text(
+      app, "--field-of-view", "DEGREES",
+      "that the longer side of the picture covers in the scene, for what detail the eye makes out (default 50)",
+      [&args](const std::string& text) {
+        args.given.emplace_back("--field-of-view");
+        return store_number(text, {0.1, 180, "is not an angle in degrees", "degrees"}, args.choice.field_of_view_deg);
+      });
 }
 
 void add_effects(CLI::App& app, LookArgs& args) {
@@ -91,7 +94,7 @@ void add_effects(CLI::App& app, LookArgs& args) {
            "pixels (default 0.5)",
            [&args](const std::string& text) {
              args.given.emplace_back("--tolerance");
-             return store_number(text, {1e-3, 100, "is no colour difference"}, args.choice.tolerance);
+             return store_number(text, {1e-3, 100, "is not a colour difference"}, args.choice.tolerance);
            });
   add_text(
       app, "--dimming", "SHARE",
@@ -99,7 +102,7 @@ void add_effects(CLI::App& app, LookArgs& args) {
       "100 cd/m2 (default 0.4; automatic exposure only)",
       [&args](const std::string& text) {
         args.given.emplace_back("--dimming");
-        return store_number(text, {0, 1, "is no share"}, args.choice.dimming);
+        return store_number(text, {0, 1, "is not a fraction"}, args.choice.dimming);
       });
 }
 
@@ -149,7 +152,8 @@ void add_look(CLI::App& app, LookArgs& args) {
            "displays of 250 cd/m2 (default: no change)",
            [&args](const std::string& text) -> Wrong {
              double luminance = 0;
-             if (auto wrong = store_number(text, {1e-3, 1e5, "is no luminance in cd/m2"}, luminance)) return wrong;
+             if (auto wrong = store_number(text, {1e-3, 1e5, "is not a luminance in cd/m2", "cd/m2"}, luminance))
+               return wrong;
              args.display_cd_m2 = luminance;
              return std::nullopt;
            });
@@ -161,7 +165,9 @@ std::optional<std::string> complete_look(const LookArgs& args, Planner planner, 
     return "--coefficients go with --look shin or --display-luminance";
   }
   constexpr std::array only_eye{"--effects", "--tolerance", "--field-of-view"};
-  const bool lists = choice.which == isp::LookChoice::Which::listed;
+  const bool lists =
+      choice.which == isp::LookChoice::Which::listed &&
+      std::ranges::any_of(isp::night_effect_names, [&](auto name) { return *isp::effect_named(choice.listed, name); });
   for (const std::string& option : args.given) {
     const bool planned = option == "--tolerance" || (option == "--effects" && !lists);
     if (planner == Planner::of_everything && planned) continue;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <exception>
@@ -9,6 +10,8 @@
 #include <fmt/format.h>
 
 #include "isp/cli/exit_code.h"
+#include "isp/cli/option_values.h"
+#include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
 #include "isp/cli/version.h"
 #include "isp/raw/raw_to_rgb.h"
@@ -36,21 +39,42 @@ constexpr std::array verbs{
     Verb{"simulate", "raw files of scenes of known truth", run_simulate},
 };
 
-void print_help() {
-  fmt::print("lowlux: a raw developer for pictures taken in the dark\n\nusage: lowlux VERB [OPTIONS]\n\nverbs:\n");
-  for (const Verb& verb : verbs) fmt::print("  {:<10} {}\n", verb.name, verb.summary);
-  fmt::print(
-      "\n`lowlux VERB --help` lists a verb's options, `lowlux --version` what is built in.\n"
-      "exit codes: 0 done, 1 an input or the work failed, 2 the command line is wrong\n");
+void print_help(std::FILE* out) {
+  fmt::print(out, "lowlux: a raw developer for pictures taken in the dark\n\nusage: lowlux VERB [OPTIONS]\n\nverbs:\n");
+  for (const Verb& verb : verbs) fmt::print(out, "  {:<10} {}\n", verb.name, verb.summary);
+  fmt::print(out,
+             "\n`lowlux VERB --help` lists a verb's options, `lowlux --version` what is built in.\n"
+             "exit codes: 0 done, 1 an input or the work failed, 2 the command line is wrong\n");
 }
 
-int run(const std::vector<std::string>& args) {
-  const std::string_view first = args.empty() ? std::string_view() : args.front();
-  if (first == "--help" || first == "-h") {
-    print_help();
+int run_verb(const std::vector<std::string>& args) {
+  const std::string& first = args.front();
+  for (const Verb& verb : verbs) {
+    if (verb.name == first) return verb.run({args.begin() + 1, args.end()});
+  }
+  std::array<std::string_view, verbs.size()> names;
+  std::ranges::transform(verbs, names.begin(), &Verb::name);
+  fmt::print(stderr, "{}\n",
+             one_line(fmt::format("lowlux: unknown verb '{}'{}; `lowlux --help` lists them", first,
+                                  suggestion(first, names))));
+  return exit_usage;
+}
+
+int run(std::vector<std::string> args) {
+  if (args.empty()) {
+    print_help(stderr);
+    return exit_usage;
+  }
+  if (args.front() == "help" && args.size() > 1) {  // help VERB: VERB --help
+    args.erase(args.begin());
+    args.emplace_back("--help");
+  }
+  const std::string& first = args.front();
+  if (first == "--help" || first == "-h" || first == "help") {
+    print_help(stdout);
     return exit_done;
   }
-  if (first == "--version") {
+  if (first == "--version" || first == "-v") {
     fmt::print("{}\n", version_text());
     return exit_done;
   }
@@ -58,15 +82,7 @@ int run(const std::vector<std::string>& args) {
     fmt::print(stderr, "lowlux: this processor lacks SSSE3, which the kernels need\n");
     return exit_failed;
   }
-  for (const Verb& verb : verbs) {
-    if (verb.name == first) return verb.run({args.begin() + 1, args.end()});
-  }
-  if (first.empty()) {
-    fmt::print(stderr, "lowlux: no verb given; `lowlux --help` lists them\n");
-  } else {
-    fmt::print(stderr, "lowlux: there is no verb '{}'; `lowlux --help` lists them\n", first);
-  }
-  return exit_usage;
+  return run_verb(args);
 }
 
 }  // namespace

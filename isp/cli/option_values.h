@@ -3,7 +3,9 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace CLI {
@@ -13,8 +15,12 @@ class Option;
 
 namespace lowlux::cli {
 
-/// The whole text as a finite number; nullopt if it is none.
-std::optional<double> number_of(const std::string& text);
+/// The whole text as a finite number with a decimal point, with a sign or without; nullopt if it is not one.
+std::optional<double> number_of(std::string_view text);
+
+/// A number or a fraction as this program prints it, the unit in any case or left out: "+1.5 EV", "3000K", "1/60 s",
+/// "f/2.8" (unit "f/"). Denominators are at least 1. nullopt if the text is anything else.
+std::optional<double> quantity_of(std::string_view text, std::string_view unit);
 
 /// Numbers parted by commas, at most `most`; nullopt if one is none or there are more.
 std::optional<std::vector<double>> numbers_of(const std::string& text, std::size_t most);
@@ -32,11 +38,14 @@ std::string joined(const Names<Enum>& names) {
   return text;
 }
 
-/// An option that takes text; `store` returns what is wrong with it, or nothing.
-CLI::Option* add_text(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
-                      std::function<std::optional<std::string>(const std::string&)> store);
+/// Takes the text of an option. @return what is wrong with it, or nothing
+using OptionStore = std::function<std::optional<std::string>(const std::string&)>;
 
-/// An option that takes a finite number.
+/// An option that takes text. Where a decimal comma is what is wrong, the message shows the number with a point.
+CLI::Option* add_text(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
+                      OptionStore store);
+
+/// An option that takes a quantity; `type` names its unit: S, C, CD_M2, DN, E, UM, PX, PX_PER_S or f/N.
 CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
                         std::function<void(double)> store);
 
@@ -52,6 +61,12 @@ CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum
                     return std::nullopt;
                   });
 }
+
+/// " (did you mean --exposure?)" for a name that is near a known one, empty if none is.
+std::string suggestion(std::string_view wanted, std::span<const std::string_view> known);
+
+/// Of --bits, wherever pictures are written.
+inline constexpr const char* bits_help = "bits per sample: 8, 16 or 32 (default: PNG, JPEG 8, TIFF, EXR 16, PFM 32)";
 
 /// Prints what is wrong with a command line. @return the exit code
 int refuse(const CLI::App& app, const std::string& wrong);

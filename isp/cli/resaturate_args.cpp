@@ -66,8 +66,7 @@ Parsed<ResaturateArgs> parse_resaturate(const std::vector<std::string>& words) {
            });
   app.add_option("--radius", args.radius, "pixels around one over which its brightness is averaged (default 4)")
       ->check(CLI::Range(0, 64));
-  app.add_option("--bits", args.bits, "bits per sample: 8, 16 or 32 (float; for OpenEXR 16 is half float)")
-      ->check(CLI::IsMember({8, 16, 32}));
+  app.add_option("--bits", args.bits, bits_help)->check(CLI::IsMember({8, 16, 32}));
   app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
   app.add_flag("--force", args.force, "overwrite a file that exists");
   app.add_flag("--json", args.json, "JSON instead of text");

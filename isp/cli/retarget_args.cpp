@@ -45,8 +45,7 @@ Parsed<RetargetArgs> parse_retarget(const std::vector<std::string>& words) {
   add_luminance(app, "--display-black", "luminance of the display's black (default 0)",
                 args.options.display_black_cd_m2);
   add_model(app, args);
-  app.add_option("--bits", args.bits, "bits per sample: 8, 16 or 32 (float; for OpenEXR 16 is half float)")
-      ->check(CLI::IsMember({8, 16, 32}));
+  app.add_option("--bits", args.bits, bits_help)->check(CLI::IsMember({8, 16, 32}));
   app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
   app.add_flag("--force", args.force, "overwrite a file that exists");
   app.add_flag("--json", args.json, "JSON instead of text");

@@ -167,7 +167,7 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
   figure("--column-noise", "E", "standard deviation", f.column_noise_e);
   figure("--pixel-pitch", "UM", "side of a pixel", f.pixel_pitch_um);
   figure("--peak-qe", "RATIO", "largest quantum efficiency, electrons per photon", f.peak_quantum_efficiency);
-  figure("--iso", "S", "saturation-based speed of the gain setting", f.iso);
+  figure("--iso", "ISO", "saturation-based speed of the gain setting", f.iso);
   figure("--white-luminance", "CD_M2", "of a white that fills a pixel in 1 s", args.optics.white_luminance_cd_m2);
   add_choice<Quantisation>(
       app, "--quantise", {{"round", Quantisation::round}, {"floor", Quantisation::floor}},
@@ -183,7 +183,7 @@ void add_camera(CLI::App& app, SimulateArgs& args) {
                  "whose spectral sensitivities (--list; default: the sensor's own or a stand-in)")
       ->type_name("NAME");
   add_number(app, "--exposure", "S", "exposure time (default 0.1)", [&o](double s) { o.exposure.time_s = s; });
-  add_number(app, "--f-number", "N", "(default 2)", [&args](double n) { args.optics.f_number = n; });
+  add_number(app, "--f-number", "f/N", "(default 2)", [&args](double n) { args.optics.f_number = n; });
   add_number(app, "--temperature", "C", "of the sensor (default 20)", [&o](double c) { o.exposure.temperature_c = c; });
   add_choice<BayerPhase>(
       app, "--cfa",

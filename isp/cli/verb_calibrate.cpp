@@ -1,13 +1,16 @@
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <string_view>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "calib/quoted_profile.h"
 #include "isp/cli/calibrate_colour.h"
 #include "isp/cli/calibration.h"
 #include "isp/cli/exit_code.h"
+#include "isp/cli/option_values.h"
 #include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
 
@@ -74,10 +77,13 @@ int run_calibrate(const std::vector<std::string>& words) {
   for (const Kind& kind : kinds) {
     if (kind.name == first) return kind.run({words.begin() + 1, words.end()});
   }
-  fmt::print(
-      stderr, "{}\n",
-      one_line(first.empty() ? "lowlux calibrate: what to calibrate is missing; --help lists the kinds"
-                             : fmt::format("lowlux calibrate: there is no kind '{}'; --help lists them", first)));
+  std::array<std::string_view, kinds.size()> names;
+  std::ranges::transform(kinds, names.begin(), &Kind::name);
+  fmt::print(stderr, "{}\n",
+             one_line(first.empty() ? fmt::format("lowlux calibrate: name what to calibrate: {}; --help describes them",
+                                                  fmt::join(names, ", "))
+                                    : fmt::format("lowlux calibrate: unknown kind '{}'{}; --help lists them", first,
+                                                  suggestion(first, names))));
   return exit_usage;
 }
 

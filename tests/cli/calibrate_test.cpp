@@ -280,8 +280,8 @@ TEST_F(Calibrate, WrongCommandLinesAreSaid) {
     EXPECT_EQ(done.exit_code, 2) << why;
     EXPECT_TRUE(holds(done.err, why)) << done.err;
   };
-  usage({"calibrate"}, "what to calibrate is missing");
-  usage({"calibrate", "grey"}, "no kind 'grey'");
+  usage({"calibrate"}, "name what to calibrate: black, colour, noise, quoted");
+  usage({"calibrate", "grey"}, "unknown kind 'grey'");
   usage({"calibrate", "black", "-o", file("p.json")}, "FRAMES");
   usage({"calibrate", "black", "a.dng"}, "--output");
   usage({"calibrate", "black", "a.dng", "-o", file("p.json"), "--system-gain", "0"}, "above 0");

@@ -45,7 +45,6 @@ TEST(Command, WrongCommandLinesExitWithTwoAndOneLine) {
   const test::ScratchDirectory scratch;
   const std::string png = scratch.file("x.png");
   const std::vector<std::vector<std::string>> wrong{
-      {},
       {"fry"},
       {"develop"},
       {"develop", dog},

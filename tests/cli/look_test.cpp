@@ -85,7 +85,7 @@ TEST_F(LookCommand, RefusesWhatDoesNotFit) {
   refused({"--look", "owl"}, "is none of camera, eye, ");
   refused({"--scene-luminance", "1"}, "--look eye");
   refused({"--look", "shin", "--effects", "purkinje"}, "--look eye");
-  refused({"--look", "shin", "--effects", "none", "--dimming", "0.5", "--scene-luminance", "1"}, "--effects");
+  refused({"--look", "shin", "--effects", "glare", "--dimming", "0.5", "--scene-luminance", "1"}, "--effects");
   refused({"--look", "eye", "--scene-luminance", "0"}, "1e-07");
   refused({"--look", "eye", "--scene-luminance", "-3"}, "1e-07");
   refused({"--look", "eye", "--effects", "purkinje,fog"}, "'fog'");

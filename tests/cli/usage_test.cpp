@@ -1,0 +1,138 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/cli/simulate_command.h"
+
+namespace lowlux {
+namespace {
+
+using Json = nlohmann::json;
+using Words = std::vector<std::string>;
+
+const std::string raws = LOWLUX_TESTDATA "/raws/";
+const std::string dog = raws + "n900_dog_small_grbg10in16.dng";
+
+bool holds(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
+
+class Usage : public test::SimulateCommand {
+ protected:
+  static void refused(const Words& args, const std::string& why) {
+    const auto result = lowlux(args);
+    EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(args) << result.err;
+    EXPECT_TRUE(holds(result.err, why)) << why << "\n" << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_EQ(result.out, "");
+  }
+};
+
+TEST_F(Usage, ACommandWithoutArgumentsPrintsHelpAsAnError) {
+  const auto bare = lowlux({}), help = lowlux({"--help"});
+  EXPECT_EQ(bare.exit_code, 2);
+  EXPECT_EQ(bare.err, help.out);
+  EXPECT_EQ(bare.out, "");
+  EXPECT_EQ(lowlux({"help"}).out, help.out);
+}
+
+TEST_F(Usage, HelpOfAVerbIsFoundBothWays) {
+  for (const Words& verb : {Words{"develop"}, Words{"calibrate"}, Words{"calibrate", "black"}}) {
+    Words before{"help"}, after = verb;
+    before.insert(before.end(), verb.begin(), verb.end());
+    after.emplace_back("--help");
+    const auto help = lowlux(before);
+    EXPECT_EQ(help.exit_code, 0);
+    EXPECT_EQ(help.out, lowlux(after).out);
+  }
+  EXPECT_EQ(lowlux({"-v"}).out, lowlux({"--version"}).out);
+  EXPECT_EQ(lowlux({"-v"}).exit_code, 0);
+}
+
+TEST_F(Usage, MisspelledNamesGetASuggestion) {
+  refused({"devlop", dog}, "unknown verb 'devlop' (did you mean develop?); `lowlux");
+  refused({"help", "devlop"}, "did you mean develop?");
+  refused({"fry"}, "unknown verb 'fry'; `lowlux --help` lists them");
+  refused({"calibrate", "color"}, "did you mean colour?");
+  refused({"develop", dog, "-o", file("x.png"), "--exposre", "1"},
+          "unknown option --exposre (did you mean --exposure?);");
+  refused({"develop", dog, "-o", file("x.png"), "--exposre=1"}, "unknown option --exposre (did you mean --exposure?);");
+  refused({"develop", "--halff"}, "unknown option --halff (did you mean --half?)");  // before what is missing
+  refused({"simulate", "flat", "-o", file("x.dng"), "--lumniance", "1"}, "did you mean --luminance?");
+  refused({"info", dog, "--xml"}, "unknown option --xml; --help lists the options");
+}
+
+TEST_F(Usage, FilesThatBeginWithADashAreReadAfterTwoDashes) {
+  std::filesystem::copy_file(dog, file("-dash.dng"));
+  const std::string in_folder = "cd " + scratch_.path() + " && " LOWLUX_COMMAND " ";
+  const auto hint = test::run_process({"sh", "-c", in_folder + "info -dash.dng"});
+  EXPECT_EQ(hint.exit_code, 2);
+  EXPECT_TRUE(holds(hint.err, "write ./-dash.dng")) << hint.err;
+  for (const char* words : {"info -- -dash.dng", "info ./-dash.dng", "info --json -- -dash.dng"}) {
+    const auto read = test::run_process({"sh", "-c", in_folder + words});
+    EXPECT_EQ(read.exit_code, 0) << words << read.err;
+    EXPECT_TRUE(holds(read.out, "-dash.dng"));
+  }
+}
+
+TEST_F(Usage, InfoIsWrittenAsPhotographersWrite) {
+  const auto kiss = lowlux({"info", raws + "canon_kissx4_ml_colorchart.dng"});
+  EXPECT_TRUE(holds(kiss.out, "camera         Canon EOS Kiss X4")) << kiss.out;
+  simulated("flat", "f.dng", {"--exposure", "1/60 s", "--f-number", "f/5.6", "--no-truth"});
+  const auto text = lowlux({"info", file("f.dng")});
+  EXPECT_TRUE(holds(text.out, "1/60 s, f/5.6, ISO")) << text.out;
+  const Json exposure = Json::parse(lowlux({"info", file("f.dng"), "--json"}).out)[0]["exposure"];
+  EXPECT_NEAR(exposure["exposure_s"].get<double>(), 1.0 / 60, 1e-6);  // a rational of the DNG
+  EXPECT_NEAR(exposure["f_number"].get<double>(), 5.6, 1e-6);
+}
+
+TEST_F(Usage, DarkFramesHaveATruthOnlyWhereItIsNamed) {
+  simulated("dark", "d.dng");
+  EXPECT_EQ(scratch_.names(), Words{"d.dng"});
+  simulated("dark", "n.dng", {"--truth", file("named.exr")});
+  simulated("dark", "stars.dng", {"--stars", "3"});
+  EXPECT_TRUE(scratch_.holds("named.exr") && scratch_.holds("stars.truth.exr"));
+  EXPECT_FALSE(scratch_.holds("n.truth.exr"));
+}
+
+TEST_F(Usage, NoEffectsAreAcceptedWithoutALook) {
+  const auto none = lowlux({"develop", dog, "-o", file("x.png"), "--half", "--effects", "none"});
+  EXPECT_EQ(none.exit_code, 0) << none.err;
+  refused({"develop", dog, "-o", file("x.png"), "--effects", "hue"}, "--look eye");
+}
+
+TEST_F(Usage, AnImpossibleBlackLevelNamesTheOptionThatHelps) {
+  const auto result = lowlux({"develop", dog, "-o", file("x.png"), "--black", "2000"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_TRUE(holds(result.err, "is not above the black level 2000 DN: give it with --black DN")) << result.err;
+}
+
+// A frame without an ISO, and a profile of four.
+TEST_F(Usage, AGainSettingIsChosenWhereTheRawStatesNoIso) {
+  ASSERT_EQ(lowlux({"calibrate", "quoted", "ELD_NikonD850", "-o", file("p.json")}).exit_code, 0);
+  Json profile = Json::parse(scratch_.read("p.json"));
+  profile["make"] = profile["model"] = "";  // of any camera
+  scratch_.write("p.json", profile.dump());
+  const auto developed = [&](const Words& more) {
+    Words words{"develop", dog, "-o", file("x.png"), "--force", "--profile", file("p.json"), "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return lowlux(words);
+  };
+  const auto lost = developed({});
+  EXPECT_EQ(lost.exit_code, 1);
+  EXPECT_TRUE(holds(lost.err, "--gain-setting: 'ISO 100', 'ISO 400', 'ISO 1600', 'ISO 6400'")) << lost.err;
+  for (const char* setting : {"ISO 1600", "1600", "800"}) {
+    const auto found = developed({"--gain-setting", setting});
+    EXPECT_EQ(found.exit_code, 0) << setting << found.err;
+  }
+  const auto other = developed({"--gain-setting", "high"});
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_TRUE(holds(other.err, "no gain setting 'high', it has 'ISO 100'")) << other.err;
+  refused({"develop", dog, "-o", file("x.png"), "--gain-setting", "100"}, "name the profile with --profile");
+}
+
+}  // namespace
+}  // namespace lowlux
