@@ -10,6 +10,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/cli/frame_text.h"
+#include "isp/cli/version.h"
+
 namespace lowlux::cli {
 namespace {
 
@@ -30,13 +33,15 @@ const char* name_of(isp::NoiseSource source) {
 
 std::string limit_of(const isp::AdvicePoint& point) { return point.exceeds ? name_of(*point.exceeds) : ""; }
 
+bool has_heavy_tails(const isp::AdvicePoint& p) { return p.midtone && p.midtone->weight_snr < heavy_tails; }
+
 /// The numbers of a point: exposure, SNR, std of u'v', highlight in the well and in the range.
 std::vector<std::string> cells_of(const isp::AdvicePoint& p) {
   std::vector<std::string> cells{fmt::format("{:.4g}", p.exposure_s)};
   if (p.midtone) {
     cells.push_back(fmt::format("{:.1f}", isp::decibel(p.midtone->snr)));
     cells.push_back(fmt::format("{:.3g}", p.midtone->snr));
-    cells.push_back(fmt::format("{:.2g}{}", p.midtone->uv_std, p.midtone->weight_snr < heavy_tails ? "*" : ""));
+    cells.push_back(fmt::format("{:.2g}{}", p.midtone->uv_std, has_heavy_tails(p) ? "*" : ""));
   } else {
     cells.insert(cells.end(), {"clips", "clips", "clips"});
   }
@@ -99,9 +104,9 @@ std::string text_of(const isp::Table& table) {
 
 std::string advised(const AdviceCase& asked, const isp::ExposureAdvice& advice) {
   const isp::AdvicePoint& p = advice.gains[advice.best].at;
-  return fmt::format("{}, {:.4g} s: SNR {:.1f} dB, u'v' standard deviation {:.2g}{}", asked.request.gains[p.gain].name,
-                     p.exposure_s, isp::decibel(p.midtone->snr), p.midtone->uv_std,
-                     p.midtone->weight_snr < heavy_tails ? "*" : "");
+  return fmt::format("{}, {}: SNR {:.1f} dB, u'v' standard deviation {:.2g}{}", asked.request.gains[p.gain].name,
+                     exposure_text(p.exposure_s), isp::decibel(p.midtone->snr), p.midtone->uv_std,
+                     has_heavy_tails(p) ? "*" : "");
 }
 
 std::string scene_of(const isp::AdviceRequest& r) {
@@ -110,11 +115,6 @@ std::string scene_of(const isp::AdviceRequest& r) {
       "red pixels",
       r.midtone_cd_m2, r.highlight_cd_m2, r.longest_exposure_s, r.temperature_c, r.frames, r.frames == 1 ? "" : "s",
       r.patch_pixels);
-}
-
-bool has_heavy_tails(const isp::ExposureAdvice& advice) {
-  const auto heavy = [](const isp::AdvicePoint& p) { return p.midtone && p.midtone->weight_snr < heavy_tails; };
-  return std::ranges::any_of(advice.curve, heavy);
 }
 
 constexpr const char* heavy_note = "* a bound only: of so little signal the chromaticity scatters with heavy tails";
@@ -182,8 +182,10 @@ std::string advice_text(const AdviceCase& asked, const isp::ExposureAdvice& advi
   fmt::format_to(out, "  scene           {}\n", scene_of(asked.request));
   for (const std::string& note : asked.notes) fmt::format_to(out, "  note            {}\n", note);
   fmt::format_to(out, "the best of each gain\n{}", text_of(gains_table(asked, advice)));
-  fmt::format_to(out, "curve\n{}", text_of(curve_table(asked, advice)));
-  if (has_heavy_tails(advice)) fmt::format_to(out, "{}\n", heavy_note);
+  if (std::ranges::any_of(advice.gains, has_heavy_tails, &isp::GainAdvice::at)) {
+    fmt::format_to(out, "{}\n", heavy_note);
+  }
+  fmt::format_to(out, "the curves over exposure time are in the page of --report and in --json\n");
   return text;
 }
 
@@ -222,11 +224,12 @@ std::string advice_json(const AdviceCase& asked, const isp::ExposureAdvice& advi
 
 isp::Report advice_page(const AdviceCase& asked, const isp::ExposureAdvice& advice) {
   std::string notes;
-  for (const std::string& note : asked.notes) notes += (notes.empty() ? "" : "; ") + note;
+  for (const std::string& note : asked.notes) notes += "Note: " + note + ".\n";
   isp::Report report{"Exposure and gain: " + advised(asked, advice),
-                     fmt::format("Because {}. {}; {}.", advice.reason, asked.camera, scene_of(asked.request)),
+                     fmt::format("Reason: {}.\nSensor: {}.\nScene: {}.\nPredicted by lowlux {}.", advice.reason,
+                                 asked.camera, scene_of(asked.request), version_number()),
                      {}};
-  const std::string tails = has_heavy_tails(advice) ? heavy_note : "";
+  const std::string tails = std::ranges::any_of(advice.curve, has_heavy_tails) ? heavy_note : "";
   report.sections.push_back({"The best of each gain",
                              notes,
                              gains_table(asked, advice),

@@ -20,7 +20,7 @@ constexpr const char* sites[] = {"site 00", "site 01", "site 10", "site 11"};
 template <class Values, class Text>
 std::string joined(const Values& values, const Text& text) {
   std::string out;
-  for (const auto& v : values) out += fmt::format("{:>20}", text(v));
+  for (const auto& v : values) out += fmt::format("{:>22}", text(v));
   return out;
 }
 
@@ -31,29 +31,28 @@ void add_pedestal(const PerSite<Estimate>& level, Lines& out) {
 
 isp::Table table_of(const GainProfile& gain) {
   isp::Table table{{"figure", "value", "standard error", "unit"}, {}};
-  const auto add = [&table](std::string name, double value, double error, const char* unit) {
-    table.rows.push_back({std::move(name), fmt::format("{:.5g}", value), fmt::format("{:.2g}", error), unit});
+  const auto add = [&table](std::string name, const Estimate& estimate, const char* unit) {
+    EstimateCells cells = cells_of(estimate);
+    table.rows.push_back({std::move(name), std::move(cells.value), std::move(cells.standard_error), unit});
   };
   for (int site = 0; gain.pedestal_dn && site < 4; ++site) {
-    const Estimate& e = (*gain.pedestal_dn)[site];
-    add(fmt::format("pedestal, {}", sites[site]), e.value, e.standard_error, "DN");
+    add(fmt::format("black level, {}", sites[site]), (*gain.pedestal_dn)[site], "DN");
   }
   const SensorModel& s = *gain.sensor;
-  add("system gain", s.system_gain_dn_per_e, gain.errors.system_gain_dn_per_e, "DN/e-");
-  add("read noise", s.read_noise_e, gain.errors.read_noise_e, "e-");
+  add("system gain", {s.system_gain_dn_per_e, gain.errors.system_gain_dn_per_e}, "DN/e-");
+  add("read noise", {s.read_noise_e, gain.errors.read_noise_e}, "e-");
   for (int k = 0; k < 3; ++k) {
-    add(fmt::format("dark current at {:g} C, {}", s.dark_temperature_c, channels[k]), s.dark_current_e_per_s[k],
-        gain.errors.dark_current_e_per_s[k], "e-/s");
+    add(fmt::format("dark current at {:g} C, {}", s.dark_temperature_c, channels[k]),
+        {s.dark_current_e_per_s[k], gain.errors.dark_current_e_per_s[k]}, "e-/s");
   }
   for (int k = 0; gain.dark_chromaticity && k < 3; ++k) {
-    const Estimate& share = (*gain.dark_chromaticity)[k];
-    add(fmt::format("black point, {}", channels[k]), share.value, share.standard_error, "of the dark current");
+    add(fmt::format("dark colour, {}", channels[k]), (*gain.dark_chromaticity)[k], "fraction of the dark current");
   }
-  if (gain.errors.dark_doubling_c > 0) add("doubling", s.dark_doubling_c, gain.errors.dark_doubling_c, "C");
-  add("DSNU", s.dsnu, gain.errors.dsnu, "of the dark current");
-  add("row noise", s.row_noise_e, 0, "e-");
-  add("column noise", s.column_noise_e, 0, "e-");
-  add("hot pixels", static_cast<double>(gain.hot_pixels.size()), 0, "");
+  if (gain.errors.dark_doubling_c > 0) add("doubling", {s.dark_doubling_c, gain.errors.dark_doubling_c}, "C");
+  add("DSNU", {s.dsnu, gain.errors.dsnu}, "fraction of the dark current");
+  table.rows.push_back({"row noise", fmt::format("{:.3g}", s.row_noise_e), "", "e-"});
+  table.rows.push_back({"column noise", fmt::format("{:.3g}", s.column_noise_e), "", "e-"});
+  table.rows.push_back({"hot pixels", std::to_string(gain.hot_pixels.size()), "", ""});
   return table;
 }
 
@@ -133,20 +132,27 @@ isp::Plot plot_of_temperature(const calib::DarkSeries& series, const std::string
   return plot;
 }
 
+std::string fit_text(const calib::DarkSeries& series) {
+  if (series.degrees_of_freedom == 0)
+    return "exact, as it has as many parameters as settings: add a third exposure time";
+  return fmt::format("mean square of residual / error {:.3g}, {} degrees of freedom", series.reduced_chi_square,
+                     series.degrees_of_freedom);
+}
+
 /// R and G shares of the dark current with their standard errors as a cross; light of equal charge is at 1/3, 1/3.
 isp::Plot plot_of_black_point(const std::array<Estimate, 3>& share, const std::string& id) {
   const auto& [r, g, b] = share;
   isp::Series cross{
-      .name = "black point +- 1 standard error",
+      .name = "dark current +- 1 standard error",
       .x = {r.value - r.standard_error, r.value, r.value + r.standard_error, NAN, r.value, r.value, r.value},
       .y = {g.value, g.value, g.value, NAN, g.value - g.standard_error, g.value, g.value + g.standard_error}};
   return {.id = id + "-black-point",
-          .title = "Black point: chromaticity of the dark current",
+          .title = "Colour of the dark current",
           .x_label = "R / (R + G + B)",
           .y_label = "G / (R + G + B)",
           .equal_scales = true,
           .series = {{.name = "equal charge", .x = {1.0 / 3}, .y = {1.0 / 3}, .mark = isp::Mark::points}, cross},
-          .caption = "Camera RGB. What is measured in the dark is drawn towards this point (Eq. 4.23)."};
+          .caption = "Camera RGB. Shadows move towards this colour where the dark current is not subtracted."};
 }
 
 std::string id_of(const calib::FrameSetting& setting) {
@@ -180,9 +186,9 @@ void show_black(const calib::BlackFigures& black, const calib::FrameSetting& set
 
   isp::Table table{{"site", "black [DN]", "standard error [DN]", "deviation [DN]"}, {}};
   for (int site = 0; site < 4; ++site) {
-    table.rows.push_back({sites[site], fmt::format("{:.3f}", black.level_dn[site].value),
-                          fmt::format("{:.3f}", black.level_dn[site].standard_error),
-                          fmt::format("{:.3f}", black.deviation_dn[site])});
+    EstimateCells level = cells_of(black.level_dn[site]);
+    table.rows.push_back({sites[site], std::move(level.value), std::move(level.standard_error),
+                          fmt::format("{:.4g}", black.deviation_dn[site])});
   }
   found.report.sections.push_back(
       {name_of_gain(setting),
@@ -209,9 +215,9 @@ void show_dark_series(const calib::DarkSeries& series, std::span<const calib::Da
                                        c.temperature_c ? fmt::format("  at {:g} C", *c.temperature_c) : std::string()));
   }
   if (series.chromaticity) {
-    out.add("black point", fmt::format("{}  of the dark current", joined(*series.chromaticity, text_of)));
+    out.add("dark colour", fmt::format("{}  of the dark current", joined(*series.chromaticity, text_of)));
   } else {
-    out.add("black point", "the dark current is too small to tell its colour");
+    out.add("dark colour", "not measurable: the dark current is too small");
   }
   if (series.law) out.add("doubling", fmt::format("every {} C", text_of(series.law->doubling_c)));
   out.add("read noise", series.read_noise_e ? text_of(*series.read_noise_e) + " e-"
@@ -219,14 +225,16 @@ void show_dark_series(const calib::DarkSeries& series, std::span<const calib::Da
   out.add("patterns", fmt::format("DSNU {:.3g} of the dark current, row noise {:.3g} e-, column noise {:.3g} e-",
                                   series.dsnu.value, series.row_noise_e, series.column_noise_e));
   out.add("hot pixels", std::to_string(series.hot.size()));
-  out.add("fit", fmt::format("mean square of residual / error {:.3g}, {} degrees of freedom", series.reduced_chi_square,
-                             series.degrees_of_freedom));
+  out.add("fit", fit_text(series));
   found.text += name_of_gain(setting) + "\n" + out.text();
 
   const std::string id = id_of(setting);
-  isp::ReportSection section{name_of_gain(setting), fmt::format("System gain: {}.", gain_source), table_of(gain), {}};
-  section.plots = {plot_of_charge(series, groups, id), plot_of_residuals(series, groups, id)};
-  if (series.currents.front().temperature_c) section.plots.push_back(plot_of_temperature(series, id));
+  isp::ReportSection section{name_of_gain(setting),
+                             fmt::format("System gain: {}.\nFit: {}.", gain_source, fit_text(series)),
+                             table_of(gain),
+                             {plot_of_charge(series, groups, id)}};
+  if (series.degrees_of_freedom > 0) section.plots.push_back(plot_of_residuals(series, groups, id));
+  if (series.currents.size() > 1) section.plots.push_back(plot_of_temperature(series, id));
   if (series.chromaticity) section.plots.push_back(plot_of_black_point(*series.chromaticity, id));
   found.report.sections.push_back(std::move(section));
 }

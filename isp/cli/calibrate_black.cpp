@@ -8,6 +8,7 @@
 #include "calib/dark_series.h"
 #include "calib/dark_sorter.h"
 #include "calib/profile_use.h"
+#include "isp/base/camera_name.h"
 #include "isp/cli/black_report.h"
 #include "isp/cli/calibration.h"
 #include "isp/cli/progress.h"
@@ -57,6 +58,7 @@ struct Darks {
   std::vector<std::pair<std::optional<double>, std::string>> files;  // with their ISO
   FrameInfo camera;
   std::string mosaic;
+  isp::Table frames;
 };
 
 calib::Measured measured_on(const Darks& darks, const std::optional<double>& iso) {
@@ -77,6 +79,7 @@ Result<Darks> read_darks(const CalibrateBlackArgs& args) {
     out.camera = frame->raw.info;
     out.mosaic = calib::mosaic_of(frame->raw);
     out.files.emplace_back(frame->raw.info.iso, file);
+    list_frame(file, args.masked ? "masked pixels" : "dark", frame->raw.info, out.frames);
     const auto dark = dark_part(std::move(frame->raw), args);
     if (!dark) return tl::make_unexpected(at(dark.error(), file));
     if (const auto added = sorter.add(*dark); !added) return tl::make_unexpected(at(added.error(), file));
@@ -162,7 +165,8 @@ Result<Calibration> calibrate(const CalibrateBlackArgs& args) {
   if (!darks) return tl::make_unexpected(darks.error());
   Calibration found;
   found.profile = std::move(*profile);
-  found.report.title = fmt::format("{} {}: black point", darks->camera.make, darks->camera.model);
+  found.frames = darks->frames;
+  found.report.title = camera_name(darks->camera.make, darks->camera.model) + ": black level and dark current";
   if (const auto same = put_camera(darks->camera, found.profile); !same) return tl::make_unexpected(same.error());
   if (const auto same = put_mosaic(darks->mosaic, found.profile); !same) return tl::make_unexpected(same.error());
   for (const calib::DarkSet& set : darks->sets) {

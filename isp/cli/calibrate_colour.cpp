@@ -65,7 +65,7 @@ Result<void> write_files(const CalibrateColourArgs& args, const ColourOutcome& o
     if (!written) return written;
   }
   if (!args.report.empty()) {
-    auto written = isp::write_text(args.report, isp::html_of(colour_report(outcome)), overwrite);
+    auto written = isp::write_text(args.report, isp::html_of(colour_report(outcome, args.output)), overwrite);
     if (!written) return written;
   }
   return write_profile(args.output, *profile, overwrite);

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/cli/calibration.h"
 #include "isp/cli/report.h"
 #include "isp/model/spectral_data.h"
 
@@ -209,11 +210,12 @@ std::string colour_json(const ColourOutcome& outcome, const std::string& profile
   return out.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-isp::Report colour_report(const ColourOutcome& outcome) {
+isp::Report colour_report(const ColourOutcome& outcome, const std::string& profile) {
   isp::ReportSection summary{"Matrices", facts(outcome), summary_table(outcome), {}};
   isp::ReportSection patches{"Patches", {}, patch_table(outcome), {error_plot(outcome), ab_plot(outcome)}};
   return {fmt::format("Colour calibration: {}", outcome.input),
-          "CIEDE2000 between what a matrix makes of the camera's patches and a ColorChecker under the illuminant.",
+          "CIEDE2000 between what a matrix makes of the camera's patches and a ColorChecker under the illuminant.\n" +
+              measurement_text(profile),
           {std::move(summary), std::move(patches)}};
 }
 

@@ -12,8 +12,8 @@ namespace lowlux::cli {
 std::string colour_text(const ColourOutcome& outcome);
 /// One JSON object.
 std::string colour_json(const ColourOutcome& outcome, const std::string& profile);
-/// Differences and a*b* of the patches, drawn; and the tables.
-isp::Report colour_report(const ColourOutcome& outcome);
+/// Differences and a*b* of the patches, drawn; and the tables. @param profile  file it is written to
+isp::Report colour_report(const ColourOutcome& outcome, const std::string& profile);
 
 /// The half-size picture, white by the chart, with the outline of what was measured of each patch; the first patch's is
 /// red. Display codes, as the sensor lies.

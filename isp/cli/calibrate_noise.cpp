@@ -8,6 +8,7 @@
 #include "calib/pair_statistics.h"
 #include "calib/photon_transfer.h"
 #include "calib/profile_use.h"
+#include "isp/base/camera_name.h"
 #include "isp/base/executor.h"
 #include "isp/cli/black_report.h"
 #include "isp/cli/calibration.h"
@@ -21,17 +22,18 @@ namespace lowlux::cli {
 namespace {
 
 /// Adds the frames of files to pairs, and sees that all are of the profile's camera.
-Result<void> read_pairs(const std::vector<std::string>& files, const CalibrateArgs& args, Progress& progress,
-                        CameraProfile& profile, FramePairs& pairs) {
+Result<void> read_pairs(const std::vector<std::string>& files, const std::string& use, const CalibrateArgs& args,
+                        Progress& progress, Calibration& found, FramePairs& pairs) {
   for (const std::string& file : files) {
     auto frame = read_calibration_frame(file, args);
     if (!frame) return tl::make_unexpected(frame.error());
-    if (const auto same = put_camera(frame->raw.info, profile); !same) {
+    if (const auto same = put_camera(frame->raw.info, found.profile); !same) {
       return fail(same.error().code, same.error().message, file);
     }
-    if (const auto same = put_mosaic(calib::mosaic_of(frame->raw), profile); !same) {
+    if (const auto same = put_mosaic(calib::mosaic_of(frame->raw), found.profile); !same) {
       return fail(same.error().code, same.error().message, file);
     }
+    list_frame(file, use, frame->raw.info, found.frames);
     if (auto added = pairs.add(std::move(frame->raw), file); !added) return added;
     progress.advance(1, file);
   }
@@ -84,17 +86,17 @@ Result<Calibration> calibrate_flats(const CalibrateNoiseArgs& args) {
   if (!profile) return tl::make_unexpected(profile.error());
   found.profile = std::move(*profile);
   FramePairs darks;
-  auto read = read_pairs(args.darks, args.common, progress, found.profile, darks);
+  auto read = read_pairs(args.darks, "dark", args.common, progress, found, darks);
   if (!read) return tl::make_unexpected(read.error());
   FramePairs flats(darks.pairs());
-  read = read_pairs(args.common.frames, args.common, progress, found.profile, flats);
+  read = read_pairs(args.common.frames, "flat", args.common, progress, found, flats);
   if (!read) return tl::make_unexpected(read.error());
   for (const FramePairs* pairs : {&darks, &flats}) {
     for (const std::string& file : pairs->alone()) {
       found.warnings.push_back(file + " has no partner of the same exposure time and level: it is not used");
     }
   }
-  found.report.title = fmt::format("{} {}: photon transfer", found.profile.make, found.profile.model);
+  found.report.title = camera_name(found.profile.make, found.profile.model) + ": photon transfer";
   if (flats.pairs().empty()) return fail(ErrorCode::insufficient, "no two flats make a pair; take two of each light");
   for (const auto& iso : isos_of(flats.pairs())) {
     const auto done = calibrate_gain(of_iso(darks.pairs(), iso), of_iso(flats.pairs(), iso), args, found);
@@ -121,9 +123,10 @@ Result<Calibration> calibrate_picture(const CalibrateNoiseArgs& args) {
   if (!noise) return at(noise.error());
   Calibration found;
   found.profile = std::move(*profile);
-  found.report.title = fmt::format("{} {}: noise of one picture", frame->raw.info.make, frame->raw.info.model);
+  found.report.title = camera_name(frame->raw.info.make, frame->raw.info.model) + ": noise of one picture";
   if (const auto same = put_camera(frame->raw.info, found.profile); !same) return at(same.error());
   if (const auto same = put_mosaic(calib::mosaic_of(frame->raw), found.profile); !same) return at(same.error());
+  list_frame(file, "image", frame->raw.info, found.frames);
   for (const std::string& reason : noise->reasons) found.warnings.push_back(fmt::format("{}: {}", file, reason));
   calib::put_picture_noise(*noise, *black, *setting, measured_today({file}), calib::gain_at(found.profile, *setting));
   show_picture_noise(*noise, *frame, *black, found);

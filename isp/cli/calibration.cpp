@@ -33,6 +33,14 @@ std::string readable(const std::string& name) {
   return Json::parse(Json(name).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
 }
 
+/// What was found, how it was measured and what on.
+isp::Report whole_report(const CalibrateArgs& args, const Calibration& found) {
+  isp::Report report = found.report;
+  report.text = measurement_text(args.output);
+  report.sections.push_back({"Frames", "", found.frames, {}});
+  return report;
+}
+
 }  // namespace
 
 Result<void> check_outputs(const CalibrateArgs& args) {
@@ -77,6 +85,21 @@ Result<void> put_mosaic(const std::string& mosaic, CameraProfile& profile) {
   return {};
 }
 
+void list_frame(const std::string& file, const std::string& use, const FrameInfo& info, isp::Table& frames) {
+  frames.columns = {"file", "use", "ISO", "exposure time [s]", "temperature [C]"};
+  const auto cell = [](const std::optional<double>& value) {
+    return value ? fmt::format("{:g}", *value) : std::string("not stated");
+  };
+  frames.rows.push_back({readable(std::filesystem::path(file).filename().string()), use, cell(info.iso),
+                         cell(info.exposure_s), cell(info.temperature_c)});
+}
+
+std::string measurement_text(const std::string& profile) {
+  const calib::Measured today = measured_today({});
+  return fmt::format("Measured on {} with {}.\nNext step: lowlux develop RAW -o OUT.png --profile {}", today.date,
+                     today.source, readable(profile));
+}
+
 calib::Measured measured_today(std::vector<std::string> files) {
   const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   for (std::string& file : files) file = readable(std::filesystem::path(file).filename().string());
@@ -102,7 +125,7 @@ int finish(const CalibrateArgs& args, const Calibration& found) {
     if (!written) return calibration_failed(args, written.error());
   }
   if (!args.report.empty()) {
-    const auto written = isp::write_text(args.report, isp::html_of(found.report), overwrite);
+    const auto written = isp::write_text(args.report, isp::html_of(whole_report(args, found)), overwrite);
     if (!written) return calibration_failed(args, with_file(written.error(), args.report));
   }
   if (const auto written = isp::write_text(args.output, *text, overwrite); !written) {

@@ -19,6 +19,7 @@ struct Calibration {
   CameraProfile profile;
   std::string text;
   isp::Report report;
+  isp::Table frames;  // that were measured, for the report: list_frame
   std::vector<std::string> warnings;
   std::vector<PixelMap> maps;
 };
@@ -38,6 +39,12 @@ Result<void> put_camera(const FrameInfo& info, CameraProfile& profile);
 
 /// Makes the profile one of this mosaic; a profile without one fits any. Error: it is another.
 Result<void> put_mosaic(const std::string& mosaic, CameraProfile& profile);
+
+/// Adds a frame and what it was taken with. @param use  "dark", "flat", "image"
+void list_frame(const std::string& file, const std::string& use, const FrameInfo& info, isp::Table& frames);
+
+/// For a report: when and by which version the figures were measured, and how to use the profile.
+std::string measurement_text(const std::string& profile);
 
 /// Source and date of what is measured today.
 calib::Measured measured_today(std::vector<std::string> files);

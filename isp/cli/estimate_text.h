@@ -6,8 +6,16 @@
 
 namespace lowlux::cli {
 
-/// "2047.30 +- 0.24": two digits of the standard error, and as many decimals of the value; without a standard error
-/// five digits.
+/// The two numbers of an estimate, for a table.
+struct EstimateCells {
+  std::string value;
+  std::string standard_error;  // empty if there is none
+};
+
+/// Two digits of the standard error, and as many decimals of the value; without a standard error five digits.
+EstimateCells cells_of(const Estimate& estimate);
+
+/// The same in one text: "2047.30 +- 0.24".
 std::string text_of(const Estimate& estimate);
 
 }  // namespace lowlux::cli

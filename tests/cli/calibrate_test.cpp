@@ -97,7 +97,7 @@ TEST_F(Calibrate, BlackFindsWhatTheSensorHas) {
                                    file("p.html"), "--map", file("map")},
                                   darks));
   ASSERT_EQ(done.exit_code, 0) << done.err;
-  EXPECT_TRUE(holds(done.out, "black point"));
+  EXPECT_TRUE(holds(done.out, "dark colour"));
   EXPECT_TRUE(holds(done.out, "doubling"));
   const Json gain = profile("p.json")["gains"][0];
   EXPECT_EQ(gain["iso"], 1600);
@@ -117,9 +117,14 @@ TEST_F(Calibrate, BlackFindsWhatTheSensorHas) {
   EXPECT_EQ(gain["provenance"].size(), 2U);  // the full well was not measured
   const std::string page = scratch_.read("p.html");
   for (const char* plot :
-       {"Dark charge against time", "Dark current against temperature", "Residuals", "Black point"}) {
+       {"Dark charge against time", "Dark current against temperature", "Colour of the dark current"}) {
     EXPECT_TRUE(holds(page, plot)) << plot;
   }
+  // Pedestal and two currents of three settings: nothing is left to test the fit.
+  EXPECT_FALSE(holds(page, "Residuals"));
+  EXPECT_TRUE(holds(page, "add a third exposure time") && holds(done.out, "add a third exposure time"));
+  EXPECT_FALSE(holds(page, "+- 0"));
+  EXPECT_TRUE(holds(page, "c_0003.dng") && holds(page, "Next step: lowlux develop"));
   EXPECT_TRUE(exists("map_pedestal.pfm") && exists("map_current.pfm"));
 }
 
