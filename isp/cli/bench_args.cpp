@@ -17,9 +17,8 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
       ->delimiter(',')
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  app.add_flag(
-         "--calibrate-cost", args.calibrate_cost,
-         "measure how fast this machine develops, for develop --budget-ms, and keep it; about a minute and a half")
+  app.add_flag("--calibrate-cost", args.calibrate_cost,
+               "measure how fast this machine develops, for develop --budget-ms, and keep it; 2 to 5 minutes")
       ->excludes("--stage");
   app.add_flag("--list", args.list, "the stages, one line each");
   app.add_option("-o,--output", args.output,

@@ -22,6 +22,7 @@
 #include "isp/cli/progress.h"
 #include "isp/cli/report.h"
 #include "isp/output/report.h"
+#include "isp/pipeline/reference_cost.h"
 
 namespace lowlux::cli {
 namespace {
@@ -133,7 +134,7 @@ Result<isp::CostModel> kept_cost(int threads) {
   const auto path = cost_file(threads);
   if (!path) return fail(ErrorCode::not_found, "without XDG_CACHE_HOME and HOME it is kept nowhere");
   std::error_code ignored;
-  if (!std::filesystem::exists(*path, ignored)) return fail(ErrorCode::not_found, "it is not known yet", *path);
+  if (!std::filesystem::exists(*path, ignored)) return fail(ErrorCode::not_found, "no measurement is kept", *path);
   const auto bytes = capture::read_file_bytes(*path, largest_file);
   if (!bytes) return tl::make_unexpected(bytes.error());
   auto model = parse_cost(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()));
@@ -171,16 +172,17 @@ Result<isp::CostModel> calibrate_cost(int threads, bool quiet, std::string& writ
   return model;
 }
 
-Result<isp::CostModel> cost_of_this_machine(int threads, bool quiet) {
+isp::CostModel cost_of_this_machine(int threads, bool quiet) {
   auto kept = kept_cost(threads);
-  if (kept) return kept;
+  if (kept) return *std::move(kept);
   if (!quiet) {
-    fmt::print(stderr, "{}\n",
-               one_line("lowlux: this machine's speed is measured, which takes about a minute and a half: " +
-                        kept.error().message));
+    fmt::print(
+        stderr, "{}\n",
+        one_line("lowlux: times are rough estimates until `lowlux bench --calibrate-cost` (2 to 5 minutes) measures "
+                 "this machine: " +
+                 kept.error().message));
   }
-  std::string ignored;
-  return calibrate_cost(threads, quiet, ignored);
+  return isp::reference_cost();
 }
 
 Result<std::shared_ptr<const isp::CostModel>> MachineSpeed::now(Executor& executor) {

@@ -31,9 +31,8 @@ Result<isp::CostModel> parse_cost(std::string_view text);
 /// another format, machine, instruction set, version of lowlux or number of threads.
 Result<isp::CostModel> kept_cost(int threads);
 
-/// The kept model or, where there is none, one that is measured now and kept. That it is measured, and why, and what
-/// keeps it from being written, are told on stderr; it is used all the same. Errors: those of measuring.
-Result<isp::CostModel> cost_of_this_machine(int threads, bool quiet);
+/// The kept model or, where there is none, isp::reference_cost(), with a message on stderr that gives the reason.
+isp::CostModel cost_of_this_machine(int threads, bool quiet);
 
 /// What developing costs at the moment: a machine that has other work too, or is hot, is slower than when it was
 /// calibrated.

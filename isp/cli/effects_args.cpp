@@ -31,8 +31,8 @@ void add_budget(CLI::App& app, EffectsArgs& args) {
       app, "--budget-ms", "MS", "ms",
       "time for developing each frame, from decoded codes to a finished picture (files are read and written "
       "besides): the most accurate way that is predicted to fit, or with --tolerance the fastest within it. "
-      "This machine's speed is measured once, see bench --calibrate-cost, and before each file how busy it is, which "
-      "takes a tenth of a second or two more; one file at a time",
+      "Times are rough estimates until bench --calibrate-cost has measured this machine; before each file how busy it "
+      "is is measured, which takes a tenth of a second or two more; one file at a time",
       args.budget_ms);
   add_positive(app, "--budget-mpps", "MP_PER_S", "MP/s", "the same as megapixels in a second", args.budget_mpps);
 }

@@ -6,6 +6,7 @@
 #include "isp/cli/lines.h"
 #include "isp/cli/report.h"
 #include "isp/cli/source_names.h"
+#include "isp/pipeline/reference_cost.h"
 
 namespace lowlux::cli {
 namespace {
@@ -36,7 +37,10 @@ void add_time(Lines& out, const isp::EffectsPlan& effects, const isp::EffectsCho
     return;
   }
   std::string text = fmt::format("{:.1f} ms; predicted {:.1f} ms", 1e3 * *choice.budget_s, predicted_ms);
-  if (choice.cost->pace_s > 0) {
+  if (choice.cost->machine == isp::reference_machine) {
+    text += fmt::format(", roughly: {:.2f} times what {} take; bench --calibrate-cost measures this machine",
+                        choice.cost->pace, isp::reference_machine);
+  } else if (choice.cost->pace_s > 0) {
     text += fmt::format(", everything taking {:.2f} times what it took when this machine was calibrated",
                         choice.cost->pace);
   }

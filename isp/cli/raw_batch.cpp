@@ -130,9 +130,7 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
     if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
   }
   if (args.effects.budgeted()) {
-    auto cost = cost_of_this_machine(threads_of_each(1), args.quiet);
-    if (!cost) return tl::make_unexpected(cost.error());
-    batch.speed = std::make_shared<MachineSpeed>(*std::move(cost));
+    batch.speed = std::make_shared<MachineSpeed>(cost_of_this_machine(threads_of_each(1), args.quiet));
   } else if (args.effects.effects && (args.explain || args.json)) {
     if (auto cost = kept_cost(threads_of_each(1))) {
       batch.kept_cost = std::make_shared<const isp::CostModel>(*std::move(cost));

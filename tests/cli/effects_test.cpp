@@ -1,9 +1,6 @@
 #include <gtest/gtest.h>
-#include <sys/types.h>
 
-#include <array>
-#include <csignal>
-#include <cstdio>
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -136,34 +133,24 @@ TEST_F(EffectsCommand, GoByTheMachinesPace) {
   EXPECT_EQ(developed({"--budget-ms", "1000", "--explain"}).out.find("was calibrated"), std::string::npos);
 }
 
-/// The first line that a program says on stderr, empty if it ends without one. It is ended then.
-std::string first_complaint(const std::vector<std::string>& command) {
-  std::string words;
-  for (const std::string& word : command) words += " '" + word + "'";
-  FILE* const pipe = popen(("echo $$; exec" + words + " 2>&1 >/dev/null").c_str(), "r");
-  if (pipe == nullptr) return "no pipe";
-  std::array<char, 1000> line{};
-  const bool started = std::fgets(line.data(), line.size(), pipe) != nullptr;
-  const pid_t process = started ? std::atoi(line.data()) : 0;
-  const bool said = std::fgets(line.data(), line.size(), pipe) != nullptr;
-  if (process > 0) kill(process, SIGKILL);
-  pclose(pipe);
-  return said ? line.data() : "";
-}
-
-// Measuring takes a minute and more: it is seen to begin.
-TEST_F(EffectsCommand, MeasureTheMachineAnewWhereAnotherWasKept) {
-  const std::vector<std::string> command{LOWLUX_COMMAND,  "develop", file("night.dng"), "-o",
-                                         file("out.png"), "--force", "--budget-ms",     "1000"};
-  EXPECT_EQ(first_complaint(command), "");
-  EXPECT_TRUE(std::filesystem::remove(file("out.png"))) << "it was developed";
+// A budget does not wait for a measurement.
+TEST_F(EffectsCommand, AreEstimatedWhereThisMachineWasNotMeasured) {
   isp::CostModel model = *cli::kept_cost(cli::threads_of_each(1));
   model.machine = "another";
   std::ofstream(*cli::cost_file(model.threads)) << cli::cost_text(model);
-  const std::string said = first_complaint(command);
-  EXPECT_NE(said.find("is measured"), std::string::npos) << said;
-  EXPECT_NE(said.find("another machine: another, and this is " + cli::machine_name()), std::string::npos) << said;
-  EXPECT_FALSE(std::filesystem::exists(file("out.png")));
+  const auto estimated = developed({"--budget-ms", "100000", "--explain"});
+  ASSERT_EQ(estimated.exit_code, 0) << estimated.err;
+  EXPECT_EQ(std::count(estimated.err.begin(), estimated.err.end(), '\n'), 1) << estimated.err;
+  for (const std::string& said : {std::string("rough estimates until `lowlux bench --calibrate-cost`"),
+                                  "another machine: another, and this is " + cli::machine_name()}) {
+    EXPECT_NE(estimated.err.find(said), std::string::npos) << estimated.err;
+  }
+  EXPECT_NE(estimated.out.find("times what two cores"), std::string::npos) << estimated.out;
+  EXPECT_EQ(developed({"--budget-ms", "100000", "--quiet"}).err, "");
+  std::filesystem::remove_all(file("cache"));
+  EXPECT_NE(developed({"--budget-ms", "100000"}).err.find("rough estimates"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(file("cache"))) << "an estimate is not kept";
+  EXPECT_EQ(developed({"--budget-ms", "100000", "--json"}).exit_code, 0);
 }
 
 TEST_F(EffectsCommand, GoByWhatWasCalibrated) {
