@@ -58,6 +58,23 @@ void fill_shot(const libraw_data_t& data, DecodedHeader& h) {
   copy_text(h.software, data.idata.software);
 }
 
+/// Sets how files are unpacked: by LibRaw itself and without its options, of which only conversion of floating-point
+/// samples to integers would matter here. LibRaw 0.21 has these fields in rawparams, older versions in params.
+template <typename Data>
+void set_unpacking(Data& data, const ReadLimits& limits) {
+  const auto set = [&limits](auto& parameters, unsigned& options) {
+    parameters.use_rawspeed = 0;
+    parameters.use_dngsdk = 0;
+    parameters.max_raw_memory_mb = static_cast<unsigned>((limits.max_pixels * 8 >> 20) + 1);
+    options = 0;
+  };
+  if constexpr (requires { data.rawparams; }) {
+    set(data.rawparams, data.rawparams.options);
+  } else {
+    set(data.params, data.params.raw_processing_options);
+  }
+}
+
 /// What lowlux does not develop, in words; nullptr if there is nothing of the kind. Needs open, not unpack.
 const char* unsupported_kind(LibRaw& libraw) {
   const libraw_iparams_t& id = libraw.imgdata.idata;
@@ -161,12 +178,7 @@ void decode_with_libraw(std::span<const std::byte> file, const ReadLimits& limit
   h = {};
   h.sensor_temperature_c = h.camera_temperature_c = unknown_temperature_c;
   auto libraw = std::make_unique<LibRaw>(LIBRAW_OPIONS_NO_DATAERR_CALLBACK);
-  libraw_output_params_t& parameters = libraw->imgdata.params;
-  parameters.use_rawspeed = 0;
-  parameters.use_dngsdk = 0;
-  parameters.raw_processing_options &= ~static_cast<unsigned>(LIBRAW_PROCESSING_CONVERTFLOAT_TO_INT);
-  parameters.max_raw_memory_mb = static_cast<unsigned>((limits.max_pixels * 8 >> 20) + 1);
-
+  set_unpacking(libraw->imgdata, limits);
   const int error = libraw->open_buffer(const_cast<std::byte*>(file.data()), file.size());
   if (error != LIBRAW_SUCCESS) {
     fill_failure(error, "open", h);
