@@ -8,7 +8,7 @@ Result<capture::LibcameraModule> load_libcamera() {
   const auto found = load_module({.file = "liblowlux_libcamera.so",
                                   .function = capture::libcamera_module_name,
                                   .purpose = "libcamera's cameras",
-                                  .needs = "the libcamera it was built with (Debian: libcamera0.0.3)"});
+                                  .needs = "the libcamera it was built with (Debian: libcamera-dev)"});
   if (!found) return tl::make_unexpected(found.error());
   return *reinterpret_cast<capture::GetLibcameraModule*>(*found)();
 }

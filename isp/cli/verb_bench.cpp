@@ -48,7 +48,7 @@ Result<const isp::NlMeans*> load_nl_means() {
   const auto found = load_module({.file = "liblowlux_nlm.so",
                                   .function = isp::nl_means_name,
                                   .purpose = "OpenCV's non-local means",
-                                  .needs = "OpenCV's photo module (Debian: libopencv-photo406)"});
+                                  .needs = "OpenCV's photo module (Debian: libopencv-photo-dev)"});
   if (!found) return tl::make_unexpected(found.error());
   return reinterpret_cast<isp::GetNlMeans*>(*found)();
 }
