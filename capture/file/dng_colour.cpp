@@ -7,6 +7,8 @@
 #include "capture/file/dng_tags.h"
 #include "capture/file/number_text.h"
 #include "capture/file/pass_on.h"
+#include "isp/model/camera_colour.h"
+#include "isp/model/colorimetry.h"
 
 namespace lowlux::capture {
 namespace {
@@ -41,6 +43,15 @@ Result<std::optional<Matrix3>> read_matrix(const DngFile& dng, const TiffDirecto
   return matrix;
 }
 
+/// A forward matrix: white-balanced camera RGB of a neutral has positive XYZ.
+Result<std::optional<Matrix3>> read_forward(const DngFile& dng, const TiffDirectory& raw_image, TagName name) {
+  auto matrix = read_matrix(dng, raw_image, name);
+  if (!matrix || !*matrix) return matrix;
+  const Vector3 white = **matrix * Vector3{1, 1, 1};
+  if (std::all_of(white.begin(), white.end(), [](double sum) { return sum > 0; })) return matrix;
+  return bad(name, "takes a neutral to a colour that cannot be");
+}
+
 /// Three positive numbers; nullopt if there is no such tag.
 Result<std::optional<Vector3>> read_positive(const DngFile& dng, const TiffDirectory& raw_image, TagName name) {
   auto values = numbers_of(dng, raw_image, name, 3);
@@ -55,46 +66,48 @@ Result<std::optional<Vector3>> read_positive(const DngFile& dng, const TiffDirec
   return out;
 }
 
-/// Calibration `index` (0 or 1); nullopt if the file has no colour matrix for it.
-Result<std::optional<ColourCalibration>> read_calibration(const DngFile& dng, const TiffDirectory& raw_image,
-                                                          int index) {
-  auto colour = read_matrix(dng, raw_image, tag::color_matrix[index]);
-  if (!colour) return pass_on(colour);
-  if (!*colour) return std::nullopt;
-  auto calibration = read_matrix(dng, raw_image, tag::camera_calibration[index]);
-  if (!calibration) return pass_on(calibration);
-  auto forward = read_matrix(dng, raw_image, tag::forward_matrix[index]);
-  if (!forward) return pass_on(forward);
+/// Calibration `index` (0 or 1); nullopt if the file has no usable colour matrix for it.
+std::optional<ColourCalibration> read_calibration(const DngFile& dng, const TiffDirectory& raw_image, int index,
+                                                  std::vector<std::string>& warnings) {
+  const auto colour = or_ignored(read_matrix(dng, raw_image, tag::color_matrix[index]), warnings);
+  if (!colour) return std::nullopt;
   const TagName light = tag::calibration_illuminant[index];
-  auto illuminant = directory_with(dng, raw_image, light).whole(light);
-  if (!illuminant) return pass_on(illuminant);
   ColourCalibration out;
-  out.xyz_to_camera = **colour;
-  out.camera_calibration = calibration->value_or(identity3());
-  out.forward = *forward;
-  out.cct_k = illuminant_cct_k(illuminant->value_or(0));
+  out.xyz_to_camera = *colour;
+  out.camera_calibration =
+      or_ignored(read_matrix(dng, raw_image, tag::camera_calibration[index]), warnings).value_or(identity3());
+  out.forward = or_ignored(read_forward(dng, raw_image, tag::forward_matrix[index]), warnings);
+  out.cct_k = illuminant_cct_k(or_ignored(directory_with(dng, raw_image, light).whole(light), warnings).value_or(0));
   return out;
 }
 
-Result<void> read_white(const DngFile& dng, const TiffDirectory& raw_image, CameraColour& colour) {
-  auto neutral = read_positive(dng, raw_image, tag::as_shot_neutral);
-  if (!neutral) return pass_on(neutral);
-  if (*neutral) {
-    const Vector3& n = **neutral;
-    const double top = std::max({n[0], n[1], n[2]});
-    colour.as_shot_neutral = Vector3{n[0] / top, n[1] / top, n[2] / top};
-  }
+Result<std::optional<std::array<double, 2>>> read_white_xy(const DngFile& dng, const TiffDirectory& raw_image) {
   auto xy = numbers_of(dng, raw_image, tag::as_shot_white_xy, 2);
   if (!xy) return pass_on(xy);
-  if (*xy) {
-    const double x = (**xy)[0], y = (**xy)[1];
-    if (!(x > 0 && y > 0 && x + y < 1)) {
-      return bad(tag::as_shot_white_xy,
-                 "holds " + number_text(x) + ", " + number_text(y) + ", which is no chromaticity");
-    }
-    colour.as_shot_white_xy = {x, y};
+  if (!*xy) return std::nullopt;
+  const double x = (**xy)[0], y = (**xy)[1];
+  if (x > 0 && y > 0 && x + y < 1) return std::array<double, 2>{x, y};
+  return bad(tag::as_shot_white_xy,
+             "holds " + number_text(x) + ", " + number_text(y) + ", which is not a valid chromaticity");
+}
+
+void read_white(const DngFile& dng, const TiffDirectory& raw_image, CameraColour& colour,
+                std::vector<std::string>& warnings) {
+  if (const auto n = or_ignored(read_positive(dng, raw_image, tag::as_shot_neutral), warnings)) {
+    const double top = std::max({(*n)[0], (*n)[1], (*n)[2]});
+    colour.as_shot_neutral = Vector3{(*n)[0] / top, (*n)[1] / top, (*n)[2] / top};
   }
-  return {};
+  colour.as_shot_white_xy = or_ignored(read_white_xy(dng, raw_image), warnings);
+}
+
+/// Whether pictures can be made of light of this white by the calibrations.
+bool is_usable(const CameraColour& colour, const isp::Xy& white) {
+  return isp::camera_to_xyz(colour, white, isp::white_d65).has_value();
+}
+
+bool is_usable(const CameraColour& colour, const Vector3& neutral) {
+  const auto white = isp::white_of_neutral(colour, neutral);
+  return white && is_usable(colour, white->xy);
 }
 
 }  // namespace
@@ -117,23 +130,34 @@ double illuminant_cct_k(std::uint32_t light_source) {
   return 0;
 }
 
-Result<CameraColour> read_colour(const DngFile& dng, const TiffDirectory& raw_image,
-                                 std::vector<std::string>& warnings) {
+CameraColour read_colour(const DngFile& dng, const TiffDirectory& raw_image, std::vector<std::string>& warnings) {
   CameraColour colour;
   for (int i = 0; i < 2; ++i) {
-    auto calibration = read_calibration(dng, raw_image, i);
-    if (!calibration) return pass_on(calibration);
-    if (*calibration) colour.calibrations.push_back(**std::move(calibration));
+    if (auto calibration = read_calibration(dng, raw_image, i, warnings)) colour.calibrations.push_back(*calibration);
   }
   std::stable_sort(colour.calibrations.begin(), colour.calibrations.end(),
                    [](const auto& a, const auto& b) { return a.cct_k < b.cct_k; });
   if (!colour.calibrations.empty()) colour.source = CameraColour::Source::file_tags;
-  auto balance = read_positive(dng, raw_image, tag::analog_balance);
-  if (!balance) return pass_on(balance);
-  colour.analog_balance = balance->value_or(Vector3{1, 1, 1});
-  if (auto white = read_white(dng, raw_image, colour); !white) return pass_on(white);
+  colour.analog_balance =
+      or_ignored(read_positive(dng, raw_image, tag::analog_balance), warnings).value_or(Vector3{1, 1, 1});
+  read_white(dng, raw_image, colour, warnings);
   if (dng.main.find(tag::color_matrix_3) != nullptr) warnings.emplace_back("ColorMatrix3 is not used");
   return colour;
+}
+
+void ignore_impossible_white(CameraColour& colour, std::vector<std::string>& warnings) {
+  if (colour.calibrations.empty()) return;
+  const std::string why =
+      " is not the colour of a light under the camera's colour matrices; it is ignored, --wb sets another";
+  if (const auto n = colour.as_shot_neutral; n && !is_usable(colour, *n)) {
+    warnings.push_back("the as-shot neutral " + number_text((*n)[0]) + " " + number_text((*n)[1]) + " " +
+                       number_text((*n)[2]) + why);
+    colour.as_shot_neutral.reset();
+  }
+  if (const auto xy = colour.as_shot_white_xy; xy && !is_usable(colour, isp::Xy{(*xy)[0], (*xy)[1]})) {
+    warnings.push_back("the as-shot white x " + number_text((*xy)[0]) + " y " + number_text((*xy)[1]) + why);
+    colour.as_shot_white_xy.reset();
+  }
 }
 
 Result<std::optional<NoiseProfile>> read_noise(const DngFile& dng, const TiffDirectory& raw_image, int planes) {
@@ -151,7 +175,7 @@ Result<std::optional<NoiseProfile>> read_noise(const DngFile& dng, const TiffDir
     const std::size_t at = pairs.size() == 2 || planes == 1 ? 0 : 2 * i;
     // Of a value from 0 to 1: no variance is above 1.
     if (!(pairs[at] >= 0 && pairs[at] <= 1 && std::fabs(pairs[at + 1]) <= 1)) {
-      return bad(name, "holds a value that is no variance");
+      return bad(name, "holds a value that is not a variance");
     }
     noise.scale[i] = pairs[at];
     noise.offset[i] = pairs[at + 1];

@@ -11,9 +11,11 @@
 namespace lowlux::capture {
 
 /// Colour calibrations and the as-shot white of a DNG; tags of the first directory before those of the raw image.
-/// A matrix or white with a value that is not a number, or without an inverse, is an error that names its tag.
-Result<CameraColour> read_colour(const DngFile& dng, const TiffDirectory& raw_image,
-                                 std::vector<std::string>& warnings);
+/// A tag with a value that is not a number, or a matrix without an inverse, is ignored with a warning that names it.
+CameraColour read_colour(const DngFile& dng, const TiffDirectory& raw_image, std::vector<std::string>& warnings);
+
+/// Removes an as-shot white that no light can have under the calibrations, with a warning.
+void ignore_impossible_white(CameraColour& colour, std::vector<std::string>& warnings);
 
 /// nullopt if the file states none. `planes` is 3, or 1 for monochrome.
 Result<std::optional<NoiseProfile>> read_noise(const DngFile& dng, const TiffDirectory& raw_image, int planes);

@@ -60,7 +60,18 @@ std::vector<TiffDirectory> all_directories(const TiffFile& tiff, TiffDirectory f
   return found;
 }
 
+Result<std::optional<TiffDirectory>> exif_of(const TiffFile& tiff, const TiffDirectory& main) {
+  const auto offset = main.whole(tag::exif_ifd);
+  if (!offset) return tl::make_unexpected(offset.error());
+  if (!*offset) return std::nullopt;
+  auto directory = tiff.directory(**offset);
+  if (directory) return *std::move(directory);
+  return fail(directory.error().code, std::string("the tag ") + tag::exif_ifd.name + ": " + directory.error().message);
+}
+
 }  // namespace
+
+std::string ignored(const Error& error) { return error.message + "; the tag is ignored"; }
 
 Result<std::optional<DngFile>> open_dng(std::span<const std::byte> bytes) {
   const auto tiff = TiffFile::open(bytes);
@@ -78,9 +89,7 @@ Result<std::optional<DngFile>> open_dng(std::span<const std::byte> bytes) {
     return fail(ErrorCode::unsupported, "this DNG holds no raw image, only rendered pictures");
   std::stable_sort(dng.raw_images.begin(), dng.raw_images.end(),
                    [](const auto& a, const auto& b) { return area_of(a) > area_of(b); });
-  if (const auto exif = dng.main.whole(tag::exif_ifd); exif && *exif) {
-    if (auto directory = tiff->directory(**exif)) dng.exif = *std::move(directory);
-  }
+  dng.exif = or_ignored(exif_of(*tiff, dng.main), dng.warnings);
   return dng;
 }
 

@@ -3,6 +3,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "capture/file/tiff_directory.h"
@@ -16,7 +17,19 @@ struct DngFile {
   TiffDirectory main;                     // the first directory
   std::vector<TiffDirectory> raw_images;  // full-size CFA or LinearRaw images, the largest first; never empty
   std::optional<TiffDirectory> exif;
+  std::vector<std::string> warnings;  // optional directories that are damaged
 };
+
+/// The warning for an optional tag that is damaged, and so ignored.
+std::string ignored(const Error& error);
+
+/// The value of an optional tag; where it is damaged nullopt, and a warning.
+template <class T>
+std::optional<T> or_ignored(Result<std::optional<T>> tag, std::vector<std::string>& warnings) {
+  if (tag) return *std::move(tag);
+  warnings.push_back(ignored(tag.error()));
+  return std::nullopt;
+}
 
 /// How the samples of one raw image are laid out and stored.
 struct DngImage {

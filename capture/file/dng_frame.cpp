@@ -30,27 +30,22 @@ Result<DngDescription> decoded_image(const DngFile& dng, DngDescription expected
                                         " pixels, no raw image of this DNG has that size");
 }
 
-Result<void> read_colour_and_noise(const DngFile& dng, const TiffDirectory& directory, RawFrame& frame) {
+void read_colour_and_noise(const DngFile& dng, const TiffDirectory& directory, RawFrame& frame) {
   const bool coloured = frame.raw.layout != SensorLayout::monochrome;
-  auto noise = read_noise(dng, directory, coloured ? 3 : 1);
-  if (!noise) return pass_on(noise);
-  frame.noise = *noise;
-  if (!coloured) return {};
-  auto colour = read_colour(dng, directory, frame.warnings);
-  if (!colour) return pass_on(colour);
-  frame.colour = *std::move(colour);
-  return {};
+  frame.noise = or_ignored(read_noise(dng, directory, coloured ? 3 : 1), frame.warnings);
+  if (coloured) frame.colour = read_colour(dng, directory, frame.warnings);
 }
 
-Result<void> read_corrections(const DngFile& dng, const TiffDirectory& directory, RawFrame& frame) {
+void read_corrections(const DngFile& dng, const TiffDirectory& directory, RawFrame& frame) {
   const bool linearized = directory.find(tag::linearization_table) != nullptr;
   for (int list = 1; list <= 3; ++list) {
     const TagName name = tag::opcode_list[list - 1];
-    auto bytes = (directory.find(name) != nullptr ? directory : dng.main).bytes(name);
-    if (!bytes) return pass_on(bytes);
-    if (auto read = read_opcodes(*bytes, list, linearized, frame); !read) return read;
+    const TiffDirectory& home = directory.find(name) != nullptr ? directory : dng.main;
+    if (home.find(name) == nullptr) continue;
+    auto read = home.bytes(name).and_then(
+        [&](std::span<const std::byte> bytes) { return read_opcodes(bytes, list, linearized, frame); });
+    if (!read) frame.warnings.push_back(ignored(read.error()));
   }
-  return {};
 }
 
 }  // namespace
@@ -63,9 +58,10 @@ Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw
   frame.raw.layout = image->layout;
   frame.raw.phase = image->phase;
   frame.raw.info = read_info(dng);
+  frame.warnings = dng.warnings;
   if (auto read = read_geometry(raw_image, *image, frame.raw, frame.warnings); !read) return pass_on(read);
   if (auto read = read_levels(raw_image, *image, frame.raw); !read) return pass_on(read);
-  if (auto read = read_colour_and_noise(dng, raw_image, frame); !read) return pass_on(read);
+  read_colour_and_noise(dng, raw_image, frame);
   return described;
 }
 
@@ -82,7 +78,8 @@ Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std:
     frame.colour.calibrations.push_back(*table);
     frame.colour.source = CameraColour::Source::decoder_table;
   }
-  if (auto read = read_corrections(dng, *chosen->directory, frame); !read) return pass_on(read);
+  read_corrections(dng, *chosen->directory, frame);
+  ignore_impossible_white(frame.colour, frame.warnings);
   return frame;
 }
 

@@ -36,50 +36,50 @@ tl::unexpected<Error> bad_rect(TagName name, const double* edges, const DngImage
   return fail(ErrorCode::malformed, std::move(message), name.name);
 }
 
-Result<void> read_masked(const TiffDirectory& directory, const DngImage& image, RawDn& raw) {
+/// The areas of the tag MaskedAreas; nullopt if there is no such tag.
+Result<std::optional<std::vector<Rect>>> read_masked(const TiffDirectory& directory, const DngImage& image) {
   auto masked = directory.numbers(tag::masked_areas, 4, max_masked_numbers);
   if (!masked) return pass_on(masked);
-  raw.masked_is_stated = masked->has_value();
-  if (!*masked) {
-    raw.masked = borders(image.width, image.height, raw.active);
-    return {};
-  }
+  if (!*masked) return std::nullopt;
   const std::vector<double>& edges = **masked;
   if (edges.size() % 4 != 0) {
     return fail(ErrorCode::malformed,
                 "the tag MaskedAreas has " + std::to_string(edges.size()) + " values, expected four for each rectangle",
                 tag::masked_areas.name);
   }
+  std::vector<Rect> areas;
   for (std::size_t i = 0; i + 4 <= edges.size(); i += 4) {
     const auto rect = rect_inside(&edges[i], image.width, image.height);
     if (!rect) return bad_rect(tag::masked_areas, &edges[i], image);
-    raw.masked.push_back(*rect);
+    areas.push_back(*rect);
   }
-  return {};
+  return areas;
 }
 
-/// Default crop: stated in (rational) pixels from the corner of the active area; rounded to whole ones.
-Result<void> read_crop(const TiffDirectory& directory, RawDn& raw, std::vector<std::string>& warnings) {
-  const Rect whole{0, 0, raw.active.width, raw.active.height};
-  raw.default_crop = whole;
+/// Default crop: stated in (rational) pixels from the corner of the active area; rounded to whole ones. nullopt if the
+/// file states none.
+Result<std::optional<Rect>> read_crop(const TiffDirectory& directory, const Rect& active,
+                                      std::vector<std::string>& warnings) {
   auto origin = directory.numbers(tag::default_crop_origin, 2, 2);
   if (!origin) return pass_on(origin);
   auto size = directory.numbers(tag::default_crop_size, 2, 2);
   if (!size) return pass_on(size);
-  if (!*size) return {};
+  if (!*size) return std::nullopt;
   const double x = *origin ? std::round((**origin)[0]) : 0, y = *origin ? std::round((**origin)[1]) : 0;
   const double right = std::round(x + (**size)[0]), bottom = std::round(y + (**size)[1]);
-  const double inner_right = std::min<double>(right, whole.width),
-               inner_bottom = std::min<double>(bottom, whole.height);
-  if (!(x >= 0 && y >= 0 && inner_right > x && inner_bottom > y)) {
-    return fail(ErrorCode::malformed, "the default crop lies outside of the active area", tag::default_crop_size.name);
+  const double inner_right = std::min<double>(right, active.width),
+               inner_bottom = std::min<double>(bottom, active.height);
+  const bool inside = x >= 0 && y >= 0 && inner_right > x && inner_bottom > y;
+  if (!inside || !std::isfinite(right) || !std::isfinite(bottom)) {
+    return fail(ErrorCode::malformed,
+                std::string("the tag ") + tag::default_crop_size.name + " states a crop outside of the active area",
+                tag::default_crop_size.name);
   }
   if (inner_right < right || inner_bottom < bottom) {
     warnings.emplace_back("DefaultCropSize reaches beyond the active area: the part inside is used");
   }
-  raw.default_crop = {static_cast<int>(x), static_cast<int>(y), static_cast<int>(inner_right - x),
-                      static_cast<int>(inner_bottom - y)};
-  return {};
+  return Rect{static_cast<int>(x), static_cast<int>(y), static_cast<int>(inner_right - x),
+              static_cast<int>(inner_bottom - y)};
 }
 
 Result<void> check_finite(const std::vector<double>& values, TagName name) {
@@ -198,13 +198,29 @@ Result<void> read_geometry(const TiffDirectory& directory, const DngImage& image
     if (!rect) return bad_rect(tag::active_area, (*active)->data(), image);
     raw.active = *rect;
   }
-  if (auto masked = read_masked(directory, image, raw); !masked) return masked;
-  if (auto crop = read_crop(directory, raw, warnings); !crop) return crop;
-  const auto scale = directory.numbers(tag::default_scale, 2, 2);
-  if (scale && *scale && (**scale)[0] != (**scale)[1]) {
+  auto masked = or_ignored(read_masked(directory, image), warnings);
+  raw.masked_is_stated = masked.has_value();
+  raw.masked = masked ? *std::move(masked) : borders(image.width, image.height, raw.active);
+  const auto crop = or_ignored(read_crop(directory, raw.active, warnings), warnings);
+  raw.default_crop = crop.value_or(Rect{0, 0, raw.active.width, raw.active.height});
+  const auto scale = or_ignored(read_scale(directory), warnings);
+  if (scale && (*scale)[0] != (*scale)[1]) {
     warnings.emplace_back("DefaultScale is not applied: the pixels are not square");
   }
   return {};
+}
+
+Result<std::optional<std::vector<double>>> read_scale(const TiffDirectory& directory) {
+  auto scale = directory.numbers(tag::default_scale, 2, 2);
+  if (!scale || !*scale) return scale;
+  for (const double value : **scale) {
+    if (!std::isfinite(value) || value <= 0) {
+      return fail(ErrorCode::malformed,
+                  "the tag DefaultScale holds " + number_text(value) + ", expected numbers above 0",
+                  tag::default_scale.name);
+    }
+  }
+  return scale;
 }
 
 Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,9 +11,13 @@
 
 namespace lowlux::capture {
 
-/// Fills the geometry (active area, crop, masked areas) of a raw image from its tags. `raw.dn` is not needed.
+/// Fills the geometry (active area, crop, masked areas) of a raw image from its tags. `raw.dn` is not needed. A damaged
+/// ActiveArea is an error; damaged tags for the crop, masked areas and scale are ignored with a warning.
 Result<void> read_geometry(const TiffDirectory& directory, const DngImage& image, RawDn& raw,
                            std::vector<std::string>& warnings);
+
+/// DefaultScale, two numbers above zero; nullopt if there is no such tag.
+Result<std::optional<std::vector<double>>> read_scale(const TiffDirectory& directory);
 
 /// Fills black and white levels. Precondition: the geometry is filled. White levels not above black are refused.
 Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw);

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bitset>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -13,9 +15,11 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr std::size_t max_constant_defects = 1 << 20;
+// Cameras write some opcodes a list, four gain maps and some thousand defects.
+constexpr std::size_t max_opcodes = 64;                    // in one list
+constexpr std::size_t max_defects = std::size_t{1} << 20;  // in all lists
+constexpr std::size_t max_gains = 64;                      // in all lists
 constexpr std::size_t opcode_header_bytes = 16;
-constexpr std::size_t max_gains = 64;
 constexpr std::uint32_t fix_vignette_radial = 3, fix_bad_pixels_constant = 4, fix_bad_pixels_list = 5, gain_map = 9;
 
 /// Big-endian numbers one after the other. Past the end it reads zeros and remembers that.
@@ -56,18 +60,30 @@ std::string opcode_name(std::uint32_t id) {
   return id < std::size(names) ? names[id] : "opcode " + std::to_string(id);
 }
 
+/// One list, while it is read. What it asks for reaches the frame only when all of the list has been read.
 struct Context {
   int list;
   bool linearized;
-  RawFrame& frame;
+  const RawFrame& frame;
+  RawCorrections& found;
+  std::bitset<65536>& constants;  // values of defective pixels
+  std::vector<std::string>& warnings;
 
-  std::string name_of(std::uint32_t id) const { return opcode_name(id) + " (OpcodeList" + std::to_string(list) + ")"; }
+  std::string tag() const { return "OpcodeList" + std::to_string(list); }
   void not_applied(std::uint32_t id, const std::string& why = {}) const {
-    frame.warnings.push_back(name_of(id) + " is not applied" + why);
+    warnings.push_back(opcode_name(id) + " (" + tag() + ") is not applied" + why);
   }
   tl::unexpected<Error> damaged(std::uint32_t id) const {
-    return fail(ErrorCode::malformed, name_of(id) + " is damaged", "OpcodeList" + std::to_string(list));
+    return fail(ErrorCode::malformed, opcode_name(id) + " of the tag " + tag() + " is damaged", tag());
   }
+  Result<void> check_gains(std::size_t more) const {
+    const RawCorrections& before = frame.corrections;
+    const std::size_t gains =
+        before.gain_maps.size() + before.radial_gains.size() + found.gain_maps.size() + found.radial_gains.size();
+    if (gains + more <= max_gains) return {};
+    return fail(ErrorCode::malformed, "the tag " + tag() + " asks for more gain maps than any camera writes", tag());
+  }
+  std::size_t room_for_defects() const { return max_defects - frame.corrections.defects.size() - found.defects.size(); }
 };
 
 /// Gains for one colour of a mosaic, as a map that touches only the sites of that colour in one of the cell's rows.
@@ -92,7 +108,7 @@ void add_split(const Context& context, const GainMap& map) {
       const int plane = static_cast<int>(colour_at(context.frame.raw.phase, x, y));
       if (plane < map.first_plane || plane >= map.first_plane + map.planes) continue;
       GainMap one = map_of_sites(map, x, y, plane);
-      if (one.top < one.bottom && one.left < one.right) context.frame.corrections.gain_maps.push_back(std::move(one));
+      if (one.top < one.bottom && one.left < one.right) context.found.gain_maps.push_back(std::move(one));
     }
   }
 }
@@ -131,6 +147,7 @@ Result<void> read_gain_map(const Context& context, Reader in) {
   for (float& gain : map.gain) gain = in.f32();
   if (!is_usable(map)) return context.damaged(gain_map);
   if (map.top >= map.bottom || map.left >= map.right) return {};  // it touches nothing
+  if (auto room = context.check_gains(4); !room) return room;
 
   const bool mosaic = context.frame.raw.layout == SensorLayout::bayer;
   const bool alike = map.first_plane == 0 && map.planes >= 3 && map.map_planes == 1;
@@ -141,7 +158,7 @@ Result<void> read_gain_map(const Context& context, Reader in) {
   } else if (context.list == 3 && mosaic && !alike) {
     add_split(context, map);
   } else {
-    context.frame.corrections.gain_maps.push_back(std::move(map));
+    context.found.gain_maps.push_back(std::move(map));
   }
   return {};
 }
@@ -156,10 +173,11 @@ Result<void> read_vignette(const Context& context, Reader in) {
   if (!in.complete() || !finite || !relative(radial.centre_x) || !relative(radial.centre_y)) {
     return context.damaged(fix_vignette_radial);
   }
+  if (auto room = context.check_gains(1); !room) return room;
   if (context.list == 1) {
     context.not_applied(fix_vignette_radial, ": it is meant for values that still hold the black level");
   } else {
-    context.frame.corrections.radial_gains.push_back(radial);
+    context.found.radial_gains.push_back(radial);
   }
   return {};
 }
@@ -173,7 +191,7 @@ void add_defect(const Context& context, std::uint32_t top, std::uint32_t left, s
   const std::int64_t x1 = std::min<std::int64_t>(static_cast<std::int64_t>(right) - dx, active.width);
   const std::int64_t y1 = std::min<std::int64_t>(static_cast<std::int64_t>(bottom) - dy, active.height);
   if (x0 >= x1 || y0 >= y1) return;
-  context.frame.corrections.defects.push_back(
+  context.found.defects.push_back(
       {static_cast<int>(x0), static_cast<int>(y0), static_cast<int>(x1 - x0), static_cast<int>(y1 - y0)});
 }
 
@@ -181,6 +199,9 @@ Result<void> read_defect_list(const Context& context, Reader in) {
   in.u32();  // the Bayer phase; ours is known
   const std::uint64_t points = in.u32(), rects = in.u32();
   if (!in.complete() || points * 8 + rects * 16 > in.left()) return context.damaged(fix_bad_pixels_list);
+  if (points + rects > context.room_for_defects()) {
+    return fail(ErrorCode::malformed, "the tag " + context.tag() + " names more than a million defects", context.tag());
+  }
   for (std::uint64_t i = 0; i < points; ++i) {
     const std::uint32_t y = in.u32(), x = in.u32();
     add_defect(context, y, x, std::uint64_t{y} + 1, std::uint64_t{x} + 1);
@@ -192,30 +213,34 @@ Result<void> read_defect_list(const Context& context, Reader in) {
   return {};
 }
 
-/// Pixels of a constant value are defective: they are looked up in the readout here, where it is complete.
+/// Pixels of a constant value are defective: they are looked up in the readout, where it is complete.
 Result<void> read_defect_constant(const Context& context, Reader in) {
   const std::uint32_t constant = in.u32();
   if (!in.complete()) return context.damaged(fix_bad_pixels_constant);
   if (context.linearized || context.list != 1 || context.frame.raw.layout == SensorLayout::linear_rgb) {
     context.not_applied(fix_bad_pixels_constant, ": its constant does not refer to the decoded values");
-    return {};
+  } else if (constant < context.constants.size()) {
+    context.constants.set(constant);
   }
+  return {};
+}
+
+/// One pass over the readout for all constants together.
+void find_constants(const Context& context) {
   const RawDn& raw = context.frame.raw;
-  std::vector<DefectRect> found;
+  std::vector<DefectRect>& defects = context.found.defects;
+  const std::size_t named = defects.size(), room = context.room_for_defects();
   for (int y = 0; y < raw.active.height; ++y) {
     const std::uint16_t* row = raw.dn.row(raw.active.y + y) + raw.active.x;
     for (int x = 0; x < raw.active.width; ++x) {
-      if (row[x] != constant) continue;
-      if (found.size() == max_constant_defects) {
-        context.not_applied(fix_bad_pixels_constant, ": more than a million pixels have its value");
-        return {};
+      if (!context.constants[row[x]]) continue;
+      if (defects.size() - named == room) {
+        defects.resize(named);
+        return context.not_applied(fix_bad_pixels_constant, ": more than a million pixels have its value");
       }
-      found.push_back({x, y, 1, 1});
+      defects.push_back({x, y, 1, 1});
     }
   }
-  std::vector<DefectRect>& defects = context.frame.corrections.defects;
-  defects.insert(defects.end(), found.begin(), found.end());
-  return {};
 }
 
 Result<void> read_opcode(const Context& context, std::uint32_t id, std::span<const std::byte> parameters) {
@@ -234,28 +259,45 @@ Result<void> read_opcode(const Context& context, std::uint32_t id, std::span<con
   }
 }
 
-}  // namespace
-
-Result<void> read_opcodes(std::span<const std::byte> bytes, int list, bool linearized, RawFrame& frame) {
-  if (bytes.empty()) return {};
-  const Context context{list, linearized, frame};
-  const std::string name = "OpcodeList" + std::to_string(list);
+Result<void> read_list(const Context& context, std::span<const std::byte> bytes) {
+  const auto damaged = [&] {
+    return fail(ErrorCode::malformed, "the tag " + context.tag() + " is damaged", context.tag());
+  };
   Reader in(bytes);
   const std::uint32_t count = in.u32();
-  if (!in.complete() || count > in.left() / opcode_header_bytes) {
-    return fail(ErrorCode::malformed, "the tag " + name + " is damaged", name);
+  if (!in.complete() || count > in.left() / opcode_header_bytes) return damaged();
+  if (count > max_opcodes) {
+    return fail(ErrorCode::malformed, "the tag " + context.tag() + " holds more opcodes than any camera writes",
+                context.tag());
   }
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t id = in.u32();
     in.u32();  // the DNG version that introduced it
-    in.u32();  // flags: whether a reader may skip it; what is skipped is told in any case
+    in.u32();  // flags: whether a reader may skip it; what is skipped becomes a warning in any case
     const auto parameters = in.block(in.u32());
-    if (!in.complete()) return fail(ErrorCode::malformed, "the tag " + name + " is damaged", name);
+    if (!in.complete()) return damaged();
     if (auto read = read_opcode(context, id, parameters); !read) return read;
   }
-  if (frame.corrections.gain_maps.size() + frame.corrections.radial_gains.size() > max_gains) {
-    return fail(ErrorCode::malformed, "the tag " + name + " asks for more gain maps than any camera writes", name);
-  }
+  if (context.constants.any()) find_constants(context);
+  return {};
+}
+
+template <class T>
+void append(std::vector<T>& to, std::vector<T>& from) {
+  to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+}
+
+}  // namespace
+
+Result<void> read_opcodes(std::span<const std::byte> bytes, int list, bool linearized, RawFrame& frame) {
+  RawCorrections found;
+  std::bitset<65536> constants;
+  std::vector<std::string> warnings;
+  if (auto read = read_list({list, linearized, frame, found, constants, warnings}, bytes); !read) return read;
+  append(frame.corrections.gain_maps, found.gain_maps);
+  append(frame.corrections.radial_gains, found.radial_gains);
+  append(frame.corrections.defects, found.defects);
+  append(frame.warnings, warnings);
   return {};
 }
 

@@ -15,7 +15,12 @@ namespace lowlux::capture {
 ///
 /// GainMap and FixVignetteRadial of lists 2 and 3, FixBadPixelsList and FixBadPixelsConstant are kept; what else is
 /// there becomes a warning that names it. Gains of list 3 are meant for demosaiced data: applied to the mosaic they
-/// give the same picture where nothing clips, because demosaicing is linear and gains vary slowly.
+/// give the same picture where nothing clips, because demosaicing is linear and gains vary slowly. Opcodes that are not
+/// applied become warnings whether the file marks them optional or not: the picture without them is still of use.
+///
+/// The opcodes of a list build on each other, so a list is applied whole or not at all: on an error, which names what
+/// is damaged or over a limit, `frame` stays as it was. A list holds up to 64 opcodes, the frame up to 64 gains and
+/// 2^20 defects; pixels of all constants of a list are looked up in one pass.
 ///
 /// @param list        1, 2 or 3: positions count from the readout (1) or the active area (2, 3)
 /// @param linearized  the samples went through a LinearizationTable, which opcodes of list 1 precede

@@ -9,8 +9,11 @@
 
 #include "capture/file/decoder_frame.h"
 #include "capture/file/decoder_process.h"
+#include "capture/file/dng_colour.h"
 #include "capture/file/dng_file.h"
 #include "capture/file/dng_frame.h"
+#include "capture/file/dng_levels.h"
+#include "capture/file/dng_tags.h"
 #include "capture/file/file_bytes.h"
 #include "capture/file/libraw_decoder.h"
 #include "capture/file/pass_on.h"
@@ -19,13 +22,30 @@
 namespace lowlux::capture {
 namespace {
 
-/// Whether the first bytes are text: no raw format begins with 64 characters that can be printed. Bytes from 128 on
-/// are taken for UTF-8, which has none from 0xF5 on.
-bool looks_like_text(std::string_view head) {
-  return std::all_of(head.begin(), head.end(), [](char c) {
-    const auto code = static_cast<unsigned char>(c);
-    return (code >= ' ' && code < 0xF5 && code != 127) || c == '\n' || c == '\r' || c == '\t';
-  });
+constexpr std::size_t text_sample_bytes = std::size_t{1} << 20;
+
+/// Bytes of the character of UTF-8 at the front of `text`; 0 if there is none that can be printed.
+std::size_t printable_bytes(std::string_view text) {
+  const auto first = static_cast<unsigned char>(text[0]);
+  if (first < 0x80) return (first >= ' ' && first != 127) || first == '\n' || first == '\r' || first == '\t' ? 1 : 0;
+  if (first < 0xC2 || first > 0xF4) return 0;
+  const std::size_t size = first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
+  if (size > text.size()) return 0;
+  const auto follows = [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) == 0x80; };
+  return std::all_of(text.begin() + 1, text.begin() + static_cast<std::ptrdiff_t>(size), follows) ? size : 0;
+}
+
+/// Whether the file is text: all of its first megabyte is printable UTF-8. Less is not enough to tell: the samples of a
+/// raw without a header can be printable for some rows.
+bool is_text(std::string_view file) {
+  constexpr std::size_t longest_character = 4;
+  const std::size_t end = std::min(file.size(), text_sample_bytes);
+  for (std::size_t at = 0; at < end;) {
+    const std::size_t size = printable_bytes(file.substr(at, longest_character));
+    if (size == 0) return false;
+    at += size;
+  }
+  return true;
 }
 
 struct Kind {
@@ -37,15 +57,15 @@ struct Kind {
 /// decoder, which takes anything of certain sizes for a headerless dump.
 std::string other_kind(std::span<const std::byte> bytes) {
   using std::string_view_literals::operator""sv;
-  const std::string_view head(reinterpret_cast<const char*>(bytes.data()), std::min<std::size_t>(bytes.size(), 64));
+  const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   constexpr Kind kinds[] = {{"\x89PNG"sv, "a PNG picture"},
                             {"GIF8"sv, "a GIF picture"},
                             {"%PDF"sv, "a PDF document"},
                             {"\x76\x2F\x31\x01"sv, "an OpenEXR picture"}};
   for (const Kind& kind : kinds) {
-    if (head.starts_with(kind.magic)) return kind.what;
+    if (file.starts_with(kind.magic)) return kind.what;
   }
-  return looks_like_text(head) ? "text" : "";
+  return is_text(file) ? "text" : "";
 }
 
 bool is_jpeg(std::span<const std::byte> bytes) {
@@ -62,6 +82,24 @@ Error not_decoded(std::span<const std::byte> bytes, Error error) {
   return error;
 }
 
+/// Tags that make the decoder give up on the file where they are damaged, though the samples can do without them.
+std::vector<const TiffEntry*> harmful_tags(const DngFile& dng) {
+  std::vector<const TiffEntry*> found;
+  const TiffDirectory& raw_image = dng.raw_images.front();
+  if (!read_scale(raw_image)) found.push_back(raw_image.find(tag::default_scale));
+  if (!dng.exif && dng.main.find(tag::exif_ifd) != nullptr) found.push_back(dng.main.find(tag::exif_ifd));
+  return found;
+}
+
+Result<DecodedRaw> decode_dng(const DngFile& dng, std::span<const std::byte> bytes, const ReadLimits& limits) {
+  const auto harmful = harmful_tags(dng);
+  if (harmful.empty()) return decode_contained(bytes, limits, decode_with_libraw);
+  std::vector<std::byte> without(bytes.begin(), bytes.end());
+  for (const TiffEntry* entry : harmful)
+    std::fill_n(without.begin() + static_cast<std::ptrdiff_t>(entry->place), 2, std::byte{0});
+  return decode_contained(without, limits, decode_with_libraw);
+}
+
 Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, const ReadLimits& limits) {
   auto described = describe_dng(dng, dng.raw_images.front(), bytes.size());
   if (!described) return pass_on(described);
@@ -71,7 +109,7 @@ Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, 
                                           std::to_string(image.height) + " pixels is over the limit of " +
                                           std::to_string(limits.max_pixels) + " pixels");
   }
-  auto decoded = decode_contained(bytes, limits, decode_with_libraw);
+  auto decoded = decode_dng(dng, bytes, limits);
   if (!decoded) return pass_on(decoded);
   return complete_dng(dng, *std::move(described), bytes.size(), *std::move(decoded));
 }
@@ -87,7 +125,9 @@ Result<RawFrame> read_bytes(std::span<const std::byte> bytes, const ReadLimits& 
   }
   auto decoded = decode_contained(bytes, limits, decode_with_libraw);
   if (!decoded) return tl::make_unexpected(not_decoded(bytes, std::move(decoded.error())));
-  return frame_of_decoder(*std::move(decoded));
+  auto frame = frame_of_decoder(*std::move(decoded));
+  if (frame) ignore_impossible_white(frame->colour, frame->warnings);
+  return frame;
 }
 
 }  // namespace

@@ -30,6 +30,7 @@ std::string plural(std::size_t count) { return std::to_string(count) + (count ==
 TiffEntry read_entry(std::span<const std::byte> file, const std::byte* at, bool big_endian) {
   TiffEntry entry;
   entry.id = load_u16(at, big_endian);
+  entry.place = static_cast<std::size_t>(at - file.data());
   entry.type = static_cast<TiffEntry::Type>(load_u16(at + 2, big_endian));
   entry.count = load_u32(at + 4, big_endian);
   entry.big_endian = big_endian;
@@ -159,6 +160,10 @@ std::string TiffDirectory::text(TagName tag) const {
 Result<std::span<const std::byte>> TiffDirectory::bytes(TagName tag) const {
   const TiffEntry* entry = find(tag);
   if (entry == nullptr) return std::span<const std::byte>{};
+  if (value_bytes(entry->type) == 0) {
+    return fail(ErrorCode::malformed, std::string("the tag ") + tag.name + " has a type that TIFF does not know",
+                tag.name);
+  }
   if (!entry->inside_file) {
     return fail(
         ErrorCode::malformed,

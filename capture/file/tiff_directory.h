@@ -37,6 +37,7 @@ class TiffEntry {
   };
 
   std::uint16_t id = 0;
+  std::size_t place = 0;  // of the entry in the file
   Type type = Type::byte;
   std::uint32_t count = 0;
   bool big_endian = false;

@@ -84,7 +84,13 @@ TEST(DngColour, AKnownCameraWithoutMatrixGetsTheDecodersTable) {
   EXPECT_NEAR(colour.calibrations[0].xyz_to_camera[2][2], 0.6651, 1e-6);
 }
 
-TEST(DngColour, MatricesThatAreNotNumbersAreRefusedByName) {
+bool warns(const DngBuilder& dng, const std::string& words) {
+  const std::string warning = warned(dng);
+  EXPECT_TRUE(warning.ends_with("; the tag is ignored")) << warning;
+  return warning.find(words) != std::string::npos;
+}
+
+TEST(DngColour, MatricesThatAreNotNumbersAreIgnoredByName) {
   for (const std::uint16_t id : {50721, 50723, 50964}) {
     DngBuilder dng;
     std::vector<std::pair<double, double>> values;
@@ -92,33 +98,36 @@ TEST(DngColour, MatricesThatAreNotNumbersAreRefusedByName) {
     for (const double v : some_matrix) values.emplace_back(v * 10, 10);
     values[4] = {0, 0};
     dng.set(id, Tag::rationals(TagType::srational, values));
-    EXPECT_TRUE(has(refused(dng), "holds a value that is not a number")) << id;
+    EXPECT_TRUE(warns(dng, "holds a value that is not a number")) << id;
     values[4] = {1, 0};
     dng.set(id, Tag::rationals(TagType::srational, values));
-    EXPECT_TRUE(has(refused(dng), "holds a value that is not a number")) << id;
+    EXPECT_TRUE(warns(dng, "holds a value that is not a number")) << id;
   }
   DngBuilder floating;
   std::vector<double> values = some_matrix;
   values[8] = std::numeric_limits<double>::quiet_NaN();
   floating.set(50721, Tag::numbers(TagType::f32, values));
-  const Error error = refused(floating);
-  EXPECT_EQ(error.code, ErrorCode::malformed);
-  EXPECT_TRUE(has(error, "ColorMatrix1"));
+  EXPECT_TRUE(warns(floating, "ColorMatrix1"));
+  EXPECT_TRUE(read_built(floating).colour.calibrations.empty());
 }
 
-TEST(DngColour, SingularAndTruncatedMatricesAreRefusedByName) {
+TEST(DngColour, SingularAndTruncatedMatricesAreIgnoredByName) {
   DngBuilder zero;
   zero.set(50721, Tag::numbers(TagType::srational, std::vector<double>(9, 0)));
-  EXPECT_TRUE(has(refused(zero), "ColorMatrix1 is a singular matrix"));
+  EXPECT_TRUE(warns(zero, "ColorMatrix1 is a singular matrix"));
   DngBuilder rows;
   rows.set(50722, Tag::numbers(TagType::srational, {1, 2, 3, 2, 4, 6, 0, 0, 1}));
-  EXPECT_TRUE(has(refused(rows), "ColorMatrix2 is a singular matrix"));
+  EXPECT_TRUE(warns(rows, "ColorMatrix2 is a singular matrix"));
+  EXPECT_EQ(read_built(rows).colour.calibrations.size(), 1u) << "the sound one is kept";
   DngBuilder brief;
   brief.set(50721, Tag::numbers(TagType::srational, {1, 0, 0, 0, 1, 0}));
-  EXPECT_TRUE(has(refused(brief), "ColorMatrix1 has 6 values, expected 9 values"));
+  EXPECT_TRUE(warns(brief, "ColorMatrix1 has 6 values, expected 9 values"));
+  DngBuilder forward;
+  forward.set(50964, Tag::numbers(TagType::srational, {-1, 0, 0, 0, 1, 0, 0, 0, 1}));
+  EXPECT_TRUE(warns(forward, "ForwardMatrix1 takes a neutral to a colour that cannot be"));
 }
 
-TEST(DngColour, WhitesThatCannotBeAreRefusedByName) {
+TEST(DngColour, WhitesThatCannotBeAreIgnoredByName) {
   const std::pair<std::uint16_t, Tag> cases[] = {{50728, Tag::numbers(TagType::rational, {0.5, 0, 0.6})},
                                                  {50728, Tag::rationals(TagType::rational, {{1, 2}, {1, 0}, {1, 2}})},
                                                  {50728, Tag::numbers(TagType::srational, {0.5, -1, 0.6})},
@@ -128,8 +137,22 @@ TEST(DngColour, WhitesThatCannotBeAreRefusedByName) {
   for (const auto& [id, tag] : cases) {
     DngBuilder dng;
     dng.set(id, tag);
-    EXPECT_EQ(refused(dng).code, ErrorCode::malformed) << id;
+    EXPECT_TRUE(warns(dng, "holds")) << id;
   }
+}
+
+TEST(DngColour, ANeutralThatNoLightHasGivesWayToTheWhiteThatTheFileStates) {
+  DngBuilder dng;
+  dng.set(50728, Tag::numbers(TagType::rational, {1, 0.01, 1}));
+  dng.set(50729, Tag::numbers(TagType::rational, {0.3457, 0.3585}));
+  EXPECT_EQ(warned(dng),
+            "the as-shot neutral 1 0.01 1 is not the colour of a light under the camera's colour matrices; it is "
+            "ignored, --wb sets another");
+  EXPECT_FALSE(read_built(dng).colour.as_shot_neutral);
+  EXPECT_TRUE(read_built(dng).colour.as_shot_white_xy);
+  dng.remove(50728).set(50729, Tag::numbers(TagType::rational, {0.01, 0.001}));
+  EXPECT_EQ(warned(dng).find("the as-shot white x 0.01 y 0.001 is not"), 0u);
+  EXPECT_FALSE(read_built(dng).colour.as_shot_white_xy);
 }
 
 TEST(DngColour, NoiseProfilesAreOneForAllOrOnePerColour) {
@@ -150,9 +173,10 @@ TEST(DngColour, NoiseProfilesAreOneForAllOrOnePerColour) {
   EXPECT_FALSE(read_built(DngBuilder{}).noise);
   DngBuilder bad;
   bad.set(51041, Tag::numbers(TagType::f64, {std::numeric_limits<double>::quiet_NaN(), 0}));
-  EXPECT_TRUE(has(refused(bad), "NoiseProfile"));
+  EXPECT_TRUE(warns(bad, "NoiseProfile"));
+  EXPECT_FALSE(read_built(bad).noise);
   bad.set(51041, Tag::numbers(TagType::f64, {1, 2, 3, 4}));
-  EXPECT_TRUE(has(refused(bad), "NoiseProfile"));
+  EXPECT_TRUE(warns(bad, "NoiseProfile"));
 }
 
 TEST(DngColour, StandardIlluminantsHaveTheirTemperaturesAndUnknownOnesNone) {

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <limits>
 #include <utility>
 
 #include "tests/capture/read_built.h"
+#include "tests/support/peak_memory.h"
 
 namespace lowlux::test {
 namespace {
@@ -207,28 +209,37 @@ TEST(DngOpcodes, WhatIsNotAppliedIsNamed) {
   EXPECT_EQ(read_built(dng).warnings, expected);
 }
 
-TEST(DngOpcodes, ListsThatClaimMoreThanTheyHoldAreRefused) {
+/// A damaged list is ignored as a whole, whatever sound opcodes it has: nothing of it is left in the frame.
+void expect_ignored(const DngBuilder& dng, const std::string& warning) {
+  EXPECT_EQ(warned(dng), warning + "; the tag is ignored");
+  const RawCorrections corrections = read_built(dng).corrections;
+  EXPECT_TRUE(corrections.gain_maps.empty() && corrections.radial_gains.empty() && corrections.defects.empty());
+}
+
+TEST(DngOpcodes, ListsThatClaimMoreThanTheyHoldAreIgnored) {
   Bytes claims;
   append_u32(claims, 0xFFFFFFFF);
   DngBuilder count;
   count.set(list2, Tag::opaque(claims));
-  EXPECT_TRUE(has(refused(count), "OpcodeList2 is damaged"));
+  expect_ignored(count, "the tag OpcodeList2 is damaged");
 
   Bytes longer;
   for (const std::uint32_t word : {1U, 9U, 0U, 0U, 0xFFFFFFF0U, 1U}) append_u32(longer, word);
   DngBuilder size;
   size.set(list2, Tag::opaque(longer));
-  EXPECT_TRUE(has(refused(size), "OpcodeList2 is damaged"));
+  expect_ignored(size, "the tag OpcodeList2 is damaged");
 
   MapFields points;
   points.points_v = points.points_h = 0x7FFFFFFF;
-  EXPECT_TRUE(has(refused(with(list2, {gain_map(points)})), "GainMap (OpcodeList2) is damaged"));
-  EXPECT_TRUE(has(refused(with(list1, {words(5, {0, 0xFFFFFFFF, 0xFFFFFFFF, 1, 1})})), "FixBadPixelsList"));
-  EXPECT_TRUE(has(refused(with(list3, {vignette({0, 0, 0})})), "FixVignetteRadial"));
-  EXPECT_TRUE(has(refused(with(list1, {words(4, {})})), "FixBadPixelsConstant"));
+  const Opcode sound = vignette({0.1, 0, 0, 0, 0, 0.5, 0.5});
+  expect_ignored(with(list2, {sound, gain_map(points)}), "GainMap of the tag OpcodeList2 is damaged");
+  expect_ignored(with(list1, {words(5, {0, 1, 0, 7, 9}), words(5, {0, 0xFFFFFFFF, 0xFFFFFFFF, 1, 1})}),
+                 "FixBadPixelsList of the tag OpcodeList1 is damaged");
+  expect_ignored(with(list3, {vignette({0, 0, 0})}), "FixVignetteRadial of the tag OpcodeList3 is damaged");
+  expect_ignored(with(list1, {words(4, {})}), "FixBadPixelsConstant of the tag OpcodeList1 is damaged");
 }
 
-TEST(DngOpcodes, MapsThatCannotBeEvaluatedAreRefused) {
+TEST(DngOpcodes, MapsThatCannotBeEvaluatedAreIgnored) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   MapFields gain;
   gain.gain[2] = nan;
@@ -243,9 +254,75 @@ TEST(DngOpcodes, MapsThatCannotBeEvaluatedAreRefused) {
   MapFields negative;
   negative.gain[0] = -1;
   for (const MapFields& fields : {gain, pitch, empty, spacing, origin, negative}) {
-    EXPECT_TRUE(has(refused(with(list2, {gain_map(fields)})), "GainMap (OpcodeList2) is damaged"));
+    expect_ignored(with(list2, {gain_map(fields)}), "GainMap of the tag OpcodeList2 is damaged");
   }
-  EXPECT_TRUE(has(refused(with(list2, {vignette({nan, 0, 0, 0, 0, 0.5, 0.5})})), "FixVignetteRadial"));
+  expect_ignored(with(list2, {vignette({nan, 0, 0, 0, 0, 0.5, 0.5})}),
+                 "FixVignetteRadial of the tag OpcodeList2 is damaged");
+}
+
+TEST(DngOpcodes, AListHolds64OpcodesAndTheFrame64Gains) {
+  const std::vector<Opcode> most(64, words(5, {0, 1, 0, 7, 9}));
+  EXPECT_EQ(read_built(with(list2, most)).corrections.defects.size(), 64u);
+  std::vector<Opcode> more = most;
+  more.push_back(most.front());
+  expect_ignored(with(list2, more), "the tag OpcodeList2 holds more opcodes than any camera writes");
+
+  DngBuilder gains = with(list2, std::vector<Opcode>(64, vignette({0.1, 0, 0, 0, 0, 0.5, 0.5})));
+  EXPECT_EQ(read_built(gains).corrections.radial_gains.size(), 64u);
+  gains.set(list3, opcode_list({gain_map({})}));
+  EXPECT_EQ(warned(gains), "the tag OpcodeList3 asks for more gain maps than any camera writes; the tag is ignored");
+}
+
+TEST(DngOpcodes, DefectsOfAllListsTogetherAreLimited) {
+  // 2^20 points are the most; each list here names half of them and one.
+  std::vector<std::uint32_t> half{0, (1U << 19) + 1, 0};
+  half.resize(half.size() + 2 * ((std::size_t{1} << 19) + 1));
+  DngBuilder dng = with(list1, {words(5, half)});
+  dng.set(list2, opcode_list({words(5, half)}));
+  EXPECT_EQ(warned(dng), "the tag OpcodeList2 names more than a million defects; the tag is ignored");
+  EXPECT_EQ(read_built(dng).corrections.defects.size(), half[1]);
+}
+
+DngBuilder megapixel(std::vector<Opcode> opcodes) {
+  DngBuilder dng = with(list1, opcodes);
+  dng.width = dng.height = 1024;
+  dng.pixels = std::vector<std::uint16_t>(std::size_t{1} << 20, 500);
+  return dng;
+}
+
+TEST(DngOpcodes, ABombOfConstantsTakesNoMoreMemoryThanOne) {
+  const std::vector<std::byte> bomb = megapixel(std::vector<Opcode>(64, words(4, {500, 0}))).build();
+  const std::int64_t before = peak_bytes([] {});
+  const std::int64_t peak = peak_bytes([&] { EXPECT_TRUE(read_bytes(bomb)); });
+  // A list of 2^20 defects takes 16 MiB, and twice as much while it grows and is handed over; the frame and the
+  // decoder's samples take 2 MiB each. 64 times as many defects would take 1 GiB.
+  EXPECT_LT(peak - before, std::int64_t{96} << 20);
+  EXPECT_EQ(read_bytes(bomb)->corrections.defects.size(), std::size_t{1} << 20);
+}
+
+TEST(DngOpcodes, ConstantsThatMatchNothingCostOnePassTogether) {
+  std::vector<Opcode> constants;
+  for (std::uint32_t value = 1000; value < 1064; ++value) constants.push_back(words(4, {value, 0}));
+  const auto seconds = [](const DngBuilder& dng) {
+    const auto bytes = dng.build();
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < 5; ++i) {
+      const auto start = std::chrono::steady_clock::now();
+      EXPECT_TRUE(read_bytes(bytes)->corrections.defects.empty());
+      least = std::min(least, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    }
+    return least;
+  };
+  const double one = seconds(megapixel({constants[0]})), all = seconds(megapixel(constants));
+  EXPECT_LT(all, 3 * one);  // 64 passes over a megapixel took ten times as long as all else
+}
+
+TEST(DngOpcodes, PixelsOfSeveralConstantsAreAllFound) {
+  DngBuilder dng = with(list1, {words(4, {777, 0}), words(4, {65536 + 500, 0}), words(4, {778, 0})});
+  dng.pixels = std::vector<std::uint16_t>(24 * 24, 500);
+  dng.pixels[7] = 777;
+  dng.pixels[30] = 778;
+  EXPECT_EQ(read_built(dng).corrections.defects.size(), 2u);
 }
 
 }  // namespace

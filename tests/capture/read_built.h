@@ -40,6 +40,14 @@ inline Error refused(const DngBuilder& dng, const capture::ReadLimits& limits = 
   return refused(dng.build(), limits);
 }
 
+/// The warning of a file that must be readable with its samples, and have no other.
+inline std::string warned(const DngBuilder& dng) {
+  const RawFrame frame = read_built(dng);
+  EXPECT_EQ(frame.raw.dn.size(), ramp(dng).size());
+  EXPECT_EQ(frame.warnings.size(), 1u);
+  return frame.warnings.empty() ? "" : frame.warnings.front();
+}
+
 inline bool has(const Error& error, const std::string& words) { return error.message.find(words) != std::string::npos; }
 
 /// Samples of a frame, row after row.
