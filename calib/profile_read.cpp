@@ -18,7 +18,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Names = std::initializer_list<const char*>;
 
-constexpr int deepest = 8;  // a profile has six levels
+constexpr int deepest = 8;             // a profile has six levels
+constexpr std::size_t most_keys = 64;  // of one object; the JSON library compares each with all before it
 
 /// Reads one JSON object; finish() complains about keys nobody asked for.
 class Reader {
@@ -189,13 +190,14 @@ class Reader {
   std::set<std::string> asked_;
 };
 
-/// JSON allows a key twice and leaves open which counts: here neither does.
+/// JSON allows a key twice and leaves open which counts: here neither does. After a failure nothing more is kept.
 class KeyCheck {
  public:
   explicit KeyCheck(ProfileFailure& failure) : failure_(failure) {}
 
   /// Whether the value is to be kept.
   bool operator()(int depth, Json::parse_event_t event, const Json& value) {
+    if (failure_.error) return false;
     if (depth > deepest) {
       failure_.set(ErrorCode::malformed, "", "nested deeper than a profile is");
       return false;
@@ -203,7 +205,7 @@ class KeyCheck {
     if (event == Json::parse_event_t::object_start) levels_.emplace_back();
     if (event == Json::parse_event_t::object_end) levels_.pop_back();
     if (event == Json::parse_event_t::key) add(value.get<std::string>());
-    return true;
+    return !failure_.error;
   }
 
  private:
@@ -214,6 +216,9 @@ class KeyCheck {
 
   void add(const std::string& key) {
     levels_.back().last = key;
+    if (levels_.back().keys.size() == most_keys) {
+      return failure_.set(ErrorCode::malformed, "", fmt::format("an object has more than {} keys", most_keys));
+    }
     if (levels_.back().keys.insert(key).second) return;
     std::string path;
     for (const Level& level : levels_) path = joined(path, level.last);
