@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <optional>
 #include <string>
 #include <utility>
+
+#include "isp/base/number_text.h"
 
 namespace lowlux::capture {
 namespace {
@@ -79,10 +80,9 @@ class Loop {
   }
 
   Error none_in_time(const Error& last) const {
-    std::array<char, 32> limit_s{};
-    std::snprintf(limit_s.data(), limit_s.size(), "%g", std::chrono::duration<double>(limits_.timeout).count());
+    const std::string limit_s = number_text(std::chrono::duration<double>(limits_.timeout).count());
     std::string text = count_.damaged > 0 ? "no whole frame" : "no frame";
-    text += std::string(" came within ") + limit_s.data() + " s: " + last.message;
+    text += " came within " + limit_s + " s: " + last.message;
     if (count_.damaged > 0) text += ", " + std::to_string(count_.damaged) + " were damaged";
     return {ErrorCode::insufficient, text + "; --timeout allows for longer exposures", last.where};
   }

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "capture/camera/v4l2_controls.h"
-#include "capture/file/number_text.h"
+#include "isp/base/number_text.h"
 
 namespace lowlux::capture {
 namespace {

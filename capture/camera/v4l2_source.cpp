@@ -6,8 +6,8 @@
 #include "capture/camera/v4l2_controls.h"
 #include "capture/camera/v4l2_exposure.h"
 #include "capture/camera/v4l2_negotiation.h"
-#include "capture/file/number_text.h"
 #include "capture/file/pass_on.h"
+#include "isp/base/number_text.h"
 
 namespace lowlux::capture {
 namespace {

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "capture/file/dng_tags.h"
-#include "capture/file/number_text.h"
 #include "capture/file/pass_on.h"
+#include "isp/base/number_text.h"
 #include "isp/model/camera_colour.h"
 #include "isp/model/colorimetry.h"
 

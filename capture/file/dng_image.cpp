@@ -5,8 +5,8 @@
 #include "capture/file/dng_file.h"
 #include "capture/file/dng_tags.h"
 #include "capture/file/libraw_decoder.h"
-#include "capture/file/number_text.h"
 #include "capture/file/pass_on.h"
+#include "isp/base/number_text.h"
 
 namespace lowlux::capture {
 namespace {

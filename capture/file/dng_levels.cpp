@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "capture/file/dng_tags.h"
-#include "capture/file/number_text.h"
 #include "capture/file/pass_on.h"
+#include "isp/base/number_text.h"
 
 namespace lowlux::capture {
 namespace {

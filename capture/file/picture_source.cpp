@@ -9,10 +9,10 @@
 
 #include "capture/file/dng_tags.h"
 #include "capture/file/file_bytes.h"
-#include "capture/file/number_text.h"
 #include "capture/file/pass_on.h"
 #include "capture/file/picture_colour.h"
 #include "capture/file/picture_light.h"
+#include "isp/base/number_text.h"
 #include "isp/codec/exr.h"
 #include "isp/codec/jpeg.h"
 #include "isp/codec/pfm.h"

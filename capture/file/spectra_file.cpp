@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "capture/file/file_bytes.h"
+#include "isp/base/number_text.h"
 
 namespace lowlux::capture {
 namespace {
@@ -53,7 +54,7 @@ class Table {
         return wrong("holds '" + std::string(cells[i].substr(0, 40)) + "', which is not a finite number");
       }
       if (i == 0 && !columns_[0].empty() && value <= columns_[0].back()) {
-        return wrong("goes from " + std::to_string(columns_[0].back()) + " nm to " + std::to_string(value) +
+        return wrong("goes from " + number_text(columns_[0].back()) + " nm to " + number_text(value) +
                      " nm: wavelengths must rise");
       }
       columns_[i].push_back(value);

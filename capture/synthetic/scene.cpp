@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "isp/base/number_text.h"
 #include "isp/base/random.h"
 #include "isp/model/cie_data.h"
 #include "isp/model/spectral_lift.h"
@@ -23,7 +24,7 @@ tl::unexpected<Error> wrong(const std::string& what, const std::string& where = 
 
 Result<void> check_luminance(double luminance_cd_m2) {
   if (luminance_cd_m2 >= 0 && luminance_cd_m2 <= brightest_cd_m2) return {};
-  return wrong("the luminance of a scene must lie between 0 and 1e12 cd/m2, found " + std::to_string(luminance_cd_m2));
+  return wrong("the luminance of a scene must lie between 0 and 1e12 cd/m2, found " + number_text(luminance_cd_m2));
 }
 
 /// A scene of one size without light, and the radiance of its white.
@@ -100,7 +101,7 @@ Result<Scene> chart_scene(const SceneSetup& setup, const std::vector<isp::NamedS
   for (const isp::NamedSpectrum& patch : reflectances) {
     for (const double value : patch.spectrum.values()) {
       if (value < 0)
-        return wrong("a reflectance is never negative, found " + std::to_string(value), std::string(patch.name));
+        return wrong("a reflectance is never negative, found " + number_text(value), std::string(patch.name));
     }
   }
   auto scene = empty_scene(setup);

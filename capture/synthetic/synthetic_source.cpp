@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
+#include "isp/base/number_text.h"
 #include "isp/base/random.h"
 #include "isp/model/camera_colour.h"
 #include "isp/model/camera_matrix.h"
@@ -103,13 +103,6 @@ Result<void> check_options(const SyntheticOptions& options, const Scene& scene) 
   return {};
 }
 
-/// The error of a mean that the sampler cannot draw; `format` takes it.
-__attribute__((format(printf, 1, 0))) tl::unexpected<Error> beyond_sampler(const char* format, double mean) {
-  char text[176];
-  std::snprintf(text, sizeof text, format, mean);
-  return fail(ErrorCode::invalid_argument, text);
-}
-
 }  // namespace
 
 SyntheticSource::SyntheticSource(Scene scene, isp::NamedSensor sensor, SpectralResponse response,
@@ -172,20 +165,20 @@ Result<void> SyntheticSource::check_means(const std::vector<isp::BlockLevel>& bl
     if (!kept.has(Effect::clipping)) mean_e = std::max(mean_e, largest_mean_e(blocks[i], kept));
   }
   if (mean_e <= poisson_max_mean) return {};
-  return beyond_sampler(
-      "a pixel may collect %.3g e- on average, above the sampler's limit of 1e6, and clipping is left "
-      "out: keep it, or expose less",
-      mean_e);
+  return fail(
+      ErrorCode::invalid_argument,
+      "a pixel may collect " + number_text(mean_e, 3) +
+          " e- on average, above the sampler's limit of 1e6, and clipping is left out: keep it, or expose less");
 }
 
 Result<void> SyntheticSource::check_photons(Executor& executor) const {
   const std::optional<PhotonRows> rows = photon_rows();
   const double photons = rows ? rows->largest_mean_per_s(executor) * options_.exposure.time_s : 0;
   if (photons <= poisson_max_mean) return {};
-  return beyond_sampler(
-      "published photon sampling expects %.3g photons in one bin of wavelengths, above the sampler's "
-      "limit of 1e6: sample physically, or expose less",
-      photons);
+  return fail(ErrorCode::invalid_argument,
+              "published photon sampling expects " + number_text(photons, 3) +
+                  " photons in one bin of wavelengths, above the sampler's limit of 1e6: sample physically, or expose "
+                  "less");
 }
 
 void SyntheticSource::choose_storage() {

@@ -12,6 +12,8 @@
 #include <string_view>
 #include <vector>
 
+#include "isp/base/number_text.h"
+
 namespace lowlux::isp {
 namespace {
 
@@ -69,7 +71,7 @@ Result<Header> take_header(std::string_view& text) {
   header.height = *height;
   header.scale = *scale;
   if (header.scale != 1 && header.scale != -1) {
-    return fail(ErrorCode::unsupported, "the PFM has a scale of " + std::to_string(header.scale) +
+    return fail(ErrorCode::unsupported, "the PFM has a scale of " + number_text(header.scale) +
                                             ", lowlux reads 1 and -1: multiply it into the values");
   }
   return header;

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "isp/base/number_text.h"
 #include "isp/model/noise_budget.h"
 
 namespace lowlux::isp {
@@ -12,11 +12,7 @@ namespace {
 constexpr double largest_luminance_cd_m2 = 1e12;
 constexpr double least = 1e-12;  // of luminances, rates and times: their products stay within double
 
-std::string text_of(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
+std::string text_of(double value) { return number_text(value, 3); }
 
 tl::unexpected<Error> wrong(const std::string& what) { return fail(ErrorCode::invalid_argument, what); }
 

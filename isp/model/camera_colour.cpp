@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "isp/base/number_text.h"
 #include "isp/model/correlated_colour_temperature.h"
 
 namespace lowlux::isp {
@@ -37,10 +38,8 @@ Matrix3 mix(const Matrix3& a, const Matrix3& b, double weight_b) {
   return out;
 }
 
-std::string text_of(const Vector3& v) {
-  return std::to_string(v[0]) + " " + std::to_string(v[1]) + " " + std::to_string(v[2]);
-}
-std::string text_of(const Xy& xy) { return "x " + std::to_string(xy.x) + " y " + std::to_string(xy.y); }
+std::string text_of(const Vector3& v) { return number_text(v[0]) + " " + number_text(v[1]) + " " + number_text(v[2]); }
+std::string text_of(const Xy& xy) { return "x " + number_text(xy.x) + " y " + number_text(xy.y); }
 
 /// Nothing if the figures are usable at all.
 std::optional<Error> fault_of(const CameraColour& colour) {

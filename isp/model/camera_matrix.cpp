@@ -10,6 +10,7 @@
 
 #include <Eigen/Dense>
 
+#include "isp/base/number_text.h"
 #include "isp/model/cie_data.h"
 #include "isp/model/colorimetry.h"
 #include "isp/model/correlated_colour_temperature.h"
@@ -168,7 +169,7 @@ Result<SpectralMatrix> spectral_matrix(const std::array<Spectrum, 3>& sensitivit
   if (!(condition <= worst_condition_number)) {
     return fail(ErrorCode::insufficient,
                 "the sensitivities see fewer than three dimensions of colour: C T^t has the condition number " +
-                    std::to_string(condition));
+                    number_text(condition));
   }
   const Eigen::Matrix3d m = tt * svd.solve(Eigen::Matrix3d::Identity());
   SpectralMatrix out{{}, condition};

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <initializer_list>
 #include <numbers>
 #include <string>
+
+#include "isp/base/number_text.h"
 
 namespace lowlux::isp {
 namespace {
@@ -15,11 +16,7 @@ struct Named {
   double value;
 };
 
-std::string text_of(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", value);
-  return text;
-}
+std::string text_of(double value) { return number_text(value, 6); }
 
 Result<void> check_not_negative(const SensorModel& s) {
   for (const Named& figure : std::initializer_list<Named>{{"read noise", s.read_noise_e},

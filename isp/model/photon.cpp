@@ -7,21 +7,23 @@
 #include <string>
 #include <utility>
 
+#include "isp/base/number_text.h"
+
 namespace lowlux::isp {
 namespace {
 
 constexpr double metre_per_nm = 1e-9;
 
 tl::unexpected<Error> bad_value(const char* what, double value, double wavelength_nm) {
-  return fail(ErrorCode::invalid_argument, std::string(what) + " must not be negative, found " + std::to_string(value) +
-                                               " at " + std::to_string(wavelength_nm) + " nm");
+  return fail(ErrorCode::invalid_argument, std::string(what) + " must not be negative, found " + number_text(value) +
+                                               " at " + number_text(wavelength_nm) + " nm");
 }
 
 // What any light must be: wavelengths above 0, values not below. Spectrum::of has seen to it that all are finite.
 std::optional<tl::unexpected<Error>> not_a_light(const Spectrum& spectrum, const char* what) {
   if (spectrum.wavelengths_nm().front() <= 0) {
     return fail(ErrorCode::invalid_argument, "the wavelengths of a light must be positive, found " +
-                                                 std::to_string(spectrum.wavelengths_nm().front()) + " nm");
+                                                 number_text(spectrum.wavelengths_nm().front()) + " nm");
   }
   for (std::size_t i = 0; i < spectrum.size(); ++i) {
     if (spectrum.values()[i] < 0) return bad_value(what, spectrum.values()[i], spectrum.wavelengths_nm()[i]);
@@ -77,11 +79,11 @@ Result<Spectrum> normalised(const Spectrum& power) {
 Result<PhotonMeans> mean_photons(const Spectrum& power, double power_w, double exposure_s) {
   if (!(power_w >= 0) || !std::isfinite(power_w)) {
     return fail(ErrorCode::invalid_argument,
-                "a power must be finite and not negative, found " + std::to_string(power_w) + " W");
+                "a power must be finite and not negative, found " + number_text(power_w) + " W");
   }
   if (!(exposure_s >= 0) || !std::isfinite(exposure_s)) {
     return fail(ErrorCode::invalid_argument,
-                "an exposure must be finite and not negative, found " + std::to_string(exposure_s) + " s");
+                "an exposure must be finite and not negative, found " + number_text(exposure_s) + " s");
   }
   const Result<Spectrum> shares = normalised(power);
   if (!shares) return tl::make_unexpected(shares.error());
@@ -90,8 +92,8 @@ Result<PhotonMeans> mean_photons(const Spectrum& power, double power_w, double e
     const double energy_j = power_w * exposure_s * shares->values()[i] * out.widths_nm[i];
     out.photons.push_back(energy_j / photon_energy_j(out.wavelengths_nm[i]));
     if (!std::isfinite(out.photons.back())) {
-      return fail(ErrorCode::invalid_argument, "the photons of " + std::to_string(power_w) + " W in " +
-                                                   std::to_string(exposure_s) + " s are beyond what can be counted");
+      return fail(ErrorCode::invalid_argument, "the photons of " + number_text(power_w) + " W in " +
+                                                   number_text(exposure_s) + " s are beyond what can be counted");
     }
   }
   return out;

@@ -7,6 +7,8 @@
 
 #include <boost/math/special_functions/gamma.hpp>
 
+#include "isp/base/number_text.h"
+
 namespace lowlux::isp {
 namespace {
 
@@ -18,7 +20,7 @@ using Policy =
 
 tl::unexpected<Error> outside(const char* what, double found, const char* expected) {
   return fail(ErrorCode::invalid_argument,
-              std::string(what) + " must be " + expected + ", found " + std::to_string(found));
+              std::string(what) + " must be " + expected + ", found " + number_text(found));
 }
 
 std::optional<tl::unexpected<Error>> bad_threshold(int threshold) {

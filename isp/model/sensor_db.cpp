@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <utility>
 
 #include "isp/base/near_match.h"
+#include "isp/base/number_text.h"
 #include "isp/model/noise_budget.h"
 #include "isp/model/text_table.h"
 
@@ -57,12 +58,6 @@ bool is_setting(std::string_view setting, std::string_view wanted) {
 std::string list(const std::vector<std::string_view>& names) {
   std::string text;
   for (const std::string_view name : names) text += (text.empty() ? "" : ", ") + std::string(name);
-  return text;
-}
-
-std::string number_text(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", value);
   return text;
 }
 
@@ -117,13 +112,13 @@ void take_electronics(NamedSensor& out, int row, const SensorFigures& given) {
   const auto black = given.black_level_dn ? given.black_level_dn : t.number(row, "black_level_DN");
   m.black_level_dn = black.value_or(std::exp2(m.bits - 4));
   out.black_level_is_sourced = black.has_value();
-  if (!black) out.assumptions.push_back("black level " + number_text(m.black_level_dn) + " DN");
+  if (!black) out.assumptions.push_back("black level " + number_text(m.black_level_dn, 6) + " DN");
   m.white_level_dn = given.white_level_dn.value_or(t.number(row, "white_level_DN").value_or(largest_code));
   m.system_gain_dn_per_e =
       given.system_gain_dn_per_e ? *given.system_gain_dn_per_e : *t.number(row, "conversion_gain_DN_per_e");
   const auto full_well = given.full_well_e ? given.full_well_e : t.number(row, "full_well_e");
   m.full_well_e = full_well.value_or((m.white_level_dn - m.black_level_dn) / m.system_gain_dn_per_e);
-  if (!full_well) out.assumptions.push_back("full well " + number_text(m.full_well_e) + " e-: the charge at white");
+  if (!full_well) out.assumptions.push_back("full well " + number_text(m.full_well_e, 6) + " e-: the charge at white");
   m.read_noise_e = given.read_noise_e ? *given.read_noise_e : *t.number(row, "read_noise_e");
   m.quantisation =
       given.quantisation.value_or(out.model.name == thesis_sensor ? Quantisation::floor : Quantisation::round);
@@ -200,9 +195,13 @@ Result<void> check_sourced(std::string_view name, int row, const SensorFigures& 
 }
 
 /// The speed in the name of a gain setting.
-std::optional<double> iso_of(const std::string& gain_setting) {
+std::optional<double> iso_of(std::string_view gain_setting) {
+  constexpr std::string_view prefix = "ISO ";
+  if (!gain_setting.starts_with(prefix)) return std::nullopt;
   double iso = 0;
-  return std::sscanf(gain_setting.c_str(), "ISO %lf", &iso) == 1 ? std::optional(iso) : std::nullopt;
+  const auto read =
+      std::from_chars(gain_setting.data() + prefix.size(), gain_setting.data() + gain_setting.size(), iso);
+  return read.ec == std::errc() ? std::optional(iso) : std::nullopt;
 }
 
 void take_camera(NamedSensor& out, const SensorFigures& given) {
@@ -241,7 +240,7 @@ std::vector<std::string_view> options_needed(std::string_view name, std::string_
   std::vector<std::string_view> options;
   for (const UnknownFigure& figure : unknown_electronics(*row, {})) options.push_back(figure.option);
   // The thesis' sensor has a scale of its own.
-  if (name == thesis_sensor || iso_of(std::string(sensors().text(*row, "gain_setting")))) return options;
+  if (name == thesis_sensor || iso_of(sensors().text(*row, "gain_setting"))) return options;
   if (!sensors().number(*row, "pixel_pitch_um")) options.emplace_back("--pixel-pitch");
   if (!sensors().number(*row, "peak_qe")) options.emplace_back("--peak-qe");
   return options;

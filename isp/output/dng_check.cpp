@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <string>
 #include <vector>
+
+#include "isp/base/number_text.h"
 
 namespace lowlux::isp {
 namespace {
@@ -17,12 +18,6 @@ constexpr double smallest_gain = 1e-4;
 
 tl::unexpected<Error> cannot(const char* tag, const std::string& why) {
   return fail(ErrorCode::invalid_argument, std::string("a DNG cannot hold this ") + tag + ": " + why);
-}
-
-std::string text_of(double number) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.10g", number);
-  return text;
 }
 
 std::string text_of(const Rect& r) {
@@ -93,9 +88,10 @@ Result<void> check_black(const RawDn& raw) {
 
 Result<void> check_white(const RawDn& raw) {
   for (const double white : raw.white_dn) {
-    if (!within(white, 1, max_level_dn)) return cannot("WhiteLevel", text_of(white) + ", expected 1 to 65535 DN");
+    if (!within(white, 1, max_level_dn)) return cannot("WhiteLevel", number_text(white) + ", expected 1 to 65535 DN");
     if (raw.layout != SensorLayout::linear_rgb && white != raw.white_dn[0]) {
-      return cannot("WhiteLevel", "a mosaic has one, found " + text_of(raw.white_dn[0]) + " and " + text_of(white));
+      return cannot("WhiteLevel",
+                    "a mosaic has one, found " + number_text(raw.white_dn[0]) + " and " + number_text(white));
     }
   }
   if (!raw.black_tag) return {};
@@ -105,7 +101,8 @@ Result<void> check_white(const RawDn& raw) {
     const double white = std::round(raw.white_dn[black.samples == 3 ? i % 3 : 0]);
     const double level = black.pattern_dn[i] + deltas;
     if (!(white > level)) {
-      return cannot("WhiteLevel", text_of(white) + " DN is not above the black level of " + text_of(level) + " DN");
+      return cannot("WhiteLevel",
+                    number_text(white) + " DN is not above the black level of " + number_text(level) + " DN");
     }
   }
   return {};

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "isp/base/number_text.h"
+
 namespace lowlux::isp {
 namespace {
 
@@ -22,12 +24,7 @@ std::string csv_line(const std::vector<std::string>& cells) {
   return out + '\n';
 }
 
-std::string number(double value) {
-  if (!std::isfinite(value)) return {};
-  char text[32];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
-}
+std::string number(double value) { return std::isfinite(value) ? number_text(value, 17) : std::string(); }
 
 }  // namespace
 

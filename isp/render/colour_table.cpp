@@ -1,4 +1,5 @@
 #include "isp/render/colour_table.h"
+#include "isp/base/number_text.h"
 #include "isp/model/colour_difference.h"
 
 #include <algorithm>
@@ -168,13 +169,13 @@ ColourTableError measure(const ColourTable& t, const RgbMap& map, const Samples&
 }
 
 std::optional<std::string> wrong_with(const ColourTableRequest& r) {
-  if (!(r.limit >= 1e-6 && r.limit <= 1e6)) return "a limit of 1e-6 to 1e6, found " + std::to_string(r.limit);
-  if (!(r.error_bound > 0)) return "an error bound above 0, found " + std::to_string(r.error_bound);
+  if (!(r.limit >= 1e-6 && r.limit <= 1e6)) return "a limit of 1e-6 to 1e6, found " + number_text(r.limit);
+  if (!(r.error_bound > 0)) return "an error bound above 0, found " + number_text(r.error_bound);
   if (r.largest_bytes < std::size_t{512} << 10 || r.largest_bytes > std::size_t{256} << 20) {
     return "512 KiB to 256 MiB, found " + std::to_string(r.largest_bytes) + " bytes";
   }
   for (const double weight : r.rgb_to_xyz[1]) {
-    if (!(weight > 0)) return "primaries that each have luminance, found " + std::to_string(weight);
+    if (!(weight > 0)) return "primaries that each have luminance, found " + number_text(weight);
   }
   return std::nullopt;
 }

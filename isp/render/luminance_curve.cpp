@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "isp/base/number_text.h"
 #include "isp/model/contrast_sensitivity.h"
 
 namespace lowlux::isp {
@@ -68,12 +69,12 @@ Result<void> check(const LuminanceRange& range) {
   const auto positive = [](double v) { return v > 0 && std::isfinite(v); };
   if (!positive(range.source_white_cd_m2) || !positive(range.display_white_cd_m2)) {
     return fail(ErrorCode::invalid_argument, "luminances of white must be positive and finite, found " +
-                                                 std::to_string(range.source_white_cd_m2) + " and " +
-                                                 std::to_string(range.display_white_cd_m2) + " cd/m2");
+                                                 number_text(range.source_white_cd_m2) + " and " +
+                                                 number_text(range.display_white_cd_m2) + " cd/m2");
   }
   if (!(range.display_black_cd_m2 >= 0 && range.display_black_cd_m2 < range.display_white_cd_m2)) {
     return fail(ErrorCode::invalid_argument, "the display's black must be 0 or more and below its white, found " +
-                                                 std::to_string(range.display_black_cd_m2) + " cd/m2");
+                                                 number_text(range.display_black_cd_m2) + " cd/m2");
   }
   return {};
 }

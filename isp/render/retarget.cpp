@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "isp/base/number_text.h"
 #include "isp/model/appearance/cao.h"
 #include "isp/model/appearance/gamut_map.h"
 #include "isp/model/appearance/shin.h"
@@ -125,7 +126,7 @@ Result<void> check(const RetargetOptions& options) {
   const auto positive = [](double v) { return v > 0 && std::isfinite(v); };
   const auto refuse = [](const std::string& what, double found, const std::string& expected) {
     return fail(ErrorCode::invalid_argument,
-                "the " + what + " must be " + expected + ", found " + std::to_string(found) + " cd/m2");
+                "the " + what + " must be " + expected + ", found " + number_text(found) + " cd/m2");
   };
   if (!positive(options.source_cd_m2)) return refuse("source's luminance", options.source_cd_m2, "positive and finite");
   if (!positive(options.display_cd_m2)) {
@@ -133,7 +134,7 @@ Result<void> check(const RetargetOptions& options) {
   }
   if (!(options.display_black_cd_m2 >= 0 && options.display_black_cd_m2 < options.display_cd_m2)) {
     return refuse("display's black", options.display_black_cd_m2,
-                  "0 or more and below its white of " + std::to_string(options.display_cd_m2));
+                  "0 or more and below its white of " + number_text(options.display_cd_m2));
   }
   return {};
 }

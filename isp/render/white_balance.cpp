@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "isp/base/number_text.h"
 #include "isp/model/correlated_colour_temperature.h"
 #include "isp/render/block_statistics.h"
 
@@ -132,7 +133,7 @@ Result<WhiteBalance> white_balance_of_temperature(const CameraColour& colour, do
   if (!xy) {
     return fail(ErrorCode::invalid_argument,
                 "a colour temperature must be in " + rounded(white_min_k) + ".." + rounded(white_max_k) + " K, found " +
-                    std::to_string(kelvin),
+                    number_text(kelvin),
                 "white balance");
   }
   return balance_of_white(colour, *xy, WhiteSource::temperature);

@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/support/comma_locale.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux::isp {
@@ -160,6 +161,11 @@ TEST(Csv, QuotesWhatNeedsIt) {
 TEST(Csv, OfAPlotHasAllDigitsAndEmptyGaps) {
   EXPECT_EQ(csv_of(plot_of({0.1, std::numeric_limits<double>::infinity()})),
             "series,x,y\none,1,0.10000000000000001\none,2,\n");
+}
+
+TEST(Csv, HasDecimalPointsUnderEveryLocale) {
+  const test::CommaLocale comma;
+  EXPECT_EQ(csv_of(plot_of({0.1, 1.5})), "series,x,y\none,1,0.10000000000000001\none,2,1.5\n");
 }
 
 TEST(TextFile, IsWrittenWholeAndNeverOverAnother) {

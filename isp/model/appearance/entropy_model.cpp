@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 
+#include "isp/base/number_text.h"
 #include "isp/model/cie_data.h"
 #include "isp/model/mesopic.h"
 
@@ -65,8 +66,7 @@ Result<Matrix3> inverse_weight(const Matrix3& covariance) {
     return fail(ErrorCode::invalid_argument, "the noise covariance of cone responses must be " + found +
                                                  "; give one of three channels that each have noise");
   };
-  if (!std::isfinite(trace) || !(trace > 0))
-    return refuse("finite with a positive trace, found " + std::to_string(trace));
+  if (!std::isfinite(trace) || !(trace > 0)) return refuse("finite with a positive trace, found " + number_text(trace));
   const Matrix3 s = 3 / trace * covariance;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < i; ++j) {
@@ -93,7 +93,7 @@ Result<EntropyModel> entropy_model(double m, const NodePower& white, const Entro
                      .gamma = options.gamma_fixed.value_or(entropy_weight(m))};
   if (!(model.gamma >= smallest_gamma) || !std::isfinite(model.gamma)) {
     return fail(ErrorCode::invalid_argument,
-                "the weight of entropy must be 1e-12 or more, found " + std::to_string(model.gamma));
+                "the weight of entropy must be 1e-12 or more, found " + number_text(model.gamma));
   }
   if (!(sum_of(white) > 0) || !std::isfinite(sum_of(white))) {
     return fail(ErrorCode::invalid_argument, "the white needs power between 390 and 730 nm to compare colours with");

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "isp/base/number_text.h"
 #include "isp/model/mesopic.h"
 
 namespace lowlux::isp {
@@ -14,7 +15,7 @@ constexpr double most_brightening = 8;
 constexpr double most_component = 1e12;
 
 tl::unexpected<Error> refused(const std::string& what, double found, const std::string& expected) {
-  return fail(ErrorCode::invalid_argument, what + " must be " + expected + ", found " + std::to_string(found));
+  return fail(ErrorCode::invalid_argument, what + " must be " + expected + ", found " + number_text(found));
 }
 
 bool is_luminance(double value) { return value >= least_cd_m2 && value <= most_cd_m2; }
@@ -49,8 +50,8 @@ Result<SeenScene> seen_scene(const ViewingConditions& conditions) {
   const auto to_d65 = xy && excites_all_cones(white) ? bradford_adaptation(*xy, white_d65) : std::nullopt;
   if (!to_d65) {
     return fail(ErrorCode::invalid_argument,
-                "the white is no light's colour: it must excite all cones and the rods; found XYZ " +
-                    std::to_string(w.x) + " " + std::to_string(w.y) + " " + std::to_string(w.z));
+                "the white is no light's colour: it must excite all cones and the rods; found XYZ " + number_text(w.x) +
+                    " " + number_text(w.y) + " " + number_text(w.z));
   }
   SeenScene scene;
   scene.white = white;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "isp/base/number_text.h"
 #include "isp/model/mesopic.h"
 
 namespace lowlux::isp {
@@ -78,8 +79,8 @@ Result<ShinTable> read_shin_table(std::string_view text, std::string name) {
     if (!node) return tl::make_unexpected(node.error());
     const double before = table.nodes.empty() ? 0 : table.nodes.back().e;
     if (!(node->e > before)) {
-      return malformed(
-          line, "E must be positive and rise, found " + std::to_string(node->e) + " after " + std::to_string(before));
+      return malformed(line,
+                       "E must be positive and rise, found " + number_text(node->e) + " after " + number_text(before));
     }
     if (table.nodes.size() == most_nodes) {
       return fail(ErrorCode::too_large, "a table of coefficients may have 1000 lines, this one has more");
