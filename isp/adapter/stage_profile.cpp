@@ -1,8 +1,11 @@
 #include "isp/adapter/stage_profile.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <utility>
 
@@ -48,15 +51,35 @@ double dark_doubling_of(const GainProfile& gain) {
   return temperature_unknown ? std::numeric_limits<double>::infinity() : gain.sensor->dark_doubling_c;
 }
 
+/// The text of a regular file, one byte more than a profile has at most. Opening any other kind must not wait for
+/// whoever writes to it.
+Result<std::string> text_of_profile(const std::string& file) {
+  const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  struct stat status {};
+  const bool regular = fd >= 0 && fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
+  std::string text(regular ? calib::largest_profile_bytes + 1 : 0, '\0');
+  std::size_t have = 0;
+  ssize_t got = 1;
+  while (got > 0 && have < text.size()) {
+    got = ::read(fd, text.data() + have, text.size() - have);
+    if (got < 0 && errno == EINTR)
+      got = 1;
+    else if (got > 0)
+      have += static_cast<std::size_t>(got);
+  }
+  if (fd >= 0) close(fd);
+  if (fd >= 0 && !regular) return fail(ErrorCode::unreadable, "the profile is not a regular file", file);
+  if (fd < 0 || got < 0) return fail(ErrorCode::unreadable, "the profile cannot be read", file);
+  text.resize(have);
+  return text;
+}
+
 }  // namespace
 
 Result<StageProfile> StageProfile::read(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return fail(ErrorCode::unreadable, "the profile cannot be read", file);
-  std::string text(calib::largest_profile_bytes + 1, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  auto profile = calib::parse_profile(text);
+  const auto text = text_of_profile(file);
+  if (!text) return tl::make_unexpected(text.error());
+  auto profile = calib::parse_profile(*text);
   if (!profile) return fail(profile.error().code, profile.error().message, file);
   auto out = of(*std::move(profile));
   if (!out) out.error().where = file;

@@ -1,6 +1,8 @@
 #include "isp/adapter/stage_profile.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstdint>
@@ -12,6 +14,7 @@
 
 #include "calib/profile_io.h"
 #include "calib/profile_use.h"
+#include "tests/support/scratch_directory.h"
 
 namespace lowlux::isp {
 namespace {
@@ -160,6 +163,19 @@ TEST(StageProfile, RefusesSensorsOfAnotherKindAndSettingsWithoutIso) {
   const auto picture = StageProfile::read(LOWLUX_TESTDATA "/pictures/kodim05.png");
   ASSERT_FALSE(picture);
   EXPECT_NE(picture.error().where.find("kodim05"), std::string::npos);
+}
+
+TEST(StageProfile, OnlyRegularFilesAreProfiles) {
+  const test::ScratchDirectory scratch;
+  ASSERT_EQ(mkfifo(scratch.file("fifo").c_str(), 0600), 0);
+  alarm(60);  // ends a program that waits for a writer
+  for (const std::string& file : {scratch.file("fifo"), scratch.path(), std::string("/dev/null")}) {
+    const auto read = StageProfile::read(file);
+    ASSERT_FALSE(read) << file;
+    EXPECT_EQ(read.error().code, ErrorCode::unreadable);
+    EXPECT_EQ(read.error().message, "the profile is not a regular file");
+  }
+  alarm(0);
 }
 
 TEST(StageProfile, WithoutGainsInElectronsThereAreNoFigures) {
