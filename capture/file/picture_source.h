@@ -30,9 +30,9 @@ struct ScenePicture {
 /// else as sRGB. EXIF orientation is honoured. Floats: linear; primaries of the OpenEXR chromaticities or of a linear
 /// ICC profile, else Rec. 709. Alpha is dropped.
 ///
-/// Errors: the file or its format (codec); NaN, infinite, or negative values that are not small, with their pixel;
-/// profiles of other kinds. Components above -0.05 of what 99.9 % of the pixels stay below are taken for the ringing
-/// of a filter: they become 0, with a warning that counts them.
+/// Errors: the file or its format (codec); NaN and infinite values, with their pixel; profiles of other kinds. Negative
+/// values are not radiance: they become 0, with a warning that states their number and their fraction of the light;
+/// above a twentieth of it they are an error.
 /// @param executor  its threads share the rows
 Result<ScenePicture> read_picture(const std::string& path, Executor& executor, const isp::DecodeLimits& limits = {});
 

@@ -76,29 +76,61 @@ TEST(ReadPicture, LightBeyondFloatsIsRefusedWithItsPixel) {
   EXPECT_TRUE(has(refused(pfm_of(linear_row({{1, 1, 1}, {top, top, top}}))), "column 1, row 0"));
 }
 
-/// 2000 pixels of 0.5 and a few bright ones: the bright end is 0.5, the bound -0.0005.
 SceneLinear mostly_half(float one_value) {
   SceneLinear picture(2000, 1);
   for (auto& plane : picture.plane) std::fill_n(plane.data(), plane.size(), 0.5F);
-  picture.plane[0].at(7, 0) = 1000;
   picture.plane[2].at(9, 0) = one_value;
   return picture;
 }
 
-TEST(ReadPicture, SmallNegativeValuesBecomeZeroWithAWarningThatCountsThem) {
-  SceneLinear picture = mostly_half(-0.0249F);
-  picture.plane[1].at(9, 0) = -1e-6F;
+TEST(ReadPicture, NegativeValuesBecomeZeroWithAWarningThatStatesTheirFraction) {
+  SceneLinear picture = mostly_half(-0.06F);
+  picture.plane[1].at(9, 0) = -0.03F;
   const ScenePicture scene = read_good(exr_of(picture));
   ASSERT_EQ(scene.warnings.size(), 1u);
-  EXPECT_EQ(scene.warnings[0].rfind("2 slightly negative values", 0), 0u) << scene.warnings[0];
+  // 2 of 6000 samples; 0.09 of 5998 / 2.
+  EXPECT_EQ(scene.warnings[0],
+            "0.0333 % of the samples are negative, down to -0.06, 0.003 % of its light: they become 0");
   expect_near(at(scene.xyz, 9), rec709 * Vector3{0.5, 0, 0}, float_tolerance);
 }
 
-TEST(ReadPicture, LargerNegativeValuesAreRefusedWithTheirPixel) {
-  for (const float value : {-0.0251F, -1.0F}) {
-    EXPECT_TRUE(has(refused(exr_of(mostly_half(value))), "blue of the pixel at column 9, row 0 is -"));
+/// Black and white bars, four pixels wide, four times as large by a Lanczos-3 filter.
+SceneLinear enlarged_bars() {
+  constexpr int size = 64, factor = 4;
+  const auto sinc = [](double x) { return x == 0 ? 1 : std::sin(std::numbers::pi * x) / (std::numbers::pi * x); };
+  SceneLinear picture(size * factor, 1);
+  for (int x = 0; x < picture.width(); ++x) {
+    const double place = (x + 0.5) / factor - 0.5;
+    double sum = 0;
+    for (int i = static_cast<int>(std::floor(place)) - 2; i <= static_cast<int>(std::floor(place)) + 3; ++i) {
+      const bool white = (i + size) / 4 % 2 == 1;
+      if (white && std::fabs(place - i) < 3) sum += sinc(place - i) * sinc((place - i) / 3);
+    }
+    for (auto& plane : picture.plane) plane.at(x, 0) = static_cast<float>(sum);
   }
-  EXPECT_TRUE(has(refused(exr_of(linear_row({{-1e-6F, 0, 0}, {0, 0, 0}}))), "red"));  // nothing is bright here
+  return picture;
+}
+
+// What is right: the ringing of any filter in use passes, even at its most; what was never light does not.
+TEST(ReadPicture, RingingOfFiltersIsClippedAndADifferenceOfPicturesRefused) {
+  const ScenePicture bars = read_good(exr_of(enlarged_bars()));
+  ASSERT_EQ(bars.warnings.size(), 1u);
+  EXPECT_NE(bars.warnings[0].find("3.5 % of its light"), std::string::npos) << bars.warnings[0];
+
+  SceneLinear difference(64, 1);
+  for (auto& plane : difference.plane) {
+    for (int x = 0; x < 64; ++x) plane.at(x, 0) = x % 2 == 0 ? 0.01F : -0.01F;
+  }
+  EXPECT_TRUE(has(refused(exr_of(difference)),
+                  "50 % of the samples are negative, down to -0.01, 50 % of its light and more than the 5 % that"));
+  EXPECT_TRUE(has(refused(exr_of(linear_row({{-1e-6F, 0, 0}, {0, 0, 0}}))), "100 % of its light"));
+}
+
+TEST(ReadPicture, ATwentiethOfTheLightIsTheMostThatIsClipped) {
+  // One sample of -v among 5999 of 0.5.
+  const float limit = 0.05F / 0.95F * 0.5F * 5999;
+  EXPECT_TRUE(read(exr_of(mostly_half(-0.999F * limit))));
+  EXPECT_TRUE(has(refused(exr_of(mostly_half(-1.001F * limit))), "clip the picture at 0 if that is meant"));
 }
 
 TEST(ReadPicture, FlippedBitsAreAnErrorOrAFinitePicture) {

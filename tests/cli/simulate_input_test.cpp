@@ -236,10 +236,10 @@ TEST_F(SimulateInput, ReflectancesBelowZeroOrAboveTwoAreRefused) {
 TEST_F(SimulateInput, PicturesThatAreNoLightAreRefused) {
   SceneLinear nan = grey(0.5F), negative = grey(0.5F), infinite = grey(0.5F);
   nan.plane[1].at(3, 2) = std::numeric_limits<float>::quiet_NaN();
-  negative.plane[0].at(5, 7) = -0.5F;
+  std::fill_n(negative.plane[0].data(), negative.plane[0].size(), -0.5F);
   infinite.plane[2].at(1, 1) = std::numeric_limits<float>::infinity();
   for (const auto& [scene, clue] : {std::pair{&nan, "green of the pixel at column 3, row 2"},
-                                    {&negative, "red of the pixel at column 5, row 7"},
+                                    {&negative, "33.3 % of its light"},
                                     {&infinite, "blue of the pixel at column 1, row 1"}}) {
     expect_refused(picture("in.pfm", pfm_of(*scene)), {}, 1, clue);
     const auto exr = test::encoded([&, from = scene](std::FILE* out) { return isp::encode_exr(*from, {}, {}, out); });
