@@ -1,48 +1,33 @@
 #include "capture/file/decoder_process.h"
 
+#include <dlfcn.h>
 #include <fcntl.h>
-#include <pthread.h>
+#include <link.h>
+#include <spawn.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
-#include <sys/time.h>
-#include <sys/types.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <csignal>
-#include <cstdio>
-#include <cstring>
-#include <new>
+#include <cstdlib>
+#include <filesystem>
 #include <optional>
-#include <string>
 #include <system_error>
 #include <utility>
+
+#include "capture/file/decoder_program.h"
+#include "capture/file/pass_on.h"
+#include "isp/base/number_text.h"
 
 namespace lowlux::capture {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define LOWLUX_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
-#define LOWLUX_SANITIZED 1
-#endif
-#endif
-#if defined(LOWLUX_SANITIZED)
-constexpr bool can_limit_address_space = false;  // shadow memory takes terabytes of it
-#else
-constexpr bool can_limit_address_space = true;
-#endif
-
-// Samples as decoders hold them (LibRaw: up to four 16-bit values a pixel), their tables, and the heap's own needs.
-constexpr std::uint64_t decoder_bytes_per_pixel = 8;
-constexpr std::uint64_t decoder_base_bytes = std::uint64_t{256} << 20;
-constexpr int wall_clock_factor = 5;
-constexpr int result_file = 3;  // descriptor of the result in the child
+constexpr const char* decoder_file = "lowlux-decode";
 
 class FileDescriptor {
  public:
@@ -58,15 +43,18 @@ class FileDescriptor {
   int fd_;
 };
 
-bool write_all(int fd, const void* data, std::size_t bytes, std::uint64_t offset) {
-  const char* at = static_cast<const char*>(data);
-  while (bytes > 0) {
-    const ssize_t done = pwrite(fd, at, bytes, static_cast<off_t>(offset));
+/// An empty file in memory, of a number that the child has no other use for; -1 if there can be none.
+int memory_file(const char* name) {
+  const FileDescriptor low(memfd_create(name, MFD_CLOEXEC));
+  return low.get() < 0 ? -1 : fcntl(low.get(), F_DUPFD_CLOEXEC, std::max(result_descriptor, file_descriptor) + 1);
+}
+
+bool write_all(int fd, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t done = write(fd, bytes.data(), bytes.size());
     if (done < 0 && errno == EINTR) continue;
     if (done <= 0) return false;
-    at += done;
-    offset += static_cast<std::uint64_t>(done);
-    bytes -= static_cast<std::size_t>(done);
+    bytes = bytes.subspan(static_cast<std::size_t>(done));
   }
   return true;
 }
@@ -84,113 +72,99 @@ bool read_all(int fd, void* data, std::size_t bytes, std::uint64_t offset) {
   return true;
 }
 
-/// Address space this process uses now [bytes]; 0 if the system does not tell.
-std::uint64_t address_space_in_use() {
-  const FileDescriptor statm(open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
-  char text[64] = {};
-  if (statm.get() < 0 || read(statm.get(), text, sizeof text - 1) <= 0) return 0;
-  return std::strtoull(text, nullptr, 10) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+Error system_error(const std::string& what, int number) {
+  return {ErrorCode::unreadable, what + ": " + std::system_category().message(number), {}};
 }
 
-struct ChildLimits {
-  rlim_t cpu_s;
-  unsigned wall_s;
-  rlim_t address_space;  // RLIM_INFINITY: not limited
-  rlim_t file_bytes;
+/// Starts a program with all signals as at the start of a program, and nothing but its two files.
+Result<pid_t> start(const std::vector<std::string>& command, int file, int result) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  for (int standard = 0; standard < 3; ++standard) {
+    posix_spawn_file_actions_addopen(&actions, standard, "/dev/null", O_RDWR, 0);
+  }
+  posix_spawn_file_actions_adddup2(&actions, result, result_descriptor);
+  posix_spawn_file_actions_adddup2(&actions, file, file_descriptor);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t all, none;
+  sigfillset(&all);
+  sigemptyset(&none);
+  posix_spawnattr_setsigdefault(&attributes, &all);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
+  std::vector<char*> words;
+  words.reserve(command.size() + 1);
+  for (const std::string& word : command) words.push_back(const_cast<char*>(word.c_str()));
+  words.push_back(nullptr);
+  pid_t child = 0;
+  const int failed = posix_spawn(&child, words[0], &actions, &attributes, words.data(), environ);
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  if (failed != 0) return tl::make_unexpected(system_error("the decoder " + command[0] + " cannot start", failed));
+  return child;
+}
+
+/// How a child ended.
+struct Ended {
+  std::optional<int> status;  // nullopt if another part of the program has collected it already
+  rusage used{};
+  double elapsed_s = 0;
 };
 
-ChildLimits child_limits(const ReadLimits& limits, std::size_t file_bytes) {
-  const double cpu_s = std::clamp(std::ceil(limits.max_decode_cpu_s), 1.0, 86400.0);
-  const std::uint64_t pixels = static_cast<std::uint64_t>(std::max<std::int64_t>(limits.max_pixels, 0));
-  ChildLimits out{};
-  out.cpu_s = static_cast<rlim_t>(cpu_s);
-  out.wall_s = static_cast<unsigned>(cpu_s) * wall_clock_factor;
-  out.file_bytes = sizeof(DecodedHeader) + pixels * 3 * sizeof(std::uint16_t);
-  const std::uint64_t in_use = address_space_in_use();
-  out.address_space = RLIM_INFINITY;
-  if (can_limit_address_space && in_use > 0) {
-    out.address_space = in_use + decoder_base_bytes + file_bytes + pixels * decoder_bytes_per_pixel;
-  }
+Ended wait_for(pid_t child, std::chrono::steady_clock::time_point begin) {
+  Ended out;
+  int status = 0;
+  pid_t found = -1;
+  do found = wait4(child, &status, 0, &out.used);
+  while (found < 0 && errno == EINTR);
+  if (found == child) out.status = status;
+  out.elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return out;
 }
 
-void lower_limit(int resource, rlim_t soft, rlim_t hard) {
-  struct rlimit current {};
-  if (getrlimit(static_cast<__rlimit_resource>(resource), &current) != 0) return;
-  struct rlimit wanted {};
-  wanted.rlim_max = std::min(hard, current.rlim_max);
-  wanted.rlim_cur = std::min(soft, wanted.rlim_max);
-  setrlimit(static_cast<__rlimit_resource>(resource), &wanted);
+std::string seconds_text(double seconds) { return number_text(std::round(10 * seconds) / 10) + " s"; }
+
+double cpu_s(const rusage& used) {
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(used.ru_utime) + seconds(used.ru_stime);
 }
 
-/// Cuts what the child could do by accident: signal handlers and descriptors of the parent, output, time, memory.
-void confine(const ChildLimits& limits, int result) {
-  for (int number = 1; number < NSIG; ++number) signal(number, SIG_DFL);
-  sigset_t none;
-  sigemptyset(&none);
-  pthread_sigmask(SIG_SETMASK, &none, nullptr);
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
-  prctl(PR_SET_DUMPABLE, 0);
-
-  if (dup2(result, result_file) < 0) _exit(1);
-  const int nothing = open("/dev/null", O_RDWR);
-  for (int standard = 0; standard < result_file; ++standard) dup2(nothing, standard);
-  close_range(result_file + 1, ~0U, 0);
-
-  lower_limit(RLIMIT_CORE, 0, 0);
-  lower_limit(RLIMIT_CPU, limits.cpu_s, limits.cpu_s + 1);
-  lower_limit(RLIMIT_FSIZE, limits.file_bytes, limits.file_bytes);
-  if (limits.address_space != RLIM_INFINITY) lower_limit(RLIMIT_AS, limits.address_space, limits.address_space);
-  // Also what ends a child that waits for a lock some other thread of the parent held when the child was made.
-  alarm(limits.wall_s);
-}
-
-[[noreturn]] void run_child(std::span<const std::byte> file, const ReadLimits& limits, const ChildLimits& child,
-                            int result, DecodeFunction decode) {
-  confine(child, result);
-  DecodeSink sink(result_file);
-  try {
-    decode(file, limits, sink);
-  } catch (const std::bad_alloc&) {
-    DecodedHeader header{};
-    header.outcome = DecodeOutcome::out_of_memory;
-    sink.finish(header);
-  } catch (...) {
-    _exit(1);
+/// The Error of a child that a signal ended.
+Error ended_by(int number, const Ended& ended, const ReadLimits& limits) {
+  if (number == SIGXCPU || (number == SIGKILL && cpu_s(ended.used) >= limits.max_decode_cpu_s)) {
+    return {ErrorCode::malformed,
+            "the decoder was stopped after " + seconds_text(cpu_s(ended.used)) +
+                " of processor time, the limit: the file is damaged or far too large",
+            {}};
   }
-  _exit(0);
-}
-
-/// Status of the ended child; nullopt if another part of the program has collected it already.
-std::optional<int> wait_for(pid_t child) {
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0) {
-    if (errno != EINTR) return std::nullopt;
+  if (number == SIGALRM) {
+    return {ErrorCode::malformed,
+            "the decoder was stopped after " + seconds_text(ended.elapsed_s) + ", of which it used the processor for " +
+                seconds_text(cpu_s(ended.used)) + ": the computer is overloaded, or the decoder has a fault",
+            {}};
   }
-  return status;
+  if (number == SIGKILL) {
+    return {ErrorCode::too_large,
+            "the decoder was killed after " + seconds_text(ended.elapsed_s) + " with " +
+                std::to_string(ended.used.ru_maxrss >> 10) +
+                " MiB in use: the system is short of memory, or an operator ended it; read fewer files at a time",
+            {}};
+  }
+  return {ErrorCode::malformed,
+          "the decoder crashed on this file (signal " + std::to_string(number) +
+              "): the file is damaged or the decoder has a fault",
+          {}};
 }
 
-std::string seconds_text(double seconds) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g s", seconds);
-  return text;
-}
-
-/// The Error of a child that did not end by itself; nullopt if it did.
-std::optional<Error> abnormal_end(int status, const ReadLimits& limits) {
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return std::nullopt;
-  if (WIFSIGNALED(status)) {
-    const int number = WTERMSIG(status);
-    if (number == SIGXCPU || number == SIGALRM || number == SIGKILL) {
-      return Error{ErrorCode::malformed,
-                   "the decoder was stopped after the time limit of " + seconds_text(limits.max_decode_cpu_s) +
-                       ": the file is damaged or far too large",
-                   {}};
-    }
-    return Error{ErrorCode::malformed,
-                 "the decoder crashed on this file (signal " + std::to_string(number) +
-                     "): the file is damaged or the decoder has a fault",
-                 {}};
+/// The Error of a child that did not end as it should; nullopt if it did.
+std::optional<Error> abnormal_end(const Ended& ended, const ReadLimits& limits) {
+  if (!ended.status || (WIFEXITED(*ended.status) && WEXITSTATUS(*ended.status) == 0)) return std::nullopt;
+  if (WIFSIGNALED(*ended.status)) return ended_by(WTERMSIG(*ended.status), ended, limits);
+  if (WEXITSTATUS(*ended.status) == wrong_protocol_exit) {
+    return Error{ErrorCode::unreadable, "the decoder is of another version of lowlux: install lowlux again", {}};
   }
   return Error{
       ErrorCode::malformed, "the decoder failed on this file: the file is damaged or the decoder has a fault", {}};
@@ -257,43 +231,49 @@ Result<DecodedRaw> collect(int result, const ReadLimits& limits) {
   return raw;
 }
 
-}  // namespace
-
-bool DecodeSink::write_samples(const std::uint16_t* samples, std::size_t count) {
-  const std::size_t bytes = count * sizeof *samples;
-  if (!write_all(file_, samples, bytes, offset_)) return false;
-  offset_ += bytes;
-  return true;
+/// Folder of the library or program that holds this code.
+Result<std::filesystem::path> own_folder() {
+  Dl_info info{};
+  void* found = nullptr;
+  const bool known = dladdr1(reinterpret_cast<void*>(&own_folder), &info, &found, RTLD_DL_LINKMAP) != 0;
+  const char* const name = known ? static_cast<const link_map*>(found)->l_name : "";  // "" is the program itself
+  std::error_code failed;
+  const auto file = std::filesystem::canonical(*name != '\0' ? name : "/proc/self/exe", failed);
+  if (failed) return fail(ErrorCode::unreadable, "the folder of lowlux's library is not known: is /proc mounted?");
+  return file.parent_path();
 }
 
-void DecodeSink::finish(const DecodedHeader& header) const { write_all(file_, &header, sizeof header, 0); }
+}  // namespace
 
-bool decoder_memory_is_limited() { return can_limit_address_space; }
-
-Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits, DecodeFunction decode) {
-  const FileDescriptor result(memfd_create("lowlux-decoded", MFD_CLOEXEC));
-  if (result.get() < 0) {
-    return fail(ErrorCode::unreadable,
-                std::string("no memory file for the decoder: ") + std::system_category().message(errno));
+Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits,
+                                    std::vector<std::string> command) {
+  const FileDescriptor result(memory_file("lowlux-decoded"));
+  std::optional<FileDescriptor> copy(std::in_place, memory_file("lowlux-raw"));
+  if (result.get() < 0 || copy->get() < 0) {
+    return tl::make_unexpected(system_error("no memory file for the decoder", errno));
   }
-  const ChildLimits child = child_limits(limits, file.size());
-
-  // No handler of this process may run in the child before it has been reset there.
-  sigset_t all, before;
-  sigfillset(&all);
-  pthread_sigmask(SIG_SETMASK, &all, &before);
-  const pid_t pid = fork();
-  if (pid == 0) run_child(file, limits, child, result.get(), decode);
-  const int fork_error = errno;
-  pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  if (pid < 0) {
-    return fail(ErrorCode::unreadable,
-                std::string("the decoder process cannot start: ") + std::system_category().message(fork_error));
+  if (!write_all(copy->get(), file)) {
+    return fail(ErrorCode::too_large, "there is not enough memory to hand this file to the decoder");
   }
-  if (const auto status = wait_for(pid)) {
-    if (auto error = abnormal_end(*status, limits)) return tl::make_unexpected(*std::move(error));
-  }
+  command.push_back(std::to_string(decode_protocol));
+  command.push_back(std::to_string(limits.max_pixels));
+  command.push_back(number_text(limits.max_decode_cpu_s));
+  const auto begin = std::chrono::steady_clock::now();
+  const auto child = start(command, copy->get(), result.get());
+  if (!child) return tl::make_unexpected(child.error());
+  copy.reset();
+  if (auto error = abnormal_end(wait_for(*child, begin), limits)) return tl::make_unexpected(*std::move(error));
   return collect(result.get(), limits);
+}
+
+Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits) {
+  auto folder = own_folder();
+  if (!folder) return pass_on(folder);
+  for (const auto& place : {*folder / decoder_file, *folder / "lowlux" / decoder_file}) {
+    if (access(place.c_str(), X_OK) == 0) return decode_contained(file, limits, {place.string()});
+  }
+  return fail(ErrorCode::unreadable, std::string("the program ") + decoder_file + " is neither in " + folder->string() +
+                                         " nor in lowlux/ there: install lowlux again");
 }
 
 }  // namespace lowlux::capture

@@ -93,11 +93,11 @@ std::vector<const TiffEntry*> harmful_tags(const DngFile& dng) {
 
 Result<DecodedRaw> decode_dng(const DngFile& dng, std::span<const std::byte> bytes, const ReadLimits& limits) {
   const auto harmful = harmful_tags(dng);
-  if (harmful.empty()) return decode_contained(bytes, limits, decode_with_libraw);
+  if (harmful.empty()) return decode_contained(bytes, limits);
   std::vector<std::byte> without(bytes.begin(), bytes.end());
   for (const TiffEntry* entry : harmful)
     std::fill_n(without.begin() + static_cast<std::ptrdiff_t>(entry->place), 2, std::byte{0});
-  return decode_contained(without, limits, decode_with_libraw);
+  return decode_contained(without, limits);
 }
 
 Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, const ReadLimits& limits) {
@@ -123,7 +123,7 @@ Result<RawFrame> read_bytes(std::span<const std::byte> bytes, const ReadLimits& 
   if (const std::string kind = other_kind(bytes); !kind.empty()) {
     return fail(ErrorCode::unsupported, "this is " + kind + ", not a raw file");
   }
-  auto decoded = decode_contained(bytes, limits, decode_with_libraw);
+  auto decoded = decode_contained(bytes, limits);
   if (!decoded) return tl::make_unexpected(not_decoded(bytes, std::move(decoded.error())));
   auto frame = frame_of_decoder(*std::move(decoded));
   if (frame) ignore_impossible_white(frame->colour, frame->warnings);

@@ -166,12 +166,6 @@ void unpack(LibRaw& libraw, DecodedHeader& h, DecodeSink& sink) {
 
 }  // namespace
 
-std::string decoder_name() {
-  const int number = LibRaw::versionNumber();
-  return "LibRaw " + std::to_string(number >> 16) + "." + std::to_string(number >> 8 & 255) + "." +
-         std::to_string(number & 255);
-}
-
 void decode_with_libraw(std::span<const std::byte> file, const ReadLimits& limits, DecodeSink& sink) {
   auto header = std::make_unique<DecodedHeader>();
   DecodedHeader& h = *header;
