@@ -3,12 +3,25 @@
 #include <dlfcn.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <system_error>
 
 #include <fmt/format.h>
 
+extern "C" const char lowlux_module_stamp[];
+
 namespace lowlux::cli {
+namespace {
+
+/// The function of a module that is open; nullptr if the module was not made with this command.
+void* function_of(void* loaded, const Module& module) {
+  const void* stamp = dlsym(loaded, "lowlux_module_stamp");
+  const bool ours = stamp != nullptr && std::strcmp(static_cast<const char*>(stamp), lowlux_module_stamp) == 0;
+  return ours ? dlsym(loaded, module.function.c_str()) : nullptr;
+}
+
+}  // namespace
 
 Result<void*> load_module(const Module& module) {
   std::error_code failed;
@@ -22,9 +35,10 @@ Result<void*> load_module(const Module& module) {
       said += fmt::format("{}{}", said.empty() ? "" : "; ", reason != nullptr ? reason : "no reason given");
       continue;
     }
-    void* found = dlsym(loaded, module.function.c_str());
-    if (found != nullptr) return found;
-    said += fmt::format("{} is of another version", module.file);
+    if (void* found = function_of(loaded, module); found != nullptr) return found;
+    dlclose(loaded);
+    said += fmt::format("{}{} is of another build of lowlux: build or install it again", said.empty() ? "" : "; ",
+                        (place / module.file).string());
   }
   std::replace(said.begin(), said.end(), '\n', ' ');
   return fail(ErrorCode::unreadable,
