@@ -145,6 +145,13 @@ CameraColour read_colour(const DngFile& dng, const TiffDirectory& raw_image, std
   return colour;
 }
 
+Result<void> check_colour_matrices(const DngFile& dng, const TiffDirectory& raw_image) {
+  for (const TagName name : tag::color_matrix) {
+    if (auto matrix = read_matrix(dng, raw_image, name); !matrix) return pass_on(matrix);
+  }
+  return {};
+}
+
 void ignore_impossible_white(CameraColour& colour, std::vector<std::string>& warnings) {
   if (colour.calibrations.empty()) return;
   const std::string why =

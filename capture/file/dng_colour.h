@@ -14,6 +14,10 @@ namespace lowlux::capture {
 /// A tag with a value that is not a number, or a matrix without an inverse, is ignored with a warning that names it.
 CameraColour read_colour(const DngFile& dng, const TiffDirectory& raw_image, std::vector<std::string>& warnings);
 
+/// The error of a damaged ColorMatrix: where neither the other one nor the decoder's table serves, the picture needs
+/// it.
+Result<void> check_colour_matrices(const DngFile& dng, const TiffDirectory& raw_image);
+
 /// Removes an as-shot white that no light can have under the calibrations, with a warning.
 void ignore_impossible_white(CameraColour& colour, std::vector<std::string>& warnings);
 

@@ -78,6 +78,9 @@ Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std:
     frame.colour.calibrations.push_back(*table);
     frame.colour.source = CameraColour::Source::decoder_table;
   }
+  if (frame.colour.calibrations.empty() && frame.raw.layout != SensorLayout::monochrome) {
+    if (auto sound = check_colour_matrices(dng, *chosen->directory); !sound) return pass_on(sound);
+  }
   read_corrections(dng, *chosen->directory, frame);
   ignore_impossible_white(frame.colour, frame.warnings);
   return frame;

@@ -91,7 +91,7 @@ bool warns(const DngBuilder& dng, const std::string& words) {
 }
 
 TEST(DngColour, MatricesThatAreNotNumbersAreIgnoredByName) {
-  for (const std::uint16_t id : {50721, 50723, 50964}) {
+  for (const std::uint16_t id : {50722, 50723, 50964}) {
     DngBuilder dng;
     std::vector<std::pair<double, double>> values;
     values.reserve(9);
@@ -103,28 +103,40 @@ TEST(DngColour, MatricesThatAreNotNumbersAreIgnoredByName) {
     dng.set(id, Tag::rationals(TagType::srational, values));
     EXPECT_TRUE(warns(dng, "holds a value that is not a number")) << id;
   }
-  DngBuilder floating;
-  std::vector<double> values = some_matrix;
-  values[8] = std::numeric_limits<double>::quiet_NaN();
-  floating.set(50721, Tag::numbers(TagType::f32, values));
-  EXPECT_TRUE(warns(floating, "ColorMatrix1"));
-  EXPECT_TRUE(read_built(floating).colour.calibrations.empty());
 }
 
 TEST(DngColour, SingularAndTruncatedMatricesAreIgnoredByName) {
-  DngBuilder zero;
-  zero.set(50721, Tag::numbers(TagType::srational, std::vector<double>(9, 0)));
-  EXPECT_TRUE(warns(zero, "ColorMatrix1 is a singular matrix"));
   DngBuilder rows;
   rows.set(50722, Tag::numbers(TagType::srational, {1, 2, 3, 2, 4, 6, 0, 0, 1}));
   EXPECT_TRUE(warns(rows, "ColorMatrix2 is a singular matrix"));
   EXPECT_EQ(read_built(rows).colour.calibrations.size(), 1u) << "the sound one is kept";
   DngBuilder brief;
-  brief.set(50721, Tag::numbers(TagType::srational, {1, 0, 0, 0, 1, 0}));
-  EXPECT_TRUE(warns(brief, "ColorMatrix1 has 6 values, expected 9 values"));
+  brief.set(50723, Tag::numbers(TagType::srational, {1, 0, 0, 0, 1, 0}));
+  EXPECT_TRUE(warns(brief, "CameraCalibration1 has 6 values, expected 9 values"));
   DngBuilder forward;
   forward.set(50964, Tag::numbers(TagType::srational, {-1, 0, 0, 0, 1, 0, 0, 0, 1}));
   EXPECT_TRUE(warns(forward, "ForwardMatrix1 takes a neutral to a colour that cannot be"));
+}
+
+TEST(DngColour, ADamagedColourMatrixIsAnErrorUnlessAnotherOneServes) {
+  std::vector<double> values = some_matrix;
+  values[8] = std::numeric_limits<double>::quiet_NaN();
+  DngBuilder dng;
+  dng.set(50721, Tag::numbers(TagType::f32, values));
+  const Error error = refused(dng);
+  EXPECT_EQ(error.code, ErrorCode::malformed);
+  EXPECT_TRUE(has(error, "ColorMatrix1 holds a value that is not a number"));
+  dng.set(50721, Tag::numbers(TagType::srational, std::vector<double>(9, 0)));
+  EXPECT_TRUE(has(refused(dng), "ColorMatrix1 is a singular matrix"));
+
+  dng.set(50722, Tag::numbers(TagType::srational, some_matrix));
+  EXPECT_TRUE(warns(dng, "ColorMatrix1 is a singular matrix"));
+  EXPECT_EQ(read_built(dng).colour.calibrations.size(), 1u);
+  dng.remove(50722);
+  for (const std::uint16_t id : {272, 50708}) dng.set(id, Tag::text("Canon EOS 5D Mark II"));
+  dng.set(271, Tag::text("Canon"));
+  EXPECT_TRUE(warns(dng, "ColorMatrix1 is a singular matrix"));
+  EXPECT_EQ(read_built(dng).colour.source, CameraColour::Source::decoder_table);
 }
 
 TEST(DngColour, WhitesThatCannotBeAreIgnoredByName) {

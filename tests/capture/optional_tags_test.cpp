@@ -24,7 +24,6 @@ const std::vector<OptionalTag>& optional_tags() {
   static const std::vector<OptionalTag> tags = {
       {.id = 50718, .name = "DefaultScale", .sound = {1, 1}, .only_positive = true},
       {.id = 50720, .name = "DefaultCropSize", .sound = {24, 24}, .only_positive = true},
-      {.id = 50721, .name = "ColorMatrix1", .sound = matrix, .only_positive = true},
       {.id = 50722, .name = "ColorMatrix2", .sound = matrix, .only_positive = true},
       {.id = 50723, .name = "CameraCalibration1", .sound = matrix, .only_positive = true},
       {.id = 50727, .name = "AnalogBalance", .sound = {1, 1, 1}, .only_positive = true},

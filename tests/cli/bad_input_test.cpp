@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <random>
 #include <string>
@@ -114,6 +115,21 @@ TEST_F(BadInput, SingularMatrices) {
   DngBuilder dng = small_dng();
   dng.set(colour_matrix_1, Tag::numbers(TagType::srational, std::vector<double>(9, 1.0)));
   expect_refused(develop(dng.build()), "ColorMatrix1");
+}
+
+TEST_F(BadInput, DamagedTagsThatThePictureCanDoWithoutAreWarningsThatHelp) {
+  const std::pair<DngBuilder, std::string> cases[] = {
+      {small_dng().set(50728, Tag::numbers(TagType::rational, {1, 0.01, 1})), "--wb sets another"},
+      {small_dng().set(51041, Tag::numbers(TagType::f64, {std::nan(""), 0})), "NoiseProfile"},
+      {small_dng().set(51009, Tag::opaque(std::vector<std::byte>(9, std::byte{255}))), "OpcodeList2"},
+      {small_dng().set(34853, Tag::numbers(TagType::u32, {4e9})), ""}};
+  for (const auto& [dng, clue] : cases) {
+    const test::ProcessResult result = develop(dng.build());
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_NE(result.err.find(clue), std::string::npos) << result.err;
+    EXPECT_TRUE(scratch_.holds("out.png"));
+    std::filesystem::remove(scratch_.file("out.png"));
+  }
 }
 
 TEST_F(BadInput, MissingMatricesSayThatCameraRgbIsStillPossible) {
