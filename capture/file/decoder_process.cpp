@@ -136,8 +136,8 @@ double cpu_s(const rusage& used) {
 Error ended_by(int number, const Ended& ended, const ReadLimits& limits) {
   if (number == SIGXCPU || (number == SIGKILL && cpu_s(ended.used) >= limits.max_decode_cpu_s)) {
     return {ErrorCode::malformed,
-            "the decoder was stopped after " + seconds_text(cpu_s(ended.used)) +
-                " of processor time, the limit: the file is damaged or far too large",
+            "the decoder was stopped at its limit of " + seconds_text(std::ceil(limits.max_decode_cpu_s)) +
+                " of processor time: the file is damaged or far too large",
             {}};
   }
   if (number == SIGALRM) {

@@ -79,7 +79,7 @@ TEST(DecoderProcess, SignalsThatThisProcessBlocksOrIgnoresEndTheDecoder) {
   const auto result = loop();
   sigaction(SIGXCPU, &handled, nullptr);
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  EXPECT_TRUE(says(result, "of processor time, the limit")) << message_of(result);
+  EXPECT_TRUE(says(result, "limit of 1 s of processor time")) << message_of(result);
 }
 
 TEST(DecoderProcess, AnExceptionAndAnEarlyExitBecomeErrors) {
@@ -90,7 +90,7 @@ TEST(DecoderProcess, AnExceptionAndAnEarlyExitBecomeErrors) {
 
 TEST(DecoderProcess, AnEndlessLoopIsStoppedAtTheTimeLimit) {
   const auto result = loop();
-  EXPECT_TRUE(says(result, "the decoder was stopped after 1 s of processor time, the limit")) << message_of(result);
+  EXPECT_TRUE(says(result, "the decoder was stopped at its limit of 1 s of processor time")) << message_of(result);
 }
 
 TEST(DecoderProcess, ADecoderThatWaitsForeverIsStoppedByTheClock) {
