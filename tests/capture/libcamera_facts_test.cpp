@@ -1,5 +1,6 @@
 #include "capture/camera/libcamera_facts.h"
 
+#include <array>
 #include <cstdint>
 #include <limits>
 
@@ -77,7 +78,7 @@ TEST(LibcameraFacts, PlaceholdersOfZeroAreNoFacts) {
                                         .analogue_gain = 0.0F,
                                         .digital_gain = 0.0F,
                                         .colour_gains = {{0, 0}},
-                                        .colour_matrix = {{}},
+                                        .colour_matrix = std::array<float, 9>{},
                                         .colour_temperature_k = 0},
                                        12);
   EXPECT_FALSE(facts.exposure_s || facts.analogue_gain || facts.digital_gain || facts.colour_gains ||
