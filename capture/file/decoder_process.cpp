@@ -238,7 +238,9 @@ Result<std::filesystem::path> own_folder() {
   const bool known = dladdr1(reinterpret_cast<void*>(&own_folder), &info, &found, RTLD_DL_LINKMAP) != 0;
   const char* const name = known ? static_cast<const link_map*>(found)->l_name : "";  // "" is the program itself
   std::error_code failed;
-  const auto file = std::filesystem::canonical(*name != '\0' ? name : "/proc/self/exe", failed);
+  // The link of the program holds its folder also when its file has been replaced since.
+  const auto file = *name != '\0' ? std::filesystem::canonical(name, failed)
+                                  : std::filesystem::read_symlink("/proc/self/exe", failed);
   if (failed) return fail(ErrorCode::unreadable, "the folder of lowlux's library is not known: is /proc mounted?");
   return file.parent_path();
 }
