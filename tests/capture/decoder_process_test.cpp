@@ -30,15 +30,6 @@ bool says(const Result<DecodedRaw>& result, const std::string& words) {
   return message_of(result).find(words) != std::string::npos;
 }
 
-/// An endless loop at a limit of a second. A busy computer may not give it that second within five: then again.
-Result<DecodedRaw> loop() {
-  Result<DecodedRaw> result = run("loop", {.max_decode_cpu_s = 1});
-  for (int again = 0; again < 8 && says(result, "the computer is overloaded"); ++again) {
-    result = run("loop", {.max_decode_cpu_s = 1});
-  }
-  return result;
-}
-
 TEST(DecoderProcess, SamplesArriveInOrder) {
   const auto raw = run("count up");
   ASSERT_TRUE(raw) << message_of(raw);
@@ -76,7 +67,7 @@ TEST(DecoderProcess, SignalsThatThisProcessBlocksOrIgnoresEndTheDecoder) {
   }, handled{};
   ignore.sa_handler = SIG_IGN;
   sigaction(SIGXCPU, &ignore, &handled);
-  const auto result = loop();
+  const auto result = run("processor time", {.max_decode_cpu_s = 1});
   sigaction(SIGXCPU, &handled, nullptr);
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
   EXPECT_TRUE(says(result, "limit of 1 s of processor time")) << message_of(result);
@@ -89,14 +80,16 @@ TEST(DecoderProcess, AnExceptionAndAnEarlyExitBecomeErrors) {
 }
 
 TEST(DecoderProcess, AnEndlessLoopIsStoppedAtTheTimeLimit) {
-  const auto result = loop();
-  EXPECT_TRUE(says(result, "the decoder was stopped at its limit of 1 s of processor time")) << message_of(result);
+  EXPECT_EQ(message_of(run("processor time", {.max_decode_cpu_s = 1})),
+            "the decoder was stopped at its limit of 1 s of processor time: the file is damaged or far too large");
+  // A busy computer may not give it that second within five by the clock.
+  const auto result = run("loop", {.max_decode_cpu_s = 1});
+  EXPECT_TRUE(says(result, "the decoder was stopped")) << message_of(result);
 }
 
 TEST(DecoderProcess, ADecoderThatWaitsForeverIsStoppedByTheClock) {
   const auto result = run("wait", {.max_decode_cpu_s = 1});
-  EXPECT_TRUE(says(result, "the decoder was stopped after 5 s, of which it used the processor for 0 s"))
-      << message_of(result);
+  EXPECT_TRUE(says(result, ", of which it used the processor for 0 s")) << message_of(result);
 }
 
 // The kernel ends by SIGKILL who takes the last of the memory: that is neither the time limit nor the file's fault.
@@ -104,7 +97,7 @@ TEST(DecoderProcess, AKilledDecoderIsNotReportedAsATimeLimitOrADamagedFile) {
   const auto result = run("killed");
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, ErrorCode::too_large);
-  EXPECT_EQ(message_of(result).find("the decoder was killed after 0 s with "), 0u) << message_of(result);
+  EXPECT_EQ(message_of(result).find("the decoder was killed after "), 0u) << message_of(result);
   EXPECT_TRUE(says(result, " MiB in use: the system is short of memory"));
   EXPECT_FALSE(says(result, "limit") || says(result, "damaged"));
 }

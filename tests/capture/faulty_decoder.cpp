@@ -96,6 +96,7 @@ constexpr Decoder decoders[] = {
     {"count up", count_up},
     {"abort", [](Bytes, const ReadLimits&, DecodeSink&) { std::abort(); }},
     {"segmentation fault", [](Bytes, const ReadLimits&, DecodeSink&) { raise(SIGSEGV); }},
+    {"processor time", [](Bytes, const ReadLimits&, DecodeSink&) { raise(SIGXCPU); }},
     {"killed", [](Bytes, const ReadLimits&, DecodeSink&) { raise(SIGKILL); }},
     {"exception", [](Bytes, const ReadLimits&, DecodeSink&) { throw std::runtime_error("x"); }},
     {"exit 0", [](Bytes, const ReadLimits&, DecodeSink&) { _exit(0); }},
