@@ -22,11 +22,11 @@ class OnlyTarget {
   }
 };
 
-/// Those of the processor that the kernels are compiled for: SSSE3 and better on x86.
+/// Targets of the processor that the kernels are compiled for: SSSE3 and better on x86.
 inline std::vector<std::int64_t> kernel_targets() {
   std::vector<std::int64_t> out;
   for (const std::int64_t target : {HWY_AVX3, HWY_AVX2, HWY_SSE4, HWY_SSSE3}) {
-    if ((hwy::SupportedTargets() & target) != 0) out.push_back(target);
+    if ((hwy::SupportedTargets() & HWY_TARGETS & target) != 0) out.push_back(target);
   }
   return out;
 }
