@@ -1,11 +1,14 @@
 #pragma once
 
+#include <atomic>
+#include <exception>
 #include <memory>
 #include <type_traits>
 
 namespace lowlux {
 
-/// Runs the n parts of one piece of work, at most width() at a time. Nothing is allocated and nothing thrown.
+/// Runs the n parts of one piece of work, at most width() at a time. Nothing is allocated and nothing thrown: parts
+/// that may throw go through for_each_index or for_each_band.
 class Executor {
  public:
   virtual ~Executor() = default;
@@ -54,11 +57,26 @@ constexpr RowBand row_band(int height, int count, int index) {
   return {edge(index), edge(index + 1)};
 }
 
-/// Calls work(i) for each i in 0..count-1.
+/// Calls work(i) for each i in 0..count-1. The first exception that work throws is thrown again when all threads are
+/// done; parts that have not begun by then are left out.
 template <class Work>
 void for_each_index(Executor& executor, int count, Work&& work) {
-  executor.run(
-      count, [](void* context, int index) { (*static_cast<std::remove_reference_t<Work>*>(context))(index); }, &work);
+  struct Call {
+    std::remove_reference_t<Work>* work;
+    std::atomic<bool> failed{false};
+    std::exception_ptr failure;
+  } call{&work};
+  const auto part = [](void* context, int index) {
+    Call& c = *static_cast<Call*>(context);
+    if (c.failed.load(std::memory_order_relaxed)) return;
+    try {
+      (*c.work)(index);
+    } catch (...) {
+      if (!c.failed.exchange(true)) c.failure = std::current_exception();
+    }
+  };
+  executor.run(count, part, &call);
+  if (call.failure) std::rethrow_exception(call.failure);
 }
 
 /// Calls work(band, index) for executor.width() bands of `height` rows.

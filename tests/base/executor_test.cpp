@@ -5,6 +5,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <new>
 #include <set>
 #include <thread>
 #include <vector>
@@ -41,6 +42,24 @@ TEST(PoolExecutor, RunsEachTaskOnceOverManyRounds) {
       pool.run(
           width + 2, [](void* context, int i) { ++(*static_cast<std::vector<std::atomic<int>>*>(context))[i]; }, &runs);
       for (const auto& count : runs) ASSERT_EQ(count, 1);
+    }
+  }
+}
+
+// Whether one part has no memory or all have none, on whichever thread: the caller has the exception, and the next call
+// works as ever.
+TEST(PoolExecutor, WhatAPartThrowsReachesTheCaller) {
+  for (const int width : {1, 2, 4}) {
+    PoolExecutor pool(width);
+    for (int failing = -1; failing < 8; ++failing) {
+      std::atomic<int> done{0};
+      const auto work = [&](int i) {
+        if (failing < 0 || i == failing) throw std::bad_alloc();
+        ++done;
+      };
+      EXPECT_THROW(for_each_index(pool, 8, work), std::bad_alloc) << width << " threads, part " << failing;
+      EXPECT_LT(done, 8);
+      EXPECT_NO_THROW(for_each_band(pool, 16, [&](RowBand, int) { ++done; }));
     }
   }
 }
