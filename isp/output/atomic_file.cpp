@@ -1,12 +1,14 @@
 #include "isp/output/atomic_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
 #include <filesystem>
+#include <mutex>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -37,7 +39,10 @@ tl::unexpected<Error> cannot_write(const std::string& path, int cause) {
     case EPERM:
       return fail(ErrorCode::unwritable, "cannot write " + name + ": no permission to write in " + directory_of(path),
                   path);
+    case EROFS:
+      return fail(ErrorCode::unwritable, "cannot write " + name + ": the file system is read-only", path);
     case ENOSPC:
+    case EDQUOT:
       return fail(ErrorCode::unwritable, "cannot write " + name + ": the disk is full", path);
     default:
       break;
@@ -73,53 +78,145 @@ std::string resolve(const std::string& path) {
   return failed ? path : target.string();
 }
 
+/// The temporary files of this process. Whoever makes, publishes or removes one holds the mutex.
+struct Unfinished {
+  std::mutex mutex;
+  std::set<std::string> names;
+  std::set<std::string> swept;  // directories without remnants of dead processes
+  unsigned made = 0;
+};
+
+Unfinished& unfinished() {
+  static Unfinished all;
+  return all;
+}
+
+/// Of the temporary files of this host: a lock may not be seen by other hosts that have the directory too.
+std::string temporary_prefix() {
+  char host[256] = {};
+  gethostname(host, sizeof host - 1);
+  return std::string(".lowlux-") + host + "-";
+}
+
+bool has_name(int descriptor) {
+  struct stat found {};
+  return fstat(descriptor, &found) == 0 && found.st_nlink > 0;
+}
+
+/// Removes temporary files whose process is dead: nothing holds their lock.
+void sweep(const std::string& directory, const std::string& prefix) {
+  std::error_code failed;
+  for (fs::directory_iterator entry(directory, failed), end; !failed && entry != end; entry.increment(failed)) {
+    const std::string name = entry->path().filename().string();
+    if (!name.starts_with(prefix) || !name.ends_with(".part")) continue;
+    const int descriptor = open(entry->path().c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (descriptor < 0) continue;
+    if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 && has_name(descriptor)) unlink(entry->path().c_str());
+    close(descriptor);
+  }
+}
+
+struct Temporary {
+  std::string name;
+  int descriptor = -1;
+  int cause = 0;  // errno where there is none
+};
+
+/// A new locked file. Another process may take one for dead between its making and its locking; then the next name is
+/// tried.
+Temporary make_temporary(const std::string& directory) {
+  Unfinished& all = unfinished();
+  const std::lock_guard guard(all.mutex);
+  const std::string prefix = temporary_prefix();
+  if (all.swept.insert(directory).second) sweep(directory, prefix);
+  for (;;) {
+    Temporary out;
+    out.name = directory + "/" + prefix + std::to_string(getpid()) + "-" + std::to_string(all.made++) + ".part";
+    out.descriptor = open(out.name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (out.descriptor < 0 && errno == EEXIST) continue;  // of another process with this number
+    if (out.descriptor < 0) {
+      out.cause = errno;
+      return out;
+    }
+    const bool taken_for_dead = flock(out.descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+    if (!taken_for_dead && has_name(out.descriptor)) {
+      all.names.insert(out.name);
+      return out;
+    }
+    close(out.descriptor);
+  }
+}
+
+/// @return 0 or an errno
+int sync_directory(const std::string& directory) {
+  const int descriptor = open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return errno;
+  const int cause = fsync(descriptor) == 0 || errno == EINVAL ? 0 : errno;  // EINVAL: not offered for directories
+  close(descriptor);
+  return cause;
+}
+
 }  // namespace
 
-AtomicFile::AtomicFile(std::string path, std::string target, Overwrite overwrite)
-    : path_(std::move(path)), target_(std::move(target)), overwrite_(overwrite) {}
+AtomicFile::AtomicFile(std::string path, std::string target, Overwrite overwrite, Sync sync)
+    : path_(std::move(path)), target_(std::move(target)), overwrite_(overwrite), sync_(sync) {}
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
     : path_(std::move(other.path_)),
       target_(std::move(other.target_)),
       temporary_(std::exchange(other.temporary_, {})),
       overwrite_(other.overwrite_),
+      sync_(other.sync_),
+      locked_(std::exchange(other.locked_, -1)),
       file_(std::move(other.file_)) {}
 
 AtomicFile::~AtomicFile() {
-  if (!temporary_.empty()) unlink(temporary_.c_str());
+  if (!temporary_.empty()) {
+    Unfinished& all = unfinished();
+    const std::lock_guard guard(all.mutex);
+    unlink(temporary_.c_str());
+    all.names.erase(temporary_);
+  }
+  if (locked_ >= 0) close(locked_);
 }
 
-Result<AtomicFile> AtomicFile::create(const std::string& path, Overwrite overwrite) {
+Result<AtomicFile> AtomicFile::create(const std::string& path, Overwrite overwrite, Sync sync) {
   if (auto free = check_target(path, overwrite); !free) return tl::make_unexpected(free.error());
-  static std::atomic<unsigned> counter{0};  // tells this process's files apart; nothing else depends on it
-  AtomicFile out(path, resolve(path), overwrite);
-  const std::string stem = directory_of(out.target_) + "/.lowlux-" + std::to_string(getpid()) + "-";
-  int descriptor = -1;
-  std::string name;
-  do {
-    name = stem + std::to_string(counter.fetch_add(1)) + ".part";
-    descriptor = open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  } while (descriptor < 0 && errno == EEXIST);  // left by a killed process of the same number
-  if (descriptor < 0) return cannot_write(path, errno);
-  out.temporary_ = std::move(name);
-  out.file_.reset(fdopen(descriptor, "w+b"));
+  AtomicFile out(path, resolve(path), overwrite, sync);
+  Temporary made = make_temporary(directory_of(out.target_));
+  if (made.descriptor < 0) return cannot_write(path, made.cause);
+  out.temporary_ = std::move(made.name);
+  out.locked_ = made.descriptor;
+  const int second = fcntl(made.descriptor, F_DUPFD_CLOEXEC, 0);
+  if (second >= 0) out.file_.reset(fdopen(second, "w+b"));
   if (out.file_ == nullptr) {
     const int cause = errno;
-    close(descriptor);
+    if (second >= 0) close(second);
     return cannot_write(path, cause);
   }
   return out;
 }
 
-Result<void> AtomicFile::commit() {
+void AtomicFile::abandon_all() {
+  Unfinished& all = unfinished();
+  all.mutex.lock();  // for good
+  for (const std::string& name : all.names) unlink(name.c_str());
+}
+
+Result<void> AtomicFile::close_file() {
   errno = 0;
-  const bool sound = std::ferror(file_.get()) == 0 && std::fflush(file_.get()) == 0;
+  const bool sound =
+      std::ferror(file_.get()) == 0 && std::fflush(file_.get()) == 0 && (sync_ == Sync::no || fsync(locked_) == 0);
   const int flush_cause = errno;
   // Network file systems report a full disk on closing.
-  if (std::fclose(file_.release()) != 0 || !sound) {
-    const int cause = flush_cause != 0 ? flush_cause : errno;
-    return cannot_write(path_, cause != 0 ? cause : EIO);
-  }
+  if (std::fclose(file_.release()) == 0 && sound) return {};
+  const int cause = flush_cause != 0 ? flush_cause : errno;
+  return cannot_write(path_, cause != 0 ? cause : EIO);
+}
+
+Result<void> AtomicFile::publish() {
+  Unfinished& all = unfinished();
+  const std::lock_guard guard(all.mutex);
   int cause = 0;
   if (overwrite_ == Overwrite::yes) {
     cause = std::rename(temporary_.c_str(), target_.c_str()) == 0 ? 0 : errno;
@@ -128,8 +225,16 @@ Result<void> AtomicFile::commit() {
   }
   if (cause == EEXIST) return taken(path_);
   if (cause != 0) return cannot_write(path_, cause);
-  temporary_.clear();
+  all.names.erase(std::exchange(temporary_, {}));
   return {};
+}
+
+Result<void> AtomicFile::commit() {
+  return close_file().and_then([&] { return publish(); }).and_then([&]() -> Result<void> {
+    const int cause = sync_ == Sync::yes ? sync_directory(directory_of(target_)) : 0;
+    if (cause != 0) return cannot_write(path_, cause);
+    return {};
+  });
 }
 
 }  // namespace lowlux::isp

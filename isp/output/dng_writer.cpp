@@ -124,7 +124,7 @@ Result<void> write_dng(const RawFrame& frame, const std::string& path, const Dng
   };
   return check_dng_frame(frame)
       .and_then([&] { return check_dng_size(static_cast<std::int64_t>(frame.raw.dn.size())); })
-      .and_then([&] { return AtomicFile::create(path, options.overwrite); })
+      .and_then([&] { return AtomicFile::create(path, options.overwrite, options.sync); })
       .and_then(
           [&](AtomicFile out) { return encode(frame, options, out.file()).and_then([&] { return out.commit(); }); })
       .map_error(located);

@@ -13,6 +13,7 @@ struct DngWriteOptions {
   Overwrite overwrite = Overwrite::no;
   std::string software = "lowlux";  // with its version; replaces what the frame names
   std::string description;          // ImageDescription: how the frame was made; printable ASCII is kept
+  Sync sync = Sync::no;
 };
 
 /// Writes a raw frame as DNG 1.4, whole or not at all: 16 bits, uncompressed, in adjacent strips of about 1 MB. Mosaics

@@ -164,7 +164,7 @@ Result<void> write_picture(const Picture& picture, OutputSpace space, const Fram
   const auto format = format_of(path);
   if (!format) return tl::make_unexpected(format.error());
   return check_writable(*format, sample_type(picture), space)
-      .and_then([&] { return AtomicFile::create(path, options.overwrite); })
+      .and_then([&] { return AtomicFile::create(path, options.overwrite, options.sync); })
       .and_then([&](AtomicFile out) {
         return encode(picture, *format, metadata_for(picture, space, info, options), options, executor, out.file())
             .and_then([&] { return out.commit(); });

@@ -32,6 +32,7 @@ Result<void> check_writable(FileFormat format, SampleType type, OutputSpace spac
 
 struct WriteOptions {
   Overwrite overwrite = Overwrite::no;
+  Sync sync = Sync::no;
   std::string software = "lowlux";              // with its version, for the metadata
   std::optional<double> white_luminance_cd_m2;  // of (1, 1, 1); OpenEXR keeps it
   JpegOptions jpeg;

@@ -2,11 +2,15 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "isp/output/publish.h"
@@ -70,6 +74,65 @@ TEST(AtomicFile, AFileThatAppearsMeanwhileIsKept) {
   ASSERT_FALSE(committed);
   EXPECT_EQ(committed.error().code, ErrorCode::exists);
   EXPECT_EQ(scratch.read("a.txt"), "someone else's");
+}
+
+// A process that is killed lets go of its lock, and the next one that writes there removes what it left. Files of
+// processes that live, of other hosts and of other programs stay.
+TEST(AtomicFile, RemnantsOfKilledProcessesAreRemoved) {
+  const ScratchDirectory scratch;
+  std::array<int, 2> ready{};
+  ASSERT_EQ(pipe(ready.data()), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    const auto first = AtomicFile::create(scratch.file("a.txt"), Overwrite::no);
+    const auto second = AtomicFile::create(scratch.file("b.txt"), Overwrite::yes);
+    if (first && second) std::ignore = write(ready[1], "", 1);
+    for (;;) pause();
+  }
+  char byte = 1;
+  ASSERT_EQ(read(ready[0], &byte, 1), 1);
+  ASSERT_EQ(scratch.names().size(), 2U);
+  scratch.write(".lowlux-another.host-1-0.part", "");
+  scratch.write("lowlux.part", "");
+  const auto sweep = [&] {  // as a process that has written nothing here yet
+    const pid_t other = fork();
+    if (other == 0) _exit(write_words(scratch.file("c.txt"), "words", Overwrite::yes) ? 0 : 1);
+    int status = -1;
+    waitpid(other, &status, 0);
+    return status;
+  };
+  EXPECT_EQ(sweep(), 0);
+  EXPECT_EQ(scratch.names().size(), 5U);  // nothing of the living
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  EXPECT_EQ(sweep(), 0);
+  EXPECT_EQ(scratch.names(), (std::vector<std::string>{".lowlux-another.host-1-0.part", "c.txt", "lowlux.part"}));
+  for (const int end : ready) close(end);
+}
+
+TEST(AtomicFile, AbandonedFilesAreGone) {
+  const ScratchDirectory scratch;
+  const pid_t child = fork();
+  if (child == 0) {
+    const auto out = AtomicFile::create(scratch.file("a.txt"), Overwrite::no);
+    if (!out || scratch.names().size() != 1) _exit(1);
+    AtomicFile::abandon_all();
+    _exit(0);
+  }
+  int status = -1;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+  EXPECT_TRUE(scratch.names().empty());
+}
+
+TEST(AtomicFile, SyncedFilesAreWhole) {
+  const ScratchDirectory scratch;
+  auto out = AtomicFile::create(scratch.file("a.txt"), Overwrite::no, Sync::yes);
+  ASSERT_TRUE(out);
+  std::fputs("words", out->file());
+  ASSERT_TRUE(out->commit());
+  EXPECT_EQ(scratch.read("a.txt"), "words");
+  EXPECT_EQ(scratch.names().size(), 1U);
 }
 
 TEST(AtomicFile, OfManyWritersOfOneNameExactlyOneWins) {
