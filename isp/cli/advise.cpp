@@ -10,6 +10,7 @@
 #include "isp/cli/advise_camera.h"
 #include "isp/cli/advise_report.h"
 #include "isp/cli/exit_code.h"
+#include "isp/cli/print.h"
 #include "isp/cli/report.h"
 #include "isp/output/report.h"
 
@@ -18,11 +19,11 @@ namespace {
 
 int failed(const std::string& file, const Error& error) {
   if (error.code == ErrorCode::invalid_argument) {
-    fmt::print(stderr, "{}\n",
-               one_line("lowlux info: " + error.message + (error.where.empty() ? "" : " (" + error.where + ")")));
+    print_err("{}\n",
+              one_line("lowlux info: " + error.message + (error.where.empty() ? "" : " (" + error.where + ")")));
     return exit_usage;
   }
-  fmt::print(stderr, "{}\n", error_line(file, error));
+  print_err("{}\n", error_line(file, error));
   return exit_failed;
 }
 
@@ -46,9 +47,9 @@ int run_advise(const InfoArgs& args) {
     if (!written) return failed(args.advise.report, written.error());
   }
   if (args.json) {
-    fmt::print("{}\n", advice_json(*asked, *advice));
+    print_out("{}\n", advice_json(*asked, *advice));
   } else {
-    fmt::print("{}", advice_text(*asked, *advice));
+    print_out("{}", advice_text(*asked, *advice));
   }
   return exit_done;
 }

@@ -14,6 +14,7 @@
 #include "isp/cli/calibration.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/output_place.h"
+#include "isp/cli/print.h"
 #include "isp/cli/profile_file.h"
 #include "isp/cli/report.h"
 #include "isp/cli/version.h"
@@ -90,17 +91,17 @@ int run_calibrate_colour(const std::vector<std::string>& words) {
   if (!outcome) {
     const std::string& input = args.chart.empty() ? args.camera : args.chart;
     const std::string& where = outcome.error().where;
-    fmt::print(stderr, "{}\n", error_line(where.empty() ? input : where, outcome.error()));
-    if (args.json) fmt::print("{}\n", error_json(input, outcome.error()));
+    print_err("{}\n", error_line(where.empty() ? input : where, outcome.error()));
+    if (args.json) print_out("{}\n", error_json(input, outcome.error()));
     return exit_failed;
   }
   for (const std::string& warning : outcome->warnings) {
-    fmt::print(stderr, "{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome->input, warning)));
+    print_err("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome->input, warning)));
   }
   if (args.json) {
-    fmt::print("{}\n", colour_json(*outcome, args.output));
+    print_out("{}\n", colour_json(*outcome, args.output));
   } else {
-    fmt::print("{}", colour_text(*outcome));
+    print_out("{}", colour_text(*outcome));
   }
   return exit_done;
 }

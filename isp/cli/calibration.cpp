@@ -14,6 +14,7 @@
 #include "isp/base/camera_name.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/output_place.h"
+#include "isp/cli/print.h"
 #include "isp/cli/profile_file.h"
 #include "isp/cli/report.h"
 #include "isp/cli/version.h"
@@ -108,8 +109,8 @@ calib::Measured measured_today(std::vector<std::string> files) {
 
 int calibration_failed(const CalibrateArgs& args, const Error& error) {
   const std::string what = error.where.empty() ? "calibrate" : error.where;
-  fmt::print(stderr, "{}\n", error_line(what, error));
-  if (args.json) fmt::print("{}\n", error_json(what, error));
+  print_err("{}\n", error_line(what, error));
+  if (args.json) print_out("{}\n", error_json(what, error));
   return exit_failed;
 }
 
@@ -133,15 +134,15 @@ int finish(const CalibrateArgs& args, const Calibration& found) {
   }
   if (!args.quiet) {
     for (const std::string& warning : found.warnings) {
-      fmt::print(stderr, "{}\n", one_line("lowlux: warning: " + warning));
+      print_err("{}\n", one_line("lowlux: warning: " + warning));
     }
   }
   if (args.json) {
     const nlohmann::ordered_json json{
         {"output", args.output}, {"warnings", found.warnings}, {"profile", nlohmann::ordered_json::parse(*text)}};
-    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    print_out("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   } else {
-    fmt::print("{}", found.text);
+    print_out("{}", found.text);
   }
   return exit_done;
 }

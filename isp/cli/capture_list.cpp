@@ -11,6 +11,7 @@
 #include "capture/camera/v4l2_source.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/libcamera_module.h"
+#include "isp/cli/print.h"
 #include "isp/cli/report.h"
 
 namespace lowlux::cli {
@@ -47,9 +48,9 @@ Json listing_json(const std::vector<CameraListing>& cameras) {
 
 void print_listing(const char* option, const std::vector<CameraListing>& cameras) {
   for (const CameraListing& camera : cameras) {
-    fmt::print("{}\n", one_line(fmt::format("{} {}  {}", option, camera.id, camera.name)));
-    for (const std::string& format : camera.formats) fmt::print("    {}\n", one_line(format));
-    if (camera.formats.empty()) fmt::print("    no raw format\n");
+    print_out("{}\n", one_line(fmt::format("{} {}  {}", option, camera.id, camera.name)));
+    for (const std::string& format : camera.formats) print_out("    {}\n", one_line(format));
+    if (camera.formats.empty()) print_out("    no raw format\n");
   }
 }
 
@@ -61,14 +62,14 @@ int list_cameras(bool json) {
     const Json all{{"v4l2", listing_json(found.v4l2)},
                    {"libcamera", listing_json(found.libcamera)},
                    {"note", found.note.empty() ? Json(nullptr) : Json(found.note)}};
-    fmt::print("{}\n", all.dump(2, ' ', false, Json::error_handler_t::replace));
+    print_out("{}\n", all.dump(2, ' ', false, Json::error_handler_t::replace));
     return exit_done;
   }
   print_listing("--v4l2", found.v4l2);
   print_listing("--libcamera", found.libcamera);
-  if (found.v4l2.empty() && found.libcamera.empty()) fmt::print("no cameras\n");
+  if (found.v4l2.empty() && found.libcamera.empty()) print_out("no cameras\n");
   if (!found.note.empty()) {
-    fmt::print(stderr, "{}\n", one_line(fmt::format("lowlux: note: libcamera's cameras are left out: {}", found.note)));
+    print_err("{}\n", one_line(fmt::format("lowlux: note: libcamera's cameras are left out: {}", found.note)));
   }
   return exit_done;
 }

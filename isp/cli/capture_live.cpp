@@ -13,6 +13,7 @@
 #include "isp/adapter/lowlux_stage.h"
 #include "isp/base/raw_format.h"
 #include "isp/cli/capture_sink.h"
+#include "isp/cli/print.h"
 #include "isp/cli/report.h"
 #include "isp/output/y4m.h"
 
@@ -172,8 +173,7 @@ class LiveSink final : public CaptureSink {
   void warn_of_colours(const lowlux_stage_params& params) const {
     const bool known = !args_.develop.profile.empty() || (params.valid & LOWLUX_STAGE_HAS_COLOUR_MATRIX) != 0;
     if (known || args_.develop.quiet || stream_.format.raw.layout != SensorLayout::bayer) return;
-    fmt::print(stderr, "{}\n",
-               one_line(fmt::format("lowlux: {}: warning: {}", stream_.camera, capture::colours_unknown)));
+    print_err("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", stream_.camera, capture::colours_unknown)));
   }
 
   const CaptureArgs& args_;

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/base/raw_format.h"
+#include "isp/cli/print.h"
 
 namespace lowlux::cli {
 namespace {
@@ -94,14 +95,14 @@ void CaptureProgress::show(const CaptureState& state) {
   const auto now = std::chrono::steady_clock::now();
   if (!wanted_ || now < next_) return;
   next_ = now + std::chrono::seconds(1);
-  fmt::print(stderr, "\r\033[K{}", progress_text(state));
+  print_err("\r\033[K{}", progress_text(state));
   std::fflush(stderr);
   shown_ = true;
 }
 
 void CaptureProgress::clear() {
   if (!shown_) return;
-  fmt::print(stderr, "\r\033[K");
+  print_err("\r\033[K");
   std::fflush(stderr);
   shown_ = false;
 }

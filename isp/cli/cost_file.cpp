@@ -19,6 +19,7 @@
 #include "isp/bench/cost_measurement.h"
 #include "isp/bench/pace.h"
 #include "isp/cli/machine.h"
+#include "isp/cli/print.h"
 #include "isp/cli/progress.h"
 #include "isp/cli/report.h"
 #include "isp/output/report.h"
@@ -162,9 +163,8 @@ Result<isp::CostModel> calibrate_cost(int threads, bool quiet, std::string& writ
   if (!path) return model;
   if (const auto written = write_cost(*path, *model); !written) {
     progress.print([&] {
-      fmt::print(stderr, "{}\n",
-                 one_line(fmt::format("lowlux: warning: {}: this machine's speed is measured anew each time: {}", *path,
-                                      written.error().message)));
+      print_err("{}\n", one_line(fmt::format("lowlux: warning: {}: this machine's speed is measured anew each time: {}",
+                                             *path, written.error().message)));
     });
   } else {
     written_to = *path;
@@ -176,8 +176,8 @@ isp::CostModel cost_of_this_machine(int threads, bool quiet) {
   auto kept = kept_cost(threads);
   if (kept) return *std::move(kept);
   if (!quiet) {
-    fmt::print(
-        stderr, "{}\n",
+    print_err(
+        "{}\n",
         one_line("lowlux: times are rough estimates until `lowlux bench --calibrate-cost` (2 to 5 minutes) measures "
                  "this machine: " +
                  kept.error().message));

@@ -1,5 +1,9 @@
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -10,7 +14,9 @@
 #include <fmt/format.h>
 
 #include "isp/cli/exit_code.h"
+#include "isp/cli/interruption.h"
 #include "isp/cli/option_values.h"
+#include "isp/cli/print.h"
 #include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
 #include "isp/cli/version.h"
@@ -39,12 +45,13 @@ constexpr std::array verbs{
     Verb{"simulate", "raw files of scenes of known truth", run_simulate},
 };
 
-void print_help(std::FILE* out) {
-  fmt::print(out, "lowlux: a raw developer for pictures taken in the dark\n\nusage: lowlux VERB [OPTIONS]\n\nverbs:\n");
-  for (const Verb& verb : verbs) fmt::print(out, "  {:<10} {}\n", verb.name, verb.summary);
-  fmt::print(out,
-             "\n`lowlux VERB --help` lists a verb's options, `lowlux --version` what is built in.\n"
-             "exit codes: 0 done, 1 an input or the work failed, 2 the command line is wrong\n");
+std::string help_text() {
+  std::string out =
+      "lowlux: a raw developer for pictures taken in the dark\n\nusage: lowlux VERB [OPTIONS]\n\nverbs:\n";
+  for (const Verb& verb : verbs) out += fmt::format("  {:<10} {}\n", verb.name, verb.summary);
+  return out +
+         "\n`lowlux VERB --help` lists a verb's options, `lowlux --version` what is built in.\n"
+         "exit codes: 0 done, 1 an input or the work failed, 2 the command line is wrong\n";
 }
 
 int run_verb(const std::vector<std::string>& args) {
@@ -54,15 +61,14 @@ int run_verb(const std::vector<std::string>& args) {
   }
   std::array<std::string_view, verbs.size()> names;
   std::ranges::transform(verbs, names.begin(), &Verb::name);
-  fmt::print(stderr, "{}\n",
-             one_line(fmt::format("lowlux: unknown verb '{}'{}; `lowlux --help` lists them", first,
-                                  suggestion(first, names))));
+  print_err("{}\n", one_line(fmt::format("lowlux: unknown verb '{}'{}; `lowlux --help` lists them", first,
+                                         suggestion(first, names))));
   return exit_usage;
 }
 
 int run(std::vector<std::string> args) {
   if (args.empty()) {
-    print_help(stderr);
+    print_err("{}", help_text());
     return exit_usage;
   }
   if (args.front() == "help" && args.size() > 1) {  // help VERB: VERB --help
@@ -71,34 +77,47 @@ int run(std::vector<std::string> args) {
   }
   const std::string& first = args.front();
   if (first == "--help" || first == "-h" || first == "help") {
-    print_help(stdout);
+    print_out("{}", help_text());
     return exit_done;
   }
   if (first == "--version" || first == "-v") {
-    fmt::print("{}\n", version_text());
+    print_out("{}\n", version_text());
     return exit_done;
   }
   if (!isp::cpu_runs_raw_to_rgb()) {
-    fmt::print(stderr, "lowlux: this processor lacks SSSE3, which the kernels need\n");
+    print_err("lowlux: this processor lacks SSSE3, which the kernels need\n");
     return exit_failed;
   }
   return run_verb(args);
 }
 
+/// Closed standard streams are opened, or the first files of the command would get their numbers and its messages. What
+/// is written to them still fails.
+void open_standard_streams() {
+  int descriptor = 0;
+  while (descriptor >= 0 && descriptor <= STDERR_FILENO) descriptor = open("/dev/null", O_RDONLY);
+  if (descriptor > STDERR_FILENO) close(descriptor);
+}
+
+/// What main() does, from the first line on.
+int run_process(const std::vector<std::string>& args) {
+  open_standard_streams();
+  for (const int number : {SIGPIPE, SIGXFSZ}) std::signal(number, SIG_IGN);  // writing fails, and that is reported
+  clean_up_on_signals();
+  int code = exit_failed;
+  try {
+    code = run(args);
+  } catch (const std::bad_alloc&) {
+    print_err("lowlux: not enough memory\n");
+  } catch (const std::exception& failure) {
+    print_err("{}\n", one_line(std::string("lowlux: ") + failure.what()));
+  }
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  print_err("lowlux: cannot write to standard output\n");
+  return code == exit_done ? exit_failed : code;
+}
+
 }  // namespace
 }  // namespace lowlux::cli
 
-int main(int argc, char** argv) {
-  try {
-    const int code = lowlux::cli::run({argv + 1, argv + argc});
-    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
-    std::fprintf(stderr, "lowlux: cannot write to standard output\n");
-    return lowlux::cli::exit_failed;
-  } catch (const std::bad_alloc&) {
-    std::fprintf(stderr, "lowlux: not enough memory\n");
-    return lowlux::cli::exit_failed;
-  } catch (const std::exception& failure) {
-    std::fprintf(stderr, "lowlux: %s\n", failure.what());
-    return lowlux::cli::exit_failed;
-  }
-}
+int main(int argc, char** argv) { return lowlux::cli::run_process({argv + 1, argv + argc}); }

@@ -15,6 +15,8 @@
 
 #include "isp/base/near_match.h"
 #include "isp/cli/exit_code.h"
+#include "isp/cli/print.h"
+#include "isp/cli/report.h"
 
 namespace lowlux::cli {
 
@@ -147,7 +149,7 @@ CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::strin
 }
 
 int refuse(const CLI::App& app, const std::string& wrong) {
-  fmt::print(stderr, "{}: {}; --help lists the options\n", app.get_name(), wrong);
+  print_err("{}\n", one_line(fmt::format("{}: {}; --help lists the options", app.get_name(), wrong)));
   return exit_usage;
 }
 

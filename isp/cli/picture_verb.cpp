@@ -8,6 +8,7 @@
 
 #include "isp/cli/exit_code.h"
 #include "isp/cli/output_place.h"
+#include "isp/cli/print.h"
 #include "isp/cli/report.h"
 #include "isp/cli/version.h"
 #include "isp/output/image_writer.h"
@@ -17,15 +18,15 @@ namespace {
 
 int usage_error(const PictureVerb& verb, const Error& error) {
   const std::string place = error.where.empty() ? "" : error.where + ": ";
-  fmt::print(stderr, "{}\n", one_line("lowlux " + verb.name + ": " + place + error.message));
+  print_err("{}\n", one_line("lowlux " + verb.name + ": " + place + error.message));
   return exit_usage;
 }
 
 int failed(const PictureVerb& verb, Error error) {
   const std::string& input = verb.inputs.front();
   if (error.where.empty()) error.where = input;
-  fmt::print(stderr, "{}\n", error_line(input, error));
-  if (verb.json) fmt::print("{}\n", error_json(input, error));
+  print_err("{}\n", error_line(input, error));
+  if (verb.json) print_out("{}\n", error_json(input, error));
   return exit_failed;
 }
 
@@ -56,7 +57,7 @@ int run_picture_verb(const PictureVerb& verb, const PictureWork& work) {
   if (!warnings) return failed(verb, warnings.error());
   if (verb.quiet) return exit_done;
   for (const std::string& warning : *warnings) {
-    fmt::print(stderr, "{}\n", one_line(fmt::format("lowlux: {}: warning: {}", verb.inputs.front(), warning)));
+    print_err("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", verb.inputs.front(), warning)));
   }
   return exit_done;
 }

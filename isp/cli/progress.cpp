@@ -7,6 +7,9 @@
 
 #include <fmt/format.h>
 
+#include "isp/cli/print.h"
+#include "isp/cli/report.h"
+
 namespace lowlux::cli {
 namespace {
 
@@ -24,7 +27,7 @@ void Progress::advance(double amount, const std::string& what) {
   done_ += amount;
   if (!wanted_ || std::chrono::steady_clock::now() - start_ < patience) return;
   const int filled = std::min(bar_width, static_cast<int>(bar_width * done_ / total_));
-  fmt::print(stderr, "\r\033[K[{:<{}}] {:.0f} % {}", std::string(filled, '#'), bar_width, 100 * done_ / total_, what);
+  print_err("\r\033[K[{:<{}}] {:.0f} % {}", std::string(filled, '#'), bar_width, 100 * done_ / total_, one_line(what));
   std::fflush(stderr);
   shown_ = true;
 }
@@ -37,7 +40,7 @@ void Progress::print(const std::function<void()>& print) {
 
 void Progress::clear() {
   if (!shown_) return;
-  fmt::print(stderr, "\r\033[K");
+  print_err("\r\033[K");
   std::fflush(stderr);
   shown_ = false;
 }

@@ -57,17 +57,17 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
 
 void print_outcome(const DevelopArgs& args, const DevelopOutcome& outcome) {
   if (outcome.error) {
-    fmt::print(stderr, "{}\n", error_line(outcome.input, *outcome.error));
+    print_err("{}\n", error_line(outcome.input, *outcome.error));
     return;
   }
   if (!args.quiet) {
     for (const std::string& warning : outcome.plan->warnings) {
-      fmt::print(stderr, "{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome.input, warning)));
+      print_err("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome.input, warning)));
     }
   }
   if (args.json) return;
-  if (args.explain) fmt::print("{}\n{}", outcome.input, explain_text(*outcome.plan));
-  if (args.timings) fmt::print("{}\n{}", outcome.input, times_text(outcome.times));
+  if (args.explain) print_out("{}\n{}", outcome.input, explain_text(*outcome.plan));
+  if (args.timings) print_out("{}\n{}", outcome.input, times_text(outcome.times));
 }
 
 DevelopOutcome outcome_of(const Job& job, const RawWork& work, Executor& executor, Progress& progress) {
@@ -187,10 +187,10 @@ int run_batch(const RawBatch& batch, const RawWork& work) {
       if (!json.empty()) json += ",\n";
       json += develop_json(outcome);
     }
-    fmt::print("[{}]\n", json);
+    print_out("[{}]\n", json);
   }
   if (failed > 0 && outcomes.size() > 1) {
-    fmt::print(stderr, "lowlux: {} of {} files failed\n", failed, outcomes.size());
+    print_err("lowlux: {} of {} files failed\n", failed, outcomes.size());
   }
   return failed > 0 ? exit_failed : exit_done;
 }

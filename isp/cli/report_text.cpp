@@ -138,12 +138,16 @@ std::string info_text(const std::string& file, const RawFrame& frame) {
   out.add("corrections", fmt::format("{} gain maps, {} radial gains, {} named defects", c.gain_maps.size(),
                                      c.radial_gains.size(), c.defects.size()));
   for (const std::string& warning : frame.warnings) out.add("warning", warning);
-  return file + "\n" + out.text();
+  return one_line(file) + "\n" + out.text();
 }
 
 std::string one_line(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto c = static_cast<unsigned char>(text[i]),
+               next = static_cast<unsigned char>(i + 1 < text.size() ? text[i + 1] : 0);
+    if (c < 0x20 || c == 0x7f) text[i] = ' ';
+    if (c == 0xc2 && next >= 0x80 && next < 0xa0) text[i] = text[i + 1] = ' ';  // U+0080 to U+009F in UTF-8
+  }
   return text;
 }
 

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/cli/report.h"
 #include "isp/model/cie_data.h"
 #include "isp/model/spectral_data.h"
 
@@ -113,7 +114,7 @@ std::string simulate_text(const SimulateArgs& args, const SimulateOutcome& o) {
   std::string text;
   auto out = std::back_inserter(text);
   fmt::format_to(out, "{}\n  sensor          {}{}{}, {:g} DN/e-, read noise {:g} e-, {:.0f} e- at white, {} bits\n",
-                 o.files.front(), m.name, o.sensor.gain_setting.empty() ? "" : " ", o.sensor.gain_setting,
+                 one_line(o.files.front()), m.name, o.sensor.gain_setting.empty() ? "" : " ", o.sensor.gain_setting,
                  m.system_gain_dn_per_e, m.read_noise_e, isp::saturation_charge_e(m), m.bits);
   for (const std::string& assumption : o.sensor.assumptions) {
     fmt::format_to(out, "  not sourced     taken as: {}\n", assumption);
@@ -121,7 +122,7 @@ std::string simulate_text(const SimulateArgs& args, const SimulateOutcome& o) {
   fmt::format_to(out, "  exposure        {:g} s at f/{:g}, {:g} C; white {:g} cd/m2{}\n", args.options.exposure.time_s,
                  args.options.f_number, args.options.exposure.temperature_c, o.white_cd_m2,
                  o.saturation_cd_m2 ? fmt::format(", saturates at {:.3g} cd/m2 of D65", *o.saturation_cd_m2) : "");
-  for (std::size_t i = 1; i < o.files.size(); ++i) fmt::format_to(out, "  also            {}\n", o.files[i]);
+  for (std::size_t i = 1; i < o.files.size(); ++i) fmt::format_to(out, "  also            {}\n", one_line(o.files[i]));
   return text;
 }
 

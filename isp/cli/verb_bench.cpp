@@ -13,6 +13,7 @@
 #include "isp/cli/exit_code.h"
 #include "isp/cli/machine.h"
 #include "isp/cli/module.h"
+#include "isp/cli/print.h"
 #include "isp/cli/progress.h"
 #include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
@@ -68,7 +69,7 @@ std::vector<MeasuredStage> run_each(const std::vector<isp::BenchStage>& stages, 
     } else {
       const Error& error = outcome.error();
       const std::string where = error.where.empty() ? std::string(stage.id) : error.where;
-      progress.print([&] { fmt::print(stderr, "{}\n", error_line(where, error)); });
+      progress.print([&] { print_err("{}\n", error_line(where, error)); });
     }
   }
   return out;
@@ -87,7 +88,7 @@ isp::BenchOptions options_of(const BenchArgs& args, const std::string& folder) {
 }
 
 int failed(const Error& error) {
-  fmt::print(stderr, "{}\n", error_line(error.where, error));
+  print_err("{}\n", error_line(error.where, error));
   return exit_failed;
 }
 
@@ -98,17 +99,17 @@ int run_calibrate_cost(const BenchArgs& args) {
   const auto model = calibrate_cost(threads, args.json, file);
   if (!model) return failed(model.error());
   if (args.json) {
-    fmt::print("{}", cost_text(*model));
+    print_out("{}", cost_text(*model));
     return exit_done;
   }
-  fmt::print("{}, {} threads; ms for a frame of 12 MP\n", model->machine, threads);
+  print_out("{}, {} threads; ms for a frame of 12 MP\n", model->machine, threads);
   for (int i = 0; i < isp::cost_parts; ++i) {
     const auto part = static_cast<isp::CostPart>(i);
     const bool sampled = part == isp::CostPart::samples;  // it takes the same however large the frame
     const isp::CostSize size = sampled ? isp::CostSize{isp::sample_megapixels} : isp::cost_size(4000, 3000);
-    fmt::print("  {:<12}{:10.1f}\n", name_of(part), 1e3 * model->seconds(part, size));
+    print_out("  {:<12}{:10.1f}\n", name_of(part), 1e3 * model->seconds(part, size));
   }
-  fmt::print("{}\n", file.empty() ? "not kept" : "kept in " + file);
+  print_out("{}\n", file.empty() ? "not kept" : "kept in " + file);
   return exit_done;
 }
 
@@ -119,13 +120,13 @@ int run_bench(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<BenchArgs>(parsed);
   if (args.list) {
-    for (const isp::BenchStage& stage : isp::bench_stages()) fmt::print("{:<20} {}\n", stage.id, stage.title);
+    for (const isp::BenchStage& stage : isp::bench_stages()) print_out("{:<20} {}\n", stage.id, stage.title);
     return exit_done;
   }
   if (args.calibrate_cost) return run_calibrate_cost(args);
   const auto stages = chosen(args.stages);
   if (!stages) {
-    fmt::print(stderr, "{}\n", one_line("lowlux bench: " + stages.error().message));
+    print_err("{}\n", one_line("lowlux bench: " + stages.error().message));
     return exit_usage;
   }
   const auto folder = pictures_folder(args);
@@ -135,17 +136,20 @@ int run_bench(const std::vector<std::string>& words) {
   const std::vector<MeasuredStage> measured = run_each(*stages, options);
   const Machine machine = this_machine(options.threads);
   if (args.json) {
-    fmt::print("{}\n", bench_json(measured, machine));
+    print_out("{}\n", bench_json(measured, machine));
   } else {
-    for (const MeasuredStage& stage : measured) fmt::print("{}", bench_text(stage));
+    for (const MeasuredStage& stage : measured) print_out("{}", bench_text(stage));
   }
   if (!args.output.empty() && !measured.empty()) {
     PoolExecutor executor(options.threads);
     const auto written = write_bench_files(measured, machine, args, executor);
     if (!written) return failed(written.error());
-    if (!args.json) fmt::print("\nwritten:\n  {}\n", fmt::join(*written, "\n  "));
+    if (!args.json) print_out("\nwritten:\n");
+    for (const std::string& name : *written) {
+      if (!args.json) print_out("  {}\n", one_line(name));
+    }
   }
-  if (!args.json && !measured.empty()) fmt::print("\n{}\n", time_text(measured));
+  if (!args.json && !measured.empty()) print_out("\n{}\n", time_text(measured));
   return measured.size() == stages->size() ? exit_done : exit_failed;
 }
 

@@ -11,6 +11,7 @@
 #include "isp/cli/calibration.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/option_values.h"
+#include "isp/cli/print.h"
 #include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
 
@@ -31,11 +32,11 @@ constexpr std::array kinds{
 };
 
 void print_help() {
-  fmt::print(
+  print_out(
       "Measures a camera and writes what was found to a profile.\n\nusage: lowlux calibrate KIND [OPTIONS]\n\n"
       "kinds:\n");
-  for (const Kind& kind : kinds) fmt::print("  {:<10} {}\n", kind.name, kind.summary);
-  fmt::print(
+  for (const Kind& kind : kinds) print_out("  {:<10} {}\n", kind.name, kind.summary);
+  print_out(
       "\n`lowlux calibrate KIND --help` lists a kind's options. `lowlux develop --black PROFILE.json` uses the "
       "profile.\n");
 }
@@ -79,11 +80,11 @@ int run_calibrate(const std::vector<std::string>& words) {
   }
   std::array<std::string_view, kinds.size()> names;
   std::ranges::transform(kinds, names.begin(), &Kind::name);
-  fmt::print(stderr, "{}\n",
-             one_line(first.empty() ? fmt::format("lowlux calibrate: name what to calibrate: {}; --help describes them",
-                                                  fmt::join(names, ", "))
-                                    : fmt::format("lowlux calibrate: unknown kind '{}'{}; --help lists them", first,
-                                                  suggestion(first, names))));
+  print_err("{}\n",
+            one_line(first.empty() ? fmt::format("lowlux calibrate: name what to calibrate: {}; --help describes them",
+                                                 fmt::join(names, ", "))
+                                   : fmt::format("lowlux calibrate: unknown kind '{}'{}; --help lists them", first,
+                                                 suggestion(first, names))));
   return exit_usage;
 }
 

@@ -25,6 +25,7 @@
 #include "isp/cli/libcamera_module.h"
 #include "isp/cli/output_place.h"
 #include "isp/cli/outputs.h"
+#include "isp/cli/print.h"
 #include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
 
@@ -92,7 +93,7 @@ Result<void> check_files(const CaptureArgs& args) {
 
 int usage_error(const Error& error) {
   const std::string place = error.where.empty() ? "" : error.where + ": ";
-  fmt::print(stderr, "{}\n", one_line("lowlux capture: " + place + error.message));
+  print_err("{}\n", one_line("lowlux capture: " + place + error.message));
   return exit_usage;
 }
 
@@ -127,13 +128,13 @@ class Capture {
       const std::string camera = args_.v4l2.empty() ? "libcamera " + args_.libcamera : args_.v4l2;
       const bool of_camera = error->where.empty() || error->where == args_.libcamera;
       const std::string& place = of_camera ? camera : error->where;
-      fmt::print(stderr, "{}\n", error_line(place, {error->code, error->message + taken, {}}));
+      print_err("{}\n", error_line(place, {error->code, error->message + taken, {}}));
     } else if (!args_.develop.quiet) {
       print_warnings();
-      fmt::print(stderr, "lowlux: {}\n", progress_text(state_));
+      print_err("lowlux: {}\n", progress_text(state_));
     }
     if (args_.develop.json) {
-      fmt::print(args_.kind == CaptureKind::live ? stderr : stdout, "{}\n", capture_json(state_, error));
+      print_text(args_.kind == CaptureKind::live ? stderr : stdout, capture_json(state_, error) + "\n");
     }
     return error == nullptr ? exit_done : exit_failed;
   }
@@ -158,9 +159,8 @@ class Capture {
   void print_warnings() {
     if (args_.develop.quiet) return;
     for (; printed_ < state_.work.warnings.size(); ++printed_) {
-      fmt::print(
-          stderr, "{}\n",
-          one_line(fmt::format("lowlux: {}: warning: {}", state_.stream.camera, state_.work.warnings[printed_])));
+      print_err("{}\n",
+                one_line(fmt::format("lowlux: {}: warning: {}", state_.stream.camera, state_.work.warnings[printed_])));
     }
   }
 

@@ -14,6 +14,7 @@
 #include "isp/cli/compare_report.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/hull_module.h"
+#include "isp/cli/print.h"
 #include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
 
@@ -70,17 +71,17 @@ int run_compare(const std::vector<std::string>& words) {
   const Result<CompareOutcome> done = compared(args);
   if (!done) {
     const Error& error = done.error();
-    fmt::print(stderr, "{}\n", error_line(error.where, error));
-    if (args.json) fmt::print("{}\n", error_json(error.where, error));
+    print_err("{}\n", error_line(error.where, error));
+    if (args.json) print_out("{}\n", error_json(error.where, error));
     return exit_failed;
   }
   for (const std::string& warning : done->warnings) {
-    fmt::print(stderr, "{}\n", one_line("lowlux compare: warning: " + warning));
+    print_err("{}\n", one_line("lowlux compare: warning: " + warning));
   }
   if (args.json) {
-    fmt::print("{}\n", compare_json(args, *done));
+    print_out("{}\n", compare_json(args, *done));
   } else {
-    fmt::print("{} against {}\n{}", one_line(args.test), one_line(args.reference), compare_text(*done));
+    print_out("{} against {}\n{}", one_line(args.test), one_line(args.reference), compare_text(*done));
   }
   return exit_done;
 }

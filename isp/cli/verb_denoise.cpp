@@ -46,7 +46,7 @@ Result<void> denoise_file(const RawBatch& batch, const Job& job, Executor& execu
 
 int usage_error(const Error& error) {
   const std::string place = error.where.empty() ? "" : error.where + ": ";
-  fmt::print(stderr, "{}\n", one_line("lowlux denoise: " + place + error.message));
+  print_err("{}\n", one_line("lowlux denoise: " + place + error.message));
   return exit_usage;
 }
 
@@ -80,7 +80,7 @@ int run_denoise(const std::vector<std::string>& words) {
 
   const Result<RawBatch> batch = make_batch(args, without_rendering(args.options), *std::move(jobs), *darks);
   if (!batch) {
-    fmt::print(stderr, "{}\n", error_line(batch.error().where, batch.error()));
+    print_err("{}\n", error_line(batch.error().where, batch.error()));
     return exit_failed;
   }
   return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {

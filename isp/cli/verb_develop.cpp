@@ -44,7 +44,7 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
 
 int usage_error(const Error& error) {
   const std::string place = error.where.empty() ? "" : error.where + ": ";
-  fmt::print(stderr, "{}\n", one_line("lowlux develop: " + place + error.message));
+  print_err("{}\n", one_line("lowlux develop: " + place + error.message));
   return exit_usage;
 }
 
@@ -74,12 +74,12 @@ int run_develop(const std::vector<std::string>& words) {
   if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed) return usage_error(unharmed.error());
 
   if (const auto made = make_for_display(args, *options); !made) {
-    fmt::print(stderr, "{}\n", error_line(made.error().where, made.error()));
+    print_err("{}\n", error_line(made.error().where, made.error()));
     return exit_failed;
   }
   const Result<RawBatch> batch = make_batch(args, *options, *std::move(jobs), *darks);
   if (!batch) {
-    fmt::print(stderr, "{}\n", error_line(batch.error().where, batch.error()));
+    print_err("{}\n", error_line(batch.error().where, batch.error()));
     return exit_failed;
   }
   return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {

@@ -6,6 +6,7 @@
 #include "isp/cli/advise.h"
 #include "isp/cli/args.h"
 #include "isp/cli/exit_code.h"
+#include "isp/cli/print.h"
 #include "isp/cli/report.h"
 #include "isp/cli/verbs.h"
 
@@ -23,15 +24,15 @@ int run_info(const std::vector<std::string>& words) {
     const Result<RawFrame> frame = capture::read_raw(file);
     if (!frame) {
       code = exit_failed;
-      fmt::print(stderr, "{}\n", error_line(file, frame.error()));
+      print_err("{}\n", error_line(file, frame.error()));
     }
     if (args.json) {
       json += (json.empty() ? "" : ",\n") + (frame ? info_json(file, *frame) : error_json(file, frame.error()));
     } else if (frame) {
-      fmt::print("{}", info_text(file, *frame));
+      print_out("{}", info_text(file, *frame));
     }
   }
-  if (args.json) fmt::print("[{}]\n", json);
+  if (args.json) print_out("[{}]\n", json);
   return code;
 }
 

@@ -10,6 +10,8 @@
 #include "isp/cli/lines.h"
 #include "isp/cli/outputs.h"
 #include "isp/cli/picture_verb.h"
+#include "isp/cli/print.h"
+#include "isp/cli/report.h"
 #include "isp/cli/resaturate_args.h"
 #include "isp/cli/verbs.h"
 #include "isp/pipeline/resaturate_picture.h"
@@ -99,7 +101,7 @@ void print(const ResaturateArgs& args, const Outcome& done) {
                                       {"share_dark", done.made.share_dark},
                                       {"share_saturated", done.made.share_saturated},
                                       {"warnings", done.warnings}};
-    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    print_out("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   } else if (!args.quiet) {
     Lines lines;
     lines.add("black", fmt::format("X {:.5f}, Y {:.5f}, Z {:.5f} of white 1", b.x, b.y, b.z));
@@ -107,7 +109,7 @@ void print(const ResaturateArgs& args, const Outcome& done) {
                                           args.chroma_noise ? ", given" : ", measured on the picture"));
     lines.add("no brighter", fmt::format("{:.1f} % of the pixels: grey now", 100 * done.made.share_dark));
     lines.add("saturated", fmt::format("{:.1f} % of the pixels: as they were", 100 * done.made.share_saturated));
-    fmt::print("{}\n{}", args.output, lines.text());
+    print_out("{}\n{}", one_line(args.output), lines.text());
   }
 }
 

@@ -9,6 +9,8 @@
 #include "isp/base/executor.h"
 #include "isp/cli/lines.h"
 #include "isp/cli/picture_verb.h"
+#include "isp/cli/print.h"
+#include "isp/cli/report.h"
 #include "isp/cli/retarget_args.h"
 #include "isp/cli/shin_file.h"
 #include "isp/cli/verbs.h"
@@ -68,7 +70,7 @@ void print_json(const RetargetArgs& args, const Outcome& done) {
     json["coefficients"] = nullptr;
     json["units"] = nullptr;
   }
-  fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  print_out("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
 void print_text(const RetargetArgs& args, const Outcome& done) {
@@ -85,7 +87,7 @@ void print_text(const RetargetArgs& args, const Outcome& done) {
             fmt::format("{:.1f} % of the pixels: as near as the display shows", 100 * done.made.share_held));
   lines.add("table", fmt::format("{0} x {0} x {0}, off by {1:.2f} CIEDE2000 in the mean, {2:.1f} at most",
                                  done.made.levels, done.made.error.mean_ciede2000, done.made.error.max_ciede2000));
-  fmt::print("{}\n{}", args.output, lines.text());
+  print_out("{}\n{}", one_line(args.output), lines.text());
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "isp/base/executor.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/output_place.h"
+#include "isp/cli/print.h"
 #include "isp/cli/progress.h"
 #include "isp/cli/report.h"
 #include "isp/cli/scene_argument.h"
@@ -30,7 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 
 int usage_error(const std::string& what) {
-  fmt::print(stderr, "{}\n", one_line("lowlux simulate: " + what));
+  print_err("{}\n", one_line("lowlux simulate: " + what));
   return exit_usage;
 }
 
@@ -84,7 +85,8 @@ std::string wrong_files(const SimulateArgs& args) {
   return {};
 }
 
-/// A run leaves all of its files or none.
+/// No work is begun that would end at a file that is in the way. A run that fails later (a full disk) or is interrupted
+/// leaves the frames that were finished, each of them whole.
 Result<void> check_free(const Files& files, const SimulateArgs& args) {
   std::vector<std::string> all = files.frames;
   for (const std::string& truth : {files.truth, files.truth_electrons}) {
@@ -246,16 +248,16 @@ class Simulation {
 void print_outcome(const SimulateArgs& args, const SimulateOutcome& outcome) {
   if (!args.quiet) {
     for (const std::string& warning : outcome.warnings) {
-      fmt::print(stderr, "{}\n", one_line(fmt::format("lowlux: {}: warning: {}", args.scene.what, warning)));
+      print_err("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", args.scene.what, warning)));
     }
   }
   if (args.json) {
-    fmt::print("{}\n", simulate_json(args, outcome));
+    print_out("{}\n", simulate_json(args, outcome));
     return;
   }
-  if (!args.quiet) fmt::print("{}", simulate_text(args, outcome));
-  if (args.explain) fmt::print("{}", explain_text(args, outcome));
-  if (args.timings) fmt::print("{}", times_text(outcome.times));
+  if (!args.quiet) print_out("{}", simulate_text(args, outcome));
+  if (args.explain) print_out("{}", explain_text(args, outcome));
+  if (args.timings) print_out("{}", times_text(outcome.times));
 }
 
 }  // namespace
@@ -265,7 +267,7 @@ int run_simulate(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<SimulateArgs>(parsed);
   if (args.list) {
-    fmt::print("{}", simulate_list());
+    print_out("{}", simulate_list());
     return exit_done;
   }
   if (const std::string wrong = wrong_files(args); !wrong.empty()) return usage_error(wrong);
@@ -275,7 +277,7 @@ int run_simulate(const std::vector<std::string>& words) {
       return usage_error(outcome.error().message +
                          (outcome.error().where.empty() ? "" : " (" + outcome.error().where + ")"));
     }
-    fmt::print(stderr, "{}\n", error_line(args.scene.what, outcome.error()));
+    print_err("{}\n", error_line(args.scene.what, outcome.error()));
     return exit_failed;
   }
   print_outcome(args, *outcome);
