@@ -36,4 +36,25 @@ std::size_t pipeline_bytes(const RawDn& raw, const DevelopPlan& plan, int thread
   return whole_frame_bytes(raw, plan, threads);
 }
 
+std::size_t expected_bytes(const RawDn& raw, const DevelopOptions& options, int threads) {
+  const DenoiseChoice& denoise = options.denoise;
+  const bool best = options.effects && !options.effects->tolerance_delta_e;  // within a budget
+  DevelopPlan most;
+  most.options = options;
+  most.width = options.half ? raw.default_crop.width / 2 : raw.default_crop.width;
+  most.height = options.half ? raw.default_crop.height / 2 : raw.default_crop.height;
+  if (denoise.mode == DenoiseChoice::Mode::automatic) {
+    most.noise_reduction.level = best ? denoise::Level::best : denoise::Level::high;
+  }
+  if (denoise.mode == DenoiseChoice::Mode::level) most.noise_reduction.level = denoise.level;
+  const std::size_t codes = sizeof(std::uint16_t) * static_cast<std::size_t>(raw.dn.size());
+  const std::size_t sample = options.samples == SampleType::u8 ? 1 : options.samples == SampleType::u16 ? 2 : 4;
+  const std::size_t picture = 3 * sample * area(most.width, most.height);
+  const std::size_t dark = options.dark_frame ? sizeof(float) * area(raw.active.width, raw.active.height) : 0;
+  const std::size_t turned = raw.info.orientation == Orientation::normal ? 0 : picture;
+  const std::size_t around = codes + dark + picture + turned;
+  if (options.look.look == Look::camera) return around + pipeline_bytes(raw, most, threads);
+  return around + whole_frame_bytes(raw, most, threads) + 3 * sizeof(float) * area(most.width, most.height);
+}
+
 }  // namespace lowlux::isp

@@ -14,4 +14,8 @@ namespace lowlux::isp {
 /// @param threads  of the executor
 std::size_t pipeline_bytes(const RawDn& raw, const DevelopPlan& plan, int threads, const TileLimits& limits = {});
 
+/// About the most bytes that developing a frame takes: the frame, its dark frame, its picture, and a Pipeline that
+/// reduces the noise as much as the options may ask for. Known before anything is planned.
+std::size_t expected_bytes(const RawDn& raw, const DevelopOptions& options, int threads);
+
 }  // namespace lowlux::isp
