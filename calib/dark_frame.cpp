@@ -266,7 +266,6 @@ Result<DarkFrame> make_dark_frame(Groups groups, const RawDn& picture, const Dar
     if (auto good = check_masked_level(picture, *request.masked_dn, out); !good)
       return tl::make_unexpected(good.error());
   }
-  if (auto good = check_below_picture(picture, out); !good) return tl::make_unexpected(good.error());
   return out;
 }
 

@@ -21,6 +21,7 @@ struct FrameSetting {
   std::optional<double> iso;
   std::optional<double> exposure_s;
   std::optional<double> temperature_c;
+  friend bool operator==(const FrameSetting&, const FrameSetting&) = default;
 };
 
 /// The setting of a frame.

@@ -9,13 +9,10 @@ namespace lowlux::cli {
 namespace {
 
 void add_darks(CLI::App& app, DarkArgs& dark) {
-  CLI::Option* frames =
-      app.add_option("--dark-frame", dark.words,
-                     "dark frames to take off in place of the black point: files or folders, many and of several "
-                     "exposure times if need be; may be repeated")
-          ->type_name("FILE[,FILE...]")
-          ->expected(1)
-          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  CLI::Option* frames = app.add_option("--dark-frame", dark.words,
+                                       "dark frames to subtract: files, a folder or a quoted pattern; repeatable")
+                            ->type_name("FILE[,FILE...]|FOLDER")
+                            ->allow_extra_args(false);
   add_text(app, "--dark-noise", "SHARE",
            "most that the dark frames may add to a picture's own variance in the dark (default 0.1)",
            [&dark](const std::string& text) -> std::optional<std::string> {
@@ -44,12 +41,15 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
 /// What every verb that takes raw files one by one has.
 /// @param explained  help for --explain
 void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
-  app.add_option("RAW", args.inputs, "raw files")->required();
+  app.add_option("RAW", args.inputs, "raw files, or folders of them")->required();
   app.add_flag("--maps", args.options.denoise.maps,
                "also write what is left of the noise [e-^2] and how far colour can be believed (0 to 1), for each 2x2 "
                "cell: OUT.noise.pfm and OUT.confidence.pfm");
-  app.add_flag("--force", args.force, "overwrite files that exist");
-  app.add_option("--jobs", args.jobs, "files at a time (default: one for each processor)")->check(CLI::Range(1, 256));
+  app.add_flag("--skip-existing", args.skip_existing, "leave out raw files whose outputs exist")
+      ->excludes(app.add_flag("--force", args.force, "overwrite files that exist"));
+  app.add_flag("--sync", args.sync, "wait until each file is on the disk (fsync)");
+  app.add_option("--jobs", args.jobs, "files at a time (default: one per processor, fewer if memory is short)")
+      ->check(CLI::Range(1, 256));
   app.add_flag("--explain", args.explain, explained);
   app.add_flag("--json", args.json, "one JSON object for each file on stdout, as an array");
   app.add_flag("--timings", args.timings, "time of each stage");

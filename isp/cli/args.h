@@ -15,7 +15,7 @@ namespace lowlux::cli {
 
 /// Dark frames: --dark-frame, --dark-noise, --dark-doubling.
 struct DarkArgs {
-  std::vector<std::string> words;    // files, files parted by commas, folders; empty: none are taken off
+  std::vector<std::string> words;    // files, lists separated by commas, folders, patterns; empty: none
   double noise_share = 0.1;          // most that they may add to a picture's variance in the dark
   std::optional<double> doubling_c;  // given as a number
   std::string doubling_profile;      // or as a profile's file
@@ -38,6 +38,8 @@ struct DevelopArgs {
   int jpeg_quality = 92;
   int jobs = 0;  // files at a time; 0: one for each processor
   bool force = false;
+  bool skip_existing = false;
+  bool sync = false;  // files are on the disk before the next one is begun
   bool json = false;
   bool timings = false;
   bool explain = false;

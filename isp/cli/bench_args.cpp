@@ -15,8 +15,7 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
   app.add_option("--stage", args.stages, "stages to measure (default: all); --list names them")
       ->type_name("ID[,ID...]")
       ->delimiter(',')
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+      ->allow_extra_args(false);
   app.add_flag("--calibrate-cost", args.calibrate_cost,
                "measure how fast this machine develops, for develop --budget-ms, and keep it; 2 to 5 minutes")
       ->excludes("--stage");

@@ -1,9 +1,13 @@
 #include "isp/cli/calibrate_args.h"
 
+#include <filesystem>
+
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "isp/cli/option_values.h"
 #include "isp/cli/output_place.h"
+#include "isp/cli/raw_files.h"
 
 namespace lowlux::cli {
 namespace {
@@ -37,6 +41,15 @@ std::string wrong(const CalibrateArgs& args, const std::vector<std::string>& inp
   if (!args.output.ends_with(".json")) return "-o: profiles are .json, not " + args.output;
   if (!args.report.empty() && !args.report.ends_with(".html")) return "--report: reports are .html, not " + args.report;
   return wrong_names({args.output, args.report}, inputs);
+}
+
+/// A shell makes several words of bias/*.dng, and the option takes the first of them.
+std::string one_dark(const std::string& file) {
+  const std::string folder = std::filesystem::path(file).parent_path().string();
+  return fmt::format(
+      "--darks is {} alone, two or more are needed: give their folder (--darks {}), a quoted pattern or a "
+      "list separated by commas",
+      file, folder.empty() ? "." : folder + "/");
 }
 
 }  // namespace
@@ -74,7 +87,9 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
       "Without --darks there is one ordinary picture: noise is then measured in its even parts.");
   CalibrateNoiseArgs args;
   app.add_option("FRAMES", args.common.frames, "flats in pairs, or one ordinary picture")->required();
-  app.add_option("--darks", args.darks, "two or more dark frames")->type_name("FRAMES");
+  app.add_option("--darks", args.darks, "two or more dark frames: files, a folder or a quoted pattern; repeatable")
+      ->type_name("FILE[,FILE...]|FOLDER")
+      ->allow_extra_args(false);
   add_output(app, args.common);
   add_settings(app, args.common);
   app.add_flag("--steady-light", args.steady_light,
@@ -85,11 +100,15 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
       [&args](Method method) { args.method = method; },
       "for one picture: blocks, or single details (default ponomarenko)");
   if (const auto code = parse_words(app, words)) return *code;
+  const auto darks = raw_files_of_lists(args.darks);
+  if (!darks) return refuse(app, fmt::format("--darks: {}: {}", darks.error().where, darks.error().message));
+  args.darks = *darks;
   if (args.darks.empty() && args.common.frames.size() > 1) {
     return refuse(app, "several flats need --darks; without darks one picture is measured");
   }
   if (args.darks.empty() && args.steady_light) return refuse(app, "--steady-light: it is for flats");
   if (!args.darks.empty() && args.method) return refuse(app, "--method: it is for one picture, without --darks");
+  if (args.darks.size() == 1) return refuse(app, one_dark(args.darks.front()));
   std::vector<std::string> inputs = args.common.frames;
   inputs.insert(inputs.end(), args.darks.begin(), args.darks.end());
   if (const std::string what = wrong(args.common, inputs); !what.empty()) return refuse(app, what);

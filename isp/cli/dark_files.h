@@ -1,34 +1,64 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "calib/dark_frame.h"
 #include "calib/dark_stack.h"
+#include "calib/frame_setting.h"
 #include "isp/base/dark_frame.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 #include "isp/cli/args.h"
+#include "isp/cli/outputs.h"
 
 namespace lowlux::cli {
 
-/// The dark frames a command line names: files as they are, of folders the raw files in them by name. Errors: a folder
-/// without raw files; a picture that is itself among its darks; a black point beside darks, which hold it already.
-Result<std::vector<std::string>> dark_files(const DevelopArgs& args);
+/// The dark frames a command line names: see raw_files_of_lists. Errors: those, a picture that is itself among its
+/// darks, a black point besides darks, which hold it already.
+Result<std::vector<std::string>> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs);
 
-/// What all pictures' dark frames are made of.
-struct DarkSource {
-  std::vector<calib::DarkGroup> groups;
-  double noise_share = 0.1;
-  std::optional<double> doubling_c;
+/// What all pictures' dark frames are made of, and the last ones that were made. May be used from any thread.
+class DarkSource {
+ public:
+  /// @param request  what is the same for all pictures
+  DarkSource(std::vector<calib::DarkGroup> groups, const calib::DarkRequest& request)
+      : groups_(std::move(groups)), request_(request) {}
+
+  /// The dark frame of one picture: calib::make_dark_frame, with the picture's own masked pixels and tag, once for all
+  /// pictures that agree in these and in their setting. Errors: those of that, and of calib::check_below_picture.
+  Result<std::shared_ptr<const DarkFrame>> frame_for(const RawDn& picture);
+
+ private:
+  /// What a dark frame depends on.
+  struct Key {
+    calib::FrameSetting setting;
+    std::optional<PerSite<double>> masked_dn;
+    std::optional<PerSite<double>> pedestal_dn;
+    friend bool operator==(const Key&, const Key&) = default;
+  };
+  struct Made {
+    Key key;
+    std::shared_ptr<const DarkFrame> frame;
+  };
+  static constexpr std::size_t most_made = 4;  // exposures of a bracket, and one more
+
+  Result<std::shared_ptr<const DarkFrame>> make_or_find(const RawDn& picture, const Key& key,
+                                                        const calib::DarkRequest& request);
+
+  std::vector<calib::DarkGroup> groups_;
+  calib::DarkRequest request_;
+  std::mutex mutex_;
+  std::vector<Made> made_;  // the last used first
 };
 
 /// Reads the files one by one, adding them up. Errors: those of reading, of calib::DarkLibrary, and of the profile
 /// that --dark-doubling may name: another camera's, or without that figure.
-Result<DarkSource> read_darks(const std::vector<std::string>& files, const DarkArgs& args);
-
-/// The dark frame of one picture: calib::make_dark_frame, with the picture's own masked pixels and tag.
-Result<std::shared_ptr<const DarkFrame>> dark_frame_of(const DarkSource& darks, const RawDn& picture);
+Result<std::shared_ptr<DarkSource>> read_darks(const std::vector<std::string>& files, const DarkArgs& args);
 
 }  // namespace lowlux::cli

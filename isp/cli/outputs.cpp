@@ -1,12 +1,13 @@
 #include "isp/cli/outputs.h"
 
 #include <filesystem>
-#include <set>
+#include <map>
 #include <system_error>
 
 #include <fmt/format.h>
 
 #include "isp/cli/noise_maps.h"
+#include "isp/cli/raw_files.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::cli {
@@ -40,6 +41,26 @@ SampleType sample_type_of(FileFormat format, int bits) {
   return bits == 16 ? SampleType::u16 : SampleType::u8;
 }
 
+Result<std::vector<std::string>> inputs_of(const DevelopArgs& args) {
+  std::vector<std::string> out;
+  for (const std::string& input : args.inputs) {
+    const auto files = raw_files_of(input);
+    if (!files) return files;
+    out.insert(out.end(), files->begin(), files->end());
+  }
+  return out;
+}
+
+tl::unexpected<Error> written_twice(const std::string& output, const std::string& first, const std::string& second) {
+  if (same_file(first, second)) {
+    return fail(ErrorCode::invalid_argument, fmt::format("{} is given twice", second), "RAW");
+  }
+  return fail(ErrorCode::invalid_argument,
+              fmt::format("{} would be written twice, from {} and from {}: give each a run and a folder of its own",
+                          output, first, second),
+              "-o");
+}
+
 }  // namespace
 
 bool names_folder(const DevelopArgs& args) {
@@ -49,13 +70,15 @@ bool names_folder(const DevelopArgs& args) {
 
 Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string& extension) {
   const bool folder = names_folder(args);
-  if (args.inputs.size() > 1 && !folder) {
+  const auto inputs = inputs_of(args);
+  if (!inputs) return tl::make_unexpected(inputs.error());
+  if (inputs->size() > 1 && !folder) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("{} raw files need a folder to go to: '{}/'", args.inputs.size(), args.output), "-o");
+                fmt::format("{} raw files need a folder to go to: '{}/'", inputs->size(), args.output), "-o");
   }
   std::vector<Job> jobs;
-  std::set<std::string> taken;
-  for (const std::string& input : args.inputs) {
+  std::map<std::string, std::string> input_of;  // each file that is written
+  for (const std::string& input : *inputs) {
     std::string output = args.output;
     if (folder) {
       output = (fs::path(args.output) / fs::path(input).stem()).string() + "." +
@@ -66,9 +89,8 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
       for (std::string& map : noise_map_names(output)) files.push_back(std::move(map));
     }
     for (const std::string& file : files) {
-      if (!taken.insert(file).second) {
-        return fail(ErrorCode::invalid_argument, fmt::format("{} would be written twice", file), "-o");
-      }
+      const auto [first, is_new] = input_of.emplace(file, input);
+      if (!is_new) return written_twice(file, first->second, input);
     }
     if (same_file(input, output)) {
       return fail(ErrorCode::invalid_argument, fmt::format("{} would be replaced by what is made of it", input), "-o");

@@ -6,6 +6,7 @@
 
 #include "isp/base/result.h"
 #include "isp/cli/args.h"
+#include "isp/output/atomic_file.h"
 #include "isp/output/image_writer.h"
 
 namespace lowlux::cli {
@@ -14,11 +15,13 @@ namespace lowlux::cli {
 struct Job {
   std::string input;
   std::string output;
+  isp::Overwrite overwrite = isp::Overwrite::no;
 };
 
 /// The output of each input: `output` itself for one, files in it where it is a folder (it exists as one or ends
-/// with /), with `extension` unless the arguments name a format. Errors (command line wrong): several inputs and no
-/// folder, an unknown extension, two inputs for one picture, a picture that would replace its own raw file.
+/// with /), with `extension` unless the arguments name a format. Inputs that are folders stand for the raw files in
+/// them. Errors: those of raw_files_of; with ErrorCode::invalid_argument (command line wrong) several inputs and no
+/// folder, two inputs for one picture, a picture that would replace its own raw file.
 Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string& extension);
 
 /// Error (command line wrong): an output that would replace one of the files that are only read.

@@ -14,8 +14,8 @@ Error with_file(Error error, const std::string& file) {
 
 }  // namespace
 
-Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite) {
-  auto file = isp::AtomicFile::create(map.path, overwrite);
+Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite, isp::Sync sync) {
+  auto file = isp::AtomicFile::create(map.path, overwrite, sync);
   if (!file) return tl::make_unexpected(with_file(file.error(), map.path));
   if (const auto written = isp::encode_pfm(map.value.view(), file->file()); !written) {
     return tl::make_unexpected(with_file(written.error(), map.path));

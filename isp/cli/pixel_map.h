@@ -15,6 +15,6 @@ struct PixelMap {
 };
 
 /// Writes a map as grey PFM, whole or not at all. Errors name the file.
-Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite);
+Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite, isp::Sync sync = isp::Sync::no);
 
 }  // namespace lowlux::cli

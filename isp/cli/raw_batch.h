@@ -13,31 +13,44 @@
 #include "isp/cli/args.h"
 #include "isp/cli/cost_file.h"
 #include "isp/cli/dark_files.h"
+#include "isp/cli/memory_gate.h"
 #include "isp/cli/outputs.h"
 #include "isp/cli/pixel_map.h"
 #include "isp/cli/progress.h"
 #include "isp/cli/report.h"
 #include "isp/output/atomic_file.h"
+#include "isp/pipeline/pipeline_memory.h"
 #include "isp/pipeline/stage_clock.h"
 
 /// Raw files one after the other, several at a time, each to a file of its own: `develop` and `denoise`.
 namespace lowlux::cli {
+
+/// About the most memory that the work on one frame takes.
+using EstimateBytes = std::size_t (*)(const RawDn& raw, const isp::DevelopOptions& options, int threads);
 
 /// What all files share.
 struct RawBatch {
   const DevelopArgs& args;
   isp::DevelopOptions options;
   std::vector<Job> jobs;
-  std::optional<CameraProfile> profile;
-  std::optional<DarkSource> darks;
-  isp::Overwrite overwrite = isp::Overwrite::no;
-  std::shared_ptr<MachineSpeed> speed;              // with a budget: files then come one after the other
-  std::shared_ptr<const isp::CostModel> kept_cost;  // without one, where decisions are told and it is known
+  std::optional<CameraProfile> profile = std::nullopt;
+  std::shared_ptr<DarkSource> darks = nullptr;
+  isp::Sync sync = isp::Sync::no;
+  std::shared_ptr<MemoryGate> memory = nullptr;               // absent: --jobs says how many files at a time
+  EstimateBytes bytes_of = isp::expected_bytes;               // of one file
+  std::shared_ptr<MachineSpeed> speed = nullptr;              // with a budget: files then come one after the other
+  std::shared_ptr<const isp::CostModel> kept_cost = nullptr;  // without one, where decisions are told and it is known
 };
 
 /// Reads profile and darks and makes the output folder. Errors name their file.
 Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& options, std::vector<Job> jobs,
                             const std::vector<std::string>& darks);
+
+/// All that is written for one file: the output, and its maps.
+std::vector<std::string> files_of(const RawBatch& batch, const Job& job);
+
+/// The error, with `where` as its place if it has none.
+Error with_place(Error error, const std::string& where);
 
 /// A raw file ready to be worked on, with what holds for it: profile, darks, the noise of its picture.
 struct ReadyFrame {

@@ -14,8 +14,9 @@ namespace lowlux::cli {
 struct DevelopOutcome {
   std::string input;
   std::string output;
-  std::optional<Error> error;            // set: nothing was written
-  std::optional<isp::DevelopPlan> plan;  // set without an error
+  std::optional<Error> error;            // set: not all was written
+  std::optional<isp::DevelopPlan> plan;  // set without an error, unless skipped
+  bool skipped = false;                  // the outputs exist, and are kept
   int width = 0;                         // of the picture as written, upright
   int height = 0;
   std::vector<isp::StageTime> times;  // all stages, in order

@@ -164,6 +164,9 @@ Json exposure_json(const FrameInfo& info) {
 
 std::string develop_json(const DevelopOutcome& outcome) {
   if (outcome.error) return error_json(outcome.input, *outcome.error);
+  if (outcome.skipped) {
+    return dumped(Json{{"file", outcome.input}, {"ok", true}, {"output", outcome.output}, {"skipped", true}});
+  }
   const isp::DevelopPlan& plan = *outcome.plan;
   Json json{{"file", outcome.input},
             {"ok", true},

@@ -6,6 +6,7 @@
 #include "isp/cli/args.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/outputs.h"
+#include "isp/cli/print.h"
 #include "isp/cli/raw_batch.h"
 #include "isp/cli/source_names.h"
 #include "isp/cli/verbs.h"
@@ -33,9 +34,10 @@ Result<void> denoise_file(const RawBatch& batch, const Job& job, Executor& execu
   progress.reach(0.8);
   isp::StageClock finish(out.times);
   const Result<void> written = isp::write_dng(clean->frame, job.output,
-                                              {.overwrite = batch.overwrite,
+                                              {.overwrite = job.overwrite,
                                                .software = "lowlux " + version_number(),
-                                               .description = description_of(clean->plan.noise_reduction)});
+                                               .description = description_of(clean->plan.noise_reduction),
+                                               .sync = batch.sync});
   finish.lap("write");
   if (!written) return fail(written.error().code, written.error().message, job.output);
   out.width = clean->frame.raw.default_crop.width;
@@ -44,10 +46,22 @@ Result<void> denoise_file(const RawBatch& batch, const Job& job, Executor& execu
   return write_noise_maps(batch, job, std::move(clean->maps), ready->frame.raw, executor);
 }
 
+int failed(const Error& error) {
+  print_err("{}\n", error_line(error.where, error));
+  return exit_failed;
+}
+
 int usage_error(const Error& error) {
   const std::string place = error.where.empty() ? "" : error.where + ": ";
   print_err("{}\n", one_line("lowlux denoise: " + place + error.message));
   return exit_usage;
+}
+
+/// The maps are always made, and there are codes in place of a picture.
+std::size_t clean_raw_bytes(const RawDn& raw, const isp::DevelopOptions& options, int threads) {
+  isp::DevelopOptions with_maps = options;
+  with_maps.denoise.maps = true;
+  return isp::expected_bytes(raw, with_maps, threads);
 }
 
 /// Nothing is rendered: what a plan decides of colour and tone is not used.
@@ -68,21 +82,19 @@ int run_denoise(const std::vector<std::string>& words) {
   const auto& args = std::get<DevelopArgs>(parsed);
 
   Result<std::vector<Job>> jobs = plan_outputs(args, "dng");
-  if (!jobs) return usage_error(jobs.error());
+  if (!jobs) return jobs.error().code == ErrorCode::invalid_argument ? usage_error(jobs.error()) : failed(jobs.error());
   if (!jobs->front().output.ends_with(".dng")) {
     return usage_error({ErrorCode::invalid_argument, "a clean raw is a DNG: its name ends with .dng", "-o"});
   }
-  const Result<std::vector<std::string>> darks = dark_files(args);
+  const Result<std::vector<std::string>> darks = dark_files(args, *jobs);
   if (!darks) return usage_error(darks.error());
   std::vector<std::string> only_read = *darks;
   only_read.insert(only_read.end(), {args.profile, args.black_profile, args.dark.doubling_profile});
   if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed) return usage_error(unharmed.error());
 
-  const Result<RawBatch> batch = make_batch(args, without_rendering(args.options), *std::move(jobs), *darks);
-  if (!batch) {
-    print_err("{}\n", error_line(batch.error().where, batch.error()));
-    return exit_failed;
-  }
+  Result<RawBatch> batch = make_batch(args, without_rendering(args.options), *std::move(jobs), *darks);
+  if (!batch) return failed(batch.error());
+  batch->bytes_of = clean_raw_bytes;
   return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {
     return denoise_file(*batch, job, executor, progress, out);
   });

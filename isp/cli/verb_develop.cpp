@@ -7,6 +7,7 @@
 #include "isp/cli/exit_code.h"
 #include "isp/cli/outputs.h"
 #include "isp/cli/picture_options.h"
+#include "isp/cli/print.h"
 #include "isp/cli/raw_batch.h"
 #include "isp/cli/verbs.h"
 #include "isp/output/image_writer.h"
@@ -30,8 +31,10 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
   isp::StageClock finish(out.times);
   const Picture upright = isp::oriented(std::move(developed->picture), raw.info.orientation, executor);
   finish.lap("orientation");
-  const Result<void> written =
-      isp::write_picture(upright, batch.options.space, raw.info, job.output, write_options(batch.args), executor);
+  isp::WriteOptions write = write_options(batch.args);
+  write.overwrite = job.overwrite;
+  write.sync = batch.sync;
+  const Result<void> written = isp::write_picture(upright, batch.options.space, raw.info, job.output, write, executor);
   finish.lap("encode and write");
   if (!written) return fail(written.error().code, written.error().message, job.output);
   std::visit([&](const auto& picture) { out.width = picture.width(), out.height = picture.height(); }, upright);
@@ -40,6 +43,11 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
     out.plan->warnings.emplace_back("no maps were written: the noise is left as it is");
   }
   return write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);
+}
+
+int failed(const Error& error) {
+  print_err("{}\n", error_line(error.where, error));
+  return exit_failed;
 }
 
 int usage_error(const Error& error) {
@@ -56,7 +64,7 @@ int run_develop(const std::vector<std::string>& words) {
   const auto& args = std::get<DevelopArgs>(parsed);
 
   Result<std::vector<Job>> jobs = plan_outputs(args, "png");
-  if (!jobs) return usage_error(jobs.error());
+  if (!jobs) return jobs.error().code == ErrorCode::invalid_argument ? usage_error(jobs.error()) : failed(jobs.error());
   const Result<isp::FileFormat> format = isp::format_of(jobs->front().output);
   if (!format) return usage_error(format.error());
   if (!args.format.empty() && !names_folder(args)) {
@@ -66,22 +74,16 @@ int run_develop(const std::vector<std::string>& words) {
   Result<isp::DevelopOptions> options = complete_options(args, *format);
   if (!options) return usage_error(options.error());
 
-  const Result<std::vector<std::string>> darks = dark_files(args);
+  const Result<std::vector<std::string>> darks = dark_files(args, *jobs);
   if (!darks) return usage_error(darks.error());
   std::vector<std::string> only_read = *darks;
   only_read.insert(only_read.end(),
                    {args.profile, args.black_profile, args.dark.doubling_profile, args.look.coefficients});
   if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed) return usage_error(unharmed.error());
 
-  if (const auto made = make_for_display(args, *options); !made) {
-    print_err("{}\n", error_line(made.error().where, made.error()));
-    return exit_failed;
-  }
+  if (const auto made = make_for_display(args, *options); !made) return failed(made.error());
   const Result<RawBatch> batch = make_batch(args, *options, *std::move(jobs), *darks);
-  if (!batch) {
-    print_err("{}\n", error_line(batch.error().where, batch.error()));
-    return exit_failed;
-  }
+  if (!batch) return failed(batch.error());
   return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {
     return develop_file(*batch, job, executor, progress, out);
   });

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calib/dark_library.h"
+#include "calib/light_in_darks.h"
 #include "capture/synthetic/fixed_pattern.h"
 #include "tests/sensor_bench/sensor_bench.h"
 
@@ -230,7 +231,9 @@ TEST(DarkFrame, PixelsThatAreFullOrTooNoisyAreToBeRepaired) {
 std::string refusal(const SensorBench& darks, const RawDn& picture, const DarkRequest& request = {}, int frames = 2,
                     isp::Exposure exposure = {4, 20}) {
   const auto dark = make_dark_frame(darks_of(darks, {exposure}, frames), picture, request);
-  return dark ? "" : dark.error().message;
+  if (!dark) return dark.error().message;
+  const auto below = check_below_picture(picture, *dark);
+  return below ? "" : below.error().message;
 }
 
 const SensorBench small{.sensor = test::hot_sensor(), .width = 96, .height = 96};

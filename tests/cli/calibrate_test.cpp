@@ -150,8 +150,8 @@ TEST_F(Calibrate, NoiseFindsGainReadNoiseAndFullWell) {
     flats = joined(flats, shoot("f" + std::to_string(n++), "flat", "0.1", 2, {"--luminance", luminance}));
   }
   Words words = joined({"calibrate", "noise", "-o", file("p.json"), "--report", file("p.html"), "--json"}, flats);
-  words.emplace_back("--darks");
-  const auto done = lowlux(joined(words, darks));
+  for (const std::string& dark : darks) words = joined(words, {"--darks", dark});
+  const auto done = lowlux(words);
   ASSERT_EQ(done.exit_code, 0) << done.err;
   const Json out = Json::parse(done.out);
   EXPECT_EQ(out["profile"], profile("p.json"));
@@ -271,9 +271,9 @@ TEST_F(Calibrate, BadFramesAreOneErrorAndNoProfile) {
   refused({"calibrate", "black", dark[0], dark[1], shoot("e", "dark", "2", 1)[0]}, "one dark frame at 2 s");
   refused({"calibrate", "black", dark[0], "--add-to", file("missing.json")}, "missing.json");
   const Words more = shoot("m", "dark", "1", 2);
-  refused({"calibrate", "noise", more[0], more[1], "--darks", dark[0], dark[1]}, "not brighter than the darks");
-  refused({"calibrate", "noise", more[0], wide[0], "--darks", dark[0], dark[1]}, "130 x 128 pixels");
-  refused({"calibrate", "noise", more[0], "--darks", dark[0], dark[1]}, "no two flats make a pair");
+  refused({"calibrate", "noise", more[0], more[1], "--darks", dark[0] + "," + dark[1]}, "not brighter than the darks");
+  refused({"calibrate", "noise", more[0], wide[0], "--darks", dark[0] + "," + dark[1]}, "130 x 128 pixels");
+  refused({"calibrate", "noise", more[0], "--darks", dark[0] + "," + dark[1]}, "no two flats make a pair");
   refused({"calibrate", "quoted", "nosuch"}, "nosuch");
   scratch_.write("future.json", R"({"format": "lowlux camera profile", "version": 9})");
   refused({"calibrate", "black", dark[0], "--add-to", file("future.json")}, "version");
@@ -322,7 +322,7 @@ TEST_F(Calibrate, NoInputAndNoOutputIsReplacedByAnother) {
   };
   usage({"calibrate", "black", dark[0], dark[1], "-o", dark[0], "--force"}, "profiles are .json");
   usage({"calibrate", "black", dark[0], dark[0], "-o", file("p.json")}, "given twice");
-  usage({"calibrate", "noise", dark[0], "--darks", dark[1], dark[0], "-o", file("p.json")}, "given twice");
+  usage({"calibrate", "noise", dark[0], "--darks", dark[1] + "," + dark[0], "-o", file("p.json")}, "given twice");
   usage({"calibrate", "black", dark[0], "-o", file("p.json"), "--report", file("p.json")}, ".html");
   usage({"calibrate", "noise", dark[0], "-o", file("p.json"), "--steady-light"}, "for flats");
   usage({"calibrate", "noise", dark[0], "--darks", dark[1], "-o", file("p.json"), "--method", "foi"}, "one picture");

@@ -48,7 +48,7 @@ class Pages:
         for i, luminance in enumerate(["0.05", "0.1", "0.2", "0.4", "0.7", "1", "1.4", "20"]):
             flats += self._shoot(f"flat{i}", "flat", "0.1", 2 + i, "--luminance", luminance)
         page = self.path("calibration.html")
-        self.run("calibrate", "noise", *flats, "--darks", *darks, "-o", self.path("camera.json"), "--report", page)
+        self.run("calibrate", "noise", *flats, "--darks", ",".join(darks), "-o", self.path("camera.json"), "--report", page)
         return page
 
     def reproduction(self):

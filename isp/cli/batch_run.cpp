@@ -1,0 +1,148 @@
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <filesystem>
+#include <new>
+#include <optional>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "isp/cli/exit_code.h"
+#include "isp/cli/interruption.h"
+#include "isp/cli/print.h"
+#include "isp/cli/raw_batch.h"
+
+namespace lowlux::cli {
+namespace {
+
+void print_outcome(const DevelopArgs& args, const DevelopOutcome& outcome) {
+  if (outcome.error) return print_err("{}\n", error_line(outcome.input, *outcome.error));
+  if (!outcome.plan) return;  // skipped
+  if (!args.quiet) {
+    for (const std::string& warning : outcome.plan->warnings) {
+      print_err("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome.input, warning)));
+    }
+  }
+  if (args.json) return;
+  if (args.explain) print_out("{}\n{}", one_line(outcome.input), explain_text(*outcome.plan));
+  if (args.timings) print_out("{}\n{}", one_line(outcome.input), times_text(outcome.times));
+}
+
+/// The work on all files. Of a file that is done, counts stay and what is to be printed at the end, no more: memory
+/// does not grow with the number of files.
+class BatchRun {
+ public:
+  BatchRun(const RawBatch& batch, const RawWork& work)
+      : batch_(batch),
+        work_(work),
+        files_(static_cast<int>(batch.jobs.size())),
+        progress_(files_, !batch.args.quiet),
+        json_(batch.args.json ? batch.jobs.size() : 0) {}
+
+  int run() {
+    std::optional<InterruptionReport> interruption;
+    if (!batch_.args.quiet) interruption.emplace([this] { return interruption_text(); });
+    work_on_all();
+    print_summary();
+    return failed_ > 0 ? exit_failed : exit_done;
+  }
+
+ private:
+  int worker_count() const {
+    const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    return batch_.speed ? 1 : std::min(files_, batch_.args.jobs > 0 ? batch_.args.jobs : processors);
+  }
+
+  void work_on_all() {
+    const int workers = worker_count();
+    std::vector<std::jthread> threads;
+    threads.reserve(workers);
+    try {
+      for (int i = 1; i < workers; ++i) threads.emplace_back([this, workers] { take_files(workers); });
+    } catch (const std::system_error&) {
+      // The system gives no more threads: those there are do the work.
+    }
+    take_files(workers);
+  }
+
+  /// Each worker takes the next file: while one reads, another renders or encodes.
+  void take_files(int workers) {
+    PoolExecutor executor(threads_of_each(workers));
+    for (int i = next_++; i < files_; i = next_++) {
+      if (batch_.memory) batch_.memory->enter();
+      finish(i, outcome_of(batch_.jobs[i], executor));
+      if (batch_.memory) batch_.memory->leave();
+    }
+  }
+
+  DevelopOutcome outcome_of(const Job& job, Executor& executor) {
+    DevelopOutcome out{job.input, job.output};
+    FileProgress progress(progress_, job.input);
+    const std::vector<std::string> files = files_of(batch_, job);
+    const auto exists = [](const std::string& file) {
+      std::error_code ignored;
+      return std::filesystem::exists(file, ignored);
+    };
+    out.skipped = batch_.args.skip_existing && std::ranges::all_of(files, exists);
+    if (out.skipped) return out;
+    Job own = job;
+    const bool partial = batch_.args.skip_existing && std::ranges::any_of(files, exists);  // left by a killed run
+    if (batch_.args.force || partial) own.overwrite = isp::Overwrite::yes;
+    try {
+      const Result<void> worked = work_(own, executor, progress, out);
+      if (!worked) out.error = with_place(worked.error(), job.input);
+    } catch (const std::bad_alloc&) {
+      out.error = Error{ErrorCode::too_large, "not enough memory; --jobs 1 takes the least", job.input};
+    } catch (const std::exception& failure) {
+      out.error = Error{ErrorCode::too_large, failure.what(), job.input};
+    }
+    if (out.error && out.error->code == ErrorCode::exists && batch_.args.skip_existing) {  // another run was faster
+      out.error.reset();
+      out.plan.reset();
+      out.skipped = true;
+    }
+    return out;
+  }
+
+  void finish(int index, const DevelopOutcome& outcome) {
+    ++(outcome.error ? failed_ : outcome.skipped ? skipped_ : done_);
+    if (batch_.args.json) json_[static_cast<std::size_t>(index)] = develop_json(outcome);
+    progress_.print([&] { print_outcome(batch_.args, outcome); });
+  }
+
+  void print_summary() const {
+    if (batch_.args.json) print_out("[{}]\n", fmt::join(json_, ",\n"));
+    const bool chatty = batch_.args.explain || batch_.args.timings;
+    if (batch_.memory && chatty && !batch_.args.json) {
+      if (const auto text = batch_.memory->limit_text()) print_out("{} files: {}\n", files_, *text);
+    }
+    if (skipped_ > 0 && !batch_.args.quiet) {
+      print_err("lowlux: {} of {} files skipped: their outputs exist\n", skipped_.load(), files_);
+    }
+    if (failed_ > 0 && files_ > 1) print_err("lowlux: {} of {} files failed\n", failed_.load(), files_);
+  }
+
+  std::string interruption_text() const {
+    const char* const advice = batch_.args.force ? "" : "; run again with --skip-existing";
+    return fmt::format("{} of {} files done{}", done_ + skipped_, files_, advice);
+  }
+
+  const RawBatch& batch_;
+  const RawWork& work_;
+  int files_;
+  Progress progress_;
+  std::vector<std::string> json_;  // in the order of the files
+  std::atomic<int> next_{0};
+  std::atomic<int> done_{0};
+  std::atomic<int> skipped_{0};
+  std::atomic<int> failed_{0};
+};
+
+}  // namespace
+
+int run_batch(const RawBatch& batch, const RawWork& work) { return BatchRun(batch, work).run(); }
+
+}  // namespace lowlux::cli
