@@ -76,7 +76,8 @@ Error system_error(const std::string& what, int number) {
   return {ErrorCode::unreadable, what + ": " + std::system_category().message(number), {}};
 }
 
-/// Starts a program with all signals as at the start of a program, and nothing but its two files.
+/// Starts a program with all signals as at the start of a program, and nothing but its two files. It has a process group
+/// of its own: what a terminal sends to its programs reaches the caller alone, and the child ends with it.
 Result<pid_t> start(const std::vector<std::string>& command, int file, int result) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -92,7 +93,8 @@ Result<pid_t> start(const std::vector<std::string>& command, int file, int resul
   sigemptyset(&none);
   posix_spawnattr_setsigdefault(&attributes, &all);
   posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
   std::vector<char*> words;
   words.reserve(command.size() + 1);
   for (const std::string& word : command) words.push_back(const_cast<char*>(word.c_str()));

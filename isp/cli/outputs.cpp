@@ -44,7 +44,7 @@ SampleType sample_type_of(FileFormat format, int bits) {
 Result<std::vector<std::string>> inputs_of(const DevelopArgs& args) {
   std::vector<std::string> out;
   for (const std::string& input : args.inputs) {
-    const auto files = raw_files_of(input);
+    auto files = raw_files_of(input);
     if (!files) return files;
     out.insert(out.end(), files->begin(), files->end());
   }

@@ -45,7 +45,7 @@ Result<std::vector<std::string>> files_in_folder(const std::string& folder) {
 
 Result<std::vector<std::string>> files_of_pattern(const std::string& pattern) {
   glob_t matches{};
-  const int failure = glob(pattern.c_str(), 0, nullptr, &matches);
+  const int failure = glob(pattern.c_str(), 0, nullptr, &matches);  // NOLINT(concurrency-mt-unsafe): one thread yet
   std::vector<std::string> found(matches.gl_pathv, matches.gl_pathv + (failure == 0 ? matches.gl_pathc : 0));
   globfree(&matches);
   if (found.empty()) return fail(ErrorCode::not_found, "no file matches", pattern);
@@ -69,7 +69,7 @@ Result<std::vector<std::string>> raw_files_of_lists(const std::vector<std::strin
     std::error_code ignored;
     const bool one = fs::exists(argument, ignored);
     for (const std::string& name : one ? std::vector<std::string>{argument} : words_of(argument)) {
-      const auto found = raw_files_of(name);
+      auto found = raw_files_of(name);
       if (!found) return found;
       files.insert(files.end(), found->begin(), found->end());
     }

@@ -129,9 +129,11 @@ Temporary make_temporary(const std::string& directory) {
   const std::lock_guard guard(all.mutex);
   const std::string prefix = temporary_prefix();
   if (all.swept.insert(directory).second) sweep(directory, prefix);
+  std::string stem = directory;
+  stem.append("/").append(prefix).append(std::to_string(getpid())).append("-");
   for (;;) {
     Temporary out;
-    out.name = directory + "/" + prefix + std::to_string(getpid()) + "-" + std::to_string(all.made++) + ".part";
+    out.name = stem + std::to_string(all.made++) + ".part";
     out.descriptor = open(out.name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (out.descriptor < 0 && errno == EEXIST) continue;  // of another process with this number
     if (out.descriptor < 0) {
