@@ -18,7 +18,7 @@ struct ProcessResult {
   double peak_bytes = 0;  // largest resident memory; at least what the test had when it started the program
 };
 
-/// A program with its output captured and no standard input.
+/// A program in a process group of its own, with its output captured and no standard input.
 class RunningProcess {
  public:
   explicit RunningProcess(const std::vector<std::string>& command);
@@ -27,6 +27,7 @@ class RunningProcess {
   RunningProcess& operator=(const RunningProcess&) = delete;
 
   void send(int signal) const;
+  void send_to_group(int signal) const;  // to the processes that it started too
   ProcessResult wait();
 
  private:
