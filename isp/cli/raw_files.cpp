@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What cameras write; truths, profiles and notes may lie beside them.
+// What cameras write; a folder may also hold reference images, profiles and notes.
 constexpr std::array<std::string_view, 24> raw_extensions{
     ".dng", ".cr2", ".cr3", ".crw", ".nef", ".nrw", ".arw", ".srf", ".sr2", ".raf", ".orf", ".rw2",
     ".pef", ".srw", ".3fr", ".fff", ".iiq", ".mos", ".mrw", ".kdc", ".dcr", ".erf", ".rwl", ".raw"};

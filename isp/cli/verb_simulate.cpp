@@ -85,7 +85,7 @@ std::string wrong_files(const SimulateArgs& args) {
   return {};
 }
 
-/// No work is begun that would end at a file that is in the way. A run that fails later (a full disk) or is interrupted
+/// No work is begun that would end at a file that exists. A run that fails later (a full disk) or is interrupted
 /// leaves the frames that were finished, each of them whole.
 Result<void> check_free(const Files& files, const SimulateArgs& args) {
   std::vector<std::string> all = files.frames;
