@@ -19,11 +19,11 @@ namespace {
 
 int failed(const std::string& file, const Error& error) {
   if (error.code == ErrorCode::invalid_argument) {
-    print_err("{}\n",
-              one_line("lowlux info: " + error.message + (error.where.empty() ? "" : " (" + error.where + ")")));
+    print_err(fmt::format(
+        "{}\n", one_line("lowlux info: " + error.message + (error.where.empty() ? "" : " (" + error.where + ")"))));
     return exit_usage;
   }
-  print_err("{}\n", error_line(file, error));
+  print_err(fmt::format("{}\n", error_line(file, error)));
   return exit_failed;
 }
 
@@ -47,9 +47,9 @@ int run_advise(const InfoArgs& args) {
     if (!written) return failed(args.advise.report, written.error());
   }
   if (args.json) {
-    print_out("{}\n", advice_json(*asked, *advice));
+    print_out(fmt::format("{}\n", advice_json(*asked, *advice)));
   } else {
-    print_out("{}", advice_text(*asked, *advice));
+    print_out(fmt::format("{}", advice_text(*asked, *advice)));
   }
   return exit_done;
 }

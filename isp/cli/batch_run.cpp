@@ -19,16 +19,16 @@ namespace lowlux::cli {
 namespace {
 
 void print_outcome(const DevelopArgs& args, const DevelopOutcome& outcome) {
-  if (outcome.error) return print_err("{}\n", error_line(outcome.input, *outcome.error));
+  if (outcome.error) return print_err(fmt::format("{}\n", error_line(outcome.input, *outcome.error)));
   if (!outcome.plan) return;  // skipped
   if (!args.quiet) {
     for (const std::string& warning : outcome.plan->warnings) {
-      print_err("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome.input, warning)));
+      print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome.input, warning))));
     }
   }
   if (args.json) return;
-  if (args.explain) print_out("{}\n{}", one_line(outcome.input), explain_text(*outcome.plan));
-  if (args.timings) print_out("{}\n{}", one_line(outcome.input), times_text(outcome.times));
+  if (args.explain) print_out(fmt::format("{}\n{}", one_line(outcome.input), explain_text(*outcome.plan)));
+  if (args.timings) print_out(fmt::format("{}\n{}", one_line(outcome.input), times_text(outcome.times)));
 }
 
 /// The work on all files. Of a file that is done, counts stay and what is to be printed at the end, no more: memory
@@ -114,15 +114,15 @@ class BatchRun {
   }
 
   void print_summary() const {
-    if (batch_.args.json) print_out("[{}]\n", fmt::join(json_, ",\n"));
+    if (batch_.args.json) print_out(fmt::format("[{}]\n", fmt::join(json_, ",\n")));
     const bool chatty = batch_.args.explain || batch_.args.timings;
     if (batch_.memory && chatty && !batch_.args.json) {
-      if (const auto text = batch_.memory->limit_text()) print_out("{} files: {}\n", files_, *text);
+      if (const auto text = batch_.memory->limit_text()) print_out(fmt::format("{} files: {}\n", files_, *text));
     }
     if (skipped_ > 0 && !batch_.args.quiet) {
-      print_err("lowlux: {} of {} files skipped: their outputs exist\n", skipped_.load(), files_);
+      print_err(fmt::format("lowlux: {} of {} files skipped: their outputs exist\n", skipped_.load(), files_));
     }
-    if (failed_ > 0 && files_ > 1) print_err("lowlux: {} of {} files failed\n", failed_.load(), files_);
+    if (failed_ > 0 && files_ > 1) print_err(fmt::format("lowlux: {} of {} files failed\n", failed_.load(), files_));
   }
 
   std::string interruption_text() const {

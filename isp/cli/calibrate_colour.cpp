@@ -91,17 +91,17 @@ int run_calibrate_colour(const std::vector<std::string>& words) {
   if (!outcome) {
     const std::string& input = args.chart.empty() ? args.camera : args.chart;
     const std::string& where = outcome.error().where;
-    print_err("{}\n", error_line(where.empty() ? input : where, outcome.error()));
-    if (args.json) print_out("{}\n", error_json(input, outcome.error()));
+    print_err(fmt::format("{}\n", error_line(where.empty() ? input : where, outcome.error())));
+    if (args.json) print_out(fmt::format("{}\n", error_json(input, outcome.error())));
     return exit_failed;
   }
   for (const std::string& warning : outcome->warnings) {
-    print_err("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome->input, warning)));
+    print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome->input, warning))));
   }
   if (args.json) {
-    print_out("{}\n", colour_json(*outcome, args.output));
+    print_out(fmt::format("{}\n", colour_json(*outcome, args.output)));
   } else {
-    print_out("{}", colour_text(*outcome));
+    print_out(fmt::format("{}", colour_text(*outcome)));
   }
   return exit_done;
 }

@@ -109,8 +109,8 @@ calib::Measured measured_today(std::vector<std::string> files) {
 
 int calibration_failed(const CalibrateArgs& args, const Error& error) {
   const std::string what = error.where.empty() ? "calibrate" : error.where;
-  print_err("{}\n", error_line(what, error));
-  if (args.json) print_out("{}\n", error_json(what, error));
+  print_err(fmt::format("{}\n", error_line(what, error)));
+  if (args.json) print_out(fmt::format("{}\n", error_json(what, error)));
   return exit_failed;
 }
 
@@ -134,15 +134,15 @@ int finish(const CalibrateArgs& args, const Calibration& found) {
   }
   if (!args.quiet) {
     for (const std::string& warning : found.warnings) {
-      print_err("{}\n", one_line("lowlux: warning: " + warning));
+      print_err(fmt::format("{}\n", one_line("lowlux: warning: " + warning)));
     }
   }
   if (args.json) {
     const nlohmann::ordered_json json{
         {"output", args.output}, {"warnings", found.warnings}, {"profile", nlohmann::ordered_json::parse(*text)}};
-    print_out("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    print_out(fmt::format("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
   } else {
-    print_out("{}", found.text);
+    print_out(fmt::format("{}", found.text));
   }
   return exit_done;
 }

@@ -48,8 +48,8 @@ Json listing_json(const std::vector<CameraListing>& cameras) {
 
 void print_listing(const char* option, const std::vector<CameraListing>& cameras) {
   for (const CameraListing& camera : cameras) {
-    print_out("{}\n", one_line(fmt::format("{} {}  {}", option, camera.id, camera.name)));
-    for (const std::string& format : camera.formats) print_out("    {}\n", one_line(format));
+    print_out(fmt::format("{}\n", one_line(fmt::format("{} {}  {}", option, camera.id, camera.name))));
+    for (const std::string& format : camera.formats) print_out(fmt::format("    {}\n", one_line(format)));
     if (camera.formats.empty()) print_out("    no raw format\n");
   }
 }
@@ -62,14 +62,15 @@ int list_cameras(bool json) {
     const Json all{{"v4l2", listing_json(found.v4l2)},
                    {"libcamera", listing_json(found.libcamera)},
                    {"note", found.note.empty() ? Json(nullptr) : Json(found.note)}};
-    print_out("{}\n", all.dump(2, ' ', false, Json::error_handler_t::replace));
+    print_out(fmt::format("{}\n", all.dump(2, ' ', false, Json::error_handler_t::replace)));
     return exit_done;
   }
   print_listing("--v4l2", found.v4l2);
   print_listing("--libcamera", found.libcamera);
   if (found.v4l2.empty() && found.libcamera.empty()) print_out("no cameras\n");
   if (!found.note.empty()) {
-    print_err("{}\n", one_line(fmt::format("lowlux: note: libcamera's cameras are left out: {}", found.note)));
+    print_err(
+        fmt::format("{}\n", one_line(fmt::format("lowlux: note: libcamera's cameras are left out: {}", found.note))));
   }
   return exit_done;
 }

@@ -173,7 +173,8 @@ class LiveSink final : public CaptureSink {
   void warn_of_colours(const lowlux_stage_params& params) const {
     const bool known = !args_.develop.profile.empty() || (params.valid & LOWLUX_STAGE_HAS_COLOUR_MATRIX) != 0;
     if (known || args_.develop.quiet || stream_.format.raw.layout != SensorLayout::bayer) return;
-    print_err("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", stream_.camera, capture::colours_unknown)));
+    print_err(fmt::format("{}\n",
+                          one_line(fmt::format("lowlux: {}: warning: {}", stream_.camera, capture::colours_unknown))));
   }
 
   const CaptureArgs& args_;

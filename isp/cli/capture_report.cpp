@@ -95,7 +95,7 @@ void CaptureProgress::show(const CaptureState& state) {
   const auto now = std::chrono::steady_clock::now();
   if (!wanted_ || now < next_) return;
   next_ = now + std::chrono::seconds(1);
-  print_err("\r\033[K{}", progress_text(state));
+  print_err(fmt::format("\r\033[K{}", progress_text(state)));
   std::fflush(stderr);
   shown_ = true;
 }

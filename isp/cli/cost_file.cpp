@@ -163,8 +163,9 @@ Result<isp::CostModel> calibrate_cost(int threads, bool quiet, std::string& writ
   if (!path) return model;
   if (const auto written = write_cost(*path, *model); !written) {
     progress.print([&] {
-      print_err("{}\n", one_line(fmt::format("lowlux: warning: {}: this machine's speed is measured anew each time: {}",
-                                             *path, written.error().message)));
+      print_err(fmt::format(
+          "{}\n", one_line(fmt::format("lowlux: warning: {}: this machine's speed is measured anew each time: {}",
+                                       *path, written.error().message))));
     });
   } else {
     written_to = *path;
@@ -176,11 +177,11 @@ isp::CostModel cost_of_this_machine(int threads, bool quiet) {
   auto kept = kept_cost(threads);
   if (kept) return *std::move(kept);
   if (!quiet) {
-    print_err(
+    print_err(fmt::format(
         "{}\n",
         one_line("lowlux: times are rough estimates until `lowlux bench --calibrate-cost` (2 to 5 minutes) measures "
                  "this machine: " +
-                 kept.error().message));
+                 kept.error().message)));
   }
   return isp::reference_cost();
 }

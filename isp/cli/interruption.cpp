@@ -12,6 +12,8 @@
 #include <thread>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "isp/cli/print.h"
 #include "isp/output/atomic_file.h"
 
@@ -48,7 +50,7 @@ void end_when_asked() {
     Report& current = report();
     const std::lock_guard guard(current.mutex);
     const char* const clear_line = ::isatty(STDERR_FILENO) == 1 ? "\r\033[K" : "";
-    if (current.text) print_err("{}lowlux: interrupted: {}\n", clear_line, current.text());
+    if (current.text) print_err(fmt::format("{}lowlux: interrupted: {}\n", clear_line, current.text()));
   }
   const int number = arrived_signal;
   std::signal(number, SIG_DFL);

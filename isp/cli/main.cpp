@@ -61,14 +61,14 @@ int run_verb(const std::vector<std::string>& args) {
   }
   std::array<std::string_view, verbs.size()> names;
   std::ranges::transform(verbs, names.begin(), &Verb::name);
-  print_err("{}\n", one_line(fmt::format("lowlux: unknown verb '{}'{}; `lowlux --help` lists them", first,
-                                         suggestion(first, names))));
+  print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: unknown verb '{}'{}; `lowlux --help` lists them", first,
+                                                     suggestion(first, names)))));
   return exit_usage;
 }
 
 int run(std::vector<std::string> args) {
   if (args.empty()) {
-    print_err("{}", help_text());
+    print_err(help_text());
     return exit_usage;
   }
   if (args.front() == "help" && args.size() > 1) {  // help VERB: VERB --help
@@ -77,11 +77,11 @@ int run(std::vector<std::string> args) {
   }
   const std::string& first = args.front();
   if (first == "--help" || first == "-h" || first == "help") {
-    print_out("{}", help_text());
+    print_out(help_text());
     return exit_done;
   }
   if (first == "--version" || first == "-v") {
-    print_out("{}\n", version_text());
+    print_out(fmt::format("{}\n", version_text()));
     return exit_done;
   }
   if (!isp::cpu_runs_raw_to_rgb()) {
@@ -110,7 +110,7 @@ int run_process(const std::vector<std::string>& args) {
   } catch (const std::bad_alloc&) {
     print_err("lowlux: not enough memory\n");
   } catch (const std::exception& failure) {
-    print_err("{}\n", one_line(std::string("lowlux: ") + failure.what()));
+    print_err(fmt::format("{}\n", one_line(std::string("lowlux: ") + failure.what())));
   }
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
   print_err("lowlux: cannot write to standard output\n");

@@ -149,7 +149,7 @@ CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::strin
 }
 
 int refuse(const CLI::App& app, const std::string& wrong) {
-  print_err("{}\n", one_line(fmt::format("{}: {}; --help lists the options", app.get_name(), wrong)));
+  print_err(fmt::format("{}\n", one_line(fmt::format("{}: {}; --help lists the options", app.get_name(), wrong))));
   return exit_usage;
 }
 

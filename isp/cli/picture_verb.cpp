@@ -18,15 +18,15 @@ namespace {
 
 int usage_error(const PictureVerb& verb, const Error& error) {
   const std::string place = error.where.empty() ? "" : error.where + ": ";
-  print_err("{}\n", one_line("lowlux " + verb.name + ": " + place + error.message));
+  print_err(fmt::format("{}\n", one_line("lowlux " + verb.name + ": " + place + error.message)));
   return exit_usage;
 }
 
 int failed(const PictureVerb& verb, Error error) {
   const std::string& input = verb.inputs.front();
   if (error.where.empty()) error.where = input;
-  print_err("{}\n", error_line(input, error));
-  if (verb.json) print_out("{}\n", error_json(input, error));
+  print_err(fmt::format("{}\n", error_line(input, error)));
+  if (verb.json) print_out(fmt::format("{}\n", error_json(input, error)));
   return exit_failed;
 }
 
@@ -57,7 +57,7 @@ int run_picture_verb(const PictureVerb& verb, const PictureWork& work) {
   if (!warnings) return failed(verb, warnings.error());
   if (verb.quiet) return exit_done;
   for (const std::string& warning : *warnings) {
-    print_err("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", verb.inputs.front(), warning)));
+    print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", verb.inputs.front(), warning))));
   }
   return exit_done;
 }

@@ -27,7 +27,8 @@ void Progress::advance(double amount, const std::string& what) {
   done_ += amount;
   if (!wanted_ || std::chrono::steady_clock::now() - start_ < patience) return;
   const int filled = std::min(bar_width, static_cast<int>(bar_width * done_ / total_));
-  print_err("\r\033[K[{:<{}}] {:.0f} % {}", std::string(filled, '#'), bar_width, 100 * done_ / total_, one_line(what));
+  print_err(fmt::format("\r\033[K[{:<{}}] {:.0f} % {}", std::string(filled, '#'), bar_width, 100 * done_ / total_,
+                        one_line(what)));
   std::fflush(stderr);
   shown_ = true;
 }

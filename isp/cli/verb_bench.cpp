@@ -69,7 +69,7 @@ std::vector<MeasuredStage> run_each(const std::vector<isp::BenchStage>& stages, 
     } else {
       const Error& error = outcome.error();
       const std::string where = error.where.empty() ? std::string(stage.id) : error.where;
-      progress.print([&] { print_err("{}\n", error_line(where, error)); });
+      progress.print([&] { print_err(fmt::format("{}\n", error_line(where, error))); });
     }
   }
   return out;
@@ -88,7 +88,7 @@ isp::BenchOptions options_of(const BenchArgs& args, const std::string& folder) {
 }
 
 int failed(const Error& error) {
-  print_err("{}\n", error_line(error.where, error));
+  print_err(fmt::format("{}\n", error_line(error.where, error)));
   return exit_failed;
 }
 
@@ -99,17 +99,17 @@ int run_calibrate_cost(const BenchArgs& args) {
   const auto model = calibrate_cost(threads, args.json, file);
   if (!model) return failed(model.error());
   if (args.json) {
-    print_out("{}", cost_text(*model));
+    print_out(fmt::format("{}", cost_text(*model)));
     return exit_done;
   }
-  print_out("{}, {} threads; ms for a frame of 12 MP\n", model->machine, threads);
+  print_out(fmt::format("{}, {} threads; ms for a frame of 12 MP\n", model->machine, threads));
   for (int i = 0; i < isp::cost_parts; ++i) {
     const auto part = static_cast<isp::CostPart>(i);
     const bool sampled = part == isp::CostPart::samples;  // it takes the same however large the frame
     const isp::CostSize size = sampled ? isp::CostSize{isp::sample_megapixels} : isp::cost_size(4000, 3000);
-    print_out("  {:<12}{:10.1f}\n", name_of(part), 1e3 * model->seconds(part, size));
+    print_out(fmt::format("  {:<12}{:10.1f}\n", name_of(part), 1e3 * model->seconds(part, size)));
   }
-  print_out("{}\n", file.empty() ? "not kept" : "kept in " + file);
+  print_out(fmt::format("{}\n", file.empty() ? "not kept" : "kept in " + file));
   return exit_done;
 }
 
@@ -120,13 +120,14 @@ int run_bench(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<BenchArgs>(parsed);
   if (args.list) {
-    for (const isp::BenchStage& stage : isp::bench_stages()) print_out("{:<20} {}\n", stage.id, stage.title);
+    for (const isp::BenchStage& stage : isp::bench_stages())
+      print_out(fmt::format("{:<20} {}\n", stage.id, stage.title));
     return exit_done;
   }
   if (args.calibrate_cost) return run_calibrate_cost(args);
   const auto stages = chosen(args.stages);
   if (!stages) {
-    print_err("{}\n", one_line("lowlux bench: " + stages.error().message));
+    print_err(fmt::format("{}\n", one_line("lowlux bench: " + stages.error().message)));
     return exit_usage;
   }
   const auto folder = pictures_folder(args);
@@ -136,9 +137,9 @@ int run_bench(const std::vector<std::string>& words) {
   const std::vector<MeasuredStage> measured = run_each(*stages, options);
   const Machine machine = this_machine(options.threads);
   if (args.json) {
-    print_out("{}\n", bench_json(measured, machine));
+    print_out(fmt::format("{}\n", bench_json(measured, machine)));
   } else {
-    for (const MeasuredStage& stage : measured) print_out("{}", bench_text(stage));
+    for (const MeasuredStage& stage : measured) print_out(fmt::format("{}", bench_text(stage)));
   }
   if (!args.output.empty() && !measured.empty()) {
     PoolExecutor executor(options.threads);
@@ -146,10 +147,10 @@ int run_bench(const std::vector<std::string>& words) {
     if (!written) return failed(written.error());
     if (!args.json) print_out("\nwritten:\n");
     for (const std::string& name : *written) {
-      if (!args.json) print_out("  {}\n", one_line(name));
+      if (!args.json) print_out(fmt::format("  {}\n", one_line(name)));
     }
   }
-  if (!args.json && !measured.empty()) print_out("\n{}\n", time_text(measured));
+  if (!args.json && !measured.empty()) print_out(fmt::format("\n{}\n", time_text(measured)));
   return measured.size() == stages->size() ? exit_done : exit_failed;
 }
 

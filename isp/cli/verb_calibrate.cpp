@@ -35,7 +35,7 @@ void print_help() {
   print_out(
       "Measures a camera and writes what was found to a profile.\n\nusage: lowlux calibrate KIND [OPTIONS]\n\n"
       "kinds:\n");
-  for (const Kind& kind : kinds) print_out("  {:<10} {}\n", kind.name, kind.summary);
+  for (const Kind& kind : kinds) print_out(fmt::format("  {:<10} {}\n", kind.name, kind.summary));
   print_out(
       "\n`lowlux calibrate KIND --help` lists a kind's options. `lowlux develop --black PROFILE.json` uses the "
       "profile.\n");
@@ -80,11 +80,12 @@ int run_calibrate(const std::vector<std::string>& words) {
   }
   std::array<std::string_view, kinds.size()> names;
   std::ranges::transform(kinds, names.begin(), &Kind::name);
-  print_err("{}\n",
-            one_line(first.empty() ? fmt::format("lowlux calibrate: name what to calibrate: {}; --help describes them",
-                                                 fmt::join(names, ", "))
-                                   : fmt::format("lowlux calibrate: unknown kind '{}'{}; --help lists them", first,
-                                                 suggestion(first, names))));
+  print_err(fmt::format(
+      "{}\n",
+      one_line(first.empty() ? fmt::format("lowlux calibrate: name what to calibrate: {}; --help describes them",
+                                           fmt::join(names, ", "))
+                             : fmt::format("lowlux calibrate: unknown kind '{}'{}; --help lists them", first,
+                                           suggestion(first, names)))));
   return exit_usage;
 }
 

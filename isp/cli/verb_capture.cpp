@@ -93,7 +93,7 @@ Result<void> check_files(const CaptureArgs& args) {
 
 int usage_error(const Error& error) {
   const std::string place = error.where.empty() ? "" : error.where + ": ";
-  print_err("{}\n", one_line("lowlux capture: " + place + error.message));
+  print_err(fmt::format("{}\n", one_line("lowlux capture: " + place + error.message)));
   return exit_usage;
 }
 
@@ -128,10 +128,10 @@ class Capture {
       const std::string camera = args_.v4l2.empty() ? "libcamera " + args_.libcamera : args_.v4l2;
       const bool of_camera = error->where.empty() || error->where == args_.libcamera;
       const std::string& place = of_camera ? camera : error->where;
-      print_err("{}\n", error_line(place, {error->code, error->message + taken, {}}));
+      print_err(fmt::format("{}\n", error_line(place, {error->code, error->message + taken, {}})));
     } else if (!args_.develop.quiet) {
       print_warnings();
-      print_err("lowlux: {}\n", progress_text(state_));
+      print_err(fmt::format("lowlux: {}\n", progress_text(state_)));
     }
     if (args_.develop.json) {
       print_text(args_.kind == CaptureKind::live ? stderr : stdout, capture_json(state_, error) + "\n");
@@ -159,8 +159,8 @@ class Capture {
   void print_warnings() {
     if (args_.develop.quiet) return;
     for (; printed_ < state_.work.warnings.size(); ++printed_) {
-      print_err("{}\n",
-                one_line(fmt::format("lowlux: {}: warning: {}", state_.stream.camera, state_.work.warnings[printed_])));
+      print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", state_.stream.camera,
+                                                         state_.work.warnings[printed_]))));
     }
   }
 

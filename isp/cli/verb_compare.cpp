@@ -71,17 +71,17 @@ int run_compare(const std::vector<std::string>& words) {
   const Result<CompareOutcome> done = compared(args);
   if (!done) {
     const Error& error = done.error();
-    print_err("{}\n", error_line(error.where, error));
-    if (args.json) print_out("{}\n", error_json(error.where, error));
+    print_err(fmt::format("{}\n", error_line(error.where, error)));
+    if (args.json) print_out(fmt::format("{}\n", error_json(error.where, error)));
     return exit_failed;
   }
   for (const std::string& warning : done->warnings) {
-    print_err("{}\n", one_line("lowlux compare: warning: " + warning));
+    print_err(fmt::format("{}\n", one_line("lowlux compare: warning: " + warning)));
   }
   if (args.json) {
-    print_out("{}\n", compare_json(args, *done));
+    print_out(fmt::format("{}\n", compare_json(args, *done)));
   } else {
-    print_out("{} against {}\n{}", one_line(args.test), one_line(args.reference), compare_text(*done));
+    print_out(fmt::format("{} against {}\n{}", one_line(args.test), one_line(args.reference), compare_text(*done)));
   }
   return exit_done;
 }

@@ -47,13 +47,13 @@ Result<void> denoise_file(const RawBatch& batch, const Job& job, Executor& execu
 }
 
 int failed(const Error& error) {
-  print_err("{}\n", error_line(error.where, error));
+  print_err(fmt::format("{}\n", error_line(error.where, error)));
   return exit_failed;
 }
 
 int usage_error(const Error& error) {
   const std::string place = error.where.empty() ? "" : error.where + ": ";
-  print_err("{}\n", one_line("lowlux denoise: " + place + error.message));
+  print_err(fmt::format("{}\n", one_line("lowlux denoise: " + place + error.message)));
   return exit_usage;
 }
 

@@ -24,15 +24,15 @@ int run_info(const std::vector<std::string>& words) {
     const Result<RawFrame> frame = capture::read_raw(file);
     if (!frame) {
       code = exit_failed;
-      print_err("{}\n", error_line(file, frame.error()));
+      print_err(fmt::format("{}\n", error_line(file, frame.error())));
     }
     if (args.json) {
       json += (json.empty() ? "" : ",\n") + (frame ? info_json(file, *frame) : error_json(file, frame.error()));
     } else if (frame) {
-      print_out("{}", info_text(file, *frame));
+      print_out(fmt::format("{}", info_text(file, *frame)));
     }
   }
-  if (args.json) print_out("[{}]\n", json);
+  if (args.json) print_out(fmt::format("[{}]\n", json));
   return code;
 }
 

@@ -66,7 +66,7 @@ std::vector<Done> run_each(const std::vector<isp::Experiment>& experiments, cons
     } else {
       progress.print([&] {
         const Error& error = outcome.error();
-        print_err("{}\n", error_line(error.where.empty() ? id : error.where, error));
+        print_err(fmt::format("{}\n", error_line(error.where.empty() ? id : error.where, error)));
       });
     }
     progress.advance(1, id);
@@ -137,7 +137,7 @@ Result<void> write_all(const std::vector<OutputFile>& files, const ReproduceArgs
 }
 
 int failed(const Error& error) {
-  print_err("{}\n", error_line(error.where, error));
+  print_err(fmt::format("{}\n", error_line(error.where, error)));
   return exit_failed;
 }
 
@@ -148,12 +148,12 @@ int run_reproduce(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<ReproduceArgs>(parsed);
   if (args.list) {
-    for (const isp::Experiment& e : isp::experiments()) print_out("{:<22} {}\n", e.id, e.title);
+    for (const isp::Experiment& e : isp::experiments()) print_out(fmt::format("{:<22} {}\n", e.id, e.title));
     return exit_done;
   }
   const auto experiments = chosen(args.experiments);
   if (!experiments) {
-    print_err("{}\n", one_line("lowlux reproduce: " + experiments.error().message));
+    print_err(fmt::format("{}\n", one_line("lowlux reproduce: " + experiments.error().message)));
     return exit_usage;
   }
   if (const auto error = in_the_way(args)) return failed(*error);
@@ -162,7 +162,7 @@ int run_reproduce(const std::vector<std::string>& words) {
     if (const auto written = write_all(files_of(done, args), args); !written) return failed(written.error());
   }
   const std::vector<isp::Finding> findings = findings_of(done);
-  print_out("{}\n", args.json ? findings_json(findings) : findings_text(findings));
+  print_out(fmt::format("{}\n", args.json ? findings_json(findings) : findings_text(findings)));
   return done.size() == experiments->size() ? exit_done : exit_failed;
 }
 

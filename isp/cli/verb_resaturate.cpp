@@ -101,7 +101,7 @@ void print(const ResaturateArgs& args, const Outcome& done) {
                                       {"share_dark", done.made.share_dark},
                                       {"share_saturated", done.made.share_saturated},
                                       {"warnings", done.warnings}};
-    print_out("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    print_out(fmt::format("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
   } else if (!args.quiet) {
     Lines lines;
     lines.add("black", fmt::format("X {:.5f}, Y {:.5f}, Z {:.5f} of white 1", b.x, b.y, b.z));
@@ -109,7 +109,7 @@ void print(const ResaturateArgs& args, const Outcome& done) {
                                           args.chroma_noise ? ", given" : ", measured on the picture"));
     lines.add("no brighter", fmt::format("{:.1f} % of the pixels: grey now", 100 * done.made.share_dark));
     lines.add("saturated", fmt::format("{:.1f} % of the pixels: as they were", 100 * done.made.share_saturated));
-    print_out("{}\n{}", one_line(args.output), lines.text());
+    print_out(fmt::format("{}\n{}", one_line(args.output), lines.text()));
   }
 }
 

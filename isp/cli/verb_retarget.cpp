@@ -70,10 +70,10 @@ void print_json(const RetargetArgs& args, const Outcome& done) {
     json["coefficients"] = nullptr;
     json["units"] = nullptr;
   }
-  print_out("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  print_out(fmt::format("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
 }
 
-void print_text(const RetargetArgs& args, const Outcome& done) {
+void print_outcome(const RetargetArgs& args, const Outcome& done) {
   const isp::RetargetOptions& o = args.options;
   Lines lines;
   lines.add("luminance",
@@ -87,7 +87,7 @@ void print_text(const RetargetArgs& args, const Outcome& done) {
             fmt::format("{:.1f} % of the pixels: as near as the display shows", 100 * done.made.share_held));
   lines.add("table", fmt::format("{0} x {0} x {0}, off by {1:.2f} CIEDE2000 in the mean, {2:.1f} at most",
                                  done.made.levels, done.made.error.mean_ciede2000, done.made.error.max_ciede2000));
-  print_out("{}\n{}", one_line(args.output), lines.text());
+  print_out(fmt::format("{}\n{}", one_line(args.output), lines.text()));
 }
 
 }  // namespace
@@ -101,7 +101,7 @@ int run_retarget(const std::vector<std::string>& words) {
       if (args.json) {
         print_json(args, done);
       } else if (!args.quiet) {
-        print_text(args, done);
+        print_outcome(args, done);
       }
       return done.warnings;
     });

@@ -31,7 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 
 int usage_error(const std::string& what) {
-  print_err("{}\n", one_line("lowlux simulate: " + what));
+  print_err(fmt::format("{}\n", one_line("lowlux simulate: " + what)));
   return exit_usage;
 }
 
@@ -248,16 +248,16 @@ class Simulation {
 void print_outcome(const SimulateArgs& args, const SimulateOutcome& outcome) {
   if (!args.quiet) {
     for (const std::string& warning : outcome.warnings) {
-      print_err("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", args.scene.what, warning)));
+      print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", args.scene.what, warning))));
     }
   }
   if (args.json) {
-    print_out("{}\n", simulate_json(args, outcome));
+    print_out(fmt::format("{}\n", simulate_json(args, outcome)));
     return;
   }
-  if (!args.quiet) print_out("{}", simulate_text(args, outcome));
-  if (args.explain) print_out("{}", explain_text(args, outcome));
-  if (args.timings) print_out("{}", times_text(outcome.times));
+  if (!args.quiet) print_out(fmt::format("{}", simulate_text(args, outcome)));
+  if (args.explain) print_out(fmt::format("{}", explain_text(args, outcome)));
+  if (args.timings) print_out(fmt::format("{}", times_text(outcome.times)));
 }
 
 }  // namespace
@@ -267,7 +267,7 @@ int run_simulate(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<SimulateArgs>(parsed);
   if (args.list) {
-    print_out("{}", simulate_list());
+    print_out(fmt::format("{}", simulate_list()));
     return exit_done;
   }
   if (const std::string wrong = wrong_files(args); !wrong.empty()) return usage_error(wrong);
@@ -277,7 +277,7 @@ int run_simulate(const std::vector<std::string>& words) {
       return usage_error(outcome.error().message +
                          (outcome.error().where.empty() ? "" : " (" + outcome.error().where + ")"));
     }
-    print_err("{}\n", error_line(args.scene.what, outcome.error()));
+    print_err(fmt::format("{}\n", error_line(args.scene.what, outcome.error())));
     return exit_failed;
   }
   print_outcome(args, *outcome);
