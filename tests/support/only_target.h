@@ -22,10 +22,11 @@ class OnlyTarget {
   }
 };
 
-/// Targets of the processor that the kernels are compiled for: SSSE3 and better on x86.
+/// The processor's instruction sets that the kernels are compiled for, best first: SSSE3 and better on x86. Highway has
+/// the better one in the lower bit, and newer versions have more of them.
 inline std::vector<std::int64_t> kernel_targets() {
   std::vector<std::int64_t> out;
-  for (const std::int64_t target : {HWY_AVX3, HWY_AVX2, HWY_SSE4, HWY_SSSE3}) {
+  for (std::int64_t target = 1; target <= HWY_SSSE3; target *= 2) {
     if ((hwy::SupportedTargets() & HWY_TARGETS & target) != 0) out.push_back(target);
   }
   return out;
