@@ -6,6 +6,7 @@
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -76,8 +77,8 @@ Error system_error(const std::string& what, int number) {
   return {ErrorCode::unreadable, what + ": " + std::system_category().message(number), {}};
 }
 
-/// Starts a program with all signals as at the start of a program, and nothing but its two files. It has a process group
-/// of its own: what a terminal sends to its programs reaches the caller alone, and the child ends with it.
+/// Starts a program with all signals as at the start of a program, and nothing but its two files. It has a process
+/// group of its own: what a terminal sends to its programs reaches the caller alone.
 Result<pid_t> start(const std::vector<std::string>& command, int file, int result) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -138,8 +139,8 @@ double cpu_s(const rusage& used) {
 Error ended_by(int number, const Ended& ended, const ReadLimits& limits) {
   if (number == SIGXCPU || (number == SIGKILL && cpu_s(ended.used) >= limits.max_decode_cpu_s)) {
     return {ErrorCode::malformed,
-            "the decoder was stopped at its limit of " + seconds_text(std::ceil(limits.max_decode_cpu_s)) +
-                " of processor time: the file is damaged or far too large",
+            "the decoder was stopped at its limit of processor time, after " + seconds_text(cpu_s(ended.used)) +
+                ": the file is damaged or far too large",
             {}};
   }
   if (number == SIGALRM) {
@@ -150,9 +151,8 @@ Error ended_by(int number, const Ended& ended, const ReadLimits& limits) {
   }
   if (number == SIGKILL) {
     return {ErrorCode::too_large,
-            "the decoder was killed after " + seconds_text(ended.elapsed_s) + " with " +
-                std::to_string(ended.used.ru_maxrss >> 10) +
-                " MiB in use: the system is short of memory, or an operator ended it; read fewer files at a time",
+            "the decoder was killed after " + seconds_text(ended.elapsed_s) +
+                ": the system is short of memory, or an operator ended it; read fewer files at a time",
             {}};
   }
   return {ErrorCode::malformed,
@@ -161,12 +161,25 @@ Error ended_by(int number, const Ended& ended, const ReadLimits& limits) {
           {}};
 }
 
+constexpr int cannot_load_exit = 127;  // of the dynamic linker
+
 /// The Error of a child that did not end as it should; nullopt if it did.
 std::optional<Error> abnormal_end(const Ended& ended, const ReadLimits& limits) {
   if (!ended.status || (WIFEXITED(*ended.status) && WEXITSTATUS(*ended.status) == 0)) return std::nullopt;
   if (WIFSIGNALED(*ended.status)) return ended_by(WTERMSIG(*ended.status), ended, limits);
   if (WEXITSTATUS(*ended.status) == wrong_protocol_exit) {
-    return Error{ErrorCode::unreadable, "the decoder is of another version of lowlux: install lowlux again", {}};
+    return Error{ErrorCode::unreadable,
+                 "the decoder is of another version of lowlux: start lowlux again, or install it again",
+                 {}};
+  }
+  if (WEXITSTATUS(*ended.status) == no_memory_exit) {
+    return Error{ErrorCode::too_large, "there is not enough memory for the decoder to read this file", {}};
+  }
+  if (WEXITSTATUS(*ended.status) == cannot_load_exit) {
+    return Error{
+        ErrorCode::unreadable,
+        "the decoder cannot be loaded: is LibRaw installed, and is there memory for it? lowlux-decode says more",
+        {}};
   }
   return Error{
       ErrorCode::malformed, "the decoder failed on this file: the file is damaged or the decoder has a fault", {}};
@@ -226,9 +239,14 @@ Result<DecodedRaw> collect(int result, const ReadLimits& limits) {
   end_text(h.model);
   end_text(h.software);
   if (auto error = reported_failure(h, limits)) return tl::make_unexpected(*std::move(error));
+  const std::uint64_t sample_bytes = std::uint64_t{sizeof(std::uint16_t)} * h.raw_width * h.samples * h.raw_height;
+  struct stat delivered {};
+  if (fstat(result, &delivered) != 0 || static_cast<std::uint64_t>(delivered.st_size) < sizeof h + sample_bytes) {
+    return fail(ErrorCode::malformed, "the decoder delivered fewer samples than the image has");
+  }
   raw.samples = Plane<std::uint16_t>(h.raw_width * h.samples, h.raw_height);
   if (!read_all(result, raw.samples.data(), raw.samples.size() * sizeof(std::uint16_t), sizeof h)) {
-    return fail(ErrorCode::malformed, "the decoder delivered fewer samples than the image has");
+    return fail(ErrorCode::unreadable, "the decoder's samples cannot be read");
   }
   return raw;
 }
@@ -240,6 +258,11 @@ Result<std::filesystem::path> own_folder() {
   const bool known = dladdr1(reinterpret_cast<void*>(&own_folder), &info, &found, RTLD_DL_LINKMAP) != 0;
   const char* const name = known ? static_cast<const link_map*>(found)->l_name : "";  // "" is the program itself
   std::error_code failed;
+  if (*name != '\0' && *name != '/') {
+    return fail(ErrorCode::unreadable,
+                std::string("the library ") + name +
+                    " was loaded by a relative path, so its folder is not known: load it by a whole one");
+  }
   // The link of the program holds its folder also when its file has been replaced since.
   const auto file = *name != '\0' ? std::filesystem::canonical(name, failed)
                                   : std::filesystem::read_symlink("/proc/self/exe", failed);
@@ -260,6 +283,7 @@ Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadL
     return fail(ErrorCode::too_large, "there is not enough memory to hand this file to the decoder");
   }
   command.push_back(std::to_string(decode_protocol));
+  command.push_back(std::to_string(getpid()));
   command.push_back(std::to_string(limits.max_pixels));
   command.push_back(number_text(limits.max_decode_cpu_s));
   const auto begin = std::chrono::steady_clock::now();

@@ -53,13 +53,19 @@ void lower_limit(int resource, rlim_t soft, rlim_t hard) {
   if (getrlimit(static_cast<__rlimit_resource>(resource), &current) != 0) return;
   struct rlimit wanted {};
   wanted.rlim_max = std::min(hard, current.rlim_max);
-  wanted.rlim_cur = std::min(soft, wanted.rlim_max);
+  wanted.rlim_cur = std::min({soft, wanted.rlim_max, current.rlim_cur});
   setrlimit(static_cast<__rlimit_resource>(resource), &wanted);
 }
 
-/// Limits what the program can do by accident: descriptors of who started it, output, time, memory.
-void confine(const ReadLimits& limits, std::uint64_t file_bytes) {
+/// Ends the program together with its caller, and by nothing that is meant for the caller.
+void follow(pid_t caller) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != caller) _exit(EXIT_FAILURE);  // it ended before
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) signal(number, SIG_IGN);
+}
+
+/// Limits what the program can do by accident: descriptors of its caller, output, time, memory.
+void confine(const ReadLimits& limits, std::uint64_t file_bytes) {
   prctl(PR_SET_DUMPABLE, 0);
   close_range(std::max(result_descriptor, file_descriptor) + 1, ~0U, 0);
   const auto cpu_s = static_cast<rlim_t>(std::clamp(std::ceil(limits.max_decode_cpu_s), 1.0, 86400.0));
@@ -84,14 +90,20 @@ std::optional<Number> number_of(std::string_view text) {
   return number;
 }
 
-std::optional<ReadLimits> limits_of(std::span<char* const> arguments) {
-  if (arguments.size() < 3) return std::nullopt;
-  const auto last = arguments.last(3);
+struct Request {
+  pid_t caller;
+  ReadLimits limits;
+};
+
+std::optional<Request> request_of(std::span<char* const> arguments) {
+  if (arguments.size() < 4) return std::nullopt;
+  const auto last = arguments.last(4);
   if (number_of<std::uint64_t>(last[0]) != decode_protocol) return std::nullopt;
-  const auto pixels = number_of<std::int64_t>(last[1]);
-  const auto cpu_s = number_of<double>(last[2]);
-  if (!pixels || !cpu_s) return std::nullopt;
-  return ReadLimits{.max_pixels = *pixels, .max_decode_cpu_s = *cpu_s};
+  const auto caller = number_of<pid_t>(last[1]);
+  const auto pixels = number_of<std::int64_t>(last[2]);
+  const auto cpu_s = number_of<double>(last[3]);
+  if (!caller || !pixels || !cpu_s) return std::nullopt;
+  return Request{*caller, {.max_pixels = *pixels, .max_decode_cpu_s = *cpu_s}};
 }
 
 /// The file; nullopt where there is none.
@@ -116,14 +128,15 @@ bool DecodeSink::write_samples(const std::uint16_t* samples, std::size_t count) 
 void DecodeSink::finish(const DecodedHeader& header) const { write_all(file_, &header, sizeof header, 0); }
 
 void run_decoder(std::span<char* const> arguments, DecodeFunction decode) {
-  const auto limits = limits_of(arguments);
-  if (!limits) _exit(wrong_protocol_exit);
+  const auto request = request_of(arguments);
+  if (!request) _exit(wrong_protocol_exit);
+  follow(request->caller);
   const auto file = mapped_file();
-  if (!file) _exit(EXIT_FAILURE);
-  confine(*limits, file->size());
+  if (!file) _exit(no_memory_exit);
+  confine(request->limits, file->size());
   DecodeSink sink(result_descriptor);
   try {
-    decode(*file, *limits, sink);
+    decode(*file, request->limits, sink);
   } catch (const std::bad_alloc&) {
     DecodedHeader header{};
     header.outcome = DecodeOutcome::out_of_memory;

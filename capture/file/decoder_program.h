@@ -9,16 +9,17 @@
 
 namespace lowlux::capture {
 
-// What a decoder program and decode_contained(), which starts it, agree on. Its last arguments are decode_protocol, the
-// most pixels, and the processor time [s]; file_descriptor has the file, result_descriptor takes the DecodedHeader and
-// behind it the samples.
+// The protocol between a decoder program and decode_contained(), which starts it. The last arguments of the program are
+// decode_protocol, the process ID of its caller, the maximum number of pixels, and the processor time [s];
+// file_descriptor has the file, result_descriptor takes the DecodedHeader and behind it the samples.
 
-/// Counts changes of meaning, in thousands of millions, above the size of the header.
-inline constexpr std::uint64_t decode_protocol = 1'000'000'000 + sizeof(DecodedHeader);
+/// The version of the protocol in units of 1e9, plus the size of the header. Any change of meaning is a new version.
+inline constexpr std::uint64_t decode_protocol = 2'000'000'000 + sizeof(DecodedHeader);
 inline constexpr int result_descriptor = 3;
 inline constexpr int file_descriptor = 4;
 inline constexpr int wall_clock_factor = 5;  // time by the clock for one of the processor
 inline constexpr int wrong_protocol_exit = 2;
+inline constexpr int no_memory_exit = 3;
 
 /// Whether a decoder's memory is limited too: not in builds with a sanitizer, whose shadow memory takes terabytes.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)

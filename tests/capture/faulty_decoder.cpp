@@ -80,6 +80,17 @@ void write_elsewhere(Bytes file, const ReadLimits& limits, DecodeSink& sink) {
   count_up(file, limits, sink);
 }
 
+void raise_signal(Bytes file, const ReadLimits& limits, DecodeSink& sink) {
+  raise(std::stoi(word_of_command));
+  count_up(file, limits, sink);
+}
+
+/// Fails if the signals of a terminal's programs reach it.
+void need_own_group(Bytes file, const ReadLimits& limits, DecodeSink& sink) {
+  if (getpgrp() != getpid()) _exit(1);
+  count_up(file, limits, sink);
+}
+
 /// Takes the C library's lock for time zones, as LibRaw does.
 void ask_the_time_zone(Bytes file, const ReadLimits& limits, DecodeSink& sink) {
   std::tm time{.tm_mday = 1, .tm_year = 100};
@@ -101,6 +112,9 @@ constexpr Decoder decoders[] = {
     {"exception", [](Bytes, const ReadLimits&, DecodeSink&) { throw std::runtime_error("x"); }},
     {"exit 0", [](Bytes, const ReadLimits&, DecodeSink&) { _exit(0); }},
     {"exit 7", [](Bytes, const ReadLimits&, DecodeSink&) { _exit(7); }},
+    {"exit 127", [](Bytes, const ReadLimits&, DecodeSink&) { _exit(127); }},
+    {"raise", raise_signal},
+    {"own group", need_own_group},
     {"nothing", [](Bytes, const ReadLimits&, DecodeSink&) {}},
     {"loop", loop_forever},
     {"wait", wait_forever},
