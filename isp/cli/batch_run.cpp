@@ -47,7 +47,7 @@ class BatchRun {
     if (!batch_.args.quiet) interruption.emplace([this] { return interruption_text(); });
     work_on_all();
     print_summary();
-    return failed_ > 0 ? exit_failed : exit_done;
+    return failed_ > 0 || reports_lost_ ? exit_failed : exit_done;
   }
 
  private:
@@ -72,26 +72,26 @@ class BatchRun {
   void take_files(int workers) {
     PoolExecutor executor(threads_of_each(workers));
     for (int i = next_++; i < files_; i = next_++) {
-      if (batch_.memory) batch_.memory->enter();
+      const MemoryGate::Entry entry(batch_.memory.get());
       finish(i, outcome_of(batch_.jobs[i], executor));
-      if (batch_.memory) batch_.memory->leave();
     }
   }
 
   DevelopOutcome outcome_of(const Job& job, Executor& executor) {
     DevelopOutcome out{job.input, job.output};
     FileProgress progress(progress_, job.input);
-    const std::vector<std::string> files = files_of(batch_, job);
-    const auto exists = [](const std::string& file) {
-      std::error_code ignored;
-      return std::filesystem::exists(file, ignored);
-    };
-    out.skipped = batch_.args.skip_existing && std::ranges::all_of(files, exists);
-    if (out.skipped) return out;
-    Job own = job;
-    const bool partial = batch_.args.skip_existing && std::ranges::any_of(files, exists);  // left by a killed run
-    if (batch_.args.force || partial) own.overwrite = isp::Overwrite::yes;
     try {
+      Job own = job;
+      if (batch_.args.force) own.overwrite = isp::Overwrite::yes;
+      if (batch_.args.skip_existing) {
+        // The output is written last: where it is, so is the rest, and what is there without it is of a killed run. An
+        // empty file is the name that such a run had claimed (see publish.h).
+        std::error_code absent;
+        out.skipped = std::filesystem::file_size(job.output, absent) > 0 && !absent;
+        if (out.skipped) return out;
+        const auto exists = [](const std::string& file) { return std::filesystem::exists(file); };
+        if (std::ranges::any_of(files_of(batch_, job), exists)) own.overwrite = isp::Overwrite::yes;
+      }
       const Result<void> worked = work_(own, executor, progress, out);
       if (!worked) out.error = with_place(worked.error(), job.input);
     } catch (const std::bad_alloc&) {
@@ -109,8 +109,13 @@ class BatchRun {
 
   void finish(int index, const DevelopOutcome& outcome) {
     ++(outcome.error ? failed_ : outcome.skipped ? skipped_ : done_);
-    if (batch_.args.json) json_[static_cast<std::size_t>(index)] = develop_json(outcome);
-    progress_.print([&] { print_outcome(batch_.args, outcome); });
+    try {
+      if (batch_.args.json) json_[static_cast<std::size_t>(index)] = develop_json(outcome);
+      progress_.print([&] { print_outcome(batch_.args, outcome); });
+    } catch (const std::bad_alloc&) {
+      print_err("lowlux: not enough memory to print what was done\n");
+      reports_lost_ = true;
+    }
   }
 
   void print_summary() const {
@@ -126,7 +131,7 @@ class BatchRun {
   }
 
   std::string interruption_text() const {
-    const char* const advice = batch_.args.force ? "" : "; run again with --skip-existing";
+    const char* const advice = batch_.args.force || files_ == 1 ? "" : "; run again with --skip-existing";
     return fmt::format("{} of {} files done{}", done_ + skipped_, files_, advice);
   }
 
@@ -139,6 +144,7 @@ class BatchRun {
   std::atomic<int> done_{0};
   std::atomic<int> skipped_{0};
   std::atomic<int> failed_{0};
+  std::atomic<bool> reports_lost_{false};
 };
 
 }  // namespace

@@ -164,8 +164,9 @@ Result<isp::CostModel> calibrate_cost(int threads, bool quiet, std::string& writ
   if (const auto written = write_cost(*path, *model); !written) {
     progress.print([&] {
       print_err(fmt::format(
-          "{}\n", one_line(fmt::format("lowlux: warning: {}: this machine's speed is measured anew each time: {}",
-                                       *path, written.error().message))));
+          "{}\n", one_line(fmt::format(
+                      "lowlux: warning: {}: this machine's speed is not kept, so times stay rough estimates: {}", *path,
+                      written.error().message))));
     });
   } else {
     written_to = *path;

@@ -32,7 +32,7 @@ struct Report {
 };
 
 Report& report() {
-  static Report only;
+  static Report& only = *new Report;  // never destroyed: the thread below outlives main()
   return only;
 }
 
@@ -46,6 +46,7 @@ void note(int number) {
 void end_when_asked() {
   while (sem_wait(&arrived) != 0) continue;
   isp::AtomicFile::abandon_all();
+  alarm(2);  // ends the process if the reader of stderr has stopped
   {
     Report& current = report();
     const std::lock_guard guard(current.mutex);

@@ -26,7 +26,23 @@ class MemoryGate {
   void report_size(std::size_t bytes);
   void leave();
 
-  /// What the limit was if files had to wait for memory, for people; else nothing.
+  /// enter() and leave() of a gate, if there is one.
+  class Entry {
+   public:
+    explicit Entry(MemoryGate* gate) : gate_(gate) {
+      if (gate_ != nullptr) gate_->enter();
+    }
+    ~Entry() {
+      if (gate_ != nullptr) gate_->leave();
+    }
+    Entry(const Entry&) = delete;
+    Entry& operator=(const Entry&) = delete;
+
+   private:
+    MemoryGate* gate_;
+  };
+
+  /// Text about the limit if files had to wait for memory; else nullopt.
   std::optional<std::string> limit_text() const;
 
  private:

@@ -36,10 +36,11 @@ struct RawBatch {
   std::optional<CameraProfile> profile = std::nullopt;
   std::shared_ptr<DarkSource> darks = nullptr;
   isp::Sync sync = isp::Sync::no;
-  std::shared_ptr<MemoryGate> memory = nullptr;               // absent: --jobs says how many files at a time
-  EstimateBytes bytes_of = isp::expected_bytes;               // of one file
-  std::shared_ptr<MachineSpeed> speed = nullptr;              // with a budget: files then come one after the other
-  std::shared_ptr<const isp::CostModel> kept_cost = nullptr;  // without one, where decisions are told and it is known
+  std::shared_ptr<MemoryGate> memory = nullptr;   // absent: --jobs says how many files at a time
+  EstimateBytes bytes_of = isp::expected_bytes;   // of one file
+  std::shared_ptr<MachineSpeed> speed = nullptr;  // with a budget: files then come one after the other
+  std::shared_ptr<const isp::CostModel> kept_cost =
+      nullptr;  // without one, where decisions are printed and it is known
 };
 
 /// Reads profile and darks and makes the output folder. Errors name their file.

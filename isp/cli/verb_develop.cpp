@@ -34,6 +34,9 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
   isp::WriteOptions write = write_options(batch.args);
   write.overwrite = job.overwrite;
   write.sync = batch.sync;
+  // The output comes last: where it is, --skip-existing knows that all is done.
+  const Result<void> maps = write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);
+  if (!maps) return maps;
   const Result<void> written = isp::write_picture(upright, batch.options.space, raw.info, job.output, write, executor);
   finish.lap("encode and write");
   if (!written) return fail(written.error().code, written.error().message, job.output);
@@ -42,7 +45,7 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
   if (ready->options.denoise.maps && !out.plan->noise_reduction.has_level()) {
     out.plan->warnings.emplace_back("no maps were written: the noise is left as it is");
   }
-  return write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);
+  return {};
 }
 
 int failed(const Error& error) {

@@ -5,10 +5,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <filesystem>
 #include <mutex>
 #include <set>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -86,8 +88,9 @@ struct Unfinished {
   unsigned made = 0;
 };
 
+/// Never destroyed: a thread that handles signals may still ask for them while the process ends.
 Unfinished& unfinished() {
-  static Unfinished all;
+  static Unfinished& all = *new Unfinished;
   return all;
 }
 
@@ -96,6 +99,15 @@ std::string temporary_prefix() {
   char host[256] = {};
   gethostname(host, sizeof host - 1);
   return std::string(".lowlux-") + host + "-";
+}
+
+/// Whether this is the prefix and behind it only a process and a number. Prefixes of other hosts may begin alike.
+bool is_temporary(const std::string& name, const std::string& prefix) {
+  constexpr std::string_view suffix = ".part";
+  if (!name.starts_with(prefix) || !name.ends_with(suffix) || name.size() < prefix.size() + suffix.size()) return false;
+  const std::string_view middle =
+      std::string_view(name).substr(prefix.size(), name.size() - prefix.size() - suffix.size());
+  return std::ranges::count(middle, '-') == 1 && middle.find_first_not_of("0123456789-") == std::string_view::npos;
 }
 
 bool has_name(int descriptor) {
@@ -108,7 +120,7 @@ void sweep(const std::string& directory, const std::string& prefix) {
   std::error_code failed;
   for (fs::directory_iterator entry(directory, failed), end; !failed && entry != end; entry.increment(failed)) {
     const std::string name = entry->path().filename().string();
-    if (!name.starts_with(prefix) || !name.ends_with(".part")) continue;
+    if (!is_temporary(name, prefix)) continue;
     const int descriptor = open(entry->path().c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (descriptor < 0) continue;
     if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 && has_name(descriptor)) unlink(entry->path().c_str());
@@ -131,7 +143,8 @@ Temporary make_temporary(const std::string& directory) {
   if (all.swept.insert(directory).second) sweep(directory, prefix);
   std::string stem = directory;
   stem.append("/").append(prefix).append(std::to_string(getpid())).append("-");
-  for (;;) {
+  constexpr int most_tries = 1000;  // on some file systems no file ever seems to have a name
+  for (int tries = 0; tries < most_tries; ++tries) {
     Temporary out;
     out.name = stem + std::to_string(all.made++) + ".part";
     out.descriptor = open(out.name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
@@ -147,6 +160,7 @@ Temporary make_temporary(const std::string& directory) {
     }
     close(out.descriptor);
   }
+  return {.cause = EAGAIN};
 }
 
 /// @return 0 or an errno
@@ -201,7 +215,7 @@ Result<AtomicFile> AtomicFile::create(const std::string& path, Overwrite overwri
 
 void AtomicFile::abandon_all() {
   Unfinished& all = unfinished();
-  all.mutex.lock();  // for good
+  all.mutex.lock();  // and never unlocks it
   for (const std::string& name : all.names) unlink(name.c_str());
 }
 

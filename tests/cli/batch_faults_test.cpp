@@ -112,17 +112,6 @@ TEST_F(BatchFaults, SignalsCleanUpAndSayWhatIsDone) {
   }
 }
 
-// A terminal sends its signals to decoders too. They leave it to the command, and no file is called damaged.
-TEST_F(BatchFaults, AnInterruptedDecoderIsNotADamagedFile) {
-  for (int delay_ms = 10; delay_ms <= 250; delay_ms += 10) {
-    RunningProcess run(develop({"--force"}));
-    std::this_thread::sleep_for(std::chrono::milliseconds(delay_ms));
-    run.send_to_group(SIGINT);
-    const ProcessResult result = run.wait();
-    EXPECT_EQ(result.err.find("decoder"), std::string::npos) << result.err;
-  }
-}
-
 TEST_F(BatchFaults, AnIgnoredSignalStaysIgnored) {
   std::string line = "trap '' HUP; exec";
   for (const std::string& word : develop()) line += " '" + word + "'";

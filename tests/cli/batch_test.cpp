@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -69,14 +70,30 @@ TEST_F(Batch, ExistingOutputsAreSkippedAndCounted) {
 }
 
 // A run that was killed between a picture and its maps has not done that file.
-TEST_F(Batch, AFileWithoutItsMapsIsDoneAgain) {
+// A killed run leaves maps without a picture, as the picture is written last; or an empty picture, a claimed name.
+TEST_F(Batch, MapsWithoutAPictureAreMadeAgainWithIt) {
   raw("a.dng");
   const std::vector<std::string> args{"develop", file("a.dng"), "-o", file("out/"), "--maps", "--skip-existing"};
   ASSERT_EQ(lowlux(args).exit_code, 0);
-  const std::string map = test::read_file(file("out/a.noise.pfm"));
-  fs::remove(file("out/a.noise.pfm"));
-  EXPECT_EQ(lowlux(args).exit_code, 0);
-  EXPECT_EQ(test::read_file(file("out/a.noise.pfm")), map);
+  const std::string map = test::read_file(file("out/a.noise.pfm")), picture = test::read_file(file("out/a.png"));
+  const auto made_again = [&] {
+    std::ofstream(file("out/a.noise.pfm")) << "half a map";
+    EXPECT_EQ(lowlux(args).exit_code, 0);
+    EXPECT_TRUE(test::read_file(file("out/a.noise.pfm")) == map);
+    EXPECT_TRUE(test::read_file(file("out/a.png")) == picture);
+  };
+  fs::remove(file("out/a.png"));
+  made_again();
+  std::ofstream(file("out/a.png")).close();
+  made_again();
+}
+
+TEST_F(Batch, APictureWithoutItsMapsIsNotReplaced) {
+  raw("a.dng");
+  fs::create_directories(file("out"));
+  std::ofstream(file("out/a.png")) << "edited since";
+  EXPECT_EQ(lowlux({"develop", file("a.dng"), "-o", file("out/"), "--maps", "--skip-existing"}).exit_code, 0);
+  EXPECT_EQ(test::read_file(file("out/a.png")), "edited since");
 }
 
 TEST_F(Batch, AFolderStandsForTheRawFilesInIt) {

@@ -29,7 +29,7 @@ RunningProcess::RunningProcess(const std::vector<std::string>& command) {
   sigemptyset(&ends);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) sigaddset(&ends, signal);
   posix_spawnattr_setsigdefault(&attributes, &ends);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
   std::vector<char*> argv;
   for (const std::string& word : command) argv.push_back(const_cast<char*>(word.c_str()));
   argv.push_back(nullptr);
@@ -46,8 +46,6 @@ RunningProcess::~RunningProcess() {
 }
 
 void RunningProcess::send(int signal) const { kill(child_, signal); }
-
-void RunningProcess::send_to_group(int signal) const { kill(-child_, signal); }
 
 ProcessResult RunningProcess::wait() {
   int status = 0;

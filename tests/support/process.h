@@ -27,7 +27,6 @@ class RunningProcess {
   RunningProcess& operator=(const RunningProcess&) = delete;
 
   void send(int signal) const;
-  void send_to_group(int signal) const;  // to the processes that it started too
   ProcessResult wait();
 
  private:

@@ -50,8 +50,8 @@ Result<SeenScene> seen_scene(const ViewingConditions& conditions) {
   const auto to_d65 = xy && excites_all_cones(white) ? bradford_adaptation(*xy, white_d65) : std::nullopt;
   if (!to_d65) {
     return fail(ErrorCode::invalid_argument,
-                "the white is no light's colour: it must excite all cones and the rods; found XYZ " + number_text(w.x) +
-                    " " + number_text(w.y) + " " + number_text(w.z));
+                "the white is not a valid colour of a light: it must excite all cones and the rods; found XYZ " +
+                    number_text(w.x) + " " + number_text(w.y) + " " + number_text(w.z));
   }
   SeenScene scene;
   scene.white = white;
