@@ -55,7 +55,7 @@ double dark_doubling_of(const GainProfile& gain) {
 /// The text of a regular file, one byte more than a profile has at most. Opening any other kind must not wait for
 /// whoever writes to it.
 Result<std::string> text_of_profile(const std::string& file) {
-  const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
   struct stat status {};
   const bool regular = fd >= 0 && fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
   std::string text(regular ? calib::largest_profile_bytes + 1 : 0, '\0');
