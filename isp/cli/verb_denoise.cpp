@@ -33,7 +33,7 @@ Result<void> denoise_file(const RawBatch& batch, const Job& job, Executor& execu
   out.times.insert(out.times.end(), clean->plan.times.begin(), clean->plan.times.end());
   progress.reach(0.8);
   isp::StageClock finish(out.times);
-  const Result<void> maps = write_noise_maps(batch, job, std::move(clean->maps), ready->frame.raw, executor);
+  Result<void> maps = write_noise_maps(batch, job, std::move(clean->maps), ready->frame.raw, executor);
   if (!maps) return maps;
   const Result<void> written = isp::write_dng(clean->frame, job.output,
                                               {.overwrite = job.overwrite,

@@ -35,7 +35,7 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
   write.overwrite = job.overwrite;
   write.sync = batch.sync;
   // The output comes last: where it is, --skip-existing knows that all is done.
-  const Result<void> maps = write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);
+  Result<void> maps = write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);
   if (!maps) return maps;
   const Result<void> written = isp::write_picture(upright, batch.options.space, raw.info, job.output, write, executor);
   finish.lap("encode and write");
