@@ -18,13 +18,9 @@ namespace lowlux::cli {
 namespace {
 
 int failed(const std::string& file, const Error& error) {
-  if (error.code == ErrorCode::invalid_argument) {
-    print_err(fmt::format(
-        "{}\n", one_line("lowlux info: " + error.message + (error.where.empty() ? "" : " (" + error.where + ")"))));
-    return exit_usage;
-  }
-  print_err(fmt::format("{}\n", error_line(file, error)));
-  return exit_failed;
+  if (error.code != ErrorCode::invalid_argument) return print_failure(file, error);
+  const std::string place = error.where.empty() ? "" : " (" + error.where + ")";
+  return print_usage_error("info", {error.code, error.message + place, {}});
 }
 
 }  // namespace

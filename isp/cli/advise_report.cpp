@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/cli/frame_text.h"
+#include "isp/cli/lines.h"
 #include "isp/cli/version.h"
 
 namespace lowlux::cli {
@@ -36,7 +37,7 @@ std::string limit_of(const isp::AdvicePoint& point) { return point.exceeds ? nam
 bool has_heavy_tails(const isp::AdvicePoint& p) { return p.midtone && p.midtone->weight_snr < heavy_tails; }
 
 /// The numbers of a point: exposure, SNR, std of u'v', highlight in the well and in the range.
-std::vector<std::string> cells_of(const isp::AdvicePoint& p) {
+std::vector<std::string> cells_of_point(const isp::AdvicePoint& p) {
   std::vector<std::string> cells{fmt::format("{:.4g}", p.exposure_s)};
   if (p.midtone) {
     cells.push_back(fmt::format("{:.1f}", isp::decibel(p.midtone->snr)));
@@ -58,7 +59,7 @@ isp::Table gains_table(const AdviceCase& asked, const isp::ExposureAdvice& advic
   table.columns.emplace_back("largest noise");
   table.rows.reserve(advice.gains.size());
   for (const isp::GainAdvice& gain : advice.gains) {
-    std::vector<std::string> row = cells_of(gain.at);
+    std::vector<std::string> row = cells_of_point(gain.at);
     row.insert(row.begin(), asked.request.gains[gain.at.gain].name);
     row.emplace_back(name_of(gain.limit));
     row.push_back(fmt::format("{} {:.0f} %", name_of(gain.largest_noise), 100 * gain.largest_noise_share));
@@ -72,34 +73,12 @@ isp::Table curve_table(const AdviceCase& asked, const isp::ExposureAdvice& advic
   table.columns.back() = "exceeds";
   table.rows.reserve(advice.curve.size());
   for (const isp::AdvicePoint& point : advice.curve) {
-    std::vector<std::string> row = cells_of(point);
+    std::vector<std::string> row = cells_of_point(point);
     row.insert(row.begin(), asked.request.gains[point.gain].name);
     row.push_back(limit_of(point));
     table.rows.push_back(std::move(row));
   }
   return table;
-}
-
-/// Columns as wide as their widest cell.
-std::string text_of(const isp::Table& table) {
-  std::vector<std::size_t> widths;
-  widths.reserve(table.columns.size());
-  for (const std::string& column : table.columns) widths.push_back(column.size());
-  for (const auto& row : table.rows) {
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-  }
-  std::string text;
-  const auto line = [&](const std::vector<std::string>& cells) {
-    std::string out = " ";
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      const bool words = i == 0 || i >= 7;
-      out += words ? fmt::format(" {:<{}} ", cells[i], widths[i]) : fmt::format(" {:>{}} ", cells[i], widths[i]);
-    }
-    text += out.substr(0, out.find_last_not_of(' ') + 1) + '\n';
-  };
-  line(table.columns);
-  for (const auto& row : table.rows) line(row);
-  return text;
 }
 
 std::string advised(const AdviceCase& asked, const isp::ExposureAdvice& advice) {
@@ -181,7 +160,7 @@ std::string advice_text(const AdviceCase& asked, const isp::ExposureAdvice& advi
   fmt::format_to(out, "  sensor          {}\n", asked.camera);
   fmt::format_to(out, "  scene           {}\n", scene_of(asked.request));
   for (const std::string& note : asked.notes) fmt::format_to(out, "  note            {}\n", note);
-  fmt::format_to(out, "the best of each gain\n{}", text_of(gains_table(asked, advice)));
+  fmt::format_to(out, "the best of each gain\n{}", aligned_text(gains_table(asked, advice), 7));
   if (std::ranges::any_of(advice.gains, has_heavy_tails, &isp::GainAdvice::at)) {
     fmt::format_to(out, "{}\n", heavy_note);
   }

@@ -93,7 +93,7 @@ class BatchRun {
         if (std::ranges::any_of(files_of(batch_, job), exists)) own.overwrite = isp::Overwrite::yes;
       }
       const Result<void> worked = work_(own, executor, progress, out);
-      if (!worked) out.error = with_place(worked.error(), job.input);
+      if (!worked) out.error = with_file(worked.error(), job.input);
     } catch (const std::bad_alloc&) {
       out.error = Error{ErrorCode::too_large, "not enough memory; --jobs 1 takes the least", job.input};
     } catch (const std::exception& failure) {

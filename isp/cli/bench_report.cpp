@@ -56,7 +56,7 @@ Json json_of(const Machine& machine) {
 }
 
 /// Names of systems and processors may be of any bytes.
-std::string text_of(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
+std::string dumped(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
 
 Json json_of(const MeasuredStage& measured, const Machine& machine) {
   Json rows = Json::array();
@@ -92,7 +92,7 @@ isp::Table self_contained_table(const MeasuredStage& measured, const Machine& ma
 std::vector<OutputFile> text_files(const MeasuredStage& measured, const Machine& machine) {
   const std::string id(measured.stage.id);
   return {{id + ".csv", isp::csv_of(self_contained_table(measured, machine))},
-          {id + ".json", text_of(json_of(measured, machine)) + "\n"}};
+          {id + ".json", dumped(json_of(measured, machine)) + "\n"}};
 }
 
 Result<void> check_free(const std::string& name, const BenchArgs& args) {
@@ -131,7 +131,7 @@ std::string bench_text(const MeasuredStage& measured) {
 std::string bench_json(const std::vector<MeasuredStage>& measured, const Machine& machine) {
   Json out = Json::array();
   for (const MeasuredStage& m : measured) out.push_back(json_of(m, machine));
-  return text_of(out);
+  return dumped(out);
 }
 
 Result<void> check_bench_files(const std::vector<isp::BenchStage>& stages, const BenchArgs& args) {

@@ -15,18 +15,17 @@ namespace lowlux::cli {
 namespace {
 
 constexpr const char* channels[] = {"red", "green", "blue"};
-constexpr const char* sites[] = {"site 00", "site 01", "site 10", "site 11"};
 
 template <class Values, class Text>
-std::string joined(const Values& values, const Text& text) {
+std::string cells(const Values& values, const Text& text) {
   std::string out;
   for (const auto& v : values) out += fmt::format("{:>22}", text(v));
   return out;
 }
 
 void add_pedestal(const PerSite<Estimate>& level, Lines& out) {
-  out.add("", joined(sites, [](const char* name) { return std::string(name); }));
-  out.add("black [DN]", joined(level, text_of));
+  out.add("", cells(site_names, [](const char* name) { return std::string(name); }));
+  out.add("black [DN]", cells(level, text_of));
 }
 
 isp::Table table_of(const GainProfile& gain) {
@@ -36,7 +35,7 @@ isp::Table table_of(const GainProfile& gain) {
     table.rows.push_back({std::move(name), std::move(cells.value), std::move(cells.standard_error), unit});
   };
   for (int site = 0; gain.pedestal_dn && site < 4; ++site) {
-    add(fmt::format("black level, {}", sites[site]), (*gain.pedestal_dn)[site], "DN");
+    add(fmt::format("black level, {}", site_names[site]), (*gain.pedestal_dn)[site], "DN");
   }
   const SensorModel& s = *gain.sensor;
   add("system gain", {s.system_gain_dn_per_e, gain.errors.system_gain_dn_per_e}, "DN/e-");
@@ -67,7 +66,7 @@ std::vector<isp::Series> by_site(const calib::DarkSeries& series, std::span<cons
   std::vector<isp::Series> out;
   for (const calib::DarkPoint& p : series.points) {
     const calib::DarkGroup& group = groups[static_cast<std::size_t>(p.group)];
-    const std::string name = celsius_of(group) + sites[p.site];
+    const std::string name = celsius_of(group) + site_names[p.site];
     auto own = std::find_if(out.begin(), out.end(), [&](const isp::Series& s) { return s.name == name; });
     if (own == out.end()) own = out.insert(out.end(), isp::Series{.name = name, .mark = mark});
     own->x.push_back(*group.setting.exposure_s);
@@ -168,12 +167,12 @@ std::string name_of_gain(const calib::FrameSetting& setting) {
 void show_black(const calib::BlackFigures& black, const calib::FrameSetting& setting, Calibration& found) {
   Lines out;
   add_pedestal(black.level_dn, out);
-  out.add("deviation [DN]", joined(black.deviation_dn, [](double v) { return fmt::format("{:.4g}", v); }));
+  out.add("deviation [DN]", cells(black.deviation_dn, [](double v) { return fmt::format("{:.4g}", v); }));
   const auto scatter = [](const calib::LineScatter& s) {
     return fmt::format("{:.3g} ({:.3g})", s.found_dn, s.white_dn);
   };
-  out.add("row means", joined(black.rows, scatter));
-  out.add("column means", joined(black.columns, scatter));
+  out.add("row means", cells(black.rows, scatter));
+  out.add("column means", cells(black.columns, scatter));
   out.add("", fmt::format("standard deviation in DN{}; in brackets what white noise alone would give",
                           black.frames == 1 ? "" : " of the mean of the frames"));
   out.add("row noise", fmt::format("{:.3g} DN, column noise {:.3g} DN beyond white noise", black.row_noise_dn,
@@ -187,7 +186,7 @@ void show_black(const calib::BlackFigures& black, const calib::FrameSetting& set
   isp::Table table{{"site", "black [DN]", "standard error [DN]", "deviation [DN]"}, {}};
   for (int site = 0; site < 4; ++site) {
     EstimateCells level = cells_of(black.level_dn[site]);
-    table.rows.push_back({sites[site], std::move(level.value), std::move(level.standard_error),
+    table.rows.push_back({site_names[site], std::move(level.value), std::move(level.standard_error),
                           fmt::format("{:.4g}", black.deviation_dn[site])});
   }
   found.report.sections.push_back(
@@ -205,17 +204,18 @@ void show_dark_series(const calib::DarkSeries& series, std::span<const calib::Da
   for (const calib::DarkGroup& g : groups) frames += g.frames;
   out.add("darks", fmt::format("{} frames of {} settings, {:.2g} % of the pixels left out", frames, groups.size(),
                                100 * series.excluded_share));
-  out.add("system gain",
-          fmt::format("{} DN/e-, {}", text_of({gain.sensor->system_gain_dn_per_e, gain.errors.system_gain_dn_per_e}),
-                      gain_source));
+  out.add(
+      "system gain",
+      fmt::format("{} DN/e-, {}",
+                  text_of(Estimate{gain.sensor->system_gain_dn_per_e, gain.errors.system_gain_dn_per_e}), gain_source));
   add_pedestal(series.pedestal_dn, out);
-  out.add("", joined(channels, [](const char* name) { return std::string(name); }));
+  out.add("", cells(channels, [](const char* name) { return std::string(name); }));
   for (const calib::DarkCurrent& c : series.currents) {
-    out.add("dark [e-/s]", fmt::format("{}{}", joined(c.current_e_per_s, text_of),
+    out.add("dark [e-/s]", fmt::format("{}{}", cells(c.current_e_per_s, text_of),
                                        c.temperature_c ? fmt::format("  at {:g} C", *c.temperature_c) : std::string()));
   }
   if (series.chromaticity) {
-    out.add("dark colour", fmt::format("{}  of the dark current", joined(*series.chromaticity, text_of)));
+    out.add("dark colour", fmt::format("{}  of the dark current", cells(*series.chromaticity, text_of)));
   } else {
     out.add("dark colour", "not measurable: the dark current is too small");
   }

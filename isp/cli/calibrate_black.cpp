@@ -11,6 +11,7 @@
 #include "isp/base/camera_name.h"
 #include "isp/cli/black_report.h"
 #include "isp/cli/calibration.h"
+#include "isp/cli/exit_code.h"
 #include "isp/cli/progress.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/masked_black.h"
@@ -20,11 +21,6 @@ namespace {
 
 constexpr double light_of_range = 0.005;  // how far the picture may lie above the masked pixels
 constexpr double light_of_noise = 10;     // or in standard deviations of these
-
-Error at(Error error, const std::string& file) {
-  error.where = file;
-  return error;
-}
 
 double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
 
@@ -81,8 +77,8 @@ Result<Darks> read_darks(const CalibrateBlackArgs& args) {
     out.files.emplace_back(frame->raw.info.iso, file);
     list_frame(file, args.masked ? "masked pixels" : "dark", frame->raw.info, out.frames);
     const auto dark = dark_part(std::move(frame->raw), args);
-    if (!dark) return tl::make_unexpected(at(dark.error(), file));
-    if (const auto added = sorter.add(*dark); !added) return tl::make_unexpected(at(added.error(), file));
+    if (!dark) return tl::make_unexpected(with_file(dark.error(), file));
+    if (const auto added = sorter.add(*dark); !added) return tl::make_unexpected(with_file(added.error(), file));
     progress.advance(1, file);
   }
   out.sets = sorter.sets();

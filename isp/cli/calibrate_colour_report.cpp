@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/cli/calibration.h"
+#include "isp/cli/lines.h"
 #include "isp/cli/report.h"
 #include "isp/model/spectral_data.h"
 
@@ -56,27 +57,6 @@ isp::Table summary_table(const ColourOutcome& outcome) {
                         fmt::format("{:.2f}", summary.largest), errors.what});
   }
   return out;
-}
-
-std::string text_of(const isp::Table& table) {
-  std::vector<std::size_t> width(table.columns.size());
-  const auto widen = [&](const std::vector<std::string>& row) {
-    for (std::size_t i = 0; i < row.size(); ++i) width[i] = std::max(width[i], row[i].size());
-  };
-  widen(table.columns);
-  for (const auto& row : table.rows) widen(row);
-  std::string text;
-  const auto print = [&](const std::vector<std::string>& row) {
-    std::string line = "  ";
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      const bool words = i == 0 || (i + 1 == row.size() && table.columns[i] == "of");
-      line += words ? fmt::format("{:<{}}  ", row[i], width[i]) : fmt::format("{:>{}}  ", row[i], width[i]);
-    }
-    text += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
-  };
-  print(table.columns);
-  for (const auto& row : table.rows) print(row);
-  return text;
 }
 
 /// Corner of the chart in pixels of the active area: a half-size pixel's centre lies between two.
@@ -188,8 +168,9 @@ isp::Plot ab_plot(const ColourOutcome& outcome) {
 }  // namespace
 
 std::string colour_text(const ColourOutcome& outcome) {
-  return fmt::format("{}\n{}\n{}\n{}", one_line(outcome.input), facts(outcome), text_of(patch_table(outcome)),
-                     text_of(summary_table(outcome)));
+  const isp::Table patches = patch_table(outcome), summary = summary_table(outcome);
+  return fmt::format("{}\n{}\n{}\n{}", one_line(outcome.input), facts(outcome),
+                     aligned_text(patches, patches.columns.size()), aligned_text(summary, summary.columns.size() - 1));
 }
 
 std::string colour_json(const ColourOutcome& outcome, const std::string& profile) {

@@ -23,11 +23,6 @@
 namespace lowlux::cli {
 namespace {
 
-Error with_file(Error error, const std::string& file) {
-  if (error.where.empty()) error.where = file;
-  return error;
-}
-
 /// JSON holds UTF-8 only; names of files hold any bytes.
 std::string readable(const std::string& name) {
   using Json = nlohmann::ordered_json;
@@ -109,9 +104,8 @@ calib::Measured measured_today(std::vector<std::string> files) {
 
 int calibration_failed(const CalibrateArgs& args, const Error& error) {
   const std::string what = error.where.empty() ? "calibrate" : error.where;
-  print_err(fmt::format("{}\n", error_line(what, error)));
   if (args.json) print_out(fmt::format("{}\n", error_json(what, error)));
-  return exit_failed;
+  return print_failure(what, error);
 }
 
 int finish(const CalibrateArgs& args, const Calibration& found) {

@@ -5,6 +5,7 @@
 #include "capture/camera/camera_frame.h"
 #include "isp/base/camera_profile.h"
 #include "isp/cli/capture_sink.h"
+#include "isp/cli/exit_code.h"
 #include "isp/cli/noise_source.h"
 #include "isp/cli/outputs.h"
 #include "isp/cli/picture_options.h"
@@ -18,11 +19,6 @@
 
 namespace lowlux::cli {
 namespace {
-
-Error at(Error error, const std::string& file) {
-  if (error.where.empty()) error.where = file;
-  return error;
-}
 
 class PictureSink final : public CaptureSink {
  public:
@@ -44,7 +40,7 @@ class PictureSink final : public CaptureSink {
     const std::string file = frame_file(args_, work.files.size() + 1);
     const auto written =
         isp::write_picture(*picture, options_.space, info_, file, write_options(args_.develop), executor_);
-    if (!written) return tl::make_unexpected(at(written.error(), file));
+    if (!written) return tl::make_unexpected(with_file(written.error(), file));
     clock.lap("write");
     work.process_s += times[0].seconds;
     work.write_s += times[1].seconds;
@@ -60,7 +56,8 @@ class PictureSink final : public CaptureSink {
       const bool everything = !args_.develop.profile.empty();
       const ProfileChoice choice{everything, args_.develop.gain_setting};
       if (const auto used = use_profile(*profile_, choice, frame, options); !used) {
-        return tl::make_unexpected(at(used.error(), everything ? args_.develop.profile : args_.develop.black_profile));
+        return tl::make_unexpected(
+            with_file(used.error(), everything ? args_.develop.profile : args_.develop.black_profile));
       }
       if (everything && !profile_->colours.empty()) std::erase(frame.warnings, capture::colours_unknown);
     }
@@ -102,7 +99,7 @@ class RawSink final : public CaptureSink {
     const isp::DngWriteOptions options{args_.develop.force ? isp::Overwrite::yes : isp::Overwrite::no,
                                        "lowlux " + version_number()};
     if (auto written = isp::write_dng(raw, file, options); !written) {
-      return tl::make_unexpected(at(written.error(), file));
+      return tl::make_unexpected(with_file(written.error(), file));
     }
     clock.lap("write");
     work.process_s += times[0].seconds;
@@ -133,7 +130,7 @@ Result<std::unique_ptr<CaptureSink>> make_picture_sink(const CaptureArgs& args, 
   std::optional<CameraProfile> profile;
   if (const std::string& file = develop.profile.empty() ? develop.black_profile : develop.profile; !file.empty()) {
     auto read = read_profile(file);
-    if (!read) return tl::make_unexpected(at(read.error(), file));
+    if (!read) return tl::make_unexpected(with_file(read.error(), file));
     profile = *std::move(read);
   }
   return std::make_unique<PictureSink>(args, stream, *std::move(options), std::move(profile), executor);

@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string text_of(const isp::DifferenceSummary& d) {
+std::string difference_text(const isp::DifferenceSummary& d) {
   if (std::isnan(d.mean)) return "none: no pixel is finite in both";
   return fmt::format("mean {:.3f}, median {:.3f}, 95 % {:.3f}, largest {:.3f}", d.mean, d.median, d.percentile_95,
                      d.largest);
@@ -64,9 +64,9 @@ Json egr_json(const CompareOutcome& outcome) {
 std::string compare_text(const CompareOutcome& outcome) {
   const isp::PictureComparison& c = outcome.found;
   Lines lines;
-  lines.add("Delta E ab", text_of(c.delta_e_ab));
-  lines.add("Delta E 94c", text_of(c.delta_e_94c));
-  lines.add("CIEDE2000", text_of(c.ciede2000));
+  lines.add("Delta E ab", difference_text(c.delta_e_ab));
+  lines.add("Delta E 94c", difference_text(c.delta_e_94c));
+  lines.add("CIEDE2000", difference_text(c.ciede2000));
   lines.add("EGR convex", convex_text(outcome));
   lines.add("EGR occupancy", occupancy_text(c.gamut));
   lines.add("spectra", spectra_text(outcome.spectra));

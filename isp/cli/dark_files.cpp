@@ -11,6 +11,7 @@
 #include "calib/light_in_darks.h"
 #include "capture/file/dng_source.h"
 #include "isp/cli/calibration.h"
+#include "isp/cli/exit_code.h"
 #include "isp/cli/profile_file.h"
 #include "isp/cli/raw_files.h"
 #include "isp/raw/black_point.h"
@@ -67,9 +68,7 @@ Result<std::shared_ptr<DarkSource>> read_darks(const std::vector<std::string>& f
   for (const std::string& file : files) {
     const Result<RawFrame> frame = capture::read_raw(file);
     Result<void> added = frame ? library.add(frame->raw) : tl::make_unexpected(frame.error());
-    if (added) continue;
-    if (added.error().where.empty()) added.error().where = file;
-    return tl::make_unexpected(added.error());
+    if (!added) return tl::make_unexpected(with_file(added.error(), file));
   }
   std::vector<calib::DarkGroup> groups = library.groups();
   calib::DarkRequest request{.noise_share = args.noise_share, .doubling_c = args.doubling_c};

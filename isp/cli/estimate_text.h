@@ -1,10 +1,14 @@
 #pragma once
 
+#include <array>
 #include <string>
 
 #include "isp/base/estimate.h"
 
 namespace lowlux::cli {
+
+/// The pixels of the 2x2 cell, for a table.
+inline constexpr std::array site_names = {"site 00", "site 01", "site 10", "site 11"};
 
 /// The two numbers of an estimate, for a table.
 struct EstimateCells {

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "isp/cli/report.h"
+#include "isp/output/report.h"
 
 namespace lowlux::cli {
 
@@ -24,5 +25,9 @@ class Lines {
  private:
   std::string text_;
 };
+
+/// Lines of a table, whose columns are as wide as their widest cell: words, in the first column and from `words_from`
+/// on, are aligned at their left, figures at their right.
+std::string aligned_text(const isp::Table& table, std::size_t words_from);
 
 }  // namespace lowlux::cli

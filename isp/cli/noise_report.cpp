@@ -16,8 +16,6 @@
 namespace lowlux::cli {
 namespace {
 
-constexpr const char* sites[] = {"site 00", "site 01", "site 10", "site 11"};
-
 using Pairs = std::span<const calib::PairStatistics>;
 
 std::string optional_text(const std::optional<Estimate>& e, const char* unit, const char* none) {
@@ -62,7 +60,7 @@ template <class Value>
 std::vector<isp::Series> by_site(const std::vector<calib::TransferPoint>& points, const Value& value) {
   std::vector<isp::Series> out;
   for (int site = 0; site < 4; ++site) {
-    isp::Series own{.name = sites[site], .mark = isp::Mark::points};
+    isp::Series own{.name = site_names[site], .mark = isp::Mark::points};
     for (const calib::TransferPoint& p : points) {
       if (p.site != site || p.pair < 0) continue;
       own.x.push_back(p.signal_dn);

@@ -22,7 +22,7 @@ namespace lowlux::cli {
 
 namespace {
 
-constexpr std::string_view blanks = " \t";
+constexpr std::string_view blank_characters = " \t";
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
@@ -37,7 +37,7 @@ std::string_view without_unit(std::string_view text, std::string_view unit) {
   const std::size_t rest = text.size() - unit.size();
   if (!same_letters(text.substr(rest), unit)) return text;
   text = text.substr(0, rest);
-  return text.substr(0, text.find_last_not_of(blanks) + 1);
+  return text.substr(0, text.find_last_not_of(blank_characters) + 1);
 }
 
 /// The unit that a placeholder of the help stands for; empty if it stands for none.

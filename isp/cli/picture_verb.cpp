@@ -16,18 +16,11 @@
 namespace lowlux::cli {
 namespace {
 
-int usage_error(const PictureVerb& verb, const Error& error) {
-  const std::string place = error.where.empty() ? "" : error.where + ": ";
-  print_err(fmt::format("{}\n", one_line("lowlux " + verb.name + ": " + place + error.message)));
-  return exit_usage;
-}
-
 int failed(const PictureVerb& verb, Error error) {
   const std::string& input = verb.inputs.front();
-  if (error.where.empty()) error.where = input;
-  print_err(fmt::format("{}\n", error_line(input, error)));
+  error = with_file(std::move(error), input);
   if (verb.json) print_out(fmt::format("{}\n", error_json(input, error)));
-  return exit_failed;
+  return print_failure(input, error);
 }
 
 }  // namespace
@@ -45,11 +38,11 @@ Result<void> write_made(const PictureVerb& verb, const Picture& picture, OutputS
 
 int run_picture_verb(const PictureVerb& verb, const PictureWork& work) {
   const Result<isp::FileFormat> format = isp::format_of(verb.output);
-  if (!format) return usage_error(verb, format.error());
+  if (!format) return print_usage_error(verb.name, format.error());
   const Result<PictureKind> kind = picture_kind(*format, verb.bits, std::nullopt);
-  if (!kind) return usage_error(verb, kind.error());
+  if (!kind) return print_usage_error(verb.name, kind.error());
   if (const std::string wrong = wrong_names({verb.output}, verb.inputs); !wrong.empty()) {
-    return usage_error(verb, {ErrorCode::invalid_argument, wrong, "-o"});
+    return print_usage_error(verb.name, {ErrorCode::invalid_argument, wrong, "-o"});
   }
   if (const auto place = check_place(verb.output, verb.force); !place) return failed(verb, place.error());
   PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));

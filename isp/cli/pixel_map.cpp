@@ -2,18 +2,10 @@
 
 #include <utility>
 
+#include "isp/cli/exit_code.h"
 #include "isp/codec/pfm.h"
 
 namespace lowlux::cli {
-namespace {
-
-Error with_file(Error error, const std::string& file) {
-  if (error.where.empty()) error.where = file;
-  return error;
-}
-
-}  // namespace
-
 Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite, isp::Sync sync) {
   auto file = isp::AtomicFile::create(map.path, overwrite, sync);
   if (!file) return tl::make_unexpected(with_file(file.error(), map.path));

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "capture/file/dng_source.h"
+#include "isp/cli/exit_code.h"
 #include "isp/cli/noise_maps.h"
 #include "isp/cli/noise_source.h"
 #include "isp/cli/profile_file.h"
@@ -48,11 +49,6 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
 
 }  // namespace
 
-Error with_place(Error error, const std::string& where) {
-  if (error.where.empty()) error.where = where;
-  return error;
-}
-
 std::vector<std::string> files_of(const RawBatch& batch, const Job& job) {
   std::vector<std::string> files{job.output};
   if (batch.options.denoise.maps) {
@@ -71,7 +67,7 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
   RawBatch batch{.args = args, .options = options, .jobs = std::move(jobs)};
   if (const std::string& file = args.profile.empty() ? args.black_profile : args.profile; !file.empty()) {
     auto profile = read_profile(file);
-    if (!profile) return tl::make_unexpected(with_place(profile.error(), file));
+    if (!profile) return tl::make_unexpected(with_file(profile.error(), file));
     batch.profile = std::move(*profile);
   }
   batch.sync = args.sync ? isp::Sync::yes : isp::Sync::no;

@@ -50,9 +50,6 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
 /// All that is written for one file: the output, and its maps.
 std::vector<std::string> files_of(const RawBatch& batch, const Job& job);
 
-/// The error, with `where` as its place if it has none.
-Error with_place(Error error, const std::string& where);
-
 /// A raw file ready to be worked on, with what holds for it: profile, darks, the noise of its picture.
 struct ReadyFrame {
   RawFrame frame;

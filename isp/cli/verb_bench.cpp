@@ -87,17 +87,12 @@ isp::BenchOptions options_of(const BenchArgs& args, const std::string& folder) {
   return options;
 }
 
-int failed(const Error& error) {
-  print_err(fmt::format("{}\n", error_line(error.where, error)));
-  return exit_failed;
-}
-
 /// Times of each part for a frame of 12 MP.
 int run_calibrate_cost(const BenchArgs& args) {
   const int threads = args.threads > 0 ? args.threads : threads_of_each(1);
   std::string file;
   const auto model = calibrate_cost(threads, args.json, file);
-  if (!model) return failed(model.error());
+  if (!model) return print_failure(model.error());
   if (args.json) {
     print_out(fmt::format("{}", cost_text(*model)));
     return exit_done;
@@ -126,13 +121,10 @@ int run_bench(const std::vector<std::string>& words) {
   }
   if (args.calibrate_cost) return run_calibrate_cost(args);
   const auto stages = chosen(args.stages);
-  if (!stages) {
-    print_err(fmt::format("{}\n", one_line("lowlux bench: " + stages.error().message)));
-    return exit_usage;
-  }
+  if (!stages) return print_usage_error("bench", stages.error());
   const auto folder = pictures_folder(args);
-  if (!folder) return failed(folder.error());
-  if (const auto free = check_bench_files(*stages, args); !free) return failed(free.error());
+  if (!folder) return print_failure(folder.error());
+  if (const auto free = check_bench_files(*stages, args); !free) return print_failure(free.error());
   const isp::BenchOptions options = options_of(args, *folder);
   const std::vector<MeasuredStage> measured = run_each(*stages, options);
   const Machine machine = this_machine(options.threads);
@@ -144,7 +136,7 @@ int run_bench(const std::vector<std::string>& words) {
   if (!args.output.empty() && !measured.empty()) {
     PoolExecutor executor(options.threads);
     const auto written = write_bench_files(measured, machine, args, executor);
-    if (!written) return failed(written.error());
+    if (!written) return print_failure(written.error());
     if (!args.json) print_out("\nwritten:\n");
     for (const std::string& name : *written) {
       if (!args.json) print_out(fmt::format("  {}\n", one_line(name)));

@@ -91,12 +91,6 @@ Result<void> check_files(const CaptureArgs& args) {
   return {};
 }
 
-int usage_error(const Error& error) {
-  const std::string place = error.where.empty() ? "" : error.where + ": ";
-  print_err(fmt::format("{}\n", one_line("lowlux capture: " + place + error.message)));
-  return exit_usage;
-}
-
 class Capture {
  public:
   explicit Capture(const CaptureArgs& args)
@@ -179,11 +173,13 @@ int run_capture(const std::vector<std::string>& words) {
   if (args.list) return list_cameras(args.develop.json);
   if (args.kind == CaptureKind::pictures) {
     const auto format = isp::format_of(frame_file(args, 1));
-    if (!format) return usage_error(format.error());
-    if (const auto fits = complete_options(args.develop, *format); !fits) return usage_error(fits.error());
+    if (!format) return print_usage_error("capture", format.error());
+    if (const auto fits = complete_options(args.develop, *format); !fits)
+      return print_usage_error("capture", fits.error());
   }
   if (args.kind == CaptureKind::live && ::isatty(STDOUT_FILENO) == 1) {
-    return usage_error({ErrorCode::invalid_argument, "writes a film: lead it to a player, | ffplay -", "--live"});
+    return print_usage_error("capture",
+                             {ErrorCode::invalid_argument, "writes a film: lead it to a player, | ffplay -", "--live"});
   }
   listen_to_signals();
   Capture capture(args);

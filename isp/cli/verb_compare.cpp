@@ -71,9 +71,8 @@ int run_compare(const std::vector<std::string>& words) {
   const Result<CompareOutcome> done = compared(args);
   if (!done) {
     const Error& error = done.error();
-    print_err(fmt::format("{}\n", error_line(error.where, error)));
     if (args.json) print_out(fmt::format("{}\n", error_json(error.where, error)));
-    return exit_failed;
+    return print_failure(error);
   }
   for (const std::string& warning : done->warnings) {
     print_err(fmt::format("{}\n", one_line("lowlux compare: warning: " + warning)));

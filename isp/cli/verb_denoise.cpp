@@ -48,17 +48,6 @@ Result<void> denoise_file(const RawBatch& batch, const Job& job, Executor& execu
   return {};
 }
 
-int failed(const Error& error) {
-  print_err(fmt::format("{}\n", error_line(error.where, error)));
-  return exit_failed;
-}
-
-int usage_error(const Error& error) {
-  const std::string place = error.where.empty() ? "" : error.where + ": ";
-  print_err(fmt::format("{}\n", one_line("lowlux denoise: " + place + error.message)));
-  return exit_usage;
-}
-
 /// The maps are always made, and there are codes in place of a picture.
 std::size_t clean_raw_bytes(const RawDn& raw, const isp::DevelopOptions& options, int threads) {
   isp::DevelopOptions with_maps = options;
@@ -84,18 +73,22 @@ int run_denoise(const std::vector<std::string>& words) {
   const auto& args = std::get<DevelopArgs>(parsed);
 
   Result<std::vector<Job>> jobs = plan_outputs(args, "dng");
-  if (!jobs) return jobs.error().code == ErrorCode::invalid_argument ? usage_error(jobs.error()) : failed(jobs.error());
+  if (!jobs)
+    return jobs.error().code == ErrorCode::invalid_argument ? print_usage_error("denoise", jobs.error())
+                                                            : print_failure(jobs.error());
   if (!jobs->front().output.ends_with(".dng")) {
-    return usage_error({ErrorCode::invalid_argument, "a clean raw is a DNG: its name ends with .dng", "-o"});
+    return print_usage_error("denoise",
+                             {ErrorCode::invalid_argument, "a clean raw is a DNG: its name ends with .dng", "-o"});
   }
   const Result<std::vector<std::string>> darks = dark_files(args, *jobs);
-  if (!darks) return usage_error(darks.error());
+  if (!darks) return print_usage_error("denoise", darks.error());
   std::vector<std::string> only_read = *darks;
   only_read.insert(only_read.end(), {args.profile, args.black_profile, args.dark.doubling_profile});
-  if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed) return usage_error(unharmed.error());
+  if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed)
+    return print_usage_error("denoise", unharmed.error());
 
   Result<RawBatch> batch = make_batch(args, without_rendering(args.options), *std::move(jobs), *darks);
-  if (!batch) return failed(batch.error());
+  if (!batch) return print_failure(batch.error());
   batch->bytes_of = clean_raw_bytes;
   return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {
     return denoise_file(*batch, job, executor, progress, out);

@@ -48,17 +48,6 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
   return {};
 }
 
-int failed(const Error& error) {
-  print_err(fmt::format("{}\n", error_line(error.where, error)));
-  return exit_failed;
-}
-
-int usage_error(const Error& error) {
-  const std::string place = error.where.empty() ? "" : error.where + ": ";
-  print_err(fmt::format("{}\n", one_line("lowlux develop: " + place + error.message)));
-  return exit_usage;
-}
-
 }  // namespace
 
 int run_develop(const std::vector<std::string>& words) {
@@ -67,26 +56,29 @@ int run_develop(const std::vector<std::string>& words) {
   const auto& args = std::get<DevelopArgs>(parsed);
 
   Result<std::vector<Job>> jobs = plan_outputs(args, "png");
-  if (!jobs) return jobs.error().code == ErrorCode::invalid_argument ? usage_error(jobs.error()) : failed(jobs.error());
+  if (!jobs)
+    return jobs.error().code == ErrorCode::invalid_argument ? print_usage_error("develop", jobs.error())
+                                                            : print_failure(jobs.error());
   const Result<isp::FileFormat> format = isp::format_of(jobs->front().output);
-  if (!format) return usage_error(format.error());
+  if (!format) return print_usage_error("develop", format.error());
   if (!args.format.empty() && !names_folder(args)) {
-    return usage_error(
-        {ErrorCode::invalid_argument, "goes with a folder as output; a file's name says its format", "--format"});
+    return print_usage_error("develop", {ErrorCode::invalid_argument,
+                                         "goes with a folder as output; a file's name says its format", "--format"});
   }
   Result<isp::DevelopOptions> options = complete_options(args, *format);
-  if (!options) return usage_error(options.error());
+  if (!options) return print_usage_error("develop", options.error());
 
   const Result<std::vector<std::string>> darks = dark_files(args, *jobs);
-  if (!darks) return usage_error(darks.error());
+  if (!darks) return print_usage_error("develop", darks.error());
   std::vector<std::string> only_read = *darks;
   only_read.insert(only_read.end(),
                    {args.profile, args.black_profile, args.dark.doubling_profile, args.look.coefficients});
-  if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed) return usage_error(unharmed.error());
+  if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed)
+    return print_usage_error("develop", unharmed.error());
 
-  if (const auto made = make_for_display(args, *options); !made) return failed(made.error());
+  if (const auto made = make_for_display(args, *options); !made) return print_failure(made.error());
   const Result<RawBatch> batch = make_batch(args, *options, *std::move(jobs), *darks);
-  if (!batch) return failed(batch.error());
+  if (!batch) return print_failure(batch.error());
   return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {
     return develop_file(*batch, job, executor, progress, out);
   });

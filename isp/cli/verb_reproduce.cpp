@@ -24,7 +24,7 @@ struct Done {
   isp::Outcome outcome;
 };
 
-struct OutputFile {
+struct TextFile {
   std::string name;
   std::string text;
 };
@@ -80,9 +80,9 @@ std::vector<isp::Finding> findings_of(const std::vector<Done>& done) {
   return out;
 }
 
-std::vector<OutputFile> files_of(const std::vector<Done>& done, const ReproduceArgs& args) {
+std::vector<TextFile> files_of(const std::vector<Done>& done, const ReproduceArgs& args) {
   const std::vector<isp::Finding> findings = findings_of(done);
-  std::vector<OutputFile> out{{"findings.csv", isp::csv_of(isp::table_of(findings))}};
+  std::vector<TextFile> out{{"findings.csv", isp::csv_of(isp::table_of(findings))}};
   isp::Report report{"lowlux reproduce: published experiments and ours",
                      fmt::format("Seed {}{}. Each published finding stands beside the same quantity computed here, "
                                  "each check of our own beside what is expected; a sampled figure agrees within five "
@@ -116,29 +116,24 @@ std::optional<Error> in_the_way(const ReproduceArgs& args) {
 }
 
 // Nothing is written if one of the files is in the way.
-Result<void> write_all(const std::vector<OutputFile>& files, const ReproduceArgs& args) {
+Result<void> write_all(const std::vector<TextFile>& files, const ReproduceArgs& args) {
   std::error_code error;
   const std::filesystem::path folder(args.output);
   std::filesystem::create_directories(folder, error);
   if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
-  for (const OutputFile& file : files) {
+  for (const TextFile& file : files) {
     std::error_code ignored;
     if (!args.force && std::filesystem::exists(folder / file.name, ignored)) {
       return fail(ErrorCode::exists, "the file exists: use --force to overwrite it", (folder / file.name).string());
     }
   }
   const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
-  for (const OutputFile& file : files) {
+  for (const TextFile& file : files) {
     if (auto written = isp::write_text((folder / file.name).string(), file.text, overwrite); !written) {
       return written;
     }
   }
   return {};
-}
-
-int failed(const Error& error) {
-  print_err(fmt::format("{}\n", error_line(error.where, error)));
-  return exit_failed;
 }
 
 }  // namespace
@@ -152,14 +147,11 @@ int run_reproduce(const std::vector<std::string>& words) {
     return exit_done;
   }
   const auto experiments = chosen(args.experiments);
-  if (!experiments) {
-    print_err(fmt::format("{}\n", one_line("lowlux reproduce: " + experiments.error().message)));
-    return exit_usage;
-  }
-  if (const auto error = in_the_way(args)) return failed(*error);
+  if (!experiments) return print_usage_error("reproduce", experiments.error());
+  if (const auto error = in_the_way(args)) return print_failure(*error);
   const std::vector<Done> done = run_each(*experiments, args);
   if (!args.output.empty()) {
-    if (const auto written = write_all(files_of(done, args), args); !written) return failed(written.error());
+    if (const auto written = write_all(files_of(done, args), args); !written) return print_failure(written.error());
   }
   const std::vector<isp::Finding> findings = findings_of(done);
   print_out(fmt::format("{}\n", args.json ? findings_json(findings) : findings_text(findings)));

@@ -20,7 +20,7 @@
 namespace lowlux::cli {
 namespace {
 
-struct Outcome {
+struct ResaturateOutcome {
   isp::Xyz black;
   isp::Resaturated made;
   std::vector<std::string> warnings;
@@ -49,7 +49,7 @@ Result<isp::Xyz> black_of_area(const SceneLinear& xyz, const Rect& area) {
   return isp::Xyz{sum[0] / pixels, sum[1] / pixels, sum[2] / pixels};
 }
 
-void add_warnings(Outcome& out) {
+void add_warnings(ResaturateOutcome& out) {
   if (out.made.share_dark > 0.5) {
     out.warnings.push_back(fmt::format(
         "{:.0f} % of the picture is no brighter than the black point and becomes grey: is the black point too bright?",
@@ -65,10 +65,10 @@ PictureVerb verb_of(const ResaturateArgs& args) {
   return {"resaturate", {args.input}, args.output, args.bits, args.jpeg_quality, args.force, args.json, args.quiet};
 }
 
-Result<Outcome> worked(const ResaturateArgs& args, const PictureKind& kind, Executor& executor) {
+Result<ResaturateOutcome> worked(const ResaturateArgs& args, const PictureKind& kind, Executor& executor) {
   auto picture = capture::read_picture(args.input, executor);
   if (!picture) return tl::make_unexpected(picture.error());
-  Outcome out;
+  ResaturateOutcome out;
   out.warnings = picture->warnings;
   if (args.black_area) {
     const Result<isp::Xyz> black = black_of_area(picture->xyz, *args.black_area);
@@ -90,7 +90,7 @@ Result<Outcome> worked(const ResaturateArgs& args, const PictureKind& kind, Exec
   return out;
 }
 
-void print(const ResaturateArgs& args, const Outcome& done) {
+void print(const ResaturateArgs& args, const ResaturateOutcome& done) {
   const isp::Xyz& b = done.black;
   if (args.json) {
     const nlohmann::ordered_json json{{"file", args.input},
@@ -120,7 +120,7 @@ int run_resaturate(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<ResaturateArgs>(parsed);
   return run_picture_verb(verb_of(args), [&args](const PictureKind& kind, Executor& executor) {
-    return worked(args, kind, executor).map([&args](const Outcome& done) {
+    return worked(args, kind, executor).map([&args](const ResaturateOutcome& done) {
       print(args, done);
       return done.warnings;
     });

@@ -20,7 +20,7 @@
 namespace lowlux::cli {
 namespace {
 
-struct Outcome {
+struct RetargetOutcome {
   std::string coefficients;
   isp::RetargetedPicture made;
   std::vector<std::string> warnings;
@@ -33,7 +33,7 @@ PictureVerb verb_of(const RetargetArgs& args) {
   return verb;
 }
 
-Result<Outcome> worked(const RetargetArgs& args, const PictureKind& kind, Executor& executor) {
+Result<RetargetOutcome> worked(const RetargetArgs& args, const PictureKind& kind, Executor& executor) {
   isp::RetargetOptions options = args.options;
   Result<isp::ShinTable> table = isp::shin_substitute();
   if (!args.coefficients.empty()) {
@@ -47,10 +47,10 @@ Result<Outcome> worked(const RetargetArgs& args, const PictureKind& kind, Execut
   if (!made) return tl::make_unexpected(made.error());
   const auto written = write_made(verb_of(args), made->picture, kind.space, executor);
   if (!written) return tl::make_unexpected(written.error());
-  return Outcome{isp::coefficients_name(options), std::move(*made), picture->warnings};
+  return RetargetOutcome{isp::coefficients_name(options), std::move(*made), picture->warnings};
 }
 
-void print_json(const RetargetArgs& args, const Outcome& done) {
+void print_json(const RetargetArgs& args, const RetargetOutcome& done) {
   const isp::RetargetOptions& o = args.options;
   nlohmann::ordered_json json{{"file", args.input},
                               {"ok", true},
@@ -73,7 +73,7 @@ void print_json(const RetargetArgs& args, const Outcome& done) {
   print_out(fmt::format("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
 }
 
-void print_outcome(const RetargetArgs& args, const Outcome& done) {
+void print_outcome(const RetargetArgs& args, const RetargetOutcome& done) {
   const isp::RetargetOptions& o = args.options;
   Lines lines;
   lines.add("luminance",
@@ -97,7 +97,7 @@ int run_retarget(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<RetargetArgs>(parsed);
   return run_picture_verb(verb_of(args), [&args](const PictureKind& kind, Executor& executor) {
-    return worked(args, kind, executor).map([&args](const Outcome& done) {
+    return worked(args, kind, executor).map([&args](const RetargetOutcome& done) {
       if (args.json) {
         print_json(args, done);
       } else if (!args.quiet) {

@@ -30,11 +30,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-int usage_error(const std::string& what) {
-  print_err(fmt::format("{}\n", one_line("lowlux simulate: " + what)));
-  return exit_usage;
-}
-
 std::string frame_file(const SimulateArgs& args, int index) {
   if (args.frames == 1) return args.output;
   return fmt::format("{}_{:04}.dng", args.output.substr(0, args.output.size() - 4), index);
@@ -270,15 +265,15 @@ int run_simulate(const std::vector<std::string>& words) {
     print_out(fmt::format("{}", simulate_list()));
     return exit_done;
   }
-  if (const std::string wrong = wrong_files(args); !wrong.empty()) return usage_error(wrong);
+  if (const std::string wrong = wrong_files(args); !wrong.empty()) {
+    return print_usage_error("simulate", {ErrorCode::invalid_argument, wrong, {}});
+  }
   const Result<SimulateOutcome> outcome = Simulation(args).run();
   if (!outcome) {
-    if (outcome.error().code == ErrorCode::invalid_argument) {
-      return usage_error(outcome.error().message +
-                         (outcome.error().where.empty() ? "" : " (" + outcome.error().where + ")"));
-    }
-    print_err(fmt::format("{}\n", error_line(args.scene.what, outcome.error())));
-    return exit_failed;
+    const Error& error = outcome.error();
+    if (error.code != ErrorCode::invalid_argument) return print_failure(args.scene.what, error);
+    const std::string place = error.where.empty() ? "" : " (" + error.where + ")";
+    return print_usage_error("simulate", {error.code, error.message + place, {}});
   }
   print_outcome(args, *outcome);
   return exit_done;
