@@ -7,10 +7,10 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr std::uint32_t longest_side_px = 65535;
+constexpr std::uint32_t largest_side_px = 65535;
 constexpr std::uint64_t most_buffer_bytes = std::uint64_t{4} << 30;
 
-std::string size_text(std::int64_t width, std::int64_t height) {
+std::string pixels_text(std::int64_t width, std::int64_t height) {
   return std::to_string(width) + "x" + std::to_string(height);
 }
 
@@ -50,7 +50,7 @@ Result<void> check_bytes(const AgreedStream& agreed, const CameraFormat& format)
   if (format.stride_bytes < row_bytes(format.raw, format.width) || agreed.frame_bytes < frame_bytes(format)) {
     return fail(ErrorCode::malformed, "the camera states " + std::to_string(agreed.stride_bytes) +
                                           " bytes for a row and " + std::to_string(agreed.frame_bytes) +
-                                          " for a frame, too few for " + size_text(agreed.width, agreed.height) +
+                                          " for a frame, too few for " + pixels_text(agreed.width, agreed.height) +
                                           " of " + name_of(format.raw) + ", whose rows take " +
                                           std::to_string(row_bytes(format.raw, format.width)));
   }
@@ -77,8 +77,8 @@ Result<void> compare(const CameraFormat& format, const RawStreamChoice& choice, 
   }
   const FrameSize size{format.width, format.height};
   if (choice.size != FrameSize{} && size != choice.size) {
-    const std::string text = "the camera gives " + size_text(size.width, size.height) + " in place of " +
-                             size_text(choice.size.width, choice.size.height);
+    const std::string text = "the camera gives " + pixels_text(size.width, size.height) + " in place of " +
+                             pixels_text(choice.size.width, choice.size.height);
     if (request.width) return fail(ErrorCode::unsupported, text + ": ask for a size it has");
     warnings.push_back(text);
   }
@@ -94,7 +94,7 @@ std::vector<std::string> raw_stream_texts(std::span<const OfferedStream> offered
     const auto format = raw_format_of_drm(stream.drm_fourcc, stream.drm_modifier);
     if (!format) continue;
     std::string text = name_of(*format);
-    for (const FrameSize& size : stream.sizes) text += " " + size_text(size.width, size.height);
+    for (const FrameSize& size : stream.sizes) text += " " + pixels_text(size.width, size.height);
     texts.push_back(std::move(text));
   }
   return texts;
@@ -138,9 +138,9 @@ Result<CameraFormat> agreed_format(const AgreedStream& agreed, const RawStreamCh
     return fail(ErrorCode::unsupported, "this camera offers no raw stream: asked for " + name_of(choice.format) +
                                             ", it gives a format that is not raw");
   }
-  if (agreed.width < 1 || agreed.height < 1 || agreed.width > longest_side_px || agreed.height > longest_side_px) {
-    return fail(ErrorCode::malformed,
-                "the camera states a size of " + size_text(agreed.width, agreed.height) + ", which is not 1 to 65535");
+  if (agreed.width < 1 || agreed.height < 1 || agreed.width > largest_side_px || agreed.height > largest_side_px) {
+    return fail(ErrorCode::malformed, "the camera states a size of " + pixels_text(agreed.width, agreed.height) +
+                                          ", which is not 1 to 65535");
   }
   CameraFormat format{.raw = *raw,
                       .width = static_cast<int>(agreed.width),

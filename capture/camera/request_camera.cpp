@@ -14,7 +14,7 @@ namespace {
 using std::chrono::milliseconds;
 
 /// So that no sum of it and the clock overflows.
-constexpr milliseconds longest_wait = std::chrono::hours(24);
+constexpr milliseconds longest_timeout = std::chrono::hours(24);
 /// A camera that is unplugged may cancel its requests before it says why.
 constexpr milliseconds patience_after_cancel{200};
 
@@ -76,7 +76,7 @@ void RequestCamera::queue(int buffer) {
 
 Result<CameraFrame> RequestCamera::next(milliseconds timeout) {
   assert(streaming_);
-  const milliseconds wait = std::clamp(timeout, milliseconds(0), longest_wait);
+  const milliseconds wait = std::clamp(timeout, milliseconds(0), longest_timeout);
   const auto deadline = std::chrono::steady_clock::now() + wait;
   for (;;) {
     const auto completion = open_.completions->take(deadline);

@@ -17,7 +17,7 @@ using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 
 // A device that vanishes need not end a wait: the node is looked at again this often.
-constexpr milliseconds longest_wait{500};
+constexpr milliseconds longest_slice{500};
 constexpr milliseconds longest_timeout = std::chrono::hours(24);
 // After a buffer that was announced and was not there.
 constexpr int pause_ms = 1;
@@ -112,7 +112,7 @@ std::optional<Error> V4l2Camera::wait(nanoseconds until, short events, short* ha
   if (left <= nanoseconds(0)) {
     return Error{ErrorCode::insufficient, "no frame came in time from " + name(), device_->path()};
   }
-  const auto slice = std::min(std::chrono::ceil<milliseconds>(left), longest_wait);
+  const auto slice = std::min(std::chrono::ceil<milliseconds>(left), longest_slice);
   const int timeout_ms = events == 0 ? pause_ms : static_cast<int>(slice.count());
   *happened = 0;
   if (system.poll(system.context, device_->file(), events, timeout_ms, happened) < 0) {

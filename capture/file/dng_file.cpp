@@ -12,20 +12,15 @@ namespace {
 
 constexpr std::size_t max_directories = 64;
 
-/// A tag's whole number, or `otherwise` where the file has no such tag.
-Result<std::uint32_t> whole_or(const TiffDirectory& directory, TagName name, std::uint32_t otherwise) {
-  return directory.whole(name).map([otherwise](auto found) { return found.value_or(otherwise); });
-}
-
 bool is_full_raw(const TiffDirectory& directory) {
-  const auto kind = whole_or(directory, tag::new_subfile_type, 0);
-  const auto photometric = whole_or(directory, tag::photometric, 0);
+  const auto kind = directory.whole_or(tag::new_subfile_type, 0);
+  const auto photometric = directory.whole_or(tag::photometric, 0);
   return kind && *kind == 0 && photometric &&
          (*photometric == tag::photometric_cfa || *photometric == tag::photometric_linear_raw);
 }
 
 double area_of(const TiffDirectory& directory) {
-  const auto width = whole_or(directory, tag::image_width, 0), height = whole_or(directory, tag::image_length, 0);
+  const auto width = directory.whole_or(tag::image_width, 0), height = directory.whole_or(tag::image_length, 0);
   return width && height ? static_cast<double>(*width) * *height : 0.0;
 }
 

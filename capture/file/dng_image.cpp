@@ -18,11 +18,6 @@ constexpr std::size_t max_parts = std::size_t{1} << 22;  // strips or tiles
 constexpr int min_size = 22;                             // LibRaw takes smaller ones for thumbnails
 constexpr int max_size = 65535;                          // LibRaw keeps sizes in 16 bits
 
-/// A tag's whole number, or `otherwise` where the file has no such tag.
-Result<std::uint32_t> whole_or(const TiffDirectory& directory, TagName name, std::uint32_t otherwise) {
-  return directory.whole(name).map([otherwise](auto found) { return found.value_or(otherwise); });
-}
-
 Result<std::uint32_t> required(const TiffDirectory& directory, TagName name) {
   auto found = directory.whole(name);
   if (!found) return pass_on(found);
@@ -49,7 +44,7 @@ Result<int> bits_of(const TiffDirectory& directory, std::size_t samples) {
     return fail(ErrorCode::malformed, "the tag BitsPerSample does not agree with the samples",
                 tag::bits_per_sample.name);
   }
-  auto format = whole_or(directory, tag::sample_format, 1);
+  auto format = directory.whole_or(tag::sample_format, 1);
   if (!format) return pass_on(format);
   if (*format == 3) {
     return fail(ErrorCode::unsupported, "floating-point raws are not supported: convert to an integer DNG",
@@ -73,7 +68,7 @@ Result<BayerPhase> phase_of(const TiffDirectory& directory) {
                     number_text((**size)[1]) + " sites are not supported: only Bayer mosaics and monochrome are",
                 tag::cfa_repeat_pattern_dim.name);
   }
-  auto layout = whole_or(directory, tag::cfa_layout, 1);
+  auto layout = directory.whole_or(tag::cfa_layout, 1);
   if (!layout) return pass_on(layout);
   if (*layout != 1) {
     return fail(ErrorCode::unsupported, "mosaics that are not rectangular are not supported", tag::cfa_layout.name);
@@ -179,7 +174,7 @@ Result<void> fill_layout(const TiffDirectory& directory, DngImage& image) {
                 "LinearRaw images of " + std::to_string(image.samples) + " samples are not supported, 1 and 3 are",
                 tag::samples_per_pixel.name);
   }
-  auto planar = whole_or(directory, tag::planar_configuration, 1);
+  auto planar = directory.whole_or(tag::planar_configuration, 1);
   if (!planar) return pass_on(planar);
   if (image.samples == 3 && *planar != 1) {
     return fail(ErrorCode::unsupported, "images stored colour after colour are not supported",
@@ -207,9 +202,9 @@ Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_byte
   if (!width) return pass_on(width);
   auto height = required(directory, tag::image_length);
   if (!height) return pass_on(height);
-  auto samples = whole_or(directory, tag::samples_per_pixel, 1);
+  auto samples = directory.whole_or(tag::samples_per_pixel, 1);
   if (!samples) return pass_on(samples);
-  auto compression = whole_or(directory, tag::compression, compression_none);
+  auto compression = directory.whole_or(tag::compression, compression_none);
   if (!compression) return pass_on(compression);
   if (*width < min_size || *height < min_size || *width > max_size || *height > max_size) {
     return fail(ErrorCode::malformed, "a raw image of " + std::to_string(*width) + " x " + std::to_string(*height) +

@@ -61,7 +61,7 @@ std::string opcode_name(std::uint32_t id) {
 }
 
 /// One list, while it is read. What it asks for reaches the frame only when all of the list has been read.
-struct Context {
+struct OpcodeContext {
   int list;
   bool linearized;
   const RawFrame& frame;
@@ -102,7 +102,7 @@ GainMap map_of_sites(const GainMap& all, int site_x, int site_y, int plane) {
 }
 
 /// A map of demosaiced data that differs between colours, split into maps of the mosaic's four sites.
-void add_split(const Context& context, const GainMap& map) {
+void add_split(const OpcodeContext& context, const GainMap& map) {
   for (int y = 0; y < 2; ++y) {
     for (int x = 0; x < 2; ++x) {
       const int plane = static_cast<int>(colour_at(context.frame.raw.phase, x, y));
@@ -123,7 +123,7 @@ bool is_usable(const GainMap& map) {
 
 int small(std::uint32_t value) { return static_cast<int>(std::min<std::uint32_t>(value, 1U << 30)); }
 
-Result<void> read_gain_map(const Context& context, Reader in) {
+Result<void> read_gain_map(const OpcodeContext& context, Reader in) {
   const Rect& active = context.frame.raw.active;
   GainMap map;
   map.top = small(in.u32());
@@ -163,7 +163,7 @@ Result<void> read_gain_map(const Context& context, Reader in) {
   return {};
 }
 
-Result<void> read_vignette(const Context& context, Reader in) {
+Result<void> read_vignette(const OpcodeContext& context, Reader in) {
   RadialGain radial;
   for (double& k : radial.k) k = in.f64();
   radial.centre_x = in.f64();
@@ -183,7 +183,7 @@ Result<void> read_vignette(const Context& context, Reader in) {
 }
 
 /// Adds the part of a rectangle (ends excluded, in the pixels of the list) that lies in the active area.
-void add_defect(const Context& context, std::uint32_t top, std::uint32_t left, std::uint64_t bottom,
+void add_defect(const OpcodeContext& context, std::uint32_t top, std::uint32_t left, std::uint64_t bottom,
                 std::uint64_t right) {
   const Rect& active = context.frame.raw.active;
   const std::int64_t dx = context.list == 1 ? active.x : 0, dy = context.list == 1 ? active.y : 0;
@@ -195,7 +195,7 @@ void add_defect(const Context& context, std::uint32_t top, std::uint32_t left, s
       {static_cast<int>(x0), static_cast<int>(y0), static_cast<int>(x1 - x0), static_cast<int>(y1 - y0)});
 }
 
-Result<void> read_defect_list(const Context& context, Reader in) {
+Result<void> read_defect_list(const OpcodeContext& context, Reader in) {
   in.u32();  // the Bayer phase; ours is known
   const std::uint64_t points = in.u32(), rects = in.u32();
   if (!in.complete() || points * 8 + rects * 16 > in.left()) return context.damaged(fix_bad_pixels_list);
@@ -214,7 +214,7 @@ Result<void> read_defect_list(const Context& context, Reader in) {
 }
 
 /// Pixels of a constant value are defective: they are looked up in the readout, where it is complete.
-Result<void> read_defect_constant(const Context& context, Reader in) {
+Result<void> read_defect_constant(const OpcodeContext& context, Reader in) {
   const std::uint32_t constant = in.u32();
   if (!in.complete()) return context.damaged(fix_bad_pixels_constant);
   if (context.linearized || context.list != 1 || context.frame.raw.layout == SensorLayout::linear_rgb) {
@@ -226,7 +226,7 @@ Result<void> read_defect_constant(const Context& context, Reader in) {
 }
 
 /// One pass over the readout for all constants together.
-void find_constants(const Context& context) {
+void find_constants(const OpcodeContext& context) {
   const RawDn& raw = context.frame.raw;
   std::vector<DefectRect>& defects = context.found.defects;
   const std::size_t named = defects.size(), room = context.room_for_defects();
@@ -243,7 +243,7 @@ void find_constants(const Context& context) {
   }
 }
 
-Result<void> read_opcode(const Context& context, std::uint32_t id, std::span<const std::byte> parameters) {
+Result<void> read_opcode(const OpcodeContext& context, std::uint32_t id, std::span<const std::byte> parameters) {
   switch (id) {
     case gain_map:
       return read_gain_map(context, Reader(parameters));
@@ -259,7 +259,7 @@ Result<void> read_opcode(const Context& context, std::uint32_t id, std::span<con
   }
 }
 
-Result<void> read_list(const Context& context, std::span<const std::byte> bytes) {
+Result<void> read_list(const OpcodeContext& context, std::span<const std::byte> bytes) {
   const auto damaged = [&] {
     return fail(ErrorCode::malformed, "the tag " + context.tag() + " is damaged", context.tag());
   };

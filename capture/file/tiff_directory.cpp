@@ -152,6 +152,10 @@ Result<std::optional<std::uint32_t>> TiffDirectory::whole(TagName tag) const {
   return fail(ErrorCode::malformed, std::string("the tag ") + tag.name + " does not hold a whole number", tag.name);
 }
 
+Result<std::uint32_t> TiffDirectory::whole_or(TagName tag, std::uint32_t otherwise) const {
+  return whole(tag).map([otherwise](auto found) { return found.value_or(otherwise); });
+}
+
 std::string TiffDirectory::text(TagName tag) const {
   const TiffEntry* entry = find(tag);
   return entry != nullptr && entry->type == TiffEntry::Type::ascii ? entry->text() : std::string();

@@ -12,6 +12,8 @@ using Matrix3 = std::array<Vector3, 3>;  // rows
 constexpr Matrix3 identity3() { return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}; }
 constexpr Matrix3 diagonal3(const Vector3& d) { return {{{d[0], 0, 0}, {0, d[1], 0}, {0, 0, d[2]}}}; }
 
+constexpr double dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
 constexpr Vector3 operator*(const Matrix3& m, const Vector3& v) {
   Vector3 out{};
   for (int i = 0; i < 3; ++i) out[i] = m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2];

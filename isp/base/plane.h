@@ -89,4 +89,10 @@ class Plane {
   std::unique_ptr<T[]> samples_;
 };
 
+/// Makes the plane anew if it has another size. What it holds then is not initialised.
+template <class T>
+void fit(Plane<T>& plane, int width, int height) {
+  if (plane.width() != width || plane.height() != height) plane = Plane<T>(width, height);
+}
+
 }  // namespace lowlux

@@ -8,8 +8,8 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double tolerance = 1e-7;      // of the optimality condition; the area is within about (3/2) of it
-constexpr int most_iterations = 20000;  // linear convergence: a few hundred in practice
+constexpr double optimality_tolerance = 1e-7;  // of the optimality condition; the area is within about (3/2) of it
+constexpr int most_iterations = 20000;         // linear convergence: a few hundred in practice
 
 // The samples after an affine map that makes their covariance the identity: the least ellipse is affinely covariant,
 // and clouds far smaller than their distance from the origin keep their digits.
@@ -60,7 +60,7 @@ bool improve(const std::vector<Vector3>& points, std::vector<double>& weight) {
     if (kappa > farthest) farthest = kappa, out = n;
     if (weight[n] > 0 && kappa < nearest) nearest = kappa, in = n;
   }
-  if (farthest / 3 - 1 <= tolerance && 1 - nearest / 3 <= tolerance) return false;
+  if (farthest / 3 - 1 <= optimality_tolerance && 1 - nearest / 3 <= optimality_tolerance) return false;
   const bool towards = farthest / 3 - 1 >= 1 - nearest / 3;
   const std::size_t chosen = towards ? out : in;
   const double kappa = towards ? farthest : nearest;

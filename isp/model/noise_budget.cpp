@@ -16,7 +16,7 @@ struct Named {
   double value;
 };
 
-std::string text_of(double value) { return number_text(value, 6); }
+std::string six_digits(double value) { return number_text(value, 6); }
 
 Result<void> check_not_negative(const SensorModel& s) {
   for (const Named& figure : std::initializer_list<Named>{{"read noise", s.read_noise_e},
@@ -31,7 +31,7 @@ Result<void> check_not_negative(const SensorModel& s) {
                                                           {"column noise", s.column_noise_e}}) {
     if (!(figure.value >= 0) || !(figure.value <= 1e9)) {
       return fail(ErrorCode::invalid_argument,
-                  std::string("the ") + figure.name + " must lie between 0 and 1e9, found " + text_of(figure.value),
+                  std::string("the ") + figure.name + " must lie between 0 and 1e9, found " + six_digits(figure.value),
                   s.name);
     }
   }
@@ -39,7 +39,7 @@ Result<void> check_not_negative(const SensorModel& s) {
            {"read noise", s.read_noise_e}, {"row noise", s.row_noise_e}, {"column noise", s.column_noise_e}}) {
     if (noise.value > largest_noise_e) {
       return fail(ErrorCode::invalid_argument,
-                  std::string("the ") + noise.name + " is at most 1e6 e-, found " + text_of(noise.value), s.name);
+                  std::string("the ") + noise.name + " is at most 1e6 e-, found " + six_digits(noise.value), s.name);
     }
   }
   return {};
@@ -59,32 +59,32 @@ Result<void> check_sensor(const SensorModel& s) {
   if (auto good = check_not_negative(s); !good) return good;
   const auto wrong = [&](const std::string& what) { return fail(ErrorCode::invalid_argument, what, s.name); };
   if (!(s.system_gain_dn_per_e > 0) || !(s.system_gain_dn_per_e <= 1e6)) {
-    return wrong("the system gain must be above 0 and at most 1e6 DN/e-, found " + text_of(s.system_gain_dn_per_e));
+    return wrong("the system gain must be above 0 and at most 1e6 DN/e-, found " + six_digits(s.system_gain_dn_per_e));
   }
   if (s.bits < 1 || s.bits > 16) return wrong("a converter has 1 to 16 bits, found " + std::to_string(s.bits));
   const double largest_code = (1 << s.bits) - 1;
   if (!(s.black_level_dn >= 0) || !(s.white_level_dn <= largest_code) || !(s.black_level_dn < s.white_level_dn)) {
-    return wrong("black and white level must be 0 <= black < white <= " + text_of(largest_code) + ", found " +
-                 text_of(s.black_level_dn) + " and " + text_of(s.white_level_dn));
+    return wrong("black and white level must be 0 <= black < white <= " + six_digits(largest_code) + ", found " +
+                 six_digits(s.black_level_dn) + " and " + six_digits(s.white_level_dn));
   }
   if (s.white_level_dn != std::floor(s.white_level_dn)) {
-    return wrong("the white level is a code, a whole number, found " + text_of(s.white_level_dn));
+    return wrong("the white level is a code, a whole number, found " + six_digits(s.white_level_dn));
   }
   if (!(s.full_well_e > 0) || !(s.full_well_e <= largest_full_well_e)) {
-    return wrong("the full well must be above 0 and at most 990000 e-, found " + text_of(s.full_well_e));
+    return wrong("the full well must be above 0 and at most 990000 e-, found " + six_digits(s.full_well_e));
   }
   for (const Named& share : std::initializer_list<Named>{{"photo response non-uniformity", s.prnu},
                                                          {"dark signal non-uniformity", s.dsnu},
                                                          {"fraction of hot pixels", s.hot_pixel_fraction}}) {
     if (share.value > 1)
-      return wrong(std::string("the ") + share.name + " is at most 1, found " + text_of(share.value));
+      return wrong(std::string("the ") + share.name + " is at most 1, found " + six_digits(share.value));
   }
   if (!(s.dark_doubling_c >= 1) || !(s.dark_doubling_c <= 1e3)) {
-    return wrong("the dark current must double every 1 to 1000 degrees, found " + text_of(s.dark_doubling_c));
+    return wrong("the dark current must double every 1 to 1000 degrees, found " + six_digits(s.dark_doubling_c));
   }
   if (!(std::fabs(s.dark_temperature_c) <= 200)) {
     return wrong("the temperature of the dark current must lie between -200 and 200 C, found " +
-                 text_of(s.dark_temperature_c));
+                 six_digits(s.dark_temperature_c));
   }
   return {};
 }
@@ -92,11 +92,11 @@ Result<void> check_sensor(const SensorModel& s) {
 Result<void> check_exposure(const Exposure& exposure) {
   if (!(exposure.time_s >= 0) || !(exposure.time_s <= 1e6)) {
     return fail(ErrorCode::invalid_argument,
-                "the exposure time must lie between 0 and 1e6 s, found " + text_of(exposure.time_s));
+                "the exposure time must lie between 0 and 1e6 s, found " + six_digits(exposure.time_s));
   }
   if (!(exposure.temperature_c >= -100) || !(exposure.temperature_c <= 150)) {
-    return fail(ErrorCode::invalid_argument,
-                "the sensor's temperature must lie between -100 and 150 C, found " + text_of(exposure.temperature_c));
+    return fail(ErrorCode::invalid_argument, "the sensor's temperature must lie between -100 and 150 C, found " +
+                                                 six_digits(exposure.temperature_c));
   }
   return {};
 }

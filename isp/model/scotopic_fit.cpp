@@ -22,8 +22,6 @@ struct Seen {
   double scotopic;
 };
 
-double dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 /// Weights that sum to s: with w_2 = s - w_0 - w_1 two are free,
 ///     minimise sum (w_0 (r - b) + w_1 (g - b) + s b - y)^2 / y^2
 std::optional<Vector3> weights_of_sum(const std::vector<Seen>& all, double s) {

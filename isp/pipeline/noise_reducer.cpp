@@ -11,10 +11,6 @@
 namespace lowlux::isp {
 namespace {
 
-void fit(Plane<float>& plane, int width, int height) {
-  if (plane.width() != width || plane.height() != height) plane = Plane<float>(width, height);
-}
-
 denoise::DenoiseMaps views_of(NoiseMaps& maps) {
   return {.residual_variance = maps.residual_variance_e2.view(),
           .chroma_confidence = maps.chroma_confidence.view(),

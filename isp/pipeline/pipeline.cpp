@@ -20,11 +20,6 @@ PlaneView<const float> crop_of(const Plane<float>& active, const Rect& crop) {
   return active.view().crop(crop.x, crop.y, crop.width, crop.height);
 }
 
-template <class T>
-void fit(Plane<T>& plane, int width, int height) {
-  if (plane.width() != width || plane.height() != height) plane = Plane<T>(width, height);
-}
-
 // What is left to do with planes that are already light in the picture's primaries.
 RgbTransform of_modelled(const DevelopPlan& plan, const LookGrid* look) {
   RgbTransform out;

@@ -16,7 +16,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double saturated = 0.99;  // of white: a little below, because pixels do not all saturate at one code
+constexpr double saturated_share_of_white = 0.99;  // a little below, because pixels do not all saturate at one code
 
 int colour_of(const RawDn& raw, int site) { return static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)); }
 
@@ -45,7 +45,7 @@ denoise::RawNoise noise_of(const RawFrame& frame, const DevelopPlan& plan) {
   for (double& variance : out.variance_e2) variance = std::min(variance, denoise::largest_e);
   for (int site = 0; site < 4; ++site) {
     double& saturation_e = out.saturation_e[colour_of(frame.raw, site)];
-    saturation_e = std::min(saturation_e, saturated * (*plan.electrons_at_white)[site]);
+    saturation_e = std::min(saturation_e, saturated_share_of_white * (*plan.electrons_at_white)[site]);
   }
   return out;
 }

@@ -69,10 +69,6 @@ std::size_t bytes_of(SampleType samples) {
   return samples == SampleType::u8 ? 3 : samples == SampleType::u16 ? 6 : 12;  // a pixel's
 }
 
-void fit(Plane<float>& plane, int width, int height) {
-  if (plane.width() != width || plane.height() != height) plane = Plane<float>(width, height);
-}
-
 }  // namespace
 
 bool goes_by_tiles(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limits) {

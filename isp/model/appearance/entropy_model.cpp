@@ -15,7 +15,7 @@ namespace {
 
 constexpr double node_width_nm = 5;
 constexpr double smallest_adaptive_gamma = 1e-4;  // responses are matched; below, those of no light take long
-constexpr double smallest_gamma = 1e-12;          // of fit_max_entropy
+constexpr double least_gamma = 1e-12;             // of fit_max_entropy
 constexpr Vector3 rod_weights{3, 3, 5};           // W of thesis Eq. 5.8
 constexpr int luminance_rounds = 3;
 
@@ -91,7 +91,7 @@ Result<EntropyModel> entropy_model(double m, const NodePower& white, const Entro
   EntropyModel model{.measured = basis_of(options.cones, entropy_rod_share(m)),
                      .explained = {},
                      .gamma = options.gamma_fixed.value_or(entropy_weight(m))};
-  if (!(model.gamma >= smallest_gamma) || !std::isfinite(model.gamma)) {
+  if (!(model.gamma >= least_gamma) || !std::isfinite(model.gamma)) {
     return fail(ErrorCode::invalid_argument,
                 "the weight of entropy must be 1e-12 or more, found " + number_text(model.gamma));
   }

@@ -25,7 +25,7 @@ double kwak_lightness(double achromatic, double achromatic_white, double relativ
 
 namespace {
 
-AchromaticSignal signal_at(double adaptation_cd_m2, std::optional<double> colour_temperature_k) {
+AchromaticSignal kwak_signal_at(double adaptation_cd_m2, std::optional<double> colour_temperature_k) {
   const double level = luminance_level_factor(adaptation_cd_m2);
   const RodAdaptation rods = rod_adaptation(scotopic_adaptation(adaptation_cd_m2, colour_temperature_k));
   return [=](const Vector3& cones, double s) {
@@ -33,7 +33,7 @@ AchromaticSignal signal_at(double adaptation_cd_m2, std::optional<double> colour
   };
 }
 
-Result<ColourMap> kwak_map(const ViewingConditions& conditions) { return lightness_match(conditions, signal_at); }
+Result<ColourMap> kwak_map(const ViewingConditions& conditions) { return lightness_match(conditions, kwak_signal_at); }
 
 }  // namespace
 

@@ -12,8 +12,6 @@ namespace {
 constexpr double most_exponent = 4;
 constexpr double reference_cd_m2 = 200;
 
-double dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 Vector3 scaled(double scale, const Vector3& v) { return {scale * v[0], scale * v[1], scale * v[2]}; }
 
 }  // namespace
