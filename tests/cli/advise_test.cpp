@@ -8,15 +8,17 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/profile_io.h"
+#include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 
 namespace lowlux {
 namespace {
 
+using test::holds;
+using test::lowlux;
+
 using Json = nlohmann::json;
 using Words = std::vector<std::string>;
-
-bool holds(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
 
 class Advise : public test::SimulateCommand {
  protected:

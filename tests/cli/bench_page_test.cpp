@@ -11,12 +11,13 @@
 #include <vector>
 
 #include "isp/cli/bench_report.h"
+#include "tests/cli/command.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux::cli {
 namespace {
 
-bool holds(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
+using test::holds;
 
 /// As a stage yields it: a row that is undominated and one that is not, a finding that holds and one that does not.
 MeasuredStage stage_of(std::string_view id) {

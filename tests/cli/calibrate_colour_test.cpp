@@ -12,6 +12,7 @@
 #include "calib/profile_io.h"
 #include "isp/base/matrix3.h"
 #include "isp/output/dng_writer.h"
+#include "tests/cli/command.h"
 #include "tests/support/chart_photograph.h"
 #include "tests/support/process.h"
 #include "tests/support/scratch_directory.h"
@@ -20,9 +21,10 @@
 namespace lowlux {
 namespace {
 
+using test::raws;
+
 using Json = nlohmann::json;
 
-const std::string raws = LOWLUX_TESTDATA "/raws/";
 const std::string kiss_x4 = raws + "canon_kissx4_ml_colorchart.dng";
 const std::string rose = raws + "nikon_dsc1339_crop_rggb14.dng";
 

@@ -9,30 +9,26 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/cli/command.h"
 #include "tests/support/process.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux {
 namespace {
 
+using test::holds;
+using test::lowlux;
+
 using Json = nlohmann::json;
 using Words = std::vector<std::string>;
 
 constexpr const char* site_names[] = {"site_00", "site_01", "site_10", "site_11"};
-
-bool holds(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
 
 /// A simulated camera's darks and flats as files, and the command that measures them.
 class Calibrate : public testing::Test {
  protected:
   std::string file(const std::string& name) const { return scratch_.file(name); }
   bool exists(const std::string& name) const { return scratch_.holds(name); }
-
-  static test::ProcessResult lowlux(const Words& words) {
-    Words command{LOWLUX_COMMAND};
-    command.insert(command.end(), words.begin(), words.end());
-    return test::run_process(command);
-  }
 
   /// Frames NAME_0000.dng..., 0.5 DN/e-, 2 e- of read noise, 20 e-/s of dark current at 20 C.
   Words shoot(const std::string& name, const std::string& scene, const std::string& time_s, int frames,
@@ -358,7 +354,7 @@ TEST_F(Calibrate, NamesThatAreNoUtf8AreWrittenReadable) {
   std::filesystem::rename(dark[0], odd);
   const auto done = lowlux({"calibrate", "black", odd, dark[1], "-o", file("p.json")});
   EXPECT_EQ(done.exit_code, 0) << done.err;
-  EXPECT_TRUE(holds(profile("p.json")["gains"][0]["provenance"][0]["files"][0], "odd"));
+  EXPECT_TRUE(holds(profile("p.json")["gains"][0]["provenance"][0]["files"][0].get<std::string>(), "odd"));
 }
 
 TEST_F(Calibrate, ColoursAloneAreAProfileToDevelopWith) {

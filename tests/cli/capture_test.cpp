@@ -6,10 +6,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 
 namespace lowlux {
 namespace {
+
+using test::lowlux;
 
 using Json = nlohmann::json;
 

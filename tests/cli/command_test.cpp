@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/cli/command.h"
 #include "tests/support/dng_builder.h"
 #include "tests/support/process.h"
 #include "tests/support/scratch_directory.h"
@@ -12,16 +13,13 @@
 namespace lowlux {
 namespace {
 
+using test::dog;
+using test::lowlux;
+using test::raws;
+
 using Json = nlohmann::json;
 
-const std::string raws = LOWLUX_TESTDATA "/raws/";
-const std::string dog = raws + "n900_dog_small_grbg10in16.dng";
 const std::string chart = raws + "canon_kissx4_ml_colorchart.dng";
-
-test::ProcessResult lowlux(std::vector<std::string> args) {
-  args.insert(args.begin(), LOWLUX_COMMAND);
-  return test::run_process(args);
-}
 
 TEST(Command, HelpListsVerbsAndEveryVerbHasHelp) {
   const auto help = lowlux({"--help"});

@@ -14,10 +14,13 @@
 #include "isp/model/colour_difference.h"
 #include "isp/output/image_writer.h"
 #include "isp/render/output_space.h"
+#include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 
 namespace lowlux {
 namespace {
+
+using test::lowlux;
 
 using Json = nlohmann::json;
 using Codes = std::array<int, 3>;

@@ -11,10 +11,13 @@
 #include "capture/file/dng_source.h"
 #include "capture/file/picture_source.h"
 #include "isp/base/executor.h"
+#include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 
 namespace lowlux {
 namespace {
+
+using test::lowlux;
 
 using Json = nlohmann::json;
 

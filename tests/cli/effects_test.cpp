@@ -11,11 +11,14 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/cli/cost_file.h"
+#include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 #include "tests/support/reference_cost.h"
 
 namespace lowlux {
 namespace {
+
+using test::lowlux;
 
 using Json = nlohmann::json;
 

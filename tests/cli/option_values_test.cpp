@@ -9,15 +9,16 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/cli/command.h"
 #include "tests/support/process.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux {
 namespace {
 
-using Json = nlohmann::json;
+using test::dog;
 
-const std::string dog = LOWLUX_TESTDATA "/raws/n900_dog_small_grbg10in16.dng";
+using Json = nlohmann::json;
 
 struct Form {
   const char* text;

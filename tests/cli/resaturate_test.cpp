@@ -12,10 +12,13 @@
 #include "isp/base/executor.h"
 #include "isp/model/colorimetry.h"
 #include "isp/output/image_writer.h"
+#include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 
 namespace lowlux {
 namespace {
+
+using test::lowlux;
 
 using Json = nlohmann::json;
 

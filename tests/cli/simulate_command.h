@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/process.h"
+#include "tests/cli/command.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux::test {
@@ -15,11 +15,6 @@ namespace lowlux::test {
 /// Runs `lowlux simulate`, its files going to a folder of the test's own.
 class SimulateCommand : public testing::Test {
  protected:
-  static ProcessResult lowlux(std::vector<std::string> args) {
-    args.insert(args.begin(), LOWLUX_COMMAND);
-    return run_process(args);
-  }
-
   /// `scene`, the output NAME.dng and, unless it is a file, a size that takes no time, then `more`.
   ProcessResult simulate(const std::string& scene, const std::string& name, const std::vector<std::string>& more = {}) {
     std::vector<std::string> args{"simulate", scene, "-o", file(name)};

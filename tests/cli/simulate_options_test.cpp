@@ -9,10 +9,14 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/codec/pfm.h"
+#include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 
 namespace lowlux {
 namespace {
+
+using test::holds;
+using test::lowlux;
 
 using Json = nlohmann::json;
 using Words = std::vector<std::string>;
@@ -41,8 +45,6 @@ class SimulateOptions : public test::SimulateCommand {
     return out;
   }
 };
-
-bool holds(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
 
 TEST_F(SimulateOptions, TheListSaysWhichSensorsNeedMoreFigures) {
   const std::string list = lowlux({"simulate", "--list"}).out;

@@ -8,10 +8,14 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/file/dng_source.h"
+#include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 
 namespace lowlux {
 namespace {
+
+using test::holds;
+using test::lowlux;
 
 using Json = nlohmann::json;
 using Words = std::vector<std::string>;
@@ -28,8 +32,6 @@ class Simulate : public test::SimulateCommand {
     return {frame.dn.data(), frame.dn.data() + frame.dn.size()};
   }
 };
-
-bool holds(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
 
 std::string three_digits(double value) {
   char text[32];

@@ -14,11 +14,14 @@
 #include "isp/model/colorimetry.h"
 #include "isp/model/colour_difference.h"
 #include "isp/model/spectral_data.h"
+#include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 #include "tests/codec/pictures.h"
 
 namespace lowlux {
 namespace {
+
+using test::lowlux;
 
 constexpr int patches = 24, columns = 6, side = 100;  // of the chart on 600 x 400 pixels
 constexpr int white_patch = 18;

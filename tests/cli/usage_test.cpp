@@ -7,18 +7,19 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 
 namespace lowlux {
 namespace {
 
+using test::dog;
+using test::holds;
+using test::lowlux;
+using test::raws;
+
 using Json = nlohmann::json;
 using Words = std::vector<std::string>;
-
-const std::string raws = LOWLUX_TESTDATA "/raws/";
-const std::string dog = raws + "n900_dog_small_grbg10in16.dng";
-
-bool holds(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
 
 class Usage : public test::SimulateCommand {
  protected:
