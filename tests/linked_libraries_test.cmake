@@ -1,7 +1,6 @@
 cmake_minimum_required(VERSION 3.25)
-# Fails if one of FILES links OpenCV or libcamera, at first or at second hand, or one of STAGES what reads or writes
-# files. Each of MODULES, FILE=LIBRARY, must link that
-# library, or ldd told us nothing.
+# Fails if one of FILES links OpenCV, libcamera or LibRaw, at first or at second hand, or one of STAGES what reads or
+# writes files. Each of MODULES, FILE=LIBRARY, must link that library, or ldd told us nothing.
 function(libraries_of file out)
   execute_process(COMMAND ldd ${file} OUTPUT_VARIABLE text RESULT_VARIABLE code)
   if(NOT code EQUAL 0)
@@ -12,8 +11,8 @@ endfunction()
 
 foreach(file IN LISTS FILES)
   libraries_of(${file} text)
-  if(text MATCHES "[\t\n ](libopencv[^ ]*|libcamera[^ ]*)")
-    message(FATAL_ERROR "${file} links ${CMAKE_MATCH_1}: only the modules may")
+  if(text MATCHES "[\t\n ](libopencv[^ ]*|libcamera[^ ]*|libraw(_r)?\\.[^ ]*)")
+    message(FATAL_ERROR "${file} links ${CMAKE_MATCH_1}: only modules and lowlux-decode may")
   endif()
 endforeach()
 foreach(file IN LISTS STAGES)
@@ -26,7 +25,7 @@ if(NOT MODULES)
   message(FATAL_ERROR "no MODULES given")
 endif()
 foreach(module IN LISTS MODULES)
-  if(NOT module MATCHES "^(.+)=(libopencv_[a-z]+|libcamera)$")
+  if(NOT module MATCHES "^(.+)=(libopencv_[a-z]+|libcamera|libraw[a-z_]*)$")
     message(FATAL_ERROR "${module} is not FILE=LIBRARY")
   endif()
   set(file ${CMAKE_MATCH_1})

@@ -6,6 +6,7 @@
 
 #include "capture/file/decoded_raw.h"
 #include "capture/file/read_limits.h"
+#include "isp/base/sanitized.h"
 
 namespace lowlux::capture {
 
@@ -22,13 +23,6 @@ inline constexpr int wrong_protocol_exit = 2;
 inline constexpr int no_memory_exit = 3;
 
 /// Whether a decoder's memory is limited too: not in builds with a sanitizer, whose shadow memory takes terabytes.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define LOWLUX_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
-#define LOWLUX_SANITIZED 1
-#endif
-#endif
 #if defined(LOWLUX_SANITIZED)
 inline constexpr bool decoder_memory_is_limited = false;
 #else

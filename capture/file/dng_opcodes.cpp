@@ -147,15 +147,16 @@ Result<void> read_gain_map(const OpcodeContext& context, Reader in) {
   for (float& gain : map.gain) gain = in.f32();
   if (!is_usable(map)) return context.damaged(gain_map);
   if (map.top >= map.bottom || map.left >= map.right) return {};  // it touches nothing
-  if (auto room = context.check_gains(4); !room) return room;
 
   const bool mosaic = context.frame.raw.layout == SensorLayout::bayer;
   const bool alike = map.first_plane == 0 && map.planes >= 3 && map.map_planes == 1;
+  const bool split = context.list == 3 && mosaic && !alike;
+  if (auto room = context.check_gains(split ? 4 : 1); !room) return room;
   if (context.list == 1) {
     context.not_applied(gain_map, ": it is meant for values that still hold the black level");
-  } else if (context.list == 3 && mosaic && !alike && (map.row_pitch != 1 || map.column_pitch != 1)) {
+  } else if (split && (map.row_pitch != 1 || map.column_pitch != 1)) {
     context.not_applied(gain_map, ": it skips rows or columns of demosaiced data");
-  } else if (context.list == 3 && mosaic && !alike) {
+  } else if (split) {
     add_split(context, map);
   } else {
     context.found.gain_maps.push_back(std::move(map));

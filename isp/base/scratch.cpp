@@ -3,21 +3,16 @@
 #include <cassert>
 #include <cstring>
 
-#if defined(__SANITIZE_ADDRESS__)
-#define LOWLUX_POISONS_SCRATCH
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define LOWLUX_POISONS_SCRATCH
-#endif
-#endif
-#if defined(LOWLUX_POISONS_SCRATCH)
+#include "isp/base/sanitized.h"
+
+#if defined(LOWLUX_ADDRESS_SANITIZED)
 #include <sanitizer/asan_interface.h>
 #endif
 
 namespace lowlux {
 namespace {
 
-#if defined(LOWLUX_POISONS_SCRATCH)
+#if defined(LOWLUX_ADDRESS_SANITIZED)
 void poison(const Scratch& s) { ASAN_POISON_MEMORY_REGION(s.data, s.bytes + scratch_guard_bytes); }
 void unpoison(const Scratch& s) { ASAN_UNPOISON_MEMORY_REGION(s.data, s.bytes); }
 void mark_guard(const Scratch& /*s*/) {}

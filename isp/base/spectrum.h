@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "isp/base/number_text.h"
 #include "isp/base/result.h"
 
 namespace lowlux {
@@ -30,8 +31,8 @@ class Spectrum {
       }
       if (i > 0 && wavelengths_nm[i] <= wavelengths_nm[i - 1]) {
         return fail(ErrorCode::malformed, "the wavelengths of a spectrum must rise, but " +
-                                              std::to_string(wavelengths_nm[i]) + " nm follows " +
-                                              std::to_string(wavelengths_nm[i - 1]) + " nm");
+                                              number_text(wavelengths_nm[i]) + " nm follows " +
+                                              number_text(wavelengths_nm[i - 1]) + " nm");
       }
     }
     return Spectrum(std::move(wavelengths_nm), std::move(values));

@@ -39,16 +39,16 @@ static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler sets
 
 void ask_to_stop(int /*signal*/) { stop_asked = true; }
 
-/// The first SIGINT or SIGTERM asks for an end, a second one ends the process as ever.
+/// The first SIGINT or SIGTERM asks for an end, a second one ends the process as ever. What the caller ignores stays
+/// ignored.
 void listen_to_signals() {
   struct sigaction ask {};
   ask.sa_handler = ask_to_stop;
   ask.sa_flags = static_cast<int>(SA_RESETHAND);
-  sigaction(SIGINT, &ask, nullptr);
-  sigaction(SIGTERM, &ask, nullptr);
-  struct sigaction ignore {};
-  ignore.sa_handler = SIG_IGN;
-  sigaction(SIGPIPE, &ignore, nullptr);  // a reader that leaves is told by write()
+  for (const int number : {SIGINT, SIGTERM}) {
+    struct sigaction before {};
+    if (sigaction(number, nullptr, &before) == 0 && before.sa_handler != SIG_IGN) sigaction(number, &ask, nullptr);
+  }
 }
 
 Result<std::unique_ptr<capture::Camera>> open_camera(const CaptureArgs& args) {

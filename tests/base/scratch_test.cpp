@@ -6,6 +6,8 @@
 #include <cstring>
 #include <vector>
 
+#include "isp/base/sanitized.h"
+
 namespace lowlux {
 namespace {
 
@@ -39,13 +41,11 @@ TEST(ScratchDeathTest, WritingBehindItEndsTheProgram) {
 }
 #endif
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
+#if defined(LOWLUX_ADDRESS_SANITIZED)
 TEST(ScratchDeathTest, ReadingItOutsideOfAUseEndsTheProgram) {
   const Owned owned;
   EXPECT_DEATH(static_cast<volatile char*>(owned.scratch.data)[7], "use-after-poison");
 }
-#endif
 #endif
 
 }  // namespace

@@ -269,6 +269,7 @@ TEST(DngOpcodes, AListHolds64OpcodesAndTheFrame64Gains) {
 
   DngBuilder gains = with(list2, std::vector<Opcode>(64, vignette({0.1, 0, 0, 0, 0, 0.5, 0.5})));
   EXPECT_EQ(read_built(gains).corrections.radial_gains.size(), 64u);
+  EXPECT_EQ(read_built(with(list2, std::vector<Opcode>(64, gain_map({})))).corrections.gain_maps.size(), 64u);
   gains.set(list3, opcode_list({gain_map({})}));
   EXPECT_EQ(warned(gains), "the tag OpcodeList3 asks for more gain maps than any camera writes; the tag is ignored");
 }

@@ -2,15 +2,8 @@
 
 #include <cerrno>
 
+#include "isp/base/sanitized.h"
 #include "tests/support/count_allocations.h"
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define LOWLUX_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
-#define LOWLUX_SANITIZED 1
-#endif
-#endif
 
 // What does not come by operator new is counted too, where no sanitizer has these functions.
 #if !defined(LOWLUX_SANITIZED) && defined(__GLIBC__)
