@@ -67,7 +67,7 @@ TEST(HostileCounts, PicturesThatStateMoreThanTheyHoldTakeNoMemoryForIt) {
   const std::int64_t before = test::peak_bytes([] {});
   for (const auto& [name, file] :
        {std::pair{"JPEG", vast_jpeg()}, {"OpenEXR", vast_exr()}, {"TIFF", vast_tiff()}, {"PFM", vast_pfm()}}) {
-    const std::int64_t peak = test::peak_bytes([&, &file = file, &name = name] { EXPECT_FALSE(read(file)) << name; });
+    const std::int64_t peak = test::peak_bytes([&, &bytes = file, &kind = name] { EXPECT_FALSE(read(bytes)) << kind; });
     EXPECT_LT(peak - before, std::int64_t{48} << 20) << name << ": what is stated takes 732 MiB and more";
   }
 }
