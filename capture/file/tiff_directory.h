@@ -67,7 +67,7 @@ class TiffDirectory {
   Result<std::optional<std::vector<double>>> numbers(TagName tag, std::size_t min_count, std::size_t max_count) const;
   /// The first value of a tag that must be a whole number from 0 to 2^32 - 1; nullopt if there is no such tag.
   Result<std::optional<std::uint32_t>> whole(TagName tag) const;
-  /// As above; `otherwise` if there is no such tag.
+  /// The same, and `otherwise` without the tag.
   Result<std::uint32_t> whole_or(TagName tag, std::uint32_t otherwise) const;
   /// Empty if there is no such tag.
   std::string text(TagName tag) const;
