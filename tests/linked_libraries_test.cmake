@@ -1,6 +1,6 @@
 cmake_minimum_required(VERSION 3.25)
 # Fails if one of FILES links OpenCV, libcamera or LibRaw, at first or at second hand, or one of STAGES what reads or
-# writes files. Each of MODULES, FILE=LIBRARY, must link that library, or ldd told us nothing.
+# writes files. Each of MODULES, FILE=LIBRARY, must link that library, or ldd shows nothing here.
 function(libraries_of file out)
   execute_process(COMMAND ldd ${file} OUTPUT_VARIABLE text RESULT_VARIABLE code)
   if(NOT code EQUAL 0)

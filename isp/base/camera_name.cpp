@@ -2,16 +2,16 @@
 
 #include <algorithm>
 
+#include "isp/base/ascii.h"
+
 namespace lowlux {
 namespace {
-
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
 /// Whether the model begins with the first word of the make.
 bool repeats(std::string_view make, std::string_view model) {
   const std::string_view word = make.substr(0, make.find(' '));
   return model.size() > word.size() && model[word.size()] == ' ' &&
-         std::ranges::equal(word, model.substr(0, word.size()), {}, lower, lower);
+         std::ranges::equal(word, model.substr(0, word.size()), {}, ascii_lower, ascii_lower);
 }
 
 }  // namespace

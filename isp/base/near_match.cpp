@@ -6,18 +6,18 @@
 #include <optional>
 #include <tuple>
 
+#include "isp/base/ascii.h"
+
 namespace lowlux {
 namespace {
 
 constexpr std::size_t longest_wanted = 64;  // bytes: bounds the work on what an outsider typed
 constexpr std::size_t most_matches = 3;
 
-char folded(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
 std::size_t common_beginning(std::string_view a, std::string_view b) {
   const std::size_t shorter = std::min(a.size(), b.size());
   std::size_t n = 0;
-  while (n < shorter && folded(a[n]) == folded(b[n])) ++n;
+  while (n < shorter && ascii_lower(a[n]) == ascii_lower(b[n])) ++n;
   return n;
 }
 
@@ -29,9 +29,10 @@ std::size_t distance(std::string_view a, std::string_view b) {
   for (std::size_t j = 1; j <= b.size(); ++j) {
     row[0] = j;
     for (std::size_t i = 1; i <= a.size(); ++i) {
-      const std::size_t replaced = last[i - 1] + (folded(a[i - 1]) == folded(b[j - 1]) ? 0 : 1);
+      const std::size_t replaced = last[i - 1] + (ascii_lower(a[i - 1]) == ascii_lower(b[j - 1]) ? 0 : 1);
       row[i] = std::min({replaced, last[i] + 1, row[i - 1] + 1});
-      if (i > 1 && j > 1 && folded(a[i - 1]) == folded(b[j - 2]) && folded(a[i - 2]) == folded(b[j - 1])) {
+      if (i > 1 && j > 1 && ascii_lower(a[i - 1]) == ascii_lower(b[j - 2]) &&
+          ascii_lower(a[i - 2]) == ascii_lower(b[j - 1])) {
         row[i] = std::min(row[i], before_last[i - 2] + 1);
       }
     }

@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "capture/camera/camera_request.h"
+#include "isp/base/ascii.h"
 #include "isp/base/raw_format.h"
 #include "isp/cli/develop_args.h"
 #include "isp/cli/look_args.h"
@@ -234,7 +235,7 @@ Wrong set_kind(const Words& words, CaptureArgs& args) {
   }
   if (!words.as.empty()) return "--as goes with a folder as output; a file's name says its format";
   std::string end = fs::path(output).extension().string();
-  std::ranges::transform(end, end.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  std::ranges::transform(end, end.begin(), ascii_lower);
   args.kind = end == ".dng" ? CaptureKind::raw : CaptureKind::pictures;
   if (words.raw && args.kind != CaptureKind::raw) return "--raw writes .dng, not " + output;
   if (args.kind == CaptureKind::pictures) {

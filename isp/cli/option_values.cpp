@@ -13,6 +13,7 @@
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
+#include "isp/base/ascii.h"
 #include "isp/base/near_match.h"
 #include "isp/cli/exit_code.h"
 #include "isp/cli/print.h"
@@ -24,9 +25,9 @@ namespace {
 
 constexpr std::string_view blank_characters = " \t";
 
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
-bool same_letters(std::string_view a, std::string_view b) { return std::ranges::equal(a, b, {}, lower, lower); }
+bool same_letters(std::string_view a, std::string_view b) {
+  return std::ranges::equal(a, b, {}, ascii_lower, ascii_lower);
+}
 
 /// The text without its unit, which follows it, or, if it ends with a slash, precedes it.
 std::string_view without_unit(std::string_view text, std::string_view unit) {

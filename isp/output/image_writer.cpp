@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "isp/base/ascii.h"
 #include "isp/codec/pfm.h"
 #include "isp/codec/png.h"
 #include "isp/output/icc.h"
@@ -28,8 +29,6 @@ constexpr std::array<Extension, 7> extensions{{{".png", FileFormat::png},
                                                {".tiff", FileFormat::tiff},
                                                {".exr", FileFormat::exr},
                                                {".pfm", FileFormat::pfm}}};
-
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
 const char* name_of(FileFormat format) {
   switch (format) {
@@ -120,7 +119,7 @@ Result<FileFormat> format_of(const std::string& path) {
   const std::size_t name = path.rfind('/') == std::string::npos ? 0 : path.rfind('/') + 1;
   const std::size_t dot = path.rfind('.');
   std::string ending = dot == std::string::npos || dot <= name ? "" : path.substr(dot);
-  std::transform(ending.begin(), ending.end(), ending.begin(), lower);
+  std::transform(ending.begin(), ending.end(), ending.begin(), ascii_lower);
   for (const Extension& known : extensions) {
     if (ending == known.text) return known.format;
   }
