@@ -17,7 +17,8 @@ struct Module {
 /// The address of its function. The module is looked for in the command's folder, then in the installation's library
 /// folder; it stays loaded.
 /// Errors: unreadable, with what the loader says (a library is not installed, the file is missing), or that the module
-/// is of another build: it carries the version and a hash of all headers, which must be those of the command.
+/// is of another build: it carries the version and a hash of all headers, the compiler and its flags, which must be
+/// those of the command.
 Result<void*> load_module(const Module& module);
 
 }  // namespace lowlux::cli

@@ -1,9 +1,10 @@
-# Writes OUT, the source of lowlux_module_stamp: VERSION and a hash of all headers, which stand for the layout of all that
-# the command and its modules hand to each other. cmake -DSOURCE_DIR=... -DVERSION=... -DOUT=... -P module_stamp.cmake
+# Writes OUT, the source of lowlux_module_stamp: VERSION and a hash of all headers and of BUILD, a hash of compiler and
+# flags. They stand for the layout of all that the command and its modules hand to each other.
+# cmake -DSOURCE_DIR=... -DVERSION=... -DBUILD=... -DOUT=... -P module_stamp.cmake
 file(GLOB_RECURSE headers RELATIVE ${SOURCE_DIR}
   ${SOURCE_DIR}/isp/*.h ${SOURCE_DIR}/capture/*.h ${SOURCE_DIR}/calib/*.h ${SOURCE_DIR}/denoise/*.h)
 list(SORT headers)
-set(hashes "")
+set(hashes ${BUILD})
 foreach(header IN LISTS headers)
   file(SHA256 ${SOURCE_DIR}/${header} hash)
   string(APPEND hashes ${header} ${hash})
