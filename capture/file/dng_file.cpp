@@ -78,7 +78,7 @@ Result<std::optional<DngFile>> open_dng(std::span<const std::byte> bytes) {
   DngFile dng;
   dng.main = *first;
   for (TiffDirectory& directory : all_directories(*tiff, *std::move(first))) {
-    if (is_full_raw(directory)) dng.raw_images.push_back(std::move(directory));
+    (is_full_raw(directory) ? dng.raw_images : dng.previews).push_back(std::move(directory));
   }
   if (dng.raw_images.empty())
     return fail(ErrorCode::unsupported, "this DNG holds no raw image, only rendered pictures");

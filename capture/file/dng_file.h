@@ -16,6 +16,7 @@ namespace lowlux::capture {
 struct DngFile {
   TiffDirectory main;                     // the first directory
   std::vector<TiffDirectory> raw_images;  // full-size CFA or LinearRaw images, the largest first; never empty
+  std::vector<TiffDirectory> previews;    // all other directories that are linked
   std::optional<TiffDirectory> exif;
   std::vector<std::string> warnings;  // optional directories that are damaged
 };

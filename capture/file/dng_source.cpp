@@ -85,8 +85,11 @@ Error not_decoded(std::span<const std::byte> bytes, Error error) {
 /// Tags that make the decoder give up on the file where they are damaged, though the samples can do without them.
 std::vector<const TiffEntry*> harmful_tags(const DngFile& dng) {
   std::vector<const TiffEntry*> found;
-  const TiffDirectory& raw_image = dng.raw_images.front();
-  if (!read_scale(raw_image)) found.push_back(raw_image.find(tag::default_scale));
+  for (const auto* directories : {&dng.raw_images, &dng.previews}) {
+    for (const TiffDirectory& directory : *directories) {
+      if (!read_scale(directory)) found.push_back(directory.find(tag::default_scale));
+    }
+  }
   if (!dng.exif && dng.main.find(tag::exif_ifd) != nullptr) found.push_back(dng.main.find(tag::exif_ifd));
   return found;
 }

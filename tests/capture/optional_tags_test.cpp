@@ -160,6 +160,24 @@ TEST(OptionalTags, DamageOfEachIsWarnedOfOnceAndThePictureIsRead) {
   }
 }
 
+// LibRaw takes DefaultScale from any directory. It is set under another number here, because it belongs to the raw
+// image.
+TEST(OptionalTags, ADefaultScaleDamagedInThePreviewDoesNoHarm) {
+  constexpr std::uint16_t private_id = 65000, default_scale = 50718;
+  for (const std::uint32_t type : {2U, 99U}) {
+    DngBuilder dng;
+    dng.raw_in_sub_ifd = true;
+    File file = dng.set(private_id, Tag::numbers(TagType::srational, {1, 1})).build();
+    const std::size_t at = entry_of(file, private_id);
+    put(file, at, default_scale, 2);
+    put(file, at + 2, type, 2);
+    const auto frame = read_bytes(file);
+    ASSERT_TRUE(frame) << type << ": " << frame.error().message;
+    EXPECT_EQ(samples_of(*frame), ramp(dng));
+    EXPECT_TRUE(frame->warnings.empty());
+  }
+}
+
 TEST(OptionalTags, ADirectoryOfExifBeyondTheEndIsWarnedOf) {
   DngBuilder dng;
   File file = dng.set(33434, Tag::rationals(TagType::rational, {{1, 30}})).build();
