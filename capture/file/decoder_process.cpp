@@ -21,6 +21,7 @@
 #include <system_error>
 #include <utility>
 
+#include "capture/file/all_bytes.h"
 #include "capture/file/decoder_program.h"
 #include "capture/file/pass_on.h"
 #include "isp/base/number_text.h"
@@ -48,29 +49,6 @@ class FileDescriptor {
 int memory_file(const char* name) {
   const FileDescriptor low(memfd_create(name, MFD_CLOEXEC));
   return low.get() < 0 ? -1 : fcntl(low.get(), F_DUPFD_CLOEXEC, std::max(result_descriptor, file_descriptor) + 1);
-}
-
-bool write_all(int fd, std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t done = write(fd, bytes.data(), bytes.size());
-    if (done < 0 && errno == EINTR) continue;
-    if (done <= 0) return false;
-    bytes = bytes.subspan(static_cast<std::size_t>(done));
-  }
-  return true;
-}
-
-bool read_all(int fd, void* data, std::size_t bytes, std::uint64_t offset) {
-  char* at = static_cast<char*>(data);
-  while (bytes > 0) {
-    const ssize_t done = pread(fd, at, bytes, static_cast<off_t>(offset));
-    if (done < 0 && errno == EINTR) continue;
-    if (done <= 0) return false;
-    at += done;
-    offset += static_cast<std::uint64_t>(done);
-    bytes -= static_cast<std::size_t>(done);
-  }
-  return true;
 }
 
 Error system_error(const std::string& what, int number) {
@@ -230,7 +208,7 @@ std::optional<Error> reported_failure(const DecodedHeader& h, const ReadLimits& 
 Result<DecodedRaw> collect(int result, const ReadLimits& limits) {
   DecodedRaw raw;
   DecodedHeader& h = raw.header;
-  if (!read_all(result, &h, sizeof h, 0)) {
+  if (!read_all(result, std::as_writable_bytes(std::span(&h, 1)), 0)) {
     h = {};
     h.outcome = DecodeOutcome::crashed;
   }
@@ -245,7 +223,7 @@ Result<DecodedRaw> collect(int result, const ReadLimits& limits) {
     return fail(ErrorCode::malformed, "the decoder delivered fewer samples than the image has");
   }
   raw.samples = Plane<std::uint16_t>(h.raw_width * h.samples, h.raw_height);
-  if (!read_all(result, raw.samples.data(), raw.samples.size() * sizeof(std::uint16_t), sizeof h)) {
+  if (!read_all(result, std::as_writable_bytes(std::span(raw.samples.data(), raw.samples.size())), sizeof h)) {
     return fail(ErrorCode::unreadable, "the decoder's samples cannot be read");
   }
   return raw;
@@ -279,7 +257,7 @@ Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadL
   if (result.get() < 0 || copy->get() < 0) {
     return tl::make_unexpected(system_error("no memory file for the decoder", errno));
   }
-  if (!write_all(copy->get(), file)) {
+  if (!write_all(copy->get(), file, 0)) {
     return fail(ErrorCode::too_large, "there is not enough memory to hand this file to the decoder");
   }
   command.push_back(std::to_string(decode_protocol));

@@ -8,15 +8,15 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
-#include <cstring>
 #include <new>
 #include <optional>
 #include <string_view>
+
+#include "capture/file/all_bytes.h"
 
 namespace lowlux::capture {
 namespace {
@@ -24,19 +24,6 @@ namespace {
 // Samples as decoders hold them (LibRaw: up to four 16-bit values a pixel), their tables, and the heap's own needs.
 constexpr std::uint64_t decoder_bytes_per_pixel = 8;
 constexpr std::uint64_t decoder_base_bytes = std::uint64_t{256} << 20;
-
-bool write_all(int fd, const void* data, std::size_t bytes, std::uint64_t offset) {
-  const char* at = static_cast<const char*>(data);
-  while (bytes > 0) {
-    const ssize_t done = pwrite(fd, at, bytes, static_cast<off_t>(offset));
-    if (done < 0 && errno == EINTR) continue;
-    if (done <= 0) return false;
-    at += done;
-    offset += static_cast<std::uint64_t>(done);
-    bytes -= static_cast<std::size_t>(done);
-  }
-  return true;
-}
 
 /// Address space this process uses now [bytes]; 0 if the system does not say.
 std::uint64_t address_space_in_use() {
@@ -119,13 +106,15 @@ std::optional<std::span<const std::byte>> mapped_file() {
 }  // namespace
 
 bool DecodeSink::write_samples(const std::uint16_t* samples, std::size_t count) {
-  const std::size_t bytes = count * sizeof *samples;
-  if (!write_all(file_, samples, bytes, offset_)) return false;
-  offset_ += bytes;
+  const auto bytes = std::as_bytes(std::span(samples, count));
+  if (!write_all(file_, bytes, offset_)) return false;
+  offset_ += bytes.size();
   return true;
 }
 
-void DecodeSink::finish(const DecodedHeader& header) const { write_all(file_, &header, sizeof header, 0); }
+void DecodeSink::finish(const DecodedHeader& header) const {
+  write_all(file_, std::as_bytes(std::span(&header, 1)), 0);
+}
 
 void run_decoder(std::span<char* const> arguments, DecodeFunction decode) {
   const auto request = request_of(arguments);
