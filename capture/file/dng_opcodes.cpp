@@ -226,18 +226,22 @@ Result<void> read_defect_constant(const OpcodeContext& context, Reader in) {
   return {};
 }
 
-/// One pass over the readout for all constants together.
+/// One pass over the readout for all constants together. Constants of too many pixels are dropped; defects that the
+/// file lists stay.
 void find_constants(const OpcodeContext& context) {
   const RawDn& raw = context.frame.raw;
   std::vector<DefectRect>& defects = context.found.defects;
-  const std::size_t named = defects.size(), room = context.room_for_defects();
+  const std::int64_t believed = std::int64_t{raw.active.width} * raw.active.height / max_named_share;
+  const std::size_t named = defects.size();
+  const std::size_t room = std::min(context.room_for_defects(), static_cast<std::size_t>(believed));
   for (int y = 0; y < raw.active.height; ++y) {
     const std::uint16_t* row = raw.dn.row(raw.active.y + y) + raw.active.x;
     for (int x = 0; x < raw.active.width; ++x) {
       if (!context.constants[row[x]]) continue;
       if (defects.size() - named == room) {
         defects.resize(named);
-        return context.not_applied(fix_bad_pixels_constant, ": more than a million pixels have its value");
+        return context.not_applied(fix_bad_pixels_constant,
+                                   ": more than " + std::to_string(room) + " pixels have its value");
       }
       defects.push_back({x, y, 1, 1});
     }

@@ -20,7 +20,8 @@ namespace lowlux::capture {
 ///
 /// The opcodes of a list build on each other, so a list is applied whole or not at all: on an error, which names what
 /// is damaged or over a limit, `frame` stays as it was. A list holds up to 64 opcodes, the frame up to 64 gains and
-/// 2^20 defects; pixels of all constants of a list are looked up in one pass.
+/// 2^20 defects; pixels of all constants of a list are looked up in one pass. Constants of more than a sixteenth of the
+/// active pixels are not applied, with a warning.
 ///
 /// @param list        1, 2 or 3: positions count from the readout (1) or the active area (2, 3)
 /// @param linearized  the samples went through a LinearizationTable, which opcodes of list 1 precede

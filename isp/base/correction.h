@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 namespace lowlux {
@@ -26,6 +27,9 @@ struct RadialGain {
 struct DefectRect {
   int x = 0, y = 0, width = 1, height = 1;
 };
+
+/// Sources that name more than 1 / max_named_share of the active pixels as defective are not believed.
+inline constexpr std::int64_t max_named_share = 16;
 
 /// Corrections a source asks for, each multiplied or repaired after black (and dark) have been subtracted.
 struct RawCorrections {

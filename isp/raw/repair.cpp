@@ -23,7 +23,6 @@ constexpr double max_shared = 0.1, max_shared_green = 0.07;
 constexpr double star_share = 0.2187, star_share_green = 0.11;
 constexpr double shared_deviation = 0.44;  // of the neighbours' mean excess, in standard deviations of a pixel
 constexpr double certain = 3.5;            // standard deviations
-constexpr std::int64_t max_named_share = 16;
 
 struct Neighbours {
   int low;

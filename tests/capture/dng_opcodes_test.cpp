@@ -295,10 +295,21 @@ TEST(DngOpcodes, ABombOfConstantsTakesNoMoreMemoryThanOne) {
   const std::vector<std::byte> bomb = megapixel(std::vector<Opcode>(64, words(4, {500, 0}))).build();
   const std::int64_t before = peak_bytes([] {});
   const std::int64_t peak = peak_bytes([&] { EXPECT_TRUE(read_bytes(bomb)); });
-  // A list of 2^20 defects takes 16 MiB, and twice as much while it grows and is handed over; the frame and the
-  // decoder's samples take 2 MiB each. 64 times as many defects would take 1 GiB.
-  EXPECT_LT(peak - before, std::int64_t{96} << 20);
-  EXPECT_EQ(read_bytes(bomb)->corrections.defects.size(), std::size_t{1} << 20);
+  // 2^16 defects, at which the search ends, take 1 MiB, and twice as much while their list grows; the file, the frame
+  // and the decoder's samples take 2 MiB each. All pixels, once for each opcode, would take 1 GiB.
+  EXPECT_LT(peak - before, std::int64_t{32} << 20);
+  EXPECT_TRUE(read_bytes(bomb)->corrections.defects.empty());
+}
+
+// 24 x 24 pixels: 36 are a sixteenth.
+TEST(DngOpcodes, AConstantOfTooManyPixelsIsDroppedAndTheListIsKept) {
+  DngBuilder dng = with(list1, {words(5, {0, 2, 0, 3, 4, 5, 6}), words(4, {777, 0})});
+  dng.pixels = std::vector<std::uint16_t>(24 * 24, 500);
+  std::fill_n(dng.pixels.begin(), 36, 777);
+  EXPECT_EQ(read_built(dng).corrections.defects.size(), 2u + 36u);
+  dng.pixels[36] = 777;
+  EXPECT_EQ(read_built(dng).corrections.defects.size(), 2u);
+  EXPECT_EQ(warned(dng), "FixBadPixelsConstant (OpcodeList1) is not applied: more than 36 pixels have its value");
 }
 
 TEST(DngOpcodes, PixelsOfSeveralConstantsAreAllFound) {
