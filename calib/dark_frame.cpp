@@ -262,9 +262,31 @@ Result<DarkFrame> make_dark_frame(Groups groups, const RawDn& picture, const Dar
     }
   }
   settle_noise(*job, request.noise_share, *unknown, out);
-  if (request.masked_dn) {
-    if (auto good = check_masked_level(picture, *request.masked_dn, out); !good)
-      return tl::make_unexpected(good.error());
+  if (job->weights.of_pedestal != 0) out.masked_dn = request.masked_dn;
+  return out;
+}
+
+DarkFrame at_masked_level(const DarkFrame& dark, const PerSite<double>& masked_dn) {
+  DarkFrame out{.dn = dark.dn.clone(),
+                .unknown = dark.unknown,
+                .mean_dn = dark.mean_dn,
+                .noise_std_dn = dark.noise_std_dn,
+                .added_variance_dn2 = dark.added_variance_dn2,
+                .frames = dark.frames,
+                .settings = dark.settings,
+                .scale = dark.scale,
+                .doubling_c = dark.doubling_c,
+                .noise_share = dark.noise_share,
+                .pattern_share = dark.pattern_share,
+                .masked_dn = masked_dn,
+                .warnings = dark.warnings};
+  PerSite<double> change_dn{};
+  for (int site = 0; site < 4; ++site) {
+    change_dn[site] = masked_dn[site] - (*dark.masked_dn)[site];
+    out.mean_dn[site] += change_dn[site];
+  }
+  for (int y = 0; y < out.dn.height(); ++y) {
+    for (int x = 0; x < out.dn.width(); ++x) out.dn.at(x, y) += static_cast<float>(change_dn[site_of(x, y)]);
   }
   return out;
 }

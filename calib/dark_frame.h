@@ -25,9 +25,13 @@ struct DarkRequest {
 /// @param groups  of DarkLibrary
 /// Errors: those of weigh_darks; a request out of its range; a picture without exposure time; darks of another camera,
 /// size, mosaic or gain; darks that hold light (one side brighter than the other by more than one frame's noise and a
-/// quarter of the dark charge; a level that is not the masked pixels'); more than a sixteenth of the pixels unknown.
+/// quarter of the dark charge); more than a sixteenth of the pixels unknown.
 /// The picture's codes are not read: the dark frame is the same for all pictures of one setting and request. Whether it
-/// is darker than each of them, check_below_picture says.
+/// fits each of them, check_masked_level and check_below_picture say.
 Result<DarkFrame> make_dark_frame(std::span<const DarkGroup> groups, const RawDn& picture, const DarkRequest& request);
+
+/// The dark frame of another picture of the same setting, made from that of a picture with other masked pixels.
+/// Precondition: dark.masked_dn.
+DarkFrame at_masked_level(const DarkFrame& dark, const PerSite<double>& masked_dn);
 
 }  // namespace lowlux::calib

@@ -51,7 +51,8 @@ Result<void> check_even_dark(const DarkGroup& group, const PerSite<DarkSite>& si
   return {};
 }
 
-Result<void> check_masked_level(const RawDn& picture, const PerSite<double>& masked_dn, DarkFrame& dark) {
+Result<std::optional<std::string>> check_masked_level(const RawDn& picture, const PerSite<double>& masked_dn,
+                                                      const DarkFrame& dark) {
   double worst = 0;
   for (int site = 0; site < 4; ++site) {
     const double distance = dark.mean_dn[site] - masked_dn[site];
@@ -66,10 +67,8 @@ Result<void> check_masked_level(const RawDn& picture, const PerSite<double>& mas
     }
     if (std::fabs(distance) > off * dark.noise_std_dn[site] && std::fabs(distance) > std::fabs(worst)) worst = distance;
   }
-  if (worst != 0) {
-    dark.warnings.push_back(fmt::format("the darks lie {:+.3g} DN off the picture's masked pixels", worst));
-  }
-  return {};
+  if (worst == 0) return std::nullopt;
+  return fmt::format("the darks lie {:+.3g} DN off the picture's masked pixels", worst);
 }
 
 Result<void> check_below_picture(const RawDn& picture, const DarkFrame& dark) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,7 @@ struct DarkFrame {
   double doubling_c = 0;     // degrees over which dark charge was taken to double; 0 if no temperature was scaled
   double noise_share = 0;    // mean of added variance over the picture's own variance without light
   double pattern_share = 1;  // of each pixel's deviation that was kept; 1: all of it
+  std::optional<PerSite<double>> masked_dn;  // the picture's masked pixels, where the level of `dn` follows from them
   std::vector<std::string> warnings;
 };
 

@@ -80,20 +80,27 @@ Result<std::shared_ptr<DarkSource>> read_darks(const std::vector<std::string>& f
   return std::make_shared<DarkSource>(std::move(groups), request);
 }
 
-Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(const RawDn& picture) {
+Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(RawFrame& picture) {
+  const RawDn& raw = picture.raw;
   calib::DarkRequest request = request_;
-  if (const auto masked = isp::measure_masked_black(picture).black) request.masked_dn = masked->pedestal_dn;
-  if (const auto tag = isp::choose_black(picture, {isp::BlackChoice::metadata}); tag) {
+  if (const auto masked = isp::measure_masked_black(raw).black) request.masked_dn = masked->pedestal_dn;
+  if (const auto tag = isp::choose_black(raw, {isp::BlackChoice::metadata}); tag) {
     request.pedestal_dn = tag->pedestal_dn;
   }
-  const auto setting = calib::setting_of(picture);
+  const auto setting = calib::setting_of(raw);
   if (!setting) return tl::make_unexpected(setting.error());
-  auto made = make_or_find(picture, {*setting, request.masked_dn, request.pedestal_dn}, request);
-  if (!made) return made;
-  if (const auto fits = calib::check_below_picture(picture, **made); !fits) {
-    return tl::make_unexpected(fits.error());
+  auto dark = make_or_find(raw, {*setting, request.masked_dn.has_value(), request.pedestal_dn}, request);
+  if (!dark) return dark;
+  if ((*dark)->masked_dn && (*dark)->masked_dn != request.masked_dn) {
+    dark = std::make_shared<const DarkFrame>(calib::at_masked_level(**dark, *request.masked_dn));
   }
-  return made;
+  if (request.masked_dn) {
+    auto warning = calib::check_masked_level(raw, *request.masked_dn, **dark);
+    if (!warning) return tl::make_unexpected(std::move(warning.error()));
+    if (*warning) picture.warnings.push_back(*std::move(*warning));
+  }
+  if (const auto fits = calib::check_below_picture(raw, **dark); !fits) return tl::make_unexpected(fits.error());
+  return dark;
 }
 
 Result<std::shared_ptr<const DarkFrame>> DarkSource::make_or_find(const RawDn& picture, const Key& key,

@@ -23,22 +23,23 @@ namespace lowlux::cli {
 /// darks, a black point besides darks, which hold it already.
 Result<std::vector<std::string>> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs);
 
-/// What all pictures' dark frames are made of, and the last ones that were made. May be used from any thread.
+/// What the dark frames of all pictures are made of, and the last ones that were made. May be used from any thread.
 class DarkSource {
  public:
   /// @param request  what is the same for all pictures
   DarkSource(std::vector<calib::DarkGroup> groups, const calib::DarkRequest& request)
       : groups_(std::move(groups)), request_(request) {}
 
-  /// The dark frame of one picture: calib::make_dark_frame, with the picture's own masked pixels and tag, once for all
-  /// pictures that agree in these and in their setting. Errors: those of that, and of calib::check_below_picture.
-  Result<std::shared_ptr<const DarkFrame>> frame_for(const RawDn& picture);
+  /// The dark frame of one picture: calib::make_dark_frame, once for all pictures of the same setting and black tag; at
+  /// the level of the picture's masked pixels if it follows from such. Errors: those of that, of
+  /// calib::check_masked_level, whose warning becomes one of the picture, and of calib::check_below_picture.
+  Result<std::shared_ptr<const DarkFrame>> frame_for(RawFrame& picture);
 
  private:
   /// What a dark frame depends on.
   struct Key {
     calib::FrameSetting setting;
-    std::optional<PerSite<double>> masked_dn;
+    bool has_masked_pixels;
     std::optional<PerSite<double>> pedestal_dn;
     friend bool operator==(const Key&, const Key&) = default;
   };

@@ -40,7 +40,7 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
     if (!used) return tl::make_unexpected(used.error());
   }
   if (!batch.darks) return options;
-  Result<std::shared_ptr<const DarkFrame>> dark = batch.darks->frame_for(frame.raw);
+  Result<std::shared_ptr<const DarkFrame>> dark = batch.darks->frame_for(frame);
   if (!dark) return tl::make_unexpected(dark.error());
   options.dark_frame = std::move(*dark);
   options.black = batch.options.black;  // the darks hold it

@@ -201,6 +201,14 @@ TEST(DarkFrame, MaskedPixelsOfThePictureSetTheLevelOfOneScaledDark) {
   ASSERT_TRUE(dark) << dark.error().message;
   // Masked pixels hold hot ones, the median of the darks does not: 0.4 % of 300 e- at 4 s, times 0.8 DN/e-.
   for (int site = 0; site < 4; ++site) EXPECT_NEAR(dark->mean_dn[site], masked[site], 3);
+
+  // Of other masked pixels: as if made for them, within the rounding of floats of 500 DN.
+  const PerSite<double> other{masked[0] + 1, masked[1] - 2, masked[2] + 3, masked[3]};
+  const auto made =
+      make_dark_frame(darks_of(bench, {{8, 20}}, 16), picture_of(bench, {4, 20}, 20), {.masked_dn = other});
+  const DarkFrame moved = at_masked_level(*dark, other);
+  for (int site = 0; site < 4; ++site) EXPECT_NEAR(moved.mean_dn[site], made->mean_dn[site], 1e-4);
+  for (std::size_t i = 0; i < moved.dn.size(); ++i) ASSERT_NEAR(moved.dn.data()[i], made->dn.data()[i], 1e-3);
 }
 
 TEST(DarkFrame, PixelsThatAreFullOrTooNoisyAreToBeRepaired) {
@@ -232,6 +240,9 @@ std::string refusal(const SensorBench& darks, const RawDn& picture, const DarkRe
                     isp::Exposure exposure = {4, 20}) {
   const auto dark = make_dark_frame(darks_of(darks, {exposure}, frames), picture, request);
   if (!dark) return dark.error().message;
+  if (request.masked_dn) {
+    if (const auto fits = check_masked_level(picture, *request.masked_dn, *dark); !fits) return fits.error().message;
+  }
   const auto below = check_below_picture(picture, *dark);
   return below ? "" : below.error().message;
 }

@@ -7,6 +7,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "capture/file/dng_source.h"
+#include "isp/cli/dark_files.h"
+#include "isp/cli/raw_files.h"
+#include "isp/raw/masked_black.h"
 #include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 
@@ -122,6 +126,26 @@ TEST_F(DarkFrameCommand, WhatCannotBeIsRefusedWithACure) {
   refused({"--dark-frame", file("warm")}, 1, "--dark-doubling");
   refused({"--dark-frame", file("brief")}, 1, "at most 4 times");
   refused({"--dark-frame", file("other")}, 1, "pixels");
+}
+
+// The masked pixels of two pictures never have the same mean.
+TEST_F(DarkFrameCommand, IsMadeOnceForAllPicturesOfASetting) {
+  picture("later.dng", {"--luminance", "0.02", "--seed", "100"});
+  darks("same/d.dng", "1", 4);
+  darks("long/d.dng", "2", 4);
+  RawFrame first = *capture::read_raw(file("night.dng")), later = *capture::read_raw(file("later.dng"));
+  const auto level = [](const RawFrame& frame) { return isp::measure_masked_black(frame.raw).black->pedestal_dn; };
+  ASSERT_NE(level(first), level(later));
+  const auto same = *cli::read_darks(*cli::raw_files_of(file("same")), {});
+  const auto made = same->frame_for(first);
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(*same->frame_for(later), *made);
+  const auto scaled = *cli::read_darks(*cli::raw_files_of(file("long")), {});
+  const auto before = scaled->frame_for(first), after = scaled->frame_for(later);
+  ASSERT_TRUE(before && after);
+  for (int site = 0; site < 4; ++site) {
+    EXPECT_NEAR((*after)->mean_dn[site] - (*before)->mean_dn[site], level(later)[site] - level(first)[site], 1e-9);
+  }
 }
 
 TEST_F(DarkFrameCommand, DarksThatHoldLightAreRefused) {
