@@ -68,12 +68,15 @@ class BatchRun {
     take_files(workers);
   }
 
-  /// Each worker takes the next file: while one reads, another renders or encodes.
+  /// Each worker takes the next file: while one reads, another renders or encodes. Where memory holds fewer files than
+  /// there are workers, each file gets more of the processors.
   void take_files(int workers) {
-    PoolExecutor executor(threads_of_each(workers));
+    std::optional<PoolExecutor> executor;
     for (int i = next_++; i < files_; i = next_++) {
       const MemoryGate::Entry entry(batch_.memory.get());
-      finish(i, outcome_of(batch_.jobs[i], executor));
+      const int threads = threads_of_each(batch_.memory ? batch_.memory->files_at_a_time(workers) : workers);
+      if (!executor || executor->width() != threads) executor.emplace(threads);
+      finish(i, outcome_of(batch_.jobs[i], *executor));
     }
   }
 

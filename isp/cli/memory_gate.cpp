@@ -73,9 +73,13 @@ std::optional<double> available_memory(const std::string& proc, const std::strin
   return std::max(room, 0.0);
 }
 
-bool MemoryGate::has_room() const {
-  return inside_ == 0 || (file_bytes_ > 0 && (inside_ + 1) * file_bytes_ <= limit_bytes_);
+/// Always one file; more only when their size is known.
+int MemoryGate::capacity() const {
+  if (file_bytes_ == 0) return 1;
+  return static_cast<int>(std::clamp(limit_bytes_ / file_bytes_, 1.0, 1e6));
 }
+
+bool MemoryGate::has_room() const { return inside_ < capacity(); }
 
 void MemoryGate::enter() {
   std::unique_lock lock(mutex_);
@@ -98,11 +102,15 @@ void MemoryGate::leave() {
   changed_.notify_all();
 }
 
+int MemoryGate::files_at_a_time(int wanted) const {
+  const std::lock_guard lock(mutex_);
+  return std::min(wanted, capacity());
+}
+
 std::optional<std::string> MemoryGate::limit_text() const {
   const std::lock_guard lock(mutex_);
   if (!waited_) return std::nullopt;
-  const int files = std::max(1, static_cast<int>(limit_bytes_ / file_bytes_));
-  return fmt::format("{} at a time, limited by memory: about {:.0f} MB for each, {:.0f} MB for all", files,
+  return fmt::format("{} at a time, limited by memory: about {:.0f} MB for each, {:.0f} MB for all", capacity(),
                      1e-6 * file_bytes_, 1e-6 * limit_bytes_);
 }
 

@@ -25,6 +25,8 @@ class MemoryGate {
   /// A file that was let in takes so much.
   void report_size(std::size_t bytes);
   void leave();
+  /// How many files of those that are wanted at a time memory holds; 1 until the first size is known.
+  int files_at_a_time(int wanted) const;
 
   /// enter() and leave() of a gate, if there is one.
   class Entry {
@@ -47,6 +49,7 @@ class MemoryGate {
 
  private:
   bool has_room() const;
+  int capacity() const;
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;

@@ -54,6 +54,18 @@ TEST(MemoryGate, AsManyFilesAsMemoryHoldsAndAlwaysOne) {
   EXPECT_FALSE(all.text.has_value());
 }
 
+TEST(MemoryGate, StatesHowManyFilesShareTheProcessors) {
+  MemoryGate gate(3.9e6);
+  EXPECT_EQ(gate.files_at_a_time(8), 1) << "the others wait for the first size";
+  gate.enter();
+  gate.report_size(1'200'000);
+  EXPECT_EQ(gate.files_at_a_time(8), 3);
+  EXPECT_EQ(gate.files_at_a_time(2), 2);
+  gate.report_size(5'000'000);
+  EXPECT_EQ(gate.files_at_a_time(8), 1);
+  gate.leave();
+}
+
 // A file that cannot be read has no size: the others are not kept waiting for it.
 TEST(MemoryGate, FilesWithoutASizeComeOneByOne) {
   MemoryGate gate(1e9);
