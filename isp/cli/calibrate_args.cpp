@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "isp/cli/exit_code.h"
 #include "isp/cli/option_values.h"
 #include "isp/cli/output_place.h"
 #include "isp/cli/raw_files.h"
@@ -101,7 +102,7 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
       "for one picture: blocks, or single details (default ponomarenko)");
   if (const auto code = parse_words(app, words)) return *code;
   const auto darks = raw_files_of_lists(args.darks);
-  if (!darks) return refuse(app, fmt::format("--darks: {}: {}", darks.error().where, darks.error().message));
+  if (!darks) return print_failure(darks.error());
   args.darks = *darks;
   if (args.darks.empty() && args.common.frames.size() > 1) {
     return refuse(app, "several flats need --darks; without darks one picture is measured");

@@ -20,6 +20,10 @@ int print_usage_error(std::string_view verb, const Error& error) {
   return exit_usage;
 }
 
+int print_argument_error(std::string_view verb, const Error& error) {
+  return error.code == ErrorCode::invalid_argument ? print_usage_error(verb, error) : print_failure(error);
+}
+
 Error with_file(Error error, const std::string& file) {
   if (error.where.empty()) error.where = file;
   return error;

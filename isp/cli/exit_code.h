@@ -18,6 +18,8 @@ int print_failure(const std::string& file, const Error& error);
 int print_failure(const Error& error);
 /// Prints "lowlux VERB: OPTION: what is wrong"; the option is the error's place, if it has one. @return exit_usage
 int print_usage_error(std::string_view verb, const Error& error);
+/// Prints a usage error if an argument is invalid, else the failure of the file or folder that it names.
+int print_argument_error(std::string_view verb, const Error& error);
 
 /// The error, with the file as its place where it has none.
 Error with_file(Error error, const std::string& file);

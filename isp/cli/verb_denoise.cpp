@@ -73,15 +73,13 @@ int run_denoise(const std::vector<std::string>& words) {
   const auto& args = std::get<DevelopArgs>(parsed);
 
   Result<std::vector<Job>> jobs = plan_outputs(args, "dng");
-  if (!jobs)
-    return jobs.error().code == ErrorCode::invalid_argument ? print_usage_error("denoise", jobs.error())
-                                                            : print_failure(jobs.error());
+  if (!jobs) return print_argument_error("denoise", jobs.error());
   if (!jobs->front().output.ends_with(".dng")) {
     return print_usage_error("denoise",
                              {ErrorCode::invalid_argument, "a clean raw is a DNG: its name ends with .dng", "-o"});
   }
   const Result<std::vector<std::string>> darks = dark_files(args, *jobs);
-  if (!darks) return print_usage_error("denoise", darks.error());
+  if (!darks) return print_argument_error("denoise", darks.error());
   std::vector<std::string> only_read = *darks;
   only_read.insert(only_read.end(), {args.profile, args.black_profile, args.dark.doubling_profile});
   if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed)

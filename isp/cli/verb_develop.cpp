@@ -56,9 +56,7 @@ int run_develop(const std::vector<std::string>& words) {
   const auto& args = std::get<DevelopArgs>(parsed);
 
   Result<std::vector<Job>> jobs = plan_outputs(args, "png");
-  if (!jobs)
-    return jobs.error().code == ErrorCode::invalid_argument ? print_usage_error("develop", jobs.error())
-                                                            : print_failure(jobs.error());
+  if (!jobs) return print_argument_error("develop", jobs.error());
   const Result<isp::FileFormat> format = isp::format_of(jobs->front().output);
   if (!format) return print_usage_error("develop", format.error());
   if (!args.format.empty() && !names_folder(args)) {
@@ -69,7 +67,7 @@ int run_develop(const std::vector<std::string>& words) {
   if (!options) return print_usage_error("develop", options.error());
 
   const Result<std::vector<std::string>> darks = dark_files(args, *jobs);
-  if (!darks) return print_usage_error("develop", darks.error());
+  if (!darks) return print_argument_error("develop", darks.error());
   std::vector<std::string> only_read = *darks;
   only_read.insert(only_read.end(),
                    {args.profile, args.black_profile, args.dark.doubling_profile, args.look.coefficients});

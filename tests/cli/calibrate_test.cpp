@@ -270,6 +270,8 @@ TEST_F(Calibrate, BadFramesAreOneErrorAndNoProfile) {
   refused({"calibrate", "noise", more[0], more[1], "--darks", dark[0] + "," + dark[1]}, "not brighter than the darks");
   refused({"calibrate", "noise", more[0], wide[0], "--darks", dark[0] + "," + dark[1]}, "130 x 128 pixels");
   refused({"calibrate", "noise", more[0], "--darks", dark[0] + "," + dark[1]}, "no two flats make a pair");
+  std::filesystem::create_directories(file("empty"));
+  refused({"calibrate", "noise", more[0], "--darks", file("empty")}, "no raw files");
   refused({"calibrate", "quoted", "nosuch"}, "nosuch");
   scratch_.write("future.json", R"({"format": "lowlux camera profile", "version": 9})");
   refused({"calibrate", "black", dark[0], "--add-to", file("future.json")}, "version");

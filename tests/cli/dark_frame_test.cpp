@@ -122,7 +122,8 @@ TEST_F(DarkFrameCommand, WhatCannotBeIsRefusedWithACure) {
   refused({"--dark-frame", file("nowhere.dng")}, 1, "nowhere.dng");
   refused({"--dark-frame", file("")}, 2, "one of its darks");  // the folder of the picture itself
   std::filesystem::create_directories(file("empty"));
-  refused({"--dark-frame", file("empty")}, 2, "no raw files");
+  refused({"--dark-frame", file("empty")}, 1, "no raw files");
+  refused({"--dark-frame", file("empty/*.dng")}, 1, "no file matches");
   refused({"--dark-frame", file("warm")}, 1, "--dark-doubling");
   refused({"--dark-frame", file("brief")}, 1, "at most 4 times");
   refused({"--dark-frame", file("other")}, 1, "pixels");
