@@ -154,7 +154,7 @@ int run_reproduce(const std::vector<std::string>& words) {
     if (const auto written = write_all(files_of(done, args), args); !written) return print_failure(written.error());
   }
   const std::vector<isp::Finding> findings = findings_of(done);
-  print_out(fmt::format("{}\n", args.json ? findings_json(findings) : findings_text(findings)));
+  print_out(args.json ? findings_json(findings) + '\n' : findings_text(findings));
   return done.size() == experiments->size() ? exit_done : exit_failed;
 }
 

@@ -64,6 +64,7 @@ TEST(Reproduce, CountsPublishedFindingsAndChecksApart) {
                             "checks of our own: 1 agree, 0 have the same direction, 1 do not hold\n"),
             std::string::npos)
       << result.out;
+  EXPECT_FALSE(result.out.ends_with("\n\n"));
 }
 
 TEST(Reproduce, AnOrderWhoseFiguresAreOthersHasTheSameDirectionOnly) {
