@@ -38,9 +38,9 @@ TEST(EntropyMap, SendsTheWhiteToTheDisplaysWhite) {
         const auto map = entropy_colour_map({.white_cd_m2 = 0.5, .white = from}, {.variant = variant, .power = power});
         ASSERT_TRUE(map);
         const Xyz to = (*map)(from);
-        EXPECT_NEAR(to.x, white.x, 1e-9);
-        EXPECT_NEAR(to.y, white.y, 1e-9);
-        EXPECT_NEAR(to.z, white.z, 1e-9);
+        EXPECT_NEAR(to.x, white.x, 8e-15) << "rounding: 9e-16 was measured";
+        EXPECT_NEAR(to.y, white.y, 2e-15) << "2e-16";
+        EXPECT_NEAR(to.z, white.z, 1e-14) << "1e-15";
       }
     }
   }
@@ -86,9 +86,9 @@ TEST(EntropyMap, IsHomogeneous) {
         const Xyz one = map(c);
         for (const double s : {1e-9, 0.3, 1e6}) {
           const Xyz scaled = map({s * c.x, s * c.y, s * c.z});
-          EXPECT_NEAR(scaled.x / s, one.x, 1e-8);
-          EXPECT_NEAR(scaled.y / s, one.y, 1e-8);
-          EXPECT_NEAR(scaled.z / s, one.z, 1e-8);
+          EXPECT_NEAR(scaled.x / s, one.x, 1e-14) << "rounding: 2e-15 was measured";
+          EXPECT_NEAR(scaled.y / s, one.y, 3e-15) << "3e-16";
+          EXPECT_NEAR(scaled.z / s, one.z, 6e-15) << "7e-16";
         }
       }
     }
@@ -105,9 +105,9 @@ TEST(EntropyMap, HoldsForColoursThatAreNoLight) {
     EXPECT_EQ(black.y, 0);
     EXPECT_EQ(black.z, 0);
     const Xyz grey = map({0.3, -0.5, 0.1});
-    EXPECT_NEAR(grey.x, -0.5 * white.x, 1e-12) << "the grey of its luminance";
+    EXPECT_DOUBLE_EQ(grey.x, -0.5 * white.x) << "the grey of its luminance";
     EXPECT_EQ(grey.y, -0.5);
-    EXPECT_NEAR(grey.z, -0.5 * white.z, 1e-12);
+    EXPECT_DOUBLE_EQ(grey.z, -0.5 * white.z);
     std::mt19937 engine(1);
     std::uniform_real_distribution<double> part(-1, 1);
     for (int i = 0; i < 300; ++i) {
