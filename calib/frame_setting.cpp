@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "isp/base/camera_name.h"
+#include "isp/base/camera_profile.h"
 
 namespace lowlux::calib {
 namespace {

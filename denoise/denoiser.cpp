@@ -6,15 +6,15 @@
 #include <cstring>
 #include <span>
 
-#include "denoise/bands.h"
-#include "denoise/chroma_start.h"
-#include "denoise/frame_memory.h"
-#include "denoise/nl_bayes.h"
-#include "denoise/passes.h"
-#include "denoise/point_sources.h"
-#include "denoise/rows.h"
-#include "denoise/saturated_chroma.h"
-#include "denoise/site_slopes.h"
+#include "denoise/spatial/bands.h"
+#include "denoise/spatial/chroma_start.h"
+#include "denoise/spatial/frame_memory.h"
+#include "denoise/spatial/nl_bayes.h"
+#include "denoise/spatial/passes.h"
+#include "denoise/spatial/point_sources.h"
+#include "denoise/spatial/rows.h"
+#include "denoise/spatial/saturated_chroma.h"
+#include "denoise/spatial/site_slopes.h"
 
 namespace lowlux::denoise {
 namespace {

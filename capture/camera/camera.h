@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "isp/base/frame.h"
-#include "isp/base/raw_format.h"
+#include "isp/base/packed/raw_format.h"
 #include "isp/base/result.h"
 
 namespace lowlux::capture {

@@ -7,9 +7,9 @@
 #include <optional>
 #include <utility>
 
-#include "isp/base/unpack.h"
-#include "isp/model/colorimetry.h"
-#include "isp/model/correlated_colour_temperature.h"
+#include "isp/base/packed/raw_format.h"
+#include "isp/model/colour/colorimetry.h"
+#include "isp/model/colour/correlated_colour_temperature.h"
 
 namespace lowlux::capture {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "isp/base/number_text.h"
+#include "isp/base/text.h"
 
 namespace lowlux::capture {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "isp/base/number_text.h"
+#include "isp/base/text.h"
 
 namespace lowlux::capture {
 namespace {

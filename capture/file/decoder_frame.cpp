@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "capture/file/dng_info.h"
-#include "capture/file/dng_levels.h"
+#include "capture/dng/dng_info.h"
+#include "capture/dng/dng_levels.h"
 #include "capture/file/pass_on.h"
 
 namespace lowlux::capture {

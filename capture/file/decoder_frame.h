@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "capture/file/decoded_raw.h"
+#include "capture/decoder/decoded_raw.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 

@@ -7,17 +7,17 @@
 #include <utility>
 #include <vector>
 
+#include "capture/decoder/decoder_process.h"
+#include "capture/decoder/libraw_decoder.h"
+#include "capture/dng/dng_colour.h"
+#include "capture/dng/dng_file.h"
+#include "capture/dng/dng_frame.h"
+#include "capture/dng/dng_levels.h"
+#include "capture/dng/dng_tags.h"
+#include "capture/dng/tiff_directory.h"
 #include "capture/file/decoder_frame.h"
-#include "capture/file/decoder_process.h"
-#include "capture/file/dng_colour.h"
-#include "capture/file/dng_file.h"
-#include "capture/file/dng_frame.h"
-#include "capture/file/dng_levels.h"
-#include "capture/file/dng_tags.h"
 #include "capture/file/file_bytes.h"
-#include "capture/file/libraw_decoder.h"
 #include "capture/file/pass_on.h"
-#include "capture/file/tiff_directory.h"
 
 namespace lowlux::capture {
 namespace {

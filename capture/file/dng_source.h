@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "capture/file/read_limits.h"
+#include "capture/decoder/decoded_raw.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 

@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 
 namespace lowlux::capture {
 namespace {

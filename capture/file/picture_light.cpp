@@ -8,7 +8,7 @@
 #include <limits>
 #include <optional>
 
-#include "isp/base/number_text.h"
+#include "isp/base/text.h"
 
 namespace lowlux::capture {
 namespace {

@@ -7,18 +7,18 @@
 #include <utility>
 #include <variant>
 
-#include "capture/file/dng_tags.h"
+#include "capture/dng/dng_tags.h"
 #include "capture/file/file_bytes.h"
 #include "capture/file/pass_on.h"
 #include "capture/file/picture_colour.h"
 #include "capture/file/picture_light.h"
-#include "isp/base/number_text.h"
+#include "isp/base/text.h"
 #include "isp/codec/exr.h"
 #include "isp/codec/jpeg.h"
 #include "isp/codec/pfm.h"
 #include "isp/codec/png.h"
 #include "isp/codec/tiff.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 
 namespace lowlux::capture {
 namespace {

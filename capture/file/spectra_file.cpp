@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "capture/file/file_bytes.h"
-#include "isp/base/number_text.h"
+#include "isp/base/text.h"
 
 namespace lowlux::capture {
 namespace {

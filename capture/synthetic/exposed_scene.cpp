@@ -6,8 +6,8 @@
 #include <numbers>
 #include <vector>
 
-#include "isp/model/cie_data.h"
-#include "isp/model/spectral_response.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_response.h"
 
 namespace lowlux::capture {
 namespace {

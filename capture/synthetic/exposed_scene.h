@@ -7,7 +7,7 @@
 #include "isp/base/executor.h"
 #include "isp/base/image.h"
 #include "isp/base/sensor.h"
-#include "isp/model/spectral_lift.h"
+#include "isp/model/spectrum/spectral_lift.h"
 
 namespace lowlux::capture {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 
 namespace lowlux::capture {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <cstddef>
 
-#include "isp/base/random.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/photon.h"
+#include "isp/base/random/random.h"
+#include "isp/model/sensor/photon.h"
+#include "isp/model/spectrum/cie_data.h"
 
 namespace lowlux::capture {
 PhotonRows::PhotonRows(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,

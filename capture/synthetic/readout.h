@@ -4,7 +4,7 @@
 #include <limits>
 #include <span>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 #include "isp/base/sensor.h"
 
 namespace lowlux::capture {

@@ -10,7 +10,7 @@
 #include <hwy/foreach_target.h>  // compiles this file once more for each instruction set
 #include <hwy/highway.h>
 
-#include "isp/base/random-inl.h"
+#include "isp/base/random/random-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::capture::HWY_NAMESPACE {

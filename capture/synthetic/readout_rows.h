@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isp/base/random_rows.h"
+#include "isp/base/random/random_rows.h"
 
-/// The row kernels under read_out_row, dispatched at run time. Plain types only, see isp/base/random_rows.h.
+/// The row kernels under read_out_row, dispatched at run time. Plain types only, see isp/base/random/random_rows.h.
 namespace lowlux::capture {
 
 struct ReadoutParameters;

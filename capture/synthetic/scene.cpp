@@ -5,11 +5,11 @@
 #include <cstddef>
 #include <utility>
 
-#include "isp/base/number_text.h"
-#include "isp/base/random.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/spectral_lift.h"
-#include "isp/model/spectral_response.h"
+#include "isp/base/random/random.h"
+#include "isp/base/text.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_lift.h"
+#include "isp/model/spectrum/spectral_response.h"
 
 namespace lowlux::capture {
 namespace {

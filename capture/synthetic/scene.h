@@ -9,7 +9,7 @@
 #include "isp/base/plane.h"
 #include "isp/base/result.h"
 #include "isp/base/spectrum.h"
-#include "isp/model/spectral_data.h"
+#include "isp/model/spectrum/spectral_data.h"
 
 namespace lowlux::capture {
 
@@ -55,7 +55,8 @@ Result<Scene> flat_scene(const SceneSetup& setup);
 /// Errors: none or more than 4096, a reflectance below 0, a patch above 1e12 cd/m2.
 Result<Scene> chart_scene(const SceneSetup& setup, const std::vector<isp::NamedSpectrum>& reflectances);
 
-/// A picture whose Y = 1 is given a luminance. Its spectra are lifted from its colours (isp/model/spectral_lift.h).
+/// A picture whose Y = 1 is given a luminance. Its spectra are lifted from its colours
+/// (isp/model/spectrum/spectral_lift.h).
 Result<Scene> picture_scene(SceneLinear xyz, double luminance_cd_m2);
 
 /// Adds a distant lamp. Errors: a light without luminance.

@@ -9,7 +9,7 @@
 
 #include "capture/synthetic/fixed_pattern.h"
 #include "capture/synthetic/readout.h"
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 
 namespace lowlux::capture {
 namespace {

@@ -8,7 +8,7 @@
 #include "isp/base/executor.h"
 #include "isp/base/plane.h"
 #include "isp/base/sensor.h"
-#include "isp/model/effect_plan.h"
+#include "isp/model/sensor/effect_plan.h"
 
 namespace lowlux::capture {
 

@@ -4,13 +4,14 @@
 #include <cmath>
 #include <utility>
 
-#include "isp/base/number_text.h"
-#include "isp/base/random.h"
-#include "isp/model/camera_colour.h"
-#include "isp/model/camera_matrix.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/spectral_data.h"
-#include "isp/model/spectral_response.h"
+#include "isp/base/random/random.h"
+#include "isp/base/sensor.h"
+#include "isp/base/text.h"
+#include "isp/model/colour/camera_colour.h"
+#include "isp/model/colour/camera_matrix.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
+#include "isp/model/spectrum/spectral_response.h"
 
 namespace lowlux::capture {
 namespace {
@@ -18,7 +19,7 @@ namespace {
 using isp::Effect;
 
 constexpr double pedestal_sigmas = 8;    // of the noise, below a stored pedestal
-constexpr double largest_deviate = 6.5;  // no normal deviate of isp/base/random.h is larger
+constexpr double largest_deviate = 6.5;  // no normal deviate of isp/base/random/random.h is larger
 constexpr double hottest = 23;           // no hot pixel has more than 33 log(2) times their mean
 
 template <class Predicate>
@@ -251,7 +252,7 @@ std::optional<NoiseProfile> SyntheticSource::noise_profile() const {
   if (options_.sampling == PhotonSampling::published || !kept.has(Effect::photon_noise)) return std::nullopt;
   const SensorModel& s = sensor_.model;
   const double range = range_dn(s), k = s.system_gain_dn_per_e;
-  double offset_dn2 = kept.has(Effect::quantisation) ? 1.0 / 12 : 0;
+  double offset_dn2 = kept.has(Effect::quantisation) ? quantisation_dn2 : 0;
   if (kept.has(Effect::read_noise)) offset_dn2 += k * k * s.read_noise_e * s.read_noise_e;
   if (kept.has(Effect::row_noise)) offset_dn2 += k * k * s.row_noise_e * s.row_noise_e;
   NoiseProfile out;
@@ -282,7 +283,7 @@ RawFrame SyntheticSource::described(Plane<std::uint16_t> codes) const {
   info.exposure_s = options_.exposure.time_s;
   info.temperature_c = options_.exposure.temperature_c;
   info.f_number = options_.f_number;
-  // The speed at which the frame's exposure, f-number and saturation agree (isp/model/scene_luminance.h).
+  // The speed at which the frame's exposure, f-number and saturation agree (isp/model/sensor/scene_luminance.h).
   const double saturation_cd_m2 = isp::saturation_luminance_cd_m2(s, response_, 1);
   info.iso = 78 * options_.f_number * options_.f_number / (0.65 * saturation_cd_m2);
   out.colour = colour_;

@@ -11,8 +11,8 @@
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
-#include "isp/model/effect_plan.h"
-#include "isp/model/sensor_db.h"
+#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/sensor_db.h"
 
 namespace lowlux::capture {
 

@@ -11,10 +11,9 @@
 #include "isp/adapter/stage_formats.h"
 #include "isp/adapter/stage_params.h"
 #include "isp/adapter/stage_profile.h"
-#include "isp/adapter/stage_writer.h"
 #include "isp/base/executor.h"
 #include "isp/base/result.h"
-#include "isp/pipeline/live_pipeline.h"
+#include "isp/pipeline/live/live_pipeline.h"
 
 namespace lowlux::isp {
 

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include "isp/base/sensor.h"
 
 namespace lowlux::isp {
 namespace {
@@ -63,7 +64,7 @@ void set_levels(const lowlux_stage_params& params, const StageStream& stream, co
   LiveNoise& noise = out.live.noise.emplace();
   noise.gain_dn = gain_dn;
   for (int site = 0; site < 4; ++site) {
-    noise.black_variance_dn2[site] = read_dn * read_dn + gain_dn * gain_dn * dark_e[site] + 1.0 / 12;
+    noise.black_variance_dn2[site] = read_dn * read_dn + gain_dn * gain_dn * dark_e[site] + quantisation_dn2;
   }
 }
 

@@ -7,7 +7,7 @@
 #include "isp/adapter/stage_budget.h"
 #include "isp/adapter/stage_profile.h"
 #include "isp/base/cfa.h"
-#include "isp/pipeline/live_plan.h"
+#include "isp/pipeline/live/live_plan.h"
 
 namespace lowlux::isp {
 

@@ -12,9 +12,9 @@
 
 #include <fmt/format.h>
 
-#include "calib/gain_interpolation.h"
-#include "calib/profile_io.h"
-#include "calib/profile_use.h"
+#include "calib/profile/gain_interpolation.h"
+#include "calib/profile/profile_io.h"
+#include "calib/profile/profile_use.h"
 
 namespace lowlux::isp {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "isp/base/camera_profile.h"
 #include "isp/base/frame.h"
-#include "isp/base/raw_format.h"
+#include "isp/base/packed/raw_format.h"
 #include "isp/base/result.h"
 
 namespace lowlux::isp {

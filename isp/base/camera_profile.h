@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "isp/base/cfa.h"
@@ -74,7 +75,7 @@ struct ColourProfile {
   Provenance provenance;
 };
 
-/// What has been measured of a camera; written and read by calib/profile_io.h.
+/// What has been measured of a camera; written and read by calib/profile/profile_io.h.
 struct CameraProfile {
   std::string make;
   std::string model;
@@ -82,5 +83,9 @@ struct CameraProfile {
   std::vector<ColourProfile> colours;
   std::string mosaic;  // of the frames that were measured: RGGB, GRBG, GBRG, BGGR or monochrome; empty if unknown
 };
+
+/// A camera as people name it: "Canon EOS 550D" of the make "Canon" and the model "Canon EOS 550D", "NIKON D750" of
+/// "NIKON CORPORATION", "Nokia RX-51" of "Nokia" and "RX-51".
+std::string camera_name(std::string_view make, std::string_view model);
 
 }  // namespace lowlux

@@ -11,7 +11,7 @@
 namespace lowlux {
 
 /// What a sensor gives without light under the setting of one picture, pixel by pixel: pedestal and dark charge in one,
-/// so that nothing of either is left to subtract. Made of dark frames by calib/dark_frame.h.
+/// so that nothing of either is left to subtract. Made of dark frames by calib/dark/dark_frame.h.
 struct DarkFrame {
   Plane<float> dn;                       // active height x width: the mean code expected without light
   std::vector<DefectRect> unknown;       // pixels whose dark cannot be told, ascending, 1 x 1; to be repaired

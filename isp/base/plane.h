@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "isp/base/huge_pages.h"
+#include "isp/base/memory.h"
 
 namespace lowlux {
 

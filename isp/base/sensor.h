@@ -11,6 +11,9 @@ namespace lowlux {
 /// How the converter makes a code of a voltage: the nearest one, or the one below (thesis Eq. 4.10).
 enum class Quantisation : std::uint8_t { round, floor };
 
+/// Variance that rounding to whole codes adds [DN^2].
+inline constexpr double quantisation_dn2 = 1.0 / 12;
+
 /// An image sensor at one gain setting, in the terms of EMVA 1288. Figures of three are those of R, G and B.
 /// What is 0 by default is an effect the sensor does not have. Checked by isp::check_sensor.
 struct SensorModel {
@@ -39,7 +42,7 @@ struct SensorModel {
 
 /// What light does to the sensor: electrons in one pixel for radiance in front of the camera.
 ///     mu_k [e-] = exposure_s * etendue_m2_sr * integral of photons(nm) * quantum_efficiency[k](nm)
-/// with photons in s-1 m-2 sr-1 nm-1 (isp/model/photon.h).
+/// with photons in s-1 m-2 sr-1 nm-1 (isp/model/sensor/photon.h).
 struct SpectralResponse {
   std::string name;
   std::array<Spectrum, 3> quantum_efficiency;  // of R, G, B [e- per photon]; filters and optics included

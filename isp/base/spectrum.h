@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "isp/base/number_text.h"
 #include "isp/base/result.h"
+#include "isp/base/text.h"
 
 namespace lowlux {
 

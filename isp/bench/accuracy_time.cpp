@@ -10,8 +10,8 @@
 
 #include <fmt/format.h>
 
-#include "isp/bench/median.h"
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/metrics/statistics.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 
 namespace lowlux::isp {
 namespace {

@@ -9,10 +9,10 @@
 
 #include "isp/base/image.h"
 #include "isp/base/result.h"
-#include "isp/bench/bench_picture.h"
-#include "isp/bench/nl_means.h"
-#include "isp/bench/reproduce.h"
-#include "isp/output/report.h"
+#include "isp/bench/peers/nl_means.h"
+#include "isp/reproduce/bench_picture.h"
+#include "isp/output/report/report.h"
+#include "isp/reproduce/reproduce.h"
 
 namespace lowlux::isp {
 

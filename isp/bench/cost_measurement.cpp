@@ -10,11 +10,11 @@
 
 #include <fmt/format.h>
 
-#include "isp/bench/median.h"
 #include "isp/bench/pace.h"
 #include "isp/bench/timing_frame.h"
+#include "isp/metrics/statistics.h"
+#include "isp/pipeline/budget/frame_sample.h"
 #include "isp/pipeline/develop.h"
-#include "isp/pipeline/frame_sample.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {

@@ -5,7 +5,7 @@
 
 #include "isp/base/executor.h"
 #include "isp/base/result.h"
-#include "isp/pipeline/cost_model.h"
+#include "isp/pipeline/budget/cost_model.h"
 
 namespace lowlux::isp {
 

@@ -1,7 +1,7 @@
 #include "isp/bench/pace.h"
 
-#include "isp/bench/median.h"
 #include "isp/bench/timing_frame.h"
+#include "isp/metrics/statistics.h"
 #include "isp/pipeline/develop.h"
 
 namespace lowlux::isp {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {

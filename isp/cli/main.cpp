@@ -13,14 +13,14 @@
 
 #include <fmt/format.h>
 
-#include "isp/cli/exit_code.h"
-#include "isp/cli/interruption.h"
-#include "isp/cli/option_values.h"
-#include "isp/cli/print.h"
-#include "isp/cli/report.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/interruption.h"
+#include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/machine.h"
+#include "isp/cli/shared/option_values.h"
+#include "isp/cli/shared/report.h"
 #include "isp/cli/verbs.h"
-#include "isp/cli/version.h"
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 
 namespace lowlux::cli {
 namespace {

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <span>
 
+#include "isp/base/result.h"
 #include "isp/codec/picture_file.h"
 
 namespace lowlux::isp {
@@ -28,5 +29,10 @@ Result<void> encode_exr(const SceneLinear& picture, const FileMetadata& metadata
 /// them, are dropped. Deep files, those of several parts, subsampled
 /// colour and files without these channels are refused.
 Result<DecodedPicture> decode_exr(std::span<const std::byte> bytes, const DecodeLimits& limits = {});
+
+/// Walks the attributes of an OpenEXR header without believing any size in it: OpenEXR itself takes the memory an
+/// attribute asks for before it finds the file too short for it. An error unless every attribute, and every string and
+/// preview inside one, ends within the file. Files of several parts and deep files are refused.
+Result<void> check_exr_header(std::span<const std::byte> bytes);
 
 }  // namespace lowlux::isp

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "isp/base/number_text.h"
+#include "isp/base/text.h"
 
 namespace lowlux::isp {
 namespace {

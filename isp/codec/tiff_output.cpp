@@ -5,7 +5,6 @@
 #include <cerrno>
 
 #include "isp/codec/picture_file.h"
-#include "isp/codec/tiff_client.h"
 
 namespace lowlux::isp {
 namespace {

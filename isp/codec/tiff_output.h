@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstdarg>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <string>
 
 #include "isp/base/result.h"
 
@@ -37,6 +39,18 @@ class TiffOutput {
  private:
   struct State;
   std::unique_ptr<State> state_;
+};
+
+/// Keeps the first message libtiff has for one file, instead of printing it.
+struct TiffMessages {
+  std::string first_error;
+
+  __attribute__((format(printf, 2, 0))) void keep(const char* format, std::va_list arguments) {
+    if (!first_error.empty()) return;
+    char line[200];
+    std::vsnprintf(line, sizeof line, format, arguments);
+    first_error = line;
+  }
 };
 
 }  // namespace lowlux::isp

@@ -10,7 +10,7 @@ if(cells MATCHES ",," OR NOT cells MATCHES "^[-+0-9.eE, \n]+$")
   message(FATAL_ERROR "${CSV}: a cell is empty or not a number")
 endif()
 file(WRITE "${OUT}.new" "// Generated from isp/model/data/${NAME}.csv.
-#include \"isp/model/cie_table.h\"
+#include \"isp/model/spectrum/cie_data.h\"
 
 namespace lowlux::isp {
 namespace {

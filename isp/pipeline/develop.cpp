@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "isp/pipeline/pipeline.h"
+#include "isp/pipeline/render/pipeline.h"
 #include "isp/pipeline/stage_clock.h"
 
 namespace lowlux::isp {

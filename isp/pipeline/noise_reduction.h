@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "denoise/denoiser.h"
-#include "denoise/line_noise.h"
-#include "denoise/temporal.h"
+#include "denoise/lines/line_noise.h"
+#include "denoise/temporal/temporal.h"
 #include "isp/base/frame.h"
 #include "isp/base/plane.h"
 

@@ -4,14 +4,14 @@
 #include <cmath>
 #include <utility>
 
-#include "isp/pipeline/effect_sizes.h"
-#include "isp/pipeline/plan_effects.h"
-#include "isp/pipeline/plan_noise.h"
-#include "isp/pipeline/plan_rendering.h"
+#include "isp/pipeline/budget/effect_sizes.h"
+#include "isp/pipeline/budget/plan_effects.h"
+#include "isp/pipeline/plan/plan_noise.h"
+#include "isp/pipeline/plan/plan_rendering.h"
 #include "isp/pipeline/stage_clock.h"
 #include "isp/raw/corrections.h"
+#include "isp/raw/measure/thumbnail.h"
 #include "isp/raw/subtract_dark_frame.h"
-#include "isp/raw/thumbnail.h"
 #include "isp/raw/to_linear.h"
 
 namespace lowlux::isp {

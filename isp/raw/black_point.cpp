@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "isp/raw/masked_black.h"
+#include "isp/raw/measure/masked_black.h"
 
 namespace lowlux::isp {
 namespace {

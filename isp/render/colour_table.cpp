@@ -1,6 +1,6 @@
 #include "isp/render/colour_table.h"
-#include "isp/base/number_text.h"
-#include "isp/model/colour_difference.h"
+#include "isp/base/text.h"
+#include "isp/model/colour/colour_difference.h"
 
 #include <algorithm>
 #include <array>

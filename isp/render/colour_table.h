@@ -9,7 +9,7 @@
 #include "isp/base/matrix3.h"
 #include "isp/base/result.h"
 #include "isp/model/appearance/appearance_model.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 
 namespace lowlux::isp {
 

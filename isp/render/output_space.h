@@ -6,7 +6,7 @@
 
 #include "isp/base/image.h"
 #include "isp/base/matrix3.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 
 namespace lowlux::isp {
 

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "isp/base/number_text.h"
-#include "isp/model/correlated_colour_temperature.h"
+#include "isp/base/text.h"
+#include "isp/model/colour/correlated_colour_temperature.h"
 #include "isp/render/block_statistics.h"
 
 namespace lowlux::isp {

@@ -9,7 +9,7 @@
 #include "isp/base/frame.h"
 #include "isp/base/image.h"
 #include "isp/base/result.h"
-#include "isp/model/camera_colour.h"
+#include "isp/model/colour/camera_colour.h"
 
 namespace lowlux::isp {
 

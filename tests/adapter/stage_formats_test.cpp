@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "isp/base/unpack.h"
+#include "isp/base/packed/raw_format.h"
 #include "isp/render/pixel_rows.h"
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/guarded_memory.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "isp/adapter/lowlux_stage.h"
-#include "isp/base/raw_format.h"
+#include "isp/base/packed/raw_format.h"
 
 /// Frames as cameras have them in memory, and stages to give them to.
 namespace lowlux::stage_testing {

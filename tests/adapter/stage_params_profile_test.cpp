@@ -3,7 +3,7 @@
 #include <cmath>
 #include <string>
 
-#include "calib/profile_io.h"
+#include "calib/profile/profile_io.h"
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/scratch_directory.h"
 

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "calib/profile_io.h"
-#include "calib/profile_use.h"
+#include "calib/profile/profile_io.h"
+#include "calib/profile/profile_use.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux::isp {

@@ -2,10 +2,10 @@
 
 #include <cstring>
 
-#include "calib/profile_io.h"
+#include "calib/profile/profile_io.h"
 #include "isp/adapter/stage_profile.h"
 #include "isp/pipeline/develop.h"
-#include "isp/pipeline/pipeline.h"
+#include "isp/pipeline/render/pipeline.h"
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/scratch_directory.h"
 

@@ -1,4 +1,4 @@
-#include "isp/base/camera_name.h"
+#include "isp/base/camera_profile.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/base/huge_pages.h"
+#include "isp/base/memory.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/base/near_match.h"
+#include "isp/base/text.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "isp/base/exact_draw.h"
-#include "isp/base/random.h"
+#include "isp/base/random/exact_draw.h"
+#include "isp/base/random/random.h"
 #include "tests/reference/poisson_ref.h"
 
 namespace lowlux {

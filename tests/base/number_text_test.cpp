@@ -1,4 +1,4 @@
-#include "isp/base/number_text.h"
+#include "isp/base/text.h"
 
 #include <gtest/gtest.h>
 

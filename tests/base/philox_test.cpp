@@ -1,10 +1,10 @@
-#include "isp/base/philox.h"
+#include "isp/base/random/philox.h"
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 
 namespace lowlux {
 namespace {

@@ -6,8 +6,8 @@
 #endif
 #include <hwy/highway.h>
 
-#include "isp/base/random-inl.h"
-#include "isp/base/random.h"
+#include "isp/base/random/random-inl.h"
+#include "isp/base/random/random.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::draws::HWY_NAMESPACE {

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 #include "tests/reference/poisson_ref.h"
 
 namespace lowlux {

@@ -8,9 +8,9 @@
 #include <random>
 #include <vector>
 
-#include "isp/base/exact_draw.h"
-#include "isp/base/random.h"
-#include "isp/base/random_rows.h"
+#include "isp/base/random/exact_draw.h"
+#include "isp/base/random/random.h"
+#include "isp/base/random/random_rows.h"
 #include "tests/reference/poisson_ref.h"
 
 namespace lowlux {

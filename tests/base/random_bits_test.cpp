@@ -8,8 +8,8 @@
 
 #include "isp/base/executor.h"
 #include "isp/base/plane.h"
-#include "isp/base/random.h"
-#include "isp/base/random_rows.h"
+#include "isp/base/random/random.h"
+#include "isp/base/random/random_rows.h"
 #include "tests/support/draw_bits.h"
 
 namespace lowlux {

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "isp/base/random.h"
-#include "isp/base/random_rows.h"
+#include "isp/base/random/random.h"
+#include "isp/base/random/random_rows.h"
 #include "tests/support/draw_bits.h"
 #include "tests/support/only_target.h"
 

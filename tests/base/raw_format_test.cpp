@@ -1,4 +1,4 @@
-#include "isp/base/raw_format.h"
+#include "isp/base/packed/raw_format.h"
 
 #include <gtest/gtest.h>
 

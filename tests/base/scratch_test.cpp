@@ -1,12 +1,10 @@
-#include "isp/base/scratch.h"
+#include "isp/base/memory.h"
 
 #include <gtest/gtest.h>
 
 #include <cstddef>
 #include <cstring>
 #include <vector>
-
-#include "isp/base/sanitized.h"
 
 namespace lowlux {
 namespace {

@@ -9,8 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "isp/base/raw_format.h"
-#include "isp/base/unpack.h"
+#include "isp/base/packed/raw_format.h"
 #include "tests/reference/unpack_ref.h"
 #include "tests/support/guarded_memory.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <thread>
 
-#include "isp/bench/median.h"
+#include "isp/metrics/statistics.h"
 
 namespace lowlux::isp {
 namespace {

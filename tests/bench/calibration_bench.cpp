@@ -12,16 +12,16 @@
 #include <utility>
 #include <vector>
 
-#include "calib/black_figures.h"
-#include "calib/colour_fit.h"
-#include "calib/dark_gain.h"
-#include "calib/dark_series.h"
-#include "calib/dark_stack.h"
-#include "calib/pair_statistics.h"
-#include "calib/photon_transfer.h"
+#include "calib/chart/colour_fit.h"
+#include "calib/dark/dark_series.h"
+#include "calib/dark/dark_stack.h"
+#include "calib/dark/dark_temperature.h"
+#include "calib/flat/pair_statistics.h"
+#include "calib/flat/photon_transfer.h"
+#include "calib/profile/gain_profile.h"
 #include "capture/synthetic/fixed_pattern.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
+#include "isp/model/spectrum/cie_data.h"
 #include "tests/sensor_bench/sensor_bench.h"
 
 namespace {

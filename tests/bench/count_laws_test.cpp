@@ -1,4 +1,4 @@
-#include "isp/bench/count_laws.h"
+#include "isp/bench/stages/count_laws.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 
 namespace lowlux::isp {
 namespace {

@@ -1,4 +1,4 @@
-#include "isp/bench/demosaic_reference.h"
+#include "isp/bench/peers/demosaic_reference.h"
 
 #include <gtest/gtest.h>
 

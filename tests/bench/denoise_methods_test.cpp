@@ -1,10 +1,10 @@
-#include "isp/bench/denoise_methods.h"
+#include "isp/bench/peers/denoise_methods.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "isp/bench/gat_denoise.h"
+#include "isp/bench/peers/gat_denoise.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "isp/bench/denoise_bench.h"
+#include "isp/bench/stages/denoise_bench.h"
 
 namespace lowlux::isp {
 namespace {

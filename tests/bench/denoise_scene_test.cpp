@@ -1,4 +1,4 @@
-#include "isp/bench/denoise_scene.h"
+#include "isp/bench/scenes/denoise_scene.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/bench/developing_stages.h"
+#include "isp/bench/stages/developing_stages.h"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@
 
 #include "isp/base/executor.h"
 #include "isp/bench/accuracy_time.h"
-#include "isp/bench/develop_scene.h"
-#include "isp/bench/developing_memory.h"
+#include "isp/bench/scenes/develop_scene.h"
+#include "isp/bench/stages/developing_memory.h"
 
 namespace lowlux::isp {
 namespace {

@@ -15,12 +15,12 @@
 #include <vector>
 
 #include "isp/base/executor.h"
-#include "isp/model/night_eye.h"
-#include "isp/raw/raw_to_rgb.h"
-#include "isp/render/night_look.h"
-#include "isp/render/retarget.h"
-#include "isp/render/retarget_rows.h"
-#include "isp/render/retarget_table.h"
+#include "isp/model/vision/night_eye.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
+#include "isp/render/night/night_look.h"
+#include "isp/render/retarget/retarget.h"
+#include "isp/render/retarget/retarget_rows.h"
+#include "isp/render/retarget/retarget_table.h"
 #include "tests/reference/night_look_ref.h"
 #include "tests/reference/raw_to_rgb_ref.h"
 

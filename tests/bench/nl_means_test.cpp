@@ -1,4 +1,4 @@
-#include "isp/bench/nl_means.h"
+#include "isp/bench/peers/nl_means.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cstring>
 #include <vector>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 
 namespace lowlux::isp {
 namespace {

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "capture/synthetic/synthetic_source.h"
-#include "isp/base/random_rows.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/spectral_response.h"
+#include "isp/base/random/random_rows.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_response.h"
 
 namespace {
 

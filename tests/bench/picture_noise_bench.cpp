@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "calib/picture_noise.h"
+#include "calib/picture/picture_noise.h"
 #include "isp/base/executor.h"
 #include "tests/sensor_bench/picture_raw.h"
 #include "tests/sensor_bench/sensor_bench.h"

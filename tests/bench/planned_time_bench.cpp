@@ -23,15 +23,15 @@
 #include <utility>
 #include <vector>
 
-#include "isp/bench/bench_raw.h"
 #include "isp/bench/cost_measurement.h"
-#include "isp/bench/median.h"
 #include "isp/bench/pace.h"
-#include "isp/bench/picture_metrics.h"
-#include "isp/bench/seen_difference.h"
+#include "isp/metrics/picture_metrics.h"
+#include "isp/metrics/statistics.h"
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/plan.h"
+#include "tests/scenarios/bench_raw.h"
 #include "tests/scenarios/planner_scene.h"
+#include "tests/scenarios/seen_difference.h"
 
 namespace lowlux::isp {
 namespace {

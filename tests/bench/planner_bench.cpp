@@ -1,6 +1,6 @@
 // What the planner of developing rests on.
 //   planner_bench levels   what levels of noise reduction change, beside what is predicted of the noise, on the tuning
-//                          pictures: the figures of isp/pipeline/plan_effects.cpp
+//                          pictures: the figures of isp/pipeline/budget/plan_effects.cpp
 //   planner_bench bounds   what they change over the bound that the planner has of it, in 300 drawn parts of the tuning
 //                          pictures at drawn lights, and likewise of the held-out ones
 //   planner_bench truth    what they leave against the noise-free picture, likewise
@@ -14,14 +14,14 @@
 #include <utility>
 #include <vector>
 
-#include "isp/bench/bench_raw.h"
-#include "isp/bench/seen_difference.h"
+#include "isp/pipeline/budget/effect_candidates.h"
+#include "isp/pipeline/budget/visible_noise.h"
 #include "isp/pipeline/develop.h"
-#include "isp/pipeline/effect_candidates.h"
-#include "isp/pipeline/pipeline.h"
 #include "isp/pipeline/plan.h"
-#include "isp/pipeline/visible_noise.h"
+#include "isp/pipeline/render/pipeline.h"
+#include "tests/scenarios/bench_raw.h"
 #include "tests/scenarios/planner_scene.h"
+#include "tests/scenarios/seen_difference.h"
 
 namespace lowlux::isp {
 namespace {

@@ -17,8 +17,8 @@
 
 #include "isp/base/executor.h"
 #include "isp/base/image.h"
-#include "isp/bench/median.h"
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/metrics/statistics.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 #include "tests/reference/raw_to_rgb_ref.h"
 
 namespace {

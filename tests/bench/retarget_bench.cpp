@@ -9,14 +9,14 @@
 #include <thread>
 #include <vector>
 
-#include "isp/bench/bench_picture.h"
-#include "isp/bench/gamut_ratio.h"
+#include "isp/metrics/gamut_ratio.h"
 #include "isp/model/appearance/appearance_model.h"
-#include "isp/model/colour_difference.h"
+#include "isp/model/colour/colour_difference.h"
 #include "isp/render/output_space.h"
-#include "isp/render/retarget.h"
-#include "isp/render/retarget_rows.h"
-#include "isp/render/retarget_table.h"
+#include "isp/render/retarget/retarget.h"
+#include "isp/render/retarget/retarget_rows.h"
+#include "isp/render/retarget/retarget_table.h"
+#include "isp/reproduce/bench_picture.h"
 
 namespace lowlux::isp {
 namespace {
@@ -110,7 +110,7 @@ Score score(const std::vector<Lab>& original, const std::vector<Lab>& test) {
     out.delta_e_94c += delta_e_94c(original[i], test[i]) / static_cast<double>(original.size());
     out.lightness += std::abs(original[i].l - test[i].l) / static_cast<double>(original.size());
   }
-  out.gamut = gamut_ratio(original, test, lowlux_measure_hulls);
+  out.gamut = gamut_ratio(original, test);
   return out;
 }
 
@@ -138,7 +138,7 @@ void compare_methods(const std::string& folder, double display_cd_m2, ShinUnits 
       std::printf("%-17s%-17s", std::string(file).c_str(), std::string(retarget_methods[m].name).c_str());
       for (std::size_t j = 0; j < originals.size(); ++j) {
         const Score s = score(originals[j], seen(shown, eye_of(judges[j], display_cd_m2, units)));
-        std::printf("| %6.2f %6.1f %6.2f ", s.delta_e_94c, s.gamut.convex_percent.value_or(0), s.lightness);
+        std::printf("| %6.2f %6.1f %6.2f ", s.delta_e_94c, s.gamut.convex_percent, s.lightness);
       }
       std::printf("\n");
       std::fflush(stdout);

@@ -1,4 +1,4 @@
-// Times the random draws of isp/base/random.h and the readout against what they replace, in one run: see
+// Times the random draws of isp/base/random/random.h and the readout against what they replace, in one run: see
 // docs/kernels.md.
 //   sampler_bench [--rounds N, at least 15]
 #include <algorithm>
@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "capture/synthetic/readout.h"
-#include "isp/base/random.h"
-#include "isp/base/random_rows.h"
+#include "isp/base/random/random.h"
+#include "isp/base/random/random_rows.h"
 
 namespace {
 

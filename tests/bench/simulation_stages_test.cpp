@@ -1,4 +1,4 @@
-#include "isp/bench/simulation_stages.h"
+#include "isp/bench/stages/simulation_stages.h"
 
 #include <gtest/gtest.h>
 
@@ -6,11 +6,11 @@
 #include <cmath>
 #include <ctime>
 
-#include "isp/bench/black_point_bench.h"
-#include "isp/bench/effect_change.h"
-#include "isp/bench/simulated_camera.h"
-#include "isp/bench/stage_rows.h"
-#include "isp/raw/masked_black.h"
+#include "isp/bench/scenes/simulated_camera.h"
+#include "isp/bench/stages/black_point_bench.h"
+#include "isp/bench/stages/simulation_effects_bench.h"
+#include "isp/bench/stages/stage_rows.h"
+#include "isp/raw/measure/masked_black.h"
 
 namespace lowlux::isp {
 namespace {

@@ -16,8 +16,8 @@
 
 #include "isp/adapter/lowlux_stage.h"
 #include "isp/base/executor.h"
+#include "isp/base/packed/raw_format.h"
 #include "isp/base/plane.h"
-#include "isp/base/unpack.h"
 #include "tests/sensor_bench/picture_raw.h"
 
 namespace {

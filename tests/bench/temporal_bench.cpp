@@ -9,8 +9,8 @@
 #include <ctime>
 #include <vector>
 
-#include "denoise/temporal.h"
-#include "isp/bench/median.h"
+#include "denoise/temporal/temporal.h"
+#include "isp/metrics/statistics.h"
 #include "tests/denoise/frames.h"
 
 namespace {

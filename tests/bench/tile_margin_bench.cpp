@@ -11,7 +11,7 @@
 
 #include "capture/file/picture_source.h"
 #include "denoise/denoiser.h"
-#include "isp/pipeline/frame_tiles.h"
+#include "isp/pipeline/render/frame_tiles.h"
 
 namespace {
 

@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "isp/base/unpack.h"
-#include "isp/bench/median.h"
+#include "isp/base/packed/raw_format.h"
+#include "isp/metrics/statistics.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "calib/black_figures.h"
+#include "calib/profile/gain_profile.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "calib/chart_finder.h"
+#include "calib/chart/chart_finder.h"
 
 #include <gtest/gtest.h>
 

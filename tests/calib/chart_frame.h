@@ -3,8 +3,8 @@
 #include <array>
 #include <cstddef>
 
-#include "calib/chart_detector.h"
-#include "calib/chart_picture.h"
+#include "calib/chart/chart_detector.h"
+#include "calib/chart/chart_patches.h"
 #include "tests/support/chart_photograph.h"
 #include "tests/support/synthetic_chart.h"
 

@@ -1,4 +1,4 @@
-#include "calib/chart_grid.h"
+#include "calib/chart/chart_grid.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "calib/chart_patches.h"
+#include "calib/chart/chart_patches.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "calib/colour_fit.h"
+#include "calib/chart/colour_fit.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "isp/model/cie_data.h"
+#include "isp/model/spectrum/cie_data.h"
 #include "tests/calib/chart_frame.h"
 
 namespace lowlux::calib {

@@ -1,4 +1,4 @@
-#include "calib/dark_dose.h"
+#include "calib/dark/dark_dose.h"
 
 #include <gtest/gtest.h>
 

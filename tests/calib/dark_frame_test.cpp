@@ -1,4 +1,4 @@
-#include "calib/dark_frame.h"
+#include "calib/dark/dark_frame.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/dark_library.h"
-#include "calib/light_in_darks.h"
+#include "calib/dark/dark_library.h"
+#include "calib/dark/light_in_darks.h"
 #include "capture/synthetic/fixed_pattern.h"
 #include "tests/sensor_bench/sensor_bench.h"
 

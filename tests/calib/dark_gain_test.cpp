@@ -1,4 +1,4 @@
-#include "calib/dark_gain.h"
+#include "calib/dark/dark_temperature.h"
 
 #include <cmath>
 #include <string>

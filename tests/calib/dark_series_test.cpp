@@ -1,4 +1,4 @@
-#include "calib/dark_series.h"
+#include "calib/dark/dark_series.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "calib/dark_sorter.h"
+#include "calib/dark/dark_library.h"
 
 #include <string>
 

@@ -1,4 +1,4 @@
-#include "calib/dark_stack.h"
+#include "calib/dark/dark_stack.h"
 
 #include <cmath>
 #include <random>

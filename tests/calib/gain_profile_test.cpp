@@ -1,4 +1,4 @@
-#include "calib/gain_profile.h"
+#include "calib/profile/gain_profile.h"
 
 #include <cmath>
 #include <string>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "calib/profile_use.h"
+#include "calib/profile/profile_use.h"
 #include "tests/sensor_bench/sensor_bench.h"
 
 namespace lowlux::calib {

@@ -1,4 +1,4 @@
-#include "calib/linear_estimators.h"
+#include "calib/dark/dark_fit.h"
 
 #include <vector>
 

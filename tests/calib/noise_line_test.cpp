@@ -1,4 +1,4 @@
-#include "calib/noise_line.h"
+#include "calib/picture/noise_line.h"
 
 #include <cmath>
 #include <random>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "calib/flat_samples.h"
+#include "calib/picture/flat_samples.h"
 
 namespace lowlux::calib {
 namespace {

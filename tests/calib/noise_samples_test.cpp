@@ -1,4 +1,4 @@
-#include "calib/noise_samples.h"
+#include "calib/picture/noise_samples.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "calib/pair_statistics.h"
+#include "calib/flat/pair_statistics.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "calib/photon_transfer.h"
+#include "calib/flat/photon_transfer.h"
 
 #include <algorithm>
 #include <cmath>

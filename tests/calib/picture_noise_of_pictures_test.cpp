@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "calib/picture_noise.h"
+#include "calib/picture/picture_noise.h"
 #include "capture/file/dng_source.h"
 #include "tests/sensor_bench/picture_raw.h"
 #include "tests/sensor_bench/sensor_bench.h"

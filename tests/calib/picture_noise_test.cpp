@@ -1,4 +1,4 @@
-#include "calib/picture_noise.h"
+#include "calib/picture/picture_noise.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "calib/flat_samples.h"
-#include "calib/noise_samples.h"
+#include "calib/picture/flat_samples.h"
+#include "calib/picture/noise_samples.h"
 #include "capture/file/dng_source.h"
 #include "tests/support/frames.h"
 

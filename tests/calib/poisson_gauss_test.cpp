@@ -1,4 +1,4 @@
-#include "calib/poisson_gauss.h"
+#include "calib/dark/dark_fit.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "calib/profile_io.h"
+#include "calib/profile/profile_io.h"
 
 #include <chrono>
 #include <cmath>

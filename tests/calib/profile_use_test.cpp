@@ -1,4 +1,4 @@
-#include "calib/profile_use.h"
+#include "calib/profile/profile_use.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "calib/profile_io.h"
-#include "calib/quoted_profile.h"
-#include "isp/model/sensor_db.h"
+#include "calib/profile/profile_io.h"
+#include "calib/profile/quoted_profile.h"
+#include "isp/model/sensor/sensor_db.h"
 
 namespace lowlux::calib {
 namespace {

@@ -1,13 +1,13 @@
-#include "calib/spectral_colour.h"
+#include "calib/chart/spectral_colour.h"
 
 #include <gtest/gtest.h>
 
 #include <cstddef>
 #include <string_view>
 
-#include "calib/colour_fit.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/spectral_data.h"
+#include "calib/chart/colour_fit.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
 
 namespace lowlux::calib {
 namespace {

@@ -20,7 +20,7 @@
 #include "isp/codec/pfm.h"
 #include "isp/codec/png.h"
 #include "isp/codec/tiff.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 #include "tests/codec/pictures.h"
 #include "tests/support/dng_builder.h"
 

@@ -1,4 +1,4 @@
-#include "capture/file/decoder_process.h"
+#include "capture/decoder/decoder_process.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "capture/file/decoder_program.h"
+#include "capture/decoder/decoder_program.h"
 
 namespace lowlux::capture {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "capture/file/dng_colour.h"
+#include "capture/dng/dng_colour.h"
 #include "tests/capture/read_built.h"
 
 namespace lowlux::test {

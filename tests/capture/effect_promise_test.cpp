@@ -12,11 +12,11 @@
 #include <gtest/gtest.h>
 
 #include "capture/synthetic/synthetic_source.h"
-#include "isp/base/random.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/colour_difference.h"
-#include "isp/model/spectral_data.h"
-#include "isp/model/spectral_response.h"
+#include "isp/base/random/random.h"
+#include "isp/model/colour/colour_difference.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
+#include "isp/model/spectrum/spectral_response.h"
 
 // The planner's promise: a frame simulated with the effects it chose differs from the frame with all effects, made of
 // the same random numbers, by less than the tolerance, in the colour of block means and in the variance of blocks.

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <utility>
 
-#include "isp/model/cie_data.h"
-#include "isp/model/spectral_response.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_response.h"
 #include "tests/support/synthetic_camera.h"
 
 namespace lowlux::capture {

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "capture/file/decoder_program.h"
+#include "capture/decoder/decoder_program.h"
 
 namespace lowlux::capture {
 namespace {

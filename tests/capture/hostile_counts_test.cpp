@@ -7,9 +7,9 @@
 #include <string>
 #include <string_view>
 
+#include "capture/dng/tiff_directory.h"
 #include "capture/file/picture_source.h"
 #include "capture/file/spectra_file.h"
-#include "capture/file/tiff_directory.h"
 #include "tests/capture/built_pictures.h"
 #include "tests/codec/pictures.h"
 #include "tests/support/peak_memory.h"

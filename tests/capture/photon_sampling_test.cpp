@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "isp/base/random.h"
-#include "isp/model/photon.h"
+#include "isp/base/random/random.h"
+#include "isp/model/sensor/photon.h"
 #include "tests/support/sensor_frames.h"
 #include "tests/support/synthetic_camera.h"
 

@@ -12,7 +12,7 @@
 #include <random>
 
 #include "capture/file/picture_colour.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 #include "tests/capture/built_pictures.h"
 #include "tests/codec/pictures.h"
 #include "tests/support/dng_builder.h"

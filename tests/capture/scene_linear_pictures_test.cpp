@@ -5,7 +5,7 @@
 #include <random>
 
 #include "capture/file/picture_source.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 #include "tests/capture/built_pictures.h"
 #include "tests/codec/pictures.h"
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "isp/model/cie_data.h"
+#include "isp/model/spectrum/cie_data.h"
 #include "tests/support/synthetic_camera.h"
 
 namespace lowlux::capture {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "isp/model/noise_budget.h"
+#include "isp/model/sensor/noise_budget.h"
 #include "tests/reference/poisson_ref.h"
 #include "tests/support/sensor_frames.h"
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "capture/synthetic/synthetic_source.h"
-#include "isp/model/scene_luminance.h"
-#include "isp/model/spectral_response.h"
+#include "isp/model/sensor/scene_luminance.h"
+#include "isp/model/spectrum/spectral_response.h"
 #include "tests/support/sensor_frames.h"
 #include "tests/support/synthetic_camera.h"
 

@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "calib/profile_io.h"
+#include "calib/profile/profile_io.h"
 #include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 

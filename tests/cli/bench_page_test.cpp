@@ -1,4 +1,4 @@
-#include "isp/cli/bench_page.h"
+#include "isp/cli/bench/bench_page.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "isp/cli/bench_report.h"
+#include "isp/cli/bench/bench_report.h"
 #include "tests/cli/command.h"
 #include "tests/support/scratch_directory.h"
 

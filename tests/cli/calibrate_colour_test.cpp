@@ -9,9 +9,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "calib/profile_io.h"
+#include "calib/profile/profile_io.h"
 #include "isp/base/matrix3.h"
-#include "isp/output/dng_writer.h"
+#include "isp/output/dng/dng_writer.h"
 #include "tests/cli/command.h"
 #include "tests/support/chart_photograph.h"
 #include "tests/support/process.h"

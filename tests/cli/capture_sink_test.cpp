@@ -1,4 +1,4 @@
-#include "isp/cli/capture_sink.h"
+#include "isp/cli/capture/capture_sink.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -17,8 +17,8 @@
 #include "capture/camera/capture_loop.h"
 #include "capture/file/dng_source.h"
 #include "isp/base/executor.h"
-#include "isp/cli/capture_args.h"
-#include "isp/cli/capture_report.h"
+#include "isp/cli/capture/capture_args.h"
+#include "isp/cli/capture/capture_report.h"
 #include "isp/codec/png.h"
 #include "tests/cli/simulate_command.h"
 #include "tests/support/fake_camera.h"

@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/base/executor.h"
-#include "isp/model/colour_difference.h"
-#include "isp/output/image_writer.h"
+#include "isp/model/colour/colour_difference.h"
+#include "isp/output/picture/image_writer.h"
 #include "isp/render/output_space.h"
 #include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
@@ -142,19 +142,6 @@ TEST_F(CompareCommand, RefusesWhatCannotBeCompared) {
   EXPECT_NE(Json::parse(missing.out)["file"].get<std::string>().find("no.png"), std::string::npos);
   EXPECT_EQ(lowlux({"compare", file("a.png")}).exit_code, 2);
   EXPECT_EQ(compare("a.png", "a.png", {"--luck"}).exit_code, 2);
-}
-
-// The command alone in a folder finds no module beside it or above.
-TEST_F(CompareCommand, WithoutTheModuleAllButTheConvexRatioIsSaid) {
-  write("a.png", paint);
-  std::filesystem::create_directory(file("bin"));
-  std::filesystem::copy_file(LOWLUX_COMMAND, file("bin/lowlux"));
-  const auto result = test::run_process({file("bin/lowlux"), "compare", file("a.png"), file("a.png"), "--json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const Json json = Json::parse(result.out);
-  EXPECT_TRUE(json["egr"]["convex_percent"].is_null());
-  EXPECT_NE(json["egr"]["why_no_convex"].get<std::string>().find("liblowlux_hull.so"), std::string::npos);
-  EXPECT_EQ(json["egr"]["occupancy_percent"], 100);
 }
 
 }  // namespace

@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/file/dng_source.h"
-#include "isp/cli/dark_files.h"
-#include "isp/cli/raw_files.h"
-#include "isp/raw/masked_black.h"
+#include "isp/cli/develop/dark_files.h"
+#include "isp/cli/shared/raw_files.h"
+#include "isp/raw/measure/masked_black.h"
 #include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isp/cli/cost_file.h"
+#include "isp/cli/develop/cost_file.h"
 #include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 #include "tests/support/reference_cost.h"

@@ -1,4 +1,4 @@
-#include "isp/cli/frame_text.h"
+#include "isp/cli/shared/report.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/cli/memory_gate.h"
+#include "isp/cli/develop/memory_gate.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "isp/pipeline/pipeline_memory.h"
+#include "isp/pipeline/render/pipeline_memory.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux::cli {

@@ -1,4 +1,4 @@
-#include "isp/cli/module.h"
+#include "isp/cli/shared/module.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/cli/option_values.h"
+#include "isp/cli/shared/option_values.h"
 
 #include <gtest/gtest.h>
 

@@ -10,8 +10,8 @@
 
 #include "capture/file/picture_source.h"
 #include "isp/base/executor.h"
-#include "isp/model/colorimetry.h"
-#include "isp/output/image_writer.h"
+#include "isp/model/colour/colorimetry.h"
+#include "isp/output/picture/image_writer.h"
 #include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 

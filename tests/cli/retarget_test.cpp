@@ -11,7 +11,7 @@
 
 #include "capture/file/picture_source.h"
 #include "isp/base/executor.h"
-#include "isp/output/image_writer.h"
+#include "isp/output/picture/image_writer.h"
 #include "tests/cli/simulate_command.h"
 
 namespace lowlux {

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "isp/codec/exr.h"
-#include "isp/codec/exr_header.h"
 #include "isp/codec/jpeg.h"
 #include "isp/codec/pfm.h"
 #include "isp/codec/png.h"

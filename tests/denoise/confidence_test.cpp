@@ -1,4 +1,4 @@
-#include "denoise/confidence.h"
+#include "denoise/picture/resaturate.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "denoise/dark.h"
+#include "denoise/picture/resaturate.h"
 
 #include <gtest/gtest.h>
 
@@ -6,10 +6,10 @@
 #include <limits>
 #include <utility>
 
-#include "denoise/box_mean.h"
-#include "isp/model/chroma_bound.h"
-#include "isp/model/chromaticity_cloud.h"
-#include "isp/model/dark_desaturation.h"
+#include "denoise/picture/box_mean.h"
+#include "isp/model/colour/chroma_bound.h"
+#include "isp/model/colour/chromaticity_cloud.h"
+#include "isp/model/colour/dark_desaturation.h"
 #include "tests/denoise/draws.h"
 
 namespace lowlux::denoise {

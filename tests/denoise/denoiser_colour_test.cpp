@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "denoise/denoiser.h"
-#include "isp/model/chroma_bound.h"
-#include "isp/model/dark_desaturation.h"
+#include "isp/model/colour/chroma_bound.h"
+#include "isp/model/colour/dark_desaturation.h"
 #include "tests/denoise/draws.h"
 #include "tests/denoise/flat_charts.h"
 

@@ -8,10 +8,10 @@
 #include <limits>
 #include <vector>
 
+#include "denoise/check/noise_check.h"
 #include "denoise/denoiser.h"
-#include "denoise/line_noise.h"
-#include "denoise/noise_check.h"
-#include "denoise/rows.h"
+#include "denoise/lines/line_noise.h"
+#include "denoise/spatial/rows.h"
 #include "isp/base/executor.h"
 #include "tests/denoise/flat_charts.h"
 

@@ -3,7 +3,7 @@
 #include <cstring>
 
 #include "denoise/denoiser.h"
-#include "denoise/temporal.h"
+#include "denoise/temporal/temporal.h"
 #include "tests/denoise/against_reference.h"
 #include "tests/support/frame_sizes.h"
 

@@ -3,7 +3,7 @@
 #include <cstring>
 
 #include "denoise/denoiser.h"
-#include "denoise/temporal.h"
+#include "denoise/temporal/temporal.h"
 #include "tests/denoise/frames.h"
 #include "tests/support/count_allocations.h"
 #include "tests/support/only_target.h"

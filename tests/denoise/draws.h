@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "isp/base/matrix3.h"
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 
 namespace lowlux::test {
 

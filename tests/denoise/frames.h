@@ -7,7 +7,7 @@
 
 #include "denoise/denoiser.h"
 #include "isp/base/plane.h"
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 
 namespace lowlux::denoise_testing {
 

@@ -1,4 +1,4 @@
-#include "denoise/line_groups.h"
+#include "denoise/lines/line_noise.h"
 
 #include <gtest/gtest.h>
 

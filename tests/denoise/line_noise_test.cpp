@@ -1,4 +1,4 @@
-#include "denoise/line_noise.h"
+#include "denoise/lines/line_noise.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 #include "tests/denoise/draws.h"
 
 namespace lowlux::denoise {

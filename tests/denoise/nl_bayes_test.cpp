@@ -1,4 +1,4 @@
-#include "denoise/nl_bayes.h"
+#include "denoise/spatial/nl_bayes.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "denoise/noise_check.h"
+#include "denoise/check/noise_check.h"
 
 #include <gtest/gtest.h>
 

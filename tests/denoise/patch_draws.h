@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "denoise/patch_estimate.h"
+#include "denoise/picture/resaturate.h"
 #include "tests/denoise/draws.h"
 
 namespace lowlux::test {

@@ -1,4 +1,4 @@
-#include "denoise/point_sources.h"
+#include "denoise/spatial/point_sources.h"
 
 #include <gtest/gtest.h>
 

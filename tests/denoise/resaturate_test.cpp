@@ -1,4 +1,4 @@
-#include "denoise/resaturate.h"
+#include "denoise/picture/resaturate.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "isp/model/dark_desaturation.h"
+#include "isp/model/colour/dark_desaturation.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::denoise {

@@ -8,8 +8,8 @@
 #include <limits>
 #include <vector>
 
-#include "denoise/temporal.h"
-#include "denoise/temporal_thresholds.h"
+#include "denoise/temporal/temporal.h"
+#include "denoise/temporal/temporal_thresholds.h"
 #include "tests/denoise/draws.h"
 #include "tests/denoise/frames.h"
 #include "tests/reference/temporal_ref.h"

@@ -8,16 +8,15 @@
 #include <string_view>
 #include <vector>
 
-#include "isp/cli/args.h"
-#include "isp/cli/bench_args.h"
-#include "isp/cli/calibrate_args.h"
-#include "isp/cli/calibrate_colour_args.h"
-#include "isp/cli/capture_args.h"
-#include "isp/cli/compare_args.h"
-#include "isp/cli/exit_code.h"
-#include "isp/cli/resaturate_args.h"
-#include "isp/cli/retarget_args.h"
-#include "isp/cli/simulate_args.h"
+#include "isp/cli/bench/bench_args.h"
+#include "isp/cli/calibrate/calibrate_args.h"
+#include "isp/cli/capture/capture_args.h"
+#include "isp/cli/compare/compare_args.h"
+#include "isp/cli/develop/develop_args.h"
+#include "isp/cli/finished/resaturate_args.h"
+#include "isp/cli/finished/retarget_args.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/simulate/simulate_args.h"
 #include "tests/fuzz/input.h"
 
 namespace lowlux::cli {

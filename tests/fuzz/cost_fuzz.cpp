@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "isp/cli/cost_file.h"
+#include "isp/cli/develop/cost_file.h"
 #include "tests/fuzz/input.h"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <utility>
 
-#include "capture/file/dng_frame.h"
+#include "capture/dng/dng_frame.h"
 #include "tests/fuzz/check_frame.h"
 
 namespace {

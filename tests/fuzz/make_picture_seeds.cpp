@@ -18,7 +18,7 @@
 #include "isp/codec/pfm.h"
 #include "isp/codec/png.h"
 #include "isp/codec/tiff.h"
-#include "isp/output/icc.h"
+#include "isp/output/picture/icc.h"
 #include "tests/codec/pictures.h"
 
 namespace lowlux::test {

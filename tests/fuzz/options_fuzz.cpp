@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "isp/cli/option_values.h"
+#include "isp/cli/shared/option_values.h"
 #include "tests/fuzz/input.h"
 
 using lowlux::test::require;

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "calib/profile_io.h"
+#include "calib/profile/profile_io.h"
 #include "tests/fuzz/input.h"
 
 using lowlux::test::require;

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "isp/adapter/lowlux_stage.h"
-#include "isp/base/raw_format.h"
+#include "isp/base/packed/raw_format.h"
 #include "tests/fuzz/input.h"
 
 /// What the stage's C functions are given by a fuzzer.

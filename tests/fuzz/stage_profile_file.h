@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "calib/profile_io.h"
+#include "calib/profile/profile_io.h"
 #include "isp/base/camera_profile.h"
 #include "tests/fuzz/input.h"
 

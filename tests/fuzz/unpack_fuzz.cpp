@@ -6,7 +6,7 @@
 #include <cstring>
 #include <vector>
 
-#include "isp/base/unpack.h"
+#include "isp/base/packed/raw_format.h"
 #include "tests/reference/unpack_ref.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "capture/camera/camera_frame.h"
-#include "capture/camera/v4l2_source.h"
-#include "isp/base/raw_format.h"
+#include "capture/v4l2/v4l2_source.h"
+#include "isp/base/packed/raw_format.h"
 #include "tests/fuzz/check_frame.h"
 #include "tests/fuzz/input.h"
 #include "tests/support/fake_v4l2.h"

@@ -13,7 +13,7 @@
 #include "isp/model/appearance/kwak.h"
 #include "isp/model/appearance/mikamo.h"
 #include "isp/model/appearance/wanat_mantiuk.h"
-#include "isp/model/mesopic.h"
+#include "isp/model/vision/mesopic.h"
 #include "tests/hard_cases/hard_case.h"
 #include "tests/hard_cases/model_pictures.h"
 #include "tests/reference/exact_ref.h"

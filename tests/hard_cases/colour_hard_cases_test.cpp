@@ -8,13 +8,14 @@
 #include <utility>
 #include <vector>
 
-#include "isp/bench/gamut_ratio.h"
-#include "isp/model/colour_difference.h"
-#include "isp/model/seeing.h"
-#include "isp/model/spectral_divergence.h"
-#include "isp/render/retarget.h"
-#include "isp/render/retarget_rows.h"
-#include "isp/render/retarget_table.h"
+#include "isp/metrics/convex_hull.h"
+#include "isp/metrics/gamut_ratio.h"
+#include "isp/model/colour/colour_difference.h"
+#include "isp/model/spectrum/spectral_divergence.h"
+#include "isp/model/vision/seeing.h"
+#include "isp/render/retarget/retarget.h"
+#include "isp/render/retarget/retarget_rows.h"
+#include "isp/render/retarget/retarget_table.h"
 #include "tests/hard_cases/hard_case.h"
 #include "tests/hard_cases/rendering.h"
 #include "tests/reference/exact_ref.h"
@@ -135,9 +136,11 @@ TEST(HardCaseColour, GamutsWithoutArea) {
       0, [](Denormals m) {
         return in_mode(m, [] {
           const isp::GamutBins none;
-          double wrong = std::isnan(isp::convex_percent({1e-10, 5, 0})) ? 0 : 1;
-          wrong += isp::convex_percent({400, 0, 0}) == 0 ? 0 : 1;
-          wrong += std::isnan(isp::gamut_ratio(none, none, nullptr).occupancy_percent) ? 0 : 1;
+          const std::vector<isp::Xy> line{{0, 0}, {1, 1}, {2, 2}}, square{{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+          double wrong = isp::convex_hull(line).empty() && isp::hull_area(line) == 0 ? 0 : 1;
+          wrong += isp::shared_area(isp::convex_hull(square), isp::convex_hull(line)) == 0 ? 0 : 1;
+          wrong += std::isnan(isp::gamut_ratio(none, none).occupancy_percent) ? 0 : 1;
+          wrong += std::isnan(isp::gamut_ratio(none, none).convex_percent) ? 0 : 1;
           return wrong;
         });
       });

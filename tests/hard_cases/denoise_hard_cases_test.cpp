@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "denoise/line_noise.h"
-#include "denoise/noise_check.h"
+#include "denoise/check/noise_check.h"
+#include "denoise/lines/line_noise.h"
 #include "isp/base/executor.h"
 #include "tests/hard_cases/mosaics.h"
 

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <string_view>
 
-#include "denoise/noise_check.h"
+#include "denoise/check/noise_check.h"
 #include "isp/base/executor.h"
 #include "tests/hard_cases/mosaics.h"
 

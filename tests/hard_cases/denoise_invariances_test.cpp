@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "denoise/temporal.h"
+#include "denoise/temporal/temporal.h"
 #include "tests/hard_cases/mosaics.h"
 #include "tests/reference/temporal_ref.h"
 

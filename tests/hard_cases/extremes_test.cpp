@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "isp/base/matrix3.h"
-#include "isp/model/camera_colour.h"
-#include "isp/model/mesopic.h"
-#include "isp/model/noise_budget.h"
+#include "isp/model/colour/camera_colour.h"
+#include "isp/model/sensor/noise_budget.h"
+#include "isp/model/vision/mesopic.h"
 #include "tests/hard_cases/mosaics.h"
 #include "tests/hard_cases/rendering.h"
 #include "tests/hard_cases/simulated.h"

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "isp/raw/frame_meter.h"
-#include "isp/raw/meter_rows.h"
-#include "isp/raw/thumbnail.h"
+#include "isp/raw/measure/frame_meter.h"
+#include "isp/raw/measure/meter_rows.h"
+#include "isp/raw/measure/thumbnail.h"
 #include "tests/hard_cases/rendering.h"
 #include "tests/hard_cases/simulated.h"
 

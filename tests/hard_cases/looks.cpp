@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "isp/pipeline/develop.h"
-#include "isp/pipeline/live_pipeline.h"
+#include "isp/pipeline/live/live_pipeline.h"
 #include "tests/hard_cases/rec709_camera.h"
 #include "tests/reference/night_look_ref.h"
 #include "tests/reference/raw_to_rgb_ref.h"

@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 #include "tests/hard_cases/hard_case.h"
 #include "tests/hard_cases/rec709_camera.h"
 

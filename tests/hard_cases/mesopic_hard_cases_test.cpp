@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "isp/model/mesopic.h"
-#include "isp/render/eye_rows.h"
-#include "isp/render/eye_tables.h"
+#include "isp/model/vision/mesopic.h"
+#include "isp/render/night/eye_rows.h"
+#include "isp/render/night/eye_tables.h"
 #include "tests/hard_cases/hard_case.h"
 #include "tests/hard_cases/looks.h"
 #include "tests/hard_cases/rec709_camera.h"

@@ -11,8 +11,8 @@
 #include <string>
 #include <utility>
 
-#include "isp/pipeline/live_pipeline.h"
-#include "isp/pipeline/pipeline.h"
+#include "isp/pipeline/live/live_pipeline.h"
+#include "isp/pipeline/render/pipeline.h"
 #include "tests/reference/denoise_ref.h"
 
 namespace lowlux::hard_cases {

@@ -11,9 +11,9 @@
 #include <variant>
 
 #include "isp/pipeline/develop.h"
-#include "isp/pipeline/frame_tiles.h"
-#include "isp/pipeline/pipeline.h"
-#include "isp/pipeline/tile_renderer.h"
+#include "isp/pipeline/render/frame_tiles.h"
+#include "isp/pipeline/render/pipeline.h"
+#include "isp/pipeline/render/tile_renderer.h"
 #include "tests/hard_cases/rendering.h"
 #include "tests/pipeline/night_frames.h"
 

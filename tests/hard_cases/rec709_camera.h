@@ -4,7 +4,7 @@
 #include <functional>
 
 #include "isp/base/frame.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 
 /// A camera whose white-balanced RGB is linear Rec. 709, white 1.
 namespace lowlux::hard_cases {

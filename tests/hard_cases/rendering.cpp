@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "isp/pipeline/develop.h"
-#include "isp/pipeline/live_pipeline.h"
+#include "isp/pipeline/live/live_pipeline.h"
 #include "tests/reference/raw_to_rgb_ref.h"
 #include "tests/support/raw_frames.h"
 

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 #include "tests/hard_cases/hard_case.h"
 
 /// Mosaics through the kernel that makes pictures.

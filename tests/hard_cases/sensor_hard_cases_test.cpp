@@ -8,13 +8,13 @@
 #include <utility>
 #include <vector>
 
-#include "denoise/resaturate.h"
-#include "isp/base/random.h"
-#include "isp/model/camera_matrix.h"
-#include "isp/model/dark_desaturation.h"
-#include "isp/model/photon.h"
+#include "denoise/picture/resaturate.h"
+#include "isp/base/random/random.h"
+#include "isp/model/colour/camera_matrix.h"
+#include "isp/model/colour/dark_desaturation.h"
+#include "isp/model/sensor/photon.h"
 #include "isp/pipeline/develop.h"
-#include "isp/pipeline/live_pipeline.h"
+#include "isp/pipeline/live/live_pipeline.h"
 #include "tests/hard_cases/mosaics.h"
 #include "tests/hard_cases/simulated.h"
 #include "tests/reference/exact_ref.h"

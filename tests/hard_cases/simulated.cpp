@@ -8,9 +8,9 @@
 #include <span>
 #include <utility>
 
-#include "denoise/resaturate.h"
-#include "isp/model/photon.h"
-#include "isp/pipeline/live_pipeline.h"
+#include "denoise/picture/resaturate.h"
+#include "isp/model/sensor/photon.h"
+#include "isp/pipeline/live/live_pipeline.h"
 
 namespace lowlux::hard_cases {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "isp/base/frame.h"
 #include "isp/base/spectrum.h"
-#include "isp/pipeline/live_plan.h"
+#include "isp/pipeline/live/live_plan.h"
 #include "tests/hard_cases/hard_case.h"
 #include "tests/support/raw_frames.h"
 #include "tests/support/synthetic_camera.h"

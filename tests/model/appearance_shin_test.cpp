@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "isp/model/appearance/gamut_map.h"
-#include "isp/model/mesopic.h"
+#include "isp/model/vision/mesopic.h"
 
 namespace lowlux::isp {
 namespace {

@@ -1,11 +1,11 @@
-#include "isp/model/camera_colour.h"
+#include "isp/model/colour/camera_colour.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "isp/model/correlated_colour_temperature.h"
+#include "isp/model/colour/correlated_colour_temperature.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::isp {

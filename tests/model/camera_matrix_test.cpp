@@ -1,4 +1,4 @@
-#include "isp/model/camera_matrix.h"
+#include "isp/model/colour/camera_matrix.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "isp/model/cie_data.h"
-#include "isp/model/spectral_data.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
 
 namespace lowlux::isp {
 namespace {

@@ -1,4 +1,4 @@
-#include "isp/model/chroma_bound.h"
+#include "isp/model/colour/chroma_bound.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/model/chromaticity_cloud.h"
+#include "isp/model/colour/chromaticity_cloud.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <numbers>
 #include <random>
 
-#include "isp/model/cie_data.h"
-#include "isp/model/spectral_data.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::isp {

@@ -1,4 +1,4 @@
-#include "isp/model/cie_data.h"
+#include "isp/model/spectrum/cie_data.h"
 
 #include <gtest/gtest.h>
 

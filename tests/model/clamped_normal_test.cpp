@@ -8,7 +8,7 @@
 
 #include <boost/math/quadrature/gauss.hpp>
 
-#include "isp/model/noise_budget.h"
+#include "isp/model/sensor/noise_budget.h"
 #include "tests/support/sweep.h"
 
 // Two laws of a noise budget near the ends of a range, against quadrature and sums over codes.

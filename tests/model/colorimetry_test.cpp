@@ -1,4 +1,4 @@
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 
 #include <gtest/gtest.h>
 

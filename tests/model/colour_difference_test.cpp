@@ -1,4 +1,4 @@
-#include "isp/model/colour_difference.h"
+#include "isp/model/colour/colour_difference.h"
 
 #include <gtest/gtest.h>
 

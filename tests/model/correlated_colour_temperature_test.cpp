@@ -1,11 +1,11 @@
-#include "isp/model/correlated_colour_temperature.h"
+#include "isp/model/colour/correlated_colour_temperature.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "isp/model/cie_data.h"
+#include "isp/model/spectrum/cie_data.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::isp {

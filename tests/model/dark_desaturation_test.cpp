@@ -1,4 +1,4 @@
-#include "isp/model/dark_desaturation.h"
+#include "isp/model/colour/dark_desaturation.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/model/effect_plan.h"
+#include "isp/model/sensor/effect_plan.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::isp {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "isp/model/appearance/entropy_model.h"
-#include "isp/model/colour_difference.h"
+#include "isp/model/colour/colour_difference.h"
 
 namespace lowlux::isp {
 namespace {

@@ -9,9 +9,9 @@
 #include <limits>
 #include <optional>
 
-#include "isp/base/philox.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/mesopic.h"
+#include "isp/base/random/philox.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/vision/mesopic.h"
 
 namespace lowlux::isp {
 namespace {

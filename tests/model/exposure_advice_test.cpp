@@ -1,4 +1,4 @@
-#include "isp/model/exposure_advice.h"
+#include "isp/model/sensor/exposure_advice.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "isp/model/chroma_bound.h"
-#include "isp/model/noise_budget.h"
+#include "isp/model/colour/chroma_bound.h"
+#include "isp/model/sensor/noise_budget.h"
 
 namespace lowlux::isp {
 namespace {

@@ -1,4 +1,4 @@
-#include "isp/model/given_figures.h"
+#include "isp/model/sensor/given_figures.h"
 
 #include <gtest/gtest.h>
 

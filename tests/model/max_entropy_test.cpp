@@ -1,4 +1,4 @@
-#include "isp/model/max_entropy.h"
+#include "isp/model/spectrum/max_entropy.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <limits>
 #include <utility>
 
-#include "isp/model/cie_table.h"
-#include "isp/model/spectral_data.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
 
 namespace lowlux::isp {
 namespace {

@@ -1,12 +1,12 @@
-#include "isp/model/mesopic.h"
+#include "isp/model/vision/mesopic.h"
 
 #include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 
-#include "isp/model/cie_data.h"
-#include "isp/model/spectral_data.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
 
 namespace lowlux::isp {
 namespace {

@@ -1,4 +1,4 @@
-#include "isp/model/night_eye.h"
+#include "isp/model/vision/night_eye.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "isp/model/noise_budget.h"
+#include "isp/model/sensor/noise_budget.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/model/photon.h"
+#include "isp/model/sensor/photon.h"
 
 #include <gtest/gtest.h>
 

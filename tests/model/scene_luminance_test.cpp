@@ -1,4 +1,4 @@
-#include "isp/model/scene_luminance.h"
+#include "isp/model/sensor/scene_luminance.h"
 
 #include <gtest/gtest.h>
 

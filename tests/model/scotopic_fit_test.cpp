@@ -1,4 +1,4 @@
-#include "isp/model/scotopic_fit.h"
+#include "isp/model/vision/scotopic_fit.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -7,10 +7,10 @@
 
 #include <gtest/gtest.h>
 
-#include "isp/model/camera_matrix.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/mesopic.h"
-#include "isp/model/spectral_data.h"
+#include "isp/model/colour/camera_matrix.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
+#include "isp/model/vision/mesopic.h"
 
 namespace lowlux::isp {
 namespace {

@@ -1,4 +1,4 @@
-#include "isp/model/seeing.h"
+#include "isp/model/vision/seeing.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/model/sensor_db.h"
+#include "isp/model/sensor/sensor_db.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "isp/model/noise_budget.h"
-#include "isp/model/spectral_data.h"
-#include "isp/model/spectral_response.h"
+#include "isp/model/sensor/noise_budget.h"
+#include "isp/model/spectrum/spectral_data.h"
+#include "isp/model/spectrum/spectral_response.h"
 
 namespace lowlux::isp {
 namespace {

@@ -1,4 +1,4 @@
-#include "isp/model/spectral_data.h"
+#include "isp/model/spectrum/spectral_data.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "isp/model/cie_data.h"
-#include "isp/model/cie_table.h"
-#include "isp/model/correlated_colour_temperature.h"
-#include "isp/model/text_table.h"
+#include "isp/model/colour/correlated_colour_temperature.h"
+#include "isp/model/sensor/text_table.h"
+#include "isp/model/spectrum/cie_data.h"
 
 // Check values are those of isp/model/data/SOURCES.md.
 namespace lowlux::isp {

@@ -1,4 +1,4 @@
-#include "isp/model/spectral_divergence.h"
+#include "isp/model/spectrum/spectral_divergence.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "isp/model/spectral_data.h"
+#include "isp/model/spectrum/spectral_data.h"
 
 namespace lowlux::isp {
 namespace {

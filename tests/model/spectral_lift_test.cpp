@@ -1,4 +1,4 @@
-#include "isp/model/spectral_lift.h"
+#include "isp/model/spectrum/spectral_lift.h"
 
 #include <cmath>
 #include <cstdint>
@@ -6,10 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include "isp/model/cie_data.h"
-#include "isp/model/colour_difference.h"
-#include "isp/model/sensor_db.h"
-#include "isp/model/spectral_response.h"
+#include "isp/model/colour/colour_difference.h"
+#include "isp/model/sensor/sensor_db.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_response.h"
 
 namespace lowlux::isp {
 namespace {

@@ -1,4 +1,4 @@
-#include "isp/model/spectral_response.h"
+#include "isp/model/spectrum/spectral_response.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include <numbers>
 #include <string>
 
-#include "isp/model/cie_data.h"
-#include "isp/model/noise_budget.h"
-#include "isp/model/photon.h"
+#include "isp/model/sensor/noise_budget.h"
+#include "isp/model/sensor/photon.h"
+#include "isp/model/spectrum/cie_data.h"
 
 namespace lowlux::isp {
 namespace {

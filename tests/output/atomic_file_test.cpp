@@ -13,7 +13,6 @@
 #include <tuple>
 #include <vector>
 
-#include "isp/output/publish.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux::isp {

@@ -1,4 +1,4 @@
-#include "isp/output/dng_writer.h"
+#include "isp/output/dng/dng_writer.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -14,7 +14,8 @@
 #include <limits>
 #include <sstream>
 
-#include "isp/output/dng_check.h"
+#include "isp/output/dng/dng_check.h"
+#include "isp/output/dng/dng_tags.h"
 #include "tests/support/process.h"
 #include "tests/support/raw_frames.h"
 #include "tests/support/scratch_directory.h"

@@ -1,4 +1,4 @@
-#include "isp/output/icc.h"
+#include "isp/output/picture/icc.h"
 
 #include <gtest/gtest.h>
 #include <lcms2.h>
@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "isp/base/matrix3.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 
 namespace lowlux::isp {
 namespace {

@@ -1,4 +1,4 @@
-#include "isp/output/image_writer.h"
+#include "isp/output/picture/image_writer.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -11,7 +11,7 @@
 
 #include "isp/codec/pfm.h"
 #include "isp/codec/png.h"
-#include "isp/output/icc.h"
+#include "isp/output/picture/icc.h"
 #include "tests/codec/pictures.h"
 #include "tests/support/scratch_directory.h"
 

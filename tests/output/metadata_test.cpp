@@ -1,4 +1,4 @@
-#include "isp/output/metadata.h"
+#include "isp/output/picture/metadata.h"
 
 #include <gtest/gtest.h>
 #include <libexif/exif-data.h>

@@ -1,4 +1,4 @@
-#include "isp/output/orient.h"
+#include "isp/output/picture/orient.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/output/report.h"
+#include "isp/output/report/report.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/output/y4m.h"
+#include "isp/output/picture/y4m.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

@@ -9,7 +9,7 @@
 
 #include "capture/camera/camera_frame.h"
 #include "capture/file/dng_source.h"
-#include "isp/output/dng_writer.h"
+#include "isp/output/dng/dng_writer.h"
 
 namespace lowlux {
 namespace {

@@ -1,4 +1,4 @@
-#include "isp/pipeline/clean_raw.h"
+#include "isp/pipeline/finished/clean_raw.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 #include "tests/pipeline/night_frames.h"
 
 namespace lowlux::isp {

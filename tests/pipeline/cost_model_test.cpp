@@ -1,4 +1,4 @@
-#include "isp/pipeline/cost_model.h"
+#include "isp/pipeline/budget/cost_model.h"
 
 #include <gtest/gtest.h>
 

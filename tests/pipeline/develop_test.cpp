@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "isp/pipeline/pipeline.h"
+#include "isp/pipeline/render/pipeline.h"
 #include "tests/support/frames.h"
 
 namespace lowlux::isp {

@@ -1,4 +1,4 @@
-#include "isp/pipeline/effect_sizes.h"
+#include "isp/pipeline/budget/effect_sizes.h"
 
 #include <gtest/gtest.h>
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <variant>
 
-#include "isp/pipeline/clean_raw.h"
-#include "isp/pipeline/frame_tiles.h"
-#include "isp/pipeline/pipeline.h"
+#include "isp/pipeline/finished/clean_raw.h"
+#include "isp/pipeline/render/frame_tiles.h"
+#include "isp/pipeline/render/pipeline.h"
 #include "tests/pipeline/live_frames.h"
 #include "tests/support/frame_sizes.h"
 #include "tests/support/ramp_frame.h"

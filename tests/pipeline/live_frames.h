@@ -8,7 +8,7 @@
 #include <span>
 #include <utility>
 
-#include "isp/pipeline/live_pipeline.h"
+#include "isp/pipeline/live/live_pipeline.h"
 #include "tests/pipeline/night_frames.h"
 
 /// What the tests of live frames share: the stream that night_frame's frames make, and what is known of them.

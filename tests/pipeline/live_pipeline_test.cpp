@@ -1,4 +1,4 @@
-#include "isp/pipeline/live_pipeline.h"
+#include "isp/pipeline/live/live_pipeline.h"
 
 #include <gtest/gtest.h>
 

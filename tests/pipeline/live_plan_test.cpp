@@ -1,4 +1,4 @@
-#include "isp/pipeline/live_plan.h"
+#include "isp/pipeline/live/live_plan.h"
 
 #include <gtest/gtest.h>
 

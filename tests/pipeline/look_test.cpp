@@ -1,6 +1,6 @@
-#include "isp/pipeline/look.h"
+#include "isp/pipeline/plan/look.h"
 #include "isp/model/appearance/appearance_model.h"
-#include "isp/model/colour_difference.h"
+#include "isp/model/colour/colour_difference.h"
 
 #include <cmath>
 #include <limits>
@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "isp/model/night_eye.h"
+#include "isp/model/vision/night_eye.h"
 #include "isp/pipeline/develop.h"
 #include "isp/render/output_space.h"
 #include "tests/pipeline/night_frames.h"

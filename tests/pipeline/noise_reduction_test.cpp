@@ -5,7 +5,7 @@
 #include <string>
 
 #include "isp/pipeline/develop.h"
-#include "isp/pipeline/pipeline.h"
+#include "isp/pipeline/render/pipeline.h"
 #include "tests/pipeline/night_frames.h"
 
 namespace lowlux::isp {

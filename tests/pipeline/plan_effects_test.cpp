@@ -1,4 +1,4 @@
-#include "isp/pipeline/plan_effects.h"
+#include "isp/pipeline/budget/plan_effects.h"
 
 #include <gtest/gtest.h>
 
@@ -12,11 +12,11 @@
 #include <utility>
 #include <vector>
 
+#include "isp/pipeline/budget/effect_candidates.h"
+#include "isp/pipeline/budget/frame_sample.h"
+#include "isp/pipeline/budget/visible_noise.h"
 #include "isp/pipeline/develop.h"
-#include "isp/pipeline/effect_candidates.h"
-#include "isp/pipeline/frame_sample.h"
-#include "isp/pipeline/plan_regions.h"
-#include "isp/pipeline/visible_noise.h"
+#include "isp/pipeline/plan/plan_regions.h"
 #include "tests/pipeline/night_frames.h"
 #include "tests/support/reference_cost.h"
 

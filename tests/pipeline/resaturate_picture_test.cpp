@@ -1,4 +1,4 @@
-#include "isp/pipeline/resaturate_picture.h"
+#include "isp/pipeline/finished/resaturate_picture.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 
 namespace lowlux::isp {
 namespace {

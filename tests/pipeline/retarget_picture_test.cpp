@@ -1,5 +1,5 @@
-#include "isp/pipeline/retarget_picture.h"
-#include "isp/pipeline/display_target.h"
+#include "isp/pipeline/finished/retarget_picture.h"
+#include "isp/pipeline/finished/display_target.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <utility>
 #include <variant>
 
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {

@@ -4,9 +4,9 @@
 #include <cstring>
 #include <string>
 
-#include "isp/pipeline/frame_tiles.h"
-#include "isp/pipeline/pipeline.h"
-#include "isp/pipeline/pipeline_memory.h"
+#include "isp/pipeline/render/frame_tiles.h"
+#include "isp/pipeline/render/pipeline.h"
+#include "isp/pipeline/render/pipeline_memory.h"
 #include "tests/pipeline/night_frames.h"
 #include "tests/support/count_malloc.h"
 

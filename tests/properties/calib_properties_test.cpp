@@ -7,9 +7,9 @@
 #include <random>
 #include <vector>
 
-#include "calib/colour_fit.h"
-#include "calib/dark_series.h"
-#include "isp/model/cie_data.h"
+#include "calib/chart/colour_fit.h"
+#include "calib/dark/dark_series.h"
+#include "isp/model/spectrum/cie_data.h"
 #include "tests/properties/draws.h"
 
 namespace lowlux::calib {

@@ -5,7 +5,7 @@
 #include <array>
 
 #include "denoise/denoiser.h"
-#include "denoise/temporal.h"
+#include "denoise/temporal/temporal.h"
 #include "isp/base/executor.h"
 #include "tests/properties/draws.h"
 

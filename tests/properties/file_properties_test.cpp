@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "calib/linear_estimators.h"
-#include "calib/noise_line.h"
-#include "calib/profile_io.h"
+#include "calib/dark/dark_fit.h"
+#include "calib/picture/noise_line.h"
+#include "calib/profile/profile_io.h"
 #include "capture/file/dng_source.h"
-#include "isp/output/dng_writer.h"
+#include "isp/output/dng/dng_writer.h"
 #include "tests/properties/draws.h"
 #include "tests/support/raw_frames.h"
 #include "tests/support/scratch_directory.h"

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "denoise/line_noise.h"
-#include "denoise/noise_check.h"
+#include "denoise/check/noise_check.h"
+#include "denoise/lines/line_noise.h"
 #include "isp/base/executor.h"
 #include "tests/denoise/frames.h"
 #include "tests/properties/draws.h"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <variant>
 
-#include "isp/pipeline/live_pipeline.h"
+#include "isp/pipeline/live/live_pipeline.h"
 #include "tests/pipeline/live_frames.h"
 #include "tests/properties/draws.h"
 

@@ -9,8 +9,8 @@
 
 #include "isp/model/appearance/appearance_model.h"
 #include "isp/model/appearance/seen_scene.h"
-#include "isp/model/colour_difference.h"
-#include "isp/model/mesopic.h"
+#include "isp/model/colour/colour_difference.h"
+#include "isp/model/vision/mesopic.h"
 #include "tests/properties/draws.h"
 
 namespace lowlux::isp {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "isp/adapter/stage_budget.h"
-#include "isp/pipeline/cost_model.h"
-#include "isp/pipeline/effect_candidates.h"
-#include "isp/pipeline/plan_effects.h"
+#include "isp/pipeline/budget/cost_model.h"
+#include "isp/pipeline/budget/effect_candidates.h"
+#include "isp/pipeline/budget/plan_effects.h"
 #include "tests/pipeline/night_frames.h"
 #include "tests/properties/draws.h"
 #include "tests/support/reference_cost.h"

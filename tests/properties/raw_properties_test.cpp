@@ -9,9 +9,9 @@
 
 #include "isp/base/executor.h"
 #include "isp/raw/corrections.h"
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
+#include "isp/raw/measure/thumbnail.h"
 #include "isp/raw/repair.h"
-#include "isp/raw/thumbnail.h"
 #include "isp/raw/to_linear.h"
 #include "tests/properties/draws.h"
 

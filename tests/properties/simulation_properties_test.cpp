@@ -12,8 +12,8 @@
 #include "capture/synthetic/readout.h"
 #include "capture/synthetic/sensor_sim.h"
 #include "isp/base/executor.h"
-#include "isp/base/random.h"
-#include "isp/model/photon.h"
+#include "isp/base/random/random.h"
+#include "isp/model/sensor/photon.h"
 #include "tests/properties/draws.h"
 
 namespace lowlux {

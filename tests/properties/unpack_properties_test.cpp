@@ -6,8 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "isp/base/raw_format.h"
-#include "isp/base/unpack.h"
+#include "isp/base/packed/raw_format.h"
 #include "tests/adapter/stage_frames.h"
 #include "tests/properties/draws.h"
 

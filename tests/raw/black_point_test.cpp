@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "isp/raw/masked_black.h"
+#include "isp/raw/measure/masked_black.h"
 #include "tests/support/frames.h"
 
 namespace lowlux::isp {

@@ -1,4 +1,4 @@
-#include "isp/raw/frame_meter.h"
+#include "isp/raw/measure/frame_meter.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "isp/base/unpack.h"
+#include "isp/base/packed/raw_format.h"
 #include "isp/raw/black_point.h"
 #include "tests/support/guarded_memory.h"
 

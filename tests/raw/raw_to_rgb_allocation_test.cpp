@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 #include "tests/raw/raw_to_rgb_support.h"
 #include "tests/support/count_allocations.h"
 

@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 #include "tests/raw/raw_to_rgb_support.h"
 
 namespace lowlux {

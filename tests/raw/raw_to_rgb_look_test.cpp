@@ -8,7 +8,7 @@
 
 #include "isp/base/executor.h"
 #include "isp/base/look_grid.h"
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 #include "tests/raw/raw_to_rgb_support.h"
 #include "tests/reference/raw_to_rgb_ref.h"
 

@@ -6,7 +6,7 @@
 
 #include "isp/base/cfa.h"
 #include "isp/base/plane.h"
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 #include "tests/reference/raw_to_rgb_ref.h"
 
 /// What the tests of RawToRgb share: random frames in rows that are longer than the picture, and a transform.

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 #include "tests/raw/raw_to_rgb_support.h"
 #include "tests/support/only_target.h"
 

@@ -1,4 +1,4 @@
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/raw/thumbnail.h"
+#include "isp/raw/measure/thumbnail.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isp/raw/tile_noise.h"
+#include "isp/raw/measure/tile_noise.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "isp/base/plane.h"
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 #include "tests/support/tile_columns.h"
 
 namespace lowlux::isp {

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <vector>
 
-#include "denoise/layout.h"
-#include "denoise/residual_shares.h"
+#include "denoise/spatial/layout.h"
+#include "denoise/spatial/residual_shares.h"
 #include "tests/reference/denoise_ref_blocks.h"
 #include "tests/reference/nl_bayes_ref.h"
 

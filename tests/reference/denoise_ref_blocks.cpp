@@ -5,8 +5,8 @@
 #include <numbers>
 #include <vector>
 
-#include "denoise/layout.h"
-#include "denoise/residual_shares.h"
+#include "denoise/spatial/layout.h"
+#include "denoise/spatial/residual_shares.h"
 
 namespace lowlux::reference::denoising {
 

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "isp/base/matrix3.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 
 /// Formulas in 50 decimal digits, each rounded once, to the nearest double. Written from their sources; nothing is
 /// shared with the library.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "isp/model/night_eye.h"
+#include "isp/model/vision/night_eye.h"
 
 namespace lowlux::reference {
 namespace {

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "isp/base/image.h"
-#include "isp/render/night_look.h"
+#include "isp/render/night/night_look.h"
 
-/// What isp/render/night_look.h promises, in double and without tables: CIE 191 solved for every cell.
+/// What isp/render/night/night_look.h promises, in double and without tables: CIE 191 solved for every cell.
 namespace lowlux::reference {
 
 /// A plane in double, row by row; places beyond its ends count as the nearest inside.

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <utility>
 
-#include "denoise/layout.h"
-#include "denoise/residual_shares.h"
+#include "denoise/spatial/layout.h"
+#include "denoise/spatial/residual_shares.h"
 
 namespace lowlux::reference::denoising {
 namespace {

@@ -6,9 +6,9 @@
 #include "isp/base/cfa.h"
 #include "isp/base/look_grid.h"
 #include "isp/base/tone_table.h"
-#include "isp/raw/raw_to_rgb.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 
-/// What isp/raw/raw_to_rgb.h promises, one pixel at a time, in double, written to be read against its sources.
+/// What isp/raw/kernel/raw_to_rgb.h promises, one pixel at a time, in double, written to be read against its sources.
 namespace lowlux::reference {
 
 using Rgb = std::array<double, 3>;

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "isp/render/retarget_table.h"
+#include "isp/render/retarget/retarget_table.h"
 
-/// What isp/render/retarget_table.h promises, written to be read against its source.
+/// What isp/render/retarget/retarget_table.h promises, written to be read against its source.
 namespace lowlux::reference {
 
 /// Tetrahedral interpolation, its six cases spelled out (Kasson, Nin, Plouffe & Hafner 1995, table 1). @param code 0..1

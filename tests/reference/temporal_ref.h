@@ -1,7 +1,7 @@
 #pragma once
 
-#include "denoise/temporal.h"
-#include "denoise/temporal_thresholds.h"
+#include "denoise/temporal/temporal.h"
+#include "denoise/temporal/temporal_thresholds.h"
 
 namespace lowlux::reference {
 

@@ -3,12 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isp/base/raw_format.h"
+#include "isp/base/packed/raw_format.h"
 
 namespace lowlux::reference {
 
 /// The code of column x of a row that begins at `row`, put together bit by bit from where the format has each: what
-/// isp/base/unpack.h says, in plain arithmetic.
+/// isp/base/packed/raw_format.h says, in plain arithmetic.
 std::uint16_t unpacked_code(const RawFormat& format, const std::byte* row, int x);
 
 }  // namespace lowlux::reference

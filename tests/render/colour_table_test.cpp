@@ -1,5 +1,5 @@
 #include "isp/render/colour_table.h"
-#include "isp/model/colour_difference.h"
+#include "isp/model/colour/colour_difference.h"
 
 #include <gtest/gtest.h>
 
@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "isp/base/philox.h"
+#include "isp/base/random/philox.h"
 #include "isp/model/appearance/entropy_model.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/spectral_data.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
 #include "isp/render/colour_table_rows.h"
 #include "tests/reference/colour_table_ref.h"
 #include "tests/support/only_target.h"

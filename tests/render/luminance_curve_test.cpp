@@ -1,4 +1,4 @@
-#include "isp/render/luminance_curve.h"
+#include "isp/render/retarget/luminance_curve.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "isp/model/contrast_sensitivity.h"
+#include "isp/model/vision/seeing.h"
 
 namespace lowlux::isp {
 namespace {

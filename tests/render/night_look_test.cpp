@@ -1,4 +1,4 @@
-#include "isp/render/night_look.h"
+#include "isp/render/night/night_look.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,10 +11,10 @@
 #include <gtest/gtest.h>
 
 #include "isp/base/executor.h"
-#include "isp/model/contrast_sensitivity.h"
-#include "isp/model/night_eye.h"
-#include "isp/render/eye_rows.h"
-#include "isp/render/grid.h"
+#include "isp/model/vision/night_eye.h"
+#include "isp/model/vision/seeing.h"
+#include "isp/render/night/eye_rows.h"
+#include "isp/render/night/grid.h"
 #include "tests/reference/night_look_ref.h"
 
 namespace lowlux::isp {

@@ -1,4 +1,4 @@
-#include "isp/render/retarget_optimum.h"
+#include "isp/render/retarget/retarget_optimum.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 
 #include "isp/model/appearance/shin.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {

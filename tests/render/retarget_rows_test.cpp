@@ -1,4 +1,4 @@
-#include "isp/render/retarget_rows.h"
+#include "isp/render/retarget/retarget_rows.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "isp/base/executor.h"
-#include "isp/render/retarget_table.h"
+#include "isp/render/retarget/retarget_table.h"
 #include "tests/reference/retarget_ref.h"
 
 namespace lowlux::isp {

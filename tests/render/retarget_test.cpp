@@ -1,4 +1,4 @@
-#include "isp/render/retarget.h"
+#include "isp/render/retarget/retarget.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "isp/model/appearance/shin.h"
-#include "isp/model/colour_difference.h"
+#include "isp/model/colour/colour_difference.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "isp/model/correlated_colour_temperature.h"
+#include "isp/model/colour/correlated_colour_temperature.h"
 #include "tests/support/sweep.h"
 #include "tests/support/synthetic_chart.h"
 

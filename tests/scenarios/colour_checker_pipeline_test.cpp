@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <numeric>
 
-#include "isp/model/colorimetry.h"
-#include "isp/model/colour_difference.h"
+#include "isp/model/colour/colorimetry.h"
+#include "isp/model/colour/colour_difference.h"
 #include "isp/pipeline/develop.h"
 #include "isp/render/output_space.h"
 #include "tests/support/synthetic_chart.h"

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "isp/model/camera_colour.h"
-#include "isp/model/colorimetry.h"
-#include "isp/model/colour_difference.h"
+#include "isp/model/colour/camera_colour.h"
+#include "isp/model/colour/colorimetry.h"
+#include "isp/model/colour/colour_difference.h"
 #include "tests/support/synthetic_chart.h"
 
 namespace lowlux::isp {

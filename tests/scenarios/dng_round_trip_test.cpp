@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "capture/file/dng_source.h"
-#include "isp/output/dng_writer.h"
+#include "isp/output/dng/dng_writer.h"
 #include "tests/codec/pictures.h"
 #include "tests/support/raw_frames.h"
 #include "tests/support/scratch_directory.h"

@@ -1,4 +1,4 @@
-#include "isp/model/exposure_advice.h"
+#include "isp/model/sensor/exposure_advice.h"
 
 #include <gtest/gtest.h>
 
@@ -11,10 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "isp/model/camera_colour.h"
-#include "isp/model/camera_matrix.h"
-#include "isp/model/chroma_bound.h"
-#include "isp/model/noise_budget.h"
+#include "isp/model/colour/camera_colour.h"
+#include "isp/model/colour/camera_matrix.h"
+#include "isp/model/colour/chroma_bound.h"
+#include "isp/model/sensor/noise_budget.h"
 #include "tests/support/sensor_frames.h"
 #include "tests/support/synthetic_camera.h"
 

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <span>
 
-#include "denoise/noise_check.h"
+#include "denoise/check/noise_check.h"
 #include "isp/base/executor.h"
 #include "tests/sensor_bench/picture_raw.h"
 

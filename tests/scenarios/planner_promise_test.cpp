@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "isp/bench/seen_difference.h"
 #include "isp/pipeline/develop.h"
 #include "tests/scenarios/planner_scene.h"
+#include "tests/scenarios/seen_difference.h"
 
 namespace lowlux::isp {
 namespace {

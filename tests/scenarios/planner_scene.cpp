@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 #include "tests/support/reference_cost.h"
 
 namespace lowlux::test {

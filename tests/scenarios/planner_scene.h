@@ -3,8 +3,8 @@
 #include <cstdint>
 
 #include "isp/base/executor.h"
-#include "isp/bench/bench_raw.h"
 #include "isp/pipeline/plan.h"
+#include "tests/scenarios/bench_raw.h"
 
 namespace lowlux::test {
 

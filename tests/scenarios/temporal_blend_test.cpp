@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "isp/pipeline/noise_reducer.h"
+#include "isp/pipeline/render/noise_reducer.h"
 #include "tests/sensor_bench/picture_raw.h"
 
 namespace lowlux::isp {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "isp/raw/tile_noise.h"
+#include "isp/raw/measure/tile_noise.h"
 #include "tests/sensor_bench/picture_raw.h"
 #include "tests/support/tile_columns.h"
 

@@ -17,9 +17,9 @@
 #include "capture/synthetic/scene.h"
 #include "capture/synthetic/sensor_sim.h"
 #include "isp/codec/exr.h"
-#include "isp/model/effect_plan.h"
-#include "isp/model/spectral_lift.h"
-#include "isp/model/spectral_response.h"
+#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/spectrum/spectral_lift.h"
+#include "isp/model/spectrum/spectral_response.h"
 
 namespace lowlux::test {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "isp/base/executor.h"
-#include "isp/model/effect_plan.h"
+#include "isp/model/sensor/effect_plan.h"
 
 namespace lowlux::test {
 

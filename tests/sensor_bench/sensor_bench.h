@@ -6,7 +6,7 @@
 #include "capture/synthetic/sensor_sim.h"
 #include "isp/base/frame.h"
 #include "isp/base/sensor.h"
-#include "isp/model/noise_budget.h"
+#include "isp/model/sensor/noise_budget.h"
 
 namespace lowlux::test {
 

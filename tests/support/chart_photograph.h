@@ -19,7 +19,7 @@ struct ChartPhotograph {
   double keystone = 0;    // how much larger its lower edge is than its upper
   bool mirrored = false;  // left and right
   double exposure = 0.8;  // fraction of the range that a perfect diffuser's largest channel reaches
-  double light_x = 0;     // LightGradient of calib/colour_fit.h
+  double light_x = 0;     // LightGradient of calib/chart/colour_fit.h
   double light_y = 0;
   double read_noise_dn = 2;
   double electrons_per_dn = 4;  // photon noise

@@ -2,7 +2,7 @@
 
 #include <cerrno>
 
-#include "isp/base/sanitized.h"
+#include "isp/base/memory.h"
 #include "tests/support/count_allocations.h"
 
 // What does not come by operator new is counted too, where no sanitizer has these functions.

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 
 namespace lowlux::test {
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "capture/camera/v4l2_system.h"
+#include "capture/v4l2/v4l2_device.h"
 
 namespace lowlux::test {
 

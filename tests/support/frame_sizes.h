@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 
 /// Frame sizes that tests go through: drawn over the whole range, and those of real cameras.
 namespace lowlux::test {

@@ -11,7 +11,7 @@
 
 #include "isp/base/cfa.h"
 #include "isp/base/plane.h"
-#include "isp/base/random.h"
+#include "isp/base/random/random.h"
 #include "tests/support/frame_sizes.h"
 
 /// Frames of any size whose noise-free values are known everywhere, made fast enough for 150 megapixels: a neutral

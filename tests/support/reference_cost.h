@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "isp/pipeline/reference_cost.h"
+#include "isp/pipeline/budget/cost_model.h"
 
 namespace lowlux::test {
 

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "capture/synthetic/synthetic_source.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/sensor_db.h"
-#include "isp/model/spectral_response.h"
+#include "isp/model/sensor/sensor_db.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_response.h"
 
 namespace lowlux::test {
 

@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "isp/base/spectrum.h"
-#include "isp/model/camera_matrix.h"
-#include "isp/model/cie_data.h"
-#include "isp/model/spectral_data.h"
+#include "isp/model/colour/camera_matrix.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
 
 namespace lowlux::test {
 namespace {

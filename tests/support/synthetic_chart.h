@@ -7,7 +7,7 @@
 #include "isp/base/frame.h"
 #include "isp/base/matrix3.h"
 #include "isp/base/result.h"
-#include "isp/model/colorimetry.h"
+#include "isp/model/colour/colorimetry.h"
 
 namespace lowlux::test {
 

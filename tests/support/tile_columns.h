@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "isp/base/plane.h"
-#include "isp/raw/tile_noise.h"
+#include "isp/raw/measure/tile_noise.h"
 
 namespace lowlux::test {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "isp/model/appearance/seen_scene.h"
-#include "isp/model/mesopic.h"
+#include "isp/model/vision/mesopic.h"
 
 namespace lowlux::isp {
 namespace {

@@ -7,9 +7,9 @@
 #include "isp/base/matrix3.h"
 #include "isp/base/result.h"
 #include "isp/model/appearance/appearance_model.h"
-#include "isp/model/colorimetry.h"
-#include "isp/model/max_entropy.h"
-#include "isp/model/spectral_data.h"
+#include "isp/model/colour/colorimetry.h"
+#include "isp/model/spectrum/max_entropy.h"
+#include "isp/model/spectrum/spectral_data.h"
 
 namespace lowlux::isp {
 

@@ -5,7 +5,7 @@
 
 #include "isp/model/appearance/lightness_match.h"
 #include "isp/model/appearance/seen_scene.h"
-#include "isp/model/mesopic.h"
+#include "isp/model/vision/mesopic.h"
 
 namespace lowlux::isp {
 

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "isp/model/appearance/seen_scene.h"
-#include "isp/model/mesopic.h"
+#include "isp/model/vision/mesopic.h"
 
 namespace lowlux::isp {
 namespace {

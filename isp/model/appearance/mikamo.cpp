@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "isp/model/appearance/seen_scene.h"
-#include "isp/model/mesopic.h"
-#include "isp/model/spectral_data.h"
-#include "isp/model/spectral_lift.h"
+#include "isp/model/spectrum/spectral_data.h"
+#include "isp/model/spectrum/spectral_lift.h"
+#include "isp/model/vision/mesopic.h"
 
 namespace lowlux::isp {
 

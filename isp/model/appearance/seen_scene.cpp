@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
-#include "isp/base/number_text.h"
-#include "isp/model/mesopic.h"
+#include "isp/base/text.h"
+#include "isp/model/vision/mesopic.h"
 
 namespace lowlux::isp {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "isp/model/appearance/bracketed_root.h"
 #include "isp/model/appearance/seen_scene.h"
-#include "isp/model/mesopic.h"
+#include "isp/model/vision/mesopic.h"
 
 namespace lowlux::isp {
 namespace {

@@ -8,8 +8,8 @@
 #include <optional>
 #include <utility>
 
-#include "isp/base/number_text.h"
-#include "isp/model/mesopic.h"
+#include "isp/base/text.h"
+#include "isp/model/vision/mesopic.h"
 
 namespace lowlux::isp {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "isp/model/appearance/seen_scene.h"
-#include "isp/model/night_eye.h"
+#include "isp/model/vision/night_eye.h"
 
 namespace lowlux::isp {
 namespace {

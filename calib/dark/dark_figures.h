@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "isp/base/cfa.h"
+#include "isp/base/estimate.h"
+#include "isp/base/plane.h"
+
+namespace lowlux::calib {
+
+/// Dark current of R, G and B pixels that are not hot, at one temperature. Negative values are scatter about none.
+struct DarkCurrent {
+  std::optional<double> temperature_c;  // none if the frames do not state it
+  std::array<Estimate, 3> current_e_per_s{};
+};
+
+/// D(T) = current * 2^((T - temperature) / doubling), one doubling for the three channels.
+struct DarkTemperatureLaw {
+  double temperature_c = 0;
+  std::array<Estimate, 3> current_e_per_s{};
+  Estimate doubling_c;
+  double reduced_chi_square = 0;
+  int degrees_of_freedom = 0;
+};
+
+/// A pixel whose mean lies more than 8 standard deviations of one frame above its site's median.
+struct HotPixel {
+  int x = 0;  // active pixels
+  int y = 0;
+  double excess_e_per_s = 0;
+};
+
+/// Mean of one site's pixels in one group, and how far it lies from the fit.
+struct DarkPoint {
+  int group = 0;
+  int site = 0;
+  double mean_dn = 0;
+  Estimate residual_dn;  // its error is that of the residual, made pixel by pixel
+};
+
+/// Figures of one gain setting from darks of several exposures.
+struct DarkSeries {
+  PerSite<Estimate> pedestal_dn{};    // mean code of no charge
+  std::vector<DarkCurrent> currents;  // by rising temperature
+  std::optional<DarkTemperatureLaw> law;
+  /// R : G : B of the dark current where it is largest, sum 1. None if their sum is below five of its standard errors.
+  std::optional<std::array<Estimate, 3>> chromaticity;
+  Estimate dsnu;              // deviation of the pixels' dark current relative to its mean; 0 if there is no current
+  double row_noise_e = 0;     // temporal
+  double column_noise_e = 0;  // fixed
+  std::vector<HotPixel> hot;  // row by row, found in the group with most dark charge
+  std::optional<double> hot_temperature_c;  // of that group, where it is stated
+  double excluded_share = 0;                // of all pixels, from all means
+  double largest_correction_dn = 0;         // of a mean, for what excluding pixels does to it
+  std::optional<Estimate>
+      read_noise_e;               // of a pixel about its row, from the group with least dark charge; none if lost
+  std::vector<DarkPoint> points;  // four for each group
+  double reduced_chi_square = 0;  // mean square of residual / error: about 1 where mean is linear in time
+  int degrees_of_freedom = 0;
+  Plane<float> pedestal_map_dn;      // every pixel's own, outliers included
+  Plane<float> current_map_e_per_s;  // at the temperature where the dark current is largest
+};
+
+}  // namespace lowlux::calib

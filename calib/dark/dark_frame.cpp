@@ -1,0 +1,393 @@
+#include "calib/dark/dark_frame.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "calib/dark/dark_dose.h"
+#include "calib/dark/dark_image.h"
+#include "calib/dark/light_in_darks.h"
+
+namespace lowlux::calib {
+namespace {
+
+using Groups = std::span<const DarkGroup>;
+
+constexpr double near_white = 0.05;  // of the range
+constexpr double most_noise = 5;     // times the noise of a pixel's site
+constexpr double most_unknown = 1.0 / 16;
+constexpr double clipped_share = 1e-3;
+constexpr double least_doubling_c = 2, most_doubling_c = 30;
+
+/// All that is known before pixels are touched.
+struct Job {
+  Groups groups;
+  std::vector<PerSite<DarkSite>> sites;  // of each group
+  std::vector<double> hot_gain_dn;       // of each group
+  DarkWeights weights;
+  std::optional<PerSite<double>> pedestal_dn;
+};
+
+Result<void> check_request(const DarkRequest& r) {
+  if (!(r.noise_share > 0 && r.noise_share <= 1)) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("the share of noise darks may add is {:g}, expected above 0 and at most 1", r.noise_share));
+  }
+  if (r.doubling_c && !(*r.doubling_c >= least_doubling_c && *r.doubling_c <= most_doubling_c)) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("dark current doubling over {:g} degrees, expected {:g} to {:g}", *r.doubling_c,
+                            least_doubling_c, most_doubling_c));
+  }
+  return {};
+}
+
+Result<FrameSetting> check_frames(Groups groups, const RawDn& picture) {
+  auto setting = setting_of(picture);
+  if (!setting) return setting;
+  if (groups.empty()) return fail(ErrorCode::insufficient, "there are no dark frames");
+  if (!setting->exposure_s) {
+    return fail(ErrorCode::insufficient, "the picture does not state its exposure time, which darks are matched by");
+  }
+  for (const DarkGroup& group : groups) {
+    if (!group.setting.exposure_s) {
+      return fail(ErrorCode::insufficient, "a dark frame does not state its exposure time, which darks are matched by");
+    }
+    auto same = check_same_camera(*setting, group.setting, "the dark frame");
+    if (same) continue;
+    same.error().message += "; the first frame is the picture: take darks with its camera, size and ISO";
+    return tl::make_unexpected(same.error());
+  }
+  return setting;
+}
+
+double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
+
+std::vector<DarkLevel> levels_of(const Job& job) {
+  std::vector<DarkLevel> out;
+  out.reserve(job.groups.size());
+  for (std::size_t g = 0; g < job.groups.size(); ++g) {
+    const DarkGroup& group = job.groups[g];
+    DarkLevel level{{*group.setting.exposure_s, group.setting.temperature_c}, group.frames};
+    for (const DarkSite& site : job.sites[g]) {
+      level.level_dn += site.spread.median / 4;
+      level.variance_dn2 += site.noise_dn2 / (4 * static_cast<double>(group.mean_dn.size()) * group.frames);
+    }
+    out.push_back(level);
+  }
+  return out;
+}
+
+Result<Job> weigh(Groups groups, const FrameSetting& picture, const DarkRequest& request) {
+  Job job{.groups = groups, .sites = {}, .hot_gain_dn = {}, .weights = {}, .pedestal_dn = request.pedestal_dn};
+  job.sites.reserve(groups.size());
+  job.hot_gain_dn.reserve(groups.size());
+  for (const DarkGroup& group : groups) {
+    job.sites.push_back(sites_of(group));
+    job.hot_gain_dn.push_back(hot_pixel_gain_dn(group, job.sites.back()));
+  }
+  const DarkScaling known{
+      .doubling_c = request.doubling_c,
+      .pedestal_dn = request.pedestal_dn ? std::optional(mean_of(*request.pedestal_dn)) : std::nullopt,
+      .pedestal_from_picture = request.masked_dn.has_value()};
+  auto weights = weigh_darks(levels_of(job), {*picture.exposure_s, picture.temperature_c}, known);
+  if (!weights) return tl::make_unexpected(weights.error());
+  job.weights = std::move(*weights);
+  if (job.weights.of_pedestal != 0 && request.masked_dn) {
+    job.pedestal_dn.emplace();
+    for (int site = 0; site < 4; ++site) {
+      double level = (*request.masked_dn)[site];
+      for (std::size_t g = 0; g < groups.size(); ++g) {
+        level -= job.weights.of_level[g] * job.sites[g][site].spread.median;
+      }
+      (*job.pedestal_dn)[site] = level / job.weights.of_pedestal;
+    }
+  }
+  return job;
+}
+
+Plane<float> weighted_sum(const Job& job) {
+  Plane<float> out(job.groups[0].mean_dn.width(), job.groups[0].mean_dn.height());
+  for (int y = 0; y < out.height(); ++y) {
+    for (int x = 0; x < out.width(); ++x) {
+      double sum = job.weights.of_pedestal != 0 ? job.weights.of_pedestal * (*job.pedestal_dn)[site_of(x, y)] : 0;
+      for (std::size_t g = 0; g < job.groups.size(); ++g) {
+        if (job.weights.of_level[g] != 0) sum += job.weights.of_level[g] * job.groups[g].mean_dn.at(x, y);
+      }
+      out.at(x, y) = static_cast<float>(sum);
+    }
+  }
+  return out;
+}
+
+/// Temporal noise of a site. The picture's is linear in its charge as the mean is, and at least that of any group times
+/// the ratio of their charges, which is at least the group's weight.
+DarkNoise noise_of(const Job& job, int site) {
+  DarkNoise out{.rows_known = true};
+  double interpolated = 0, least = 0;
+  for (std::size_t g = 0; g < job.groups.size(); ++g) {
+    const double w = job.weights.of_level[g], noise = job.sites[g][site].noise_dn2;
+    if (w == 0) continue;
+    const DarkGroup& group = job.groups[g];
+    interpolated += w * noise;
+    least = std::max(least, std::min(1.0, job.weights.scale) * noise);
+    out.estimate_dn2 += w * w * noise / group.frames;
+    out.rows_dn2 += w * w * std::max(0.0, group.row_variance_dn2[site]) / group.frames;
+    out.rows_known = out.rows_known && group.frames > 1;
+  }
+  out.picture_dn2 = job.weights.of_pedestal == 0 && interpolated > 0 ? interpolated : least;
+  return out;
+}
+
+/// A pixel's noise in the picture less its dark: measured, or what its charge makes expect if that is more.
+double pixel_noise(const Job& job, int x, int y) {
+  double out = 0;
+  for (std::size_t g = 0; g < job.groups.size(); ++g) {
+    const double w = std::fabs(job.weights.of_level[g]);
+    if (w == 0 || job.groups[g].frames < 2) continue;
+    const DarkSite& site = job.sites[g][site_of(x, y)];
+    const double charge = std::max(0.0, job.groups[g].mean_dn.at(x, y) - site.spread.median);
+    const double expected = site.noise_dn2 + job.hot_gain_dn[g] * charge;
+    out += (w + w * w / job.groups[g].frames) * std::max<double>(job.groups[g].variance_dn2.at(x, y), expected);
+  }
+  return out;
+}
+
+double site_noise(const Job& job, int site) {
+  double out = 0;
+  for (std::size_t g = 0; g < job.groups.size(); ++g) {
+    const double w = std::fabs(job.weights.of_level[g]);
+    out += (w + w * w / job.groups[g].frames) * job.sites[g][site].noise_dn2;
+  }
+  return out;
+}
+
+Result<PixelMask> unknown_pixels(const Job& job, const RawDn& picture, DarkFrame& out) {
+  PixelMask mask(out.dn.width(), out.dn.height());
+  PerSite<double> limit_dn2{};
+  for (int site = 0; site < 4; ++site) limit_dn2[site] = most_noise * most_noise * site_noise(job, site);
+  const double white = *std::ranges::min_element(picture.white_dn);
+  const auto full = [&](int x, int y) {
+    for (std::size_t g = 0; g < job.groups.size(); ++g) {
+      const double level = job.sites[g][site_of(x, y)].spread.median;
+      const double limit = white - near_white * std::max(0.0, white - level);
+      if (job.weights.of_level[g] != 0 && job.groups[g].mean_dn.at(x, y) >= limit) return true;
+    }
+    return false;
+  };
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) {
+      const double limit = limit_dn2[site_of(x, y)];
+      mask.at(x, y) = full(x, y) || (limit > 0 && pixel_noise(job, x, y) > limit) ? 1 : 0;
+    }
+  }
+  const auto unknown = std::count(mask.data(), mask.data() + mask.size(), std::uint8_t{1});
+  const double share = static_cast<double>(unknown) / static_cast<double>(mask.size());
+  if (share > most_unknown) {
+    return fail(
+        ErrorCode::malformed,
+        fmt::format("{:.3g} % of the darks' pixels are saturated or too noisy to subtract, at most {:.3g} % may; "
+                    "are these dark frames? Take shorter or colder ones",
+                    100 * share, 100 * most_unknown));
+  }
+  out.unknown.reserve(static_cast<std::size_t>(unknown));
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) {
+      if (mask.at(x, y) != 0) out.unknown.push_back({x, y, 1, 1});
+    }
+  }
+  return mask;
+}
+
+void describe(const Job& job, DarkFrame& out) {
+  for (std::size_t g = 0; g < job.groups.size(); ++g) {
+    if (job.weights.of_level[g] == 0) continue;
+    out.frames += job.groups[g].frames;
+    ++out.settings;
+    const double zero = *std::ranges::max_element(job.groups[g].share_at_zero);
+    if (zero > clipped_share) {
+      out.warnings.push_back(
+          fmt::format("{:.2g} % of the darks' samples are cut off at code 0: their mean is too high", 100 * zero));
+    }
+  }
+  if (out.frames == 1) {
+    out.warnings.emplace_back(
+        "a single dark cannot tell its pattern from its noise: hot pixels and columns are taken from it, no more");
+  }
+  out.scale = job.weights.scale;
+  out.doubling_c = job.weights.doubling_c.value_or(0);
+  out.warnings.insert(out.warnings.end(), job.weights.warnings.begin(), job.weights.warnings.end());
+}
+
+void settle_noise(const Job& job, double share, const PixelMask& unknown, DarkFrame& out) {
+  for (int site = 0; site < 4; ++site) {
+    const DarkNoise noise = noise_of(job, site);
+    const KeptPattern kept = limit_noise(out.dn, site, noise, share, unknown);
+    out.mean_dn[site] = kept.mean_dn;
+    out.noise_std_dn[site] = std::sqrt(noise.picture_dn2);
+    out.added_variance_dn2[site] = kept.added_dn2;
+    out.noise_share += noise.picture_dn2 > 0 ? kept.added_dn2 / noise.picture_dn2 / 4 : 0;
+    out.pattern_share = std::min(out.pattern_share, kept.pixel_share);
+  }
+  if (out.noise_share > share) {
+    out.warnings.push_back(
+        fmt::format("hot pixels alone add {:.2g} of the picture's variance in the dark, {:.2g} was "
+                    "allowed: more darks would add less",
+                    out.noise_share, share));
+  }
+}
+
+}  // namespace
+
+Result<DarkFrame> make_dark_frame(Groups groups, const RawDn& picture, const DarkRequest& request) {
+  if (auto good = check_request(request); !good) return tl::make_unexpected(good.error());
+  const auto setting = check_frames(groups, picture);
+  if (!setting) return tl::make_unexpected(setting.error());
+  const auto job = weigh(groups, *setting, request);
+  if (!job) return tl::make_unexpected(job.error());
+  DarkFrame out;
+  describe(*job, out);
+  out.dn = weighted_sum(*job);
+  const auto unknown = unknown_pixels(*job, picture, out);
+  if (!unknown) return tl::make_unexpected(unknown.error());
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    if (job->weights.of_level[g] == 0) continue;
+    if (auto even = check_even_dark(groups[g], job->sites[g], job->pedestal_dn); !even) {
+      return tl::make_unexpected(even.error());
+    }
+  }
+  settle_noise(*job, request.noise_share, *unknown, out);
+  if (job->weights.of_pedestal != 0) out.masked_dn = request.masked_dn;
+  return out;
+}
+
+DarkFrame at_masked_level(const DarkFrame& dark, const PerSite<double>& masked_dn) {
+  DarkFrame out{.dn = dark.dn.clone(),
+                .unknown = dark.unknown,
+                .mean_dn = dark.mean_dn,
+                .noise_std_dn = dark.noise_std_dn,
+                .added_variance_dn2 = dark.added_variance_dn2,
+                .frames = dark.frames,
+                .settings = dark.settings,
+                .scale = dark.scale,
+                .doubling_c = dark.doubling_c,
+                .noise_share = dark.noise_share,
+                .pattern_share = dark.pattern_share,
+                .masked_dn = masked_dn,
+                .warnings = dark.warnings};
+  PerSite<double> change_dn{};
+  for (int site = 0; site < 4; ++site) {
+    change_dn[site] = masked_dn[site] - (*dark.masked_dn)[site];
+    out.mean_dn[site] += change_dn[site];
+  }
+  for (int y = 0; y < out.dn.height(); ++y) {
+    for (int x = 0; x < out.dn.width(); ++x) out.dn.at(x, y) += static_cast<float>(change_dn[site_of(x, y)]);
+  }
+  return out;
+}
+
+namespace {
+
+constexpr double stands_out = 5;  // standard deviations
+constexpr double least_deviation_dn = 1e-3;
+constexpr double rows_share = 0.25;  // of the allowed noise, at most
+
+struct Lines {
+  std::vector<double> sum, n;
+  explicit Lines(int count) : sum(static_cast<std::size_t>(count)), n(sum) {}
+  double deviation(int i, double mean) const { return n[i] > 0 ? sum[i] / n[i] - mean : 0; }
+  /// Mean square of the deviations, and mean number of pixels in a line.
+  double variance(double mean) const {
+    double squares = 0, lines = 0;
+    for (std::size_t i = 0; i < n.size(); ++i) {
+      if (n[i] == 0) continue;
+      squares += std::pow(deviation(static_cast<int>(i), mean), 2);
+      ++lines;
+    }
+    return lines > 1 ? squares / (lines - 1) : 0;
+  }
+  double pixels_in_line() const {
+    double pixels = 0, lines = 0;
+    for (const double count : n) pixels += count, lines += count > 0;
+    return lines > 0 ? pixels / lines : 1;
+  }
+};
+
+/// A site's pixels taken apart: mean, columns, rows, and what is left.
+struct Parts {
+  double mean = 0;
+  Lines columns, rows;
+  double variance = 0;  // of what is left, in pixels that do not stand out
+  double inside = 0;    // share of pixels that do not
+  double rest(const Plane<float>& dn, int x, int y) const {
+    return dn.at(x, y) - mean - columns.deviation(x, mean) - rows.deviation(y, mean);
+  }
+};
+
+template <class Visit>
+void for_each_of_site(const Plane<float>& dn, int site, const PixelMask& unknown, const Visit& visit) {
+  for (int y = site >> 1; y < dn.height(); y += 2) {
+    for (int x = site & 1; x < dn.width(); x += 2) {
+      if (unknown.at(x, y) == 0) visit(x, y);
+    }
+  }
+}
+
+Parts take_apart(const Plane<float>& dn, int site, const PixelMask& unknown) {
+  const SiteSpread spread = spread_of(dn, site, least_deviation_dn);
+  const double cut = stands_out * std::max(spread.deviation, least_deviation_dn);
+  Parts out{.columns = Lines(dn.width()), .rows = Lines(dn.height())};
+  double sum = 0, n = 0, all = 0, squares = 0;
+  for_each_of_site(dn, site, unknown, [&](int x, int y) {
+    ++all;
+    const double v = dn.at(x, y);
+    if (std::fabs(v - spread.median) > cut) return;
+    ++n, sum += v;
+    out.columns.sum[x] += v, ++out.columns.n[x];
+    out.rows.sum[y] += v, ++out.rows.n[y];
+  });
+  if (n == 0) return out;
+  out.mean = sum / n;
+  for_each_of_site(dn, site, unknown, [&](int x, int y) {
+    if (std::fabs(dn.at(x, y) - spread.median) <= cut) squares += std::pow(out.rest(dn, x, y), 2);
+  });
+  out.variance = squares / n;
+  out.inside = n / all;
+  return out;
+}
+
+double wiener(double pattern, double noise) { return pattern > 0 ? pattern / (pattern + std::max(noise, 0.0)) : 0; }
+
+}  // namespace
+
+KeptPattern limit_noise(Plane<float>& dn, int site, const DarkNoise& noise, double share, const PixelMask& unknown) {
+  const double allowed = share * noise.picture_dn2;
+  const Parts parts = take_apart(dn, site, unknown);
+  if (noise.estimate_dn2 <= allowed) return {parts.mean, noise.estimate_dn2, 1};
+  const double white = std::max(0.0, noise.estimate_dn2 - noise.rows_dn2);
+  const double column_noise = white / parts.columns.pixels_in_line();
+  const double row_noise = white / parts.rows.pixels_in_line() + noise.rows_dn2;
+  const double of_columns = wiener(parts.columns.variance(parts.mean) - column_noise, column_noise);
+  double of_rows = 0;
+  if (noise.rows_known) {
+    of_rows = std::min(wiener(parts.rows.variance(parts.mean) - row_noise, row_noise),
+                       std::sqrt(rows_share * allowed / row_noise));
+  }
+  const double out = 1 - parts.inside;
+  const double lines = of_columns * of_columns * column_noise + of_rows * of_rows * row_noise;
+  const double left = std::max(0.0, allowed - lines - out * noise.estimate_dn2);
+  const double of_pixels = std::min(wiener(parts.variance - white, white), std::sqrt(left / (parts.inside * white)));
+  const double cut = stands_out * std::sqrt(parts.variance);
+  for_each_of_site(dn, site, unknown, [&](int x, int y) {
+    const double rest = parts.rest(dn, x, y);
+    if (std::fabs(rest) > cut) return;
+    dn.at(x, y) = static_cast<float>(parts.mean + of_columns * parts.columns.deviation(x, parts.mean) +
+                                     of_rows * parts.rows.deviation(y, parts.mean) + of_pixels * rest);
+  });
+  return {parts.mean, lines + parts.inside * of_pixels * of_pixels * white + out * noise.estimate_dn2, of_pixels};
+}
+
+}  // namespace lowlux::calib

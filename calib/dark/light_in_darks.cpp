@@ -1,0 +1,145 @@
+#include "calib/dark/light_in_darks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+namespace lowlux::calib {
+namespace {
+
+constexpr double certain = 5;             // standard errors
+constexpr double least_gradient = 0.25;   // of the dark charge, from edge to edge
+constexpr double far_off = 2, off = 0.5;  // standard deviations of a pixel
+constexpr double far_off_range = 1e-3;
+constexpr double below = 4;  // standard deviations
+constexpr double most_below = 0.01;
+
+PixelMask outliers_of(const DarkGroup& group, const PerSite<DarkSite>& sites) {
+  PixelMask mask(group.mean_dn.width(), group.mean_dn.height());
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) {
+      const SiteSpread& s = sites[site_of(x, y)].spread;
+      // A gradient widens the spread itself; what lies far out of it is a hot pixel.
+      mask.at(x, y) = std::fabs(group.mean_dn.at(x, y) - s.median) > certain * std::max(s.deviation, 0.5) ? 1 : 0;
+    }
+  }
+  return mask;
+}
+
+}  // namespace
+
+Result<void> check_even_dark(const DarkGroup& group, const PerSite<DarkSite>& sites,
+                             const std::optional<PerSite<double>>& pedestal_dn) {
+  const double one = 1;
+  const PixelMask mask = outliers_of(group, sites);
+  for (int site = 0; site < 4; ++site) {
+    const ImageFigures f = figures_of({{&group, 1}, {&one, 1}}, mask, site);
+    const double charge = pedestal_dn ? std::max(0.0, f.mean - (*pedestal_dn)[site]) : 0;
+    const double floor = std::max(std::sqrt(sites[site].noise_dn2), least_gradient * charge);
+    for (const auto& [change, error] : {std::pair(f.change_x, f.error_x), std::pair(f.change_y, f.error_y)}) {
+      if (std::fabs(change) <= std::max(certain * error, floor)) continue;
+      return fail(ErrorCode::malformed,
+                  fmt::format("the darks of {:g} s change by {:.3g} DN across the frame, at most {:.3g} DN are dark "
+                              "current's; light gets in, or the sensor glows; cover camera and viewfinder and take "
+                              "them again",
+                              *group.setting.exposure_s, std::fabs(change), floor));
+    }
+  }
+  return {};
+}
+
+Result<std::optional<std::string>> check_masked_level(const RawDn& picture, const PerSite<double>& masked_dn,
+                                                      const DarkFrame& dark) {
+  double worst = 0;
+  for (int site = 0; site < 4; ++site) {
+    const double distance = dark.mean_dn[site] - masked_dn[site];
+    const double range = *std::ranges::min_element(picture.white_dn) - masked_dn[site];
+    if (std::fabs(distance) > std::max(far_off * dark.noise_std_dn[site], far_off_range * range)) {
+      return fail(
+          ErrorCode::malformed,
+          fmt::format("the darks lie {:.3g} DN {} the picture's masked pixels; {}; take them again, covered, as "
+                      "warm as the picture",
+                      std::fabs(distance), distance > 0 ? "above" : "below",
+                      distance > 0 ? "light gets in, or they are warmer" : "they are colder"));
+    }
+    if (std::fabs(distance) > off * dark.noise_std_dn[site] && std::fabs(distance) > std::fabs(worst)) worst = distance;
+  }
+  if (worst == 0) return std::nullopt;
+  return fmt::format("the darks lie {:+.3g} DN off the picture's masked pixels", worst);
+}
+
+Result<void> check_below_picture(const RawDn& picture, const DarkFrame& dark) {
+  std::int64_t count = 0;
+  PerSite<double> margin{};
+  for (int site = 0; site < 4; ++site) margin[site] = below * dark.noise_std_dn[site] + 1;
+  for (int y = 0; y < dark.dn.height(); ++y) {
+    const std::uint16_t* codes = picture.dn.row(picture.active.y + y) + picture.active.x;
+    for (int x = 0; x < dark.dn.width(); ++x) count += codes[x] < dark.dn.at(x, y) - margin[site_of(x, y)];
+  }
+  const double share = static_cast<double>(count) / static_cast<double>(dark.dn.size());
+  if (share <= most_below) return {};
+  return fail(ErrorCode::malformed,
+              fmt::format("{:.2g} % of the picture's pixels lie more than {:g} standard deviations below the darks, at "
+                          "most {:g} % may; the darks hold light or are warmer than the picture; take them again, "
+                          "covered, as warm as the picture",
+                          100 * share, below, 100 * most_below));
+}
+
+namespace {
+
+constexpr double least_deviation_dn = 1e-3;
+constexpr double far_out = 5;  // standard deviations: left out of means
+constexpr double hot = 8;      // standard deviations
+constexpr std::size_t fewest_hot = 16;
+
+double noise_of_differences(const Plane<float>& dn, int site) {
+  Plane<float> difference(dn.width() - 2, dn.height());
+  for (int y = 0; y < difference.height(); ++y) {
+    for (int x = 0; x < difference.width(); ++x) difference.at(x, y) = dn.at(x + 2, y) - dn.at(x, y);
+  }
+  const double deviation = spread_of(difference, site, least_deviation_dn).deviation;
+  return deviation * deviation / 2;
+}
+
+}  // namespace
+
+PerSite<DarkSite> sites_of(const DarkGroup& group) {
+  PerSite<DarkSite> out{};
+  for (int site = 0; site < 4; ++site) {
+    const SiteSpread spread = spread_of(group.mean_dn, site, least_deviation_dn);
+    double sum = 0, n = 0;
+    for (int y = site >> 1; y < group.mean_dn.height(); y += 2) {
+      for (int x = site & 1; x < group.mean_dn.width(); x += 2) {
+        if (std::fabs(group.mean_dn.at(x, y) - spread.median) > far_out * spread.deviation) continue;
+        sum += group.variance_dn2.at(x, y);
+        ++n;
+      }
+    }
+    out[site] = {spread, group.frames > 1 && n > 0 ? sum / n : noise_of_differences(group.mean_dn, site)};
+  }
+  return out;
+}
+
+double hot_pixel_gain_dn(const DarkGroup& group, const PerSite<DarkSite>& sites) {
+  if (group.frames < 2) return 0;
+  std::vector<double> gains;
+  for (int y = 0; y < group.mean_dn.height(); ++y) {
+    for (int x = 0; x < group.mean_dn.width(); ++x) {
+      const DarkSite& site = sites[site_of(x, y)];
+      const double excess = group.mean_dn.at(x, y) - site.spread.median;
+      if (excess * excess <= hot * hot * site.noise_dn2 || excess <= 0) continue;
+      gains.push_back((group.variance_dn2.at(x, y) - site.noise_dn2) / excess);
+    }
+  }
+  if (gains.size() < fewest_hot) return 0;
+  const auto middle = gains.begin() + static_cast<std::ptrdiff_t>(gains.size() / 2);
+  std::ranges::nth_element(gains, middle);
+  const double degrees = group.frames - 1;
+  return std::max(0.0, *middle / std::pow(1 - 2 / (9 * degrees), 3));
+}
+
+}  // namespace lowlux::calib

@@ -1,0 +1,129 @@
+#include "calib/flat/pair_statistics.h"
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+namespace lowlux::calib {
+namespace {
+
+// Shading of the light is slow: within a block it is nothing beside the pattern of single pixels.
+constexpr int block_sites = 32;
+constexpr int block_pixels = 2 * block_sites;
+
+/// Sums of codes: whole numbers, so that nothing cancels. 2^28 pixels of 16 bits stay below 2^60.
+struct BlockSums {
+  std::int64_t pixels = 0, a = 0, b = 0, ab = 0;
+};
+
+struct SiteSums {
+  std::int64_t pixels = 0, a = 0, b = 0, difference_squared = 0, at_white = 0, at_zero = 0;
+  int rows = 0;
+  double row_squares = 0;      // sum over rows of (sum of b - a)^2 / pixels
+  double within_products = 0;  // sum over blocks of the products about the block's means
+  std::int64_t within_degrees = 0;
+};
+
+using SiteBlocks = std::array<std::vector<BlockSums>, 4>;
+
+struct Codes {
+  PlaneView<const std::uint16_t> a, b;
+};
+
+struct RowSite {
+  int y;
+  int parity;  // of its columns
+  double white_dn;
+};
+
+void add_row(const Codes& codes, const RowSite& which, SiteSums& sums, std::vector<BlockSums>& blocks) {
+  const std::uint16_t* a = codes.a.row(which.y);
+  const std::uint16_t* b = codes.b.row(which.y);
+  std::int64_t row_difference = 0, row_pixels = 0;
+  for (int x0 = 0; x0 < codes.a.width; x0 += block_pixels) {
+    BlockSums& block = blocks[x0 / block_pixels];
+    for (int x = x0 + which.parity; x < std::min(codes.a.width, x0 + block_pixels); x += 2) {
+      const std::int64_t va = a[x], vb = b[x], d = vb - va;
+      ++block.pixels;
+      block.a += va;
+      block.b += vb;
+      block.ab += va * vb;
+      ++row_pixels;
+      row_difference += d;
+      sums.difference_squared += d * d;
+      sums.at_white += (static_cast<double>(va) >= which.white_dn) + (static_cast<double>(vb) >= which.white_dn);
+      sums.at_zero += (va == 0) + (vb == 0);
+    }
+  }
+  ++sums.rows;
+  const auto difference = static_cast<double>(row_difference);
+  sums.row_squares += difference * difference / static_cast<double>(row_pixels);
+}
+
+void close_blocks(SiteBlocks& blocks, PerSite<SiteSums>& sums) {
+  for (int site = 0; site < 4; ++site) {
+    for (BlockSums& block : blocks[site]) {
+      if (block.pixels > 0) {
+        const double mean_a = static_cast<double>(block.a) / static_cast<double>(block.pixels);
+        sums[site].within_products += static_cast<double>(block.ab) - mean_a * static_cast<double>(block.b);
+        sums[site].within_degrees += block.pixels - 1;
+      }
+      sums[site].pixels += block.pixels;
+      sums[site].a += block.a;
+      sums[site].b += block.b;
+      block = {};
+    }
+  }
+}
+
+// Analysis of variance with rows as groups of equal size.
+SiteStatistics statistics_of(const SiteSums& s) {
+  const auto n = static_cast<double>(s.pixels), rows = static_cast<double>(s.rows);
+  const auto difference = static_cast<double>(s.b - s.a);
+  const double total = static_cast<double>(s.difference_squared) - difference * difference / n;
+  const double between = s.row_squares - difference * difference / n;
+  const double within = (total - between) / (n - rows);
+  SiteStatistics out;
+  out.pixels = s.pixels;
+  out.rows = s.rows;
+  out.mean_dn = static_cast<double>(s.a + s.b) / (2 * n);
+  out.drift_dn = difference / n;
+  out.variance_dn2 = total / (2 * (n - 1));
+  out.row_variance_dn2 = (between / (rows - 1) - within) / (2 * n / rows);
+  out.covariance_dn2 = s.within_products / static_cast<double>(s.within_degrees);
+  out.share_at_white = static_cast<double>(s.at_white) / (2 * n);
+  out.share_at_zero = static_cast<double>(s.at_zero) / (2 * n);
+  return out;
+}
+
+PlaneView<const std::uint16_t> active_view(const RawDn& raw) {
+  return raw.dn.view().crop(raw.active.x, raw.active.y, raw.active.width, raw.active.height);
+}
+
+}  // namespace
+
+Result<PairStatistics> measure_pair(const RawDn& a, const RawDn& b) {
+  auto setting = setting_of(a);
+  if (!setting) return tl::make_unexpected(setting.error());
+  const auto second = setting_of(b);
+  if (!second) return tl::make_unexpected(second.error());
+  if (auto same = check_same_setting(*setting, *second, "the second frame of a pair"); !same) {
+    return tl::make_unexpected(same.error());
+  }
+  const Codes codes{active_view(a), active_view(b)};
+  PerSite<SiteSums> sums{};
+  SiteBlocks blocks;
+  for (auto& row_of_blocks : blocks) row_of_blocks.resize((codes.a.width + block_pixels - 1) / block_pixels);
+  for (int y = 0; y < codes.a.height; ++y) {
+    for (int parity = 0; parity < 2; ++parity) {
+      const int site = site_of(parity, y);
+      add_row(codes, {y, parity, setting->white_dn[channel_of_site(*setting, site)]}, sums[site], blocks[site]);
+    }
+    if (y % block_pixels == block_pixels - 1 || y == codes.a.height - 1) close_blocks(blocks, sums);
+  }
+  PairStatistics out{std::move(*setting), {}};
+  for (int site = 0; site < 4; ++site) out.site[site] = statistics_of(sums[site]);
+  return out;
+}
+
+}  // namespace lowlux::calib

@@ -1,0 +1,172 @@
+#include "calib/flat/transfer_curve.h"
+#include "isp/base/sensor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace lowlux::calib {
+namespace {
+
+constexpr double linear_share = 0.7;     // of saturation: EMVA 1288, section 6.6
+constexpr double largest_drift = 0.01;   // of the signal
+constexpr double clipped_share = 1e-3;   // clipping 0.1 % of a normal law takes 0.7 % off its variance
+constexpr double fallen_variance = 0.8;  // of the largest: no scatter of a variance from 1000 pixels falls so far
+constexpr double same_level = 1.05;      // ratio of signals below which two pairs are one level
+constexpr int fewest_levels = 4;
+constexpr int fewest_pixels = 1000;  // of a site: variances then scatter by 4.5 %
+constexpr double dithered_variance_dn2 = 0.25;
+
+using Points = std::vector<TransferPoint>;
+using Pairs = std::span<const PairStatistics>;
+
+Result<void> check_darks(Pairs darks) {
+  if (darks.empty()) {
+    return fail(ErrorCode::insufficient, "there are no darks; photon transfer needs two frames with the lens covered");
+  }
+  for (std::size_t i = 0; i < darks.size(); ++i) {
+    const auto what = fmt::format("pair {} of the darks", i + 1);
+    if (auto same = check_same_setting(darks.front().setting, darks[i].setting, what); !same) return same;
+    for (const SiteStatistics& s : darks[i].site) {
+      if (s.pixels < fewest_pixels) {
+        return fail(ErrorCode::insufficient,
+                    fmt::format("a CFA site has {} pixels, photon transfer needs {}; use a larger "
+                                "part of the frame",
+                                s.pixels, fewest_pixels));
+      }
+      if (s.share_at_zero <= clipped_share) continue;
+      return fail(ErrorCode::insufficient,
+                  fmt::format("{:.2g} % of the samples of {} are at code 0, so their noise is cut off; raise the "
+                              "camera's black level (offset)",
+                              100 * s.share_at_zero, what));
+    }
+  }
+  return {};
+}
+
+Result<void> check_drift(const SiteStatistics& s, double signal_dn, int pair, double row_variance_dn2) {
+  const double error2 = 2 * s.variance_dn2 / static_cast<double>(s.pixels) + 2 * row_variance_dn2 / s.rows;
+  if (std::fabs(s.drift_dn) > largest_drift * signal_dn && std::fabs(s.drift_dn) > 5 * std::sqrt(error2)) {
+    return fail(
+        ErrorCode::invalid_argument,
+        fmt::format("the light of pair {} of the flats drifts by {:.2g} % between its frames, at most {:g} % is "
+                    "allowed; let the lamp warm up or expose for whole periods of its flicker",
+                    pair + 1, 100 * s.drift_dn / signal_dn, 100 * largest_drift));
+  }
+  return {};
+}
+
+Result<Points> points_of(Pairs pairs, const JoinedDarks& darks, bool are_flats) {
+  Points out;
+  for (int i = 0; i < static_cast<int>(pairs.size()); ++i) {
+    for (int site = 0; site < 4; ++site) {
+      const SiteStatistics& s = pairs[i].site[site];
+      const double signal = are_flats ? s.mean_dn - darks.mean_dn[site] : 0;
+      if (are_flats) {
+        if (!(signal > 0)) {
+          return fail(ErrorCode::invalid_argument,
+                      fmt::format("pair {} of the flats is not brighter than the darks ({:.4g} DN against {:.4g} DN)",
+                                  i + 1, s.mean_dn, darks.mean_dn[site]));
+        }
+        auto steady = check_drift(s, signal, i, darks.scatter.row_variance_dn2);
+        if (!steady) return tl::make_unexpected(steady.error());
+      }
+      out.push_back({site, are_flats ? i : -1, signal, s.variance_dn2 - quantisation_dn2, static_cast<double>(s.pixels),
+                     static_cast<double>(s.rows)});
+    }
+  }
+  return out;
+}
+
+TransferPeak peak_of(const Points& flats, Pairs pairs, int site) {
+  TransferPeak peak;
+  double largest = -std::numeric_limits<double>::infinity();
+  for (const TransferPoint& p : flats) {
+    if (p.site != site || p.variance_dn2 <= largest) continue;
+    largest = p.variance_dn2;
+    peak.signal_dn = p.signal_dn;
+  }
+  double brightest = 0;
+  for (const TransferPoint& p : flats) {
+    if (p.site != site) continue;
+    brightest = std::max(brightest, p.signal_dn);
+    const bool fallen = p.signal_dn > peak.signal_dn && p.variance_dn2 < fallen_variance * largest;
+    peak.reached |= fallen || pairs[p.pair].site[site].share_at_white > clipped_share;
+  }
+  if (!peak.reached) peak.signal_dn = brightest;
+  return peak;
+}
+
+bool is_linear(const TransferPoint& p, const TransferPeak& peak) {
+  return !peak.reached || p.signal_dn <= linear_share * peak.signal_dn;
+}
+
+int count_levels(const Points& points, int site) {
+  std::vector<double> signals;
+  for (const TransferPoint& p : points) {
+    if (p.site == site && p.pair >= 0) signals.push_back(p.signal_dn);
+  }
+  std::sort(signals.begin(), signals.end());
+  int levels = 0;
+  double last = 0;
+  for (const double signal : signals) {
+    if (signal <= same_level * last) continue;
+    ++levels;
+    last = signal;
+  }
+  return levels;
+}
+
+}  // namespace
+
+Result<JoinedDarks> join_darks(Pairs darks) {
+  if (auto good = check_darks(darks); !good) return tl::make_unexpected(good.error());
+  JoinedDarks out;
+  out.scatter.pairs = static_cast<double>(darks.size());
+  const double share = 1 / out.scatter.pairs;
+  for (const PairStatistics& pair : darks) {
+    for (int site = 0; site < 4; ++site) {
+      const SiteStatistics& s = pair.site[site];
+      out.mean_dn[site] += share * s.mean_dn;
+      out.spatial_dn2[site] += share * s.covariance_dn2;
+      out.variance_dn2 += share * s.variance_dn2 / 4;
+      out.scatter.row_variance_dn2 += share * s.row_variance_dn2 / 4;
+    }
+  }
+  out.scatter.row_variance_dn2 = std::max(0.0, out.scatter.row_variance_dn2);
+  out.scatter.dark_variance_dn2 = std::max(0.0, out.variance_dn2 - quantisation_dn2);
+  return out;
+}
+
+Result<TransferCurve> curve_of(Pairs dark_pairs, Pairs flats, const JoinedDarks& darks, bool under_dithered) {
+  TransferCurve out;
+  for (std::size_t i = 0; i < flats.size(); ++i) {
+    const auto what = fmt::format("pair {} of the flats", i + 1);
+    const auto same = check_same_camera(dark_pairs.front().setting, flats[i].setting, what);
+    if (!same) return tl::make_unexpected(same.error());
+  }
+  auto points = points_of(flats, darks, true);
+  if (!points) return tl::make_unexpected(points.error());
+  out.flats = std::move(*points);
+  for (int site = 0; site < 4; ++site) out.peak[site] = peak_of(out.flats, flats, site);
+  for (const TransferPoint& p : out.flats) {
+    if (is_linear(p, out.peak[p.site]) && !(under_dithered && p.variance_dn2 < dithered_variance_dn2))
+      out.linear.push_back(p);
+  }
+  for (int site = 0; site < 4; ++site) out.levels = std::min(out.levels, count_levels(out.linear, site));
+  if (out.levels < fewest_levels) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("the flats hold {} levels of light in the linear range, up to {:g} % of saturation; photon "
+                            "transfer needs {} that differ by 5 % or more; add darker flats",
+                            out.levels, 100 * linear_share, fewest_levels));
+  }
+  if (under_dithered) return out;
+  const auto dark_points = points_of(dark_pairs, darks, false);
+  if (!dark_points) return tl::make_unexpected(dark_points.error());
+  out.linear.insert(out.linear.end(), dark_points->begin(), dark_points->end());
+  return out;
+}
+
+}  // namespace lowlux::calib

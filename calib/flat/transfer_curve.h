@@ -1,0 +1,42 @@
+#pragma once
+
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "calib/flat/pair_statistics.h"
+#include "calib/flat/photon_transfer_fit.h"
+#include "isp/base/cfa.h"
+#include "isp/base/result.h"
+
+namespace lowlux::calib {
+
+/// All pairs of darks as one.
+struct JoinedDarks {
+  PerSite<double> mean_dn{};
+  PerSite<double> spatial_dn2{};
+  double variance_dn2 = 0;  // temporal, of all sites, quantisation included
+  DarkScatter scatter;
+};
+
+/// Where a site's variance is largest; `reached` if it falls beyond or codes end there, else the brightest flats.
+struct TransferPeak {
+  double signal_dn = 0;
+  bool reached = false;
+};
+
+struct TransferCurve {
+  std::vector<TransferPoint> flats;  // all
+  PerSite<TransferPeak> peak{};
+  std::vector<TransferPoint> linear;             // flats of the linear range, and the darks where they are dithered
+  int levels = std::numeric_limits<int>::max();  // in `linear`, of the site that has fewest
+};
+
+/// Darks that may be joined: one setting, not clipped. Errors: see fit_photon_transfer.
+Result<JoinedDarks> join_darks(std::span<const PairStatistics> darks);
+
+/// Variance against mean. Errors: see fit_photon_transfer.
+Result<TransferCurve> curve_of(std::span<const PairStatistics> dark_pairs, std::span<const PairStatistics> flats,
+                               const JoinedDarks& darks, bool under_dithered);
+
+}  // namespace lowlux::calib

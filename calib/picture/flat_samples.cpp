@@ -1,0 +1,294 @@
+#include "calib/picture/flat_samples.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+#include <vector>
+
+namespace lowlux::calib {
+namespace {
+
+constexpr int most_groups = 24;            // of one site
+constexpr double least_degrees = 24 * 24;  // of freedom in a group: its variance is known to 6 %
+constexpr double most_clipped = 0.75;      // of a group's pixels: beyond, its variance tells of the law's tail only
+
+constexpr double most_step = 3;  // standard deviations of the noise, between a sample and its surroundings
+
+/// Sum over the samples of one group.
+struct Sum {
+  double n = 0, mean = 0, high = 0, high_n = 0, middle = 0;
+};
+
+NoisePoint point_of(const Sum& sum, const DetailCount& details, const ClipRange& clip, double mean_below) {
+  return {sum.mean / sum.n, sum.high / sum.high_n / mean_below, sum.high_n * details.high * details.independent_share,
+          clip};
+}
+
+std::span<const NoiseSample> of_site(const NoiseSamples& samples, int site) {
+  const auto [first, last] = std::equal_range(
+      samples.sample.begin(), samples.sample.end(), NoiseSample{.site = static_cast<std::uint8_t>(site)},
+      [](const NoiseSample& a, const NoiseSample& b) { return a.site < b.site; });
+  return {first, last};
+}
+
+/// Cuts a span into groups of even size and calls fn(group).
+template <class Fn>
+void for_each_group(std::span<const NoiseSample> all, int groups, const Fn& fn) {
+  for (int g = 0; g < groups; ++g) {
+    const std::size_t first = all.size() * g / groups, last = all.size() * (g + 1) / groups;
+    if (last > first) fn(all.subspan(first, last - first));
+  }
+}
+
+int groups_for(std::size_t samples, int details) {
+  return std::clamp(static_cast<int>(static_cast<double>(samples) * details / least_degrees), 1, most_groups);
+}
+
+struct Limits {
+  double low = 0, middle = 0, high = 0;  // of an energy relative to the line
+  double mean_below = 1;
+};
+
+Limits limits_of(const DetailCount& details, const FlatRule& rule) {
+  Limits out;
+  out.low = chi_square_quantile(details.low, rule.low_share) / details.low;
+  out.middle = details.middle > 0 ? chi_square_quantile(details.middle, rule.middle_share) / details.middle : INFINITY;
+  const double high = chi_square_quantile(details.high, rule.high_share);
+  out.high = high / details.high;
+  out.mean_below = chi_square_mean_below(details.high, high);
+  return out;
+}
+
+/// read_variance_dn2 of one line, tabulated where the lower bound matters.
+class ReadVariance {
+ public:
+  ReadVariance(const NoiseLine& line, const ClipRange& clip) : line_(line), clip_(clip) {
+    // From where 6 standard deviations of gain x + offset above the bound end: x = g + sqrt(g^2 + 36 v), g = 18 gain
+    const double gain = std::max(line.gain_dn_per_e.value, 0.0), half = 18 * gain;
+    const double at_bound = std::max(gain * clip.low_dn + line.offset_dn2.value, 1e-6);
+    step_dn_ = (half + std::sqrt(half * half + 36 * at_bound)) / (static_cast<double>(table_.size()) - 1);
+    for (std::size_t i = 0; i < table_.size(); ++i) {
+      table_[i] = read_variance_dn2(line, clip.low_dn + step_dn_ * static_cast<double>(i), clip);
+    }
+  }
+  double operator()(double mean_dn) const {
+    const double place = std::max(mean_dn - clip_.low_dn, 0.0) / step_dn_;
+    const auto i = static_cast<std::size_t>(std::min(place, 1e9));
+    if (i + 1 >= table_.size()) return read_variance_dn2(line_, mean_dn, clip_);
+    return std::lerp(table_[i], table_[i + 1], place - static_cast<double>(i));
+  }
+
+ private:
+  NoiseLine line_;
+  ClipRange clip_;
+  double step_dn_ = 1;
+  std::array<double, 129> table_{};
+};
+
+}  // namespace
+
+double chi_square_probability(int degrees, double x) {
+  if (!(x > 0)) return 0;
+  // P(a + 1, t) = P(a, t) - t^a exp(-t) / Gamma(a + 1), from P(1/2, t) = erf(sqrt t) or P(1, t) = 1 - exp(-t)
+  const double t = x / 2;
+  double a = degrees % 2 == 0 ? 1 : 0.5;
+  double p = degrees % 2 == 0 ? -std::expm1(-t) : std::erf(std::sqrt(t));
+  for (; 2 * a < degrees; a += 1) p -= std::exp(a * std::log(t) - t) / std::tgamma(a + 1);
+  return std::clamp(p, 0.0, 1.0);
+}
+
+double chi_square_quantile(int degrees, double probability) {
+  double low = 0, high = 20.0 * degrees + 100;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    (chi_square_probability(degrees, middle) < probability ? low : high) = middle;
+  }
+  return (low + high) / 2;
+}
+
+double chi_square_mean_below(int degrees, double x) {
+  return chi_square_probability(degrees + 2, x) / chi_square_probability(degrees, x);
+}
+
+void sort_by_surroundings(NoiseSamples& samples) {
+  std::sort(samples.sample.begin(), samples.sample.end(), [](const NoiseSample& a, const NoiseSample& b) {
+    return a.site != b.site ? a.site < b.site : a.around_dn < b.around_dn;
+  });
+}
+
+FlatPoints flat_points(const NoiseSamples& samples, const NoiseLine& line, const PerSite<ClipRange>& clip,
+                       const FlatRule& rule) {
+  const Limits limit = limits_of(samples.details, rule);
+  FlatPoints out;
+  Sum all;
+  std::vector<NoiseSample> flat;
+  for (int site = 0; site < 4; ++site) {
+    flat.clear();
+    const ReadVariance variance(line, clip[site]);
+    for (const NoiseSample& s : of_site(samples, site)) {
+      const double model = variance(s.around_dn);
+      const double step = s.mean_dn - s.around_dn;
+      if (step * step > most_step * most_step * model * samples.details.step_share) continue;
+      if (s.low_dn2 > limit.low * model || s.middle_dn2 > limit.middle * model) continue;
+      all.n += 1;
+      all.high += s.high_dn2 / model;
+      all.middle += s.middle_dn2 / model;
+      flat.push_back(s);
+    }
+    for_each_group(flat, groups_for(flat.size(), samples.details.high), [&](std::span<const NoiseSample> group) {
+      Sum sum;
+      for (const NoiseSample& s : group) {
+        sum.n += 1;
+        sum.mean += s.mean_dn;
+        if (s.high_dn2 > limit.high * variance(s.around_dn)) continue;
+        sum.high += s.high_dn2;
+        sum.high_n += 1;
+      }
+      if (sum.high_n * samples.details.high < least_degrees / 2) return;
+      const NoisePoint point = point_of(sum, samples.details, clip[site], limit.mean_below);
+      if (clipped_share(line, point.mean_dn, clip[site]) > most_clipped) return;
+      out.points.push_back(point);
+    });
+  }
+  out.samples = all.n;
+  out.mean_high = all.n > 0 ? all.high / all.n : 0;
+  out.mean_middle = all.n > 0 ? all.middle / all.n : 0;
+  return out;
+}
+
+FlatPoints quietest_points(const NoiseSamples& samples, const PerSite<ClipRange>& clip, double share) {
+  FlatPoints out;
+  Sum all;
+  for (int site = 0; site < 4; ++site) {
+    const std::span<const NoiseSample> of = of_site(samples, site);
+    std::vector<NoiseSample> quiet;
+    for_each_group(of, groups_for(of.size(), samples.details.high), [&](std::span<const NoiseSample> group) {
+      quiet.assign(group.begin(), group.end());
+      const auto kept = static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(quiet.size())));
+      std::nth_element(quiet.begin(), quiet.begin() + kept - 1, quiet.end(),
+                       [](const NoiseSample& a, const NoiseSample& b) { return a.low_dn2 < b.low_dn2; });
+      Sum sum;
+      for (std::ptrdiff_t i = 0; i < kept; ++i) {
+        sum.n += 1;
+        sum.mean += quiet[i].mean_dn;
+        sum.high += quiet[i].high_dn2;
+        sum.middle += quiet[i].middle_dn2;
+      }
+      sum.high_n = sum.n;
+      if (!(sum.high > 0)) return;
+      all.n += sum.n;
+      all.high += sum.n;
+      all.middle += sum.n * sum.middle / sum.high;
+      out.points.push_back(point_of(sum, samples.details, clip[site], 1));
+    });
+  }
+  out.samples = all.n;
+  out.mean_high = all.n > 0 ? all.high / all.n : 0;
+  out.mean_middle = all.n > 0 ? all.middle / all.n : 0;
+  return out;
+}
+
+namespace {
+
+constexpr int windows = 16;
+constexpr double dense_per_code = 30;
+constexpr int least_width = 8;           // codes of a window: fewer tell no step
+constexpr double quietest_share = 0.05;  // of each group of samples
+constexpr int grid = 8;
+constexpr double least_excess = 0.1;
+
+struct Steps {
+  int smallest = 0;  // 0: nowhere dense enough
+  int largest = 0;
+};
+
+std::vector<std::int64_t> histogram(const RawDn& raw, int site) {
+  std::vector<std::int64_t> out(65536, 0);
+  for (int y = site >> 1; y < raw.active.height; y += 2) {
+    const std::uint16_t* row = raw.dn.row(raw.active.y + y) + raw.active.x;
+    for (int x = site & 1; x < raw.active.width; x += 2) ++out[row[x]];
+  }
+  return out;
+}
+
+/// Where all but a thousandth of the pixels at either end lie.
+std::array<int, 2> range_in_use(const std::vector<std::int64_t>& count) {
+  std::int64_t all = 0;
+  for (const std::int64_t n : count) all += n;
+  int low = 0, high = 65535;
+  for (std::int64_t sum = 0; low < high && (sum += count[low]) <= all / 1000;) ++low;
+  for (std::int64_t sum = 0; high > low && (sum += count[high]) <= all / 1000;) --high;
+  return {low, high};
+}
+
+Steps steps_of(const std::vector<std::int64_t>& count) {
+  const auto [low, high] = range_in_use(count);
+  Steps out;
+  for (int w = 0; w < windows; ++w) {
+    const int first = low + (high - low) * w / windows, last = low + (high - low) * (w + 1) / windows;
+    std::int64_t pixels = 0;
+    int used = 0;
+    for (int code = first; code < last; ++code) {
+      pixels += count[code];
+      used += count[code] > 0 ? 1 : 0;
+    }
+    if (last - first < least_width || static_cast<double>(pixels) < dense_per_code * (last - first)) continue;
+    const int step = static_cast<int>(std::lround(static_cast<double>(last - first) / used));
+    out.smallest = out.smallest == 0 ? step : std::min(out.smallest, step);
+    out.largest = std::max(out.largest, step);
+  }
+  return out;
+}
+
+/// Mean size of second differences at each phase of an 8 x 8 grid of one colour's pixels, across columns or rows.
+std::array<double, grid> restlessness(const RawDn& raw, bool across_columns) {
+  std::array<double, grid> sum{}, n{};
+  const int dx = across_columns ? 2 : 0, dy = across_columns ? 0 : 2;
+  for (int y = 2 * dy; y < raw.active.height - dy; ++y) {
+    for (int x = 2 * dx; x < raw.active.width - dx; ++x) {
+      const auto at = [&](int i) {
+        return static_cast<int>(raw.dn.at(raw.active.x + x + i * dx, raw.active.y + y + i * dy));
+      };
+      const int phase = (across_columns ? x / 2 : y / 2) % grid;
+      sum[phase] += std::abs(3 * (at(0) - at(-1)) - at(1) + at(-2));
+      n[phase] += 1;
+    }
+  }
+  for (int p = 0; p < grid; ++p) sum[p] = n[p] > 0 ? sum[p] / n[p] : 0;
+  return sum;
+}
+
+/// By how much the largest phase exceeds the quiet ones, if it does so by more than they scatter. A step raises the
+/// phase it lies at and both beside it: five are left.
+double excess_of(std::array<double, grid> phase) {
+  std::sort(phase.begin(), phase.end());
+  const double quiet = phase[2], scatter = phase[4] - phase[0];
+  return quiet > 0 && phase[7] - quiet > 3 * scatter ? phase[7] / quiet - 1 : 0;
+}
+
+}  // namespace
+
+RawTraces code_traces(const RawDn& raw) {
+  RawTraces out;
+  for (int site = 0; site < 4; ++site) {
+    const Steps steps = steps_of(histogram(raw, site));
+    if (steps.smallest == 0) continue;
+    out.code_step_dn = std::max(out.code_step_dn, steps.smallest);
+    out.largest_step_dn = std::max(out.largest_step_dn, steps.largest);
+    out.companded = out.companded || steps.largest > steps.smallest;
+  }
+  out.grid_excess = std::max(excess_of(restlessness(raw, true)), excess_of(restlessness(raw, false)));
+  out.block_grid = out.grid_excess > least_excess;
+  return out;
+}
+
+void add_filter_trace(const NoiseSamples& blocks_by_surroundings, RawTraces& traces) {
+  const FlatPoints quiet = quietest_points(blocks_by_surroundings, {}, quietest_share);
+  traces.fine_to_coarse = quiet.mean_middle > 0 ? quiet.mean_high / quiet.mean_middle : 0;
+  traces.denoised = quiet.mean_middle > 0 && traces.fine_to_coarse < least_fine_to_coarse;
+}
+
+}  // namespace lowlux::calib

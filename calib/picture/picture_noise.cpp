@@ -1,0 +1,245 @@
+#include "calib/picture/picture_noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "calib/picture/flat_samples.h"
+#include "calib/picture/noise_line.h"
+#include "calib/picture/noise_samples.h"
+
+namespace lowlux::calib {
+namespace {
+
+constexpr std::size_t least_samples = 100;
+constexpr double first_share = 0.05;  // of each group: the quietest, to begin with
+constexpr int most_rounds = 30;
+constexpr double settled = 1e-3;             // relative change of the gain
+constexpr double expected_contrast = 0.015;  // of PRNU, grain and texture as fine as pixels, in flat samples
+constexpr double most_clipped_share = 0.9;   // of the pixels
+constexpr double largest_gain_error = 0.15;  // relative: beyond, the levels were too alike
+constexpr double largest_chi_square = 5;
+
+double white_of(const RawDn& raw, int site) {
+  if (raw.layout == SensorLayout::monochrome) return raw.white_dn[0];
+  return raw.white_dn[static_cast<int>(colour_at(raw.phase, site & 1, site >> 1))];
+}
+
+/// The codes that a site's pixels end at, and how many pixels lie there.
+struct SiteRange {
+  ClipRange clip;
+  double clipped = 0;
+  double pixels = 0;
+};
+
+SiteRange range_of(const RawDn& raw, double black_dn, int site) {
+  int smallest = 65535;
+  std::int64_t at_smallest = 0, at_white = 0, pixels = 0;
+  const double white_dn = white_of(raw, site);
+  for (int y = site >> 1; y < raw.active.height; y += 2) {
+    const std::uint16_t* row = raw.dn.row(raw.active.y + y) + raw.active.x;
+    for (int x = site & 1; x < raw.active.width; x += 2) {
+      const int code = row[x];
+      if (code < smallest) at_smallest = 0;
+      smallest = std::min(smallest, code);
+      at_smallest += code == smallest ? 1 : 0;
+      at_white += code >= white_dn ? 1 : 0;
+      ++pixels;
+    }
+  }
+  const std::int64_t clipped = smallest >= white_dn ? pixels : at_smallest + at_white;
+  return {{smallest - black_dn, white_dn - black_dn}, static_cast<double>(clipped), static_cast<double>(pixels)};
+}
+
+/// Greens are one lattice of samples: both get the range that holds both.
+void join_greens(const RawDn& raw, PerSite<ClipRange>& clip) {
+  if (raw.layout != SensorLayout::bayer) return;
+  const int upper = colour_at(raw.phase, 0, 0) == CfaColour::green ? 0 : 1, lower = 3 - upper;
+  const ClipRange both{std::min(clip[upper].low_dn, clip[lower].low_dn),
+                       std::max(clip[upper].high_dn, clip[lower].high_dn)};
+  clip[upper] = clip[lower] = both;
+}
+
+Result<void> check(const RawDn& raw, const PerSite<double>& black_dn, const PictureNoiseOptions& options) {
+  if (raw.layout == SensorLayout::linear_rgb) {
+    return fail(ErrorCode::unsupported,
+                "demosaiced pixels: their noise is that of the demosaicing too: give the raw with its mosaic");
+  }
+  if (options.most_samples < 1 || options.most_samples > 10'000'000) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("most_samples is {}: it must be 1 to 10000000", options.most_samples), "most_samples");
+  }
+  for (int site = 0; site < 4; ++site) {
+    if (black_dn[site] >= 0 && black_dn[site] < white_of(raw, site) && std::isfinite(white_of(raw, site))) continue;
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("black {:g} DN of site {} is not from 0 to below white ({:g} DN): give the black level",
+                            black_dn[site], site, white_of(raw, site)),
+                "black");
+  }
+  return {};
+}
+
+struct Fit {
+  NoiseLine line;
+  FlatPoints flat;
+  bool converged = false;
+};
+
+/// The quietest samples give a first line; that line says which samples are flat, and those give the next.
+std::optional<Fit> settle(const NoiseSamples& samples, const PerSite<ClipRange>& clip) {
+  const auto first = fit_noise_line(quietest_points(samples, clip, first_share).points);
+  if (!first) return std::nullopt;
+  Fit out{*first, {}, false};
+  for (int i = 0; i < most_rounds && !out.converged; ++i) {
+    out.flat = flat_points(samples, out.line, clip, {});
+    const auto next = fit_noise_line(out.flat.points, expected_contrast);
+    if (!next) return std::nullopt;
+    const double gain = out.line.gain_dn_per_e.value;
+    out.converged = std::abs(next->gain_dn_per_e.value - gain) < settled * std::abs(gain);
+    out.line = *next;
+    if (!(next->gain_dn_per_e.value > 0)) break;  // no noise is like that: check_fit says so
+  }
+  return out;
+}
+
+Result<void> check_fit(const NoiseLine& line) {
+  const Estimate& gain = line.gain_dn_per_e;
+  if (!(gain.value > 0) || !(gain.standard_error < largest_gain_error * gain.value)) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("levels too alike: the gain comes out as {:.3g} +- {:.2g} DN per electron (15 % is the "
+                            "limit): take a picture with flat parts both dark and bright",
+                            gain.value, gain.standard_error));
+  }
+  const Estimate& offset = line.offset_dn2;
+  if (offset.value + 3 * offset.standard_error < 0) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("variance without light comes out as {:.3g} +- {:.2g} DN^2, below 0: give the right black "
+                            "level, or a picture with more of it above black",
+                            offset.value, offset.standard_error));
+  }
+  if (line.reduced_chi_square > largest_chi_square) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("variance against mean is no straight line (reduced chi square {:.1f}, at most 5): give "
+                            "a raw that is linear, or flat fields",
+                            line.reduced_chi_square));
+  }
+  return {};
+}
+
+void judge(PictureNoise& out) {
+  const RawTraces& t = out.traces;
+  const double step = t.code_step_dn;
+  const double darkest = out.gain_dn_per_e.value * std::max(out.darkest_dn, 0.0) + out.offset_dn2.value;
+  out.darkest_noise_steps = std::sqrt(std::max(darkest / (step * step) - 1.0 / 12, 0.0));
+  out.under_dithered = out.darkest_noise_steps < 0.5;
+  if (out.under_dithered) {
+    out.reasons.push_back(
+        fmt::format("under-dithered: the darkest parts scatter by {:.2f} steps of {} DN, half a step "
+                    "is needed for quantisation to be noise",
+                    out.darkest_noise_steps, t.code_step_dn));
+  }
+  if (t.code_step_dn > 1) out.reasons.push_back(fmt::format("only every {}th code is in use", t.code_step_dn));
+  if (t.companded) {
+    out.reasons.push_back(
+        fmt::format("lossy: codes lie {} to {} DN apart, depending on the value", t.code_step_dn, t.largest_step_dn));
+  }
+  if (t.block_grid) {
+    out.reasons.push_back(fmt::format("lossy: lines of an 8 x 8 grid stand out by {:.0f} %", 100 * t.grid_excess));
+  }
+  if (t.denoised) {
+    out.reasons.push_back(fmt::format(
+        "denoised, or grain in the scene: the finest details have {:.2f} of the energy of the next, noise has 1",
+        t.fine_to_coarse));
+  }
+  if (!out.converged) out.reasons.emplace_back("the choice of flat samples did not settle");
+}
+
+PictureNoise described(const Fit& fit, double samples, const RawTraces& traces) {
+  const auto [darkest, brightest] =
+      std::minmax_element(fit.flat.points.begin(), fit.flat.points.end(),
+                          [](const NoisePoint& a, const NoisePoint& b) { return a.mean_dn < b.mean_dn; });
+  PictureNoise out{.gain_dn_per_e = fit.line.gain_dn_per_e,
+                   .offset_dn2 = fit.line.offset_dn2,
+                   .covariance = fit.line.covariance,
+                   .reduced_chi_square = fit.line.reduced_chi_square,
+                   .degrees_of_freedom = fit.line.degrees_of_freedom,
+                   .darkest_dn = darkest->mean_dn,
+                   .brightest_dn = brightest->mean_dn,
+                   .flat_share = fit.flat.samples / samples,
+                   .converged = fit.converged,
+                   .traces = traces,
+                   .contrast_squared = fit.line.contrast_squared};
+  judge(out);
+  return out;
+}
+
+/// Ours about the profile's, both differences together.
+double chi_square_of(const PictureNoise& noise, double gain, double offset) {
+  const double da = noise.gain_dn_per_e.value - gain, db = noise.offset_dn2.value - offset;
+  const double aa = noise.gain_dn_per_e.standard_error * noise.gain_dn_per_e.standard_error;
+  const double bb = noise.offset_dn2.standard_error * noise.offset_dn2.standard_error, ab = noise.covariance;
+  return (bb * da * da - 2 * ab * da * db + aa * db * db) / (aa * bb - ab * ab);
+}
+
+}  // namespace
+
+Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& black_dn,
+                                       const PictureNoiseOptions& options, Executor& executor) {
+  if (const auto good = check(raw, black_dn, options); !good) return tl::make_unexpected(good.error());
+  const SamplePlan plan{black_dn, options.most_samples};
+  NoiseSamples blocks = block_samples(raw, plan, executor);
+  if (blocks.sample.size() < least_samples) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("{} x {} pixels give {} blocks of 16 x 16, and 100 are needed: give a larger picture",
+                            raw.active.width, raw.active.height, blocks.sample.size()));
+  }
+  PerSite<ClipRange> clip;
+  double clipped = 0, pixels = 0;
+  for (int site = 0; site < 4; ++site) {
+    const SiteRange range = range_of(raw, black_dn[site], site);
+    clip[site] = range.clip;
+    clipped += range.clipped;
+    pixels += range.pixels;
+  }
+  join_greens(raw, clip);
+  if (clipped > most_clipped_share * pixels) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("{:.0f} % of the pixels are clipped: change the exposure", 100 * clipped / pixels));
+  }
+  sort_by_surroundings(blocks);
+  RawTraces traces = code_traces(raw);
+  add_filter_trace(blocks, traces);
+  NoiseSamples samples = std::move(blocks);
+  if (options.method == PictureNoiseMethod::foi) {
+    samples = detail_samples(raw, plan, executor);
+    sort_by_surroundings(samples);
+  }
+  const auto fit = settle(samples, clip);
+  if (!fit) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("too few flat parts of different brightness among {} samples (finest details at {:.2f} of "
+                            "the next coarser ones): take a picture with smooth surfaces",
+                            samples.sample.size(), traces.fine_to_coarse));
+  }
+  if (const auto good = check_fit(fit->line); !good) return tl::make_unexpected(good.error());
+  return described(*fit, static_cast<double>(samples.sample.size()), traces);
+}
+
+std::array<NoiseAgreement, 3> compare_with(const NoiseProfile& profile, const PictureNoise& noise, double range_dn) {
+  std::array<NoiseAgreement, 3> out;
+  for (int c = 0; c < 3; ++c) {
+    NoiseAgreement& of = out[c];
+    of.gain_dn_per_e = profile.scale[c] * range_dn;
+    of.offset_dn2 = profile.offset[c] * range_dn * range_dn;
+    if (of.gain_dn_per_e != 0) of.gain_ratio = noise.gain_dn_per_e.value / of.gain_dn_per_e;
+    if (of.offset_dn2 != 0) of.offset_ratio = noise.offset_dn2.value / of.offset_dn2;
+    of.chi_square = chi_square_of(noise, of.gain_dn_per_e, of.offset_dn2);
+    const bool near = std::abs(of.gain_ratio - 1) < 0.1 && std::abs(of.offset_ratio - 1) < 0.1;
+    of.agrees = of.chi_square < 11.8 || near;
+  }
+  return out;
+}
+
+}  // namespace lowlux::calib

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+
+#include "isp/base/plane.h"
+
+namespace lowlux::capture {
+
+enum class DecodeOutcome : std::uint32_t {
+  crashed = 0,  // the value of fresh memory: nothing was ever written
+  decoded,
+  unsupported,   // `reason` says why
+  not_raw,       // the decoder does not know the file
+  damaged,       // `reason` says what the decoder says
+  too_large,     // `raw_width` x `raw_height` x `samples` is over the limit
+  out_of_memory  // within the limits set for the decoder
+};
+
+/// What the decoder tells about a file: fixed-size fields only, because it comes from another process by bytes.
+/// Nothing in it is trusted: every figure came from the file, through a library that may be wrong.
+struct DecodedHeader {
+  DecodeOutcome outcome;
+  char reason[192];
+
+  std::int32_t raw_width, raw_height, samples;  // of the readout; samples per pixel, 1 or 3
+  std::int32_t left, top, width, height;        // the visible area
+  std::int32_t masks[8][4];                     // top, left, bottom, right in the readout, ends excluded
+  std::int32_t flip;                            // bit 0 mirrors x, bit 1 mirrors y, bit 2 then transposes
+  std::uint32_t filters;                        // 0: none; else dcraw's pattern, 2 bits a site, 8 x 2 sites
+  std::uint32_t black, channel_black[4];        // added up, see decoder_black()
+  std::int32_t pattern_rows, pattern_columns;
+  std::uint32_t pattern_black[4098];
+  std::uint32_t maximum;
+  float camera_multiplier[4];  // R, G, B, second G; 0 or less where unknown
+  float xyz_to_camera[3][3];   // all 0 where unknown
+  std::uint32_t dng_version;
+  double pixel_aspect;
+  float iso, exposure_s, f_number, focal_length_mm;  // 0 where unknown
+  float sensor_temperature_c, camera_temperature_c;  // below -273 where unknown
+  std::int64_t timestamp;                            // seconds since 1970; 0 where unknown
+  char make[64], model[64], software[64];
+};
+static_assert(std::is_trivially_copyable_v<DecodedHeader>);
+
+struct DecodedRaw {
+  DecodedHeader header{};
+  Plane<std::uint16_t> samples;  // raw_height x (raw_width * samples)
+};
+
+/// What reading one file may take. Each is checked before the memory is taken or the time is spent.
+struct ReadLimits {
+  std::uint64_t max_file_bytes = std::uint64_t{2} << 30;
+  std::int64_t max_pixels = 400'000'000;  // of the readout, borders included
+  double max_decode_cpu_s = 120;          // rounded up to whole seconds; the wall clock gets five times as much
+};
+
+}  // namespace lowlux::capture

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "capture/dng/tiff_directory.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+
+namespace lowlux::capture {
+
+/// The directories of a DNG file that lowlux reads. They borrow the bytes of the file.
+struct DngFile {
+  TiffDirectory main;                     // the first directory
+  std::vector<TiffDirectory> raw_images;  // full-size CFA or LinearRaw images, the largest first; never empty
+  std::vector<TiffDirectory> previews;    // all other directories that are linked
+  std::optional<TiffDirectory> exif;
+  std::vector<std::string> warnings;  // optional directories that are damaged
+};
+
+/// The warning for an optional tag that is damaged, and so ignored.
+std::string ignored(const Error& error);
+
+/// The value of an optional tag; where it is damaged nullopt, and a warning.
+template <class T>
+std::optional<T> or_ignored(Result<std::optional<T>> tag, std::vector<std::string>& warnings) {
+  if (tag) return *std::move(tag);
+  warnings.push_back(ignored(tag.error()));
+  return std::nullopt;
+}
+
+/// How the samples of one raw image are laid out and stored.
+struct DngImage {
+  int width = 0, height = 0;  // of the readout
+  int samples = 1;            // per pixel
+  int bits = 0;               // per sample, as stored
+  SensorLayout layout = SensorLayout::bayer;
+  BayerPhase phase = BayerPhase::rggb;
+};
+
+/// nullopt: not a TIFF, or a TIFF without the tag DNGVersion. Fails on a DNG without a raw image.
+Result<std::optional<DngFile>> open_dng(std::span<const std::byte> bytes);
+
+/// Size and layout of a raw image; a clear refusal of what cannot be decoded or developed, and of image data that
+/// ends beyond the file. `file_bytes` is the size of the file.
+Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_bytes);
+
+/// "JPEG XL (52546)": for messages.
+std::string compression_name(std::uint32_t compression);
+
+}  // namespace lowlux::capture

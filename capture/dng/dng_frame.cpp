@@ -1,0 +1,89 @@
+#include "capture/dng/dng_frame.h"
+
+#include <utility>
+
+#include "capture/dng/dng_colour.h"
+#include "capture/dng/dng_info.h"
+#include "capture/dng/dng_levels.h"
+#include "capture/dng/dng_opcodes.h"
+#include "capture/dng/dng_tags.h"
+#include "capture/file/decoder_frame.h"
+#include "capture/file/pass_on.h"
+
+namespace lowlux::capture {
+namespace {
+
+bool fits(const DngImage& image, const DecodedHeader& h) {
+  return image.width == h.raw_width && image.height == h.raw_height && image.samples == h.samples;
+}
+
+/// The description of the raw image that has the size and samples the decoder delivered.
+Result<DngDescription> decoded_image(const DngFile& dng, DngDescription expected, std::size_t file_bytes,
+                                     const DecodedHeader& h) {
+  if (fits(expected.image, h)) return expected;
+  for (const TiffDirectory& directory : dng.raw_images) {
+    const auto image = dng_image(directory, file_bytes);
+    if (image && fits(*image, h)) return describe_dng(dng, directory, file_bytes);
+  }
+  return fail(ErrorCode::malformed, "the decoder delivers " + std::to_string(h.raw_width) + " x " +
+                                        std::to_string(h.raw_height) +
+                                        " pixels, no raw image of this DNG has that size");
+}
+
+void read_colour_and_noise(const DngFile& dng, const TiffDirectory& directory, RawFrame& frame) {
+  const bool coloured = frame.raw.layout != SensorLayout::monochrome;
+  frame.noise = or_ignored(read_noise(dng, directory, coloured ? 3 : 1), frame.warnings);
+  if (coloured) frame.colour = read_colour(dng, directory, frame.warnings);
+}
+
+void read_corrections(const DngFile& dng, const TiffDirectory& directory, RawFrame& frame) {
+  const bool linearized = directory.find(tag::linearization_table) != nullptr;
+  for (int list = 1; list <= 3; ++list) {
+    const TagName name = tag::opcode_list[list - 1];
+    const TiffDirectory& home = directory.find(name) != nullptr ? directory : dng.main;
+    if (home.find(name) == nullptr) continue;
+    auto read = home.bytes(name).and_then(
+        [&](std::span<const std::byte> bytes) { return read_opcodes(bytes, list, linearized, frame); });
+    if (!read) frame.warnings.push_back(ignored(read.error()));
+  }
+}
+
+}  // namespace
+
+Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw_image, std::size_t file_bytes) {
+  auto image = dng_image(raw_image, file_bytes);
+  if (!image) return pass_on(image);
+  DngDescription described{&raw_image, *image, {}};
+  RawFrame& frame = described.frame;
+  frame.raw.layout = image->layout;
+  frame.raw.phase = image->phase;
+  frame.raw.info = read_info(dng);
+  frame.warnings = dng.warnings;
+  if (auto read = read_geometry(raw_image, *image, frame.raw, frame.warnings); !read) return pass_on(read);
+  if (auto read = read_levels(raw_image, *image, frame.raw); !read) return pass_on(read);
+  read_colour_and_noise(dng, raw_image, frame);
+  return described;
+}
+
+Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std::size_t file_bytes,
+                              DecodedRaw decoded) {
+  const DecodedHeader& h = decoded.header;
+  auto chosen = decoded_image(dng, std::move(described), file_bytes, h);
+  if (!chosen) return pass_on(chosen);
+  RawFrame frame = std::move(chosen->frame);
+  frame.raw.dn = std::move(decoded.samples);
+  if (const auto celsius = decoder_temperature_c(h)) frame.raw.info.temperature_c = celsius;
+  const auto table = table_calibration(h);
+  if (table && frame.colour.calibrations.empty() && frame.raw.layout != SensorLayout::monochrome) {
+    frame.colour.calibrations.push_back(*table);
+    frame.colour.source = CameraColour::Source::decoder_table;
+  }
+  if (frame.colour.calibrations.empty() && frame.raw.layout != SensorLayout::monochrome) {
+    if (auto sound = check_colour_matrices(dng, *chosen->directory); !sound) return pass_on(sound);
+  }
+  read_corrections(dng, *chosen->directory, frame);
+  ignore_impossible_white(frame.colour, frame.warnings);
+  return frame;
+}
+
+}  // namespace lowlux::capture

@@ -1,0 +1,207 @@
+#include "capture/dng/tiff_directory.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace lowlux::capture {
+namespace {
+
+constexpr std::size_t entry_bytes = 12;
+
+/// Size of one value, 0 for a type TIFF does not know.
+std::size_t value_bytes(TiffEntry::Type type) {
+  constexpr std::size_t bytes[] = {0, 1, 1, 2, 4, 8, 1, 1, 2, 4, 8, 4, 8, 4};
+  const auto index = static_cast<std::size_t>(type);
+  return index < std::size(bytes) ? bytes[index] : 0;
+}
+
+double quotient(double numerator, double denominator) {
+  if (denominator != 0) return numerator / denominator;
+  return numerator == 0 ? std::numeric_limits<double>::quiet_NaN()
+                        : std::copysign(std::numeric_limits<double>::infinity(), numerator);
+}
+
+std::string plural(std::size_t count) { return std::to_string(count) + (count == 1 ? " value" : " values"); }
+
+/// An entry whose values lie outside of the file is kept as such: whether that matters depends on who asks for it.
+TiffEntry read_entry(std::span<const std::byte> file, const std::byte* at, bool big_endian) {
+  TiffEntry entry;
+  entry.id = load_u16(at, big_endian);
+  entry.place = static_cast<std::size_t>(at - file.data());
+  entry.type = static_cast<TiffEntry::Type>(load_u16(at + 2, big_endian));
+  entry.count = load_u32(at + 4, big_endian);
+  entry.big_endian = big_endian;
+  const std::uint64_t length = std::uint64_t{entry.count} * value_bytes(entry.type);
+  if (length <= 4) {
+    entry.values = {at + 8, static_cast<std::size_t>(length)};
+    entry.inside_file = true;
+    return entry;
+  }
+  const std::uint64_t offset = load_u32(at + 8, big_endian);
+  if (offset + length <= file.size()) {
+    entry.values = file.subspan(offset, length);
+    entry.inside_file = true;
+  }
+  return entry;
+}
+
+}  // namespace
+
+std::uint16_t load_u16(const std::byte* at, bool big_endian) {
+  const auto first = std::to_integer<std::uint32_t>(at[0]), second = std::to_integer<std::uint32_t>(at[1]);
+  return static_cast<std::uint16_t>(big_endian ? first << 8 | second : second << 8 | first);
+}
+
+std::uint32_t load_u32(const std::byte* at, bool big_endian) {
+  const std::uint32_t first = load_u16(at, big_endian), second = load_u16(at + 2, big_endian);
+  return big_endian ? first << 16 | second : second << 16 | first;
+}
+
+float load_f32(const std::byte* at, bool big_endian) { return std::bit_cast<float>(load_u32(at, big_endian)); }
+
+double load_f64(const std::byte* at, bool big_endian) {
+  const std::uint64_t first = load_u32(at, big_endian), second = load_u32(at + 4, big_endian);
+  return std::bit_cast<double>(big_endian ? first << 32 | second : second << 32 | first);
+}
+
+bool TiffEntry::is_numeric() const { return inside_file && value_bytes(type) > 0 && type != Type::ascii; }
+
+double TiffEntry::number(std::size_t i) const {
+  const std::byte* at = values.data() + i * value_bytes(type);
+  switch (type) {
+    case Type::byte:
+    case Type::ascii:
+    case Type::undefined:
+      return std::to_integer<int>(*at);
+    case Type::sbyte:
+      return std::to_integer<std::int8_t>(*at);
+    case Type::u16:
+      return load_u16(at, big_endian);
+    case Type::s16:
+      return static_cast<std::int16_t>(load_u16(at, big_endian));
+    case Type::u32:
+    case Type::ifd:
+      return load_u32(at, big_endian);
+    case Type::s32:
+      return static_cast<std::int32_t>(load_u32(at, big_endian));
+    case Type::rational:
+      return quotient(load_u32(at, big_endian), load_u32(at + 4, big_endian));
+    case Type::srational:
+      return quotient(static_cast<std::int32_t>(load_u32(at, big_endian)),
+                      static_cast<std::int32_t>(load_u32(at + 4, big_endian)));
+    case Type::f32:
+      return load_f32(at, big_endian);
+    case Type::f64:
+      return load_f64(at, big_endian);
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+std::string TiffEntry::text() const {
+  std::string out;
+  for (const std::byte b : values) {
+    const char c = std::to_integer<char>(b);
+    if (c == '\0') break;
+    if (c >= ' ' && c <= '~') out.push_back(c);
+  }
+  const std::size_t first = out.find_first_not_of(' ');
+  if (first == std::string::npos) return {};
+  return out.substr(first, out.find_last_not_of(' ') - first + 1);
+}
+
+const TiffEntry* TiffDirectory::find(TagName tag) const {
+  const auto at = std::find_if(entries.begin(), entries.end(), [tag](const TiffEntry& e) { return e.id == tag.id; });
+  return at == entries.end() ? nullptr : &*at;
+}
+
+Result<std::optional<std::vector<double>>> TiffDirectory::numbers(TagName tag, std::size_t min_count,
+                                                                  std::size_t max_count) const {
+  const TiffEntry* entry = find(tag);
+  if (entry == nullptr) return std::nullopt;
+  if (value_bytes(entry->type) == 0 || entry->type == TiffEntry::Type::ascii) {
+    return fail(ErrorCode::malformed, std::string("the tag ") + tag.name + " does not hold numbers", tag.name);
+  }
+  if (entry->count < min_count || entry->count > max_count) {
+    std::string expected = plural(min_count);
+    if (min_count != max_count) expected = std::to_string(min_count) + " to " + plural(max_count);
+    return fail(ErrorCode::malformed,
+                std::string("the tag ") + tag.name + " has " + plural(entry->count) + ", expected " + expected,
+                tag.name);
+  }
+  if (!entry->inside_file) {
+    return fail(ErrorCode::malformed,
+                std::string("the values of the tag ") + tag.name +
+                    " lie beyond the end of the file: it is truncated or damaged",
+                tag.name);
+  }
+  std::vector<double> values(entry->count);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = entry->number(i);
+  return values;
+}
+
+Result<std::optional<std::uint32_t>> TiffDirectory::whole(TagName tag) const {
+  const TiffEntry* entry = find(tag);
+  if (entry == nullptr) return std::nullopt;
+  if (entry->count > 0 && entry->is_numeric()) {
+    const double value = entry->number(0);
+    if (value >= 0 && value <= 4294967295.0 && value == std::floor(value)) return static_cast<std::uint32_t>(value);
+  }
+  return fail(ErrorCode::malformed, std::string("the tag ") + tag.name + " does not hold a whole number", tag.name);
+}
+
+Result<std::uint32_t> TiffDirectory::whole_or(TagName tag, std::uint32_t otherwise) const {
+  return whole(tag).map([otherwise](auto found) { return found.value_or(otherwise); });
+}
+
+std::string TiffDirectory::text(TagName tag) const {
+  const TiffEntry* entry = find(tag);
+  return entry != nullptr && entry->type == TiffEntry::Type::ascii ? entry->text() : std::string();
+}
+
+Result<std::span<const std::byte>> TiffDirectory::bytes(TagName tag) const {
+  const TiffEntry* entry = find(tag);
+  if (entry == nullptr) return std::span<const std::byte>{};
+  if (value_bytes(entry->type) == 0) {
+    return fail(ErrorCode::malformed, std::string("the tag ") + tag.name + " has a type that TIFF does not know",
+                tag.name);
+  }
+  if (!entry->inside_file) {
+    return fail(
+        ErrorCode::malformed,
+        std::string("the bytes of the tag ") + tag.name + " lie beyond the end of the file: it is truncated or damaged",
+        tag.name);
+  }
+  return entry->values;
+}
+
+std::optional<TiffFile> TiffFile::open(std::span<const std::byte> bytes) {
+  if (bytes.size() < 8) return std::nullopt;
+  const char first = std::to_integer<char>(bytes[0]), second = std::to_integer<char>(bytes[1]);
+  if (first != second || (first != 'I' && first != 'M')) return std::nullopt;
+  const bool big_endian = first == 'M';
+  if (load_u16(bytes.data() + 2, big_endian) != 42) return std::nullopt;
+  return TiffFile(bytes, big_endian, load_u32(bytes.data() + 4, big_endian));
+}
+
+Result<TiffDirectory> TiffFile::directory(std::uint32_t offset) const {
+  const auto outside = [offset] {
+    return fail(ErrorCode::malformed, "the tag directory at byte " + std::to_string(offset) +
+                                          " lies beyond the end of the file: it is truncated or damaged");
+  };
+  if (std::uint64_t{offset} + 2 > bytes_.size()) return outside();
+  const std::size_t count = load_u16(bytes_.data() + offset, big_endian_);
+  const std::uint64_t end = std::uint64_t{offset} + 2 + count * entry_bytes;
+  if (end > bytes_.size()) return outside();
+  TiffDirectory directory;
+  directory.entries.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    directory.entries.push_back(read_entry(bytes_, bytes_.data() + offset + 2 + i * entry_bytes, big_endian_));
+  }
+  if (end + 4 <= bytes_.size()) directory.next = load_u32(bytes_.data() + end, big_endian_);
+  return directory;
+}
+
+}  // namespace lowlux::capture

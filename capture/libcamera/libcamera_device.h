@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "capture/camera/camera.h"
+#include "capture/libcamera/completion_queue.h"
+#include "capture/libcamera/mapped_plane.h"
+#include "capture/libcamera/raw_stream.h"
+#include "capture/libcamera/request_camera.h"
+#include "capture/libcamera/start_controls.h"
+#include "isp/base/result.h"
+
+namespace libcamera {
+class Camera;
+class CameraConfiguration;
+class CameraManager;
+class FrameBufferAllocator;
+class Request;
+}  // namespace libcamera
+
+namespace lowlux::capture {
+
+/// The one manager that libcamera allows in a process, started for as long as somebody holds it. Errors: unreadable.
+Result<std::shared_ptr<libcamera::CameraManager>> libcamera_manager();
+
+/// For people: its model where it tells one.
+std::string libcamera_name(const libcamera::Camera& camera);
+
+/// What a configuration's first stream offers; none where there is no configuration.
+std::vector<OfferedStream> offered_streams(const libcamera::CameraConfiguration* configuration);
+
+/// The configuration for a raw stream alone; null where the camera has none.
+std::unique_ptr<libcamera::CameraConfiguration> raw_configuration(libcamera::Camera& camera);
+
+/// A libcamera camera, acquired. What it holds is let go in the order that libcamera wants: requests, mappings,
+/// buffers, configuration, camera, manager.
+class LibcameraDevice final : public RequestDevice {
+ public:
+  LibcameraDevice(std::shared_ptr<libcamera::CameraManager> manager, std::shared_ptr<libcamera::Camera> camera);
+  ~LibcameraDevice() override;
+  LibcameraDevice(const LibcameraDevice&) = delete;
+  LibcameraDevice& operator=(const LibcameraDevice&) = delete;
+
+  /// To be called once, in this order. Errors: as LibcameraModule::open.
+  Result<void> acquire();
+  Result<CameraFormat> configure(const CameraRequest& request, std::vector<std::string>& warnings);
+  Result<int> allocate(const CameraRequest& request, std::vector<std::string>& warnings);
+  std::shared_ptr<CompletionQueue> completions() const { return completions_; }
+
+  int start() override;
+  void stop() override;
+  int queue(int buffer) override;
+  std::span<const std::byte> bytes(int buffer) const override;
+  bool begin_reading(int buffer) override;
+  void end_reading(int buffer) override;
+
+ private:
+  Result<void> add_buffer(int buffer);
+  void request_completed(libcamera::Request* request);
+  void disconnected();
+
+  std::shared_ptr<libcamera::CameraManager> manager_;
+  std::shared_ptr<libcamera::Camera> camera_;
+  std::string name_;
+  bool acquired_ = false;
+  CameraFormat format_;
+  StartControls controls_;
+  bool controls_are_due_ = false;  // in the first request of a stream
+  std::shared_ptr<CompletionQueue> completions_;
+  std::unique_ptr<libcamera::CameraConfiguration> configuration_;
+  std::unique_ptr<libcamera::FrameBufferAllocator> allocator_;
+  std::vector<MappedPlane> planes_;
+  std::vector<std::unique_ptr<libcamera::Request>> requests_;
+};
+
+}  // namespace lowlux::capture

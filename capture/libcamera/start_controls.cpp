@@ -1,0 +1,76 @@
+#include "capture/libcamera/start_controls.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "isp/base/text.h"
+
+namespace lowlux::capture {
+namespace {
+
+constexpr double usual_frame_us = 1e6 / 30;
+// A year: longer than any frame, and far from the ends of 64 bits.
+constexpr double longest_frame_us = 3.2e13;
+
+std::int64_t whole_us(double time_us) { return std::llround(std::clamp(time_us, 1.0, longest_frame_us)); }
+
+struct Wanted {
+  const char* name;
+  double value;
+};
+
+/// Whether the control is to be set; warns where it is not there or its range does not hold the value.
+bool is_settable(const Wanted& wanted, const OfferedControl& control, std::vector<std::string>& warnings) {
+  if (!control.offered) {
+    warnings.push_back(std::string("the camera has no control of its ") + wanted.name + ": " +
+                       number_text(wanted.value) + " is not set");
+    return false;
+  }
+  if (control.range && !(wanted.value >= control.range->least && wanted.value <= control.range->largest)) {
+    warnings.push_back("the camera states a range of " + number_text(control.range->least) + " to " +
+                       number_text(control.range->largest) + " for its " + wanted.name + ", asked for is " +
+                       number_text(wanted.value) + ": it may take the nearest");
+  }
+  return true;
+}
+
+void set_frame_duration(const CameraRequest& request, const OfferedControl& control, StartControls& controls) {
+  if (request.frame_rate_hz) {
+    const double frame_us = 1e6 / *request.frame_rate_hz;
+    if (is_settable({"frame duration [us]", frame_us}, control, controls.warnings)) {
+      controls.frame_duration_us = {whole_us(frame_us), whole_us(frame_us)};
+    }
+    if (request.exposure_s && *request.exposure_s * 1e6 > frame_us) {
+      controls.warnings.push_back("an exposure of " + number_text(*request.exposure_s) + " s does not fit a frame at " +
+                                  number_text(*request.frame_rate_hz) + " Hz: the camera shortens one of them");
+    }
+  } else if (controls.exposure_us && *controls.exposure_us > usual_frame_us && control.offered) {
+    // Rows are read after the exposure, so a frame is longer than it by some rows; the camera takes what it needs.
+    const double longest_us = std::max(control.range ? control.range->largest : 0.0, 2.0 * *controls.exposure_us);
+    controls.frame_duration_us = {*controls.exposure_us, whole_us(longest_us)};
+  }
+}
+
+}  // namespace
+
+StartControls start_controls(const CameraRequest& request, const OfferedControls& offered) {
+  StartControls controls;
+  if (request.exposure_s) {
+    const double exposure_us = *request.exposure_s * 1e6;
+    if (is_settable({"exposure [us]", exposure_us}, offered.exposure_us, controls.warnings)) {
+      constexpr auto largest_us = static_cast<double>(std::numeric_limits<std::int32_t>::max());
+      controls.exposure_us = static_cast<std::int32_t>(std::lround(std::clamp(exposure_us, 1.0, largest_us)));
+    }
+  }
+  if (request.analogue_gain &&
+      is_settable({"analogue gain", *request.analogue_gain}, offered.analogue_gain, controls.warnings)) {
+    constexpr auto largest = static_cast<double>(std::numeric_limits<float>::max());
+    controls.analogue_gain = static_cast<float>(std::min(*request.analogue_gain, largest));
+  }
+  controls.ae_off = offered.ae_enable && (controls.exposure_us || controls.analogue_gain);
+  set_frame_duration(request, offered.frame_duration_us, controls);
+  return controls;
+}
+
+}  // namespace lowlux::capture

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "capture/v4l2/v4l2_device.h"
+
+namespace lowlux::capture {
+
+/// What the driver says of the buffer that it hands over; nothing of it is checked.
+struct V4l2Taken {
+  std::uint32_t index = 0;
+  std::uint32_t flags = 0;
+  std::uint32_t sequence = 0;
+  std::uint32_t bytes_used = 0;
+  std::uint32_t data_offset = 0;  // of the frame in the buffer; 0 with one plane of memory
+  std::int64_t seconds = 0;
+  std::int64_t microseconds = 0;
+};
+
+/// The driver's buffers, mapped. Streaming is ended, and all is unmapped, closed and returned, on destruction.
+class V4l2Buffers {
+ public:
+  /// Asks for `count` buffers (the driver may give fewer or more), each of at least `frame_bytes`, all of
+  /// them at most most_buffer_bytes. None is queued.
+  static Result<std::unique_ptr<V4l2Buffers>> request(V4l2Device& device, V4l2Memory memory, int count,
+                                                      std::size_t frame_bytes);
+  ~V4l2Buffers();
+  V4l2Buffers(const V4l2Buffers&) = delete;
+  V4l2Buffers& operator=(const V4l2Buffers&) = delete;
+
+  /// Queues all buffers and starts.
+  Result<void> start_streaming();
+  /// Hands a buffer to the driver: 0, else errno. `index` is one of a buffer that is not queued.
+  int queue(std::size_t index);
+  /// Takes the next filled buffer, without waiting: 0, else errno. EBADMSG if the driver hands over one it does not
+  /// have.
+  int take(V4l2Taken& taken);
+  /// Before and after this process reads a buffer: 0, else errno. Of mapped buffers nothing is to be done.
+  int begin_access(std::size_t index);
+  int end_access(std::size_t index);
+
+  std::size_t count() const { return buffers_.size(); }
+  std::size_t queued() const;
+  bool is_queued(std::size_t index) const { return buffers_[index].queued; }
+  std::span<const std::byte> bytes(std::size_t index) const { return {buffers_[index].at, buffers_[index].bytes}; }
+
+ private:
+  struct Buffer {
+    const std::byte* at = nullptr;
+    std::size_t bytes = 0;
+    int file = -1;  // of the DMA buffer
+    bool queued = false;
+    bool accessed = false;  // begin_access without end_access
+  };
+  V4l2Buffers(V4l2Device& device, V4l2Memory memory) : device_(device), memory_(memory) {}
+  Result<void> add(std::uint32_t index, std::size_t frame_bytes, std::size_t most_bytes);
+  Result<int> exported(std::uint32_t index);
+  int synchronise(std::size_t index, std::uint64_t flags);
+
+  V4l2Device& device_;
+  V4l2Memory memory_;
+  std::vector<Buffer> buffers_;
+  bool requested_ = false;
+  bool streaming_ = false;
+};
+
+}  // namespace lowlux::capture

@@ -1,0 +1,192 @@
+#include "capture/v4l2/v4l2_camera.h"
+
+#include <linux/videodev2.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <utility>
+
+#include "capture/file/pass_on.h"
+#include "capture/v4l2/v4l2_exposure.h"
+
+namespace lowlux::capture {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+
+// A device that vanishes need not end a wait: the node is looked at again this often.
+constexpr milliseconds longest_slice{500};
+constexpr milliseconds longest_timeout = std::chrono::hours(24);
+// After a buffer that was announced and was not there.
+constexpr int pause_ms = 1;
+
+// CameraFrame::buffer holds the index in the low bits and the start above.
+constexpr int index_bits = 5;
+constexpr int most_sessions = 1 << 20;
+
+/// Frames missing after `last`; 0 where the count repeats itself or goes back.
+std::uint32_t lost_between(std::uint32_t last, std::uint32_t now) {
+  const std::uint32_t step = now - last;  // modulo 2^32, as drivers count
+  return step == 0 || step > std::uint32_t{1} << 31 ? 0 : step - 1;
+}
+
+}  // namespace
+
+V4l2Camera::V4l2Camera(std::unique_ptr<V4l2Device> device, V4l2Agreement agreement, const V4l2Options& options)
+    : device_(std::move(device)),
+      agreement_(std::move(agreement)),
+      memory_(options.memory),
+      buffers_wanted_(options.request.buffers) {}
+
+Result<void> V4l2Camera::start() {
+  if (buffers_) return {};
+  if (device_->gone()) return tl::make_unexpected(device_->gone_error());
+  auto buffers = V4l2Buffers::request(*device_, memory_, buffers_wanted_, frame_bytes(agreement_.format));
+  if (!buffers) return pass_on(buffers);
+  if (auto unchanged = check_unchanged(); !unchanged) return unchanged;
+  facts_ = read_facts(*device_, agreement_.format);
+  if (auto started = (*buffers)->start_streaming(); !started) return started;
+  buffers_ = *std::move(buffers);
+  last_sequence_.reset();
+  failure_.reset();
+  session_ = (session_ + 1) % most_sessions;
+  return {};
+}
+
+/// Once buffers are had nobody else can change the format; before that anybody can.
+Result<void> V4l2Camera::check_unchanged() {
+  auto now = read_layout(*device_);
+  if (!now) return pass_on(now);
+  if (*now == agreement_.layout) return {};
+  return fail(ErrorCode::unreadable,
+              "another program changed the format to " + format_text(now->fourcc) + " " + std::to_string(now->width) +
+                  "x" + std::to_string(now->height) + ": end that program and open the camera again",
+              device_->path());
+}
+
+void V4l2Camera::stop() { buffers_.reset(); }
+
+std::optional<Error> V4l2Camera::not_ready() const {
+  if (device_->gone()) return device_->gone_error();
+  if (failure_) return failure_;
+  if (!buffers_) return Error{ErrorCode::insufficient, "the camera delivers nothing before it is started", {}};
+  if (buffers_->queued() == 0) {
+    return Error{ErrorCode::insufficient,
+                 "no frame can come: all " + std::to_string(buffers_->count()) +
+                     " buffers are in use, give one back or ask for more",
+                 device_->path()};
+  }
+  return std::nullopt;
+}
+
+Result<CameraFrame> V4l2Camera::next(milliseconds timeout) {
+  if (auto error = not_ready()) return tl::make_unexpected(*std::move(error));
+  const V4l2System& system = device_->system();
+  const nanoseconds until =
+      system.now(system.context) + nanoseconds(std::clamp(timeout, milliseconds(0), longest_timeout));
+  short happened = 0;
+  for (;;) {
+    V4l2Taken taken;
+    const int code = buffers_->take(taken);
+    if (code == 0) return deliver(taken);
+    if (code == EBADMSG) {
+      return fail(ErrorCode::malformed, "the driver of " + name() + " delivers a buffer that it does not have",
+                  device_->path());
+    }
+    if (code != EAGAIN) return tl::make_unexpected(device_->error(code, "the next frame cannot be read"));
+    if ((happened & (POLLERR | POLLNVAL)) != 0) {
+      return fail(ErrorCode::unreadable, "the driver of " + name() + " has stopped streaming: start the camera again",
+                  device_->path());
+    }
+    const bool announced = (happened & POLLIN) != 0;
+    if (auto error = wait(until, announced ? 0 : POLLIN, &happened)) return tl::make_unexpected(*std::move(error));
+  }
+}
+
+/// Waits for `events`, or shortly for none; not for long. An Error when the time is over or the device is gone.
+std::optional<Error> V4l2Camera::wait(nanoseconds until, short events, short* happened) {
+  const V4l2System& system = device_->system();
+  const nanoseconds left = until - system.now(system.context);
+  if (left <= nanoseconds(0)) {
+    return Error{ErrorCode::insufficient, "no frame came in time from " + name(), device_->path()};
+  }
+  const auto slice = std::min(std::chrono::ceil<milliseconds>(left), longest_slice);
+  const int timeout_ms = events == 0 ? pause_ms : static_cast<int>(slice.count());
+  *happened = 0;
+  if (system.poll(system.context, device_->file(), events, timeout_ms, happened) < 0) {
+    *happened = 0;
+    const int code = errno;
+    if (code != EINTR && code != EAGAIN) return device_->error(code, "waiting for a frame failed");
+  }
+  if ((*happened & POLLHUP) != 0) {
+    device_->set_gone();
+    return device_->gone_error();
+  }
+  return std::nullopt;
+}
+
+Result<CameraFrame> V4l2Camera::deliver(const V4l2Taken& taken) {
+  if (auto error = contradiction(taken)) {
+    requeue(taken.index);
+    return tl::make_unexpected(*std::move(error));
+  }
+  if (const int code = buffers_->begin_access(taken.index)) {
+    requeue(taken.index);
+    return tl::make_unexpected(device_->error(code, "the DMA buffer of a frame cannot be made ready"));
+  }
+  const std::size_t whole = frame_bytes(agreement_.format);
+  CameraFrame frame;
+  frame.bytes = buffers_->bytes(taken.index).subspan(taken.data_offset, whole);
+  frame.sequence = taken.sequence;
+  frame.lost_before = last_sequence_ ? lost_between(*last_sequence_, taken.sequence) : 0;
+  frame.timestamp = timestamp_of(taken);
+  frame.damaged = (taken.flags & V4L2_BUF_FLAG_ERROR) != 0 || taken.bytes_used < taken.data_offset + whole;
+  frame.facts = facts_;
+  frame.buffer = session_ << index_bits | static_cast<int>(taken.index);
+  last_sequence_ = taken.sequence;
+  return frame;
+}
+
+/// Where what the driver says of a frame does not fit in its buffer.
+std::optional<Error> V4l2Camera::contradiction(const V4l2Taken& taken) const {
+  const std::size_t held = buffers_->bytes(taken.index).size();
+  const std::size_t whole = frame_bytes(agreement_.format);
+  if (taken.bytes_used <= held && taken.data_offset <= held - whole) return std::nullopt;
+  return Error{ErrorCode::malformed,
+               "the driver of " + name() + " says that " + std::to_string(taken.bytes_used) + " bytes, from byte " +
+                   std::to_string(taken.data_offset) + " on, are in a buffer of " + std::to_string(held),
+               device_->path()};
+}
+
+nanoseconds V4l2Camera::timestamp_of(const V4l2Taken& taken) {
+  constexpr std::int64_t most_seconds = 9'000'000'000;  // what nanoseconds in 64 bits hold
+  const bool monotonic = (taken.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+  const bool sane =
+      taken.seconds >= 0 && taken.seconds < most_seconds && taken.microseconds >= 0 && taken.microseconds < 1'000'000;
+  if (monotonic && sane) return std::chrono::seconds(taken.seconds) + std::chrono::microseconds(taken.microseconds);
+  if (!told_of_clock_) {
+    agreement_.warnings.emplace_back("the driver's timestamps are not of the monotonic clock: frames have none");
+    told_of_clock_ = true;
+  }
+  return nanoseconds(0);
+}
+
+void V4l2Camera::requeue(std::size_t index) {
+  if (const int code = buffers_->queue(index)) {
+    failure_ = device_->error(code, "the driver does not take its buffer back");
+  }
+}
+
+void V4l2Camera::give_back(const CameraFrame& frame) {
+  if (!buffers_ || frame.buffer < 0 || frame.buffer >> index_bits != session_) return;
+  const auto index = static_cast<std::size_t>(frame.buffer & ((1 << index_bits) - 1));
+  if (index >= buffers_->count() || buffers_->is_queued(index)) return;
+  if (const int code = buffers_->end_access(index)) {
+    failure_ = device_->error(code, "the DMA buffer of a frame cannot be handed back");
+  }
+  requeue(index);
+}
+
+}  // namespace lowlux::capture

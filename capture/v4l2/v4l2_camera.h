@@ -1,0 +1,51 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "capture/camera/camera.h"
+#include "capture/v4l2/v4l2_buffers.h"
+#include "capture/v4l2/v4l2_device.h"
+#include "capture/v4l2/v4l2_negotiation.h"
+
+namespace lowlux::capture {
+
+/// A V4L2 node with which a format was agreed. Memory and streaming from start() to stop().
+class V4l2Camera final : public Camera {
+ public:
+  V4l2Camera(std::unique_ptr<V4l2Device> device, V4l2Agreement agreement, const V4l2Options& options);
+
+  const std::string& name() const override { return device_->name(); }
+  const CameraFormat& format() const override { return agreement_.format; }
+  const std::vector<std::string>& warnings() const override { return agreement_.warnings; }
+  Result<void> start() override;
+  Result<CameraFrame> next(std::chrono::milliseconds timeout) override;
+  void give_back(const CameraFrame& frame) override;
+  void stop() override;
+
+ private:
+  Result<void> check_unchanged();
+  std::optional<Error> not_ready() const;
+  std::optional<Error> wait(std::chrono::nanoseconds until, short events, short* happened);
+  Result<CameraFrame> deliver(const V4l2Taken& taken);
+  std::optional<Error> contradiction(const V4l2Taken& taken) const;
+  std::chrono::nanoseconds timestamp_of(const V4l2Taken& taken);
+  void requeue(std::size_t index);
+
+  std::unique_ptr<V4l2Device> device_;  // first: what follows refers to it and goes before it
+  V4l2Agreement agreement_;
+  V4l2Memory memory_;
+  int buffers_wanted_;
+  std::unique_ptr<V4l2Buffers> buffers_;  // while streaming
+  FrameFacts facts_;
+  std::optional<std::uint32_t> last_sequence_;
+  std::optional<Error> failure_;  // met where none can be returned
+  int session_ = 0;               // counts the starts, so that a frame of an earlier one is known
+  bool told_of_clock_ = false;
+};
+
+}  // namespace lowlux::capture

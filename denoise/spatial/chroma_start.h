@@ -1,0 +1,35 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "denoise/denoise_options.h"
+#include "denoise/spatial/layout.h"
+
+/// On which pyramid level the chroma of each tile starts.
+namespace lowlux::denoise {
+
+struct ChromaStarts {
+  std::span<float> start;               // of each tile
+  std::span<unsigned char> has_chroma;  // for each level, each tile: whether blocks of chroma are needed there
+  int columns = 0;                      // tiles
+  int rows = 0;
+  float least = 0;
+  float most = 0;
+
+  bool everywhere(int level) const { return most <= static_cast<float>(level); }
+  bool nowhere(int level) const { return least >= static_cast<float>(level + 1); }
+};
+
+/// 0, 1 or 2 by the mean signal to noise ratio of one site, q = s / sqrt(s + dark + variance): from 3, from 0.7, below.
+/// No signal, 2.
+int start_of(double mean_signal_e, double mean_dark_e, double variance_e2);
+
+/// Fills least, most and has_chroma. A tile needs chroma where one up to two tiles away starts on that level or finer:
+/// one for the blend, one for what recomposition reads around a cell.
+void complete(ChromaStarts& starts);
+
+/// Share of coarser levels in the chroma of `level`, for a row of cells of level `grid`.
+void share_row(const ChromaStarts& starts, int level, int grid, int y, std::span<float> out);
+
+}  // namespace lowlux::denoise

@@ -1,0 +1,134 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <vector>
+
+#include "denoise/spatial/layout.h"
+#include "denoise/spatial/nl_bayes_rows.h"
+#include "denoise/spatial/point_sources.h"
+#include "denoise/spatial/rows.h"
+#include "isp/base/memory.h"
+#include "isp/base/plane.h"
+
+/// The memory of a Denoiser: everything a frame needs, laid out for the largest.
+namespace lowlux::denoise {
+
+/// Four planes of one size: L, C1, C2, C3.
+struct PlaneSet {
+  std::array<float*, 4> plane{};
+  std::ptrdiff_t stride = 0;
+
+  float* row(int p, int y) const { return plane[p] + y * stride; }
+};
+
+/// One pyramid level. `variance` and `residual` are of half its size.
+struct PyramidLevel {
+  int width = 0;  // of the frame at hand
+  int height = 0;
+  PlaneSet noisy;
+  PlaneSet value[2];  // of pass 1 and of pass 2
+  PlaneSet variance;  // mean over 2x2 cells, divided by 4
+  PlaneSet residual;
+};
+
+/// Rows of one thread while it makes planes and variances of level 0. Here and below, rows are of the widest level and
+/// its padding, those of raw samples twice as long.
+struct FrontMemory {
+  Scratch scratch;
+  std::array<float*, 2> raw{};                     // raw samples
+  std::array<std::array<float*, 16>, 3> window{};  // R, G, B with dark, last 16 rows
+  float* saturated = nullptr;
+  rows::RowScratch variance{};
+};
+
+/// Sums of blocks of one thread.
+struct BlockMemory {
+  Scratch scratch;
+  std::array<std::array<float*, 8>, 4> value{};   // of 8 rows
+  std::array<std::array<float*, 4>, 4> weight{};  // of 4 rows of half size
+  std::array<std::array<float*, 4>, 4> residual{};
+  rows::RowScratch weights{};  // one row
+  rows::RowScratch blocks{};
+};
+
+/// Rows of one thread while it puts a level on top of the next coarser one.
+struct UpMemory {
+  Scratch scratch;
+  rows::RowScratch up{};
+  float* coarse = nullptr;
+  float* share = nullptr;  // of the coarse level
+  float* finer = nullptr;  // the same at the next finer level
+};
+
+/// Rows of one thread while it makes a mosaic of the planes of level 0.
+struct UnpackMemory {
+  Scratch scratch;
+  rows::RowScratch up{};
+  std::array<float*, 4> residual{};
+  float* seen = nullptr;
+  std::array<float*, 2> signal{};  // raw samples
+  float* confidence = nullptr;
+  std::array<float*, 3> variance{};
+};
+
+struct ThreadMemory {
+  FrontMemory front;
+  BlockMemory blocks;
+  UpMemory up;
+  UnpackMemory unpack;
+};
+
+/// Sums of patches of one thread, for Level::best only.
+struct PatchMemory {
+  Scratch scratch;
+  std::array<std::array<float*, rows::ring>, 4> change{};
+  std::array<std::array<float*, rows::ring>, 4> weight{};
+  std::array<std::array<float*, 2>, 4> residual{};  // of half size
+  std::array<std::array<float*, 2>, 4> residual_weight{};
+  rows::RowScratch patches{};
+  std::uint8_t* chroma = nullptr;  // of each patch of a row
+};
+
+/// What lies in one stretch of floats.
+struct FrameLayout {
+  /// @param best  whether Level::best is wanted too
+  FrameLayout(int max_width, int max_height, int threads, bool best);
+
+  int columns;  // cells of the largest frame
+  int rows;
+  std::array<PyramidLevel, most_levels> level{};
+  PlaneSet difference;  // of the size of level 1
+  std::vector<ThreadMemory> thread;
+  std::vector<SearchMemory> search;  // of each thread
+  std::vector<PatchMemory> patches;  // of each thread, or empty
+
+  /// Places everything from `memory` on, each scratch memory with a guard of its own behind it; without memory it only
+  /// counts.
+  /// @return the floats that takes
+  std::size_t lay_out(float* memory);
+};
+
+struct FrameMemory : FrameLayout {
+  FrameMemory(int max_width, int max_height, int threads, bool best);
+  /// Of memory that one takes.
+  static std::size_t bytes(int max_width, int max_height, int threads, bool best);
+
+  Plane<std::uint8_t> sources;            // cells that hold point sources
+  Plane<std::uint8_t> saturated;          // cells of level 0 that hold saturated sites: 1
+  std::vector<float> starts;              // chroma start level of each tile
+  std::vector<unsigned char> has_chroma;  // for each level, each tile
+
+ private:
+  struct Free {
+    void operator()(float* memory) const { std::free(memory); }
+  };
+  std::unique_ptr<float[], Free> memory_;  // zeros of the system, which threads touch first
+  std::vector<std::int32_t> found_;
+  std::vector<std::uint8_t> chroma_;
+};
+
+}  // namespace lowlux::denoise

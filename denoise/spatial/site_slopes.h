@@ -1,0 +1,43 @@
+#pragma once
+
+#include "denoise/spatial/bands.h"
+#include "denoise/spatial/frame_memory.h"
+#include "isp/base/cfa.h"
+
+/// The sites of a 2x2 cell lie a quarter of a cell beside its middle. Where the luma has a slope they differ by it,
+/// which C2 = (R - B) / sqrt 2 and C3 = G1 - G2 take for colour; left to thresholds that colour is lost, and cells
+/// become steps. So what the luma's own slope explains is taken off before, and put back with the slope of the denoised
+/// luma:
+///     C2 -> C2 -+ (sx gx + sy gy) / (2 sqrt 2),   C3 -> C3 -+ (sy gy - sx gx) / 2
+/// gx is the harmonic mean of L(x) - L(x - 1) and L(x + 1) - L(x), 0 where they differ in sign (van Leer's limiter:
+/// beside a lamp there is a step and no slope), gy likewise, edges repeated; (sx, sy) are the signs of R's offset. What
+/// is taken off of noise adds less than 3 % to that of C2 and C3. Greys without slope stay as they are.
+namespace lowlux::denoise {
+
+/// C2 += c2_x gx + c2_y gy, C3 += c3_x gx + c3_y gy.
+struct SiteSlopes {
+  float c2_x;
+  float c2_y;
+  float c3_x;
+  float c3_y;
+};
+
+/// What puts slopes back; the negative takes them off.
+SiteSlopes site_slopes(BayerPhase phase);
+
+/// Repeats the luma's first and last column beside every row, before rows are read: each row is read by the threads of
+/// its neighbours too.
+void repeat_luma_edges(const PlaneSet& planes, int columns, int rows, const Workers& workers);
+
+/// Rows of the luma around row y of `rows`.
+struct LumaRows {
+  const float* above;
+  const float* own;
+  const float* below;
+};
+LumaRows luma_rows(const PlaneSet& planes, int y, int rows);
+
+/// Takes the slopes off the finest planes of a frame of columns x rows cells, and mirrors C2 and C3 anew beyond it.
+void take_slopes_off(const PyramidLevel& level, BayerPhase phase, int columns, int rows, const Workers& workers);
+
+}  // namespace lowlux::denoise

@@ -1,0 +1,169 @@
+// One strip of blocks through its transforms, for shrink_rows.cpp. Included once for each instruction set: hence a
+// guard that toggles in place of #pragma once.
+#if defined(LOWLUX_DENOISE_STRIP_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef LOWLUX_DENOISE_STRIP_INL_H
+#undef LOWLUX_DENOISE_STRIP_INL_H
+#else
+#define LOWLUX_DENOISE_STRIP_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstddef>
+
+#include "denoise/spatial/dct-inl.h"
+#include "denoise/spatial/rows.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lowlux::denoise::rows::HWY_NAMESPACE {
+
+// Lanes are blocks beside each other. Column c of block i is cell step * i + c, i.e. place i + c / step of the run of
+// the cells of phase c % step: rows are split into such runs once, and everything after that is contiguous.
+
+constexpr int run = strip_blocks + 32;  // places of one run in a strip, those of the last blocks' columns included
+constexpr int lead = 16;                // empty places before a strip's blocks, which shifted reads may touch
+constexpr int places = lead + run;
+
+/// Memory for one strip, zeros at first: what no strip writes, before the first block and after the last, stays 0.
+struct Strip {
+  float noisy[8][4][run];  // vertical frequency, phase, place
+  float pilot[8][4][run];
+  float luma[64][run];      // 1 where the luma coefficient is kept, else 0
+  float value[64][places];  // vertical frequency and column of blocks, before the inverse vertical transform
+  float weight[places];
+};
+
+template <int kStep>
+struct Interleaved;
+template <>
+struct Interleaved<2> {
+  static HWY_INLINE void load(const float* from, VF (&v)[2]) { hn::LoadInterleaved2(Floats(), from, v[0], v[1]); }
+  static HWY_INLINE void store(const VF (&v)[2], float* to) { hn::StoreInterleaved2(v[0], v[1], Floats(), to); }
+};
+template <>
+struct Interleaved<4> {
+  static HWY_INLINE void load(const float* from, VF (&v)[4]) {
+    hn::LoadInterleaved4(Floats(), from, v[0], v[1], v[2], v[3]);
+  }
+  static HWY_INLINE void store(const VF (&v)[4], float* to) {
+    hn::StoreInterleaved4(v[0], v[1], v[2], v[3], Floats(), to);
+  }
+};
+
+/// Vertical transform of the cells of `count` blocks, split into runs.
+template <int kStep>
+HWY_INLINE void transform_columns(const float* from, std::ptrdiff_t stride, int count, float (*out)[4][run]) {
+  HWY_ALIGN float rows[8][4 * hn::MaxLanes(Floats())];
+  const int n = lanes();
+  for (int k = 0; k < count + 8 / kStep - 1; k += n) {
+    for (int part = 0; part < kStep; ++part) {
+      VF x[8];
+      for (int y = 0; y < 8; ++y) x[y] = load(from + y * stride + kStep * k + part * n);
+      forward8(x);
+      for (int y = 0; y < 8; ++y) store(x[y], rows[y] + part * n);
+    }
+    for (int y = 0; y < 8; ++y) {
+      VF phases[kStep];
+      Interleaved<kStep>::load(rows[y], phases);
+      for (int j = 0; j < kStep; ++j) store(phases[j], out[y][j] + k);
+    }
+  }
+}
+
+template <int kStep>
+HWY_INLINE void coefficients(const float (*from)[run], int place, VF (&x)[8]) {
+  for (int c = 0; c < 8; ++c) x[c] = load(from[c % kStep] + place + c / kStep);
+  forward8(x);
+}
+
+/// What a group of blocks keeps: the sum of squared gains.
+struct HardLuma {
+  VF least;
+  HWY_INLINE explicit HardLuma(VF variance) : least(hn::Mul(constant(9), variance)) {}
+  HWY_INLINE VF gain(VF x, float* luma) const {
+    const VF kept = hn::IfThenElseZero(hn::Gt(hn::Mul(x, x), least), constant(1));
+    store(kept, luma);
+    return kept;
+  }
+};
+struct HardChroma {
+  VF least, least_beside_luma;
+  HWY_INLINE explicit HardChroma(VF variance)
+      : least(hn::Mul(constant(16), variance)), least_beside_luma(hn::Mul(constant(6.25f), variance)) {}
+  HWY_INLINE VF gain(VF x, const float* luma) const {
+    const VF enough = hn::IfThenElse(hn::Gt(load(luma), hn::Zero(Floats())), least_beside_luma, least);
+    return hn::IfThenElseZero(hn::Gt(hn::Mul(x, x), enough), constant(1));
+  }
+};
+
+/// Hard thresholds of one group of blocks; the sum of its gains.
+template <int kStep, class Rule>
+HWY_INLINE VF threshold(Strip& s, int place, const Rule& rule) {
+  VF power = hn::Zero(Floats());
+  for (int v = 0; v < 8; ++v) {
+    VF x[8];
+    coefficients<kStep>(s.noisy[v], place, x);
+    for (int u = 0; u < 8; ++u) {
+      VF gain = rule.gain(x[u], s.luma[8 * v + u] + place);
+      if (u == 0 && v == 0) gain = constant(1);
+      power = hn::Add(power, gain);
+      x[u] = hn::Mul(x[u], gain);
+    }
+    inverse8(x);
+    for (int c = 0; c < 8; ++c) store(x[c], s.value[8 * v + c] + lead + place);
+  }
+  return power;
+}
+
+/// Empirical Wiener gains of one group of blocks; the sum of their squares.
+template <int kStep>
+HWY_INLINE VF wiener(Strip& s, int place, VF variance) {
+  VF power = hn::Zero(Floats());
+  for (int v = 0; v < 8; ++v) {
+    VF gain[8], x[8];
+    coefficients<kStep>(s.pilot[v], place, gain);
+    for (VF& g : gain) {
+      const VF square = hn::Mul(g, g);
+      g = hn::Div(square, hn::Add(square, variance));
+    }
+    if (v == 0) gain[0] = constant(1);
+    for (const VF& g : gain) power = hn::MulAdd(g, g, power);
+    coefficients<kStep>(s.noisy[v], place, x);
+    for (int u = 0; u < 8; ++u) x[u] = hn::Mul(x[u], gain[u]);
+    inverse8(x);
+    for (int c = 0; c < 8; ++c) store(x[c], s.value[8 * v + c] + lead + place);
+  }
+  return power;
+}
+
+/// Weighted blocks, overlaid, through the inverse vertical transform, added to eight rows.
+template <int kStep>
+HWY_INLINE void add_columns(const Strip& s, int count, int first_cell, float* const (&rows)[8]) {
+  HWY_ALIGN float row[4 * hn::MaxLanes(Floats())];
+  const int n = lanes();
+  for (int k = 0; k < count + 8 / kStep - 1; k += n) {
+    VF out[8][kStep];
+    for (int j = 0; j < kStep; ++j) {
+      VF x[8];
+      for (int v = 0; v < 8; ++v) {
+        x[v] = hn::Zero(Floats());
+        for (int m = 0; m < 8 / kStep; ++m) {
+          const int place = lead + k - m;
+          x[v] = hn::MulAdd(load(s.weight + place), load(s.value[8 * v + j + kStep * m] + place), x[v]);
+        }
+      }
+      inverse8(x);
+      for (int y = 0; y < 8; ++y) out[y][j] = x[y];
+    }
+    for (int y = 0; y < 8; ++y) {
+      Interleaved<kStep>::store(out[y], row);
+      float* const to = rows[y] + first_cell + kStep * k;
+      for (int part = 0; part < kStep; ++part) store(hn::Add(load(to + part * n), load(row + part * n)), to + part * n);
+    }
+  }
+}
+
+}  // namespace lowlux::denoise::rows::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,288 @@
+#include "denoise/temporal/temporal.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <numeric>
+#include <vector>
+
+#include "denoise/spatial/bands.h"
+#include "denoise/temporal/temporal_rows.h"
+#include "denoise/temporal/temporal_thresholds.h"
+
+namespace lowlux::denoise {
+namespace {
+
+using rows::blocks_of_strip;
+using rows::motion_block;
+using rows::sites_of_strip;
+
+constexpr double largest_share = 1e6;  // a history that is worth nothing
+constexpr double most_light = 1e6;     // up or down, beyond which it is
+
+constexpr int rounded_up(int n, int unit) { return (n + unit - 1) / unit * unit; }
+
+/// What a strip at the end of rows is copied to and from.
+struct StripMemory {
+  std::array<std::array<float, sites_of_strip>, motion_block> raw{};
+  std::array<std::array<float, sites_of_strip>, motion_block> out{};
+  float sums[2][sites_of_strip]{};
+};
+
+[[maybe_unused]] bool usable(const RawNoise& noise, double light, const TemporalOptions& options) {
+  const auto within = [](double x, double least, double most) { return x >= least && x <= most; };
+  bool good = light > 0 && std::isfinite(light) && within(options.false_alarm, 1e-6, 0.5);
+  for (const double saturation : noise.saturation_e) good = good && saturation > 0;
+  for (const double variance : noise.variance_e2) good = good && within(variance, 0, largest_value_e);
+  for (const double dark : noise.dark_mean_e) good = good && within(dark, 0, largest_value_e);
+  return good && within(options.most_frames, 2, 256);
+}
+
+/// All that outlives a frame, for the largest one.
+struct Memory {
+  Memory(int max_width, int max_height, int threads)
+      // Rows are an odd number of cache lines: at a power of two, those that are read together would share cache sets.
+      : mean_e(rounded_up(max_width, sites_of_strip) + 16, rounded_up(max_height, motion_block)),
+        share(rounded_up(max_width, sites_of_strip) / motion_block, mean_e.height() / motion_block),
+        moved(share.width(), share.height()),
+        strip(static_cast<std::size_t>(threads)),
+        count(static_cast<std::size_t>(threads)) {
+    std::fill(mean_e.data(), mean_e.data() + mean_e.size(), 0.0f);
+    std::fill(share.data(), share.data() + share.size(), 1.0f);
+  }
+
+  Plane<float> mean_e;  // without dark charge
+  Plane<float> share;   // of each block: variance of the mean over that of a raw value
+  Plane<std::uint8_t> moved;
+  std::vector<StripMemory> strip;  // of each thread
+  std::vector<long long> count;    // of blocks that moved, of each thread
+  bool empty = true;
+  int width = 0;  // of the last frame
+  int height = 0;
+  BayerPhase phase = BayerPhase::rggb;
+  rows::SiteNoise noise{};
+};
+
+/// One call of TemporalMean::run.
+struct Frame {
+  Memory& memory;
+  const RawElectronsView& raw;
+  rows::SiteNoise noise;
+  double light;
+  TemporalOptions options;
+  bool first;
+  int columns = (raw.value.width + motion_block - 1) / motion_block;  // of blocks
+  int rows = (raw.value.height + motion_block - 1) / motion_block;
+
+  float least_weight() const { return 1 / static_cast<float>(options.most_frames); }
+  std::array<const float*, motion_block> raw_rows(int x, int y, StripMemory& strip) const;
+  std::size_t colour_of(int site) const { return static_cast<std::size_t>(colour_at(raw.phase, site % 2, site / 2)); }
+  double share_now(double share, const std::array<const float*, 2>& sums, int width, int height) const;
+  void rescale(int y, StripMemory& strip) const;
+  void find(int y, const MotionThresholds& at, StripMemory& strip) const;
+  bool has_moved(int x, int y) const;
+  long long update(int y, PlaneView<float> out, StripMemory& strip) const;
+  void put_shares(int y, PlaneView<float> map) const;
+  void take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const;
+};
+
+/// Eight rows of a strip, those beyond the frame being its last. Where the frame ends before the strip does, a copy.
+std::array<const float*, motion_block> Frame::raw_rows(int x, int y, StripMemory& strip) const {
+  const int width = std::min(sites_of_strip, raw.value.width - x);
+  std::array<const float*, motion_block> out{};
+  for (int r = 0; r < motion_block; ++r) {
+    out[r] = raw.value.row(std::min(motion_block * y + r, raw.value.height - 1)) + x;
+    if (width == sites_of_strip) continue;
+    std::memcpy(strip.raw[r].data(), out[r], width * sizeof(float));
+    out[r] = strip.raw[r].data();
+  }
+  return out;
+}
+
+/// The mean's variance over that of a raw value, where neither light nor noise is that of the mean any more: it changes
+/// by light^2 times the raw value's variance before, over that now. Both by the block's mean of each colour: a site's
+/// own would let the weights of values depend on their noise.
+/// @param sums  of the block's columns over even and odd rows, in the light of now
+double Frame::share_now(double share, const std::array<const float*, 2>& sums, int width, int height) const {
+  std::array<double, 3> sum{}, count{};
+  for (int y = 0; y < 2; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto c = static_cast<std::size_t>(colour_at(raw.phase, x, y));
+      sum[c] += static_cast<double>(sums[y][x]);
+      const int rows_of_parity = (height + 1 - y) / 2;
+      count[c] += rows_of_parity;
+    }
+  }
+  double before = 0, now = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (count[c] == 0) continue;
+    before += count[c] * variance_of(memory.noise, c, std::min(sum[c] / count[c] / light, largest_value_e));
+    now += count[c] * variance_of(noise, c, sum[c] / count[c]);
+  }
+  return std::min(share * light * light * before / now, largest_share);
+}
+
+void Frame::rescale(int y, StripMemory& strip) const {
+  rows::ScaleStrip in{};
+  in.light = static_cast<float>(light);
+  in.rows = std::min(motion_block, raw.value.height - motion_block * y);
+  for (int site = 0; site < 4; ++site) in.saturation_e[site] = noise.saturation_e[colour_of(site)];
+  for (int x = 0; x < columns; ++x) {
+    const int left = motion_block * x, of_strip = left % sites_of_strip;
+    if (of_strip == 0) {
+      for (int r = 0; r < in.rows; ++r) in.mean_e[r] = memory.mean_e.row(motion_block * y + r) + left;
+      rows::scale_mean(in, strip.sums);
+    }
+    float& share = memory.share.at(x, y);
+    share =
+        static_cast<float>(share_now(static_cast<double>(share), {strip.sums[0] + of_strip, strip.sums[1] + of_strip},
+                                     std::min(motion_block, raw.value.width - left), in.rows));
+  }
+}
+
+void Frame::find(int y, const MotionThresholds& at, StripMemory& strip) const {
+  rows::MotionStrip in{};
+  in.red_is_odd = red_column(raw.phase) == 1;
+  in.least_weight = least_weight();
+  in.noise = noise;
+  in.alone = {static_cast<float>(at.alone.z), static_cast<float>(at.alone.few)};
+  in.beside = {static_cast<float>(at.beside.z), static_cast<float>(at.beside.few)};
+  for (int x = 0; x < columns; x += blocks_of_strip) {
+    const int left = motion_block * x;
+    const auto raw_row = raw_rows(left, y, strip);
+    for (int r = 0; r < motion_block; ++r) {
+      const int source = r ^ red_row(raw.phase);  // that with red first
+      in.raw[r] = raw_row[source];
+      in.mean_e[r] = memory.mean_e.row(motion_block * y + source) + left;
+      in.inside[r] = motion_block * y + source < raw.value.height;
+    }
+    in.width = std::min(sites_of_strip, raw.value.width - left);
+    in.share = memory.share.row(y) + x;
+    rows::find_motion(in, memory.moved.row(y) + x);
+  }
+}
+
+/// A block that moved by itself, or at the lower threshold beside such a one.
+bool Frame::has_moved(int x, int y) const {
+  const auto level = [this](int u, int v) { return static_cast<int>(memory.moved.at(u, v)); };
+  if (level(x, y) != 1) return level(x, y) == 2;
+  for (int v = std::max(y - 1, 0); v <= std::min(y + 1, rows - 1); ++v) {
+    for (int u = std::max(x - 1, 0); u <= std::min(x + 1, columns - 1); ++u) {
+      if (level(u, v) == 2) return true;
+    }
+  }
+  return false;
+}
+
+/// Takes a row of blocks in.
+/// @return how many of them moved
+long long Frame::update(int y, PlaneView<float> out, StripMemory& strip) const {
+  rows::UpdateStrip in{};
+  in.rows = std::min(motion_block, raw.value.height - motion_block * y);
+  for (int site = 0; site < 4; ++site) {
+    in.dark_e[site] = noise.dark_e[colour_of(site)];
+    in.saturation_e[site] = noise.saturation_e[colour_of(site)];
+  }
+  long long moved = 0;
+  for (int x = 0; x < columns; x += blocks_of_strip) {
+    const int left = motion_block * x, width = std::min(sites_of_strip, raw.value.width - left);
+    std::array<float, blocks_of_strip> weight{};
+    for (int b = 0; b < std::min(blocks_of_strip, columns - x); ++b) {
+      float& share = memory.share.at(x + b, y);
+      const bool starts = first || has_moved(x + b, y);
+      const float k = starts ? 1.0f : std::max(share / (1 + share), least_weight());
+      share = starts ? 1.0f : (1 - k) * (1 - k) * share + k * k;
+      weight[b] = k;
+      moved += starts ? 1 : 0;
+    }
+    in.weight = weight.data();
+    const auto raw_row = raw_rows(left, y, strip);
+    for (int r = 0; r < in.rows; ++r) {
+      in.raw[r] = raw_row[r];
+      in.mean_e[r] = memory.mean_e.row(motion_block * y + r) + left;
+      in.out[r] = width == sites_of_strip ? out.row(motion_block * y + r) + left : strip.out[r].data();
+    }
+    rows::update_mean(in);
+    if (width == sites_of_strip) continue;
+    for (int r = 0; r < in.rows; ++r) {
+      std::memcpy(out.row(motion_block * y + r) + left, strip.out[r].data(), width * sizeof(float));
+    }
+  }
+  return moved;
+}
+
+/// Those of a row of blocks, for each cell.
+void Frame::put_shares(int y, PlaneView<float> map) const {
+  constexpr int cells = motion_block / 2;
+  for (int v = cells * y; v < std::min(cells * (y + 1), map.height); ++v) {
+    for (int u = 0; u < map.width; ++u) map.at(u, v) = memory.share.at(u / cells, y);
+  }
+}
+
+/// Counts blocks that move in memory.count.
+void Frame::take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const {
+  const bool same = light == 1 && noise == memory.noise;
+  const MotionThresholds at = motion_thresholds(options.false_alarm);
+  const auto compare = [&](int y, StripMemory& strip) {
+    if (!same) rescale(y, strip);
+    find(y, at, strip);
+  };
+  // The ends of bands first, for those beside them. Inside of a band the rest follows where it is still in the cache.
+  if (!first) {
+    in_bands(workers, rows, [&](int top, int bottom, int thread) {
+      compare(top, memory.strip[thread]);
+      if (bottom - 1 > top) compare(bottom - 1, memory.strip[thread]);
+    });
+  }
+  std::fill(memory.count.begin(), memory.count.end(), 0);
+  in_bands(workers, rows, [&](int top, int bottom, int thread) {
+    StripMemory& strip = memory.strip[thread];
+    for (int y = top; y < bottom; ++y) {
+      if (!first && y + 1 < bottom - 1) compare(y + 1, strip);
+      memory.count[thread] += update(y, out, strip);
+      if (shares.data != nullptr) put_shares(y, shares);
+    }
+  });
+}
+
+}  // namespace
+
+struct TemporalMean::State {
+  Memory memory;
+};
+
+TemporalMean::TemporalMean(int max_width, int max_height, int threads) {
+  assert(max_width >= 2 && max_height >= 2 && threads >= 1);
+  assert(max_width <= largest_side && max_height <= largest_side);
+  state_ = std::make_unique<State>(State{Memory(max_width, max_height, threads)});
+}
+TemporalMean::~TemporalMean() = default;
+
+void TemporalMean::reset() { state_->memory.empty = true; }
+
+double TemporalMean::run(const RawElectronsView& raw, const RawNoise& noise, double light,
+                         const TemporalOptions& options, PlaneView<float> mean_e, PlaneView<float> variance_share,
+                         Executor& executor) {
+  Memory& memory = state_->memory;
+  assert(raw.value.width >= 2 && raw.value.height >= 2);
+  assert(raw.value.width <= memory.share.width() * motion_block);
+  assert(raw.value.height <= memory.share.height() * motion_block);
+  assert(mean_e.width == raw.value.width && mean_e.height == raw.value.height);
+  assert(usable(noise, light, options));
+  const bool known = memory.width == raw.value.width && memory.height == raw.value.height && memory.phase == raw.phase;
+  const bool worthless = light > most_light || light < 1 / most_light;
+  const Frame frame{memory, raw, site_noise(noise, raw.phase), light, options, memory.empty || !known || worthless};
+  frame.take_in({executor, static_cast<int>(memory.strip.size())}, mean_e, variance_share);
+  memory.empty = false;
+  memory.width = raw.value.width;
+  memory.height = raw.value.height;
+  memory.phase = raw.phase;
+  memory.noise = frame.noise;
+  const long long moved = std::accumulate(memory.count.begin(), memory.count.end(), 0LL);
+  return static_cast<double>(moved) / (static_cast<double>(frame.columns) * frame.rows);
+}
+
+}  // namespace lowlux::denoise

@@ -1,0 +1,149 @@
+#include "isp/bench/peers/denoise_methods.h"
+
+#include <algorithm>
+#include <cstring>
+#include <ctime>
+#include <utility>
+
+#include "isp/bench/peers/gat_denoise.h"
+#include "isp/metrics/statistics.h"
+
+namespace lowlux::isp {
+namespace {
+
+using denoise::Level;
+
+double cpu_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+template <class Work>
+double time_of(const Work& work) {
+  const double start = cpu_s();
+  work();
+  return cpu_s() - start;
+}
+
+/// Rounds of work and of memcpy in turn; with more than one, another goes before to warm up.
+template <class Work>
+void time_rounds(const MethodInput& input, MethodResult& result, const Work& work) {
+  const Plane<float>& frame = input.shot.raw_e;
+  Plane<float> copy(frame.width(), frame.height());
+  std::vector<double> work_s, memcpy_s;
+  for (int round = input.rounds > 1 ? -1 : 0; round < input.rounds; ++round) {
+    const double copied = time_of([&] { std::memcpy(copy.data(), frame.data(), frame.size() * sizeof(float)); });
+    const double worked = time_of(work);
+    if (round < 0) continue;
+    memcpy_s.push_back(copied);
+    work_s.push_back(worked);
+  }
+  result.cpu_s = median(work_s);
+  result.spread = spread_of(work_s);
+  result.memcpy_s = median(memcpy_s);
+}
+
+Plane<float> same_size(const MethodInput& input) { return {input.shot.raw_e.width(), input.shot.raw_e.height()}; }
+
+void subtract_dark(const DenoiseShot& shot, Plane<float>& out) {
+  const auto dark_e = static_cast<float>(shot.light.dark_e);
+  std::transform(shot.raw_e.data(), shot.raw_e.data() + shot.raw_e.size(), out.data(),
+                 [dark_e](float e) { return e - dark_e; });
+}
+
+Result<MethodResult> run_noise_free(const MethodInput& input, Level /*level*/, MethodMemory& memory) {
+  return MethodResult{.picture = memory.renderer.render(input.shot.signal_e.view(), input.shot)};
+}
+
+Result<MethodResult> run_none(const MethodInput& input, Level /*level*/, MethodMemory& memory) {
+  MethodResult result;
+  Plane<float> out = same_size(input);
+  time_rounds(input, result, [&] { subtract_dark(input.shot, out); });
+  result.picture = memory.renderer.render(out.view(), input.shot);
+  return result;
+}
+
+RenderedPicture with_dark(const MethodInput& input, MethodMemory& memory) {
+  return memory.renderer.render(input.shot.raw_e.view(), input.shot, exposure_with_dark(input.picture, input.shot));
+}
+
+Result<MethodResult> run_dark_left_in(const MethodInput& input, Level /*level*/, MethodMemory& memory) {
+  MethodResult result;
+  Plane<float> out = same_size(input);
+  // Nothing is done to the mosaic: what remains is to have it.
+  time_rounds(input, result, [&] { std::copy_n(input.shot.raw_e.data(), out.size(), out.data()); });
+  result.picture = with_dark(input, memory);
+  return result;
+}
+
+Result<MethodResult> run_chromatic(const MethodInput& input, Level /*level*/, MethodMemory& memory) {
+  MethodResult result;
+  const SceneLinear light = with_dark(input, memory).light;
+  time_rounds(input, result, [&] { result.picture.light = chromatic_filtered(light.view(), input.tuned.windows); });
+  result.picture.display = memory.renderer.display_of(result.picture.light);
+  return result;
+}
+
+Result<MethodResult> run_nl_means(const MethodInput& input, Level /*level*/, MethodMemory& memory) {
+  MethodResult result;
+  Plane<float> out = same_size(input);
+  subtract_dark(input.shot, out);
+  Encoded8 noisy = nl_means_input(memory.renderer.render(out.view(), input.shot));
+  Encoded8 clean{Plane<std::uint8_t>(noisy.codes.width(), noisy.codes.height())};
+  const NlMeansPicture from{noisy.codes.data(), noisy.width(), noisy.height()};
+  const NlMeansPicture to{clean.codes.data(), clean.width(), clean.height()};
+  bool works = true;
+  MethodInput timed = input;
+  timed.rounds = input.slow_rounds;
+  time_rounds(timed, result,
+              [&] { works = input.nl_means->denoise(from, to, input.strength.lightness, input.strength.colour); });
+  if (!works) return fail(ErrorCode::unreadable, "OpenCV's fastNlMeansDenoisingColored failed: not enough memory?");
+  result.picture.display = linear_of(clean);
+  result.picture.light = linear_of(clean);
+  return result;
+}
+
+Result<MethodResult> run_gat(const MethodInput& input, Level level, MethodMemory& memory) {
+  MethodResult result;
+  Plane<float> out = same_size(input);
+  InlineExecutor one;
+  time_rounds(input, result,
+              [&] { gat_denoise(memory.denoiser, input.shot, level, input.tuned.stabilised_gain, out.view(), one); });
+  result.picture = memory.renderer.render(out.view(), input.shot);
+  return result;
+}
+
+Result<MethodResult> run_denoiser(const MethodInput& input, Level level, MethodMemory& memory) {
+  MethodResult result;
+  Plane<float> out = same_size(input);
+  InlineExecutor one;
+  MethodInput timed = input;
+  if (level == Level::best) timed.rounds = input.slow_rounds;
+  time_rounds(timed, result, [&] {
+    memory.denoiser.run({input.shot.raw_e.view(), BayerPhase::rggb}, input.shot.noise(),
+                        {.level = level, .white_gain = bench_white_gain}, out.view(), {}, one);
+  });
+  result.picture = memory.renderer.render(out.view(), input.shot);
+  return result;
+}
+
+}  // namespace
+
+MethodMemory::MethodMemory(int max_width, int max_height, Executor& for_rendering)
+    : denoiser(max_width, max_height, 1, denoise::all_levels.back()), renderer(max_width, for_rendering) {}
+
+std::vector<DenoiseMethod> denoise_methods(bool with_nl_means) {
+  std::vector<DenoiseMethod> out{{"noise-free", MethodKind::ceiling, Level::standard, run_noise_free},
+                                 {name_of_none, MethodKind::other, Level::standard, run_none},
+                                 {"dark-left-in", MethodKind::other, Level::standard, run_dark_left_in},
+                                 {"chromatic", MethodKind::other, Level::standard, run_chromatic}};
+  if (with_nl_means) out.push_back({name_of_nl_means, MethodKind::other, Level::standard, run_nl_means});
+  out.push_back({"gat-standard", MethodKind::other, Level::standard, run_gat});
+  for (const Level level : denoise::all_levels) {
+    out.push_back({std::string(denoise::name_of(level)), MethodKind::ours, level, run_denoiser});
+  }
+  return out;
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,117 @@
+#include "isp/bench/scenes/denoise_scene.h"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "isp/base/random/random.h"
+#include "isp/render/output_space.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr BayerPhase phase = BayerPhase::rggb;
+
+double gain_at(int x, int y) { return bench_white_gain[static_cast<std::size_t>(colour_at(phase, x, y))]; }
+
+Vector3 weights() { return luminance_weights(OutputSpace::linear_srgb).value(); }  // of a space with primaries
+
+RgbTransform transform(bool move_into_gamut) {
+  const Vector3 w = weights();
+  return {.luminance = {static_cast<float>(w[0]), static_cast<float>(w[1]), static_cast<float>(w[2])},
+          .clip = std::numeric_limits<float>::infinity(),  // no pixel is saturated
+          .move_into_gamut = move_into_gamut};
+}
+
+double mean_of(const Plane<float>& plane) {
+  double sum = 0;
+  for (std::size_t i = 0; i < plane.size(); ++i) sum += static_cast<double>(plane.data()[i]);
+  return sum / static_cast<double>(plane.size());
+}
+
+}  // namespace
+
+std::string name_of(const DenoiseLight& light) { return fmt::format("{:g}/{:g}", light.mean_e, light.dark_e); }
+
+denoise::RawNoise DenoiseShot::noise() const {
+  const double read_e2 = light.read_noise_e * light.read_noise_e;
+  return {.dark_mean_e = {light.dark_e, light.dark_e, light.dark_e, light.dark_e},
+          .variance_e2 = {read_e2, read_e2, read_e2}};
+}
+
+std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light) {
+  const auto all = files_of(PictureSet::all);
+  const auto place = static_cast<std::uint64_t>(std::find(all.begin(), all.end(), picture.name) - all.begin());
+  return 1000 * place + static_cast<std::uint64_t>(light.mean_e) + (light.dark_e > 2 ? 100000 : 0);
+}
+
+DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::uint64_t seed) {
+  const int width = picture.linear.width(), height = picture.linear.height();
+  DenoiseShot shot{.light = light, .signal_e = Plane<float>(width, height), .raw_e = Plane<float>(width, height)};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto colour = static_cast<std::size_t>(colour_at(phase, x, y));
+      shot.signal_e.at(x, y) = static_cast<float>(picture.linear.plane[colour].at(x, y) / gain_at(x, y));
+    }
+  }
+  shot.white_e = light.mean_e / mean_of(shot.signal_e);
+  std::vector<float> mean(static_cast<std::size_t>(width)), normal(static_cast<std::size_t>(width));
+  const DrawStream stream{.seed = seed, .frame = 0, .purpose = draw_purpose::electrons};
+  for (int y = 0; y < height; ++y) {
+    float* const signal = shot.signal_e.row(y);
+    float* const raw = shot.raw_e.row(y);
+    for (std::size_t x = 0; x < mean.size(); ++x) {
+      signal[x] = static_cast<float>(signal[x] * shot.white_e);
+      mean[x] = static_cast<float>(signal[x] + light.dark_e);
+      assert(mean[x] <= poisson_max_mean);
+    }
+    poisson_row(stream, 0, static_cast<std::uint32_t>(y), mean, {raw, mean.size()});
+    normal_row(stream, 0, static_cast<std::uint32_t>(y), 1, normal);
+    for (std::size_t x = 0; x < mean.size(); ++x) raw[x] += static_cast<float>(light.read_noise_e) * normal[x];
+  }
+  return shot;
+}
+
+SignedMosaic mosaic_of(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, double exposure) {
+  SignedMosaic out{.value = mosaic_e, .phase = phase};
+  for (int y = 0; y < 2; ++y) {
+    for (int x = 0; x < 2; ++x) {
+      out.gain[static_cast<std::size_t>(site_of(x, y))] = static_cast<float>(gain_at(x, y) * exposure / shot.white_e);
+    }
+  }
+  return out;
+}
+
+BenchRenderer::BenchRenderer(int max_width, Executor& executor)
+    : executor_(executor), kernel_(max_width, executor.width()) {}
+
+RenderedPicture BenchRenderer::render(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot,
+                                      double exposure) {
+  const SignedMosaic in = mosaic_of(mosaic_e, shot, exposure);
+  RenderedPicture out{SceneLinear(mosaic_e.width, mosaic_e.height), SceneLinear(mosaic_e.width, mosaic_e.height)};
+  kernel_.linear(in, transform(true), out.display.view(), executor_);
+  kernel_.linear(in, transform(false), out.light.view(), executor_);
+  return out;
+}
+
+SceneLinear BenchRenderer::display_of(const SceneLinear& light) {
+  SceneLinear out(light.width(), light.height());
+  kernel_.linear(CameraPlanes{.rgb = light.view()}, transform(true), out.view(), executor_);
+  return out;
+}
+
+double exposure_with_dark(const BenchPicture& picture, const DenoiseShot& shot) {
+  const Vector3 w = weights();
+  double signal = 0, dark = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    signal += w[c] * mean_of(picture.linear.plane[c]);
+    dark += w[c] * shot.light.dark_e * bench_white_gain[c] / shot.white_e;
+  }
+  return signal / (signal + dark);
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,277 @@
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "isp/base/executor.h"
+#include "isp/bench/accuracy_time.h"
+#include "isp/bench/peers/demosaic_reference.h"
+#include "isp/bench/peers/nl_means.h"
+#include "isp/bench/scenes/develop_scene.h"
+#include "isp/bench/stages/developing_stages.h"
+#include "isp/metrics/picture_metrics.h"
+#include "isp/pipeline/develop.h"
+
+namespace lowlux::isp {
+namespace {
+
+using denoise::Level;
+
+constexpr PicturePart quick_part{192, 128};
+constexpr PicturePart shown_part{288, 192};  // of a picture in the report: twice as large it fills its column
+constexpr std::size_t pictures_used = 3;
+constexpr int rounds_by_one = 3;
+constexpr std::size_t least_undominated = 4;
+constexpr double least_span = 50;
+constexpr std::string_view light_of_images = "20 e-";
+
+/// What is asked of develop, beside the look.
+struct PlanChoice {
+  std::optional<Level> level;  // absent: off
+  bool repairs = true;         // defects that are found, and lines
+  bool half = false;
+
+  std::string name() const {
+    return fmt::format("{}{}{}", level ? denoise::name_of(*level) : "off", repairs ? "" : ", no repairs",
+                       half ? ", half" : "");
+  }
+};
+
+constexpr std::array plan_choices{
+    PlanChoice{.repairs = false, .half = true},
+    PlanChoice{.half = true},
+    PlanChoice{.level = Level::draft, .half = true},
+    PlanChoice{.level = Level::standard, .half = true},
+    PlanChoice{.repairs = false},
+    PlanChoice{},
+    PlanChoice{.level = Level::draft},
+    PlanChoice{.level = Level::standard, .repairs = false},
+    PlanChoice{.level = Level::standard},
+    PlanChoice{.level = Level::high},
+    PlanChoice{.level = Level::best},
+};
+
+DevelopOptions options_of(const PlanChoice& choice, Look look, const DevelopLight& light,
+                          std::optional<double> exposure_ev) {
+  DevelopOptions out;
+  out.exposure_ev = exposure_ev;
+  out.half = choice.half;
+  out.find_defects = choice.repairs;
+  if (choice.level) out.denoise = {.mode = DenoiseChoice::Mode::level, .level = *choice.level};
+  out.denoise.line_noise = choice.repairs;
+  out.look.look = look;
+  out.look.scene_luminance_cd_m2 = light.scene_cd_m2;
+  return out;
+}
+
+const Encoded8& codes_of(const Developed& developed) { return std::get<Encoded8>(developed.picture); }
+
+Result<std::vector<SimulatedRaws>> raws_of(const std::vector<BenchPicture>& pictures, const DevelopLight& light,
+                                           Executor& executor) {
+  std::vector<SimulatedRaws> out;
+  out.reserve(pictures.size());
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    auto raws = simulated_raws(pictures[i], light, i + 1, executor);
+    if (!raws) return tl::make_unexpected(raws.error());
+    out.push_back(*std::move(raws));
+  }
+  return out;
+}
+
+/// A picture taken in one light, and what is developed of it without noise.
+struct Scene {
+  const RawFrame& noisy;
+  double exposure_ev = 0;  // automatic, of the mean
+  PictureTruth truth;
+};
+
+Result<std::vector<Scene>> scenes_of(const std::vector<SimulatedRaws>& raws, const DevelopLight& light, Look look,
+                                     Executor& executor) {
+  std::vector<Scene> out;
+  out.reserve(raws.size());
+  for (const SimulatedRaws& of : raws) {
+    const PlanChoice untouched{.repairs = false};
+    const auto automatic = plan_develop(of.mean, options_of(untouched, Look::camera, light, {}), executor);
+    if (!automatic) return tl::make_unexpected(automatic.error());
+    const double ev = automatic->exposure_ev;
+    const auto truth = develop(of.mean, options_of(untouched, look, light, ev), executor);
+    if (!truth) return tl::make_unexpected(truth.error());
+    const SceneLinear light_of_truth = linear_of(codes_of(*truth));
+    out.push_back({of.noisy, ev, PictureTruth(light_of_truth.view(), executor)});
+  }
+  return out;
+}
+
+/// Adds a scene's share to the errors of a level.
+Result<void> add_error(const Scene& scene, const DevelopOptions& options, double share, AccuracyLevel& level,
+                       Executor& executor) {
+  const auto developed = develop(scene.noisy, options, executor);
+  if (!developed) return tl::make_unexpected(developed.error());
+  SceneLinear picture = linear_of(codes_of(*developed));
+  if (options.half) picture = enlarged_twice(std::as_const(picture).view(), scene.truth.width(), scene.truth.height());
+  const ColourDifference error = display_difference(std::as_const(picture).view(), scene.truth, executor);
+  level.error += share * error.mean;
+  level.largest = std::max(level.largest, error.largest);
+  return {};
+}
+
+/// One group by all threads and the same by one.
+struct MeasuredPlans {
+  std::vector<AccuracyRow> by_all;
+  std::vector<AccuracyRow> by_one;
+};
+
+Result<MeasuredPlans> measured(const std::vector<Scene>& scenes, const DevelopLight& light, Look look,
+                               const AccuracyTiming& timing, Executor& executor) {
+  AccuracyGroup group{fmt::format("{}, {}", light.name, look == Look::eye ? "eye" : "camera"),
+                      "mean CIEDE2000 against developed without noise",
+                      {}};
+  InlineExecutor one;
+  Executor* executor_in_use = &executor;
+  const RawFrame& timed = scenes.front().noisy;
+  for (const PlanChoice& choice : plan_choices) {
+    AccuracyLevel level{
+        .name = choice.name(), .megapixels = 1e-6 * timed.raw.active.width * timed.raw.active.height, .largest = 0};
+    for (const Scene& scene : scenes) {
+      const auto added = add_error(scene, options_of(choice, look, light, scene.exposure_ev),
+                                   1 / static_cast<double>(scenes.size()), level, executor);
+      if (!added) return tl::make_unexpected(added.error());
+    }
+    level.run = [&executor_in_use, &timed, options = options_of(choice, look, light, scenes.front().exposure_ev)] {
+      (void)develop(timed, options, *executor_in_use);  // it worked before
+    };
+    group.levels.push_back(std::move(level));
+  }
+  MeasuredPlans out{.by_all = measure(group, timing), .by_one = {}};
+  executor_in_use = &one;
+  out.by_one = measure(group, {.rounds = rounds_by_one, .wall_clock = true});
+  return out;
+}
+
+Finding undominated_finding(std::span<const AccuracyRow> rows) {
+  std::vector<const AccuracyRow*> front;
+  for (const AccuracyRow& row : rows) {
+    if (row.undominated) front.push_back(&row);
+  }
+  std::ranges::sort(front, {}, [](const AccuracyRow* row) { return row->ms_per_mp; });
+  std::string names;
+  for (const AccuracyRow* row : front) names += (names.empty() ? "" : "; ") + row->level;
+  const double span = front.back()->ms_per_mp / front.front()->ms_per_mp;
+  return {"develop/undominated: " + rows.front().group,
+          "so many plans no other beats in time and error, from the fastest to the slowest of them",
+          fmt::format("at least {}, {:g} times the time", least_undominated, least_span),
+          fmt::format("{}, {:.0f} times", front.size(), span),
+          front.size() >= least_undominated && span >= least_span,
+          names,
+          Finding::Kind::check};
+}
+
+/// What all lights add to.
+struct Gathered {
+  std::vector<AccuracyRow> rows;
+  std::vector<AccuracyRow> by_one;
+  std::vector<Finding> findings;
+  std::vector<BenchImage> images;
+  std::vector<BenchComparison> comparisons;
+};
+
+Encoded8 middle_of(const Encoded8& picture) {
+  const int width = std::min(shown_part.width, picture.width()), height = std::min(shown_part.height, picture.height());
+  Encoded8 out{Plane<std::uint8_t>(3 * width, height)};
+  const int left = (picture.width() - width) / 2, top = (picture.height() - height) / 2;
+  for (int y = 0; y < height; ++y) {
+    std::copy_n(picture.codes.row(top + y) + 3 * left, 3 * width, out.codes.row(y));
+  }
+  return out;
+}
+
+/// The middle of one dark frame by several plans for the page, each as exposed automatically.
+Result<void> add_pictures(const RawFrame& frame, const DevelopLight& light, Executor& executor, Gathered& out) {
+  struct Shown {
+    const char* id;
+    PlanChoice choice;
+    Look look;
+  };
+  const PlanChoice standard{.level = Level::standard};
+  for (const Shown& shown :
+       {Shown{"develop-plain", {}, Look::camera}, Shown{"develop-draft", {.level = Level::draft}, Look::camera},
+        Shown{"develop-standard", standard, Look::camera}, Shown{"develop-best", {.level = Level::best}, Look::camera},
+        Shown{"develop-eye", standard, Look::eye}}) {
+    const auto developed = develop(frame, options_of(shown.choice, shown.look, light, {}), executor);
+    if (!developed) return tl::make_unexpected(developed.error());
+    out.images.push_back({shown.id, middle_of(codes_of(*developed))});
+  }
+  out.comparisons = {
+      {"Noise, " + light.name, "develop-plain", "no noise reduction", "develop-standard", "level standard"},
+      {"Levels, " + light.name, "develop-draft", "level draft", "develop-best", "level best"},
+      {fmt::format("Looks, {}, level standard", light.name), "develop-standard", "camera", "develop-eye",
+       fmt::format("eye at {:g} cd/m2", light.scene_cd_m2)},
+  };
+  return {};
+}
+
+Result<void> gather(const std::vector<BenchPicture>& pictures, const DevelopLight& light, const AccuracyTiming& timing,
+                    Executor& executor, Gathered& out) {
+  const auto raws = raws_of(pictures, light, executor);
+  if (!raws) return tl::make_unexpected(raws.error());
+  for (const Look look : {Look::camera, Look::eye}) {
+    const auto scenes = scenes_of(*raws, light, look, executor);
+    if (!scenes) return tl::make_unexpected(scenes.error());
+    const auto plans = measured(*scenes, light, look, timing, executor);
+    if (!plans) return tl::make_unexpected(plans.error());
+    out.findings.push_back(undominated_finding(plans->by_all));
+    out.rows.insert(out.rows.end(), plans->by_all.begin(), plans->by_all.end());
+    out.by_one.insert(out.by_one.end(), plans->by_one.begin(), plans->by_one.end());
+  }
+  if (light.name != light_of_images) return {};
+  return add_pictures(raws->front().noisy, light, executor, out);
+}
+
+}  // namespace
+
+Result<BenchOutcome> run_develop_bench(const BenchOptions& options) {
+  PoolExecutor executor(options.threads);
+  const bool quick = options.quick;
+  const auto all = files_of(options.pictures);
+  const auto pictures =
+      read_bench_pictures(options.pictures_folder,
+                          quick ? quick_files_of(options.pictures) : all.first(std::min(pictures_used, all.size())),
+                          quick ? quick_part : PicturePart{768, 512}, executor);
+  if (!pictures) return tl::make_unexpected(pictures.error());
+  const AccuracyTiming timing{.rounds = quick ? 3 : 5, .wall_clock = true};
+  const std::vector<DevelopLight> lights = develop_lights(quick);
+  Gathered all_lights;
+  for (const DevelopLight& light : lights) {
+    const auto done = gather(*pictures, light, timing, executor, all_lights);
+    if (!done) return tl::make_unexpected(done.error());
+    options.advance(1 / static_cast<double>(lights.size()), "plans at " + light.name);
+  }
+  BenchOutcome out = accuracy_outcome("develop", all_lights.rows, timing, options.threads);
+  if (!quick) out.findings = std::move(all_lights.findings);  // of parts, planning takes most of the time
+  out.images = std::move(all_lights.images);
+  out.comparisons = std::move(all_lights.comparisons);
+  out.table.columns.insert(out.table.columns.end(), {"one thread [ms/MP]", "its spread [%]"});
+  for (std::size_t i = 0; i < out.table.rows.size(); ++i) {
+    out.table.rows[i].emplace_back(all_lights.by_one[i].ms_per_mp);
+    out.table.rows[i].emplace_back(100 * all_lights.by_one[i].spread);
+  }
+  out.remarks.push_back(fmt::format(
+      "{} pictures{} by a simulated camera of 14 bits, masked columns telling its dark; errors against what is "
+      "developed "
+      "of the mean of the signal, with the same exposure and look: demosaicing is in both, its noise in one; half "
+      "sizes "
+      "are enlarged to be compared; megapixels are those of the mosaic; times of the first picture, planning included; "
+      "by one thread in {} rounds",
+      pictures->size(), quick ? ", quick: parts of them," : "", rounds_by_one));
+  return out;
+}
+
+}  // namespace lowlux::isp

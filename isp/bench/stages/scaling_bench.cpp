@@ -1,0 +1,292 @@
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "capture/file/dng_source.h"
+#include "isp/base/executor.h"
+#include "isp/bench/accuracy_time.h"
+#include "isp/bench/scenes/develop_scene.h"
+#include "isp/bench/stages/developing_memory.h"
+#include "isp/bench/stages/developing_stages.h"
+#include "isp/output/dng/dng_writer.h"
+#include "isp/output/picture/image_writer.h"
+#include "isp/pipeline/develop.h"
+
+namespace lowlux::isp {
+namespace {
+
+using denoise::Level;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr std::array sizes_mp{0.3, 1.0, 3.0, 12.0, 25.0, 50.0, 100.0};
+constexpr std::size_t quick_sizes = 3;
+/// Rounds of timing: fewer for large frames.
+struct Rounds {
+  int usual;
+  int few;
+  double few_from_mp;
+};
+constexpr Rounds full_rounds{5, 2, 25}, quick_rounds{2, 2, 3};
+constexpr double memory_share = 0.4;  // of the machine's, that a frame may ask for
+constexpr int files = 8;
+constexpr double file_mp = 1;
+
+struct PlanKind {
+  const char* name;
+  std::optional<Level> level;
+};
+constexpr std::array plan_kinds{PlanKind{"plain", {}}, PlanKind{"draft", Level::draft},
+                                PlanKind{"standard", Level::standard}};
+
+DevelopOptions options_of(const PlanKind& plan) {
+  DevelopOptions out;
+  if (plan.level) out.denoise = {.mode = DenoiseChoice::Mode::level, .level = *plan.level};
+  return out;
+}
+
+/// 3 : 2, even sides.
+RawFrame frame_of(const RawFrame& small, double megapixels) {
+  const int width = 2 * static_cast<int>(std::lround(std::sqrt(1.5e6 * megapixels) / 2));
+  return tiled(small, width, 2 * static_cast<int>(std::lround(width / 3.0)));
+}
+
+/// One line of the table; what was not measured is not a number.
+struct ScalingRow {
+  std::string plan;
+  double megapixels = nan;
+  int threads = 1;
+  double jobs = nan;
+  double ms_per_mp = nan;
+  double spread = nan;
+  double times_memcpy = nan;
+  double peak_bytes_per_pixel = nan;
+  double ms_per_file = nan;
+};
+
+double pixels_of(const RawFrame& frame) { return 1.0 * frame.raw.active.width * frame.raw.active.height; }
+
+std::vector<int> thread_counts(int threads) {
+  std::vector<int> out{1};
+  if (threads >= 2) out.push_back(2);
+  if (threads > 2) out.push_back(threads);
+  return out;
+}
+
+/// All plans by all numbers of threads, in turn, on one frame.
+std::vector<ScalingRow> rows_of(const RawFrame& frame, const std::vector<std::unique_ptr<Executor>>& executors,
+                                int rounds) {
+  const double megapixels = 1e-6 * pixels_of(frame);
+  AccuracyGroup group{"", "", {}};
+  std::vector<ScalingRow> out;
+  for (const PlanKind& plan : plan_kinds) {
+    const DevelopOptions options = options_of(plan);
+    const auto peak = peak_bytes_of([&] {
+      InlineExecutor one;
+      return develop(frame, options, one).has_value();
+    });
+    for (const auto& executor : executors) {
+      out.push_back({.plan = plan.name, .megapixels = megapixels, .threads = executor->width()});
+      if (executor->width() == 1 && peak) out.back().peak_bytes_per_pixel = *peak / pixels_of(frame);
+      group.levels.push_back({.name = plan.name,
+                              .run = [&frame, &executor, options] { (void)develop(frame, options, *executor); },
+                              .megapixels = megapixels});
+    }
+  }
+  const auto measured = measure(group, {.rounds = rounds, .wall_clock = true});
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i].ms_per_mp = measured[i].ms_per_mp;
+    out[i].spread = measured[i].spread;
+    out[i].times_memcpy = measured[i].times_memcpy;
+  }
+  return out;
+}
+
+/// A folder of its own for files, which goes with them.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::error_code error;
+    std::string pattern = (std::filesystem::temp_directory_path(error) / "lowlux-bench-XXXXXX").string();
+    if (!error && mkdtemp(pattern.data()) != nullptr) path_ = pattern;
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  bool made() const { return !path_.empty(); }
+  std::string file(int index, const char* end) const { return (path_ / (std::to_string(index) + end)).string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+Result<void> develop_file(const ScratchFolder& folder, int index, Executor& executor) {
+  const auto frame = capture::read_raw(folder.file(index, ".dng"));
+  if (!frame) return tl::make_unexpected(frame.error());
+  const auto developed = develop(*frame, options_of(plan_kinds.back()), executor);
+  if (!developed) return tl::make_unexpected(developed.error());
+  return write_picture(developed->picture, OutputSpace::srgb, frame->raw.info, folder.file(index, ".png"),
+                       {.overwrite = Overwrite::yes}, executor);
+}
+
+/// All files, several at a time, each of these with its share of the threads.
+Result<void> develop_files(const ScratchFolder& folder, int jobs, int threads) {
+  std::atomic<int> next{0};
+  std::vector<Result<void>> outcome(files);
+  const auto work = [&] {
+    PoolExecutor executor(std::max(1, threads / jobs));
+    for (int i = next++; i < files; i = next++) {
+      outcome[static_cast<std::size_t>(i)] = develop_file(folder, i, executor);
+    }
+  };
+  std::vector<std::thread> others;
+  others.reserve(static_cast<std::size_t>(jobs));
+  for (int i = 1; i < jobs; ++i) others.emplace_back(work);
+  work();
+  for (std::thread& other : others) other.join();
+  for (const Result<void>& each : outcome) {
+    if (!each) return each;
+  }
+  return {};
+}
+
+Result<std::vector<ScalingRow>> rows_of_files(const RawFrame& frame, int threads, int rounds) {
+  const ScratchFolder folder;
+  if (!folder.made()) return fail(ErrorCode::unwritable, "no folder for temporary files can be made: is TMPDIR right?");
+  for (int i = 0; i < files; ++i) {
+    if (const auto written = write_dng(frame, folder.file(i, ".dng")); !written) {
+      return tl::make_unexpected(written.error());
+    }
+  }
+  AccuracyGroup group{"", "", {}};
+  std::vector<ScalingRow> out;
+  Result<void> outcome;
+  for (const int jobs : {1, 2}) {
+    out.push_back({.plan = fmt::format("{} files, standard", files),
+                   .megapixels = 1e-6 * pixels_of(frame),
+                   .threads = threads,
+                   .jobs = 1.0 * jobs});
+    group.levels.push_back({.name = "",
+                            .run =
+                                [&folder, &outcome, jobs, threads] {
+                                  if (auto done = develop_files(folder, jobs, threads); !done) outcome = done;
+                                },
+                            .megapixels = files * 1e-6 * pixels_of(frame)});
+  }
+  const auto measured = measure(group, {.rounds = rounds, .wall_clock = true});
+  if (!outcome) return tl::make_unexpected(outcome.error());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i].ms_per_mp = measured[i].ms_per_mp;
+    out[i].spread = measured[i].spread;
+    out[i].times_memcpy = measured[i].times_memcpy;
+    out[i].ms_per_file = measured[i].ms_per_mp * out[i].megapixels;
+  }
+  return out;
+}
+
+BenchTable table_of(const std::vector<ScalingRow>& rows) {
+  BenchTable out{{"plan", "frame [MP]", "threads", "jobs", "time [ms/MP]", "spread [%]", "x memcpy",
+                  "peak memory [bytes/pixel]", "time [ms/file]"},
+                 {}};
+  out.rows.reserve(rows.size());
+  for (const ScalingRow& row : rows) {
+    out.rows.push_back({row.plan, row.megapixels, 1.0 * row.threads, row.jobs, row.ms_per_mp, 100 * row.spread,
+                        row.times_memcpy, row.peak_bytes_per_pixel, row.ms_per_file});
+  }
+  return out;
+}
+
+/// A figure over the frame's size, a line for each plan and number of threads that have it.
+Plot plot_over_size(const std::vector<ScalingRow>& rows, std::string id, const std::string& label,
+                    double ScalingRow::*figure) {
+  Plot out{.id = std::move(id),
+           .title = label + " over the size of the frame",
+           .x_label = "frame [MP]",
+           .y_label = label,
+           .x_scale = AxisScale::logarithmic,
+           .y_scale = AxisScale::logarithmic};
+  for (const ScalingRow& row : rows) {
+    if (!std::isfinite(row.*figure) || std::isfinite(row.jobs)) continue;
+    const std::string name = fmt::format("{}, {} thread{}", row.plan, row.threads, row.threads == 1 ? "" : "s");
+    auto series = std::ranges::find(out.series, name, &Series::name);
+    if (series == out.series.end()) series = out.series.insert(out.series.end(), Series{name, {}, {}, Mark::line});
+    series->x.push_back(row.megapixels);
+    series->y.push_back(row.*figure);
+  }
+  return out;
+}
+
+/// Frames of all sizes there is memory for.
+std::vector<ScalingRow> rows_over_size(const RawFrame& small, const BenchOptions& options, const Rounds& rounds,
+                                       std::string& left_out) {
+  std::vector<std::unique_ptr<Executor>> executors;
+  for (const int threads : thread_counts(options.threads)) executors.push_back(std::make_unique<PoolExecutor>(threads));
+  std::vector<ScalingRow> out;
+  double most_bytes_per_pixel = 0;
+  const auto sizes = std::span(sizes_mp).first(options.quick ? quick_sizes : sizes_mp.size());
+  for (const double megapixels : sizes) {
+    options.advance(1 / static_cast<double>(sizes.size() + 1), fmt::format("frames of {:g} MP", megapixels));
+    if (1e6 * megapixels * most_bytes_per_pixel > memory_share * physical_bytes()) {
+      left_out += fmt::format("; {:g} MP left out, for want of memory", megapixels);
+      continue;
+    }
+    const int of_size = megapixels < rounds.few_from_mp ? rounds.usual : rounds.few;
+    for (ScalingRow& row : rows_of(frame_of(small, megapixels), executors, of_size)) {
+      most_bytes_per_pixel = std::fmax(most_bytes_per_pixel, row.peak_bytes_per_pixel);
+      out.push_back(std::move(row));
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<BenchOutcome> run_scaling_bench(const BenchOptions& options) {
+  PoolExecutor executor(options.threads);
+  const auto picture =
+      read_bench_pictures(options.pictures_folder, files_of(options.pictures).first(1), {768, 512}, executor);
+  if (!picture) return tl::make_unexpected(picture.error());
+  const auto raws = simulated_raws(picture->front(), develop_lights(true).front(), 1, executor);
+  if (!raws) return tl::make_unexpected(raws.error());
+  const Rounds rounds = options.quick ? quick_rounds : full_rounds;
+  std::string left_out;
+  std::vector<ScalingRow> rows = rows_over_size(raws->noisy, options, rounds, left_out);
+  const RawFrame of_file = frame_of(raws->noisy, options.quick ? sizes_mp[0] : file_mp);
+  auto of_files = rows_of_files(of_file, options.threads, options.quick ? 2 : 3);
+  if (!of_files) return tl::make_unexpected(of_files.error());
+  rows.insert(rows.end(), of_files->begin(), of_files->end());
+  BenchOutcome out{.table = table_of(rows)};
+  out.plots = {plot_over_size(rows, "scaling-time", "time [ms/MP]", &ScalingRow::ms_per_mp),
+               plot_over_size(rows, "scaling-memory", "peak memory [bytes/pixel]", &ScalingRow::peak_bytes_per_pixel)};
+  out.remarks.push_back(
+      timing_remark({.rounds = rounds.usual, .wall_clock = true}, options.threads) +
+      fmt::format("; from {:g} MP on {}; threads as in their column{}", rounds.few_from_mp, rounds.few, left_out));
+  out.remarks.emplace_back(
+      "frames are one of 20 e- repeated, planned and developed anew each time; peak memory is what a child process "
+      "with "
+      "one thread adds to its largest resident set, beyond the frame's 2 bytes for each pixel");
+  out.remarks.push_back(fmt::format(
+      "{} files: DNGs are read, developed and written as PNG, so many jobs at a time, which share the threads", files));
+  options.advance(1.0 / (options.quick ? quick_sizes + 1 : sizes_mp.size() + 1), "several files");
+  return out;
+}
+
+}  // namespace lowlux::isp

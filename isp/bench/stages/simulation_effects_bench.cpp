@@ -1,0 +1,291 @@
+#include "isp/bench/stages/simulation_effects_bench.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "capture/synthetic/sensor_sim.h"
+#include "capture/synthetic/synthetic_source.h"
+#include "isp/bench/peers/nl_means.h"
+#include "isp/bench/scenes/simulated_camera.h"
+#include "isp/bench/stages/simulation_stages.h"
+#include "isp/bench/stages/stage_rows.h"
+#include "isp/model/colour/colour_difference.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr std::array tolerances{Tolerance{0.1, 0.01}, Tolerance{0.5, 0.05}, Tolerance{2, 0.2}};
+constexpr int shown_px = 384;  // side of a picture's part in the report, before it is binned
+
+std::string name_of(const Tolerance& tolerance) {
+  return fmt::format("auto {:g},{:g}", tolerance.delta_e, tolerance.relative_variance);
+}
+
+std::string id_of(const SceneLight& light) {
+  std::string id = light.name;
+  std::ranges::replace(id, ' ', '-');
+  return id;
+}
+
+/// One picture in one light: its charge, its blocks, and the frame with all effects.
+struct PictureShot {
+  capture::SyntheticSource source;
+  std::vector<BlockLevel> blocks;
+  Plane<float> all_dn;
+};
+
+/// Which effects a level keeps: those of a tolerance, or these.
+struct Choice {
+  std::string name;
+  std::optional<Tolerance> tolerance;
+  EffectSet kept;
+};
+
+std::vector<Choice> choices() {
+  std::vector<Choice> out{{"all", std::nullopt, EffectSet::all()}};
+  out.reserve(effect_count + tolerances.size() + 2);
+  for (int e = 0; e < effect_count; ++e) {
+    const auto effect = static_cast<Effect>(e);
+    out.push_back({fmt::format("without {}", effect_names()[static_cast<std::size_t>(e)]), std::nullopt,
+                   EffectSet::all().without(effect)});
+  }
+  for (const Tolerance& tolerance : tolerances) out.push_back({name_of(tolerance), tolerance, {}});
+  out.push_back({"none", std::nullopt, EffectSet()});
+  return out;
+}
+
+/// All pictures in one light.
+class EffectsLight {
+ public:
+  static Result<EffectsLight> of(const std::vector<BenchPicture>& pictures, const SceneLight& light,
+                                 Executor& executor) {
+    EffectsLight out(light);
+    for (const BenchPicture& picture : pictures) {
+      auto source = capture::SyntheticSource::of(bench_scene(picture, light.white_cd_m2), out.camera_, bench_response(),
+                                                 {.exposure = light.exposure()}, executor);
+      if (!source) return tl::make_unexpected(source.error());
+      auto blocks = out.block_levels_of(*source);
+      Plane<float> dn(source->rate_e_per_s().width(), source->rate_e_per_s().height());
+      out.shots_.push_back({*std::move(source), std::move(blocks), std::move(dn)});
+      PictureShot& shot = out.shots_.back();
+      capture::read_out(out.frame_of(shot), out.plan_of(shot, choices().front()), executor, shot.all_dn.view());
+      out.megapixels_ += 1e-6 * static_cast<double>(shot.all_dn.size());
+      out.most_width_ = std::max(out.most_width_, shot.all_dn.width());
+      out.most_height_ = std::max(out.most_height_, shot.all_dn.height());
+    }
+    return out;
+  }
+
+  /// Changes of each choice, and the levels.
+  AccuracyGroup measure(std::vector<std::vector<double>>& figures, std::vector<Finding>& findings) {
+    AccuracyGroup group{light_.name, "largest CIEDE2000 of block means against all effects", {}};
+    auto dn = std::make_shared<Plane<float>>(most_width_, most_height_);
+    Closest of_tolerance, of_prediction;
+    for (const Choice& choice : choices()) {
+      std::vector<EffectPlan> plans;
+      plans.reserve(shots_.size());
+      for (const PictureShot& shot : shots_) plans.push_back(plan_of(shot, choice));
+      const auto [measured, predicted] = changes_of(plans);
+      figures.push_back({predicted.delta_e, measured.relative_variance, predicted.relative_variance});
+      if (choice.tolerance) {
+        of_tolerance.look_at(choice.name, measured, {choice.tolerance->delta_e, choice.tolerance->relative_variance});
+      } else {
+        of_prediction.look_at(choice.name, measured, predicted);
+      }
+      group.levels.push_back(
+          {choice.name, measured.delta_e, [this, plans = std::move(plans), dn] { read_all(plans, *dn); }, megapixels_});
+    }
+    findings.push_back(promise_finding(of_tolerance));
+    findings.push_back(bound_finding(of_prediction));
+    return group;
+  }
+
+  /// The first picture's middle with all effects, by the planner at each tolerance, and with none.
+  Encoded8 strip() const {
+    const PictureShot& shot = shots_.front();
+    const int width = std::min(shown_px, shot.all_dn.width()), height = std::min(shown_px, shot.all_dn.height());
+    std::vector<Choice> shown{choices().front()};
+    shown.reserve(tolerances.size() + 2);
+    for (const Tolerance& tolerance : tolerances) shown.push_back({{}, tolerance, {}});
+    shown.push_back({{}, std::nullopt, EffectSet()});
+    SceneLinear out(static_cast<int>(shown.size()) * (width / 2), height / 2);
+    const Developing developing = shown_developing(shot);
+    InlineExecutor one;
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+      Plane<float> dn(shot.all_dn.width(), shot.all_dn.height());
+      capture::read_out(frame_of(shot), plan_of(shot, shown[i]), one, dn.view());
+      const Plane<float> charge_e = charge_of(dn, camera_.model);
+      const int left = (dn.width() - width) / 2 & ~1, top = (dn.height() - height) / 2 & ~1;
+      const SceneLinear part =
+          binned_picture(std::as_const(charge_e).view().crop(left, top, width, height), developing);
+      for (std::size_t c = 0; c < 3; ++c) {
+        for (int y = 0; y < part.height(); ++y) {
+          std::copy_n(part.plane[c].row(y), part.width(), out.plane[c].row(y) + static_cast<int>(i) * part.width());
+        }
+      }
+    }
+    return codes_of(std::as_const(out).view());
+  }
+
+ private:
+  explicit EffectsLight(const SceneLight& light) : light_(light), camera_(bench_camera()) {}
+
+  std::vector<BlockLevel> block_levels_of(const capture::SyntheticSource& source) const {
+    return capture::block_levels(source.rate_e_per_s().view(), BayerPhase::rggb, light_.time_s);
+  }
+  capture::SensorFrame frame_of(const PictureShot& shot) const {
+    return {.sensor = camera_.model,
+            .exposure = light_.exposure(),
+            .rate_e_per_s = shot.source.rate_e_per_s().view(),
+            .seed = 1,
+            .pattern_seed = 1};
+  }
+  EffectPlan plan_of(const PictureShot& shot, const Choice& choice) const {
+    if (!choice.tolerance) return plan_keeping(choice.kept, shot.all_dn.width(), shot.all_dn.height());
+    return plan_effects(camera_.model, light_.exposure(), shot.source.developing(), shot.blocks, *choice.tolerance);
+  }
+  void read_all(const std::vector<EffectPlan>& plans, Plane<float>& dn) const {
+    InlineExecutor one;
+    for (std::size_t i = 0; i < shots_.size(); ++i) {
+      const Plane<float>& all = shots_[i].all_dn;
+      capture::read_out(frame_of(shots_[i]), plans[i], one, dn.view().crop(0, 0, all.width(), all.height()));
+    }
+  }
+
+  /// As it is developed, but the brightest pixel to white however dark it is.
+  static Developing shown_developing(const PictureShot& shot) {
+    Developing out = shot.source.developing();
+    const double peak_e = std::ranges::max(shot.blocks, {}, &BlockLevel::peak_e).peak_e;
+    const double white_e = *std::ranges::max_element(out.white_e);
+    for (double& channel_e : out.white_e) channel_e *= peak_e / white_e;
+    return out;
+  }
+
+  struct Changes {
+    PredictedChange measured;
+    PredictedChange predicted;
+  };
+  Changes changes_of(const std::vector<EffectPlan>& plans) const {
+    Changes out;
+    InlineExecutor one;
+    for (std::size_t i = 0; i < shots_.size(); ++i) {
+      const PictureShot& shot = shots_[i];
+      Plane<float> dn(shot.all_dn.width(), shot.all_dn.height());
+      capture::read_out(frame_of(shot), plans[i], one, dn.view());
+      const ChangedFrame frame{camera_.model, light_.exposure(), shot.source.developing()};
+      out.measured = larger(out.measured, measured_change(frame, dn, shot.all_dn));
+      out.predicted = larger(out.predicted, predicted_change(frame, shot.blocks, plans[i]));
+    }
+    return out;
+  }
+
+  /// How close a choice came to what it must not pass: the tolerance of a plan, or what was predicted.
+  struct Closest {
+    double share = 0;
+    std::string choice = "-";
+
+    void look_at(const std::string& name, const PredictedChange& change, const PredictedChange& most) {
+      const auto share_of = [](double value, double limit) { return value > 0 ? value / limit : 0.0; };
+      const double here =
+          std::max(share_of(change.delta_e, most.delta_e), share_of(change.relative_variance, most.relative_variance));
+      if (here > share) *this = {here, name};
+    }
+    std::string text() const { return fmt::format("{:.3g} ({})", share, choice); }
+  };
+
+  Finding promise_finding(const Closest& closest) const {
+    return check_of("simulation-effects/promise-" + id_of(light_),
+                    "the planner keeps its tolerances in every block: share of them that is used", "< 1",
+                    closest.text(), closest.share < 1);
+  }
+  Finding bound_finding(const Closest& closest) const {
+    return check_of("simulation-effects/bound-" + id_of(light_),
+                    "no block changes by more than was predicted: share of it that is seen", "<= 1", closest.text(),
+                    closest.share <= 1);
+  }
+
+  SceneLight light_;
+  NamedSensor camera_;
+  std::vector<PictureShot> shots_;
+  double megapixels_ = 0;
+  int most_width_ = 0, most_height_ = 0;
+};
+
+}  // namespace
+
+Result<BenchOutcome> run_simulation_effects_bench(const BenchOptions& options) {
+  PoolExecutor executor(options.threads);
+  const auto pictures = options.quick ? read_bench_pictures(options, 192, 128, 1, executor)
+                                      : read_bench_pictures(options, 768, 512, 0, executor);
+  if (!pictures) return tl::make_unexpected(pictures.error());
+  const AccuracyTiming timing{.rounds = options.quick ? 3 : 5};
+  StageRows rows{.further = {"predicted CIEDE2000", "relative variance", "predicted variance"}};
+  std::vector<Finding> findings;
+  std::vector<BenchImage> images;
+  images.reserve(scene_lights.size());
+  for (const SceneLight& scene_light : scene_lights) {
+    auto light = EffectsLight::of(*pictures, scene_light, executor);
+    if (!light) return tl::make_unexpected(light.error());
+    std::vector<std::vector<double>> figures;
+    const AccuracyGroup group = light->measure(figures, findings);
+    rows.add(group, std::move(figures), timing);
+    images.push_back({"simulation-effects-" + id_of(scene_light), light->strip()});
+    options.advance(1.0 / scene_lights.size(), scene_light.name);
+  }
+  BenchOutcome out = outcome_of("simulation-effects", rows, TimeOf::megapixel);
+  out.findings = std::move(findings);
+  out.images = std::move(images);
+  out.remarks = {
+      fmt::format(
+          "{} pictures ({}); the reference is the frame with all effects, of the same random numbers; figures are "
+          "the largest over blocks of {} px: CIEDE2000 of their means and relative variance of R, G or B",
+          pictures->size(), name_of(options.pictures), effect_block),
+      "Plans are made beforehand; times are of reading out one frame as floats; auto DE,VARIANCE is the planner at "
+      "these tolerances",
+      "Images show, from left to right: all effects, auto at each tolerance, none; 2 x 2 pixels are one, the brightest "
+      "pixel is white",
+      timing_remark(timing, 1)};
+  return out;
+}
+
+PredictedChange larger(const PredictedChange& a, const PredictedChange& b) {
+  return {std::max(a.delta_e, b.delta_e), std::max(a.relative_variance, b.relative_variance)};
+}
+
+PredictedChange measured_change(const ChangedFrame& frame, const Plane<float>& dn, const Plane<float>& reference_dn) {
+  assert(dn.width() == reference_dn.width() && dn.height() == reference_dn.height());
+  const auto statistics = [&](const Plane<float>& of) {
+    const Plane<float> charge_e = charge_of(of, frame.sensor);
+    return box_statistics(std::as_const(charge_e).view(), BayerPhase::rggb, effect_block);
+  };
+  const auto changed = statistics(dn), reference = statistics(reference_dn);
+  const double k = frame.sensor.system_gain_dn_per_e, floor_e2 = variance_floor_dn2 / (k * k);
+  PredictedChange out;
+  for (std::size_t i = 0; i < changed.size(); ++i) {
+    out.delta_e = std::max(out.delta_e, ciede2000(developed_lab(frame.developing, reference[i].mean),
+                                                  developed_lab(frame.developing, changed[i].mean)));
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double change_e2 = std::fabs(changed[i].variance[c] - reference[i].variance[c]);
+      out.relative_variance = std::max(out.relative_variance, change_e2 / std::max(reference[i].variance[c], floor_e2));
+    }
+  }
+  return out;
+}
+
+PredictedChange predicted_change(const ChangedFrame& frame, std::span<const BlockLevel> blocks,
+                                 const EffectPlan& plan) {
+  assert(blocks.size() == plan.region_of_block.size());
+  PredictedChange out;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    out = larger(out, predict_change(frame.sensor, frame.exposure, frame.developing, blocks[i],
+                                     plan.regions[plan.region_of_block[i]].kept));
+  }
+  return out;
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,46 @@
+#include "isp/cli/bench/bench_args.h"
+
+#include <CLI/CLI.hpp>
+
+#include "isp/cli/shared/option_values.h"
+
+namespace lowlux::cli {
+
+Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
+  CLI::App app(
+      "Measures accuracy against time: each stage at each of its levels, beside other methods. All of it is made for "
+      "less than 15 minutes on two cores, with --quick for less than one; how long it took is said at the end.",
+      "lowlux bench");
+  BenchArgs args;
+  app.add_option("--stage", args.stages, "stages to measure (default: all); --list names them")
+      ->type_name("ID[,ID...]")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  app.add_flag("--calibrate-cost", args.calibrate_cost,
+               "measure how fast this machine develops, for develop --budget-ms, and keep it; 2 to 5 minutes")
+      ->excludes("--stage");
+  app.add_flag("--list", args.list, "the stages, one line each");
+  app.add_option("-o,--output", args.output,
+                 "folder, made if need be, for the page bench.html, STAGE.csv, STAGE.json and parts of pictures (PNG)")
+      ->type_name("DIR");
+  add_choice<isp::PictureSet>(
+      app, "--pictures",
+      {{"held-out", isp::PictureSet::held_out}, {"tuning", isp::PictureSet::tuning}, {"all", isp::PictureSet::all}},
+      [&args](isp::PictureSet set) { args.pictures = set; },
+      "which of the clean pictures; parameters are chosen on the tuning set (default: held-out)");
+  app.add_option("--pictures-folder", args.pictures_folder,
+                 "where the clean pictures are (default: testdata/pictures of the source tree)")
+      ->type_name("DIR");
+  app.add_flag("--quick", args.quick,
+               "parts of two pictures in two lights, to see that all of it works: less than a minute on two cores, no "
+               "final figures");
+  app.add_option("--threads", args.threads, "for all but what is timed (default: one for each processor)")
+      ->check(CLI::Range(1, 256))
+      ->type_name("N");
+  app.add_flag("--json", args.json, "JSON instead of tables");
+  app.add_flag("--force", args.force, "overwrite files that exist");
+  if (const auto code = parse_words(app, words)) return *code;
+  return args;
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "isp/reproduce/bench_picture.h"
+#include "isp/cli/develop/develop_args.h"
+
+namespace lowlux::cli {
+
+/// `bench`: what the command line asks for.
+struct BenchArgs {
+  std::vector<std::string> stages;  // by id; empty: all
+  std::string output;               // folder for table, plots, pictures and the page; empty: none
+  std::string pictures_folder;      // empty: the source tree's
+  isp::PictureSet pictures = isp::PictureSet::held_out;
+  int threads = 0;  // 0: one for each processor
+  bool list = false;
+  bool calibrate_cost = false;  // nothing else then
+  bool quick = false;
+  bool json = false;
+  bool force = false;
+};
+
+Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words);
+
+}  // namespace lowlux::cli

@@ -1,0 +1,149 @@
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "isp/bench/bench_stages.h"
+#include "isp/cli/bench/bench_args.h"
+#include "isp/cli/bench/bench_report.h"
+#include "isp/cli/develop/cost_file.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/machine.h"
+#include "isp/cli/shared/module.h"
+#include "isp/cli/shared/progress.h"
+#include "isp/cli/shared/report.h"
+#include "isp/cli/verbs.h"
+#include "isp/pipeline/budget/frame_sample.h"
+
+namespace lowlux::cli {
+namespace {
+
+Result<std::vector<isp::BenchStage>> chosen(const std::vector<std::string>& ids) {
+  if (ids.empty()) return std::vector<isp::BenchStage>(isp::bench_stages().begin(), isp::bench_stages().end());
+  std::vector<isp::BenchStage> out;
+  out.reserve(ids.size());
+  for (const std::string& id : ids) {
+    const auto stage = isp::bench_stage_named(id);
+    if (!stage) return tl::make_unexpected(stage.error());
+    const bool again = std::ranges::any_of(out, [&](const isp::BenchStage& other) { return other.id == stage->id; });
+    if (!again) out.push_back(*stage);
+  }
+  return out;
+}
+
+/// Where the clean pictures are: as given, else in the tree the command was built from.
+Result<std::string> pictures_folder(const BenchArgs& args) {
+  const std::string folder = args.pictures_folder.empty() ? LOWLUX_PICTURES : args.pictures_folder;
+  std::error_code ignored;
+  if (std::filesystem::is_directory(folder, ignored)) return folder;
+  return fail(ErrorCode::not_found,
+              "there is no such folder of pictures: --pictures-folder names the testdata/pictures of lowlux's sources",
+              folder);
+}
+
+Result<const isp::NlMeans*> load_nl_means() {
+  const auto found = load_module({.file = "liblowlux_nlm.so",
+                                  .function = isp::nl_means_name,
+                                  .purpose = "OpenCV's non-local means",
+                                  .needs = "OpenCV's photo module (Debian: libopencv-photo-dev)"});
+  if (!found) return tl::make_unexpected(found.error());
+  return reinterpret_cast<isp::GetNlMeans*>(*found)();
+}
+
+/// Stages that fail are told of at once; the others go on.
+std::vector<MeasuredStage> run_each(const std::vector<isp::BenchStage>& stages, const isp::BenchOptions& options) {
+  std::vector<MeasuredStage> out;
+  Progress progress(static_cast<int>(stages.size()), true);
+  for (const isp::BenchStage& stage : stages) {
+    isp::BenchOptions with = options;
+    with.advance = [&progress](double share, const std::string& what) { progress.advance(share, what); };
+    const auto start = std::chrono::steady_clock::now();
+    auto outcome = stage.run(with);
+    if (outcome) {
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+      out.push_back({stage, *std::move(outcome), took.count()});
+    } else {
+      const Error& error = outcome.error();
+      const std::string where = error.where.empty() ? std::string(stage.id) : error.where;
+      progress.print([&] { print_err(fmt::format("{}\n", error_line(where, error))); });
+    }
+  }
+  return out;
+}
+
+isp::BenchOptions options_of(const BenchArgs& args, const std::string& folder) {
+  isp::BenchOptions options{.pictures_folder = folder, .pictures = args.pictures, .quick = args.quick};
+  options.threads =
+      args.threads > 0 ? args.threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  if (const auto nl_means = load_nl_means()) {
+    options.nl_means = *nl_means;
+  } else {
+    options.why_no_nl_means = nl_means.error().message;
+  }
+  return options;
+}
+
+/// Times of each part for a frame of 12 MP.
+int run_calibrate_cost(const BenchArgs& args) {
+  const int threads = args.threads > 0 ? args.threads : threads_of_each(1);
+  std::string file;
+  const auto model = calibrate_cost(threads, args.json, file);
+  if (!model) return print_failure(model.error());
+  if (args.json) {
+    print_out(fmt::format("{}", cost_text(*model)));
+    return exit_done;
+  }
+  print_out(fmt::format("{}, {} threads; ms for a frame of 12 MP\n", model->machine, threads));
+  for (int i = 0; i < isp::cost_parts; ++i) {
+    const auto part = static_cast<isp::CostPart>(i);
+    const bool sampled = part == isp::CostPart::samples;  // it takes the same however large the frame
+    const isp::CostSize size = sampled ? isp::CostSize{isp::sample_megapixels} : isp::cost_size(4000, 3000);
+    print_out(fmt::format("  {:<12}{:10.1f}\n", name_of(part), 1e3 * model->seconds(part, size)));
+  }
+  print_out(fmt::format("{}\n", file.empty() ? "not kept" : "kept in " + file));
+  return exit_done;
+}
+
+}  // namespace
+
+int run_bench(const std::vector<std::string>& words) {
+  const Parsed<BenchArgs> parsed = parse_bench(words);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& args = std::get<BenchArgs>(parsed);
+  if (args.list) {
+    for (const isp::BenchStage& stage : isp::bench_stages())
+      print_out(fmt::format("{:<20} {}\n", stage.id, stage.title));
+    return exit_done;
+  }
+  if (args.calibrate_cost) return run_calibrate_cost(args);
+  const auto stages = chosen(args.stages);
+  if (!stages) return print_usage_error("bench", stages.error());
+  const auto folder = pictures_folder(args);
+  if (!folder) return print_failure(folder.error());
+  if (const auto free = check_bench_files(*stages, args); !free) return print_failure(free.error());
+  const isp::BenchOptions options = options_of(args, *folder);
+  const std::vector<MeasuredStage> measured = run_each(*stages, options);
+  const Machine machine = this_machine(options.threads);
+  if (args.json) {
+    print_out(fmt::format("{}\n", bench_json(measured, machine)));
+  } else {
+    for (const MeasuredStage& stage : measured) print_out(fmt::format("{}", bench_text(stage)));
+  }
+  if (!args.output.empty() && !measured.empty()) {
+    PoolExecutor executor(options.threads);
+    const auto written = write_bench_files(measured, machine, args, executor);
+    if (!written) return print_failure(written.error());
+    if (!args.json) print_out("\nwritten:\n");
+    for (const std::string& name : *written) {
+      if (!args.json) print_out(fmt::format("  {}\n", one_line(name)));
+    }
+  }
+  if (!args.json && !measured.empty()) print_out(fmt::format("\n{}\n", time_text(measured)));
+  return measured.size() == stages->size() ? exit_done : exit_failed;
+}
+
+}  // namespace lowlux::cli

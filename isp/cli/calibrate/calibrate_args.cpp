@@ -1,0 +1,191 @@
+#include "isp/cli/calibrate/calibrate_args.h"
+
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/option_values.h"
+#include "isp/cli/shared/outputs.h"
+#include "isp/cli/shared/raw_files.h"
+#include "isp/output/picture/image_writer.h"
+
+namespace lowlux::cli {
+namespace {
+
+void add_output(CLI::App& app, CalibrateArgs& args) {
+  app.add_option("-o,--output", args.output, "profile to write (JSON)")->required()->type_name("PROFILE.json");
+  app.add_option("--add-to", args.add_to, "start from this profile: what is measured now takes the place of its own")
+      ->type_name("PROFILE.json");
+  app.add_option("--report", args.report, "page with tables and plots")->type_name("PAGE.html");
+  app.add_flag("--force", args.force, "overwrite files that exist");
+  app.add_flag("--json", args.json, "JSON instead of text");
+  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+}
+
+void add_settings(CLI::App& app, CalibrateArgs& args) {
+  const auto setting = [&app](const char* flag, const char* type, const char* help, std::optional<double>& out) {
+    add_number(app, flag, type, help, [&out](double value) { out = value; })->group("of frames that do not say");
+  };
+  setting("--iso", "ISO", "gain setting of all frames", args.iso);
+  setting("--exposure-time", "S", "exposure time of all frames", args.exposure_s);
+  setting("--temperature", "C", "temperature of the sensor, for all frames", args.temperature_c);
+}
+
+/// What is wrong with the command line beyond single options; empty if nothing.
+std::string wrong(const CalibrateArgs& args, const std::vector<std::string>& inputs) {
+  if (args.iso && *args.iso <= 0) return "--iso must be above 0";
+  if (args.exposure_s && *args.exposure_s < 0) return "--exposure-time must not be negative";
+  if (args.temperature_c && (*args.temperature_c < -200 || *args.temperature_c > 200)) {
+    return "--temperature must be from -200 to 200 C";
+  }
+  if (!args.output.ends_with(".json")) return "-o: profiles are .json, not " + args.output;
+  if (!args.report.empty() && !args.report.ends_with(".html")) return "--report: reports are .html, not " + args.report;
+  return wrong_names({args.output, args.report}, inputs);
+}
+
+/// A shell makes several words of bias/*.dng, and the option takes the first of them.
+std::string one_dark(const std::string& file) {
+  const std::string folder = std::filesystem::path(file).parent_path().string();
+  return fmt::format(
+      "--darks is {} alone, two or more are needed: give their folder (--darks {}), a quoted pattern or a "
+      "list separated by commas",
+      file, folder.empty() ? "." : folder + "/");
+}
+
+}  // namespace
+
+Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>& words) {
+  CLI::App app("Pedestal, dark current, its temperature law and hot pixels from dark frames.",
+               "lowlux calibrate black");
+  app.footer(
+      "Frames are put together by gain, exposure time and temperature. Two exposure times tell dark current from the\n"
+      "pedestal, two temperatures give its law; with one exposure time, or one frame, both stay in one figure. The\n"
+      "system gain comes from --system-gain, else from --add-to, else from the noise of the dark charge itself.");
+  CalibrateBlackArgs args;
+  app.add_option("FRAMES", args.common.frames, "dark frames: lens covered; with --masked any frames")->required();
+  add_output(app, args.common);
+  add_settings(app, args.common);
+  add_number(app, "--system-gain", "DN_PER_E", "codes per electron",
+             [&args](double value) { args.system_gain_dn_per_e = value; });
+  app.add_flag("--masked", args.masked, "measure the masked pixels of the frames in place of the picture");
+  app.add_option("--map", args.map,
+                 "write each pixel's pedestal and dark current to PREFIX_pedestal.pfm [DN] and "
+                 "PREFIX_current.pfm [e-/s] (with the ISO in the name if there are several)")
+      ->type_name("PREFIX");
+  if (const auto code = parse_words(app, words)) return *code;
+  if (args.system_gain_dn_per_e && *args.system_gain_dn_per_e <= 0) return refuse(app, "--system-gain must be above 0");
+  if (const std::string what = wrong(args.common, args.common.frames); !what.empty()) return refuse(app, what);
+  return args;
+}
+
+Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>& words) {
+  CLI::App app("System gain, read noise, full well, PRNU and linearity by photon transfer (EMVA 1288).",
+               "lowlux calibrate noise");
+  app.footer(
+      "Two flats of the same light make a pair, and four pairs of different light a curve; frames are paired by\n"
+      "gain, exposure time and level, in the order given. Darks are of one exposure time, the shorter the better.\n"
+      "Without --darks there is one ordinary picture: noise is then measured in its even parts.");
+  CalibrateNoiseArgs args;
+  app.add_option("FRAMES", args.common.frames, "flats in pairs, or one ordinary picture")->required();
+  app.add_option("--darks", args.darks, "two or more dark frames: files, a folder or a quoted pattern; repeatable")
+      ->type_name("FILE[,FILE...]|FOLDER")
+      ->allow_extra_args(false);
+  add_output(app, args.common);
+  add_settings(app, args.common);
+  app.add_flag("--steady-light", args.steady_light,
+               "the lamp never changed, so that the flats' exposure times tell how linear the sensor is");
+  using Method = calib::PictureNoiseMethod;
+  add_choice<Method>(
+      app, "--method", {{"ponomarenko", Method::ponomarenko}, {"foi", Method::foi}},
+      [&args](Method method) { args.method = method; },
+      "for one picture: blocks, or single details (default ponomarenko)");
+  if (const auto code = parse_words(app, words)) return *code;
+  const auto darks = raw_files_of_lists(args.darks);
+  if (!darks) return print_failure(darks.error());
+  args.darks = *darks;
+  if (args.darks.empty() && args.common.frames.size() > 1) {
+    return refuse(app, "several flats need --darks; without darks one picture is measured");
+  }
+  if (args.darks.empty() && args.steady_light) return refuse(app, "--steady-light: it is for flats");
+  if (!args.darks.empty() && args.method) return refuse(app, "--method: it is for one picture, without --darks");
+  if (args.darks.size() == 1) return refuse(app, one_dark(args.darks.front()));
+  std::vector<std::string> inputs = args.common.frames;
+  inputs.insert(inputs.end(), args.darks.begin(), args.darks.end());
+  if (const std::string what = wrong(args.common, inputs); !what.empty()) return refuse(app, what);
+  return args;
+}
+
+Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string>& words) {
+  CLI::App app("The profile of a sensor whose figures are published; `lowlux simulate --list` names them.",
+               "lowlux calibrate quoted");
+  CalibrateQuotedArgs args;
+  app.add_option("SENSOR", args.common.frames, "its name")->required()->expected(1);
+  app.add_option("-o,--output", args.common.output, "profile to write (JSON)")->required()->type_name("PROFILE.json");
+  app.add_flag("--force", args.common.force, "overwrite files that exist");
+  app.add_flag("--json", args.common.json, "JSON instead of text");
+  if (const auto code = parse_words(app, words)) return *code;
+  if (const std::string what = wrong(args.common, {}); !what.empty()) return refuse(app, what);
+  return args;
+}
+
+namespace {
+
+/// What is wrong with the files that would be written; empty if nothing.
+std::string wrong_files(const CalibrateColourArgs& args) {
+  if (args.output.empty()) return "-o is required: the profile to write";
+  if (!args.output.ends_with(".json")) return fmt::format("-o: profiles are .json, not {}", args.output);
+  if (!args.report.empty() && !args.report.ends_with(".html")) {
+    return fmt::format("--report: reports are .html, not {}", args.report);
+  }
+  if (!args.overlay.empty()) {
+    const auto format = isp::format_of(args.overlay);
+    if (!format) return format.error().message;
+    const auto fits = isp::check_writable(*format, SampleType::u8, OutputSpace::srgb);
+    if (!fits) return fits.error().message;
+  }
+  return wrong_names({args.output, args.report, args.overlay}, {args.chart});
+}
+
+std::string wrong(const CalibrateColourArgs& args) {
+  if (args.chart.empty() == args.camera.empty()) {
+    return "give a photographed chart, or --camera with spectral sensitivities";
+  }
+  if (args.chart.empty() && !args.overlay.empty()) return "--overlay: it shows a photographed chart";
+  if (args.chart.empty() && args.preserve_white) return "--preserve-white: it is for a photographed chart";
+  if (args.chart.empty() && args.even_light) return "--even-light: it is for a photographed chart";
+  if (!args.chart.empty() && args.per_photon) return "--per-photon: it is for spectral sensitivities (--camera)";
+  return wrong_files(args);
+}
+
+}  // namespace
+
+Parsed<CalibrateColourArgs> parse_calibrate_colour(const std::vector<std::string>& words) {
+  CLI::App app("A camera's colour matrix from a photographed ColorChecker or from its spectral sensitivities.",
+               "lowlux calibrate colour");
+  CalibrateColourArgs args;
+  app.add_option("CHART", args.chart, "raw file that shows a ColorChecker Classic, whole and once")->type_name("");
+  app.add_option("--camera", args.camera,
+                 "in place of a chart: spectral sensitivities, by name (`lowlux simulate --list`) or a table of "
+                 "wavelength, R, G, B")
+      ->type_name("NAME|FILE.csv");
+  app.add_flag("--per-photon", args.per_photon, "the table is quantum efficiency, not response per unit of power");
+  app.add_option("--illuminant", args.illuminant,
+                 "the light on the chart: a CIE illuminant or a lamp, or a table (default: of A, D50, D55, D65 and D75 "
+                 "the nearest to the chart's neutral; D50 where the file has no matrix, and with --camera)")
+      ->type_name("NAME|FILE.csv");
+  app.add_flag("--preserve-white", args.preserve_white, "the grey row's mean colour becomes the light's white exactly");
+  app.add_flag("--even-light", args.even_light, "do not fit how the light falls off over the chart");
+  app.add_option("-o,--output", args.output, "profile to write")->type_name("PROFILE.json");
+  app.add_option("--add-to", args.add_to, "profile whose other figures are kept")->type_name("PROFILE.json");
+  app.add_option("--report", args.report, "page with tables and plots")->type_name("PAGE.html");
+  app.add_option("--overlay", args.overlay, "picture that shows where patches were measured")->type_name("FILE.png");
+  app.add_flag("--force", args.force, "overwrite files that exist");
+  app.add_flag("--json", args.json, "one JSON object on stdout");
+  if (const auto code = parse_words(app, words)) return *code;
+  if (const std::string what = wrong(args); !what.empty()) return refuse(app, what);
+  return args;
+}
+
+}  // namespace lowlux::cli

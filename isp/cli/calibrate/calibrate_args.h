@@ -1,0 +1,65 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/picture/picture_noise.h"
+#include "isp/cli/develop/develop_args.h"
+
+namespace lowlux::cli {
+
+/// What the kinds of calibration have in common.
+struct CalibrateArgs {
+  std::vector<std::string> frames;
+  std::string output;         // the profile
+  std::string add_to;         // a profile to start from; empty: none
+  std::string report;         // a page; empty: none
+  std::optional<double> iso;  // of frames that do not state theirs
+  std::optional<double> exposure_s;
+  std::optional<double> temperature_c;
+  bool force = false;
+  bool json = false;
+  bool quiet = false;
+};
+
+struct CalibrateBlackArgs {
+  CalibrateArgs common;
+  std::optional<double> system_gain_dn_per_e;
+  bool masked = false;  // the frames' masked pixels are what is dark
+  std::string map;      // prefix of the maps' names; empty: none
+};
+
+struct CalibrateNoiseArgs {
+  CalibrateArgs common;
+  std::vector<std::string> darks;
+  bool steady_light = false;
+  std::optional<calib::PictureNoiseMethod> method;  // for one picture; absent: ponomarenko
+};
+
+struct CalibrateQuotedArgs {
+  CalibrateArgs common;  // `frames` holds the sensor's name
+};
+
+Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>& words);
+Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>& words);
+Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string>& words);
+
+struct CalibrateColourArgs {
+  std::string chart;       // a raw file; empty: spectral sensitivities
+  std::string camera;      // a name of the table, or a CSV file; empty: a chart
+  std::string illuminant;  // a name or a CSV file; empty: chosen
+  std::string output;
+  std::string add_to;   // a profile; empty: a new one
+  std::string report;   // HTML; empty: none
+  std::string overlay;  // picture; empty: none
+  bool per_photon = false;
+  bool preserve_white = false;
+  bool even_light = false;
+  bool force = false;
+  bool json = false;
+};
+
+Parsed<CalibrateColourArgs> parse_calibrate_colour(const std::vector<std::string>& words);
+
+}  // namespace lowlux::cli

@@ -1,0 +1,185 @@
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "calib/dark/dark_library.h"
+#include "calib/dark/dark_series.h"
+#include "calib/dark/dark_temperature.h"
+#include "calib/profile/profile_use.h"
+#include "isp/base/camera_profile.h"
+#include "isp/cli/calibrate/black_report.h"
+#include "isp/cli/calibrate/calibration.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/progress.h"
+#include "isp/raw/black_point.h"
+#include "isp/raw/measure/masked_black.h"
+
+namespace lowlux::cli {
+namespace {
+
+constexpr double light_of_range = 0.005;  // how far the picture may lie above the masked pixels
+constexpr double light_of_noise = 10;     // or in standard deviations of these
+
+double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
+
+/// A dark frame is as dark as its own masked pixels, where it has some.
+Result<void> check_dark(const RawDn& raw) {
+  const isp::MaskedBlack masked = isp::measure_masked_black(raw);
+  if (!masked.black) return {};
+  const double black = mean_of(masked.black->pedestal_dn), mean = calib::mean_dn(raw);
+  const double tolerated = std::max(light_of_noise * mean_of(masked.black->noise_std_dn),
+                                    light_of_range * isp::mean_range_dn(raw, *masked.black));
+  if (mean - black <= tolerated) return {};
+  return fail(ErrorCode::invalid_argument,
+              fmt::format("light reaches this frame: its mean is {:.1f} DN, that of its masked pixels {:.1f} DN; cover "
+                          "the lens, or measure the masked pixels with --masked",
+                          mean, black));
+}
+
+Result<RawDn> dark_part(RawDn raw, const CalibrateBlackArgs& args) {
+  if (!args.masked) {
+    if (const auto dark = check_dark(raw); !dark) return tl::make_unexpected(dark.error());
+    return raw;
+  }
+  const isp::MaskedBlack masked = isp::measure_masked_black(raw);
+  if (!masked.black) return fail(ErrorCode::insufficient, masked.refusal);
+  return calib::part_of(raw, masked.region);
+}
+
+/// What was read: the darks by setting, and the camera.
+struct Darks {
+  std::vector<calib::DarkSet> sets;
+  std::vector<std::pair<std::optional<double>, std::string>> files;  // with their ISO
+  FrameInfo camera;
+  std::string mosaic;
+  isp::Table frames;
+};
+
+calib::Measured measured_on(const Darks& darks, const std::optional<double>& iso) {
+  std::vector<std::string> files;
+  for (const auto& [own, file] : darks.files) {
+    if (own == iso) files.push_back(file);
+  }
+  return measured_today(std::move(files));
+}
+
+Result<Darks> read_darks(const CalibrateBlackArgs& args) {
+  calib::DarkSorter sorter;
+  Darks out;
+  Progress progress(static_cast<int>(args.common.frames.size()), !args.common.quiet);
+  for (const std::string& file : args.common.frames) {
+    auto frame = read_calibration_frame(file, args.common);
+    if (!frame) return tl::make_unexpected(frame.error());
+    out.camera = frame->raw.info;
+    out.mosaic = calib::mosaic_of(frame->raw);
+    out.files.emplace_back(frame->raw.info.iso, file);
+    list_frame(file, args.masked ? "masked pixels" : "dark", frame->raw.info, out.frames);
+    const auto dark = dark_part(std::move(frame->raw), args);
+    if (!dark) return tl::make_unexpected(with_file(dark.error(), file));
+    if (const auto added = sorter.add(*dark); !added) return tl::make_unexpected(with_file(added.error(), file));
+    progress.advance(1, file);
+  }
+  out.sets = sorter.sets();
+  return out;
+}
+
+struct Gain {
+  Estimate dn_per_e;
+  std::string source;
+};
+
+Result<Gain> gain_of(const calib::DarkSet& set, const CalibrateBlackArgs& args, const CameraProfile& profile) {
+  if (args.system_gain_dn_per_e) return Gain{{*args.system_gain_dn_per_e, 0}, "given"};
+  for (const GainProfile& g : profile.gains) {
+    if (g.iso == set.iso && g.sensor) {
+      return Gain{{g.sensor->system_gain_dn_per_e, g.errors.system_gain_dn_per_e}, "from " + args.common.add_to};
+    }
+  }
+  const auto gain = calib::gain_of_darks(set.groups);
+  if (!gain) return tl::make_unexpected(gain.error());
+  return Gain{*gain, "from the noise of the dark charge"};
+}
+
+bool tells_dark_current(const calib::DarkSet& set) {
+  return std::ranges::any_of(set.groups, [&](const calib::DarkGroup& g) {
+    return g.setting.exposure_s != set.groups.front().setting.exposure_s;
+  });
+}
+
+std::string map_name(const CalibrateBlackArgs& args, const calib::DarkSet& set, bool several, const char* what) {
+  const std::string iso = several && set.iso ? fmt::format("_iso{:g}", *set.iso) : "";
+  return fmt::format("{}{}_{}.pfm", args.map, iso, what);
+}
+
+/// Of one exposure time: what can be told is the black level with the dark charge in it.
+Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measured& measured,
+                                   const CalibrateBlackArgs& args, Calibration& found) {
+  if (set.groups.size() > 1) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("the darks have one exposure time at {} temperatures: dark current needs a second exposure "
+                            "time, a black level frames of one temperature",
+                            set.groups.size()));
+  }
+  if (!args.map.empty() || args.system_gain_dn_per_e) {
+    found.warnings.emplace_back("one exposure time does not tell dark current: --map and --system-gain do nothing");
+  }
+  const calib::DarkGroup& group = set.groups.front();
+  const auto black = calib::measure_black(group);
+  if (!black) return tl::make_unexpected(black.error());
+  calib::put_black(*black, group.setting, measured, calib::gain_at(found.profile, group.setting));
+  show_black(*black, group.setting, found);
+  return {};
+}
+
+/// One gain setting: fits what its frames can tell.
+Result<void> calibrate_set(const calib::DarkSet& set, const Darks& darks, const CalibrateBlackArgs& args,
+                           Calibration& found) {
+  const calib::Measured measured = measured_on(darks, set.iso);
+  if (!tells_dark_current(set)) return calibrate_black_level(set, measured, args, found);
+  const auto gain = gain_of(set, args, found.profile);
+  if (!gain) return tl::make_unexpected(gain.error());
+  auto series = calib::fit_dark_series(set.groups, gain->dn_per_e);
+  if (!series) return tl::make_unexpected(series.error());
+  GainProfile& profile = calib::gain_at(found.profile, set.groups.front().setting);
+  calib::put_dark_series(*series, set.groups, gain->dn_per_e, measured, profile);
+  if (args.masked) profile.hot_pixels.clear();  // they are none of the picture's
+  show_dark_series(*series, set.groups, profile, gain->source, found);
+  if (args.map.empty()) return {};
+  const bool several = darks.sets.size() > 1;
+  found.maps.push_back({map_name(args, set, several, "pedestal"), std::move(series->pedestal_map_dn)});
+  found.maps.push_back({map_name(args, set, several, "current"), std::move(series->current_map_e_per_s)});
+  return {};
+}
+
+Result<Calibration> calibrate(const CalibrateBlackArgs& args) {
+  if (const auto good = check_outputs(args.common); !good) return tl::make_unexpected(good.error());
+  auto profile = starting_profile(args.common);
+  if (!profile) return tl::make_unexpected(profile.error());
+  const auto darks = read_darks(args);
+  if (!darks) return tl::make_unexpected(darks.error());
+  Calibration found;
+  found.profile = std::move(*profile);
+  found.frames = darks->frames;
+  found.report.title = camera_name(darks->camera.make, darks->camera.model) + ": black level and dark current";
+  if (const auto same = put_camera(darks->camera, found.profile); !same) return tl::make_unexpected(same.error());
+  if (const auto same = put_mosaic(darks->mosaic, found.profile); !same) return tl::make_unexpected(same.error());
+  for (const calib::DarkSet& set : darks->sets) {
+    const auto done = calibrate_set(set, *darks, args, found);
+    if (!done) return tl::make_unexpected(done.error());
+  }
+  return found;
+}
+
+}  // namespace
+
+int run_calibrate_black(const std::vector<std::string>& words) {
+  const auto parsed = parse_calibrate_black(words);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& args = std::get<CalibrateBlackArgs>(parsed);
+  const auto found = calibrate(args);
+  return found ? finish(args.common, *found) : calibration_failed(args.common, found.error());
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,144 @@
+#include "isp/cli/calibrate/calibration.h"
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <utility>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "calib/profile/profile_io.h"
+#include "capture/file/dng_source.h"
+#include "isp/base/camera_profile.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/machine.h"
+#include "isp/cli/shared/outputs.h"
+#include "isp/cli/shared/profile_option.h"
+#include "isp/cli/shared/report.h"
+#include "isp/output/atomic_file.h"
+
+namespace lowlux::cli {
+namespace {
+
+/// JSON holds UTF-8 only; names of files hold any bytes.
+std::string readable(const std::string& name) {
+  using Json = nlohmann::ordered_json;
+  return Json::parse(Json(name).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
+}
+
+/// What was found, how it was measured and what on.
+isp::Report whole_report(const CalibrateArgs& args, const Calibration& found) {
+  isp::Report report = found.report;
+  report.text = measurement_text(args.output);
+  report.sections.push_back({"Frames", "", found.frames, {}});
+  return report;
+}
+
+}  // namespace
+
+Result<void> check_outputs(const CalibrateArgs& args) {
+  if (auto place = check_place(args.output, args.force); !place) return place;
+  if (args.report.empty()) return {};
+  return check_place(args.report, args.force);
+}
+
+Result<CameraProfile> starting_profile(const CalibrateArgs& args) {
+  return args.add_to.empty() ? CameraProfile{} : read_profile(args.add_to);
+}
+
+Result<RawFrame> read_calibration_frame(const std::string& file, const CalibrateArgs& args) {
+  Result<RawFrame> frame = capture::read_raw(file);
+  if (!frame) return tl::make_unexpected(with_file(std::move(frame.error()), file));
+  FrameInfo& info = frame->raw.info;
+  if (!info.iso) info.iso = args.iso;
+  if (!info.exposure_s) info.exposure_s = args.exposure_s;
+  if (!info.temperature_c) info.temperature_c = args.temperature_c;
+  return frame;
+}
+
+Result<void> put_camera(const FrameInfo& info, CameraProfile& profile) {
+  const auto differs = [](const std::string& a, const std::string& b) { return !a.empty() && !b.empty() && a != b; };
+  if (differs(profile.make, info.make) || differs(profile.model, info.model)) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format(R"(the profile is of "{}", what is to be added of "{}")",
+                            camera_name(profile.make, profile.model), camera_name(info.make, info.model)));
+  }
+  if (profile.make.empty()) profile.make = info.make;
+  if (profile.model.empty()) profile.model = info.model;
+  return {};
+}
+
+Result<void> put_mosaic(const std::string& mosaic, CameraProfile& profile) {
+  if (!profile.mosaic.empty() && !mosaic.empty() && profile.mosaic != mosaic) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("the profile is of a sensor that is {}, what is to be added of one that is {}",
+                            profile.mosaic, mosaic));
+  }
+  if (profile.mosaic.empty()) profile.mosaic = mosaic;
+  return {};
+}
+
+void list_frame(const std::string& file, const std::string& use, const FrameInfo& info, isp::Table& frames) {
+  frames.columns = {"file", "use", "ISO", "exposure time [s]", "temperature [C]"};
+  const auto cell = [](const std::optional<double>& value) {
+    return value ? fmt::format("{:g}", *value) : std::string("not stated");
+  };
+  frames.rows.push_back({readable(std::filesystem::path(file).filename().string()), use, cell(info.iso),
+                         cell(info.exposure_s), cell(info.temperature_c)});
+}
+
+std::string measurement_text(const std::string& profile) {
+  const calib::Measured today = measured_today({});
+  return fmt::format("Measured on {} with {}.\nNext step: lowlux develop RAW -o OUT.png --profile {}", today.date,
+                     today.source, readable(profile));
+}
+
+calib::Measured measured_today(std::vector<std::string> files) {
+  const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  for (std::string& file : files) file = readable(std::filesystem::path(file).filename().string());
+  return {"lowlux " + version_number(), fmt::format("{:%Y-%m-%d}", fmt::gmtime(now)), std::move(files)};
+}
+
+int calibration_failed(const CalibrateArgs& args, const Error& error) {
+  const std::string what = error.where.empty() ? "calibrate" : error.where;
+  if (args.json) print_out(fmt::format("{}\n", error_json(what, error)));
+  return print_failure(what, error);
+}
+
+int finish(const CalibrateArgs& args, const Calibration& found) {
+  const auto text = calib::profile_text(found.profile);
+  if (!text) return calibration_failed(args, with_file(text.error(), args.output));
+  const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
+  for (const PixelMap& map : found.maps) {
+    if (const auto free = check_place(map.path, args.force); !free) return calibration_failed(args, free.error());
+  }
+  for (const PixelMap& map : found.maps) {
+    const auto written = write_map(map, overwrite);
+    if (!written) return calibration_failed(args, written.error());
+  }
+  if (!args.report.empty()) {
+    const auto written = isp::write_text(args.report, isp::html_of(whole_report(args, found)), overwrite);
+    if (!written) return calibration_failed(args, with_file(written.error(), args.report));
+  }
+  if (const auto written = isp::write_text(args.output, *text, overwrite); !written) {
+    return calibration_failed(args, with_file(written.error(), args.output));
+  }
+  if (!args.quiet) {
+    for (const std::string& warning : found.warnings) {
+      print_err(fmt::format("{}\n", one_line("lowlux: warning: " + warning)));
+    }
+  }
+  if (args.json) {
+    const nlohmann::ordered_json json{
+        {"output", args.output}, {"warnings", found.warnings}, {"profile", nlohmann::ordered_json::parse(*text)}};
+    print_out(fmt::format("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
+  } else {
+    print_out(fmt::format("{}", found.text));
+  }
+  return exit_done;
+}
+
+}  // namespace lowlux::cli

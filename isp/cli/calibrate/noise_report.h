@@ -1,0 +1,21 @@
+#pragma once
+
+#include <span>
+
+#include "calib/flat/pair_statistics.h"
+#include "calib/flat/photon_transfer.h"
+#include "calib/picture/picture_noise.h"
+#include "isp/base/frame.h"
+#include "isp/cli/calibrate/calibration.h"
+
+namespace lowlux::cli {
+
+/// Adds a photon transfer to a calibration's text and report: figures, the curve and its residuals.
+void show_photon_transfer(const calib::PhotonTransfer& transfer, std::span<const calib::PairStatistics> darks,
+                          std::span<const calib::PairStatistics> flats, Calibration& found);
+
+/// Adds the noise of one ordinary picture to a calibration's text and report, beside what the file says of it.
+void show_picture_noise(const calib::PictureNoise& noise, const RawFrame& frame, const BlackPoint& black,
+                        Calibration& found);
+
+}  // namespace lowlux::cli

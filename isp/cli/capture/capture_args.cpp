@@ -1,0 +1,296 @@
+#include "isp/cli/capture/capture_args.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <span>
+#include <string_view>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "capture/camera/camera_request.h"
+#include "isp/base/packed/raw_format.h"
+#include "isp/base/text.h"
+#include "isp/cli/develop/develop_args.h"
+#include "isp/cli/develop/look_args.h"
+#include "isp/cli/shared/option_values.h"
+#include "isp/output/picture/image_writer.h"
+
+namespace lowlux::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Wrong = std::optional<std::string>;
+
+constexpr double longest_timeout_s = 86400;
+constexpr double most_frames = 1e9;
+constexpr double least_budget_ms = 0.01, most_budget_ms = 1e6;  // of the stage
+
+/// What the command line said that CaptureArgs holds in another form.
+struct Words {
+  bool raw = false;
+  bool live = false;
+  std::string as;
+  std::optional<double> frames;
+};
+
+Wrong set_format(const std::string& text, capture::CameraRequest& request) {
+  const auto formats = raw_formats();
+  const auto found = std::ranges::find_if(formats, [&](const RawFormatNames& names) {
+    return text == names.libcamera || (names.v4l2_fourcc != 0 && text == v4l2_text(names.v4l2_fourcc));
+  });
+  if (found == formats.end()) {
+    return "is no raw format: name one as V4L2 (RG10, pRAA) or libcamera does (SRGGB10, SRGGB10_CSI2P); --list has "
+           "those of the cameras here";
+  }
+  request.format = found->format;
+  return std::nullopt;
+}
+
+Wrong set_size(const std::string& text, capture::CameraRequest& request) {
+  const auto cross = text.find('x');
+  const auto whole = [](const std::string& digits) -> std::optional<int> {
+    const auto number = number_of(digits);
+    const bool fits = number && *number >= 1 && *number <= 65535 && *number == static_cast<int>(*number);
+    return fits ? std::optional(static_cast<int>(*number)) : std::nullopt;
+  };
+  const auto width = whole(text.substr(0, cross));
+  const auto height = cross == std::string::npos ? std::nullopt : whole(text.substr(cross + 1));
+  if (!width || !height) return "is no size such as 640x480";
+  request.width = width;
+  request.height = height;
+  return std::nullopt;
+}
+
+std::function<Wrong(const std::string&)> store_positive(std::optional<double>& out, double most, const char* unit) {
+  return [&out, most, unit](const std::string& text) -> Wrong {
+    const auto number = quantity_of(text, unit);
+    if (!number || !(*number > 0 && *number <= most))
+      return fmt::format("is not above 0 and at most {:g} {}", most, unit);
+    out = number;
+    return std::nullopt;
+  };
+}
+
+void add_source(CLI::App& app, CaptureArgs& args) {
+  app.add_flag("--list", args.list, "the cameras here and their raw formats");
+  app.add_option("--v4l2", args.v4l2, "V4L2 camera: its device node")->type_name("/dev/videoN");
+  app.add_option("--libcamera", args.libcamera, "libcamera's camera: its id, its place in --list, or part of its name")
+      ->type_name("ID");
+  capture::CameraRequest& request = args.request;
+  add_text(app, "--format", "FORMAT",
+           "raw format, by V4L2's or libcamera's name (RG10, SRGGB10_CSI2P...; default: the deepest there is)",
+           [&request](const std::string& text) { return set_format(text, request); });
+  add_text(app, "--size", "WxH", "of the frames (default: the largest there is)",
+           [&request](const std::string& text) { return set_size(text, request); });
+  add_text(app, "--fps", "HZ", "frames in a second (default: as the camera has it)",
+           store_positive(request.frame_rate_hz, 1e5, "Hz"));
+  add_text(app, "--exposure-time", "S", "of a frame (default: as the camera has it)",
+           store_positive(request.exposure_s, 1e5, "s"));
+  add_text(app, "--gain", "X", "analogue gain, a factor (default: as the camera has it)",
+           store_positive(request.analogue_gain, 1e6, "x"));
+  app.add_option("--gain-code", args.gain_code, "of a V4L2 camera, whose driver does not say what factor a code is")
+      ->type_name("CODE");
+  add_text(app, "--flip", "h|v|hv", "horizontally, vertically or both, on the sensor (default: as the camera has it)",
+           [&request](const std::string& text) -> Wrong {
+             if (text != "h" && text != "v" && text != "hv") return "is none of h, v, hv";
+             request.flip_horizontal = text.starts_with('h');
+             request.flip_vertical = text.ends_with('v');
+             return std::nullopt;
+           });
+  add_choice<capture::V4l2Memory>(
+      app, "--memory", {{"mmap", capture::V4l2Memory::mmap}, {"dma-buf", capture::V4l2Memory::dma_buf}},
+      [&args](capture::V4l2Memory memory) { args.memory = memory; },
+      "how frames of a V4L2 camera get here, both without a copy (default: mmap)");
+  app.add_option("--buffers", request.buffers, "frames under way at a time, 2 to 32 (default 4)")
+      ->check(CLI::Range(2, 32));
+}
+
+void add_frames(CLI::App& app, CaptureArgs& args, Words& words) {
+  const auto store_whole = [](auto store) {
+    return [store](const std::string& text) -> Wrong {
+      const auto number = number_of(text);
+      if (!number || !(*number >= 0 && *number <= most_frames) ||
+          *number != static_cast<double>(static_cast<std::uint64_t>(*number))) {
+        return "is no number of frames";
+      }
+      store(*number);
+      return std::nullopt;
+    };
+  };
+  add_text(app, "--frames", "N", "to take; 0: until stopped (default: 1 to a file, 0 to a folder and with --live)",
+           store_whole([&words](double number) { words.frames = number; }));
+  add_text(app, "--skip", "N", "frames to leave out first, while exposure settles (default 0)",
+           store_whole([&args](double number) { args.limits.skip = static_cast<std::uint64_t>(number); }));
+  add_text(app, "--timeout", "S", "to wait for a frame (default 5)", [&args](const std::string& text) -> Wrong {
+    const auto number = quantity_of(text, "s");
+    if (!number || !(*number >= 0.001 && *number <= longest_timeout_s)) {
+      return fmt::format("is not within 0.001 to {:g} s", longest_timeout_s);
+    }
+    args.limits.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(*number * 1000));
+    return std::nullopt;
+  });
+}
+
+void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
+  app.add_option(
+         "-o,--output", args.develop.output,
+         "picture (.png .jpg .tif .exr .pfm) or raw file (.dng) to write, with -NNNN before its end where there "
+         "are several frames; or a folder (made if it ends with /)")
+      ->type_name("OUT");
+  app.add_option("--as", words.as, "what is written to a folder: png (default), jpg, tif, exr, pfm or dng")
+      ->check(CLI::IsMember({"png", "jpg", "tif", "exr", "pfm", "dng"}));
+  app.add_flag("--raw", words.raw, "raw files: the same as --as dng");
+  app.add_flag("--live", words.live, "a film on standard output instead: YUV4MPEG2, which ffplay and ffmpeg read");
+  app.add_flag("--temporal", args.temporal, "with --live: frames before take part in noise reduction");
+  add_text(app, "--budget-ms", "MS",
+           "with --live: time for each frame; what does not fit is left out step by step: the level standard for high, "
+           "draft, no level, plain. No frame is",
+           [&args](const std::string& text) -> Wrong {
+             args.budget_ms = quantity_of(text, "ms");
+             if (args.budget_ms && *args.budget_ms >= least_budget_ms && *args.budget_ms <= most_budget_ms) {
+               return std::nullopt;
+             }
+             return "is not a number of milliseconds from 0.01 to 1e6";
+           });
+  app.add_flag("--force", args.develop.force, "overwrite files that exist");
+  app.add_flag("--json", args.develop.json, "what was done, as JSON on stdout (with --live on stderr)");
+  app.add_flag("--quiet", args.develop.quiet, "no warnings, no progress and no summary");
+}
+
+// These say nothing of a film, and the first list nothing of raw files either.
+constexpr std::array of_pictures{"--bits",         "--quality",           "--space",       "--half",    "--repair",
+                                 "--line-noise",   "--effects",           "--tolerance",   "--dimming", "--noise-limit",
+                                 "--coefficients", "--display-luminance", "--gain-setting"};
+constexpr std::array of_pictures_and_films{"--exposure",      "--wb",      "--tone",   "--look", "--scene-luminance",
+                                           "--field-of-view", "--profile", "--denoise"};
+
+/// The first of these options that was given.
+std::optional<std::string> given_of(const CLI::App& app, std::span<const char* const> options) {
+  const auto found = std::ranges::find_if(options, [&](const char* option) { return app.count(option) > 0; });
+  return found == options.end() ? std::nullopt : std::optional<std::string>(*found);
+}
+
+Wrong wrong_for_raw(const CLI::App& app, const CaptureArgs& args) {
+  auto given = given_of(app, of_pictures);
+  if (!given) given = given_of(app, of_pictures_and_films);
+  if (given) return *given + " is of pictures: a raw file keeps what the camera said, and `develop` has the option";
+  const isp::BlackChoice black = args.develop.options.black.choice;
+  if (!args.develop.black_profile.empty() ||
+      (black != isp::BlackChoice::automatic && black != isp::BlackChoice::given)) {
+    return "--black of a raw file is one or four figures in DN";
+  }
+  return std::nullopt;
+}
+
+Wrong wrong_for_live(const CLI::App& app, const CaptureArgs& args) {
+  if (const auto given = given_of(app, of_pictures)) return *given + " is of picture files, not of --live";
+  const isp::DevelopOptions& options = args.develop.options;
+  if (options.white_balance.mode == isp::WhiteBalanceChoice::Mode::temperature) {
+    return "--wb of --live is as-shot or auto";
+  }
+  if (options.look.look == isp::Look::model) return "--look of --live is camera or eye";
+  if (options.denoise.mode == isp::DenoiseChoice::Mode::level && options.denoise.level == denoise::Level::best) {
+    return "--denoise best takes seconds for a frame: --live has up to high";
+  }
+  const isp::BlackChoice black = options.black.choice;
+  if (!args.develop.black_profile.empty() ||
+      (black != isp::BlackChoice::automatic && black != isp::BlackChoice::given)) {
+    return "--black of --live is one or four figures in DN; --profile names a profile";
+  }
+  return std::nullopt;
+}
+
+Wrong wrong_camera(const CaptureArgs& args) {
+  if (args.v4l2.empty() == args.libcamera.empty()) {
+    return "name one camera: --v4l2 /dev/videoN or --libcamera ID; --list has those that are here";
+  }
+  if (args.v4l2.empty() && args.gain_code) return "--gain-code is of V4L2 cameras";
+  if (args.gain_code && args.request.analogue_gain) return "--gain and --gain-code do not go together";
+  if (const auto checked = capture::check_camera_request(args.request); !checked) return checked.error().message;
+  return std::nullopt;
+}
+
+/// Where frames go and as what.
+Wrong set_kind(const Words& words, CaptureArgs& args) {
+  const std::string& output = args.develop.output;
+  if (words.live) {
+    if (!output.empty() || words.raw || !words.as.empty()) return "--live writes a film to standard output: no files";
+    args.kind = CaptureKind::live;
+    return std::nullopt;
+  }
+  if (args.temporal) return "--temporal goes with --live";
+  if (args.budget_ms) return "--budget-ms goes with --live; of files `develop` has it";
+  if (output.empty()) return "say where frames go: -o OUT, or --live";
+  std::error_code ignored;
+  args.folder = output.ends_with('/') || fs::is_directory(output, ignored);
+  if (words.raw && !words.as.empty() && words.as != "dng")
+    return "--raw and --as " + words.as + " contradict each other";
+  if (args.folder) {
+    args.extension = words.raw ? "dng" : words.as.empty() ? "png" : words.as;
+    args.kind = args.extension == "dng" ? CaptureKind::raw : CaptureKind::pictures;
+    return std::nullopt;
+  }
+  if (!words.as.empty()) return "--as goes with a folder as output; a file's name says its format";
+  std::string end = fs::path(output).extension().string();
+  std::ranges::transform(end, end.begin(), ascii_lower);
+  args.kind = end == ".dng" ? CaptureKind::raw : CaptureKind::pictures;
+  if (words.raw && args.kind != CaptureKind::raw) return "--raw writes .dng, not " + output;
+  if (args.kind == CaptureKind::pictures) {
+    if (const auto format = isp::format_of(output); !format) return format.error().message + " or .dng";
+  }
+  return std::nullopt;
+}
+
+Wrong complete(const CLI::App& app, const Words& words, CaptureArgs& args) {
+  if (args.list) return std::nullopt;
+  if (auto wrong = wrong_camera(args)) return wrong;
+  if (auto wrong = set_kind(words, args)) return wrong;
+  DevelopArgs& develop = args.develop;
+  if (auto wrong = wrong_profiles(develop)) return wrong;
+  if (auto wrong = complete_look(develop.look, Planner::of_look, develop.options.look)) return wrong;
+  const bool endless = args.folder || args.kind == CaptureKind::live;
+  args.limits.frames = static_cast<std::uint64_t>(words.frames.value_or(endless ? 0 : 1));
+  if (args.kind == CaptureKind::raw) return wrong_for_raw(app, args);
+  return args.kind == CaptureKind::live ? wrong_for_live(app, args) : std::nullopt;
+}
+
+}  // namespace
+
+Parsed<CaptureArgs> parse_capture(const std::vector<std::string>& words) {
+  CLI::App app("Takes raw frames from a camera: to pictures, raw files, or a film on standard output.",
+               "lowlux capture");
+  app.footer(
+      "Examples:\n"
+      "  lowlux capture --list\n"
+      "  lowlux capture --v4l2 /dev/video0 -o night.png --black 64\n"
+      "  lowlux capture --libcamera 0 --exposure-time 0.5 --gain 8 --skip 3 -o night.dng\n"
+      "  lowlux capture --v4l2 /dev/video0 -o frames/ --as dng --frames 100\n"
+      "  lowlux capture --v4l2 /dev/video0 --live --temporal | ffplay -");
+  CaptureArgs args;
+  Words said;
+  add_source(app, args);
+  add_frames(app, args, said);
+  add_output(app, args, said);
+  add_samples(app, args.develop);
+  add_rendering(app, args.develop);
+  add_look(app, args.develop.look);
+  add_camera(app, args.develop);
+  add_denoise(app, args.develop);
+  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto wrong = complete(app, said, args)) return refuse(app, *wrong);
+  return args;
+}
+
+std::string frame_file(const CaptureArgs& args, std::uint64_t index) {
+  if (args.folder)
+    return (fs::path(args.develop.output) / fmt::format("frame-{:04}.{}", index, args.extension)).string();
+  if (args.limits.frames == 1) return args.develop.output;
+  const fs::path output(args.develop.output);
+  return (output.parent_path() / fmt::format("{}-{:04}{}", output.stem().string(), index, output.extension().string()))
+      .string();
+}
+
+}  // namespace lowlux::cli

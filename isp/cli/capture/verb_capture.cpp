@@ -1,0 +1,188 @@
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string_view>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "capture/camera/capture_loop.h"
+#include "capture/v4l2/v4l2_source.h"
+#include "isp/base/executor.h"
+#include "isp/cli/capture/capture_args.h"
+#include "isp/cli/capture/capture_list.h"
+#include "isp/cli/capture/capture_report.h"
+#include "isp/cli/capture/capture_sink.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/module.h"
+#include "isp/cli/shared/outputs.h"
+#include "isp/cli/shared/report.h"
+#include "isp/cli/verbs.h"
+
+namespace lowlux::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::atomic<bool> stop_asked{false};
+static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler sets it
+
+void ask_to_stop(int /*signal*/) { stop_asked = true; }
+
+/// The first SIGINT or SIGTERM asks for an end, a second one ends the process as ever. What the caller ignores stays
+/// ignored.
+void listen_to_signals() {
+  struct sigaction ask {};
+  ask.sa_handler = ask_to_stop;
+  ask.sa_flags = static_cast<int>(SA_RESETHAND);
+  for (const int number : {SIGINT, SIGTERM}) {
+    struct sigaction before {};
+    if (sigaction(number, nullptr, &before) == 0 && before.sa_handler != SIG_IGN) sigaction(number, &ask, nullptr);
+  }
+}
+
+Result<std::unique_ptr<capture::Camera>> open_camera(const CaptureArgs& args) {
+  if (!args.v4l2.empty()) {
+    return capture::open_v4l2(args.v4l2, {.request = args.request, .memory = args.memory, .gain_code = args.gain_code});
+  }
+  return load_libcamera().and_then(
+      [&](const capture::LibcameraModule& module) { return module.open(args.libcamera, args.request); });
+}
+
+/// The number in a name that frame_file() gives; 0 if it is none.
+std::uint64_t index_in(std::string_view name, std::string_view before, std::string_view after) {
+  if (name.size() <= before.size() + after.size() || !name.starts_with(before) || !name.ends_with(after)) return 0;
+  name = name.substr(before.size(), name.size() - before.size() - after.size());
+  std::uint64_t index = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), index);
+  return error == std::errc() && end == name.data() + name.size() ? index : 0;
+}
+
+/// What is in the way of the files to come, before the camera is opened; whoever writes them looks again.
+Result<void> check_files(const CaptureArgs& args) {
+  const DevelopArgs& develop = args.develop;
+  if (args.folder) {
+    std::error_code error;
+    fs::create_directories(develop.output, error);
+    if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), develop.output);
+  }
+  const std::string first = frame_file(args, 1);
+  if (auto place = check_place(first, develop.force); !place || args.limits.frames == 1 || develop.force) return place;
+  const std::string name = fs::path(first).filename().string();
+  const std::size_t at = name.rfind("0001");
+  const fs::path folder = fs::path(first).parent_path();
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder.empty() ? fs::path(".") : folder, error)) {
+    const std::uint64_t index = index_in(entry.path().filename().string(), name.substr(0, at), name.substr(at + 4));
+    if (index == 0 || (args.limits.frames > 0 && index > args.limits.frames)) continue;
+    return fail(ErrorCode::exists, fmt::format("{} exists: use --force to overwrite it", entry.path().string()),
+                entry.path().string());
+  }
+  return {};
+}
+
+class Capture {
+ public:
+  explicit Capture(const CaptureArgs& args)
+      : args_(args), executor_(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8)) {}
+
+  Result<void> run() {
+    if (args_.kind != CaptureKind::live) {
+      if (auto free = check_files(args_); !free) return free;
+    }
+    auto camera = open_camera(args_);
+    if (!camera) return tl::make_unexpected(camera.error());
+    state_.stream = {(*camera)->format(), (*camera)->name()};
+    auto sink = make_sink();
+    if (!sink) return tl::make_unexpected(sink.error());
+    take_warnings(**camera);
+    if (args_.kind == CaptureKind::live) print_warnings();  // at the end is too late for a film
+    CaptureProgress progress(!args_.develop.quiet);
+    const auto work = [&](const capture::CameraFrame& frame) { return (*sink)->take(frame, state_.work); };
+    const auto watch = [&](const capture::LoopCount&) { progress.show(state_); };
+    auto done = capture::capture_frames(**camera, args_.limits, stop_asked, work, watch, state_.count);
+    take_warnings(**camera);
+    return done;
+  }
+
+  int finish(const Result<void>& done) {
+    const Error* error = done ? nullptr : &done.error();
+    if (error != nullptr) {
+      const std::string taken = state_.count.taken > 0 ? fmt::format(" (after {} frames)", state_.count.taken) : "";
+      const std::string camera = args_.v4l2.empty() ? "libcamera " + args_.libcamera : args_.v4l2;
+      const bool of_camera = error->where.empty() || error->where == args_.libcamera;
+      const std::string& place = of_camera ? camera : error->where;
+      print_err(fmt::format("{}\n", error_line(place, {error->code, error->message + taken, {}})));
+    } else if (!args_.develop.quiet) {
+      print_warnings();
+      print_err(fmt::format("lowlux: {}\n", progress_text(state_)));
+    }
+    if (args_.develop.json) {
+      print_text(args_.kind == CaptureKind::live ? stderr : stdout, capture_json(state_, error) + "\n");
+    }
+    return error == nullptr ? exit_done : exit_failed;
+  }
+
+ private:
+  Result<std::unique_ptr<CaptureSink>> make_sink() {
+    switch (args_.kind) {
+      case CaptureKind::raw:
+        return make_raw_sink(args_, state_.stream);
+      case CaptureKind::live:
+        return make_live_sink(args_, state_.stream, STDOUT_FILENO, stop_asked);
+      case CaptureKind::pictures:
+        break;
+    }
+    return make_picture_sink(args_, state_.stream, executor_);
+  }
+
+  void take_warnings(const capture::Camera& camera) {
+    for (const std::string& warning : camera.warnings()) warn_once(warning, state_.work);
+  }
+
+  void print_warnings() {
+    if (args_.develop.quiet) return;
+    for (; printed_ < state_.work.warnings.size(); ++printed_) {
+      print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", state_.stream.camera,
+                                                         state_.work.warnings[printed_]))));
+    }
+  }
+
+  const CaptureArgs& args_;
+  PoolExecutor executor_;
+  CaptureState state_;
+  std::size_t printed_ = 0;  // warnings
+};
+
+}  // namespace
+
+int run_capture(const std::vector<std::string>& words) {
+  const Parsed<CaptureArgs> parsed = parse_capture(words);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& args = std::get<CaptureArgs>(parsed);
+  if (args.list) return list_cameras(args.develop.json);
+  if (args.kind == CaptureKind::pictures) {
+    const auto format = isp::format_of(frame_file(args, 1));
+    if (!format) return print_usage_error("capture", format.error());
+    if (const auto fits = complete_options(args.develop, *format); !fits)
+      return print_usage_error("capture", fits.error());
+  }
+  if (args.kind == CaptureKind::live && ::isatty(STDOUT_FILENO) == 1) {
+    return print_usage_error("capture",
+                             {ErrorCode::invalid_argument, "writes a film: lead it to a player, | ffplay -", "--live"});
+  }
+  listen_to_signals();
+  Capture capture(args);
+  return capture.finish(capture.run());
+}
+
+}  // namespace lowlux::cli

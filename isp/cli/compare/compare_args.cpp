@@ -1,0 +1,25 @@
+#include "isp/cli/compare/compare_args.h"
+
+#include <CLI/CLI.hpp>
+
+#include "isp/cli/shared/option_values.h"
+
+namespace lowlux::cli {
+
+Parsed<CompareArgs> parse_compare(const std::vector<std::string>& words) {
+  CLI::App app(
+      "How far picture B is from picture A, the reference: colour differences Delta E ab, Delta E 94c (chromaticity "
+      "alone) and CIEDE2000 of every pixel; EGR, the share of A's colours that B has; PSNR and SSIM of sRGB codes. "
+      "Both "
+      "are taken by their own ICC profile or chromaticities; white is 1, of floats too. For measurement, develop with "
+      "--tone none --exposure 0 --space linear-srgb.",
+      "lowlux compare");
+  CompareArgs args;
+  app.add_option("A", args.reference, "reference picture (PNG, JPEG, TIFF, OpenEXR, PFM)")->required();
+  app.add_option("B", args.test, "picture of the same size")->required();
+  app.add_flag("--json", args.json, "JSON instead of text");
+  if (const auto code = parse_words(app, words)) return *code;
+  return args;
+}
+
+}  // namespace lowlux::cli

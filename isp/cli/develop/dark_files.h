@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calib/dark/dark_frame.h"
+#include "calib/dark/dark_stack.h"
+#include "calib/frame_setting.h"
+#include "isp/base/dark_frame.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+#include "isp/cli/develop/develop_args.h"
+#include "isp/cli/shared/outputs.h"
+
+namespace lowlux::cli {
+
+/// The dark frames a command line names: see raw_files_of_lists. Errors: those, a picture that is itself among its
+/// darks, a black point besides darks, which hold it already.
+Result<std::vector<std::string>> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs);
+
+/// What the dark frames of all pictures are made of, and the last ones that were made. May be used from any thread.
+class DarkSource {
+ public:
+  /// @param request  what is the same for all pictures
+  DarkSource(std::vector<calib::DarkGroup> groups, const calib::DarkRequest& request)
+      : groups_(std::move(groups)), request_(request) {}
+
+  /// The dark frame of one picture: calib::make_dark_frame, once for all pictures of the same setting and black tag; at
+  /// the level of the picture's masked pixels if it follows from such. Errors: those of that, of
+  /// calib::check_masked_level, whose warning becomes one of the picture, and of calib::check_below_picture.
+  Result<std::shared_ptr<const DarkFrame>> frame_for(RawFrame& picture);
+
+ private:
+  /// What a dark frame depends on.
+  struct Key {
+    calib::FrameSetting setting;
+    bool has_masked_pixels;
+    std::optional<PerSite<double>> pedestal_dn;
+    friend bool operator==(const Key&, const Key&) = default;
+  };
+  struct Made {
+    Key key;
+    std::shared_ptr<const DarkFrame> frame;
+  };
+  static constexpr std::size_t most_made = 4;  // exposures of a bracket, and one more
+
+  Result<std::shared_ptr<const DarkFrame>> make_or_find(const RawDn& picture, const Key& key,
+                                                        const calib::DarkRequest& request);
+
+  std::vector<calib::DarkGroup> groups_;
+  calib::DarkRequest request_;
+  std::mutex mutex_;
+  std::vector<Made> made_;  // the last used first
+};
+
+/// Reads the files one by one, adding them up. Errors: those of reading, of calib::DarkLibrary, and of the profile
+/// that --dark-doubling may name: another camera's, or without that figure.
+Result<std::shared_ptr<DarkSource>> read_darks(const std::vector<std::string>& files, const DarkArgs& args);
+
+}  // namespace lowlux::cli

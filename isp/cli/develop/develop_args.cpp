@@ -1,0 +1,312 @@
+#include "isp/cli/develop/develop_args.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "denoise/denoiser.h"
+#include "isp/cli/shared/option_values.h"
+#include "isp/model/colour/correlated_colour_temperature.h"
+#include "isp/render/output_space.h"
+#include "isp/render/tone.h"
+
+namespace lowlux::cli {
+namespace {
+
+void add_darks(CLI::App& app, DarkArgs& dark) {
+  CLI::Option* frames = app.add_option("--dark-frame", dark.words,
+                                       "dark frames to subtract: files, a folder or a quoted pattern; repeatable")
+                            ->type_name("FILE[,FILE...]|FOLDER")
+                            ->allow_extra_args(false);
+  add_text(app, "--dark-noise", "SHARE",
+           "most that the dark frames may add to a picture's own variance in the dark (default 0.1)",
+           [&dark](const std::string& text) -> std::optional<std::string> {
+             const auto share = number_of(text);
+             if (!share || !(*share > 0 && *share <= 1)) return "is no share above 0 and at most 1";
+             dark.noise_share = *share;
+             return std::nullopt;
+           })
+      ->needs(frames);
+  add_text(app, "--dark-doubling", "C|PROFILE.json",
+           "degrees over which dark current doubles, for darks of another temperature, or a profile that tells "
+           "(default: as the darks themselves tell)",
+           [&dark](const std::string& text) -> std::optional<std::string> {
+             dark.doubling_c = quantity_of(text, "C");
+             if (!dark.doubling_c) {
+               if (!text.ends_with(".json")) return "is neither a number of degrees nor a profile (.json)";
+               dark.doubling_profile = text;
+             } else if (!(*dark.doubling_c >= 2 && *dark.doubling_c <= 30)) {
+               return "is not within 2 to 30 degrees";
+             }
+             return std::nullopt;
+           })
+      ->needs(frames);
+}
+
+/// What every verb that takes raw files one by one has.
+/// @param explained  help for --explain
+void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
+  app.add_option("RAW", args.inputs, "raw files, or folders of them")->required();
+  app.add_flag("--maps", args.options.denoise.maps,
+               "also write what is left of the noise [e-^2] and how far colour can be believed (0 to 1), for each 2x2 "
+               "cell: OUT.noise.pfm and OUT.confidence.pfm");
+  app.add_flag("--skip-existing", args.skip_existing, "leave out raw files whose outputs exist")
+      ->excludes(app.add_flag("--force", args.force, "overwrite files that exist"));
+  app.add_flag("--sync", args.sync, "wait until each file is on the disk (fsync)");
+  app.add_option("--jobs", args.jobs, "files at a time (default: one per processor, fewer if memory is short)")
+      ->check(CLI::Range(1, 256));
+  app.add_flag("--explain", args.explain, explained);
+  app.add_flag("--json", args.json, "one JSON object for each file on stdout, as an array");
+  app.add_flag("--timings", args.timings, "time of each stage");
+  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+}
+
+void add_output(CLI::App& app, DevelopArgs& args) {
+  app.add_option("-o,--output", args.output,
+                 "picture to write (.png .jpg .tif .exr .pfm), or a folder for several (made if it ends with /)")
+      ->required()
+      ->type_name("OUT");
+  app.add_option("--format", args.format, "format of pictures written to a folder: png (default), jpg, tif, exr or pfm")
+      ->check(CLI::IsMember({"png", "jpg", "tif", "exr", "pfm"}));
+  add_samples(app, args);
+}
+
+template <class Args>
+Parsed<Args> parse(CLI::App& app, const std::vector<std::string>& words, const Args& args) {
+  if (const auto code = parse_words(app, words)) return *code;
+  return args;
+}
+
+Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& words, const DevelopArgs& args) {
+  Parsed<DevelopArgs> parsed = parse(app, words, args);
+  const isp::DenoiseChoice& choice = args.options.denoise;
+  if (std::holds_alternative<DevelopArgs>(parsed) && choice.maps && choice.mode == isp::DenoiseChoice::Mode::off) {
+    return refuse(app, "--maps are of what --denoise leaves: they do not go with off");
+  }
+  if (std::holds_alternative<DevelopArgs>(parsed)) {
+    if (const auto wrong = wrong_profiles(args)) return refuse(app, *wrong);
+  }
+  return parsed;
+}
+
+}  // namespace
+
+Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
+  CLI::App app("Develops raw files to pictures.", "lowlux develop");
+  DevelopArgs args;
+  add_output(app, args);
+  add_rendering(app, args);
+  add_look(app, args.look);
+  add_camera(app, args);
+  add_denoise(app, args);
+  add_darks(app, args.dark);
+  add_budget(app, args.effects);
+  add_batch(
+      app,
+      "what was decided for each file, why, and, where this machine's speed is known (bench --calibrate-cost), what "
+      "it takes",
+      args);
+  Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
+  if (auto* const good = std::get_if<DevelopArgs>(&parsed)) {
+    if (const auto wrong = complete_look(good->look, Planner::of_everything, good->options.look)) {
+      return refuse(app, *wrong);
+    }
+    if (const auto wrong = complete_effects(good->look, good->effects)) return refuse(app, *wrong);
+    if (good->effects.budgeted() && good->jobs > 1) {
+      return refuse(app, "a budget is for one file at a time: leave --jobs out");
+    }
+  }
+  return parsed;
+}
+
+Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
+  CLI::App app("Takes noise, dark charge and defects off raw files and writes raw files for any raw developer.",
+               "lowlux denoise");
+  DevelopArgs args;
+  app.add_option("-o,--output", args.output,
+                 "raw file to write (.dng), or a folder for several (made if it ends with /)")
+      ->required()
+      ->type_name("CLEAN.dng");
+  add_camera(app, args);
+  add_denoise(app, args);
+  add_darks(app, args.dark);
+  add_batch(app, "what was decided for each file, and why", args);
+  Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
+  if (args.options.denoise.mode == isp::DenoiseChoice::Mode::off && std::holds_alternative<DevelopArgs>(parsed)) {
+    return refuse(app, "--denoise off leaves nothing to do: name a level, or auto");
+  }
+  return parsed;
+}
+
+Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
+  CLI::App app("Prints what raw files say, and what was measured on them.", "lowlux info");
+  InfoArgs args;
+  app.add_option("RAW", args.inputs, "raw files; with --advise one or none");
+  app.add_flag("--json", args.json, "JSON instead of text");
+  add_advise(app, args.advise);
+  if (const auto code = parse_words(app, words)) return *code;
+  const std::string wrong = wrong_advise(args.advise, args.inputs.size());
+  if (!wrong.empty()) return refuse(app, wrong);
+  return args;
+}
+
+Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words) {
+  CLI::App app("Runs the published experiments and prints each finding beside ours.", "lowlux reproduce");
+  ReproduceArgs args;
+  app.add_option("ID", args.experiments, "experiments (default: all); --list names them");
+  app.add_flag("--list", args.list, "the experiments, one line each");
+  app.add_option("-o,--output", args.output,
+                 "folder, made if need be, for findings.csv, the plots' data and report.html")
+      ->type_name("DIR");
+  app.add_option("--pictures-folder", args.pictures_folder,
+                 "where the pictures of `retargeting` are (default: testdata/pictures of the source tree)")
+      ->type_name("DIR");
+  app.add_flag("--quick", args.quick, "fewer samples: wider confidence intervals");
+  app.add_option("--seed", args.seed, "of the random numbers (default 1)")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N");
+  app.add_flag("--json", args.json, "JSON instead of a table");
+  app.add_flag("--force", args.force, "overwrite files that exist");
+  return parse(app, words, args);
+}
+
+namespace {
+
+constexpr double max_exposure_ev = 12;  // the tone curve's range
+
+Names<OutputSpace> space_names() {
+  Names<OutputSpace> names;
+  for (const isp::NamedOutputSpace& named : isp::output_spaces) names.emplace(named.name, named.space);
+  return names;
+}
+
+std::optional<std::string> set_white_balance(const std::string& text, isp::WhiteBalanceChoice& choice) {
+  using Mode = isp::WhiteBalanceChoice::Mode;
+  if (text == "as-shot") {
+    choice.mode = Mode::as_shot;
+  } else if (text == "auto") {
+    choice.mode = Mode::automatic;
+  } else if (const auto kelvin = quantity_of(text, "K");
+             kelvin && *kelvin >= isp::white_min_k && *kelvin <= isp::white_max_k) {
+    choice = {Mode::temperature, *kelvin};
+  } else {
+    return fmt::format("is neither as-shot nor auto nor a temperature from {:.0f} to {:.0f} K", isp::white_min_k,
+                       isp::white_max_k);
+  }
+  return std::nullopt;
+}
+
+// One figure for all sites or four; nullopt if it is neither.
+std::optional<PerSite<double>> site_figures(const std::string& text) {
+  const auto figures = numbers_of(text, 4);
+  if (!figures || (figures->size() != 1 && figures->size() != 4)) return std::nullopt;
+  const auto& f = *figures;
+  return f.size() == 1 ? PerSite<double>{f[0], f[0], f[0], f[0]} : PerSite<double>{f[0], f[1], f[2], f[3]};
+}
+
+std::optional<std::string> set_black(const std::string& text, DevelopArgs& args) {
+  isp::BlackRequest& request = args.options.black;
+  static const Names<isp::BlackChoice> names{{"auto", isp::BlackChoice::automatic},
+                                             {"metadata", isp::BlackChoice::metadata},
+                                             {"masked", isp::BlackChoice::masked}};
+  if (const auto named = names.find(text); named != names.end()) {
+    request.choice = named->second;
+  } else if (const auto figures = site_figures(text)) {
+    request.choice = isp::BlackChoice::given;
+    request.given_dn = *figures;
+  } else if (text.ends_with(".json")) {
+    args.black_profile = text;
+  } else {
+    return fmt::format("is neither {} nor one or four figures in DN nor a profile (PROFILE.json)", joined(names));
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> set_exposure(const std::string& text, DevelopArgs& args) {
+  args.exposure_given = true;
+  if (text == "auto") {
+    args.options.exposure_ev.reset();
+  } else if (const auto ev = quantity_of(text, "EV"); ev && std::fabs(*ev) <= max_exposure_ev) {
+    args.options.exposure_ev = *ev;
+  } else {
+    return fmt::format("is neither auto nor a number of EV from -{} to {}", max_exposure_ev, max_exposure_ev);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+void add_rendering(CLI::App& app, DevelopArgs& args) {
+  isp::DevelopOptions& o = args.options;
+  add_text(app, "--exposure", "auto|EV",
+           "gain in EV; auto brings the middle of the picture to mid-grey without lifting the black noise "
+           "(default: auto, in linear spaces 0)",
+           [&args](const std::string& text) { return set_exposure(text, args); });
+  add_text(app, "--wb", "as-shot|auto|KELVIN",
+           "white balance: as the camera chose (default), estimated from the picture, or by colour temperature",
+           [&o](const std::string& text) { return set_white_balance(text, o.white_balance); });
+  add_choice<isp::ToneCurve>(
+      app, "--tone", {{"standard", isp::ToneCurve::standard}, {"none", isp::ToneCurve::none}},
+      [&args](isp::ToneCurve tone) { args.tone = tone; }, "tone curve (default: standard, in linear spaces none)");
+  add_choice<OutputSpace>(
+      app, "--space", space_names(), [&args](OutputSpace space) { args.space = space; },
+      "what the numbers mean (default: srgb; linear-srgb for OpenEXR and PFM)");
+  app.add_flag("--half", o.half, "half size: exact 2x2 binning in place of demosaicing");
+}
+
+void add_camera(CLI::App& app, DevelopArgs& args) {
+  isp::DevelopOptions& o = args.options;
+  add_text(app, "--black", "auto|metadata|masked|DN[,DN,DN,DN]|PROFILE.json",
+           "black point: measured on masked pixels where there are any, else the file's figure (auto, default); one of "
+           "the two; given in DN, for all pixels or for the four sites of the 2x2 cell; or a camera's profile, whose "
+           "noise and hot pixels are used too",
+           [&args](const std::string& text) { return set_black(text, args); });
+  app.add_option("--profile", args.profile,
+                 "a camera's profile (see calibrate): black point, noise and hot pixels, and its colour matrices if it "
+                 "holds any")
+      ->type_name("PROFILE.json");
+  app.add_option("--gain-setting", args.gain_setting,
+                 "gain setting of the profile to use: its name or an ISO (default: the raw's ISO)")
+      ->type_name("SETTING");
+  add_choice<bool>(
+      app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
+      "hot and dead pixels: look for them (default), or repair only those the file names");
+}
+
+std::optional<std::string> wrong_profiles(const DevelopArgs& args) {
+  if (!args.profile.empty() && !args.black_profile.empty()) {
+    return "--black and --profile name a profile each: --profile uses all that is in one";
+  }
+  if (!args.gain_setting.empty() && args.profile.empty() && args.black_profile.empty()) {
+    return "--gain-setting is one of a profile's: name the profile with --profile";
+  }
+  return std::nullopt;
+}
+
+void add_denoise(CLI::App& app, DevelopArgs& args) {
+  isp::DenoiseChoice& choice = args.options.denoise;
+  using Mode = isp::DenoiseChoice::Mode;
+  choice.mode = Mode::automatic;
+  Names<isp::DenoiseChoice> names{{"auto", {.mode = Mode::automatic}}, {"off", {.mode = Mode::off}}};
+  for (const denoise::Level level : denoise::all_levels) {
+    names.emplace(denoise::name_of(level), isp::DenoiseChoice{Mode::level, level});
+  }
+  add_choice<isp::DenoiseChoice>(
+      app, "--denoise", names,
+      [&choice](const isp::DenoiseChoice& named) {
+        choice.mode = named.mode;
+        choice.level = named.level;
+      },
+      "noise reduction, by how much work it is; auto (default) chooses by how much noise there is");
+  add_choice<bool>(
+      app, "--line-noise", {{"auto", true}, {"off", false}}, [&choice](bool lines) { choice.line_noise = lines; },
+      "noise that whole rows or columns share: take it off where it stands out (default) or leave it");
+}
+
+void add_samples(CLI::App& app, DevelopArgs& args) {
+  app.add_option("--bits", args.bits, bits_help)->check(CLI::IsMember({8, 16, 32}));
+  app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,232 @@
+#include "isp/cli/develop/look_args.h"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
+
+#include "isp/cli/shared/option_values.h"
+#include "isp/model/appearance/appearance_model.h"
+
+namespace lowlux::cli {
+namespace {
+
+constexpr double eye_noise_limit = 2;  // CIE L*
+
+using Wrong = std::optional<std::string>;
+
+/// A number with its range in the message.
+struct Range {
+  double least;
+  double most;
+  const char* is_not;
+  const char* unit = "";
+};
+
+Wrong store_number(const std::string& text, const Range& range, double& out) {
+  const std::optional<double> number = quantity_of(text, range.unit);
+  if (!number || !(*number >= range.least && *number <= range.most)) {
+    return fmt::format("{} from {} to {}", range.is_not, range.least, range.most);
+  }
+  out = *number;
+  return std::nullopt;
+}
+
+Wrong set_effects(const std::string& text, isp::LookChoice& choice) {
+  using Which = isp::LookChoice::Which;
+  if (text == "auto" || text == "all") {
+    choice.which = text == "all" ? Which::all : Which::automatic;
+    return std::nullopt;
+  }
+  choice.which = Which::listed;
+  choice.listed = {false, false, false, false, false, false};
+  if (text == "none") return std::nullopt;
+  for (const std::string& word : words_of(text)) {
+    bool* const effect = isp::effect_named(choice.listed, word);
+    if (effect == nullptr) {
+      return fmt::format("names '{}', which is none of {}", word, fmt::join(isp::night_effect_names, ", "));
+    }
+    *effect = true;
+  }
+  return std::nullopt;
+}
+
+void add_scene(CLI::App& app, LookArgs& args) {
+  add_text(app, "--scene-luminance", "auto|CD_M2",
+           "mean luminance of the scene, for --look eye and models: from f-number, exposure time and ISO, of the file "
+           "or its "
+           "camera's profile (auto, default), or given",
+           [&args](const std::string& text) -> Wrong {
+             args.given.emplace_back("--scene-luminance");
+             args.choice.scene_luminance_cd_m2.reset();
+             if (text == "auto") return std::nullopt;
+             double luminance = 0;
+             if (auto wrong =
+                     store_number(text, {1e-7, 1e9, "is neither auto nor a luminance in cd/m2", "cd/m2"}, luminance)) {
+               return wrong;
+             }
+             args.choice.scene_luminance_cd_m2 = luminance;
+             return std::nullopt;
+           });
+  add_text(
+      app, "--field-of-view", "DEGREES",
+      "that the longer side of the picture covers in the scene, for what detail the eye makes out (default 50)",
+      [&args](const std::string& text) {
+        args.given.emplace_back("--field-of-view");
+        return store_number(text, {0.1, 180, "is not an angle in degrees", "degrees"}, args.choice.field_of_view_deg);
+      });
+}
+
+void add_effects(CLI::App& app, LookArgs& args) {
+  add_text(app, "--effects", "auto|all|none|LIST",
+           fmt::format("what is done to the frame: what can be seen here (auto, default) or everything (all), of "
+                       "corrections and of what --look eye shows of the dark (auto never shows glare and "
+                       "visual-noise); or of the latter none, or those listed, parted by commas ({})",
+                       fmt::join(isp::night_effect_names, ", ")),
+           [&args](const std::string& text) {
+             args.given.emplace_back("--effects");
+             return set_effects(text, args.choice);
+           });
+  add_text(app, "--tolerance", "DELTA_E",
+           "CIEDE2000 that --effects auto may leave out: as 95 % of the picture have it, seen in means over 8 x 8 "
+           "pixels (default 0.5)",
+           [&args](const std::string& text) {
+             args.given.emplace_back("--tolerance");
+             return store_number(text, {1e-3, 100, "is not a colour difference"}, args.choice.tolerance);
+           });
+  add_text(
+      app, "--dimming", "SHARE",
+      "how much of its darkness the picture keeps: 0 is as bright as by day, 1 as dark as it was beside a room with "
+      "100 cd/m2 (default 0.4; automatic exposure only)",
+      [&args](const std::string& text) {
+        args.given.emplace_back("--dimming");
+        return store_number(text, {0, 1, "is not a fraction"}, args.choice.dimming);
+      });
+}
+
+}  // namespace
+
+void add_look(CLI::App& app, LookArgs& args) {
+  std::string models;
+  for (const isp::AppearanceModel& model : isp::appearance_models()) {
+    models += (models.empty() ? "" : ", ") + std::string(model.name);
+  }
+  add_text(app, "--look", "camera|eye|MODEL",
+           "as a camera in daylight would have it (default), as an eye saw it that stood there (reds darken, colours "
+           "fade, detail softens), or its colours by one published model (" +
+               models + ")",
+           [&args, models](const std::string& text) -> Wrong {
+             args.choice.model.clear();
+             if (text == "camera" || text == "eye") {
+               args.choice.look = text == "eye" ? isp::Look::eye : isp::Look::camera;
+               return std::nullopt;
+             }
+             if (!isp::appearance_model_named(text)) return "is none of camera, eye, " + models;
+             args.choice.look = isp::Look::model;
+             args.choice.model = text;
+             return std::nullopt;
+           });
+  add_scene(app, args);
+  add_effects(app, args);
+  add_text(app, "--noise-limit", "off|LIGHTNESS",
+           "CIE L* that noise may reach in even parts of the picture: shadows whose noise would exceed it are lifted "
+           "less (default: off, with --look eye 2)",
+           [&args](const std::string& text) -> Wrong {
+             args.noise_limit_given = true;
+             args.choice.noise_limit.reset();
+             if (text == "off") return std::nullopt;
+             double limit = 0;
+             if (auto wrong = store_number(text, {1e-3, 100, "is neither off nor a lightness"}, limit)) return wrong;
+             args.choice.noise_limit = limit;
+             return std::nullopt;
+           });
+  app.add_option(
+         "--coefficients", args.coefficients,
+         "coefficients of Shin's model for --look shin and --display-luminance: lines of E, alpha, beta, l, a, m, b "
+         "(default: SHIN-SUB-1, a substitute)")
+      ->type_name("FILE");
+  add_text(app, "--display-luminance", "CD_M2",
+           "white of the display the picture is made for: colours are made up for what the eye misses there, against "
+           "displays of 250 cd/m2 (default: no change)",
+           [&args](const std::string& text) -> Wrong {
+             double luminance = 0;
+             if (auto wrong = store_number(text, {1e-3, 1e5, "is not a luminance in cd/m2", "cd/m2"}, luminance))
+               return wrong;
+             args.display_cd_m2 = luminance;
+             return std::nullopt;
+           });
+}
+
+std::optional<std::string> complete_look(const LookArgs& args, Planner planner, isp::LookChoice& choice) {
+  choice = args.choice;
+  if (!args.coefficients.empty() && choice.model != "shin" && !args.display_cd_m2) {
+    return "--coefficients go with --look shin or --display-luminance";
+  }
+  constexpr std::array only_eye{"--effects", "--tolerance", "--field-of-view"};
+  const bool lists =
+      choice.which == isp::LookChoice::Which::listed &&
+      std::ranges::any_of(isp::night_effect_names, [&](auto name) { return *isp::effect_named(choice.listed, name); });
+  for (const std::string& option : args.given) {
+    const bool planned = option == "--tolerance" || (option == "--effects" && !lists);
+    if (planner == Planner::of_everything && planned) continue;
+    const bool for_models = std::ranges::find(only_eye, option) == only_eye.end();
+    if (choice.look == isp::Look::camera || (choice.look == isp::Look::model && !for_models)) {
+      return option + (for_models ? " goes with --look eye or a model" : " goes with --look eye");
+    }
+  }
+  if (choice.look == isp::Look::eye && !args.noise_limit_given) choice.noise_limit = eye_noise_limit;
+  return std::nullopt;
+}
+
+namespace {
+
+constexpr double least_budget = 1e-3, most_budget = 1e9;
+
+bool is_given(const LookArgs& look, const char* option) {
+  return std::ranges::find(look.given, option) != look.given.end();
+}
+
+void add_positive(CLI::App& app, const char* flag, const char* type, const char* unit, const char* help,
+                  std::optional<double>& out) {
+  add_text(app, flag, type, help, [&out, unit](const std::string& text) -> std::optional<std::string> {
+    out = quantity_of(text, unit);
+    if (out && *out >= least_budget && *out <= most_budget) return std::nullopt;
+    return "is not a number from 0.001 to 1e9";
+  });
+}
+
+}  // namespace
+
+void add_budget(CLI::App& app, EffectsArgs& args) {
+  add_positive(
+      app, "--budget-ms", "MS", "ms",
+      "time for developing each frame, from decoded codes to a finished picture (files are read and written "
+      "besides): the most accurate way that is predicted to fit, or with --tolerance the fastest within it. "
+      "Times are rough estimates until bench --calibrate-cost has measured this machine; before each file how busy it "
+      "is is measured, which takes a tenth of a second or two more; one file at a time",
+      args.budget_ms);
+  add_positive(app, "--budget-mpps", "MP_PER_S", "MP/s", "the same as megapixels in a second", args.budget_mpps);
+}
+
+std::optional<std::string> complete_effects(const LookArgs& look, EffectsArgs& args) {
+  using Which = isp::LookChoice::Which;
+  if (args.budget_ms && args.budget_mpps) return "--budget-ms and --budget-mpps are two words for one thing: give one";
+  const bool all = look.choice.which == Which::all;
+  if (all && is_given(look, "--tolerance")) return "--effects all leaves nothing out: --tolerance goes with auto";
+  if (all && args.budgeted()) return "--effects all leaves nothing out: a budget goes with auto";
+  args.effects.emplace().all = all;
+  if (args.budgeted() && !is_given(look, "--tolerance")) {
+    args.effects->tolerance_delta_e.reset();
+  } else {
+    args.effects->tolerance_delta_e = look.choice.tolerance;
+  }
+  return std::nullopt;
+}
+
+double budget_s(const EffectsArgs& args, double megapixels) {
+  return args.budget_ms ? 1e-3 * *args.budget_ms : megapixels / *args.budget_mpps;
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,276 @@
+#include "isp/cli/develop/raw_batch.h"
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <filesystem>
+#include <new>
+#include <optional>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "capture/file/dng_source.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/interruption.h"
+#include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/noise_maps.h"
+#include "isp/cli/shared/noise_source.h"
+#include "isp/cli/shared/profile_option.h"
+
+namespace lowlux::cli {
+namespace {
+
+constexpr double used_memory = 0.8;  // of what is available: estimates are not exact, and others need some too
+
+/// An existing output is reported before any work is done; the writer of the file checks again.
+Result<void> check_free(const std::string& output, isp::Overwrite overwrite) {
+  std::error_code ignored;
+  if (overwrite == isp::Overwrite::yes || !std::filesystem::exists(output, ignored)) return {};
+  return fail(ErrorCode::exists,
+              fmt::format("{} exists: use --force to overwrite it, --skip-existing to keep it", output), output);
+}
+
+/// What holds for one frame: profile and darks; what the profile says goes into the frame.
+Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) {
+  isp::DevelopOptions options = batch.options;
+  options.effects = batch.args.effects.effects;
+  if (options.effects) options.effects->cost = batch.kept_cost;
+  if (batch.speed) {
+    const Rect& crop = frame.raw.default_crop;
+    options.effects->budget_s = budget_s(batch.args.effects, 1e-6 * crop.width * crop.height);
+  }
+  if (batch.profile) {
+    const ProfileChoice choice{!batch.args.profile.empty(), batch.args.gain_setting};
+    const auto used = use_profile(*batch.profile, choice, frame, options);
+    if (!used) return tl::make_unexpected(used.error());
+  }
+  if (!batch.darks) return options;
+  Result<std::shared_ptr<const DarkFrame>> dark = batch.darks->frame_for(frame);
+  if (!dark) return tl::make_unexpected(dark.error());
+  options.dark_frame = std::move(*dark);
+  options.black = batch.options.black;  // the darks hold it
+  return options;
+}
+
+}  // namespace
+
+std::vector<std::string> files_of(const RawBatch& batch, const Job& job) {
+  std::vector<std::string> files{job.output};
+  if (batch.options.denoise.maps) {
+    for (std::string& map : noise_map_names(job.output)) files.push_back(std::move(map));
+  }
+  return files;
+}
+
+void FileProgress::reach(double share) {
+  whole_.advance(share - reached_, file_);
+  reached_ = share;
+}
+
+Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& options, std::vector<Job> jobs,
+                            const std::vector<std::string>& darks) {
+  RawBatch batch{.args = args, .options = options, .jobs = std::move(jobs)};
+  if (const std::string& file = args.profile.empty() ? args.black_profile : args.profile; !file.empty()) {
+    auto profile = read_profile(file);
+    if (!profile) return tl::make_unexpected(with_file(profile.error(), file));
+    batch.profile = std::move(*profile);
+  }
+  batch.sync = args.sync ? isp::Sync::yes : isp::Sync::no;
+  if (args.output.ends_with('/')) {
+    std::error_code error;
+    std::filesystem::create_directories(args.output, error);
+    if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
+  }
+  if (args.effects.budgeted()) {
+    batch.speed = std::make_shared<MachineSpeed>(cost_of_this_machine(threads_of_each(1), args.quiet));
+  } else if (args.effects.effects && (args.explain || args.json)) {
+    if (auto cost = kept_cost(threads_of_each(1))) {
+      batch.kept_cost = std::make_shared<const isp::CostModel>(*std::move(cost));
+    }
+  }
+  if (!darks.empty()) {
+    auto source = read_darks(darks, args.dark);
+    if (!source) return tl::make_unexpected(source.error());
+    batch.darks = *std::move(source);
+  }
+  if (args.jobs == 0 && batch.jobs.size() > 1) {  // the darks are held by now
+    if (const auto bytes = available_memory()) batch.memory = std::make_shared<MemoryGate>(used_memory * *bytes);
+  }
+  return batch;
+}
+
+Result<ReadyFrame> ready_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock) {
+  for (const std::string& output : files_of(batch, job)) {
+    if (const auto free = check_free(output, job.overwrite); !free) return tl::make_unexpected(free.error());
+  }
+  Result<RawFrame> frame = capture::read_raw(job.input);
+  clock.lap("read and decode");
+  if (!frame) return tl::make_unexpected(frame.error());
+  Result<isp::DevelopOptions> options = options_for(batch, *frame);
+  if (!options) return tl::make_unexpected(options.error());
+  if (batch.memory) batch.memory->report_size(batch.bytes_of(frame->raw, *options, executor.width()));
+  if (batch.darks) clock.lap("dark frame's making");
+  if (const Result<void> found = find_noise(*options, *frame, executor); !found) {
+    return tl::make_unexpected(found.error());
+  }
+  if (frame->noise && frame->noise->source == NoiseProfile::Source::picture) clock.lap("noise of the picture");
+  if (batch.speed) {
+    auto cost = batch.speed->now(executor);
+    if (!cost) return tl::make_unexpected(cost.error());
+    options->effects->cost = *std::move(cost);
+    clock.lap("machine's pace");
+  }
+  return ReadyFrame{*std::move(frame), *std::move(options)};
+}
+
+Result<void> write_noise_maps(const RawBatch& batch, const Job& job, isp::NoiseMaps maps, const RawDn& raw,
+                              Executor& executor) {
+  for (const PixelMap& map : noise_map_files(std::move(maps), raw, job.output, executor)) {
+    if (Result<void> written = write_map(map, job.overwrite, batch.sync); !written) return written;
+  }
+  return {};
+}
+
+namespace {
+
+void print_outcome(const DevelopArgs& args, const DevelopOutcome& outcome) {
+  if (outcome.error) return print_err(fmt::format("{}\n", error_line(outcome.input, *outcome.error)));
+  if (!outcome.plan) return;  // skipped
+  if (!args.quiet) {
+    for (const std::string& warning : outcome.plan->warnings) {
+      print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome.input, warning))));
+    }
+  }
+  if (args.json) return;
+  if (args.explain) print_out(fmt::format("{}\n{}", one_line(outcome.input), explain_text(*outcome.plan)));
+  if (args.timings) print_out(fmt::format("{}\n{}", one_line(outcome.input), times_text(outcome.times)));
+}
+
+/// The work on all files. Of a file that is done, counts stay and what is to be printed at the end, no more: memory
+/// does not grow with the number of files.
+class BatchRun {
+ public:
+  BatchRun(const RawBatch& batch, const RawWork& work)
+      : batch_(batch),
+        work_(work),
+        files_(static_cast<int>(batch.jobs.size())),
+        progress_(files_, !batch.args.quiet),
+        json_(batch.args.json ? batch.jobs.size() : 0) {}
+
+  int run() {
+    std::optional<InterruptionReport> interruption;
+    if (!batch_.args.quiet) interruption.emplace([this] { return interruption_text(); });
+    work_on_all();
+    print_summary();
+    return failed_ > 0 || reports_lost_ ? exit_failed : exit_done;
+  }
+
+ private:
+  int worker_count() const {
+    const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    return batch_.speed ? 1 : std::min(files_, batch_.args.jobs > 0 ? batch_.args.jobs : processors);
+  }
+
+  void work_on_all() {
+    const int workers = worker_count();
+    std::vector<std::jthread> threads;
+    threads.reserve(workers);
+    try {
+      for (int i = 1; i < workers; ++i) threads.emplace_back([this, workers] { take_files(workers); });
+    } catch (const std::system_error&) {
+      // The system gives no more threads: those there are do the work.
+    }
+    take_files(workers);
+  }
+
+  /// Each worker takes the next file: while one reads, another renders or encodes. Where memory holds fewer files than
+  /// there are workers, each file gets more of the processors.
+  void take_files(int workers) {
+    std::optional<PoolExecutor> executor;
+    for (int i = next_++; i < files_; i = next_++) {
+      const MemoryGate::Entry entry(batch_.memory.get());
+      const int threads = threads_of_each(batch_.memory ? batch_.memory->files_at_a_time(workers) : workers);
+      if (!executor || executor->width() != threads) executor.emplace(threads);
+      finish(i, outcome_of(batch_.jobs[i], *executor));
+    }
+  }
+
+  DevelopOutcome outcome_of(const Job& job, Executor& executor) {
+    DevelopOutcome out{job.input, job.output};
+    FileProgress progress(progress_, job.input);
+    try {
+      Job own = job;
+      if (batch_.args.force) own.overwrite = isp::Overwrite::yes;
+      if (batch_.args.skip_existing) {
+        // The output is written last: where it is, so is the rest, and what is there without it is of a killed run. An
+        // empty file is the name that such a run had claimed (see publish.h).
+        std::error_code absent;
+        out.skipped = std::filesystem::file_size(job.output, absent) > 0 && !absent;
+        if (out.skipped) return out;
+        const auto exists = [](const std::string& file) { return std::filesystem::exists(file); };
+        if (std::ranges::any_of(files_of(batch_, job), exists)) own.overwrite = isp::Overwrite::yes;
+      }
+      const Result<void> worked = work_(own, executor, progress, out);
+      if (!worked) out.error = with_file(worked.error(), job.input);
+    } catch (const std::bad_alloc&) {
+      out.error = Error{ErrorCode::too_large, "not enough memory; --jobs 1 takes the least", job.input};
+    } catch (const std::exception& failure) {
+      out.error = Error{ErrorCode::too_large, failure.what(), job.input};
+    }
+    if (out.error && out.error->code == ErrorCode::exists && batch_.args.skip_existing) {  // another run was faster
+      out.error.reset();
+      out.plan.reset();
+      out.skipped = true;
+    }
+    return out;
+  }
+
+  void finish(int index, const DevelopOutcome& outcome) {
+    ++(outcome.error ? failed_ : outcome.skipped ? skipped_ : done_);
+    try {
+      if (batch_.args.json) json_[static_cast<std::size_t>(index)] = develop_json(outcome);
+      progress_.print([&] { print_outcome(batch_.args, outcome); });
+    } catch (const std::bad_alloc&) {
+      print_err("lowlux: not enough memory to print what was done\n");
+      reports_lost_ = true;
+    }
+  }
+
+  void print_summary() const {
+    if (batch_.args.json) print_out(fmt::format("[{}]\n", fmt::join(json_, ",\n")));
+    const bool chatty = batch_.args.explain || batch_.args.timings;
+    if (batch_.memory && chatty && !batch_.args.json) {
+      if (const auto text = batch_.memory->limit_text()) print_out(fmt::format("{} files: {}\n", files_, *text));
+    }
+    if (skipped_ > 0 && !batch_.args.quiet) {
+      print_err(fmt::format("lowlux: {} of {} files skipped: their outputs exist\n", skipped_.load(), files_));
+    }
+    if (failed_ > 0 && files_ > 1) print_err(fmt::format("lowlux: {} of {} files failed\n", failed_.load(), files_));
+  }
+
+  std::string interruption_text() const {
+    const char* const advice = batch_.args.force || files_ == 1 ? "" : "; run again with --skip-existing";
+    return fmt::format("{} of {} files done{}", done_ + skipped_, files_, advice);
+  }
+
+  const RawBatch& batch_;
+  const RawWork& work_;
+  int files_;
+  Progress progress_;
+  std::vector<std::string> json_;  // in the order of the files
+  std::atomic<int> next_{0};
+  std::atomic<int> done_{0};
+  std::atomic<int> skipped_{0};
+  std::atomic<int> failed_{0};
+  std::atomic<bool> reports_lost_{false};
+};
+
+}  // namespace
+
+int run_batch(const RawBatch& batch, const RawWork& work) { return BatchRun(batch, work).run(); }
+
+}  // namespace lowlux::cli

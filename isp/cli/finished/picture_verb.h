@@ -1,0 +1,36 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/base/image.h"
+#include "isp/base/result.h"
+#include "isp/cli/shared/outputs.h"
+
+namespace lowlux::cli {
+
+/// What the verbs that make one picture of another have in common.
+struct PictureVerb {
+  std::string name;                 // of the verb
+  std::vector<std::string> inputs;  // files that are read, the picture first
+  std::string output;
+  std::optional<int> bits;
+  int jpeg_quality = 92;
+  bool force = false;
+  bool json = false;
+  bool quiet = false;
+};
+
+/// Reads, works, writes by write_made() and prints its report; returns warnings.
+using PictureWork = std::function<Result<std::vector<std::string>>(const PictureKind& kind, Executor& executor)>;
+
+/// Checks the output before the work, prints warnings and errors after it. @return the exit code
+int run_picture_verb(const PictureVerb& verb, const PictureWork& work);
+
+/// Writes the picture that was made to the verb's output.
+Result<void> write_made(const PictureVerb& verb, const Picture& picture, OutputSpace space, Executor& executor);
+
+}  // namespace lowlux::cli

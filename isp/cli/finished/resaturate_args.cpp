@@ -1,0 +1,81 @@
+#include "isp/cli/finished/resaturate_args.h"
+
+#include <algorithm>
+
+#include <CLI/CLI.hpp>
+
+#include "isp/cli/shared/option_values.h"
+
+namespace lowlux::cli {
+namespace {
+
+std::optional<std::string> set_codes(const std::string& text, ResaturateArgs& args) {
+  const auto codes = numbers_of(text, 3);
+  if (!codes || codes->size() != 3 || !std::ranges::all_of(*codes, [](double c) { return c >= 0 && c <= 255; })) {
+    return "is not three codes from 0 to 255";
+  }
+  args.black_codes = {(*codes)[0], (*codes)[1], (*codes)[2]};
+  return std::nullopt;
+}
+
+std::optional<std::string> set_area(const std::string& text, ResaturateArgs& args) {
+  constexpr double most = 1e6;
+  const auto numbers = numbers_of(text, 4);
+  const auto whole = [](double n) { return n >= 0 && n <= most && n == static_cast<int>(n); };
+  if (!numbers || numbers->size() != 4 || !std::ranges::all_of(*numbers, whole) || (*numbers)[2] < 1 ||
+      (*numbers)[3] < 1) {
+    return "is not left, top, width and height in pixels";
+  }
+  const auto at = [&](std::size_t i) { return static_cast<int>((*numbers)[i]); };
+  args.black_area = Rect{at(0), at(1), at(2), at(3)};
+  return std::nullopt;
+}
+
+}  // namespace
+
+Parsed<ResaturateArgs> parse_resaturate(const std::vector<std::string>& words) {
+  CLI::App app(
+      "Gives a finished picture, whose raw file is lost, the colours back that dark current took. A picture's noise is "
+      "not changed, nor is its luminance; of raw files `develop` and `denoise` take the dark charge off, which is "
+      "better.",
+      "lowlux resaturate");
+  ResaturateArgs args;
+  app.add_option("IMAGE", args.input, "picture (PNG, JPEG, TIFF, OpenEXR, PFM)")->required();
+  app.add_option("-o,--output", args.output, "picture to write (.png .jpg .tif .exr .pfm)")
+      ->required()
+      ->type_name("OUT");
+  add_text(app, "--black", "R,G,B",
+           "black point: what the picture shows where there is no light, in sRGB codes 0 to 255",
+           [&args](const std::string& text) { return set_codes(text, args); });
+  add_text(app, "--black-area", "X,Y,WIDTH,HEIGHT", "black point: the mean of this part of the picture, in pixels",
+           [&args](const std::string& text) { return set_area(text, args); });
+  add_text(
+      app, "--chroma-noise", "SHARE",
+      "standard deviation of a pixel's chroma, of white (default: measured on the picture): the larger, the less is "
+      "colour believed in the dark",
+      [&args](const std::string& text) -> std::optional<std::string> {
+        args.chroma_noise = number_of(text);
+        if (!args.chroma_noise || *args.chroma_noise < 0 || *args.chroma_noise > 1) return "is not within 0 to 1";
+        return std::nullopt;
+      });
+  add_text(app, "--prior", "STD", "how colourful scenes are: standard deviation of x and y (default 0.065)",
+           [&args](const std::string& text) -> std::optional<std::string> {
+             args.prior_std = number_of(text).value_or(0);
+             if (args.prior_std < 0.001 || args.prior_std > 1) return "is not within 0.001 to 1";
+             return std::nullopt;
+           });
+  app.add_option("--radius", args.radius, "pixels around one over which its brightness is averaged (default 4)")
+      ->check(CLI::Range(0, 64));
+  app.add_option("--bits", args.bits, bits_help)->check(CLI::IsMember({8, 16, 32}));
+  app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
+  app.add_flag("--force", args.force, "overwrite a file that exists");
+  app.add_flag("--json", args.json, "JSON instead of text");
+  app.add_flag("--quiet", args.quiet, "no warnings and no text");
+  if (const auto code = parse_words(app, words)) return *code;
+  if (args.black_codes.has_value() == args.black_area.has_value()) {
+    return refuse(app, "the black point is needed once: --black R,G,B, or --black-area of a part without light");
+  }
+  return args;
+}
+
+}  // namespace lowlux::cli

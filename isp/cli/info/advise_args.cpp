@@ -1,0 +1,124 @@
+#include "isp/cli/info/advise_args.h"
+
+#include <array>
+#include <cstddef>
+
+#include <CLI/CLI.hpp>
+
+#include "isp/cli/shared/option_values.h"
+
+namespace lowlux::cli {
+namespace {
+
+constexpr const char* group = "advice";
+
+void add_optional(CLI::App& app, const char* flag, const char* type, const char* help, std::optional<double>& out) {
+  add_number(app, flag, type, help, [&out](double value) { out = value; })->group(group);
+}
+
+std::optional<std::string> set_highlight(const std::string& text, AdviseArgs& args) {
+  const bool ratio = text.ends_with('x');
+  const auto value = quantity_of(text, ratio ? "x" : "cd/m2");
+  if (!value) return "is neither a luminance in cd/m2 nor, as 20x, a multiple of the mid tone's";
+  (ratio ? args.highlight_ratio : args.highlight_cd_m2) = *value;
+  return std::nullopt;
+}
+
+void add_camera(CLI::App& app, AdviseArgs& args) {
+  app.add_option("--sensor", args.sensor, "by name (`lowlux simulate --list`), or the file of a camera's profile")
+      ->type_name("NAME|PROFILE.json")
+      ->group(group);
+  app.add_option("--gain", args.gain, "only this gain setting (default: the best of all)")
+      ->type_name("SETTING")
+      ->group(group);
+  app.add_option("--camera", args.figures.camera,
+                 "whose spectral sensitivities (default: the sensor's own or a stand-in)")
+      ->type_name("NAME")
+      ->group(group);
+  add_optional(app, "--f-number", "f/N", "(default: the file's; without a file 2)", args.f_number);
+  add_optional(app, "--temperature", "C", "of the sensor (default: the file's, or 20)", args.temperature_c);
+}
+
+void add_figures(CLI::App& app, AdviseArgs& args) {
+  isp::SensorFigures& f = args.figures;
+  add_optional(app, "--system-gain", "DN_PER_E", "codes per electron; with --gain", f.system_gain_dn_per_e);
+  add_optional(app, "--read-noise", "E", "standard deviation; with --gain", f.read_noise_e);
+  add_optional(app, "--iso", "ISO", "saturation-based speed; with --gain", f.iso);
+  add_optional(app, "--full-well", "E", "charge of a full pixel", f.full_well_e);
+  app.add_option("--bits", f.bits, "of the converter")->type_name("N")->group(group);
+  add_text(app, "--dark-current", "E_PER_S[,G,B]", "for all channels, or for red, green and blue",
+           [&f](const std::string& text) -> std::optional<std::string> {
+             const auto n = numbers_of(text, 3);
+             if (!n || n->size() == 2) return "is neither one number nor three";
+             f.dark_current_e_per_s = std::array{n->front(), n->size() == 3 ? (*n)[1] : n->front(), n->back()};
+             return std::nullopt;
+           })
+      ->group(group);
+  add_optional(app, "--pixel-pitch", "UM", "side of a pixel", f.pixel_pitch_um);
+  add_optional(app, "--peak-qe", "RATIO", "largest quantum efficiency, electrons per photon",
+               f.peak_quantum_efficiency);
+  add_optional(app, "--white-luminance", "CD_M2", "of a white that fills a pixel in 1 s", args.white_luminance_cd_m2);
+}
+
+void add_scene(CLI::App& app, AdviseArgs& args) {
+  add_optional(app, "--luminance", "CD_M2", "of the mid tone (default: the median of the file's green pixels)",
+               args.midtone_cd_m2);
+  add_text(app, "--highlight", "CD_M2|RATIOx",
+           "luminance that must not clip, or how many times the mid tone's it is (default: what the share --clip of "
+           "the file's green pixels exceeds)",
+           [&args](const std::string& text) { return set_highlight(text, args); })
+      ->group(group);
+  app.add_option("--illuminant", args.light, "light of the scene, by name (default D65)")
+      ->type_name("NAME")
+      ->group(group);
+}
+
+}  // namespace
+
+void add_advise(CLI::App& app, AdviseArgs& args) {
+  CLI::Option* wanted =
+      app.add_flag("--advise", args.wanted,
+                   "the exposure and gain that would give the mid tone the best signal-to-noise ratio and chromaticity")
+          ->group(group);
+  add_camera(app, args);
+  add_figures(app, args);
+  add_scene(app, args);
+  add_optional(app, "--max-exposure", "S", "longest exposure", args.longest_exposure_s);
+  add_optional(app, "--motion", "PX_PER_S", "how fast the scene moves; goes with --blur", args.speed_px_per_s);
+  add_optional(app, "--blur", "PX", "how far it may move during the exposure", args.blur_px);
+  add_number(app, "--clip", "SHARE", "share of pixels that may clip (default 0.001)", [&args](double share) {
+    args.clipped_share = share;
+  })->group(group);
+  add_number(app, "--patch", "PIXELS", "red pixels of the patch whose chromaticity is judged (default 256)",
+             [&args](double pixels) { args.patch_pixels = pixels; })
+      ->group(group);
+  app.add_option("--frames", args.frames, "frames that are averaged (default 1)")
+      ->check(CLI::Range(1, 1000000))
+      ->type_name("N")
+      ->group(group);
+  app.add_option("--report", args.report, "page to write, with the curves")->type_name("PAGE.html")->group(group);
+  app.add_flag("--force", args.force, "overwrite the page if it exists")->group(group);
+  for (CLI::Option* option : app.get_options([](const CLI::Option* o) { return o->get_group() == group; })) {
+    if (option != wanted) option->needs(wanted);
+  }
+}
+
+std::string wrong_advise(const AdviseArgs& args, std::size_t files) {
+  if (!args.wanted) return files == 0 ? "RAW is required" : "";
+  if (args.sensor.empty()) return "--advise needs --sensor: a name (`lowlux simulate --list`) or a profile's file";
+  if (files > 1) return "--advise takes one raw file, or none with --luminance and --highlight";
+  if (files == 0 && !args.midtone_cd_m2) return "--advise without a raw file needs --luminance";
+  if (files == 0 && !args.highlight_cd_m2 && !args.highlight_ratio) {
+    return "--advise without a raw file needs --highlight, as a luminance or as 20x";
+  }
+  if (args.speed_px_per_s.has_value() != args.blur_px.has_value()) return "--motion and --blur go together";
+  if (!args.report.empty() && !args.report.ends_with(".html")) {
+    return "--report is a page, its name ends with .html, found " + args.report;
+  }
+  if (!args.longest_exposure_s && !args.speed_px_per_s) {
+    return "--advise needs a longest exposure: --max-exposure, or --motion with --blur";
+  }
+  return {};
+}
+
+}  // namespace lowlux::cli

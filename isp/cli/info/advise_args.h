@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "isp/model/sensor/exposure_advice.h"
+#include "isp/model/sensor/sensor_db.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
+
+namespace lowlux::cli {
+
+/// What `info --advise` is told; what is absent comes from the raw file.
+struct AdviseArgs {
+  bool wanted = false;
+  std::string sensor;                     // by name, or a camera profile's file (.json)
+  std::string gain;                       // only this setting; empty: all
+  isp::SensorFigures figures;             // in place of the table's
+  std::string light = "D65";              // of the scene
+  std::optional<double> midtone_cd_m2;    // --luminance
+  std::optional<double> highlight_cd_m2;  // --highlight: 20, or 20x for so many times the mid tone
+  std::optional<double> highlight_ratio;
+  std::optional<double> f_number;
+  std::optional<double> white_luminance_cd_m2;
+  std::optional<double> longest_exposure_s;
+  std::optional<double> speed_px_per_s;
+  std::optional<double> blur_px;
+  std::optional<double> temperature_c;
+  double clipped_share = 1e-3;
+  double patch_pixels = 256;
+  int frames = 1;
+  std::string report;  // HTML page to write; empty: none
+  bool force = false;
+};
+
+/// Adds the options of `info --advise`.
+void add_advise(CLI::App& app, AdviseArgs& args);
+
+/// What is wrong with them together; empty if nothing.
+/// @param files  raw files on the command line
+std::string wrong_advise(const AdviseArgs& args, std::size_t files);
+
+}  // namespace lowlux::cli

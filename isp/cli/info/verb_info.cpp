@@ -1,0 +1,80 @@
+#include "isp/cli/info/verb_info.h"
+
+#include <cstdio>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "capture/file/dng_source.h"
+#include "isp/cli/develop/develop_args.h"
+#include "isp/cli/info/advise_camera.h"
+#include "isp/cli/info/advise_report.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/report.h"
+#include "isp/cli/verbs.h"
+#include "isp/output/report/report.h"
+
+namespace lowlux::cli {
+
+int run_info(const std::vector<std::string>& words) {
+  const Parsed<InfoArgs> parsed = parse_info(words);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& args = std::get<InfoArgs>(parsed);
+  if (args.advise.wanted) return run_advise(args);
+
+  int code = exit_done;
+  std::string json;
+  for (const std::string& file : args.inputs) {
+    const Result<RawFrame> frame = capture::read_raw(file);
+    if (!frame) {
+      code = exit_failed;
+      print_err(fmt::format("{}\n", error_line(file, frame.error())));
+    }
+    if (args.json) {
+      json += (json.empty() ? "" : ",\n") + (frame ? info_json(file, *frame) : error_json(file, frame.error()));
+    } else if (frame) {
+      print_out(fmt::format("{}", info_text(file, *frame)));
+    }
+  }
+  if (args.json) print_out(fmt::format("[{}]\n", json));
+  return code;
+}
+
+namespace {
+
+int failed(const std::string& file, const Error& error) {
+  if (error.code != ErrorCode::invalid_argument) return print_failure(file, error);
+  const std::string place = error.where.empty() ? "" : " (" + error.where + ")";
+  return print_usage_error("info", {error.code, error.message + place, {}});
+}
+
+}  // namespace
+
+int run_advise(const InfoArgs& args) {
+  const std::string subject = args.inputs.empty() ? args.advise.sensor : args.inputs.front();
+  std::optional<RawFrame> frame;
+  if (!args.inputs.empty()) {
+    auto read = capture::read_raw(args.inputs.front());
+    if (!read) return failed(subject, read.error());
+    frame = *std::move(read);
+  }
+  const auto asked = advice_case(args.advise, frame ? &*frame : nullptr);
+  if (!asked) return failed(subject, asked.error());
+  const auto advice = isp::advise_exposure(asked->request);
+  if (!advice) return failed(subject, advice.error());
+  if (!args.advise.report.empty()) {
+    const auto overwrite = args.advise.force ? isp::Overwrite::yes : isp::Overwrite::no;
+    const auto written = isp::write_text(args.advise.report, isp::html_of(advice_page(*asked, *advice)), overwrite);
+    if (!written) return failed(args.advise.report, written.error());
+  }
+  if (args.json) {
+    print_out(fmt::format("{}\n", advice_json(*asked, *advice)));
+  } else {
+    print_out(fmt::format("{}", advice_text(*asked, *advice)));
+  }
+  return exit_done;
+}
+
+}  // namespace lowlux::cli

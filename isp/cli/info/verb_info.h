@@ -1,0 +1,10 @@
+#pragma once
+
+#include "isp/cli/develop/develop_args.h"
+
+namespace lowlux::cli {
+
+/// `info --advise`: prints the advice and writes its page. @return the exit code
+int run_advise(const InfoArgs& args);
+
+}  // namespace lowlux::cli

@@ -1,0 +1,32 @@
+#include "isp/cli/shared/exit_code.h"
+
+#include <fmt/format.h>
+
+#include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/report.h"
+
+namespace lowlux::cli {
+
+int print_failure(const std::string& file, const Error& error) {
+  print_err(error_line(file, error) + "\n");
+  return exit_failed;
+}
+
+int print_failure(const Error& error) { return print_failure(error.where, error); }
+
+int print_usage_error(std::string_view verb, const Error& error) {
+  const std::string place = error.where.empty() ? "" : error.where + ": ";
+  print_err(one_line(fmt::format("lowlux {}: {}{}", verb, place, error.message)) + "\n");
+  return exit_usage;
+}
+
+int print_argument_error(std::string_view verb, const Error& error) {
+  return error.code == ErrorCode::invalid_argument ? print_usage_error(verb, error) : print_failure(error);
+}
+
+Error with_file(Error error, const std::string& file) {
+  if (error.where.empty()) error.where = file;
+  return error;
+}
+
+}  // namespace lowlux::cli

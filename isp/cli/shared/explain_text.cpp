@@ -1,0 +1,148 @@
+#include "isp/cli/shared/explain_text.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/report.h"
+#include "isp/pipeline/budget/cost_model.h"
+
+namespace lowlux::cli {
+namespace {
+
+void add_noise(Lines& out, const isp::NoiseReduction& noise) {
+  if (noise.snr) {
+    const auto& variance = noise.noise.variance_e2;
+    out.add("noise", fmt::format("from {}; without light {:.3g} {:.3g} {:.3g} e- (R, G, B)", name_of(noise.source),
+                                 std::sqrt(variance[0]), std::sqrt(variance[1]), std::sqrt(variance[2])));
+  }
+  out.add("denoise", fmt::format("{}: {}", noise.level ? denoise::name_of(*noise.level) : "off", noise.reason));
+  for (const denoise::LineOffsets& lines : noise.lines) {
+    out.add("", fmt::format("{} noise {:.3g} e- taken off, {:.3g} e- left",
+                            lines.lines == denoise::Lines::rows ? "row" : "column", lines.line_std_e,
+                            lines.residual_std_e));
+  }
+}
+
+void add_time(Lines& out, const isp::EffectsPlan& effects, const isp::EffectsChoice& choice) {
+  if (!effects.predicted_s) {
+    out.add("time", "not predicted: bench --calibrate-cost measures this machine's speed, once");
+    return;
+  }
+  const double predicted_ms = 1e3 * *effects.predicted_s;
+  if (!choice.budget_s) {
+    out.add("time",
+            fmt::format("predicted {:.1f} ms, one file at a time on this machine as it was calibrated", predicted_ms));
+    return;
+  }
+  std::string text = fmt::format("{:.1f} ms; predicted {:.1f} ms", 1e3 * *choice.budget_s, predicted_ms);
+  if (choice.cost->machine == isp::reference_machine) {
+    text += fmt::format(", roughly: {:.2f} times what {} take; bench --calibrate-cost measures this machine",
+                        choice.cost->pace, isp::reference_machine);
+  } else if (choice.cost->pace_s > 0) {
+    text += fmt::format(", everything taking {:.2f} times what it took when this machine was calibrated",
+                        choice.cost->pace);
+  }
+  out.add("budget", text);
+}
+
+void add_effects(Lines& out, const isp::EffectsPlan& effects, const isp::EffectsChoice& choice) {
+  out.add("effects", choice.all ? std::string("all")
+                     : choice.tolerance_delta_e
+                         ? fmt::format("auto, tolerance {:.2g} CIEDE2000", *choice.tolerance_delta_e)
+                         : std::string("auto, as accurate as the budget lets them be"));
+  for (const isp::PlannedEffect& effect : effects.effects) {
+    std::string text = fmt::format("{}: {}", effect.name, effect.used ? "done" : "left out");
+    text += std::isfinite(effect.size)
+                ? fmt::format("; {:.2g} CIEDE2000, of which {:.2g} may stay", effect.size, effect.left)
+                : std::string("; size not predicted");
+    if (effect.seconds) text += fmt::format("; {}{:.1f} ms", effect.used ? "" : "would take ", 1e3 * *effect.seconds);
+    out.add("", text + " (" + effect.decision + ")");
+  }
+  add_time(out, effects, choice);
+}
+
+std::string look_name(const isp::DevelopPlan& plan) {
+  return plan.look->kind == isp::Look::model ? plan.options.look.model : "eye";
+}
+
+void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, const std::string& coefficients,
+              bool noise_known) {
+  if (look.kind != isp::Look::camera) {
+    out.add("look", fmt::format("{}; scene {:.3g} cd/m2 ({}), adaptation m {:.2f}, {:+.2f} EV of darkness kept", name,
+                                look.mean_cd_m2, look.luminance_rule, look.state.m, look.dimming_ev));
+    for (const isp::LookEffect& effect : look.effects) {
+      const std::string size = std::isfinite(effect.size) ? fmt::format("up to {:.2g} CIEDE2000", effect.size)
+                                                          : std::string("a matter of taste");
+      out.add("", fmt::format("{} {}: {}", effect.name, effect.used ? "shown" : "left out", size));
+    }
+  }
+  if (look.table) {
+    out.add("", fmt::format(
+                    "table of {0} x {0} chromaticities, {1} levels: off by {2:.2f} CIEDE2000 in the mean, {3:.2f} at "
+                    "most",
+                    look.table->cells, look.table->levels, look.table->error.mean, look.table->error.largest));
+    if (name == "shin") out.add("", fmt::format("coefficients = {}", coefficients));
+  }
+  if (look.noise_limit) {
+    out.add("noise limit",
+            noise_known ? fmt::format("{:.3g} CIE L*", *look.noise_limit) : "none: the noise is not known");
+  }
+}
+
+}  // namespace
+
+std::string explain_text(const isp::DevelopPlan& plan) {
+  Lines out;
+  out.add("black [DN]",
+          fmt::format("{:.2f} from {}{}", fmt::join(plan.black.pedestal_dn, " "), name_of(plan.black.source),
+                      plan.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", dark charge in it" : ""));
+  if (plan.effects) add_effects(out, *plan.effects, *plan.options.effects);
+  out.add("defects", fmt::format("{} pixels repaired", plan.defects.size()));
+  add_noise(out, plan.noise_reduction);
+  out.add("white", plan.white ? fmt::format("{}, {:.0f} K", plan.white_balance_rule, plan.white->cct_k)
+                              : std::string(plan.white_balance_rule));
+  out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.exposure_ev, plan.exposure_rule));
+  if (plan.look)
+    add_look(out, *plan.look, look_name(plan), coefficients_of(plan.options.look),
+             plan.look->noise || plan.noise_reduction.has_level());
+  if (plan.options.display) {
+    const isp::DisplayTarget& display = *plan.options.display;
+    out.add("display", fmt::format("{:g} to {:g} cd/m2, coefficients {}, table off by {:.2f} CIEDE2000 in the mean",
+                                   display.source_cd_m2, display.display_cd_m2, display.coefficients,
+                                   display.made.error.mean_ciede2000));
+  }
+  return out.text();
+}
+
+std::string_view name_of(BlackPoint::Source source) {
+  switch (source) {
+    case BlackPoint::Source::masked_pixels:
+      return "masked-pixels";
+    case BlackPoint::Source::tag:
+      return "tag";
+    case BlackPoint::Source::given:
+      return "given";
+    case BlackPoint::Source::profile:
+      return "profile";
+    case BlackPoint::Source::dark_frame:
+      return "dark-frame";
+  }
+  return "";
+}
+
+std::string_view name_of(NoiseProfile::Source source) {
+  switch (source) {
+    case NoiseProfile::Source::file:
+      return "file";
+    case NoiseProfile::Source::profile:
+      return "profile";
+    case NoiseProfile::Source::picture:
+      return "picture";
+  }
+  return "";
+}
+
+}  // namespace lowlux::cli

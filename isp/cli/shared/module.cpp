@@ -1,0 +1,65 @@
+#include "isp/cli/shared/module.h"
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+extern "C" const char lowlux_module_stamp[];
+
+namespace lowlux::cli {
+namespace {
+
+/// The function of a module that is open; nullptr if the module was not made with this command.
+void* function_of(void* loaded, const Module& module) {
+  const void* stamp = dlsym(loaded, "lowlux_module_stamp");
+  const bool ours = stamp != nullptr && std::strcmp(static_cast<const char*>(stamp), lowlux_module_stamp) == 0;
+  return ours ? dlsym(loaded, module.function.c_str()) : nullptr;
+}
+
+}  // namespace
+
+Result<void*> load_module(const Module& module) {
+  std::error_code failed;
+  const std::filesystem::path folder = std::filesystem::read_symlink("/proc/self/exe", failed).parent_path();
+  if (failed) return fail(ErrorCode::unreadable, "cannot tell where the command lies: is /proc mounted?");
+  std::string said;
+  for (const std::filesystem::path& place : {folder, folder / LOWLUX_MODULE_FOLDER}) {
+    void* loaded = dlopen((place / module.file).c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (loaded == nullptr) {
+      const char* reason = dlerror();  // NOLINT(concurrency-mt-unsafe): glibc keeps one for each thread
+      said += fmt::format("{}{}", said.empty() ? "" : "; ", reason != nullptr ? reason : "no reason given");
+      continue;
+    }
+    if (void* found = function_of(loaded, module); found != nullptr) return found;
+    dlclose(loaded);
+    said += fmt::format("{}{} is of another build of lowlux: build or install it again", said.empty() ? "" : "; ",
+                        (place / module.file).string());
+  }
+  std::replace(said.begin(), said.end(), '\n', ' ');
+  return fail(ErrorCode::unreadable,
+              fmt::format("{} needs {} and {}: {}", module.purpose, module.file, module.needs, said));
+}
+
+Result<calib::DetectCharts*> load_chart_detector() {
+  const auto found = load_module({.file = "liblowlux_chart.so",
+                                  .function = calib::detect_charts_name,
+                                  .purpose = "finding charts",
+                                  .needs = "OpenCV's mcc module (Debian: libopencv-contrib-dev)"});
+  if (!found) return tl::make_unexpected(found.error());
+  return reinterpret_cast<calib::DetectCharts*>(*found);
+}
+
+Result<capture::LibcameraModule> load_libcamera() {
+  const auto found = load_module({.file = "liblowlux_libcamera.so",
+                                  .function = capture::libcamera_module_name,
+                                  .purpose = "libcamera's cameras",
+                                  .needs = "the libcamera it was built with (Debian: libcamera-dev)"});
+  if (!found) return tl::make_unexpected(found.error());
+  return *reinterpret_cast<capture::GetLibcameraModule*>(*found)();
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,56 @@
+#include "isp/cli/shared/noise_maps.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "isp/base/image.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/codec/pfm.h"
+#include "isp/output/picture/orient.h"
+
+namespace lowlux::cli {
+namespace {
+
+/// The cells a crop touches.
+Plane<float> cropped(const Plane<float>& cells, const Rect& crop) {
+  const int left = crop.x / 2, top = crop.y / 2;
+  Plane<float> out((crop.x + crop.width + 1) / 2 - left, (crop.y + crop.height + 1) / 2 - top);
+  for (int y = 0; y < out.height(); ++y) std::copy_n(cells.row(top + y) + left, out.width(), out.row(y));
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::string> noise_map_names(const std::string& picture) {
+  const std::string stem = std::filesystem::path(picture).replace_extension().string();
+  return {stem + ".noise.pfm", stem + ".confidence.pfm"};
+}
+
+std::vector<PixelMap> noise_map_files(isp::NoiseMaps maps, const RawDn& raw, const std::string& picture,
+                                      Executor& executor) {
+  if (maps.chroma_confidence.size() == 0) return {};
+  SceneLinear both;  // as planes of one picture they are turned alike
+  both.plane[0] = cropped(maps.residual_variance_e2, raw.default_crop);
+  both.plane[1] = cropped(maps.chroma_confidence, raw.default_crop);
+  both.plane[2] = Plane<float>(both.plane[0].width(), both.plane[0].height());
+  auto upright = std::get<SceneLinear>(isp::oriented(std::move(both), raw.info.orientation, executor));
+  const std::vector<std::string> names = noise_map_names(picture);
+  std::vector<PixelMap> out;
+  out.push_back({names[0], std::move(upright.plane[0])});
+  out.push_back({names[1], std::move(upright.plane[1])});
+  return out;
+}
+
+Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite, isp::Sync sync) {
+  auto file = isp::AtomicFile::create(map.path, overwrite, sync);
+  if (!file) return tl::make_unexpected(with_file(file.error(), map.path));
+  if (const auto written = isp::encode_pfm(map.value.view(), file->file()); !written) {
+    return tl::make_unexpected(with_file(written.error(), map.path));
+  }
+  const auto committed = file->commit();
+  if (!committed) return tl::make_unexpected(with_file(committed.error(), map.path));
+  return {};
+}
+
+}  // namespace lowlux::cli

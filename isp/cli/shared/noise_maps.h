@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/plane.h"
+#include "isp/base/result.h"
+#include "isp/output/atomic_file.h"
+#include "isp/pipeline/noise_reduction.h"
+
+namespace lowlux::cli {
+
+/// A figure of each pixel, and its file.
+struct PixelMap {
+  std::string path;
+  Plane<float> value;
+};
+
+/// Writes a map as grey PFM, whole or not at all. Errors name the file.
+Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite, isp::Sync sync = isp::Sync::no);
+
+/// Where the maps of a picture go: OUT.noise.pfm and OUT.confidence.pfm for OUT.png.
+std::vector<std::string> noise_map_names(const std::string& picture);
+
+/// The maps as their picture lies: cropped and upright, one pixel for each 2x2 cell. None if `maps` is empty.
+std::vector<PixelMap> noise_map_files(isp::NoiseMaps maps, const RawDn& raw, const std::string& picture,
+                                      Executor& executor);
+
+}  // namespace lowlux::cli

@@ -1,0 +1,174 @@
+#include "isp/cli/shared/option_values.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
+
+#include "isp/base/text.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/report.h"
+
+namespace lowlux::cli {
+
+namespace {
+
+constexpr std::string_view blank_characters = " \t";
+
+bool same_letters(std::string_view a, std::string_view b) {
+  return std::ranges::equal(a, b, {}, ascii_lower, ascii_lower);
+}
+
+/// The text without its unit, which follows it, or, if it ends with a slash, precedes it.
+std::string_view without_unit(std::string_view text, std::string_view unit) {
+  if (unit.empty() || text.size() <= unit.size()) return text;
+  if (unit.ends_with('/')) {
+    return same_letters(text.substr(0, unit.size()), unit) ? text.substr(unit.size()) : text;
+  }
+  const std::size_t rest = text.size() - unit.size();
+  if (!same_letters(text.substr(rest), unit)) return text;
+  text = text.substr(0, rest);
+  return text.substr(0, text.find_last_not_of(blank_characters) + 1);
+}
+
+/// The unit that a placeholder of the help stands for; empty if it stands for none.
+std::string_view unit_of(std::string_view placeholder) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 9> units{{{"S", "s"},
+                                                                                {"C", "C"},
+                                                                                {"CD_M2", "cd/m2"},
+                                                                                {"DN", "DN"},
+                                                                                {"E", "e-"},
+                                                                                {"UM", "um"},
+                                                                                {"PX", "px"},
+                                                                                {"PX_PER_S", "px/s"},
+                                                                                {"f/N", "f/"}}};
+  const auto* const found =
+      std::ranges::find(units, placeholder, &std::pair<std::string_view, std::string_view>::first);
+  return found == units.end() ? std::string_view() : found->second;
+}
+
+/// How to write a number with a decimal comma; empty if `store` does not take it with a point either.
+std::string decimal_point_hint(std::string text, const OptionStore& store) {
+  const std::size_t comma = text.find(',');
+  if (comma == std::string::npos) return {};
+  text[comma] = '.';
+  return store(text) ? std::string() : fmt::format("; write decimals with a point: {}", text);
+}
+
+/// The first argument that looks like an option and is not one, with what may have been meant; nullopt if all are
+/// known.
+std::optional<std::string> unknown_option(const CLI::App& app) {
+  const std::vector<std::string> unknown = app.remaining();
+  const auto found = std::ranges::find_if(unknown, [](const auto& word) { return word.size() > 1 && word[0] == '-'; });
+  if (found == unknown.end() || *found == "--") return std::nullopt;
+  std::error_code ignored;
+  if (std::filesystem::exists(*found, ignored)) {
+    return fmt::format("'{0}' is read as an option; for the file of that name write ./{0}", *found);
+  }
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  const std::vector<std::string_view> known(names.begin(), names.end());
+  const std::string name = found->substr(0, found->find('='));
+  return fmt::format("unknown option {}{}", name, suggestion(name, known));
+}
+
+}  // namespace
+
+std::optional<double> number_of(std::string_view text) {
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+std::optional<double> quantity_of(std::string_view text, std::string_view unit) {
+  text = without_unit(text, unit);
+  const std::size_t slash = text.find('/');
+  if (slash == std::string_view::npos) return number_of(text);
+  const auto numerator = number_of(text.substr(0, slash)), denominator = number_of(text.substr(slash + 1));
+  if (!numerator || !denominator || !(*denominator >= 1)) return std::nullopt;
+  return *numerator / *denominator;
+}
+
+std::vector<std::string> words_of(const std::string& text) {
+  std::vector<std::string> words;
+  for (std::size_t start = 0; start <= text.size();) {
+    const std::size_t end = std::min(text.find(',', start), text.size());
+    words.push_back(text.substr(start, end - start));
+    start = end + 1;
+  }
+  return words;
+}
+
+std::optional<std::vector<double>> numbers_of(const std::string& text, std::size_t most) {
+  std::vector<double> numbers;
+  for (const std::string& word : words_of(text)) {
+    const auto number = number_of(word);
+    if (!number || numbers.size() == most) return std::nullopt;
+    numbers.push_back(*number);
+  }
+  return numbers;
+}
+
+CLI::Option* add_text(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
+                      OptionStore store) {
+  return app
+      .add_option_function<std::string>(
+          flag,
+          [store = std::move(store), flag](const std::string& text) {
+            const auto wrong = store(text);
+            if (!wrong) return;
+            throw CLI::ValidationError(flag, fmt::format("'{}' {}{}", text, *wrong, decimal_point_hint(text, store)));
+          },
+          help)
+      ->type_name(type);
+}
+
+CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
+                        std::function<void(double)> store) {
+  return add_text(
+      app, flag, type, help,
+      [store = std::move(store), unit = unit_of(type)](const std::string& text) -> std::optional<std::string> {
+        const auto number = quantity_of(text, unit);
+        if (!number) return "is not a finite number";
+        store(*number);
+        return std::nullopt;
+      });
+}
+
+int refuse(const CLI::App& app, const std::string& wrong) {
+  print_err(fmt::format("{}\n", one_line(fmt::format("{}: {}; --help lists the options", app.get_name(), wrong))));
+  return exit_usage;
+}
+
+std::string suggestion(std::string_view wanted, std::span<const std::string_view> known) {
+  const auto near = near_matches(wanted, known);
+  return near.empty() ? std::string() : fmt::format(" (did you mean {}?)", fmt::join(near, " or "));
+}
+
+std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words) {
+  try {
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // CLI11 takes them last first
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // help
+    if (const auto unknown = unknown_option(app)) return refuse(app, *unknown);
+    std::string text = error.what();
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    return refuse(app, text);
+  }
+  return std::nullopt;
+}
+
+}  // namespace lowlux::cli

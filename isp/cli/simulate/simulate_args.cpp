@@ -1,0 +1,269 @@
+#include "isp/cli/simulate/simulate_args.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "isp/base/text.h"
+#include "isp/cli/shared/option_values.h"
+
+namespace lowlux::cli {
+namespace {
+
+using Wrong = std::optional<std::string>;
+
+/// A whole number of min_side to 65535; 0 if the text is none.
+int side_of(const std::string& text) {
+  const double side = number_of(text).value_or(0);
+  return side >= min_side && side <= 65535 && side == std::floor(side) ? static_cast<int>(side) : 0;
+}
+
+Wrong set_size(const std::string& text, SceneArgs& scene) {
+  const std::size_t x = std::min(text.find('x'), text.size());
+  scene.size_given = true;
+  scene.width = side_of(text.substr(0, x));
+  scene.height = side_of(text.substr(std::min(x + 1, text.size())));
+  if (scene.width == 0 || scene.height == 0) {
+    return fmt::format("is not WIDTHxHEIGHT of {} to 65535 pixels: raw developers read no smaller frames", min_side);
+  }
+  return std::nullopt;
+}
+
+Wrong add_lamp(const std::string& text, SceneArgs& scene) {
+  const auto words = words_of(text);
+  constexpr const char* expected = "is no X,Y,LIGHT,LUMINANCE with a luminance of 0 to 1e12 cd/m2";
+  if (words.size() != 4) return expected;
+  const auto x = number_of(words[0]), y = number_of(words[1]), luminance = number_of(words[3]);
+  if (!x || !y || !luminance || std::fabs(*x) > 1e6 || std::fabs(*y) > 1e6 || *luminance < 0 || *luminance > 1e12) {
+    return expected;
+  }
+  scene.lamps.push_back({*x, *y, words[2], *luminance});
+  return std::nullopt;
+}
+
+std::string no_effect(const std::string& word) {
+  const auto names = isp::effect_names();
+  const auto near = near_matches(word, names);
+  return fmt::format("holds '{}', which is none of auto, all, none, {}{}", word, fmt::join(names, ", "),
+                     near.empty() ? "" : fmt::format("; near it: {}", fmt::join(near, ", ")));
+}
+
+/// auto, all, none, or a list of names; photon-noise,dark-current... or all but some: all,-prnu or -prnu.
+Wrong set_effects(const std::string& text, capture::EffectChoice& choice) {
+  if (text == "auto") {
+    choice.tolerance = choice.tolerance.value_or(isp::Tolerance{});
+    return std::nullopt;
+  }
+  const auto names = isp::effect_names();
+  isp::EffectSet effects = text.starts_with('-') ? isp::EffectSet::all() : isp::EffectSet();
+  isp::EffectSet named;
+  for (std::string word : words_of(text)) {
+    const bool without = word.starts_with('-');
+    if (without) word.erase(0, 1);
+    const auto found = std::find(names.begin(), names.end(), word);
+    if (word == "auto") return "holds auto, which decides on every effect and cannot be combined";
+    if (word == "all" && !without) {
+      effects = isp::EffectSet::all();
+    } else if (word == "none" && !without) {
+      effects = named = {};
+    } else if (found != names.end()) {
+      const auto effect = static_cast<isp::Effect>(found - names.begin());
+      effects = without ? effects.without(effect) : effects.with(effect);
+      named = without ? named.without(effect) : named.with(effect);
+    } else {
+      return no_effect(word);
+    }
+  }
+  // Of all effects but dark current DSNU is quietly left out; who names it expects it to do something.
+  if (named.has(isp::Effect::dsnu) && !effects.has(isp::Effect::dark_current)) {
+    return "names dsnu without dark-current: dsnu multiplies the dark current";
+  }
+  choice.tolerance.reset();
+  choice.effects = effects;
+  return std::nullopt;
+}
+
+Wrong set_tolerance(const std::string& text, isp::Tolerance& tolerance) {
+  const auto numbers = numbers_of(text, 2);
+  if (!numbers || (*numbers)[0] <= 0 || (numbers->size() == 2 && (*numbers)[1] <= 0)) {
+    return "is no positive DELTA_E or DELTA_E,RELATIVE_VARIANCE";
+  }
+  tolerance.delta_e = (*numbers)[0];
+  if (numbers->size() == 2) tolerance.relative_variance = (*numbers)[1];
+  return std::nullopt;
+}
+
+Wrong set_seed(const std::string& text, std::uint64_t& seed) {
+  const char* end = text.data() + text.size();
+  const auto read = std::from_chars(text.data(), end, seed);
+  if (read.ec != std::errc() || read.ptr != end) return "is no whole number of 0 to 18446744073709551615";
+  return std::nullopt;
+}
+
+void add_scene(CLI::App& app, SceneArgs& s) {
+  app.add_option("SCENE", s.what,
+                 "a picture (PNG, JPEG, TIFF, OpenEXR, PFM), or dark, flat, chart, chart:macbeth, chart:munsell, or "
+                 "chart:FILE.csv with reflectances by wavelength")
+      ->type_name("");
+  add_text(app, "--size", "WxH", "of a scene that is no picture (default 1200x800)",
+           [&s](const std::string& text) { return set_size(text, s); });
+  add_text(app, "--light", "NAME|FILE.csv",
+           "of charts and flats: a CIE illuminant or a lamp (--list), or a table's file (default D65)",
+           [&s](const std::string& text) -> Wrong {
+             s.light = text;
+             s.light_given = true;
+             return std::nullopt;
+           });
+  add_number(app, "--luminance", "CD_M2",
+             "of a white diffuser in the scene, in pictures of their white (default 1, or what the picture states)",
+             [&s](double value) {
+               s.luminance_cd_m2 = value;
+               s.luminance_given = true;
+             });
+  app.add_option("--stars", s.stars, "add so many stars")->check(CLI::Range(0, 1000000))->type_name("N");
+  add_number(app, "--star-luminance", "CD_M2",
+             "of the faintest star's light, spread over one pixel (default: a tenth of --luminance)",
+             [&s](double value) { s.star_luminance_cd_m2 = value; });
+  add_text(app, "--lamp", "X,Y,LIGHT,CD_M2", "add a distant lamp at a pixel, its light spread over one pixel",
+           [&s](const std::string& text) { return add_lamp(text, s); })
+      ->allow_extra_args(false);
+}
+
+void add_figures(CLI::App& app, SimulateArgs& args) {
+  isp::SensorFigures& f = args.figures;
+  const auto figure = [&app](const std::string& flag, const std::string& type, const std::string& help,
+                             std::optional<double>& out) {
+    add_number(app, flag, type, help, [&out](double value) { out = value; })->group("sensor figures");
+  };
+  figure("--system-gain", "DN_PER_E", "codes per electron", f.system_gain_dn_per_e);
+  figure("--read-noise", "E", "standard deviation", f.read_noise_e);
+  figure("--full-well", "E", "charge of a full pixel", f.full_well_e);
+  app.add_option("--bits", f.bits, "of the converter")->group("sensor figures");
+  figure("--black-level", "DN", "pedestal", f.black_level_dn);
+  figure("--white-level", "DN", "largest code", f.white_level_dn);
+  add_text(app, "--dark-current", "E_PER_S[,G,B]", "for all channels, or for red, green and blue",
+           [&f](const std::string& text) -> Wrong {
+             const auto n = numbers_of(text, 3);
+             if (!n || n->size() == 2) return "is neither one number nor three";
+             f.dark_current_e_per_s =
+                 n->size() == 1 ? std::array{(*n)[0], (*n)[0], (*n)[0]} : std::array{(*n)[0], (*n)[1], (*n)[2]};
+             return std::nullopt;
+           })
+      ->group("sensor figures");
+  figure("--dark-temperature", "C", "at which the dark current is that", f.dark_temperature_c);
+  figure("--dark-doubling", "C", "degrees over which it doubles", f.dark_doubling_c);
+  figure("--prnu", "RATIO", "photo response non-uniformity", f.prnu);
+  figure("--dsnu", "RATIO", "dark signal non-uniformity, of the dark current", f.dsnu);
+  figure("--hot-pixels", "RATIO", "share of pixels that are hot", f.hot_pixel_fraction);
+  figure("--hot-current", "E_PER_S", "mean dark current of hot pixels", f.hot_pixel_current_e_per_s);
+  figure("--row-noise", "E", "standard deviation", f.row_noise_e);
+  figure("--column-noise", "E", "standard deviation", f.column_noise_e);
+  figure("--pixel-pitch", "UM", "side of a pixel", f.pixel_pitch_um);
+  figure("--peak-qe", "RATIO", "largest quantum efficiency, electrons per photon", f.peak_quantum_efficiency);
+  figure("--iso", "ISO", "saturation-based speed of the gain setting", f.iso);
+  figure("--white-luminance", "CD_M2", "of a white that fills a pixel in 1 s", args.optics.white_luminance_cd_m2);
+  add_choice<Quantisation>(
+      app, "--quantise", {{"round", Quantisation::round}, {"floor", Quantisation::floor}},
+      [&f](Quantisation q) { f.quantisation = q; }, "how the converter makes codes")
+      ->group("sensor figures");
+}
+
+void add_camera(CLI::App& app, SimulateArgs& args) {
+  capture::SyntheticOptions& o = args.options;
+  app.add_option("--sensor", args.sensor, "by name (--list; default ELD_NikonD850)")->type_name("NAME");
+  app.add_option("--gain", args.gain, "gain setting of the sensor, as ISO 1600 or its number")->type_name("SETTING");
+  app.add_option("--camera", args.figures.camera,
+                 "whose spectral sensitivities (--list; default: the sensor's own or a stand-in)")
+      ->type_name("NAME");
+  add_number(app, "--exposure", "S", "exposure time (default 0.1)", [&o](double s) { o.exposure.time_s = s; });
+  add_number(app, "--f-number", "f/N", "(default 2)", [&args](double n) { args.optics.f_number = n; });
+  add_number(app, "--temperature", "C", "of the sensor (default 20)", [&o](double c) { o.exposure.temperature_c = c; });
+  add_choice<BayerPhase>(
+      app, "--cfa",
+      {{"rggb", BayerPhase::rggb}, {"grbg", BayerPhase::grbg}, {"gbrg", BayerPhase::gbrg}, {"bggr", BayerPhase::bggr}},
+      [&o](BayerPhase phase) { o.phase = phase; }, "mosaic (default rggb)");
+  app.add_option("--masked-columns", o.masked_columns, "light-shielded columns left of the picture (even; default 0)")
+      ->type_name("N");
+}
+
+void add_work(CLI::App& app, SimulateArgs& args) {
+  capture::SyntheticOptions& o = args.options;
+  add_text(app, "--effects", "auto|all|none|LIST",
+           "what is simulated: what the scene calls for (auto; default, but with --sampling published all), or names "
+           "parted by commas (-prnu is all but one)",
+           [&args](const std::string& text) {
+             args.effects = text;
+             return set_effects(text, args.options.effects);
+           });
+  add_choice<capture::PhotonSampling>(
+      app, "--sampling",
+      {{"physical", capture::PhotonSampling::physical}, {"published", capture::PhotonSampling::published}},
+      [&o](capture::PhotonSampling sampling) { o.sampling = sampling; },
+      "photons: one Poisson draw for each pixel (default), or one for each wavelength as the thesis has it");
+  add_text(
+      app, "--seed", "N",
+      "of the noise, and of where stars are (default 1); darks and lights that are to have noise of their own need "
+      "seeds of their own",
+      [&o](const std::string& text) { return set_seed(text, o.seed); });
+  add_text(app, "--sensor-seed", "N", "of the fixed pattern: which specimen of the sensor it is (default 1)",
+           [&o](const std::string& text) { return set_seed(text, o.sensor_seed); });
+  app.add_option("--frames", args.frames, "frames of the same scene, OUT_0000.dng and on (default 1)")
+      ->check(CLI::Range(1, 10000))
+      ->type_name("N");
+  app.add_flag("--explain", args.explain, "what each effect was predicted to change, what was decided, what it saved");
+}
+
+void add_files(CLI::App& app, SimulateArgs& args) {
+  app.add_option("-o,--output", args.output, "raw file to write (.dng)")->type_name("OUT.dng");
+  auto* truth = app.add_option("--truth", args.truth,
+                               "the noise-free scene, linear, white at --luminance (.exr, .pfm, .tif; default "
+                               "OUT.truth.exr, of a dark frame none)")
+                    ->type_name("FILE");
+  app.add_flag("--no-truth", args.no_truth, "do not write it")->excludes(truth);
+  app.add_option("--truth-electrons", args.truth_electrons,
+                 "also write the noise-free electrons of R, G and B at every pixel (.exr, .pfm, .tif)")
+      ->type_name("FILE");
+  app.add_flag("--list", args.list, "the sensors, lights and cameras there are");
+  app.add_flag("--force", args.force, "overwrite files that exist");
+  app.add_flag("--json", args.json, "one JSON object on stdout");
+  app.add_flag("--timings", args.timings, "time of each stage");
+  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+}
+
+}  // namespace
+
+Parsed<SimulateArgs> parse_simulate(const std::vector<std::string>& words) {
+  CLI::App app("Makes raw files of scenes of known truth.", "lowlux simulate");
+  SimulateArgs args;
+  args.options.exposure.time_s = 0.1;
+  args.options.effects.tolerance = isp::Tolerance{};
+  std::optional<isp::Tolerance> tolerance;
+  add_scene(app, args.scene);
+  add_files(app, args);
+  add_camera(app, args);
+  add_work(app, args);
+  add_text(app, "--tolerance", "DE[,VARIANCE]",
+           "what leaving effects out may change: CIEDE2000 of 32x32 block means, relative variance of blocks "
+           "(default 0.5,0.05)",
+           [&tolerance](const std::string& text) { return set_tolerance(text, tolerance.emplace()); });
+  add_figures(app, args);
+  if (const auto code = parse_words(app, words)) return *code;
+  if (tolerance) {
+    if (!args.options.effects.tolerance) return refuse(app, "--tolerance: it is for --effects auto, not for a list");
+    args.options.effects.tolerance = tolerance;
+  }
+  if (args.effects.empty() && args.options.sampling == capture::PhotonSampling::published) {
+    args.options.effects.tolerance.reset();  // the planner knows physical photons only
+  }
+  args.options.f_number = args.optics.f_number;
+  return args;
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "capture/synthetic/synthetic_source.h"
+#include "isp/cli/develop/develop_args.h"
+#include "isp/model/sensor/sensor_db.h"
+#include "isp/model/spectrum/spectral_response.h"
+
+namespace lowlux::cli {
+
+/// Smallest width and height of a raw image: LibRaw, and with it most raw developers, takes smaller ones for
+/// thumbnails. Masked columns do not count.
+inline constexpr int min_side = 22;
+
+/// A distant lamp: --lamp X,Y,LIGHT,LUMINANCE.
+struct LampArgs {
+  double x_px = 0, y_px = 0;
+  std::string light;
+  double luminance_cd_m2 = 0;  // of its light spread over one pixel
+};
+
+/// What is in front of the camera.
+struct SceneArgs {
+  std::string what;  // a picture's file, or dark, flat, chart, chart:macbeth, chart:munsell, chart:FILE.csv
+  int width = 1200;
+  int height = 800;
+  bool size_given = false;
+  std::string light = "D65";  // by name, or a table's file
+  bool light_given = false;
+  double luminance_cd_m2 = 1;
+  bool luminance_given = false;
+  int stars = 0;
+  std::optional<double> star_luminance_cd_m2;  // of the faintest; absent: a tenth of the scene's
+  std::vector<LampArgs> lamps;
+};
+
+struct SimulateArgs {
+  SceneArgs scene;
+  std::string output;  // NIGHT.dng; several frames are NIGHT_0000.dng...
+  std::string truth;   // empty: OUT.truth.exr
+  bool no_truth = false;
+  std::string truth_electrons;  // empty: not written
+  std::string sensor = "ELD_NikonD850";
+  std::string gain;
+  isp::SensorFigures figures;
+  isp::Optics optics;
+  capture::SyntheticOptions options;
+  int frames = 1;
+  std::string effects;  // as asked for; empty: auto, or all for published sampling
+  bool list = false;
+  bool explain = false;
+  bool force = false;
+  bool json = false;
+  bool timings = false;
+  bool quiet = false;
+};
+
+Parsed<SimulateArgs> parse_simulate(const std::vector<std::string>& words);
+
+}  // namespace lowlux::cli

@@ -1,0 +1,172 @@
+#include "isp/cli/simulate/simulate_report.h"
+
+#include <iterator>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/report.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
+
+namespace lowlux::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* reason_of(const isp::EffectDecision& decision, isp::EffectSet wanted) {
+  switch (decision.reason) {
+    case isp::EffectDecision::Reason::absent:
+      return "the sensor has none";
+    case isp::EffectDecision::Reason::negligible:
+      return "below the tolerance with all that is left out";
+    case isp::EffectDecision::Reason::asked_for:
+      return wanted.has(decision.effect) && !decision.kept ? "nothing without dark current" : "as asked";
+    case isp::EffectDecision::Reason::free:
+      return "negligible, but leaving it out saves nothing";
+    case isp::EffectDecision::Reason::needed:
+      break;
+  }
+  return "above the tolerance, alone or with what is left out";
+}
+
+std::string name_of(isp::Effect effect) { return std::string(isp::effect_names()[static_cast<int>(effect)]); }
+
+Json region_json(const isp::RegionPlan& region, isp::EffectSet wanted) {
+  Json decisions = Json::array();
+  for (const isp::EffectDecision& d : region.decisions) {
+    decisions.push_back({{"effect", name_of(d.effect)},
+                         {"kept", d.kept},
+                         {"reason", reason_of(d, wanted)},
+                         {"predicted_delta_e", d.alone.delta_e},
+                         {"predicted_relative_variance", d.alone.relative_variance}});
+  }
+  return {{"darkest_e", region.darkest_e},
+          {"brightest_e", region.brightest_e},
+          {"blocks", region.blocks},
+          {"left_out_delta_e", region.left_out_together.delta_e},
+          {"left_out_relative_variance", region.left_out_together.relative_variance},
+          {"effects", decisions}};
+}
+
+Json sensor_json(const isp::NamedSensor& sensor) {
+  const SensorModel& m = sensor.model;
+  return {{"name", m.name},
+          {"gain_setting", sensor.gain_setting},
+          {"source", sensor.source},
+          {"camera", sensor.camera},
+          {"assumptions", sensor.assumptions},
+          {"system_gain_dn_per_e", m.system_gain_dn_per_e},
+          {"read_noise_e", m.read_noise_e},
+          {"full_well_e", m.full_well_e},
+          {"bits", m.bits},
+          {"black_level_dn", m.black_level_dn},
+          {"white_level_dn", m.white_level_dn},
+          {"dark_current_e_per_s", m.dark_current_e_per_s},
+          {"dark_temperature_c", m.dark_temperature_c},
+          {"dark_doubling_c", m.dark_doubling_c},
+          {"prnu", m.prnu},
+          {"dsnu", m.dsnu},
+          {"hot_pixel_fraction", m.hot_pixel_fraction},
+          {"hot_pixel_current_e_per_s", m.hot_pixel_current_e_per_s},
+          {"row_noise_e", m.row_noise_e},
+          {"column_noise_e", m.column_noise_e}};
+}
+
+Json cost_json(const capture::EffectCost& cost) {
+  Json saved = Json::object();
+  for (int i = 0; i < isp::effect_count; ++i) {
+    if (cost.saved_ms[i]) saved[std::string(isp::effect_names()[i])] = *cost.saved_ms[i];
+  }
+  return {{"all_effects_ms", cost.all_ms}, {"saved_ms", saved}};
+}
+
+}  // namespace
+
+std::string explain_text(const SimulateArgs& args, const SimulateOutcome& outcome) {
+  const isp::EffectPlan& plan = *outcome.plan;
+  std::string text;
+  auto out = std::back_inserter(text);
+  for (const isp::RegionPlan& region : plan.regions) {
+    fmt::format_to(out, "{} blocks of {:.3g} to {:.3g} e-\n", region.blocks, region.darkest_e, region.brightest_e);
+    fmt::format_to(out, "  {:<13} {:>10} {:>12}  {:<9} {}\n", "effect", "delta E", "variance", "decision", "because");
+    for (const isp::EffectDecision& d : region.decisions) {
+      fmt::format_to(out, "  {:<13} {:>10.3g} {:>12.3g}  {:<9} {}\n", name_of(d.effect), d.alone.delta_e,
+                     d.alone.relative_variance, d.kept ? "simulate" : "leave out",
+                     reason_of(d, args.options.effects.effects));
+    }
+    fmt::format_to(out, "  {:<13} {:>10.3g} {:>12.3g}  of {:g} and {:g} tolerated\n", "left out",
+                   region.left_out_together.delta_e, region.left_out_together.relative_variance, plan.tolerance.delta_e,
+                   plan.tolerance.relative_variance);
+  }
+  if (!outcome.cost) return text;
+  fmt::format_to(out, "time on one thread, measured on 128 rows: all effects {:.1f} ms per frame\n",
+                 outcome.cost->all_ms);
+  for (int i = 0; i < isp::effect_count; ++i) {
+    if (!outcome.cost->saved_ms[i]) continue;
+    fmt::format_to(out, "  without {:<13} {:>8.1f} ms less\n", isp::effect_names()[i], *outcome.cost->saved_ms[i]);
+  }
+  return text;
+}
+
+std::string simulate_text(const SimulateArgs& args, const SimulateOutcome& o) {
+  const SensorModel& m = o.sensor.model;
+  std::string text;
+  auto out = std::back_inserter(text);
+  fmt::format_to(out, "{}\n  sensor          {}{}{}, {:g} DN/e-, read noise {:g} e-, {:.0f} e- at white, {} bits\n",
+                 one_line(o.files.front()), m.name, o.sensor.gain_setting.empty() ? "" : " ", o.sensor.gain_setting,
+                 m.system_gain_dn_per_e, m.read_noise_e, isp::saturation_charge_e(m), m.bits);
+  for (const std::string& assumption : o.sensor.assumptions) {
+    fmt::format_to(out, "  not sourced     taken as: {}\n", assumption);
+  }
+  fmt::format_to(out, "  exposure        {:g} s at f/{:g}, {:g} C; white {:g} cd/m2{}\n", args.options.exposure.time_s,
+                 args.options.f_number, args.options.exposure.temperature_c, o.white_cd_m2,
+                 o.saturation_cd_m2 ? fmt::format(", saturates at {:.3g} cd/m2 of D65", *o.saturation_cd_m2) : "");
+  for (std::size_t i = 1; i < o.files.size(); ++i) fmt::format_to(out, "  also            {}\n", one_line(o.files[i]));
+  return text;
+}
+
+std::string simulate_json(const SimulateArgs& args, const SimulateOutcome& o) {
+  Json regions = Json::array();
+  for (const isp::RegionPlan& region : o.plan->regions)
+    regions.push_back(region_json(region, args.options.effects.effects));
+  Json json{{"files", o.files},
+            {"sensor", sensor_json(o.sensor)},
+            {"exposure_s", args.options.exposure.time_s},
+            {"temperature_c", args.options.exposure.temperature_c},
+            {"f_number", args.options.f_number},
+            {"white_luminance_cd_m2", o.white_cd_m2},
+            {"seed", args.options.seed},
+            {"tolerance",
+             {{"delta_e", o.plan->tolerance.delta_e}, {"relative_variance", o.plan->tolerance.relative_variance}}},
+            {"regions", regions},
+            {"warnings", o.warnings}};
+  if (o.saturation_cd_m2) json["saturation_luminance_cd_m2"] = *o.saturation_cd_m2;  // of D65
+  if (o.cost) json["cost"] = cost_json(*o.cost);
+  for (const isp::StageTime& time : o.times) json["times_s"][time.stage] = time.seconds;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string simulate_list() {
+  std::string text =
+      "sensors, with their gain settings and the options that must be given where no source has the figure\n"
+      "(--iso or --white-luminance in place of --pixel-pitch and --peak-qe)\n";
+  auto out = std::back_inserter(text);
+  for (const std::string_view name : isp::sensor_names()) {
+    std::vector<std::string> settings;
+    for (const std::string_view gain : isp::gain_settings(name)) {
+      const auto needed = isp::options_needed(name, gain);
+      settings.push_back(fmt::format("{}{}{}", gain, gain.empty() || needed.empty() ? "" : " ",
+                                     needed.empty() ? "" : fmt::format("(needs {})", fmt::join(needed, ", "))));
+    }
+    fmt::format_to(out, "  {:<26} {}\n", name, fmt::join(settings, "; "));
+  }
+  fmt::format_to(out, "lights\n");
+  for (const std::string_view name : isp::light_names()) fmt::format_to(out, "  {}\n", name);
+  fmt::format_to(out, "cameras\n");
+  for (const std::string_view name : isp::camera_names()) fmt::format_to(out, "  {}\n", name);
+  return text;
+}
+
+}  // namespace lowlux::cli

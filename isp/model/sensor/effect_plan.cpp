@@ -1,0 +1,205 @@
+#include "isp/model/sensor/effect_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <utility>
+
+namespace lowlux::isp {
+namespace {
+
+constexpr std::array<std::string_view, effect_count> names{"photon-noise", "dark-current", "read-noise", "quantisation",
+                                                           "clipping",     "prnu",         "dsnu",       "hot-pixels",
+                                                           "row-noise",    "column-noise"};
+
+/// Share of the tolerance that predictions may use up. They take all laws for normal ones, which near saturation and
+/// at a few electrons they are not.
+constexpr double usable_share = 0.5;
+
+constexpr int most_samples = 24;  // blocks of one region that are evaluated: its extremes and others evenly among them
+
+/// Whether the sensor and exposure have the effect at all.
+bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
+  const auto dark = dark_mean_e(s, exposure);
+  const bool has_dark = dark[0] + dark[1] + dark[2] > 0;
+  switch (effect) {
+    case Effect::dark_current:
+      return has_dark;
+    case Effect::read_noise:
+      return s.read_noise_e > 0;
+    case Effect::prnu:
+      return s.prnu > 0;
+    case Effect::dsnu:
+      return s.dsnu > 0 && has_dark;
+    case Effect::hot_pixels:
+      return s.hot_pixel_fraction > 0 && s.hot_pixel_current_e_per_s > 0 && exposure.time_s > 0;
+    case Effect::row_noise:
+      return s.row_noise_e > 0;
+    case Effect::column_noise:
+      return s.column_noise_e > 0;
+    case Effect::photon_noise:
+    case Effect::quantisation:
+    case Effect::clipping:
+      break;
+  }
+  return true;
+}
+
+double level_of(const BlockLevel& block) { return *std::max_element(block.signal_e.begin(), block.signal_e.end()); }
+
+/// Decade of a level; what no frame can tell apart is one: below a thousandth of an electron, above 1e9.
+int decade_of(double level_e) { return static_cast<int>(std::floor(std::log10(std::clamp(level_e, 1e-3, 1e9)))); }
+
+/// The blocks a region is judged by: sorted by level, its extremes and others between, and the extremes of each
+/// channel.
+std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vector<std::size_t> members) {
+  const auto by = [&](auto key) {
+    return [&blocks, key](std::size_t a, std::size_t b) { return key(blocks[a]) < key(blocks[b]); };
+  };
+  std::vector<BlockLevel> samples;
+  samples.reserve(10 + most_samples);
+  samples.push_back(
+      blocks[*std::max_element(members.begin(), members.end(), by([](const BlockLevel& b) { return b.peak_e; }))]);
+  for (int c = 0; c < 3; ++c) {
+    samples.push_back(blocks[*std::min_element(members.begin(), members.end(),
+                                               by([c](const BlockLevel& b) { return b.darkest_e[c]; }))]);
+    const auto [low, high] =
+        std::minmax_element(members.begin(), members.end(), by([c](const BlockLevel& b) { return b.signal_e[c]; }));
+    samples.push_back(blocks[*low]);
+    samples.push_back(blocks[*high]);
+  }
+  std::sort(members.begin(), members.end(), by(level_of));
+  const std::size_t count = std::min<std::size_t>(members.size(), most_samples);
+  for (std::size_t i = 0; i < count; ++i) {
+    samples.push_back(blocks[members[count == 1 ? 0 : i * (members.size() - 1) / (count - 1)]]);
+  }
+  return samples;
+}
+
+/// Predicts for the blocks of one region.
+class Region {
+ public:
+  Region(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
+         std::vector<BlockLevel> samples)
+      : sensor_(sensor), exposure_(exposure), developing_(developing), samples_(std::move(samples)) {}
+
+  PredictedChange change(EffectSet kept) const {
+    PredictedChange worst;
+    for (const BlockLevel& block : samples_) {
+      const PredictedChange one = predict_change(sensor_, exposure_, developing_, block, kept);
+      worst.delta_e = std::max(worst.delta_e, one.delta_e);
+      worst.relative_variance = std::max(worst.relative_variance, one.relative_variance);
+    }
+    return worst;
+  }
+  bool has(Effect effect) const { return present(sensor_, exposure_, effect); }
+
+ private:
+  const SensorModel& sensor_;
+  const Exposure& exposure_;
+  const Developing& developing_;
+  std::vector<BlockLevel> samples_;
+};
+
+/// Each effect by itself.
+std::array<EffectDecision, effect_count> decisions_alone(const Region& region) {
+  std::array<EffectDecision, effect_count> out{};
+  for (int i = 0; i < effect_count; ++i) {
+    EffectDecision& d = out[i];
+    d.effect = static_cast<Effect>(i);
+    if (region.has(d.effect)) {
+      d.alone = region.change(EffectSet::all().without(d.effect));
+    } else {
+      d.kept = false;
+      d.reason = EffectDecision::Reason::absent;
+    }
+  }
+  return out;
+}
+
+double size_of(const PredictedChange& change, const Tolerance& tolerance) {
+  return std::max(change.delta_e / tolerance.delta_e, change.relative_variance / tolerance.relative_variance);
+}
+
+void drop_negligible(const Region& region, const Tolerance& tolerance, RegionPlan& plan) {
+  std::array<int, effect_count> order{};
+  std::iota(order.rbegin(), order.rend(), 0);  // among equals DSNU goes before dark current, which waits for it
+  const auto size = [&](int i) { return size_of(plan.decisions[i].alone, tolerance); };
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size(a) < size(b); });
+  for (const int i : order) {
+    EffectDecision& d = plan.decisions[i];
+    if (!d.kept || size(i) >= usable_share) continue;
+    if (d.effect == Effect::dark_current && plan.kept.has(Effect::dsnu)) continue;  // it multiplies dark current
+    const PredictedChange together = region.change(plan.kept.without(d.effect));
+    if (size_of(together, tolerance) >= usable_share) continue;
+    plan.kept = plan.kept.without(d.effect);
+    plan.left_out_together = together;
+    d.kept = false;
+    d.reason = EffectDecision::Reason::negligible;
+  }
+}
+
+/// Regions by decade.
+std::vector<std::vector<std::size_t>> group(std::span<const BlockLevel> blocks) {
+  std::map<int, std::vector<std::size_t>> decades;
+  for (std::size_t i = 0; i < blocks.size(); ++i) decades[decade_of(level_of(blocks[i]))].push_back(i);
+  std::vector<std::vector<std::size_t>> regions;
+  regions.reserve(decades.size());
+  for (auto& decade : decades) regions.push_back(std::move(decade.second));
+  return regions;
+}
+
+template <class Decide>
+EffectPlan plan_regions(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
+                        std::span<const BlockLevel> blocks, const Decide& decide) {
+  EffectPlan plan;
+  plan.region_of_block.resize(blocks.size());
+  for (const std::vector<std::size_t>& members : group(blocks)) {
+    const Region region(sensor, exposure, developing, samples_of(blocks, members));
+    RegionPlan r;
+    r.blocks = static_cast<int>(members.size());
+    r.darkest_e = std::numeric_limits<double>::infinity();
+    for (const std::size_t i : members) {
+      plan.region_of_block[i] = static_cast<std::uint8_t>(plan.regions.size());
+      r.darkest_e = std::min(r.darkest_e, level_of(blocks[i]));
+      r.brightest_e = std::max(r.brightest_e, level_of(blocks[i]));
+    }
+    r.decisions = decisions_alone(region);
+    for (const EffectDecision& d : r.decisions) {
+      if (!d.kept) r.kept = r.kept.without(d.effect);
+    }
+    decide(region, r);
+    plan.regions.push_back(r);
+  }
+  return plan;
+}
+
+}  // namespace
+
+std::span<const std::string_view> effect_names() { return names; }
+
+EffectPlan plan_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
+                        std::span<const BlockLevel> blocks, const Tolerance& tolerance) {
+  EffectPlan plan = plan_regions(sensor, exposure, developing, blocks,
+                                 [&](const Region& region, RegionPlan& r) { drop_negligible(region, tolerance, r); });
+  plan.tolerance = tolerance;
+  return plan;
+}
+
+EffectPlan fixed_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
+                         std::span<const BlockLevel> blocks, EffectSet wanted) {
+  return plan_regions(sensor, exposure, developing, blocks, [&](const Region& region, RegionPlan& r) {
+    for (EffectDecision& d : r.decisions) {
+      if (d.reason == EffectDecision::Reason::absent) continue;
+      d.kept = wanted.has(d.effect) && (d.effect != Effect::dsnu || wanted.has(Effect::dark_current));
+      d.reason = EffectDecision::Reason::asked_for;
+      if (!d.kept) r.kept = r.kept.without(d.effect);
+    }
+    r.left_out_together = region.change(r.kept);
+  });
+}
+
+}  // namespace lowlux::isp

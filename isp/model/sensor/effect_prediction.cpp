@@ -1,0 +1,268 @@
+#include <algorithm>
+#include <cmath>
+
+#include "isp/model/colour/colorimetry.h"
+#include "isp/model/colour/colour_difference.h"
+#include "isp/model/sensor/effect_plan.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double sigmas = 5;            // of a bound
+constexpr double channel_pixels = 256;  // of R or B in a block; G has twice as many
+constexpr double block_lines = 16;      // rows, or columns, of a block that hold one channel
+constexpr double hottest = 14;          // of an exponential law, in units of its mean: exceeded once in a million
+constexpr double black_noise_of_white = 0.02;  // isp/render/exposure
+
+double square(double x) { return x * x; }
+
+/// Mean charge of one channel's pixels by where it comes from [e-].
+struct Charge {
+  double signal, dark, hot;  // hot: of a hot pixel, on top
+};
+
+/// What is kept of one channel without hot pixels: mean, and variance by how it is shared between pixels [e-, e-^2].
+struct Budget {
+  double collected_mean = 0;
+  double collected_variance = 0;  // before the full well
+  double pixel_variance = 0;      // after it, independent for each pixel
+  double line_variance = 0;       // shared by a row or a column
+};
+
+Budget budget_of(const SensorModel& s, const Charge& q, EffectSet kept) {
+  Budget b;
+  b.collected_mean = q.signal;
+  if (kept.has(Effect::photon_noise)) b.collected_variance += q.signal;
+  if (kept.has(Effect::prnu)) b.collected_variance += square(s.prnu * q.signal);
+  if (kept.has(Effect::dark_current)) {
+    b.collected_mean += q.dark;
+    b.collected_variance += q.dark;
+    if (kept.has(Effect::dsnu)) b.collected_variance += square(s.dsnu * q.dark);
+  }
+  if (kept.has(Effect::read_noise)) b.pixel_variance += square(s.read_noise_e);
+  if (kept.has(Effect::row_noise)) b.line_variance += square(s.row_noise_e);
+  if (kept.has(Effect::column_noise)) b.line_variance += square(s.column_noise_e);
+  return b;
+}
+
+/// Probability that a normal variable lies between two bounds.
+double share_inside(const Moments& normal, double low, double high) {
+  if (normal.variance <= 0) return normal.mean >= low && normal.mean <= high ? 1 : 0;
+  const double unit = std::sqrt(2 * normal.variance);
+  return 0.5 * (std::erf((high - normal.mean) / unit) - std::erf((low - normal.mean) / unit));
+}
+
+/// Moments in DN of one channel of a block, and how far quantisation may move them.
+struct ChannelMoments {
+  Moments dn;
+  QuantisationBounds uncertain{0, 0};
+  double unclipped = 1;          // share of the variance that clipping leaves
+  double variance_slope_dn = 0;  // of the variance over the mean: not 0 where clipping bites
+  double inside = 1;             // share of the pixels that do not come within a code of the ends of the range
+};
+
+/// The readout before quantisation [DN], with `more` charge collected and `offset` charge added after it [e-].
+struct Displaced {
+  double more = 0, offset = 0;
+};
+Moments analogue_dn(const SensorModel& s, const Budget& b, EffectSet kept, const Displaced& by) {
+  Moments charge{b.collected_mean + by.more, b.collected_variance};
+  if (kept.has(Effect::clipping)) charge = clamped_normal(charge, -INFINITY, s.full_well_e);
+  const double k = s.system_gain_dn_per_e;
+  const Moments dn{s.black_level_dn + k * (charge.mean + by.offset),
+                   k * k * (charge.variance + b.pixel_variance + b.line_variance)};
+  return kept.has(Effect::clipping) ? clamped_normal(dn, 0, s.white_level_dn) : dn;
+}
+
+ChannelMoments moments_of(const SensorModel& s, const Budget& b, EffectSet kept) {
+  ChannelMoments out;
+  const double k = s.system_gain_dn_per_e;
+  const double before_e2 = b.collected_variance + b.pixel_variance + b.line_variance;
+  const Moments unclipped = analogue_dn(s, b, kept.without(Effect::clipping), {});
+  out.inside = share_inside(unclipped, 1, std::min(s.white_level_dn, s.black_level_dn + k * s.full_well_e) - 1);
+  out.dn = analogue_dn(s, b, kept, {});
+  if (before_e2 > 0) {
+    const double step_e = std::sqrt(before_e2) / 4;
+    const auto slope = [&](const Displaced& up, const Displaced& down) {
+      return std::fabs(analogue_dn(s, b, kept, up).variance - analogue_dn(s, b, kept, down).variance) /
+             (2 * k * step_e);
+    };
+    out.variance_slope_dn = std::max(slope({step_e, 0}, {-step_e, 0}), slope({0, step_e}, {0, -step_e}));
+    out.unclipped = std::min(1.0, out.dn.variance / (k * k * before_e2));
+  }
+  if (kept.has(Effect::quantisation)) {
+    out.uncertain = quantisation_bounds(std::sqrt(out.dn.variance));
+    // A level held at an end of the range is a whole code already.
+    const double inside = out.dn.variance > 0 || (out.dn.mean > 0 && out.dn.mean < s.white_level_dn) ? 1 : 0;
+    out.uncertain.mean_dn *= inside;
+    out.uncertain.variance_dn2 *= inside;
+    out.dn.mean -= inside * (s.quantisation == Quantisation::floor ? 0.5 : 0.0);
+    out.dn.variance += inside / 12;
+  }
+  return out;
+}
+
+/// Variance of one pixel's change when the effects that are not kept are left out, the random numbers being the same.
+/// A change of a Poisson mean by delta moves the count by a whole number now and then: at most min(1/4, delta).
+struct ChangeVariance {
+  double pixel = 0, line = 0;
+};
+
+ChangeVariance change_variance(const SensorModel& s, const Charge& q, EffectSet kept) {
+  const Budget all = budget_of(s, q, EffectSet::all()), left = budget_of(s, q, kept);
+  ChangeVariance v;
+  v.line = std::max(0.0, all.line_variance - left.line_variance);
+  v.pixel = std::max(0.0, all.collected_variance - left.collected_variance) +
+            std::max(0.0, all.pixel_variance - left.pixel_variance);
+  if (!kept.has(Effect::prnu)) v.pixel += std::min(0.25, s.prnu * q.signal);
+  if (!kept.has(Effect::dsnu)) v.pixel += std::min(0.25, s.dsnu * q.dark);
+  if (!kept.has(Effect::quantisation)) v.pixel += 1 / (12 * square(s.system_gain_dn_per_e));
+  return v;
+}
+
+/// How many pixels of a kind a channel of a block may hold: exceeded once in a million.
+double count_in_block(double fraction) {
+  const double mean = fraction * channel_pixels;
+  if (mean < 1e-6) return 0;
+  double term = std::exp(-mean), sum = term;
+  int count = 0;
+  while (sum < 1 - 1e-6 && count < channel_pixels) {
+    ++count;
+    term *= mean / count;
+    sum += term;
+  }
+  return std::max(count, 1);
+}
+
+/// How far the charge of a hot pixel can move: all of it if hot pixels are left out, what would not fit if clipping is.
+double changed_charge_of_hot_pixel(const SensorModel& s, const Charge& q, EffectSet kept) {
+  if (q.hot == 0) return 0;
+  const double hot = q.hot * hottest, room = saturation_charge_e(s) - q.signal - q.dark;
+  if (!kept.has(Effect::hot_pixels)) return kept.has(Effect::clipping) ? std::clamp(room, 0.0, hot) : hot;
+  const double noise = sigmas * std::sqrt(q.signal + q.dark + hot + square(s.read_noise_e));
+  return kept.has(Effect::clipping) ? 0 : std::max(0.0, hot + noise - room);
+}
+
+/// Bounds on what changes in one channel of a block.
+struct ChannelChange {
+  double shift_dn = 0;    // of the mean, known
+  double scatter_dn = 0;  // of the mean, bound
+  double relative_variance = 0;
+};
+
+ChannelChange channel_change(const SensorModel& s, const Charge& q, EffectSet kept) {
+  const ChannelMoments all = moments_of(s, budget_of(s, q, EffectSet::all()), EffectSet::all());
+  const ChannelMoments left = moments_of(s, budget_of(s, q, kept), kept);
+  const double k = s.system_gain_dn_per_e;
+  const double passed = std::max(all.unclipped, left.unclipped);
+  const ChangeVariance change = change_variance(s, q, kept);
+  const double pixel = passed * k * k * change.pixel, line = passed * k * k * change.line;
+  const double hot_dn = k * changed_charge_of_hot_pixel(s, q, kept), hot_count = count_in_block(s.hot_pixel_fraction);
+  const double hot_mean = hot_count * hot_dn / channel_pixels,
+               hot_variance = hot_count * square(hot_dn) / channel_pixels;
+  ChannelChange out;
+  out.shift_dn = left.dn.mean - all.dn.mean;
+  const bool quantisation_differs = pixel + line > 0 || !kept.has(Effect::quantisation);
+  const double rounding_mean = quantisation_differs ? all.uncertain.mean_dn + left.uncertain.mean_dn : 0;
+  const double rounding_variance = quantisation_differs ? all.uncertain.variance_dn2 + left.uncertain.variance_dn2 : 0;
+  // Without clipping, a pixel at the end of the range may read one code beyond it.
+  const double beyond = kept.has(Effect::clipping) ? 0 : count_in_block(1 - all.inside) / channel_pixels;
+  out.scatter_dn = sigmas * std::sqrt(pixel / channel_pixels + line / block_lines) + rounding_mean + hot_mean + beyond;
+  // Where most pixels are clipped, the few others make the variance.
+  const double pixels = std::max(1.0, channel_pixels * std::min(all.inside, left.inside));
+  // Sample variances: their own scatter, and the sample covariance of what is left out with what is kept.
+  const double larger = std::max(all.dn.variance, left.dn.variance);
+  const double slope = std::max(all.variance_slope_dn, left.variance_slope_dn);
+  const double moved =
+      std::fabs(left.dn.variance - all.dn.variance) + rounding_variance + hot_variance + beyond +
+      sigmas * (pixel * std::sqrt(2 / pixels) + line * std::sqrt(2 / std::min(block_lines, pixels)) +
+                2 * std::sqrt((pixel + line) * larger / pixels)) +
+      slope * (std::fabs(out.shift_dn) + sigmas * std::sqrt(pixel / channel_pixels + line / block_lines));
+  const double seen = all.dn.variance * (1 - sigmas * std::sqrt(2 / pixels));  // the least a block may show
+  out.relative_variance = moved / std::max(seen, variance_floor_dn2);
+  return out;
+}
+
+Charge charge_of(const SensorModel& s, const Exposure& exposure, int channel, double signal_e) {
+  const double time_factor = exposure.time_s * dark_current_factor(s, exposure.temperature_c);
+  return {signal_e, s.dark_current_e_per_s[channel] * time_factor, s.hot_pixel_current_e_per_s * time_factor};
+}
+
+Lab lab_of_dn(const SensorModel& s, const Developing& developing, const Vector3& dn) {
+  Vector3 rgb{};
+  for (int c = 0; c < 3; ++c) {
+    rgb[c] = (dn[c] - s.black_level_dn) / (s.system_gain_dn_per_e * developing.white_e[c]);
+  }
+  return lab_of(xyz_of(developing.camera_to_xyz * rgb), *xyz_of(white_d65));
+}
+
+PredictedChange larger(const PredictedChange& a, const PredictedChange& b) {
+  return {std::max(a.delta_e, b.delta_e), std::max(a.relative_variance, b.relative_variance)};
+}
+
+/// The largest colour difference between a mean and where shift and scatter may take it [DN].
+double farthest(const SensorModel& s, const Developing& developing, const Vector3& mean, const Vector3& shift,
+                const Vector3& scatter) {
+  const Lab before = lab_of_dn(s, developing, mean);
+  double largest = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vector3 after = mean;
+    for (int c = 0; c < 3; ++c) after[c] += shift[c] + ((corner >> c) & 1 ? scatter[c] : -scatter[c]);
+    largest = std::max(largest, ciede2000(before, lab_of_dn(s, developing, after)));
+  }
+  return largest;
+}
+
+PredictedChange change_at(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
+                          const Vector3& signal_e, EffectSet kept) {
+  PredictedChange out;
+  Vector3 mean{}, shift{}, scatter{};
+  for (int c = 0; c < 3; ++c) {
+    const Charge charge = charge_of(sensor, exposure, c, signal_e[c]);
+    mean[c] = moments_of(sensor, budget_of(sensor, charge, EffectSet::all()), EffectSet::all()).dn.mean;
+    const ChannelChange change = channel_change(sensor, charge, kept);
+    shift[c] = change.shift_dn;
+    scatter[c] = change.scatter_dn;
+    out.relative_variance = std::max(out.relative_variance, change.relative_variance);
+  }
+  // Noise that stays moves the colour about: where it happens to be grey, differences count most.
+  const double grey = (mean[0] + mean[1] + mean[2]) / 3 - sensor.black_level_dn;
+  Vector3 neutral{};
+  for (int c = 0; c < 3; ++c) {
+    neutral[c] = sensor.black_level_dn + grey * developing.white_e[c] / developing.white_e[1];
+  }
+  out.delta_e = std::max(farthest(sensor, developing, mean, shift, scatter),
+                         farthest(sensor, developing, neutral, shift, scatter));
+  return out;
+}
+
+}  // namespace
+
+Developing developing_of(const SensorModel& sensor, const Exposure& exposure, const Matrix3& camera_to_xyz,
+                         const Vector3& neutral, std::span<const BlockLevel> blocks) {
+  double level = 0;
+  for (const BlockLevel& block : blocks) {
+    for (int c = 0; c < 3; ++c) level = std::max(level, block.signal_e[c] / neutral[c]);
+  }
+  level = std::min(level, saturation_charge_e(sensor));
+  for (int c = 0; c < 3; ++c) {
+    const Budget black = budget_of(sensor, charge_of(sensor, exposure, c, 0), EffectSet::all());
+    const double variance_e2 = black.collected_variance + black.pixel_variance + black.line_variance +
+                               1 / (12 * square(sensor.system_gain_dn_per_e));
+    level = std::max(level, std::sqrt(variance_e2) / (black_noise_of_white * neutral[c]));
+  }
+  return {camera_to_xyz * diagonal3(neutral), {level * neutral[0], level * neutral[1], level * neutral[2]}};
+}
+
+PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
+                               const BlockLevel& block, EffectSet kept) {
+  PredictedChange out = larger(change_at(sensor, exposure, developing, block.signal_e, kept),
+                               change_at(sensor, exposure, developing, block.darkest_e, kept));
+  if (kept.has(Effect::clipping)) return out;
+  // The mean of a block does not tell what its brightest pixel loses: look at a block as bright as that.
+  const PredictedChange peak = change_at(sensor, exposure, developing, {block.peak_e, block.peak_e, block.peak_e},
+                                         EffectSet::all().without(Effect::clipping));
+  return larger(out, peak);
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,42 @@
+#include "isp/model/sensor/given_figures.h"
+
+#include <algorithm>
+#include <string>
+
+namespace lowlux::isp {
+namespace {
+
+struct Useless {
+  bool is;
+  const char* option;
+  const char* missing;
+  const char* why;
+};
+
+bool positive(const std::optional<double>& figure) { return figure && *figure > 0; }
+
+}  // namespace
+
+Result<void> check_given_figures(const SensorFigures& given, const NamedSensor& sensor, const Optics& optics) {
+  const SensorModel& m = sensor.model;
+  const bool no_dark = std::ranges::all_of(m.dark_current_e_per_s, [](double rate) { return rate == 0; });
+  const bool no_pitch = !sensor.peak_quantum_efficiency && !optics.white_luminance_cd_m2;
+  constexpr const char* no_dark_current = "the sensor has no dark current";
+  const Useless options[] = {
+      {positive(given.hot_pixel_fraction) && m.hot_pixel_current_e_per_s == 0, "--hot-pixels", "--hot-current",
+       "hot pixels are told from others by their dark current"},
+      {positive(given.hot_pixel_current_e_per_s) && m.hot_pixel_fraction == 0, "--hot-current", "--hot-pixels",
+       "the sensor has no hot pixels"},
+      {positive(given.dsnu) && no_dark, "--dsnu", "--dark-current", no_dark_current},
+      {given.dark_temperature_c && no_dark, "--dark-temperature", "--dark-current", no_dark_current},
+      {given.dark_doubling_c && no_dark, "--dark-doubling", "--dark-current", no_dark_current},
+      {given.pixel_pitch_um && no_pitch, "--pixel-pitch", "--peak-qe",
+       "no source gives the sensor's quantum efficiency"},
+  };
+  const auto* const useless = std::ranges::find_if(options, &Useless::is);
+  if (useless == std::ranges::end(options)) return {};
+  return fail(ErrorCode::invalid_argument,
+              std::string(useless->option) + " does nothing without " + useless->missing + ": " + useless->why, m.name);
+}
+
+}  // namespace lowlux::isp

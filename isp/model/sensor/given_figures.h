@@ -1,0 +1,17 @@
+#pragma once
+
+#include "isp/base/result.h"
+#include "isp/model/sensor/sensor_db.h"
+#include "isp/model/spectrum/spectral_response.h"
+
+namespace lowlux::isp {
+
+/// Refuses figures that would change nothing, because another one they hang on is missing: hot pixels without their
+/// dark current and the other way round; DSNU, or the dark current's temperature or doubling, of a sensor without dark
+/// current; a pixel pitch without peak quantum efficiency, unless the luminance that fills a pixel is given. A share of
+/// 0 says that there is no such effect, and needs nothing.
+/// @param sensor  made by sensor_named() of these figures
+/// Errors: invalid_argument; the message names the option that does nothing and the one that is missing.
+Result<void> check_given_figures(const SensorFigures& given, const NamedSensor& sensor, const Optics& optics);
+
+}  // namespace lowlux::isp

@@ -1,0 +1,135 @@
+#include "isp/output/dng/dng_writer.h"
+
+#include <tiffio.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <new>
+#include <utility>
+
+#include "isp/codec/tiff_info.h"
+#include "isp/codec/tiff_output.h"
+#include "isp/output/dng/dng_check.h"
+#include "isp/output/dng/dng_tags.h"
+#include "isp/output/picture/metadata.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr std::size_t longest_description = 4000;
+constexpr int photometric_linear_raw = 34892;  // DNG LinearRaw
+
+std::string unique_camera_model(const FrameInfo& info) {
+  if (info.model.empty()) return info.make.empty() ? "Unknown" : info.make;
+  if (info.make.empty() || info.model.starts_with(info.make)) return info.model;
+  return info.make + " " + info.model;
+}
+
+void set_image(TIFF* tiff, const RawDn& raw, int rows_per_strip) {
+  const int samples = samples_of(raw.layout);
+  const bool mosaic = raw.layout == SensorLayout::bayer;
+  TIFFSetField(tiff, TIFFTAG_SUBFILETYPE, 0);
+  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, raw.dn.width() / samples);
+  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, raw.dn.height());
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 16);
+  TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, samples);
+  TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_NONE);
+  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, mosaic ? PHOTOMETRIC_CFA : photometric_linear_raw);
+  TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+  TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, rows_per_strip);
+  if (!mosaic) return;
+  constexpr std::array<std::uint16_t, 2> cell{2, 2};
+  constexpr std::array<std::uint8_t, 3> planes{0, 1, 2};  // R, G, B
+  std::array<std::uint8_t, 4> colours{};
+  for (int i = 0; i < 4; ++i) colours[i] = static_cast<std::uint8_t>(colour_at(raw.phase, i & 1, i >> 1));
+  TIFFSetField(tiff, TIFFTAG_CFAREPEATPATTERNDIM, cell.data());
+  TIFFSetField(tiff, TIFFTAG_CFAPATTERN, 4, colours.data());
+  TIFFSetField(tiff, TIFFTAG_CFAPLANECOLOR, 3, planes.data());
+  TIFFSetField(tiff, TIFFTAG_CFALAYOUT, 1);  // rectangular
+}
+
+void set_identity(TIFF* tiff, const RawFrame& frame, const FrameInfo& info, const DngWriteOptions& options) {
+  constexpr std::array<std::uint8_t, 4> version{1, 4, 0, 0};
+  // MaskedAreas came with 1.1; opcodes came with 1.3 and are not to be skipped.
+  const RawCorrections& c = frame.corrections;
+  const bool opcodes = !c.gain_maps.empty() || !c.radial_gains.empty() || !c.defects.empty();
+  const std::array<std::uint8_t, 4> backward{1, static_cast<std::uint8_t>(opcodes ? 3 : 1), 0, 0};
+  TIFFSetField(tiff, TIFFTAG_DNGVERSION, version.data());
+  TIFFSetField(tiff, TIFFTAG_DNGBACKWARDVERSION, backward.data());
+  TIFFSetField(tiff, TIFFTAG_UNIQUECAMERAMODEL, unique_camera_model(info).c_str());
+  set_tiff_info(tiff, info);
+  // Left blank, they are unknown (EXIF 2.32, 4.6.5.4); RawSpeed, and with it darktable, misses them if they are not
+  // there.
+  if (info.make.empty()) TIFFSetField(tiff, TIFFTAG_MAKE, "");
+  if (info.model.empty()) TIFFSetField(tiff, TIFFTAG_MODEL, "");
+  const std::string description = printable_ascii(options.description, longest_description);
+  if (!description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
+}
+
+bool write_strips(TIFF* tiff, const Plane<std::uint16_t>& dn, int rows_per_strip) {
+  std::uint32_t index = 0;
+  for (int y = 0; y < dn.height(); y += rows_per_strip, ++index) {
+    const int rows = std::min(rows_per_strip, dn.height() - y);
+    const auto size = static_cast<tmsize_t>(sizeof(std::uint16_t) * dn.width() * rows);
+    // libtiff's interface lacks const; it only reads what needs no change of byte order.
+    auto* samples = const_cast<std::uint16_t*>(dn.row(y));
+    if (TIFFWriteEncodedStrip(tiff, index, samples, size) != size) return false;
+  }
+  return true;
+}
+
+/// dcraw and its descendants read 512 bytes where a description begins, and call the end of the file an error.
+Result<void> pad(std::FILE* file) {
+  constexpr std::array<char, 512> zeros{};
+  const bool padded = std::fseek(file, 0, SEEK_END) == 0 && std::fwrite(zeros.data(), zeros.size(), 1, file) == 1;
+  if (!padded) return fail(ErrorCode::unwritable, "the file's end could not be written: is the disk full?");
+  return {};
+}
+
+Result<void> encode(const RawFrame& frame, const DngWriteOptions& options, std::FILE* file) {
+  FrameInfo info = written_info(frame.raw.info, options.software);
+  info.orientation = frame.raw.info.orientation;
+  const std::size_t row_bytes = sizeof(std::uint16_t) * frame.raw.dn.width();
+  const int rows = static_cast<int>(std::clamp<std::size_t>(tiff_strip_bytes / row_bytes, 1, frame.raw.dn.height()));
+  TiffOutput output(file, false);
+  TIFF* tiff = output.handle();
+  if (tiff == nullptr) return output.finish(false);
+  const std::uint64_t exif = write_tiff_exif(tiff, info);
+  declare_dng_tags(tiff);
+  set_image(tiff, frame.raw, rows);
+  set_identity(tiff, frame, info, options);
+  set_dng_levels(tiff, frame.raw);
+  if (frame.raw.layout != SensorLayout::monochrome) set_dng_colour(tiff, frame.colour);
+  TIFFSetField(tiff, TIFFTAG_BASELINEEXPOSURE, 0.0);
+  set_dng_noise_and_opcodes(tiff, frame);
+  if (exif != 0) TIFFSetField(tiff, TIFFTAG_EXIFIFD, exif);
+  return output.finish(write_strips(tiff, frame.raw.dn, rows) && TIFFWriteDirectory(tiff) != 0).and_then([&] {
+    return pad(file);
+  });
+}
+
+}  // namespace
+
+Result<void> check_dng_size(std::int64_t samples) {
+  if (samples <= static_cast<std::int64_t>(tiff_classic_limit / sizeof(std::uint16_t))) return {};
+  return fail(ErrorCode::too_large, "a DNG holds " + std::to_string(tiff_classic_limit / sizeof(std::uint16_t)) +
+                                        " samples, the frame has " + std::to_string(samples) + ": crop it");
+}
+
+Result<void> write_dng(const RawFrame& frame, const std::string& path, const DngWriteOptions& options) try {
+  const auto located = [&](Error error) {
+    if (error.where.empty()) error = Error{error.code, "cannot write " + path + ": " + error.message, path};
+    return error;
+  };
+  return check_dng_frame(frame)
+      .and_then([&] { return check_dng_size(static_cast<std::int64_t>(frame.raw.dn.size())); })
+      .and_then([&] { return AtomicFile::create(path, options.overwrite, options.sync); })
+      .and_then(
+          [&](AtomicFile out) { return encode(frame, options, out.file()).and_then([&] { return out.commit(); }); })
+      .map_error(located);
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::too_large, "cannot write " + path + ": there is not enough memory", path);
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,105 @@
+#include "isp/pipeline/budget/chroma_work.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "denoise/spatial/chroma_start.h"
+#include "denoise/spatial/layout.h"
+#include "isp/pipeline/render/cell_figures.h"
+
+namespace lowlux::isp {
+namespace {
+
+struct Tile {
+  double charge_e = 0;  // sum over blocks
+  int blocks = 0;
+  double share = 0;  // of the frame
+};
+
+/// One direction: the denoiser's tiles along cells; the last is the larger.
+struct Axis {
+  int cells;
+  int tiles;
+  int blocks;  // of the thumbnail
+
+  int tile_of_block(int block) const {
+    return denoise::tile_of(static_cast<int>((block + 0.5) / blocks * cells), tiles);
+  }
+  int block_in(int tile) const {
+    return std::min(static_cast<int>((tile + 0.5) * denoise::tile / cells * blocks), blocks - 1);
+  }
+  double share_of(int tile) const {
+    const int width = tile + 1 < tiles ? denoise::tile : cells - (tiles - 1) * denoise::tile;
+    return static_cast<double>(width) / cells;
+  }
+};
+
+Axis axis_of(int pixels, int blocks) {
+  const int cells = (pixels + 1) / 2;
+  return {cells, denoise::tiles_of(cells), blocks};
+}
+
+/// The denoiser's, from left to right, from above. A block counts where its middle lies; a tile that has no middle, as
+/// it is smaller than a block, goes by the one around it.
+std::vector<Tile> tiles_of(const Axis& across, const Axis& down, const CameraRgb& mean,
+                           const std::array<double, 3>& electrons_at_white) {
+  const auto charge_e = [&](int x, int y) {
+    double sum = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto value = static_cast<double>(mean.plane[c].at(x, y));
+      if (std::isfinite(value)) sum += share_of_sites[c] * electrons_at_white[c] * value;
+    }
+    return sum;
+  };
+  const auto index = [&](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(across.tiles) + static_cast<std::size_t>(x);
+  };
+  std::vector<Tile> out(static_cast<std::size_t>(across.tiles) * static_cast<std::size_t>(down.tiles));
+  for (int y = 0; y < down.blocks; ++y) {
+    for (int x = 0; x < across.blocks; ++x) {
+      Tile& tile = out[index(across.tile_of_block(x), down.tile_of_block(y))];
+      tile.charge_e += charge_e(x, y);
+      ++tile.blocks;
+    }
+  }
+  for (int y = 0; y < down.tiles; ++y) {
+    for (int x = 0; x < across.tiles; ++x) {
+      Tile& tile = out[index(x, y)];
+      tile.share = across.share_of(x) * down.share_of(y);
+      if (tile.blocks == 0) tile = {charge_e(across.block_in(x), down.block_in(y)), 1, tile.share};
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+ChromaWork chroma_work(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
+                       const Thumbnail& thumbnail) {
+  const double dark_e = mean_of_sites(noise.dark_mean_e), variance_e2 = mean_of_colours(noise.variance_e2);
+  const Rect& active = frame.raw.active;
+  const Axis across = axis_of(active.width, thumbnail.mean.width());
+  const Axis down = axis_of(active.height, thumbnail.mean.height());
+  const std::vector<Tile> tiles = tiles_of(across, down, thumbnail.mean, electrons_by_colour(frame.raw, plan));
+  const int levels = denoise::levels_of(across.cells, down.cells);
+  const std::size_t count = tiles.size();
+  std::vector<float> start(count);
+  std::vector<unsigned char> has_chroma(count * denoise::most_levels);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double mean_e = tiles[i].charge_e / tiles[i].blocks;
+    const int level = denoise::start_of(mean_e - dark_e, dark_e, variance_e2);
+    start[i] = static_cast<float>(std::min(level, levels - 1));
+  }
+  denoise::ChromaStarts starts{start, has_chroma, across.tiles, down.tiles};
+  denoise::complete(starts);
+  ChromaWork out{{}, {}};
+  for (std::size_t i = 0; i < count; ++i) {
+    out.start[static_cast<std::size_t>(start[i])] += tiles[i].share;
+    out.work[has_chroma[i] != 0 ? 0 : has_chroma[count + i] != 0 ? 1 : 2] += tiles[i].share;
+  }
+  return out;
+}
+
+}  // namespace lowlux::isp

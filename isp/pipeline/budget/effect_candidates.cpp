@@ -1,0 +1,174 @@
+#include "isp/pipeline/budget/effect_candidates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/pipeline/budget/plan_effects.h"
+
+namespace lowlux::isp {
+namespace {
+
+using denoise::Level;
+
+/// How much of what row and column noise takes is counted where it is not known whether there is any.
+constexpr double share_of_unknown = 0.5;
+
+/// CIEDE2000 that what is not predicted counts for where plans are compared: so that it is done where there is time.
+constexpr double size_of_unknown = 0.3;
+
+CostPart part_of(Level level, int start) {
+  if (level == Level::best) return start == 2 ? CostPart::best_2 : CostPart::best_0;
+  constexpr std::array first{CostPart::draft_0, CostPart::standard_0, CostPart::high_0};
+  return static_cast<CostPart>(static_cast<int>(first[static_cast<std::size_t>(level)]) + start);
+}
+
+std::vector<CostShare> work_of(const EffectFacts& facts, const EffectCandidate& plan) {
+  std::vector<CostShare> work{{CostPart::planning}};
+  if (facts.sizes.sampled_share > 0) work.push_back({CostPart::samples, facts.sizes.sampled_share});
+  if (plan.defects && facts.may_search) work.push_back({CostPart::defects});
+  if (plan.level) {
+    if (plan.lines && facts.may_take_lines) {
+      work.push_back({CostPart::lines});
+      const double size = facts.sizes.lines;
+      if (size != 0) work.push_back({CostPart::offsets, std::isnan(size) ? share_of_unknown : 1});
+    }
+    work.push_back({CostPart::check});
+    for (int start = 0; start < 3; ++start) {
+      const double share = facts.chroma.work[static_cast<std::size_t>(start)];
+      if (share > 0) work.push_back({part_of(*plan.level, start), share});
+    }
+  } else {
+    const bool repairs = plan.defects && facts.sizes.has_defects;
+    const bool takes_dark = plan.dark && facts.sizes.dark > 0;
+    work.push_back({facts.from_codes && !repairs && !takes_dark ? CostPart::codes : CostPart::floats});
+  }
+  if (facts.samples == SampleType::u16) work.push_back({CostPart::codes_16});
+  if (facts.samples == SampleType::f32) work.push_back({CostPart::floats_32});
+  if (facts.look) work.push_back({CostPart::look});
+  if (facts.display && plan.display) work.push_back({CostPart::display});
+  return work;
+}
+
+std::vector<std::optional<Level>> levels_of(const EffectFacts& facts, bool with_best) {
+  if (facts.level_is_fixed) return {facts.fixed_level};
+  if (!facts.has_noise) return {std::nullopt};
+  std::vector<std::optional<Level>> out{std::nullopt, Level::draft, Level::standard, Level::high};
+  if (with_best) out.emplace_back(Level::best);
+  return out;
+}
+
+/// The least work that stays below the tolerance: the level first, which saves most, then smallest first.
+EffectCandidate within_tolerance(const EffectFacts& facts, double tolerance) {
+  EffectCandidate plan{.level = levels_of(facts, false).back()};
+  for (const std::optional<Level> level : levels_of(facts, false)) {
+    EffectCandidate tried{.level = level};
+    rate(facts, tried);
+    if (tried.left >= share_for_level * tolerance) continue;
+    plan = tried;
+    break;
+  }
+  struct Option {
+    bool EffectCandidate::*used;
+    double size;
+  };
+  std::array options{
+      Option{&EffectCandidate::defects, facts.sizes.defects}, Option{&EffectCandidate::lines, facts.sizes.lines},
+      Option{&EffectCandidate::dark, facts.sizes.dark}, Option{&EffectCandidate::display, facts.sizes.display}};
+  std::ranges::sort(options, {}, &Option::size);
+  for (const Option& option : options) {
+    if (std::isnan(option.size)) continue;  // not predicted: it is done
+    EffectCandidate tried = plan;
+    tried.*option.used = false;
+    rate(facts, tried);
+    if (tried.left < tolerance) plan = tried;
+  }
+  rate(facts, plan);
+  return plan;
+}
+
+/// All there are, the cheapest first.
+std::vector<EffectCandidate> candidates(const EffectFacts& facts) {
+  std::vector<EffectCandidate> out;
+  for (const std::optional<Level> level : levels_of(facts, true)) {
+    for (const bool defects : {false, true}) {
+      for (const bool lines : {false, true}) {
+        for (const bool dark : {false, true}) {
+          // A display that was asked for is left out by a tolerance only: no budget turns a wish down unsaid.
+          EffectCandidate plan{.level = level, .defects = defects, .lines = lines, .dark = dark};
+          rate(facts, plan);
+          out.push_back(plan);
+        }
+      }
+    }
+  }
+  std::ranges::sort(out, {}, &EffectCandidate::seconds);
+  return out;
+}
+
+Result<EffectCandidate> within_budget(const EffectFacts& facts, double budget_s) {
+  const std::vector<EffectCandidate> all = candidates(facts);
+  if (all.front().seconds > budget_s) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("the budget of {:.3g} ms is below the cheapest plan, which is predicted to take {:.3g} ms "
+                            "with {} {}: raise --budget-ms",
+                            1e3 * budget_s, 1e3 * all.front().seconds, facts.choice.cost->threads,
+                            facts.choice.cost->threads == 1 ? "thread" : "threads"));
+  }
+  const double tolerance = facts.choice.tolerance_delta_e.value_or(0);
+  const EffectCandidate* best = nullptr;
+  for (const EffectCandidate& plan : all) {
+    if (plan.seconds > budget_s) break;
+    if (plan.left < tolerance) return plan;
+    if (best == nullptr || plan.error < best->error) best = &plan;
+  }
+  return *best;
+}
+
+}  // namespace
+
+LevelNoise level_noise(const std::vector<SeenBlock>& blocks) {
+  std::vector<float> rms(blocks.size());
+  const auto percentile = [&](const auto& delta_e) {
+    std::ranges::transform(blocks, rms.begin(), delta_e);
+    return seen_percentile(rms);
+  };
+  const auto left_by = [&](std::optional<Level> level) {
+    return percentile([level](const SeenBlock& block) { return left_delta_e(level, block); });
+  };
+  LevelNoise out;
+  out.all = percentile([](const SeenBlock& block) { return block.noise_delta_e; });
+  out.without_level = left_by(std::nullopt);
+  for (const Level level : {Level::draft, Level::standard}) out.left[static_cast<std::size_t>(level)] = left_by(level);
+  return out;
+}
+
+void rate(const EffectFacts& facts, EffectCandidate& plan) {
+  plan.left = facts.noise.left_by(plan.level);
+  double squares = std::pow(error_share(plan.level) * facts.noise.all, 2);
+  const auto leave = [&](bool used, double size) {
+    if (used || size == 0) return;
+    if (!std::isnan(size)) plan.left += size;
+    squares += std::pow(std::isnan(size) ? size_of_unknown : size, 2);
+  };
+  if (facts.may_search) leave(plan.defects, facts.sizes.defects);
+  if (facts.may_take_lines) leave(plan.lines && plan.level, facts.sizes.lines);  // they go with the noise, or stay
+  leave(plan.dark || plan.level, facts.sizes.dark);
+  leave(plan.display, facts.sizes.display);
+  plan.error = std::sqrt(squares);
+  if (facts.choice.cost) plan.seconds = predicted_s(*facts.choice.cost, facts.size, work_of(facts, plan));
+}
+
+Result<EffectCandidate> choose_candidate(const EffectFacts& facts) {
+  if (facts.choice.all) {
+    EffectCandidate everything{.level = levels_of(facts, false).back()};
+    rate(facts, everything);
+    return everything;
+  }
+  if (facts.choice.budget_s) return within_budget(facts, *facts.choice.budget_s);
+  return within_tolerance(facts, facts.choice.tolerance_delta_e.value_or(0));
+}
+
+}  // namespace lowlux::isp

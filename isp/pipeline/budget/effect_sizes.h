@@ -1,0 +1,37 @@
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "denoise/denoiser.h"
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/pipeline/budget/visible_noise.h"
+#include "isp/pipeline/plan.h"
+#include "isp/raw/measure/thumbnail.h"
+#include "isp/raw/repair.h"
+
+namespace lowlux::isp {
+
+/// What leaving things out would change: CIEDE2000 as visible_noise.h measures it. Not a number: not known, because the
+/// frame is too small, or too uneven, for a sample to save anything.
+struct EffectSizes {
+  double sampled_share = 0;  // of the frame
+  double defects = 0;        // of the 8 x 8 pixels around the strongest defect of the sample
+  bool has_defects = false;
+  std::string defects_words;
+  double lines = 0;  // of row and column noise
+  std::string lines_words;
+  double dark = 0;     // of the mean dark charge that is known
+  double display = 0;  // of the change for a display; not a number where the noise is not known
+};
+
+/// @param noise   of the frame; null where it is not known
+/// @param blocks  of the frame; none where the noise is not known
+EffectSizes effect_sizes(const RawFrame& frame, const DevelopPlan& plan, const Thumbnail& thumbnail,
+                         const denoise::RawNoise* noise, std::span<const SeenBlock> blocks, Executor& executor);
+
+/// What the search for defects goes by.
+DefectNoise defect_noise(const RawFrame& frame, const DevelopPlan& plan, const Thumbnail& thumbnail);
+
+}  // namespace lowlux::isp

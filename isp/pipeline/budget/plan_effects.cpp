@@ -1,0 +1,178 @@
+#include "isp/pipeline/budget/plan_effects.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/pipeline/budget/effect_candidates.h"
+#include "isp/pipeline/plan/plan_noise.h"
+#include "isp/pipeline/plan/plan_regions.h"
+
+namespace lowlux::isp {
+namespace {
+
+using denoise::Level;
+
+std::string level_words(const EffectFacts& facts, const EffectCandidate& plan) {
+  if (!facts.has_noise) return "the noise is not known, or not to be reduced";
+  if (!plan.level) return "left as it is";
+  std::array<double, 3> share = facts.chroma.start;
+  if (*plan.level == Level::best) share = {share[0] + share[1], 0, share[2]};  // it starts level 1's on level 0
+  return fmt::format("{}; chroma from level 0, 1, 2 in {:.0f}, {:.0f}, {:.0f} % of the frame", name_of(*plan.level),
+                     100 * share[0], 100 * share[1], 100 * share[2]);
+}
+
+/// How many of the regions have which level.
+std::string region_words(const NoiseRegions& regions) {
+  const auto have = [&](std::optional<Level> level) { return std::ranges::count(regions.level, level); };
+  return fmt::format("; of {} regions {} none, {} draft, {} standard, {} high", regions.level.size(),
+                     have(std::nullopt), have(Level::draft), have(Level::standard), have(Level::high));
+}
+
+std::optional<double> cost_of(const EffectFacts& facts, std::initializer_list<CostShare> parts) {
+  if (!facts.choice.cost) return std::nullopt;
+  return predicted_s(*facts.choice.cost, facts.size, parts);
+}
+
+double seconds_of(const EffectFacts& facts, EffectCandidate plan) {
+  rate(facts, plan);
+  return plan.seconds;
+}
+
+/// Of the plan's level, or of the most that a tolerance calls for where it has none; without lines.
+std::optional<double> cost_of_noise(const EffectFacts& facts, EffectCandidate plan) {
+  if (!facts.choice.cost) return std::nullopt;
+  plan.lines = false;
+  if (!plan.level) plan.level = Level::high;
+  EffectCandidate without = plan;
+  without.level.reset();
+  return seconds_of(facts, plan) - seconds_of(facts, without);
+}
+
+std::optional<double> cost_of_lines(const EffectFacts& facts, EffectCandidate plan) {
+  if (!facts.choice.cost) return std::nullopt;
+  plan.lines = true;
+  if (!plan.level) plan.level = Level::high;
+  EffectCandidate without = plan;
+  without.lines = false;
+  return seconds_of(facts, plan) - seconds_of(facts, without);
+}
+
+EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  EffectsPlan out;
+  const auto left = [](bool used, double size) { return used || !(size > 0) ? 0 : size; };
+  const auto add = [&](PlannedEffect effect) { out.effects.push_back(std::move(effect)); };
+  if (facts.has_noise) {
+    const double all = facts.noise.all, kept = facts.noise.left_by(plan.level);
+    PlannedEffect noise{
+        "noise", all, plan.level ? kept : std::min(kept, all), plan.level.has_value(), level_words(facts, plan), {}};
+    noise.seconds = cost_of_noise(facts, plan);
+    add(std::move(noise));
+  } else {
+    add({"noise", nan, 0, false, level_words(facts, plan), {}});
+  }
+  if (facts.may_search) {
+    add({"hot pixels", facts.sizes.defects, left(plan.defects, facts.sizes.defects), plan.defects,
+         facts.sizes.defects_words, cost_of(facts, {{CostPart::defects}})});
+  }
+  if (facts.may_take_lines) {
+    const bool taken = plan.lines && plan.level;
+    add({"row and column noise", facts.sizes.lines, left(taken, facts.sizes.lines), taken,
+         plan.level ? facts.sizes.lines_words : "taken off with the noise or not at all", cost_of_lines(facts, plan)});
+  }
+  if (facts.sizes.dark > 0) {
+    const bool used = plan.dark || plan.level;
+    add({"dark charge", facts.sizes.dark, left(used, facts.sizes.dark), used, used ? "subtracted" : "left in",
+         std::nullopt});
+  }
+  if (facts.display) {
+    add({"change for the display", facts.sizes.display, left(plan.display, facts.sizes.display), plan.display,
+         plan.display ? "made" : "left out", cost_of(facts, {{CostPart::display}})});
+  }
+  const bool by_tolerance = facts.choice.tolerance_delta_e && !facts.choice.all && !facts.choice.budget_s;
+  if (by_tolerance && plan.level && !facts.level_is_fixed) {
+    out.regions =
+        plan_regions(facts.active, facts.blocks, *plan.level, share_for_level * *facts.choice.tolerance_delta_e);
+  }
+  if (out.regions) out.effects.front().decision += region_words(*out.regions);
+  if (facts.choice.cost) out.predicted_s = plan.seconds;
+  out.find_defects = plan.defects;
+  out.lines = plan.lines;
+  out.dark = plan.dark || plan.level;
+  out.display = plan.display;
+  out.level = plan.level;
+  out.level_decided = facts.has_noise;
+  return out;
+}
+
+EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopPlan& plan, Executor& executor) {
+  const DevelopOptions& o = plan.options;
+  EffectFacts facts{*o.effects, {}, {}};
+  facts.size = cost_size(frame.raw);
+  facts.samples = o.samples;
+  facts.active = frame.raw.active;
+  facts.look = plan.look.has_value();
+  facts.display = o.display != nullptr;
+  NoiseReduction reduction;
+  facts.has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !noise_obstacle(frame, plan);
+  if (facts.has_noise) {
+    set_noise_model(frame, plan, reduction);
+    facts.blocks = seen_blocks(frame, plan, reduction.noise, thumbnail, executor);
+    facts.has_noise = !facts.blocks.empty();
+    facts.noise = level_noise(facts.blocks);
+    facts.chroma = chroma_work(frame, plan, reduction.noise, thumbnail);
+  }
+  facts.level_is_fixed = o.denoise.mode != DenoiseChoice::Mode::automatic;
+  if (o.denoise.mode == DenoiseChoice::Mode::level) facts.fixed_level = o.denoise.level;
+  facts.may_search = o.find_defects && frame.raw.layout == SensorLayout::bayer;
+  facts.may_take_lines = facts.has_noise && o.denoise.line_noise;
+  facts.sizes =
+      effect_sizes(frame, plan, thumbnail, facts.has_noise ? &reduction.noise : nullptr, facts.blocks, executor);
+  facts.from_codes = frame.raw.layout == SensorLayout::bayer && frame.corrections.defects.empty() &&
+                     !plan.black.pattern && !o.dark_frame;
+  return facts;
+}
+
+}  // namespace
+
+double left_of_noise(std::optional<Level> level, double snr) {
+  constexpr std::array at{0.2, 0.7, 1.5, 3.0, 6.0, 12.0};
+  constexpr std::array draft{0.12, 0.16, 0.185, 0.225, 0.28, 0.33};
+  constexpr std::array standard{0.08, 0.105, 0.12, 0.14, 0.165, 0.19};
+  if (!level) return 0.9;
+  if (*level >= Level::high) return 0;
+  const auto& left = *level == Level::draft ? draft : standard;
+  if (!(snr > at.front())) return left.front();
+  for (std::size_t i = 1; i < at.size(); ++i) {
+    if (snr < at[i]) return std::lerp(left[i - 1], left[i], std::log(snr / at[i - 1]) / std::log(at[i] / at[i - 1]));
+  }
+  return left.back();
+}
+
+float left_delta_e(std::optional<Level> level, const SeenBlock& block) {
+  const auto left = static_cast<float>(left_of_noise(level, static_cast<double>(block.snr)));
+  const float noise = left * block.surroundings * block.noise_delta_e;
+  return level ? noise : std::hypot(noise, block.clip_delta_e);
+}
+
+double error_share(std::optional<Level> level) {
+  constexpr std::array share{0.70, 0.67, 0.63, 0.54};
+  return level ? share[static_cast<std::size_t>(*level)] : 0.85;
+}
+
+Result<void> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan, Executor& executor) {
+  const EffectFacts facts = facts_of(frame, thumbnail, plan, executor);
+  const Result<EffectCandidate> best = choose_candidate(facts);
+  if (!best) return tl::make_unexpected(best.error());
+  plan.effects = told(facts, *best);
+  if (!plan.effects->dark) plan.black.dark_mean_e = {};
+  if (!plan.effects->display) plan.options.display.reset();
+  return {};
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,258 @@
+#include "isp/pipeline/budget/visible_noise.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "isp/model/colour/colorimetry.h"
+#include "isp/model/colour/colour_difference.h"
+#include "isp/pipeline/render/cell_figures.h"
+#include "isp/render/output_space.h"
+#include "isp/render/retarget/retarget_rows.h"
+#include "isp/render/tone.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr int most_blocks_along = 16;
+constexpr std::array<double, 3> samples_in_box{16, 32, 16};  // of R, G, B
+constexpr double least_variance_e2 = 1e-6;
+constexpr double surroundings_px =
+    12;  // each way: a block of the denoiser, whose thresholds are those of its mean variance
+constexpr double most_surroundings = 2;
+/// What pixels of the picture scatter by over what their raw values do: on the tuning pictures.
+constexpr double pixel_scatter = 1.3;
+
+double normal_density(double t) { return std::exp(-0.5 * t * t) * std::numbers::inv_sqrtpi / std::numbers::sqrt2; }
+
+/// Mean of what is above black of a normal law.
+double mean_above_black(double mean, double std) {
+  if (!(std > 0)) return std::max(mean, 0.0);
+  const double t = mean / std;
+  return std * normal_density(t) + mean * 0.5 * std::erfc(-t / std::numbers::sqrt2);
+}
+
+/// From camera RGB, a fraction of white with the black off, to what is displayed.
+class Display {
+ public:
+  explicit Display(const DevelopPlan& plan)
+      : plan_(plan),
+        limit_(tone_limit(plan.options.tone, plan.exposure_ev)),
+        to_xyz_(*inverse(*xyz_to_output(plan.options.space))),
+        white_(*xyz_of(output_white)) {}
+
+  Lab lab(const Vector3& camera) const { return lab_of_shown(shown(camera)); }
+
+  /// Of the mean of pixels that scatter. @param std  of each colour, a fraction of white
+  Lab lab_of_clipped(const Vector3& camera, const Vector3& std) const {
+    const Vector3 mean = linear(camera);
+    Vector3 raised{};
+    double luminance = 0, too_bright = 0;
+    for (int i = 0; i < 3; ++i) {
+      double variance = 0;
+      for (int c = 0; c < 3; ++c) {
+        variance += std::pow(matrix(i, c) * static_cast<double>(plan_.white_gain[c]) * std[c], 2);
+      }
+      const auto weight = static_cast<double>(plan_.transform.luminance[i]);
+      raised[i] = mean_above_black(mean[i], pixel_scatter * std::sqrt(variance));
+      luminance += weight * std::max(mean[i], 0.0);
+      too_bright += weight * raised[i];
+    }
+    if (luminance > 0) {
+      for (double& v : raised) v *= luminance / too_bright;
+    }
+    return lab_of_shown(toned(raised));
+  }
+
+  /// What changing its code for the planned display makes of a colour, by the colours that codes stand for.
+  double changed_for_display(const Vector3& camera) const {
+    if (!plan_.options.display) return 0;
+    const Vector3 before = shown(camera);
+    std::array<std::uint16_t, 3> code{};
+    for (int i = 0; i < 3; ++i) {
+      code[i] = static_cast<std::uint16_t>(std::lround(65535 * encode_transfer(plan_.options.space, before[i])));
+    }
+    apply(plan_.options.display->made.table, code.data(), 1, code.data());
+    Vector3 after{};
+    for (int i = 0; i < 3; ++i) after[i] = decode_transfer(plan_.options.space, code[i] / 65535.0);
+    return ciede2000(lab_of_shown(before), lab_of_shown(after));
+  }
+
+ private:
+  double matrix(int row, int column) const { return static_cast<double>(plan_.transform.matrix[3 * row + column]); }
+  Vector3 linear(const Vector3& camera) const {
+    Vector3 out{};
+    for (int c = 0; c < 3; ++c) {
+      const double balanced = std::min(camera[c] * static_cast<double>(plan_.white_gain[c]), 1.0);
+      for (int i = 0; i < 3; ++i) out[i] += matrix(i, c) * balanced;
+    }
+    return out;
+  }
+  Vector3 toned(const Vector3& linear) const {
+    Vector3 out{};
+    for (int i = 0; i < 3; ++i) {
+      out[i] = std::min(apply_tone(plan_.options.tone, std::clamp(linear[i], 0.0, 1.0) * limit_, limit_), 1.0);
+    }
+    return out;
+  }
+  Vector3 shown(const Vector3& camera) const { return toned(linear(camera)); }
+  Lab lab_of_shown(const Vector3& shown) const { return lab_of(xyz_of(to_xyz_ * shown), white_); }
+
+  const DevelopPlan& plan_;
+  double limit_;
+  Matrix3 to_xyz_;
+  Xyz white_;
+};
+
+/// Per colour, of the frame.
+struct Channels {
+  std::array<double, 3> electrons_at_white{};
+  std::array<double, 3> dark_e{};
+};
+
+Channels channels_of(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise) {
+  Channels out{.electrons_at_white = electrons_by_colour(frame.raw, plan)};
+  for (int site = 0; site < 4; ++site) {
+    const auto c = static_cast<std::size_t>(colour_at(frame.raw.phase, site & 1, site >> 1));
+    out.dark_e[c] += noise.dark_mean_e[site] * (c == 1 ? 0.5 : 1);
+  }
+  return out;
+}
+
+/// What is seen of noise whose mean lies below black, as it does where dark charge is overestimated: sqrt(2) times the
+/// rms of what reaches above, which for a mean at black is all of it. Half the distance counts: the light of a block
+/// varies.
+double above_black_e(double mean_e, double std_e) {
+  const double below = std::max(-mean_e / (2 * std_e), 0.0);
+  const double reaching = 0.5 * std::erfc(below / std::numbers::sqrt2);
+  return std_e * std::sqrt(std::max(2 * ((1 + below * below) * reaching - below * normal_density(below)), 0.0));
+}
+
+SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise::RawNoise& noise,
+               const Display& display) {
+  Vector3 signal{};
+  double mean_signal = 0, mean_variance = 0, squares = 0;
+  for (int c = 0; c < 3; ++c) {
+    signal[c] = (charge_e[c] - channels.dark_e[c]) / channels.electrons_at_white[c];
+    mean_signal += share_of_sites[c] * (charge_e[c] - channels.dark_e[c]);
+    mean_variance += share_of_sites[c] * (std::max(charge_e[c], 0.0) + noise.variance_e2[c]);
+  }
+  Vector3 lit{};
+  for (int c = 0; c < 3; ++c) lit[c] = std::max(signal[c], 0.0);
+  const Lab lab = display.lab(lit);
+  Vector3 with_dark = signal, with_line = lit;
+  const double line_e = std::sqrt(std::max(mean_variance, least_variance_e2) / (seen_box_px * seen_box_px));
+  double point = 0;
+  Vector3 pixel_std{};
+  for (int c = 0; c < 3; ++c) {
+    const double variance_e2 = std::max(charge_e[c], 0.0) + noise.variance_e2[c];
+    const double step_e = std::sqrt(std::max(variance_e2, least_variance_e2) / samples_in_box[c]);
+    Vector3 moved = lit;
+    moved[c] += above_black_e(charge_e[c] - channels.dark_e[c], step_e) / channels.electrons_at_white[c];
+    const double difference = ciede2000(lab, display.lab(moved));
+    squares += difference * difference;
+    point = std::max(point, difference / (step_e * samples_in_box[c]));
+    pixel_std[c] = std::sqrt(std::max(variance_e2, 0.0)) / channels.electrons_at_white[c];
+    with_dark[c] += channels.dark_e[c] / channels.electrons_at_white[c];
+    with_line[c] += line_e / channels.electrons_at_white[c];
+  }
+  SeenBlock out;
+  out.line_delta_e = static_cast<float>(ciede2000(lab, display.lab(with_line)) / line_e);
+  out.point_delta_e = static_cast<float>(point);
+  out.display_delta_e = static_cast<float>(display.changed_for_display(signal));
+  out.snr = static_cast<float>(std::max(mean_signal, 0.0) / std::sqrt(std::max(mean_variance, least_variance_e2)));
+  out.noise_delta_e = static_cast<float>(std::sqrt(squares));
+  out.clip_delta_e = static_cast<float>(ciede2000(lab, display.lab_of_clipped(signal, pixel_std)));
+  if (with_dark != signal)
+    out.dark_delta_e = static_cast<float>(ciede2000(display.lab(signal), display.lab(with_dark)));
+  return out;
+}
+
+/// The thumbnail in electrons.
+class Charge {
+ public:
+  Charge(const Thumbnail& thumbnail, const Channels& channels, const denoise::RawNoise& noise)
+      : mean_(thumbnail.mean), channels_(channels), noise_(noise) {}
+
+  Vector3 at(int x, int y) const {
+    Vector3 out{};
+    for (int c = 0; c < 3; ++c) {
+      const auto mean = static_cast<double>(mean_.plane[c].at(x, y));
+      out[c] = (std::isfinite(mean) ? mean : 0) * channels_.electrons_at_white[c];
+    }
+    return out;
+  }
+
+  /// See SeenBlock. @param reach  in blocks
+  double surroundings(int x, int y, int reach) const {
+    double sum = 0;
+    int count = 0;
+    for (int j = std::max(y - reach, 0); j <= std::min(y + reach, mean_.height() - 1); ++j) {
+      for (int i = std::max(x - reach, 0); i <= std::min(x + reach, mean_.width() - 1); ++i, ++count) {
+        sum += variance(i, j);
+      }
+    }
+    const double own = std::max(variance(x, y), least_variance_e2);
+    return std::clamp(std::sqrt(sum / count / own), 1.0, most_surroundings);
+  }
+
+ private:
+  double variance(int x, int y) const {
+    const Vector3 charge_e = at(x, y);
+    double out = 0;
+    for (int c = 0; c < 3; ++c) out += share_of_sites[c] * (std::max(charge_e[c], 0.0) + noise_.variance_e2[c]);
+    return out;
+  }
+
+  const CameraRgb& mean_;
+  const Channels& channels_;
+  const denoise::RawNoise& noise_;
+};
+
+}  // namespace
+
+std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
+                                   const Thumbnail& thumbnail, Executor& executor) {
+  const OutputSpace space = plan.options.space;
+  if (space == OutputSpace::camera || space == OutputSpace::xyz) return {};
+  const Display display(plan);
+  const Channels channels = channels_of(frame, plan, noise);
+  const int columns = thumbnail.mean.width(), rows = thumbnail.mean.height();
+  const int along = std::min(columns, most_blocks_along), down = std::min(rows, most_blocks_along);
+  const Charge charge(thumbnail, channels, noise);
+  const int reach = static_cast<int>(std::ceil(surroundings_px * columns / frame.raw.active.width));
+  std::vector<SeenBlock> out(static_cast<std::size_t>(along) * static_cast<std::size_t>(down));
+  for_each_index(executor, down, [&](int j) {
+    for (int i = 0; i < along; ++i) {
+      const int x = (2 * i + 1) * columns / (2 * along), y = (2 * j + 1) * rows / (2 * down);
+      SeenBlock& block =
+          out[static_cast<std::size_t>(j) * static_cast<std::size_t>(along) + static_cast<std::size_t>(i)];
+      block = seen(charge.at(x, y), channels, noise, display);
+      block.surroundings = static_cast<float>(charge.surroundings(x, y, reach));
+      block.x = (static_cast<float>(x) + 0.5f) / static_cast<float>(columns);
+      block.y = (static_cast<float>(y) + 0.5f) / static_cast<float>(rows);
+    }
+  });
+  return out;
+}
+
+double seen_percentile(std::span<const float> rms_delta_e) {
+  const auto noisy = std::ranges::count_if(rms_delta_e, [](float rms) { return rms > 0; });
+  if (static_cast<double>(noisy) <= (1 - seen_share) * static_cast<double>(rms_delta_e.size())) return 0;
+  const auto share_above = [&](double x) {
+    double sum = 0;
+    for (const float rms : rms_delta_e) {
+      sum += rms > 0 ? std::erfc(x / (std::sqrt(2.0) * static_cast<double>(rms))) : 0;
+    }
+    return sum / static_cast<double>(rms_delta_e.size());
+  };
+  double low = 0, high = 5 * static_cast<double>(*std::ranges::max_element(rms_delta_e));
+  for (int step = 0; step < 24; ++step) {
+    const double middle = (low + high) / 2;
+    (share_above(middle) > 1 - seen_share ? low : high) = middle;
+  }
+  return (low + high) / 2;
+}
+
+}  // namespace lowlux::isp

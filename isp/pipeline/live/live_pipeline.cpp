@@ -1,0 +1,171 @@
+#include "isp/pipeline/live/live_pipeline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/raw/black_point.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr int most_side = 65536;
+
+bool inside(const Rect& r, int width, int height) {
+  return r.x >= 0 && r.y >= 0 && r.width >= 0 && r.height >= 0 && r.x <= width - r.width && r.y <= height - r.height;
+}
+
+Result<void> check(const LiveSetup& setup) {
+  const auto wrong = [](std::string message) { return fail(ErrorCode::invalid_argument, std::move(message)); };
+  if (names_of(setup.format) == nullptr) return fail(ErrorCode::unsupported, "no raw format that is known");
+  if (setup.width < 2 || setup.height < 2 || setup.width > most_side || setup.height > most_side) {
+    return wrong(fmt::format("frames have 2 to {} pixels each way, not {} x {}", most_side, setup.width, setup.height));
+  }
+  if (!inside(setup.active, setup.width, setup.height) || setup.active.width < 2 || setup.active.height < 2) {
+    return wrong("the picture's part of the frame lies inside it and has two pixels each way at least");
+  }
+  for (const Rect& masked : setup.masked) {
+    if (!inside(masked, setup.width, setup.height) || masked.width < 2 || masked.height < 2) {
+      return wrong("masked pixels lie inside the frame, two each way at least");
+    }
+  }
+  if (setup.white_dn != 0 && !(setup.white_dn >= 0.001 && setup.white_dn <= 65535)) {
+    return wrong("white lies between 0.001 and 65535, or is 0 for the largest code");
+  }
+  if (setup.most == denoise::Level::best) return wrong("live frames are denoised by draft, standard or high");
+  if (setup.look.look == Look::model) return wrong("live frames have the look of the camera or of the eye");
+  if (setup.samples == SampleType::f32) return wrong("live frames have codes of 8 or 16 bits");
+  return {};
+}
+
+RawFrame frame_of(const LiveSetup& setup) {
+  RawFrame frame;
+  RawDn& raw = frame.raw;
+  raw.dn = Plane<std::uint16_t>(setup.width, setup.height);
+  raw.layout = setup.format.layout;
+  raw.active = setup.active;
+  raw.default_crop = {0, 0, setup.active.width, setup.active.height};
+  if (raw.layout == SensorLayout::bayer) raw.phase = phase_of_crop(setup.format.phase, setup.active.x, setup.active.y);
+  raw.masked = setup.masked;
+  raw.masked_is_stated = true;
+  raw.white_dn.fill(setup.white_dn > 0 ? setup.white_dn : largest_code(setup.format));
+  frame.colour = setup.colour;
+  return frame;
+}
+
+DevelopPlan plan_of(const LiveSetup& setup) {
+  DevelopPlan plan;
+  plan.width = setup.active.width;
+  plan.height = setup.active.height;
+  plan.defects = setup.defects;
+  plan.options.tone = setup.tone;
+  plan.options.samples = setup.samples;
+  plan.options.look = setup.look;
+  plan.options.find_defects = false;
+  return plan;
+}
+
+}  // namespace
+
+LivePipeline::LivePipeline(LiveSetup setup, RawFrame frame, Executor& executor)
+    : executor_(executor),
+      setup_(std::move(setup)),
+      frame_(std::move(frame)),
+      plan_(plan_of(setup_)),
+      meter_(frame_.raw, setup_.format, executor.width()),
+      planner_(setup_),
+      pipeline_(executor) {}
+
+Result<std::unique_ptr<LivePipeline>> LivePipeline::make(LiveSetup setup, Executor& executor) {
+  if (Result<void> checked = check(setup); !checked) return tl::make_unexpected(checked.error());
+  RawFrame frame = frame_of(setup);
+  std::unique_ptr<LivePipeline> out(new LivePipeline(std::move(setup), std::move(frame), executor));
+  if (Result<void> warm = out->warm_up(); !warm) return tl::make_unexpected(warm.error());
+  return out;
+}
+
+/// A made-up frame through every step, so that all of them have their memory.
+Result<void> LivePipeline::warm_up() {
+  const double black = frame_.raw.white_dn[0] / 16, gain_dn = frame_.raw.white_dn[0] / 1000,
+               variance = 4 * gain_dn * gain_dn;
+  LiveFacts facts{
+      .black_dn = PerSite<double>{black, black, black, black},
+      .noise = LiveNoise{.gain_dn = gain_dn, .black_variance_dn2 = {variance, variance, variance, variance}},
+      .scene_luminance_cd_m2 = 1};
+  {
+    const std::size_t stride = row_bytes(setup_.format, setup_.width);
+    const std::vector<std::byte> zeros(stride * static_cast<std::size_t>(setup_.height));
+    read(zeros, stride, facts, true);
+  }
+  plan_.options.look.which = LookChoice::Which::all;  // which of them is called for, each frame tells anew
+  const bool bayer = setup_.format.layout == SensorLayout::bayer;
+  for (const bool reduces : {false, true}) {
+    if (reduces && !bayer) continue;
+    facts.denoise = {.mode = reduces && setup_.levels ? LiveDenoise::Mode::level : LiveDenoise::Mode::off,
+                     .level = setup_.most,
+                     .temporal = reduces};
+    if (Result<void> planned = plan(facts); !planned) return planned;
+    if (setup_.samples == SampleType::u16) {
+      Plane<std::uint16_t> rgb(3 * setup_.active.width, setup_.active.height);
+      render(rgb.view());
+    } else {
+      render(RowSink{[](void*, int, int, const std::uint8_t*, int) {}, nullptr});
+    }
+  }
+  // Automatic levels have memory of their own.
+  facts.denoise.mode = LiveDenoise::Mode::automatic;
+  if (Result<void> planned = plan(facts); !planned) return planned;
+  plan_.options.look.which = setup_.look.which;
+  reset();
+  return {};
+}
+
+void LivePipeline::read(std::span<const std::byte> bytes, std::size_t stride, const LiveFacts& facts, bool statistics) {
+  meter_.read(bytes, stride, frame_.raw, executor_, planner_.wants(facts, statistics));
+}
+
+Result<void> LivePipeline::plan(const LiveFacts& facts) { return planner_.plan(facts, meter_, frame_, plan_); }
+
+void LivePipeline::reset() { planner_.reset(); }
+
+void LivePipeline::render_mosaic(PlaneView<std::uint16_t> codes) {
+  const Rect& active = frame_.raw.active;
+  const int shift = 16 - setup_.format.bits, largest = largest_code(setup_.format);
+  if (!plan_.electrons_at_white) {
+    for_each_band(executor_, active.height, [&](RowBand band, int) {
+      for (int y = band.first; y < band.last; ++y) {
+        const std::uint16_t* const dn = frame_.raw.dn.row(active.y + y) + active.x;
+        // Words of 16 bits may hold more than the format's bits, which would come out dark.
+        for (int x = 0; x < active.width; ++x) {
+          codes.at(x, y) = static_cast<std::uint16_t>(std::min<int>(dn[x], largest) << shift);
+        }
+      }
+    });
+    return;
+  }
+  const PlaneView<const float> signal_e = pipeline_.signal(frame_, plan_);
+  const auto most = static_cast<float>(largest << shift);
+  PerSite<float> black{}, code_per_e{};
+  for (int site = 0; site < 4; ++site) {
+    const double black_dn = plan_.black.pedestal_dn[site];
+    const double dn_per_e = (white_at(frame_.raw, site) - black_dn) / (*plan_.electrons_at_white)[site];
+    black[site] = static_cast<float>(std::ldexp(black_dn, shift)) + 0.5f;
+    code_per_e[site] = static_cast<float>(std::ldexp(dn_per_e, shift));
+  }
+  for_each_band(executor_, active.height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      const float* const in = signal_e.row(y);
+      std::uint16_t* const out = codes.row(y);
+      const int left = site_of(0, y);
+      for (int x = 0; x < active.width; ++x) {
+        const int site = left + (x & 1);
+        const float code = black[site] + code_per_e[site] * in[x];
+        out[x] = static_cast<std::uint16_t>(std::clamp(code, 0.0f, most));
+      }
+    }
+  });
+}
+
+}  // namespace lowlux::isp

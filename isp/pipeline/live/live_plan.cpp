@@ -1,0 +1,322 @@
+#include "isp/pipeline/live/live_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/pipeline/plan/plan_look.h"
+#include "isp/pipeline/plan/plan_noise.h"
+#include "isp/pipeline/plan/plan_rendering.h"
+#include "isp/raw/black_point.h"
+#include "isp/raw/to_linear.h"
+#include "isp/render/output_space.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double still_ev = 0.1;  // exposure stays where it is for targets nearer than this ...
+constexpr double step = 0.15;     // ... else goes this share of the way with each frame
+// Of white. A frame that is bright everywhere shows no black; pedestals of cameras are an eighth of white at most.
+constexpr double highest_black = 0.25;
+constexpr double level_slack = 1.2;  // a level of noise reduction is left only this far beyond its edge
+
+/// Noise that was measured follows the frames slowly: one of them is a rough measurement.
+NoiseLine blended(const NoiseLine& before, const NoiseLine& now) {
+  NoiseLine out = before;
+  out.gain_dn += step * (now.gain_dn - before.gain_dn);
+  out.offset_dn2 += step * (now.offset_dn2 - before.offset_dn2);
+  return out;
+}
+
+/// As calib::profile_at has it: means over the sites of a colour. Monochrome frames have one for all.
+NoiseProfile profile_of(const LiveNoise& noise, const RawDn& raw, const BlackPoint& black) {
+  NoiseProfile out{.source = NoiseProfile::Source::profile};
+  std::array<int, 3> sites{};
+  for (int site = 0; site < 4; ++site) {
+    const double range_dn = white_at(raw, site) - black.pedestal_dn[site];
+    for (int c = 0; c < 3; ++c) {
+      if (raw.layout == SensorLayout::bayer && static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)) != c)
+        continue;
+      out.scale[c] += noise.gain_dn / range_dn;
+      out.offset[c] += noise.black_variance_dn2[site] / (range_dn * range_dn);
+      ++sites[c];
+    }
+  }
+  for (int c = 0; c < 3; ++c) {
+    out.scale[c] /= sites[c];
+    out.offset[c] /= sites[c];
+  }
+  return out;
+}
+
+/// 1 where one of them is not known: absent, or no figure there can be. Held to what means over frames take for
+/// another light altogether.
+double ratio(const std::optional<double>& now, const std::optional<double>& before) {
+  const auto known = [](const std::optional<double>& figure) {
+    return figure && *figure > 0 && std::isfinite(*figure);
+  };
+  return known(now) && known(before) ? std::clamp(*now / *before, 1e-9, 1e9) : 1;
+}
+
+/// A line at another gain of the sensor: codes for each electron go with it.
+NoiseLine at_gain(const NoiseLine& line, double factor) {
+  return {line.gain_dn * factor, line.offset_dn2 * factor * factor, line.gain_error_dn * factor,
+          line.offset_error_dn2 * factor * factor};
+}
+
+LiveNoise noise_of(const NoiseLine& line) {
+  const double variance = line.offset_dn2;
+  return {line.gain_dn, {variance, variance, variance, variance}};
+}
+
+/// Moves linear colours away from the neutral of their luminance, or to it.
+Matrix3 saturated(double saturation, const Vector3& luminance) {
+  Matrix3 out{};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) out[i][j] = (1 - saturation) * luminance[j] + (i == j ? saturation : 0);
+  }
+  return out;
+}
+
+/// Camera RGB of daylight; equal channels where no calibration tells it.
+Vector3 daylight_of(const CameraColour& colour) {
+  if (colour.calibrations.empty()) return {1, 1, 1};
+  const auto daylight = neutral_of_white(colour, white_d65);
+  return daylight ? *daylight : Vector3{1, 1, 1};
+}
+
+Vector3 scaled_to_one(const Vector3& v) {
+  const double largest = *std::ranges::max_element(v);
+  return {v[0] / largest, v[1] / largest, v[2] / largest};
+}
+
+}  // namespace
+
+void LivePlanner::reset() {
+  exposure_ev_.reset();
+  neutral_.reset();
+  line_.reset();
+  has_level_ = false;
+  noise_iso_.reset();
+  last_ = {};
+  first_ = true;
+}
+
+bool LivePlanner::needs_light(const LiveFacts& facts) const {
+  const bool colour = setup_.format.layout == SensorLayout::bayer;
+  return !facts.exposure_ev || (colour && !facts.neutral) || setup_.look.look == Look::eye ||
+         facts.denoise.mode == LiveDenoise::Mode::automatic;
+}
+
+MeterWants LivePlanner::wants(const LiveFacts& facts, bool statistics) const {
+  const bool finds_black = !facts.black_dn && setup_.masked.empty();
+  return {.light = needs_light(facts), .noise = statistics || finds_black || !facts.noise, .statistics = statistics};
+}
+
+Result<void> LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, const RawFrame& frame,
+                                    DevelopPlan& plan) {
+  BlackPoint& black = plan.black;
+  black.holds = BlackPoint::Holds::pedestal_and_dark;
+  if (facts.black_dn) {
+    black.pedestal_dn = *facts.black_dn;
+    black.source = BlackPoint::Source::given;
+    decision_.black = LiveSource::given;
+  } else if (const auto masked = meter.masked_dn()) {
+    black.pedestal_dn = *masked;
+    black.source = BlackPoint::Source::masked_pixels;
+    decision_.black = LiveSource::masked_pixels;
+  } else {
+    black.pedestal_dn = meter.tiles().darkest_dn();
+    for (int site = 0; site < 4; ++site) {
+      black.pedestal_dn[site] = std::min(black.pedestal_dn[site], highest_black * white_at(frame.raw, site));
+    }
+    black.source = BlackPoint::Source::given;
+    decision_.black = LiveSource::frame;
+  }
+  for (int site = 0; site < 4; ++site) {
+    const double white = white_at(frame.raw, site);
+    if (white > black.pedestal_dn[site]) continue;
+    return fail(ErrorCode::malformed,
+                fmt::format("the white level {:g} DN is not above black {:g} DN, dark charge in it", white,
+                            black.pedestal_dn[site]));
+  }
+  return {};
+}
+
+void LivePlanner::set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan) {
+  if (meter.wanted().noise) {
+    decision_.measured = meter.tiles().line(plan.black.pedestal_dn, frame.raw.white_dn[1]);
+  }
+  if (facts.noise) {
+    frame.noise = profile_of(*facts.noise, frame.raw, plan.black);
+    decision_.noise = LiveSource::given;
+  } else {
+    if (!facts.follows) line_.reset();
+    if (line_) line_ = at_gain(*line_, ratio(facts.iso, noise_iso_));
+    noise_iso_ = facts.iso;
+    if (decision_.measured) line_ = line_ ? blended(*line_, *decision_.measured) : *decision_.measured;
+    frame.noise.reset();
+    if (line_) frame.noise = profile_of(noise_of(*line_), frame.raw, plan.black);
+    decision_.noise = line_ ? LiveSource::frame : LiveSource::none;
+  }
+  plan.electrons_at_white.reset();
+  if (frame.noise) plan.electrons_at_white = electrons_at_white(frame.raw, *frame.noise);
+}
+
+/// Given, else estimated and following the scene, else daylight, else equal channels.
+WhiteBalance LivePlanner::choose_white(const LiveFacts& facts, RawFrame& frame) {
+  if (frame.raw.layout == SensorLayout::monochrome) return {};
+  if (facts.neutral) {
+    decision_.white = LiveSource::given;
+    frame.colour.as_shot_neutral = scaled_to_one(*facts.neutral);
+  } else {
+    memory_.resize(thumbnail_.mean.plane[0].size());
+    const WhiteEstimate found =
+        estimate_white(std::as_const(thumbnail_).mean.view(), block_noise_std(frame.raw, thumbnail_), frame.colour,
+                       AutoWhiteOptions{}, memory_);
+    decision_.white = LiveSource::frame;
+    if (found.blocks >= AutoWhiteOptions{}.min_blocks) {
+      const Vector3& now = found.balance.neutral;
+      if (!neutral_) neutral_ = now;
+      for (int c = 0; c < 3; ++c) (*neutral_)[c] += step * (now[c] - (*neutral_)[c]);
+    }
+    if (!neutral_) {
+      decision_.white = LiveSource::none;
+      frame.colour.as_shot_neutral = daylight_of(frame.colour);
+    } else {
+      frame.colour.as_shot_neutral = scaled_to_one(*neutral_);
+    }
+  }
+  WhiteBalance out{.neutral = *frame.colour.as_shot_neutral, .source = WhiteSource::as_shot};
+  if (frame.colour.calibrations.empty()) return out;
+  if (const auto white = white_of_neutral(frame.colour, out.neutral)) {
+    out.white = *white;
+  } else if (!facts.neutral) {  // an estimate that is no colour of a light gives way to daylight
+    decision_.white = LiveSource::none;
+    frame.colour.as_shot_neutral = out.neutral = daylight_of(frame.colour);
+    if (const auto daylight = white_of_neutral(frame.colour, out.neutral)) out.white = *daylight;
+  }
+  return out;
+}
+
+Result<Matrix3> LivePlanner::balanced_matrix(const LiveFacts& facts, const RawFrame& frame, const DevelopPlan& plan,
+                                             const WhiteBalance& balance) {
+  const Vector3 luminance = *luminance_weights(plan.options.space);
+  const Matrix3 colours = saturated(facts.saturation, luminance);
+  if (facts.colour_matrix) return colours * *facts.colour_matrix;
+  const bool coloured = frame.raw.layout != SensorLayout::monochrome;
+  if (coloured && frame.colour.calibrations.empty()) return colours;
+  if (coloured && !balance.white) {
+    return fail(ErrorCode::malformed, "the white balance is no colour of a light under the camera's matrices");
+  }
+  Result<Matrix3> balanced = balanced_to_output(frame, plan.options, balance);
+  if (!balanced) return balanced;
+  return coloured ? colours * *balanced : *balanced;
+}
+
+double LivePlanner::smooth_exposure(double target_ev) {
+  if (!exposure_ev_) exposure_ev_ = target_ev;
+  const double away = target_ev - *exposure_ev_;
+  if (std::fabs(away) > still_ev) *exposure_ev_ += step * away;
+  return *exposure_ev_;
+}
+
+Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame, DevelopPlan& plan) {
+  const WhiteBalance balance = choose_white(facts, frame);
+  set_white(plan, balance);
+  const Result<Matrix3> balanced = balanced_matrix(facts, frame, plan, balance);
+  if (!balanced) return tl::make_unexpected(balanced.error());
+  blocks_.resize(needs_light(facts) ? thumbnail_.mean.plane[0].size() : 0);
+  rendered_luminance(thumbnail_.mean, plan, *balanced, blocks_);
+  const double gain = *std::ranges::max_element(plan.white_gain);
+  const double noise_std = thumbnail_.black_noise_std * gain;
+  plan.options.exposure_ev = facts.exposure_ev;
+  if (facts.exposure_ev) {
+    plan.exposure_ev = *facts.exposure_ev;
+    plan.exposure_rule = "given";
+  } else {
+    memory_.assign(blocks_.begin(), blocks_.end());
+    const AutoExposure automatic = auto_exposure_reordering(memory_, noise_std);
+    plan.exposure_ev = smooth_exposure(automatic.ev);
+    plan.exposure_rule = name_of(automatic.rule);
+  }
+  if (auto look = plan_look(frame, {blocks_, noise_std}, plan); !look) return look;
+  set_transform(plan, *balanced);
+  if (const double limit = tone_limit(plan.options.tone, plan.exposure_ev); limit != tone_limit_) {
+    set_tone(plan);
+    tone_limit_ = limit;
+  }
+  return {};
+}
+
+/// A level that was chosen for the frame before is kept until the signal to noise ratio is clearly beyond its range.
+void LivePlanner::choose_level(const LiveDenoise& wanted, const RawFrame& frame, DevelopPlan& plan) {
+  NoiseReduction& out = plan.noise_reduction;
+  std::optional<denoise::Level> level;
+  out.snr.reset();
+  const bool can = plan.electrons_at_white && frame.raw.layout == SensorLayout::bayer;
+  if (can) set_noise_model(frame, plan, out);
+  if (can && wanted.mode != LiveDenoise::Mode::off) {
+    if (wanted.mode == LiveDenoise::Mode::level) {
+      level = wanted.level;
+    } else {
+      out.snr = middle_snr(frame, plan, out.noise, thumbnail_, snr_);
+      const bool kept =
+          has_level_ && (level_for(*out.snr * level_slack) == level_ || level_for(*out.snr / level_slack) == level_);
+      level = kept ? level_ : level_for(*out.snr);
+      level_ = level;
+      has_level_ = true;
+    }
+  }
+  if (level) level = std::min(*level, setup_.most);
+  decision_.level = level;
+  decision_.reducible = can;
+  level = std::min(level, wanted.most);  // none is below every level
+  out.level = level;
+  out.options.level = level.value_or(denoise::Level::draft);
+}
+
+void LivePlanner::set_temporal(const LiveFacts& facts, const RawFrame& frame, DevelopPlan& plan) {
+  std::optional<TemporalReduction>& temporal = plan.noise_reduction.temporal;
+  const bool can =
+      setup_.temporal && facts.denoise.temporal && plan.electrons_at_white && frame.raw.layout == SensorLayout::bayer;
+  if (!can) {
+    temporal.reset();
+    last_ = {};
+    first_ = true;  // what comes after begins anew
+    return;
+  }
+  temporal.emplace();
+  const double e_per_dn = (*plan.electrons_at_white)[0] / (white_at(frame.raw, 0) - plan.black.pedestal_dn[0]);
+  temporal->light = ratio(facts.exposure_s, last_.exposure_s);
+  if (decision_.noise == LiveSource::frame) {
+    // Electrons whose gain the frames tell are a unit that moves with its measurement.
+    temporal->light *= ratio(facts.iso, last_.iso) * ratio(e_per_dn, last_.e_per_dn);
+  }
+  temporal->restart = first_ || !facts.follows;
+  first_ = false;
+  last_ = {facts.exposure_s, facts.iso, e_per_dn};
+}
+
+Result<void> LivePlanner::plan(const LiveFacts& facts, FrameMeter& meter, RawFrame& frame, DevelopPlan& plan) {
+  decision_ = {};
+  plan.warnings.clear();
+  frame.raw.info.exposure_s = facts.exposure_s;
+  frame.raw.info.iso = facts.iso;
+  frame.raw.info.f_number = facts.f_number;
+  plan.options.look.scene_luminance_cd_m2 =
+      facts.scene_luminance_cd_m2 ? facts.scene_luminance_cd_m2 : setup_.look.scene_luminance_cd_m2;
+  if (Result<void> black = set_black(facts, meter, frame, plan); !black) return black;
+  set_noise(facts, meter, frame, plan);
+  if (needs_light(facts)) meter.thumbnail().make(frame, plan.black, thumbnail_);
+  if (Result<void> rendering = set_rendering(facts, frame, plan); !rendering) return rendering;
+  choose_level(facts.denoise, frame, plan);
+  set_temporal(facts, frame, plan);
+  plan.from_codes = frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.noise_reduction.reduces();
+  if (plan.from_codes || frame.raw.layout != SensorLayout::bayer) plan.electrons_at_white.reset();
+  return {};
+}
+
+}  // namespace lowlux::isp

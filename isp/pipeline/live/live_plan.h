@@ -1,0 +1,127 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "isp/base/frame.h"
+#include "isp/base/matrix3.h"
+#include "isp/base/packed/raw_format.h"
+#include "isp/base/result.h"
+#include "isp/pipeline/plan.h"
+#include "isp/raw/measure/frame_meter.h"
+#include "isp/raw/measure/thumbnail.h"
+
+namespace lowlux::isp {
+
+/// What holds for all frames of a stream.
+struct LiveSetup {
+  RawFormat format;
+  int width = 0;  // of whole frames
+  int height = 0;
+  Rect active;                 // the part that becomes the picture, from an even pixel on or not; at least 2 x 2
+  std::vector<Rect> masked;    // light-shielded pixels of the frame, if any
+  double white_dn = 0;         // saturation, 0.001 to 65535; 0: the format's largest code
+  CameraColour colour;         // without calibrations the camera's colours are taken for those of the output
+  std::vector<Pixel> defects;  // of the active area, ascending
+  ToneCurve tone = ToneCurve::standard;
+  SampleType samples = SampleType::u8;
+  LookChoice look;                                 // of the eye or the camera
+  bool levels = true;                              // frames may be denoised one by one ...
+  denoise::Level most = denoise::Level::standard;  // ... up to this level
+  bool temporal = false;                           // frames before take part
+};
+
+/// Noise reduction of one frame.
+struct LiveDenoise {
+  enum class Mode : std::uint8_t { off, automatic, level } mode = Mode::automatic;
+  denoise::Level level = denoise::Level::draft;  // for Mode::level; no higher than LiveSetup::most
+  bool temporal = true;                          // where the setup has it
+  /// No level beyond this one, however it was come by; none: no level at all.
+  std::optional<denoise::Level> most = denoise::Level::best;
+};
+
+/// Temporal noise in codes: a code v DN above black has the variance gain_dn v + black_variance_dn2 of its site.
+struct LiveNoise {
+  double gain_dn = 0;  // the system gain [DN/e-]
+  PerSite<double> black_variance_dn2{};
+};
+
+/// What is known of one frame. What is absent is measured on it or left out; of exposure time and ISO speed, so is what
+/// is not positive and finite.
+struct LiveFacts {
+  std::optional<PerSite<double>> black_dn;  // of the active area's sites, mean dark charge in it
+  std::optional<LiveNoise> noise;
+  std::optional<double> exposure_s;
+  std::optional<double> iso;
+  std::optional<double> f_number;
+  std::optional<double> scene_luminance_cd_m2;  // mean
+  std::optional<Vector3> neutral;               // camera RGB of white; any scale
+  std::optional<Matrix3> colour_matrix;         // white-balanced camera RGB to linear sRGB, in place of calibrations
+  std::optional<double> exposure_ev;            // absent: automatic
+  double saturation = 1;                        // of the picture's colours, 0..4
+  bool follows = true;                          // on the frame before; false forgets frames and noise before
+  LiveDenoise denoise;
+};
+
+/// Where a figure of a frame came from.
+enum class LiveSource : std::uint8_t { none, given, masked_pixels, frame };
+
+/// What was decided beyond the plan.
+struct LiveDecision {
+  LiveSource black = LiveSource::none;
+  LiveSource noise = LiveSource::none;
+  LiveSource white = LiveSource::none;
+  std::optional<NoiseLine> measured;    // the noise that the frame itself shows, where it was measured
+  std::optional<denoise::Level> level;  // that LiveDenoise::most may have lowered
+  bool reducible = false;               // a mosaic whose noise is known
+};
+
+/// Decides about one frame after the other, into the same plan. Allocates nothing after the first frame but to say what
+/// went wrong.
+class LivePlanner {
+ public:
+  explicit LivePlanner(const LiveSetup& setup) : setup_(setup) {}
+
+  /// @param frame  gets the noise, colour and exposure that the facts tell
+  /// Errors: black not below white, colours that lead to no picture (malformed), a look whose luminance is not known
+  /// (insufficient).
+  Result<void> plan(const LiveFacts& facts, FrameMeter& meter, RawFrame& frame, DevelopPlan& plan);
+  /// What has to be measured of the frame that comes, if these are its facts.
+  MeterWants wants(const LiveFacts& facts, bool statistics) const;
+  const LiveDecision& decision() const { return decision_; }
+  void reset();
+
+ private:
+  Result<void> set_black(const LiveFacts& facts, FrameMeter& meter, const RawFrame& frame, DevelopPlan& plan);
+  bool needs_light(const LiveFacts& facts) const;
+  void set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan);
+  WhiteBalance choose_white(const LiveFacts& facts, RawFrame& frame);
+  static Result<Matrix3> balanced_matrix(const LiveFacts& facts, const RawFrame& frame, const DevelopPlan& plan,
+                                         const WhiteBalance& balance);
+  Result<void> set_rendering(const LiveFacts& facts, RawFrame& frame, DevelopPlan& plan);
+  double smooth_exposure(double target_ev);
+  void choose_level(const LiveDenoise& wanted, const RawFrame& frame, DevelopPlan& plan);
+  void set_temporal(const LiveFacts& facts, const RawFrame& frame, DevelopPlan& plan);
+
+  const LiveSetup& setup_;
+  LiveDecision decision_;
+  Thumbnail thumbnail_;
+  std::vector<float> blocks_, memory_;
+  std::vector<double> snr_;
+  std::optional<double> exposure_ev_;  // of the frame before
+  std::optional<Vector3> neutral_;     // the same, where it was estimated
+  std::optional<NoiseLine> line_;      // of the frames before, where noise is not given
+  std::optional<denoise::Level> level_;
+  bool has_level_ = false;           // level_ was decided for a frame before
+  std::optional<double> noise_iso_;  // that line_ was measured at
+  /// Of the last frame that took part in a mean over frames.
+  struct Before {
+    std::optional<double> exposure_s, iso, e_per_dn;
+  } last_;
+  double tone_limit_ = 0;  // of the plan's tone table; 0: none yet
+  bool first_ = true;
+};
+
+}  // namespace lowlux::isp

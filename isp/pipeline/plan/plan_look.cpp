@@ -1,0 +1,257 @@
+#include "isp/pipeline/plan/plan_look.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "isp/model/appearance/appearance_model.h"
+#include "isp/model/appearance/entropy_model.h"
+#include "isp/model/sensor/scene_luminance.h"
+#include "isp/model/vision/night_eye.h"
+#include "isp/render/output_space.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double least_mean = 1e-6;   // of the white level: blacker frames are taken for this
+constexpr double most_cd_m2 = 1e9;    // the sun
+constexpr double least_cd_m2 = 1e-7;  // below a starless night
+constexpr double least_dark = 1e-5;   // of LookGrid, in the pixels' unit
+
+Result<void> check(const LookChoice& o, OutputSpace space) {
+  const auto wrong = [](const std::string& message) { return fail(ErrorCode::invalid_argument, message); };
+  if ((o.look != Look::camera || o.noise_limit) && (space == OutputSpace::camera || space == OutputSpace::xyz)) {
+    return wrong(
+        "looks other than the camera's and the limit of noise need a space with red, green and blue: srgb, p3, "
+        "rec2020, "
+        "linear-srgb or "
+        "linear-rec2020");
+  }
+  if (o.scene_luminance_cd_m2 && !(*o.scene_luminance_cd_m2 >= least_cd_m2 && *o.scene_luminance_cd_m2 <= most_cd_m2)) {
+    return wrong(fmt::format("a scene's luminance lies between {} and {} cd/m2, not at {}", least_cd_m2, most_cd_m2,
+                             *o.scene_luminance_cd_m2));
+  }
+  if (!(o.dimming >= 0 && o.dimming <= 1)) return wrong("the share of darkness that is kept lies between 0 and 1");
+  if (!(o.field_of_view_deg >= 0.1 && o.field_of_view_deg <= 180))
+    return wrong("a field of view has 0.1 to 180 degrees");
+  if (!(o.tolerance > 0 && o.tolerance <= 100)) return wrong("a tolerance lies above 0 and at most at 100");
+  if (o.noise_limit && !(*o.noise_limit > 0 && *o.noise_limit <= 100)) {
+    return wrong("the limit of noise is a CIE lightness above 0 and at most 100");
+  }
+  return {};
+}
+
+double mean_of(std::span<const float> values) {
+  double sum = 0;
+  for (const float v : values) sum += std::isfinite(v) ? v : 0;
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
+// Luminance of the white level [cd/m2]: from the exposure, or so that the mean is as given.
+Result<double> white_level_cd_m2(const RawFrame& frame, double mean, LookPlan& look, const LookChoice& choice) {
+  if (choice.scene_luminance_cd_m2) {
+    look.luminance_rule = "given";
+    look.mean_cd_m2 = *choice.scene_luminance_cd_m2;
+    return look.mean_cd_m2 / mean;
+  }
+  FrameInfo info = frame.raw.info;
+  const bool by_profile = !info.iso && choice.profile_iso;
+  if (by_profile) info.iso = choice.profile_iso;
+  const std::optional<double> saturation = saturation_luminance_cd_m2(info);
+  if (!saturation) {
+    return fail(ErrorCode::insufficient,
+                "the luminance of the scene is unknown: it takes exposure time, f-number and ISO to estimate it, and "
+                "the file lacks one; give its mean with --scene-luminance, in cd/m2");
+  }
+  look.luminance_rule = by_profile ? "profile" : "exposure";
+  look.mean_cd_m2 = mean * *saturation;
+  return *saturation;
+}
+
+// Weights of scotopic luminance relative to white, and the rods' tint, in the primaries of the pixels.
+void set_primaries(OutputSpace space, NightLook& look) {
+  const Matrix3 from_xyz = *xyz_to_output(space), to_xyz = *inverse(from_xyz);
+  const Vector3 luminance = *luminance_weights(space);
+  const Vector3 tint = from_xyz * (*rgb_to_xyz(primaries_rec709) * rod_tint);
+  double sum = 0;
+  Vector3 rods{};
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 3; ++i) rods[j] += scotopic_weights[i] * to_xyz[i][j];
+    sum += rods[j];
+  }
+  for (int j = 0; j < 3; ++j) {
+    look.luminance[j] = static_cast<float>(luminance[j]);
+    look.rods[j] = static_cast<float>(rods[j] / sum);
+    look.tint[j] = static_cast<float>(tint[j]);
+  }
+}
+
+double ratio_of_white(const std::optional<WhitePoint>& white) {
+  const std::optional<Xyz> colour = xyz_of(white ? white->xy : output_white);
+  return std::clamp(colour ? scotopic_luminance(*colour) : 0.0, 0.1, 60.0);
+}
+
+// The darkest and the brightest place an eye adapts to, by blocks of the frame [cd/m2].
+std::array<double, 2> range_of_fields(std::span<const float> blocks, double white_cd_m2, const LookPlan& look) {
+  float darkest = INFINITY, brightest = 0;
+  for (const float v : blocks) {
+    if (!std::isfinite(v)) continue;
+    darkest = std::min(darkest, std::max(v, 0.0f));
+    brightest = std::max(brightest, v);
+  }
+  const auto field = [&](double own_cd_m2) {
+    return (1 - adaptation_share_of_mean) * own_cd_m2 + adaptation_share_of_mean * look.mean_cd_m2;
+  };
+  return {field(std::isfinite(darkest) ? darkest * white_cd_m2 : 0), field(brightest * white_cd_m2)};
+}
+
+// The largest sizes anywhere in the frame: the tint of rods is strongest in between, not where it is darkest.
+std::array<LookEffect, 6> largest_effects(const std::array<double, 2>& fields_cd_m2, const NightLook& look) {
+  constexpr int steps = 12;
+  std::array<LookEffect, 6> out{};
+  const double least = std::max(fields_cd_m2[0], least_cd_m2), most = std::max(fields_cd_m2[1], least);
+  for (int i = 0; i <= steps; ++i) {
+    const double field = least * std::pow(most / least, static_cast<double>(i) / steps);
+    const auto here = predict_effects(night_eye({field, field * look.scotopic_ratio_of_white}),
+                                      look.scotopic_ratio_of_white, look.pixels_per_degree);
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      if (i == 0 || here[k].size > out[k].size) out[k] = here[k];
+    }
+  }
+  return out;
+}
+
+// The smallest first, as long as all that is left out together stays below the tolerance. What is a matter of taste has
+// no size, and is not called for.
+void leave_out(double tolerance, std::span<LookEffect> effects) {
+  std::array<LookEffect*, night_effect_names.size()> order{};
+  std::size_t count = 0;
+  for (LookEffect& effect : effects) {
+    effect.used = std::isfinite(effect.size);
+    if (effect.used) order[count++] = &effect;
+  }
+  const std::span sized(order.data(), count);
+  std::ranges::sort(sized, {}, [](const LookEffect* effect) { return effect->size; });
+  double together = 0;
+  for (LookEffect* const effect : sized) {
+    together += effect->size;
+    if (together > tolerance) break;
+    effect->used = false;
+  }
+}
+
+void decide_effects(const LookChoice& choice, const std::array<double, 2>& fields_cd_m2, bool monochrome,
+                    LookPlan& look) {
+  const auto predicted = largest_effects(fields_cd_m2, look.look);
+  look.effects.assign(predicted.begin(), predicted.end());
+  if (monochrome) {
+    for (int k = 0; k < 3; ++k) look.effects[static_cast<std::size_t>(k)].size = 0;  // those of colours
+  }
+  switch (choice.which) {
+    case LookChoice::Which::automatic:
+      leave_out(choice.tolerance, look.effects);
+      break;
+    case LookChoice::Which::all:
+      for (LookEffect& effect : look.effects) effect.used = true;
+      break;
+    case LookChoice::Which::listed: {
+      NightEffects listed = choice.listed;
+      for (LookEffect& effect : look.effects) effect.used = *effect_named(listed, effect.name);
+      break;
+    }
+  }
+  for (const LookEffect& effect : look.effects) *effect_named(look.look.effects, effect.name) = effect.used;
+}
+
+// The state of the eye, what it calls for, and how much darker the picture gets.
+void decide_eye(const FrameLight& light, double white_cd_m2, DevelopPlan& plan, LookPlan& look) {
+  const LookChoice& choice = plan.options.look;
+  const double ratio = look.look.scotopic_ratio_of_white;
+  look.state = mesopic_state({look.mean_cd_m2, look.mean_cd_m2 * ratio});
+  look.white_cd_m2 = look.mean_cd_m2 / scene_mean_of_white;
+  if (choice.look == Look::eye) {
+    decide_effects(choice, range_of_fields(light.block_luminance, white_cd_m2, look), !plan.white, look);
+  }
+  if (plan.options.exposure_ev) return;
+  look.dimming_ev = choice.dimming * apparent_dimming_ev(look.state.luminance_cd_m2);
+  plan.exposure_ev += look.dimming_ev;
+}
+
+// Covariance of what cones see of the noise of a pixel of mid-grey, up to a factor.
+Matrix3 noise_of_cones(const NoiseProfile& noise, const DevelopPlan& plan, const Matrix3& rgb_to_xyz) {
+  ChannelNoise channels;
+  Matrix3 balanced_to_rgb{};
+  for (int c = 0; c < 3; ++c) {
+    const double gain = plan.white_gain[c];
+    channels.variance_e2[c] =
+        noise.scale[c] * scene_mean_of_white / std::exp2(plan.exposure_ev) / gain + noise.offset[c];
+    channels.rgb_per_e[c] = gain;
+    for (int j = 0; j < 3; ++j) balanced_to_rgb[j][c] = plan.transform.matrix[3 * j + c];
+  }
+  channels.camera_to_xyz = rgb_to_xyz * balanced_to_rgb;
+  return noise_covariance_of_cones(channels);
+}
+
+}  // namespace
+
+Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPlan& plan) {
+  const LookChoice& choice = plan.options.look;
+  if (auto checked = check(choice, plan.options.space); !checked) return checked;
+  if (choice.look == Look::camera && !choice.noise_limit) return {};
+  LookPlan& look = plan.look ? *plan.look : plan.look.emplace();
+  look.kind = choice.look;
+  look.noise_limit = choice.noise_limit;
+  look.noise = frame.noise;
+  NightLook& eye = look.look;
+  eye.effects = {false, false, false, false, false, false};
+  eye.scotopic_ratio_of_white = ratio_of_white(plan.white);
+  eye.pixels_per_degree = std::max(plan.width, plan.height) / choice.field_of_view_deg;
+  double white_cd_m2 = 100;
+  if (choice.look != Look::camera) {
+    const Result<double> found =
+        white_level_cd_m2(frame, std::max(mean_of(light.block_luminance), least_mean), look, choice);
+    if (!found) return tl::make_unexpected(found.error());
+    white_cd_m2 = *found;
+    decide_eye(light, white_cd_m2, plan, look);
+  }
+  const double units = std::exp2(plan.exposure_ev) / tone_limit(plan.options.tone, plan.exposure_ev);
+  eye.cd_m2_per_unit = white_cd_m2 / units;
+  eye.dark = static_cast<float>(std::clamp(light.black_noise_std * units, least_dark, 1.0));
+  set_primaries(plan.options.space, eye);
+  return {};
+}
+
+Result<void> plan_model(DevelopPlan& plan) {
+  if (!plan.look || plan.look->kind != Look::model) return {};
+  LookPlan& look = *plan.look;
+  const Result<AppearanceModel> model = appearance_model_named(plan.options.look.model);
+  if (!model) return tl::make_unexpected(model.error());
+  const Matrix3 rgb_to_xyz = *inverse(*xyz_to_output(plan.options.space));
+  ViewingConditions scene{.white_cd_m2 = look.white_cd_m2};
+  scene.adaptation_cd_m2 = look.mean_cd_m2;
+  scene.shin = plan.options.look.shin.get();
+  scene.scotopic_ratio = look.look.scotopic_ratio_of_white;
+  if (plan.white) scene.colour_temperature_k = plan.white->cct_k;
+  if (look.noise && plan.white) scene.noise_covariance = noise_of_cones(*look.noise, plan, rgb_to_xyz);
+  const Result<ColourMap> map = model->at(scene);
+  if (!map) return tl::make_unexpected(map.error());
+  const double limit = std::clamp(look.look.cd_m2_per_unit / look.white_cd_m2, 1e-6, 1e6);
+  Result<ColourTable> table = make_colour_table(*map, {.rgb_to_xyz = rgb_to_xyz, .limit = limit});
+  if (!table) return tl::make_unexpected(table.error());
+  look.table = *std::move(table);
+  if (!(look.white_cd_m2 >= model->valid_from_cd_m2 && look.white_cd_m2 <= model->valid_to_cd_m2)) {
+    plan.warnings.push_back(
+        fmt::format("the model {} is known for whites of {:g} to {:g} cd/m2; this scene's has {:.3g}", model->name,
+                    model->valid_from_cd_m2, model->valid_to_cd_m2, look.white_cd_m2));
+  }
+  if (!look.table->within_bound) {
+    plan.warnings.push_back(fmt::format("the table of the model {} is off by up to {:.2g} CIEDE2000", model->name,
+                                        look.table->error.largest));
+  }
+  return {};
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,206 @@
+#include "isp/pipeline/plan/plan_noise.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "denoise/check/noise_check.h"
+#include "isp/pipeline/budget/frame_sample.h"
+#include "isp/pipeline/render/cell_figures.h"
+#include "isp/pipeline/render/electron_mosaic.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double saturated_share_of_white = 0.99;  // a little below, because pixels do not all saturate at one code
+
+int colour_of(const RawDn& raw, int site) { return static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)); }
+
+/// Of a raw value without light, by the noise model or, if that is more, as the black point's pixels had it; at least
+/// that of rounding to codes.
+std::array<double, 3> black_variance_e2(const RawFrame& frame, const DevelopPlan& plan) {
+  std::array<double, 3> out{};
+  for (int site = 0; site < 4; ++site) {
+    const int colour = colour_of(frame.raw, site);
+    const double electrons = (*plan.electrons_at_white)[site];
+    const double e_per_dn = electrons / (white_at(frame.raw, site) - plan.black.pedestal_dn[site]);
+    double variance = std::max(frame.noise->offset[colour] * electrons * electrons, e_per_dn * e_per_dn / 12);
+    // What was measured in the dark holds the noise of the dark charge, of which a noise profile may know nothing.
+    variance = std::max(variance, std::pow(plan.black.noise_std_dn[site] * e_per_dn, 2));
+    if (plan.options.dark_frame) variance += plan.options.dark_frame->added_variance_dn2[site] * e_per_dn * e_per_dn;
+    out[colour] += variance * (colour == 1 ? 0.5 : 1);
+  }
+  return out;
+}
+
+denoise::RawNoise noise_of(const RawFrame& frame, const DevelopPlan& plan) {
+  denoise::RawNoise out;
+  out.dark_mean_e = plan.black.dark_mean_e;
+  out.variance_e2 = black_variance_e2(frame, plan);
+  // White levels of a thousandth of a code make more.
+  for (double& variance : out.variance_e2) variance = std::min(variance, denoise::largest_e);
+  for (int site = 0; site < 4; ++site) {
+    double& saturation_e = out.saturation_e[colour_of(frame.raw, site)];
+    saturation_e = std::min(saturation_e, saturated_share_of_white * (*plan.electrons_at_white)[site]);
+  }
+  return out;
+}
+
+/// Gains that make a neutral equal in R, G and B [e-], G's 1.
+std::array<double, 3> balance_of(const RawFrame& frame, const DevelopPlan& plan) {
+  std::array<double, 3> gain{plan.white_gain[0], plan.white_gain[1], plan.white_gain[2]};
+  if (plan.options.space == OutputSpace::camera && frame.colour.as_shot_neutral) {
+    for (int c = 0; c < 3; ++c) gain[c] = 1 / (*frame.colour.as_shot_neutral)[c];
+  }
+  for (int site = 0; site < 4; ++site) {
+    const int colour = colour_of(frame.raw, site);
+    gain[colour] /= std::pow((*plan.electrons_at_white)[site], colour == 1 ? 0.5 : 1.0);
+  }
+  const double green = gain[1];
+  for (double& g : gain) g = std::clamp(g / green, 1e-3, 1e3);
+  return gain;
+}
+
+/// Of a pixel without light.
+double black_std_e(const denoise::RawNoise& noise) {
+  const auto& v = noise.variance_e2;
+  return std::sqrt(noise.dark_mean_e[0] + (v[0] + 2 * v[1] + v[2]) / 4);
+}
+
+/// What is seen of lines: the eye follows their sum.
+double least_line_std_e(const denoise::RawNoise& noise) { return 0.03 * black_std_e(noise); }
+
+std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, PlaneView<const float> charge_e,
+                                           Executor& executor) {
+  const denoise::FrameLineOptions options{.least_std_e = least_line_std_e(plan.noise)};
+  std::array<std::optional<denoise::LineOffsets>, 2> of_kind;
+  for_each_index(executor, 2, [&](int kind) {
+    auto found = denoise::line_offsets_of_frame(charge_e, static_cast<denoise::Lines>(kind), options);
+    if (found) of_kind[static_cast<std::size_t>(kind)] = *std::move(found);
+  });
+  std::vector<denoise::LineOffsets> lines;
+  for (auto& found : of_kind) {
+    if (found && lines_stand_out(*found, plan.noise)) lines.push_back(*std::move(found));
+  }
+  return lines;
+}
+
+/// What lines took part in the noise of a pixel goes with them.
+void take_lines_off(RawElectrons& charge, NoiseReduction& out, Executor& executor) {
+  out.lines = lines_of(out, charge.value.view(), executor);
+  for (const denoise::LineOffsets& lines : out.lines) {
+    subtract_lines(lines, charge.value.view());
+    const double gone_e2 = lines.line_std_e * lines.line_std_e - lines.residual_std_e * lines.residual_std_e;
+    for (double& variance : out.noise.variance_e2) variance = std::max(variance - gone_e2, 0.25 * variance);
+  }
+}
+
+NoiseReduction left_alone(std::string reason) {
+  NoiseReduction out;
+  out.reason = std::move(reason);
+  return out;
+}
+
+void choose_level(const DenoiseChoice& choice, const std::optional<EffectsPlan>& effects, NoiseReduction& out) {
+  if (choice.mode == DenoiseChoice::Mode::level) {
+    out.level = choice.level;
+    out.reason = "given";
+    return;
+  }
+  if (effects && effects->level_decided) {
+    out.level = effects->level;
+    out.regions = effects->regions;
+    out.reason = fmt::format("what the frame calls for, at a signal to noise ratio of {:.3g}", *out.snr);
+    return;
+  }
+  out.level = level_for(*out.snr);
+  if (!out.level && choice.always) out.level = denoise::Level::draft;
+  out.reason = fmt::format("signal to noise ratio {:.3g} of a pixel in the middle block", *out.snr);
+}
+
+/// Lines need the whole frame; what noise is left is checked on a sample of it where there is one.
+RawElectrons charge_to_check(const RawFrame& frame, const DevelopPlan& plan, bool with_lines, NoiseReduction& out,
+                             Executor& executor) {
+  const std::vector<Rect> squares = sample_squares(frame, plan);
+  if (!with_lines && !squares.empty()) return sample_electrons(frame, plan, squares, executor);
+  RawElectrons charge = raw_electrons(frame, plan, {}, executor);
+  if (with_lines) take_lines_off(charge, out, executor);
+  return squares.empty() ? std::move(charge) : sample_of(charge, squares);
+}
+
+}  // namespace
+
+std::optional<Error> noise_obstacle(const RawFrame& frame, const DevelopPlan& plan) {
+  if (frame.raw.layout != SensorLayout::bayer) {
+    return Error{ErrorCode::unsupported, "noise is reduced on Bayer mosaics, and this is none"};
+  }
+  if (frame.raw.active.width < 2 || frame.raw.active.height < 2) {
+    return Error{ErrorCode::invalid_argument, "the picture is too small to tell noise from detail"};
+  }
+  if (!plan.electrons_at_white) {
+    return Error{ErrorCode::insufficient,
+                 "the noise is unknown: the file has no usable NoiseProfile; give a profile (--profile, see calibrate "
+                 "and calib/profiles)"};
+  }
+  return std::nullopt;
+}
+
+bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise) {
+  return found.gain >= 0.5 && found.line_std_e > least_line_std_e(noise) && found.line_std_e < black_std_e(noise);
+}
+
+std::optional<denoise::Level> level_for(double snr) {
+  if (snr >= 60) return std::nullopt;
+  if (snr >= 20) return denoise::Level::draft;
+  return snr >= 3 ? denoise::Level::standard : denoise::Level::high;
+}
+
+void set_noise_model(const RawFrame& frame, const DevelopPlan& plan, NoiseReduction& out) {
+  out.source = frame.noise->source;
+  out.noise = noise_of(frame, plan);
+  out.options.white_gain = balance_of(frame, plan);
+}
+
+double middle_snr(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
+                  const Thumbnail& thumbnail, std::vector<double>& snr) {
+  const std::array<double, 3> electrons = electrons_by_colour(frame.raw, plan);
+  const double dark = mean_of_sites(noise.dark_mean_e), variance = mean_of_colours(noise.variance_e2);
+  snr.resize(thumbnail.mean.plane[0].size());
+  for (std::size_t i = 0; i < snr.size(); ++i) {
+    double charge = 0;
+    for (int c = 0; c < 3; ++c) charge += share_of_sites[c] * electrons[c] * thumbnail.mean.plane[c].data()[i];
+    snr[i] = std::max(charge - dark, 0.0) / std::sqrt(std::max(charge, 0.0) + variance);
+  }
+  const auto middle = snr.begin() + static_cast<std::ptrdiff_t>(snr.size() / 2);
+  std::nth_element(snr.begin(), middle, snr.end());
+  return *middle;
+}
+
+Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan,
+                                  Executor& executor) {
+  const DenoiseChoice& choice = plan.options.denoise;
+  if (choice.mode == DenoiseChoice::Mode::off) return left_alone("not asked for");
+  if (auto error = noise_obstacle(frame, plan)) {
+    if (choice.mode == DenoiseChoice::Mode::level) return tl::make_unexpected(*std::move(error));
+    return left_alone(std::move(error->message));
+  }
+  NoiseReduction out;
+  set_noise_model(frame, plan, out);
+  std::vector<double> memory;
+  out.snr = middle_snr(frame, plan, out.noise, thumbnail, memory);
+  choose_level(choice, plan.effects, out);
+  if (!out.level) return out;
+  out.options.level = *out.level;
+  const bool with_lines = choice.line_noise && (!plan.effects || plan.effects->lines);
+  const RawElectrons charge = charge_to_check(frame, plan, with_lines, out, executor);
+  const denoise::NoiseCheck check = denoise::check_noise({charge.value.view(), charge.phase}, out.noise, executor);
+  for (const denoise::NoiseRemark& remark : denoise::remarks_on(check)) plan.warnings.push_back(remark.text);
+  out.options.variance_scale = denoise::variance_scale_of(check);
+  return out;
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,78 @@
+#include "isp/pipeline/render/look_noise.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "isp/base/look_grid.h"
+#include "isp/pipeline/render/cell_figures.h"
+
+namespace lowlux::isp {
+namespace {
+
+// Luminance of a unit of white-balanced camera RGB.
+std::array<float, 3> weights_of(const DevelopPlan& plan) {
+  std::array<float, 3> weights{};
+  for (int c = 0; c < 3; ++c) {
+    for (int j = 0; j < 3; ++j) weights[c] += plan.transform.luminance[j] * plan.transform.matrix[3 * j + c];
+  }
+  return weights;
+}
+
+// Luma that is left noisy, over the cells of 2 x 2 that lie in those of the grid.
+void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const float>& residual, PlaneView<float> out,
+             Executor& executor) {
+  const std::array<float, 3> weights = weights_of(plan);
+  const auto electrons = static_cast<float>(mean_of_sites(*plan.electrons_at_white));
+  const float unit = (weights[0] + weights[1] + weights[2]) / electrons;
+  const int cells = plan.options.half ? 4 : 2;  // of the map along a side of the grid's
+  for_each_band(executor, out.height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      for (int x = 0; x < out.width; ++x) {
+        float sum = 0;
+        for (int k = 0; k < cells * cells; ++k) {
+          sum += residual.at(std::min(crop.x / 2 + cells * x + k % cells, residual.width - 1),
+                             std::min(crop.y / 2 + cells * y + k / cells, residual.height - 1));
+        }
+        out.row(y)[x] = unit * unit * sum / static_cast<float>(cells * cells);
+      }
+    }
+  });
+}
+
+// The raw's variance at the fraction x of white, scale x + offset, of each channel, as if each pixel had its own three,
+// but for monochrome frames.
+void of_model(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
+  const std::array<float, 3> weights = weights_of(plan);
+  const NoiseProfile& noise = *plan.look->noise;
+  const bool monochrome = !plan.white;  // one plane serves for all three
+  for_each_band(executor, out.height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      for (int x = 0; x < out.width; ++x) {
+        float sum = 0, weight = 0;
+        for (int c = 0; c < 3; ++c) {
+          const float gain = plan.white_gain[c];
+          const float fraction = std::max(quarter[c].row(y)[x], 0.0f) / gain;
+          const float variance = static_cast<float>(noise.scale[c]) * fraction + static_cast<float>(noise.offset[c]);
+          sum += weights[c] * weights[c] * gain * gain * variance;
+          weight += weights[c] * gain;
+          if (monochrome) sum = weight * weight * variance;
+        }
+        out.row(y)[x] = sum;
+      }
+    }
+  });
+}
+
+}  // namespace
+
+void noise_of_luminance(const DevelopPlan& plan, const Rect& crop, const NoiseMaps& maps,
+                        const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
+  if (plan.noise_reduction.has_level()) {
+    of_maps(plan, crop, maps.residual_variance_e2.view(), out, executor);
+  } else {
+    of_model(plan, quarter, out, executor);
+  }
+}
+
+}  // namespace lowlux::isp

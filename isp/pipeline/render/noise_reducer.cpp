@@ -1,0 +1,256 @@
+#include "isp/pipeline/render/noise_reducer.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <cstring>
+#include <utility>
+
+#include "isp/pipeline/render/frame_tiles.h"
+
+namespace lowlux::isp {
+namespace {
+
+denoise::DenoiseMaps views_of(NoiseMaps& maps) {
+  return {.residual_variance = maps.residual_variance_e2.view(),
+          .chroma_confidence = maps.chroma_confidence.view(),
+          .site_variance = {maps.site_variance_e2[0].view(), maps.site_variance_e2[1].view(),
+                            maps.site_variance_e2[2].view()}};
+}
+
+/// Memory for the maps of a mosaic.
+void fit(NoiseMaps& maps, int width, int height) {
+  const int columns = (width + 1) / 2, rows = (height + 1) / 2;
+  fit(maps.residual_variance_e2, columns, rows);
+  fit(maps.chroma_confidence, columns, rows);
+  for (Plane<float>& plane : maps.site_variance_e2) fit(plane, columns, rows);
+}
+
+/// Of the cells of a part; none where there are no maps.
+denoise::DenoiseMaps crop_of(const denoise::DenoiseMaps& maps, const Rect& sites) {
+  if (maps.residual_variance.data == nullptr) return {};
+  const auto cells = [&](const PlaneView<float>& map) {
+    return map.crop(sites.x / 2, sites.y / 2, (sites.width + 1) / 2, (sites.height + 1) / 2);
+  };
+  return {.residual_variance = cells(maps.residual_variance),
+          .chroma_confidence = cells(maps.chroma_confidence),
+          .site_variance = {cells(maps.site_variance[0]), cells(maps.site_variance[1]), cells(maps.site_variance[2])}};
+}
+
+void copy(const PlaneView<float>& from, const PlaneView<float>& to) {
+  for (int y = 0; y < to.height; ++y)
+    std::memcpy(to.row(y), from.row(y), static_cast<std::size_t>(to.width) * sizeof(float));
+}
+
+void copy(const denoise::DenoiseMaps& from, const denoise::DenoiseMaps& to) {
+  if (to.residual_variance.data == nullptr) return;
+  copy(from.residual_variance, to.residual_variance);
+  copy(from.chroma_confidence, to.chroma_confidence);
+  for (std::size_t c = 0; c < 3; ++c) copy(from.site_variance[c], to.site_variance[c]);
+}
+
+template <class T>
+PlaneView<T> crop_of(const PlaneView<T>& view, const Rect& part) {
+  return view.crop(part.x, part.y, part.width, part.height);
+}
+
+/// As seen from the corner of a piece.
+Rect seen_from(const Rect& piece, const Rect& part) {
+  return {part.x - piece.x, part.y - piece.y, part.width, part.height};
+}
+
+/// A core may begin one pixel behind an even column or row; what is before belongs to the margin then.
+Rect from_even_site(const Rect& core) {
+  return {core.x & ~1, core.y & ~1, core.width + (core.x & 1), core.height + (core.y & 1)};
+}
+
+void take_lines_off(const NoiseReduction& how, const Rect& piece, PlaneView<float> raw_e) {
+  for (const denoise::LineOffsets& lines : how.lines) {
+    subtract_lines(lines, raw_e, lines.lines == denoise::Lines::rows ? piece.y : piece.x);
+  }
+}
+
+/// What a part is reduced in.
+Rect with_own_margin(const LevelPart& part, const NoiseReducer::Piece& piece) {
+  return overlap(with_margin(part.core, {}, piece.frame_width, piece.frame_height), piece.whole);
+}
+
+/// Sides of the largest of the parts that have a level, each way; 0 where none has.
+struct PartSize {
+  int width = 0;
+  int height = 0;
+};
+
+PartSize largest(const std::vector<LevelPart>& parts, const NoiseReducer::Piece& piece) {
+  PartSize out;
+  for (const LevelPart& part : parts) {
+    if (!part.level) continue;
+    const Rect whole = with_own_margin(part, piece);
+    out = {std::max(out.width, whole.width), std::max(out.height, whole.height)};
+  }
+  return out;
+}
+
+/// One column parity of one row of mosaics: what a mean over frames and a level's result make together.
+struct BlendSites {
+  const float* mean_e;    // dark charge in; every second sample
+  const float* share;     // one for each cell
+  const float* level_e2;  // variance of the level's result, one for each cell
+  float dark_e;
+  float variance_e2;
+};
+
+void blend_sites(const BlendSites& in, int sites, float* signal_e) {
+  for (int i = 0; i < sites; ++i) {
+    const float mean_e = in.mean_e[2 * i];
+    // The charge by the level's result: by the noisy mean itself, low values would count more than high ones.
+    const float charge_e = std::max(signal_e[2 * i] + in.dark_e, 0.0f);
+    const float time_e2 = in.share[i] * (charge_e + in.variance_e2);
+    const float level_e2 = NoiseReducer::doubt_of(in.share[i]) * in.level_e2[i];
+    const float way = level_e2 / (level_e2 + time_e2);
+    signal_e[2 * i] += way * (mean_e - in.dark_e - signal_e[2 * i]);
+  }
+}
+
+}  // namespace
+
+void NoiseReducer::reserve_level(int width, int height, denoise::Level most) {
+  if (denoiser_ && width <= width_ && height <= height_ && most <= most_) return;
+  width_ = std::max(width, width_);
+  height_ = std::max(height, height_);
+  most_ = std::max(most, most_);
+  denoiser_.reset();  // before the next one takes its memory
+  denoiser_ = std::make_unique<denoise::Denoiser>(width_, height_, executor_.width(), most_);
+}
+
+void NoiseReducer::reserve_time(int width, int height) {
+  if (!temporal_ || width != temporal_width_ || height != temporal_height_) {
+    temporal_.reset();
+    temporal_ = std::make_unique<denoise::TemporalMean>(width, height, executor_.width());
+    temporal_width_ = width;
+    temporal_height_ = height;
+  }
+  fit(mean_e_, width, height);
+  fit(variance_share_, (width + 1) / 2, (height + 1) / 2);
+}
+
+std::size_t NoiseReducer::maps_bytes(int width, int height) {
+  return 5 * sizeof(float) * static_cast<std::size_t>((width + 1) / 2) * static_cast<std::size_t>((height + 1) / 2);
+}
+
+std::size_t NoiseReducer::bytes(int width, int height, const NoiseReduction& how, bool maps, int threads) {
+  if (!how.has_level()) return 0;
+  const Piece frame{{0, 0, width, height}, {0, 0, width, height}, width, height};
+  std::vector<LevelPart> parts;
+  cut_by_level(how, frame.core, TileLimits{}.side_px, parts);
+  const PartSize most = largest(parts, frame);
+  const std::size_t denoiser = denoise::Denoiser::bytes(most.width, most.height, threads, most_of(how));
+  if (parts.size() == 1) return denoiser;
+  return denoiser + sizeof(float) * static_cast<std::size_t>(most.width) * static_cast<std::size_t>(most.height) +
+         (maps ? maps_bytes(most.width, most.height) : 0);
+}
+
+void NoiseReducer::reserve_pieces(int width, int height, const NoiseReduction& how) {
+  if (how.has_level()) reserve_level(width, height, most_of(how));
+}
+
+void NoiseReducer::reduce_part(const LevelPart& part, const Piece& piece, const NoiseReduction& how,
+                               PlaneView<const float> raw_e, PlaneView<float> signal_e,
+                               const denoise::DenoiseMaps& maps) {
+  const Rect core = seen_from(piece.whole, part.core), whole = with_own_margin(part, piece);
+  if (!part.level) {
+    const Rect even = from_even_site(core);
+    take_dark_off(crop_of(raw_e, even), how.noise, crop_of(signal_e, even), executor_);
+    const denoise::DenoiseMaps of_core = crop_of(maps, core);
+    if (of_core.residual_variance.data == nullptr) return;
+    return set_own_noise({crop_of(raw_e, core), piece.phase}, how, of_core);
+  }
+  denoise::DenoiseOptions options = how.options;
+  options.level = *part.level;
+  denoise::DenoiseMaps of_part;
+  if (maps.residual_variance.data != nullptr) {
+    of_part = crop_of(views_of(part_maps_), {0, 0, whole.width, whole.height});
+  }
+  const PlaneView<float> out = part_e_.view().crop(0, 0, whole.width, whole.height);
+  denoiser_->run({crop_of(raw_e, seen_from(piece.whole, whole)), piece.phase}, how.noise, options, out, of_part,
+                 executor_);
+  const Rect place = seen_from(whole, part.core);
+  copy(crop_of(out, place), crop_of(signal_e, core));
+  copy(crop_of(of_part, place), crop_of(maps, core));
+}
+
+void NoiseReducer::reduce_by_level(const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e,
+                                   PlaneView<float> signal_e, const denoise::DenoiseMaps& maps) {
+  cut_by_level(how, piece.core, TileLimits{}.side_px, parts_);
+  if (parts_.size() == 1 && parts_.front().level) {
+    reserve_level(piece.whole.width, piece.whole.height, *parts_.front().level);
+    denoise::DenoiseOptions options = how.options;
+    options.level = *parts_.front().level;
+    return denoiser_->run({raw_e, piece.phase}, how.noise, options, signal_e, maps, executor_);
+  }
+  if (const auto [width, height] = largest(parts_, piece); width > 0) {
+    reserve_level(width, height, most_of(how));
+    if (width > part_e_.width() || height > part_e_.height()) {
+      part_e_ = Plane<float>(std::max(width, part_e_.width()), std::max(height, part_e_.height()));
+    }
+    if (maps.residual_variance.data != nullptr) fit(part_maps_, part_e_.width(), part_e_.height());
+  }
+  for (const LevelPart& part : parts_) reduce_part(part, piece, how, raw_e, signal_e, maps);
+}
+
+void NoiseReducer::reduce_by_time(const RawElectrons& raw, const NoiseReduction& how) {
+  if (how.temporal->restart) temporal_->reset();
+  moved_ = temporal_->run({raw.value.view(), raw.phase}, how.noise, how.temporal->light, how.temporal->options,
+                          mean_e_.view(), variance_share_.view(), executor_);
+}
+
+void NoiseReducer::blend(const RawElectrons& raw, const NoiseReduction& how, const NoiseMaps& maps,
+                         PlaneView<float> signal_e) {
+  for_each_band(executor_, signal_e.height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      for (int column = 0; column < std::min(2, signal_e.width); ++column) {
+        const auto colour = static_cast<std::size_t>(colour_at(raw.phase, column, y));
+        const BlendSites sites{mean_e_.row(y) + column, variance_share_.row(y / 2),
+                               maps.site_variance_e2[colour].row(y / 2),
+                               static_cast<float>(how.noise.dark_mean_e[site_of(column, y)]),
+                               static_cast<float>(how.noise.variance_e2[colour])};
+        blend_sites(sites, (signal_e.width + 1 - column) / 2, signal_e.row(y) + column);
+      }
+    }
+  });
+}
+
+void NoiseReducer::run_piece(const Piece& piece, const NoiseReduction& how, PlaneView<float> raw_e,
+                             PlaneView<float> signal_e) {
+  assert(how.reduces() && !how.temporal);
+  moved_ = 0;
+  take_lines_off(how, piece.whole, raw_e);
+  reduce_by_level(piece, how, raw_e, signal_e, {});
+}
+
+SignalElectrons NoiseReducer::run(RawElectrons& raw, const NoiseReduction& how, Plane<float> memory, NoiseMaps* maps) {
+  const int width = raw.value.width(), height = raw.value.height();
+  const Rect whole{0, 0, width, height};
+  fit(memory, width, height);
+  take_lines_off(how, whole, raw.value.view());
+  moved_ = 0;
+  if (how.temporal) {
+    reserve_time(width, height);
+    reduce_by_time(raw, how);
+  }
+  if (!how.has_level()) {
+    take_dark_off(std::as_const(mean_e_).view(), how.noise, memory.view(), executor_);
+    return {std::move(memory), raw.phase};
+  }
+  NoiseMaps* const level_maps = maps != nullptr || !how.temporal ? maps : &level_maps_;
+  denoise::DenoiseMaps views;
+  if (level_maps != nullptr) {
+    fit(*level_maps, width, height);
+    views = views_of(*level_maps);
+  }
+  reduce_by_level({whole, whole, width, height, raw.phase}, how, std::as_const(raw.value).view(), memory.view(), views);
+  if (how.temporal) blend(raw, how, *level_maps, memory.view());
+  return {std::move(memory), raw.phase};
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "denoise/denoiser.h"
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/pipeline/noise_reduction.h"
+#include "isp/pipeline/render/level_parts.h"
+
+namespace lowlux::isp {
+
+/// Takes lines, noise and dark charge off a mosaic as decided. Owns the denoisers and their memory (see Denoiser and
+/// TemporalMean), which the first frame of a size allocates.
+///
+/// Where a level and frames before both take part, each site is the mean of both results, weighted by the inverse of
+/// their predicted variances: what moves is left to the level, what stands still to the frames before. That of the
+/// level counts doubt_of() times, because what it takes from detail is not in it.
+class NoiseReducer {
+ public:
+  explicit NoiseReducer(Executor& executor) : executor_(executor) {}
+
+  /// Where regions differ, each is reduced with a margin of tile_margin_px of its own, and the rest as it is.
+  /// @param raw   as the frame the decision was made for; its lines are taken off in place
+  /// @param maps  filled if not null
+  /// Precondition: how.reduces().
+  SignalElectrons run(RawElectrons& raw, const NoiseReduction& how, Plane<float> memory, NoiseMaps* maps);
+
+  /// A piece of a frame, in pixels of its active area. The corner of `whole` is on the lattice of frame_tiles.h.
+  struct Piece {
+    Rect core;   // what is asked for
+    Rect whole;  // what is known, the margin with it
+    int frame_width = 0;
+    int frame_height = 0;
+    BayerPhase phase = BayerPhase::rggb;  // of the frame
+  };
+  /// The same for a piece of a frame.
+  /// @param raw_e     `whole`; its lines are taken off in place
+  /// @param signal_e  as large; the core is set
+  /// Precondition: how.reduces(), without frames before.
+  void run_piece(const Piece& piece, const NoiseReduction& how, PlaneView<float> raw_e, PlaneView<float> signal_e);
+  /// Bytes for a frame of width x height pixels, without frames before.
+  /// @param maps  whether they are asked for; their own memory is not in it
+  static std::size_t bytes(int width, int height, const NoiseReduction& how, bool maps, int threads);
+  /// Of NoiseMaps.
+  static std::size_t maps_bytes(int width, int height);
+  /// Memory for pieces of up to width x height pixels, so that later ones need none.
+  void reserve_pieces(int width, int height, const NoiseReduction& how);
+
+  /// 1 where only this frame is known, 4 where many before it are: noise of one frame that comes back is seen, and a
+  /// mean of few frames may be of something that moved too little to be found. Chosen on the pictures of
+  /// tests/scenarios/temporal_blend_test.cpp, which prints what others give.
+  /// @param share  variance of the mean over frames, of a raw value's, 0..1
+  static constexpr float doubt_of(float share) { return 1 + 3 * (1 - share) * (1 - share); }
+
+  /// Share of the blocks that moved in the last frame; 0 where frames before took no part.
+  double moved() const { return moved_; }
+
+ private:
+  void reserve_level(int width, int height, denoise::Level most);
+  void reserve_time(int width, int height);
+  void reduce_by_level(const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e,
+                       PlaneView<float> signal_e, const denoise::DenoiseMaps& maps);
+  void reduce_part(const LevelPart& part, const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e,
+                   PlaneView<float> signal_e, const denoise::DenoiseMaps& maps);
+  void reduce_by_time(const RawElectrons& raw, const NoiseReduction& how);
+  void blend(const RawElectrons& raw, const NoiseReduction& how, const NoiseMaps& maps, PlaneView<float> signal_e);
+
+  Executor& executor_;
+  std::unique_ptr<denoise::Denoiser> denoiser_;
+  int width_ = 0;
+  int height_ = 0;
+  std::unique_ptr<denoise::TemporalMean> temporal_;
+  int temporal_width_ = 0;
+  int temporal_height_ = 0;
+  Plane<float> mean_e_;          // over frames, dark charge in
+  Plane<float> variance_share_;  // of a raw value's, one for each 2x2 cell
+  NoiseMaps level_maps_;
+  double moved_ = 0;
+  denoise::Level most_ = denoise::Level::high;  // that there is memory for
+  std::vector<LevelPart> parts_;
+  Plane<float> part_e_;  // of a region and its margin
+  NoiseMaps part_maps_;
+};
+
+}  // namespace lowlux::isp

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <variant>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/image.h"
+#include "isp/pipeline/plan.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
+
+namespace lowlux::isp {
+
+/// A picture of somebody's, or a part of it: codes are height x 3 width.
+using PictureView = std::variant<PlaneView<std::uint8_t>, PlaneView<std::uint16_t>, RgbView<float>>;
+
+/// An uninitialised picture.
+Picture make_picture(SampleType samples, int width, int height);
+
+PictureView view_of(Picture& picture);
+
+/// @param pixels  inside of the picture
+PictureView crop_of(const PictureView& picture, const Rect& pixels);
+
+/// Both of one size and sample type.
+void copy_pixels(const PictureView& from, const PictureView& to);
+
+/// What the kernel makes of `in`, as the plan says: codes, those of the plan's display, or floats.
+void encode(RawToRgb& kernel, const RgbInput& in, const RgbTransform& transform, const DevelopPlan& plan,
+            const PictureView& out, Executor& executor);
+
+}  // namespace lowlux::isp

@@ -1,0 +1,203 @@
+#include "isp/pipeline/render/pipeline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "isp/pipeline/render/electron_mosaic.h"
+#include "isp/pipeline/render/frame_needs.h"
+#include "isp/pipeline/render/look_noise.h"
+#include "isp/pipeline/render/picture_view.h"
+#include "isp/raw/bin_plane.h"
+#include "isp/raw/corrections.h"
+#include "isp/raw/to_linear.h"
+
+namespace lowlux::isp {
+namespace {
+
+PlaneView<const float> crop_of(const Plane<float>& active, const Rect& crop) {
+  return active.view().crop(crop.x, crop.y, crop.width, crop.height);
+}
+
+// What is left to do with planes that are already light in the picture's primaries.
+RgbTransform of_modelled(const DevelopPlan& plan, const LookGrid* look) {
+  RgbTransform out;
+  out.luminance = plan.transform.luminance;
+  out.clip = INFINITY;
+  out.move_into_gamut = plan.transform.move_into_gamut;
+  out.look = look;
+  return out;
+}
+
+DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
+  const Rect& crop = raw.default_crop;
+  PerSite<double> range{};
+  for (int site = 0; site < 4; ++site) range[site] = white_at(raw, site) - plan.black.pedestal_dn[site];
+  return {raw.dn.view().crop(raw.active.x + crop.x, raw.active.y + crop.y, crop.width, crop.height),
+          phase_of_crop(raw.phase, crop.x, crop.y),
+          {of_crop(plan.black.pedestal_dn, crop), site_gains(raw, plan, range, crop)}};
+}
+
+}  // namespace
+
+// Dark charge off, and noise if so decided.
+SignalElectrons Pipeline::signal_electrons(const RawFrame& frame, const DevelopPlan& plan) {
+  if (!plan.noise_reduction.reduces()) {
+    return subtract_dark(raw_electrons(frame, plan, std::move(mosaic_), executor_), plan.black, executor_);
+  }
+  RawElectrons raw = raw_electrons(frame, plan, std::move(noisy_), executor_);
+  SignalElectrons out =
+      noise_reducer_.run(raw, plan.noise_reduction, std::move(mosaic_), keeps_maps(plan) ? &noise_maps_ : nullptr);
+  noisy_ = std::move(raw.value);
+  return out;
+}
+
+// Bayer frames that have to be repaired, multiplied or denoised first: in electrons where the gain is known.
+void Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& plan) {
+  const RawDn& raw = frame.raw;
+  if (plan.electrons_at_white) {
+    mosaic_ = signal_electrons(frame, plan).value;
+  } else {
+    fit(mosaic_, raw.active.width, raw.active.height);
+    take_black_off(raw, plan, mosaic_.view(), executor_);
+    repair(mosaic_.view(), plan.defects, 2);
+  }
+  apply_gains(frame.corrections, mosaic_.view(), executor_);
+}
+
+RgbInput Pipeline::prepare_bayer(const RawFrame& frame, const DevelopPlan& plan) {
+  const RawDn& raw = frame.raw;
+  const Rect& crop = raw.default_crop;
+  const auto half_or_whole = [&](const auto& mosaic) -> RgbInput {
+    if (!plan.options.half) return mosaic;
+    const RgbView<float> half{half_planes_[0].view(), half_planes_[1].view(), half_planes_[2].view()};
+    kernel_->bin2x2(mosaic, half, executor_);
+    return CameraPlanes{{half[0], half[1], half[2]}, {1, 1, 1}};
+  };
+  if (plan.from_codes) return half_or_whole(code_mosaic(raw, plan));
+  float_mosaic(frame, plan);
+  return half_or_whole(
+      SignedMosaic{crop_of(mosaic_, crop), phase_of_crop(raw.phase, crop.x, crop.y), site_gains(raw, plan, crop)});
+}
+
+// Monochrome frames serve as R, G and B at once; demosaiced ones have three planes of their own.
+RgbInput Pipeline::prepare_planes(const RawFrame& frame, const DevelopPlan& plan) {
+  const RawDn& raw = frame.raw;
+  const bool monochrome = raw.layout == SensorLayout::monochrome;
+  const int planes = monochrome ? 1 : 3;
+  for (int c = 0; c < planes; ++c) fit(planes_[c], raw.active.width, raw.active.height);
+  if (monochrome) {
+    take_black_off(raw, plan, planes_[0].view(), executor_);
+    repair(planes_[0].view(), plan.defects, 1);
+    apply_gains(frame.corrections, planes_[0].view(), executor_);
+  } else {
+    const RgbView<float> rgb{planes_[0].view(), planes_[1].view(), planes_[2].view()};
+    to_fraction_rgb(raw, plan.black, rgb, executor_);
+    for (const auto& plane : rgb) repair(plane, plan.defects, 1);
+    apply_gains(frame.corrections, rgb, executor_);
+  }
+  CameraPlanes out{{}, plan.white_gain};
+  for (int c = 0; c < 3; ++c) {
+    const int source = std::min(c, planes - 1);
+    out.rgb[c] = crop_of(planes_[source], raw.default_crop);
+    if (!plan.options.half) continue;
+    if (c == source) bin_plane(out.rgb[c], half_planes_[c].view(), executor_);
+    out.rgb[c] = half_planes_[source].view();
+  }
+  return out;
+}
+
+void Pipeline::reserve(const RawFrame& frame, const DevelopPlan& plan) {
+  const int width = frame.raw.default_crop.width;
+  if (!kernel_ || kernel_width_ < width) {
+    kernel_ = std::make_unique<RawToRgb>(width, executor_.width());
+    kernel_width_ = width;
+  }
+  if (plan.options.half) {
+    for (Plane<float>& plane : half_planes_) fit(plane, plan.width, plan.height);
+  }
+}
+
+// From means of the frame that is rendered.
+LookGrid Pipeline::look_grid(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan) {
+  if (!look_ || look_width_ < plan.width || look_height_ < plan.height) {
+    look_width_ = std::max(plan.width, look_width_);
+    look_height_ = std::max(plan.height, look_height_);
+    look_.reset();  // before the next one takes its memory
+    look_ = std::make_unique<NightLookGrid>(look_width_, look_height_);
+  }
+  const int width = cells_along(plan.width), height = cells_along(plan.height);
+  for (Plane<float>& plane : quarter_) fit(plane, width, height);
+  kernel_->quarter(in, {quarter_[0].view(), quarter_[1].view(), quarter_[2].view()}, executor_);
+  const RgbView<const float> quarter{quarter_[0].view(), quarter_[1].view(), quarter_[2].view()};
+  std::optional<NoiseLimit> limit;
+  if (bounds_noise(plan)) {
+    fit(luminance_noise_, width, height);
+    noise_of_luminance(plan, frame.raw.default_crop, noise_maps_, quarter, luminance_noise_.view(), executor_);
+    limit = {*plan.look->noise_limit, tone_limit(plan.options.tone, plan.exposure_ev), luminance_noise_.view()};
+  }
+  return look_->make(quarter, plan.transform.matrix, plan.transform.clip, plan.look->look, limit, executor_);
+}
+
+template <class Encode>
+void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const Encode& encode) {
+  has_noise_maps_ = keeps_maps(plan);
+  reserve(frame, plan);
+  const RgbInput in =
+      frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);
+  RgbTransform transform = plan.transform;
+  LookGrid look;
+  if (needs_grid(plan)) {
+    look = look_grid(in, frame, plan);
+    transform.look = &look;
+  }
+  if (needs_table(plan)) {
+    encode(as_modelled(in, plan), of_modelled(plan, transform.look));
+  } else {
+    encode(in, transform);
+  }
+}
+
+void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
+  if (goes_by_tiles(frame.raw, plan, limits_)) {
+    has_noise_maps_ = false;
+    return tiles_.render(frame, plan, noise_reducer_, out);
+  }
+  render_to(frame, plan, [&](const RgbInput& in, const RgbTransform& transform) {
+    encode(*kernel_, in, transform, plan, view_of(out), executor_);
+  });
+}
+
+void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, const RowSink& out) {
+  render_to(frame, plan, [&](const RgbInput& in, const RgbTransform& transform) {
+    kernel_->rows8(in, transform, plan.tone, out, executor_);
+  });
+}
+
+void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, PlaneView<std::uint16_t> out) {
+  render_to(frame, plan, [&](const RgbInput& in, const RgbTransform& transform) {
+    kernel_->rgb16(in, transform, plan.tone, out, executor_);
+  });
+}
+
+PlaneView<const float> Pipeline::signal(const RawFrame& frame, const DevelopPlan& plan) {
+  mosaic_ = signal_electrons(frame, plan).value;
+  return std::as_const(mosaic_).view();
+}
+
+// Light relative to the scene's white through the model's table; in planes of the picture's own primaries.
+CameraPlanes Pipeline::as_modelled(const RgbInput& in, const DevelopPlan& plan) {
+  for (Plane<float>& plane : modelled_) fit(plane, plan.width, plan.height);
+  const RgbView<float> planes{modelled_[0].view(), modelled_[1].view(), modelled_[2].view()};
+  const auto limit = static_cast<float>(plan.look->look.cd_m2_per_unit / plan.look->white_cd_m2);
+  RgbTransform to_light = plan.transform;
+  for (float& coefficient : to_light.matrix) coefficient *= limit;
+  to_light.move_into_gamut = false;
+  kernel_->linear(in, to_light, planes, executor_);
+  apply_colour_table(*plan.look->table, {planes[0], planes[1], planes[2]}, planes, executor_);
+  return {{planes[0], planes[1], planes[2]}, {1 / limit, 1 / limit, 1 / limit}};
+}
+
+Picture make_picture(const DevelopPlan& plan) { return make_picture(plan.options.samples, plan.width, plan.height); }
+
+}  // namespace lowlux::isp

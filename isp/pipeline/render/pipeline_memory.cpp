@@ -1,0 +1,60 @@
+#include "isp/pipeline/render/pipeline_memory.h"
+
+#include <cassert>
+#include <vector>
+
+#include "isp/pipeline/render/frame_needs.h"
+#include "isp/pipeline/render/level_parts.h"
+#include "isp/pipeline/render/noise_reducer.h"
+#include "isp/pipeline/render/tile_renderer.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
+
+namespace lowlux::isp {
+namespace {
+
+std::size_t area(int width, int height) { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
+
+std::size_t whole_frame_bytes(const RawDn& raw, const DevelopPlan& plan, int threads) {
+  const int width = raw.active.width, height = raw.active.height;
+  const std::size_t plane = sizeof(float) * area(width, height);
+  std::size_t out = RawToRgb::bytes(raw.default_crop.width, threads);
+  if (plan.options.half) out += 3 * sizeof(float) * area(plan.width, plan.height);
+  if (plan.from_codes) return out;
+  if (raw.layout == SensorLayout::linear_rgb) return out + 3 * plane;
+  out += plane;
+  if (!plan.noise_reduction.reduces()) return out;
+  const bool maps = keeps_maps(plan);
+  if (maps) out += NoiseReducer::maps_bytes(width, height);
+  return out + plane + NoiseReducer::bytes(width, height, plan.noise_reduction, maps, threads);
+}
+
+}  // namespace
+
+std::size_t pipeline_bytes(const RawDn& raw, const DevelopPlan& plan, int threads, const TileLimits& limits) {
+  assert(!needs_grid(plan) && !needs_table(plan) && !plan.noise_reduction.temporal);
+  if (goes_by_tiles(raw, plan, limits)) return TileRenderer::bytes(raw, plan, limits, threads);
+  return whole_frame_bytes(raw, plan, threads);
+}
+
+std::size_t expected_bytes(const RawDn& raw, const DevelopOptions& options, int threads) {
+  const DenoiseChoice& denoise = options.denoise;
+  const bool best = options.effects && !options.effects->tolerance_delta_e;  // within a budget
+  DevelopPlan most;
+  most.options = options;
+  most.width = options.half ? raw.default_crop.width / 2 : raw.default_crop.width;
+  most.height = options.half ? raw.default_crop.height / 2 : raw.default_crop.height;
+  if (denoise.mode == DenoiseChoice::Mode::automatic) {
+    most.noise_reduction.level = best ? denoise::Level::best : denoise::Level::high;
+  }
+  if (denoise.mode == DenoiseChoice::Mode::level) most.noise_reduction.level = denoise.level;
+  const std::size_t codes = sizeof(std::uint16_t) * static_cast<std::size_t>(raw.dn.size());
+  const std::size_t sample = options.samples == SampleType::u8 ? 1 : options.samples == SampleType::u16 ? 2 : 4;
+  const std::size_t picture = 3 * sample * area(most.width, most.height);
+  const std::size_t dark = options.dark_frame ? sizeof(float) * area(raw.active.width, raw.active.height) : 0;
+  const std::size_t turned = raw.info.orientation == Orientation::normal ? 0 : picture;
+  const std::size_t around = codes + dark + picture + turned;
+  if (options.look.look == Look::camera) return around + pipeline_bytes(raw, most, threads);
+  return around + whole_frame_bytes(raw, most, threads) + 3 * sizeof(float) * area(most.width, most.height);
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <optional>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/image.h"
+#include "isp/pipeline/plan.h"
+#include "isp/pipeline/render/frame_tiles.h"
+#include "isp/pipeline/render/noise_reducer.h"
+#include "isp/pipeline/render/picture_view.h"
+
+namespace lowlux::isp {
+
+/// Whether a frame is rendered piece by piece: a Bayer frame above TileLimits::most_whole_px whose mosaic goes through
+/// floats. Those that go straight from codes need no mosaic. Whole stay, whatever their size: frames that are
+/// demosaiced or monochrome, looks that are made of the whole picture or tabulated (`--look`), noise that is held to a
+/// limit, maps of the noise, and what frames before take part in.
+bool goes_by_tiles(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limits);
+
+/// Renders Bayer frames piece by piece: of each core and its margin the mosaic, its noise, its picture. Without noise
+/// reduction the picture has the same bits as that of the whole frame; with it, what differs is far below the noise
+/// (README.md). Owns its memory, which the first frame of a size allocates.
+class TileRenderer {
+ public:
+  TileRenderer(Executor& executor, const TileLimits& limits) : executor_(executor), limits_(limits) {}
+
+  /// Precondition: goes_by_tiles.
+  void render(const RawFrame& frame, const DevelopPlan& plan, NoiseReducer& noise, Picture& out);
+
+  /// Bytes for such a frame, those of the NoiseReducer with it; more than it takes only where regions differ.
+  static std::size_t bytes(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limits, int threads);
+
+ private:
+  void reserve(const RawFrame& frame, const DevelopPlan& plan);
+  PlaneView<float> mosaic_of(const RawFrame& frame, const DevelopPlan& plan, const Rect& core, NoiseReducer& noise);
+  void render_core(const RawFrame& frame, const DevelopPlan& plan, const Rect& core, PlaneView<const float> mosaic,
+                   const PictureView& out);
+
+  Executor& executor_;
+  TileLimits limits_;
+  Plane<float> noisy_;   // of a piece
+  Plane<float> mosaic_;  // of a piece, where noise is reduced
+  std::array<Plane<float>, 3> half_planes_;
+  std::unique_ptr<RawToRgb> kernel_;
+  int kernel_width_ = 0;
+  std::optional<Picture> picture_;  // of a core, and a little more
+  SampleType picture_samples_ = SampleType::u8;
+  int picture_width_ = 0;
+  int picture_height_ = 0;
+};
+
+}  // namespace lowlux::isp

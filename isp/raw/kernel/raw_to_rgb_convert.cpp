@@ -1,0 +1,277 @@
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "isp/raw/kernel/raw_to_rgb_rows.h"
+
+#if defined(__aarch64__)  // NEON only: the vectors of SVE have no size, so no structs can be made of them
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
+#endif
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "isp/raw/kernel/raw_to_rgb_convert.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once more for each instruction set
+#include <hwy/highway.h>
+
+#include "isp/raw/kernel/raw_to_rgb_demosaic-inl.h"
+#include "isp/raw/kernel/raw_to_rgb_look-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lowlux::isp::rows::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Ints = hn::RebindToSigned<Floats>;
+using VI = hn::Vec<Ints>;
+
+/// Steps after demosaicing: clip, matrix, gamut move.
+struct ColourVectors {
+  VF column[3][3];
+  VF luminance[3];
+  VF clip;
+
+  explicit HWY_INLINE ColourVectors(const Colour& from) {
+    for (int c = 0; c < 3; ++c) {
+      for (int j = 0; j < 3; ++j) column[c][j] = constant(from.column[c][j]);
+      luminance[c] = constant(from.luminance[c]);
+    }
+    clip = constant(from.clip);
+  }
+
+  HWY_INLINE Site transform(const Site& in) const {
+    const VF c0 = hn::Min(in.c[0], clip), c1 = hn::Min(in.c[1], clip), c2 = hn::Min(in.c[2], clip);
+    const auto output = [&](int j) HWY_ATTR {
+      return hn::MulAdd(column[2][j], c2, hn::MulAdd(column[1][j], c1, hn::Mul(column[0][j], c0)));
+    };
+    return {{output(0), output(1), output(2)}};
+  }
+
+  /// Y + t (v - Y) with t = min(Y / (Y - min(v, 0)), (1 - Y) / (max(v, 1) - Y)), as one division. t is taken
+  /// 2^-22 short, so that no rounding can leave 0..1; colours inside keep every bit, as 0 + 1 (v - 0).
+  HWY_INLINE Site moved(const Site& v, VF least, VF greatest) const {
+    const VF zero = constant(0), one = constant(1);
+    const VF weighted =
+        hn::MulAdd(luminance[2], v.c[2], hn::MulAdd(luminance[1], v.c[1], hn::Mul(luminance[0], v.c[0])));
+    const VF y = hn::Min(hn::Max(weighted, zero), one);
+    const VF rest = hn::Sub(one, y);
+    // The ends lie a hair outside 0..1, so that neither distance is 0, and t is 0 where Y is at one of them.
+    const VF below = hn::Sub(y, hn::Min(least, constant(-1e-30f)));
+    const VF above = hn::Sub(hn::Max(greatest, constant(1 + 0x1p-23f)), y);
+    const auto low_end_first = hn::Lt(hn::Mul(y, above), hn::Mul(rest, below));
+    const VF part = hn::Mul(hn::IfThenElse(low_end_first, y, rest), constant(1 - 0x1p-22f));
+    const VF whole = hn::IfThenElse(low_end_first, below, above);
+    const auto outside = hn::Or(hn::Lt(least, zero), hn::Gt(greatest, one));
+    const VF t = hn::IfThenElse(outside, hn::Div(part, whole), one);
+    const VF from = hn::IfThenElseZero(outside, y);
+    return {{hn::MulAdd(t, hn::Sub(v.c[0], from), from), hn::MulAdd(t, hn::Sub(v.c[1], from), from),
+             hn::MulAdd(t, hn::Sub(v.c[2], from), from)}};
+  }
+
+  HWY_INLINE void move_into_gamut(SitePair& v) const {
+    const auto least = [](const Site& s) HWY_ATTR { return hn::Min(hn::Min(s.c[0], s.c[1]), s.c[2]); };
+    const auto greatest = [](const Site& s) HWY_ATTR { return hn::Max(hn::Max(s.c[0], s.c[1]), s.c[2]); };
+    const VF least_even = least(v.even), least_odd = least(v.odd);
+    const VF greatest_even = greatest(v.even), greatest_odd = greatest(v.odd);
+    const auto outside = hn::Or(hn::Lt(hn::Min(least_even, least_odd), constant(0)),
+                                hn::Gt(hn::Max(greatest_even, greatest_odd), constant(1)));
+    if (HWY_LIKELY(hn::AllFalse(Floats(), outside))) return;
+    v.even = moved(v.even, least_even, greatest_even);
+    v.odd = moved(v.odd, least_odd, greatest_odd);
+  }
+};
+
+HWY_INLINE void clamp(Site& v) {
+  for (VF& c : v.c) c = hn::Min(hn::Max(c, constant(0)), constant(1));
+}
+
+/// Bins of ToneTable, and the place within the bin.
+struct Tone {
+  VF offset;
+  VI base;
+  VI bin_mask;
+  VF bin_fraction;
+  int shift;
+  const ToneTable* table;
+
+  explicit HWY_INLINE Tone(const ToneTable& tone)
+      : offset(constant(tone.offset)),
+        base(hn::Set(Ints(), static_cast<std::int32_t>(tone.base_bits()))),
+        bin_mask(hn::Set(Ints(), (1 << tone.shift) - 1)),
+        bin_fraction(constant(1.0f / static_cast<float>(1 << tone.shift))),
+        shift(tone.shift),
+        table(&tone) {}
+
+  HWY_INLINE VI steps(VF v) const { return hn::Sub(hn::BitCast(Ints(), hn::Add(v, offset)), base); }
+  HWY_INLINE VI code8(VF v) const {
+    return hn::GatherIndex(Ints(), table->code8.data(), hn::ShiftRightSame(steps(v), shift));
+  }
+  HWY_INLINE VI code16(VF v) const {
+    const Floats f;
+    const VI step = steps(v), bin = hn::ShiftRightSame(step, shift);
+    const VF low = hn::GatherIndex(f, table->edge.data(), bin), high = hn::GatherIndex(f, table->edge.data() + 1, bin);
+    const VF fraction = hn::Mul(hn::ConvertTo(f, hn::And(step, bin_mask)), bin_fraction);
+    return hn::NearestInt(hn::Mul(constant(65535.0f), hn::MulAdd(fraction, hn::Sub(high, low), low)));
+  }
+};
+
+constexpr int pixels_at_once() { return 2 * static_cast<int>(hn::MaxLanes(Floats())); }
+
+// Where finished pixels go: write() stores a vector of pairs at pixel x of a row that has `left` pixels from there on.
+
+struct ToCodes8 {
+  static constexpr bool clamps = true;
+  Tone tone;
+  std::uint8_t* out;
+
+  explicit HWY_INLINE ToCodes8(const Codes8& to) : tone(*to.tone), out(to.out) {}
+
+  HWY_INLINE auto codes(VF even, VF odd) const {
+    const hn::Rebind<std::uint16_t, Floats> u16;
+    const hn::Repartition<std::uint8_t, decltype(u16)> u8;
+    const VI pair = hn::Or(tone.code8(even), hn::ShiftLeft<8>(tone.code8(odd)));
+    return hn::BitCast(u8, hn::TruncateTo(u16, hn::BitCast(hn::RebindToUnsigned<Ints>(), pair)));
+  }
+  HWY_INLINE void write(const SitePair& v, int x, int left) const {
+    const hn::Repartition<std::uint8_t, hn::Rebind<std::uint16_t, Floats>> u8;
+    HWY_ALIGN std::uint8_t last[3 * pixels_at_once()];
+    const auto r = codes(v.even.c[0], v.odd.c[0]);
+    const auto g = codes(v.even.c[1], v.odd.c[1]);
+    const auto b = codes(v.even.c[2], v.odd.c[2]);
+    std::uint8_t* to = out + 3 * static_cast<std::ptrdiff_t>(x);
+    hn::StoreInterleaved3(r, g, b, u8, left < pixels_at_once() ? last : to);
+    if (left < pixels_at_once()) std::memcpy(to, last, 3 * static_cast<std::size_t>(left));
+  }
+};
+
+struct ToCodes16 {
+  static constexpr bool clamps = true;
+  Tone tone;
+  std::uint16_t* out;
+
+  explicit HWY_INLINE ToCodes16(const Codes16& to) : tone(*to.tone), out(to.out) {}
+
+  HWY_INLINE auto codes(VF even, VF odd) const {
+    const hn::Repartition<std::uint16_t, Floats> u16;
+    return hn::BitCast(u16, hn::Or(tone.code16(even), hn::ShiftLeft<16>(tone.code16(odd))));
+  }
+  HWY_INLINE void write(const SitePair& v, int x, int left) const {
+    const hn::Repartition<std::uint16_t, Floats> u16;
+    HWY_ALIGN std::uint16_t last[3 * pixels_at_once()];
+    const auto r = codes(v.even.c[0], v.odd.c[0]);
+    const auto g = codes(v.even.c[1], v.odd.c[1]);
+    const auto b = codes(v.even.c[2], v.odd.c[2]);
+    std::uint16_t* to = out + 3 * static_cast<std::ptrdiff_t>(x);
+    hn::StoreInterleaved3(r, g, b, u16, left < pixels_at_once() ? last : to);
+    if (left < pixels_at_once()) std::memcpy(to, last, 3 * static_cast<std::size_t>(left) * sizeof *to);
+  }
+};
+
+struct ToPlanes {
+  static constexpr bool clamps = false;
+  float* out[3];
+
+  explicit HWY_INLINE ToPlanes(const Planes& to) : out{to.out[0], to.out[1], to.out[2]} {}
+
+  HWY_INLINE void write(const SitePair& v, int x, int left) const {
+    HWY_ALIGN float last[pixels_at_once()];
+    for (int c = 0; c < 3; ++c) {
+      float* to = out[c] + x;
+      hn::StoreInterleaved2(v.even.c[c], v.odd.c[c], Floats(), left < pixels_at_once() ? last : to);
+      if (left < pixels_at_once()) std::memcpy(to, last, static_cast<std::size_t>(left) * sizeof *to);
+    }
+  }
+};
+
+template <class Source, class Look, class Sink>
+HWY_INLINE void convert(const Source& source, const Colour& colour, const Look& look, int width, const Sink& sink) {
+  const ColourVectors vectors(colour);
+  const bool move = colour.move_into_gamut;
+  const auto lanes = static_cast<int>(hn::Lanes(Floats()));
+  for (int i = 0; 2 * i < width; i += lanes) {
+    SitePair v = source.at(i);
+    v = {vectors.transform(v.even), vectors.transform(v.odd)};
+    look(v, i);
+    if (move) {
+      vectors.move_into_gamut(v);
+    } else if (Sink::clamps) {
+      clamp(v.even);
+      clamp(v.odd);
+    }
+    sink.write(v, 2 * i, width - 2 * i);
+  }
+}
+
+template <class Source, class Sink>
+HWY_INLINE void convert(const Source& source, const Colour& colour, int width, const Sink& sink) {
+  if (colour.look != nullptr) {
+    convert(source, colour, LookVectors(*colour.look), width, sink);
+  } else {
+    convert(source, colour, AsItIs(), width, sink);
+  }
+}
+
+template <class Sink>
+HWY_INLINE void convert_mosaic(const MosaicRows& in, const Colour& colour, int width, const Sink& sink) {
+  if (in.own_is_odd) {
+    convert(Malvar<true>(in), colour, width, sink);
+  } else {
+    convert(Malvar<false>(in), colour, width, sink);
+  }
+}
+
+void MosaicTo8(const MosaicRows& in, const Colour& colour, int width, const Codes8& out) {
+  convert_mosaic(in, colour, width, ToCodes8(out));
+}
+void MosaicTo16(const MosaicRows& in, const Colour& colour, int width, const Codes16& out) {
+  convert_mosaic(in, colour, width, ToCodes16(out));
+}
+void MosaicToPlanes(const MosaicRows& in, const Colour& colour, int width, const Planes& out) {
+  convert_mosaic(in, colour, width, ToPlanes(out));
+}
+void PlanesTo8(const PlaneRows& in, const Colour& colour, int width, const Codes8& out) {
+  convert(Demosaiced{in}, colour, width, ToCodes8(out));
+}
+void PlanesTo16(const PlaneRows& in, const Colour& colour, int width, const Codes16& out) {
+  convert(Demosaiced{in}, colour, width, ToCodes16(out));
+}
+void PlanesToPlanes(const PlaneRows& in, const Colour& colour, int width, const Planes& out) {
+  convert(Demosaiced{in}, colour, width, ToPlanes(out));
+}
+
+const char* TargetName() { return hwy::TargetName(HWY_TARGET); }
+
+}  // namespace lowlux::isp::rows::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lowlux::isp::rows {
+
+HWY_EXPORT(MosaicTo8);
+HWY_EXPORT(MosaicTo16);
+HWY_EXPORT(MosaicToPlanes);
+HWY_EXPORT(PlanesTo8);
+HWY_EXPORT(PlanesTo16);
+HWY_EXPORT(PlanesToPlanes);
+HWY_EXPORT(TargetName);
+
+void convert_row(const MosaicRows& in, const Colour& colour, int width, const Codes8& out) {
+  HWY_DYNAMIC_DISPATCH(MosaicTo8)(in, colour, width, out);
+}
+void convert_row(const MosaicRows& in, const Colour& colour, int width, const Codes16& out) {
+  HWY_DYNAMIC_DISPATCH(MosaicTo16)(in, colour, width, out);
+}
+void convert_row(const MosaicRows& in, const Colour& colour, int width, const Planes& out) {
+  HWY_DYNAMIC_DISPATCH(MosaicToPlanes)(in, colour, width, out);
+}
+void convert_row(const PlaneRows& in, const Colour& colour, int width, const Codes8& out) {
+  HWY_DYNAMIC_DISPATCH(PlanesTo8)(in, colour, width, out);
+}
+void convert_row(const PlaneRows& in, const Colour& colour, int width, const Codes16& out) {
+  HWY_DYNAMIC_DISPATCH(PlanesTo16)(in, colour, width, out);
+}
+void convert_row(const PlaneRows& in, const Colour& colour, int width, const Planes& out) {
+  HWY_DYNAMIC_DISPATCH(PlanesToPlanes)(in, colour, width, out);
+}
+
+const char* target_name() { return HWY_DYNAMIC_DISPATCH(TargetName)(); }
+
+}  // namespace lowlux::isp::rows
+#endif

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <variant>
+
+#include "isp/base/cfa.h"
+#include "isp/base/image.h"
+#include "isp/base/plane.h"
+
+namespace lowlux::isp {
+
+/// value = (dn - black[site]) * gain[site], sites as in site_of(). The gain holds 1 / (white - black) and the white
+/// balance.
+struct SiteLevels {
+  PerSite<float> black{};  // [DN]
+  PerSite<float> gain{1, 1, 1, 1};
+};
+
+/// A Bayer mosaic as read out. The rows are read once, front to back, so they may lie in uncached memory.
+struct DnMosaic {
+  PlaneView<const std::uint16_t> dn;
+  BayerPhase phase = BayerPhase::rggb;
+  SiteLevels levels;
+};
+
+/// A signed linear Bayer mosaic, black already removed; value = sample * gain[site].
+/// A sample that is not a number counts as 0, one beyond +-1e9 as +-1e9.
+struct SignedMosaic {
+  PlaneView<const float> value;
+  BayerPhase phase = BayerPhase::rggb;
+  PerSite<float> gain{1, 1, 1, 1};
+};
+
+/// Camera RGB that needs no demosaicing; samples as in SignedMosaic. For monochrome data all three planes may be one.
+struct CameraPlanes {
+  RgbView<const float> rgb;
+  std::array<float, 3> gain{1, 1, 1};
+};
+
+using RgbInput = std::variant<DnMosaic, SignedMosaic, CameraPlanes>;
+
+}  // namespace lowlux::isp

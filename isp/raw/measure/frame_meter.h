@@ -1,0 +1,92 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/packed/raw_format.h"
+#include "isp/raw/measure/thumbnail.h"
+#include "isp/raw/measure/tile_noise.h"
+
+namespace lowlux::isp {
+
+/// What the codes of one frame's active area tell before anything is done to them: for exposure and white balance of
+/// the next frames. Black is in all of it.
+struct FrameStatistics {
+  static constexpr int bins = 1024;
+  std::array<std::uint64_t, 3> sum{};    // of the codes of R, G, B; of monochrome frames all three are the same
+  std::array<std::uint64_t, 3> count{};  // of the sites in it
+  std::uint64_t pixels = 0;
+  std::uint64_t clipped = 0;  // codes of white or more
+  std::uint64_t zero = 0;     // codes 0
+  /// Whole 2x2 cells of every second row of cells, by luma (77 R + 75 G1 + 75 G2 + 29 B) / 256 (Rec. 601), even bins
+  /// from 0 to 2^bits.
+  std::array<std::uint32_t, bins> luma{};
+};
+
+/// What is asked of a frame besides its codes.
+struct MeterWants {
+  bool light = true;       // thumbnail
+  bool noise = true;       // tiles
+  bool statistics = true;  // FrameStatistics
+};
+
+/// Reads frames from a camera's memory, each row once and in order, and measures them on the way. All memory is taken
+/// in the constructor. Sums are integers: the result is the same for every number of threads.
+class FrameMeter {
+ public:
+  /// @param raw  the frames that come: layout, phase, active area, white; its plane is as large as a camera's frame
+  FrameMeter(const RawDn& raw, const RawFormat& format, int threads);
+
+  /// @param bytes  rows from its first byte on, `stride` apart; large enough for raw.dn's rows
+  /// @param raw    as in the constructor; its plane gets the codes
+  void read(std::span<const std::byte> bytes, std::size_t stride, RawDn& raw, Executor& executor,
+            const MeterWants& wants = {});
+
+  const FrameStatistics& statistics() const { return statistics_; }  // empty where they were not wanted
+  const MeterWants& wanted() const { return wanted_; }               // of the frame read last
+  ThumbnailSums& thumbnail() { return thumbnail_; }
+  TileNoise& tiles() { return tiles_; }
+  const TileNoise& tiles() const { return tiles_; }
+  /// Mean codes of the sites (of the active area's cells) on the masked pixels; nullopt if there are none.
+  std::optional<PerSite<double>> masked_dn() const;
+
+ private:
+  /// Of one thread.
+  struct Tally {
+    PerSite<std::uint64_t> masked_sum{};
+    PerSite<std::uint64_t> masked_count{};
+    std::uint64_t clipped = 0;
+    std::uint64_t zero = 0;
+    std::array<std::array<std::uint32_t, FrameStatistics::bins>, 2> luma{};  // of even and of odd cells
+  };
+  /// Sums of columns, of even and of odd rows.
+  struct Columns {
+    std::array<std::vector<std::uint32_t>, 2> sum;
+    std::array<std::vector<std::uint32_t>, 2> square;
+    std::vector<std::uint16_t> bin;
+  };
+  struct Job;
+  void read_rows(const Job& job, RowBand rows, int thread);
+  void measure_row(const RawDn& raw, int y, const MeterWants& wants, int thread);
+  void count_cells(const RawDn& raw, int y, int thread);
+  void fold(const RawDn& raw, int y, const MeterWants& wants, Columns& columns);
+  void add_up(const RawDn& raw, int threads, const MeterWants& wants);
+
+  RawFormat format_;
+  ThumbnailSums thumbnail_;
+  TileNoise tiles_;
+  std::vector<Tally> tallies_;    // of the threads
+  std::vector<Columns> columns_;  // of the threads
+  PerSite<std::uint64_t> masked_sum_{};
+  PerSite<std::uint64_t> masked_count_{};
+  MeterWants wanted_;
+  FrameStatistics statistics_;
+};
+
+}  // namespace lowlux::isp

@@ -1,0 +1,77 @@
+#include "isp/render/night/eye_tables.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "isp/model/vision/mesopic.h"
+#include "isp/model/vision/night_eye.h"
+#include "isp/model/vision/seeing.h"
+
+namespace lowlux::isp {
+namespace {
+
+using rows::EyeTables;
+
+double node(int i, int nodes, double first, double last) { return first + (last - first) * i / (nodes - 1); }
+
+// The root before it is held to 0..1, so that the ends are lines too.
+double unheld_coefficient(double log2_light, double log2_ratio) {
+  const LuminancePair field{std::exp2(log2_light), std::exp2(log2_light + log2_ratio)};
+  const double m = mesopic_state(field).m;
+  const double end = mes2_response(m == 0 ? field.scotopic : field.photopic);
+  return m == 0 || m == 1 ? end : m;
+}
+
+EyeTables make_tables() {
+  EyeTables t{};
+  for (int j = 0; j < EyeTables::ratios; ++j) {
+    for (int i = 0; i < EyeTables::lights; ++i) {
+      t.m[static_cast<std::size_t>(j) * EyeTables::lights + i] = static_cast<float>(
+          unheld_coefficient(node(i, EyeTables::lights, EyeTables::first_log2_light, EyeTables::last_log2_light),
+                             node(j, EyeTables::ratios, EyeTables::first_log2_ratio, EyeTables::last_log2_ratio)));
+    }
+  }
+  for (int i = 0; i < EyeTables::lights; ++i) {
+    const double light = std::exp2(node(i, EyeTables::lights, EyeTables::first_log2_light, EyeTables::last_log2_light));
+    const double blur_deg = blur_std_deg(light);
+    t.blue[i] = static_cast<float>(rod_blue(light));
+    t.variance_deg2[i] = static_cast<float>(blur_deg * blur_deg);
+  }
+  t.half_saturation_cd_m2 = static_cast<float>(half_saturation_cd_m2);
+  t.chroma_scale = static_cast<float>(1 + half_saturation_cd_m2 / 100);
+  return t;
+}
+
+constexpr int contrast_nodes = 256;  // log2 L as in EyeTables
+
+const std::array<float, contrast_nodes>& thresholds() {
+  static const std::array<float, contrast_nodes> table = [] {
+    std::array<float, contrast_nodes> out{};
+    for (int i = 0; i < contrast_nodes; ++i) {
+      out[i] = static_cast<float>(threshold_contrast(
+          std::exp2(node(i, contrast_nodes, EyeTables::first_log2_light, EyeTables::last_log2_light))));
+    }
+    return out;
+  }();
+  return table;
+}
+
+}  // namespace
+
+const EyeTables& eye_tables() {
+  static const EyeTables tables = make_tables();
+  return tables;
+}
+
+float tabulated_threshold_contrast(float luminance_cd_m2) {
+  const std::array<float, contrast_nodes>& threshold = thresholds();
+  constexpr float first = EyeTables::first_log2_light, last = EyeTables::last_log2_light;
+  const float at = (std::log2(std::max(luminance_cd_m2, 1e-7f)) - first) * (contrast_nodes - 1) / (last - first);
+  const int low = std::clamp(static_cast<int>(at), 0, contrast_nodes - 2);
+  const float way = std::clamp(at - static_cast<float>(low), 0.0f, 1.0f);
+  return threshold[low] + way * (threshold[low + 1] - threshold[low]);
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "capture/v4l2/v4l2_source.h"
+#include "isp/base/packed/raw_format.h"
+#include "tests/support/fake_v4l2.h"
+
+namespace lowlux::test {
+
+inline constexpr RawFormat srggb10{10, RawPacking::little16, SensorLayout::bayer, BayerPhase::rggb};
+
+inline bool has(const Error& error, const std::string& words) { return error.message.find(words) != std::string::npos; }
+
+inline std::string joined(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + "\n";
+  return text;
+}
+
+/// The fake's camera; ends the test where it does not open.
+inline std::unique_ptr<capture::Camera> opened(FakeV4l2& fake, const capture::V4l2Options& options = {}) {
+  auto camera = capture::open_v4l2("/dev/video0", options, fake.system());
+  if (!camera) ADD_FAILURE() << camera.error().message;
+  return std::move(camera).value();
+}
+
+/// The error of opening, after which nothing may be left open.
+inline Error refused(FakeV4l2& fake, const capture::V4l2Options& options = {}) {
+  const auto camera = capture::open_v4l2("/dev/video0", options, fake.system());
+  EXPECT_EQ(fake.misuses, 0);
+  EXPECT_EQ(fake.open_files, 0);
+  if (camera) {
+    ADD_FAILURE() << "opened";
+    return {};
+  }
+  EXPECT_EQ(camera.error().where, "/dev/video0");
+  EXPECT_FALSE(camera.error().message.ends_with('.'));
+  return camera.error();
+}
+
+/// The same, streaming.
+inline std::unique_ptr<capture::Camera> started(FakeV4l2& fake, const capture::V4l2Options& options = {}) {
+  auto camera = opened(fake, options);
+  const auto ok = camera->start();
+  EXPECT_TRUE(ok) << ok.error().message;
+  return camera;
+}
+
+/// That all was closed, unmapped and handed back, and no call was one that no driver would take.
+inline void expect_clean(const FakeV4l2& fake) {
+  EXPECT_EQ(fake.open_files, 0);
+  EXPECT_EQ(fake.open_maps, 0);
+  EXPECT_EQ(fake.misuses, 0);
+  EXPECT_EQ(fake.accesses, 0);
+}
+
+}  // namespace lowlux::test

@@ -1,0 +1,107 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+
+#include "isp/reproduce/reproduce.h"
+
+namespace lowlux::isp {
+namespace {
+
+// Findings of either kind that do not hold, and why: their notes say the same. All others do.
+const std::set<std::string> known_not_to_hold{
+    "chromaticity-clouds/blue-and-red-each",  // a purple is larger than an orange
+    "frequency-of-seeing/tail",               // 1 - sum cancels
+    "sensor-scenarios/published-sampling",    // photons weighted by Qe are no Poisson variable
+    "snr-sensitivity/read",                   // volts beside volts squared
+    "snr-sensitivity/read-all-on",            // likewise
+    "snr-sensitivity/quantisation",           // likewise
+};
+
+// What nobody published: equations held against themselves, samplings against their expectation.
+const std::set<std::string> checks{
+    "few-photons/distance-law",         "few-photons/distance-predicted",    "few-photons/no-photon",
+    "chromaticity-clouds/covariance-I", "chromaticity-clouds/covariance-II", "frequency-of-seeing/drawn",
+    "frequency-of-seeing/tail",         "sensor-scenarios/saturation",       "sensor-scenarios/published-sampling",
+    "dark-desaturation/undo-sampled",   "snr-sensitivity/quantisation",      "mesopic-fixed-gamma/by-day",
+};
+
+// Those that draw samples come first; the others are the same for all seeds, and tests/bench runs them.
+constexpr int sampled_experiments = 6;
+
+class PublishedExperiment : public testing::TestWithParam<int> {};
+
+// Each finding's own tolerance is five computed standard errors or a rounding; three seeds.
+TEST_P(PublishedExperiment, FindingsHoldOrAreKnownNotTo) {
+  const Experiment& experiment = experiments()[static_cast<std::size_t>(GetParam())];
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const auto outcome = experiment.run({seed, true});
+    ASSERT_TRUE(outcome) << outcome.error().message;
+    EXPECT_FALSE(outcome->findings.empty());
+    EXPECT_FALSE(outcome->plots.empty());
+    for (const Finding& f : outcome->findings) {
+      EXPECT_EQ(f.holds, !known_not_to_hold.contains(f.id)) << f.id << ": " << f.ours << " (" << f.note << ")";
+      EXPECT_TRUE(f.id.starts_with(std::string(experiment.id) + "/")) << f.id;
+      EXPECT_FALSE(f.claim.empty() || f.published.empty() || f.ours.empty() || f.note.empty()) << f.id;
+    }
+  }
+}
+
+TEST_P(PublishedExperiment, IsTheSameForTheSameSeed) {
+  const Experiment& experiment = experiments()[static_cast<std::size_t>(GetParam())];
+  const auto first = experiment.run({5, true}), second = experiment.run({5, true});
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(csv_of(table_of(first->findings)), csv_of(table_of(second->findings)));
+  ASSERT_EQ(first->plots.size(), second->plots.size());
+  for (std::size_t i = 0; i < first->plots.size(); ++i) EXPECT_EQ(csv_of(first->plots[i]), csv_of(second->plots[i]));
+}
+
+std::string name_of_experiment(const testing::TestParamInfo<int>& info) {
+  std::string name(experiments()[static_cast<std::size_t>(info.param)].id);
+  std::ranges::replace(name, '-', '_');
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Thesis, PublishedExperiment, testing::Range(0, sampled_experiments), name_of_experiment);
+
+TEST(PublishedExperiments, NamesOfFindingsAndPlotsAreUnique) {
+  std::set<std::string> findings, plots;
+  for (const Experiment& experiment : experiments()) {
+    if (experiment.looks_at_pictures) continue;  // tests/bench
+    const auto outcome = experiment.run({1, true});
+    ASSERT_TRUE(outcome);
+    for (const Finding& f : outcome->findings) {
+      EXPECT_TRUE(findings.insert(f.id).second) << f.id;
+      EXPECT_EQ(f.kind == Finding::Kind::check, checks.contains(f.id)) << f.id;
+      EXPECT_TRUE(f.kind == Finding::Kind::check || f.published != "0 standard errors") << f.id;
+    }
+    for (const Plot& p : outcome->plots) {
+      EXPECT_TRUE(plots.insert(p.id).second) << p.id;
+      EXPECT_NE(p.id, "findings");  // that file is the table's
+      for (const Series& s : p.series) EXPECT_EQ(s.x.size(), s.y.size()) << p.id << " " << s.name;
+    }
+  }
+  for (const std::string& id : known_not_to_hold) EXPECT_TRUE(findings.contains(id)) << id;
+  for (const std::string& id : checks) EXPECT_TRUE(findings.contains(id)) << id;
+}
+
+TEST(PublishedExperiments, AnotherSeedIsAnotherSample) {
+  const auto run = experiments().front().run;
+  EXPECT_NE(csv_of(run({1, true})->plots[1]), csv_of(run({2, true})->plots[1]));
+}
+
+TEST(PublishedExperiments, AreFoundByTheirIdsAndNearOnesAreNamed) {
+  EXPECT_EQ(experiment_named("few-photons")->id, "few-photons");
+  const auto unknown = experiment_named("few-photon");
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::not_found);
+  EXPECT_NE(unknown.error().message.find("few-photons"), std::string::npos);
+  EXPECT_EQ(experiment_named("zzz").error().message.find("mean"), std::string::npos);
+  EXPECT_FALSE(experiment_named(""));
+}
+
+}  // namespace
+}  // namespace lowlux::isp

@@ -1,0 +1,122 @@
+#include "tests/scenarios/seen_difference.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "isp/model/colour/colorimetry.h"
+#include "isp/model/colour/colour_difference.h"
+#include "isp/pipeline/budget/visible_noise.h"
+#include "isp/render/output_space.h"
+
+namespace lowlux::isp {
+namespace {
+
+/// Sums of columns over the rows of a square, for one row of squares.
+class ColumnSums {
+ public:
+  ColumnSums(const RgbView<const float>& picture, int top) : picture_(picture) {
+    for (auto& plane : sum_) plane.resize(static_cast<std::size_t>(picture[0].width));
+    for (int y = top; y < top + seen_box_px; ++y) add(y, 1);
+  }
+  void move_to(int top) {
+    add(top + seen_box_px - 1, 1);
+    add(top - 1, -1);
+  }
+  /// Lab of the squares of this row, left to right.
+  void labs(const Matrix3& to_xyz, const Xyz& white, std::vector<Lab>& out) const {
+    Vector3 box{};
+    constexpr double pixels = seen_box_px * seen_box_px;
+    for (int x = 0; x < picture_[0].width; ++x) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        box[c] += sum_[c][static_cast<std::size_t>(x)];
+        if (x >= seen_box_px) box[c] -= sum_[c][static_cast<std::size_t>(x) - seen_box_px];
+      }
+      if (x < seen_box_px - 1) continue;
+      const Vector3 mean{box[0] / pixels, box[1] / pixels, box[2] / pixels};
+      out[static_cast<std::size_t>(x) - (seen_box_px - 1)] = lab_of(xyz_of(to_xyz * mean), white);
+    }
+  }
+
+ private:
+  void add(int y, double sign) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float* const row = picture_[c].row(y);
+      for (std::size_t x = 0; x < sum_[c].size(); ++x) sum_[c][x] += sign * static_cast<double>(row[x]);
+    }
+  }
+
+  const RgbView<const float>& picture_;
+  std::array<std::vector<double>, 3> sum_;
+};
+
+struct Work {
+  const RgbView<const float>& first;
+  const RgbView<const float>& second;
+  Plane<float>& difference;
+  int bands;
+};
+
+void compare_band(const Work& work, int band) {
+  const int rows = work.difference.height(), from = rows * band / work.bands, to = rows * (band + 1) / work.bands;
+  if (from == to) return;
+  const Matrix3 to_xyz = *inverse(*xyz_to_output(OutputSpace::linear_srgb));
+  const Xyz white = *xyz_of(output_white);
+  ColumnSums a(work.first, from), b(work.second, from);
+  std::vector<Lab> lab_a(static_cast<std::size_t>(work.difference.width())), lab_b(lab_a.size());
+  for (int y = from; y < to; ++y) {
+    if (y > from) {
+      a.move_to(y);
+      b.move_to(y);
+    }
+    a.labs(to_xyz, white, lab_a);
+    b.labs(to_xyz, white, lab_b);
+    float* const out = work.difference.row(y);
+    for (std::size_t x = 0; x < lab_a.size(); ++x) out[x] = static_cast<float>(ciede2000(lab_a[x], lab_b[x]));
+  }
+}
+
+}  // namespace
+
+SeenDifference seen_difference(const RgbView<const float>& first, const RgbView<const float>& second,
+                               Executor& executor) {
+  assert(first[0].width == second[0].width && first[0].height == second[0].height);
+  assert(first[0].width >= seen_box_px && first[0].height >= seen_box_px);
+  Plane<float> difference(first[0].width - seen_box_px + 1, first[0].height - seen_box_px + 1);
+  const Work work{first, second, difference, executor.width()};
+  for_each_index(executor, work.bands, [&](int band) { compare_band(work, band); });
+  std::vector<float> sorted(difference.data(), difference.data() + difference.size());
+  SeenDifference out;
+  for (const float d : sorted) out.mean += static_cast<double>(d) / static_cast<double>(sorted.size());
+  const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(seen_share * static_cast<double>(sorted.size() - 1));
+  std::nth_element(sorted.begin(), at, sorted.end());
+  out.percentile95 = static_cast<double>(*at);
+  out.largest = static_cast<double>(*std::max_element(at, sorted.end()));
+  return out;
+}
+
+SceneLinear light_of_codes(const Encoded8& codes) {
+  std::array<float, 256> light{};
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    light[i] = static_cast<float>(decode_transfer(OutputSpace::srgb, static_cast<double>(i) / 255));
+  }
+  SceneLinear out(codes.width(), codes.height());
+  for (int y = 0; y < codes.height(); ++y) {
+    const std::uint8_t* const row = codes.codes.row(y);
+    for (int x = 0; x < codes.width(); ++x) {
+      for (int c = 0; c < 3; ++c) out.plane[c].at(x, y) = light[row[3 * x + c]];
+    }
+  }
+  return out;
+}
+
+SeenDifference seen_difference(const Encoded8& first, const Encoded8& second, Executor& executor) {
+  const SceneLinear a = light_of_codes(first), b = light_of_codes(second);
+  return seen_difference(a.view(), b.view(), executor);
+}
+
+}  // namespace lowlux::isp
