@@ -344,16 +344,16 @@ void Stage::tell(const StageFacts& facts, lowlux_stage_result& out) const {
   out.black_from = source(decision.black, facts.black_from);
   out.noise_from = source(decision.noise, facts.noise_from);
   out.white_from = source(decision.white, LOWLUX_STAGE_FROM_PARAMS);
-  to_channels(plan.black.pedestal_dn, stream_->stream.phase, out.black_level);
+  to_channels(plan.levels.black.pedestal_dn, stream_->stream.phase, out.black_level);
   out.noise_gain = out.noise_read = 0;
   if (const auto& noise = pipeline.frame().noise; noise) {
-    const auto [inverse, square] = green_range(pipeline.frame().raw, plan.black);
+    const auto [inverse, square] = green_range(pipeline.frame().raw, plan.levels.black);
     out.noise_gain = static_cast<float>(noise->scale[1] / inverse);
     out.noise_read = static_cast<float>(std::sqrt(noise->offset[1] / square));
   }
-  out.colour_gains[0] = plan.white_gain[0] / plan.white_gain[1];
-  out.colour_gains[1] = plan.white_gain[2] / plan.white_gain[1];
-  out.exposure_ev = static_cast<float>(plan.exposure_ev);
+  out.colour_gains[0] = plan.rendering.white_gain[0] / plan.rendering.white_gain[1];
+  out.colour_gains[1] = plan.rendering.white_gain[2] / plan.rendering.white_gain[1];
+  out.exposure_ev = static_cast<float>(plan.rendering.exposure_ev);
   const auto& level = plan.noise_reduction.level;
   out.level = level ? static_cast<std::int32_t>(*level) + 1 : LOWLUX_STAGE_LEVEL_NONE;
   out.step = done() == asked_for(facts) ? LOWLUX_STAGE_STEP_ALL : static_cast<std::int32_t>(done());
@@ -361,8 +361,8 @@ void Stage::tell(const StageFacts& facts, lowlux_stage_result& out) const {
   const auto& temporal = plan.noise_reduction.temporal;
   out.temporal = temporal && !temporal->restart ? 1 : 0;
   out.moved = out.temporal == 1 ? static_cast<float>(pipeline.moved()) : 0;
-  out.scene_luminance_cd_m2 = plan.look ? static_cast<float>(plan.look->mean_cd_m2) : 0;
-  out.adaptation = plan.look ? static_cast<float>(plan.look->state.m) : 1;
+  out.scene_luminance_cd_m2 = plan.rendering.look ? static_cast<float>(plan.rendering.look->mean_cd_m2) : 0;
+  out.adaptation = plan.rendering.look ? static_cast<float>(plan.rendering.look->state.m) : 1;
 }
 
 void Stage::count(lowlux_stage_statistics& out) const {

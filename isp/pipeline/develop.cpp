@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "isp/pipeline/stage_clock.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "denoise/denoiser.h"
+#include "denoise/denoise_options.h"
 #include "denoise/lines/line_noise.h"
 #include "denoise/temporal/temporal.h"
 #include "isp/base/frame.h"
@@ -43,6 +43,12 @@ struct NoiseRegions {
   std::vector<std::optional<denoise::Level>> level;  // rows x columns; absent: noise stays, lines and dark charge go
 };
 
+/// The level of a frame, where it is decided together with everything else: see plan_effects.h.
+struct DecidedLevel {
+  std::optional<denoise::Level> level;
+  std::optional<NoiseRegions> regions;  // with levels of their own
+};
+
 /// What was decided: everything that reducing the noise of one frame takes. Sites as in the active area.
 struct NoiseReduction {
   std::optional<denoise::Level> level;  // absent: values stay as they are
@@ -54,6 +60,7 @@ struct NoiseReduction {
   std::vector<denoise::LineOffsets> lines;  // taken off before
   std::optional<TemporalReduction> temporal;
   std::optional<NoiseRegions> regions;  // set: their levels hold, and `level` does not
+  std::vector<std::string> warnings;    // what contradicts the noise model
 
   /// Whether some part of the frame has a level.
   bool has_level() const {

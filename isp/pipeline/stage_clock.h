@@ -4,9 +4,13 @@
 #include <string_view>
 #include <vector>
 
-#include "isp/pipeline/plan.h"
-
 namespace lowlux::isp {
+
+/// Time one step took.
+struct StageTime {
+  std::string_view stage;
+  double seconds;
+};
 
 /// Notes how long each step took: lap() names the time since the last one.
 class StageClock {

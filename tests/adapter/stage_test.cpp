@@ -5,6 +5,7 @@
 #include "calib/profile/profile_io.h"
 #include "isp/adapter/stage_profile.h"
 #include "isp/pipeline/develop.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/scratch_directory.h"

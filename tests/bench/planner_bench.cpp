@@ -17,7 +17,7 @@
 #include "isp/pipeline/budget/effect_candidates.h"
 #include "isp/pipeline/budget/visible_noise.h"
 #include "isp/pipeline/develop.h"
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "tests/scenarios/bench_raw.h"
 #include "tests/scenarios/planner_scene.h"
@@ -58,8 +58,9 @@ Predicted predicted(const BenchRaw& raw) {
   options.denoise.level = denoise::Level::draft;
   options.find_defects = false;
   const Result<DevelopPlan> plan = plan_develop(raw.frame, options, executor);
-  const Thumbnail thumbnail = make_thumbnail(raw.frame, plan->black, executor);
-  const auto blocks = seen_blocks(raw.frame, *plan, plan->noise_reduction.noise, thumbnail, executor);
+  const Thumbnail thumbnail = make_thumbnail(raw.frame, plan->levels.black, executor);
+  const auto blocks =
+      seen_blocks(raw.frame, options, plan->levels, plan->rendering, plan->noise_reduction.noise, thumbnail, executor);
   return {*plan->noise_reduction.snr, level_noise(blocks)};
 }
 

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "isp/pipeline/live/live_pipeline.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "tests/reference/denoise_ref.h"
 

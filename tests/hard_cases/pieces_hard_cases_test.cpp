@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "isp/pipeline/develop.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/frame_tiles.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "isp/pipeline/render/tile_renderer.h"
@@ -121,8 +122,8 @@ struct Part {
 double difference(const Part& a, const Part& b, int width, int height, const isp::DevelopPlan& plan) {
   double worst = 0;
   for (std::size_t c = 0; c < 3; ++c) {
-    const double unit =
-        (*plan.electrons_at_white)[0] / plan.white_gain[c] / std::sqrt(mean_e + read_noise_e * read_noise_e);
+    const double unit = (*plan.levels.electrons_at_white)[0] / plan.rendering.white_gain[c] /
+                        std::sqrt(mean_e + read_noise_e * read_noise_e);
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
         const auto one = static_cast<double>(a.picture.plane[c].at(a.x + x, a.y + y));

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "isp/pipeline/develop.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "tests/support/frames.h"
 #include "tests/support/raw_frames.h"
 
@@ -85,8 +86,8 @@ TEST(DevelopWithDarkFrame, ThePatternGoesAndThePictureStays) {
     ASSERT_TRUE(a && b);
     EXPECT_LT(largest_difference(a->picture, b->picture), 2e-6);
     // The hot pixel is no defect once its dark is off; without a dark frame it is.
-    EXPECT_TRUE(b->plan.defects.empty());
-    EXPECT_EQ(plan_develop(patterned, camera_float, executor)->defects, (std::vector<Pixel>{{20, 21}}));
+    EXPECT_TRUE(b->plan.levels.defects.empty());
+    EXPECT_EQ(plan_develop(patterned, camera_float, executor)->levels.defects, (std::vector<Pixel>{{20, 21}}));
   }
 }
 
@@ -102,9 +103,9 @@ TEST(DevelopWithDarkFrame, PixelsWhoseDarkIsUnknownAreRepairedAndWarningsPassedO
   options.dark_frame = dark;
   const auto repaired = develop(broken, options, executor);
   ASSERT_TRUE(repaired);
-  EXPECT_EQ(repaired->plan.defects, (std::vector<Pixel>{{20, 21}}));
+  EXPECT_EQ(repaired->plan.levels.defects, (std::vector<Pixel>{{20, 21}}));
   EXPECT_EQ(repaired->plan.warnings.back(), "so it is");
-  EXPECT_EQ(repaired->plan.black.source, BlackPoint::Source::dark_frame);
+  EXPECT_EQ(repaired->plan.levels.black.source, BlackPoint::Source::dark_frame);
   const auto sound = develop(scene(SensorLayout::bayer), options, executor);
   ASSERT_TRUE(sound);
   EXPECT_LT(largest_difference(repaired->picture, sound->picture), 2e-6);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "tests/support/frames.h"
 
@@ -99,7 +100,7 @@ TEST(Develop, NamedDefectsAreRepaired) {
   DevelopOptions options = linear_float;
   options.find_defects = false;
   EXPECT_LT(largest_difference(float_picture(sound, options), float_picture(broken, options)), 1e-6);
-  EXPECT_EQ(plan_develop(broken, options, executor)->defects.size(), 2u);
+  EXPECT_EQ(plan_develop(broken, options, executor)->levels.defects.size(), 2u);
 }
 
 TEST(Develop, DefaultCropIsAWindowOfTheActiveArea) {

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "tests/pipeline/night_frames.h"
 #include "tests/support/reference_cost.h"
 

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "isp/pipeline/finished/clean_raw.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/frame_tiles.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "tests/pipeline/live_frames.h"
@@ -84,7 +85,7 @@ SceneLinear rendered(const Case& of, const DevelopPlan& plan, const TileLimits& 
 /// Electrons for a sample of 1 of each colour. At a site of its own colour, demosaicing changes nothing.
 std::array<double, 3> unit_e(const DevelopPlan& plan) {
   std::array<double, 3> out{};
-  for (std::size_t c = 0; c < 3; ++c) out[c] = test::night_full_e() / plan.white_gain[c];
+  for (std::size_t c = 0; c < 3; ++c) out[c] = test::night_full_e() / plan.rendering.white_gain[c];
   return out;
 }
 

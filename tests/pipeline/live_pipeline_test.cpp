@@ -9,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "isp/pipeline/plan/plan_develop.h"
 #include "tests/pipeline/live_frames.h"
 
 namespace lowlux::isp {
@@ -52,16 +53,16 @@ TEST(LivePipeline, DecidesAndRendersAsDevelopDoesOfTheSameFacts) {
     if (level) facts.denoise = {.mode = LiveDenoise::Mode::level, .level = denoise::Level::draft};
     ASSERT_TRUE(live->plan(facts));
     const DevelopPlan& plan = live->decided();
-    EXPECT_EQ(plan.black.pedestal_dn, expected->black.pedestal_dn);
-    EXPECT_EQ(plan.electrons_at_white.has_value(), level);
-    EXPECT_EQ(expected->electrons_at_white.has_value(), level);
-    EXPECT_EQ(plan.neutral, expected->neutral);
-    EXPECT_EQ(plan.white_gain, expected->white_gain);
-    EXPECT_EQ(plan.exposure_ev, expected->exposure_ev);
-    EXPECT_EQ(plan.exposure_rule, expected->exposure_rule);
-    EXPECT_GT(plan.exposure_ev, 1);
-    EXPECT_EQ(plan.transform.matrix, expected->transform.matrix);
-    EXPECT_EQ(plan.tone.code8, expected->tone.code8);
+    EXPECT_EQ(plan.levels.black.pedestal_dn, expected->levels.black.pedestal_dn);
+    EXPECT_EQ(plan.levels.electrons_at_white.has_value(), level);
+    EXPECT_EQ(expected->levels.electrons_at_white.has_value(), level);
+    EXPECT_EQ(plan.rendering.neutral, expected->rendering.neutral);
+    EXPECT_EQ(plan.rendering.white_gain, expected->rendering.white_gain);
+    EXPECT_EQ(plan.rendering.exposure_ev, expected->rendering.exposure_ev);
+    EXPECT_EQ(plan.rendering.exposure_rule, expected->rendering.exposure_rule);
+    EXPECT_GT(plan.rendering.exposure_ev, 1);
+    EXPECT_EQ(plan.rendering.transform.matrix, expected->rendering.transform.matrix);
+    EXPECT_EQ(plan.rendering.tone.code8, expected->rendering.tone.code8);
     EXPECT_EQ(plan.from_codes, !level);
     for (int c = 0; level && c < 3; ++c) {
       const auto& noise = plan.noise_reduction.noise;

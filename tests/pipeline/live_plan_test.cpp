@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "isp/pipeline/noise_reduction.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "tests/pipeline/live_frames.h"
 
 namespace lowlux::isp {
@@ -25,13 +26,13 @@ TEST(LivePlanner, ExposureFollowsAStepInLightAndSettlesWithinATenth) {
   const RawFrame dark = night(waves(40)), bright = night(waves(400));
   DevelopOptions options;
   options.find_defects = false;
-  const double from = plan_develop(dark, options, one)->exposure_ev;
-  const double to = plan_develop(bright, options, one)->exposure_ev;
+  const double from = plan_develop(dark, options, one)->rendering.exposure_ev;
+  const double to = plan_develop(bright, options, one)->rendering.exposure_ev;
   ASSERT_GT(from, to + 1);
   const auto live = live_of(setup_of(dark), one);
   read(*live, dark);
   ASSERT_TRUE(live->plan(known()));
-  EXPECT_EQ(live->decided().exposure_ev, from);
+  EXPECT_EQ(live->decided().rendering.exposure_ev, from);
   read(*live, bright);
   double expected = from;
   const int frames = static_cast<int>(std::ceil(std::log(0.1 / (from - to)) / std::log(0.85)));
@@ -39,12 +40,12 @@ TEST(LivePlanner, ExposureFollowsAStepInLightAndSettlesWithinATenth) {
     ASSERT_TRUE(live->plan(known()));
     // A share of 0.15 of the way with each frame, until a tenth is left.
     expected = to + (from - to) * std::pow(0.85, std::min(i, frames));
-    EXPECT_NEAR(live->decided().exposure_ev, expected, 1e-9) << "frame " << i;
+    EXPECT_NEAR(live->decided().rendering.exposure_ev, expected, 1e-9) << "frame " << i;
   }
-  EXPECT_LE(live->decided().exposure_ev - to, 0.1);
+  EXPECT_LE(live->decided().rendering.exposure_ev - to, 0.1);
   live->reset();
   ASSERT_TRUE(live->plan(known()));
-  EXPECT_EQ(live->decided().exposure_ev, to);
+  EXPECT_EQ(live->decided().rendering.exposure_ev, to);
 }
 
 /// Facts with so many times the gain: fewer electrons of the same codes.
@@ -112,7 +113,7 @@ TEST(LivePlanner, LevelsGoNoHigherThanAFrameMayHaveAndTellWhatTheyWouldHaveBeen)
       EXPECT_EQ(live->decided().noise_reduction.level, std::min(most, free->decided().noise_reduction.level));
       EXPECT_EQ(live->decision().level, free->decided().noise_reduction.level) << "as if there were no bound";
       EXPECT_TRUE(live->decision().reducible);
-      EXPECT_EQ(live->decided().exposure_ev, free->decided().exposure_ev);
+      EXPECT_EQ(live->decided().rendering.exposure_ev, free->decided().rendering.exposure_ev);
     }
   }
 }
@@ -161,7 +162,8 @@ TEST(LivePlanner, BlackIsGivenElseMaskedElseTheDarkestPlace) {
   read(*whole, frame);
   ASSERT_TRUE(whole->plan(facts));
   EXPECT_EQ(whole->decision().black, LiveSource::frame);
-  for (const double dn : whole->decided().black.pedestal_dn) EXPECT_NEAR(dn, test::night_black_dn, 3.1);  // 3 of a tile
+  for (const double dn : whole->decided().levels.black.pedestal_dn)
+    EXPECT_NEAR(dn, test::night_black_dn, 3.1);  // 3 of a tile
   LiveSetup setup = setup_of(frame);
   setup.active = {0, 4, 256, 196};
   setup.masked = {{0, 0, 256, 4}};
@@ -172,10 +174,10 @@ TEST(LivePlanner, BlackIsGivenElseMaskedElseTheDarkestPlace) {
   read(*bordered, frame);
   ASSERT_TRUE(bordered->plan(facts));
   EXPECT_EQ(bordered->decision().black, LiveSource::masked_pixels);
-  EXPECT_EQ(bordered->decided().black.pedestal_dn, (PerSite<double>{500, 501, 502, 503}));
+  EXPECT_EQ(bordered->decided().levels.black.pedestal_dn, (PerSite<double>{500, 501, 502, 503}));
   ASSERT_TRUE(bordered->plan(known()));
   EXPECT_EQ(bordered->decision().black, LiveSource::given);
-  EXPECT_EQ(bordered->decided().black.pedestal_dn, *known().black_dn);
+  EXPECT_EQ(bordered->decided().levels.black.pedestal_dn, *known().black_dn);
 }
 
 TEST(LivePlanner, SaturationKeepsLuminanceAndTheGivenMatrixIsTaken) {
@@ -187,15 +189,16 @@ TEST(LivePlanner, SaturationKeepsLuminanceAndTheGivenMatrixIsTaken) {
   facts.exposure_ev = 0;
   facts.colour_matrix = Matrix3{{{1.6, -0.5, -0.1}, {-0.2, 1.5, -0.3}, {0.1, -0.6, 1.5}}};
   const auto weights_of_luminance = [&] {
-    const RgbTransform& t = live->decided().transform;
+    const RgbTransform& t = live->decided().rendering.transform;
     std::array<double, 3> out{};
     for (std::size_t i = 0; i < 9; ++i) out[i % 3] += static_cast<double>(t.luminance[i / 3] * t.matrix[i]);
     return out;
   };
   ASSERT_TRUE(live->plan(facts));
-  EXPECT_EQ(live->decided().exposure_rule, "given");
+  EXPECT_EQ(live->decided().rendering.exposure_rule, "given");
   for (std::size_t i = 0; i < 9; ++i) {
-    EXPECT_NEAR(live->decided().transform.matrix[i], (*facts.colour_matrix)[i / 3][i % 3], 1e-6);  // 0 EV: limit 1
+    EXPECT_NEAR(live->decided().rendering.transform.matrix[i], (*facts.colour_matrix)[i / 3][i % 3],
+                1e-6);  // 0 EV: limit 1
   }
   const std::array<double, 3> expected = weights_of_luminance();
   for (const double saturation : {0.0, 0.5, 1.3, 4.0}) {
@@ -205,7 +208,7 @@ TEST(LivePlanner, SaturationKeepsLuminanceAndTheGivenMatrixIsTaken) {
   }
   facts.saturation = 0;
   ASSERT_TRUE(live->plan(facts));
-  const auto& grey = live->decided().transform.matrix;
+  const auto& grey = live->decided().rendering.transform.matrix;
   for (std::size_t i = 3; i < 9; ++i) EXPECT_NEAR(grey[i], grey[i - 3], 1e-6);
 }
 
@@ -218,7 +221,7 @@ TEST(LivePlanner, FramesBeforeKeepTheirScaleWhereTheUnitOfElectronsMoves) {
   LiveFacts facts = known();
   facts.noise.reset();  // measured on each frame, and followed slowly
   const auto e_per_dn = [&] {
-    return (*live->decided().electrons_at_white)[0] / (test::night_white_dn - test::night_black_dn);
+    return (*live->decided().levels.electrons_at_white)[0] / (test::night_white_dn - test::night_black_dn);
   };
   double before = 0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {

@@ -200,17 +200,17 @@ TEST(EyeLook, SaysWhatItIsMissing) {
   frame.raw.info.f_number = 2;
   const auto known = develop(frame, options, executor);
   ASSERT_TRUE(known) << known.error().message;
-  EXPECT_EQ(known->plan.look->luminance_rule, "exposure");
+  EXPECT_EQ(known->plan.rendering.look->luminance_rule, "exposure");
   frame.raw.info.iso.reset();
   EXPECT_FALSE(develop(frame, options, executor));
   options.look.profile_iso = 1600;
   const auto profiled = develop(frame, options, executor);
   ASSERT_TRUE(profiled);
-  EXPECT_EQ(profiled->plan.look->luminance_rule, "profile");
-  EXPECT_EQ(profiled->plan.look->mean_cd_m2, known->plan.look->mean_cd_m2);
+  EXPECT_EQ(profiled->plan.rendering.look->luminance_rule, "profile");
+  EXPECT_EQ(profiled->plan.rendering.look->mean_cd_m2, known->plan.rendering.look->mean_cd_m2);
   // 78 N^2 / (0.65 S t) is 3 cd/m2 at saturation.
-  EXPECT_LT(known->plan.look->mean_cd_m2, 3);
-  EXPECT_GT(known->plan.look->mean_cd_m2, 0.1);
+  EXPECT_LT(known->plan.rendering.look->mean_cd_m2, 3);
+  EXPECT_GT(known->plan.rendering.look->mean_cd_m2, 0.1);
 }
 
 TEST(EyeLook, RefusesFiguresThatCannotBe) {
@@ -238,13 +238,14 @@ TEST(EyeLook, DimsOnlyAnAutomaticExposure) {
   InlineExecutor executor;
   DevelopOptions options = eye_at(0.01);
   const auto given = develop(coloured_frame(), options, executor);
-  EXPECT_EQ(given->plan.exposure_ev, 0);
+  EXPECT_EQ(given->plan.rendering.exposure_ev, 0);
   options.exposure_ev.reset();
   const auto dimmed = develop(coloured_frame(), options, executor);
   options.look.dimming = 0;
   const auto bright = develop(coloured_frame(), options, executor);
-  EXPECT_LT(dimmed->plan.look->dimming_ev, -0.5);
-  EXPECT_NEAR(dimmed->plan.exposure_ev, bright->plan.exposure_ev + dimmed->plan.look->dimming_ev, 1e-12);
+  EXPECT_LT(dimmed->plan.rendering.look->dimming_ev, -0.5);
+  EXPECT_NEAR(dimmed->plan.rendering.exposure_ev,
+              bright->plan.rendering.exposure_ev + dimmed->plan.rendering.look->dimming_ev, 1e-12);
 }
 
 // A grey in the dark, by codes and by what the noise model says: its noise as it comes out, in L*.

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "isp/pipeline/develop.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "tests/pipeline/night_frames.h"
 

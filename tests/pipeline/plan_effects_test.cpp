@@ -16,6 +16,7 @@
 #include "isp/pipeline/budget/frame_sample.h"
 #include "isp/pipeline/budget/visible_noise.h"
 #include "isp/pipeline/develop.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/plan/plan_regions.h"
 #include "tests/pipeline/night_frames.h"
 #include "tests/support/reference_cost.h"
@@ -70,7 +71,7 @@ TEST(VisibleNoise, OfAGreyIsWhatFramesDifferBy) {
   DevelopOptions options = planned_options(0.5);
   const auto plan = plan_develop(frame, options, executor);
   ASSERT_TRUE(plan);
-  const Thumbnail thumbnail = make_thumbnail(frame, plan->black, executor);
+  const Thumbnail thumbnail = make_thumbnail(frame, plan->levels.black, executor);
   denoise::RawNoise noise = plan->noise_reduction.noise;
   DevelopPlan with_electrons = *plan_develop(
       frame,
@@ -80,7 +81,8 @@ TEST(VisibleNoise, OfAGreyIsWhatFramesDifferBy) {
       }(),
       executor);
   noise = with_electrons.noise_reduction.noise;
-  const auto blocks = seen_blocks(frame, with_electrons, noise, thumbnail, executor);
+  const auto blocks = seen_blocks(frame, with_electrons.options, with_electrons.levels, with_electrons.rendering, noise,
+                                  thumbnail, executor);
   ASSERT_FALSE(blocks.empty());
   for (const SeenBlock& block : blocks) {
     EXPECT_NEAR(block.snr, 17, 1.5);  // mean of 200, 400, 400 and 250 e-, its noise and that of readout
@@ -88,6 +90,10 @@ TEST(VisibleNoise, OfAGreyIsWhatFramesDifferBy) {
     EXPECT_LT(block.noise_delta_e, 3.0f);
     EXPECT_EQ(block.dark_delta_e, 0);
   }
+}
+
+std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopPlan& plan, const Thumbnail& thumbnail) {
+  return seen_blocks(frame, plan.options, plan.levels, plan.rendering, plan.noise_reduction.noise, thumbnail, executor);
 }
 
 DevelopPlan exposed(const RawFrame& frame, double ev) {
@@ -105,8 +111,8 @@ TEST(VisibleNoise, SurroundingsAreBrighterBesideALamp) {
     for (int x = middle; x < frame.raw.dn.width(); ++x) frame.raw.dn.at(x, y) = 3500;
   }
   const DevelopPlan plan = exposed(frame, 0);
-  const Thumbnail thumbnail = make_thumbnail(frame, plan.black, executor);
-  const auto blocks = seen_blocks(frame, plan, plan.noise_reduction.noise, thumbnail, executor);
+  const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, executor);
+  const auto blocks = seen_blocks(frame, plan, thumbnail);
   int beside = 0;
   for (const SeenBlock& block : blocks) {
     const double away_px = (0.5 - static_cast<double>(block.x)) * frame.raw.active.width;
@@ -128,8 +134,8 @@ TEST(VisibleNoise, ClippingAtBlackIsSeenInTheDark) {
   for (const auto& [green_e, seen] : {std::pair{1.0, true}, std::pair{400.0, false}}) {
     const RawFrame frame = grey(green_e);
     const DevelopPlan plan = exposed(frame, 5);
-    const Thumbnail thumbnail = make_thumbnail(frame, plan.black, executor);
-    for (const SeenBlock& block : seen_blocks(frame, plan, plan.noise_reduction.noise, thumbnail, executor)) {
+    const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, executor);
+    for (const SeenBlock& block : seen_blocks(frame, plan, thumbnail)) {
       if (seen) {
         EXPECT_GT(block.clip_delta_e, 0.02f);
         EXPECT_GT(left_delta_e(std::nullopt, block), block.clip_delta_e);
@@ -150,8 +156,8 @@ RawFrame two_greys(double left_e, double right_e, int edge_px, int width, int he
 
 void expect_work(const RawFrame& frame, std::array<double, 3> start, std::array<double, 3> work) {
   const DevelopPlan plan = exposed(frame, 0);
-  const Thumbnail thumbnail = make_thumbnail(frame, plan.black, executor);
-  const ChromaWork found = chroma_work(frame, plan, plan.noise_reduction.noise, thumbnail);
+  const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, executor);
+  const ChromaWork found = chroma_work(frame, plan.levels, plan.noise_reduction.noise, thumbnail);
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_NEAR(found.start[i], start[i], 1e-12) << "level " << i;
     EXPECT_NEAR(found.work[i], work[i], 1e-12) << "level " << i;
@@ -258,7 +264,7 @@ TEST(PlanEffects, DarkChargeIsLeftInWhereItCannotBeSeen) {
   const auto small = plan_develop(frame, options, executor);
   ASSERT_TRUE(small);
   EXPECT_FALSE(small->effects->dark);
-  EXPECT_EQ(small->black.dark_mean_e, PerSite<double>{});
+  EXPECT_EQ(small->levels.black.dark_mean_e, PerSite<double>{});
 }
 
 // Known dark charge is no light: it must not darken the automatic exposure.
@@ -271,7 +277,7 @@ TEST(PlanEffects, DarkChargeDoesNotCountForTheExposure) {
     Camera camera;
     camera.dark_e.fill(dark_e);
     const RawFrame frame = test::night_frame(camera, flat(0.5 * signal_e, signal_e, 0.625 * signal_e), 256, 256);
-    return plan_develop(frame, options, executor)->exposure_ev;
+    return plan_develop(frame, options, executor)->rendering.exposure_ev;
   };
   EXPECT_NEAR(with(300, 300), with(300, 0), 0.05);
 }
@@ -280,10 +286,10 @@ TEST(FrameSample, LargeFramesAreSampledAtEvenPlacesAndSmallOnesWhole) {
   const RawFrame small = grey(40);
   const auto plan = plan_develop(small, {}, executor);
   ASSERT_TRUE(plan);
-  EXPECT_TRUE(sample_squares(small, *plan).empty());
+  EXPECT_TRUE(sample_squares(small, plan->levels).empty());
   RawFrame large;
   large.raw.active = {3, 5, 4001, 3001};
-  const auto squares = sample_squares(large, *plan);
+  const auto squares = sample_squares(large, plan->levels);
   ASSERT_EQ(squares.size(), 6);
   for (const Rect& square : squares) {
     EXPECT_EQ(square.x % 2, 0);

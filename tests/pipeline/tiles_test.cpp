@@ -4,6 +4,7 @@
 #include <cstring>
 #include <string>
 
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/frame_tiles.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "isp/pipeline/render/pipeline_memory.h"
@@ -118,7 +119,7 @@ TEST(Tiles, WithoutNoiseReductionTheBitsAreThoseOfTheWholeFrame) {
           DevelopOptions options = options_for({}, samples);
           options.half = half;
           const DevelopPlan plan = planned(frame, options);
-          EXPECT_GE(plan.defects.size(), 6U);
+          EXPECT_GE(plan.levels.defects.size(), 6U);
           EXPECT_TRUE(same_bits(rendered(frame, plan, small_tiles), rendered(frame, plan, never)))
               << static_cast<int>(phase) << electrons << static_cast<int>(samples) << half;
         }
@@ -152,7 +153,8 @@ Difference difference(const Picture& tiled, const Picture& whole, const DevelopP
   Difference out;
   double sum = 0;
   for (int c = 0; c < 3; ++c) {
-    const double unit = (*plan.electrons_at_white)[0] / plan.white_gain[c] / std::sqrt(mean_e + 1.5 * 1.5);
+    const double unit =
+        (*plan.levels.electrons_at_white)[0] / plan.rendering.white_gain[c] / std::sqrt(mean_e + 1.5 * 1.5);
     for (std::size_t i = 0; i < a.plane[c].size(); ++i) {
       const double d = unit * (a.plane[c].data()[i] - b.plane[c].data()[i]);
       sum += d * d;
@@ -203,7 +205,8 @@ TEST(Tiles, StarsAtASeamAreFoundAsInTheWholeFrame) {
   DevelopPlan plan = planned(frame, options);
   const auto star_e = [&](const TileLimits& limits) {
     const Picture out = rendered(frame, plan, limits);
-    return std::get<SceneLinear>(out).plane[1].at(star_x, star_y) * (*plan.electrons_at_white)[1] / plan.white_gain[1];
+    return std::get<SceneLinear>(out).plane[1].at(star_x, star_y) * (*plan.levels.electrons_at_white)[1] /
+           plan.rendering.white_gain[1];
   };
   const double measured_e = (frame.raw.dn.at(star_x, star_y) - test::night_black_dn) / test::night_gain_dn_per_e;
   EXPECT_NEAR(star_e(small_tiles), measured_e, 0.01);  // as measured, but for what is behind it
@@ -232,9 +235,9 @@ TEST(Tiles, OnlyLargeFramesWithAMosaicOfTheirOwnAreCutUp) {
   plan.noise_reduction.temporal = TemporalReduction{};
   EXPECT_FALSE(cut_up(0));
   plan.noise_reduction.temporal.reset();
-  plan.look = LookPlan{.noise_limit = 2};
+  plan.rendering.look = LookPlan{.noise_limit = 2};
   EXPECT_FALSE(cut_up(0));
-  plan.look.reset();
+  plan.rendering.look.reset();
   plan.from_codes = true;
   EXPECT_FALSE(cut_up(0));
   plan.from_codes = false;
@@ -369,7 +372,7 @@ double bytes_per_pixel(int width, int height, SampleType samples) {
   plan.options.samples = samples;
   plan.width = width;
   plan.height = height;
-  plan.electrons_at_white = PerSite<double>{1000, 1000, 1000, 1000};
+  plan.levels.electrons_at_white = PerSite<double>{1000, 1000, 1000, 1000};
   plan.noise_reduction.level = Level::standard;
   const double pixels = static_cast<double>(width) * height;
   return 2 + (samples == SampleType::u8 ? 3 : 6) + static_cast<double>(pipeline_bytes(raw, plan, 8)) / pixels;

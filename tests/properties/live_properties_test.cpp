@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "isp/pipeline/live/live_pipeline.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "tests/pipeline/live_frames.h"
 #include "tests/properties/draws.h"
 

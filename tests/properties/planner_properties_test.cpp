@@ -13,6 +13,7 @@
 #include "isp/pipeline/budget/cost_model.h"
 #include "isp/pipeline/budget/effect_candidates.h"
 #include "isp/pipeline/budget/plan_effects.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "tests/pipeline/night_frames.h"
 #include "tests/properties/draws.h"
 #include "tests/support/reference_cost.h"

@@ -47,7 +47,7 @@ TEST(PlannerPromise, WhatIsLeftOutStaysBelowTheToleranceOver300Scenes) {
       const std::string_view level = planned.plan.effects->level ? name_of(*planned.plan.effects->level) : "none";
       std::printf("  scene %u: %.3f of its tolerance; %s e-, read noise %.2f, level %s%s\n", i, of_tolerance.back(),
                   name_of(scene.light).c_str(), scene.light.read_noise_e, std::string(level).c_str(),
-                  planned.plan.look ? ", eye" : "");
+                  planned.plan.rendering.look ? ", eye" : "");
     }
     saved.push_back(1 - *planned.plan.effects->predicted_s / *everything.plan.effects->predicted_s);
     ++levels[planned.plan.effects->level ? 1 + static_cast<std::size_t>(*planned.plan.effects->level) : 0];

@@ -19,6 +19,7 @@
 #include "isp/bench/stages/developing_stages.h"
 #include "isp/metrics/picture_metrics.h"
 #include "isp/pipeline/develop.h"
+#include "isp/pipeline/plan/plan_develop.h"
 
 namespace lowlux::isp {
 namespace {
@@ -101,7 +102,7 @@ Result<std::vector<Scene>> scenes_of(const std::vector<SimulatedRaws>& raws, con
     const PlanChoice untouched{.repairs = false};
     const auto automatic = plan_develop(of.mean, options_of(untouched, Look::camera, light, {}), executor);
     if (!automatic) return tl::make_unexpected(automatic.error());
-    const double ev = automatic->exposure_ev;
+    const double ev = automatic->rendering.exposure_ev;
     const auto truth = develop(of.mean, options_of(untouched, look, light, ev), executor);
     if (!truth) return tl::make_unexpected(truth.error());
     const SceneLinear light_of_truth = linear_of(codes_of(*truth));

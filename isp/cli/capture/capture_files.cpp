@@ -13,6 +13,7 @@
 #include "isp/cli/shared/profile_option.h"
 #include "isp/output/dng/dng_writer.h"
 #include "isp/output/picture/image_writer.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "isp/pipeline/stage_clock.h"
 

@@ -8,7 +8,7 @@
 
 #include "isp/cli/develop/look_args.h"
 #include "isp/cli/info/advise_args.h"
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/options.h"
 
 namespace CLI {
 class App;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/options.h"
 #include "isp/pipeline/plan/look.h"
 
 namespace CLI {

@@ -1,6 +1,7 @@
 #include "isp/cli/shared/explain_text.h"
 
 #include <cmath>
+#include <span>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -65,7 +66,15 @@ void add_effects(Lines& out, const isp::EffectsPlan& effects, const isp::Effects
 }
 
 std::string look_name(const isp::DevelopPlan& plan) {
-  return plan.look->kind == isp::Look::model ? plan.options.look.model : "eye";
+  return plan.rendering.look->kind == isp::Look::model ? plan.options.look.model : "eye";
+}
+
+void add_look_effects(Lines& out, std::span<const isp::LookEffect> effects) {
+  for (const isp::LookEffect& effect : effects) {
+    const std::string size = std::isfinite(effect.size) ? fmt::format("up to {:.2g} CIEDE2000", effect.size)
+                                                        : std::string("a matter of taste");
+    out.add("", fmt::format("{} {}: {}", effect.name, effect.used ? "shown" : "left out", size));
+  }
 }
 
 void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, const std::string& coefficients,
@@ -73,11 +82,7 @@ void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, co
   if (look.kind != isp::Look::camera) {
     out.add("look", fmt::format("{}; scene {:.3g} cd/m2 ({}), adaptation m {:.2f}, {:+.2f} EV of darkness kept", name,
                                 look.mean_cd_m2, look.luminance_rule, look.state.m, look.dimming_ev));
-    for (const isp::LookEffect& effect : look.effects) {
-      const std::string size = std::isfinite(effect.size) ? fmt::format("up to {:.2g} CIEDE2000", effect.size)
-                                                          : std::string("a matter of taste");
-      out.add("", fmt::format("{} {}: {}", effect.name, effect.used ? "shown" : "left out", size));
-    }
+    if (look.effects) add_look_effects(out, *look.effects);
   }
   if (look.table) {
     out.add("", fmt::format(
@@ -96,20 +101,22 @@ void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, co
 
 std::string explain_text(const isp::DevelopPlan& plan) {
   Lines out;
-  out.add("black [DN]",
-          fmt::format("{:.2f} from {}{}", fmt::join(plan.black.pedestal_dn, " "), name_of(plan.black.source),
-                      plan.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", dark charge in it" : ""));
+  out.add(
+      "black [DN]",
+      fmt::format("{:.2f} from {}{}", fmt::join(plan.levels.black.pedestal_dn, " "), name_of(plan.levels.black.source),
+                  plan.levels.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", dark charge in it" : ""));
   if (plan.effects) add_effects(out, *plan.effects, *plan.options.effects);
-  out.add("defects", fmt::format("{} pixels repaired", plan.defects.size()));
+  out.add("defects", fmt::format("{} pixels repaired", plan.levels.defects.size()));
   add_noise(out, plan.noise_reduction);
-  out.add("white", plan.white ? fmt::format("{}, {:.0f} K", plan.white_balance_rule, plan.white->cct_k)
-                              : std::string(plan.white_balance_rule));
-  out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.exposure_ev, plan.exposure_rule));
-  if (plan.look)
-    add_look(out, *plan.look, look_name(plan), coefficients_of(plan.options.look),
-             plan.look->noise || plan.noise_reduction.has_level());
-  if (plan.options.display) {
-    const isp::DisplayTarget& display = *plan.options.display;
+  out.add("white", plan.rendering.white
+                       ? fmt::format("{}, {:.0f} K", plan.rendering.white_balance_rule, plan.rendering.white->cct_k)
+                       : std::string(plan.rendering.white_balance_rule));
+  out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.rendering.exposure_ev, plan.rendering.exposure_rule));
+  if (plan.rendering.look)
+    add_look(out, *plan.rendering.look, look_name(plan), coefficients_of(plan.options.look),
+             plan.rendering.look->noise || plan.noise_reduction.has_level());
+  if (plan.display) {
+    const isp::DisplayTarget& display = *plan.display;
     out.add("display", fmt::format("{:g} to {:g} cd/m2, coefficients {}, table off by {:.2f} CIEDE2000 in the mean",
                                    display.source_cd_m2, display.display_cd_m2, display.coefficients,
                                    display.made.error.mean_ciede2000));

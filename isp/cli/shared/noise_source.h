@@ -3,7 +3,7 @@
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/options.h"
 
 namespace lowlux::cli {
 

@@ -6,7 +6,7 @@
 #include "isp/cli/develop/develop_args.h"
 #include "isp/model/appearance/shin_table.h"
 #include "isp/output/picture/image_writer.h"
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/options.h"
 
 /// What verbs that make pictures of raw frames do with their options.
 

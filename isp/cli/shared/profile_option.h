@@ -6,7 +6,7 @@
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 #include "isp/output/atomic_file.h"
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/options.h"
 
 namespace lowlux::cli {
 

@@ -55,11 +55,11 @@ Json tag_json(const std::optional<BlackLevel>& tag) {
 }
 
 Json white_json(const isp::DevelopPlan& plan) {
-  Json json{{"rule", plan.white_balance_rule}, {"neutral", plan.neutral}};
-  if (plan.white) {
-    json["cct_k"] = plan.white->cct_k;
-    json["duv"] = plan.white->duv;
-    json["xy"] = {plan.white->xy.x, plan.white->xy.y};
+  Json json{{"rule", plan.rendering.white_balance_rule}, {"neutral", plan.rendering.neutral}};
+  if (plan.rendering.white) {
+    json["cct_k"] = plan.rendering.white->cct_k;
+    json["duv"] = plan.rendering.white->duv;
+    json["xy"] = {plan.rendering.white->xy.x, plan.rendering.white->xy.y};
   }
   return json;
 }
@@ -105,8 +105,8 @@ Json effects_json(const isp::DevelopPlan& plan) {
 }
 
 Json look_json(const isp::DevelopPlan& plan) {
-  if (!plan.look) return nullptr;
-  const isp::LookPlan& look = *plan.look;
+  if (!plan.rendering.look) return nullptr;
+  const isp::LookPlan& look = *plan.rendering.look;
   const std::string& model = plan.options.look.model;
   const bool noise_known = look.noise || plan.noise_reduction.has_level();
   const std::string name = look.kind == isp::Look::model ? model : look.kind == isp::Look::eye ? "eye" : "camera";
@@ -124,7 +124,8 @@ Json look_json(const isp::DevelopPlan& plan) {
   json["white_scotopic_ratio"] = look.look.scotopic_ratio_of_white;
   json["dimming_ev"] = look.dimming_ev;
   json["effects"] = Json::array();
-  for (const isp::LookEffect& effect : look.effects) {
+  if (!look.effects) return json;
+  for (const isp::LookEffect& effect : *look.effects) {
     json["effects"].push_back({{"name", effect.name},
                                {"ciede2000", std::isfinite(effect.size) ? Json(effect.size) : Json(nullptr)},
                                {"shown", effect.used}});
@@ -173,18 +174,18 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"output", outcome.output},
             {"width", outcome.width},
             {"height", outcome.height},
-            {"black", black_json(plan.black)},
-            {"dark_frame", dark_json(plan.options.dark_frame.get())},
-            {"unit", plan.electrons_at_white ? "electrons" : "fraction-of-white"},
+            {"black", black_json(plan.levels.black)},
+            {"dark_frame", dark_json(plan.levels.dark_frame.get())},
+            {"unit", plan.levels.electrons_at_white ? "electrons" : "fraction-of-white"},
             {"white_balance", white_json(plan)},
-            {"exposure", {{"ev", plan.exposure_ev}, {"rule", plan.exposure_rule}}},
-            {"defects_repaired", plan.defects.size()},
+            {"exposure", {{"ev", plan.rendering.exposure_ev}, {"rule", plan.rendering.exposure_rule}}},
+            {"defects_repaired", plan.levels.defects.size()},
             {"effects", effects_json(plan)},
             {"denoise", noise_json(plan.noise_reduction)},
             {"look", look_json(plan)},
             {"warnings", plan.warnings}};
-  if (plan.options.display) {
-    const isp::DisplayTarget& display = *plan.options.display;
+  if (plan.display) {
+    const isp::DisplayTarget& display = *plan.display;
     json["display"] = {{"source_cd_m2", display.source_cd_m2},
                        {"display_cd_m2", display.display_cd_m2},
                        {"coefficients", display.coefficients},

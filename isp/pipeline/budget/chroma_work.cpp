@@ -76,21 +76,21 @@ std::vector<Tile> tiles_of(const Axis& across, const Axis& down, const CameraRgb
 
 }  // namespace
 
-ChromaWork chroma_work(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
+ChromaWork chroma_work(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
                        const Thumbnail& thumbnail) {
   const double dark_e = mean_of_sites(noise.dark_mean_e), variance_e2 = mean_of_colours(noise.variance_e2);
   const Rect& active = frame.raw.active;
   const Axis across = axis_of(active.width, thumbnail.mean.width());
   const Axis down = axis_of(active.height, thumbnail.mean.height());
-  const std::vector<Tile> tiles = tiles_of(across, down, thumbnail.mean, electrons_by_colour(frame.raw, plan));
-  const int levels = denoise::levels_of(across.cells, down.cells);
+  const std::vector<Tile> tiles = tiles_of(across, down, thumbnail.mean, electrons_by_colour(frame.raw, levels));
+  const int pyramid_levels = denoise::levels_of(across.cells, down.cells);
   const std::size_t count = tiles.size();
   std::vector<float> start(count);
   std::vector<unsigned char> has_chroma(count * denoise::most_levels);
   for (std::size_t i = 0; i < count; ++i) {
     const double mean_e = tiles[i].charge_e / tiles[i].blocks;
     const int level = denoise::start_of(mean_e - dark_e, dark_e, variance_e2);
-    start[i] = static_cast<float>(std::min(level, levels - 1));
+    start[i] = static_cast<float>(std::min(level, pyramid_levels - 1));
   }
   denoise::ChromaStarts starts{start, has_chroma, across.tiles, down.tiles};
   denoise::complete(starts);

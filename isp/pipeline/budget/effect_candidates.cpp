@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "isp/pipeline/budget/plan_effects.h"
+#include "isp/pipeline/budget/visible_noise.h"
 
 namespace lowlux::isp {
 namespace {

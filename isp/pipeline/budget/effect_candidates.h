@@ -8,7 +8,7 @@
 #include "isp/pipeline/budget/chroma_work.h"
 #include "isp/pipeline/budget/effect_sizes.h"
 #include "isp/pipeline/budget/visible_noise.h"
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/options.h"
 
 /// The ways to develop one frame, what each leaves and takes, and which is chosen.
 namespace lowlux::isp {

@@ -56,7 +56,7 @@ double percentile_of(std::span<const SeenBlock> blocks, float SeenBlock::*figure
   return static_cast<double>(*at);
 }
 
-void set_defects(const RawFrame& frame, const DevelopPlan& plan, const DefectNoise& noise,
+void set_defects(const RawFrame& frame, const RawLevels& levels, const DefectNoise& noise,
                  std::span<const Rect> squares, std::span<const SeenBlock> blocks, EffectSizes& out,
                  Executor& executor) {
   if (squares.empty()) {
@@ -69,18 +69,18 @@ void set_defects(const RawFrame& frame, const DevelopPlan& plan, const DefectNoi
   double strongest_dn = 0;
   for (const Rect& square : squares) {
     const RawDn codes = square_codes(frame.raw, square);
-    const std::vector<Pixel> defects = find_defects(codes, plan.black, noise, executor);
+    const std::vector<Pixel> defects = find_defects(codes, levels.black, noise, executor);
     found += defects.size();
     for (const Pixel& p : defects) strongest_dn = std::max(strongest_dn, excess_dn(codes, p));
   }
   out.has_defects = found > 0;
   out.defects_words = fmt::format("{} in a sample of {:.0f} % of the frame", found, 100 * share_of(frame, squares));
   if (found == 0) return;
-  if (blocks.empty() || !plan.electrons_at_white) {
+  if (blocks.empty() || !levels.electrons_at_white) {
     out.defects = nan;
     return;
   }
-  const double electrons = strongest_dn / mean_range_dn(frame.raw, plan.black) * (*plan.electrons_at_white)[0];
+  const double electrons = strongest_dn / mean_range_dn(frame.raw, levels.black) * (*levels.electrons_at_white)[0];
   const double each = median_of(blocks, [](const SeenBlock& block) { return block.point_delta_e; });
   out.defects = std::min(electrons * each, largest_delta_e);
 }
@@ -99,7 +99,7 @@ std::vector<std::optional<denoise::LineOffsets>> lines_of_squares(const RawElect
 
 /// Standard deviation of what lines share, over the squares; 0 where it would not stand out of whole lines either,
 /// whose offsets are measured better than a square's.
-/// @param length_px  of whole lines
+/// levels.blackparam length_px  of whole lines
 double line_std_e(const RawElectrons& sample, int squares, denoise::Lines kind, int length_px,
                   const denoise::RawNoise& noise, Executor& executor) {
   double squares_e2 = 0;
@@ -118,14 +118,14 @@ double line_std_e(const RawElectrons& sample, int squares, denoise::Lines kind, 
   return lines_stand_out(mean, noise) ? mean.line_std_e : 0;
 }
 
-void set_lines(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
+void set_lines(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
                std::span<const Rect> squares, std::span<const SeenBlock> blocks, EffectSizes& out, Executor& executor) {
   if (squares.empty()) {
     out.lines = nan;
     out.lines_words = "looked for in the whole frame: a sample would save nothing";
     return;
   }
-  const RawElectrons sample = sample_electrons(frame, plan, squares, executor);
+  const RawElectrons sample = sample_electrons(frame, levels, squares, executor);
   const int count = static_cast<int>(squares.size());
   const Rect& active = frame.raw.active;
   const double rows_e = line_std_e(sample, count, denoise::Lines::rows, active.width, noise, executor);
@@ -142,28 +142,29 @@ void set_lines(const RawFrame& frame, const DevelopPlan& plan, const denoise::Ra
 
 }  // namespace
 
-DefectNoise defect_noise(const RawFrame& frame, const DevelopPlan& plan, const Thumbnail& thumbnail) {
-  DefectNoise noise{thumbnail.black_noise_std * mean_range_dn(frame.raw, plan.black)};
+DefectNoise defect_noise(const RawFrame& frame, const BlackPoint& black, const Thumbnail& thumbnail) {
+  DefectNoise noise{thumbnail.black_noise_std * mean_range_dn(frame.raw, black)};
   // A variance of scale * x at the fraction x of white is scale * range for each DN.
   if (frame.noise) {
-    noise.shot_dn = *std::ranges::max_element(frame.noise->scale) * mean_range_dn(frame.raw, plan.black);
+    noise.shot_dn = *std::ranges::max_element(frame.noise->scale) * mean_range_dn(frame.raw, black);
   }
   return noise;
 }
 
-EffectSizes effect_sizes(const RawFrame& frame, const DevelopPlan& plan, const Thumbnail& thumbnail,
-                         const denoise::RawNoise* noise, std::span<const SeenBlock> blocks, Executor& executor) {
+EffectSizes effect_sizes(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
+                         const Thumbnail& thumbnail, const denoise::RawNoise* noise, std::span<const SeenBlock> blocks,
+                         Executor& executor) {
   EffectSizes out;
   const std::vector<Rect> squares =
-      frame.raw.layout == SensorLayout::bayer ? sample_squares(frame, plan) : std::vector<Rect>{};
-  const bool lines_asked = noise != nullptr && plan.options.denoise.line_noise;
-  if (plan.options.find_defects || lines_asked) out.sampled_share = share_of(frame, squares);
-  if (plan.options.find_defects) {
-    set_defects(frame, plan, defect_noise(frame, plan, thumbnail), squares, blocks, out, executor);
+      frame.raw.layout == SensorLayout::bayer ? sample_squares(frame, levels) : std::vector<Rect>{};
+  const bool lines_asked = noise != nullptr && options.denoise.line_noise;
+  if (options.find_defects || lines_asked) out.sampled_share = share_of(frame, squares);
+  if (options.find_defects) {
+    set_defects(frame, levels, defect_noise(frame, levels.black, thumbnail), squares, blocks, out, executor);
   }
-  if (plan.options.display) out.display = noise == nullptr ? nan : percentile_of(blocks, &SeenBlock::display_delta_e);
+  if (options.display) out.display = noise == nullptr ? nan : percentile_of(blocks, &SeenBlock::display_delta_e);
   if (noise == nullptr) return out;
-  if (lines_asked) set_lines(frame, plan, *noise, squares, blocks, out, executor);
+  if (lines_asked) set_lines(frame, levels, *noise, squares, blocks, out, executor);
   out.dark = percentile_of(blocks, &SeenBlock::dark_delta_e);
   return out;
 }

@@ -7,7 +7,8 @@
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
 #include "isp/pipeline/budget/visible_noise.h"
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/options.h"
+#include "isp/pipeline/plan/levels.h"
 #include "isp/raw/measure/thumbnail.h"
 #include "isp/raw/repair.h"
 
@@ -28,10 +29,11 @@ struct EffectSizes {
 
 /// @param noise   of the frame; null where it is not known
 /// @param blocks  of the frame; none where the noise is not known
-EffectSizes effect_sizes(const RawFrame& frame, const DevelopPlan& plan, const Thumbnail& thumbnail,
-                         const denoise::RawNoise* noise, std::span<const SeenBlock> blocks, Executor& executor);
+EffectSizes effect_sizes(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
+                         const Thumbnail& thumbnail, const denoise::RawNoise* noise, std::span<const SeenBlock> blocks,
+                         Executor& executor);
 
 /// What the search for defects goes by.
-DefectNoise defect_noise(const RawFrame& frame, const DevelopPlan& plan, const Thumbnail& thumbnail);
+DefectNoise defect_noise(const RawFrame& frame, const BlackPoint& black, const Thumbnail& thumbnail);
 
 }  // namespace lowlux::isp

@@ -27,10 +27,10 @@ std::vector<Pixel> inside(const std::vector<Pixel>& defects, const Rect& square)
 
 }  // namespace
 
-std::vector<Rect> sample_squares(const RawFrame& frame, const DevelopPlan& plan) {
+std::vector<Rect> sample_squares(const RawFrame& frame, const RawLevels& levels) {
   const Rect& active = frame.raw.active;
   const double pixels = static_cast<double>(active.width) * active.height;
-  const bool even = !plan.black.pattern && !plan.options.dark_frame;
+  const bool even = !levels.black.pattern && !levels.dark_frame;
   if (!even || 1e-6 * pixels < least_gain * sample_megapixels || active.width < sample_squares_along * sample_side_px ||
       active.height < sample_squares_down * sample_side_px) {
     return {};
@@ -59,15 +59,15 @@ RawDn square_codes(const RawDn& raw, const Rect& square) {
   return out;
 }
 
-RawElectrons sample_electrons(const RawFrame& frame, const DevelopPlan& plan, std::span<const Rect> squares,
+RawElectrons sample_electrons(const RawFrame& frame, const RawLevels& levels, std::span<const Rect> squares,
                               Executor& executor) {
   RawElectrons out{Plane<float>(sample_side_px, sample_side_px * static_cast<int>(squares.size())), frame.raw.phase};
   for (std::size_t i = 0; i < squares.size(); ++i) {
     const RawDn codes = square_codes(frame.raw, squares[i]);
     const PlaneView<float> part =
         out.value.view().crop(0, sample_side_px * static_cast<int>(i), sample_side_px, sample_side_px);
-    to_electrons(codes, plan.black, *plan.electrons_at_white, part, executor);
-    repair(part, inside(plan.defects, squares[i]), 2);
+    to_electrons(codes, levels.black, *levels.electrons_at_white, part, executor);
+    repair(part, inside(levels.defects, squares[i]), 2);
   }
   return out;
 }

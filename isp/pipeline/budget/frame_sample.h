@@ -6,7 +6,7 @@
 
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/plan/levels.h"
 
 /// Parts of a large Bayer frame that stand for all of it: for what is much the same all over, like noise.
 namespace lowlux::isp {
@@ -18,14 +18,14 @@ inline constexpr double sample_megapixels =
 
 /// Squares of the active area, evenly spread, even corners. Empty where the whole is hardly more than the sample would
 /// be, or where each place has a black of its own: then the whole has to be looked at.
-std::vector<Rect> sample_squares(const RawFrame& frame, const DevelopPlan& plan);
+std::vector<Rect> sample_squares(const RawFrame& frame, const RawLevels& levels);
 
 /// The codes of one square, as a frame that ends there. Tags that are about the whole readout are left out.
 RawDn square_codes(const RawDn& raw, const Rect& square);
 
-/// The squares one below the other in electrons, dark charge in, the plan's defects repaired.
-/// Precondition: plan.electrons_at_white.
-RawElectrons sample_electrons(const RawFrame& frame, const DevelopPlan& plan, std::span<const Rect> squares,
+/// The squares one below the other in electrons, dark charge in, defects repaired.
+/// Precondition: levels.electrons_at_white.
+RawElectrons sample_electrons(const RawFrame& frame, const RawLevels& levels, std::span<const Rect> squares,
                               Executor& executor);
 
 /// The squares of a mosaic that is there already, one below the other.

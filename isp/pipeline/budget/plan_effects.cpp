@@ -110,69 +110,43 @@ EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
   return out;
 }
 
-EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopPlan& plan, Executor& executor) {
-  const DevelopOptions& o = plan.options;
+EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& o,
+                     const RawLevels& levels, const Rendering& rendering, Executor& executor) {
   EffectFacts facts{*o.effects, {}, {}};
   facts.size = cost_size(frame.raw);
   facts.samples = o.samples;
   facts.active = frame.raw.active;
-  facts.look = plan.look.has_value();
+  facts.look = rendering.look.has_value();
   facts.display = o.display != nullptr;
-  NoiseReduction reduction;
-  facts.has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !noise_obstacle(frame, plan);
+  std::optional<NoiseModel> model;
+  facts.has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !noise_obstacle(frame, levels);
   if (facts.has_noise) {
-    set_noise_model(frame, plan, reduction);
-    facts.blocks = seen_blocks(frame, plan, reduction.noise, thumbnail, executor);
+    model = noise_model(frame, levels, rendering.white_gain, o.space);
+    facts.blocks = seen_blocks(frame, o, levels, rendering, model->noise, thumbnail, executor);
     facts.has_noise = !facts.blocks.empty();
     facts.noise = level_noise(facts.blocks);
-    facts.chroma = chroma_work(frame, plan, reduction.noise, thumbnail);
+    facts.chroma = chroma_work(frame, levels, model->noise, thumbnail);
   }
   facts.level_is_fixed = o.denoise.mode != DenoiseChoice::Mode::automatic;
   if (o.denoise.mode == DenoiseChoice::Mode::level) facts.fixed_level = o.denoise.level;
   facts.may_search = o.find_defects && frame.raw.layout == SensorLayout::bayer;
   facts.may_take_lines = facts.has_noise && o.denoise.line_noise;
   facts.sizes =
-      effect_sizes(frame, plan, thumbnail, facts.has_noise ? &reduction.noise : nullptr, facts.blocks, executor);
-  facts.from_codes = frame.raw.layout == SensorLayout::bayer && frame.corrections.defects.empty() &&
-                     !plan.black.pattern && !o.dark_frame;
+      effect_sizes(frame, o, levels, thumbnail, facts.has_noise ? &model->noise : nullptr, facts.blocks, executor);
+  RawLevels without_dark = levels;
+  without_dark.black.dark_mean_e = {};
+  facts.from_codes = frame.corrections.defects.empty() && renders_from_codes(frame, without_dark, false);
   return facts;
 }
 
 }  // namespace
 
-double left_of_noise(std::optional<Level> level, double snr) {
-  constexpr std::array at{0.2, 0.7, 1.5, 3.0, 6.0, 12.0};
-  constexpr std::array draft{0.12, 0.16, 0.185, 0.225, 0.28, 0.33};
-  constexpr std::array standard{0.08, 0.105, 0.12, 0.14, 0.165, 0.19};
-  if (!level) return 0.9;
-  if (*level >= Level::high) return 0;
-  const auto& left = *level == Level::draft ? draft : standard;
-  if (!(snr > at.front())) return left.front();
-  for (std::size_t i = 1; i < at.size(); ++i) {
-    if (snr < at[i]) return std::lerp(left[i - 1], left[i], std::log(snr / at[i - 1]) / std::log(at[i] / at[i - 1]));
-  }
-  return left.back();
-}
-
-float left_delta_e(std::optional<Level> level, const SeenBlock& block) {
-  const auto left = static_cast<float>(left_of_noise(level, static_cast<double>(block.snr)));
-  const float noise = left * block.surroundings * block.noise_delta_e;
-  return level ? noise : std::hypot(noise, block.clip_delta_e);
-}
-
-double error_share(std::optional<Level> level) {
-  constexpr std::array share{0.70, 0.67, 0.63, 0.54};
-  return level ? share[static_cast<std::size_t>(*level)] : 0.85;
-}
-
-Result<void> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan, Executor& executor) {
-  const EffectFacts facts = facts_of(frame, thumbnail, plan, executor);
+Result<EffectsPlan> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& options,
+                                   const RawLevels& levels, const Rendering& rendering, Executor& executor) {
+  const EffectFacts facts = facts_of(frame, thumbnail, options, levels, rendering, executor);
   const Result<EffectCandidate> best = choose_candidate(facts);
   if (!best) return tl::make_unexpected(best.error());
-  plan.effects = told(facts, *best);
-  if (!plan.effects->dark) plan.black.dark_mean_e = {};
-  if (!plan.effects->display) plan.options.display.reset();
-  return {};
+  return told(facts, *best);
 }
 
 }  // namespace lowlux::isp

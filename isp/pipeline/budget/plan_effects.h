@@ -1,32 +1,50 @@
 #pragma once
 
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
-#include "isp/pipeline/budget/visible_noise.h"
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/noise_reduction.h"
+#include "isp/pipeline/options.h"
+#include "isp/pipeline/plan/levels.h"
+#include "isp/pipeline/plan/rendering.h"
 #include "isp/raw/measure/thumbnail.h"
 
 namespace lowlux::isp {
 
-/// Decides what a frame calls for, by its levels, its noise and a sample of it: sets plan.effects, and takes dark
-/// charge and a display out of the plan where they are left out. Without a budget it leaves out what stays below the
-/// tolerance, all of it together; with one it takes the most accurate of all plans that are predicted to fit, or the
-/// cheapest of those within the tolerance, if one is given and one fits.
-/// Needs plan.options.effects, and of the plan black, electrons at white, rendering. Error: the budget is below the
-/// cheapest plan, whose time is told (insufficient).
-Result<void> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan, Executor& executor);
+/// One thing that may be left out of developing, or done with less work.
+struct PlannedEffect {
+  std::string_view name;
+  double size = 0;  // CIEDE2000 that leaving it out would change; not a number where that is not known
+  double left = 0;  // that the decision leaves of it, against everything that can be done
+  bool used = true;
+  std::string decision;           // in words
+  std::optional<double> seconds;  // it is predicted to take, or would; what every plan begins with is none of them
+};
 
-/// What a level of noise reduction leaves of the visible noise, against Level::high, for blocks of this signal to noise
-/// ratio in even surroundings: about the most that pictures showed, but for lamps in the dark; nullopt is no reduction.
-/// tests/bench/planner_bench.cpp prints what was seen over it.
-double left_of_noise(std::optional<denoise::Level> level, double snr);
+/// What was decided of them together.
+struct EffectsPlan {
+  std::vector<PlannedEffect> effects;
+  std::optional<double> predicted_s;  // of planning and rendering
+  bool find_defects = true;
+  bool lines = true;  // row and column noise is subtracted with the noise
+  bool dark = true;
+  bool display = true;
+  std::optional<denoise::Level> level;
+  bool level_decided = false;           // false: noise is reduced as the options have it
+  std::optional<NoiseRegions> regions;  // with levels of their own
+};
 
-/// Root mean square CIEDE2000 of that: left_of_noise() of the noise of the surroundings, which thresholds go by, and
-/// without reduction what clipping at black makes of it.
-float left_delta_e(std::optional<denoise::Level> level, const SeenBlock& block);
-
-/// What is left of it against the truth, for telling which of two plans is better.
-double error_share(std::optional<denoise::Level> level);
+/// Decides what a frame calls for, by its levels, its noise and a sample of it. Without a budget it leaves out what
+/// stays below the tolerance, all of it together; with one it takes the most accurate of all plans that are predicted
+/// to fit, or the cheapest of those within the tolerance, if one is given and one fits.
+/// @param levels  before defects were looked for
+/// Precondition: options.effects. Error: the budget is below the cheapest plan, whose time is stated (insufficient).
+Result<EffectsPlan> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& options,
+                                   const RawLevels& levels, const Rendering& rendering, Executor& executor);
 
 }  // namespace lowlux::isp

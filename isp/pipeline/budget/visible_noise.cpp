@@ -36,10 +36,11 @@ double mean_above_black(double mean, double std) {
 /// From camera RGB, a fraction of white with the black off, to what is displayed.
 class Display {
  public:
-  explicit Display(const DevelopPlan& plan)
-      : plan_(plan),
-        limit_(tone_limit(plan.options.tone, plan.exposure_ev)),
-        to_xyz_(*inverse(*xyz_to_output(plan.options.space))),
+  Display(const DevelopOptions& options, const Rendering& rendering)
+      : options_(options),
+        rendering_(rendering),
+        limit_(tone_limit(options.tone, rendering.exposure_ev)),
+        to_xyz_(*inverse(*xyz_to_output(options.space))),
         white_(*xyz_of(output_white)) {}
 
   Lab lab(const Vector3& camera) const { return lab_of_shown(shown(camera)); }
@@ -52,9 +53,9 @@ class Display {
     for (int i = 0; i < 3; ++i) {
       double variance = 0;
       for (int c = 0; c < 3; ++c) {
-        variance += std::pow(matrix(i, c) * static_cast<double>(plan_.white_gain[c]) * std[c], 2);
+        variance += std::pow(matrix(i, c) * static_cast<double>(rendering_.white_gain[c]) * std[c], 2);
       }
-      const auto weight = static_cast<double>(plan_.transform.luminance[i]);
+      const auto weight = static_cast<double>(rendering_.transform.luminance[i]);
       raised[i] = mean_above_black(mean[i], pixel_scatter * std::sqrt(variance));
       luminance += weight * std::max(mean[i], 0.0);
       too_bright += weight * raised[i];
@@ -67,24 +68,26 @@ class Display {
 
   /// What changing its code for the planned display makes of a colour, by the colours that codes stand for.
   double changed_for_display(const Vector3& camera) const {
-    if (!plan_.options.display) return 0;
+    if (!options_.display) return 0;
     const Vector3 before = shown(camera);
     std::array<std::uint16_t, 3> code{};
     for (int i = 0; i < 3; ++i) {
-      code[i] = static_cast<std::uint16_t>(std::lround(65535 * encode_transfer(plan_.options.space, before[i])));
+      code[i] = static_cast<std::uint16_t>(std::lround(65535 * encode_transfer(options_.space, before[i])));
     }
-    apply(plan_.options.display->made.table, code.data(), 1, code.data());
+    apply(options_.display->made.table, code.data(), 1, code.data());
     Vector3 after{};
-    for (int i = 0; i < 3; ++i) after[i] = decode_transfer(plan_.options.space, code[i] / 65535.0);
+    for (int i = 0; i < 3; ++i) after[i] = decode_transfer(options_.space, code[i] / 65535.0);
     return ciede2000(lab_of_shown(before), lab_of_shown(after));
   }
 
  private:
-  double matrix(int row, int column) const { return static_cast<double>(plan_.transform.matrix[3 * row + column]); }
+  double matrix(int row, int column) const {
+    return static_cast<double>(rendering_.transform.matrix[3 * row + column]);
+  }
   Vector3 linear(const Vector3& camera) const {
     Vector3 out{};
     for (int c = 0; c < 3; ++c) {
-      const double balanced = std::min(camera[c] * static_cast<double>(plan_.white_gain[c]), 1.0);
+      const double balanced = std::min(camera[c] * static_cast<double>(rendering_.white_gain[c]), 1.0);
       for (int i = 0; i < 3; ++i) out[i] += matrix(i, c) * balanced;
     }
     return out;
@@ -92,14 +95,15 @@ class Display {
   Vector3 toned(const Vector3& linear) const {
     Vector3 out{};
     for (int i = 0; i < 3; ++i) {
-      out[i] = std::min(apply_tone(plan_.options.tone, std::clamp(linear[i], 0.0, 1.0) * limit_, limit_), 1.0);
+      out[i] = std::min(apply_tone(options_.tone, std::clamp(linear[i], 0.0, 1.0) * limit_, limit_), 1.0);
     }
     return out;
   }
   Vector3 shown(const Vector3& camera) const { return toned(linear(camera)); }
   Lab lab_of_shown(const Vector3& shown) const { return lab_of(xyz_of(to_xyz_ * shown), white_); }
 
-  const DevelopPlan& plan_;
+  const DevelopOptions& options_;
+  const Rendering& rendering_;
   double limit_;
   Matrix3 to_xyz_;
   Xyz white_;
@@ -111,8 +115,8 @@ struct Channels {
   std::array<double, 3> dark_e{};
 };
 
-Channels channels_of(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise) {
-  Channels out{.electrons_at_white = electrons_by_colour(frame.raw, plan)};
+Channels channels_of(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise) {
+  Channels out{.electrons_at_white = electrons_by_colour(frame.raw, levels)};
   for (int site = 0; site < 4; ++site) {
     const auto c = static_cast<std::size_t>(colour_at(frame.raw.phase, site & 1, site >> 1));
     out.dark_e[c] += noise.dark_mean_e[site] * (c == 1 ? 0.5 : 1);
@@ -212,12 +216,13 @@ class Charge {
 
 }  // namespace
 
-std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
+std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
+                                   const Rendering& rendering, const denoise::RawNoise& noise,
                                    const Thumbnail& thumbnail, Executor& executor) {
-  const OutputSpace space = plan.options.space;
+  const OutputSpace space = options.space;
   if (space == OutputSpace::camera || space == OutputSpace::xyz) return {};
-  const Display display(plan);
-  const Channels channels = channels_of(frame, plan, noise);
+  const Display display(options, rendering);
+  const Channels channels = channels_of(frame, levels, noise);
   const int columns = thumbnail.mean.width(), rows = thumbnail.mean.height();
   const int along = std::min(columns, most_blocks_along), down = std::min(rows, most_blocks_along);
   const Charge charge(thumbnail, channels, noise);
@@ -253,6 +258,31 @@ double seen_percentile(std::span<const float> rms_delta_e) {
     (share_above(middle) > 1 - seen_share ? low : high) = middle;
   }
   return (low + high) / 2;
+}
+
+double left_of_noise(std::optional<denoise::Level> level, double snr) {
+  constexpr std::array at{0.2, 0.7, 1.5, 3.0, 6.0, 12.0};
+  constexpr std::array draft{0.12, 0.16, 0.185, 0.225, 0.28, 0.33};
+  constexpr std::array standard{0.08, 0.105, 0.12, 0.14, 0.165, 0.19};
+  if (!level) return 0.9;
+  if (*level >= denoise::Level::high) return 0;
+  const auto& left = *level == denoise::Level::draft ? draft : standard;
+  if (!(snr > at.front())) return left.front();
+  for (std::size_t i = 1; i < at.size(); ++i) {
+    if (snr < at[i]) return std::lerp(left[i - 1], left[i], std::log(snr / at[i - 1]) / std::log(at[i] / at[i - 1]));
+  }
+  return left.back();
+}
+
+float left_delta_e(std::optional<denoise::Level> level, const SeenBlock& block) {
+  const auto left = static_cast<float>(left_of_noise(level, static_cast<double>(block.snr)));
+  const float noise = left * block.surroundings * block.noise_delta_e;
+  return level ? noise : std::hypot(noise, block.clip_delta_e);
+}
+
+double error_share(std::optional<denoise::Level> level) {
+  constexpr std::array share{0.70, 0.67, 0.63, 0.54};
+  return level ? share[static_cast<std::size_t>(*level)] : 0.85;
 }
 
 }  // namespace lowlux::isp

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "denoise/denoiser.h"
+#include "denoise/denoise_options.h"
 #include "isp/base/executor.h"
-#include "isp/pipeline/plan.h"
+#include "isp/pipeline/options.h"
+#include "isp/pipeline/plan/levels.h"
+#include "isp/pipeline/plan/rendering.h"
 #include "isp/raw/measure/thumbnail.h"
 
 /// What changes of raw values are worth in the picture. A difference of pictures is measured as it is seen from some
@@ -34,12 +37,25 @@ struct SeenBlock {
 ///     noise_delta_e^2 = sum over c of CIEDE2000(C(r), C(r + s_c))^2.
 /// Clipping raises the mean of a displayed primary p, whose pixels scatter by d around m, by d (phi(m / d) + m / d
 /// Phi(m / d)) - max(m, 0); the luminance is kept, as moving colours into the gamut does.
-/// Needs the plan's white balance, transform and electrons at white. Empty for spaces without primaries.
-std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
+/// Empty for spaces without primaries. Precondition: levels.electrons_at_white.
+std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
+                                   const Rendering& rendering, const denoise::RawNoise& noise,
                                    const Thumbnail& thumbnail, Executor& executor);
 
 /// The difference that 5 % of the pixels exceed, each block's being normal with this root mean square: to 1.5e-7 of the
 /// largest. 0 where no more than 5 % of the blocks have any.
 double seen_percentile(std::span<const float> rms_delta_e);
+
+/// What a level of noise reduction leaves of the visible noise, against Level::high, for blocks of this signal to noise
+/// ratio in even surroundings: about the most that pictures showed, but for lamps in the dark; nullopt is no reduction.
+/// tests/bench/planner_bench.cpp prints what was seen over it.
+double left_of_noise(std::optional<denoise::Level> level, double snr);
+
+/// Root mean square CIEDE2000 of that: left_of_noise() of the noise of the surroundings, which thresholds go by, and
+/// without reduction what clipping at black makes of it.
+float left_delta_e(std::optional<denoise::Level> level, const SeenBlock& block);
+
+/// What is left of it against the truth, for telling which of two plans is better.
+double error_share(std::optional<denoise::Level> level);
 
 }  // namespace lowlux::isp

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "isp/base/random/random.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/electron_mosaic.h"
 #include "isp/pipeline/render/noise_reducer.h"
 #include "isp/pipeline/stage_clock.h"
@@ -31,7 +32,7 @@ Levels levels_for(const DevelopPlan& plan) {
   for (int site = 0; site < 4; ++site) {
     const denoise::RawNoise& n = plan.noise_reduction.noise;
     const double variance = *std::ranges::max_element(n.variance_e2) + n.dark_mean_e[site];
-    noise = std::max(noise, std::sqrt(variance) / (*plan.electrons_at_white)[site]);
+    noise = std::max(noise, std::sqrt(variance) / (*plan.levels.electrons_at_white)[site]);
   }
   const double wanted = 8 * noise / (1 + 8 * noise) * most_dn;
   const double black_dn = std::clamp(256 * std::ceil(wanted / 256), 1024.0, 16384.0);
@@ -49,7 +50,7 @@ Plane<std::uint16_t> coded(const SignalElectrons& signal, const RawElectrons& ra
   const std::array<double, 3>& saturation_e = plan.noise_reduction.noise.saturation_e;
   Plane<std::uint16_t> out(width, height);
   PerSite<double> dn_per_e{};
-  for (int site = 0; site < 4; ++site) dn_per_e[site] = levels.range_dn / (*plan.electrons_at_white)[site];
+  for (int site = 0; site < 4; ++site) dn_per_e[site] = levels.range_dn / (*plan.levels.electrons_at_white)[site];
   for_each_band(executor, height, [&](RowBand band, int) {
     std::vector<std::uint32_t> words(width);
     for (int y = band.first; y < band.last; ++y) {
@@ -87,7 +88,7 @@ Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options,
   CleanRaw out;
   out.plan = *std::move(plan);
   StageClock clock(out.plan.times);
-  RawElectrons raw = raw_electrons(frame, out.plan, {}, executor);
+  RawElectrons raw = raw_electrons(frame, out.plan.levels, {}, executor);
   const SignalElectrons signal = NoiseReducer(executor).run(raw, out.plan.noise_reduction, {}, &out.maps);
   clock.lap("denoise");
   const Levels levels = levels_for(out.plan);
@@ -96,8 +97,8 @@ Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options,
   out.frame.corrections = frame.corrections;
   out.frame.corrections.defects.clear();
   const double step = 1 / levels.range_dn;
-  out.frame.noise =
-      residual_profile(signal, out.maps.site_variance_e2, *out.plan.electrons_at_white, rounding_dn2 * step * step);
+  out.frame.noise = residual_profile(signal, out.maps.site_variance_e2, *out.plan.levels.electrons_at_white,
+                                     rounding_dn2 * step * step);
   if (!options.denoise.maps) out.maps = {};
   clock.lap("codes");
   return out;

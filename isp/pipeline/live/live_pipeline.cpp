@@ -55,25 +55,12 @@ RawFrame frame_of(const LiveSetup& setup) {
   return frame;
 }
 
-DevelopPlan plan_of(const LiveSetup& setup) {
-  DevelopPlan plan;
-  plan.width = setup.active.width;
-  plan.height = setup.active.height;
-  plan.defects = setup.defects;
-  plan.options.tone = setup.tone;
-  plan.options.samples = setup.samples;
-  plan.options.look = setup.look;
-  plan.options.find_defects = false;
-  return plan;
-}
-
 }  // namespace
 
 LivePipeline::LivePipeline(LiveSetup setup, RawFrame frame, Executor& executor)
     : executor_(executor),
       setup_(std::move(setup)),
       frame_(std::move(frame)),
-      plan_(plan_of(setup_)),
       meter_(frame_.raw, setup_.format, executor.width()),
       planner_(setup_),
       pipeline_(executor) {}
@@ -86,7 +73,7 @@ Result<std::unique_ptr<LivePipeline>> LivePipeline::make(LiveSetup setup, Execut
   return out;
 }
 
-/// A made-up frame through every step, so that all of them have their memory.
+/// Passes a warm-up frame through every step, so that all of them have their memory.
 Result<void> LivePipeline::warm_up() {
   const double black = frame_.raw.white_dn[0] / 16, gain_dn = frame_.raw.white_dn[0] / 1000,
                variance = 4 * gain_dn * gain_dn;
@@ -99,7 +86,7 @@ Result<void> LivePipeline::warm_up() {
     const std::vector<std::byte> zeros(stride * static_cast<std::size_t>(setup_.height));
     read(zeros, stride, facts, true);
   }
-  plan_.options.look.which = LookChoice::Which::all;  // which of them is called for, each frame tells anew
+  planner_.use_all_effects(true);  // each frame decides anew which of them it calls for
   const bool bayer = setup_.format.layout == SensorLayout::bayer;
   for (const bool reduces : {false, true}) {
     if (reduces && !bayer) continue;
@@ -117,7 +104,7 @@ Result<void> LivePipeline::warm_up() {
   // Automatic levels have memory of their own.
   facts.denoise.mode = LiveDenoise::Mode::automatic;
   if (Result<void> planned = plan(facts); !planned) return planned;
-  plan_.options.look.which = setup_.look.which;
+  planner_.use_all_effects(false);
   reset();
   return {};
 }
@@ -126,14 +113,15 @@ void LivePipeline::read(std::span<const std::byte> bytes, std::size_t stride, co
   meter_.read(bytes, stride, frame_.raw, executor_, planner_.wants(facts, statistics));
 }
 
-Result<void> LivePipeline::plan(const LiveFacts& facts) { return planner_.plan(facts, meter_, frame_, plan_); }
+Result<void> LivePipeline::plan(const LiveFacts& facts) { return planner_.plan(facts, meter_, frame_); }
 
 void LivePipeline::reset() { planner_.reset(); }
 
 void LivePipeline::render_mosaic(PlaneView<std::uint16_t> codes) {
+  const RawLevels& levels = decided().levels;
   const Rect& active = frame_.raw.active;
   const int shift = 16 - setup_.format.bits, largest = largest_code(setup_.format);
-  if (!plan_.electrons_at_white) {
+  if (!levels.electrons_at_white) {
     for_each_band(executor_, active.height, [&](RowBand band, int) {
       for (int y = band.first; y < band.last; ++y) {
         const std::uint16_t* const dn = frame_.raw.dn.row(active.y + y) + active.x;
@@ -145,12 +133,12 @@ void LivePipeline::render_mosaic(PlaneView<std::uint16_t> codes) {
     });
     return;
   }
-  const PlaneView<const float> signal_e = pipeline_.signal(frame_, plan_);
+  const PlaneView<const float> signal_e = pipeline_.signal(frame_, decided());
   const auto most = static_cast<float>(largest << shift);
   PerSite<float> black{}, code_per_e{};
   for (int site = 0; site < 4; ++site) {
-    const double black_dn = plan_.black.pedestal_dn[site];
-    const double dn_per_e = (white_at(frame_.raw, site) - black_dn) / (*plan_.electrons_at_white)[site];
+    const double black_dn = levels.black.pedestal_dn[site];
+    const double dn_per_e = (white_at(frame_.raw, site) - black_dn) / (*levels.electrons_at_white)[site];
     black[site] = static_cast<float>(std::ldexp(black_dn, shift)) + 0.5f;
     code_per_e[site] = static_cast<float>(std::ldexp(dn_per_e, shift));
   }

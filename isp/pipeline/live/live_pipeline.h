@@ -39,16 +39,16 @@ class LivePipeline {
   /// a look whose luminance is not known (insufficient).
   Result<void> plan(const LiveFacts& facts);
 
-  const DevelopPlan& decided() const { return plan_; }
+  const DevelopPlan& decided() const { return planner_.decided(); }
   const LiveDecision& decision() const { return planner_.decision(); }
   FrameMeter& meter() { return meter_; }
   const RawFrame& frame() const { return frame_; }
   double moved() const { return pipeline_.moved(); }  // share of the picture, in the frame rendered last
 
   /// The picture in display codes, active area, row by row.
-  void render(const RowSink& sink) { pipeline_.render(frame_, plan_, sink); }
+  void render(const RowSink& sink) { pipeline_.render(frame_, decided(), sink); }
   /// The same in 16 bits: height x 3 width.
-  void render(PlaneView<std::uint16_t> rgb) { pipeline_.render(frame_, plan_, rgb); }
+  void render(PlaneView<std::uint16_t> rgb) { pipeline_.render(frame_, decided(), rgb); }
   /// The mosaic of the active area without noise, in codes of 16 bits whose largest is 2^bits - 1 times 2^(16 - bits):
   /// black is where it was, times that. Negative values are kept as far as black allows.
   void render_mosaic(PlaneView<std::uint16_t> codes);
@@ -63,7 +63,6 @@ class LivePipeline {
   Executor& executor_;
   LiveSetup setup_;
   RawFrame frame_;
-  DevelopPlan plan_;
   FrameMeter meter_;
   LivePlanner planner_;
   Pipeline pipeline_;

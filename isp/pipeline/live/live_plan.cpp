@@ -8,9 +8,10 @@
 
 #include "isp/pipeline/plan/plan_look.h"
 #include "isp/pipeline/plan/plan_noise.h"
-#include "isp/pipeline/plan/plan_rendering.h"
+#include "isp/pipeline/plan/rendering.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/to_linear.h"
+#include "isp/render/exposure.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {
@@ -94,6 +95,16 @@ Vector3 scaled_to_one(const Vector3& v) {
 
 }  // namespace
 
+LivePlanner::LivePlanner(const LiveSetup& setup) : setup_(setup) {
+  plan_.width = setup.active.width;
+  plan_.height = setup.active.height;
+  plan_.levels.defects = setup.defects;
+  plan_.options.tone = setup.tone;
+  plan_.options.samples = setup.samples;
+  plan_.options.look = setup.look;
+  plan_.options.find_defects = false;
+}
+
 void LivePlanner::reset() {
   exposure_ev_.reset();
   neutral_.reset();
@@ -115,9 +126,8 @@ MeterWants LivePlanner::wants(const LiveFacts& facts, bool statistics) const {
   return {.light = needs_light(facts), .noise = statistics || finds_black || !facts.noise, .statistics = statistics};
 }
 
-Result<void> LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, const RawFrame& frame,
-                                    DevelopPlan& plan) {
-  BlackPoint& black = plan.black;
+Result<void> LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, const RawFrame& frame) {
+  BlackPoint& black = plan_.levels.black;
   black.holds = BlackPoint::Holds::pedestal_and_dark;
   if (facts.black_dn) {
     black.pedestal_dn = *facts.black_dn;
@@ -145,12 +155,12 @@ Result<void> LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, c
   return {};
 }
 
-void LivePlanner::set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan) {
+void LivePlanner::set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame) {
   if (meter.wanted().noise) {
-    decision_.measured = meter.tiles().line(plan.black.pedestal_dn, frame.raw.white_dn[1]);
+    decision_.measured = meter.tiles().line(plan_.levels.black.pedestal_dn, frame.raw.white_dn[1]);
   }
   if (facts.noise) {
-    frame.noise = profile_of(*facts.noise, frame.raw, plan.black);
+    frame.noise = profile_of(*facts.noise, frame.raw, plan_.levels.black);
     decision_.noise = LiveSource::given;
   } else {
     if (!facts.follows) line_.reset();
@@ -158,11 +168,11 @@ void LivePlanner::set_noise(const LiveFacts& facts, const FrameMeter& meter, Raw
     noise_iso_ = facts.iso;
     if (decision_.measured) line_ = line_ ? blended(*line_, *decision_.measured) : *decision_.measured;
     frame.noise.reset();
-    if (line_) frame.noise = profile_of(noise_of(*line_), frame.raw, plan.black);
+    if (line_) frame.noise = profile_of(noise_of(*line_), frame.raw, plan_.levels.black);
     decision_.noise = line_ ? LiveSource::frame : LiveSource::none;
   }
-  plan.electrons_at_white.reset();
-  if (frame.noise) plan.electrons_at_white = electrons_at_white(frame.raw, *frame.noise);
+  plan_.levels.electrons_at_white.reset();
+  if (frame.noise) plan_.levels.electrons_at_white = electrons_at_white(frame.raw, *frame.noise);
 }
 
 /// Given, else estimated and following the scene, else daylight, else equal channels.
@@ -201,9 +211,9 @@ WhiteBalance LivePlanner::choose_white(const LiveFacts& facts, RawFrame& frame) 
   return out;
 }
 
-Result<Matrix3> LivePlanner::balanced_matrix(const LiveFacts& facts, const RawFrame& frame, const DevelopPlan& plan,
-                                             const WhiteBalance& balance) {
-  const Vector3 luminance = *luminance_weights(plan.options.space);
+Result<Matrix3> LivePlanner::balanced_matrix(const LiveFacts& facts, const RawFrame& frame,
+                                             const WhiteBalance& balance) const {
+  const Vector3 luminance = *luminance_weights(plan_.options.space);
   const Matrix3 colours = saturated(facts.saturation, luminance);
   if (facts.colour_matrix) return colours * *facts.colour_matrix;
   const bool coloured = frame.raw.layout != SensorLayout::monochrome;
@@ -211,7 +221,7 @@ Result<Matrix3> LivePlanner::balanced_matrix(const LiveFacts& facts, const RawFr
   if (coloured && !balance.white) {
     return fail(ErrorCode::malformed, "the white balance is no colour of a light under the camera's matrices");
   }
-  Result<Matrix3> balanced = balanced_to_output(frame, plan.options, balance);
+  Result<Matrix3> balanced = balanced_to_output(frame, plan_.options, balance);
   if (!balanced) return balanced;
   return coloured ? colours * *balanced : *balanced;
 }
@@ -223,46 +233,58 @@ double LivePlanner::smooth_exposure(double target_ev) {
   return *exposure_ev_;
 }
 
-Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame, DevelopPlan& plan) {
+Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame) {
+  Rendering& out = plan_.rendering;
   const WhiteBalance balance = choose_white(facts, frame);
-  set_white(plan, balance);
-  const Result<Matrix3> balanced = balanced_matrix(facts, frame, plan, balance);
+  out.neutral = balance.neutral;
+  out.white = balance.white;
+  out.white_balance_rule = name_of(balance.source);
+  out.white_gain = white_gain_of(balance.neutral);
+  const Result<Matrix3> balanced = balanced_matrix(facts, frame, balance);
   if (!balanced) return tl::make_unexpected(balanced.error());
   blocks_.resize(needs_light(facts) ? thumbnail_.mean.plane[0].size() : 0);
-  rendered_luminance(thumbnail_.mean, plan, *balanced, blocks_);
-  const double gain = *std::ranges::max_element(plan.white_gain);
-  const double noise_std = thumbnail_.black_noise_std * gain;
-  plan.options.exposure_ev = facts.exposure_ev;
+  rendered_luminance(thumbnail_.mean, plan_.options.space, out.white_gain, *balanced, blocks_);
+  const double noise_std = thumbnail_.black_noise_std * *std::ranges::max_element(out.white_gain);
+  plan_.options.exposure_ev = facts.exposure_ev;
   if (facts.exposure_ev) {
-    plan.exposure_ev = *facts.exposure_ev;
-    plan.exposure_rule = "given";
+    out.exposure_ev = *facts.exposure_ev;
+    out.exposure_rule = "given";
   } else {
     memory_.assign(blocks_.begin(), blocks_.end());
     const AutoExposure automatic = auto_exposure_reordering(memory_, noise_std);
-    plan.exposure_ev = smooth_exposure(automatic.ev);
-    plan.exposure_rule = name_of(automatic.rule);
+    out.exposure_ev = smooth_exposure(automatic.ev);
+    out.exposure_rule = name_of(automatic.rule);
   }
-  if (auto look = plan_look(frame, {blocks_, noise_std}, plan); !look) return look;
-  set_transform(plan, *balanced);
-  if (const double limit = tone_limit(plan.options.tone, plan.exposure_ev); limit != tone_limit_) {
-    set_tone(plan);
+  Result<std::optional<LookPlan>> look =
+      plan_look(frame, {blocks_, noise_std, out.white, out.exposure_ev}, plan_.options);
+  if (!look) return tl::make_unexpected(std::move(look.error()));
+  out.look = *std::move(look);
+  if (out.look) out.exposure_ev += out.look->dimming_ev;
+  out.transform = transform_of(*balanced, out.exposure_ev, plan_.options);
+  if (const double limit = tone_limit(plan_.options.tone, out.exposure_ev); limit != tone_limit_) {
+    out.tone = tone_of(out.exposure_ev, plan_.options);
     tone_limit_ = limit;
   }
   return {};
 }
 
 /// A level that was chosen for the frame before is kept until the signal to noise ratio is clearly beyond its range.
-void LivePlanner::choose_level(const LiveDenoise& wanted, const RawFrame& frame, DevelopPlan& plan) {
-  NoiseReduction& out = plan.noise_reduction;
+void LivePlanner::choose_level(const LiveDenoise& wanted, const RawFrame& frame) {
+  NoiseReduction& out = plan_.noise_reduction;
   std::optional<denoise::Level> level;
   out.snr.reset();
-  const bool can = plan.electrons_at_white && frame.raw.layout == SensorLayout::bayer;
-  if (can) set_noise_model(frame, plan, out);
+  const bool can = plan_.levels.electrons_at_white && frame.raw.layout == SensorLayout::bayer;
+  if (can) {
+    const NoiseModel model = noise_model(frame, plan_.levels, plan_.rendering.white_gain, plan_.options.space);
+    out.source = model.source;
+    out.noise = model.noise;
+    out.options.white_gain = model.white_gain;
+  }
   if (can && wanted.mode != LiveDenoise::Mode::off) {
     if (wanted.mode == LiveDenoise::Mode::level) {
       level = wanted.level;
     } else {
-      out.snr = middle_snr(frame, plan, out.noise, thumbnail_, snr_);
+      out.snr = middle_snr(frame, plan_.levels, out.noise, thumbnail_, snr_);
       const bool kept =
           has_level_ && (level_for(*out.snr * level_slack) == level_ || level_for(*out.snr / level_slack) == level_);
       level = kept ? level_ : level_for(*out.snr);
@@ -278,10 +300,10 @@ void LivePlanner::choose_level(const LiveDenoise& wanted, const RawFrame& frame,
   out.options.level = level.value_or(denoise::Level::draft);
 }
 
-void LivePlanner::set_temporal(const LiveFacts& facts, const RawFrame& frame, DevelopPlan& plan) {
-  std::optional<TemporalReduction>& temporal = plan.noise_reduction.temporal;
-  const bool can =
-      setup_.temporal && facts.denoise.temporal && plan.electrons_at_white && frame.raw.layout == SensorLayout::bayer;
+void LivePlanner::set_temporal(const LiveFacts& facts, const RawFrame& frame) {
+  std::optional<TemporalReduction>& temporal = plan_.noise_reduction.temporal;
+  const bool can = setup_.temporal && facts.denoise.temporal && plan_.levels.electrons_at_white &&
+                   frame.raw.layout == SensorLayout::bayer;
   if (!can) {
     temporal.reset();
     last_ = {};
@@ -289,7 +311,8 @@ void LivePlanner::set_temporal(const LiveFacts& facts, const RawFrame& frame, De
     return;
   }
   temporal.emplace();
-  const double e_per_dn = (*plan.electrons_at_white)[0] / (white_at(frame.raw, 0) - plan.black.pedestal_dn[0]);
+  const double e_per_dn =
+      (*plan_.levels.electrons_at_white)[0] / (white_at(frame.raw, 0) - plan_.levels.black.pedestal_dn[0]);
   temporal->light = ratio(facts.exposure_s, last_.exposure_s);
   if (decision_.noise == LiveSource::frame) {
     // Electrons whose gain the frames tell are a unit that moves with its measurement.
@@ -300,22 +323,23 @@ void LivePlanner::set_temporal(const LiveFacts& facts, const RawFrame& frame, De
   last_ = {facts.exposure_s, facts.iso, e_per_dn};
 }
 
-Result<void> LivePlanner::plan(const LiveFacts& facts, FrameMeter& meter, RawFrame& frame, DevelopPlan& plan) {
+Result<void> LivePlanner::plan(const LiveFacts& facts, FrameMeter& meter, RawFrame& frame) {
   decision_ = {};
-  plan.warnings.clear();
+  plan_.warnings.clear();
   frame.raw.info.exposure_s = facts.exposure_s;
   frame.raw.info.iso = facts.iso;
   frame.raw.info.f_number = facts.f_number;
-  plan.options.look.scene_luminance_cd_m2 =
+  plan_.options.look.which = all_effects_ ? LookChoice::Which::all : setup_.look.which;
+  plan_.options.look.scene_luminance_cd_m2 =
       facts.scene_luminance_cd_m2 ? facts.scene_luminance_cd_m2 : setup_.look.scene_luminance_cd_m2;
-  if (Result<void> black = set_black(facts, meter, frame, plan); !black) return black;
-  set_noise(facts, meter, frame, plan);
-  if (needs_light(facts)) meter.thumbnail().make(frame, plan.black, thumbnail_);
-  if (Result<void> rendering = set_rendering(facts, frame, plan); !rendering) return rendering;
-  choose_level(facts.denoise, frame, plan);
-  set_temporal(facts, frame, plan);
-  plan.from_codes = frame.raw.layout == SensorLayout::bayer && plan.defects.empty() && !plan.noise_reduction.reduces();
-  if (plan.from_codes || frame.raw.layout != SensorLayout::bayer) plan.electrons_at_white.reset();
+  if (Result<void> black = set_black(facts, meter, frame); !black) return black;
+  set_noise(facts, meter, frame);
+  if (needs_light(facts)) meter.thumbnail().make(frame, plan_.levels.black, thumbnail_);
+  if (Result<void> rendering = set_rendering(facts, frame); !rendering) return rendering;
+  choose_level(facts.denoise, frame);
+  set_temporal(facts, frame);
+  plan_.from_codes = renders_from_codes(frame, plan_.levels, plan_.noise_reduction.reduces());
+  if (plan_.from_codes || frame.raw.layout != SensorLayout::bayer) plan_.levels.electrons_at_white.reset();
   return {};
 }
 

@@ -78,34 +78,38 @@ struct LiveDecision {
   bool reducible = false;               // a mosaic whose noise is known
 };
 
-/// Decides about one frame after the other, into the same plan. Allocates nothing after the first frame but to say what
-/// went wrong.
+/// Decides about one frame after the other, and owns the plan of the last one. Allocates nothing after the first frame
+/// but to say what went wrong.
 class LivePlanner {
  public:
-  explicit LivePlanner(const LiveSetup& setup) : setup_(setup) {}
+  explicit LivePlanner(const LiveSetup& setup);
 
   /// @param frame  gets the noise, colour and exposure that the facts tell
   /// Errors: black not below white, colours that lead to no picture (malformed), a look whose luminance is not known
   /// (insufficient).
-  Result<void> plan(const LiveFacts& facts, FrameMeter& meter, RawFrame& frame, DevelopPlan& plan);
+  Result<void> plan(const LiveFacts& facts, FrameMeter& meter, RawFrame& frame);
   /// What has to be measured of the frame that comes, if these are its facts.
   MeterWants wants(const LiveFacts& facts, bool statistics) const;
+  const DevelopPlan& decided() const { return plan_; }
   const LiveDecision& decision() const { return decision_; }
+  /// Whether the next plans use every effect of the look, so that all of its steps take their memory.
+  void use_all_effects(bool all) { all_effects_ = all; }
   void reset();
 
  private:
-  Result<void> set_black(const LiveFacts& facts, FrameMeter& meter, const RawFrame& frame, DevelopPlan& plan);
+  Result<void> set_black(const LiveFacts& facts, FrameMeter& meter, const RawFrame& frame);
   bool needs_light(const LiveFacts& facts) const;
-  void set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame, DevelopPlan& plan);
+  void set_noise(const LiveFacts& facts, const FrameMeter& meter, RawFrame& frame);
   WhiteBalance choose_white(const LiveFacts& facts, RawFrame& frame);
-  static Result<Matrix3> balanced_matrix(const LiveFacts& facts, const RawFrame& frame, const DevelopPlan& plan,
-                                         const WhiteBalance& balance);
-  Result<void> set_rendering(const LiveFacts& facts, RawFrame& frame, DevelopPlan& plan);
+  Result<Matrix3> balanced_matrix(const LiveFacts& facts, const RawFrame& frame, const WhiteBalance& balance) const;
+  Result<void> set_rendering(const LiveFacts& facts, RawFrame& frame);
   double smooth_exposure(double target_ev);
-  void choose_level(const LiveDenoise& wanted, const RawFrame& frame, DevelopPlan& plan);
-  void set_temporal(const LiveFacts& facts, const RawFrame& frame, DevelopPlan& plan);
+  void choose_level(const LiveDenoise& wanted, const RawFrame& frame);
+  void set_temporal(const LiveFacts& facts, const RawFrame& frame);
 
   const LiveSetup& setup_;
+  DevelopPlan plan_;
+  bool all_effects_ = false;
   LiveDecision decision_;
   Thumbnail thumbnail_;
   std::vector<float> blocks_, memory_;

@@ -63,7 +63,7 @@ struct LookPlan {
   std::string_view luminance_rule;  // "given", "exposure", or "profile" for its ISO speed
   MesopicState state;               // of an eye adapted to the mean
   double dimming_ev = 0;
-  std::vector<LookEffect> effects;
+  std::optional<std::array<LookEffect, 6>> effects;  // of Look::eye
   std::optional<double> noise_limit;
   std::optional<NoiseProfile> noise;  // of the raw; absent: not known
 };

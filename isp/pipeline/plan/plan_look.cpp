@@ -146,50 +146,48 @@ void leave_out(double tolerance, std::span<LookEffect> effects) {
 void decide_effects(const LookChoice& choice, const std::array<double, 2>& fields_cd_m2, bool monochrome,
                     LookPlan& look) {
   const auto predicted = largest_effects(fields_cd_m2, look.look);
-  look.effects.assign(predicted.begin(), predicted.end());
+  std::array<LookEffect, 6>& effects = look.effects.emplace(predicted);
   if (monochrome) {
-    for (int k = 0; k < 3; ++k) look.effects[static_cast<std::size_t>(k)].size = 0;  // those of colours
+    for (int k = 0; k < 3; ++k) effects[static_cast<std::size_t>(k)].size = 0;  // those of colours
   }
   switch (choice.which) {
     case LookChoice::Which::automatic:
-      leave_out(choice.tolerance, look.effects);
+      leave_out(choice.tolerance, effects);
       break;
     case LookChoice::Which::all:
-      for (LookEffect& effect : look.effects) effect.used = true;
+      for (LookEffect& effect : effects) effect.used = true;
       break;
     case LookChoice::Which::listed: {
       NightEffects listed = choice.listed;
-      for (LookEffect& effect : look.effects) effect.used = *effect_named(listed, effect.name);
+      for (LookEffect& effect : effects) effect.used = *effect_named(listed, effect.name);
       break;
     }
   }
-  for (const LookEffect& effect : look.effects) *effect_named(look.look.effects, effect.name) = effect.used;
+  for (const LookEffect& effect : effects) *effect_named(look.look.effects, effect.name) = effect.used;
 }
 
 // The state of the eye, what it calls for, and how much darker the picture gets.
-void decide_eye(const FrameLight& light, double white_cd_m2, DevelopPlan& plan, LookPlan& look) {
-  const LookChoice& choice = plan.options.look;
+void decide_eye(const FrameLight& light, double white_cd_m2, const DevelopOptions& options, LookPlan& look) {
+  const LookChoice& choice = options.look;
   const double ratio = look.look.scotopic_ratio_of_white;
   look.state = mesopic_state({look.mean_cd_m2, look.mean_cd_m2 * ratio});
   look.white_cd_m2 = look.mean_cd_m2 / scene_mean_of_white;
   if (choice.look == Look::eye) {
-    decide_effects(choice, range_of_fields(light.block_luminance, white_cd_m2, look), !plan.white, look);
+    decide_effects(choice, range_of_fields(light.block_luminance, white_cd_m2, look), !light.white, look);
   }
-  if (plan.options.exposure_ev) return;
-  look.dimming_ev = choice.dimming * apparent_dimming_ev(look.state.luminance_cd_m2);
-  plan.exposure_ev += look.dimming_ev;
+  if (!options.exposure_ev) look.dimming_ev = choice.dimming * apparent_dimming_ev(look.state.luminance_cd_m2);
 }
 
 // Covariance of what cones see of the noise of a pixel of mid-grey, up to a factor.
-Matrix3 noise_of_cones(const NoiseProfile& noise, const DevelopPlan& plan, const Matrix3& rgb_to_xyz) {
+Matrix3 noise_of_cones(const NoiseProfile& noise, const ModelBasis& basis, const Matrix3& rgb_to_xyz) {
   ChannelNoise channels;
   Matrix3 balanced_to_rgb{};
   for (int c = 0; c < 3; ++c) {
-    const double gain = plan.white_gain[c];
+    const double gain = basis.white_gain[c];
     channels.variance_e2[c] =
-        noise.scale[c] * scene_mean_of_white / std::exp2(plan.exposure_ev) / gain + noise.offset[c];
+        noise.scale[c] * scene_mean_of_white / std::exp2(basis.exposure_ev) / gain + noise.offset[c];
     channels.rgb_per_e[c] = gain;
-    for (int j = 0; j < 3; ++j) balanced_to_rgb[j][c] = plan.transform.matrix[3 * j + c];
+    for (int j = 0; j < 3; ++j) balanced_to_rgb[j][c] = basis.transform.matrix[3 * j + c];
   }
   channels.camera_to_xyz = rgb_to_xyz * balanced_to_rgb;
   return noise_covariance_of_cones(channels);
@@ -197,61 +195,59 @@ Matrix3 noise_of_cones(const NoiseProfile& noise, const DevelopPlan& plan, const
 
 }  // namespace
 
-Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPlan& plan) {
-  const LookChoice& choice = plan.options.look;
-  if (auto checked = check(choice, plan.options.space); !checked) return checked;
-  if (choice.look == Look::camera && !choice.noise_limit) return {};
-  LookPlan& look = plan.look ? *plan.look : plan.look.emplace();
-  look.kind = choice.look;
-  look.noise_limit = choice.noise_limit;
-  look.noise = frame.noise;
+Result<std::optional<LookPlan>> plan_look(const RawFrame& frame, const FrameLight& light,
+                                          const DevelopOptions& options) {
+  const LookChoice& choice = options.look;
+  if (auto checked = check(choice, options.space); !checked) return tl::make_unexpected(checked.error());
+  if (choice.look == Look::camera && !choice.noise_limit) return std::nullopt;
+  LookPlan look{.kind = choice.look, .noise_limit = choice.noise_limit, .noise = frame.noise};
   NightLook& eye = look.look;
   eye.effects = {false, false, false, false, false, false};
-  eye.scotopic_ratio_of_white = ratio_of_white(plan.white);
-  eye.pixels_per_degree = std::max(plan.width, plan.height) / choice.field_of_view_deg;
+  eye.scotopic_ratio_of_white = ratio_of_white(light.white);
+  const PictureSize size = picture_size(frame.raw, options);
+  eye.pixels_per_degree = std::max(size.width, size.height) / choice.field_of_view_deg;
   double white_cd_m2 = 100;
   if (choice.look != Look::camera) {
     const Result<double> found =
         white_level_cd_m2(frame, std::max(mean_of(light.block_luminance), least_mean), look, choice);
     if (!found) return tl::make_unexpected(found.error());
     white_cd_m2 = *found;
-    decide_eye(light, white_cd_m2, plan, look);
+    decide_eye(light, white_cd_m2, options, look);
   }
-  const double units = std::exp2(plan.exposure_ev) / tone_limit(plan.options.tone, plan.exposure_ev);
+  const double exposure_ev = light.exposure_ev + look.dimming_ev;
+  const double units = std::exp2(exposure_ev) / tone_limit(options.tone, exposure_ev);
   eye.cd_m2_per_unit = white_cd_m2 / units;
   eye.dark = static_cast<float>(std::clamp(light.black_noise_std * units, least_dark, 1.0));
-  set_primaries(plan.options.space, eye);
-  return {};
+  set_primaries(options.space, eye);
+  return look;
 }
 
-Result<void> plan_model(DevelopPlan& plan) {
-  if (!plan.look || plan.look->kind != Look::model) return {};
-  LookPlan& look = *plan.look;
-  const Result<AppearanceModel> model = appearance_model_named(plan.options.look.model);
+Result<ModelTable> tabulate_model(const LookPlan& look, const ModelBasis& basis, const DevelopOptions& options) {
+  const Result<AppearanceModel> model = appearance_model_named(options.look.model);
   if (!model) return tl::make_unexpected(model.error());
-  const Matrix3 rgb_to_xyz = *inverse(*xyz_to_output(plan.options.space));
+  const Matrix3 rgb_to_xyz = *inverse(*xyz_to_output(options.space));
   ViewingConditions scene{.white_cd_m2 = look.white_cd_m2};
   scene.adaptation_cd_m2 = look.mean_cd_m2;
-  scene.shin = plan.options.look.shin.get();
+  scene.shin = options.look.shin.get();
   scene.scotopic_ratio = look.look.scotopic_ratio_of_white;
-  if (plan.white) scene.colour_temperature_k = plan.white->cct_k;
-  if (look.noise && plan.white) scene.noise_covariance = noise_of_cones(*look.noise, plan, rgb_to_xyz);
+  if (basis.white) scene.colour_temperature_k = basis.white->cct_k;
+  if (look.noise && basis.white) scene.noise_covariance = noise_of_cones(*look.noise, basis, rgb_to_xyz);
   const Result<ColourMap> map = model->at(scene);
   if (!map) return tl::make_unexpected(map.error());
   const double limit = std::clamp(look.look.cd_m2_per_unit / look.white_cd_m2, 1e-6, 1e6);
   Result<ColourTable> table = make_colour_table(*map, {.rgb_to_xyz = rgb_to_xyz, .limit = limit});
   if (!table) return tl::make_unexpected(table.error());
-  look.table = *std::move(table);
+  ModelTable out{*std::move(table), {}};
   if (!(look.white_cd_m2 >= model->valid_from_cd_m2 && look.white_cd_m2 <= model->valid_to_cd_m2)) {
-    plan.warnings.push_back(
+    out.warnings.push_back(
         fmt::format("the model {} is known for whites of {:g} to {:g} cd/m2; this scene's has {:.3g}", model->name,
                     model->valid_from_cd_m2, model->valid_to_cd_m2, look.white_cd_m2));
   }
-  if (!look.table->within_bound) {
-    plan.warnings.push_back(fmt::format("the table of the model {} is off by up to {:.2g} CIEDE2000", model->name,
-                                        look.table->error.largest));
+  if (!out.table.within_bound) {
+    out.warnings.push_back(fmt::format("the table of the model {} is off by up to {:.2g} CIEDE2000", model->name,
+                                       out.table.error.largest));
   }
-  return {};
+  return out;
 }
 
 }  // namespace lowlux::isp

@@ -2,27 +2,49 @@
 
 #include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
+#include "isp/base/frame.h"
 #include "isp/base/result.h"
-#include "isp/pipeline/plan.h"
+#include "isp/model/colour/camera_colour.h"
+#include "isp/pipeline/options.h"
+#include "isp/pipeline/plan/look.h"
+#include "isp/raw/kernel/raw_to_rgb.h"
 
 namespace lowlux::isp {
 
-/// What is known of a frame's light before exposure.
+/// What a look is decided by: the light of a frame, and how it would be rendered without the look.
 struct FrameLight {
   std::span<const float> block_luminance;  // white balanced, 1 at the white level, signed
   double black_noise_std = 0;              // of one pixel, same unit
+  std::optional<WhitePoint> white;         // absent without a colour calibration
+  double exposure_ev = 0;
 };
 
-/// Decides the look: how bright the scene was, how an eye adapted to it sees it, which effects that calls for. Sets
-/// plan.look where one is asked for (into the memory of one that is there), and lowers an automatic exposure by the
-/// share of the darkness that is kept. Needs the plan's white balance and exposure. Errors: insufficient where the
-/// luminance is neither given nor told by the exposure; invalid_argument for figures out of range, or a space without
-/// RGB primaries (camera, xyz).
-Result<void> plan_look(const RawFrame& frame, const FrameLight& light, DevelopPlan& plan);
+/// Decides the look: how bright the scene was, how an eye adapted to it sees it, which effects that calls for, and by
+/// how much an automatic exposure is lowered for it (LookPlan::dimming_ev). Nullopt where none is asked for. Allocates
+/// nothing but to say what went wrong. Errors: insufficient where the luminance is neither given nor told by the
+/// exposure; invalid_argument for figures out of range, or a space without RGB primaries (camera, xyz).
+Result<std::optional<LookPlan>> plan_look(const RawFrame& frame, const FrameLight& light,
+                                          const DevelopOptions& options);
 
-/// Tabulates the model of a look that has one, for the scene's white, adaptation, light and noise. Needs
-/// plan.transform. Errors: no such model (invalid_argument), those of the model and of make_colour_table.
-Result<void> plan_model(DevelopPlan& plan);
+/// What the table of a model depends on beside the look.
+struct ModelBasis {
+  std::optional<WhitePoint> white;
+  std::array<float, 3> white_gain{1, 1, 1};
+  RgbTransform transform;
+  double exposure_ev = 0;
+};
+
+/// A model's table, and what is to be said of it.
+struct ModelTable {
+  ColourTable table;
+  std::vector<std::string> warnings;
+};
+
+/// Tabulates the model of a look that has one, for the scene's white, adaptation, light and noise. Errors: no such
+/// model (invalid_argument), those of the model and of make_colour_table.
+Result<ModelTable> tabulate_model(const LookPlan& look, const ModelBasis& basis, const DevelopOptions& options);
 
 }  // namespace lowlux::isp

@@ -22,43 +22,44 @@ int colour_of(const RawDn& raw, int site) { return static_cast<int>(colour_at(ra
 
 /// Of a raw value without light, by the noise model or, if that is more, as the black point's pixels had it; at least
 /// that of rounding to codes.
-std::array<double, 3> black_variance_e2(const RawFrame& frame, const DevelopPlan& plan) {
+std::array<double, 3> black_variance_e2(const RawFrame& frame, const RawLevels& levels) {
   std::array<double, 3> out{};
   for (int site = 0; site < 4; ++site) {
     const int colour = colour_of(frame.raw, site);
-    const double electrons = (*plan.electrons_at_white)[site];
-    const double e_per_dn = electrons / (white_at(frame.raw, site) - plan.black.pedestal_dn[site]);
+    const double electrons = (*levels.electrons_at_white)[site];
+    const double e_per_dn = electrons / (white_at(frame.raw, site) - levels.black.pedestal_dn[site]);
     double variance = std::max(frame.noise->offset[colour] * electrons * electrons, e_per_dn * e_per_dn / 12);
     // What was measured in the dark holds the noise of the dark charge, of which a noise profile may know nothing.
-    variance = std::max(variance, std::pow(plan.black.noise_std_dn[site] * e_per_dn, 2));
-    if (plan.options.dark_frame) variance += plan.options.dark_frame->added_variance_dn2[site] * e_per_dn * e_per_dn;
+    variance = std::max(variance, std::pow(levels.black.noise_std_dn[site] * e_per_dn, 2));
+    if (levels.dark_frame) variance += levels.dark_frame->added_variance_dn2[site] * e_per_dn * e_per_dn;
     out[colour] += variance * (colour == 1 ? 0.5 : 1);
   }
   return out;
 }
 
-denoise::RawNoise noise_of(const RawFrame& frame, const DevelopPlan& plan) {
+denoise::RawNoise noise_of(const RawFrame& frame, const RawLevels& levels) {
   denoise::RawNoise out;
-  out.dark_mean_e = plan.black.dark_mean_e;
-  out.variance_e2 = black_variance_e2(frame, plan);
+  out.dark_mean_e = levels.black.dark_mean_e;
+  out.variance_e2 = black_variance_e2(frame, levels);
   // White levels of a thousandth of a code make more.
   for (double& variance : out.variance_e2) variance = std::min(variance, denoise::largest_e);
   for (int site = 0; site < 4; ++site) {
     double& saturation_e = out.saturation_e[colour_of(frame.raw, site)];
-    saturation_e = std::min(saturation_e, saturated_share_of_white * (*plan.electrons_at_white)[site]);
+    saturation_e = std::min(saturation_e, saturated_share_of_white * (*levels.electrons_at_white)[site]);
   }
   return out;
 }
 
 /// Gains that make a neutral equal in R, G and B [e-], G's 1.
-std::array<double, 3> balance_of(const RawFrame& frame, const DevelopPlan& plan) {
-  std::array<double, 3> gain{plan.white_gain[0], plan.white_gain[1], plan.white_gain[2]};
-  if (plan.options.space == OutputSpace::camera && frame.colour.as_shot_neutral) {
+std::array<double, 3> balance_of(const RawFrame& frame, const RawLevels& levels, const std::array<float, 3>& white_gain,
+                                 OutputSpace space) {
+  std::array<double, 3> gain{white_gain[0], white_gain[1], white_gain[2]};
+  if (space == OutputSpace::camera && frame.colour.as_shot_neutral) {
     for (int c = 0; c < 3; ++c) gain[c] = 1 / (*frame.colour.as_shot_neutral)[c];
   }
   for (int site = 0; site < 4; ++site) {
     const int colour = colour_of(frame.raw, site);
-    gain[colour] /= std::pow((*plan.electrons_at_white)[site], colour == 1 ? 0.5 : 1.0);
+    gain[colour] /= std::pow((*levels.electrons_at_white)[site], colour == 1 ? 0.5 : 1.0);
   }
   const double green = gain[1];
   for (double& g : gain) g = std::clamp(g / green, 1e-3, 1e3);
@@ -74,9 +75,9 @@ double black_std_e(const denoise::RawNoise& noise) {
 /// What is seen of lines: the eye follows their sum.
 double least_line_std_e(const denoise::RawNoise& noise) { return 0.03 * black_std_e(noise); }
 
-std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, PlaneView<const float> charge_e,
+std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& reduction, PlaneView<const float> charge_e,
                                            Executor& executor) {
-  const denoise::FrameLineOptions options{.least_std_e = least_line_std_e(plan.noise)};
+  const denoise::FrameLineOptions options{.least_std_e = least_line_std_e(reduction.noise)};
   std::array<std::optional<denoise::LineOffsets>, 2> of_kind;
   for_each_index(executor, 2, [&](int kind) {
     auto found = denoise::line_offsets_of_frame(charge_e, static_cast<denoise::Lines>(kind), options);
@@ -84,7 +85,7 @@ std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& plan, PlaneView
   });
   std::vector<denoise::LineOffsets> lines;
   for (auto& found : of_kind) {
-    if (found && lines_stand_out(*found, plan.noise)) lines.push_back(*std::move(found));
+    if (found && lines_stand_out(*found, reduction.noise)) lines.push_back(*std::move(found));
   }
   return lines;
 }
@@ -105,15 +106,16 @@ NoiseReduction left_alone(std::string reason) {
   return out;
 }
 
-void choose_level(const DenoiseChoice& choice, const std::optional<EffectsPlan>& effects, NoiseReduction& out) {
+void choose_level(const NoiseRequest& request, NoiseReduction& out) {
+  const DenoiseChoice& choice = request.choice;
   if (choice.mode == DenoiseChoice::Mode::level) {
     out.level = choice.level;
     out.reason = "given";
     return;
   }
-  if (effects && effects->level_decided) {
-    out.level = effects->level;
-    out.regions = effects->regions;
+  if (request.level) {
+    out.level = request.level->level;
+    out.regions = request.level->regions;
     out.reason = fmt::format("what the frame calls for, at a signal to noise ratio of {:.3g}", *out.snr);
     return;
   }
@@ -123,25 +125,25 @@ void choose_level(const DenoiseChoice& choice, const std::optional<EffectsPlan>&
 }
 
 /// Lines need the whole frame; what noise is left is checked on a sample of it where there is one.
-RawElectrons charge_to_check(const RawFrame& frame, const DevelopPlan& plan, bool with_lines, NoiseReduction& out,
+RawElectrons charge_to_check(const RawFrame& frame, const RawLevels& levels, bool with_lines, NoiseReduction& out,
                              Executor& executor) {
-  const std::vector<Rect> squares = sample_squares(frame, plan);
-  if (!with_lines && !squares.empty()) return sample_electrons(frame, plan, squares, executor);
-  RawElectrons charge = raw_electrons(frame, plan, {}, executor);
+  const std::vector<Rect> squares = sample_squares(frame, levels);
+  if (!with_lines && !squares.empty()) return sample_electrons(frame, levels, squares, executor);
+  RawElectrons charge = raw_electrons(frame, levels, {}, executor);
   if (with_lines) take_lines_off(charge, out, executor);
   return squares.empty() ? std::move(charge) : sample_of(charge, squares);
 }
 
 }  // namespace
 
-std::optional<Error> noise_obstacle(const RawFrame& frame, const DevelopPlan& plan) {
+std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& levels) {
   if (frame.raw.layout != SensorLayout::bayer) {
     return Error{ErrorCode::unsupported, "noise is reduced on Bayer mosaics, and this is none"};
   }
   if (frame.raw.active.width < 2 || frame.raw.active.height < 2) {
     return Error{ErrorCode::invalid_argument, "the picture is too small to tell noise from detail"};
   }
-  if (!plan.electrons_at_white) {
+  if (!levels.electrons_at_white) {
     return Error{ErrorCode::insufficient,
                  "the noise is unknown: the file has no usable NoiseProfile; give a profile (--profile, see calibrate "
                  "and calib/profiles)"};
@@ -159,15 +161,14 @@ std::optional<denoise::Level> level_for(double snr) {
   return snr >= 3 ? denoise::Level::standard : denoise::Level::high;
 }
 
-void set_noise_model(const RawFrame& frame, const DevelopPlan& plan, NoiseReduction& out) {
-  out.source = frame.noise->source;
-  out.noise = noise_of(frame, plan);
-  out.options.white_gain = balance_of(frame, plan);
+NoiseModel noise_model(const RawFrame& frame, const RawLevels& levels, const std::array<float, 3>& white_gain,
+                       OutputSpace space) {
+  return {frame.noise->source, noise_of(frame, levels), balance_of(frame, levels, white_gain, space)};
 }
 
-double middle_snr(const RawFrame& frame, const DevelopPlan& plan, const denoise::RawNoise& noise,
+double middle_snr(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
                   const Thumbnail& thumbnail, std::vector<double>& snr) {
-  const std::array<double, 3> electrons = electrons_by_colour(frame.raw, plan);
+  const std::array<double, 3> electrons = electrons_by_colour(frame.raw, levels);
   const double dark = mean_of_sites(noise.dark_mean_e), variance = mean_of_colours(noise.variance_e2);
   snr.resize(thumbnail.mean.plane[0].size());
   for (std::size_t i = 0; i < snr.size(); ++i) {
@@ -180,25 +181,27 @@ double middle_snr(const RawFrame& frame, const DevelopPlan& plan, const denoise:
   return *middle;
 }
 
-Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan,
-                                  Executor& executor) {
-  const DenoiseChoice& choice = plan.options.denoise;
+Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, const RawLevels& levels,
+                                  const NoiseRequest& request, Executor& executor) {
+  const DenoiseChoice& choice = request.choice;
   if (choice.mode == DenoiseChoice::Mode::off) return left_alone("not asked for");
-  if (auto error = noise_obstacle(frame, plan)) {
+  if (auto error = noise_obstacle(frame, levels)) {
     if (choice.mode == DenoiseChoice::Mode::level) return tl::make_unexpected(*std::move(error));
     return left_alone(std::move(error->message));
   }
+  const NoiseModel model = noise_model(frame, levels, request.white_gain, request.space);
   NoiseReduction out;
-  set_noise_model(frame, plan, out);
+  out.source = model.source;
+  out.noise = model.noise;
+  out.options.white_gain = model.white_gain;
   std::vector<double> memory;
-  out.snr = middle_snr(frame, plan, out.noise, thumbnail, memory);
-  choose_level(choice, plan.effects, out);
+  out.snr = middle_snr(frame, levels, out.noise, thumbnail, memory);
+  choose_level(request, out);
   if (!out.level) return out;
   out.options.level = *out.level;
-  const bool with_lines = choice.line_noise && (!plan.effects || plan.effects->lines);
-  const RawElectrons charge = charge_to_check(frame, plan, with_lines, out, executor);
+  const RawElectrons charge = charge_to_check(frame, levels, choice.line_noise && request.lines, out, executor);
   const denoise::NoiseCheck check = denoise::check_noise({charge.value.view(), charge.phase}, out.noise, executor);
-  for (const denoise::NoiseRemark& remark : denoise::remarks_on(check)) plan.warnings.push_back(remark.text);
+  for (const denoise::NoiseRemark& remark : denoise::remarks_on(check)) out.warnings.push_back(remark.text);
   out.options.variance_scale = denoise::variance_scale_of(check);
   return out;
 }

@@ -4,7 +4,6 @@
 #include <array>
 #include <utility>
 
-#include "isp/pipeline/budget/plan_effects.h"
 #include "isp/pipeline/render/frame_tiles.h"
 #include "isp/pipeline/render/level_parts.h"
 

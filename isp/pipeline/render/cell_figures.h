@@ -3,8 +3,7 @@
 #include <array>
 #include <cstddef>
 
-#include "isp/base/frame.h"
-#include "isp/pipeline/plan.h"
+#include "isp/base/cfa.h"
 
 /// Figures of a Bayer cell, by colour or by site.
 namespace lowlux::isp {
@@ -21,15 +20,6 @@ constexpr double mean_of_colours(const std::array<double, 3>& of_colour) {
 
 constexpr double mean_of_sites(const PerSite<double>& of_site) {
   return (of_site[0] + of_site[1] + of_site[2] + of_site[3]) / 4;
-}
-
-/// Electrons at white of each colour; both greens have as many. Precondition: plan.electrons_at_white.
-inline std::array<double, 3> electrons_by_colour(const RawDn& raw, const DevelopPlan& plan) {
-  std::array<double, 3> out{};
-  for (int site = 0; site < 4; ++site) {
-    out[static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1))] = (*plan.electrons_at_white)[site];
-  }
-  return out;
 }
 
 }  // namespace lowlux::isp

@@ -12,37 +12,37 @@ Rect whole_of(const RawDn& raw) { return {0, 0, raw.active.width, raw.active.hei
 
 }  // namespace
 
-void take_black_off(const RawDn& raw, const DevelopPlan& plan, PlaneView<float> out, Executor& executor) {
-  take_black_off(raw, plan, whole_of(raw), out, executor);
+void take_black_off(const RawDn& raw, const RawLevels& levels, PlaneView<float> out, Executor& executor) {
+  take_black_off(raw, levels, whole_of(raw), out, executor);
 }
 
-void take_black_off(const RawDn& raw, const DevelopPlan& plan, const Rect& part, PlaneView<float> out,
+void take_black_off(const RawDn& raw, const RawLevels& levels, const Rect& part, PlaneView<float> out,
                     Executor& executor) {
-  if (plan.options.dark_frame) {
-    to_fraction(raw, *plan.options.dark_frame, plan.black, part, out, executor);
+  if (levels.dark_frame) {
+    to_fraction(raw, *levels.dark_frame, levels.black, part, out, executor);
   } else {
-    to_fraction(raw, plan.black, part, out, executor);
+    to_fraction(raw, levels.black, part, out, executor);
   }
 }
 
-RawElectrons raw_electrons(const RawFrame& frame, const DevelopPlan& plan, Plane<float> memory, Executor& executor) {
+RawElectrons raw_electrons(const RawFrame& frame, const RawLevels& levels, Plane<float> memory, Executor& executor) {
   const RawDn& raw = frame.raw;
   if (memory.width() != raw.active.width || memory.height() != raw.active.height) {
     memory = Plane<float>(raw.active.width, raw.active.height);
   }
-  raw_electrons(frame, plan, whole_of(raw), memory.view(), executor);
+  raw_electrons(frame, levels, whole_of(raw), memory.view(), executor);
   return {std::move(memory), raw.phase};
 }
 
-void raw_electrons(const RawFrame& frame, const DevelopPlan& plan, const Rect& part, PlaneView<float> out,
+void raw_electrons(const RawFrame& frame, const RawLevels& levels, const Rect& part, PlaneView<float> out,
                    Executor& executor) {
-  if (plan.options.dark_frame) {
-    take_black_off(frame.raw, plan, part, out, executor);
-    count_electrons(out, *plan.electrons_at_white, executor);
+  if (levels.dark_frame) {
+    take_black_off(frame.raw, levels, part, out, executor);
+    count_electrons(out, *levels.electrons_at_white, executor);
   } else {
-    to_electrons(frame.raw, plan.black, *plan.electrons_at_white, part, out, executor);
+    to_electrons(frame.raw, levels.black, *levels.electrons_at_white, part, out, executor);
   }
-  repair(out, {part.x, part.y}, plan.defects, 2);
+  repair(out, {part.x, part.y}, levels.defects, 2);
 }
 
 PerSite<float> of_crop(const PerSite<double>& active, const Rect& crop) {
@@ -53,18 +53,14 @@ PerSite<float> of_crop(const PerSite<double>& active, const Rect& crop) {
   return out;
 }
 
-PerSite<float> site_gains(const RawDn& raw, const DevelopPlan& plan, const PerSite<double>& units_at_white,
-                          const Rect& crop) {
+PerSite<float> site_gains(const RawDn& raw, const std::array<float, 3>& white_gain,
+                          const PerSite<double>& units_at_white, const Rect& crop) {
   PerSite<double> gain{};
   for (int site = 0; site < 4; ++site) {
     const int colour = static_cast<int>(colour_at(raw.phase, site & 1, site >> 1));
-    gain[site] = plan.white_gain[colour] / units_at_white[site];
+    gain[site] = white_gain[colour] / units_at_white[site];
   }
   return of_crop(gain, crop);
-}
-
-PerSite<float> site_gains(const RawDn& raw, const DevelopPlan& plan, const Rect& crop) {
-  return site_gains(raw, plan, plan.electrons_at_white.value_or(PerSite<double>{1, 1, 1, 1}), crop);
 }
 
 }  // namespace lowlux::isp

@@ -8,17 +8,19 @@
 namespace lowlux::isp {
 
 inline bool bounds_noise(const DevelopPlan& plan) {
-  return plan.look && plan.look->noise_limit && (plan.look->noise || plan.noise_reduction.has_level());
+  const std::optional<LookPlan>& look = plan.rendering.look;
+  return look && look->noise_limit && (look->noise || plan.noise_reduction.has_level());
 }
 
 inline bool needs_grid(const DevelopPlan& plan) {
-  const auto shows_effects = [](const LookPlan& look) {
-    return std::ranges::any_of(look.effects, [](const LookEffect& effect) { return effect.used; });
+  const std::optional<LookPlan>& look = plan.rendering.look;
+  const auto shows_effects = [](const LookPlan& of) {
+    return of.effects && std::ranges::any_of(*of.effects, [](const LookEffect& effect) { return effect.used; });
   };
-  return plan.look && (shows_effects(*plan.look) || bounds_noise(plan));
+  return look && (shows_effects(*look) || bounds_noise(plan));
 }
 
-inline bool needs_table(const DevelopPlan& plan) { return plan.look && plan.look->table; }
+inline bool needs_table(const DevelopPlan& plan) { return plan.rendering.look && plan.rendering.look->table; }
 
 inline bool keeps_maps(const DevelopPlan& plan) {
   return plan.noise_reduction.has_level() && (plan.options.denoise.maps || bounds_noise(plan));

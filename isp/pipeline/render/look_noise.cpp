@@ -14,7 +14,8 @@ namespace {
 std::array<float, 3> weights_of(const DevelopPlan& plan) {
   std::array<float, 3> weights{};
   for (int c = 0; c < 3; ++c) {
-    for (int j = 0; j < 3; ++j) weights[c] += plan.transform.luminance[j] * plan.transform.matrix[3 * j + c];
+    for (int j = 0; j < 3; ++j)
+      weights[c] += plan.rendering.transform.luminance[j] * plan.rendering.transform.matrix[3 * j + c];
   }
   return weights;
 }
@@ -23,7 +24,7 @@ std::array<float, 3> weights_of(const DevelopPlan& plan) {
 void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const float>& residual, PlaneView<float> out,
              Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
-  const auto electrons = static_cast<float>(mean_of_sites(*plan.electrons_at_white));
+  const auto electrons = static_cast<float>(mean_of_sites(*plan.levels.electrons_at_white));
   const float unit = (weights[0] + weights[1] + weights[2]) / electrons;
   const int cells = plan.options.half ? 4 : 2;  // of the map along a side of the grid's
   for_each_band(executor, out.height, [&](RowBand band, int) {
@@ -44,14 +45,14 @@ void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const fl
 // but for monochrome frames.
 void of_model(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
-  const NoiseProfile& noise = *plan.look->noise;
-  const bool monochrome = !plan.white;  // one plane serves for all three
+  const NoiseProfile& noise = *plan.rendering.look->noise;
+  const bool monochrome = !plan.rendering.white;  // one plane serves for all three
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       for (int x = 0; x < out.width; ++x) {
         float sum = 0, weight = 0;
         for (int c = 0; c < 3; ++c) {
-          const float gain = plan.white_gain[c];
+          const float gain = plan.rendering.white_gain[c];
           const float fraction = std::max(quarter[c].row(y)[x], 0.0f) / gain;
           const float variance = static_cast<float>(noise.scale[c]) * fraction + static_cast<float>(noise.offset[c]);
           sum += weights[c] * weights[c] * gain * gain * variance;

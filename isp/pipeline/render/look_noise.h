@@ -6,8 +6,8 @@
 
 namespace lowlux::isp {
 
-/// Variance of the noise in the luminance of the picture's pixels, in their unit (that of plan.transform), one figure
-/// for each cell of 4 x 4: what the denoiser says it left, or what the noise model says of what came in.
+/// Variance of the noise in the luminance of the picture's pixels, in their unit (that of plan.rendering.transform),
+/// one figure for each cell of 4 x 4: what the denoiser says it left, or what the noise model says of what came in.
 /// Needs noise that was reduced, or a look that knows it.
 /// @param maps  of the active area; read where noise was reduced
 /// @param quarter  means of camera RGB (RawToRgb::quarter), read where it was not

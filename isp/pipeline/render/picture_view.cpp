@@ -79,15 +79,15 @@ void copy_pixels(const PictureView& from, const PictureView& to) {
 
 void encode(RawToRgb& kernel, const RgbInput& in, const RgbTransform& transform, const DevelopPlan& plan,
             const PictureView& out, Executor& executor) {
-  const CodeChange retarget = plan.options.display ? change_by(plan.options.display->made.table) : CodeChange{};
-  const CodeChange* const change = plan.options.display ? &retarget : nullptr;
+  const CodeChange retarget = plan.display ? change_by(plan.display->made.table) : CodeChange{};
+  const CodeChange* const change = plan.display ? &retarget : nullptr;
   std::visit(
       [&](const auto& view) {
         using View = std::remove_cvref_t<decltype(view)>;
         if constexpr (std::is_same_v<View, PlaneView<std::uint8_t>>) {
-          kernel.rgb8(in, transform, plan.tone, view, executor, change);
+          kernel.rgb8(in, transform, plan.rendering.tone, view, executor, change);
         } else if constexpr (std::is_same_v<View, PlaneView<std::uint16_t>>) {
-          kernel.rgb16(in, transform, plan.tone, view, executor, change);
+          kernel.rgb16(in, transform, plan.rendering.tone, view, executor, change);
         } else {
           kernel.linear(in, transform, view, executor);
         }

@@ -22,9 +22,9 @@ PlaneView<const float> crop_of(const Plane<float>& active, const Rect& crop) {
 // What is left to do with planes that are already light in the picture's primaries.
 RgbTransform of_modelled(const DevelopPlan& plan, const LookGrid* look) {
   RgbTransform out;
-  out.luminance = plan.transform.luminance;
+  out.luminance = plan.rendering.transform.luminance;
   out.clip = INFINITY;
-  out.move_into_gamut = plan.transform.move_into_gamut;
+  out.move_into_gamut = plan.rendering.transform.move_into_gamut;
   out.look = look;
   return out;
 }
@@ -32,10 +32,10 @@ RgbTransform of_modelled(const DevelopPlan& plan, const LookGrid* look) {
 DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
   const Rect& crop = raw.default_crop;
   PerSite<double> range{};
-  for (int site = 0; site < 4; ++site) range[site] = white_at(raw, site) - plan.black.pedestal_dn[site];
+  for (int site = 0; site < 4; ++site) range[site] = white_at(raw, site) - plan.levels.black.pedestal_dn[site];
   return {raw.dn.view().crop(raw.active.x + crop.x, raw.active.y + crop.y, crop.width, crop.height),
           phase_of_crop(raw.phase, crop.x, crop.y),
-          {of_crop(plan.black.pedestal_dn, crop), site_gains(raw, plan, range, crop)}};
+          {of_crop(plan.levels.black.pedestal_dn, crop), site_gains(raw, plan.rendering.white_gain, range, crop)}};
 }
 
 }  // namespace
@@ -43,9 +43,10 @@ DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
 // Dark charge off, and noise if so decided.
 SignalElectrons Pipeline::signal_electrons(const RawFrame& frame, const DevelopPlan& plan) {
   if (!plan.noise_reduction.reduces()) {
-    return subtract_dark(raw_electrons(frame, plan, std::move(mosaic_), executor_), plan.black, executor_);
+    return subtract_dark(raw_electrons(frame, plan.levels, std::move(mosaic_), executor_), plan.levels.black,
+                         executor_);
   }
-  RawElectrons raw = raw_electrons(frame, plan, std::move(noisy_), executor_);
+  RawElectrons raw = raw_electrons(frame, plan.levels, std::move(noisy_), executor_);
   SignalElectrons out =
       noise_reducer_.run(raw, plan.noise_reduction, std::move(mosaic_), keeps_maps(plan) ? &noise_maps_ : nullptr);
   noisy_ = std::move(raw.value);
@@ -55,12 +56,12 @@ SignalElectrons Pipeline::signal_electrons(const RawFrame& frame, const DevelopP
 // Bayer frames that have to be repaired, multiplied or denoised first: in electrons where the gain is known.
 void Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& plan) {
   const RawDn& raw = frame.raw;
-  if (plan.electrons_at_white) {
+  if (plan.levels.electrons_at_white) {
     mosaic_ = signal_electrons(frame, plan).value;
   } else {
     fit(mosaic_, raw.active.width, raw.active.height);
-    take_black_off(raw, plan, mosaic_.view(), executor_);
-    repair(mosaic_.view(), plan.defects, 2);
+    take_black_off(raw, plan.levels, mosaic_.view(), executor_);
+    repair(mosaic_.view(), plan.levels.defects, 2);
   }
   apply_gains(frame.corrections, mosaic_.view(), executor_);
 }
@@ -76,8 +77,8 @@ RgbInput Pipeline::prepare_bayer(const RawFrame& frame, const DevelopPlan& plan)
   };
   if (plan.from_codes) return half_or_whole(code_mosaic(raw, plan));
   float_mosaic(frame, plan);
-  return half_or_whole(
-      SignedMosaic{crop_of(mosaic_, crop), phase_of_crop(raw.phase, crop.x, crop.y), site_gains(raw, plan, crop)});
+  return half_or_whole(SignedMosaic{crop_of(mosaic_, crop), phase_of_crop(raw.phase, crop.x, crop.y),
+                                    site_gains(raw, plan.rendering.white_gain, units_at_white(plan.levels), crop)});
 }
 
 // Monochrome frames serve as R, G and B at once; demosaiced ones have three planes of their own.
@@ -87,16 +88,16 @@ RgbInput Pipeline::prepare_planes(const RawFrame& frame, const DevelopPlan& plan
   const int planes = monochrome ? 1 : 3;
   for (int c = 0; c < planes; ++c) fit(planes_[c], raw.active.width, raw.active.height);
   if (monochrome) {
-    take_black_off(raw, plan, planes_[0].view(), executor_);
-    repair(planes_[0].view(), plan.defects, 1);
+    take_black_off(raw, plan.levels, planes_[0].view(), executor_);
+    repair(planes_[0].view(), plan.levels.defects, 1);
     apply_gains(frame.corrections, planes_[0].view(), executor_);
   } else {
     const RgbView<float> rgb{planes_[0].view(), planes_[1].view(), planes_[2].view()};
-    to_fraction_rgb(raw, plan.black, rgb, executor_);
-    for (const auto& plane : rgb) repair(plane, plan.defects, 1);
+    to_fraction_rgb(raw, plan.levels.black, rgb, executor_);
+    for (const auto& plane : rgb) repair(plane, plan.levels.defects, 1);
     apply_gains(frame.corrections, rgb, executor_);
   }
-  CameraPlanes out{{}, plan.white_gain};
+  CameraPlanes out{{}, plan.rendering.white_gain};
   for (int c = 0; c < 3; ++c) {
     const int source = std::min(c, planes - 1);
     out.rgb[c] = crop_of(planes_[source], raw.default_crop);
@@ -134,9 +135,11 @@ LookGrid Pipeline::look_grid(const RgbInput& in, const RawFrame& frame, const De
   if (bounds_noise(plan)) {
     fit(luminance_noise_, width, height);
     noise_of_luminance(plan, frame.raw.default_crop, noise_maps_, quarter, luminance_noise_.view(), executor_);
-    limit = {*plan.look->noise_limit, tone_limit(plan.options.tone, plan.exposure_ev), luminance_noise_.view()};
+    limit = {*plan.rendering.look->noise_limit, tone_limit(plan.options.tone, plan.rendering.exposure_ev),
+             luminance_noise_.view()};
   }
-  return look_->make(quarter, plan.transform.matrix, plan.transform.clip, plan.look->look, limit, executor_);
+  return look_->make(quarter, plan.rendering.transform.matrix, plan.rendering.transform.clip, plan.rendering.look->look,
+                     limit, executor_);
 }
 
 template <class Encode>
@@ -145,7 +148,7 @@ void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const E
   reserve(frame, plan);
   const RgbInput in =
       frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);
-  RgbTransform transform = plan.transform;
+  RgbTransform transform = plan.rendering.transform;
   LookGrid look;
   if (needs_grid(plan)) {
     look = look_grid(in, frame, plan);
@@ -170,13 +173,13 @@ void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& o
 
 void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, const RowSink& out) {
   render_to(frame, plan, [&](const RgbInput& in, const RgbTransform& transform) {
-    kernel_->rows8(in, transform, plan.tone, out, executor_);
+    kernel_->rows8(in, transform, plan.rendering.tone, out, executor_);
   });
 }
 
 void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, PlaneView<std::uint16_t> out) {
   render_to(frame, plan, [&](const RgbInput& in, const RgbTransform& transform) {
-    kernel_->rgb16(in, transform, plan.tone, out, executor_);
+    kernel_->rgb16(in, transform, plan.rendering.tone, out, executor_);
   });
 }
 
@@ -189,12 +192,12 @@ PlaneView<const float> Pipeline::signal(const RawFrame& frame, const DevelopPlan
 CameraPlanes Pipeline::as_modelled(const RgbInput& in, const DevelopPlan& plan) {
   for (Plane<float>& plane : modelled_) fit(plane, plan.width, plan.height);
   const RgbView<float> planes{modelled_[0].view(), modelled_[1].view(), modelled_[2].view()};
-  const auto limit = static_cast<float>(plan.look->look.cd_m2_per_unit / plan.look->white_cd_m2);
-  RgbTransform to_light = plan.transform;
+  const auto limit = static_cast<float>(plan.rendering.look->look.cd_m2_per_unit / plan.rendering.look->white_cd_m2);
+  RgbTransform to_light = plan.rendering.transform;
   for (float& coefficient : to_light.matrix) coefficient *= limit;
   to_light.move_into_gamut = false;
   kernel_->linear(in, to_light, planes, executor_);
-  apply_colour_table(*plan.look->table, {planes[0], planes[1], planes[2]}, planes, executor_);
+  apply_colour_table(*plan.rendering.look->table, {planes[0], planes[1], planes[2]}, planes, executor_);
   return {{planes[0], planes[1], planes[2]}, {1 / limit, 1 / limit, 1 / limit}};
 }
 

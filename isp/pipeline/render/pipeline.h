@@ -23,14 +23,14 @@ class Pipeline {
 
   /// `out` holds a picture of plan.width x plan.height of the planned sample type: see make_picture().
   void render(const RawFrame& frame, const DevelopPlan& plan, Picture& out);
-  /// The picture's 8-bit codes, row by row; plan.options.display is not asked. This and what follows works on whole
+  /// The picture's 8-bit codes, row by row; plan.display is not asked. This and what follows works on whole
   /// frames of any size.
   void render(const RawFrame& frame, const DevelopPlan& plan, const RowSink& out);
   /// The picture's 16-bit codes into memory of the caller's, height x 3 width; the same.
   void render(const RawFrame& frame, const DevelopPlan& plan, PlaneView<std::uint16_t> out);
 
   /// The mosaic of the active area as it is before corrections and white balance: electrons, signed, noise and dark
-  /// charge off as planned. Valid until the next frame. Precondition: a Bayer frame, plan.electrons_at_white.
+  /// charge off as planned. Valid until the next frame. Precondition: a Bayer frame, plan.levels.electrons_at_white.
   PlaneView<const float> signal(const RawFrame& frame, const DevelopPlan& plan);
 
   /// Share of the picture that moved, see NoiseReducer.

@@ -120,18 +120,18 @@ PlaneView<float> TileRenderer::mosaic_of(const RawFrame& frame, const DevelopPla
   const RawDn& raw = frame.raw;
   const Rect whole = whole_of(raw, plan, core);
   PlaneView<float> out = noisy_.view().crop(0, 0, whole.width, whole.height);
-  if (!plan.electrons_at_white) {
-    take_black_off(raw, plan, whole, out, executor_);
-    repair(out, {whole.x, whole.y}, plan.defects, 2);
+  if (!plan.levels.electrons_at_white) {
+    take_black_off(raw, plan.levels, whole, out, executor_);
+    repair(out, {whole.x, whole.y}, plan.levels.defects, 2);
   } else {
-    raw_electrons(frame, plan, whole, out, executor_);
+    raw_electrons(frame, plan.levels, whole, out, executor_);
     if (plan.noise_reduction.reduces()) {
       const PlaneView<float> clean = mosaic_.view().crop(0, 0, whole.width, whole.height);
       const Rect seen = seen_of(raw, plan, core);
       noise.run_piece({seen, whole, raw.active.width, raw.active.height, raw.phase}, plan.noise_reduction, out, clean);
       out = clean;
     } else {
-      subtract_dark(out, plan.black.dark_mean_e, executor_);
+      subtract_dark(out, plan.levels.black.dark_mean_e, executor_);
     }
   }
   apply_gains(frame.corrections, {whole.x, whole.y, raw.active.width, raw.active.height}, out, executor_);
@@ -143,16 +143,16 @@ void TileRenderer::render_core(const RawFrame& frame, const DevelopPlan& plan, c
   const RawDn& raw = frame.raw;
   const Rect seen = seen_of(raw, plan, core), pixels = pixels_of(raw, plan, core);
   const SignedMosaic in{crop_of(mosaic, whole_of(raw, plan, core), seen), phase_of_crop(raw.phase, seen.x, seen.y),
-                        site_gains(raw, plan, seen)};
+                        site_gains(raw, plan.rendering.white_gain, units_at_white(plan.levels), seen)};
   if (plan.options.half) {
     RgbView<float> half;
     for (std::size_t c = 0; c < 3; ++c) half[c] = half_planes_[c].view().crop(0, 0, pixels.width, pixels.height);
     kernel_->bin2x2(in, half, executor_);
     const CameraPlanes planes{{half[0], half[1], half[2]}, {1, 1, 1}};
-    return encode(*kernel_, planes, plan.transform, plan, isp::crop_of(out, pixels), executor_);
+    return encode(*kernel_, planes, plan.rendering.transform, plan, isp::crop_of(out, pixels), executor_);
   }
   const PictureView picture = isp::crop_of(view_of(*picture_), {0, 0, seen.width, seen.height});
-  encode(*kernel_, in, plan.transform, plan, picture, executor_);
+  encode(*kernel_, in, plan.rendering.transform, plan, picture, executor_);
   copy_pixels(isp::crop_of(picture, {core.x - seen.x, core.y - seen.y, core.width, core.height}),
               isp::crop_of(out, pixels));
 }

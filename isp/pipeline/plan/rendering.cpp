@@ -1,11 +1,13 @@
-#include "isp/pipeline/plan/plan_rendering.h"
+#include "isp/pipeline/plan/rendering.h"
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 #include <vector>
 
 #include "isp/pipeline/plan/plan_look.h"
+#include "isp/render/exposure.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {
@@ -43,25 +45,24 @@ Result<WhiteBalance> with_white(Result<WhiteBalance> balance, const RawFrame& fr
               "the white balance is no colour of a light under the file's matrices: try --wb 5500, or --space camera");
 }
 
-void decide_exposure(DevelopPlan& plan, std::span<const float> luminance, double black_noise_std) {
-  if (plan.options.exposure_ev) {
-    plan.exposure_ev = *plan.options.exposure_ev;
-    plan.exposure_rule = "given";
+void decide_exposure(const DevelopOptions& options, std::span<const float> luminance, double black_noise_std,
+                     Rendering& out) {
+  if (options.exposure_ev) {
+    out.exposure_ev = *options.exposure_ev;
+    out.exposure_rule = "given";
     return;
   }
   const AutoExposure automatic = auto_exposure(luminance, black_noise_std);
-  plan.exposure_ev = automatic.ev;
-  plan.exposure_rule = name_of(automatic.rule);
+  out.exposure_ev = automatic.ev;
+  out.exposure_rule = name_of(automatic.rule);
 }
 
 }  // namespace
 
-void set_white(DevelopPlan& plan, const WhiteBalance& balance) {
-  plan.neutral = balance.neutral;
-  plan.white = balance.white;
-  plan.white_balance_rule = name_of(balance.source);
-  if (!balance.reason.empty()) plan.warnings.push_back(balance.reason);
-  for (int c = 0; c < 3; ++c) plan.white_gain[c] = static_cast<float>(1 / plan.neutral[c]);
+std::array<float, 3> white_gain_of(const Vector3& neutral) {
+  std::array<float, 3> out{};
+  for (int c = 0; c < 3; ++c) out[c] = static_cast<float>(1 / neutral[c]);
+  return out;
 }
 
 double block_noise_std(const RawDn& raw, const Thumbnail& thumbnail) {
@@ -83,55 +84,66 @@ Result<Matrix3> balanced_to_output(const RawFrame& frame, const DevelopOptions& 
   return to_output * *to_xyz * diagonal3(balance.neutral);
 }
 
-void rendered_luminance(const CameraRgb& blocks, const DevelopPlan& plan, const Matrix3& balanced,
-                        std::span<float> out) {
-  const Vector3 luminance = luminance_of(plan.options.space);
+void rendered_luminance(const CameraRgb& blocks, OutputSpace space, const std::array<float, 3>& white_gain,
+                        const Matrix3& balanced, std::span<float> out) {
+  const Vector3 luminance = luminance_of(space);
   Vector3 weights{};  // of white-balanced camera RGB
   for (int c = 0; c < 3; ++c) {
     for (int i = 0; i < 3; ++i) weights[c] += luminance[i] * balanced[i][c];
   }
   for (std::size_t i = 0; i < out.size(); ++i) {
     double y = 0;
-    for (int c = 0; c < 3; ++c) y += weights[c] * std::min(blocks.plane[c].data()[i] * plan.white_gain[c], 1.0f);
+    for (int c = 0; c < 3; ++c) y += weights[c] * std::min(blocks.plane[c].data()[i] * white_gain[c], 1.0f);
     out[i] = static_cast<float>(y);
   }
 }
 
-void set_transform(DevelopPlan& plan, const Matrix3& balanced) {
-  const bool camera = plan.options.space == OutputSpace::camera;
-  const double limit = tone_limit(plan.options.tone, plan.exposure_ev);
-  const Matrix3 scaled = (std::exp2(plan.exposure_ev) / limit) * balanced;
-  const Vector3 luminance = luminance_of(plan.options.space);
-  RgbTransform& t = plan.transform;
-  for (int i = 0; i < 9; ++i) t.matrix[i] = static_cast<float>(scaled[i / 3][i % 3]);
-  for (int c = 0; c < 3; ++c) t.luminance[c] = static_cast<float>(luminance[c]);
-  t.clip = camera ? INFINITY : 1.0f;
-  t.move_into_gamut = plan.options.samples != SampleType::f32;
+RgbTransform transform_of(const Matrix3& balanced, double exposure_ev, const DevelopOptions& options) {
+  const double limit = tone_limit(options.tone, exposure_ev);
+  const Matrix3 scaled = (std::exp2(exposure_ev) / limit) * balanced;
+  const Vector3 luminance = luminance_of(options.space);
+  RgbTransform out;
+  for (int i = 0; i < 9; ++i) out.matrix[i] = static_cast<float>(scaled[i / 3][i % 3]);
+  for (int c = 0; c < 3; ++c) out.luminance[c] = static_cast<float>(luminance[c]);
+  out.clip = options.space == OutputSpace::camera ? INFINITY : 1.0f;
+  out.move_into_gamut = options.samples != SampleType::f32;
+  return out;
 }
 
-void set_tone(DevelopPlan& plan) {
-  if (plan.options.samples == SampleType::f32) return;
-  plan.tone = make_tone_table(plan.options.tone, plan.options.space, tone_limit(plan.options.tone, plan.exposure_ev));
+ToneTable tone_of(double exposure_ev, const DevelopOptions& options) {
+  if (options.samples == SampleType::f32) return {};
+  return make_tone_table(options.tone, options.space, tone_limit(options.tone, exposure_ev));
 }
 
-Result<void> decide_rendering(const RawFrame& frame, const Thumbnail& thumbnail, DevelopPlan& plan) {
-  const DevelopOptions& options = plan.options;
+Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light, const DevelopOptions& options) {
   Result<WhiteBalance> balance{};
-  if (options.space != OutputSpace::camera)
-    balance = with_white(choose_white(frame, options, thumbnail), frame, options);
+  if (options.space != OutputSpace::camera) balance = with_white(choose_white(frame, options, light), frame, options);
   if (!balance) return tl::make_unexpected(std::move(balance.error()));
-  set_white(plan, *balance);
+  Rendering out{.neutral = balance->neutral,
+                .white = balance->white,
+                .white_balance_rule = name_of(balance->source),
+                .white_gain = white_gain_of(balance->neutral)};
+  if (!balance->reason.empty()) out.warnings.push_back(balance->reason);
 
   const Result<Matrix3> balanced = balanced_to_output(frame, options, *balance);
   if (!balanced) return tl::make_unexpected(balanced.error());
-  std::vector<float> blocks(thumbnail.mean.plane[0].size());
-  rendered_luminance(thumbnail.mean, plan, *balanced, blocks);
-  const double gain = *std::max_element(plan.white_gain.begin(), plan.white_gain.end());
-  decide_exposure(plan, blocks, thumbnail.black_noise_std * gain);
-  if (auto look = plan_look(frame, {blocks, thumbnail.black_noise_std * gain}, plan); !look) return look;
-  set_transform(plan, *balanced);
-  set_tone(plan);
-  return plan_model(plan);
+  std::vector<float> blocks(light.mean.plane[0].size());
+  rendered_luminance(light.mean, options.space, out.white_gain, *balanced, blocks);
+  const double noise_std = light.black_noise_std * *std::ranges::max_element(out.white_gain);
+  decide_exposure(options, blocks, noise_std, out);
+  Result<std::optional<LookPlan>> look = plan_look(frame, {blocks, noise_std, out.white, out.exposure_ev}, options);
+  if (!look) return tl::make_unexpected(std::move(look.error()));
+  out.look = *std::move(look);
+  if (out.look) out.exposure_ev += out.look->dimming_ev;
+  out.transform = transform_of(*balanced, out.exposure_ev, options);
+  out.tone = tone_of(out.exposure_ev, options);
+  if (!out.look || out.look->kind != Look::model) return out;
+  Result<ModelTable> model =
+      tabulate_model(*out.look, {out.white, out.white_gain, out.transform, out.exposure_ev}, options);
+  if (!model) return tl::make_unexpected(std::move(model.error()));
+  out.look->table = std::move(model->table);
+  std::ranges::move(model->warnings, std::back_inserter(out.warnings));
+  return out;
 }
 
 }  // namespace lowlux::isp

@@ -1,0 +1,23 @@
+#include "isp/pipeline/plan/levels.h"
+
+#include <algorithm>
+
+#include "isp/raw/corrections.h"
+
+namespace lowlux::isp {
+
+bool renders_from_codes(const RawFrame& frame, const RawLevels& levels, bool reduces_noise) {
+  return frame.raw.layout == SensorLayout::bayer && !reduces_noise && levels.defects.empty() && !levels.dark_frame &&
+         !levels.black.pattern && levels.black.dark_mean_e == PerSite<double>{} &&
+         frame.corrections.radial_gains.empty() && std::ranges::none_of(frame.corrections.gain_maps, has_effect);
+}
+
+std::array<double, 3> electrons_by_colour(const RawDn& raw, const RawLevels& levels) {
+  std::array<double, 3> out{};
+  for (int site = 0; site < 4; ++site) {
+    out[static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1))] = (*levels.electrons_at_white)[site];
+  }
+  return out;
+}
+
+}  // namespace lowlux::isp

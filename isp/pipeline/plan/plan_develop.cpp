@@ -1,0 +1,148 @@
+#include "isp/pipeline/plan/plan_develop.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "isp/pipeline/budget/effect_sizes.h"
+#include "isp/pipeline/budget/plan_effects.h"
+#include "isp/pipeline/plan/plan_noise.h"
+#include "isp/raw/corrections.h"
+#include "isp/raw/measure/thumbnail.h"
+#include "isp/raw/subtract_dark_frame.h"
+#include "isp/raw/to_linear.h"
+
+namespace lowlux::isp {
+namespace {
+
+Result<void> check(const RawFrame& frame, const DevelopOptions& o) {
+  if (Result<void> options = check_options(o); !options) return options;
+  const bool coloured = frame.raw.layout != SensorLayout::monochrome;
+  if (coloured && o.space != OutputSpace::camera && frame.colour.calibrations.empty()) {
+    return fail(ErrorCode::insufficient,
+                "the file has no colour matrix and the decoder does not know the camera; "
+                "--space camera develops it without colour conversion");
+  }
+  const Rect& crop = frame.raw.default_crop;
+  if (o.half && (crop.width < 2 || crop.height < 2)) {
+    return fail(ErrorCode::invalid_argument, "the picture is too small to halve");
+  }
+  return {};
+}
+
+// Defects the source names, those whose dark is unknown and, if asked for, those that stand out of what is measured.
+struct FoundDefects {
+  std::vector<Pixel> defects;
+  std::vector<std::string> warnings;
+};
+
+FoundDefects all_defects(const RawFrame& frame, const RawDn& measured, const Thumbnail& thumbnail,
+                         const RawLevels& levels, bool search, Executor& executor) {
+  FoundDefects out;
+  const auto named = named_defects(frame.raw, frame.corrections.defects);
+  if (!named) {
+    out.warnings.emplace_back("the file names a large part of its pixels as defective: these are not repaired");
+  }
+  out.defects = named.value_or(std::vector<Pixel>{});
+  if (levels.dark_frame) out.defects = merged(out.defects, *named_defects(frame.raw, levels.dark_frame->unknown));
+  if (!search) return out;
+  out.defects =
+      merged(out.defects, find_defects(measured, levels.black, defect_noise(frame, levels.black, thumbnail), executor));
+  return out;
+}
+
+// Dark charge that is known and still in the codes is no light.
+Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels& levels) {
+  Thumbnail out{CameraRgb(thumbnail.mean.width(), thumbnail.mean.height()), thumbnail.black_noise_std};
+  std::array<double, 3> dark{};
+  for (int site = 0; site < 4 && levels.electrons_at_white; ++site) {
+    const auto c = static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1));
+    dark[c] += levels.black.dark_mean_e[site] / (*levels.electrons_at_white)[site] * (c == 1 ? 0.5 : 1);
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    const Plane<float>& from = thumbnail.mean.plane[c];
+    std::transform(from.data(), from.data() + from.size(), out.mean.plane[c].data(),
+                   [&](float mean) { return mean - static_cast<float>(dark[c]); });
+  }
+  return out;
+}
+
+Result<RawLevels> choose_levels(const RawFrame& frame, const DevelopOptions& options) {
+  RawLevels out{.dark_frame = options.dark_frame};
+  Result<BlackPoint> black =
+      out.dark_frame ? black_of(frame.raw, *out.dark_frame) : choose_black(frame.raw, options.black);
+  if (!black) return tl::make_unexpected(std::move(black.error()));
+  out.black = *std::move(black);
+  if (frame.noise) out.electrons_at_white = electrons_at_white(frame.raw, *frame.noise);
+  return out;
+}
+
+void append(std::vector<std::string>& to, std::vector<std::string>& from) {
+  std::ranges::move(from, std::back_inserter(to));
+  from.clear();
+}
+
+}  // namespace
+
+Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
+  if (const Result<void> checked = check(frame, options); !checked) return tl::make_unexpected(checked.error());
+  const PictureSize size = picture_size(frame.raw, options);
+  DevelopPlan plan{.options = options, .display = options.display, .width = size.width, .height = size.height};
+  plan.warnings = frame.warnings;
+  StageClock clock(plan.times);
+
+  Result<RawLevels> levels = choose_levels(frame, options);
+  if (!levels) return tl::make_unexpected(std::move(levels.error()));
+  clock.lap("black point");
+
+  std::optional<RawFrame> without_dark;
+  if (levels->dark_frame) {
+    const DarkFrame& dark = *levels->dark_frame;
+    plan.warnings.insert(plan.warnings.end(), dark.warnings.begin(), dark.warnings.end());
+    without_dark = measurable_without_dark(frame, dark, levels->black, executor);
+    clock.lap("dark frame");
+  }
+  const RawFrame& measured = without_dark ? *without_dark : frame;
+  const Thumbnail thumbnail = make_thumbnail(measured, levels->black, executor);
+  clock.lap("thumbnail");
+
+  Result<Rendering> rendering = decide_rendering(frame, light_of(thumbnail, frame.raw, *levels), options);
+  if (!rendering) return tl::make_unexpected(std::move(rendering.error()));
+  append(plan.warnings, rendering->warnings);
+  clock.lap("white and exposure");
+
+  if (options.effects) {
+    Result<EffectsPlan> effects = decide_effects(frame, thumbnail, options, *levels, *rendering, executor);
+    if (!effects) return tl::make_unexpected(std::move(effects.error()));
+    if (!effects->dark) levels->black.dark_mean_e = {};
+    if (!effects->display) plan.display.reset();
+    plan.effects = *std::move(effects);
+    clock.lap("effects");
+  }
+  const bool search = options.find_defects && (!plan.effects || plan.effects->find_defects);
+  FoundDefects found = all_defects(frame, measured.raw, thumbnail, *levels, search, executor);
+  levels->defects = std::move(found.defects);
+  append(plan.warnings, found.warnings);
+  clock.lap("defects");
+
+  NoiseRequest request{.choice = options.denoise, .space = options.space, .white_gain = rendering->white_gain};
+  if (plan.effects) {
+    if (plan.effects->level_decided) request.level.emplace(DecidedLevel{plan.effects->level, plan.effects->regions});
+    request.lines = plan.effects->lines;
+  }
+  Result<NoiseReduction> noise = plan_noise(frame, thumbnail, *levels, request, executor);
+  if (!noise) return tl::make_unexpected(std::move(noise.error()));
+  append(plan.warnings, noise->warnings);
+  if (rendering->look && rendering->look->noise_limit && !rendering->look->noise && !noise->has_level()) {
+    plan.warnings.emplace_back("the noise of the frame is not known, so it is not held to a limit");
+  }
+  plan.from_codes = renders_from_codes(frame, *levels, noise->reduces());
+  if (plan.from_codes || frame.raw.layout != SensorLayout::bayer) levels->electrons_at_white.reset();
+  plan.levels = *std::move(levels);
+  plan.rendering = *std::move(rendering);
+  plan.noise_reduction = *std::move(noise);
+  clock.lap("noise model");
+  return plan;
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+#include "isp/pipeline/plan.h"
+
+namespace lowlux::isp {
+
+/// Measures black, noise, exposure and white of a frame, and decides how to develop it. With a dark frame, all is
+/// measured on what is left when it is off. Errors: no black point (insufficient), those of black_of, no colour
+/// calibration for a space other than `camera` (insufficient), white not above black, matrices that cannot be
+/// (malformed), options that do not fit together or the frame (invalid_argument), those of plan_look and plan_noise.
+Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
+
+}  // namespace lowlux::isp
