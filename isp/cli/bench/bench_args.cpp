@@ -29,7 +29,7 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
       [&args](isp::PictureSet set) { args.pictures = set; },
       "which of the clean pictures; parameters are chosen on the tuning set (default: held-out)");
   app.add_option("--pictures-folder", args.pictures_folder,
-                 "where the clean pictures are (default: testdata/pictures of the source tree)")
+                 "where the clean pictures are (default: pictures next to the command, as its build makes them)")
       ->type_name("DIR");
   app.add_flag("--quick", args.quick,
                "parts of two pictures in two lights, to see that all of it works: less than a minute on two cores, no "

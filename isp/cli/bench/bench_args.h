@@ -12,7 +12,7 @@ namespace lowlux::cli {
 struct BenchArgs {
   std::vector<std::string> stages;  // by id; empty: all
   std::string output;               // folder for table, plots, pictures and the page; empty: none
-  std::string pictures_folder;      // empty: the source tree's
+  std::string pictures_folder;      // empty: next to the command
   isp::PictureSet pictures = isp::PictureSet::held_out;
   int threads = 0;  // 0: one for each processor
   bool list = false;

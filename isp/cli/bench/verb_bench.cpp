@@ -35,9 +35,8 @@ Result<std::vector<isp::BenchStage>> chosen(const std::vector<std::string>& ids)
   return out;
 }
 
-/// Where the clean pictures are: as given, else in the tree the command was built from.
-Result<std::string> pictures_folder(const BenchArgs& args) {
-  const std::string folder = args.pictures_folder.empty() ? LOWLUX_PICTURES : args.pictures_folder;
+Result<std::string> existing_pictures_folder(const BenchArgs& args) {
+  const std::string folder = pictures_folder(args.pictures_folder);
   std::error_code ignored;
   if (std::filesystem::is_directory(folder, ignored)) return folder;
   return fail(ErrorCode::not_found,
@@ -122,7 +121,7 @@ int run_bench(const std::vector<std::string>& words) {
   if (args.calibrate_cost) return run_calibrate_cost(args);
   const auto stages = chosen(args.stages);
   if (!stages) return print_usage_error("bench", stages.error());
-  const auto folder = pictures_folder(args);
+  const auto folder = existing_pictures_folder(args);
   if (!folder) return print_failure(folder.error());
   if (const auto free = check_bench_files(*stages, args); !free) return print_failure(free.error());
   const isp::BenchOptions options = options_of(args, *folder);

@@ -9,6 +9,7 @@
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/findings.h"
 #include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/module.h"
 #include "isp/cli/shared/progress.h"
 #include "isp/cli/shared/report.h"
 #include "isp/cli/verbs.h"
@@ -41,7 +42,7 @@ Result<std::vector<isp::Experiment>> chosen_experiments(const std::vector<std::s
 
 isp::RunOptions options_of(const ReproduceArgs& args) {
   isp::RunOptions options{.seed = args.seed, .quick = args.quick};
-  options.pictures_folder = args.pictures_folder.empty() ? LOWLUX_PICTURES : args.pictures_folder;
+  options.pictures_folder = pictures_folder(args.pictures_folder);
   return options;
 }
 

@@ -159,8 +159,9 @@ Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words) {
   app.add_option("-o,--output", args.output,
                  "folder, made if need be, for findings.csv, the plots' data and report.html")
       ->type_name("DIR");
-  app.add_option("--pictures-folder", args.pictures_folder,
-                 "where the pictures of `retargeting` are (default: testdata/pictures of the source tree)")
+  app.add_option(
+         "--pictures-folder", args.pictures_folder,
+         "where the pictures of `retargeting` are (default: pictures next to the command, as its build makes them)")
       ->type_name("DIR");
   app.add_flag("--quick", args.quick, "fewer samples: wider confidence intervals");
   app.add_option("--seed", args.seed, "of the random numbers (default 1)")

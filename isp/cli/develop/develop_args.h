@@ -68,7 +68,7 @@ struct ReproduceArgs {
   bool quick = false;
   bool json = false;
   bool force = false;
-  std::string pictures_folder;  // empty: the source tree's
+  std::string pictures_folder;  // empty: next to the command
 };
 
 /// The parsed arguments; or the exit code, help or error having been printed.

@@ -22,12 +22,23 @@ void* function_of(void* loaded, const Module& module) {
 
 }  // namespace
 
-Result<void*> load_module(const Module& module) {
+Result<std::filesystem::path> command_folder() {
   std::error_code failed;
-  const std::filesystem::path folder = std::filesystem::read_symlink("/proc/self/exe", failed).parent_path();
+  const std::filesystem::path command = std::filesystem::read_symlink("/proc/self/exe", failed);
   if (failed) return fail(ErrorCode::unreadable, "cannot tell where the command lies: is /proc mounted?");
+  return command.parent_path();
+}
+
+std::string pictures_folder(const std::string& given) {
+  const auto folder = command_folder();
+  return given.empty() && folder ? (*folder / "pictures").string() : given;
+}
+
+Result<void*> load_module(const Module& module) {
+  const auto folder = command_folder();
+  if (!folder) return tl::make_unexpected(folder.error());
   std::string said;
-  for (const std::filesystem::path& place : {folder, folder / LOWLUX_MODULE_FOLDER}) {
+  for (const std::filesystem::path& place : {*folder, *folder / LOWLUX_MODULE_FOLDER}) {
     void* loaded = dlopen((place / module.file).c_str(), RTLD_NOW | RTLD_LOCAL);
     if (loaded == nullptr) {
       const char* reason = dlerror();  // NOLINT(concurrency-mt-unsafe): glibc keeps one for each thread

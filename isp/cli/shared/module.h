@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "calib/chart/chart_detector.h"
@@ -7,6 +8,12 @@
 #include "isp/base/result.h"
 
 namespace lowlux::cli {
+
+/// The folder of the running command. Error: unreadable, where /proc is not mounted.
+Result<std::filesystem::path> command_folder();
+
+/// The folder of test pictures: `given`, or if that is empty, `pictures` next to the command, which its build makes.
+std::string pictures_folder(const std::string& given);
 
 /// A part of the command that is loaded only by what needs it, because of the libraries that come with it.
 struct Module {
