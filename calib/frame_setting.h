@@ -9,7 +9,7 @@
 
 namespace lowlux::calib {
 
-/// What frames must have in common before their figures may be put together, and how each was exposed.
+/// Properties that frames must have in common before their results may be combined, and the exposure of each.
 struct FrameSetting {
   std::string make;
   std::string model;
@@ -24,21 +24,21 @@ struct FrameSetting {
   friend bool operator==(const FrameSetting&, const FrameSetting&) = default;
 };
 
-/// The setting of a frame.
+/// Returns the setting of a frame.
 /// Errors: a layout that is not a mosaic, an active area below 16 x 16 or outside the readout, a white level that is
-/// not positive, an exposure time that is negative or no number.
+/// not positive, an exposure time that is negative or NaN.
 Result<FrameSetting> setting_of(const RawDn& raw);
 
-/// An error unless both are of the same camera, size, mosaic, white level and gain; `what` names the second.
+/// Returns an error unless both are of the same camera, size, mosaic, white level and gain; `what` names the second.
 Result<void> check_same_camera(const FrameSetting& first, const FrameSetting& second, const std::string& what);
 
-/// The same, and of the same exposure time.
+/// Returns an error unless check_same_camera() passes and both are of the same exposure time.
 Result<void> check_same_setting(const FrameSetting& first, const FrameSetting& second, const std::string& what);
 
-/// Mean code of the active area.
+/// Returns the mean code of the active area.
 double mean_dn(const RawDn& raw);
 
-/// Colour of a site, 0..2 for R, G, B; 1 for a sensor without filters.
+/// Returns the colour of a site, 0..2 for R, G, B; 1 for a sensor without filters.
 int channel_of_site(const FrameSetting& setting, int site);
 
 }  // namespace lowlux::calib

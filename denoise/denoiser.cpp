@@ -19,7 +19,7 @@
 namespace lowlux::denoise {
 namespace {
 
-/// One call of Denoiser::run.
+/// State of one call of Denoiser::run.
 struct Run {
   FrameMemory& memory;
   const RawElectronsView& raw;
@@ -30,7 +30,7 @@ struct Run {
   int rows;
   int levels;
   std::array<double, 3> dark_e;     // R, G, B
-  PlaneView<std::uint8_t> sources;  // no data: none are looked for
+  PlaneView<std::uint8_t> sources;  // no data: no search for point sources
 
   Run(FrameMemory& m, const RawElectronsView& r, const RawNoise& n, const DenoiseOptions& o, Executor& executor)
       : memory(m),
@@ -81,7 +81,8 @@ void Run::for_each_source_site(int y, const Work& work) const {
   }
 }
 
-/// Starts for each tile, one thread for each row of tiles so that sums are the same for every number of threads.
+/// Finds the chroma start of each tile; one thread sums each row of tiles, so that sums are the same for every number
+/// of threads.
 ChromaStarts Run::starts() const {
   ChromaStarts out;
   out.columns = tiles_of(columns);
@@ -125,7 +126,7 @@ rows::PackRow Run::packing(const FrontMemory& m) const {
   return in;
 }
 
-/// One row of cells, beyond the ends of the frame mirrored, into the window, and if asked for into level 0.
+/// Packs one row of cells, mirrored beyond the ends of the frame, into the window, and if `planes` into level 0.
 void Run::pack(int virtual_row, bool planes, const FrontMemory& m) const {
   const int row = mirrored(virtual_row, rows), width = raw.value.width;
   const int red_y = red_row(raw.phase), slot = (virtual_row + 16) % 16, padded_columns = memory.level[0].width;
@@ -154,7 +155,7 @@ void Run::pack(int virtual_row, bool planes, const FrontMemory& m) const {
   for (int i = 0; i < padded_columns; ++i) saturated[i] = out.saturated[i] != 0 ? 1 : 0;
 }
 
-/// Planes and variances of level 0.
+/// Computes the planes and variances of level 0.
 void Run::front() const {
   const PyramidLevel& level = memory.level[0];
   in_bands(workers, level.height / 2, [&](int first, int last, int thread) {
@@ -178,7 +179,7 @@ void Run::front() const {
   });
 }
 
-/// Planes of level 0 back to a mosaic.
+/// Converts the planes of level 0 back to a mosaic.
 void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const {
   const PyramidLevel& level = memory.level[0];
   const SiteSlopes slopes = site_slopes(raw.phase);

@@ -11,22 +11,24 @@ namespace lowlux::denoise {
 
 /// Reduces the noise of a Bayer mosaic: joint multi-scale DCT on cells, with hard thresholds and empirical Wiener
 /// weights in the linear domain, after G. Yu, G. Sapiro (IPOL 2011) and N. Pierazzo, J.-M. Morel, G. Facciolo (IPOL 7,
-/// 2017). README.md has the equations; tests/reference/denoise_ref.h is the same in plain double.
+/// 2017). README.md has the equations; tests/reference/denoise_ref.h is a plain double implementation.
 ///
-/// Owns its memory and allocates only in the constructor; does one frame at a time. The result is the same, bit for
-/// bit, for every number of threads.
+/// Owns its memory, allocates only in the constructor, and processes one frame at a time. The result is bit-identical
+/// for every number of threads.
 class Denoiser {
  public:
-  /// For mosaics of up to max_width x max_height pixels, each 2..65536, and up to `threads` of an executor's threads.
-  /// Takes about 22 bytes for each pixel, and 2 MB for each thread of a mosaic 4000 wide.
-  /// @param most  no frame may ask for more; Level::best takes 2.4 MB more for each thread of a mosaic 4000 wide
+  /// Allocates for mosaics of up to max_width x max_height pixels, each 2..65536, and up to `threads` of an executor's
+  /// threads: about 22 bytes for each pixel, and 2 MB for each thread of a mosaic 4000 wide.
+  /// @param most  the highest level a frame may request; Level::best needs 2.4 MB more for each thread of a mosaic 4000
+  /// wide
   Denoiser(int max_width, int max_height, int threads, Level most = Level::high);
-  /// Of memory that one takes, to the last plane.
+  /// Returns the bytes of memory that one denoiser allocates, including every plane.
   static std::size_t bytes(int max_width, int max_height, int threads, Level most = Level::high);
   ~Denoiser();
   Denoiser(const Denoiser&) = delete;
   Denoiser& operator=(const Denoiser&) = delete;
 
+  /// Denoises one frame.
   /// @param raw  at least 2 x 2 pixels; any phase, odd sizes too
   /// @param signal_e  as large as `raw`; denoised, dark subtracted, signed [e-]. May not overlap `raw`.
   void run(const RawElectronsView& raw, const RawNoise& noise, const DenoiseOptions& options, PlaneView<float> signal_e,
@@ -37,7 +39,7 @@ class Denoiser {
   std::unique_ptr<State> state_;
 };
 
-/// The vector instruction set the kernels use on this machine, as Highway names it.
+/// Returns the name of the vector instruction set that the kernels use on this machine, as Highway names it.
 const char* denoiser_target();
 
 }  // namespace lowlux::denoise

@@ -25,7 +25,7 @@ int lowlux_detect_charts(const DetectorPicture& picture, ChartShape* shapes, int
     }
     return count;
   } catch (...) {
-    return -1;  // out of memory, or a case OpenCV's checks refuse
+    return -1;  // out of memory, or an input that OpenCV's checks reject
   }
 }
 

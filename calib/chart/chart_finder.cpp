@@ -13,18 +13,18 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr int most_shapes = 8;                 // of one look: charts hang beside one another, not in dozens
-constexpr double worst_relative_error = 0.03;  // of the median patch: it moves colours by one or two CIEDE2000
+constexpr int most_shapes = 8;                 // of one detection: images show few charts, not dozens
+constexpr double worst_relative_error = 0.03;  // of the median patch: it changes colours by one or two CIEDE2000
 
-/// One of them is left out in cross-validation.
+/// Minimum number of patches; one of them is left out in cross-validation.
 constexpr int least_patches = static_cast<int>(least_colour_samples) + 1;
 
-/// The sides the picture is shown in: the detector enlarges what is small, and shrinking takes noise off.
+/// Longer sides of the resized images: the detector enlarges small images, and shrinking reduces noise.
 constexpr std::array longer_sides{1000, 640, 420};
-/// Gains on top of one that brings the 99th percentile to white. A chart in front of a bright window is dark.
+/// Factors on the gain that brings the 99th percentile to white. A chart in front of a bright window is dark.
 constexpr std::array looks{1.0, 3.0};
 
-/// Means of blocks of n x n pixels; what does not fill a block is left out.
+/// Returns means of blocks of n x n pixels; incomplete blocks are left out.
 CameraRgb shrunk(const CameraRgb& picture, int n) {
   CameraRgb out(picture.width() / n, picture.height() / n);
   for (std::size_t c = 0; c < 3; ++c) {
@@ -41,7 +41,7 @@ CameraRgb shrunk(const CameraRgb& picture, int n) {
   return out;
 }
 
-/// The value below which 99 % of a plane lie; at least the smallest positive float.
+/// Returns the value below which 99 % of a plane lie; at least the smallest positive float.
 float bright_value(const Plane<float>& plane) {
   std::vector<float> values(plane.data(), plane.data() + plane.size());
   const auto place = values.begin() + static_cast<std::ptrdiff_t>(values.size() * 99 / 100);
@@ -49,8 +49,8 @@ float bright_value(const Plane<float>& plane) {
   return std::max(*place, 1e-30F);
 }
 
-/// As 8-bit codes, blue first: each channel to the same white, which balances roughly, then a square root, which keeps
-/// dark patches apart.
+/// Converts to 8-bit codes, blue first: each channel to the same white, an approximate white balance, then a square
+/// root, which keeps dark patches separate.
 std::vector<std::uint8_t> codes_of(const CameraRgb& picture, double gain) {
   std::vector<std::uint8_t> out(3 * picture.plane[0].size());
   for (std::size_t c = 0; c < 3; ++c) {
@@ -64,8 +64,8 @@ std::vector<std::uint8_t> codes_of(const CameraRgb& picture, double gain) {
   return out;
 }
 
-/// How well patches are a ColorChecker's; infinite if they are not at all. The light matters little: a matrix takes one
-/// to another nearly.
+/// Returns the colour error of patches as a ColorChecker's; infinite if the patches cannot be one. The assumed light
+/// matters little: a matrix nearly converts one light to another.
 double chart_error(const std::array<ChartPatch, chart_patch_count>& patches) {
   static const Spectrum light = *isp::light_named("D50");
   static const auto reference = *chart_reference(light);
@@ -91,18 +91,18 @@ FoundChart turned_right(const ChartPicture& picture, const ChartGrid& grid) {
   return best;
 }
 
-/// Two grids on the same chart: the middle of one lies within the other's half.
+/// Returns whether two grids are on the same chart: the middle of one lies within the other's half.
 bool same_chart(const ChartGrid& a, const ChartGrid& b) {
   const PicturePoint p = a.at(3, 2), q = b.at(3, 2), edge = b.at(3, 0);
   return std::hypot(p.x - q.x, p.y - q.y) < std::hypot(edge.x - q.x, edge.y - q.y);
 }
 
-/// What one or more looks at a picture found.
+/// Results of one or more detections in an image.
 struct Search {
   std::vector<FoundChart> charts;
   std::optional<FoundChart> unusable;  // a shape whose patches are clipped or too small to be measured
   int shapes = 0;
-  double nearest = HUGE_VAL;  // CIEDE2000 of the best shape that was none
+  double nearest = HUGE_VAL;  // CIEDE2000 of the best rejected shape
 };
 
 int measurable(const FoundChart& chart) {
@@ -133,7 +133,7 @@ Result<void> look(const ChartPicture& picture, const CameraRgb& small, int shrin
   if (count < 0) return fail(ErrorCode::unreadable, "OpenCV's chart detector failed on the picture");
   for (int i = 0; i < count; ++i) {
     // The detector's model has patches of 2.5 that are 0.25 apart, in a border of 0.25: cells of 2.75 that end 0.125
-    // inside of its box.
+    // inside its box.
     const auto box = grid_of(shapes[static_cast<std::size_t>(i)].corner);
     if (!box) continue;
     const auto inner = [&](double u, double v) {

@@ -31,7 +31,7 @@ bool convex(const Corners& c) {
   return left == 4 || right == 4;
 }
 
-/// Linear between the four pixels around a point; nullopt outside of the picture.
+/// Returns the linear interpolation between the four pixels around a point; nullopt outside the image.
 std::optional<Vector3> sample(RgbView<const float> picture, const PicturePoint& p) {
   if (!(p.x >= 0 && p.y >= 0 && p.x < picture[0].width - 1 && p.y < picture[0].height - 1)) return std::nullopt;
   const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
@@ -46,7 +46,7 @@ std::optional<Vector3> sample(RgbView<const float> picture, const PicturePoint& 
 
 constexpr int samples_across = 9;
 constexpr double middle = 0.76;          // of a cell's width
-constexpr double black_fraction = 0.02;  // of the brightest patch: below it noise is not taken for structure
+constexpr double black_fraction = 0.02;  // of the brightest patch, added to means: noise in black does not count
 
 struct CellSpread {
   Vector3 mean{};
@@ -76,7 +76,7 @@ std::optional<CellSpread> spread_of(const Matrix3& h, int column, int row, RgbVi
   return out;
 }
 
-/// How uneven the cells are; infinite for a grid that is none or leaves the picture.
+/// Returns the non-uniformity of the cells; infinite for an invalid grid or one that leaves the image.
 double unevenness(const Corners& corners, RgbView<const float> picture) {
   constexpr double none = HUGE_VAL;
   const auto grid = grid_of(corners);
@@ -100,7 +100,8 @@ double unevenness(const Corners& corners, RgbView<const float> picture) {
 
 constexpr int move_count = 12;
 
-/// Move number 0..7 shifts one coordinate of a corner, 8 and 9 the grid, 10 and 11 stretch it about its middle.
+/// Applies move number 0..7, which shifts one coordinate of a corner, 8 and 9 the grid, or 10 and 11, which stretch it
+/// about its middle.
 Corners moved(const Corners& corners, int move, double by_px) {
   Corners out = corners;
   if (move < 8) {
@@ -109,7 +110,7 @@ Corners moved(const Corners& corners, int move, double by_px) {
     return out;
   }
   for (std::size_t i = 0; i < 4; ++i) {
-    // Its neighbour across the stretched side tells the direction.
+    // The direction is that of its neighbour across the stretched side.
     const PicturePoint &p = corners[i], &q = corners[move == 10 ? i ^ 1U : 3 - i];
     const double length = std::hypot(p.x - q.x, p.y - q.y);
     if (move == 8) out[i].x += by_px;

@@ -14,35 +14,35 @@ inline constexpr int chart_columns = 6;
 inline constexpr int chart_rows = 4;
 inline constexpr int chart_patch_count = chart_columns * chart_rows;
 
-/// Which way a grid lies on a chart: where the chart's first patch is among the grid's corners. The last two are seen
-/// in a mirror.
+/// Orientation of a grid on a chart: which of the grid's corners the chart's first patch is at. The last two are mirror
+/// images.
 enum class ChartTurn : std::uint8_t { as_is, half_turn, mirrored_columns, mirrored_rows };
 inline constexpr std::array all_chart_turns{ChartTurn::as_is, ChartTurn::half_turn, ChartTurn::mirrored_columns,
                                             ChartTurn::mirrored_rows};
 
-/// A grid of 6 x 4 cells in a picture: cell (i, j) spans i..i+1, j..j+1 in the plane that the homography takes to the
-/// picture; a patch fills the middle of its cell.
+/// A grid of 6 x 4 cells in an image: cell (i, j) spans i..i+1, j..j+1 in the plane that the homography maps to the
+/// image; a patch fills the middle of its cell.
 struct ChartGrid {
   Matrix3 to_picture = identity3();
   ChartTurn turn = ChartTurn::as_is;
 
-  /// The picture's point of a point of the chart's plane, with the chart's turn: u 0..6 and v 0..4 from the corner of
-  /// the chart's first patch.
+  /// Returns the image point of a point in the chart's plane, with the chart's orientation: u 0..6 and v 0..4 from the
+  /// corner of the chart's first patch.
   PicturePoint at(double u, double v) const;
 };
 
-/// The grid whose cells' outer corners (0, 0), (6, 0), (6, 4), (0, 4) lie at four points. nullopt if three of them are
-/// on one line, or the quadrilateral is not convex, or a number is not finite.
+/// Returns the grid whose cells' outer corners (0, 0), (6, 0), (6, 4), (0, 4) lie at four points. nullopt if three of
+/// them are on one line, or the quadrilateral is not convex, or a number is not finite.
 std::optional<ChartGrid> grid_of(const std::array<PicturePoint, 4>& corners);
 
-/// The same grid in a picture whose points lie elsewhere: x * scale + offset, for both axes.
+/// Returns a grid in an image with transformed coordinates: x * scale + offset, for both axes.
 ChartGrid rescaled(const ChartGrid& grid, double scale, double offset);
 
-/// The grid near `start` whose cells are the most even inside: minimises the sum over cells of the relative standard
-/// deviation in the middle 76 % of their width. Patches fill more: 85 % on a ColorChecker Passport, 91 % in the
-/// model of OpenCV's detector. A pattern search over
-/// the four corners and the grid's place and size, down to an eightieth of a cell; a grid within 0.05 cells is as good
-/// to it. nullopt if the grid leaves the picture.
+/// Returns the grid near `start` whose cells are the most uniform inside: minimises the sum over cells of the relative
+/// standard deviation in the middle 76 % of their width. Patches fill more: 85 % on a ColorChecker Passport, 91 % in
+/// the model of OpenCV's detector. It is a pattern search over the four corners and the grid's position and size, down
+/// to an eightieth of a cell; grids within 0.05 cells are equally good by this measure. nullopt if the grid leaves the
+/// image.
 std::optional<ChartGrid> refined(const ChartGrid& start, RgbView<const float> picture);
 
 }  // namespace lowlux::calib

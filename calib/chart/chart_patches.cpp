@@ -11,8 +11,8 @@ namespace lowlux::calib {
 namespace {
 
 constexpr double middle = 0.5;               // of a cell's width and height
-constexpr double outlier_deviations = 5;     // a normal law leaves 6e-7 beyond
-constexpr double mad_to_deviation = 1.4826;  // of a normal law
+constexpr double outlier_deviations = 5;     // of a normal distribution, 6e-7 lies beyond
+constexpr double mad_to_deviation = 1.4826;  // of a normal distribution
 
 using PatchCorners = std::array<PicturePoint, 4>;
 
@@ -32,8 +32,8 @@ double median_of(std::vector<double> values) {
   return *middle_value;
 }
 
-/// What is taken for the patch: between low and high, ends included. Where more than half of the pixels share one
-/// code, their scatter tells of no outliers and all of them are taken.
+/// Range of the pixels that are kept: between low and high, ends included. If more than half of the pixels have one
+/// code, outliers cannot be determined from their scatter and all pixels are kept.
 struct Kept {
   double low = -HUGE_VAL;
   double high = HUGE_VAL;
@@ -59,7 +59,7 @@ void average(const std::vector<Vector3>& pixels, ChartPatch& patch) {
     if (!good) continue;
     ++patch.pixels;
     for (std::size_t c = 0; c < 3; ++c) {
-      // From the first pixel, so that the squares of a bright, even patch do not cancel.
+      // Relative to the first pixel, so that the squares of a bright, uniform patch do not cancel.
       const double difference = rgb[c] - pixels[0][c];
       sum[c] += difference;
       squares[c] += difference * difference;

@@ -17,7 +17,8 @@
 namespace lowlux::calib {
 namespace {
 
-/// A ColourFit as a sum: camera_to_xyz = sum of theta_k basis_k, then the light's two figures if they are fitted.
+/// Unknowns of a ColourFit as a sum: camera_to_xyz = sum of theta_k basis_k, then the light's two values if they are
+/// fitted.
 struct Unknowns {
   std::vector<Matrix3> basis;
   bool light = false;
@@ -55,7 +56,7 @@ Unknowns unknowns_of(const ColourFitOptions& options) {
     }
     return out;
   }
-  // One that takes the neutral to white, and six that take it to nothing: rows at right angles to it.
+  // One basis matrix maps the neutral to white, and six map it to zero: their rows are orthogonal to it.
   const Eigen::Vector3d neutral(n[0], n[1], n[2]);
   const Eigen::Vector3d first = neutral.unitOrthogonal(), second = neutral.cross(first).normalized();
   const double square = neutral.squaredNorm();
@@ -67,7 +68,8 @@ Unknowns unknowns_of(const ColourFitOptions& options) {
   return out;
 }
 
-/// CIELAB weighs a small difference at luminance Y with the slope of the cube root.
+/// Returns the weight of a small difference at luminance Y in CIELAB: the slope of the cube root, without its factor
+/// 1/3.
 double weight_of(const ColourSample& sample) { return std::pow(sample.reference.y, -2.0 / 3); }
 
 bool finite(const ColourSample& s) {
@@ -108,7 +110,8 @@ struct Solution {
   double condition_number;
 };
 
-/// Least squares with columns scaled to length 1, so that the condition number tells of the patches and not of units.
+/// Solves least squares with columns scaled to length 1, so that the condition number depends on the patches and not on
+/// units.
 Solution solve(Eigen::MatrixXd equations, const Eigen::VectorXd& right) {
   Eigen::VectorXd length = equations.colwise().norm();
   for (Eigen::Index k = 0; k < length.size(); ++k) {
@@ -149,8 +152,8 @@ Eigen::VectorXd residuals(const Unknowns& unknowns, const Eigen::VectorXd& theta
   return Eigen::Map<const Eigen::VectorXd>(errors.data(), static_cast<Eigen::Index>(errors.size()));
 }
 
-/// Levenberg's method with Marquardt's scaling. Each accepted step lowers the sum of squares, so the result is never
-/// worse than the start.
+/// Minimises by Levenberg's method with Marquardt's scaling. Each accepted step lowers the sum of squares, so the
+/// result is never worse than the start.
 Eigen::VectorXd minimise_ciede2000(const Unknowns& unknowns, Eigen::VectorXd theta,
                                    std::span<const ColourSample> samples, const isp::Xyz& white) {
   constexpr int most_steps = 60;
@@ -195,7 +198,7 @@ Result<ColourFit> fit_colour(std::span<const ColourSample> samples, const Colour
   Solution solution = least_squares(unknowns, samples);
   if (!(solution.condition_number <= worst_colour_condition)) {
     return fail(ErrorCode::insufficient,
-                fmt::format("the patches do not tell the three channels apart: the equations' condition number is "
+                fmt::format("the patches do not separate the three channels: the equations' condition number is "
                             "{:.3g}, and at most {:g} can be solved",
                             solution.condition_number, worst_colour_condition));
   }

@@ -36,7 +36,8 @@ Result<RatedMatrix> rated(const Matrix3& camera_to_xyz, double condition_number,
   return out;
 }
 
-/// Eq. 4.15 as printed divides by the wavelength where the energy of a photon asks to multiply.
+/// Returns the sensitivities of Eq. 4.15 as printed: it divides by the wavelength although the energy of a photon
+/// requires a multiplication.
 std::array<Spectrum, 3> as_printed(const std::array<Spectrum, 3>& sensitivity) {
   const auto change = [](double nm, double value) { return value * (550 / nm) * (550 / nm); };
   return {sensitivity[0].mapped(change), sensitivity[1].mapped(change), sensitivity[2].mapped(change)};

@@ -16,12 +16,12 @@ constexpr double same_time = 0.01;        // relative
 constexpr double most_extrapolation = 4;  // of the charge: two doublings
 constexpr double least_ratio = 2;         // of charges that give a line
 constexpr double least_doubling_c = 2, most_doubling_c = 30;
-constexpr double certain_chi2 = 25;             // five standard deviations
-constexpr double systematic_dn2 = 0.01 * 0.01;  // of a level: what drifts from frame to frame
+constexpr double certain_chi2 = 25;             // square of five standard deviations
+constexpr double systematic_dn2 = 0.01 * 0.01;  // of a level: its drift from frame to frame
 
 struct Dose {
   std::size_t level;
-  double charge;  // time at the picture's temperature [s]
+  double charge;  // time at the image's temperature [s]
   double weight;
 };
 
@@ -46,7 +46,7 @@ std::optional<DarkWeights> plain_mean(std::span<const DarkLevel> levels, const D
   return out;
 }
 
-// Doses of all levels if the temperature law is known, else of those at the picture's temperature.
+// Returns the doses of all levels if the temperature law is known, else of those at the image's temperature.
 std::vector<Dose> doses_of(std::span<const DarkLevel> levels, const DarkExposure& picture,
                            const std::optional<double>& doubling_c) {
   std::vector<Dose> out;
@@ -101,7 +101,7 @@ Result<void> check_range(double charge_s, double low_s, double high_s, bool line
   if (charge_s > most_extrapolation * high_s) {
     return fail(ErrorCode::insufficient,
                 fmt::format("the picture holds {:.3g} times the dark charge of the longest and warmest darks, at most "
-                            "{:g} times can be told; take darks as long and as warm as the picture",
+                            "{:g} times can be computed; take darks as long and as warm as the picture",
                             charge_s / high_s, most_extrapolation));
   }
   if (charge_s > (1 + same_time) * high_s || (line && charge_s < (1 - same_time) * low_s)) {
@@ -119,7 +119,7 @@ struct LevelPoint {
   double weight;
 };
 
-// Weighted sum of squares about the best line; through the pedestal where it is known.
+// Returns the weighted sum of squares about the best line, which passes through the pedestal where that is known.
 double misfit(const std::vector<LevelPoint>& points, std::optional<double> pedestal_dn) {
   double w = 0, x = 0, y = 0, xx = 0, xy = 0, out = 0;
   for (const LevelPoint& p : points) w += p.weight, x += p.weight * p.charge, y += p.weight * p.level_dn;
@@ -192,7 +192,7 @@ Result<DarkWeights> weigh_darks(std::span<const DarkLevel> levels, const DarkExp
     }
     if (!line && !known.pedestal_dn && !known.pedestal_from_picture) {
       return fail(ErrorCode::insufficient,
-                  fmt::format("darks of {:g} s are to be scaled to {:g} s and the file does not tell the level of no "
+                  fmt::format("darks of {:g} s are to be scaled to {:g} s and the file does not state the level of no "
                               "charge; add darks of the shortest exposure time",
                               levels[high.level].exposure.time_s, picture.time_s));
     }

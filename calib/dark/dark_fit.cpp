@@ -14,9 +14,9 @@ namespace lowlux::calib {
 namespace {
 
 constexpr double cut_deviations = 5;
-constexpr double dithered_variance_dn2 = 0.25 + quantisation_dn2;  // half a code of noise, and quantisation's
+constexpr double dithered_variance_dn2 = 0.25 + quantisation_dn2;  // half a code of noise, with quantisation
 constexpr double same_temperature_c = 1;
-constexpr int iterations = 3;  // of corrections that are a small part of a mean
+constexpr int iterations = 3;  // of corrections that are a small fraction of a mean
 
 void name_temperatures(DarkFit& s) {
   const auto celsius = [](const DarkGroup& g) { return g.setting.temperature_c.value_or(0); };
@@ -82,7 +82,7 @@ Result<void> make_estimators(DarkFit& s) {
     if (!estimators) {
       return fail(
           ErrorCode::insufficient,
-          fmt::format("{} groups of darks at {} temperatures do not tell pedestal from dark current; add another "
+          fmt::format("{} groups of darks at {} temperatures do not separate pedestal from dark current; add another "
                       "exposure time, the longest at least ten times the shortest",
                       s.groups.size(), s.temperature_c.size()));
     }
@@ -91,7 +91,8 @@ Result<void> make_estimators(DarkFit& s) {
   return {};
 }
 
-/// The law of a stack's mean is that of its frames' sum: Poisson + normal, the pixels' own spread taken as normal.
+/// Returns the bias by excluded pixels. The distribution of a stack's mean is that of its frames' sum: Poisson +
+/// normal, the pixels' own spread taken as normal.
 double exclusion_bias_dn(const DarkFit& s, std::size_t g, int site, double pedestal_dn) {
   const double one = 1, gain = s.gain.value, frames = s.groups[g].frames;
   const ImageFigures figures = figures_of({s.groups.subspan(g, 1), {&one, 1}}, s.mask, site);
@@ -142,7 +143,7 @@ Result<void> finish_fit(DarkFit& fit) {
 
 namespace {
 
-constexpr double singular = 1e-12;  // of a column's own square: what elimination leaves of dependent columns
+constexpr double singular = 1e-12;  // of a column's own square: remainder that elimination leaves of dependent columns
 
 }  // namespace
 
@@ -158,7 +159,7 @@ std::optional<Design> linear_estimators(const Design& design, std::span<const do
     }
   }
   const Design before = normal;
-  // Symmetric and not negative: the diagonal holds the pivots.
+  // Symmetric and positive semidefinite: the diagonal holds the pivots.
   for (std::size_t i = 0; i < parameters; ++i) {
     const double pivot = normal[i][i];
     if (!(pivot > singular * before[i][i])) return std::nullopt;
@@ -180,13 +181,13 @@ namespace {
 double below(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
 double density(double z) { return std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi); }
 
-/// Calls visit(count, probability) for the Poisson counts that matter.
+/// Calls visit(count, probability) for the Poisson counts with a significant probability.
 template <class Visit>
 void for_each_count(double mean, const Visit& visit) {
   const double reach = 10 * std::sqrt(mean) + 40;
   const double first = std::max(0.0, std::floor(mean - reach)), last = std::ceil(mean + reach);
-  const double counts = last - first + 1;  // none of a mean that is no number
-  int sign = 0;                            // of the gamma function, for the form that threads may share
+  const double counts = last - first + 1;  // 0 for a NaN mean
+  int sign = 0;                            // of the gamma function; needed by its thread-safe form
   for (int i = 0; i < counts; ++i) {
     const double k = first + i;
     visit(k, mean > 0 ? std::exp(k * std::log(mean) - mean - ::lgamma_r(k + 1, &sign)) : (k == 0 ? 1.0 : 0.0));
@@ -210,7 +211,7 @@ double truncation_bias_e(const PoissonGauss& law, double low_e, double high_e) {
 
 namespace {
 
-/// Weights that make of the groups' means the residual of one of them.
+/// Returns the weights that give the residual of one group from the groups' means.
 std::vector<double> residual_weights(const DarkFit& s, std::size_t group, int site) {
   std::vector<double> out(s.groups.size());
   for (std::size_t i = 0; i < out.size(); ++i) {

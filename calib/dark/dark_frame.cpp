@@ -18,16 +18,16 @@ namespace {
 using Groups = std::span<const DarkGroup>;
 
 constexpr double near_white = 0.05;  // of the range
-constexpr double most_noise = 5;     // times the noise of a pixel's site
+constexpr double most_noise = 5;     // relative to the noise of a pixel's site
 constexpr double most_unknown = 1.0 / 16;
 constexpr double clipped_share = 1e-3;
 constexpr double least_doubling_c = 2, most_doubling_c = 30;
 
-/// All that is known before pixels are touched.
+/// Inputs and intermediate results, before pixels are processed.
 struct Job {
   Groups groups;
-  std::vector<PerSite<DarkSite>> sites;  // of each group
-  std::vector<double> hot_gain_dn;       // of each group
+  std::vector<PerSite<DarkSite>> sites;  // for each group
+  std::vector<double> hot_gain_dn;       // for each group
   DarkWeights weights;
   std::optional<PerSite<double>> pedestal_dn;
 };
@@ -35,7 +35,7 @@ struct Job {
 Result<void> check_request(const DarkRequest& r) {
   if (!(r.noise_share > 0 && r.noise_share <= 1)) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("the share of noise darks may add is {:g}, expected above 0 and at most 1", r.noise_share));
+                fmt::format("the fraction of noise that darks may add is {:g}, expected above 0 and at most 1", r.noise_share));
   }
   if (r.doubling_c && !(*r.doubling_c >= least_doubling_c && *r.doubling_c <= most_doubling_c)) {
     return fail(ErrorCode::invalid_argument,
@@ -123,8 +123,8 @@ Plane<float> weighted_sum(const Job& job) {
   return out;
 }
 
-/// Temporal noise of a site. The picture's is linear in its charge as the mean is, and at least that of any group times
-/// the ratio of their charges, which is at least the group's weight.
+/// Returns the temporal noise of a site. That of the image is linear in its charge, as the mean is, and at least that
+/// of any group times the ratio of their charges, which is at least the group's weight.
 DarkNoise noise_of(const Job& job, int site) {
   DarkNoise out{.rows_known = true};
   double interpolated = 0, least = 0;
@@ -142,7 +142,7 @@ DarkNoise noise_of(const Job& job, int site) {
   return out;
 }
 
-/// A pixel's noise in the picture less its dark: measured, or what its charge makes expect if that is more.
+/// Returns a pixel's noise in the image less its dark: measured, or the noise expected from its charge if that is more.
 double pixel_noise(const Job& job, int x, int y) {
   double out = 0;
   for (std::size_t g = 0; g < job.groups.size(); ++g) {
@@ -215,7 +215,7 @@ void describe(const Job& job, DarkFrame& out) {
   }
   if (out.frames == 1) {
     out.warnings.emplace_back(
-        "a single dark cannot tell its pattern from its noise: hot pixels and columns are taken from it, no more");
+        "a single dark does not separate its pattern from its noise: hot pixels and columns are taken from it, no more");
   }
   out.scale = job.weights.scale;
   out.doubling_c = job.weights.doubling_c.value_or(0);
@@ -299,7 +299,7 @@ struct Lines {
   std::vector<double> sum, n;
   explicit Lines(int count) : sum(static_cast<std::size_t>(count)), n(sum) {}
   double deviation(int i, double mean) const { return n[i] > 0 ? sum[i] / n[i] - mean : 0; }
-  /// Mean square of the deviations, and mean number of pixels in a line.
+  /// Returns the mean square of the deviations, given the mean number of pixels in a line.
   double variance(double mean) const {
     double squares = 0, lines = 0;
     for (std::size_t i = 0; i < n.size(); ++i) {
@@ -316,12 +316,12 @@ struct Lines {
   }
 };
 
-/// A site's pixels taken apart: mean, columns, rows, and what is left.
+/// Decomposition of a site's pixels: mean, columns, rows, and the remainder.
 struct Parts {
   double mean = 0;
   Lines columns, rows;
-  double variance = 0;  // of what is left, in pixels that do not stand out
-  double inside = 0;    // share of pixels that do not
+  double variance = 0;  // of the remainder, in pixels that are not outliers
+  double inside = 0;    // fraction of pixels that are not outliers
   double rest(const Plane<float>& dn, int x, int y) const {
     return dn.at(x, y) - mean - columns.deviation(x, mean) - rows.deviation(y, mean);
   }

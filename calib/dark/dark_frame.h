@@ -13,52 +13,53 @@
 
 namespace lowlux::calib {
 
-/// How darks become the dark frame of a picture.
+/// Options for making the dark frame of an image.
 struct DarkRequest {
-  double noise_share = 0.1;                    // most that may be added to the picture's own variance in the dark, 0..1
+  double noise_share = 0.1;  // maximum added variance as a fraction of the image's own variance in the dark, 0..1
   std::optional<double> doubling_c;            // degrees over which dark charge doubles, 2..30; absent: fitted
-  std::optional<PerSite<double>> masked_dn;    // the picture's masked pixels: pedestal and dark charge in one
-  std::optional<PerSite<double>> pedestal_dn;  // the file's tag: level of no charge
+  std::optional<PerSite<double>> masked_dn;    // the image's masked pixels: pedestal plus dark charge
+  std::optional<PerSite<double>> pedestal_dn;  // the file's tag: level without charge
 };
 
-/// The dark frame of a picture: see weigh_darks for how times and temperatures are scaled, limit_noise for what is kept
-/// of a mean of few darks. Pixels are `unknown` whose darks come within 5 % of the range to white, or whose temporal
-/// noise in the picture is more than 5 times that of their site.
-/// A pedestal follows from masked pixels where there are any: that with which the scaled darks have their level.
+/// Makes the dark frame of an image: see weigh_darks for the scaling of times and temperatures, limit_noise for the
+/// weighting of a mean of few darks. Pixels are `unknown` whose darks come within 5 % of the range to white, or whose
+/// temporal noise in the image is more than 5 times that of their site. If there are masked pixels, they determine the
+/// pedestal: the one with which the scaled darks have the level of the masked pixels.
 /// @param groups  of DarkLibrary
-/// Errors: those of weigh_darks; a request out of its range; a picture without exposure time; darks of another camera,
+/// Errors: those of weigh_darks; a request out of its range; an image without exposure time; darks of another camera,
 /// size, mosaic or gain; darks that hold light (one side brighter than the other by more than one frame's noise and a
 /// quarter of the dark charge); more than a sixteenth of the pixels unknown.
-/// The picture's codes are not read: the dark frame is the same for all pictures of one setting and request. Whether it
-/// fits each of them, check_masked_level and check_below_picture say.
+/// The image's codes are not read: the dark frame is the same for all images of one setting and request. Use
+/// check_masked_level and check_below_picture to check that it fits each of them.
 Result<DarkFrame> make_dark_frame(std::span<const DarkGroup> groups, const RawDn& picture, const DarkRequest& request);
 
-/// The dark frame of another picture of the same setting, made from that of a picture with other masked pixels.
-/// Precondition: dark.masked_dn.
+/// Returns the dark frame of another image of the same setting, adapted to its masked pixels. Precondition:
+/// dark.masked_dn.
 DarkFrame at_masked_level(const DarkFrame& dark, const PerSite<double>& masked_dn);
 
 /// Temporal noise of one site's pixels.
 struct DarkNoise {
-  double picture_dn2 = 0;   // of the picture without light
+  double picture_dn2 = 0;   // of the image without light
   double estimate_dn2 = 0;  // of the dark frame, rows included
-  double rows_dn2 = 0;      // of it what whole rows have in common; 0 if not known
+  double rows_dn2 = 0;      // the part of `estimate_dn2` that whole rows have in common; 0 if not known
   bool rows_known = false;
 };
 
-/// What a dark frame adds, and what was kept of its pattern.
+/// Noise added by a dark frame, and the fraction of its pattern that was kept.
 struct KeptPattern {
-  double mean_dn = 0;      // of the pixels that do not stand out
+  double mean_dn = 0;      // of the pixels that are not outliers
   double added_dn2 = 0;    // mean over the pixels
-  double pixel_share = 1;  // of a pixel's own deviation, those that stand out left aside
+  double pixel_share = 1;  // fraction of a pixel's own deviation, outliers excluded
 };
 
-/// Shrinks what one site's pixels deviate from its mean, so that subtracting them adds no more noise than the share
-/// allows. Nothing is changed where the whole deviation does not. Else columns, rows and pixels are weighted by
+/// Shrinks the deviations of one site's pixels from its mean, so that subtracting them adds no more noise than the
+/// fraction `share` allows. Nothing is changed where the unshrunk deviation meets the limit. Else columns, rows and
+/// pixels are weighted by
 ///     w = P / (P + N)        (Wiener; P: variance of the pattern, N: of the estimate's noise)
-/// the pixels' w being at most what the share leaves. Pixels five standard deviations off are kept whole: such a
-/// deviation is no noise. So the mean square error falls with every dark, from the first.
+/// the pixels' w being limited by what `share` leaves. Pixels five standard deviations off are not shrunk: such a
+/// deviation is not noise. So the mean square error falls with every dark, from the first.
 /// @param share   of picture_dn2
-/// @param unknown pixels that take no part
+/// @param unknown pixels that are excluded
 KeptPattern limit_noise(Plane<float>& dn, int site, const DarkNoise& noise, double share, const PixelMask& unknown);
 
 }  // namespace lowlux::calib

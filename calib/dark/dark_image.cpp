@@ -6,7 +6,7 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr double mad_to_deviation = 1.4826;  // of a normal law
+constexpr double mad_to_deviation = 1.4826;  // of a normal distribution
 constexpr double wide_cut = 6;
 
 struct Sums {
@@ -38,7 +38,7 @@ struct Change {
   double value = 0, error = 0;
 };
 
-// Least squares; the error from the scatter about the line.
+// Fits a line by least squares; the error is from the scatter about the line.
 Change change_over(const std::vector<Sums>& lines) {
   Sums positions;
   double products = 0, sum = 0;
@@ -94,7 +94,7 @@ ImageFigures figures_of(const WeightedImage& image, const PixelMask& mask, int s
         value += image.weights[g] * group.mean_dn.at(x, y);
         out.temporal_variance += image.weights[g] * image.weights[g] * group.variance_dn2.at(x, y) / group.frames;
       }
-      if (all.n == 0) origin = value;  // so that squares keep their digits
+      if (all.n == 0) origin = value;  // keeps the precision of squares
       all.add(value - origin);
       rows[y].add(value - origin);
       columns[x].add(value - origin);

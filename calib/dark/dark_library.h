@@ -11,18 +11,18 @@
 
 namespace lowlux::calib {
 
-/// Dark frames of one camera and gain, sorted by exposure time and temperature as they come: one DarkStack for each
-/// setting.
+/// Dark frames of one camera and gain, sorted by exposure time and temperature as they are added: one DarkStack for
+/// each setting.
 class DarkLibrary {
  public:
-  /// @param most_settings  of exposure time and temperature; each takes 10 bytes for each pixel
+  /// @param most_settings  maximum number of pairs of exposure time and temperature; each takes 10 bytes for each pixel
   explicit DarkLibrary(std::size_t most_settings = 8) : most_settings_(most_settings) {}
 
   /// Adds a frame to the stack of its exposure time whose first frame is within a degree. Errors: those of DarkStack;
   /// another camera, size, mosaic, white level or gain than the first frame's; more settings than allowed.
   Result<void> add(const RawDn& raw);
 
-  /// What was added, in the order of first frames. Of a single frame the variances are 0 and mean nothing.
+  /// Returns the groups in the order of their first frames. Of a single frame the variances are 0 and without meaning.
   std::vector<DarkGroup> groups() const;
 
  private:
@@ -36,13 +36,13 @@ struct DarkSet {
   std::vector<DarkGroup> groups;
 };
 
-/// Dark frames of one camera, sorted by gain, exposure time and temperature as they come.
+/// Dark frames of one camera, sorted by gain, exposure time and temperature as they are added.
 class DarkSorter {
  public:
-  /// Errors: those of DarkLibrary::add; more than 16 gain settings.
+  /// Adds a frame. Errors: those of DarkLibrary::add; more than 16 gain settings.
   Result<void> add(const RawDn& frame);
 
-  /// By rising ISO.
+  /// Returns the sets by rising ISO.
   std::vector<DarkSet> sets() const;
 
  private:

@@ -14,10 +14,10 @@ namespace lowlux::calib {
 namespace {
 
 constexpr double hot_deviations = 8;
-constexpr double full_share = 0.95;  // of the white level: above it a pixel may be full
+constexpr double full_share = 0.95;  // of the white level: above it a pixel may be saturated
 constexpr double most_excluded = 0.05;
 constexpr double clipped_share = 1e-3;
-constexpr double least_misfit = 0.02;   // of the dark charge: what is called not linear
+constexpr double least_misfit = 0.02;   // of the dark charge: smallest deviation that counts as nonlinear
 constexpr double least_gradient = 0.1;  // of the dark charge, from edge to edge
 constexpr double certain = 5;           // standard errors
 
@@ -120,7 +120,7 @@ Estimate mean_of(std::span<const Estimate> estimates) {
   return out;
 }
 
-/// Channels of sites [DN/s]; a sensor without filters has the mean of all in each.
+/// Returns the channels of sites [DN/s]; a sensor without filters has the mean of all sites in each.
 std::array<Estimate, 3> channels_of(const FrameSetting& setting, const PerSite<Estimate>& sites) {
   std::array<Estimate, 3> out{};
   for (int channel = 0; channel < 3; ++channel) {
@@ -149,12 +149,12 @@ void put_patterns(const DarkFit& s, std::size_t darkest, DarkSeries& out) {
   out.column_noise_e = std::sqrt(std::max(0.0, column)) / s.gain.value;
   if (!(slope > 0)) return;
   const double deviation = std::sqrt(std::max(0.0, spread)), error_of_square = std::sqrt(error2);
-  const double smallest = std::max(deviation, std::sqrt(error_of_square));  // near 0 the square is what is normal
+  const double smallest = std::max(deviation, std::sqrt(error_of_square));  // near 0 it is the square that is normal
   out.dsnu = {deviation / slope, error_of_square > 0 ? error_of_square / (2 * smallest * slope) : 0};
 }
 
-/// Excess of one pixel in the longest darks of that temperature in which it is not full; if it always is, in the
-/// shortest: then it has at least that.
+/// Returns the excess of one pixel in the longest darks of that temperature in which it is not saturated; if it always
+/// is, in the shortest: then this is a lower bound.
 double excess_e_per_s(const DarkFit& s, std::size_t darkest, int x, int y) {
   const auto& white = s.groups[darkest].setting.white_dn;
   const double full_dn = full_share * *std::min_element(white.begin(), white.end());

@@ -10,7 +10,7 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr int most_frames = 32768;  // times 65535 stays within 32 bits
+constexpr int most_frames = 32768;  // times 65535 fits in 32 bits
 
 std::int64_t pixels_of_site(const FrameSetting& s, int site) {
   return static_cast<std::int64_t>((s.width + 1 - (site & 1)) / 2) * ((s.height + 1 - (site >> 1)) / 2);
@@ -118,7 +118,7 @@ DarkGroup DarkStack::average() const {
   for (int site = 0; site < 4; ++site) {
     const auto pixels = static_cast<double>(pixels_of_site(setting_, site));
     const int columns = (setting_.width + 1 - (site & 1)) / 2, rows = (setting_.height + 1 - (site >> 1)) / 2;
-    // The pixels' variance holds the rows' too.
+    // The pixels' variance includes that of the rows.
     const double of_rows = row_variance[site] / rows, of_pixels = variance[site] / pixels;
     out.row_variance_dn2[site] = (of_rows * columns - of_pixels) / (columns - 1);
     out.share_at_zero[site] = static_cast<double>(at_zero_[site]) / (pixels * n);

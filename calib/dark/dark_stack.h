@@ -10,37 +10,37 @@
 
 namespace lowlux::calib {
 
-/// Frames this close in temperature are of one setting.
+/// Largest temperature difference of frames of one setting.
 inline constexpr double same_temperature_c = 1;
 
 /// Dark frames of one exposure time and temperature, reduced to two planes of the active area.
 struct DarkGroup {
   FrameSetting setting;
   int frames = 0;
-  Plane<float> mean_dn;                // of the frames, pixel by pixel
-  Plane<float> variance_dn2;           // temporal, pixel by pixel, quantisation included; unbiased
-  PerSite<double> row_variance_dn2{};  // temporal, of what whole rows have in common; unbiased, may be negative
-  PerSite<double> share_at_zero{};     // of the samples
+  Plane<float> mean_dn;                // of the frames, for each pixel
+  Plane<float> variance_dn2;           // temporal, for each pixel, quantisation included; unbiased
+  PerSite<double> row_variance_dn2{};  // temporal, common to whole rows; unbiased, may be negative
+  PerSite<double> share_at_zero{};     // fraction of the samples at code 0
 };
 
-/// An error where there is but one frame, which tells nothing about noise.
+/// Returns an error for a single frame, which contains no information about noise.
 Result<void> check_noise_is_known(const DarkGroup& group);
 
-/// Adds dark frames up as they come: 10 bytes for each pixel, however many frames.
+/// Accumulates dark frames as they are added: 10 bytes for each pixel, for any number of frames.
 class DarkStack {
  public:
   /// Adds a frame. Errors: those of setting_of; a frame that differs from the first in camera, size,
   /// mosaic, white level, gain, exposure time, or by more than a degree; more than 32,768 frames.
   Result<void> add(const RawDn& raw);
 
-  /// What was added. Errors: fewer than two frames, which tell nothing about noise.
+  /// Returns the group of the added frames. Errors: fewer than two frames, which contain no information about noise.
   Result<DarkGroup> group() const;
 
-  /// The same of one frame or more. Of a single frame the variances are 0 and mean nothing.
+  /// Returns the group of one frame or more. Of a single frame the variances are 0 and without meaning.
   DarkGroup average() const;
 
   int frames() const { return frames_; }
-  /// Of the first frame; there must be one.
+  /// Returns the setting of the first frame; there must be one.
   const FrameSetting& setting() const { return setting_; }
 
  private:
@@ -49,7 +49,7 @@ class DarkStack {
 
   FrameSetting setting_;
   int frames_ = 0;
-  Plane<std::uint16_t> first_;  // what is added up is the difference to it, so that nothing cancels
+  Plane<std::uint16_t> first_;  // the accumulated values are differences to it, to avoid cancellation
   Plane<std::int32_t> sum_;
   Plane<float> squares_;
   std::vector<double> row_sum_, row_squares_;  // of row means, two for each row: even and odd columns

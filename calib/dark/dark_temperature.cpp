@@ -14,7 +14,7 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr double certain = 5;  // standard errors: the logarithm of such a figure is normal, and biased by 2 % at most
+constexpr double certain = 5;  // standard errors: the logarithm of such a value is normal, and biased by 2 % at most
 
 Estimate in_electrons(const Estimate& dn, const Estimate& gain) {
   const double value = dn.value / gain.value;
@@ -41,7 +41,7 @@ std::vector<LogPoint> log_points(std::span<const double> temperature_c,
   return out;
 }
 
-/// ln D_k(T) = a_k + b (T - T_0); the gain is common to all and moves only a_k.
+/// Fits ln D_k(T) = a_k + b (T - T_0); the gain is common to all and changes only a_k.
 std::optional<DarkTemperatureLaw> law_of(std::span<const LogPoint> points, double reference_c, const Estimate& gain) {
   Design design;
   std::vector<double> weights;
@@ -80,7 +80,7 @@ std::optional<DarkTemperatureLaw> law_of(std::span<const LogPoint> points, doubl
   return law;
 }
 
-/// The gain cancels; the channels' errors are independent.
+/// Returns the ratios of the slopes. The gain cancels; the channels' errors are independent.
 std::optional<std::array<Estimate, 3>> chromaticity_of(const std::array<Estimate, 3>& slopes) {
   double sum = 0, variance = 0;
   for (const Estimate& s : slopes) {

@@ -11,15 +11,15 @@
 
 namespace lowlux::calib {
 
-/// Fills in currents, temperature law and chromaticity.
+/// Computes currents, temperature law and chromaticity.
 /// @param temperature_c  rising; one entry, without meaning, if not `stated`
 /// @param slopes_dn      of R, G, B at each temperature [DN/s]
 void put_currents(std::span<const double> temperature_c, std::span<const std::array<Estimate, 3>> slopes_dn,
                   bool stated, const Estimate& gain_dn_per_e, DarkSeries& out);
 
-/// System gain [DN/e-] from darks alone: dark charge is Poisson as photons are, so that the temporal variance rises
-/// with the mean by K. One K for all sites; each has its own noise at no charge. Row noise is the same in all groups
-/// and drops out.
+/// Returns the system gain [DN/e-] from darks alone: dark charge is Poisson distributed as photons are, so that the
+/// temporal variance rises with the mean by K. One K for all sites; each has its own noise at no charge. Row noise is
+/// the same in all groups and cancels.
 /// @param groups  of one gain setting
 /// Errors: fewer than two groups; a single frame of a setting; so little dark charge that the standard error would be
 /// above 5 %.

@@ -23,7 +23,7 @@ PixelMask outliers_of(const DarkGroup& group, const PerSite<DarkSite>& sites) {
   for (int y = 0; y < mask.height(); ++y) {
     for (int x = 0; x < mask.width(); ++x) {
       const SiteSpread& s = sites[site_of(x, y)].spread;
-      // A gradient widens the spread itself; what lies far out of it is a hot pixel.
+      // A gradient widens the spread itself; only hot pixels lie far outside it.
       mask.at(x, y) = std::fabs(group.mean_dn.at(x, y) - s.median) > certain * std::max(s.deviation, 0.5) ? 1 : 0;
     }
   }
@@ -92,7 +92,7 @@ Result<void> check_below_picture(const RawDn& picture, const DarkFrame& dark) {
 namespace {
 
 constexpr double least_deviation_dn = 1e-3;
-constexpr double far_out = 5;  // standard deviations: left out of means
+constexpr double far_out = 5;  // standard deviations: excluded from means
 constexpr double hot = 8;      // standard deviations
 constexpr std::size_t fewest_hot = 16;
 

@@ -13,34 +13,36 @@
 
 namespace lowlux::calib {
 
-/// Figures of one site of a group of darks.
+/// Statistics of one site of a group of darks.
 struct DarkSite {
   SiteSpread spread;     // of the means
   double noise_dn2 = 0;  // temporal, of one frame
 };
 
-/// Pixels beyond five deviations of the means are left out of the noise. Of a single frame it is half the variance of
-/// the differences of neighbours: the pattern is in it, so that it is too large, but a glow or a scene is not.
+/// Returns the statistics of each site. Pixels beyond five deviations of the means are excluded from the noise. For a
+/// single frame it is half the variance of the differences of neighbours: this includes the pattern, so that it is too
+/// large, but not a glow or a scene.
 PerSite<DarkSite> sites_of(const DarkGroup& group);
 
-/// How much variance a hot pixel has for each DN it is above its site: the system gain [DN/e-], as the median over
-/// pixels more than 8 standard deviations of one frame above their site, so that those that are full do not count. The
-/// median of a chi-square law of n degrees is taken for n (1 - 2 / (9 n))^3 (Wilson and Hilferty, 1931).
+/// Returns the variance of a hot pixel for each DN it is above its site: the system gain [DN/e-], as the median over
+/// pixels more than 8 standard deviations of one frame above their site, so that saturated pixels have no effect. The
+/// median of a chi-square distribution of n degrees is approximated by n (1 - 2 / (9 n))^3 (Wilson and Hilferty, 1931).
 /// @return 0 with a single frame or fewer than 16 such pixels
 double hot_pixel_gain_dn(const DarkGroup& group, const PerSite<DarkSite>& sites);
 
-/// Whether a group is brighter on one side than on the other: by more than five standard errors, one frame's noise, and
-/// a quarter of the charge above the pedestal where that is known. Error: it is; malformed.
+/// Checks whether a group is brighter on one side than on the other: by more than five standard errors, one frame's
+/// noise, and a quarter of the charge above the pedestal where that is known. Error (malformed): it is.
 Result<void> check_even_dark(const DarkGroup& group, const PerSite<DarkSite>& sites,
                              const std::optional<PerSite<double>>& pedestal_dn);
 
-/// Whether the dark frame has the level of the picture's masked pixels. Error: it is off by more than two standard
-/// deviations of a pixel and 0.1 % of the range. @return a warning if it is off by more than half of one
+/// Checks whether the dark frame has the level of the image's masked pixels. Error: it is off by more than two standard
+/// deviations of a pixel and 0.1 % of the range. @return a warning if it is off by more than half of one standard
+/// deviation
 Result<std::optional<std::string>> check_masked_level(const RawDn& picture, const PerSite<double>& masked_dn,
                                                       const DarkFrame& dark);
 
-/// Whether the picture is brighter than its dark frame. Error: more than 1 % of its pixels lie more than four standard
-/// deviations below (3e-5 of a normal law do): subtraction would leave black dots.
+/// Checks whether the image is brighter than its dark frame. Error: more than 1 % of its pixels lie more than four
+/// standard deviations below (3e-5 of a normal distribution do): subtraction would leave black dots.
 Result<void> check_below_picture(const RawDn& picture, const DarkFrame& dark);
 
 }  // namespace lowlux::calib

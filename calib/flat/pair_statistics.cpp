@@ -7,11 +7,11 @@
 namespace lowlux::calib {
 namespace {
 
-// Shading of the light is slow: within a block it is nothing beside the pattern of single pixels.
+// Shading of the light varies slowly: within a block it is negligible compared with the pattern of single pixels.
 constexpr int block_sites = 32;
 constexpr int block_pixels = 2 * block_sites;
 
-/// Sums of codes: whole numbers, so that nothing cancels. 2^28 pixels of 16 bits stay below 2^60.
+/// Sums of codes as integers, to avoid cancellation. 2^28 pixels of 16 bits stay below 2^60.
 struct BlockSums {
   std::int64_t pixels = 0, a = 0, b = 0, ab = 0;
 };
@@ -32,7 +32,7 @@ struct Codes {
 
 struct RowSite {
   int y;
-  int parity;  // of its columns
+  int parity;  // of the site's columns
   double white_dn;
 };
 
@@ -76,7 +76,7 @@ void close_blocks(SiteBlocks& blocks, PerSite<SiteSums>& sums) {
   }
 }
 
-// Analysis of variance with rows as groups of equal size.
+// Computes an analysis of variance with rows as groups of equal size.
 SiteStatistics statistics_of(const SiteSums& s) {
   const auto n = static_cast<double>(s.pixels), rows = static_cast<double>(s.rows);
   const auto difference = static_cast<double>(s.b - s.a);

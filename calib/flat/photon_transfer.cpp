@@ -16,8 +16,8 @@ namespace lowlux::calib {
 namespace {
 
 constexpr double linearity_low = 0.05, linearity_high = 0.95;  // of saturation: EMVA 1288, section 6.7
-constexpr double dithered_std_dn = 0.5;     // denoise.md of the specification, and quantisation_bounds()
-constexpr double gone_photon_noise = 0.02;  // what is left of it where flats are saturated
+constexpr double dithered_std_dn = 0.5;     // see denoise.md of the specification, and quantisation_bounds()
+constexpr double gone_photon_noise = 0.02;  // remaining fraction where flats are saturated
 constexpr double largest_gain_error = 0.05;
 constexpr double half_saturation_width = 0.1;
 
@@ -33,7 +33,7 @@ Estimate scaled(double value_dn, double error_dn, const Estimate& gain) {
   return {value, std::hypot(error_dn / gain.value, value * relative_error(gain))};
 }
 
-/// Root of a squared figure that may have come out below 0: then 0, and the error says how large it could be.
+/// Returns the root of a squared value that may be below 0 by noise: then 0, with an error that bounds its size.
 Estimate root(double square, double error_of_square) {
   const double value = std::sqrt(std::max(0.0, square));
   return {value, error_of_square > 0 ? error_of_square / (2 * std::max(value, std::sqrt(error_of_square))) : 0};
@@ -125,14 +125,14 @@ void put_saturation(const Curve& curve, Pairs pairs, const Darks& darks, PhotonT
   if (peaks == 0) return;
   out.saturation_capacity_e = scaled(peak_dn / peaks, 0, out.system_gain_dn_per_e);
   if (full == 0) return;
-  // Codes that do not scatter may all be off by the same: half a code at worst for each of the two means.
+  // Codes that do not scatter may all have the same offset: at most half a code for each of the two means.
   const double undithered_dn = out.under_dithered ? 1 / std::sqrt(6.0) : 0;
   out.saturation =
       Saturation{scaled(full_dn / full, std::hypot(std::sqrt(error2) / full, undithered_dn), out.system_gain_dn_per_e),
                  at_white / full > 0.5 ? Saturation::LimitedBy::converter : Saturation::LimitedBy::full_well};
 }
 
-/// Signal against exposure time: the line whose squared relative deviations are least.
+/// Fits a line of signal against exposure time that minimises the squared relative deviations.
 std::optional<double> deviation_of_site(const Curve& curve, Pairs pairs, int site) {
   std::vector<std::pair<double, double>> points;
   for (const TransferPoint& p : curve.flats) {
@@ -153,7 +153,7 @@ std::optional<double> deviation_of_site(const Curve& curve, Pairs pairs, int sit
     wxy += weight * x * y;
   }
   const double spread = w * wxx - wx * wx;
-  if (!(spread > 1e-9 * w * wxx)) return std::nullopt;  // all of one time: there is no line
+  if (!(spread > 1e-9 * w * wxx)) return std::nullopt;  // all of one time: the line is undetermined
   const double slope = (w * wxy - wx * wy) / spread, offset = (wy - slope * wx) / w;
   double sum = 0;
   for (const auto& [x, y] : points) sum += std::fabs(y / (offset + slope * x) - 1);

@@ -12,8 +12,8 @@ namespace {
 
 constexpr double linear_share = 0.7;     // of saturation: EMVA 1288, section 6.6
 constexpr double largest_drift = 0.01;   // of the signal
-constexpr double clipped_share = 1e-3;   // clipping 0.1 % of a normal law takes 0.7 % off its variance
-constexpr double fallen_variance = 0.8;  // of the largest: no scatter of a variance from 1000 pixels falls so far
+constexpr double clipped_share = 1e-3;   // clipping 0.1 % of a normal distribution reduces its variance by 0.7 %
+constexpr double fallen_variance = 0.8;  // of the largest: more than a variance from 1000 pixels scatters
 constexpr double same_level = 1.05;      // ratio of signals below which two pairs are one level
 constexpr int fewest_levels = 4;
 constexpr int fewest_pixels = 1000;  // of a site: variances then scatter by 4.5 %

@@ -11,7 +11,7 @@
 
 namespace lowlux::calib {
 
-/// All pairs of darks as one.
+/// Statistics of all pairs of darks together.
 struct JoinedDarks {
   PerSite<double> mean_dn{};
   PerSite<double> spatial_dn2{};
@@ -19,23 +19,23 @@ struct JoinedDarks {
   DarkScatter scatter;
 };
 
-/// Where a site's variance is largest; `reached` if it falls beyond or codes end there, else the brightest flats.
+/// Point where a site's variance is largest; `reached` if it falls beyond or codes end there, else the brightest flats.
 struct TransferPeak {
   double signal_dn = 0;
   bool reached = false;
 };
 
 struct TransferCurve {
-  std::vector<TransferPoint> flats;  // all
+  std::vector<TransferPoint> flats;  // all flats
   PerSite<TransferPeak> peak{};
   std::vector<TransferPoint> linear;             // flats of the linear range, and the darks where they are dithered
-  int levels = std::numeric_limits<int>::max();  // in `linear`, of the site that has fewest
+  int levels = std::numeric_limits<int>::max();  // number in `linear`, of the site that has fewest
 };
 
-/// Darks that may be joined: one setting, not clipped. Errors: see fit_photon_transfer.
+/// Joins darks of one setting that are not clipped. Errors: see fit_photon_transfer.
 Result<JoinedDarks> join_darks(std::span<const PairStatistics> darks);
 
-/// Variance against mean. Errors: see fit_photon_transfer.
+/// Computes the curve of variance against mean. Errors: see fit_photon_transfer.
 Result<TransferCurve> curve_of(std::span<const PairStatistics> dark_pairs, std::span<const PairStatistics> flats,
                                const JoinedDarks& darks, bool under_dithered);
 

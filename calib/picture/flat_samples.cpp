@@ -13,11 +13,11 @@ namespace {
 
 constexpr int most_groups = 24;            // of one site
 constexpr double least_degrees = 24 * 24;  // of freedom in a group: its variance is known to 6 %
-constexpr double most_clipped = 0.75;      // of a group's pixels: beyond, its variance tells of the law's tail only
+constexpr double most_clipped = 0.75;  // of a group's pixels: beyond, its variance shows only the distribution's tail
 
 constexpr double most_step = 3;  // standard deviations of the noise, between a sample and its surroundings
 
-/// Sum over the samples of one group.
+/// Sums over the samples of one group.
 struct Sum {
   double n = 0, mean = 0, high = 0, high_n = 0, middle = 0;
 };
@@ -34,7 +34,7 @@ std::span<const NoiseSample> of_site(const NoiseSamples& samples, int site) {
   return {first, last};
 }
 
-/// Cuts a span into groups of even size and calls fn(group).
+/// Divides a span into groups of equal size and calls fn(group).
 template <class Fn>
 void for_each_group(std::span<const NoiseSample> all, int groups, const Fn& fn) {
   for (int g = 0; g < groups; ++g) {
@@ -62,11 +62,12 @@ Limits limits_of(const DetailCount& details, const FlatRule& rule) {
   return out;
 }
 
-/// read_variance_dn2 of one line, tabulated where the lower bound matters.
+/// Tabulates read_variance_dn2 of one line in the range where the lower bound matters.
 class ReadVariance {
  public:
   ReadVariance(const NoiseLine& line, const ClipRange& clip) : line_(line), clip_(clip) {
-    // From where 6 standard deviations of gain x + offset above the bound end: x = g + sqrt(g^2 + 36 v), g = 18 gain
+    // The table ends where the bound is 6 standard deviations of gain x + offset away: x = g + sqrt(g^2 + 36 v), g = 18
+    // gain
     const double gain = std::max(line.gain_dn_per_e.value, 0.0), half = 18 * gain;
     const double at_bound = std::max(gain * clip.low_dn + line.offset_dn2.value, 1e-6);
     step_dn_ = (half + std::sqrt(half * half + 36 * at_bound)) / (static_cast<double>(table_.size()) - 1);
@@ -195,13 +196,13 @@ namespace {
 
 constexpr int windows = 16;
 constexpr double dense_per_code = 30;
-constexpr int least_width = 8;           // codes of a window: fewer tell no step
+constexpr int least_width = 8;           // codes of a window: in fewer, steps cannot be measured
 constexpr double quietest_share = 0.05;  // of each group of samples
 constexpr int grid = 8;
 constexpr double least_excess = 0.1;
 
 struct Steps {
-  int smallest = 0;  // 0: nowhere dense enough
+  int smallest = 0;  // 0: codes are nowhere dense enough
   int largest = 0;
 };
 
@@ -214,7 +215,7 @@ std::vector<std::int64_t> histogram(const RawDn& raw, int site) {
   return out;
 }
 
-/// Where all but a thousandth of the pixels at either end lie.
+/// Returns the range that holds all but a thousandth of the pixels at either end.
 std::array<int, 2> range_in_use(const std::vector<std::int64_t>& count) {
   std::int64_t all = 0;
   for (const std::int64_t n : count) all += n;
@@ -243,7 +244,8 @@ Steps steps_of(const std::vector<std::int64_t>& count) {
   return out;
 }
 
-/// Mean size of second differences at each phase of an 8 x 8 grid of one colour's pixels, across columns or rows.
+/// Returns the mean size of second differences at each phase of an 8 x 8 grid of one colour's pixels, across columns or
+/// rows.
 std::array<double, grid> restlessness(const RawDn& raw, bool across_columns) {
   std::array<double, grid> sum{}, n{};
   const int dx = across_columns ? 2 : 0, dy = across_columns ? 0 : 2;
@@ -261,8 +263,8 @@ std::array<double, grid> restlessness(const RawDn& raw, bool across_columns) {
   return sum;
 }
 
-/// By how much the largest phase exceeds the quiet ones, if it does so by more than they scatter. A step raises the
-/// phase it lies at and both beside it: five are left.
+/// Returns the relative excess of the largest phase above the quiet ones, or 0 if it is within their scatter. A step
+/// raises the phase it lies at and both adjacent ones: five remain.
 double excess_of(std::array<double, grid> phase) {
   std::sort(phase.begin(), phase.end());
   const double quiet = phase[2], scatter = phase[4] - phase[0];

@@ -11,9 +11,9 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr double far_sigmas = 6;  // a bound further off than this clips one pixel in 1e9
+constexpr double far_sigmas = 6;  // a bound further away than this clips one pixel in 1e9
 
-/// A normal law before clipping.
+/// Returns the normal distribution before clipping.
 isp::Moments law_at(const NoiseLine& line, double mu_dn) {
   const double floor_dn2 = 1e-3 * std::abs(line.offset_dn2.value) + 1e-9;
   const double light = std::max(mu_dn, 0.0), texture = line.contrast_squared * light * light;
@@ -27,9 +27,9 @@ bool is_far(const isp::Moments& law, const ClipRange& clip) {
 
 double density(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * std::numbers::pi); }
 
-/// Mean and variance after clipping. To those of the normal law comes what the third cumulant K^2 (K lambda) of the
-/// photons does, to first order (Edgeworth): kappa_3 / 6 times the mean of the third derivative of clamp(x) and of its
-/// square, which are delta functions at the bounds.
+/// Returns mean and variance after clipping. To those of the normal distribution it adds the effect of the third
+/// cumulant K^2 (K lambda) of the photons, to first order (Edgeworth): kappa_3 / 6 times the mean of the third
+/// derivative of clamp(x) and of its square, which are delta functions at the bounds.
 isp::Moments read_moments(const NoiseLine& line, const isp::Moments& law, const ClipRange& clip) {
   isp::Moments seen = isp::clamped_normal(law, clip.low_dn, clip.high_dn);
   const double s = std::sqrt(law.variance), gain = line.gain_dn_per_e.value;
@@ -41,13 +41,13 @@ isp::Moments read_moments(const NoiseLine& line, const isp::Moments& law, const 
     mean -= sign * third * slope;
     square += sign * third * (2 * f - 2 * bound * slope);
   }
-  const double from_law = seen.mean - law.mean;  // square is about the mean of the law
+  const double from_law = seen.mean - law.mean;  // square is about the mean of the distribution
   seen.variance = std::max(seen.variance + square - 2 * from_law * mean, 0.0);
   seen.mean += mean;
   return seen;
 }
 
-/// The law whose clipped mean is mean_dn, by bisection: the clipped mean rises with mu.
+/// Returns the distribution whose clipped mean is mean_dn, by bisection: the clipped mean rises with mu.
 isp::Moments law_seen_as(const NoiseLine& line, double mean_dn, const ClipRange& clip) {
   const isp::Moments here = law_at(line, mean_dn);
   if (is_far(here, clip)) return here;
@@ -68,12 +68,12 @@ double share_beyond(const isp::Moments& law, const ClipRange& clip) {
   return upper_tail((law.mean - clip.low_dn) / s) + upper_tail((clip.high_dn - law.mean) / s);
 }
 
-/// By how much a line moves.
+/// Change of a line's parameters.
 struct Step {
   double gain = 0, offset = 0, contrast_squared = 0;
 };
 
-/// The parameters' information: J^T W J of gain (a), offset (b) and contrast squared (c), and J^T W r.
+/// Normal equations of the parameters: J^T W J of gain (a), offset (b) and contrast squared (c), and J^T W r.
 struct Normal {
   double aa = 0, ab = 0, bb = 0, ac = 0, bc = 0, cc = 0;
   double ra = 0, rb = 0, rc = 0;
@@ -82,7 +82,8 @@ struct Normal {
   double determinant() const { return aa * bb - ab * ab; }
   bool solvable() const { return determinant() > 1e-9 * aa * bb && std::isfinite(determinant()); }
 
-  /// Of gain and offset where c is whatever suits them (Schur's complement). Without information on c: fixed.
+  /// Returns the equations of gain and offset with c eliminated (Schur's complement). Without information on c it is
+  /// fixed.
   Normal without_contrast() const {
     if (!(cc > 0)) return *this;
     Normal out = *this;
@@ -94,13 +95,13 @@ struct Normal {
     return out;
   }
 
-  /// To the best gain and offset where c moves by so much.
+  /// Returns the step to the best gain and offset for a given change of c.
   Step solved_for(double by_c) const {
     const double a = ra - ac * by_c, b = rb - bc * by_c;
     return {(bb * a - ab * b) / determinant(), (aa * b - ab * a) / determinant(), by_c};
   }
 
-  /// To the best of all, c staying at least 0.
+  /// Returns the step to the optimum, with c at least 0.
   Step solved(double c) const {
     if (!(cc > 0)) return solved_for(0);
     const Step free = without_contrast().solved_for(0);
@@ -109,7 +110,7 @@ struct Normal {
   }
 };
 
-/// Cauchy's weight with the constant that costs 5 % of efficiency where errors are normal.
+/// Returns Cauchy's weight with the constant that costs 5 % of efficiency for normal errors.
 double robust_weight(double residual) { return 1 / (1 + residual * residual / (2.385 * 2.385)); }
 
 NoiseLine moved(const NoiseLine& line, const Step& by) {
@@ -120,7 +121,7 @@ NoiseLine moved(const NoiseLine& line, const Step& by) {
   return out;
 }
 
-/// @param expected  standard deviation of the contrast squared before anything is measured; 0: none is fitted
+/// @param expected  prior standard deviation of the contrast squared; 0: it is not fitted
 Normal normal_equations(std::span<const NoisePoint> points, const NoiseLine& line, double expected) {
   Normal out;
   for (const NoisePoint& p : points) {
@@ -155,7 +156,7 @@ Normal normal_equations(std::span<const NoisePoint> points, const NoiseLine& lin
   return out;
 }
 
-/// A line to begin with: clipping left out of account, weights from the measured variances.
+/// Returns an initial line: clipping ignored, weights from the measured variances.
 NoiseLine first_line(std::span<const NoisePoint> points) {
   double w0 = 0, w1 = 0, w2 = 0, v0 = 0, v1 = 0, least = INFINITY;
   for (const NoisePoint& p : points) {
@@ -174,7 +175,7 @@ NoiseLine first_line(std::span<const NoisePoint> points) {
   return line;
 }
 
-/// Whether every point keeps a variance: steps that lose one are halved.
+/// Returns whether every point keeps a positive variance: steps for which one does not are halved.
 bool is_lawful(std::span<const NoisePoint> points, const NoiseLine& line) {
   return std::all_of(points.begin(), points.end(), [&](const NoisePoint& p) {
     const double mean = std::max(p.mean_dn, 0.0);

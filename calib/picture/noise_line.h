@@ -7,13 +7,13 @@
 
 namespace lowlux::calib {
 
-/// Between which values a pixel is read, counted from black [DN].
+/// Range of values within which a pixel is read, relative to black [DN].
 struct ClipRange {
   double low_dn = 0;
   double high_dn = 0;
 };
 
-/// Mean and variance of pixels that see about the same light, as read: clipping included.
+/// Mean and variance of pixels that receive about the same light, as read: clipping included.
 struct NoisePoint {
   double mean_dn = 0;  // above black
   double variance_dn2 = 0;
@@ -21,34 +21,32 @@ struct NoisePoint {
   ClipRange clip;
 };
 
-/// variance = gain * mean + offset + contrast_squared * mean^2, of pixels that are not clipped. The last is what is
-/// proportional to the light and no noise of the light: PRNU, grain and texture of the scene.
+/// A noise model, variance = gain * mean + offset + contrast_squared * mean^2, of pixels that are not clipped. The last
+/// term is proportional to the light and is not noise of the light: PRNU, grain and texture of the scene.
 struct NoiseLine {
   Estimate gain_dn_per_e;
   Estimate offset_dn2;
-  double covariance = 0;  // of the two
+  double covariance = 0;  // of gain and offset
   double reduced_chi_square = 0;
   int degrees_of_freedom = 0;
   double contrast_squared = 0;  // at least 0
 };
 
-/// Variance of pixels whose clipped mean is `mean_dn`, as read:
+/// Returns the variance of pixels whose clipped mean is `mean_dn`, as read:
 ///     m, V: mean and variance of clamp(N(mu, gain mu + offset + contrast^2 mu^2)), mu such that m = mean_dn
 /// (Foi et al., IEEE TIP 17(10), 2008, section IV, there as the functions E_m and S_m). Never below 0.
 double read_variance_dn2(const NoiseLine& line, double mean_dn, const ClipRange& clip);
 
-/// What share of pixels whose clipped mean is `mean_dn` is clipped, by the line.
+/// Returns the fraction of pixels whose clipped mean is `mean_dn` that is clipped, according to the line.
 double clipped_share(const NoiseLine& line, double mean_dn, const ClipRange& clip);
 
-/// The line that is most likely, by iterated weighted least squares. A point's variance is 2 V^2 / degrees of freedom,
-/// V being that of the line and not that measured, which would favour points that came out low. Points that are off by
-/// several standard deviations weigh less (Cauchy's weights). Standard errors are multiplied by sqrt(reduced chi
-/// square) where that exceeds 1.
-/// @param expected_contrast  0: contrast_squared is 0. Above 0: it is fitted too, as what is expected to lie within 0
-/// and
-///                           this contrast's square (a normal law's prior, cut at 0); gain and offset are the less
-///                           certain by it, whether or not any is found
-/// nullopt: fewer than three points, or means that do not tell gain from offset.
+/// Fits the most likely line by iterated weighted least squares. A point's variance is 2 V^2 / degrees of freedom, V
+/// being that of the line and not the measured one, which would favour points with low measured values. Points that are
+/// off by several standard deviations have less weight (Cauchy's weights). Standard errors are multiplied by
+/// sqrt(reduced chi square) where that exceeds 1.
+/// @param expected_contrast  0: contrast_squared is 0. Above 0: it is fitted too, and expected to lie within 0 and this
+/// contrast's square (a normal prior, cut at 0); gain and offset are less certain by it, whether or not any is found
+/// @return nullopt: fewer than three points, or means that do not separate gain from offset
 std::optional<NoiseLine> fit_noise_line(std::span<const NoisePoint> points, double expected_contrast = 0);
 
 }  // namespace lowlux::calib

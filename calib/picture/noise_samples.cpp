@@ -12,7 +12,7 @@ namespace {
 constexpr int side = noise_block;
 using Block = std::array<float, side * side>;
 
-/// Row u of the orthonormal cosine transform.
+/// Returns the matrix of the orthonormal cosine transform, one row for each frequency u.
 const std::array<std::array<float, side>, side>& cosines() {
   static const auto table = [] {
     std::array<std::array<float, side>, side> out{};
@@ -29,9 +29,9 @@ const std::array<std::array<float, side>, side>& cosines() {
 
 enum class Band : std::uint8_t { none, low, middle, high };
 
-/// Bands by u + v and not by the smaller of the two: a lens leaves the less of the scene the finer a detail is, and so
-/// the middle ones betray texture that is as strong in the high ones. The finest of all holds most of a difference
-/// between the two greens of a mosaic, which is no noise.
+/// Assigns bands by u + v and not by the smaller of the two: a lens transmits less of the scene the finer a detail is,
+/// so the middle ones reveal texture that is equally strong in the high ones. The finest of all holds most of a
+/// difference between the two greens of a mosaic, which is not noise.
 constexpr Band band_of(int u, int v) {
   if (u + v <= 1 || u + v == 2 * (side - 1)) return Band::none;
   if (u + v >= side) return Band::high;
@@ -51,10 +51,10 @@ constexpr int count_of(Band band) {
 struct Lattice {
   const RawDn& raw;
   PerSite<float> black_dn;
-  std::uint8_t site;  // the lowest of those it holds
+  std::uint8_t site;  // the lowest of its sites
   int ux, uy, vx, vy;
 
-  /// Counted from black.
+  /// Returns a value above black.
   float at(int x, int y, int u, int v) const {
     const int column = x + u * ux + v * vx, row = y + u * uy + v * vy;
     return static_cast<float>(raw.dn.at(raw.active.x + column, raw.active.y + row)) - black_dn[site_of(column, row)];
@@ -115,7 +115,7 @@ NoiseSample block_sample(const Lattice& lattice, int x0, int y0) {
 
 constexpr int detail_reach = 3;  // sites on each side of the middle one
 
-/// Sums of the eight parts of the 7 x 7 sites about the middle 3 x 3: corners of 2 x 2, sides of 3 x 2.
+/// Sums of the eight parts of the 7 x 7 sites around the middle 3 x 3: corners of 2 x 2, sides of 3 x 2.
 using Parts = std::array<float, 9>;
 
 NoiseSample detail_sample(const Lattice& lattice, int x0, int y0) {
@@ -146,8 +146,9 @@ NoiseSample detail_sample(const Lattice& lattice, int x0, int y0) {
           .site = lattice.site};
 }
 
-/// The greens of a Bayer mosaic as the one lattice they are, at 45 degrees: the details of one of its two halves, whose
-/// pixels lie two apart, would be mixed with those of the scene that are finer. The other sites each for itself.
+/// Returns the lattices of a mosaic. The greens of a Bayer mosaic are one lattice at 45 degrees: with only one of its
+/// two halves, whose pixels lie two apart, details would be aliased with finer ones of the scene. Each other site is a
+/// lattice of its own.
 std::vector<Lattice> lattices_of(const RawDn& raw, const PerSite<double>& black_dn) {
   PerSite<float> black;
   for (int site = 0; site < 4; ++site) black[site] = static_cast<float>(black_dn[site]);
@@ -165,14 +166,14 @@ std::vector<Lattice> lattices_of(const RawDn& raw, const PerSite<double>& black_
   return out;
 }
 
-/// How far a sample reaches from its first pixel, and how far the next one is off: [pixels of the lattice].
+/// Extent of a sample from its first pixel, and distance to the next one: [pixels of the lattice].
 struct Reach {
   int before = 0;
   int after = 0;
   int step = 1;
 };
 
-/// Where samples of a lattice lie: rows of them, every second one shifted where the lattice is turned.
+/// Positions of the samples of a lattice: rows of them, every second one shifted where the lattice is turned.
 struct Places {
   int x = 0, y = 0;
   int step_x = 1, step_y = 1;
@@ -236,7 +237,8 @@ NoiseSamples block_samples(const RawDn& raw, const SamplePlan& plan, Executor& e
 }
 
 NoiseSamples detail_samples(const RawDn& raw, const SamplePlan& plan, Executor& executor) {
-  // Samples two sites apart share pixels: their squares are correlated by 1/36 (beside) and 1/1296 (diagonally).
+  // Samples two sites apart have pixels in common: their squares are correlated by 1/36 (adjacent) and 1/1296
+  // (diagonal).
   constexpr double share = 1 / (1 + 4.0 / 36 + 4.0 / 1296);
   return {{6, 0, 1, 1.0 / 9 + 1.0 / 40, share},
           samples_of(raw, plan, executor, {detail_reach, detail_reach, 2}, detail_sample)};

@@ -14,12 +14,12 @@ namespace lowlux::calib {
 namespace {
 
 constexpr std::size_t least_samples = 100;
-constexpr double first_share = 0.05;  // of each group: the quietest, to begin with
+constexpr double first_share = 0.05;  // of each group: the samples of least detail, as a start
 constexpr int most_rounds = 30;
 constexpr double settled = 1e-3;             // relative change of the gain
 constexpr double expected_contrast = 0.015;  // of PRNU, grain and texture as fine as pixels, in flat samples
 constexpr double most_clipped_share = 0.9;   // of the pixels
-constexpr double largest_gain_error = 0.15;  // relative: beyond, the levels were too alike
+constexpr double largest_gain_error = 0.15;  // relative: beyond, the levels were too similar
 constexpr double largest_chi_square = 5;
 
 double white_of(const RawDn& raw, int site) {
@@ -27,7 +27,7 @@ double white_of(const RawDn& raw, int site) {
   return raw.white_dn[static_cast<int>(colour_at(raw.phase, site & 1, site >> 1))];
 }
 
-/// The codes that a site's pixels end at, and how many pixels lie there.
+/// Range of codes of a site's pixels, and the numbers of pixels at its ends.
 struct SiteRange {
   ClipRange clip;
   double clipped = 0;
@@ -53,7 +53,7 @@ SiteRange range_of(const RawDn& raw, double black_dn, int site) {
   return {{smallest - black_dn, white_dn - black_dn}, static_cast<double>(clipped), static_cast<double>(pixels)};
 }
 
-/// Greens are one lattice of samples: both get the range that holds both.
+/// Gives both greens, which are one lattice of samples, the range that holds both.
 void join_greens(const RawDn& raw, PerSite<ClipRange>& clip) {
   if (raw.layout != SensorLayout::bayer) return;
   const int upper = colour_at(raw.phase, 0, 0) == CfaColour::green ? 0 : 1, lower = 3 - upper;
@@ -87,7 +87,8 @@ struct Fit {
   bool converged = false;
 };
 
-/// The quietest samples give a first line; that line says which samples are flat, and those give the next.
+/// Iterates: the samples of least detail give a first line; that line determines which samples are flat, and those give
+/// the next.
 std::optional<Fit> settle(const NoiseSamples& samples, const PerSite<ClipRange>& clip) {
   const auto first = fit_noise_line(quietest_points(samples, clip, first_share).points);
   if (!first) return std::nullopt;
@@ -99,7 +100,7 @@ std::optional<Fit> settle(const NoiseSamples& samples, const PerSite<ClipRange>&
     const double gain = out.line.gain_dn_per_e.value;
     out.converged = std::abs(next->gain_dn_per_e.value - gain) < settled * std::abs(gain);
     out.line = *next;
-    if (!(next->gain_dn_per_e.value > 0)) break;  // no noise is like that: check_fit says so
+    if (!(next->gain_dn_per_e.value > 0)) break;  // not a possible noise: check_fit reports it
   }
   return out;
 }
@@ -175,7 +176,7 @@ PictureNoise described(const Fit& fit, double samples, const RawTraces& traces) 
   return out;
 }
 
-/// Ours about the profile's, both differences together.
+/// Returns the chi square of the measured line about the profile's, for both differences together.
 double chi_square_of(const PictureNoise& noise, double gain, double offset) {
   const double da = noise.gain_dn_per_e.value - gain, db = noise.offset_dn2.value - offset;
   const double aa = noise.gain_dn_per_e.standard_error * noise.gain_dn_per_e.standard_error;

@@ -20,7 +20,7 @@ double between_logs(double a, double b, double share) {
   return a > 0 && b > 0 ? std::exp(between(std::log(a), std::log(b), share)) : between(a, b, share);
 }
 
-/// Figures of `share` of the way from a to b; patterns and hot pixels are those of the nearer one.
+/// Interpolates by `share` of the way from a to b; patterns and hot pixels are those of the nearer one.
 GainProfile between(const GainProfile& a, const GainProfile& b, double share) {
   GainProfile out = share < 0.5 ? a : b;
   if (!a.pedestal_dn || !b.pedestal_dn) out.pedestal_dn.reset();
@@ -41,7 +41,7 @@ GainProfile between(const GainProfile& a, const GainProfile& b, double share) {
   return out;
 }
 
-/// Beyond the measured settings: the gain follows the ISO, electrons stay electrons.
+/// Extrapolates beyond the measured settings: the gain follows the ISO, values in electrons stay.
 GainProfile beyond(const GainProfile& nearest, double ratio) {
   GainProfile out = nearest;
   if (!out.sensor) return out;
@@ -57,7 +57,7 @@ std::string settings_of(const CameraProfile& profile) {
   return text;
 }
 
-/// "ISO 1600" or "1600"; nullopt if it is neither.
+/// Parses "ISO 1600" or "1600"; nullopt if it is neither.
 std::optional<double> iso_named(std::string_view name) {
   constexpr std::string_view prefix = "ISO ";
   if (name.starts_with(prefix)) name.remove_prefix(prefix.size());

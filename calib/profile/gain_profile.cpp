@@ -16,7 +16,7 @@ double smallest_white(const FrameSetting& setting) {
   return *std::min_element(setting.white_dn.begin(), setting.white_dn.end());
 }
 
-constexpr double dithered_deviation_dn = 0.5;  // noise below it is lost in the codes
+constexpr double dithered_deviation_dn = 0.5;  // smaller noise is not measurable in the codes
 constexpr const char* dark_series_note = "dark series";
 constexpr const char* black_level_note = "black level";
 
@@ -28,7 +28,7 @@ PerSite<double> values_of(const PerSite<Estimate>& estimates) {
   return out;
 }
 
-/// Takes the place of an older entry about the same figures.
+/// Adds an entry, which replaces an older one about the same figures.
 void note(Provenance provenance, GainProfile& out) {
   std::erase_if(out.provenance, [&](const Provenance& p) { return p.figures == provenance.figures; });
   out.provenance.push_back(std::move(provenance));
@@ -42,7 +42,7 @@ Provenance assumed(const std::string& figures, const std::string& what, const Me
   return {Provenance::Kind::quoted, figures, what, m.date, {}, 0, 0};
 }
 
-/// Electrons that were counted with another system gain, counted anew: the codes they were read from stay.
+/// Converts values in electrons from another system gain: the codes they were measured in stay.
 void recount(double ratio, GainProfile& out) {
   SensorModel& s = *out.sensor;
   SensorErrors& e = out.errors;
@@ -57,7 +57,7 @@ void recount(double ratio, GainProfile& out) {
   for (HotPixelFigure& hot : out.hot_pixels) hot.excess_e_per_s *= ratio;
 }
 
-/// A sensor of this gain, with what any frame tells of it.
+/// Returns a sensor of this gain, with the properties that any frame states.
 SensorModel& begin_sensor(const FrameSetting& setting, const Estimate& gain, double black_dn, const Measured& measured,
                           GainProfile& out) {
   const bool is_new = !out.sensor;
@@ -85,7 +85,7 @@ bool has_note(const GainProfile& gain, const char* figures) {
                      [&](const Provenance& p) { return p.figures == figures; });
 }
 
-/// Whether the pedestal comes from dark pixels, and so is better than what flats or a picture say in passing.
+/// Returns whether the pedestal comes from dark pixels: then it is better than an estimate from flats or an image.
 bool pedestal_is_measured(const GainProfile& gain) {
   return gain.pedestal_dn && (has_note(gain, dark_series_note) || has_note(gain, black_level_note));
 }

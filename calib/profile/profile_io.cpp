@@ -20,9 +20,9 @@ using Json = nlohmann::ordered_json;
 using Names = std::initializer_list<const char*>;
 
 constexpr int deepest = 8;             // a profile has six levels
-constexpr std::size_t most_keys = 64;  // of one object; the JSON library compares each with all before it
+constexpr std::size_t most_keys = 64;  // of one object; the JSON library compares each with all previous ones
 
-/// Reads one JSON object; finish() complains about keys nobody asked for.
+/// Reads one JSON object; finish() reports unexpected keys.
 class Reader {
  public:
   Reader(const Json& node, std::string path, ProfileFailure& failure)
@@ -117,7 +117,7 @@ class Reader {
     object(key, [&](Reader& inner) { visit(inner, *out); });
   }
 
-  /// Three rows of three.
+  /// Reads three rows of three numbers.
   void matrix(const char* key, Matrix3& out) {
     const Json* rows = array(key, 3, 3);
     for (std::size_t i = 0; rows != nullptr && i < 9 && !failure_.error; ++i) {
@@ -191,12 +191,12 @@ class Reader {
   std::set<std::string> asked_;
 };
 
-/// JSON allows a key twice and leaves open which counts: here neither does. After a failure nothing more is kept.
+/// Rejects duplicate keys: JSON allows them and does not define which is valid. After a failure nothing more is kept.
 class KeyCheck {
  public:
   explicit KeyCheck(ProfileFailure& failure) : failure_(failure) {}
 
-  /// Whether the value is to be kept.
+  /// Returns whether the value is to be kept.
   bool operator()(int depth, Json::parse_event_t event, const Json& value) {
     if (failure_.error) return false;
     if (depth > deepest) {

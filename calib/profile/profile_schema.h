@@ -11,26 +11,26 @@ namespace lowlux::calib {
 
 inline constexpr const char* profile_format = "lowlux camera profile";
 
-/// The first thing that went wrong; what follows is skipped.
+/// The first failure; what follows is skipped.
 struct ProfileFailure {
   std::optional<Error> error;
   void set(ErrorCode code, const std::string& path, const std::string& what);
 };
 
-/// "path.key" and "path[i]".
+/// Return "path.key" and "path[i]".
 std::string joined(const std::string& path, const std::string& key);
 std::string indexed(const std::string& path, std::size_t i);
 
-/// Values a key may have, ends included.
+/// Range of values of a key, ends included.
 struct Range {
   double low = 0;
   double high = 1e9;
 };
 
-/// Whether the value lies in the range; if not, or if it is no number, `failure` says so.
+/// Returns whether the value lies in the range; if not, or if it is NaN, sets `failure`.
 bool check_range(double value, const Range& range, const std::string& path, ProfileFailure& failure);
 
-/// What no single key can tell: figures of a sensor that contradict each other.
+/// Checks what no single key can show: values of a sensor that contradict each other.
 void check_together(const CameraProfile& profile, ProfileFailure& failure);
 
 inline constexpr double tiny = 1e-12;  // stands for "above 0"
@@ -38,7 +38,7 @@ inline constexpr std::size_t most_gains = 256, most_hot_pixels = 100000, most_fi
                              most_colours = 64;
 inline constexpr Range matrix_entries{-1e3, 1e3};
 
-/// The profile's keys, in order, once for reading and writing. A visitor offers
+/// Visits the profile's keys in order, once for reading and writing. A visitor offers
 ///     text(key, string)               number(key, double, range)       integer(key, int, range)
 ///     optional_number(key, optional)  estimate(key, value, standard error, range)
 ///     choice(key, enum, names)        object(key, fn)                  optional_object(key, optional, fn)

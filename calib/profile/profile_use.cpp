@@ -17,7 +17,7 @@ namespace {
 constexpr const char* monochrome = "monochrome";
 constexpr double hot_deviations = 6;
 constexpr double same_exposure = 0.01;    // relative
-constexpr double telling_charge_e = 0.2;  // dark charge below this moves no black point that can be measured
+constexpr double telling_charge_e = 0.2;  // smaller dark charge does not change a black point measurably
 
 Result<void> check_camera(const CameraProfile& profile, const FrameInfo& info) {
   const auto differs = [](const std::string& a, const std::string& b) { return !a.empty() && !b.empty() && a != b; };
@@ -27,7 +27,7 @@ Result<void> check_camera(const CameraProfile& profile, const FrameInfo& info) {
                           camera_name(info.make, info.model)));
 }
 
-/// A mode of the sensor or a crop may begin at another site.
+/// Compares the mosaics. A mode of the sensor or a crop may begin at another site.
 Result<void> check_mosaic(const CameraProfile& profile, const RawDn& frame, std::vector<std::string>& warnings) {
   const std::string mosaic = mosaic_of(frame);
   if (profile.mosaic.empty() || profile.mosaic == mosaic) return {};
@@ -47,7 +47,7 @@ int channel_of(const RawDn& frame, int site) {
   return channel_of_site({.layout = frame.layout, .phase = frame.phase}, site);
 }
 
-/// By how much dark current differs from that at the profile's temperature.
+/// Returns the ratio of dark current to that at the profile's temperature.
 double temperature_factor(const GainProfile& gain, const FrameInfo& info, double charge_e,
                           std::vector<std::string>& warnings) {
   const SensorModel& sensor = *gain.sensor;
@@ -93,7 +93,7 @@ void warn_of_exposure(const GainProfile& gain, double exposure_s, bool scaled, s
   }
 }
 
-/// Dark charge at the frame's exposure and temperature, where the profile tells it apart from the pedestal.
+/// Computes the dark charge at the frame's exposure and temperature, if the profile separates it from the pedestal.
 /// @return the standard errors of the charge
 Result<PerSite<double>> find_dark_charge(const GainProfile& gain, const RawDn& frame, ProfileAtFrame& out) {
   SensorModel& sensor = *out.sensor;
@@ -115,7 +115,7 @@ Result<PerSite<double>> find_dark_charge(const GainProfile& gain, const RawDn& f
   for (int site = 0; site < 4; ++site) {
     const int k = channel_of(frame, site);
     out.dark_mean_e[site] = sensor.dark_current_e_per_s[k] * time_s;
-    // What is subtracted are codes: the system gain's error is in the current, and cancels.
+    // Codes are subtracted: the system gain's error is in the current, and cancels.
     const double of_gain = gain.errors.system_gain_dn_per_e / gain.sensor->system_gain_dn_per_e;
     const double all = gain.errors.dark_current_e_per_s[k], shared = of_gain * gain.sensor->dark_current_e_per_s[k];
     errors[site] = std::sqrt(std::max(0.0, all * all - shared * shared)) * factor * time_s;
@@ -149,7 +149,7 @@ double black_of(const RawDn& frame, int site, const ProfileAtFrame& out) {
   return frame.black_tag ? frame.black_tag->at(site & 1, site >> 1) : out.sensor->black_level_dn;
 }
 
-/// A sensor without filters has one figure for the three channels.
+/// Adds the noise profile. A sensor without filters has one value for the three channels.
 void add_noise(const RawDn& frame, ProfileAtFrame& out) {
   const SensorModel& sensor = *out.sensor;
   NoiseProfile sum;
@@ -159,7 +159,7 @@ void add_noise(const RawDn& frame, ProfileAtFrame& out) {
     const double range_dn = frame.white_dn[k] - black_of(frame, site, out);
     const double variance = dark_variance_dn2(sensor, out.dark_mean_e[site]);
     if (out.black) out.black->noise_std_dn[site] = std::sqrt(variance);
-    if (!(range_dn > 0)) return;  // choose_black refuses such a frame
+    if (!(range_dn > 0)) return;  // choose_black rejects such a frame
     sum.scale[k] += sensor.system_gain_dn_per_e / range_dn;
     sum.offset[k] += variance / (range_dn * range_dn);
     ++sites[k];
@@ -172,7 +172,7 @@ void add_noise(const RawDn& frame, ProfileAtFrame& out) {
   }
 }
 
-/// Excess currents are those at the profile's temperature, as the dark current is.
+/// Lists the hot pixels. Excess currents are those at the profile's temperature, as the dark current is.
 void list_hot_pixels(const GainProfile& gain, const RawDn& frame, ProfileAtFrame& out) {
   const double time_s = frame.info.exposure_s.value_or(0);
   const double reference = gain.sensor->dark_current_e_per_s[1], now = out.sensor->dark_current_e_per_s[1];
@@ -205,7 +205,7 @@ std::vector<ColourCalibration> calibrations_of(const CameraProfile& profile) {
 
 Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame, const std::string& gain_setting) {
   if (frame.layout == SensorLayout::linear_rgb) {
-    return fail(ErrorCode::unsupported, "the frame is already demosaiced: a profile tells of the mosaic");
+    return fail(ErrorCode::unsupported, "the frame is already demosaiced: a profile describes the mosaic");
   }
   if (const auto same = check_camera(profile, frame.info); !same) return tl::make_unexpected(same.error());
   ProfileAtFrame out;

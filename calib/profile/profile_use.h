@@ -10,34 +10,34 @@
 
 namespace lowlux::calib {
 
-/// RGGB, GRBG, GBRG, BGGR, or monochrome; empty for frames that are demosaiced.
+/// Returns RGGB, GRBG, GBRG, BGGR, or monochrome; empty for frames that are demosaiced.
 std::string mosaic_of(const RawDn& frame);
 
-/// What a camera's profile says about one frame.
+/// Properties of a camera's profile at the setting of one frame.
 struct ProfileAtFrame {
-  std::optional<BlackPoint> black;     // at the frame's gain, exposure and temperature; the dark charge is in it.
-                                       // Absent if the profile knows none: then the frame's own holds
+  std::optional<BlackPoint> black;     // at the frame's gain, exposure and temperature, dark charge included; absent if
+                                       // not in the profile: then the frame's own applies
   std::optional<SensorModel> sensor;   // at the frame's gain and temperature; absent if the gain is unknown
   PerSite<double> dark_mean_e{};       // of the frame; 0 if unknown
   std::optional<NoiseProfile> noise;   // of the sensor, with that of the dark charge in `dark_mean_e`
   std::vector<DefectRect> hot_pixels;  // those whose excess charge is above 6 standard deviations in this frame
   std::vector<std::string> warnings;   // what was extrapolated or assumed
-  std::optional<double> iso;           // of the setting, where the profile knows it
+  std::optional<double> iso;           // of the setting, if known to the profile
 };
 
-/// The profile at a frame's setting.
-/// Gain: between two measured ISO settings gain and read noise follow straight lines in log-log, levels in the
-/// logarithm of the ISO; beyond them the gain follows the ISO, with a warning. Exposure: pedestal + K D t. Temperature:
-/// the profile's doubling figure. Errors and warnings of the mosaic: one is a mosaic and the other monochrome (error);
-/// the phases differ (warning: levels of sites may belong to others). Warnings for exposures and temperatures beyond
-/// those of the darks. Errors: another camera; a frame that states no ISO where the profile has several; no exposure
-/// time where dark current needs it. A profile without gain settings says nothing about a frame.
-/// @param gain_setting  of the profile, as gain_named has it; empty: by the frame's ISO
+/// Evaluates the profile at a frame's setting. Gain: between two measured ISO settings gain and read noise follow
+/// straight lines in log-log, levels in the logarithm of the ISO; beyond them the gain follows the ISO, with a warning.
+/// Exposure: pedestal + K D t. Temperature: the profile's doubling figure. Errors and warnings of the mosaic: one is a
+/// mosaic and the other monochrome (error); the phases differ (warning: levels of sites may belong to others). Warnings
+/// for exposures and temperatures beyond those of the darks. Errors: another camera; a frame that states no ISO where
+/// the profile has several; no exposure time where dark current needs it. A profile without gain settings has no effect
+/// on a frame.
+/// @param gain_setting  of the profile, as for gain_named; empty: by the frame's ISO
 Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame,
                                   const std::string& gain_setting = {});
 
-/// A profile's colours as a frame has them: at most two, as in a DNG, those of the lights of lowest and highest
-/// temperature; by rising temperature.
+/// Returns a profile's colour calibrations as a frame has them: at most two, as in a DNG, those of the illuminants of
+/// lowest and highest temperature; by rising temperature.
 std::vector<ColourCalibration> calibrations_of(const CameraProfile& profile);
 
 }  // namespace lowlux::calib

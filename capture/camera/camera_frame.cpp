@@ -15,7 +15,7 @@ namespace lowlux::capture {
 namespace {
 
 constexpr double least_gain = 1e-3, most_gain = 1e3;
-constexpr double most_coefficient = 255;  // fits in 24 bits with 16 of fraction, as floats do
+constexpr double most_coefficient = 255;  // fits in 24 bits with a fraction of 16, as floats do
 constexpr double matrix_step = 0x1p-16, neutral_step = 0x1p-20;
 constexpr double d65_cct_k = 6504;
 constexpr double iso_of_unit_gain = 100;
@@ -72,8 +72,8 @@ std::optional<Matrix3> matrix_of(const FrameFacts& facts, RawFrame& out) {
   return std::nullopt;
 }
 
+/// Returns the calibration of a colour matrix; nullopt if its values exceed the range of a DNG.
 /// @param to_srgb  of white-balanced camera RGB
-/// nullopt where a DNG has no room for what comes of it.
 std::optional<ColourCalibration> calibration_of(const Matrix3& to_srgb, const Vector3& neutral,
                                                 const std::optional<double>& cct_k) {
   const auto light = cct_k ? isp::white_of_temperature(*cct_k) : std::nullopt;
@@ -113,7 +113,7 @@ void set_info(const FrameFacts& facts, const std::string& camera, FrameInfo& out
     return value && std::isfinite(*value) && *value > 0 ? value : std::nullopt;
   };
   out.model = camera;
-  // As DNGs have it: libtiff takes rationals as floats.
+  // Rounded as DNGs have it: libtiff takes rationals as floats.
   if (const auto time_s = positive(facts.exposure_s)) out.exposure_s = static_cast<float>(*time_s);
   if (const auto gain = positive(facts.analogue_gain)) out.iso = std::round(iso_of_unit_gain * *gain);
   if (facts.temperature_c && std::isfinite(*facts.temperature_c)) out.temperature_c = facts.temperature_c;

@@ -19,7 +19,7 @@ double seconds_between(steady_clock::time_point from, steady_clock::time_point t
   return std::chrono::duration<double>(to - from).count();
 }
 
-/// A camera that runs, and stops on every way out.
+/// A running camera, which stops when this goes out of scope.
 class Running {
  public:
   explicit Running(Camera& camera) : camera_(camera) {}
@@ -58,7 +58,7 @@ class Loop {
   }
 
  private:
-  /// nullopt: none has come for a while, and there is time left.
+  /// Returns a frame, or nullopt if none came within a tenth of a second and time is left.
   Result<std::optional<CameraFrame>> wait() {
     const auto start = steady_clock::now();
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(last_whole_ + limits_.timeout - start);
@@ -112,7 +112,7 @@ class Loop {
   const std::atomic<bool>& stop_;
   LoopCount& count_;
   std::optional<steady_clock::time_point> first_;
-  steady_clock::time_point last_whole_;  // or the start
+  steady_clock::time_point last_whole_;  // or time of the start
 };
 
 }  // namespace

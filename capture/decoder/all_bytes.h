@@ -10,7 +10,7 @@
 
 namespace lowlux::capture {
 
-/// Repeats a system call that moves bytes at an offset of a file, pread or pwrite, until it has moved all of them.
+/// Repeats pread or pwrite, system calls that move bytes at an offset of a file, until all bytes are moved.
 /// @return false if it fails or reaches the end of the file
 template <class Byte, class Call>
 bool move_all(Call call, int fd, std::span<Byte> bytes, std::uint64_t offset) {

@@ -8,17 +8,17 @@
 namespace lowlux::capture {
 
 enum class DecodeOutcome : std::uint32_t {
-  crashed = 0,  // the value of fresh memory: nothing was ever written
+  crashed = 0,  // zero, the value of fresh memory: nothing was written
   decoded,
-  unsupported,   // `reason` says why
-  not_raw,       // the decoder does not know the file
-  damaged,       // `reason` says what the decoder says
+  unsupported,   // `reason` states why
+  not_raw,       // unknown to the decoder
+  damaged,       // `reason` is the decoder's message
   too_large,     // `raw_width` x `raw_height` x `samples` is over the limit
   out_of_memory  // within the limits set for the decoder
 };
 
-/// What the decoder tells about a file: fixed-size fields only, because it comes from another process by bytes.
-/// Nothing in it is trusted: every figure came from the file, through a library that may be wrong.
+/// Header that the decoder reports for a file: fixed-size fields only, because it comes from another process as bytes.
+/// None of it is trusted: every value came from the file, through a library that may have errors.
 struct DecodedHeader {
   DecodeOutcome outcome;
   char reason[192];
@@ -28,7 +28,7 @@ struct DecodedHeader {
   std::int32_t masks[8][4];                     // top, left, bottom, right in the readout, ends excluded
   std::int32_t flip;                            // bit 0 mirrors x, bit 1 mirrors y, bit 2 then transposes
   std::uint32_t filters;                        // 0: none; else dcraw's pattern, 2 bits a site, 8 x 2 sites
-  std::uint32_t black, channel_black[4];        // added up, see decoder_black()
+  std::uint32_t black, channel_black[4];        // to be added, see decoder_black()
   std::int32_t pattern_rows, pattern_columns;
   std::uint32_t pattern_black[4098];
   std::uint32_t maximum;
@@ -48,7 +48,7 @@ struct DecodedRaw {
   Plane<std::uint16_t> samples;  // raw_height x (raw_width * samples)
 };
 
-/// What reading one file may take. Each is checked before the memory is taken or the time is spent.
+/// Limits for reading one file. Each is checked before the memory is allocated or the time is spent.
 struct ReadLimits {
   std::uint64_t max_file_bytes = std::uint64_t{2} << 30;
   std::int64_t max_pixels = 400'000'000;  // of the readout, borders included

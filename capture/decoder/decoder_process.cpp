@@ -45,7 +45,7 @@ class FileDescriptor {
   int fd_;
 };
 
-/// An empty file in memory, of a number that the child has no other use for; -1 if there can be none.
+/// Returns an empty file in memory, whose number the child does not use otherwise; -1 on failure.
 int memory_file(const char* name) {
   const FileDescriptor low(memfd_create(name, MFD_CLOEXEC));
   return low.get() < 0 ? -1 : fcntl(low.get(), F_DUPFD_CLOEXEC, std::max(result_descriptor, file_descriptor) + 1);
@@ -55,8 +55,8 @@ Error system_error(const std::string& what, int number) {
   return {ErrorCode::unreadable, what + ": " + std::system_category().message(number), {}};
 }
 
-/// Starts a program with all signals as at the start of a program, and nothing but its two files. It has a process
-/// group of its own: what a terminal sends to its programs reaches the caller alone.
+/// Starts a program with default signal handling, and with no open files except its two. It has a process group of its
+/// own: signals of a terminal reach the caller alone.
 Result<pid_t> start(const std::vector<std::string>& command, int file, int result) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -86,9 +86,9 @@ Result<pid_t> start(const std::vector<std::string>& command, int file, int resul
   return child;
 }
 
-/// How a child ended.
+/// Exit of a child process.
 struct Ended {
-  std::optional<int> status;  // nullopt if another part of the program has collected it already
+  std::optional<int> status;  // nullopt if other code of this process has collected it already
   rusage used{};
   double elapsed_s = 0;
 };
@@ -113,7 +113,7 @@ double cpu_s(const rusage& used) {
   return seconds(used.ru_utime) + seconds(used.ru_stime);
 }
 
-/// The Error of a child that a signal ended.
+/// Returns the Error of a child that a signal ended.
 Error ended_by(int number, const Ended& ended, const ReadLimits& limits) {
   if (number == SIGXCPU || (number == SIGKILL && cpu_s(ended.used) >= limits.max_decode_cpu_s)) {
     return {ErrorCode::malformed,
@@ -141,7 +141,7 @@ Error ended_by(int number, const Ended& ended, const ReadLimits& limits) {
 
 constexpr int cannot_load_exit = 127;  // of the dynamic linker
 
-/// The Error of a child that did not end as it should; nullopt if it did.
+/// Returns the Error of a child that did not exit normally; nullopt if it did.
 std::optional<Error> abnormal_end(const Ended& ended, const ReadLimits& limits) {
   if (!ended.status || (WIFEXITED(*ended.status) && WEXITSTATUS(*ended.status) == 0)) return std::nullopt;
   if (WIFSIGNALED(*ended.status)) return ended_by(WTERMSIG(*ended.status), ended, limits);
@@ -175,7 +175,7 @@ std::string size_text(const DecodedHeader& h) {
   return std::to_string(h.raw_width) + " x " + std::to_string(h.raw_height);
 }
 
-/// The Error of what the decoder reports; nullopt if it decoded something that fits in the limits.
+/// Returns the Error that the decoder reports; nullopt if it decoded data within the limits.
 std::optional<Error> reported_failure(const DecodedHeader& h, const ReadLimits& limits) {
   const std::string reason = h.reason;
   switch (h.outcome) {
@@ -229,7 +229,7 @@ Result<DecodedRaw> collect(int result, const ReadLimits& limits) {
   return raw;
 }
 
-/// Folder of the library or program that holds this code.
+/// Returns the folder of the library or program that contains this code.
 Result<std::filesystem::path> own_folder() {
   Dl_info info{};
   void* found = nullptr;
@@ -241,7 +241,7 @@ Result<std::filesystem::path> own_folder() {
                 std::string("the library ") + name +
                     " was loaded by a relative path, so its folder is not known: load it by a whole one");
   }
-  // The link of the program holds its folder also when its file has been replaced since.
+  // The link to the program names its folder even if its file has been replaced since.
   const auto file = *name != '\0' ? std::filesystem::canonical(name, failed)
                                   : std::filesystem::read_symlink("/proc/self/exe", failed);
   if (failed) return fail(ErrorCode::unreadable, "the folder of lowlux's library is not known: is /proc mounted?");

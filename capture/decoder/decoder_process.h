@@ -10,18 +10,18 @@
 
 namespace lowlux::capture {
 
-/// Runs a decoder program on a file, so that its crash, endless loop or use of too much memory becomes an Error here.
-/// It can take the time and memory that follow from the limits, and no more. What it reports is checked: sizes are
-/// within the limits, texts end, and all samples are there.
+/// Runs a decoder program on a file, so that its crash, endless loop or excessive use of memory becomes an Error here.
+/// Its time and memory are bounded by the limits. Its results are checked: sizes are within the limits, texts are
+/// terminated, and all samples are present.
 ///
 /// The program is started by posix_spawn: it shares no memory with this process, nor any lock that a thread of it
 /// holds. May be called from any thread.
-/// @param command  the program and its first arguments; those of decoder_program.h follow
+/// @param command  the program and its first arguments; those of decoder_program.h are appended
 Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits,
                                     std::vector<std::string> command);
 
-/// The same by lowlux-decode, which runs LibRaw. It lies in the folder of this library or, once installed, in lowlux/
-/// below it.
+/// Runs lowlux-decode, which uses LibRaw, on a file. The program is in the folder of this library or, once installed,
+/// in lowlux/ below it.
 Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits);
 
 }  // namespace lowlux::capture

@@ -21,11 +21,11 @@
 namespace lowlux::capture {
 namespace {
 
-// Samples as decoders hold them (LibRaw: up to four 16-bit values a pixel), their tables, and the heap's own needs.
+// Samples as decoders hold them (LibRaw: up to four 16-bit values a pixel), with their tables and the heap's overhead.
 constexpr std::uint64_t decoder_bytes_per_pixel = 8;
 constexpr std::uint64_t decoder_base_bytes = std::uint64_t{256} << 20;
 
-/// Address space this process uses now [bytes]; 0 if the system does not say.
+/// Returns the address space this process uses now [bytes]; 0 if the system does not report it.
 std::uint64_t address_space_in_use() {
   const int statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
   char text[64] = {};
@@ -44,14 +44,14 @@ void lower_limit(int resource, rlim_t soft, rlim_t hard) {
   setrlimit(static_cast<__rlimit_resource>(resource), &wanted);
 }
 
-/// Ends the program together with its caller, and by nothing that is meant for the caller.
+/// Ends the program together with its caller, but not by signals that are meant for the caller.
 void follow(pid_t caller) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != caller) _exit(EXIT_FAILURE);  // it ended before
+  if (getppid() != caller) _exit(EXIT_FAILURE);  // the caller ended before
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) signal(number, SIG_IGN);
 }
 
-/// Limits what the program can do by accident: descriptors of its caller, output, time, memory.
+/// Limits accidental effects of the program: descriptors of its caller, output, time, memory.
 void confine(const ReadLimits& limits, std::uint64_t file_bytes) {
   prctl(PR_SET_DUMPABLE, 0);
   close_range(std::max(result_descriptor, file_descriptor) + 1, ~0U, 0);
@@ -93,7 +93,7 @@ std::optional<Request> request_of(std::span<char* const> arguments) {
   return Request{*caller, {.max_pixels = *pixels, .max_decode_cpu_s = *cpu_s}};
 }
 
-/// The file; nullopt where there is none.
+/// Returns the mapped file; nullopt if there is none.
 std::optional<std::span<const std::byte>> mapped_file() {
   struct stat status {};
   if (fstat(file_descriptor, &status) != 0 || status.st_size <= 0) return std::nullopt;

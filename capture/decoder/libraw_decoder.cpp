@@ -58,8 +58,9 @@ void fill_shot(const libraw_data_t& data, DecodedHeader& h) {
   copy_text(h.software, data.idata.software);
 }
 
-/// Sets how files are unpacked: by LibRaw itself and without its options, of which only conversion of floating-point
-/// samples to integers would matter here. LibRaw 0.21 has these fields in rawparams, older versions in params.
+/// Sets how files are unpacked: by LibRaw itself and without its options, of which only the conversion of
+/// floating-point samples to integers would have an effect here. LibRaw 0.21 has these fields in rawparams, older
+/// versions in params.
 template <typename Data>
 void set_unpacking(Data& data, const ReadLimits& limits) {
   const auto set = [&limits](auto& parameters, unsigned& options) {
@@ -75,7 +76,7 @@ void set_unpacking(Data& data, const ReadLimits& limits) {
   }
 }
 
-/// What lowlux does not develop, in words; nullptr if there is nothing of the kind. Needs open, not unpack.
+/// Returns a description of a property that lowlux does not develop; nullptr if there is none. Needs open, not unpack.
 const char* unsupported_kind(LibRaw& libraw) {
   const libraw_iparams_t& id = libraw.imgdata.idata;
   if (id.is_foveon != 0) return "Foveon (three-layer) sensors are not supported";
@@ -91,7 +92,7 @@ const char* unsupported_kind(LibRaw& libraw) {
   return nullptr;
 }
 
-/// The outcome of a LibRaw error code.
+/// Sets the outcome of a LibRaw error code.
 void fill_failure(int error, const char* step, DecodedHeader& h) {
   const char* text = libraw_strerror(error);
   switch (error) {
@@ -113,7 +114,7 @@ void fill_failure(int error, const char* step, DecodedHeader& h) {
   std::snprintf(h.reason, sizeof h.reason, "%s cannot %s this file: %s", decoder_name().c_str(), step, text);
 }
 
-/// Rows of a three-sample image, which LibRaw keeps four samples wide.
+/// Writes the rows of a three-sample image, which LibRaw stores with four samples for each pixel.
 bool write_rgb(const libraw_data_t& data, DecodeSink& sink) {
   const std::size_t width = data.sizes.raw_width;
   const auto row = std::make_unique<std::uint16_t[]>(width * 3);

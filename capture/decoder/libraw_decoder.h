@@ -8,11 +8,11 @@
 
 namespace lowlux::capture {
 
-/// Decodes the mosaic of a raw file with LibRaw: unpacking only, none of its processing. A DecodeFunction, in the
+/// Decodes the mosaic of a raw file with LibRaw: unpacking only, without its processing. It is a DecodeFunction for the
 /// program lowlux-decode only.
 void decode_with_libraw(std::span<const std::byte> file, const ReadLimits& limits, DecodeSink& sink);
 
-/// "LibRaw 0.20.2": for messages.
+/// Returns the decoder's name for messages, "LibRaw 0.20.2".
 std::string decoder_name();
 
 }  // namespace lowlux::capture

@@ -15,7 +15,8 @@ namespace {
 
 using Numbers = std::optional<std::vector<double>>;
 
-/// The profile and as-shot tags belong into the first directory; some writers put them beside the raw image.
+/// Returns the directory with a tag: profile and as-shot tags belong in the first one; some writers put them in that of
+/// the raw image.
 const TiffDirectory& directory_with(const DngFile& dng, const TiffDirectory& raw_image, TagName name) {
   return dng.main.find(name) != nullptr ? dng.main : raw_image;
 }
@@ -28,7 +29,7 @@ tl::unexpected<Error> bad(TagName name, const std::string& what) {
   return fail(ErrorCode::malformed, std::string("the tag ") + name.name + " " + what, name.name);
 }
 
-/// A 3x3 matrix with an inverse; nullopt if there is no such tag.
+/// Reads a 3x3 matrix with an inverse; nullopt if there is no such tag.
 Result<std::optional<Matrix3>> read_matrix(const DngFile& dng, const TiffDirectory& raw_image, TagName name) {
   auto values = numbers_of(dng, raw_image, name, 9);
   if (!values) return pass_on(values);
@@ -43,7 +44,7 @@ Result<std::optional<Matrix3>> read_matrix(const DngFile& dng, const TiffDirecto
   return matrix;
 }
 
-/// A forward matrix: white-balanced camera RGB of a neutral has positive XYZ.
+/// Reads a forward matrix: white-balanced camera RGB of a neutral has positive XYZ.
 Result<std::optional<Matrix3>> read_forward(const DngFile& dng, const TiffDirectory& raw_image, TagName name) {
   auto matrix = read_matrix(dng, raw_image, name);
   if (!matrix || !*matrix) return matrix;
@@ -52,7 +53,7 @@ Result<std::optional<Matrix3>> read_forward(const DngFile& dng, const TiffDirect
   return bad(name, "takes a neutral to a colour that cannot be");
 }
 
-/// Three positive numbers; nullopt if there is no such tag.
+/// Reads three positive numbers; nullopt if there is no such tag.
 Result<std::optional<Vector3>> read_positive(const DngFile& dng, const TiffDirectory& raw_image, TagName name) {
   auto values = numbers_of(dng, raw_image, name, 3);
   if (!values) return pass_on(values);
@@ -66,7 +67,7 @@ Result<std::optional<Vector3>> read_positive(const DngFile& dng, const TiffDirec
   return out;
 }
 
-/// Calibration `index` (0 or 1); nullopt if the file has no usable colour matrix for it.
+/// Reads calibration `index` (0 or 1); nullopt if the file has no usable colour matrix for it.
 std::optional<ColourCalibration> read_calibration(const DngFile& dng, const TiffDirectory& raw_image, int index,
                                                   std::vector<std::string>& warnings) {
   const auto colour = or_ignored(read_matrix(dng, raw_image, tag::color_matrix[index]), warnings);
@@ -100,7 +101,7 @@ void read_white(const DngFile& dng, const TiffDirectory& raw_image, CameraColour
   colour.as_shot_white_xy = or_ignored(read_white_xy(dng, raw_image), warnings);
 }
 
-/// Whether pictures can be made of light of this white by the calibrations.
+/// Returns whether images can be made of light of this white with the calibrations.
 bool is_usable(const CameraColour& colour, const isp::Xy& white) {
   return isp::camera_to_xyz(colour, white, isp::white_d65).has_value();
 }
@@ -180,7 +181,7 @@ Result<std::optional<NoiseProfile>> read_noise(const DngFile& dng, const TiffDir
   NoiseProfile noise;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t at = pairs.size() == 2 || planes == 1 ? 0 : 2 * i;
-    // Of a value from 0 to 1: no variance is above 1.
+    // This is the variance of a value between 0 and 1: it is at most 1.
     if (!(pairs[at] >= 0 && pairs[at] <= 1 && std::fabs(pairs[at + 1]) <= 1)) {
       return bad(name, "holds a value that is not a variance");
     }

@@ -27,7 +27,7 @@ double area_of(const TiffDirectory& directory) {
   return width && height ? static_cast<double>(*width) * *height : 0.0;
 }
 
-/// Offsets of the directories right below one, and of the one that follows it.
+/// Returns the offsets of the direct subdirectories of a directory, and of the one that follows it.
 std::vector<std::uint32_t> neighbours(const TiffDirectory& directory) {
   std::vector<std::uint32_t> offsets;
   if (const auto below = directory.numbers(tag::sub_ifds, 1, max_directories); below && *below) {
@@ -39,7 +39,7 @@ std::vector<std::uint32_t> neighbours(const TiffDirectory& directory) {
   return offsets;
 }
 
-/// All directories, the first one first; damaged ones that nothing else needs are left out.
+/// Returns all directories, the first one first; damaged ones that are not needed otherwise are left out.
 std::vector<TiffDirectory> all_directories(const TiffFile& tiff, TiffDirectory first) {
   std::vector<TiffDirectory> found;
   std::set<std::uint32_t> seen{tiff.first_directory()};
@@ -97,7 +97,7 @@ constexpr std::uint32_t compression_none = 1;
 constexpr std::uint32_t compression_jpeg = 7;
 constexpr std::uint32_t compression_vc5 = 9;
 constexpr std::size_t max_parts = std::size_t{1} << 22;  // strips or tiles
-constexpr int min_size = 22;                             // LibRaw takes smaller ones for thumbnails
+constexpr int min_size = 22;                             // LibRaw treats smaller ones as thumbnails
 constexpr int max_size = 65535;                          // LibRaw keeps sizes in 16 bits
 
 Result<std::uint32_t> required(const TiffDirectory& directory, TagName name) {
@@ -173,7 +173,7 @@ Result<BayerPhase> phase_of(const TiffDirectory& directory) {
   return static_cast<BayerPhase>(at - std::begin(patterns));
 }
 
-/// Where the parts (strips or tiles) of an image lie.
+/// Locations of the parts (strips or tiles) of an image.
 struct Parts {
   std::vector<double> offset, bytes;
   bool tiled = false;
@@ -204,7 +204,7 @@ Result<Parts> parts_of(const TiffDirectory& directory) {
   return parts;
 }
 
-/// Image data must lie inside the file, and where LibRaw looks for it: without compression in one piece, row after
+/// Checks that image data lie inside the file, and where LibRaw reads it: without compression contiguously, row after
 /// row; with lossless JPEG in one strip, or in tiles.
 Result<void> check_storage(const TiffDirectory& directory, const DngImage& image, bool compressed,
                            std::size_t file_bytes) {

@@ -16,15 +16,15 @@ namespace lowlux::capture {
 struct DngFile {
   TiffDirectory main;                     // the first directory
   std::vector<TiffDirectory> raw_images;  // full-size CFA or LinearRaw images, the largest first; never empty
-  std::vector<TiffDirectory> previews;    // all other directories that are linked
+  std::vector<TiffDirectory> previews;    // all other linked directories
   std::optional<TiffDirectory> exif;
-  std::vector<std::string> warnings;  // optional directories that are damaged
+  std::vector<std::string> warnings;  // one for each optional directory that is damaged
 };
 
-/// The warning for an optional tag that is damaged, and so ignored.
+/// Returns the warning for an optional tag that is damaged, and so ignored.
 std::string ignored(const Error& error);
 
-/// The value of an optional tag; where it is damaged nullopt, and a warning.
+/// Returns the value of an optional tag; if it is damaged, adds a warning and returns nullopt.
 template <class T>
 std::optional<T> or_ignored(Result<std::optional<T>> tag, std::vector<std::string>& warnings) {
   if (tag) return *std::move(tag);
@@ -32,7 +32,7 @@ std::optional<T> or_ignored(Result<std::optional<T>> tag, std::vector<std::strin
   return std::nullopt;
 }
 
-/// How the samples of one raw image are laid out and stored.
+/// Layout and storage of the samples of one raw image.
 struct DngImage {
   int width = 0, height = 0;  // of the readout
   int samples = 1;            // per pixel
@@ -41,14 +41,14 @@ struct DngImage {
   BayerPhase phase = BayerPhase::rggb;
 };
 
-/// nullopt: not a TIFF, or a TIFF without the tag DNGVersion. Fails on a DNG without a raw image.
+/// Opens a DNG; nullopt: not a TIFF, or a TIFF without the tag DNGVersion. Fails on a DNG without a raw image.
 Result<std::optional<DngFile>> open_dng(std::span<const std::byte> bytes);
 
-/// Size and layout of a raw image; a clear refusal of what cannot be decoded or developed, and of image data that
-/// ends beyond the file. `file_bytes` is the size of the file.
+/// Returns the size and layout of a raw image; a specific error for an image that cannot be decoded or developed, and
+/// for image data that extend beyond the file. `file_bytes` is the size of the file.
 Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_bytes);
 
-/// "JPEG XL (52546)": for messages.
+/// Returns a compression's name for messages, "JPEG XL (52546)".
 std::string compression_name(std::uint32_t compression);
 
 }  // namespace lowlux::capture

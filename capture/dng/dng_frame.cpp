@@ -17,7 +17,7 @@ bool fits(const DngImage& image, const DecodedHeader& h) {
   return image.width == h.raw_width && image.height == h.raw_height && image.samples == h.samples;
 }
 
-/// The description of the raw image that has the size and samples the decoder delivered.
+/// Returns the description of the raw image that has the size and samples the decoder delivered.
 Result<DngDescription> decoded_image(const DngFile& dng, DngDescription expected, std::size_t file_bytes,
                                      const DecodedHeader& h) {
   if (fits(expected.image, h)) return expected;

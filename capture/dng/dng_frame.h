@@ -7,7 +7,7 @@
 
 namespace lowlux::capture {
 
-/// What the tags say of one raw image of a DNG: the frame without its samples and what depends on them.
+/// Contents of the tags of one raw image of a DNG: the frame without its samples and the values that depend on them.
 struct DngDescription {
   const TiffDirectory* directory;  // of the DngFile
   DngImage image;
@@ -17,9 +17,9 @@ struct DngDescription {
 /// Reads and checks the tags of a raw image, one of `dng.raw_images`.
 Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw_image, std::size_t file_bytes);
 
-/// Puts samples into the frame, and what the decoder alone knows. `described` is the raw image expected; where the
+/// Adds the samples to the frame, and what only the decoder knows. `described` is the raw image expected; if the
 /// decoder chose another one of its size, that one is described instead. Without a colour matrix in the file the
-/// decoder's table helps out, if it knows the camera.
+/// decoder's table is used, if it has the camera.
 Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std::size_t file_bytes, DecodedRaw decoded);
 
 }  // namespace lowlux::capture

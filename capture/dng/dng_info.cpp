@@ -14,7 +14,7 @@ std::optional<double> within(double value, double low, double high) {
   return std::nullopt;
 }
 
-/// The first value of an informative tag; nullopt if it is missing or damaged, which spoils no picture.
+/// Returns the first value of an informative tag; nullopt if it is missing or damaged, which is not an error.
 std::optional<double> first_number(const TiffDirectory& directory, TagName name) {
   const TiffEntry* entry = directory.find(name);
   if (entry == nullptr || entry->count == 0 || !entry->is_numeric()) return std::nullopt;

@@ -8,17 +8,17 @@
 
 namespace lowlux::capture {
 
-/// Camera, exposure, time and orientation of a DNG. What is missing, zero or absurd stays absent.
+/// Reads camera, exposure, time and orientation of a DNG. Missing, zero or implausible values stay absent.
 FrameInfo read_info(const DngFile& dng);
 
-/// The values a camera can have meant; nullopt for all others, zero and NaN included.
+/// Each returns the value if it is plausible for a camera; nullopt otherwise, zero and NaN included.
 std::optional<double> plausible_exposure_s(double seconds);
 std::optional<double> plausible_iso(double iso);
 std::optional<double> plausible_f_number(double f_number);
 std::optional<double> plausible_focal_length_mm(double mm);
 std::optional<double> plausible_temperature_c(double celsius);
 
-/// The text, if it is a date as EXIF writes it, "YYYY:MM:DD hh:mm:ss"; else empty.
+/// Returns the text if it is a date as EXIF writes it, "YYYY:MM:DD hh:mm:ss"; else empty.
 std::string plausible_date(const std::string& text);
 
 }  // namespace lowlux::capture

@@ -12,11 +12,12 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr int max_pattern = 4096;                 // values of a black level pattern: more is damage, not a camera
+constexpr int max_pattern = 4096;  // maximum number of values of a black level pattern: more indicate damage
 constexpr std::size_t max_masked_numbers = 1024;  // four for each area
 constexpr double max_level_dn = 65535;
 
-/// The rectangle of four numbers top, left, bottom, right; nullopt unless it is whole, not empty and in the readout.
+/// Returns the rectangle of four numbers top, left, bottom, right; nullopt unless all are valid and it is not empty and
+/// in the readout.
 std::optional<Rect> rect_inside(const double* edges, int width, int height) {
   const double top = edges[0], left = edges[1], bottom = edges[2], right = edges[3];
   if (!(top >= 0 && left >= 0 && bottom > top && right > left && bottom <= height && right <= width))
@@ -36,7 +37,7 @@ tl::unexpected<Error> bad_rect(TagName name, const double* edges, const DngImage
   return fail(ErrorCode::malformed, std::move(message), name.name);
 }
 
-/// The areas of the tag MaskedAreas; nullopt if there is no such tag.
+/// Reads the areas of the tag MaskedAreas; nullopt if there is no such tag.
 Result<std::optional<std::vector<Rect>>> read_masked(const TiffDirectory& directory, const DngImage& image) {
   auto masked = directory.numbers(tag::masked_areas, 4, max_masked_numbers);
   if (!masked) return pass_on(masked);
@@ -56,8 +57,8 @@ Result<std::optional<std::vector<Rect>>> read_masked(const TiffDirectory& direct
   return areas;
 }
 
-/// Default crop: stated in (rational) pixels from the corner of the active area; rounded to whole ones. nullopt if the
-/// file states none.
+/// Reads the default crop: stated in (rational) pixels from the corner of the active area; rounded to integers. nullopt
+/// if the file states none.
 Result<std::optional<Rect>> read_crop(const TiffDirectory& directory, const Rect& active,
                                       std::vector<std::string>& warnings) {
   auto origin = directory.numbers(tag::default_crop_origin, 2, 2);
@@ -92,7 +93,7 @@ Result<void> check_finite(const std::vector<double>& values, TagName name) {
   return {};
 }
 
-/// One offset for each active column or row; empty if there is no such tag.
+/// Reads one offset for each active column or row; empty if there is no such tag.
 Result<std::vector<double>> read_deltas(const TiffDirectory& directory, TagName name, int expected) {
   auto deltas = directory.numbers(name, expected, expected);
   if (!deltas) return pass_on(deltas);
@@ -119,7 +120,7 @@ Result<BlackLevel> read_black(const TiffDirectory& directory, std::vector<double
     black.columns = static_cast<int>(columns);
   }
   const auto expected = static_cast<std::size_t>(black.rows) * black.columns * samples;
-  if (stated.size() == 1) stated.resize(expected, stated.front());  // one figure for all, as some writers have it
+  if (stated.size() == 1) stated.resize(expected, stated.front());  // one value for all, as some writers have it
   if (stated.size() != expected) {
     return fail(ErrorCode::malformed,
                 "the tag BlackLevel has " + std::to_string(stated.size()) + " values, its pattern needs " +
@@ -137,7 +138,7 @@ Result<BlackLevel> read_black(const TiffDirectory& directory, std::vector<double
   return black;
 }
 
-/// White level: one for each sample, or one for all; 2^bits - 1 where the file does not say.
+/// Reads the white level: one for each sample, or one for all; 2^bits - 1 if the file does not state it.
 Result<std::array<double, 3>> read_white(const TiffDirectory& directory, const DngImage& image) {
   auto stated = directory.numbers(tag::white_level, 1, 16);
   if (!stated) return pass_on(stated);

@@ -11,21 +11,21 @@
 
 namespace lowlux::capture {
 
-/// Fills the geometry (active area, crop, masked areas) of a raw image from its tags. `raw.dn` is not needed. A damaged
+/// Reads the geometry (active area, crop, masked areas) of a raw image from its tags. `raw.dn` is not needed. A damaged
 /// ActiveArea is an error; damaged tags for the crop, masked areas and scale are ignored with a warning.
 Result<void> read_geometry(const TiffDirectory& directory, const DngImage& image, RawDn& raw,
                            std::vector<std::string>& warnings);
 
-/// DefaultScale, two numbers above zero; nullopt if there is no such tag.
+/// Reads DefaultScale, two numbers above zero; nullopt if there is no such tag.
 Result<std::optional<std::vector<double>>> read_scale(const TiffDirectory& directory);
 
-/// Fills black and white levels. Precondition: the geometry is filled. White levels not above black are refused.
+/// Reads black and white levels. Precondition: the geometry is filled. White levels not above black are an error.
 Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw);
 
-/// Everything of a readout outside its active area, as up to four rectangles that do not overlap.
+/// Returns the regions of a readout outside its active area, as up to four rectangles that do not overlap.
 std::vector<Rect> borders(int width, int height, const Rect& active);
 
-/// Refuses white levels that are not above black, with both figures. `source` says where they come from.
+/// Returns an error for white levels that are not above black, with both values. `source` states their origin.
 Result<void> check_levels(const RawDn& raw, const std::string& source);
 
 }  // namespace lowlux::capture

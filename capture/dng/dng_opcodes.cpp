@@ -22,7 +22,7 @@ constexpr std::size_t max_gains = 64;                      // in all lists
 constexpr std::size_t opcode_header_bytes = 16;
 constexpr std::uint32_t fix_vignette_radial = 3, fix_bad_pixels_constant = 4, fix_bad_pixels_list = 5, gain_map = 9;
 
-/// Big-endian numbers one after the other. Past the end it reads zeros and remembers that.
+/// Reads consecutive big-endian numbers. Beyond the end it returns zeros and sets a flag.
 class Reader {
  public:
   explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -51,7 +51,7 @@ class Reader {
   bool complete_ = true;
 };
 
-/// Name of an opcode, DNG 1.4 chapter 7 and DNG 1.6.
+/// Returns the name of an opcode, DNG 1.4 chapter 7 and DNG 1.6.
 std::string opcode_name(std::uint32_t id) {
   constexpr const char* names[] = {
       "opcode 0",         "WarpRectilinear", "WarpFisheye", "FixVignetteRadial", "FixBadPixelsConstant",
@@ -60,7 +60,7 @@ std::string opcode_name(std::uint32_t id) {
   return id < std::size(names) ? names[id] : "opcode " + std::to_string(id);
 }
 
-/// One list, while it is read. What it asks for reaches the frame only when all of the list has been read.
+/// State of one list while it is read. Its results are added to the frame only when all of the list has been read.
 struct OpcodeContext {
   int list;
   bool linearized;
@@ -86,7 +86,8 @@ struct OpcodeContext {
   std::size_t room_for_defects() const { return max_defects - frame.corrections.defects.size() - found.defects.size(); }
 };
 
-/// Gains for one colour of a mosaic, as a map that touches only the sites of that colour in one of the cell's rows.
+/// Returns the gains for one colour of a mosaic, as a map that applies only to the sites of that colour in one of the
+/// cell's rows.
 GainMap map_of_sites(const GainMap& all, int site_x, int site_y, int plane) {
   GainMap one = all;
   one.top += (all.top & 1) != site_y;
@@ -101,7 +102,7 @@ GainMap map_of_sites(const GainMap& all, int site_x, int site_y, int plane) {
   return one;
 }
 
-/// A map of demosaiced data that differs between colours, split into maps of the mosaic's four sites.
+/// Adds a map of demosaiced data that differs between colours, split into maps of the mosaic's four sites.
 void add_split(const OpcodeContext& context, const GainMap& map) {
   for (int y = 0; y < 2; ++y) {
     for (int x = 0; x < 2; ++x) {
@@ -146,7 +147,7 @@ Result<void> read_gain_map(const OpcodeContext& context, Reader in) {
   map.gain.resize(static_cast<std::size_t>(points));
   for (float& gain : map.gain) gain = in.f32();
   if (!is_usable(map)) return context.damaged(gain_map);
-  if (map.top >= map.bottom || map.left >= map.right) return {};  // it touches nothing
+  if (map.top >= map.bottom || map.left >= map.right) return {};  // it applies to no pixel
 
   const bool mosaic = context.frame.raw.layout == SensorLayout::bayer;
   const bool alike = map.first_plane == 0 && map.planes >= 3 && map.map_planes == 1;
@@ -183,7 +184,7 @@ Result<void> read_vignette(const OpcodeContext& context, Reader in) {
   return {};
 }
 
-/// Adds the part of a rectangle (ends excluded, in the pixels of the list) that lies in the active area.
+/// Adds the intersection of a rectangle (ends excluded, in the pixels of the list) with the active area.
 void add_defect(const OpcodeContext& context, std::uint32_t top, std::uint32_t left, std::uint64_t bottom,
                 std::uint64_t right) {
   const Rect& active = context.frame.raw.active;
@@ -197,7 +198,7 @@ void add_defect(const OpcodeContext& context, std::uint32_t top, std::uint32_t l
 }
 
 Result<void> read_defect_list(const OpcodeContext& context, Reader in) {
-  in.u32();  // the Bayer phase; ours is known
+  in.u32();  // the Bayer phase; the frame's is known
   const std::uint64_t points = in.u32(), rects = in.u32();
   if (!in.complete() || points * 8 + rects * 16 > in.left()) return context.damaged(fix_bad_pixels_list);
   if (points + rects > context.room_for_defects()) {
@@ -214,7 +215,7 @@ Result<void> read_defect_list(const OpcodeContext& context, Reader in) {
   return {};
 }
 
-/// Pixels of a constant value are defective: they are looked up in the readout, where it is complete.
+/// Marks pixels of a constant value as defective: they are found in the readout, once it is complete.
 Result<void> read_defect_constant(const OpcodeContext& context, Reader in) {
   const std::uint32_t constant = in.u32();
   if (!in.complete()) return context.damaged(fix_bad_pixels_constant);
@@ -226,8 +227,8 @@ Result<void> read_defect_constant(const OpcodeContext& context, Reader in) {
   return {};
 }
 
-/// One pass over the readout for all constants together. Constants of too many pixels are dropped; defects that the
-/// file lists stay.
+/// Finds all constants in one pass over the readout. Constants of too many pixels are dropped; defects that the file
+/// lists stay.
 void find_constants(const OpcodeContext& context) {
   const RawDn& raw = context.frame.raw;
   std::vector<DefectRect>& defects = context.found.defects;
@@ -278,7 +279,7 @@ Result<void> read_list(const OpcodeContext& context, std::span<const std::byte> 
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t id = in.u32();
     in.u32();  // the DNG version that introduced it
-    in.u32();  // flags: whether a reader may skip it; what is skipped becomes a warning in any case
+    in.u32();  // flags: whether a reader may skip it; a skipped opcode becomes a warning in any case
     const auto parameters = in.block(in.u32());
     if (!in.complete()) return damaged();
     if (auto read = read_opcode(context, id, parameters); !read) return read;

@@ -2,7 +2,7 @@
 
 #include "capture/dng/tiff_directory.h"
 
-/// Tags by the names of TIFF 6.0, TIFF/EP, EXIF 2.31 and DNG 1.4.
+/// This header has tags by the names of TIFF 6.0, TIFF/EP, EXIF 2.31 and DNG 1.4.
 namespace lowlux::capture::tag {
 
 inline constexpr TagName new_subfile_type{254, "NewSubfileType"};

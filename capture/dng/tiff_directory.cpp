@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t entry_bytes = 12;
 
-/// Size of one value, 0 for a type TIFF does not know.
+/// Returns the size of one value, 0 for a type TIFF does not know.
 std::size_t value_bytes(TiffEntry::Type type) {
   constexpr std::size_t bytes[] = {0, 1, 1, 2, 4, 8, 1, 1, 2, 4, 8, 4, 8, 4};
   const auto index = static_cast<std::size_t>(type);
@@ -26,7 +26,7 @@ double quotient(double numerator, double denominator) {
 
 std::string plural(std::size_t count) { return std::to_string(count) + (count == 1 ? " value" : " values"); }
 
-/// An entry whose values lie outside of the file is kept as such: whether that matters depends on who asks for it.
+/// Reads an entry. One whose values lie outside the file is kept as such: whether that matters depends on its use.
 TiffEntry read_entry(std::span<const std::byte> file, const std::byte* at, bool big_endian) {
   TiffEntry entry;
   entry.id = load_u16(at, big_endian);

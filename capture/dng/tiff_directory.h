@@ -11,13 +11,13 @@
 
 namespace lowlux::capture {
 
-/// A tag by number and by the name it has in its specification (TIFF 6.0, DNG 1.4, EXIF 2.31).
+/// A tag: number, and name in its specification (TIFF 6.0, DNG 1.4, EXIF 2.31).
 struct TagName {
   std::uint16_t id;
   const char* name;
 };
 
-/// One entry of a TIFF directory. Its values stay where they are, in the bytes of the file.
+/// One entry of a TIFF directory. Its values are not copied from the bytes of the file.
 class TiffEntry {
  public:
   enum class Type : std::uint16_t {
@@ -37,19 +37,19 @@ class TiffEntry {
   };
 
   std::uint16_t id = 0;
-  std::size_t place = 0;  // of the entry in the file
+  std::size_t place = 0;  // offset of the entry in the file
   Type type = Type::byte;
   std::uint32_t count = 0;
   bool big_endian = false;
-  bool inside_file = false;  // false: `values` is empty because the entry points outside of the file
+  bool inside_file = false;  // false: `values` is empty because they lie outside the file
   std::span<const std::byte> values;
 
-  /// Whether the values are numbers that can be read.
+  /// Returns whether the values are numbers that can be read.
   bool is_numeric() const;
-  /// Value i, whatever the numeric type; a rational n/0 is infinite, and 0/0 is NaN.
+  /// Returns value i, for any numeric type; a rational n/0 is infinite, and 0/0 is NaN.
   /// Precondition: i < count, is_numeric().
   double number(std::size_t i) const;
-  /// Text up to the first NUL, without what is not printable ASCII and without blanks around it.
+  /// Returns the text up to the first NUL, without unprintable characters and without blanks at both ends.
   std::string text() const;
 };
 
@@ -59,30 +59,30 @@ class TiffDirectory {
   std::vector<TiffEntry> entries;
   std::uint32_t next = 0;  // offset of the next directory; 0: none
 
-  /// nullptr if there is no such tag.
+  /// Returns the entry of a tag; nullptr if there is none.
   const TiffEntry* find(TagName tag) const;
 
-  /// The values of a tag; nullopt if there is no such tag. Fails if they lie outside of the file, or are not
-  /// numbers, or if their count is not within the limits, which are checked before memory is taken.
+  /// Returns the values of a tag; nullopt if there is no such tag. Fails if they lie outside the file, or are not
+  /// numbers, or if their count is not within the limits, which are checked before memory is allocated.
   Result<std::optional<std::vector<double>>> numbers(TagName tag, std::size_t min_count, std::size_t max_count) const;
-  /// The first value of a tag that must be a whole number from 0 to 2^32 - 1; nullopt if there is no such tag.
+  /// Returns the first value of a tag that must be an integer from 0 to 2^32 - 1; nullopt if there is no such tag.
   Result<std::optional<std::uint32_t>> whole(TagName tag) const;
-  /// The same, and `otherwise` without the tag.
+  /// Returns the value of whole(), or `otherwise` without the tag.
   Result<std::uint32_t> whole_or(TagName tag, std::uint32_t otherwise) const;
-  /// Empty if there is no such tag.
+  /// Returns the text of a tag; empty if there is no such tag.
   std::string text(TagName tag) const;
-  /// Bytes of a tag of any type; empty if there is no such tag. Fails if they lie outside of the file.
+  /// Returns the bytes of a tag of any type; empty if there is no such tag. Fails if they lie outside the file.
   Result<std::span<const std::byte>> bytes(TagName tag) const;
 };
 
-/// The directories of a TIFF file held in memory. Nothing is copied: `bytes` must outlive it and all it returns.
+/// A TIFF file held in memory, with its directories. Nothing is copied: `bytes` must outlive it and all it returns.
 class TiffFile {
  public:
-  /// nullopt if the bytes do not begin as a classic (32-bit) TIFF.
+  /// Opens a TIFF; nullopt if the bytes do not begin as a classic (32-bit) TIFF.
   static std::optional<TiffFile> open(std::span<const std::byte> bytes);
 
   std::uint32_t first_directory() const { return first_directory_; }
-  /// The directory at an offset; fails if it does not lie inside the file.
+  /// Returns the directory at an offset; fails if it does not lie inside the file.
   Result<TiffDirectory> directory(std::uint32_t offset) const;
 
  private:
@@ -94,7 +94,7 @@ class TiffFile {
   std::uint32_t first_directory_;
 };
 
-/// Unsigned and floating-point numbers in a stated byte order. Precondition: enough bytes.
+/// Each loads an unsigned or floating-point number in a stated byte order. Precondition: enough bytes.
 std::uint16_t load_u16(const std::byte* at, bool big_endian);
 std::uint32_t load_u32(const std::byte* at, bool big_endian);
 float load_f32(const std::byte* at, bool big_endian);

@@ -15,12 +15,12 @@
 namespace lowlux::capture {
 namespace {
 
-/// Colour number 0..3 (3: the second green) of a site of the visible area in dcraw's packed pattern.
+/// Returns the colour number 0..3 (3: the second green) of a site of the visible area in dcraw's packed pattern.
 int channel_of(std::uint32_t filters, int x, int y) {
   return static_cast<int>(filters >> ((((y << 1) & 14) | (x & 1)) << 1) & 3);
 }
 
-/// The phase of a packed pattern: it must be Bayer over all of its eight rows.
+/// Returns the phase of a packed pattern: it must be Bayer over all of its eight rows.
 std::optional<BayerPhase> phase_of(std::uint32_t filters) {
   for (int p = 0; p < 4; ++p) {
     const auto phase = static_cast<BayerPhase>(p);
@@ -56,14 +56,14 @@ Result<void> fill_geometry(const DecodedHeader& h, RawDn& raw) {
   return {};
 }
 
-/// Black level as dcraw and LibRaw add it up: one for all, one for each colour number, and a pattern.
+/// Returns the black level as dcraw and LibRaw sum it: one for all, one for each colour number, and a pattern.
 BlackLevel decoder_black(const DecodedHeader& h) {
   const bool has_pattern =
       h.pattern_rows > 0 && h.pattern_columns > 0 &&
       std::int64_t{h.pattern_rows} * h.pattern_columns <= std::int64_t{std::ssize(h.pattern_black)};
   const int rows = has_pattern ? h.pattern_rows : 1, columns = has_pattern ? h.pattern_columns : 1;
   BlackLevel black;
-  black.rows = h.filters == 0 ? rows : rows * (rows % 2 == 0 ? 1 : 2);  // whole Bayer cells
+  black.rows = h.filters == 0 ? rows : rows * (rows % 2 == 0 ? 1 : 2);  // multiple of a Bayer cell
   black.columns = h.filters == 0 ? columns : columns * (columns % 2 == 0 ? 1 : 2);
   black.samples = h.samples;
   for (int y = 0; y < black.rows; ++y) {
@@ -78,8 +78,9 @@ BlackLevel decoder_black(const DecodedHeader& h) {
   return black;
 }
 
-/// A black of 0 in a file with masked pixels means that the decoder expects it to be measured there. Without them it is
-/// kept, because many older cameras clip at 0, and told, because the decoder also says 0 where it does not know.
+/// Sets the levels. A black of 0 in a file with masked pixels means that the decoder expects it to be measured there.
+/// Without them it is kept, because many older cameras clip at 0, with a warning, because the decoder also reports 0 if
+/// it does not know.
 Result<void> fill_levels(const DecodedHeader& h, RawDn& raw, std::vector<std::string>& warnings) {
   raw.white_dn.fill(h.maximum);
   if (h.maximum < 1 || h.maximum > 65535) {
@@ -94,7 +95,7 @@ Result<void> fill_levels(const DecodedHeader& h, RawDn& raw, std::vector<std::st
   return check_levels(raw, "as the decoder reports them");
 }
 
-/// EXIF orientation of dcraw's flip: bit 0 mirrors x, bit 1 mirrors y, bit 2 transposes.
+/// Returns the EXIF orientation of dcraw's flip: bit 0 mirrors x, bit 1 mirrors y, bit 2 transposes.
 Orientation orientation_of(int flip) {
   constexpr int orientation[] = {1, 2, 4, 3, 5, 8, 6, 7};
   return static_cast<Orientation>(orientation[flip >= 0 && flip <= 7 ? flip : 0]);
@@ -114,7 +115,7 @@ FrameInfo info_of(const DecodedHeader& h) {
   std::tm time{};
   const std::time_t seconds = h.timestamp;
   char text[32];
-  // The camera's clock has no zone: the decoder read it as local time, so local time gives it back.
+  // The camera's clock has no time zone: the decoder read it as local time, so conversion to local time restores it.
   if (seconds > 0 && localtime_r(&seconds, &time) != nullptr &&
       std::strftime(text, sizeof text, "%Y:%m:%d %H:%M:%S", &time) > 0) {
     info.date_time = plausible_date(text);

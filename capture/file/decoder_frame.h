@@ -8,13 +8,13 @@
 
 namespace lowlux::capture {
 
-/// The frame of a raw that is not a DNG: everything from the decoder, whose figures are checked, not trusted.
+/// Returns the frame of a raw that is not a DNG: all values come from the decoder and are checked, not trusted.
 Result<RawFrame> frame_of_decoder(DecodedRaw decoded);
 
-/// XYZ to camera RGB from the decoder's table of cameras; nullopt if it does not know this one.
+/// Returns XYZ to camera RGB from the decoder's table of cameras; nullopt if the camera is not in it.
 std::optional<ColourCalibration> table_calibration(const DecodedHeader& header);
 
-/// Temperature of the sensor, else of the camera [deg C]; nullopt if neither is told.
+/// Returns the temperature of the sensor, else of the camera [deg C]; nullopt if neither is known.
 std::optional<double> decoder_temperature_c(const DecodedHeader& header);
 
 }  // namespace lowlux::capture

@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::size_t text_sample_bytes = std::size_t{1} << 20;
 
-/// Bytes of the character of UTF-8 at the front of `text`; 0 if there is none that can be printed.
+/// Returns the number of bytes of the UTF-8 character at the front of `text`; 0 if there is no printable one.
 std::size_t printable_bytes(std::string_view text) {
   const auto first = static_cast<unsigned char>(text[0]);
   if (first < 0x80) return (first >= ' ' && first != 127) || first == '\n' || first == '\r' || first == '\t' ? 1 : 0;
@@ -35,8 +35,8 @@ std::size_t printable_bytes(std::string_view text) {
   return std::all_of(text.begin() + 1, text.begin() + static_cast<std::ptrdiff_t>(size), follows) ? size : 0;
 }
 
-/// Whether the file is text: all of its first megabyte is printable UTF-8. Less is not enough to tell: the samples of a
-/// raw without a header can be printable for some rows.
+/// Returns whether the file is text: all of its first megabyte is printable UTF-8. Less is not sufficient: the samples
+/// of a raw without a header can be printable for some rows.
 bool is_text(std::string_view file) {
   constexpr std::size_t longest_character = 4;
   const std::size_t end = std::min(file.size(), text_sample_bytes);
@@ -53,8 +53,8 @@ struct Kind {
   const char* what;
 };
 
-/// What a file that can be no raw is, judged by its first bytes; empty if that is unknown. It is asked before the
-/// decoder, which takes anything of certain sizes for a headerless dump.
+/// Returns the kind of a file that cannot be a raw, by its first bytes; empty if that is unknown. It is called before
+/// the decoder, which accepts anything of certain sizes as a headerless dump.
 std::string other_kind(std::span<const std::byte> bytes) {
   using std::string_view_literals::operator""sv;
   const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -72,8 +72,8 @@ bool is_jpeg(std::span<const std::byte> bytes) {
   return bytes.size() > 2 && bytes[0] == std::byte{0xFF} && bytes[1] == std::byte{0xD8} && bytes[2] == std::byte{0xFF};
 }
 
-/// The error of a file that is not a DNG and that the decoder did not take. JPEG files can hold a raw behind the
-/// picture, and most raws begin as TIFF: they are known for pictures only now.
+/// Returns the error of a file that is not a DNG and that the decoder rejected. JPEG files can hold a raw after the
+/// image, and most raws begin as TIFF: only now is it known that they are ordinary images.
 Error not_decoded(std::span<const std::byte> bytes, Error error) {
   if (is_jpeg(bytes)) return {ErrorCode::unsupported, "this is a JPEG picture, not a raw file", {}};
   if (error.code == ErrorCode::unsupported && TiffFile::open(bytes)) {
@@ -82,7 +82,7 @@ Error not_decoded(std::span<const std::byte> bytes, Error error) {
   return error;
 }
 
-/// Tags that make the decoder give up on the file where they are damaged, though the samples can do without them.
+/// Returns the damaged tags that make the decoder reject the file, although the samples do not need them.
 std::vector<const TiffEntry*> harmful_tags(const DngFile& dng) {
   std::vector<const TiffEntry*> found;
   for (const auto* directories : {&dng.raw_images, &dng.previews}) {

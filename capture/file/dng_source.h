@@ -11,11 +11,11 @@
 
 namespace lowlux::capture {
 
-/// Reads a raw file: a DNG, or any other raw that LibRaw decodes. What the file does not tell stays absent.
-/// LibRaw runs in a process of its own, so a file that crashes it or keeps it busy is an Error here.
+/// Reads a raw file: a DNG, or any other raw that LibRaw decodes. Values that the file does not state stay absent.
+/// LibRaw runs in a process of its own, so a file that crashes it or makes it run too long is an Error here.
 Result<RawFrame> read_raw(const std::filesystem::path& file, const ReadLimits& limits = {});
 
-/// The same from the bytes of a file; `name` is what errors call it.
+/// Reads a raw file from its bytes; errors refer to it as `name`.
 Result<RawFrame> read_raw(std::span<const std::byte> bytes, const std::string& name, const ReadLimits& limits = {});
 
 }  // namespace lowlux::capture

@@ -9,11 +9,11 @@
 
 namespace lowlux::capture {
 
-/// All bytes of a regular file. Errors name the file: it is missing, cannot be read, is no regular file, or has more
-/// than `max_bytes`.
+/// Reads all bytes of a regular file. Errors name the file: it is missing, cannot be read, is not a regular file, or
+/// has more than `max_bytes`.
 Result<std::vector<std::byte>> read_file_bytes(const std::filesystem::path& file, std::uint64_t max_bytes);
 
-/// The error of bytes over a limit.
+/// Returns the error of a number of bytes over a limit.
 tl::unexpected<Error> too_many_bytes(std::uint64_t bytes, std::uint64_t max_bytes);
 
 }  // namespace lowlux::capture

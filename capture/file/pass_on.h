@@ -6,7 +6,7 @@
 
 namespace lowlux::capture {
 
-/// Hands the failure of one result on as that of another: `if (!size) return pass_on(size);`
+/// Converts the failure of one result to that of another: `if (!size) return pass_on(size);`
 template <class T>
 tl::unexpected<Error> pass_on(Result<T>& failed) {
   return tl::make_unexpected(std::move(failed.error()));

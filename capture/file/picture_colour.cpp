@@ -37,7 +37,7 @@ tl::unexpected<Error> damaged(const std::string& what) {
   return fail(ErrorCode::malformed, "the ICC profile of the picture " + what + ": remove it, or convert to sRGB");
 }
 
-/// Curves are held within 0..1, the range ICC gives them.
+/// Returns a curve, clamped to 0..1, the range ICC defines.
 Result<std::vector<float>> curve_of(cmsHPROFILE profile, cmsTagSignature tag, int codes) {
   const auto* curve = static_cast<const cmsToneCurve*>(cmsReadTag(profile, tag));
   if (curve == nullptr) return damaged("has a curve that cannot be read");
@@ -50,7 +50,7 @@ Result<std::vector<float>> curve_of(cmsHPROFILE profile, cmsTagSignature tag, in
   return table;
 }
 
-/// Colorants (XYZ under D50) to XYZ under D65.
+/// Returns the matrix from colorants (XYZ under D50) to XYZ under D65.
 Result<Matrix3> matrix_of(cmsHPROFILE profile) {
   constexpr cmsTagSignature tags[] = {cmsSigRedColorantTag, cmsSigGreenColorantTag, cmsSigBlueColorantTag};
   Matrix3 colorants{};
@@ -71,7 +71,7 @@ Result<DisplayColour> grey_colour(cmsHPROFILE profile, int codes) {
   if (!curve) return tl::make_unexpected(curve.error());
   DisplayColour colour;
   colour.curve.fill(*curve);
-  colour.to_xyz = *isp::rgb_to_xyz(isp::primaries_rec709);  // for R = G = B any primaries of a D65 white will do
+  colour.to_xyz = *isp::rgb_to_xyz(isp::primaries_rec709);  // for R = G = B any primaries with a D65 white are valid
   colour.grey = true;
   return colour;
 }

@@ -13,15 +13,16 @@
 namespace lowlux::capture {
 namespace {
 
-// Of the light (the sum of absolute values). Enlarging by a filter with negative lobes leaves less: 3.5 % of bars of
-// black and white four pixels wide by Lanczos-3, the sharpest in use. A difference of two pictures has half.
+// Maximum fraction of the light (the sum of absolute values). Enlarging with a filter with negative lobes stays below
+// it: 3.5 % for black and white bars four pixels wide with Lanczos-3, the sharpest in use. A difference of two images
+// has half.
 constexpr double max_negative_fraction = 0.05;
 constexpr std::array<const char*, 3> channel_names{"red", "green", "blue"};
 
-/// Where pixel (x, y) of a stored picture goes in the upright one: base + x * step_x + y * step_y, samples of a plane
+/// Position of pixel (x, y) of a stored image in the upright one: base + x * step_x + y * step_y, samples of a plane
 /// without gaps. EXIF 2.32 table 6.
 struct Placement {
-  int width = 0;  // upright
+  int width = 0;  // width of the upright image
   int height = 0;
   std::ptrdiff_t base = 0;
   std::ptrdiff_t step_x = 1;
@@ -31,7 +32,7 @@ struct Placement {
 Placement placement_of(int width, int height, Orientation orientation) {
   const int o = static_cast<int>(orientation);
   const bool transposed = o >= 5;
-  const bool flip_x = o == 2 || o == 3 || o == 7 || o == 8;  // of the stored picture
+  const bool flip_x = o == 2 || o == 3 || o == 7 || o == 8;  // of the stored image
   const bool flip_y = o == 3 || o == 4 || o == 6 || o == 7;
   Placement p;
   p.width = transposed ? height : width;
@@ -80,7 +81,7 @@ Result<SceneLinear> light_of_codes(const Encoded<Code>& picture, const DisplayCo
   return xyz;
 }
 
-/// A sample of a float picture, by its place in the order of rows, pixels and channels.
+/// A sample of a float image, by its index in the order of rows, pixels and channels.
 struct Place {
   std::int64_t index = std::numeric_limits<std::int64_t>::max();
   bool found() const { return index != std::numeric_limits<std::int64_t>::max(); }
@@ -188,7 +189,7 @@ Result<SceneLinear> light_of(const SceneLinear& picture, const Matrix3& to_xyz, 
         for (int c = 0; c < 3; ++c) rgb[c] = std::max(0.0F, picture.plane[c].row(y)[x]);
         const Vector3 v = to_xyz * rgb;
         for (int i = 0; i < 3; ++i) {
-          xyz.plane[i].data()[at] = static_cast<float>(std::max(0.0, v[i]));  // beyond AP0, Y can be below 0
+          xyz.plane[i].data()[at] = static_cast<float>(std::max(0.0, v[i]));  // with AP0, Y can be below 0
           const bool fits = std::fabs(v[i]) <= std::numeric_limits<float>::max();
           if (!fits && !beyond[index].found()) beyond[index].index = 3 * (std::int64_t{y} * picture.width() + x);
         }

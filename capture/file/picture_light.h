@@ -11,13 +11,14 @@
 
 namespace lowlux::capture {
 
-/// Codes of a display picture as XYZ, turned upright. `colour` has a curve value for each code.
+/// Converts the codes of a display image to upright XYZ. `colour` has a curve value for each code.
 Result<SceneLinear> light_of(const Encoded8& picture, const DisplayColour& colour, Orientation orientation,
                              Executor& executor);
 Result<SceneLinear> light_of(const Encoded16& picture, const DisplayColour& colour, Orientation orientation,
                              Executor& executor);
 
-/// Linear RGB as XYZ, turned upright. What is no radiance is refused, or set to 0 with a warning: see read_picture.
+/// Converts linear RGB to upright XYZ. Values that are not radiance are an error, or set to 0 with a warning: see
+/// read_picture.
 Result<SceneLinear> light_of(const SceneLinear& picture, const Matrix3& to_xyz, Orientation orientation,
                              Executor& executor, std::vector<std::string>& warnings);
 

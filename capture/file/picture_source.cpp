@@ -23,10 +23,10 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr std::uint64_t bytes_per_pixel = 16;  // four floats, the most a file needs for one
+constexpr std::uint64_t bytes_per_pixel = 16;  // four floats, the maximum for one pixel in a file
 constexpr std::uint64_t bytes_of_metadata = std::uint64_t{64} << 20;
-constexpr int curve_points = 1025;                // at which the curve of a profile for floats is compared with a line
-constexpr float linear_tolerance = 1.0F / 65535;  // a 16-bit step, in which profiles state curves
+constexpr int curve_points = 1025;  // at which the curve of a profile for floats is compared with a straight line
+constexpr float linear_tolerance = 1.0F / 65535;  // a 16-bit step, the precision of curves in profiles
 
 using Decoder = Result<isp::DecodedPicture> (*)(std::span<const std::byte>, const isp::DecodeLimits&);
 
@@ -36,7 +36,7 @@ bool starts_with(std::span<const std::byte> bytes, std::string_view magic) {
 
 bool is_dng(const TiffDirectory& first) { return first.find(tag::dng_version) != nullptr; }
 
-/// Cameras' own raw files in TIFF's form (NEF, ARW) show a thumbnail first, and say so.
+/// Returns whether the first image is a thumbnail, as stated in cameras' own raw files in TIFF's form (NEF, ARW).
 bool is_thumbnail(const TiffDirectory& first) {
   const auto kind = first.whole(tag::new_subfile_type);
   return kind && *kind && (**kind & 1U) != 0;  // TIFF 6.0: a reduced version of another image of the file
@@ -71,7 +71,7 @@ Result<Decoder> decoder_of(std::span<const std::byte> bytes) {
               "this is no picture that lowlux reads: convert it to PNG, JPEG, TIFF, OpenEXR or PFM");
 }
 
-/// Orientation of the EXIF block, or of the format's own field where there is no block.
+/// Returns the orientation of the EXIF block, or of the format's own field if there is no block.
 Orientation orientation_of(const isp::FileMetadata& metadata) {
   if (metadata.exif.empty()) return metadata.info.orientation;
   const auto tiff = TiffFile::open(metadata.exif);

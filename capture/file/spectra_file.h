@@ -15,11 +15,11 @@ struct SpectrumColumn {
 };
 
 /// Reads a table of spectra: lines starting with '#' are comments; then a row of names, the first column being the
-/// wavelength [nm]; then rows of numbers parted by commas. At most 16 MB, 4096 columns and 100000 rows.
+/// wavelength [nm]; then rows of numbers separated by commas. At most 16 MB, 4096 columns and 100000 rows.
 /// Errors name the line: a cell that is not a finite number, a row of another length, wavelengths that do not rise.
 Result<std::vector<SpectrumColumn>> read_spectra(const std::string& path);
 
-/// The same from text; `name` is what errors call it.
+/// Parses a table of spectra; errors refer to it as `name`.
 Result<std::vector<SpectrumColumn>> parse_spectra(const std::string& text, const std::string& name);
 
 }  // namespace lowlux::capture

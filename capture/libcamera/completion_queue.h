@@ -12,11 +12,11 @@
 
 namespace lowlux::capture {
 
-/// How a buffer came back from a camera.
+/// State of a buffer returned by a camera.
 enum class CompletionState : std::uint8_t {
   filled,
-  startup,   // filled while the camera settles: not for use
-  damaged,   // filled with something else than what the sensor saw
+  startup,   // filled while the camera settles: not to be used
+  damaged,   // filled with data other than the sensor's
   cancelled  // not filled: the stream ends
 };
 
@@ -29,23 +29,25 @@ struct Completion {
   FrameFacts facts;
 };
 
-/// Buffers on their way from a camera's own thread to the one that wants frames. All functions may be called from both.
+/// Queue of buffers from a camera's own thread to the consumer of frames. All functions may be called from both
+/// threads.
 class CompletionQueue {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  /// Room for one completion of each buffer; nothing is allocated later.
+  /// Reserves one completion for each buffer; nothing is allocated later.
   explicit CompletionQueue(int buffers);
 
-  /// From the camera's thread. What is beyond the room is dropped: no buffer comes back twice.
+  /// Adds a completion, on the camera's thread. It is dropped if the queue is full: no buffer comes back twice.
   void push(const Completion& completion) noexcept;
-  /// From the camera's thread: it was unplugged, for good.
+  /// Records, on the camera's thread, that the camera was unplugged, permanently.
   void set_gone() noexcept;
   bool is_gone() const;
 
-  /// The oldest completion; waits until the deadline for one. nullopt: none came, or the camera is gone and left none.
+  /// Returns the oldest completion; waits for one until the deadline. nullopt: none came, or the camera is gone and
+  /// left none.
   std::optional<Completion> take(Time deadline);
-  /// Whether the camera is gone; waits until the deadline for it.
+  /// Returns whether the camera is gone; waits for it until the deadline.
   bool wait_gone(Time deadline);
   void clear();
 

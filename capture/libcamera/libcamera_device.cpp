@@ -20,7 +20,7 @@
 namespace lowlux::capture {
 namespace {
 
-/// libcamera ends the process when a second manager is made, so all cameras share one.
+/// The shared manager: libcamera ends the process when a second one is made, so all cameras use one.
 struct SharedManager {
   std::mutex mutex;
   std::unique_ptr<libcamera::CameraManager> manager;
@@ -40,7 +40,7 @@ void leave_manager(libcamera::CameraManager* /*manager*/) {
   shared.manager.reset();
 }
 
-/// libcamera writes its log to standard error, which is not ours, unless its own variables ask for it.
+/// Silences libcamera's log on standard error, unless its own environment variables request it.
 void silence_log() {
   // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing here sets variables
   if (std::getenv("LIBCAMERA_LOG_LEVELS") == nullptr && std::getenv("LIBCAMERA_LOG_FILE") == nullptr) {
@@ -58,7 +58,7 @@ OfferedStream offered_stream(const libcamera::PixelFormat& format) {
   return {.drm_fourcc = format.fourcc(), .drm_modifier = format.modifier(), .sizes = {}};
 }
 
-/// What is called of libcamera's may find no memory; its own errors are integers.
+/// Converts exceptions of libcamera's calls, for lack of memory, to an errno; its own errors are integers.
 template <class Work>
 int without_exceptions(const Work& work) noexcept {
   try {
@@ -234,7 +234,7 @@ int LibcameraDevice::queue(int buffer) {
   return without_exceptions([&] {
     libcamera::Request& request = *requests_[static_cast<std::size_t>(buffer)];
     request.reuse(libcamera::Request::ReuseBuffers);
-    // Most pipelines ignore the controls that a stream starts with, and heed those of its first request.
+    // Most pipelines ignore the controls given at the start of a stream, and apply those of its first request.
     if (std::exchange(controls_are_due_, false)) add_controls(controls_, request.controls());
     return camera_->queueRequest(&request);
   });

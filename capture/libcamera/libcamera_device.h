@@ -23,19 +23,20 @@ class Request;
 
 namespace lowlux::capture {
 
-/// The one manager that libcamera allows in a process, started for as long as somebody holds it. Errors: unreadable.
+/// Returns the one manager that libcamera allows in a process, which runs as long as it is referenced. Errors:
+/// unreadable.
 Result<std::shared_ptr<libcamera::CameraManager>> libcamera_manager();
 
-/// For people: its model where it tells one.
+/// Returns a camera's name for display: its model if it states one.
 std::string libcamera_name(const libcamera::Camera& camera);
 
-/// What a configuration's first stream offers; none where there is no configuration.
+/// Returns the formats that a configuration's first stream offers; none without a configuration.
 std::vector<OfferedStream> offered_streams(const libcamera::CameraConfiguration* configuration);
 
-/// The configuration for a raw stream alone; null where the camera has none.
+/// Returns the configuration for a raw stream alone; null if the camera has none.
 std::unique_ptr<libcamera::CameraConfiguration> raw_configuration(libcamera::Camera& camera);
 
-/// A libcamera camera, acquired. What it holds is let go in the order that libcamera wants: requests, mappings,
+/// A libcamera camera, acquired. Its resources are released in the order that libcamera requires: requests, mappings,
 /// buffers, configuration, camera, manager.
 class LibcameraDevice final : public RequestDevice {
  public:
@@ -44,7 +45,7 @@ class LibcameraDevice final : public RequestDevice {
   LibcameraDevice(const LibcameraDevice&) = delete;
   LibcameraDevice& operator=(const LibcameraDevice&) = delete;
 
-  /// To be called once, in this order. Errors: as LibcameraModule::open.
+  /// These three functions are called once, in this order. Errors: as LibcameraModule::open.
   Result<void> acquire();
   Result<CameraFormat> configure(const CameraRequest& request, std::vector<std::string>& warnings);
   Result<int> allocate(const CameraRequest& request, std::vector<std::string>& warnings);
@@ -68,7 +69,7 @@ class LibcameraDevice final : public RequestDevice {
   bool acquired_ = false;
   CameraFormat format_;
   StartControls controls_;
-  bool controls_are_due_ = false;  // in the first request of a stream
+  bool controls_are_due_ = false;  // to be set in the first request of a stream
   std::shared_ptr<CompletionQueue> completions_;
   std::unique_ptr<libcamera::CameraConfiguration> configuration_;
   std::unique_ptr<libcamera::FrameBufferAllocator> allocator_;

@@ -8,7 +8,7 @@
 
 namespace lowlux::capture {
 
-/// What libcamera's metadata say of one frame, in its units; each control may be absent from any frame.
+/// Metadata of one frame from libcamera, in its units; each control may be absent from any frame.
 struct LibcameraValues {
   std::optional<std::int32_t> exposure_us;                  // ExposureTime
   std::optional<float> analogue_gain;                       // AnalogueGain
@@ -21,11 +21,11 @@ struct LibcameraValues {
   std::optional<float> temperature_c;                       // SensorTemperature
 };
 
-/// The same in lowlux's units, for a stream of `bits` per sample.
+/// Converts metadata to lowlux's units, for a stream of `bits` per sample.
 ///     black_level_dn = black_level * 2^bits / 65536
 /// (libcamera control_ids: black levels are numbers out of a 16-bit range; fractions are kept.)
-/// What cannot be is left out, alone: exposures, gains and colour temperatures not above 0, black levels outside of 0
-/// to 65535, negative lux, temperatures below absolute zero, a colour matrix of zeros, whatever is not finite.
+/// Each invalid value is left out: exposures, gains and colour temperatures not above 0, black levels outside 0 to
+/// 65535, negative lux, temperatures below absolute zero, a colour matrix of zeros, values that are not finite.
 FrameFacts frame_facts(const LibcameraValues& values, int bits);
 
 }  // namespace lowlux::capture

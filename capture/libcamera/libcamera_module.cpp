@@ -11,7 +11,7 @@
 namespace lowlux::capture {
 namespace {
 
-/// Without the formats, which take a configuration of each.
+/// Returns the cameras without their formats, which need a configuration of each.
 std::vector<CameraListing> names_of_cameras(const libcamera::CameraManager& manager) {
   std::vector<CameraListing> cameras;
   for (const auto& camera : manager.cameras()) {

@@ -8,8 +8,8 @@
 #include <libcamera/framebuffer.h>
 #include <libcamera/version.h>
 
-// All that differs between libcamera's versions stands here; for the rest, one text serves 0.0.3 to 0.7.
-// Orientation came in place of transform with 0.2.
+// All differences between libcamera's versions are in this file; all other code compiles with 0.0.3 to 0.7. Orientation
+// replaced transform in 0.2.
 #define LOWLUX_LIBCAMERA_HAS_ORIENTATION (LIBCAMERA_VERSION_MAJOR > 0 || LIBCAMERA_VERSION_MINOR >= 2)
 
 namespace lowlux::capture {
@@ -17,7 +17,7 @@ namespace {
 
 namespace controls = libcamera::controls;
 
-/// FrameMetadata::FrameStartup, which came with 0.6: older headers lack its name.
+/// FrameMetadata::FrameStartup, new in 0.6: older headers do not define it.
 constexpr int frame_startup = libcamera::FrameMetadata::FrameCancelled + 1;
 
 std::optional<double> number_of(const libcamera::ControlValue& value) {

@@ -16,21 +16,22 @@ class ControlList;
 
 namespace lowlux::capture {
 
-/// A frame's controls as plain values.
+/// Returns a frame's controls as plain values.
 LibcameraValues libcamera_values(const libcamera::ControlList& metadata);
 
-/// Which controls a camera has; its ranges are those of the mode it is configured for.
+/// Returns the controls of a camera; its ranges are those of the mode it is configured for.
 OfferedControls offered_controls(const libcamera::ControlInfoMap& infos);
 
-/// Adds what is to be set.
+/// Adds the controls to be set.
 void add_controls(const StartControls& wanted, libcamera::ControlList& list);
 
-/// Asks for flips, before the configuration is validated. Where only one is given the other is off; none: as it is.
+/// Requests flips, before the configuration is validated. If only one is given the other is off; if none, they are
+/// unchanged.
 void set_flips(const CameraRequest& request, libcamera::CameraConfiguration& configuration);
-/// Whether a validated configuration has the flips asked for.
+/// Returns whether a validated configuration has the requested flips.
 bool has_flips(const CameraRequest& request, const libcamera::CameraConfiguration& configuration);
 
-/// The state of a buffer by libcamera's FrameMetadata::Status.
+/// Returns the state of a buffer by libcamera's FrameMetadata::Status.
 CompletionState completion_state(int frame_status);
 
 }  // namespace lowlux::capture

@@ -35,13 +35,13 @@ Result<MappedPlane> MappedPlane::map(const PlaneLocation& plane) {
                                           std::to_string(plane.offset) + ", which is not within 2 GiB");
   }
   const std::size_t end = plane.offset + plane.length;
-  // Touching bytes behind the end of a file is fatal. Dma-bufs tell their size so, too.
+  // Access beyond the end of a file is fatal. Dma-bufs report their size in this way, too.
   const off_t size = lseek(plane.fd, 0, SEEK_END);
   if (size >= 0 && static_cast<std::size_t>(size) < end) {
     return fail(ErrorCode::malformed, "a buffer of the camera holds " + std::to_string(size) +
                                           " bytes, fewer than the " + std::to_string(end) + " it states");
   }
-  // From the buffer's start on: not every exporter maps from an offset.
+  // Map from the buffer's start: not every exporter maps from an offset.
   void* start = mmap(nullptr, end, PROT_READ, MAP_SHARED, plane.fd, 0);
   if (start == MAP_FAILED) {
     return fail(ErrorCode::unreadable, "cannot map a buffer of the camera: " + std::generic_category().message(errno));

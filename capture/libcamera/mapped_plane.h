@@ -7,17 +7,18 @@
 
 namespace lowlux::capture {
 
-/// Where a plane of a camera's buffer lies: `length` bytes from `offset` on in a dma-buf, which other planes may share.
+/// Location of a plane of a camera's buffer: `length` bytes from `offset` on in a dma-buf, which may hold other planes.
 struct PlaneLocation {
   int fd = -1;
   std::size_t offset = 0;
   std::size_t length = 0;
 };
 
-/// A plane in our address space, to be read. The descriptor stays the caller's and is open for as long as this lives.
+/// A plane mapped for reading. The descriptor is owned by the caller and must stay open for the lifetime of this
+/// object.
 class MappedPlane {
  public:
-  /// Errors: malformed (it has no bytes, or ends behind the buffer), unreadable (the kernel refuses).
+  /// Maps a plane. Errors: malformed (it has no bytes, or ends beyond the buffer), unreadable (the kernel fails).
   static Result<MappedPlane> map(const PlaneLocation& plane);
 
   MappedPlane(MappedPlane&& other) noexcept;
@@ -26,8 +27,9 @@ class MappedPlane {
 
   std::span<const std::byte> bytes() const { return {start_ + offset_, mapped_bytes_ - offset_}; }
 
-  /// To be called before and after reading what the device wrote (DMA_BUF_IOCTL_SYNC), so that caches agree. Nothing
-  /// where the memory is no dma-buf. @return false if the kernel cannot bring the caches in step: bytes may be stale
+  /// Begins reading what the device wrote (DMA_BUF_IOCTL_SYNC), so that caches agree; end_reading() ends it. Does
+  /// nothing if the memory is not a dma-buf. @return false if the kernel cannot synchronise the caches: bytes may be
+  /// stale
   bool begin_reading() const;
   bool end_reading() const;
 
@@ -35,7 +37,7 @@ class MappedPlane {
   MappedPlane() = default;
 
   int fd_ = -1;
-  const std::byte* start_ = nullptr;  // of the mapping, which starts where the buffer does
+  const std::byte* start_ = nullptr;  // of the mapping, which starts at the start of the buffer
   std::size_t mapped_bytes_ = 0;
   std::size_t offset_ = 0;
 };

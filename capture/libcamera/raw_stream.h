@@ -18,14 +18,14 @@ struct FrameSize {
   friend bool operator==(const FrameSize&, const FrameSize&) = default;
 };
 
-/// One pixel format that a libcamera stream offers, raw or not, with its sizes (none where it does not list them).
+/// One pixel format that a libcamera stream offers, raw or not, with its sizes (empty if it does not list them).
 struct OfferedStream {
   std::uint32_t drm_fourcc = 0;
   std::uint64_t drm_modifier = 0;
   std::vector<FrameSize> sizes;
 };
 
-/// What is asked of libcamera. A size of 0 x 0 leaves it to the camera.
+/// Format requested of libcamera. A size of 0 x 0 leaves it to the camera.
 struct RawStreamChoice {
   RawFormat format;
   std::uint32_t drm_fourcc = 0;
@@ -33,17 +33,17 @@ struct RawStreamChoice {
   FrameSize size;
 };
 
-/// The raw formats among those offered: "SRGGB10_CSI2P 1920x1080 3280x2464".
+/// Returns the raw formats among those offered: "SRGGB10_CSI2P 1920x1080 3280x2464".
 std::vector<std::string> raw_stream_texts(std::span<const OfferedStream> offered);
 
-/// Chooses among what a camera offers, for a request that passed check_camera_request: the format asked for, else one
-/// that lists the size asked for, else any; Bayer before monochrome, then the deepest, then the one with the largest
-/// size, then the first. The size is the one asked for, else the largest.
-/// Errors: unsupported (no raw stream at all: processed pictures are never taken for raw; or not in that format).
+/// Chooses among the formats of a camera, for a request that passed check_camera_request: the requested format, else
+/// one that lists the requested size, else any; Bayer before monochrome, then the deepest, then the one with the
+/// largest size, then the first. The size is the requested one, else the largest.
+/// Errors: unsupported (no raw stream at all: processed images are never used as raw; or not in that format).
 Result<RawStreamChoice> choose_raw_stream(std::span<const OfferedStream> offered, const CameraRequest& request,
                                           const std::string& camera);
 
-/// What libcamera made of a choice.
+/// Response of libcamera to a choice.
 struct AgreedStream {
   std::uint32_t drm_fourcc = 0;
   std::uint64_t drm_modifier = 0;
@@ -54,9 +54,9 @@ struct AgreedStream {
   std::uint32_t buffers = 0;
 };
 
-/// The format as it was agreed on. `warnings` are appended to: a format or size that nobody asked for and that came out
-/// otherwise; a Bayer phase other than the one asked for, which the sensor's flips decide.
-/// Errors: unsupported (not the format or size asked for, no raw format), malformed (strides and sizes that contradict
+/// Returns the format agreed on. `warnings` are appended to: a format or size that was not requested and differs from
+/// the choice; a Bayer phase other than the requested one, which depends on the sensor's flips.
+/// Errors: unsupported (not the requested format or size, no raw format), malformed (strides and sizes that contradict
 /// each other), too_large (buffers above 4 GiB together).
 Result<CameraFormat> agreed_format(const AgreedStream& agreed, const RawStreamChoice& choice,
                                    const CameraRequest& request, std::vector<std::string>& warnings);

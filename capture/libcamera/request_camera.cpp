@@ -13,9 +13,9 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// So that no sum of it and the clock overflows.
+/// Limited so that its sum with the clock does not overflow.
 constexpr milliseconds longest_timeout = std::chrono::hours(24);
-/// A camera that is unplugged may cancel its requests before it says why.
+/// Waiting time for the reason: a camera that is unplugged may cancel its requests first.
 constexpr milliseconds patience_after_cancel{200};
 
 }  // namespace
@@ -94,7 +94,7 @@ Result<CameraFrame> RequestCamera::next(milliseconds timeout) {
 }
 
 std::uint32_t RequestCamera::lost_before(std::uint32_t sequence) {
-  // Counters wrap around; one that repeats or jumps back says nothing of what is lost.
+  // Counters wrap around; one that repeats or jumps back does not indicate lost frames.
   const std::uint32_t step = last_sequence_ ? sequence - *last_sequence_ : 1;
   last_sequence_ = sequence;
   return step == 0 || step >= 0x80000000U ? 0 : step - 1;

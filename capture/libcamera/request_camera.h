@@ -13,22 +13,22 @@
 
 namespace lowlux::capture {
 
-/// What a camera that fills one buffer for each request does, in its API's terms: RequestCamera drives it. Integers are
-/// 0 or a negative errno. Completions and unplugging are told to a CompletionQueue, from any thread.
+/// Interface of a camera that fills one buffer for each request, in its API's terms: RequestCamera uses it. Integers
+/// are 0 or a negative errno. Completions and unplugging are reported to a CompletionQueue, from any thread.
 class RequestDevice {
  public:
   virtual ~RequestDevice() = default;
   virtual int start() = 0;
-  virtual void stop() = 0;  // when it returns, no more completions come
+  virtual void stop() = 0;  // no completions come after it returns
   virtual int queue(int buffer) = 0;
   virtual std::span<const std::byte> bytes(int buffer) const = 0;
   virtual bool begin_reading(int buffer) = 0;  // false: the bytes may be stale
   virtual void end_reading(int buffer) = 0;
 };
 
-/// An open device and all that was agreed on with it.
+/// An open device and what was agreed on with it.
 struct OpenRequestDevice {
-  std::shared_ptr<CompletionQueue> completions;  // what the device tells
+  std::shared_ptr<CompletionQueue> completions;  // reports of the device
   std::unique_ptr<RequestDevice> device;
   std::string name;
   CameraFormat format;
@@ -36,10 +36,10 @@ struct OpenRequestDevice {
   int buffers = 0;  // each holds frame_bytes(format)
 };
 
-/// What a device's negative errno means, in `doing` ("start") something with a camera.
+/// Returns the error of a device's negative errno; `doing` ("start") is the action on the camera that failed.
 Error device_error(int negative_errno, const std::string& doing, const std::string& camera);
 
-/// A camera made of requests: counts what is lost, drops frames of the start, keeps account of lent buffers.
+/// A camera with requests: counts lost frames, drops frames of the start, keeps track of lent buffers.
 class RequestCamera final : public Camera {
  public:
   explicit RequestCamera(OpenRequestDevice open);
@@ -65,9 +65,9 @@ class RequestCamera final : public Camera {
 
   OpenRequestDevice open_;
   bool streaming_ = false;
-  int failed_ = 0;                                             // the errno a buffer was refused with
+  int failed_ = 0;                                             // the errno with which a buffer was rejected
   std::optional<std::uint32_t> last_sequence_;                 // of this stream
-  std::vector<std::optional<std::chrono::nanoseconds>> lent_;  // by buffer: the timestamp of the frame lent
+  std::vector<std::optional<std::chrono::nanoseconds>> lent_;  // by buffer: the timestamp of the lent frame
 };
 
 }  // namespace lowlux::capture

@@ -10,7 +10,7 @@ namespace lowlux::capture {
 namespace {
 
 constexpr double usual_frame_us = 1e6 / 30;
-// A year: longer than any frame, and far from the ends of 64 bits.
+// One year: longer than any frame, and far below the limit of 64 bits.
 constexpr double longest_frame_us = 3.2e13;
 
 std::int64_t whole_us(double time_us) { return std::llround(std::clamp(time_us, 1.0, longest_frame_us)); }
@@ -20,7 +20,7 @@ struct Wanted {
   double value;
 };
 
-/// Whether the control is to be set; warns where it is not there or its range does not hold the value.
+/// Returns whether the control can be set; warns if it is absent or its range does not include the value.
 bool is_settable(const Wanted& wanted, const OfferedControl& control, std::vector<std::string>& warnings) {
   if (!control.offered) {
     warnings.push_back(std::string("the camera has no control of its ") + wanted.name + ": " +
@@ -46,7 +46,8 @@ void set_frame_duration(const CameraRequest& request, const OfferedControl& cont
                                   number_text(*request.frame_rate_hz) + " Hz: the camera shortens one of them");
     }
   } else if (controls.exposure_us && *controls.exposure_us > usual_frame_us && control.offered) {
-    // Rows are read after the exposure, so a frame is longer than it by some rows; the camera takes what it needs.
+    // Rows are read after the exposure, so a frame is longer than it by some rows; the camera uses the minimum it
+    // needs.
     const double longest_us = std::max(control.range ? control.range->largest : 0.0, 2.0 * *controls.exposure_us);
     controls.frame_duration_us = {*controls.exposure_us, whole_us(longest_us)};
   }

@@ -30,20 +30,21 @@ struct OfferedControls {
   OfferedControl frame_duration_us;  // FrameDurationLimits
 };
 
-/// Values for the start of a stream; absent: not set.
+/// Values to be set at the start of a stream; absent: not set.
 struct StartControls {
   bool ae_off = false;  // AeEnable = false
   std::optional<std::int32_t> exposure_us;
   std::optional<float> analogue_gain;
   std::optional<std::array<std::int64_t, 2>> frame_duration_us;  // shortest, longest
-  std::vector<std::string> warnings;                             // what cannot be honoured, one line each
+  std::vector<std::string> warnings;                             // settings that cannot be applied, one line each
 };
 
-/// What to set for a request that passed check_camera_request. A control the camera does not have is left out with a
-/// warning. One beyond the stated range is set all the same, with a warning: cameras state ranges of another mode until
-/// they run, and they take the nearest value. Automatic exposure is off as soon as exposure or gain is given.
-/// Pipelines hold frames to 1/30 s or less than a given exposure unless told (Raspberry Pi's defaultMinFrameDuration
-/// and defaultMaxFrameDuration), so an exposure above 1/30 s without a frame rate asks for frames that hold it.
+/// Returns the controls to set for a request that passed check_camera_request. A control that the camera does not have
+/// is left out with a warning. A value beyond the stated range is set nevertheless, with a warning: cameras state
+/// ranges of another mode until they run, and they use the nearest value. Automatic exposure is switched off if
+/// exposure or gain is given. Pipelines limit frames to 1/30 s, or to less than a given exposure, by default (Raspberry
+/// Pi's defaultMinFrameDuration and defaultMaxFrameDuration), so an exposure above 1/30 s without a frame rate requests
+/// frames long enough for it.
 StartControls start_controls(const CameraRequest& request, const OfferedControls& offered);
 
 }  // namespace lowlux::capture

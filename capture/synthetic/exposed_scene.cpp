@@ -12,7 +12,8 @@
 namespace lowlux::capture {
 namespace {
 
-/// A chromaticity inside the triangle of the Rec.709 primaries can always be lifted; the others are looked at closely.
+/// Returns whether a chromaticity is inside the triangle of the Rec.709 primaries: it can then always be lifted; others
+/// need a closer test.
 bool inside_rec709(float x, float y) {
   // Edges blue-red, red-green, green-blue of (0.15, 0.06), (0.64, 0.33), (0.30, 0.60).
   return 0.49f * (y - 0.06f) - 0.27f * (x - 0.15f) >= 0 && -0.34f * (y - 0.33f) - 0.27f * (x - 0.64f) >= 0 &&
@@ -41,13 +42,14 @@ std::vector<Vector3> patch_rates(const Scene& scene, const SpectralResponse& res
   return rates;
 }
 
-/// Share of a Gaussian of standard deviation `spread` that falls on the pixel `offset` away from its centre.
+/// Returns the fraction of a Gaussian of standard deviation `spread` that falls on the pixel `offset` away from its
+/// centre.
 double share_of(double offset, double spread) {
   const double unit = spread * std::numbers::sqrt2;
   return 0.5 * (std::erf((offset + 0.5) / unit) - std::erf((offset - 0.5) / unit));
 }
 
-/// Calls add(x, y, share) for the pixels a point falls on.
+/// Calls add(x, y, fraction) for the pixels a point falls on.
 template <class Add>
 void spread_point(const PointSource& point, int width, int height, const Add& add) {
   const int reach = static_cast<int>(std::ceil(6 * point.spread_px)) + 1;
@@ -60,7 +62,7 @@ void spread_point(const PointSource& point, int width, int height, const Add& ad
   }
 }
 
-/// Rates of each point light at 1 cd/m2.
+/// Returns the rates of each point light at 1 cd/m2.
 std::vector<Vector3> point_rates(const Scene& scene, const SpectralResponse& response) {
   std::vector<Vector3> rates;
   rates.reserve(scene.point_lights.size());
@@ -69,7 +71,7 @@ std::vector<Vector3> point_rates(const Scene& scene, const SpectralResponse& res
 }
 
 /// Calls put(x, y, rates) for every pixel, where rates(k) gives channel k without the points.
-/// @return how many colours had to be moved
+/// @return the number of colours that had to be moved
 template <class Put>
 std::int64_t for_each_pixel(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
                             Executor& executor, const Put& put) {

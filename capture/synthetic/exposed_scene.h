@@ -11,19 +11,19 @@
 
 namespace lowlux::capture {
 
-/// What the light of a scene does in a sensor, before any noise.
+/// Effect of a scene's light in a sensor, before any noise.
 struct ChargeRate {
   Plane<float> e_per_s;           // height x width: mean electrons per second under each pixel's own filter
-  std::int64_t moved_pixels = 0;  // of a colour no light can have: moved towards white until one could
+  std::int64_t moved_pixels = 0;  // number whose colour no light can have; moved towards white until one can
 };
 
-/// Patches and points by the integrals of their spectra, lifted colours by the table.
+/// Computes patches and points by the integrals of their spectra, lifted colours by the table.
 /// @param table of the response; may be null for a scene of patches
 ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
                        BayerPhase phase, Executor& executor);
 
-/// The same under all three filters at every pixel: the noise-free truth of a demosaiced, black-subtracted frame
-/// [e- per s].
+/// Computes the charge rate under all three filters at every pixel: the noise-free truth of a demosaiced,
+/// black-subtracted frame [e- per s].
 CameraRgb charge_rate_rgb(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
                           Executor& executor);
 

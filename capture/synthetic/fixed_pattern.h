@@ -5,7 +5,8 @@
 
 namespace lowlux::capture {
 
-/// A row of a sensor's fixed pattern. What is drawn depends on the seed and the pixel alone: all frames have it.
+/// A row of a sensor's fixed pattern. Draws depend on the seed and the pixel alone: the pattern is the same in all
+/// frames.
 struct PatternRow {
   std::uint64_t seed = 0;
   std::uint32_t x0 = 0;
@@ -16,10 +17,10 @@ struct PatternRow {
 /// @param scratch as long as `values`
 void apply_prnu(const PatternRow& row, float deviation, std::span<float> values, std::span<float> scratch);
 
-/// The same with draws of its own: DSNU on dark charge.
+/// Multiplies each value like apply_prnu(), with independent draws: DSNU on dark charge.
 void apply_dsnu(const PatternRow& row, float deviation, std::span<float> values, std::span<float> scratch);
 
-/// Adds the charge of hot pixels: a share `fraction` of all, each with an exponentially distributed charge.
+/// Adds the charge of hot pixels: a fraction `fraction` of all, each with an exponentially distributed charge.
 /// @param mean_e of a hot pixel's extra charge
 void add_hot_pixels(const PatternRow& row, double fraction, double mean_e, std::span<float> charge_e,
                     std::span<std::uint32_t> scratch);
@@ -27,7 +28,7 @@ void add_hot_pixels(const PatternRow& row, double fraction, double mean_e, std::
 /// Adds the column pattern to a row of offsets [e-].
 void add_column_pattern(const PatternRow& row, float deviation_e, std::span<float> offset_e, std::span<float> scratch);
 
-/// The offset of one row of one frame [e-].
+/// Returns the offset of one row of one frame [e-].
 float row_offset_e(std::uint64_t seed, std::uint32_t frame, std::uint32_t y, float deviation_e);
 
 }  // namespace lowlux::capture

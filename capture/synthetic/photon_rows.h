@@ -13,14 +13,14 @@
 
 namespace lowlux::capture {
 
-/// How photons become electrons: as physics has it (Poisson(mu), one draw for each pixel), or wavelength by wavelength
-/// as the thesis publishes it (see PhotonRows).
+/// Model of photon sampling: physical (Poisson(mu), one draw for each pixel), or wavelength by wavelength as published
+/// in the thesis (see PhotonRows).
 enum class PhotonSampling : std::uint8_t { physical, published };
 
-/// Photons sampled by wavelength, as the thesis publishes it (Eq. 4.4 to 4.6): X_i ~ Poisson(x_i) photons fall on a
+/// Samples photons by wavelength, as published in the thesis (Eq. 4.4 to 4.6): X_i ~ Poisson(x_i) photons fall on a
 /// pixel in bin i, and sum X_i Qe_k(i) electrons are collected. The mean is right, the variance is sum x_i Qe_k(i)^2
-/// instead of sum x_i Qe_k(i): too small, because each photon is taken to give a fraction of an electron.
-/// Kept to reproduce the thesis; about a hundred draws for each pixel instead of one.
+/// instead of sum x_i Qe_k(i): too small, because each photon contributes a fraction of an electron. Provided to
+/// reproduce the thesis; it needs about a hundred draws for each pixel instead of one.
 class PhotonRows {
  public:
   /// @param table          of the response; may be null for a scene of patches
@@ -28,14 +28,14 @@ class PhotonRows {
   PhotonRows(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table, BayerPhase phase,
              int masked_columns);
 
-  /// The largest mean of any pixel and bin [photons per s]: collect() is right up to the sampler's limit.
+  /// Returns the largest mean of any pixel and bin [photons per s]: collect() is correct up to the sampler's limit.
   double largest_mean_per_s(Executor& executor) const;
 
-  /// Charge of the pixels (x0 + i, y) of the sensor in `time_s` [e-], fractions included.
+  /// Computes the charge of the pixels (x0 + i, y) of the sensor in `time_s` [e-], fractions included.
   void collect(std::uint64_t seed, std::uint32_t frame, int x0, int y, double time_s, std::span<float> charge_e) const;
 
  private:
-  /// What one bin of wavelengths contributes: photons per second, and electrons per photon in R, G, B.
+  /// Contribution of one bin of wavelengths: photons per second, and electrons per photon in R, G, B.
   struct Bin {
     float photons_per_s;
     std::array<float, 3> efficiency;

@@ -2,7 +2,7 @@
 
 #include "capture/synthetic/readout.h"
 
-#if defined(__aarch64__)  // NEON only: the vectors of SVE have no size, so no structs can be made of them
+#if defined(__aarch64__)  // NEON only: the vectors of SVE have no fixed size and cannot be members of structs
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #endif
 #undef HWY_TARGET_INCLUDE
@@ -17,7 +17,7 @@ namespace lowlux::capture::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using namespace draws::HWY_NAMESPACE;
 
-/// Electrons of the vector of pixels at index i, read noise and offset included.
+/// Returns the electrons of the vector of pixels at index i, read noise and offset included.
 HWY_INLINE VF electrons(VU r, VF z, const ChargePointers& at, const ReadoutParameters& p, std::size_t i,
                         std::size_t left) {
   const Floats f;
@@ -35,7 +35,7 @@ HWY_INLINE VF dn_of(VF e, const ReadoutParameters& p) {
   VF v = hn::Add(constant(p.black_dn), hn::Mul(constant(p.gain_dn_per_e), e));
   if (p.quantise) v = p.quantisation == Quantisation::floor ? hn::Floor(v) : hn::Round(v);
   if (p.clip) return hn::Min(hn::IfThenElseZero(hn::Gt(v, constant(0)), v), constant(p.max_dn));
-  return hn::Add(v, constant(0));  // a zero without sign: rounding gives either, as the processor likes
+  return hn::Add(v, constant(0));  // makes the zero unsigned: its sign after rounding depends on the processor
 }
 
 HWY_INLINE void put(VF v, float* to, std::size_t left) { store(Floats(), v, to, left); }
@@ -48,7 +48,7 @@ HWY_INLINE void put(VF v, std::uint16_t* to, std::size_t left) {
 template <class T>
 HWY_INLINE void read_out(const draws::Row& from, const ChargePointers& from_charge, const ReadoutParameters& parameters,
                          std::size_t count, T* dn) {
-  const draws::Row row = from;  // copies, so that no store can change them
+  const draws::Row row = from;  // copied, so that no store can change it
   const ReadoutParameters p = parameters;
   const ChargePointers charge = from_charge;
   const std::size_t lanes = hn::Lanes(Words());

@@ -5,7 +5,8 @@
 
 #include "isp/base/random/random_rows.h"
 
-/// The row kernels under read_out_row, dispatched at run time. Plain types only, see isp/base/random/random_rows.h.
+/// The row kernels under read_out_row, dispatched at run time. They have plain types only, see
+/// isp/base/random/random_rows.h.
 namespace lowlux::capture {
 
 struct ReadoutParameters;

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double most_pixels = 1 << 28;
 constexpr double brightest_cd_m2 = 1e12;
-constexpr double gap = 0.08;  // of a patch's pitch: the frame around it
+constexpr double gap = 0.08;  // fraction of a patch's pitch: the frame around it
 
 tl::unexpected<Error> wrong(const std::string& what, const std::string& where = {}) {
   return fail(ErrorCode::invalid_argument, what, where);
@@ -27,7 +27,7 @@ Result<void> check_luminance(double luminance_cd_m2) {
   return wrong("the luminance of a scene must lie between 0 and 1e12 cd/m2, found " + number_text(luminance_cd_m2));
 }
 
-/// A scene of one size without light, and the radiance of its white.
+/// Returns a scene of one size without light, and the radiance of its white.
 Result<Scene> empty_scene(const SceneSetup& setup) {
   if (setup.width < 1 || setup.height < 1 || static_cast<double>(setup.width) * setup.height > most_pixels) {
     return wrong("a scene has 1 to 2^28 pixels, found " + std::to_string(setup.width) + " x " +
@@ -57,7 +57,7 @@ void fill(Scene& scene, int x0, int y0, int x1, int y1, int radiance) {
   }
 }
 
-/// What a patch of a reflectance sends to the camera. Errors: it is brighter than a scene may be.
+/// Returns the radiance of a patch of a reflectance. Errors: it is brighter than a scene may be.
 Result<Spectrum> patch_radiance(const Spectrum& white, const isp::NamedSpectrum& patch) {
   bool finite = true;
   Spectrum radiance = white.mapped([&](double nm, double power) {

@@ -19,7 +19,7 @@ using isp::EffectSet;
 
 int blocks_across(int pixels) { return (pixels + isp::effect_block - 1) / isp::effect_block; }
 
-/// Rows of one thread.
+/// Row buffers of one thread.
 struct Scratch {
   explicit Scratch(int width) : signal(width), mean(width), offset(width), normal(width), words(width) {}
   std::vector<float> signal, mean, offset, normal;
@@ -121,7 +121,7 @@ class RowReadout {
   double hot_mean_e_ = 0;
 };
 
-/// Rows first to last, in runs of one region.
+/// Reads out rows first to last, in runs of one region.
 template <class Code>
 void read_out_rows(const SensorFrame& frame, const isp::EffectPlan& plan, RowBand band, PlaneView<Code> dn) {
   const int width = frame.rate_e_per_s.width, across = blocks_across(width);
@@ -144,7 +144,7 @@ void read_out_bands(const SensorFrame& frame, const isp::EffectPlan& plan, Execu
   for_each_band(executor, dn.height, [&](RowBand band, int) { read_out_rows(frame, plan, band, dn); });
 }
 
-/// The best of three [ms], writing what a file would get: codes where the converter is kept.
+/// Returns the shortest of three times [ms], writing the output of a file: codes where the converter is kept.
 template <class Code>
 double time_rows(const SensorFrame& frame, const isp::EffectPlan& plan, Plane<Code>& dn) {
   double best = std::numeric_limits<double>::infinity();

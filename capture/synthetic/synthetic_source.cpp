@@ -18,16 +18,16 @@ namespace {
 
 using isp::Effect;
 
-constexpr double pedestal_sigmas = 8;    // of the noise, below a stored pedestal
-constexpr double largest_deviate = 6.5;  // no normal deviate of isp/base/random/random.h is larger
-constexpr double hottest = 23;           // no hot pixel has more than 33 log(2) times their mean
+constexpr double pedestal_sigmas = 8;    // standard deviations of the noise, below a stored pedestal
+constexpr double largest_deviate = 6.5;  // limit of the normal deviates of isp/base/random/random.h
+constexpr double hottest = 23;           // limit of hot pixels' charge: 33 log(2) times their mean
 
 template <class Predicate>
 bool every_region(const isp::EffectPlan& plan, const Predicate& predicate) {
   return std::all_of(plan.regions.begin(), plan.regions.end(), predicate);
 }
 
-/// Black columns on the left, the scene beside them.
+/// Returns the rate with black columns added at its left.
 Plane<float> with_mask(const Plane<float>& rate, int masked_columns) {
   Plane<float> out(rate.width() + masked_columns, rate.height());
   for (int y = 0; y < rate.height(); ++y) {
@@ -37,7 +37,7 @@ Plane<float> with_mask(const Plane<float>& rate, int masked_columns) {
   return out;
 }
 
-/// Matrices for A and D65 fitted on the camera's sensitivities, and the neutral of the scene's white.
+/// Returns matrices for A and D65 fitted to the camera's sensitivities, and the neutral of the scene's white.
 Result<CameraColour> colour_of(const isp::NamedSensor& sensor, const SpectralResponse& response,
                                const Spectrum& white) {
   const auto sensitivity = *isp::camera_sensitivity(sensor.camera);
@@ -50,7 +50,7 @@ Result<CameraColour> colour_of(const isp::NamedSensor& sensor, const SpectralRes
   Vector3 neutral = isp::electron_rate(response, white);
   const double largest = *std::max_element(neutral.begin(), neutral.end());
   if (!(*std::min_element(neutral.begin(), neutral.end()) > 1e-6 * largest)) {
-    // A light that leaves a channel dark (or no light) has no white to balance to: daylight's stands in.
+    // A light that leaves a channel dark (or no light) gives no white balance: daylight replaces it.
     neutral = isp::electron_rate(response, *isp::radiance_of(*isp::light_named("D65"), 1));
   }
   const double scale = *std::max_element(neutral.begin(), neutral.end());
@@ -59,10 +59,12 @@ Result<CameraColour> colour_of(const isp::NamedSensor& sensor, const SpectralRes
   return colour;
 }
 
-/// Mean code at which a pixel saturates, above black [DN]: the full well's, where that is less than the converter's.
+/// Returns the mean code at which a pixel saturates, above black [DN]: the full well's, if that is less than the
+/// converter's.
 double range_dn(const SensorModel& s) { return s.system_gain_dn_per_e * isp::saturation_charge_e(s); }
 
-/// The plan of a file: the planner's, with the converter, which costs nothing and makes files of one sensor alike.
+/// Returns the plan of a file: the planner's, with the converter, which costs no time and makes files of one sensor
+/// alike.
 isp::EffectPlan with_converter(isp::EffectPlan plan) {
   for (isp::RegionPlan& region : plan.regions) {
     for (const Effect effect : {Effect::quantisation, Effect::clipping}) {
@@ -75,7 +77,7 @@ isp::EffectPlan with_converter(isp::EffectPlan plan) {
   return plan;
 }
 
-/// What of() promises of its options, and of points that no function of scene.h made.
+/// Checks the options as of() documents, and points that were not made by functions of scene.h.
 Result<void> check_options(const SyntheticOptions& options, const Scene& scene) {
   if (options.masked_columns < 0 || options.masked_columns > 4096 || options.masked_columns % 2 != 0) {
     return fail(ErrorCode::invalid_argument, "masked columns are an even number between 0 and 4096");
@@ -149,7 +151,7 @@ double SyntheticSource::largest_mean_e(const isp::BlockLevel& block, isp::Effect
   const SensorModel& s = sensor_.model;
   const auto dark = isp::dark_mean_e(s, options_.exposure);
   const double dark_e = kept.has(Effect::dark_current) ? *std::max_element(dark.begin(), dark.end()) : 0;
-  // The planner has weighed what the few extreme pixels lose; a caller who sets effects has not.
+  // The planner has considered the loss in the few extreme pixels; a caller who sets effects has not.
   if (options_.effects.tolerance) return block.peak_e + dark_e;
   const double prnu = kept.has(Effect::prnu) ? s.prnu : 0, dsnu = kept.has(Effect::dsnu) ? s.dsnu : 0;
   const double hot_e = kept.has(Effect::hot_pixels) && s.hot_pixel_fraction > 0
@@ -243,9 +245,9 @@ RawFrame SyntheticSource::frame(std::uint32_t index, Executor& executor) const {
   return described(stored_codes(index, executor));
 }
 
-/// Variance of codes in 0..1 of the range above black (DNG NoiseProfile): K / range * x + (K^2 sigma^2 + 1/12) /
-/// range^2, of what is simulated. Without the photons' Poisson law no line in x describes the noise: then there is
-/// none.
+/// Returns the variance of codes in 0..1 of the range above black (DNG NoiseProfile): K / range * x + (K^2 sigma^2 +
+/// 1/12) / range^2, for the simulated effects. Without the photons' Poisson distribution no line in x describes the
+/// noise: then nullopt.
 std::optional<NoiseProfile> SyntheticSource::noise_profile() const {
   const isp::EffectSet kept =
       options_.effects.tolerance ? isp::EffectSet::all() : file_plan_.regions.front().kept;  // one set for all regions
@@ -283,7 +285,7 @@ RawFrame SyntheticSource::described(Plane<std::uint16_t> codes) const {
   info.exposure_s = options_.exposure.time_s;
   info.temperature_c = options_.exposure.temperature_c;
   info.f_number = options_.f_number;
-  // The speed at which the frame's exposure, f-number and saturation agree (isp/model/sensor/scene_luminance.h).
+  // The ISO speed at which the frame's exposure, f-number and saturation agree (isp/model/sensor/scene_luminance.h).
   const double saturation_cd_m2 = isp::saturation_luminance_cd_m2(s, response_, 1);
   info.iso = 78 * options_.f_number * options_.f_number / (0.65 * saturation_cd_m2);
   out.colour = colour_;

@@ -16,47 +16,46 @@
 
 namespace lowlux::capture {
 
-/// Which effects are simulated: those a tolerance calls for, or those given.
+/// Choice of the simulated effects: those required by a tolerance, or those given.
 struct EffectChoice {
   std::optional<isp::Tolerance> tolerance;         // set: the planner decides
-  isp::EffectSet effects = isp::EffectSet::all();  // else these
+  isp::EffectSet effects = isp::EffectSet::all();  // used without a tolerance
 };
 
 struct SyntheticOptions {
   isp::Exposure exposure;
   double f_number = 2;
   BayerPhase phase = BayerPhase::rggb;
-  int masked_columns = 0;  // light-shielded, left of the picture; even
+  int masked_columns = 0;  // light-shielded, left of the image; even
   PhotonSampling sampling = PhotonSampling::physical;
   EffectChoice effects;
-  std::uint64_t seed = 1;         // of the noise: frames of one seed and index have the same, whatever the scene
-  std::uint64_t sensor_seed = 1;  // of the fixed pattern: which specimen of the sensor it is
+  std::uint64_t seed = 1;         // of the noise: frames of one seed and index have the same noise, for any scene
+  std::uint64_t sensor_seed = 1;  // of the fixed pattern: selects the specimen of the sensor
 };
 
-/// A camera in front of a scene. What does not change from frame to frame is worked out once, by of().
+/// A camera in front of a scene. Values common to all frames are computed once, by of().
 class SyntheticSource {
  public:
-  /// Errors: an exposure that cannot be; a mean charge beyond the sampler's limit where no full well holds it; point
-  /// sources with published sampling, or more photons in one of its bins than the sampler's limit; masked columns that
-  /// are odd, negative or more than 4096; a tolerance that is not above 0, or with published sampling, which
-  /// the planner does not know; an f-number outside of 0.5..1000; point
-  /// sources without place or spread.
+  /// Makes a source. Errors: an invalid exposure; a mean charge beyond the sampler's limit without a full well to bound
+  /// it; point sources with published sampling, or more photons in one of its bins than the sampler's limit; masked
+  /// columns that are odd, negative or more than 4096; a tolerance that is not above 0, or with published sampling,
+  /// which the planner does not support; an f-number outside 0.5..1000; point sources without position or spread.
   static Result<SyntheticSource> of(Scene scene, isp::NamedSensor sensor, SpectralResponse response,
                                     const SyntheticOptions& options, Executor& executor);
 
-  /// Frame number `index`: the same scene and fixed pattern, its own noise. Any index, in any order.
-  /// A file holds the converter's whole codes, which cost nothing: quantisation and clipping that the planner would
-  /// leave out stay (file_plan). Where a caller leaves them out, see Storage.
+  /// Returns frame number `index`: the same scene and fixed pattern, its own noise. Any index, in any order. A file
+  /// holds the converter's integer codes, which cost no time: quantisation and clipping that the planner would leave
+  /// out are kept (file_plan). For a caller that leaves them out, see Storage.
   RawFrame frame(std::uint32_t index, Executor& executor) const;
 
-  /// The same in DN as floats, before anything is stored: what the converter would give.
+  /// Returns a frame in DN as floats, before storage: the output of the converter.
   Plane<float> frame_dn(std::uint32_t index, Executor& executor) const;
 
-  /// Noise-free truth: mean signal electrons of R, G, B at every pixel, and the scene's XYZ [cd/m2].
+  /// Return the noise-free truth: mean signal electrons of R, G, B at every pixel, and the scene's XYZ [cd/m2].
   CameraRgb signal_e(Executor& executor) const;
   SceneLinear xyz_cd_m2() const;
 
-  /// What frame_dn() simulates, and what frame() does.
+  /// Return the effects simulated by frame_dn() and by frame().
   const isp::EffectPlan& plan() const { return plan_; }
   const isp::EffectPlan& file_plan() const { return file_plan_; }
   const Plane<float>& rate_e_per_s() const { return rate_.e_per_s; }
@@ -65,17 +64,17 @@ class SyntheticSource {
   EffectCost measure_cost() const;
 
  private:
-  /// How codes are stored: code = round(scale * (dn + offset_dn)). Anything but 1 and 0 only where a caller leaves
+  /// Storage of codes: code = round(scale * (dn + offset_dn)). Differs from 1 and 0 only if a caller leaves
   /// quantisation or clipping out: then 16 bits keep the fractions, and the pedestal is raised to keep negative values.
   struct Storage {
     int scale = 1;
     double offset_dn = 0;
-    bool codes = true;  // the readout gives whole codes
+    bool codes = true;  // the readout gives integer codes
   };
 
   SyntheticSource(Scene scene, isp::NamedSensor sensor, SpectralResponse response, const SyntheticOptions& options);
   Result<void> expose(Executor& executor);
-  /// Of a block's pixels, fixed pattern included [e-].
+  /// Returns the largest mean of a block's pixels, fixed pattern included [e-].
   double largest_mean_e(const isp::BlockLevel& block, isp::EffectSet kept) const;
   Result<void> check_means(const std::vector<isp::BlockLevel>& blocks) const;
   Result<void> check_photons(Executor& executor) const;

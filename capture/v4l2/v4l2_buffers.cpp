@@ -16,9 +16,9 @@ namespace lowlux::capture {
 namespace {
 
 constexpr std::uint32_t most_buffers = 32;  // VIDEO_MAX_FRAME
-constexpr int most_attempts = 100;          // DMA_BUF_IOCTL_SYNC asks to be repeated for EAGAIN too
+constexpr int most_attempts = 100;          // DMA_BUF_IOCTL_SYNC must also be repeated for EAGAIN
 
-/// One v4l2_buffer, with the plane a multi-planar driver wants beside it.
+/// One v4l2_buffer, with the plane that a multi-planar driver requires.
 class BufferCall {
  public:
   BufferCall(const V4l2Device& device, std::uint32_t index) : multi_planar_(device.multi_planar()) {
@@ -52,7 +52,7 @@ int request_buffers(V4l2Device& device, std::uint32_t wanted, std::uint32_t* had
   return code;
 }
 
-/// The failure of VIDIOC_STREAMON.
+/// Returns the failure of VIDIOC_STREAMON.
 Error not_started(const V4l2Device& device, int code) {
   switch (code) {
     case EPIPE:
@@ -78,7 +78,7 @@ Result<std::unique_ptr<V4l2Buffers>> V4l2Buffers::request(V4l2Device& device, V4
   if (const int code = request_buffers(device, static_cast<std::uint32_t>(count), &had)) {
     return tl::make_unexpected(device.error(code, "the driver gives no buffers"));
   }
-  out->requested_ = true;  // whatever fails now, they go back when `out` is destroyed
+  out->requested_ = true;  // if a later step fails, they are returned when `out` is destroyed
   if (had == 0 || had > most_buffers) {
     return fail(ErrorCode::malformed,
                 "asked for " + std::to_string(count) + " buffers, the driver gives " + std::to_string(had) +

@@ -10,7 +10,7 @@
 
 namespace lowlux::capture {
 
-/// What the driver says of the buffer that it hands over; nothing of it is checked.
+/// Description of a buffer by the driver that hands it over; not checked.
 struct V4l2Taken {
   std::uint32_t index = 0;
   std::uint32_t flags = 0;
@@ -21,25 +21,25 @@ struct V4l2Taken {
   std::int64_t microseconds = 0;
 };
 
-/// The driver's buffers, mapped. Streaming is ended, and all is unmapped, closed and returned, on destruction.
+/// The driver's buffers, mapped. The destructor ends streaming, and unmaps, closes and returns all.
 class V4l2Buffers {
  public:
-  /// Asks for `count` buffers (the driver may give fewer or more), each of at least `frame_bytes`, all of
-  /// them at most most_buffer_bytes. None is queued.
+  /// Requests `count` buffers (the driver may give fewer or more), each of at least `frame_bytes`, all of them at most
+  /// most_buffer_bytes. None is queued.
   static Result<std::unique_ptr<V4l2Buffers>> request(V4l2Device& device, V4l2Memory memory, int count,
                                                       std::size_t frame_bytes);
   ~V4l2Buffers();
   V4l2Buffers(const V4l2Buffers&) = delete;
   V4l2Buffers& operator=(const V4l2Buffers&) = delete;
 
-  /// Queues all buffers and starts.
+  /// Queues all buffers and starts streaming.
   Result<void> start_streaming();
-  /// Hands a buffer to the driver: 0, else errno. `index` is one of a buffer that is not queued.
+  /// Hands a buffer to the driver and returns 0, else errno. `index` is that of a buffer that is not queued.
   int queue(std::size_t index);
-  /// Takes the next filled buffer, without waiting: 0, else errno. EBADMSG if the driver hands over one it does not
-  /// have.
+  /// Takes the next filled buffer, without waiting, and returns 0, else errno. EBADMSG if the driver hands over one
+  /// that it does not have.
   int take(V4l2Taken& taken);
-  /// Before and after this process reads a buffer: 0, else errno. Of mapped buffers nothing is to be done.
+  /// Called before and after this process reads a buffer: return 0, else errno. They do nothing for mapped buffers.
   int begin_access(std::size_t index);
   int end_access(std::size_t index);
 
@@ -54,7 +54,7 @@ class V4l2Buffers {
     std::size_t bytes = 0;
     int file = -1;  // of the DMA buffer
     bool queued = false;
-    bool accessed = false;  // begin_access without end_access
+    bool accessed = false;  // begin_access was called without end_access
   };
   V4l2Buffers(V4l2Device& device, V4l2Memory memory) : device_(device), memory_(memory) {}
   Result<void> add(std::uint32_t index, std::size_t frame_bytes, std::size_t most_bytes);

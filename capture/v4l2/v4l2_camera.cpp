@@ -16,17 +16,17 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 
-// A device that vanishes need not end a wait: the node is looked at again this often.
+// A wait may continue after a device vanishes: the node is tested again after at most this time.
 constexpr milliseconds longest_slice{500};
 constexpr milliseconds longest_timeout = std::chrono::hours(24);
-// After a buffer that was announced and was not there.
+// Pause after a buffer that was announced but not available.
 constexpr int pause_ms = 1;
 
 // CameraFrame::buffer holds the index in the low bits and the start above.
 constexpr int index_bits = 5;
 constexpr int most_sessions = 1 << 20;
 
-/// Frames missing after `last`; 0 where the count repeats itself or goes back.
+/// Returns the number of frames missing after `last`; 0 if the count repeats itself or goes back.
 std::uint32_t lost_between(std::uint32_t last, std::uint32_t now) {
   const std::uint32_t step = now - last;  // modulo 2^32, as drivers count
   return step == 0 || step > std::uint32_t{1} << 31 ? 0 : step - 1;
@@ -55,7 +55,7 @@ Result<void> V4l2Camera::start() {
   return {};
 }
 
-/// Once buffers are had nobody else can change the format; before that anybody can.
+/// Checks that the format is unchanged. Once buffers are allocated no other program can change it; before that any can.
 Result<void> V4l2Camera::check_unchanged() {
   auto now = read_layout(*device_);
   if (!now) return pass_on(now);
@@ -105,7 +105,8 @@ Result<CameraFrame> V4l2Camera::next(milliseconds timeout) {
   }
 }
 
-/// Waits for `events`, or shortly for none; not for long. An Error when the time is over or the device is gone.
+/// Waits for `events`, or briefly for none, at most one slice. Returns an Error when the time is over or the device is
+/// gone.
 std::optional<Error> V4l2Camera::wait(nanoseconds until, short events, short* happened) {
   const V4l2System& system = device_->system();
   const nanoseconds left = until - system.now(system.context);
@@ -149,7 +150,7 @@ Result<CameraFrame> V4l2Camera::deliver(const V4l2Taken& taken) {
   return frame;
 }
 
-/// Where what the driver says of a frame does not fit in its buffer.
+/// Returns an error if the driver's description of a frame does not fit in its buffer.
 std::optional<Error> V4l2Camera::contradiction(const V4l2Taken& taken) const {
   const std::size_t held = buffers_->bytes(taken.index).size();
   const std::size_t whole = frame_bytes(agreement_.format);
@@ -161,7 +162,7 @@ std::optional<Error> V4l2Camera::contradiction(const V4l2Taken& taken) const {
 }
 
 nanoseconds V4l2Camera::timestamp_of(const V4l2Taken& taken) {
-  constexpr std::int64_t most_seconds = 9'000'000'000;  // what nanoseconds in 64 bits hold
+  constexpr std::int64_t most_seconds = 9'000'000'000;  // limit of nanoseconds in 64 bits
   const bool monotonic = (taken.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
   const bool sane =
       taken.seconds >= 0 && taken.seconds < most_seconds && taken.microseconds >= 0 && taken.microseconds < 1'000'000;

@@ -14,7 +14,7 @@
 
 namespace lowlux::capture {
 
-/// A V4L2 node with which a format was agreed. Memory and streaming from start() to stop().
+/// A V4L2 node with which a format was agreed. It holds memory and streams from start() to stop().
 class V4l2Camera final : public Camera {
  public:
   V4l2Camera(std::unique_ptr<V4l2Device> device, V4l2Agreement agreement, const V4l2Options& options);
@@ -36,15 +36,15 @@ class V4l2Camera final : public Camera {
   std::chrono::nanoseconds timestamp_of(const V4l2Taken& taken);
   void requeue(std::size_t index);
 
-  std::unique_ptr<V4l2Device> device_;  // first: what follows refers to it and goes before it
+  std::unique_ptr<V4l2Device> device_;  // first: the members below refer to it and are destroyed before it
   V4l2Agreement agreement_;
   V4l2Memory memory_;
   int buffers_wanted_;
   std::unique_ptr<V4l2Buffers> buffers_;  // while streaming
   FrameFacts facts_;
   std::optional<std::uint32_t> last_sequence_;
-  std::optional<Error> failure_;  // met where none can be returned
-  int session_ = 0;               // counts the starts, so that a frame of an earlier one is known
+  std::optional<Error> failure_;  // failure that occurred where none can be returned
+  int session_ = 0;               // counts the starts, to identify frames of an earlier one
   bool told_of_clock_ = false;
 };
 

@@ -21,13 +21,13 @@
 namespace lowlux::capture {
 namespace {
 
-// A signal interrupts a call once; what interrupts it this often is no signal.
+// A signal interrupts a call once; more interruptions than this are not caused by signals.
 constexpr int most_interruptions = 100;
 
-// V4L2_CAP_IO_MC of Linux 5.9; older headers lack it.
+// V4L2_CAP_IO_MC of Linux 5.9; older headers do not define it.
 constexpr std::uint32_t capability_media_controlled = 0x20000000;
 
-/// A fixed field of a driver, which may lack its final zero, with what cannot be printed as '?'.
+/// Returns a fixed field of a driver, which may lack its final zero, with '?' for unprintable characters.
 template <std::size_t n>
 std::string printable(const unsigned char (&field)[n]) {
   std::string text(std::begin(field), std::find(std::begin(field), std::end(field), '\0'));
@@ -69,7 +69,7 @@ Result<void> V4l2Device::identify() {
   v4l2_capability told{};
   if (const int code = call(VIDIOC_QUERYCAP, &told)) {
     if (code == ENOTTY || code == EINVAL) return fail(ErrorCode::unsupported, "this is no V4L2 device", path_);
-    return tl::make_unexpected(error(code, "the driver does not tell what the device is"));
+    return tl::make_unexpected(error(code, "the driver does not state what the device is"));
   }
   name_ = printable(told.card);
   const std::uint32_t can = (told.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? told.device_caps : told.capabilities;
@@ -140,7 +140,7 @@ int wait(void* /*context*/, int file, short events, int timeout_ms, short* happe
   return count;
 }
 
-/// The 7 of "video7".
+/// Returns the 7 of "video7".
 std::optional<int> number_of(std::string_view name) {
   constexpr std::string_view prefix = "video";
   if (!name.starts_with(prefix)) return std::nullopt;

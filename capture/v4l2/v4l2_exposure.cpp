@@ -14,16 +14,17 @@
 namespace lowlux::capture {
 namespace {
 
-// Deprecated by V4L2 as a synonym of brightness, and what drivers of raw cameras still use for the pedestal.
+// V4L2 deprecates it as a synonym of brightness, but drivers of raw cameras still use it for the pedestal.
 constexpr std::uint32_t control_black_level = 0x0098090b;
 
-/// The control that holds the exposure time, and what one of its steps of 1 is.
+/// The control of the exposure time, with the unit of its steps.
 struct ExposureControl {
   V4l2Control control;
   double unit_s;
 };
 
-/// Time of one line: (width read out + horizontal blanking) / pixel rate; nullopt if the node does not have both.
+/// Returns the time of one line: (width read out + horizontal blanking) / pixel rate; nullopt if the node does not have
+/// both.
 std::optional<double> line_time_s(V4l2Device& device, const CameraFormat& format) {
   const auto rate_hz = read_wide_control(device, V4L2_CID_PIXEL_RATE);
   const auto blanking = read_control(device, V4L2_CID_HBLANK);
@@ -49,7 +50,7 @@ bool exposes_by_itself(V4l2Device& device) {
   return mode && *mode != V4L2_EXPOSURE_MANUAL && *mode != V4L2_EXPOSURE_SHUTTER_PRIORITY;
 }
 
-/// Ends automatic exposure, or sets the mode that leaves only the iris to the camera.
+/// Ends automatic exposure, or sets the mode in which only the iris is automatic.
 void end_automatic_exposure(V4l2Device& device) {
   const auto mode = find_control(device, V4L2_CID_EXPOSURE_AUTO);
   if (!mode) return;
@@ -117,13 +118,13 @@ Result<void> apply_gain(V4l2Device& device, const V4l2Options& options, std::vec
     set_gain(device, *gain, gain->minimum, warnings);
   } else {
     warnings.push_back("gain of " + number_text(*factor) +
-                       ": V4L2 does not tell the factors of the driver's codes; give one of them, " +
+                       ": V4L2 does not state the factors of the driver's codes; give one of them, " +
                        range_text(*gain));
   }
   return {};
 }
 
-/// A rate as a fraction of seconds: to 1e-4 Hz, lowest terms.
+/// Returns a rate as a fraction of seconds: to 1e-4 Hz, lowest terms.
 v4l2_fract interval_of(double rate_hz) {
   constexpr std::uint32_t fineness = 10000;
   const auto denominator = static_cast<std::uint32_t>(std::lround(rate_hz * fineness));
@@ -187,7 +188,7 @@ FrameFacts read_facts(V4l2Device& device, const CameraFormat& format) {
 
 namespace {
 
-/// V4L2_CTRL_FLAG_MODIFY_LAYOUT of Linux 4.15; older headers lack it.
+/// V4L2_CTRL_FLAG_MODIFY_LAYOUT of Linux 4.15; older headers do not define it.
 constexpr std::uint32_t flag_modifies_layout = 0x0400;
 
 struct Flip {

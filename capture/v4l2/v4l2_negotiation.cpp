@@ -18,7 +18,7 @@ std::string size_text(std::uint32_t width, std::uint32_t height) {
   return std::to_string(width) + "x" + std::to_string(height);
 }
 
-/// What the driver offers, for errors: the raw formats with sizes, else the other ones.
+/// Returns the formats that the driver offers, for errors: the raw formats with sizes, else the other ones.
 std::string offers_text(V4l2Device& device) {
   constexpr std::size_t most = 12;
   std::vector<std::string> entries = raw_offers_text(device);
@@ -38,14 +38,15 @@ std::string asked_text(const RawFormat& format) {
   return "such raw format";
 }
 
-/// Best last: Bayer before monochrome, then depth; among equals what is in force, then the mosaic's order in force.
+/// Returns the rank of a format, highest best: Bayer before monochrome, then depth; among equals the current format,
+/// then the current mosaic order.
 auto rank(const RawFormat& raw, std::uint32_t fourcc, const V4l2Layout& current) {
   const auto now = raw_format_of_v4l2(current.fourcc);
   return std::tuple(raw.layout == SensorLayout::bayer, raw.bits, fourcc == current.fourcc,
                     now && now->layout == raw.layout && now->phase == raw.phase);
 }
 
-/// The code to ask for.
+/// Returns the format code to request.
 Result<std::uint32_t> choose_format(V4l2Device& device, const CameraRequest& request, const V4l2Layout& current) {
   if (!request.format && device.media_controlled() && raw_format_of_v4l2(current.fourcc)) return current.fourcc;
   const V4l2Offer* best = nullptr;
@@ -63,14 +64,14 @@ Result<std::uint32_t> choose_format(V4l2Device& device, const CameraRequest& req
               device.path());
 }
 
-/// The size to ask for.
+/// Returns the size to request.
 V4l2Size choose_size(V4l2Device& device, const CameraRequest& request, std::uint32_t fourcc,
                      const V4l2Layout& current) {
   if (request.width) {
     return {static_cast<std::uint32_t>(*request.width), static_cast<std::uint32_t>(*request.height)};
   }
   const V4l2Sizes listed = device.media_controlled() ? V4l2Sizes{} : list_sizes(device, fourcc);
-  if (!listed.range) {  // a range is what a scaler makes, not what the sensor has
+  if (!listed.range) {  // a range is that of a scaler, not of the sensor
     const auto largest =
         std::max_element(listed.sizes.begin(), listed.sizes.end(), [](const V4l2Size& a, const V4l2Size& b) {
           return std::uint64_t{a.width} * a.height < std::uint64_t{b.width} * b.height;
@@ -80,7 +81,7 @@ V4l2Size choose_size(V4l2Device& device, const CameraRequest& request, std::uint
   return {current.width, current.height};
 }
 
-/// That the driver's answer is one a raw frame can have, free of contradictions and within bounds.
+/// Checks that the driver's response is possible for a raw frame, consistent and within bounds.
 Result<CameraFormat> checked(const V4l2Device& device, const V4l2Layout& got, const RawFormat& raw, int buffers) {
   const std::string what = format_text(got.fourcc) + " " + size_text(got.width, got.height);
   const auto refuse = [&](ErrorCode code, const std::string& why) {
@@ -151,7 +152,7 @@ Result<V4l2Agreement> negotiate(V4l2Device& device, const CameraRequest& request
 
 namespace {
 
-// Lists of drivers end by an error; these are the lengths at which a list is taken to be without end.
+// Drivers end their lists with an error; a list of this length is assumed to be endless.
 constexpr std::uint32_t most_formats = 256;
 constexpr std::uint32_t most_sizes = 128;
 
@@ -184,7 +185,7 @@ Result<V4l2Layout> read_layout(V4l2Device& device) {
   v4l2_format told{};
   told.type = device.buffer_type();
   if (const int code = device.call(VIDIOC_G_FMT, &told)) {
-    return tl::make_unexpected(device.error(code, "the driver does not tell its format"));
+    return tl::make_unexpected(device.error(code, "the driver does not state its format"));
   }
   return layout_of(told, device.multi_planar());
 }

@@ -34,7 +34,7 @@ Result<void> check_request(const V4l2Options& options) {
   return {};
 }
 
-/// What it is that flips a mosaic and does not say whether its order changes.
+/// Warns of flips for which the driver does not state whether they change the order of the mosaic.
 void warn_of_order(const std::vector<std::string>& flips, const CameraFormat& format,
                    std::vector<std::string>& warnings) {
   if (format.raw.layout != SensorLayout::bayer) return;
@@ -65,7 +65,7 @@ Result<std::unique_ptr<Camera>> open_v4l2(const std::string& device, const V4l2O
   warn_of_order(silent_flips, agreement->format, warnings);
   apply_frame_rate(node, options.request, agreement->format, warnings);
   if (auto ok = apply_exposure(node, options, agreement->format, warnings); !ok) return pass_on(ok);
-  // Wishes that are refused are warnings; that the device vanished meanwhile is none.
+  // Refused settings are warnings; that the device has vanished is an error.
   if (node.gone()) return tl::make_unexpected(node.gone_error());
   agreement->warnings = std::move(warnings);
   return std::make_unique<V4l2Camera>(*std::move(opened), *std::move(agreement), options);

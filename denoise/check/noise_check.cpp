@@ -12,32 +12,32 @@
 namespace lowlux::denoise {
 namespace {
 
-constexpr int part = block << (most_levels - 1);  // cells of a part, each way: one block of the coarsest level
+constexpr int part = block << (most_levels - 1);  // cells of a tile, each way: one block of the coarsest level
 constexpr int window = 9;
 constexpr std::size_t least_blocks = 8;
 constexpr float none = std::numeric_limits<float>::quiet_NaN();
 
-/// Details of a block of 8 x 8, over their variance in the model, summed over R, G, B.
+/// Details of a block of 8 x 8, divided by their variance in the model, averaged over R, G, B.
 struct BlockDetail {
   double across;    // mean square of the horizontal and vertical ones
   double diagonal;  // mean square
 };
 
-/// What the model says of one colour, G being the mean of two sites.
+/// The model's noise of one colour, G being the mean of two sites.
 struct ColourModel {
   double dark_e;
   double variance_e2;
   double sites;
   float saturation_e;
 
-  /// Variance of a cell whose mean, dark in, is mean_e.
+  /// Returns the variance of a cell whose mean, dark charge included, is mean_e.
   double variance_of(double mean_e) const { return (std::max(mean_e, 0.3 * dark_e + 0.02) + variance_e2) / sites; }
 };
 
 struct Check {
   const RawElectronsView& raw;
   std::array<ColourModel, 3> model;
-  std::array<std::vector<float>, 3> cells;  // of one part, part x part, dark in
+  std::array<std::vector<float>, 3> cells;  // of one tile, part x part, dark charge included
   std::array<std::vector<BlockDetail>, most_levels> blocks;
   NoiseCheck out;
   std::array<long, 3> negative{};
@@ -62,14 +62,14 @@ struct Check {
   void add_blocks(int level, int columns, int rows);
   std::optional<BlockDetail> detail(int x0, int y0, double averaged) const;
   void halve(int columns, int rows);
-  /// Rows of parts, the last left out.
+  /// Measures the rows of tiles first .. last - 1.
   void measure(int first, int last);
-  /// What another one measured.
+  /// Adds the counts and blocks that `other` measured.
   void add(const Check& other);
   void finish();
 };
 
-/// Cells of the part whose first is (x0, y0). Saturated sites and those that are no numbers make cells no numbers.
+/// Loads the cells of the tile whose first cell is (x0, y0). Saturated and NaN sites make their cells NaN.
 void Check::load(int x0, int y0, int columns, int rows) {
   const auto usable = [this](float e, int colour) {
     if (e >= model[colour].saturation_e) {
@@ -120,7 +120,8 @@ void Check::add_windows(int columns, int rows) {
   }
 }
 
-/// @param averaged how many finest cells each cell is the mean of
+/// Returns the details of one block, or nullopt if one is not finite.
+/// @param averaged  number of finest cells of which each cell is the mean
 std::optional<BlockDetail> Check::detail(int x0, int y0, double averaged) const {
   BlockDetail sum{0, 0};
   for (int c = 0; c < 3; ++c) {
@@ -131,7 +132,7 @@ std::optional<BlockDetail> Check::detail(int x0, int y0, double averaged) const 
       for (int x = x0; x < x0 + block; x += 2) {
         const float falling = upper[x] - lower[x + 1], rising = upper[x + 1] - lower[x];
         const float both = upper[x] + lower[x + 1] - upper[x + 1] - lower[x];
-        // Squares of ((falling + rising) / 2, (falling - rising) / 2) add up so.
+        // This is the sum of the squares of ((falling + rising) / 2, (falling - rising) / 2).
         across += 0.5 * static_cast<double>(falling * falling + rising * rising);
         diagonal += 0.25 * static_cast<double>(both * both);
         mean += static_cast<double>(upper[x] + lower[x + 1] + upper[x + 1] + lower[x]);
@@ -167,7 +168,7 @@ void Check::halve(int columns, int rows) {
 }
 
 void Check::measure(int first, int last) {
-  const int columns = raw.value.width / 2, rows = raw.value.height / 2;  // whole cells
+  const int columns = raw.value.width / 2, rows = raw.value.height / 2;  // complete cells only
   for (int y = first * part; y < std::min(last * part, rows); y += part) {
     for (int x = 0; x < columns; x += part) {
       int width = std::min(part, columns - x), height = std::min(part, rows - y);
@@ -190,7 +191,7 @@ void Check::add(const Check& other) {
   saturated += other.saturated;
 }
 
-/// Mean of `wanted` over the tenth of the blocks, 8 at least, with the smallest `flatness`.
+/// Returns the mean of `wanted` over the tenth of the blocks, at least 8, with the smallest `flatness`.
 double mean_of_flattest(std::vector<BlockDetail>& found, double BlockDetail::*flatness, double BlockDetail::*wanted) {
   const std::size_t count = std::max(least_blocks, found.size() / 10);
   const auto last = found.begin() + static_cast<std::ptrdiff_t>(count);
@@ -221,7 +222,7 @@ void Check::finish() {
 
 NoiseCheck check_noise(const RawElectronsView& raw, const RawNoise& noise, Executor& executor) {
   assert(raw.value.width >= 2 && raw.value.height >= 2);
-  const int rows = raw.value.height / 2;  // whole cells
+  const int rows = raw.value.height / 2;  // complete cells only
   const int parts = (rows + part - 1) / part, bands = std::min(executor.width(), parts);
   std::vector<Check> band;
   band.reserve(static_cast<std::size_t>(bands));

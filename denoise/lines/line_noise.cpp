@@ -17,13 +17,13 @@ namespace lowlux::denoise {
 namespace {
 
 constexpr int fewest_lines = 16, fewest_pixels = 4;
-constexpr double sigma_per_mad = 1.4826;  // of a normal law
+constexpr double sigma_per_mad = 1.4826;  // of a normal distribution
 
-/// Variances of the location of n normal values, in units of theirs over n.
+/// Returns the variance of the median of n normal values, in units of their variance over n.
 double median_factor(double n) { return std::numbers::pi / 2 * n / (n + std::numbers::pi / 2 - 1); }
 constexpr double hodges_lehmann_factor = std::numbers::pi / 3;
 
-/// The median of all means of two values (Hodges & Lehmann, Ann. Math. Statist. 34 (1963) 598).
+/// Returns the median of all means of two values (Hodges & Lehmann, Ann. Math. Statist. 34 (1963) 598).
 double hodges_lehmann(const std::vector<double>& values) {
   std::vector<double> means;
   means.reserve(values.size() * (values.size() + 1) / 2);
@@ -33,21 +33,21 @@ double hodges_lehmann(const std::vector<double>& values) {
   return median_of(means);
 }
 
-/// Normal standard deviation by the median absolute deviation.
+/// Returns the standard deviation of normal values by their median absolute deviation.
 double robust_std(std::vector<double> values) {
   const double centre = median_of(values);
   for (double& v : values) v = std::abs(v - centre);
   return sigma_per_mad * median_of(values);
 }
 
-/// Scatter of neighbouring lines of the same colours.
+/// Scatter between neighbouring lines of the same colours.
 struct Scatter {
-  double group_variance_e2 = 0;  // of one group's mean, about what its line has in common
-  double line_variance_e2 = 0;   // of what a line has in common, as measured by medians: V + e^2
+  double group_variance_e2 = 0;  // of one group's mean about the line's common offset
+  double line_variance_e2 = 0;   // of the line's common offset, as measured by medians: V + e^2
   double groups_used = 0;
 };
 
-/// @return nullopt where too few lines can be compared
+/// Returns the scatter, or nullopt where too few lines can be compared.
 std::optional<Scatter> scatter_of(const Plane<double>& means) {
   const std::vector<double> common = differences(means, 2);
   std::vector<double> within, between;
@@ -65,18 +65,18 @@ std::optional<Scatter> scatter_of(const Plane<double>& means) {
   const auto used = static_cast<double>(within.size()) / static_cast<double>(between.size());
   if (used < fewest_pixels) return std::nullopt;
   const double inside = robust_std(within), across = robust_std(between);
-  // Two lines are in each difference, and the groups' own centre has been taken off.
+  // Each difference holds the noise of two lines, and the groups' own centre has been subtracted.
   return Scatter{inside * inside / 2 * used / (used - 1), across * across / 2, used};
 }
 
 tl::unexpected<Error> too_little(const Plane<double>& means, PlaneView<const float> pixels) {
   return fail(ErrorCode::insufficient,
-              "line noise cannot be told from " + std::to_string(pixels.width) + " x " + std::to_string(pixels.height) +
+              "line noise cannot be separated from " + std::to_string(pixels.width) + " x " + std::to_string(pixels.height) +
                   " pixels: expected 16 lines of 4 finite values at least, found " + std::to_string(means.width()) +
                   " lines or too few values; use a larger area");
 }
 
-/// The means, and how they scatter; an error if that cannot be told.
+/// The group means and their scatter.
 struct Measured {
   Plane<double> means;
   Scatter scatter;
@@ -90,7 +90,7 @@ Result<Measured> measured(PlaneView<const float> pixels, Lines lines) {
   return Measured{std::move(means), *scatter};
 }
 
-/// What all lines of a parity have in common in each group.
+/// Returns the median over all lines of a parity in each group.
 std::vector<double> common_of(const Plane<double>& means, int parity) {
   std::vector<double> out(groups), values;
   values.reserve(static_cast<std::size_t>(means.width()) / 2 + 1);
@@ -113,16 +113,17 @@ double variance_of(const std::vector<double>& values) {
   return std::max((squares - sum * sum / count) / (count - 1), 0.0);
 }
 
-/// Mean of d_ij over the neighbours that pass for the same scene, and the number of lines in it.
+/// Mean of d_ij over the neighbours accepted as the same scene, and the number of lines in it.
 struct Comparison {
   double offset_e = 0;
   int lines = 1;
 };
 
+/// Compares a line with its neighbours on both sides.
 /// @param steps  differences of the lines from those 2, 4, 6 and so on before them
 Comparison compared(const std::vector<std::vector<double>>& steps, int line, int lines, double bound_e) {
   const int reach = static_cast<int>(steps.size());
-  const int room = std::min({reach, line / 2, (lines - 1 - line) / 2});  // even to both sides: slopes cancel
+  const int room = std::min({reach, line / 2, (lines - 1 - line) / 2});  // the same on both sides: slopes cancel
   Comparison out;
   double sum = 0;
   for (int k = -room; k <= room; ++k) {
@@ -217,14 +218,14 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-/// Sums of the finite pixels of one group of one line, and their number.
+/// Sum and number of the finite pixels of one group of one line.
 struct GroupSum {
   double sum = 0;
   double number = 0;
 };
 
 GroupSum every_second(const float* pixels, int first, int last) {
-  constexpr int at_once = 8;  // sums that do not wait for each other
+  constexpr int at_once = 8;  // independent sums, which do not wait for each other
   std::array<double, at_once> sum{}, number{};
   const auto add = [&](int from, int count) {
     for (int k = 0; k < count; ++k) {
@@ -240,7 +241,7 @@ GroupSum every_second(const float* pixels, int first, int last) {
   return {std::accumulate(sum.begin(), sum.end(), 0.0), std::accumulate(number.begin(), number.end(), 0.0)};
 }
 
-/// First pixel of each segment of a line, and the end of the last.
+/// Returns the first pixel of each segment of a line, and the end of the last.
 std::array<int, segments + 1> edges_of(int length) {
   const int pairs = (length + 1) / 2;
   std::array<int, segments + 1> edge{};
@@ -305,7 +306,7 @@ Plane<double> group_means(PlaneView<const float> pixels, Lines lines) {
   Plane<double> sum(count, groups), number(count, groups);
   std::fill_n(sum.data(), sum.size(), 0.0);
   std::fill_n(number.data(), number.size(), 0.0);
-  // Row by row for columns too, as memory lies; each group's sum has the same order either way.
+  // Columns are summed row by row too, in memory order; each group's sum has the same order either way.
   (lines == Lines::rows ? sum_rows : sum_columns)(pixels, sum, number);
   for (std::size_t i = 0; i < sum.size(); ++i) {
     sum.data()[i] = number.data()[i] > 0 ? sum.data()[i] / number.data()[i] : nan;

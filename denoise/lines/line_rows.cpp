@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#if defined(__aarch64__)  // NEON only, as everywhere
+#if defined(__aarch64__)  // NEON only, as in the other kernels
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #endif
 #undef HWY_TARGET_INCLUDE
@@ -21,8 +21,8 @@ struct Step {
   int second;
 };
 
-/// Batcher's odd-even merge sort (K. Batcher, AFIPS Spring Joint Computer Conf. 32 (1968) 307): the same steps for any
-/// values, so that each lane sorts its own.
+/// The steps of Batcher's odd-even merge sort (K. Batcher, AFIPS Spring Joint Computer Conf. 32 (1968) 307). They do
+/// not depend on the values, so that each lane sorts its own.
 constexpr auto sorting_steps = [] {
   std::array<Step, 63> steps{};
   std::size_t count = 0;

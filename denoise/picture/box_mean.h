@@ -4,9 +4,9 @@
 
 namespace lowlux::denoise {
 
-/// Means over squares of 2 radius + 1 pixels, cut off at the picture's edges. NaN marks a pixel without a value: it is
-/// left out of the means, as are infinities, and comes out where a square holds no value. Every mean is summed anew, so
-/// that large values leave nothing behind in others.
+/// Returns means over squares of 2 radius + 1 pixels, cropped at the image's edges. NaN marks a pixel without a value:
+/// NaN and infinities are excluded from the means, and the mean is NaN where a square holds no value. Every mean is
+/// summed anew, so that large values leave no rounding error in others.
 /// @param radius  0 (a copy) to 64
 Plane<double> box_mean(const Plane<double>& values, int radius);
 

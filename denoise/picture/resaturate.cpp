@@ -11,15 +11,15 @@
 namespace lowlux::denoise {
 namespace {
 
-constexpr double lowest_locus_y = 0.0048;  // CIE 1931, 405 to 420 nm: below it there is no light, and X / Y explodes
+constexpr double lowest_locus_y = 0.0048;  // CIE 1931, 405 to 420 nm: no light is below it, and X / Y would diverge
 
 Vector3 rgb_of(const isp::Xy& c, const Matrix3& xyz_to_rgb) { return xyz_to_rgb * Vector3{c.x, c.y, 1 - c.x - c.y}; }
 
-/// How far the way from the neutral to a colour stays where value >= 0, if it is `at_neutral` > 0 and `there` at its
-/// ends.
+/// Returns the fraction of the way from the neutral to a colour on which a value stays >= 0, given that it is
+/// `at_neutral` > 0 and `there` at the ends.
 double inside(double at_neutral, double there) { return there < 0 ? at_neutral / (at_neutral - there) : 1; }
 
-/// The chromaticity, or the last one inside the gamut on the straight way to it from the neutral.
+/// Returns the chromaticity, or the last one inside the gamut on the straight line to it from the neutral.
 isp::Xy held_in_gamut(const isp::Xy& c, const Resaturation& how) {
   const Vector3 from = rgb_of(how.neutral, how.xyz_to_rgb), to = rgb_of(c, how.xyz_to_rgb);
   double t = inside(how.neutral.y - lowest_locus_y, c.y - lowest_locus_y);
@@ -54,13 +54,13 @@ Plane<double> intensities(const RgbView<const float>& in, const Resaturation& ho
   return sum;
 }
 
-/// The chromaticity of a pixel's light; the neutral where there is none to be had.
+/// Returns the chromaticity of a pixel's light; the neutral where it cannot be estimated.
 isp::Xy light_of(const isp::Xyz& pixel, double mean_intensity, const Resaturation& how) {
   const double signal = mean_intensity - intensity(how.dark, ShareWeights::xy);
   const auto measured = isp::xy_of(pixel);
   if (!measured || !(pixel.y > 0) || !(signal > 0) || !(mean_intensity > 0)) return how.neutral;
   const double confidence = plane_confidence(signal, how.chroma_noise * how.chroma_noise, how.prior_std);
-  const isp::Xy dark = isp::xy_of(how.dark).value_or(how.neutral);  // without dark alpha is 1, and it plays no part
+  const isp::Xy dark = isp::xy_of(how.dark).value_or(how.neutral);  // no effect without dark charge: alpha is 1
   return held_in_gamut(resaturate_xy(*measured, dark, signal / mean_intensity, confidence, how.neutral), how);
 }
 
@@ -98,7 +98,7 @@ void resaturate(const RgbView<const float>& in, const Resaturation& how, const R
 
 namespace {
 
-/// 1 / (1 + q^2) for q = noise / what is expected; 0 where there is no such q.
+/// Returns 1 / (1 + q^2) for q = noise / expected value; 0 where there is no such q.
 double share_of(double expected_std, double noise_std) {
   if (!(expected_std > 0) || !(noise_std >= 0)) return 0;
   const double q = noise_std / expected_std;
@@ -121,9 +121,9 @@ ShrunkChroma shrunk_chroma(const XyzEstimate& estimate, const ChromaPrior& prior
   const double noise = std::sqrt((covariance_of(u_row, estimate.covariance, u_row) +  //
                                   covariance_of(v_row, estimate.covariance, v_row)) /
                                  2);
-  const double a = weight * prior.std / noise;  // how far the expected chroma stands out of the noise
+  const double a = weight * prior.std / noise;  // ratio of the expected chroma to the noise
   const auto moved = [&](const Vector3& row) {
-    // w / W as one factor: apart, the one vanishes and the other grows where W does.
+    // Compute w / W as one factor: separately, w vanishes and 1 / W grows as W approaches 0.
     const double r = dot(row, xyz);
     return noise > 0 && std::isfinite(a) ? r / noise * prior.std / (a + 1 / a) : r / weight;
   };

@@ -6,13 +6,13 @@
 
 namespace lowlux::denoise {
 
-/// An executor, of which at most `threads` are used at once: there is scratch memory for so many.
+/// An executor, of which at most `threads` are used at once: there is scratch memory for that many.
 struct Workers {
   Executor& executor;
   int threads;
 };
 
-/// Calls work(first, last, thread) for contiguous parts of 0..count - 1, at most one part for each thread.
+/// Calls work(first, last, thread) for contiguous ranges of 0..count - 1, at most one range for each thread.
 template <class Work>
 void in_bands(const Workers& workers, int count, const Work& work) {
   const int parts = std::min({workers.executor.width(), workers.threads, std::max(1, count)});

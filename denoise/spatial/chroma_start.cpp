@@ -13,7 +13,7 @@ struct Place {
   float fraction;
 };
 
-/// Tiles around the centre of cell i of level `grid`, linear between the centres of tiles.
+/// Returns the tiles around the centre of cell i of level `grid`, with the fraction between their centres.
 Place place_of(int i, int grid, int tiles) {
   const float at = (static_cast<float>(i) + 0.5f) * static_cast<float>(1 << grid) / tile - 0.5f;
   const float inside = std::clamp(at, 0.0f, static_cast<float>(tiles - 1));
@@ -21,7 +21,7 @@ Place place_of(int i, int grid, int tiles) {
   return {first, std::min(first + 1, tiles - 1), inside - static_cast<float>(first)};
 }
 
-/// The first cell of level `grid` at or beyond the centre of a tile.
+/// Returns the first cell of level `grid` at or beyond the centre of a tile.
 int next_centre(int column, int grid) {
   const int cells = tile >> grid;  // of a tile: a power of two
   return column * cells + cells / 2;
@@ -60,7 +60,7 @@ void share_row(const ChromaStarts& starts, int level, int grid, int y, std::span
   const float* const lower = starts.start.data() + v.second * starts.columns;
   const auto start = [&](int i) { return upper[i] + v.fraction * (lower[i] - upper[i]); };
   const int width = static_cast<int>(out.size());
-  // Between the centres of two tiles everything is linear: one run of cells after the other.
+  // Between the centres of two tiles everything is linear: process one run of cells after the other.
   for (int x = 0; x < width;) {
     const Place u = place_of(x, grid, starts.columns);
     const int end = u.second == u.first ? width : std::min(width, next_centre(u.first + 1, grid));

@@ -6,13 +6,13 @@
 #include "denoise/denoise_options.h"
 #include "denoise/spatial/layout.h"
 
-/// On which pyramid level the chroma of each tile starts.
+/// Selects the pyramid level on which the chroma of each tile starts.
 namespace lowlux::denoise {
 
 struct ChromaStarts {
-  std::span<float> start;               // of each tile
+  std::span<float> start;               // start level of each tile
   std::span<unsigned char> has_chroma;  // for each level, each tile: whether blocks of chroma are needed there
-  int columns = 0;                      // tiles
+  int columns = 0;                      // number of tiles
   int rows = 0;
   float least = 0;
   float most = 0;
@@ -21,15 +21,15 @@ struct ChromaStarts {
   bool nowhere(int level) const { return least >= static_cast<float>(level + 1); }
 };
 
-/// 0, 1 or 2 by the mean signal to noise ratio of one site, q = s / sqrt(s + dark + variance): from 3, from 0.7, below.
-/// No signal, 2.
+/// Returns 0, 1 or 2 for a mean signal to noise ratio of one site, q = s / sqrt(s + dark + variance), of at least 3, of
+/// at least 0.7, or below. Returns 2 without signal.
 int start_of(double mean_signal_e, double mean_dark_e, double variance_e2);
 
-/// Fills least, most and has_chroma. A tile needs chroma where one up to two tiles away starts on that level or finer:
-/// one for the blend, one for what recomposition reads around a cell.
+/// Fills least, most and has_chroma. A tile needs chroma on a level if a tile up to two tiles away starts on that level
+/// or finer: one tile for the blend, one for the cells that recomposition reads around a cell.
 void complete(ChromaStarts& starts);
 
-/// Share of coarser levels in the chroma of `level`, for a row of cells of level `grid`.
+/// Computes the fraction of coarser levels in the chroma of `level`, for a row of cells of level `grid`.
 void share_row(const ChromaStarts& starts, int level, int grid, int y, std::span<float> out);
 
 }  // namespace lowlux::denoise

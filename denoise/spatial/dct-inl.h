@@ -1,4 +1,4 @@
-// Eight-point DCT of kernels, included once for each instruction set: hence a guard that toggles in place of #pragma
+// Eight-point DCT of kernels, included once for each instruction set: hence a guard that toggles instead of #pragma
 // once.
 #if defined(LOWLUX_DENOISE_DCT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LOWLUX_DENOISE_DCT_INL_H
@@ -21,16 +21,16 @@ HWY_INLINE VF load(const float* from) { return hn::LoadU(Floats(), from); }
 HWY_INLINE void store(VF v, float* to) { hn::StoreU(v, Floats(), to); }
 HWY_INLINE int lanes() { return static_cast<int>(hn::Lanes(Floats())); }
 
-// cos(k pi / 16) / 2, and 1 / sqrt(8)
+// cos(k pi / 16) / 2 for k = 1, 2, 3, 5, 6, 7, and 1 / sqrt(8)
 constexpr float c1 = 0.490392640202f, c2 = 0.461939766256f, c3 = 0.415734806151f, c5 = 0.277785116510f;
 constexpr float c6 = 0.191341716183f, c7 = 0.0975451610081f, c0 = 0.353553390593f;
 
-/// a x + b y + c z + d w
+/// Returns a x + b y + c z + d w.
 HWY_INLINE VF dot4(float a, VF x, float b, VF y, float c, VF z, float d, VF w) {
   return hn::MulAdd(constant(a), x, hn::MulAdd(constant(b), y, hn::MulAdd(constant(c), z, hn::Mul(constant(d), w))));
 }
 
-/// Orthonormal DCT-II in place, each lane its own: even and odd halves, 36 operations.
+/// Computes the orthonormal DCT-II in place, independently in each lane: even and odd halves, 36 operations.
 HWY_INLINE void forward8(VF (&x)[8]) {
   const VF a0 = hn::Add(x[0], x[7]), a1 = hn::Add(x[1], x[6]), a2 = hn::Add(x[2], x[5]), a3 = hn::Add(x[3], x[4]);
   const VF b0 = hn::Sub(x[0], x[7]), b1 = hn::Sub(x[1], x[6]), b2 = hn::Sub(x[2], x[5]), b3 = hn::Sub(x[3], x[4]);
@@ -45,7 +45,7 @@ HWY_INLINE void forward8(VF (&x)[8]) {
   x[7] = dot4(c7, b0, -c5, b1, c3, b2, -c1, b3);
 }
 
-/// Its inverse, which is its transpose.
+/// Computes the inverse of forward8() in place, which is its transpose.
 HWY_INLINE void inverse8(VF (&x)[8]) {
   const VF e0 = hn::Mul(constant(c0), hn::Add(x[0], x[4])), e1 = hn::Mul(constant(c0), hn::Sub(x[0], x[4]));
   const VF f0 = hn::MulAdd(constant(c2), x[2], hn::Mul(constant(c6), x[6]));

@@ -13,13 +13,14 @@ namespace {
 constexpr std::size_t line_floats = 16;  // one cache line
 constexpr std::size_t lead = 16;         // floats that may be read before a row
 
-/// An odd number of cache lines: at a power of two, the rows that are read together would share cache sets.
+/// Returns the floats of a row, an odd number of cache lines: at a power of two, the rows that are read together would
+/// share cache sets.
 std::size_t row_size(int cells) {
   const std::size_t lines = (lead + static_cast<std::size_t>(cells) + rows::padding + line_floats - 1) / line_floats;
   return (lines | 1U) * line_floats;
 }
 
-/// Hands out rows of one stretch of memory; without memory it counts.
+/// Allocates rows from one array; without memory it only counts.
 class Rows {
  public:
   explicit Rows(float* memory) : memory_(memory) {}
@@ -36,12 +37,12 @@ class Rows {
     for (float*& plane : set.plane) plane = take(row, static_cast<std::size_t>(height));
     return set;
   }
-  /// A row for a kernel's own use, of `floats` at least.
+  /// Returns scratch memory of at least `floats` floats for a kernel.
   rows::RowScratch kernel(std::size_t floats) {
     const std::size_t whole = (lead + floats + line_floats - 1) / line_floats * line_floats;
     return {take(whole, 1), whole - lead};
   }
-  /// What `lay_out` takes is one scratch memory.
+  /// Makes everything that `lay_out` allocates one scratch memory.
   template <class LayOut>
   Scratch scratch(const LayOut& lay_out) {
     const std::size_t first = used_;
@@ -124,12 +125,12 @@ void lay_out(Rows& from, int width, PatchMemory& out) {
   });
 }
 
-/// Cells of the largest frame, those that are appended with them.
+/// Cells of the largest frame, including those appended as padding.
 struct Extent {
   int levels;
   int width;
   int height;
-  std::size_t starts;  // tiles of chroma's start
+  std::size_t starts;  // tiles of ChromaStarts
 };
 
 Extent extent_of(const FrameLayout& of) {
@@ -191,7 +192,7 @@ FrameMemory::FrameMemory(int max_width, int max_height, int threads, bool best)
       found_(static_cast<std::size_t>(threads) * max_width) {
   const Extent extent = extent_of(*this);
   saturated = Plane<std::uint8_t>(extent.width, extent.height);
-  // Zeros: what lies beside rows is read, and must be numbers.
+  // Memory is zeroed: cells next to rows are read, and must be finite.
   const std::size_t floats = lay_out(nullptr);
   memory_.reset(static_cast<float*>(std::calloc(floats, sizeof(float))));
   if (!memory_) throw std::bad_alloc();

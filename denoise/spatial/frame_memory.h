@@ -14,7 +14,7 @@
 #include "isp/base/memory.h"
 #include "isp/base/plane.h"
 
-/// The memory of a Denoiser: everything a frame needs, laid out for the largest.
+/// The memory of a Denoiser: everything that a frame needs, laid out for the largest frame.
 namespace lowlux::denoise {
 
 /// Four planes of one size: L, C1, C2, C3.
@@ -25,46 +25,46 @@ struct PlaneSet {
   float* row(int p, int y) const { return plane[p] + y * stride; }
 };
 
-/// One pyramid level. `variance` and `residual` are of half its size.
+/// One pyramid level. `variance` and `residual` have half its width and height.
 struct PyramidLevel {
-  int width = 0;  // of the frame at hand
+  int width = 0;  // of the current frame
   int height = 0;
   PlaneSet noisy;
-  PlaneSet value[2];  // of pass 1 and of pass 2
+  PlaneSet value[2];  // results of pass 1 and of pass 2
   PlaneSet variance;  // mean over 2x2 cells, divided by 4
   PlaneSet residual;
 };
 
-/// Rows of one thread while it makes planes and variances of level 0. Here and below, rows are of the widest level and
-/// its padding, those of raw samples twice as long.
+/// Rows of one thread while it computes planes and variances of level 0. All rows of the thread memories are as long as
+/// those of the widest level with its padding, rows of raw samples twice as long.
 struct FrontMemory {
   Scratch scratch;
   std::array<float*, 2> raw{};                     // raw samples
-  std::array<std::array<float*, 16>, 3> window{};  // R, G, B with dark, last 16 rows
+  std::array<std::array<float*, 16>, 3> window{};  // R, G, B with dark charge, last 16 rows
   float* saturated = nullptr;
   rows::RowScratch variance{};
 };
 
-/// Sums of blocks of one thread.
+/// Block sums of one thread.
 struct BlockMemory {
   Scratch scratch;
   std::array<std::array<float*, 8>, 4> value{};   // of 8 rows
-  std::array<std::array<float*, 4>, 4> weight{};  // of 4 rows of half size
+  std::array<std::array<float*, 4>, 4> weight{};  // of 4 rows of half width
   std::array<std::array<float*, 4>, 4> residual{};
   rows::RowScratch weights{};  // one row
   rows::RowScratch blocks{};
 };
 
-/// Rows of one thread while it puts a level on top of the next coarser one.
+/// Rows of one thread while it adds a level to the next coarser one.
 struct UpMemory {
   Scratch scratch;
   rows::RowScratch up{};
   float* coarse = nullptr;
-  float* share = nullptr;  // of the coarse level
-  float* finer = nullptr;  // the same at the next finer level
+  float* share = nullptr;  // fraction at the coarse level, see share_row()
+  float* finer = nullptr;  // the same fraction at the next finer level
 };
 
-/// Rows of one thread while it makes a mosaic of the planes of level 0.
+/// Rows of one thread while it converts the planes of level 0 to a mosaic.
 struct UnpackMemory {
   Scratch scratch;
   rows::RowScratch up{};
@@ -82,20 +82,21 @@ struct ThreadMemory {
   UnpackMemory unpack;
 };
 
-/// Sums of patches of one thread, for Level::best only.
+/// Patch sums of one thread, for Level::best only.
 struct PatchMemory {
   Scratch scratch;
   std::array<std::array<float*, rows::ring>, 4> change{};
   std::array<std::array<float*, rows::ring>, 4> weight{};
-  std::array<std::array<float*, 2>, 4> residual{};  // of half size
+  std::array<std::array<float*, 2>, 4> residual{};  // of half width
   std::array<std::array<float*, 2>, 4> residual_weight{};
   rows::RowScratch patches{};
-  std::uint8_t* chroma = nullptr;  // of each patch of a row
+  std::uint8_t* chroma = nullptr;  // whether chroma is wanted in each patch of a row
 };
 
-/// What lies in one stretch of floats.
+/// Layout of a frame's memory in one array of floats.
 struct FrameLayout {
-  /// @param best  whether Level::best is wanted too
+  /// Computes the sizes for the largest frame.
+  /// @param best  whether Level::best is needed too
   FrameLayout(int max_width, int max_height, int threads, bool best);
 
   int columns;  // cells of the largest frame
@@ -103,18 +104,18 @@ struct FrameLayout {
   std::array<PyramidLevel, most_levels> level{};
   PlaneSet difference;  // of the size of level 1
   std::vector<ThreadMemory> thread;
-  std::vector<SearchMemory> search;  // of each thread
-  std::vector<PatchMemory> patches;  // of each thread, or empty
+  std::vector<SearchMemory> search;  // one for each thread
+  std::vector<PatchMemory> patches;  // one for each thread, or empty
 
-  /// Places everything from `memory` on, each scratch memory with a guard of its own behind it; without memory it only
+  /// Places everything from `memory` on, each scratch memory followed by a guard of its own; without memory it only
   /// counts.
-  /// @return the floats that takes
+  /// @return the number of floats needed
   std::size_t lay_out(float* memory);
 };
 
 struct FrameMemory : FrameLayout {
   FrameMemory(int max_width, int max_height, int threads, bool best);
-  /// Of memory that one takes.
+  /// Returns the number of bytes that one FrameMemory takes.
   static std::size_t bytes(int max_width, int max_height, int threads, bool best);
 
   Plane<std::uint8_t> sources;            // cells that hold point sources
@@ -126,7 +127,7 @@ struct FrameMemory : FrameLayout {
   struct Free {
     void operator()(float* memory) const { std::free(memory); }
   };
-  std::unique_ptr<float[], Free> memory_;  // zeros of the system, which threads touch first
+  std::unique_ptr<float[], Free> memory_;  // zeroed by the system; threads touch it first
   std::vector<std::int32_t> found_;
   std::vector<std::uint8_t> chroma_;
 };

@@ -18,13 +18,13 @@ namespace lowlux::denoise::rows::HWY_NAMESPACE {
 
 constexpr float per_root2 = 0.707106781187f;
 
-/// What is not a number to 0, the rest to +-1e9.
+/// Returns 0 for NaN, and otherwise x limited to +-1e9.
 HWY_INLINE VF usable(VF x) {
   const VF number = hn::IfThenElseZero(hn::Eq(x, x), x);
   return hn::Min(hn::Max(number, constant(-1e9f)), constant(1e9f));
 }
 
-/// The sites of a vector of cells: R, G beside it, G beside B, B.
+/// The sites of a vector of cells: R, the G in its row, the G in the row of B, and B.
 struct Sites {
   VF e[4];
 };
@@ -65,14 +65,14 @@ void PackCells(const PackRow& in, const PackedRow& out) {
   }
 }
 
-/// Nine numbers beside each other.
+/// Returns the sum of nine adjacent numbers.
 HWY_INLINE VF nine(const float* from) {
   VF sum = load(from - 4);
   for (int i = -3; i <= 4; ++i) sum = hn::Add(sum, load(from + i));
   return sum;
 }
 
-/// Variances of R, G, B of each column of two rows, summed over the rows and divided by 16.
+/// Computes variances of R, G, B of each column of two rows, summed over the rows and divided by 16.
 /// @param scratch two rows
 HWY_INLINE void colour_variances(const VarianceRow& in, float* scratch, int row, float* const (&variance)[3]) {
   const int n = lanes();
@@ -96,7 +96,7 @@ HWY_INLINE void colour_variances(const VarianceRow& in, float* scratch, int row,
   }
 }
 
-/// Sums of cells 2 i and 2 i + 1.
+/// Returns the sums of cells 2 i and 2 i + 1.
 HWY_INLINE VF pairs(const float* from, int i) {
   VF even, odd;
   hn::LoadInterleaved2(Floats(), from + 2 * i, even, odd);
@@ -131,7 +131,7 @@ double SumOf(const float* in, int count) {
   return total;
 }
 
-/// Variance left in R, G and B, from that left in C1 and C2.
+/// Computes the remaining variance in R, G and B from that in C1 and C2.
 HWY_INLINE void site_variances(const UnpackRow& in, const UnpackedRow& out, int i, const VF (&left)[4]) {
   const VF luma = load(in.residual[0] + i);
   const VF other = hn::MulAdd(constant(0.5f), left[2], hn::MulAdd(constant(0.36f), left[1], luma));
@@ -143,7 +143,7 @@ HWY_INLINE void site_variances(const UnpackRow& in, const UnpackedRow& out, int 
   }
 }
 
-/// Of the steps before and after a cell: their harmonic mean, 0 where they differ in sign (van Leer).
+/// Returns the harmonic mean of the differences before and after a cell, 0 where they differ in sign (van Leer).
 HWY_INLINE VF slope(VF before, VF after) {
   const Floats f;
   const VF product = hn::Mul(before, after), sum = hn::Add(before, after);
@@ -151,7 +151,7 @@ HWY_INLINE VF slope(VF before, VF after) {
   return hn::Div(hn::Mul(constant(2), hn::Max(product, hn::Zero(f))), safe);
 }
 
-/// Slopes of the luma at cell i: to C2 and C3.
+/// Adds the slopes of the luma at cell i to C2 and C3.
 HWY_INLINE void add_slopes(const float* above, const float* own, const float* below, const Slopes& s, int i,
                            VF& blue_red, VF& greens) {
   const VF here = load(own + i);

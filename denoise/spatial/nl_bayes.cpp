@@ -12,14 +12,14 @@ namespace lowlux::denoise {
 namespace {
 
 constexpr int step = 2;                                      // cells from one patch to the next
-constexpr int below = rows::search_reach + rows::patch - 1;  // rows that patches found from one row reach down
+constexpr int below = rows::search_reach + rows::patch - 1;  // rows that patches found from one row extend down
 
 rows::ResidualOfPatches left_by(PlaneKind kind, FoundBy found_by) {
   const PatchShares shares = patch_shares(kind, found_by);
   return {shares.trace, shares.squares, shares.other};
 }
 
-/// One band of one level.
+/// Filter of one strip of rows of one level.
 struct NlBayes {
   const PassFrame& frame;
   int l;
@@ -27,7 +27,7 @@ struct NlBayes {
   const PyramidLevel& level() const { return frame.memory.level[l]; }
   int planes() const { return frame.starts.nowhere(l) ? 1 : 4; }
 
-  /// Whether chroma is wanted in each patch of a row.
+  /// Computes for each patch of a row whether chroma is wanted in it.
   void wanted(int y, std::uint8_t* out) const {
     const ChromaStarts& s = frame.starts;
     const unsigned char* const has = s.has_chroma.data() + l * s.columns * s.rows;
@@ -75,7 +75,7 @@ struct NlBayes {
 
   static void clear(float* row, int cells) { std::memset(row, 0, static_cast<std::size_t>(cells) * sizeof(float)); }
 
-  /// A row whose sums are complete; its memory is made ready for another.
+  /// Finishes a row whose sums are complete, and clears its memory for another row.
   void finish(const PatchMemory& m, int y, bool inside) const {
     const PyramidLevel& at = level();
     for (int p = 0; p < planes(); ++p) {
@@ -96,7 +96,7 @@ struct NlBayes {
     }
   }
 
-  /// Rows first .. last - 1, even. Patches that reach in from beside the band are found again.
+  /// Filters rows first .. last - 1, even. Patches that reach in from outside the strip are found again.
   void band(int first, int last, const PatchMemory& m) const {
     const ScratchUse use(m.scratch);
     const int height = level().height;

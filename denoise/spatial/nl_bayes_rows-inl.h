@@ -1,5 +1,5 @@
-// One group of patches, found and filtered, for nl_bayes_rows.cpp. Included once for each instruction set: hence a
-// guard that toggles in place of #pragma once.
+// Search and filter of one group of patches, for nl_bayes_rows.cpp. Included once for each instruction set: hence a
+// guard that toggles instead of #pragma once.
 #if defined(LOWLUX_DENOISE_PATCH_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LOWLUX_DENOISE_PATCH_INL_H
 #undef LOWLUX_DENOISE_PATCH_INL_H
@@ -21,18 +21,18 @@
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::denoise::rows::HWY_NAMESPACE {
 
-// Lanes are the places of candidates beside each other, or the 16 cells of a patch, row by row.
+// Lanes are adjacent candidate positions, or the 16 cells of a patch, row by row.
 
 constexpr int cells = patch * patch;
-constexpr int wide = 2 * search_reach;      // columns of places
-constexpr int tall = 2 * search_reach + 1;  // rows of places
+constexpr int wide = 2 * search_reach;      // columns of positions
+constexpr int tall = 2 * search_reach + 1;  // rows of positions
 constexpr int parts = cells / static_cast<int>(hn::MaxLanes(Floats()));
 static_assert(wide == cells);
 
-/// Squared distance of each place, infinite where there is no patch or it is the reference's own.
+/// Squared distance of each position, infinite where there is no patch or it is the reference's own.
 struct Keys {
   HWY_ALIGN float key[tall * wide];
-  int above;  // row of the reference's own place
+  int above;  // row of the reference's own position
   int rows;
 };
 
@@ -42,9 +42,9 @@ struct Members {
   int count;
 };
 
-/// Patches of one plane of a group, up to a multiple of four.
+/// Patches of one plane of a group, padded to a multiple of four.
 struct Patches {
-  HWY_ALIGN float noisy[group][cells];  // the result too
+  HWY_ALIGN float noisy[group][cells];  // the input, and then the result
   HWY_ALIGN float pilot[group][cells];
   HWY_ALIGN float matrix[cells][cells];
 };
@@ -54,7 +54,7 @@ struct Filtered {
   float residual;
 };
 
-/// Mean variance of the cells around the middle of a patch.
+/// Returns the mean variance of the cells around the middle of a patch.
 HWY_INLINE float variance_of(const PatchRow& in, int p, int x, int y) {
   const float* const upper = in.variance[p] + (y + 1) / 2 * in.variance_stride;
   const float* const lower = in.variance[p] + (y + 2) / 2 * in.variance_stride;
@@ -62,7 +62,7 @@ HWY_INLINE float variance_of(const PatchRow& in, int p, int x, int y) {
   return std::max(upper[left] + upper[right] + lower[left] + lower[right], 1e-30f);
 }
 
-/// Squared distances, over the variances, of a row of places from the reference's patch.
+/// Computes squared distances, divided by the variances, of a row of positions from the reference's patch.
 HWY_INLINE void row_of_distances(const PatchRow& in, int x0, int y, const float (&per_variance)[4], VF (&sum)[parts]) {
   const int n = lanes();
   for (VF& s : sum) s = hn::Zero(Floats());
@@ -116,15 +116,15 @@ HWY_INLINE int count_up_to(const Keys& keys, float most) {
   return static_cast<int>(hn::GetLane(hn::SumOfLanes(f, sum)));
 }
 
-/// The reference's own patch and the nearest others; of equally near ones, the first.
+/// Selects the reference's own patch and the nearest others; of equally near ones, the first.
 HWY_INLINE void choose(const PatchRow& in, int x0, const Keys& keys, Members& out) {
-  // Positive floats are ordered as their bits are: the least limit that enough places reach, bit by bit.
+  // Positive floats are ordered as their bits are: find the smallest limit that enough positions reach, bit by bit.
   constexpr int wanted = group - 1;
   constexpr std::int32_t largest = 0x7f7fffff;  // finite
   std::int32_t limit = 0x7fffffff;
   int reached = count_up_to(keys, std::bit_cast<float>(largest));
   for (std::int32_t bit = 1 << 30; bit != 0 && reached > wanted; bit >>= 1) {
-    // All bits below `bit` are set, so that what is left out is the upper half of the range.
+    // All bits below `bit` are set, so that the upper half of the range is excluded.
     const std::int32_t lower = limit & ~bit;
     const int count = count_up_to(keys, std::bit_cast<float>(std::min(lower, largest)));
     if (count < wanted) continue;
@@ -165,7 +165,7 @@ HWY_INLINE void gather(const PatchRow& in, int p, const Members& members, Patche
   }
 }
 
-/// Takes the mean patch off; patches up to a multiple of four become 0.
+/// Subtracts the mean patch; the padding patches up to a multiple of four become 0.
 HWY_INLINE void centre(float (*patches)[cells], int count, float* mean) {
   const int n = lanes();
   for (int part = 0; part < cells; part += n) {
@@ -178,7 +178,7 @@ HWY_INLINE void centre(float (*patches)[cells], int count, float* mean) {
   }
 }
 
-/// Mean of the patches' outer products.
+/// Computes the mean of the patches' outer products.
 HWY_INLINE void covariance(const float (*patches)[cells], int count, float (*out)[cells]) {
   const int n = lanes();
   const VF per_count = constant(1 / static_cast<float>(count));
@@ -201,11 +201,11 @@ HWY_INLINE void covariance(const float (*patches)[cells], int count, float (*out
   }
 }
 
-/// Of the trace of C: keeps its inverse within what floats can tell.
+/// Smallest variance relative to the trace of C: keeps the inverse within float precision.
 constexpr float least_variance = 1e-6f;
 
-/// Gauss-Jordan in place, of a symmetric matrix whose eigenvalues are at least `least`: so are then its pivots, but for
-/// rounding.
+/// Inverts by Gauss-Jordan in place a symmetric matrix whose eigenvalues are at least `least`: then so are its pivots,
+/// except for rounding.
 HWY_INLINE void invert(float (*m)[cells], float least) {
   const int n = lanes();
   for (int k = 0; k < cells; ++k) {
@@ -227,7 +227,7 @@ HWY_INLINE void invert(float (*m)[cells], float least) {
   }
 }
 
-/// patches <- mean + matrix patches, four at a time.
+/// Computes patches <- mean + matrix patches, four at a time.
 HWY_INLINE void apply(const float (*matrix)[cells], const float* mean, int count, float (*patches)[cells]) {
   const int n = lanes();
   for (int i = 0; i < count; i += 4) {
@@ -247,7 +247,7 @@ HWY_INLINE void apply(const float (*matrix)[cells], const float* mean, int count
   }
 }
 
-/// matrix <- matrix (matrix + variance)^-1 = 1 - variance (matrix + variance)^-1; its trace and sum of squares.
+/// Trace and sum of squares of a filter, matrix (matrix + variance)^-1 = 1 - variance (matrix + variance)^-1.
 struct Gains {
   float trace;
   float squares;
@@ -267,8 +267,9 @@ HWY_INLINE Gains to_filter(float variance, float (*m)[cells]) {
   return out;
 }
 
-/// noisy <- m + C (C + V)^-1 (noisy - mean of noisy), C the covariance of the pilot's patches. m is the pilot's mean
-/// where little is kept, and the noisy one where much is: there the pilot may have lost as much as the noise adds.
+/// Computes noisy <- m + C (C + V)^-1 (noisy - mean of noisy), C the covariance of the pilot's patches. m is the
+/// pilot's mean where little is kept, and the noisy one where much is kept: there the pilot may have lost as much as
+/// the noise adds.
 HWY_INLINE Filtered filter(int count, float variance, const ResidualOfPatches& left, Patches& at) {
   HWY_ALIGN float mean[cells], pilot_mean[cells];
   centre(at.noisy, count, mean);

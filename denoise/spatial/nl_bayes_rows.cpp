@@ -24,7 +24,7 @@ struct Scratch {
   Patches patches;
 };
 
-/// What one plane of a group adds to the sums.
+/// Adds the result of one plane of a group to the sums.
 HWY_INLINE void add_group(const PatchRow& in, int p, const Scratch& s, const Filtered& filtered, int x0,
                           const PatchSums& sums) {
   const hn::FixedTag<float, 4> four;

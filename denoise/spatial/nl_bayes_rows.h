@@ -11,39 +11,39 @@ namespace lowlux::denoise::rows {
 inline constexpr int patch = 4;         // cells, each way
 inline constexpr int search_reach = 8;  // rows above and below, columns to the left; one less to the right
 inline constexpr int group = 32;        // patches filtered together, a multiple of 4
-inline constexpr int ring = 32;         // rows of sums: those that patches found from one row lie in, rounded up
+inline constexpr int ring = 32;         // rows of sums: those that patches found from one row cover, rounded up
 
-/// See PatchShares.
+/// Remaining variance of patches; see PatchShares.
 struct ResidualOfPatches {
   float trace;
   float squares;
   float other;
 };
 
-/// Patches with their corner on one row of cells, 2 cells apart.
+/// Input of the patches with their corner on one row of cells, 2 cells apart.
 struct PatchRow {
   const float* noisy[4];  // row 0 of L, C1, C2, C3
   const float* pilot[4];
-  std::ptrdiff_t stride;     // of both
-  const float* variance[4];  // of half size, a quarter of the mean over 2x2 cells
+  std::ptrdiff_t stride;     // of both `noisy` and `pilot`
+  const float* variance[4];  // of half width and height, a quarter of the mean over 2x2 cells
   std::ptrdiff_t variance_stride;
-  int width;  // cells, multiples of 4
+  int width;  // cells, a multiple of 4, as is `height`
   int height;
-  int y;                       // of the corners, even
+  int y;                       // row of the corners, even
   const std::uint8_t* chroma;  // for each patch, whether C1, C2, C3 are wanted; null: nowhere
   ResidualOfPatches left[3];   // luma, chroma, luma where chroma is not wanted
 };
-/// What patches add up to.
+/// Weighted sums of patches.
 struct PatchSums {
-  float* change[4][ring];  // of the pilot, times weight; row y in place y % ring
+  float* change[4][ring];  // change of the pilot, times weight; row y at index y % ring
   float* weight[4][ring];
-  float* residual[4][2];  // rows of half size below the corners
+  float* residual[4][2];  // rows of half width below the corners
   float* residual_weight[4][2];
 };
 std::size_t patch_scratch();
 void nl_bayes_row(const PatchRow& in, const RowScratch& scratch, const PatchSums& sums);
 
-/// out = to + sum / weight, or `to` where there is no weight. Without `to`, it is 0.
+/// Computes out = to + sum / weight, or `to` where the weight is 0. If `to` is null, it counts as 0.
 void add_mean_row(const float* sum, const float* weight, int count, const float* to, float* out);
 
 }  // namespace lowlux::denoise::rows

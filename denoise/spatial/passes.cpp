@@ -11,10 +11,10 @@
 namespace lowlux::denoise {
 namespace {
 
-/// Which of C1, C2, C3 there are on a level.
+/// Returns 4, or 1 on a level without C1, C2, C3.
 int planes_of(const PassFrame& frame, int level) { return frame.starts.nowhere(level) ? 1 : 4; }
 
-/// One band of one level through the blocks.
+/// Filter of one strip of rows of one level by blocks.
 struct Shrink {
   const PassFrame& frame;
   int l;
@@ -23,7 +23,7 @@ struct Shrink {
 
   const PyramidLevel& level() const { return frame.memory.level[l]; }
 
-  /// Whether chroma is wanted in each strip of a row of blocks.
+  /// Computes for each strip of a row of blocks whether chroma is wanted in it.
   void wanted(int y0, std::uint8_t* strip) const {
     const ChromaStarts& s = frame.starts;
     const unsigned char* const has = s.has_chroma.data() + l * s.columns * s.rows;
@@ -75,7 +75,7 @@ struct Shrink {
 
   static void clear(float* row, int cells) { std::memset(row, 0, (cells + rows::padding) * sizeof(float)); }
 
-  /// Two rows whose sums are complete; their memory is made ready for the next.
+  /// Finishes two rows whose sums are complete, and clears their memory for the next.
   void finish(const BlockMemory& m, int y, bool inside) const {
     const PyramidLevel& at = level();
     for (int p = 0; p < planes_of(frame, l); ++p) {
@@ -92,7 +92,7 @@ struct Shrink {
     }
   }
 
-  /// Rows first .. last - 1, multiples of 4. Blocks that reach in from beside the band are computed again.
+  /// Filters rows first .. last - 1, multiples of 4. Blocks that reach in from outside these rows are computed again.
   void band(int first, int last, const BlockMemory& m) const {
     const ScratchUse use(m.scratch);
     const int height = level().height;
@@ -123,7 +123,8 @@ rows::UpRow up_row(const PlaneSet& coarse, int p, int y, int width, int height) 
   return in;
 }
 
-/// out_l = D_l + up2(G3(out_{l+1} - down2(D_l))), blended with up2(out_{l+1}) where chroma starts on a coarser level.
+/// Recomposition, out_l = D_l + up2(G3(out_{l+1} - down2(D_l))), blended with up2(out_{l+1}) where chroma starts on a
+/// coarser level.
 struct Recompose {
   const PassFrame& frame;
   int l;
@@ -168,7 +169,7 @@ struct Recompose {
   }
 };
 
-/// share_row of residual variances. @param finer as long as `share`
+/// Computes share_row() for residual variances. @param finer as long as `share`
 void residual_share_row(const ChromaStarts& starts, int level, int y, std::span<float> share, float* finer) {
   share_row(starts, level, level + 1, y, share);
   if (level == 0) return;

@@ -6,7 +6,8 @@
 #include "denoise/spatial/chroma_start.h"
 #include "denoise/spatial/frame_memory.h"
 
-/// What happens between the finest planes and their denoised likes. Levels 0 .. levels - 1 of `memory`.
+/// The filter passes between the finest noisy planes and the denoised ones. They use levels 0 .. levels - 1 of
+/// `memory`.
 namespace lowlux::denoise {
 
 struct PassFrame {
@@ -17,15 +18,15 @@ struct PassFrame {
   std::array<double, most_levels> variance_scale{1, 1, 1, 1, 1};  // see DenoiseOptions
 };
 
-/// Coarser planes and variances from those of level 0.
+/// Computes the coarser planes and variances from those of level 0.
 void build_pyramid(const PassFrame& frame);
 
-/// Pass 0: hard thresholds. Pass 1: Wiener gains from what pass 0 left. Fills value[pass] and `residual` of all levels;
-/// each level's value is recomposed from the coarser ones.
+/// Runs pass 0 with hard thresholds, or pass 1 with Wiener gains from the result of pass 0. Fills value[pass] and
+/// `residual` of all levels; each level's value is recomposed from the coarser ones.
 /// @param step cells from one block to the next, 2 or 4
 void run_pass(const PassFrame& frame, int pass, int step);
 
-/// value[pass] of `level`, as its blocks or patches left it, on top of that of the next coarser level.
+/// Adds value[pass] of `level`, the result of its blocks or patches, to that of the next coarser level.
 void recompose(const PassFrame& frame, int level, int pass);
 
 /// Adds the residual variances of coarser levels to those of finer ones.

@@ -11,13 +11,14 @@ namespace {
 
 constexpr int ring_windows = 40;  // 14 x 14 sites less 6 x 6, in windows of 4
 
-/// Sum of the squares of 40 Poisson-like windows over their variance: five standard deviations above its mean.
+/// Returns the limit for the sum of the squares of 40 Poisson-like windows over their variance: five standard
+/// deviations above its mean.
 double most_spread(double variance_e2) { return ring_windows + 5 * std::sqrt(ring_windows * (2 + 1 / variance_e2)); }
 
 struct Search {
   PlaneView<const float> raw;
-  double floor_e;      // least mean of a window
-  double variance_e2;  // of a window, beyond its mean
+  double floor_e;      // smallest mean of a window
+  double variance_e2;  // of a window, in addition to its mean
 
   double value(int x, int y) const {
     const auto e = static_cast<double>(raw.at(x, y));
@@ -25,7 +26,7 @@ struct Search {
   }
   double window(int x, int y) const { return value(x, y) + value(x + 1, y) + value(x, y + 1) + value(x + 1, y + 1); }
 
-  /// The largest of the 3 x 3 windows around; of equal ones, the first.
+  /// Returns whether a window is the largest of the 3 x 3 windows around; of equal ones, the first is.
   bool is_peak(int x, int y, double own) const {
     for (int j = -1; j <= 1; ++j) {
       for (int i = -1; i <= 1; ++i) {
@@ -38,8 +39,8 @@ struct Search {
   }
 
   struct Surroundings {
-    double mean = 0;               // of windows
-    double spread = 0;             // sum of squares about it
+    double mean = 0;               // mean of the windows
+    double spread = 0;             // sum of squared deviations from the mean
     std::array<double, 4> site{};  // mean of each site of a window
   };
   Surroundings around(int x, int y) const {
@@ -72,7 +73,7 @@ struct Search {
   }
 };
 
-/// Cells of rows first .. last - 1, from all windows that reach into them.
+/// Marks the cells of rows first .. last - 1, from all windows that reach into them.
 struct Band {
   const Search& search;
   const SearchMemory& memory;
@@ -84,7 +85,8 @@ struct Band {
     }
   }
 
-  /// A necessary condition of is_source, in single precision: the surroundings are clearly not more uneven than noise.
+  /// Returns a necessary condition of is_source, in single precision: the surroundings are not clearly more uneven than
+  /// noise.
   bool may_be_alone(const rows::WindowRow& in, int x) const {
     std::array<float, ring_windows> windows{};
     double mean = 0, spread = 0;
@@ -123,7 +125,7 @@ struct Band {
       in.variance_e2 = static_cast<float>(search.variance_e2);
       in.inner = memory.sums[0];
       in.outer = memory.sums[1];
-      in.significance = static_cast<float>(0.999 * least_significance);  // rounding: is_source decides in double
+      in.significance = static_cast<float>(0.999 * least_significance);  // for rounding: is_source decides in double
       const int found = rows::bright_windows(in, memory.found);
       for (int i = 0; i < found; ++i) {
         if (may_be_alone(in, memory.found[i]) && search.is_source(memory.found[i], y))

@@ -8,41 +8,41 @@
 #include "isp/base/memory.h"
 #include "isp/base/plane.h"
 
-/// Stars and specular dots of a few pixels. A delta of one cell spreads over all 64 coefficients of a block, each below
-/// the thresholds at a signal to noise ratio of 10, so that shrinkage leaves a third of its flux: such sources are
-/// found first, replaced by what is around them, and put back as they were measured.
+/// Detection of stars and specular dots of a few pixels. A delta of one cell spreads over all 64 coefficients of a
+/// block, each below the thresholds at a signal to noise ratio of 10, so that shrinkage leaves a third of its flux:
+/// such sources are found first, replaced by the background around them, and added back as they were measured.
 namespace lowlux::denoise {
 
-/// Least significance of a source: V h(t / V) with h(u) = (1 + u) ln(1 + u) - u, t the sum of a 2x2 window less what is
-/// expected there and V its variance. Bennett's inequality: flat noise exceeds it with a probability below exp(-13);
+/// Minimum significance of a source: V h(t / V) with h(u) = (1 + u) ln(1 + u) - u, t the sum of a 2x2 window less its
+/// expected value and V its variance. By Bennett's inequality, flat noise exceeds it with a probability below exp(-13);
 /// for normal noise it is 5.1 standard deviations, 1.7e-7, and there are four windows for each cell.
 inline constexpr double least_significance = 13;
 
-/// Sites on each side of a window within which a source has to lie inside of the frame.
+/// Minimum distance in sites from each side of a source's window to the border of the frame.
 inline constexpr int source_margin = 6;
 
-/// Memory of one thread.
+/// Search memory of one thread.
 struct SearchMemory {
   Scratch scratch;                // of the rows below
   std::array<float*, 14> pair{};  // sums of two rows; each as long as a row and its padding
   std::array<float*, 2> sums{};
-  std::int32_t* found = nullptr;  // as many as the frame is wide
+  std::int32_t* found = nullptr;  // as long as the frame is wide
 };
 
-/// Sets cells[x, y] to 1 where the 2x2 cell holds part of a point source, to 0 elsewhere. A source is a 2x2 window of
-/// sites, wherever it begins, that
+/// Sets cells[x, y] to 1 where the 2x2 cell holds a part of a point source, to 0 elsewhere. A source is a 2x2 window of
+/// sites, at any position, that
 ///   - is significant against the mean of the 14 x 14 sites around it without the inner 6 x 6, and no less than the
-///     windows beside it;
-///   - is seen, with 2.5 standard deviations, without its brightest site too: one hot site is no star;
-///   - stands on a background that is flat within its noise: what has structure is for the transform.
+///     adjacent windows;
+///   - is detected, at 2.5 standard deviations, without its brightest site too: one hot site is not a star;
+///   - lies on a background that is flat within its noise: structure is left to the transform.
 /// Nothing is found within source_margin sites of the border.
 /// @param memory one for each of the workers' threads
 /// @param cells  ceil(height / 2) x ceil(width / 2)
 void find_point_sources(const RawElectronsView& raw, const RawNoise& noise, const Workers& workers,
                         const SearchMemory* memory, PlaneView<std::uint8_t> cells);
 
-/// What would be at raw site (x, y) without the source: the mean of the sites of this kind in the 7 x 7 cells around
-/// that belong to none; the value itself if there are none.
+/// Returns the expected value at raw site (x, y) without the source: the mean of the sites of this kind in the 7 x 7
+/// cells around that belong to no source; the value itself if there are none.
 double background_e(const RawElectronsView& raw, PlaneView<const std::uint8_t> cells, int x, int y);
 
 }  // namespace lowlux::denoise

@@ -16,7 +16,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::denoise::rows::HWY_NAMESPACE {
 
-/// Sums of 2x2 cells.
+/// Returns the sums of 2x2 cells.
 HWY_INLINE VF sum4(const float* const rows[2], int i) {
   VF even0, odd0, even1, odd1;
   hn::LoadInterleaved2(Floats(), rows[0] + 2 * i, even0, odd0);
@@ -34,13 +34,13 @@ void Difference(const float* const fine[2], const float* coarse, int cells, floa
   }
 }
 
-/// A row of cells with its ends repeated: `row` can be read from -1 to cells.
+/// Repeats the ends of a row of cells: `row` can be read from -1 to cells.
 HWY_INLINE void repeat_ends(float* row, int cells) {
   row[-1] = row[0];
   row[cells] = row[cells - 1];
 }
 
-/// Three quarters of each cell and one quarter of its left or right neighbour.
+/// Computes three quarters of each cell plus one quarter of its left or right neighbour.
 template <bool kAdd>
 HWY_INLINE void up_columns(const float* row, int cells, float* out) {
   const Floats f;

@@ -2,15 +2,16 @@
 
 #include "denoise/spatial/layout.h"
 
-/// How much of its noise a block leaves, for the predicted residual variances. Denoiser and reference share the
-/// figures.
+/// Fractions of the noise that blocks and patches leave, for the predicted residual variances. Denoiser and reference
+/// share these values.
 namespace lowlux::denoise {
 
-/// Variance a block leaves in each of its cells, in units of its noise variance V, where squared gains g^2 add up to P:
+/// Factors of the variance that a block leaves in each of its cells, in units of its noise variance V, where squared
+/// gains g^2 add up to P:
 ///     kept (P - 1) + other (64 - P) + mean
-/// P - 1 counts the coefficients that are taken for signal. `other` is the noise that passes with the rest: a threshold
-/// of T standard deviations lets noise pass that has 2 T phi(T) more power than the V of each coefficient that is
-/// counted, and what coarser levels replace is less. It does not follow from P, where noise that passed is far above V.
+/// P - 1 counts the coefficients that are taken for signal. `other` is the noise that passes in the rest: a threshold
+/// of T standard deviations passes noise that has 2 T phi(T) more power than the V of each counted coefficient; where
+/// coarser levels replace it, it is less. It does not follow from P, where noise that passed is far above V.
 struct ResidualShares {
   float kept;
   float other;
@@ -19,10 +20,10 @@ struct ResidualShares {
 
 enum class PlaneKind : unsigned char { luma, chroma };
 
-/// Of `level` of `levels`. Finer levels give their coarse structure up to coarser ones, whose fine structure G3 and up2
-/// take away: one quarter of what is kept there counts. `other` is what tests/denoise/flat_noise measures on white
-/// noise: of the finest level within 3 %, of coarser ones, a tenth of it all, within a third. Cross-covariances between
-/// levels are in that of the finest.
+/// Returns the factors of `level` of `levels`. Coarser levels replace the coarse structure of finer ones and lose their
+/// own fine structure to G3 and up2: one quarter of their kept variance counts. `other` is measured on white noise by
+/// tests/denoise/flat_noise: within 3 % on the finest level, within a third on coarser ones, which are a tenth of the
+/// total. Cross-covariances between levels are included in that of the finest.
 constexpr ResidualShares residual_shares(PlaneKind kind, int pass, int step, int level, int levels) {
   struct Other {
     float finest;
@@ -36,11 +37,13 @@ constexpr ResidualShares residual_shares(PlaneKind kind, int pass, int step, int
   return {level == 0 ? 1.0f / 64 : 0.25f / 64, level == 0 ? o.finest : o.coarser, level + 1 == levels ? mean : 0};
 }
 
-/// Variance a patch of Level::best leaves in each of its cells, in units of V, where W is its group's filter:
+/// Factors of the variance that a patch of Level::best leaves in each of its cells, in units of V, where W is its
+/// group's filter:
 ///     trace tr W / 16 + squares tr W^2 / 16 + other
-/// `trace` is there because the pilot, which made W, has seen the same noise. `other` are blotches of the pilot that
-/// many patches of a group share: they stay, and W does not know of them. Similar chroma tells blotches of luma from
-/// each other, so that groups found by luma alone share more of them; what chroma leaves is in `trace`.
+/// `trace` is needed because the pilot, from which W is made, contains the same noise. `other` is blotches of the pilot
+/// that are common to many patches of a group: they stay, and W does not include them. Chroma similarity separates
+/// blotches of luma, so that groups found by luma alone have more of them in common; the remaining variance of chroma
+/// is in `trace`.
 struct PatchShares {
   float trace;
   float squares;
@@ -49,17 +52,17 @@ struct PatchShares {
 
 enum class FoundBy : unsigned char { luma, all_planes };
 
-/// On all levels but the coarsest. Of luma, `trace` and `squares` hold for texture within a fifth; of chroma, `squares`
-/// does, and `trace` is what flat frames leave. `other` makes up for three things there: white noise leaves 12e-6 and
-/// 74e-6; false point sources 1e-5 of V in all on the average, but in one place in ten megapixels; and G has a seventh
-/// more than the sum of its planes, as luma and chroma of one cell covary.
+/// Returns the factors on all levels but the coarsest. For luma, `trace` and `squares` hold for texture within a fifth;
+/// for chroma, `squares` does, and `trace` is measured on flat frames. `other` includes three terms for luma: white
+/// noise leaves 12e-6 and 74e-6; false point sources add 1e-5 of V on average, although in one place in ten megapixels;
+/// and G has a seventh more than the sum of its planes, as luma and chroma of one cell covary.
 constexpr PatchShares patch_shares(PlaneKind kind, FoundBy found_by) {
   if (kind == PlaneKind::chroma) return {0.08f, 0.6f, 0};
   return {0.21f, 0.5f, found_by == FoundBy::luma ? 86e-6f : 22e-6f};
 }
 
-/// By how much more the noise of a coarser level counts where chroma starts there: nothing finer takes it away. Not of
-/// the coarsest.
+/// Factor on the noise of a coarser level where chroma starts there: no finer level reduces it. It does not apply to
+/// the coarsest level.
 inline constexpr double as_finest = 2.8;
 
 }  // namespace lowlux::denoise

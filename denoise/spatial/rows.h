@@ -3,24 +3,25 @@
 #include <cstddef>
 #include <cstdint>
 
-/// The row kernels under Denoiser, dispatched at run time. Plain types only: their sources are compiled for several
-/// instruction sets, and shared inline code must not be. Rows are of cells (2x2 sites) of some pyramid level.
+/// The row kernels under Denoiser, dispatched at run time. Their interface has plain types only: their sources are
+/// compiled for several instruction sets, and must not share inline code. Rows consist of cells (2x2 sites) of a
+/// pyramid level.
 namespace lowlux::denoise::rows {
 
-/// Floats that may be read and written after the last of a row.
+/// Number of floats that may be read and written after the last of a row.
 inline constexpr int padding = 192;
 
-/// Memory for a kernel's own use, of at least as many floats as the kernel's ..._scratch() says. It begins as zeros
+/// Memory for a kernel's own use, of at least as many floats as the kernel's ..._scratch() returns. It is zero at first
 /// (see ScratchUse), and no other kernel uses it in between.
 struct RowScratch {
   float* data;
   std::size_t floats;
 };
 
-/// Blocks of one row that are transformed together: their coefficients stay in the first-level cache.
+/// Number of blocks of one row that are transformed together: their coefficients stay in the first-level cache.
 inline constexpr int strip_blocks = 32;
 
-/// One row of cells from two raw rows, which hold an even number of samples each (see raw_of).
+/// Input for one row of cells: two raw rows, which hold an even number of samples each (see raw_of).
 struct PackRow {
   const float* raw[2];  // the row with red, the row with blue
   bool red_is_odd;      // red lies in odd columns
@@ -30,13 +31,14 @@ struct PackRow {
   float saturation_e[3];
 };
 struct PackedRow {
-  float* raw_e[3];   // R, mean of both greens, B, dark in, as measured
-  float* saturated;  // 1 where a site is, else 0
-  float* plane[4];   // L, C1, C2, C3; null: not wanted, nor is `saturated`
+  float* raw_e[3];   // R, mean of both greens, B, dark charge included, as measured
+  float* saturated;  // 1 where a site is saturated, else 0
+  float* plane[4];   // L, C1, C2, C3; null: neither these nor `saturated` are wanted
 };
 void pack_row(const PackRow& in, const PackedRow& out);
 
-/// Variances of the four planes in one row of half size, from the ten rows of R, G, B around its two rows of cells.
+/// Input for variances of the four planes in one row of half width: the ten rows of R, G, B around its two rows of
+/// cells.
 struct VarianceRow {
   const float* raw_e[3][10];  // read from 4 cells before to 4 cells after
   int cells;
@@ -47,62 +49,63 @@ struct VarianceRow {
 std::size_t variance_scratch(int cells);
 void variance_row(const VarianceRow& in, const RowScratch& scratch, float* const out[4]);
 
-/// Sum of `count` samples, those that are not a number as 0, limited to +-1e9.
+/// Returns the sum of `count` samples, with NaN as 0, each limited to +-1e9.
 double sum_of(const float* in, int count);
 
-/// Means of 2x2 cells times `scale`.
+/// Computes means of 2x2 cells times `scale`.
 void down2_row(const float* const in[2], int out_cells, float scale, float* out);
 
-/// coarse - mean of 2x2 cells.
+/// Computes coarse - mean of 2x2 cells.
 void difference_row(const float* const fine[2], const float* coarse, int cells, float* out);
 
-/// Bilinear upsampling of one row, `near` and `far` being the coarse rows at 1/4 and 3/4 of a cell's distance.
+/// Input for bilinear upsampling of one row, `near` and `far` being the coarse rows at 1/4 and 3/4 of a cell's
+/// distance.
 struct UpRow {
   const float* near[3];  // only the middle one is read by smooth_row
   const float* far[3];
   int coarse_cells;
 };
 std::size_t up_scratch(int coarse_cells);
-/// inout += up2 of the 3x3 binomial mean of the rows.
+/// Computes inout += up2 of the 3x3 binomial mean of the rows.
 void add_correction_row(const UpRow& in, const RowScratch& scratch, float* inout);
-/// out = up2 of near[1], far[1].
+/// Computes out = up2 of near[1], far[1].
 void smooth_row(const UpRow& in, const RowScratch& scratch, float* out);
 
-/// inout = (1 - share) inout + share coarse.
+/// Computes inout = (1 - share) inout + share coarse.
 void blend_row(const float* coarse, const float* share, int cells, float* inout);
-/// inout = (1 - share) own + inout.
+/// Computes inout = (1 - share) own + inout.
 void add_residual_row(const float* own, const float* share, int cells, float* inout);
 
-/// See residual_shares.h.
+/// Factors of the variance that blocks leave; see ResidualShares.
 struct ResidualOfBlocks {
   float kept;
   float other;
   float mean;
 };
 
-/// All blocks with their corner on one row of cells.
+/// Input of all blocks with their corner on one row of cells.
 struct BlockRow {
   const float* noisy[4];     // L, C1, C2, C3
-  const float* pilot[4];     // null: hard thresholds
-  std::ptrdiff_t stride;     // of both
-  const float* variance[4];  // of half size
+  const float* pilot[4];     // result of pass 0; null: hard thresholds
+  std::ptrdiff_t stride;     // of both `noisy` and `pilot`
+  const float* variance[4];  // of half width and height
   std::ptrdiff_t variance_stride;
   int blocks;
   int step;                    // cells from one block to the next, 2 or 4
   ResidualOfBlocks left[2];    // luma, chroma
   const std::uint8_t* chroma;  // for each strip, whether C1, C2, C3 are wanted; null: nowhere
 };
-/// What blocks add up to: 8 rows of cells, 4 rows of half size.
+/// Weighted sums of blocks: 8 rows of cells, 4 rows of half width.
 struct BlockSums {
   float* value[4][8];
   float* weight[4][4];
   float* residual[4][4];
 };
-/// For rows of up to `cells` cells.
+/// Returns the scratch size for rows of up to `cells` cells.
 std::size_t block_scratch(int cells);
 void shrink_block_row(const BlockRow& in, const RowScratch& scratch, const BlockSums& sums);
 
-/// Divides two rows of sums, and one of half size, by their weight; nothing where there is none.
+/// Two rows of sums, and one of half width, to be divided by their weight; a sum without weight gives 0.
 struct SumRows {
   const float* value[2];
   const float* weight;
@@ -123,7 +126,7 @@ struct Slopes {
 /// Adds the slopes of a row of luma, given with those above and below and read one cell beyond both ends, to C2 and C3.
 void add_slope_row(const float* const (&luma)[3], int cells, const Slopes& slopes, float* const (&chroma)[2]);
 
-/// One row of cells back to two raw rows of 2 cells samples.
+/// Input for converting one row of cells to two raw rows of 2 cells samples.
 struct UnpackRow {
   const float* plane[4];
   const float* residual[4];
@@ -132,7 +135,7 @@ struct UnpackRow {
   float rho;  // < 0: no prior
   float per_gain[3];
   bool red_is_odd;
-  const float* luma_beside[2];  // above and below
+  const float* luma_beside[2];  // rows above and below
   Slopes slopes;
 };
 struct UnpackedRow {
@@ -142,13 +145,14 @@ struct UnpackedRow {
 };
 void unpack_row(const UnpackRow& in, const UnpackedRow& out);
 
-/// Sums of two raw rows, samples as in sum_of.
+/// Computes the sums of two raw rows, samples as in sum_of.
 void pair_row(const float* upper, const float* lower, int width, float* out);
 
-/// Windows of 2x2 sites in one row of them: pair[3] is the sum of the window's rows, pair[i] that 2 (i - 3) rows below.
+/// Input for windows of 2x2 sites in one row of them: pair[3] is the sum of the window's rows, pair[i] that 2 (i - 3)
+/// rows below.
 struct WindowRow {
   const float* pair[7];
-  const float* above;  // sums of two rows one row above the windows, and one below
+  const float* above;  // sums of two rows one row above the windows; `below` one row below
   const float* below;
   int first;  // column of the first window, at least 6
   int last;   // one beyond the last; 8 columns more are read
@@ -158,8 +162,8 @@ struct WindowRow {
   float* inner;  // scratch, as long as a row and its padding
   float* outer;
 };
-/// Columns of windows whose excess t over the mean around has t > 0, t^2 / (2 V) >= significance, and that no window
-/// one site away clearly exceeds: necessary conditions of those in point_sources.h. Gives how many.
+/// Finds the columns of windows whose excess t over the mean around has t > 0, t^2 / (2 V) >= significance, and that no
+/// window one site away clearly exceeds: necessary conditions of those in point_sources.h. Returns their number.
 int bright_windows(const WindowRow& in, std::int32_t* columns);
 
 const char* target_name();

@@ -9,8 +9,8 @@
 namespace lowlux::denoise {
 namespace {
 
-/// Calls blend(i, before, after, share of after) for each i of 0..count - 1 that is a hole: from the nearest before and
-/// after that are none, or twice from the only one; for none if all are holes.
+/// Calls blend(i, before, after, fraction of after) for each i of 0..count - 1 that is a hole: with the nearest valid
+/// index before and after, or twice with the only one; with none if all are holes.
 template <class Hole, class Blend>
 void over_holes(int count, const Hole& hole, const Blend& blend) {
   for (int i = 0; i < count; ++i) {
@@ -28,8 +28,8 @@ void over_holes(int count, const Hole& hole, const Blend& blend) {
 
 constexpr int widest = 1 << (most_levels - 1);  // cells of a tile, each way
 
-/// Works on tiles, each a cell of the coarsest level. Of `value[0]`, plane 0 holds the share of cells that are seen,
-/// the others their mean chroma, in tiles that hold saturated cells and in those beside them: no other is read.
+/// Fill that works on tiles, each a cell of the coarsest level. In `value[0]`, plane 0 holds the fraction of valid
+/// cells, the others their mean chroma, in tiles that hold saturated cells and in adjacent ones: no others are read.
 struct Fill {
   const FrameMemory& memory;
   int levels;
@@ -39,7 +39,7 @@ struct Fill {
   const std::uint8_t* saturated(int y) const { return memory.saturated.row(y); }
   float* value(int level, int p, int y) const { return memory.level[level].value[0].row(p, y); }
 
-  /// Whether a tile holds saturated cells.
+  /// Returns a row of flags: whether each tile holds saturated cells.
   float* held(int tile_y) const { return coarsest().value[1].row(0, tile_y); }
 
   void find(int tile_y) const {
@@ -75,7 +75,7 @@ struct Fill {
     return out;
   }
 
-  /// Calls work(first x, one beyond the last, y) for the rows of a tile on a level.
+  /// Calls work(first x, last x + 1, y) for the rows of a tile on a level.
   template <class Work>
   void for_rows(int level, int tile_x, int tile_y, const Work& work) const {
     const int n = side(level);
@@ -143,7 +143,7 @@ struct Fill {
     for (int p = 1; p < 4; ++p) {
       const float *const upper = value(level + 1, p, near_y), *const lower = value(level + 1, p, far_y);
       float* const out = value(level, p, y);
-      std::array<float, widest / 2 + 2> between{};  // from the coarser cell before to that after
+      std::array<float, widest / 2 + 2> between{};  // coarser cells, with one before and one after the tile
       const int before = first / 2 - 1, count = (last - first) / 2;
       for (int i = 0; i < count + 2; ++i) {
         const int x = std::clamp(before + i, 0, coarse.width - 1);

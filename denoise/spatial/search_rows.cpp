@@ -35,7 +35,7 @@ void PairRow(const float* upper, const float* lower, int width, float* out) {
   store(hn::Add(number(hn::Load(f, last[0])), number(hn::Load(f, last[1]))), out + i);
 }
 
-/// The largest of the eight windows one site away from those of columns x and on.
+/// Returns the largest of the eight windows one site away from those of columns x and on.
 HWY_INLINE VF brightest_beside(const WindowRow& in, int x) {
   VF most = constant(-4e9f);
   for (const float* row : {in.above, in.pair[3], in.below}) {
@@ -49,7 +49,7 @@ HWY_INLINE VF brightest_beside(const WindowRow& in, int x) {
 
 int BrightWindows(const WindowRow& in, std::int32_t* columns) {
   const Floats f;
-  for (int x = in.first - 6; x < in.last + 6; x += lanes()) {  // windows above each other: the inner three, the others
+  for (int x = in.first - 6; x < in.last + 6; x += lanes()) {  // vertical sums of windows: the inner three, the others
     const auto two = [&](int k) HWY_ATTR { return hn::Add(load(in.pair[k] + x), load(in.pair[k] + x + 1)); };
     store(hn::Add(two(2), hn::Add(two(3), two(4))), in.inner + x);
     store(hn::Add(hn::Add(two(0), two(1)), hn::Add(two(5), two(6))), in.outer + x);
@@ -67,7 +67,7 @@ int BrightWindows(const WindowRow& in, std::int32_t* columns) {
     const VF excess = hn::Max(hn::Sub(own, mean), hn::Zero(f));
     const auto bright = hn::Ge(hn::Mul(excess, excess), hn::Mul(constant(2 * 1.025f * in.significance), one));
     if (HWY_LIKELY(hn::AllFalse(f, bright))) continue;
-    // Rounding of single precision is no difference: who calls decides in double.
+    // Rounding of single precision does not matter: the caller decides in double.
     const auto slack = [](VF v) HWY_ATTR { return hn::Mul(constant(1e-5f), hn::Abs(v)); };
     const VF beside = brightest_beside(in, x);
     const auto peak = hn::Ge(hn::Add(own, slack(own)), hn::Sub(beside, slack(beside)));

@@ -21,10 +21,10 @@ namespace lowlux::denoise::rows::HWY_NAMESPACE {
 /// Memory for one plane's row of blocks. Before the first block and after the last, weights are 0.
 struct RowMemory {
   Strip* strip;
-  float* cells;     // one row of half size
+  float* cells;     // one row of half width
   float* variance;  // of each block
   float* weight;    // of each block
-  float* residual;  // weight times variance left
+  float* residual;  // weight times remaining variance
 };
 
 std::size_t memory_row(int cells) { return (static_cast<std::size_t>(cells) + padding + 15) / 16 * 16; }
@@ -35,7 +35,8 @@ HWY_INLINE RowMemory row_memory(float* scratch, int row) {
   return {reinterpret_cast<Strip*>(scratch), after, after + size, after + 2 * size + 16, after + 3 * size + 16};
 }
 
-/// Mean variance of each block, from four rows of half size whose values are a quarter of the mean over 2x2 cells.
+/// Computes the mean variance of each block, from four rows of half width whose values are a quarter of the mean over
+/// 2x2 cells.
 template <int kStep>
 HWY_INLINE void block_variances(const float* from, std::ptrdiff_t stride, int blocks, const RowMemory& m) {
   const int cells = (blocks - 1) * kStep / 2 + 4, n = lanes();
@@ -55,12 +56,12 @@ HWY_INLINE void block_variances(const float* from, std::ptrdiff_t stride, int bl
       hn::LoadInterleaved2(Floats(), at + 2, even1, odd1);
       four = hn::Add(hn::Add(even0, odd0), hn::Add(even1, odd1));
     }
-    // Places after the last block hold anything; 1e-30 keeps every quotient finite there.
+    // Places after the last block hold arbitrary values; 1e-30 keeps every quotient finite there.
     store(hn::Max(hn::Mul(constant(0.25f), four), constant(1e-30f)), m.variance + i);
   }
 }
 
-/// One plane of one strip: blocks first .. first + count - 1.
+/// Filters one plane of one strip: blocks first .. first + count - 1.
 template <int kStep>
 HWY_INLINE void shrink_strip(const BlockRow& in, int plane, int first, int count, const RowMemory& m,
                              const BlockSums& sums) {
@@ -96,7 +97,7 @@ HWY_INLINE void shrink_strip(const BlockRow& in, int plane, int first, int count
   add_columns<kStep>(s, count, kStep * first, sums.value[plane]);
 }
 
-/// Adds what each block has to the four rows of half size it covers.
+/// Adds one value of each block to the four rows of half width that the block covers.
 template <int kStep>
 HWY_INLINE void add_blocks(const float* of_block, int blocks, float* const (&rows)[4]) {
   const int n = lanes();
@@ -120,7 +121,7 @@ HWY_INLINE void add_blocks(const float* of_block, int blocks, float* const (&row
 
 template <int kStep>
 HWY_INLINE void shrink_row(const BlockRow& in, const RowMemory& m, std::size_t row, const BlockSums& sums) {
-  // Strip by strip, and in each all planes: chroma needs to know what luma kept.
+  // Process strip by strip, and in each all planes: chroma depends on the luma coefficients that are kept.
   const int strips = (in.blocks + strip_blocks - 1) / strip_blocks;
   const int planes = in.chroma == nullptr ? 1 : 4;
   const auto of_plane = [&](int plane) HWY_ATTR {

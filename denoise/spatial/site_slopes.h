@@ -4,17 +4,17 @@
 #include "denoise/spatial/frame_memory.h"
 #include "isp/base/cfa.h"
 
-/// The sites of a 2x2 cell lie a quarter of a cell beside its middle. Where the luma has a slope they differ by it,
-/// which C2 = (R - B) / sqrt 2 and C3 = G1 - G2 take for colour; left to thresholds that colour is lost, and cells
-/// become steps. So what the luma's own slope explains is taken off before, and put back with the slope of the denoised
-/// luma:
+/// Correction for the positions of sites: those of a 2x2 cell lie a quarter of a cell from its middle. Where the luma
+/// has a slope they differ by it, and this appears as colour in C2 = (R - B) / sqrt 2 and C3 = G1 - G2; thresholds
+/// would remove that colour, and cells would become steps. So the part explained by the luma's own slope is subtracted
+/// first, and added back with the slope of the denoised luma:
 ///     C2 -> C2 -+ (sx gx + sy gy) / (2 sqrt 2),   C3 -> C3 -+ (sy gy - sx gx) / 2
 /// gx is the harmonic mean of L(x) - L(x - 1) and L(x + 1) - L(x), 0 where they differ in sign (van Leer's limiter:
-/// beside a lamp there is a step and no slope), gy likewise, edges repeated; (sx, sy) are the signs of R's offset. What
-/// is taken off of noise adds less than 3 % to that of C2 and C3. Greys without slope stay as they are.
+/// next to a lamp there is a step and not a slope), gy likewise, edges repeated; (sx, sy) are the signs of R's offset.
+/// The subtraction adds less than 3 % to the noise of C2 and C3. Greys without slope stay as they are.
 namespace lowlux::denoise {
 
-/// C2 += c2_x gx + c2_y gy, C3 += c3_x gx + c3_y gy.
+/// Factors of C2 += c2_x gx + c2_y gy, C3 += c3_x gx + c3_y gy.
 struct SiteSlopes {
   float c2_x;
   float c2_y;
@@ -22,14 +22,14 @@ struct SiteSlopes {
   float c3_y;
 };
 
-/// What puts slopes back; the negative takes them off.
+/// Returns the factors that add slopes; their negatives subtract them.
 SiteSlopes site_slopes(BayerPhase phase);
 
-/// Repeats the luma's first and last column beside every row, before rows are read: each row is read by the threads of
-/// its neighbours too.
+/// Repeats the luma's first and last column at both ends of every row. This comes before rows are read, because each
+/// row is read by the threads of its neighbours too.
 void repeat_luma_edges(const PlaneSet& planes, int columns, int rows, const Workers& workers);
 
-/// Rows of the luma around row y of `rows`.
+/// The rows of the luma above, at and below row y of `rows`.
 struct LumaRows {
   const float* above;
   const float* own;
@@ -37,7 +37,8 @@ struct LumaRows {
 };
 LumaRows luma_rows(const PlaneSet& planes, int y, int rows);
 
-/// Takes the slopes off the finest planes of a frame of columns x rows cells, and mirrors C2 and C3 anew beyond it.
+/// Subtracts the slopes from the finest planes of a frame of columns x rows cells, and mirrors C2 and C3 anew beyond
+/// it.
 void take_slopes_off(const PyramidLevel& level, BayerPhase phase, int columns, int rows, const Workers& workers);
 
 }  // namespace lowlux::denoise

@@ -1,5 +1,5 @@
-// One strip of blocks through its transforms, for shrink_rows.cpp. Included once for each instruction set: hence a
-// guard that toggles in place of #pragma once.
+// Transforms of one strip of blocks, for shrink_rows.cpp. Included once for each instruction set: hence a guard that
+// toggles instead of #pragma once.
 #if defined(LOWLUX_DENOISE_STRIP_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LOWLUX_DENOISE_STRIP_INL_H
 #undef LOWLUX_DENOISE_STRIP_INL_H
@@ -17,14 +17,14 @@
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::denoise::rows::HWY_NAMESPACE {
 
-// Lanes are blocks beside each other. Column c of block i is cell step * i + c, i.e. place i + c / step of the run of
-// the cells of phase c % step: rows are split into such runs once, and everything after that is contiguous.
+// Lanes are adjacent blocks. Column c of block i is cell step * i + c, i.e. place i + c / step of the run of the cells
+// of phase c % step: rows are split into such runs once, so that all later accesses are contiguous.
 
-constexpr int run = strip_blocks + 32;  // places of one run in a strip, those of the last blocks' columns included
+constexpr int run = strip_blocks + 32;  // places of one run in a strip, including the columns of the last blocks
 constexpr int lead = 16;                // empty places before a strip's blocks, which shifted reads may touch
 constexpr int places = lead + run;
 
-/// Memory for one strip, zeros at first: what no strip writes, before the first block and after the last, stays 0.
+/// Memory for one strip, zero at first: places that no strip writes, before the first block and after the last, stay 0.
 struct Strip {
   float noisy[8][4][run];  // vertical frequency, phase, place
   float pilot[8][4][run];
@@ -50,7 +50,7 @@ struct Interleaved<4> {
   }
 };
 
-/// Vertical transform of the cells of `count` blocks, split into runs.
+/// Computes the vertical transform of the cells of `count` blocks, split into runs.
 template <int kStep>
 HWY_INLINE void transform_columns(const float* from, std::ptrdiff_t stride, int count, float (*out)[4][run]) {
   HWY_ALIGN float rows[8][4 * hn::MaxLanes(Floats())];
@@ -76,7 +76,7 @@ HWY_INLINE void coefficients(const float (*from)[run], int place, VF (&x)[8]) {
   forward8(x);
 }
 
-/// What a group of blocks keeps: the sum of squared gains.
+/// Hard threshold of the luma of a group of blocks, with gains 0 or 1.
 struct HardLuma {
   VF least;
   HWY_INLINE explicit HardLuma(VF variance) : least(hn::Mul(constant(9), variance)) {}
@@ -96,7 +96,7 @@ struct HardChroma {
   }
 };
 
-/// Hard thresholds of one group of blocks; the sum of its gains.
+/// Applies hard thresholds to one group of blocks, and returns the sum of the gains.
 template <int kStep, class Rule>
 HWY_INLINE VF threshold(Strip& s, int place, const Rule& rule) {
   VF power = hn::Zero(Floats());
@@ -115,7 +115,7 @@ HWY_INLINE VF threshold(Strip& s, int place, const Rule& rule) {
   return power;
 }
 
-/// Empirical Wiener gains of one group of blocks; the sum of their squares.
+/// Applies empirical Wiener gains to one group of blocks, and returns the sum of their squares.
 template <int kStep>
 HWY_INLINE VF wiener(Strip& s, int place, VF variance) {
   VF power = hn::Zero(Floats());
@@ -136,7 +136,7 @@ HWY_INLINE VF wiener(Strip& s, int place, VF variance) {
   return power;
 }
 
-/// Weighted blocks, overlaid, through the inverse vertical transform, added to eight rows.
+/// Adds weighted, overlapping blocks to eight rows, through the inverse vertical transform.
 template <int kStep>
 HWY_INLINE void add_columns(const Strip& s, int count, int first_cell, float* const (&rows)[8]) {
   HWY_ALIGN float row[4 * hn::MaxLanes(Floats())];

@@ -20,12 +20,12 @@ using rows::blocks_of_strip;
 using rows::motion_block;
 using rows::sites_of_strip;
 
-constexpr double largest_share = 1e6;  // a history that is worth nothing
-constexpr double most_light = 1e6;     // up or down, beyond which it is
+constexpr double largest_share = 1e6;  // relative variance of a history without value
+constexpr double most_light = 1e6;     // ratio, up or down, beyond which a history has no value
 
 constexpr int rounded_up(int n, int unit) { return (n + unit - 1) / unit * unit; }
 
-/// What a strip at the end of rows is copied to and from.
+/// Buffers for a strip at the end of rows, which is copied in and out.
 struct StripMemory {
   std::array<std::array<float, sites_of_strip>, motion_block> raw{};
   std::array<std::array<float, sites_of_strip>, motion_block> out{};
@@ -41,7 +41,7 @@ struct StripMemory {
   return good && within(options.most_frames, 2, 256);
 }
 
-/// All that outlives a frame, for the largest one.
+/// State that is kept between frames, sized for the largest one.
 struct Memory {
   Memory(int max_width, int max_height, int threads)
       // Rows are an odd number of cache lines: at a power of two, those that are read together would share cache sets.
@@ -55,18 +55,18 @@ struct Memory {
   }
 
   Plane<float> mean_e;  // without dark charge
-  Plane<float> share;   // of each block: variance of the mean over that of a raw value
+  Plane<float> share;   // of each block: ratio of the variance of the mean to that of a raw value
   Plane<std::uint8_t> moved;
-  std::vector<StripMemory> strip;  // of each thread
-  std::vector<long long> count;    // of blocks that moved, of each thread
+  std::vector<StripMemory> strip;  // one for each thread
+  std::vector<long long> count;    // number of blocks that moved, for each thread
   bool empty = true;
-  int width = 0;  // of the last frame
+  int width = 0;  // of the previous frame
   int height = 0;
   BayerPhase phase = BayerPhase::rggb;
   rows::SiteNoise noise{};
 };
 
-/// One call of TemporalMean::run.
+/// State of one call of TemporalMean::run.
 struct Frame {
   Memory& memory;
   const RawElectronsView& raw;
@@ -74,7 +74,7 @@ struct Frame {
   double light;
   TemporalOptions options;
   bool first;
-  int columns = (raw.value.width + motion_block - 1) / motion_block;  // of blocks
+  int columns = (raw.value.width + motion_block - 1) / motion_block;  // number of blocks
   int rows = (raw.value.height + motion_block - 1) / motion_block;
 
   float least_weight() const { return 1 / static_cast<float>(options.most_frames); }
@@ -89,7 +89,8 @@ struct Frame {
   void take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const;
 };
 
-/// Eight rows of a strip, those beyond the frame being its last. Where the frame ends before the strip does, a copy.
+/// Returns eight rows of a strip; the last row of the frame replaces those beyond it. A strip that extends beyond the
+/// end of rows is copied.
 std::array<const float*, motion_block> Frame::raw_rows(int x, int y, StripMemory& strip) const {
   const int width = std::min(sites_of_strip, raw.value.width - x);
   std::array<const float*, motion_block> out{};
@@ -102,10 +103,10 @@ std::array<const float*, motion_block> Frame::raw_rows(int x, int y, StripMemory
   return out;
 }
 
-/// The mean's variance over that of a raw value, where neither light nor noise is that of the mean any more: it changes
-/// by light^2 times the raw value's variance before, over that now. Both by the block's mean of each colour: a site's
-/// own would let the weights of values depend on their noise.
-/// @param sums  of the block's columns over even and odd rows, in the light of now
+/// Returns the mean's variance over that of a raw value after a change of light or noise: the ratio changes by light^2
+/// times the raw value's variance before, over that now. Both come from the block's mean of each colour: a site's own
+/// value would make the weights of values depend on their noise.
+/// @param sums  of the block's columns over even and odd rows, in the light of this frame
 double Frame::share_now(double share, const std::array<const float*, 2>& sums, int width, int height) const {
   std::array<double, 3> sum{}, count{};
   for (int y = 0; y < 2; ++y) {
@@ -154,7 +155,7 @@ void Frame::find(int y, const MotionThresholds& at, StripMemory& strip) const {
     const int left = motion_block * x;
     const auto raw_row = raw_rows(left, y, strip);
     for (int r = 0; r < motion_block; ++r) {
-      const int source = r ^ red_row(raw.phase);  // that with red first
+      const int source = r ^ red_row(raw.phase);  // the row with red first
       in.raw[r] = raw_row[source];
       in.mean_e[r] = memory.mean_e.row(motion_block * y + source) + left;
       in.inside[r] = motion_block * y + source < raw.value.height;
@@ -165,7 +166,7 @@ void Frame::find(int y, const MotionThresholds& at, StripMemory& strip) const {
   }
 }
 
-/// A block that moved by itself, or at the lower threshold beside such a one.
+/// Returns whether a block moved by itself, or at the lower threshold next to one that did.
 bool Frame::has_moved(int x, int y) const {
   const auto level = [this](int u, int v) { return static_cast<int>(memory.moved.at(u, v)); };
   if (level(x, y) != 1) return level(x, y) == 2;
@@ -177,8 +178,8 @@ bool Frame::has_moved(int x, int y) const {
   return false;
 }
 
-/// Takes a row of blocks in.
-/// @return how many of them moved
+/// Adds a row of blocks to the mean.
+/// @return the number of blocks that moved
 long long Frame::update(int y, PlaneView<float> out, StripMemory& strip) const {
   rows::UpdateStrip in{};
   in.rows = std::min(motion_block, raw.value.height - motion_block * y);
@@ -214,7 +215,7 @@ long long Frame::update(int y, PlaneView<float> out, StripMemory& strip) const {
   return moved;
 }
 
-/// Those of a row of blocks, for each cell.
+/// Writes the variance ratios of a row of blocks, for each cell.
 void Frame::put_shares(int y, PlaneView<float> map) const {
   constexpr int cells = motion_block / 2;
   for (int v = cells * y; v < std::min(cells * (y + 1), map.height); ++v) {
@@ -222,7 +223,7 @@ void Frame::put_shares(int y, PlaneView<float> map) const {
   }
 }
 
-/// Counts blocks that move in memory.count.
+/// Adds the frame to the mean, and counts blocks that moved in memory.count.
 void Frame::take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const {
   const bool same = light == 1 && noise == memory.noise;
   const MotionThresholds at = motion_thresholds(options.false_alarm);
@@ -230,7 +231,7 @@ void Frame::take_in(const Workers& workers, PlaneView<float> out, PlaneView<floa
     if (!same) rescale(y, strip);
     find(y, at, strip);
   };
-  // The ends of bands first, for those beside them. Inside of a band the rest follows where it is still in the cache.
+  // Compare the ends of each thread's rows first, as neighbours need them. The other rows follow while in the cache.
   if (!first) {
     in_bands(workers, rows, [&](int top, int bottom, int thread) {
       compare(top, memory.strip[thread]);

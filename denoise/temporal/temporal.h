@@ -9,41 +9,43 @@
 namespace lowlux::denoise {
 
 struct TemporalOptions {
-  double false_alarm = 1e-3;  // share of blocks of a still scene that are taken to move, 1e-6..0.5
-  int most_frames = 32;       // 2..256: the newest frame weighs 1 / most_frames at least
+  double false_alarm = 1e-3;  // fraction of blocks of a still scene that are detected as moving, 1e-6..0.5
+  int most_frames = 32;       // 2..256: the newest frame has a weight of at least 1 / most_frames
 };
 
 /// Recursive mean over the frames of a video, in electrons, of what does not move. README.md has the equations, and
-/// tests/reference/temporal_ref.h the same in plain double.
+/// tests/reference/temporal_ref.h is a plain double implementation.
 ///
-/// Blocks of 8 x 8 sites are compared with the mean so far. Those that differ by more than the noise model explains,
-/// and those beside them at a lower threshold, start anew. After n <= most_frames still frames of equal light the
-/// mean's variance is 1 / n of a raw value's; with more of them it falls to 1 / (2 most_frames - 1).
+/// Blocks of 8 x 8 sites are compared with the mean of the previous frames. Those that differ by more than the noise
+/// model explains, and their neighbours at a lower threshold, start anew. After n <= most_frames still frames of equal
+/// light the mean's variance is 1 / n of a raw value's; with more frames it falls to 1 / (2 most_frames - 1).
 ///
-/// Owns its memory and allocates only in the constructor; does one frame at a time. The result is the same, bit for
-/// bit, for every number of threads and every instruction set.
+/// Owns its memory, allocates only in the constructor, and processes one frame at a time. The result is bit-identical
+/// for every number of threads and every instruction set.
 class TemporalMean {
  public:
-  /// For mosaics of up to max_width x max_height pixels, each 2..65536, and up to `threads` of an executor's threads.
-  /// Takes 4.1 bytes for each pixel, rows rounded up to 128 pixels, and 9 KB for each thread.
+  /// Allocates for mosaics of up to max_width x max_height pixels, each 2..65536, and up to `threads` of an executor's
+  /// threads: 4.1 bytes for each pixel, rows rounded up to 128 pixels, and 9 KB for each thread.
   TemporalMean(int max_width, int max_height, int threads);
   ~TemporalMean();
   TemporalMean(const TemporalMean&) = delete;
   TemporalMean& operator=(const TemporalMean&) = delete;
 
-  /// Forgets all frames: to be called where a stream starts, frames are missing, or the mode changes.
+  /// Forgets all frames. Call it where a stream starts, frames are missing, or the mode changes.
   void reset();
 
-  /// Takes a frame in. One of another size or phase than the one before is the first, as after reset().
+  /// Adds a frame to the mean. If its size or phase differs from that of the previous frame, it is the first, as after
+  /// reset().
   /// @param raw  at least 2 x 2 pixels; any phase, odd sizes too
   /// @param noise  of this frame; the dark charge and the variance may change from frame to frame
-  /// @param light  how many times the signal [e-] of the frame before the same scene gives in this one: the ratio of
+  /// @param light  ratio of the signal [e-] of a scene in this frame to that in the previous frame: the ratio of
   /// exposure times, where only they change. > 0 and finite; beyond 1e-6..1e6 the frame is the first
   /// @param mean_e  as large as `raw`: the mean scaled to this frame's light, with this frame's dark charge in it, as
-  /// `raw` has. Sites that are saturated in this frame, and blocks that moved, are as in `raw`. May not overlap `raw`
-  /// @param variance_share  variance of mean_e over that of `raw`, for each 2x2 cell, ceil(width / 2) x
-  /// ceil(height / 2); without data it is left out
-  /// @return the share of blocks that moved; 1 for the first frame
+  /// `raw` has. Sites that are saturated in this frame, and blocks that moved, are as in `raw`. May not overlap
+  /// `raw`
+  /// @param variance_share  variance of mean_e over that of `raw`, for each 2x2 cell, ceil(width / 2) x ceil(height /
+  /// 2); without data it is not written
+  /// @return the fraction of blocks that moved; 1 for the first frame
   double run(const RawElectronsView& raw, const RawNoise& noise, double light, const TemporalOptions& options,
              PlaneView<float> mean_e, PlaneView<float> variance_share, Executor& executor);
 

@@ -10,7 +10,7 @@
 #include <hwy/foreach_target.h>  // compiles this file once more for each instruction set
 #include <hwy/highway.h>
 
-// Decisions must be those of every processor: no fused products, no estimates.
+// Decisions must be identical on every processor: no fused products, no estimates.
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::denoise::rows::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -28,10 +28,10 @@ HWY_INLINE void store(VF v, float* to) { hn::StoreU(v, Floats(), to); }
 HWY_INLINE int lanes() { return static_cast<int>(hn::Lanes(Floats())); }
 HWY_INLINE VF limited(VF x) { return hn::Min(hn::Max(x, constant(-1e9f)), constant(1e9f)); }
 
-/// What is not a number to 0, the rest to +-1e9.
+/// Returns 0 for NaN, and otherwise x limited to +-1e9.
 HWY_INLINE VF usable(VF x) { return limited(hn::IfThenElseZero(hn::Eq(x, x), x)); }
 
-/// Figures of each cell of a strip, whose sums over 4 cells are those of a block. In threes: of R, G, B.
+/// Statistics of each cell of a strip, whose sums over 4 cells are those of a block. Some are in threes: of R, G, B.
 struct Sums {
   enum Figure {
     squares,
@@ -46,7 +46,7 @@ struct Sums {
   float figure[all][cells_of_strip];
 };
 
-/// One colour in two rows of cells.
+/// Sums of one colour in two rows of cells.
 struct OfColour {
   VF squares;
   VF change;
@@ -54,7 +54,7 @@ struct OfColour {
   VF count;
 };
 
-/// One site of each cell. Where it is saturated both in the frame and in the mean, it does not count.
+/// Adds one site of each cell. A site that is saturated both in the frame and in the mean does not count.
 HWY_INLINE void add_site(VF raw, VF before, float dark_e, float saturation_e, MF there, OfColour& sum) {
   const VF most = constant(saturation_e), y = hn::Min(hn::Sub(usable(raw), constant(dark_e)), most);
   const MF counts = hn::And(there, hn::Lt(hn::Min(y, before), most));
@@ -84,8 +84,8 @@ HWY_INLINE void add_cells(const MotionStrip& in, int pair, int i, OfColour (&sum
   }
 }
 
-/// Adds the figures of one colour in groups of 2 x 2 cells. They share a variance x of their raw values, told by the
-/// updated mean, which a change does not correlate with. Changes weigh 1 / x, their squares too.
+/// Adds the statistics of one colour in groups of 2 x 2 cells. A group has one variance x of its raw values, estimated
+/// from the updated mean, with which a change is not correlated. Changes have weight 1 / x, and so have their squares.
 HWY_INLINE void add_group(const SiteNoise& noise, int c, VF weight, const OfColour& own, VF (&sum)[Sums::all]) {
   const Floats f;
   const VF steady = constant(noise.variance_e2[c]), mean = hn::Add(own.before, hn::Mul(weight, own.change));
@@ -121,14 +121,14 @@ HWY_INLINE void sum_cells(const MotionStrip& in, const float* weights, Sums& out
   }
 }
 
-/// Sums over the cells of blocks.
+/// Returns the sums over the cells of blocks.
 HWY_INLINE VF of_blocks(const Sums& sums, int figure, int first) {
   VF a, b, c, d;
   hn::LoadInterleaved4(Floats(), sums.figure[figure] + 4 * first, a, b, c, d);
   return hn::Add(hn::Add(a, b), hn::Add(c, d));
 }
 
-/// Whether a gamma variable of this mean and variance is above its threshold.
+/// Returns whether x exceeds the threshold of a gamma variable of this mean and variance.
 HWY_INLINE MF exceeds(VF x, VF mean, VF variance, float z, VF few) {
   const VF positive = hn::Max(mean, constant(1e-6f));
   const VF by_shape = hn::Div(hn::Div(variance, positive), positive);
@@ -138,7 +138,7 @@ HWY_INLINE MF exceeds(VF x, VF mean, VF variance, float z, VF few) {
   return hn::And(hn::Gt(mean, hn::Zero(Floats())), hn::Gt(x, threshold));
 }
 
-/// The two statistics of blocks with their means and variances.
+/// The two statistics of blocks, each with its mean and variance.
 struct Statistics {
   VF spread;
   VF spread_mean;
@@ -148,7 +148,8 @@ struct Statistics {
   VF step_variance;
 };
 
-/// @param s  share of the mean's variance, before
+/// Returns the statistics of the blocks `first` and on.
+/// @param s  variance ratio of the mean, before this frame
 HWY_INLINE Statistics statistics_of(const Sums& sums, int first, VF s) {
   const Floats f;
   const VF one = constant(1), scale = hn::Div(one, hn::Add(one, s)), fresh = hn::Mul(s, scale), less = hn::Sub(one, s);
@@ -204,7 +205,7 @@ void FindMotion(const MotionStrip& in, std::uint8_t* moved) {
   for (int b = 0; b < blocks_of_strip; ++b) moved[b] = static_cast<std::uint8_t>(level[b]);
 }
 
-/// What is alternately that of even and of odd columns.
+/// Returns a vector that alternates the values of even and of odd columns.
 HWY_INLINE VF alternating(float even, float odd) { return hn::OddEven(constant(odd), constant(even)); }
 
 void UpdateMean(const UpdateStrip& in) {

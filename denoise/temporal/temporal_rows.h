@@ -2,65 +2,67 @@
 
 #include <cstdint>
 
-/// The kernels under TemporalMean: plain types only, as in rows.h. They work on strips of 16 blocks of 8 x 8 sites.
+/// The kernels under TemporalMean, with plain types only, as in rows.h. They work on strips of 16 blocks of 8 x 8
+/// sites.
 namespace lowlux::denoise::rows {
 
 inline constexpr int motion_block = 8;      // sites, each way
-inline constexpr int blocks_of_strip = 16;  // as many as the longest vector has lanes
+inline constexpr int blocks_of_strip = 16;  // number of lanes of the longest vector
 inline constexpr int sites_of_strip = motion_block * blocks_of_strip;
 
-/// Noise of R, G, B.
+/// Noise parameters of R, G, B.
 struct SiteNoise {
   float dark_e[3];
   float variance_e2[3];
-  float least_e2[3];      // floor of the variance that a mean tells
-  float saturation_e[3];  // without dark charge; at most 1e9, where values end
+  float least_e2[3];      // floor of the variance estimated from a mean
+  float saturation_e[3];  // without dark charge; at most 1e9, the limit of values
 
   bool operator==(const SiteNoise&) const = default;
 };
 
-/// As MotionThreshold.
+/// Plain-type copy of MotionThreshold.
 struct Threshold {
   float z;
   float few;
 };
 
-/// The rows of a strip, of each pair first that with red. All may be read as far as the strip is long.
+/// Input of one strip: its rows, in each pair the row with red first. All may be read over the full length of a strip.
 struct MotionStrip {
   const float* raw[motion_block];
-  const float* mean_e[motion_block];  // of the frames before, in the light of this one, without dark charge
+  const float* mean_e[motion_block];  // of the previous frames, in the light of this one, without dark charge
   bool inside[motion_block];          // whether the frame has the row
   int width;                          // sites of the strip that the frame has
   bool red_is_odd;
-  float least_weight;  // of the newest frame
-  const float* share;  // of each block, before this frame
+  float least_weight;  // smallest weight of the newest frame
+  const float* share;  // variance ratio of each block, before this frame
   SiteNoise noise;
   Threshold alone;
   Threshold beside;
 };
-/// @param moved  of each block: 2 moved, 1 if one beside it has, 0
+/// Compares a strip with the mean.
+/// @param moved  for each block: 2 if it moved, 1 if it counts as moved next to a block that moved, else 0
 void find_motion(const MotionStrip& in, std::uint8_t* moved);
 
-/// Rows of a strip in their order.
+/// The rows of a strip to be scaled, in their order.
 struct ScaleStrip {
   float* mean_e[motion_block];
   int rows;
   float light;
   float saturation_e[4];  // without dark charge, of sites as in site_of()
 };
-/// Brings a mean to other light.
-/// @param sums  of the columns, over even rows and over odd ones, afterwards
+/// Scales a mean to a change of light.
+/// @param sums  of the columns, over even rows and over odd ones, after scaling
 void scale_mean(const ScaleStrip& in, float (*sums)[sites_of_strip]);
 
-/// Rows of a strip in their order.
+/// The rows of a strip to be updated, in their order.
 struct UpdateStrip {
   const float* raw[motion_block];
   float* mean_e[motion_block];
-  float* out[motion_block];  // with dark charge
+  float* out[motion_block];  // the new mean, with dark charge
   int rows;
   float dark_e[4];        // of sites as in site_of()
   float saturation_e[4];  // without dark charge
-  const float* weight;    // of the newest frame, for each block; 1: it moved
+  const float* weight;    // of the newest frame, for each block; 1 if it moved
 };
 void update_mean(const UpdateStrip& in);
 

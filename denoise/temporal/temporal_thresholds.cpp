@@ -8,7 +8,7 @@
 namespace lowlux::denoise {
 namespace {
 
-/// Where a falling function of 0..most passes `wanted`.
+/// Returns the point in 0..most where a falling function crosses `wanted`.
 template <class Falling>
 double solve(double least, double most, double wanted, const Falling& falling) {
   for (int i = 0; i < 80; ++i) {
@@ -20,11 +20,12 @@ double solve(double least, double most, double wanted, const Falling& falling) {
 
 double normal_tail(double z) { return std::erfc(z / std::numbers::sqrt2) / 2; }
 
-/// Of chi-square with 3 degrees of freedom.
+/// Returns the tail probability of chi-square with 3 degrees of freedom above x.
 double chi3_tail(double x) {
   return std::erfc(std::sqrt(x / 2)) + std::sqrt(2 * x / std::numbers::pi) * std::exp(-x / 2);
 }
 
+/// Returns the threshold for a rate of false alarms.
 /// @param rate  at which either of two independent statistics is above its threshold
 MotionThreshold threshold_of(double rate) {
   const double of_one = 1 - std::sqrt(1 - rate), shape = 1.5;
@@ -50,7 +51,7 @@ rows::SiteNoise site_noise(const RawNoise& noise, BayerPhase phase) {
     out.dark_e[c] = static_cast<float>(dark_e[c]);
     out.variance_e2[c] = static_cast<float>(noise.variance_e2[c]);
     out.least_e2[c] = static_cast<float>(0.5 * noise.variance_e2[c] + 0.3 * dark_e[c] + 0.02);
-    // Subtracted as the kernels do it: what is saturated stays so by every bit.
+    // Subtract as the kernels do: a saturated value stays saturated in every bit.
     out.saturation_e[c] = static_cast<float>(std::min(noise.saturation_e[c], largest_value_e)) - out.dark_e[c];
   }
   return out;

@@ -10,7 +10,7 @@
 
 #include "isp/adapter/stage.h"
 
-/// The C functions: sizes of structs, null pointers, and no exception beyond.
+/// The C functions check sizes of structs and null pointers, and let no exception out.
 struct lowlux_stage {
   std::unique_ptr<lowlux::isp::Stage> stage;
 };
@@ -23,7 +23,7 @@ using lowlux::isp::Stage;
 
 constexpr std::size_t largest_struct = 65536;
 
-// Sizes that structs had before they grew.
+// Sizes of structs in their first version, before they grew.
 template <class T>
 constexpr std::size_t first_size = sizeof(T);
 template <>
@@ -36,7 +36,7 @@ bool is_of_a_version(const T& of_caller) {
   return of_caller.size == first_size<T> || (of_caller.size >= sizeof(T) && of_caller.size <= largest_struct);
 }
 
-/// A caller's struct, as much of it as both know; false where its size is of none.
+/// Copies the common part of a caller's struct; false if its size is invalid.
 template <class T>
 bool take(const T* from, T& to) {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -45,7 +45,7 @@ bool take(const T* from, T& to) {
   return true;
 }
 
-/// The same for an answer, which keeps the caller's size.
+/// Copies the common part of an answer to the caller, and keeps the caller's size.
 template <class T>
 void give(T answer, T* to) {
   if (to == nullptr) return;

@@ -1,19 +1,19 @@
-/* lowlux as a stage of a camera pipeline: raw frames in, pictures or clean raw frames out.
+/* lowlux as a stage of a camera pipeline: raw frames in, images or denoised raw frames out.
  *
  * A C interface without types of libcamera or V4L2, to be linked or loaded by name (dlopen of liblowlux_stage.so.0, or
- * dlsym of each function). It keeps these promises:
+ * dlsym of each function). It guarantees:
  *   - No exception leaves it. lowlux_stage_process allocates nothing, takes no lock while it works on pixels, and
- * starts no threads; lowlux_stage_configure takes all memory.
- *   - Every call on one stage comes from one thread at a time; stages do not know of one another.
- *   - The bytes of a result do not depend on the number of threads, but for the times in it and what a budget makes
- *     of them.
+ *     starts no threads; lowlux_stage_configure allocates all memory.
+ *   - Calls on one stage must come from one thread at a time; stages are independent of one another.
+ *   - The bytes of a result do not depend on the number of threads, except for the times in it and the effects of a
+ *     budget.
  *   - Input rows are read once, from first to last: they may lie in uncached memory.
- *   - Structs begin with their size, which the caller sets, but for the small ones that never change: source, plane and
- *     rect. Within one version structs grow at their end: a caller with a later or an earlier header is served, what
- *     one of both does not know is left out. Bits of `valid` that are not known refuse the frame.
- * Functions return LOWLUX_STAGE_OK, LOWLUX_STAGE_ADJUSTED, or an error below 0; lowlux_stage_last_error says more.
- * After an error in lowlux_stage_process the output planes are not touched or hold part of a picture; the stage goes
- * on.
+ *   - Structs begin with their size, which the caller sets, except for the small ones that never change: source, plane
+ *     and rect. Within one version structs grow at their end: callers with a later or an earlier header are supported;
+ *     members that one of the two does not know are left out. A frame with unknown bits of `valid` is an error.
+ * Functions return LOWLUX_STAGE_OK, LOWLUX_STAGE_ADJUSTED, or an error below 0; lowlux_stage_last_error gives details.
+ * After an error in lowlux_stage_process the output planes are not touched or hold part of an image; the stage remains
+ * usable.
  */
 #ifndef LOWLUX_STAGE_H
 #define LOWLUX_STAGE_H
@@ -38,25 +38,25 @@ typedef struct lowlux_stage lowlux_stage;
 
 enum {
   LOWLUX_STAGE_OK = 0,
-  LOWLUX_STAGE_ADJUSTED = 1,      /* configured, but not as asked: read the formats again */
-  LOWLUX_STAGE_BAD_ARGUMENT = -1, /* a null pointer, a size of no struct, a figure out of range */
+  LOWLUX_STAGE_ADJUSTED = 1,      /* configured, but not as requested: read the formats again */
+  LOWLUX_STAGE_BAD_ARGUMENT = -1, /* a null pointer, an invalid struct size, a value out of range */
   LOWLUX_STAGE_UNSUPPORTED = -2,  /* the format, or this output for this input */
   LOWLUX_STAGE_TOO_LARGE = -3,    /* more memory than the limit */
   LOWLUX_STAGE_NO_MEMORY = -4,
   LOWLUX_STAGE_NOT_CONFIGURED = -5,
-  LOWLUX_STAGE_SHORT_BUFFER = -6, /* a plane ends before the picture does */
+  LOWLUX_STAGE_SHORT_BUFFER = -6, /* a plane ends before the image does */
   LOWLUX_STAGE_BAD_STRIDE = -7,   /* rows would overlap */
   LOWLUX_STAGE_MISSING_PLANE = -8,
-  LOWLUX_STAGE_BAD_PARAMETER = -9,  /* not a number, or absurd */
-  LOWLUX_STAGE_BAD_PROFILE = -10,   /* cannot be read, or is of no use for these frames */
+  LOWLUX_STAGE_BAD_PARAMETER = -9,  /* not a number, or implausible */
+  LOWLUX_STAGE_BAD_PROFILE = -10,   /* cannot be read, or does not apply to these frames */
   LOWLUX_STAGE_UNKNOWN_LIGHT = -11, /* the look of the eye needs the luminance of the scene */
   LOWLUX_STAGE_INTERNAL = -12
 };
 
-/* How a four-character code is meant. */
+/* Meaning of a four-character code. */
 enum { LOWLUX_STAGE_DRM = 0 /* and libcamera, with its modifier */, LOWLUX_STAGE_V4L2 = 1 };
 
-/* Outputs, by their DRM codes; the order of bytes in memory is: */
+/* Outputs, by their DRM codes, with the order of bytes in memory: */
 #define LOWLUX_STAGE_FOURCC(a, b, c, d) \
   ((uint32_t)(a) | ((uint32_t)(b) << 8) | ((uint32_t)(c) << 16) | ((uint32_t)(d) << 24))
 #define LOWLUX_STAGE_XBGR8888 LOWLUX_STAGE_FOURCC('X', 'B', '2', '4') /* R G B 255 */
@@ -65,8 +65,8 @@ enum { LOWLUX_STAGE_DRM = 0 /* and libcamera, with its modifier */, LOWLUX_STAGE
 #define LOWLUX_STAGE_RGB888 LOWLUX_STAGE_FOURCC('R', 'G', '2', '4')   /* B G R */
 #define LOWLUX_STAGE_NV12 LOWLUX_STAGE_FOURCC('N', 'V', '1', '2')     /* plane 0: Y; plane 1: Cb Cr of 2x2 pixels */
 #define LOWLUX_STAGE_RGB48 LOWLUX_STAGE_FOURCC('B', 'G', '4', '8')    /* R G B of 16 bits, little endian */
-/* The clean mosaic in 16 bits, little endian, in the order of the picture's own corner; the largest code of the input
- * is the largest of 16 bits' high end: black is at the input's black times 2^(16 - bits). */
+/* The denoised mosaic in 16 bits, little endian, with its phase at the image's own corner. Codes of the input are
+ * scaled to the high end of 16 bits: black is at the input's black times 2^(16 - bits). */
 #define LOWLUX_STAGE_BAYER16 LOWLUX_STAGE_FOURCC('B', 'Y', '1', '6')
 
 enum { LOWLUX_STAGE_MAX_PLANES = 3 };
@@ -75,33 +75,33 @@ typedef struct {
   int32_t x, y, width, height;
 } lowlux_stage_rect;
 
-/* Frames that come in. */
+/* Describes the input frames. */
 typedef struct {
   size_t size;
   int32_t api; /* LOWLUX_STAGE_DRM or LOWLUX_STAGE_V4L2 */
   uint32_t fourcc;
   uint64_t modifier; /* of DRM codes; else 0 */
-  int32_t width;     /* of whole frames, 2..65536 */
+  int32_t width;     /* of full frames, 2..65536 */
   int32_t height;
-  size_t stride;            /* bytes from one row to the next, at least; each frame states its own */
-  lowlux_stage_rect crop;   /* that becomes the picture; all 0: the whole frame */
-  lowlux_stage_rect masked; /* light-shielded pixels; all 0: there are none */
+  size_t stride;            /* smallest number of bytes from one row to the next; each frame states its own */
+  lowlux_stage_rect crop;   /* region that becomes the image; all 0: the full frame */
+  lowlux_stage_rect masked; /* light-shielded pixels; all 0: none */
   double white_level;       /* code at which a pixel is saturated, 0.001 to 65535; 0: the largest of the format */
 } lowlux_stage_input;
 
-/* Pictures that go out. Width and height are those of the crop. */
+/* Describes the output images. Width and height are those of the crop. */
 typedef struct {
   size_t size;
   uint32_t fourcc; /* one of those above */
   int32_t width;
   int32_t height;
-  int32_t planes;                         /* lowlux_stage_configure says how many */
-  size_t stride[LOWLUX_STAGE_MAX_PLANES]; /* least, or as asked; in bytes */
-  size_t bytes[LOWLUX_STAGE_MAX_PLANES];  /* a plane of that stride takes */
-  int32_t yuv_matrix; /* of NV12: 601 or 709; 0: 709 from 720 rows on, 601 below. Video range, chroma in the middle */
+  int32_t planes;                         /* set by lowlux_stage_configure */
+  size_t stride[LOWLUX_STAGE_MAX_PLANES]; /* in bytes: minimum, or as requested */
+  size_t bytes[LOWLUX_STAGE_MAX_PLANES];  /* size of a plane of that stride */
+  int32_t yuv_matrix; /* for NV12: 601 or 709; 0: 709 from 720 rows on, 601 below. Video range, central chroma */
 } lowlux_stage_output;
 
-/* What a raw format is. */
+/* Describes a raw format. */
 typedef struct {
   size_t size;
   int32_t bits;
@@ -109,18 +109,18 @@ typedef struct {
   int32_t mosaic; /* 0 RGGB, 1 GRBG, 2 GBRG, 3 BGGR, -1 monochrome */
   int32_t group_pixels;
   int32_t group_bytes;
-  int32_t alignment; /* of the buffer that is asked for: 1, none */
-  int32_t margin;    /* pixels that are lost at each edge: 0, none */
-  int32_t outputs;   /* in use of: */
+  int32_t alignment; /* required alignment of the buffer: 1, none */
+  int32_t margin;    /* pixels lost at each edge: 0, none */
+  int32_t outputs;   /* number of entries used in output */
   uint32_t output[8];
 } lowlux_stage_format_info;
 
 enum {
   LOWLUX_STAGE_DENOISE_OFF = 0,
   LOWLUX_STAGE_DENOISE_FAST = 1,         /* draft */
-  LOWLUX_STAGE_DENOISE_HIGH_QUALITY = 2, /* standard, or high where it is the most that was asked for */
-  LOWLUX_STAGE_DENOISE_MINIMAL = 3,      /* frames before alone, where they take part; else draft */
-  LOWLUX_STAGE_DENOISE_AUTO = 5          /* by the signal to noise ratio of the frame */
+  LOWLUX_STAGE_DENOISE_HIGH_QUALITY = 2, /* standard, or high where it is the settings' maximum */
+  LOWLUX_STAGE_DENOISE_MINIMAL = 3,      /* previous frames alone, if temporal is set; else draft */
+  LOWLUX_STAGE_DENOISE_AUTO = 5          /* by the signal-to-noise ratio of the frame */
 };
 enum { LOWLUX_STAGE_LOOK_CAMERA = 0, LOWLUX_STAGE_LOOK_EYE = 1 };
 enum {
@@ -130,17 +130,17 @@ enum {
   LOWLUX_STAGE_LEVEL_HIGH = 3
 };
 
-/* What holds from lowlux_stage_open to lowlux_stage_release. */
+/* Settings that apply from lowlux_stage_open to lowlux_stage_release. */
 typedef struct {
   size_t size;
-  int32_t threads;          /* 1..8, the caller's among them; 0: 2 */
+  int32_t threads;          /* 1..8, including the caller's; 0: 2 */
   uint64_t memory_limit;    /* bytes; 0: 1 GiB */
-  const char* profile_file; /* of `lowlux calibrate`, JSON; its hot pixels are places in whole frames; null: none */
-  int32_t most_denoise;     /* LOWLUX_STAGE_LEVEL_... that there is memory for; 0 as every level: none */
-  int32_t temporal;         /* 1: frames before take part */
+  const char* profile_file; /* of `lowlux calibrate`, JSON; its hot pixels are positions in full frames; null: none */
+  int32_t most_denoise;     /* LOWLUX_STAGE_LEVEL_... that memory is allocated for; 0, as for every level: none */
+  int32_t temporal;         /* 1: previous frames contribute */
   int32_t look;             /* LOWLUX_STAGE_LOOK_... */
-  int32_t tone;             /* 1: the standard curve; 0: none, linear light in sRGB's coding */
-  double field_of_view_deg; /* of the picture's longer side; 0: 50 */
+  int32_t tone;             /* 1: the standard curve; 0: none, linear light in sRGB's encoding */
+  double field_of_view_deg; /* of the image's longer side; 0: 50 */
 } lowlux_stage_settings;
 
 /* Validity of the members of lowlux_stage_params, and which of them took effect. */
@@ -168,7 +168,7 @@ enum {
   LOWLUX_STAGE_HAS_ALL = (1 << 20) - 1
 };
 
-/* What is known of one frame, of the frame that is exposed and not of the one before. What is not valid comes from the
+/* Known figures of one frame: of the exposed frame, not of the one before. A figure that is not valid is taken from the
  * profile, else from the frame itself, else it is left out. */
 typedef struct {
   size_t size;
@@ -176,45 +176,46 @@ typedef struct {
   float black_level[4];   /* R, Gr, Gb, B, in codes of the input; libcamera's 16-bit figure is v 2^bits / 65536 */
   double exposure_s;      /* 1e-7..1e5 */
   float analogue_gain;    /* 0.1..1e4; 1 is ISO 100 of the profile */
-  float digital_gain;     /* already in the codes, 0.1..1e3; noise goes with it */
-  float colour_gains[2];  /* R and B, with G's 1; 1e-3..1e3 */
+  float digital_gain;     /* already applied to the codes, 0.1..1e3; noise scales with it */
+  float colour_gains[2];  /* R and B, relative to G = 1; 1e-3..1e3 */
   float colour_matrix[9]; /* rows; white-balanced camera RGB to linear sRGB; each within 1e3 */
-  float lux;              /* of the scene: for its luminance, where nothing better tells */
+  float lux;              /* of the scene: for its luminance, if there is no better source */
   float temperature_c;    /* of the sensor, -100..200 */
   int32_t denoise;        /* LOWLUX_STAGE_DENOISE_...; libcamera's ZSL (4) counts as MINIMAL */
-  uint32_t sequence;      /* a gap or a step back forgets the frames before */
-  uint64_t timestamp_ns;  /* a step back, or of more than two seconds and three exposures, does so too */
-  float gamma;            /* accepted, without effect: the curve is the stage's own */
-  float contrast;         /* the same */
+  uint32_t sequence;      /* a gap or a step back discards the previous frames */
+  uint64_t timestamp_ns;  /* so does a step back, or one above both two seconds and three exposures */
+  float gamma;            /* accepted, without effect: the stage has its own curve */
+  float contrast;         /* accepted, without effect */
   float saturation;       /* 0..4 */
   float sharpness;        /* accepted, without effect */
-  float exposure_ev;      /* gain 2^EV of the picture, -10..20; absent: automatic */
-  float noise_gain;       /* DN for each electron, at this frame's gain; with: */
+  float exposure_ev;      /* gain 2^EV of the image, -10..20; absent: automatic */
+  float noise_gain;       /* DN per electron, at this frame's gain; requires noise_read */
   float noise_read;       /* standard deviation of a pixel without light [DN] */
   float f_number;
-  double scene_luminance_cd_m2; /* mean over the picture */
-  float budget_ms;              /* time that this frame may take, 0.01..1e6; what does not fit is left out: */
+  double scene_luminance_cd_m2; /* mean over the image */
+  float budget_ms;              /* time limit for this frame, 0.01..1e6; steps that do not fit are left out: */
 } lowlux_stage_params;
 
-/* What a budget leaves of a frame. No frame is ever left out, and look and output are never changed: a budget that even
- * the last step exceeds gives that step, and took_ms says so. Steps that are no less than what the frame gets without a
- * budget are passed over. Times are those of frames before: the first frame after lowlux_stage_configure, of which none
- * are known, goes at the last step. A better step is taken when it is expected to leave a tenth of its time spare, and
- * left for one that fits when frames take longer. One that did not fit is tried again now and then, the sooner the less
- * it lacked: isp/adapter/README.md. lowlux_stage_reset keeps what is known of times. */
+/* Steps to which a budget reduces the work on a frame. No frame is ever dropped, and look and output are never changed:
+ * a budget that even the last step exceeds gives that step, and took_ms reports it. Steps that are no less than the
+ * frame's work without a budget are skipped. Times are those of previous frames: the first frame after
+ * lowlux_stage_configure, for which none are known, is processed at the last step. A better step is chosen when it is
+ * expected to leave a tenth of its time spare, and abandoned for one that fits when frames take longer. A step that did
+ * not fit is tried again from time to time, the sooner the closer it was: isp/adapter/README.md. lowlux_stage_reset
+ * keeps the measured times. */
 enum {
-  LOWLUX_STAGE_STEP_ALL = 0,           /* all that is asked for */
+  LOWLUX_STAGE_STEP_ALL = 0,           /* everything requested */
   LOWLUX_STAGE_STEP_STANDARD = 1,      /* the level standard in place of high */
   LOWLUX_STAGE_STEP_DRAFT = 2,         /* the level draft in place of a higher one */
-  LOWLUX_STAGE_STEP_FRAMES_BEFORE = 3, /* no level; frames before, where the settings have them */
-  LOWLUX_STAGE_STEP_PLAIN = 4          /* straight from codes */
+  LOWLUX_STAGE_STEP_FRAMES_BEFORE = 3, /* no level; previous frames, if the settings enable them */
+  LOWLUX_STAGE_STEP_PLAIN = 4          /* straight from codes, without noise reduction */
 };
 
 typedef struct {
   const void* data;
-  size_t length; /* bytes there are */
+  size_t length; /* bytes available */
   size_t stride;
-  int fd; /* of a dma-buf, whose access is then bracketed by DMA_BUF_IOCTL_SYNC; else -1 */
+  int fd; /* a dma-buf, whose access is then bracketed by DMA_BUF_IOCTL_SYNC; else -1 */
 } lowlux_stage_source;
 
 typedef struct {
@@ -225,7 +226,7 @@ typedef struct {
 
 typedef struct {
   size_t size;
-  int32_t planes; /* that follow */
+  int32_t planes; /* number of planes used */
   lowlux_stage_plane plane[LOWLUX_STAGE_MAX_PLANES];
 } lowlux_stage_picture;
 
@@ -237,72 +238,72 @@ enum {
   LOWLUX_STAGE_FROM_FRAME = 4
 };
 
-/* What was done to the frame. */
+/* Reports the processing of the frame. */
 typedef struct {
   size_t size;
-  uint32_t applied;   /* LOWLUX_STAGE_HAS_... of those that were heeded, as far as look and output ask */
+  uint32_t applied;   /* LOWLUX_STAGE_HAS_... that took effect, as far as look and output use them */
   int32_t black_from; /* LOWLUX_STAGE_FROM_... */
   int32_t noise_from;
   int32_t white_from;
-  float black_level[4]; /* R, Gr, Gb, B that was taken off, dark charge in it */
-  float noise_gain;     /* DN for each electron; 0: not known */
+  float black_level[4]; /* R, Gr, Gb, B that was subtracted, including dark charge */
+  float noise_gain;     /* DN per electron; 0: not known */
   float noise_read;     /* DN */
   float colour_gains[2];
   float exposure_ev;
   int32_t level;               /* LOWLUX_STAGE_LEVEL_... of noise reduction */
-  int32_t temporal;            /* 1: frames before took part */
-  float moved;                 /* share of the picture that was found to move */
+  int32_t temporal;            /* 1: previous frames contributed */
+  float moved;                 /* fraction of the image detected as moving */
   float scene_luminance_cd_m2; /* 0: not known */
   float adaptation;            /* m of CIE 191, 0 scotopic to 1 photopic; 1 without the look of the eye */
   int32_t step;                /* LOWLUX_STAGE_STEP_...; without a budget 0 */
-  float predicted_ms;          /* time that was expected of what was done; 0: not known yet */
-  float took_ms;               /* the frame, from the first look at its rows to the last row of its picture */
+  float predicted_ms;          /* expected time of the steps done; 0: not known yet */
+  float took_ms;               /* time of the frame, from the first read of its rows to the last row of its image */
 } lowlux_stage_result;
 
-/* Of the frame as it came in, before anything was taken off or denoised: for exposure and white balance of the next. */
+/* Statistics of the input frame, before subtraction and noise reduction: for the next exposure and white balance. */
 typedef struct {
   size_t size;
-  uint64_t sum[3]; /* of the codes of R, G, B */
+  uint64_t sum[3]; /* sum of the codes of R, G, B */
   uint64_t count[3];
-  float clipped;       /* share of the pixels at white or above */
-  float zero;          /* share at code 0 */
-  uint32_t luma[1024]; /* 2x2 cells of every second row of them, by (77 R + 75 Gr + 75 Gb + 29 B) / 256, even bins over
-                          all codes */
-  uint32_t luma64[64]; /* the same, as libcamera's SwIspStats has it */
-  float measured_black[4];       /* R, Gr, Gb, B: of masked pixels, else of the darkest hundredth of the picture */
+  float clipped;                 /* fraction of the pixels at white or above */
+  float zero;                    /* fraction at code 0 */
+  uint32_t luma[1024];           /* histogram of 2x2 cells in every second row of cells, by
+                                    (77 R + 75 Gr + 75 Gb + 29 B) / 256, even bins over all codes */
+  uint32_t luma64[64];           /* luma in 64 bins, as in libcamera's SwIspStats */
+  float measured_black[4];       /* R, Gr, Gb, B: of masked pixels, else of the darkest hundredth of the image */
   int32_t measured_black_masked; /* 1: of masked pixels */
-  float measured_noise_gain;     /* DN for each electron, from the frame alone; 0: it does not tell */
+  float measured_noise_gain;     /* DN per electron, from the frame alone; 0: not measurable */
   float measured_noise_read;     /* DN */
 } lowlux_stage_statistics;
 
 LOWLUX_STAGE_EXPORT uint32_t lowlux_stage_version(void);
 
-/* What an input format is and what can be made of it. Needs no stage. */
+/* Describes an input format and the outputs possible for it. Needs no stage. */
 LOWLUX_STAGE_EXPORT int lowlux_stage_query(int32_t api, uint32_t fourcc, uint64_t modifier,
                                            lowlux_stage_format_info* info);
 
-/* settings may be null. *stage is null after an error. message, if not null, gets why it failed. */
+/* Opens a stage. settings may be null. *stage is null after an error. message, if not null, gets the reason. */
 LOWLUX_STAGE_EXPORT int lowlux_stage_open(const lowlux_stage_settings* settings, lowlux_stage** stage, char* message,
                                           size_t message_size);
 
-/* Takes all memory. out->fourcc is asked for, the rest is answered; out->stride of 0 is filled in, one that is too
- * small is adjusted. A stage that was configured before and fails stays
- * unconfigured, but where a struct is missing or of no size: then nothing changes. */
+/* Allocates all memory. out->fourcc is the request, the rest is filled in; an out->stride of 0 is filled in, one that
+ * is too small is adjusted. A configured stage that fails becomes unconfigured, except if a struct is missing or has
+ * an invalid size: then nothing changes. */
 LOWLUX_STAGE_EXPORT int lowlux_stage_configure(lowlux_stage* stage, const lowlux_stage_input* in,
                                                lowlux_stage_output* out);
 
-/* params, result and statistics may be null. */
+/* Processes one frame. params, result and statistics may be null. */
 LOWLUX_STAGE_EXPORT int lowlux_stage_process(lowlux_stage* stage, const lowlux_stage_source* in,
                                              const lowlux_stage_picture* out, const lowlux_stage_params* params,
                                              lowlux_stage_result* result, lowlux_stage_statistics* statistics);
 
-/* Forgets the frames before: for the start of a stream or a change of mode. */
+/* Discards the previous frames: for the start of a stream or a change of mode. */
 LOWLUX_STAGE_EXPORT int lowlux_stage_reset(lowlux_stage* stage);
 
-/* Ends threads and gives memory back; null is allowed. */
+/* Ends threads and frees memory; null is allowed. */
 LOWLUX_STAGE_EXPORT void lowlux_stage_release(lowlux_stage* stage);
 
-/* Of the last call on this stage that failed; one line. Valid until the next call. */
+/* Returns the message of the last call on this stage that failed; one line. Valid until the next call. */
 LOWLUX_STAGE_EXPORT const char* lowlux_stage_last_error(const lowlux_stage* stage);
 
 /* NOLINTEND(modernize-use-using,modernize-deprecated-headers) */

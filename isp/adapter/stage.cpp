@@ -41,7 +41,7 @@ int code_of(const Error& error) {
   }
 }
 
-/// Brackets what the processor reads of a dma-buf; other descriptors refuse, which does no harm.
+/// Brackets the processor's access to a dma-buf; other descriptors reject this, which has no effect.
 class DmaAccess {
  public:
   explicit DmaAccess(int fd) : fd_(fd) { sync(DMA_BUF_SYNC_START); }
@@ -83,7 +83,7 @@ struct InverseRange {
   double mean_square = 0;
 };
 
-/// One over white less black [1/DN], of the sites that a noise profile's green stands for.
+/// Returns 1 / (white - black) [1/DN], for the sites that the green of a noise profile applies to.
 InverseRange green_range(const RawDn& raw, const BlackPoint& black) {
   InverseRange out;
   int sites = 0;
@@ -117,10 +117,10 @@ std::uint64_t stage_memory_bytes(const LiveSetup& setup, int threads) {
   const auto area = [](int width, int height) {
     return static_cast<std::uint64_t>(std::max(width, 0)) * static_cast<std::uint64_t>(std::max(height, 0));
   };
-  // A crop beyond the frame is refused later.
+  // A crop beyond the frame is rejected later.
   const std::uint64_t rounded =
       area(std::min(setup.active.width, setup.width) + 128, std::min(setup.active.height, setup.height) + 16);
-  std::uint64_t for_each = 0;  // bytes of a pixel; from codes straight to the picture none
+  std::uint64_t for_each = 0;  // bytes per pixel; none if codes are converted directly to the image
   if (setup.levels || setup.temporal) {
     for_each = 12;  // mosaics in electrons
   } else if (!setup.defects.empty() || setup.format.layout == SensorLayout::monochrome) {
@@ -129,9 +129,9 @@ std::uint64_t stage_memory_bytes(const LiveSetup& setup, int threads) {
   if (setup.levels) for_each += 24;    // Denoiser
   if (setup.temporal) for_each += 16;  // TemporalMean, its mean, maps
   if (setup.look.look == Look::eye) for_each += 8;
-  if (setup.samples == SampleType::u16) for_each += 6;  // the made-up frame's picture
+  if (setup.samples == SampleType::u16) for_each += 6;  // the warm-up frame's image
   const auto row = static_cast<std::uint64_t>(setup.width) + 4096;
-  // A made-up frame of the stream's own size runs through once.
+  // A warm-up frame of the stream's own size is processed once.
   return 2 * area(setup.width, setup.height) +
          row_bytes(setup.format, setup.width) * static_cast<std::uint64_t>(setup.height) + for_each * rounded +
          static_cast<std::uint64_t>(threads) * row * 700 + (std::uint64_t{4} << 20);
@@ -141,7 +141,7 @@ Stage::Stage(const lowlux_stage_settings& settings, std::optional<StageProfile> 
     : settings_(settings),
       profile_(std::move(profile)),
       executor_(settings.threads == 0 ? default_threads : settings.threads) {
-  settings_.profile_file = nullptr;  // the caller's
+  settings_.profile_file = nullptr;  // owned by the caller
 }
 
 Result<std::unique_ptr<Stage>> Stage::open(const lowlux_stage_settings& settings) {
@@ -316,14 +316,14 @@ void Stage::reset() {
   if (stream_) stream_->pipeline->reset();
 }
 
-/// What the frame got.
+/// Returns the work done on the frame.
 StageWork Stage::done() const {
   const NoiseReduction& reduction = stream_->pipeline->decided().noise_reduction;
   if (reduction.level) return work_of(*reduction.level);
   return reduction.temporal ? StageWork::frames_before : StageWork::plain;
 }
 
-/// What it would have got of itself without a budget.
+/// Returns the work that the frame would have got without a budget.
 StageWork Stage::asked_for(const StageFacts& facts) const {
   const LiveDecision& decision = stream_->pipeline->decision();
   if (decision.level) return work_of(*decision.level);

@@ -17,26 +17,28 @@
 
 namespace lowlux::isp {
 
-/// The stage behind lowlux_stage.h: formats and buffers of the caller's around a LivePipeline. Structs are whole here.
+/// Implements lowlux_stage.h: the caller's formats and buffers around a LivePipeline. Structs have their full size
+/// here.
 class Stage {
  public:
-  /// Errors: settings out of range (invalid_argument), those of StageProfile::read.
+  /// Opens a stage. Errors: settings out of range (invalid_argument), those of StageProfile::read.
   static Result<std::unique_ptr<Stage>> open(const lowlux_stage_settings& settings);
 
-  /// @return LOWLUX_STAGE_OK or LOWLUX_STAGE_ADJUSTED
+  /// Configures the stage for a stream. @return LOWLUX_STAGE_OK or LOWLUX_STAGE_ADJUSTED
   Result<int> configure(const lowlux_stage_input& in, lowlux_stage_output& out);
 
   struct Answers {
     lowlux_stage_result* result = nullptr;
     lowlux_stage_statistics* statistics = nullptr;
   };
-  /// Allocates nothing but for a message where LivePipeline::plan fails. @return a code of lowlux_stage.h
+  /// Processes one frame. Allocates nothing except a message if LivePipeline::plan fails. @return a code of
+  /// lowlux_stage.h
   int process(const lowlux_stage_source& in, const lowlux_stage_picture& out, const lowlux_stage_params& params,
               const Answers& answers);
 
   void reset();
   const char* last_error() const { return message_; }
-  /// Keeps as much of a message as there is room for; @return `code`
+  /// Keeps as much of a message as fits; @return `code`
   int say(int code, const char* message);
 
  private:
@@ -50,13 +52,13 @@ class Stage {
   StageWork asked_for(const StageFacts& facts) const;
   void count(lowlux_stage_statistics& out) const;
 
-  /// All that is there only between configure and the next.
+  /// Holds everything that exists only between one configure and the next.
   struct Stream {
     StageStream stream;
     lowlux_stage_output layout{};
     StageOutput kind = StageOutput::rgb;
     int width = 0;
-    int height = 0;  // of whole frames
+    int height = 0;  // width and height of full frames
     std::unique_ptr<LivePipeline> pipeline;
     std::unique_ptr<StageWriter> writer;
     StageBudget budget;
@@ -70,7 +72,7 @@ class Stage {
   char message_[256] = "";
 };
 
-/// Bytes that a stage takes for a stream, a little more than what it really does.
+/// Returns the bytes that a stage allocates for a stream, slightly more than it really does.
 std::uint64_t stage_memory_bytes(const LiveSetup& setup, int threads);
 
 }  // namespace lowlux::isp

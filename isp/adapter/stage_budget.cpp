@@ -5,18 +5,18 @@
 namespace lowlux::isp {
 namespace {
 
-// Milliseconds of README.md's table at 1920x1080 with two threads; high, which it has not, is as far beyond standard,
-// for what standard is beyond draft, as denoise/README.md has them (33 - 21 and 50 - 33 ms/MP).
+// Milliseconds of README.md's table at 1920x1080 with two threads. The table has no value for high: it is extrapolated
+// from standard and draft in proportion to denoise/README.md (33 - 21 and 50 - 33 ms/MP).
 constexpr std::array<double, 5> camera_ms{77, 50, 31, 14, 9.2};
 constexpr std::array<double, 5> eye_ms{92, 65, 46, 22, 19.2};
-// That frames before add to a level: temporal and draft less draft.
+// Time that previous frames add to a level: temporal and draft minus draft.
 constexpr double camera_temporal_ms = 11;
 constexpr double eye_temporal_ms = 5;
 
 constexpr double rise = 0.75, fall = 0.1;
 constexpr double longest_ms = 1e9;
 constexpr double climb_slack = 1.1;
-constexpr double hope = 0.5;  // share of its prediction that dearer work's time goes to
+constexpr double hope = 0.5;  // fraction of its prediction that the time of more expensive work moves to
 constexpr int forget_frames = 100;
 constexpr int most_patience = 8;
 
@@ -45,12 +45,12 @@ StageWork StageBudget::choose(double budget_ms, StageWork asked) {
   return chosen_;
 }
 
-/// How long a trial of dearer work lasted tells how soon the next may come.
+/// Adapts the time to the next trial of more expensive work to the length of the last trial.
 void StageBudget::learn_from(StageWork before, StageWork now, StageWork asked) {
   if (now < before) {
     trial_frames_ = 0;
   } else if (now > before) {
-    const bool gave_up = trial_frames_ && now != asked;  // and was not asked for less
+    const bool gave_up = trial_frames_ && now != asked;  // and less was not requested
     if (gave_up) patience_ = std::min(2 * patience_, most_patience);
     trial_frames_.reset();
   } else if (trial_frames_ && ++*trial_frames_ == forget_frames) {
@@ -68,7 +68,7 @@ void StageBudget::took(StageWork work, double ms) {
     if (i == own) continue;
     const double expected = ms_[own] * share_[i] / share_[own];
     if (!(ms_[i] > 0)) ms_[i] = expected;
-    // A first frame is slow for reasons that are no one's share.
+    // A first frame is slow for reasons outside of the relative times.
     if (!measured_[i]) ms_[i] = std::min(ms_[i], expected);
     const bool dearer = i < own;
     const double frames = dearer ? forget_frames * patience_ : forget_frames;

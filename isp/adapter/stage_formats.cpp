@@ -128,7 +128,7 @@ void StageWriter::write(int thread, int y, const std::uint8_t* rgb) {
       break;
     case StageOutput::rgb48:
     case StageOutput::mosaic:
-      return;  // have no rows of 8 bits
+      return;  // no rows of 8 bits
   }
   luma_row(matrix_, rgb, width_, row(0, y));
   const std::size_t bytes = 3 * static_cast<std::size_t>(width_);

@@ -14,34 +14,34 @@
 
 namespace lowlux::isp {
 
-/// What a picture is made of.
+/// Lists the outputs of the stage.
 enum class StageOutput : std::uint8_t { rgbx, bgrx, rgb, bgr, nv12, rgb48, mosaic };
 
-/// By its four-character code; nullopt for another.
+/// Returns the output of a four-character code; nullopt for an unknown code.
 std::optional<StageOutput> stage_output(std::uint32_t fourcc);
 
-/// By one of the two ways to name raw formats; nullopt where none is known.
+/// Returns the format for a code of one of the two APIs; nullopt for an unknown code.
 std::optional<RawFormat> stage_input(std::int32_t api, std::uint32_t fourcc, std::uint64_t modifier);
 
-/// What lowlux_stage_query answers, its size aside.
+/// Fills in the answer of lowlux_stage_query, except its size.
 void describe(const RawFormat& format, lowlux_stage_format_info& info);
 
-/// Fills in planes, strides that are 0 or too small, and bytes. @return whether something that was asked for (not 0) is
-/// not had
+/// Fills in planes, strides that are 0 or too small, and bytes. @return whether a requested value (not 0) was changed
 bool lay_out(StageOutput kind, int width, int height, lowlux_stage_output& out);
 
-/// Bytes of a row of a plane, and rows of it.
+/// Both functions measure a plane: the bytes of a row, and the number of rows.
 std::size_t plane_row_bytes(StageOutput kind, int width, int plane);
 int plane_rows(StageOutput kind, int height, int plane);
 int planes_of(StageOutput kind);
 
-/// Rows of 8-bit codes as one of the stage's outputs. Takes its memory in the constructor.
+/// Writes rows of 8-bit codes in one of the stage's output formats. Allocates its memory in the constructor.
 class StageWriter {
  public:
+  /// Makes a writer for images of one size.
   /// @param kind  of 8 bits
   StageWriter(StageOutput kind, YuvStandard standard, int width, int height, int threads);
 
-  /// A sink for one picture; `planes` must outlive it.
+  /// Returns a sink for one image; `planes` must outlive it.
   RowSink sink(const lowlux_stage_plane* planes);
 
  private:
@@ -51,7 +51,7 @@ class StageWriter {
   StageOutput kind_;
   YuvMatrix matrix_;
   int width_, height_;
-  std::unique_ptr<std::uint8_t[]> above_;  // each thread's last even row
+  std::unique_ptr<std::uint8_t[]> above_;  // last even row of each thread
   const lowlux_stage_plane* planes_ = nullptr;
 };
 

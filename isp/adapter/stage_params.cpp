@@ -14,7 +14,7 @@ constexpr std::uint64_t longest_step_ns = 2'000'000'000;
 
 bool has(const lowlux_stage_params& params, std::uint32_t bit) { return (params.valid & bit) != 0; }
 
-/// Not for what is not a number.
+/// Returns whether a value is in [low, high]; false for a value that is not a number.
 bool within(double value, double low, double high) { return value >= low && value <= high; }
 
 template <std::size_t kCount>
@@ -57,7 +57,7 @@ void set_levels(const lowlux_stage_params& params, const StageStream& stream, co
     black_dn = *sensor->pedestal_dn;
     out.black_from = LOWLUX_STAGE_FROM_PROFILE;
   }
-  // A level of the sensor's driver is the pedestal; masked pixels hold the dark charge already.
+  // A level of the sensor's driver is the pedestal without dark charge; masked pixels include the dark charge already.
   for (int site = 0; site < 4; ++site) black_dn[site] += gain_dn * dark_e[site];
   if (out.black_from != LOWLUX_STAGE_FROM_NOTHING) out.live.black_dn = black_dn;
   if (gain_dn <= 0) return;
@@ -223,7 +223,7 @@ bool StageHistory::follows(const lowlux_stage_params& params) const {
   const double exposure_ns = has(params, LOWLUX_STAGE_HAS_EXPOSURE) ? params.exposure_s * 1e9 : 0;
   const std::uint64_t longest_ns = std::max(longest_step_ns, static_cast<std::uint64_t>(3 * exposure_ns));
   if (sequence_ && has(params, LOWLUX_STAGE_HAS_SEQUENCE) && params.sequence != *sequence_ + 1) return false;
-  // Unsigned: a step back is a long one too.
+  // The difference is unsigned: a step back is a long one too.
   return !timestamp_ns_ || !has(params, LOWLUX_STAGE_HAS_TIMESTAMP) ||
          params.timestamp_ns - *timestamp_ns_ <= longest_ns;
 }

@@ -11,43 +11,45 @@
 
 namespace lowlux::isp {
 
-/// What is wrong with the parameters of a frame; null if nothing is. Only valid members are looked at.
+/// Returns the fault in the parameters of a frame; null if there is none. Only valid members are checked.
 const char* fault_of(const lowlux_stage_params& params);
 
-/// What parameters and profile say of one frame.
+/// Holds the statements of parameters and profile on one frame.
 struct StageFacts {
   LiveFacts live;
   std::uint32_t applied = 0;  // LOWLUX_STAGE_HAS_... that took effect
   std::int32_t black_from = LOWLUX_STAGE_FROM_NOTHING;
   std::int32_t noise_from = LOWLUX_STAGE_FROM_NOTHING;
-  bool temporal_asked = false;  // whatever came of it
+  bool temporal_asked = false;  // true if requested, even without effect
 };
 
-/// What the facts are made for.
+/// Describes the stream for which the facts are made.
 struct StageStream {
   RawFormat format;
   BayerPhase phase = BayerPhase::rggb;  // of the active area
   denoise::Level most = denoise::Level::draft;
-  bool has_level = true;  // there is memory for one
+  bool has_level = true;  // memory for a level is allocated
   bool has_masked = false;
   bool temporal = false;
 };
 
-/// The dearest work that the parameters ask for; frames by whose noise a level is chosen may come to less.
+/// Returns the most expensive work that the parameters request; frames whose level is chosen by their noise may need
+/// less.
 StageWork asked_of(const lowlux_stage_params& params, const StageStream& stream);
 
-/// Parameters of which fault_of finds none. What they do not tell the profile does, if there is one.
-/// @param most  noise reduction stays within this
+/// Returns the facts for parameters without a fault. Figures they do not state are taken from the profile, if there is
+/// one.
+/// @param most  upper limit of noise reduction
 StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream, const StageProfile* profile,
                     StageWork most = StageWork::high);
 
-/// high, standard or draft, as a level up to high is.
+/// Returns high, standard or draft for a level up to high.
 StageWork work_of(denoise::Level level);
 
-/// Follows frames by sequence and time.
+/// Tracks frames by sequence and time.
 class StageHistory {
  public:
-  /// Whether this frame comes right after the one that was taken last.
+  /// Returns whether this frame directly follows the one that was taken last.
   bool follows(const lowlux_stage_params& params) const;
   void take(const lowlux_stage_params& params);
   void reset();
@@ -57,7 +59,7 @@ class StageHistory {
   std::optional<std::uint64_t> timestamp_ns_;
 };
 
-/// Four figures in the order R, Gr, Gb, B, to and from sites.
+/// Both functions convert four figures in the order R, Gr, Gb, B: to sites and from sites.
 PerSite<double> sites_of(const float (&channels)[4], BayerPhase phase);
 void to_channels(const PerSite<double>& sites, BayerPhase phase, float (&channels)[4]);
 

@@ -19,7 +19,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double unit_iso = 100;  // of an analogue gain of 1
+constexpr double unit_iso = 100;  // ISO speed of an analogue gain of 1
 constexpr double shortest_frame_s = 0.04;
 constexpr double hot_deviations = 6;
 
@@ -28,7 +28,7 @@ double between_logs(double a, double b, double share) {
   return a > 0 && b > 0 ? std::exp(between(std::log(a), std::log(b), share)) : between(a, b, share);
 }
 
-/// Four for each octave from 2^-3 to 2^14 times 100, and the profile's own.
+/// Returns four ISO speeds for each octave from 2^-3 to 2^14 times 100, and the profile's own.
 std::vector<double> iso_grid(const CameraProfile& profile) {
   std::vector<double> out;
   out.reserve(69 + profile.gains.size());
@@ -40,20 +40,21 @@ std::vector<double> iso_grid(const CameraProfile& profile) {
   return out;
 }
 
-/// As calib::profile_at has it: none beside a pedestal that holds it.
+/// Returns the dark current as calib::profile_at does: none if the pedestal includes it.
 std::array<double, 3> dark_current_of(const GainProfile& gain) {
   const bool in_pedestal = gain.pedestal_holds == BlackPoint::Holds::pedestal_and_dark;
   return in_pedestal ? std::array<double, 3>{} : gain.sensor->dark_current_e_per_s;
 }
 
-/// The same: of darks that state no temperature the charge is taken at every one.
+/// Returns the dark doubling temperature as calib::profile_at does: if the darks state no temperature, their charge is
+/// used at every temperature.
 double dark_doubling_of(const GainProfile& gain) {
   const bool temperature_unknown = gain.dark_exposure_s && !gain.dark_temperature_c;
   return temperature_unknown ? std::numeric_limits<double>::infinity() : gain.sensor->dark_doubling_c;
 }
 
-/// The text of a regular file, one byte more than a profile has at most. Opening any other kind must not wait for
-/// whoever writes to it.
+/// Returns the text of a regular file, up to one byte more than the largest profile. Opening any other kind of file
+/// must not wait for a writer.
 Result<std::string> text_of_profile(const std::string& file) {
   const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
   struct stat status {};

@@ -12,7 +12,7 @@
 
 namespace lowlux::isp {
 
-/// A camera's figures at one setting, in codes of the stream.
+/// Holds a camera's figures at one setting, in codes of the stream.
 struct StageSensor {
   double gain_dn_per_e = 0;
   double read_noise_dn = 0;
@@ -20,26 +20,28 @@ struct StageSensor {
   std::optional<PerSite<double>> pedestal_dn;
 };
 
-/// A profile made ready for frames that come too fast to look it up: the gain settings on a grid of ISO speeds, 100 for
-/// an analogue gain of 1, four for each octave.
+/// Prepares a profile for frames that arrive too fast for a full look-up: the gain settings on a grid of ISO speeds,
+/// 100 for an analogue gain of 1, four for each octave.
 class StageProfile {
  public:
-  /// Errors: those of the profile's reader; a profile of another kind of sensor (invalid_argument).
+  /// Reads or takes a profile. Errors: those of the profile's reader; a profile of another kind of sensor
+  /// (invalid_argument).
   static Result<StageProfile> read(const std::string& file);
   static Result<StageProfile> of(CameraProfile profile);
 
-  /// For a stream: codes of `format`, sites of its active area.
+  /// Converts the profile for a stream: codes of `format`, sites of its active area.
   Result<void> prepare(const RawFormat& format, BayerPhase phase);
 
-  /// Allocates nothing. Gain and read noise go by straight lines in log-log between the profile's settings.
-  /// @param analogue_gain, exposure_s, temperature_c  where they are not known: gain 1, no dark charge, the
+  /// Returns the figures for one frame. Allocates nothing. Gain and read noise are interpolated linearly in log-log
+  /// between the profile's settings.
+  /// @param analogue_gain, exposure_s, temperature_c  if not known: gain 1, no dark charge, the
   ///     temperature of the profile's darks
-  /// @return nullopt where the profile has no gain settings with a known system gain
+  /// @return nullopt if the profile has no gain settings with a known system gain
   std::optional<StageSensor> at(std::optional<double> analogue_gain, std::optional<double> exposure_s,
                                 std::optional<double> temperature_c) const;
 
   std::vector<ColourCalibration> calibrations() const;
-  /// Pixels that stand out by six read noises in a frame of a 25th of a second, ascending.
+  /// Returns the pixels that exceed the others by six read noises in a frame of a 25th of a second, ascending.
   std::vector<HotPixelFigure> hot_pixels() const;
 
  private:
@@ -50,7 +52,7 @@ class StageProfile {
     std::array<double, 3> dark_current_e_per_s{};
     double dark_temperature_c = 20;
     double dark_doubling_c = 7;
-    double codes = 1;  // of the stream for one of the profile's
+    double codes = 1;  // codes of the stream per code of the profile
     std::optional<PerSite<double>> pedestal_dn;
   };
   CameraProfile profile_;

@@ -7,7 +7,7 @@
 namespace lowlux {
 namespace {
 
-/// Whether the model begins with the first word of the make.
+/// Returns whether the model begins with the first word of the make.
 bool repeats(std::string_view make, std::string_view model) {
   const std::string_view word = make.substr(0, make.find(' '));
   return model.size() > word.size() && model[word.size()] == ' ' &&

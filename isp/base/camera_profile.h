@@ -14,7 +14,8 @@
 
 namespace lowlux {
 
-/// Standard errors of the figures of a SensorModel, in the same units; 0 where a figure is quoted and not measured.
+/// Holds the standard errors of the figures of a SensorModel, in the same units; 0 where a figure is quoted and not
+/// measured.
 struct SensorErrors {
   double system_gain_dn_per_e = 0;
   double read_noise_e = 0;
@@ -25,67 +26,67 @@ struct SensorErrors {
   double dsnu = 0;
 };
 
-/// A pixel with much more dark current than the others, in active pixels.
+/// Describes a pixel with much more dark current than the others, in active pixels.
 struct HotPixelFigure {
   int x = 0;
   int y = 0;
   double excess_e_per_s = 0;  // at the model's dark_temperature_c
 };
 
-/// Where figures come from.
+/// States the source of a set of figures.
 struct Provenance {
   enum class Kind : std::uint8_t { measured, quoted } kind = Kind::measured;
-  std::string figures;             // which: "photon transfer", "dark series"...
+  std::string figures;             // kind of figures: "photon transfer", "dark series"...
   std::string source;              // the program and its version, or the publication
   std::string date;                // YYYY-MM-DD
-  std::vector<std::string> files;  // that were measured
+  std::vector<std::string> files;  // files that were measured
   double reduced_chi_square = 0;   // of the fit; 0 if nothing was fitted
   int degrees_of_freedom = 0;
 };
 
-/// What figures were measured over, ends included.
+/// Holds the range that figures were measured over, ends included.
 struct MeasuredRange {
   double low = 0;
   double high = 0;
   friend bool operator==(const MeasuredRange&, const MeasuredRange&) = default;
 };
 
-/// A camera at one gain setting.
+/// Describes a camera at one gain setting.
 struct GainProfile {
-  std::string gain_setting;  // as the camera calls it
+  std::string gain_setting;  // as the camera names it
   std::optional<double> iso;
-  std::optional<SensorModel> sensor;  // absent where the system gain is unknown: then nothing is known in electrons
+  std::optional<SensorModel> sensor;  // absent where the system gain is unknown: then no figure is in electrons
   SensorErrors errors;
-  std::optional<PerSite<Estimate>> pedestal_dn;  // the model's black level, site by site; absent if it was not measured
-  BlackPoint::Holds pedestal_holds = BlackPoint::Holds::pedestal_only;  // with the dark charge if it was not told apart
-  std::optional<MeasuredRange> dark_exposure_s;                         // of the darks; absent if there were none
-  std::optional<MeasuredRange> dark_temperature_c;                      // of the darks, where they state it
-  std::optional<std::array<Estimate, 3>> dark_chromaticity{};           // R : G : B of the dark current, sum 1
+  std::optional<PerSite<Estimate>> pedestal_dn;  // the model's black level, per CFA site; absent if it was not measured
+  BlackPoint::Holds pedestal_holds = BlackPoint::Holds::pedestal_only;  // with the dark charge if it was not separated
+  std::optional<MeasuredRange> dark_exposure_s;                // exposure times of the darks; absent if there were none
+  std::optional<MeasuredRange> dark_temperature_c;             // temperatures of the darks, where they state them
+  std::optional<std::array<Estimate, 3>> dark_chromaticity{};  // R : G : B of the dark current, sum 1
   std::vector<HotPixelFigure> hot_pixels;
   std::vector<Provenance> provenance;
 };
 
-/// A camera's colours under one light, and how well the matrix gives them: mean CIEDE2000 over the patches.
+/// Describes a camera's colours under one illuminant, and the error of the matrix: mean CIEDE2000 over the patches.
 struct ColourProfile {
   std::string illuminant;
   ColourCalibration calibration;                    // camera_calibration is the identity
-  std::optional<double> patches_ciede2000;          // of the patches the matrix was fitted to
-  std::optional<double> cross_validated_ciede2000;  // of patches left out of the fit
-  std::optional<double> condition_number;           // of the equations solved
+  std::optional<double> patches_ciede2000;          // error of the patches the matrix was fitted to
+  std::optional<double> cross_validated_ciede2000;  // error of patches left out of the fit
+  std::optional<double> condition_number;           // condition number of the equations solved
   Provenance provenance;
 };
 
-/// What has been measured of a camera; written and read by calib/profile/profile_io.h.
+/// Holds what has been measured of a camera; written and read by calib/profile/profile_io.h.
 struct CameraProfile {
   std::string make;
   std::string model;
   std::vector<GainProfile> gains;
   std::vector<ColourProfile> colours;
-  std::string mosaic;  // of the frames that were measured: RGGB, GRBG, GBRG, BGGR or monochrome; empty if unknown
+  std::string mosaic;  // mosaic of the measured frames: RGGB, GRBG, GBRG, BGGR or monochrome; empty if unknown
 };
 
-/// A camera as people name it: "Canon EOS 550D" of the make "Canon" and the model "Canon EOS 550D", "NIKON D750" of
-/// "NIKON CORPORATION", "Nokia RX-51" of "Nokia" and "RX-51".
+/// Returns the usual name of a camera: "Canon EOS 550D" for the make "Canon" and the model "Canon EOS 550D", "NIKON
+/// D750" for "NIKON CORPORATION", "Nokia RX-51" for "Nokia" and "RX-51".
 std::string camera_name(std::string_view make, std::string_view model);
 
 }  // namespace lowlux

@@ -7,17 +7,17 @@ namespace lowlux {
 
 enum class CfaColour : std::uint8_t { red, green, blue };
 
-/// The phase of a Bayer mosaic, named by the colours of its first 2x2 cell, row by row:
+/// Lists the phases of a Bayer mosaic, named by the colours of its first 2x2 cell, row by row:
 ///     rggb  R G    grbg  G R    gbrg  G B    bggr  B G
 ///           G B          B G          R G          G R
-/// The enumerator's bit 0 says that red lies in odd columns, bit 1 that red lies in odd rows.
+/// Bit 0 of the enumerator states that red lies in odd columns, bit 1 that red lies in odd rows.
 enum class BayerPhase : std::uint8_t { rggb = 0, grbg = 1, gbrg = 2, bggr = 3 };
 
-/// Column (0 or 1) and row (0 or 1) of red in the 2x2 cell.
+/// Both functions return the position (0 or 1) of red in the 2x2 cell: its column and its row.
 constexpr int red_column(BayerPhase phase) { return static_cast<int>(phase) & 1; }
 constexpr int red_row(BayerPhase phase) { return static_cast<int>(phase) >> 1; }
 
-/// Colour of the site at column x, row y, both >= 0.
+/// Returns the colour of the site at column x, row y, both >= 0.
 constexpr CfaColour colour_at(BayerPhase phase, int x, int y) {
   const bool in_red_column = (x & 1) == red_column(phase);
   const bool in_red_row = (y & 1) == red_row(phase);
@@ -25,12 +25,12 @@ constexpr CfaColour colour_at(BayerPhase phase, int x, int y) {
   return in_red_column || in_red_row ? CfaColour::green : CfaColour::blue;
 }
 
-/// The phase seen by a crop whose corner is at (x, y) of a mosaic of this phase.
+/// Returns the phase of a crop whose corner is at (x, y) of a mosaic of this phase.
 constexpr BayerPhase phase_of_crop(BayerPhase phase, int x, int y) {
   return static_cast<BayerPhase>(static_cast<int>(phase) ^ (x & 1) ^ ((y & 1) << 1));
 }
 
-/// Index 0..3 of a site in its 2x2 cell: 2 * (y mod 2) + x mod 2. All per-site figures are in this order.
+/// Returns the index 0..3 of a site in its 2x2 cell: 2 * (y mod 2) + x mod 2. All per-site figures are in this order.
 constexpr int site_of(int x, int y) { return ((y & 1) << 1) | (x & 1); }
 
 template <class T>

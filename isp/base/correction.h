@@ -5,33 +5,33 @@
 
 namespace lowlux {
 
-/// A coarse grid of gains stretched over part of the active area (DNG opcode GainMap, bilinear between its points).
+/// Holds a coarse grid of gains that spans part of the active area (DNG opcode GainMap, bilinear between its points).
 struct GainMap {
   int top = 0, left = 0, bottom = 0, right = 0;  // the area it multiplies, in active pixels, ends excluded
-  int row_pitch = 1, column_pitch = 1;           // every how many-th row and column of that area
-  int first_plane = 0, planes = 1;               // of linear_rgb data
+  int row_pitch = 1, column_pitch = 1;  // it multiplies every row_pitch-th row and every column_pitch-th column
+  int first_plane = 0, planes = 1;      // planes of linear_rgb data it multiplies
   int points_v = 1, points_h = 1, map_planes = 1;
-  double spacing_v = 1, spacing_h = 1;  // of the points, relative to the active area's height and width
-  double origin_v = 0, origin_h = 0;    // of the first point, relative likewise
+  double spacing_v = 1, spacing_h = 1;  // distance of the points, relative to the active area's height and width
+  double origin_v = 0, origin_h = 0;    // position of the first point, relative likewise
   std::vector<float> gain;              // points_v x points_h x map_planes
 };
 
-/// Radial lens shading: gain 1 + k0 r^2 + k1 r^4 + ... + k4 r^10 (DNG opcode FixVignetteRadial),
-/// r the distance to the centre, relative to that of the farthest corner.
+/// Describes radial lens shading: gain 1 + k0 r^2 + k1 r^4 + ... + k4 r^10 (DNG opcode FixVignetteRadial), with r the
+/// distance to the centre, relative to that of the farthest corner.
 struct RadialGain {
   double k[5] = {};
   double centre_x = 0.5, centre_y = 0.5;  // relative to the active area
 };
 
-/// A rectangle of pixels known to be defective, in active pixels; one pixel is 1x1.
+/// Marks a rectangle of pixels known to be defective, in active pixels; one pixel is 1x1.
 struct DefectRect {
   int x = 0, y = 0, width = 1, height = 1;
 };
 
-/// Sources that name more than 1 / max_named_share of the active pixels as defective are not believed.
+/// Defect lists of more than 1 / max_named_share of the active pixels are rejected as implausible.
 inline constexpr std::int64_t max_named_share = 16;
 
-/// Corrections a source asks for, each multiplied or repaired after black (and dark) have been subtracted.
+/// Holds the corrections a source asks for, each applied after black (and dark) have been subtracted.
 struct RawCorrections {
   std::vector<GainMap> gain_maps;
   std::vector<RadialGain> radial_gains;

@@ -2,7 +2,7 @@
 
 namespace lowlux {
 
-/// A measured figure and its standard error, both in the unit of the name that holds them.
+/// Holds a measured figure and its standard error, both in the unit of the variable's name.
 struct Estimate {
   double value = 0;
   double standard_error = 0;  // at least 0

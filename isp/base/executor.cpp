@@ -14,11 +14,11 @@
 namespace lowlux {
 namespace {
 
-/// How long a thread looks for what it waits for before it sleeps. The pieces of one frame follow each other sooner,
-/// and waking up takes tens of microseconds.
+/// A waiting thread spins this long before it sleeps. The tasks of one frame follow each other sooner, and waking up
+/// takes tens of microseconds.
 constexpr std::chrono::microseconds busy_wait{50};
 
-/// Leaves the core to its other thread for a moment.
+/// Yields the core to its other hardware thread for a moment.
 void relax() {
 #if defined(__x86_64__)
   __builtin_ia32_pause();
@@ -27,7 +27,7 @@ void relax() {
 #endif
 }
 
-/// Whether `done` came true before the time was up.
+/// Returns whether `done` became true before the time was up.
 template <class Done>
 bool waited_busily(const Done& done) {
   const auto end = std::chrono::steady_clock::now() + busy_wait;
@@ -44,8 +44,8 @@ void InlineExecutor::run(int n, void (*fn)(void* context, int index), void* cont
   for (int i = 0; i < n; ++i) fn(context, i);
 }
 
-// Task i runs on worker i mod width, task 0 on the caller: the same split every time, so per-task scratch stays warm.
-// A new generation says that there is work; what it is, and the list of workers, were written before.
+// Task i runs on worker i mod width, task 0 on the caller: always the same assignment, so per-task scratch stays in
+// cache. A new generation signals new work; the work and the list of workers are written before it.
 struct PoolExecutor::State {
   std::mutex mutex;
   std::condition_variable work_ready;
@@ -91,7 +91,7 @@ PoolExecutor::PoolExecutor(int threads) : state_(std::make_unique<State>()) {
       pthread_setname_np(state_->workers.back().native_handle(), "lowlux");
     }
   } catch (const std::system_error&) {
-    // The system gives no more threads: those there are do the work.
+    // The system gives no more threads: the existing ones do the work.
   }
 }
 

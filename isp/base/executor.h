@@ -7,8 +7,8 @@
 
 namespace lowlux {
 
-/// Runs the n parts of one piece of work, at most width() at a time. Nothing is allocated and nothing thrown: parts
-/// that may throw go through for_each_index or for_each_band.
+/// Runs n tasks, at most width() at a time. It allocates and throws nothing: tasks that may throw use for_each_index or
+/// for_each_band.
 class Executor {
  public:
   virtual ~Executor() = default;
@@ -17,15 +17,15 @@ class Executor {
   virtual void run(int n, void (*fn)(void* context, int index), void* context) noexcept = 0;
 };
 
-/// Everything on the calling thread.
+/// Runs every task on the calling thread.
 class InlineExecutor final : public Executor {
  public:
   int width() const noexcept override { return 1; }
   void run(int n, void (*fn)(void* context, int index), void* context) noexcept override;
 };
 
-/// The calling thread and up to threads - 1 workers (as many as the system gives) named "lowlux". Between calls they
-/// look out for the next one for a moment, then sleep; they end with the object.
+/// Runs tasks on the calling thread and on up to threads - 1 workers (as many as the system gives) named "lowlux".
+/// Between calls the workers spin for a moment, then sleep; they end with the object.
 class PoolExecutor final : public Executor {
  public:
   explicit PoolExecutor(int threads);
@@ -41,13 +41,13 @@ class PoolExecutor final : public Executor {
   std::unique_ptr<State> state_;
 };
 
-/// A contiguous run of rows, first included, last excluded.
+/// Describes a contiguous range of rows, first included, last excluded.
 struct RowBand {
   int first = 0;
   int last = 0;
 };
 
-/// Band `index` of `count` over `height` rows. Every band starts at an even row, so that the CFA phase is kept.
+/// Returns band `index` of `count` over `height` rows. Every band starts at an even row, so that the CFA phase is kept.
 constexpr RowBand row_band(int height, int count, int index) {
   const int pairs = (height + 1) / 2;
   const auto edge = [&](int i) {
@@ -57,8 +57,8 @@ constexpr RowBand row_band(int height, int count, int index) {
   return {edge(index), edge(index + 1)};
 }
 
-/// Calls work(i) for each i in 0..count-1. The first exception that work throws is thrown again when all threads are
-/// done; parts that have not begun by then are left out.
+/// Calls work(i) for each i in 0..count-1. The first exception that work throws is rethrown when all threads are done;
+/// tasks that have not begun by then are skipped.
 template <class Work>
 void for_each_index(Executor& executor, int count, Work&& work) {
   struct Call {

@@ -21,14 +21,14 @@ struct Rect {
   friend bool operator==(const Rect&, const Rect&) = default;
 };
 
-/// What one sample of a readout stands for.
+/// Lists what one sample of a readout represents.
 enum class SensorLayout : std::uint8_t {
   bayer,       // one filter per pixel, see BayerPhase
   monochrome,  // no filters
   linear_rgb,  // three samples per pixel, already demosaiced (DNG LinearRaw), interleaved R G B
 };
 
-/// EXIF orientation, 1 to 8: what has to be done to the stored picture to see it upright.
+/// Lists the EXIF orientations, 1 to 8: the transform that brings the stored image upright.
 enum class Orientation : std::uint8_t {
   normal = 1,
   mirror_horizontal,
@@ -40,7 +40,7 @@ enum class Orientation : std::uint8_t {
   rotate_270
 };
 
-/// What is known about how a frame was taken; what the source does not tell is absent, never guessed.
+/// Holds what is known about how a frame was taken; what the source does not state is absent, never guessed.
 struct FrameInfo {
   std::string make;
   std::string model;
@@ -54,69 +54,69 @@ struct FrameInfo {
   Orientation orientation = Orientation::normal;
 };
 
-/// Black level a source states: a pattern that repeats from the corner of the active area, plus an offset for
+/// Holds the black level a source states: a pattern that repeats from the corner of the active area, plus an offset for
 /// each active column and row (DNG BlackLevelRepeatDim, BlackLevel, BlackLevelDeltaH, BlackLevelDeltaV).
 struct BlackLevel {
   int rows = 1;
   int columns = 1;
-  int samples = 1;                 // per pixel: 3 for SensorLayout::linear_rgb
+  int samples = 1;                 // samples per pixel: 3 for SensorLayout::linear_rgb
   std::vector<double> pattern_dn;  // rows x columns x samples
   std::vector<double> column_dn;   // empty, or one for each active column
   std::vector<double> row_dn;      // empty, or one for each active row
 
-  /// Black level [DN] of sample `sample` at active column x, row y.
+  /// Returns the black level [DN] of sample `sample` at active column x, row y.
   double at(int x, int y, int sample = 0) const {
     const int i = ((y % rows) * columns + x % columns) * samples + sample;
     return pattern_dn[i] + (column_dn.empty() ? 0.0 : column_dn[x]) + (row_dn.empty() ? 0.0 : row_dn[y]);
   }
 };
 
-/// One readout, as the source delivers it after its own LinearizationTable and before anything else.
-/// `dn` holds the whole readout, borders included: readout height x width (x 3 interleaved for linear_rgb).
-/// `active` is in readout pixels; `phase`, `black_tag` and `default_crop` count from the corner of `active`.
+/// Holds one readout, as the source delivers it after its own LinearizationTable and before anything else. `dn` holds
+/// the complete readout, borders included: readout height x width (x 3 interleaved for linear_rgb). `active` is in
+/// readout pixels; `phase`, `black_tag` and `default_crop` count from the corner of `active`.
 struct RawDn {
   Plane<std::uint16_t> dn;
   SensorLayout layout = SensorLayout::bayer;
   BayerPhase phase = BayerPhase::rggb;  // only for SensorLayout::bayer
   Rect active;
-  Rect default_crop;                    // the part of the active area that makes the picture
-  std::vector<Rect> masked;             // light-shielded parts of the readout, in readout pixels
-  bool masked_is_stated = false;        // true: the source says so; false: taken to be all that is not active
+  Rect default_crop;                    // the region of the active area that makes the image
+  std::vector<Rect> masked;             // light-shielded regions of the readout, in readout pixels
+  bool masked_is_stated = false;        // true: the source states them; false: assumed to be all that is not active
   std::optional<BlackLevel> black_tag;  // what the source states; absent if it states nothing
   std::array<double, 3> white_dn{};     // saturation of R, G, B (all equal for monochrome)
   FrameInfo info;
 };
 
-/// Black point of one frame, per CFA site. The pedestal [DN] is what is subtracted, or its mean where `pattern` is set;
-/// when it was measured on masked pixels or dark frames it holds the dark charge too, and the dark mean left to
-/// subtract is 0. Of a dark frame it is the mean: what is subtracted is the frame itself (dark_frame.h). For
-/// SensorLayout::linear_rgb the four figures are those of R, G, B and B.
+/// Holds the black point of one frame, per CFA site. The pedestal [DN] is subtracted, or is the mean of what is
+/// subtracted where `pattern` is set. If it was measured on masked pixels or dark frames it holds the dark charge too,
+/// and the dark mean left to subtract is 0. For a dark frame it is the mean: what is subtracted is the frame itself
+/// (dark_frame.h). For SensorLayout::linear_rgb the four figures are those of R, G, B and B.
 struct BlackPoint {
   PerSite<double> pedestal_dn{};
-  PerSite<double> pedestal_standard_error_dn{};  // 0 where it is quoted and not measured
-  PerSite<double> dark_mean_e{};                 // left in the data once the pedestal is off; 0 if unknown
-  PerSite<double> noise_std_dn{};                // of masked pixels; 0 where nothing was measured
+  PerSite<double> pedestal_standard_error_dn{};  // 0 where the pedestal is quoted and not measured
+  PerSite<double> dark_mean_e{};   // dark charge left in the data once the pedestal is subtracted; 0 if unknown
+  PerSite<double> noise_std_dn{};  // noise of masked pixels; 0 where nothing was measured
   enum class Holds : std::uint8_t { pedestal_only, pedestal_and_dark } holds = Holds::pedestal_only;
   enum class Source : std::uint8_t { masked_pixels, tag, given, profile, dark_frame } source = Source::tag;
   std::optional<BlackLevel> pattern;  // set when `source` is tag and four figures cannot express it
 };
 
-/// Variance of a raw value x in 0..1 (black to white): scale * x + offset (DNG NoiseProfile), R, G, B.
+/// Describes the variance of a raw value x in 0..1 (black to white): scale * x + offset (DNG NoiseProfile), R, G, B.
 struct NoiseProfile {
   std::array<double, 3> scale{};
   std::array<double, 3> offset{};
-  enum class Source : std::uint8_t { file, profile, picture } source = Source::file;  // who says so
+  enum class Source : std::uint8_t { file, profile, picture } source = Source::file;  // origin of the figures
 };
 
-/// One colour calibration of a camera (DNG ColorMatrixN, CameraCalibrationN, ForwardMatrixN).
+/// Holds one colour calibration of a camera (DNG ColorMatrixN, CameraCalibrationN, ForwardMatrixN).
 struct ColourCalibration {
-  double cct_k = 0;  // of its calibration illuminant; 0 if the source does not say
+  double cct_k = 0;  // of its calibration illuminant; 0 if the source does not state it
   Matrix3 xyz_to_camera = identity3();
   Matrix3 camera_calibration = identity3();
   std::optional<Matrix3> forward;  // white-balanced camera RGB -> XYZ under D50
 };
 
-/// What a source knows about a camera's colour. No calibration: nothing beyond camera RGB can be made.
+/// Holds what a source states about a camera's colour. Without a calibration, only camera RGB can be made.
 struct CameraColour {
   std::vector<ColourCalibration> calibrations;  // none, one or two; by rising cct_k
   Vector3 analog_balance{1, 1, 1};
@@ -125,22 +125,22 @@ struct CameraColour {
   enum class Source : std::uint8_t { none, file_tags, decoder_table, profile } source = Source::none;
 };
 
-/// A frame with all its source tells about it: what capture hands to the pipeline.
+/// Holds a frame with all that its source states about it: capture passes it to the pipeline.
 struct RawFrame {
   RawDn raw;
   CameraColour colour;
   std::optional<NoiseProfile> noise;
   RawCorrections corrections;
-  std::vector<std::string> warnings;  // what could not be honoured, by name; one line each
+  std::vector<std::string> warnings;  // requests of the source that were not met, by name; one line each
 };
 
-struct Electrons {};        // the system gain is known
-struct FractionOfWhite {};  // it is not: 0 is black, 1 the white level
+struct Electrons {};        // unit: the system gain is known
+struct FractionOfWhite {};  // unit for an unknown system gain: 0 is black, 1 the white level
 struct DarkIn {};           // the dark charge is still in the values
-struct DarkOut {};          // it has been subtracted
+struct DarkOut {};          // the dark charge has been subtracted
 
-/// A mosaic in linear signed units, active area only; pedestal removed, nothing clipped: values below zero are data.
-/// The unit and whether dark is still in are part of the type, so that neither can be mistaken.
+/// Holds a mosaic in linear signed units, active area only; pedestal removed, nothing clipped: values below zero are
+/// data. The unit and whether the dark charge is still in are part of the type, so that neither can be confused.
 template <class Unit, class Dark>
 struct LinearMosaic {
   Plane<float> value;

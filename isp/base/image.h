@@ -8,7 +8,7 @@
 
 namespace lowlux {
 
-/// Three planes of equal size.
+/// Borrows three planes of equal size.
 template <class T>
 using RgbView = std::array<PlaneView<T>, 3>;
 
@@ -24,12 +24,12 @@ struct RgbPlanes {
   RgbView<const float> view() const { return {plane[0].view(), plane[1].view(), plane[2].view()}; }
 };
 
-/// Camera RGB: black removed, 1 at the white level, signed, not white balanced.
+/// Camera RGB has black removed, is 1 at the white level, signed, and not white balanced.
 using CameraRgb = RgbPlanes<struct CameraRgbDomain>;
-/// Scene-linear R, G, B (or X, Y, Z) of an OutputSpace; signed and unbounded.
+/// Scene-linear R, G, B (or X, Y, Z) of an OutputSpace is signed and unbounded.
 using SceneLinear = RgbPlanes<struct SceneLinearDomain>;
 
-/// Interleaved R G B codes, ready for a file or a display: `codes` is height x 3 width.
+/// Holds interleaved R G B codes, ready for a file or a display: `codes` is height x 3 width.
 template <class Code>
 struct Encoded {
   Plane<Code> codes;
@@ -39,13 +39,13 @@ struct Encoded {
 using Encoded8 = Encoded<std::uint8_t>;
 using Encoded16 = Encoded<std::uint16_t>;
 
-/// A finished picture in one of the three sample types files are written in.
+/// Holds a finished image in one of the three sample types files are written in.
 using Picture = std::variant<Encoded8, Encoded16, SceneLinear>;
 
-/// The sample type of a picture: display codes of 8 or 16 bits, or scene-linear float.
+/// Lists the sample types of an image: display codes of 8 or 16 bits, or scene-linear float.
 enum class SampleType : std::uint8_t { u8, u16, f32 };
 
-/// What the numbers of a picture mean. `camera` has no known primaries.
+/// Lists the colour spaces of an image. `camera` has no known primaries.
 enum class OutputSpace : std::uint8_t { srgb, display_p3, rec2020, linear_srgb, linear_rec2020, xyz, camera };
 
 constexpr bool is_linear(OutputSpace space) { return space >= OutputSpace::linear_srgb; }

@@ -7,19 +7,19 @@
 
 namespace lowlux {
 
-/// Cells of 4 pixels along a side of so many.
+/// Returns the number of 4-pixel cells along a side of `pixels` pixels.
 constexpr int cells_along(int pixels) { return (pixels + 3) / 4; }
 
-/// How a look changes linear RGB, on a grid with one cell for 4 x 4 pixels, interpolated linearly between the cells'
-/// middles. With v a pixel, Y = luminance . v, S = max(rods . v, min(least_rods Y, Y)) and the five parts of the grid
-/// at the pixel:
-///     E   = Y + rod_share (S - Y)                               what is seen of its light
+/// Describes how a look changes linear RGB, on a grid with one cell for 4 x 4 pixels, interpolated linearly between the
+/// cell centres. With v a pixel, Y = luminance . v, S = max(rods . v, min(least_rods Y, Y)) and the five components of
+/// the grid at the pixel:
+///     E   = Y + rod_share (S - Y)                               perceived luminance
 ///     out = (base + detail E) (1 + blue tint) + chroma (max(E, 0) + dark) / (max(Y, 0) + dark) (v - Y)
-/// rod_share 0, chroma 1, blue 0, detail 1, base 0 leave v as it is, up to rounding.
+/// rod_share 0, chroma 1, blue 0, detail 1, base 0 leave v unchanged, up to rounding.
 struct LookGrid {
   static constexpr int cell = 4;
-  /// The least S/P of any light, low-pressure sodium's 0.215, over that of D65: linear weights make reds darker than
-  /// that, and negative. Noise below black stays signed.
+  /// Gives the smallest S/P of any light, low-pressure sodium's 0.215, divided by that of D65. Linear weights make reds
+  /// darker than that, and negative. Noise below black stays signed.
   static constexpr float least_rods = 0.215f / 2.46f;
   enum Part : std::uint8_t { rod_share, chroma, blue, detail, base };
   static constexpr int parts = 5;

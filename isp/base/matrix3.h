@@ -30,7 +30,8 @@ constexpr Matrix3 operator*(const Matrix3& a, const Matrix3& b) {
 
 constexpr Matrix3 operator*(double s, const Matrix3& m) { return diagonal3({s, s, s}) * m; }
 
-/// Inverse by cofactors; nullopt if a value is not finite or the matrix is singular to about 1e-12 of its scale.
+/// Returns the inverse by cofactors; nullopt if a value is not finite or the matrix is singular to about 1e-12 of its
+/// scale.
 inline std::optional<Matrix3> inverse(const Matrix3& m) {
   Matrix3 cofactor_transposed{};
   for (int i = 0; i < 3; ++i) {

@@ -52,10 +52,10 @@ ScratchUse::~ScratchUse() {
 void prefer_huge_pages(void* memory, std::size_t bytes) noexcept {
   constexpr std::uintptr_t page = std::uintptr_t{2} << 20, least = 2 * page;
   if (bytes < least) return;
-  // Only what lies in whole pages: what is beside it is someone else's.
+  // Only complete pages are advised: the memory next to them belongs to other allocations.
   const std::uintptr_t before = (page - reinterpret_cast<std::uintptr_t>(memory) % page) % page;
   const std::uintptr_t whole = (bytes - before) / page * page;
-  madvise(static_cast<std::byte*>(memory) + before, whole, MADV_HUGEPAGE);  // a wish: it may be refused
+  madvise(static_cast<std::byte*>(memory) + before, whole, MADV_HUGEPAGE);  // a hint: the system may refuse it
 }
 
 }  // namespace lowlux

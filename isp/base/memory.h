@@ -2,8 +2,8 @@
 
 #include <cstddef>
 
-/// LOWLUX_SANITIZED is defined where the address, thread or memory sanitizer has the heap, and LOWLUX_ADDRESS_SANITIZED
-/// where it is the first of them. GCC and clang say so in different words.
+/// LOWLUX_SANITIZED is defined if the address, thread or memory sanitizer manages the heap, and
+/// LOWLUX_ADDRESS_SANITIZED if it is the address sanitizer. GCC and clang have different macros for this.
 #if defined(__SANITIZE_ADDRESS__)
 #define LOWLUX_ADDRESS_SANITIZED 1
 #elif defined(__SANITIZE_THREAD__)
@@ -21,21 +21,21 @@
 
 namespace lowlux {
 
-/// Scratch memory of one use by one thread: kernels' rows, sums on their way to a result. It holds nothing between
+/// Describes scratch memory for one use by one thread: rows of kernels, intermediate sums. It holds nothing between
 /// uses.
 struct Scratch {
   void* data = nullptr;
   std::size_t bytes = 0;
 };
 
-/// Bytes between two pieces of scratch memory, and after the last, that belong to neither.
+/// Sets the number of bytes between two scratch areas, and after the last, that belong to neither.
 inline constexpr std::size_t scratch_guard_bytes = 64;
 
-/// Makes scratch memory that was just allocated, and its guard, ready for ScratchUse.
+/// Prepares newly allocated scratch memory, and its guard, for ScratchUse.
 void close_scratch(const Scratch& scratch) noexcept;
 
-/// The right to use scratch memory, which begins as zeros: what another use left there cannot matter. Outside of it the
-/// address sanitizer reports every access; debug builds check at its end that the guard is as it was.
+/// Grants the use of scratch memory, which begins as zeros, so that data of earlier uses cannot matter. Outside of a
+/// use the address sanitizer reports every access; debug builds check at its end that the guard is unchanged.
 class ScratchUse {
  public:
   explicit ScratchUse(const Scratch& scratch) noexcept;
@@ -47,9 +47,9 @@ class ScratchUse {
   Scratch scratch_;
 };
 
-/// Asks the system for huge pages in large memory that has not been touched yet: with small ones, much of the time of
-/// developing a frame goes into handing them out and taking them back. Without effect on small memory, and where the
-/// system has none.
+/// Asks the system for huge pages in large memory that has not been touched yet: with small pages, allocating and
+/// freeing them takes much of the time of developing a frame. Has no effect on small memory, and where the system has
+/// no huge pages.
 void prefer_huge_pages(void* memory, std::size_t bytes) noexcept;
 
 }  // namespace lowlux

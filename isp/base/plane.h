@@ -11,8 +11,8 @@
 
 namespace lowlux {
 
-/// Borrowed rows of samples: `height` rows of `width`, `stride` samples from one row to the next.
-/// Valid only as long as its owner; passed by value.
+/// Borrows rows of samples: `height` rows of `width`, `stride` samples from one row to the next. A view is valid only
+/// as long as its owner, and is passed by value.
 template <class T>
 struct PlaneView {
   T* data = nullptr;
@@ -28,7 +28,7 @@ struct PlaneView {
     assert(x >= 0 && x < width);
     return row(y)[x];
   }
-  /// The rectangle of this view with its corner at (x, y); it must lie inside.
+  /// Returns the rectangle of this view with its corner at (x, y); it must lie inside.
   PlaneView crop(int x, int y, int crop_width, int crop_height) const {
     assert(x >= 0 && y >= 0 && crop_width >= 0 && crop_height >= 0);
     assert(x + crop_width <= width && y + crop_height <= height);
@@ -37,8 +37,8 @@ struct PlaneView {
   operator PlaneView<const T>() const requires(!std::is_const_v<T>) { return {data, width, height, stride}; }
 };
 
-/// Owned samples, rows end to end. Fresh planes are not initialised; copies are spelled clone(); a plane moved from is
-/// empty.
+/// Owns samples, stored row after row. New planes are not initialised; copies are made with clone(); a moved-from plane
+/// is empty.
 template <class T>
 class Plane {
  public:
@@ -89,7 +89,7 @@ class Plane {
   std::unique_ptr<T[]> samples_;
 };
 
-/// Makes the plane anew if it has another size. What it holds then is not initialised.
+/// Reallocates the plane if it has another size. Its contents are then not initialised.
 template <class T>
 void fit(Plane<T>& plane, int width, int height) {
   if (plane.width() != width || plane.height() != height) plane = Plane<T>(width, height);

@@ -7,20 +7,20 @@
 
 namespace lowlux {
 
-/// What kind of thing went wrong outside of lowlux. Our own mistakes are assertions, not errors.
+/// Lists the kinds of failures outside of lowlux. Programming errors are assertions, not errors.
 enum class ErrorCode {
   not_found,         // no such file or device
-  unreadable,        // it is there and cannot be read
+  unreadable,        // it exists and cannot be read
   malformed,         // it contradicts its format or itself
   unsupported,       // it is well formed, and lowlux does not handle it
   too_large,         // it would take more memory than the limit
-  exists,            // an output is in the way
+  exists,            // an output already exists
   unwritable,        // an output cannot be written
   invalid_argument,  // an option or parameter outside its range
   insufficient,      // too little in the data to answer without guessing
 };
 
-/// One failure: what is wrong and what would help, in one line without a final stop.
+/// Describes one failure: what is wrong and what would help, in one line without a final full stop.
 struct Error {
   ErrorCode code;
   std::string message;

@@ -8,21 +8,21 @@
 
 namespace lowlux {
 
-/// How the converter makes a code of a voltage: the nearest one, or the one below (thesis Eq. 4.10).
+/// Lists how the converter rounds a voltage to a code: to the nearest one, or the one below (thesis Eq. 4.10).
 enum class Quantisation : std::uint8_t { round, floor };
 
-/// Variance that rounding to whole codes adds [DN^2].
+/// Gives the variance that rounding to integer codes adds [DN^2].
 inline constexpr double quantisation_dn2 = 1.0 / 12;
 
-/// An image sensor at one gain setting, in the terms of EMVA 1288. Figures of three are those of R, G and B.
-/// What is 0 by default is an effect the sensor does not have. Checked by isp::check_sensor.
+/// Describes an image sensor at one gain setting, in the terms of EMVA 1288. Arrays of three are for R, G and B. A
+/// noise source whose figure is 0 (the default) is absent. Checked by isp::check_sensor.
 struct SensorModel {
   std::string name;
   double system_gain_dn_per_e = 1;  // K
-  double read_noise_e = 0;          // temporal dark noise without dark current's
+  double read_noise_e = 0;          // temporal dark noise without that of dark current
   double full_well_e = 0;           // saturation capacity: the charge at which a pixel is full
-  int bits = 12;                    // of the converter
-  double black_level_dn = 0;        // pedestal: the mean code of no charge
+  int bits = 12;                    // bits of the converter
+  double black_level_dn = 0;        // pedestal: the mean code without charge
   double white_level_dn = 4095;     // largest code the converter gives
   Quantisation quantisation = Quantisation::round;
 
@@ -33,14 +33,14 @@ struct SensorModel {
 
   double prnu = 0;                // standard deviation of the pixels' sensitivity, relative to its mean
   double dsnu = 0;                // standard deviation of the pixels' dark current, relative to its mean
-  double hot_pixel_fraction = 0;  // of all pixels
+  double hot_pixel_fraction = 0;  // fraction of all pixels
   double hot_pixel_current_e_per_s =
       0;                      // mean of their extra dark current, exponentially distributed; same temperature law
   double row_noise_e = 0;     // standard deviation of an offset drawn for each row of each frame
-  double column_noise_e = 0;  // the same for each column, fixed
+  double column_noise_e = 0;  // standard deviation of an offset drawn for each column, the same in all frames
 };
 
-/// What light does to the sensor: electrons in one pixel for radiance in front of the camera.
+/// Describes the response of the sensor to light: electrons in one pixel for radiance in front of the camera.
 ///     mu_k [e-] = exposure_s * etendue_m2_sr * integral of photons(nm) * quantum_efficiency[k](nm)
 /// with photons in s-1 m-2 sr-1 nm-1 (isp/model/sensor/photon.h).
 struct SpectralResponse {

@@ -13,10 +13,11 @@
 
 namespace lowlux {
 
-/// A quantity tabulated over wavelength; the steps may be unequal. Between its nodes it is linear, outside them 0.
-/// Made by of(), so that an object always holds at least two finite nodes with rising wavelengths.
+/// Holds a quantity tabulated over wavelength; the steps may be unequal. Between its nodes it is linear, outside them
+/// 0. It is made by of(), so that an object always holds at least two finite nodes with rising wavelengths.
 class Spectrum {
  public:
+  /// Makes a spectrum from its nodes.
   /// @param wavelengths_nm  rising strictly, as many as there are values; at least two
   /// @param values          finite; negative ones are allowed (differences of spectra)
   static Result<Spectrum> of(std::vector<double> wavelengths_nm, std::vector<double> values) {
@@ -42,7 +43,7 @@ class Spectrum {
   std::span<const double> values() const { return values_; }
   std::size_t size() const { return values_.size(); }
 
-  /// The spectrum with each value replaced by change(wavelength_nm, value), which must be finite.
+  /// Returns the spectrum with each value replaced by change(wavelength_nm, value), which must be finite.
   template <class Change>
   Spectrum mapped(const Change& change) const {
     std::vector<double> values(values_);
@@ -50,7 +51,7 @@ class Spectrum {
     return {wavelengths_nm_, std::move(values)};
   }
 
-  /// Value at a wavelength: linear between nodes, 0 outside the tabulated range.
+  /// Returns the value at a wavelength: linear between nodes, 0 outside the tabulated range.
   double at(double wavelength_nm) const {
     if (!(wavelength_nm >= wavelengths_nm_.front() && wavelength_nm <= wavelengths_nm_.back())) return 0;
     const auto above = std::upper_bound(wavelengths_nm_.begin(), wavelengths_nm_.end(), wavelength_nm);
@@ -68,7 +69,7 @@ class Spectrum {
   std::vector<double> values_;
 };
 
-/// The spectrum at other wavelengths, which must rise; see Spectrum::at.
+/// Returns the spectrum at other wavelengths, which must rise; see Spectrum::at.
 inline Result<Spectrum> resample(const Spectrum& spectrum, std::span<const double> wavelengths_nm) {
   std::vector<double> values(wavelengths_nm.size());
   std::transform(wavelengths_nm.begin(), wavelengths_nm.end(), values.begin(),
@@ -76,13 +77,14 @@ inline Result<Spectrum> resample(const Spectrum& spectrum, std::span<const doubl
   return Spectrum::of({wavelengths_nm.begin(), wavelengths_nm.end()}, std::move(values));
 }
 
-/// Light reflected by a surface, at the nodes of the light.
+/// Returns the light reflected by a surface, at the nodes of the light.
 inline Spectrum reflected(const Spectrum& light, const Spectrum& reflectance) {
   return light.mapped([&](double nm, double power) { return power * reflectance.at(nm); });
 }
 
-/// Integral of spectrum(nm) * weight(nm) by the trapezium rule on the nodes of `spectrum` [value x nm].
-/// Its nodes alone are used because tables of lamps hold their lines summed into bins: between bins nothing is known.
+/// Returns the integral of spectrum(nm) * weight(nm) by the trapezium rule on the nodes of `spectrum` [value x nm].
+/// Only its own nodes are used because tables of lamps hold their lines summed into bins: between bins nothing is
+/// known.
 template <class Weight>
 double integrate(const Spectrum& spectrum, const Weight& weight) {
   const auto nm = spectrum.wavelengths_nm();
@@ -97,7 +99,8 @@ double integrate(const Spectrum& spectrum, const Weight& weight) {
   return sum;
 }
 
-/// Integral of the spectrum over its range [value x nm], exact for what it is between its nodes: linear.
+/// Returns the integral of the spectrum over its range [value x nm], exact for a spectrum that is linear between its
+/// nodes.
 inline double integrate(const Spectrum& spectrum) {
   return integrate(spectrum, [](double) { return 1.0; });
 }

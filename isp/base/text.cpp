@@ -9,7 +9,7 @@
 namespace lowlux {
 namespace {
 
-constexpr std::size_t longest_wanted = 64;  // bytes: bounds the work on what an outsider typed
+constexpr std::size_t longest_wanted = 64;  // bytes: bounds the work on untrusted input
 constexpr std::size_t most_matches = 3;
 
 std::size_t common_beginning(std::string_view a, std::string_view b) {
@@ -19,7 +19,7 @@ std::size_t common_beginning(std::string_view a, std::string_view b) {
   return n;
 }
 
-/// The distance by rows of the usual table, of which three are kept; a.size() <= longest_wanted.
+/// Returns the edit distance from the rows of the usual table, of which three are kept; a.size() <= longest_wanted.
 std::size_t distance(std::string_view a, std::string_view b) {
   using Row = std::array<std::size_t, longest_wanted + 1>;
   Row before_last{}, last{}, row{};
@@ -40,8 +40,8 @@ std::size_t distance(std::string_view a, std::string_view b) {
   return last[a.size()];
 }
 
-/// What a name is sorted by; nullopt if it is not near. A name that `wanted` begins is one edit away: some letters are
-/// still to be typed, all in one place.
+/// Returns the sort key of a name; nullopt if it is not near. A name that begins with `wanted` is one edit away: the
+/// missing letters are all at its end.
 std::optional<std::tuple<std::size_t, std::size_t>> rank(std::string_view wanted, std::string_view name) {
   const std::size_t common = common_beginning(wanted, name);
   const std::size_t allowed = std::max<std::size_t>(1, wanted.size() / 3);
@@ -56,7 +56,7 @@ std::optional<std::tuple<std::size_t, std::size_t>> rank(std::string_view wanted
 
 std::vector<std::string_view> near_matches(std::string_view wanted, std::span<const std::string_view> known) {
   if (wanted.empty() || wanted.size() > longest_wanted) return {};
-  std::vector<std::tuple<std::size_t, std::size_t, std::size_t>> near;  // edits, letters not in common, place
+  std::vector<std::tuple<std::size_t, std::size_t, std::size_t>> near;  // edits, letters not in common, index
   for (std::size_t i = 0; i < known.size(); ++i) {
     if (const auto ranked = rank(wanted, known[i])) near.push_back(std::tuple_cat(*ranked, std::tuple{i}));
   }

@@ -25,7 +25,7 @@ double now_s(bool wall_clock) {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// Seconds of one run of the work; short work is repeated.
+/// Returns the seconds of one run of the work; short work is repeated.
 template <class Work>
 double time_of(const Work& work, const AccuracyTiming& timing) {
   const double start = now_s(timing.wall_clock);
@@ -43,7 +43,7 @@ bool dominates(const AccuracyRow& a, const AccuracyRow& b) {
   return a.ms_per_mp <= b.ms_per_mp && a.error <= b.error && (a.ms_per_mp < b.ms_per_mp || a.error < b.error);
 }
 
-/// Rows of the group of `first`, which follow it.
+/// Returns the rows of the group that begins at `first`.
 template <class Row>
 std::span<Row> group_from(std::span<Row> rows, std::size_t first) {
   std::size_t last = first;

@@ -10,28 +10,28 @@
 #include "isp/base/image.h"
 #include "isp/base/result.h"
 #include "isp/bench/peers/nl_means.h"
-#include "isp/reproduce/bench_picture.h"
 #include "isp/output/report/report.h"
+#include "isp/reproduce/bench_picture.h"
 #include "isp/reproduce/reproduce.h"
 
 namespace lowlux::isp {
 
-/// Text or a figure; one that is not finite is one that there is not.
+/// Holds text or a number; a number that is not finite means that the value is missing.
 using BenchCell = std::variant<std::string, double>;
 
-/// What was measured, a line for each row; columns carry their units.
+/// Table of measurements, a line for each row; columns carry their units.
 struct BenchTable {
   std::vector<std::string> columns;
   std::vector<std::vector<BenchCell>> rows;  // each as long as columns
 };
 
-/// A picture for the report, beside the table.
+/// An image for the report, in addition to the table.
 struct BenchImage {
-  std::string id;  // letters, digits and -: it names the file
+  std::string id;  // letters, digits and -: used as file name
   Encoded8 codes;  // sRGB
 };
 
-/// Two of the pictures, of the same size, to be laid over each other.
+/// Two of the images, of the same size, to be overlaid for comparison.
 struct BenchComparison {
   std::string title;
   std::string before_id;
@@ -40,25 +40,25 @@ struct BenchComparison {
   std::string after_label;
 };
 
-/// What one stage yields.
+/// Holds the results of one stage.
 struct BenchOutcome {
   BenchTable table;
-  std::vector<Finding> findings;  // what the stage must show, beside what it shows
+  std::vector<Finding> findings;  // checks that the stage must pass, in addition to its results
   std::vector<Plot> plots;
   std::vector<BenchImage> images;
   std::vector<std::string> remarks;  // how it was measured, and what was left out; one line each
   std::vector<BenchComparison> comparisons = {};
-  int threads = 1;  // that did what was timed, where the table has no such column
+  int threads = 1;  // number used by the timed work, where the table has no such column
 };
 
 struct BenchOptions {
-  std::string pictures_folder;  // that of testdata/pictures
+  std::string pictures_folder;  // folder of testdata/pictures
   PictureSet pictures = PictureSet::held_out;
-  bool quick = false;                                                  // parts of two pictures in two lights
-  int threads = 1;                                                     // for all but what is timed
-  const NlMeans* nl_means = nullptr;                                   // the other method; absent: its row is left out
-  std::string why_no_nl_means;                                         // then
-  std::function<void(double share, const std::string& what)> advance;  // another share of the whole is done; any thread
+  bool quick = false;                                                  // crops of two images in two lights
+  int threads = 1;                                                     // for all work that is not timed
+  const NlMeans* nl_means = nullptr;                                   // compared method; absent: its row is left out
+  std::string why_no_nl_means;                                         // reason why nl_means is absent
+  std::function<void(double share, const std::string& what)> advance;  // adds to the fraction done; from any thread
 };
 
 /// A stage of the pipeline whose accuracy and time are measured.
@@ -68,13 +68,13 @@ struct BenchStage {
   Result<BenchOutcome> (*run)(const BenchOptions& options);
 };
 
-/// All of them.
+/// Returns all stages.
 std::span<const BenchStage> bench_stages();
 
-/// The stage of an id. Error: there is none; the message names those there are.
+/// Returns the stage of an id. Error: no such stage; the message names the valid ids.
 Result<BenchStage> bench_stage_named(std::string_view id);
 
-/// The table with figures as text of so many significant digits, empty where there is none.
+/// Returns the table with numbers as text of `digits` significant digits, empty where the value is missing.
 Table table_of(const BenchTable& table, int digits);
 
 }  // namespace lowlux::isp

@@ -25,20 +25,20 @@ using denoise::Level;
 struct MeasuredSize {
   FrameSize frame;
   int rounds;
-  bool best;       // whether Level::best is measured: it takes most of a second for each megapixel
-  double advance;  // share of a pass
+  bool best;       // whether Level::best is measured: it takes almost a second for each megapixel
+  double advance;  // fraction of a pass
 };
-/// From about 0.9 MP on, memory comes fresh from the system for each frame: there is one size on each side of that.
+/// From about 0.9 MP on, the system allocates new memory for each frame: there is one size on each side of that.
 constexpr std::array<MeasuredSize, 6> sizes{{{{256, 192}, 5, true, 0.01},
                                              {{672, 448}, 5, true, 0.07},
                                              {{1056, 704}, 4, false, 0.06},
                                              {{1296, 864}, 4, false, 0.1},
                                              {{1728, 1152}, 3, true, 0.3},
                                              {{3680, 2448}, 2, false, 0.46}}};
-constexpr int passes = 5;                               // over everything, so that a busy moment meets each part once
-constexpr std::size_t sampled_size = sizes.size() - 1;  // large enough for a sample to save something
-/// So that the chroma of a frame is worked on from level 0, 1 and 2 on. Tiles that start on different levels take a
-/// little more, and hardly any picture starts on level 1 everywhere.
+constexpr int passes = 5;  // over all measurements, so that a busy moment affects each part once
+constexpr std::size_t sampled_size = sizes.size() - 1;  // large enough for a sample to save time
+/// In these lights the chroma of a frame starts from level 0, 1 and 2. Tiles that start on different levels take a
+/// little longer, and hardly any image starts on level 1 everywhere.
 constexpr std::array<TimingLight, 3> lights{{{200, 200}, {2, 0.5}, {0.5, 0.5}}};
 
 DevelopOptions options_for(std::optional<Level> level) {
@@ -49,7 +49,7 @@ DevelopOptions options_for(std::optional<Level> level) {
   return options;
 }
 
-/// Median time of each step of developing, in units of the pace before it.
+/// Holds the median time of each step of developing, in units of the pace before it.
 class Steps {
  public:
   static Result<Steps> of(const RawFrame& frame, const DevelopOptions& options, int count, Pace& pace,
@@ -88,7 +88,7 @@ class Steps {
 
 double megapixels_of(const FrameSize& size) { return 1e-6 * size.width * size.height; }
 
-/// All parts at one size, a pass at a time.
+/// Measures all parts at one size, one pass at a time.
 class Measurement {
  public:
   Measurement(std::size_t size, std::shared_ptr<const DisplayTarget> display, Pace& pace, Executor& executor)
@@ -106,7 +106,7 @@ class Measurement {
     plain.find_defects = false;
     const auto codes = steps(frames_[0], plain);
     if (!codes) return tl::make_unexpected(codes.error());
-    // Noise in the dark takes colours out of the gamut, and moving them back takes time.
+    // Noise in the dark moves colours out of the gamut, and moving them back takes time.
     const auto dark = steps(frames_[1], plain);
     if (!dark) return tl::make_unexpected(dark.error());
     add(CostPart::codes, (codes->render() + dark->render()) / 2);
@@ -164,7 +164,7 @@ class Measurement {
     const bool best = level == Level::best;
     if (best && !sizes[size_].best) return {};
     for (int start = 0; start < 3; ++start) {
-      if (best && start == 1) continue;  // it begins with level 0 there too
+      if (best && start == 1) continue;  // with Level::best, chroma begins with level 0 there too
       DevelopOptions options = options_for(level);
       options.find_defects = false;
       options.denoise.line_noise = false;
@@ -177,7 +177,7 @@ class Measurement {
     return {};
   }
 
-  /// The median over the passes, of each part that was measured.
+  /// Adds the median over the passes to the model, for each part that was measured.
   void tell(CostModel& model, double pace_s) const {
     for (std::size_t part = 0; part < taken_.size(); ++part) {
       if (taken_[part].empty()) continue;
@@ -216,9 +216,9 @@ class Measurement {
   std::shared_ptr<const DisplayTarget> display_;
   Pace& pace_;
   Executor& executor_;
-  std::vector<RawFrame> frames_;                       // of each light
-  std::array<RawFrame, 2> defective_;                  // of the first two
-  RawFrame uneven_;                                    // with row and column noise
+  std::vector<RawFrame> frames_;                       // one for each light
+  std::array<RawFrame, 2> defective_;                  // first two frames with defects
+  RawFrame uneven_;                                    // frame with row and column noise
   std::array<std::vector<double>, cost_parts> taken_;  // in units of the pace
 };
 

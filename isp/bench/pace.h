@@ -9,15 +9,15 @@
 
 namespace lowlux::isp {
 
-/// How fast the machine is at the moment: others use it too, and it slows down when it is hot. A fixed piece of work,
-/// a frame of 0.8 MP developed with denoise::Level::standard, is the unit of times that are to be compared.
+/// Measures the current speed of the machine, which varies with other load and with temperature. A fixed workload,
+/// developing a frame of 0.8 MP with denoise::Level::standard, is the unit of times that are to be compared.
 class Pace {
  public:
   Pace();
 
-  /// Of one run. Errors: those of develop().
+  /// Returns the time of one run. Errors: those of develop().
   Result<double> seconds(Executor& executor);
-  /// The median of all runs so far.
+  /// Returns the median of all runs so far.
   double usual_s() const;
 
  private:
@@ -26,7 +26,7 @@ class Pace {
   std::vector<double> taken_s_;
 };
 
-/// Median of seven runs, after one that does not count.
+/// Returns the median of seven runs, after one that does not count.
 Result<double> pace_now(Pace& pace, Executor& executor);
 
 }  // namespace lowlux::isp

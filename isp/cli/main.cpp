@@ -32,14 +32,14 @@ struct Verb {
 };
 
 constexpr std::array verbs{
-    Verb{"bench", "accuracy against time, beside other methods", run_bench},
+    Verb{"bench", "accuracy against time, compared with other methods", run_bench},
     Verb{"calibrate", "a camera's black point, noise and colour, measured", run_calibrate},
-    Verb{"capture", "frames of a camera to pictures, raw files or a film", run_capture},
+    Verb{"capture", "frames of a camera to pictures, raw files or video", run_capture},
     Verb{"compare", "how far one picture is from another", run_compare},
     Verb{"denoise", "raw files without noise, for any raw developer", run_denoise},
     Verb{"develop", "raw files to pictures", run_develop},
     Verb{"info", "what a raw file says, and what was measured on it", run_info},
-    Verb{"reproduce", "the published experiments, each finding beside ours", run_reproduce},
+    Verb{"reproduce", "the published experiments, each finding next to ours", run_reproduce},
     Verb{"resaturate", "pictures whose colours dark current took", run_resaturate},
     Verb{"retarget", "pictures made to look right on dim displays", run_retarget},
     Verb{"simulate", "raw files of scenes of known truth", run_simulate},
@@ -71,7 +71,7 @@ int run(std::vector<std::string> args) {
     print_err(help_text());
     return exit_usage;
   }
-  if (args.front() == "help" && args.size() > 1) {  // help VERB: VERB --help
+  if (args.front() == "help" && args.size() > 1) {  // help VERB is VERB --help
     args.erase(args.begin());
     args.emplace_back("--help");
   }
@@ -91,18 +91,18 @@ int run(std::vector<std::string> args) {
   return run_verb(args);
 }
 
-/// Closed standard streams are opened, or the first files of the command would get their numbers and its messages. What
-/// is written to them still fails.
+/// Opens closed standard streams; otherwise the first files of the command would get their numbers and its messages.
+/// Writing to them still fails.
 void open_standard_streams() {
   int descriptor = 0;
   while (descriptor >= 0 && descriptor <= STDERR_FILENO) descriptor = open("/dev/null", O_RDONLY);
   if (descriptor > STDERR_FILENO) close(descriptor);
 }
 
-/// What main() does, from the first line on.
+/// Runs the process from the first line of main() on.
 int run_process(const std::vector<std::string>& args) {
   open_standard_streams();
-  for (const int number : {SIGPIPE, SIGXFSZ}) std::signal(number, SIG_IGN);  // writing fails, and that is reported
+  for (const int number : {SIGPIPE, SIGXFSZ}) std::signal(number, SIG_IGN);  // writing then fails, which is reported
   clean_up_on_signals();
   int code = exit_failed;
   try {

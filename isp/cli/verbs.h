@@ -5,7 +5,7 @@
 
 namespace lowlux::cli {
 
-/// Each verb takes the arguments after its name, prints what it has to say and returns an exit code.
+/// Each verb takes the arguments after its name, prints its results and returns an exit code.
 int run_bench(const std::vector<std::string>& words);
 int run_calibrate(const std::vector<std::string>& words);
 int run_capture(const std::vector<std::string>& words);

@@ -32,8 +32,8 @@ constexpr int rows_per_call = 32;  // one PIZ block
 constexpr float largest_half = 65504.0f;
 constexpr std::array<const char*, 3> colour_names{"R", "G", "B"};
 
-/// Writes to the caller's stream and keeps its first failure: OpenEXR rewords what is thrown through it, and its
-/// destructor, which writes the table of rows, swallows it.
+/// Writes to the caller's stream and keeps its first failure: OpenEXR rewords exceptions passed through it, and its
+/// destructor, which writes the table of rows, discards them.
 class OutputStream final : public Imf::OStream {
  public:
   explicit OutputStream(std::FILE* file) : OStream("picture"), file_(file) {}
@@ -140,7 +140,7 @@ void write_half(Imf::OutputFile& file, const SceneLinear& picture) {
   }
 }
 
-/// Reads nothing but the header, and refuses what would make OpenEXR allocate without bound.
+/// Reads only the header, and rejects files that would make OpenEXR allocate without bound.
 Result<Imath::Box2i> check_window(std::span<const std::byte> bytes, const DecodeLimits& limits) {
   if (auto sound = check_exr_header(bytes); !sound) return tl::make_unexpected(sound.error());
   InputStream stream(bytes);
@@ -182,7 +182,7 @@ FileMetadata metadata_of(const Imf::Header& header) {
   return metadata;
 }
 
-/// The channel each colour is read from; an error if there are none or they are subsampled.
+/// Returns the channel each colour is read from; an error if there are none or they are subsampled.
 Result<std::array<const char*, 3>> colour_channels(const Imf::ChannelList& channels) {
   const bool rgb = std::all_of(colour_names.begin(), colour_names.end(),
                                [&](const char* name) { return channels.findChannel(name) != nullptr; });
@@ -263,7 +263,7 @@ constexpr std::uint32_t not_image_flag = 0x800;  // deep data
 constexpr std::uint32_t multi_part_flag = 0x1000;
 constexpr std::size_t longest_name = 255;
 
-/// Takes pieces off the front of a run of bytes; nullopt once they are not there.
+/// Reads values from the front of a run of bytes; nullopt once there are too few bytes.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::byte> bytes) : left_(bytes) {}
@@ -285,7 +285,7 @@ class ByteReader {
     return piece;
   }
 
-  /// Characters up to a zero byte, which is taken too.
+  /// Returns the characters up to a zero byte, and consumes the zero byte too.
   std::optional<std::string> name() {
     const auto end = std::find(left_.begin(), left_.end(), std::byte{0});
     const auto size = static_cast<std::size_t>(end - left_.begin());
@@ -298,7 +298,7 @@ class ByteReader {
   std::span<const std::byte> left_;
 };
 
-/// Whether the sizes an attribute of `type` holds inside agree with its own.
+/// Returns whether the sizes inside an attribute of `type` agree with its own.
 bool is_consistent(const std::string& type, std::span<const std::byte> value) {
   ByteReader reader(value);
   if (type == "preview") {

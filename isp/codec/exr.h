@@ -11,28 +11,27 @@
 namespace lowlux::isp {
 
 struct ExrOptions {
-  /// Half keeps 11 significant bits (1 part in 2048) from 6.1e-5 to 65504, what lies beyond is held at +-65504:
-  /// finer than the noise of any camera. Full keeps every float as it is.
+  /// Half keeps 11 significant bits (1 part in 2048) from 6.1e-5 to 65504 and clamps larger values to +-65504: finer
+  /// than the noise of any camera. Full keeps every float unchanged.
   enum class Depth : std::uint8_t { half, full } depth = Depth::half;
-  /// PIZ is lossless: wavelets and Huffman codes. What it saves and costs on sensor noise is in the README.
+  /// PIZ is lossless: wavelets and Huffman codes. The README states its size and time on sensor noise.
   enum class Compression : std::uint8_t { none, piz } compression = Compression::none;
 };
 
-/// Writes scene-linear R, G, B channels. `metadata.chromaticities`, `white_luminance_cd_m2` where it is
-/// positive, and the exposure time, f-number, ISO, camera and time of `metadata.info` become attributes; an OpenEXR
-/// file has no place for an ICC profile.
+/// Writes scene-linear R, G, B channels. `metadata.chromaticities`, `white_luminance_cd_m2` if it is positive, and the
+/// exposure time, f-number, ISO, camera and time of `metadata.info` become attributes; an OpenEXR file cannot hold an
+/// ICC profile.
 /// @param file open for writing, at its start
 Result<void> encode_exr(const SceneLinear& picture, const FileMetadata& metadata, const ExrOptions& options,
                         std::FILE* file);
 
-/// Reads the data window of the channels R, G, B, or of Y as grey, whatever their type; other channels, alpha among
-/// them, are dropped. Deep files, those of several parts, subsampled
-/// colour and files without these channels are refused.
+/// Reads the data window of the channels R, G, B, or of Y as grey, whatever their type; other channels, including
+/// alpha, are dropped. Deep files, multi-part files, subsampled colour and files without these channels are errors.
 Result<DecodedPicture> decode_exr(std::span<const std::byte> bytes, const DecodeLimits& limits = {});
 
-/// Walks the attributes of an OpenEXR header without believing any size in it: OpenEXR itself takes the memory an
+/// Checks the attributes of an OpenEXR header without trusting any size in it: OpenEXR itself allocates the memory an
 /// attribute asks for before it finds the file too short for it. An error unless every attribute, and every string and
-/// preview inside one, ends within the file. Files of several parts and deep files are refused.
+/// preview inside one, ends within the file. Multi-part files and deep files are errors.
 Result<void> check_exr_header(std::span<const std::byte> bytes);
 
 }  // namespace lowlux::isp

@@ -1,6 +1,6 @@
 #include "isp/codec/jpeg.h"
 
-// jpeglib.h needs FILE and size_t declared before it, and its error codes come in a header of their own.
+// jpeglib.h needs FILE and size_t declared before it, and its error codes are in a separate header.
 #include <jpeglib.h>
 
 #include <jerror.h>
@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-// libjpeg leaves a failed call by longjmp out of error_exit. Every function below that calls setjmp has only trivial
+// libjpeg leaves a failed call by longjmp from error_exit. Every function below that calls setjmp has only trivial
 // locals and calls nothing but libjpeg, so that no destructor is skipped; all memory is owned by their callers.
 
 namespace lowlux::isp {
@@ -25,7 +25,7 @@ constexpr std::size_t max_segment = 65533;
 constexpr int max_scans = 100;  // a progressive file of many tiny scans would take unbounded time
 
 struct Failure {
-  jpeg_error_mgr manager{};  // first, so that libjpeg's pointer to it is a pointer to us
+  jpeg_error_mgr manager{};  // first member, so that libjpeg's pointer to it is also a pointer to Failure
   std::jmp_buf jump{};
   std::array<char, JMSG_LENGTH_MAX> message{};
 };
@@ -36,7 +36,7 @@ struct Failure {
   std::longjmp(failure->jump, 1);
 }
 
-/// Warnings (level -1) mean damaged data, except stray bytes between segments, which cameras do write.
+/// Fails on warnings (level -1), which mean damaged data, except stray bytes between segments, which cameras do write.
 void judge_message(j_common_ptr codec, int level) {
   if (level < 0 && codec->err->msg_code != JWRN_EXTRANEOUS_DATA) leave(codec);
 }
@@ -115,7 +115,7 @@ bool compress(Compressor* compressor, PlaneView<const std::uint8_t> codes, const
     jpeg_write_icc_profile(jpeg, segments->icc, static_cast<unsigned>(segments->icc_size));
   }
   while (jpeg->next_scanline < jpeg->image_height) {
-    // libjpeg's interface lacks const; it only reads these rows.
+    // libjpeg's interface is not const-correct; it only reads these rows.
     auto* row = const_cast<JSAMPROW>(codes.row(static_cast<int>(jpeg->next_scanline)));
     jpeg_write_scanlines(jpeg, &row, 1);
   }
@@ -148,7 +148,7 @@ bool read_rows(Decompressor* decompressor, PlaneView<std::uint8_t> codes) {
   return true;
 }
 
-/// Joins the profile's segments into `bytes` (malloc) of `size`; nothing if there is none.
+/// Joins the profile's segments into `bytes` (malloc) of `size`; null if there is none.
 bool read_profile(Decompressor* decompressor, JOCTET** bytes, unsigned* size) {
   if (setjmp(decompressor->failure.jump)) return false;
   return jpeg_read_icc_profile(&decompressor->jpeg, bytes, size) != 0;
@@ -224,7 +224,7 @@ Result<DecodedPicture> decode_jpeg(std::span<const std::byte> bytes, const Decod
   if (jpeg.jpeg_color_space == JCS_CMYK || jpeg.jpeg_color_space == JCS_YCCK || jpeg.jpeg_color_space == JCS_UNKNOWN) {
     return fail(ErrorCode::unsupported, "the JPEG is not grey or RGB (CMYK?): convert it to RGB first");
   }
-  FileMetadata metadata = metadata_of(decompressor);  // libjpeg forgets the segments when it is done with the rows
+  FileMetadata metadata = metadata_of(decompressor);  // before libjpeg discards the segments after the last row
   Encoded8 picture{Plane<std::uint8_t>(static_cast<int>(3 * jpeg.image_width), static_cast<int>(jpeg.image_height))};
   if (!read_rows(&decompressor, picture.codes.view())) return malformed(decompressor.failure);
   return DecodedPicture{std::move(picture), std::move(metadata)};

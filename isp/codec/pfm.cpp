@@ -25,7 +25,8 @@ std::uint32_t swapped(std::uint32_t word) {
   return word >> 24 | (word >> 8 & 0xFF00U) | (word << 8 & 0xFF0000U) | word << 24;
 }
 
-/// The next word of the header and the one blank that ends it; nullopt if there is none of sensible length.
+/// Removes and returns the next word of the header and the one blank that ends it; nullopt if no word of valid length
+/// follows.
 std::optional<std::string_view> take_word(std::string_view& text) {
   const auto begin = static_cast<std::size_t>(std::find_if_not(text.begin(), text.end(), is_blank) - text.begin());
   text.remove_prefix(begin);
@@ -57,7 +58,7 @@ tl::unexpected<Error> malformed(const std::string& why) {
   return fail(ErrorCode::malformed, "not a readable PFM: " + why);
 }
 
-/// Takes the header off the front of `text`.
+/// Removes the header from the front of `text` and returns it.
 Result<Header> take_header(std::string_view& text) {
   Header header;
   const auto kind = take_word(text);
@@ -89,6 +90,7 @@ void put_row(const std::vector<std::uint32_t>& row, int samples, int y, SceneLin
 
 namespace {
 
+/// Writes a file from samples.
 /// @param sample_at  value of sample i of row y
 template <class SampleAt>
 Result<void> encode(const char* kind, int samples, int width, int height, const SampleAt& sample_at,

@@ -7,7 +7,7 @@
 namespace lowlux::isp {
 
 Result<void> check_size(std::int64_t width, std::int64_t height, const DecodeLimits& limits) {
-  constexpr std::int64_t max_side = (std::int64_t{1} << 30) / 3;  // 3 samples per pixel stay inside an int
+  constexpr std::int64_t max_side = (std::int64_t{1} << 30) / 3;  // 3 samples per pixel fit an int
   const std::string size = std::to_string(width) + " x " + std::to_string(height);
   if (width < 1 || height < 1) return fail(ErrorCode::malformed, "a picture of " + size + " pixels has no content");
   if (width > max_side || height > max_side || width > limits.max_pixels / height) {
@@ -18,7 +18,7 @@ Result<void> check_size(std::int64_t width, std::int64_t height, const DecodeLim
 }
 
 Result<void> write_bytes(std::FILE* file, std::span<const std::byte> bytes) {
-  if (bytes.empty()) return {};  // fwrite takes no null pointer, even for nothing
+  if (bytes.empty()) return {};  // fwrite accepts no null pointer, even for 0 bytes
   errno = 0;
   if (std::fwrite(bytes.data(), 1, bytes.size(), file) != bytes.size()) return write_failure();
   return {};

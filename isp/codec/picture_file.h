@@ -14,7 +14,7 @@
 
 namespace lowlux::isp {
 
-/// CIE 1931 xy of the three primaries and the white of an RGB space.
+/// Holds the CIE 1931 xy of the three primaries and the white of an RGB space.
 struct Chromaticities {
   struct Xy {
     double x = 0;
@@ -25,11 +25,11 @@ struct Chromaticities {
   friend bool operator==(const Chromaticities&, const Chromaticities&) = default;
 };
 
-/// What a picture file carries besides its pixels; each format keeps what it has a place for.
+/// Holds the contents of an image file except its pixels; each format keeps what it can hold.
 struct FileMetadata {
   std::vector<std::byte> icc;   // ICC profile; empty: none (PNG, JPEG, TIFF)
   std::vector<std::byte> exif;  // EXIF block from its TIFF header on, without "Exif\0\0"; empty: none (PNG, JPEG)
-  FrameInfo info;               // as fields of the format's own (TIFF, OpenEXR)
+  FrameInfo info;               // stored in the format's own fields (TIFF, OpenEXR)
   std::optional<Chromaticities> chromaticities;  // OpenEXR
   std::optional<double> white_luminance_cd_m2;   // luminance of RGB (1, 1, 1) (OpenEXR whiteLuminance)
 };
@@ -43,17 +43,17 @@ struct DecodeLimits {
   std::int64_t max_pixels = std::int64_t{1} << 28;  // 268 MP; 3.2 GB as float RGB
 };
 
-/// An error unless 1 <= width, height <= 2^30 / 3 and width * height <= limits.max_pixels.
+/// Returns an error unless 1 <= width, height <= 2^30 / 3 and width * height <= limits.max_pixels.
 Result<void> check_size(std::int64_t width, std::int64_t height, const DecodeLimits& limits);
 
-/// Writes all of `bytes` at the position of `file`; an error names what the system said.
+/// Writes all of `bytes` at the position of `file`; an error includes the system's message.
 Result<void> write_bytes(std::FILE* file, std::span<const std::byte> bytes);
 
-/// The error of a file that a library cannot read, ending with what the library says of it, on one line: it may quote
-/// the file, whose names hold any bytes.
+/// Returns the error for a file that a library cannot read, ending with the library's message, on one line: it may
+/// quote the file, whose names hold any bytes.
 tl::unexpected<Error> not_readable(const std::string& what, std::string said);
 
-/// The error of a failed write, from errno.
+/// Returns the error for a failed write, from errno.
 tl::unexpected<Error> write_failure();
 
 }  // namespace lowlux::isp

@@ -21,7 +21,7 @@ namespace {
 
 struct Source {
   std::span<const std::byte> left;
-  std::array<char, 160> message{};  // of the last error
+  std::array<char, 160> message{};  // message of the last error
 };
 
 void read_bytes(png_structp png, png_bytep out, std::size_t count) {
@@ -62,10 +62,10 @@ struct Header {
   std::size_t stored_row_bytes = 0;
 };
 
-/// Reads up to the pixels.
+/// Reads the file up to the pixels.
 bool read_header(png_structp png, png_infop info, Header* out) {
   if (setjmp(png_jmpbuf(png))) return false;
-  png_set_user_limits(png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);  // ours come before memory is taken
+  png_set_user_limits(png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);  // check_size limits the size before memory is allocated
   png_set_chunk_malloc_max(png, 64U << 20);
   png_set_chunk_cache_max(png, 64);
   png_read_info(png, info);
@@ -74,7 +74,7 @@ bool read_header(png_structp png, png_infop info, Header* out) {
   return true;
 }
 
-/// Asks libpng for RGB of 8 or 16 bits in the machine's byte order, and checks that a row has `row_bytes`.
+/// Requests RGB of 8 or 16 bits from libpng in the machine's byte order, and checks that a row has `row_bytes`.
 bool ask_for_rgb(png_structp png, png_infop info, std::size_t row_bytes) {
   if (setjmp(png_jmpbuf(png))) return false;
   png_set_expand(png);
@@ -134,7 +134,7 @@ Result<DecodedPicture> decode_png(std::span<const std::byte> bytes, const Decode
   Header header;
   if (!read_header(reader.png, reader.info, &header)) return malformed(source);
   if (auto size = check_size(header.width, header.height, limits); !size) return tl::make_unexpected(size.error());
-  // Deflate shrinks at most 1032 to 1: a file shorter than that for its dimensions needs no memory to be refused.
+  // Deflate shrinks at most 1032 to 1: a file too short for its dimensions is rejected without allocating memory.
   if (header.stored_row_bytes > 1032 * bytes.size() / header.height) {
     return fail(ErrorCode::malformed, "not a readable PNG: the file is too short for its " +
                                           std::to_string(header.width) + " x " + std::to_string(header.height) +
@@ -157,14 +157,14 @@ void put_u32(std::uint32_t number, std::vector<std::byte>& out) {
 const Bytef* as_bytef(const std::byte* bytes) { return reinterpret_cast<const Bytef*>(bytes); }
 Bytef* as_bytef(std::byte* bytes) { return reinterpret_cast<Bytef*>(bytes); }
 
-/// One chunk: length, type, data, CRC over type and data (PNG 5.3).
+/// Writes one chunk: length, type, data, CRC over type and data (PNG 5.3).
 Result<void> write_chunk(const char (&type)[5], std::span<const std::byte> data, std::FILE* file) {
   if (data.size() > 0x7FFFFFFF) return fail(ErrorCode::unsupported, "a PNG chunk cannot hold more than 2 GB");
   std::vector<std::byte> head;
   put_u32(static_cast<std::uint32_t>(data.size()), head);
   for (int i = 0; i < 4; ++i) head.push_back(static_cast<std::byte>(type[i]));
   uLong crc = crc32(0, as_bytef(head.data() + 4), 4);
-  if (!data.empty()) crc = crc32_z(crc, as_bytef(data.data()), data.size());  // a null pointer would reset it
+  if (!data.empty()) crc = crc32_z(crc, as_bytef(data.data()), data.size());  // a null pointer would reset the CRC
   std::vector<std::byte> tail;
   put_u32(static_cast<std::uint32_t>(crc), tail);
   return write_bytes(file, head).and_then([&] { return write_bytes(file, data); }).and_then([&] {
@@ -172,7 +172,7 @@ Result<void> write_chunk(const char (&type)[5], std::span<const std::byte> data,
   });
 }
 
-/// Signature, IHDR, and the chunks that must come before the pixels.
+/// Writes the signature, IHDR, and the chunks that must precede the pixels.
 Result<void> write_head(int width, int height, int bits, const FileMetadata& metadata, std::FILE* file) {
   constexpr std::array<unsigned char, 8> signature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
   std::vector<std::byte> header;
@@ -199,7 +199,7 @@ Result<void> write_head(int width, int height, int bits, const FileMetadata& met
   return written;
 }
 
-/// A row of codes as PNG stores it: most significant byte first.
+/// Stores a row of codes as PNG does: most significant byte first.
 void store_row(const std::uint8_t* codes, std::size_t count, std::uint8_t* out) { std::memcpy(out, codes, count); }
 void store_row(const std::uint16_t* codes, std::size_t count, std::uint8_t* out) {
   for (std::size_t i = 0; i < count; ++i) {
@@ -208,7 +208,7 @@ void store_row(const std::uint16_t* codes, std::size_t count, std::uint8_t* out)
   }
 }
 
-/// Filter type 3 (PNG 9.2): each byte less floor((left + above) / 2).
+/// Applies filter type 3 (PNG 9.2): each byte minus floor((left + above) / 2).
 void filter_average(const std::uint8_t* row, const std::uint8_t* above, std::size_t size, std::size_t pixel_bytes,
                     std::uint8_t* out) {
   for (std::size_t i = 0; i < pixel_bytes; ++i) out[i] = static_cast<std::uint8_t>(row[i] - (above[i] >> 1));
@@ -217,7 +217,7 @@ void filter_average(const std::uint8_t* row, const std::uint8_t* above, std::siz
   }
 }
 
-/// Compresses one stretch of rows; owns all memory that takes, so that workers allocate only inside zlib.
+/// Compresses one block of rows; owns all memory it needs, so that workers allocate only inside zlib.
 template <class Code>
 class StretchCompressor {
  public:
@@ -229,7 +229,7 @@ class StretchCompressor {
         filtered_(max_rows * (row_bytes_ + 1)),
         deflated_(filtered_.size() + filtered_.size() / 8 + 1024) {}  // above zlib's own bound for raw deflate
 
-  /// Rows first..last - 1, as raw deflate blocks that end on a byte; the last stretch closes the stream.
+  /// Compresses rows first..last - 1 as raw deflate blocks that end on a byte; the last block closes the stream.
   void compress(int first, int last) noexcept {
     filter(first, last);
     const std::size_t size = (last - first) * (row_bytes_ + 1);
@@ -250,7 +250,7 @@ class StretchCompressor {
     deflateEnd(&stream);
   }
 
-  /// What compress() made; empty if zlib had no memory.
+  /// Returns the result of compress(); empty if zlib had no memory.
   std::span<const std::uint8_t> deflated() const { return {deflated_.data(), deflated_size_}; }
   uLong adler() const { return adler_; }
   std::size_t filtered_size() const { return filtered_size_; }
@@ -277,7 +277,7 @@ class StretchCompressor {
   uLong adler_ = 1;
 };
 
-/// One zlib stream (RFC 1950) in IDAT chunks, one for each stretch of rows.
+/// Writes one zlib stream (RFC 1950) in IDAT chunks, one for each block of rows.
 template <class Code>
 Result<void> write_pixels(const Encoded<Code>& picture, Executor& executor, std::FILE* file) {
   const std::size_t row_bytes = static_cast<std::size_t>(picture.codes.width()) * sizeof(Code);

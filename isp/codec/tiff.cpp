@@ -126,7 +126,7 @@ tl::unexpected<Error> malformed(const Input& input) {
   return not_readable("TIFF", why.empty() ? "the pixels do not decode" : why);
 }
 
-/// `count` samples of one colour, from pixel (x, y) on.
+/// Describes `count` samples of one colour, from pixel (x, y) on.
 struct Run {
   int colour = 0;
   int x = 0;
@@ -207,9 +207,9 @@ void invert(Encoded<Code>& picture) {
   for (std::size_t i = 0; i < picture.codes.size(); ++i) codes[i] = static_cast<Code>(~codes[i]);
 }
 
-void invert(SceneLinear& /*picture*/) {}  // check_layout refuses floats where 0 is white
+void invert(SceneLinear& /*picture*/) {}  // check_layout rejects floats where 0 is white
 
-/// Leaves the file at its EXIF directory if it has one: call it last.
+/// Returns the metadata of the file. Leaves the file at its EXIF directory if it has one: call it last.
 FileMetadata metadata_of(TIFF* tiff) {
   FileMetadata metadata;
   std::uint32_t size = 0;
@@ -277,7 +277,7 @@ void set_tags(TIFF* tiff, const OutputLayout& layout, const FileMetadata& metada
   if (options.compression == TiffOptions::Compression::deflate) {
     TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
     TIFFSetField(tiff, TIFFTAG_PREDICTOR, layout.bits == 32 ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL);
-    TIFFSetField(tiff, TIFFTAG_ZIPQUALITY, 1);  // matches are rare in noise: higher levels cost time and gain little
+    TIFFSetField(tiff, TIFFTAG_ZIPQUALITY, 1);  // matches are rare in noise: higher levels cost time and save little
   } else {
     TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_NONE);
   }

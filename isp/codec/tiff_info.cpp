@@ -11,7 +11,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double hottest_c = 200;  // beyond it no camera has been, and a file that says so is not believed
+constexpr double hottest_c = 200;  // above the temperature of any camera: a higher figure is rejected
 
 void set_positive(TIFF* tiff, std::uint32_t tag, const std::optional<double>& number) {
   if (number && std::isfinite(*number) && *number > 0) TIFFSetField(tiff, tag, *number);
@@ -21,7 +21,8 @@ void set_text(TIFF* tiff, std::uint32_t tag, const std::string& text) {
   if (!text.empty()) TIFFSetField(tiff, tag, text.c_str());
 }
 
-/// PhotographicSensitivity holds 16 bits; above them EXIF 2.32 (4.6.6.7) asks for 65535 and the figure elsewhere.
+/// Sets PhotographicSensitivity, which holds 16 bits; for larger figures EXIF 2.32 (4.6.6.7) requires 65535 and the
+/// figure in another tag.
 void set_sensitivity(TIFF* tiff, const std::optional<double>& iso) {
   if (!iso || !(*iso >= 1 && *iso < 4e9)) return;
   const auto exact = static_cast<std::uint32_t>(std::lround(*iso));
@@ -32,7 +33,7 @@ void set_sensitivity(TIFF* tiff, const std::optional<double>& iso) {
   TIFFSetField(tiff, EXIFTAG_RECOMMENDEDEXPOSUREINDEX, exact);
 }
 
-/// A number as libtiff hands it out: some tags as float and some as double.
+/// Returns a number from libtiff, which returns some tags as float and some as double.
 std::optional<double> number_of(TIFF* tiff, std::uint32_t tag) {
   const TIFFField* field = TIFFFindField(tiff, tag, TIFF_ANY);
   if (field == nullptr) return std::nullopt;

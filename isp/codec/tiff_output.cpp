@@ -9,7 +9,7 @@
 namespace lowlux::isp {
 namespace {
 
-/// The caller's stream as libtiff sees it. C wants a seek between reading and writing.
+/// Holds the caller's stream for libtiff. C requires a seek between reading and writing.
 struct Output {
   std::FILE* file = nullptr;
   int write_errno = 0;
@@ -39,7 +39,7 @@ tmsize_t write_file(thandle_t handle, void* data, tmsize_t size) {
 toff_t seek_file(thandle_t handle, toff_t offset, int whence) {
   errno = 0;
   std::FILE* file = output_of(handle)->file;
-  if (fseeko(file, static_cast<off_t>(offset), whence) != 0) {  // it flushes first, and so may find the disk full
+  if (fseeko(file, static_cast<off_t>(offset), whence) != 0) {  // it flushes first, and may fail on a full disk
     keep_errno(*output_of(handle));
     return static_cast<toff_t>(-1);
   }

@@ -13,15 +13,16 @@ struct tiff;  // libtiff's open file
 
 namespace lowlux::isp {
 
-/// Bytes of pixels in one strip, about.
+/// Sets the approximate number of bytes of pixels in one strip.
 inline constexpr std::size_t tiff_strip_bytes = std::size_t{1} << 20;
 
-/// Bytes of pixels a file with offsets of 32 bits can hold, with room for its directories.
+/// Limits the bytes of pixels in a file with offsets of 32 bits, with space for its directories.
 inline constexpr std::uint64_t tiff_classic_limit = 3'900'000'000;
 
-/// A TIFF that libtiff writes to a stream of the caller's. Its complaints are kept, not printed.
+/// Writes a TIFF by libtiff to a stream of the caller. Messages of libtiff are kept, not printed.
 class TiffOutput {
  public:
+  /// Opens a TIFF for writing.
   /// @param file open for reading and writing, at its start; it stays open
   /// @param big  offsets of 64 bits (BigTIFF)
   TiffOutput(std::FILE* file, bool big);
@@ -29,10 +30,10 @@ class TiffOutput {
   TiffOutput& operator=(const TiffOutput&) = delete;
   ~TiffOutput();
 
-  /// nullptr if there was no memory, or after finish().
+  /// Returns libtiff's open file; nullptr if there was no memory, or after finish().
   tiff* handle() const;
 
-  /// Lets libtiff write its last bytes, once. @param written whether all calls of the caller's succeeded
+  /// Makes libtiff write its last bytes, once. @param written whether all calls of the caller succeeded
   /// @return the first failure of the stream, else of libtiff
   Result<void> finish(bool written);
 
@@ -41,7 +42,7 @@ class TiffOutput {
   std::unique_ptr<State> state_;
 };
 
-/// Keeps the first message libtiff has for one file, instead of printing it.
+/// Keeps the first message of libtiff for one file, instead of printing it.
 struct TiffMessages {
   std::string first_error;
 

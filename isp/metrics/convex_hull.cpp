@@ -5,7 +5,7 @@
 namespace lowlux::isp {
 namespace {
 
-/// Twice the area of the triangle o, a, b; positive if it turns left.
+/// Returns twice the area of the triangle o, a, b; positive if it turns left.
 double turn(const Xy& o, const Xy& a, const Xy& b) { return (a.x - o.x) * (b.y - o.y) - (a.y - o.y) * (b.x - o.x); }
 
 /// Adds one chain of the hull over sorted points; its last point is left to the other chain.
@@ -18,7 +18,7 @@ void add_chain(std::span<const Xy> points, std::vector<Xy>& hull) {
   hull.pop_back();
 }
 
-/// The part of a polygon that lies left of the line from `a` to `b`.
+/// Returns the part of a polygon that lies left of the line from `a` to `b`.
 std::vector<Xy> left_part(std::span<const Xy> polygon, const Xy& a, const Xy& b) {
   std::vector<Xy> out;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -50,7 +50,8 @@ std::vector<Xy> convex_hull(std::span<const Xy> points) {
 
 double polygon_area(std::span<const Xy> corners) {
   double area = 0;
-  for (std::size_t i = 0; i < corners.size(); ++i) area += 0.5 * turn({}, corners[i], corners[(i + 1) % corners.size()]);
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    area += 0.5 * turn({}, corners[i], corners[(i + 1) % corners.size()]);
   return area;
 }
 

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t side = 2 * gamut_reach;  // bins along a* and along b*
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-// What is added up is whole, so that the order of threads does not matter.
+// The counts are integers, so that the order of threads does not matter.
 template <class Count>
 void increase(Count& count, Count by) {
   std::atomic_ref(count).fetch_add(by, std::memory_order_relaxed);
@@ -22,7 +22,7 @@ void increase(Count& count, Count by) {
 
 double centre(std::size_t bin) { return static_cast<double>(bin) + 0.5 - gamut_reach; }
 
-/// First and last kept bin of each row: no other can be a corner of the hull.
+/// Returns the first and last kept bin of each row: no other can be a corner of the hull.
 std::vector<Xy> outermost(const std::vector<bool>& kept) {
   std::vector<Xy> out;
   out.reserve(2 * side);

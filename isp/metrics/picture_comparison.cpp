@@ -25,11 +25,11 @@ Vector3 pixel(const SceneLinear& picture, int x, int y) {
 }
 
 Lab lab_at(const SceneLinear& xyz, int x, int y) {
-  static const Xyz white = xyz_of(white_d65).value();  // of a constant
+  static const Xyz white = xyz_of(white_d65).value();  // cannot fail for a constant
   return lab_of(xyz_of(pixel(xyz, x, y)), white);
 }
 
-/// One for each pixel, NaN where it is not finite.
+/// Holds one difference for each pixel, NaN where it is not finite.
 struct Differences {
   explicit Differences(std::size_t pixels) : ab(pixels), of_94c(pixels), of_2000(pixels) {}
   std::vector<float> ab, of_94c, of_2000;
@@ -42,7 +42,7 @@ struct Comparing {
   GamutBins reference_bins, test_bins;
 };
 
-constexpr int piece_px = 64;  // of a row, whose colours fit on the stack
+constexpr int piece_px = 64;  // pixels of a row whose colours fit on the stack
 
 void compare_piece(Comparing& work, int x0, int y) {
   std::array<Lab, piece_px> first, second;
@@ -66,14 +66,14 @@ DifferenceSummary summary_of_finite(std::vector<float>& differences) {
   return summary_of({differences.begin(), end});
 }
 
-/// What a display shows of a picture.
+/// Holds the codes that a display shows of an image.
 struct DisplayCodes {
   SceneLinear srgb;  // code values, 0..1
   std::uint64_t outside = 0;
 };
 
 DisplayCodes display_codes(const SceneLinear& xyz, Executor& executor) {
-  static const Matrix3 to_rgb = inverse(rgb_to_xyz(primaries_rec709).value()).value();  // of constants
+  static const Matrix3 to_rgb = inverse(rgb_to_xyz(primaries_rec709).value()).value();  // cannot fail for constants
   DisplayCodes out{.srgb = SceneLinear(xyz.width(), xyz.height())};
   std::vector<std::uint64_t> outside(static_cast<std::size_t>(executor.width()));
   for_each_band(executor, xyz.height(), [&](RowBand band, int index) {
@@ -82,7 +82,7 @@ DisplayCodes display_codes(const SceneLinear& xyz, Executor& executor) {
         const Vector3 rgb = to_rgb * pixel(xyz, x, y);
         bool inside = true;
         for (std::size_t c = 0; c < 3; ++c) {
-          inside = inside && rgb[c] >= -display_tolerance && rgb[c] <= 1 + display_tolerance;  // NaN is not
+          inside = inside && rgb[c] >= -display_tolerance && rgb[c] <= 1 + display_tolerance;  // false for NaN
           out.srgb.plane[c].at(x, y) = srgb_code(rgb[c]);
         }
         outside[static_cast<std::size_t>(index)] += inside ? 0 : 1;
@@ -94,7 +94,7 @@ DisplayCodes display_codes(const SceneLinear& xyz, Executor& executor) {
 }
 
 Plane<float> luma_of(const SceneLinear& codes) {
-  static const Vector3 weight = luminance_weights(OutputSpace::linear_srgb).value();  // of constants
+  static const Vector3 weight = luminance_weights(OutputSpace::linear_srgb).value();  // cannot fail for constants
   Plane<float> out(codes.width(), codes.height());
   for (int y = 0; y < codes.height(); ++y) {
     for (int x = 0; x < codes.width(); ++x) {

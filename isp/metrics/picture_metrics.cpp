@@ -16,13 +16,13 @@ namespace {
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 const Matrix3& to_xyz() {
-  static const Matrix3 matrix = rgb_to_xyz(primaries_rec709).value();  // of constants: it is there
+  static const Matrix3 matrix = rgb_to_xyz(primaries_rec709).value();  // cannot fail for constants
   return matrix;
 }
 
 double display_value(double v) { return v >= 0 ? std::min(v, 1.0) : 0.0; }
 
-/// Sums of what each row gives, in the order of the rows whatever the bands.
+/// Sums the results of all rows, in the order of the rows regardless of the bands.
 template <class Sums, class OfRow>
 Sums sum_of_rows(int height, Executor& executor, const OfRow& of_row) {
   std::vector<Sums> rows(static_cast<std::size_t>(height));
@@ -76,7 +76,7 @@ SceneLinear lab_picture(const RgbView<const float>& display, Executor& executor)
   return out;
 }
 
-/// The chroma vector r and W of the header.
+/// Holds the chroma vector r and W of the header.
 struct Chroma {
   double u;
   double v;
@@ -84,7 +84,7 @@ struct Chroma {
 };
 
 Chroma chroma_of(const Xyz& c) {
-  static const UvPrime white = uv_prime_of(white_d65).value();  // of a constant
+  static const UvPrime white = uv_prime_of(white_d65).value();  // cannot fail for a constant
   const double w = c.x + 15 * c.y + 3 * c.z;
   return {4 * c.x - white.u * w, 9 * c.y - white.v * w, w};
 }

@@ -26,7 +26,7 @@ Window gaussian() {
   return w;
 }
 
-/// Weighted means over a window, or over one of its columns.
+/// Holds weighted means over a window, or over one of its columns.
 struct Moments {
   double a = 0, b = 0, aa = 0, bb = 0, ab = 0;
 
@@ -50,7 +50,7 @@ struct Planes {
   Window weight;
 };
 
-/// Sum over the windows whose upper row is y. `columns` has as many elements as the planes.
+/// Returns the sum over the windows whose upper row is y. `columns` has as many elements as the planes have columns.
 double row_sum(const Planes& planes, int y, std::vector<Moments>& columns) {
   for (std::size_t x = 0; x < columns.size(); ++x) {
     columns[x] = {};
@@ -77,7 +77,7 @@ std::optional<double> ssim(const PlaneView<const float>& first, const PlaneView<
   const int across = first.width - ssim_window_px + 1, down = first.height - ssim_window_px + 1;
   if (across < 1 || down < 1) return std::nullopt;
   const Planes planes{first, second, gaussian()};
-  // Taken before the threads start, which cannot say that there is no memory.
+  // The memory is allocated before the threads start, because they cannot report an allocation failure.
   std::vector<std::vector<Moments>> columns(static_cast<std::size_t>(executor.width()),
                                             std::vector<Moments>(static_cast<std::size_t>(first.width)));
   std::vector<double> rows(static_cast<std::size_t>(down));

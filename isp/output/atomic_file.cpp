@@ -52,7 +52,7 @@ tl::unexpected<Error> cannot_write(const std::string& path, int cause) {
   return fail(ErrorCode::unwritable, "cannot write " + name + ": " + std::generic_category().message(cause), path);
 }
 
-/// Refuses what is in the way of `path`.
+/// Returns an error if `path` cannot be written or replaced.
 Result<void> check_target(const std::string& path, Overwrite overwrite) {
   if (path.empty()) return cannot_write(path, EINVAL);
   struct stat found {};
@@ -61,7 +61,7 @@ Result<void> check_target(const std::string& path, Overwrite overwrite) {
     return cannot_write(path, errno);
   }
   struct stat behind {};
-  if (stat(path.c_str(), &behind) == 0) found = behind;  // else a dangling link, replaced as if it were a file
+  if (stat(path.c_str(), &behind) == 0) found = behind;  // else a dangling link, replaced like a file
   if (S_ISDIR(found.st_mode)) {
     return fail(ErrorCode::unwritable, path + " is a directory: name a file in it", path);
   }
@@ -72,7 +72,7 @@ Result<void> check_target(const std::string& path, Overwrite overwrite) {
   return {};
 }
 
-/// The name to write: the file a link leads to, or `path` itself.
+/// Returns the name to write: the target of a link, or `path` itself.
 std::string resolve(const std::string& path) {
   std::error_code failed;
   if (!fs::is_symlink(path, failed)) return path;
@@ -80,7 +80,7 @@ std::string resolve(const std::string& path) {
   return failed ? path : target.string();
 }
 
-/// The temporary files of this process. Whoever makes, publishes or removes one holds the mutex.
+/// Holds the temporary files of this process. A thread that makes, publishes or removes one holds the mutex.
 struct Unfinished {
   std::mutex mutex;
   std::set<std::string> names;
@@ -88,20 +88,22 @@ struct Unfinished {
   unsigned made = 0;
 };
 
-/// Never destroyed: a thread that handles signals may still ask for them while the process ends.
+/// Returns the temporary files. They are never destroyed: a thread that handles signals may use them while the process
+/// ends.
 Unfinished& unfinished() {
   static Unfinished& all = *new Unfinished;
   return all;
 }
 
-/// Of the temporary files of this host: a lock may not be seen by other hosts that have the directory too.
+/// Returns the prefix of this host's temporary files: other hosts that mount the directory may not see a lock.
 std::string temporary_prefix() {
   char host[256] = {};
   gethostname(host, sizeof host - 1);
   return std::string(".lowlux-") + host + "-";
 }
 
-/// Whether this is the prefix and behind it only a process and a number. Prefixes of other hosts may begin alike.
+/// Returns whether a name is the prefix followed only by a process and a number. Prefixes of other hosts may begin the
+/// same.
 bool is_temporary(const std::string& name, const std::string& prefix) {
   constexpr std::string_view suffix = ".part";
   if (!name.starts_with(prefix) || !name.ends_with(suffix) || name.size() < prefix.size() + suffix.size()) return false;
@@ -115,7 +117,7 @@ bool has_name(int descriptor) {
   return fstat(descriptor, &found) == 0 && found.st_nlink > 0;
 }
 
-/// Removes temporary files whose process is dead: nothing holds their lock.
+/// Removes temporary files whose process is dead: no process holds their lock.
 void sweep(const std::string& directory, const std::string& prefix) {
   std::error_code failed;
   for (fs::directory_iterator entry(directory, failed), end; !failed && entry != end; entry.increment(failed)) {
@@ -131,11 +133,11 @@ void sweep(const std::string& directory, const std::string& prefix) {
 struct Temporary {
   std::string name;
   int descriptor = -1;
-  int cause = 0;  // errno where there is none
+  int cause = 0;  // errno if there is no descriptor
 };
 
-/// A new locked file. Another process may take one for dead between its making and its locking; then the next name is
-/// tried.
+/// Creates a new locked file. Another process may consider it abandoned between its creation and its locking; then the
+/// next name is tried.
 Temporary make_temporary(const std::string& directory) {
   Unfinished& all = unfinished();
   const std::lock_guard guard(all.mutex);
@@ -148,7 +150,7 @@ Temporary make_temporary(const std::string& directory) {
     Temporary out;
     out.name = stem + std::to_string(all.made++) + ".part";
     out.descriptor = open(out.name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (out.descriptor < 0 && errno == EEXIST) continue;  // of another process with this number
+    if (out.descriptor < 0 && errno == EEXIST) continue;  // belongs to another process with the same number
     if (out.descriptor < 0) {
       out.cause = errno;
       return out;
@@ -163,11 +165,11 @@ Temporary make_temporary(const std::string& directory) {
   return {.cause = EAGAIN};
 }
 
-/// @return 0 or an errno
+/// Writes a directory to the disk. @return 0 or an errno
 int sync_directory(const std::string& directory) {
   const int descriptor = open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return errno;
-  const int cause = fsync(descriptor) == 0 || errno == EINVAL ? 0 : errno;  // EINVAL: not offered for directories
+  const int cause = fsync(descriptor) == 0 || errno == EINVAL ? 0 : errno;  // EINVAL: not supported for directories
   close(descriptor);
   return cause;
 }
@@ -215,7 +217,7 @@ Result<AtomicFile> AtomicFile::create(const std::string& path, Overwrite overwri
 
 void AtomicFile::abandon_all() {
   Unfinished& all = unfinished();
-  all.mutex.lock();  // and never unlocks it
+  all.mutex.lock();  // never unlocked
   for (const std::string& name : all.names) unlink(name.c_str());
 }
 
@@ -275,7 +277,7 @@ int by_claim(const char* from, const char* to) {
   return cause;
 }
 
-/// What the system answers where it, or the file system, does not know a way.
+/// Returns whether an errno means that the system, or the file system, does not support a way.
 bool not_offered(int cause) {
   return cause == EINVAL || cause == ENOSYS || cause == EOPNOTSUPP || cause == EPERM || cause == EMLINK;
 }

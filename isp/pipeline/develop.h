@@ -8,14 +8,15 @@
 
 namespace lowlux::isp {
 
-/// A developed frame and how it was made. The picture is not yet turned upright: FrameInfo::orientation says how.
+/// Holds a developed frame and the plan it was made with. The image is not yet turned upright: FrameInfo::orientation
+/// states its orientation.
 struct Developed {
   Picture picture;
   DevelopPlan plan;
-  NoiseMaps noise_maps;  // of the active area; empty unless its noise was reduced and maps were asked for
+  NoiseMaps noise_maps;  // of the active area; empty unless its noise was reduced and maps were requested
 };
 
-/// One frame from raw to picture: plan_develop, then Pipeline::render.
+/// Develops one frame from raw to image: plan_develop, then Pipeline::render.
 Result<Developed> develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
 
 }  // namespace lowlux::isp

@@ -15,54 +15,55 @@
 
 namespace lowlux::isp {
 
-/// What is asked for.
+/// Describes the noise reduction that is requested.
 struct DenoiseChoice {
   enum class Mode : std::uint8_t {
     off,
-    automatic,  // by the frame's signal to noise ratio: level_for
+    automatic,  // chosen from the frame's signal-to-noise ratio: level_for
     level,
   } mode = Mode::off;
   denoise::Level level = denoise::Level::standard;  // for Mode::level
-  bool line_noise = true;                           // rows and columns too, where theirs stands out
+  bool line_noise = true;                           // also row and column noise where it is significant
   bool maps = false;                                // keep NoiseMaps
-  bool always = false;                              // automatic: draft at least
+  bool always = false;                              // for Mode::automatic: draft at least
 };
 
-/// Frames of a stream before this one take part: see denoise::TemporalMean.
+/// Describes noise reduction in which previous frames of the stream take part: see denoise::TemporalMean.
 struct TemporalReduction {
   denoise::TemporalOptions options;
-  double light = 1;     // on this frame over that on the one before, by exposure time
-  bool restart = true;  // nothing is known of frames before
+  double light = 1;     // light on this frame over that on the previous one, by exposure time
+  bool restart = true;  // nothing is known of previous frames
 };
 
-/// Levels of the parts of a frame: squares from the corner of the active area on, which cover it.
+/// Lists the levels of the regions of a frame: squares that start at the corner of the active area and cover it.
 struct NoiseRegions {
-  int size = 0;  // of a side [px]; a multiple of tile_lattice_px
+  int size = 0;  // side of a region [px]; a multiple of tile_lattice_px
   int columns = 0;
   int rows = 0;
-  std::vector<std::optional<denoise::Level>> level;  // rows x columns; absent: noise stays, lines and dark charge go
+  std::vector<std::optional<denoise::Level>> level;  // rows x columns; absent: only subtract lines and dark charge
 };
 
-/// The level of a frame, where it is decided together with everything else: see plan_effects.h.
+/// Holds the level of a frame where it is decided together with everything else: see plan_effects.h.
 struct DecidedLevel {
   std::optional<denoise::Level> level;
-  std::optional<NoiseRegions> regions;  // with levels of their own
+  std::optional<NoiseRegions> regions;  // regions with levels of their own
 };
 
-/// What was decided: everything that reducing the noise of one frame takes. Sites as in the active area.
+/// Holds the decision on noise reduction: everything that is needed to reduce the noise of one frame. Sites are those
+/// of the active area.
 struct NoiseReduction {
   std::optional<denoise::Level> level;  // absent: values stay as they are
-  std::string reason;                   // for that; one line
-  std::optional<double> snr;            // of one pixel in the middle block of the frame, by the noise model
+  std::string reason;                   // for the level or its absence; one line
+  std::optional<double> snr;            // of one pixel in the median block of the frame, by the noise model
   NoiseProfile::Source source = NoiseProfile::Source::file;
   denoise::RawNoise noise;
   denoise::DenoiseOptions options;
-  std::vector<denoise::LineOffsets> lines;  // taken off before
+  std::vector<denoise::LineOffsets> lines;  // subtracted before noise reduction
   std::optional<TemporalReduction> temporal;
-  std::optional<NoiseRegions> regions;  // set: their levels hold, and `level` does not
-  std::vector<std::string> warnings;    // what contradicts the noise model
+  std::optional<NoiseRegions> regions;  // set: their levels apply, and `level` does not
+  std::vector<std::string> warnings;    // contradictions to the noise model
 
-  /// Whether some part of the frame has a level.
+  /// Returns whether any region of the frame has a level.
   bool has_level() const {
     if (!regions) return level.has_value();
     return std::ranges::any_of(regions->level, [](const auto& of_region) { return of_region.has_value(); });
@@ -70,12 +71,13 @@ struct NoiseReduction {
   bool reduces() const { return has_level() || temporal; }
 };
 
-/// The level for the signal to noise ratio of one pixel. None from 60 on, where no difference can be seen; draft from
-/// 20 on, standard from 3 on; high below, where chroma starts coarse, which makes it cheap.
+/// Returns the level for the signal-to-noise ratio of one pixel: none from 60 on, where no difference is visible; draft
+/// from 20 on, standard from 3 on; high below, where chroma starts coarse, which makes it cheap.
 std::optional<denoise::Level> level_for(double snr);
 
-/// What is known of what is left, for each 2x2 cell of the picture: see denoise::DenoiseMaps. Where a region keeps its
-/// noise, that is what is left, by the mean of 8 x 8 cells, and colour is as it was: its confidence is 1.
+/// Holds what is known of the residual noise, for each 2x2 cell of the image: see denoise::DenoiseMaps. Where a region
+/// keeps its noise, that is the residual noise, averaged over 8 x 8 cells, and colour is unchanged: its confidence is
+/// 1.
 struct NoiseMaps {
   Plane<float> residual_variance_e2;
   Plane<float> chroma_confidence;

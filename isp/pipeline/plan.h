@@ -15,17 +15,17 @@
 
 namespace lowlux::isp {
 
-/// Everything decided about one frame before a pixel is touched.
+/// Holds everything decided about one frame before a pixel is processed.
 struct DevelopPlan {
-  DevelopOptions options;              // what was asked for
-  std::optional<EffectsPlan> effects;  // where DevelopOptions::effects asked for it
+  DevelopOptions options;              // as requested
+  std::optional<EffectsPlan> effects;  // set where DevelopOptions::effects requested it
   RawLevels levels;
   Rendering rendering;
   NoiseReduction noise_reduction;
   std::shared_ptr<const DisplayTarget> display;  // set: codes are changed for it
-  int width = 0;                                 // of the picture, before orientation
+  int width = 0;                                 // of the image, before orientation
   int height = 0;
-  bool from_codes = false;  // renders_from_codes
+  bool from_codes = false;  // result of renders_from_codes
   std::vector<std::string> warnings;
   std::vector<StageTime> times;
 };

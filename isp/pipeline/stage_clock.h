@@ -6,13 +6,13 @@
 
 namespace lowlux::isp {
 
-/// Time one step took.
+/// Holds the time that one step took.
 struct StageTime {
   std::string_view stage;
   double seconds;
 };
 
-/// Notes how long each step took: lap() names the time since the last one.
+/// Records how long each step took: lap() names the time since the last one.
 class StageClock {
  public:
   explicit StageClock(std::vector<StageTime>& times) : times_(times) {}

@@ -5,7 +5,7 @@
 
 namespace lowlux::isp {
 
-/// Mean of each whole 2x2 block: `out` is floor(height / 2) x floor(width / 2).
+/// Writes the mean of each complete 2x2 block to `out`, which is floor(height / 2) x floor(width / 2).
 void bin_plane(PlaneView<const float> in, PlaneView<float> out, Executor& executor);
 
 }  // namespace lowlux::isp

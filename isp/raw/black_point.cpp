@@ -12,7 +12,7 @@
 namespace lowlux::isp {
 namespace {
 
-// Mean of the offsets of every other column or row, from `start`; 0 if there are none.
+// Returns the mean of the offsets of every other column or row, from `start`; 0 if there are none.
 double mean_offset(const std::vector<double>& offsets, std::size_t start) {
   double sum = 0;
   int n = 0;
@@ -22,7 +22,7 @@ double mean_offset(const std::vector<double>& offsets, std::size_t start) {
   return n > 0 ? sum / n : 0;
 }
 
-// Mean of a tag over all pixels of one site (R, G, B for demosaiced samples).
+// Returns the mean of a tag over all pixels of one site (R, G, B for demosaiced samples).
 double site_mean(const BlackLevel& tag, int site) {
   const bool rgb = tag.samples > 1;
   const int step_x = rgb || tag.columns % 2 != 0 ? 1 : 2;
@@ -61,7 +61,7 @@ Result<BlackPoint> requested_black(const RawDn& raw, const BlackRequest& request
   }
   if (request.choice == BlackChoice::measured) return request.measured;
   if (request.choice == BlackChoice::metadata) return black_from_tag(raw, "");
-  // A tag that is finer than four figures is not replaced by four.
+  // A tag that is finer than four figures is not replaced with four figures.
   const bool tag_is_finer = raw.black_tag && !four_figures_do(*raw.black_tag);
   if (request.choice == BlackChoice::automatic && tag_is_finer) return black_from_tag(raw, "");
   MaskedBlack measured = measure_masked_black(raw);

@@ -5,13 +5,13 @@
 
 namespace lowlux::isp {
 
-/// Where the black point may come from.
+/// Names the source of the black point.
 enum class BlackChoice {
-  automatic,  // masked pixels where there are enough of them, else the tag, else an error
+  automatic,  // a tag finer than one figure per site, else masked pixels where there are enough, else the tag
   metadata,   // the tag only
   masked,     // the masked pixels only
-  given,      // figures of the user's
-  measured,   // a black point measured before, as a camera's profile holds it
+  given,      // figures given by the user
+  measured,   // a black point measured earlier, stored in a camera's profile
 };
 
 struct BlackRequest {
@@ -20,14 +20,14 @@ struct BlackRequest {
   BlackPoint measured;         // for BlackChoice::measured
 };
 
-/// The black point as requested. Errors: insufficient when the source has neither masked pixels nor a tag (black is
-/// not guessed), malformed when white is not above black.
+/// Returns the black point as requested. Errors: insufficient when the source has neither masked pixels nor a tag
+/// (black is not guessed), malformed when white is not above black.
 Result<BlackPoint> choose_black(const RawDn& raw, const BlackRequest& request);
 
-/// White level of the site's colour [DN]; for SensorLayout::linear_rgb sites 0 to 3 are R, G, B and B.
+/// Returns the white level of the site's colour [DN]; for SensorLayout::linear_rgb sites 0 to 3 are R, G, B and B.
 double white_at(const RawDn& raw, int site);
 
-/// White level above black [DN], mean of the four sites.
+/// Returns the white level above black [DN], as the mean of the four sites.
 double mean_range_dn(const RawDn& raw, const BlackPoint& black);
 
 }  // namespace lowlux::isp

@@ -7,7 +7,7 @@
 namespace lowlux::isp {
 namespace {
 
-// Position of a pixel on the map's grid: the point before it and the weight of the one after.
+// Holds a pixel's position on the map's grid: the point before it, the point after it and the weight of the latter.
 struct GridPosition {
   int before;
   int after;
@@ -29,7 +29,7 @@ float gain_at(const GainMap& map, const GridPosition& v, const GridPosition& h, 
   return top * (1 - v.weight) + bottom * v.weight;
 }
 
-// First index >= start in start + k * pitch that is >= at.
+// Returns the first index >= start in start + k * pitch that is >= at.
 int aligned_up(int start, int pitch, int at) {
   return at <= start ? start : start + (at - start + pitch - 1) / pitch * pitch;
 }

@@ -16,7 +16,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Floats = hn::ScalableTag<float>;
 using Words = hn::RebindToSigned<Floats>;
-using Codes = hn::Rebind<std::uint16_t, Floats>;  // as many, of half the width
+using Codes = hn::Rebind<std::uint16_t, Floats>;  // as many lanes, of half the width
 using Bytes = hn::Rebind<std::uint8_t, Floats>;
 
 using VF = hn::Vec<Floats>;

@@ -16,13 +16,13 @@ constexpr double range_factor = 4;
 constexpr double noise_factor = 8;
 constexpr double floor_of_white = 0.01;
 constexpr double known_noise_factor = 5, detail_factor = 12;
-constexpr double noise_range = 4.5;  // of eight normal deviates: one in a hundred has more
+constexpr double noise_range = 4.5;  // range of eight normal deviates that one in a hundred exceeds
 constexpr double max_shared = 0.1, max_shared_green = 0.07;
-// A Gaussian of 1.5 pixels FWHM, centred: exp(-1/2 / 0.637^2) less a quarter of it for the neighbour across. At green
-// sites the mean of red and blue counts, which cameras see half as strong.
+// For a centred Gaussian of 1.5 pixels FWHM: exp(-1/2 / 0.637^2) less a quarter of it for the neighbour across. At
+// green sites the mean of red and blue counts, to which cameras respond half as strongly.
 constexpr double star_share = 0.2187, star_share_green = 0.11;
 constexpr double shared_deviation = 0.44;  // of the neighbours' mean excess, in standard deviations of a pixel
-constexpr double certain = 3.5;            // standard deviations
+constexpr double certain = 3.5;            // required margin in standard deviations
 
 struct Neighbours {
   int low;
@@ -37,8 +37,8 @@ Neighbours eight_same_colour(const PlaneView<const std::uint16_t>& dn, int x, in
   return {*std::min_element(v.begin(), v.end()), *std::max_element(v.begin(), v.end())};
 }
 
-// How far a pixel stands out of the median of its four nearest neighbours of the same colour that lie inside the plane:
-// a star beside them reaches one or two.
+// Returns the difference of a pixel from the median of its four nearest neighbours of the same colour that lie inside
+// the plane; a star next to them reaches one or two of the neighbours.
 double excess(const PlaneView<const std::uint16_t>& dn, int x, int y) {
   int sum = 0, n = 0, low = 65535, high = 0;
   for (const auto [dx, dy] : {std::array{-2, 0}, {2, 0}, {0, -2}, {0, 2}}) {
@@ -54,18 +54,18 @@ double excess(const PlaneView<const std::uint16_t>& dn, int x, int y) {
   return dn.at(x, y) - median;
 }
 
-// The direct neighbours' mean excess in the direction of this pixel's own.
+// Returns the direct neighbours' mean excess over their same-colour neighbours.
 double shared_excess(const PlaneView<const std::uint16_t>& dn, int x, int y) {
   return (excess(dn, x - 1, y) + excess(dn, x + 1, y) + excess(dn, x, y - 1) + excess(dn, x, y + 1)) / 4;
 }
 
-// What of a defect's surroundings depends on the frame, not on the pixel.
+// Data of the defect test that depends on the frame, not on the pixel.
 struct Judge {
   PlaneView<const std::uint16_t> dn;
   BayerPhase phase;
   PerSite<double> black_dn;
   DefectNoise noise;
-  double floor_dn;  // least distance from the neighbours
+  double floor_dn;  // minimum distance from the neighbours
 
   double variance(int x, int y, double dn_value) const {
     const double level = std::max(0.0, dn_value - black_dn[site_of(x, y)]);
@@ -103,7 +103,7 @@ bool is_defect(const Judge& judge, int x, int y) {
   return shared_excess(judge.dn, x, y) * (own > 0 ? 1 : -1) < most_shared(judge, x, y, std::fabs(own));
 }
 
-// Distances that is_defect() asks at least, rounding allowed for.
+// Returns lower bounds on the distances that is_defect() requires, with a margin for rounding.
 defect_rows::Bounds least_bounds(const Judge& judge, int x, int y) {
   constexpr double nearly = 0.999;
   defect_rows::Bounds bounds;
@@ -120,7 +120,7 @@ defect_rows::Bounds least_bounds(const Judge& judge, int x, int y) {
   return bounds;
 }
 
-// A quick test of a part of the row first, so that the careful one runs on few.
+// Tests a run of the row with the fast kernel first, so that the slower exact test runs on few pixels.
 void judge_row(const Judge& judge, int y, std::vector<Pixel>& found) {
   std::array<std::uint8_t, 512> marked;
   constexpr int most = marked.size();

@@ -26,7 +26,7 @@ PerSite<Site> sites_of(const RawDn& raw, const BlackPoint& black) {
   return out;
 }
 
-// Code less its dark [DN].
+// Returns the code minus its dark value [DN].
 float light_dn(std::uint16_t code, float dark, const Site& site) {
   const auto dn = static_cast<float>(code);
   return dn - (dn >= site.white ? site.mean : dark);
@@ -55,7 +55,7 @@ void for_each_pixel(const RawDn& raw, const DarkFrame& dark, const BlackPoint& b
 Result<BlackPoint> black_of(const RawDn& raw, const DarkFrame& dark) {
   if (raw.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported,
-                "the picture is already demosaiced; dark frames are taken off the mosaic as the sensor gave it");
+                "the picture is already demosaiced; dark frames are subtracted from the mosaic as the sensor gave it");
   }
   if (dark.dn.width() != raw.active.width || dark.dn.height() != raw.active.height) {
     return fail(ErrorCode::invalid_argument,

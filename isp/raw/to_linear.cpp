@@ -30,12 +30,12 @@ Rect whole_of(const RawDn& raw) { return {0, 0, raw.active.width, raw.active.hei
          part.y + part.height <= raw.active.height && out.width == part.width && out.height == part.height;
 }
 
-// Codes of row y of a part of the active area.
+// Returns the codes of row y of a region of the active area.
 const std::uint16_t* codes_of(const RawDn& raw, const Rect& part, int y) {
   return raw.dn.row(raw.active.y + part.y + y) + raw.active.x + part.x;
 }
 
-// The pattern of a tag that four figures cannot express; white stays that of the site.
+// Subtracts the pattern of a tag that four figures cannot express; white stays that of the site.
 void row_by_pattern(const RawDn& raw, const BlackLevel& pattern, const Rect& part, int y, float* out) {
   const std::uint16_t* dn = codes_of(raw, part, y);
   for (int x = 0; x < part.width; ++x) {
@@ -51,7 +51,7 @@ void row_by_site(const RawDn& raw, const SiteScale& scale, const Rect& part, int
   const float gain[2] = {scale.gain[left], scale.gain[left + 1]};
   const int width = part.width;
   int x = 0;
-  for (; x + 1 < width; x += 2) {  // whole pairs: what compilers make vectors of
+  for (; x + 1 < width; x += 2) {  // complete pairs, which compilers vectorise
     out[x] = (static_cast<float>(dn[x]) - black[0]) * gain[0];
     out[x + 1] = (static_cast<float>(dn[x + 1]) - black[1]) * gain[1];
   }
@@ -66,7 +66,7 @@ void row_of(const RawDn& raw, const BlackPoint& black, const SiteScale& scale, c
   }
 }
 
-// Multiplies (or shifts) each site by its own figure.
+// Calls `apply` (which multiplies or shifts) on each pixel with the index of its site.
 template <class Apply>
 void for_each_site(PlaneView<float> plane, Executor& executor, const Apply& apply) {
   for_each_band(executor, plane.height, [&](RowBand band, int) {

@@ -25,7 +25,7 @@ constexpr double largest_answer = 1e30;  // for a sum of 1, as the kernel's larg
 
 Vector3 scaled(const Vector3& v, double s) { return {s * v[0], s * v[1], s * v[2]}; }
 
-/// The map between RGB and RGB, in units of the sum R + G + B.
+/// Maps RGB to RGB, in units of the sum R + G + B.
 struct RgbMap {
   const ColourMap& map;
   Matrix3 to_xyz;
@@ -39,7 +39,7 @@ struct RgbMap {
 
 double largest_of(const Vector3& v) { return std::max({v[0], v[1], v[2]}); }
 
-/// Whether the answer per sum is the same at three brightnesses.
+/// Returns whether the result per sum is the same at three brightnesses.
 bool homogeneous(const RgbMap& map, double limit) {
   constexpr std::array<Vector3, 10> colours{{{1, 1, 1},
                                              {1, 0, 0},
@@ -66,7 +66,7 @@ bool homogeneous(const RgbMap& map, double limit) {
 
 double share_at(const ColourTable& t, double node) { return node * (1 + 3 * t.margin) / t.cells - t.margin; }
 
-/// The sum R + G + B of a level, whole or between two.
+/// Returns the sum R + G + B of a level, which may lie between two levels.
 double sum_at(const ColourTable& t, double level) {
   const double octave = std::floor(level / t.levels_per_octave);
   const double part = level / t.levels_per_octave - octave;
@@ -96,7 +96,7 @@ table_rows::Table view_of(const ColourTable& t) {
 
 bool fits_floats(const Vector3& v) { return std::fabs(v[0]) + std::fabs(v[1]) + std::fabs(v[2]) <= largest_answer; }
 
-/// Fills the nodes that cells with colours in them use; the others stay 0. False if the map's answer fits no float.
+/// Fills the nodes of cells that contain colours; the others stay 0. Returns false if a result exceeds a float.
 bool fill(ColourTable& t, const RgbMap& map, double brightest_sum) {
   t.node.assign(nodes_of(t.cells, t.levels) * floats_per_node, 0.0f);
   float* to = t.node.data();
@@ -115,7 +115,7 @@ bool fill(ColourTable& t, const RgbMap& map, double brightest_sum) {
   return true;
 }
 
-/// Colours as planar rows.
+/// Holds colours as planar rows.
 struct Samples {
   std::vector<float> channel[3];
 
@@ -124,7 +124,7 @@ struct Samples {
   }
 };
 
-/// Colours at the middle of cells, `beyond` above each level, of a table that has levels.
+/// Returns the colours at the centre of cells, `beyond` above each level, of a table that has levels.
 Samples middles(const ColourTable& t, double limit, double beyond) {
   Samples out;
   const int levels = std::max(t.levels - 1, 1);
@@ -156,7 +156,7 @@ ColourTableError measure(const ColourTable& t, const RgbMap& map, const Samples&
     const Vector3 rgb{in.channel[0][i], in.channel[1][i], in.channel[2][i]};
     const Vector3 shown{out.channel[0][i], out.channel[1][i], out.channel[2][i]};
     const Lab exact = lab_of(map.map(xyz_of(map.to_xyz * rgb)), white);
-    // ciede2000 takes what is not a number for equal.
+    // ciede2000 treats values that are not numbers as equal.
     const bool usable = std::isfinite(exact.l + exact.a + exact.b);
     difference[i] = usable ? ciede2000(lab_of(xyz_of(map.to_xyz * shown), white), exact) : INFINITY;
   }
@@ -180,7 +180,7 @@ std::optional<std::string> wrong_with(const ColourTableRequest& r) {
   return std::nullopt;
 }
 
-/// The next finer table, twice as fine in the direction it errs in; nullopt where the request ends.
+/// Returns the next finer table, twice as fine in the direction of the larger error; nullopt at the request's limits.
 std::optional<ColourTable> finer(const ColourTable& t, const RgbMap& map, const ColourTableRequest& request) {
   ColourTable next{.luminance = t.luminance, .grey = t.grey, .margin = t.margin, .cells = t.cells};
   next.levels = t.levels;
@@ -212,7 +212,7 @@ Result<ColourTable> make_colour_table(const ColourMap& map, const ColourTableReq
   ColourTable table{.luminance = request.rgb_to_xyz[1], .cells = first_cells};
   const double least = *std::ranges::min_element(table.luminance);
   const double all = table.luminance[0] + table.luminance[1] + table.luminance[2];
-  // The corner of the least primary has luminance least + margin (3 least - all): a fifth of it is kept.
+  // The corner of the least primary has luminance least + margin (3 least - all): a fifth of `least` is kept.
   table.margin = std::min(widest_margin, 0.8 * least / std::max(all - 3 * least, least));
   const double brightest_sum = 3 * request.limit;
   table.first_level_log2 = static_cast<int>(std::ceil(std::log2(brightest_sum))) - octaves;

@@ -27,19 +27,19 @@ struct Colour {
   VF c[3];
 };
 
-/// What is not a number to 0, the rest to +-1e30, so that no sum is infinite.
+/// Replaces values that are not numbers with 0 and limits the rest to +-1e30, so that no sum is infinite.
 HWY_INLINE VF usable(VF x) {
   const VF number = hn::IfThenElseZero(hn::Eq(x, x), x);
   return hn::Min(hn::Max(number, constant(-1e30f)), constant(1e30f));
 }
 
-/// a + t (b - a) of what is found at two nodes.
+/// Returns a + t (b - a) of the values at two nodes.
 HWY_INLINE VF between(const float* a, const float* b, VI at, VF t) {
   const VF first = hn::GatherIndex(Floats(), a, at), second = hn::GatherIndex(Floats(), b, at);
   return hn::MulAdd(t, hn::Sub(second, first), first);
 }
 
-/// Place on an axis of nodes: the lower one, as a float, and how far it is to the next.
+/// Locates a value on an axis of nodes: the lower node, as a float, and the fraction of the way to the next.
 struct Place {
   VF node;
   VF t;
@@ -53,8 +53,8 @@ HWY_INLINE Place place_of(VF x, std::int32_t cells) {
 
 struct Kernel {
   const Table& table;
-  std::size_t row;    // floats from a node to the one with the next share of green
-  std::size_t level;  // and to the next level
+  std::size_t row;    // floats from a node to the one with the next fraction of green
+  std::size_t level;  // floats from a node to the one at the next level
 
   explicit HWY_INLINE Kernel(const Table& from)
       : table(from),
@@ -66,7 +66,7 @@ struct Kernel {
     return hn::MulAdd(y.t, hn::Sub(high, low), low);
   }
 
-  /// What the table says of a colour within it, for a sum of 1.
+  /// Returns the table's result for a colour within it, for a sum of 1.
   HWY_INLINE Colour looked_up(const Colour& in, VF sum) const {
     const VF per_sum = hn::Div(constant(table.nodes_per_share), sum);
     const VF first = constant(table.margin * table.nodes_per_share);
@@ -98,7 +98,7 @@ struct Kernel {
                    hn::MulAdd(constant(table.luminance[1]), in.c[1], hn::Mul(constant(table.luminance[0]), in.c[0])));
     const auto lit = hn::Gt(y, constant(1e-30f));
     const VF least = hn::Min(hn::Min(in.c[0], in.c[1]), in.c[2]);
-    // Shares below -margin move to it, on the way to the grey of equal luminance.
+    // Fractions below -margin move to -margin, towards the grey of equal luminance.
     const VF beyond = hn::MulAdd(constant(table.margin), hn::Add(hn::Add(in.c[0], in.c[1]), in.c[2]), least);
     const VF room = hn::Mul(y, constant(1 + 3 * table.margin));
     const VF t = hn::IfThenElse(hn::And(lit, hn::Lt(beyond, zero)), hn::Div(room, hn::Sub(room, beyond)), constant(1));

@@ -9,7 +9,7 @@
 namespace lowlux::isp {
 namespace {
 
-/// EV that takes `from` to `to`; infinite if there is nothing to take.
+/// Returns the EV that maps `from` to `to`; infinite if `from` is not positive.
 double ev_to_reach(double to, double from) {
   return from > 0 ? std::log2(to / from) : std::numeric_limits<double>::infinity();
 }

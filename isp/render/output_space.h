@@ -10,7 +10,7 @@
 
 namespace lowlux::isp {
 
-/// An output space and the name the command line calls it by.
+/// Pairs an output space with its name on the command line.
 struct NamedOutputSpace {
   OutputSpace space;
   std::string_view name;
@@ -24,28 +24,30 @@ inline constexpr std::array<NamedOutputSpace, 7> output_spaces{{{OutputSpace::sr
                                                                 {OutputSpace::xyz, "xyz"},
                                                                 {OutputSpace::camera, "camera"}}};
 
-/// nullopt for a name that is none of them.
+/// Returns the output space of that name; nullopt for an unknown name.
 std::optional<OutputSpace> output_space_named(std::string_view name);
 std::string_view name_of(OutputSpace space);
 
-/// The white every space but `camera` is made for, D65.
+/// D65 is the white of every space but `camera`.
 inline constexpr Xy output_white = white_d65;
 
-/// XYZ under output_white (Y = 1 at white) -> linear values of the space, white at (1, 1, 1); identity for `xyz`,
-/// nullopt for `camera`, which has no known primaries.
+/// Returns the matrix from XYZ under output_white (Y = 1 at white) to linear values of the space, white at (1, 1, 1);
+/// identity for `xyz`, nullopt for `camera`, which has no known primaries.
 std::optional<Matrix3> xyz_to_output(OutputSpace space);
 
-/// Luminance of the space's linear values, Y = w . value, 1 at white; (0, 1, 0) for `xyz`, nullopt for `camera`.
+/// Returns the weights w of luminance in the space's linear values, Y = w . value, 1 at white; (0, 1, 0) for `xyz`,
+/// nullopt for `camera`.
 std::optional<Vector3> luminance_weights(OutputSpace space);
 
-/// Display-linear value -> code value, both 0..1 for the displayable range; negative values by odd symmetry.
+/// Converts a display-linear value to a code value, both 0..1 for the displayable range; negative values by odd
+/// symmetry.
 ///     srgb, p3:  12.92 v for v <= 0.0031308, else 1.055 v^(1/2.4) - 0.055         (IEC 61966-2-1)
 ///     rec2020:   4.5 v for v < b, else a v^0.45 - (a - 1)                         (BT.2020, table 4)
 ///     others:    v
 /// with a = 1.0993, b = 0.0181, BT.2020's rounding for 12 bits. Its published constants leave a step of 1e-5 at b.
 double encode_transfer(OutputSpace space, double linear);
 
-/// The inverse. In the step of the Rec.2020 curve it takes the code value of b as the border.
+/// Inverts encode_transfer. In the step of the Rec.2020 curve it takes the code value of b as the border.
 double decode_transfer(OutputSpace space, double code);
 
 }  // namespace lowlux::isp

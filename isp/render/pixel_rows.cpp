@@ -54,7 +54,7 @@ void RgbxRow(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Or
 void BgrxRow(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Order::bgrx, rgb, width, out); }
 void BgrRow(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Order::bgr, rgb, width, out); }
 
-/// Sixteen pixels at once in 32 bits: what three channels weigh, rounded, `shift` bits off.
+/// Sixteen pixels are processed at once in 32 bits: weighted sums of three channels, rounded, shifted by `shift` bits.
 using Pixels = hn::FixedTag<std::uint8_t, 16>;
 using Quads = hn::CappedTag<std::int32_t, 8>;
 
@@ -106,7 +106,7 @@ void LumaRow(const YuvMatrix& matrix, const std::uint8_t* rgb, int width, std::u
   }
 }
 
-/// Sums of two neighbours of both rows, of 32 pixels.
+/// Adds the sums of two neighbours of both rows, for 32 pixels.
 HWY_INLINE void add_pairs(const std::uint8_t (&above)[32], const std::uint8_t (&below)[32], std::int32_t* to) {
   const hn::CappedTag<std::uint16_t, 8> w;
   const hn::Repartition<std::uint8_t, decltype(w)> b;
@@ -169,7 +169,7 @@ HWY_EXPORT(ChromaRow);
 
 namespace {
 
-/// Rows of a matrix whose figures add up exactly, so that greys stay grey.
+/// Returns the rows of a matrix in integers that add up exactly, so that greys stay grey.
 std::array<std::int32_t, 3> scaled(const std::array<double, 3>& weight, double range, std::int32_t sum) {
   std::array<std::int32_t, 3> out{};
   for (int c = 0; c < 3; ++c) out[c] = static_cast<std::int32_t>(std::lround(weight[c] * range / 255 * 65536));

@@ -14,7 +14,7 @@ constexpr double mid_grey = 0.18;
 constexpr double black_slope = 0.7;
 constexpr double mid_slope = 2 - black_slope;
 
-/// The shoulder's p = 1.5, and its inverse.
+/// Returns x to the power of the shoulder's p = 1.5; root() is its inverse.
 double to_power(double x) { return x * std::sqrt(x); }
 double root(double x) { return std::cbrt(x * x); }
 
@@ -30,10 +30,11 @@ double shoulder(double x, double limit) {
 
 constexpr int mantissa_bits = 23;
 
-/// Bins in use for 2^log2 bins per octave: the octaves from offset = 2^-octaves to 1, and the rest up to 1 + offset.
+/// Returns the bins in use for 2^log2 bins per octave: the octaves from offset = 2^-octaves to 1, and the rest up to
+/// 1 + offset.
 constexpr int bins_in_use(int octaves, int log2) { return (octaves << log2) + ((1 << log2) >> octaves) + 1; }
 
-/// Most bins per octave, as a power of two, that fit the table.
+/// Returns the maximum number of bins per octave, as a power of two, that fits the table.
 constexpr int bins_per_octave_log2(int octaves) {
   int log2 = 0;
   while (bins_in_use(octaves, log2 + 1) <= ToneTable::capacity) ++log2;

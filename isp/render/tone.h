@@ -11,42 +11,42 @@ namespace lowlux::isp {
 
 enum class ToneCurve : std::uint8_t { standard, none };
 
-/// "standard" or "none"; nullopt for another name.
+/// Returns the curve named "standard" or "none"; nullopt for another name.
 std::optional<ToneCurve> tone_curve_named(std::string_view name);
 std::string_view name_of(ToneCurve curve);
 
-/// The largest gain make_tone_table is made for, 2^12.
+/// make_tone_table accepts limits up to this gain, 2^12.
 inline constexpr double max_tone_limit = 4096;
 
-/// Scene-linear value, after exposure, that becomes display white: where the sensor saturates, but not below 1 and
-/// not above max_tone_limit. `none` compresses nothing: 1.
+/// Returns the scene-linear value, after exposure, that becomes display white: where the sensor saturates, but not
+/// below 1 and not above max_tone_limit. `none` compresses nothing: 1.
 double tone_limit(ToneCurve curve, double exposure_ev);
 
-/// Scene-linear value after exposure -> display-linear value, both relative to white.
+/// Converts a scene-linear value after exposure to a display-linear value, both relative to white.
 ///
 /// `none` is the identity up to 1.
 ///
-/// `standard` maps [0, limit] onto [0, 1] in two pieces that meet at mid-grey m = 0.18 with equal value and slope:
+/// `standard` maps [0, limit] onto [0, 1] in two segments that meet at mid-grey m = 0.18 with equal value and slope:
 ///     toe,      x <= m:  y = x (s + (1 - s) x / m),              s = 0.7 (slope at black)
 ///     shoulder, x >= m:  y = m + g t / (1 + (a t)^p)^(1/p),      t = x - m, g = 2 - s = 1.3, p = 1.5
 ///     a = ((g T / (1 - m))^p - 1)^(1/p) / T,                     T = limit - m
 /// Derivation. Mid-grey has to stay where exposure put it, for every limit, so the curve is built outward from (m, m).
-/// Downward the simplest curve through (0, 0) and (m, m) that gives contrast is a parabola; its slope runs evenly
-/// from s to 2 - s, so shadows get up to 1.3 times contrast at the expense of the deepest ones. Slope s < 1 at black:
-/// noise around zero is not amplified, and below zero the line s x goes on, so it is not rectified either.
-/// Upward the straight line of slope g has to bend to reach 1 at the limit. (1 + z^p)^(-1/p) bends the line z towards
-/// a level smoothly and without end: p = 1 bends from the start (mid-tones turn dull), a large p is a corner; 1.5
-/// shows a white wall (x = 0.9) at 0.92 of white for limit 1, at 0.73 for limit 1000, where lamps need the room.
-/// `a` follows from y(limit) = 1 and is real because g T >= 1 - m for limit >= 1. The slope
-/// g (1 + (a t)^p)^(-1/p - 1) is positive everywhere and continuous at m: monotone and C1 for every limit.
+/// Downward the simplest curve through (0, 0) and (m, m) that gives contrast is a parabola; its slope runs evenly from
+/// s to 2 - s, so shadows get up to 1.3 times contrast at the expense of the deepest ones. Slope s < 1 at black: noise
+/// around zero is not amplified, and below zero the line s x continues, so it is not rectified either. Upward the
+/// straight line of slope g has to bend to reach 1 at the limit. (1 + z^p)^(-1/p) bends the line z towards a level
+/// smoothly and without end: p = 1 bends from the start (mid-tones lose contrast), a large p is a corner; 1.5 shows a
+/// white wall (x = 0.9) at 0.92 of white for limit 1, at 0.73 for limit 1000, where lamps need the range above. `a`
+/// follows from y(limit) = 1 and is real because g T >= 1 - m for limit >= 1. The slope g (1 + (a t)^p)^(-1/p - 1) is
+/// positive everywhere and continuous at m: monotone and C1 for every limit.
 ///
 /// Above the limit the result is 1.
-/// @param limit  as tone_limit gives it
+/// @param limit  value that tone_limit returns
 double apply_tone(ToneCurve curve, double scene_linear, double limit);
 
-/// apply_tone and encode_transfer in one table, for kernels. The table's input is v = x / limit in 0..1.
-/// Even steps reach up to x = 2^-6 (or the power of two next to it, if the limit is none); from there every octave has
-/// the same number of bins, as many as fit: 512 for limits to 2^1.4, 256 to 2^9.4, 128 above.
+/// Combines apply_tone and encode_transfer in one table, for kernels. The table's input is v = x / limit in 0..1. Even
+/// steps reach up to x = 2^-6 (or the power of two next to it, if the limit is not a power of two); from there every
+/// octave has the same number of bins, as many as fit: 512 for limits to 2^1.4, 256 to 2^9.4, 128 above.
 /// Errors against the exact curve, over all v, for limits up to   2^1.4   2^9.4   2^12
 ///     code8, srgb p3 rec2020 (0.5 of it is the rounding)           0.6     0.7     0.8
 ///     code8, linear spaces                                         0.7     0.75    0.9

@@ -23,7 +23,7 @@ Vector3 scaled_to_one(const Vector3& v) {
 
 WhiteBalance balance_of(const CameraColour& colour, const Vector3& neutral, WhiteSource source) {
   WhiteBalance out{scaled_to_one(neutral), std::nullopt, source, {}};
-  if (colour.calibrations.empty()) return out;  // asked in vain, it would have words for it, which take memory
+  if (colour.calibrations.empty()) return out;  // white_of_neutral would fail and allocate an error message
   if (const auto white = white_of_neutral(colour, neutral)) out.white = *white;
   return out;
 }
@@ -42,7 +42,7 @@ struct GreyEstimate {
   int blocks = 0;
 };
 
-/// Shades of grey over the blocks that qualify. The values are at most 1, so their powers sum without care.
+/// Computes shades of grey over the blocks that qualify. The values are at most 1: sums of their powers stay finite.
 GreyEstimate shades_of_grey(const RgbView<const float>& blocks, double block_noise, const AutoWhiteOptions& options,
                             std::span<float> memory) {
   std::array<double, 3> floor{};
@@ -67,7 +67,7 @@ GreyEstimate shades_of_grey(const RgbView<const float>& blocks, double block_noi
   return estimate;
 }
 
-/// The nearest white that a light can have, by `options`; nullopt if it is one already.
+/// Returns the nearest white that a light can have, by `options`; nullopt if `white` is one already.
 std::optional<Xy> held_to_lights(const WhitePoint& white, const AutoWhiteOptions& options) {
   const double kelvin = std::clamp(white.cct_k, options.min_k, options.max_k);
   const auto usual = white_of_temperature(kelvin);
@@ -167,7 +167,7 @@ WhiteBalance auto_white_balance(const RgbView<const float>& blocks, double block
   if (found.blocks < options.min_blocks) {
     return fallback(colour, "only " + std::to_string(found.blocks) +
                                 " of the picture's blocks are neither black nor "
-                                "clipped, too few to tell the white");
+                                "clipped, too few to estimate the white");
   }
   found.balance.reason = found.remark;
   return std::move(found.balance);

@@ -32,7 +32,7 @@ NodePower even_power() {
   return out;
 }
 
-/// Luminances of a power at the model's nodes, in units of their own.
+/// Returns the luminances of a power at the model's nodes, in units of the power.
 LuminancePair luminance_of_nodes(const NodePower& power) {
   LuminancePair out;
   for (int i = 0; i < entropy_nodes; ++i) {
@@ -49,7 +49,7 @@ std::optional<Xyz> spectrum_seen(const EntropyModel& model, const NodePower& pow
   return xyz_of(model, *fit);
 }
 
-/// The eye at one level: the model, and what takes its white to the equal-energy one.
+/// Holds the model at one level, and the transform from its white to the equal-energy one.
 struct SpectralEye {
   EntropyModel model;
   double m = 0;
@@ -57,7 +57,7 @@ struct SpectralEye {
   double white_luminance = 1;  // L_mes
 };
 
-/// @param adaptation_cd_m2  of equal-energy light
+/// Makes the model for a level. @param adaptation_cd_m2  of equal-energy light
 Result<SpectralEye> spectral_eye(double adaptation_cd_m2, const EntropyOptions& options) {
   const double m = mesopic_state({adaptation_cd_m2, scotopic_ratio_of_equal_energy * adaptation_cd_m2}).m;
   auto model = entropy_model(m, even_power(), options);

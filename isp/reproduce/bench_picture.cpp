@@ -23,7 +23,7 @@
 namespace lowlux::isp {
 namespace {
 
-// The tuning set first.
+// The tuning set comes first.
 constexpr std::array<std::string_view, 8> files{"kodim05.png", "kodim08.png", "Carrots.exr", "StillLife.exr",
                                                 "kodim15.png", "kodim19.png", "kodim23.png", "GoldenGate.exr"};
 constexpr std::size_t tuning_files = 4;
@@ -37,8 +37,8 @@ Plane<float> middle_of(const PlaneView<const float>& plane, int width, int heigh
   return out;
 }
 
-/// XYZ of an OpenEXR picture whose primaries reach beyond the colours, so that light may be negative in them: that is 0
-/// here, where capture::read_picture refuses it. Carrots.exr is in ACES AP0.
+/// Returns XYZ of an OpenEXR image whose primaries lie outside the spectral locus, so that light may be negative in
+/// them: negative values become 0 here, while capture::read_picture refuses them. Carrots.exr is in ACES AP0.
 Result<SceneLinear> wide_light(DecodedPicture& decoded, Executor& executor) {
   auto& linear = std::get<SceneLinear>(decoded.picture);
   for (Plane<float>& plane : linear.plane) {
@@ -62,7 +62,7 @@ Result<SceneLinear> picture_xyz(const std::string& path, Executor& executor) {
   return std::move(picture->xyz);
 }
 
-/// What brings the percentile of the largest component of linear Rec. 709 to 1.
+/// Returns the factor that scales the percentile of the largest component of linear Rec. 709 to 1.
 double white_scale(const SceneLinear& xyz, const Matrix3& to_rgb) {
   std::vector<float> largest;
   largest.reserve(xyz.plane[0].size());
@@ -75,9 +75,9 @@ double white_scale(const SceneLinear& xyz, const Matrix3& to_rgb) {
   return *at > 0 ? 1.0 / static_cast<double>(*at) : 1.0;
 }
 
-/// What a display of Rec. 709 shows of it.
+/// Returns the light that a Rec. 709 display shows of an image.
 SceneLinear shown(const SceneLinear& xyz, bool scene_linear, Executor& executor) {
-  const Matrix3 to_rgb = xyz_to_output(OutputSpace::linear_srgb).value();  // of a space with primaries
+  const Matrix3 to_rgb = xyz_to_output(OutputSpace::linear_srgb).value();  // cannot fail for a space with primaries
   const Matrix3 matrix = (scene_linear ? white_scale(xyz, to_rgb) : 1.0) * to_rgb;
   const Vector3 weights = luminance_weights(OutputSpace::linear_srgb).value();
   RgbTransform transform{.clip = std::numeric_limits<float>::infinity()};
@@ -122,7 +122,7 @@ Plane<float> lens_blurred(const PlaneView<const float>& plane, double sigma_px) 
     const double i = static_cast<double>(k) - reach, z = i == 0 ? 0 : i / sigma_px;
     sum += weight[k] = std::exp(-z * z / 2);
   }
-  // Along the rows, turned; twice, and the picture is upright again.
+  // Blurring along the rows also transposes; after two passes the image is upright again.
   const auto along_rows = [&](const PlaneView<const float>& in) {
     Plane<float> out(in.height, in.width);
     for (int y = 0; y < in.height; ++y) {

@@ -13,10 +13,10 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double drawn_deviations = 10;  // of the thesis' ellipses
+constexpr double drawn_deviations = 10;  // scale of the thesis' ellipses, in standard deviations
 constexpr double degree = std::numbers::pi / 180;
 
-/// One colour at one level.
+/// Holds the samples of one colour at one level.
 struct Cloud {
   double power_w = 0;
   std::vector<Xy> samples;
@@ -59,7 +59,7 @@ Result<void> sample_colours(std::vector<Colour>& colours, std::uint32_t first_fr
   return {};
 }
 
-/// The exponent that is farthest from -1/2 in units of its own standard error, over all colours.
+/// Reports the exponent that is farthest from -1/2 in units of its own standard error, over all colours.
 Finding size_law(const std::vector<Colour>& colours, const std::string& scenario) {
   Estimate worst{-0.5, 1};
   const auto errors_off = [](const Estimate& e) { return std::fabs(e.value + 0.5) / e.standard_error; };
@@ -126,12 +126,12 @@ bool is_one_of(const std::string& name, std::initializer_list<std::string_view> 
   return std::ranges::any_of(families, [&](std::string_view family) { return name.starts_with(family); });
 }
 
-/// Sizes of the chips of some hue families at the dimmest level, as predicted: without sampling error.
+/// Predicted sizes of the chips of some hue families at the dimmest level, without sampling error.
 struct Family {
   struct Member {
     std::string name;
     double size = 0;
-    double error = 0;  // standard error that a sampled ellipse of this size has
+    double error = 0;  // standard error of a sampled ellipse of this size
   };
   double mean = 0;
   Member smallest, largest;
@@ -179,7 +179,7 @@ Series drawn(const std::string& name, const XyEllipse& e, Mark mark) {
   return out;
 }
 
-// All of MacAdam's as one line with gaps.
+// Returns all of MacAdam's ellipses as one line with gaps.
 Series macadam_ellipses() {
   Series out{"MacAdam, x10", {}, {}, Mark::dashed};
   const CieTable table = macadam1942_table();

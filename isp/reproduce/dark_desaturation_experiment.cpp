@@ -22,8 +22,8 @@ Xyz scaled(const Xyz& v, double f) { return {f * v.x, f * v.y, f * v.z}; }
 Xyz sum(const Xyz& a, const Xyz& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 
 struct Law {
-  double worst_line = 0;  // expectation against Eq. 4.23, in xy
-  double worst_undo = 0;  // Eq. 4.23 undone against the truth, in xy, times alpha: the rounding it amplifies
+  double worst_line = 0;  // error of the expectation against Eq. 4.23, in xy
+  double worst_undo = 0;  // inverse of Eq. 4.23 against the truth, in xy, times alpha: the rounding it amplifies
   double smallest_alpha = 1;
 };
 
@@ -64,7 +64,8 @@ double true_area(const LevelResult& level) {
   return hull_area(points);
 }
 
-// Undone means against the truth, in their standard errors: subtracting the dark leaves the variance and shrinks S.
+// Returns the largest error of corrected means against the truth, in their standard errors: subtracting the dark leaves
+// the variance and shrinks S.
 double worst_undone(const ThesisCamera& camera, const std::vector<Patch>& patches,
                     const std::vector<LevelResult>& levels, int samples) {
   const Vector3 dark_e = dark_charge_e(camera);
@@ -78,7 +79,7 @@ double worst_undone(const ThesisCamera& camera, const std::vector<Patch>& patche
       }
       const auto cloud = sensor_cloud(camera, mean_e, variance_e2);
       const auto& undone = level.patches[i].undone_xy;
-      // The chromaticity is a ratio: to first order only while the sum's own error is small against the sum.
+      // The chromaticity is a ratio: the first order holds only while the sum's own error is small against the sum.
       const double sum_error = std::sqrt(variance_e2[0] + variance_e2[1] + variance_e2[2]) /
                                (mean_e[0] + mean_e[1] + mean_e[2]) / std::sqrt(samples);
       if (!cloud || sum_error > 0.02) continue;
@@ -103,7 +104,7 @@ Finding gamut(const std::vector<LevelResult>& levels) {
           fmt::format("convex hull in xy of the expectations of {} patches", levels.front().patches.size())};
 }
 
-// Expectations of all patches as one line with gaps, each ending at the black point.
+// Returns the expectations of all patches as one line with gaps, each ending at the black point.
 Series paths_of(const std::vector<LevelResult>& levels, const Xy& black) {
   Series out{"expectation, 100 to 0.1 cd/m2", {}, {}, Mark::line};
   for (std::size_t i = 0; i < levels.front().patches.size(); ++i) {

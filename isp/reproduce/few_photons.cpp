@@ -13,18 +13,19 @@
 namespace lowlux::isp {
 namespace {
 
-// Below the thesis' last level until no photon is the rule: there the API has to say that there is no spectrum.
+// The levels continue below the thesis' last one until most samples have no photon: there the API has to report that
+// there is no spectrum.
 constexpr double levels_w[] = {1e-9, 1e-11, 1e-12, 1e-13, 1e-14, 6e-15, 1e-16, 1e-17, 1e-18};
-constexpr double fewest_photons = 1000;  // of a sample, for the laws that hold to first order in 1 / photons
+constexpr double fewest_photons = 1000;  // minimum per sample, for the laws that hold to first order in 1 / photons
 
 struct Level {
   double power_w = 0;
-  double photons = 0;             // expected, all wavelengths
+  double photons = 0;             // expected number, all wavelengths
   std::vector<double> distances;  // Eq. 3.8, of the samples that have a spectrum
   std::vector<double> squares;
   int without_photon = 0;
   double expected_square = 0;
-  std::vector<Spectrum> examples;  // the first sample's, if it has one
+  std::vector<Spectrum> examples;  // spectrum of the first sample, if it has one
 };
 
 Result<Level> sample_level(const Spectrum& light, std::uint32_t index, std::uint32_t samples, std::uint64_t seed) {
@@ -108,7 +109,7 @@ Finding no_photon(const std::vector<Level>& levels, std::uint32_t samples) {
     const double p = std::exp(-level.photons);
     const double deviation = std::sqrt(p * (1 - p) * samples);
     const double difference = std::fabs(level.without_photon - p * samples);
-    // Where p is 0 or 1 in effect, a single exception would be one count.
+    // Where p is practically 0 or 1, the deviation is below one count.
     worst = std::max(worst, difference / std::max(deviation, 1.0));
   }
   const Level& last = levels.back();

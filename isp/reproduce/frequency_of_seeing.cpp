@@ -14,7 +14,7 @@ namespace {
 constexpr int thresholds[] = {1, 2, 3, 5, 7, 10};
 constexpr std::uint32_t draw_purpose_flash = draw_purpose::wavelength_bin;
 
-/// Steepness over log N: from 25 % to 75 % seen [decades of photons]; alpha moves both ends alike.
+/// Returns the curve's width over log N, from 25 % to 75 % seen [decades of photons]; alpha moves both ends alike.
 Result<double> width_decades(int threshold, double isomerisations_per_photon) {
   const auto quarter = isomerisations_seen_with(0.25, threshold);
   const auto three = isomerisations_seen_with(0.75, threshold);
@@ -62,7 +62,7 @@ Result<Finding> drawn_flashes(const RunOptions& options) {
       }
       ++place;
       const double expected = *p * flashes;
-      // Where nearly all or none are seen, one flash more or less is no error.
+      // Where nearly all or no flashes are detected, a difference of one flash is not an error.
       const double deviation = std::max(1.0, std::sqrt(expected * (1 - *p)));
       worst = std::max(worst, std::fabs(seen - expected) / deviation);
     }
@@ -83,8 +83,8 @@ Result<Finding> tail() {
   if (!exact) return tl::make_unexpected(exact.error());
   double term = std::exp(-x), sum = 0;
   for (int m = 0; m < k; ++m, term *= x / m) sum += term;
-  // The first term of the series of P(K, x) and its bound: x^K e^-x / K! (1 + x / (K + 1) + ...).
-  int sign = 0;  // of the gamma function, for the form that threads may share
+  // This is the first term of the series of P(K, x) and its bound: x^K e^-x / K! (1 + x / (K + 1) + ...).
+  int sign = 0;  // of the gamma function, which the thread-safe lgamma_r returns
   const double first = std::exp(k * std::log(x) - x - ::lgamma_r(k + 1.0, &sign));
   const bool agrees = std::fabs((1 - sum) / *exact - 1) < 1e-6;
   const bool bounded = *exact >= first * (1 - 1e-12) && *exact <= first / (1 - x / (k + 1)) * (1 + 1e-12);

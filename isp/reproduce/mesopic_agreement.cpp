@@ -42,7 +42,7 @@ std::vector<NamedSpectrum> patch_alone() {
   return out;
 }
 
-/// The patch by all models of the pairs.
+/// Computes the appearance of the patch by all models of the pairs.
 Result<std::vector<AppearanceTracks>> patch_tracks(std::span<const PublishedPair> pairs, const TrackReading& reading,
                                                    std::optional<double> gamma_fixed) {
   std::set<std::string_view> models;
@@ -68,7 +68,7 @@ const AppearanceTracks& tracks_of(const std::vector<AppearanceTracks>& all, std:
 
 bool has(const PublishedPair& pair, std::string_view model) { return pair.first == model || pair.second == model; }
 
-/// Why ours are others.
+/// Returns the reason why the values computed here differ.
 std::string note_on(const Agreement& a) {
   if (has(a.pair, "cao")) {
     return "the scale of Cao's rods is not published; the weights end at 0.1 cd/m2 and are kept below, where the "
@@ -177,7 +177,7 @@ namespace {
 constexpr double fixed_gamma = 2;
 constexpr std::array<PublishedPair, 3> table_5_2{
     {{"shin", spectral_model, 17.91}, {"shin", "icam06", 10.15}, {spectral_model, "icam06", 23.24}}};
-// The same pairs of Table 5-1.
+// These are the values of Table 5-1 for the pairs of Table 5-2.
 constexpr std::array<PublishedPair, 3> adaptive_pairs{
     {{"shin", spectral_model, 9.14}, {"shin", "icam06", 10.15}, {spectral_model, "icam06", 15.78}}};
 

@@ -14,46 +14,46 @@
 
 namespace lowlux::isp {
 
-/// The spectral model's name among tracks; the others have those of appearance_models().
+/// Name of the spectral model among tracks; the others have those of appearance_models().
 inline constexpr std::string_view spectral_model = "spectral";
 
-/// The patch of the thesis' Tables 5-1 and 5-2.
+/// Name of the patch of the thesis' Tables 5-1 and 5-2.
 inline constexpr std::string_view agreement_chip = "10GY_6_10";
 
-/// All readings of what the thesis leaves open. The first is the one that plots and single figures are of: one
-/// luminance for white and adaptation, Shin's coefficients looked up with it as it stands, whites kept white. The
-/// others: a fifth of the white for adaptation, coefficients by lux, Eq. 5.1 as printed.
+/// Returns all readings of what the thesis leaves open. The first is used for plots and single values: one luminance
+/// for white and adaptation, Shin's coefficients looked up with it unconverted, whites kept white. The others vary: a
+/// fifth of the white for adaptation, coefficients by lux, Eq. 5.1 as printed.
 std::span<const TrackReading> track_readings();
 inline constexpr std::size_t readings = 8;
-inline constexpr std::size_t reading_by_lux = 2;  // the first but for the unit of Shin's coefficients
+inline constexpr std::size_t reading_by_lux = 2;  // the first except for the unit of Shin's coefficients
 
-/// A figure of the tables: mean Delta E ab between what two models show of the patch at 14 levels.
+/// A value of the tables: mean Delta E ab between two models' appearances of the patch at 14 levels.
 struct PublishedPair {
   std::string_view first, second;
   double delta_e;
 };
 
-/// One beside ours.
+/// A published value with the values computed here.
 struct Agreement {
   PublishedPair pair;
   std::array<double, readings> ours{};
   double without_lightness = 0;  // mean difference in a* and b* alone, in the first reading
 };
 
-/// Errors: those of tracks_by_colour() and tracks_by_spectrum().
+/// Computes the agreements of all pairs. Errors: those of tracks_by_colour() and tracks_by_spectrum().
 Result<std::vector<Agreement>> agreements(std::span<const PublishedPair> pairs, std::optional<double> gamma_fixed);
 
-/// The agreement of a pair that is among them, in either order.
+/// Returns the agreement of a pair that is in `all`, in either order.
 const Agreement& agreement_of(std::span<const Agreement> all, std::string_view first, std::string_view second);
 
-/// That the published figure is among those the readings span.
+/// Returns the finding that the published value is within the range of the readings.
 /// @param experiment, table  "mesopic-tracks", "Table 5-1"
 Finding figure_of(const std::string& experiment, const std::string& table, const Agreement& agreement);
 
-/// Ten chips in the chromaticity diagram by one model.
+/// Plots ten chips in the chromaticity diagram by one model.
 Plot track_plot(const std::string& id, const AppearanceTracks& tracks, const std::vector<NamedSpectrum>& chips);
 
-/// Delta E ab of the patch over luminance, of pairs of models, in the first reading.
+/// Plots Delta E ab of the patch over luminance, for pairs of models, in the first reading.
 Result<Plot> difference_plot(const std::string& id, std::span<const PublishedPair> pairs,
                              std::optional<double> gamma_fixed);
 

@@ -23,13 +23,13 @@ constexpr std::array<PublishedPair, 10> table_5_1{{{"shin", spectral_model, 9.14
                                                    {"icam06", "cao", 254.07},
                                                    {spectral_model, "cao", 254.48},
                                                    {"shin", "cao", 256.33}}};
-// Of the first six, which rise as published, three are without Khan & Pattanaik.
+// Of the first six pairs, which rise as published, three are without Khan & Pattanaik.
 constexpr std::size_t pairs_without_cao = 6, pairs_without_khan = 3;
 
 constexpr std::array<std::string_view, 10> models_of_colours{
     "shin", "icam06", "cao", "khan_pattanaik", "hunt", "kwak", "kirk_obrien", "filament", "mikamo", "wanat_mantiuk"};
 
-/// In how many readings a claim about one of them is true.
+/// Returns the number of readings in which a claim about one reading is true.
 template <class Claim>
 std::size_t readings_with(const Claim& claim) {
   std::size_t out = 0;
@@ -62,7 +62,7 @@ std::vector<Finding> order_of_agreement(std::span<const Agreement> all) {
            sorted == readings, "neighbours in that order differ by less than one pair does between readings"}};
 }
 
-/// @param why  it is no farther, or not by as much
+/// Reports whether Cao is farther than Khan & Pattanaik. @param why  reason why it is not, or not by as much
 Finding cao_is_far(std::span<const Agreement> all, std::string_view model, const std::string& why) {
   const Agreement &cao = agreement_of(all, model, "cao"), &khan = agreement_of(all, model, "khan_pattanaik");
   std::array<double, readings> ratio{};
@@ -83,7 +83,7 @@ double chroma(const Xyz& seen) {
   return std::hypot(lab.a, lab.b);
 }
 
-/// The largest share of its daylight chroma that a chip keeps at the darkest level.
+/// Returns the largest fraction of its daylight chroma that a chip keeps at the darkest level.
 double chroma_left(const AppearanceTracks& tracks) {
   double out = 0;
   for (const auto& chip : tracks.seen) out = std::max(out, chroma(chip.front()) / chroma(chip.back()));

@@ -66,7 +66,7 @@ std::string_view verdict_of(const Finding& finding) {
 }
 
 bool figures_agree(std::initializer_list<FigurePair> figures) {
-  constexpr double tolerance = 0.1;  // of the published figure
+  constexpr double tolerance = 0.1;  // relative to the published value
   return std::ranges::all_of(figures, [](const FigurePair& f) {
     return std::fabs(f.ours - f.published) <= tolerance * std::fabs(f.published);
   });

@@ -12,31 +12,31 @@
 
 namespace lowlux::isp {
 
-/// One finding, published or our own, beside what is computed here.
+/// One finding, published or this project's own, with the value computed here.
 struct Finding {
-  /// Whether its authors published the claim, or whether it is a check of ours: of their equations, or of the sampling.
+  /// The claim is either published or a check by this project: of published equations, or of the sampling.
   enum class Kind : std::uint8_t { published, check };
 
   std::string id;         // EXPERIMENT/what
   std::string claim;      // what was published or is checked, with its figure, equation or section
-  std::string published;  // the figure in it, of a check what is expected; "-" where the claim has none
+  std::string published;  // the claim's value, for a check the expected one; "-" where the claim has none
   std::string ours;       // the same quantity, computed
   bool holds = false;
   std::string note;  // how it was computed; why it does not hold
   Kind kind = Kind::published;
-  bool direction_only = false;  // the claim holds, and its figures are not ours
+  bool direction_only = false;  // the claim holds, but the values differ from the published ones
 };
 
-/// A published figure and the same quantity, computed.
+/// A published value and the same quantity, computed.
 struct FigurePair {
   double published;
   double ours;
 };
 
-/// Whether each of our figures is within a tenth of the published one.
+/// Returns whether each computed value is within a tenth of the published one.
 bool figures_agree(std::initializer_list<FigurePair> figures);
 
-/// What one experiment yields.
+/// Holds the results of one experiment.
 struct Outcome {
   std::vector<Finding> findings;
   std::vector<Plot> plots;
@@ -45,37 +45,37 @@ struct Outcome {
 struct RunOptions {
   std::uint64_t seed = 1;
   bool quick = false;           // fewer samples: the same findings with wider confidence intervals
-  std::string pictures_folder;  // that of testdata/pictures, for the experiments that look at pictures
+  std::string pictures_folder;  // folder of testdata/pictures, for the experiments that use images
 };
 
-/// A published experiment: its result depends on the options only. Errors: what it computes cannot be computed, the
-/// pictures it looks at are not there.
+/// A published experiment: its result depends on the options only. Errors: a quantity cannot be computed, the images it
+/// uses are missing.
 struct Experiment {
   std::string_view id;
   std::string_view title;
   Result<Outcome> (*run)(const RunOptions& options);
-  bool looks_at_pictures = false;  // those of RunOptions::pictures_folder
+  bool looks_at_pictures = false;  // uses the images of RunOptions::pictures_folder
 };
 
-/// All of them, in the order of the thesis.
+/// Returns all experiments, in the order of the thesis.
 std::span<const Experiment> experiments();
 
-/// The experiment of an id. Error: there is none; the message names near ones.
+/// Returns the experiment of an id. Error: no such experiment; the message names similar ids.
 Result<Experiment> experiment_named(std::string_view id);
 
-/// Findings as a table: finding, kind, claim, published, ours, verdict, note.
+/// Returns findings as a table: finding, kind, claim, published, ours, verdict, note.
 Table table_of(std::span<const Finding> findings);
 
-/// "published" or "check".
+/// Returns "published" or "check".
 std::string_view kind_of(const Finding& finding);
 
-/// "agrees", "same direction" (the claim holds, its figures do not) or "does not hold".
+/// Returns "agrees", "same direction" (the claim holds, its values do not) or "does not hold".
 std::string_view verdict_of(const Finding& finding);
 
-/// How many findings of a kind have each verdict: "20 agree, 10 have the same direction, 2 do not hold".
+/// Returns the number of findings of a kind with each verdict: "20 agree, 10 have the same direction, 2 do not hold".
 std::string count_of_verdicts(std::span<const Finding> findings, Finding::Kind kind);
 
-/// The experiments of the registry, one file each; the claims are in their findings.
+/// These are the experiments of the registry, one file each; the claims are in their findings.
 Result<Outcome> run_few_photons(const RunOptions& options);
 Result<Outcome> run_chromaticity_clouds(const RunOptions& options);
 Result<Outcome> run_frequency_of_seeing(const RunOptions& options);

@@ -22,7 +22,7 @@ constexpr std::array inverse_and_ours{RetargetMethod::shin, RetargetMethod::cons
 constexpr std::array<std::string_view, 3> other_judges{"wanat_mantiuk", "mikamo", "icam06"};
 constexpr std::size_t enough_pictures = 7, enough_judges = 2;
 
-// What the thesis' Table 5-6 has for seven pictures of its own, in the mean.
+// Means over seven images of the thesis' own, from its Table 5-6.
 struct PublishedMeans {
   double delta_e_94c, gamut_percent;
 };
@@ -67,7 +67,7 @@ std::vector<Finding> published_findings(const DisplayScores& at, const Retargeti
        Finding::Kind::published, !agree(by_icam06, icam)}};
 }
 
-/// In how many pictures ours beats the published inverse.
+/// Numbers of images in which this project's method is better than the published inverse.
 struct Wins {
   std::size_t delta_e = 0, gamut = 0;
 };
@@ -112,7 +112,7 @@ std::vector<Finding> our_findings(const DisplayScores& at, const RetargetingWork
       check_of("ours-gamut" + unit, "ours beats Shin's inverse in EGR at 2 cd/m2" + by, least,
                fmt::format("{} of {}, mean {} for {}", wins.gamut, ours.size(), gamut_text(ours), gamut_text(shin)),
                wins.gamut >= enough_pictures, note)};
-  if (at.units == ShinUnits::lux) return out;  // where the others were not measured
+  if (at.units == ShinUnits::lux) return out;  // the other methods are not measured in this unit
   const PictureScores& wanat = at.of(RetargetMethod::wanat);
   out.push_back(check_of("wanat", "Wanat & Mantiuk's own saturation and luminance curve is farther than Shin's inverse",
                          "farther", both(wanat), mean_delta_e(wanat) > mean_delta_e(shin),
@@ -120,7 +120,7 @@ std::vector<Finding> our_findings(const DisplayScores& at, const RetargetingWork
   return out;
 }
 
-/// Mean Delta E 94c by one judge.
+/// Mean Delta E 94c according to one judge.
 struct JudgedMeans {
   double ours = 0, inverse = 0, none = 0;
 };

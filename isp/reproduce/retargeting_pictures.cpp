@@ -16,9 +16,9 @@
 namespace lowlux::isp {
 namespace {
 
-/// sRGB's primaries, and its white as they make it.
+/// Holds sRGB's primaries, and the white that results from them.
 struct DisplaySpace {
-  Matrix3 to_xyz = rgb_to_xyz(primaries_rec709).value();  // of constants
+  Matrix3 to_xyz = rgb_to_xyz(primaries_rec709).value();  // cannot fail for constants
   Xyz white = xyz_of(to_xyz * Vector3{1, 1, 1});
 };
 

@@ -8,7 +8,7 @@
 namespace lowlux::isp {
 namespace {
 
-// Signal, dark and the variance of their sum [e-, e-^2] in each channel.
+// Holds signal, dark and the variance of their sum [e-, e-^2] in each channel.
 struct Charge {
   Vector3 signal_e;
   Vector3 total_e;

@@ -9,17 +9,17 @@
 
 namespace lowlux::isp {
 
-/// Levels F of the thesis' chapter 4; F = 1 is 100 cd/m2.
+/// These are the levels F of the thesis' chapter 4; F = 1 is 100 cd/m2.
 inline constexpr double sensor_levels[] = {1, 0.5, 0.1, 0.05, 0.01, 0.005, 0.001};
 
-/// One patch at one level: what is expected and what was sampled.
+/// Expected and sampled chromaticities of one patch at one level.
 struct PatchResult {
-  Xy truth;                                  // of the signal alone, as the camera's matrix sees it
-  ChromaticityCloud expected;                // of signal and dark together, first order; noises independent
-  std::vector<Xy> xy;                        // of the unsaturated samples that have a chromaticity
-  std::optional<ChromaticityCloud> sampled;  // of xy
+  Xy truth;                                  // chromaticity of the signal alone, by the camera's matrix
+  ChromaticityCloud expected;                // cloud of signal and dark together, first order; noises independent
+  std::vector<Xy> xy;                        // chromaticities of the unsaturated samples that have one
+  std::optional<ChromaticityCloud> sampled;  // cloud of xy
   std::optional<Xy> mean_code_xy;            // chromaticity of the mean of unsaturated codes
-  std::optional<Xy> undone_xy;               // the same, mean dark subtracted first
+  std::optional<Xy> undone_xy;               // mean_code_xy with the mean dark subtracted first
   int unsaturated = 0;
   int saturated = 0;
 };
@@ -35,15 +35,15 @@ struct Scenario {
   int samples = 0;
 };
 
-/// All levels of a scenario. Errors: an expectation has no chromaticity.
+/// Runs all levels of a scenario. Errors: an expectation has no chromaticity.
 Result<std::vector<LevelResult>> run_scenario(const ThesisCamera& camera, const std::vector<Patch>& patches,
                                               const Scenario& scenario, std::uint64_t seed);
 
-/// Worst distance of a mean code's chromaticity from its expectation in standard errors, over all levels and patches
-/// without saturation.
+/// Returns the largest distance of a mean code's chromaticity from its expectation in standard errors, over all levels
+/// and patches without saturation.
 double worst_mean_error(const std::vector<LevelResult>& levels);
 
-/// Mean over the patches.
+/// Returns the mean of a quantity over the patches.
 template <class Quantity>
 double mean_over(const LevelResult& level, const Quantity& quantity) {
   double sum = 0;

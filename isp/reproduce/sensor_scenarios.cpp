@@ -19,8 +19,8 @@ constexpr double half = 0.5;
 
 struct Scenarios {
   std::vector<LevelResult> photons;  // I: photon noise alone
-  std::vector<LevelResult> dark;     // II: and dark current
-  std::vector<LevelResult> all;      // III: everything, codes cut off below (Eq. 4.10)
+  std::vector<LevelResult> dark;     // II: with dark current
+  std::vector<LevelResult> all;      // III: all noises, codes rounded down (Eq. 4.10)
   std::vector<LevelResult> nearest;  // III with codes rounded to the nearest
 };
 
@@ -48,7 +48,8 @@ double jnd_of_dark(const LevelResult& level) {
   return mean_over(level, [](const PatchResult& p) { return noticeable_differences(p.truth, p.expected.mean); });
 }
 
-// How far the mean of the samples' chromaticities is from the truth; photon noise alone does that by its ratio's bias.
+// Returns the distance of the mean of the samples' chromaticities from the truth; photon noise alone causes one by the
+// bias of the ratio.
 double jnd_of_mean(const LevelResult& level) {
   return mean_over(level, [](const PatchResult& p) {
     return p.sampled ? noticeable_differences(p.truth, p.sampled->mean) : std::numeric_limits<double>::infinity();
@@ -114,11 +115,11 @@ Finding means_on_line(const Scenarios& s) {
 
 struct Movement {
   double by_dark = 0;    // mean shift of the expectation
-  double by_others = 0;  // mean distance of the mean code's chromaticity from it
+  double by_others = 0;  // mean distance of the mean code's chromaticity from the expectation
   int patches = 0;
 };
 
-// Levels below 10 cd/m2, where no patch saturates.
+// Averages over levels below 10 cd/m2, where no patch saturates.
 Movement movement(const std::vector<LevelResult>& levels) {
   Movement out;
   for (const LevelResult& level : levels) {
@@ -167,7 +168,7 @@ Finding saturation(const Scenarios& s) {
           Finding::Kind::check};
 }
 
-/// Variance over mean of the electrons of one channel by the published sampling: sum x Qe^2 / sum x Qe.
+/// Returns variance over mean of the electrons of one channel by the published sampling: sum x Qe^2 / sum x Qe.
 double published_ratio(const ThesisCamera& camera, const Patch& patch, int channel) {
   const auto photons = photon_radiance(patch.radiance);
   const Spectrum& qe = camera.response.quantum_efficiency[channel];

@@ -18,14 +18,15 @@ constexpr double more = 1.1;                            // + 10 %
 
 enum class Form : std::uint8_t { consistent, as_printed };
 
-/// What is on besides photon noise, and how much of it.
+/// Amounts of the noises other than photon noise.
 struct Noise {
-  double dark = 0;  // times the sensor's
+  double dark = 0;  // factor of the sensor's
   double read = 0;
   bool quantisation = false;
 };
 
-/// SNR of one channel with a signal [e-]. As printed, Eq. 4.12 adds the shot term in volts to squares of volts:
+/// Returns the SNR of one channel with a signal [e-]. As printed, Eq. 4.12 adds the shot term in volts to squares of
+/// volts:
 ///     Var [DN^2] = G^2 (G_Ve (mu + d) + (G_Ve sigma_r)^2) + 1/12
 double snr_of(Form form, const ThesisCamera& camera, int channel, double signal_e, const Noise& noise) {
   SensorModel sensor = camera.sensor;
@@ -42,8 +43,8 @@ double snr_of(Form form, const ThesisCamera& camera, int channel, double signal_
   return signal_dn * signal_dn / variance;
 }
 
-/// Relative loss of SNR from one noise to another, least and most over the published levels and patches, in the channel
-/// with the most signal of each patch.
+/// Minimum and maximum relative loss of SNR from one noise to another, over the published levels and patches, in the
+/// channel with the most signal of each patch.
 struct Range {
   double least = 1;
   double most = 0;
@@ -84,8 +85,8 @@ std::vector<Finding> read_findings(const ThesisCamera& camera, const std::vector
   return {{"snr-sensitivity/read-as-printed", claim + "Eq. 4.12 as printed", "below 1 %", percent(printed),
            printed.most < 0.01, "photon and read noise only; 10 to 0.1 cd/m2, patches 1, 3, 6, 8, 10, 12"},
           {"snr-sensitivity/read", claim + "consistent units", "below 1 %", percent(alone), alone.most < 0.01,
-           "as printed, the shot term is in volts beside read noise in volts squared, which makes it 5000 times too "
-           "large; in consistent units 16 e-^2 of read noise stand beside few electrons of signal"},
+           "as printed, the shot term is in volts next to read noise in volts squared, which makes it 5000 times too "
+           "large; in consistent units 16 e-^2 of read noise are compared with few electrons of signal"},
           {"snr-sensitivity/read-all-on", claim + "consistent units, dark current on", "below 1 %", percent(together),
            together.most < 0.01, "dark current's shot noise, about 215 e-^2, covers part of the read noise"}};
 }
@@ -106,18 +107,18 @@ std::vector<Finding> dark_findings(const ThesisCamera& camera, const std::vector
 Finding quantisation(const ThesisCamera& camera, const std::vector<Patch>& patches) {
   const Range printed = loss(Form::as_printed, camera, patches, unquantised, all);
   const Range ours = loss(Form::consistent, camera, patches, unquantised, all);
-  return {
-      "snr-sensitivity/quantisation",
-      "what quantisation to 8 bits costs of the SNR, 10 to 0.1 cd/m2",
-      percent(printed) + " by Eq. 4.12 as printed",
-      percent(ours),
-      ours.most < 2 * printed.most,
-      "one code is 35 e-, so 1/12 DN^2 are 104 e-^2 beside 215 e-^2 of dark noise; as printed, that dark noise is 5000 "
-      "times as much",
-      Finding::Kind::check};
+  return {"snr-sensitivity/quantisation",
+          "what quantisation to 8 bits costs of the SNR, 10 to 0.1 cd/m2",
+          percent(printed) + " by Eq. 4.12 as printed",
+          percent(ours),
+          ours.most < 2 * printed.most,
+          "one code is 35 e-, so 1/12 DN^2 are 104 e-^2 compared with 215 e-^2 of dark noise; as printed, that dark "
+          "noise is 5000 "
+          "times as much",
+          Finding::Kind::check};
 }
 
-// "about 9 e- at 0.1 cd/m2", of a perfect white: what the scale of Qe gives.
+// Checks "about 9 e- at 0.1 cd/m2" for a perfect white, which follows from the scale of Qe.
 Finding signal(const ThesisCamera& camera) {
   const double white_e = 0.001 * std::ranges::max(signal_charge_e(camera, *at_full_level(*light_named("D65"))));
   return {"snr-sensitivity/signal",

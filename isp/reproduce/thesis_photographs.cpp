@@ -27,7 +27,7 @@ capture::ReadoutParameters readout_of(const SensorModel& sensor, const Noises& n
   return out;
 }
 
-// The published way: photons on the pixel are drawn for each wavelength, and each counts Qe electrons in each channel.
+// Samples as published: photons on the pixel are drawn for each wavelength; each counts Qe electrons in each channel.
 std::array<Row, 3> weighted_photons(const ThesisCamera& camera, const Patch& patch, double level,
                                     const PatchPlace& place, int samples) {
   const auto photons = photon_radiance(patch.radiance);
@@ -52,8 +52,8 @@ std::array<Row, 3> weighted_photons(const ThesisCamera& camera, const Patch& pat
   return out;
 }
 
-/// The smallest code of a full pixel: five deviations of read noise below the full well. The code alone cannot tell a
-/// full pixel from one that is nearly full, so those are given up with it.
+/// Returns the smallest code of a full pixel: five deviations of read noise below the full well. The code alone cannot
+/// distinguish a full pixel from one that is nearly full, so the latter are discarded too.
 double saturation_dn(const SensorModel& sensor) {
   const double full_e = sensor.full_well_e - 5 * sensor.read_noise_e;
   return std::min(std::floor(sensor.black_level_dn + sensor.system_gain_dn_per_e * full_e), sensor.white_level_dn);

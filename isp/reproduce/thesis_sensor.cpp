@@ -17,7 +17,7 @@
 namespace lowlux::isp {
 namespace {
 
-// Codes per radiance and nanometre: what Eq. 4.14 calls C.
+// Returns codes per radiance and nanometre, called C in Eq. 4.14.
 std::array<Spectrum, 3> energy_response(const ThesisCamera& camera) {
   std::array<Spectrum, 3> out = camera.response.quantum_efficiency;
   const double dn_per_photon = camera.exposure_s * camera.response.etendue_m2_sr * camera.sensor.system_gain_dn_per_e;

@@ -6,7 +6,7 @@
 namespace lowlux::reference {
 namespace {
 
-/// Node below a place on an axis of `cells`, and the weights of it and the next.
+/// Holds the node below a position on an axis of `cells`, and the weights of it and the next.
 struct Step {
   int node;
   double weight[2];
@@ -18,7 +18,7 @@ Step step_of(double place, int cells) {
   return {node, {1 - (inside - node), inside - node}};
 }
 
-/// Place of a sum among the levels: octaves above the lowest, linear within each.
+/// Returns the position of a sum among the levels: octaves above the lowest, linear within each.
 double level_of(const isp::ColourTable& table, double sum) {
   const int octave = std::ilogb(sum);
   return (octave - table.first_level_log2 + std::ldexp(sum, -octave) - 1) * table.levels_per_octave;

@@ -5,7 +5,7 @@
 
 namespace lowlux::reference {
 
-/// One pixel through a ColourTable, in double.
+/// Passes one pixel through a ColourTable, in double.
 Vector3 through_colour_table(const isp::ColourTable& table, const Vector3& rgb);
 
 }  // namespace lowlux::reference

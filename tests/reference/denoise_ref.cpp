@@ -64,7 +64,7 @@ struct Frame {
            (std::max(sum / 81, 0.3 * dark_e[k] + 0.02) + variance_e2[k]);
   }
 
-  /// Chroma start level at each tile.
+  /// Returns the chroma start level at each tile.
   Image starts() const {
     Image out(tiles_of(columns), tiles_of(rows));
     Image sum = out, count = out;
@@ -88,7 +88,7 @@ struct Frame {
   }
 };
 
-/// Share of coarser levels in the chroma of `level`, at the place of cell (x, y) of level `grid`.
+/// Returns the fraction of coarser levels in the chroma of `level`, at the position of cell (x, y) of level `grid`.
 double coarser_share(const Image& starts, int level, int grid, int x, int y) {
   const auto place = [grid](int i, int tiles) {
     return std::clamp((i + 0.5) * (1 << grid) / tile - 0.5, 0.0, static_cast<double>(tiles - 1));
@@ -131,7 +131,7 @@ Four decorrelated(const Frame& frame, Four& variance) {
   return out;
 }
 
-/// Levels from coarse to fine, in place: what was shrunk becomes the picture at that level.
+/// Recomposes levels from coarse to fine, in place: what was shrunk becomes the image at that level.
 void recompose(std::vector<Four>& levels, const Image& starts) {
   for (int l = static_cast<int>(levels.size()) - 2; l >= 0; --l) {
     for (int p = 0; p < 4; ++p) {
@@ -150,7 +150,7 @@ void recompose(std::vector<Four>& levels, const Image& starts) {
   }
 }
 
-/// Residual variances added up over levels, at the finest.
+/// Returns residual variances summed over levels, at the finest.
 Four total_residual(const std::vector<Four>& levels, const Image& starts) {
   Four total;
   for (int l = static_cast<int>(levels.size()) - 1; l >= 0; --l) {
@@ -172,7 +172,7 @@ Four total_residual(const std::vector<Four>& levels, const Image& starts) {
   return total;
 }
 
-/// Saturated cells have the chroma of their surroundings.
+/// Gives saturated cells the chroma of their surroundings.
 void fill_saturated(const Frame& frame, Four& x) {
   Image seen(x[0].width, x[0].height);
   for (int cy = 0; cy < seen.height; ++cy) {
@@ -185,7 +185,7 @@ void fill_saturated(const Frame& frame, Four& x) {
   for (int p = 1; p < 4; ++p) fill_unseen(seen, x[p], frame.levels);
 }
 
-/// Pyramid of the planes, and of their variances.
+/// Adds the coarser levels to the pyramids of the planes, and of their variances.
 void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, const Frame& frame) {
   const int levels = frame.levels;
   const auto& scale = frame.options.variance_scale;
@@ -203,10 +203,10 @@ void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, const Frame&
   }
 }
 
-/// Harmonic mean of two steps of one sign, else 0.
+/// Returns the harmonic mean of two steps of one sign, else 0.
 double slope(double before, double after) { return before * after > 0 ? 2 * before * after / (before + after) : 0; }
 
-/// Adds `sign` times what the slopes of the luma, over the cells of the frame, make of C2 and C3; mirrored beyond.
+/// Adds to C2 and C3 `sign` times the effect of the luma's slopes, over the cells of the frame; mirrored beyond.
 void add_slopes(const Frame& frame, double sign, const Image& luma, Four& planes) {
   const double sx = red_column(frame.raw.phase) == 0 ? -1 : 1, sy = red_row(frame.raw.phase) == 0 ? -1 : 1;
   const auto at = [&](int x, int y) {

@@ -48,7 +48,7 @@ Image binomial3(const Image& in) {
 
 namespace {
 
-/// What is not seen: linear between the cells before and after it, or that of the only one.
+/// Interpolates values that are not seen: linear between the cells before and after, or that of the only one.
 std::vector<double> interpolated(std::vector<double> value, const std::vector<bool>& seen) {
   const int n = static_cast<int>(value.size());
   const std::vector<double> in = value;
@@ -149,7 +149,7 @@ Block inverse_dct(const Block& in) {
   return out;
 }
 
-/// Gains of the coefficients of plane p, 0 or 1 (section "pass 1" of denoise/README.md).
+/// Returns the gains of the coefficients of plane p, 0 or 1 (section "pass 1" of denoise/README.md).
 Block hard_gains(int p, const std::array<Block, 4>& f, const std::array<double, 4>& variance) {
   Block gain{};
   for (int v = 0; v < block; ++v) {

@@ -23,8 +23,8 @@ Image down2(const Image& in);      // 2x2 means
 Image up2(const Image& in);        // bilinear, edges repeated
 Image binomial3(const Image& in);  // 3x3 weights 1 2 1, edges repeated
 
-/// Gives one plane, where nothing is seen (0), the mean of the smallest square of 2, 4 ... cells of which something is,
-/// bilinear between squares; on the last of `levels` linear along rows, then from row to row.
+/// Gives one plane, where `seen` is 0, the mean of the smallest square of 2, 4 ... cells of which any is seen, bilinear
+/// between squares; on the last of `levels` linear along rows, then from row to row.
 void fill_unseen(const Image& seen, Image& value, int levels);
 
 struct Shrunk {
@@ -32,7 +32,7 @@ struct Shrunk {
   Four residual;  // variance
 };
 
-/// One level of one pass: every block, `stride` apart. `pilot` is null in the first pass.
+/// Computes one level of one pass: every block, `stride` apart. `pilot` is null in the first pass.
 Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride, int level, int levels);
 
 }  // namespace lowlux::reference::denoising

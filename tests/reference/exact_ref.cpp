@@ -22,7 +22,7 @@ Exact mes2_h(const Exact& m, double photopic, double scotopic) {
 
 Exact degrees(const Exact& angle) { return angle * boost::math::constants::pi<Exact>() / 180; }
 
-/// In 0..360; 0 for grey.
+/// Returns the hue angle in 0..360; 0 for grey.
 Exact hue(const Exact& a, const Exact& b) {
   if (a == 0 && b == 0) return 0;
   const Exact h = atan2(b, a) / boost::math::constants::pi<Exact>() * 180;

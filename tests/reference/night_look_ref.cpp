@@ -52,7 +52,7 @@ Field blurred(const Field& in, double std_cells) {
   return out;
 }
 
-// The field of adaptation: 1 degree around each place, and a share of the mean of the whole.
+// Returns the field of adaptation: 1 degree around each position, and a fraction of the mean of the entire image.
 Field adapted(const Field& light, const isp::NightLook& look) {
   std::vector<Field> level{light};
   double std_cells = isp::adaptation_field_std_deg * look.pixels_per_degree / LookGrid::cell;
@@ -69,7 +69,7 @@ Field adapted(const Field& light, const isp::NightLook& look) {
   return field;
 }
 
-// What is seen, blurred as far as each cell asks [px^2] beyond the cells' own.
+// Returns the perceived light, blurred as far as each cell requires [px^2] beyond the cells' own blur.
 Field softened(const Field& seen, const Field& variance_px2) {
   const double widest = *std::ranges::max_element(variance_px2.value);
   std::vector<Field> light{seen}, wanted{variance_px2};

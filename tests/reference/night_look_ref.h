@@ -6,10 +6,11 @@
 #include "isp/base/image.h"
 #include "isp/render/night/night_look.h"
 
-/// What isp/render/night/night_look.h promises, in double and without tables: CIE 191 solved for every cell.
+/// These functions compute what isp/render/night/night_look.h promises, in double and without tables: CIE 191 solved
+/// for every cell.
 namespace lowlux::reference {
 
-/// A plane in double, row by row; places beyond its ends count as the nearest inside.
+/// Holds a plane in double, row by row; positions beyond its ends count as the nearest inside.
 struct Field {
   int width = 0;
   int height = 0;
@@ -20,11 +21,12 @@ struct Field {
   double clamped(int x, int y) const;
 };
 
-/// The five parts of LookGrid. Without glare and without a limit of noise.
+/// Returns the five parts of LookGrid, without glare and without a limit of noise.
 std::vector<Field> night_look(const RgbView<const float>& camera, const std::array<float, 9>& matrix, float clip,
                               const isp::NightLook& look);
 
-/// The parts in float, as LookGrid has them. @param memory  keeps them
+/// Returns the parts in float, as LookGrid has them.
+/// @param memory  keeps them
 LookGrid look_grid(const std::vector<Field>& parts, const isp::NightLook& look, std::vector<Plane<float>>& memory);
 
 }  // namespace lowlux::reference

@@ -27,7 +27,7 @@ Patch patch_at(const Image& in, Place at) {
   return out;
 }
 
-/// Mean over the 2x2 cells, on the even lattice, that hold the middle of the patch.
+/// Returns the mean over the 2x2 cells, on the even lattice, that hold the middle of the patch.
 double variance_at(const Image& in, Place at) {
   double sum = 0;
   for (const int y : {at.y + 1, at.y + 2}) {
@@ -38,7 +38,7 @@ double variance_at(const Image& in, Place at) {
   return sum;
 }
 
-/// The patch itself and the nearest others, by squared distance of the pilot over the noise's variance.
+/// Returns the patch itself and the nearest others, by squared distance of the pilot over the noise's variance.
 std::vector<Place> nearest(const Four& pilot, const Four& variance, Place own) {
   std::array<double, 4> v{};
   for (int p = 0; p < 4; ++p) v[p] = variance_at(variance[p], own);
@@ -61,7 +61,7 @@ std::vector<Place> nearest(const Four& pilot, const Four& variance, Place own) {
   return out;
 }
 
-/// Inverse of a symmetric positive matrix, by its Cholesky factor.
+/// Returns the inverse of a symmetric positive matrix, by its Cholesky factor.
 Matrix inverse(const Matrix& m) {
   Matrix factor{}, out{};
   for (int i = 0; i < dims; ++i) {
@@ -95,7 +95,7 @@ Patch mean_of(const std::vector<Patch>& patches) {
   return mean;
 }
 
-/// C (C + V)^-1, C the covariance of the patches.
+/// Returns C (C + V)^-1, C the covariance of the patches.
 Matrix filter_of(const std::vector<Patch>& patches, double& variance) {
   const Patch mean = mean_of(patches);
   Matrix c{};
@@ -161,7 +161,8 @@ void add_group(const Four& x, const Four& variance, const Four& pilot, int p, co
   }
 }
 
-/// Whether chroma starts on this level or a finer one within two tiles of the patch: elsewhere nobody sees it.
+/// Returns all_planes where chroma starts on this level or a finer one within two tiles of the patch; elsewhere luma,
+/// because chroma is not visible there.
 FoundBy found_by(const Image& starts, int level, Place at) {
   const auto tile = [level](int cell, int tiles) { return denoise::tile_of(cell << level, tiles); };
   for (int y = tile(at.y, starts.height) - 2; y <= tile(at.y + side - 1, starts.height) + 2; ++y) {

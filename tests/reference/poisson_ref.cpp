@@ -12,7 +12,7 @@ long double probability(long double k, long double mean) {
   return mean == 0 ? (k == 0 ? 1.0L : 0.0L) : std::exp(k * std::log(mean) - mean - std::lgamma(k + 1));
 }
 
-/// F(k) = P(k) (1 + k/mean + k (k-1)/mean^2 + ...): all terms are positive, none cancels.
+/// Returns F(k) = P(k) (1 + k/mean + k (k-1)/mean^2 + ...): all terms are positive, none cancels.
 long double lower_tail(long double k, long double mean) {
   if (k < 0) return 0;
   const long double per_mean = 1 / mean;
@@ -24,7 +24,8 @@ long double lower_tail(long double k, long double mean) {
   return probability(k, mean) * sum;
 }
 
-/// 1 - F(k) = P(k+1) (1 + mean/(k+2) + mean^2/((k+2)(k+3)) + ...), which keeps its digits where F is close to 1.
+/// Returns 1 - F(k) = P(k+1) (1 + mean/(k+2) + mean^2/((k+2)(k+3)) + ...), which keeps its digits where F is close to
+/// 1.
 long double upper_tail(long double k, long double mean) {
   long double term = 1, sum = 0;
   for (long double j = k + 2; j <= mean || term > 1e-20L * sum; ++j) {

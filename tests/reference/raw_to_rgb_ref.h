@@ -8,44 +8,45 @@
 #include "isp/base/tone_table.h"
 #include "isp/raw/kernel/raw_to_rgb.h"
 
-/// What isp/raw/kernel/raw_to_rgb.h promises, one pixel at a time, in double, written to be read against its sources.
+/// These functions compute what isp/raw/kernel/raw_to_rgb.h promises, one pixel at a time, in double, written to be
+/// read against its sources.
 namespace lowlux::reference {
 
 using Rgb = std::array<double, 3>;
 
-/// A mosaic after black and gain, row by row.
+/// Holds a mosaic after black and gain, row by row.
 struct LinearisedMosaic {
   int width = 0;
   int height = 0;
   BayerPhase phase = BayerPhase::rggb;
   std::vector<double> value;
 
-  /// The value at any column and row, borders mirrored without repeating the edge: -1 is 1, n is n - 2.
+  /// Returns the value at any column and row, borders mirrored without repeating the edge: -1 is 1, n is n - 2.
   double at(int x, int y) const;
 };
 
 LinearisedMosaic linearised(const isp::DnMosaic& in);
 LinearisedMosaic linearised(const isp::SignedMosaic& in);
 
-/// Camera RGB at one site: Malvar, He, Cutler, ICASSP 2004, figure 2.
+/// Returns camera RGB at one site: Malvar, He, Cutler, ICASSP 2004, figure 2.
 Rgb malvar(const LinearisedMosaic& mosaic, int x, int y);
 
-/// Camera RGB of one pixel of planes, gains applied.
+/// Returns camera RGB of one pixel of planes, gains applied.
 Rgb camera_rgb(const isp::CameraPlanes& in, int x, int y);
 
-/// LookGrid at pixel (x, y).
+/// Applies LookGrid at pixel (x, y).
 Rgb seen(const Rgb& v, const LookGrid& look, int x, int y);
 
-/// min(c, clip), matrix, and the move into the gamut where it is asked for.
+/// Applies min(c, clip), matrix, and the move into the gamut where it is requested.
 Rgb transformed(const Rgb& camera, const isp::RgbTransform& transform);
 
-/// Along the line to the neutral of equal luminance until all channels are in 0..1.
+/// Moves a colour along the line to the neutral of equal luminance until all channels are in 0..1.
 Rgb moved_into_gamut(const Rgb& v, const std::array<float, 3>& luminance);
 
-/// IEC 61966-2-1 transfer function of v in 0..1; values outside are clamped first.
+/// Returns the IEC 61966-2-1 transfer function of v in 0..1; values outside are clamped first.
 double srgb_encoded(double v);
 
-/// srgb_encoded as a table.
+/// Returns srgb_encoded as a table.
 ToneTable srgb_tone_table();
 
 }  // namespace lowlux::reference

@@ -6,7 +6,7 @@
 
 namespace lowlux::reference {
 
-/// One pixel of read_out_row in double, draws included: those of poisson_ref.h.
+/// Holds the charge of one pixel for read_out(): read_out_row in double, draws included, those of poisson_ref.h.
 struct PixelCharge {
   float mean_e = 0;
   float steady_e = 0;
@@ -15,7 +15,7 @@ struct PixelCharge {
 
 struct PixelReadout {
   double dn;         // before it is quantised and clipped
-  double result_dn;  // after
+  double result_dn;  // after it is quantised and clipped
   double float_dn;   // how far float arithmetic may be from dn
 };
 

@@ -19,7 +19,7 @@ bool above(double x, double mean, double variance, double z, double few) {
 
 }  // namespace
 
-/// A frame and its noise by colour.
+/// Holds a frame and its noise by colour.
 struct TemporalMean::Now {
   const denoise::RawElectronsView& raw;
   const denoise::RawNoise& noise;

@@ -5,20 +5,20 @@
 
 namespace lowlux::reference {
 
-/// What denoise::TemporalMean does, in double, one site at a time.
+/// Computes what denoise::TemporalMean does, in double, one site at a time.
 class TemporalMean {
  public:
   void reset() { blocks_ = Plane<Block>(); }
   double run(const denoise::RawElectronsView& raw, const denoise::RawNoise& noise, double light,
              const denoise::TemporalOptions& options);
 
-  Plane<double> mean_e;          // with dark charge
+  Plane<double> mean_e;          // dark charge included
   Plane<double> variance_share;  // of each 2x2 cell
 
  private:
   struct Block {
     double share = 1;
-    int level = 2;  // 2 moved, 1 if one beside it has
+    int level = 2;  // 2: moved; 1: moved if a neighbour has
   };
   struct Now;
   void rescale(const Now& now, double light, int x, int y);

@@ -8,12 +8,12 @@ struct BitPlace {
   unsigned bit;  // 0 is the least significant
 };
 
-/// Of one bit in a run of bits that begins with the least significant of each byte.
+/// Returns the position of one bit in a run of bits that begins with the least significant of each byte.
 BitPlace in_run(std::size_t first_byte, std::size_t position) {
   return {first_byte + position / 8, static_cast<unsigned>(position % 8)};
 }
 
-/// Where bit `bit` of column x lies.
+/// Returns where bit `bit` of column x lies.
 BitPlace place_of(const RawFormat& format, std::size_t x, unsigned bit) {
   const auto bits = static_cast<unsigned>(format.bits);
   switch (format.packing) {

@@ -10,9 +10,9 @@
 namespace lowlux::test {
 namespace {
 
-constexpr double patch_width = 0.86;  // of a cell
+constexpr double patch_width = 0.86;  // fraction of a cell
 
-/// A plane's (u, v) to the frame, both ways.
+/// Maps a plane's (u, v) to the frame, and back.
 struct Projection {
   Matrix3 to_frame;
   Matrix3 to_plane;
@@ -34,7 +34,7 @@ std::array<double, 2> project(const Matrix3& m, double x, double y) {
   return {p[0] / p[2], p[1] / p[2]};
 }
 
-/// Camera RGB at a point of the plane; nullopt beside the chart.
+/// Returns the camera RGB at a point of the plane; nullopt outside the chart.
 std::optional<Vector3> colour_of(double u, double v, const std::array<Vector3, 24>& camera_rgb) {
   constexpr double border = 0.25;
   if (u < -border || v < -border || u > 6 + border || v > 4 + border) return std::nullopt;

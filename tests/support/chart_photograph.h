@@ -8,7 +8,7 @@
 
 namespace lowlux::test {
 
-/// How a ColorChecker lies in a raw frame, and how it was exposed. Lengths in raw pixels.
+/// Describes how a ColorChecker lies in a raw frame, and how it was exposed. Lengths are in raw pixels.
 struct ChartPhotograph {
   int width = 1000;
   int height = 760;
@@ -29,14 +29,14 @@ struct ChartPhotograph {
 inline constexpr double photograph_black_dn = 256;
 inline constexpr double photograph_white_dn = 16383;
 
-/// The frame's point where the chart's plane has (u, v): cell (i, j) spans i..i+1, j..j+1.
+/// Returns the frame's point where the chart's plane has (u, v): cell (i, j) spans i..i+1, j..j+1.
 std::array<double, 2> chart_point(const ChartPhotograph& photograph, double u, double v);
 
-/// A frame (RGGB, 14 bits, black tagged) of patches of these camera colours, 1 the perfect diffuser's largest channel,
-/// in a black frame on a grey wall.
+/// Returns a frame (RGGB, 14 bits, black tagged) of patches of these camera colours, 1 the perfect diffuser's largest
+/// channel, in a black frame on a grey wall.
 RawFrame photograph_patches(const ChartPhotograph& photograph, const std::array<Vector3, 24>& camera_rgb);
 
-/// Another chart in a frame that photograph_patches has made.
+/// Adds another chart to a frame that photograph_patches has made.
 void add_patches(const ChartPhotograph& photograph, const std::array<Vector3, 24>& camera_rgb, RawFrame& frame);
 
 }  // namespace lowlux::test

@@ -11,8 +11,8 @@
 
 namespace lowlux::test {
 
-/// While it lives, the C library writes and reads numbers with a decimal comma, as in a program under German settings.
-/// The locale is made here: machines for tests have none.
+/// Makes the C library write and read numbers with a decimal comma, for the lifetime of the object, as in a program
+/// under German settings. The locale is made here: machines for tests have none.
 class CommaLocale {
  public:
   CommaLocale() {

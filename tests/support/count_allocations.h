@@ -7,15 +7,15 @@
 #include <cstdlib>
 #include <new>
 
-/// Counts what a program allocates, and the bytes it holds at once. To be included by one file of it: operator new can
-/// be replaced once.
+/// These functions count what a program allocates, and the bytes it holds at once. One file of the program includes
+/// this header: operator new can be replaced once.
 namespace lowlux::test {
 
 inline std::atomic<long> allocations{0};
 inline std::atomic<long> held_bytes{0};
 inline std::atomic<long> most_held_bytes{0};  // since it was last set
 
-/// Holds a piece of memory from now on.
+/// Counts a block of memory as held from now on.
 inline void hold(void* memory) noexcept {
   const auto bytes = static_cast<long>(malloc_usable_size(memory));
   const long held = held_bytes.fetch_add(bytes) + bytes;

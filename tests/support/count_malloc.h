@@ -5,7 +5,7 @@
 #include "isp/base/memory.h"
 #include "tests/support/count_allocations.h"
 
-// What does not come by operator new is counted too, where no sanitizer has these functions.
+// Memory that operator new does not allocate is counted too, where no sanitizer has these functions.
 #if !defined(LOWLUX_SANITIZED) && defined(__GLIBC__)
 #define LOWLUX_COUNTS_MALLOC 1
 extern "C" {
@@ -21,7 +21,7 @@ void* malloc(std::size_t size) {
 void* calloc(std::size_t count, std::size_t size) {
   ++lowlux::test::allocations;
   void* const memory = __libc_calloc(count, size);
-  lowlux::test::hold(memory);  // for good: who gives it back is not asked
+  lowlux::test::hold(memory);  // for good: its release is not tracked
   return memory;
 }
 void* realloc(void* memory, std::size_t size) {

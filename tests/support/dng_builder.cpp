@@ -30,7 +30,7 @@ std::vector<std::byte> packed_rows(const DngBuilder& dng, const std::vector<std:
   return writer.out;
 }
 
-/// One tile or strip as lossless JPEG; what lies outside of the image repeats its last row and column.
+/// Encodes one tile or strip as lossless JPEG; what lies outside of the image repeats its last row and column.
 std::vector<std::byte> jpeg_part(const DngBuilder& dng, const std::vector<std::uint16_t>& pixels, int x0, int y0,
                                  int width, int height) {
   JpegSamples jpeg;
@@ -73,7 +73,7 @@ std::vector<std::vector<std::byte>> image_parts(const DngBuilder& dng) {
 
 Tag one(TagType type, double value) { return Tag::numbers(type, {value}); }
 
-/// Tags that belong beside the image data; all others go into the first directory.
+/// Returns whether a tag belongs to the image data; all others go into the first directory.
 bool belongs_to_image(std::uint16_t id) {
   constexpr std::uint16_t others[] = {322,   323,   324,   325,   33421, 33422, 50710, 50711,
                                       50712, 50713, 50714, 50715, 50716, 50717, 50718, 50719,

@@ -13,7 +13,8 @@ namespace lowlux::test {
 
 enum class DngStorage : std::uint8_t { uncompressed, lossless_jpeg, tiled_lossless_jpeg };
 
-/// Writes small DNG files for tests, honest ones and others. Not built upon a TIFF library, which would refuse to lie.
+/// Writes small DNG files for tests, valid ones and others. Not built upon a TIFF library, which would refuse the
+/// others.
 ///
 ///     DngBuilder dng;
 ///     dng.width = 27, dng.height = 25, dng.bits = 12, dng.phase = BayerPhase::gbrg;
@@ -24,20 +25,20 @@ enum class DngStorage : std::uint8_t { uncompressed, lossless_jpeg, tiled_lossle
 /// Defaults: 24 x 24 pixels, 16 bits, no compression, black 64 and white 2^bits - 1, one colour matrix (D65), a neutral
 /// of (0.5, 1, 0.6), make "Test", model "Camera".
 struct DngBuilder {
-  int width = 24, height = 24;          // LibRaw takes nothing below 22 x 22
+  int width = 24, height = 24;          // LibRaw rejects anything below 22 x 22
   int samples = 1;                      // 1: a mosaic or monochrome, 3: LinearRaw
   bool monochrome = false;              // LinearRaw with one sample
   int bits = 16;                        // below 16: packed, first bit first, rows start at bytes
   BayerPhase phase = BayerPhase::rggb;  // counted from the corner of the active area, as CFAPattern is
   std::vector<std::uint16_t> pixels;    // height x (width * samples); empty: ramp()
   DngStorage storage = DngStorage::uncompressed;
-  int jpeg_components = 2;  // that one row of a mosaic is dealt to; LinearRaw has one for each sample
+  int jpeg_components = 2;  // components that a mosaic's row is split into; LinearRaw has one for each sample
   int tile_width = 16, tile_height = 16;
   int rows_per_strip = 0;  // 0: one strip
   bool big_endian = false;
   bool raw_in_sub_ifd = false;  // a small RGB preview comes first, the raw image is its SubIFD
 
-  /// Adds a tag to, or replaces it in, the directory where DNG wants it (EXIF tags: the EXIF directory).
+  /// Adds a tag to, or replaces it in, the directory where DNG requires it (EXIF tags: the EXIF directory).
   DngBuilder& set(std::uint16_t id, Tag tag);
   /// Leaves a tag out.
   DngBuilder& remove(std::uint16_t id);
@@ -58,7 +59,7 @@ struct DngBuilder {
   std::set<std::uint16_t> removed_;
 };
 
-/// Samples that differ from their neighbours, use all bits and both ends of the range.
+/// Returns samples that differ from their neighbours, use all bits and both ends of the range.
 std::vector<std::uint16_t> ramp(const DngBuilder& dng);
 
 }  // namespace lowlux::test

@@ -10,7 +10,7 @@
 
 namespace lowlux::test {
 
-/// FNV-1a, 64 bits, over the bytes of a row. Rows are chained by handing on the hash.
+/// Returns the FNV-1a hash, 64 bits, over the bytes of a row. Rows are chained by passing the hash on.
 template <class T>
 std::uint64_t hash_of(std::span<const T> row, std::uint64_t hash = 0xcbf29ce484222325ULL) {
   for (const T& element : row) {
@@ -21,7 +21,7 @@ std::uint64_t hash_of(std::span<const T> row, std::uint64_t hash = 0xcbf29ce4842
   return hash;
 }
 
-/// Means from 1e-3 to 1e5 in no order, made without rounding: the same bits everywhere.
+/// Returns means from 1e-3 to 1e5 in no order, made without rounding: the same bits everywhere.
 inline std::vector<float> scattered_means(std::uint32_t y, std::size_t size) {
   std::vector<float> means(size);
   for (std::uint32_t i = 0; i < size; ++i) {

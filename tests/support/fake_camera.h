@@ -14,10 +14,10 @@
 
 namespace lowlux::test {
 
-/// A camera that delivers what a test has written down: frames, errors, or nothing for a while.
+/// Delivers what a test has written down, as a camera: frames, errors, or nothing for a while.
 class FakeCamera final : public capture::Camera {
  public:
-  /// nullopt: nothing comes within the time given.
+  /// Holds what the camera delivers next; nullopt: nothing comes within the time given.
   using Event = std::optional<Result<capture::CameraFrame>>;
 
   explicit FakeCamera(const capture::CameraFormat& format) : format_(format), memory_(frame_bytes(format)) {}
@@ -54,14 +54,14 @@ class FakeCamera final : public capture::Camera {
   void stop() override { ++stops; }
 
   std::vector<Event> events;
-  std::optional<Error> refusal;  // of start()
+  std::optional<Error> refusal;  // error of start()
   std::chrono::milliseconds longest_wait{0};
   int starts = 0, stops = 0, lent = 0, returned = 0, last_returned = -1;
 
  private:
   capture::CameraFormat format_;
   std::vector<std::byte> memory_;
-  std::size_t at_ = 0;  // of events
+  std::size_t at_ = 0;  // index of the next of `events`
   std::string name_ = "fake camera";
   std::vector<std::string> warnings_;
 };

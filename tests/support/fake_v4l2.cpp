@@ -10,7 +10,7 @@
 namespace lowlux::test {
 namespace {
 
-constexpr int camera = -1;  // in files_
+constexpr int camera = -1;  // value in files_
 
 }  // namespace
 
@@ -82,7 +82,7 @@ int FakeV4l2::ioctl(int file, unsigned long request, void* argument) {
 }
 
 int FakeV4l2::random_fault(unsigned long request) {
-  // Ends of lists and unknown controls come by themselves; one call in 40 fails, and of those one in eight for good.
+  // Ends of lists and unknown controls occur anyway; one call in 40 fails, and of those one in eight permanently.
   if ((*random)() % 40 != 0) return 0;
   constexpr int codes[] = {EIO, EBUSY, EINVAL, ENOMEM, EINTR, EAGAIN, EPIPE, ENODEV};
   const int code = codes[(*random)() % std::size(codes)];

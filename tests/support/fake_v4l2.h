@@ -15,9 +15,9 @@
 
 namespace lowlux::test {
 
-/// A driver of one V4L2 camera, /dev/video0, with what a test needs to make it misbehave. Time passes in it only while
-/// somebody waits. Calls that no driver would get right (closed files, foreign maps, buffers queued twice) count as
-/// `misuses`.
+/// Simulates the driver of one V4L2 camera, /dev/video0, with what a test needs to make it misbehave. Time passes in it
+/// only while a caller waits. Calls that no driver would get right (closed files, foreign maps, buffers queued twice)
+/// count as `misuses`.
 class FakeV4l2 {
  public:
   struct Fault {
@@ -43,11 +43,11 @@ class FakeV4l2 {
     std::uint32_t flags = 0x2000;  // V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC
     std::optional<std::uint32_t> bytes_used;
     std::uint32_t data_offset = 0;
-    std::optional<std::uint32_t> index;  // a lie
+    std::optional<std::uint32_t> index;  // a false index
     std::int64_t seconds = 12;
     std::int64_t microseconds = 345678;
   };
-  /// What the driver makes of a format it was asked for or has.
+  /// Holds what the driver makes of a format it was asked for or has.
   struct Layout {
     std::uint32_t fourcc = 0;
     std::uint32_t width = 0;
@@ -70,16 +70,16 @@ class FakeV4l2 {
   std::uint32_t crop_width = 0;    // 0: no selections
   std::uint32_t interval[2] = {1, 30};
   bool sets_interval = true;
-  std::optional<std::uint32_t> only_interval;  // frames a second that it keeps to
-  Layout layout;                               // in force
-  std::function<void(Layout&)> on_set_format;  // what it makes of a format it knows
+  std::optional<std::uint32_t> only_interval;  // frames per second that it keeps to
+  Layout layout;                               // the current layout
+  std::function<void(Layout&)> on_set_format;  // changes the layout of a format it knows
   std::function<void(std::uint32_t id)> on_set_control;
   std::optional<std::uint32_t> buffers_given;
   std::optional<std::uint32_t> buffer_length;
-  std::optional<std::uint32_t> length_told;  // a lie
+  std::optional<std::uint32_t> length_told;  // a false length
   int map_errno = 0;
 
-  // Faults: errno of the open or of one request; for so many calls, after so many good ones.
+  // Faults: errno of the open or of one request; for `calls` calls, after `good_before` good ones.
   int open_errno = 0;
   std::map<unsigned long, Fault> faults;
   std::mt19937* random = nullptr;  // any call may fail, in any way
@@ -87,10 +87,10 @@ class FakeV4l2 {
   bool unplugged = false;
   bool wakes_on_unplugging = true;
   int poll_errno = 0;
-  short poll_answer = 0;  // bits that come at once, whatever is waited for
+  short poll_answer = 0;  // bits that are returned at once, whatever is waited for
 
   // The stream.
-  std::deque<Frame> frames;  // to come
+  std::deque<Frame> frames;  // frames to come
   int frame_interval_ms = 10;
 
   // What was done.
@@ -137,7 +137,7 @@ class FakeV4l2 {
   int export_buffer(void* argument);
 
   bool is_multi_planar_;
-  std::map<int, int> files_;  // open ones: -1 the camera, else the buffer exported
+  std::map<int, int> files_;  // open files: -1 the camera, else the buffer exported
   int last_file_ = 2;
   std::vector<std::unique_ptr<Memory>> memory_;
   std::deque<std::uint32_t> queue_;

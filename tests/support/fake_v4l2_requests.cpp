@@ -6,7 +6,7 @@
 
 #include "tests/support/fake_v4l2.h"
 
-// What the fake driver answers to each request.
+// This file holds what the fake driver answers to each request.
 namespace lowlux::test {
 namespace {
 
@@ -14,7 +14,7 @@ void copy_name(unsigned char (&field)[32], const char* name) {
   std::memcpy(field, name, std::min(sizeof field, std::strlen(name) + 1));
 }
 
-/// What the fake camera sees: each byte tells its place and the frame.
+/// Fills a buffer with what the fake camera sees: each byte states its position and the frame.
 void fill(std::vector<std::byte>& bytes, std::uint32_t sequence) {
   for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::byte>(i * 7 + sequence);
 }
@@ -85,7 +85,7 @@ int FakeV4l2::set_format(void* argument) {
   const std::uint32_t fourcc = is_multi_planar_ ? asked.fmt.pix_mp.pixelformat : asked.fmt.pix.pixelformat;
   const auto known =
       std::find_if(formats.begin(), formats.end(), [&](const Format& one) { return one.fourcc == fourcc; });
-  const Format& format = known == formats.end() ? formats.front() : *known;  // as drivers do: another one
+  const Format& format = known == formats.end() ? formats.front() : *known;  // another one, as drivers do
   layout.fourcc = format.fourcc;
   layout.width = is_multi_planar_ ? asked.fmt.pix_mp.width : asked.fmt.pix.width;
   layout.height = is_multi_planar_ ? asked.fmt.pix_mp.height : asked.fmt.pix.height;

@@ -13,11 +13,11 @@
 
 namespace lowlux::test {
 
-/// Whether numbers below the normal range are kept, as the standard has them, or count as 0 in operands and results:
-/// many programs that run in real time switch to that, and a library gets what its caller has.
+/// States whether numbers below the normal range are kept, as the standard requires, or count as 0 in operands and
+/// results: many programs that run in real time switch to that, and a library gets what its caller has.
 enum class Denormals : std::uint8_t { kept, flushed };
 
-/// The mode of the calling thread, for the life of the object.
+/// Sets the mode of the calling thread, for the lifetime of the object.
 class DenormalsScope {
  public:
   explicit DenormalsScope(Denormals mode) : before_(control()) {
@@ -44,7 +44,7 @@ class DenormalsScope {
   std::uint64_t before_;
 };
 
-/// Another executor's threads in one mode: each of them sets it for each part of the work.
+/// Runs another executor's threads in one mode: each of them sets it for each item of the work.
 class ExecutorInMode final : public Executor {
  public:
   ExecutorInMode(Executor& threads, Denormals mode) : threads_(threads), mode_(mode) {}
@@ -70,7 +70,7 @@ class ExecutorInMode final : public Executor {
   Denormals mode_;
 };
 
-/// What `work` gives in one mode. What it is compared with is worked out outside.
+/// Returns what `work` gives in one mode. What it is compared with is computed outside of it.
 template <class Work>
 auto in_mode(Denormals mode, Work&& work) {
   const DenormalsScope scope(mode);

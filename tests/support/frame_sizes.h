@@ -10,7 +10,7 @@
 
 #include "isp/base/random/random.h"
 
-/// Frame sizes that tests go through: drawn over the whole range, and those of real cameras.
+/// These are the frame sizes that tests go through: drawn over the whole range, and those of real cameras.
 namespace lowlux::test {
 
 struct FrameSize {
@@ -23,8 +23,8 @@ struct FrameSize {
 
 inline constexpr int max_drawn_side = 20000;
 
-/// Size `index` of a sequence: one side is log-uniform in min_side..max_drawn_side, the other log-uniform from min_side
-/// up to what `max_pixels` leaves. Odd and even indices exchange width and height.
+/// Returns size `index` of a sequence: one side is log-uniform in min_side..max_drawn_side, the other log-uniform from
+/// min_side up to what `max_pixels` leaves. Odd and even indices exchange width and height.
 inline FrameSize drawn_size(std::uint64_t seed, std::uint32_t index, int min_side, std::int64_t max_pixels) {
   const PhiloxWords words = words_at({.seed = seed}, index, 0);
   const auto log_uniform = [min_side](std::uint32_t word, double largest) {
@@ -39,7 +39,7 @@ inline FrameSize drawn_size(std::uint64_t seed, std::uint32_t index, int min_sid
   return index % 2 == 0 ? FrameSize{longer, other} : FrameSize{other, longer};
 }
 
-/// How many sizes a test draws; scripts/nightly draws twenty times as many.
+/// Returns how many sizes a test draws; scripts/nightly draws twenty times as many.
 inline std::uint32_t drawn_sizes(std::uint32_t count) {
   return std::getenv("LOWLUX_NIGHTLY") == nullptr ? count : 20 * count;
 }
@@ -49,7 +49,8 @@ struct CameraSize {
   FrameSize size;
 };
 
-/// Largest images of thirty cameras and sensors with a Bayer mosaic, as their makers' specifications state them.
+/// Lists the largest images of thirty cameras and sensors with a Bayer mosaic, as their makers' specifications state
+/// them.
 inline constexpr std::array<CameraSize, 30> camera_sizes{{
     {"Nokia N900", {2592, 1968}},
     {"ZWO ASI533MC (IMX533)", {3008, 3008}},

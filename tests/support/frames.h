@@ -7,7 +7,7 @@
 
 namespace lowlux::test {
 
-/// A Bayer frame whose whole readout is active: black 0 is tagged, white 4095.
+/// Returns a Bayer frame whose entire readout is active: black 0 is tagged, white 4095.
 inline RawDn bayer_frame(int width, int height, BayerPhase phase, const std::function<int(int, int)>& dn_at) {
   RawDn raw;
   raw.dn = Plane<std::uint16_t>(width, height);
@@ -22,7 +22,7 @@ inline RawDn bayer_frame(int width, int height, BayerPhase phase, const std::fun
   return raw;
 }
 
-/// Rounded normal deviates from a fixed seed.
+/// Draws rounded normal deviates from a fixed seed.
 class NormalDn {
  public:
   explicit NormalDn(unsigned seed) : engine_(seed) {}

@@ -9,7 +9,7 @@
 
 namespace lowlux::test {
 
-/// Memory between two pages that nobody may touch: one byte too far ends the program.
+/// Owns memory between two inaccessible pages: an access one byte too far ends the program.
 class GuardedMemory {
  public:
   explicit GuardedMemory(std::size_t least_bytes) : page_(static_cast<std::size_t>(sysconf(_SC_PAGESIZE))) {
@@ -23,7 +23,7 @@ class GuardedMemory {
   GuardedMemory(const GuardedMemory&) = delete;
   GuardedMemory& operator=(const GuardedMemory&) = delete;
 
-  /// `bytes` of it, right after the page before, or right before the page after.
+  /// Returns `bytes` of the memory: first() right after the page before, last() right before the page after.
   std::span<std::byte> first(std::size_t bytes) const { return {begin_, bytes}; }
   std::span<std::byte> last(std::size_t bytes) const { return {begin_ + (size_ - bytes), bytes}; }
 

@@ -69,7 +69,7 @@ void put_headers(const JpegSamples& image, std::vector<std::byte>& out) {
   put_u16(out, 0);
 }
 
-/// One difference modulo 2^16: its category, then its bits, T.81 H.1.2.2.
+/// Writes one difference modulo 2^16: its category, then its bits, T.81 H.1.2.2.
 void put_difference(int sample, int prediction, BitWriter& bits) {
   const int difference = static_cast<std::int16_t>(static_cast<std::uint16_t>(sample - prediction));
   const int category = std::bit_width(static_cast<std::uint32_t>(std::abs(difference)));

@@ -7,7 +7,7 @@
 
 namespace lowlux::test {
 
-/// Lets vector kernels use one instruction set only, for the life of the object.
+/// Restricts vector kernels to one instruction set, for the lifetime of the object.
 class OnlyTarget {
  public:
   explicit OnlyTarget(std::int64_t target) { choose(target); }
@@ -22,8 +22,8 @@ class OnlyTarget {
   }
 };
 
-/// The processor's instruction sets that the kernels are compiled for, best first: SSSE3 and better on x86. Highway has
-/// the better one in the lower bit, and newer versions have more of them.
+/// Returns the processor's instruction sets that the kernels are compiled for, best first: SSSE3 and better on x86.
+/// Highway has the better one in the lower bit, and newer versions have more of them.
 inline std::vector<std::int64_t> kernel_targets() {
   std::vector<std::int64_t> out;
   for (std::int64_t target = 1; target <= HWY_SSSE3; target *= 2) {

@@ -9,8 +9,8 @@
 
 namespace lowlux::test {
 
-/// The most memory [bytes] that a process of its own has at a time while it does `work`, this program included. The
-/// expectations of `work` count as usual; it must not have threads to wait for.
+/// Returns the maximum memory [bytes] that a process of its own has at a time while it does `work`, this program
+/// included. The expectations of `work` count as usual; it must not have threads to wait for.
 template <class Work>
 std::int64_t peak_bytes(const Work& work) {
   const pid_t child = fork();

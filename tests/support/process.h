@@ -10,7 +10,7 @@
 
 namespace lowlux::test {
 
-/// What a finished program left behind.
+/// Holds what a finished program left behind.
 struct ProcessResult {
   int exit_code = -1;  // 128 + signal if a signal ended it
   std::string out;
@@ -18,11 +18,11 @@ struct ProcessResult {
   double peak_bytes = 0;  // largest resident memory; at least what the test had when it started the program
 };
 
-/// A program in a process group of its own, with its output captured and no standard input.
+/// Runs a program in a process group of its own, with its output captured and no standard input.
 class RunningProcess {
  public:
   explicit RunningProcess(const std::vector<std::string>& command);
-  ~RunningProcess();  // kills it
+  ~RunningProcess();  // kills the program
   RunningProcess(const RunningProcess&) = delete;
   RunningProcess& operator=(const RunningProcess&) = delete;
 
@@ -31,7 +31,7 @@ class RunningProcess {
 
  private:
   ScratchDirectory scratch_;
-  pid_t child_ = 0;  // 0 once it has ended
+  pid_t child_ = 0;  // 0 once the program has ended
 };
 
 /// Runs a program to its end.

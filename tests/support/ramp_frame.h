@@ -14,17 +14,17 @@
 #include "isp/base/random/random.h"
 #include "tests/support/frame_sizes.h"
 
-/// Frames of any size whose noise-free values are known everywhere, made fast enough for 150 megapixels: a neutral
-/// ramp.
+/// These frames of any size have noise-free values that are known everywhere, and are made fast enough for 150
+/// megapixels: a neutral ramp.
 namespace lowlux::test {
 
-/// Mean electrons of each site, and their noise.
+/// Holds the mean electrons of each site, and their noise.
 struct Ramp {
   FrameSize size;
   BayerPhase phase = BayerPhase::rggb;
   double read_noise_e = 2;
 
-  /// The sensor's answer to neutral light.
+  /// States the sensor's response to neutral light.
   static constexpr std::array<double, 3> neutral{0.5, 1, 0.625};
 
   double mean_e(int x, int y) const {
@@ -33,8 +33,8 @@ struct Ramp {
   }
   double variance_e2(double mean) const { return mean + read_noise_e * read_noise_e; }
 
-  /// Codes of gain * (mean + noise) + black, rounded; the noise is normal, from a table gone through in an order that
-  /// repeats in no row or column.
+  /// Returns codes of gain * (mean + noise) + black, rounded; the noise is normal, from a table traversed in an order
+  /// that repeats in no row or column.
   Plane<std::uint16_t> codes(double gain_dn_per_e, double black_dn, std::uint64_t seed) const {
     std::vector<float> normal(65536);
     normal_row({.seed = seed}, 0, 0, 0, normal);
@@ -55,7 +55,7 @@ struct Ramp {
 /// Expects the means of values over squares of 32 x 32 sites, colour by colour, to be those of the ramp within 6.5
 /// standard errors of the values before noise reduction: 1e-10 for one mean, of 3e5 in the largest frame.
 /// @param value_e  gives the electrons of the site at column x and row y
-/// @param added_e  error of a value that comes on top, its coding for example
+/// @param added_e  additional error of a value, from its coding for example
 template <class Value>
 void expect_means_of(const Ramp& ramp, const Value& value_e, double added_e = 0) {
   constexpr int side = 32;

@@ -6,8 +6,8 @@
 
 namespace lowlux::test {
 
-/// A frame whose samples differ from their neighbours and use both ends of the range; the whole readout is active,
-/// black 256 is tagged, white 65535; one matrix (D65) and a neutral unless it is monochrome.
+/// Returns a frame whose samples differ from their neighbours and use both ends of the range; the entire readout is
+/// active, black 256 is tagged, white 65535; one matrix (D65) and a neutral unless it is monochrome.
 inline RawFrame plain_frame(int width, int height, SensorLayout layout = SensorLayout::bayer,
                             BayerPhase phase = BayerPhase::rggb) {
   RawFrame frame;

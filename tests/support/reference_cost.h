@@ -6,9 +6,9 @@
 
 namespace lowlux::test {
 
-/// isp::reference_cost() without a pace, so that times do not depend on the machine that runs the tests: tests that
-/// compare plans by their predicted time are the same everywhere, and of small frames they say what holds for large
-/// ones that are searched whole.
+/// Returns isp::reference_cost() without a pace, so that times do not depend on the machine that runs the tests: tests
+/// that compare plans by their predicted time are the same everywhere, and for small frames they state what holds for
+/// large ones that are searched entirely.
 inline std::shared_ptr<const isp::CostModel> reference_cost() {
   static const auto model = [] {
     auto without_pace = std::make_shared<isp::CostModel>(isp::reference_cost());

@@ -10,7 +10,7 @@
 
 namespace lowlux::test {
 
-/// A directory of its own, removed with all it holds.
+/// Makes a directory of its own, removed with all its contents.
 class ScratchDirectory {
  public:
   ScratchDirectory() {

@@ -12,7 +12,8 @@
 
 namespace lowlux::test {
 
-/// Sample mean and variance with their standard errors, the variance's from the sample's fourth central moment.
+/// Holds the sample mean and variance with their standard errors, the variance's from the sample's fourth central
+/// moment.
 struct SampleMoments {
   double mean = 0, variance = 0, mean_error = 0, variance_error = 0;
 };
@@ -40,7 +41,7 @@ inline Plane<float> filled(int width, int height, float value) {
   return out;
 }
 
-/// One region, these effects.
+/// Returns a plan of one region with these effects.
 inline isp::EffectPlan plan_of(int width, int height, isp::EffectSet kept) {
   const auto blocks = [](int pixels) { return (pixels + isp::effect_block - 1) / isp::effect_block; };
   isp::EffectPlan plan;
@@ -52,7 +53,7 @@ inline isp::EffectPlan plan_of(int width, int height, isp::EffectSet kept) {
   return plan;
 }
 
-/// A frame of even light [e- per second].
+/// Describes a frame of even light [e- per second].
 struct Flat {
   int width = 512;
   int height = 256;

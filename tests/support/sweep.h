@@ -5,7 +5,7 @@
 
 namespace lowlux::test {
 
-/// first, first + step, ... up to and including last where it is met.
+/// Returns first, first + step, ... up to and including last where it is met.
 inline std::vector<double> steps(double first, double last, double step) {
   std::vector<double> values;
   const int count = static_cast<int>(std::floor((last - first) / step + 1e-9));
@@ -13,7 +13,7 @@ inline std::vector<double> steps(double first, double last, double step) {
   return values;
 }
 
-/// first, first * ratio, ... up to last.
+/// Returns first, first * ratio, ... up to last.
 inline std::vector<double> ratios(double first, double last, double ratio) {
   std::vector<double> values;
   const int count = static_cast<int>(std::floor(std::log(last / first) / std::log(ratio) + 1e-9));

@@ -11,7 +11,7 @@
 
 namespace lowlux::test {
 
-/// A sensor of 14 bits that has no effect but photon noise, quantisation and clipping, with a Nikon's filters.
+/// Returns a sensor of 14 bits that has no effect but photon noise, quantisation and clipping, with a Nikon's filters.
 inline isp::NamedSensor plain_sensor() {
   isp::NamedSensor out;
   out.model.name = "plain";
@@ -24,7 +24,7 @@ inline isp::NamedSensor plain_sensor() {
   return out;
 }
 
-/// Filled by a white of 100 cd/m2 in 1 s.
+/// Returns the response of a sensor that a white of 100 cd/m2 fills in 1 s.
 inline SpectralResponse response_of(const isp::NamedSensor& sensor) {
   return *isp::spectral_response(sensor, {2, 100.0});
 }

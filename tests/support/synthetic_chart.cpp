@@ -12,7 +12,7 @@
 namespace lowlux::test {
 namespace {
 
-/// A camera under a light: what it measures of a reflectance, largest channel of the perfect diffuser 1.
+/// Computes what a camera under a light measures of a reflectance; the largest channel of the perfect diffuser is 1.
 class Photograph {
  public:
   static Result<Photograph> of(const std::string& camera, const std::string& light_name) {

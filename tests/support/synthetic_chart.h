@@ -11,16 +11,16 @@
 
 namespace lowlux::test {
 
-/// What to photograph with what. Names are those of isp::camera_names and isp::light_named.
+/// States what is photographed with what. Names are those of isp::camera_names and isp::light_named.
 struct ChartSetup {
   std::string camera = "Nikon_D5100";
   std::string light = "D65";
-  std::vector<std::string> calibration_lights = {"D65"};  // by rising temperature, one or two
+  std::vector<std::string> calibration_lights = {"D65"};  // by ascending temperature, one or two
   bool with_forward_matrix = false;
 };
 
-/// A noise-free photograph of a ColorChecker, as colours: what the scene is, what the camera measures, and what a raw
-/// file would tell of the camera's colour.
+/// Holds a noise-free photograph of a ColorChecker, as colours: what the scene is, what the camera measures, and what a
+/// raw file would state of the camera's colour.
 struct SyntheticChart {
   static constexpr int patches = 24;
   std::array<isp::Xyz, patches> scene_xyz;  // under the light, Y = 1 for a perfect diffuser
@@ -29,15 +29,16 @@ struct SyntheticChart {
   CameraColour colour;                      // as_shot_neutral is the camera RGB of a perfect diffuser
 };
 
-/// The 24 patches from Ohta's reflectances. Camera RGB and XYZ are integrals over the light's nodes.
-/// ColorMatrix (and ForwardMatrix) come from least squares on isp::training_reflectances(), which hold no patch of a
+/// Photographs the 24 patches from Ohta's reflectances. Camera RGB and XYZ are integrals over the light's nodes.
+/// ColorMatrix (and ForwardMatrix) come from least squares on isp::training_reflectances(), which contain no patch of a
 /// chart.
 Result<SyntheticChart> photograph_chart(const ChartSetup& setup);
 
-/// Each training reflectance seen under the setup's light: for scenes that are not the chart.
+/// Photographs each training reflectance under the setup's light: for scenes that are not the chart.
 Result<std::vector<Vector3>> photograph_training_set(const ChartSetup& setup);
 
-/// All still cameras there are. (The thesis' video camera is a rough instrument: its fitted curves have flat floors.)
+/// Returns all available still cameras. (The thesis' video camera is a rough instrument: its fitted curves have flat
+/// floors.)
 std::vector<std::string> chart_cameras();
 
 }  // namespace lowlux::test

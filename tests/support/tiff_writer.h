@@ -8,7 +8,7 @@
 
 namespace lowlux::test {
 
-/// Types of tag values, TIFF 6.0 section 2.
+/// Lists the types of tag values, TIFF 6.0 section 2.
 enum class TagType : std::uint16_t {
   byte = 1,
   ascii,
@@ -24,8 +24,8 @@ enum class TagType : std::uint16_t {
   f64
 };
 
-/// One tag: its values as whole numbers (or n/d pairs, or floating point). Whatever the type says is written, so that
-/// a test can say the impossible.
+/// Holds one tag: its values as whole numbers (or n/d pairs, or floating point). Whatever the type states is written,
+/// so that a test can state the impossible.
 struct Tag {
   TagType type = TagType::u16;
   std::vector<std::pair<double, double>> values;  // the second number is used by the rational types
@@ -39,7 +39,7 @@ struct Tag {
 
 using TagDirectory = std::map<std::uint16_t, Tag>;
 
-/// Bytes in a stated order.
+/// Writes bytes in a stated order.
 class ByteWriter {
  public:
   explicit ByteWriter(bool big_endian) : big_endian_(big_endian) {}
@@ -61,7 +61,7 @@ class ByteWriter {
 /// Writes a directory that begins at byte `offset`, with its longer values behind it.
 std::vector<std::byte> encode_directory(const TagDirectory& directory, std::size_t offset, bool big_endian);
 
-/// Big-endian numbers for opcode lists.
+/// Appends a big-endian number, for opcode lists.
 void append_u32(std::vector<std::byte>& out, std::uint32_t value);
 void append_f32(std::vector<std::byte>& out, float value);
 void append_f64(std::vector<std::byte>& out, double value);

@@ -1,7 +1,7 @@
-// Raw frames of libcamera's first camera through lowlux's stage, by libcamera's public functions alone: what an
-// application does that wants its own pictures of a raw stream.
+// Processes raw frames of libcamera's first camera by lowlux's stage, with libcamera's public functions alone: an
+// example for applications that develop a raw stream themselves.
 //   lowlux_libcamera_app [FRAMES [PICTURE.ppm]]      30 frames; the last one is written
-// One text serves libcamera 0.0.3 to 0.7. Not every camera offers a raw stream.
+// The same source builds with libcamera 0.0.3 to 0.7. Not every camera offers a raw stream.
 #include <libcamera/camera.h>
 #include <libcamera/camera_manager.h>
 #include <libcamera/control_ids.h>
@@ -26,7 +26,7 @@ namespace {
 
 using StagePtr = std::unique_ptr<lowlux_stage, decltype(&lowlux_stage_release)>;
 
-/// Requests that libcamera's thread has completed, for ours.
+/// Queues the requests that libcamera's thread has completed, for the application's thread.
 class Completed {
  public:
   void add(libcamera::Request* request) {
@@ -34,7 +34,7 @@ class Completed {
     requests_.push_back(request);
     added_.notify_one();
   }
-  /// Null when none comes for five seconds.
+  /// Returns the next request; null if none arrives for five seconds.
   libcamera::Request* next() {
     std::unique_lock lock(mutex_);
     if (!added_.wait_for(lock, std::chrono::seconds(5), [&] { return !requests_.empty(); })) return nullptr;
@@ -61,7 +61,8 @@ bool is_raw(const libcamera::PixelFormat& format, lowlux_stage_format_info& info
   return lowlux_stage_query(LOWLUX_STAGE_DRM, format.fourcc(), format.modifier(), &info) == LOWLUX_STAGE_OK;
 }
 
-/// A pipeline may answer the role Raw by a picture, so its list is looked through. Pictures are never taken for raw.
+/// Selects a raw stream. A pipeline may offer processed formats for the role Raw, so its list is searched. Processed
+/// formats are never used as raw.
 bool choose_raw(libcamera::StreamConfiguration& stream) {
   lowlux_stage_format_info info{};
   if (is_raw(stream.pixelFormat, info)) return true;
@@ -73,7 +74,8 @@ bool choose_raw(libcamera::StreamConfiguration& stream) {
   return false;
 }
 
-/// Every control may be missing, from any frame. libcamera's digital gain is not in raw codes, so it stays out.
+/// Returns the parameters of a frame. Every control may be missing, from any frame. libcamera's digital gain is not
+/// applied to raw codes, so it is not used.
 lowlux_stage_params params_of(libcamera::Request& request, const libcamera::FrameMetadata& frame, int bits) {
   namespace controls = libcamera::controls;
   const libcamera::ControlList& metadata = request.metadata();
@@ -157,7 +159,7 @@ int stream_frames(libcamera::Camera& camera, libcamera::CameraConfiguration& con
   picture.planes = 1;
   picture.plane[0] = {rgb.data(), rgb.size(), out.stride[0]};
 
-  // Buffers are mapped once, from their start on: not every exporter maps from an offset.
+  // Buffers are mapped once, from their start: not every exporter supports an offset.
   libcamera::Stream* const stream = format.stream();
   libcamera::FrameBufferAllocator allocator(camera.shared_from_this());
   if (allocator.allocate(stream) < 0) return failed("no buffers");
@@ -188,7 +190,7 @@ int stream_frames(libcamera::Camera& camera, libcamera::CameraConfiguration& con
                                        mapping.length - mapping.offset, format.stride, buffer->planes()[0].fd.get()};
       const auto params = params_of(*request, buffer->metadata(), info.bits);
       if (lowlux_stage_process(opened, &source, &picture, &params, nullptr, nullptr) < 0) {
-        failed("a frame:", lowlux_stage_last_error(opened));  // the stage goes on with the next
+        failed("a frame:", lowlux_stage_last_error(opened));  // the stage continues with the next frame
       }
       ++done;
     }
@@ -202,7 +204,7 @@ int stream_frames(libcamera::Camera& camera, libcamera::CameraConfiguration& con
   return code == 0 && picture_name != nullptr ? write_ppm(picture_name, out, rgb) : code;
 }
 
-/// With a camera that is ours from here to the end.
+/// Runs with a camera that this application has acquired until the end.
 int with_camera(libcamera::Camera& camera, int frames, const char* picture_name) {
   const auto configuration = camera.generateConfiguration({libcamera::StreamRole::Raw});
   if (!configuration || configuration->empty() || !choose_raw(configuration->at(0))) {

@@ -10,13 +10,14 @@
 namespace lowlux {
 namespace {
 
-// Modifiers of DRM codes: vendor in the highest byte, its own number below (drm_fourcc.h as libcamera ships it).
+// Modifiers of DRM codes hold the vendor in the highest byte, its own number below (drm_fourcc.h as libcamera ships
+// it).
 constexpr std::uint64_t linear = 0;
 constexpr std::uint64_t mipi = std::uint64_t{0x0b} << 56 | 1;          // MIPI_FORMAT_MOD_CSI2_PACKED
 constexpr std::uint64_t ipu3_packed = std::uint64_t{0x01} << 56 | 13;  // IPU3_FORMAT_MOD_PACKED
-constexpr std::uint32_t big_endian = 1U << 31;                         // of V4L2 codes, v4l2_fourcc_be
+constexpr std::uint32_t big_endian = 1U << 31;                         // V4L2 codes: v4l2_fourcc_be
 
-/// "" is no code.
+/// Returns the code of four characters; 0 (no code) for "".
 constexpr std::uint32_t code_of(std::string_view four) {
   return four.empty() ? 0 : fourcc(four[0], four[1], four[2], four[3]);
 }
@@ -49,8 +50,8 @@ constexpr RawFormatNames big_endian_y16() {
 using enum RawPacking;
 using enum BayerPhase;
 
-// V4L2 codes: linux/videodev2.h (Y12P and Y14P in newer ones). DRM codes and names: libcamera's formats.yaml and
-// drm_fourcc.h. The two agree up to 12 bits and part above: RG16 is raw in V4L2 and RGB565 in DRM.
+// V4L2 codes are from linux/videodev2.h (Y12P and Y14P in newer ones), DRM codes and names from libcamera's
+// formats.yaml and drm_fourcc.h. The two agree up to 12 bits and differ above: RG16 is raw in V4L2 and RGB565 in DRM.
 constexpr std::array formats{
     bayer(8, byte, bggr, {"BA81", "BA81"}, linear, "SBGGR8"),
     bayer(8, byte, gbrg, {"GBRG", "GBRG"}, linear, "SGBRG8"),
@@ -143,7 +144,7 @@ RawGroup group_of(const RawFormat& format) {
     case RawPacking::bits_msb_first:
       break;
   }
-  const int common = std::gcd(format.bits, 8);  // the fewest samples that fill whole bytes
+  const int common = std::gcd(format.bits, 8);  // the smallest number of samples that fills complete bytes
   return {8 / common, format.bits / common};
 }
 

@@ -1,6 +1,6 @@
 #include "isp/base/packed/unpack_rows.h"
 
-#if defined(__aarch64__)  // NEON only: the vectors of SVE have no size, so no structs can be made of them
+#if defined(__aarch64__)  // NEON only: SVE vectors have no fixed size and cannot be struct members
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #endif
 #undef HWY_TARGET_INCLUDE
@@ -24,10 +24,10 @@ using VC = hn::Vec<Codes>;
 
 constexpr std::size_t vector_bytes = hn::MaxLanes(Bytes());
 constexpr std::size_t vector_codes = hn::MaxLanes(Codes());
-constexpr std::size_t widest_bytes = 64;  // of any instruction set
+constexpr std::size_t widest_bytes = 64;  // vector size of the widest instruction set
 constexpr std::uint8_t no_byte = 0x80;    // an index that gives zero
 
-/// Copies the last bytes of a row, fewer than 2 kBytes, in pieces that fall by halves: none is read twice.
+/// Copies the last bytes of a row, fewer than 2 kBytes, in blocks that fall by halves: none is read twice.
 template <std::size_t kBytes>
 HWY_INLINE void copy_rest(const std::uint8_t* from, std::size_t count, std::uint8_t* to) {
   if constexpr (kBytes > 0) {
@@ -39,7 +39,8 @@ HWY_INLINE void copy_rest(const std::uint8_t* from, std::size_t count, std::uint
   }
 }
 
-/// memcpy, but each byte is read once and in order: the C library reads both ends first and some bytes twice.
+/// Copies as memcpy does, but reads each byte once and in order: the C library reads both ends first and some bytes
+/// twice.
 HWY_INLINE void copy(const std::uint8_t* from, std::size_t count, std::uint8_t* to) {
   const Bytes b;
   std::size_t i = 0;
@@ -47,7 +48,7 @@ HWY_INLINE void copy(const std::uint8_t* from, std::size_t count, std::uint8_t* 
   copy_rest<vector_bytes / 2>(from + i, count - i, to + i);
 }
 
-/// A whole vector, or the first `left` of its codes.
+/// Stores a full vector, or the first `left` of its codes.
 HWY_INLINE void store(VC codes, std::uint16_t* out, std::size_t left) {
   const Codes c;
   if (HWY_LIKELY(left >= vector_codes)) return hn::StoreU(codes, c, out);
@@ -56,14 +57,14 @@ HWY_INLINE void store(VC codes, std::uint16_t* out, std::size_t left) {
   std::memcpy(out, rest, left * sizeof(*out));
 }
 
-constexpr std::size_t stage_pixels = 800;  // whole vectors and whole groups of any layout
+constexpr std::size_t stage_pixels = 800;  // complete vectors and complete groups of any layout
 constexpr std::size_t stage_bytes = stage_pixels * 14 / 8;
 static_assert(stage_pixels % 25 == 0 && stage_pixels % (widest_bytes / 2) == 0);
 
-/// Eight codes are made of `bytes` bytes: 16-bit lane i is
+/// Describes how eight codes are made from `bytes` bytes: 16-bit lane i is
 ///     high[i] << (bits - 8)  |  (the two bytes low[i] as little endian, times factor[i], modulo 2^16) >> low_shift
 /// The factor moves the wanted bits to the top of the lane, where those above them are lost; vectors have no shifts
-/// that differ by lane. These eight repeat within a run; only IPU3 has runs shorter than a stage.
+/// that differ by lane. These eight codes repeat within a run; only IPU3 has runs shorter than a stage.
 struct Layout {
   std::size_t bytes = 0;
   std::size_t group_pixels = 0;
@@ -110,7 +111,8 @@ constexpr Layout msb_first_10_layout() {
   return out;
 }
 
-/// A layout as vectors want it: a shuffle of bytes cannot leave its 16, so one of 32-bit words comes before it.
+/// Holds a layout as vector instructions need it: a byte shuffle cannot cross 16 bytes, so a shuffle of 32-bit words
+/// precedes it.
 struct Pattern {
   std::int32_t word[widest_bytes / 4] = {};
   std::uint8_t high[widest_bytes] = {};
@@ -160,7 +162,7 @@ struct MsbFirst10 {
   static constexpr Pattern pattern = pattern_of(layout);
 };
 
-/// A pattern in registers, for the length of a row.
+/// Keeps a pattern in registers for the length of a row.
 struct Registers {
   decltype(hn::SetTableIndices(Words(), Pattern().word)) word;
   VB high;
@@ -168,7 +170,7 @@ struct Registers {
   VC factor;
 };
 
-/// The codes of one vector; reads vector_bytes at `in`.
+/// Returns the codes of one vector; reads vector_bytes at `in`.
 template <class Packing>
 HWY_INLINE VC codes_of(const Registers& r, const std::uint8_t* in) {
   constexpr Layout layout = Packing::layout;
@@ -187,8 +189,8 @@ HWY_INLINE VC codes_of(const Registers& r, const std::uint8_t* in) {
   }
 }
 
-/// By way of a small buffer: the vectors at its end may read on, those of the row may not, and where they overlap they
-/// would read slow memory of a camera twice. Memory is kept busy meanwhile by fetching ahead.
+/// Unpacks a row through a small buffer: the vectors at its end may read past the end, those of the row may not, and
+/// where they overlap they would read slow camera memory twice. Prefetching keeps the memory busy meanwhile.
 template <class Packing>
 HWY_INLINE void put_packed(const std::uint8_t* in, std::size_t width, std::uint16_t* out) {
   constexpr Layout layout = Packing::layout;
@@ -206,7 +208,7 @@ HWY_INLINE void put_packed(const std::uint8_t* in, std::size_t width, std::uint1
     for (std::size_t x = first; x < end; x += layout.run_pixels, run += layout.run_bytes) {
       for (std::size_t i = 0; i < layout.run_pixels && x + i < end; i += vector_codes) {
         const std::size_t at = i / 8 * layout.bytes;
-        hwy::Prefetch(in + (run - stage) + at);  // of the next stage, or row: harmless where there is none
+        hwy::Prefetch(in + (run - stage) + at);  // prefetches the next stage, or row: harmless if there is none
         store(codes_of<Packing>(r, run + at), out + x + i, width - x - i);
       }
     }
@@ -221,7 +223,7 @@ void PutMsbFirst10(const std::uint8_t* in, std::size_t width, std::uint16_t* out
   put_packed<MsbFirst10>(in, width, out);
 }
 
-/// The first `left` bytes, zeros after them.
+/// Loads the first `left` bytes, with zeros after them.
 template <class Tag>
 HWY_INLINE hn::Vec<Tag> load(Tag tag, const std::uint8_t* in, std::size_t left) {
   constexpr std::size_t whole = hn::MaxLanes(Tag());

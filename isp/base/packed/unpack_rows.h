@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
-/// The row kernels under unpack.h, dispatched at run time. Plain types only: their source is compiled for several
-/// instruction sets, and shared inline code must not be. What unpack_row promises holds for each.
+/// The row kernels under raw_format.h are dispatched at run time. They use plain types only: their source is compiled
+/// for several instruction sets, and shared inline code must not be. The contract of unpack_row holds for each.
 namespace lowlux::unpack_rows {
 
 void put_bytes(const std::uint8_t* in, std::size_t width, std::uint16_t* out);
@@ -16,7 +16,7 @@ void put_csi2_14(const std::uint8_t* in, std::size_t width, std::uint16_t* out);
 void put_ipu3(const std::uint8_t* in, std::size_t width, std::uint16_t* out);
 void put_msb_first_10(const std::uint8_t* in, std::size_t width, std::uint16_t* out);
 
-/// The instruction set in use, for reports and tests.
+/// Returns the instruction set in use, for reports and tests.
 const char* target_name();
 
 }  // namespace lowlux::unpack_rows

@@ -5,8 +5,8 @@
 
 namespace lowlux {
 
-/// Philox4x32-10 (Salmon, Moraes, Dror, Shaw: "Parallel random numbers: as easy as 1, 2, 3", SC11): a bijection of
-/// the 128-bit counter for each key, whose images pass for independent random words.
+/// Computes Philox4x32-10 (Salmon, Moraes, Dror, Shaw: "Parallel random numbers: as easy as 1, 2, 3", SC11): a
+/// bijection of the 128-bit counter for each key, whose outputs serve as independent random words.
 constexpr std::array<std::uint32_t, 4> philox4x32_10(std::array<std::uint32_t, 4> counter,
                                                      std::array<std::uint32_t, 2> key) {
   auto& [c0, c1, c2, c3] = counter;

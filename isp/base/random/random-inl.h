@@ -1,7 +1,7 @@
-// Random draws for kernels of any folder: Philox words, normal and Poisson quantiles of a vector of pixels. Included
-// once for each instruction set: hence a guard that toggles in place of #pragma once. See docs/kernels.md.
+// Random draws for kernels of any folder: Philox words, normal and Poisson quantiles of a vector of pixels. The file is
+// included once for each instruction set: hence a guard that toggles instead of #pragma once. See docs/kernels.md.
 //
-// Every bit is the same on every processor, on one condition: the including source is given to
+// Every bit is the same on every processor, on one condition: the including source is listed in
 // lowlux_exact_kernel_sources() in CMake. Only correctly rounded operations are used, in a fixed order: no MulAdd, no
 // estimates of reciprocals.
 #if defined(LOWLUX_ISP_BASE_RANDOM_INL_H) == defined(HWY_TARGET_TOGGLE)
@@ -36,8 +36,8 @@ using MF = hn::Mask<Floats>;
 
 HWY_INLINE VF constant(float x) { return hn::Set(Floats(), x); }
 
-/// c[0] + c[1] x + c[2] x^2 ... by Estrin's scheme: pairs, pairs of pairs. A kernel waits for results more than it
-/// computes, and Horner's rule is one long wait.
+/// Evaluates c[0] + c[1] x + c[2] x^2 ... by Estrin's scheme: pairs, pairs of pairs. Kernels are limited by latency
+/// rather than throughput, and Horner's rule is a single dependency chain.
 template <std::size_t kCount>
 HWY_INLINE VF polynomial(const float (&c)[kCount], VF x) {
   VF terms[(kCount + 1) / 2];
@@ -53,7 +53,7 @@ HWY_INLINE VF polynomial(const float (&c)[kCount], VF x) {
   return terms[0];
 }
 
-/// A whole vector, or the last `left` elements of a row with zeros after them.
+/// Loads a full vector, or the last `left` elements of a row with zeros after them.
 template <class Tag>
 HWY_INLINE hn::Vec<Tag> load(Tag tag, const hn::TFromD<Tag>* from, std::size_t left) {
   if (HWY_LIKELY(left >= hn::Lanes(tag))) return hn::LoadU(tag, from);
@@ -74,8 +74,8 @@ struct FourWords {
   VU word[4];
 };
 
-/// Philox4x32-10 (philox.h) of the pixels (x, row.y), x being a vector of columns. Even and odd lanes go through the
-/// rounds apart, as 64-bit lanes: a word is the low half, and what a round leaves above it is ignored by the next.
+/// Returns Philox4x32-10 (philox.h) of the pixels (x, row.y), with x a vector of columns. Even and odd lanes pass the
+/// rounds separately, as 64-bit lanes: a word is the low half, and the next round ignores the high half.
 HWY_INLINE FourWords words_of(const Row& row, VU x) {
   const Words w;
   const Halves h;
@@ -99,7 +99,7 @@ HWY_INLINE FourWords words_of(const Row& row, VU x) {
   return {{joined(0), joined(1), joined(2), joined(3)}};
 }
 
-/// Natural logarithm of normal positive numbers, error about 1e-7 (relative, or absolute near 1).
+/// Returns the natural logarithm of normal positive numbers, error about 1e-7 (relative, or absolute near 1).
 HWY_INLINE VF log_of(VF x) {
   const Floats f;
   const Ints s32;
@@ -113,16 +113,16 @@ HWY_INLINE VF log_of(VF x) {
   return hn::Add(hn::Add(powers, hn::Add(s, s)), series);
 }
 
-/// Standard normal quantile of (r + 1/2) / 2^32: z P(w) / Q(w) with z = 2u - 1 and w = -ln(1 - z^2). P and Q are a
-/// minimax fit of quantile / z over w in 0..21.6 (a weighted least-squares fit, its weights adapted until the error
-/// levelled at 1.0e-8); with rounding, 4e-7.
+/// Returns the standard normal quantile of (r + 1/2) / 2^32: z P(w) / Q(w) with z = 2u - 1 and w = -ln(1 - z^2). P and
+/// Q are a minimax fit of quantile / z over w in 0..21.6 (a weighted least-squares fit, its weights adapted until the
+/// error levelled at 1.0e-8); with rounding, 4e-7.
 HWY_INLINE VF normal_of(VU r) {
   const Floats f;
   const Ints s32;
   const VI word = hn::BitCast(s32, r);
   const VI centred = hn::Xor(word, hn::Set(s32, INT32_MIN));
   const VF z = hn::Mul(hn::Add(hn::ConvertTo(f, centred), constant(0.5f)), constant(0x1p-31f));
-  // The nearer tail, 0..1/2, because 1 - z^2 of the rounded z would be wrong there.
+  // p is the nearer tail, 0..1/2, because 1 - z^2 of the rounded z would be wrong there.
   const VI folded = hn::Xor(word, hn::ShiftRight<31>(word));
   const VF p = hn::Mul(hn::Add(hn::ConvertTo(f, folded), constant(0.5f)), constant(0x1p-32f));
   const VF w = hn::Sub(hn::Zero(f), log_of(hn::Mul(hn::Mul(constant(4), p), hn::Sub(constant(1), p))));
@@ -134,7 +134,7 @@ HWY_INLINE VF normal_of(VU r) {
   return hn::Mul(z, hn::Div(above, below));
 }
 
-/// e^-x for x in 0..12, relative error about 2e-7.
+/// Returns e^-x for x in 0..12, relative error about 2e-7.
 HWY_INLINE VF exp_of_minus(VF x) {
   const Floats f;
   const Ints s32;
@@ -145,7 +145,7 @@ HWY_INLINE VF exp_of_minus(VF x) {
   return hn::BitCast(f, hn::Sub(hn::BitCast(s32, series), hn::ShiftLeft<23>(halvings)));
 }
 
-/// Counts between which the Poisson quantile lies; where they are equal, and not negative, they are the quantile.
+/// Bounds the Poisson quantile by two counts; where they are equal, and not negative, they are the quantile.
 struct Bracket {
   VF least;
   VF most;
@@ -153,8 +153,8 @@ struct Bracket {
 
 constexpr float large_mean = 12;
 
-/// For means of 12 and more: Cornish-Fisher expansion, whose bound of error is checked in tests/base/poisson_test.cpp.
-/// The mean is split into whole and fraction, so that the small terms keep their digits.
+/// Brackets the quantile for means of 12 and more by the Cornish-Fisher expansion, whose error bound is checked in
+/// tests/base/poisson_test.cpp. The mean is split into integer and fraction, so that the small terms keep their digits.
 HWY_INLINE Bracket bracket_large(VF w, VF mean) {
   const VF whole = hn::Floor(mean), fraction = hn::Sub(mean, whole);
   const VF s = hn::Sqrt(mean), per_s = hn::Div(constant(1), s), per_mean = hn::Mul(per_s, per_s);
@@ -177,9 +177,9 @@ struct Reciprocals {
 };
 constexpr Reciprocals reciprocals;
 
-/// For the lanes of `small`, whose means are below 12: the CDF summed up, against u a little less and a little more.
-/// Rounding lets the sum stall just below 1; the bracket turns that into a lane to be resolved, not a false bright
-/// pixel.
+/// Brackets the quantile in the lanes of `small`, whose means are below 12: the summed CDF is compared with a value
+/// slightly below u and one slightly above. Rounding lets the sum stall just below 1; the bracket turns that into a
+/// lane to be resolved, not a false bright pixel.
 HWY_INLINE Bracket bracket_small(VU r, VF mean, MF small) {
   const Floats f;
   const Ints s32;
@@ -190,7 +190,7 @@ HWY_INLINE Bracket bracket_small(VU r, VF mean, MF small) {
   VF term = exp_of_minus(lambda), reached = term;
   VI least = hn::Zero(s32), most = least;
   int k = 1;
-  do {  // four terms at once, and always the first four: whether they are needed is hard to predict
+  do {  // four terms at once, and always the first four: the branch would be hard to predict
     for (int j = k; j < k + 4; ++j) {
       least = hn::Sub(least, hn::VecFromMask(s32, hn::RebindMask(s32, hn::Gt(lower, reached))));
       most = hn::Sub(most, hn::VecFromMask(s32, hn::RebindMask(s32, hn::Gt(upper, reached))));
@@ -202,7 +202,7 @@ HWY_INLINE Bracket bracket_small(VU r, VF mean, MF small) {
   return {hn::ConvertTo(f, least), hn::ConvertTo(f, most)};
 }
 
-/// `counts` with the lanes of `open` replaced by what double precision says.
+/// Returns `counts` with the lanes of `open` replaced by the double-precision results.
 HWY_NOINLINE inline VF resolved(VU r, VF mean, MF open, VF counts) {
   const Floats f;
   HWY_ALIGN std::uint32_t words[hn::MaxLanes(Floats())];
@@ -217,13 +217,13 @@ HWY_NOINLINE inline VF resolved(VU r, VF mean, MF open, VF counts) {
   return hn::Load(f, out);
 }
 
-/// Means outside 0..poisson_max_mean brought there, and those that are not a number to 0.
+/// Clamps means to 0..poisson_max_mean and replaces those that are not a number by 0.
 HWY_INLINE VF valid_mean(VF mean) {
   const VF positive = hn::IfThenElseZero(hn::Gt(mean, hn::Zero(Floats())), mean);
   return hn::Min(positive, constant(1e6f));
 }
 
-/// @param mean from valid_mean
+/// Brackets the Poisson quantile of (r + 1/2) / 2^32 for a mean from valid_mean.
 HWY_INLINE Bracket poisson_bracket(VU r, VF mean) {
   const Floats f;
   const MF small = hn::Lt(mean, constant(large_mean));
@@ -234,12 +234,12 @@ HWY_INLINE Bracket poisson_bracket(VU r, VF mean) {
   return {hn::IfThenElse(small, other.least, large.least), hn::IfThenElse(small, other.most, large.most)};
 }
 
-/// The lanes that a bracket leaves open.
+/// Returns the lanes that a bracket leaves undecided.
 HWY_INLINE MF open_lanes(const Bracket& b) {
   return hn::Or(hn::Ne(b.least, b.most), hn::Lt(b.least, hn::Zero(Floats())));
 }
 
-/// Poisson quantile of (r + 1/2) / 2^32, as random.h has it.
+/// Returns the Poisson quantile of (r + 1/2) / 2^32, as defined in random.h.
 HWY_INLINE VF poisson_of(VU r, VF any_mean) {
   const VF mean = valid_mean(any_mean);
   const Bracket bracket = poisson_bracket(r, mean);
@@ -248,12 +248,12 @@ HWY_INLINE VF poisson_of(VU r, VF any_mean) {
   return resolved(r, mean, open, bracket.least);
 }
 
-/// Pixels that share one filling of a buffer with words. The words and what is made of them are long chains of
-/// operations: loops of their own let the processor work on several vectors at once.
+/// Sets the number of pixels that share one filling of a buffer with words. The words and their results are long chains
+/// of operations: separate loops let the processor work on several vectors at once.
 constexpr std::size_t block_pixels = 256;
 static_assert(block_pixels % hn::MaxLanes(Words()) == 0);
 
-/// Words kFirst and, for kCount of 2, the one after it, of pixels first..first + count - 1 of a row. Writes whole
+/// Computes words kFirst and, for kCount of 2, kFirst + 1, of pixels first..first + count - 1 of a row. Writes full
 /// vectors.
 template <int kFirst, int kCount>
 HWY_INLINE void put_block(const Row& row, std::size_t first, std::size_t count, std::uint32_t (*out)[block_pixels]) {
@@ -266,10 +266,10 @@ HWY_INLINE void put_block(const Row& row, std::size_t first, std::size_t count, 
   }
 }
 
-/// Whether Add(Mul(a, b), c) rounds twice: (1 + 2^-12)^2 - (1 + 2^-11) is 2^-24 exactly, and 0 if the square is
+/// Returns whether Add(Mul(a, b), c) rounds twice: (1 + 2^-12)^2 - (1 + 2^-11) is 2^-24 exactly, and 0 if the square is
 /// rounded.
 HWY_INLINE bool rounds_products() {
-  volatile float a = 1 + 0x1p-12f, c = -1 - 0x1p-11f;  // volatile: not to be worked out by the compiler
+  volatile float a = 1 + 0x1p-12f, c = -1 - 0x1p-11f;  // volatile: prevents evaluation by the compiler
   const VF sum = hn::Add(hn::Mul(constant(a), constant(a)), constant(c));
   return hn::AllTrue(Floats(), hn::Eq(sum, hn::Zero(Floats())));
 }

@@ -6,51 +6,53 @@
 
 namespace lowlux {
 
-/// Which random numbers are meant. Together with a pixel (x, y) it is the whole input of the generator, Philox4x32-10
-/// (Salmon et al., SC11) with key = seed and counter = (x, y, frame, purpose). There is no state: a draw is the same on
-/// every instruction set, compiler, tile and thread.
+/// Selects a stream of random numbers. Together with a pixel (x, y) it is the complete input of the generator,
+/// Philox4x32-10 (Salmon et al., SC11) with key = seed and counter = (x, y, frame, purpose). There is no state: a draw
+/// is the same on every instruction set, compiler, tile and thread.
 struct DrawStream {
   std::uint64_t seed = 0;
   std::uint32_t frame = 0;
   std::uint32_t purpose = 0;
 };
 
-/// The `purpose` of each quantity. No counter serves two quantities; the four words of one counter are independent.
+/// Lists the `purpose` of each quantity. No counter serves two quantities; the four words of one counter are
+/// independent.
 namespace draw_purpose {
 inline constexpr std::uint32_t electrons = 0;        // word 0: collected electrons, word 1: read noise
 inline constexpr std::uint32_t fixed_pattern = 2;    // frame 0. Words 0: PRNU, 1: DSNU, 2: is it hot, 3: how hot
 inline constexpr std::uint32_t row_noise = 3;        // x = 0, word 0
 inline constexpr std::uint32_t column_noise = 4;     // y = 0, frame 0, word 0: a fixed pattern
-inline constexpr std::uint32_t scene = 5;            // where the scene itself is drawn: stars
-inline constexpr std::uint32_t risk_probe = 8;       // what a denoiser is disturbed by, to see how it answers
+inline constexpr std::uint32_t scene = 5;            // random scene content: stars
+inline constexpr std::uint32_t risk_probe = 8;       // perturbation of a denoiser's input, to measure its response
 inline constexpr std::uint32_t code_dither = 9;      // word 0: rounds electrons to codes without bias
-inline constexpr std::uint32_t visual_noise = 10;    // word 0: the eye's own grain, by cells of 4 pixels
+inline constexpr std::uint32_t visual_noise = 10;    // word 0: the eye's own noise, by cells of 4 pixels
 inline constexpr std::uint32_t wavelength_bin = 16;  // + i, for photons sampled by wavelength
 }  // namespace draw_purpose
 
 using PhiloxWords = std::array<std::uint32_t, 4>;
 
-/// The largest mean of poisson_row and poisson_at; larger means count as this one, so callers check first.
+/// Limits the means of poisson_row and poisson_of_word; larger means are clamped to it, so callers check first.
 inline constexpr float poisson_max_mean = 1e6f;
 
-/// The four words of pixel (x, y).
+/// Returns the four words of pixel (x, y).
 PhiloxWords words_at(const DrawStream& stream, std::uint32_t x, std::uint32_t y);
 
-/// One word of each of the pixels (x0, y), (x0 + 1, y)...
+/// Writes one word of each of the pixels (x0, y), (x0 + 1, y)...
 /// @param word 0..3
 void words_row(const DrawStream& stream, std::uint32_t x0, std::uint32_t y, int word, std::span<std::uint32_t> out);
 
-/// Poisson counts by inverse CDF: the smallest k with F(k; mean) >= (r + 1/2) / 2^32, r being word 0 of pixel
-/// (x0 + i, y). Exact: equal to the CDF evaluated in double, for every mean up to poisson_max_mean. Never falls when
-/// the mean or r rises. Means that are zero, negative or not a number give 0.
+/// Draws Poisson counts by inverse CDF: the smallest k with F(k; mean) >= (r + 1/2) / 2^32, with r word 0 of pixel (x0
+/// + i, y). Exact: equal to the CDF evaluated in double, for every mean up to poisson_max_mean. Never falls when the
+/// mean or r rises. Means that are zero, negative or not a number give 0.
 /// @param mean [events]; as many as counts. Both may be the same memory.
 void poisson_row(const DrawStream& stream, std::uint32_t x0, std::uint32_t y, std::span<const float> mean,
                  std::span<float> counts);
 
-/// Standard normal deviates by inverse CDF of one word (0..3) of each pixel: relative error below 1e-6, |z| <= 6.4.
+/// Draws standard normal deviates by inverse CDF of one word (0..3) of each pixel: relative error below 1e-6, |z| <=
+/// 6.4.
 void normal_row(const DrawStream& stream, std::uint32_t x0, std::uint32_t y, int word, std::span<float> out);
 
-/// The same for one word r, whoever drew it: bit for bit what the rows give.
+/// Both functions draw one deviate from one word r of any origin: bit for bit the result of poisson_row and normal_row.
 float poisson_of_word(std::uint32_t r, float mean);
 float normal_of_word(std::uint32_t r);
 

@@ -1,6 +1,6 @@
 #include "isp/base/random/random_rows.h"
 
-#if defined(__aarch64__)  // NEON only: the vectors of SVE have no size, so no structs can be made of them
+#if defined(__aarch64__)  // NEON only: SVE vectors have no fixed size and cannot be struct members
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #endif
 #undef HWY_TARGET_INCLUDE
@@ -15,7 +15,7 @@ namespace lowlux::draws::HWY_NAMESPACE {
 
 template <int kWord>
 HWY_INLINE void put_one_word(const Row& from, std::size_t count, std::uint32_t* out) {
-  const Row row = from;  // a copy, so that no store can change it and its products stay out of the loop
+  const Row row = from;  // a copy, so that no store can change it and its products are hoisted out of the loop
   const Words w;
   VU x = hn::Iota(w, row.x0);
   for (std::size_t i = 0; i < count; i += hn::Lanes(w)) {
@@ -24,7 +24,7 @@ HWY_INLINE void put_one_word(const Row& from, std::size_t count, std::uint32_t* 
   }
 }
 
-/// Calls put(words, index, how many are left) for each vector of pixels.
+/// Calls put(words, index, number of pixels left) for each vector of pixels.
 template <int kWord, class Put>
 HWY_INLINE void for_each_draw(const Row& from, std::size_t count, const Put& put) {
   const Row row = from;

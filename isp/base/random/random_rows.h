@@ -3,15 +3,15 @@
 #include <cstddef>
 #include <cstdint>
 
-/// The row kernels under random.h, dispatched at run time. Plain types only: their sources are compiled for several
-/// instruction sets, and shared inline code must not be.
+/// The row kernels under random.h are dispatched at run time. They use plain types only: their sources are compiled for
+/// several instruction sets, and shared inline code must not be.
 namespace lowlux {
 struct DrawStream;
 }
 
 namespace lowlux::draws {
 
-/// What the counters of one row have in common, and where it starts.
+/// Holds the common counter values of one row, and its first column.
 struct Row {
   std::uint32_t x0;
   std::uint32_t y;
@@ -26,14 +26,14 @@ void put_words(const Row& row, int word, std::size_t count, std::uint32_t* out);
 void put_normals(const Row& row, int word, std::size_t count, float* out);
 void put_poisson(const Row& row, const float* mean, std::size_t count, float* out);
 
-/// The same for words that are there already.
+/// Both functions convert words that already exist.
 void normals_of_words(const std::uint32_t* r, std::size_t count, float* out);
 void poisson_of_words(const std::uint32_t* r, const float* mean, std::size_t count, float* out);
 
-/// Whether this build rounds products before it adds to them, which equal draws everywhere depend on.
+/// Returns whether this build rounds products before adding to them, which bit-identical draws on all machines require.
 bool products_are_rounded();
 
-/// The instruction set in use, for reports and tests.
+/// Returns the instruction set in use, for reports and tests.
 const char* target_name();
 
 }  // namespace lowlux::draws

@@ -9,10 +9,10 @@
 namespace lowlux::isp {
 namespace {
 
-/// Means over what lies in the picture of 2 radius + 1 samples along each row, turned: rows become columns.
+/// Returns means of 2 radius + 1 samples along each row, those inside the image, transposed: rows become columns.
 Plane<float> row_means(const PlaneView<const float>& in, int radius) {
   Plane<float> out(in.height, in.width);
-  std::vector<double> sum(static_cast<std::size_t>(in.width) + 1, 0.0);  // of all samples before
+  std::vector<double> sum(static_cast<std::size_t>(in.width) + 1, 0.0);  // sums of all preceding samples
   for (int y = 0; y < in.height; ++y) {
     const float* const row = in.row(y);
     for (int x = 0; x < in.width; ++x) sum[x + 1] = sum[x] + static_cast<double>(row[x]);
@@ -32,7 +32,7 @@ Plane<float> box_means(const PlaneView<const float>& in, int radius) {
 
 SceneLinear chromatic_filtered(const RgbView<const float>& linear, const ChromaticWindows& windows) {
   assert(windows.chroma_radius >= 0 && windows.luminance_radius >= 0);
-  const Vector3 weights = luminance_weights(OutputSpace::linear_srgb).value();  // of a space with primaries
+  const Vector3 weights = luminance_weights(OutputSpace::linear_srgb).value();  // has primaries
   const int width = linear[0].width, height = linear[0].height;
   SceneLinear out;
   Plane<float> luminance(width, height), window_luminance(width, height);

@@ -13,7 +13,7 @@ namespace {
 /// Weights [row][column] of the 5 x 5 sites around one.
 using Filter = std::array<std::array<double, 5>, 5>;
 
-/// By where the wanted colour is: in all four direct neighbours, left and right, or in the four corners.
+/// Filters by the position of the wanted colour: in all four direct neighbours, left and right, or in the four corners.
 struct Filters {
   Filter cross;
   Filter row;
@@ -95,7 +95,7 @@ void demosaic(const SignedMosaic& in, const Filters& filters, DoublePlanes& out)
   }
 }
 
-/// The two places that a place of the large picture lies between, and the share of the second.
+/// Holds the two pixels that a pixel of the large image lies between, and the weight of the second.
 struct Between {
   int first;
   int second;

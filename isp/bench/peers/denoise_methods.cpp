@@ -26,7 +26,7 @@ double time_of(const Work& work) {
   return cpu_s() - start;
 }
 
-/// Rounds of work and of memcpy in turn; with more than one, another goes before to warm up.
+/// Alternates rounds of work and of memcpy; with more than one, another runs first to warm up.
 template <class Work>
 void time_rounds(const MethodInput& input, MethodResult& result, const Work& work) {
   const Plane<float>& frame = input.shot.raw_e;
@@ -71,7 +71,7 @@ RenderedPicture with_dark(const MethodInput& input, MethodMemory& memory) {
 Result<MethodResult> run_dark_left_in(const MethodInput& input, Level /*level*/, MethodMemory& memory) {
   MethodResult result;
   Plane<float> out = same_size(input);
-  // Nothing is done to the mosaic: what remains is to have it.
+  // The mosaic is not processed, so that only the copy remains.
   time_rounds(input, result, [&] { std::copy_n(input.shot.raw_e.data(), out.size(), out.data()); });
   result.picture = with_dark(input, memory);
   return result;

@@ -22,19 +22,19 @@ struct TunedParameters {
   std::array<double, 3> stabilised_gain{1, 1, 1};  // of gat_denoise
 };
 
-/// What a method has to work with.
+/// Input of a method.
 struct MethodInput {
   const BenchPicture& picture;
   const DenoiseShot& shot;
   const TunedParameters& tuned;
   const NlMeans* nl_means = nullptr;
-  NlMeansStrength strength;  // the best there is
+  NlMeansStrength strength;  // optimum found by search
   int rounds = 1;            // of timing
-  int slow_rounds = 1;       // of methods that take a second and more for each megapixel
+  int slow_rounds = 1;       // of methods that take a second or more for each megapixel
 };
 
-/// The result, and the CPU time of the denoising alone on one thread: the median of the rounds, their spread_of(), and
-/// the median of copying the mosaic in between.
+/// Result of a method, and the CPU time of the denoising alone on one thread: the median of the rounds, their
+/// spread_of(), and the median time of copying the mosaic between rounds.
 struct MethodResult {
   RenderedPicture picture;
   double cpu_s = 0;
@@ -42,7 +42,7 @@ struct MethodResult {
   double memcpy_s = 0;
 };
 
-/// What methods share: memory for pictures up to a size.
+/// Memory that methods have in common, for images up to a given size.
 struct MethodMemory {
   MethodMemory(int max_width, int max_height, Executor& for_rendering);
   denoise::Denoiser denoiser;
@@ -54,24 +54,24 @@ enum class MethodKind : std::uint8_t { ceiling, other, ours };
 struct DenoiseMethod {
   std::string name;
   MethodKind kind = MethodKind::other;
-  denoise::Level level = denoise::Level::standard;  // where it has one
+  denoise::Level level = denoise::Level::standard;  // for methods with levels
   Result<MethodResult> (*run)(const MethodInput& input, denoise::Level level, MethodMemory& memory);
 };
 
 inline constexpr const char* name_of_none = "none";
 inline constexpr const char* name_of_nl_means = "opencv-nlm";
 
-/// All rows of the table, ours last.
-///     noise-free      the mean of the mosaic: what demosaicing leaves
+/// Returns all rows of the table, those of this project last.
+///     noise-free      the mean of the mosaic: the error left by demosaicing
 ///     none            dark subtracted, signed
 ///     dark-left-in    pedestal only; the exposure gives it the mean luminance of the truth
-///     chromatic       chromatic_filtered() on that
+///     chromatic       chromatic_filtered() on dark-left-in
 ///     opencv-nlm      fastNlMeansDenoisingColored on the codes of `none`; only with nl_means
 ///     gat-standard    gat_denoise(), level standard
-/// and the levels of the denoiser with their defaults.
+/// The levels of the denoiser with their defaults follow.
 std::vector<DenoiseMethod> denoise_methods(bool with_nl_means);
 
-/// Chooses them by PSNR, over the mean of the pictures.
+/// Chooses parameters by PSNR, averaged over the images.
 TunedParameters tune(const std::vector<BenchPicture>& pictures, const DenoiseLight& light, Executor& executor);
 
 }  // namespace lowlux::isp

@@ -52,26 +52,26 @@ void gat_denoise(denoise::Denoiser& denoiser, const DenoiseShot& shot, denoise::
 namespace lowlux::denoise {
 namespace {
 
-constexpr double asymptotic_variance_e2 = 300;  // lambda + sigma^2 from which on the first order serves
-constexpr double smallest_mean_e = 1e-4;        // first place of the table after 0
+constexpr double asymptotic_variance_e2 = 300;  // lambda + sigma^2 from which on the first order is used
+constexpr double smallest_mean_e = 1e-4;        // first node of the table after 0
 constexpr int places = 400;
 constexpr double counting_noise_e = 1e-6;  // below it f(j + sigma x) differs from f(j) by less than 1e-11 in the mean
 
 double log_factorial(double n) {
-  int sign = 0;  // of the gamma function, for the form that threads may share
+  int sign = 0;  // of the gamma function, which the thread-safe lgamma_r returns
   return ::lgamma_r(n + 1, &sign);
 }
 
-/// Mean of f(j + sigma x) over a standard normal x. The root's edge is no obstacle in t = f / 2, where the integrand
-/// 4 t^2 phi((t^2 - j - 3/8 - sigma^2) / sigma) / sigma is smooth and even, so that the trapezium rule converges
-/// exponentially.
+/// Returns the mean of f(j + sigma x) over a standard normal x. The root's edge causes no error in t = f / 2, where the
+/// integrand 4 t^2 phi((t^2 - j - 3/8 - sigma^2) / sigma) / sigma is smooth and even, so that the trapezium rule
+/// converges exponentially.
 double mean_for_count(int count, double noise) {
   const double centre = count + 0.375 + noise * noise;
   if (noise < counting_noise_e) return 2 * std::sqrt(centre);
   const double begin = std::sqrt(std::max(centre - 9.5 * noise, 0.0)), end = std::sqrt(centre + 9.5 * noise);
   const double step = noise / (4 * std::sqrt(centre));  // half a standard deviation of t
   const auto steps = static_cast<int>(std::ceil((end - begin) / step));
-  double sum = 0;  // the first place counts half at t = 0, where the integrand is 0
+  double sum = 0;  // the first node, t = 0, has half weight, but the integrand is 0 there
   for (int i = 0; i <= steps; ++i) {
     const double t = begin + i * step;
     const double z = (t * t - centre) / noise;
@@ -80,7 +80,7 @@ double mean_for_count(int count, double noise) {
   return 4 * sum * step / (noise * std::sqrt(2 * std::numbers::pi));
 }
 
-/// mean_for_count of 0, 1, ... as far as means below asymptotic_variance_e2 reach.
+/// Returns mean_for_count of 0, 1, ... up to the counts that means below asymptotic_variance_e2 reach.
 std::vector<double> means_for_counts(double noise, double largest_mean) {
   const int last = static_cast<int>(std::ceil(largest_mean + 9 * std::sqrt(largest_mean) + 20));
   std::vector<double> out(static_cast<std::size_t>(last) + 1);
@@ -88,7 +88,7 @@ std::vector<double> means_for_counts(double noise, double largest_mean) {
   return out;
 }
 
-/// E[f] and its derivative by lambda, sum of Pois(j) (m_j+1 - m_j).
+/// Holds E[f] and its derivative by lambda, sum of Pois(j) (m_j+1 - m_j).
 struct MeanAndSlope {
   double mean, slope;
 };
@@ -109,7 +109,7 @@ double asymptotic_mean_e(double stabilised, double noise) {
   return stabilised * stabilised / 4 - 0.125 - noise * noise;
 }
 
-/// Slopes of at most three secants keep a cubic monotone (Fritsch & Carlson, SIAM J. Numer. Anal. 17 (1980) 238).
+/// Limits slopes to three secants, so that a cubic is monotone (Fritsch & Carlson, SIAM J. Numer. Anal. 17 (1980) 238).
 void limit_slopes(GatTable& table) {
   for (std::size_t i = 0; i + 1 < table.mean_e.size(); ++i) {
     const double secant = (table.mean_e[i + 1] - table.mean_e[i]) / (table.stabilised[i + 1] - table.stabilised[i]);
@@ -149,7 +149,7 @@ GatTable gat_table(double noise_std_e) {
   GatTable table;
   table.noise_std_e = noise_std_e;
   const double largest = asymptotic_variance_e2 - noise_std_e * noise_std_e;
-  if (largest < 1) return table;  // and so a last place 4e-4 e- off stays above the one before
+  if (largest < 1) return table;  // so that a last node that is 4e-4 e- off stays above the one before
   const std::vector<double> for_count = means_for_counts(noise_std_e, largest);
   const double ratio = std::pow(largest / smallest_mean_e, 1.0 / (places - 1));
   table.stabilised.reserve(places + 1);
@@ -158,7 +158,7 @@ GatTable gat_table(double noise_std_e) {
   for (int i = 0; i <= places; ++i) {
     const double lambda = i == 0 ? 0 : smallest_mean_e * std::pow(ratio, i - 1);
     const MeanAndSlope at = poisson_mean_of(for_count, lambda);
-    // The last place lies on the asymptotic form, so that there is no step where it takes over.
+    // The last node lies on the asymptotic form, so that there is no step where that begins.
     table.stabilised.push_back(at.mean);
     table.mean_e.push_back(i < places ? lambda : asymptotic_mean_e(at.mean, noise_std_e));
     table.slope_e.push_back(1 / at.slope);

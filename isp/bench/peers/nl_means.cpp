@@ -14,17 +14,17 @@ namespace {
 
 constexpr int last_step = 27;  // strength 2^(i / 3 - 1), up to 256
 constexpr int octave = 3;
-using Steps = std::array<int, 2>;  // of lightness, of colour
+using Steps = std::array<int, 2>;  // step of lightness, step of colour
 using Bytes = std::vector<std::uint8_t>;
 
 double strength_at(int step) { return std::exp2(step / 3.0 - 1); }
 
 NlMeansPicture picture_of(const Encoded8& codes) {
-  // Only written where it is the place to go to.
+  // The codes are written only where they are the destination.
   return {const_cast<std::uint8_t*>(codes.codes.data()), codes.width(), codes.height()};
 }
 
-/// Filtered planes, each run once.
+/// Holds filtered planes, each computed once.
 class Search {
  public:
   Search(const NlMeans& filter, const Encoded8& noisy, const RgbView<const float>& truth)
@@ -38,7 +38,7 @@ class Search {
   bool works() const { return works_; }
   int runs() const { return static_cast<int>(filtered_[0].size() + filtered_[1].size()); }
 
-  /// Mean squared difference of codes; infinite beyond the ends of the steps.
+  /// Returns the mean squared difference of codes; infinite beyond the ends of the steps.
   double error(const Steps& step) {
     for (const int s : step) {
       if (s < 0 || s > last_step) return INFINITY;
@@ -89,7 +89,7 @@ class Search {
   std::map<Steps, double> errors_;
 };
 
-/// The best of all pairs of every second octave, whatever lies between.
+/// Returns the best of all pairs of every second octave.
 Steps best_octaves(Search& search) {
   Steps best{0, 0};
   for (int lightness = 0; lightness <= last_step; lightness += 2 * octave) {
@@ -100,7 +100,7 @@ Steps best_octaves(Search& search) {
   return best;
 }
 
-/// Up or down by equal strides, in one and in the other, until none helps.
+/// Climbs up or down by equal strides, in each strength in turn, until no step improves the result.
 Steps climbed(Search& search, Steps at, int stride) {
   for (bool moved = true; moved;) {
     moved = false;
@@ -125,7 +125,7 @@ StrengthSearch found(Search& search, const Steps& at) {
 constexpr int tiles_across = 4, tiles_down = 3;
 constexpr int tile_columns = search_columns / tiles_across, tile_rows = search_rows / tiles_down;
 
-/// Tiles of a plane of `samples` for each pixel, from corner to corner of the picture, beside each other.
+/// Returns tiles of a plane of `samples` for each pixel, spread from corner to corner of the image, next to each other.
 template <class T>
 Plane<T> spread_tiles(const Plane<T>& plane, int samples) {
   Plane<T> out(samples * search_columns, search_rows);

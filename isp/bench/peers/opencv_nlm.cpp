@@ -11,7 +11,7 @@ namespace {
 
 constexpr int template_px = 7, search_px = 21;
 
-// cv::Mat has no constant view; what is read from is not written to.
+// cv::Mat has no constant view; input data is not written to.
 cv::Mat mat(const std::uint8_t* data, int columns, int rows, int channels) {
   return {rows, columns, CV_8UC(channels), const_cast<std::uint8_t*>(data)};
 }
@@ -24,7 +24,7 @@ bool done(const Work& work) noexcept {
     work();
     return true;
   } catch (...) {
-    return false;  // out of memory, or a case OpenCV's checks refuse
+    return false;  // out of memory, or an input that OpenCV's checks refuse
   }
 }
 
@@ -39,7 +39,7 @@ bool denoise(const NlMeansPicture& from, const NlMeansPicture& to, double lightn
   });
 }
 
-// The conversions are those of fastNlMeansDenoisingColored in OpenCV 4.6: it takes codes for linear light.
+// The conversions are those of fastNlMeansDenoisingColored in OpenCV 4.6, which treats codes as linear light.
 bool split(const NlMeansPicture& from, std::uint8_t* lightness, std::uint8_t* colour) noexcept {
   return done([&] {
     cv::Mat lab;

@@ -41,7 +41,7 @@ NamedSensor sensor_of(const DevelopLight& light) {
 
 Result<capture::SyntheticSource> source_of(const BenchPicture& picture, const DevelopLight& light, double luminance,
                                            const capture::SyntheticOptions& options, Executor& executor) {
-  const Matrix3 to_xyz = rgb_to_xyz(primaries_rec709).value();  // of constants
+  const Matrix3 to_xyz = rgb_to_xyz(primaries_rec709).value();  // cannot fail for constants
   SceneLinear xyz(picture.linear.width() & ~1, picture.linear.height() & ~1);
   for (int y = 0; y < xyz.height(); ++y) {
     for (int x = 0; x < xyz.width(); ++x) {

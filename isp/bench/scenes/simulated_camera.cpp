@@ -13,7 +13,7 @@
 namespace lowlux::isp {
 namespace {
 
-// Of constants: they are there.
+// Returns the matrix, which cannot fail for constants.
 const Matrix3& rec709_to_xyz() {
   static const Matrix3 matrix = rgb_to_xyz(primaries_rec709).value();
   return matrix;
@@ -53,7 +53,7 @@ NamedSensor bench_camera() {
   figures.hot_pixel_current_e_per_s = 50;
   figures.row_noise_e = 0.05;
   figures.column_noise_e = 0.03;
-  return sensor_named("ELD_NikonD850", "ISO 1600", figures).value();  // of the table
+  return sensor_named("ELD_NikonD850", "ISO 1600", figures).value();  // cannot fail for an entry of the table
 }
 
 SpectralResponse bench_response() {
@@ -68,7 +68,7 @@ capture::Scene bench_scene(const BenchPicture& picture, double white_cd_m2) {
     const Vector3 light = rec709_to_xyz() * rgb;
     for (std::size_t c = 0; c < 3; ++c) xyz.plane[c].data()[i] = static_cast<float>(light[c]);
   }
-  return capture::picture_scene(std::move(xyz), white_cd_m2).value();  // of a picture that is finite and not empty
+  return capture::picture_scene(std::move(xyz), white_cd_m2).value();  // the image is finite and not empty
 }
 
 Result<std::vector<BenchPicture>> read_bench_pictures(const BenchOptions& options, int crop_width, int crop_height,
@@ -137,7 +137,7 @@ std::vector<BoxStatistics> box_statistics(const PlaneView<const float>& mosaic, 
 }
 
 Lab developed_lab(const Developing& developing, const Vector3& mean_e) {
-  static const Xyz white = xyz_of(white_d65).value();  // of a constant
+  static const Xyz white = xyz_of(white_d65).value();  // cannot fail for a constant
   Vector3 camera{};
   for (std::size_t k = 0; k < 3; ++k) camera[k] = mean_e[k] / developing.white_e[k];
   return lab_of(xyz_of(developing.camera_to_xyz * camera), white);
@@ -152,7 +152,7 @@ Plane<float> charge_of(const Plane<float>& dn, const SensorModel& sensor) {
 }
 
 SceneLinear binned_picture(const PlaneView<const float>& charge_e, const Developing& developing) {
-  static const Matrix3 from_xyz = inverse(rec709_to_xyz()).value();  // of constants
+  static const Matrix3 from_xyz = inverse(rec709_to_xyz()).value();  // cannot fail for constants
   const Matrix3 matrix = from_xyz * developing.camera_to_xyz;
   SceneLinear out(charge_e.width / 2, charge_e.height / 2);
   for (int y = 0; y < out.height(); ++y) {

@@ -13,26 +13,26 @@
 #include "isp/base/result.h"
 #include "isp/base/sensor.h"
 #include "isp/bench/bench_stages.h"
-#include "isp/reproduce/bench_picture.h"
 #include "isp/model/colour/colorimetry.h"
 #include "isp/model/sensor/effect_plan.h"
 #include "isp/model/sensor/sensor_db.h"
+#include "isp/reproduce/bench_picture.h"
 
-/// The camera in front of which the stages of simulation and calibration put their scenes, and what they see of it.
+/// Camera of the stages of simulation and calibration, and the scenes in front of it.
 namespace lowlux::isp {
 
-/// ELD_NikonD850 at ISO 1600, with figures for the effects its source says nothing of: every effect there is.
+/// Returns ELD_NikonD850 at ISO 1600, with assumed values for effects missing in its source: all are simulated.
 NamedSensor bench_camera();
 
-/// Its response: a white of bench_full_cd_m2 under D65 fills it in 1 s.
+/// Returns its response: a white of bench_full_cd_m2 under D65 fills it in 1 s.
 SpectralResponse bench_response();
 inline constexpr double bench_full_cd_m2 = 100;
 
-/// A picture whose white has a luminance; bench_response() makes a charge of it.
+/// Returns the scene of an image whose white has a luminance; bench_response() converts it to charge.
 capture::Scene bench_scene(const BenchPicture& picture, double white_cd_m2);
 
-/// The lights pictures are taken in: white gives about 1200, 24 and 2.4 e-; the last is exposed so long that dark
-/// current shows.
+/// Lights of the scenes: white gives about 1200, 24 and 2.4 e-; the exposure of the last is long enough for dark
+/// current to matter.
 struct SceneLight {
   const char* name;
   double white_cd_m2;
@@ -43,26 +43,26 @@ struct SceneLight {
 inline constexpr std::array scene_lights{SceneLight{"bright", 1500, 1.0 / 30}, SceneLight{"dim", 30, 1.0 / 30},
                                          SceneLight{"very dark", 0.1, 1}};
 
-/// The middle of the pictures that were asked for.
-/// @param most  of them, the first ones; 0: all
+/// Reads central crops of the requested images.
+/// @param most  number of images, the first ones; 0: all
 Result<std::vector<BenchPicture>> read_bench_pictures(const BenchOptions& options, int crop_width, int crop_height,
                                                       std::size_t most, Executor& executor);
 
-/// A plan that keeps these effects in every block of a frame of that size.
+/// Returns a plan that keeps these effects in every block of a frame of that size.
 EffectPlan plan_keeping(EffectSet kept, int width, int height);
 
-/// Even light on a sensor, all of its effects included; RGGB.
+/// Uniform light on a sensor, all of its effects included; RGGB.
 struct EvenLight {
   SensorModel sensor;
   Exposure exposure;
   std::array<double, 3> rate_e_per_s{};  // of R, G and B
-  int width = 0;                         // of the active area
+  int width = 0;                         // width of the active area
   int height = 0;
-  int masked_columns = 0;  // dark ones beside it, on the left; even
+  int masked_columns = 0;  // dark columns to the left of it; even
   std::uint64_t seed = 1;
 };
 
-/// Frame number `frame` of it: the fixed pattern of the seed, and noise of its own.
+/// Returns frame number `frame` of the light: the fixed pattern of the seed, and noise of its own.
 RawDn even_frame(const EvenLight& light, std::uint32_t frame, Executor& executor);
 
 /// Mean and variance of the R, G and B pixels of a box.
@@ -71,16 +71,16 @@ struct BoxStatistics {
   Vector3 variance{};
 };
 
-/// Of all whole boxes of a mosaic, row by row. @param box_px  even
+/// Returns the statistics of all complete boxes of a mosaic, row by row. @param box_px  even
 std::vector<BoxStatistics> box_statistics(const PlaneView<const float>& mosaic, BayerPhase phase, int box_px);
 
-/// What a mean charge above the pedestal is developed to.
+/// Returns the colour that a mean charge above the pedestal is developed to.
 Lab developed_lab(const Developing& developing, const Vector3& mean_e);
 
-/// Charge above the pedestal [e-] of values in DN.
+/// Returns the charge above the pedestal [e-] of values in DN.
 Plane<float> charge_of(const Plane<float>& dn, const SensorModel& sensor);
 
-/// A mosaic of charge [e-] as a picture of half its size, one pixel for each cell of 2 x 2: linear Rec. 709, signed.
+/// Returns a mosaic of charge [e-] as a half-size image, one pixel per cell of 2 x 2: linear Rec. 709, signed.
 SceneLinear binned_picture(const PlaneView<const float>& charge_e, const Developing& developing);
 
 }  // namespace lowlux::isp

@@ -21,13 +21,13 @@ namespace lowlux::isp {
 namespace {
 
 constexpr int outer_px = 4, inner_px = 12, measured_px = 40;  // columns; the trims are those of measure_masked_black()
-constexpr std::int64_t product_least = 500;                   // pixels of a site it asks for
+constexpr std::int64_t product_least = 500;                   // pixels per site that measure_masked_black() requires
 constexpr double grey_e = 20;                                 // green of a grey that is developed to 18 % of white
-constexpr Vector3 grey_of_green{0.5, 1, 0.7};                 // what red and blue pixels get of it
+constexpr Vector3 grey_of_green{0.5, 1, 0.7};                 // red and blue relative to green
 
 PerSite<double> product_black_dn(const RawDn& raw) {
   const MaskedBlack measured = measure_masked_black(raw);
-  return measured.black.value().pedestal_dn;  // the region is stated and large enough
+  return measured.black.value().pedestal_dn;  // cannot fail: the region is declared and large enough
 }
 
 struct Grey {
@@ -35,7 +35,7 @@ struct Grey {
   UvPrime uv;
 };
 
-/// What the grey becomes when black is off by `error_e`: channels of a camera whose primaries are Rec. 709's.
+/// Returns the grey developed with black off by `error_e`: channels of a camera whose primaries are Rec. 709's.
 Grey grey_with(const PerSite<double>& error_e) {
   static const Developing developing{
       rgb_to_xyz(primaries_rec709).value(),
@@ -50,7 +50,7 @@ Grey grey_with(const PerSite<double>& error_e) {
   return {developed_lab(developing, left), uv.value_or(UvPrime{nan, nan})};
 }
 
-/// How wrong the black points of many frames are.
+/// Errors of the black points of many frames.
 struct BlackErrors {
   double rms_e = 0;      // over sites and seeds
   double ciede2000 = 0;  // of the grey, mean over the seeds
@@ -81,7 +81,7 @@ class BlackSums {
   double frames_ = 0;
 };
 
-/// A way to measure black, and how wrong it is.
+/// A way to measure black, and its errors.
 struct Way {
   std::string name;
   PerSite<double> (*measure)(const RawDn&);
@@ -89,7 +89,7 @@ struct Way {
 };
 
 struct Amount {
-  std::int64_t pixels;  // of each site
+  std::int64_t pixels;  // per site
   int seeds;
 };
 
@@ -108,7 +108,7 @@ std::vector<DarkCase> dark_cases() {
   return {{"2 e- dark", plain, 2}, {"200 e- dark, 4 e- read", warm, 200}, {"2 e- dark, 0.1 % hot", hot, 2}};
 }
 
-/// One case: its levels with what they cost and miss.
+/// Measures one case: its levels with their times and errors.
 class BlackCase {
  public:
   BlackCase(const DarkCase& dark, const BenchOptions& options) : dark_(dark), options_(options) {
@@ -138,7 +138,8 @@ class BlackCase {
     }
   }
 
-  /// The root of a mean of n squares of normal deviates has a relative standard error of sqrt(1 / (2 n)).
+  /// Checks the ratio; the root of a mean of n squares of normal deviates has a relative standard error of sqrt(1 / (2
+  /// n)).
   Finding check(const Amount& amount, const std::string& name, double rms_e) const {
     const double ratio = rms_e / black_error_e(dark_, amount.pixels);
     const double allowed = confidence_errors * std::sqrt(0.5 / (4 * amount.seeds));
@@ -191,7 +192,7 @@ PerSite<double> mean_black_dn(const RawDn& raw) {
 }
 
 Result<BenchOutcome> run_black_point_bench(const BenchOptions& options) {
-  const AccuracyTiming timing{.rounds = options.quick ? 3 : 7, .least_s = 2e-3};  // some take microseconds
+  const AccuracyTiming timing{.rounds = options.quick ? 3 : 7, .least_s = 2e-3};  // some work takes microseconds
   StageRows rows{.further = {"closed form [e-]", "CIEDE2000 of a grey", "its u'v' shift", "frames"}};
   std::vector<Finding> findings;
   const std::vector<DarkCase> cases = dark_cases();

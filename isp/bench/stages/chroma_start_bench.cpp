@@ -29,7 +29,7 @@ std::string name_of(Level level, std::optional<int> start) {
   return fmt::format("{}, {}", denoise::name_of(level), start ? std::to_string(*start) : "auto");
 }
 
-/// A picture taken in one light.
+/// An image captured in one light.
 struct Sample {
   const BenchPicture& picture;
   DenoiseShot shot;
@@ -55,7 +55,7 @@ void run(Sample& sample, denoise::Denoiser& denoiser, const denoise::DenoiseOpti
                one);
 }
 
-/// The levels' memory and the pictures they work on.
+/// Holds the levels' memory and the images they process.
 struct Bench {
   std::vector<BenchPicture> pictures;
   MethodMemory memory;
@@ -91,7 +91,7 @@ struct Bench {
     for (const Level which : levels) {
       if (which == Level::best) group.name += ", best, on parts";
       for (const std::optional<int> start : starts) {
-        if (which == Level::best && start == 1) continue;  // best has 0 and 2 alone
+        if (which == Level::best && start == 1) continue;  // best starts at 0 and 2 alone
         group.levels.push_back(level(samples, {.level = which, .white_gain = bench_white_gain, .chroma_start = start}));
       }
     }

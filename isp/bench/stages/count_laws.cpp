@@ -14,7 +14,7 @@ double at(std::span<const double> law, std::size_t k) { return k < law.size() ? 
 
 std::vector<double> poisson_law(double mean) {
   assert(mean > 0 && mean <= 1e6);
-  // 12 standard deviations, and what small means need: the rest is below 1e-17.
+  // The size is 12 standard deviations, plus a margin for small means: the rest is below 1e-17.
   const auto size = static_cast<std::size_t>(mean + 12 * std::sqrt(mean) + 30);
   std::vector<double> law(size, 0.0);
   const auto mode = static_cast<std::size_t>(mean);
@@ -28,7 +28,7 @@ std::vector<double> poisson_law(double mean) {
 
 std::vector<double> law_of_words(const std::function<double(std::uint32_t)>& count_of_word, std::size_t counts) {
   std::vector<double> law(counts);
-  std::uint64_t first = 0;  // word that gives more than k - 1
+  std::uint64_t first = 0;  // first word that gives more than k - 1
   for (std::size_t k = 0; k < counts; ++k) {
     std::uint64_t last = std::uint64_t{1} << 32;  // all words below `first` give k or less; those from `last` on more
     while (first < last) {
@@ -55,7 +55,7 @@ double kolmogorov_distance(std::span<const double> law, std::span<const double> 
 double kolmogorov_distance(std::vector<float> sample, std::span<const double> law) {
   assert(!sample.empty());
   std::ranges::sort(sample);
-  // Between whole numbers the law is level and the sample's distribution rises: the ends are enough.
+  // Between integers the distribution is constant and the sample's rises, so that comparing the ends suffices.
   const auto count = static_cast<double>(sample.size());
   const auto share_to = [&](auto end) { return static_cast<double>(end - sample.begin()) / count; };
   double largest = share_to(std::ranges::lower_bound(sample, 0.0F));

@@ -20,15 +20,15 @@ namespace {
 constexpr PicturePart quick_part{384, 256};
 constexpr DenoiseLight light{20, 2, 1.5};
 
-/// The kernel, demosaicing alone: camera RGB as it is.
+/// Transform that leaves the kernel's camera RGB unchanged, so that demosaicing alone is measured.
 constexpr RgbTransform untouched{.clip = std::numeric_limits<float>::infinity(), .move_into_gamut = false};
 
-/// A mosaic, the truth behind it, and memory for what is made of it.
+/// A mosaic, the truth behind it, and memory for the results.
 struct Sample {
   const BenchPicture& picture;
   DenoiseShot shot;
   PictureTruth truth;
-  Plane<float> noisy_e;  // dark off
+  Plane<float> noisy_e;  // dark subtracted
   SceneLinear light;
   SceneLinear half;
   DoublePlanes exact;
@@ -67,7 +67,7 @@ SceneLinear rounded(const DoublePlanes& exact) {
   return out;
 }
 
-/// One way from a sample's mosaic to RGB: the work, and what it made as a picture of full size.
+/// One way from a sample's mosaic to RGB: the work, and its result as an image of full size.
 struct Method {
   std::string name;
   void (*work)(Sample& sample, const SignedMosaic& mosaic, RawToRgb& kernel);
@@ -104,7 +104,7 @@ std::vector<Method> methods() {
        [](const Sample& sample) { return rounded(sample.exact); }}};
 }
 
-/// What all groups work with.
+/// Data that all groups use.
 struct Bench {
   std::vector<Sample> samples;
   RawToRgb kernel;
@@ -129,7 +129,7 @@ struct Bench {
     return out;
   }
 
-  /// Mean and largest difference of the kernel from double, in millionths of display white.
+  /// Sets the mean and largest difference of the kernel from double, in millionths of display white.
   void set_rounding(AccuracyLevel& kernel_level) {
     double sum = 0, values = 0, largest = 0;
     for (Sample& sample : samples) {

@@ -16,20 +16,20 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr int rounds = 5;
-constexpr int slow_rounds = 3;  // of slow methods, with the first picture alone
-/// The middle of a picture, where a part is enough: to tune others, and to be quick.
+constexpr int slow_rounds = 3;  // of slow methods, with the first image alone
+/// Central crops, used where a crop suffices: to tune other methods, and for quick runs.
 constexpr PicturePart tuning_part{256, 160}, quick_part{192, 128};
-constexpr int crop_px = 192;                        // side of a picture's part in the report
-constexpr const char* compared_level = "standard";  // with none
-constexpr double search_share = 0.2;                // of the whole's time
+constexpr int crop_px = 192;                        // side of an image's crop in the report
+constexpr const char* compared_level = "standard";  // level compared with `none`
+constexpr double search_share = 0.2;                // fraction of the total time
 
-/// What is measured: pictures in lights.
+/// Input of all measurements: images in lights.
 struct Work {
   const BenchOptions& options;
   std::vector<BenchPicture> pictures;
   std::vector<DenoiseLight> lights;
-  std::vector<TunedParameters> tuned;     // for each light
-  std::vector<StrengthSearch> strengths;  // for each picture in each light, picture by picture
+  std::vector<TunedParameters> tuned;     // one for each light
+  std::vector<StrengthSearch> strengths;  // one for each image in each light, image by image
 
   std::size_t shots() const { return pictures.size() * lights.size(); }
 };
@@ -46,7 +46,7 @@ StrengthSearch searched(const Work& work, std::size_t picture, std::size_t light
   return search_strength(*work.options.nl_means, nl_means_input(result->picture), PictureTruth(of.linear.view(), one));
 }
 
-/// Shared by the executor's threads, one shot each.
+/// Distributes the searches over the executor's threads, one shot each.
 Result<void> search_all(Work& work, Executor& executor) {
   work.strengths.resize(work.shots());
   for_each_index(executor, static_cast<int>(work.shots()), [&](int index) {
@@ -72,7 +72,7 @@ void add(PictureError& sum, const PictureError& error, double share) {
   sum.saturation_ratio += share * error.saturation_ratio;
 }
 
-/// What a method makes of the middle of a picture.
+/// Result of a method for the central crop of an image.
 struct NamedPart {
   std::string name;
   Encoded8 codes;
@@ -102,7 +102,7 @@ Encoded8 middle_codes(const SceneLinear& display) {
   return codes_of(part);
 }
 
-/// The pictures of a light for the report: all parts in a row, and two of them to be compared.
+/// Adds the images of a light to the report: all crops in a row, and two of them for comparison.
 void add_pictures(const DenoiseLight& light, std::vector<NamedPart> parts, BenchOutcome& outcome) {
   const std::string id = fmt::format("denoise-{:g}-{:g}", light.mean_e, light.dark_e);
   outcome.images.push_back({id, side_by_side(parts)});
@@ -117,7 +117,7 @@ void add_pictures(const DenoiseLight& light, std::vector<NamedPart> parts, Bench
                                  .after_label = fmt::format("level {}", compared_level)});
 }
 
-/// Rows of one light.
+/// Measures the rows of one light.
 class LightRows {
  public:
   LightRows(const Work& work, std::size_t light, const std::vector<DenoiseMethod>& methods)
@@ -165,14 +165,14 @@ class LightRows {
     return std::move(rows_);
   }
 
-  std::vector<NamedPart> parts;  // of the first picture
+  std::vector<NamedPart> parts;  // crops of the first image
 
  private:
   const Work& work_;
   std::size_t light_;
   const std::vector<DenoiseMethod>& methods_;
   std::vector<DenoiseRow> rows_;
-  std::vector<std::vector<double>> spreads_;  // of each row, of the pictures that have one
+  std::vector<std::vector<double>> spreads_;  // by row, of the images that have one
 };
 
 std::vector<std::string> remarks_of(const Work& work) {
@@ -272,7 +272,7 @@ bool dominates(const DenoiseRow& a, const DenoiseRow& b) {
 
 BenchCell if_ceiling_none(const DenoiseRow& row, double value) { return row.kind == MethodKind::ceiling ? nan : value; }
 
-/// The rows of the light of `first`, which follow it.
+/// Returns the rows of the light that begins at `first`.
 std::span<const DenoiseRow> rows_of_light(std::span<const DenoiseRow> rows, std::size_t first) {
   std::size_t last = first;
   while (last < rows.size() && same_light(rows[first], rows[last])) ++last;
@@ -312,7 +312,7 @@ Plot plot_of(std::span<const DenoiseRow> rows) {
 
 std::vector<DenoiseLight> denoise_lights(bool quick) {
   constexpr double small_dark_e = 2, small_read_e = 1.5, large_dark_e = 200, large_read_e = 4;
-  constexpr double most_over_large_dark_e = 20;  // with more light, that dark makes no other picture than little dark
+  constexpr double most_over_large_dark_e = 20;  // with more light, large dark charge gives the same image as small
   if (quick) return {{20, small_dark_e, small_read_e}, {4, large_dark_e, large_read_e}};
   std::vector<DenoiseLight> out;
   for (const double mean_e : {2000, 200, 20, 4, 1}) {

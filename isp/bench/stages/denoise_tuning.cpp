@@ -42,7 +42,7 @@ double chromatic_psnr_db(const std::vector<Sample>& samples, const ChromaticWind
   return sum / static_cast<double>(samples.size());
 }
 
-/// One radius after the other, each over all radii, twice.
+/// Searches one radius after the other, each over all radii, twice.
 ChromaticWindows best_windows(const std::vector<Sample>& samples, Executor& executor) {
   ChromaticWindows best{2, 2};
   double best_db = chromatic_psnr_db(samples, best, executor);
@@ -75,8 +75,8 @@ double gat_psnr_db(const std::vector<Sample>& samples, const std::array<double, 
   return sum / static_cast<double>(samples.size());
 }
 
-/// Stabilised noise is white and equal in all colours, which speaks for equal gains; neutral detail is equal under the
-/// square roots of the gains, where photons are all the noise.
+/// Chooses between two sets of gains. Stabilised noise is white and equal in all colours, which favours equal gains;
+/// neutral detail is equal under the square roots of the gains, where noise is photon noise alone.
 std::array<double, 3> best_gain(const std::vector<Sample>& samples, Executor& executor) {
   constexpr std::array<double, 3> equal{1, 1, 1};
   std::array<double, 3> roots{};

@@ -27,17 +27,17 @@ namespace {
 using denoise::Level;
 
 constexpr PicturePart quick_part{192, 128};
-constexpr PicturePart shown_part{288, 192};  // of a picture in the report: twice as large it fills its column
+constexpr PicturePart shown_part{288, 192};  // size of a crop in the report: enlarged twice, it fills its column
 constexpr std::size_t pictures_used = 3;
 constexpr int rounds_by_one = 3;
 constexpr std::size_t least_undominated = 4;
 constexpr double least_span = 50;
 constexpr std::string_view light_of_images = "20 e-";
 
-/// What is asked of develop, beside the look.
+/// Options of develop, in addition to the look.
 struct PlanChoice {
   std::optional<Level> level;  // absent: off
-  bool repairs = true;         // defects that are found, and lines
+  bool repairs = true;         // of detected defects, and of lines
   bool half = false;
 
   std::string name() const {
@@ -87,10 +87,10 @@ Result<std::vector<SimulatedRaws>> raws_of(const std::vector<BenchPicture>& pict
   return out;
 }
 
-/// A picture taken in one light, and what is developed of it without noise.
+/// An image captured in one light, and its noise-free version developed.
 struct Scene {
   const RawFrame& noisy;
-  double exposure_ev = 0;  // automatic, of the mean
+  double exposure_ev = 0;  // automatic, of the mean frame
   PictureTruth truth;
 };
 
@@ -111,7 +111,7 @@ Result<std::vector<Scene>> scenes_of(const std::vector<SimulatedRaws>& raws, con
   return out;
 }
 
-/// Adds a scene's share to the errors of a level.
+/// Adds a scene's contribution to the errors of a level.
 Result<void> add_error(const Scene& scene, const DevelopOptions& options, double share, AccuracyLevel& level,
                        Executor& executor) {
   const auto developed = develop(scene.noisy, options, executor);
@@ -124,7 +124,7 @@ Result<void> add_error(const Scene& scene, const DevelopOptions& options, double
   return {};
 }
 
-/// One group by all threads and the same by one.
+/// Rows of one group, timed with all threads and with one.
 struct MeasuredPlans {
   std::vector<AccuracyRow> by_all;
   std::vector<AccuracyRow> by_one;
@@ -147,7 +147,7 @@ Result<MeasuredPlans> measured(const std::vector<Scene>& scenes, const DevelopLi
       if (!added) return tl::make_unexpected(added.error());
     }
     level.run = [&executor_in_use, &timed, options = options_of(choice, look, light, scenes.front().exposure_ev)] {
-      (void)develop(timed, options, *executor_in_use);  // it worked before
+      (void)develop(timed, options, *executor_in_use);  // the same call succeeded before
     };
     group.levels.push_back(std::move(level));
   }
@@ -175,7 +175,7 @@ Finding undominated_finding(std::span<const AccuracyRow> rows) {
           Finding::Kind::check};
 }
 
-/// What all lights add to.
+/// Collects the results of all lights.
 struct Gathered {
   std::vector<AccuracyRow> rows;
   std::vector<AccuracyRow> by_one;
@@ -194,7 +194,7 @@ Encoded8 middle_of(const Encoded8& picture) {
   return out;
 }
 
-/// The middle of one dark frame by several plans for the page, each as exposed automatically.
+/// Adds the central crop of one dark frame by several plans to the page, each with automatic exposure.
 Result<void> add_pictures(const RawFrame& frame, const DevelopLight& light, Executor& executor, Gathered& out) {
   struct Shown {
     const char* id;
@@ -256,7 +256,7 @@ Result<BenchOutcome> run_develop_bench(const BenchOptions& options) {
     options.advance(1 / static_cast<double>(lights.size()), "plans at " + light.name);
   }
   BenchOutcome out = accuracy_outcome("develop", all_lights.rows, timing, options.threads);
-  if (!quick) out.findings = std::move(all_lights.findings);  // of parts, planning takes most of the time
+  if (!quick) out.findings = std::move(all_lights.findings);  // for crops, planning takes most of the time
   out.images = std::move(all_lights.images);
   out.comparisons = std::move(all_lights.comparisons);
   out.table.columns.insert(out.table.columns.end(), {"one thread [ms/MP]", "its spread [%]"});

@@ -17,7 +17,7 @@ double largest_resident_bytes() {
   return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
-/// The largest resident set starts from the one there is now. False: the system does not do that.
+/// Resets the largest resident set to the current one. Returns false if the system does not support it.
 bool forget_largest_resident() {
   const int file = open("/proc/self/clear_refs", O_WRONLY | O_CLOEXEC);
   const bool forgotten = file >= 0 && write(file, "5", 1) == 1;
@@ -25,9 +25,9 @@ bool forget_largest_resident() {
   return forgotten;
 }
 
-/// In the child: what the work added, to the parent.
+/// Runs the work in the child and sends the added memory to the parent.
 [[noreturn]] void tell(int to, const std::function<bool()>& work) {
-  malloc_trim(0);  // or memory that was freed before would be taken again and not counted
+  malloc_trim(0);  // freed memory would otherwise be reused and not counted
   const bool forgotten = forget_largest_resident();
   const double before = largest_resident_bytes();
   const double added = forgotten && work() ? largest_resident_bytes() - before : -1;

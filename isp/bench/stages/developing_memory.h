@@ -5,12 +5,12 @@
 
 namespace lowlux::isp {
 
-/// The most memory that work takes beyond what is there before [bytes]: it is done in a child process, whose largest
-/// resident set is asked for before and after, so that nothing is counted that other work left behind. The child has
-/// the calling thread alone, and ends with the work. nullopt: no child could be made, or it failed.
+/// Returns the peak memory that work takes in addition to the memory in use before [bytes]. The work runs in a child
+/// process, whose largest resident set is read before and after, so that memory left by other work does not count. The
+/// child has the calling thread alone, and ends with the work. Returns nullopt if it could not be started, or failed.
 std::optional<double> peak_bytes_of(const std::function<bool()>& work);
 
-/// Of the machine [bytes].
+/// Returns the physical memory of the machine [bytes].
 double physical_bytes();
 
 }  // namespace lowlux::isp

@@ -26,12 +26,12 @@ namespace {
 
 constexpr PicturePart part{384, 256}, quick_part{96, 64};
 constexpr double pixels_of_cell = LookGrid::cell * LookGrid::cell;
-constexpr double least_field_ratio = 0.27;  // as of NightLookGrid
+constexpr double least_field_ratio = 0.27;  // as in NightLookGrid
 constexpr float dark = 1e-6f;
 constexpr AccuracyTiming timing{.rounds = 5, .least_s = 1e-3};
 
 const Matrix3& to_xyz() {
-  static const Matrix3 matrix = rgb_to_xyz(primaries_rec709).value();  // of constants
+  static const Matrix3 matrix = rgb_to_xyz(primaries_rec709).value();  // cannot fail for constants
   return matrix;
 }
 
@@ -44,7 +44,7 @@ double scotopic_ratio_of_white() { return scotopic_luminance(white()); }
 
 Lab lab_of_xyz(const Xyz& xyz) { return lab_of(xyz, white()); }
 
-/// The colours of all pictures: linear Rec. 709 in one row, and what eyes weigh of it relative to white.
+/// Colours of all images: linear Rec. 709 in one row, and their photopic and scotopic luminance relative to white.
 struct Colours {
   SceneLinear rgb;
   std::vector<float> cones;
@@ -54,7 +54,7 @@ struct Colours {
   Vector3 at(std::size_t i) const { return {rgb.plane[0].data()[i], rgb.plane[1].data()[i], rgb.plane[2].data()[i]}; }
 };
 
-/// Every n-th, so that there are no more than so many.
+/// Returns every n-th colour, so that there are at most `most`.
 Colours colours_of(const std::vector<BenchPicture>& pictures, std::size_t most) {
   std::vector<Vector3> all;
   for (const BenchPicture& picture : pictures) {
@@ -79,9 +79,9 @@ Colours colours_of(const std::vector<BenchPicture>& pictures, std::size_t most) 
   return out;
 }
 
-/// What an eye adapted to each colour itself makes of it: three of the parts of LookGrid.
+/// States of an eye adapted to each colour itself: three of the parts of LookGrid.
 struct States {
-  std::vector<float> cones_cd_m2, rods_cd_m2;  // the fields
+  std::vector<float> cones_cd_m2, rods_cd_m2;  // fields of adaptation
   std::vector<float> rod_share, chroma, blue, variance_deg2;
 };
 
@@ -120,7 +120,7 @@ void look_up_each(States& states) {
                 {states.rod_share.data(), states.chroma.data(), states.blue.data(), states.variance_deg2.data()});
 }
 
-/// One state for all, that of the mean.
+/// Sets one state for all colours, the state of the mean.
 void solve_once(States& states) {
   LuminancePair sum;
   for (std::size_t i = 0; i < states.chroma.size(); ++i) {
@@ -134,7 +134,7 @@ void solve_once(States& states) {
   }
 }
 
-/// LookGrid's change of colours without its blur, in double.
+/// Applies LookGrid's change of colours without its blur, in double.
 std::vector<Lab> seen(const Colours& colours, const States& states) {
   std::vector<Lab> out;
   out.reserve(colours.size());
@@ -196,7 +196,7 @@ std::vector<Lab> lab_of_planes(const SceneLinear& rgb) {
 }
 
 void map_each(const ColourMap& map, const SceneLinear& in, SceneLinear& out) {
-  static const Matrix3 from_xyz = inverse(to_xyz()).value();  // of constants
+  static const Matrix3 from_xyz = inverse(to_xyz()).value();  // cannot fail for constants
   for (std::size_t i = 0; i < in.plane[0].size(); ++i) {
     const Vector3 v{in.plane[0].data()[i], in.plane[1].data()[i], in.plane[2].data()[i]};
     const Vector3 mapped = from_xyz * vector_of(map(xyz_of(to_xyz() * v)));
@@ -204,13 +204,13 @@ void map_each(const ColourMap& map, const SceneLinear& in, SceneLinear& out) {
   }
 }
 
-/// A table, and how long making it took.
+/// A table, and the time taken to make it.
 struct MadeTable {
   ColourTable table;
   double made_s = 0;
 };
 
-/// Tables of rising size, of several bounds that one size meets the first.
+/// Returns tables of rising size; if several bounds give one size, only the first is kept.
 Result<std::vector<MadeTable>> tables_of(const ColourMap& map, std::span<const double> of_bounds) {
   std::vector<MadeTable> out;
   out.reserve(of_bounds.size());

@@ -21,9 +21,9 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::array shares_of_full{0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6};  // of flats: levels of light
-constexpr Exposure flat_exposure{.time_s = 0.01, .temperature_c = 20};          // of darks too
+constexpr Exposure flat_exposure{.time_s = 0.01, .temperature_c = 20};          // of flats and of darks
 
-/// Relative errors of figures that were measured many times.
+/// Relative errors of values that were measured many times.
 struct FitErrors {
   double gain_square = 0, told_square = 0, noise_square = 0;
   int fits = 0, refused = 0;
@@ -37,9 +37,9 @@ constexpr const char* gain_error = "relative error of the system gain, rms";
 
 AccuracyTiming timing_of(const BenchOptions& options) { return {.rounds = options.quick ? 2 : 5}; }
 
-// Photon transfer.
+// Photon transfer follows.
 
-/// How many frames are taken, of how many pixels.
+/// Numbers of frames, and of their pixels.
 struct FlatAmount {
   int side;
   int pairs;  // of darks, and of each level of light
@@ -51,7 +51,7 @@ std::vector<FlatAmount> flat_amounts(bool quick) {
   return {{64, 1, 100}, {64, 4, 40}, {128, 1, 60}, {256, 1, 30}, {256, 4, 10}, {512, 1, 10}};
 }
 
-/// The frames of one photon transfer measurement: pairs of darks, then pairs of flats, level by level.
+/// Frames of one photon transfer measurement: pairs of darks, then pairs of flats, level by level.
 struct FlatFrames {
   std::vector<RawDn> frames;
   int pairs;
@@ -87,7 +87,7 @@ FlatFrames take_flats(const FlatAmount& amount, std::uint64_t seed) {
   return out;
 }
 
-/// Temporal noise of darks of flat_exposure [e-].
+/// Returns the temporal noise of darks of flat_exposure [e-].
 double dark_noise_e(const SensorModel& s) {
   return std::sqrt(s.read_noise_e * s.read_noise_e + s.row_noise_e * s.row_noise_e + dark_mean_e(s, flat_exposure)[1]);
 }
@@ -100,7 +100,8 @@ void add(FitErrors& errors, const calib::PhotonTransfer& found, const SensorMode
   ++errors.fits;
 }
 
-/// Relative standard error of a root mean square of n normal deviates: sqrt(1 / (2 n)).
+/// Checks the fit's standard error. A root mean square of n normal deviates has the relative standard error sqrt(1 / (2
+/// n)).
 Finding told_finding(const std::string& id, const FitErrors& errors) {
   const double ratio = errors.gain() / errors.told(), allowed = confidence_errors * std::sqrt(0.5 / errors.fits);
   return check_of("noise-fit/" + id, "the gain's error is the standard error that the fit tells, to five of its own",
@@ -133,9 +134,9 @@ Result<void> measure_flats(const BenchOptions& options, StageRows& rows, std::ve
   return {};
 }
 
-// Single pictures.
+// Single images follow.
 
-/// One raw of a picture, and what the sensor adds to its light.
+/// One raw frame of an image, and the sensor's contribution to its light.
 struct NoisyPicture {
   RawDn raw;
   PerSite<double> black_dn{};  // dark charge included
@@ -160,7 +161,8 @@ Result<std::vector<NoisyPicture>> take_pictures(const std::vector<BenchPicture>&
   return out;
 }
 
-/// Noise of a pixel without light [e-]: the patterns of the dark count, which one frame cannot tell from noise.
+/// Returns the noise of a pixel without light [e-], including patterns of the dark, which one frame cannot separate
+/// from noise.
 double lightless_noise_e(const SensorModel& s, const Exposure& exposure) {
   const double dark_e = dark_mean_e(s, exposure)[1];
   return std::sqrt(s.read_noise_e * s.read_noise_e + s.row_noise_e * s.row_noise_e +
@@ -202,7 +204,7 @@ std::vector<PictureWay> picture_ways(bool quick) {
           {"details, all", {PictureNoiseMethod::foi, 400'000}}};
 }
 
-/// A light's pictures by each way; those that no picture was good enough for are told in the remarks.
+/// Measures a light's images by each method; methods for which no image was suitable are reported in the remarks.
 Result<void> measure_pictures(const std::vector<BenchPicture>& pictures, const SceneLight& light,
                               const BenchOptions& options, StageRows& rows, std::vector<std::string>& remarks) {
   PoolExecutor executor(options.threads);
@@ -242,7 +244,7 @@ Result<BenchOutcome> run_noise_fit_bench(const BenchOptions& options) {
   std::vector<Finding> findings;
   std::vector<std::string> left_out;
   if (const auto done = measure_flats(options, rows, findings); !done) return tl::make_unexpected(done.error());
-  const auto lights = std::span(scene_lights).first(options.quick ? 1 : 2);  // in the last there is little but noise
+  const auto lights = std::span(scene_lights).first(options.quick ? 1 : 2);  // the last light contains little but noise
   for (const SceneLight& light : lights) {
     const auto done = measure_pictures(*pictures, light, options, rows, left_out);
     if (!done) return tl::make_unexpected(done.error());

@@ -20,16 +20,16 @@ namespace {
 
 constexpr int width = 512;
 constexpr std::uint64_t seed = 20261122;
-constexpr double exact_bound = 0x1p-32;  // of 2^32 words none can be split, and the counts are rounded to the nearest
+constexpr double exact_bound = 0x1p-32;  // none of 2^32 words can be split, and the counts are rounded to the nearest
 
-/// How much is drawn.
+/// Amount of samples.
 struct Size {
   int height;  // rows of `width` pixels in a round
   int rounds;
-  std::size_t samples;  // of what has no closed form
+  std::size_t samples;  // for methods without a closed form
 };
 
-/// A white under D65, so long that green pixels expect `mean_e`.
+/// A white under D65, exposed so that green pixels expect `mean_e`.
 struct Flat {
   explicit Flat(const SpectralResponse& response, int height)
       : scene(capture::flat_scene({width, height, light_named("D65").value(), "D65", 1}).value()),
@@ -39,9 +39,9 @@ struct Flat {
   double green_e_per_s;
 };
 
-/// sum x_i Qe_i^2 / sum x_i Qe_i - 1 in green: the relative error of the variance that Eq. 4.4 to 4.6 give.
+/// Returns sum x_i Qe_i^2 / sum x_i Qe_i - 1 in green: the relative error of the variance that Eq. 4.4 to 4.6 give.
 double published_variance_error(const SpectralResponse& response, const Spectrum& radiance) {
-  const Spectrum photons = photon_radiance(radiance).value();  // of a radiance that is not negative
+  const Spectrum photons = photon_radiance(radiance).value();  // cannot fail for a radiance that is not negative
   const std::vector<double> widths = bin_widths_nm(photons);
   double mean = 0, variance = 0;
   for (std::size_t i = 0; i < photons.size(); ++i) {
@@ -52,7 +52,7 @@ double published_variance_error(const SpectralResponse& response, const Spectrum
   return variance / mean - 1;
 }
 
-/// One light: what the levels draw into, and the laws.
+/// One light: the output of the levels, and the distributions.
 class PhotonLight {
  public:
   PhotonLight(double mean_e, const Flat& flat, const capture::PhotonRows& photons, const Size& size)
@@ -107,7 +107,7 @@ class PhotonLight {
     std::ranges::generate(sample, [&] { return static_cast<float>(poisson(sequence_)); });
     return sample;
   }
-  /// Of green pixels.
+  /// Returns samples of green pixels.
   std::vector<float> published_sample() {
     std::vector<float> sample;
     sample.reserve(static_cast<std::size_t>(width) * size_.height / 2);

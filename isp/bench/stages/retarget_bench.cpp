@@ -31,7 +31,7 @@ constexpr std::size_t quick_tables = 2;
 constexpr double largest_code = 65535;
 constexpr AccuracyTiming timing{.rounds = 5, .least_s = 1e-3};
 
-/// Colours of all pictures as codes of 16 bits.
+/// Returns the colours of all images as codes of 16 bits.
 std::vector<std::uint16_t> codes_of(const std::vector<PictureColours>& pictures) {
   std::vector<std::uint16_t> out;
   std::size_t colours = 0;
@@ -46,7 +46,7 @@ std::vector<std::uint16_t> codes_of(const std::vector<PictureColours>& pictures)
 }
 
 Lab lab_of_code(const Vector3& code) {
-  static const Matrix3 to_xyz = rgb_to_xyz(primaries_rec709).value();  // of constants
+  static const Matrix3 to_xyz = rgb_to_xyz(primaries_rec709).value();  // cannot fail for constants
   static const Xyz white = xyz_of(to_xyz * Vector3{1, 1, 1});
   Vector3 light{};
   for (std::size_t c = 0; c < 3; ++c) light[c] = decode_transfer(OutputSpace::srgb, code[c]);
@@ -68,7 +68,7 @@ void map_each(const CodeMap& map, const std::vector<std::uint16_t>& codes, std::
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = map(code_at(codes, i));
 }
 
-/// Colours, and memory for what becomes of them.
+/// Colours, and memory for the results.
 struct Work {
   std::vector<std::uint16_t> codes;
   std::vector<std::uint16_t> shown;

@@ -42,7 +42,7 @@ struct Rounds {
   double few_from_mp;
 };
 constexpr Rounds full_rounds{5, 2, 25}, quick_rounds{2, 2, 3};
-constexpr double memory_share = 0.4;  // of the machine's, that a frame may ask for
+constexpr double memory_share = 0.4;  // fraction of the machine's memory that a frame may need
 constexpr int files = 8;
 constexpr double file_mp = 1;
 
@@ -59,13 +59,13 @@ DevelopOptions options_of(const PlanKind& plan) {
   return out;
 }
 
-/// 3 : 2, even sides.
+/// Returns a frame of 3 : 2, with even sides.
 RawFrame frame_of(const RawFrame& small, double megapixels) {
   const int width = 2 * static_cast<int>(std::lround(std::sqrt(1.5e6 * megapixels) / 2));
   return tiled(small, width, 2 * static_cast<int>(std::lround(width / 3.0)));
 }
 
-/// One line of the table; what was not measured is not a number.
+/// One line of the table; values that were not measured are not numbers.
 struct ScalingRow {
   std::string plan;
   double megapixels = nan;
@@ -87,7 +87,7 @@ std::vector<int> thread_counts(int threads) {
   return out;
 }
 
-/// All plans by all numbers of threads, in turn, on one frame.
+/// Times all plans with all numbers of threads, in turn, on one frame.
 std::vector<ScalingRow> rows_of(const RawFrame& frame, const std::vector<std::unique_ptr<Executor>>& executors,
                                 int rounds) {
   const double megapixels = 1e-6 * pixels_of(frame);
@@ -116,7 +116,7 @@ std::vector<ScalingRow> rows_of(const RawFrame& frame, const std::vector<std::un
   return out;
 }
 
-/// A folder of its own for files, which goes with them.
+/// A temporary folder for files, removed with the object.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -147,7 +147,7 @@ Result<void> develop_file(const ScratchFolder& folder, int index, Executor& exec
                        {.overwrite = Overwrite::yes}, executor);
 }
 
-/// All files, several at a time, each of these with its share of the threads.
+/// Develops all files, several at a time, each with an equal part of the threads.
 Result<void> develop_files(const ScratchFolder& folder, int jobs, int threads) {
   std::atomic<int> next{0};
   std::vector<Result<void>> outcome(files);
@@ -214,7 +214,7 @@ BenchTable table_of(const std::vector<ScalingRow>& rows) {
   return out;
 }
 
-/// A figure over the frame's size, a line for each plan and number of threads that have it.
+/// Plots a quantity over the frame's size, a line for each plan and number of threads that have it.
 Plot plot_over_size(const std::vector<ScalingRow>& rows, std::string id, const std::string& label,
                     double ScalingRow::*figure) {
   Plot out{.id = std::move(id),
@@ -234,7 +234,7 @@ Plot plot_over_size(const std::vector<ScalingRow>& rows, std::string id, const s
   return out;
 }
 
-/// Frames of all sizes there is memory for.
+/// Measures frames of all sizes that fit in memory.
 std::vector<ScalingRow> rows_over_size(const RawFrame& small, const BenchOptions& options, const Rounds& rounds,
                                        std::string& left_out) {
   std::vector<std::unique_ptr<Executor>> executors;

@@ -19,17 +19,17 @@ using capture::PhotonSampling;
 using capture::SyntheticSource;
 
 constexpr int box_px = 8;
-constexpr std::uint32_t pair_frame = 10;  // and the next: frames whose difference is noise
+constexpr std::uint32_t pair_frame = 10;  // this frame and the next have a difference that is noise
 
-/// A way to simulate, as `lowlux simulate` is told it.
+/// A way to simulate, as the options of `lowlux simulate` select it.
 struct SimulatePlan {
   std::string name;
   PhotonSampling sampling = PhotonSampling::physical;
   capture::EffectChoice effects;
-  std::uint32_t frame = 0;  // whose noise
+  std::uint32_t frame = 0;  // frame whose noise is drawn
 };
 
-/// The first is the reference.
+/// Returns the plans; the first is the reference.
 std::vector<SimulatePlan> simulate_plans() {
   const capture::EffectChoice all, automatic{Tolerance{}, {}}, none{std::nullopt, EffectSet()};
   return {{"physical, all", PhotonSampling::physical, all},
@@ -39,9 +39,9 @@ std::vector<SimulatePlan> simulate_plans() {
           {"published, all", PhotonSampling::published, all}};
 }
 
-/// Charge above the pedestal [e-] of a file, by its black and white level alone.
+/// Returns the charge above the pedestal [e-] of a file, by its black and white level alone.
 Plane<float> charge_of_file(const RawDn& raw, double saturation_e) {
-  const double black = raw.black_tag.value().at(0, 0);  // simulated files have one
+  const double black = raw.black_tag.value().at(0, 0);  // simulated files have one level
   const double e_per_code = saturation_e / (raw.white_dn[1] - black);
   Plane<float> out(raw.dn.width(), raw.dn.height());
   std::transform(raw.dn.data(), raw.dn.data() + raw.dn.size(), out.data(), [&](std::uint16_t code) {
@@ -59,7 +59,7 @@ std::vector<Lab> boxes_of(const RawDn& raw, const Developing& developing, double
   return out;
 }
 
-/// All pictures in one light by one plan.
+/// Holds the sources of all images in one light by one plan.
 struct PlanSources {
   std::vector<SyntheticSource> sources;
   double megapixels = 0;
@@ -80,7 +80,7 @@ Result<PlanSources> sources_of(const std::vector<BenchPicture>& pictures, const 
   return out;
 }
 
-/// Temporal variance of a pixel, mean of all: half the mean square of the difference of two frames [e-^2].
+/// Returns the mean temporal variance of a pixel: half the mean square of the difference of two frames [e-^2].
 double temporal_variance_e2(const PlanSources& plan, double saturation_e, Executor& executor) {
   double sum = 0, count = 0;
   for (const SyntheticSource& source : plan.sources) {
@@ -92,13 +92,13 @@ double temporal_variance_e2(const PlanSources& plan, double saturation_e, Execut
   return sum / count;
 }
 
-/// What a plan gets wrong.
+/// Errors of a plan.
 struct PlanError {
-  double p95 = 0;       // CIEDE2000 of boxes
-  double variance = 0;  // relative, of temporal_variance_e2()
+  double p95 = 0;       // 95th percentile of CIEDE2000 of boxes
+  double variance = 0;  // relative error of temporal_variance_e2()
 };
 
-/// Errors of a light's plans, against the one that is asked for first.
+/// Computes errors of a light's plans, against the first plan that is requested.
 class LightErrors {
  public:
   PlanError of(const PlanSources& plan, std::uint32_t frame, Executor& executor) {
@@ -123,7 +123,7 @@ class LightErrors {
   double reference_e2_ = 0;
 };
 
-/// Levels of a light: the same work on one thread and on all.
+/// Measures the levels of a light: the same work on one thread and on all.
 Result<void> measure_light(const std::vector<BenchPicture>& pictures, const SceneLight& light,
                            const BenchOptions& options, Executor& executor, StageRows& rows) {
   InlineExecutor one;

@@ -20,7 +20,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::array tolerances{Tolerance{0.1, 0.01}, Tolerance{0.5, 0.05}, Tolerance{2, 0.2}};
-constexpr int shown_px = 384;  // side of a picture's part in the report, before it is binned
+constexpr int shown_px = 384;  // side of an image's crop in the report, before binning
 
 std::string name_of(const Tolerance& tolerance) {
   return fmt::format("auto {:g},{:g}", tolerance.delta_e, tolerance.relative_variance);
@@ -32,14 +32,14 @@ std::string id_of(const SceneLight& light) {
   return id;
 }
 
-/// One picture in one light: its charge, its blocks, and the frame with all effects.
+/// One image in one light: its charge, its blocks, and the frame with all effects.
 struct PictureShot {
   capture::SyntheticSource source;
   std::vector<BlockLevel> blocks;
   Plane<float> all_dn;
 };
 
-/// Which effects a level keeps: those of a tolerance, or these.
+/// Selects the effects of a level: those the planner keeps for a tolerance, or a fixed set.
 struct Choice {
   std::string name;
   std::optional<Tolerance> tolerance;
@@ -59,7 +59,7 @@ std::vector<Choice> choices() {
   return out;
 }
 
-/// All pictures in one light.
+/// Measures all images in one light.
 class EffectsLight {
  public:
   static Result<EffectsLight> of(const std::vector<BenchPicture>& pictures, const SceneLight& light,
@@ -81,7 +81,7 @@ class EffectsLight {
     return out;
   }
 
-  /// Changes of each choice, and the levels.
+  /// Returns the levels and their errors, and adds changes and findings for each choice.
   AccuracyGroup measure(std::vector<std::vector<double>>& figures, std::vector<Finding>& findings) {
     AccuracyGroup group{light_.name, "largest CIEDE2000 of block means against all effects", {}};
     auto dn = std::make_shared<Plane<float>>(most_width_, most_height_);
@@ -105,7 +105,7 @@ class EffectsLight {
     return group;
   }
 
-  /// The first picture's middle with all effects, by the planner at each tolerance, and with none.
+  /// Returns the centre of the first image with all effects, by the planner at each tolerance, and with none.
   Encoded8 strip() const {
     const PictureShot& shot = shots_.front();
     const int width = std::min(shown_px, shot.all_dn.width()), height = std::min(shown_px, shot.all_dn.height());
@@ -157,7 +157,7 @@ class EffectsLight {
     }
   }
 
-  /// As it is developed, but the brightest pixel to white however dark it is.
+  /// Develops normally, but maps the brightest pixel to white however dark it is.
   static Developing shown_developing(const PictureShot& shot) {
     Developing out = shot.source.developing();
     const double peak_e = std::ranges::max(shot.blocks, {}, &BlockLevel::peak_e).peak_e;
@@ -184,7 +184,7 @@ class EffectsLight {
     return out;
   }
 
-  /// How close a choice came to what it must not pass: the tolerance of a plan, or what was predicted.
+  /// Finds the choice that came closest to its limit: the tolerance of a plan, or the prediction.
   struct Closest {
     double share = 0;
     std::string choice = "-";

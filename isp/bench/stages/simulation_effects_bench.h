@@ -8,22 +8,22 @@
 
 namespace lowlux::isp {
 
-/// What frames whose effects differ are made with; RGGB.
+/// Data from which frames with different effects are made; RGGB.
 struct ChangedFrame {
   const SensorModel& sensor;
   Exposure exposure;
   const Developing& developing;
 };
 
-/// The larger of both, figure by figure.
+/// Returns the larger of both, member by member.
 PredictedChange larger(const PredictedChange& a, const PredictedChange& b);
 
-/// The largest over all whole blocks of effect_block px: CIEDE2000 of their developed means, and the difference of a
-/// channel's variance, relative to that of `reference_dn` or variance_floor_dn2 if that is more.
+/// Returns the largest changes over all complete blocks of effect_block px: CIEDE2000 of their developed means, and the
+/// difference of a channel's variance, relative to that of `reference_dn` or variance_floor_dn2 if that is more.
 /// @param dn, reference_dn  of one size
 PredictedChange measured_change(const ChangedFrame& frame, const Plane<float>& dn, const Plane<float>& reference_dn);
 
-/// The largest that predict_change() says of the blocks, by what the plan keeps in each.
+/// Returns the largest changes that predict_change() gives for the blocks, by the effects the plan keeps in each.
 PredictedChange predicted_change(const ChangedFrame& frame, std::span<const BlockLevel> blocks, const EffectPlan& plan);
 
 }  // namespace lowlux::isp

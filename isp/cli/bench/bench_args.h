@@ -3,20 +3,20 @@
 #include <string>
 #include <vector>
 
-#include "isp/reproduce/bench_picture.h"
 #include "isp/cli/develop/develop_args.h"
+#include "isp/reproduce/bench_picture.h"
 
 namespace lowlux::cli {
 
-/// `bench`: what the command line asks for.
+/// Holds the arguments of `bench`.
 struct BenchArgs {
   std::vector<std::string> stages;  // by id; empty: all
-  std::string output;               // folder for table, plots, pictures and the page; empty: none
+  std::string output;               // folder for table, plots, images and the page; empty: none
   std::string pictures_folder;      // empty: next to the command
   isp::PictureSet pictures = isp::PictureSet::held_out;
   int threads = 0;  // 0: one for each processor
   bool list = false;
-  bool calibrate_cost = false;  // nothing else then
+  bool calibrate_cost = false;  // then nothing else is run
   bool quick = false;
   bool json = false;
   bool force = false;

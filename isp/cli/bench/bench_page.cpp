@@ -48,7 +48,7 @@ std::string count_of_findings(const std::vector<isp::Finding>& findings) {
 isp::ReportSection overview(const std::vector<const MeasuredStage*>& stages) {
   isp::ReportSection section{.title = "At a glance",
                              .text =
-                                 "Findings are what a stage must show, beside what it shows. Rows whose findings "
+                                 "Findings are what a stage must show, next to what it shows. Rows whose findings "
                                  "do not all hold are on a tinted ground.",
                              .table = {{"stage", "what", "rows measured", "findings", "took [s]"}, {}}};
   section.table.rows.reserve(stages.size());
@@ -64,7 +64,7 @@ isp::ReportSection overview(const std::vector<const MeasuredStage*>& stages) {
   return section;
 }
 
-/// The rows whose cell in column `undominated` is "yes".
+/// Returns the rows whose cell in column `undominated` is "yes".
 std::vector<std::size_t> undominated_rows(const isp::BenchTable& table) {
   std::vector<std::size_t> out;
   const auto column = std::ranges::find(table.columns, "undominated") - table.columns.begin();
@@ -158,11 +158,12 @@ std::string time_text(const std::vector<MeasuredStage>& measured) {
 
 Result<std::string> bench_page(const std::vector<MeasuredStage>& measured, const Machine& machine, Executor& executor) {
   const std::vector<const MeasuredStage*> stages = in_order_of_page(measured);
-  isp::Report page{.title = "lowlux bench: accuracy against time",
-                   .text =
-                       "What each stage of the pipeline costs and what it gets right, at each of its levels and "
-                       "beside other methods. Times are of the machine below; ratios carry over to others better.",
-                   .sections = {machine_section(machine), overview(stages)}};
+  isp::Report page{
+      .title = "lowlux bench: accuracy against time",
+      .text =
+          "What each stage of the pipeline costs and what it gets right, at each of its levels and "
+          "compared with other methods. Times are of the machine below; ratios carry over to others better.",
+      .sections = {machine_section(machine), overview(stages)}};
   page.sections.back().text += '\n' + time_text(measured) + '.';
   for (const MeasuredStage* stage : stages) {
     if (auto added = add_stage(*stage, executor, page); !added) return tl::make_unexpected(added.error());

@@ -10,21 +10,21 @@
 
 namespace lowlux::cli {
 
-/// A stage and what it yielded.
+/// Holds a stage and its results.
 struct MeasuredStage {
   isp::BenchStage stage;
   isp::BenchOutcome outcome;
-  double took_s = 0;  // wall clock, of all its work and not only of what is timed
+  double took_s = 0;  // wall clock, of all its work and not only of the timed work
 };
 
-/// "2 stages took 12.3 s".
+/// Returns "2 stages took 12.3 s".
 std::string time_text(const std::vector<MeasuredStage>& measured);
 
-/// Significant digits of figures that are read.
+/// Number of significant digits in texts for people.
 inline constexpr int shown_digits = 4;
 
-/// One page of all that was measured: the machine, how many findings hold, then a section for each stage, those of the
-/// whole pipeline (develop, simulate) first. Error: no memory for a picture.
+/// Returns one page with all measurements: the machine, how many findings hold, then a section for each stage, those of
+/// the entire pipeline (develop, simulate) first. Error: no memory for an image.
 Result<std::string> bench_page(const std::vector<MeasuredStage>& measured, const Machine& machine, Executor& executor);
 
 }  // namespace lowlux::cli

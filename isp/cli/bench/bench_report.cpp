@@ -17,7 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr const char* page_name = "bench.html";
 
-/// Columns as wide as their widest cell, figures to the right.
+/// Returns columns as wide as their widest cell, numbers aligned at the right.
 std::string table_text(const isp::BenchTable& bench) {
   const isp::Table table = isp::table_of(bench, shown_digits);
   std::vector<std::size_t> width;
@@ -55,7 +55,7 @@ Json json_of(const Machine& machine) {
           {"lowlux", machine.lowlux}};
 }
 
-/// Names of systems and processors may be of any bytes.
+/// Returns JSON text; names of systems and processors may hold any bytes, so that invalid UTF-8 is replaced.
 std::string dumped(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
 
 Json json_of(const MeasuredStage& measured, const Machine& machine) {
@@ -75,7 +75,7 @@ struct OutputFile {
   std::string text;
 };
 
-/// The table with what its times are of, which stands beside it elsewhere: lines of a CSV are taken out of it.
+/// Returns the table with columns for the conditions of its times, because lines of a CSV are used without context.
 isp::Table self_contained_table(const MeasuredStage& measured, const Machine& machine) {
   constexpr int all_digits = 17;
   isp::Table out = isp::table_of(measured.outcome.table, all_digits);

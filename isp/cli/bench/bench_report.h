@@ -13,18 +13,17 @@
 
 namespace lowlux::cli {
 
-/// For a terminal: how it was measured, the table, the findings.
+/// Returns the text for a terminal: how it was measured, the table, the findings.
 std::string bench_text(const MeasuredStage& measured);
 
-/// One JSON array, an object for each stage: stage, machine, took_s, remarks, rows with the table's columns as keys
-/// (null where there is no figure), findings.
+/// Returns one JSON array, an object for each stage: stage, machine, took_s, remarks, rows with the table's columns as
+/// keys (null where a value is missing), findings.
 std::string bench_json(const std::vector<MeasuredStage>& measured, const Machine& machine);
 
-/// Before the work: makes the folder, and sees what keeps bench.html, STAGE.csv and STAGE.json from being written to
-/// the folder `output`.
+/// Before the work, makes the folder `output` and checks that bench.html, STAGE.csv and STAGE.json can be written.
 Result<void> check_bench_files(const std::vector<isp::BenchStage>& stages, const BenchArgs& args);
 
-/// Writes bench.html and all files of all stages; nothing if one is in the way. Their paths, in the order of writing.
+/// Writes bench.html and all files of all stages; nothing if one exists. Returns their paths, in the order of writing.
 Result<std::vector<std::string>> write_bench_files(const std::vector<MeasuredStage>& measured, const Machine& machine,
                                                    const BenchArgs& args, Executor& executor);
 

@@ -53,7 +53,7 @@ Result<const isp::NlMeans*> load_nl_means() {
   return reinterpret_cast<isp::GetNlMeans*>(*found)();
 }
 
-/// Stages that fail are told of at once; the others go on.
+/// Runs every stage; a failed stage is reported at once, and the others continue.
 std::vector<MeasuredStage> run_each(const std::vector<isp::BenchStage>& stages, const isp::BenchOptions& options) {
   std::vector<MeasuredStage> out;
   Progress progress(static_cast<int>(stages.size()), true);
@@ -86,7 +86,7 @@ isp::BenchOptions options_of(const BenchArgs& args, const std::string& folder) {
   return options;
 }
 
-/// Times of each part for a frame of 12 MP.
+/// Prints the times of each part for a frame of 12 MP.
 int run_calibrate_cost(const BenchArgs& args) {
   const int threads = args.threads > 0 ? args.threads : threads_of_each(1);
   std::string file;
@@ -99,7 +99,7 @@ int run_calibrate_cost(const BenchArgs& args) {
   print_out(fmt::format("{}, {} threads; ms for a frame of 12 MP\n", model->machine, threads));
   for (int i = 0; i < isp::cost_parts; ++i) {
     const auto part = static_cast<isp::CostPart>(i);
-    const bool sampled = part == isp::CostPart::samples;  // it takes the same however large the frame
+    const bool sampled = part == isp::CostPart::samples;  // it takes equally long for any size of frame
     const isp::CostSize size = sampled ? isp::CostSize{isp::sample_megapixels} : isp::cost_size(4000, 3000);
     print_out(fmt::format("  {:<12}{:10.1f}\n", name_of(part), 1e3 * model->seconds(part, size)));
   }

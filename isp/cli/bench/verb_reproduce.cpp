@@ -46,7 +46,7 @@ isp::RunOptions options_of(const ReproduceArgs& args) {
   return options;
 }
 
-// Experiments whose computation fails are told of at once; the others go on.
+// Runs every experiment; a failed experiment is reported at once, and the others continue.
 std::vector<Done> run_experiments(const std::vector<isp::Experiment>& experiments, const ReproduceArgs& args) {
   std::vector<Done> out;
   Progress progress(static_cast<int>(experiments.size()), true);
@@ -78,8 +78,8 @@ std::vector<TextFile> files_of(const std::vector<Done>& done, const ReproduceArg
   const std::vector<isp::Finding> findings = findings_of(done);
   std::vector<TextFile> out{{"findings.csv", isp::csv_of(isp::table_of(findings))}};
   isp::Report report{"lowlux reproduce: published experiments and ours",
-                     fmt::format("Seed {}{}. Each published finding stands beside the same quantity computed here, "
-                                 "each check of our own beside what is expected; a sampled figure agrees within five "
+                     fmt::format("Seed {}{}. Each published finding is listed next to the same quantity computed here, "
+                                 "each check of our own next to what is expected; a sampled figure agrees within five "
                                  "standard errors, any other within a tenth; where only the order or the sign of a "
                                  "claim is found, the verdict is 'same direction'. Published findings: {}. Checks of "
                                  "our own: {}.",
@@ -96,7 +96,7 @@ std::vector<TextFile> files_of(const std::vector<Done>& done, const ReproduceArg
   return out;
 }
 
-// Before the work: the two files that are always written. write_text looks again at each.
+// Checks before the work the two files that are always written. write_text checks each again.
 std::optional<Error> in_the_way(const ReproduceArgs& args) {
   if (args.output.empty() || args.force) return std::nullopt;
   for (const char* name : {"findings.csv", "report.html"}) {
@@ -109,7 +109,7 @@ std::optional<Error> in_the_way(const ReproduceArgs& args) {
   return std::nullopt;
 }
 
-// Nothing is written if one of the files is in the way.
+// Writes all files; nothing if one of them exists.
 Result<void> write_all(const std::vector<TextFile>& files, const ReproduceArgs& args) {
   std::error_code error;
   const std::filesystem::path folder(args.output);

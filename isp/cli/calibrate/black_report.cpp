@@ -58,7 +58,7 @@ std::string celsius_of(const calib::DarkGroup& group) {
   return group.setting.temperature_c ? fmt::format("{:g} C, ", *group.setting.temperature_c) : "";
 }
 
-/// Series by temperature and site that `value` gives of a point.
+/// Returns series by temperature and site of the quantity that `value` returns for a point.
 template <class Value>
 std::vector<isp::Series> by_site(const calib::DarkSeries& series, std::span<const calib::DarkGroup> groups,
                                  isp::Mark mark, const Value& value) {
@@ -137,7 +137,7 @@ std::string fit_text(const calib::DarkSeries& series) {
                      series.degrees_of_freedom);
 }
 
-/// R and G shares of the dark current with their standard errors as a cross; light of equal charge is at 1/3, 1/3.
+/// Plots R and G fractions of the dark current, with standard errors as a cross; light of equal charge is at 1/3, 1/3.
 isp::Plot plot_of_black_point(const std::array<Estimate, 3>& share, const std::string& id) {
   const auto& [r, g, b] = share;
   isp::Series cross{
@@ -178,7 +178,7 @@ void show_black(const calib::BlackFigures& black, const calib::FrameSetting& set
                                    black.column_noise_dn));
   out.add("pixels", fmt::format("{} in {} frame{}, {:.2g} % left out", black.pixels, black.frames,
                                 black.frames == 1 ? "" : "s", 100 * black.excluded_share));
-  out.add("holds", fmt::format("pedestal and dark charge in one{}: a second exposure time would tell them apart",
+  out.add("holds", fmt::format("pedestal and dark charge in one{}: a second exposure time would separate them",
                                setting.exposure_s ? fmt::format(", at {:g} s", *setting.exposure_s) : ""));
   found.text += name_of_gain(setting) + "\n" + out.text();
 

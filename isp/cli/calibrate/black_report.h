@@ -14,13 +14,13 @@ namespace lowlux::cli {
 /// Adds a black level of one exposure time to a calibration's text and report.
 void show_black(const calib::BlackFigures& black, const calib::FrameSetting& setting, Calibration& found);
 
-/// Adds a dark series: figures, dark charge against time, dark current against temperature, residuals and the black
+/// Adds a dark series: values, dark charge against time, dark current against temperature, residuals and the black
 /// point's chromaticity.
-/// @param gain_source  where the system gain comes from
+/// @param gain_source  origin of the system gain
 void show_dark_series(const calib::DarkSeries& series, std::span<const calib::DarkGroup> groups,
                       const GainProfile& gain, const std::string& gain_source, Calibration& found);
 
-/// "ISO 1600", "one gain" if the frames state none.
+/// Returns "ISO 1600", or "one gain" if the frames state none.
 std::string name_of_gain(const calib::FrameSetting& setting);
 
 }  // namespace lowlux::cli

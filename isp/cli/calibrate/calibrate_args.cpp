@@ -33,7 +33,7 @@ void add_settings(CLI::App& app, CalibrateArgs& args) {
   setting("--temperature", "C", "temperature of the sensor, for all frames", args.temperature_c);
 }
 
-/// What is wrong with the command line beyond single options; empty if nothing.
+/// Returns the error of the arguments in combination; empty if there is none.
 std::string wrong(const CalibrateArgs& args, const std::vector<std::string>& inputs) {
   if (args.iso && *args.iso <= 0) return "--iso must be above 0";
   if (args.exposure_s && *args.exposure_s < 0) return "--exposure-time must not be negative";
@@ -45,7 +45,7 @@ std::string wrong(const CalibrateArgs& args, const std::vector<std::string>& inp
   return wrong_names({args.output, args.report}, inputs);
 }
 
-/// A shell makes several words of bias/*.dng, and the option takes the first of them.
+/// Explains a missing second dark: a shell expands bias/*.dng to several arguments, the option takes the first.
 std::string one_dark(const std::string& file) {
   const std::string folder = std::filesystem::path(file).parent_path().string();
   return fmt::format(
@@ -60,7 +60,8 @@ Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>&
   CLI::App app("Pedestal, dark current, its temperature law and hot pixels from dark frames.",
                "lowlux calibrate black");
   app.footer(
-      "Frames are put together by gain, exposure time and temperature. Two exposure times tell dark current from the\n"
+      "Frames are put together by gain, exposure time and temperature. Two exposure times separate dark current from "
+      "the\n"
       "pedestal, two temperatures give its law; with one exposure time, or one frame, both stay in one figure. The\n"
       "system gain comes from --system-gain, else from --add-to, else from the noise of the dark charge itself.");
   CalibrateBlackArgs args;
@@ -95,7 +96,7 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
   add_output(app, args.common);
   add_settings(app, args.common);
   app.add_flag("--steady-light", args.steady_light,
-               "the lamp never changed, so that the flats' exposure times tell how linear the sensor is");
+               "the lamp never changed, so that the flats' exposure times show how linear the sensor is");
   using Method = calib::PictureNoiseMethod;
   add_choice<Method>(
       app, "--method", {{"ponomarenko", Method::ponomarenko}, {"foi", Method::foi}},
@@ -132,7 +133,7 @@ Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string
 
 namespace {
 
-/// What is wrong with the files that would be written; empty if nothing.
+/// Returns the error of the output files; empty if there is none.
 std::string wrong_files(const CalibrateColourArgs& args) {
   if (args.output.empty()) return "-o is required: the profile to write";
   if (!args.output.ends_with(".json")) return fmt::format("-o: profiles are .json, not {}", args.output);

@@ -9,13 +9,13 @@
 
 namespace lowlux::cli {
 
-/// What the kinds of calibration have in common.
+/// Holds the arguments that all kinds of calibration have in common.
 struct CalibrateArgs {
   std::vector<std::string> frames;
   std::string output;         // the profile
-  std::string add_to;         // a profile to start from; empty: none
+  std::string add_to;         // a profile to extend; empty: none
   std::string report;         // a page; empty: none
-  std::optional<double> iso;  // of frames that do not state theirs
+  std::optional<double> iso;  // for frames that do not state theirs
   std::optional<double> exposure_s;
   std::optional<double> temperature_c;
   bool force = false;
@@ -26,7 +26,7 @@ struct CalibrateArgs {
 struct CalibrateBlackArgs {
   CalibrateArgs common;
   std::optional<double> system_gain_dn_per_e;
-  bool masked = false;  // the frames' masked pixels are what is dark
+  bool masked = false;  // measure the masked pixels of the frames
   std::string map;      // prefix of the maps' names; empty: none
 };
 
@@ -34,7 +34,7 @@ struct CalibrateNoiseArgs {
   CalibrateArgs common;
   std::vector<std::string> darks;
   bool steady_light = false;
-  std::optional<calib::PictureNoiseMethod> method;  // for one picture; absent: ponomarenko
+  std::optional<calib::PictureNoiseMethod> method;  // for a single image; absent: ponomarenko
 };
 
 struct CalibrateQuotedArgs {
@@ -47,12 +47,12 @@ Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string
 
 struct CalibrateColourArgs {
   std::string chart;       // a raw file; empty: spectral sensitivities
-  std::string camera;      // a name of the table, or a CSV file; empty: a chart
+  std::string camera;      // an entry of the table, or a CSV file; empty: a chart
   std::string illuminant;  // a name or a CSV file; empty: chosen
   std::string output;
   std::string add_to;   // a profile; empty: a new one
   std::string report;   // HTML; empty: none
-  std::string overlay;  // picture; empty: none
+  std::string overlay;  // image; empty: none
   bool per_photon = false;
   bool preserve_white = false;
   bool even_light = false;

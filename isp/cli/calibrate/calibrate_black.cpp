@@ -19,12 +19,12 @@
 namespace lowlux::cli {
 namespace {
 
-constexpr double light_of_range = 0.005;  // how far the picture may lie above the masked pixels
-constexpr double light_of_noise = 10;     // or in standard deviations of these
+constexpr double light_of_range = 0.005;  // maximum excess of the image over the masked pixels
+constexpr double light_of_noise = 10;     // the maximum in standard deviations of the masked pixels
 
 double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
 
-/// A dark frame is as dark as its own masked pixels, where it has some.
+/// Checks that a dark frame is as dark as its own masked pixels, if it has some.
 Result<void> check_dark(const RawDn& raw) {
   const isp::MaskedBlack masked = isp::measure_masked_black(raw);
   if (!masked.black) return {};
@@ -48,10 +48,10 @@ Result<RawDn> dark_part(RawDn raw, const CalibrateBlackArgs& args) {
   return calib::part_of(raw, masked.region);
 }
 
-/// What was read: the darks by setting, and the camera.
+/// Holds the darks by setting, and the camera.
 struct Darks {
   std::vector<calib::DarkSet> sets;
-  std::vector<std::pair<std::optional<double>, std::string>> files;  // with their ISO
+  std::vector<std::pair<std::optional<double>, std::string>> files;  // names with the ISO of each
   FrameInfo camera;
   std::string mosaic;
   isp::Table frames;
@@ -113,7 +113,7 @@ std::string map_name(const CalibrateBlackArgs& args, const calib::DarkSet& set, 
   return fmt::format("{}{}_{}.pfm", args.map, iso, what);
 }
 
-/// Of one exposure time: what can be told is the black level with the dark charge in it.
+/// Calibrates from one exposure time, which determines only the black level including dark charge.
 Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measured& measured,
                                    const CalibrateBlackArgs& args, Calibration& found) {
   if (set.groups.size() > 1) {
@@ -123,7 +123,8 @@ Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measu
                             set.groups.size()));
   }
   if (!args.map.empty() || args.system_gain_dn_per_e) {
-    found.warnings.emplace_back("one exposure time does not tell dark current: --map and --system-gain do nothing");
+    found.warnings.emplace_back(
+        "one exposure time does not determine dark current: --map and --system-gain do nothing");
   }
   const calib::DarkGroup& group = set.groups.front();
   const auto black = calib::measure_black(group);
@@ -133,7 +134,7 @@ Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measu
   return {};
 }
 
-/// One gain setting: fits what its frames can tell.
+/// Fits the quantities that the frames of one gain setting determine.
 Result<void> calibrate_set(const calib::DarkSet& set, const Darks& darks, const CalibrateBlackArgs& args,
                            Calibration& found) {
   const calib::Measured measured = measured_on(darks, set.iso);
@@ -144,7 +145,7 @@ Result<void> calibrate_set(const calib::DarkSet& set, const Darks& darks, const 
   if (!series) return tl::make_unexpected(series.error());
   GainProfile& profile = calib::gain_at(found.profile, set.groups.front().setting);
   calib::put_dark_series(*series, set.groups, gain->dn_per_e, measured, profile);
-  if (args.masked) profile.hot_pixels.clear();  // they are none of the picture's
+  if (args.masked) profile.hot_pixels.clear();  // their coordinates are not those of active pixels
   show_dark_series(*series, set.groups, profile, gain->source, found);
   if (args.map.empty()) return {};
   const bool several = darks.sets.size() > 1;

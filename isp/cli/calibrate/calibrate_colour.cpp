@@ -31,7 +31,7 @@ Result<void> check_places(const CalibrateColourArgs& args) {
   return {};
 }
 
-/// A profile with the new colours: they replace those under the same illuminant.
+/// Returns a profile with the new colours, which replace those under the same illuminant.
 Result<CameraProfile> profile_of(const CalibrateColourArgs& args, const ColourOutcome& outcome) {
   CameraProfile profile;
   if (!args.add_to.empty()) {

@@ -31,7 +31,7 @@ std::string cell(const std::optional<PatchError>& error) {
   return error ? fmt::format("{:.2f}", error->ciede2000) : std::string("-");
 }
 
-/// CIEDE2000 of each patch, a column for each matrix; for charts also what the camera measured.
+/// Returns CIEDE2000 of each patch, a column for each matrix; for charts also the camera's values.
 isp::Table patch_table(const ColourOutcome& outcome) {
   isp::Table out{{"patch"}, {}};
   if (outcome.chart) out.columns.insert(out.columns.end(), {"R", "G", "B", "error %"});
@@ -62,7 +62,7 @@ isp::Table summary_table(const ColourOutcome& outcome) {
   return out;
 }
 
-/// Corner of the chart in pixels of the active area: a half-size pixel's centre lies between two.
+/// Returns the chart's corners in pixels of the active area: a half-size pixel's centre lies between two.
 std::array<calib::PicturePoint, 4> corners_px(const calib::ChartGrid& grid) {
   std::array<calib::PicturePoint, 4> out{grid.at(0, 0), grid.at(6, 0), grid.at(6, 4), grid.at(0, 4)};
   for (calib::PicturePoint& p : out) p = {2 * p.x + 0.5, 2 * p.y + 0.5};
@@ -217,7 +217,7 @@ void draw(Encoded8& picture, const calib::PicturePoint& from, const calib::Pictu
   }
 }
 
-/// The brightest channel of the chart's brightest patch, white balanced: it becomes nearly white in the picture.
+/// Returns the brightest channel of the chart's brightest patch, white balanced; it becomes nearly white in the image.
 double white_of(const MeasuredChart& chart) {
   double brightest = 0;
   for (const calib::ChartPatch& patch : chart.found.patches) {

@@ -8,15 +8,15 @@
 
 namespace lowlux::cli {
 
-/// The patches in a table, what was found, and a line for each matrix.
+/// Returns the patches in a table, the results, and a line for each matrix.
 std::string colour_text(const ColourOutcome& outcome);
-/// One JSON object.
+/// Returns one JSON object.
 std::string colour_json(const ColourOutcome& outcome, const std::string& profile);
-/// Differences and a*b* of the patches, drawn; and the tables. @param profile  file it is written to
+/// Returns a page with plots of differences and a*b* of the patches, and tables. @param profile  file it is written to
 isp::Report colour_report(const ColourOutcome& outcome, const std::string& profile);
 
-/// The half-size picture, white by the chart, with the outline of what was measured of each patch; the first patch's is
-/// red. Display codes, as the sensor lies.
+/// Returns the half-size image, white balanced by the chart, with the outline of the measured area of each patch; the
+/// first patch's is red. It holds display codes, in the sensor's orientation.
 Encoded8 colour_overlay(const MeasuredChart& chart);
 
 }  // namespace lowlux::cli

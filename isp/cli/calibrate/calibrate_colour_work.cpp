@@ -58,11 +58,11 @@ Result<Light> light_from(const std::string& name, const std::string& reason) {
   return Light{name, reason, *std::move(spectrum), {sum.x / sum.y, 1, sum.z / sum.y}};
 }
 
-/// The illuminant asked for; or, as the matrix is for the light that was there, the nearest of those matrices are
-/// published for.
+/// Returns the requested illuminant; by default, because the matrix is valid for the light of the chart, the nearest of
+/// the illuminants that matrices are published for.
 Result<Light> choose_light(const CalibrateColourArgs& args, const std::optional<double>& cct_k) {
   if (!args.illuminant.empty()) return light_from(args.illuminant, "as asked");
-  if (!cct_k) return light_from("D50", "the file has no matrix to tell the light by");
+  if (!cct_k) return light_from("D50", "the file has no matrix to estimate the light with");
   std::string nearest;
   double distance = HUGE_VAL;
   for (const char* name : {"A", "D50", "D55", "D65", "D75"}) {
@@ -75,7 +75,7 @@ Result<Light> choose_light(const CalibrateColourArgs& args, const std::optional<
   return light_from(nearest, fmt::format("nearest to the chart's neutral, {:.0f} K by the file's own matrix", *cct_k));
 }
 
-/// Errors of the usable patches, put back among all of them.
+/// Returns the errors of the usable patches at their positions among all patches.
 MatrixErrors errors_of(std::string name, std::string what, const MeasuredChart& chart,
                        const std::vector<double>& ciede2000, const std::vector<isp::Lab>& lab) {
   MatrixErrors out{std::move(name), std::move(what), std::vector<std::optional<PatchError>>(24)};
@@ -88,7 +88,7 @@ MatrixErrors errors_of(std::string name, std::string what, const MeasuredChart& 
   return out;
 }
 
-/// One calibration from start to end.
+/// Performs one calibration from start to end.
 class ChartCalibration {
  public:
   ChartCalibration(const CalibrateColourArgs& args, const RawFrame& frame, MeasuredChart chart)

@@ -16,20 +16,20 @@
 
 namespace lowlux::cli {
 
-/// What one matrix makes of a patch; without `lab` only the difference is known.
+/// Holds one matrix's result for a patch; without `lab` only the difference is known.
 struct PatchError {
   double ciede2000 = 0;
   std::optional<isp::Lab> lab;
 };
 
-/// A matrix's errors over the chart; nullopt for patches that could not be measured.
+/// Holds a matrix's errors over the chart; nullopt for patches that could not be measured.
 struct MatrixErrors {
-  std::string name;  // a word for a column
+  std::string name;  // a single word, used as column name
   std::string what;
   std::vector<std::optional<PatchError>> patches;
 };
 
-/// A chart as it was found and measured.
+/// Holds a chart as it was found and measured.
 struct MeasuredChart {
   calib::ChartPicture picture;
   calib::FoundChart found;
@@ -38,30 +38,30 @@ struct MeasuredChart {
   std::optional<double> neutral_cct_k;  // by the file's own matrix
 };
 
-/// What `calibrate colour` found out.
+/// Holds the results of `calibrate colour`.
 struct ColourOutcome {
   std::string input;
   std::string make, model;
   ColourProfile colour;
   std::string illuminant_reason;
   std::array<isp::Lab, 24> reference{};
-  std::vector<MatrixErrors> matrices;  // the last but cross-validation is the profile's
+  std::vector<MatrixErrors> matrices;  // the last, apart from cross-validation, is the profile's
   std::optional<MeasuredChart> chart;
   std::vector<std::string> warnings;
 };
 
-/// Mean, median and largest over the patches that have a figure.
+/// Returns mean, median and maximum over the patches that have a value.
 calib::ErrorSummary summary_of(const MatrixErrors& errors);
 
-/// From a photographed chart. Errors: those of capture::read_raw, calib::find_chart and calib::fit_colour; a frame that
-/// is no Bayer mosaic; an unknown illuminant; OpenCV's module cannot be loaded.
+/// Calibrates from a photographed chart. Errors: those of capture::read_raw, calib::find_chart and calib::fit_colour; a
+/// frame that is not a Bayer mosaic; an unknown illuminant; OpenCV's module cannot be loaded.
 Result<ColourOutcome> colour_from_chart(const CalibrateColourArgs& args, Executor& executor);
 
-/// From spectral sensitivities. Errors: an unknown camera (near matches are offered), a table without three columns,
-/// those of calib::spectral_colour.
+/// Calibrates from spectral sensitivities. Errors: an unknown camera (near matches are offered), a table without three
+/// columns, those of calib::spectral_colour.
 Result<ColourOutcome> colour_from_spectra(const CalibrateColourArgs& args);
 
-/// Who found the figures out of which files, and when.
+/// Returns the program, the source files and the date of the values.
 Provenance provenance_of(const std::string& file);
 
 }  // namespace lowlux::cli

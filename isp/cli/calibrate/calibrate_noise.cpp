@@ -23,7 +23,7 @@
 namespace lowlux::cli {
 namespace {
 
-/// Adds the frames of files to pairs, and sees that all are of the profile's camera.
+/// Adds the frames of files to pairs, and checks that all are of the profile's camera.
 Result<void> read_pairs(const std::vector<std::string>& files, const std::string& use, const CalibrateArgs& args,
                         Progress& progress, Calibration& found, FramePairs& pairs) {
   for (const std::string& file : files) {
@@ -42,7 +42,7 @@ Result<void> read_pairs(const std::vector<std::string>& files, const std::string
   return {};
 }
 
-/// Pairs of one gain setting, and their files.
+/// Holds pairs of one gain setting, and their files.
 struct GainPairs {
   std::vector<calib::PairStatistics> pairs;
   std::vector<std::string> files;
@@ -148,7 +148,7 @@ int run_calibrate_noise(const std::vector<std::string>& words) {
 
 namespace {
 
-constexpr double same_level = 0.02;  // of the light; what drifts by more than 1 % is refused later
+constexpr double same_level = 0.02;  // relative to the light; a drift of more than 1 % is refused later
 constexpr double same_level_dn = 0.5;
 constexpr std::size_t most_waiting = 32;
 

@@ -11,25 +11,25 @@
 
 namespace lowlux::cli {
 
-/// Two frames of one light, reduced, and their files.
+/// Holds the statistics of two frames of one light, and their files.
 struct FramePair {
   calib::PairStatistics statistics;
   std::vector<std::string> files;
 };
 
-/// Frames become pairs as they come: each waits for one of its gain, exposure time and level.
+/// Pairs frames as they arrive: each waits for one of its gain, exposure time and level.
 class FramePairs {
  public:
-  /// @param darks  what is black: levels of light are told apart above their mean; empty where the frames are darks
+  /// @param darks  define black: levels of light are compared above their mean; empty where the frames are darks
   explicit FramePairs(std::span<const FramePair> darks = {}) : darks_(darks) {}
 
-  /// The partner is the waiting frame whose level is nearest, if it is within 2 % above black or half a code.
-  /// Errors: those of calib::measure_pair; more than 32 frames that wait.
+  /// Adds a frame. Its partner is the waiting frame with the nearest level, if it is within 2 % above black or half a
+  /// code. Errors: those of calib::measure_pair; more than 32 waiting frames.
   Result<void> add(RawDn frame, const std::string& file);
 
   const std::vector<FramePair>& pairs() const { return pairs_; }
 
-  /// Files without a partner.
+  /// Returns the files without a partner.
   std::vector<std::string> alone() const;
 
  private:

@@ -23,13 +23,13 @@
 namespace lowlux::cli {
 namespace {
 
-/// JSON holds UTF-8 only; names of files hold any bytes.
+/// Replaces invalid UTF-8: names of files hold any bytes, JSON holds UTF-8 only.
 std::string readable(const std::string& name) {
   using Json = nlohmann::ordered_json;
   return Json::parse(Json(name).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
 }
 
-/// What was found, how it was measured and what on.
+/// Returns the report with the results, the method and the frames.
 isp::Report whole_report(const CalibrateArgs& args, const Calibration& found) {
   isp::Report report = found.report;
   report.text = measurement_text(args.output);

@@ -14,39 +14,39 @@
 
 namespace lowlux::cli {
 
-/// What a calibration found, and how it is shown.
+/// Holds the results of a calibration, and their text and report.
 struct Calibration {
   CameraProfile profile;
   std::string text;
   isp::Report report;
-  isp::Table frames;  // that were measured, for the report: list_frame
+  isp::Table frames;  // measured frames, for the report: list_frame
   std::vector<std::string> warnings;
   std::vector<PixelMap> maps;
 };
 
-/// What would keep files from being written is known before any work: they exist, or their folder is missing.
+/// Checks before any work that files can be written. Errors: a file exists, or its folder is missing.
 Result<void> check_outputs(const CalibrateArgs& args);
 
-/// The profile to start from: --add-to's, or an empty one.
+/// Returns the profile to extend: --add-to's, or an empty one.
 Result<CameraProfile> starting_profile(const CalibrateArgs& args);
 
-/// A raw file, with what the options say where it states nothing. Errors name the file.
+/// Reads a raw file and completes values it does not state from the options. Errors name the file.
 Result<RawFrame> read_calibration_frame(const std::string& file, const CalibrateArgs& args);
 
-/// Makes the profile one of this camera; a profile or a frame without a camera's name fits any.
-/// Error: it is another one's.
+/// Assigns the profile to this camera; a profile or a frame without a camera's name fits any.
+/// Error: it belongs to another camera.
 Result<void> put_camera(const FrameInfo& info, CameraProfile& profile);
 
-/// Makes the profile one of this mosaic; a profile without one fits any. Error: it is another.
+/// Assigns the profile to this mosaic; a profile without one fits any. Error: it belongs to another mosaic.
 Result<void> put_mosaic(const std::string& mosaic, CameraProfile& profile);
 
-/// Adds a frame and what it was taken with. @param use  "dark", "flat", "image"
+/// Adds a frame and its capture settings. @param use  "dark", "flat", "image"
 void list_frame(const std::string& file, const std::string& use, const FrameInfo& info, isp::Table& frames);
 
-/// For a report: when and by which version the figures were measured, and how to use the profile.
+/// Returns the date and program version of the measurement and the use of the profile, for a report.
 std::string measurement_text(const std::string& profile);
 
-/// Source and date of what is measured today.
+/// Returns the source and date of values measured today.
 calib::Measured measured_today(std::vector<std::string> files);
 
 /// Writes maps, report and profile, prints the text or JSON. @return the exit code

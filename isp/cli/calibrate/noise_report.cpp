@@ -34,7 +34,7 @@ std::string saturation_text(const calib::PhotonTransfer& t) {
                      well ? "the pixels are full" : "the converter's range ends");
 }
 
-/// Figures by name, for text and table alike.
+/// Returns values by name, for text and table alike.
 std::vector<std::pair<const char*, std::string>> figures_of(const calib::PhotonTransfer& t) {
   const auto& b = t.black_dn;
   return {
@@ -56,7 +56,7 @@ std::vector<std::pair<const char*, std::string>> figures_of(const calib::PhotonT
   };
 }
 
-/// Points of each site, `value` against signal.
+/// Returns the points of each site, `value` against signal.
 template <class Value>
 std::vector<isp::Series> by_site(const std::vector<calib::TransferPoint>& points, const Value& value) {
   std::vector<isp::Series> out;
@@ -117,7 +117,7 @@ void show_photon_transfer(const calib::PhotonTransfer& transfer, Pairs darks, Pa
   }
   found.text += name + "\n" + out.text();
   const auto joined = calib::join_darks(darks);
-  const auto curve = calib::curve_of(darks, flats, *joined, transfer.under_dithered);  // as the fit did
+  const auto curve = calib::curve_of(darks, flats, *joined, transfer.under_dithered);  // as in the fit
   const calib::TransferLine line = calib::fit_line(curve->linear, joined->scatter);
   const std::string id = darks.front().setting.iso ? fmt::format("iso{:.0f}", *darks.front().setting.iso) : "gain";
   section.plots = {plot_of_curve(*curve, line, id), plot_of_residuals(*curve, line, id)};

@@ -10,11 +10,11 @@
 
 namespace lowlux::cli {
 
-/// Adds a photon transfer to a calibration's text and report: figures, the curve and its residuals.
+/// Adds a photon transfer to a calibration's text and report: values, the curve and its residuals.
 void show_photon_transfer(const calib::PhotonTransfer& transfer, std::span<const calib::PairStatistics> darks,
                           std::span<const calib::PairStatistics> flats, Calibration& found);
 
-/// Adds the noise of one ordinary picture to a calibration's text and report, beside what the file says of it.
+/// Adds the noise of one ordinary image to a calibration's text and report, together with the values in the file.
 void show_picture_noise(const calib::PictureNoise& noise, const RawFrame& frame, const BlackPoint& black,
                         Calibration& found);
 

@@ -26,9 +26,9 @@ using Wrong = std::optional<std::string>;
 
 constexpr double longest_timeout_s = 86400;
 constexpr double most_frames = 1e9;
-constexpr double least_budget_ms = 0.01, most_budget_ms = 1e6;  // of the stage
+constexpr double least_budget_ms = 0.01, most_budget_ms = 1e6;  // limits of the stage
 
-/// What the command line said that CaptureArgs holds in another form.
+/// Holds arguments that CaptureArgs stores in another form.
 struct Words {
   bool raw = false;
   bool live = false;
@@ -143,8 +143,8 @@ void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
   app.add_option("--as", words.as, "what is written to a folder: png (default), jpg, tif, exr, pfm or dng")
       ->check(CLI::IsMember({"png", "jpg", "tif", "exr", "pfm", "dng"}));
   app.add_flag("--raw", words.raw, "raw files: the same as --as dng");
-  app.add_flag("--live", words.live, "a film on standard output instead: YUV4MPEG2, which ffplay and ffmpeg read");
-  app.add_flag("--temporal", args.temporal, "with --live: frames before take part in noise reduction");
+  app.add_flag("--live", words.live, "video to standard output instead: YUV4MPEG2, which ffplay and ffmpeg read");
+  app.add_flag("--temporal", args.temporal, "with --live: use previous frames for noise reduction");
   add_text(app, "--budget-ms", "MS",
            "with --live: time for each frame; what does not fit is left out step by step: the level standard for high, "
            "draft, no level, plain. No frame is",
@@ -160,14 +160,14 @@ void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
   app.add_flag("--quiet", args.develop.quiet, "no warnings, no progress and no summary");
 }
 
-// These say nothing of a film, and the first list nothing of raw files either.
+// The first list applies to images alone, the second to images and videos; neither applies to raw files.
 constexpr std::array of_pictures{"--bits",         "--quality",           "--space",       "--half",    "--repair",
                                  "--line-noise",   "--effects",           "--tolerance",   "--dimming", "--noise-limit",
                                  "--coefficients", "--display-luminance", "--gain-setting"};
 constexpr std::array of_pictures_and_films{"--exposure",      "--wb",      "--tone",   "--look", "--scene-luminance",
                                            "--field-of-view", "--profile", "--denoise"};
 
-/// The first of these options that was given.
+/// Returns the first of these options that was given.
 std::optional<std::string> given_of(const CLI::App& app, std::span<const char* const> options) {
   const auto found = std::ranges::find_if(options, [&](const char* option) { return app.count(option) > 0; });
   return found == options.end() ? std::nullopt : std::optional<std::string>(*found);
@@ -213,11 +213,11 @@ Wrong wrong_camera(const CaptureArgs& args) {
   return std::nullopt;
 }
 
-/// Where frames go and as what.
+/// Sets the destination and kind of the frames.
 Wrong set_kind(const Words& words, CaptureArgs& args) {
   const std::string& output = args.develop.output;
   if (words.live) {
-    if (!output.empty() || words.raw || !words.as.empty()) return "--live writes a film to standard output: no files";
+    if (!output.empty() || words.raw || !words.as.empty()) return "--live writes video to standard output: no files";
     args.kind = CaptureKind::live;
     return std::nullopt;
   }
@@ -260,7 +260,7 @@ Wrong complete(const CLI::App& app, const Words& words, CaptureArgs& args) {
 }  // namespace
 
 Parsed<CaptureArgs> parse_capture(const std::vector<std::string>& words) {
-  CLI::App app("Takes raw frames from a camera: to pictures, raw files, or a film on standard output.",
+  CLI::App app("Takes raw frames from a camera: to pictures, raw files, or video on standard output.",
                "lowlux capture");
   app.footer(
       "Examples:\n"

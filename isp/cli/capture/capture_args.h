@@ -12,30 +12,30 @@
 
 namespace lowlux::cli {
 
-/// What becomes of the frames.
+/// Names the output made of the frames.
 enum class CaptureKind : std::uint8_t { pictures, raw, live };
 
-/// `capture`: what the command line asks for, checked as far as that is possible without a camera.
+/// Holds the arguments of `capture`, checked as far as that is possible without a camera.
 struct CaptureArgs {
-  DevelopArgs develop;  // output, force, quiet, json, and what pictures are to be
+  DevelopArgs develop;  // output, force, quiet, json, and options of images
   bool list = false;
   std::string v4l2;       // device; empty: libcamera
-  std::string libcamera;  // id, place in the list, or part of a name
+  std::string libcamera;  // id, index in the list, or part of a name
   capture::CameraRequest request;
   capture::V4l2Memory memory = capture::V4l2Memory::mmap;
   std::optional<int> gain_code;
   capture::LoopLimits limits;
   CaptureKind kind = CaptureKind::pictures;
-  std::string extension;  // of files in a folder, without dot
-  bool folder = false;    // develop.output is one
+  std::string extension;  // extension of files in a folder, without dot
+  bool folder = false;    // develop.output is a folder
   bool temporal = false;
-  std::optional<double> budget_ms;  // of a film, for each frame
+  std::optional<double> budget_ms;  // for each frame of a video
 };
 
 Parsed<CaptureArgs> parse_capture(const std::vector<std::string>& words);
 
-/// Name of frame `index`, from 1: the output itself for a single frame, else with -NNNN before its end; in a folder
-/// frame-NNNN.
+/// Returns the name of frame `index`, from 1: the output itself for a single frame, else with -NNNN before its
+/// extension; in a folder frame-NNNN.
 std::string frame_file(const CaptureArgs& args, std::uint64_t index);
 
 }  // namespace lowlux::cli

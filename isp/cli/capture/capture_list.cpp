@@ -23,7 +23,7 @@ using capture::CameraListing;
 struct Found {
   std::vector<CameraListing> v4l2;
   std::vector<CameraListing> libcamera;
-  std::string note;  // why libcamera was not asked; empty: it was
+  std::string note;  // reason why libcamera was not used; empty: it was
 };
 
 Found find_cameras() {

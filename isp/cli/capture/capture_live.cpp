@@ -23,7 +23,7 @@ namespace {
 using std::chrono::steady_clock;
 
 constexpr std::uint64_t memory_limit = std::uint64_t{4} << 30;
-constexpr double usual_frame_rate_hz = 30;  // of a film whose camera does not tell
+constexpr double usual_frame_rate_hz = 30;  // of a video whose camera does not state its rate
 
 struct Release {
   void operator()(lowlux_stage* stage) const { lowlux_stage_release(stage); }
@@ -56,11 +56,11 @@ lowlux_stage_settings settings_of(const CaptureArgs& args) {
 std::int32_t denoise_of(const isp::DenoiseChoice& choice) {
   using Mode = isp::DenoiseChoice::Mode;
   if (choice.mode == Mode::automatic) return LOWLUX_STAGE_DENOISE_AUTO;
-  if (choice.mode == Mode::off) return LOWLUX_STAGE_DENOISE_MINIMAL;  // frames before alone, if they take part
+  if (choice.mode == Mode::off) return LOWLUX_STAGE_DENOISE_MINIMAL;  // temporal history alone, if enabled
   return choice.level == denoise::Level::draft ? LOWLUX_STAGE_DENOISE_FAST : LOWLUX_STAGE_DENOISE_HIGH_QUALITY;
 }
 
-/// Figures within the stage's own bounds; what a camera says beyond them is not known.
+/// Sets values within the stage's own bounds; values beyond them count as unknown.
 template <class T>
 void set_if(const std::optional<double>& value, double low, double high, std::uint32_t bit, T& member,
             lowlux_stage_params& out) {
@@ -78,13 +78,13 @@ void set_all_if(const std::optional<std::array<double, kCount>>& values, double 
   out.valid |= bit;
 }
 
-/// As the camera says, else as it was asked for: libcamera does not say.
+/// Returns the rate the camera states, else the requested one: libcamera does not state it.
 double rate_of(const CaptureArgs& args, const capture::CameraFormat& format) {
   if (format.frame_rate_hz) return *format.frame_rate_hz;
   return args.request.frame_rate_hz.value_or(usual_frame_rate_hz);
 }
 
-/// @param taken  frames before this one
+/// @param taken  number of previous frames
 lowlux_stage_params params_of(const capture::CameraFrame& frame, const RawFormat& format, const CaptureArgs& args,
                               std::uint32_t taken) {
   const capture::FrameFacts& facts = frame.facts;
@@ -113,7 +113,7 @@ lowlux_stage_params params_of(const capture::CameraFrame& frame, const RawFormat
          out);
   set_if(args.budget_ms, 0.01, 1e6, LOWLUX_STAGE_HAS_BUDGET, out.budget_ms, out);
   out.denoise = denoise_of(options.denoise);
-  out.sequence = taken;  // frames that were lost are a pause, which is left to its length
+  out.sequence = taken;  // lost frames count as a pause of unchanged duration
   out.valid |= LOWLUX_STAGE_HAS_DENOISE | LOWLUX_STAGE_HAS_SEQUENCE;
   if (frame.timestamp.count() > 0) {
     out.timestamp_ns = static_cast<std::uint64_t>(frame.timestamp.count());

@@ -23,7 +23,7 @@ double ms_for_each(double seconds, std::uint64_t frames) {
   return frames == 0 ? 0 : 1000 * seconds / static_cast<double>(frames);
 }
 
-/// Frames that came, whatever became of them, in a second; the first one starts the clock.
+/// Returns the frames received per second, including skipped and damaged ones; the first one starts the clock.
 std::optional<double> rate_hz(const capture::LoopCount& count) {
   const std::uint64_t came = count.taken + count.skipped + count.damaged;
   if (came < 2 || count.seconds <= 0) return std::nullopt;
@@ -32,7 +32,7 @@ std::optional<double> rate_hz(const capture::LoopCount& count) {
 
 constexpr std::array step_names{"all", "standard", "draft", "frames_before", "plain"};  // LOWLUX_STAGE_STEP_...
 
-/// "; all 28, draft 2" of a budget.
+/// Returns "; all 28, draft 2" for a budget.
 std::string step_text(const CaptureWork& work) {
   std::string out;
   if (!work.steps) return out;

@@ -10,16 +10,16 @@
 
 namespace lowlux::cli {
 
-/// What a run knows of itself.
+/// Holds the state of a run for reports.
 struct CaptureState {
   CaptureStream stream;
   capture::LoopCount count;
   CaptureWork work;
 };
 
-/// "29.9 frames/s, 370 frames, 0 lost, 0 damaged; ms for each: wait 20.1, process 8.0, write 3.2"
+/// Returns "29.9 frames/s, 370 frames, 0 lost, 0 damaged; ms for each: wait 20.1, process 8.0, write 3.2".
 std::string progress_text(const CaptureState& state);
-/// One JSON object; `error` may be null.
+/// Returns one JSON object; `error` may be null.
 std::string capture_json(const CaptureState& state, const Error* error);
 
 /// Shows progress on stderr once a second, where that is a terminal.
@@ -30,7 +30,7 @@ class CaptureProgress {
   CaptureProgress(const CaptureProgress&) = delete;
   CaptureProgress& operator=(const CaptureProgress&) = delete;
   void show(const CaptureState& state);
-  /// Takes the line away.
+  /// Removes the line.
   void clear();
 
  private:

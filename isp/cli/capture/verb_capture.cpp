@@ -38,8 +38,8 @@ static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler sets
 
 void ask_to_stop(int /*signal*/) { stop_asked = true; }
 
-/// The first SIGINT or SIGTERM asks for an end, a second one ends the process as ever. What the caller ignores stays
-/// ignored.
+/// Makes the first SIGINT or SIGTERM request an end; a second one ends the process as by default. Signals the caller
+/// ignores stay ignored.
 void listen_to_signals() {
   struct sigaction ask {};
   ask.sa_handler = ask_to_stop;
@@ -58,7 +58,7 @@ Result<std::unique_ptr<capture::Camera>> open_camera(const CaptureArgs& args) {
       [&](const capture::LibcameraModule& module) { return module.open(args.libcamera, args.request); });
 }
 
-/// The number in a name that frame_file() gives; 0 if it is none.
+/// Returns the number in a name that frame_file() makes; 0 for other names.
 std::uint64_t index_in(std::string_view name, std::string_view before, std::string_view after) {
   if (name.size() <= before.size() + after.size() || !name.starts_with(before) || !name.ends_with(after)) return 0;
   name = name.substr(before.size(), name.size() - before.size() - after.size());
@@ -67,7 +67,7 @@ std::uint64_t index_in(std::string_view name, std::string_view before, std::stri
   return error == std::errc() && end == name.data() + name.size() ? index : 0;
 }
 
-/// What is in the way of the files to come, before the camera is opened; whoever writes them looks again.
+/// Checks before the camera is opened that no output file exists; the writers check again.
 Result<void> check_files(const CaptureArgs& args) {
   const DevelopArgs& develop = args.develop;
   if (args.folder) {
@@ -105,7 +105,7 @@ class Capture {
     auto sink = make_sink();
     if (!sink) return tl::make_unexpected(sink.error());
     take_warnings(**camera);
-    if (args_.kind == CaptureKind::live) print_warnings();  // at the end is too late for a film
+    if (args_.kind == CaptureKind::live) print_warnings();  // the end would be too late for a video
     CaptureProgress progress(!args_.develop.quiet);
     const auto work = [&](const capture::CameraFrame& frame) { return (*sink)->take(frame, state_.work); };
     const auto watch = [&](const capture::LoopCount&) { progress.show(state_); };
@@ -160,7 +160,7 @@ class Capture {
   const CaptureArgs& args_;
   PoolExecutor executor_;
   CaptureState state_;
-  std::size_t printed_ = 0;  // warnings
+  std::size_t printed_ = 0;  // number of warnings
 };
 
 }  // namespace
@@ -178,7 +178,7 @@ int run_capture(const std::vector<std::string>& words) {
   }
   if (args.kind == CaptureKind::live && ::isatty(STDOUT_FILENO) == 1) {
     return print_usage_error("capture",
-                             {ErrorCode::invalid_argument, "writes a film: lead it to a player, | ffplay -", "--live"});
+                             {ErrorCode::invalid_argument, "writes video: pipe it to a player, | ffplay -", "--live"});
   }
   listen_to_signals();
   Capture capture(args);

@@ -9,7 +9,7 @@ namespace lowlux::cli {
 Parsed<CompareArgs> parse_compare(const std::vector<std::string>& words) {
   CLI::App app(
       "How far picture B is from picture A, the reference: colour differences Delta E ab, Delta E 94c (chromaticity "
-      "alone) and CIEDE2000 of every pixel; EGR, the share of A's colours that B has; PSNR and SSIM of sRGB codes. "
+      "alone) and CIEDE2000 of every pixel; EGR, the fraction of A's colours that B has; PSNR and SSIM of sRGB codes. "
       "Both "
       "are taken by their own ICC profile or chromaticities; white is 1, of floats too. For measurement, develop with "
       "--tone none --exposure 0 --space linear-srgb.",

@@ -7,7 +7,7 @@
 
 namespace lowlux::cli {
 
-/// `compare`: two pictures.
+/// Holds the arguments of `compare`: two images.
 struct CompareArgs {
   std::string reference;
   std::string test;

@@ -20,7 +20,7 @@ std::string difference_text(const isp::DifferenceSummary& d) {
                      d.largest);
 }
 
-/// Why there is no convex ratio; empty where there is one.
+/// Returns the reason why the convex ratio is missing; empty if it exists.
 std::string why_no_convex(const isp::GamutRatio& gamut) {
   return std::isnan(gamut.convex_percent) ? "the colours of A span no area" : "";
 }
@@ -96,7 +96,7 @@ std::string compare_json(const CompareArgs& args, const CompareOutcome& outcome)
                     {"jeffreys_nat", outcome.spectra.jeffreys},
                     {"pixels", outcome.spectra.pixels}}},
                   {"identical_codes", std::isinf(c.psnr_db)},
-                  {"psnr_db", c.psnr_db},  // infinite: null
+                  {"psnr_db", c.psnr_db},  // null if infinite
                   {"ssim", c.ssim ? Json(*c.ssim) : Json(nullptr)},
                   {"not_finite", c.not_finite},
                   {"outside_display_a", c.reference_outside},

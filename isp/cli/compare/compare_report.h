@@ -9,7 +9,7 @@
 
 namespace lowlux::cli {
 
-/// What `compare` has to say.
+/// Holds the results of `compare`.
 struct CompareOutcome {
   isp::PictureComparison found;
   isp::SpectralDifference spectra;

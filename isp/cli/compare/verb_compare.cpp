@@ -31,7 +31,7 @@ Result<capture::ScenePicture> read(const std::string& file, Executor& executor, 
   return picture;
 }
 
-/// Files may say what their white is in cd/m2; what is compared is relative to it.
+/// Warns if the files state different whites in cd/m2; the comparison is relative to each white.
 void warn_of_whites(const capture::ScenePicture& a, const capture::ScenePicture& b, CompareOutcome& out) {
   if (!a.absolute || !b.absolute || a.white_luminance_cd_m2 == b.white_luminance_cd_m2) return;
   out.warnings.push_back(fmt::format("white is {:g} cd/m2 in A and {:g} in B: each is compared relative to its own",

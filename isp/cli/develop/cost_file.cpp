@@ -30,7 +30,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int format_number = 4;  // counts up where other parts or sizes are measured
+constexpr int format_number = 4;  // incremented when parts or sizes change
 constexpr std::size_t largest_file = 1 << 20;
 constexpr std::size_t most_points = 100;
 
@@ -38,7 +38,7 @@ tl::unexpected<Error> malformed(const std::string& what) {
   return fail(ErrorCode::malformed, "no cost model: " + what + "; bench --calibrate-cost makes one");
 }
 
-/// Points of one part, checked: rising sizes, times that can be.
+/// Returns the points of one part after checks: rising sizes, possible times.
 std::optional<std::vector<isp::CostPoint>> points_of(const Json& json) {
   if (!json.is_array() || json.size() > most_points) return std::nullopt;
   std::vector<isp::CostPoint> out;
@@ -121,7 +121,7 @@ Result<isp::CostModel> parse_cost(std::string_view text) {
   if (count < 1 || count > std::numeric_limits<int>::max()) return malformed("no such number of threads");
   model.threads = static_cast<int>(count);
   model.pace_s = pace.get<double>();
-  if (!(model.pace_s >= 0) || !std::isfinite(model.pace_s)) return malformed("pace_s is no time");
+  if (!(model.pace_s >= 0) || !std::isfinite(model.pace_s)) return malformed("pace_s is not a time");
   for (int i = 0; i < isp::cost_parts; ++i) {
     const std::string name(name_of(static_cast<isp::CostPart>(i)));
     auto points = points_of(parts.value(name, Json()));

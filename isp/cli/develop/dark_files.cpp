@@ -105,7 +105,7 @@ Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(RawFrame& picture
 
 Result<std::shared_ptr<const DarkFrame>> DarkSource::make_or_find(const RawDn& picture, const Key& key,
                                                                   const calib::DarkRequest& request) {
-  const std::lock_guard lock(mutex_);  // others that need the same one wait for it
+  const std::lock_guard lock(mutex_);  // others that need the same frame wait for it
   auto found = std::ranges::find(made_, key, &Made::key);
   if (found == made_.end()) {
     Result<DarkFrame> made = calib::make_dark_frame(groups_, picture, request);
@@ -113,7 +113,7 @@ Result<std::shared_ptr<const DarkFrame>> DarkSource::make_or_find(const RawDn& p
     if (made_.size() == most_made) made_.pop_back();
     found = made_.insert(made_.end(), {key, std::make_shared<const DarkFrame>(*std::move(made))});
   }
-  std::rotate(made_.begin(), found, found + 1);  // the last one used comes first
+  std::rotate(made_.begin(), found, found + 1);  // the most recently used comes first
   return made_.front().frame;
 }
 

@@ -19,24 +19,24 @@
 
 namespace lowlux::cli {
 
-/// The dark frames a command line names: see raw_files_of_lists. Errors: those, a picture that is itself among its
-/// darks, a black point besides darks, which hold it already.
+/// Returns the dark frames that the arguments name: see raw_files_of_lists. Errors: those, an image that is itself
+/// among its darks, a black point in addition to darks, which hold it already.
 Result<std::vector<std::string>> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs);
 
-/// What the dark frames of all pictures are made of, and the last ones that were made. May be used from any thread.
+/// Holds the data of the dark frames of all images, and the last frames that were made. It may be used from any thread.
 class DarkSource {
  public:
-  /// @param request  what is the same for all pictures
+  /// @param request  values that are the same for all images
   DarkSource(std::vector<calib::DarkGroup> groups, const calib::DarkRequest& request)
       : groups_(std::move(groups)), request_(request) {}
 
-  /// The dark frame of one picture: calib::make_dark_frame, once for all pictures of the same setting and black tag; at
-  /// the level of the picture's masked pixels if it follows from such. Errors: those of that, of
-  /// calib::check_masked_level, whose warning becomes one of the picture, and of calib::check_below_picture.
+  /// Returns the dark frame of one image: calib::make_dark_frame, once for all images of the same setting and black
+  /// tag; at the level of the image's masked pixels if the frame depends on them. Errors: those of make_dark_frame, of
+  /// calib::check_masked_level, whose warning is added to those of the image, and of calib::check_below_picture.
   Result<std::shared_ptr<const DarkFrame>> frame_for(RawFrame& picture);
 
  private:
-  /// What a dark frame depends on.
+  /// Identifies a dark frame by the values it depends on.
   struct Key {
     calib::FrameSetting setting;
     bool has_masked_pixels;
@@ -55,11 +55,11 @@ class DarkSource {
   std::vector<calib::DarkGroup> groups_;
   calib::DarkRequest request_;
   std::mutex mutex_;
-  std::vector<Made> made_;  // the last used first
+  std::vector<Made> made_;  // most recently used first
 };
 
-/// Reads the files one by one, adding them up. Errors: those of reading, of calib::DarkLibrary, and of the profile
-/// that --dark-doubling may name: another camera's, or without that figure.
+/// Reads the files one by one and accumulates them. Errors: those of reading, of calib::DarkLibrary, and of the profile
+/// that --dark-doubling may name: another camera's, or one without the value.
 Result<std::shared_ptr<DarkSource>> read_darks(const std::vector<std::string>& files, const DarkArgs& args);
 
 }  // namespace lowlux::cli

@@ -29,8 +29,8 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
            })
       ->needs(frames);
   add_text(app, "--dark-doubling", "C|PROFILE.json",
-           "degrees over which dark current doubles, for darks of another temperature, or a profile that tells "
-           "(default: as the darks themselves tell)",
+           "degrees over which dark current doubles, for darks of another temperature, or a profile that states it "
+           "(default: as measured on the darks)",
            [&dark](const std::string& text) -> std::optional<std::string> {
              dark.doubling_c = quantity_of(text, "C");
              if (!dark.doubling_c) {
@@ -44,7 +44,7 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
       ->needs(frames);
 }
 
-/// What every verb that takes raw files one by one has.
+/// Adds the options of every verb that takes raw files one by one.
 /// @param explained  help for --explain
 void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
   app.add_option("RAW", args.inputs, "raw files, or folders of them")->required();
@@ -121,7 +121,7 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
 }
 
 Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
-  CLI::App app("Takes noise, dark charge and defects off raw files and writes raw files for any raw developer.",
+  CLI::App app("Removes noise, dark charge and defects from raw files and writes raw files for any raw developer.",
                "lowlux denoise");
   DevelopArgs args;
   app.add_option("-o,--output", args.output,
@@ -152,7 +152,8 @@ Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
 }
 
 Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words) {
-  CLI::App app("Runs the published experiments and prints each finding beside ours.", "lowlux reproduce");
+  CLI::App app("Runs the published experiments and prints each finding next to the one computed here.",
+               "lowlux reproduce");
   ReproduceArgs args;
   app.add_option("ID", args.experiments, "experiments (default: all); --list names them");
   app.add_flag("--list", args.list, "the experiments, one line each");
@@ -198,7 +199,7 @@ std::optional<std::string> set_white_balance(const std::string& text, isp::White
   return std::nullopt;
 }
 
-// One figure for all sites or four; nullopt if it is neither.
+// Returns one value for all sites or four values; nullopt for other text.
 std::optional<PerSite<double>> site_figures(const std::string& text) {
   const auto figures = numbers_of(text, 4);
   if (!figures || (figures->size() != 1 && figures->size() != 4)) return std::nullopt;
@@ -302,7 +303,7 @@ void add_denoise(CLI::App& app, DevelopArgs& args) {
       "noise reduction, by how much work it is; auto (default) chooses by how much noise there is");
   add_choice<bool>(
       app, "--line-noise", {{"auto", true}, {"off", false}}, [&choice](bool lines) { choice.line_noise = lines; },
-      "noise that whole rows or columns share: take it off where it stands out (default) or leave it");
+      "noise that whole rows or columns share: subtract it where it is significant (default) or leave it");
 }
 
 void add_samples(CLI::App& app, DevelopArgs& args) {

@@ -14,19 +14,19 @@ namespace CLI {
 class App;
 }
 
-/// Options that verbs have in common which make pictures of raw frames.
+/// These options are common to verbs that make images of raw frames.
 
 namespace lowlux::cli {
 
-/// Dark frames: --dark-frame, --dark-noise, --dark-doubling.
+/// Holds the arguments of dark frames: --dark-frame, --dark-noise, --dark-doubling.
 struct DarkArgs {
   std::vector<std::string> words;    // files, lists separated by commas, folders, patterns; empty: none
-  double noise_share = 0.1;          // most that they may add to a picture's variance in the dark
+  double noise_share = 0.1;          // maximum fraction they may add to an image's variance in the dark
   std::optional<double> doubling_c;  // given as a number
-  std::string doubling_profile;      // or as a profile's file
+  std::string doubling_profile;      // or as the file of a profile
 };
 
-/// `develop`, and `denoise` where it has the option: what the command line asks for, checked as far as that is possible
+/// Holds the arguments of `develop`, and of `denoise` where it has the option, checked as far as that is possible
 /// without opening a file.
 struct DevelopArgs {
   std::vector<std::string> inputs;
@@ -37,14 +37,14 @@ struct DevelopArgs {
   std::optional<OutputSpace> space;    // absent: srgb, or linear-srgb for OpenEXR and PFM
   bool exposure_given = false;
   isp::DevelopOptions options;  // white balance, black, half, defects, exposure
-  std::string black_profile;    // a camera's profile to take black and noise from; empty: none
-  std::string profile;          // to take everything from it, colour too; empty: none
+  std::string black_profile;    // a camera's profile for black and noise; empty: none
+  std::string profile;          // a camera's profile for everything, colour too; empty: none
   std::string gain_setting;     // of the profile; empty: by the frame's ISO
   int jpeg_quality = 92;
   int jobs = 0;  // files at a time; 0: one for each processor
   bool force = false;
   bool skip_existing = false;
-  bool sync = false;  // files are on the disk before the next one is begun
+  bool sync = false;  // files are flushed to disk before the next one begins
   bool json = false;
   bool timings = false;
   bool explain = false;
@@ -55,7 +55,7 @@ struct DevelopArgs {
 };
 
 struct InfoArgs {
-  std::vector<std::string> inputs;  // may be empty with advice
+  std::vector<std::string> inputs;  // may be empty with --advise
   bool json = false;
   AdviseArgs advise;
 };
@@ -71,7 +71,7 @@ struct ReproduceArgs {
   std::string pictures_folder;  // empty: next to the command
 };
 
-/// The parsed arguments; or the exit code, help or error having been printed.
+/// Holds the parsed arguments; or the exit code if help or an error was printed.
 template <class Args>
 using Parsed = std::variant<Args, int>;
 
@@ -80,14 +80,14 @@ Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words);
 Parsed<InfoArgs> parse_info(const std::vector<std::string>& words);
 Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words);
 
-/// Exposure, white balance, tone, space, half size.
+/// Adds exposure, white balance, tone, space, half size.
 void add_rendering(CLI::App& app, DevelopArgs& args);
-/// What is known of the camera, and what is repaired by it.
+/// Adds the options of the camera's known properties and of corrections that use them.
 void add_camera(CLI::App& app, DevelopArgs& args);
-/// What is wrong with the options of add_camera together, or nothing.
+/// Returns the error of the options of add_camera in combination, or nothing.
 std::optional<std::string> wrong_profiles(const DevelopArgs& args);
 void add_denoise(CLI::App& app, DevelopArgs& args);
-/// What picture files hold: bits, JPEG quality.
+/// Adds the options of image files: bits, JPEG quality.
 void add_samples(CLI::App& app, DevelopArgs& args);
 
 }  // namespace lowlux::cli

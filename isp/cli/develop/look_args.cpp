@@ -17,7 +17,7 @@ constexpr double eye_noise_limit = 2;  // CIE L*
 
 using Wrong = std::optional<std::string>;
 
-/// A number with its range in the message.
+/// Holds a number with its range for the message.
 struct Range {
   double least;
   double most;
@@ -72,7 +72,8 @@ void add_scene(CLI::App& app, LookArgs& args) {
            });
   add_text(
       app, "--field-of-view", "DEGREES",
-      "that the longer side of the picture covers in the scene, for what detail the eye makes out (default 50)",
+      "that the longer side of the picture covers in the scene, which decides what detail the eye resolves (default "
+      "50)",
       [&args](const std::string& text) {
         args.given.emplace_back("--field-of-view");
         return store_number(text, {0.1, 180, "is not an angle in degrees", "degrees"}, args.choice.field_of_view_deg);
@@ -83,7 +84,7 @@ void add_effects(CLI::App& app, LookArgs& args) {
   add_text(app, "--effects", "auto|all|none|LIST",
            fmt::format("what is done to the frame: what can be seen here (auto, default) or everything (all), of "
                        "corrections and of what --look eye shows of the dark (auto never shows glare and "
-                       "visual-noise); or of the latter none, or those listed, parted by commas ({})",
+                       "visual-noise); or none of the latter, or a comma-separated list of them ({})",
                        fmt::join(isp::night_effect_names, ", ")),
            [&args](const std::string& text) {
              args.given.emplace_back("--effects");
@@ -96,14 +97,14 @@ void add_effects(CLI::App& app, LookArgs& args) {
              args.given.emplace_back("--tolerance");
              return store_number(text, {1e-3, 100, "is not a colour difference"}, args.choice.tolerance);
            });
-  add_text(
-      app, "--dimming", "SHARE",
-      "how much of its darkness the picture keeps: 0 is as bright as by day, 1 as dark as it was beside a room with "
-      "100 cd/m2 (default 0.4; automatic exposure only)",
-      [&args](const std::string& text) {
-        args.given.emplace_back("--dimming");
-        return store_number(text, {0, 1, "is not a fraction"}, args.choice.dimming);
-      });
+  add_text(app, "--dimming", "SHARE",
+           "how much of its darkness the picture keeps: 0 is as bright as by day, 1 as dark as it was compared with a "
+           "room with "
+           "100 cd/m2 (default 0.4; automatic exposure only)",
+           [&args](const std::string& text) {
+             args.given.emplace_back("--dimming");
+             return store_number(text, {0, 1, "is not a fraction"}, args.choice.dimming);
+           });
 }
 
 }  // namespace
@@ -114,7 +115,8 @@ void add_look(CLI::App& app, LookArgs& args) {
     models += (models.empty() ? "" : ", ") + std::string(model.name);
   }
   add_text(app, "--look", "camera|eye|MODEL",
-           "as a camera in daylight would have it (default), as an eye saw it that stood there (reds darken, colours "
+           "as a camera in daylight would have it (default), as an observer on site would have seen it (reds darken, "
+           "colours "
            "fade, detail softens), or its colours by one published model (" +
                models + ")",
            [&args, models](const std::string& text) -> Wrong {
@@ -148,7 +150,8 @@ void add_look(CLI::App& app, LookArgs& args) {
          "(default: SHIN-SUB-1, a substitute)")
       ->type_name("FILE");
   add_text(app, "--display-luminance", "CD_M2",
-           "white of the display the picture is made for: colours are made up for what the eye misses there, against "
+           "white of the display the picture is made for: colours are compensated for what the eye loses there, "
+           "compared with "
            "displays of 250 cd/m2 (default: no change)",
            [&args](const std::string& text) -> Wrong {
              double luminance = 0;
@@ -212,7 +215,7 @@ void add_budget(CLI::App& app, EffectsArgs& args) {
 
 std::optional<std::string> complete_effects(const LookArgs& look, EffectsArgs& args) {
   using Which = isp::LookChoice::Which;
-  if (args.budget_ms && args.budget_mpps) return "--budget-ms and --budget-mpps are two words for one thing: give one";
+  if (args.budget_ms && args.budget_mpps) return "--budget-ms and --budget-mpps are mutually exclusive";
   const bool all = look.choice.which == Which::all;
   if (all && is_given(look, "--tolerance")) return "--effects all leaves nothing out: --tolerance goes with auto";
   if (all && args.budgeted()) return "--effects all leaves nothing out: a budget goes with auto";

@@ -18,39 +18,39 @@ class App;
 
 namespace lowlux::cli {
 
-/// --look and what goes with it.
+/// Holds the arguments of --look and its related options.
 struct LookArgs {
   isp::LookChoice choice;
   bool noise_limit_given = false;
   std::string coefficients;             // file of a table for Shin's model; empty: the substitute
-  std::optional<double> display_cd_m2;  // white of the display pictures are made for
-  std::vector<std::string> given;       // options that do not go with every look
+  std::optional<double> display_cd_m2;  // white of the display for which images are made
+  std::vector<std::string> given;       // options that are not valid for every look
 };
 
 void add_look(CLI::App& app, LookArgs& args);
 
-/// Who decides what a frame calls for: the look alone, or a planner that also decides about corrections, to which
-/// --effects auto, --effects all and --tolerance belong whatever the look.
+/// Names what decides on corrections: the look alone, or a planner for all corrections, for which --effects auto,
+/// --effects all and --tolerance are valid with any look.
 enum class Planner : std::uint8_t { of_look, of_everything };
 
-/// The choice with defaults filled in. @return what is wrong with the options together, or nothing
+/// Completes the choice with defaults. @return the error of the options in combination, or nothing
 std::optional<std::string> complete_look(const LookArgs& args, Planner planner, isp::LookChoice& choice);
 
-/// What `develop` is to decide for itself, and in what time.
+/// Holds the decisions that `develop` takes itself, and their time budget.
 struct EffectsArgs {
   std::optional<double> budget_ms;            // for each frame
   std::optional<double> budget_mpps;          // megapixels in a second
-  std::optional<isp::EffectsChoice> effects;  // without the budget, which depends on the frame
+  std::optional<isp::EffectsChoice> effects;  // excludes the budget, which depends on the frame
   bool budgeted() const { return budget_ms || budget_mpps; }
 };
 
-/// --budget-ms, --budget-mpps; --effects and --tolerance are the look's too.
+/// Adds --budget-ms and --budget-mpps; --effects and --tolerance belong to the look's options too.
 void add_budget(CLI::App& app, EffectsArgs& args);
 
-/// What is asked for, of these options and those of the look. @return what is wrong with them together, or nothing
+/// Combines these options with those of the look. @return the error of their combination, or nothing
 std::optional<std::string> complete_effects(const LookArgs& look, EffectsArgs& args);
 
-/// The budget for a frame of this size [s]. Precondition: args.budgeted().
+/// Returns the budget for a frame of this size [s]. Precondition: args.budgeted().
 double budget_s(const EffectsArgs& args, double megapixels);
 
 }  // namespace lowlux::cli

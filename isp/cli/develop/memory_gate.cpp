@@ -13,14 +13,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The number in a file that holds nothing else; "max" and absent files are none.
+/// Returns the number in a file that holds nothing else; nullopt for "max" and absent files.
 std::optional<double> number_in(const fs::path& file) {
   double value = 0;
   if (std::ifstream(file) >> value) return value;
   return std::nullopt;
 }
 
-/// The number after `key` in a file of "key number" lines.
+/// Returns the number after `key` in a file of "key number" lines.
 std::optional<double> number_of_key(const fs::path& file, const std::string& key) {
   std::ifstream in(file);
   for (std::string line; std::getline(in, line);) {
@@ -32,16 +32,16 @@ std::optional<double> number_of_key(const fs::path& file, const std::string& key
   return std::nullopt;
 }
 
-/// Names of what a control group says of memory.
+/// Holds the names of a control group's memory files.
 struct GroupFiles {
   const char* limit;
   const char* usage;
-  const char* cache;  // in memory.stat: file pages the system can take back
+  const char* cache;  // in memory.stat: file pages the system can reclaim
 };
 constexpr GroupFiles version_1{"memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"};
 constexpr GroupFiles version_2{"memory.max", "memory.current", "inactive_file"};
 
-/// What the group at root/group and those above it leave.
+/// Returns the memory left by the group at root/group and its parents.
 double room_in_groups(const fs::path& root, std::string group, const GroupFiles& files) {
   double room = std::numeric_limits<double>::infinity();
   for (;;) {
@@ -73,7 +73,7 @@ std::optional<double> available_memory(const std::string& proc, const std::strin
   return std::max(room, 0.0);
 }
 
-/// Always one file; more only when their size is known.
+/// Returns the number of files at a time: at least one, more only when their size is known.
 int MemoryGate::capacity() const {
   if (file_bytes_ == 0) return 1;
   return static_cast<int>(std::clamp(limit_bytes_ / file_bytes_, 1.0, 1e6));

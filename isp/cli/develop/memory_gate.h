@@ -8,13 +8,13 @@
 
 namespace lowlux::cli {
 
-/// Memory this process may still take [bytes]: what the system calls available, or what its control groups (v1 or v2)
-/// leave if that is less. nullopt if nothing is known.
-/// @param proc, groups  where the system reports them
+/// Returns the memory this process may still take [bytes]: the system's available memory, or the memory left by its
+/// control groups (v1 or v2) if that is less. Returns nullopt if nothing is known.
+/// @param proc, groups  paths under which the system reports them
 std::optional<double> available_memory(const std::string& proc = "/proc", const std::string& groups = "/sys/fs/cgroup");
 
-/// Lets as many files be worked on at a time as memory holds, and always one. All are taken to be as large as the
-/// largest so far; until the first size is known there is one file.
+/// Limits the number of files processed at a time to those that fit in memory, at least one. All are assumed to be as
+/// large as the largest so far; until the first size is known, one file is processed.
 class MemoryGate {
  public:
   /// @param limit_bytes  for all files together
@@ -22,13 +22,13 @@ class MemoryGate {
 
   /// Waits until there is memory for one more file.
   void enter();
-  /// A file that was let in takes so much.
+  /// Reports the memory that a file which has entered takes.
   void report_size(std::size_t bytes);
   void leave();
-  /// How many files of those that are wanted at a time memory holds; 1 until the first size is known.
+  /// Returns how many of the wanted files fit in memory at a time; 1 until the first size is known.
   int files_at_a_time(int wanted) const;
 
-  /// enter() and leave() of a gate, if there is one.
+  /// Calls enter() and leave() of a gate, if it is not null.
   class Entry {
    public:
     explicit Entry(MemoryGate* gate) : gate_(gate) {
@@ -44,7 +44,7 @@ class MemoryGate {
     MemoryGate* gate_;
   };
 
-  /// Text about the limit if files had to wait for memory; else nullopt.
+  /// Returns text about the limit if files had to wait for memory; else nullopt.
   std::optional<std::string> limit_text() const;
 
  private:

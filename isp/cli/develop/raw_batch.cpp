@@ -24,9 +24,9 @@
 namespace lowlux::cli {
 namespace {
 
-constexpr double used_memory = 0.8;  // of what is available: estimates are not exact, and others need some too
+constexpr double used_memory = 0.8;  // of the available: estimates are not exact, and others need some too
 
-/// An existing output is reported before any work is done; the writer of the file checks again.
+/// Reports an existing output before any work is done; the writer of the file checks again.
 Result<void> check_free(const std::string& output, isp::Overwrite overwrite) {
   std::error_code ignored;
   if (overwrite == isp::Overwrite::yes || !std::filesystem::exists(output, ignored)) return {};
@@ -34,7 +34,7 @@ Result<void> check_free(const std::string& output, isp::Overwrite overwrite) {
               fmt::format("{} exists: use --force to overwrite it, --skip-existing to keep it", output), output);
 }
 
-/// What holds for one frame: profile and darks; what the profile says goes into the frame.
+/// Returns the options of one frame: profile and darks; values of the profile are put into the frame.
 Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) {
   isp::DevelopOptions options = batch.options;
   options.effects = batch.args.effects.effects;
@@ -52,7 +52,7 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
   Result<std::shared_ptr<const DarkFrame>> dark = batch.darks->frame_for(frame);
   if (!dark) return tl::make_unexpected(dark.error());
   options.dark_frame = std::move(*dark);
-  options.black = batch.options.black;  // the darks hold it
+  options.black = batch.options.black;  // the darks include it
   return options;
 }
 
@@ -97,7 +97,7 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
     if (!source) return tl::make_unexpected(source.error());
     batch.darks = *std::move(source);
   }
-  if (args.jobs == 0 && batch.jobs.size() > 1) {  // the darks are held by now
+  if (args.jobs == 0 && batch.jobs.size() > 1) {  // the darks are in memory by now
     if (const auto bytes = available_memory()) batch.memory = std::make_shared<MemoryGate>(used_memory * *bytes);
   }
   return batch;
@@ -150,8 +150,8 @@ void print_outcome(const DevelopArgs& args, const DevelopOutcome& outcome) {
   if (args.timings) print_out(fmt::format("{}\n{}", one_line(outcome.input), times_text(outcome.times)));
 }
 
-/// The work on all files. Of a file that is done, counts stay and what is to be printed at the end, no more: memory
-/// does not grow with the number of files.
+/// Processes all files. Of a finished file only counts and the text to be printed at the end are kept: memory does not
+/// grow with the number of files.
 class BatchRun {
  public:
   BatchRun(const RawBatch& batch, const RawWork& work)
@@ -182,13 +182,13 @@ class BatchRun {
     try {
       for (int i = 1; i < workers; ++i) threads.emplace_back([this, workers] { take_files(workers); });
     } catch (const std::system_error&) {
-      // The system gives no more threads: those there are do the work.
+      // If the system refuses more threads, the existing ones do the work.
     }
     take_files(workers);
   }
 
-  /// Each worker takes the next file: while one reads, another renders or encodes. Where memory holds fewer files than
-  /// there are workers, each file gets more of the processors.
+  /// Lets each worker take the next file: while one reads, another renders or encodes. If fewer files fit in memory
+  /// than there are workers, each file gets more processors.
   void take_files(int workers) {
     std::optional<PoolExecutor> executor;
     for (int i = next_++; i < files_; i = next_++) {
@@ -206,8 +206,8 @@ class BatchRun {
       Job own = job;
       if (batch_.args.force) own.overwrite = isp::Overwrite::yes;
       if (batch_.args.skip_existing) {
-        // The output is written last: where it is, so is the rest, and what is there without it is of a killed run. An
-        // empty file is the name that such a run had claimed (see publish.h).
+        // The output is written last: if it exists, the maps do too, and maps without it are from an interrupted run.
+        // An empty file is the name that such a run had reserved (see publish.h).
         std::error_code absent;
         out.skipped = std::filesystem::file_size(job.output, absent) > 0 && !absent;
         if (out.skipped) return out;
@@ -221,7 +221,7 @@ class BatchRun {
     } catch (const std::exception& failure) {
       out.error = Error{ErrorCode::too_large, failure.what(), job.input};
     }
-    if (out.error && out.error->code == ErrorCode::exists && batch_.args.skip_existing) {  // another run was faster
+    if (out.error && out.error->code == ErrorCode::exists && batch_.args.skip_existing) {  // another run wrote it first
       out.error.reset();
       out.plan.reset();
       out.skipped = true;

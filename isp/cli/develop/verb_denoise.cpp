@@ -48,14 +48,14 @@ Result<void> denoise_file(const RawBatch& batch, const Job& job, Executor& execu
   return {};
 }
 
-/// The maps are always made, and there are codes in place of a picture.
+/// Returns the memory of `denoise`: the maps are always made, and codes take the place of an image.
 std::size_t clean_raw_bytes(const RawDn& raw, const isp::DevelopOptions& options, int threads) {
   isp::DevelopOptions with_maps = options;
   with_maps.denoise.maps = true;
   return isp::expected_bytes(raw, with_maps, threads);
 }
 
-/// Nothing is rendered: what a plan decides of colour and tone is not used.
+/// Removes rendering: a plan's decisions on colour and tone are not used.
 isp::DevelopOptions without_rendering(isp::DevelopOptions o) {
   o.space = OutputSpace::camera;
   o.samples = SampleType::f32;

@@ -34,7 +34,7 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
   isp::WriteOptions write = write_options(batch.args);
   write.overwrite = job.overwrite;
   write.sync = batch.sync;
-  // The output comes last: where it is, --skip-existing knows that all is done.
+  // The output is written last: if it exists, --skip-existing takes all as done.
   Result<void> maps = write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);
   if (!maps) return maps;
   const Result<void> written = isp::write_picture(upright, batch.options.space, raw.info, job.output, write, executor);

@@ -12,10 +12,10 @@
 
 namespace lowlux::cli {
 
-/// What the verbs that make one picture of another have in common.
+/// Holds the arguments common to the verbs that convert one image to another.
 struct PictureVerb {
   std::string name;                 // of the verb
-  std::vector<std::string> inputs;  // files that are read, the picture first
+  std::vector<std::string> inputs;  // files that are read, the image first
   std::string output;
   std::optional<int> bits;
   int jpeg_quality = 92;
@@ -24,13 +24,13 @@ struct PictureVerb {
   bool quiet = false;
 };
 
-/// Reads, works, writes by write_made() and prints its report; returns warnings.
+/// Reads, processes, writes by write_made() and prints its report; returns warnings.
 using PictureWork = std::function<Result<std::vector<std::string>>(const PictureKind& kind, Executor& executor)>;
 
 /// Checks the output before the work, prints warnings and errors after it. @return the exit code
 int run_picture_verb(const PictureVerb& verb, const PictureWork& work);
 
-/// Writes the picture that was made to the verb's output.
+/// Writes the resulting image to the verb's output.
 Result<void> write_made(const PictureVerb& verb, const Picture& picture, OutputSpace space, Executor& executor);
 
 }  // namespace lowlux::cli

@@ -10,13 +10,13 @@
 
 namespace lowlux::cli {
 
-/// `resaturate`: one picture to another. Exactly one of the two black points is set.
+/// Holds the arguments of `resaturate`, from one image to another. Exactly one of the two black points is set.
 struct ResaturateArgs {
   std::string input;
   std::string output;
   std::optional<std::array<double, 3>> black_codes;  // sRGB, 0..255
-  std::optional<Rect> black_area;                    // of the picture, upright
-  std::optional<double> chroma_noise;                // of white
+  std::optional<Rect> black_area;                    // in the upright image
+  std::optional<double> chroma_noise;                // relative to white
   double prior_std = 0.065;
   int radius = 4;
   std::optional<int> bits;

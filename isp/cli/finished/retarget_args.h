@@ -9,7 +9,7 @@
 
 namespace lowlux::cli {
 
-/// `retarget`: one picture to another.
+/// Holds the arguments of `retarget`, from one image to another.
 struct RetargetArgs {
   std::string input;
   std::string output;

@@ -86,7 +86,7 @@ void add_advise(CLI::App& app, AdviseArgs& args) {
   add_optional(app, "--max-exposure", "S", "longest exposure", args.longest_exposure_s);
   add_optional(app, "--motion", "PX_PER_S", "how fast the scene moves; goes with --blur", args.speed_px_per_s);
   add_optional(app, "--blur", "PX", "how far it may move during the exposure", args.blur_px);
-  add_number(app, "--clip", "SHARE", "share of pixels that may clip (default 0.001)", [&args](double share) {
+  add_number(app, "--clip", "SHARE", "fraction of pixels that may clip (default 0.001)", [&args](double share) {
     args.clipped_share = share;
   })->group(group);
   add_number(app, "--patch", "PIXELS", "red pixels of the patch whose chromaticity is judged (default 256)",

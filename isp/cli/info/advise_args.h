@@ -13,15 +13,15 @@ class App;
 
 namespace lowlux::cli {
 
-/// What `info --advise` is told; what is absent comes from the raw file.
+/// Holds the arguments of `info --advise`; absent values come from the raw file.
 struct AdviseArgs {
   bool wanted = false;
   std::string sensor;                     // by name, or a camera profile's file (.json)
   std::string gain;                       // only this setting; empty: all
-  isp::SensorFigures figures;             // in place of the table's
-  std::string light = "D65";              // of the scene
+  isp::SensorFigures figures;             // override those of the table
+  std::string light = "D65";              // illuminant of the scene
   std::optional<double> midtone_cd_m2;    // --luminance
-  std::optional<double> highlight_cd_m2;  // --highlight: 20, or 20x for so many times the mid tone
+  std::optional<double> highlight_cd_m2;  // --highlight: 20, or 20x for a multiple of the mid tone
   std::optional<double> highlight_ratio;
   std::optional<double> f_number;
   std::optional<double> white_luminance_cd_m2;
@@ -39,8 +39,8 @@ struct AdviseArgs {
 /// Adds the options of `info --advise`.
 void add_advise(CLI::App& app, AdviseArgs& args);
 
-/// What is wrong with them together; empty if nothing.
-/// @param files  raw files on the command line
+/// Returns the error of the options in combination; empty if there is none.
+/// @param files  number of raw files among the arguments
 std::string wrong_advise(const AdviseArgs& args, std::size_t files);
 
 }  // namespace lowlux::cli

@@ -36,7 +36,7 @@ void add_note(std::vector<std::string>& notes, std::string note) {
   if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(std::move(note));
 }
 
-/// What of a sensor the advice does not know.
+/// Notes noise of a sensor that the advice does not include.
 void note_unknown(const isp::GainSetting& gain, std::vector<std::string>& notes) {
   const double noise_e = std::hypot(gain.sensor.row_noise_e, gain.sensor.column_noise_e);
   if (noise_e > 0) {
@@ -54,7 +54,7 @@ Result<Spectrum> light_of(const std::string& name) {
 
 isp::Xy white_of(const Spectrum& light) { return *isp::xy_of(isp::xyz_of(light)); }
 
-/// Camera electrons to XYZ as seen under D65, by the camera's sensitivities.
+/// Returns the matrix from camera electrons to XYZ adapted to D65, by the camera's sensitivities.
 Result<Matrix3> matrix_of(const std::string& camera, const Spectrum& light) {
   const auto sensitivity = isp::camera_sensitivity(camera);
   if (!sensitivity) {
@@ -70,12 +70,12 @@ Result<Matrix3> matrix_of(const std::string& camera, const Spectrum& light) {
   return isp::camera_to_xyz(colour, white_of(light), isp::white_d65);
 }
 
-/// The gain settings of a sensor that are asked for. Errors: figures of one setting for several.
+/// Returns the requested gain settings of a sensor. Errors: values of one setting for several.
 Result<std::vector<std::string>> settings_of(const AdviseArgs& args) {
   if (!args.gain.empty()) return std::vector<std::string>{args.gain};
   const auto names = isp::gain_settings(args.sensor);
   std::vector<std::string> settings(names.begin(), names.end());
-  if (settings.empty()) settings.emplace_back();  // an unknown sensor: sensor_named() says so
+  if (settings.empty()) settings.emplace_back();  // sensor_named() reports the unknown sensor
   const isp::SensorFigures& f = args.figures;
   if (settings.size() > 1 && (f.system_gain_dn_per_e || f.read_noise_e || f.iso)) {
     return fail(ErrorCode::invalid_argument,
@@ -90,7 +90,7 @@ bool has_figures(const isp::SensorFigures& f) {
          f.pixel_pitch_um || f.peak_quantum_efficiency;
 }
 
-/// Gains that lack a figure are left out and named; if all do, the first one's error is the answer.
+/// Adds gains of a named sensor. Gains without a value are left out and named; if all are, returns the first error.
 Result<void> take_named(const AdviseArgs& args, const Spectrum& light, const isp::Optics& optics, AdviceCase& out) {
   const auto radiance = isp::radiance_of(light, 1);
   std::optional<Error> first_error;
@@ -122,7 +122,7 @@ Result<void> take_named(const AdviseArgs& args, const Spectrum& light, const isp
   return {};
 }
 
-/// The calibrations of a profile that serve a light: the one of its name, else all where they are one or two.
+/// Returns the calibrations of a profile for a light: the one of its name, else all if there are one or two.
 Result<CameraColour> colour_of(const CameraProfile& profile, const std::string& light) {
   CameraColour colour;
   for (const ColourProfile& c : profile.colours) {
@@ -141,7 +141,7 @@ Result<CameraColour> colour_of(const CameraProfile& profile, const std::string& 
   return colour;
 }
 
-/// What a profile's camera makes of a neutral, largest 1, and its matrix.
+/// Holds the response of a profile's camera to a neutral, largest 1, and its matrix.
 struct ProfileColour {
   Vector3 neutral{};
   Matrix3 camera_to_xyz{};
@@ -282,7 +282,7 @@ std::vector<float> green_fractions(const RawDn& raw, const BlackPoint& black) {
   return out;
 }
 
-/// The value that `share` of the others exceed.
+/// Returns the value that the fraction `share` of the values exceed.
 double exceeded_by(std::vector<float>& values, double share) {
   const auto place = static_cast<std::size_t>((1 - share) * static_cast<double>(values.size() - 1));
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(place);
@@ -304,7 +304,7 @@ Result<RawLuminance> raw_luminance(const RawFrame& frame, const FrameInfo& info,
   if (!black) return tl::make_unexpected(black.error());
   std::vector<float> green = green_fractions(frame.raw, *black);
   if (green.empty()) return fail(ErrorCode::insufficient, "the file has no green pixels; give --luminance");
-  constexpr double clipped = 0.995;  // of the range: noise and the last code
+  constexpr double clipped = 0.995;  // of the range, for noise and the last code
   const double highlight = exceeded_by(green, std::clamp(share, 0.0, 1.0));
   const double median = exceeded_by(green, 0.5);
   if (!(median > 0)) {

@@ -36,7 +36,7 @@ std::string limit_of(const isp::AdvicePoint& point) { return point.exceeds ? lim
 
 bool has_heavy_tails(const isp::AdvicePoint& p) { return p.midtone && p.midtone->weight_snr < heavy_tails; }
 
-/// The numbers of a point: exposure, SNR, std of u'v', highlight in the well and in the range.
+/// Returns the cells of a point: exposure, SNR, std of u'v', highlight relative to the well and to the range.
 std::vector<std::string> cells_of_point(const isp::AdvicePoint& p) {
   std::vector<std::string> cells{fmt::format("{:.4g}", p.exposure_s)};
   if (p.midtone) {
@@ -133,7 +133,7 @@ isp::Plot plot_of(const AdviceCase& asked, const isp::ExposureAdvice& advice, bo
     for (const isp::AdvicePoint& point : advice.curve) {
       if (point.gain != gain) continue;
       isp::Series& series = point.exceeds ? beyond : allowed;
-      if (point.exceeds && beyond.x.empty()) {  // from where the limit is
+      if (point.exceeds && beyond.x.empty()) {  // starting at the limit
         const isp::AdvicePoint& at = advice.gains[gain].at;
         for (isp::Series* s : {&allowed, &beyond}) s->x.push_back(at.exposure_s), s->y.push_back(value(at));
       }

@@ -8,13 +8,13 @@
 
 namespace lowlux::cli {
 
-/// The advice, each gain's best, and the curve, for people.
+/// Returns the advice, each gain's best, and the curve, for people.
 std::string advice_text(const AdviceCase& asked, const isp::ExposureAdvice& advice);
 
-/// The same as one JSON object; null where the mid tone clips.
+/// Returns the advice as one JSON object; null where the mid tone clips.
 std::string advice_json(const AdviceCase& asked, const isp::ExposureAdvice& advice);
 
-/// The same as a page, signal-to-noise ratio and chromaticity drawn over the exposure for each gain.
+/// Returns the advice as a page, with signal-to-noise ratio and chromaticity drawn over the exposure for each gain.
 isp::Report advice_page(const AdviceCase& asked, const isp::ExposureAdvice& advice);
 
 }  // namespace lowlux::cli

@@ -4,7 +4,7 @@
 
 namespace lowlux::cli {
 
-/// `info --advise`: prints the advice and writes its page. @return the exit code
+/// Runs `info --advise`: prints the advice and writes its page. @return the exit code
 int run_advise(const InfoArgs& args);
 
 }  // namespace lowlux::cli

@@ -5,7 +5,7 @@
 
 #include "isp/base/result.h"
 
-/// Exit codes of the command, and the two ways in which a verb fails.
+/// Defines exit codes of the command, and the two ways in which a verb fails.
 namespace lowlux::cli {
 
 inline constexpr int exit_done = 0;
@@ -14,14 +14,14 @@ inline constexpr int exit_usage = 2;   // the command line is wrong
 
 /// Prints "lowlux: FILE: what is wrong". @return exit_failed
 int print_failure(const std::string& file, const Error& error);
-/// As above; the file is the error's own.
+/// Prints the failure of the file that the error itself names. @return exit_failed
 int print_failure(const Error& error);
 /// Prints "lowlux VERB: OPTION: what is wrong"; the option is the error's place, if it has one. @return exit_usage
 int print_usage_error(std::string_view verb, const Error& error);
 /// Prints a usage error if an argument is invalid, else the failure of the file or folder that it names.
 int print_argument_error(std::string_view verb, const Error& error);
 
-/// The error, with the file as its place where it has none.
+/// Returns the error, with the file as its place if it has none.
 Error with_file(Error error, const std::string& file);
 
 }  // namespace lowlux::cli

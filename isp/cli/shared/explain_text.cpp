@@ -21,7 +21,7 @@ void add_noise(Lines& out, const isp::NoiseReduction& noise) {
   }
   out.add("denoise", fmt::format("{}: {}", noise.level ? denoise::name_of(*noise.level) : "off", noise.reason));
   for (const denoise::LineOffsets& lines : noise.lines) {
-    out.add("", fmt::format("{} noise {:.3g} e- taken off, {:.3g} e- left",
+    out.add("", fmt::format("{} noise: {:.3g} e- subtracted, {:.3g} e- left",
                             lines.lines == denoise::Lines::rows ? "row" : "column", lines.line_std_e,
                             lines.residual_std_e));
   }

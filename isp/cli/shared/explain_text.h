@@ -6,10 +6,10 @@
 
 namespace lowlux::cli {
 
-/// "masked-pixels" and so on, as reports name them.
+/// Returns "masked-pixels" and so on, the names in reports.
 std::string_view name_of(BlackPoint::Source source);
 
-/// "profile", "file", "picture".
+/// Returns "profile", "file" or "picture".
 std::string_view name_of(NoiseProfile::Source source);
 
 }  // namespace lowlux::cli

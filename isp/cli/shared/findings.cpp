@@ -14,7 +14,7 @@ namespace {
 constexpr std::array<std::size_t, 5> widths{40, 9, 24, 32, 14};  // finding, kind, published, ours, verdict
 constexpr std::size_t note_width = 104;
 
-// Broken at blanks; a word that is longer than the width has its own line.
+// Wraps text at blanks; a word that is longer than the width has its own line.
 std::vector<std::string> wrapped(const std::string& text, std::size_t width) {
   std::vector<std::string> lines{""};
   for (std::size_t start = 0; start < text.size();) {

@@ -7,12 +7,12 @@
 
 namespace lowlux::cli {
 
-/// The findings as a table for a terminal: finding, kind, published, ours, verdict, wrapped to about 120 columns; the
-/// note follows where a finding does not agree. The last lines count the verdicts of published ones and of our own
-/// checks.
+/// Returns the findings as a table for a terminal: finding, kind, published, ours, verdict, wrapped to about 120
+/// columns; the note follows where a finding does not agree. The last lines count the verdicts of published findings
+/// and of this project's own checks.
 std::string findings_text(std::span<const isp::Finding> findings);
 
-/// One JSON array of objects.
+/// Returns one JSON array of objects.
 std::string findings_json(std::span<const isp::Finding> findings);
 
 }  // namespace lowlux::cli

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::array signals{SIGINT, SIGTERM, SIGHUP};
 
-sem_t arrived;  // posted by the handler, which may do little else
+sem_t arrived;  // posted by the handler, in which few functions are allowed
 std::atomic<int> arrived_signal{0};
 static_assert(std::atomic<int>::is_always_lock_free);
 
@@ -65,7 +65,7 @@ void clean_up_on_signals() {
   try {
     std::thread(end_when_asked).detach();
   } catch (const std::system_error&) {
-    return;  // without the thread signals end the process as ever
+    return;  // without the thread signals end the process as by default
   }
   for (const int number : signals) {
     struct sigaction before {};

@@ -5,11 +5,11 @@
 
 namespace lowlux::cli {
 
-/// From now on SIGINT, SIGTERM and SIGHUP remove the temporary files of this process, and print a line if there is an
-/// InterruptionReport, before they end it as they would have. Those that are ignored (nohup) stay so.
+/// Makes SIGINT, SIGTERM and SIGHUP remove the temporary files of this process, and print a line if there is an
+/// InterruptionReport, before they end it as by default. Signals that are ignored (nohup) stay ignored.
 void clean_up_on_signals();
 
-/// What that line says after "lowlux: interrupted:" as long as the object lives. At most one at a time.
+/// Sets the text of that line after "lowlux: interrupted:" while the object exists. At most one may exist at a time.
 class InterruptionReport {
  public:
   explicit InterruptionReport(std::function<std::string()> text);

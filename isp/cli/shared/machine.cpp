@@ -14,7 +14,7 @@
 namespace lowlux::cli {
 namespace {
 
-constexpr std::streamsize most_cpuinfo = 1 << 16;  // bytes; the first processor is at the beginning, a board at the end
+constexpr std::streamsize most_cpuinfo = 1 << 16;  // bytes; the first processor is at the start, a board at the end
 constexpr std::string_view blanks = " \t\r";
 
 std::string_view trimmed(std::string_view text) {
@@ -23,7 +23,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(blanks) + 1 - first);
 }
 
-/// What follows the first "KEY :" at the beginning of a line.
+/// Returns the text after the first "KEY :" at the beginning of a line.
 std::optional<std::string> value_of(std::string_view key, std::string_view text) {
   while (!text.empty()) {
     const std::string_view line = text.substr(0, text.find('\n'));

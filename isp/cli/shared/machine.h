@@ -6,11 +6,11 @@
 
 namespace lowlux::cli {
 
-/// What times were measured on. Absent is what the system does not tell.
+/// Describes the machine on which times were measured. Values that the system does not report are absent.
 struct Machine {
   std::optional<std::string> cpu;
   int processors = 0;   // online
-  int threads = 0;      // that the command uses, where its text does not say otherwise
+  int threads = 0;      // used by the command, unless its text states otherwise
   std::string kernels;  // instruction set of the vector kernels: "AVX2"
   std::optional<double> memory_gib;
   std::string system;    // "Linux 6.1.0-18-amd64 x86_64"
@@ -18,15 +18,15 @@ struct Machine {
   std::string lowlux;    // version
 };
 
-/// The model of the first processor in the text of /proc/cpuinfo: "model name", on boards without one "Model".
+/// Returns the model of the first processor in the text of /proc/cpuinfo: "model name", on boards without one "Model".
 std::optional<std::string> cpu_model(std::string_view cpuinfo);
 
-/// This machine. @param cpuinfo  a file like /proc/cpuinfo; it need not exist
+/// Describes this machine. @param cpuinfo  a file like /proc/cpuinfo; it need not exist
 Machine this_machine(int threads, const std::string& cpuinfo = "/proc/cpuinfo");
 
-/// "0.1.0".
+/// Returns "0.1.0".
 std::string version_number();
-/// The version, the raw decoder and the kernels' instruction set, one line each.
+/// Returns the version, the raw decoder and the kernels' instruction set, one line each.
 std::string version_text();
 
 }  // namespace lowlux::cli

@@ -13,7 +13,7 @@ extern "C" const char lowlux_module_stamp[];
 namespace lowlux::cli {
 namespace {
 
-/// The function of a module that is open; nullptr if the module was not made with this command.
+/// Returns the function of an open module; nullptr if the module was not built with this command.
 void* function_of(void* loaded, const Module& module) {
   const void* stamp = dlsym(loaded, "lowlux_module_stamp");
   const bool ours = stamp != nullptr && std::strcmp(static_cast<const char*>(stamp), lowlux_module_stamp) == 0;
@@ -25,7 +25,7 @@ void* function_of(void* loaded, const Module& module) {
 Result<std::filesystem::path> command_folder() {
   std::error_code failed;
   const std::filesystem::path command = std::filesystem::read_symlink("/proc/self/exe", failed);
-  if (failed) return fail(ErrorCode::unreadable, "cannot tell where the command lies: is /proc mounted?");
+  if (failed) return fail(ErrorCode::unreadable, "cannot find the folder of the command: is /proc mounted?");
   return command.parent_path();
 }
 

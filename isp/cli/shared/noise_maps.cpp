@@ -12,7 +12,7 @@
 namespace lowlux::cli {
 namespace {
 
-/// The cells a crop touches.
+/// Returns the cells that intersect a crop.
 Plane<float> cropped(const Plane<float>& cells, const Rect& crop) {
   const int left = crop.x / 2, top = crop.y / 2;
   Plane<float> out((crop.x + crop.width + 1) / 2 - left, (crop.y + crop.height + 1) / 2 - top);
@@ -30,7 +30,7 @@ std::vector<std::string> noise_map_names(const std::string& picture) {
 std::vector<PixelMap> noise_map_files(isp::NoiseMaps maps, const RawDn& raw, const std::string& picture,
                                       Executor& executor) {
   if (maps.chroma_confidence.size() == 0) return {};
-  SceneLinear both;  // as planes of one picture they are turned alike
+  SceneLinear both;  // as planes of one image they are rotated alike
   both.plane[0] = cropped(maps.residual_variance_e2, raw.default_crop);
   both.plane[1] = cropped(maps.chroma_confidence, raw.default_crop);
   both.plane[2] = Plane<float>(both.plane[0].width(), both.plane[0].height());

@@ -12,19 +12,19 @@
 
 namespace lowlux::cli {
 
-/// A figure of each pixel, and its file.
+/// Holds a value for each pixel, and its file.
 struct PixelMap {
   std::string path;
   Plane<float> value;
 };
 
-/// Writes a map as grey PFM, whole or not at all. Errors name the file.
+/// Writes a map as grey PFM, completely or not at all. Errors name the file.
 Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite, isp::Sync sync = isp::Sync::no);
 
-/// Where the maps of a picture go: OUT.noise.pfm and OUT.confidence.pfm for OUT.png.
+/// Returns the files of an image's maps: OUT.noise.pfm and OUT.confidence.pfm for OUT.png.
 std::vector<std::string> noise_map_names(const std::string& picture);
 
-/// The maps as their picture lies: cropped and upright, one pixel for each 2x2 cell. None if `maps` is empty.
+/// Returns the maps in their image's geometry: cropped and upright, one pixel per 2x2 cell; none if `maps` is empty.
 std::vector<PixelMap> noise_map_files(isp::NoiseMaps maps, const RawDn& raw, const std::string& picture,
                                       Executor& executor);
 

@@ -7,10 +7,10 @@
 
 namespace lowlux::cli {
 
-/// Gives a Bayer frame whose noise is to be reduced, and of which neither a profile nor its file states usable noise,
-/// that measured on the picture itself, with a warning that says so. Where it cannot be measured the warning says why,
-/// and the frame stays as it is. Errors: those of the black point, and where noise has to be reduced (a level was asked
-/// for, or DenoiseChoice::always) those of calib::fit_picture_noise.
+/// Measures the noise of a Bayer frame on the image itself where noise is to be reduced and neither a profile nor its
+/// file states usable noise, and adds a warning. If it cannot be measured, the warning gives the reason, and the frame
+/// is unchanged. Errors: those of the black point, and where noise has to be reduced (a level was requested, or
+/// DenoiseChoice::always) those of calib::fit_picture_noise.
 Result<void> find_noise(const isp::DevelopOptions& options, RawFrame& frame, Executor& executor);
 
 }  // namespace lowlux::cli

@@ -28,7 +28,7 @@ bool same_letters(std::string_view a, std::string_view b) {
   return std::ranges::equal(a, b, {}, ascii_lower, ascii_lower);
 }
 
-/// The text without its unit, which follows it, or, if it ends with a slash, precedes it.
+/// Returns the text without its unit, which follows it, or precedes it if the unit ends with a slash.
 std::string_view without_unit(std::string_view text, std::string_view unit) {
   if (unit.empty() || text.size() <= unit.size()) return text;
   if (unit.ends_with('/')) {
@@ -40,7 +40,7 @@ std::string_view without_unit(std::string_view text, std::string_view unit) {
   return text.substr(0, text.find_last_not_of(blank_characters) + 1);
 }
 
-/// The unit that a placeholder of the help stands for; empty if it stands for none.
+/// Returns the unit of a placeholder in the help; empty if it has none.
 std::string_view unit_of(std::string_view placeholder) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 9> units{{{"S", "s"},
                                                                                 {"C", "C"},
@@ -56,7 +56,7 @@ std::string_view unit_of(std::string_view placeholder) {
   return found == units.end() ? std::string_view() : found->second;
 }
 
-/// How to write a number with a decimal comma; empty if `store` does not take it with a point either.
+/// Returns a hint on a number with a decimal comma; empty if `store` does not accept it with a point either.
 std::string decimal_point_hint(std::string text, const OptionStore& store) {
   const std::size_t comma = text.find(',');
   if (comma == std::string::npos) return {};
@@ -64,8 +64,7 @@ std::string decimal_point_hint(std::string text, const OptionStore& store) {
   return store(text) ? std::string() : fmt::format("; write decimals with a point: {}", text);
 }
 
-/// The first argument that looks like an option and is not one, with what may have been meant; nullopt if all are
-/// known.
+/// Returns the first argument that looks like an option and is not one, with a suggestion; nullopt if all are known.
 std::optional<std::string> unknown_option(const CLI::App& app) {
   const std::vector<std::string> unknown = app.remaining();
   const auto found = std::ranges::find_if(unknown, [](const auto& word) { return word.size() > 1 && word[0] == '-'; });

@@ -15,17 +15,17 @@ class Option;
 
 namespace lowlux::cli {
 
-/// The whole text as a finite number with a decimal point, with a sign or without; nullopt if it is not one.
+/// Returns the entire text as a finite number with a decimal point, with or without a sign; nullopt for other text.
 std::optional<double> number_of(std::string_view text);
 
-/// A number or a fraction as this program prints it, the unit in any case or left out: "+1.5 EV", "3000K", "1/60 s",
-/// "f/2.8" (unit "f/"). Denominators are at least 1. nullopt if the text is anything else.
+/// Returns a number or a fraction as this program prints it, the unit in any case or left out: "+1.5 EV", "3000K",
+/// "1/60 s", "f/2.8" (unit "f/"). Denominators are at least 1. Returns nullopt for any other text.
 std::optional<double> quantity_of(std::string_view text, std::string_view unit);
 
-/// Numbers parted by commas, at most `most`; nullopt if one is none or there are more.
+/// Returns numbers separated by commas; nullopt if one is not a number or there are more than `most`.
 std::optional<std::vector<double>> numbers_of(const std::string& text, std::size_t most);
 
-/// Words parted by commas.
+/// Returns words separated by commas.
 std::vector<std::string> words_of(const std::string& text);
 
 template <class Enum>
@@ -38,18 +38,18 @@ std::string joined(const Names<Enum>& names) {
   return text;
 }
 
-/// Takes the text of an option. @return what is wrong with it, or nothing
+/// Stores the text of an option. @return the error, or nothing
 using OptionStore = std::function<std::optional<std::string>(const std::string&)>;
 
-/// An option that takes text. Where a decimal comma is what is wrong, the message shows the number with a point.
+/// Adds an option that takes text. If a decimal comma is the error, the message shows the number with a point.
 CLI::Option* add_text(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
                       OptionStore store);
 
-/// An option that takes a quantity; `type` names its unit: S, C, CD_M2, DN, E, UM, PX, PX_PER_S or f/N.
+/// Adds an option that takes a quantity; `type` names its unit: S, C, CD_M2, DN, E, UM, PX, PX_PER_S or f/N.
 CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
                         std::function<void(double)> store);
 
-/// An option whose values are names; the message for any other lists them.
+/// Adds an option whose values are names; the message for any other lists them.
 template <class Enum, class Store>
 CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum>& names, Store store,
                         const std::string& help) {
@@ -62,16 +62,16 @@ CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum
                   });
 }
 
-/// " (did you mean --exposure?)" for a name that is near a known one, empty if none is.
+/// Returns " (did you mean --exposure?)" for a name that is similar to a known one, empty if none is.
 std::string suggestion(std::string_view wanted, std::span<const std::string_view> known);
 
-/// Of --bits, wherever pictures are written.
+/// Help text of --bits, for all verbs that write images.
 inline constexpr const char* bits_help = "bits per sample: 8, 16 or 32 (default: PNG, JPEG 8, TIFF, EXR 16, PFM 32)";
 
-/// Prints what is wrong with a command line. @return the exit code
+/// Prints the error of the arguments. @return the exit code
 int refuse(const CLI::App& app, const std::string& wrong);
 
-/// Parses the words after a verb. @return nullopt if they are good, else the exit code, help or error having been
+/// Parses the arguments after a verb. @return nullopt if they are valid, else the exit code, after help or an error was
 /// printed
 std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words);
 

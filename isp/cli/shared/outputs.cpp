@@ -77,7 +77,7 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
                 fmt::format("{} raw files need a folder to go to: '{}/'", inputs->size(), args.output), "-o");
   }
   std::vector<Job> jobs;
-  std::map<std::string, std::string> input_of;  // each file that is written
+  std::map<std::string, std::string> input_of;  // by file that is written
   for (const std::string& input : *inputs) {
     std::string output = args.output;
     if (folder) {

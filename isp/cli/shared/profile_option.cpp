@@ -14,7 +14,7 @@ namespace {
 void use_colours(const CameraProfile& profile, RawFrame& frame) {
   if (profile.colours.empty()) return;
   frame.colour.calibrations = calib::calibrations_of(profile);
-  frame.colour.analog_balance = {1, 1, 1};  // the matrices were fitted to the camera's values as they are
+  frame.colour.analog_balance = {1, 1, 1};  // the matrices were fitted to the camera's unscaled values
   frame.colour.source = CameraColour::Source::profile;
 }
 
@@ -50,7 +50,7 @@ Result<CameraProfile> read_profile(const std::string& path) {
   const auto bytes = capture::read_file_bytes(path, calib::largest_profile_bytes);
   if (!bytes) return tl::make_unexpected(bytes.error());
   auto profile = calib::parse_profile(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()));
-  if (!profile) profile.error().where = path;  // the message has the key's path
+  if (!profile) profile.error().where = path;  // the message includes the key's path
   return profile;
 }
 

@@ -10,23 +10,24 @@
 
 namespace lowlux::cli {
 
-/// What is used of a camera's profile.
+/// Selects the parts of a camera's profile that are used.
 struct ProfileChoice {
-  bool everything = false;   // its colour matrices too
-  std::string gain_setting;  // as calib::gain_named has it; empty: by the frame's ISO
+  bool everything = false;   // includes its colour matrices
+  std::string gain_setting;  // as in calib::gain_named; empty: by the frame's ISO
 };
 
-/// Puts what a camera's profile says of a frame into the frame, in place of what its file says: noise, hot pixels to be
-/// repaired, warnings, and with `everything` the profile's matrices if it holds any. The black point goes into the
-/// options unless they ask for another, and the ISO speed of the setting for looks that need the luminance of the
-/// scene. Errors: those of calib::profile_at; without `everything` a profile that knows no black level.
+/// Replaces values of a frame's file with those of a camera's profile: noise, hot pixels to be repaired, warnings, and
+/// with `everything` the profile's matrices if it holds any. The black point is put into the options unless they
+/// request another, and the ISO speed of the setting for looks that need the luminance of the scene. Errors: those of
+/// calib::profile_at; without `everything` a profile without a black level.
 Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choice, RawFrame& frame,
                          isp::DevelopOptions& options);
 
-/// The profile in a JSON file. Errors: the file cannot be read; those of calib::parse_profile, with the key's path.
+/// Reads a profile from a JSON file. Errors: the file is unreadable; those of calib::parse_profile, with the key's
+/// path.
 Result<CameraProfile> read_profile(const std::string& path);
 
-/// A profile as a JSON file, whole or not at all. Errors: those of calib::profile_text and isp::AtomicFile.
+/// Writes a profile as a JSON file, completely or not at all. Errors: those of calib::profile_text and isp::AtomicFile.
 Result<void> write_profile(const std::string& path, const CameraProfile& profile, isp::Overwrite overwrite);
 
 }  // namespace lowlux::cli

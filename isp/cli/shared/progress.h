@@ -7,8 +7,8 @@
 
 namespace lowlux::cli {
 
-/// A progress bar on stderr for work that takes longer than a second, where stderr is a terminal; elsewhere nothing.
-/// May be used from any thread.
+/// Shows a progress bar on stderr for work that takes longer than a second, if stderr is a terminal; else nothing. It
+/// may be used from any thread.
 class Progress {
  public:
   Progress(int total, bool wanted);
@@ -16,9 +16,9 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// Another `amount` of the total is done; `what` is being worked on.
+  /// Adds `amount` to the progress; `what` names the current work.
   void advance(double amount, const std::string& what);
-  /// Takes the bar off its line and calls print(); the bar stays away until that is done.
+  /// Removes the bar, calls print(), and shows the bar again afterwards.
   void print(const std::function<void()>& print);
 
  private:

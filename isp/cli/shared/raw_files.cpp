@@ -16,12 +16,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What cameras write; a folder may also hold reference images, profiles and notes.
+// These are the extensions of cameras; a folder may also hold reference images, profiles and notes.
 constexpr std::array<std::string_view, 24> raw_extensions{
     ".dng", ".cr2", ".cr3", ".crw", ".nef", ".nrw", ".arw", ".srf", ".sr2", ".raf", ".orf", ".rw2",
     ".pef", ".srw", ".3fr", ".fff", ".iiq", ".mos", ".mrw", ".kdc", ".dcr", ".erf", ".rwl", ".raw"};
 
-/// Names that begin with a dot are hidden: some systems keep notes on files under such names (._IMG_1.DNG).
+/// Returns whether a name is that of a raw file. Names that begin with a dot are hidden: some systems store notes on
+/// files under such names (._IMG_1.DNG).
 bool is_raw_name(const fs::path& path) {
   std::string extension = path.extension().string();
   std::ranges::transform(extension, extension.begin(),

@@ -153,7 +153,7 @@ namespace {
 
 constexpr double longest_fraction_s = 0.25001;
 
-/// With so many decimals at most.
+/// Returns a number with at most `decimals` decimals.
 std::string rounded(double value, int decimals) {
   const double scale = std::pow(10, decimals);
   return fmt::format("{}", std::round(value * scale) / scale);

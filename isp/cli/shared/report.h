@@ -10,38 +10,38 @@
 
 namespace lowlux::cli {
 
-/// What became of one file of `develop`.
+/// Holds the outcome of one file of `develop`.
 struct DevelopOutcome {
   std::string input;
   std::string output;
-  std::optional<Error> error;            // set: not all was written
+  std::optional<Error> error;            // set: not all files were written
   std::optional<isp::DevelopPlan> plan;  // set without an error, unless skipped
   bool skipped = false;                  // the outputs exist, and are kept
-  int width = 0;                         // of the picture as written, upright
+  int width = 0;                         // of the written image, upright
   int height = 0;
   std::vector<isp::StageTime> times;  // all stages, in order
 };
 
-/// One JSON object.
+/// Returns one JSON object.
 std::string develop_json(const DevelopOutcome& outcome);
-/// What was decided for a frame, and why, as text.
+/// Returns the decisions for a frame, with reasons, as text.
 std::string explain_text(const isp::DevelopPlan& plan);
-/// Stage times as text, one line for each and their sum.
+/// Returns stage times as text, one line for each and their sum.
 std::string times_text(const std::vector<isp::StageTime>& times);
 
-/// What a raw file says and what was measured on it: text for people, or one JSON object.
+/// Returns the metadata of a raw file and values measured on it: text for people, or one JSON object.
 std::string info_text(const std::string& file, const RawFrame& frame);
 std::string info_json(const std::string& file, const RawFrame& frame);
 std::string error_json(const std::string& file, const Error& error);
 
-/// "lowlux: FILE: what is wrong", one line.
+/// Returns "lowlux: FILE: what is wrong", one line.
 std::string error_line(const std::string& file, const Error& error);
 
-/// An exposure time as photographers write it: "1/60 s" below a quarter of a second, else with one decimal at most,
-/// "5 s", "0.3 s" (the rule of ExifTool's PrintExposureTime).
+/// Returns an exposure time in photographers' notation: "1/60 s" below a quarter of a second, else with one decimal at
+/// most, "5 s", "0.3 s" (the rule of ExifTool's PrintExposureTime).
 std::string exposure_text(double exposure_s);
 
-/// "f/5.6"; below f/1 with two decimals.
+/// Returns "f/5.6"; below f/1 with two decimals.
 std::string f_number_text(double f_number);
 
 }  // namespace lowlux::cli

@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Names are bytes on Linux: what is not UTF-8 is replaced, so that the output stays JSON.
+// Returns JSON text. Names are bytes on Linux: invalid UTF-8 is replaced, so that the output is valid JSON.
 std::string dumped(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
 
 Json rect_json(const Rect& r) { return {{"x", r.x}, {"y", r.y}, {"width", r.width}, {"height", r.height}}; }

@@ -20,7 +20,7 @@ namespace {
 
 bool names_table(const std::string& text) { return text.ends_with(".csv"); }
 
-/// With nodes at most 5 nm apart where sensors and eyes may see: at a light's own nodes alone is it integrated over.
+/// Resamples a light to at most 5 nm where sensors and eyes may respond: integrals use the light's own nodes alone.
 Result<Spectrum> finely_sampled(const Spectrum& light) {
   constexpr double step_nm = 5, least_nm = 200, most_nm = 2500;
   std::vector<double> nodes;
@@ -44,7 +44,7 @@ Result<capture::SceneSetup> setup_of(const SceneArgs& args) {
 }
 
 Result<std::vector<capture::SpectrumColumn>> read_reflectances(const std::string& file) {
-  constexpr double largest = 2;  // fluorescence and highlights reach beyond 1, percentages far beyond
+  constexpr double largest = 2;  // fluorescence and highlights exceed 1, percentages far more
   auto table = capture::read_spectra(file);
   if (!table) return table;
   for (const capture::SpectrumColumn& column : *table) {

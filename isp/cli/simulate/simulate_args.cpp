@@ -19,7 +19,7 @@ namespace {
 
 using Wrong = std::optional<std::string>;
 
-/// A whole number of min_side to 65535; 0 if the text is none.
+/// Returns an integer from min_side to 65535; 0 for other text.
 int side_of(const std::string& text) {
   const double side = number_of(text).value_or(0);
   return side >= min_side && side <= 65535 && side == std::floor(side) ? static_cast<int>(side) : 0;
@@ -55,7 +55,7 @@ std::string no_effect(const std::string& word) {
                      near.empty() ? "" : fmt::format("; near it: {}", fmt::join(near, ", ")));
 }
 
-/// auto, all, none, or a list of names; photon-noise,dark-current... or all but some: all,-prnu or -prnu.
+/// Parses auto, all, none, or a list of names: photon-noise,dark-current... or all but some: all,-prnu or -prnu.
 Wrong set_effects(const std::string& text, capture::EffectChoice& choice) {
   if (text == "auto") {
     choice.tolerance = choice.tolerance.value_or(isp::Tolerance{});
@@ -81,7 +81,7 @@ Wrong set_effects(const std::string& text, capture::EffectChoice& choice) {
       return no_effect(word);
     }
   }
-  // Of all effects but dark current DSNU is quietly left out; who names it expects it to do something.
+  // DSNU without dark current is left out silently from all effects, but is an error if it is named.
   if (named.has(isp::Effect::dsnu) && !effects.has(isp::Effect::dark_current)) {
     return "names dsnu without dark-current: dsnu multiplies the dark current";
   }
@@ -161,7 +161,7 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
   figure("--dark-doubling", "C", "degrees over which it doubles", f.dark_doubling_c);
   figure("--prnu", "RATIO", "photo response non-uniformity", f.prnu);
   figure("--dsnu", "RATIO", "dark signal non-uniformity, of the dark current", f.dsnu);
-  figure("--hot-pixels", "RATIO", "share of pixels that are hot", f.hot_pixel_fraction);
+  figure("--hot-pixels", "RATIO", "fraction of pixels that are hot", f.hot_pixel_fraction);
   figure("--hot-current", "E_PER_S", "mean dark current of hot pixels", f.hot_pixel_current_e_per_s);
   figure("--row-noise", "E", "standard deviation", f.row_noise_e);
   figure("--column-noise", "E", "standard deviation", f.column_noise_e);
@@ -197,7 +197,7 @@ void add_work(CLI::App& app, SimulateArgs& args) {
   capture::SyntheticOptions& o = args.options;
   add_text(app, "--effects", "auto|all|none|LIST",
            "what is simulated: what the scene calls for (auto; default, but with --sampling published all), or names "
-           "parted by commas (-prnu is all but one)",
+           "separated by commas (-prnu is all but one)",
            [&args](const std::string& text) {
              args.effects = text;
              return set_effects(text, args.options.effects);
@@ -260,7 +260,7 @@ Parsed<SimulateArgs> parse_simulate(const std::vector<std::string>& words) {
     args.options.effects.tolerance = tolerance;
   }
   if (args.effects.empty() && args.options.sampling == capture::PhotonSampling::published) {
-    args.options.effects.tolerance.reset();  // the planner knows physical photons only
+    args.options.effects.tolerance.reset();  // the planner supports physical photons only
   }
   args.options.f_number = args.optics.f_number;
   return args;

@@ -11,29 +11,29 @@
 
 namespace lowlux::cli {
 
-/// Smallest width and height of a raw image: LibRaw, and with it most raw developers, takes smaller ones for
-/// thumbnails. Masked columns do not count.
+/// Minimum width and height of a raw image: LibRaw, and with it most raw developers, takes smaller ones for thumbnails.
+/// Masked columns do not count.
 inline constexpr int min_side = 22;
 
-/// A distant lamp: --lamp X,Y,LIGHT,LUMINANCE.
+/// Holds a distant lamp: --lamp X,Y,LIGHT,LUMINANCE.
 struct LampArgs {
   double x_px = 0, y_px = 0;
   std::string light;
-  double luminance_cd_m2 = 0;  // of its light spread over one pixel
+  double luminance_cd_m2 = 0;  // with its light spread over one pixel
 };
 
-/// What is in front of the camera.
+/// Describes the scene in front of the camera.
 struct SceneArgs {
-  std::string what;  // a picture's file, or dark, flat, chart, chart:macbeth, chart:munsell, chart:FILE.csv
+  std::string what;  // an image file, or dark, flat, chart, chart:macbeth, chart:munsell, chart:FILE.csv
   int width = 1200;
   int height = 800;
   bool size_given = false;
-  std::string light = "D65";  // by name, or a table's file
+  std::string light = "D65";  // a name, or a table's file
   bool light_given = false;
   double luminance_cd_m2 = 1;
   bool luminance_given = false;
   int stars = 0;
-  std::optional<double> star_luminance_cd_m2;  // of the faintest; absent: a tenth of the scene's
+  std::optional<double> star_luminance_cd_m2;  // of the faintest star; absent: a tenth of the scene's
   std::vector<LampArgs> lamps;
 };
 
@@ -49,7 +49,7 @@ struct SimulateArgs {
   isp::Optics optics;
   capture::SyntheticOptions options;
   int frames = 1;
-  std::string effects;  // as asked for; empty: auto, or all for published sampling
+  std::string effects;  // as given; empty: auto, or all for published sampling
   bool list = false;
   bool explain = false;
   bool force = false;

@@ -12,26 +12,26 @@
 
 namespace lowlux::cli {
 
-/// What a run of `simulate` has to say.
+/// Holds the results of a run of `simulate`.
 struct SimulateOutcome {
   isp::NamedSensor sensor;
   std::vector<std::string> files;
   std::optional<isp::EffectPlan> plan;
   std::optional<capture::EffectCost> cost;  // measured for --explain
   double white_cd_m2 = 0;                   // luminance of white
-  std::optional<double> saturation_cd_m2;   // luminance of D65 that saturates in the exposure time; none in no time
+  std::optional<double> saturation_cd_m2;  // luminance of D65 that saturates in the exposure time; none for a time of 0
   std::vector<std::string> warnings;
   std::vector<isp::StageTime> times;
 };
 
-/// For each region the effects, what leaving each out was predicted to change, the decision and why; then what was
-/// saved.
+/// Returns for each region the effects, the predicted change of leaving each out, the decision and its reason; then the
+/// time saved.
 std::string explain_text(const SimulateArgs& args, const SimulateOutcome& outcome);
-/// Sensor, files and assumptions, a few lines.
+/// Returns sensor, files and assumptions in a few lines.
 std::string simulate_text(const SimulateArgs& args, const SimulateOutcome& outcome);
-/// All of it as one JSON object.
+/// Returns all results as one JSON object.
 std::string simulate_json(const SimulateArgs& args, const SimulateOutcome& outcome);
-/// The sensors with their gain settings and the options each needs, lights and cameras.
+/// Returns the sensors with their gain settings and the options each needs, lights and cameras.
 std::string simulate_list();
 
 }  // namespace lowlux::cli

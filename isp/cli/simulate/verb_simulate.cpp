@@ -35,14 +35,14 @@ std::string frame_file(const SimulateArgs& args, int index) {
   return fmt::format("{}_{:04}.dng", args.output.substr(0, args.output.size() - 4), index);
 }
 
-/// The files of a run: all frames, then the truths.
+/// Holds the files of a run: all frames, then the truths.
 struct Files {
   std::vector<std::string> frames;
   std::string truth;
   std::string truth_electrons;
 };
 
-/// A dark frame's truth is black: it is written only where its file is named.
+/// Returns whether the truth is written; for a dark frame, whose truth is black, only where its file is named.
 bool writes_truth(const SimulateArgs& args) {
   const bool black = args.scene.what == "dark" && args.scene.lamps.empty() && args.scene.stars == 0;
   return !args.no_truth && (!black || !args.truth.empty());
@@ -58,7 +58,7 @@ Files files_of(const SimulateArgs& args) {
   return files;
 }
 
-/// What is wrong with the files that would be written; empty if nothing.
+/// Returns the error of the output files; empty if there is none.
 std::string wrong_files(const SimulateArgs& args) {
   if (args.scene.what.empty()) return "SCENE is required: a picture, or dark, flat, chart; --help lists the options";
   if (args.output.empty()) return "-o is required: the raw file to write";
@@ -80,8 +80,8 @@ std::string wrong_files(const SimulateArgs& args) {
   return {};
 }
 
-/// No work is begun that would end at a file that exists. A run that fails later (a full disk) or is interrupted
-/// leaves the frames that were finished, each of them whole.
+/// Checks before any work that no output exists. A run that fails later (a full disk) or is interrupted leaves the
+/// frames that were finished, each of them complete.
 Result<void> check_free(const Files& files, const SimulateArgs& args) {
   std::vector<std::string> all = files.frames;
   for (const std::string& truth : {files.truth, files.truth_electrons}) {
@@ -97,7 +97,7 @@ Result<void> check_free(const Files& files, const SimulateArgs& args) {
   return {};
 }
 
-/// XYZ in cd/m2 to linear sRGB with white at 1.
+/// Converts XYZ in cd/m2 to linear sRGB with white at 1.
 void to_relative_srgb(SceneLinear& picture, double white_cd_m2, Executor& executor) {
   const double scale = white_cd_m2 > 0 ? 1 / white_cd_m2 : 1;
   const Matrix3 m = scale * *inverse(*isp::rgb_to_xyz(isp::primaries_rec709));
@@ -112,7 +112,8 @@ void to_relative_srgb(SceneLinear& picture, double white_cd_m2, Executor& execut
   });
 }
 
-/// Half floats are finer than any noise, but end at 65504: a lamp in a dark scene goes beyond.
+/// Returns whether half floats suffice. They are finer than any noise, but end at 65504, which a lamp in a dark scene
+/// exceeds.
 bool fits_half(const SceneLinear& picture) {
   constexpr float largest = 65504;
   return std::all_of(picture.plane.begin(), picture.plane.end(), [](const Plane<float>& plane) {
@@ -170,7 +171,7 @@ class Simulation {
     return source;
   }
 
-  /// --size is checked with the command line; pictures have a size of their own.
+  /// Checks the size of an image, which has its own; --size is checked with the arguments.
   static Result<void> check_size(const SceneLinear& picture) {
     if (picture.width() >= min_side && picture.height() >= min_side) return {};
     return fail(ErrorCode::insufficient,

@@ -4,14 +4,14 @@
 
 namespace lowlux::isp {
 
-/// An abscissa and what a function is there.
+/// Holds an abscissa and the value of a function there.
 struct Evaluated {
   double x = 0;
   double f = 0;
 };
 
-/// Root of a function between two points of opposite sign: regula falsi in the Illinois form (Dowell & Jarratt 1971),
-/// until |f| is within the tolerance or doubles end.
+/// Returns the root of a function between two points of opposite sign: regula falsi in the Illinois form (Dowell &
+/// Jarratt 1971), until |f| is within the tolerance or the precision of double is exhausted.
 template <class Function>
 double bracketed_root(const Function& function, Evaluated kept, Evaluated last, double tolerance) {
   for (int i = 0; i < 100 && std::fabs(last.f) > tolerance; ++i) {

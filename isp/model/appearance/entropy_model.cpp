@@ -17,12 +17,13 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double node_width_nm = 5;
-constexpr double smallest_adaptive_gamma = 1e-4;  // responses are matched; below, those of no light take long
-constexpr double least_gamma = 1e-12;             // of fit_max_entropy
-constexpr Vector3 rod_weights{3, 3, 5};           // W of thesis Eq. 5.8
+constexpr double smallest_adaptive_gamma =
+    1e-4;                                // responses are matched; below it, fits of impossible responses are slow
+constexpr double least_gamma = 1e-12;    // limit of fit_max_entropy
+constexpr Vector3 rod_weights{3, 3, 5};  // W of thesis Eq. 5.8
 constexpr int luminance_rounds = 3;
 
-/// The CIE 1931 functions at the nodes.
+/// Returns the CIE 1931 functions at the nodes.
 const std::array<Vector3, entropy_nodes>& matching_functions() {
   static const std::array<Vector3, entropy_nodes> all = [] {
     std::array<Vector3, entropy_nodes> out{};
@@ -62,7 +63,7 @@ Vector3 moments_of(const SpectralBasis<3>& basis, const NodePower& power) {
   return sum;
 }
 
-/// A^-1 = 3 / trace(S) S of a covariance S, so that A = I where noise is the same in all directions.
+/// Returns A^-1 = 3 / trace(S) S of a covariance S, so that A = I where noise is the same in all directions.
 Result<Matrix3> inverse_weight(const Matrix3& covariance) {
   const double trace = covariance[0][0] + covariance[1][1] + covariance[2][2];
   const auto refuse = [](const std::string& found) {
@@ -133,7 +134,7 @@ std::optional<MaxEntropyFit<3>> entropy_fit_of_luminance(const EntropyModel& mod
                                                          double luminance) {
   NodePower even;
   even.fill(1);
-  double luminance_of_fit = 0;  // of power 1
+  double luminance_of_fit = 0;  // luminance at power 1
   for (const Vector3& f : matching_functions()) luminance_of_fit += f[1] / entropy_nodes;
   std::optional<MaxEntropyFit<3>> fit;
   for (int round = 0; round < luminance_rounds; ++round) {
@@ -191,12 +192,13 @@ constexpr double largest_value = 1e300;            // beyond, factors above 1 co
 
 constexpr Xyz scaled(const Xyz& c, double s) { return {s * c.x, s * c.y, s * c.z}; }
 
-/// Power of the smoothest spectrum of a colour with Y > 0, of its nearest liftable chromaticity at the same Y.
+/// Returns the power of the smoothest spectrum of a colour with Y > 0, or of its nearest liftable chromaticity at the
+/// same Y.
 std::optional<NodePower> power_of(const Xyz& colour) {
   const std::optional<Xy> seen = xy_of(colour);
   if (!seen) return std::nullopt;
   Xy xy = liftable(*seen);
-  if (!(xy == *seen)) {  // a hair inside of the border, so that lift() finds it there
+  if (!(xy == *seen)) {  // slightly inside of the border, so that lift() accepts it
     constexpr double inside = 1 - 1e-9;
     xy = {white_e.x + inside * (xy.x - white_e.x), white_e.y + inside * (xy.y - white_e.y)};
   }
@@ -217,7 +219,7 @@ double total(const NodePower& power) {
   return sum;
 }
 
-/// Scotopic luminance of a power per 5 nm.
+/// Returns the scotopic luminance of a power per 5 nm.
 double scotopic_of(const NodePower& power) {
   double sum = 0;
   for (int i = 0; i < entropy_nodes; ++i) sum += power[i] * scotopic_observer().at(entropy_wavelength_nm(i));
@@ -239,7 +241,8 @@ struct EntropyMap {
                                     luminance / luminous_efficacy_lm_w);
   }
 
-  /// XYZ of the spectrum seen, not yet for the display, of any luminance; nullopt if there is no such spectrum.
+  /// Returns the XYZ of the fitted spectrum, before adaptation to the display, of any luminance; nullopt if there is no
+  /// such spectrum.
   std::optional<Xyz> appearance(const NodePower& light, double luminance) const {
     const auto found = fit(light, luminance);
     if (!found) return std::nullopt;

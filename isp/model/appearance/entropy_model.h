@@ -13,23 +13,26 @@
 
 namespace lowlux::isp {
 
-// What the dark-adapted eye can know of a spectrum: the one of largest entropy that gives its responses, the rods'
-// share of them growing and the trust in them falling as it gets darker (thesis Eq. 5.1 to 5.9; Clark & Skaff, J. Opt.
-// Soc. Am. A 26 (2009)). A response is f_i = cone_i + xi w_i V', w = (3, 3, 5), cones and V' with peak 1.
+// Spectrum that the dark-adapted eye can infer: the one of largest entropy that gives its responses. With falling
+// luminance the rods' weight in the responses grows and the confidence in them falls (thesis Eq. 5.1 to 5.9; Clark &
+// Skaff, J. Opt. Soc. Am. A 26 (2009)). A response is f_i = cone_i + xi w_i V', w = (3, 3, 5), cones and V' with peak
+// 1.
 
-/// Nodes of the model's integrals: 390, 395 ... 730 nm, each 5 nm wide.
+/// The model's integrals have these nodes: 390, 395 ... 730 nm, each 5 nm wide.
 inline constexpr int entropy_nodes = 69;
 constexpr double entropy_wavelength_nm(int i) { return 390.0 + 5.0 * i; }
-/// Relative spectral power at those nodes.
+/// Holds relative spectral power at the nodes of the model.
 using NodePower = std::array<double, entropy_nodes>;
 
-/// `rendering` measures with cones and rods, relates the measurement to that of the white (von Kries) and explains it
-/// by the cones alone; `thesis` does both with cones and rods, as Eq. 5.1 reads, and turns whites greenish.
+/// Selects the variant. `rendering` measures with cones and rods, relates the measurement to that of the white (von
+/// Kries) and reconstructs the spectrum from the cones alone; `thesis` does both with cones and rods, as Eq. 5.1 reads,
+/// and turns whites greenish.
 enum class EntropyVariant : std::uint8_t { rendering, thesis };
 
-/// How much light stands behind a pixel's three responses. `lifted`: that of the smoothest spectrum of the colour, see
-/// spectral_lift.h. `luminance`: what gives the spectrum found the pixel's luminance, by three rounds from an even one;
-/// it cannot tell much, for V is nearly a sum of cones, and leaves saturated blues too bright to be any spectrum.
+/// Selects the assumed light power behind a pixel's three responses. `lifted`: that of the smoothest spectrum of the
+/// colour, see spectral_lift.h. `luminance`: the power that gives the fitted spectrum the pixel's luminance, by three
+/// rounds from an even one; it adds little information, for V is nearly a sum of cones, and leaves saturated blues too
+/// bright to be any spectrum.
 enum class PixelPower : std::uint8_t { lifted, luminance };
 
 struct EntropyOptions {
@@ -37,70 +40,73 @@ struct EntropyOptions {
   ConeSet cones = ConeSet::stockman_sharpe_2000;
   PixelPower power = PixelPower::lifted;
   std::optional<double> gamma_fixed;        // 2 is the thesis' run without adaptation (Table 5-2)
-  std::optional<Matrix3> noise_covariance;  // of the responses, up to a factor; absent: alike and independent
+  std::optional<Matrix3> noise_covariance;  // of the responses, up to a factor; absent: equal and independent
 };
 
-/// Weight of entropy, gamma = 2 (1 - m), at least 1e-4; m in 0..1 as in mesopic.h.
+/// Returns the weight of entropy, gamma = 2 (1 - m), at least 1e-4; m in 0..1 as in mesopic.h.
 double entropy_weight(double m);
-/// Share of the rods, xi = (e^(1 - m) - 1) / (e - 1).
+/// Returns the weight of the rods, xi = (e^(1 - m) - 1) / (e - 1).
 double entropy_rod_share(double m);
 
-/// The model for one state of adaptation and one white.
+/// Holds the model for one state of adaptation and one white.
 struct EntropyModel {
-  SpectralBasis<3> measured;    // f that weighs the light
-  SpectralBasis<3> explained;   // f the answer is built of
-  Vector3 adaptation{1, 1, 1};  // von Kries factors from one to the other
+  SpectralBasis<3> measured;    // f that weights the light
+  SpectralBasis<3> explained;   // f of the reconstructed spectrum
+  Vector3 adaptation{1, 1, 1};  // von Kries factors from `measured` to `explained`
   Matrix3 inverse_a = identity3();
   double gamma = 2;
 };
 
+/// Makes the model for an adaptation coefficient and a white.
 /// @param m      0..1
 /// @param white  power of the white, nowhere negative
 /// Errors: invalid_argument for a white without power, a gamma_fixed below 1e-12 or not finite, a covariance that is
 /// not symmetric or not positive definite (to 1e-12 of its trace).
 Result<EntropyModel> entropy_model(double m, const NodePower& white, const EntropyOptions& options = {});
 
-/// Responses to a light of power 1, von Kries factors included: what the answer's moments should be (eta).
+/// Returns the responses to a light of power 1, von Kries factors included: the target moments (eta) of the fitted
+/// spectrum.
 /// @param power  with a positive sum
 Vector3 entropy_moments(const EntropyModel& model, const NodePower& power);
 
-/// The spectrum seen, from responses to a light of power 1; nullopt as fit_max_entropy.
+/// Returns the fitted spectrum from responses to a light of power 1; nullopt as fit_max_entropy.
 std::optional<MaxEntropyFit<3>> entropy_fit(const EntropyModel& model, const Vector3& eta);
 
-/// The spectrum seen, from responses to a light of unknown power and its luminance, beta = Y / integral of V p.
+/// Returns the fitted spectrum from responses to a light of unknown power and its luminance, beta = Y / integral of V
+/// p.
 /// @param responses        integral of f times power, von Kries factors included
 /// @param luminance        integral of V times power, > 0
 std::optional<MaxEntropyFit<3>> entropy_fit_of_luminance(const EntropyModel& model, const Vector3& responses,
                                                          double luminance);
 
-/// XYZ of the spectrum of a fit, whose power is 1.
+/// Returns the XYZ of the spectrum of a fit, whose power is 1.
 Xyz xyz_of(const EntropyModel& model, const MaxEntropyFit<3>& fit);
 
-/// Matrix from XYZ to responses of the cones, by least squares over the wavelengths. Off by up to 0.03, 0.03 and 0.2 of
-/// the peak for Stockman & Sharpe's L, M and S, which are no sums of the CIE 1931 functions.
+/// Returns the matrix from XYZ to responses of the cones, by least squares over the wavelengths. It is off by up to
+/// 0.03, 0.03 and 0.2 of the peak for Stockman & Sharpe's L, M and S, which are not sums of the CIE 1931 functions.
 Matrix3 cone_matrix(ConeSet cones);
 
-/// Noise of one pixel, after a camera's colour matrix.
+/// Describes the noise of one pixel and the camera's colour matrix.
 struct ChannelNoise {
   Vector3 variance_e2;         // of R, G, B
   Vector3 rgb_per_e{1, 1, 1};  // camera RGB of an electron: gains of white balance and exposure
   Matrix3 camera_to_xyz = identity3();
 };
 
-/// Covariance of cone responses, M diag(rgb_per_e^2 variance) M^T with M = cone_matrix() camera_to_xyz: what
-/// ViewingConditions::noise_covariance asks for. Its factor does not matter.
+/// Returns the covariance of cone responses, M diag(rgb_per_e^2 variance) M^T with M = cone_matrix() camera_to_xyz, for
+/// ViewingConditions::noise_covariance. Its factor does not matter.
 Matrix3 noise_covariance_of_cones(const ChannelNoise& noise, ConeSet cones = ConeSet::stockman_sharpe_2000);
 
-/// The model as a map of colours. The white goes to the D65 white of ViewingConditions{}, chromaticities by Bradford's
-/// matrix from what the white has become. Luminance is L_mes over that of the white, with the rods' part from the
-/// lifted spectrum. A colour without positive luminance has no spectrum and becomes the grey of its luminance; one
-/// outside of the spectral locus keeps its luminance and is seen as the nearest liftable() chromaticity. What is not
-/// finite becomes black. The map is homogeneous: s times a colour gives s times the answer, s > 0. Errors:
-/// invalid_argument for conditions that are not positive and finite, a white without a spectrum, and as
-/// entropy_model().
+/// Returns the model as a map of colours. The white goes to the D65 white of ViewingConditions{}, chromaticities by
+/// Bradford's matrix from the model's output for the white. Luminance is L_mes over that of the white, with the rods'
+/// part from the lifted spectrum. A colour without positive luminance has no spectrum and becomes the grey of its
+/// luminance; one outside of the spectral locus keeps its luminance and is treated as the nearest liftable()
+/// chromaticity. Values that are not finite become black. The map is homogeneous: s times a colour gives s times the
+/// result, s > 0. Errors: invalid_argument for conditions that are not positive and finite, a white without a spectrum,
+/// and as entropy_model().
 Result<ColourMap> entropy_colour_map(const ViewingConditions& conditions, const EntropyOptions& options);
 
-/// The entry for appearance_models(): entropy_colour_map() by the variant `rendering`.
+/// Returns the entry for appearance_models(): entropy_colour_map() in the variant `rendering`.
 AppearanceModel entropy_appearance();
 
 }  // namespace lowlux::isp

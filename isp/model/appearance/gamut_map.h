@@ -4,14 +4,14 @@
 
 namespace lowlux::isp {
 
-/// Linear RGB in a gamut of 0..1, and how much of its colour it kept.
+/// Holds linear RGB in a gamut of 0..1, and the fraction of its chroma that was kept.
 struct GamutMapped {
   Vector3 rgb{};
-  double kept = 1;  // t: 1 for a colour that was within, 0 for one that became grey
+  double kept = 1;  // t: 1 for a colour inside the gamut, 0 for one that became grey
 };
 
-/// A colour moved towards the grey of its luminance until it is within 0..1: Y (1, 1, 1) + t (rgb - Y (1, 1, 1)) with
-/// the largest t in 0..1 (thesis, Fig. 5-9). Luminance and direction of chroma stay. A luminance of 0 or less gives
+/// Moves a colour towards the grey of its luminance until it is within 0..1: Y (1, 1, 1) + t (rgb - Y (1, 1, 1)) with
+/// the largest t in 0..1 (thesis, Fig. 5-9). Luminance and direction of chroma are kept. A luminance of 0 or less gives
 /// black, one of 1 or more white, the only colours of that luminance or nearest to it.
 /// @param luminance_weights  of R, G and B; they sum to 1
 GamutMapped toward_white(const Vector3& rgb, const Vector3& luminance_weights);

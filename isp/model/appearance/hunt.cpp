@@ -55,7 +55,7 @@ AchromaticSignal signal_at(double adaptation_cd_m2, std::optional<double> colour
     Vector3 response{};
     for (int i = 0; i < 3; ++i) response[i] = bleaching * hunt_response(level * cones[i]) + 1;
     const double cone_signal = 2 * response[0] + response[1] + response[2] / 20 - 3.05 + 1;
-    return hunt_achromatic(cone_signal, rod_signal(rods, s), 1);  // N_bb falls out of the ratio
+    return hunt_achromatic(cone_signal, rod_signal(rods, s), 1);  // N_bb cancels in the ratio
   };
 }
 

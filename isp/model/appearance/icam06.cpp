@@ -18,7 +18,7 @@ constexpr double noise = 0.1;
 constexpr double least_white_cd_m2 = 1e-6;
 constexpr double daylight_white_cd_m2 = 318.31;
 
-/// What depends on the state alone.
+/// Holds what depends on the state alone.
 struct Compression {
   double level_per_cd_m2;  // F_L / Y_w
   RodAdaptation rods;

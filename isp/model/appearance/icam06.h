@@ -5,8 +5,8 @@
 
 namespace lowlux::isp {
 
-// The tone compression of iCAM06 (Kuang, Johnson & Fairchild 2007; thesis Eq. 2.19 to 2.21 with its own channel in each
-// row and the fourth power of (1 - j^2)).
+// The tone compression of iCAM06 (Kuang, Johnson & Fairchild 2007; thesis Eq. 2.19 to 2.21 with a separate channel in
+// each row and the fourth power of (1 - j^2)).
 
 enum class Icam06Variant : std::uint8_t {
   paper,
@@ -20,7 +20,7 @@ struct Icam06State {
   Icam06Variant variant = Icam06Variant::paper;
 };
 
-/// What comes out of the compression: RGB'_a of the cones, A_s of the rods, and their sum in XYZ, a response without
+/// Holds the result of the compression: RGB'_a of the cones, A_s of the rods, and their sum in XYZ, a response without
 /// unit.
 struct Icam06Response {
   Vector3 cones{};
@@ -28,16 +28,17 @@ struct Icam06Response {
   Vector3 xyz_tc{};
 };
 
-/// @param xyz_cd_m2  adapted to the white; its |Y| is what the rods get
+/// Compresses a colour.
+/// @param xyz_cd_m2  adapted to the white; its |Y| is the rods' input
 Icam06Response icam06_compress(const Vector3& xyz_cd_m2, const Icam06State& state);
 
-/// XYZ [cd/m2] of a luminance of at least 0 that compresses to xyz_tc: the rods' part is that of the answer, a
-/// scalar equation. Responses below those of black get black's rods; cones' responses of 400, which no light gives,
-/// count as a millionth less. Of the paper's variant alone: rods of the program's dim again with light, so that several
-/// luminances give one response.
+/// Returns the XYZ [cd/m2] of a luminance of at least 0 that compresses to xyz_tc: the rods' part is that of the
+/// result, a scalar equation. Responses below those of black get black's rods; cone responses of 400, which no light
+/// gives, count as a millionth less. Valid for the paper's variant only: the rods of the program's variant dim again
+/// with light, so that several luminances give one response.
 Vector3 icam06_expand(const Vector3& xyz_tc, const Icam06State& state);
 
-/// The model as a map: cones fully adapted to the white in HPE space, compressed with Y_w = S_w of the scene's
+/// Returns the model as a map: cones fully adapted to the white in HPE space, compressed with Y_w = S_w of the scene's
 /// white, expanded with those of a white of 318.31 cd/m2 (1000 lx); from there up the identity.
 AppearanceModel icam06_appearance();
 

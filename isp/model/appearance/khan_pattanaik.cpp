@@ -46,7 +46,7 @@ Result<ColourMap> khan_pattanaik_map(const ViewingConditions& conditions) {
   if (!scene) return tl::make_unexpected(scene.error());
   const double white_s = (xyz_to_hpe * scene->white)[2];
   Vector3 s_cones = *inverse(xyz_to_hpe) * Vector3{0, 0, white_s};
-  s_cones[1] = 0;  // S cones have no share in luminance but the rounding of the matrix
+  s_cones[1] = 0;  // S cones do not contribute to luminance, except for rounding of the matrix
   return colour_map([scene = *scene, s_cones](const Vector3& xyz) {
     const double m = scene.adaptation_m, luminance = relative_mesopic(scene, xyz);
     const double rods_cd_m2 = relative_scotopic(scene, xyz) * scene.white_scotopic * scene.white_cd_m2;

@@ -13,14 +13,14 @@ namespace {
 constexpr double per_td = 0.33;  // Cao et al. 2008
 constexpr double least_base = 1e-6;
 
-// Filament: sensitivities, what rods add to each cone's gain, and its receptors of linear Rec.709.
+// Filament's constants: sensitivities, the rods' weight in each cone's gain, and its receptors of linear Rec.709.
 constexpr Vector3 filament_peak{0.63721, 0.39242, 1.6064};
 constexpr Vector3 filament_k{0.2, 0.2, 0.3};
 constexpr Matrix3 filament_cones{
     {{7.696847, 18.424824, 2.068096}, {2.431137, 18.697937, 3.012463}, {0.289117, 1.401833, 13.792292}}};
 constexpr Vector3 filament_rods{0.466386, 15.564362, 10.059963};
 constexpr double filament_scale = 380;
-constexpr double filament_per_cd_m2 = 3;  // kappa: a public calibration's
+constexpr double filament_per_cd_m2 = 3;  // kappa, from a public calibration
 
 Matrix3 filament_opponent_matrix() {
   constexpr double k3 = 0.6, rw = 0.139, p = 0.6189, k = 45.0 / 10;

@@ -10,7 +10,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double most_octaves = 10;
-constexpr double tolerance = 1e-12;  // of the signal, white's being 1
+constexpr double tolerance = 1e-12;  // relative to the signal of white
 
 struct Excitation {
   Vector3 cones;
@@ -21,7 +21,8 @@ Excitation times(const Excitation& e, double scale) {
   return {{scale * e.cones[0], scale * e.cones[1], scale * e.cones[2]}, scale * e.rods};
 }
 
-/// The octaves that bring `signal` to the target, as far as they go; it rises all the way.
+/// Returns the octaves that bring `signal` to the target, within the limit of most_octaves; the signal rises
+/// monotonically.
 double octaves_to(double target, const Excitation& e, const AchromaticSignal& signal) {
   const auto excess = [&](double octaves) {
     const Excitation scaled = times(e, std::exp2(octaves));

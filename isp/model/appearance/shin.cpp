@@ -12,7 +12,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double white_reflectance = 0.9;
-constexpr double least_coefficient = 0.05;  // of alpha, l and m in the inverse
+constexpr double least_coefficient = 0.05;  // lower limit of alpha, l and m in the inverse
 constexpr Vector3 equal_energy_cones{2.0 / 3.0, 1.0 / 3.0, 1};
 constexpr Matrix3 cones_to_opponent{{{1, 1, 0}, {1, -2, 0}, {1, 1, -1}}};
 constexpr Matrix3 published_opponent_to_xyz{{{1.008, 2.149, -0.212}, {1, 0, 0}, {1, 0, -1}}};
@@ -21,14 +21,14 @@ double power_of_rods(const ShinEye& eye, double rods) {
   return eye.rod_white * eye.white_y * std::pow(rods / eye.white_scotopic, eye.gamma);
 }
 
-/// What the inverse has to solve.
+/// Holds the inputs of the inverse.
 struct Problem {
   OpponentSignals signals;
   ShinCoefficients c;
   ShinEye eye;
 };
 
-/// L + M, L - 2 M, L + M - S for rods at a level.
+/// Returns L + M, L - 2 M, L + M - S for rods at a level.
 Vector3 opponent_at(const Problem& p, double rods) {
   const double cones = (p.signals.a - p.c.beta * power_of_rods(p.eye, rods)) / p.c.alpha;
   return {std::max(0.0, cones), (p.signals.rg - p.c.a * rods) / p.c.l, (p.signals.by - p.c.b * rods) / p.c.m};
@@ -36,7 +36,7 @@ Vector3 opponent_at(const Problem& p, double rods) {
 
 double rods_of(const Vector3& xyz) { return scotopic_luminance(xyz_of(xyz)); }
 
-/// Rods of the colour that rods at a level lead to, less that level: 0 where the two agree.
+/// Returns the rods' level of the resulting colour minus the assumed level of the rods: 0 where the two agree.
 double excess_at(const Problem& p, double rods) { return rods_of(p.eye.from_opponent * opponent_at(p, rods)) - rods; }
 
 struct Solution {
@@ -44,7 +44,8 @@ struct Solution {
   bool exists;
 };
 
-/// The excess at 0 is never negative, and falls with rods unless a or b are large.
+/// Finds the level of the rods at which the excess is 0. The excess at 0 is never negative, and falls with rods unless
+/// a or b are large.
 Solution self_consistent_rods(const Problem& p) {
   const auto excess = [&](double rods) { return excess_at(p, rods); };
   const Evaluated none{0, excess(0)};
@@ -71,7 +72,7 @@ Problem bounded(const OpponentSignals& signals, const ShinCoefficients& c, const
 bool is_within_bounds(const Problem& p, const ShinCoefficients& asked, double rods) {
   const bool floored = p.c.alpha != asked.alpha || p.c.l != asked.l || p.c.m != asked.m;
   const double cones = p.signals.a - p.c.beta * power_of_rods(p.eye, rods);
-  return !floored && cones >= -1e-10 * p.eye.white_y;  // what rounding of the rods' root leaves of black
+  return !floored && cones >= -1e-10 * p.eye.white_y;  // rounding of the rods' root at black
 }
 
 }  // namespace

@@ -8,8 +8,8 @@
 
 namespace lowlux::isp {
 
-/// The coefficients of Shin's model at one level: of the achromatic signal (alpha: cones, beta: rods), of the red-green
-/// (l: cones, a: rods) and of the blue-yellow one (m, b). By day alpha = l = m = 1, beta = a = b = 0.
+/// Holds the coefficients of Shin's model at one level: for the achromatic signal (alpha: cones, beta: rods), the
+/// red-green (l: cones, a: rods) and the blue-yellow one (m, b). In daylight alpha = l = m = 1, beta = a = b = 0.
 struct ShinCoefficients {
   double alpha = 1;
   double beta = 0;
@@ -21,29 +21,30 @@ struct ShinCoefficients {
 
 inline constexpr std::string_view shin_substitute_name = "SHIN-SUB-1";
 
-/// Coefficients over E, the illuminance of a white surface [lx] (or luminance, see ShinUnits). Made by
+/// Holds coefficients over E, the illuminance of a white surface [lx] (or luminance, see ShinUnits). Made by
 /// read_shin_table() or shin_substitute(), so that nodes rise.
 struct ShinTable {
   struct Node {
     double e = 0;
     ShinCoefficients coefficients;
   };
-  std::string name;         // what a report must say of where the figures come from
+  std::string name;         // origin of the figures, for reports
   std::vector<Node> nodes;  // E rising; empty: the closed forms of SHIN-SUB-1
 };
 
-/// A table from text: '#' comments, then lines of E and six numbers alpha, beta, l, a, m, b, parted by commas or
-/// blanks; a first line of words is skipped. Errors: malformed for another number of columns, for what is no finite
-/// number, E that does not rise or is not positive, fewer than two lines; too_large above 1000 lines. The line is told.
+/// Reads a table from text: '#' comments, then lines of E and six numbers alpha, beta, l, a, m, b, separated by commas
+/// or blanks; a first line of words is skipped. Errors: malformed for another number of columns, for a value that is
+/// not a finite number, E that does not rise or is not positive, fewer than two lines; too_large above 1000 lines. The
+/// message states the line.
 Result<ShinTable> read_shin_table(std::string_view text, std::string name);
 
-/// What stands in for Table 1 of Shin et al., which could not be had: closed forms that end where theirs do and fade
-/// between as their abstract tells, not their figures. With E,
+/// Returns the substitute for Table 1 of Shin et al., which was not available: closed forms that end where theirs do
+/// and fade between as their abstract describes, not their figures. With E,
 ///     alpha = m of CIE 191 at L_p = E, L_s = 2.26 E;  beta = 1 - alpha;  a = b = 0
 ///     l = 0.1 + 0.9 clamp((log10 E + 1) / 4, 0, 1),   m = 0.1 + 0.9 clamp(log10 E / 3, 0, 1)
 const ShinTable& shin_substitute();
 
-/// Linear in log10 E between nodes, the outermost beyond. @param e > 0
+/// Returns the coefficients at E, linear in log10 E between nodes, the outermost beyond. @param e > 0
 ShinCoefficients shin_coefficients(const ShinTable& table, double e);
 
 }  // namespace lowlux::isp

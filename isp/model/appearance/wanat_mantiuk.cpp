@@ -28,7 +28,7 @@ Vector3 wanat_saturated(const Vector3& rgb, double exponent, const Vector3& lumi
   const double luminance = dot(luminance_weights, rgb);
   if (luminance == 0) return {};
   if (luminance < 0) return scaled(-1, wanat_saturated(scaled(-1, rgb), exponent, luminance_weights));
-  const double largest = *std::ranges::max_element(rgb);  // in place of Y: the scale falls out, and nothing overflows
+  const double largest = *std::ranges::max_element(rgb);  // in place of Y: the scale cancels, and nothing overflows
   Vector3 power{}, below{};
   for (int i = 0; i < 3; ++i) {
     power[i] = rgb[i] > 0 ? std::pow(rgb[i] / largest, exponent) : 0;
@@ -39,7 +39,7 @@ Vector3 wanat_saturated(const Vector3& rgb, double exponent, const Vector3& lumi
   for (int i = 0; i < 3; ++i) positive += luminance_weights[i] * std::max(rgb[i], 0.0);
   const double scale = positive / dot(luminance_weights, power);
   for (int i = 0; i < 3; ++i) out[i] += scale * power[i];
-  const double shown = dot(luminance_weights, out);  // at least the luminance, but for rounding
+  const double shown = dot(luminance_weights, out);  // at least the luminance, up to rounding
   return shown > luminance ? scaled(luminance / shown, out) : out;
 }
 

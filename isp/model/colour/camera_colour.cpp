@@ -13,7 +13,7 @@
 namespace lowlux::isp {
 namespace {
 
-/// What the interpolation yields at one white.
+/// Holds the interpolated matrices at one white.
 struct Calibration {
   Matrix3 reference_to_camera = identity3();  // AnalogBalance * CameraCalibration
   Matrix3 xyz_to_camera = identity3();        // the above * ColorMatrix
@@ -41,7 +41,7 @@ Matrix3 mix(const Matrix3& a, const Matrix3& b, double weight_b) {
 std::string text_of(const Vector3& v) { return number_text(v[0]) + " " + number_text(v[1]) + " " + number_text(v[2]); }
 std::string text_of(const Xy& xy) { return "x " + number_text(xy.x) + " y " + number_text(xy.y); }
 
-/// Nothing if the figures are usable at all.
+/// Returns the first fault of the figures; nullopt if they are usable.
 std::optional<Error> fault_of(const CameraColour& colour) {
   if (colour.calibrations.empty()) {
     return Error{ErrorCode::insufficient,
@@ -61,7 +61,7 @@ std::optional<Error> fault_of(const CameraColour& colour) {
   return std::nullopt;
 }
 
-/// The one or two calibrations in use. `low` and `high` are the same where nothing can be interpolated.
+/// Points to the one or two calibrations in use. `low` and `high` are the same if interpolation is not possible.
 struct Bracket {
   const ColourCalibration* low;
   const ColourCalibration* high;
@@ -77,7 +77,8 @@ Bracket bracket_of(const CameraColour& colour) {
   return two_told ? Bracket{&all.front(), &all.back()} : Bracket{last_told, last_told};
 }
 
-/// Share of the calibration with the higher temperature at a white: linear in 1/CCT, held at the ends.
+/// Returns the weight of the calibration with the higher temperature at a white: linear in 1/CCT, constant beyond the
+/// ends.
 double weight_of(const Bracket& bracket, const Xy& white) {
   if (bracket.low == bracket.high) return 1;
   const auto temperature = colour_temperature_of(white);
@@ -106,7 +107,7 @@ Result<Matrix3> inverse_or_error(const Matrix3& matrix, const char* name) {
   return fail(ErrorCode::malformed, "the matrix is singular: it maps different colours to the same camera RGB", name);
 }
 
-/// One step of the iteration: the white of a neutral by the matrix of a given weight.
+/// Computes one step of the iteration: the white of a neutral by the matrix of a given weight.
 Result<Xy> white_at_weight(const CameraColour& colour, const Bracket& bracket, double weight, const Vector3& neutral) {
   const auto to_xyz = inverse_or_error(interpolate(colour, bracket, weight).xyz_to_camera, "ColorMatrix");
   if (!to_xyz) return tl::make_unexpected(to_xyz.error());
@@ -153,7 +154,7 @@ Result<Calibration> calibration_at(const CameraColour& colour, const Xy& scene_w
   return interpolate(colour, bracket, weight_of(bracket, scene_white));
 }
 
-/// ForwardMatrix with each row scaled so that (1, 1, 1) goes to D50.
+/// Returns ForwardMatrix with each row scaled so that (1, 1, 1) goes to D50.
 Result<Matrix3> normalised_forward(const Matrix3& forward) {
   const Vector3 white = vector_of(*xyz_of(white_d50));
   const Vector3 sums = forward * Vector3{1, 1, 1};
@@ -163,7 +164,8 @@ Result<Matrix3> normalised_forward(const Matrix3& forward) {
   return diagonal3({white[0] / sums[0], white[1] / sums[1], white[2] / sums[2]}) * forward;
 }
 
-/// White-balanced by the reference neutral, then ForwardMatrix: camera RGB -> XYZ under D50.
+/// Returns the matrix that white-balances by the reference neutral, then applies ForwardMatrix: camera RGB -> XYZ under
+/// D50.
 Result<Matrix3> to_xyz_by_forward(const Calibration& calibration, const Vector3& neutral) {
   auto to_reference = inverse_or_error(calibration.reference_to_camera, "CameraCalibration");
   if (!to_reference) return to_reference;
@@ -177,7 +179,7 @@ Result<Matrix3> to_xyz_by_forward(const Calibration& calibration, const Vector3&
   return *forward * diagonal3({1 / reference[0], 1 / reference[1], 1 / reference[2]}) * *to_reference;
 }
 
-/// Inverse of the interpolated matrix, scaled so that the neutral (largest component 1) has Y = 1.
+/// Returns the inverse of the interpolated matrix, scaled so that the neutral (largest component 1) has Y = 1.
 Result<Matrix3> to_xyz_by_inverse(const Calibration& calibration, const Vector3& neutral) {
   auto to_xyz = inverse_or_error(calibration.xyz_to_camera, "ColorMatrix");
   if (!to_xyz) return to_xyz;

@@ -20,7 +20,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double worst_condition_number = 1e12;  // four digits are left of a double's sixteen
+constexpr double worst_condition_number = 1e12;  // leaves four of a double's sixteen digits
 
 template <class Reflectance>
 Vector3 response(const std::array<Spectrum, 3>& sensitivity, const Spectrum& light, const Reflectance& reflectance) {
@@ -31,14 +31,14 @@ Vector3 response(const std::array<Spectrum, 3>& sensitivity, const Spectrum& lig
   return out;
 }
 
-/// Element `index` of the van der Corput sequence of a base: evenly spread over 0..1 without randomness.
+/// Returns element `index` of the van der Corput sequence of a base: evenly spread over 0..1 without randomness.
 double van_der_corput(int index, int base) {
   double value = 0, digit = 1.0 / base;
   for (; index > 0; index /= base, digit /= base) value += digit * (index % base);
   return value;
 }
 
-/// Smooth reflectance number i: the logistic function keeps a short cosine series in 0.04..0.90,
+/// Returns smooth reflectance number i: the logistic function keeps a short cosine series in 0.04..0.90,
 ///     R = 0.04 + 0.86 / (1 + exp(-q)),  q = sum over k = 0..3 of s_k (2 h_k - 1) cos(k pi t),  t = (nm - 380) / 400
 /// with s = 3, 3, 2, 1 and h_k the van der Corput sequences of bases 2, 3, 5, 7 at i.
 Spectrum smooth_reflectance(int i) {
@@ -56,8 +56,8 @@ Spectrum smooth_reflectance(int i) {
   return *Spectrum::of(std::move(nm), std::move(value));
 }
 
-/// M that minimises the sum of |to - M from|^2 / to.y^2, errors relative to luminance so that dark colours count:
-/// M = (sum w to from^T) (sum w from from^T)^-1.
+/// Returns the M that minimises the sum of |to - M from|^2 / to.y^2, errors relative to luminance so that dark colours
+/// count: M = (sum w to from^T) (sum w from from^T)^-1.
 std::optional<Matrix3> least_squares(const std::vector<Vector3>& from, const std::vector<Vector3>& to) {
   Matrix3 cross{}, gram{};
   for (std::size_t n = 0; n < from.size(); ++n) {
@@ -74,14 +74,15 @@ std::optional<Matrix3> least_squares(const std::vector<Vector3>& from, const std
   return cross * *inverted;
 }
 
-/// What a camera under a light makes of the training set, a perfect diffuser being (1, 1, 1), and the truth.
+/// Holds the camera RGB of the training set under a light, a perfect diffuser being (1, 1, 1), and the true XYZ.
 struct TrainingSet {
   std::vector<Vector3> camera_rgb;
   std::vector<Vector3> xyz;  // Y = 1 for the perfect diffuser
 };
 
 TrainingSet photograph(const std::array<Spectrum, 3>& sensitivity, const Spectrum& light, const Vector3& neutral) {
-  // What each node of the light contributes to camera R, G, B and to X, Y, Z, so that a reflectance costs one pass.
+  // weight holds the contribution of each node of the light to camera R, G, B and X, Y, Z: a reflectance costs one
+  // pass.
   const auto nm = light.wavelengths_nm();
   const double white_y = xyz_of(light).y;
   std::vector<std::array<double, 6>> weight(nm.size());
@@ -164,7 +165,7 @@ Result<SpectralMatrix> spectral_matrix(const std::array<Spectrum, 3>& sensitivit
     ct += c * t.transpose();
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(ct, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const bool solved = svd.info() == Eigen::Success;  // not where a sensitivity is infinite
+  const bool solved = svd.info() == Eigen::Success;  // false where a sensitivity is infinite
   const double condition = solved ? svd.singularValues()[0] / svd.singularValues()[2] : HUGE_VAL;
   if (!(condition <= worst_condition_number)) {
     return fail(ErrorCode::insufficient,

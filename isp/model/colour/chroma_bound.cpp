@@ -12,21 +12,21 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double counting_noise_e = 0.05;       // below it whole electrons are told apart
-constexpr double asymptotic_variance_e2 = 1e3;  // from it on the law is nearly normal
+constexpr double counting_noise_e = 0.05;       // below it integer electrons are distinguished
+constexpr double asymptotic_variance_e2 = 1e3;  // from it on the distribution is nearly normal
 
-/// Step of the trapezium rule, whose error is exp(-2 pi D / step) where the integrand is analytic up to the distance D
-/// from the real axis: zeros of p lie pi sigma^2 away from it, between two whole numbers.
+/// Returns the step of the trapezium rule, whose error is exp(-2 pi D / step) where the integrand is analytic up to the
+/// distance D from the real axis: zeros of p lie pi sigma^2 away from it, between two integers.
 double step_e(double noise_std_e) {
   return std::min(noise_std_e / 2, std::numbers::pi * noise_std_e * noise_std_e / 3);
 }
 
 double log_factorial(double n) {
-  int sign = 0;  // of the gamma function, for the form that threads may share
+  int sign = 0;  // sign of the gamma function: lgamma_r is the thread-safe form
   return ::lgamma_r(n + 1, &sign);
 }
 
-/// The Poisson probabilities that matter, as logarithms.
+/// Holds the Poisson probabilities that matter, as logarithms.
 struct Counts {
   int first = 0;
   std::vector<double> log_probability;
@@ -67,14 +67,14 @@ double information_by_quadrature(double mean, double noise) {
   return sum * step / (noise * std::sqrt(2 * std::numbers::pi));
 }
 
-/// Mean variance of a whole number seen through normal noise, all numbers being alike probable [e-^2].
+/// Returns the mean variance of an integer observed with normal noise, all integers being equally probable [e-^2].
 double lattice_variance_e2(double noise) {
-  if (noise >= 1) return noise * noise;  // to exp(-2 pi^2 sigma^2)
+  if (noise >= 1) return noise * noise;  // accurate to exp(-2 pi^2 sigma^2)
   if (noise < counting_noise_e) return 0;
   const auto steps = static_cast<int>(std::ceil(1 / step_e(noise)));
   const int reach = static_cast<int>(std::ceil(9 * noise)) + 1;
   double sum = 0;
-  for (int i = 0; i < steps; ++i) {  // of one period
+  for (int i = 0; i < steps; ++i) {  // over one period
     const double y = static_cast<double>(i) / steps;
     double density = 0, first = 0, second = 0;
     for (int j = -reach; j <= reach; ++j) {
@@ -95,7 +95,7 @@ double information_far_out(double mean, double noise) {
   return 1 / v + (m / v) * (m / v) / (2 * v * v + mean * m / v);
 }
 
-/// The variances of the three planes' means [e-^2].
+/// Returns the variances of the three planes' means [e-^2].
 template <class Information>
 Vector3 plane_variances(const FlatPatch& patch, const Information& information) {
   Vector3 out{};
@@ -109,12 +109,12 @@ Vector3 plane_variances(const FlatPatch& patch, const Information& information) 
   return out;
 }
 
-/// r diag(v) s^T
+/// Returns r diag(v) s^T.
 double product(const Vector3& r, const Vector3& v, const Vector3& s) {
   return r[0] * v[0] * s[0] + r[1] * v[1] * s[1] + r[2] * v[2] * s[2];
 }
 
-/// Row times matrix.
+/// Returns row times matrix.
 Vector3 times(const Vector3& row, const Matrix3& m) {
   Vector3 out{};
   for (int j = 0; j < 3; ++j) out[j] = row[0] * m[0][j] + row[1] * m[1][j] + row[2] * m[2][j];

@@ -13,7 +13,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
-constexpr double energy_unit_j = 1e-19;  // keeps squares of photon energies far from the ends of double's range
+constexpr double energy_unit_j = 1e-19;  // keeps squares of photon energies far from the limits of double
 
 Vector3 weight_of(double wavelength_nm) {
   const double energy = photon_energy_j(wavelength_nm) / energy_unit_j;
@@ -50,11 +50,11 @@ XyEllipse principal_ellipse(const ChromaticityCloud& cloud, double deviations) {
   const double middle = 0.5 * (c.xx + c.yy);
   const double half_gap = std::hypot(0.5 * (c.xx - c.yy), c.xy);
   const double larger = middle + half_gap;
-  // From the determinant, not middle - half_gap, which cancels for thin ellipses.
+  // The determinant is used, not middle - half_gap, which cancels for thin ellipses.
   const double smaller = larger > 0 ? std::max(0.0, (c.xx * c.yy - c.xy * c.xy) / larger) : 0;
   double inclination = 0.5 * std::atan2(2 * c.xy, c.xx - c.yy) / degree;
   if (inclination < 0) inclination += 180;
-  if (inclination >= 180) inclination = 0;  // what a tiny negative angle plus 180 rounds to
+  if (inclination >= 180) inclination = 0;  // a tiny negative angle plus 180 rounds to 180
   return {cloud.mean, deviations * std::sqrt(larger), deviations * std::sqrt(smaller), inclination};
 }
 
@@ -98,7 +98,7 @@ Xyz xyz_of_photons(const PhotonMeans& means, std::span<const double> counts) {
 
 namespace {
 
-constexpr double optimality_tolerance = 1e-7;  // of the optimality condition; the area is within about (3/2) of it
+constexpr double optimality_tolerance = 1e-7;  // for the optimality condition; the area is within about (3/2) of it
 constexpr int most_iterations = 20000;         // linear convergence: a few hundred in practice
 
 // The samples after an affine map that makes their covariance the identity: the least ellipse is affinely covariant,
@@ -113,7 +113,7 @@ std::optional<Whitening> whitening_of(const ChromaticityCloud& cloud) {
   const double l11 = std::sqrt(c.xx);
   const double l21 = c.xy / l11;
   const double rest = c.yy - l21 * l21;
-  // On one line up to rounding: the smaller axis is below 1e-6 of the larger.
+  // The samples are on one line up to rounding: the smaller axis is below 1e-6 of the larger.
   if (!(c.xx > 0) || !(rest > 1e-12 * c.yy)) return std::nullopt;
   return Whitening{cloud.mean, l11, l21, std::sqrt(rest)};
 }
@@ -138,8 +138,8 @@ double quadratic(const Matrix3& m, const Vector3& v) {
   return v[0] * mv[0] + v[1] * mv[1] + v[2] * mv[2];
 }
 
-// One step towards the sample farthest out, or away from the one farthest in that still has weight; whether it was
-// needed. At the optimum all samples with weight are at kappa = 3, the dimension of the lifted points.
+// Makes one step towards the sample farthest out, or away from the one farthest in that still has weight; returns
+// whether it was needed. At the optimum all samples with weight are at kappa = 3, the dimension of the lifted points.
 bool improve(const std::vector<Vector3>& points, std::vector<double>& weight) {
   const auto inverted = inverse(moments(points, weight));
   if (!inverted) return false;

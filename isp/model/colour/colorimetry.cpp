@@ -7,7 +7,7 @@ namespace {
 
 constexpr Matrix3 bradford{{{0.8951, 0.2664, -0.1614}, {-0.7502, 1.7135, 0.0367}, {0.0389, -0.0685, 1.0296}}};
 
-/// CIE 15:2018 Eq. 8.6: cube root above (24/116)^3, a line of equal value and slope below.
+/// Computes CIE 15:2018 Eq. 8.6: cube root above (24/116)^3, a line of equal value and slope below.
 double lab_f(double ratio) {
   constexpr double knee = (24.0 / 116.0) * (24.0 / 116.0) * (24.0 / 116.0);
   return ratio > knee ? std::cbrt(ratio) : (841.0 / 108.0) * ratio + 16.0 / 116.0;

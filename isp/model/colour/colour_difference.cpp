@@ -9,7 +9,7 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
 
-/// Hue angle in [0, 360) degrees; 0 for a grey.
+/// Returns the hue angle in [0, 360) degrees; 0 for a grey.
 double hue_degrees(double a, double b) {
   if (a == 0 && b == 0) return 0;
   const double h = std::atan2(b, a) / degree;
@@ -21,7 +21,7 @@ struct HuePair {
   double mean;        // degrees, on the shorter arc
 };
 
-/// Sharma et al. 2005, Eq. 10 and 14.
+/// Compares hues by Sharma et al. 2005, Eq. 10 and 14.
 HuePair compare_hues(double h1, double h2, bool one_is_grey) {
   if (one_is_grey) return {0, h1 + h2};
   const double d = h2 - h1;
@@ -30,7 +30,7 @@ HuePair compare_hues(double h1, double h2, bool one_is_grey) {
   return {d > 180 ? d - 360 : d + 360, 0.5 * (sum < 360 ? sum + 360 : sum - 360)};
 }
 
-/// c^7 / (c^7 + 25^7)
+/// Returns c^7 / (c^7 + 25^7).
 double chroma_ratio(double c) {
   const double c2 = c * c, c7 = c2 * c2 * c2 * c;
   return c7 / (c7 + 6103515625.0);
@@ -40,7 +40,7 @@ double chroma_ratio(double c) {
 
 double delta_e_ab(const Lab& first, const Lab& second) {
   const double l = first.l - second.l, a = first.a - second.a, b = first.b - second.b;
-  return std::sqrt(l * l + a * a + b * b);  // std::hypot of three loses NaN in libstdc++ 12
+  return std::sqrt(l * l + a * a + b * b);  // std::hypot of three arguments loses NaN in libstdc++ 12
 }
 
 double delta_e_94c(const Lab& reference, const Lab& test) {

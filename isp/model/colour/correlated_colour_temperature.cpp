@@ -10,13 +10,13 @@
 namespace lowlux::isp {
 namespace {
 
-/// CIE 1960 uv.
+/// Holds a CIE 1960 uv chromaticity.
 struct Uv {
   double u = 0;
   double v = 0;
 };
 
-/// A point of the locus at a reciprocal temperature m [MK^-1], and its derivative by m.
+/// Holds a point of the locus at a reciprocal temperature m [MK^-1], and its derivative by m.
 struct LocusPoint {
   Uv uv;
   Uv slope;
@@ -25,7 +25,8 @@ struct LocusPoint {
 constexpr double min_mired = 1e6 / planckian_max_k;
 constexpr double max_mired = 1e6 / planckian_min_k;
 
-/// Planck's law in m: S ~ nm^-5 / (exp(a) - 1), a = c2 m / wavelength, and dS/dm = -S (a / m) (1 + 1 / (exp(a) - 1)).
+/// Evaluates Planck's law in m: S ~ nm^-5 / (exp(a) - 1), a = c2 m / wavelength, and dS/dm = -S (a / m) (1 + 1 /
+/// (exp(a) - 1)).
 LocusPoint locus_at(double mired) {
   constexpr double c2_nm_per_mired = 14.388;  // c2 = 1.4388e-2 m K
   const auto& observer = cie_1931_observer();
@@ -48,7 +49,7 @@ LocusPoint locus_at(double mired) {
   return {uv, {(4 * slope[0] - uv.u * sum_slope) / sum, (6 * slope[1] - uv.v * sum_slope) / sum}};
 }
 
-/// Points over the whole locus, evenly spaced in mired, from which the search starts.
+/// Sets the number of points over the whole locus, evenly spaced in mired, from which the search starts.
 constexpr int scan_size = 200;
 constexpr double scan_mired(int i) { return min_mired + (max_mired - min_mired) * i / (scan_size - 1); }
 
@@ -63,8 +64,8 @@ const std::array<Uv, scan_size>& scan_points() {
 
 double squared_distance(const Uv& a, const Uv& b) { return (a.u - b.u) * (a.u - b.u) + (a.v - b.v) * (a.v - b.v); }
 
-/// Mired of the point of the locus nearest to p: Gauss-Newton on the tangent condition (uv(m) - p) . uv'(m) = 0,
-/// kept inside a bracket that shrinks with every step, by halving where a step would leave it.
+/// Returns the mired of the point of the locus nearest to p: Gauss-Newton on the tangent condition (uv(m) - p) . uv'(m)
+/// = 0, kept inside a bracket that shrinks with every step, by halving where a step would leave it.
 double nearest_mired(const Uv& p) {
   const auto& points = scan_points();
   const auto* best = std::min_element(points.begin(), points.end(), [&](const Uv& a, const Uv& b) {
@@ -87,7 +88,7 @@ double nearest_mired(const Uv& p) {
   return mired;
 }
 
-/// Unit normal of the locus on its green side.
+/// Returns the unit normal of the locus on its green side.
 Uv normal_of(const Uv& slope) {
   const double length = std::hypot(slope.u, slope.v);
   return {-slope.v / length, slope.u / length};

@@ -16,7 +16,7 @@ Xy desaturated(const Xy& signal, const Xy& dark, double alpha) {
 }
 
 std::optional<Xy> resaturated(const Xy& measured, const Xy& dark, double alpha) {
-  // As a step from the dark: near alpha = 0 the textbook form would take the difference of two products.
+  // The result is a step from the dark: near alpha = 0 the textbook form would subtract two products.
   const Xy out{dark.x + (measured.x - dark.x) / alpha, dark.y + (measured.y - dark.y) / alpha};
   if (!(alpha > 0) || !std::isfinite(out.x) || !std::isfinite(out.y)) return std::nullopt;
   return out;

@@ -15,13 +15,13 @@ constexpr std::array<std::string_view, effect_count> names{"photon-noise", "dark
                                                            "clipping",     "prnu",         "dsnu",       "hot-pixels",
                                                            "row-noise",    "column-noise"};
 
-/// Share of the tolerance that predictions may use up. They take all laws for normal ones, which near saturation and
-/// at a few electrons they are not.
+/// Limits the fraction of the tolerance that predictions may use up. They assume normal distributions, which do not
+/// hold near saturation and at a few electrons.
 constexpr double usable_share = 0.5;
 
-constexpr int most_samples = 24;  // blocks of one region that are evaluated: its extremes and others evenly among them
+constexpr int most_samples = 24;  // evaluated blocks of one region: its extremes and others evenly between them
 
-/// Whether the sensor and exposure have the effect at all.
+/// Returns whether the sensor and exposure have the effect at all.
 bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
   const auto dark = dark_mean_e(s, exposure);
   const bool has_dark = dark[0] + dark[1] + dark[2] > 0;
@@ -50,11 +50,11 @@ bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
 
 double level_of(const BlockLevel& block) { return *std::max_element(block.signal_e.begin(), block.signal_e.end()); }
 
-/// Decade of a level; what no frame can tell apart is one: below a thousandth of an electron, above 1e9.
+/// Returns the decade of a level; levels below a thousandth of an electron share a decade, and so do those above 1e9.
 int decade_of(double level_e) { return static_cast<int>(std::floor(std::log10(std::clamp(level_e, 1e-3, 1e9)))); }
 
-/// The blocks a region is judged by: sorted by level, its extremes and others between, and the extremes of each
-/// channel.
+/// Returns the blocks a region is evaluated by: sorted by level, its extremes and others between, and the extremes of
+/// each channel.
 std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vector<std::size_t> members) {
   const auto by = [&](auto key) {
     return [&blocks, key](std::size_t a, std::size_t b) { return key(blocks[a]) < key(blocks[b]); };
@@ -79,7 +79,7 @@ std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vect
   return samples;
 }
 
-/// Predicts for the blocks of one region.
+/// Predicts the change for the blocks of one region.
 class Region {
  public:
   Region(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
@@ -104,7 +104,7 @@ class Region {
   std::vector<BlockLevel> samples_;
 };
 
-/// Each effect by itself.
+/// Decides on each effect by itself.
 std::array<EffectDecision, effect_count> decisions_alone(const Region& region) {
   std::array<EffectDecision, effect_count> out{};
   for (int i = 0; i < effect_count; ++i) {
@@ -126,13 +126,14 @@ double size_of(const PredictedChange& change, const Tolerance& tolerance) {
 
 void drop_negligible(const Region& region, const Tolerance& tolerance, RegionPlan& plan) {
   std::array<int, effect_count> order{};
-  std::iota(order.rbegin(), order.rend(), 0);  // among equals DSNU goes before dark current, which waits for it
+  std::iota(order.rbegin(), order.rend(),
+            0);  // among equals DSNU is dropped before dark current, which needs it dropped
   const auto size = [&](int i) { return size_of(plan.decisions[i].alone, tolerance); };
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size(a) < size(b); });
   for (const int i : order) {
     EffectDecision& d = plan.decisions[i];
     if (!d.kept || size(i) >= usable_share) continue;
-    if (d.effect == Effect::dark_current && plan.kept.has(Effect::dsnu)) continue;  // it multiplies dark current
+    if (d.effect == Effect::dark_current && plan.kept.has(Effect::dsnu)) continue;  // DSNU multiplies dark current
     const PredictedChange together = region.change(plan.kept.without(d.effect));
     if (size_of(together, tolerance) >= usable_share) continue;
     plan.kept = plan.kept.without(d.effect);
@@ -142,7 +143,7 @@ void drop_negligible(const Region& region, const Tolerance& tolerance, RegionPla
   }
 }
 
-/// Regions by decade.
+/// Groups the blocks into regions by decade.
 std::vector<std::vector<std::size_t>> group(std::span<const BlockLevel> blocks) {
   std::map<int, std::vector<std::size_t>> decades;
   for (std::size_t i = 0; i < blocks.size(); ++i) decades[decade_of(level_of(blocks[i]))].push_back(i);

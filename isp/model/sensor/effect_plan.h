@@ -13,22 +13,22 @@
 
 namespace lowlux::isp {
 
-/// What happens to charge on its way to a code, each switchable.
+/// Lists the switchable noise sources and nonlinearities between charge and code.
 enum class Effect : std::uint8_t {
   photon_noise,  // the signal's Poisson fluctuation
   dark_current,  // its mean and its Poisson fluctuation
   read_noise,    // Gaussian
-  quantisation,  // whole codes, by rounding or by floor
+  quantisation,  // integer codes, by rounding or by floor
   clipping,      // full well and the converter's range
   prnu,          // pixels differ in sensitivity
   dsnu,          // pixels differ in dark current
-  hot_pixels,    // a few have much more of it
+  hot_pixels,    // a few pixels have much more dark current
   row_noise,     // an offset for each row and frame
   column_noise,  // an offset for each column
 };
 inline constexpr int effect_count = 10;
 
-/// "photon-noise", "dark-current"... in the order of Effect.
+/// Returns "photon-noise", "dark-current"... in the order of Effect.
 std::span<const std::string_view> effect_names();
 
 class EffectSet {
@@ -49,63 +49,65 @@ class EffectSet {
   unsigned bits_ = 0;
 };
 
-/// What leaving effects out may change in a block of 32 x 32 pixels: the colour of its mean, as the frame would be
-/// developed, and the variance of each of its channels, relative to itself.
+/// Limits what leaving effects out may change in a block of 32 x 32 pixels: the colour of its mean, as the frame would
+/// be developed, and the variance of each of its channels, relative to itself.
 struct Tolerance {
   double delta_e = 0.5;  // CIEDE2000
   double relative_variance = 0.05;
 };
 inline constexpr int effect_block = 32;
 
-/// Changes of variance below this are not looked at [DN^2]: a block of whole codes cannot show them.
+/// Changes of variance below this are ignored [DN^2]: a block of integer codes cannot show them.
 inline constexpr double variance_floor_dn2 = 0.01;
 
-/// What a block of the scene gives to the sensor.
+/// Holds the signal that a block of the scene gives to the sensor.
 struct BlockLevel {
   Vector3 signal_e{};   // mean signal of its R, G and B pixels
-  Vector3 darkest_e{};  // of its darkest R, G and B pixels: a star's block is dark around it
-  double peak_e = 0;    // of its brightest pixel
+  Vector3 darkest_e{};  // signal of its darkest R, G and B pixels: a star's block is dark around it
+  double peak_e = 0;    // signal of its brightest pixel
 };
 
-/// How block means become colours: what the tolerance is measured in.
+/// Describes how block means become colours, in which the tolerance is measured.
 struct Developing {
   Matrix3 camera_to_xyz = identity3();  // (white_e) / white_e -> XYZ of D65 at Y = 1
   Vector3 white_e{1, 1, 1};             // charge of R, G, B that is developed to white
 };
 
-/// How a frame of such blocks is developed: white is the brightest block's level, but no less than 50 times the noise
-/// of a black frame, and no more than saturation (the rules of isp/render/exposure).
+/// Returns how a frame of such blocks is developed: white is the brightest block's level, but no less than 50 times the
+/// noise of a black frame, and no more than saturation (the rules of isp/render/exposure).
 /// @param neutral camera RGB of a neutral, largest 1
 Developing developing_of(const SensorModel& sensor, const Exposure& exposure, const Matrix3& camera_to_xyz,
                          const Vector3& neutral, std::span<const BlockLevel> blocks);
 
-/// What is predicted to change in a block if effects are left out: bounds at five standard deviations of normal laws.
+/// Holds the predicted change in a block if effects are left out: bounds at five standard deviations of normal
+/// distributions.
 struct PredictedChange {
   double delta_e = 0;
   double relative_variance = 0;
 };
 
-/// Hot pixels come by the piece: a block may hold none, so they widen no other effect's tolerance, or several.
+/// Predicts the change in a block if only the effects `kept` are simulated. Hot pixels are discrete events: a block may
+/// hold none, so they widen no other effect's tolerance, or several.
 PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
                                const BlockLevel& block, EffectSet kept);
 
-/// One effect in one region: its size if it alone were left out, and what was decided.
+/// Holds the decision on one effect in one region, and the change if it alone were left out.
 struct EffectDecision {
   Effect effect = Effect::photon_noise;
   enum class Reason : std::uint8_t {
-    absent,      // the sensor has no such effect, or the exposure makes nothing of it
-    negligible,  // left out, all that is left out together staying below the tolerance
+    absent,      // the sensor has no such effect, or it is 0 at the exposure
+    negligible,  // left out: together with all others left out it stays below the tolerance
     needed,      // above the tolerance, alone or together with what is left out already
-    asked_for,   // kept or left out because the caller said so
+    asked_for,   // kept or left out at the caller's request
     free,        // kept because leaving it out saves nothing
   } reason = Reason::needed;
   bool kept = true;
   PredictedChange alone;
 };
 
-/// Blocks of similar level, planned together.
+/// Describes blocks of similar level that are planned together.
 struct RegionPlan {
-  double darkest_e = 0;  // of the blocks' largest channels
+  double darkest_e = 0;  // lowest level of the blocks: that of the largest channel
   double brightest_e = 0;
   int blocks = 0;
   EffectSet kept = EffectSet::all();
@@ -113,7 +115,7 @@ struct RegionPlan {
   std::array<EffectDecision, effect_count> decisions{};
 };
 
-/// Which effects each block of a frame gets.
+/// Holds the effects that each block of a frame gets.
 struct EffectPlan {
   Tolerance tolerance;
   std::vector<RegionPlan> regions;
@@ -126,7 +128,7 @@ struct EffectPlan {
 EffectPlan plan_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
                         std::span<const BlockLevel> blocks, const Tolerance& tolerance);
 
-/// The plan of a caller who wants these effects and no others, with the predictions all the same.
+/// Returns a plan with the effects that the caller requests and no others, including the predictions.
 EffectPlan fixed_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
                          std::span<const BlockLevel> blocks, EffectSet wanted);
 

@@ -8,20 +8,21 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double sigmas = 5;            // of a bound
-constexpr double channel_pixels = 256;  // of R or B in a block; G has twice as many
+constexpr double sigmas = 5;            // standard deviations of a bound
+constexpr double channel_pixels = 256;  // pixels of R or B in a block; G has twice as many
 constexpr double block_lines = 16;      // rows, or columns, of a block that hold one channel
-constexpr double hottest = 14;          // of an exponential law, in units of its mean: exceeded once in a million
+constexpr double hottest =
+    14;  // quantile of an exponential distribution, in units of its mean: exceeded once in a million
 constexpr double black_noise_of_white = 0.02;  // isp/render/exposure
 
 double square(double x) { return x * x; }
 
-/// Mean charge of one channel's pixels by where it comes from [e-].
+/// Holds the mean charge of one channel's pixels by origin [e-].
 struct Charge {
-  double signal, dark, hot;  // hot: of a hot pixel, on top
+  double signal, dark, hot;  // hot: additional charge of a hot pixel
 };
 
-/// What is kept of one channel without hot pixels: mean, and variance by how it is shared between pixels [e-, e-^2].
+/// Holds the kept part of one channel without hot pixels: mean, and variance by how pixels share it [e-, e-^2].
 struct Budget {
   double collected_mean = 0;
   double collected_variance = 0;  // before the full well
@@ -45,23 +46,24 @@ Budget budget_of(const SensorModel& s, const Charge& q, EffectSet kept) {
   return b;
 }
 
-/// Probability that a normal variable lies between two bounds.
+/// Returns the probability that a normal variable lies between two bounds.
 double share_inside(const Moments& normal, double low, double high) {
   if (normal.variance <= 0) return normal.mean >= low && normal.mean <= high ? 1 : 0;
   const double unit = std::sqrt(2 * normal.variance);
   return 0.5 * (std::erf((high - normal.mean) / unit) - std::erf((low - normal.mean) / unit));
 }
 
-/// Moments in DN of one channel of a block, and how far quantisation may move them.
+/// Holds the moments in DN of one channel of a block, and bounds on their change by quantisation.
 struct ChannelMoments {
   Moments dn;
   QuantisationBounds uncertain{0, 0};
-  double unclipped = 1;          // share of the variance that clipping leaves
-  double variance_slope_dn = 0;  // of the variance over the mean: not 0 where clipping bites
-  double inside = 1;             // share of the pixels that do not come within a code of the ends of the range
+  double unclipped = 1;          // fraction of the variance that clipping leaves
+  double variance_slope_dn = 0;  // derivative of the variance by the mean: not 0 where clipping occurs
+  double inside = 1;             // fraction of the pixels more than a code away from the ends of the range
 };
 
-/// The readout before quantisation [DN], with `more` charge collected and `offset` charge added after it [e-].
+/// Describes the readout before quantisation [DN], with `more` charge collected and `offset` charge added after it
+/// [e-].
 struct Displaced {
   double more = 0, offset = 0;
 };
@@ -92,7 +94,7 @@ ChannelMoments moments_of(const SensorModel& s, const Budget& b, EffectSet kept)
   }
   if (kept.has(Effect::quantisation)) {
     out.uncertain = quantisation_bounds(std::sqrt(out.dn.variance));
-    // A level held at an end of the range is a whole code already.
+    // A level clamped to an end of the range is an integer code already.
     const double inside = out.dn.variance > 0 || (out.dn.mean > 0 && out.dn.mean < s.white_level_dn) ? 1 : 0;
     out.uncertain.mean_dn *= inside;
     out.uncertain.variance_dn2 *= inside;
@@ -102,8 +104,8 @@ ChannelMoments moments_of(const SensorModel& s, const Budget& b, EffectSet kept)
   return out;
 }
 
-/// Variance of one pixel's change when the effects that are not kept are left out, the random numbers being the same.
-/// A change of a Poisson mean by delta moves the count by a whole number now and then: at most min(1/4, delta).
+/// Holds the variance of one pixel's change when the effects that are not kept are left out, with the same random
+/// numbers. A change of a Poisson mean by delta occasionally moves the count by an integer: at most min(1/4, delta).
 struct ChangeVariance {
   double pixel = 0, line = 0;
 };
@@ -120,7 +122,7 @@ ChangeVariance change_variance(const SensorModel& s, const Charge& q, EffectSet 
   return v;
 }
 
-/// How many pixels of a kind a channel of a block may hold: exceeded once in a million.
+/// Returns the number of pixels of a kind that a channel of a block may hold: exceeded once in a million.
 double count_in_block(double fraction) {
   const double mean = fraction * channel_pixels;
   if (mean < 1e-6) return 0;
@@ -134,7 +136,8 @@ double count_in_block(double fraction) {
   return std::max(count, 1);
 }
 
-/// How far the charge of a hot pixel can move: all of it if hot pixels are left out, what would not fit if clipping is.
+/// Returns how far the charge of a hot pixel can change: all of it if hot pixels are left out, the excess over
+/// saturation if clipping is.
 double changed_charge_of_hot_pixel(const SensorModel& s, const Charge& q, EffectSet kept) {
   if (q.hot == 0) return 0;
   const double hot = q.hot * hottest, room = saturation_charge_e(s) - q.signal - q.dark;
@@ -143,10 +146,10 @@ double changed_charge_of_hot_pixel(const SensorModel& s, const Charge& q, Effect
   return kept.has(Effect::clipping) ? 0 : std::max(0.0, hot + noise - room);
 }
 
-/// Bounds on what changes in one channel of a block.
+/// Holds bounds on the changes in one channel of a block.
 struct ChannelChange {
-  double shift_dn = 0;    // of the mean, known
-  double scatter_dn = 0;  // of the mean, bound
+  double shift_dn = 0;    // known shift of the mean
+  double scatter_dn = 0;  // bound on the scatter of the mean
   double relative_variance = 0;
 };
 
@@ -168,9 +171,9 @@ ChannelChange channel_change(const SensorModel& s, const Charge& q, EffectSet ke
   // Without clipping, a pixel at the end of the range may read one code beyond it.
   const double beyond = kept.has(Effect::clipping) ? 0 : count_in_block(1 - all.inside) / channel_pixels;
   out.scatter_dn = sigmas * std::sqrt(pixel / channel_pixels + line / block_lines) + rounding_mean + hot_mean + beyond;
-  // Where most pixels are clipped, the few others make the variance.
+  // Where most pixels are clipped, the few others determine the variance.
   const double pixels = std::max(1.0, channel_pixels * std::min(all.inside, left.inside));
-  // Sample variances: their own scatter, and the sample covariance of what is left out with what is kept.
+  // Terms of the sample variances: their own scatter, and the sample covariance of what is left out with what is kept.
   const double larger = std::max(all.dn.variance, left.dn.variance);
   const double slope = std::max(all.variance_slope_dn, left.variance_slope_dn);
   const double moved =
@@ -178,7 +181,7 @@ ChannelChange channel_change(const SensorModel& s, const Charge& q, EffectSet ke
       sigmas * (pixel * std::sqrt(2 / pixels) + line * std::sqrt(2 / std::min(block_lines, pixels)) +
                 2 * std::sqrt((pixel + line) * larger / pixels)) +
       slope * (std::fabs(out.shift_dn) + sigmas * std::sqrt(pixel / channel_pixels + line / block_lines));
-  const double seen = all.dn.variance * (1 - sigmas * std::sqrt(2 / pixels));  // the least a block may show
+  const double seen = all.dn.variance * (1 - sigmas * std::sqrt(2 / pixels));  // lower bound of a block's variance
   out.relative_variance = moved / std::max(seen, variance_floor_dn2);
   return out;
 }
@@ -200,7 +203,7 @@ PredictedChange larger(const PredictedChange& a, const PredictedChange& b) {
   return {std::max(a.delta_e, b.delta_e), std::max(a.relative_variance, b.relative_variance)};
 }
 
-/// The largest colour difference between a mean and where shift and scatter may take it [DN].
+/// Returns the largest colour difference between a mean and its possible values by shift and scatter [DN].
 double farthest(const SensorModel& s, const Developing& developing, const Vector3& mean, const Vector3& shift,
                 const Vector3& scatter) {
   const Lab before = lab_of_dn(s, developing, mean);
@@ -225,7 +228,7 @@ PredictedChange change_at(const SensorModel& sensor, const Exposure& exposure, c
     scatter[c] = change.scatter_dn;
     out.relative_variance = std::max(out.relative_variance, change.relative_variance);
   }
-  // Noise that stays moves the colour about: where it happens to be grey, differences count most.
+  // The remaining noise changes the colour: where it happens to be grey, differences count most.
   const double grey = (mean[0] + mean[1] + mean[2]) / 3 - sensor.black_level_dn;
   Vector3 neutral{};
   for (int c = 0; c < 3; ++c) {
@@ -259,7 +262,7 @@ PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposu
   PredictedChange out = larger(change_at(sensor, exposure, developing, block.signal_e, kept),
                                change_at(sensor, exposure, developing, block.darkest_e, kept));
   if (kept.has(Effect::clipping)) return out;
-  // The mean of a block does not tell what its brightest pixel loses: look at a block as bright as that.
+  // The mean of a block does not show the loss of its brightest pixel: a block as bright as that is predicted too.
   const PredictedChange peak = change_at(sensor, exposure, developing, {block.peak_e, block.peak_e, block.peak_e},
                                          EffectSet::all().without(Effect::clipping));
   return larger(out, peak);

@@ -21,18 +21,18 @@ double normal_quantile_above(double share) { return std::numbers::sqrt2 * boost:
 
 double code_range_e(const SensorModel& s) { return (s.white_level_dn - s.black_level_dn) / s.system_gain_dn_per_e; }
 
-/// Mean charge m that a wall is z standard deviations above: m + z sqrt(m + noise^2) = wall. Below 0 if noise alone
-/// reaches the wall.
+/// Returns the mean charge m that is z standard deviations below a limit: m + z sqrt(m + noise^2) = limit. Below 0 if
+/// noise alone reaches the limit.
 double charge_below(double wall_e, double noise_e, double z) {
   return wall_e + z * z / 2 - z * std::sqrt(wall_e + noise_e * noise_e + z * z / 4);
 }
 
-/// Dark electrons of R, G and B per second.
+/// Returns the dark electrons of R, G and B per second.
 Vector3 dark_rate(const AdviceRequest& r, const SensorModel& sensor) {
   return dark_mean_e(sensor, {1, r.temperature_c});
 }
 
-/// Electrons per second of the fullest channel of a neutral, dark current included.
+/// Returns the electrons per second of the fullest channel of a neutral, dark current included.
 double fullest_rate(const AdviceRequest& r, const GainSetting& gain, double luminance_cd_m2) {
   const Vector3 dark = dark_rate(r, gain.sensor);
   double most = 0;
@@ -40,7 +40,7 @@ double fullest_rate(const AdviceRequest& r, const GainSetting& gain, double lumi
   return most;
 }
 
-/// The mean charges that the two walls of a sensor allow.
+/// Holds the mean charges that the two saturation limits of a sensor allow.
 struct Walls {
   double full_well_e;
   double converter_e;
@@ -91,7 +91,7 @@ std::optional<MidtoneQuality> midtone_quality(const AdviceRequest& r, const Gain
                         chroma->weight_snr};
 }
 
-/// The largest part of the mid tone's variance.
+/// Returns the largest component of the mid tone's variance and its fraction.
 std::pair<NoiseSource, double> largest_noise(const AdviceRequest& r, const GainSetting& gain, double exposure_s) {
   const MeanCharge charge = midtone_charge(r, gain, exposure_s);
   const double gain2 = gain.sensor.system_gain_dn_per_e * gain.sensor.system_gain_dn_per_e;
@@ -106,11 +106,11 @@ GainAdvice best_of(const AdviceRequest& r, std::size_t gain) {
   const auto [exposure_s, limit] = longest_exposure(r, r.gains[gain]);
   const auto [noise, share] = largest_noise(r, r.gains[gain], exposure_s);
   GainAdvice out{predicted_point(r, gain, exposure_s), limit, noise, share};
-  out.at.exceeds.reset();  // it is the limit, to rounding
+  out.at.exceeds.reset();  // equals the limit, up to rounding
   return out;
 }
 
-/// The larger of what each gain loses against the best SNR and against the best chromaticity [dB].
+/// Returns for each gain the larger loss: against the best SNR or against the best chromaticity [dB].
 std::vector<double> losses_db(const std::vector<GainAdvice>& gains) {
   double best_snr = 0, least_std = INFINITY;
   for (const GainAdvice& g : gains) {
@@ -126,7 +126,7 @@ std::vector<double> losses_db(const std::vector<GainAdvice>& gains) {
   return losses;
 }
 
-/// Of the gains that lose least, or hardly more, the lowest.
+/// Returns the lowest of the gains whose loss is smallest, or within equal_quality_db of it.
 std::size_t best_gain(const AdviceRequest& r, const std::vector<double>& losses) {
   const double least = *std::ranges::min_element(losses);
   std::optional<std::size_t> best;
@@ -175,7 +175,7 @@ AdvicePoint predicted_point(const AdviceRequest& request, std::size_t gain, doub
     out.exceeds = ExposureLimit::full_well;
   }
   const double midtone_e = fullest_rate(request, setting, request.midtone_cd_m2) * exposure_s;
-  const double reachable_e = std::min(walls.full_well_e, walls.converter_e) * (1 + 1e-12);  // the limit, to rounding
+  const double reachable_e = std::min(walls.full_well_e, walls.converter_e) * (1 + 1e-12);  // the limit, up to rounding
   if (midtone_e <= reachable_e) out.midtone = midtone_quality(request, setting, exposure_s);
   return out;
 }
@@ -210,7 +210,7 @@ Result<ExposureAdvice> advise_exposure(const AdviceRequest& request) {
 namespace {
 
 constexpr double largest_luminance_cd_m2 = 1e12;
-constexpr double least = 1e-12;  // of luminances, rates and times: their products stay within double
+constexpr double least = 1e-12;  // lower limit of luminances, rates and times: their products stay within double
 
 std::string text_of(double value) { return number_text(value, 3); }
 
@@ -250,7 +250,7 @@ const char* name_of(NoiseSource source) {
   return names[static_cast<int>(source)];
 }
 
-/// A gain setting beside the best one, if there is one: the next higher, or the next lower.
+/// Returns the gain setting next to the best one, if there is one: the next higher, or the next lower.
 std::optional<std::size_t> neighbour(const AdviceRequest& r, std::size_t best, bool higher) {
   const auto k = [&](std::size_t i) { return r.gains[i].sensor.system_gain_dn_per_e; };
   std::optional<std::size_t> found;

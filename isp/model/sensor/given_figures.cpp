@@ -24,7 +24,7 @@ Result<void> check_given_figures(const SensorFigures& given, const NamedSensor& 
   constexpr const char* no_dark_current = "the sensor has no dark current";
   const Useless options[] = {
       {positive(given.hot_pixel_fraction) && m.hot_pixel_current_e_per_s == 0, "--hot-pixels", "--hot-current",
-       "hot pixels are told from others by their dark current"},
+       "hot pixels differ from others by their dark current"},
       {positive(given.hot_pixel_current_e_per_s) && m.hot_pixel_fraction == 0, "--hot-current", "--hot-pixels",
        "the sensor has no hot pixels"},
       {positive(given.dsnu) && no_dark, "--dsnu", "--dark-current", no_dark_current},

@@ -6,10 +6,10 @@
 
 namespace lowlux::isp {
 
-/// Refuses figures that would change nothing, because another one they hang on is missing: hot pixels without their
-/// dark current and the other way round; DSNU, or the dark current's temperature or doubling, of a sensor without dark
-/// current; a pixel pitch without peak quantum efficiency, unless the luminance that fills a pixel is given. A share of
-/// 0 says that there is no such effect, and needs nothing.
+/// Rejects figures that would have no effect, because another one they depend on is missing: hot pixels without their
+/// dark current and vice versa; DSNU, or the dark current's temperature or doubling, of a sensor without dark current;
+/// a pixel pitch without peak quantum efficiency, unless the luminance that fills a pixel is given. A fraction of 0
+/// states that there is no such effect, and depends on nothing.
 /// @param sensor  made by sensor_named() of these figures
 /// Errors: invalid_argument; the message names the option that does nothing and the one that is missing.
 Result<void> check_given_figures(const SensorFigures& given, const NamedSensor& sensor, const Optics& optics);

@@ -48,7 +48,7 @@ Result<void> check_not_negative(const SensorModel& s) {
 
 double density(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi); }
 
-/// Probability that a standard normal variable lies between a and b, without cancellation in either tail.
+/// Returns the probability that a standard normal variable lies between a and b, without cancellation in either tail.
 double probability(double a, double b) {
   if (a > 0) return probability(-b, -a);
   return 0.5 * (std::erfc(-b / std::numbers::sqrt2) - std::erfc(-a / std::numbers::sqrt2));
@@ -141,7 +141,7 @@ Moments clamped_normal(const Moments& normal, double low, double high) {
   const double s = std::sqrt(std::max(normal.variance, 0.0));
   const double centre = std::clamp(normal.mean, low, high);
   if (s == 0) return {centre, 0};
-  // Moments about `centre`, so that a variable far outside its bounds keeps its digits.
+  // The moments are about `centre`, so that a variable far outside its bounds keeps its digits.
   const double a = (low - normal.mean) / s, b = (high - normal.mean) / s;
   const double below = probability(-INFINITY, a), inside = probability(a, b), above = probability(b, INFINITY);
   const double phi_a = std::isinf(a) ? 0 : density(a), phi_b = std::isinf(b) ? 0 : density(b);
@@ -157,7 +157,7 @@ Moments clamped_normal(const Moments& normal, double low, double high) {
 }
 
 QuantisationBounds quantisation_bounds(double std_dn) {
-  constexpr int terms = 20;  // what they leave out matters below 0.05 DN only, where both bounds are at their limit
+  constexpr int terms = 20;  // the rest matters below 0.05 DN only, where both bounds are at their limit
   constexpr double pi = std::numbers::pi;
   const double s2 = std_dn * std_dn;
   double mean = 0, variance = 0;

@@ -7,67 +7,69 @@
 
 namespace lowlux::isp {
 
-/// An error unless the sensor can exist: figures finite and not negative, gain and full well positive, read, row and
-/// column noise of at most largest_noise_e, 1 to 16 bits, 0 <= black < white <= 2^bits - 1, a white level that is a
-/// whole number, a dark current that doubles every 1 to 1000 degrees, a full well the sampler can draw.
+/// Returns an error unless the sensor is possible: figures finite and not negative, gain and full well positive, read,
+/// row and column noise of at most largest_noise_e, 1 to 16 bits, 0 <= black < white <= 2^bits - 1, an integer white
+/// level, a dark current that doubles every 1 to 1000 degrees, a full well the sampler can draw.
 Result<void> check_sensor(const SensorModel& sensor);
 
-/// The largest standard deviation check_sensor() lets pass [e-]: more than any full well.
+/// Limits the standard deviations that check_sensor() accepts [e-]: more than any full well.
 inline constexpr double largest_noise_e = 1e6;
 
-/// The largest full well check_sensor() lets pass [e-]: seven standard deviations below the sampler's limit, so that
+/// Limits the full well that check_sensor() accepts [e-]: seven standard deviations below the sampler's limit, so that
 /// a mean beyond the limit fills the pixel in any case.
 inline constexpr double largest_full_well_e = 9.9e5;
 
-/// How a frame is exposed.
+/// Describes the exposure of a frame.
 struct Exposure {
   double time_s = 1;
   double temperature_c = 20;  // of the sensor
 };
 
-/// An error unless the time is finite and not negative and the temperature within -100..150 C.
+/// Returns an error unless the time is finite and not negative and the temperature within -100..150 C.
 Result<void> check_exposure(const Exposure& exposure);
 
-/// How much more dark current there is than at the sensor's reference temperature: 2^((T - T_ref) / dT).
+/// Returns the factor of dark current against the sensor's reference temperature: 2^((T - T_ref) / dT).
 double dark_current_factor(const SensorModel& sensor, double temperature_c);
 
-/// Mean dark charge of R, G, B pixels that are not hot [e-].
+/// Returns the mean dark charge of R, G, B pixels that are not hot [e-].
 std::array<double, 3> dark_mean_e(const SensorModel& sensor, const Exposure& exposure);
 
-/// Charge at which a pixel reads the largest code: its full well or the converter's range, whichever is less [e-].
+/// Returns the charge at which a pixel reads the largest code: its full well or the converter's range, whichever is
+/// less [e-].
 double saturation_charge_e(const SensorModel& sensor);
 
-/// Which of R, G and B are saturated: where one is, the colour of the pixels is not that of the light, and means of
-/// noisy pixels hide it. A pixel is taken for full from five standard deviations of the noise after collection below
-/// the code at which it saturates.
+/// Returns which of R, G and B are saturated: where one is, the colour of the pixels is not that of the light, and
+/// means of noisy pixels hide it. A pixel counts as full from five standard deviations of the noise after collection
+/// below the code at which it saturates.
 /// @param largest_dn the largest code of each channel; one that is not a number is flagged too
 std::array<bool, 3> saturated_channels(const SensorModel& sensor, const std::array<double, 3>& largest_dn);
 
-/// Mean charge of one pixel.
+/// Holds the mean charge of one pixel.
 struct MeanCharge {
   double signal_e = 0;
   double dark_e = 0;
 };
 
-/// Variance of one pixel of an array without fixed pattern, in DN^2, full well and range being far away:
+/// Returns the variance of one pixel of an array without fixed pattern, in DN^2, far from full well and the ends of the
+/// range:
 ///     Var = K^2 (mu + d + sigma_r^2) + 1/12
-/// @note Thesis Eq. 4.12 writes the shot term in V beside V^2; this is the consistent form.
+/// @note Thesis Eq. 4.12 adds the shot term in V to terms in V^2; this is the consistent form.
 double variance_dn2(const SensorModel& sensor, const MeanCharge& charge);
 
-/// Signal-to-noise ratio as a ratio of powers, (K mu)^2 / Var (thesis Eq. 4.13).
+/// Returns the signal-to-noise ratio as a ratio of powers, (K mu)^2 / Var (thesis Eq. 4.13).
 double snr(const SensorModel& sensor, const MeanCharge& charge);
 
-/// Mean and variance.
+/// Holds mean and variance of a random variable.
 struct Moments {
   double mean = 0;
   double variance = 0;
 };
 
-/// A normal variable held between two bounds (either may be infinite): mean and variance of clamp(X, low, high).
+/// Returns mean and variance of a normal variable clamped to two bounds (either may be infinite): clamp(X, low, high).
 /// Exact; a variance of 0 is allowed.
 Moments clamped_normal(const Moments& normal, double low, double high);
 
-/// By how much quantising a normal variable of standard deviation `std_dn` can move its mean and its variance, at the
+/// Bounds the change of mean and variance when a normal variable of standard deviation `std_dn` is quantised, at the
 /// worst position between two codes:
 ///     |mean - m -+ offset| <= sum over n of exp(-2 pi^2 n^2 s^2) / (pi n) <= 1/2,  |variance - s^2 - 1/12| likewise.
 /// (Widrow & Kollar, Quantization Noise, 2008, section 4: the characteristic function of the quantiser's input.)

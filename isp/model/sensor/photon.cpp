@@ -19,7 +19,8 @@ tl::unexpected<Error> bad_value(const char* what, double value, double wavelengt
                                                " at " + number_text(wavelength_nm) + " nm");
 }
 
-// What any light must be: wavelengths above 0, values not below. Spectrum::of has seen to it that all are finite.
+// Returns an error unless the spectrum is a possible light: wavelengths above 0, values not below. Spectrum::of ensures
+// that all are finite.
 std::optional<tl::unexpected<Error>> not_a_light(const Spectrum& spectrum, const char* what) {
   if (spectrum.wavelengths_nm().front() <= 0) {
     return fail(ErrorCode::invalid_argument, "the wavelengths of a light must be positive, found " +
@@ -66,7 +67,7 @@ Result<Spectrum> normalised(const Spectrum& power) {
   if (const auto wrong = not_a_light(power, "a spectral power")) return *wrong;
   const double largest = std::ranges::max(power.values());
   if (!(largest > 0)) return fail(ErrorCode::insufficient, "a spectrum without power has no shares: all values are 0");
-  // By the largest value first: the integral of values near the ends of double's range would leave it.
+  // The values are divided by the largest first: the integral of values near the limits of double would exceed them.
   std::vector<double> shares(power.values().begin(), power.values().end());
   for (double& share : shares) share /= largest;
   auto scaled = with_values(power, shares);

@@ -22,7 +22,7 @@ const TextTable& sensors() {
   return table;
 }
 
-/// The name users give: the three rows of the thesis' sensor are one.
+/// Returns the name that users give: the three rows of the thesis' sensor have the same.
 std::string_view name_of(int row) {
   const std::string_view name = sensors().text(row, "name");
   return name.starts_with(thesis_rows) ? thesis_sensor : name;
@@ -42,7 +42,7 @@ std::string lower(std::string_view text) {
   return out;
 }
 
-/// Whether `wanted` is `setting`, or one of its words.
+/// Returns whether `wanted` is `setting`, or one of its words.
 bool is_setting(std::string_view setting, std::string_view wanted) {
   const std::string whole = lower(setting), word = lower(wanted);
   if (whole == word) return true;
@@ -60,7 +60,7 @@ std::string list(const std::vector<std::string_view>& names) {
   return text;
 }
 
-/// Whose spectral sensitivities a sensor gets, and whether they are its own.
+/// States the camera whose spectral sensitivities a sensor gets, and whether they are its own.
 struct CameraOf {
   std::string_view sensor;
   std::string_view camera;
@@ -77,7 +77,7 @@ constexpr std::array cameras{
 };
 constexpr std::string_view stand_in_camera = "Nikon_D5100";
 
-/// What the ELD calibration measured of one camera at one ISO.
+/// Returns the row of the ELD calibration for one camera at one ISO.
 std::optional<int> eld_row(const TextTable& table, std::string_view name, double iso) {
   if (!name.starts_with("ELD_")) return std::nullopt;
   for (int row = 0; row < table.rows(); ++row) {
@@ -170,7 +170,7 @@ struct UnknownFigure {
   std::string_view option;
 };
 
-/// What no frame can be simulated without, as far as it is not known.
+/// Returns the unknown figures among those that simulation requires.
 std::vector<UnknownFigure> unknown_electronics(int row, const SensorFigures& given) {
   std::vector<UnknownFigure> unknown;
   const auto need = [&](bool known, const UnknownFigure& figure) {
@@ -193,7 +193,7 @@ Result<void> check_sourced(std::string_view name, int row, const SensorFigures& 
   return fail(ErrorCode::insufficient, "no source gives " + what + "; give " + options, std::string(name));
 }
 
-/// The speed in the name of a gain setting.
+/// Returns the ISO speed in the name of a gain setting.
 std::optional<double> iso_of(std::string_view gain_setting) {
   constexpr std::string_view prefix = "ISO ";
   if (!gain_setting.starts_with(prefix)) return std::nullopt;
@@ -238,7 +238,7 @@ std::vector<std::string_view> options_needed(std::string_view name, std::string_
   if (!row) return {};
   std::vector<std::string_view> options;
   for (const UnknownFigure& figure : unknown_electronics(*row, {})) options.push_back(figure.option);
-  // The thesis' sensor has a scale of its own.
+  // The thesis' sensor has its own scale.
   if (name == thesis_sensor || iso_of(sensors().text(*row, "gain_setting"))) return options;
   if (!sensors().number(*row, "pixel_pitch_um")) options.emplace_back("--pixel-pitch");
   if (!sensors().number(*row, "peak_qe")) options.emplace_back("--peak-qe");

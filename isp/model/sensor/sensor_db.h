@@ -11,7 +11,7 @@
 
 namespace lowlux::isp {
 
-/// Figures a user gives for a sensor, in place of those of the table or where it has none.
+/// Holds the figures a user gives for a sensor, which replace or complete those of the table.
 struct SensorFigures {
   std::optional<double> system_gain_dn_per_e;
   std::optional<double> read_noise_e;
@@ -32,43 +32,43 @@ struct SensorFigures {
   std::optional<double> peak_quantum_efficiency;
   std::optional<double> iso;
   std::optional<Quantisation> quantisation;
-  std::optional<std::string> camera;  // whose spectral sensitivities
+  std::optional<std::string> camera;  // camera whose spectral sensitivities are used
 };
 
-/// A sensor by name, complete enough to be simulated, and what of it nobody has measured.
+/// Describes a sensor by name, complete enough to be simulated, with the figures that had to be assumed.
 struct NamedSensor {
   SensorModel model;
-  std::string gain_setting;  // as the source calls it; may be empty
+  std::string gain_setting;  // as the source names it; may be empty
   std::string source;        // of the figures
-  std::string camera;        // whose spectral sensitivities stand in, see camera_sensitivity()
+  std::string camera;        // camera whose spectral sensitivities are used, see camera_sensitivity()
   std::optional<double> pixel_pitch_um;
   std::optional<double> peak_quantum_efficiency;
   std::optional<double> iso;             // of the gain setting
-  bool iso_given = false;                // by the user: it comes before pitch and efficiency
-  std::vector<std::string> assumptions;  // one line each: a figure no source gives, and what was taken instead
+  bool iso_given = false;                // by the user: it takes precedence over pitch and efficiency
+  std::vector<std::string> assumptions;  // one line each: a figure no source gives, and the value used instead
   bool black_level_is_sourced = false;   // by the table or the user
 };
 
-/// The thesis' camera of Table 4-1: in the table as three rows, one for each channel.
+/// Names the thesis' camera of Table 4-1: in the table as three rows, one for each channel.
 inline constexpr std::string_view thesis_sensor = "thesis";
 
-/// Each name once, "thesis" first.
+/// Returns each name once, "thesis" first.
 std::vector<std::string_view> sensor_names();
 
-/// The gain settings of a sensor, as its source calls them.
+/// Returns the gain settings of a sensor, as its source names them.
 std::vector<std::string_view> gain_settings(std::string_view name);
 
-/// The options without which a sensor at a gain setting cannot be simulated, none if its sources suffice: what
-/// sensor_named() and spectral_response() would ask for. Of an unknown sensor or setting there are none.
+/// Returns the options without which a sensor at a gain setting cannot be simulated, none if its sources suffice: those
+/// that sensor_named() and spectral_response() would require. Empty for an unknown sensor or setting.
 std::vector<std::string_view> options_needed(std::string_view name, std::string_view gain);
 
-/// A sensor of data/sensors.csv at a gain setting.
+/// Returns a sensor of data/sensors.csv at a gain setting.
 /// @param gain     a gain setting or its number ("ISO 1600", "1600"); empty: the first of the table
-/// @param figures  take the place of the table's
-/// Errors: an unknown name or setting (near matches or the list are offered); a figure without which no frame can be
-/// simulated (gain, read noise, bits) that neither table nor `figures` give, named; a sensor that cannot be.
-/// A full well that is not sourced is the charge at the white level; a pedestal that is not sourced is a
-/// sixteenth of the range; an effect without figures is one the sensor has not: each of these is an assumption.
+/// @param figures  replace those of the table
+/// Errors: an unknown name or setting (near matches or the list are offered); a figure required for simulation (gain,
+/// read noise, bits) that neither table nor `figures` give, named; an impossible sensor. A full well that is not
+/// sourced is the charge at the white level; a pedestal that is not sourced is a sixteenth of the range; an effect
+/// without figures is treated as absent: each of these is an assumption.
 Result<NamedSensor> sensor_named(std::string_view name, std::string_view gain, const SensorFigures& figures);
 
 }  // namespace lowlux::isp

@@ -8,7 +8,7 @@
 namespace lowlux::isp {
 namespace {
 
-/// Cuts the text up to the next `end` off its front.
+/// Removes the text up to the next `end` from the front and returns it.
 std::string_view take(std::string_view& text, char end) {
   const std::size_t length = std::min(text.find(end), text.size());
   const std::string_view front = text.substr(0, length);
@@ -19,7 +19,7 @@ std::string_view take(std::string_view& text, char end) {
 std::vector<std::string_view> split(std::string_view line, std::size_t expected) {
   std::vector<std::string_view> cells;
   while (!line.empty()) cells.push_back(take(line, ','));
-  cells.resize(std::max(cells.size(), expected));  // a blank last cell leaves nothing behind its comma
+  cells.resize(std::max(cells.size(), expected));  // no text follows the comma of a blank last cell
   return cells;
 }
 

@@ -6,16 +6,16 @@
 
 namespace lowlux::isp {
 
-/// A table of isp/model/data that holds text: '#' comments, one row of column names, rows of cells parted by commas.
-/// Views into its text, which must outlive it.
+/// Reads a table of isp/model/data that holds text: '#' comments, one row of column names, rows of cells separated by
+/// commas. The cells are views into the text, which must outlive the table.
 class TextTable {
  public:
   explicit TextTable(std::string_view csv);
 
   int rows() const { return static_cast<int>(cells_.size()); }
-  /// A cell; empty where the source is blank. The column must exist.
+  /// Returns a cell; empty where the source is blank. The column must exist.
   std::string_view text(int row, std::string_view column) const;
-  /// A cell as a number; nullopt where the source is blank.
+  /// Returns a cell as a number; nullopt where the source is blank.
   std::optional<double> number(int row, std::string_view column) const;
 
  private:

@@ -11,7 +11,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr int most_newton_steps = 60;
-constexpr double largest_gradient = 1e-10;  // of a fit that has settled, in units of the moments
+constexpr double largest_gradient = 1e-10;  // limit for a converged fit, in units of the moments
 constexpr double smallest_gamma = 1e-12;
 constexpr double smallest_step = 1e-9;
 
@@ -24,7 +24,7 @@ class Dual {
   Dual(const SpectralBasis<N>& basis, Vector eta, Matrix ridge)
       : basis_(basis), eta_(std::move(eta)), ridge_(std::move(ridge)), power_(basis.f.size()) {}
 
-  /// Moves to theta; all members below are those of the new place.
+  /// Moves to theta; all members below are those at the new position.
   void move(const Vector& theta) {
     double largest = -INFINITY;
     for (std::size_t k = 0; k < basis_.f.size(); ++k) {
@@ -45,7 +45,7 @@ class Dual {
     value = psi - theta.dot(eta_) + theta.dot(ridge_ * theta);
   }
 
-  /// False where anything is not a number.
+  /// Returns whether the fit has converged; false where any value is not a number.
   bool settled() const {
     return std::isfinite(value) && gradient.allFinite() &&
            gradient.template lpNorm<Eigen::Infinity>() <= largest_gradient;
@@ -95,7 +95,7 @@ std::optional<MaxEntropyFit<N>> fit_max_entropy(const SpectralBasis<N>& basis, c
     if (iteration == most_newton_steps || !std::isfinite(here.value)) return std::nullopt;
     const Vector direction = here.hessian().llt().solve(-here.gradient);
     const double slope = here.gradient.dot(direction);
-    const double rounding = 1e-14 * (1 + std::fabs(here.value));  // what the comparison cannot see
+    const double rounding = 1e-14 * (1 + std::fabs(here.value));  // below the resolution of the comparison
     double step = 1;
     for (next.move(theta + direction); step > smallest_step; next.move(theta + step * direction)) {
       if (next.value <= here.value + 1e-4 * step * slope + rounding) break;

@@ -8,19 +8,19 @@
 
 namespace lowlux::isp {
 
-/// N functions f at the nodes of a wavelength grid, with the weight of each node in integrals [nm].
+/// Holds N functions f at the nodes of a wavelength grid, with the weight of each node in integrals [nm].
 template <std::size_t N>
 struct SpectralBasis {
   std::vector<std::array<double, N>> f;
   std::vector<double> weight_nm;  // as many as f
 };
 
-/// The spectrum of largest entropy with given moments, p = exp(<f, theta> - psi), integral 1.
+/// Holds the spectrum of largest entropy with given moments, p = exp(<f, theta> - psi), integral 1.
 template <std::size_t N>
 struct MaxEntropyFit {
   std::array<double, N> theta{};
   double psi = 0;
-  std::array<double, N> moments{};  // integral of f p, what was reached
+  std::array<double, N> moments{};  // integral of f p that was reached
   double entropy = 0;               // -integral of p log p
   int iterations = 0;
 };

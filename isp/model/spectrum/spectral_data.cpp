@@ -30,7 +30,7 @@ CieTable table_of(SpectrumSet set) {
   return munsell_ten_chips_1nm_table();
 }
 
-/// The three, so that the largest value of all is 1.
+/// Scales the three spectra so that the largest value of all is 1.
 std::array<Spectrum, 3> peak_one(std::array<Spectrum, 3> rgb) {
   double peak = 0;
   for (const Spectrum& channel : rgb) peak = std::max(peak, std::ranges::max(channel.values()));

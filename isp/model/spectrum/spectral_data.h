@@ -10,7 +10,7 @@
 
 namespace lowlux::isp {
 
-/// Spectra that belong together; origin, licence and check values of each are in data/SOURCES.md.
+/// Lists sets of spectra; origin, licence and check values of each are in data/SOURCES.md.
 enum class SpectrumSet : std::uint8_t {
   cie_illuminants,   // relative power, 5 nm: "A", "D65", "FL2", "LED-B3"...
   street_lamps,      // relative power, 5 nm: "HPS_generic", "LPS"...
@@ -25,23 +25,23 @@ struct NamedSpectrum {
   Spectrum spectrum;
 };
 
-/// A set whole, in its order.
+/// Returns all spectra of a set, in its order.
 std::vector<NamedSpectrum> spectra_of(SpectrumSet set);
 
-/// One spectrum by its name; nullopt for a name the set has not.
+/// Returns one spectrum by its name; nullopt for a name that is not in the set.
 std::optional<Spectrum> spectrum_named(SpectrumSet set, std::string_view name);
 
-/// Response of a camera's R, G and B (lens included) per unit radiant power, largest of the three 1, 380 to 780 nm: 22
-/// still cameras at 5 nm, and "Sony_DXC-930", the thesis' video camera, at 4 nm. nullopt for another name.
+/// Returns the response of a camera's R, G and B (lens included) per unit radiant power, largest of the three 1, 380 to
+/// 780 nm: 22 still cameras at 5 nm, and "Sony_DXC-930", the thesis' video camera, at 4 nm. nullopt for another name.
 std::optional<std::array<Spectrum, 3>> camera_sensitivity(std::string_view camera);
 
-/// All names camera_sensitivity() knows.
+/// Returns all names that camera_sensitivity() accepts.
 std::vector<std::string_view> camera_names();
 
-/// Which measurement of the cones' sensitivities.
+/// Selects a measurement of the cones' sensitivities.
 enum class ConeSet : std::uint8_t { smith_pokorny_1975, stockman_sharpe_2000 };
 
-/// Sensitivity of the L, M and S cones of the 2-degree observer per unit radiant power, peak 1.
+/// Returns the sensitivity of the L, M and S cones of the 2-degree observer per unit radiant power, peak 1.
 std::array<Spectrum, 3> cone_fundamentals(ConeSet set);
 
 }  // namespace lowlux::isp

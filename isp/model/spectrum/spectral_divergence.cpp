@@ -10,11 +10,11 @@
 namespace lowlux::isp {
 namespace {
 
-/// With the floor, at an integral of 1; nullopt without light.
+/// Returns the spectrum with the floor applied, at an integral of 1; nullopt without light.
 std::optional<Spectrum> density_of(const Spectrum& measured) {
   const double peak = *std::ranges::max_element(measured.values());
   if (!(peak > 0)) return std::nullopt;
-  // Divided by the peak first, so that no sum overflows.
+  // The values are divided by the peak first, so that no sum overflows.
   const Spectrum held = measured.mapped([&](double, double v) { return std::max(v / peak, spectral_floor); });
   const double whole = integrate(held);
   return held.mapped([&](double, double v) { return v / whole; });

@@ -13,7 +13,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double gamma = 1e-6;
-constexpr double locus_margin = 0.98;  // of the way from white to the locus
+constexpr double locus_margin = 0.98;  // fraction of the way from white to the locus
 constexpr std::array<std::array<double, 2>, 2> unit{{{1, 0}, {0, 1}}};
 
 struct Nodes {
@@ -33,7 +33,7 @@ const Nodes& nodes() {
   return all;
 }
 
-/// The spectral locus at the nodes, closed by the line of purples.
+/// Returns the spectral locus at the nodes, closed by the line of purples.
 const std::array<Xy, lift_nodes>& locus() {
   static const std::array<Xy, lift_nodes> all = [] {
     std::array<Xy, lift_nodes> out;
@@ -43,7 +43,7 @@ const std::array<Xy, lift_nodes>& locus() {
   return all;
 }
 
-/// How far the ray from white through xy goes before it leaves the locus, in units of the distance to xy.
+/// Returns the distance at which the ray from white through xy leaves the locus, in units of the distance to xy.
 double reach(const Xy& xy) {
   const double dx = xy.x - white_e.x, dy = xy.y - white_e.y;
   double nearest = std::numeric_limits<double>::infinity();
@@ -73,7 +73,7 @@ std::optional<std::array<double, 2>> fit(const Xy& xy, const std::array<double, 
   return found->theta;
 }
 
-/// Power at the nodes for X + Y + Z = 1 cd/m2 [W m-2 sr-1 nm-1].
+/// Returns the power at the nodes for X + Y + Z = 1 cd/m2 [W m-2 sr-1 nm-1].
 std::array<double, lift_nodes> power(const Xy& xy, const std::array<double, 2>& theta) {
   std::array<double, lift_nodes> p{};
   double sum = 0;
@@ -137,7 +137,7 @@ LiftTable::LiftTable(const SpectralResponse& response) : nodes_(static_cast<std:
 
 namespace {
 
-/// Place of a chromaticity in the table: the cell and how far in it.
+/// Holds the position of a chromaticity in the table: the cell and the offset in it.
 struct Cell {
   std::size_t corner;
   float tx, ty;

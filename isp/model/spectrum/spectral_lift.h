@@ -12,33 +12,34 @@
 
 namespace lowlux::isp {
 
-// A colour says little about the spectrum it came from. The lift takes the spectrum of largest entropy among all with
-// the colour's chromaticity: the smoothest guess, positive everywhere. With S = xbar + ybar + zbar it is
+// A colour contains little information about its spectrum. The lift returns the spectrum of largest entropy among all
+// with the colour's chromaticity: the smoothest estimate, positive everywhere. With S = xbar + ybar + zbar it is
 //     p(nm) = exp(a (xbar - x S) + b (ybar - y S)) / normalisation,
 // which is the largest-entropy spectrum for f = (xbar, ybar, zbar) at the total power where entropy is largest: two
-// multipliers instead of three, and no guess of the power. Its smoothing weight gamma is 1e-6.
+// multipliers instead of three, and no estimate of the power. Its smoothing weight gamma is 1e-6.
 
-/// Where the lifted spectra have their nodes: 380, 385 ... 780 nm.
+/// Lifted spectra have these nodes: 380, 385 ... 780 nm.
 inline constexpr int lift_nodes = 81;
 constexpr double lift_wavelength_nm(int i) { return 380.0 + 5.0 * i; }
 
-/// The spectral radiance [W m-2 sr-1 nm-1] of a colour [cd/m2]; nullopt if it has no chromaticity or one that no
-/// light can have (outside of, or within 2 % of, the spectral locus: see liftable).
+/// Returns the spectral radiance [W m-2 sr-1 nm-1] of a colour [cd/m2]; nullopt if it has no chromaticity or one that
+/// no light can have (outside of, or within 2 % of, the spectral locus: see liftable).
 std::optional<Spectrum> lift(const Xyz& colour_cd_m2);
 
-/// The nearest chromaticity on the way to the equal-energy white that can be lifted; itself for those that can.
+/// Returns the nearest chromaticity on the way to the equal-energy white that can be lifted; the argument itself if it
+/// can.
 Xy liftable(const Xy& xy);
 
-/// What a sensor makes of lifted colours, by a bilinear table over xy with steps of 1/128: electrons per second in a
-/// pixel of R, G, B per cd/m2 of X + Y + Z. It is exactly linear in xy for a sensor whose sensitivities are sums of
-/// colour-matching functions, and nearly so for real ones.
+/// Tabulates a sensor's response to lifted colours, as a bilinear table over xy with steps of 1/128: electrons per
+/// second in a pixel of R, G, B per cd/m2 of X + Y + Z. It is exactly linear in xy for a sensor whose sensitivities are
+/// sums of colour-matching functions, and nearly so for real ones.
 class LiftTable {
  public:
   explicit LiftTable(const SpectralResponse& response);
 
-  /// Electrons per second of one channel for X + Y + Z = 1 at a liftable chromaticity.
+  /// Returns the electrons per second of one channel for X + Y + Z = 1 at a liftable chromaticity.
   float response(int channel, float x, float y) const;
-  /// The multipliers a, b of the spectrum at a liftable chromaticity.
+  /// Returns the multipliers a, b of the spectrum at a liftable chromaticity.
   std::array<float, 2> multipliers(float x, float y) const;
 
   static constexpr float steps_per_unit = 128;
@@ -53,7 +54,8 @@ class LiftTable {
   std::vector<Node> nodes_;  // rows x columns
 };
 
-/// The lifted radiance at its nodes [W m-2 sr-1 nm-1] of a colour [cd/m2], by the table's multipliers; 0 for black.
+/// Returns the lifted radiance at its nodes [W m-2 sr-1 nm-1] of a colour [cd/m2], by the table's multipliers; 0 for
+/// black.
 std::array<float, lift_nodes> lifted_power(const LiftTable& table, const Xyz& colour_cd_m2);
 
 }  // namespace lowlux::isp

@@ -16,7 +16,8 @@
 namespace lowlux::isp {
 namespace {
 
-/// Quantum efficiency of R, G, B up to a factor: response per joule divided by photons per joule, largest value 1.
+/// Returns the quantum efficiency of R, G, B up to a factor: response per joule divided by photons per joule, largest
+/// value 1.
 Result<std::array<Spectrum, 3>> relative_quantum_efficiency(const std::string& camera) {
   auto sensitivity = camera_sensitivity(camera);
   if (!sensitivity) {
@@ -38,7 +39,8 @@ Result<std::array<Spectrum, 3>> relative_quantum_efficiency(const std::string& c
   return *std::move(sensitivity);
 }
 
-/// The etendue at which a white of this luminance under D65 gives `charge_e` to the most sensitive channel in 1 s.
+/// Returns the etendue at which a white of this luminance under D65 gives `charge_e` to the most sensitive channel in 1
+/// s.
 double etendue_for(const SpectralResponse& response, double luminance_cd_m2, double charge_e) {
   SpectralResponse unit = response;
   unit.etendue_m2_sr = 1;
@@ -46,7 +48,7 @@ double etendue_for(const SpectralResponse& response, double luminance_cd_m2, dou
   return charge_e / *std::max_element(rate.begin(), rate.end());
 }
 
-/// Checked whether used or not: nobody gives a pitch below 0 to be ignored.
+/// Checks the figures whether used or not: an invalid value is an error even where it has no effect.
 Result<void> check_figures(const NamedSensor& sensor, const Optics& optics) {
   const auto wrong = [](const char* what) { return fail(ErrorCode::invalid_argument, what); };
   if (!(optics.f_number >= 0.5) || !(optics.f_number <= 1000)) {
@@ -71,7 +73,7 @@ tl::unexpected<Error> no_scale(const NamedSensor& sensor) {
   std::string missing = sensor.pixel_pitch_um ? "" : "--pixel-pitch";
   if (!sensor.peak_quantum_efficiency) missing += missing.empty() ? "--peak-qe" : " and --peak-qe";
   return fail(ErrorCode::insufficient,
-              "no source tells how much light the sensor " + sensor.model.name + " needs; give " + missing +
+              "no source states how much light the sensor " + sensor.model.name + " needs; give " + missing +
                   ", or --iso, or --white-luminance (the luminance that fills a pixel in 1 s)");
 }
 
@@ -115,7 +117,7 @@ Vector3 electron_rate(const SpectralResponse& response, const Spectrum& radiance
 std::optional<Spectrum> radiance_of(const Spectrum& light, double luminance_cd_m2) {
   const double y = luminous_efficacy_lm_w * xyz_of(light).y;
   if (!(y > 0) || !std::isfinite(y)) return std::nullopt;
-  // Divided first: the scale of a light is anything.
+  // The value is divided first: the scale of a light is arbitrary.
   const auto scaled = [&](double value) { return value / y * luminance_cd_m2; };
   if (!std::ranges::all_of(light.values(), [&](double value) { return std::isfinite(scaled(value)); })) {
     return std::nullopt;

@@ -28,7 +28,7 @@ Step step_at(double m, const LuminancePair& field) {
   return {h, b / std::numbers::ln10 * v0 * (field.photopic - field.scotopic) / (numerator * denominator) - 1};
 }
 
-// h(0) > 0 > h(1), or infinitely far below where a luminance is 0.
+// Returns the root of h: h(0) > 0 > h(1), or infinitely far below where a luminance is 0.
 double root(const LuminancePair& field) {
   double low = 0, high = 1;
   const double middle = std::sqrt(field.photopic) * std::sqrt(field.scotopic);

@@ -13,16 +13,16 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::size_t fewest = 4;
-constexpr double least_determinant = 1e-9;  // of normal equations, relative to their diagonal
+constexpr double least_determinant = 1e-9;  // lower limit for normal equations, relative to their diagonal
 
-/// One reflectance as camera and eye see it, the perfect diffuser having RGB 1, 1, 1 and Y = 1.
+/// Holds one reflectance in camera RGB, XYZ and scotopic luminance, the perfect diffuser having RGB 1, 1, 1 and Y = 1.
 struct Seen {
   Vector3 rgb;
   Vector3 xyz;
   double scotopic;
 };
 
-/// Weights that sum to s: with w_2 = s - w_0 - w_1 two are free,
+/// Returns the weights that sum to s: with w_2 = s - w_0 - w_1 two are free,
 ///     minimise sum (w_0 (r - b) + w_1 (g - b) + s b - y)^2 / y^2
 std::optional<Vector3> weights_of_sum(const std::vector<Seen>& all, double s) {
   double rr = 0, rg = 0, gg = 0, ry = 0, gy = 0;
@@ -41,7 +41,7 @@ std::optional<Vector3> weights_of_sum(const std::vector<Seen>& all, double s) {
   return Vector3{w0, w1, s - w0 - w1};
 }
 
-/// M that minimises the sum of |xyz - M rgb|^2 / Y^2.
+/// Returns the M that minimises the sum of |xyz - M rgb|^2 / Y^2.
 std::optional<Matrix3> best_matrix(const std::vector<Seen>& all) {
   Matrix3 cross{}, gram{};
   for (const Seen& one : all) {

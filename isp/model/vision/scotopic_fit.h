@@ -9,23 +9,23 @@
 
 namespace lowlux::isp {
 
-/// How scotopic luminance follows from a camera's channels under one light.
+/// Describes how scotopic luminance follows from a camera's channels under one light.
 struct ScotopicFit {
-  Vector3 weights{};          // of white-balanced R, G, B, a perfect diffuser being (1, 1, 1); they sum to the ratio
-  double scotopic_ratio = 0;  // S/P of the light, exactly
-  double relative_error = 0;  // rms over the reflectances, of scotopic luminance
-  double through_xyz = 0;     // the same of scotopic_weights behind the best matrix of the camera to XYZ
+  Vector3 weights{};          // for white-balanced R, G, B, a perfect diffuser being (1, 1, 1); they sum to the ratio
+  double scotopic_ratio = 0;  // exact S/P of the light
+  double relative_error = 0;  // rms error of scotopic luminance over the reflectances
+  double through_xyz = 0;     // relative error of scotopic_weights after the best matrix of the camera to XYZ
 };
 
-/// Weights of V' in a camera's channels by least squares of the relative error, with the light's own S/P for white: a
-/// camera that sees more green-blue than the colour-matching functions do knows more of the rods. Luminances are
-/// relative to the photopic one of a perfect diffuser. The matrix to compare with is fitted on the same reflectances,
-/// relative to luminance.
+/// Fits weights of V' in a camera's channels by least squares of the relative error, with the light's own S/P for
+/// white: a camera that sees more green-blue than the colour-matching functions do holds more information about the
+/// rods. Luminances are relative to the photopic one of a perfect diffuser. The matrix to compare with is fitted on the
+/// same reflectances, relative to luminance.
 /// @param sensitivity   response per unit radiant power
 /// @param light         its nodes are those of all integrals
 /// @param reflectances  four at least, none black to rods
 /// @return nullopt with fewer or black reflectances, a light that a channel, cones or rods do not see, or channels that
-///     depend on one another over the reflectances
+/// depend on one another over the reflectances
 std::optional<ScotopicFit> fit_scotopic(const std::array<Spectrum, 3>& sensitivity, const Spectrum& light,
                                         std::span<const Spectrum> reflectances);
 

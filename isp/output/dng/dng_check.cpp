@@ -12,8 +12,9 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double max_level_dn = 65535;
-constexpr std::size_t max_values = 65535;     // libtiff counts the values of these tags in 16 bits
-constexpr double largest_coefficient = 1000;  // of a matrix or gain: beyond it no camera is, and rationals get coarse
+constexpr std::size_t max_values = 65535;  // libtiff counts the values of these tags in 16 bits
+constexpr double largest_coefficient =
+    1000;  // of a matrix or gain: above it no camera is plausible, and rationals are too coarse
 constexpr double smallest_gain = 1e-4;
 
 tl::unexpected<Error> cannot(const char* tag, const std::string& why) {

@@ -5,10 +5,10 @@
 
 namespace lowlux::isp {
 
-/// Samples per pixel of a layout.
+/// Returns the samples per pixel of a layout.
 constexpr int samples_of(SensorLayout layout) { return layout == SensorLayout::linear_rgb ? 3 : 1; }
 
-/// An error of code invalid_argument, naming the tag, unless the frame agrees with itself and DNG tags can hold its
+/// Returns an error of code invalid_argument, naming the tag, unless the frame is consistent and DNG tags can hold its
 /// figures: rectangles inside one another, as many figures as there are sites, columns and rows, levels of 0 to 65535
 /// DN with white above black, regular matrices, positive gains.
 Result<void> check_dng_frame(const RawFrame& frame);

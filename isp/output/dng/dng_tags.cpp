@@ -20,7 +20,7 @@ constexpr std::array<std::uint32_t, 2> illuminant{TIFFTAG_CALIBRATIONILLUMINANT1
 constexpr std::array<std::uint32_t, 2> forward_matrix{50964, 50965};
 constexpr std::uint32_t opcode_list1 = 51008, opcode_list2 = 51009, noise_profile = 51041;
 
-/// libtiff takes the values of rationals as floats.
+/// Converts the values of rationals to float, as libtiff requires.
 template <class Numbers>
 std::vector<float> floats_of(const Numbers& numbers) {
   std::vector<float> out;
@@ -128,7 +128,7 @@ void set_dng_noise_and_opcodes(TIFF* file, const RawFrame& frame) {
 }
 
 std::uint16_t light_source_of(double cct_k) {
-  // Temperatures as in CIE 15; fluorescent lamps other than F2: the middle of the range EXIF 2.32 gives.
+  // Temperatures are those of CIE 15; fluorescent lamps other than F2: the centre of the range EXIF 2.32 gives.
   struct LightSource {
     std::uint16_t code;
     double cct_k;
@@ -153,7 +153,7 @@ namespace {
 constexpr std::uint32_t fix_vignette_radial = 3, fix_bad_pixels_list = 5, gain_map = 9;
 constexpr std::uint32_t since_version = 0x01030000;  // DNG 1.3 introduced them all
 
-/// Big-endian, whatever the byte order of the file.
+/// Writes numbers big-endian, whatever the byte order of the file.
 class Numbers {
  public:
   void whole(int number) { put(static_cast<std::uint32_t>(number), 4); }
@@ -173,7 +173,7 @@ class Numbers {
 class List {
  public:
   void add(std::uint32_t id, const Numbers& parameters) {
-    for (const std::uint32_t word : {id, since_version, 0U}) opcodes_.word(word);  // flags 0: not to be skipped
+    for (const std::uint32_t word : {id, since_version, 0U}) opcodes_.word(word);  // flags 0: must not be skipped
     opcodes_.word(static_cast<std::uint32_t>(parameters.bytes().size()));
     opcodes_.append(parameters);
     ++count_;
@@ -211,7 +211,8 @@ Numbers parameters_of(const RadialGain& radial) {
   return out;
 }
 
-/// Positions count from the corner of the readout; so does the phase (DNG 1.4, FixBadPixelsList).
+/// Returns the parameters of FixBadPixelsList. Positions count from the corner of the readout; so does the phase (DNG
+/// 1.4, FixBadPixelsList).
 Numbers parameters_of(const std::vector<DefectRect>& defects, const RawDn& raw) {
   Numbers out;
   out.whole(static_cast<int>(phase_of_crop(raw.phase, raw.active.x, raw.active.y)));

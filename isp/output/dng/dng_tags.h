@@ -10,8 +10,8 @@ struct tiff;  // libtiff's open file
 
 namespace lowlux::isp {
 
-/// Teaches libtiff the tags of DNG 1.2 to 1.4 it does not know. To be called for the directory they are set in: libtiff
-/// forgets them when it begins another.
+/// Declares the tags of DNG 1.2 to 1.4 that libtiff does not know. Call it for the directory they are set in: libtiff
+/// drops them when it begins another.
 void declare_dng_tags(tiff* file);
 
 /// Sets ActiveArea, MaskedAreas, DefaultCrop and the black and white levels. Precondition: check_dng_frame.
@@ -23,7 +23,8 @@ void set_dng_colour(tiff* file, const CameraColour& colour);
 /// Sets NoiseProfile and the opcode lists. Precondition: check_dng_frame.
 void set_dng_noise_and_opcodes(tiff* file, const RawFrame& frame);
 
-/// The corrections of a frame as the opcode lists of DNG 1.4 (chapter 7); empty where there is nothing to correct.
+/// Holds the corrections of a frame as the opcode lists of DNG 1.4 (chapter 7); empty where there is nothing to
+/// correct.
 struct OpcodeLists {
   std::vector<std::byte> first;   // OpcodeList1, on the readout: FixBadPixelsList
   std::vector<std::byte> second;  // OpcodeList2, on values without black: GainMap, FixVignetteRadial
@@ -31,9 +32,10 @@ struct OpcodeLists {
 
 OpcodeLists opcode_lists(const RawFrame& frame);
 
-/// LightSource of EXIF 2.32 whose colour temperature is nearest in 1/T, as camera matrices are interpolated; the CIE
-/// illuminants A, B, C, D50, D55, D65, D75 and F2, the ISO studio tungsten lamp, and the middles of EXIF's ranges for
-/// fluorescent lamps. 0 (unknown) unless the temperature is positive and finite.
+/// Returns the LightSource of EXIF 2.32 whose colour temperature is nearest in 1/T, as camera matrices are
+/// interpolated; the candidates are the CIE illuminants A, B, C, D50, D55, D65, D75 and F2, the ISO studio tungsten
+/// lamp, and the centres of EXIF's ranges for fluorescent lamps. 0 (unknown) unless the temperature is positive and
+/// finite.
 std::uint16_t light_source_of(double cct_k);
 
 }  // namespace lowlux::isp

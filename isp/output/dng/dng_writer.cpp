@@ -51,7 +51,7 @@ void set_image(TIFF* tiff, const RawDn& raw, int rows_per_strip) {
 
 void set_identity(TIFF* tiff, const RawFrame& frame, const FrameInfo& info, const DngWriteOptions& options) {
   constexpr std::array<std::uint8_t, 4> version{1, 4, 0, 0};
-  // MaskedAreas came with 1.1; opcodes came with 1.3 and are not to be skipped.
+  // MaskedAreas came with 1.1; opcodes came with 1.3 and must not be skipped.
   const RawCorrections& c = frame.corrections;
   const bool opcodes = !c.gain_maps.empty() || !c.radial_gains.empty() || !c.defects.empty();
   const std::array<std::uint8_t, 4> backward{1, static_cast<std::uint8_t>(opcodes ? 3 : 1), 0, 0};
@@ -59,8 +59,7 @@ void set_identity(TIFF* tiff, const RawFrame& frame, const FrameInfo& info, cons
   TIFFSetField(tiff, TIFFTAG_DNGBACKWARDVERSION, backward.data());
   TIFFSetField(tiff, TIFFTAG_UNIQUECAMERAMODEL, unique_camera_model(info).c_str());
   set_tiff_info(tiff, info);
-  // Left blank, they are unknown (EXIF 2.32, 4.6.5.4); RawSpeed, and with it darktable, misses them if they are not
-  // there.
+  // Blank tags mean unknown (EXIF 2.32, 4.6.5.4); RawSpeed, and with it darktable, requires them to be present.
   if (info.make.empty()) TIFFSetField(tiff, TIFFTAG_MAKE, "");
   if (info.model.empty()) TIFFSetField(tiff, TIFFTAG_MODEL, "");
   const std::string description = printable_ascii(options.description, longest_description);
@@ -72,14 +71,15 @@ bool write_strips(TIFF* tiff, const Plane<std::uint16_t>& dn, int rows_per_strip
   for (int y = 0; y < dn.height(); y += rows_per_strip, ++index) {
     const int rows = std::min(rows_per_strip, dn.height() - y);
     const auto size = static_cast<tmsize_t>(sizeof(std::uint16_t) * dn.width() * rows);
-    // libtiff's interface lacks const; it only reads what needs no change of byte order.
+    // libtiff's interface is not const-correct; it only reads data that needs no change of byte order.
     auto* samples = const_cast<std::uint16_t*>(dn.row(y));
     if (TIFFWriteEncodedStrip(tiff, index, samples, size) != size) return false;
   }
   return true;
 }
 
-/// dcraw and its descendants read 512 bytes where a description begins, and call the end of the file an error.
+/// Pads the file: dcraw and its descendants read 512 bytes where a description begins, and treat the end of the file as
+/// an error.
 Result<void> pad(std::FILE* file) {
   constexpr std::array<char, 512> zeros{};
   const bool padded = std::fseek(file, 0, SEEK_END) == 0 && std::fwrite(zeros.data(), zeros.size(), 1, file) == 1;

@@ -11,25 +11,26 @@ namespace lowlux::isp {
 
 struct DngWriteOptions {
   Overwrite overwrite = Overwrite::no;
-  std::string software = "lowlux";  // with its version; replaces what the frame names
-  std::string description;          // ImageDescription: how the frame was made; printable ASCII is kept
+  std::string software = "lowlux";  // with its version; replaces the name in the frame
+  std::string description;          // ImageDescription, the processing of the frame; printable ASCII is kept
   Sync sync = Sync::no;
 };
 
-/// Writes a raw frame as DNG 1.4, whole or not at all: 16 bits, uncompressed, in adjacent strips of about 1 MB. Mosaics
-/// and monochrome have one sample per pixel, SensorLayout::linear_rgb three. Every figure of the frame that DNG has a
-/// tag for is written; what is absent stays absent. Rationals are within 1e-7 of the figure, relative.
+/// Writes a raw frame as DNG 1.4, completely or not at all: 16 bits, uncompressed, in adjacent strips of about 1 MB.
+/// Mosaics and monochrome have one sample per pixel, SensorLayout::linear_rgb three. Every figure of the frame that has
+/// a DNG tag is written; what is absent stays absent. Rationals are within 1e-7 of the figure, relative.
 ///
-/// Rounded to what DNG holds: white levels to whole DN; the temperature of a calibration to the nearest light source of
-/// EXIF (light_source_of). UniqueCameraModel, which DNG demands, is make and model, or "Unknown".
+/// Figures rounded to what DNG can hold: white levels to integer DN; the temperature of a calibration to the nearest
+/// light source of EXIF (light_source_of). UniqueCameraModel, which DNG requires, is make and model, or "Unknown".
 ///
 /// Errors
-///     invalid_argument  a figure DNG cannot hold or that contradicts another (the message names it)
-///     too_large         check_dng_size
-///     exists, unwritable  as AtomicFile says
+///     invalid_argument  a figure that DNG cannot hold or that contradicts another (the message names it)
+///     too_large         as check_dng_size
+///     exists, unwritable  as AtomicFile
 Result<void> write_dng(const RawFrame& frame, const std::string& path, const DngWriteOptions& options = {});
 
-/// An error if so many 16-bit samples would need offsets of 64 bits (BigTIFF), which raw developers do not read.
+/// Returns an error if this number of 16-bit samples would need offsets of 64 bits (BigTIFF), which raw developers do
+/// not read.
 Result<void> check_dng_size(std::int64_t samples);
 
 }  // namespace lowlux::isp

@@ -57,7 +57,7 @@ const char* profile_name(OutputSpace space) {
   return "";
 }
 
-/// Code to light, as ICC parametric curve type 3: (a X + b)^g from d on, c X below.
+/// Returns the curve from code to light, as ICC parametric curve type 3: (a X + b)^g from d on, c X below.
 Curve curve_of(cmsContext context, OutputSpace space) {
   if (is_linear(space)) return Curve(cmsBuildGamma(context, 1.0));
   if (space == OutputSpace::rec2020) {  // inverse of BT.2020-2 table 4, its constants for 12 bits
@@ -82,7 +82,7 @@ std::vector<std::byte> bytes_of(cmsHPROFILE profile) {
   return bytes;
 }
 
-/// Takes the date out and puts the MD5 of what is left into the profile ID (ICC.1:2022 7.2.18).
+/// Removes the date and sets the profile ID to the MD5 of the remaining bytes (ICC.1:2022 7.2.18).
 void make_deterministic(cmsContext context, std::vector<std::byte>& bytes) {
   if (bytes.size() < 128) return;
   std::fill_n(bytes.begin() + date_offset, 12, std::byte{0});

@@ -124,7 +124,7 @@ Result<FileFormat> format_of(const std::string& path) {
     if (ending == known.text) return known.format;
   }
   return fail(ErrorCode::invalid_argument,
-              "cannot tell the format of " + path + ": name it .png, .jpg, .jpeg, .tif, .tiff, .exr or .pfm", path);
+              "cannot find the format of " + path + ": name it .png, .jpg, .jpeg, .tif, .tiff, .exr or .pfm", path);
 }
 
 bool supported(FileFormat format, SampleType type) {
@@ -179,7 +179,7 @@ Result<std::vector<std::byte>> png_bytes(const Encoded8& picture, OutputSpace sp
   FileMetadata metadata;
   metadata.icc = icc_profile(space);
   const Result<void> written = encode_png(picture, metadata, executor, file);
-  const bool whole = std::fclose(file) == 0;  // only now `bytes` is what was written
+  const bool whole = std::fclose(file) == 0;  // `bytes` is complete only after fclose
   const std::unique_ptr<char, decltype(&std::free)> owned(bytes, std::free);
   if (!written) return tl::make_unexpected(written.error());
   if (!whole) return fail(ErrorCode::too_large, "no memory for the picture's file");

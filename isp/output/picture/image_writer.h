@@ -21,32 +21,34 @@ enum class FileFormat : std::uint8_t { png, jpeg, tiff, exr, pfm };
 
 SampleType sample_type(const Picture& picture);
 
-/// By the end of the name, in any case: .png .jpg .jpeg .tif .tiff .exr .pfm; others are an error that lists these.
+/// Returns the format by the file extension, in any case: .png .jpg .jpeg .tif .tiff .exr .pfm; others are an error
+/// that lists these.
 Result<FileFormat> format_of(const std::string& path);
 
-/// PNG: u8, u16. JPEG: u8. TIFF: all. OpenEXR, PFM: f32.
+/// Returns whether a format holds a sample type. PNG: u8, u16. JPEG: u8. TIFF: all. OpenEXR, PFM: f32.
 bool supported(FileFormat format, SampleType type);
 
-/// What can be known before the work: the format holds the samples, and floats are scene-linear.
+/// Checks in advance that the format holds the samples, and that floats are scene-linear.
 Result<void> check_writable(FileFormat format, SampleType type, OutputSpace space);
 
 struct WriteOptions {
   Overwrite overwrite = Overwrite::no;
   Sync sync = Sync::no;
   std::string software = "lowlux";              // with its version, for the metadata
-  std::optional<double> white_luminance_cd_m2;  // of (1, 1, 1); OpenEXR keeps it
+  std::optional<double> white_luminance_cd_m2;  // luminance of (1, 1, 1); OpenEXR keeps it
   JpegOptions jpeg;
   TiffOptions tiff;
   ExrOptions exr;
 };
 
-/// Writes the picture whole or not at all, with the ICC profile or chromaticities of `space` and what `info` tells of
-/// the exposure; PFM has a place for neither. Pixels are written as they lie: turn them first (orient.h); the file says
+/// Writes the image completely or not at all, with the ICC profile or chromaticities of `space` and the exposure data
+/// of `info`; PFM can hold neither. Pixels are written as stored: rotate them first (orient.h); the file states
 /// orientation 1. The executor's threads compress PNG.
 Result<void> write_picture(const Picture& picture, OutputSpace space, const FrameInfo& info, const std::string& path,
                            const WriteOptions& options, Executor& executor);
 
-/// A PNG file in memory, with the ICC profile of `space`. Error: there is not enough memory; the size cannot be.
+/// Returns a PNG file in memory, with the ICC profile of `space`. Error: there is not enough memory; the size is
+/// impossible.
 Result<std::vector<std::byte>> png_bytes(const Encoded8& picture, OutputSpace space, Executor& executor);
 
 }  // namespace lowlux::isp

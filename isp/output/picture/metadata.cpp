@@ -22,7 +22,7 @@ struct Unref {
   void operator()(ExifMem* memory) const { exif_mem_unref(memory); }
 };
 
-/// Nearest fraction with 32-bit terms to 1e-9 of itself, by continued fraction: 1/30 s comes out as 1/30.
+/// Returns the nearest fraction with 32-bit terms to 1e-9 of the number, by continued fraction: 1/30 s gives 1/30.
 std::optional<ExifRational> rational(double number) {
   if (!(number > 1e-9) || !(number < 4e9)) return std::nullopt;
   double p0 = 0, q0 = 1, p1 = 1, q1 = 0;
@@ -97,7 +97,7 @@ class Block {
   std::unique_ptr<ExifData, Unref> data_;
 };
 
-/// "YYYY:MM:DD hh:mm:ss"
+/// Returns whether a text has the form "YYYY:MM:DD hh:mm:ss".
 bool is_time(const std::string& text) {
   constexpr std::string_view shape = "dddd:dd:dd dd:dd:dd";
   if (text.size() != shape.size()) return false;
@@ -108,7 +108,8 @@ bool is_time(const std::string& text) {
   return true;
 }
 
-/// PhotographicSensitivity holds 16 bits; above them EXIF 2.32 (4.6.6.7) asks for 65535 and the figure elsewhere.
+/// Adds PhotographicSensitivity, which holds 16 bits; for larger figures EXIF 2.32 (4.6.6.7) requires 65535 and the
+/// figure in another tag.
 void add_sensitivity(Block& block, const std::optional<double>& iso) {
   if (!iso || !(*iso >= 1 && *iso < 4e9)) return;
   const auto exact = static_cast<ExifLong>(std::lround(*iso));

@@ -7,11 +7,11 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int block = 64;  // of pixels on a side: a block's source and destination stay in cache together
+constexpr int block = 64;  // pixels on a side: a block's source and destination stay in cache together
 
 bool is_transposed(Orientation orientation) { return orientation >= Orientation::transpose; }
 
-bool is_mirrored_x(Orientation o) {  // in the source
+bool is_mirrored_x(Orientation o) {  // refers to the source
   return o == Orientation::mirror_horizontal || o == Orientation::rotate_180 || o == Orientation::transverse ||
          o == Orientation::rotate_270;
 }
@@ -21,7 +21,8 @@ bool is_mirrored_y(Orientation o) {
          o == Orientation::transverse;
 }
 
-/// Where each pixel comes from: going one pixel right in the result goes `x_step` samples further in the source.
+/// Describes the source position of each pixel: one pixel to the right in the result is `x_step` samples further in the
+/// source.
 template <class T>
 struct Walk {
   const T* origin = nullptr;
@@ -37,14 +38,14 @@ Walk<T> walk_over(const Plane<T>& in, Orientation orientation) {
   return is_transposed(orientation) ? Walk<T>{origin, down, right} : Walk<T>{origin, right, down};
 }
 
-/// Turns pixels of `Samples` interleaved samples, block by block.
+/// Rotates or mirrors pixels of `Samples` interleaved samples, block by block.
 template <int Samples, class T>
 Plane<T> turned(const Plane<T>& in, Orientation orientation, Executor& executor) {
   const bool transposed = is_transposed(orientation);
   const int in_width = in.width() / Samples;
   const int width = transposed ? in.height() : in_width, height = transposed ? in_width : in.height();
   const Walk<T> walk = walk_over<Samples>(in, orientation);
-  const int block_width = transposed ? block : width;  // rows that stay rows need no blocks
+  const int block_width = transposed ? block : width;  // without transposition rows need no blocks
   Plane<T> out(Samples * width, height);
   const auto turn_block = [&](int x0, int y0, int y1) {
     const int x1 = std::min(x0 + block_width, width);

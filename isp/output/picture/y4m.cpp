@@ -21,7 +21,7 @@ namespace {
 using std::chrono::steady_clock;
 
 constexpr int wait_ms = 100;
-constexpr std::chrono::seconds patience{1};  // with a reader that takes nothing, once the film is to end
+constexpr std::chrono::seconds patience{1};  // wait for a reader that reads nothing, after `stop` is set
 
 struct Fraction {
   long long numerator;
@@ -30,7 +30,7 @@ struct Fraction {
 
 Fraction fraction_of(double rate_hz) {
   if (rate_hz == std::round(rate_hz)) return {std::llround(rate_hz), 1};
-  // Drivers give 29.97 for 30000 / 1001.
+  // Drivers report 29.97 for 30000 / 1001.
   const double television = std::round(rate_hz * 1.001) * 1000 / 1001;
   if (std::fabs(television - rate_hz) < 0.005 && television > 0) return {std::llround(television * 1001), 1001};
   const long long thousandths = std::max(1LL, std::llround(rate_hz * 1000));
@@ -38,7 +38,8 @@ Fraction fraction_of(double rate_hz) {
   return {thousandths / common, 1000 / common};
 }
 
-/// A pipe that is said to be ready has room for PIPE_BUF bytes (POSIX, write()); a file never holds its writer up.
+/// Returns the bytes to write at once: a pipe reported as ready has space for PIPE_BUF bytes (POSIX, write()); a
+/// regular file never blocks its writer.
 std::size_t piece_of(int file) {
   struct stat found {};
   return fstat(file, &found) == 0 && S_ISREG(found.st_mode) ? std::size_t{1} << 30 : PIPE_BUF;
@@ -98,7 +99,7 @@ Result<Y4mWriter::Written> Y4mWriter::write_all(const std::atomic<bool>& stop) {
     }
     if (errno == EPIPE) return Written::reader_left;
     if (errno == EINTR || errno == EAGAIN) continue;
-    return fail(ErrorCode::unwritable, "the film cannot be written: " + std::generic_category().message(errno));
+    return fail(ErrorCode::unwritable, "the video cannot be written: " + std::generic_category().message(errno));
   }
   return Written::whole;
 }

@@ -63,7 +63,7 @@ using Json = nlohmann::json;
 constexpr std::size_t least_sections_with_contents = 3;
 constexpr std::size_t short_cell = 20, long_cell = 40;  // characters
 
-// Whatever a text might become, the browser fetches nothing for it.
+// The policy keeps the browser from fetching anything, whatever the text of the page.
 constexpr std::string_view head = R"html(<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -113,7 +113,7 @@ bool is_number(std::string_view cell) {
   return error == std::errc() && end == cell.data() + cell.size();
 }
 
-/// How a column is set: figures to the right, names unbroken, sentences wide enough to be read.
+/// Returns the style of a column: figures right-aligned, names unbroken, sentences wide enough to be read.
 std::string_view class_of_column(const Table& table, std::size_t column) {
   bool any = false, numbers = true;
   std::size_t longest = 0;
@@ -131,7 +131,7 @@ std::string_view class_of_column(const Table& table, std::size_t column) {
 
 std::string html_of(const Table& table, std::string_view title) {
   if (table.columns.empty()) return {};
-  std::vector<std::string> opening;  // of each column's cells, without the tag's name
+  std::vector<std::string> opening;  // opening of each column's cells, without the tag's name
   opening.reserve(table.columns.size());
   std::string out = R"(<div class="scroll" role="region" tabindex="0" aria-label="Table: )" + escaped(title) +
                     "\">\n<table>\n<thead><tr>";
@@ -180,7 +180,7 @@ Json json_of(const Plot& plot) {
           {"series", series}};
 }
 
-// JSON that is safe inside a script element: no "</script>" or "<!--" can appear in it.
+// Returns JSON that is safe inside a script element: no "</script>" or "<!--" can appear in it.
 std::string script_text(const Json& json) {
   std::string out;
   for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {
@@ -193,7 +193,7 @@ std::string script_text(const Json& json) {
   return out;
 }
 
-/// RFC 4648, section 4.
+/// Returns the base64 encoding of RFC 4648, section 4.
 std::string base64(std::span<const std::byte> bytes) {
   constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string out;
@@ -229,7 +229,7 @@ std::string figure(const Plot& plot, std::size_t number) {
          escaped(plot.caption) + "</figcaption></figure>\n";
 }
 
-/// The page's plots are numbered in their order: `plots` takes them for the script.
+/// Returns the HTML of a section. The page's plots are numbered in order: they are appended to `plots` for the script.
 std::string html_of(const ReportSection& section, std::size_t number, Json& plots) {
   const std::string heading = section.is_part ? "h3" : "h2";
   std::string out = "<" + heading + R"( id="section)" + std::to_string(number) + "\">" + escaped(section.title) + "</" +

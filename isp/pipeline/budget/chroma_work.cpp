@@ -15,10 +15,10 @@ namespace {
 struct Tile {
   double charge_e = 0;  // sum over blocks
   int blocks = 0;
-  double share = 0;  // of the frame
+  double share = 0;  // fraction of the frame
 };
 
-/// One direction: the denoiser's tiles along cells; the last is the larger.
+/// Describes one direction: the denoiser's tiles along cells, of which the last is the larger.
 struct Axis {
   int cells;
   int tiles;
@@ -41,8 +41,8 @@ Axis axis_of(int pixels, int blocks) {
   return {cells, denoise::tiles_of(cells), blocks};
 }
 
-/// The denoiser's, from left to right, from above. A block counts where its middle lies; a tile that has no middle, as
-/// it is smaller than a block, goes by the one around it.
+/// Returns the denoiser's tiles, from left to right and from top to bottom. A block counts in the tile that holds its
+/// centre; a tile without any centre, because it is smaller than a block, takes the block around it.
 std::vector<Tile> tiles_of(const Axis& across, const Axis& down, const CameraRgb& mean,
                            const std::array<double, 3>& electrons_at_white) {
   const auto charge_e = [&](int x, int y) {

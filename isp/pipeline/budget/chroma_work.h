@@ -9,13 +9,14 @@
 
 namespace lowlux::isp {
 
-/// On which pyramid level the denoiser will start the chroma of a frame, as shares of it for levels 0, 1 and 2.
+/// States on which pyramid level the denoiser will start the chroma of a frame, as fractions of the frame for levels 0,
+/// 1 and 2.
 struct ChromaWork {
-  std::array<double, 3> start{1, 0, 0};  // in tiles that start there
-  std::array<double, 3> work{1, 0, 0};   // in tiles where chroma is worked on from there: around what starts finer, too
+  std::array<double, 3> start{1, 0, 0};  // in tiles that start on the level
+  std::array<double, 3> work{1, 0, 0};   // in tiles whose chroma is processed from it on, near finer starts too
 };
 
-/// As denoise/spatial/chroma_start.h decides it, from the means of a thumbnail's blocks. Precondition:
+/// Predicts what denoise/spatial/chroma_start.h decides, from the means of a thumbnail's blocks. Precondition:
 /// levels.electrons_at_white.
 /// @param noise  of the frame, its dark charge included
 ChromaWork chroma_work(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,

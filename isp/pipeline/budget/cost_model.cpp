@@ -62,8 +62,8 @@ double predicted_s(const CostModel& model, const CostSize& size, const std::vect
 
 namespace {
 
-/// The fixed piece of work of isp/bench/pace.h, 0.79 MP at the level standard, by the table below: 13 ms/MP. It was not
-/// recorded with the times.
+/// States the time of the fixed workload of isp/bench/pace.h, 0.79 MP at the level standard, by the table below: 13
+/// ms/MP. It was not recorded with the times.
 constexpr double pace_s = 0.0105;
 
 CostModel made() {

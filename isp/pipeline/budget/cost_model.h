@@ -8,21 +8,21 @@
 
 #include "isp/base/frame.h"
 
-/// How long developing takes on this machine.
+/// This header predicts how long developing takes on this machine.
 
 namespace lowlux::isp {
 
-/// Parts of the work that plans differ in.
+/// Lists the parts of the work in which plans differ.
 enum class CostPart : std::uint8_t {
-  planning,  // black point, thumbnail, white, exposure, effects, signal to noise ratio: what every plan begins with
-  samples,   // of the frame, looked into for hot pixels, row and column noise
-  defects,   // the search in the whole frame
-  lines,     // row and column noise looked for in the whole frame
-  offsets,   // what it takes more where it stands out
-  check,     // of the noise model, where noise is reduced
-  codes,     // rendering straight from codes
+  planning,  // black point, thumbnail, white, exposure, effects, signal-to-noise ratio: common to all plans
+  samples,   // samples of the frame, searched for hot pixels, row and column noise
+  defects,   // search for defects in the whole frame
+  lines,     // search for row and column noise in the whole frame
+  offsets,   // additional time of `lines` where line noise is significant
+  check,     // check of the noise model, where noise is reduced
+  codes,     // rendering directly from codes
   floats,    // rendering from electrons
-  draft_0,   // the same with noise reduced, chroma starting on level 0, 1 or 2
+  draft_0,   // rendering with noise reduction, chroma starting on level 0, 1 or 2
   draft_1,
   draft_2,
   standard_0,
@@ -33,60 +33,61 @@ enum class CostPart : std::uint8_t {
   high_2,
   best_0,
   best_2,
-  codes_16,  // what 16-bit codes take more than 8-bit ones
+  codes_16,  // additional time of 16-bit codes over 8-bit ones
   floats_32,
-  look,     // what the look of the eye takes more
-  display,  // what the change for a display takes more
+  look,     // additional time of the look of the eye
+  display,  // additional time of the change for a display
 };
 inline constexpr int cost_parts = 23;
 
-/// "planning", "draft-1" and so on.
+/// Returns the name of a part: "planning", "draft-1" and so on.
 std::string_view name_of(CostPart part);
 constexpr bool is_denoising(CostPart part) { return part >= CostPart::draft_0 && part <= CostPart::best_2; }
 
-/// Of the active area of a frame.
+/// Holds the size of the active area of a frame.
 struct CostSize {
   double megapixels = 0;
-  double denoised_megapixels = 0;  // with what the denoiser appends, and what pieces of a large frame share
+  double denoised_megapixels = 0;  // with the denoiser's padding and the overlaps of tiles of a large frame
 };
-/// Of a frame that is worked on as a whole.
+/// Returns the size of a frame that is processed as a whole.
 CostSize cost_size(int width, int height);
-/// Of any, in pieces where TileLimits say so.
+/// Returns the size of any frame, in tiles where TileLimits require them.
 CostSize cost_size(const RawDn& raw);
 
-/// Measured at some sizes.
+/// Holds a time measured at one size.
 struct CostPoint {
-  double megapixels = 0;  // denoised ones for draft_0 to best_2
+  double megapixels = 0;  // denoised megapixels for draft_0 to best_2
   double seconds = 0;
 };
 
-/// Times of one machine with one number of threads.
+/// Holds the times of one machine with one number of threads.
 struct CostModel {
-  std::string machine;  // that was measured; see isp/cli/develop/cost_file.h
+  std::string machine;  // machine that was measured; see isp/cli/develop/cost_file.h
   int threads = 1;
-  double pace_s = 0;  // what a fixed piece of work took meanwhile (isp/bench/pace.h); 0: not known
-  double pace = 1;    // what it takes at the moment, in units of that: factor of all times
-  std::array<std::vector<CostPoint>, cost_parts> points;  // of each part, by rising size; none: the part is free
+  double pace_s = 0;  // time of a fixed workload at that moment (isp/bench/pace.h); 0: not known
+  double pace = 1;    // current time of that workload over pace_s: factor of all times
+  std::array<std::vector<CostPoint>, cost_parts> points;  // of each part, by ascending size; none: the part is free
 
-  /// Seconds of a part for a frame of this size: linear between two points, which is exact for a fixed time and one for
-  /// each pixel; beyond them the seconds per megapixel of the nearest. @param size  > 0
+  /// Returns the seconds of a part for a frame of this size: linear between two points, which is exact for the sum of a
+  /// fixed time and one for each pixel; beyond them the seconds per megapixel of the nearest.
+  /// @param size  > 0
   double seconds(CostPart part, const CostSize& size) const;
 };
 
-/// One part of a plan's work.
+/// Holds one part of a plan's work.
 struct CostShare {
   CostPart part;
-  double share = 1;  // of the frame
+  double share = 1;  // fraction of the frame
 };
 
-/// The sum over parts.
+/// Returns the predicted time: the sum over parts.
 double predicted_s(const CostModel& model, const CostSize& size, const std::vector<CostShare>& work);
 
 inline constexpr std::string_view reference_machine = "two cores of an AMD EPYC with AVX-512";
 
-/// The times of large frames on the reference machine, measured by `lowlux bench --calibrate-cost` when nothing else
-/// ran on it. In units of its pace they are an estimate for a machine that was not measured: parts limited by memory
-/// and parts limited by arithmetic do not scale alike from one processor to another.
+/// Returns the times of large frames on the reference machine, measured by `lowlux bench --calibrate-cost` when nothing
+/// else ran on it. In units of its pace they are an estimate for a machine that was not measured: parts limited by
+/// memory and parts limited by arithmetic do not scale alike from one processor to another.
 const CostModel& reference_cost();
 
 }  // namespace lowlux::isp

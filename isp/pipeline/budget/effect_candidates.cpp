@@ -13,10 +13,11 @@ namespace {
 
 using denoise::Level;
 
-/// How much of what row and column noise takes is counted where it is not known whether there is any.
+/// States the fraction of the time for row and column noise that counts where it is not known whether there is any.
 constexpr double share_of_unknown = 0.5;
 
-/// CIEDE2000 that what is not predicted counts for where plans are compared: so that it is done where there is time.
+/// States the CIEDE2000 that an unpredicted effect counts for where plans are compared: so that it is done where there
+/// is time.
 constexpr double size_of_unknown = 0.3;
 
 CostPart part_of(Level level, int start) {
@@ -60,7 +61,8 @@ std::vector<std::optional<Level>> levels_of(const EffectFacts& facts, bool with_
   return out;
 }
 
-/// The least work that stays below the tolerance: the level first, which saves most, then smallest first.
+/// Returns the plan with the least work that stays below the tolerance: the level first, which saves most, then the
+/// other effects, smallest first.
 EffectCandidate within_tolerance(const EffectFacts& facts, double tolerance) {
   EffectCandidate plan{.level = levels_of(facts, false).back()};
   for (const std::optional<Level> level : levels_of(facts, false)) {
@@ -79,7 +81,7 @@ EffectCandidate within_tolerance(const EffectFacts& facts, double tolerance) {
       Option{&EffectCandidate::dark, facts.sizes.dark}, Option{&EffectCandidate::display, facts.sizes.display}};
   std::ranges::sort(options, {}, &Option::size);
   for (const Option& option : options) {
-    if (std::isnan(option.size)) continue;  // not predicted: it is done
+    if (std::isnan(option.size)) continue;  // not predicted: the effect is used
     EffectCandidate tried = plan;
     tried.*option.used = false;
     rate(facts, tried);
@@ -89,14 +91,15 @@ EffectCandidate within_tolerance(const EffectFacts& facts, double tolerance) {
   return plan;
 }
 
-/// All there are, the cheapest first.
+/// Returns all candidates, the cheapest first.
 std::vector<EffectCandidate> candidates(const EffectFacts& facts) {
   std::vector<EffectCandidate> out;
   for (const std::optional<Level> level : levels_of(facts, true)) {
     for (const bool defects : {false, true}) {
       for (const bool lines : {false, true}) {
         for (const bool dark : {false, true}) {
-          // A display that was asked for is left out by a tolerance only: no budget turns a wish down unsaid.
+          // A requested change for a display is omitted only within a tolerance: a budget never silently drops an
+          // explicit request.
           EffectCandidate plan{.level = level, .defects = defects, .lines = lines, .dark = dark};
           rate(facts, plan);
           out.push_back(plan);
@@ -154,7 +157,7 @@ void rate(const EffectFacts& facts, EffectCandidate& plan) {
     squares += std::pow(std::isnan(size) ? size_of_unknown : size, 2);
   };
   if (facts.may_search) leave(plan.defects, facts.sizes.defects);
-  if (facts.may_take_lines) leave(plan.lines && plan.level, facts.sizes.lines);  // they go with the noise, or stay
+  if (facts.may_take_lines) leave(plan.lines && plan.level, facts.sizes.lines);  // subtracted with the noise, or kept
   leave(plan.dark || plan.level, facts.sizes.dark);
   leave(plan.display, facts.sizes.display);
   plan.error = std::sqrt(squares);

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double largest_delta_e = 100;
-constexpr double only_how_much = std::numeric_limits<double>::infinity();  // no line's own offset is asked
+constexpr double only_how_much = std::numeric_limits<double>::infinity();  // only the amount, no offset of any line
 
 double share_of(const RawFrame& frame, std::span<const Rect> squares) {
   const Rect& active = frame.raw.active;
@@ -27,7 +27,7 @@ double share_of(const RawFrame& frame, std::span<const Rect> squares) {
          (static_cast<double>(active.width) * active.height);
 }
 
-/// How far a pixel stands out of its four neighbours of the same colour [DN].
+/// Returns how far a pixel differs from its four neighbours of the same colour [DN].
 double excess_dn(const RawDn& raw, const Pixel& p) {
   const auto code = [&](int x, int y) { return static_cast<double>(raw.dn.at(x, y)); };
   const double around = (code(p.x - 2, p.y) + code(p.x + 2, p.y) + code(p.x, p.y - 2) + code(p.x, p.y + 2)) / 4;
@@ -45,7 +45,7 @@ double median_of(std::span<const SeenBlock> blocks, const Figure& figure) {
   return *middle;
 }
 
-/// What 5 % of the blocks exceed.
+/// Returns the value that 5 % of the blocks exceed.
 double percentile_of(std::span<const SeenBlock> blocks, float SeenBlock::*figure) {
   if (blocks.empty()) return 0;
   std::vector<float> values;
@@ -85,7 +85,7 @@ void set_defects(const RawFrame& frame, const RawLevels& levels, const DefectNoi
   out.defects = std::min(electrons * each, largest_delta_e);
 }
 
-/// Of each square, the lines of one kind; what cannot be told is absent.
+/// Returns the lines of one kind of each square; absent where they cannot be measured.
 std::vector<std::optional<denoise::LineOffsets>> lines_of_squares(const RawElectrons& sample, int squares,
                                                                   denoise::Lines kind, Executor& executor) {
   std::vector<std::optional<denoise::LineOffsets>> of_square(static_cast<std::size_t>(squares));
@@ -97,9 +97,9 @@ std::vector<std::optional<denoise::LineOffsets>> lines_of_squares(const RawElect
   return of_square;
 }
 
-/// Standard deviation of what lines share, over the squares; 0 where it would not stand out of whole lines either,
-/// whose offsets are measured better than a square's.
-/// levels.blackparam length_px  of whole lines
+/// Returns the standard deviation of line noise, over the squares; 0 where it would not be significant for whole lines
+/// either, whose offsets are measured better than a square's.
+/// @param length_px  of whole lines
 double line_std_e(const RawElectrons& sample, int squares, denoise::Lines kind, int length_px,
                   const denoise::RawNoise& noise, Executor& executor) {
   double squares_e2 = 0;
@@ -130,7 +130,7 @@ void set_lines(const RawFrame& frame, const RawLevels& levels, const denoise::Ra
   const Rect& active = frame.raw.active;
   const double rows_e = line_std_e(sample, count, denoise::Lines::rows, active.width, noise, executor);
   const double columns_e = line_std_e(sample, count, denoise::Lines::columns, active.height, noise, executor);
-  // A square of 8 x 8 pixels has the mean of eight of each.
+  // A block of 8 x 8 pixels averages eight rows and eight columns.
   const double seen_e = std::sqrt((rows_e * rows_e + columns_e * columns_e) / seen_box_px);
   std::vector<float> rms;
   rms.reserve(blocks.size());

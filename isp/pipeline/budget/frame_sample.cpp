@@ -8,9 +8,9 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double least_gain = 2;  // a sample is of half the frame at most
+constexpr double least_gain = 2;  // a sample covers half the frame at most
 
-/// Even, and evenly spread.
+/// Returns the position of square `i` along one direction: even, and evenly spread.
 int place(int i, int count, int size) {
   const int room = size - sample_side_px;
   return (count == 1 ? room / 2 : room * i / (count - 1)) & ~1;

@@ -21,12 +21,12 @@ std::string level_words(const EffectFacts& facts, const EffectCandidate& plan) {
   if (!facts.has_noise) return "the noise is not known, or not to be reduced";
   if (!plan.level) return "left as it is";
   std::array<double, 3> share = facts.chroma.start;
-  if (*plan.level == Level::best) share = {share[0] + share[1], 0, share[2]};  // it starts level 1's on level 0
+  if (*plan.level == Level::best) share = {share[0] + share[1], 0, share[2]};  // best starts level 1 on level 0
   return fmt::format("{}; chroma from level 0, 1, 2 in {:.0f}, {:.0f}, {:.0f} % of the frame", name_of(*plan.level),
                      100 * share[0], 100 * share[1], 100 * share[2]);
 }
 
-/// How many of the regions have which level.
+/// Returns how many of the regions have which level, as text.
 std::string region_words(const NoiseRegions& regions) {
   const auto have = [&](std::optional<Level> level) { return std::ranges::count(regions.level, level); };
   return fmt::format("; of {} regions {} none, {} draft, {} standard, {} high", regions.level.size(),
@@ -43,7 +43,8 @@ double seconds_of(const EffectFacts& facts, EffectCandidate plan) {
   return plan.seconds;
 }
 
-/// Of the plan's level, or of the most that a tolerance calls for where it has none; without lines.
+/// Returns the time of noise reduction by the plan's level, or by the highest that a tolerance selects where it has
+/// none; without lines.
 std::optional<double> cost_of_noise(const EffectFacts& facts, EffectCandidate plan) {
   if (!facts.choice.cost) return std::nullopt;
   plan.lines = false;
@@ -83,7 +84,7 @@ EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
   if (facts.may_take_lines) {
     const bool taken = plan.lines && plan.level;
     add({"row and column noise", facts.sizes.lines, left(taken, facts.sizes.lines), taken,
-         plan.level ? facts.sizes.lines_words : "taken off with the noise or not at all", cost_of_lines(facts, plan)});
+         plan.level ? facts.sizes.lines_words : "subtracted with the noise or not at all", cost_of_lines(facts, plan)});
   }
   if (facts.sizes.dark > 0) {
     const bool used = plan.dark || plan.level;

@@ -16,33 +16,33 @@
 
 namespace lowlux::isp {
 
-/// One thing that may be left out of developing, or done with less work.
+/// Describes one effect that may be left out of developing, or done with less work.
 struct PlannedEffect {
   std::string_view name;
-  double size = 0;  // CIEDE2000 that leaving it out would change; not a number where that is not known
-  double left = 0;  // that the decision leaves of it, against everything that can be done
+  double size = 0;  // CIEDE2000 that omitting it would change; not a number where that is not known
+  double left = 0;  // CIEDE2000 that the decision leaves of it, relative to everything that can be done
   bool used = true;
-  std::string decision;           // in words
-  std::optional<double> seconds;  // it is predicted to take, or would; what every plan begins with is none of them
+  std::string decision;           // as text
+  std::optional<double> seconds;  // time it is predicted to take, or would; excludes the work common to all plans
 };
 
-/// What was decided of them together.
+/// Holds the decisions about all effects together.
 struct EffectsPlan {
   std::vector<PlannedEffect> effects;
-  std::optional<double> predicted_s;  // of planning and rendering
+  std::optional<double> predicted_s;  // for planning and rendering
   bool find_defects = true;
   bool lines = true;  // row and column noise is subtracted with the noise
   bool dark = true;
   bool display = true;
   std::optional<denoise::Level> level;
-  bool level_decided = false;           // false: noise is reduced as the options have it
-  std::optional<NoiseRegions> regions;  // with levels of their own
+  bool level_decided = false;           // false: noise is reduced as the options state
+  std::optional<NoiseRegions> regions;  // regions with levels of their own
 };
 
-/// Decides what a frame calls for, by its levels, its noise and a sample of it. Without a budget it leaves out what
-/// stays below the tolerance, all of it together; with one it takes the most accurate of all plans that are predicted
+/// Decides which effects a frame needs, from its levels, its noise and a sample of it. Without a budget it omits what
+/// stays below the tolerance, all of it together; with one it chooses the most accurate of all plans that are predicted
 /// to fit, or the cheapest of those within the tolerance, if one is given and one fits.
-/// @param levels  before defects were looked for
+/// @param levels  before the search for defects
 /// Precondition: options.effects. Error: the budget is below the cheapest plan, whose time is stated (insufficient).
 Result<EffectsPlan> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& options,
                                    const RawLevels& levels, const Rendering& rendering, Executor& executor);

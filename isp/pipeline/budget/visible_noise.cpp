@@ -21,19 +21,19 @@ constexpr double least_variance_e2 = 1e-6;
 constexpr double surroundings_px =
     12;  // each way: a block of the denoiser, whose thresholds are those of its mean variance
 constexpr double most_surroundings = 2;
-/// What pixels of the picture scatter by over what their raw values do: on the tuning pictures.
+/// States the scatter of the image's pixels over that of their raw values: on the tuning images.
 constexpr double pixel_scatter = 1.3;
 
 double normal_density(double t) { return std::exp(-0.5 * t * t) * std::numbers::inv_sqrtpi / std::numbers::sqrt2; }
 
-/// Mean of what is above black of a normal law.
+/// Returns the mean of a normally distributed value that is clipped at black.
 double mean_above_black(double mean, double std) {
   if (!(std > 0)) return std::max(mean, 0.0);
   const double t = mean / std;
   return std * normal_density(t) + mean * 0.5 * std::erfc(-t / std::numbers::sqrt2);
 }
 
-/// From camera RGB, a fraction of white with the black off, to what is displayed.
+/// Converts camera RGB, a fraction of white with black subtracted, to the displayed colour.
 class Display {
  public:
   Display(const DevelopOptions& options, const Rendering& rendering)
@@ -45,7 +45,8 @@ class Display {
 
   Lab lab(const Vector3& camera) const { return lab_of_shown(shown(camera)); }
 
-  /// Of the mean of pixels that scatter. @param std  of each colour, a fraction of white
+  /// Returns the colour of the mean of pixels that scatter and are clipped at black.
+  /// @param std  of each colour, a fraction of white
   Lab lab_of_clipped(const Vector3& camera, const Vector3& std) const {
     const Vector3 mean = linear(camera);
     Vector3 raised{};
@@ -66,7 +67,8 @@ class Display {
     return lab_of_shown(toned(raised));
   }
 
-  /// What changing its code for the planned display makes of a colour, by the colours that codes stand for.
+  /// Returns the CIEDE2000 by which a colour changes when its code is changed for the planned display, from the colours
+  /// that the codes represent.
   double changed_for_display(const Vector3& camera) const {
     if (!options_.display) return 0;
     const Vector3 before = shown(camera);
@@ -109,7 +111,7 @@ class Display {
   Xyz white_;
 };
 
-/// Per colour, of the frame.
+/// Holds values of the frame for each colour.
 struct Channels {
   std::array<double, 3> electrons_at_white{};
   std::array<double, 3> dark_e{};
@@ -124,9 +126,9 @@ Channels channels_of(const RawFrame& frame, const RawLevels& levels, const denoi
   return out;
 }
 
-/// What is seen of noise whose mean lies below black, as it does where dark charge is overestimated: sqrt(2) times the
-/// rms of what reaches above, which for a mean at black is all of it. Half the distance counts: the light of a block
-/// varies.
+/// Returns the visible standard deviation of noise whose mean lies below black, as it does where dark charge is
+/// overestimated: sqrt(2) times the rms of what reaches above, which for a mean at black is all of it. Half the
+/// distance counts: the light of a block varies.
 double above_black_e(double mean_e, double std_e) {
   const double below = std::max(-mean_e / (2 * std_e), 0.0);
   const double reaching = 0.5 * std::erfc(below / std::numbers::sqrt2);
@@ -173,7 +175,7 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
   return out;
 }
 
-/// The thumbnail in electrons.
+/// Holds the thumbnail in electrons.
 class Charge {
  public:
   Charge(const Thumbnail& thumbnail, const Channels& channels, const denoise::RawNoise& noise)
@@ -188,7 +190,8 @@ class Charge {
     return out;
   }
 
-  /// See SeenBlock. @param reach  in blocks
+  /// Returns SeenBlock::surroundings.
+  /// @param reach  in blocks
   double surroundings(int x, int y, int reach) const {
     double sum = 0;
     int count = 0;

@@ -20,13 +20,13 @@ namespace {
 constexpr double most_dn = 65535;
 constexpr double rounding_dn2 = 1.0 / 6;  // mean of f (1 - f) over fractions f
 
-/// Levels of the new codes.
+/// Holds the levels of the new codes.
 struct Levels {
   double black_dn;
   double range_dn;
 };
 
-/// Black is a multiple of 256 from 1024 on, at most a quarter of the codes.
+/// Returns the levels of the new codes: black is a multiple of 256 from 1024 on, at most a quarter of the codes.
 Levels levels_for(const DevelopPlan& plan) {
   double noise = 0;  // of a dark pixel, in fractions of white
   for (int site = 0; site < 4; ++site) {
@@ -114,8 +114,8 @@ struct Sample {
   double variance;
 };
 
-/// Weighted least squares of variance = scale x + offset, weights 1 / variance^2: every level counts alike. Where the
-/// line would fall, or start below 0, the better of the two lines at that bound is taken.
+/// Holds a line of weighted least squares, variance = scale x + offset, weights 1 / variance^2: every level counts
+/// alike. Where the line would fall, or start below 0, the best line at that bound is used.
 struct Line {
   double scale = least_scale;
   double offset = 0;

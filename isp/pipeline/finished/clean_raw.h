@@ -8,27 +8,28 @@
 
 namespace lowlux::isp {
 
-/// A raw frame without noise, for any raw developer.
+/// Holds a raw frame without noise, for any raw developer.
 struct CleanRaw {
   RawFrame frame;  // the active area only, in 16-bit codes
   DevelopPlan plan;
-  NoiseMaps maps;  // of the active area; empty unless asked for
+  NoiseMaps maps;  // of the active area; empty unless requested
 };
 
-/// Takes lines, noise and dark charge off a Bayer frame, repairs its defects, and codes it anew in 16 bits.
+/// Subtracts lines and dark charge from a Bayer frame, reduces its noise, repairs its defects, and encodes it again in
+/// 16 bits.
 ///
 /// Codes are black + (white - black) * signal / electrons at white. Black is so far above 0 that 8 standard deviations
 /// of a dark pixel stay positive: negative electrons survive. Codes are rounded up with the probability of their
 /// fraction, so that no mean is biased and smooth shadows do not break into steps; that adds 1/6 DN^2 on average.
-/// Saturated pixels get the code of white. What the source asks to be done to linear values (gain maps) is still asked
-/// for; defects, masked pixels and dark charge are gone. The NoiseProfile is that of residual_profile.
+/// Saturated pixels get the code of white. Corrections that the source requests for linear values (gain maps) are still
+/// requested; defects, masked pixels and dark charge are gone. The NoiseProfile is that of residual_profile.
 ///
 /// Errors: those of plan_develop; noise that cannot be reduced at all (the plan's reason), also for an automatic level.
 Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
 
-/// The straight line variance = scale x + offset that is nearest, relative to the variances, to what is left of the
-/// noise at each site; x and variances in fractions of white. Scales are at least what
-/// electrons_at_white accepts, offsets at least 0.
+/// Returns the straight line variance = scale x + offset that is nearest, relative to the variances, to the residual
+/// noise at each site; x and variances in fractions of white. Scales are at least what electrons_at_white accepts,
+/// offsets at least 0.
 /// @param signal_e         the clean mosaic
 /// @param site_variance_e2 of R, G, B in each 2x2 cell
 /// @param added            variance of the codes' rounding, in fractions of white squared

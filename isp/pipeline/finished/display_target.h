@@ -9,18 +9,18 @@
 
 namespace lowlux::isp {
 
-/// Mean error [CIEDE2000] a table of colours may have; a larger table is made where one has more.
+/// States the mean error [CIEDE2000] that a table of colours may have; a larger table is made where one has more.
 inline constexpr double retarget_table_tolerance = 0.5;
 
-/// The display pictures are made for: a change of sRGB codes, and what it goes by.
+/// Describes the display that images are made for: a change of sRGB codes, and what it is based on.
 struct DisplayTarget {
-  double source_cd_m2 = 0;   // white of displays the codes were right for
-  double display_cd_m2 = 0;  // white of this one
+  double source_cd_m2 = 0;   // white of the displays that the codes were made for
+  double display_cd_m2 = 0;  // white of this display
   std::string coefficients;  // of Shin's model; empty: it is not used
   MeasuredTable made;
 };
 
-/// A map as the smallest table within retarget_table_tolerance. Takes up to seconds.
+/// Tabulates a map as the smallest table within retarget_table_tolerance. Takes up to seconds.
 MeasuredTable retarget_table(const RetargetMap& map, Executor& executor);
 
 /// Tabulates retargeting(options). Takes up to seconds. Errors: those of retargeting().

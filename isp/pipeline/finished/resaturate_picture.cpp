@@ -14,13 +14,13 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double saturated_from = 0.995;  // of white: the highest code of 8 bits, rounding off
+constexpr double saturated_from = 0.995;  // of white: the highest code of 8 bits, allowing for rounding
 
 double intensity_at(const RgbView<const float>& xyz, int x, int y) {
   return static_cast<double>(xyz[0].at(x, y)) + xyz[1].at(x, y) + xyz[2].at(x, y);
 }
 
-/// 1 where a channel of the space is at white.
+/// Returns a mask that is 1 where a channel of the space is at white.
 Plane<std::uint8_t> saturated_pixels(const RgbView<const float>& xyz, const Matrix3& to_rgb) {
   Plane<std::uint8_t> out(xyz[0].width, xyz[0].height);
   for (int y = 0; y < out.height(); ++y) {
@@ -32,7 +32,7 @@ Plane<std::uint8_t> saturated_pixels(const RgbView<const float>& xyz, const Matr
   return out;
 }
 
-/// Of the pixels that are not saturated.
+/// Returns the fraction of pixels that are not saturated and whose surroundings are at most `dark`.
 double share_of_dark(const RgbView<const float>& xyz, const Plane<std::uint8_t>& saturated, double dark, int radius) {
   Plane<double> sum(xyz[0].width, xyz[0].height);
   for (int y = 0; y < sum.height(); ++y) {
@@ -46,7 +46,7 @@ double share_of_dark(const RgbView<const float>& xyz, const Plane<std::uint8_t>&
   return static_cast<double>(below) / static_cast<double>(mean.size());
 }
 
-/// X - x0 S (k = 0) or Y - y0 S (k = 1), mean over the square of `side` pixels at (x, y).
+/// Returns X - x0 S (k = 0) or Y - y0 S (k = 1), mean over the square of `side` pixels at (x, y).
 double chroma_at(const RgbView<const float>& xyz, int k, int x, int y, int side) {
   const Vector3 white = vector_of(*xyz_of(white_d65));
   const double share = white[k] / (white[0] + white[1] + white[2]);
@@ -57,7 +57,8 @@ double chroma_at(const RgbView<const float>& xyz, int k, int x, int y, int side)
   return sum / (side * side);
 }
 
-/// 1.4826 times the median of the absolute diagonal Haar details of means over squares; the mean of both chromas.
+/// Returns 1.4826 times the median of the absolute diagonal Haar details of means over squares; the mean of both
+/// chromas.
 double median_detail(const RgbView<const float>& xyz, int side) {
   double mean = 0;
   for (int k = 0; k < 2; ++k) {

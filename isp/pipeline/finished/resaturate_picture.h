@@ -8,9 +8,9 @@
 
 namespace lowlux::isp {
 
-/// How a finished picture gets its colours back.
+/// Describes how the colours of a finished image are restored.
 struct ResaturateOptions {
-  Xyz black;                           // what the picture shows where there is no light; white is Y = 1
+  Xyz black;                           // what the image shows where there is no light; white is Y = 1
   std::optional<double> chroma_noise;  // denoise::Resaturation::chroma_noise; absent: measured
   double prior_std = 0.065;            // denoise::Resaturation::prior_std
   int radius = 4;                      // denoise::Resaturation::radius
@@ -21,18 +21,18 @@ struct ResaturateOptions {
 struct Resaturated {
   Picture picture;
   double chroma_noise = 0;
-  double share_dark = 0;       // of pixels, not saturated, whose surroundings are no brighter than black: grey now
-  double share_saturated = 0;  // left as they are
+  double share_dark = 0;  // fraction of pixels, not saturated, with surroundings at most as bright as black: now grey
+  double share_saturated = 0;  // fraction of saturated pixels, which are unchanged
 };
 
-/// Standard deviation of X - x0 S and of Y - y0 S (S = X + Y + Z, neutral D65) in flat parts, the mean of both: 1.4826
-/// times the median of diagonal Haar details' absolute values. Demosaicing and JPEG leave little of it between
-/// neighbours, so means over squares of 2 and 4 pixels are asked too, times 2 and 4, and the largest counts. 0 for
-/// pictures of fewer than 2 x 2 pixels.
+/// Returns the standard deviation of X - x0 S and of Y - y0 S (S = X + Y + Z, neutral D65) in flat areas, the mean of
+/// both: 1.4826 times the median of diagonal Haar details' absolute values. Demosaicing and JPEG leave little of it
+/// between neighbours, so means over squares of 2 and 4 pixels are evaluated too, times 2 and 4, and the largest
+/// counts. Returns 0 for images of fewer than 2 x 2 pixels.
 double chroma_noise_of(const RgbView<const float>& xyz);
 
-/// denoise::resaturate on a picture in XYZ, and the result in an output space without tone curve. Pixels with a channel
-/// at white are saturated.
+/// Applies denoise::resaturate to an image in XYZ, and encodes the result in an output space without tone curve. Pixels
+/// with a channel at white are saturated.
 /// @param xyz  display-linear, D65 white at Y = 1; taken over
 Resaturated resaturate_picture(SceneLinear xyz, const ResaturateOptions& options, Executor& executor);
 

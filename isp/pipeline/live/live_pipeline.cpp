@@ -73,7 +73,7 @@ Result<std::unique_ptr<LivePipeline>> LivePipeline::make(LiveSetup setup, Execut
   return out;
 }
 
-/// Passes a warm-up frame through every step, so that all of them have their memory.
+/// Passes a warm-up frame through every step, so that all of them allocate their memory.
 Result<void> LivePipeline::warm_up() {
   const double black = frame_.raw.white_dn[0] / 16, gain_dn = frame_.raw.white_dn[0] / 1000,
                variance = 4 * gain_dn * gain_dn;
@@ -86,7 +86,7 @@ Result<void> LivePipeline::warm_up() {
     const std::vector<std::byte> zeros(stride * static_cast<std::size_t>(setup_.height));
     read(zeros, stride, facts, true);
   }
-  planner_.use_all_effects(true);  // each frame decides anew which of them it calls for
+  planner_.use_all_effects(true);  // each frame decides anew which effects it needs
   const bool bayer = setup_.format.layout == SensorLayout::bayer;
   for (const bool reduces : {false, true}) {
     if (reduces && !bayer) continue;
@@ -101,7 +101,7 @@ Result<void> LivePipeline::warm_up() {
       render(RowSink{[](void*, int, int, const std::uint8_t*, int) {}, nullptr});
     }
   }
-  // Automatic levels have memory of their own.
+  // Automatic levels use memory of their own.
   facts.denoise.mode = LiveDenoise::Mode::automatic;
   if (Result<void> planned = plan(facts); !planned) return planned;
   planner_.use_all_effects(false);
@@ -125,7 +125,7 @@ void LivePipeline::render_mosaic(PlaneView<std::uint16_t> codes) {
     for_each_band(executor_, active.height, [&](RowBand band, int) {
       for (int y = band.first; y < band.last; ++y) {
         const std::uint16_t* const dn = frame_.raw.dn.row(active.y + y) + active.x;
-        // Words of 16 bits may hold more than the format's bits, which would come out dark.
+        // 16-bit words may hold values above the format's largest code, which would come out dark.
         for (int x = 0; x < active.width; ++x) {
           codes.at(x, y) = static_cast<std::uint16_t>(std::min<int>(dn[x], largest) << shift);
         }

@@ -20,40 +20,42 @@
 
 namespace lowlux::isp {
 
-/// Frames of one stream, one after the other: read() its memory, plan() by what is known of it, then one picture of it.
-/// Everything is measured and decided as plan_develop does, but that exposure and white balance follow the scene
-/// slowly. All memory is taken in make(), which runs a first frame through every step; the three steps allocate
-/// nothing, and give the same bytes for every number of threads. Lines of rows and columns, and defects that no one
-/// named, stay.
+/// Processes the frames of one stream, one after the other: read() takes a frame's memory in, plan() decides by what is
+/// known of it, then one image of it is rendered. Everything is measured and decided as plan_develop does, except that
+/// exposure and white balance follow the scene slowly. All memory is allocated in make(), which passes a first frame
+/// through every step; the three steps allocate nothing, and give the same bytes for every number of threads. Row and
+/// column noise, and defects that are not listed, stay.
 class LivePipeline {
  public:
-  /// Errors: invalid_argument (sizes, rectangles outside the frame, levels), those of plan_look.
+  /// Makes the pipeline of a stream. Errors: invalid_argument (sizes, rectangles outside the frame, levels), those of
+  /// plan_look.
   static Result<std::unique_ptr<LivePipeline>> make(LiveSetup setup, Executor& executor);
 
+  /// Reads a frame.
   /// @param bytes  rows from its first byte on, `stride` apart, for the whole frame; may lie in uncached memory
-  /// @param facts  that plan() gets: what they tell is not measured
+  /// @param facts  those that plan() gets: what they state is not measured
   /// @param statistics  whether meter().statistics() and the noise of the frame are wanted
   void read(std::span<const std::byte> bytes, std::size_t stride, const LiveFacts& facts, bool statistics);
 
-  /// Decides about the frame that was read. Errors: black not below white, colours that lead to no picture (malformed),
-  /// a look whose luminance is not known (insufficient).
+  /// Decides about the frame that was read. Errors: black not below white, colours that lead to no image (malformed), a
+  /// look whose luminance is not known (insufficient).
   Result<void> plan(const LiveFacts& facts);
 
   const DevelopPlan& decided() const { return planner_.decided(); }
   const LiveDecision& decision() const { return planner_.decision(); }
   FrameMeter& meter() { return meter_; }
   const RawFrame& frame() const { return frame_; }
-  double moved() const { return pipeline_.moved(); }  // share of the picture, in the frame rendered last
+  double moved() const { return pipeline_.moved(); }  // fraction of the image, in the frame rendered last
 
-  /// The picture in display codes, active area, row by row.
+  /// Renders the image in display codes, active area, row by row.
   void render(const RowSink& sink) { pipeline_.render(frame_, decided(), sink); }
-  /// The same in 16 bits: height x 3 width.
+  /// Renders the image in display codes of 16 bits: height x 3 width.
   void render(PlaneView<std::uint16_t> rgb) { pipeline_.render(frame_, decided(), rgb); }
-  /// The mosaic of the active area without noise, in codes of 16 bits whose largest is 2^bits - 1 times 2^(16 - bits):
-  /// black is where it was, times that. Negative values are kept as far as black allows.
+  /// Renders the mosaic of the active area without noise, in codes of 16 bits whose largest is 2^bits - 1 times 2^(16 -
+  /// bits): black is where it was, times that. Negative values are kept as far as black allows.
   void render_mosaic(PlaneView<std::uint16_t> codes);
 
-  /// Forgets what was learnt of frames before: the next one is the first.
+  /// Forgets what was learnt from previous frames: the next one is the first.
   void reset();
 
  private:

@@ -17,13 +17,14 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double still_ev = 0.1;  // exposure stays where it is for targets nearer than this ...
-constexpr double step = 0.15;     // ... else goes this share of the way with each frame
-// Of white. A frame that is bright everywhere shows no black; pedestals of cameras are an eighth of white at most.
+constexpr double still_ev = 0.1;  // exposure stays unchanged for targets nearer than this
+constexpr double step = 0.15;  // fraction of the difference by which exposure, white and noise follow with each frame
+// Fraction of white. A frame that is bright everywhere shows no black; pedestals of cameras are an eighth of white at
+// most.
 constexpr double highest_black = 0.25;
-constexpr double level_slack = 1.2;  // a level of noise reduction is left only this far beyond its edge
+constexpr double level_slack = 1.2;  // a level of noise reduction is left only this far beyond its limit
 
-/// Noise that was measured follows the frames slowly: one of them is a rough measurement.
+/// Returns measured noise that follows the frames slowly: one of them is a rough measurement.
 NoiseLine blended(const NoiseLine& before, const NoiseLine& now) {
   NoiseLine out = before;
   out.gain_dn += step * (now.gain_dn - before.gain_dn);
@@ -31,7 +32,8 @@ NoiseLine blended(const NoiseLine& before, const NoiseLine& now) {
   return out;
 }
 
-/// As calib::profile_at has it: means over the sites of a colour. Monochrome frames have one for all.
+/// Returns the profile as calib::profile_at has it: means over the sites of a colour. Monochrome frames have one for
+/// all.
 NoiseProfile profile_of(const LiveNoise& noise, const RawDn& raw, const BlackPoint& black) {
   NoiseProfile out{.source = NoiseProfile::Source::profile};
   std::array<int, 3> sites{};
@@ -52,8 +54,8 @@ NoiseProfile profile_of(const LiveNoise& noise, const RawDn& raw, const BlackPoi
   return out;
 }
 
-/// 1 where one of them is not known: absent, or no figure there can be. Held to what means over frames take for
-/// another light altogether.
+/// Returns now / before; 1 where one of them is not known: absent, or not a possible value. Clamped to values that
+/// means over frames treat as entirely different light.
 double ratio(const std::optional<double>& now, const std::optional<double>& before) {
   const auto known = [](const std::optional<double>& figure) {
     return figure && *figure > 0 && std::isfinite(*figure);
@@ -61,7 +63,7 @@ double ratio(const std::optional<double>& now, const std::optional<double>& befo
   return known(now) && known(before) ? std::clamp(*now / *before, 1e-9, 1e9) : 1;
 }
 
-/// A line at another gain of the sensor: codes for each electron go with it.
+/// Returns a noise line at another gain of the sensor: the codes for each electron scale with it.
 NoiseLine at_gain(const NoiseLine& line, double factor) {
   return {line.gain_dn * factor, line.offset_dn2 * factor * factor, line.gain_error_dn * factor,
           line.offset_error_dn2 * factor * factor};
@@ -72,7 +74,7 @@ LiveNoise noise_of(const NoiseLine& line) {
   return {line.gain_dn, {variance, variance, variance, variance}};
 }
 
-/// Moves linear colours away from the neutral of their luminance, or to it.
+/// Returns the matrix that moves linear colours away from the neutral of their luminance, or to it.
 Matrix3 saturated(double saturation, const Vector3& luminance) {
   Matrix3 out{};
   for (int i = 0; i < 3; ++i) {
@@ -81,7 +83,7 @@ Matrix3 saturated(double saturation, const Vector3& luminance) {
   return out;
 }
 
-/// Camera RGB of daylight; equal channels where no calibration tells it.
+/// Returns the camera RGB of daylight; equal channels where no calibration states it.
 Vector3 daylight_of(const CameraColour& colour) {
   if (colour.calibrations.empty()) return {1, 1, 1};
   const auto daylight = neutral_of_white(colour, white_d65);
@@ -175,7 +177,7 @@ void LivePlanner::set_noise(const LiveFacts& facts, const FrameMeter& meter, Raw
   if (frame.noise) plan_.levels.electrons_at_white = electrons_at_white(frame.raw, *frame.noise);
 }
 
-/// Given, else estimated and following the scene, else daylight, else equal channels.
+/// Returns the given white, else an estimate that follows the scene, else daylight, else equal channels.
 WhiteBalance LivePlanner::choose_white(const LiveFacts& facts, RawFrame& frame) {
   if (frame.raw.layout == SensorLayout::monochrome) return {};
   if (facts.neutral) {
@@ -203,7 +205,7 @@ WhiteBalance LivePlanner::choose_white(const LiveFacts& facts, RawFrame& frame) 
   if (frame.colour.calibrations.empty()) return out;
   if (const auto white = white_of_neutral(frame.colour, out.neutral)) {
     out.white = *white;
-  } else if (!facts.neutral) {  // an estimate that is no colour of a light gives way to daylight
+  } else if (!facts.neutral) {  // an estimate that is not a valid colour of a light is replaced by daylight
     decision_.white = LiveSource::none;
     frame.colour.as_shot_neutral = out.neutral = daylight_of(frame.colour);
     if (const auto daylight = white_of_neutral(frame.colour, out.neutral)) out.white = *daylight;
@@ -268,7 +270,8 @@ Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame)
   return {};
 }
 
-/// A level that was chosen for the frame before is kept until the signal to noise ratio is clearly beyond its range.
+/// Chooses the level. A level chosen for the previous frame is kept until the signal-to-noise ratio is clearly beyond
+/// its range.
 void LivePlanner::choose_level(const LiveDenoise& wanted, const RawFrame& frame) {
   NoiseReduction& out = plan_.noise_reduction;
   std::optional<denoise::Level> level;
@@ -295,7 +298,7 @@ void LivePlanner::choose_level(const LiveDenoise& wanted, const RawFrame& frame)
   if (level) level = std::min(*level, setup_.most);
   decision_.level = level;
   decision_.reducible = can;
-  level = std::min(level, wanted.most);  // none is below every level
+  level = std::min(level, wanted.most);  // nullopt is below every level
   out.level = level;
   out.options.level = level.value_or(denoise::Level::draft);
 }
@@ -307,7 +310,7 @@ void LivePlanner::set_temporal(const LiveFacts& facts, const RawFrame& frame) {
   if (!can) {
     temporal.reset();
     last_ = {};
-    first_ = true;  // what comes after begins anew
+    first_ = true;  // the next frame starts a new mean
     return;
   }
   temporal.emplace();
@@ -315,7 +318,7 @@ void LivePlanner::set_temporal(const LiveFacts& facts, const RawFrame& frame) {
       (*plan_.levels.electrons_at_white)[0] / (white_at(frame.raw, 0) - plan_.levels.black.pedestal_dn[0]);
   temporal->light = ratio(facts.exposure_s, last_.exposure_s);
   if (decision_.noise == LiveSource::frame) {
-    // Electrons whose gain the frames tell are a unit that moves with its measurement.
+    // Electrons whose gain is measured on the frames are a unit that changes with its measurement.
     temporal->light *= ratio(facts.iso, last_.iso) * ratio(e_per_dn, last_.e_per_dn);
   }
   temporal->restart = first_ || !facts.follows;

@@ -15,43 +15,43 @@
 
 namespace lowlux::isp {
 
-/// What holds for all frames of a stream.
+/// Describes what holds for all frames of a stream.
 struct LiveSetup {
   RawFormat format;
   int width = 0;  // of whole frames
   int height = 0;
-  Rect active;                 // the part that becomes the picture, from an even pixel on or not; at least 2 x 2
+  Rect active;                 // region that becomes the image, its corner even or odd; at least 2 x 2
   std::vector<Rect> masked;    // light-shielded pixels of the frame, if any
   double white_dn = 0;         // saturation, 0.001 to 65535; 0: the format's largest code
-  CameraColour colour;         // without calibrations the camera's colours are taken for those of the output
+  CameraColour colour;         // without calibrations the camera's colours count as those of the output
   std::vector<Pixel> defects;  // of the active area, ascending
   ToneCurve tone = ToneCurve::standard;
   SampleType samples = SampleType::u8;
-  LookChoice look;                                 // of the eye or the camera
-  bool levels = true;                              // frames may be denoised one by one ...
-  denoise::Level most = denoise::Level::standard;  // ... up to this level
-  bool temporal = false;                           // frames before take part
+  LookChoice look;                                 // that of the eye or the camera
+  bool levels = true;                              // frames may be denoised one by one, up to `most`
+  denoise::Level most = denoise::Level::standard;  // highest level of frames denoised one by one
+  bool temporal = false;                           // previous frames take part
 };
 
-/// Noise reduction of one frame.
+/// Describes the noise reduction of one frame.
 struct LiveDenoise {
   enum class Mode : std::uint8_t { off, automatic, level } mode = Mode::automatic;
   denoise::Level level = denoise::Level::draft;  // for Mode::level; no higher than LiveSetup::most
-  bool temporal = true;                          // where the setup has it
-  /// No level beyond this one, however it was come by; none: no level at all.
+  bool temporal = true;                          // where the setup allows it
+  /// States the highest level allowed, regardless of how it was chosen; none: no level at all.
   std::optional<denoise::Level> most = denoise::Level::best;
 };
 
-/// Temporal noise in codes: a code v DN above black has the variance gain_dn v + black_variance_dn2 of its site.
+/// Holds temporal noise in codes: a code v DN above black has the variance gain_dn v + black_variance_dn2 of its site.
 struct LiveNoise {
   double gain_dn = 0;  // the system gain [DN/e-]
   PerSite<double> black_variance_dn2{};
 };
 
-/// What is known of one frame. What is absent is measured on it or left out; of exposure time and ISO speed, so is what
-/// is not positive and finite.
+/// Holds what is known of one frame. What is absent is measured on it or left out; so is an exposure time or ISO speed
+/// that is not positive and finite.
 struct LiveFacts {
-  std::optional<PerSite<double>> black_dn;  // of the active area's sites, mean dark charge in it
+  std::optional<PerSite<double>> black_dn;  // of the active area's sites, mean dark charge included
   std::optional<LiveNoise> noise;
   std::optional<double> exposure_s;
   std::optional<double> iso;
@@ -60,39 +60,40 @@ struct LiveFacts {
   std::optional<Vector3> neutral;               // camera RGB of white; any scale
   std::optional<Matrix3> colour_matrix;         // white-balanced camera RGB to linear sRGB, in place of calibrations
   std::optional<double> exposure_ev;            // absent: automatic
-  double saturation = 1;                        // of the picture's colours, 0..4
-  bool follows = true;                          // on the frame before; false forgets frames and noise before
+  double saturation = 1;                        // of the image's colours, 0..4
+  bool follows = true;                          // the previous frame; false forgets previous frames and their noise
   LiveDenoise denoise;
 };
 
-/// Where a figure of a frame came from.
+/// States where a value of a frame came from.
 enum class LiveSource : std::uint8_t { none, given, masked_pixels, frame };
 
-/// What was decided beyond the plan.
+/// Holds what was decided beyond the plan.
 struct LiveDecision {
   LiveSource black = LiveSource::none;
   LiveSource noise = LiveSource::none;
   LiveSource white = LiveSource::none;
   std::optional<NoiseLine> measured;    // the noise that the frame itself shows, where it was measured
-  std::optional<denoise::Level> level;  // that LiveDenoise::most may have lowered
-  bool reducible = false;               // a mosaic whose noise is known
+  std::optional<denoise::Level> level;  // the level before LiveDenoise::most, which may lower it
+  bool reducible = false;               // the frame is a mosaic whose noise is known
 };
 
-/// Decides about one frame after the other, and owns the plan of the last one. Allocates nothing after the first frame
-/// but to say what went wrong.
+/// Decides about one frame after the other, and owns the plan of the last one. Allocates only to report an error after
+/// the first frame.
 class LivePlanner {
  public:
   explicit LivePlanner(const LiveSetup& setup);
 
-  /// @param frame  gets the noise, colour and exposure that the facts tell
-  /// Errors: black not below white, colours that lead to no picture (malformed), a look whose luminance is not known
+  /// Decides about a frame.
+  /// @param frame  gets the noise, colour and exposure that the facts state
+  /// Errors: black not below white, colours that lead to no image (malformed), a look whose luminance is not known
   /// (insufficient).
   Result<void> plan(const LiveFacts& facts, FrameMeter& meter, RawFrame& frame);
-  /// What has to be measured of the frame that comes, if these are its facts.
+  /// Returns what has to be measured of the next frame, if these are its facts.
   MeterWants wants(const LiveFacts& facts, bool statistics) const;
   const DevelopPlan& decided() const { return plan_; }
   const LiveDecision& decision() const { return decision_; }
-  /// Whether the next plans use every effect of the look, so that all of its steps take their memory.
+  /// Sets whether the next plans use every effect of the look, so that all of its steps allocate their memory.
   void use_all_effects(bool all) { all_effects_ = all; }
   void reset();
 
@@ -114,13 +115,13 @@ class LivePlanner {
   Thumbnail thumbnail_;
   std::vector<float> blocks_, memory_;
   std::vector<double> snr_;
-  std::optional<double> exposure_ev_;  // of the frame before
-  std::optional<Vector3> neutral_;     // the same, where it was estimated
-  std::optional<NoiseLine> line_;      // of the frames before, where noise is not given
+  std::optional<double> exposure_ev_;  // of the previous frame
+  std::optional<Vector3> neutral_;     // of the previous frame, where it was estimated
+  std::optional<NoiseLine> line_;      // of the previous frames, where noise is not given
   std::optional<denoise::Level> level_;
-  bool has_level_ = false;           // level_ was decided for a frame before
-  std::optional<double> noise_iso_;  // that line_ was measured at
-  /// Of the last frame that took part in a mean over frames.
+  bool has_level_ = false;           // level_ was decided for a previous frame
+  std::optional<double> noise_iso_;  // ISO speed that line_ was measured at
+  /// Holds values of the last frame that took part in a mean over frames.
   struct Before {
     std::optional<double> exposure_s, iso, e_per_dn;
   } last_;

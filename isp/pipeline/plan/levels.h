@@ -12,19 +12,20 @@
 
 namespace lowlux::isp {
 
-/// What the raw values of a frame mean, and which of them are to be repaired.
+/// States what the raw values of a frame mean, and which of them are to be repaired.
 struct RawLevels {
   BlackPoint black;
-  std::shared_ptr<const DarkFrame> dark_frame;        // set: subtracted pixel by pixel in place of the pedestal
-  std::optional<PerSite<double>> electrons_at_white;  // set where the mosaic is counted in electrons on its way
+  std::shared_ptr<const DarkFrame> dark_frame;        // set: subtracted pixel by pixel instead of the pedestal
+  std::optional<PerSite<double>> electrons_at_white;  // set where the mosaic is converted to electrons
   std::vector<Pixel> defects;                         // ascending
 };
 
-/// Whether a frame can be rendered straight from its 16-bit codes: nothing has to be repaired, multiplied, reduced, or
-/// subtracted pixel by pixel on the way.
+/// Returns whether a frame can be rendered directly from its 16-bit codes: no step before that repairs, multiplies,
+/// reduces noise, or subtracts pixel by pixel.
 bool renders_from_codes(const RawFrame& frame, const RawLevels& levels, bool reduces_noise);
 
-/// Electrons at white of each colour; both greens have as many. Precondition: levels.electrons_at_white.
+/// Returns the electrons at white of each colour; both greens have the same number. Precondition:
+/// levels.electrons_at_white.
 std::array<double, 3> electrons_by_colour(const RawDn& raw, const RawLevels& levels);
 
 }  // namespace lowlux::isp

@@ -17,7 +17,7 @@ const Matrix3& to_xyz() {
   return matrix;
 }
 
-// LookGrid for one colour, without blur.
+// Applies LookGrid to one colour, without blur.
 Vector3 seen(const Vector3& rgb, double rod_share, double chroma, double blue) {
   const Xyz xyz = xyz_of(to_xyz() * rgb);
   const double rods = scotopic_luminance(xyz) / scotopic_luminance(*xyz_of(white_d65));
@@ -29,7 +29,7 @@ Vector3 seen(const Vector3& rgb, double rod_share, double chroma, double blue) {
   return out;
 }
 
-/// What is shown of the three effects on colours; what is not is 0, 1 and 0.
+/// Holds the strengths of the three effects on colours; those that are left out are 0, 1 and 0.
 struct ColourEffects {
   double rod_share = 0;
   double chroma = 1;
@@ -50,7 +50,8 @@ double largest_difference(const ColourEffects& first, const ColourEffects& secon
   return largest;
 }
 
-// What one of them changes, alone or with the others: faded colours show a tint that strong ones hide.
+// Returns the largest change that an effect makes, alone or with the others: faded colours show a tint that saturated
+// ones hide.
 double size_of(double ColourEffects::*effect, const ColourEffects& all) {
   ColourEffects alone, others = all;
   alone.*effect = all.*effect;

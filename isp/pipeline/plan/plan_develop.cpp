@@ -30,7 +30,8 @@ Result<void> check(const RawFrame& frame, const DevelopOptions& o) {
   return {};
 }
 
-// Defects the source names, those whose dark is unknown and, if asked for, those that stand out of what is measured.
+// Holds the defects that the source lists, those with an unknown dark value and, if requested, those found in the
+// measured values.
 struct FoundDefects {
   std::vector<Pixel> defects;
   std::vector<std::string> warnings;
@@ -51,7 +52,7 @@ FoundDefects all_defects(const RawFrame& frame, const RawDn& measured, const Thu
   return out;
 }
 
-// Dark charge that is known and still in the codes is no light.
+// Returns the thumbnail without the dark charge that is known and still in the codes: it is not light.
 Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels& levels) {
   Thumbnail out{CameraRgb(thumbnail.mean.width(), thumbnail.mean.height()), thumbnail.black_noise_std};
   std::array<double, 3> dark{};

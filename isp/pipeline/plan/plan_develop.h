@@ -7,10 +7,10 @@
 
 namespace lowlux::isp {
 
-/// Measures black, noise, exposure and white of a frame, and decides how to develop it. With a dark frame, all is
-/// measured on what is left when it is off. Errors: no black point (insufficient), those of black_of, no colour
-/// calibration for a space other than `camera` (insufficient), white not above black, matrices that cannot be
-/// (malformed), options that do not fit together or the frame (invalid_argument), those of plan_look and plan_noise.
+/// Measures black, noise, exposure and white of a frame, and decides how to develop it. With a dark frame, everything
+/// is measured after it is subtracted. Errors: no black point (insufficient), those of black_of, no colour calibration
+/// for a space other than `camera` (insufficient), white not above black, invalid matrices (malformed), options that do
+/// not fit together or the frame (invalid_argument), those of plan_look and plan_noise.
 Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
 
 }  // namespace lowlux::isp

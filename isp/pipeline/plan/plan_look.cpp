@@ -16,7 +16,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double least_mean = 1e-6;   // of the white level: blacker frames are taken for this
+constexpr double least_mean = 1e-6;   // of the white level: darker frames count as this
 constexpr double most_cd_m2 = 1e9;    // the sun
 constexpr double least_cd_m2 = 1e-7;  // below a starless night
 constexpr double least_dark = 1e-5;   // of LookGrid, in the pixels' unit
@@ -34,7 +34,7 @@ Result<void> check(const LookChoice& o, OutputSpace space) {
     return wrong(fmt::format("a scene's luminance lies between {} and {} cd/m2, not at {}", least_cd_m2, most_cd_m2,
                              *o.scene_luminance_cd_m2));
   }
-  if (!(o.dimming >= 0 && o.dimming <= 1)) return wrong("the share of darkness that is kept lies between 0 and 1");
+  if (!(o.dimming >= 0 && o.dimming <= 1)) return wrong("the fraction of darkness that is kept is between 0 and 1");
   if (!(o.field_of_view_deg >= 0.1 && o.field_of_view_deg <= 180))
     return wrong("a field of view has 0.1 to 180 degrees");
   if (!(o.tolerance > 0 && o.tolerance <= 100)) return wrong("a tolerance lies above 0 and at most at 100");
@@ -50,7 +50,7 @@ double mean_of(std::span<const float> values) {
   return values.empty() ? 0 : sum / static_cast<double>(values.size());
 }
 
-// Luminance of the white level [cd/m2]: from the exposure, or so that the mean is as given.
+// Returns the luminance of the white level [cd/m2]: from the exposure, or such that the mean is as given.
 Result<double> white_level_cd_m2(const RawFrame& frame, double mean, LookPlan& look, const LookChoice& choice) {
   if (choice.scene_luminance_cd_m2) {
     look.luminance_rule = "given";
@@ -71,7 +71,7 @@ Result<double> white_level_cd_m2(const RawFrame& frame, double mean, LookPlan& l
   return *saturation;
 }
 
-// Weights of scotopic luminance relative to white, and the rods' tint, in the primaries of the pixels.
+// Sets the weights of scotopic luminance relative to white, and the rods' tint, in the primaries of the pixels.
 void set_primaries(OutputSpace space, NightLook& look) {
   const Matrix3 from_xyz = *xyz_to_output(space), to_xyz = *inverse(from_xyz);
   const Vector3 luminance = *luminance_weights(space);
@@ -94,7 +94,7 @@ double ratio_of_white(const std::optional<WhitePoint>& white) {
   return std::clamp(colour ? scotopic_luminance(*colour) : 0.0, 0.1, 60.0);
 }
 
-// The darkest and the brightest place an eye adapts to, by blocks of the frame [cd/m2].
+// Returns the darkest and the brightest luminance that an eye adapts to, from blocks of the frame [cd/m2].
 std::array<double, 2> range_of_fields(std::span<const float> blocks, double white_cd_m2, const LookPlan& look) {
   float darkest = INFINITY, brightest = 0;
   for (const float v : blocks) {
@@ -108,7 +108,7 @@ std::array<double, 2> range_of_fields(std::span<const float> blocks, double whit
   return {field(std::isfinite(darkest) ? darkest * white_cd_m2 : 0), field(brightest * white_cd_m2)};
 }
 
-// The largest sizes anywhere in the frame: the tint of rods is strongest in between, not where it is darkest.
+// Returns the largest sizes anywhere in the frame: the tint of rods is strongest in between, not where it is darkest.
 std::array<LookEffect, 6> largest_effects(const std::array<double, 2>& fields_cd_m2, const NightLook& look) {
   constexpr int steps = 12;
   std::array<LookEffect, 6> out{};
@@ -124,8 +124,8 @@ std::array<LookEffect, 6> largest_effects(const std::array<double, 2>& fields_cd
   return out;
 }
 
-// The smallest first, as long as all that is left out together stays below the tolerance. What is a matter of taste has
-// no size, and is not called for.
+// Leaves out effects, the smallest first, as long as the sum of all that are left out stays below the tolerance.
+// Effects that are a matter of preference have no size, and are left out.
 void leave_out(double tolerance, std::span<LookEffect> effects) {
   std::array<LookEffect*, night_effect_names.size()> order{};
   std::size_t count = 0;
@@ -148,7 +148,7 @@ void decide_effects(const LookChoice& choice, const std::array<double, 2>& field
   const auto predicted = largest_effects(fields_cd_m2, look.look);
   std::array<LookEffect, 6>& effects = look.effects.emplace(predicted);
   if (monochrome) {
-    for (int k = 0; k < 3; ++k) effects[static_cast<std::size_t>(k)].size = 0;  // those of colours
+    for (int k = 0; k < 3; ++k) effects[static_cast<std::size_t>(k)].size = 0;  // the effects on colours
   }
   switch (choice.which) {
     case LookChoice::Which::automatic:
@@ -166,7 +166,7 @@ void decide_effects(const LookChoice& choice, const std::array<double, 2>& field
   for (const LookEffect& effect : effects) *effect_named(look.look.effects, effect.name) = effect.used;
 }
 
-// The state of the eye, what it calls for, and how much darker the picture gets.
+// Decides the state of the eye, the effects it requires, and how much darker the image gets.
 void decide_eye(const FrameLight& light, double white_cd_m2, const DevelopOptions& options, LookPlan& look) {
   const LookChoice& choice = options.look;
   const double ratio = look.look.scotopic_ratio_of_white;
@@ -178,7 +178,7 @@ void decide_eye(const FrameLight& light, double white_cd_m2, const DevelopOption
   if (!options.exposure_ev) look.dimming_ev = choice.dimming * apparent_dimming_ev(look.state.luminance_cd_m2);
 }
 
-// Covariance of what cones see of the noise of a pixel of mid-grey, up to a factor.
+// Returns the covariance of the cones' responses to the noise of a mid-grey pixel, up to a factor.
 Matrix3 noise_of_cones(const NoiseProfile& noise, const ModelBasis& basis, const Matrix3& rgb_to_xyz) {
   ChannelNoise channels;
   Matrix3 balanced_to_rgb{};

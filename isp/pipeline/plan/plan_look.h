@@ -14,7 +14,7 @@
 
 namespace lowlux::isp {
 
-/// What a look is decided by: the light of a frame, and how it would be rendered without the look.
+/// Holds what a look is decided by: the light of a frame, and how it would be rendered without the look.
 struct FrameLight {
   std::span<const float> block_luminance;  // white balanced, 1 at the white level, signed
   double black_noise_std = 0;              // of one pixel, same unit
@@ -22,14 +22,14 @@ struct FrameLight {
   double exposure_ev = 0;
 };
 
-/// Decides the look: how bright the scene was, how an eye adapted to it sees it, which effects that calls for, and by
-/// how much an automatic exposure is lowered for it (LookPlan::dimming_ev). Nullopt where none is asked for. Allocates
-/// nothing but to say what went wrong. Errors: insufficient where the luminance is neither given nor told by the
-/// exposure; invalid_argument for figures out of range, or a space without RGB primaries (camera, xyz).
+/// Decides the look: how bright the scene was, how an eye adapted to it perceives it, which effects that requires, and
+/// by how much an automatic exposure is lowered for it (LookPlan::dimming_ev). Returns nullopt where none is requested.
+/// Allocates only to report an error. Errors: insufficient where the luminance is neither given nor known from the
+/// exposure; invalid_argument for values out of range, or a space without RGB primaries (camera, xyz).
 Result<std::optional<LookPlan>> plan_look(const RawFrame& frame, const FrameLight& light,
                                           const DevelopOptions& options);
 
-/// What the table of a model depends on beside the look.
+/// Holds what the table of a model depends on in addition to the look.
 struct ModelBasis {
   std::optional<WhitePoint> white;
   std::array<float, 3> white_gain{1, 1, 1};
@@ -37,7 +37,7 @@ struct ModelBasis {
   double exposure_ev = 0;
 };
 
-/// A model's table, and what is to be said of it.
+/// Holds a model's table and the warnings about it.
 struct ModelTable {
   ColourTable table;
   std::vector<std::string> warnings;

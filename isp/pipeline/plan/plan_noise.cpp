@@ -16,12 +16,12 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double saturated_share_of_white = 0.99;  // a little below, because pixels do not all saturate at one code
+constexpr double saturated_share_of_white = 0.99;  // slightly below 1, because pixels do not all saturate at one code
 
 int colour_of(const RawDn& raw, int site) { return static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)); }
 
-/// Of a raw value without light, by the noise model or, if that is more, as the black point's pixels had it; at least
-/// that of rounding to codes.
+/// Returns the variance of a raw value without light, by the noise model or, if that is more, as measured on the black
+/// point's pixels; at least that of rounding to codes.
 std::array<double, 3> black_variance_e2(const RawFrame& frame, const RawLevels& levels) {
   std::array<double, 3> out{};
   for (int site = 0; site < 4; ++site) {
@@ -29,7 +29,7 @@ std::array<double, 3> black_variance_e2(const RawFrame& frame, const RawLevels& 
     const double electrons = (*levels.electrons_at_white)[site];
     const double e_per_dn = electrons / (white_at(frame.raw, site) - levels.black.pedestal_dn[site]);
     double variance = std::max(frame.noise->offset[colour] * electrons * electrons, e_per_dn * e_per_dn / 12);
-    // What was measured in the dark holds the noise of the dark charge, of which a noise profile may know nothing.
+    // Values measured in the dark include the noise of the dark charge, which a noise profile may not contain.
     variance = std::max(variance, std::pow(levels.black.noise_std_dn[site] * e_per_dn, 2));
     if (levels.dark_frame) variance += levels.dark_frame->added_variance_dn2[site] * e_per_dn * e_per_dn;
     out[colour] += variance * (colour == 1 ? 0.5 : 1);
@@ -41,7 +41,7 @@ denoise::RawNoise noise_of(const RawFrame& frame, const RawLevels& levels) {
   denoise::RawNoise out;
   out.dark_mean_e = levels.black.dark_mean_e;
   out.variance_e2 = black_variance_e2(frame, levels);
-  // White levels of a thousandth of a code make more.
+  // White levels of a thousandth of a code give larger variances.
   for (double& variance : out.variance_e2) variance = std::min(variance, denoise::largest_e);
   for (int site = 0; site < 4; ++site) {
     double& saturation_e = out.saturation_e[colour_of(frame.raw, site)];
@@ -50,7 +50,7 @@ denoise::RawNoise noise_of(const RawFrame& frame, const RawLevels& levels) {
   return out;
 }
 
-/// Gains that make a neutral equal in R, G and B [e-], G's 1.
+/// Returns the gains that make a neutral equal in R, G and B [e-]; that of G is 1.
 std::array<double, 3> balance_of(const RawFrame& frame, const RawLevels& levels, const std::array<float, 3>& white_gain,
                                  OutputSpace space) {
   std::array<double, 3> gain{white_gain[0], white_gain[1], white_gain[2]};
@@ -66,13 +66,13 @@ std::array<double, 3> balance_of(const RawFrame& frame, const RawLevels& levels,
   return gain;
 }
 
-/// Of a pixel without light.
+/// Returns the standard deviation of the noise of a pixel without light.
 double black_std_e(const denoise::RawNoise& noise) {
   const auto& v = noise.variance_e2;
   return std::sqrt(noise.dark_mean_e[0] + (v[0] + 2 * v[1] + v[2]) / 4);
 }
 
-/// What is seen of lines: the eye follows their sum.
+/// Returns the least visible standard deviation of line noise: the eye integrates it along lines.
 double least_line_std_e(const denoise::RawNoise& noise) { return 0.03 * black_std_e(noise); }
 
 std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& reduction, PlaneView<const float> charge_e,
@@ -90,7 +90,7 @@ std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& reduction, Plan
   return lines;
 }
 
-/// What lines took part in the noise of a pixel goes with them.
+/// Subtracts line noise, and its contribution to the variance of a pixel.
 void take_lines_off(RawElectrons& charge, NoiseReduction& out, Executor& executor) {
   out.lines = lines_of(out, charge.value.view(), executor);
   for (const denoise::LineOffsets& lines : out.lines) {
@@ -124,7 +124,8 @@ void choose_level(const NoiseRequest& request, NoiseReduction& out) {
   out.reason = fmt::format("signal to noise ratio {:.3g} of a pixel in the middle block", *out.snr);
 }
 
-/// Lines need the whole frame; what noise is left is checked on a sample of it where there is one.
+/// Returns the charge to check: lines need the whole frame; the remaining noise is checked on a sample of it where
+/// there is one.
 RawElectrons charge_to_check(const RawFrame& frame, const RawLevels& levels, bool with_lines, NoiseReduction& out,
                              Executor& executor) {
   const std::vector<Rect> squares = sample_squares(frame, levels);
@@ -141,7 +142,7 @@ std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& leve
     return Error{ErrorCode::unsupported, "noise is reduced on Bayer mosaics, and this is none"};
   }
   if (frame.raw.active.width < 2 || frame.raw.active.height < 2) {
-    return Error{ErrorCode::invalid_argument, "the picture is too small to tell noise from detail"};
+    return Error{ErrorCode::invalid_argument, "the picture is too small to separate noise from detail"};
   }
   if (!levels.electrons_at_white) {
     return Error{ErrorCode::insufficient,

@@ -14,44 +14,44 @@
 
 namespace lowlux::isp {
 
-/// Why the noise of a frame cannot be reduced at all; nullopt if it can. Errors: no Bayer mosaic (unsupported), too
-/// small (invalid_argument), unknown noise (insufficient).
+/// Returns why the noise of a frame cannot be reduced at all; nullopt if it can. Errors: no Bayer mosaic (unsupported),
+/// too small (invalid_argument), unknown noise (insufficient).
 std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& levels);
 
-/// Row or column noise is taken off where it stands out: its own is more than the error of its measurement, and more
-/// than 3 % of a pixel's noise, as the eye follows its sum over a line. More than a pixel's noise is no readout, but a
-/// blind or a fence.
+/// Returns whether row or column noise is significant and thus subtracted: it is more than the error of its
+/// measurement, and more than 3 % of a pixel's noise, as the eye integrates it along a line. More than a pixel's noise
+/// is not from the readout but scene structure, such as a blind or a fence.
 bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise);
 
-/// What the reduction of a frame's noise goes by.
+/// Holds what the reduction of a frame's noise is decided by.
 struct NoiseRequest {
   DenoiseChoice choice;
   OutputSpace space = OutputSpace::srgb;
   std::array<float, 3> white_gain{1, 1, 1};
-  std::optional<DecidedLevel> level;  // set: in place of what Mode::automatic chooses
+  std::optional<DecidedLevel> level;  // set: used instead of the choice of Mode::automatic
   bool lines = true;                  // false: row and column noise stays, whatever the choice
 };
 
-/// Decides how noise is reduced. Errors, for a level that was asked for: a frame that is no Bayer mosaic (unsupported),
-/// unknown noise (insufficient). For an automatic one these are reasons to leave the noise.
+/// Decides how noise is reduced. Errors for a requested level: a frame that is not a Bayer mosaic (unsupported),
+/// unknown noise (insufficient). For an automatic level these are reasons to leave the noise.
 Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, const RawLevels& levels,
                                   const NoiseRequest& request, Executor& executor);
 
-// Its steps that allocate nothing.
+// Steps of plan_noise that allocate nothing.
 
-/// The noise of a frame's raw values, and the gains of R, G and B that its chroma is balanced by.
+/// Holds the noise of a frame's raw values, and the gains of R, G and B that balance its chroma.
 struct NoiseModel {
   NoiseProfile::Source source = NoiseProfile::Source::file;
   denoise::RawNoise noise;
   std::array<double, 3> white_gain{1, 1, 1};
 };
 
-/// Precondition: frame.noise, levels.electrons_at_white.
+/// Returns the noise model of a frame. Precondition: frame.noise, levels.electrons_at_white.
 NoiseModel noise_model(const RawFrame& frame, const RawLevels& levels, const std::array<float, 3>& white_gain,
                        OutputSpace space);
 
-/// Signal to noise ratio of a mean pixel of the block in the middle of all, dark blocks first.
-/// @param snr  memory; grows to as many figures as there are blocks
+/// Returns the median over all blocks of the signal-to-noise ratio of a mean pixel.
+/// @param snr  memory; grows to one value for each block
 double middle_snr(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
                   const Thumbnail& thumbnail, std::vector<double>& snr);
 

@@ -14,8 +14,8 @@ using denoise::Level;
 
 constexpr double least_saving = 0.1;
 
-/// Time of a level for each pixel, relative to draft: `lowlux bench --stage denoise`. Taking dark off is next to
-/// nothing.
+/// Returns the time of a level for each pixel, relative to draft: `lowlux bench --stage denoise`. Subtracting dark
+/// charge takes next to nothing.
 double work_of(std::optional<Level> level) {
   constexpr std::array work{1.0, 1.5, 2.1, 40.0};
   return level ? work[static_cast<std::size_t>(*level)] : 0.05;

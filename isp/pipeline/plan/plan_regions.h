@@ -9,13 +9,13 @@
 
 namespace lowlux::isp {
 
-inline constexpr int region_px = 1024;  // of a side
+inline constexpr int region_px = 1024;  // side of a region
 
-/// Less work for the parts of a frame that call for less: for each region the cheapest level that stays below the
-/// tolerance there, `most` where none does. Nullopt where that saves less than a tenth of the noise reduction's time,
-/// as far as the levels' usual ones and the margins of the parts tell, or where the frame is one region.
+/// Plans less work for the regions of a frame that need less: for each region the cheapest level that stays below the
+/// tolerance there, `most` where none does. Returns nullopt where that saves less than a tenth of the noise reduction's
+/// time, as estimated from the levels' usual times and the margins of the tiles, or where the frame is one region.
 /// @param active  of the frame
-/// @param most    that of the frame as a whole
+/// @param most    level of the frame as a whole
 std::optional<NoiseRegions> plan_regions(const Rect& active, const std::vector<SeenBlock>& blocks, denoise::Level most,
                                          double tolerance_delta_e);
 

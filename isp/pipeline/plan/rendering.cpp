@@ -32,7 +32,8 @@ Result<WhiteBalance> choose_white(const RawFrame& frame, const DevelopOptions& o
   return found;
 }
 
-// A neutral that is no colour of a light leads to no XYZ: an automatic one gives way to daylight, others are errors.
+// A neutral that is not a valid colour of a light has no XYZ: an automatic one is replaced by daylight, others are
+// errors.
 Result<WhiteBalance> with_white(Result<WhiteBalance> balance, const RawFrame& frame, const DevelopOptions& o) {
   if (!balance || balance->white || frame.raw.layout == SensorLayout::monochrome) return balance;
   if (o.white_balance.mode == WhiteBalanceChoice::Mode::automatic) {

@@ -5,13 +5,13 @@
 
 #include "isp/base/cfa.h"
 
-/// Figures of a Bayer cell, by colour or by site.
+/// These functions average over a Bayer cell, by colour or by site.
 namespace lowlux::isp {
 
-/// How many of its sites are red, green and blue, of all.
+/// States the fractions of a cell's sites that are red, green and blue.
 inline constexpr std::array<double, 3> share_of_sites{0.25, 0.5, 0.25};
 
-/// Mean over the sites of a figure that each colour has.
+/// Returns the mean over the sites of a value that each colour has.
 constexpr double mean_of_colours(const std::array<double, 3>& of_colour) {
   double sum = 0;
   for (std::size_t c = 0; c < 3; ++c) sum += share_of_sites[c] * of_colour[c];

@@ -4,7 +4,7 @@
 
 #include "isp/pipeline/plan.h"
 
-/// What a plan asks of the frame as a whole.
+/// These functions return what a plan requires of the frame as a whole.
 namespace lowlux::isp {
 
 inline bool bounds_noise(const DevelopPlan& plan) {

@@ -8,7 +8,7 @@ namespace {
 
 int rounded_up(int value, int unit) { return (value + unit - 1) / unit * unit; }
 
-/// First and last, excluded, of what a piece covers along one direction.
+/// Holds the first and last pixel, the latter excluded, that a padded tile covers along one direction.
 struct Span {
   int first;
   int last;
@@ -25,7 +25,7 @@ TileGrid::Axis TileGrid::axis(int start, int length, int side) {
   assert(length > 0 && start >= 0 && side >= tile_lattice_px && side % tile_lattice_px == 0);
   const int first = start / tile_lattice_px * tile_lattice_px, span = start + length - first;
   const int fewest = (span + side - 1) / side;
-  const int core = rounded_up((span + fewest - 1) / fewest, tile_lattice_px);  // none much smaller than the others
+  const int core = rounded_up((span + fewest - 1) / fewest, tile_lattice_px);  // none is much smaller than the others
   return {start, length, first, core, (span + core - 1) / core};
 }
 
@@ -36,7 +36,7 @@ int TileGrid::Axis::edge(int i) const {
   if (i == 0) return start;
   if (i == count) return start + length;
   const int line = first + i * core;
-  return line + ((line - start) & 1);  // even in the picture: cells of half size stay in one piece
+  return line + ((line - start) & 1);  // even in the image: a cell of half size stays in one tile
 }
 
 Rect TileGrid::core(int i) const {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int noise_block = 8;  // cells, each way
 
-/// Regions of a grid, ends excluded.
+/// Holds a range of regions of a grid, ends excluded.
 struct Cells {
   int left, top, right, bottom;
 };
@@ -46,7 +46,7 @@ bool touches(const Rect& a, const Rect& b) {
   return both.width > 0 && both.height > 0;
 }
 
-/// The largest part from a region on: first to the right, then downwards.
+/// Returns the largest tile that starts at a region: extended first to the right, then downwards.
 Cells joined(const NoiseRegions& regions, int column, int row, const Cells& within, int side,
              const std::vector<LevelPart>& taken) {
   const auto level = level_at(regions, column, row);
@@ -66,7 +66,7 @@ Cells joined(const NoiseRegions& regions, int column, int row, const Cells& with
   return out;
 }
 
-/// Mean of the finite values of one colour in a block of sites.
+/// Holds sums and counts of the finite values of each colour in a block of sites, for their means.
 struct BlockMeans {
   std::array<double, 3> sum{};
   std::array<int, 3> count{};

@@ -10,7 +10,7 @@
 namespace lowlux::isp {
 namespace {
 
-// Luminance of a unit of white-balanced camera RGB.
+// Returns the luminance of a unit of each channel of white-balanced camera RGB.
 std::array<float, 3> weights_of(const DevelopPlan& plan) {
   std::array<float, 3> weights{};
   for (int c = 0; c < 3; ++c) {
@@ -20,13 +20,13 @@ std::array<float, 3> weights_of(const DevelopPlan& plan) {
   return weights;
 }
 
-// Luma that is left noisy, over the cells of 2 x 2 that lie in those of the grid.
+// Averages the residual variance of luma over the cells of 2 x 2 that lie in each cell of the grid.
 void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const float>& residual, PlaneView<float> out,
              Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
   const auto electrons = static_cast<float>(mean_of_sites(*plan.levels.electrons_at_white));
   const float unit = (weights[0] + weights[1] + weights[2]) / electrons;
-  const int cells = plan.options.half ? 4 : 2;  // of the map along a side of the grid's
+  const int cells = plan.options.half ? 4 : 2;  // cells of the map along a side of the grid's
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       for (int x = 0; x < out.width; ++x) {
@@ -41,8 +41,8 @@ void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const fl
   });
 }
 
-// The raw's variance at the fraction x of white, scale x + offset, of each channel, as if each pixel had its own three,
-// but for monochrome frames.
+// Applies the raw frame's variance at the fraction x of white, scale x + offset, to each channel, as if each pixel had
+// its own three, except for monochrome frames.
 void of_model(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
   const NoiseProfile& noise = *plan.rendering.look->noise;

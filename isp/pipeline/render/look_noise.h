@@ -6,11 +6,11 @@
 
 namespace lowlux::isp {
 
-/// Variance of the noise in the luminance of the picture's pixels, in their unit (that of plan.rendering.transform),
-/// one figure for each cell of 4 x 4: what the denoiser says it left, or what the noise model says of what came in.
-/// Needs noise that was reduced, or a look that knows it.
+/// Computes the variance of the noise in the luminance of the image's pixels, in their unit (that of
+/// plan.rendering.transform), one value for each cell of 4 x 4: the residual noise that the denoiser predicts, or the
+/// input noise that the noise model predicts. Needs noise that was reduced, or a look with a noise model.
 /// @param maps  of the active area; read where noise was reduced
-/// @param quarter  means of camera RGB (RawToRgb::quarter), read where it was not
+/// @param quarter  means of camera RGB (RawToRgb::quarter), read where noise was not reduced
 /// @param out  ceil(plan.height / 4) x ceil(plan.width / 4)
 void noise_of_luminance(const DevelopPlan& plan, const Rect& crop, const NoiseMaps& maps,
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor);

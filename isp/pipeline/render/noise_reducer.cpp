@@ -18,7 +18,7 @@ denoise::DenoiseMaps views_of(NoiseMaps& maps) {
                             maps.site_variance_e2[2].view()}};
 }
 
-/// Memory for the maps of a mosaic.
+/// Allocates memory for the maps of a mosaic.
 void fit(NoiseMaps& maps, int width, int height) {
   const int columns = (width + 1) / 2, rows = (height + 1) / 2;
   fit(maps.residual_variance_e2, columns, rows);
@@ -26,7 +26,7 @@ void fit(NoiseMaps& maps, int width, int height) {
   for (Plane<float>& plane : maps.site_variance_e2) fit(plane, columns, rows);
 }
 
-/// Of the cells of a part; none where there are no maps.
+/// Returns the maps of the cells of a tile; none where there are no maps.
 denoise::DenoiseMaps crop_of(const denoise::DenoiseMaps& maps, const Rect& sites) {
   if (maps.residual_variance.data == nullptr) return {};
   const auto cells = [&](const PlaneView<float>& map) {
@@ -54,12 +54,13 @@ PlaneView<T> crop_of(const PlaneView<T>& view, const Rect& part) {
   return view.crop(part.x, part.y, part.width, part.height);
 }
 
-/// As seen from the corner of a piece.
+/// Returns `part` relative to the corner of `piece`.
 Rect seen_from(const Rect& piece, const Rect& part) {
   return {part.x - piece.x, part.y - piece.y, part.width, part.height};
 }
 
-/// A core may begin one pixel behind an even column or row; what is before belongs to the margin then.
+/// Extends a core to an even column and row: it may begin one pixel behind one; what is before then belongs to the
+/// margin.
 Rect from_even_site(const Rect& core) {
   return {core.x & ~1, core.y & ~1, core.width + (core.x & 1), core.height + (core.y & 1)};
 }
@@ -70,12 +71,12 @@ void take_lines_off(const NoiseReduction& how, const Rect& piece, PlaneView<floa
   }
 }
 
-/// What a part is reduced in.
+/// Returns the padded tile in which a tile's noise is reduced.
 Rect with_own_margin(const LevelPart& part, const NoiseReducer::Piece& piece) {
   return overlap(with_margin(part.core, {}, piece.frame_width, piece.frame_height), piece.whole);
 }
 
-/// Sides of the largest of the parts that have a level, each way; 0 where none has.
+/// Holds the largest width and height of the tiles that have a level; 0 where none has.
 struct PartSize {
   int width = 0;
   int height = 0;
@@ -91,9 +92,10 @@ PartSize largest(const std::vector<LevelPart>& parts, const NoiseReducer::Piece&
   return out;
 }
 
-/// One column parity of one row of mosaics: what a mean over frames and a level's result make together.
+/// Holds the sites of one column parity of one row of mosaics, where a mean over frames and a level's result are
+/// blended.
 struct BlendSites {
-  const float* mean_e;    // dark charge in; every second sample
+  const float* mean_e;    // dark charge included; every second sample
   const float* share;     // one for each cell
   const float* level_e2;  // variance of the level's result, one for each cell
   float dark_e;
@@ -103,7 +105,7 @@ struct BlendSites {
 void blend_sites(const BlendSites& in, int sites, float* signal_e) {
   for (int i = 0; i < sites; ++i) {
     const float mean_e = in.mean_e[2 * i];
-    // The charge by the level's result: by the noisy mean itself, low values would count more than high ones.
+    // The charge is that of the level's result: with the noisy mean itself, low values would count more than high ones.
     const float charge_e = std::max(signal_e[2 * i] + in.dark_e, 0.0f);
     const float time_e2 = in.share[i] * (charge_e + in.variance_e2);
     const float level_e2 = NoiseReducer::doubt_of(in.share[i]) * in.level_e2[i];
@@ -119,7 +121,7 @@ void NoiseReducer::reserve_level(int width, int height, denoise::Level most) {
   width_ = std::max(width, width_);
   height_ = std::max(height, height_);
   most_ = std::max(most, most_);
-  denoiser_.reset();  // before the next one takes its memory
+  denoiser_.reset();  // frees its memory before the next one is allocated
   denoiser_ = std::make_unique<denoise::Denoiser>(width_, height_, executor_.width(), most_);
 }
 

@@ -12,50 +12,53 @@
 
 namespace lowlux::isp {
 
-/// Takes lines, noise and dark charge off a mosaic as decided. Owns the denoisers and their memory (see Denoiser and
-/// TemporalMean), which the first frame of a size allocates.
+/// Subtracts lines and dark charge from a mosaic and reduces its noise as decided. Owns the denoisers and their memory
+/// (see Denoiser and TemporalMean), which the first frame of a size allocates.
 ///
-/// Where a level and frames before both take part, each site is the mean of both results, weighted by the inverse of
-/// their predicted variances: what moves is left to the level, what stands still to the frames before. That of the
-/// level counts doubt_of() times, because what it takes from detail is not in it.
+/// Where a level and previous frames both take part, each site is the mean of both results, weighted by the inverse of
+/// their predicted variances: what moves is left to the level, what stands still to the previous frames. The variance
+/// of the level counts doubt_of() times, because it does not include the detail that the level removes.
 class NoiseReducer {
  public:
   explicit NoiseReducer(Executor& executor) : executor_(executor) {}
 
-  /// Where regions differ, each is reduced with a margin of tile_margin_px of its own, and the rest as it is.
-  /// @param raw   as the frame the decision was made for; its lines are taken off in place
+  /// Reduces the noise of a frame. Where regions differ, each tile with a level is reduced with a margin of
+  /// tile_margin_px of its own, and the others keep their noise.
+  /// @param raw   as the frame the decision was made for; its lines are subtracted in place
   /// @param maps  filled if not null
   /// Precondition: how.reduces().
   SignalElectrons run(RawElectrons& raw, const NoiseReduction& how, Plane<float> memory, NoiseMaps* maps);
 
-  /// A piece of a frame, in pixels of its active area. The corner of `whole` is on the lattice of frame_tiles.h.
+  /// Describes a tile of a frame, in pixels of its active area. The corner of `whole` is on the lattice of
+  /// frame_tiles.h.
   struct Piece {
-    Rect core;   // what is asked for
-    Rect whole;  // what is known, the margin with it
+    Rect core;   // region that is requested
+    Rect whole;  // padded tile: the region that is known, margin included
     int frame_width = 0;
     int frame_height = 0;
     BayerPhase phase = BayerPhase::rggb;  // of the frame
   };
-  /// The same for a piece of a frame.
-  /// @param raw_e     `whole`; its lines are taken off in place
+  /// Reduces the noise of a tile of a frame, as run() does for a frame.
+  /// @param raw_e     the padded tile; its lines are subtracted in place
   /// @param signal_e  as large; the core is set
-  /// Precondition: how.reduces(), without frames before.
+  /// Precondition: how.reduces(), without previous frames.
   void run_piece(const Piece& piece, const NoiseReduction& how, PlaneView<float> raw_e, PlaneView<float> signal_e);
-  /// Bytes for a frame of width x height pixels, without frames before.
-  /// @param maps  whether they are asked for; their own memory is not in it
+  /// Returns the bytes for a frame of width x height pixels, without previous frames.
+  /// @param maps  whether they are requested; their own memory is not included
   static std::size_t bytes(int width, int height, const NoiseReduction& how, bool maps, int threads);
-  /// Of NoiseMaps.
+  /// Returns the bytes of the NoiseMaps of a frame.
   static std::size_t maps_bytes(int width, int height);
-  /// Memory for pieces of up to width x height pixels, so that later ones need none.
+  /// Allocates memory for tiles of up to width x height pixels, so that later ones need none.
   void reserve_pieces(int width, int height, const NoiseReduction& how);
 
-  /// 1 where only this frame is known, 4 where many before it are: noise of one frame that comes back is seen, and a
-  /// mean of few frames may be of something that moved too little to be found. Chosen on the pictures of
-  /// tests/scenarios/temporal_blend_test.cpp, which prints what others give.
-  /// @param share  variance of the mean over frames, of a raw value's, 0..1
+  /// Returns the factor of the level's variance: 1 where only this frame is known, 4 where many previous ones are:
+  /// noise of a single frame that comes back is visible, and a mean of few frames may be of something that moved too
+  /// little to be detected. Chosen on the images of tests/scenarios/temporal_blend_test.cpp, which prints the results
+  /// of other factors.
+  /// @param share  variance of the mean over frames, as a fraction of a raw value's, 0..1
   static constexpr float doubt_of(float share) { return 1 + 3 * (1 - share) * (1 - share); }
 
-  /// Share of the blocks that moved in the last frame; 0 where frames before took no part.
+  /// Returns the fraction of the blocks that moved in the last frame; 0 where no previous frames took part.
   double moved() const { return moved_; }
 
  private:
@@ -75,13 +78,13 @@ class NoiseReducer {
   std::unique_ptr<denoise::TemporalMean> temporal_;
   int temporal_width_ = 0;
   int temporal_height_ = 0;
-  Plane<float> mean_e_;          // over frames, dark charge in
-  Plane<float> variance_share_;  // of a raw value's, one for each 2x2 cell
+  Plane<float> mean_e_;          // mean over frames, dark charge included
+  Plane<float> variance_share_;  // of mean_e_ over a raw value's, one for each 2x2 cell
   NoiseMaps level_maps_;
   double moved_ = 0;
-  denoise::Level most_ = denoise::Level::high;  // that there is memory for
+  denoise::Level most_ = denoise::Level::high;  // highest level that there is memory for
   std::vector<LevelPart> parts_;
-  Plane<float> part_e_;  // of a region and its margin
+  Plane<float> part_e_;  // of a tile and its margin
   NoiseMaps part_maps_;
 };
 

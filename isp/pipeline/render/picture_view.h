@@ -11,21 +11,22 @@
 
 namespace lowlux::isp {
 
-/// A picture of somebody's, or a part of it: codes are height x 3 width.
+/// Refers to an image owned elsewhere, or to a crop of one: codes are height x 3 width.
 using PictureView = std::variant<PlaneView<std::uint8_t>, PlaneView<std::uint16_t>, RgbView<float>>;
 
-/// An uninitialised picture.
+/// Returns an uninitialised image.
 Picture make_picture(SampleType samples, int width, int height);
 
 PictureView view_of(Picture& picture);
 
-/// @param pixels  inside of the picture
+/// Returns a crop of an image.
+/// @param pixels  inside the image
 PictureView crop_of(const PictureView& picture, const Rect& pixels);
 
-/// Both of one size and sample type.
+/// Copies an image to another of the same size and sample type.
 void copy_pixels(const PictureView& from, const PictureView& to);
 
-/// What the kernel makes of `in`, as the plan says: codes, those of the plan's display, or floats.
+/// Writes what the kernel makes of `in`, as the plan states: codes, those of the plan's display, or floats.
 void encode(RawToRgb& kernel, const RgbInput& in, const RgbTransform& transform, const DevelopPlan& plan,
             const PictureView& out, Executor& executor);
 

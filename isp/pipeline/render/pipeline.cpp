@@ -19,7 +19,7 @@ PlaneView<const float> crop_of(const Plane<float>& active, const Rect& crop) {
   return active.view().crop(crop.x, crop.y, crop.width, crop.height);
 }
 
-// What is left to do with planes that are already light in the picture's primaries.
+// Returns the remaining transform of planes that are already light in the image's primaries.
 RgbTransform of_modelled(const DevelopPlan& plan, const LookGrid* look) {
   RgbTransform out;
   out.luminance = plan.rendering.transform.luminance;
@@ -40,7 +40,7 @@ DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
 
 }  // namespace
 
-// Dark charge off, and noise if so decided.
+// Subtracts dark charge, and reduces noise if so decided.
 SignalElectrons Pipeline::signal_electrons(const RawFrame& frame, const DevelopPlan& plan) {
   if (!plan.noise_reduction.reduces()) {
     return subtract_dark(raw_electrons(frame, plan.levels, std::move(mosaic_), executor_), plan.levels.black,
@@ -53,7 +53,8 @@ SignalElectrons Pipeline::signal_electrons(const RawFrame& frame, const DevelopP
   return out;
 }
 
-// Bayer frames that have to be repaired, multiplied or denoised first: in electrons where the gain is known.
+// Makes the mosaic of Bayer frames that have to be repaired, multiplied or denoised first: in electrons where the gain
+// is known.
 void Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& plan) {
   const RawDn& raw = frame.raw;
   if (plan.levels.electrons_at_white) {
@@ -119,12 +120,12 @@ void Pipeline::reserve(const RawFrame& frame, const DevelopPlan& plan) {
   }
 }
 
-// From means of the frame that is rendered.
+// Makes the grid from means of the frame that is rendered.
 LookGrid Pipeline::look_grid(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan) {
   if (!look_ || look_width_ < plan.width || look_height_ < plan.height) {
     look_width_ = std::max(plan.width, look_width_);
     look_height_ = std::max(plan.height, look_height_);
-    look_.reset();  // before the next one takes its memory
+    look_.reset();  // frees its memory before the next one is allocated
     look_ = std::make_unique<NightLookGrid>(look_width_, look_height_);
   }
   const int width = cells_along(plan.width), height = cells_along(plan.height);
@@ -188,7 +189,7 @@ PlaneView<const float> Pipeline::signal(const RawFrame& frame, const DevelopPlan
   return std::as_const(mosaic_).view();
 }
 
-// Light relative to the scene's white through the model's table; in planes of the picture's own primaries.
+// Passes light relative to the scene's white through the model's table; the planes are in the image's own primaries.
 CameraPlanes Pipeline::as_modelled(const RgbInput& in, const DevelopPlan& plan) {
   for (Plane<float>& plane : modelled_) fit(plane, plan.width, plan.height);
   const RgbView<float> planes{modelled_[0].view(), modelled_[1].view(), modelled_[2].view()};

@@ -13,31 +13,32 @@
 
 namespace lowlux::isp {
 
-/// Turns raw frames into pictures as their plans say. Owns every buffer between the two: the first frame of a size
-/// allocates them, later ones of that size allocate nothing. One frame at a time.
+/// Renders raw frames to images as their plans state. Owns every buffer between the two: the first frame of a size
+/// allocates them, later ones of that size allocate nothing. Processes one frame at a time.
 class Pipeline {
  public:
-  /// @param limits  from which size on frames go by tiles, which bounds their memory: see goes_by_tiles
+  /// @param limits  from which size on frames are rendered in tiles, which bounds their memory: see goes_by_tiles
   explicit Pipeline(Executor& executor, const TileLimits& limits = {})
       : executor_(executor), limits_(limits), noise_reducer_(executor), tiles_(executor, limits) {}
 
-  /// `out` holds a picture of plan.width x plan.height of the planned sample type: see make_picture().
+  /// Renders a frame to `out`, an image of plan.width x plan.height of the planned sample type: see make_picture().
   void render(const RawFrame& frame, const DevelopPlan& plan, Picture& out);
-  /// The picture's 8-bit codes, row by row; plan.display is not asked. This and what follows works on whole
-  /// frames of any size.
+  /// Renders a frame to 8-bit codes, row by row; plan.display is ignored. This function and those that follow process
+  /// frames of any size as a whole.
   void render(const RawFrame& frame, const DevelopPlan& plan, const RowSink& out);
-  /// The picture's 16-bit codes into memory of the caller's, height x 3 width; the same.
+  /// Renders a frame to 16-bit codes in the caller's memory, height x 3 width; plan.display is ignored.
   void render(const RawFrame& frame, const DevelopPlan& plan, PlaneView<std::uint16_t> out);
 
-  /// The mosaic of the active area as it is before corrections and white balance: electrons, signed, noise and dark
-  /// charge off as planned. Valid until the next frame. Precondition: a Bayer frame, plan.levels.electrons_at_white.
+  /// Returns the mosaic of the active area as it is before corrections and white balance: electrons, signed, noise
+  /// reduced and dark charge subtracted as planned. Valid until the next frame. Precondition: a Bayer frame,
+  /// plan.levels.electrons_at_white.
   PlaneView<const float> signal(const RawFrame& frame, const DevelopPlan& plan);
 
-  /// Share of the picture that moved, see NoiseReducer.
+  /// Returns the fraction of the image that moved, see NoiseReducer.
   double moved() const { return noise_reducer_.moved(); }
 
-  /// Of the active area of the frame rendered last; empty unless its noise was reduced and maps were asked for or a
-  /// look needed them.
+  /// Returns the noise maps of the active area of the frame rendered last; empty unless its noise was reduced and maps
+  /// were requested or a look needed them.
   NoiseMaps take_noise_maps() {
     return std::exchange(has_noise_maps_, false) ? std::exchange(noise_maps_, {}) : NoiseMaps{};
   }
@@ -59,21 +60,21 @@ class Pipeline {
   TileRenderer tiles_;
   std::unique_ptr<RawToRgb> kernel_;
   int kernel_width_ = 0;
-  Plane<float> mosaic_;   // active area, black and dark off
-  Plane<float> noisy_;    // before noise was reduced
-  NoiseMaps noise_maps_;  // their memory stays for frames that have them again
+  Plane<float> mosaic_;   // active area, black and dark charge subtracted
+  Plane<float> noisy_;    // active area before noise reduction
+  NoiseMaps noise_maps_;  // their memory is kept for later frames that have maps
   bool has_noise_maps_ = false;
   std::unique_ptr<NightLookGrid> look_;
   int look_width_ = 0;
   int look_height_ = 0;
   std::array<Plane<float>, 3> quarter_;  // for the look: means of 4 x 4 pixels
   Plane<float> luminance_noise_;
-  std::array<Plane<float>, 3> modelled_;  // light, where a model of appearance changes it
+  std::array<Plane<float>, 3> modelled_;  // light as changed by a model of appearance
   std::array<Plane<float>, 3> planes_;    // camera RGB of frames that need no demosaicing
   std::array<Plane<float>, 3> half_planes_;
 };
 
-/// An uninitialised picture for a plan.
+/// Returns an uninitialised image for a plan.
 Picture make_picture(const DevelopPlan& plan);
 
 }  // namespace lowlux::isp

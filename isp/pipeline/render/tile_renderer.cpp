@@ -16,19 +16,20 @@ namespace {
 
 constexpr int demosaic_reach_px = 2;
 
-/// Without noise reduction a pixel depends on its neighbours only, as far as demosaicing and repair reach.
+/// Returns the margin of a tile: without noise reduction a pixel depends on its neighbours only, as far as demosaicing
+/// and repair reach.
 TileMargin margin_of(const DevelopPlan& plan) {
   return plan.noise_reduction.reduces() ? TileMargin{} : TileMargin{.px = 8, .lattice = 2};
 }
 
-/// What is demosaiced: at the border of the picture the mosaic ends, elsewhere it goes on.
+/// Returns the region that is demosaiced: at the border of the image the mosaic ends, elsewhere it continues.
 Rect seen_of(const RawDn& raw, const DevelopPlan& plan, const Rect& core) {
   constexpr int reach = demosaic_reach_px;
   if (plan.options.half) return core;
   return overlap({core.x - reach, core.y - reach, core.width + 2 * reach, core.height + 2 * reach}, raw.default_crop);
 }
 
-/// Where a core lies in the picture.
+/// Returns where a core lies in the image.
 Rect pixels_of(const RawDn& raw, const DevelopPlan& plan, const Rect& core) {
   const int cell = plan.options.half ? 2 : 1;
   return {(core.x - raw.default_crop.x) / cell, (core.y - raw.default_crop.y) / cell, core.width / cell,
@@ -43,9 +44,9 @@ PlaneView<const float> crop_of(const PlaneView<const float>& mosaic, const Rect&
   return mosaic.crop(part.x - whole.x, part.y - whole.y, part.width, part.height);
 }
 
-/// Of the largest piece.
+/// Holds the sizes of the largest tile.
 struct Sizes {
-  int width = 0;  // margins with it
+  int width = 0;  // margins included
   int height = 0;
   int seen_width = 0;
   int seen_height = 0;
@@ -65,7 +66,7 @@ Sizes sizes_of(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limi
 }
 
 std::size_t bytes_of(SampleType samples) {
-  return samples == SampleType::u8 ? 3 : samples == SampleType::u16 ? 6 : 12;  // a pixel's
+  return samples == SampleType::u8 ? 3 : samples == SampleType::u16 ? 6 : 12;  // of one pixel
 }
 
 }  // namespace
@@ -107,14 +108,14 @@ void TileRenderer::reserve(const RawFrame& frame, const DevelopPlan& plan) {
   const bool fits = picture_ && picture_samples_ == plan.options.samples && picture_width_ == sizes.seen_width &&
                     picture_height_ == sizes.seen_height;
   if (fits) return;
-  picture_.reset();  // before the next one takes its memory
+  picture_.reset();  // frees its memory before the next one is allocated
   picture_ = make_picture(plan.options.samples, sizes.seen_width, sizes.seen_height);
   picture_samples_ = plan.options.samples;
   picture_width_ = sizes.seen_width;
   picture_height_ = sizes.seen_height;
 }
 
-/// The mosaic of a core and its margin, as it goes to the kernel but for the gains of white balance.
+/// Returns the mosaic of a core and its margin, as the kernel takes it except for the gains of white balance.
 PlaneView<float> TileRenderer::mosaic_of(const RawFrame& frame, const DevelopPlan& plan, const Rect& core,
                                          NoiseReducer& noise) {
   const RawDn& raw = frame.raw;

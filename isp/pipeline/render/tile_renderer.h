@@ -15,23 +15,24 @@
 
 namespace lowlux::isp {
 
-/// Whether a frame is rendered piece by piece: a Bayer frame above TileLimits::most_whole_px whose mosaic goes through
-/// floats. Those that go straight from codes need no mosaic. Whole stay, whatever their size: frames that are
-/// demosaiced or monochrome, looks that are made of the whole picture or tabulated (`--look`), noise that is held to a
-/// limit, maps of the noise, and what frames before take part in.
+/// Returns whether a frame is rendered in tiles: a Bayer frame above TileLimits::most_whole_px whose mosaic is
+/// processed in floats. Frames rendered directly from codes need no mosaic. Never split, whatever their size, are
+/// frames that are demosaiced or monochrome, looks that are made of the entire image or tabulated (`--look`), noise
+/// that is held to a limit, maps of the noise, and frames in which previous ones take part.
 bool goes_by_tiles(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limits);
 
-/// Renders Bayer frames piece by piece: of each core and its margin the mosaic, its noise, its picture. Without noise
-/// reduction the picture has the same bits as that of the whole frame; with it, what differs is far below the noise
+/// Renders Bayer frames in tiles: for each core and its margin the mosaic, its noise, its image. Without noise
+/// reduction the image has the same bits as that of the whole frame; with it, the difference is far below the noise
 /// (README.md). Owns its memory, which the first frame of a size allocates.
 class TileRenderer {
  public:
   TileRenderer(Executor& executor, const TileLimits& limits) : executor_(executor), limits_(limits) {}
 
-  /// Precondition: goes_by_tiles.
+  /// Renders a frame in tiles. Precondition: goes_by_tiles.
   void render(const RawFrame& frame, const DevelopPlan& plan, NoiseReducer& noise, Picture& out);
 
-  /// Bytes for such a frame, those of the NoiseReducer with it; more than it takes only where regions differ.
+  /// Returns the bytes for such a frame, those of the NoiseReducer included; more than are taken only where regions
+  /// differ.
   static std::size_t bytes(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limits, int threads);
 
  private:
@@ -42,12 +43,12 @@ class TileRenderer {
 
   Executor& executor_;
   TileLimits limits_;
-  Plane<float> noisy_;   // of a piece
-  Plane<float> mosaic_;  // of a piece, where noise is reduced
+  Plane<float> noisy_;   // of a padded tile
+  Plane<float> mosaic_;  // of a padded tile, where noise is reduced
   std::array<Plane<float>, 3> half_planes_;
   std::unique_ptr<RawToRgb> kernel_;
   int kernel_width_ = 0;
-  std::optional<Picture> picture_;  // of a core, and a little more
+  std::optional<Picture> picture_;  // of a core and a few pixels around it
   SampleType picture_samples_ = SampleType::u8;
   int picture_width_ = 0;
   int picture_height_ = 0;

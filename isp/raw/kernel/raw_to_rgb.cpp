@@ -29,7 +29,7 @@ Colour colour_in_order(const RgbTransform& transform, const std::array<int, 3>& 
   return colour;
 }
 
-// Where the rows of a band go. finish() is called after each row has been converted.
+// The classes below are destinations of the rows of a band. finish() is called after each row has been converted.
 
 template <class Codes, class Code>
 struct CodeRows {
@@ -46,7 +46,7 @@ void change_row(const CodeChange& change, const std::uint16_t* rgb, int width, s
   change.to16(change.context, rgb, width, out);
 }
 
-/// Through a row of 16-bit codes of this thread's own.
+/// Writes through a row of 16-bit codes private to the thread, which a CodeChange converts.
 template <class Code>
 struct ChangedCodeRows {
   const ToneTable* tone;
@@ -57,7 +57,7 @@ struct ChangedCodeRows {
   void finish(int y) const { change_row(*change, row, out.width / 3, out.row(y)); }
 };
 
-/// Through a row of codes of this thread's own, to a sink.
+/// Passes rows to a RowSink through a row of codes private to the thread.
 struct SunkRows {
   const ToneTable* tone;
   const RowSink* sink;
@@ -74,7 +74,7 @@ struct PlaneRowsOut {
   void finish(int /*y*/) const {}
 };
 
-/// A look on one row after another.
+/// Interpolates a look for one row after another.
 class LookRows {
  public:
   LookRows(const LookGrid* look, float* memory, std::size_t stride) : look_(look) {
@@ -88,7 +88,7 @@ class LookRows {
     row_.dark = look->dark;
   }
 
-  /// That of row y; null without a look.
+  /// Returns the look of row y; null without a look.
   const LookRow* at(int y) {
     if (look_ == nullptr) return nullptr;
     const float place = (static_cast<float>(y) + 0.5f) / LookGrid::cell - 0.5f;
@@ -165,22 +165,22 @@ void convert_band(const CameraPlanes& in, const RgbTransform& transform, RowBand
   return tone.bins >= 1 && tone.bins <= ToneTable::capacity && tone.bin_of(1.0f) == tone.bins - 1;
 }
 
-/// Floats that one part of a look's row takes.
+/// Returns the number of floats that one part of a look's row takes.
 std::size_t look_run_of(int width) { return 1 + static_cast<std::size_t>(cells_along(width)) + rows::look_padding; }
 
-// Runs start on a cache line, and an odd number of lines apart: an even number could put the live rows of a column
-// into the same few sets of the first-level cache.
+// Runs start on a cache line, an odd number of lines apart: an even number could map the live rows of a column to the
+// same few sets of the first-level cache.
 std::size_t run_stride_of(int width) { return (((run_of(width) + line_floats - 1) / line_floats) | 1U) * line_floats; }
 
 constexpr std::size_t line_bytes = line_floats * sizeof(float);
 
 std::size_t whole_lines(std::size_t bytes) { return (bytes + line_bytes - 1) / line_bytes * line_bytes; }
 
-/// What one thread's scratch memory holds, for pictures `width` pixels wide.
+/// Sizes [bytes] of one thread's scratch memory for images `width` pixels wide.
 struct ThreadBytes {
   std::size_t ring;
   std::size_t look;
-  std::size_t codes;  // a row on its way to a CodeChange or a RowSink
+  std::size_t codes;  // a row of codes for a CodeChange or a RowSink
 
   explicit ThreadBytes(int width)
       : ring(run_stride_of(width) * runs_per_thread * sizeof(float)),
@@ -189,13 +189,13 @@ struct ThreadBytes {
   std::size_t all() const { return ring + look + codes + 3 * scratch_guard_bytes; }
 };
 
-/// The scratch memory of one thread: ring, look, codes.
+/// Returns the scratch memory of one thread: ring, look, codes.
 std::array<Scratch, 3> scratch_at(std::byte* start, const ThreadBytes& bytes) {
   std::byte* const look = start + bytes.ring + scratch_guard_bytes;
   return {{{start, bytes.ring}, {look, bytes.look}, {look + bytes.look + scratch_guard_bytes, bytes.codes}}};
 }
 
-/// The first whole cache line of memory that has one to spare.
+/// Returns the first complete cache line of memory that is larger by one line.
 std::byte* first_line(std::byte* memory) {
   const auto beyond = reinterpret_cast<std::uintptr_t>(memory) % line_bytes;
   return memory + (line_bytes - beyond) % line_bytes;

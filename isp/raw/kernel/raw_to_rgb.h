@@ -14,9 +14,9 @@
 
 namespace lowlux::isp {
 
-/// From white-balanced camera RGB c to the output's primaries, 0..1 being the display range:
+/// Converts white-balanced camera RGB c to the output's primaries, 0..1 being the display range:
 ///     out = matrix * min(c, clip)
-/// and then, on request, along the line to the neutral of the same luminance Y until all channels are in 0..1:
+/// and then, on request, moves it along the line to the neutral of the same luminance Y until all channels are in 0..1:
 ///     out' = Y + t (out - Y), t the largest in 0..1 that fits; Y <= 0 gives black, Y >= 1 white.
 struct RgbTransform {
   std::array<float, 9> matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};  // rows; exposure included
@@ -26,16 +26,16 @@ struct RgbTransform {
   const LookGrid* look = nullptr;    // if set, changes `out` before it is moved into the gamut
 };
 
-/// What becomes of display codes before they are stored: each call turns one row of interleaved 16-bit codes, as rgb16
-/// makes them, into what is written. Called from several threads at once.
+/// Changes display codes before they are stored: each call converts one row of interleaved 16-bit codes, as rgb16 makes
+/// them, to the codes written. It is called from several threads at once.
 struct CodeChange {
   void (*to8)(const void* context, const std::uint16_t* rgb, int width, std::uint8_t* out) = nullptr;
   void (*to16)(const void* context, const std::uint16_t* rgb, int width, std::uint16_t* out) = nullptr;
   const void* context = nullptr;
 };
 
-/// Takes rows of interleaved 8-bit codes R G B as they are made. A thread's rows come in rising order and without gaps,
-/// from an even one on; called from several threads at once, each for rows of its own. Must not throw.
+/// Receives rows of interleaved 8-bit codes R G B as they are made. A thread's rows come in rising order and without
+/// gaps, from an even one on; it is called from several threads at once, each for rows of its own. It must not throw.
 struct RowSink {
   void (*row)(void* context, int thread, int y, const std::uint8_t* rgb, int width) = nullptr;
   void* context = nullptr;
@@ -43,37 +43,37 @@ struct RowSink {
 
 struct BandScratch;
 
-/// Mosaic or camera RGB to a picture in one pass over row bands: Malvar-He-Cutler demosaic (ICASSP 2004, the
+/// Converts a mosaic or camera RGB to an image in one pass over row bands: Malvar-He-Cutler demosaic (ICASSP 2004, the
 /// 5x5 filters of its figure 2; borders mirrored without repeating the edge), RgbTransform, tone.
 ///
-/// Owns its scratch memory and allocates only in the constructor; does one frame at a time. The result does not depend
-/// on the number of threads. Every coefficient and level that is not finite, or beyond +-1e9, counts as 0.
+/// It owns its scratch memory, allocates only in the constructor, and processes one frame at a time. The result does
+/// not depend on the number of threads. Every coefficient and level that is not finite, or beyond +-1e9, counts as 0.
 class RawToRgb {
  public:
-  /// For pictures up to `max_width` pixels wide, and up to `threads` of an executor's threads.
+  /// Prepares for images up to `max_width` pixels wide, and up to `threads` of an executor's threads.
   RawToRgb(int max_width, int threads);
-  /// Of memory that one takes.
+  /// Returns the memory [bytes] that one instance takes.
   static std::size_t bytes(int max_width, int threads);
 
-  /// Interleaved display codes: `out` is height x 3 width. The tone table must reach its last bin at 1.
-  /// @param change  of codes, row by row; null: none
+  /// Makes interleaved display codes: `out` is height x 3 width. The tone table must reach its last bin at 1.
+  /// @param change  applied to the codes, row by row; null: none
   void rgb8(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, PlaneView<std::uint8_t> out,
             Executor& executor, const CodeChange* change = nullptr);
-  /// The same with round(65535 tone), linear between the edges of a bin.
+  /// Makes 16-bit codes round(65535 tone), linear between the edges of a bin.
   void rgb16(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, PlaneView<std::uint16_t> out,
              Executor& executor, const CodeChange* change = nullptr);
-  /// The codes of rgb8, row by row to a sink; `thread` is below the number of threads.
+  /// Passes the codes of rgb8 row by row to a sink; `thread` is below the number of threads.
   void rows8(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, const RowSink& sink,
              Executor& executor);
-  /// Planar float, no tone.
+  /// Makes planar float values without applying a tone curve.
   void linear(const RgbInput& in, const RgbTransform& transform, RgbView<float> out, Executor& executor);
 
-  /// R, (G1 + G2) / 2 and B of each whole 2x2 cell: `out` is floor(height / 2) x floor(width / 2).
+  /// Writes R, (G1 + G2) / 2 and B of each complete 2x2 cell: `out` is floor(height / 2) x floor(width / 2).
   void bin2x2(const DnMosaic& in, RgbView<float> out, Executor& executor);
   void bin2x2(const SignedMosaic& in, RgbView<float> out, Executor& executor);
 
-  /// Mean camera RGB, gains applied, of each square of 4 x 4 pixels, where the picture ends mirrored: `out` is
-  /// ceil(height / 4) x ceil(width / 4).
+  /// Writes the mean camera RGB, gains applied, of each block of 4 x 4 pixels, mirrored at the image's borders: `out`
+  /// is ceil(height / 4) x ceil(width / 4).
   void quarter(const RgbInput& in, RgbView<float> out, Executor& executor);
 
  private:
@@ -91,10 +91,10 @@ class RawToRgb {
   std::unique_ptr<std::byte[]> memory_;  // scratch of all threads
 };
 
-/// The vector instruction set the kernels use on this machine, as Highway names it.
+/// Returns the vector instruction set the kernels use on this machine, as Highway names it.
 const char* raw_to_rgb_target();
 
-/// Whether this processor has what the kernels need at least: SSSE3 on x86; always true elsewhere.
+/// Returns whether this processor has what the kernels need at least: SSSE3 on x86; always true elsewhere.
 bool cpu_runs_raw_to_rgb();
 
 }  // namespace lowlux::isp

@@ -10,7 +10,7 @@
 #include "isp/raw/kernel/raw_to_rgb_rows.h"
 #include "isp/raw/kernel/rgb_input.h"
 
-/// What the parts of RawToRgb share: split rows with mirrored ends, bands of rows. Internal.
+/// These internal parts are common to the files of RawToRgb: split rows with mirrored ends, bands of rows.
 namespace lowlux::isp {
 
 using rows::RowLevels;
@@ -23,7 +23,7 @@ inline constexpr float largest = 1e9f;          // keeps every product of the pa
 
 inline float usable(float x) { return std::fabs(x) <= largest ? x : 0.0f; }
 
-/// Index into 0..n-1 of x in -2..n+2, mirrored without repeating the edge; its parity is that of x for n >= 2.
+/// Returns the index in 0..n-1 of x in -2..n+2, mirrored without repeating the edge; x keeps its parity for n >= 2.
 inline int mirror(int x, int n) {
   if (n == 1) return 0;
   const int period = 2 * (n - 1);
@@ -33,7 +33,7 @@ inline int mirror(int x, int n) {
 
 inline float at(const SplitRow& row, int x) { return (x & 1) != 0 ? row.odd[x >> 1] : row.even[x >> 1]; }
 
-/// Columns -2, -1 and width .. width + 2 of a split row.
+/// Fills columns -2, -1 and width .. width + 2 of a split row with mirrored samples.
 inline void mirror_ends(const SplitRow& row, int width) {
   row.even[-1] = at(row, mirror(-2, width));
   row.odd[-1] = at(row, mirror(-1, width));
@@ -69,7 +69,7 @@ inline int height_of(const DnMosaic& in) { return in.dn.height; }
 inline int height_of(const SignedMosaic& in) { return in.value.height; }
 inline int height_of(const CameraPlanes& in) { return in.rgb[0].height; }
 
-/// The split rows of one thread: slot k of a ring, or plane k.
+/// Holds the split rows of one thread: slot k of a ring, or plane k.
 struct Ring {
   float* base;
   std::size_t run_stride;
@@ -86,12 +86,12 @@ inline void run_bands(Executor& executor, int threads, int height, const Work& w
   for_each_index(executor, count, [&](int index) { work(row_band(height, count, index), index); });
 }
 
-/// Floats that a run of scratch samples takes for pictures `width` pixels wide.
+/// Returns the number of floats that a run of scratch samples takes for images `width` pixels wide.
 inline std::size_t run_of(int width) {
   return rows::padding_before + (static_cast<std::size_t>(width) + 1) / 2 + rows::padding_after;
 }
 
-/// The scratch memory of one thread, for as long as it is used.
+/// Holds the scratch memory of one thread while it is in use.
 struct BandScratch {
   int thread;
   Ring ring;

@@ -22,7 +22,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Ints = hn::RebindToSigned<Floats>;
 using VI = hn::Vec<Ints>;
 
-/// Steps after demosaicing: clip, matrix, gamut move.
+/// Holds the constants of the steps after demosaicing: clip, matrix, gamut mapping.
 struct ColourVectors {
   VF column[3][3];
   VF luminance[3];
@@ -44,7 +44,7 @@ struct ColourVectors {
     return {{output(0), output(1), output(2)}};
   }
 
-  /// Y + t (v - Y) with t = min(Y / (Y - min(v, 0)), (1 - Y) / (max(v, 1) - Y)), as one division. t is taken
+  /// Returns Y + t (v - Y) with t = min(Y / (Y - min(v, 0)), (1 - Y) / (max(v, 1) - Y)), as one division. t is taken
   /// 2^-22 short, so that no rounding can leave 0..1; colours inside keep every bit, as 0 + 1 (v - 0).
   HWY_INLINE Site moved(const Site& v, VF least, VF greatest) const {
     const VF zero = constant(0), one = constant(1);
@@ -52,7 +52,7 @@ struct ColourVectors {
         hn::MulAdd(luminance[2], v.c[2], hn::MulAdd(luminance[1], v.c[1], hn::Mul(luminance[0], v.c[0])));
     const VF y = hn::Min(hn::Max(weighted, zero), one);
     const VF rest = hn::Sub(one, y);
-    // The ends lie a hair outside 0..1, so that neither distance is 0, and t is 0 where Y is at one of them.
+    // The ends lie 1e-30 and one rounding step outside 0..1, so that no distance is 0, and t is 0 where Y is at one.
     const VF below = hn::Sub(y, hn::Min(least, constant(-1e-30f)));
     const VF above = hn::Sub(hn::Max(greatest, constant(1 + 0x1p-23f)), y);
     const auto low_end_first = hn::Lt(hn::Mul(y, above), hn::Mul(rest, below));
@@ -82,7 +82,7 @@ HWY_INLINE void clamp(Site& v) {
   for (VF& c : v.c) c = hn::Min(hn::Max(c, constant(0)), constant(1));
 }
 
-/// Bins of ToneTable, and the place within the bin.
+/// Looks up bins of a ToneTable and the position within the bin.
 struct Tone {
   VF offset;
   VI base;
@@ -114,7 +114,7 @@ struct Tone {
 
 constexpr int pixels_at_once() { return 2 * static_cast<int>(hn::MaxLanes(Floats())); }
 
-// Where finished pixels go: write() stores a vector of pairs at pixel x of a row that has `left` pixels from there on.
+// The classes below store finished pixels: write() stores a vector of pairs at x of a row with `left` pixels from x.
 
 struct ToCodes8 {
   static constexpr bool clamps = true;

@@ -1,5 +1,5 @@
-// The demosaicing half of raw_to_rgb_convert.cpp, which includes this once for each instruction set: hence a guard that
-// toggles in place of #pragma once.
+// This is the demosaicing half of raw_to_rgb_convert.cpp, which includes it once for each instruction set: hence a
+// guard that toggles in place of #pragma once.
 #if defined(LOWLUX_ISP_RAW_RAW_TO_RGB_DEMOSAIC_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LOWLUX_ISP_RAW_RAW_TO_RGB_DEMOSAIC_INL_H
 #undef LOWLUX_ISP_RAW_RAW_TO_RGB_DEMOSAIC_INL_H
@@ -21,7 +21,7 @@ using VF = hn::Vec<Floats>;
 HWY_INLINE VF constant(float x) { return hn::Set(Floats(), x); }
 HWY_INLINE VF load(const float* from) { return hn::LoadU(Floats(), from); }
 
-/// Three channels of one vector of sites, all of even or all of odd columns.
+/// Three channels of one vector of sites, which are all in even or all in odd columns.
 struct Site {
   VF c[3];
 };
@@ -30,8 +30,8 @@ struct SitePair {
   Site odd;
 };
 
-/// Malvar, He, Cutler: "High-quality linear interpolation for demosaicing of Bayer-patterned color images",
-/// ICASSP 2004, figure 2, coefficients / 8. `a` is the run of the row's own colour, `b` that of its greens.
+/// Implements Malvar, He, Cutler: "High-quality linear interpolation for demosaicing of Bayer-patterned color images",
+/// ICASSP 2004, figure 2, coefficients / 8. `a` is the run of the row's own colour, `b` the run of its greens.
 template <bool kOwnOdd>
 struct Malvar {
   const float* a[5];
@@ -45,9 +45,9 @@ struct Malvar {
   }
 
   HWY_INLINE SitePair at(int i) const {
-    constexpr int s = kOwnOdd ? 1 : 0;  // where a run's neighbour to the right lies
+    constexpr int s = kOwnOdd ? 1 : 0;  // offset of a run's neighbour to the right
     const VF own = load(a[2] + i), green = load(b[2] + i);
-    // Sums of the rows above and below; those of the site itself are also half of the other site's diagonals.
+    // These are sums of the rows above and below; those of the site itself are also half of the other site's diagonals.
     const VF b_left = hn::Add(load(b[1] + i - 1 + s), load(b[3] + i - 1 + s));
     const VF b_right = hn::Add(load(b[1] + i + s), load(b[3] + i + s));
     const VF a_left = hn::Add(load(a[1] + i - s), load(a[3] + i - s));
@@ -55,7 +55,7 @@ struct Malvar {
     const VF a_vertical = kOwnOdd ? a_right : a_left;
     const VF b_vertical = kOwnOdd ? b_left : b_right;
 
-    // At the own colour: cross of greens, diagonals of the other colour, far cross of the own colour.
+    // At the row's own colour: cross of greens, diagonals of the other colour, distant cross of the own colour.
     const VF cross = hn::Add(a_vertical, hn::Add(load(b[2] + i - 1 + s), load(b[2] + i + s)));
     const VF far_cross =
         hn::Add(hn::Add(load(a[0] + i), load(a[4] + i)), hn::Add(load(a[2] + i - 1), load(a[2] + i + 1)));

@@ -1,5 +1,5 @@
-// The look in raw_to_rgb_convert.cpp, which includes this once for each instruction set: hence a guard that toggles in
-// place of #pragma once.
+// This is the look in raw_to_rgb_convert.cpp, which includes it once for each instruction set: hence a guard that
+// toggles in place of #pragma once.
 #if defined(LOWLUX_ISP_RAW_RAW_TO_RGB_LOOK_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LOWLUX_ISP_RAW_RAW_TO_RGB_LOOK_INL_H
 #undef LOWLUX_ISP_RAW_RAW_TO_RGB_LOOK_INL_H
@@ -20,13 +20,13 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using LaneIndices = decltype(hn::SetTableIndices(Floats(), static_cast<const std::int32_t*>(nullptr)));
 
-/// No look: pixels stay as they are.
+/// Applies no look: pixels stay as they are.
 struct AsItIs {
   HWY_INLINE void operator()(SitePair& /*pixels*/, int /*i*/) const {}
 };
 
-/// LookGrid on a vector of pairs. Seen from the cells' middles, pixel pair i lies between cells j - 1 and j, j = i / 2:
-/// 5/8 and 7/8 of the way for even i, and 1/8 and 3/8 of the way between the next two for odd i.
+/// Applies a LookGrid to a vector of pairs. Relative to the cells' centres, pixel pair i lies between cells j - 1 and
+/// j, j = i / 2: 5/8 and 7/8 of the way for even i, and 1/8 and 3/8 of the way between the next two for odd i.
 struct LookVectors {
   LookRow row;
   LaneIndices before, after;
@@ -56,8 +56,8 @@ struct LookVectors {
     dark = constant(from.dark);
   }
 
-  /// The parts at the even and at the odd pixels of pairs i and on. No struct holds them: its constructor would be
-  /// compiled for another target.
+  /// Returns the parts at the even and at the odd pixels of pairs from i. They are not held in a struct, whose
+  /// constructor would be compiled for another target.
   HWY_INLINE void parts_at(int i, VF (&even)[LookGrid::parts], VF (&odd)[LookGrid::parts]) const {
     for (int k = 0; k < LookGrid::parts; ++k) {
       const VF cells = load(row.part[k] + i / 2 - 1);

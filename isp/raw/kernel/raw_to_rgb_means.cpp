@@ -7,7 +7,7 @@
 namespace lowlux::isp {
 namespace {
 
-/// Row y of cells, four rows of pixels.
+/// Computes row y of the cells, which are four pixels high.
 template <class Mosaic>
 void quarter_row(const Mosaic& in, int y, const Ring& ring, const RgbView<float>& out) {
   const float* site[4][2];  // the two runs of each site of a 2x2 cell

@@ -5,32 +5,32 @@
 #include "isp/base/look_grid.h"
 #include "isp/base/tone_table.h"
 
-/// The row kernels under RawToRgb, dispatched at run time. Plain types only: their sources are compiled for several
-/// instruction sets, and shared inline code must not be.
+/// The row kernels of RawToRgb are dispatched at run time. They take plain types only: their sources are compiled for
+/// several instruction sets, which must not have inline code in common.
 namespace lowlux::isp::rows {
 
-/// Samples that may be read before the first and after the last pair of a run; see docs/kernels.md.
+/// These are the samples that may be read before the first and after the last pair of a run; see docs/kernels.md.
 inline constexpr int padding_before = 16;
 inline constexpr int padding_after = 48;
 
-/// One row in two runs: even[i] is column 2i, odd[i] column 2i + 1.
+/// Stores one row in two runs: even[i] is column 2i, odd[i] column 2i + 1.
 struct SplitRow {
   float* even;
   float* odd;
 };
 
-/// Levels of the even and the odd columns of one row.
+/// Holds the levels of the even and the odd columns of one row.
 struct RowLevels {
   float black[2];
   float gain[2];
 };
 
-/// (in - black) * gain of one row, without mirrored ends. A row of odd width leaves a finite figure in its last odd
-/// place.
+/// Computes (in - black) * gain of one row, without mirrored ends. A row of odd width leaves a finite value in its last
+/// odd position.
 void split_dn(const std::uint16_t* in, int width, const RowLevels& levels, const SplitRow& out);
 void split_float(const float* in, int width, const RowLevels& levels, const SplitRow& out);
 
-/// The rows y-2 .. y+2 around an output row, borders mirrored in. Each row holds green and one of red and blue:
+/// Holds the rows y-2 .. y+2 around an output row, with mirrored borders. Each row holds green and one of red and blue:
 /// its own colour, at odd columns if own_is_odd.
 struct MosaicRows {
   const float* even[5];
@@ -38,14 +38,14 @@ struct MosaicRows {
   bool own_is_odd;
 };
 
-/// Three rows of camera RGB.
+/// Holds three rows of camera RGB.
 struct PlaneRows {
   const float* even[3];
   const float* odd[3];
 };
 
-/// LookGrid on one row of pixels: the parts interpolated between rows of cells, with one cell repeated before the first
-/// and look_padding after the last.
+/// Holds a LookGrid for one row of pixels: the parts interpolated between rows of cells, with one cell repeated before
+/// the first and look_padding after the last.
 struct LookRow {
   const float* part[LookGrid::parts];
   float luminance[3];
@@ -55,9 +55,9 @@ struct LookRow {
 };
 inline constexpr int look_padding = 24;
 
-/// RgbTransform for one order of the camera channels: (own, green, other) of a mosaic row, (R, G, B) of planes.
+/// Holds an RgbTransform for one channel order of the camera: (own, green, other) of a mosaic row, (R, G, B) of planes.
 struct Colour {
-  float column[3][3];  // column[c][j]: what camera channel c adds to output j
+  float column[3][3];  // column[c][j]: contribution of camera channel c to output j
   float luminance[3];
   float clip;
   bool move_into_gamut;
@@ -83,14 +83,14 @@ void convert_row(const PlaneRows& in, const Colour& colour, int width, const Cod
 void convert_row(const PlaneRows& in, const Colour& colour, int width, const Codes16& out);
 void convert_row(const PlaneRows& in, const Colour& colour, int width, const Planes& out);
 
-/// One row of 2x2 cells; the sites of a cell in the order R, G1, G2, B, one run each.
+/// Holds one row of 2x2 cells; the sites of a cell are in the order R, G1, G2, B, one run each.
 struct CellRow {
   const float* site[4];
 };
 void bin_row(const CellRow& in, int cells, const Planes& out);
 
-/// Runs of samples whose means over four columns of pixels are wanted: out[j] = factor * the sum of samples 2j and
-/// 2j + 1 of all runs.
+/// Holds runs of samples to be averaged over four columns of pixels: out[j] = factor * the sum of samples 2j and 2j + 1
+/// of all runs.
 struct QuarterRuns {
   const float* run[8];
   int runs;
@@ -98,7 +98,7 @@ struct QuarterRuns {
 };
 void quarter_row(const QuarterRuns& in, int cells, float* out);
 
-/// out = a + t (b - a), samples 0 to n - 1.
+/// Computes out = a + t (b - a) for samples 0 to n - 1.
 void blend_row(const float* a, const float* b, float t, int n, float* out);
 
 const char* target_name();

@@ -10,21 +10,21 @@
 
 namespace lowlux::isp {
 
-/// value = (dn - black[site]) * gain[site], sites as in site_of(). The gain holds 1 / (white - black) and the white
-/// balance.
+/// Defines value = (dn - black[site]) * gain[site], with sites as in site_of(). The gain holds 1 / (white - black) and
+/// the white balance.
 struct SiteLevels {
   PerSite<float> black{};  // [DN]
   PerSite<float> gain{1, 1, 1, 1};
 };
 
-/// A Bayer mosaic as read out. The rows are read once, front to back, so they may lie in uncached memory.
+/// Views a Bayer mosaic as read out. The rows are read once, front to back, so they may lie in uncached memory.
 struct DnMosaic {
   PlaneView<const std::uint16_t> dn;
   BayerPhase phase = BayerPhase::rggb;
   SiteLevels levels;
 };
 
-/// A signed linear Bayer mosaic, black already removed; value = sample * gain[site].
+/// Views a signed linear Bayer mosaic, black already subtracted; value = sample * gain[site].
 /// A sample that is not a number counts as 0, one beyond +-1e9 as +-1e9.
 struct SignedMosaic {
   PlaneView<const float> value;
@@ -32,7 +32,8 @@ struct SignedMosaic {
   PerSite<float> gain{1, 1, 1, 1};
 };
 
-/// Camera RGB that needs no demosaicing; samples as in SignedMosaic. For monochrome data all three planes may be one.
+/// Views camera RGB that needs no demosaicing; samples as in SignedMosaic. Monochrome data may use one plane for all
+/// three.
 struct CameraPlanes {
   RgbView<const float> rgb;
   std::array<float, 3> gain{1, 1, 1};

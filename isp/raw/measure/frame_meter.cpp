@@ -9,7 +9,7 @@
 namespace lowlux::isp {
 namespace {
 
-/// A whole number of thumbnail blocks, at least 16 pixels.
+/// Returns the side of a tile: a multiple of the thumbnail block's side, at least 16 pixels.
 int tile_of(int block) { return block * ((16 + block - 1) / block); }
 
 std::array<std::uint16_t, 4> luma_weights(const RawDn& raw) {
@@ -56,7 +56,7 @@ void count_masked(const RawDn& raw, int y, Tally& tally) {
     if (y < masked.y || y >= masked.y + masked.height) continue;
     const std::uint16_t* const row = raw.dn.row(y);
     for (int x = masked.x; x < masked.x + masked.width; ++x) {
-      // Sites count from the active area's corner; parity is all that matters.
+      // Sites count from the active area's corner; only parity matters.
       const int site = site_of(x + (raw.active.x & 1), y + (raw.active.y & 1));
       tally.masked_sum[site] += row[x];
       ++tally.masked_count[site];
@@ -66,7 +66,7 @@ void count_masked(const RawDn& raw, int y, Tally& tally) {
 
 }  // namespace
 
-// The cells of rows y - 1 and y of the active area.
+// Counts the cells of rows y - 1 and y of the active area.
 void FrameMeter::count_cells(const RawDn& raw, int y, int thread) {
   std::vector<std::uint16_t>& bin = columns_[static_cast<std::size_t>(thread)].bin;
   const meter::LumaBins how{luma_weights(raw), format_.bits - 10, FrameStatistics::bins - 1};
@@ -74,14 +74,14 @@ void FrameMeter::count_cells(const RawDn& raw, int y, int thread) {
                    raw.active.width, how, bin.data());
   auto& luma = tallies_[static_cast<std::size_t>(thread)].luma;
   std::size_t i = 0;
-  for (; i + 1 < bin.size(); i += 2) {  // two histograms: neighbours are alike, and would wait for one another
+  for (; i + 1 < bin.size(); i += 2) {  // two histograms, because equal neighbouring bins would serialise the updates
     ++luma[0][bin[i]];
     ++luma[1][bin[i + 1]];
   }
   if (i < bin.size()) ++luma[0][bin[i]];
 }
 
-// Row y of the active area.
+// Measures row y of the active area.
 void FrameMeter::measure_row(const RawDn& raw, int y, const MeterWants& wants, int thread) {
   const std::uint16_t* const dn = raw.dn.row(raw.active.y + y) + raw.active.x;
   const int width = raw.active.width;
@@ -98,7 +98,7 @@ void FrameMeter::measure_row(const RawDn& raw, int y, const MeterWants& wants, i
   if ((y + 1) % thumbnail_.block() == 0 || y + 1 == raw.active.height) fold(raw, y, wants, columns);
 }
 
-// The columns' sums end with row y: a block of rows is whole, or the frame ends.
+// Closes the columns' sums at row y, where a block of rows is complete or the frame ends.
 void FrameMeter::fold(const RawDn& raw, int y, const MeterWants& wants, Columns& columns) {
   const int block = thumbnail_.block();
   const std::array<const std::uint32_t*, 2> sum{columns.sum[0].data(), columns.sum[1].data()};
@@ -132,7 +132,7 @@ void FrameMeter::read(std::span<const std::byte> bytes, std::size_t stride, RawD
   const Job job{bytes, stride, raw, wants, std::min(executor.width(), static_cast<int>(tallies_.size()))};
   for_each_index(executor, job.bands, [&](int index) {
     tallies_[static_cast<std::size_t>(index)] = {};
-    // Bands of whole tiles of the active area; the first and the last have the rows above and below it.
+    // Bands consist of complete tiles of the active area; the first and the last include the rows above and below it.
     const int tile = tiles_.tile(), tiles = (raw.active.height + tile - 1) / tile;
     const auto edge = [&](int i) { return raw.active.y + tile * (tiles * i / job.bands); };
     const int first = index == 0 ? 0 : edge(index);

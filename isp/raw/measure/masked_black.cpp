@@ -16,9 +16,9 @@ constexpr int inner_trim = 12;
 constexpr int min_side = 8;                // of the trimmed strip, in pixels
 constexpr int min_samples_per_site = 500;  // standard error below 0.05 standard deviations
 constexpr double cut_sigma = 5.0;
-constexpr double max_offset_of_range = 0.005;  // of an unstated border from the tag
-constexpr double max_offset_of_noise = 16;     // likewise, in standard deviations of its pixels
-constexpr double mad_to_std = 1.4826;          // of a normal law
+constexpr double max_offset_of_range = 0.005;  // of an undeclared border from the tag
+constexpr double max_offset_of_noise = 16;     // undeclared border to tag, in standard deviations of its pixels
+constexpr double mad_to_std = 1.4826;          // for a normal distribution
 
 enum class Side { left, right, top, bottom, elsewhere };
 
@@ -30,8 +30,7 @@ Side side_of(const Rect& masked, const Rect& active) {
   return Side::elsewhere;
 }
 
-// Cuts `thickness` pixels to what lies between an outer and an inner trim; thin strips lose at most a quarter on each
-// side.
+// Trims `thickness` pixels at the outer and at the inner side; thin strips lose at most a quarter on each side.
 void trim(int& start, int& thickness, bool inner_is_high) {
   const int outer = std::min(outer_trim, thickness / 4);
   const int inner = std::min(inner_trim, thickness / 4);
@@ -39,7 +38,7 @@ void trim(int& start, int& thickness, bool inner_is_high) {
   thickness -= outer + inner;
 }
 
-// Columns are used beside active rows only: the corners belong to the vertical blanking.
+// Returns the trimmed strip. Columns are used next to active rows only: the corners belong to the vertical blanking.
 Rect trimmed(Rect masked, const Rect& active, Side side) {
   if (side == Side::left || side == Side::right) {
     const int top = std::max(masked.y, active.y);
@@ -55,7 +54,7 @@ Rect trimmed(Rect masked, const Rect& active, Side side) {
 
 std::int64_t area(const Rect& r) { return static_cast<std::int64_t>(r.width) * r.height; }
 
-// The largest usable strip, columns before rows.
+// Returns the largest usable strip, columns before rows.
 std::optional<Rect> best_region(const RawDn& raw) {
   std::optional<Rect> best;
   bool best_is_column = false;
@@ -73,7 +72,7 @@ std::optional<Rect> best_region(const RawDn& raw) {
   return best;
 }
 
-// Median and deviation of 16-bit codes by counting: exact, and the same for any order of the samples.
+// Finds the median and deviation of 16-bit codes by counting, exactly and independently of the order of the samples.
 class Histogram {
  public:
   Histogram() : count_(65536) {}
@@ -132,7 +131,7 @@ struct SiteEstimate {
   double noise_std = 0;
 };
 
-// Values are taken relative to the median, so that the sums of squares keep their digits.
+// Values are taken relative to the median, so that the sums of squares keep their precision.
 SiteEstimate estimate_site(const RawDn& raw, const Rect& region, int site) {
   const auto first = [&](int start, int origin, int parity) { return start + (((start - origin) & 1) != parity); };
   const int x0 = first(region.x, raw.active.x, site & 1);
@@ -143,7 +142,7 @@ SiteEstimate estimate_site(const RawDn& raw, const Rect& region, int site) {
   }
   const double median = histogram.median();
   const double spread = mad_to_std * histogram.median_absolute_deviation(median);
-  const double cut = cut_sigma * std::max(spread, 0.5);  // half a code: a constant strip has no spread
+  const double cut = cut_sigma * std::max(spread, 0.5);  // at least half a code: a constant strip has no spread
 
   Sums all;
   std::vector<Sums> rows(region.height);
@@ -183,7 +182,7 @@ double block_mean(const RawDn& raw, const Rect& r) {
   return sum / static_cast<double>(area(r));
 }
 
-// A strip under light shows the scene: its profile along the edge follows that of the active pixels beside it.
+// Returns whether light reaches a strip: its profile along the edge then follows that of the adjacent active pixels.
 bool profile_follows_scene(const RawDn& raw, const Rect& region, double noise_std) {
   const bool column = region.x + region.width <= raw.active.x || region.x >= raw.active.x + raw.active.width;
   const int length = column ? region.height : region.width;

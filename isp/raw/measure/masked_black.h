@@ -7,23 +7,23 @@
 
 namespace lowlux::isp {
 
-/// Black point measured on light-shielded pixels, or why they do not serve.
+/// Holds the black point measured on light-shielded pixels, or the reason why they cannot be used.
 struct MaskedBlack {
   std::optional<BlackPoint> black;
-  Rect region;          // the part of the readout that was used, in readout pixels
+  Rect region;          // region of the readout that was used, in readout pixels
   std::string refusal;  // set when `black` is absent
 };
 
 /// Measures pedestal plus dark on the masked pixels of one frame, per CFA site and so per row parity.
 ///
-/// Of the masked rectangles the largest beside the active area is used, columns before rows: only columns share
-/// the read-out of every active row. Its outer 4 and inner 12 pixels are left out (edge effects, stray light).
-/// Per site: mean of the samples within 5 standard deviations (from the median absolute deviation) of the median;
-/// the cut is symmetric and takes 6e-7 of a normal law. Standard error, with row and column noise in it:
+/// The largest of the masked rectangles next to the active area is used, columns before rows: only columns share the
+/// read-out of every active row. Its outer 4 and inner 12 pixels are left out (edge effects, stray light). The value
+/// per site is the mean of the samples within 5 standard deviations (from the median absolute deviation) of the median;
+/// the cut is symmetric and removes 6e-7 of a normal distribution. The standard error includes row and column noise:
 ///     se^2 = var(row means) / rows + var(column means) / columns - var(sample) / samples
-/// Borders that a source does not call masked are refused when there is no tag to check them by, when they are constant
-/// (padding), when their level is off the tag by more than 16 standard deviations of a pixel and 0.5 % of the range, or
-/// when their row profile follows that of the neighbouring active columns.
+/// Borders that a source does not declare as masked are refused when there is no tag to check them by, when they are
+/// constant (padding), when their level differs from the tag by more than 16 standard deviations of a pixel and 0.5 %
+/// of the range, or when their row profile follows that of the neighbouring active columns.
 MaskedBlack measure_masked_black(const RawDn& raw);
 
 }  // namespace lowlux::isp

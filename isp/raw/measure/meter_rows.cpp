@@ -17,7 +17,7 @@ namespace lowlux::isp::meter::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using Sums = hn::ScalableTag<std::uint32_t>;
-using Codes = hn::Rebind<std::uint16_t, Sums>;  // as many, of half the width
+using Codes = hn::Rebind<std::uint16_t, Sums>;  // as many lanes, of half the width
 using Words = hn::ScalableTag<std::uint16_t>;
 
 constexpr int most_difference = 5792;
@@ -68,7 +68,7 @@ Extremes CountExtremes(const std::uint16_t* dn, int width, std::uint16_t white) 
   return out;
 }
 
-/// One pair of sites at a time, as one vector of 32 bits: the even column below, the odd one above.
+/// Processes pairs of sites, each as one 32-bit lane: the even column in the low half, the odd one in the high half.
 void LumaOfCells(const std::uint16_t* upper, const std::uint16_t* lower, int width, const LumaBins& how,
                  std::uint16_t* bin) {
   const Sums s;

@@ -3,25 +3,26 @@
 #include <array>
 #include <cstdint>
 
-/// The row kernels under FrameMeter, dispatched at run time; `width` samples, nothing beyond is read or written.
+/// The row kernels of FrameMeter are dispatched at run time; they read and write only `width` samples.
 namespace lowlux::isp::meter {
 
-/// column[x] += dn[x].
+/// Computes column[x] += dn[x].
 void add_row(const std::uint16_t* dn, int width, std::uint32_t* column);
 
-/// column[x] += min(|dn[x] - dn[x + 2]|, 5792)^2 for x < width - 2: 128 rows cannot overflow it.
+/// Computes column[x] += min(|dn[x] - dn[x + 2]|, 5792)^2 for x < width - 2: 128 rows cannot overflow it.
 void add_squares(const std::uint16_t* dn, int width, std::uint32_t* column);
 
 struct Extremes {
-  std::uint32_t clipped = 0;  // white or more
+  std::uint32_t clipped = 0;  // number of codes of white or more
   std::uint32_t zero = 0;
 };
 Extremes count_extremes(const std::uint16_t* dn, int width, std::uint16_t white);
 
-/// Luma of the whole 2x2 cells of two rows, (weight . sites) / 256, in bins: bin[i] of cell i, at most `last`.
+/// Converts the luma of complete 2x2 cells of two rows, (weight . sites) / 256, to bins: bin[i] of cell i, up to
+/// `last`.
 struct LumaBins {
-  std::array<std::uint16_t, 4> weight{};  // of the sites; their sum is 256
-  int shift = 0;                          // bits off a code to make it a bin; negative: on
+  std::array<std::uint16_t, 4> weight{};  // weights of the sites; their sum is 256
+  int shift = 0;                          // right shift from a code to its bin; negative: left shift
   std::uint16_t last = 0;
 };
 void luma_bins(const std::uint16_t* upper, const std::uint16_t* lower, int width, const LumaBins& how,

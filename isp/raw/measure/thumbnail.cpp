@@ -11,7 +11,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr int max_blocks = 256;    // in either direction
-constexpr int enough_blocks = 64;  // along the longer side, to have them twice as large
+constexpr int enough_blocks = 64;  // blocks along the longer side that suffice to make them twice as large
 constexpr double difference_to_std =
     0.886226925452758;  // sqrt(pi) / 2: mean |a - b| of two normals is 2 std / sqrt(pi)
 
@@ -36,7 +36,7 @@ ThumbnailSums::ThumbnailSums(const RawDn& raw)
 
 void ThumbnailSums::clear() { std::ranges::fill(blocks_, Block{}); }
 
-// One row of one block: sums of the even and of the odd columns.
+// Adds one row of one block: sums of the even and of the odd columns.
 void ThumbnailSums::add_mosaic(const std::uint16_t* dn, int width, int y, std::uint16_t white, Block& block) {
   std::uint32_t even = 0, odd = 0, clipped = 0, difference = 0;
   for (int x = 0; x + 1 < width; x += 2) {
@@ -114,7 +114,7 @@ PerSite<std::uint64_t> ThumbnailSums::sums() const {
   return out;
 }
 
-// Fraction of white of each colour, mean over the block.
+// Returns the mean of each colour over the block, as a fraction of white.
 std::array<double, 3> ThumbnailSums::colour_means(const RawDn& raw, const BlackPoint& black,
                                                   const PerSite<double>& per_dn, const Block& block,
                                                   const std::array<double, 3>& beside) {

@@ -10,32 +10,33 @@
 
 namespace lowlux::isp {
 
-/// A frame as means over square blocks, for the decisions that look at the whole picture.
+/// Represents a frame as means over square blocks, for decisions based on the entire image.
 struct Thumbnail {
-  CameraRgb mean;  // block means, fraction of white, signed, not white balanced; at most 256 x 256. A colour
-                   // that a block at an odd edge has no pixel of is that of the block before
-  double black_noise_std = 0;  // of one raw pixel without light, fraction of white; 0 if nothing tells
+  CameraRgb mean;  // block means, fraction of white, signed, not white balanced; at most 256 x 256. A colour without a
+                   // pixel in a block at an odd edge takes the value of the preceding block
+  double black_noise_std = 0;  // of one raw pixel without light, fraction of white; 0 if unknown
 };
 
-/// The sums behind a thumbnail, row by row, so that they can be taken while a frame comes in. Reserves its memory in
-/// the constructor; allocates nothing after.
+/// Accumulates the sums of a thumbnail row by row, while a frame is being read. It reserves its memory in the
+/// constructor and allocates nothing later.
 class ThumbnailSums {
  public:
-  /// Of active areas of the size of `raw`'s, in its layout; of `raw` only layout, active area and white level are read.
+  /// Prepares for active areas of the size of `raw`'s, in its layout; only layout, active area and white level of `raw`
+  /// are read.
   explicit ThumbnailSums(const RawDn& raw);
 
-  /// Rows that belong together: a multiple of them starts with row 0.
+  /// Returns the rows of one block; a multiple of them starts with row 0.
   int block() const { return block_; }
   int block_rows() const { return rows_; }
   void clear();
-  /// Row y of the active area, samples interleaved. Rows of one block of rows come from one thread.
+  /// Adds row y of the active area, samples interleaved. Rows of one block of rows come from one thread.
   void add_row(const std::uint16_t* dn, int y);
-  /// A whole block of rows of a mosaic at once, from sums of its columns, of even and of odd rows apart. Tells no
-  /// noise.
-  /// @param rows  in it: block() but for the last
+  /// Adds a complete block of rows of a mosaic at once, from sums of its columns, separate for even and odd rows. It
+  /// does not contribute to the noise estimate.
+  /// @param rows  rows in the block: block() except in the last
   void add_columns(const std::array<const std::uint32_t*, 2>& columns, int block_row, int rows);
-  PerSite<std::uint64_t> sums() const;  // of all codes of a mosaic
-  /// `frame` as in the constructor. Makes `out` of the right size where it is not.
+  PerSite<std::uint64_t> sums() const;  // sums of all codes of a mosaic
+  /// Makes `out` from the sums and resizes it if needed. `frame` has the format of the constructor's `raw`.
   void make(const RawFrame& frame, const BlackPoint& black, Thumbnail& out);
 
  private:
@@ -54,7 +55,7 @@ class ThumbnailSums {
 
   int block_ = 2;    // side in pixels, even
   int samples_ = 1;  // per pixel
-  int width_ = 0;    // of the active area
+  int width_ = 0;    // width of the active area
   int columns_ = 0;
   int rows_ = 0;
   std::array<double, 3> white_dn_{};
@@ -62,10 +63,10 @@ class ThumbnailSums {
   std::vector<double> differences_dn_;
 };
 
-/// Block means of the active area, saturated samples included; sums are integers, so any thread count gives the same.
-/// Noise of black pixels: measured on masked pixels, else sqrt(NoiseProfile offset), else estimated as the lowest
-/// twentieth of the blocks' mean absolute difference of same-colour neighbours (times sqrt(pi) / 2, for a normal law);
-/// blocks with clipped samples or without any difference do not count.
+/// Computes block means of the active area, saturated samples included; sums are integers, so any thread count gives
+/// the same. The noise of black pixels is measured on masked pixels, else sqrt(NoiseProfile offset), else estimated as
+/// the lowest twentieth of the blocks' mean absolute difference of same-colour neighbours (times sqrt(pi) / 2, for a
+/// normal distribution); blocks with clipped samples or without any difference do not count.
 /// Gain maps are not applied: exposure and white balance do not need them.
 Thumbnail make_thumbnail(const RawFrame& frame, const BlackPoint& black, Executor& executor);
 

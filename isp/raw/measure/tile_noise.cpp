@@ -12,12 +12,12 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double low_rank = 0.05;
-constexpr int least_samples = 60;  // of a level
-/// Noise of half a code and more, rounded to codes, has the variance of both; of less, it depends on where the mean
-/// lies between two codes.
+constexpr int least_samples = 60;  // of one level
+/// Noise of at least half a code, rounded to codes, has the sum of both variances; for less noise, the variance depends
+/// on the position of the mean between two codes.
 constexpr double least_variance_dn2 = 0.25 + quantisation_dn2;
 
-/// Counts of positive floats by their leading bits: 2^mantissa_bits bins for each octave, from 2^low_octave on.
+/// Bins positive floats by their leading bits: 2^mantissa_bits bins for each octave, from 2^low_octave on.
 template <int mantissa_bits, int low_octave>
 struct FloatBins {
   static constexpr int shift = 23 - mantissa_bits;
@@ -30,19 +30,19 @@ struct FloatBins {
     return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(bin + first) << shift));
   }
 };
-using LevelBins = FloatBins<1, -3>;  // of DN above black
-using RatioBins = FloatBins<3, -8>;  // of variances over those expected
+using LevelBins = FloatBins<1, -3>;  // bins of DN above black
+using RatioBins = FloatBins<3, -8>;  // bins of the ratio of measured to expected variance
 constexpr int levels = 40;
 constexpr int ratio_bins = 256;
 
-/// Of one level: variances over those expected, and the sum of means.
+/// Holds the ratios of measured to expected variance and the sum of means of one level.
 struct Level {
   std::array<std::uint32_t, ratio_bins> bin{};
   std::uint32_t samples = 0;
   double sum = 0;
 };
 
-/// What a share of the samples lies below, by straight lines within bins.
+/// Returns the quantile that the fraction `share` of the samples lies below, interpolated linearly within bins.
 double low_quantile(const Level& level, double share) {
   const double wanted = share * level.samples;
   double below = 0;
@@ -133,7 +133,7 @@ std::optional<NoiseLine> TileNoise::line_by(const NoiseLine& expected, const Per
     const double mean = level.sum / level.samples;
     const double variance = variance_at(expected, mean) * low_quantile(level, low_rank) / low_share_;
     if (!(variance > least_variance_dn2)) continue;
-    const double relative2 = low_error2_ / level.samples + 1e-4;  // and a hundredth for what detail adds
+    const double relative2 = low_error2_ / level.samples + 1e-4;  // plus a hundredth for the effect of detail
     sums.add(1 / (relative2 * variance * variance), mean, variance);
   }
   const double determinant = sums.w * sums.xx - sums.x * sums.x;
@@ -147,10 +147,10 @@ std::optional<NoiseLine> TileNoise::line_by(const NoiseLine& expected, const Per
 }
 
 std::optional<NoiseLine> TileNoise::line(const PerSite<double>& black_dn, double white_dn) const {
-  // Levels are half an octave wide. Once a first line tells how variance changes within them, that no longer matters.
+  // Levels are half an octave wide. A first line describes the variance within them, so that their width has no effect.
   std::optional<NoiseLine> out = line_by({.offset_dn2 = 1}, black_dn, white_dn);
   if (out) out = line_by(*out, black_dn, white_dn);
-  if (out) out->offset_dn2 = std::max(out->offset_dn2, quantisation_dn2);  // that of rounding to codes
+  if (out) out->offset_dn2 = std::max(out->offset_dn2, quantisation_dn2);  // variance of rounding to codes
   return out;
 }
 

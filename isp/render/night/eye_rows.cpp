@@ -25,7 +25,7 @@ HWY_INLINE VF constant(float x) { return hn::Set(Floats(), x); }
 constexpr float v0 = 683.0f / 1699.0f;  // scotopic_at_555_nm
 constexpr float darkest = 1e-7f;        // [cd/m2], below the tables' first node
 
-/// log2 of positive normal numbers within 2e-6: exponent and an odd polynomial in (f - 1) / (f + 1), f in
+/// Returns log2 of positive normal numbers within 2e-6: exponent and an odd polynomial in (f - 1) / (f + 1), f in
 /// [sqrt(1/2), sqrt(2)).
 HWY_INLINE VF log2_of(VF x) {
   const Floats f;
@@ -43,7 +43,7 @@ HWY_INLINE VF log2_of(VF x) {
   return hn::MulAdd(s, sum, hn::ConvertTo(f, exponent));
 }
 
-/// A place between two nodes of an axis.
+/// Locates a value between two nodes of an axis.
 struct Place {
   VI node;
   VF way;
@@ -65,8 +65,8 @@ HWY_INLINE VF between(const float* table, VI node, VF way) {
   return hn::MulAdd(way, hn::Sub(hn::GatherIndex(f, table + 1, node), low), low);
 }
 
-/// Calls step(i) for each vector of n samples; the last ones, where they do not fill a vector, overlap those before.
-/// Fewer than a vector: returns false.
+/// Calls step(i) for each vector of n samples; the last vector overlaps the previous one where the samples do not fill
+/// it. Returns false for fewer samples than a vector.
 template <class Step>
 HWY_INLINE bool for_each_vector(int n, const Step& step) {
   const auto lanes = static_cast<int>(hn::Lanes(Floats()));
@@ -76,7 +76,7 @@ HWY_INLINE bool for_each_vector(int n, const Step& step) {
   return true;
 }
 
-/// What is not a number counts as 0, what is beyond +-1e9 as that.
+/// Replaces values that are not numbers with 0 and limits the rest to +-1e9.
 HWY_INLINE VF defined(VF x) {
   const VF number = hn::IfThenElseZero(hn::Eq(x, x), x);
   return hn::Min(hn::Max(number, constant(-1e9f)), constant(1e9f));

@@ -16,7 +16,7 @@ using rows::EyeTables;
 
 double node(int i, int nodes, double first, double last) { return first + (last - first) * i / (nodes - 1); }
 
-// The root before it is held to 0..1, so that the ends are lines too.
+// Returns the coefficient before it is clamped to 0..1, so that interpolation is linear at the ends too.
 double unheld_coefficient(double log2_light, double log2_ratio) {
   const LuminancePair field{std::exp2(log2_light), std::exp2(log2_light + log2_ratio)};
   const double m = mesopic_state(field).m;

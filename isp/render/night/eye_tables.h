@@ -4,10 +4,10 @@
 
 namespace lowlux::isp {
 
-/// The tables of the kernels, made at the first call.
+/// Returns the tables of the kernels, made at the first call.
 const rows::EyeTables& eye_tables();
 
-/// threshold_contrast() by a table over log2 of luminance, its ends beyond.
+/// Returns threshold_contrast() from a table over log2 of luminance, constant beyond its ends.
 float tabulated_threshold_contrast(float luminance_cd_m2);
 
 }  // namespace lowlux::isp

@@ -40,7 +40,7 @@ void interpolate_row(const float* near_row, const float* far_row, int cells, int
     if (2 * x + 1 < width) out[2 * x + 1] = 0.75f * at(x) + 0.25f * at(after);
   };
   cell(0, 0, std::min(1, cells - 1));
-  for (int x = 1; x + 1 < cells; ++x) {  // each on its own, so that vectors can be made of them
+  for (int x = 1; x + 1 < cells; ++x) {  // each element independent, so that the loop can be vectorised
     const float here = 0.75f * at(x);
     out[2 * x] = here + 0.25f * at(x - 1);
     out[2 * x + 1] = here + 0.25f * at(x + 1);

@@ -8,23 +8,23 @@
 
 namespace lowlux::isp {
 
-// Grids with one sample for each cell, and the same with cells of twice the side. The ends of rows and columns are
+// Grids have one sample for each cell; halved grids have cells of twice the side. The ends of rows and columns are
 // repeated.
 
-/// Cells of twice the side along a side of n.
+/// Returns the number of cells of twice the side along a side of n cells.
 constexpr int halved(int n) { return (n + 1) / 2; }
 
-/// Mean of each 2 x 2 cells; `out` is halved() in both directions.
+/// Writes the mean of each 2 x 2 cells; `out` is halved() in both directions.
 void halve(const PlaneView<const float>& in, const PlaneView<float>& out, Executor& executor);
 
-/// Linear interpolation at the middles of the smaller cells: weights 3/4 and 1/4 in both directions.
+/// Interpolates linearly at the centres of the smaller cells: weights 3/4 and 1/4 in both directions.
 /// @param out  in.width = halved(out.width), and so for heights
 void interpolate_twice(const PlaneView<const float>& in, const PlaneView<float>& out, Executor& executor);
 
-/// Gaussian of a standard deviation in cells, 0..8, cut at three of them; `scratch` is as large as `plane`.
+/// Applies a Gaussian of a standard deviation in cells, 0..8, cut at three of them; `scratch` is as large as `plane`.
 void blur(const PlaneView<float>& plane, double std_cells, const PlaneView<float>& scratch, Executor& executor);
 
-/// A plane and its halvings, for the largest frame; frames take the upper left corner.
+/// Holds a plane and its halved versions, for the largest frame; smaller frames use the upper left corner.
 class Pyramid {
  public:
   Pyramid(int width, int height, int levels) {
@@ -42,7 +42,7 @@ class Pyramid {
   void halve_to(int last, Executor& executor) {
     for (int k = 0; k < last; ++k) halve((*this)[k], (*this)[k + 1], executor);
   }
-  /// From a coarser level down to a finer one.
+  /// Interpolates from a coarser level down to a finer one.
   void interpolate(int from, int to, Executor& executor) {
     for (int k = from; k > to; --k) interpolate_twice((*this)[k], (*this)[k - 1], executor);
   }
@@ -61,7 +61,7 @@ void for_each_row(Executor& executor, int height, const Work& work) {
   });
 }
 
-/// Levels down to one cell.
+/// Returns the number of levels down to one cell.
 inline int levels_of(int width, int height) {
   int levels = 1;
   for (int side = std::max(width, height); side > 1; side = halved(side)) ++levels;

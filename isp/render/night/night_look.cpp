@@ -14,10 +14,10 @@
 namespace lowlux::isp {
 namespace {
 
-// Of a cell of 4 pixels: box and linear interpolation blur it by half its side, 2 pixels.
+// Box and linear interpolation of a cell of 4 pixels blur it by half its side, 2 pixels.
 constexpr double cell_variance_px2 = 0.25 * LookGrid::cell * LookGrid::cell;
 
-// Of a field of adaptation: below an S/P of 0.265 CIE 191 has several answers and jumps between them.
+// Fields of adaptation have at least this S/P: below 0.265 CIE 191 has several solutions and jumps between them.
 constexpr float least_field_ratio = 0.27f;
 
 double mean_of(const PlaneView<const float>& plane) {
@@ -54,7 +54,7 @@ rows::LightWeights weights_of(const NightLook& look, const std::array<float, 9>&
 float gain_within_noise_limit(double y, double noise_std, double lightness) {
   const double allowed = lightness / (1.3 * std::max(noise_std, 1e-12));
   const double in_line = allowed / 903.3;
-  // 116/3 (0.7 g y)^(-2/3) g = allowed
+  // Solves 116/3 (0.7 g y)^(-2/3) g = allowed.
   const double root = allowed * 3 / 116 * std::cbrt(0.49 * std::max(y, 0.0) * std::max(y, 0.0));
   return static_cast<float>(std::clamp(std::max(in_line, root * root * root), 0.0, 1.0));
 }
@@ -108,17 +108,17 @@ struct NightLookGrid::State {
 
   int levels;
   Pyramid photopic, scotopic;  // light, then the field of adaptation [cd/m2]
-  int smooth = 0;              // level on which that field is still smooth
+  int smooth = 0;              // level on which the field of adaptation is still smooth
   Pyramid rod_share, chroma, blue;
   Pyramid seen;      // E of LookGrid
-  Pyramid variance;  // of the blur [px^2]
+  Pyramid variance;  // variance of the blur [px^2]
   Pyramid between;
   Plane<float> base, detail;
   Plane<float> grain;
 };
 
-// Light in the pixels' unit: photopic into `seen`, scotopic into `variance`; as fields [cd/m2], not negative, into the
-// two pyramids.
+// Computes the light in the pixels' unit, photopic into `seen` and scotopic into `variance`, and the non-negative
+// fields [cd/m2] into the two pyramids.
 void NightLookGrid::State::take_light(const RgbView<const float>& camera, const rows::LightWeights& weights,
                                       const NightLook& look, Executor& executor) {
   const PlaneView<float> y = seen[0], s = variance[0], field_y = photopic[0], field_s = scotopic[0];
@@ -141,8 +141,8 @@ void NightLookGrid::State::take_light(const RgbView<const float>& camera, const 
   });
 }
 
-// The field of adaptation: blurred where cells are as large as a half to a whole of its Gaussian, and taken from there
-// to cells of half that size, between which it is a line.
+// Computes the field of adaptation: it is blurred on the level whose cells are 0.5 to 1 times its Gaussian's size, and
+// interpolated to cells of half that size, between which it is linear.
 void NightLookGrid::State::adapt(const NightLook& look, Executor& executor) {
   double std_cells = adaptation_field_std_deg * look.pixels_per_degree / LookGrid::cell;
   int level = 0;
@@ -163,7 +163,7 @@ void NightLookGrid::State::adapt(const NightLook& look, Executor& executor) {
   }
 }
 
-// What the eye makes of each place, on the smooth level and from there on every cell; then E in place of the light.
+// Computes the eye's response at each position, on the smooth level and then on every cell; E then replaces the light.
 void NightLookGrid::State::see(const NightLook& look, Executor& executor) {
   const PlaneView<float> cones = photopic[smooth], rods = scotopic[smooth];
   const auto white = static_cast<float>(look.scotopic_ratio_of_white);
@@ -194,8 +194,9 @@ void NightLookGrid::State::see(const NightLook& look, Executor& executor) {
   });
 }
 
-// detail and base: what is left of the pixels' own light, and what takes its place, blurred as far as each cell asks.
-// Coarser cells stand for wider Gaussians; between two of them variances are met.
+// Computes detail and base: the remaining fraction of the pixels' own light, and the blurred light that replaces the
+// rest, with the blur that each cell requires. Coarser cells stand for wider Gaussians; interpolation between two of
+// them matches the variance.
 void NightLookGrid::State::soften(Executor& executor) {
   const float widest = largest_of(variance[smooth]);
   variance.interpolate(smooth, 0, executor);
@@ -226,8 +227,8 @@ void NightLookGrid::State::soften(Executor& executor) {
   });
 }
 
-// Light scattered in the eye, 10 / angle^2 per lux and degree^2 (Stiles & Holladay), from 1 degree on: Gaussians of 1,
-// 2, 4... degrees, each with what its octave of angles scatters. Into `photopic`.
+// Adds light scattered in the eye, 10 / angle^2 per lux and degree^2 (Stiles & Holladay), from 1 degree on: Gaussians
+// of 1, 2, 4... degrees, each with the scatter of its octave of angles. The result is in `photopic`.
 void NightLookGrid::State::scatter(const NightLook& look, Executor& executor) {
   constexpr int octaves = 5;
   constexpr double steradians_per_deg2 = (std::numbers::pi / 180) * (std::numbers::pi / 180);
@@ -261,7 +262,7 @@ void NightLookGrid::State::add_veil(Executor& executor) {
   });
 }
 
-// Normal deviates of as much contrast as is just seen in the field of adaptation.
+// Draws normal deviates whose contrast is just visible in the field of adaptation.
 void NightLookGrid::State::draw_grain(const NightLook& look, Executor& executor) {
   photopic.interpolate(smooth, 0, executor);
   const PlaneView<float> field = photopic[0];
@@ -282,8 +283,8 @@ void NightLookGrid::State::add_grain(Executor& executor) {
   });
 }
 
-// Gain, found on cells of 64 pixels: it rises with the square of the light, and so would lift what noise of it is left
-// in smaller ones.
+// Computes the gain limit on cells of 64 pixels: gain rises with the square of the light, and in smaller cells would
+// amplify their remaining noise.
 void NightLookGrid::State::bound_noise(const NoiseLimit& limit, Executor& executor) {
   const int level = std::min(4, levels - 1);
   const PlaneView<float> e = between[0], v = variance[0];

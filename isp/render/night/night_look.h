@@ -12,60 +12,60 @@
 
 namespace lowlux::isp {
 
-/// What the dark does to what is seen, each of which can be left out.
+/// Selects the effects of darkness on vision that are applied, each of which can be left out.
 struct NightEffects {
   bool purkinje = true;       // reds darken and blues brighten, as rods take over
   bool chroma = true;         // colours fade
-  bool hue = true;            // what is left moves towards blue
+  bool hue = true;            // remaining colour moves towards blue
   bool acuity = true;         // detail softens
-  bool glare = false;         // lamps scatter in the eye
-  bool visual_noise = false;  // the eye's own grain
+  bool glare = false;         // light of lamps scatters in the eye
+  bool visual_noise = false;  // noise of the eye itself
 };
 
-/// A look, decided for one frame: the scene as an eye that is adapted to it sees it.
+/// Parameters of a look, decided for one frame: the scene as perceived by an eye that is adapted to it.
 struct NightLook {
   NightEffects effects;
   double cd_m2_per_unit = 100;            // luminance in the scene of Y = 1 of the pixels
-  double scotopic_ratio_of_white = 2.46;  // S/P of what the pixels have as white
-  double pixels_per_degree = 60;          // of the picture
+  double scotopic_ratio_of_white = 2.46;  // S/P of the white of the pixels
+  double pixels_per_degree = 60;          // of the image
   std::array<float, 3> luminance{};       // weights in the pixels' primaries, as in LookGrid
   std::array<float, 3> rods{};
   std::array<float, 3> tint{};
   float dark = 1e-6f;      // as in LookGrid: about the noise of a pixel
-  std::uint64_t seed = 1;  // of visual_noise
+  std::uint64_t seed = 1;  // seed of visual_noise
 };
 
-/// Bounds how far noise may be lifted: where the standard deviation of what is left of it would exceed `lightness` (CIE
-/// L*) in the picture, gain is reduced until it does not. Held by every tone curve y(x) with y >= 0.7 x and y' <= 1.3
-/// below mid-grey, as those of tone.h are.
+/// Bounds the amplification of noise: where the standard deviation of the remaining noise would exceed `lightness` (CIE
+/// L*) in the image, gain is reduced until it does not. The bound holds for every tone curve y(x) with y >= 0.7 x and
+/// y' <= 1.3 below mid-grey, as those of tone.h are.
 struct NoiseLimit {
   double lightness = 2;
   double display_per_unit = 1;      // light on the display, white 1, of Y = 1 of the pixels, before the tone curve
   PlaneView<const float> variance;  // of Y of the pixels, one for each cell of the grid
 };
 
-/// The largest gain in 0..1 for pixels of luminance y with noise of standard deviation noise_std, both display-linear
-/// and before the tone curve: with the slope of L*, min(903.3, 116/3 y^(-2/3)),
+/// Returns the largest gain in 0..1 for pixels of luminance y with noise of standard deviation noise_std, both
+/// display-linear and before the tone curve, with the slope of L*, min(903.3, 116/3 y^(-2/3)):
 ///     slope(0.7 g y) 1.3 g noise_std <= lightness.
 float gain_within_noise_limit(double y, double noise_std, double lightness);
 
-/// Diameter of the field that an eye's state of adaptation goes by, as the standard deviation of a Gaussian [deg], and
-/// the share of the whole scene's mean in it, which scatter in the eye brings. Chosen, not measured.
+/// The field that determines an eye's state of adaptation: standard deviation of its Gaussian [deg], and fraction of
+/// the entire scene's mean in it, due to scatter in the eye. Both values are chosen, not measured.
 inline constexpr double adaptation_field_std_deg = 1.0;
 inline constexpr double adaptation_share_of_mean = 0.1;
 
-/// Makes LookGrids. Owns its memory and allocates only in the constructor.
+/// Makes LookGrids. It owns its memory and allocates only in the constructor.
 class NightLookGrid {
  public:
-  /// For pictures of up to max_width x max_height pixels.
+  /// Prepares for images of up to max_width x max_height pixels.
   NightLookGrid(int max_width, int max_height);
   ~NightLookGrid();
   NightLookGrid(const NightLookGrid&) = delete;
   NightLookGrid& operator=(const NightLookGrid&) = delete;
 
-  /// What a look does to one frame. The grid is valid until the next call.
-  /// The field of adaptation is the luminance around each place (adaptation_field_std_deg) and that of the whole.
-  /// @param camera  means of 4 x 4 pixels of camera RGB (RawToRgb::quarter); what is not finite counts as 0
+  /// Applies a look to one frame. The grid is valid until the next call. The field of adaptation combines the luminance
+  /// around each position (adaptation_field_std_deg) and the mean of the entire image.
+  /// @param camera  means of 4 x 4 pixels of camera RGB (RawToRgb::quarter); values that are not finite count as 0
   /// @param matrix  camera RGB to the pixels' primaries, rows; clip as in RgbTransform
   LookGrid make(const RgbView<const float>& camera, const std::array<float, 9>& matrix, float clip,
                 const NightLook& look, const std::optional<NoiseLimit>& limit, Executor& executor);

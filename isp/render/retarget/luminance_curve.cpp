@@ -35,7 +35,7 @@ double middle_log(const LuminanceCurve& curve, std::size_t segment) {
   return curve.first_log + (static_cast<double>(segment) + 0.5) * LuminanceCurve::spacing();
 }
 
-/// The best curve whose nodes are whole steps from the given one's, `reach` at most. @return whether it is another
+/// Finds the best curve whose nodes are integer steps from the given one's, `reach` at most. @return whether it differs
 bool improve(LuminanceCurve& curve, double step, const Bounds& bounds) {
   std::array<std::array<double, candidates>, nodes> value{}, cost{};
   std::array<std::array<std::size_t, candidates>, nodes> before{};

@@ -6,38 +6,39 @@
 
 namespace lowlux::isp {
 
-/// The scene and the display a luminance curve is for.
+/// Describes the scene and the display of a luminance curve.
 struct LuminanceRange {
   double source_white_cd_m2 = 250;
   double display_white_cd_m2 = 2;
   double display_black_cd_m2 = 0;
 };
 
-/// How luminances of a source are shown: log10 of the display's [cd/m2] over log10 of the source's, linear between
-/// nodes, which are evenly spaced over the 3.5 decades below the source's white: what codes of 8 bits hold.
+/// Maps luminances of a source: log10 of the display's [cd/m2] over log10 of the source's, linear between nodes, which
+/// are evenly spaced over the 3.5 decades below the source's white, the range of 8-bit codes.
 struct LuminanceCurve {
   static constexpr int segments = 32;
   static constexpr double decades = 3.5;
-  double first_log = 0;                          // of the source, of the first node
-  std::array<double, segments + 1> shown_log{};  // not falling
+  double first_log = 0;                          // log10 of the source's luminance at the first node
+  std::array<double, segments + 1> shown_log{};  // log10 of the display's luminance at each node, not falling
   double display_black_cd_m2 = 0;
 
   static constexpr double spacing() { return decades / segments; }
 };
 
-/// The integral over l = log10 Y of
+/// Returns the integral over l = log10 Y of
 ///     [(G - Gt(l)) - (T'(l) G - Gt(T(l)))]^2 + tau (l - T(l))^2,   G = 0.4, tau = 1e-4,
-/// Gt = threshold_log_contrast: how far contrasts above the threshold change, and how far luminances do (Wanat &
+/// Gt = threshold_log_contrast: the change of contrasts above the threshold, and the change of luminances (Wanat &
 /// Mantiuk, ACM Trans. Graph. 33 (2014)); one sample in the middle of each segment.
 double luminance_curve_cost(const LuminanceCurve& curve);
 
-/// The curve of least cost that does not fall and keeps within the display's black and white: dynamic programming over
-/// a few values for each node about the best so far, closer and closer, to 1e-5 of a decade.
-/// Errors: invalid_argument for luminances that are not positive and finite, a black not below the display's white.
+/// Returns the curve of least cost that does not fall and stays within the display's black and white. It is found by
+/// dynamic programming over a few values for each node around the best so far, in decreasing steps, to 1e-5 of a
+/// decade. Errors: invalid_argument for luminances that are not positive and finite, a black not below the display's
+/// white.
 Result<LuminanceCurve> luminance_curve(const LuminanceRange& range);
 
-/// Luminance shown for one of the source [cd/m2]. Above the source's white: the last node's; below the first node:
-/// proportional, so that no light is the display's black.
+/// Returns the luminance shown for one of the source [cd/m2]. Above the source's white it is the last node's; below the
+/// first node it is proportional, so that zero light gives the display's black.
 double retargeted_luminance(const LuminanceCurve& curve, double source_cd_m2);
 
 }  // namespace lowlux::isp

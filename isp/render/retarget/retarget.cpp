@@ -16,7 +16,7 @@
 namespace lowlux::isp {
 namespace {
 
-/// The picture's colours and the display's: primaries and white of sRGB.
+/// Holds the colour space of the image and the display: primaries and white of sRGB.
 struct Space {
   Matrix3 to_xyz = rgb_to_xyz(primaries_rec709).value();
   Matrix3 to_rgb = inverse(to_xyz).value();
@@ -28,8 +28,8 @@ struct Shown {
   bool held = false;
 };
 
-/// What the display shows for the wanted light, relative to its white: black taken off, then towards the neutral of the
-/// same luminance until all components are within 0 to 1.
+/// Returns the light the display shows for the wanted light, relative to its white: black subtracted, then moved
+/// towards the neutral of the same luminance until all components are within 0 to 1.
 Shown into_gamut(const Vector3& wanted, double black, const Vector3& luminance) {
   Vector3 v{};
   bool held = false;
@@ -41,7 +41,8 @@ Shown into_gamut(const Vector3& wanted, double black, const Vector3& luminance) 
   return {toward_white(v, luminance).rgb, held};
 }
 
-/// A map of light with the transfer function about it. @param to_light  linear sRGB to the light wanted on the display
+/// Applies the transfer function before and after a map of light.
+/// @param to_light  linear sRGB to the light wanted on the display
 template <class ToLight>
 RetargetMap mapped(const RetargetOptions& options, const Space& space, ToLight to_light) {
   const double black = options.display_black_cd_m2 / options.display_cd_m2;
@@ -64,7 +65,7 @@ ViewingConditions conditions_at(double white_cd_m2, const RetargetOptions& optio
   return out;
 }
 
-/// The model seen through twice, and the best colour of the display for each of the picture.
+/// Applies the model under both conditions and finds the display's best match for each colour of the image.
 Result<RetargetMap> matched(const RetargetOptions& options, const Space& space, std::string_view model_name,
                             const MatchWeights& weights) {
   const auto model = appearance_model_named(model_name);
@@ -101,7 +102,7 @@ Result<RetargetMap> cao_matrix(const RetargetOptions& options, const Space& spac
   const ViewingConditions to = conditions_at(options.display_cd_m2, options, space);
   const auto matrix =
       cao_retargeting(from.adaptation(), to.adaptation(), cao_receptors(space.to_xyz, scotopic_weights));
-  if (!matrix) return fail(ErrorCode::invalid_argument, "the receptors cannot tell the primaries apart");
+  if (!matrix) return fail(ErrorCode::invalid_argument, "the receptors do not separate the primaries");
   return mapped(options, space, [matrix = *matrix](const Vector3& light) { return matrix * light; });
 }
 

@@ -14,15 +14,16 @@
 
 namespace lowlux::isp {
 
-/// How a picture is made to look, on a display of another luminance, as it did.
+/// Names the methods that preserve the appearance of an image on a display of another luminance.
 enum class RetargetMethod : std::uint8_t {
-  constrained,  // ours: the displayable colour that looks most alike by Shin's model (closest_displayable)
+  constrained,  // this project's method: the displayable colour with the closest appearance by Shin's model
+                // (closest_displayable)
   shin,         // Shin's model inverted as published, Y' that of the source, then moved towards neutral (thesis 5.3)
-  shin_consistent,  // the same with Y' of the answer itself
+  shin_consistent,  // as `shin`, with Y' of the result itself
   wanat,            // saturation and luminance curve of Wanat & Mantiuk 2014
   cao,              // the two-term model of Cao et al. 2008, which the thesis calls Wanat & Mantiuk's
-  icam06,           // the displayable colour that looks most alike by iCAM06
-  none,             // the picture as it is
+  icam06,           // the displayable colour with the closest appearance by iCAM06
+  none,             // the image unchanged
 };
 
 struct NamedRetargetMethod {
@@ -40,32 +41,32 @@ inline constexpr std::array<NamedRetargetMethod, 7> retarget_methods{
      {RetargetMethod::none, "none"}}};
 
 std::string_view name_of(RetargetMethod method);
-/// Error: invalid_argument; the message names those there are.
+/// Returns the method of that name. Error: invalid_argument; the message lists the valid names.
 Result<RetargetMethod> retarget_method_named(std::string_view name);
 
 struct RetargetOptions {
   RetargetMethod method = RetargetMethod::constrained;
-  double source_cd_m2 = 250;         // white of the display or scene the picture is right for
-  double display_cd_m2 = 2;          // white of the display it is made for
-  double display_black_cd_m2 = 0;    // neutral, what that display shows for code 0
+  double source_cd_m2 = 250;         // white of the display or scene for which the image is correct
+  double display_cd_m2 = 2;          // white of the display for which the result is made
+  double display_black_cd_m2 = 0;    // neutral luminance that the display shows for code 0
   const ShinTable* shin = nullptr;   // absent: the substitute SHIN-SUB-1; borrowed for the call
-  ShinUnits units = ShinUnits::lux;  // luminance_as_is: as the thesis
-  MatchWeights weights;              // of `constrained`
+  ShinUnits units = ShinUnits::lux;  // luminance_as_is: as in the thesis
+  MatchWeights weights;              // weights of `constrained`
 };
 
-/// Where the coefficients come from, for reports; empty for methods without Shin's model.
+/// Returns the origin of the coefficients, for reports; empty for methods without Shin's model.
 std::string coefficients_name(const RetargetOptions& options);
 
 struct RetargetedColour {
   Vector3 code{};
-  bool held = false;  // what would look the same is not among the colours the display shows
+  bool held = false;  // whether the colour of equal appearance is outside the display's gamut
 };
 
-/// sRGB code values, 0..1, of the picture to those of the display.
+/// Maps sRGB code values, 0..1, of the image to those of the display.
 using RetargetMap = std::function<RetargetedColour(const Vector3& code)>;
 
-/// Colours stay as they are where both luminances are the same and the display's black is 0; neutrals stay neutral, but
-/// with `cao`, which adds the rods' own colour.
+/// Returns the map for the given options. Colours stay as they are where both luminances are the same and the display's
+/// black is 0; neutrals stay neutral, except with `cao`, which adds the rods' own colour.
 /// Errors: invalid_argument for luminances that are not positive and finite, a black that is not below the display's
 /// white, coefficients the model cannot use.
 Result<RetargetMap> retargeting(const RetargetOptions& options);

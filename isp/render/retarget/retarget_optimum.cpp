@@ -11,14 +11,14 @@ namespace {
 
 constexpr int most_steps = 100;
 constexpr double smallest_step = 1e-7;    // of the code range
-constexpr double derivative_step = 1e-5;  // likewise: the error of a forward difference is then as small
-constexpr double largest_damping = 1e9;   // of the mean curvature: no step is left
+constexpr double derivative_step = 1e-5;  // of the code range: the error of a forward difference is then as small
+constexpr double largest_damping = 1e9;   // of the mean curvature: steps are then negligible
 constexpr double least_damping = 1e-9;    // keeps flat directions from being singular
 constexpr int residuals = 6;
 
 using Residual = std::array<double, residuals>;
 
-/// Directions and tolerances of CIE 94 about a colour.
+/// Holds directions and tolerances of CIE 94 about a colour.
 struct Tolerance {
   Lab centre;
   double along_a = 1, along_b = 0;
@@ -54,7 +54,7 @@ Vector3 light_of(const Vector3& code) {
           decode_transfer(OutputSpace::srgb, code[2])};
 }
 
-/// The problem of one source colour.
+/// Represents the optimisation problem of one source colour.
 class Problem {
  public:
   Problem(const AppearanceMatch& match, const Vector3& source)
@@ -90,7 +90,7 @@ double squares(const Residual& r) {
   return sum;
 }
 
-/// Quadratic about the current colour: x' H x / 2 + g' x.
+/// Approximates the cost about the current colour by x' H x / 2 + g' x.
 struct Quadratic {
   Matrix3 h{};
   Vector3 g{};
@@ -115,8 +115,8 @@ Quadratic quadratic_at(const Problem& problem, const Vector3& code, const Residu
   return q;
 }
 
-/// The least of a strictly convex quadratic within the box low..high, which holds 0: one coordinate after another,
-/// each to its own optimum, which converges for every such matrix.
+/// Returns the minimum of a strictly convex quadratic within the box low..high, which holds 0: one coordinate after
+/// another, each to its own optimum, which converges for every such matrix.
 Vector3 least_in_box(const Quadratic& q, const Vector3& low, const Vector3& high) {
   constexpr int most_sweeps = 500;
   Vector3 x{};
@@ -147,8 +147,8 @@ Vector3 step_from(const Quadratic& q, double damping, const Vector3& code) {
 
 double largest(const Vector3& v) { return std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}); }
 
-/// Whether the cost would fall beyond a bound the colour lies at, by more than 1e-3 units of the squared difference per
-/// hundredth of the code range.
+/// Returns whether the cost would fall beyond a bound at which the colour lies, by more than 1e-3 units of the squared
+/// difference per hundredth of the code range.
 bool is_held(const Quadratic& q, const Vector3& code) {
   constexpr double clear_slope = 0.1;
   for (std::size_t k = 0; k < 3; ++k) {

@@ -5,43 +5,44 @@
 
 namespace lowlux::isp {
 
-/// What a difference in appearance weighs, in the units of CIE 116-1995 (Delta E 94, the source as reference, S_L = 1).
+/// Weights of differences in appearance, in the units of CIE 116-1995 (Delta E 94, the source as reference, S_L = 1).
 struct MatchWeights {
   double lightness = 0.6;
   double chroma = 1;
   double hue = 1;
-  /// Of the same difference as an eye adapted to daylight sees it, squared: what keeps colours from leaving the
-  /// picture's own for the sake of a gain nobody sees, and the optimum unique and continuous.
+  /// Weight of the squared difference as perceived by an eye adapted to daylight. It keeps colours from departing from
+  /// those of the image for an invisible gain, and makes the optimum unique and continuous.
   double faithfulness = 0.0015;
 };
 
-/// How a picture's colours are seen, and how a display's are.
+/// Models the perception of an image's colours and of a display's colours.
 struct AppearanceMatch {
-  ColourMap seen_source;     // of XYZ relative to the picture's white
-  ColourMap seen_display;    // of XYZ relative to the display's
-  double display_black = 0;  // light of the display's black, neutral, of its white; 0 <= black < 1
+  ColourMap seen_source;     // perceived colour of XYZ relative to the image's white
+  ColourMap seen_display;    // perceived colour of XYZ relative to the display's white
+  double display_black = 0;  // light of the display's neutral black relative to its white; 0 <= black < 1
   MatchWeights weights;
 };
 
-/// The displayable colour that looks most like the picture's.
+/// Holds the displayable colour that looks most like a colour of the image.
 struct MatchedColour {
   Vector3 code{};          // sRGB code values, 0..1
-  double cost = 0;         // match_cost of it
-  bool held = false;       // a better one lies outside of what the display shows
+  double cost = 0;         // match_cost of the colour
+  bool held = false;       // a better colour lies outside the display's gamut
   bool converged = false;  // the last step was below 1e-7 of the code range
   int steps = 0;
 };
 
-/// Sum of squares of what `shown` on the display differs from `source`, both sRGB code values 0..1:
+/// Returns the weighted sum of squared differences between `shown` on the display and `source`, both sRGB code values
+/// 0..1:
 ///     sum of w_i^2 (Delta_i(seen) / S_i)^2 + faithfulness * (the same of the colours themselves),
-/// Delta_i the differences in lightness L*, along and across the chroma of the source, S_C = 1 + 0.045 C and
-/// S_H = 1 + 0.015 C; neutrals have no direction, there both are plain differences.
+/// Delta_i the differences in lightness L*, along and across the chroma of the source, S_C = 1 + 0.045 C and S_H = 1 +
+/// 0.015 C; neutrals have no direction, there both are plain differences.
 double match_cost(const AppearanceMatch& match, const Vector3& source, const Vector3& shown);
 
 /// Minimises match_cost over the cube of codes by Levenberg-Marquardt steps that are each the exact minimum within the
 /// cube. Code values rather than light are the unknowns: in them appearance is nearly linear, down to black. The search
 /// starts at the source's own codes, so that equal conditions give the same colour back.
-/// @param source  sRGB code values; values outside of 0..1 count as the nearest
+/// @param source  sRGB code values; values outside 0..1 count as the nearest
 MatchedColour closest_displayable(const AppearanceMatch& match, const Vector3& source);
 
 }  // namespace lowlux::isp

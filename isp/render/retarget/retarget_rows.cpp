@@ -26,7 +26,7 @@ using VC = hn::Vec<Codes>;
 
 constexpr int most_pixels_at_once() { return 2 * static_cast<int>(hn::MaxLanes(Floats())); }
 
-/// One vector for each of R, G and B.
+/// Holds one vector for each of R, G and B.
 template <class V>
 struct Three {
   V c[3];
@@ -95,7 +95,7 @@ HWY_INLINE VI rounded(VF code, float scale, int most) {
   return hn::Min(hn::Max(nearest, hn::Zero(Ints())), hn::Set(Ints(), most));
 }
 
-// Where finished pixels go: a vector of each colour, even pixels and odd ones.
+// The structs below store finished pixels: a vector of each colour, even pixels and odd ones.
 
 struct To8 {
   using Code = std::uint8_t;
@@ -135,7 +135,7 @@ HWY_INLINE Three<VI> odd_of(const Three<VC>& codes) {
   return {{high(codes.c[0]), high(codes.c[1]), high(codes.c[2])}};
 }
 
-/// The last, partial vector takes the same way, through copies.
+/// Converts a row; the last, partial vector is processed in the same way, through copies.
 template <class Sink>
 HWY_INLINE void convert(const RetargetTable& from, const std::uint16_t* rgb, int width, typename Sink::Code* out) {
   using Code = typename Sink::Code;

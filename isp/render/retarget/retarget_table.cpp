@@ -27,7 +27,7 @@ Vector3 node(const RetargetTable& table, std::size_t number) {
   return {(first & 0xFFFF) / highest_code, (first >> 16) / highest_code, second / highest_code};
 }
 
-/// Van der Corput's sequence: the digits of i in a base, mirrored at the point.
+/// Returns Van der Corput's sequence: the digits of i in a base, mirrored at the point.
 double mirrored_digits(int i, int base) {
   double value = 0, weight = 1;
   for (; i > 0; i /= base) {
