@@ -62,7 +62,7 @@ struct DenoiseOptions {
   /// Ratio of the noise variance to that of RawNoise on each pyramid level, finest first; 0.01..100. It differs from 1
   /// where noise is not white, as in raws that were already denoised or compressed with loss: see noise_check.h. The
   /// search for point sources uses RawNoise alone.
-  std::array<double, most_levels> variance_scale{1, 1, 1, 1, 1};
+  std::array<double, max_levels> variance_scale{1, 1, 1, 1, 1};
 };
 
 /// Optional outputs for each 2x2 cell, ceil(height / 2) x ceil(width / 2); views without data are not written.

@@ -89,7 +89,7 @@ ChromaStarts Run::starts() const {
   out.rows = tiles_of(rows);
   const auto tiles = static_cast<std::size_t>(out.columns) * static_cast<std::size_t>(out.rows);
   out.start = std::span(memory.starts).first(tiles);
-  out.has_chroma = std::span(memory.has_chroma).first(tiles * most_levels);
+  out.has_chroma = std::span(memory.has_chroma).first(tiles * max_levels);
   const double dark = (dark_e[0] + 2 * dark_e[1] + dark_e[2]) / 4;
   const double variance = (noise.variance_e2[0] + 2 * noise.variance_e2[1] + noise.variance_e2[2]) / 4;
   const auto edge = [](int i, int count, int size) { return i == count ? size : std::min(size, 2 * tile * i); };
@@ -167,7 +167,7 @@ void Run::front() const {
       rows::VarianceRow in{};
       for (int k = 0; k < 3; ++k) {
         for (int y = 0; y < 10; ++y) in.raw_e[k][y] = m.window[k][(2 * pair - 4 + y + 16) % 16];
-        in.least_e[k] = static_cast<float>(0.3 * dark_e[k] + 0.02);
+        in.min_e[k] = static_cast<float>(0.3 * dark_e[k] + 0.02);
         in.gain[k] = static_cast<float>(options.white_gain[k] * std::sqrt(options.variance_scale[0]));
         in.variance_e2[k] = static_cast<float>(noise.variance_e2[k]);
       }

@@ -13,11 +13,11 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr int most_shapes = 8;                 // of one detection: images show few charts, not dozens
+constexpr int max_shapes = 8;                  // of one detection: images show few charts, not dozens
 constexpr double worst_relative_error = 0.03;  // of the median patch: it changes colours by one or two CIEDE2000
 
 /// Minimum number of patches; one of them is left out in cross-validation.
-constexpr int least_patches = static_cast<int>(least_colour_samples) + 1;
+constexpr int min_patches = static_cast<int>(min_colour_samples) + 1;
 
 /// Longer sides of the resized images: the detector enlarges small images, and shrinking reduces noise.
 constexpr std::array longer_sides{1000, 640, 420};
@@ -111,7 +111,7 @@ int measurable(const FoundChart& chart) {
 
 void judge(const FoundChart& chart, Search& search) {
   ++search.shapes;
-  if (measurable(chart) < least_patches) {
+  if (measurable(chart) < min_patches) {
     if (!search.unusable || measurable(chart) > measurable(*search.unusable)) search.unusable = chart;
     return;
   }
@@ -128,8 +128,8 @@ void judge(const FoundChart& chart, Search& search) {
 Result<void> look(const ChartPicture& picture, const CameraRgb& small, int shrink, double gain, DetectCharts* detect,
                   Search& search) {
   const std::vector<std::uint8_t> codes = codes_of(small, gain);
-  std::array<ChartShape, most_shapes> shapes;
-  const int count = detect({codes.data(), small.width(), small.height()}, shapes.data(), most_shapes);
+  std::array<ChartShape, max_shapes> shapes;
+  const int count = detect({codes.data(), small.width(), small.height()}, shapes.data(), max_shapes);
   if (count < 0) return fail(ErrorCode::unreadable, "OpenCV's chart detector failed on the picture");
   for (int i = 0; i < count; ++i) {
     // The detector's model has patches of 2.5 that are 0.25 apart, in a border of 0.25: cells of 2.75 that end 0.125
@@ -152,12 +152,12 @@ Error none_found(const Search& search) {
   if (search.unusable) {
     double clipped = 0;
     for (const ChartPatch& patch : search.unusable->patches) {
-      clipped += patch.clipped_fraction > most_clipped_fraction ? 1 : 0;
+      clipped += patch.clipped_fraction > max_clipped_fraction ? 1 : 0;
     }
     return {ErrorCode::insufficient,
             fmt::format("what may be a chart has {} of 24 patches that can be measured, and {} are needed: {} are "
                         "clipped; {}",
-                        measurable(*search.unusable), least_patches, clipped,
+                        measurable(*search.unusable), min_patches, clipped,
                         clipped > 0 ? "expose shorter" : "the chart must be larger in the picture"),
             {}};
   }

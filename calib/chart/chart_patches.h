@@ -33,13 +33,13 @@ struct ChartPatch {
 };
 
 /// Maximum clipped fraction of a usable patch: the remaining pixels of a clipped one are darker than the patch.
-inline constexpr double most_clipped_fraction = 0.01;
+inline constexpr double max_clipped_fraction = 0.01;
 /// Minimum number of pixels of a patch for a meaningful standard error.
-inline constexpr int least_patch_pixels = 16;
+inline constexpr int min_patch_pixels = 16;
 
 /// Returns whether the mean represents the patch.
 constexpr bool usable(const ChartPatch& patch) {
-  return patch.clipped_fraction <= most_clipped_fraction && patch.pixels >= least_patch_pixels;
+  return patch.clipped_fraction <= max_clipped_fraction && patch.pixels >= min_patch_pixels;
 }
 
 /// Returns the corners of the measured area of a patch, 0..23: the middle half of its cell's width and height.

@@ -79,9 +79,9 @@ bool finite(const ColourSample& s) {
 }
 
 Result<void> check(std::span<const ColourSample> samples) {
-  if (samples.size() < least_colour_samples) {
+  if (samples.size() < min_colour_samples) {
     return fail(ErrorCode::insufficient,
-                fmt::format("a colour matrix needs {} patches, found {}", least_colour_samples, samples.size()));
+                fmt::format("a colour matrix needs {} patches, found {}", min_colour_samples, samples.size()));
   }
   for (const ColourSample& sample : samples) {
     if (!finite(sample) || !(sample.reference.y > 0)) {

@@ -44,7 +44,7 @@ struct ColourFit {
 };
 
 /// Minimum number of samples for a fit: one and a half times the unknowns, nine of the matrix and two of the light.
-inline constexpr std::size_t least_colour_samples = 17;
+inline constexpr std::size_t min_colour_samples = 17;
 /// Above this condition number the patches do not determine the columns of a matrix: 24 patches of a ColorChecker have
 /// 8 to 9.
 inline constexpr double worst_colour_condition = 1e4;
@@ -53,7 +53,7 @@ inline constexpr double worst_colour_condition = 1e4;
 ///   1. least squares, linear in both: M camera - reference (x per_x + y per_y) = reference, weighted with Y^(-2/3),
 ///      how CIELAB weighs small differences;
 ///   2. from there Levenberg's damped Gauss-Newton on the sum of squared CIEDE2000.
-/// Errors (insufficient): fewer than least_colour_samples, a number that is not finite, a reference without luminance,
+/// Errors (insufficient): fewer than min_colour_samples, a number that is not finite, a reference without luminance,
 /// a condition number above worst_colour_condition, a matrix that cannot be inverted, light that would fall to 0.
 Result<ColourFit> fit_colour(std::span<const ColourSample> samples, const ColourFitOptions& options);
 

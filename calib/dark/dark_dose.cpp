@@ -12,10 +12,10 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr double same_time = 0.01;        // relative
-constexpr double most_extrapolation = 4;  // of the charge: two doublings
-constexpr double least_ratio = 2;         // of charges that give a line
-constexpr double least_doubling_c = 2, most_doubling_c = 30;
+constexpr double same_time = 0.01;       // relative
+constexpr double max_extrapolation = 4;  // of the charge: two doublings
+constexpr double min_ratio = 2;          // of charges that give a line
+constexpr double min_doubling_c = 2, max_doubling_c = 30;
 constexpr double certain_chi2 = 25;             // square of five standard deviations
 constexpr double systematic_dn2 = 0.01 * 0.01;  // of a level: its drift from frame to frame
 
@@ -98,11 +98,11 @@ void warn_of_temperatures(std::span<const DarkLevel> levels, const DarkExposure&
 }
 
 Result<void> check_range(double charge_s, double low_s, double high_s, bool line, DarkWeights& out) {
-  if (charge_s > most_extrapolation * high_s) {
+  if (charge_s > max_extrapolation * high_s) {
     return fail(ErrorCode::insufficient,
                 fmt::format("the picture holds {:.3g} times the dark charge of the longest and warmest darks, at most "
                             "{:g} times can be computed; take darks as long and as warm as the picture",
-                            charge_s / high_s, most_extrapolation));
+                            charge_s / high_s, max_extrapolation));
   }
   if (charge_s > (1 + same_time) * high_s || (line && charge_s < (1 - same_time) * low_s)) {
     out.warnings.push_back(
@@ -167,12 +167,12 @@ std::optional<double> fitted_doubling_c(std::span<const DarkLevel> levels, std::
   };
   // The misfit is smooth in 1 / doubling and has one minimum: 2000 even steps come within 0.2 % of a doubling of 8.
   constexpr int steps = 2000;
-  double best = most_doubling_c, least = std::numeric_limits<double>::infinity();
+  double best = max_doubling_c, least = std::numeric_limits<double>::infinity();
   for (int i = 0; i <= steps; ++i) {
-    const double rate = 1 / most_doubling_c + (1 / least_doubling_c - 1 / most_doubling_c) * i / steps;
+    const double rate = 1 / max_doubling_c + (1 / min_doubling_c - 1 / max_doubling_c) * i / steps;
     if (const double now = misfit_at(1 / rate); now < least) least = now, best = 1 / rate;
   }
-  if (std::min(misfit_at(least_doubling_c), misfit_at(most_doubling_c)) < least + certain_chi2) return std::nullopt;
+  if (std::min(misfit_at(min_doubling_c), misfit_at(max_doubling_c)) < least + certain_chi2) return std::nullopt;
   return best;
 }
 
@@ -186,7 +186,7 @@ Result<DarkWeights> weigh_darks(std::span<const DarkLevel> levels, const DarkExp
     out = DarkWeights{.of_level = std::vector<double>(levels.size()), .doubling_c = *doubling};
     const std::vector<Dose> doses = doses_of(levels, picture, *doubling);
     const auto [low, high] = std::ranges::minmax(doses, {}, &Dose::charge);
-    const bool line = high.charge > least_ratio * low.charge;
+    const bool line = high.charge > min_ratio * low.charge;
     if (auto good = check_range(picture.time_s, low.charge, high.charge, line, *out); !good) {
       return tl::make_unexpected(good.error());
     }

@@ -54,7 +54,7 @@ struct DarkSeries {
   double column_noise_e = 0;  // fixed
   std::vector<HotPixel> hot;  // row by row, found in the group with most dark charge
   std::optional<double> hot_temperature_c;  // of that group, where it is stated
-  double excluded_share = 0;                // fraction of all pixels, excluded from all means
+  double excluded_fraction = 0;             // fraction of all pixels, excluded from all means
   double largest_correction_dn = 0;         // largest correction of a mean for excluded pixels
   std::optional<Estimate>
       read_noise_e;  // of a pixel about its row, from the group with least dark charge; absent if not measurable

@@ -100,8 +100,8 @@ double exclusion_bias_dn(const DarkFit& s, std::size_t g, int site, double pedes
   const auto sum_e = [&](double dn) { return frames * (dn - pedestal_dn) / gain; };
   const double dark_e = std::clamp(sum_e(figures.mean + s.correction_dn[g][site]), 0.0, 1e6);
   const double total_e2 = frames * frames * figures.variance / (gain * gain);
-  const double least_e2 = frames * quantisation_dn2 / (gain * gain);
-  const PoissonGauss law{dark_e, std::max(total_e2 - dark_e, least_e2)};
+  const double min_e2 = frames * quantisation_dn2 / (gain * gain);
+  const PoissonGauss law{dark_e, std::max(total_e2 - dark_e, min_e2)};
   const double cut_dn = cut_deviations * spread.deviation;
   return truncation_bias_e(law, sum_e(spread.median - cut_dn), sum_e(spread.median + cut_dn)) * gain / frames;
 }

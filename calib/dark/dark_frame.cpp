@@ -18,10 +18,10 @@ namespace {
 using Groups = std::span<const DarkGroup>;
 
 constexpr double near_white = 0.05;  // of the range
-constexpr double most_noise = 5;     // relative to the noise of a pixel's site
-constexpr double most_unknown = 1.0 / 16;
+constexpr double max_noise = 5;      // relative to the noise of a pixel's site
+constexpr double max_unknown = 1.0 / 16;
 constexpr double clipped_share = 1e-3;
-constexpr double least_doubling_c = 2, most_doubling_c = 30;
+constexpr double min_doubling_c = 2, max_doubling_c = 30;
 
 /// Inputs and intermediate results, before pixels are processed.
 struct Job {
@@ -33,14 +33,15 @@ struct Job {
 };
 
 Result<void> check_request(const DarkRequest& r) {
-  if (!(r.noise_share > 0 && r.noise_share <= 1)) {
+  if (!(r.noise_fraction > 0 && r.noise_fraction <= 1)) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("the fraction of noise that darks may add is {:g}, expected above 0 and at most 1", r.noise_share));
+                fmt::format("the fraction of noise that darks may add is {:g}, expected above 0 and at most 1",
+                            r.noise_fraction));
   }
-  if (r.doubling_c && !(*r.doubling_c >= least_doubling_c && *r.doubling_c <= most_doubling_c)) {
+  if (r.doubling_c && !(*r.doubling_c >= min_doubling_c && *r.doubling_c <= max_doubling_c)) {
     return fail(ErrorCode::invalid_argument,
                 fmt::format("dark current doubling over {:g} degrees, expected {:g} to {:g}", *r.doubling_c,
-                            least_doubling_c, most_doubling_c));
+                            min_doubling_c, max_doubling_c));
   }
   return {};
 }
@@ -168,7 +169,7 @@ double site_noise(const Job& job, int site) {
 Result<PixelMask> unknown_pixels(const Job& job, const RawDn& picture, DarkFrame& out) {
   PixelMask mask(out.dn.width(), out.dn.height());
   PerSite<double> limit_dn2{};
-  for (int site = 0; site < 4; ++site) limit_dn2[site] = most_noise * most_noise * site_noise(job, site);
+  for (int site = 0; site < 4; ++site) limit_dn2[site] = max_noise * max_noise * site_noise(job, site);
   const double white = *std::ranges::min_element(picture.white_dn);
   const auto full = [&](int x, int y) {
     for (std::size_t g = 0; g < job.groups.size(); ++g) {
@@ -186,12 +187,12 @@ Result<PixelMask> unknown_pixels(const Job& job, const RawDn& picture, DarkFrame
   }
   const auto unknown = std::count(mask.data(), mask.data() + mask.size(), std::uint8_t{1});
   const double share = static_cast<double>(unknown) / static_cast<double>(mask.size());
-  if (share > most_unknown) {
+  if (share > max_unknown) {
     return fail(
         ErrorCode::malformed,
         fmt::format("{:.3g} % of the darks' pixels are saturated or too noisy to subtract, at most {:.3g} % may; "
                     "are these dark frames? Take shorter or colder ones",
-                    100 * share, 100 * most_unknown));
+                    100 * share, 100 * max_unknown));
   }
   out.unknown.reserve(static_cast<std::size_t>(unknown));
   for (int y = 0; y < mask.height(); ++y) {
@@ -207,7 +208,7 @@ void describe(const Job& job, DarkFrame& out) {
     if (job.weights.of_level[g] == 0) continue;
     out.frames += job.groups[g].frames;
     ++out.settings;
-    const double zero = *std::ranges::max_element(job.groups[g].share_at_zero);
+    const double zero = *std::ranges::max_element(job.groups[g].fraction_at_zero);
     if (zero > clipped_share) {
       out.warnings.push_back(
           fmt::format("{:.2g} % of the darks' samples are cut off at code 0: their mean is too high", 100 * zero));
@@ -215,7 +216,8 @@ void describe(const Job& job, DarkFrame& out) {
   }
   if (out.frames == 1) {
     out.warnings.emplace_back(
-        "a single dark does not separate its pattern from its noise: hot pixels and columns are taken from it, no more");
+        "a single dark does not separate its pattern from its noise: hot pixels and columns are taken from it, no "
+        "more");
   }
   out.scale = job.weights.scale;
   out.doubling_c = job.weights.doubling_c.value_or(0);
@@ -229,14 +231,14 @@ void settle_noise(const Job& job, double share, const PixelMask& unknown, DarkFr
     out.mean_dn[site] = kept.mean_dn;
     out.noise_std_dn[site] = std::sqrt(noise.picture_dn2);
     out.added_variance_dn2[site] = kept.added_dn2;
-    out.noise_share += noise.picture_dn2 > 0 ? kept.added_dn2 / noise.picture_dn2 / 4 : 0;
-    out.pattern_share = std::min(out.pattern_share, kept.pixel_share);
+    out.noise_fraction += noise.picture_dn2 > 0 ? kept.added_dn2 / noise.picture_dn2 / 4 : 0;
+    out.pattern_fraction = std::min(out.pattern_fraction, kept.pixel_fraction);
   }
-  if (out.noise_share > share) {
+  if (out.noise_fraction > share) {
     out.warnings.push_back(
         fmt::format("hot pixels alone add {:.2g} of the picture's variance in the dark, {:.2g} was "
                     "allowed: more darks would add less",
-                    out.noise_share, share));
+                    out.noise_fraction, share));
   }
 }
 
@@ -259,7 +261,7 @@ Result<DarkFrame> make_dark_frame(Groups groups, const RawDn& picture, const Dar
       return tl::make_unexpected(even.error());
     }
   }
-  settle_noise(*job, request.noise_share, *unknown, out);
+  settle_noise(*job, request.noise_fraction, *unknown, out);
   if (job->weights.of_pedestal != 0) out.masked_dn = request.masked_dn;
   return out;
 }
@@ -274,8 +276,8 @@ DarkFrame at_masked_level(const DarkFrame& dark, const PerSite<double>& masked_d
                 .settings = dark.settings,
                 .scale = dark.scale,
                 .doubling_c = dark.doubling_c,
-                .noise_share = dark.noise_share,
-                .pattern_share = dark.pattern_share,
+                .noise_fraction = dark.noise_fraction,
+                .pattern_fraction = dark.pattern_fraction,
                 .masked_dn = masked_dn,
                 .warnings = dark.warnings};
   PerSite<double> change_dn{};
@@ -292,8 +294,8 @@ DarkFrame at_masked_level(const DarkFrame& dark, const PerSite<double>& masked_d
 namespace {
 
 constexpr double stands_out = 5;  // standard deviations
-constexpr double least_deviation_dn = 1e-3;
-constexpr double rows_share = 0.25;  // of the allowed noise, at most
+constexpr double min_deviation_dn = 1e-3;
+constexpr double rows_fraction = 0.25;  // of the allowed noise, at most
 
 struct Lines {
   std::vector<double> sum, n;
@@ -337,8 +339,8 @@ void for_each_of_site(const Plane<float>& dn, int site, const PixelMask& unknown
 }
 
 Parts take_apart(const Plane<float>& dn, int site, const PixelMask& unknown) {
-  const SiteSpread spread = spread_of(dn, site, least_deviation_dn);
-  const double cut = stands_out * std::max(spread.deviation, least_deviation_dn);
+  const SiteSpread spread = spread_of(dn, site, min_deviation_dn);
+  const double cut = stands_out * std::max(spread.deviation, min_deviation_dn);
   Parts out{.columns = Lines(dn.width()), .rows = Lines(dn.height())};
   double sum = 0, n = 0, all = 0, squares = 0;
   for_each_of_site(dn, site, unknown, [&](int x, int y) {
@@ -374,7 +376,7 @@ KeptPattern limit_noise(Plane<float>& dn, int site, const DarkNoise& noise, doub
   double of_rows = 0;
   if (noise.rows_known) {
     of_rows = std::min(wiener(parts.rows.variance(parts.mean) - row_noise, row_noise),
-                       std::sqrt(rows_share * allowed / row_noise));
+                       std::sqrt(rows_fraction * allowed / row_noise));
   }
   const double out = 1 - parts.inside;
   const double lines = of_columns * of_columns * column_noise + of_rows * of_rows * row_noise;

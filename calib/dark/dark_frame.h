@@ -15,7 +15,7 @@ namespace lowlux::calib {
 
 /// Options for making the dark frame of an image.
 struct DarkRequest {
-  double noise_share = 0.1;  // maximum added variance as a fraction of the image's own variance in the dark, 0..1
+  double noise_fraction = 0.1;  // maximum added variance as a fraction of the image's own variance in the dark, 0..1
   std::optional<double> doubling_c;            // degrees over which dark charge doubles, 2..30; absent: fitted
   std::optional<PerSite<double>> masked_dn;    // the image's masked pixels: pedestal plus dark charge
   std::optional<PerSite<double>> pedestal_dn;  // the file's tag: level without charge
@@ -47,9 +47,9 @@ struct DarkNoise {
 
 /// Noise added by a dark frame, and the fraction of its pattern that was kept.
 struct KeptPattern {
-  double mean_dn = 0;      // of the pixels that are not outliers
-  double added_dn2 = 0;    // mean over the pixels
-  double pixel_share = 1;  // fraction of a pixel's own deviation, outliers excluded
+  double mean_dn = 0;         // of the pixels that are not outliers
+  double added_dn2 = 0;       // mean over the pixels
+  double pixel_fraction = 1;  // fraction of a pixel's own deviation, outliers excluded
 };
 
 /// Shrinks the deviations of one site's pixels from its mean, so that subtracting them adds no more noise than the

@@ -27,11 +27,11 @@ Result<void> DarkLibrary::add(const RawDn& raw) {
   for (DarkStack& stack : stacks_) {
     if (belongs_to(stack.setting(), *setting)) return stack.add(raw);
   }
-  if (stacks_.size() == most_settings_) {
+  if (stacks_.size() == max_settings_) {
     return fail(ErrorCode::too_large,
                 fmt::format("the dark frames have more than {} exposure times and temperatures, which would take too "
                             "much memory; give fewer",
-                            most_settings_));
+                            max_settings_));
   }
   DarkStack stack;
   if (auto added = stack.add(raw); !added) return added;
@@ -48,7 +48,7 @@ std::vector<DarkGroup> DarkLibrary::groups() const {
 
 namespace {
 
-constexpr std::size_t most_gains = 16, most_settings = 32;
+constexpr std::size_t most_gains = 16, max_settings = 32;
 
 auto order_of(const DarkGroup& g) {
   return std::tuple(g.setting.temperature_c.value_or(0), g.setting.exposure_s.value_or(0));
@@ -72,7 +72,7 @@ Result<void> DarkSorter::add(const RawDn& frame) {
         ErrorCode::too_large,
         fmt::format("the darks have more than {} gain settings; calibrate them in parts with --add-to", most_gains));
   }
-  Gain added{std::move(*setting), DarkLibrary(most_settings)};
+  Gain added{std::move(*setting), DarkLibrary(max_settings)};
   if (auto stacked = added.darks.add(frame); !stacked) return stacked;
   gains_.push_back(std::move(added));
   return {};

@@ -15,8 +15,8 @@ namespace lowlux::calib {
 /// each setting.
 class DarkLibrary {
  public:
-  /// @param most_settings  maximum number of pairs of exposure time and temperature; each takes 10 bytes for each pixel
-  explicit DarkLibrary(std::size_t most_settings = 8) : most_settings_(most_settings) {}
+  /// @param max_settings  maximum number of pairs of exposure time and temperature; each takes 10 bytes for each pixel
+  explicit DarkLibrary(std::size_t max_settings = 8) : max_settings_(max_settings) {}
 
   /// Adds a frame to the stack of its exposure time whose first frame is within a degree. Errors: those of DarkStack;
   /// another camera, size, mosaic, white level or gain than the first frame's; more settings than allowed.
@@ -26,7 +26,7 @@ class DarkLibrary {
   std::vector<DarkGroup> groups() const;
 
  private:
-  std::size_t most_settings_;
+  std::size_t max_settings_;
   std::vector<DarkStack> stacks_;
 };
 

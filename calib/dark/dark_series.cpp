@@ -14,12 +14,12 @@ namespace lowlux::calib {
 namespace {
 
 constexpr double hot_deviations = 8;
-constexpr double full_share = 0.95;  // of the white level: above it a pixel may be saturated
-constexpr double most_excluded = 0.05;
+constexpr double full_fraction = 0.95;  // of the white level: above it a pixel may be saturated
+constexpr double max_excluded = 0.05;
 constexpr double clipped_share = 1e-3;
-constexpr double least_misfit = 0.02;   // of the dark charge: smallest deviation that counts as nonlinear
-constexpr double least_gradient = 0.1;  // of the dark charge, from edge to edge
-constexpr double certain = 5;           // standard errors
+constexpr double min_misfit = 0.02;   // of the dark charge: smallest deviation that counts as nonlinear
+constexpr double min_gradient = 0.1;  // of the dark charge, from edge to edge
+constexpr double certain = 5;         // standard errors
 
 using Groups = std::span<const DarkGroup>;
 
@@ -37,7 +37,7 @@ Result<void> check_groups(Groups groups) {
       return fail(ErrorCode::invalid_argument,
                   "some darks state their temperature and some do not; use frames of one kind");
     }
-    const double zero = *std::max_element(groups[g].share_at_zero.begin(), groups[g].share_at_zero.end());
+    const double zero = *std::max_element(groups[g].fraction_at_zero.begin(), groups[g].fraction_at_zero.end());
     if (zero > clipped_share) {
       return fail(
           ErrorCode::insufficient,
@@ -49,13 +49,13 @@ Result<void> check_groups(Groups groups) {
   return {};
 }
 
-Result<double> excluded_share(const PixelMask& mask) {
+Result<double> excluded_fraction(const PixelMask& mask) {
   const auto excluded = std::count(mask.data(), mask.data() + mask.size(), std::uint8_t{1});
   const double share = static_cast<double>(excluded) / static_cast<double>(mask.size());
-  if (share <= most_excluded) return share;
+  if (share <= max_excluded) return share;
   return fail(ErrorCode::insufficient,
               fmt::format("{:.2g} % of the pixels lie far from the others, at most {:g} % may; are these dark frames?",
-                          100 * share, 100 * most_excluded));
+                          100 * share, 100 * max_excluded));
 }
 
 double dark_charge_dn(const DarkFit& s, const std::vector<PerSite<Estimate>>& parameters, std::size_t g, int site) {
@@ -71,7 +71,7 @@ Result<void> check_linear(const DarkFit& s, const std::vector<PerSite<Estimate>>
   for (const DarkPoint& p : points) {
     const Estimate& off = p.residual_dn;
     if (std::fabs(off.value) <= certain * off.standard_error) continue;
-    if (std::fabs(off.value) <= least_misfit * most[p.site]) continue;
+    if (std::fabs(off.value) <= min_misfit * most[p.site]) continue;
     return fail(ErrorCode::malformed,
                 fmt::format("the darks are not linear in time: at {:g} s the mean is off by {:.3g} +- {:.2g} DN of "
                             "{:.3g} DN; light gets in, or the temperature changes; cover the camera and let it settle",
@@ -98,7 +98,7 @@ Result<void> check_even(const DarkFit& s) {
     for (std::size_t p = 1; p < s.estimators[site].size(); ++p) {
       const ImageFigures f = figures_of({s.groups, s.estimators[site][p]}, s.mask, site);
       for (const auto& [change, error] : {std::pair(f.change_x, f.error_x), std::pair(f.change_y, f.error_y)}) {
-        if (std::fabs(change) <= certain * error || std::fabs(change) <= least_gradient * std::fabs(f.mean)) continue;
+        if (std::fabs(change) <= certain * error || std::fabs(change) <= min_gradient * std::fabs(f.mean)) continue;
         return fail(
             ErrorCode::malformed,
             fmt::format("the dark charge changes by {:.3g} DN/s across the frame, its mean is {:.3g} DN/s; light "
@@ -157,7 +157,7 @@ void put_patterns(const DarkFit& s, std::size_t darkest, DarkSeries& out) {
 /// is, in the shortest: then this is a lower bound.
 double excess_e_per_s(const DarkFit& s, std::size_t darkest, int x, int y) {
   const auto& white = s.groups[darkest].setting.white_dn;
-  const double full_dn = full_share * *std::min_element(white.begin(), white.end());
+  const double full_dn = full_fraction * *std::min_element(white.begin(), white.end());
   const auto time_of = [&](std::size_t g) { return *s.groups[g].setting.exposure_s; };
   std::optional<std::size_t> longest;
   std::size_t shortest = darkest;
@@ -227,9 +227,9 @@ Result<DarkSeries> fit_dark_series(Groups groups, const Estimate& gain) {
   if (auto good = check_groups(groups); !good) return tl::make_unexpected(good.error());
   DarkFit s = begin_fit(groups, gain);
   DarkSeries out;
-  const auto share = excluded_share(s.mask);
+  const auto share = excluded_fraction(s.mask);
   if (!share) return tl::make_unexpected(share.error());
-  out.excluded_share = *share;
+  out.excluded_fraction = *share;
   if (auto good = finish_fit(s); !good) return tl::make_unexpected(good.error());
   for (const PerSite<double>& of_group : s.correction_dn) {
     for (const double dn : of_group) out.largest_correction_dn = std::max(out.largest_correction_dn, std::fabs(dn));

@@ -10,7 +10,7 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr int most_frames = 32768;  // times 65535 fits in 32 bits
+constexpr int max_frames = 32768;  // times 65535 fits in 32 bits
 
 std::int64_t pixels_of_site(const FrameSetting& s, int site) {
   return static_cast<std::int64_t>((s.width + 1 - (site & 1)) / 2) * ((s.height + 1 - (site >> 1)) / 2);
@@ -56,8 +56,8 @@ Result<void> DarkStack::add(const RawDn& raw) {
                   what + " has another temperature than the first; frames of one stack agree within 1 degree");
     }
   }
-  if (frames_ == most_frames) {
-    return fail(ErrorCode::too_large, fmt::format("a stack holds at most {} dark frames", most_frames));
+  if (frames_ == max_frames) {
+    return fail(ErrorCode::too_large, fmt::format("a stack holds at most {} dark frames", max_frames));
   }
   for (int y = 0; y < setting_.height; ++y) add_row(raw, y);
   ++frames_;
@@ -121,7 +121,7 @@ DarkGroup DarkStack::average() const {
     // The pixels' variance includes that of the rows.
     const double of_rows = row_variance[site] / rows, of_pixels = variance[site] / pixels;
     out.row_variance_dn2[site] = (of_rows * columns - of_pixels) / (columns - 1);
-    out.share_at_zero[site] = static_cast<double>(at_zero_[site]) / (pixels * n);
+    out.fraction_at_zero[site] = static_cast<double>(at_zero_[site]) / (pixels * n);
   }
   return out;
 }

@@ -20,7 +20,7 @@ struct DarkGroup {
   Plane<float> mean_dn;                // of the frames, for each pixel
   Plane<float> variance_dn2;           // temporal, for each pixel, quantisation included; unbiased
   PerSite<double> row_variance_dn2{};  // temporal, common to whole rows; unbiased, may be negative
-  PerSite<double> share_at_zero{};     // fraction of the samples at code 0
+  PerSite<double> fraction_at_zero{};  // fraction of the samples at code 0
 };
 
 /// Returns an error for a single frame, which contains no information about noise.

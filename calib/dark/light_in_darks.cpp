@@ -12,11 +12,11 @@ namespace lowlux::calib {
 namespace {
 
 constexpr double certain = 5;             // standard errors
-constexpr double least_gradient = 0.25;   // of the dark charge, from edge to edge
+constexpr double min_gradient = 0.25;     // of the dark charge, from edge to edge
 constexpr double far_off = 2, off = 0.5;  // standard deviations of a pixel
 constexpr double far_off_range = 1e-3;
 constexpr double below = 4;  // standard deviations
-constexpr double most_below = 0.01;
+constexpr double max_below = 0.01;
 
 PixelMask outliers_of(const DarkGroup& group, const PerSite<DarkSite>& sites) {
   PixelMask mask(group.mean_dn.width(), group.mean_dn.height());
@@ -39,7 +39,7 @@ Result<void> check_even_dark(const DarkGroup& group, const PerSite<DarkSite>& si
   for (int site = 0; site < 4; ++site) {
     const ImageFigures f = figures_of({{&group, 1}, {&one, 1}}, mask, site);
     const double charge = pedestal_dn ? std::max(0.0, f.mean - (*pedestal_dn)[site]) : 0;
-    const double floor = std::max(std::sqrt(sites[site].noise_dn2), least_gradient * charge);
+    const double floor = std::max(std::sqrt(sites[site].noise_dn2), min_gradient * charge);
     for (const auto& [change, error] : {std::pair(f.change_x, f.error_x), std::pair(f.change_y, f.error_y)}) {
       if (std::fabs(change) <= std::max(certain * error, floor)) continue;
       return fail(ErrorCode::malformed,
@@ -81,17 +81,17 @@ Result<void> check_below_picture(const RawDn& picture, const DarkFrame& dark) {
     for (int x = 0; x < dark.dn.width(); ++x) count += codes[x] < dark.dn.at(x, y) - margin[site_of(x, y)];
   }
   const double share = static_cast<double>(count) / static_cast<double>(dark.dn.size());
-  if (share <= most_below) return {};
+  if (share <= max_below) return {};
   return fail(ErrorCode::malformed,
               fmt::format("{:.2g} % of the picture's pixels lie more than {:g} standard deviations below the darks, at "
                           "most {:g} % may; the darks hold light or are warmer than the picture; take them again, "
                           "covered, as warm as the picture",
-                          100 * share, below, 100 * most_below));
+                          100 * share, below, 100 * max_below));
 }
 
 namespace {
 
-constexpr double least_deviation_dn = 1e-3;
+constexpr double min_deviation_dn = 1e-3;
 constexpr double far_out = 5;  // standard deviations: excluded from means
 constexpr double hot = 8;      // standard deviations
 constexpr std::size_t fewest_hot = 16;
@@ -101,7 +101,7 @@ double noise_of_differences(const Plane<float>& dn, int site) {
   for (int y = 0; y < difference.height(); ++y) {
     for (int x = 0; x < difference.width(); ++x) difference.at(x, y) = dn.at(x + 2, y) - dn.at(x, y);
   }
-  const double deviation = spread_of(difference, site, least_deviation_dn).deviation;
+  const double deviation = spread_of(difference, site, min_deviation_dn).deviation;
   return deviation * deviation / 2;
 }
 
@@ -110,7 +110,7 @@ double noise_of_differences(const Plane<float>& dn, int site) {
 PerSite<DarkSite> sites_of(const DarkGroup& group) {
   PerSite<DarkSite> out{};
   for (int site = 0; site < 4; ++site) {
-    const SiteSpread spread = spread_of(group.mean_dn, site, least_deviation_dn);
+    const SiteSpread spread = spread_of(group.mean_dn, site, min_deviation_dn);
     double sum = 0, n = 0;
     for (int y = site >> 1; y < group.mean_dn.height(); y += 2) {
       for (int x = site & 1; x < group.mean_dn.width(); x += 2) {

@@ -91,8 +91,8 @@ SiteStatistics statistics_of(const SiteSums& s) {
   out.variance_dn2 = total / (2 * (n - 1));
   out.row_variance_dn2 = (between / (rows - 1) - within) / (2 * n / rows);
   out.covariance_dn2 = s.within_products / static_cast<double>(s.within_degrees);
-  out.share_at_white = static_cast<double>(s.at_white) / (2 * n);
-  out.share_at_zero = static_cast<double>(s.at_zero) / (2 * n);
+  out.fraction_at_white = static_cast<double>(s.at_white) / (2 * n);
+  out.fraction_at_zero = static_cast<double>(s.at_zero) / (2 * n);
   return out;
 }
 

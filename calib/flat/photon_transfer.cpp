@@ -118,7 +118,7 @@ void put_saturation(const Curve& curve, Pairs pairs, const Darks& darks, PhotonT
       if (photon_noise > gone_photon_noise * gain * p.signal_dn) continue;
       ++full;
       full_dn += p.signal_dn;
-      at_white += pairs[p.pair].site[site].share_at_white;
+      at_white += pairs[p.pair].site[site].fraction_at_white;
       error2 += (p.variance_dn2 + quantisation_dn2) / p.pixels;
     }
   }

@@ -10,7 +10,7 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr double linear_share = 0.7;     // of saturation: EMVA 1288, section 6.6
+constexpr double linear_fraction = 0.7;  // of saturation: EMVA 1288, section 6.6
 constexpr double largest_drift = 0.01;   // of the signal
 constexpr double clipped_share = 1e-3;   // clipping 0.1 % of a normal distribution reduces its variance by 0.7 %
 constexpr double fallen_variance = 0.8;  // of the largest: more than a variance from 1000 pixels scatters
@@ -36,11 +36,11 @@ Result<void> check_darks(Pairs darks) {
                                 "part of the frame",
                                 s.pixels, fewest_pixels));
       }
-      if (s.share_at_zero <= clipped_share) continue;
+      if (s.fraction_at_zero <= clipped_share) continue;
       return fail(ErrorCode::insufficient,
                   fmt::format("{:.2g} % of the samples of {} are at code 0, so their noise is cut off; raise the "
                               "camera's black level (offset)",
-                              100 * s.share_at_zero, what));
+                              100 * s.fraction_at_zero, what));
     }
   }
   return {};
@@ -93,14 +93,14 @@ TransferPeak peak_of(const Points& flats, Pairs pairs, int site) {
     if (p.site != site) continue;
     brightest = std::max(brightest, p.signal_dn);
     const bool fallen = p.signal_dn > peak.signal_dn && p.variance_dn2 < fallen_variance * largest;
-    peak.reached |= fallen || pairs[p.pair].site[site].share_at_white > clipped_share;
+    peak.reached |= fallen || pairs[p.pair].site[site].fraction_at_white > clipped_share;
   }
   if (!peak.reached) peak.signal_dn = brightest;
   return peak;
 }
 
 bool is_linear(const TransferPoint& p, const TransferPeak& peak) {
-  return !peak.reached || p.signal_dn <= linear_share * peak.signal_dn;
+  return !peak.reached || p.signal_dn <= linear_fraction * peak.signal_dn;
 }
 
 int count_levels(const Points& points, int site) {
@@ -160,7 +160,7 @@ Result<TransferCurve> curve_of(Pairs dark_pairs, Pairs flats, const JoinedDarks&
     return fail(ErrorCode::insufficient,
                 fmt::format("the flats hold {} levels of light in the linear range, up to {:g} % of saturation; photon "
                             "transfer needs {} that differ by 5 % or more; add darker flats",
-                            out.levels, 100 * linear_share, fewest_levels));
+                            out.levels, 100 * linear_fraction, fewest_levels));
   }
   if (under_dithered) return out;
   const auto dark_points = points_of(dark_pairs, darks, false);

@@ -11,11 +11,11 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr int most_groups = 24;            // of one site
-constexpr double least_degrees = 24 * 24;  // of freedom in a group: its variance is known to 6 %
-constexpr double most_clipped = 0.75;  // of a group's pixels: beyond, its variance shows only the distribution's tail
+constexpr int max_groups = 24;           // of one site
+constexpr double min_degrees = 24 * 24;  // of freedom in a group: its variance is known to 6 %
+constexpr double max_clipped = 0.75;     // of a group's pixels: beyond, its variance shows only the distribution's tail
 
-constexpr double most_step = 3;  // standard deviations of the noise, between a sample and its surroundings
+constexpr double max_step = 3;  // standard deviations of the noise, between a sample and its surroundings
 
 /// Sums over the samples of one group.
 struct Sum {
@@ -23,8 +23,8 @@ struct Sum {
 };
 
 NoisePoint point_of(const Sum& sum, const DetailCount& details, const ClipRange& clip, double mean_below) {
-  return {sum.mean / sum.n, sum.high / sum.high_n / mean_below, sum.high_n * details.high * details.independent_share,
-          clip};
+  return {sum.mean / sum.n, sum.high / sum.high_n / mean_below,
+          sum.high_n * details.high * details.independent_fraction, clip};
 }
 
 std::span<const NoiseSample> of_site(const NoiseSamples& samples, int site) {
@@ -44,7 +44,7 @@ void for_each_group(std::span<const NoiseSample> all, int groups, const Fn& fn) 
 }
 
 int groups_for(std::size_t samples, int details) {
-  return std::clamp(static_cast<int>(static_cast<double>(samples) * details / least_degrees), 1, most_groups);
+  return std::clamp(static_cast<int>(static_cast<double>(samples) * details / min_degrees), 1, max_groups);
 }
 
 struct Limits {
@@ -54,9 +54,10 @@ struct Limits {
 
 Limits limits_of(const DetailCount& details, const FlatRule& rule) {
   Limits out;
-  out.low = chi_square_quantile(details.low, rule.low_share) / details.low;
-  out.middle = details.middle > 0 ? chi_square_quantile(details.middle, rule.middle_share) / details.middle : INFINITY;
-  const double high = chi_square_quantile(details.high, rule.high_share);
+  out.low = chi_square_quantile(details.low, rule.low_fraction) / details.low;
+  out.middle =
+      details.middle > 0 ? chi_square_quantile(details.middle, rule.middle_fraction) / details.middle : INFINITY;
+  const double high = chi_square_quantile(details.high, rule.high_fraction);
   out.high = high / details.high;
   out.mean_below = chi_square_mean_below(details.high, high);
   return out;
@@ -132,7 +133,7 @@ FlatPoints flat_points(const NoiseSamples& samples, const NoiseLine& line, const
     for (const NoiseSample& s : of_site(samples, site)) {
       const double model = variance(s.around_dn);
       const double step = s.mean_dn - s.around_dn;
-      if (step * step > most_step * most_step * model * samples.details.step_share) continue;
+      if (step * step > max_step * max_step * model * samples.details.step_fraction) continue;
       if (s.low_dn2 > limit.low * model || s.middle_dn2 > limit.middle * model) continue;
       all.n += 1;
       all.high += s.high_dn2 / model;
@@ -148,9 +149,9 @@ FlatPoints flat_points(const NoiseSamples& samples, const NoiseLine& line, const
         sum.high += s.high_dn2;
         sum.high_n += 1;
       }
-      if (sum.high_n * samples.details.high < least_degrees / 2) return;
+      if (sum.high_n * samples.details.high < min_degrees / 2) return;
       const NoisePoint point = point_of(sum, samples.details, clip[site], limit.mean_below);
-      if (clipped_share(line, point.mean_dn, clip[site]) > most_clipped) return;
+      if (clipped_share(line, point.mean_dn, clip[site]) > max_clipped) return;
       out.points.push_back(point);
     });
   }
@@ -196,10 +197,10 @@ namespace {
 
 constexpr int windows = 16;
 constexpr double dense_per_code = 30;
-constexpr int least_width = 8;           // codes of a window: in fewer, steps cannot be measured
-constexpr double quietest_share = 0.05;  // of each group of samples
+constexpr int least_width = 8;              // codes of a window: in fewer, steps cannot be measured
+constexpr double quietest_fraction = 0.05;  // of each group of samples
 constexpr int grid = 8;
-constexpr double least_excess = 0.1;
+constexpr double min_excess = 0.1;
 
 struct Steps {
   int smallest = 0;  // 0: codes are nowhere dense enough
@@ -283,14 +284,14 @@ RawTraces code_traces(const RawDn& raw) {
     out.companded = out.companded || steps.largest > steps.smallest;
   }
   out.grid_excess = std::max(excess_of(restlessness(raw, true)), excess_of(restlessness(raw, false)));
-  out.block_grid = out.grid_excess > least_excess;
+  out.block_grid = out.grid_excess > min_excess;
   return out;
 }
 
 void add_filter_trace(const NoiseSamples& blocks_by_surroundings, RawTraces& traces) {
-  const FlatPoints quiet = quietest_points(blocks_by_surroundings, {}, quietest_share);
+  const FlatPoints quiet = quietest_points(blocks_by_surroundings, {}, quietest_fraction);
   traces.fine_to_coarse = quiet.mean_middle > 0 ? quiet.mean_high / quiet.mean_middle : 0;
-  traces.denoised = quiet.mean_middle > 0 && traces.fine_to_coarse < least_fine_to_coarse;
+  traces.denoised = quiet.mean_middle > 0 && traces.fine_to_coarse < min_fine_to_coarse;
 }
 
 }  // namespace lowlux::calib

@@ -21,9 +21,9 @@ double chi_square_mean_below(int degrees, double x);
 
 /// Fractions that select flat samples, and those to average.
 struct FlatRule {
-  double low_share = 0.8;     // fraction of flat samples that is kept: those with the least coarse detail
-  double middle_share = 0.8;  // fraction of flat samples that is kept: those with the least middle detail
-  double high_share = 0.98;   // fraction of flat samples in the average: the others count as texture
+  double low_fraction = 0.8;     // fraction of flat samples that is kept: those with the least coarse detail
+  double middle_fraction = 0.8;  // fraction of flat samples that is kept: those with the least middle detail
+  double high_fraction = 0.98;   // fraction of flat samples in the average: the others count as texture
 };
 
 struct FlatPoints {
@@ -65,7 +65,7 @@ struct RawTraces {
 /// Below this ratio (denoise.md 9.8) what looks like noise is coarser than noise is: it was filtered, or grain and
 /// texture of the scene are stronger than the noise everywhere (unfiltered kodim19 at 60 e-: 0.43). Neither gives a
 /// reliable result. In the dark, where noise dominates, unfiltered images have 0.9 to 1.
-inline constexpr double least_fine_to_coarse = 0.7;
+inline constexpr double min_fine_to_coarse = 0.7;
 
 /// Measures steps and grid of the active area; fine_to_coarse is left at 0. Steps are measured where codes are dense
 /// (30 pixels for each code): in at least a sixteenth of the range in use.

@@ -63,7 +63,7 @@ isp::Moments law_seen_as(const NoiseLine& line, double mean_dn, const ClipRange&
 
 double upper_tail(double z) { return std::erfc(z / std::sqrt(2.0)) / 2; }
 
-double share_beyond(const isp::Moments& law, const ClipRange& clip) {
+double fraction_beyond(const isp::Moments& law, const ClipRange& clip) {
   const double s = std::sqrt(law.variance);
   return upper_tail((law.mean - clip.low_dn) / s) + upper_tail((clip.high_dn - law.mean) / s);
 }
@@ -192,12 +192,12 @@ double read_variance_dn2(const NoiseLine& line, double mean_dn, const ClipRange&
   if (is_far(law, clip)) return law.variance;
   // Codes at a bound are not rounded: quantisation is added after clipping, to the others.
   const double dithered = std::max(law.variance - quantisation_dn2, 0.0);
-  const double kept = std::max(1 - share_beyond(law, clip), 0.0);
+  const double kept = std::max(1 - fraction_beyond(law, clip), 0.0);
   return read_moments(line, {law.mean, dithered}, clip).variance + kept * std::min(quantisation_dn2, law.variance);
 }
 
 double clipped_share(const NoiseLine& line, double mean_dn, const ClipRange& clip) {
-  return share_beyond(law_seen_as(line, mean_dn, clip), clip);
+  return fraction_beyond(law_seen_as(line, mean_dn, clip), clip);
 }
 
 std::optional<NoiseLine> fit_noise_line(std::span<const NoisePoint> points, double expected_contrast) {

@@ -80,7 +80,7 @@ void transform(const Block& in, Block& out) {
 }
 
 constexpr int block_window = side + 2 * noise_border;
-constexpr double block_step_share = 1.0 / (side * side) + 1.0 / (block_window * block_window - side * side);
+constexpr double block_step_fraction = 1.0 / (side * side) + 1.0 / (block_window * block_window - side * side);
 
 NoiseSample block_sample(const Lattice& lattice, int x0, int y0) {
   Block pixels, details;
@@ -201,14 +201,14 @@ Places places_of(const Lattice& l, const Reach& reach) {
 template <class Sampler>
 std::vector<NoiseSample> samples_of(const RawDn& raw, const SamplePlan& plan, Executor& executor, const Reach& reach,
                                     const Sampler& sampler) {
-  assert(raw.layout != SensorLayout::linear_rgb && plan.most_samples > 0);
+  assert(raw.layout != SensorLayout::linear_rgb && plan.max_samples > 0);
   const std::vector<Lattice> lattices = lattices_of(raw, plan.black_dn);
   std::int64_t all = 0;
   for (const Lattice& lattice : lattices) {
     const Places places = places_of(lattice, reach);
     all += static_cast<std::int64_t>(places.columns) * places.rows;
   }
-  const int every = static_cast<int>((all + plan.most_samples - 1) / plan.most_samples);
+  const int every = static_cast<int>((all + plan.max_samples - 1) / plan.max_samples);
   std::vector<NoiseSample> out;
   for (const Lattice& lattice : lattices) {
     if (every == 0) break;
@@ -232,7 +232,7 @@ std::vector<NoiseSample> samples_of(const RawDn& raw, const SamplePlan& plan, Ex
 }  // namespace
 
 NoiseSamples block_samples(const RawDn& raw, const SamplePlan& plan, Executor& executor) {
-  return {{count_of(Band::low), count_of(Band::middle), count_of(Band::high), block_step_share, 1},
+  return {{count_of(Band::low), count_of(Band::middle), count_of(Band::high), block_step_fraction, 1},
           samples_of(raw, plan, executor, {noise_border, side + noise_border - 1, side}, block_sample)};
 }
 

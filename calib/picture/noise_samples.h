@@ -25,8 +25,8 @@ struct DetailCount {
   int low = 0;
   int middle = 0;
   int high = 0;
-  double step_share = 0;         // variance of mean_dn - around_dn for noise alone, relative to a pixel's
-  double independent_share = 1;  // of the high ones: neighbouring samples may have pixels in common
+  double step_fraction = 0;         // variance of mean_dn - around_dn for noise alone, relative to a pixel's
+  double independent_fraction = 1;  // of the high ones: neighbouring samples may have pixels in common
 };
 
 struct NoiseSamples {
@@ -40,7 +40,7 @@ inline constexpr int noise_block = 8, noise_border = 2;
 /// Selection of samples.
 struct SamplePlan {
   PerSite<double> black_dn{};
-  std::int64_t most_samples = 0;  // above 0: limit for all sites together, kept by using only every n-th row of samples
+  std::int64_t max_samples = 0;  // above 0: limit for all sites together, kept by using only every n-th row of samples
 };
 
 /// Returns samples of adjacent blocks of 8 x 8 pixels of one colour, by their cosine transform (the details that N.

@@ -13,9 +13,9 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr std::size_t least_samples = 100;
-constexpr double first_share = 0.05;  // of each group: the samples of least detail, as a start
-constexpr int most_rounds = 30;
+constexpr std::size_t min_samples = 100;
+constexpr double first_fraction = 0.05;  // of each group: the samples of least detail, as a start
+constexpr int max_rounds = 30;
 constexpr double settled = 1e-3;             // relative change of the gain
 constexpr double expected_contrast = 0.015;  // of PRNU, grain and texture as fine as pixels, in flat samples
 constexpr double most_clipped_share = 0.9;   // of the pixels
@@ -67,9 +67,9 @@ Result<void> check(const RawDn& raw, const PerSite<double>& black_dn, const Pict
     return fail(ErrorCode::unsupported,
                 "demosaiced pixels: their noise is that of the demosaicing too: give the raw with its mosaic");
   }
-  if (options.most_samples < 1 || options.most_samples > 10'000'000) {
+  if (options.max_samples < 1 || options.max_samples > 10'000'000) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("most_samples is {}: it must be 1 to 10000000", options.most_samples), "most_samples");
+                fmt::format("most_samples is {}: it must be 1 to 10000000", options.max_samples), "most_samples");
   }
   for (int site = 0; site < 4; ++site) {
     if (black_dn[site] >= 0 && black_dn[site] < white_of(raw, site) && std::isfinite(white_of(raw, site))) continue;
@@ -90,10 +90,10 @@ struct Fit {
 /// Iterates: the samples of least detail give a first line; that line determines which samples are flat, and those give
 /// the next.
 std::optional<Fit> settle(const NoiseSamples& samples, const PerSite<ClipRange>& clip) {
-  const auto first = fit_noise_line(quietest_points(samples, clip, first_share).points);
+  const auto first = fit_noise_line(quietest_points(samples, clip, first_fraction).points);
   if (!first) return std::nullopt;
   Fit out{*first, {}, false};
-  for (int i = 0; i < most_rounds && !out.converged; ++i) {
+  for (int i = 0; i < max_rounds && !out.converged; ++i) {
     out.flat = flat_points(samples, out.line, clip, {});
     const auto next = fit_noise_line(out.flat.points, expected_contrast);
     if (!next) return std::nullopt;
@@ -168,7 +168,7 @@ PictureNoise described(const Fit& fit, double samples, const RawTraces& traces) 
                    .degrees_of_freedom = fit.line.degrees_of_freedom,
                    .darkest_dn = darkest->mean_dn,
                    .brightest_dn = brightest->mean_dn,
-                   .flat_share = fit.flat.samples / samples,
+                   .flat_fraction = fit.flat.samples / samples,
                    .converged = fit.converged,
                    .traces = traces,
                    .contrast_squared = fit.line.contrast_squared};
@@ -189,9 +189,9 @@ double chi_square_of(const PictureNoise& noise, double gain, double offset) {
 Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& black_dn,
                                        const PictureNoiseOptions& options, Executor& executor) {
   if (const auto good = check(raw, black_dn, options); !good) return tl::make_unexpected(good.error());
-  const SamplePlan plan{black_dn, options.most_samples};
+  const SamplePlan plan{black_dn, options.max_samples};
   NoiseSamples blocks = block_samples(raw, plan, executor);
-  if (blocks.sample.size() < least_samples) {
+  if (blocks.sample.size() < min_samples) {
     return fail(ErrorCode::insufficient,
                 fmt::format("{} x {} pixels give {} blocks of 16 x 16, and 100 are needed: give a larger picture",
                             raw.active.width, raw.active.height, blocks.sample.size()));

@@ -19,7 +19,7 @@ enum class PictureNoiseMethod : std::uint8_t { ponomarenko, foi };
 
 struct PictureNoiseOptions {
   PictureNoiseMethod method = PictureNoiseMethod::ponomarenko;  // foi is biased by texture more easily
-  std::int64_t most_samples =
+  std::int64_t max_samples =
       400'000;  // 1..1e7; of blocks (128 pixels of the raw each, 256 in red and blue) or details (8, 16)
 };
 
@@ -40,7 +40,7 @@ struct PictureNoise {
   int degrees_of_freedom = 0;
   double darkest_dn = 0;  // range of the means of the fitted samples, above black, as read
   double brightest_dn = 0;
-  double flat_share = 0;  // fraction of the samples
+  double flat_fraction = 0;  // fraction of the samples
   bool converged = false;
   RawTraces traces;
   bool under_dithered = false;       // the darkest samples scatter by less than half a code step

@@ -254,7 +254,7 @@ void put_picture_noise(const PictureNoise& noise, const BlackPoint& black, const
 namespace {
 
 constexpr double cut_deviations = 5;
-constexpr double most_excluded = 0.05;
+constexpr double max_excluded = 0.05;
 constexpr double clipped_share = 1e-3;
 constexpr double fewest_pixels = 500;  // of a site: the standard error is below 0.05 standard deviations
 
@@ -277,17 +277,17 @@ void exclude(const Plane<float>& mean_dn, int site, int frames, PixelMask& mask)
 
 Result<void> check_codes(const DarkGroup& group) {
   for (int site = 0; site < 4; ++site) {
-    if (group.share_at_zero[site] <= clipped_share) continue;
+    if (group.fraction_at_zero[site] <= clipped_share) continue;
     return fail(ErrorCode::insufficient,
                 fmt::format("{:.2g} % of the dark samples are at code 0, so their mean is too high; raise the camera's "
                             "black level (offset)",
-                            100 * group.share_at_zero[site]));
+                            100 * group.fraction_at_zero[site]));
   }
   const double white = *std::min_element(group.setting.white_dn.begin(), group.setting.white_dn.end());
   const auto at_white = std::count_if(group.mean_dn.data(), group.mean_dn.data() + group.mean_dn.size(),
                                       [white](float dn) { return dn >= white; });
   const double share = static_cast<double>(at_white) / static_cast<double>(group.mean_dn.size());
-  if (share <= most_excluded) return {};
+  if (share <= max_excluded) return {};
   return fail(ErrorCode::insufficient,
               fmt::format("{:.2g} % of the dark samples are at the white level {:g} DN; expose "
                           "less, or cover the lens",
@@ -322,11 +322,11 @@ Result<BlackFigures> measure_black(const DarkGroup& group) {
   }
   out.row_noise_dn = std::sqrt(std::max(0.0, row));
   out.column_noise_dn = std::sqrt(std::max(0.0, column));
-  out.excluded_share = 1 - static_cast<double>(out.pixels) / static_cast<double>(mask.size());
-  if (out.excluded_share <= most_excluded) return out;
+  out.excluded_fraction = 1 - static_cast<double>(out.pixels) / static_cast<double>(mask.size());
+  if (out.excluded_fraction <= max_excluded) return out;
   return fail(ErrorCode::insufficient,
               fmt::format("{:.2g} % of the pixels lie far from the others, at most {:g} % may; is this dark?",
-                          100 * out.excluded_share, 100 * most_excluded));
+                          100 * out.excluded_fraction, 100 * max_excluded));
 }
 
 Result<BlackFigures> measure_black(const RawDn& frame) {

@@ -32,7 +32,7 @@ struct BlackFigures {
   double row_noise_dn = 0;     // common to whole rows of one frame beyond white noise, mean of the sites
   double column_noise_dn = 0;  // fixed
   std::int64_t pixels = 0;     // number kept, of all sites
-  double excluded_share = 0;
+  double excluded_fraction = 0;
   int frames = 0;
 };
 

@@ -19,8 +19,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Names = std::initializer_list<const char*>;
 
-constexpr int deepest = 8;             // a profile has six levels
-constexpr std::size_t most_keys = 64;  // of one object; the JSON library compares each with all previous ones
+constexpr int deepest = 8;            // a profile has six levels
+constexpr std::size_t max_keys = 64;  // of one object; the JSON library compares each with all previous ones
 
 /// Reads one JSON object; finish() reports unexpected keys.
 class Reader {
@@ -217,8 +217,8 @@ class KeyCheck {
 
   void add(const std::string& key) {
     levels_.back().last = key;
-    if (levels_.back().keys.size() == most_keys) {
-      return failure_.set(ErrorCode::malformed, "", fmt::format("an object has more than {} keys", most_keys));
+    if (levels_.back().keys.size() == max_keys) {
+      return failure_.set(ErrorCode::malformed, "", fmt::format("an object has more than {} keys", max_keys));
     }
     if (levels_.back().keys.insert(key).second) return;
     std::string path;

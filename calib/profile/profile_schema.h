@@ -34,8 +34,8 @@ bool check_range(double value, const Range& range, const std::string& path, Prof
 void check_together(const CameraProfile& profile, ProfileFailure& failure);
 
 inline constexpr double tiny = 1e-12;  // stands for "above 0"
-inline constexpr std::size_t most_gains = 256, most_hot_pixels = 100000, most_files = 10000, most_provenance = 64,
-                             most_colours = 64;
+inline constexpr std::size_t most_gains = 256, max_hot_pixels = 100000, max_files = 10000, max_provenance = 64,
+                             max_colours = 64;
 inline constexpr Range matrix_entries{-1e3, 1e3};
 
 /// Visits the profile's keys in order, once for reading and writing. A visitor offers
@@ -73,7 +73,7 @@ void visit_provenance(Visitor& v, Source& p) {
   v.text("figures", p.figures);
   v.text("source", p.source);
   v.text("date", p.date);
-  v.texts("files", p.files, most_files);
+  v.texts("files", p.files, max_files);
   v.number("reduced_chi_square", p.reduced_chi_square, {});
   v.integer("degrees_of_freedom", p.degrees_of_freedom, {0, 1e9});
 }
@@ -106,12 +106,12 @@ void visit_gain(Visitor& v, Gain& g) {
     inner.estimate("green", share[1].value, share[1].standard_error, {-10, 10});
     inner.estimate("blue", share[2].value, share[2].standard_error, {-10, 10});
   });
-  v.list("hot_pixels", g.hot_pixels, most_hot_pixels, [](Visitor& inner, auto& hot) {
+  v.list("hot_pixels", g.hot_pixels, max_hot_pixels, [](Visitor& inner, auto& hot) {
     inner.integer("x_px", hot.x, {0, 1e6});
     inner.integer("y_px", hot.y, {0, 1e6});
     inner.number("excess_e_per_s", hot.excess_e_per_s, {});
   });
-  v.list("provenance", g.provenance, most_provenance, [](Visitor& inner, auto& p) { visit_provenance(inner, p); });
+  v.list("provenance", g.provenance, max_provenance, [](Visitor& inner, auto& p) { visit_provenance(inner, p); });
 }
 
 template <class Visitor, class Colour>
@@ -133,7 +133,7 @@ void visit_profile(Visitor& v, Profile& p) {
   v.text("model", p.model);
   v.text("mosaic", p.mosaic);
   v.list("gains", p.gains, most_gains, [](Visitor& inner, auto& gain) { visit_gain(inner, gain); });
-  v.list("colours", p.colours, most_colours, [](Visitor& inner, auto& colour) { visit_colour(inner, colour); });
+  v.list("colours", p.colours, max_colours, [](Visitor& inner, auto& colour) { visit_colour(inner, colour); });
 }
 
 }  // namespace lowlux::calib

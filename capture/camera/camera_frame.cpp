@@ -14,8 +14,8 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr double least_gain = 1e-3, most_gain = 1e3;
-constexpr double most_coefficient = 255;  // fits in 24 bits with a fraction of 16, as floats do
+constexpr double min_gain = 1e-3, max_gain = 1e3;
+constexpr double max_coefficient = 255;  // fits in 24 bits with a fraction of 16, as floats do
 constexpr double matrix_step = 0x1p-16, neutral_step = 0x1p-20;
 constexpr double d65_cct_k = 6504;
 constexpr double iso_of_unit_gain = 100;
@@ -31,7 +31,7 @@ Matrix3 rounded(Matrix3 matrix) {
 
 bool can_be(const Matrix3& matrix) {
   const bool held = std::ranges::all_of(matrix, [](const Vector3& row) {
-    return std::ranges::all_of(row, [](double value) { return std::fabs(value) <= most_coefficient; });
+    return std::ranges::all_of(row, [](double value) { return std::fabs(value) <= max_coefficient; });
   });
   return held && inverse(matrix).has_value();
 }
@@ -53,7 +53,7 @@ void set_black(const std::array<double, 4>& black_dn, RawFrame& out) {
 std::optional<Vector3> neutral_of(const FrameFacts& facts, RawFrame& out) {
   if (!facts.colour_gains) return std::nullopt;
   const auto [red, blue] = *facts.colour_gains;
-  if (!(red >= least_gain && red <= most_gain && blue >= least_gain && blue <= most_gain)) {
+  if (!(red >= min_gain && red <= max_gain && blue >= min_gain && blue <= max_gain)) {
     out.warnings.emplace_back("the camera states colour gains that cannot be: left out");
     return std::nullopt;
   }

@@ -232,7 +232,7 @@ Result<void> read_defect_constant(const OpcodeContext& context, Reader in) {
 void find_constants(const OpcodeContext& context) {
   const RawDn& raw = context.frame.raw;
   std::vector<DefectRect>& defects = context.found.defects;
-  const std::int64_t believed = std::int64_t{raw.active.width} * raw.active.height / max_named_share;
+  const std::int64_t believed = std::int64_t{raw.active.width} * raw.active.height / max_named_fraction;
   const std::size_t named = defects.size();
   const std::size_t room = std::min(context.room_for_defects(), static_cast<std::size_t>(believed));
   for (int y = 0; y < raw.active.height; ++y) {

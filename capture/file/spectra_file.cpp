@@ -14,7 +14,7 @@ namespace lowlux::capture {
 namespace {
 
 constexpr std::size_t most_bytes = 16 << 20;
-constexpr std::size_t most_columns = 4096;
+constexpr std::size_t max_columns = 4096;
 constexpr std::size_t most_rows = 100000;
 
 std::string_view trimmed(std::string_view text) {
@@ -75,7 +75,7 @@ class Table {
 
  private:
   Result<void> add_names(const std::vector<std::string_view>& cells) {
-    if (cells.size() < 2 || cells.size() > most_columns) {
+    if (cells.size() < 2 || cells.size() > max_columns) {
       return wrong("names " + std::to_string(cells.size()) +
                    " columns: a table has the wavelength and 1 to 4095 spectra");
     }

@@ -14,13 +14,13 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr std::size_t most_plane_bytes = std::size_t{2} << 30;
-constexpr int most_tries = 100;
+constexpr std::size_t max_plane_bytes = std::size_t{2} << 30;
+constexpr int max_tries = 100;
 
 bool synchronise(int fd, std::uint64_t flags) {
   dma_buf_sync sync{.flags = flags};
   int result = -1;
-  for (int tries = 0; tries < most_tries && result != 0; ++tries) {
+  for (int tries = 0; tries < max_tries && result != 0; ++tries) {
     result = ioctl(fd, DMA_BUF_IOCTL_SYNC, &sync);
     if (result != 0 && errno != EINTR && errno != EAGAIN) break;
   }
@@ -30,7 +30,7 @@ bool synchronise(int fd, std::uint64_t flags) {
 }  // namespace
 
 Result<MappedPlane> MappedPlane::map(const PlaneLocation& plane) {
-  if (plane.length == 0 || plane.length > most_plane_bytes || plane.offset > most_plane_bytes) {
+  if (plane.length == 0 || plane.length > max_plane_bytes || plane.offset > max_plane_bytes) {
     return fail(ErrorCode::malformed, "a buffer of the camera has " + std::to_string(plane.length) + " bytes at " +
                                           std::to_string(plane.offset) + ", which is not within 2 GiB");
   }

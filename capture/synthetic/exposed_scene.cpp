@@ -55,9 +55,9 @@ void spread_point(const PointSource& point, int width, int height, const Add& ad
   const int reach = static_cast<int>(std::ceil(6 * point.spread_px)) + 1;
   const int cx = static_cast<int>(std::lround(point.x_px)), cy = static_cast<int>(std::lround(point.y_px));
   for (int y = std::max(0, cy - reach); y <= std::min(height - 1, cy + reach); ++y) {
-    const double row_share = share_of(y - point.y_px, point.spread_px);
+    const double row_fraction = share_of(y - point.y_px, point.spread_px);
     for (int x = std::max(0, cx - reach); x <= std::min(width - 1, cx + reach); ++x) {
-      add(x, y, row_share * share_of(x - point.x_px, point.spread_px));
+      add(x, y, row_fraction * share_of(x - point.x_px, point.spread_px));
     }
   }
 }

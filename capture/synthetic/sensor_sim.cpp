@@ -15,7 +15,7 @@ namespace lowlux::capture {
 namespace {
 
 using isp::Effect;
-using isp::EffectSet;
+using isp::NoiseSourceSet;
 
 int blocks_across(int pixels) { return (pixels + isp::effect_block - 1) / isp::effect_block; }
 
@@ -40,7 +40,7 @@ class RowReadout {
   }
 
   template <class Code>
-  void operator()(const Run& run, EffectSet kept, Scratch& s, Code* out) const {
+  void operator()(const Run& run, NoiseSourceSet kept, Scratch& s, Code* out) const {
     const std::size_t n = run.size();
     const auto signal = std::span(s.signal).first(n), mean = std::span(s.mean).first(n);
     fill_signal(run, kept, s, signal);
@@ -61,7 +61,7 @@ class RowReadout {
     return {frame_.pattern_seed, static_cast<std::uint32_t>(run.x0), static_cast<std::uint32_t>(run.y)};
   }
 
-  void fill_signal(const Run& run, EffectSet kept, Scratch& s, std::span<float> signal) const {
+  void fill_signal(const Run& run, NoiseSourceSet kept, Scratch& s, std::span<float> signal) const {
     const auto time = static_cast<float>(frame_.exposure.time_s);
     if (frame_.photons != nullptr && kept.has(Effect::photon_noise)) {
       frame_.photons->collect(frame_.seed, frame_.frame, run.x0, run.y, frame_.exposure.time_s, signal);
@@ -72,7 +72,7 @@ class RowReadout {
     if (kept.has(Effect::prnu)) apply_prnu(pattern(run), static_cast<float>(frame_.sensor.prnu), signal, s.normal);
   }
 
-  void fill_dark(const Run& run, EffectSet kept, Scratch& s, std::span<float> mean) const {
+  void fill_dark(const Run& run, NoiseSourceSet kept, Scratch& s, std::span<float> mean) const {
     std::array<float, 2> dark{};
     if (kept.has(Effect::dark_current)) {
       for (int i = 0; i < 2; ++i) {
@@ -86,7 +86,7 @@ class RowReadout {
     }
   }
 
-  std::span<const float> fill_offset(const Run& run, EffectSet kept, Scratch& s) const {
+  std::span<const float> fill_offset(const Run& run, NoiseSourceSet kept, Scratch& s) const {
     if (!kept.has(Effect::row_noise) && !kept.has(Effect::column_noise)) return {};
     const auto offset = std::span(s.offset).first(run.size());
     const float row = kept.has(Effect::row_noise)
@@ -100,7 +100,7 @@ class RowReadout {
     return offset;
   }
 
-  ReadoutParameters parameters(EffectSet kept, bool steady) const {
+  ReadoutParameters parameters(NoiseSourceSet kept, bool steady) const {
     const SensorModel& sensor = frame_.sensor;
     ReadoutParameters p;
     p.full_well_e =
@@ -123,7 +123,7 @@ class RowReadout {
 
 /// Reads out rows first to last, in runs of one region.
 template <class Code>
-void read_out_rows(const SensorFrame& frame, const isp::EffectPlan& plan, RowBand band, PlaneView<Code> dn) {
+void read_out_rows(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, RowBand band, PlaneView<Code> dn) {
   const int width = frame.rate_e_per_s.width, across = blocks_across(width);
   const RowReadout readout(frame);
   Scratch scratch(width);
@@ -140,13 +140,14 @@ void read_out_rows(const SensorFrame& frame, const isp::EffectPlan& plan, RowBan
 }
 
 template <class Code>
-void read_out_bands(const SensorFrame& frame, const isp::EffectPlan& plan, Executor& executor, PlaneView<Code> dn) {
+void read_out_bands(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, Executor& executor,
+                    PlaneView<Code> dn) {
   for_each_band(executor, dn.height, [&](RowBand band, int) { read_out_rows(frame, plan, band, dn); });
 }
 
 /// Returns the shortest of three times [ms], writing the output of a file: codes where the converter is kept.
 template <class Code>
-double time_rows(const SensorFrame& frame, const isp::EffectPlan& plan, Plane<Code>& dn) {
+double time_rows(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, Plane<Code>& dn) {
   double best = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 3; ++i) {
     const auto start = std::chrono::steady_clock::now();
@@ -159,11 +160,12 @@ double time_rows(const SensorFrame& frame, const isp::EffectPlan& plan, Plane<Co
 
 }  // namespace
 
-void read_out(const SensorFrame& frame, const isp::EffectPlan& plan, Executor& executor, PlaneView<float> dn) {
+void read_out(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, Executor& executor, PlaneView<float> dn) {
   read_out_bands(frame, plan, executor, dn);
 }
 
-void read_out(const SensorFrame& frame, const isp::EffectPlan& plan, Executor& executor, PlaneView<std::uint16_t> dn) {
+void read_out(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, Executor& executor,
+              PlaneView<std::uint16_t> dn) {
   read_out_bands(frame, plan, executor, dn);
 }
 
@@ -199,22 +201,22 @@ std::vector<isp::BlockLevel> block_levels(PlaneView<const float> rate_e_per_s, B
   return blocks;
 }
 
-EffectCost measure_cost(const SensorFrame& frame, const isp::EffectPlan& plan) {
+EffectCost measure_cost(const SensorFrame& frame, const isp::NoiseSourcePlan& plan) {
   constexpr int measured_rows = 128;
   SensorFrame top = frame;
   top.rate_e_per_s.height = std::min(frame.rate_e_per_s.height, measured_rows);
   const double scale = static_cast<double>(frame.rate_e_per_s.height) / top.rate_e_per_s.height;
   Plane<float> dn(top.rate_e_per_s.width, top.rate_e_per_s.height);
   Plane<std::uint16_t> codes(dn.width(), dn.height());
-  isp::EffectPlan timed = plan;
-  const auto time_with = [&](EffectSet kept) {
+  isp::NoiseSourcePlan timed = plan;
+  const auto time_with = [&](NoiseSourceSet kept) {
     for (isp::RegionPlan& region : timed.regions) region.kept = kept;
     const bool whole = kept.has(Effect::quantisation) && kept.has(Effect::clipping);
     return scale * (whole ? time_rows(top, timed, codes) : time_rows(top, timed, dn));
   };
-  EffectSet present;
-  for (const isp::EffectDecision& d : plan.regions.front().decisions) {
-    if (d.reason != isp::EffectDecision::Reason::absent) present = present.with(d.effect);
+  NoiseSourceSet present;
+  for (const isp::NoiseSourceDecision& d : plan.regions.front().decisions) {
+    if (d.reason != isp::NoiseSourceDecision::Reason::absent) present = present.with(d.effect);
   }
   EffectCost cost;
   cost.all_ms = time_with(present);

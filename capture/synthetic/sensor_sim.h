@@ -8,7 +8,7 @@
 #include "isp/base/executor.h"
 #include "isp/base/plane.h"
 #include "isp/base/sensor.h"
-#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/noise_source_plan.h"
 
 namespace lowlux::capture {
 
@@ -28,10 +28,11 @@ struct SensorFrame {
 /// where clipping is not. The same for every number of threads and every processor.
 /// @param plan blocks of isp::effect_block over rate_e_per_s, row by row
 /// @param dn   as large as rate_e_per_s
-void read_out(const SensorFrame& frame, const isp::EffectPlan& plan, Executor& executor, PlaneView<float> dn);
+void read_out(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, Executor& executor, PlaneView<float> dn);
 
 /// Reads out the frame as codes, for a plan whose regions all keep quantisation and clipping.
-void read_out(const SensorFrame& frame, const isp::EffectPlan& plan, Executor& executor, PlaneView<std::uint16_t> dn);
+void read_out(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, Executor& executor,
+              PlaneView<std::uint16_t> dn);
 
 /// Returns the levels of each block at the sensor in a time, row by row, for the planner. A block without a pixel of a
 /// channel (frames one pixel wide) has the mean of the others there.
@@ -44,6 +45,6 @@ struct EffectCost {
   double all_ms = 0;
   std::array<std::optional<double>, isp::effect_count> saved_ms;
 };
-EffectCost measure_cost(const SensorFrame& frame, const isp::EffectPlan& plan);
+EffectCost measure_cost(const SensorFrame& frame, const isp::NoiseSourcePlan& plan);
 
 }  // namespace lowlux::capture

@@ -23,7 +23,7 @@ constexpr double largest_deviate = 6.5;  // limit of the normal deviates of isp/
 constexpr double hottest = 23;           // limit of hot pixels' charge: 33 log(2) times their mean
 
 template <class Predicate>
-bool every_region(const isp::EffectPlan& plan, const Predicate& predicate) {
+bool every_region(const isp::NoiseSourcePlan& plan, const Predicate& predicate) {
   return std::all_of(plan.regions.begin(), plan.regions.end(), predicate);
 }
 
@@ -65,12 +65,12 @@ double range_dn(const SensorModel& s) { return s.system_gain_dn_per_e * isp::sat
 
 /// Returns the plan of a file: the planner's, with the converter, which costs no time and makes files of one sensor
 /// alike.
-isp::EffectPlan with_converter(isp::EffectPlan plan) {
+isp::NoiseSourcePlan with_converter(isp::NoiseSourcePlan plan) {
   for (isp::RegionPlan& region : plan.regions) {
     for (const Effect effect : {Effect::quantisation, Effect::clipping}) {
       region.kept = region.kept.with(effect);
-      isp::EffectDecision& d = region.decisions[static_cast<int>(effect)];
-      if (!d.kept) d.reason = isp::EffectDecision::Reason::free;
+      isp::NoiseSourceDecision& d = region.decisions[static_cast<int>(effect)];
+      if (!d.kept) d.reason = isp::NoiseSourceDecision::Reason::free;
       d.kept = true;
     }
   }
@@ -138,8 +138,8 @@ Result<void> SyntheticSource::expose(Executor& executor) {
   const SensorModel& sensor = sensor_.model;
   const auto blocks = block_levels(std::as_const(rate_.e_per_s).view(), options_.phase, options_.exposure.time_s);
   developing_ = isp::developing_of(sensor, options_.exposure, *to_xyz, *colour_.as_shot_neutral, blocks);
-  const EffectChoice& choice = options_.effects;
-  plan_ = choice.tolerance ? isp::plan_effects(sensor, options_.exposure, developing_, blocks, *choice.tolerance)
+  const NoiseSourceChoice& choice = options_.effects;
+  plan_ = choice.tolerance ? isp::plan_noise_sources(sensor, options_.exposure, developing_, blocks, *choice.tolerance)
                            : isp::fixed_effects(sensor, options_.exposure, developing_, blocks, choice.effects);
   file_plan_ = choice.tolerance ? with_converter(plan_) : plan_;
   choose_storage();
@@ -147,7 +147,7 @@ Result<void> SyntheticSource::expose(Executor& executor) {
   return check_means(blocks);
 }
 
-double SyntheticSource::largest_mean_e(const isp::BlockLevel& block, isp::EffectSet kept) const {
+double SyntheticSource::largest_mean_e(const isp::BlockLevel& block, isp::NoiseSourceSet kept) const {
   const SensorModel& s = sensor_.model;
   const auto dark = isp::dark_mean_e(s, options_.exposure);
   const double dark_e = kept.has(Effect::dark_current) ? *std::max_element(dark.begin(), dark.end()) : 0;
@@ -164,7 +164,7 @@ double SyntheticSource::largest_mean_e(const isp::BlockLevel& block, isp::Effect
 Result<void> SyntheticSource::check_means(const std::vector<isp::BlockLevel>& blocks) const {
   double mean_e = 0;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
-    const isp::EffectSet kept = plan_.regions[plan_.region_of_block[i]].kept;
+    const isp::NoiseSourceSet kept = plan_.regions[plan_.region_of_block[i]].kept;
     if (!kept.has(Effect::clipping)) mean_e = std::max(mean_e, largest_mean_e(blocks[i], kept));
   }
   if (mean_e <= poisson_max_mean) return {};
@@ -209,7 +209,7 @@ std::optional<PhotonRows> SyntheticSource::photon_rows() const {
 }
 
 template <class Code>
-void SyntheticSource::read_out_frame(std::uint32_t index, const isp::EffectPlan& plan, Executor& executor,
+void SyntheticSource::read_out_frame(std::uint32_t index, const isp::NoiseSourcePlan& plan, Executor& executor,
                                      PlaneView<Code> out) const {
   const std::optional<PhotonRows> photons = photon_rows();
   read_out(sensor_frame(index, photons ? &*photons : nullptr), plan, executor, out);
@@ -249,8 +249,9 @@ RawFrame SyntheticSource::frame(std::uint32_t index, Executor& executor) const {
 /// 1/12) / range^2, for the simulated effects. Without the photons' Poisson distribution no line in x describes the
 /// noise: then nullopt.
 std::optional<NoiseProfile> SyntheticSource::noise_profile() const {
-  const isp::EffectSet kept =
-      options_.effects.tolerance ? isp::EffectSet::all() : file_plan_.regions.front().kept;  // one set for all regions
+  const isp::NoiseSourceSet kept = options_.effects.tolerance
+                                       ? isp::NoiseSourceSet::all()
+                                       : file_plan_.regions.front().kept;  // one set for all regions
   if (options_.sampling == PhotonSampling::published || !kept.has(Effect::photon_noise)) return std::nullopt;
   const SensorModel& s = sensor_.model;
   const double range = range_dn(s), k = s.system_gain_dn_per_e;

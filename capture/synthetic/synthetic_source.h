@@ -11,15 +11,15 @@
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
-#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/noise_source_plan.h"
 #include "isp/model/sensor/sensor_db.h"
 
 namespace lowlux::capture {
 
 /// Choice of the simulated effects: those required by a tolerance, or those given.
-struct EffectChoice {
-  std::optional<isp::Tolerance> tolerance;         // set: the planner decides
-  isp::EffectSet effects = isp::EffectSet::all();  // used without a tolerance
+struct NoiseSourceChoice {
+  std::optional<isp::Tolerance> tolerance;                   // set: the planner decides
+  isp::NoiseSourceSet effects = isp::NoiseSourceSet::all();  // used without a tolerance
 };
 
 struct SyntheticOptions {
@@ -28,7 +28,7 @@ struct SyntheticOptions {
   BayerPhase phase = BayerPhase::rggb;
   int masked_columns = 0;  // light-shielded, left of the image; even
   PhotonSampling sampling = PhotonSampling::physical;
-  EffectChoice effects;
+  NoiseSourceChoice effects;
   std::uint64_t seed = 1;         // of the noise: frames of one seed and index have the same noise, for any scene
   std::uint64_t sensor_seed = 1;  // of the fixed pattern: selects the specimen of the sensor
 };
@@ -56,8 +56,8 @@ class SyntheticSource {
   SceneLinear xyz_cd_m2() const;
 
   /// Return the effects simulated by frame_dn() and by frame().
-  const isp::EffectPlan& plan() const { return plan_; }
-  const isp::EffectPlan& file_plan() const { return file_plan_; }
+  const isp::NoiseSourcePlan& plan() const { return plan_; }
+  const isp::NoiseSourcePlan& file_plan() const { return file_plan_; }
   const Plane<float>& rate_e_per_s() const { return rate_.e_per_s; }
   std::int64_t moved_pixels() const { return rate_.moved_pixels; }
   const isp::Developing& developing() const { return developing_; }
@@ -75,13 +75,14 @@ class SyntheticSource {
   SyntheticSource(Scene scene, isp::NamedSensor sensor, SpectralResponse response, const SyntheticOptions& options);
   Result<void> expose(Executor& executor);
   /// Returns the largest mean of a block's pixels, fixed pattern included [e-].
-  double largest_mean_e(const isp::BlockLevel& block, isp::EffectSet kept) const;
+  double largest_mean_e(const isp::BlockLevel& block, isp::NoiseSourceSet kept) const;
   Result<void> check_means(const std::vector<isp::BlockLevel>& blocks) const;
   Result<void> check_photons(Executor& executor) const;
   void choose_storage();
   std::optional<NoiseProfile> noise_profile() const;
   template <class Code>
-  void read_out_frame(std::uint32_t index, const isp::EffectPlan& plan, Executor& executor, PlaneView<Code> out) const;
+  void read_out_frame(std::uint32_t index, const isp::NoiseSourcePlan& plan, Executor& executor,
+                      PlaneView<Code> out) const;
   SensorFrame sensor_frame(std::uint32_t index, const PhotonRows* photons) const;
   std::optional<PhotonRows> photon_rows() const;
   Plane<std::uint16_t> stored_codes(std::uint32_t index, Executor& executor) const;
@@ -95,8 +96,8 @@ class SyntheticSource {
   CameraColour colour_;
   ChargeRate rate_;
   isp::Developing developing_;
-  isp::EffectPlan plan_;
-  isp::EffectPlan file_plan_;
+  isp::NoiseSourcePlan plan_;
+  isp::NoiseSourcePlan file_plan_;
   Storage storage_;
 };
 

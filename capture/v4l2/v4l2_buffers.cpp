@@ -15,8 +15,8 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr std::uint32_t most_buffers = 32;  // VIDEO_MAX_FRAME
-constexpr int most_attempts = 100;          // DMA_BUF_IOCTL_SYNC must also be repeated for EAGAIN
+constexpr std::uint32_t max_buffers = 32;  // VIDEO_MAX_FRAME
+constexpr int max_attempts = 100;          // DMA_BUF_IOCTL_SYNC must also be repeated for EAGAIN
 
 /// One v4l2_buffer, with the plane that a multi-planar driver requires.
 class BufferCall {
@@ -79,14 +79,14 @@ Result<std::unique_ptr<V4l2Buffers>> V4l2Buffers::request(V4l2Device& device, V4
     return tl::make_unexpected(device.error(code, "the driver gives no buffers"));
   }
   out->requested_ = true;  // if a later step fails, they are returned when `out` is destroyed
-  if (had == 0 || had > most_buffers) {
+  if (had == 0 || had > max_buffers) {
     return fail(ErrorCode::malformed,
                 "asked for " + std::to_string(count) + " buffers, the driver gives " + std::to_string(had) +
-                    ", expected 1 to " + std::to_string(most_buffers),
+                    ", expected 1 to " + std::to_string(max_buffers),
                 device.path());
   }
   out->buffers_.reserve(had);
-  const std::size_t most_bytes = most_buffer_bytes / had;
+  const std::size_t most_bytes = max_buffer_bytes / had;
   for (std::uint32_t index = 0; index < had; ++index) {
     if (auto added = out->add(index, frame_bytes, most_bytes); !added) return pass_on(added);
   }
@@ -207,7 +207,7 @@ int V4l2Buffers::synchronise(std::size_t index, std::uint64_t flags) {
   const V4l2System& system = device_.system();
   dma_buf_sync asked{flags};
   int code = EAGAIN;
-  for (int attempt = 0; attempt < most_attempts && (code == EAGAIN || code == EINTR); ++attempt) {
+  for (int attempt = 0; attempt < max_attempts && (code == EAGAIN || code == EINTR); ++attempt) {
     code = system.ioctl(system.context, buffers_[index].file, DMA_BUF_IOCTL_SYNC, &asked) < 0 ? errno : 0;
   }
   if (code == ENODEV) device_.set_gone();

@@ -25,7 +25,7 @@ struct V4l2Taken {
 class V4l2Buffers {
  public:
   /// Requests `count` buffers (the driver may give fewer or more), each of at least `frame_bytes`, all of them at most
-  /// most_buffer_bytes. None is queued.
+  /// max_buffer_bytes. None is queued.
   static Result<std::unique_ptr<V4l2Buffers>> request(V4l2Device& device, V4l2Memory memory, int count,
                                                       std::size_t frame_bytes);
   ~V4l2Buffers();

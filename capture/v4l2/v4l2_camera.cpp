@@ -24,7 +24,7 @@ constexpr int pause_ms = 1;
 
 // CameraFrame::buffer holds the index in the low bits and the start above.
 constexpr int index_bits = 5;
-constexpr int most_sessions = 1 << 20;
+constexpr int max_sessions = 1 << 20;
 
 /// Returns the number of frames missing after `last`; 0 if the count repeats itself or goes back.
 std::uint32_t lost_between(std::uint32_t last, std::uint32_t now) {
@@ -51,7 +51,7 @@ Result<void> V4l2Camera::start() {
   buffers_ = *std::move(buffers);
   last_sequence_.reset();
   failure_.reset();
-  session_ = (session_ + 1) % most_sessions;
+  session_ = (session_ + 1) % max_sessions;
   return {};
 }
 
@@ -162,10 +162,10 @@ std::optional<Error> V4l2Camera::contradiction(const V4l2Taken& taken) const {
 }
 
 nanoseconds V4l2Camera::timestamp_of(const V4l2Taken& taken) {
-  constexpr std::int64_t most_seconds = 9'000'000'000;  // limit of nanoseconds in 64 bits
+  constexpr std::int64_t max_seconds = 9'000'000'000;  // limit of nanoseconds in 64 bits
   const bool monotonic = (taken.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
   const bool sane =
-      taken.seconds >= 0 && taken.seconds < most_seconds && taken.microseconds >= 0 && taken.microseconds < 1'000'000;
+      taken.seconds >= 0 && taken.seconds < max_seconds && taken.microseconds >= 0 && taken.microseconds < 1'000'000;
   if (monotonic && sane) return std::chrono::seconds(taken.seconds) + std::chrono::microseconds(taken.microseconds);
   if (!told_of_clock_) {
     agreement_.warnings.emplace_back("the driver's timestamps are not of the monotonic clock: frames have none");

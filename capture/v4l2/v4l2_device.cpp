@@ -22,7 +22,7 @@ namespace lowlux::capture {
 namespace {
 
 // A signal interrupts a call once; more interruptions than this are not caused by signals.
-constexpr int most_interruptions = 100;
+constexpr int max_interruptions = 100;
 
 // V4L2_CAP_IO_MC of Linux 5.9; older headers do not define it.
 constexpr std::uint32_t capability_media_controlled = 0x20000000;
@@ -45,7 +45,7 @@ V4l2Device::~V4l2Device() { system_.close(system_.context, file_); }
 
 Result<std::unique_ptr<V4l2Device>> V4l2Device::open(const V4l2System& system, const std::string& path) {
   int file = -1;
-  for (int attempt = 0; attempt < most_interruptions; ++attempt) {
+  for (int attempt = 0; attempt < max_interruptions; ++attempt) {
     file = system.open(system.context, path.c_str());
     if (file >= 0 || errno != EINTR) break;
   }
@@ -89,7 +89,7 @@ Result<void> V4l2Device::identify() {
 
 int V4l2Device::call(unsigned long request, void* argument) {
   int code = EINTR;
-  for (int attempt = 0; attempt < most_interruptions && code == EINTR; ++attempt) {
+  for (int attempt = 0; attempt < max_interruptions && code == EINTR; ++attempt) {
     code = system_.ioctl(system_.context, file_, request, argument) < 0 ? errno : 0;
   }
   if (code == ENODEV) gone_ = true;

@@ -12,7 +12,7 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr std::uint32_t most_pixels_a_side = 65536;
+constexpr std::uint32_t max_pixels_a_side = 65536;
 
 std::string size_text(std::uint32_t width, std::uint32_t height) {
   return std::to_string(width) + "x" + std::to_string(height);
@@ -93,9 +93,9 @@ Result<CameraFormat> checked(const V4l2Device& device, const V4l2Layout& got, co
   if (got.field != V4L2_FIELD_NONE && got.field != V4L2_FIELD_ANY) {
     return refuse(ErrorCode::unsupported, " interlaced; lowlux takes whole frames only");
   }
-  if (got.width == 0 || got.height == 0 || got.width > most_pixels_a_side || got.height > most_pixels_a_side) {
+  if (got.width == 0 || got.height == 0 || got.width > max_pixels_a_side || got.height > max_pixels_a_side) {
     return refuse(ErrorCode::malformed,
-                  ", expected 1 to " + std::to_string(most_pixels_a_side) + " pixels a side: ask for another size");
+                  ", expected 1 to " + std::to_string(max_pixels_a_side) + " pixels a side: ask for another size");
   }
   CameraFormat format{.raw = raw,
                       .width = static_cast<int>(got.width),
@@ -111,10 +111,10 @@ Result<CameraFormat> checked(const V4l2Device& device, const V4l2Layout& got, co
     return refuse(ErrorCode::malformed, " in buffers of " + std::to_string(got.buffer_bytes) + " bytes, which take " +
                                             std::to_string(frame_bytes(format)) + ": ask for another format");
   }
-  if (std::uint64_t{got.buffer_bytes} * static_cast<std::uint64_t>(buffers) > most_buffer_bytes) {
+  if (std::uint64_t{got.buffer_bytes} * static_cast<std::uint64_t>(buffers) > max_buffer_bytes) {
     return refuse(ErrorCode::too_large, " in " + std::to_string(buffers) + " buffers of " +
                                             std::to_string(got.buffer_bytes) + " bytes; the limit is " +
-                                            std::to_string(most_buffer_bytes) + " bytes: ask for a smaller size");
+                                            std::to_string(max_buffer_bytes) + " bytes: ask for a smaller size");
   }
   return format;
 }
@@ -153,8 +153,8 @@ Result<V4l2Agreement> negotiate(V4l2Device& device, const CameraRequest& request
 namespace {
 
 // Drivers end their lists with an error; a list of this length is assumed to be endless.
-constexpr std::uint32_t most_formats = 256;
-constexpr std::uint32_t most_sizes = 128;
+constexpr std::uint32_t max_formats = 256;
+constexpr std::uint32_t max_sizes = 128;
 
 V4l2Layout layout_of(const v4l2_format& told, bool multi_planar) {
   if (multi_planar) {
@@ -215,7 +215,7 @@ Result<V4l2Layout> set_layout(V4l2Device& device, std::uint32_t fourcc, std::uin
 
 V4l2Sizes list_sizes(V4l2Device& device, std::uint32_t fourcc) {
   V4l2Sizes out;
-  for (std::uint32_t index = 0; index < most_sizes; ++index) {
+  for (std::uint32_t index = 0; index < max_sizes; ++index) {
     v4l2_frmsizeenum one{};
     one.index = index;
     one.pixel_format = fourcc;
@@ -231,7 +231,7 @@ V4l2Sizes list_sizes(V4l2Device& device, std::uint32_t fourcc) {
 
 std::vector<V4l2Offer> list_offers(V4l2Device& device) {
   std::vector<V4l2Offer> out;
-  for (std::uint32_t index = 0; index < most_formats; ++index) {
+  for (std::uint32_t index = 0; index < max_formats; ++index) {
     v4l2_fmtdesc one{};
     one.index = index;
     one.type = device.buffer_type();

@@ -71,6 +71,6 @@ struct V4l2Agreement {
 Result<V4l2Agreement> negotiate(V4l2Device& device, const CameraRequest& request);
 
 /// Maximum memory of all buffers of a camera [bytes].
-inline constexpr std::size_t most_buffer_bytes = std::size_t{2} << 30;
+inline constexpr std::size_t max_buffer_bytes = std::size_t{2} << 30;
 
 }  // namespace lowlux::capture

@@ -12,7 +12,7 @@
 namespace lowlux::denoise {
 namespace {
 
-constexpr int part = block << (most_levels - 1);  // cells of a tile, each way: one block of the coarsest level
+constexpr int part = block << (max_levels - 1);  // cells of a tile, each way: one block of the coarsest level
 constexpr int window = 9;
 constexpr std::size_t least_blocks = 8;
 constexpr float none = std::numeric_limits<float>::quiet_NaN();
@@ -38,7 +38,7 @@ struct Check {
   const RawElectronsView& raw;
   std::array<ColourModel, 3> model;
   std::array<std::vector<float>, 3> cells;  // of one tile, part x part, dark charge included
-  std::array<std::vector<BlockDetail>, most_levels> blocks;
+  std::array<std::vector<BlockDetail>, max_levels> blocks;
   NoiseCheck out;
   std::array<long, 3> negative{};
   long without_signal = 0;
@@ -53,7 +53,7 @@ struct Check {
     }
     for (auto& colour : cells) colour.resize(static_cast<std::size_t>(part) * part);
     const auto of_level0 = static_cast<std::size_t>(raw.value.width / (2 * block)) * (raw.value.height / (2 * block));
-    for (int l = 0; l < most_levels; ++l) blocks[l].reserve(of_level0 >> (2 * l));
+    for (int l = 0; l < max_levels; ++l) blocks[l].reserve(of_level0 >> (2 * l));
   }
 
   void load(int x0, int y0, int columns, int rows);
@@ -174,7 +174,7 @@ void Check::measure(int first, int last) {
       int width = std::min(part, columns - x), height = std::min(part, rows - y);
       load(x, y, width, height);
       add_windows(width, height);
-      for (int level = 0; level < most_levels; ++level, width /= 2, height /= 2) {
+      for (int level = 0; level < max_levels; ++level, width /= 2, height /= 2) {
         if (level > 0) halve(width, height);
         add_blocks(level, width, height);
       }
@@ -183,7 +183,7 @@ void Check::measure(int first, int last) {
 }
 
 void Check::add(const Check& other) {
-  for (int l = 0; l < most_levels; ++l)
+  for (int l = 0; l < max_levels; ++l)
     blocks[l].insert(blocks[l].end(), other.blocks[l].begin(), other.blocks[l].end());
   for (int c = 0; c < 3; ++c) negative[c] += other.negative[c];
   out.windows += other.out.windows;
@@ -203,7 +203,7 @@ double mean_of_flattest(std::vector<BlockDetail>& found, double BlockDetail::*fl
 }
 
 void Check::finish() {
-  for (int l = 0; l < most_levels; ++l) {
+  for (int l = 0; l < max_levels; ++l) {
     auto& found = blocks[l];
     if (found.size() < least_blocks) continue;
     out.measured_over_model[l] = mean_of_flattest(found, &BlockDetail::across, &BlockDetail::diagonal);
@@ -212,10 +212,10 @@ void Check::finish() {
   const auto share = [](long long of, long long all) {
     return all == 0 ? 0 : static_cast<double>(of) / static_cast<double>(all);
   };
-  for (int c = 0; c < 3; ++c) out.share_negative[c] = share(negative[c], out.windows);
-  out.share_without_signal = share(without_signal, out.windows);
+  for (int c = 0; c < 3; ++c) out.fraction_negative[c] = share(negative[c], out.windows);
+  out.fraction_without_signal = share(without_signal, out.windows);
   const long long columns = raw.value.width / 2, rows = raw.value.height / 2;
-  out.share_saturated = share(saturated, 4 * columns * rows);
+  out.fraction_saturated = share(saturated, 4 * columns * rows);
 }
 
 }  // namespace
@@ -234,28 +234,28 @@ NoiseCheck check_noise(const RawElectronsView& raw, const RawNoise& noise, Execu
   return band[0].out;
 }
 
-std::array<double, most_levels> variance_scale_of(const NoiseCheck& check) {
+std::array<double, max_levels> variance_scale_of(const NoiseCheck& check) {
   const auto ratio = [&check](int l) {
     return std::max(check.measured_over_model[l].value_or(1), check.across_over_model[l].value_or(1));
   };
-  std::array<double, most_levels> scale{};
-  for (int l = 0; l < most_levels; ++l) {
-    const double own = ratio(l), coarser = l + 1 < most_levels ? std::min(1.0, ratio(l + 1)) : own;
+  std::array<double, max_levels> scale{};
+  for (int l = 0; l < max_levels; ++l) {
+    const double own = ratio(l), coarser = l + 1 < max_levels ? std::min(1.0, ratio(l + 1)) : own;
     const double both = (own + std::max(own, coarser)) / 2;
-    scale[l] = both < least_ratio ? std::max(both, 0.01) : 1;
+    scale[l] = both < min_ratio ? std::max(both, 0.01) : 1;
   }
   return scale;
 }
 
 std::vector<NoiseRemark> remarks_on(const NoiseCheck& check) {
   std::vector<NoiseRemark> out;
-  const auto* const negative = std::max_element(check.share_negative.begin(), check.share_negative.end());
+  const auto* const negative = std::max_element(check.fraction_negative.begin(), check.fraction_negative.end());
   if (*negative > 0.01) {
     constexpr std::array<const char*, 3> names{"red", "green", "blue"};
     out.push_back({NoiseFinding::black_suspicious,
                    fmt::format("the black level is suspicious: {:.0f} % of the {} means lie below it by more than 4 "
                                "standard deviations; the pedestal or the dark charge is too high, measure them anew",
-                               100 * *negative, names[negative - check.share_negative.begin()])});
+                               100 * *negative, names[negative - check.fraction_negative.begin()])});
   }
   double least = 1, most_of_least = 0;
   bool measured = false;
@@ -265,7 +265,7 @@ std::vector<NoiseRemark> remarks_on(const NoiseCheck& check) {
     least = std::min(least, *ratio);
     measured = true;
   }
-  if (least < least_ratio) {
+  if (least < min_ratio) {
     out.push_back({NoiseFinding::noise_below_model,
                    fmt::format("the noise is suspicious: {:.2f} times the variance its model expects; the raw was "
                                "denoised or compressed before, or the gain or the read noise is wrong: calibrate them",
@@ -277,13 +277,13 @@ std::vector<NoiseRemark> remarks_on(const NoiseCheck& check) {
                                "read noise is wrong: calibrate them",
                                most_of_least)});
   }
-  if (check.windows > 0 && check.share_without_signal > 0.999) {
+  if (check.windows > 0 && check.fraction_without_signal > 0.999) {
     out.push_back({NoiseFinding::all_dark,
                    "no part of the picture rises above its dark charge: expose longer, or take the lens cap off"});
   }
-  if (check.share_saturated > 0.99) {
+  if (check.fraction_saturated > 0.99) {
     out.push_back({NoiseFinding::all_saturated,
-                   fmt::format("{:.1f} % of the sites are saturated: expose less", 100 * check.share_saturated)});
+                   fmt::format("{:.1f} % of the sites are saturated: expose less", 100 * check.fraction_saturated)});
   }
   return out;
 }

@@ -71,9 +71,9 @@ std::optional<Scatter> scatter_of(const Plane<double>& means) {
 
 tl::unexpected<Error> too_little(const Plane<double>& means, PlaneView<const float> pixels) {
   return fail(ErrorCode::insufficient,
-              "line noise cannot be separated from " + std::to_string(pixels.width) + " x " + std::to_string(pixels.height) +
-                  " pixels: expected 16 lines of 4 finite values at least, found " + std::to_string(means.width()) +
-                  " lines or too few values; use a larger area");
+              "line noise cannot be separated from " + std::to_string(pixels.width) + " x " +
+                  std::to_string(pixels.height) + " pixels: expected 16 lines of 4 finite values at least, found " +
+                  std::to_string(means.width()) + " lines or too few values; use a larger area");
 }
 
 /// The group means and their scatter.
@@ -179,7 +179,7 @@ Result<LineOffsets> line_offsets_of_frame(PlaneView<const float> charge_e, Lines
   out.line_std_e = std::sqrt(line_e2);
   out.measured_std_e = std::sqrt(error_e2);
   out.gain = share(line_e2, line_e2 + error_e2);
-  if (options.least_std_e > 0 && (out.line_std_e < options.least_std_e || out.gain < 0.5)) {
+  if (options.min_std_e > 0 && (out.line_std_e < options.min_std_e || out.gain < 0.5)) {
     out.residual_std_e = out.line_std_e;
     return out;
   }

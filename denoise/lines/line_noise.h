@@ -39,7 +39,7 @@ struct FrameLineOptions {
   int reach = 8;                      // lines of the same colours to either side that a line is compared with, 1 to 64
   /// If the measured value is less than this, or the gain is below 0.5, no line is compared: no offsets are returned,
   /// and the residual is the lines' own noise. Comparing takes most of the time.
-  double least_std_e = 0;
+  double min_std_e = 0;
 };
 
 /// Measures offsets in the image itself: each line against its neighbours of the same colours,

@@ -39,7 +39,7 @@ void complete(ChromaStarts& starts) {
   starts.least = *std::min_element(starts.start.begin(), starts.start.end());
   starts.most = *std::max_element(starts.start.begin(), starts.start.end());
   const auto tiles = static_cast<std::size_t>(starts.columns) * static_cast<std::size_t>(starts.rows);
-  for (int level = 0; level < most_levels; ++level) {
+  for (int level = 0; level < max_levels; ++level) {
     for (int y = 0; y < starts.rows; ++y) {
       for (int x = 0; x < starts.columns; ++x) {
         float least = 2;
@@ -54,7 +54,7 @@ void complete(ChromaStarts& starts) {
   }
 }
 
-void share_row(const ChromaStarts& starts, int level, int grid, int y, std::span<float> out) {
+void fraction_row(const ChromaStarts& starts, int level, int grid, int y, std::span<float> out) {
   const Place v = place_of(y, grid, starts.rows);
   const float* const upper = starts.start.data() + v.first * starts.columns;
   const float* const lower = starts.start.data() + v.second * starts.columns;

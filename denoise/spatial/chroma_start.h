@@ -30,6 +30,6 @@ int start_of(double mean_signal_e, double mean_dark_e, double variance_e2);
 void complete(ChromaStarts& starts);
 
 /// Computes the fraction of coarser levels in the chroma of `level`, for a row of cells of level `grid`.
-void share_row(const ChromaStarts& starts, int level, int grid, int y, std::span<float> out);
+void fraction_row(const ChromaStarts& starts, int level, int grid, int y, std::span<float> out);
 
 }  // namespace lowlux::denoise

@@ -182,7 +182,7 @@ std::size_t FrameMemory::bytes(int max_width, int max_height, int threads, bool 
   return sizeof(float) * layout.lay_out(nullptr) + cells + padded_cells +
          sizeof(std::int32_t) * workers * static_cast<std::size_t>(max_width) +
          layout.patches.size() * (sizeof(PatchMemory) + static_cast<std::size_t>(extent.width)) +
-         workers * (sizeof(ThreadMemory) + sizeof(SearchMemory)) + extent.starts * (sizeof(float) + most_levels) +
+         workers * (sizeof(ThreadMemory) + sizeof(SearchMemory)) + extent.starts * (sizeof(float) + max_levels) +
          sizeof(FrameMemory);
 }
 
@@ -203,7 +203,7 @@ FrameMemory::FrameMemory(int max_width, int max_height, int threads, bool best)
   chroma_.resize(patches.size() * width);
   for (std::size_t i = 0; i < patches.size(); ++i) patches[i].chroma = chroma_.data() + i * width;
   starts.resize(extent.starts);
-  has_chroma.resize(extent.starts * most_levels);
+  has_chroma.resize(extent.starts * max_levels);
 }
 
 }  // namespace lowlux::denoise

@@ -60,7 +60,7 @@ struct UpMemory {
   Scratch scratch;
   rows::RowScratch up{};
   float* coarse = nullptr;
-  float* share = nullptr;  // fraction at the coarse level, see share_row()
+  float* share = nullptr;  // fraction at the coarse level, see fraction_row()
   float* finer = nullptr;  // the same fraction at the next finer level
 };
 
@@ -101,7 +101,7 @@ struct FrameLayout {
 
   int columns;  // cells of the largest frame
   int rows;
-  std::array<PyramidLevel, most_levels> level{};
+  std::array<PyramidLevel, max_levels> level{};
   PlaneSet difference;  // of the size of level 1
   std::vector<ThreadMemory> thread;
   std::vector<SearchMemory> search;  // one for each thread

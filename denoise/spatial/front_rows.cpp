@@ -85,7 +85,7 @@ HWY_INLINE void colour_variances(const VarianceRow& in, float* scratch, int row,
       store(hn::Add(shared, load(in.raw_e[k][9] + i)), sums[1] + i);
     }
     const VF scale = constant(in.gain[k] * in.gain[k] / 16), steady = constant(in.variance_e2[k]);
-    const VF least = constant(in.least_e[k]);
+    const VF least = constant(in.min_e[k]);
     for (int i = 0; i < in.cells; i += n) {
       VF both = hn::Zero(Floats());
       for (const float* const sum : sums) {

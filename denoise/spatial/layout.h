@@ -8,14 +8,14 @@
 namespace lowlux::denoise {
 
 inline constexpr int block = 8;             // cells, each way
-inline constexpr int most_levels = 5;       // of the pyramid
+inline constexpr int max_levels = 5;        // of the pyramid
 inline constexpr int largest_side = 65536;  // sites
 inline constexpr int tile = 64;             // cells at the finest level, each way
 
 /// Returns the number of pyramid levels of a mosaic of columns x rows cells: the coarsest holds at least one block.
 constexpr int levels_of(int columns, int rows) {
   int levels = 1;
-  while (levels < most_levels && (block << levels) <= std::min(columns, rows)) ++levels;
+  while (levels < max_levels && (block << levels) <= std::min(columns, rows)) ++levels;
   return levels;
 }
 

@@ -15,7 +15,7 @@ constexpr int step = 2;                                      // cells from one p
 constexpr int below = rows::search_reach + rows::patch - 1;  // rows that patches found from one row extend down
 
 rows::ResidualOfPatches left_by(PlaneKind kind, FoundBy found_by) {
-  const PatchShares shares = patch_shares(kind, found_by);
+  const PatchShares shares = patch_fractions(kind, found_by);
   return {shares.trace, shares.squares, shares.other};
 }
 

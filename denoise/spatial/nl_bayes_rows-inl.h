@@ -202,7 +202,7 @@ HWY_INLINE void covariance(const float (*patches)[cells], int count, float (*out
 }
 
 /// Smallest variance relative to the trace of C: keeps the inverse within float precision.
-constexpr float least_variance = 1e-6f;
+constexpr float min_variance = 1e-6f;
 
 /// Inverts by Gauss-Jordan in place a symmetric matrix whose eigenvalues are at least `least`: then so are its pivots,
 /// except for rounding.
@@ -277,7 +277,7 @@ HWY_INLINE Filtered filter(int count, float variance, const ResidualOfPatches& l
   covariance(at.pilot, count, at.matrix);
   float power = 0;
   for (int k = 0; k < cells; ++k) power += at.matrix[k][k];
-  const float v = std::max(variance, least_variance * power);
+  const float v = std::max(variance, min_variance * power);
   const Gains gains = to_filter(v, at.matrix);
   const auto n = static_cast<float>(count);
   const float trust = std::min(1.0f, n * gains.trace / cells);

@@ -54,7 +54,7 @@ struct Shrink {
     in.blocks = (at.width - block) / step + 1;
     in.step = step;
     for (const PlaneKind kind : {PlaneKind::luma, PlaneKind::chroma}) {
-      const ResidualShares shares = residual_shares(kind, pass, step, l, frame.levels);
+      const ResidualShares shares = residual_fractions(kind, pass, step, l, frame.levels);
       in.left[kind == PlaneKind::luma ? 0 : 1] = {shares.kept, shares.other, shares.mean};
     }
     in.chroma = planes_of(frame, l) == 4 ? chroma : nullptr;
@@ -161,7 +161,7 @@ struct Recompose {
       const ScratchUse use(m.scratch);
       for (int y = first; y < last; ++y) {
         if (!frame.starts.everywhere(l) && !frame.starts.nowhere(l)) {
-          share_row(frame.starts, l, l, y, {m.share, static_cast<std::size_t>(fine.width)});
+          fraction_row(frame.starts, l, l, y, {m.share, static_cast<std::size_t>(fine.width)});
         }
         for (int p = 0; p < 4; ++p) row(p, y, m);
       }
@@ -169,11 +169,11 @@ struct Recompose {
   }
 };
 
-/// Computes share_row() for residual variances. @param finer as long as `share`
-void residual_share_row(const ChromaStarts& starts, int level, int y, std::span<float> share, float* finer) {
-  share_row(starts, level, level + 1, y, share);
+/// Computes fraction_row() for residual variances. @param finer as long as `share`
+void residual_fraction_row(const ChromaStarts& starts, int level, int y, std::span<float> share, float* finer) {
+  fraction_row(starts, level, level + 1, y, share);
   if (level == 0) return;
-  share_row(starts, level - 1, level + 1, y, {finer, share.size()});
+  fraction_row(starts, level - 1, level + 1, y, {finer, share.size()});
   constexpr auto more = static_cast<float>(as_finest - 1);
   for (std::size_t x = 0; x < share.size(); ++x) share[x] = 1 - (1 - share[x]) * (1 + more * finer[x]);
 }
@@ -221,7 +221,7 @@ void add_residuals(const PassFrame& frame) {
           rows::smooth_row(up_row(coarse.residual, p, y, width / 2, height / 2), m.up, m.coarse);
           std::fill(m.share, m.share + width, p == 0 ? 0.0f : 1.0f);
           if (p != 0 && !frame.starts.nowhere(l)) {
-            residual_share_row(frame.starts, l, y, {m.share, static_cast<std::size_t>(width)}, m.finer);
+            residual_fraction_row(frame.starts, l, y, {m.share, static_cast<std::size_t>(width)}, m.finer);
           }
           if (p == 0 || !frame.starts.nowhere(l)) rows::add_residual_row(own, m.share, width, m.coarse);
           std::memcpy(own, m.coarse, width * sizeof(float));

@@ -15,7 +15,7 @@ struct PassFrame {
   const ChromaStarts& starts;
   int levels;
   Workers workers;
-  std::array<double, most_levels> variance_scale{1, 1, 1, 1, 1};  // see DenoiseOptions
+  std::array<double, max_levels> variance_scale{1, 1, 1, 1, 1};  // see DenoiseOptions
 };
 
 /// Computes the coarser planes and variances from those of level 0.

@@ -13,7 +13,7 @@ constexpr int ring_windows = 40;  // 14 x 14 sites less 6 x 6, in windows of 4
 
 /// Returns the limit for the sum of the squares of 40 Poisson-like windows over their variance: five standard
 /// deviations above its mean.
-double most_spread(double variance_e2) { return ring_windows + 5 * std::sqrt(ring_windows * (2 + 1 / variance_e2)); }
+double max_spread(double variance_e2) { return ring_windows + 5 * std::sqrt(ring_windows * (2 + 1 / variance_e2)); }
 
 struct Search {
   PlaneView<const float> raw;
@@ -65,8 +65,8 @@ struct Search {
     const Surroundings s = around(x, y);
     const double one = std::max(s.mean, floor_e) + variance_e2;
     const double variance = one * (1 + 1.0 / ring_windows), excess = own - s.mean, u = excess / variance;
-    if (!(excess > 0) || variance * ((1 + u) * std::log1p(u) - u) < least_significance) return false;
-    if (s.spread / one > most_spread(one)) return false;
+    if (!(excess > 0) || variance * ((1 + u) * std::log1p(u) - u) < min_significance) return false;
+    if (s.spread / one > max_spread(one)) return false;
     double brightest = value(x, y) - s.site[0];
     for (int i = 1; i < 4; ++i) brightest = std::max(brightest, value(x + i % 2, y + i / 2) - s.site[i]);
     return excess - brightest > 2.5 * std::sqrt(0.75 * variance);
@@ -100,7 +100,7 @@ struct Band {
     for (const float w : windows) mean += static_cast<double>(w) / ring_windows;
     for (const float w : windows) spread += (w - mean) * (w - mean);
     const double one = std::max(mean, search.floor_e) + search.variance_e2;
-    return spread / one <= 1.001 * most_spread(one) + 1;
+    return spread / one <= 1.001 * max_spread(one) + 1;
   }
 
   void run(int first, int last) const {
@@ -125,7 +125,7 @@ struct Band {
       in.variance_e2 = static_cast<float>(search.variance_e2);
       in.inner = memory.sums[0];
       in.outer = memory.sums[1];
-      in.significance = static_cast<float>(0.999 * least_significance);  // for rounding: is_source decides in double
+      in.significance = static_cast<float>(0.999 * min_significance);  // for rounding: is_source decides in double
       const int found = rows::bright_windows(in, memory.found);
       for (int i = 0; i < found; ++i) {
         if (may_be_alone(in, memory.found[i]) && search.is_source(memory.found[i], y))

@@ -16,7 +16,7 @@ namespace lowlux::denoise {
 /// Minimum significance of a source: V h(t / V) with h(u) = (1 + u) ln(1 + u) - u, t the sum of a 2x2 window less its
 /// expected value and V its variance. By Bennett's inequality, flat noise exceeds it with a probability below exp(-13);
 /// for normal noise it is 5.1 standard deviations, 1.7e-7, and there are four windows for each cell.
-inline constexpr double least_significance = 13;
+inline constexpr double min_significance = 13;
 
 /// Minimum distance in sites from each side of a source's window to the border of the frame.
 inline constexpr int source_margin = 6;

@@ -24,7 +24,7 @@ enum class PlaneKind : unsigned char { luma, chroma };
 /// own fine structure to G3 and up2: one quarter of their kept variance counts. `other` is measured on white noise by
 /// tests/denoise/flat_noise: within 3 % on the finest level, within a third on coarser ones, which are a tenth of the
 /// total. Cross-covariances between levels are included in that of the finest.
-constexpr ResidualShares residual_shares(PlaneKind kind, int pass, int step, int level, int levels) {
+constexpr ResidualShares residual_fractions(PlaneKind kind, int pass, int step, int level, int levels) {
   struct Other {
     float finest;
     float coarser;
@@ -56,7 +56,7 @@ enum class FoundBy : unsigned char { luma, all_planes };
 /// for chroma, `squares` does, and `trace` is measured on flat frames. `other` includes three terms for luma: white
 /// noise leaves 12e-6 and 74e-6; false point sources add 1e-5 of V on average, although in one place in ten megapixels;
 /// and G has a seventh more than the sum of its planes, as luma and chroma of one cell covary.
-constexpr PatchShares patch_shares(PlaneKind kind, FoundBy found_by) {
+constexpr PatchShares patch_fractions(PlaneKind kind, FoundBy found_by) {
   if (kind == PlaneKind::chroma) return {0.08f, 0.6f, 0};
   return {0.21f, 0.5f, found_by == FoundBy::luma ? 86e-6f : 22e-6f};
 }

@@ -42,7 +42,7 @@ void pack_row(const PackRow& in, const PackedRow& out);
 struct VarianceRow {
   const float* raw_e[3][10];  // read from 4 cells before to 4 cells after
   int cells;
-  float least_e[3];  // floor of the local mean
+  float min_e[3];  // floor of the local mean
   float variance_e2[3];
   float gain[3];
 };

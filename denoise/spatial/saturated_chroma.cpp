@@ -26,7 +26,7 @@ void over_holes(int count, const Hole& hole, const Blend& blend) {
   }
 }
 
-constexpr int widest = 1 << (most_levels - 1);  // cells of a tile, each way
+constexpr int widest = 1 << (max_levels - 1);  // cells of a tile, each way
 
 /// Fill that works on tiles, each a cell of the coarsest level. In `value[0]`, plane 0 holds the fraction of valid
 /// cells, the others their mean chroma, in tiles that hold saturated cells and in adjacent ones: no others are read.
@@ -91,17 +91,19 @@ struct Fill {
   }
 
   void pull(int level, int first, int last, int y) const {
-    const float *const upper_share = value(level - 1, 0, 2 * y), *const lower_share = value(level - 1, 0, 2 * y + 1);
+    const float *const upper_fraction = value(level - 1, 0, 2 * y), *const lower_fraction =
+                                                                        value(level - 1, 0, 2 * y + 1);
     float* const share = value(level, 0, y);
     for (int x = first; x < last; ++x) {
-      share[x] = 0.25f * (upper_share[2 * x] + upper_share[2 * x + 1] + lower_share[2 * x] + lower_share[2 * x + 1]);
+      share[x] = 0.25f * (upper_fraction[2 * x] + upper_fraction[2 * x + 1] + lower_fraction[2 * x] +
+                          lower_fraction[2 * x + 1]);
     }
     for (int p = 1; p < 4; ++p) {
       const float *const upper = value(level - 1, p, 2 * y), *const lower = value(level - 1, p, 2 * y + 1);
       float* const out = value(level, p, y);
       for (int x = first; x < last; ++x) {
-        const float sum = upper_share[2 * x] * upper[2 * x] + upper_share[2 * x + 1] * upper[2 * x + 1] +
-                          lower_share[2 * x] * lower[2 * x] + lower_share[2 * x + 1] * lower[2 * x + 1];
+        const float sum = upper_fraction[2 * x] * upper[2 * x] + upper_fraction[2 * x + 1] * upper[2 * x + 1] +
+                          lower_fraction[2 * x] * lower[2 * x] + lower_fraction[2 * x + 1] * lower[2 * x + 1];
         out[x] = share[x] > 0 ? 0.25f * sum / share[x] : 0.0f;
       }
     }

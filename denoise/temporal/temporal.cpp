@@ -20,8 +20,8 @@ using rows::blocks_of_strip;
 using rows::motion_block;
 using rows::sites_of_strip;
 
-constexpr double largest_share = 1e6;  // relative variance of a history without value
-constexpr double most_light = 1e6;     // ratio, up or down, beyond which a history has no value
+constexpr double largest_fraction = 1e6;  // relative variance of a history without value
+constexpr double max_light = 1e6;         // ratio, up or down, beyond which a history has no value
 
 constexpr int rounded_up(int n, int unit) { return (n + unit - 1) / unit * unit; }
 
@@ -38,7 +38,7 @@ struct StripMemory {
   for (const double saturation : noise.saturation_e) good = good && saturation > 0;
   for (const double variance : noise.variance_e2) good = good && within(variance, 0, largest_value_e);
   for (const double dark : noise.dark_mean_e) good = good && within(dark, 0, largest_value_e);
-  return good && within(options.most_frames, 2, 256);
+  return good && within(options.max_frames, 2, 256);
 }
 
 /// State that is kept between frames, sized for the largest one.
@@ -77,15 +77,15 @@ struct Frame {
   int columns = (raw.value.width + motion_block - 1) / motion_block;  // number of blocks
   int rows = (raw.value.height + motion_block - 1) / motion_block;
 
-  float least_weight() const { return 1 / static_cast<float>(options.most_frames); }
+  float min_weight() const { return 1 / static_cast<float>(options.max_frames); }
   std::array<const float*, motion_block> raw_rows(int x, int y, StripMemory& strip) const;
   std::size_t colour_of(int site) const { return static_cast<std::size_t>(colour_at(raw.phase, site % 2, site / 2)); }
-  double share_now(double share, const std::array<const float*, 2>& sums, int width, int height) const;
+  double fraction_now(double share, const std::array<const float*, 2>& sums, int width, int height) const;
   void rescale(int y, StripMemory& strip) const;
   void find(int y, const MotionThresholds& at, StripMemory& strip) const;
   bool has_moved(int x, int y) const;
   long long update(int y, PlaneView<float> out, StripMemory& strip) const;
-  void put_shares(int y, PlaneView<float> map) const;
+  void put_fractions(int y, PlaneView<float> map) const;
   void take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const;
 };
 
@@ -107,7 +107,7 @@ std::array<const float*, motion_block> Frame::raw_rows(int x, int y, StripMemory
 /// times the raw value's variance before, over that now. Both come from the block's mean of each colour: a site's own
 /// value would make the weights of values depend on their noise.
 /// @param sums  of the block's columns over even and odd rows, in the light of this frame
-double Frame::share_now(double share, const std::array<const float*, 2>& sums, int width, int height) const {
+double Frame::fraction_now(double share, const std::array<const float*, 2>& sums, int width, int height) const {
   std::array<double, 3> sum{}, count{};
   for (int y = 0; y < 2; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -123,7 +123,7 @@ double Frame::share_now(double share, const std::array<const float*, 2>& sums, i
     before += count[c] * variance_of(memory.noise, c, std::min(sum[c] / count[c] / light, largest_value_e));
     now += count[c] * variance_of(noise, c, sum[c] / count[c]);
   }
-  return std::min(share * light * light * before / now, largest_share);
+  return std::min(share * light * light * before / now, largest_fraction);
 }
 
 void Frame::rescale(int y, StripMemory& strip) const {
@@ -138,16 +138,16 @@ void Frame::rescale(int y, StripMemory& strip) const {
       rows::scale_mean(in, strip.sums);
     }
     float& share = memory.share.at(x, y);
-    share =
-        static_cast<float>(share_now(static_cast<double>(share), {strip.sums[0] + of_strip, strip.sums[1] + of_strip},
-                                     std::min(motion_block, raw.value.width - left), in.rows));
+    share = static_cast<float>(fraction_now(static_cast<double>(share),
+                                            {strip.sums[0] + of_strip, strip.sums[1] + of_strip},
+                                            std::min(motion_block, raw.value.width - left), in.rows));
   }
 }
 
 void Frame::find(int y, const MotionThresholds& at, StripMemory& strip) const {
   rows::MotionStrip in{};
   in.red_is_odd = red_column(raw.phase) == 1;
-  in.least_weight = least_weight();
+  in.min_weight = min_weight();
   in.noise = noise;
   in.alone = {static_cast<float>(at.alone.z), static_cast<float>(at.alone.few)};
   in.beside = {static_cast<float>(at.beside.z), static_cast<float>(at.beside.few)};
@@ -194,7 +194,7 @@ long long Frame::update(int y, PlaneView<float> out, StripMemory& strip) const {
     for (int b = 0; b < std::min(blocks_of_strip, columns - x); ++b) {
       float& share = memory.share.at(x + b, y);
       const bool starts = first || has_moved(x + b, y);
-      const float k = starts ? 1.0f : std::max(share / (1 + share), least_weight());
+      const float k = starts ? 1.0f : std::max(share / (1 + share), min_weight());
       share = starts ? 1.0f : (1 - k) * (1 - k) * share + k * k;
       weight[b] = k;
       moved += starts ? 1 : 0;
@@ -216,7 +216,7 @@ long long Frame::update(int y, PlaneView<float> out, StripMemory& strip) const {
 }
 
 /// Writes the variance ratios of a row of blocks, for each cell.
-void Frame::put_shares(int y, PlaneView<float> map) const {
+void Frame::put_fractions(int y, PlaneView<float> map) const {
   constexpr int cells = motion_block / 2;
   for (int v = cells * y; v < std::min(cells * (y + 1), map.height); ++v) {
     for (int u = 0; u < map.width; ++u) map.at(u, v) = memory.share.at(u / cells, y);
@@ -244,7 +244,7 @@ void Frame::take_in(const Workers& workers, PlaneView<float> out, PlaneView<floa
     for (int y = top; y < bottom; ++y) {
       if (!first && y + 1 < bottom - 1) compare(y + 1, strip);
       memory.count[thread] += update(y, out, strip);
-      if (shares.data != nullptr) put_shares(y, shares);
+      if (shares.data != nullptr) put_fractions(y, shares);
     }
   });
 }
@@ -265,7 +265,7 @@ TemporalMean::~TemporalMean() = default;
 void TemporalMean::reset() { state_->memory.empty = true; }
 
 double TemporalMean::run(const RawElectronsView& raw, const RawNoise& noise, double light,
-                         const TemporalOptions& options, PlaneView<float> mean_e, PlaneView<float> variance_share,
+                         const TemporalOptions& options, PlaneView<float> mean_e, PlaneView<float> variance_fraction,
                          Executor& executor) {
   Memory& memory = state_->memory;
   assert(raw.value.width >= 2 && raw.value.height >= 2);
@@ -274,9 +274,9 @@ double TemporalMean::run(const RawElectronsView& raw, const RawNoise& noise, dou
   assert(mean_e.width == raw.value.width && mean_e.height == raw.value.height);
   assert(usable(noise, light, options));
   const bool known = memory.width == raw.value.width && memory.height == raw.value.height && memory.phase == raw.phase;
-  const bool worthless = light > most_light || light < 1 / most_light;
+  const bool worthless = light > max_light || light < 1 / max_light;
   const Frame frame{memory, raw, site_noise(noise, raw.phase), light, options, memory.empty || !known || worthless};
-  frame.take_in({executor, static_cast<int>(memory.strip.size())}, mean_e, variance_share);
+  frame.take_in({executor, static_cast<int>(memory.strip.size())}, mean_e, variance_fraction);
   memory.empty = false;
   memory.width = raw.value.width;
   memory.height = raw.value.height;

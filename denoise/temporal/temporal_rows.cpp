@@ -92,7 +92,7 @@ HWY_INLINE void add_group(const SiteNoise& noise, int c, VF weight, const OfColo
   const VF sites = hn::Add(own.count, hn::Reverse2(f, own.count));
   const VF told =
       hn::Add(hn::Add(mean, hn::Reverse2(f, mean)), hn::Mul(sites, constant(noise.dark_e[c] + noise.variance_e2[c])));
-  const VF least = constant(noise.least_e2[c]), all = hn::Max(told, hn::Mul(hn::Max(sites, constant(1)), least));
+  const VF least = constant(noise.min_e2[c]), all = hn::Max(told, hn::Mul(hn::Max(sites, constant(1)), least));
   const VF by_all = hn::Div(constant(1), all), by_x = hn::Mul(sites, by_all);
   const VF weights = hn::Mul(own.count, by_x), counted = hn::Mul(weights, by_x);
   const VF read = hn::Mul(steady, counted);
@@ -187,7 +187,7 @@ HWY_INLINE MF moved_at(const Statistics& s, const Threshold& at) {
 void FindMotion(const MotionStrip& in, std::uint8_t* moved) {
   HWY_ALIGN float weights[cells_of_strip];
   for (int b = 0; b < blocks_of_strip; ++b) {
-    const float best = in.share[b] / (1 + in.share[b]), weight = best > in.least_weight ? best : in.least_weight;
+    const float best = in.share[b] / (1 + in.share[b]), weight = best > in.min_weight ? best : in.min_weight;
     for (int i = 4 * b; i < 4 * b + 4; ++i) weights[i] = weight;
   }
   Sums sums;

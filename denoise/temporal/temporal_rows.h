@@ -14,7 +14,7 @@ inline constexpr int sites_of_strip = motion_block * blocks_of_strip;
 struct SiteNoise {
   float dark_e[3];
   float variance_e2[3];
-  float least_e2[3];      // floor of the variance estimated from a mean
+  float min_e2[3];        // floor of the variance estimated from a mean
   float saturation_e[3];  // without dark charge; at most 1e9, the limit of values
 
   bool operator==(const SiteNoise&) const = default;
@@ -33,7 +33,7 @@ struct MotionStrip {
   bool inside[motion_block];          // whether the frame has the row
   int width;                          // sites of the strip that the frame has
   bool red_is_odd;
-  float least_weight;  // smallest weight of the newest frame
+  float min_weight;    // smallest weight of the newest frame
   const float* share;  // variance ratio of each block, before this frame
   SiteNoise noise;
   Threshold alone;

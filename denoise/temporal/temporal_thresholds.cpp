@@ -50,7 +50,7 @@ rows::SiteNoise site_noise(const RawNoise& noise, BayerPhase phase) {
   for (int c = 0; c < 3; ++c) {
     out.dark_e[c] = static_cast<float>(dark_e[c]);
     out.variance_e2[c] = static_cast<float>(noise.variance_e2[c]);
-    out.least_e2[c] = static_cast<float>(0.5 * noise.variance_e2[c] + 0.3 * dark_e[c] + 0.02);
+    out.min_e2[c] = static_cast<float>(0.5 * noise.variance_e2[c] + 0.3 * dark_e[c] + 0.02);
     // Subtract as the kernels do: a saturated value stays saturated in every bit.
     out.saturation_e[c] = static_cast<float>(std::min(noise.saturation_e[c], largest_value_e)) - out.dark_e[c];
   }
@@ -60,7 +60,7 @@ rows::SiteNoise site_noise(const RawNoise& noise, BayerPhase phase) {
 double variance_of(const rows::SiteNoise& noise, std::size_t colour, double signal_e) {
   const double told =
       signal_e + static_cast<double>(noise.dark_e[colour]) + static_cast<double>(noise.variance_e2[colour]);
-  return std::max(told, static_cast<double>(noise.least_e2[colour]));
+  return std::max(told, static_cast<double>(noise.min_e2[colour]));
 }
 
 }  // namespace lowlux::denoise

@@ -20,7 +20,7 @@ static_assert(static_cast<int>(StageWork::standard) == LOWLUX_STAGE_STEP_STANDAR
               static_cast<int>(StageWork::frames_before) == LOWLUX_STAGE_STEP_FRAMES_BEFORE &&
               static_cast<int>(StageWork::plain) == LOWLUX_STAGE_STEP_PLAIN);
 
-constexpr int default_threads = 2, most_threads = 8;
+constexpr int default_threads = 2, max_threads = 8;
 constexpr std::uint64_t default_memory_limit = std::uint64_t{1} << 30;
 constexpr std::size_t longest_stride = std::size_t{1} << 24;
 
@@ -63,7 +63,7 @@ class DmaAccess {
 
 Result<void> check(const lowlux_stage_settings& s) {
   const auto wrong = [](const char* message) { return fail(ErrorCode::invalid_argument, message); };
-  if (s.threads < 0 || s.threads > most_threads) return wrong("a stage has 1 to 8 threads, or 0 for 2");
+  if (s.threads < 0 || s.threads > max_threads) return wrong("a stage has 1 to 8 threads, or 0 for 2");
   if (s.most_denoise < 0 || s.most_denoise > LOWLUX_STAGE_LEVEL_HIGH) return wrong("no such level of noise reduction");
   if (s.look != LOWLUX_STAGE_LOOK_CAMERA && s.look != LOWLUX_STAGE_LOOK_EYE) return wrong("no such look");
   if (s.tone != 0 && s.tone != 1) return wrong("no such tone curve");

@@ -18,14 +18,14 @@ constexpr double longest_ms = 1e9;
 constexpr double climb_slack = 1.1;
 constexpr double hope = 0.5;  // fraction of its prediction that the time of more expensive work moves to
 constexpr int forget_frames = 100;
-constexpr int most_patience = 8;
+constexpr int max_patience = 8;
 
 }  // namespace
 
-StageBudget::StageBudget(bool eye, bool temporal) : share_(eye ? eye_ms : camera_ms), temporal_(temporal) {
+StageBudget::StageBudget(bool eye, bool temporal) : fraction_(eye ? eye_ms : camera_ms), temporal_(temporal) {
   if (!temporal) return;
   for (std::size_t i = 0; i <= static_cast<std::size_t>(StageWork::draft); ++i) {
-    share_[i] += eye ? eye_temporal_ms : camera_temporal_ms;
+    fraction_[i] += eye ? eye_temporal_ms : camera_temporal_ms;
   }
 }
 
@@ -51,7 +51,7 @@ void StageBudget::learn_from(StageWork before, StageWork now, StageWork asked) {
     trial_frames_ = 0;
   } else if (now > before) {
     const bool gave_up = trial_frames_ && now != asked;  // and less was not requested
-    if (gave_up) patience_ = std::min(2 * patience_, most_patience);
+    if (gave_up) patience_ = std::min(2 * patience_, max_patience);
     trial_frames_.reset();
   } else if (trial_frames_ && ++*trial_frames_ == forget_frames) {
     patience_ = 1;
@@ -66,7 +66,7 @@ void StageBudget::took(StageWork work, double ms) {
   measured_[own] = true;
   for (std::size_t i = 0; i < works; ++i) {
     if (i == own) continue;
-    const double expected = ms_[own] * share_[i] / share_[own];
+    const double expected = ms_[own] * fraction_[i] / fraction_[own];
     if (!(ms_[i] > 0)) ms_[i] = expected;
     // A first frame is slow for reasons outside of the relative times.
     if (!measured_[i]) ms_[i] = std::min(ms_[i], expected);

@@ -49,7 +49,7 @@ class StageBudget {
   static constexpr std::size_t works = 5;
   void learn_from(StageWork before, StageWork now, StageWork asked);
 
-  std::array<double, works> share_;  // relative times, at any scale
+  std::array<double, works> fraction_;  // relative times, at any scale
   std::array<double, works> ms_{};
   std::array<bool, works> measured_{};
   StageWork chosen_ = StageWork::plain;

@@ -28,8 +28,8 @@ struct DefectRect {
   int x = 0, y = 0, width = 1, height = 1;
 };
 
-/// Defect lists of more than 1 / max_named_share of the active pixels are rejected as implausible.
-inline constexpr std::int64_t max_named_share = 16;
+/// Defect lists of more than 1 / max_named_fraction of the active pixels are rejected as implausible.
+inline constexpr std::int64_t max_named_fraction = 16;
 
 /// Holds the corrections a source asks for, each applied after black (and dark) have been subtracted.
 struct RawCorrections {

@@ -20,12 +20,12 @@ struct DarkFrame {
   PerSite<double> noise_std_dn{};        // temporal noise of a pixel of the image without light
   PerSite<double> added_variance_dn2{};  // mean over the pixels of the variance that subtracting `dn` adds
 
-  int frames = 0;            // dark frames used
-  int settings = 0;          // number of exposure times and temperatures among them
-  double scale = 1;          // dark charge of the image over that of the longest or warmest darks used
-  double doubling_c = 0;     // degrees over which dark charge is assumed to double; 0 if no temperature was scaled
-  double noise_share = 0;    // mean of added variance over the image's own variance without light
-  double pattern_share = 1;  // fraction of each pixel's deviation that was kept; 1: all of it
+  int frames = 0;               // dark frames used
+  int settings = 0;             // number of exposure times and temperatures among them
+  double scale = 1;             // dark charge of the image over that of the longest or warmest darks used
+  double doubling_c = 0;        // degrees over which dark charge is assumed to double; 0 if no temperature was scaled
+  double noise_fraction = 0;    // mean of added variance over the image's own variance without light
+  double pattern_fraction = 1;  // fraction of each pixel's deviation that was kept; 1: all of it
   std::optional<PerSite<double>> masked_dn;  // masked pixels of the image, if they set the level of `dn`
   std::vector<std::string> warnings;
 };

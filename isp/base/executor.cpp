@@ -58,7 +58,7 @@ struct PoolExecutor::State {
   std::atomic<unsigned> generation = 0;
   std::atomic<bool> stopping = false;
 
-  void run_share(int worker, int n, void (*work)(void*, int), void* work_context) const {
+  void run_fraction(int worker, int n, void (*work)(void*, int), void* work_context) const {
     const int width = static_cast<int>(workers.size()) + 1;
     for (int i = worker; i < n; i += width) work(work_context, i);
   }
@@ -74,7 +74,7 @@ struct PoolExecutor::State {
     for (unsigned seen = 0;; ++seen) {
       wait(work_ready, [&] { return stopping || generation != seen; });
       if (stopping) return;
-      run_share(worker, tasks, fn, context);
+      run_fraction(worker, tasks, fn, context);
       if (--busy_workers == 0) {
         const std::lock_guard lock(mutex);
         work_done.notify_one();
@@ -121,7 +121,7 @@ void PoolExecutor::run(int n, void (*fn)(void* context, int index), void* contex
     ++s.generation;
   }
   s.work_ready.notify_all();
-  s.run_share(0, n, fn, context);
+  s.run_fraction(0, n, fn, context);
   s.wait(s.work_done, [&] { return s.busy_workers == 0; });
 }
 

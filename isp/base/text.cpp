@@ -10,7 +10,7 @@ namespace lowlux {
 namespace {
 
 constexpr std::size_t longest_wanted = 64;  // bytes: bounds the work on untrusted input
-constexpr std::size_t most_matches = 3;
+constexpr std::size_t max_matches = 3;
 
 std::size_t common_beginning(std::string_view a, std::string_view b) {
   const std::size_t shorter = std::min(a.size(), b.size());
@@ -62,7 +62,7 @@ std::vector<std::string_view> near_matches(std::string_view wanted, std::span<co
   }
   std::sort(near.begin(), near.end());
   std::vector<std::string_view> out;
-  for (std::size_t i = 0; i < std::min(near.size(), most_matches); ++i) out.push_back(known[std::get<2>(near[i])]);
+  for (std::size_t i = 0; i < std::min(near.size(), max_matches); ++i) out.push_back(known[std::get<2>(near[i])]);
   return out;
 }
 

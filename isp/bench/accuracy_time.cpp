@@ -16,8 +16,8 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int most_repeats = 1000000;
-constexpr double most_copied_mp = 16;  // 64 MB: beyond any cache
+constexpr int max_repeats = 1000000;
+constexpr double max_copied_mp = 16;  // 64 MB: beyond any cache
 
 double now_s(bool wall_clock) {
   timespec now{};
@@ -35,7 +35,7 @@ double time_of(const Work& work, const AccuracyTiming& timing) {
     work();
     ++repeats;
     taken = now_s(timing.wall_clock) - start;
-  } while (taken < timing.least_s && repeats < most_repeats);
+  } while (taken < timing.min_s && repeats < max_repeats);
   return taken / repeats;
 }
 
@@ -83,9 +83,9 @@ std::vector<AccuracyRow> measure(const AccuracyGroup& group, const AccuracyTimin
   assert(timing.rounds >= 1);
   const std::size_t count = group.levels.size();
   std::vector<std::vector<double>> s_per_mp(count), ratio(count);
-  double most_mp = 0;
-  for (const AccuracyLevel& level : group.levels) most_mp = std::max(most_mp, level.megapixels);
-  const std::vector<float> from(static_cast<std::size_t>(std::min(most_mp, most_copied_mp) * 1e6) + 1, 1.0f);
+  double max_mp = 0;
+  for (const AccuracyLevel& level : group.levels) max_mp = std::max(max_mp, level.megapixels);
+  const std::vector<float> from(static_cast<std::size_t>(std::min(max_mp, max_copied_mp) * 1e6) + 1, 1.0f);
   std::vector<float> to(from.size());
   const auto copy = [&] { std::memcpy(to.data(), from.data(), from.size() * sizeof(float)); };
   for (int round = -1; round < timing.rounds; ++round) {

@@ -44,7 +44,7 @@ struct AccuracyRow {
 /// Parameters of timing the levels.
 struct AccuracyTiming {
   int rounds = 7;           // number of rounds, each of which runs memcpy, then every level once
-  double least_s = 0;       // a level is repeated within a round for at least this time
+  double min_s = 0;         // a level is repeated within a round for at least this time
   bool wall_clock = false;  // false: the CPU time of the calling thread
 };
 

@@ -14,8 +14,10 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::array registry{
-    BenchStage{"denoise", "Noise reduction on the mosaic: error against time, compared with other methods", run_denoise_bench},
-    BenchStage{"photon-sampling", "Counts of photons: samplers compared with the Poisson distribution", run_photon_sampling_bench},
+    BenchStage{"denoise", "Noise reduction on the mosaic: error against time, compared with other methods",
+               run_denoise_bench},
+    BenchStage{"photon-sampling", "Counts of photons: samplers compared with the Poisson distribution",
+               run_photon_sampling_bench},
     BenchStage{"simulation-effects", "Effects of a simulated sensor, left out", run_simulation_effects_bench},
     BenchStage{"black-point", "Black by the number of dark pixels", run_black_point_bench},
     BenchStage{"noise-fit", "System gain and noise, of flats and of pictures", run_noise_fit_bench},

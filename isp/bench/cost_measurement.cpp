@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "isp/bench/pace.h"
+#include "isp/bench/speed_probe.h"
 #include "isp/bench/timing_frame.h"
 #include "isp/metrics/statistics.h"
 #include "isp/pipeline/budget/frame_sample.h"
@@ -52,7 +52,7 @@ DevelopOptions options_for(std::optional<Level> level) {
 /// Holds the median time of each step of developing, in units of the pace before it.
 class Steps {
  public:
-  static Result<Steps> of(const RawFrame& frame, const DevelopOptions& options, int count, Pace& pace,
+  static Result<Steps> of(const RawFrame& frame, const DevelopOptions& options, int count, SpeedProbe& pace,
                           Executor& executor) {
     Steps out;
     for (int i = 0; i < count; ++i) {
@@ -91,7 +91,7 @@ double megapixels_of(const FrameSize& size) { return 1e-6 * size.width * size.he
 /// Measures all parts at one size, one pass at a time.
 class Measurement {
  public:
-  Measurement(std::size_t size, std::shared_ptr<const DisplayTarget> display, Pace& pace, Executor& executor)
+  Measurement(std::size_t size, std::shared_ptr<const DisplayTarget> display, SpeedProbe& pace, Executor& executor)
       : size_(size), display_(std::move(display)), pace_(pace), executor_(executor) {
     for (const TimingLight& light : lights) frames_.push_back(timing_frame(sizes[size].frame, light));
     for (std::size_t light = 0; light < defective_.size(); ++light) {
@@ -214,7 +214,7 @@ class Measurement {
 
   std::size_t size_;
   std::shared_ptr<const DisplayTarget> display_;
-  Pace& pace_;
+  SpeedProbe& pace_;
   Executor& executor_;
   std::vector<RawFrame> frames_;                       // one for each light
   std::array<RawFrame, 2> defective_;                  // first two frames with defects
@@ -228,7 +228,7 @@ Result<CostModel> measure_cost(Executor& executor, const std::function<void(doub
   auto target = display_target({.display_cd_m2 = 5}, executor);
   if (!target) return tl::make_unexpected(target.error());
   const auto display = std::make_shared<const DisplayTarget>(*std::move(target));
-  Pace pace;
+  SpeedProbe pace;
   std::vector<Measurement> all;
   for (std::size_t i = 0; i < sizes.size(); ++i) all.emplace_back(i, display, pace, executor);
   for (int pass = 0; pass < passes; ++pass) {

@@ -69,7 +69,7 @@ void GamutBins::add(std::span<const Lab> colours) {
 std::uint64_t GamutBins::counted() const { return std::accumulate(count_.begin(), count_.end(), std::uint64_t{0}); }
 
 std::vector<bool> GamutBins::kept() const {
-  const double least = std::max(gamut_least_pixels, gamut_least_share * static_cast<double>(counted()));
+  const double least = std::max(gamut_min_pixels, gamut_min_fraction * static_cast<double>(counted()));
   std::vector<bool> out(count_.size());
   std::transform(count_.begin(), count_.end(), out.begin(), [&](std::uint32_t n) { return n >= least; });
   return out;

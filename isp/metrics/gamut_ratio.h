@@ -13,12 +13,12 @@ namespace lowlux::isp {
 /// is beyond 500.
 inline constexpr int gamut_reach = 1024;
 
-/// A bin counts as part of a gamut if it holds at least this many pixels and gamut_least_share of those counted.
-inline constexpr double gamut_least_pixels = 3;
+/// A bin counts as part of a gamut if it holds at least this many pixels and gamut_min_fraction of those counted.
+inline constexpr double gamut_min_pixels = 3;
 /// A bin counts as part of a gamut if it holds at least this fraction of the pixels counted: the larger of the two
-/// bounds decides. The bound of gamut_least_pixels alone would have no effect in large images, the fraction alone none
+/// bounds decides. The bound of gamut_min_pixels alone would have no effect in large images, the fraction alone none
 /// in images below 0.3 megapixels.
-inline constexpr double gamut_least_share = 1e-5;
+inline constexpr double gamut_min_fraction = 1e-5;
 
 /// Histogram of the colours of pixels: bins of one unit of a* by one unit of b*; 16 MB.
 class GamutBins {

@@ -145,8 +145,8 @@ Temporary make_temporary(const std::string& directory) {
   if (all.swept.insert(directory).second) sweep(directory, prefix);
   std::string stem = directory;
   stem.append("/").append(prefix).append(std::to_string(getpid())).append("-");
-  constexpr int most_tries = 1000;  // on some file systems no file ever seems to have a name
-  for (int tries = 0; tries < most_tries; ++tries) {
+  constexpr int max_tries = 1000;  // on some file systems no file ever seems to have a name
+  for (int tries = 0; tries < max_tries; ++tries) {
     Temporary out;
     out.name = stem + std::to_string(all.made++) + ".part";
     out.descriptor = open(out.name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);

@@ -31,7 +31,8 @@ struct DenoiseChoice {
 /// Describes noise reduction in which previous frames of the stream take part: see denoise::TemporalMean.
 struct TemporalReduction {
   denoise::TemporalOptions options;
-  double light = 1;     // light on this frame over that on the previous one, by exposure time
+  double light =
+      1;  // unit of this frame over that of the previous one: exposure time, and the gain where frames measure it
   bool restart = true;  // nothing is known of previous frames
 };
 
@@ -43,7 +44,7 @@ struct NoiseRegions {
   std::vector<std::optional<denoise::Level>> level;  // rows x columns; absent: only subtract lines and dark charge
 };
 
-/// Holds the level of a frame where it is decided together with everything else: see plan_effects.h.
+/// Holds the level of a frame where it is decided together with everything else: see step_plan.h.
 struct DecidedLevel {
   std::optional<denoise::Level> level;
   std::optional<NoiseRegions> regions;  // regions with levels of their own

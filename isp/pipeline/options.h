@@ -24,8 +24,8 @@ struct WhiteBalanceChoice {
 };
 
 /// Describes how much is done of the steps that the options leave open: the search for defects, row and column noise,
-/// the level of noise reduction, dark charge, the change for a display. See plan_effects.h.
-struct EffectsChoice {
+/// the level of noise reduction, dark charge, the change for a display. See step_plan.h.
+struct ProcessingGoal {
   bool all = false;  // every step, with Level::high
   /// States the CIEDE2000 that the omitted steps may change, as visible_noise.h measures it. With a budget it may be
   /// absent: then the most accurate plan that fits is wanted, Level::best included.
@@ -48,7 +48,7 @@ struct DevelopOptions {
   DenoiseChoice denoise;
   LookChoice look;
   std::shared_ptr<const DisplayTarget> display;  // set: sRGB codes are changed for it
-  std::optional<EffectsChoice> effects;          // absent: each option above decides for itself
+  std::optional<ProcessingGoal> effects;         // absent: each option above decides for itself
 };
 
 /// Holds the width and height of the developed image, before orientation.
@@ -59,7 +59,7 @@ struct PictureSize {
 PictureSize picture_size(const RawDn& raw, const DevelopOptions& options);
 
 /// Checks that the options fit together: float samples require a linear space and no tone curve, and XYZ and camera RGB
-/// require float samples. Error: invalid_argument.
+/// require float samples; a change for a display requires sRGB codes of 8 or 16 bits. Error: invalid_argument.
 Result<void> check_options(const DevelopOptions& options);
 
 }  // namespace lowlux::isp

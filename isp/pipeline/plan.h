@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "isp/pipeline/budget/plan_effects.h"
+#include "isp/pipeline/budget/step_plan.h"
 #include "isp/pipeline/finished/display_target.h"
 #include "isp/pipeline/noise_reduction.h"
 #include "isp/pipeline/options.h"
@@ -17,8 +17,8 @@ namespace lowlux::isp {
 
 /// Holds everything decided about one frame before a pixel is processed.
 struct DevelopPlan {
-  DevelopOptions options;              // as requested
-  std::optional<EffectsPlan> effects;  // set where DevelopOptions::effects requested it
+  DevelopOptions options;           // as requested
+  std::optional<StepPlan> effects;  // set where DevelopOptions::effects requested it
   RawLevels levels;
   Rendering rendering;
   NoiseReduction noise_reduction;

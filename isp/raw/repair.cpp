@@ -20,7 +20,7 @@ constexpr double noise_range = 4.5;  // range of eight normal deviates that one 
 constexpr double max_shared = 0.1, max_shared_green = 0.07;
 // For a centred Gaussian of 1.5 pixels FWHM: exp(-1/2 / 0.637^2) less a quarter of it for the neighbour across. At
 // green sites the mean of red and blue counts, to which cameras respond half as strongly.
-constexpr double star_share = 0.2187, star_share_green = 0.11;
+constexpr double star_fraction = 0.2187, star_fraction_green = 0.11;
 constexpr double shared_deviation = 0.44;  // of the neighbours' mean excess, in standard deviations of a pixel
 constexpr double certain = 3.5;            // required margin in standard deviations
 
@@ -60,7 +60,7 @@ double shared_excess(const PlaneView<const std::uint16_t>& dn, int x, int y) {
 }
 
 // Data of the defect test that depends on the frame, not on the pixel.
-struct Judge {
+struct Criterion {
   PlaneView<const std::uint16_t> dn;
   BayerPhase phase;
   PerSite<double> black_dn;
@@ -74,14 +74,14 @@ struct Judge {
   bool noise_is_known() const { return noise.shot_dn > 0 && noise.black_std_dn > 0; }
 };
 
-double least_distance(const Judge& judge, int x, int y, const Neighbours& n, int nearer) {
+double min_distance(const Criterion& judge, int x, int y, const Neighbours& n, int nearer) {
   const double range = n.high - n.low;
   if (!judge.noise_is_known()) return range_factor * range + judge.floor_dn;
   const double sigma = std::sqrt(judge.variance(x, y, nearer));
   return detail_factor * std::max(0.0, range - noise_range * sigma) + known_noise_factor * sigma;
 }
 
-double most_shared(const Judge& judge, int x, int y, double own) {
+double most_shared(const Criterion& judge, int x, int y, double own) {
   const bool green = colour_at(judge.phase, x, y) == CfaColour::green;
   const double cap = (green ? max_shared_green : max_shared) * own;
   if (!judge.noise_is_known()) return cap;
@@ -90,21 +90,21 @@ double most_shared(const Judge& judge, int x, int y, double own) {
     variance += judge.variance(x + dx, y + dy, judge.dn.at(x + dx, y + dy)) / 4;
   }
   const double scatter = shared_deviation * std::sqrt(variance);
-  return std::min(cap, (green ? star_share_green : star_share) * own - certain * scatter);
+  return std::min(cap, (green ? star_fraction_green : star_fraction) * own - certain * scatter);
 }
 
-bool is_defect(const Judge& judge, int x, int y) {
+bool is_defect(const Criterion& judge, int x, int y) {
   const Neighbours n = eight_same_colour(judge.dn, x, y);
   const int value = judge.dn.at(x, y);
   const bool hot = value > n.high;
   const double beyond = hot ? value - n.high : n.low - value;
-  if (beyond <= least_distance(judge, x, y, n, hot ? n.high : n.low)) return false;
+  if (beyond <= min_distance(judge, x, y, n, hot ? n.high : n.low)) return false;
   const double own = excess(judge.dn, x, y);
   return shared_excess(judge.dn, x, y) * (own > 0 ? 1 : -1) < most_shared(judge, x, y, std::fabs(own));
 }
 
 // Returns lower bounds on the distances that is_defect() requires, with a margin for rounding.
-defect_rows::Bounds least_bounds(const Judge& judge, int x, int y) {
+defect_rows::Bounds min_bounds(const Criterion& judge, int x, int y) {
   constexpr double nearly = 0.999;
   defect_rows::Bounds bounds;
   if (judge.noise_is_known()) {
@@ -121,10 +121,10 @@ defect_rows::Bounds least_bounds(const Judge& judge, int x, int y) {
 }
 
 // Tests a run of the row with the fast kernel first, so that the slower exact test runs on few pixels.
-void judge_row(const Judge& judge, int y, std::vector<Pixel>& found) {
+void judge_row(const Criterion& judge, int y, std::vector<Pixel>& found) {
   std::array<std::uint8_t, 512> marked;
   constexpr int most = marked.size();
-  const defect_rows::Bounds bounds = least_bounds(judge, 2, y);
+  const defect_rows::Bounds bounds = min_bounds(judge, 2, y);
   for (int first = 2; first < judge.dn.width - 2; first += most) {
     const int count = std::min(most, judge.dn.width - 2 - first);
     defect_rows::mark_outliers({judge.dn.row(y - 2) + first, judge.dn.row(y) + first, judge.dn.row(y + 2) + first},
@@ -148,7 +148,7 @@ std::vector<Pixel> find_defects(const RawDn& raw, const BlackPoint& black, const
   const PlaneView<const std::uint16_t> dn = raw.dn.view().crop(a.x, a.y, a.width, a.height);
   double range = 0;
   for (int site = 0; site < 4; ++site) range = std::max(range, white_at(raw, site) - black.pedestal_dn[site]);
-  Judge judge{dn, raw.phase, black.pedestal_dn, noise, noise_factor * noise.black_std_dn + floor_of_white * range};
+  Criterion judge{dn, raw.phase, black.pedestal_dn, noise, noise_factor * noise.black_std_dn + floor_of_white * range};
   if (judge.noise_is_known()) judge.floor_dn = known_noise_factor * noise.black_std_dn;
   std::vector<std::vector<Pixel>> found(executor.width());
   for_each_band(executor, a.height, [&](RowBand band, int index) {
@@ -166,7 +166,7 @@ std::optional<std::vector<Pixel>> named_defects(const RawDn& raw, const std::vec
     const std::int64_t width = std::min(d.x + d.width, raw.active.width) - std::max(d.x, 0);
     const std::int64_t height = std::min(d.y + d.height, raw.active.height) - std::max(d.y, 0);
     area += std::max<std::int64_t>(width, 0) * std::max<std::int64_t>(height, 0);
-    if (area * max_named_share > std::int64_t{raw.active.width} * raw.active.height) return std::nullopt;
+    if (area * max_named_fraction > std::int64_t{raw.active.width} * raw.active.height) return std::nullopt;
   }
   std::vector<Pixel> pixels;
   for (const DefectRect& d : defects) {

@@ -119,7 +119,7 @@ std::optional<PerSite<double>> electrons_at_white(const RawDn& raw, const NoiseP
     const bool bayer = raw.layout == SensorLayout::bayer;
     const int colour = bayer ? static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)) : 0;
     electrons[site] = 1.0 / noise.scale[colour];
-    if (!(electrons[site] >= 1 && electrons[site] <= most_electrons_at_white)) return std::nullopt;
+    if (!(electrons[site] >= 1 && electrons[site] <= max_electrons_at_white)) return std::nullopt;
   }
   return electrons;
 }

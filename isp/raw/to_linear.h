@@ -24,11 +24,11 @@ void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, RgbView<float> o
 
 /// The largest full wells hold about 1e6 electrons; raw data with reduced noise counts as if it held a thousand times
 /// as many.
-inline constexpr double most_electrons_at_white = 1e9;
+inline constexpr double max_electrons_at_white = 1e9;
 
 /// Returns the electrons that one FractionOfWhite stands for, per CFA site. With shot noise alone the variance of a
 /// fraction x is x / electrons, so this is 1 / NoiseProfile::scale. Returns nullopt where that is not within 1 to
-/// most_electrons_at_white.
+/// max_electrons_at_white.
 std::optional<PerSite<double>> electrons_at_white(const RawDn& raw, const NoiseProfile& noise);
 
 /// Converts fractions of white to electrons.

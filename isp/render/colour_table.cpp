@@ -17,7 +17,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int first_cells = 32, first_cells_of_levels = 16, most_cells = 256, most_levels_per_octave = 64;
+constexpr int first_cells = 32, first_cells_of_levels = 16, max_cells = 256, max_levels_per_octave = 64;
 constexpr int octaves = 18;  // one level in each: 86 KiB
 constexpr int floats_per_node = 4;
 constexpr double widest_margin = 1.0 / 16;
@@ -64,7 +64,7 @@ bool homogeneous(const RgbMap& map, double limit) {
   });
 }
 
-double share_at(const ColourTable& t, double node) { return node * (1 + 3 * t.margin) / t.cells - t.margin; }
+double fraction_at(const ColourTable& t, double node) { return node * (1 + 3 * t.margin) / t.cells - t.margin; }
 
 /// Returns the sum R + G + B of a level, which may lie between two levels.
 double sum_at(const ColourTable& t, double level) {
@@ -85,7 +85,7 @@ table_rows::Table view_of(const ColourTable& t) {
     out.grey[c] = static_cast<float>(t.grey[c]);
   }
   out.margin = static_cast<float>(t.margin);
-  out.nodes_per_share = static_cast<float>(t.cells / (1 + 3 * t.margin));
+  out.nodes_per_fraction = static_cast<float>(t.cells / (1 + 3 * t.margin));
   out.cells = t.cells;
   out.levels = t.levels;
   out.first_level_bits = std::bit_cast<std::int32_t>(std::ldexp(1.0f, t.first_level_log2));
@@ -105,7 +105,7 @@ bool fill(ColourTable& t, const RgbMap& map, double brightest_sum) {
     for (int y = 0; y <= t.cells; ++y) {
       for (int x = 0; x <= t.cells; ++x, to += floats_per_node) {
         if (x + y > t.cells + 1) continue;
-        const double red = share_at(t, x), green = share_at(t, y);
+        const double red = fraction_at(t, x), green = fraction_at(t, y);
         const Vector3 seen = map.per_sum({red, green, 1 - red - green}, sum);
         if (!fits_floats(seen)) return false;
         for (int c = 0; c < 3; ++c) to[c] = static_cast<float>(seen[c]);
@@ -132,7 +132,7 @@ Samples middles(const ColourTable& t, double limit, double beyond) {
   for (int level = 0; level < levels; ++level) {
     for (int y = 0; y < t.cells; ++y) {
       for (int x = 0; x < t.cells; ++x) {
-        const double red = share_at(t, x + 0.5), green = share_at(t, y + 0.5);
+        const double red = fraction_at(t, x + 0.5), green = fraction_at(t, y + 0.5);
         const Vector3 shares{red, green, 1 - red - green};
         if (red < 0 || green < 0 || shares[2] < 0) continue;
         const double brightest = limit / largest_of(shares);
@@ -194,7 +194,7 @@ std::optional<ColourTable> finer(const ColourTable& t, const RgbMap& map, const 
     next.cells *= 2;
   }
   const std::size_t bytes = nodes_of(next.cells, next.levels) * floats_per_node * sizeof(float);
-  if (next.cells > most_cells || next.levels_per_octave > most_levels_per_octave || bytes > request.largest_bytes) {
+  if (next.cells > max_cells || next.levels_per_octave > max_levels_per_octave || bytes > request.largest_bytes) {
     return std::nullopt;
   }
   return next;

@@ -68,8 +68,8 @@ struct Kernel {
 
   /// Returns the table's result for a colour within it, for a sum of 1.
   HWY_INLINE Colour looked_up(const Colour& in, VF sum) const {
-    const VF per_sum = hn::Div(constant(table.nodes_per_share), sum);
-    const VF first = constant(table.margin * table.nodes_per_share);
+    const VF per_sum = hn::Div(constant(table.nodes_per_fraction), sum);
+    const VF first = constant(table.margin * table.nodes_per_fraction);
     const Place x = place_of(hn::MulAdd(in.c[0], per_sum, first), table.cells);
     const Place y = place_of(hn::MulAdd(in.c[1], per_sum, first), table.cells);
     const VF side = constant(static_cast<float>(table.cells + 1));

@@ -11,8 +11,8 @@ struct Table {
   float luminance[3];
   float grey[3];
   float margin;
-  float nodes_per_share;  // nodes between fractions of 0 and 1
-  std::int32_t cells;     // in either direction
+  float nodes_per_fraction;  // nodes between fractions of 0 and 1
+  std::int32_t cells;        // in either direction
   std::int32_t levels;
   std::int32_t first_level_bits;  // bit pattern of the float
   float levels_per_bit;

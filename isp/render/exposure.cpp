@@ -26,7 +26,7 @@ std::string_view name_of(ExposureRule rule) {
       return "black-noise";
     case ExposureRule::no_gain:
       return "no-gain";
-    case ExposureRule::most_gain:
+    case ExposureRule::max_gain:
       return "most-gain";
     case ExposureRule::no_signal:
       break;
@@ -50,7 +50,7 @@ AutoExposure auto_exposure_reordering(std::span<float> luminance, double noise_f
   const AutoExposure others[] = {
       {ev_to_reach(options.highlight, bright) + options.shoulder_ev, ExposureRule::highlights},
       {ev_to_reach(options.black_noise, noise_floor), ExposureRule::black_noise},
-      {options.max_ev, ExposureRule::most_gain},
+      {options.max_ev, ExposureRule::max_gain},
   };
   for (const AutoExposure& other : others) {
     if (other.ev < chosen.ev) chosen = other;

@@ -12,7 +12,7 @@ enum class ExposureRule : std::uint8_t {
   highlights,   // the brightest blocks reach as far into the shoulder as allowed
   black_noise,  // more gain would raise the noise of black too far
   no_gain,      // the frame is bright enough as it is: 0 EV
-  most_gain,    // the largest gain allowed
+  max_gain,     // the largest gain allowed
   no_signal,    // no signal above the noise of black: 0 EV
 };
 

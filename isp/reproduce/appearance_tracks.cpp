@@ -107,7 +107,7 @@ Result<AppearanceTracks> tracks_by_colour(std::string_view model, const TrackRea
   for (const double level : levels_cd_m2) {
     ViewingConditions conditions;
     conditions.white_cd_m2 = level;
-    conditions.adaptation_cd_m2 = reading.adaptation_share * level;
+    conditions.adaptation_cd_m2 = reading.adaptation_fraction * level;
     conditions.white = equal_energy;
     conditions.shin_units = reading.shin_units;
     const auto map = found->at(conditions);
@@ -129,7 +129,7 @@ Result<AppearanceTracks> tracks_by_spectrum(std::string name, const TrackReading
   options.variant = reading.variant;
   options.gamma_fixed = gamma_fixed;
   for (const double level : levels_cd_m2) {
-    const auto eye = spectral_eye(reading.adaptation_share * level, options);
+    const auto eye = spectral_eye(reading.adaptation_fraction * level, options);
     if (!eye) return tl::make_unexpected(eye.error());
     for (std::size_t chip = 0; chip < chips.size(); ++chip) {
       const auto seen = chip_seen(*eye, reflected_power(chips[chip].spectrum));

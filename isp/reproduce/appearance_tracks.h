@@ -22,7 +22,7 @@ std::vector<NamedSpectrum> track_chips();
 
 /// Chooses among interpretations that the thesis leaves open.
 struct TrackReading {
-  double adaptation_share = 1;  // ratio of the luminance of the adaptation field to that of the white
+  double adaptation_fraction = 1;  // ratio of the luminance of the adaptation field to that of the white
   ShinUnits shin_units = ShinUnits::luminance_as_is;
   EntropyVariant variant = EntropyVariant::rendering;
 };

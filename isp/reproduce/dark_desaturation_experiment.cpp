@@ -33,7 +33,7 @@ Result<Law> check_law(const ThesisCamera& camera, const std::vector<Patch>& patc
   for (const double level : sensor_levels) {
     for (const Patch& patch : patches) {
       const Xyz signal = scaled(xyz_of_charge(camera, patch.signal_e), level);
-      const auto alpha = signal_share(signal, dark);
+      const auto alpha = signal_fraction(signal, dark);
       const auto measured = xy_of(sum(signal, dark)), truth = xy_of(signal), black = xy_of(dark);
       if (!alpha || !measured || !truth || !black) {
         return fail(ErrorCode::insufficient, patch.name + " has no chromaticity: its X + Y + Z is not positive");

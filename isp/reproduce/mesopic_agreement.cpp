@@ -32,7 +32,7 @@ constexpr std::array<TrackReading, readings> all_readings{{{1, as_is, whites_kep
                                                            {0.2, lux, whites_kept},
                                                            {0.2, lux, printed}}};
 
-static_assert(all_readings[reading_by_lux].shin_units == lux && all_readings[reading_by_lux].adaptation_share == 1 &&
+static_assert(all_readings[reading_by_lux].shin_units == lux && all_readings[reading_by_lux].adaptation_fraction == 1 &&
               all_readings[reading_by_lux].variant == whites_kept);
 
 std::vector<NamedSpectrum> patch_alone() {

@@ -49,7 +49,7 @@ PictureColours colours_of(const BenchPicture& picture, std::size_t most) {
   return out;
 }
 
-Result<ColourMap> eye_at(double white_cd_m2, const Judge& judge) {
+Result<ColourMap> eye_at(double white_cd_m2, const Criterion& judge) {
   const auto model = appearance_model_named(judge.model);
   if (!model) return tl::make_unexpected(model.error());
   ViewingConditions conditions;
@@ -110,7 +110,7 @@ Result<std::vector<PictureColours>> retargeting_pictures(const std::string& fold
 }
 
 Result<std::vector<RetargetScore>> retarget_scores(const std::vector<PictureColours>& pictures, const Showing& showing,
-                                                   const Judge& judge, Executor& executor) {
+                                                   const Criterion& judge, Executor& executor) {
   assert(showing.shown != nullptr);
   auto source = eye_at(showing.source_cd_m2, judge);
   if (!source) return tl::make_unexpected(source.error());

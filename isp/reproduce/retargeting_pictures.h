@@ -33,7 +33,7 @@ Result<std::vector<PictureColours>> retargeting_pictures(const std::string& fold
                                                          Executor& executor);
 
 /// Names the model that judges how alike two images look, and the unit with which Shin's coefficients are looked up.
-struct Judge {
+struct Criterion {
   std::string_view model;
   ShinUnits units = ShinUnits::luminance_as_is;
 };
@@ -54,6 +54,6 @@ struct Showing {
 /// Returns one score for each image.
 /// Errors: those of finding and applying the judge's model.
 Result<std::vector<RetargetScore>> retarget_scores(const std::vector<PictureColours>& pictures, const Showing& showing,
-                                                   const Judge& judge, Executor& executor);
+                                                   const Criterion& judge, Executor& executor);
 
 }  // namespace lowlux::isp

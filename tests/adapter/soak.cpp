@@ -28,9 +28,9 @@ constexpr double longest_call_s = 2;
 // Resident memory may still grow after a fifth of the frames, while rare settings come for the first time. Sanitizers
 // keep what was given back for a while.
 #ifdef LOWLUX_SANITIZED
-constexpr double most_growth_mib = 64;
+constexpr double max_growth_mib = 64;
 #else
-constexpr double most_growth_mib = 16;
+constexpr double max_growth_mib = 16;
 #endif
 
 class Soak {
@@ -54,15 +54,15 @@ class Soak {
       if (chance_.one_in(5)) fault();
       one_frame();
       const double now_mib = frame_ % 64 == 0 ? test::resident_bytes() / (1 << 20) : 0;
-      (frame_ < frames / 5 ? warm_mib : most_mib_) = std::max(frame_ < frames / 5 ? warm_mib : most_mib_, now_mib);
+      (frame_ < frames / 5 ? warm_mib : max_mib_) = std::max(frame_ < frames / 5 ? warm_mib : max_mib_, now_mib);
     }
     release();
     if (test::settled_threads(threads) != threads) fail("threads are left at the end");
-    if (most_mib_ > warm_mib + most_growth_mib) fail("memory grows");
+    if (max_mib_ > warm_mib + max_growth_mib) fail("memory grows");
     std::printf(
         "soak: %d frames, %d of them wrong on purpose, %d configurations, %.0f MiB after a fifth, %.0f at most, "
         "slowest call %.0f ms\n",
-        frames, faults_, configurations_, warm_mib, most_mib_, 1000 * slowest_s_);
+        frames, faults_, configurations_, warm_mib, max_mib_, 1000 * slowest_s_);
   }
 
  private:
@@ -305,7 +305,7 @@ class Soak {
   lowlux_stage_statistics statistics_[stages]{};
   std::uint32_t sequence_ = 0;
   int frame_ = 0, faults_ = 0, configurations_ = 0;
-  double slowest_s_ = 0, most_mib_ = 0;
+  double slowest_s_ = 0, max_mib_ = 0;
 };
 
 }  // namespace

@@ -13,7 +13,7 @@ HWY_BEFORE_NAMESPACE();
 namespace lowlux::draws::HWY_NAMESPACE {
 namespace {
 
-double share_of_open_lanes(float mean) {
+double fraction_of_open_lanes(float mean) {
   constexpr std::uint32_t vectors = 500'000;
   const Row row{0, 0, 0, 0, {12, 34}};
   const auto lanes = static_cast<std::uint32_t>(hn::Lanes(Words()));
@@ -27,13 +27,13 @@ double share_of_open_lanes(float mean) {
 
 TEST(PoissonBracket, LeavesLessThanOneInTwoHundredOpenJustAboveTheChangeOfMethod) {
   for (const float mean : {12.0f, 12.5f, 13.0f, 15.0f, 17.3f, 20.0f}) {
-    EXPECT_LT(share_of_open_lanes(mean), 0.005) << mean;
+    EXPECT_LT(fraction_of_open_lanes(mean), 0.005) << mean;
   }
 }
 
 TEST(PoissonBracket, LeavesLessThanOneInFiveHundredOpenElsewhere) {
   for (const float mean : {0.0f, 1e-6f, 0.01f, 0.5f, 3.0f, 8.0f, 11.99f, 20.5f, 100.0f, 1e3f, 1e4f, 1e5f, 1e6f}) {
-    EXPECT_LT(share_of_open_lanes(mean), 0.002) << mean;
+    EXPECT_LT(fraction_of_open_lanes(mean), 0.002) << mean;
   }
 }
 

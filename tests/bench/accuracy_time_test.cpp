@@ -93,7 +93,7 @@ TEST(AccuracyTime, SpreadIsHalfTheDistanceOfTheQuartilesOverTheMedian) {
 TEST(AccuracyTime, ShortWorkIsRepeatedUntilItTakesLongEnough) {
   int runs = 0;
   const AccuracyGroup group{"g", "e", {{"short", 0, [&] { ++runs; }, 1e-4}}};
-  measure(group, {.rounds = 1, .least_s = 1e-3});
+  measure(group, {.rounds = 1, .min_s = 1e-3});
   EXPECT_GT(runs, 2 * 10);  // two rounds of 1 ms of calls of less than 0.1 ms
 }
 

@@ -115,7 +115,7 @@ TEST(DevelopingStages, RetargetingTablesGainByTheirSize) {
 }
 
 /// Of the pixels of a picture, those that are not as in the other; not a number if that has another size.
-double share_of_other_pixels(const Encoded8& a, const Encoded8& b) {
+double fraction_of_other_pixels(const Encoded8& a, const Encoded8& b) {
   if (a.width() != b.width() || a.height() != b.height()) return std::nan("");
   int others = 0;
   for (int y = 0; y < a.height(); ++y) {
@@ -136,7 +136,7 @@ void expect_pairs(const BenchOutcome& outcome, const std::vector<std::string>& e
     const auto picture = [&](const std::string& id) { return std::ranges::find(outcome.images, id, &BenchImage::id); };
     ASSERT_TRUE(picture(c.before_id) != outcome.images.end() && picture(c.after_id) != outcome.images.end());
     // Noise is everywhere, and so is what each plan makes of it.
-    EXPECT_GT(share_of_other_pixels(picture(c.before_id)->codes, picture(c.after_id)->codes), 0.5) << c.title;
+    EXPECT_GT(fraction_of_other_pixels(picture(c.before_id)->codes, picture(c.after_id)->codes), 0.5) << c.title;
   }
   EXPECT_EQ(pairs, expected);
   EXPECT_EQ(used.size(), outcome.images.size()) << "a picture is in no pair";

@@ -63,7 +63,7 @@ void measure(const Row& row, const calib::PictureNoiseOptions& options, Executor
   if (!row.print) return;
   std::printf("%-15s %5g  a %+6.1f %% +- %4.1f   b %+6.1f %% +- %5.1f   chi2 %4.2f  flat %4.2f  fine/coarse %4.2f\n",
               row.light.name.c_str(), row.mean_e, 100 * a, 100 * found->gain_dn_per_e.standard_error / gain, 100 * b,
-              100 * b_error, found->reduced_chi_square, found->flat_share, found->traces.fine_to_coarse);
+              100 * b_error, found->reduced_chi_square, found->flat_fraction, found->traces.fine_to_coarse);
 }
 
 void print(const char* what, const Tally& t) {
@@ -137,7 +137,7 @@ int main() {
   std::printf("\nlens of sigma 0.9 px, modern small, fewer samples\n");
   for (const std::int64_t samples : {4000, 2000, 1000}) {
     std::printf("%6d ", static_cast<int>(samples));
-    run({"ponomarenko", lights, test::modern_small(), {.most_samples = samples}}, executor);
+    run({"ponomarenko", lights, test::modern_small(), {.max_samples = samples}}, executor);
   }
   return 0;
 }

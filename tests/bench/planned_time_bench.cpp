@@ -9,8 +9,9 @@
 //                             are sampled and go by regions
 // Each frame is planned and developed five times as the command line does it, by the machine's pace of that moment:
 // "wall/pred" is the median of what the wall clock says over what was predicted, and the verdict goes by that clock.
-// The times in the table are for the comparison of plans: a fixed piece of work (isp/bench/pace.h) is timed before each
-// run, and a time is the median of its ratio to that work, in milliseconds of the moment the frame was planned.
+// The times in the table are for the comparison of plans: a fixed piece of work (isp/bench/speed_probe.h) is timed
+// before each run, and a time is the median of its ratio to that work, in milliseconds of the moment the frame was
+// planned.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -24,7 +25,7 @@
 #include <vector>
 
 #include "isp/bench/cost_measurement.h"
-#include "isp/bench/pace.h"
+#include "isp/bench/speed_probe.h"
 #include "isp/metrics/picture_metrics.h"
 #include "isp/metrics/statistics.h"
 #include "isp/pipeline/develop.h"
@@ -75,7 +76,7 @@ class Clock {
   }
 
  private:
-  Pace pace_;
+  SpeedProbe pace_;
   CostModel cost_;
 };
 
@@ -98,7 +99,7 @@ DevelopOptions by_hand(const Way& way) {
 }
 
 /// The least that the planner has to do.
-DevelopOptions least_work() {
+DevelopOptions min_work() {
   DevelopOptions options;
   options.denoise.mode = DenoiseChoice::Mode::automatic;
   options.effects.emplace().tolerance_delta_e = 1000;
@@ -138,7 +139,7 @@ std::vector<Way> exhaustive(Clock& clock, const CostModel& cost, const RawFrame&
   return out;
 }
 
-std::string words_of(const EffectsPlan& plan) {
+std::string words_of(const StepPlan& plan) {
   std::string out(plan.level ? name_of(*plan.level) : "none");
   if (plan.find_defects) out += ", defects";
   if (plan.lines && plan.level) out += ", lines";
@@ -206,13 +207,13 @@ int budgets(std::uint64_t draw, std::uint32_t frames) {
     const auto cost = clock.now();
     const std::vector<Way> ways = exhaustive(clock, *cost, raw.frame, truth);
     Encoded8 made;
-    const double least_s = clock.time(*cost, raw.frame, least_work(), 5, made);
-    const double most_s = std::ranges::max(ways, {}, &Way::seconds).seconds;
+    const double min_s = clock.time(*cost, raw.frame, min_work(), 5, made);
+    const double max_s = std::ranges::max(ways, {}, &Way::seconds).seconds;
     DevelopOptions options;
     options.denoise.mode = DenoiseChoice::Mode::automatic;
     options.effects.emplace().cost = cost;
     options.effects->tolerance_delta_e.reset();
-    const double budget_s = draws.log_uniform(1.3 * least_s, 1.3 * most_s);
+    const double budget_s = draws.log_uniform(1.3 * min_s, 1.3 * max_s);
     options.effects->budget_s = budget_s;
     const Result<Developed> planned = develop(raw.frame, options, executor);
     if (!planned) {
@@ -220,7 +221,7 @@ int budgets(std::uint64_t draw, std::uint32_t frames) {
       std::printf("%3u %.1f MP, refused: %s\n", i, 1e-6 * width * height, planned.error().message.c_str());
       continue;
     }
-    const EffectsPlan& plan = *planned->plan.effects;
+    const StepPlan& plan = *planned->plan.effects;
     const double taken_s = clock.time(*cost, raw.frame, options, 9, made);
     const double error = error_of(made, truth);
     double best = std::numeric_limits<double>::infinity();
@@ -271,7 +272,7 @@ int saved() {
       std::printf("%3u not developed: %s\n", i, done.error().message.c_str());
       return 1;
     }
-    const EffectsPlan& plan = *done->plan.effects;
+    const StepPlan& plan = *done->plan.effects;
     std::vector<double> planned, everything;
     Encoded8 by_plan, with_everything;
     for (int round = 0; round < 3; ++round) {

@@ -1,6 +1,6 @@
 // What the planner of developing rests on.
 //   planner_bench levels   what levels of noise reduction change, beside what is predicted of the noise, on the tuning
-//                          pictures: the figures of isp/pipeline/budget/plan_effects.cpp
+//                          pictures: the figures of isp/pipeline/budget/step_plan.cpp
 //   planner_bench bounds   what they change over the bound that the planner has of it, in 300 drawn parts of the tuning
 //                          pictures at drawn lights, and likewise of the held-out ones
 //   planner_bench truth    what they leave against the noise-free picture, likewise
@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "isp/pipeline/budget/effect_candidates.h"
+#include "isp/pipeline/budget/step_candidates.h"
 #include "isp/pipeline/budget/visible_noise.h"
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/plan/plan_develop.h"
@@ -139,7 +139,7 @@ double quantile(std::vector<double>& values, double share) {
 
 int bounds(PictureSet set) {
   using denoise::Level;
-  constexpr double least_delta_e = 0.22;  // nine tenths of the least tolerance of the planner's promise
+  constexpr double min_delta_e = 0.22;  // nine tenths of the least tolerance of the planner's promise
   constexpr std::array ways{std::optional<Level>(), std::optional(Level::draft), std::optional(Level::standard)};
   std::vector<BenchPicture> pictures;
   for (const std::string_view name : files_of(set)) {
@@ -156,7 +156,7 @@ int bounds(PictureSet set) {
     const Encoded8 best = developed(raw, {Level::high, {}});
     for (std::size_t way = 0; way < ways.size(); ++way) {
       const double seen = seen_difference(developed(raw, {ways[way], {}}), best, executor).percentile95;
-      if (seen >= least_delta_e) found[{part.name, way}].push_back(seen / noise.left_by(ways[way]));
+      if (seen >= min_delta_e) found[{part.name, way}].push_back(seen / noise.left_by(ways[way]));
     }
   }
   constexpr std::array names{"none", "draft", "standard"};

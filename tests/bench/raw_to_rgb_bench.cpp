@@ -81,7 +81,7 @@ Plane<std::uint16_t> scene_mosaic(const Settings& settings, double saturation) {
 }
 
 /// Share of pixels that the gamut move has to change.
-double share_outside(isp::RawToRgb& kernel, const isp::RgbInput& in, SceneLinear& scratch) {
+double fraction_outside(isp::RawToRgb& kernel, const isp::RgbInput& in, SceneLinear& scratch) {
   InlineExecutor one;
   kernel.linear(in, transform(false), scratch.view(), one);
   std::size_t outside = 0;
@@ -259,8 +259,8 @@ int main(int argc, char** argv) {
   }
   const auto stage = std::make_unique<Stage>(settings);
   Shares outside{};
-  outside.saturated = share_outside(stage->kernel, Stage::dn(stage->saturated), stage->planes);
-  outside.natural = share_outside(stage->kernel, Stage::dn(stage->natural), stage->planes);  // planes stay natural
+  outside.saturated = fraction_outside(stage->kernel, Stage::dn(stage->saturated), stage->planes);
+  outside.natural = fraction_outside(stage->kernel, Stage::dn(stage->natural), stage->planes);  // planes stay natural
   std::vector<Task> tasks = tasks_of(*stage);
   time_interleaved(tasks, settings.rounds);
   (settings.json ? print_json : print_table)(*stage, tasks, outside);

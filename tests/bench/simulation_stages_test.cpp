@@ -145,12 +145,12 @@ TEST(EffectChange, NothingIsPredictedOfAllEffectsAndThePlansBlocksAreLookedAt) {
   const Developing developing{rgb_to_xyz(primaries_rec709).value(), {100, 100, 100}};
   const ChangedFrame frame{sensor, {}, developing};
   const std::vector<BlockLevel> blocks{{{50, 60, 40}, {50, 60, 40}, 60}, {{5, 6, 4}, {5, 6, 4}, 6}};
-  EffectPlan plan = plan_keeping(EffectSet::all(), 64, 32);
+  NoiseSourcePlan plan = plan_keeping(NoiseSourceSet::all(), 64, 32);
   EXPECT_EQ(predicted_change(frame, blocks, plan).delta_e, 0);
-  plan.regions.push_back({.kept = EffectSet::all().without(Effect::read_noise)});
+  plan.regions.push_back({.kept = NoiseSourceSet::all().without(Effect::read_noise)});
   plan.region_of_block = {0, 1};
   const PredictedChange expected =
-      predict_change(sensor, {}, developing, blocks[1], EffectSet::all().without(Effect::read_noise));
+      predict_change(sensor, {}, developing, blocks[1], NoiseSourceSet::all().without(Effect::read_noise));
   EXPECT_GT(expected.delta_e, 0);
   EXPECT_EQ(predicted_change(frame, blocks, plan).delta_e, expected.delta_e);
   EXPECT_EQ(predicted_change(frame, blocks, plan).relative_variance, expected.relative_variance);
@@ -177,9 +177,9 @@ double process_cpu_s() {
 
 // What `bench --quick` may take of each stage, in a build that is as fast as the released one.
 #if defined(NDEBUG) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-constexpr double most_cpu_s = 4;
+constexpr double max_cpu_s = 4;
 #else
-constexpr double most_cpu_s = 60;
+constexpr double max_cpu_s = 60;
 #endif
 
 BenchOutcome quickly(Result<BenchOutcome> (*run)(const BenchOptions&)) {
@@ -188,7 +188,7 @@ BenchOutcome quickly(Result<BenchOutcome> (*run)(const BenchOptions&)) {
   options.advance = [&](double more, const std::string&) { share += more; };
   const double start_s = process_cpu_s();
   auto out = run(options);
-  EXPECT_LT(process_cpu_s() - start_s, most_cpu_s);
+  EXPECT_LT(process_cpu_s() - start_s, max_cpu_s);
   EXPECT_TRUE(out) << out.error().message;
   if (!out) return {};
   EXPECT_NEAR(share, 1, 1e-9);

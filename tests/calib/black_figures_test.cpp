@@ -56,7 +56,7 @@ TEST(BlackFigures, OfOneFrameHaveTheErrorOfTheLaw) {
     EXPECT_NEAR(found->deviation_dn[site], 2 * std::sqrt(216), 0.5);
   }
   EXPECT_EQ(found->frames, 1);
-  EXPECT_LT(found->excluded_share, 1e-4);
+  EXPECT_LT(found->excluded_fraction, 1e-4);
 }
 
 TEST(BlackFigures, OfADimDarkAreAsGood) {
@@ -123,7 +123,7 @@ TEST(BlackFigures, LeaveHotPixelsOut) {
   for (int site = 0; site < 4; ++site) {
     EXPECT_NEAR(hot->level_dn[site].value, plain->level_dn[site].value, plain->level_dn[site].standard_error);
   }
-  EXPECT_GT(hot->excluded_share, 1.0 / (32 * 18));
+  EXPECT_GT(hot->excluded_fraction, 1.0 / (32 * 18));
 }
 
 TEST(BlackFigures, RefuseWhatIsNoBlack) {

@@ -141,12 +141,12 @@ TEST(FitColour, CrossValidationExceedsTheFittedErrorOfNoise) {
 TEST(FitColour, RefusesWhatDoesNotDetermineAMatrix) {
   const isp::Xyz white = white_of(daylight());
   auto samples = exact_samples({});
-  const auto few = fit_colour(std::span(samples).first(least_colour_samples - 1), {.white = white});
+  const auto few = fit_colour(std::span(samples).first(min_colour_samples - 1), {.white = white});
   ASSERT_FALSE(few);
   EXPECT_NE(few.error().message.find("needs 17 patches, found 16"), std::string::npos) << few.error().message;
-  EXPECT_TRUE(fit_colour(std::span(samples).first(least_colour_samples), {.white = white}));
-  EXPECT_FALSE(cross_validated(std::span(samples).first(least_colour_samples), {.white = white}));
-  EXPECT_TRUE(cross_validated(std::span(samples).first(least_colour_samples + 1), {.white = white}));
+  EXPECT_TRUE(fit_colour(std::span(samples).first(min_colour_samples), {.white = white}));
+  EXPECT_FALSE(cross_validated(std::span(samples).first(min_colour_samples), {.white = white}));
+  EXPECT_TRUE(cross_validated(std::span(samples).first(min_colour_samples + 1), {.white = white}));
 
   auto grey = samples;
   for (ColourSample& sample : grey) sample.camera_rgb = {sample.reference.y, sample.reference.y, sample.reference.y};

@@ -89,8 +89,8 @@ TEST(DarkFrame, AFewDarksAddTheNoiseThatIsReportedAndNoMoreThanAllowed) {
       const auto a = make_dark_frame(darks_of(bench, {exposure}, n), picture, {});
       const auto b = make_dark_frame(darks_of(bench, {exposure}, n, 5000), picture, {});
       ASSERT_TRUE(a && b) << a.error().message;
-      EXPECT_LE(a->noise_share, 0.1 + 1e-12);
-      EXPECT_EQ(a->pattern_share == 1, n == 16);
+      EXPECT_LE(a->noise_fraction, 0.1 + 1e-12);
+      EXPECT_EQ(a->pattern_fraction == 1, n == 16);
       // Where neither is hot; there a is all noise, and its share of the pixels is a half percent at most.
       double sum = 0, count = 0;
       for (int y = 0; y < bench.height; ++y) {
@@ -119,7 +119,7 @@ TEST(DarkFrame, OneDarkHelpsWhereThereIsAPatternAndNeverHurts) {
     const isp::Exposure exposure{4, 20};
     const auto dark = make_dark_frame(darks_of(bench, {exposure}, 1), picture_of(bench, exposure, 20), {});
     ASSERT_TRUE(dark) << dark.error().message;
-    EXPECT_LE(dark->noise_share, 0.1 + 1e-12);
+    EXPECT_LE(dark->noise_fraction, 0.1 + 1e-12);
     const Plane<float> truth = true_dark_dn(bench, exposure);
     DarkFrame none;  // four figures, as good as can be
     none.dn = truth.clone();
@@ -148,7 +148,7 @@ TEST(DarkFrame, SixteenDarksOfTheSameSettingAreTheirMeanAsItIs) {
   ASSERT_TRUE(dark);
   EXPECT_EQ(dark->frames, 16);
   EXPECT_EQ(dark->scale, 1);
-  EXPECT_NEAR(dark->noise_share, 1.0 / 16, 1e-12);
+  EXPECT_NEAR(dark->noise_fraction, 1.0 / 16, 1e-12);
   EXPECT_TRUE(dark->warnings.empty());
   EXPECT_TRUE(std::equal(dark->dn.data(), dark->dn.data() + dark->dn.size(), groups[0].mean_dn.data()));
 }
@@ -179,7 +179,7 @@ TEST(DarkFrame, ScaledDarksComeCloserToTheTruthThanFourFiguresCould) {
     }
     for (const DefectRect& d : dark->unknown) off -= dark->dn.at(d.x, d.y) - truth.at(d.x, d.y);
     const auto n = static_cast<double>(truth.size());
-    const double error = dark->noise_std_dn[0] * std::sqrt(1 / (8 * n)) + std::sqrt(dark->noise_share / n);
+    const double error = dark->noise_std_dn[0] * std::sqrt(1 / (8 * n)) + std::sqrt(dark->noise_fraction / n);
     EXPECT_NEAR(off / n, 0, 5 * error + c.tolerance * charge / n);
     // 20 % of the charge of 16 e- at least is its spread: 6.5 DN^2. What is left is noise and what shrinking leaves.
     double spread = 0;
@@ -188,7 +188,7 @@ TEST(DarkFrame, ScaledDarksComeCloserToTheTruthThanFourFiguresCould) {
       for (int x = 0; x < 192; ++x) spread += std::pow(truth.at(x, y) - means[site_of(x, y)], 2) / n;
     }
     EXPECT_LT(mean_square(*dark, truth), 0.1 * spread);
-    EXPECT_LE(dark->noise_share, 0.1 + 1e-12);
+    EXPECT_LE(dark->noise_fraction, 0.1 + 1e-12);
   }
 }
 
@@ -285,7 +285,7 @@ TEST(DarkFrame, SaturatedDarksAndRequestsOutOfRangeAreRefused) {
   EXPECT_NE(refusal(bright, bright.frame({4, 20}, 1)).find("saturated"), std::string::npos);
   const RawDn picture = picture_of(small, {4, 20}, 20);
   for (const double share : {0.0, -1.0, 1.1, std::nan("")}) {
-    EXPECT_NE(refusal(small, picture, {.noise_share = share}).find("share of noise"), std::string::npos) << share;
+    EXPECT_NE(refusal(small, picture, {.noise_fraction = share}).find("share of noise"), std::string::npos) << share;
   }
   EXPECT_NE(refusal(small, picture, {.doubling_c = 1}).find("doubling"), std::string::npos);
   EXPECT_FALSE(make_dark_frame({}, picture, {}));

@@ -27,8 +27,8 @@ TEST(DarkStack, MeanAndVarianceAreThoseOfEachPixel) {
   EXPECT_FLOAT_EQ(group->variance_dn2.at(7, 4), (16 + 1 + 25) / 2.0f);
   EXPECT_EQ(group->mean_dn.at(3, 5), 0);
   EXPECT_EQ(group->variance_dn2.at(3, 5), 0);
-  EXPECT_DOUBLE_EQ(group->share_at_zero[3], 1.0 / (17 * 10));
-  EXPECT_EQ(group->share_at_zero[0], 0);
+  EXPECT_DOUBLE_EQ(group->fraction_at_zero[3], 1.0 / (17 * 10));
+  EXPECT_EQ(group->fraction_at_zero[0], 0);
   EXPECT_NEAR(group->row_variance_dn2[0], 21, 1e-9);  // whole frames move: so do all rows
 }
 

@@ -29,8 +29,8 @@ TEST(PairStatistics, OfAFrameAndItsNegativeAreClosedForms) {
     EXPECT_EQ(s.drift_dn, 0);
     EXPECT_NEAR(s.variance_dn2, 4 * n / (2 * (n - 1)), 1e-12);
     EXPECT_NEAR(s.covariance_dn2, -1024.0 / 1023, 1e-12);  // blocks of 32 x 32 sites
-    EXPECT_EQ(s.share_at_zero, 0);
-    EXPECT_EQ(s.share_at_white, 0);
+    EXPECT_EQ(s.fraction_at_zero, 0);
+    EXPECT_EQ(s.fraction_at_white, 0);
   }
 }
 
@@ -71,8 +71,8 @@ TEST(PairStatistics, CountClippedSamplesOfTheActiveAreaOnly) {
   ASSERT_TRUE(found);
   EXPECT_EQ(found->setting.width, 32);
   for (const SiteStatistics& s : found->site) {
-    EXPECT_EQ(s.share_at_zero, 1.0 / 16);
-    EXPECT_EQ(s.share_at_white, 15.0 / 16);
+    EXPECT_EQ(s.fraction_at_zero, 1.0 / 16);
+    EXPECT_EQ(s.fraction_at_white, 15.0 / 16);
   }
 }
 

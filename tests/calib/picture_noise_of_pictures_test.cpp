@@ -150,7 +150,7 @@ TEST(PictureNoiseOfRealRaws, IsSaneOrRefused) {
     EXPECT_TRUE(std::isfinite(found->offset_dn2.value)) << name;
     std::printf("%s: gain %.4f +- %.4f offset %.3f +- %.3f chi2 %.2f flat %.2f\n", name, found->gain_dn_per_e.value,
                 found->gain_dn_per_e.standard_error, found->offset_dn2.value, found->offset_dn2.standard_error,
-                found->reduced_chi_square, found->flat_share);
+                found->reduced_chi_square, found->flat_fraction);
     for (const std::string& reason : found->reasons) std::printf("  %s\n", reason.c_str());
   }
 }

@@ -65,7 +65,7 @@ TEST(PictureNoiseOfStairs, DoesNotDependOnTheNumberOfThreads) {
 }
 
 TEST(PictureNoiseOfStairs, IsFoundFromAPartOfTheSamples) {
-  const auto found = fit(stairs(1024, 0.8, 6, 100, white_noise), 100, {.most_samples = 4000});
+  const auto found = fit(stairs(1024, 0.8, 6, 100, white_noise), 100, {.max_samples = 4000});
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_NEAR(found->gain_dn_per_e.value, 0.8, 5 * found->gain_dn_per_e.standard_error + 0.008);
 }
@@ -116,8 +116,8 @@ TEST(PictureNoise, RefusesArgumentsOutOfRange) {
   expect_refused(fit(raw, 5000), ErrorCode::invalid_argument, "black");
   expect_refused(fit(raw, -1), ErrorCode::invalid_argument, "black");
   expect_refused(fit(raw, NAN), ErrorCode::invalid_argument, "black");
-  expect_refused(fit(raw, 100, {.most_samples = 0}), ErrorCode::invalid_argument, "most_samples");
-  expect_refused(fit(raw, 100, {.most_samples = 10'000'001}), ErrorCode::invalid_argument, "most_samples");
+  expect_refused(fit(raw, 100, {.max_samples = 0}), ErrorCode::invalid_argument, "most_samples");
+  expect_refused(fit(raw, 100, {.max_samples = 10'000'001}), ErrorCode::invalid_argument, "most_samples");
   RawDn rgb = stairs(512, 0.8, 6, 100, white_noise);
   rgb.layout = SensorLayout::linear_rgb;
   expect_refused(fit(rgb, 100), ErrorCode::unsupported, "demosaiced");

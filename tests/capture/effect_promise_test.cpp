@@ -175,7 +175,7 @@ TEST(EffectPromise, WhatIsLeftOutStaysBelowTheToleranceOver300Scenes) {
     options.seed = i;
     options.effects = {tolerance, {}};
     const auto planned = SyntheticSource::of(copy_of(scene), sensor, response, options, inline_executor);
-    options.effects = {std::nullopt, isp::EffectSet::all()};
+    options.effects = {std::nullopt, isp::NoiseSourceSet::all()};
     const auto whole = SyntheticSource::of(copy_of(scene), sensor, response, options, inline_executor);
     ASSERT_TRUE(planned && whole) << i << " " << (planned ? whole.error().message : planned.error().message);
     const isp::PredictedChange change = observed_change(*planned, *whole, sensor.model);
@@ -184,8 +184,8 @@ TEST(EffectPromise, WhatIsLeftOutStaysBelowTheToleranceOver300Scenes) {
     worst_delta_e = std::max(worst_delta_e, change.delta_e);
     worst_variance = std::max(worst_variance, change.relative_variance);
     for (const isp::RegionPlan& region : planned->plan().regions) {
-      for (const isp::EffectDecision& d : region.decisions) {
-        if (d.reason == isp::EffectDecision::Reason::absent) continue;
+      for (const isp::NoiseSourceDecision& d : region.decisions) {
+        if (d.reason == isp::NoiseSourceDecision::Reason::absent) continue;
         ++(d.kept ? kept : left_out)[static_cast<int>(d.effect)];
       }
     }

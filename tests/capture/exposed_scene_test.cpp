@@ -110,8 +110,8 @@ TEST(ExposedScene, AStarAtABorderLosesWhatFallsBeside) {
   EXPECT_NEAR(share(20, -0.5), 0.5, 1e-6);
   EXPECT_NEAR(share(-0.5, 40.5), 0.25, 1e-6);
   EXPECT_EQ(share(-50, 20), 0);
-  const double erf_share = 0.5 * (1 + std::erf(0.5 / (0.7 * std::numbers::sqrt2)));
-  EXPECT_NEAR(share(0, 20), erf_share, 1e-6);
+  const double erf_fraction = 0.5 * (1 + std::erf(0.5 / (0.7 * std::numbers::sqrt2)));
+  EXPECT_NEAR(share(0, 20), erf_fraction, 1e-6);
 }
 
 TEST(ExposedScene, AStarOnASinglePixelGivesItsShareOfTheGaussian) {

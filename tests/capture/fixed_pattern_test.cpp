@@ -15,7 +15,7 @@ namespace lowlux::capture {
 namespace {
 
 using isp::Effect;
-using isp::EffectSet;
+using isp::NoiseSourceSet;
 
 constexpr int width = 512, height = 256;
 
@@ -29,7 +29,7 @@ SensorModel quiet_sensor() {
 }
 
 /// Without noise that would hide the pattern: what is asked for, in DN of one electron each.
-Plane<float> pattern(const SensorModel& s, EffectSet kept, double rate_e_per_s, std::uint64_t seed = 1,
+Plane<float> pattern(const SensorModel& s, NoiseSourceSet kept, double rate_e_per_s, std::uint64_t seed = 1,
                      std::uint32_t frame = 0) {
   return test::flat_dn(s, kept, {width, height, rate_e_per_s, {}, seed, frame});
 }
@@ -73,7 +73,7 @@ TEST(FixedPattern, FrameMeansOfManyNoisyFramesShowPrnuAndDsnuTogether) {
   constexpr int frames = 16;
   std::vector<double> mean(static_cast<std::size_t>(width) * height);
   for (std::uint32_t f = 0; f < frames; ++f) {
-    const Plane<float> one = pattern(s, EffectSet::all().without(Effect::quantisation), 400, 1, f);
+    const Plane<float> one = pattern(s, NoiseSourceSet::all().without(Effect::quantisation), 400, 1, f);
     for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += one.data()[i] / frames;
   }
   // (0.05 x 400)^2 + (0.2 x 100)^2 of the pattern, (500 + 4) / 16 of the noise that is left
@@ -172,7 +172,8 @@ TEST(FixedPattern, IsTheSameInAllFramesOfASeedAndAnotherWithAnotherSeed) {
   for (const Effect effect : {Effect::prnu, Effect::dsnu, Effect::column_noise}) {
     // Photon noise on the other charge would hide the pattern: dark is Poisson wherever it is kept, so DSNU is seen
     // through it, in the correlation of two frames.
-    const EffectSet kept = effect == Effect::dsnu ? EffectSet{Effect::dark_current, Effect::dsnu} : EffectSet{effect};
+    const NoiseSourceSet kept =
+        effect == Effect::dsnu ? NoiseSourceSet{Effect::dark_current, Effect::dsnu} : NoiseSourceSet{effect};
     const double signal = effect == Effect::prnu ? 1000 : 0;
     const Plane<float> a = pattern(s, kept, signal, 1, 0), b = pattern(s, kept, signal, 1, 1),
                        other = pattern(s, kept, signal, 2, 0);

@@ -11,9 +11,9 @@ namespace lowlux::capture {
 namespace {
 
 using isp::Effect;
-using isp::EffectSet;
+using isp::NoiseSourceSet;
 
-EffectCost cost_of(Scene scene, const isp::NamedSensor& sensor, EffectSet effects) {
+EffectCost cost_of(Scene scene, const isp::NamedSensor& sensor, NoiseSourceSet effects) {
   SyntheticOptions options;
   options.effects.effects = effects;
   return test::source_of(std::move(scene), sensor, options)->measure_cost();
@@ -22,11 +22,11 @@ EffectCost cost_of(Scene scene, const isp::NamedSensor& sensor, EffectSet effect
 TEST(MeasureCost, IsGivenForWhatIsLeftOutAndForNothingElse) {
   isp::NamedSensor sensor = test::plain_sensor();
   sensor.model.read_noise_e = 3;
-  const EffectCost all = cost_of(*flat_scene(test::setup_of(64, 300, 1)), sensor, EffectSet::all());
+  const EffectCost all = cost_of(*flat_scene(test::setup_of(64, 300, 1)), sensor, NoiseSourceSet::all());
   EXPECT_GT(all.all_ms, 0);
   for (const auto& saved : all.saved_ms) EXPECT_FALSE(saved);
   const EffectCost some =
-      cost_of(*flat_scene(test::setup_of(64, 300, 1)), sensor, EffectSet::all().without(Effect::read_noise));
+      cost_of(*flat_scene(test::setup_of(64, 300, 1)), sensor, NoiseSourceSet::all().without(Effect::read_noise));
   for (int i = 0; i < isp::effect_count; ++i) {
     EXPECT_EQ(some.saved_ms[i].has_value(), static_cast<Effect>(i) == Effect::read_noise) << i;
   }
@@ -62,7 +62,7 @@ TEST(ReadOut, GivesEachRegionItsOwnEffects) {
   SensorModel sensor = test::plain_sensor().model;
   sensor.read_noise_e = 5;
   const Plane<float> rate = test::filled(96, 40, 100);
-  isp::EffectPlan plan = test::plan_of(96, 40, {});
+  isp::NoiseSourcePlan plan = test::plan_of(96, 40, {});
   plan.regions.push_back(plan.regions[0]);
   plan.regions[1].kept = {Effect::read_noise};
   plan.region_of_block = {0, 1, 0, 1, 1, 0};

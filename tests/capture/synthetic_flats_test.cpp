@@ -17,9 +17,9 @@ namespace lowlux::capture {
 namespace {
 
 using isp::Effect;
-using isp::EffectSet;
+using isp::NoiseSourceSet;
 
-constexpr EffectSet everything = EffectSet::all();
+constexpr NoiseSourceSet everything = NoiseSourceSet::all();
 
 struct FlatCase {
   const char* name;

@@ -17,7 +17,7 @@ namespace lowlux::capture {
 namespace {
 
 using isp::Effect;
-using isp::EffectSet;
+using isp::NoiseSourceSet;
 
 /// With every effect there is.
 isp::NamedSensor rich_sensor() {
@@ -274,7 +274,7 @@ TEST(SyntheticSource, PointsWithoutPlaceOrSpreadAreRefused) {
 
 TEST(SyntheticSource, MeansBeyondTheSamplerAreRefusedWhereNothingHoldsThem) {
   SyntheticOptions options;
-  options.effects.effects = EffectSet::all().without(Effect::clipping);
+  options.effects.effects = NoiseSourceSet::all().without(Effect::clipping);
   const isp::NamedSensor sensor = test::plain_sensor();  // 100 cd/m2 give 30000 e- at most
   EXPECT_TRUE(test::source_of(*flat_scene(test::setup_of(4, 4, 3000)), sensor, options));
   expect_refused(sensor, options, "sampler's limit", 3400);
@@ -291,7 +291,7 @@ TEST(SyntheticSource, MeansBeyondTheSamplerAreRefusedWhereNothingHoldsThem) {
   hot.model.hot_pixel_current_e_per_s = 1e5;
   expect_refused(hot, options, "sampler's limit", 0);
   // The full well holds all of them.
-  options.effects.effects = EffectSet::all();
+  options.effects.effects = NoiseSourceSet::all();
   for (const isp::NamedSensor& any : {sensor, warm, uneven, hot}) {
     EXPECT_TRUE(test::source_of(*flat_scene(test::setup_of(4, 4, 1e9)), any, options));
   }

@@ -18,7 +18,7 @@ namespace lowlux::capture {
 namespace {
 
 using isp::Effect;
-using isp::EffectSet;
+using isp::NoiseSourceSet;
 
 SyntheticSource made(Scene scene, const isp::NamedSensor& sensor, const SyntheticOptions& options) {
   auto source = test::source_of(std::move(scene), sensor, options);
@@ -26,7 +26,7 @@ SyntheticSource made(Scene scene, const isp::NamedSensor& sensor, const Syntheti
   return *std::move(source);
 }
 
-SyntheticOptions with(EffectSet effects, double time_s = 1) {
+SyntheticOptions with(NoiseSourceSet effects, double time_s = 1) {
   SyntheticOptions options;
   options.exposure.time_s = time_s;
   options.effects.effects = effects;
@@ -51,7 +51,8 @@ TEST(SyntheticStorage, WholeCodesAreStoredAsTheyAre) {
   InlineExecutor executor;
   isp::NamedSensor sensor = test::plain_sensor();
   sensor.gain_setting = "ISO 1600";
-  const SyntheticSource source = made(*flat_scene(test::setup_of(32, 32, 30)), sensor, with(EffectSet::all(), 0.5));
+  const SyntheticSource source =
+      made(*flat_scene(test::setup_of(32, 32, 30)), sensor, with(NoiseSourceSet::all(), 0.5));
   const RawFrame frame = source.frame(0, executor);
   EXPECT_EQ(frame.raw.black_tag->at(5, 7), 512);
   EXPECT_EQ(frame.raw.white_dn, (std::array<double, 3>{512 + 15000, 512 + 15000, 512 + 15000})) << "the full well's";
@@ -70,7 +71,7 @@ TEST(SyntheticStorage, WhiteIsTheConverterWhereThatSaturatesFirst) {
   isp::NamedSensor sensor = test::plain_sensor();
   sensor.model.system_gain_dn_per_e = 2;
   const RawFrame frame =
-      made(*flat_scene(test::setup_of(8, 8, 1000)), sensor, with(EffectSet::all())).frame(0, executor);
+      made(*flat_scene(test::setup_of(8, 8, 1000)), sensor, with(NoiseSourceSet::all())).frame(0, executor);
   EXPECT_EQ(frame.raw.white_dn[0], 16383);
   EXPECT_EQ(frame.raw.dn.at(3, 3), 16383);
 }
@@ -79,7 +80,7 @@ TEST(SyntheticStorage, SixteenBitsKeepTheFractionsOfWhatIsNotQuantised) {
   InlineExecutor executor;
   const isp::NamedSensor sensor = test::plain_sensor();
   const SyntheticSource source =
-      made(*flat_scene(test::setup_of(64, 64, 30)), sensor, with(EffectSet::all().without(Effect::quantisation)));
+      made(*flat_scene(test::setup_of(64, 64, 30)), sensor, with(NoiseSourceSet::all().without(Effect::quantisation)));
   const RawFrame frame = source.frame(1, executor);
   const Plane<float> dn = source.frame_dn(1, executor);
   const double scale = frame.raw.black_tag->at(0, 0) / 512;
@@ -107,8 +108,8 @@ TEST(SyntheticStorage, ARaisedPedestalKeepsNegativeValuesWhereNothingClips) {
   sensor.model.read_noise_e = 6;
   sensor.model.row_noise_e = 2;
   sensor.model.column_noise_e = 1;
-  for (const EffectSet kept : {EffectSet::all().without(Effect::clipping),
-                               EffectSet::all().without(Effect::clipping).without(Effect::quantisation)}) {
+  for (const NoiseSourceSet kept : {NoiseSourceSet::all().without(Effect::clipping),
+                                    NoiseSourceSet::all().without(Effect::clipping).without(Effect::quantisation)}) {
     const SyntheticSource source = made(*dark_scene(test::setup_of(256, 256, 1)), sensor, with(kept));
     const RawFrame frame = source.frame(0, executor);
     const Plane<float> dn = source.frame_dn(0, executor);
@@ -122,7 +123,7 @@ TEST(SyntheticStorage, ARaisedPedestalKeepsNegativeValuesWhereNothingClips) {
   }
   // With clipping the same sensor loses them.
   const RawFrame clipped =
-      made(*dark_scene(test::setup_of(64, 64, 1)), sensor, with(EffectSet::all())).frame(0, executor);
+      made(*dark_scene(test::setup_of(64, 64, 1)), sensor, with(NoiseSourceSet::all())).frame(0, executor);
   EXPECT_EQ(clipped.raw.black_tag->at(0, 0), 0);
   EXPECT_GT(std::count(clipped.raw.dn.data(), clipped.raw.dn.data() + clipped.raw.dn.size(), 0), 64 * 64 / 3);
 }
@@ -132,7 +133,7 @@ TEST(SyntheticStorage, ASensorWithAPedestalKeepsItsOwn) {
   isp::NamedSensor sensor = test::plain_sensor();
   sensor.model.read_noise_e = 6;
   const RawFrame frame =
-      made(*dark_scene(test::setup_of(16, 16, 1)), sensor, with(EffectSet::all().without(Effect::clipping)))
+      made(*dark_scene(test::setup_of(16, 16, 1)), sensor, with(NoiseSourceSet::all().without(Effect::clipping)))
           .frame(0, executor);
   EXPECT_EQ(frame.raw.black_tag->at(0, 0), 512);
 }
@@ -144,7 +145,8 @@ TEST(SyntheticStorage, TheNoiseProfileIsTheVarianceOfFlats) {
   sensor.model.dark_current_e_per_s.fill(30);
   for (const double luminance_cd_m2 : {0.0, 0.05, 1.0, 40.0}) {
     const RawFrame frame =
-        made(*flat_scene(test::setup_of(512, 256, luminance_cd_m2)), sensor, with(EffectSet::all())).frame(4, executor);
+        made(*flat_scene(test::setup_of(512, 256, luminance_cd_m2)), sensor, with(NoiseSourceSet::all()))
+            .frame(4, executor);
     ASSERT_TRUE(frame.noise);
     const test::SampleMoments m = test::moments_of(green_fractions(frame));
     // The profile at the mean; the mean's own standard error moves it by less than a hundredth of the variance's.
@@ -158,7 +160,7 @@ TEST(SyntheticStorage, RowNoiseIsInTheProfileToo) {
   isp::NamedSensor sensor = test::plain_sensor();
   sensor.model.read_noise_e = 3;
   sensor.model.row_noise_e = 4;
-  const SyntheticSource source = made(*dark_scene(test::setup_of(2, 20000, 1)), sensor, with(EffectSet::all()));
+  const SyntheticSource source = made(*dark_scene(test::setup_of(2, 20000, 1)), sensor, with(NoiseSourceSet::all()));
   // One green in each row: rows are independent.
   const test::SampleMoments m = test::moments_of(green_fractions(source.frame(0, executor)));
   EXPECT_NEAR(m.variance, source.frame(0, executor).noise->offset[1], 5 * m.variance_error);
@@ -194,7 +196,7 @@ TEST(SyntheticStorage, AWhiteThatSaturatesReadsWhite) {
   sensor.model.system_gain_dn_per_e = 0.1;  // 30000 e- are 3000 of 15871 codes
   const double saturating_cd_m2 = isp::saturation_luminance_cd_m2(sensor.model, test::response_of(sensor), 1);
   const RawFrame frame =
-      made(*flat_scene(test::setup_of(16, 16, 1.5 * saturating_cd_m2)), sensor, with(EffectSet::all()))
+      made(*flat_scene(test::setup_of(16, 16, 1.5 * saturating_cd_m2)), sensor, with(NoiseSourceSet::all()))
           .frame(0, executor);
   for (const double fraction : green_fractions(frame)) EXPECT_EQ(fraction, 1);
 }

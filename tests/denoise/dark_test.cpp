@@ -122,7 +122,7 @@ TEST(SubtractDark, MakesTheMeanChromaticityOneForAllDarksAndTheNaiveWayIsOffByWh
     if (dark_e == 0) continue;
     const Drawn naive = drawn(signal_e, dark_e, 0, false);
     const Xyz dark = isp::xyz_of(test::table_camera * Vector3{dark_e, dark_e, dark_e});
-    const isp::Xy predicted = isp::desaturated(c, *isp::xy_of(dark), *isp::signal_share(truth, dark));
+    const isp::Xy predicted = isp::desaturated(c, *isp::xy_of(dark), *isp::signal_fraction(truth, dark));
     EXPECT_LT(xy_distance(*isp::xy_of(naive.xyz()), predicted), naive.xy_error()) << dark_e;
     EXPECT_GT(xy_distance(predicted, c), 3 * naive.xy_error()) << dark_e;
   }
@@ -142,7 +142,7 @@ TEST(AlphaMap, IsTheShareInItsOwnWeights) {
   const SceneLinear picture = even(5, 4, signal);
   const Plane<float> xy = alpha_map(picture, dark, ShareWeights::xy, 2);
   const Plane<float> uv = alpha_map(picture, dark, ShareWeights::uv, 2);
-  const float by_model = static_cast<float>(*isp::signal_share(signal, dark));
+  const float by_model = static_cast<float>(*isp::signal_fraction(signal, dark));
   const float by_hand = static_cast<float>(7.0 / (7.0 + 4.85));  // W: 0.7 + 6 + 0.3, and 0.2 + 3.75 + 0.9
   for (int i = 0; i < 20; ++i) {
     EXPECT_NEAR(xy.data()[i], by_model, 1e-7);  // float

@@ -182,7 +182,7 @@ TEST(DenoiserColour, OfANaiveMeanIsOffByWhatAlphaPredicts) {
     unaware.dark_e = {};
     const isp::Xyz dark = isp::xyz_of(test::table_camera * Vector3{dark_e, dark_e, dark_e});
     const isp::Xy predicted =
-        isp::desaturated(*isp::xy_of(signal), *isp::xy_of(dark), *isp::signal_share(signal, dark));
+        isp::desaturated(*isp::xy_of(signal), *isp::xy_of(dark), *isp::signal_fraction(signal, dark));
     const auto patch = patch_of(camera, signal_e, 65536);
     const double error = rss_std(isp::chroma_crb(test::table_camera, patch)->xy_covariance);
     for (const Level level : levels_for_flats()) {

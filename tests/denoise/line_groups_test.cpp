@@ -16,13 +16,13 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-Plane<float> noise(int width, int height, double share_of_nan, std::uint32_t seed) {
+Plane<float> noise(int width, int height, double fraction_of_nan, std::uint32_t seed) {
   std::mt19937 draw(seed);
   std::normal_distribution<float> value(20, 5);
   std::uniform_real_distribution<double> lost;
   Plane<float> out(width, height);
   for (std::size_t i = 0; i < out.size(); ++i) {
-    out.data()[i] = lost(draw) < share_of_nan ? std::numeric_limits<float>::infinity() : value(draw);
+    out.data()[i] = lost(draw) < fraction_of_nan ? std::numeric_limits<float>::infinity() : value(draw);
   }
   return out;
 }
@@ -99,8 +99,8 @@ TEST(LineGroups, DifferencesAreMediansWithEachInstructionSet) {
   for (const std::int64_t target : test::kernel_targets()) {
     const test::OnlyTarget only(target);
     for (const int lines : {1, 2, 5, 16, 61, 200}) {
-      for (const double share_of_nan : {0.0, 0.1}) {
-        const Plane<double> means = group_means(noise(32, lines, share_of_nan, 7).view(), Lines::rows);
+      for (const double fraction_of_nan : {0.0, 0.1}) {
+        const Plane<double> means = group_means(noise(32, lines, fraction_of_nan, 7).view(), Lines::rows);
         for (const int distance : {1, 2, 16}) expect_medians(means, distance);
       }
     }

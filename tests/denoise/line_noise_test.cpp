@@ -129,8 +129,8 @@ double worst_line(const std::vector<double>& truth, const LineOffsets& found) {
 TEST(LineNoise, BelowTheLeastThatIsAskedForIsMeasuredAndLeft) {
   const Plane<float> frame = frame_of(256, 256, no_light, row_offsets(256, 1));
   const auto all = line_offsets_of_frame(frame.view(), Lines::rows);
-  const auto asked = line_offsets_of_frame(frame.view(), Lines::rows, {.least_std_e = 0.5});
-  const auto not_asked = line_offsets_of_frame(frame.view(), Lines::rows, {.least_std_e = 2});
+  const auto asked = line_offsets_of_frame(frame.view(), Lines::rows, {.min_std_e = 0.5});
+  const auto not_asked = line_offsets_of_frame(frame.view(), Lines::rows, {.min_std_e = 2});
   ASSERT_TRUE(all && asked && not_asked);
   EXPECT_EQ(asked->offset_e, all->offset_e);
   EXPECT_TRUE(not_asked->offset_e.empty());

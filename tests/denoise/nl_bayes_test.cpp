@@ -149,9 +149,9 @@ constexpr int margin = 64;
 /// Of luma's noise on a flat frame, what is left.
 struct FlatShare {
   double predicted;  // of the variance of the noise
-  double true_share;
+  double true_fraction;
 };
-FlatShare share_left(double signal_e, double dark_e) {
+FlatShare fraction_left(double signal_e, double dark_e) {
   constexpr int side = 1024;
   const Camera camera = camera_over(dark_e);
   const auto raw = exposed(camera, flat(signal_e, signal_e, signal_e), side, side, 73);
@@ -170,12 +170,12 @@ FlatShare share_left(double signal_e, double dark_e) {
 // with as much energy as 10 cells of noise: its squared error scatters by 0.24 of itself (16 frames of other seeds
 // each), the root by 0.12. Five standard errors of the mean of two. At night, DenoiserFlats* compares with the truth.
 TEST(NlBayes, KnowsWhatItLeavesOfTheNoiseOfFlatFrames) {
-  const FlatShare faint = share_left(0.2, 2), light = share_left(20, 200);
+  const FlatShare faint = fraction_left(0.2, 2), light = fraction_left(20, 200);
   for (const double ratio : {std::sqrt(faint.predicted / 1.94e-4), std::sqrt(light.predicted / 1.46e-4)}) {
     EXPECT_GT(ratio, 0.9);
     EXPECT_LT(ratio, 1.15);
   }
-  const double both = (faint.predicted / faint.true_share) * (light.predicted / light.true_share);
+  const double both = (faint.predicted / faint.true_fraction) * (light.predicted / light.true_fraction);
   EXPECT_NEAR(std::log(both) / 4, 0, 5 * 0.12 / std::sqrt(2.0));
 }
 

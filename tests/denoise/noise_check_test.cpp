@@ -41,7 +41,7 @@ TEST(NoiseCheck, FindsNothingInTheModelsOwnNoiseAndOneForItsRatio) {
         .phase = BayerPhase::gbrg, .dark_e = {c.dark_e, c.dark_e, c.dark_e, c.dark_e}, .read_noise_e = c.read_noise_e};
     const auto raw = exposed(camera, flat(c.signal_e, 2 * c.signal_e, 0.5 * c.signal_e), 2048, 1536, 91);
     const auto check = check_noise({raw.view(), camera.phase}, camera.noise(), executor);
-    for (int l = 0; l < denoise::most_levels; ++l) {
+    for (int l = 0; l < denoise::max_levels; ++l) {
       // 0.002: the model's mean is that of 64 cells, and 1 / (1 + error) is in the mean above 1 by the error's square.
       EXPECT_NEAR(check.measured_over_model[l].value(), 1, 5 * ratio_error(raw, l) + 0.002) << l;
       EXPECT_NEAR(check.across_over_model[l].value(), 1, 5 * ratio_error(raw, l) + 0.002) << l;
@@ -168,9 +168,9 @@ TEST(NoiseCheck, FindsAPedestalThatIsTooHighAndNotOneThatIsRight) {
   EXPECT_FALSE(has(lowered(window_error_e, true), NoiseFinding::black_suspicious));
   const auto found = lowered(4 * window_error_e, true);
   EXPECT_TRUE(has(found, NoiseFinding::black_suspicious));
-  EXPECT_GT(found.share_negative[0], 0.3);
-  EXPECT_GT(found.share_negative[2], 0.3);
-  EXPECT_GT(found.share_negative[1], 0.9);  // the mean of two sites has half the variance
+  EXPECT_GT(found.fraction_negative[0], 0.3);
+  EXPECT_GT(found.fraction_negative[2], 0.3);
+  EXPECT_GT(found.fraction_negative[1], 0.9);  // the mean of two sites has half the variance
   EXPECT_NE(denoise::remarks_on(found).front().text.find("the black level is suspicious: "), std::string::npos);
   // In 12 of 42 x 56 windows: a fault of the sensor's edge, and no pedestal.
   EXPECT_FALSE(has(lowered(100, false), NoiseFinding::black_suspicious));
@@ -195,7 +195,7 @@ TEST(NoiseCheck, FindsDarkFramesAndNotThoseWithALight) {
   }
   const auto lit = check_noise({raw.view(), camera.phase}, camera.noise(), executor);
   EXPECT_FALSE(has(lit, NoiseFinding::all_dark));
-  EXPECT_LT(lit.share_without_signal, 1);
+  EXPECT_LT(lit.fraction_without_signal, 1);
 }
 
 TEST(NoiseCheck, CountsSaturatedSites) {
@@ -205,7 +205,7 @@ TEST(NoiseCheck, CountsSaturatedSites) {
   noise.saturation_e = {1000, 1000, 1000};
   for (int y = 0; y < 200; ++y) std::fill(raw.row(y), raw.row(y) + 512, 1000.0f);
   const auto half = check_noise({raw.view(), camera.phase}, noise, executor);
-  EXPECT_EQ(half.share_saturated, 0.5);
+  EXPECT_EQ(half.fraction_saturated, 0.5);
   EXPECT_FALSE(has(half, NoiseFinding::all_saturated));
   EXPECT_NEAR(half.measured_over_model[0].value(), 1, 5 * std::sqrt(2 / (48 * 38.0)) + 0.002);  // 384 blocks are left
   for (int y = 0; y < 398; ++y) std::fill(raw.row(y), raw.row(y) + 512, 2000.0f);
@@ -234,9 +234,9 @@ TEST(NoiseCheck, OfHugeNegativeAndMissingValuesIsFinite) {
     std::fill(raw.data(), raw.data() + raw.size(), e);
     const auto check = check_noise({raw.view(), camera.phase}, {}, executor);
     for (const auto& ratio : check.measured_over_model) EXPECT_TRUE(std::isfinite(ratio.value_or(0)));
-    for (const double share : check.share_negative) EXPECT_TRUE(share >= 0 && share <= 1);
-    EXPECT_TRUE(check.share_without_signal >= 0 && check.share_without_signal <= 1);
-    EXPECT_EQ(check.share_saturated, e == inf ? 1 : 0);
+    for (const double share : check.fraction_negative) EXPECT_TRUE(share >= 0 && share <= 1);
+    EXPECT_TRUE(check.fraction_without_signal >= 0 && check.fraction_without_signal <= 1);
+    EXPECT_EQ(check.fraction_saturated, e == inf ? 1 : 0);
     denoise::remarks_on(check);
   }
 }

@@ -80,7 +80,7 @@ TEST(Resaturate, RestoresChromaticitiesAndKeepsLuminances) {
     const Xyz& true_colour = truth[static_cast<std::size_t>(x)];
     const Xy found = *isp::xy_of(at(out, x)), expected = *isp::xy_of(true_colour);
     // Floats of the measured colour, 6e-8 of it, over its signal's share.
-    const double error = 4 * 6e-8 / *isp::signal_share(true_colour, dark);
+    const double error = 4 * 6e-8 / *isp::signal_fraction(true_colour, dark);
     EXPECT_NEAR(found.x, expected.x, error) << x;
     EXPECT_NEAR(found.y, expected.y, error) << x;
     EXPECT_EQ(out.plane[1].at(x, 0), picture.plane[1].at(x, 0));

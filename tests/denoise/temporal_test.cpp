@@ -66,7 +66,7 @@ void count_alarms(Stream& stream, MeanOf& alarms) {
 /// the noise of the variances do beyond that grows towards few electrons. A block that was taken to move wrongly starts
 /// from an unusual frame, and is likelier to do so again: a fifth more in the long run.
 struct AlarmCase {
-  double mean_e, most_at_first, most_later;
+  double mean_e, max_at_first, most_later;
 };
 
 TEST(TemporalFalseAlarms, OfStillFramesAreThoseAskedFor) {
@@ -84,7 +84,7 @@ TEST(TemporalFalseAlarms, OfStillFramesAreThoseAskedFor) {
         }
       }
       EXPECT_GT(second.mean() + 5 * second.standard_error(), 0.9 * rate) << light.mean_e;
-      EXPECT_LT(second.mean() - 5 * second.standard_error(), light.most_at_first * rate) << light.mean_e;
+      EXPECT_LT(second.mean() - 5 * second.standard_error(), light.max_at_first * rate) << light.mean_e;
       EXPECT_GT(eighth.mean() + 5 * eighth.standard_error(), 0.9 * rate) << light.mean_e;
       EXPECT_LT(eighth.mean() - 5 * eighth.standard_error(), light.most_later * rate) << light.mean_e;
       if (night) {
@@ -149,7 +149,7 @@ TEST(TemporalMean, OfNFramesHasOneNthOfTheVarianceAndNoBias) {
 }
 
 TEST(TemporalMean, ForgetsAtTheRateOfItsOption) {
-  Stream stream(128, 128, {.read_noise_e = 2}, {.false_alarm = never, .most_frames = 4});
+  Stream stream(128, 128, {.read_noise_e = 2}, {.false_alarm = never, .max_frames = 4});
   for (std::uint64_t n = 0; n < 40; ++n) stream.take(grey(20), 3000 + n);
   const auto got = error_of(stream, 20);
   EXPECT_NEAR(got.share, 1.0 / 7, 1e-5);  // k / (2 - k) of k = 1 / 4; (1 - k)^40 is left of the start
@@ -263,7 +263,7 @@ double difference(int width, int height, BayerPhase phase) {
                                   std::max(1000.0, std::abs(plain.mean_e.data()[i])));
     }
     for (std::size_t i = 0; i < stream.share.size(); ++i) {
-      EXPECT_NEAR(static_cast<double>(stream.share.data()[i]), plain.variance_share.data()[i], 1e-5);
+      EXPECT_NEAR(static_cast<double>(stream.share.data()[i]), plain.variance_fraction.data()[i], 1e-5);
     }
   }
   return worst;

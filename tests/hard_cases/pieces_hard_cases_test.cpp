@@ -84,7 +84,7 @@ std::optional<FewAndMany> few_and_many_periods(int columns, int rows, const isp:
   auto many = in_mode(mode, [&] { return isp::develop(many_periods, options, executor); });
   EXPECT_TRUE(few && many);
   if (!few || !many) return {};
-  EXPECT_TRUE(isp::goes_by_tiles(many_periods.raw, many->plan, {}));
+  EXPECT_TRUE(isp::is_tiled(many_periods.raw, many->plan, {}));
   return FewAndMany{std::move(*few), std::move(*many)};
 }
 
@@ -146,12 +146,12 @@ double error_of_pieces(Level level, Denormals mode) {
     EXPECT_TRUE(plan);
     if (!plan) return double{NAN};
     const auto rendered = [&](const isp::TileLimits& limits) {
-      EXPECT_EQ(isp::goes_by_tiles(frame.raw, *plan, limits), limits.most_whole_px == 0);
+      EXPECT_EQ(isp::is_tiled(frame.raw, *plan, limits), limits.max_whole_px == 0);
       Picture out = isp::make_picture(*plan);
       isp::Pipeline(executor, limits).render(frame, *plan, out);
       return std::get<SceneLinear>(std::move(out));
     };
-    const SceneLinear pieces = rendered({.most_whole_px = 0, .side_px = 256}), whole = rendered({});
+    const SceneLinear pieces = rendered({.max_whole_px = 0, .side_px = 256}), whole = rendered({});
     return difference({pieces, 0, 0}, {whole, 0, 0}, 768, 256, *plan);
   });
 }

@@ -51,7 +51,7 @@ Result<capture::SyntheticSource> source_of(const Simulated& how, Executor& execu
   capture::SceneSetup setup{how.width, how.height, light_of(how), "test", luminance_of(how)};
   capture::SyntheticOptions options;
   options.exposure = {how.time_s, how.temperature_c};
-  if (!how.clips) options.effects.effects = isp::EffectSet::all().without(isp::Effect::clipping);
+  if (!how.clips) options.effects.effects = isp::NoiseSourceSet::all().without(isp::Effect::clipping);
   const isp::NamedSensor sensor = sensor_of(how);
   auto scene = setup.luminance_cd_m2 > 0 ? capture::flat_scene(setup) : capture::dark_scene(setup);
   if (!scene) return tl::make_unexpected(scene.error());

@@ -24,13 +24,13 @@ Xyz sum(const Xyz& a, const Xyz& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; 
 Exact exact_sum(const Xyz& v) { return Exact(v.x) + Exact(v.y) + Exact(v.z); }
 
 TEST(SignalShare, IsOneWithoutDarkHalfAtEqualSumsAndNoneWithoutSignal) {
-  EXPECT_EQ(signal_share({1, 2, 3}, {0, 0, 0}), 1.0);
-  EXPECT_EQ(signal_share({1, 2, 3}, {3, 2, 1}), 0.5);
-  EXPECT_FALSE(signal_share({0, 0, 0}, dark));
-  EXPECT_FALSE(signal_share({1, -2, 0.5}, dark));       // noise: a negative sum
-  EXPECT_FALSE(signal_share({1, 1, 1}, {-2, -2, -2}));  // the whole sum is negative
-  EXPECT_FALSE(signal_share({nan, 1, 1}, dark));
-  EXPECT_FALSE(signal_share({1, 1, 1}, {inf, 1, 1}));
+  EXPECT_EQ(signal_fraction({1, 2, 3}, {0, 0, 0}), 1.0);
+  EXPECT_EQ(signal_fraction({1, 2, 3}, {3, 2, 1}), 0.5);
+  EXPECT_FALSE(signal_fraction({0, 0, 0}, dark));
+  EXPECT_FALSE(signal_fraction({1, -2, 0.5}, dark));       // noise: a negative sum
+  EXPECT_FALSE(signal_fraction({1, 1, 1}, {-2, -2, -2}));  // the whole sum is negative
+  EXPECT_FALSE(signal_fraction({nan, 1, 1}, dark));
+  EXPECT_FALSE(signal_fraction({1, 1, 1}, {inf, 1, 1}));
 }
 
 TEST(SignalShare, KeepsItsDigitsWhereTheSignalVanishes) {
@@ -38,7 +38,7 @@ TEST(SignalShare, KeepsItsDigitsWhereTheSignalVanishes) {
     const double f = std::pow(10.0, level);
     const Xyz signal{0.7 * f, 0.4 * f, 0.1 * f};
     const Exact truth = exact_sum(signal) / (exact_sum(signal) + exact_sum(dark));
-    const double relative = static_cast<double>(abs(Exact(*signal_share(signal, dark)) / truth - 1));
+    const double relative = static_cast<double>(abs(Exact(*signal_fraction(signal, dark)) / truth - 1));
     EXPECT_LT(relative, 4 * eps) << level;  // two sums of positive terms and a quotient
   }
 }
@@ -48,7 +48,7 @@ TEST(DarkDesaturation, MeasuredTrueAndDarkChromaticityAreCollinear) {
     const double f = std::pow(10.0, level);
     const Xyz signal{0.7 * f, 0.4 * f, 0.1 * f};
     const Xy measured = *xy_of(sum(signal, dark));
-    const Xy predicted = desaturated(*xy_of(signal), *xy_of(dark), *signal_share(signal, dark));
+    const Xy predicted = desaturated(*xy_of(signal), *xy_of(dark), *signal_fraction(signal, dark));
     EXPECT_NEAR(measured.x, predicted.x, 4 * eps);  // of numbers below 1
     EXPECT_NEAR(measured.y, predicted.y, 4 * eps);
   }
@@ -84,7 +84,7 @@ TEST(DarkDesaturation, BothFormsOfTheUndoAgreeOnMeans) {
     const double f = std::pow(10.0, level);
     const Xyz signal{0.7 * f, 0.4 * f, 0.1 * f};
     const Xyz measured = sum(signal, dark);
-    const double alpha = *signal_share(signal, dark);
+    const double alpha = *signal_fraction(signal, dark);
     const Xy by_vector = *resaturated(measured, dark);
     const Xy by_chromaticity = *resaturated(*xy_of(measured), *xy_of(dark), alpha);
     EXPECT_NEAR(by_vector.x, by_chromaticity.x, 16 * eps / alpha) << level;  // both subtract near-equal numbers

@@ -49,10 +49,10 @@ TEST(EntropyModel, RodShareAndWeightAreThoseOfTheLevelsPublished) {
     const double m = mesopic_state({row.luminance_cd_m2, 2.26 * row.luminance_cd_m2}).m;
     EXPECT_NEAR(m, row.m, 2e-6) << "six decimals";
     EXPECT_NEAR(entropy_weight(m), row.gamma, 4e-6) << "twice that of m";
-    EXPECT_NEAR(entropy_rod_share(m), row.xi, 3.2e-6) << "e / (e - 1) times that of m";
+    EXPECT_NEAR(entropy_rod_fraction(m), row.xi, 3.2e-6) << "e / (e - 1) times that of m";
   }
-  EXPECT_EQ(entropy_rod_share(1), 0);
-  EXPECT_EQ(entropy_rod_share(0), 1);
+  EXPECT_EQ(entropy_rod_fraction(1), 0);
+  EXPECT_EQ(entropy_rod_fraction(0), 1);
   EXPECT_EQ(entropy_weight(1), 1e-4) << "the floor";
   EXPECT_EQ(entropy_weight(0), 2);
 }

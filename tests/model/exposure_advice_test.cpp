@@ -55,7 +55,7 @@ TEST(ExposureAdvice, InTheDarkMotionLimitsAndTheGainIsTheLowestAtWhichReadNoiseI
   EXPECT_EQ(best.at.exposure_s, 0.02);
   EXPECT_EQ(best.largest_noise, NoiseSource::read_noise);
   // 1 e- of signal in green: 2.56 of 1 + 0.02 + 2.56 + 1 / (12 4.8^2)
-  EXPECT_NEAR(best.largest_noise_share, 2.56 / (3.58 + 1 / (12 * 4.8 * 4.8)), 1e-12);
+  EXPECT_NEAR(best.largest_noise_fraction, 2.56 / (3.58 + 1 / (12 * 4.8 * 4.8)), 1e-12);
   EXPECT_TRUE(holds(advice->reason, "motion limits the exposure to 0.02 s")) << advice->reason;
   EXPECT_TRUE(holds(advice->reason, "above ISO 1600 noise no longer falls by 0.1 dB")) << advice->reason;
   EXPECT_TRUE(holds(advice->reason, "read noise is 71.4 % of the variance")) << advice->reason;
@@ -96,8 +96,8 @@ TEST(ExposureAdvice, StopsWhereTheShareThatNoiseClipsIsTheOneAllowed) {
       };
       const double clipped = std::max(above(s.full_well_e, 0), above(range_e, s.read_noise_e));
       EXPECT_NEAR(clipped / share, 1, 1e-6) << share << ' ' << i;  // rounding, magnified by the tail
-      EXPECT_NEAR(advice->gains[i].at.highlight_charge_share, charge_e / 40000, 1e-9);
-      EXPECT_NEAR(advice->gains[i].at.highlight_code_share, charge_e / range_e, 1e-9);
+      EXPECT_NEAR(advice->gains[i].at.highlight_charge_fraction, charge_e / 40000, 1e-9);
+      EXPECT_NEAR(advice->gains[i].at.highlight_code_fraction, charge_e / range_e, 1e-9);
     }
   }
 }

@@ -112,7 +112,7 @@ TEST(MesopicState, OfDarkAbsurdAndBrokenFieldsIsDefined) {
 TEST(MesopicLuminance, MixesByTheShareOfTheRods) {
   EXPECT_EQ(mesopic_luminance_cd_m2(1, {3, 7}), 3);
   EXPECT_DOUBLE_EQ(mesopic_luminance_cd_m2(0, {3, 7}), 7);
-  EXPECT_DOUBLE_EQ(rod_share(0), 1);
+  EXPECT_DOUBLE_EQ(rod_fraction(0), 1);
   const double m = 0.4, v0 = 683.0 / 1699.0;
   EXPECT_NEAR(mesopic_luminance_cd_m2(m, {-3, 7}), (m * -3 + (1 - m) * 7 * v0) / (m + (1 - m) * v0), 1e-14);
 }

@@ -59,9 +59,9 @@ TEST(NightEye, SaturationFadesAsWanatAndMantiukFitted) {
                                      {1.0, 0.902527},
                                      {2.0, 0.948767},
                                      {10.0, 0.989315}}) {
-    EXPECT_NEAR(chroma_share(light) * (100 / 100.108), share, 6e-7) << light;
+    EXPECT_NEAR(chroma_fraction(light) * (100 / 100.108), share, 6e-7) << light;
   }
-  EXPECT_EQ(chroma_share(1000), 1);
+  EXPECT_EQ(chroma_fraction(1000), 1);
 }
 
 TEST(NightEye, TintIsOfOneHueAndWithoutLuminance) {

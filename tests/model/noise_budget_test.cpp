@@ -72,7 +72,7 @@ struct Figure {
 TEST(CheckSensor, PassesBothEndsOfEveryRangeAndNothingBeyond) {
   const std::vector<double> good_noise{0, 1e-300, 1e6}, bad_noise{-1e-300, 1.0000001e6, nan, inf, -inf};
   const std::vector<double> good_current{0, 1e-300, 1e9}, bad_current{-1e-300, 1.0000001e9, nan, inf, -inf};
-  const std::vector<double> good_share{0, 1}, bad_share{-1e-9, 1.0000001, nan, inf};
+  const std::vector<double> good_fraction{0, 1}, bad_fraction{-1e-9, 1.0000001, nan, inf};
   const Figure figures[] = {
       {"system gain", &SensorModel::system_gain_dn_per_e, {1e-300, 1e6}, {0, -1, 1.0000001e6, nan, inf}},
       {"read noise", &SensorModel::read_noise_e, good_noise, bad_noise},
@@ -81,9 +81,9 @@ TEST(CheckSensor, PassesBothEndsOfEveryRangeAndNothingBeyond) {
       {"white level", &SensorModel::white_level_dn, {257, 4095}, {256, 100, 4094.5, 4095.001, nan, inf, -inf}},
       {"dark temperature", &SensorModel::dark_temperature_c, {-200, 200}, {-200.1, 200.1, nan, inf}},
       {"dark doubling", &SensorModel::dark_doubling_c, {1, 1000}, {0.999, 1000.1, 0, -7, nan, inf}},
-      {"prnu", &SensorModel::prnu, good_share, bad_share},
-      {"dsnu", &SensorModel::dsnu, good_share, bad_share},
-      {"hot pixel fraction", &SensorModel::hot_pixel_fraction, good_share, bad_share},
+      {"prnu", &SensorModel::prnu, good_fraction, bad_fraction},
+      {"dsnu", &SensorModel::dsnu, good_fraction, bad_fraction},
+      {"hot pixel fraction", &SensorModel::hot_pixel_fraction, good_fraction, bad_fraction},
       {"hot pixel current", &SensorModel::hot_pixel_current_e_per_s, good_current, bad_current},
       {"row noise", &SensorModel::row_noise_e, good_noise, bad_noise},
       {"column noise", &SensorModel::column_noise_e, good_noise, bad_noise},

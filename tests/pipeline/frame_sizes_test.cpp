@@ -25,8 +25,8 @@ using test::Ramp;
 using Mode = DenoiseChoice::Mode;
 
 constexpr std::uint64_t seed = 20261123;
-constexpr TileLimits never{.most_whole_px = std::int64_t{1} << 40};
-constexpr TileLimits small_tiles{.most_whole_px = 0, .side_px = 256};
+constexpr TileLimits never{.max_whole_px = std::int64_t{1} << 40};
+constexpr TileLimits small_tiles{.max_whole_px = 0, .side_px = 256};
 
 PoolExecutor executor(2);
 

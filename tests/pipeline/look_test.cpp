@@ -92,18 +92,18 @@ TEST(EyeLook, WithoutEffectsChangesNoBit) {
 }
 
 TEST(EyeLook, DarkensRedsAndFadesColoursAsTheLightGoes) {
-  double red_share = 10, red_saturation = 10, green_saturation = 10;
+  double red_fraction = 10, red_saturation = 10, green_saturation = 10;
   for (const double cd_m2 : {100.0, 1.0, 0.1, 0.01, 0.001}) {
     const SceneLinear picture = seen(eye_at(cd_m2));
     const auto red = field_of(picture, 1), green = field_of(picture, 2), blue = field_of(picture, 3);
-    EXPECT_LT(luminance(red) / luminance(blue), red_share) << cd_m2 << ": Purkinje";
+    EXPECT_LT(luminance(red) / luminance(blue), red_fraction) << cd_m2 << ": Purkinje";
     EXPECT_LT(saturation(red), red_saturation);
     EXPECT_LT(saturation(green), green_saturation);
-    red_share = luminance(red) / luminance(blue);
+    red_fraction = luminance(red) / luminance(blue);
     red_saturation = saturation(red);
     green_saturation = saturation(green);
   }
-  EXPECT_LT(red_share, 1) << "by night the blue is brighter";
+  EXPECT_LT(red_fraction, 1) << "by night the blue is brighter";
   EXPECT_LT(red_saturation, 0.05) << "and both are grey";
 }
 

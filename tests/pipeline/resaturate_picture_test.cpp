@@ -44,8 +44,8 @@ TEST(ResaturatePicture, GivesBackTheChromaticityThatDarkTook) {
   EXPECT_NEAR(got->x, expected->x, 1e-5);  // float samples
   EXPECT_NEAR(got->y, expected->y, 1e-5);
   EXPECT_NEAR(xyz.plane[1].at(9, 9), light.y + dark.y, 1e-6) << "luminance stays";
-  EXPECT_EQ(out.share_dark, 0);
-  EXPECT_EQ(out.share_saturated, 0);
+  EXPECT_EQ(out.fraction_dark, 0);
+  EXPECT_EQ(out.fraction_saturated, 0);
 }
 
 TEST(ResaturatePicture, WhatIsNoBrighterThanBlackBecomesGrey) {
@@ -54,13 +54,13 @@ TEST(ResaturatePicture, WhatIsNoBrighterThanBlackBecomesGrey) {
   const auto got = xy_of(Xyz{xyz.plane[0].at(3, 3), xyz.plane[1].at(3, 3), xyz.plane[2].at(3, 3)});
   ASSERT_TRUE(got);
   EXPECT_NEAR(got->x, white_d65.x, 1e-6);
-  EXPECT_EQ(out.share_dark, 1);
+  EXPECT_EQ(out.fraction_dark, 1);
 }
 
 TEST(ResaturatePicture, SaturatedPixelsStayAsTheyAre) {
   const Xyz white{0.9505, 1, 1.089};
   const auto out = resaturate_picture(filled(8, 8, white), exact_to_xyz(), executor);
-  EXPECT_EQ(out.share_saturated, 1);
+  EXPECT_EQ(out.fraction_saturated, 1);
   EXPECT_EQ(std::get<SceneLinear>(out.picture).plane[2].at(4, 4), static_cast<float>(white.z));
 }
 

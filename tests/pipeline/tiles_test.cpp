@@ -20,8 +20,8 @@ using Mode = DenoiseChoice::Mode;
 
 InlineExecutor executor;
 
-constexpr TileLimits small_tiles{.most_whole_px = 0, .side_px = 256};
-constexpr TileLimits never{.most_whole_px = std::int64_t{1} << 40};
+constexpr TileLimits small_tiles{.max_whole_px = 0, .side_px = 256};
+constexpr TileLimits never{.max_whole_px = std::int64_t{1} << 40};
 
 /// Waves, a bright edge, stars beside the seams, a saturated lamp across one.
 denoise_testing::Scene night_scene(double mean_e) {
@@ -50,7 +50,7 @@ DevelopPlan planned(const RawFrame& frame, const DevelopOptions& options) {
 }
 
 Picture rendered(const RawFrame& frame, const DevelopPlan& plan, const TileLimits& limits, Executor& with = executor) {
-  EXPECT_EQ(goes_by_tiles(frame.raw, plan, limits), limits.most_whole_px == 0);
+  EXPECT_EQ(is_tiled(frame.raw, plan, limits), limits.max_whole_px == 0);
   Picture out = make_picture(plan);
   Pipeline(with, limits).render(frame, plan, out);
   return out;
@@ -167,7 +167,7 @@ Difference difference(const Picture& tiled, const Picture& whole, const DevelopP
 
 // With 256 px of margin this scene has 0.00044 and 0.006 at most, with 128 px 0.001 and 0.018 at least: the bounds lie
 // between. What a level leaves of the noise of a pixel is 0.05 and more.
-constexpr double most_rms = 0.0008, most_anywhere = 0.012;
+constexpr double max_rms = 0.0008, max_anywhere = 0.012;
 
 /// A piece that took the lines of another place for its own would be seen.
 denoise::LineOffsets uneven_lines(denoise::Lines lines, int count) {
@@ -187,8 +187,8 @@ TEST(Tiles, WithNoiseReductionTheDifferenceIsFarBelowTheNoise) {
     plan.noise_reduction.lines = {uneven_lines(denoise::Lines::rows, 741), uneven_lines(denoise::Lines::columns, 1003)};
     const Picture whole = rendered(frame, plan, never);
     const Difference found = difference(rendered(frame, plan, small_tiles), whole, plan, mean_e);
-    EXPECT_LT(found.rms, most_rms) << mean_e << " e-, " << name_of(level);
-    EXPECT_LT(found.most, most_anywhere) << mean_e << " e-, " << name_of(level);
+    EXPECT_LT(found.rms, max_rms) << mean_e << " e-, " << name_of(level);
+    EXPECT_LT(found.most, max_anywhere) << mean_e << " e-, " << name_of(level);
     EXPECT_GT(found.most, 0);
   }
 }
@@ -226,7 +226,7 @@ TEST(Tiles, TheNumberOfThreadsDoesNotChangeTheBits) {
 TEST(Tiles, OnlyLargeFramesWithAMosaicOfTheirOwnAreCutUp) {
   const RawFrame frame = demanding_frame(BayerPhase::rggb, 300, 200);
   DevelopPlan plan = planned(frame, options_for({.mode = Mode::level}));
-  const auto cut_up = [&](std::int64_t most_px) { return goes_by_tiles(frame.raw, plan, {.most_whole_px = most_px}); };
+  const auto cut_up = [&](std::int64_t max_px) { return is_tiled(frame.raw, plan, {.max_whole_px = max_px}); };
   EXPECT_TRUE(cut_up(300 * 200 - 1));
   EXPECT_FALSE(cut_up(300 * 200));
   plan.options.denoise.maps = true;
@@ -244,7 +244,7 @@ TEST(Tiles, OnlyLargeFramesWithAMosaicOfTheirOwnAreCutUp) {
   RawDn monochrome;
   monochrome.layout = SensorLayout::monochrome;
   monochrome.active = monochrome.default_crop = frame.raw.active;
-  EXPECT_FALSE(goes_by_tiles(monochrome, plan, small_tiles));
+  EXPECT_FALSE(is_tiled(monochrome, plan, small_tiles));
 }
 
 /// 256 px a region; the first column has a level, the second keeps its noise, the third has another.
@@ -282,7 +282,7 @@ TEST(Regions, EachHasItsOwnLevelInWholeFramesAndInTiles) {
   plan.noise_reduction.level.reset();
   const Picture noisy = rendered(frame, plan, never);
   plan.noise_reduction.regions = three_columns(2);
-  for (const TileLimits& limits : {never, small_tiles, TileLimits{.most_whole_px = 0, .side_px = 512}}) {
+  for (const TileLimits& limits : {never, small_tiles, TileLimits{.max_whole_px = 0, .side_px = 512}}) {
     Picture mixed = rendered(frame, plan, limits);
     const auto part_of = [](const Picture& picture, int first, int last) {
       SceneLinear out(last - first, 497);
@@ -296,8 +296,8 @@ TEST(Regions, EachHasItsOwnLevelInWholeFramesAndInTiles) {
     };
     // Demosaicing reaches 2 px across the seams, which are at 255 and 511 of the picture.
     EXPECT_TRUE(same_bits(part_of(mixed, 258, 508), part_of(noisy, 258, 508)));
-    EXPECT_LT(difference(part_of(mixed, 0, 253), part_of(standard, 0, 253), plan, 20).most, most_anywhere);
-    EXPECT_LT(difference(part_of(mixed, 514, 697), part_of(draft, 514, 697), plan, 20).most, most_anywhere);
+    EXPECT_LT(difference(part_of(mixed, 0, 253), part_of(standard, 0, 253), plan, 20).most, max_anywhere);
+    EXPECT_LT(difference(part_of(mixed, 514, 697), part_of(draft, 514, 697), plan, 20).most, max_anywhere);
     EXPECT_GT(difference(part_of(mixed, 258, 508), part_of(standard, 258, 508), plan, 20).rms, 0.5);
   }
 }
@@ -333,9 +333,9 @@ TEST(Regions, WhereNoiseStaysItsVarianceIsThatOfTheModel) {
 long held_while_rendering(const RawFrame& frame, const DevelopPlan& plan, const TileLimits& limits) {
   Picture out = make_picture(plan);
   const long before = test::held_bytes;
-  test::most_held_bytes = before;
+  test::max_held_bytes = before;
   Pipeline(executor, limits).render(frame, plan, out);
-  return test::most_held_bytes - before;
+  return test::max_held_bytes - before;
 }
 
 TEST(PipelineMemory, IsWhatItIsSaidToBe) {
@@ -343,7 +343,7 @@ TEST(PipelineMemory, IsWhatItIsSaidToBe) {
   GTEST_SKIP() << "the denoiser's memory is not counted here";
 #endif
   const RawFrame frame = demanding_frame(BayerPhase::rggb, 801, 603);
-  constexpr TileLimits larger{.most_whole_px = 0, .side_px = 512};
+  constexpr TileLimits larger{.max_whole_px = 0, .side_px = 512};
   for (const TileLimits& limits : {never, small_tiles, larger}) {
     for (const bool half : {false, true}) {
       for (const Mode mode : {Mode::off, Mode::level}) {

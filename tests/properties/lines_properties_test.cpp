@@ -106,10 +106,10 @@ RC_GTEST_PROP(NoiseCheckProperty, OfAnythingIsWithinItsRangesAndTheSameForAnyThr
   const NoiseCheck check = check_noise(view, noise, one), other = check_noise(view, noise, three);
   RC_ASSERT(check.measured_over_model == other.measured_over_model);
   RC_ASSERT(check.across_over_model == other.across_over_model);
-  RC_ASSERT(check.share_negative == other.share_negative && check.windows == other.windows);
-  for (const double share : check.share_negative) RC_ASSERT(share >= 0 && share <= 1);
-  RC_ASSERT(check.share_without_signal >= 0 && check.share_without_signal <= 1);
-  RC_ASSERT(check.share_saturated >= 0 && check.share_saturated <= 1 && check.windows >= 0);
+  RC_ASSERT(check.fraction_negative == other.fraction_negative && check.windows == other.windows);
+  for (const double share : check.fraction_negative) RC_ASSERT(share >= 0 && share <= 1);
+  RC_ASSERT(check.fraction_without_signal >= 0 && check.fraction_without_signal <= 1);
+  RC_ASSERT(check.fraction_saturated >= 0 && check.fraction_saturated <= 1 && check.windows >= 0);
   for (const auto& ratio : check.measured_over_model) RC_ASSERT(!ratio || (*ratio >= 0 && std::isfinite(*ratio)));
   for (const double scale : variance_scale_of(check)) RC_ASSERT(scale >= 0.01 && scale <= 1);
 }

@@ -72,7 +72,7 @@ RC_GTEST_PROP(MesopicProperty, LuminanceIsLinearAndBetweenThatOfConesAndOfRods, 
   const double share = any_between(-2, 2);
   const double of_both = mesopic_luminance_cd_m2(m, {a.photopic + share * b.photopic, a.scotopic + share * b.scotopic});
   RC_ASSERT(std::abs(of_both - (of_a + share * of_b)) <= 1e-13 * (of_a + 2 * of_b + high));
-  RC_ASSERT(rod_share(m) >= rod_share(std::min(1.0, m + 0.01)));
+  RC_ASSERT(rod_fraction(m) >= rod_fraction(std::min(1.0, m + 0.01)));
 }
 
 RC_GTEST_PROP(MesopicProperty, PupilsNarrowWithLightAndLetMoreOfItThrough, ()) {

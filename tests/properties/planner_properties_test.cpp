@@ -11,8 +11,8 @@
 
 #include "isp/adapter/stage_budget.h"
 #include "isp/pipeline/budget/cost_model.h"
-#include "isp/pipeline/budget/effect_candidates.h"
-#include "isp/pipeline/budget/plan_effects.h"
+#include "isp/pipeline/budget/step_candidates.h"
+#include "isp/pipeline/budget/step_plan.h"
 #include "isp/pipeline/plan/plan_develop.h"
 #include "tests/pipeline/night_frames.h"
 #include "tests/properties/draws.h"
@@ -72,10 +72,10 @@ RC_GTEST_PROP(CostModelProperty, ASizeCountsAllItsPixelsAndWhatIsAppended, ()) {
 }
 
 /// What a frame calls for: sizes known or not, levels that leave the less the more they work.
-EffectFacts any_facts(const EffectsChoice& choice) {
+StepFacts any_facts(const ProcessingGoal& choice) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto size = [&] { return *rc::gen::element(0.0, nan, any_decade(-2, 1), any_decade(-2, 1)); };
-  EffectFacts out{.choice = choice, .sizes = {}, .blocks = {}};
+  StepFacts out{.choice = choice, .sizes = {}, .blocks = {}};
   out.has_noise = *rc::gen::arbitrary<bool>();
   if (out.has_noise) {
     const double draft = any_decade(-2, 1), standard = draft * any_between(0, 1);
@@ -84,7 +84,7 @@ EffectFacts any_facts(const EffectsChoice& choice) {
     const double fine = any_between(0, 1);
     out.chroma.work = {fine, 1 - fine, any_between(0, 1)};
   }
-  out.sizes = {.sampled_share = any_between(0, 1), .defects = size(), .lines = size(), .display = size()};
+  out.sizes = {.sampled_fraction = any_between(0, 1), .defects = size(), .lines = size(), .display = size()};
   out.sizes.has_defects = *rc::gen::arbitrary<bool>();
   out.sizes.dark = *rc::gen::element(0.0, any_decade(-2, 1));
   out.may_search = *rc::gen::arbitrary<bool>();
@@ -97,24 +97,23 @@ EffectFacts any_facts(const EffectsChoice& choice) {
 }
 
 RC_GTEST_PROP(PlannerProperty, WithoutABudgetWhatIsLeftOutStaysBelowTheTolerance, ()) {
-  EffectsChoice choice{.tolerance_delta_e = any_decade(-3, 1)};
+  ProcessingGoal choice{.tolerance_delta_e = any_decade(-3, 1)};
   if (*rc::gen::arbitrary<bool>()) choice.cost = any_cost();
-  const EffectFacts facts = any_facts(choice);
-  const auto plan = choose_candidate(facts);
+  const StepFacts facts = any_facts(choice);
+  const auto plan = choose_step_candidate(facts);
   RC_ASSERT(plan.has_value());
   // The noise of a frame that no level may take stays whatever is chosen; so do lines that go with it.
   RC_ASSERT(plan->left < *choice.tolerance_delta_e);
 }
 
 /// All there are with a budget: a display is never left out for time.
-std::vector<EffectCandidate> all_plans(const EffectFacts& facts) {
+std::vector<StepCandidate> all_plans(const StepFacts& facts) {
   std::vector<std::optional<Level>> levels{std::nullopt};
   if (facts.has_noise) levels = {std::nullopt, Level::draft, Level::standard, Level::high, Level::best};
-  std::vector<EffectCandidate> out;
+  std::vector<StepCandidate> out;
   for (const auto level : levels) {
     for (int bits = 0; bits < 8; ++bits) {
-      EffectCandidate plan{
-          .level = level, .defects = (bits & 1) != 0, .lines = (bits & 2) != 0, .dark = (bits & 4) != 0};
+      StepCandidate plan{.level = level, .defects = (bits & 1) != 0, .lines = (bits & 2) != 0, .dark = (bits & 4) != 0};
       rate(facts, plan);
       out.push_back(plan);
     }
@@ -123,11 +122,11 @@ std::vector<EffectCandidate> all_plans(const EffectFacts& facts) {
 }
 
 RC_GTEST_PROP(PlannerProperty, NoPlanThatFitsTheBudgetIsMoreAccurate, ()) {
-  const EffectsChoice choice{.tolerance_delta_e = std::nullopt, .budget_s = any_decade(-4, 1), .cost = any_cost()};
-  const EffectFacts facts = any_facts(choice);
-  const auto chosen = choose_candidate(facts);
+  const ProcessingGoal choice{.tolerance_delta_e = std::nullopt, .budget_s = any_decade(-4, 1), .cost = any_cost()};
+  const StepFacts facts = any_facts(choice);
+  const auto chosen = choose_step_candidate(facts);
   RC_ASSERT(!chosen || chosen->seconds <= *choice.budget_s);
-  for (const EffectCandidate& plan : all_plans(facts)) {
+  for (const StepCandidate& plan : all_plans(facts)) {
     if (plan.seconds > *choice.budget_s) continue;
     RC_ASSERT(chosen.has_value());
     RC_ASSERT(chosen->error <= plan.error);
@@ -135,10 +134,11 @@ RC_GTEST_PROP(PlannerProperty, NoPlanThatFitsTheBudgetIsMoreAccurate, ()) {
 }
 
 RC_GTEST_PROP(PlannerProperty, WithABudgetNoPlanWithinTheToleranceIsCheaper, ()) {
-  const EffectsChoice choice{.tolerance_delta_e = any_decade(-2, 1), .budget_s = any_decade(-2, 1), .cost = any_cost()};
-  const EffectFacts facts = any_facts(choice);
-  const auto chosen = choose_candidate(facts);
-  for (const EffectCandidate& plan : all_plans(facts)) {
+  const ProcessingGoal choice{
+      .tolerance_delta_e = any_decade(-2, 1), .budget_s = any_decade(-2, 1), .cost = any_cost()};
+  const StepFacts facts = any_facts(choice);
+  const auto chosen = choose_step_candidate(facts);
+  for (const StepCandidate& plan : all_plans(facts)) {
     if (plan.seconds > *choice.budget_s || plan.left >= *choice.tolerance_delta_e) continue;
     RC_ASSERT(chosen.has_value() && chosen->left < *choice.tolerance_delta_e);
     RC_ASSERT(chosen->seconds <= plan.seconds);
@@ -146,14 +146,14 @@ RC_GTEST_PROP(PlannerProperty, WithABudgetNoPlanWithinTheToleranceIsCheaper, ())
 }
 
 RC_GTEST_PROP(PlannerProperty, MoreWorkLeavesNoMoreAndTakesNoLess, ()) {
-  const EffectsChoice choice{.cost = any_cost()};
-  const EffectFacts facts = any_facts(choice);
-  EffectCandidate less{.level = *rc::gen::element<std::optional<Level>>(std::nullopt, Level::draft, Level::standard)};
+  const ProcessingGoal choice{.cost = any_cost()};
+  const StepFacts facts = any_facts(choice);
+  StepCandidate less{.level = *rc::gen::element<std::optional<Level>>(std::nullopt, Level::draft, Level::standard)};
   if (!facts.has_noise) less.level.reset();
   less.defects = less.lines = less.dark = less.display = false;
   auto more = less;
-  const auto part = *rc::gen::element(&EffectCandidate::defects, &EffectCandidate::lines, &EffectCandidate::dark,
-                                      &EffectCandidate::display);
+  const auto part =
+      *rc::gen::element(&StepCandidate::defects, &StepCandidate::lines, &StepCandidate::dark, &StepCandidate::display);
   more.*part = true;
   if (facts.has_noise && *rc::gen::arbitrary<bool>()) more.level = less.level ? Level::high : Level::draft;
   rate(facts, less);

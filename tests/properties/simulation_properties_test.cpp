@@ -21,7 +21,7 @@ namespace {
 
 using namespace properties;
 using isp::Effect;
-using isp::EffectSet;
+using isp::NoiseSourceSet;
 
 std::uint64_t any_seed() { return *rc::gen::arbitrary<std::uint64_t>(); }
 
@@ -129,7 +129,7 @@ struct Setup {
   std::vector<isp::BlockLevel> blocks = capture::block_levels(rate_e_per_s.view(), phase, exposure.time_s);
   isp::Developing developing = isp::developing_of(sensor, exposure, identity3(), {1, 1, 1}, blocks);
 
-  isp::EffectPlan plan_of(EffectSet effects) const {
+  isp::NoiseSourcePlan plan_of(NoiseSourceSet effects) const {
     return isp::fixed_effects(sensor, exposure, developing, blocks, effects);
   }
   capture::SensorFrame frame(std::uint64_t seed) const {
@@ -140,15 +140,15 @@ struct Setup {
             .seed = seed,
             .pattern_seed = seed + 1};
   }
-  Plane<float> read_out(EffectSet effects, std::uint64_t seed, Executor& executor) const {
+  Plane<float> read_out(NoiseSourceSet effects, std::uint64_t seed, Executor& executor) const {
     Plane<float> out(rate_e_per_s.width(), rate_e_per_s.height());
     capture::read_out(frame(seed), plan_of(effects), executor, out.view());
     return out;
   }
 };
 
-EffectSet any_effects() {
-  EffectSet out;
+NoiseSourceSet any_effects() {
+  NoiseSourceSet out;
   for (int i = 0; i < isp::effect_count; ++i) {
     if (*rc::gen::arbitrary<bool>()) out = out.with(static_cast<Effect>(i));
   }
@@ -157,7 +157,7 @@ EffectSet any_effects() {
 
 RC_GTEST_PROP(SensorProperty, AnyEffectsGiveTheSameFrameForAnyThreads, ()) {
   const Setup setup;
-  const EffectSet effects = any_effects();
+  const NoiseSourceSet effects = any_effects();
   const std::uint64_t seed = any_seed();
   InlineExecutor one;
   PoolExecutor three(3);
@@ -185,15 +185,15 @@ RC_GTEST_PROP(SensorProperty, WithoutEffectsItIsALine, ()) {
 RC_GTEST_PROP(SensorProperty, WhatIsLeftOutStaysBelowTheTolerance, ()) {
   const Setup setup;
   const isp::Tolerance tolerance{any_decade(-2, 1), any_decade(-3, 0)};
-  const auto plan = isp::plan_effects(setup.sensor, setup.exposure, setup.developing, setup.blocks, tolerance);
+  const auto plan = isp::plan_noise_sources(setup.sensor, setup.exposure, setup.developing, setup.blocks, tolerance);
   RC_ASSERT(plan.region_of_block.size() == setup.blocks.size());
   for (const std::uint8_t region : plan.region_of_block) RC_ASSERT(region < plan.regions.size());
   for (const isp::RegionPlan& region : plan.regions) {
     RC_ASSERT(region.left_out_together.delta_e < tolerance.delta_e);
     RC_ASSERT(region.left_out_together.relative_variance < tolerance.relative_variance);
-    for (const isp::EffectDecision& d : region.decisions) {
+    for (const isp::NoiseSourceDecision& d : region.decisions) {
       RC_ASSERT(region.kept.has(d.effect) == d.kept);
-      RC_ASSERT(d.reason != isp::EffectDecision::Reason::negligible || d.alone.delta_e < tolerance.delta_e);
+      RC_ASSERT(d.reason != isp::NoiseSourceDecision::Reason::negligible || d.alone.delta_e < tolerance.delta_e);
     }
   }
 }

@@ -104,7 +104,7 @@ struct Star {
 };
 
 // Light within a pixel of a Gaussian spot.
-double share_within(double pixel, double centre, double spread) {
+double fraction_within(double pixel, double centre, double spread) {
   const auto below = [&](double edge) { return std::erf((edge - centre) / (std::sqrt(2.0) * spread)); };
   return (below(pixel + 0.5) - below(pixel - 0.5)) / 2;
 }
@@ -132,7 +132,7 @@ int stars_altered(double spread, const std::array<double, 3>& colour, unsigned s
       for (int x = static_cast<int>(s.x) - 6; x <= static_cast<int>(s.x) + 7; ++x) {
         if (x < 0 || y < 0 || x >= side || y >= side) continue;
         const auto c = static_cast<std::size_t>(colour_at(BayerPhase::rggb, x, y));
-        sky.at(x, y) += colour[c] * s.flux_e * share_within(x, s.x, spread) * share_within(y, s.y, spread);
+        sky.at(x, y) += colour[c] * s.flux_e * fraction_within(x, s.x, spread) * fraction_within(y, s.y, spread);
       }
     }
   }

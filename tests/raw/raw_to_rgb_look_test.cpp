@@ -107,7 +107,7 @@ TEST(RawToRgbLook, LeavesTheReddestRedsWhatSodiumLightLeaves) {
   SceneLinear out(4, 4);
   isp::RawToRgb(4, 1).linear(isp::CameraPlanes{{red.view(), none.view(), none.view()}, {1, 1, 1}}, transform,
                              out.view(), executor);
-  const float expected = 0.5f * look.grid.luminance[0] * LookGrid::least_rods;
+  const float expected = 0.5f * look.grid.luminance[0] * LookGrid::min_rods;
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(out.plane[c].at(1, 1), expected, 1e-7) << "grey, and not black";
 }
 

@@ -22,19 +22,19 @@ struct Camera {
   double white_dn() const { return std::exp2(bits) - 1; }
   double offset_dn2() const { return gain_dn * gain_dn * read_e * read_e + 1.0 / 12; }
   /// Within 1000 e- and 0.85 of white.
-  double most_e() const { return std::min(1000.0, 0.85 * (white_dn() - black_dn) / gain_dn); }
+  double max_e() const { return std::min(1000.0, 0.85 * (white_dn() - black_dn) / gain_dn); }
 };
 constexpr Camera ten_bits{0.24, 2, 64, 10}, twelve_bits{1, 1, 256, 12};
 
 /// Electrons by column.
 struct Light {
-  double least_e;
-  double most_e;
+  double min_e;
+  double max_e;
   int steps = 0;  // 0: rises evenly, in the logarithm
   double at(int x, int width) const {
     double t = static_cast<double>(x) / width;
     if (steps > 0) t = std::floor(t * steps) / std::max(1, steps - 1);
-    return least_e * std::pow(most_e / least_e, t);
+    return min_e * std::pow(max_e / min_e, t);
   }
 };
 
@@ -68,7 +68,7 @@ std::optional<NoiseLine> line_of(const Camera& camera, const Plane<std::uint16_t
 
 TEST(TileNoise, FindsGainAndOffsetOfFlatsAndSlopesWithinItsOwnErrors) {
   for (const Camera& camera : {ten_bits, twelve_bits, Camera{4, 1.5, 256, 12}, Camera{8, 0.3, 256, 12}}) {
-    for (const Light& light : {Light{1, camera.most_e(), 8}, Light{1, camera.most_e()}}) {
+    for (const Light& light : {Light{1, camera.max_e(), 8}, Light{1, camera.max_e()}}) {
       const auto line = line_of(camera, frame_of(camera, light, 512, 3));
       ASSERT_TRUE(line);
       EXPECT_NEAR(line->gain_dn, camera.gain_dn, 5 * line->gain_error_dn);
@@ -85,7 +85,7 @@ TEST(TileNoise, StatesTheErrorsItsResultsHave) {
     double gain = 0, gain2 = 0, offset = 0, offset2 = 0, gain_error = 0, offset_error = 0;
     for (int i = 0; i < frames; ++i) {
       const auto seed = static_cast<std::uint64_t>(i);
-      const auto line = line_of(camera, frame_of(camera, {1, camera.most_e(), 6}, 256, seed));
+      const auto line = line_of(camera, frame_of(camera, {1, camera.max_e(), 6}, 256, seed));
       ASSERT_TRUE(line);
       gain += line->gain_dn / frames;
       gain2 += line->gain_dn * line->gain_dn / frames;

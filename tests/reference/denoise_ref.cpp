@@ -89,7 +89,7 @@ struct Frame {
 };
 
 /// Returns the fraction of coarser levels in the chroma of `level`, at the position of cell (x, y) of level `grid`.
-double coarser_share(const Image& starts, int level, int grid, int x, int y) {
+double coarser_fraction(const Image& starts, int level, int grid, int x, int y) {
   const auto place = [grid](int i, int tiles) {
     return std::clamp((i + 0.5) * (1 << grid) / tile - 0.5, 0.0, static_cast<double>(tiles - 1));
   };
@@ -142,7 +142,7 @@ void recompose(std::vector<Four>& levels, const Image& starts) {
       const Image correction = up2(binomial3(difference)), smooth = up2(coarse);
       for (int y = 0; y < fine.height; ++y) {
         for (int x = 0; x < fine.width; ++x) {
-          const double share = p == 0 ? 0 : coarser_share(starts, l, l, x, y);
+          const double share = p == 0 ? 0 : coarser_fraction(starts, l, l, x, y);
           fine.at(x, y) = (1 - share) * (fine.at(x, y) + correction.at(x, y)) + share * smooth.at(x, y);
         }
       }
@@ -159,9 +159,9 @@ Four total_residual(const std::vector<Four>& levels, const Image& starts) {
       Image sum = total[p].v.empty() ? Image(own.width, own.height) : up2(total[p]);
       for (int y = 0; y < own.height; ++y) {
         for (int x = 0; x < own.width; ++x) {
-          const double coarser = p == 0 ? 0 : coarser_share(starts, l, l + 1, x, y);
+          const double coarser = p == 0 ? 0 : coarser_fraction(starts, l, l + 1, x, y);
           const bool between = l > 0 && l + 1 < static_cast<int>(levels.size());  // the coarsest counts as it is
-          const double finer = p != 0 && between ? coarser_share(starts, l - 1, l + 1, x, y) : 0;
+          const double finer = p != 0 && between ? coarser_fraction(starts, l - 1, l + 1, x, y) : 0;
           sum.at(x, y) += (1 - coarser) * (1 + (as_finest - 1) * finer) * own.at(x, y);
         }
       }

@@ -197,8 +197,8 @@ Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride
           kept[i / block][i % block] = g * f[p][i / block][i % block];
         }
         const Block value = inverse_dct(kept);
-        const auto left = denoise::residual_shares(p == 0 ? denoise::PlaneKind::luma : denoise::PlaneKind::chroma,
-                                                   pilot == nullptr ? 0 : 1, stride, level, levels);
+        const auto left = denoise::residual_fractions(p == 0 ? denoise::PlaneKind::luma : denoise::PlaneKind::chroma,
+                                                      pilot == nullptr ? 0 : 1, stride, level, levels);
         const double share = 1 / (v[p] * power);
         const double residual = v[p] * (left.kept * (power - 1) + left.other * (64 - power) + left.mean);
         for (int i = 0; i < block * block; ++i) {

@@ -63,7 +63,7 @@ Field adapted(const Field& light, const isp::NightLook& look) {
   for (const double v : level.back().value) mean += v / static_cast<double>(level.back().value.size());
   Field field = blurred(level.back(), std::min(std_cells, 8.0));
   for (double& v : field.value) {
-    v = isp::adaptation_share_of_mean * mean + (1 - isp::adaptation_share_of_mean) * v;
+    v = isp::adaptation_fraction_of_mean * mean + (1 - isp::adaptation_fraction_of_mean) * v;
   }
   for (std::size_t k = level.size() - 1; k-- > 0;) field = doubled(field, level[k].width, level[k].height);
   return field;
@@ -109,7 +109,7 @@ std::vector<Field> night_look(const RgbView<const float>& camera, const std::arr
         light.at(x, y) += look.luminance[j] * v;
         rods.at(x, y) += look.rods[j] * v;
       }
-      rods.at(x, y) = std::max(rods.at(x, y), std::min(LookGrid::least_rods * light.at(x, y), light.at(x, y)));
+      rods.at(x, y) = std::max(rods.at(x, y), std::min(LookGrid::min_rods * light.at(x, y), light.at(x, y)));
       photopic.at(x, y) = std::clamp(look.cd_m2_per_unit * light.at(x, y), 0.0, 1e9);
       scotopic.at(x, y) =
           std::clamp(look.cd_m2_per_unit * look.scotopic_ratio_of_white * rods.at(x, y), 0.27 * photopic.at(x, y), 1e9);
@@ -121,10 +121,10 @@ std::vector<Field> night_look(const RgbView<const float>& camera, const std::arr
   for (std::size_t i = 0; i < seen.value.size(); ++i) {
     const isp::NightEye eye = isp::night_eye({cones_field.value[i], rods_field.value[i]});
     const double share = (1 - eye.state.m) * isp::scotopic_at_555_nm * look.scotopic_ratio_of_white;
-    part[LookGrid::rod_share].value[i] = look.effects.purkinje ? share / (eye.state.m + share) : 0;
+    part[LookGrid::rod_fraction].value[i] = look.effects.purkinje ? share / (eye.state.m + share) : 0;
     part[LookGrid::chroma].value[i] = look.effects.chroma ? eye.chroma : 1;
     part[LookGrid::blue].value[i] = look.effects.hue ? eye.blue : 0;
-    seen.value[i] = light.value[i] + part[LookGrid::rod_share].value[i] * (rods.value[i] - light.value[i]);
+    seen.value[i] = light.value[i] + part[LookGrid::rod_fraction].value[i] * (rods.value[i] - light.value[i]);
     const double blur_px = look.effects.acuity ? eye.blur_std_deg * look.pixels_per_degree : 0;
     variance_px2.value[i] = blur_px * blur_px;
   }

@@ -185,7 +185,7 @@ Shrunk nl_bayes(const Four& x, const Four& variance, const Four& pilot, int leve
       const auto places = nearest(pilot, variance, {column, y});
       const FoundBy found = found_by(starts, level, {column, y});
       for (int p = 0; p < 4; ++p) {
-        const PatchShares left = patch_shares(p == 0 ? PlaneKind::luma : PlaneKind::chroma, found);
+        const PatchShares left = patch_fractions(p == 0 ? PlaneKind::luma : PlaneKind::chroma, found);
         add_group(x, variance, pilot, p, places, left, out);
       }
     }

@@ -101,8 +101,8 @@ Rgb seen(const Rgb& v, const LookGrid& look, int x, int y) {
     light += look.luminance[c] * v[c];
     rods += look.rods[c] * v[c];
   }
-  rods = std::max(rods, std::min(LookGrid::least_rods * light, light));
-  const double perceived = light + interpolated(LookGrid::rod_share) * (rods - light);
+  rods = std::max(rods, std::min(LookGrid::min_rods * light, light));
+  const double perceived = light + interpolated(LookGrid::rod_fraction) * (rods - light);
   const double chroma =
       interpolated(LookGrid::chroma) * (std::max(perceived, 0.0) + look.dark) / (std::max(light, 0.0) + look.dark);
   Rgb out{};

@@ -23,7 +23,7 @@ bool above(double x, double mean, double variance, double z, double few) {
 struct TemporalMean::Now {
   const denoise::RawElectronsView& raw;
   const denoise::RawNoise& noise;
-  double least_weight;
+  double min_weight;
 
   std::size_t colour(int x, int y) const { return static_cast<std::size_t>(colour_at(raw.phase, x, y)); }
   static double dark_e(const denoise::RawNoise& of, BayerPhase phase, std::size_t colour) {
@@ -41,7 +41,7 @@ struct TemporalMean::Now {
   }
   double dark_e(std::size_t colour) const { return dark_e(noise, raw.phase, colour); }
   double variance(std::size_t colour, double signal_e) const { return variance(noise, raw.phase, colour, signal_e); }
-  double most_e(std::size_t colour) const { return std::min(noise.saturation_e[colour], 1e9) - dark_e(colour); }
+  double max_e(std::size_t colour) const { return std::min(noise.saturation_e[colour], 1e9) - dark_e(colour); }
   double value_e(int x, int y) const { return usable(raw.value.at(x, y)) - dark_e(colour(x, y)); }
   template <class Work>
   void each_site(int x, int y, int size, const Work& work) const {
@@ -55,7 +55,7 @@ void TemporalMean::rescale(const Now& now, double light, int x, int y) {
   std::array<double, 3> sum{}, count{};
   now.each_site(side * x, side * y, side, [&](int u, int v, std::size_t c) {
     double& mean = signal_e_.at(u, v);
-    mean = std::min(std::clamp(light * mean, -1e9, 1e9), now.most_e(c));
+    mean = std::min(std::clamp(light * mean, -1e9, 1e9), now.max_e(c));
     sum[c] += mean;
     count[c] += 1;
   });
@@ -70,13 +70,13 @@ void TemporalMean::rescale(const Now& now, double light, int x, int y) {
 }
 
 int TemporalMean::level_of(const Now& now, int x, int y, const denoise::MotionThresholds& at) const {
-  const double s = blocks_.at(x, y).share, weight = std::max(s / (1 + s), now.least_weight), fresh = s / (1 + s);
+  const double s = blocks_.at(x, y).share, weight = std::max(s / (1 + s), now.min_weight), fresh = s / (1 + s);
   double squares = 0, bias = 0, steady = 0, poisson = 0, sites = 0;
   std::array<double, 3> change{}, weights{}, electrons{}, count{};
   for (int group = 0; group < 4; ++group) {
     std::array<double, 3> of_squares{}, of_change{}, of_mean{}, n{};
     now.each_site(side * x + 4 * (group % 2), side * y + 4 * (group / 2), 4, [&](int u, int v, std::size_t c) {
-      const double most = now.most_e(c), value = std::min(now.value_e(u, v), most), mean = signal_e_.at(u, v);
+      const double most = now.max_e(c), value = std::min(now.value_e(u, v), most), mean = signal_e_.at(u, v);
       if (std::min(value, mean) >= most) return;
       of_squares[c] += std::pow(value - mean, 2);
       of_change[c] += value - mean;
@@ -127,13 +127,13 @@ bool TemporalMean::has_moved(int x, int y) const {
 
 double TemporalMean::run(const denoise::RawElectronsView& raw, const denoise::RawNoise& noise, double light,
                          const denoise::TemporalOptions& options) {
-  const Now now{raw, noise, 1.0 / options.most_frames};
+  const Now now{raw, noise, 1.0 / options.max_frames};
   const int width = raw.value.width, height = raw.value.height;
   const bool first = blocks_.empty() || mean_e.width() != width || mean_e.height() != height || phase_ != raw.phase;
   if (first) {
     mean_e = Plane<double>(width, height);
     signal_e_ = Plane<double>(width, height);
-    variance_share = Plane<double>((width + 1) / 2, (height + 1) / 2);
+    variance_fraction = Plane<double>((width + 1) / 2, (height + 1) / 2);
     blocks_ = Plane<Block>((width + side - 1) / side, (height + side - 1) / side);
     std::fill(blocks_.data(), blocks_.data() + blocks_.size(), Block{});
   } else {
@@ -150,16 +150,16 @@ double TemporalMean::run(const denoise::RawElectronsView& raw, const denoise::Ra
     for (int x = 0; x < blocks_.width(); ++x) {
       const bool starts = first || has_moved(x, y);
       double& share = blocks_.at(x, y).share;
-      const double weight = starts ? 1 : std::max(share / (1 + share), now.least_weight);
+      const double weight = starts ? 1 : std::max(share / (1 + share), now.min_weight);
       share = starts ? 1 : (1 - weight) * (1 - weight) * share + weight * weight;
       moved += starts ? 1 : 0;
       now.each_site(side * x, side * y, side, [&](int u, int v, std::size_t c) {
         double& mean = signal_e_.at(u, v);
-        const double value = std::min(now.value_e(u, v), now.most_e(c));
+        const double value = std::min(now.value_e(u, v), now.max_e(c));
         mean = starts ? value : mean + weight * (value - mean);
-        const bool as_measured = starts || now.value_e(u, v) >= now.most_e(c);
+        const bool as_measured = starts || now.value_e(u, v) >= now.max_e(c);
         mean_e.at(u, v) = as_measured ? usable(raw.value.at(u, v)) : mean + now.dark_e(c);
-        variance_share.at(u / 2, v / 2) = share;
+        variance_fraction.at(u / 2, v / 2) = share;
       });
     }
   }

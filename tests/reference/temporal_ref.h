@@ -12,8 +12,8 @@ class TemporalMean {
   double run(const denoise::RawElectronsView& raw, const denoise::RawNoise& noise, double light,
              const denoise::TemporalOptions& options);
 
-  Plane<double> mean_e;          // dark charge included
-  Plane<double> variance_share;  // of each 2x2 cell
+  Plane<double> mean_e;             // dark charge included
+  Plane<double> variance_fraction;  // of each 2x2 cell
 
  private:
   struct Block {

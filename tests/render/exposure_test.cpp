@@ -52,7 +52,7 @@ TEST(AutoExposure, IgnoresLampsSmallerThanOnePercent) {
 TEST(AutoExposure, NeverDarkensAndNeverGoesBeyondTen) {
   EXPECT_EQ(auto_exposure(scene(0.5, 0.9), 0).rule, ExposureRule::no_gain);
   EXPECT_EQ(auto_exposure(scene(0.5, 0.9), 0).ev, 0);
-  EXPECT_EQ(auto_exposure(scene(1e-5, 2e-5), 0).rule, ExposureRule::most_gain);
+  EXPECT_EQ(auto_exposure(scene(1e-5, 2e-5), 0).rule, ExposureRule::max_gain);
   EXPECT_EQ(auto_exposure(scene(1e-5, 2e-5), 0).ev, 10);
 }
 
@@ -108,7 +108,7 @@ TEST(ExposureRules, HaveDistinctNames) {
   EXPECT_EQ(name_of(ExposureRule::highlights), "highlights");
   EXPECT_EQ(name_of(ExposureRule::black_noise), "black-noise");
   EXPECT_EQ(name_of(ExposureRule::no_gain), "no-gain");
-  EXPECT_EQ(name_of(ExposureRule::most_gain), "most-gain");
+  EXPECT_EQ(name_of(ExposureRule::max_gain), "most-gain");
   EXPECT_EQ(name_of(ExposureRule::no_signal), "no-signal");
 }
 

@@ -55,10 +55,10 @@ TEST(NightLook, OfAnEvenFieldIsWhatTheEyeMakesOfIt) {
     const double rods = (1 - eye.state.m) * scotopic_at_555_nm * look.scotopic_ratio_of_white;
     for (const auto& [column, row] : {std::pair{0, 0}, {63, 47}, {31, 20}}) {
       // Linear between 256 nodes of luminance and 32 of S/P.
-      EXPECT_NEAR(part_at(grid, LookGrid::rod_share, column, row), rods / (eye.state.m + rods), 0.004) << light;
+      EXPECT_NEAR(part_at(grid, LookGrid::rod_fraction, column, row), rods / (eye.state.m + rods), 0.004) << light;
       EXPECT_NEAR(part_at(grid, LookGrid::chroma, column, row), eye.chroma, 0.003) << light;
       EXPECT_NEAR(part_at(grid, LookGrid::blue, column, row), eye.blue, 0.003) << light;
-      const double e = y + part_at(grid, LookGrid::rod_share, column, row) * (s - y);
+      const double e = y + part_at(grid, LookGrid::rod_fraction, column, row) * (s - y);
       EXPECT_NEAR(part_at(grid, LookGrid::base, column, row) + part_at(grid, LookGrid::detail, column, row) * e, e,
                   2e-6)
           << "an even field has no detail to lose";
@@ -175,15 +175,15 @@ TEST(NightLook, HasNoSeamsAlongRampsThroughAllOfVision) {
       look.pixels_per_degree = 4;  // no pooling to speak of
       const CameraRgb camera = ramp(colour, brightest_cd_m2, width);
       const LookGrid grid = maker.make(camera.view(), as_it_is, 1e9f, look, std::nullopt, executor);
-      for (const LookGrid::Part part : {LookGrid::rod_share, LookGrid::chroma, LookGrid::blue}) {
+      for (const LookGrid::Part part : {LookGrid::rod_fraction, LookGrid::chroma, LookGrid::blue}) {
         for (int x = 1; x < width; ++x) {
           ASSERT_LT(std::fabs(part_at(grid, part, x, 2) - part_at(grid, part, x - 1, 2)), 0.0042f) << part << " " << x;
         }
       }
       for (int x = 0; x < width; ++x) {
         ASSERT_GE(part_at(grid, LookGrid::base, x, 2), 0) << x;
-        least = std::min(least, part_at(grid, LookGrid::rod_share, x, 2));
-        most = std::max(most, part_at(grid, LookGrid::rod_share, x, 2));
+        least = std::min(least, part_at(grid, LookGrid::rod_fraction, x, 2));
+        most = std::max(most, part_at(grid, LookGrid::rod_fraction, x, 2));
       }
     }
     EXPECT_LT(least, 0.001f) << "cones alone";
@@ -318,7 +318,7 @@ TEST(NightLook, GivesTheSameGridWithAnyNumberOfThreads) {
 TEST(EyeRow, EqualsTheModelAtEverySP) {
   InlineExecutor executor;
   NightLookGrid maker(4, 4);
-  double worst_share = 0, worst_chroma = 0;
+  double worst_fraction = 0, worst_chroma = 0;
   std::mt19937 random(3);
   std::uniform_real_distribution<double> exponent(-5, 3), log_ratio(std::log(0.27), std::log(60.0));
   for (int i = 0; i < 2000; ++i) {
@@ -329,12 +329,12 @@ TEST(EyeRow, EqualsTheModelAtEverySP) {
     const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1, look, std::nullopt, executor);
     const NightEye eye = night_eye({light, ratio * light});
     const double rods = (1 - eye.state.m) * scotopic_at_555_nm * ratio;
-    worst_share =
-        std::max(worst_share, std::fabs(part_at(grid, LookGrid::rod_share, 0, 0) - rods / (eye.state.m + rods)));
+    worst_fraction =
+        std::max(worst_fraction, std::fabs(part_at(grid, LookGrid::rod_fraction, 0, 0) - rods / (eye.state.m + rods)));
     worst_chroma = std::max(worst_chroma, std::fabs(part_at(grid, LookGrid::chroma, 0, 0) - eye.chroma));
   }
-  RecordProperty("worst_share", std::to_string(worst_share));
-  EXPECT_LT(worst_share, 0.02);  // a lookup of m is off by that where m leaves 0 (spec 1.2)
+  RecordProperty("worst_share", std::to_string(worst_fraction));
+  EXPECT_LT(worst_fraction, 0.02);  // a lookup of m is off by that where m leaves 0 (spec 1.2)
   EXPECT_LT(worst_chroma, 0.01);
 }
 

@@ -10,7 +10,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double black_dn = 1024, largest_dn = 65535, most_dn_per_e = 8, saturation_over_white = 4;
+constexpr double black_dn = 1024, largest_dn = 65535, max_dn_per_e = 8, saturation_over_white = 4;
 
 /// Draws of the flaws, which no other draw depends on.
 class Flaws {
@@ -50,7 +50,7 @@ CameraColour colour() {
 BenchRaw raw_of(const DenoiseShot& shot, const SensorFlaws& flaws, std::uint64_t seed) {
   const int width = shot.raw_e.width(), height = shot.raw_e.height();
   const double dark_e = shot.light.dark_e, full_e = saturation_over_white * shot.white_e + dark_e;
-  const double dn_per_e = std::min(most_dn_per_e, (largest_dn - black_dn) / full_e);
+  const double dn_per_e = std::min(max_dn_per_e, (largest_dn - black_dn) / full_e);
   const double white_dn = std::floor(black_dn + dn_per_e * full_e);
   BenchRaw out;
   RawDn& raw = out.frame.raw;

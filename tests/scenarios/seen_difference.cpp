@@ -92,7 +92,7 @@ SeenDifference seen_difference(const RgbView<const float>& first, const RgbView<
   std::vector<float> sorted(difference.data(), difference.data() + difference.size());
   SeenDifference out;
   for (const float d : sorted) out.mean += static_cast<double>(d) / static_cast<double>(sorted.size());
-  const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(seen_share * static_cast<double>(sorted.size() - 1));
+  const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(seen_fraction * static_cast<double>(sorted.size() - 1));
   std::nth_element(sorted.begin(), at, sorted.end());
   out.percentile95 = static_cast<double>(*at);
   out.largest = static_cast<double>(*std::max_element(at, sorted.end()));

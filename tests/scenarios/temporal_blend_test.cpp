@@ -100,14 +100,14 @@ Plane<float> blended(const Plane<float>& level, const Plane<float>& mean, const 
 class Reducers {
  public:
   explicit Reducers(const Film& film)
-      : film_(film), mean_of_frames_(film.side, film.side, 1), share_(film.side / 2, film.side / 2) {}
+      : film_(film), mean_of_frames_(film.side, film.side, 1), fraction_(film.side / 2, film.side / 2) {}
 
   void next() {
     ++frame_;
     RawElectrons raw = film_.raw(frame_, one_);
     Plane<float> mean(film_.side, film_.side);
     mean_of_frames_.run({std::as_const(raw.value).view(), phase}, how(false, true, false).noise, 1, {}, mean.view(),
-                        share_.view(), one_);
+                        fraction_.view(), one_);
     time_ = time_only_.run(raw, how(false, true, frame_ == 1), std::move(time_.value), nullptr);
     both_ = together_.run(raw, how(true, true, frame_ == 1), std::move(both_.value), nullptr);
     level_ = level_only_.run(raw, how(true, false, false), std::move(level_.value), &maps_);
@@ -117,7 +117,7 @@ class Reducers {
   double both_db() const { return psnr_db(both_.value, film_, frame_); }
   template <class Doubt>
   Plane<float> with(const Doubt& doubt) const {
-    return blended(level_.value, time_.value, share_, maps_, doubt);
+    return blended(level_.value, time_.value, fraction_, maps_, doubt);
   }
   template <class Doubt>
   double db_with(const Doubt& doubt) const {
@@ -130,7 +130,7 @@ class Reducers {
   const Film& film_;
   InlineExecutor one_;
   denoise::TemporalMean mean_of_frames_;  // for its shares
-  Plane<float> share_;
+  Plane<float> fraction_;
   NoiseReducer time_only_{one_}, level_only_{one_}, together_{one_};
   SignalElectrons time_, level_, both_;
   NoiseMaps maps_;
@@ -210,7 +210,7 @@ TEST(TemporalBlend, OfASceneThatMovesIsNotWorseThanTheLevelAlone) {
   }
 }
 
-// Nightly: the table behind NoiseReducer::doubt_of, PSNR [dB] as means over all pictures.
+// Nightly: the table behind NoiseReducer::variance_penalty, PSNR [dB] as means over all pictures.
 TEST(TemporalBlend, OtherDoubtsAreNotBetterByAQuarterDecibel) {
   if (std::getenv("LOWLUX_NIGHTLY") == nullptr) GTEST_SKIP() << "runs with LOWLUX_NIGHTLY";
   constexpr std::array constant{1.0, 2.0, 4.0, 8.0, 16.0};

@@ -17,7 +17,7 @@
 #include "capture/synthetic/scene.h"
 #include "capture/synthetic/sensor_sim.h"
 #include "isp/codec/exr.h"
-#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/noise_source_plan.h"
 #include "isp/model/spectrum/spectral_lift.h"
 #include "isp/model/spectrum/spectral_response.h"
 
@@ -114,7 +114,7 @@ RawDn take_picture(const PictureLight& light, const SensorModel& sensor, const P
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) rate.at(x, y) = per_s * light.rate_e.at(left + x, top + y);
   }
-  isp::EffectPlan plan;
+  isp::NoiseSourcePlan plan;
   plan.regions.resize(1);  // one region that keeps every effect
   const auto blocks = [](int pixels) { return (pixels + isp::effect_block - 1) / isp::effect_block; };
   plan.region_of_block.assign(static_cast<std::size_t>(blocks(width)) * blocks(height), 0);

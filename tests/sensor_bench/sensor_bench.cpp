@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "isp/base/executor.h"
-#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/noise_source_plan.h"
 
 namespace lowlux::test {
 
@@ -15,7 +15,7 @@ RawDn SensorBench::frame(const isp::Exposure& exposure, std::uint32_t index) con
       rate.at(x, y) = static_cast<float>(light * rate_e_per_s[static_cast<int>(colour_at(phase, x, y))]);
     }
   }
-  isp::EffectPlan plan;
+  isp::NoiseSourcePlan plan;
   plan.regions.resize(1);  // one region that keeps every effect
   const auto blocks = [](int pixels) { return (pixels + isp::effect_block - 1) / isp::effect_block; };
   plan.region_of_block.assign(static_cast<std::size_t>(blocks(width)) * blocks(height), 0);

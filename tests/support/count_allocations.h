@@ -13,14 +13,14 @@ namespace lowlux::test {
 
 inline std::atomic<long> allocations{0};
 inline std::atomic<long> held_bytes{0};
-inline std::atomic<long> most_held_bytes{0};  // since it was last set
+inline std::atomic<long> max_held_bytes{0};  // since it was last set
 
 /// Counts a block of memory as held from now on.
 inline void hold(void* memory) noexcept {
   const auto bytes = static_cast<long>(malloc_usable_size(memory));
   const long held = held_bytes.fetch_add(bytes) + bytes;
-  long most = most_held_bytes.load();
-  while (most < held && !most_held_bytes.compare_exchange_weak(most, held)) continue;
+  long most = max_held_bytes.load();
+  while (most < held && !max_held_bytes.compare_exchange_weak(most, held)) continue;
 }
 
 inline void* counted_or_null(std::size_t size) noexcept {

@@ -12,8 +12,8 @@ namespace lowlux::test {
 /// Owns memory between two inaccessible pages: an access one byte too far ends the program.
 class GuardedMemory {
  public:
-  explicit GuardedMemory(std::size_t least_bytes) : page_(static_cast<std::size_t>(sysconf(_SC_PAGESIZE))) {
-    size_ = (least_bytes + page_ - 1) / page_ * page_;
+  explicit GuardedMemory(std::size_t min_bytes) : page_(static_cast<std::size_t>(sysconf(_SC_PAGESIZE))) {
+    size_ = (min_bytes + page_ - 1) / page_ * page_;
     void* const all = mmap(nullptr, size_ + 2 * page_, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (all == MAP_FAILED) throw std::runtime_error("no memory for guarded pages");
     begin_ = static_cast<std::byte*>(all) + page_;

@@ -42,9 +42,9 @@ inline Plane<float> filled(int width, int height, float value) {
 }
 
 /// Returns a plan of one region with these effects.
-inline isp::EffectPlan plan_of(int width, int height, isp::EffectSet kept) {
+inline isp::NoiseSourcePlan plan_of(int width, int height, isp::NoiseSourceSet kept) {
   const auto blocks = [](int pixels) { return (pixels + isp::effect_block - 1) / isp::effect_block; };
-  isp::EffectPlan plan;
+  isp::NoiseSourcePlan plan;
   isp::RegionPlan region;
   region.blocks = blocks(width) * blocks(height);
   region.kept = kept;
@@ -63,7 +63,7 @@ struct Flat {
   std::uint32_t frame = 0;
 };
 
-inline Plane<float> flat_dn(const SensorModel& sensor, isp::EffectSet kept, const Flat& flat) {
+inline Plane<float> flat_dn(const SensorModel& sensor, isp::NoiseSourceSet kept, const Flat& flat) {
   InlineExecutor executor;
   const Plane<float> rate = filled(flat.width, flat.height, static_cast<float>(flat.rate_e_per_s));
   Plane<float> dn(flat.width, flat.height);

@@ -13,8 +13,9 @@ namespace lowlux::isp {
 /// Applies this project's multi-scale DCT behind a variance-stabilising transform: f of each raw value with its dark
 /// (Anscombe), the denoiser at `level` on noise of standard deviation 1, the exact unbiased inverse (Makitalo & Foi
 /// 2013), then the dark subtracted. The denoiser does not use the signal in its values: they are scaled by 3e4,
-/// and their mean, taken as a variance, is 3e-3 of the square of that at 2000 e-. Chroma starts at the level that q = s / sqrt(s +
-/// d + sigma^2) of the entire image requires, and is not drawn towards neutral, which stabilised values do not have.
+/// and their mean, taken as a variance, is 3e-3 of the square of that at 2000 e-. Chroma starts at the level that q = s
+/// / sqrt(s + d + sigma^2) of the entire image requires, and is not drawn towards neutral, which stabilised values do
+/// not have.
 /// @param white_gain  of the stabilised colours
 /// @param signal_e  as large as the shot
 void gat_denoise(denoise::Denoiser& denoiser, const DenoiseShot& shot, denoise::Level level,

@@ -7,7 +7,7 @@
 
 #include "capture/synthetic/scene.h"
 #include "capture/synthetic/synthetic_source.h"
-#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/noise_source_plan.h"
 #include "isp/model/sensor/sensor_db.h"
 #include "isp/model/spectrum/spectral_response.h"
 
@@ -88,13 +88,13 @@ Result<SimulatedRaws> simulated_raws(const BenchPicture& picture, const DevelopL
                                     .masked_columns = masked_columns,
                                     .seed = seed,
                                     .sensor_seed = seed};
-  options.effects.effects = EffectSet{};
+  options.effects.effects = NoiseSourceSet{};
   const auto probe = source_of(picture, light, 1, options, executor);
   if (!probe) return tl::make_unexpected(probe.error());
   const double luminance = light.mean_e / (exposure_s * mean_of(probe->rate_e_per_s(), masked_columns));
   const auto mean = source_of(picture, light, luminance, options, executor);
   if (!mean) return tl::make_unexpected(mean.error());
-  options.effects.effects = EffectSet::all();
+  options.effects.effects = NoiseSourceSet::all();
   const auto noisy = source_of(picture, light, luminance, options, executor);
   if (!noisy) return tl::make_unexpected(noisy.error());
   return SimulatedRaws{noisy->frame(0, executor), mean->frame(0, executor)};

@@ -86,8 +86,8 @@ Result<std::vector<BenchPicture>> read_bench_pictures(const BenchOptions& option
   return out;
 }
 
-EffectPlan plan_keeping(EffectSet kept, int width, int height) {
-  EffectPlan plan;
+NoiseSourcePlan plan_keeping(NoiseSourceSet kept, int width, int height) {
+  NoiseSourcePlan plan;
   plan.regions.resize(1);
   plan.regions.front().kept = kept;
   plan.region_of_block.assign(static_cast<std::size_t>(blocks_of(width)) * blocks_of(height), 0);
@@ -112,7 +112,7 @@ RawDn even_frame(const EvenLight& light, std::uint32_t frame, Executor& executor
                      .seed = light.seed,
                      .pattern_seed = light.seed,
                      .frame = frame},
-                    plan_keeping(EffectSet::all(), rate.width(), rate.height()), executor, raw.dn.view());
+                    plan_keeping(NoiseSourceSet::all(), rate.width(), rate.height()), executor, raw.dn.view());
   raw.active = {light.masked_columns, 0, light.width, light.height};
   raw.default_crop = {0, 0, light.width, light.height};
   if (light.masked_columns > 0) raw.masked = {{0, 0, light.masked_columns, light.height}};

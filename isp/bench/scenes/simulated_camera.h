@@ -14,7 +14,7 @@
 #include "isp/base/sensor.h"
 #include "isp/bench/bench_stages.h"
 #include "isp/model/colour/colorimetry.h"
-#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/noise_source_plan.h"
 #include "isp/model/sensor/sensor_db.h"
 #include "isp/reproduce/bench_picture.h"
 
@@ -49,7 +49,7 @@ Result<std::vector<BenchPicture>> read_bench_pictures(const BenchOptions& option
                                                       std::size_t most, Executor& executor);
 
 /// Returns a plan that keeps these effects in every block of a frame of that size.
-EffectPlan plan_keeping(EffectSet kept, int width, int height);
+NoiseSourcePlan plan_keeping(NoiseSourceSet kept, int width, int height);
 
 /// Uniform light on a sensor, all of its effects included; RGGB.
 struct EvenLight {

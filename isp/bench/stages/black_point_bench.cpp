@@ -192,7 +192,7 @@ PerSite<double> mean_black_dn(const RawDn& raw) {
 }
 
 Result<BenchOutcome> run_black_point_bench(const BenchOptions& options) {
-  const AccuracyTiming timing{.rounds = options.quick ? 3 : 7, .least_s = 2e-3};  // some work takes microseconds
+  const AccuracyTiming timing{.rounds = options.quick ? 3 : 7, .min_s = 2e-3};  // some work takes microseconds
   StageRows rows{.further = {"closed form [e-]", "CIEDE2000 of a grey", "its u'v' shift", "frames"}};
   std::vector<Finding> findings;
   const std::vector<DarkCase> cases = dark_cases();

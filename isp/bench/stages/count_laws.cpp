@@ -57,12 +57,12 @@ double kolmogorov_distance(std::vector<float> sample, std::span<const double> la
   std::ranges::sort(sample);
   // Between integers the distribution is constant and the sample's rises, so that comparing the ends suffices.
   const auto count = static_cast<double>(sample.size());
-  const auto share_to = [&](auto end) { return static_cast<double>(end - sample.begin()) / count; };
-  double largest = share_to(std::ranges::lower_bound(sample, 0.0F));
+  const auto fraction_to = [&](auto end) { return static_cast<double>(end - sample.begin()) / count; };
+  double largest = fraction_to(std::ranges::lower_bound(sample, 0.0F));
   for (std::size_t k = 0; at(law, k) < 1 || static_cast<double>(k) <= static_cast<double>(sample.back()); ++k) {
     const auto here = static_cast<float>(k), next = static_cast<float>(k + 1);
-    largest = std::max({largest, std::fabs(share_to(std::ranges::upper_bound(sample, here)) - at(law, k)),
-                        std::fabs(share_to(std::ranges::lower_bound(sample, next)) - at(law, k))});
+    largest = std::max({largest, std::fabs(fraction_to(std::ranges::upper_bound(sample, here)) - at(law, k)),
+                        std::fabs(fraction_to(std::ranges::lower_bound(sample, next)) - at(law, k))});
   }
   return largest;
 }

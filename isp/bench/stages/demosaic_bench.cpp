@@ -182,7 +182,7 @@ Result<BenchOutcome> run_demosaic_bench(const BenchOptions& options) {
   if (!pictures) return tl::make_unexpected(pictures.error());
   const int width = largest_of(*pictures).width;
   Bench bench{samples_of(*pictures, executor), RawToRgb(width, 1), BenchRenderer(width, executor), executor};
-  const AccuracyTiming timing{.rounds = options.quick ? 5 : 7, .least_s = 1e-3};
+  const AccuracyTiming timing{.rounds = options.quick ? 5 : 7, .min_s = 1e-3};
   const std::vector<AccuracyGroup> groups = groups_of(bench);
   std::vector<AccuracyRow> rows;
   for (const AccuracyGroup& group : groups) {

@@ -21,7 +21,7 @@ constexpr int slow_rounds = 3;  // of slow methods, with the first image alone
 constexpr PicturePart tuning_part{256, 160}, quick_part{192, 128};
 constexpr int crop_px = 192;                        // side of an image's crop in the report
 constexpr const char* compared_level = "standard";  // level compared with `none`
-constexpr double search_share = 0.2;                // fraction of the total time
+constexpr double search_fraction = 0.2;             // fraction of the total time
 
 /// Input of all measurements: images in lights.
 struct Work {
@@ -54,7 +54,7 @@ Result<void> search_all(Work& work, Executor& executor) {
     const std::size_t picture = i / work.lights.size(), light = i % work.lights.size();
     work.strengths[i] = searched(work, picture, light);
     work.options.advance(
-        search_share / static_cast<double>(work.shots()),
+        search_fraction / static_cast<double>(work.shots()),
         fmt::format("strengths for {} at {}", work.pictures[picture].name, name_of(work.lights[light])));
   });
   const bool failed = std::any_of(work.strengths.begin(), work.strengths.end(),
@@ -219,7 +219,7 @@ Result<std::vector<DenoiseRow>> measure_all(const Work& work, Executor& executor
       if (const auto done = of_light.measure(picture, memory, executor); !done) {
         return tl::make_unexpected(done.error());
       }
-      work.options.advance((1 - search_share) / static_cast<double>(work.shots()),
+      work.options.advance((1 - search_fraction) / static_cast<double>(work.shots()),
                            fmt::format("{} at {}", work.pictures[picture].name, name_of(work.lights[light])));
     }
     for (DenoiseRow& row : of_light.finished()) rows.push_back(std::move(row));
@@ -312,12 +312,12 @@ Plot plot_of(std::span<const DenoiseRow> rows) {
 
 std::vector<DenoiseLight> denoise_lights(bool quick) {
   constexpr double small_dark_e = 2, small_read_e = 1.5, large_dark_e = 200, large_read_e = 4;
-  constexpr double most_over_large_dark_e = 20;  // with more light, large dark charge gives the same image as small
+  constexpr double max_over_large_dark_e = 20;  // with more light, large dark charge gives the same image as small
   if (quick) return {{20, small_dark_e, small_read_e}, {4, large_dark_e, large_read_e}};
   std::vector<DenoiseLight> out;
   for (const double mean_e : {2000, 200, 20, 4, 1}) {
     out.push_back({mean_e, small_dark_e, small_read_e});
-    if (mean_e <= most_over_large_dark_e) out.push_back({mean_e, large_dark_e, large_read_e});
+    if (mean_e <= max_over_large_dark_e) out.push_back({mean_e, large_dark_e, large_read_e});
   }
   return out;
 }

@@ -43,7 +43,7 @@ Finding check(std::string id, std::string claim, std::string expected, std::stri
 struct AgainstNlMeans {
   std::string_view light;
   double gain_db;
-  double ciede_share;
+  double ciede_fraction;
 };
 constexpr std::array against_nl_means{AgainstNlMeans{"20/2", 1.0, 0.92}, AgainstNlMeans{"20/200", 1.5, 0.85},
                                       AgainstNlMeans{"4/2", 1.5, 0.85}, AgainstNlMeans{"4/200", 1.5, 0.85}};
@@ -61,8 +61,8 @@ void add_against_nl_means(const Rows& rows, std::vector<Finding>& out) {
                         fmt::format("{:.2f} and {:.2f} dB, its strengths found on the truth", ours->error.psnr_db,
                                     theirs->error.psnr_db)));
     out.push_back(check(fmt::format("nlm-ciede2000-{}", gate.light), "standard has a lower CIEDE2000 than OpenCV's NLM",
-                        fmt::format("at most {:.2f} of it", gate.ciede_share), fmt::format("{:.3f}", share),
-                        share <= gate.ciede_share,
+                        fmt::format("at most {:.2f} of it", gate.ciede_fraction), fmt::format("{:.3f}", share),
+                        share <= gate.ciede_fraction,
                         fmt::format("{:.2f} and {:.2f}", ours->error.ciede2000, theirs->error.ciede2000)));
   }
 }

@@ -30,8 +30,8 @@ constexpr PicturePart quick_part{192, 128};
 constexpr PicturePart shown_part{288, 192};  // size of a crop in the report: enlarged twice, it fills its column
 constexpr std::size_t pictures_used = 3;
 constexpr int rounds_by_one = 3;
-constexpr std::size_t least_undominated = 4;
-constexpr double least_span = 50;
+constexpr std::size_t min_undominated = 4;
+constexpr double min_span = 50;
 constexpr std::string_view light_of_images = "20 e-";
 
 /// Options of develop, in addition to the look.
@@ -168,9 +168,9 @@ Finding undominated_finding(std::span<const AccuracyRow> rows) {
   const double span = front.back()->ms_per_mp / front.front()->ms_per_mp;
   return {"develop/undominated: " + rows.front().group,
           "so many plans no other beats in time and error, from the fastest to the slowest of them",
-          fmt::format("at least {}, {:g} times the time", least_undominated, least_span),
+          fmt::format("at least {}, {:g} times the time", min_undominated, min_span),
           fmt::format("{}, {:.0f} times", front.size(), span),
-          front.size() >= least_undominated && span >= least_span,
+          front.size() >= min_undominated && span >= min_span,
           names,
           Finding::Kind::check};
 }

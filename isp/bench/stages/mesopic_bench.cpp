@@ -26,9 +26,9 @@ namespace {
 
 constexpr PicturePart part{384, 256}, quick_part{96, 64};
 constexpr double pixels_of_cell = LookGrid::cell * LookGrid::cell;
-constexpr double least_field_ratio = 0.27;  // as in NightLookGrid
+constexpr double min_field_ratio = 0.27;  // as in NightLookGrid
 constexpr float dark = 1e-6f;
-constexpr AccuracyTiming timing{.rounds = 5, .least_s = 1e-3};
+constexpr AccuracyTiming timing{.rounds = 5, .min_s = 1e-3};
 
 const Matrix3& to_xyz() {
   static const Matrix3 matrix = rgb_to_xyz(primaries_rec709).value();  // cannot fail for constants
@@ -74,7 +74,7 @@ Colours colours_of(const std::vector<BenchPicture>& pictures, std::size_t most) 
     const double own = scotopic_luminance(xyz) / scotopic_ratio_of_white();
     for (std::size_t c = 0; c < 3; ++c) out.rgb.plane[c].data()[i] = static_cast<float>(rgb[c]);
     out.cones.push_back(static_cast<float>(xyz.y));
-    out.rods.push_back(static_cast<float>(std::max(own, std::min(LookGrid::least_rods * xyz.y, xyz.y))));
+    out.rods.push_back(static_cast<float>(std::max(own, std::min(LookGrid::min_rods * xyz.y, xyz.y))));
   }
   return out;
 }
@@ -82,27 +82,27 @@ Colours colours_of(const std::vector<BenchPicture>& pictures, std::size_t most) 
 /// States of an eye adapted to each colour itself: three of the parts of LookGrid.
 struct States {
   std::vector<float> cones_cd_m2, rods_cd_m2;  // fields of adaptation
-  std::vector<float> rod_share, chroma, blue, variance_deg2;
+  std::vector<float> rod_fraction, chroma, blue, variance_deg2;
 };
 
 States states_of(const Colours& colours, double white_cd_m2) {
   States out;
   const std::size_t n = colours.size();
-  for (auto* part_of : {&out.rod_share, &out.chroma, &out.blue, &out.variance_deg2}) part_of->resize(n);
+  for (auto* part_of : {&out.rod_fraction, &out.chroma, &out.blue, &out.variance_deg2}) part_of->resize(n);
   out.cones_cd_m2.reserve(n);
   out.rods_cd_m2.reserve(n);
   for (std::size_t i = 0; i < n; ++i) {
     const double cones = white_cd_m2 * colours.cones[i];
     const double rods = white_cd_m2 * scotopic_ratio_of_white() * colours.rods[i];
     out.cones_cd_m2.push_back(static_cast<float>(cones));
-    out.rods_cd_m2.push_back(static_cast<float>(std::max(rods, least_field_ratio * cones)));
+    out.rods_cd_m2.push_back(static_cast<float>(std::max(rods, min_field_ratio * cones)));
   }
   return out;
 }
 
 void set_state(States& states, std::size_t i, const NightEye& eye) {
   const double share = (1 - eye.state.m) * scotopic_at_555_nm * scotopic_ratio_of_white();
-  states.rod_share[i] = static_cast<float>(share / (eye.state.m + share));
+  states.rod_fraction[i] = static_cast<float>(share / (eye.state.m + share));
   states.chroma[i] = static_cast<float>(eye.chroma);
   states.blue[i] = static_cast<float>(eye.blue);
   states.variance_deg2[i] = static_cast<float>(eye.blur_std_deg * eye.blur_std_deg);
@@ -117,7 +117,7 @@ void solve_each(States& states) {
 void look_up_each(States& states) {
   rows::eye_row(eye_tables(), static_cast<float>(scotopic_ratio_of_white()), states.cones_cd_m2.data(),
                 states.rods_cd_m2.data(), static_cast<int>(states.chroma.size()),
-                {states.rod_share.data(), states.chroma.data(), states.blue.data(), states.variance_deg2.data()});
+                {states.rod_fraction.data(), states.chroma.data(), states.blue.data(), states.variance_deg2.data()});
 }
 
 /// Sets one state for all colours, the state of the mean.
@@ -129,7 +129,7 @@ void solve_once(States& states) {
   }
   const auto count = static_cast<double>(states.chroma.size());
   set_state(states, 0, night_eye({sum.photopic / count, sum.scotopic / count}));
-  for (auto* part_of : {&states.rod_share, &states.chroma, &states.blue, &states.variance_deg2}) {
+  for (auto* part_of : {&states.rod_fraction, &states.chroma, &states.blue, &states.variance_deg2}) {
     std::fill(part_of->begin(), part_of->end(), part_of->front());
   }
 }
@@ -140,7 +140,7 @@ std::vector<Lab> seen(const Colours& colours, const States& states) {
   out.reserve(colours.size());
   for (std::size_t i = 0; i < colours.size(); ++i) {
     const Vector3 v = colours.at(i);
-    const double y = colours.cones[i], e = y + states.rod_share[i] * (colours.rods[i] - y);
+    const double y = colours.cones[i], e = y + states.rod_fraction[i] * (colours.rods[i] - y);
     const double chroma = states.chroma[i] * (std::max(e, 0.0) + dark) / (std::max(y, 0.0) + dark);
     Vector3 rgb{};
     for (std::size_t c = 0; c < 3; ++c) rgb[c] = e * (1 + states.blue[i] * rod_tint[c]) + chroma * (v[c] - y);

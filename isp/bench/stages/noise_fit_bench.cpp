@@ -20,8 +20,8 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr std::array shares_of_full{0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6};  // of flats: levels of light
-constexpr Exposure flat_exposure{.time_s = 0.01, .temperature_c = 20};          // of flats and of darks
+constexpr std::array fractions_of_full{0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6};  // of flats: levels of light
+constexpr Exposure flat_exposure{.time_s = 0.01, .temperature_c = 20};             // of flats and of darks
 
 /// Relative errors of values that were measured many times.
 struct FitErrors {
@@ -75,7 +75,7 @@ FlatFrames take_flats(const FlatAmount& amount, std::uint64_t seed) {
   light.width = light.height = amount.side;
   light.seed = seed;
   FlatFrames out{{}, amount.pairs};
-  out.frames.reserve(2 * (shares_of_full.size() + 1) * static_cast<std::size_t>(amount.pairs));
+  out.frames.reserve(2 * (fractions_of_full.size() + 1) * static_cast<std::size_t>(amount.pairs));
   const auto add_pairs = [&](double charge_e) {
     light.rate_e_per_s.fill(charge_e / flat_exposure.time_s);
     for (int i = 0; i < 2 * amount.pairs; ++i) {
@@ -83,7 +83,7 @@ FlatFrames take_flats(const FlatAmount& amount, std::uint64_t seed) {
     }
   };
   add_pairs(0);
-  for (const double share : shares_of_full) add_pairs(share * saturation_charge_e(light.sensor));
+  for (const double share : fractions_of_full) add_pairs(share * saturation_charge_e(light.sensor));
   return out;
 }
 
@@ -259,7 +259,7 @@ Result<BenchOutcome> run_noise_fit_bench(const BenchOptions& options) {
       fmt::format("Photon transfer: pairs of flats at each of {} levels of light up to {:g} of full well, and darks; "
                   "each measurement has new "
                   "noise and a new specimen of the sensor",
-                  shares_of_full.size(), shares_of_full.back()),
+                  fractions_of_full.size(), fractions_of_full.back()),
       fmt::format("One picture: {} ones, {} frames of each; texture finer than the details raises the gain, which a "
                   "standard error does not tell; the time is that of the first",
                   name_of(options.pictures), options.quick ? 1 : 3),

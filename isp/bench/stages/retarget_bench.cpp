@@ -29,7 +29,7 @@ constexpr std::array methods{RetargetMethod::constrained, RetargetMethod::shin, 
 constexpr std::array table_levels{17, 33, 65};
 constexpr std::size_t quick_tables = 2;
 constexpr double largest_code = 65535;
-constexpr AccuracyTiming timing{.rounds = 5, .least_s = 1e-3};
+constexpr AccuracyTiming timing{.rounds = 5, .min_s = 1e-3};
 
 /// Returns the colours of all images as codes of 16 bits.
 std::vector<std::uint16_t> codes_of(const std::vector<PictureColours>& pictures) {

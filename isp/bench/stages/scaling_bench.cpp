@@ -42,7 +42,7 @@ struct Rounds {
   double few_from_mp;
 };
 constexpr Rounds full_rounds{5, 2, 25}, quick_rounds{2, 2, 3};
-constexpr double memory_share = 0.4;  // fraction of the machine's memory that a frame may need
+constexpr double memory_fraction = 0.4;  // fraction of the machine's memory that a frame may need
 constexpr int files = 8;
 constexpr double file_mp = 1;
 
@@ -240,17 +240,17 @@ std::vector<ScalingRow> rows_over_size(const RawFrame& small, const BenchOptions
   std::vector<std::unique_ptr<Executor>> executors;
   for (const int threads : thread_counts(options.threads)) executors.push_back(std::make_unique<PoolExecutor>(threads));
   std::vector<ScalingRow> out;
-  double most_bytes_per_pixel = 0;
+  double max_bytes_per_pixel = 0;
   const auto sizes = std::span(sizes_mp).first(options.quick ? quick_sizes : sizes_mp.size());
   for (const double megapixels : sizes) {
     options.advance(1 / static_cast<double>(sizes.size() + 1), fmt::format("frames of {:g} MP", megapixels));
-    if (1e6 * megapixels * most_bytes_per_pixel > memory_share * physical_bytes()) {
+    if (1e6 * megapixels * max_bytes_per_pixel > memory_fraction * physical_bytes()) {
       left_out += fmt::format("; {:g} MP left out, for want of memory", megapixels);
       continue;
     }
     const int of_size = megapixels < rounds.few_from_mp ? rounds.usual : rounds.few;
     for (ScalingRow& row : rows_of(frame_of(small, megapixels), executors, of_size)) {
-      most_bytes_per_pixel = std::fmax(most_bytes_per_pixel, row.peak_bytes_per_pixel);
+      max_bytes_per_pixel = std::fmax(max_bytes_per_pixel, row.peak_bytes_per_pixel);
       out.push_back(std::move(row));
     }
   }

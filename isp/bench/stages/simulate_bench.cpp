@@ -25,13 +25,13 @@ constexpr std::uint32_t pair_frame = 10;  // this frame and the next have a diff
 struct SimulatePlan {
   std::string name;
   PhotonSampling sampling = PhotonSampling::physical;
-  capture::EffectChoice effects;
+  capture::NoiseSourceChoice effects;
   std::uint32_t frame = 0;  // frame whose noise is drawn
 };
 
 /// Returns the plans; the first is the reference.
 std::vector<SimulatePlan> simulate_plans() {
-  const capture::EffectChoice all, automatic{Tolerance{}, {}}, none{std::nullopt, EffectSet()};
+  const capture::NoiseSourceChoice all, automatic{Tolerance{}, {}}, none{std::nullopt, NoiseSourceSet()};
   return {{"physical, all", PhotonSampling::physical, all},
           {"physical, auto", PhotonSampling::physical, automatic},
           {"physical, none", PhotonSampling::physical, none},

@@ -43,19 +43,19 @@ struct PictureShot {
 struct Choice {
   std::string name;
   std::optional<Tolerance> tolerance;
-  EffectSet kept;
+  NoiseSourceSet kept;
 };
 
 std::vector<Choice> choices() {
-  std::vector<Choice> out{{"all", std::nullopt, EffectSet::all()}};
+  std::vector<Choice> out{{"all", std::nullopt, NoiseSourceSet::all()}};
   out.reserve(effect_count + tolerances.size() + 2);
   for (int e = 0; e < effect_count; ++e) {
     const auto effect = static_cast<Effect>(e);
     out.push_back({fmt::format("without {}", effect_names()[static_cast<std::size_t>(e)]), std::nullopt,
-                   EffectSet::all().without(effect)});
+                   NoiseSourceSet::all().without(effect)});
   }
   for (const Tolerance& tolerance : tolerances) out.push_back({name_of(tolerance), tolerance, {}});
-  out.push_back({"none", std::nullopt, EffectSet()});
+  out.push_back({"none", std::nullopt, NoiseSourceSet()});
   return out;
 }
 
@@ -76,7 +76,7 @@ class EffectsLight {
       capture::read_out(out.frame_of(shot), out.plan_of(shot, choices().front()), executor, shot.all_dn.view());
       out.megapixels_ += 1e-6 * static_cast<double>(shot.all_dn.size());
       out.most_width_ = std::max(out.most_width_, shot.all_dn.width());
-      out.most_height_ = std::max(out.most_height_, shot.all_dn.height());
+      out.max_height_ = std::max(out.max_height_, shot.all_dn.height());
     }
     return out;
   }
@@ -84,10 +84,10 @@ class EffectsLight {
   /// Returns the levels and their errors, and adds changes and findings for each choice.
   AccuracyGroup measure(std::vector<std::vector<double>>& figures, std::vector<Finding>& findings) {
     AccuracyGroup group{light_.name, "largest CIEDE2000 of block means against all effects", {}};
-    auto dn = std::make_shared<Plane<float>>(most_width_, most_height_);
+    auto dn = std::make_shared<Plane<float>>(most_width_, max_height_);
     Closest of_tolerance, of_prediction;
     for (const Choice& choice : choices()) {
-      std::vector<EffectPlan> plans;
+      std::vector<NoiseSourcePlan> plans;
       plans.reserve(shots_.size());
       for (const PictureShot& shot : shots_) plans.push_back(plan_of(shot, choice));
       const auto [measured, predicted] = changes_of(plans);
@@ -112,7 +112,7 @@ class EffectsLight {
     std::vector<Choice> shown{choices().front()};
     shown.reserve(tolerances.size() + 2);
     for (const Tolerance& tolerance : tolerances) shown.push_back({{}, tolerance, {}});
-    shown.push_back({{}, std::nullopt, EffectSet()});
+    shown.push_back({{}, std::nullopt, NoiseSourceSet()});
     SceneLinear out(static_cast<int>(shown.size()) * (width / 2), height / 2);
     const Developing developing = shown_developing(shot);
     InlineExecutor one;
@@ -145,11 +145,12 @@ class EffectsLight {
             .seed = 1,
             .pattern_seed = 1};
   }
-  EffectPlan plan_of(const PictureShot& shot, const Choice& choice) const {
+  NoiseSourcePlan plan_of(const PictureShot& shot, const Choice& choice) const {
     if (!choice.tolerance) return plan_keeping(choice.kept, shot.all_dn.width(), shot.all_dn.height());
-    return plan_effects(camera_.model, light_.exposure(), shot.source.developing(), shot.blocks, *choice.tolerance);
+    return plan_noise_sources(camera_.model, light_.exposure(), shot.source.developing(), shot.blocks,
+                              *choice.tolerance);
   }
-  void read_all(const std::vector<EffectPlan>& plans, Plane<float>& dn) const {
+  void read_all(const std::vector<NoiseSourcePlan>& plans, Plane<float>& dn) const {
     InlineExecutor one;
     for (std::size_t i = 0; i < shots_.size(); ++i) {
       const Plane<float>& all = shots_[i].all_dn;
@@ -170,7 +171,7 @@ class EffectsLight {
     PredictedChange measured;
     PredictedChange predicted;
   };
-  Changes changes_of(const std::vector<EffectPlan>& plans) const {
+  Changes changes_of(const std::vector<NoiseSourcePlan>& plans) const {
     Changes out;
     InlineExecutor one;
     for (std::size_t i = 0; i < shots_.size(); ++i) {
@@ -213,7 +214,7 @@ class EffectsLight {
   NamedSensor camera_;
   std::vector<PictureShot> shots_;
   double megapixels_ = 0;
-  int most_width_ = 0, most_height_ = 0;
+  int most_width_ = 0, max_height_ = 0;
 };
 
 }  // namespace
@@ -278,7 +279,7 @@ PredictedChange measured_change(const ChangedFrame& frame, const Plane<float>& d
 }
 
 PredictedChange predicted_change(const ChangedFrame& frame, std::span<const BlockLevel> blocks,
-                                 const EffectPlan& plan) {
+                                 const NoiseSourcePlan& plan) {
   assert(blocks.size() == plan.region_of_block.size());
   PredictedChange out;
   for (std::size_t i = 0; i < blocks.size(); ++i) {

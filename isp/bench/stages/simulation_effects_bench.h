@@ -4,7 +4,7 @@
 
 #include "isp/base/plane.h"
 #include "isp/base/sensor.h"
-#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/noise_source_plan.h"
 
 namespace lowlux::isp {
 
@@ -24,6 +24,7 @@ PredictedChange larger(const PredictedChange& a, const PredictedChange& b);
 PredictedChange measured_change(const ChangedFrame& frame, const Plane<float>& dn, const Plane<float>& reference_dn);
 
 /// Returns the largest changes that predict_change() gives for the blocks, by the effects the plan keeps in each.
-PredictedChange predicted_change(const ChangedFrame& frame, std::span<const BlockLevel> blocks, const EffectPlan& plan);
+PredictedChange predicted_change(const ChangedFrame& frame, std::span<const BlockLevel> blocks,
+                                 const NoiseSourcePlan& plan);
 
 }  // namespace lowlux::isp

@@ -8,7 +8,8 @@ namespace lowlux::cli {
 
 Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
   CLI::App app(
-      "Measures accuracy against time: each stage at each of its levels, compared with other methods. All of it is made for "
+      "Measures accuracy against time: each stage at each of its levels, compared with other methods. All of it is "
+      "made for "
       "less than 15 minutes on two cores, with --quick for less than one; how long it took is said at the end.",
       "lowlux bench");
   BenchArgs args;

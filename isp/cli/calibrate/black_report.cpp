@@ -177,7 +177,7 @@ void show_black(const calib::BlackFigures& black, const calib::FrameSetting& set
   out.add("row noise", fmt::format("{:.3g} DN, column noise {:.3g} DN beyond white noise", black.row_noise_dn,
                                    black.column_noise_dn));
   out.add("pixels", fmt::format("{} in {} frame{}, {:.2g} % left out", black.pixels, black.frames,
-                                black.frames == 1 ? "" : "s", 100 * black.excluded_share));
+                                black.frames == 1 ? "" : "s", 100 * black.excluded_fraction));
   out.add("holds", fmt::format("pedestal and dark charge in one{}: a second exposure time would separate them",
                                setting.exposure_s ? fmt::format(", at {:g} s", *setting.exposure_s) : ""));
   found.text += name_of_gain(setting) + "\n" + out.text();
@@ -202,7 +202,7 @@ void show_dark_series(const calib::DarkSeries& series, std::span<const calib::Da
   int frames = 0;
   for (const calib::DarkGroup& g : groups) frames += g.frames;
   out.add("darks", fmt::format("{} frames of {} settings, {:.2g} % of the pixels left out", frames, groups.size(),
-                               100 * series.excluded_share));
+                               100 * series.excluded_fraction));
   out.add(
       "system gain",
       fmt::format("{} DN/e-, {}",

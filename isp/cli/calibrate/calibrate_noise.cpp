@@ -150,7 +150,7 @@ namespace {
 
 constexpr double same_level = 0.02;  // relative to the light; a drift of more than 1 % is refused later
 constexpr double same_level_dn = 0.5;
-constexpr std::size_t most_waiting = 32;
+constexpr std::size_t max_waiting = 32;
 
 }  // namespace
 
@@ -182,10 +182,10 @@ Result<void> FramePairs::add(RawDn frame, const std::string& file) {
   const double mean = calib::mean_dn(frame);
   const auto partner = partner_of(frame, mean);
   if (partner == waiting_.end()) {
-    if (waiting_.size() == most_waiting) {
+    if (waiting_.size() == max_waiting) {
       return fail(ErrorCode::insufficient,
                   fmt::format("{} frames found no partner of the same exposure time and level; take two of each light",
-                              most_waiting),
+                              max_waiting),
                   file);
     }
     waiting_.push_back({std::move(frame), mean, file});

@@ -152,7 +152,7 @@ Figures figures_of(const calib::PictureNoise& n, const RawFrame& frame, const Bl
       {"fit",
        fmt::format("reduced chi square {:.3g}, {} degrees of freedom, {:.3g} % of the picture is flat, {:.4g} to "
                    "{:.4g} DN above black",
-                   n.reduced_chi_square, n.degrees_of_freedom, 100 * n.flat_share, n.darkest_dn, n.brightest_dn)},
+                   n.reduced_chi_square, n.degrees_of_freedom, 100 * n.flat_fraction, n.darkest_dn, n.brightest_dn)},
       {"codes",
        fmt::format("steps of {} DN, noise of {:.2g} steps in the dark", n.traces.code_step_dn, n.darkest_noise_steps)},
   };

@@ -25,8 +25,8 @@ namespace fs = std::filesystem;
 using Wrong = std::optional<std::string>;
 
 constexpr double longest_timeout_s = 86400;
-constexpr double most_frames = 1e9;
-constexpr double least_budget_ms = 0.01, most_budget_ms = 1e6;  // limits of the stage
+constexpr double max_frames = 1e9;
+constexpr double min_budget_ms = 0.01, max_budget_ms = 1e6;  // limits of the stage
 
 /// Holds arguments that CaptureArgs stores in another form.
 struct Words {
@@ -112,7 +112,7 @@ void add_frames(CLI::App& app, CaptureArgs& args, Words& words) {
   const auto store_whole = [](auto store) {
     return [store](const std::string& text) -> Wrong {
       const auto number = number_of(text);
-      if (!number || !(*number >= 0 && *number <= most_frames) ||
+      if (!number || !(*number >= 0 && *number <= max_frames) ||
           *number != static_cast<double>(static_cast<std::uint64_t>(*number))) {
         return "is no number of frames";
       }
@@ -150,7 +150,7 @@ void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
            "draft, no level, plain. No frame is",
            [&args](const std::string& text) -> Wrong {
              args.budget_ms = quantity_of(text, "ms");
-             if (args.budget_ms && *args.budget_ms >= least_budget_ms && *args.budget_ms <= most_budget_ms) {
+             if (args.budget_ms && *args.budget_ms >= min_budget_ms && *args.budget_ms <= max_budget_ms) {
                return std::nullopt;
              }
              return "is not a number of milliseconds from 0.01 to 1e6";

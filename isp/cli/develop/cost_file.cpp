@@ -17,7 +17,7 @@
 #include "capture/file/file_bytes.h"
 #include "isp/base/executor.h"
 #include "isp/bench/cost_measurement.h"
-#include "isp/bench/pace.h"
+#include "isp/bench/speed_probe.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/progress.h"
@@ -32,7 +32,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr int format_number = 4;  // incremented when parts or sizes change
 constexpr std::size_t largest_file = 1 << 20;
-constexpr std::size_t most_points = 100;
+constexpr std::size_t max_points = 100;
 
 tl::unexpected<Error> malformed(const std::string& what) {
   return fail(ErrorCode::malformed, "no cost model: " + what + "; bench --calibrate-cost makes one");
@@ -40,7 +40,7 @@ tl::unexpected<Error> malformed(const std::string& what) {
 
 /// Returns the points of one part after checks: rising sizes, possible times.
 std::optional<std::vector<isp::CostPoint>> points_of(const Json& json) {
-  if (!json.is_array() || json.size() > most_points) return std::nullopt;
+  if (!json.is_array() || json.size() > max_points) return std::nullopt;
   std::vector<isp::CostPoint> out;
   for (const Json& pair : json) {
     if (!pair.is_array() || pair.size() != 2 || !pair[0].is_number() || !pair[1].is_number()) return std::nullopt;

@@ -8,7 +8,7 @@
 
 #include "isp/base/executor.h"
 #include "isp/base/result.h"
-#include "isp/bench/pace.h"
+#include "isp/bench/speed_probe.h"
 #include "isp/pipeline/budget/cost_model.h"
 
 /// Stores the costs of developing on this machine between runs.
@@ -42,12 +42,12 @@ class MachineSpeed {
   explicit MachineSpeed(isp::CostModel calibrated) : calibrated_(std::move(calibrated)) {}
 
   /// Returns the model at the current pace; as calibrated where its own pace is not known. It takes about a tenth of a
-  /// second, which includes the extra time of a program's first frame. Errors: those of isp::Pace.
+  /// second, which includes the extra time of a program's first frame. Errors: those of isp::SpeedProbe.
   Result<std::shared_ptr<const isp::CostModel>> now(Executor& executor);
 
  private:
   isp::CostModel calibrated_;
-  isp::Pace pace_;
+  isp::SpeedProbe pace_;
 };
 
 /// Measures again and writes the file. @return the model; `written_to` is set to the file's name if it was written

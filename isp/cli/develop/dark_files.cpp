@@ -71,7 +71,7 @@ Result<std::shared_ptr<DarkSource>> read_darks(const std::vector<std::string>& f
     if (!added) return tl::make_unexpected(with_file(added.error(), file));
   }
   std::vector<calib::DarkGroup> groups = library.groups();
-  calib::DarkRequest request{.noise_share = args.noise_share, .doubling_c = args.doubling_c};
+  calib::DarkRequest request{.noise_fraction = args.noise_fraction, .doubling_c = args.doubling_c};
   if (!args.doubling_profile.empty()) {
     const Result<double> doubling = doubling_of_profile(args.doubling_profile, groups.front().setting);
     if (!doubling) return tl::make_unexpected(doubling.error());
@@ -110,7 +110,7 @@ Result<std::shared_ptr<const DarkFrame>> DarkSource::make_or_find(const RawDn& p
   if (found == made_.end()) {
     Result<DarkFrame> made = calib::make_dark_frame(groups_, picture, request);
     if (!made) return tl::make_unexpected(std::move(made.error()));
-    if (made_.size() == most_made) made_.pop_back();
+    if (made_.size() == max_made) made_.pop_back();
     found = made_.insert(made_.end(), {key, std::make_shared<const DarkFrame>(*std::move(made))});
   }
   std::rotate(made_.begin(), found, found + 1);  // the most recently used comes first

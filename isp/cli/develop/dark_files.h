@@ -47,7 +47,7 @@ class DarkSource {
     Key key;
     std::shared_ptr<const DarkFrame> frame;
   };
-  static constexpr std::size_t most_made = 4;  // exposures of a bracket, and one more
+  static constexpr std::size_t max_made = 4;  // exposures of a bracket, and one more
 
   Result<std::shared_ptr<const DarkFrame>> make_or_find(const RawDn& picture, const Key& key,
                                                         const calib::DarkRequest& request);

@@ -24,7 +24,7 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
            [&dark](const std::string& text) -> std::optional<std::string> {
              const auto share = number_of(text);
              if (!share || !(*share > 0 && *share <= 1)) return "is no share above 0 and at most 1";
-             dark.noise_share = *share;
+             dark.noise_fraction = *share;
              return std::nullopt;
            })
       ->needs(frames);
@@ -146,7 +146,7 @@ Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
   app.add_flag("--json", args.json, "JSON instead of text");
   add_advise(app, args.advise);
   if (const auto code = parse_words(app, words)) return *code;
-  const std::string wrong = wrong_advise(args.advise, args.inputs.size());
+  const std::string wrong = validate_advise(args.advise, args.inputs.size());
   if (!wrong.empty()) return refuse(app, wrong);
   return args;
 }

@@ -185,7 +185,7 @@ std::optional<std::string> complete_look(const LookArgs& args, Planner planner, 
 
 namespace {
 
-constexpr double least_budget = 1e-3, most_budget = 1e9;
+constexpr double min_budget = 1e-3, max_budget = 1e9;
 
 bool is_given(const LookArgs& look, const char* option) {
   return std::ranges::find(look.given, option) != look.given.end();
@@ -195,7 +195,7 @@ void add_positive(CLI::App& app, const char* flag, const char* type, const char*
                   std::optional<double>& out) {
   add_text(app, flag, type, help, [&out, unit](const std::string& text) -> std::optional<std::string> {
     out = quantity_of(text, unit);
-    if (out && *out >= least_budget && *out <= most_budget) return std::nullopt;
+    if (out && *out >= min_budget && *out <= max_budget) return std::nullopt;
     return "is not a number from 0.001 to 1e9";
   });
 }

@@ -38,9 +38,9 @@ std::optional<std::string> complete_look(const LookArgs& args, Planner planner, 
 
 /// Holds the decisions that `develop` takes itself, and their time budget.
 struct EffectsArgs {
-  std::optional<double> budget_ms;            // for each frame
-  std::optional<double> budget_mpps;          // megapixels in a second
-  std::optional<isp::EffectsChoice> effects;  // excludes the budget, which depends on the frame
+  std::optional<double> budget_ms;             // for each frame
+  std::optional<double> budget_mpps;           // megapixels in a second
+  std::optional<isp::ProcessingGoal> effects;  // excludes the budget, which depends on the frame
   bool budgeted() const { return budget_ms || budget_mpps; }
 };
 

@@ -49,14 +49,14 @@ Result<isp::Xyz> black_of_area(const SceneLinear& xyz, const Rect& area) {
 }
 
 void add_warnings(ResaturateOutcome& out) {
-  if (out.made.share_dark > 0.5) {
+  if (out.made.fraction_dark > 0.5) {
     out.warnings.push_back(fmt::format(
         "{:.0f} % of the picture is no brighter than the black point and becomes grey: is the black point too bright?",
-        100 * out.made.share_dark));
+        100 * out.made.fraction_dark));
   }
-  if (out.made.share_saturated > 0.5) {
+  if (out.made.fraction_saturated > 0.5) {
     out.warnings.push_back(
-        fmt::format("{:.0f} % of the picture is saturated and stays as it is", 100 * out.made.share_saturated));
+        fmt::format("{:.0f} % of the picture is saturated and stays as it is", 100 * out.made.fraction_saturated));
   }
 }
 
@@ -97,8 +97,8 @@ void print(const ResaturateArgs& args, const ResaturateOutcome& done) {
                                       {"output", args.output},
                                       {"black_xyz", {b.x, b.y, b.z}},
                                       {"chroma_noise", done.made.chroma_noise},
-                                      {"share_dark", done.made.share_dark},
-                                      {"share_saturated", done.made.share_saturated},
+                                      {"share_dark", done.made.fraction_dark},
+                                      {"share_saturated", done.made.fraction_saturated},
                                       {"warnings", done.warnings}};
     print_out(fmt::format("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
   } else if (!args.quiet) {
@@ -106,8 +106,8 @@ void print(const ResaturateArgs& args, const ResaturateOutcome& done) {
     lines.add("black", fmt::format("X {:.5f}, Y {:.5f}, Z {:.5f} of white 1", b.x, b.y, b.z));
     lines.add("chroma noise", fmt::format("{:.5f} of white{}", done.made.chroma_noise,
                                           args.chroma_noise ? ", given" : ", measured on the picture"));
-    lines.add("no brighter", fmt::format("{:.1f} % of the pixels: grey now", 100 * done.made.share_dark));
-    lines.add("saturated", fmt::format("{:.1f} % of the pixels: as they were", 100 * done.made.share_saturated));
+    lines.add("no brighter", fmt::format("{:.1f} % of the pixels: grey now", 100 * done.made.fraction_dark));
+    lines.add("saturated", fmt::format("{:.1f} % of the pixels: as they were", 100 * done.made.fraction_saturated));
     print_out(fmt::format("{}\n{}", one_line(args.output), lines.text()));
   }
 }

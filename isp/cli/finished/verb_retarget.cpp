@@ -60,7 +60,7 @@ void print_json(const RetargetArgs& args, const RetargetOutcome& done) {
                               {"source_cd_m2", o.source_cd_m2},
                               {"display_cd_m2", o.display_cd_m2},
                               {"display_black_cd_m2", o.display_black_cd_m2},
-                              {"share_beyond_gamut", done.made.share_held},
+                              {"share_beyond_gamut", done.made.fraction_held},
                               {"table_levels", done.made.levels},
                               {"table_mean_ciede2000", done.made.error.mean_ciede2000},
                               {"table_max_ciede2000", done.made.error.max_ciede2000},
@@ -83,7 +83,7 @@ void print_outcome(const RetargetArgs& args, const RetargetOutcome& done) {
                                           o.units == isp::ShinUnits::lux ? "the lux on white" : "luminance"));
   }
   lines.add("beyond gamut",
-            fmt::format("{:.1f} % of the pixels: as near as the display shows", 100 * done.made.share_held));
+            fmt::format("{:.1f} % of the pixels: as near as the display shows", 100 * done.made.fraction_held));
   lines.add("table", fmt::format("{0} x {0} x {0}, off by {1:.2f} CIEDE2000 in the mean, {2:.1f} at most",
                                  done.made.levels, done.made.error.mean_ciede2000, done.made.error.max_ciede2000));
   print_out(fmt::format("{}\n{}", one_line(args.output), lines.text()));

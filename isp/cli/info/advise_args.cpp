@@ -103,7 +103,7 @@ void add_advise(CLI::App& app, AdviseArgs& args) {
   }
 }
 
-std::string wrong_advise(const AdviseArgs& args, std::size_t files) {
+std::string validate_advise(const AdviseArgs& args, std::size_t files) {
   if (!args.wanted) return files == 0 ? "RAW is required" : "";
   if (args.sensor.empty()) return "--advise needs --sensor: a name (`lowlux simulate --list`) or a profile's file";
   if (files > 1) return "--advise takes one raw file, or none with --luminance and --highlight";

@@ -41,6 +41,6 @@ void add_advise(CLI::App& app, AdviseArgs& args);
 
 /// Returns the error of the options in combination; empty if there is none.
 /// @param files  number of raw files among the arguments
-std::string wrong_advise(const AdviseArgs& args, std::size_t files);
+std::string validate_advise(const AdviseArgs& args, std::size_t files);
 
 }  // namespace lowlux::cli

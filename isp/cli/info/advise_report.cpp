@@ -46,8 +46,8 @@ std::vector<std::string> cells_of_point(const isp::AdvicePoint& p) {
   } else {
     cells.insert(cells.end(), {"clips", "clips", "clips"});
   }
-  cells.push_back(fmt::format("{:.3g}", 100 * p.highlight_charge_share));
-  cells.push_back(fmt::format("{:.3g}", 100 * p.highlight_code_share));
+  cells.push_back(fmt::format("{:.3g}", 100 * p.highlight_charge_fraction));
+  cells.push_back(fmt::format("{:.3g}", 100 * p.highlight_code_fraction));
   return cells;
 }
 
@@ -62,7 +62,7 @@ isp::Table gains_table(const AdviceCase& asked, const isp::ExposureAdvice& advic
     std::vector<std::string> row = cells_of_point(gain.at);
     row.insert(row.begin(), asked.request.gains[gain.at.gain].name);
     row.emplace_back(limit_name(gain.limit));
-    row.push_back(fmt::format("{} {:.0f} %", source_name(gain.largest_noise), 100 * gain.largest_noise_share));
+    row.push_back(fmt::format("{} {:.0f} %", source_name(gain.largest_noise), 100 * gain.largest_noise_fraction));
     table.rows.push_back(std::move(row));
   }
   return table;
@@ -104,8 +104,8 @@ Json point_json(const isp::AdvicePoint& p) {
             {"snr_db", nullptr},
             {"uv_std", nullptr},
             {"weight_snr", nullptr},
-            {"highlight_share_of_full_well", p.highlight_charge_share},
-            {"highlight_share_of_range", p.highlight_code_share}};
+            {"highlight_share_of_full_well", p.highlight_charge_fraction},
+            {"highlight_share_of_range", p.highlight_code_fraction}};
   if (p.midtone) {
     json["snr"] = p.midtone->snr;
     json["snr_db"] = isp::decibel(p.midtone->snr);
@@ -176,7 +176,7 @@ std::string advice_json(const AdviceCase& asked, const isp::ExposureAdvice& advi
     json.update(point_json(gain.at));
     json["limit"] = limit_name(gain.limit);
     json["largest_noise"] = source_name(gain.largest_noise);
-    json["largest_noise_share"] = gain.largest_noise_share;
+    json["largest_noise_share"] = gain.largest_noise_fraction;
     gains.push_back(std::move(json));
   }
   for (const isp::AdvicePoint& point : advice.curve) {

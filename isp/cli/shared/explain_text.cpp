@@ -27,7 +27,7 @@ void add_noise(Lines& out, const isp::NoiseReduction& noise) {
   }
 }
 
-void add_time(Lines& out, const isp::EffectsPlan& effects, const isp::EffectsChoice& choice) {
+void add_time(Lines& out, const isp::StepPlan& effects, const isp::ProcessingGoal& choice) {
   if (!effects.predicted_s) {
     out.add("time", "not predicted: bench --calibrate-cost measures this machine's speed, once");
     return;
@@ -49,12 +49,12 @@ void add_time(Lines& out, const isp::EffectsPlan& effects, const isp::EffectsCho
   out.add("budget", text);
 }
 
-void add_effects(Lines& out, const isp::EffectsPlan& effects, const isp::EffectsChoice& choice) {
+void add_effects(Lines& out, const isp::StepPlan& effects, const isp::ProcessingGoal& choice) {
   out.add("effects", choice.all ? std::string("all")
                      : choice.tolerance_delta_e
                          ? fmt::format("auto, tolerance {:.2g} CIEDE2000", *choice.tolerance_delta_e)
                          : std::string("auto, as accurate as the budget lets them be"));
-  for (const isp::PlannedEffect& effect : effects.effects) {
+  for (const isp::PlannedStep& effect : effects.effects) {
     std::string text = fmt::format("{}: {}", effect.name, effect.used ? "done" : "left out");
     text += std::isfinite(effect.size)
                 ? fmt::format("; {:.2g} CIEDE2000, of which {:.2g} may stay", effect.size, effect.left)

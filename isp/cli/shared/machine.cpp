@@ -14,7 +14,7 @@
 namespace lowlux::cli {
 namespace {
 
-constexpr std::streamsize most_cpuinfo = 1 << 16;  // bytes; the first processor is at the start, a board at the end
+constexpr std::streamsize max_cpuinfo = 1 << 16;  // bytes; the first processor is at the start, a board at the end
 constexpr std::string_view blanks = " \t\r";
 
 std::string_view trimmed(std::string_view text) {
@@ -39,8 +39,8 @@ std::optional<std::string> value_of(std::string_view key, std::string_view text)
 
 std::string beginning_of(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
-  std::string text(static_cast<std::size_t>(most_cpuinfo), '\0');
-  in.read(text.data(), most_cpuinfo);
+  std::string text(static_cast<std::size_t>(max_cpuinfo), '\0');
+  in.read(text.data(), max_cpuinfo);
   text.resize(static_cast<std::size_t>(in.gcount()));
   return text;
 }

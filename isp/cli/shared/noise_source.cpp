@@ -51,7 +51,8 @@ Result<void> find_noise(const isp::DevelopOptions& options, RawFrame& frame, Exe
     return {};
   }
   const std::string why =
-      "neither a profile nor the file states usable noise, and it cannot be estimated from this picture: " + noise.error().message;
+      "neither a profile nor the file states usable noise, and it cannot be estimated from this picture: " +
+      noise.error().message;
   if (options.denoise.mode == Mode::level || options.denoise.always) {
     return fail(noise.error().code, why + "; give a profile (--profile)");
   }

@@ -39,8 +39,8 @@ Json dark_json(const DarkFrame* dark) {
           {"settings", dark->settings},
           {"scale", dark->scale},
           {"doubling_c", dark->doubling_c > 0 ? Json(dark->doubling_c) : Json(nullptr)},
-          {"noise_share", dark->noise_share},
-          {"pattern_share", dark->pattern_share},
+          {"noise_share", dark->noise_fraction},
+          {"pattern_share", dark->pattern_fraction},
           {"added_variance_dn2", dark->added_variance_dn2},
           {"unknown_pixels", dark->unknown.size()}};
 }
@@ -86,14 +86,14 @@ Json number_json(double value) { return std::isfinite(value) ? Json(value) : Jso
 
 Json effects_json(const isp::DevelopPlan& plan) {
   if (!plan.effects) return nullptr;
-  const isp::EffectsChoice& choice = *plan.options.effects;
+  const isp::ProcessingGoal& choice = *plan.options.effects;
   Json json{{"mode", choice.all ? "all" : "auto"},
             {"tolerance_ciede2000", optional_json(choice.tolerance_delta_e)},
             {"budget_s", optional_json(choice.budget_s)},
             {"predicted_s", optional_json(plan.effects->predicted_s)},
             {"pace", choice.budget_s && choice.cost->pace_s > 0 ? Json(choice.cost->pace) : Json(nullptr)},
             {"effects", Json::array()}};
-  for (const isp::PlannedEffect& effect : plan.effects->effects) {
+  for (const isp::PlannedStep& effect : plan.effects->effects) {
     json["effects"].push_back({{"name", effect.name},
                                {"ciede2000", number_json(effect.size)},
                                {"left_ciede2000", number_json(effect.left)},

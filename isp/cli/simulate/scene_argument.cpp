@@ -22,13 +22,13 @@ bool names_table(const std::string& text) { return text.ends_with(".csv"); }
 
 /// Resamples a light to at most 5 nm where sensors and eyes may respond: integrals use the light's own nodes alone.
 Result<Spectrum> finely_sampled(const Spectrum& light) {
-  constexpr double step_nm = 5, least_nm = 200, most_nm = 2500;
+  constexpr double step_nm = 5, min_nm = 200, max_nm = 2500;
   std::vector<double> nodes;
   for (const double node : light.wavelengths_nm()) {
     if (!nodes.empty() && node - nodes.back() > step_nm) {
-      const double end = std::min(node, most_nm);
+      const double end = std::min(node, max_nm);
       const int last = static_cast<int>(std::ceil(end / step_nm));
-      for (int i = static_cast<int>(std::max(nodes.back(), least_nm) / step_nm); i < last; ++i) {
+      for (int i = static_cast<int>(std::max(nodes.back(), min_nm) / step_nm); i < last; ++i) {
         if (i * step_nm > nodes.back()) nodes.push_back(i * step_nm);
       }
     }

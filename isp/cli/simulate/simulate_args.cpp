@@ -56,21 +56,21 @@ std::string no_effect(const std::string& word) {
 }
 
 /// Parses auto, all, none, or a list of names: photon-noise,dark-current... or all but some: all,-prnu or -prnu.
-Wrong set_effects(const std::string& text, capture::EffectChoice& choice) {
+Wrong set_effects(const std::string& text, capture::NoiseSourceChoice& choice) {
   if (text == "auto") {
     choice.tolerance = choice.tolerance.value_or(isp::Tolerance{});
     return std::nullopt;
   }
   const auto names = isp::effect_names();
-  isp::EffectSet effects = text.starts_with('-') ? isp::EffectSet::all() : isp::EffectSet();
-  isp::EffectSet named;
+  isp::NoiseSourceSet effects = text.starts_with('-') ? isp::NoiseSourceSet::all() : isp::NoiseSourceSet();
+  isp::NoiseSourceSet named;
   for (std::string word : words_of(text)) {
     const bool without = word.starts_with('-');
     if (without) word.erase(0, 1);
     const auto found = std::find(names.begin(), names.end(), word);
     if (word == "auto") return "holds auto, which decides on every effect and cannot be combined";
     if (word == "all" && !without) {
-      effects = isp::EffectSet::all();
+      effects = isp::NoiseSourceSet::all();
     } else if (word == "none" && !without) {
       effects = named = {};
     } else if (found != names.end()) {

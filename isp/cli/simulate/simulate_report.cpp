@@ -15,17 +15,17 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const char* reason_of(const isp::EffectDecision& decision, isp::EffectSet wanted) {
+const char* reason_of(const isp::NoiseSourceDecision& decision, isp::NoiseSourceSet wanted) {
   switch (decision.reason) {
-    case isp::EffectDecision::Reason::absent:
+    case isp::NoiseSourceDecision::Reason::absent:
       return "the sensor has none";
-    case isp::EffectDecision::Reason::negligible:
+    case isp::NoiseSourceDecision::Reason::negligible:
       return "below the tolerance with all that is left out";
-    case isp::EffectDecision::Reason::asked_for:
+    case isp::NoiseSourceDecision::Reason::asked_for:
       return wanted.has(decision.effect) && !decision.kept ? "nothing without dark current" : "as asked";
-    case isp::EffectDecision::Reason::free:
+    case isp::NoiseSourceDecision::Reason::free:
       return "negligible, but leaving it out saves nothing";
-    case isp::EffectDecision::Reason::needed:
+    case isp::NoiseSourceDecision::Reason::needed:
       break;
   }
   return "above the tolerance, alone or with what is left out";
@@ -33,9 +33,9 @@ const char* reason_of(const isp::EffectDecision& decision, isp::EffectSet wanted
 
 std::string name_of(isp::Effect effect) { return std::string(isp::effect_names()[static_cast<int>(effect)]); }
 
-Json region_json(const isp::RegionPlan& region, isp::EffectSet wanted) {
+Json region_json(const isp::RegionPlan& region, isp::NoiseSourceSet wanted) {
   Json decisions = Json::array();
-  for (const isp::EffectDecision& d : region.decisions) {
+  for (const isp::NoiseSourceDecision& d : region.decisions) {
     decisions.push_back({{"effect", name_of(d.effect)},
                          {"kept", d.kept},
                          {"reason", reason_of(d, wanted)},
@@ -85,13 +85,13 @@ Json cost_json(const capture::EffectCost& cost) {
 }  // namespace
 
 std::string explain_text(const SimulateArgs& args, const SimulateOutcome& outcome) {
-  const isp::EffectPlan& plan = *outcome.plan;
+  const isp::NoiseSourcePlan& plan = *outcome.plan;
   std::string text;
   auto out = std::back_inserter(text);
   for (const isp::RegionPlan& region : plan.regions) {
     fmt::format_to(out, "{} blocks of {:.3g} to {:.3g} e-\n", region.blocks, region.darkest_e, region.brightest_e);
     fmt::format_to(out, "  {:<13} {:>10} {:>12}  {:<9} {}\n", "effect", "delta E", "variance", "decision", "because");
-    for (const isp::EffectDecision& d : region.decisions) {
+    for (const isp::NoiseSourceDecision& d : region.decisions) {
       fmt::format_to(out, "  {:<13} {:>10.3g} {:>12.3g}  {:<9} {}\n", name_of(d.effect), d.alone.delta_e,
                      d.alone.relative_variance, d.kept ? "simulate" : "leave out",
                      reason_of(d, args.options.effects.effects));

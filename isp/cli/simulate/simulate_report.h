@@ -6,7 +6,7 @@
 
 #include "capture/synthetic/sensor_sim.h"
 #include "isp/cli/simulate/simulate_args.h"
-#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/noise_source_plan.h"
 #include "isp/model/sensor/sensor_db.h"
 #include "isp/pipeline/stage_clock.h"
 
@@ -16,7 +16,7 @@ namespace lowlux::cli {
 struct SimulateOutcome {
   isp::NamedSensor sensor;
   std::vector<std::string> files;
-  std::optional<isp::EffectPlan> plan;
+  std::optional<isp::NoiseSourcePlan> plan;
   std::optional<capture::EffectCost> cost;  // measured for --explain
   double white_cd_m2 = 0;                   // luminance of white
   std::optional<double> saturation_cd_m2;  // luminance of D65 that saturates in the exposure time; none for a time of 0

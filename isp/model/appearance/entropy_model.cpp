@@ -19,7 +19,7 @@ namespace {
 constexpr double node_width_nm = 5;
 constexpr double smallest_adaptive_gamma =
     1e-4;                                // responses are matched; below it, fits of impossible responses are slow
-constexpr double least_gamma = 1e-12;    // limit of fit_max_entropy
+constexpr double min_gamma = 1e-12;      // limit of fit_max_entropy
 constexpr Vector3 rod_weights{3, 3, 5};  // W of thesis Eq. 5.8
 constexpr int luminance_rounds = 3;
 
@@ -35,14 +35,14 @@ const std::array<Vector3, entropy_nodes>& matching_functions() {
   return all;
 }
 
-SpectralBasis<3> basis_of(ConeSet set, double rod_share) {
+SpectralBasis<3> basis_of(ConeSet set, double rod_fraction) {
   const std::array<Spectrum, 3> cones = cone_fundamentals(set);
   SpectralBasis<3> basis;
   basis.f.resize(entropy_nodes);
   basis.weight_nm.assign(entropy_nodes, node_width_nm);
   for (int i = 0; i < entropy_nodes; ++i) {
     const double nm = entropy_wavelength_nm(i), rods = scotopic_observer().at(nm);
-    for (int c = 0; c < 3; ++c) basis.f[i][c] = cones[c].at(nm) + rod_share * rod_weights[c] * rods;
+    for (int c = 0; c < 3; ++c) basis.f[i][c] = cones[c].at(nm) + rod_fraction * rod_weights[c] * rods;
   }
   return basis;
 }
@@ -88,14 +88,14 @@ Result<Matrix3> inverse_weight(const Matrix3& covariance) {
 
 double entropy_weight(double m) { return std::max(2 * (1 - m), smallest_adaptive_gamma); }
 
-double entropy_rod_share(double m) { return std::expm1(1 - m) / (std::numbers::e - 1); }
+double entropy_rod_fraction(double m) { return std::expm1(1 - m) / (std::numbers::e - 1); }
 
 Result<EntropyModel> entropy_model(double m, const NodePower& white, const EntropyOptions& options) {
   assert(m >= 0 && m <= 1);
-  EntropyModel model{.measured = basis_of(options.cones, entropy_rod_share(m)),
+  EntropyModel model{.measured = basis_of(options.cones, entropy_rod_fraction(m)),
                      .explained = {},
                      .gamma = options.gamma_fixed.value_or(entropy_weight(m))};
-  if (!(model.gamma >= least_gamma) || !std::isfinite(model.gamma)) {
+  if (!(model.gamma >= min_gamma) || !std::isfinite(model.gamma)) {
     return fail(ErrorCode::invalid_argument,
                 "the weight of entropy must be 1e-12 or more, found " + number_text(model.gamma));
   }

@@ -46,7 +46,7 @@ struct EntropyOptions {
 /// Returns the weight of entropy, gamma = 2 (1 - m), at least 1e-4; m in 0..1 as in mesopic.h.
 double entropy_weight(double m);
 /// Returns the weight of the rods, xi = (e^(1 - m) - 1) / (e - 1).
-double entropy_rod_share(double m);
+double entropy_rod_fraction(double m);
 
 /// Holds the model for one state of adaptation and one white.
 struct EntropyModel {

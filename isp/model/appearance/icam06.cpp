@@ -13,9 +13,9 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double semi_saturation = 27.13;  // of CIECAM02
-constexpr double most_response = 400;
+constexpr double max_response = 400;
 constexpr double noise = 0.1;
-constexpr double least_white_cd_m2 = 1e-6;
+constexpr double min_white_cd_m2 = 1e-6;
 constexpr double daylight_white_cd_m2 = 318.31;
 
 /// Holds what depends on the state alone.
@@ -28,10 +28,10 @@ struct Compression {
 };
 
 Compression compression_of(const Icam06State& state) {
-  const double white = std::max(state.white_cd_m2, least_white_cd_m2), adaptation = 0.2 * white;
+  const double white = std::max(state.white_cd_m2, min_white_cd_m2), adaptation = 0.2 * white;
   const bool paper = state.variant == Icam06Variant::paper;
   return {luminance_level_factor(adaptation) / white, rod_adaptation(scotopic_ratio_of_equal_energy * adaptation),
-          paper ? std::max(state.scotopic_white_cd_m2, least_white_cd_m2) : 5 * adaptation, state.power, state.variant};
+          paper ? std::max(state.scotopic_white_cd_m2, min_white_cd_m2) : 5 * adaptation, state.power, state.variant};
 }
 
 double saturating(double x, double power) {
@@ -43,12 +43,12 @@ double rods_of(const Compression& c, double s_cd_m2) {
   const double s = s_cd_m2 / c.scotopic_white_cd_m2;
   const bool paper = c.variant == Icam06Variant::paper;
   const double bleaching = 0.5 / (1 + 0.3 * std::pow(c.rods.u * s, paper ? 0.3 : 3.0)) + 0.5 / (1 + 5 * c.rods.u);
-  return 3.05 * bleaching * most_response * saturating(c.rods.f_ls * s, c.power) + (paper ? 0.3 : 0.03);
+  return 3.05 * bleaching * max_response * saturating(c.rods.f_ls * s, c.power) + (paper ? 0.3 : 0.03);
 }
 
 double expanded(const Compression& c, double response) {
   const double signal = response - noise;
-  const double share = std::min(std::fabs(signal) / most_response, 1 - 1e-6);
+  const double share = std::min(std::fabs(signal) / max_response, 1 - 1e-6);
   return std::copysign(std::pow(semi_saturation * share / (1 - share), 1 / c.power) / c.level_per_cd_m2, signal);
 }
 
@@ -66,7 +66,7 @@ Icam06Response icam06_compress(const Vector3& xyz_cd_m2, const Icam06State& stat
   out.rods = rods_of(c, std::fabs(xyz_cd_m2[1]));
   Vector3 sum{};
   for (int i = 0; i < 3; ++i) {
-    const double response = most_response * saturating(c.level_per_cd_m2 * std::fabs(hpe[i]), c.power);
+    const double response = max_response * saturating(c.level_per_cd_m2 * std::fabs(hpe[i]), c.power);
     out.cones[i] = std::copysign(response, hpe[i]) + noise;
     sum[i] = out.cones[i] + out.rods;
   }

@@ -36,7 +36,7 @@ double khan_intensity(const NakaRushton& receptor, double response) {
 
 double khan_s_cone_excitation(double scotopic_cd_m2) {
   const double rods = khan_response(khan_rods(moonlight_adaptation_cd_m2), scotopic_cd_m2);
-  return khan_intensity(khan_cones(moonlight_adaptation_cd_m2), rod_share_of_s_cones * rods);
+  return khan_intensity(khan_cones(moonlight_adaptation_cd_m2), rod_fraction_of_s_cones * rods);
 }
 
 namespace {

@@ -8,7 +8,7 @@ namespace lowlux::isp {
 // those of Hunt in the form of Pattanaik et al. 2000, R = B I^n / (I^n + sigma^n), n = 0.73.
 
 inline constexpr double moonlight_adaptation_cd_m2 = 0.03;  // G of the paper
-inline constexpr double rod_share_of_s_cones = 0.20;        // fraction of the rods' response added to the S cones'
+inline constexpr double rod_fraction_of_s_cones = 0.20;     // fraction of the rods' response added to the S cones'
 
 /// Holds half-saturation and bleaching of one class of receptors.
 struct NakaRushton {

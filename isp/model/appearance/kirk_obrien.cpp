@@ -11,7 +11,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double per_td = 0.33;  // Cao et al. 2008
-constexpr double least_base = 1e-6;
+constexpr double min_base = 1e-6;
 
 // Filament's constants: sensitivities, the rods' weight in each cone's gain, and its receptors of linear Rec.709.
 constexpr Vector3 filament_peak{0.63721, 0.39242, 1.6064};
@@ -33,15 +33,15 @@ Matrix3 filament_opponent_matrix() {
 }  // namespace
 
 OpponentGain kirk_opponent_gain(const ReceptorSignals& seen) {
-  constexpr double k1 = 0.25, lmax = 0.637, mmax = 0.392, smax = 1.606, share_of_l = 0.619;
+  constexpr double k1 = 0.25, lmax = 0.637, mmax = 0.392, smax = 1.606, fraction_of_l = 0.619;
   constexpr double r1 = 1.111, r2 = 0.939, r3 = 0.4, r4 = 0.15, x = 15, y = 15, z = 5;
   constexpr Vector3 k{k1, k1, 0.4};
   OpponentGain out;
   for (int i = 0; i < 3; ++i) {
-    out.gain[i] = 1 / std::sqrt(std::max(least_base, 1 + per_td * (seen.cones[i] + k[i] * seen.rods)));
+    out.gain[i] = 1 / std::sqrt(std::max(min_base, 1 + per_td * (seen.cones[i] + k[i] * seen.rods)));
   }
   const double l = out.gain[0] / lmax, m = out.gain[1] / mmax, s = out.gain[2] / smax;
-  const double w = share_of_l * l + (1 - share_of_l) * m;
+  const double w = fraction_of_l * l + (1 - fraction_of_l) * m;
   out.opponent = {x * k1 * (r1 * m - r2 * l) * seen.rods, y * (r3 * s - r4 * w) * seen.rods, z * w * seen.rods};
   return out;
 }

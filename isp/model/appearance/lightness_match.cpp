@@ -9,7 +9,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double most_octaves = 10;
+constexpr double max_octaves = 10;
 constexpr double tolerance = 1e-12;  // relative to the signal of white
 
 struct Excitation {
@@ -21,7 +21,7 @@ Excitation times(const Excitation& e, double scale) {
   return {{scale * e.cones[0], scale * e.cones[1], scale * e.cones[2]}, scale * e.rods};
 }
 
-/// Returns the octaves that bring `signal` to the target, within the limit of most_octaves; the signal rises
+/// Returns the octaves that bring `signal` to the target, within the limit of max_octaves; the signal rises
 /// monotonically.
 double octaves_to(double target, const Excitation& e, const AchromaticSignal& signal) {
   const auto excess = [&](double octaves) {
@@ -30,7 +30,7 @@ double octaves_to(double target, const Excitation& e, const AchromaticSignal& si
   };
   const Evaluated here{0, excess(0)};
   if (std::fabs(here.f) <= tolerance) return 0;
-  const double farthest = here.f < 0 ? most_octaves : -most_octaves;
+  const double farthest = here.f < 0 ? max_octaves : -max_octaves;
   const Evaluated end{farthest, excess(farthest)};
   if ((end.f > 0) == (here.f > 0)) return farthest;
   return bracketed_root(excess, here, end, tolerance);

@@ -10,15 +10,15 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double least_cd_m2 = 1e-12, most_cd_m2 = 1e12;
-constexpr double most_brightening = 8;
-constexpr double most_component = 1e12;
+constexpr double min_cd_m2 = 1e-12, max_cd_m2 = 1e12;
+constexpr double max_brightening = 8;
+constexpr double max_component = 1e12;
 
 tl::unexpected<Error> refused(const std::string& what, double found, const std::string& expected) {
   return fail(ErrorCode::invalid_argument, what + " must be " + expected + ", found " + number_text(found));
 }
 
-bool is_luminance(double value) { return value >= least_cd_m2 && value <= most_cd_m2; }
+bool is_luminance(double value) { return value >= min_cd_m2 && value <= max_cd_m2; }
 bool is_positive(double value) { return value > 0 && std::isfinite(value); }
 
 double scotopic(const Vector3& xyz) { return scotopic_luminance(xyz_of(xyz)); }
@@ -58,7 +58,7 @@ Result<SeenScene> seen_scene(const ViewingConditions& conditions) {
   scene.white_cd_m2 = conditions.white_cd_m2;
   scene.adaptation_cd_m2 = conditions.adaptation();
   scene.adaptation_m = mesopic_state({scene.adaptation_cd_m2, scene.adaptation_cd_m2 * conditions.scotopic_ratio}).m;
-  scene.rod_share = rod_share(scene.adaptation_m);
+  scene.rod_fraction = rod_fraction(scene.adaptation_m);
   scene.white_scotopic = scotopic(white);
   scene.from_rec709 = *inverse(*to_d65) * *rgb_to_xyz(primaries_rec709);
   scene.to_rec709 = *inverse(scene.from_rec709);
@@ -68,20 +68,20 @@ Result<SeenScene> seen_scene(const ViewingConditions& conditions) {
 double relative_scotopic(const SeenScene& scene, const Vector3& xyz) { return scotopic(xyz) / scene.white_scotopic; }
 
 double relative_mesopic(const SeenScene& scene, const Vector3& xyz) {
-  const double r = scene.rod_share;
+  const double r = scene.rod_fraction;
   return (xyz[1] + r * (scotopic(xyz) - xyz[1])) / (1 + r * (scene.white_scotopic - 1));
 }
 
 Vector3 with_luminance(const Vector3& xyz, double luminance, const Vector3& white) {
   const bool has_chromaticity = xyz[1] > 0 && luminance > 0;
-  const double scale = has_chromaticity ? std::min(luminance / xyz[1], most_brightening) : luminance;
+  const double scale = has_chromaticity ? std::min(luminance / xyz[1], max_brightening) : luminance;
   const Vector3& colour = has_chromaticity ? xyz : white;
   return {scale * colour[0], scale * colour[1], scale * colour[2]};
 }
 
 Vector3 within_reach(const Vector3& xyz) {
   Vector3 out{};
-  for (int i = 0; i < 3; ++i) out[i] = std::clamp(xyz[i], -most_component, most_component);
+  for (int i = 0; i < 3; ++i) out[i] = std::clamp(xyz[i], -max_component, max_component);
   return out;
 }
 

@@ -20,7 +20,7 @@ struct SeenScene {
   Vector3 white{};              // XYZ, Y = 1
   double white_cd_m2 = 0;       // luminance of a perfect diffuser
   double adaptation_cd_m2 = 0;  // photopic luminance of the adaptation field
-  double rod_share = 0;         // r of L_mes = L_p + r (L_s - L_p)
+  double rod_fraction = 0;      // r of L_mes = L_p + r (L_s - L_p)
   double adaptation_m = 0;      // m of CIE 191
   double white_scotopic = 0;    // scotopic luminance of the white of Y = 1
   Matrix3 to_rec709{};          // linear Rec.709 of the colour under D65, von Kries in Bradford's cones

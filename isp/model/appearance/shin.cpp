@@ -12,7 +12,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double white_reflectance = 0.9;
-constexpr double least_coefficient = 0.05;  // lower limit of alpha, l and m in the inverse
+constexpr double min_coefficient = 0.05;  // lower limit of alpha, l and m in the inverse
 constexpr Vector3 equal_energy_cones{2.0 / 3.0, 1.0 / 3.0, 1};
 constexpr Matrix3 cones_to_opponent{{{1, 1, 0}, {1, -2, 0}, {1, 1, -1}}};
 constexpr Matrix3 published_opponent_to_xyz{{{1.008, 2.149, -0.212}, {1, 0, 0}, {1, 0, -1}}};
@@ -63,9 +63,9 @@ Solution self_consistent_rods(const Problem& p) {
 
 Problem bounded(const OpponentSignals& signals, const ShinCoefficients& c, const ShinEye& eye) {
   Problem p{signals, c, eye};
-  p.c.alpha = std::max(c.alpha, least_coefficient);
-  p.c.l = std::max(c.l, least_coefficient);
-  p.c.m = std::max(c.m, least_coefficient);
+  p.c.alpha = std::max(c.alpha, min_coefficient);
+  p.c.l = std::max(c.l, min_coefficient);
+  p.c.m = std::max(c.m, min_coefficient);
   return p;
 }
 

@@ -15,7 +15,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::size_t columns = 7;
-constexpr std::size_t most_nodes = 1000;
+constexpr std::size_t max_nodes = 1000;
 constexpr std::string_view separators = ", \t\r;";
 
 std::vector<std::string_view> words_of(std::string_view line) {
@@ -82,7 +82,7 @@ Result<ShinTable> read_shin_table(std::string_view text, std::string name) {
       return malformed(line,
                        "E must be positive and rise, found " + number_text(node->e) + " after " + number_text(before));
     }
-    if (table.nodes.size() == most_nodes) {
+    if (table.nodes.size() == max_nodes) {
       return fail(ErrorCode::too_large, "a table of coefficients may have 1000 lines, this one has more");
     }
     table.nodes.push_back(*node);

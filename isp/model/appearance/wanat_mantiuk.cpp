@@ -9,7 +9,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double most_exponent = 4;
+constexpr double max_exponent = 4;
 constexpr double reference_cd_m2 = 200;
 
 Vector3 scaled(double scale, const Vector3& v) { return {scale * v[0], scale * v[1], scale * v[2]}; }
@@ -20,8 +20,8 @@ double wanat_saturation(double luminance_cd_m2) { return luminance_cd_m2 / (lumi
 
 double wanat_exponent(double from_cd_m2, double to_cd_m2) {
   const double from = wanat_saturation(from_cd_m2), to = wanat_saturation(to_cd_m2);
-  if (!(to > 0)) return from > 0 ? most_exponent : 1;
-  return std::clamp(from / to, 0.0, most_exponent);
+  if (!(to > 0)) return from > 0 ? max_exponent : 1;
+  return std::clamp(from / to, 0.0, max_exponent);
 }
 
 Vector3 wanat_saturated(const Vector3& rgb, double exponent, const Vector3& luminance_weights) {

@@ -99,7 +99,7 @@ Xyz xyz_of_photons(const PhotonMeans& means, std::span<const double> counts) {
 namespace {
 
 constexpr double optimality_tolerance = 1e-7;  // for the optimality condition; the area is within about (3/2) of it
-constexpr int most_iterations = 20000;         // linear convergence: a few hundred in practice
+constexpr int max_iterations = 20000;          // linear convergence: a few hundred in practice
 
 // The samples after an affine map that makes their covariance the identity: the least ellipse is affinely covariant,
 // and clouds far smaller than their distance from the origin keep their digits.
@@ -172,7 +172,7 @@ std::optional<XyEllipse> enclosing_ellipse(std::span<const Xy> samples) {
   std::vector<Vector3> points;
   for (const Xy& xy : samples) points.push_back(lifted(*white, xy));
   std::vector<double> weight(points.size(), 1.0 / static_cast<double>(points.size()));
-  for (int i = 0; i < most_iterations && improve(points, weight); ++i) continue;
+  for (int i = 0; i < max_iterations && improve(points, weight); ++i) continue;
 
   // In the plane the ellipse is 2 x covariance of the weights, scaled so that it reaches the farthest sample.
   const Matrix3 m = moments(points, weight);

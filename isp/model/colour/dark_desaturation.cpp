@@ -4,7 +4,7 @@
 
 namespace lowlux::isp {
 
-std::optional<double> signal_share(const Xyz& signal, const Xyz& dark) {
+std::optional<double> signal_fraction(const Xyz& signal, const Xyz& dark) {
   const double signal_sum = signal.x + signal.y + signal.z;
   const double all = signal_sum + (dark.x + dark.y + dark.z);
   if (!(signal_sum > 0) || !(all > 0) || !std::isfinite(all)) return std::nullopt;

@@ -13,7 +13,7 @@ namespace lowlux::isp {
 
 /// Returns the signal's fraction alpha of a measurement: near 1 in bright light, near 0 where dark current dominates.
 /// @return nullopt unless S(signal) and S(signal) + S(dark) are positive and finite: there is no alpha, and no colour
-std::optional<double> signal_share(const Xyz& signal, const Xyz& dark);
+std::optional<double> signal_fraction(const Xyz& signal, const Xyz& dark);
 
 /// Returns the measured chromaticity of a true one (Eq. 4.23). alpha = 0 gives the dark's own.
 Xy desaturated(const Xy& signal, const Xy& dark, double alpha);

@@ -46,7 +46,7 @@ struct Walls {
   double converter_e;
 };
 
-Walls walls_of(const AdviceRequest& r, const SensorModel& sensor) {
+Walls saturation_limits(const AdviceRequest& r, const SensorModel& sensor) {
   const double z = normal_quantile_above(r.clipped_share);
   return {charge_below(sensor.full_well_e, 0, z), charge_below(code_range_e(sensor), sensor.read_noise_e, z)};
 }
@@ -57,7 +57,7 @@ struct Longest {
 };
 
 Longest longest_exposure(const AdviceRequest& r, const GainSetting& gain) {
-  const Walls walls = walls_of(r, gain.sensor);
+  const Walls walls = saturation_limits(r, gain.sensor);
   const double rate = fullest_rate(r, gain, r.highlight_cd_m2);
   Longest out{r.longest_exposure_s, ExposureLimit::motion};
   if (walls.full_well_e < rate * out.exposure_s) out = {walls.full_well_e / rate, ExposureLimit::full_well};
@@ -112,16 +112,15 @@ GainAdvice best_of(const AdviceRequest& r, std::size_t gain) {
 
 /// Returns for each gain the larger loss: against the best SNR or against the best chromaticity [dB].
 std::vector<double> losses_db(const std::vector<GainAdvice>& gains) {
-  double best_snr = 0, least_std = INFINITY;
+  double best_snr = 0, min_std = INFINITY;
   for (const GainAdvice& g : gains) {
     best_snr = std::max(best_snr, g.at.midtone->snr);
-    least_std = std::min(least_std, g.at.midtone->uv_std);
+    min_std = std::min(min_std, g.at.midtone->uv_std);
   }
   std::vector<double> losses;
   losses.reserve(gains.size());
   for (const GainAdvice& g : gains) {
-    losses.push_back(
-        std::max(decibel(best_snr / g.at.midtone->snr), 20 * std::log10(g.at.midtone->uv_std / least_std)));
+    losses.push_back(std::max(decibel(best_snr / g.at.midtone->snr), 20 * std::log10(g.at.midtone->uv_std / min_std)));
   }
   return losses;
 }
@@ -160,13 +159,13 @@ double decibel(double snr) { return 10 * std::log10(snr); }
 
 AdvicePoint predicted_point(const AdviceRequest& request, std::size_t gain, double exposure_s) {
   const GainSetting& setting = request.gains[gain];
-  const Walls walls = walls_of(request, setting.sensor);
+  const Walls walls = saturation_limits(request, setting.sensor);
   const double highlight_e = fullest_rate(request, setting, request.highlight_cd_m2) * exposure_s;
   AdvicePoint out;
   out.gain = gain;
   out.exposure_s = exposure_s;
-  out.highlight_charge_share = highlight_e / setting.sensor.full_well_e;
-  out.highlight_code_share = highlight_e / code_range_e(setting.sensor);
+  out.highlight_charge_fraction = highlight_e / setting.sensor.full_well_e;
+  out.highlight_code_fraction = highlight_e / code_range_e(setting.sensor);
   if (exposure_s > request.longest_exposure_s) {
     out.exceeds = ExposureLimit::motion;
   } else if (highlight_e > walls.converter_e && walls.converter_e <= walls.full_well_e) {
@@ -186,7 +185,8 @@ Result<ExposureAdvice> advise_exposure(const AdviceRequest& request) {
   out.gains.reserve(request.gains.size());
   for (std::size_t i = 0; i < request.gains.size(); ++i) {
     const GainSetting& gain = request.gains[i];
-    if (const Walls walls = walls_of(request, gain.sensor); !(std::min(walls.full_well_e, walls.converter_e) > 0)) {
+    if (const Walls walls = saturation_limits(request, gain.sensor);
+        !(std::min(walls.full_well_e, walls.converter_e) > 0)) {
       return fail(ErrorCode::invalid_argument,
                   "noise alone clips more pixels than the share allowed; allow a larger share, or leave out this gain",
                   gain.name);
@@ -333,7 +333,7 @@ std::string advice_reason(const AdviceRequest& r, const ExposureAdvice& advice, 
     text += ", " + r.gains[*lower].name + " would lose " + text_of(losses_db[*lower] - losses_db[advice.best]) + " dB";
   }
   if (const std::string higher = higher_text(r, advice, losses_db); !higher.empty()) text += ", " + higher;
-  return text + "; " + name_of(best.largest_noise) + " is " + text_of(100 * best.largest_noise_share) +
+  return text + "; " + name_of(best.largest_noise) + " is " + text_of(100 * best.largest_noise_fraction) +
          " % of the variance";
 }
 

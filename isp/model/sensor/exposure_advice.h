@@ -63,8 +63,8 @@ struct AdvicePoint {
   std::size_t gain = 0;  // index in AdviceRequest::gains
   double exposure_s = 0;
   std::optional<MidtoneQuality> midtone;  // absent where the mid tone itself clips
-  double highlight_charge_share = 0;      // mean charge of its fullest channel, as a fraction of the full well
-  double highlight_code_share = 0;        // the same charge as a fraction of the charge at the largest code
+  double highlight_charge_fraction = 0;   // mean charge of its fullest channel, as a fraction of the full well
+  double highlight_code_fraction = 0;     // the same charge as a fraction of the charge at the largest code
   std::optional<ExposureLimit> exceeds;   // the first limit that is exceeded
 };
 
@@ -73,7 +73,7 @@ struct GainAdvice {
   AdvicePoint at;
   ExposureLimit limit = ExposureLimit::motion;  // limit of the exposure
   NoiseSource largest_noise = NoiseSource::photons;
-  double largest_noise_share = 0;  // fraction of the mid tone's variance, in its channel with most signal
+  double largest_noise_fraction = 0;  // fraction of the mid tone's variance, in its channel with most signal
 };
 
 struct ExposureAdvice {

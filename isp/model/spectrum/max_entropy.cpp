@@ -10,7 +10,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int most_newton_steps = 60;
+constexpr int max_newton_steps = 60;
 constexpr double largest_gradient = 1e-10;  // limit for a converged fit, in units of the moments
 constexpr double smallest_gamma = 1e-12;
 constexpr double smallest_step = 1e-9;
@@ -92,7 +92,7 @@ std::optional<MaxEntropyFit<N>> fit_max_entropy(const SpectralBasis<N>& basis, c
   here.move(theta);
   int iteration = 0;
   for (; !here.settled(); ++iteration) {
-    if (iteration == most_newton_steps || !std::isfinite(here.value)) return std::nullopt;
+    if (iteration == max_newton_steps || !std::isfinite(here.value)) return std::nullopt;
     const Vector direction = here.hessian().llt().solve(-here.gradient);
     const double slope = here.gradient.dot(direction);
     const double rounding = 1e-14 * (1 + std::fabs(here.value));  // below the resolution of the comparison

@@ -12,9 +12,9 @@ namespace {
 constexpr double a = 0.7670;  // CIE 191:2010
 constexpr double b = 0.3334;
 constexpr double v0 = scotopic_at_555_nm;
-constexpr double most_luminance = 1e30;
+constexpr double max_luminance = 1e30;
 
-double sound(double luminance) { return luminance > 0 ? std::min(luminance, most_luminance) : 0; }
+double sound(double luminance) { return luminance > 0 ? std::min(luminance, max_luminance) : 0; }
 
 struct Step {
   double h;      // a + b log10 L(m) - m
@@ -47,10 +47,10 @@ double root(const LuminancePair& field) {
 
 double mes2_response(double luminance_cd_m2) { return a + b * std::log10(luminance_cd_m2); }
 
-double rod_share(double m) { return (1 - m) * v0 / (m + (1 - m) * v0); }
+double rod_fraction(double m) { return (1 - m) * v0 / (m + (1 - m) * v0); }
 
 double mesopic_luminance_cd_m2(double m, const LuminancePair& stimulus) {
-  return stimulus.photopic + rod_share(m) * (stimulus.scotopic - stimulus.photopic);
+  return stimulus.photopic + rod_fraction(m) * (stimulus.scotopic - stimulus.photopic);
 }
 
 MesopicState mesopic_state(const LuminancePair& adaptation) {

@@ -44,7 +44,7 @@ double mesopic_luminance_cd_m2(double m, const LuminancePair& stimulus);
 
 /// Returns the rods' fraction r of the mesopic luminance: L(m) = L_p + r (L_s - L_p), r = (1 - m) v0 / (m + (1 - m)
 /// v0).
-double rod_share(double m);
+double rod_fraction(double m);
 
 /// Returns V'(lambda) of CIE 1951, peak 1, 380 to 780 nm in steps of 1 nm, 0 elsewhere.
 const Spectrum& scotopic_observer();

@@ -28,7 +28,7 @@ double brightness_of_white(double luminance) {
 
 }  // namespace
 
-double chroma_share(double luminance_cd_m2) {
+double chroma_fraction(double luminance_cd_m2) {
   if (!(luminance_cd_m2 > 0)) return 0;
   return std::min(1.0, saturation(std::min(luminance_cd_m2, 1e9)) / saturation(daylight_cd_m2));
 }
@@ -49,7 +49,7 @@ double rod_blue(double luminance_cd_m2) {
   const Vector3 seen = filament_night({light, light, light});
   const Vector3 weight = rgb_to_xyz(primaries_rec709).value()[1];
   const double luminance = weight[0] * seen[0] + weight[1] * seen[1] + weight[2] * seen[2];
-  return chroma_share(luminance_cd_m2) * (seen[2] / luminance - 1);
+  return chroma_fraction(luminance_cd_m2) * (seen[2] / luminance - 1);
 }
 
 double apparent_dimming_ev(double luminance_cd_m2) {
@@ -61,7 +61,7 @@ double apparent_dimming_ev(double luminance_cd_m2) {
 NightEye night_eye(const LuminancePair& adaptation) {
   const MesopicState state = mesopic_state(adaptation);
   const double seen = state.luminance_cd_m2;
-  return {state, chroma_share(seen), (1 - state.m) * rod_blue(seen), blur_std_deg(seen)};
+  return {state, chroma_fraction(seen), (1 - state.m) * rod_blue(seen), blur_std_deg(seen)};
 }
 
 }  // namespace lowlux::isp

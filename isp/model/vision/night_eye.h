@@ -21,7 +21,7 @@ inline constexpr double half_saturation_cd_m2 = 0.108;
 
 /// Returns s(L) / s(100) with s(L) = L / (L + 0.108 cd/m2), at most 1: the loss of saturation (Wanat & Mantiuk, ACM TOG
 /// 33(4) (2014), Eq. 26).
-double chroma_share(double luminance_cd_m2);
+double chroma_fraction(double luminance_cd_m2);
 
 /// Returns the largest frequency of gratings of full contrast that is resolved [cycles per degree],
 ///     17.25 atan(1.4 log10 L + 0.35) + 25.72
@@ -35,7 +35,7 @@ double blur_std_deg(double luminance_cd_m2);
 
 /// Returns the fraction of a neutral's blue that rods add: the chromaticity that Kirk & O'Brien's model (as in
 /// google/filament, with light counted three times, see appearance/kirk_obrien.h) gives to a neutral of this luminance,
-/// times chroma_share(): the hue of the night fades with all others.
+/// times chroma_fraction(): the hue of the night fades with all others.
 double rod_blue(double luminance_cd_m2);
 
 /// Gives the direction of the shift of rod_blue() in linear Rec. 709, for rod_blue() = 1: red, green, blue relative to

@@ -13,7 +13,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::size_t fewest = 4;
-constexpr double least_determinant = 1e-9;  // lower limit for normal equations, relative to their diagonal
+constexpr double min_determinant = 1e-9;  // lower limit for normal equations, relative to their diagonal
 
 /// Holds one reflectance in camera RGB, XYZ and scotopic luminance, the perfect diffuser having RGB 1, 1, 1 and Y = 1.
 struct Seen {
@@ -36,7 +36,7 @@ std::optional<Vector3> weights_of_sum(const std::vector<Seen>& all, double s) {
     gy += g * y;
   }
   const double determinant = rr * gg - rg * rg;
-  if (!(determinant > least_determinant * rr * gg)) return std::nullopt;
+  if (!(determinant > min_determinant * rr * gg)) return std::nullopt;
   const double w0 = (ry * gg - gy * rg) / determinant, w1 = (gy * rr - ry * rg) / determinant;
   return Vector3{w0, w1, s - w0 - w1};
 }

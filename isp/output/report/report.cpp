@@ -60,7 +60,7 @@ Result<void> write_text(const std::string& path, std::string_view text, Overwrit
 namespace {
 
 using Json = nlohmann::json;
-constexpr std::size_t least_sections_with_contents = 3;
+constexpr std::size_t min_sections_with_contents = 3;
 constexpr std::size_t short_cell = 20, long_cell = 40;  // characters
 
 // The policy keeps the browser from fetching anything, whatever the text of the page.
@@ -254,7 +254,7 @@ std::string contents_of(const std::vector<ReportSection>& sections) {
     lines += R"(<li><a href="#section)" + std::to_string(i) + "\">" + escaped(sections[i].title) + "</a></li>\n";
     ++listed;
   }
-  if (listed < least_sections_with_contents) return {};
+  if (listed < min_sections_with_contents) return {};
   return "<nav aria-label=\"Contents\"><p>Contents</p>\n<ol>\n" + lines + "</ol></nav>\n";
 }
 

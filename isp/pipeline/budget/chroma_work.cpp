@@ -49,7 +49,7 @@ std::vector<Tile> tiles_of(const Axis& across, const Axis& down, const CameraRgb
     double sum = 0;
     for (std::size_t c = 0; c < 3; ++c) {
       const auto value = static_cast<double>(mean.plane[c].at(x, y));
-      if (std::isfinite(value)) sum += share_of_sites[c] * electrons_at_white[c] * value;
+      if (std::isfinite(value)) sum += fraction_of_sites[c] * electrons_at_white[c] * value;
     }
     return sum;
   };
@@ -86,7 +86,7 @@ ChromaWork chroma_work(const RawFrame& frame, const RawLevels& levels, const den
   const int pyramid_levels = denoise::levels_of(across.cells, down.cells);
   const std::size_t count = tiles.size();
   std::vector<float> start(count);
-  std::vector<unsigned char> has_chroma(count * denoise::most_levels);
+  std::vector<unsigned char> has_chroma(count * denoise::max_levels);
   for (std::size_t i = 0; i < count; ++i) {
     const double mean_e = tiles[i].charge_e / tiles[i].blocks;
     const int level = denoise::start_of(mean_e - dark_e, dark_e, variance_e2);

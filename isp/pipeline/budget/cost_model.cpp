@@ -28,7 +28,7 @@ CostSize cost_size(const RawDn& raw) {
   constexpr TileLimits limits;
   const Rect& active = raw.active;
   CostSize out = cost_size(active.width, active.height);
-  if (static_cast<std::int64_t>(active.width) * active.height <= limits.most_whole_px) return out;
+  if (static_cast<std::int64_t>(active.width) * active.height <= limits.max_whole_px) return out;
   out.denoised_megapixels = 0;
   const TileGrid grid(raw.default_crop, limits.side_px);
   for (int i = 0; i < grid.count(); ++i) {
@@ -62,8 +62,8 @@ double predicted_s(const CostModel& model, const CostSize& size, const std::vect
 
 namespace {
 
-/// States the time of the fixed workload of isp/bench/pace.h, 0.79 MP at the level standard, by the table below: 13
-/// ms/MP. It was not recorded with the times.
+/// States the time of the fixed workload of isp/bench/speed_probe.h, 0.79 MP at the level standard, by the table below:
+/// 13 ms/MP. It was not recorded with the times.
 constexpr double pace_s = 0.0105;
 
 CostModel made() {

@@ -8,7 +8,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double least_gain = 2;  // a sample covers half the frame at most
+constexpr double min_gain = 2;  // a sample covers half the frame at most
 
 /// Returns the position of square `i` along one direction: even, and evenly spread.
 int place(int i, int count, int size) {
@@ -31,7 +31,7 @@ std::vector<Rect> sample_squares(const RawFrame& frame, const RawLevels& levels)
   const Rect& active = frame.raw.active;
   const double pixels = static_cast<double>(active.width) * active.height;
   const bool even = !levels.black.pattern && !levels.dark_frame;
-  if (!even || 1e-6 * pixels < least_gain * sample_megapixels || active.width < sample_squares_along * sample_side_px ||
+  if (!even || 1e-6 * pixels < min_gain * sample_megapixels || active.width < sample_squares_along * sample_side_px ||
       active.height < sample_squares_down * sample_side_px) {
     return {};
   }

@@ -15,12 +15,12 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int most_blocks_along = 16;
+constexpr int max_blocks_along = 16;
 constexpr std::array<double, 3> samples_in_box{16, 32, 16};  // of R, G, B
-constexpr double least_variance_e2 = 1e-6;
+constexpr double min_variance_e2 = 1e-6;
 constexpr double surroundings_px =
     12;  // each way: a block of the denoiser, whose thresholds are those of its mean variance
-constexpr double most_surroundings = 2;
+constexpr double max_surroundings = 2;
 /// States the scatter of the image's pixels over that of their raw values: on the tuning images.
 constexpr double pixel_scatter = 1.3;
 
@@ -141,19 +141,19 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
   double mean_signal = 0, mean_variance = 0, squares = 0;
   for (int c = 0; c < 3; ++c) {
     signal[c] = (charge_e[c] - channels.dark_e[c]) / channels.electrons_at_white[c];
-    mean_signal += share_of_sites[c] * (charge_e[c] - channels.dark_e[c]);
-    mean_variance += share_of_sites[c] * (std::max(charge_e[c], 0.0) + noise.variance_e2[c]);
+    mean_signal += fraction_of_sites[c] * (charge_e[c] - channels.dark_e[c]);
+    mean_variance += fraction_of_sites[c] * (std::max(charge_e[c], 0.0) + noise.variance_e2[c]);
   }
   Vector3 lit{};
   for (int c = 0; c < 3; ++c) lit[c] = std::max(signal[c], 0.0);
   const Lab lab = display.lab(lit);
   Vector3 with_dark = signal, with_line = lit;
-  const double line_e = std::sqrt(std::max(mean_variance, least_variance_e2) / (seen_box_px * seen_box_px));
+  const double line_e = std::sqrt(std::max(mean_variance, min_variance_e2) / (seen_box_px * seen_box_px));
   double point = 0;
   Vector3 pixel_std{};
   for (int c = 0; c < 3; ++c) {
     const double variance_e2 = std::max(charge_e[c], 0.0) + noise.variance_e2[c];
-    const double step_e = std::sqrt(std::max(variance_e2, least_variance_e2) / samples_in_box[c]);
+    const double step_e = std::sqrt(std::max(variance_e2, min_variance_e2) / samples_in_box[c]);
     Vector3 moved = lit;
     moved[c] += above_black_e(charge_e[c] - channels.dark_e[c], step_e) / channels.electrons_at_white[c];
     const double difference = ciede2000(lab, display.lab(moved));
@@ -167,7 +167,7 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
   out.line_delta_e = static_cast<float>(ciede2000(lab, display.lab(with_line)) / line_e);
   out.point_delta_e = static_cast<float>(point);
   out.display_delta_e = static_cast<float>(display.changed_for_display(signal));
-  out.snr = static_cast<float>(std::max(mean_signal, 0.0) / std::sqrt(std::max(mean_variance, least_variance_e2)));
+  out.snr = static_cast<float>(std::max(mean_signal, 0.0) / std::sqrt(std::max(mean_variance, min_variance_e2)));
   out.noise_delta_e = static_cast<float>(std::sqrt(squares));
   out.clip_delta_e = static_cast<float>(ciede2000(lab, display.lab_of_clipped(signal, pixel_std)));
   if (with_dark != signal)
@@ -200,15 +200,15 @@ class Charge {
         sum += variance(i, j);
       }
     }
-    const double own = std::max(variance(x, y), least_variance_e2);
-    return std::clamp(std::sqrt(sum / count / own), 1.0, most_surroundings);
+    const double own = std::max(variance(x, y), min_variance_e2);
+    return std::clamp(std::sqrt(sum / count / own), 1.0, max_surroundings);
   }
 
  private:
   double variance(int x, int y) const {
     const Vector3 charge_e = at(x, y);
     double out = 0;
-    for (int c = 0; c < 3; ++c) out += share_of_sites[c] * (std::max(charge_e[c], 0.0) + noise_.variance_e2[c]);
+    for (int c = 0; c < 3; ++c) out += fraction_of_sites[c] * (std::max(charge_e[c], 0.0) + noise_.variance_e2[c]);
     return out;
   }
 
@@ -227,7 +227,7 @@ std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopOptions& 
   const Display display(options, rendering);
   const Channels channels = channels_of(frame, levels, noise);
   const int columns = thumbnail.mean.width(), rows = thumbnail.mean.height();
-  const int along = std::min(columns, most_blocks_along), down = std::min(rows, most_blocks_along);
+  const int along = std::min(columns, max_blocks_along), down = std::min(rows, max_blocks_along);
   const Charge charge(thumbnail, channels, noise);
   const int reach = static_cast<int>(std::ceil(surroundings_px * columns / frame.raw.active.width));
   std::vector<SeenBlock> out(static_cast<std::size_t>(along) * static_cast<std::size_t>(down));
@@ -247,8 +247,8 @@ std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopOptions& 
 
 double seen_percentile(std::span<const float> rms_delta_e) {
   const auto noisy = std::ranges::count_if(rms_delta_e, [](float rms) { return rms > 0; });
-  if (static_cast<double>(noisy) <= (1 - seen_share) * static_cast<double>(rms_delta_e.size())) return 0;
-  const auto share_above = [&](double x) {
+  if (static_cast<double>(noisy) <= (1 - seen_fraction) * static_cast<double>(rms_delta_e.size())) return 0;
+  const auto fraction_above = [&](double x) {
     double sum = 0;
     for (const float rms : rms_delta_e) {
       sum += rms > 0 ? std::erfc(x / (std::sqrt(2.0) * static_cast<double>(rms))) : 0;
@@ -258,12 +258,12 @@ double seen_percentile(std::span<const float> rms_delta_e) {
   double low = 0, high = 5 * static_cast<double>(*std::ranges::max_element(rms_delta_e));
   for (int step = 0; step < 24; ++step) {
     const double middle = (low + high) / 2;
-    (share_above(middle) > 1 - seen_share ? low : high) = middle;
+    (fraction_above(middle) > 1 - seen_fraction ? low : high) = middle;
   }
   return (low + high) / 2;
 }
 
-double left_of_noise(std::optional<denoise::Level> level, double snr) {
+double residual_noise_fraction(std::optional<denoise::Level> level, double snr) {
   constexpr std::array at{0.2, 0.7, 1.5, 3.0, 6.0, 12.0};
   constexpr std::array draft{0.12, 0.16, 0.185, 0.225, 0.28, 0.33};
   constexpr std::array standard{0.08, 0.105, 0.12, 0.14, 0.165, 0.19};
@@ -277,13 +277,13 @@ double left_of_noise(std::optional<denoise::Level> level, double snr) {
   return left.back();
 }
 
-float left_delta_e(std::optional<denoise::Level> level, const SeenBlock& block) {
-  const auto left = static_cast<float>(left_of_noise(level, static_cast<double>(block.snr)));
+float residual_delta_e(std::optional<denoise::Level> level, const SeenBlock& block) {
+  const auto left = static_cast<float>(residual_noise_fraction(level, static_cast<double>(block.snr)));
   const float noise = left * block.surroundings * block.noise_delta_e;
   return level ? noise : std::hypot(noise, block.clip_delta_e);
 }
 
-double error_share(std::optional<denoise::Level> level) {
+double error_fraction(std::optional<denoise::Level> level) {
   constexpr std::array share{0.70, 0.67, 0.63, 0.54};
   return level ? share[static_cast<std::size_t>(*level)] : 0.85;
 }

@@ -17,7 +17,7 @@
 namespace lowlux::isp {
 
 inline constexpr int seen_box_px = 8;
-inline constexpr double seen_share = 0.95;  // fraction of the pixels: the others may differ more
+inline constexpr double seen_fraction = 0.95;  // fraction of the pixels: the others may differ more
 
 /// Describes a block of the frame: what is known of its light and of the effect of noise there.
 struct SeenBlock {
@@ -50,14 +50,14 @@ double seen_percentile(std::span<const float> rms_delta_e);
 /// Returns the fraction of the visible noise that a level of noise reduction leaves, relative to Level::high, for
 /// blocks of this signal-to-noise ratio in even surroundings: about the largest value over images, except for lamps in
 /// the dark; nullopt is no reduction. tests/bench/planner_bench.cpp prints measured values relative to it.
-double left_of_noise(std::optional<denoise::Level> level, double snr);
+double residual_noise_fraction(std::optional<denoise::Level> level, double snr);
 
-/// Returns the root mean square CIEDE2000 that a level leaves of a block's noise: left_of_noise() of the noise of the
-/// surroundings, which determine thresholds, and without reduction also the effect of clipping at black.
-float left_delta_e(std::optional<denoise::Level> level, const SeenBlock& block);
+/// Returns the root mean square CIEDE2000 that a level leaves of a block's noise: residual_noise_fraction() of the
+/// noise of the surroundings, which determine thresholds, and without reduction also the effect of clipping at black.
+float residual_delta_e(std::optional<denoise::Level> level, const SeenBlock& block);
 
 /// Returns the fraction of the noise that a level leaves relative to the truth, for deciding which of two plans is
 /// better.
-double error_share(std::optional<denoise::Level> level);
+double error_fraction(std::optional<denoise::Level> level);
 
 }  // namespace lowlux::isp

@@ -106,8 +106,8 @@ Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options,
 
 namespace {
 
-constexpr double least_scale = 1 / most_electrons_at_white;
-constexpr std::int64_t most_cells = 100'000;
+constexpr double min_scale = 1 / max_electrons_at_white;
+constexpr std::int64_t max_cells = 100'000;
 
 struct Sample {
   double x;  // fraction of white
@@ -117,7 +117,7 @@ struct Sample {
 /// Holds a line of weighted least squares, variance = scale x + offset, weights 1 / variance^2: every level counts
 /// alike. Where the line would fall, or start below 0, the best line at that bound is used.
 struct Line {
-  double scale = least_scale;
+  double scale = min_scale;
   double offset = 0;
 };
 
@@ -135,9 +135,9 @@ Line fitted(const std::vector<Sample>& samples) {
   const double spread = w * wxx - wx * wx;
   const double scale = spread > 1e-12 * w * wxx ? (w * wxy - wx * wy) / spread : 0;
   const double offset = (wy - scale * wx) / w;
-  if (scale >= least_scale && offset >= 0) return {scale, offset};
-  if (scale < least_scale) return {least_scale, std::max((wy - least_scale * wx) / w, 0.0)};
-  return {std::max(wxy / wxx, least_scale), 0};
+  if (scale >= min_scale && offset >= 0) return {scale, offset};
+  if (scale < min_scale) return {min_scale, std::max((wy - min_scale * wx) / w, 0.0)};
+  return {std::max(wxy / wxx, min_scale), 0};
 }
 
 }  // namespace
@@ -147,7 +147,7 @@ NoiseProfile residual_profile(const SignalElectrons& signal_e, const std::array<
   std::array<std::vector<Sample>, 3> samples;
   const int columns = signal_e.value.width() / 2, rows = signal_e.value.height() / 2;
   const std::int64_t cells = static_cast<std::int64_t>(columns) * rows;
-  const std::int64_t step = std::max<std::int64_t>(1, cells / most_cells);
+  const std::int64_t step = std::max<std::int64_t>(1, cells / max_cells);
   for (std::int64_t cell = 0; cell < cells; cell += step) {
     const auto cell_x = static_cast<int>(cell % columns), cell_y = static_cast<int>(cell / columns);
     for (int site = 0; site < 4; ++site) {

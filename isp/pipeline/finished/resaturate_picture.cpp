@@ -33,7 +33,8 @@ Plane<std::uint8_t> saturated_pixels(const RgbView<const float>& xyz, const Matr
 }
 
 /// Returns the fraction of pixels that are not saturated and whose surroundings are at most `dark`.
-double share_of_dark(const RgbView<const float>& xyz, const Plane<std::uint8_t>& saturated, double dark, int radius) {
+double fraction_of_dark(const RgbView<const float>& xyz, const Plane<std::uint8_t>& saturated, double dark,
+                        int radius) {
   Plane<double> sum(xyz[0].width, xyz[0].height);
   for (int y = 0; y < sum.height(); ++y) {
     for (int x = 0; x < sum.width(); ++x) {
@@ -99,9 +100,9 @@ Resaturated resaturate_picture(SceneLinear xyz, const ResaturateOptions& options
   Resaturated out;
   out.chroma_noise = how.chroma_noise;
   const double dark = options.black.x + options.black.y + options.black.z;
-  out.share_dark = share_of_dark(std::as_const(xyz).view(), saturated, dark, options.radius);
+  out.fraction_dark = fraction_of_dark(std::as_const(xyz).view(), saturated, dark, options.radius);
   const auto at_white = std::count(saturated.data(), saturated.data() + saturated.size(), std::uint8_t{1});
-  out.share_saturated = static_cast<double>(at_white) / static_cast<double>(saturated.size());
+  out.fraction_saturated = static_cast<double>(at_white) / static_cast<double>(saturated.size());
   denoise::resaturate(std::as_const(xyz).view(), how, xyz.view());
   out.picture = encode_picture(xyz, options.space, options.samples, executor);
   return out;

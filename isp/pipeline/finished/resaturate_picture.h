@@ -21,8 +21,9 @@ struct ResaturateOptions {
 struct Resaturated {
   Picture picture;
   double chroma_noise = 0;
-  double share_dark = 0;  // fraction of pixels, not saturated, with surroundings at most as bright as black: now grey
-  double share_saturated = 0;  // fraction of saturated pixels, which are unchanged
+  double fraction_dark =
+      0;  // fraction of pixels, not saturated, with surroundings at most as bright as black: now grey
+  double fraction_saturated = 0;  // fraction of saturated pixels, which are unchanged
 };
 
 /// Returns the standard deviation of X - x0 S and of Y - y0 S (S = X + Y + Z, neutral D65) in flat areas, the mean of

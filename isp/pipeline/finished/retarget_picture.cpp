@@ -15,7 +15,7 @@ namespace {
 
 constexpr double highest_code = 65535;
 
-double share_of_held(const Encoded16& picture, const RetargetMap& map) {
+double fraction_of_held(const Encoded16& picture, const RetargetMap& map) {
   constexpr std::size_t most_pixels = 4096;
   const std::size_t pixels = picture.codes.size() / 3;
   const std::size_t asked = std::min(most_pixels, pixels);
@@ -64,7 +64,7 @@ Result<RetargetedPicture> retarget_picture(const SceneLinear& xyz, const Retarge
   RetargetedPicture out;
   out.levels = made.table.levels;
   out.error = made.error;
-  out.share_held = share_of_held(in, *map);
+  out.fraction_held = fraction_of_held(in, *map);
   if (samples == SampleType::u8) {
     out.picture = looked_up_codes<std::uint8_t>(made.table, in, executor);
   } else {

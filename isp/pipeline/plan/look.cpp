@@ -18,10 +18,10 @@ const Matrix3& to_xyz() {
 }
 
 // Applies LookGrid to one colour, without blur.
-Vector3 seen(const Vector3& rgb, double rod_share, double chroma, double blue) {
+Vector3 seen(const Vector3& rgb, double rod_fraction, double chroma, double blue) {
   const Xyz xyz = xyz_of(to_xyz() * rgb);
   const double rods = scotopic_luminance(xyz) / scotopic_luminance(*xyz_of(white_d65));
-  const double e = xyz.y + rod_share * (std::max(rods, LookGrid::least_rods * xyz.y) - xyz.y);
+  const double e = xyz.y + rod_fraction * (std::max(rods, LookGrid::min_rods * xyz.y) - xyz.y);
   Vector3 out{};
   for (int c = 0; c < 3; ++c) {
     out[c] = e * (1 + blue * rod_tint[c]) + chroma * std::max(e, 0.0) / xyz.y * (rgb[c] - xyz.y);
@@ -31,7 +31,7 @@ Vector3 seen(const Vector3& rgb, double rod_share, double chroma, double blue) {
 
 /// Holds the strengths of the three effects on colours; those that are left out are 0, 1 and 0.
 struct ColourEffects {
-  double rod_share = 0;
+  double rod_fraction = 0;
   double chroma = 1;
   double blue = 0;
 };
@@ -39,7 +39,7 @@ struct ColourEffects {
 double largest_difference(const ColourEffects& first, const ColourEffects& second) {
   const Xyz white = *xyz_of(white_d65);
   const auto lab = [&](const Vector3& rgb, const ColourEffects& shown) {
-    return lab_of(xyz_of(to_xyz() * seen(rgb, shown.rod_share, shown.chroma, shown.blue)), white);
+    return lab_of(xyz_of(to_xyz() * seen(rgb, shown.rod_fraction, shown.chroma, shown.blue)), white);
   };
   double largest = 0;
   for (int colour = 1; colour < 8; ++colour) {
@@ -70,7 +70,7 @@ double lost_contrast(double blur_px) {
 
 }  // namespace
 
-bool* effect_named(NightEffects& effects, std::string_view name) {
+bool* effect_named(VisionEffects& effects, std::string_view name) {
   const std::array<bool*, 6> switches{&effects.purkinje, &effects.chroma, &effects.hue,
                                       &effects.acuity,   &effects.glare,  &effects.visual_noise};
   const auto* const found = std::ranges::find(night_effect_names, name);
@@ -83,7 +83,7 @@ std::array<LookEffect, 6> predict_effects(const NightEye& eye, double scotopic_r
   const double share = rods / (eye.state.m + rods);
   constexpr double taste = std::numeric_limits<double>::quiet_NaN();
   const ColourEffects all{share, eye.chroma, eye.blue};
-  const std::array<double, 6> size{size_of(&ColourEffects::rod_share, all),
+  const std::array<double, 6> size{size_of(&ColourEffects::rod_fraction, all),
                                    size_of(&ColourEffects::chroma, all),
                                    size_of(&ColourEffects::blue, all),
                                    lost_contrast(eye.blur_std_deg * pixels_per_degree),

@@ -30,7 +30,7 @@ struct LookChoice {
   std::optional<double> profile_iso;            // ISO speed from the camera's profile, where the frame states none
   /// Selects the effects: those that are visible, all, or those in `listed`.
   enum class Which : std::uint8_t { automatic, all, listed } which = Which::automatic;
-  NightEffects listed;
+  VisionEffects listed;
   double tolerance = 0.5;         // CIEDE2000: effects below it are left out by Which::automatic
   double dimming = 0.4;           // fraction of the darkness that the image keeps, 0..1; see apparent_dimming_ev
   double field_of_view_deg = 50;  // of the image's longer side
@@ -72,7 +72,7 @@ struct LookPlan {
 inline constexpr std::array<std::string_view, 6> night_effect_names{"purkinje", "chroma", "hue",
                                                                     "acuity",   "glare",  "visual-noise"};
 /// Returns the switch of an effect by its name; null for another name.
-bool* effect_named(NightEffects& effects, std::string_view name);
+bool* effect_named(VisionEffects& effects, std::string_view name);
 
 /// Predicts the size of each effect for an eye in a given state: the largest CIEDE2000 that it makes alone, or that its
 /// absence makes of all three effects on colours together, over the primaries, secondaries and the white of Rec. 709;

@@ -4,8 +4,8 @@
 #include <iterator>
 #include <utility>
 
-#include "isp/pipeline/budget/effect_sizes.h"
-#include "isp/pipeline/budget/plan_effects.h"
+#include "isp/pipeline/budget/step_plan.h"
+#include "isp/pipeline/budget/step_sizes.h"
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/measure/thumbnail.h"
@@ -113,7 +113,7 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   clock.lap("white and exposure");
 
   if (options.effects) {
-    Result<EffectsPlan> effects = decide_effects(frame, thumbnail, options, *levels, *rendering, executor);
+    Result<StepPlan> effects = choose_steps(frame, thumbnail, options, *levels, *rendering, executor);
     if (!effects) return tl::make_unexpected(std::move(effects.error()));
     if (!effects->dark) levels->black.dark_mean_e = {};
     if (!effects->display) plan.display.reset();

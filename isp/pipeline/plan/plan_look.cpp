@@ -16,10 +16,10 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double least_mean = 1e-6;   // of the white level: darker frames count as this
-constexpr double most_cd_m2 = 1e9;    // the sun
-constexpr double least_cd_m2 = 1e-7;  // below a starless night
-constexpr double least_dark = 1e-5;   // of LookGrid, in the pixels' unit
+constexpr double min_mean = 1e-6;   // of the white level: darker frames count as this
+constexpr double max_cd_m2 = 1e9;   // the sun
+constexpr double min_cd_m2 = 1e-7;  // below a starless night
+constexpr double min_dark = 1e-5;   // of LookGrid, in the pixels' unit
 
 Result<void> check(const LookChoice& o, OutputSpace space) {
   const auto wrong = [](const std::string& message) { return fail(ErrorCode::invalid_argument, message); };
@@ -30,8 +30,8 @@ Result<void> check(const LookChoice& o, OutputSpace space) {
         "linear-srgb or "
         "linear-rec2020");
   }
-  if (o.scene_luminance_cd_m2 && !(*o.scene_luminance_cd_m2 >= least_cd_m2 && *o.scene_luminance_cd_m2 <= most_cd_m2)) {
-    return wrong(fmt::format("a scene's luminance lies between {} and {} cd/m2, not at {}", least_cd_m2, most_cd_m2,
+  if (o.scene_luminance_cd_m2 && !(*o.scene_luminance_cd_m2 >= min_cd_m2 && *o.scene_luminance_cd_m2 <= max_cd_m2)) {
+    return wrong(fmt::format("a scene's luminance lies between {} and {} cd/m2, not at {}", min_cd_m2, max_cd_m2,
                              *o.scene_luminance_cd_m2));
   }
   if (!(o.dimming >= 0 && o.dimming <= 1)) return wrong("the fraction of darkness that is kept is between 0 and 1");
@@ -103,7 +103,7 @@ std::array<double, 2> range_of_fields(std::span<const float> blocks, double whit
     brightest = std::max(brightest, v);
   }
   const auto field = [&](double own_cd_m2) {
-    return (1 - adaptation_share_of_mean) * own_cd_m2 + adaptation_share_of_mean * look.mean_cd_m2;
+    return (1 - adaptation_fraction_of_mean) * own_cd_m2 + adaptation_fraction_of_mean * look.mean_cd_m2;
   };
   return {field(std::isfinite(darkest) ? darkest * white_cd_m2 : 0), field(brightest * white_cd_m2)};
 }
@@ -112,7 +112,7 @@ std::array<double, 2> range_of_fields(std::span<const float> blocks, double whit
 std::array<LookEffect, 6> largest_effects(const std::array<double, 2>& fields_cd_m2, const NightLook& look) {
   constexpr int steps = 12;
   std::array<LookEffect, 6> out{};
-  const double least = std::max(fields_cd_m2[0], least_cd_m2), most = std::max(fields_cd_m2[1], least);
+  const double least = std::max(fields_cd_m2[0], min_cd_m2), most = std::max(fields_cd_m2[1], least);
   for (int i = 0; i <= steps; ++i) {
     const double field = least * std::pow(most / least, static_cast<double>(i) / steps);
     const auto here = predict_effects(night_eye({field, field * look.scotopic_ratio_of_white}),
@@ -143,8 +143,8 @@ void leave_out(double tolerance, std::span<LookEffect> effects) {
   }
 }
 
-void decide_effects(const LookChoice& choice, const std::array<double, 2>& fields_cd_m2, bool monochrome,
-                    LookPlan& look) {
+void choose_steps(const LookChoice& choice, const std::array<double, 2>& fields_cd_m2, bool monochrome,
+                  LookPlan& look) {
   const auto predicted = largest_effects(fields_cd_m2, look.look);
   std::array<LookEffect, 6>& effects = look.effects.emplace(predicted);
   if (monochrome) {
@@ -158,7 +158,7 @@ void decide_effects(const LookChoice& choice, const std::array<double, 2>& field
       for (LookEffect& effect : effects) effect.used = true;
       break;
     case LookChoice::Which::listed: {
-      NightEffects listed = choice.listed;
+      VisionEffects listed = choice.listed;
       for (LookEffect& effect : effects) effect.used = *effect_named(listed, effect.name);
       break;
     }
@@ -173,7 +173,7 @@ void decide_eye(const FrameLight& light, double white_cd_m2, const DevelopOption
   look.state = mesopic_state({look.mean_cd_m2, look.mean_cd_m2 * ratio});
   look.white_cd_m2 = look.mean_cd_m2 / scene_mean_of_white;
   if (choice.look == Look::eye) {
-    decide_effects(choice, range_of_fields(light.block_luminance, white_cd_m2, look), !light.white, look);
+    choose_steps(choice, range_of_fields(light.block_luminance, white_cd_m2, look), !light.white, look);
   }
   if (!options.exposure_ev) look.dimming_ev = choice.dimming * apparent_dimming_ev(look.state.luminance_cd_m2);
 }
@@ -209,7 +209,7 @@ Result<std::optional<LookPlan>> plan_look(const RawFrame& frame, const FrameLigh
   double white_cd_m2 = 100;
   if (choice.look != Look::camera) {
     const Result<double> found =
-        white_level_cd_m2(frame, std::max(mean_of(light.block_luminance), least_mean), look, choice);
+        white_level_cd_m2(frame, std::max(mean_of(light.block_luminance), min_mean), look, choice);
     if (!found) return tl::make_unexpected(found.error());
     white_cd_m2 = *found;
     decide_eye(light, white_cd_m2, options, look);
@@ -217,7 +217,7 @@ Result<std::optional<LookPlan>> plan_look(const RawFrame& frame, const FrameLigh
   const double exposure_ev = light.exposure_ev + look.dimming_ev;
   const double units = std::exp2(exposure_ev) / tone_limit(options.tone, exposure_ev);
   eye.cd_m2_per_unit = white_cd_m2 / units;
-  eye.dark = static_cast<float>(std::clamp(light.black_noise_std * units, least_dark, 1.0));
+  eye.dark = static_cast<float>(std::clamp(light.black_noise_std * units, min_dark, 1.0));
   set_primaries(options.space, eye);
   return look;
 }

@@ -16,7 +16,8 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double saturated_share_of_white = 0.99;  // slightly below 1, because pixels do not all saturate at one code
+constexpr double saturated_fraction_of_white =
+    0.99;  // slightly below 1, because pixels do not all saturate at one code
 
 int colour_of(const RawDn& raw, int site) { return static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)); }
 
@@ -45,7 +46,7 @@ denoise::RawNoise noise_of(const RawFrame& frame, const RawLevels& levels) {
   for (double& variance : out.variance_e2) variance = std::min(variance, denoise::largest_e);
   for (int site = 0; site < 4; ++site) {
     double& saturation_e = out.saturation_e[colour_of(frame.raw, site)];
-    saturation_e = std::min(saturation_e, saturated_share_of_white * (*levels.electrons_at_white)[site]);
+    saturation_e = std::min(saturation_e, saturated_fraction_of_white * (*levels.electrons_at_white)[site]);
   }
   return out;
 }
@@ -73,11 +74,11 @@ double black_std_e(const denoise::RawNoise& noise) {
 }
 
 /// Returns the least visible standard deviation of line noise: the eye integrates it along lines.
-double least_line_std_e(const denoise::RawNoise& noise) { return 0.03 * black_std_e(noise); }
+double min_line_std_e(const denoise::RawNoise& noise) { return 0.03 * black_std_e(noise); }
 
 std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& reduction, PlaneView<const float> charge_e,
                                            Executor& executor) {
-  const denoise::FrameLineOptions options{.least_std_e = least_line_std_e(reduction.noise)};
+  const denoise::FrameLineOptions options{.min_std_e = min_line_std_e(reduction.noise)};
   std::array<std::optional<denoise::LineOffsets>, 2> of_kind;
   for_each_index(executor, 2, [&](int kind) {
     auto found = denoise::line_offsets_of_frame(charge_e, static_cast<denoise::Lines>(kind), options);
@@ -91,7 +92,7 @@ std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& reduction, Plan
 }
 
 /// Subtracts line noise, and its contribution to the variance of a pixel.
-void take_lines_off(RawElectrons& charge, NoiseReduction& out, Executor& executor) {
+void subtract_measured_lines(RawElectrons& charge, NoiseReduction& out, Executor& executor) {
   out.lines = lines_of(out, charge.value.view(), executor);
   for (const denoise::LineOffsets& lines : out.lines) {
     subtract_lines(lines, charge.value.view());
@@ -131,7 +132,7 @@ RawElectrons charge_to_check(const RawFrame& frame, const RawLevels& levels, boo
   const std::vector<Rect> squares = sample_squares(frame, levels);
   if (!with_lines && !squares.empty()) return sample_electrons(frame, levels, squares, executor);
   RawElectrons charge = raw_electrons(frame, levels, {}, executor);
-  if (with_lines) take_lines_off(charge, out, executor);
+  if (with_lines) subtract_measured_lines(charge, out, executor);
   return squares.empty() ? std::move(charge) : sample_of(charge, squares);
 }
 
@@ -153,7 +154,7 @@ std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& leve
 }
 
 bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise) {
-  return found.gain >= 0.5 && found.line_std_e > least_line_std_e(noise) && found.line_std_e < black_std_e(noise);
+  return found.gain >= 0.5 && found.line_std_e > min_line_std_e(noise) && found.line_std_e < black_std_e(noise);
 }
 
 std::optional<denoise::Level> level_for(double snr) {
@@ -174,7 +175,7 @@ double middle_snr(const RawFrame& frame, const RawLevels& levels, const denoise:
   snr.resize(thumbnail.mean.plane[0].size());
   for (std::size_t i = 0; i < snr.size(); ++i) {
     double charge = 0;
-    for (int c = 0; c < 3; ++c) charge += share_of_sites[c] * electrons[c] * thumbnail.mean.plane[c].data()[i];
+    for (int c = 0; c < 3; ++c) charge += fraction_of_sites[c] * electrons[c] * thumbnail.mean.plane[c].data()[i];
     snr[i] = std::max(charge - dark, 0.0) / std::sqrt(std::max(charge, 0.0) + variance);
   }
   const auto middle = snr.begin() + static_cast<std::ptrdiff_t>(snr.size() / 2);

@@ -12,7 +12,7 @@ namespace {
 
 using denoise::Level;
 
-constexpr double least_saving = 0.1;
+constexpr double min_saving = 0.1;
 
 /// Returns the time of a level for each pixel, relative to draft: `lowlux bench --stage denoise`. Subtracting dark
 /// charge takes next to nothing.
@@ -27,7 +27,7 @@ std::optional<Level> cheapest(const std::vector<SeenBlock>& blocks, Level most, 
     if (level && *level >= most) break;
     std::vector<float> rms;
     rms.reserve(blocks.size());
-    for (const SeenBlock& block : blocks) rms.push_back(left_delta_e(level, block));
+    for (const SeenBlock& block : blocks) rms.push_back(residual_delta_e(level, block));
     if (seen_percentile(rms) < tolerance_delta_e) return level;
   }
   return most;
@@ -67,7 +67,7 @@ std::optional<NoiseRegions> plan_regions(const Rect& active, const std::vector<S
     out.level.push_back(region.empty() ? std::optional(most) : cheapest(region, most, tolerance_delta_e));
   }
   const double whole = work_of(most) * active.width * active.height;
-  if (work_of_parts(out, active, most) > (1 - least_saving) * whole) return std::nullopt;
+  if (work_of_parts(out, active, most) > (1 - min_saving) * whole) return std::nullopt;
   return out;
 }
 

@@ -12,11 +12,11 @@ Rect whole_of(const RawDn& raw) { return {0, 0, raw.active.width, raw.active.hei
 
 }  // namespace
 
-void take_black_off(const RawDn& raw, const RawLevels& levels, PlaneView<float> out, Executor& executor) {
-  take_black_off(raw, levels, whole_of(raw), out, executor);
+void subtract_black(const RawDn& raw, const RawLevels& levels, PlaneView<float> out, Executor& executor) {
+  subtract_black(raw, levels, whole_of(raw), out, executor);
 }
 
-void take_black_off(const RawDn& raw, const RawLevels& levels, const Rect& part, PlaneView<float> out,
+void subtract_black(const RawDn& raw, const RawLevels& levels, const Rect& part, PlaneView<float> out,
                     Executor& executor) {
   if (levels.dark_frame) {
     to_fraction(raw, *levels.dark_frame, levels.black, part, out, executor);
@@ -37,7 +37,7 @@ RawElectrons raw_electrons(const RawFrame& frame, const RawLevels& levels, Plane
 void raw_electrons(const RawFrame& frame, const RawLevels& levels, const Rect& part, PlaneView<float> out,
                    Executor& executor) {
   if (levels.dark_frame) {
-    take_black_off(frame.raw, levels, part, out, executor);
+    subtract_black(frame.raw, levels, part, out, executor);
     count_electrons(out, *levels.electrons_at_white, executor);
   } else {
     to_electrons(frame.raw, levels.black, *levels.electrons_at_white, part, out, executor);

@@ -8,9 +8,9 @@
 namespace lowlux::isp {
 
 /// Subtracts black from the active area of a Bayer or monochrome frame: the dark frame, or the black point.
-void take_black_off(const RawDn& raw, const RawLevels& levels, PlaneView<float> out, Executor& executor);
+void subtract_black(const RawDn& raw, const RawLevels& levels, PlaneView<float> out, Executor& executor);
 /// Subtracts black from a crop of the active area whose corner is at an even column and row.
-void take_black_off(const RawDn& raw, const RawLevels& levels, const Rect& part, PlaneView<float> out,
+void subtract_black(const RawDn& raw, const RawLevels& levels, const Rect& part, PlaneView<float> out,
                     Executor& executor);
 
 /// Returns the active area of a Bayer frame in electrons as measured, dark charge included, defects repaired, signed.

@@ -18,8 +18,8 @@ inline constexpr int tile_margin_px = 256;
 
 /// States which frames are processed in tiles, and in what tiles.
 struct TileLimits {
-  std::int64_t most_whole_px = 25'000'000;  // of the active area; larger ones are split into tiles
-  int side_px = 2048;                       // maximum side of a core; a multiple of tile_lattice_px
+  std::int64_t max_whole_px = 25'000'000;  // of the active area; larger ones are split into tiles
+  int side_px = 2048;                      // maximum side of a core; a multiple of tile_lattice_px
 };
 
 /// Lists the cores that an image is split into, row by row. Each starts at an even column and row of the image, and at

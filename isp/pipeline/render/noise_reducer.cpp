@@ -65,7 +65,7 @@ Rect from_even_site(const Rect& core) {
   return {core.x & ~1, core.y & ~1, core.width + (core.x & 1), core.height + (core.y & 1)};
 }
 
-void take_lines_off(const NoiseReduction& how, const Rect& piece, PlaneView<float> raw_e) {
+void subtract_measured_lines(const NoiseReduction& how, const Rect& piece, PlaneView<float> raw_e) {
   for (const denoise::LineOffsets& lines : how.lines) {
     subtract_lines(lines, raw_e, lines.lines == denoise::Lines::rows ? piece.y : piece.x);
   }
@@ -108,7 +108,7 @@ void blend_sites(const BlendSites& in, int sites, float* signal_e) {
     // The charge is that of the level's result: with the noisy mean itself, low values would count more than high ones.
     const float charge_e = std::max(signal_e[2 * i] + in.dark_e, 0.0f);
     const float time_e2 = in.share[i] * (charge_e + in.variance_e2);
-    const float level_e2 = NoiseReducer::doubt_of(in.share[i]) * in.level_e2[i];
+    const float level_e2 = NoiseReducer::variance_penalty(in.share[i]) * in.level_e2[i];
     const float way = level_e2 / (level_e2 + time_e2);
     signal_e[2 * i] += way * (mean_e - in.dark_e - signal_e[2 * i]);
   }
@@ -133,7 +133,7 @@ void NoiseReducer::reserve_time(int width, int height) {
     temporal_height_ = height;
   }
   fit(mean_e_, width, height);
-  fit(variance_share_, (width + 1) / 2, (height + 1) / 2);
+  fit(variance_fraction_, (width + 1) / 2, (height + 1) / 2);
 }
 
 std::size_t NoiseReducer::maps_bytes(int width, int height) {
@@ -146,14 +146,14 @@ std::size_t NoiseReducer::bytes(int width, int height, const NoiseReduction& how
   std::vector<LevelPart> parts;
   cut_by_level(how, frame.core, TileLimits{}.side_px, parts);
   const PartSize most = largest(parts, frame);
-  const std::size_t denoiser = denoise::Denoiser::bytes(most.width, most.height, threads, most_of(how));
+  const std::size_t denoiser = denoise::Denoiser::bytes(most.width, most.height, threads, max_of(how));
   if (parts.size() == 1) return denoiser;
   return denoiser + sizeof(float) * static_cast<std::size_t>(most.width) * static_cast<std::size_t>(most.height) +
          (maps ? maps_bytes(most.width, most.height) : 0);
 }
 
 void NoiseReducer::reserve_pieces(int width, int height, const NoiseReduction& how) {
-  if (how.has_level()) reserve_level(width, height, most_of(how));
+  if (how.has_level()) reserve_level(width, height, max_of(how));
 }
 
 void NoiseReducer::reduce_part(const LevelPart& part, const Piece& piece, const NoiseReduction& how,
@@ -191,7 +191,7 @@ void NoiseReducer::reduce_by_level(const Piece& piece, const NoiseReduction& how
     return denoiser_->run({raw_e, piece.phase}, how.noise, options, signal_e, maps, executor_);
   }
   if (const auto [width, height] = largest(parts_, piece); width > 0) {
-    reserve_level(width, height, most_of(how));
+    reserve_level(width, height, max_of(how));
     if (width > part_e_.width() || height > part_e_.height()) {
       part_e_ = Plane<float>(std::max(width, part_e_.width()), std::max(height, part_e_.height()));
     }
@@ -203,7 +203,7 @@ void NoiseReducer::reduce_by_level(const Piece& piece, const NoiseReduction& how
 void NoiseReducer::reduce_by_time(const RawElectrons& raw, const NoiseReduction& how) {
   if (how.temporal->restart) temporal_->reset();
   moved_ = temporal_->run({raw.value.view(), raw.phase}, how.noise, how.temporal->light, how.temporal->options,
-                          mean_e_.view(), variance_share_.view(), executor_);
+                          mean_e_.view(), variance_fraction_.view(), executor_);
 }
 
 void NoiseReducer::blend(const RawElectrons& raw, const NoiseReduction& how, const NoiseMaps& maps,
@@ -212,7 +212,7 @@ void NoiseReducer::blend(const RawElectrons& raw, const NoiseReduction& how, con
     for (int y = band.first; y < band.last; ++y) {
       for (int column = 0; column < std::min(2, signal_e.width); ++column) {
         const auto colour = static_cast<std::size_t>(colour_at(raw.phase, column, y));
-        const BlendSites sites{mean_e_.row(y) + column, variance_share_.row(y / 2),
+        const BlendSites sites{mean_e_.row(y) + column, variance_fraction_.row(y / 2),
                                maps.site_variance_e2[colour].row(y / 2),
                                static_cast<float>(how.noise.dark_mean_e[site_of(column, y)]),
                                static_cast<float>(how.noise.variance_e2[colour])};
@@ -226,7 +226,7 @@ void NoiseReducer::run_piece(const Piece& piece, const NoiseReduction& how, Plan
                              PlaneView<float> signal_e) {
   assert(how.reduces() && !how.temporal);
   moved_ = 0;
-  take_lines_off(how, piece.whole, raw_e);
+  subtract_measured_lines(how, piece.whole, raw_e);
   reduce_by_level(piece, how, raw_e, signal_e, {});
 }
 
@@ -234,7 +234,7 @@ SignalElectrons NoiseReducer::run(RawElectrons& raw, const NoiseReduction& how, 
   const int width = raw.value.width(), height = raw.value.height();
   const Rect whole{0, 0, width, height};
   fit(memory, width, height);
-  take_lines_off(how, whole, raw.value.view());
+  subtract_measured_lines(how, whole, raw.value.view());
   moved_ = 0;
   if (how.temporal) {
     reserve_time(width, height);

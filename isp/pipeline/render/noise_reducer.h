@@ -17,7 +17,7 @@ namespace lowlux::isp {
 ///
 /// Where a level and previous frames both take part, each site is the mean of both results, weighted by the inverse of
 /// their predicted variances: what moves is left to the level, what stands still to the previous frames. The variance
-/// of the level counts doubt_of() times, because it does not include the detail that the level removes.
+/// of the level counts variance_penalty() times, because it does not include the detail that the level removes.
 class NoiseReducer {
  public:
   explicit NoiseReducer(Executor& executor) : executor_(executor) {}
@@ -56,7 +56,7 @@ class NoiseReducer {
   /// little to be detected. Chosen on the images of tests/scenarios/temporal_blend_test.cpp, which prints the results
   /// of other factors.
   /// @param share  variance of the mean over frames, as a fraction of a raw value's, 0..1
-  static constexpr float doubt_of(float share) { return 1 + 3 * (1 - share) * (1 - share); }
+  static constexpr float variance_penalty(float share) { return 1 + 3 * (1 - share) * (1 - share); }
 
   /// Returns the fraction of the blocks that moved in the last frame; 0 where no previous frames took part.
   double moved() const { return moved_; }
@@ -78,8 +78,8 @@ class NoiseReducer {
   std::unique_ptr<denoise::TemporalMean> temporal_;
   int temporal_width_ = 0;
   int temporal_height_ = 0;
-  Plane<float> mean_e_;          // mean over frames, dark charge included
-  Plane<float> variance_share_;  // of mean_e_ over a raw value's, one for each 2x2 cell
+  Plane<float> mean_e_;             // mean over frames, dark charge included
+  Plane<float> variance_fraction_;  // of mean_e_ over a raw value's, one for each 2x2 cell
   NoiseMaps level_maps_;
   double moved_ = 0;
   denoise::Level most_ = denoise::Level::high;  // highest level that there is memory for

@@ -61,7 +61,7 @@ void Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& plan) {
     mosaic_ = signal_electrons(frame, plan).value;
   } else {
     fit(mosaic_, raw.active.width, raw.active.height);
-    take_black_off(raw, plan.levels, mosaic_.view(), executor_);
+    subtract_black(raw, plan.levels, mosaic_.view(), executor_);
     repair(mosaic_.view(), plan.levels.defects, 2);
   }
   apply_gains(frame.corrections, mosaic_.view(), executor_);
@@ -89,7 +89,7 @@ RgbInput Pipeline::prepare_planes(const RawFrame& frame, const DevelopPlan& plan
   const int planes = monochrome ? 1 : 3;
   for (int c = 0; c < planes; ++c) fit(planes_[c], raw.active.width, raw.active.height);
   if (monochrome) {
-    take_black_off(raw, plan.levels, planes_[0].view(), executor_);
+    subtract_black(raw, plan.levels, planes_[0].view(), executor_);
     repair(planes_[0].view(), plan.levels.defects, 1);
     apply_gains(frame.corrections, planes_[0].view(), executor_);
   } else {
@@ -163,7 +163,7 @@ void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const E
 }
 
 void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
-  if (goes_by_tiles(frame.raw, plan, limits_)) {
+  if (is_tiled(frame.raw, plan, limits_)) {
     has_noise_maps_ = false;
     return tiles_.render(frame, plan, noise_reducer_, out);
   }

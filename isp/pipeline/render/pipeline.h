@@ -17,7 +17,7 @@ namespace lowlux::isp {
 /// allocates them, later ones of that size allocate nothing. Processes one frame at a time.
 class Pipeline {
  public:
-  /// @param limits  from which size on frames are rendered in tiles, which bounds their memory: see goes_by_tiles
+  /// @param limits  from which size on frames are rendered in tiles, which bounds their memory: see is_tiled
   explicit Pipeline(Executor& executor, const TileLimits& limits = {})
       : executor_(executor), limits_(limits), noise_reducer_(executor), tiles_(executor, limits) {}
 

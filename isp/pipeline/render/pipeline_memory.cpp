@@ -32,7 +32,7 @@ std::size_t whole_frame_bytes(const RawDn& raw, const DevelopPlan& plan, int thr
 
 std::size_t pipeline_bytes(const RawDn& raw, const DevelopPlan& plan, int threads, const TileLimits& limits) {
   assert(!needs_grid(plan) && !needs_table(plan) && !plan.noise_reduction.temporal);
-  if (goes_by_tiles(raw, plan, limits)) return TileRenderer::bytes(raw, plan, limits, threads);
+  if (is_tiled(raw, plan, limits)) return TileRenderer::bytes(raw, plan, limits, threads);
   return whole_frame_bytes(raw, plan, threads);
 }
 

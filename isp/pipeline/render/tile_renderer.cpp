@@ -71,9 +71,9 @@ std::size_t bytes_of(SampleType samples) {
 
 }  // namespace
 
-bool goes_by_tiles(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limits) {
+bool is_tiled(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limits) {
   const std::int64_t pixels = std::int64_t{raw.active.width} * raw.active.height;
-  return pixels > limits.most_whole_px && raw.layout == SensorLayout::bayer && !plan.from_codes &&
+  return pixels > limits.max_whole_px && raw.layout == SensorLayout::bayer && !plan.from_codes &&
          raw.default_crop.width > 0 && raw.default_crop.height > 0 && !needs_grid(plan) && !needs_table(plan) &&
          !keeps_maps(plan) && !plan.noise_reduction.temporal;
 }
@@ -85,7 +85,7 @@ std::size_t TileRenderer::bytes(const RawDn& raw, const DevelopPlan& plan, const
   const NoiseReduction& how = plan.noise_reduction;
   std::size_t noise = 0;
   if (how.reduces()) {
-    noise = denoise::Denoiser::bytes(sizes.width, sizes.height, threads, most_of(how)) +
+    noise = denoise::Denoiser::bytes(sizes.width, sizes.height, threads, max_of(how)) +
             (how.regions ? 2 : 1) * sizeof(float) * piece;
   }
   return sizeof(float) * piece + noise +
@@ -122,7 +122,7 @@ PlaneView<float> TileRenderer::mosaic_of(const RawFrame& frame, const DevelopPla
   const Rect whole = whole_of(raw, plan, core);
   PlaneView<float> out = noisy_.view().crop(0, 0, whole.width, whole.height);
   if (!plan.levels.electrons_at_white) {
-    take_black_off(raw, plan.levels, whole, out, executor_);
+    subtract_black(raw, plan.levels, whole, out, executor_);
     repair(out, {whole.x, whole.y}, plan.levels.defects, 2);
   } else {
     raw_electrons(frame, plan.levels, whole, out, executor_);

@@ -15,11 +15,11 @@
 
 namespace lowlux::isp {
 
-/// Returns whether a frame is rendered in tiles: a Bayer frame above TileLimits::most_whole_px whose mosaic is
+/// Returns whether a frame is rendered in tiles: a Bayer frame above TileLimits::max_whole_px whose mosaic is
 /// processed in floats. Frames rendered directly from codes need no mosaic. Never split, whatever their size, are
 /// frames that are demosaiced or monochrome, looks that are made of the entire image or tabulated (`--look`), noise
 /// that is held to a limit, maps of the noise, and frames in which previous ones take part.
-bool goes_by_tiles(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limits);
+bool is_tiled(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limits);
 
 /// Renders Bayer frames in tiles: for each core and its margin the mosaic, its noise, its image. Without noise
 /// reduction the image has the same bits as that of the whole frame; with it, the difference is far below the noise
@@ -28,7 +28,7 @@ class TileRenderer {
  public:
   TileRenderer(Executor& executor, const TileLimits& limits) : executor_(executor), limits_(limits) {}
 
-  /// Renders a frame in tiles. Precondition: goes_by_tiles.
+  /// Renders a frame in tiles. Precondition: is_tiled.
   void render(const RawFrame& frame, const DevelopPlan& plan, NoiseReducer& noise, Picture& out);
 
   /// Returns the bytes for such a frame, those of the NoiseReducer included; more than are taken only where regions

@@ -68,13 +68,13 @@ struct ColourVectors {
   HWY_INLINE void move_into_gamut(SitePair& v) const {
     const auto least = [](const Site& s) HWY_ATTR { return hn::Min(hn::Min(s.c[0], s.c[1]), s.c[2]); };
     const auto greatest = [](const Site& s) HWY_ATTR { return hn::Max(hn::Max(s.c[0], s.c[1]), s.c[2]); };
-    const VF least_even = least(v.even), least_odd = least(v.odd);
+    const VF min_even = least(v.even), min_odd = least(v.odd);
     const VF greatest_even = greatest(v.even), greatest_odd = greatest(v.odd);
-    const auto outside = hn::Or(hn::Lt(hn::Min(least_even, least_odd), constant(0)),
+    const auto outside = hn::Or(hn::Lt(hn::Min(min_even, min_odd), constant(0)),
                                 hn::Gt(hn::Max(greatest_even, greatest_odd), constant(1)));
     if (HWY_LIKELY(hn::AllFalse(Floats(), outside))) return;
-    v.even = moved(v.even, least_even, greatest_even);
-    v.odd = moved(v.odd, least_odd, greatest_odd);
+    v.even = moved(v.even, min_even, greatest_even);
+    v.odd = moved(v.odd, min_odd, greatest_odd);
   }
 };
 

@@ -75,8 +75,8 @@ struct LookVectors {
   HWY_INLINE Site seen(const Site& v, const VF (&part)[LookGrid::parts]) const {
     const VF zero = constant(0), one = constant(1);
     const VF y = weighted(luminance, v);
-    const VF s = hn::Max(weighted(rods, v), hn::Min(hn::Mul(constant(LookGrid::least_rods), y), y));
-    const VF e = hn::MulAdd(part[LookGrid::rod_share], hn::Sub(s, y), y);
+    const VF s = hn::Max(weighted(rods, v), hn::Min(hn::Mul(constant(LookGrid::min_rods), y), y));
+    const VF e = hn::MulAdd(part[LookGrid::rod_fraction], hn::Sub(s, y), y);
     const VF chroma =
         hn::Div(hn::Mul(part[LookGrid::chroma], hn::Add(hn::Max(e, zero), dark)), hn::Add(hn::Max(y, zero), dark));
     const VF light = hn::MulAdd(part[LookGrid::detail], e, part[LookGrid::base]);

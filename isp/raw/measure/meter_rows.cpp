@@ -20,7 +20,7 @@ using Sums = hn::ScalableTag<std::uint32_t>;
 using Codes = hn::Rebind<std::uint16_t, Sums>;  // as many lanes, of half the width
 using Words = hn::ScalableTag<std::uint16_t>;
 
-constexpr int most_difference = 5792;
+constexpr int max_difference = 5792;
 
 void AddRow(const std::uint16_t* dn, int width, std::uint32_t* column) {
   const Sums s;
@@ -37,7 +37,7 @@ void AddSquares(const std::uint16_t* dn, int width, std::uint32_t* column) {
   const Sums s;
   const Codes c;
   const int n = static_cast<int>(hn::Lanes(s));
-  const auto most = hn::Set(c, most_difference);
+  const auto most = hn::Set(c, max_difference);
   int x = 0;
   for (; x + n + 2 <= width; x += n) {
     const auto a = hn::LoadU(c, dn + x), b = hn::LoadU(c, dn + x + 2);
@@ -45,7 +45,7 @@ void AddSquares(const std::uint16_t* dn, int width, std::uint32_t* column) {
     hn::StoreU(hn::Add(hn::LoadU(s, column + x), hn::Mul(d, d)), s, column + x);
   }
   for (; x + 2 < width; ++x) {
-    const int d = std::min(std::abs(dn[x] - dn[x + 2]), most_difference);
+    const int d = std::min(std::abs(dn[x] - dn[x + 2]), max_difference);
     column[x] += static_cast<std::uint32_t>(d * d);
   }
 }

@@ -12,10 +12,10 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double low_rank = 0.05;
-constexpr int least_samples = 60;  // of one level
+constexpr int min_samples = 60;  // of one level
 /// Noise of at least half a code, rounded to codes, has the sum of both variances; for less noise, the variance depends
 /// on the position of the mean between two codes.
-constexpr double least_variance_dn2 = 0.25 + quantisation_dn2;
+constexpr double min_variance_dn2 = 0.25 + quantisation_dn2;
 
 /// Bins positive floats by their leading bits: 2^mantissa_bits bins for each octave, from 2^low_octave on.
 template <int mantissa_bits, int low_octave>
@@ -57,7 +57,7 @@ double low_quantile(const Level& level, double share) {
 }
 
 double variance_at(const NoiseLine& line, double above_black_dn) {
-  return std::max(line.offset_dn2 + line.gain_dn * above_black_dn, least_variance_dn2);
+  return std::max(line.offset_dn2 + line.gain_dn * above_black_dn, min_variance_dn2);
 }
 
 struct Sums {
@@ -78,7 +78,7 @@ TileNoise::TileNoise(int width, int height, int tile)
       memory_(tiles_.size()) {
   const boost::math::chi_squared law(freedom());
   const double low = boost::math::quantile(law, low_rank);
-  low_share_ = low / freedom();
+  low_fraction_ = low / freedom();
   const double of_density = low * boost::math::pdf(law, low);
   low_error2_ = low_rank * (1 - low_rank) / (of_density * of_density);
 }
@@ -129,10 +129,10 @@ std::optional<NoiseLine> TileNoise::line_by(const NoiseLine& expected, const Per
   }
   Sums sums;
   for (const Level& level : found) {
-    if (level.samples < least_samples) continue;
+    if (level.samples < min_samples) continue;
     const double mean = level.sum / level.samples;
-    const double variance = variance_at(expected, mean) * low_quantile(level, low_rank) / low_share_;
-    if (!(variance > least_variance_dn2)) continue;
+    const double variance = variance_at(expected, mean) * low_quantile(level, low_rank) / low_fraction_;
+    if (!(variance > min_variance_dn2)) continue;
     const double relative2 = low_error2_ / level.samples + 1e-4;  // plus a hundredth for the effect of detail
     sums.add(1 / (relative2 * variance * variance), mean, variance);
   }

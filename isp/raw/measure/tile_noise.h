@@ -63,9 +63,9 @@ class TileNoise {
   double variance_of(const Tile& tile, int site) const;
 
   int tile_;
-  int columns_, rows_;  // numbers of complete tiles
-  double low_share_;    // fraction of the variance that the lowest twentieth of estimates lies below
-  double low_error2_;   // relative, of that quantile from one estimate: p (1 - p) / (density at it times it)^2
+  int columns_, rows_;   // numbers of complete tiles
+  double low_fraction_;  // fraction of the variance that the lowest twentieth of estimates lies below
+  double low_error2_;    // relative, of that quantile from one estimate: p (1 - p) / (density at it times it)^2
   std::vector<Tile> tiles_;
   std::vector<float> memory_;
 };

@@ -122,7 +122,7 @@ HWY_INLINE void eye(const EyeTables& t, VF white_ratio, VF photopic, VF scotopic
   const VF m = adaptation_coefficient(t, log2_p, hn::Sub(log2_of(s), log2_p));
   const VF rods = hn::Mul(hn::Sub(constant(1), m), constant(v0));
   const VF of_white = hn::Mul(rods, white_ratio);
-  hn::StoreU(hn::Div(of_white, hn::Add(m, of_white)), f, out.rod_share + i);
+  hn::StoreU(hn::Div(of_white, hn::Add(m, of_white)), f, out.rod_fraction + i);
 
   const VF seen = hn::MulAdd(hn::Div(rods, hn::Add(m, rods)), hn::Sub(s, p), p);
   const VF chroma = hn::Div(hn::Mul(seen, constant(t.chroma_scale)), hn::Add(seen, constant(t.half_saturation_cd_m2)));
@@ -147,7 +147,7 @@ void EyeRowOf(const EyeTables& tables, float white, const float* photopic, const
   std::memcpy(row[0], photopic, bytes);
   std::memcpy(row[1], scotopic, bytes);
   eye(tables, ratio, hn::Load(f, row[0]), hn::Load(f, row[1]), 0, {row[2], row[3], row[4], row[5]});
-  std::memcpy(out.rod_share, row[2], bytes);
+  std::memcpy(out.rod_fraction, row[2], bytes);
   std::memcpy(out.chroma, row[3], bytes);
   std::memcpy(out.blue, row[4], bytes);
   std::memcpy(out.variance_deg2, row[5], bytes);

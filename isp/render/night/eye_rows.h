@@ -35,7 +35,7 @@ void light_row(const LightRow& in, const LightWeights& weights, int n, float* ph
 /// Computes the eye's response to one row of adaptation [cd/m2; scotopic cd/m2]: for LookGrid the rods' fraction
 /// relative to white, chroma and blue; variance of the blur [deg^2].
 struct EyeRow {
-  float* rod_share;
+  float* rod_fraction;
   float* chroma;
   float* blue;
   float* variance_deg2;

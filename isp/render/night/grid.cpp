@@ -8,16 +8,16 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int most_reach = 24;  // 3 * 8
+constexpr int max_reach = 24;  // 3 * 8
 
 struct Gaussian {
   int reach = 0;
-  std::array<float, 2 * most_reach + 1> weight{};
+  std::array<float, 2 * max_reach + 1> weight{};
 };
 
 Gaussian gaussian(double std_cells) {
   Gaussian out;
-  out.reach = std::min(most_reach, static_cast<int>(std::ceil(3 * std_cells)));
+  out.reach = std::min(max_reach, static_cast<int>(std::ceil(3 * std_cells)));
   double sum = 0;
   const auto at = [&](int k) { return std::exp(-0.5 * k * k / (std_cells * std_cells)); };
   for (int k = -out.reach; k <= out.reach; ++k) sum += at(k);

@@ -18,7 +18,7 @@ namespace {
 constexpr double cell_variance_px2 = 0.25 * LookGrid::cell * LookGrid::cell;
 
 // Fields of adaptation have at least this S/P: below 0.265 CIE 191 has several solutions and jumps between them.
-constexpr float least_field_ratio = 0.27f;
+constexpr float min_field_ratio = 0.27f;
 
 double mean_of(const PlaneView<const float>& plane) {
   double sum = 0;
@@ -64,7 +64,7 @@ struct NightLookGrid::State {
       : levels(levels_of(width, height)),
         photopic(width, height, levels),
         scotopic(width, height, levels),
-        rod_share(width, height, levels),
+        rod_fraction(width, height, levels),
         chroma(width, height, levels),
         blue(width, height, levels),
         seen(width, height, levels),
@@ -75,14 +75,14 @@ struct NightLookGrid::State {
         grain(width, height) {}
 
   void fit(int width, int height) {
-    for (Pyramid* p : {&photopic, &scotopic, &rod_share, &chroma, &blue, &seen, &variance, &between}) {
+    for (Pyramid* p : {&photopic, &scotopic, &rod_fraction, &chroma, &blue, &seen, &variance, &between}) {
       p->fit(width, height);
     }
   }
   PlaneView<float> part(LookGrid::Part part) {
     switch (part) {
-      case LookGrid::rod_share:
-        return rod_share[0];
+      case LookGrid::rod_fraction:
+        return rod_fraction[0];
       case LookGrid::chroma:
         return chroma[0];
       case LookGrid::blue:
@@ -109,7 +109,7 @@ struct NightLookGrid::State {
   int levels;
   Pyramid photopic, scotopic;  // light, then the field of adaptation [cd/m2]
   int smooth = 0;              // level on which the field of adaptation is still smooth
-  Pyramid rod_share, chroma, blue;
+  Pyramid rod_fraction, chroma, blue;
   Pyramid seen;      // E of LookGrid
   Pyramid variance;  // variance of the blur [px^2]
   Pyramid between;
@@ -132,11 +132,11 @@ void NightLookGrid::State::take_light(const RgbView<const float>& camera, const 
     float* const cones_field = field_y.row(row);
     float* const rods_field = field_s.row(row);
     for (int x = 0; x < y.width; ++x) {
-      own_rods[x] = std::max(own_rods[x], std::min(LookGrid::least_rods * light[x], light[x]));
+      own_rods[x] = std::max(own_rods[x], std::min(LookGrid::min_rods * light[x], light[x]));
     }
     for (int x = 0; x < y.width; ++x) cones_field[x] = std::min(std::max(cones * light[x], 0.0f), 1e9f);
     for (int x = 0; x < y.width; ++x) {
-      rods_field[x] = std::min(std::max(rods * own_rods[x], least_field_ratio * cones_field[x]), 1e9f);
+      rods_field[x] = std::min(std::max(rods * own_rods[x], min_field_ratio * cones_field[x]), 1e9f);
     }
   });
 }
@@ -151,12 +151,12 @@ void NightLookGrid::State::adapt(const NightLook& look, Executor& executor) {
   for (Pyramid* field : {&photopic, &scotopic}) {
     field->halve_to(level, executor);
     const PlaneView<float> coarse = (*field)[level];
-    const auto mean = static_cast<float>(adaptation_share_of_mean * mean_of(coarse));
+    const auto mean = static_cast<float>(adaptation_fraction_of_mean * mean_of(coarse));
     blur(coarse, std::min(std_cells, 8.0), between[level], executor);
     for_each_row(executor, coarse.height, [&](int row) {
       for (int x = 0; x < coarse.width; ++x) {
         float& light = coarse.row(row)[x];
-        light = mean + static_cast<float>(1 - adaptation_share_of_mean) * light;
+        light = mean + static_cast<float>(1 - adaptation_fraction_of_mean) * light;
       }
     });
     field->interpolate(level, smooth, executor);
@@ -170,7 +170,7 @@ void NightLookGrid::State::see(const NightLook& look, Executor& executor) {
   const PlaneView<float> blur_deg2 = between[smooth];
   for_each_row(executor, cones.height, [&](int y) {
     rows::eye_row(eye_tables(), white, cones.row(y), rods.row(y), cones.width,
-                  {rod_share[smooth].row(y), chroma[smooth].row(y), blue[smooth].row(y), blur_deg2.row(y)});
+                  {rod_fraction[smooth].row(y), chroma[smooth].row(y), blue[smooth].row(y), blur_deg2.row(y)});
   });
   const auto everywhere = [&](Pyramid& part, bool wanted, float without) {
     if (wanted) {
@@ -179,10 +179,10 @@ void NightLookGrid::State::see(const NightLook& look, Executor& executor) {
       for_each_row(executor, part[0].height, [&](int y) { std::fill_n(part[0].row(y), part[0].width, without); });
     }
   };
-  everywhere(rod_share, look.effects.purkinje, 0);
+  everywhere(rod_fraction, look.effects.purkinje, 0);
   everywhere(chroma, look.effects.chroma, 1);
   everywhere(blue, look.effects.hue, 0);
-  const PlaneView<float> e = seen[0], s = variance[0], share = rod_share[0];
+  const PlaneView<float> e = seen[0], s = variance[0], share = rod_fraction[0];
   for_each_row(executor, e.height, [&](int y) {
     for (int x = 0; x < e.width; ++x) e.row(y)[x] += share.row(y)[x] * (s.row(y)[x] - e.row(y)[x]);
   });

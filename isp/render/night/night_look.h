@@ -13,7 +13,7 @@
 namespace lowlux::isp {
 
 /// Selects the effects of darkness on vision that are applied, each of which can be left out.
-struct NightEffects {
+struct VisionEffects {
   bool purkinje = true;       // reds darken and blues brighten, as rods take over
   bool chroma = true;         // colours fade
   bool hue = true;            // remaining colour moves towards blue
@@ -24,7 +24,7 @@ struct NightEffects {
 
 /// Parameters of a look, decided for one frame: the scene as perceived by an eye that is adapted to it.
 struct NightLook {
-  NightEffects effects;
+  VisionEffects effects;
   double cd_m2_per_unit = 100;            // luminance in the scene of Y = 1 of the pixels
   double scotopic_ratio_of_white = 2.46;  // S/P of the white of the pixels
   double pixels_per_degree = 60;          // of the image
@@ -52,7 +52,7 @@ float gain_within_noise_limit(double y, double noise_std, double lightness);
 /// The field that determines an eye's state of adaptation: standard deviation of its Gaussian [deg], and fraction of
 /// the entire scene's mean in it, due to scatter in the eye. Both values are chosen, not measured.
 inline constexpr double adaptation_field_std_deg = 1.0;
-inline constexpr double adaptation_share_of_mean = 0.1;
+inline constexpr double adaptation_fraction_of_mean = 0.1;
 
 /// Makes LookGrids. It owns its memory and allocates only in the constructor.
 class NightLookGrid {

@@ -13,7 +13,7 @@ constexpr int most_steps = 100;
 constexpr double smallest_step = 1e-7;    // of the code range
 constexpr double derivative_step = 1e-5;  // of the code range: the error of a forward difference is then as small
 constexpr double largest_damping = 1e9;   // of the mean curvature: steps are then negligible
-constexpr double least_damping = 1e-9;    // keeps flat directions from being singular
+constexpr double min_damping = 1e-9;      // keeps flat directions from being singular
 constexpr int residuals = 6;
 
 using Residual = std::array<double, residuals>;
@@ -117,10 +117,10 @@ Quadratic quadratic_at(const Problem& problem, const Vector3& code, const Residu
 
 /// Returns the minimum of a strictly convex quadratic within the box low..high, which holds 0: one coordinate after
 /// another, each to its own optimum, which converges for every such matrix.
-Vector3 least_in_box(const Quadratic& q, const Vector3& low, const Vector3& high) {
-  constexpr int most_sweeps = 500;
+Vector3 min_in_box(const Quadratic& q, const Vector3& low, const Vector3& high) {
+  constexpr int max_sweeps = 500;
   Vector3 x{};
-  for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+  for (int sweep = 0; sweep < max_sweeps; ++sweep) {
     double change = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       const double slope = (q.h * x)[k] + q.g[k];
@@ -142,7 +142,7 @@ Vector3 step_from(const Quadratic& q, double damping, const Vector3& code) {
     low[k] = -code[k];
     high[k] = 1 - code[k];
   }
-  return least_in_box(damped, low, high);
+  return min_in_box(damped, low, high);
 }
 
 double largest(const Vector3& v) { return std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}); }
@@ -188,7 +188,7 @@ MatchedColour closest_displayable(const AppearanceMatch& match, const Vector3& s
     out.cost = cost;
     r = there;
     q = quadratic_at(problem, next, r);
-    damping = std::max(damping / 8, least_damping);
+    damping = std::max(damping / 8, min_damping);
   }
   out.held = is_held(q, out.code);
   return out;

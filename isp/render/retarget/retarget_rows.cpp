@@ -24,7 +24,7 @@ using Unsigned = hn::RebindToUnsigned<Floats>;
 using Codes = hn::Repartition<std::uint16_t, Floats>;
 using VC = hn::Vec<Codes>;
 
-constexpr int most_pixels_at_once() { return 2 * static_cast<int>(hn::MaxLanes(Floats())); }
+constexpr int max_pixels_at_once() { return 2 * static_cast<int>(hn::MaxLanes(Floats())); }
 
 /// Holds one vector for each of R, G and B.
 template <class V>
@@ -141,8 +141,8 @@ HWY_INLINE void convert(const RetargetTable& from, const std::uint16_t* rgb, int
   using Code = typename Sink::Code;
   const Table table(from);
   const int pixels = 2 * static_cast<int>(hn::Lanes(Floats()));
-  HWY_ALIGN std::uint16_t last_in[3 * most_pixels_at_once()] = {};
-  HWY_ALIGN Code last_out[3 * most_pixels_at_once()];
+  HWY_ALIGN std::uint16_t last_in[3 * max_pixels_at_once()] = {};
+  HWY_ALIGN Code last_out[3 * max_pixels_at_once()];
   for (int x = 0; x < width; x += pixels) {
     const std::ptrdiff_t place = 3 * static_cast<std::ptrdiff_t>(x);
     const bool partial = width - x < pixels;

@@ -1,4 +1,4 @@
-#include "isp/pipeline/budget/effect_sizes.h"
+#include "isp/pipeline/budget/step_sizes.h"
 
 #include <gtest/gtest.h>
 
@@ -46,14 +46,14 @@ Lines lines_of(const RawFrame& frame) {
   EXPECT_TRUE(planned && all);
   if (!planned || !all) return {};
   const auto& effects = planned->effects->effects;
-  const auto lines = std::ranges::find(effects, "row and column noise", &PlannedEffect::name);
+  const auto lines = std::ranges::find(effects, "row and column noise", &PlannedStep::name);
   EXPECT_NE(lines, effects.end());
   return {lines->size, all->noise_reduction.lines.size()};
 }
 
 // A column's offset is measured to 1.2 x 4.7 e- / sqrt(2048) = 0.12 e- in the whole frame, to 0.24 e- in a square of
 // 512 rows: 0.18 e- stands out of the one and not of the other, but squares together tell its size.
-TEST(EffectSizes, ASampleTellsOfColumnsThatOnlyWholeOnesShow) {
+TEST(StepSizes, ASampleTellsOfColumnsThatOnlyWholeOnesShow) {
   const Lines none = lines_of(grey_with_columns(0)), some = lines_of(grey_with_columns(0.18));
   EXPECT_EQ(none.taken_kinds, 0);
   EXPECT_EQ(none.predicted, 0);

@@ -1,4 +1,4 @@
-#include "isp/pipeline/budget/plan_effects.h"
+#include "isp/pipeline/budget/step_plan.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "isp/pipeline/budget/effect_candidates.h"
+#include "isp/pipeline/budget/step_candidates.h"
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/pipeline/plan/plan_regions.h"
 
@@ -17,7 +17,7 @@ namespace {
 
 using denoise::Level;
 
-std::string level_words(const EffectFacts& facts, const EffectCandidate& plan) {
+std::string level_words(const StepFacts& facts, const StepCandidate& plan) {
   if (!facts.has_noise) return "the noise is not known, or not to be reduced";
   if (!plan.level) return "left as it is";
   std::array<double, 3> share = facts.chroma.start;
@@ -33,44 +33,44 @@ std::string region_words(const NoiseRegions& regions) {
                      have(std::nullopt), have(Level::draft), have(Level::standard), have(Level::high));
 }
 
-std::optional<double> cost_of(const EffectFacts& facts, std::initializer_list<CostShare> parts) {
+std::optional<double> cost_of(const StepFacts& facts, std::initializer_list<CostShare> parts) {
   if (!facts.choice.cost) return std::nullopt;
   return predicted_s(*facts.choice.cost, facts.size, parts);
 }
 
-double seconds_of(const EffectFacts& facts, EffectCandidate plan) {
+double seconds_of(const StepFacts& facts, StepCandidate plan) {
   rate(facts, plan);
   return plan.seconds;
 }
 
 /// Returns the time of noise reduction by the plan's level, or by the highest that a tolerance selects where it has
 /// none; without lines.
-std::optional<double> cost_of_noise(const EffectFacts& facts, EffectCandidate plan) {
+std::optional<double> cost_of_noise(const StepFacts& facts, StepCandidate plan) {
   if (!facts.choice.cost) return std::nullopt;
   plan.lines = false;
   if (!plan.level) plan.level = Level::high;
-  EffectCandidate without = plan;
+  StepCandidate without = plan;
   without.level.reset();
   return seconds_of(facts, plan) - seconds_of(facts, without);
 }
 
-std::optional<double> cost_of_lines(const EffectFacts& facts, EffectCandidate plan) {
+std::optional<double> cost_of_lines(const StepFacts& facts, StepCandidate plan) {
   if (!facts.choice.cost) return std::nullopt;
   plan.lines = true;
   if (!plan.level) plan.level = Level::high;
-  EffectCandidate without = plan;
+  StepCandidate without = plan;
   without.lines = false;
   return seconds_of(facts, plan) - seconds_of(facts, without);
 }
 
-EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
+StepPlan told(const StepFacts& facts, const StepCandidate& plan) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  EffectsPlan out;
+  StepPlan out;
   const auto left = [](bool used, double size) { return used || !(size > 0) ? 0 : size; };
-  const auto add = [&](PlannedEffect effect) { out.effects.push_back(std::move(effect)); };
+  const auto add = [&](PlannedStep effect) { out.effects.push_back(std::move(effect)); };
   if (facts.has_noise) {
     const double all = facts.noise.all, kept = facts.noise.left_by(plan.level);
-    PlannedEffect noise{
+    PlannedStep noise{
         "noise", all, plan.level ? kept : std::min(kept, all), plan.level.has_value(), level_words(facts, plan), {}};
     noise.seconds = cost_of_noise(facts, plan);
     add(std::move(noise));
@@ -98,7 +98,7 @@ EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
   const bool by_tolerance = facts.choice.tolerance_delta_e && !facts.choice.all && !facts.choice.budget_s;
   if (by_tolerance && plan.level && !facts.level_is_fixed) {
     out.regions =
-        plan_regions(facts.active, facts.blocks, *plan.level, share_for_level * *facts.choice.tolerance_delta_e);
+        plan_regions(facts.active, facts.blocks, *plan.level, fraction_for_level * *facts.choice.tolerance_delta_e);
   }
   if (out.regions) out.effects.front().decision += region_words(*out.regions);
   if (facts.choice.cost) out.predicted_s = plan.seconds;
@@ -111,9 +111,9 @@ EffectsPlan told(const EffectFacts& facts, const EffectCandidate& plan) {
   return out;
 }
 
-EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& o,
-                     const RawLevels& levels, const Rendering& rendering, Executor& executor) {
-  EffectFacts facts{*o.effects, {}, {}};
+StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& o, const RawLevels& levels,
+                   const Rendering& rendering, Executor& executor) {
+  StepFacts facts{*o.effects, {}, {}};
   facts.size = cost_size(frame.raw);
   facts.samples = o.samples;
   facts.active = frame.raw.active;
@@ -133,7 +133,7 @@ EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const De
   facts.may_search = o.find_defects && frame.raw.layout == SensorLayout::bayer;
   facts.may_take_lines = facts.has_noise && o.denoise.line_noise;
   facts.sizes =
-      effect_sizes(frame, o, levels, thumbnail, facts.has_noise ? &model->noise : nullptr, facts.blocks, executor);
+      step_sizes(frame, o, levels, thumbnail, facts.has_noise ? &model->noise : nullptr, facts.blocks, executor);
   RawLevels without_dark = levels;
   without_dark.black.dark_mean_e = {};
   facts.from_codes = frame.corrections.defects.empty() && renders_from_codes(frame, without_dark, false);
@@ -142,10 +142,10 @@ EffectFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const De
 
 }  // namespace
 
-Result<EffectsPlan> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& options,
-                                   const RawLevels& levels, const Rendering& rendering, Executor& executor) {
-  const EffectFacts facts = facts_of(frame, thumbnail, options, levels, rendering, executor);
-  const Result<EffectCandidate> best = choose_candidate(facts);
+Result<StepPlan> choose_steps(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& options,
+                              const RawLevels& levels, const Rendering& rendering, Executor& executor) {
+  const StepFacts facts = facts_of(frame, thumbnail, options, levels, rendering, executor);
+  const Result<StepCandidate> best = choose_step_candidate(facts);
   if (!best) return tl::make_unexpected(best.error());
   return told(facts, *best);
 }

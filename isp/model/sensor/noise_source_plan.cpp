@@ -1,4 +1,4 @@
-#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/noise_source_plan.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,9 +17,9 @@ constexpr std::array<std::string_view, effect_count> names{"photon-noise", "dark
 
 /// Limits the fraction of the tolerance that predictions may use up. They assume normal distributions, which do not
 /// hold near saturation and at a few electrons.
-constexpr double usable_share = 0.5;
+constexpr double usable_fraction = 0.5;
 
-constexpr int most_samples = 24;  // evaluated blocks of one region: its extremes and others evenly between them
+constexpr int max_samples = 24;  // evaluated blocks of one region: its extremes and others evenly between them
 
 /// Returns whether the sensor and exposure have the effect at all.
 bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
@@ -60,7 +60,7 @@ std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vect
     return [&blocks, key](std::size_t a, std::size_t b) { return key(blocks[a]) < key(blocks[b]); };
   };
   std::vector<BlockLevel> samples;
-  samples.reserve(10 + most_samples);
+  samples.reserve(10 + max_samples);
   samples.push_back(
       blocks[*std::max_element(members.begin(), members.end(), by([](const BlockLevel& b) { return b.peak_e; }))]);
   for (int c = 0; c < 3; ++c) {
@@ -72,7 +72,7 @@ std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vect
     samples.push_back(blocks[*high]);
   }
   std::sort(members.begin(), members.end(), by(level_of));
-  const std::size_t count = std::min<std::size_t>(members.size(), most_samples);
+  const std::size_t count = std::min<std::size_t>(members.size(), max_samples);
   for (std::size_t i = 0; i < count; ++i) {
     samples.push_back(blocks[members[count == 1 ? 0 : i * (members.size() - 1) / (count - 1)]]);
   }
@@ -86,7 +86,7 @@ class Region {
          std::vector<BlockLevel> samples)
       : sensor_(sensor), exposure_(exposure), developing_(developing), samples_(std::move(samples)) {}
 
-  PredictedChange change(EffectSet kept) const {
+  PredictedChange change(NoiseSourceSet kept) const {
     PredictedChange worst;
     for (const BlockLevel& block : samples_) {
       const PredictedChange one = predict_change(sensor_, exposure_, developing_, block, kept);
@@ -105,16 +105,16 @@ class Region {
 };
 
 /// Decides on each effect by itself.
-std::array<EffectDecision, effect_count> decisions_alone(const Region& region) {
-  std::array<EffectDecision, effect_count> out{};
+std::array<NoiseSourceDecision, effect_count> decisions_alone(const Region& region) {
+  std::array<NoiseSourceDecision, effect_count> out{};
   for (int i = 0; i < effect_count; ++i) {
-    EffectDecision& d = out[i];
+    NoiseSourceDecision& d = out[i];
     d.effect = static_cast<Effect>(i);
     if (region.has(d.effect)) {
-      d.alone = region.change(EffectSet::all().without(d.effect));
+      d.alone = region.change(NoiseSourceSet::all().without(d.effect));
     } else {
       d.kept = false;
-      d.reason = EffectDecision::Reason::absent;
+      d.reason = NoiseSourceDecision::Reason::absent;
     }
   }
   return out;
@@ -131,15 +131,15 @@ void drop_negligible(const Region& region, const Tolerance& tolerance, RegionPla
   const auto size = [&](int i) { return size_of(plan.decisions[i].alone, tolerance); };
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size(a) < size(b); });
   for (const int i : order) {
-    EffectDecision& d = plan.decisions[i];
-    if (!d.kept || size(i) >= usable_share) continue;
+    NoiseSourceDecision& d = plan.decisions[i];
+    if (!d.kept || size(i) >= usable_fraction) continue;
     if (d.effect == Effect::dark_current && plan.kept.has(Effect::dsnu)) continue;  // DSNU multiplies dark current
     const PredictedChange together = region.change(plan.kept.without(d.effect));
-    if (size_of(together, tolerance) >= usable_share) continue;
+    if (size_of(together, tolerance) >= usable_fraction) continue;
     plan.kept = plan.kept.without(d.effect);
     plan.left_out_together = together;
     d.kept = false;
-    d.reason = EffectDecision::Reason::negligible;
+    d.reason = NoiseSourceDecision::Reason::negligible;
   }
 }
 
@@ -154,9 +154,9 @@ std::vector<std::vector<std::size_t>> group(std::span<const BlockLevel> blocks) 
 }
 
 template <class Decide>
-EffectPlan plan_regions(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                        std::span<const BlockLevel> blocks, const Decide& decide) {
-  EffectPlan plan;
+NoiseSourcePlan plan_regions(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
+                             std::span<const BlockLevel> blocks, const Decide& decide) {
+  NoiseSourcePlan plan;
   plan.region_of_block.resize(blocks.size());
   for (const std::vector<std::size_t>& members : group(blocks)) {
     const Region region(sensor, exposure, developing, samples_of(blocks, members));
@@ -169,7 +169,7 @@ EffectPlan plan_regions(const SensorModel& sensor, const Exposure& exposure, con
       r.brightest_e = std::max(r.brightest_e, level_of(blocks[i]));
     }
     r.decisions = decisions_alone(region);
-    for (const EffectDecision& d : r.decisions) {
+    for (const NoiseSourceDecision& d : r.decisions) {
       if (!d.kept) r.kept = r.kept.without(d.effect);
     }
     decide(region, r);
@@ -182,21 +182,22 @@ EffectPlan plan_regions(const SensorModel& sensor, const Exposure& exposure, con
 
 std::span<const std::string_view> effect_names() { return names; }
 
-EffectPlan plan_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                        std::span<const BlockLevel> blocks, const Tolerance& tolerance) {
-  EffectPlan plan = plan_regions(sensor, exposure, developing, blocks,
-                                 [&](const Region& region, RegionPlan& r) { drop_negligible(region, tolerance, r); });
+NoiseSourcePlan plan_noise_sources(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
+                                   std::span<const BlockLevel> blocks, const Tolerance& tolerance) {
+  NoiseSourcePlan plan = plan_regions(sensor, exposure, developing, blocks, [&](const Region& region, RegionPlan& r) {
+    drop_negligible(region, tolerance, r);
+  });
   plan.tolerance = tolerance;
   return plan;
 }
 
-EffectPlan fixed_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                         std::span<const BlockLevel> blocks, EffectSet wanted) {
+NoiseSourcePlan fixed_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
+                              std::span<const BlockLevel> blocks, NoiseSourceSet wanted) {
   return plan_regions(sensor, exposure, developing, blocks, [&](const Region& region, RegionPlan& r) {
-    for (EffectDecision& d : r.decisions) {
-      if (d.reason == EffectDecision::Reason::absent) continue;
+    for (NoiseSourceDecision& d : r.decisions) {
+      if (d.reason == NoiseSourceDecision::Reason::absent) continue;
       d.kept = wanted.has(d.effect) && (d.effect != Effect::dsnu || wanted.has(Effect::dark_current));
-      d.reason = EffectDecision::Reason::asked_for;
+      d.reason = NoiseSourceDecision::Reason::asked_for;
       if (!d.kept) r.kept = r.kept.without(d.effect);
     }
     r.left_out_together = region.change(r.kept);

@@ -6,7 +6,7 @@
 
 #include "isp/base/result.h"
 #include "isp/pipeline/budget/chroma_work.h"
-#include "isp/pipeline/budget/effect_sizes.h"
+#include "isp/pipeline/budget/step_sizes.h"
 #include "isp/pipeline/budget/visible_noise.h"
 #include "isp/pipeline/options.h"
 
@@ -15,7 +15,7 @@ namespace lowlux::isp {
 
 /// States the fraction of the tolerance for the level of noise reduction: its prediction is an upper bound over the
 /// tuning images, which others may exceed by a little.
-constexpr double share_for_level = 0.9;
+constexpr double fraction_for_level = 0.9;
 
 /// Holds the visible noise of a frame, and what levels leave of it: seen_percentile() over its blocks.
 struct LevelNoise {
@@ -30,7 +30,7 @@ struct LevelNoise {
 LevelNoise level_noise(const std::vector<SeenBlock>& blocks);
 
 /// Describes one way to develop the frame.
-struct EffectCandidate {
+struct StepCandidate {
   std::optional<denoise::Level> level;
   bool defects = true;
   bool lines = true;
@@ -42,9 +42,9 @@ struct EffectCandidate {
 };
 
 /// Holds what the decisions about one frame rest on.
-struct EffectFacts {
-  const EffectsChoice& choice;
-  EffectSizes sizes;
+struct StepFacts {
+  const ProcessingGoal& choice;
+  StepSizes sizes;
   std::vector<SeenBlock> blocks;
   bool has_noise = false;  // the noise is known, and may be reduced
   LevelNoise noise;
@@ -62,9 +62,9 @@ struct EffectFacts {
 };
 
 /// Sets left, error and seconds of a plan (0 seconds without a cost model).
-void rate(const EffectFacts& facts, EffectCandidate& plan);
+void rate(const StepFacts& facts, StepCandidate& plan);
 
-/// Chooses a candidate as EffectsChoice states. Error: the budget is below the cheapest plan.
-Result<EffectCandidate> choose_candidate(const EffectFacts& facts);
+/// Chooses a candidate as ProcessingGoal states. Error: the budget is below the cheapest plan.
+Result<StepCandidate> choose_step_candidate(const StepFacts& facts);
 
 }  // namespace lowlux::isp

@@ -17,7 +17,7 @@
 namespace lowlux::isp {
 
 /// Describes one effect that may be left out of developing, or done with less work.
-struct PlannedEffect {
+struct PlannedStep {
   std::string_view name;
   double size = 0;  // CIEDE2000 that omitting it would change; not a number where that is not known
   double left = 0;  // CIEDE2000 that the decision leaves of it, relative to everything that can be done
@@ -27,8 +27,8 @@ struct PlannedEffect {
 };
 
 /// Holds the decisions about all effects together.
-struct EffectsPlan {
-  std::vector<PlannedEffect> effects;
+struct StepPlan {
+  std::vector<PlannedStep> effects;
   std::optional<double> predicted_s;  // for planning and rendering
   bool find_defects = true;
   bool lines = true;  // row and column noise is subtracted with the noise
@@ -44,7 +44,7 @@ struct EffectsPlan {
 /// to fit, or the cheapest of those within the tolerance, if one is given and one fits.
 /// @param levels  before the search for defects
 /// Precondition: options.effects. Error: the budget is below the cheapest plan, whose time is stated (insufficient).
-Result<EffectsPlan> decide_effects(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& options,
-                                   const RawLevels& levels, const Rendering& rendering, Executor& executor);
+Result<StepPlan> choose_steps(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& options,
+                              const RawLevels& levels, const Rendering& rendering, Executor& executor);
 
 }  // namespace lowlux::isp

@@ -1,4 +1,4 @@
-#include "isp/pipeline/budget/effect_candidates.h"
+#include "isp/pipeline/budget/step_candidates.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,7 @@ namespace {
 using denoise::Level;
 
 /// States the fraction of the time for row and column noise that counts where it is not known whether there is any.
-constexpr double share_of_unknown = 0.5;
+constexpr double fraction_of_unknown = 0.5;
 
 /// States the CIEDE2000 that an unpredicted effect counts for where plans are compared: so that it is done where there
 /// is time.
@@ -26,15 +26,15 @@ CostPart part_of(Level level, int start) {
   return static_cast<CostPart>(static_cast<int>(first[static_cast<std::size_t>(level)]) + start);
 }
 
-std::vector<CostShare> work_of(const EffectFacts& facts, const EffectCandidate& plan) {
+std::vector<CostShare> work_of(const StepFacts& facts, const StepCandidate& plan) {
   std::vector<CostShare> work{{CostPart::planning}};
-  if (facts.sizes.sampled_share > 0) work.push_back({CostPart::samples, facts.sizes.sampled_share});
+  if (facts.sizes.sampled_fraction > 0) work.push_back({CostPart::samples, facts.sizes.sampled_fraction});
   if (plan.defects && facts.may_search) work.push_back({CostPart::defects});
   if (plan.level) {
     if (plan.lines && facts.may_take_lines) {
       work.push_back({CostPart::lines});
       const double size = facts.sizes.lines;
-      if (size != 0) work.push_back({CostPart::offsets, std::isnan(size) ? share_of_unknown : 1});
+      if (size != 0) work.push_back({CostPart::offsets, std::isnan(size) ? fraction_of_unknown : 1});
     }
     work.push_back({CostPart::check});
     for (int start = 0; start < 3; ++start) {
@@ -53,7 +53,7 @@ std::vector<CostShare> work_of(const EffectFacts& facts, const EffectCandidate& 
   return work;
 }
 
-std::vector<std::optional<Level>> levels_of(const EffectFacts& facts, bool with_best) {
+std::vector<std::optional<Level>> levels_of(const StepFacts& facts, bool with_best) {
   if (facts.level_is_fixed) return {facts.fixed_level};
   if (!facts.has_noise) return {std::nullopt};
   std::vector<std::optional<Level>> out{std::nullopt, Level::draft, Level::standard, Level::high};
@@ -63,26 +63,26 @@ std::vector<std::optional<Level>> levels_of(const EffectFacts& facts, bool with_
 
 /// Returns the plan with the least work that stays below the tolerance: the level first, which saves most, then the
 /// other effects, smallest first.
-EffectCandidate within_tolerance(const EffectFacts& facts, double tolerance) {
-  EffectCandidate plan{.level = levels_of(facts, false).back()};
+StepCandidate within_tolerance(const StepFacts& facts, double tolerance) {
+  StepCandidate plan{.level = levels_of(facts, false).back()};
   for (const std::optional<Level> level : levels_of(facts, false)) {
-    EffectCandidate tried{.level = level};
+    StepCandidate tried{.level = level};
     rate(facts, tried);
-    if (tried.left >= share_for_level * tolerance) continue;
+    if (tried.left >= fraction_for_level * tolerance) continue;
     plan = tried;
     break;
   }
   struct Option {
-    bool EffectCandidate::*used;
+    bool StepCandidate::*used;
     double size;
   };
-  std::array options{
-      Option{&EffectCandidate::defects, facts.sizes.defects}, Option{&EffectCandidate::lines, facts.sizes.lines},
-      Option{&EffectCandidate::dark, facts.sizes.dark}, Option{&EffectCandidate::display, facts.sizes.display}};
+  std::array options{Option{&StepCandidate::defects, facts.sizes.defects},
+                     Option{&StepCandidate::lines, facts.sizes.lines}, Option{&StepCandidate::dark, facts.sizes.dark},
+                     Option{&StepCandidate::display, facts.sizes.display}};
   std::ranges::sort(options, {}, &Option::size);
   for (const Option& option : options) {
     if (std::isnan(option.size)) continue;  // not predicted: the effect is used
-    EffectCandidate tried = plan;
+    StepCandidate tried = plan;
     tried.*option.used = false;
     rate(facts, tried);
     if (tried.left < tolerance) plan = tried;
@@ -92,27 +92,27 @@ EffectCandidate within_tolerance(const EffectFacts& facts, double tolerance) {
 }
 
 /// Returns all candidates, the cheapest first.
-std::vector<EffectCandidate> candidates(const EffectFacts& facts) {
-  std::vector<EffectCandidate> out;
+std::vector<StepCandidate> candidates(const StepFacts& facts) {
+  std::vector<StepCandidate> out;
   for (const std::optional<Level> level : levels_of(facts, true)) {
     for (const bool defects : {false, true}) {
       for (const bool lines : {false, true}) {
         for (const bool dark : {false, true}) {
           // A requested change for a display is omitted only within a tolerance: a budget never silently drops an
           // explicit request.
-          EffectCandidate plan{.level = level, .defects = defects, .lines = lines, .dark = dark};
+          StepCandidate plan{.level = level, .defects = defects, .lines = lines, .dark = dark};
           rate(facts, plan);
           out.push_back(plan);
         }
       }
     }
   }
-  std::ranges::sort(out, {}, &EffectCandidate::seconds);
+  std::ranges::sort(out, {}, &StepCandidate::seconds);
   return out;
 }
 
-Result<EffectCandidate> within_budget(const EffectFacts& facts, double budget_s) {
-  const std::vector<EffectCandidate> all = candidates(facts);
+Result<StepCandidate> within_budget(const StepFacts& facts, double budget_s) {
+  const std::vector<StepCandidate> all = candidates(facts);
   if (all.front().seconds > budget_s) {
     return fail(ErrorCode::insufficient,
                 fmt::format("the budget of {:.3g} ms is below the cheapest plan, which is predicted to take {:.3g} ms "
@@ -121,8 +121,8 @@ Result<EffectCandidate> within_budget(const EffectFacts& facts, double budget_s)
                             facts.choice.cost->threads == 1 ? "thread" : "threads"));
   }
   const double tolerance = facts.choice.tolerance_delta_e.value_or(0);
-  const EffectCandidate* best = nullptr;
-  for (const EffectCandidate& plan : all) {
+  const StepCandidate* best = nullptr;
+  for (const StepCandidate& plan : all) {
     if (plan.seconds > budget_s) break;
     if (plan.left < tolerance) return plan;
     if (best == nullptr || plan.error < best->error) best = &plan;
@@ -139,7 +139,7 @@ LevelNoise level_noise(const std::vector<SeenBlock>& blocks) {
     return seen_percentile(rms);
   };
   const auto left_by = [&](std::optional<Level> level) {
-    return percentile([level](const SeenBlock& block) { return left_delta_e(level, block); });
+    return percentile([level](const SeenBlock& block) { return residual_delta_e(level, block); });
   };
   LevelNoise out;
   out.all = percentile([](const SeenBlock& block) { return block.noise_delta_e; });
@@ -148,9 +148,9 @@ LevelNoise level_noise(const std::vector<SeenBlock>& blocks) {
   return out;
 }
 
-void rate(const EffectFacts& facts, EffectCandidate& plan) {
+void rate(const StepFacts& facts, StepCandidate& plan) {
   plan.left = facts.noise.left_by(plan.level);
-  double squares = std::pow(error_share(plan.level) * facts.noise.all, 2);
+  double squares = std::pow(error_fraction(plan.level) * facts.noise.all, 2);
   const auto leave = [&](bool used, double size) {
     if (used || size == 0) return;
     if (!std::isnan(size)) plan.left += size;
@@ -164,9 +164,9 @@ void rate(const EffectFacts& facts, EffectCandidate& plan) {
   if (facts.choice.cost) plan.seconds = predicted_s(*facts.choice.cost, facts.size, work_of(facts, plan));
 }
 
-Result<EffectCandidate> choose_candidate(const EffectFacts& facts) {
+Result<StepCandidate> choose_step_candidate(const StepFacts& facts) {
   if (facts.choice.all) {
-    EffectCandidate everything{.level = levels_of(facts, false).back()};
+    StepCandidate everything{.level = levels_of(facts, false).back()};
     rate(facts, everything);
     return everything;
   }

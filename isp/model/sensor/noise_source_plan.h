@@ -31,21 +31,25 @@ inline constexpr int effect_count = 10;
 /// Returns "photon-noise", "dark-current"... in the order of Effect.
 std::span<const std::string_view> effect_names();
 
-class EffectSet {
+class NoiseSourceSet {
  public:
-  constexpr EffectSet() = default;
-  constexpr EffectSet(std::initializer_list<Effect> effects) {
+  constexpr NoiseSourceSet() = default;
+  constexpr NoiseSourceSet(std::initializer_list<Effect> effects) {
     for (const Effect effect : effects) *this = with(effect);
   }
-  static constexpr EffectSet all() { return EffectSet((1u << effect_count) - 1); }
+  static constexpr NoiseSourceSet all() { return NoiseSourceSet((1u << effect_count) - 1); }
 
   constexpr bool has(Effect effect) const { return (bits_ >> static_cast<int>(effect)) & 1; }
-  constexpr EffectSet with(Effect effect) const { return EffectSet(bits_ | (1u << static_cast<int>(effect))); }
-  constexpr EffectSet without(Effect effect) const { return EffectSet(bits_ & ~(1u << static_cast<int>(effect))); }
-  friend constexpr bool operator==(EffectSet, EffectSet) = default;
+  constexpr NoiseSourceSet with(Effect effect) const {
+    return NoiseSourceSet(bits_ | (1u << static_cast<int>(effect)));
+  }
+  constexpr NoiseSourceSet without(Effect effect) const {
+    return NoiseSourceSet(bits_ & ~(1u << static_cast<int>(effect)));
+  }
+  friend constexpr bool operator==(NoiseSourceSet, NoiseSourceSet) = default;
 
  private:
-  explicit constexpr EffectSet(unsigned bits) : bits_(bits) {}
+  explicit constexpr NoiseSourceSet(unsigned bits) : bits_(bits) {}
   unsigned bits_ = 0;
 };
 
@@ -89,10 +93,10 @@ struct PredictedChange {
 /// Predicts the change in a block if only the effects `kept` are simulated. Hot pixels are discrete events: a block may
 /// hold none, so they widen no other effect's tolerance, or several.
 PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                               const BlockLevel& block, EffectSet kept);
+                               const BlockLevel& block, NoiseSourceSet kept);
 
 /// Holds the decision on one effect in one region, and the change if it alone were left out.
-struct EffectDecision {
+struct NoiseSourceDecision {
   Effect effect = Effect::photon_noise;
   enum class Reason : std::uint8_t {
     absent,      // the sensor has no such effect, or it is 0 at the exposure
@@ -110,13 +114,13 @@ struct RegionPlan {
   double darkest_e = 0;  // lowest level of the blocks: that of the largest channel
   double brightest_e = 0;
   int blocks = 0;
-  EffectSet kept = EffectSet::all();
+  NoiseSourceSet kept = NoiseSourceSet::all();
   PredictedChange left_out_together;
-  std::array<EffectDecision, effect_count> decisions{};
+  std::array<NoiseSourceDecision, effect_count> decisions{};
 };
 
 /// Holds the effects that each block of a frame gets.
-struct EffectPlan {
+struct NoiseSourcePlan {
   Tolerance tolerance;
   std::vector<RegionPlan> regions;
   std::vector<std::uint8_t> region_of_block;
@@ -125,11 +129,11 @@ struct EffectPlan {
 /// Decides by the closed forms. Blocks whose levels differ by decades are different regions; in each, effects are left
 /// out smallest first as long as all that is left out together is predicted to stay below the tolerance.
 /// @param blocks of the frame, row by row; not empty
-EffectPlan plan_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                        std::span<const BlockLevel> blocks, const Tolerance& tolerance);
+NoiseSourcePlan plan_noise_sources(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
+                                   std::span<const BlockLevel> blocks, const Tolerance& tolerance);
 
 /// Returns a plan with the effects that the caller requests and no others, including the predictions.
-EffectPlan fixed_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                         std::span<const BlockLevel> blocks, EffectSet wanted);
+NoiseSourcePlan fixed_effects(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
+                              std::span<const BlockLevel> blocks, NoiseSourceSet wanted);
 
 }  // namespace lowlux::isp

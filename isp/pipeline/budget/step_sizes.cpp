@@ -1,4 +1,4 @@
-#include "isp/pipeline/budget/effect_sizes.h"
+#include "isp/pipeline/budget/step_sizes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -51,14 +51,13 @@ double percentile_of(std::span<const SeenBlock> blocks, float SeenBlock::*figure
   std::vector<float> values;
   values.reserve(blocks.size());
   for (const SeenBlock& block : blocks) values.push_back(block.*figure);
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(seen_share * static_cast<double>(values.size() - 1));
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(seen_fraction * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
   return static_cast<double>(*at);
 }
 
 void set_defects(const RawFrame& frame, const RawLevels& levels, const DefectNoise& noise,
-                 std::span<const Rect> squares, std::span<const SeenBlock> blocks, EffectSizes& out,
-                 Executor& executor) {
+                 std::span<const Rect> squares, std::span<const SeenBlock> blocks, StepSizes& out, Executor& executor) {
   if (squares.empty()) {
     out.defects = nan;
     out.has_defects = true;
@@ -91,7 +90,7 @@ std::vector<std::optional<denoise::LineOffsets>> lines_of_squares(const RawElect
   std::vector<std::optional<denoise::LineOffsets>> of_square(static_cast<std::size_t>(squares));
   for_each_index(executor, squares, [&](int i) {
     const auto square = sample.value.view().crop(0, i * sample_side_px, sample_side_px, sample_side_px);
-    auto found = denoise::line_offsets_of_frame(square, kind, {.least_std_e = only_how_much});
+    auto found = denoise::line_offsets_of_frame(square, kind, {.min_std_e = only_how_much});
     if (found) of_square[static_cast<std::size_t>(i)] = *std::move(found);
   });
   return of_square;
@@ -119,7 +118,7 @@ double line_std_e(const RawElectrons& sample, int squares, denoise::Lines kind, 
 }
 
 void set_lines(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
-               std::span<const Rect> squares, std::span<const SeenBlock> blocks, EffectSizes& out, Executor& executor) {
+               std::span<const Rect> squares, std::span<const SeenBlock> blocks, StepSizes& out, Executor& executor) {
   if (squares.empty()) {
     out.lines = nan;
     out.lines_words = "looked for in the whole frame: a sample would save nothing";
@@ -151,14 +150,14 @@ DefectNoise defect_noise(const RawFrame& frame, const BlackPoint& black, const T
   return noise;
 }
 
-EffectSizes effect_sizes(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
-                         const Thumbnail& thumbnail, const denoise::RawNoise* noise, std::span<const SeenBlock> blocks,
-                         Executor& executor) {
-  EffectSizes out;
+StepSizes step_sizes(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
+                     const Thumbnail& thumbnail, const denoise::RawNoise* noise, std::span<const SeenBlock> blocks,
+                     Executor& executor) {
+  StepSizes out;
   const std::vector<Rect> squares =
       frame.raw.layout == SensorLayout::bayer ? sample_squares(frame, levels) : std::vector<Rect>{};
   const bool lines_asked = noise != nullptr && options.denoise.line_noise;
-  if (options.find_defects || lines_asked) out.sampled_share = share_of(frame, squares);
+  if (options.find_defects || lines_asked) out.sampled_fraction = share_of(frame, squares);
   if (options.find_defects) {
     set_defects(frame, levels, defect_noise(frame, levels.black, thumbnail), squares, blocks, out, executor);
   }

@@ -1,4 +1,4 @@
-#include "isp/pipeline/budget/plan_effects.h"
+#include "isp/pipeline/budget/step_plan.h"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "isp/pipeline/budget/effect_candidates.h"
 #include "isp/pipeline/budget/frame_sample.h"
+#include "isp/pipeline/budget/step_candidates.h"
 #include "isp/pipeline/budget/visible_noise.h"
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/plan/plan_develop.h"
@@ -44,14 +44,14 @@ RawFrame grey(double green_e, int width = 320, int height = 256) {
   return test::night_frame(Camera{}, flat(0.5 * green_e, green_e, 0.625 * green_e), width, height);
 }
 
-EffectsPlan effects_of(const RawFrame& frame, const DevelopOptions& options) {
+StepPlan effects_of(const RawFrame& frame, const DevelopOptions& options) {
   const auto plan = plan_develop(frame, options, executor);
   EXPECT_TRUE(plan) << (plan ? "" : plan.error().message);
-  return plan ? *plan->effects : EffectsPlan{};
+  return plan ? *plan->effects : StepPlan{};
 }
 
-const PlannedEffect& named(const EffectsPlan& plan, std::string_view name) {
-  return *std::ranges::find(plan.effects, name, &PlannedEffect::name);
+const PlannedStep& named(const StepPlan& plan, std::string_view name) {
+  return *std::ranges::find(plan.effects, name, &PlannedStep::name);
 }
 
 TEST(VisibleNoise, PercentileIsThatOfNormalDifferences) {
@@ -122,8 +122,8 @@ TEST(VisibleNoise, SurroundingsAreBrighterBesideALamp) {
       EXPECT_EQ(block.surroundings, 2) << away_px;
       ++beside;
     }
-    EXPECT_FLOAT_EQ(left_delta_e(Level::draft, block),
-                    static_cast<float>(left_of_noise(Level::draft, static_cast<double>(block.snr))) *
+    EXPECT_FLOAT_EQ(residual_delta_e(Level::draft, block),
+                    static_cast<float>(residual_noise_fraction(Level::draft, static_cast<double>(block.snr))) *
                         block.surroundings * block.noise_delta_e);
   }
   EXPECT_GT(beside, 0);
@@ -138,7 +138,7 @@ TEST(VisibleNoise, ClippingAtBlackIsSeenInTheDark) {
     for (const SeenBlock& block : seen_blocks(frame, plan, thumbnail)) {
       if (seen) {
         EXPECT_GT(block.clip_delta_e, 0.02f);
-        EXPECT_GT(left_delta_e(std::nullopt, block), block.clip_delta_e);
+        EXPECT_GT(residual_delta_e(std::nullopt, block), block.clip_delta_e);
       } else {
         EXPECT_LT(block.clip_delta_e, 1e-3f);
       }
@@ -186,19 +186,19 @@ TEST(ChromaWork, GoesByTheMeansOfTiles) {
 
 TEST(PlanEffects, LevelsLeaveLessTheMoreTheyWork) {
   for (const double snr : {0.0, 1.0, 5.0, 10.0, 100.0}) {
-    EXPECT_GT(left_of_noise(std::nullopt, snr), left_of_noise(Level::draft, snr));
-    EXPECT_GT(left_of_noise(Level::draft, snr), left_of_noise(Level::standard, snr));
-    EXPECT_GT(left_of_noise(Level::standard, snr), left_of_noise(Level::high, snr));
-    EXPECT_EQ(left_of_noise(Level::high, snr), 0);
+    EXPECT_GT(residual_noise_fraction(std::nullopt, snr), residual_noise_fraction(Level::draft, snr));
+    EXPECT_GT(residual_noise_fraction(Level::draft, snr), residual_noise_fraction(Level::standard, snr));
+    EXPECT_GT(residual_noise_fraction(Level::standard, snr), residual_noise_fraction(Level::high, snr));
+    EXPECT_EQ(residual_noise_fraction(Level::high, snr), 0);
   }
-  EXPECT_GT(error_share(std::nullopt), error_share(Level::draft));
-  EXPECT_GT(error_share(Level::high), error_share(Level::best));
+  EXPECT_GT(error_fraction(std::nullopt), error_fraction(Level::draft));
+  EXPECT_GT(error_fraction(Level::high), error_fraction(Level::best));
 }
 
 TEST(PlanEffects, MoreLightCallsForLessWork) {
   std::optional<Level> before = Level::high;
   for (const double green_e : {4.0, 40.0, 400.0, 3000.0}) {
-    const EffectsPlan plan = effects_of(grey(green_e), planned_options(0.5));
+    const StepPlan plan = effects_of(grey(green_e), planned_options(0.5));
     EXPECT_LE(plan.level, before) << green_e;
     before = plan.level;
   }
@@ -225,7 +225,7 @@ TEST(PlanEffects, ABudgetTakesTheMostAccuratePlanThatFits) {
   double before = 0;
   std::optional<Level> level_before;
   for (const double budget_ms : {12.0, 14.0, 18.0, 30.0, 1e4}) {
-    const EffectsPlan plan = effects_of(frame, planned_options(std::nullopt, 1e-3 * budget_ms));
+    const StepPlan plan = effects_of(frame, planned_options(std::nullopt, 1e-3 * budget_ms));
     ASSERT_TRUE(plan.predicted_s);
     EXPECT_LE(*plan.predicted_s, 1e-3 * budget_ms);
     EXPECT_GE(plan.level, level_before);
@@ -234,7 +234,7 @@ TEST(PlanEffects, ABudgetTakesTheMostAccuratePlanThatFits) {
     level_before = plan.level;
   }
   EXPECT_EQ(level_before, Level::best);
-  const EffectsPlan both = effects_of(frame, planned_options(50, 10));
+  const StepPlan both = effects_of(frame, planned_options(50, 10));
   EXPECT_EQ(both.level, std::nullopt) << "with a tolerance the cheapest plan within it";
 }
 
@@ -257,7 +257,7 @@ TEST(PlanEffects, DarkChargeIsLeftInWhereItCannotBeSeen) {
   options.black.choice = BlackChoice::measured;
   options.black.measured.pedestal_dn.fill(test::night_black_dn);
   options.black.measured.dark_mean_e.fill(500);
-  const EffectsPlan large = effects_of(frame, options);
+  const StepPlan large = effects_of(frame, options);
   EXPECT_TRUE(large.dark);
   EXPECT_GT(named(large, "dark charge").size, 2);
   options.black.measured.dark_mean_e.fill(1);
@@ -301,7 +301,7 @@ TEST(FrameSample, LargeFramesAreSampledAtEvenPlacesAndSmallOnesWhole) {
   EXPECT_EQ(squares.back().x, (4001 - 512) & ~1);
 }
 
-std::vector<SeenBlock> blocks_of(double left_delta_e, double right_delta_e) {
+std::vector<SeenBlock> blocks_of(double residual_delta_e, double right_delta_e) {
   std::vector<SeenBlock> out;
   for (int i = 0; i < 400; ++i) {
     const int column = i % 20, row = i / 20;
@@ -309,7 +309,7 @@ std::vector<SeenBlock> blocks_of(double left_delta_e, double right_delta_e) {
     out.push_back({.x = x,
                    .y = (static_cast<float>(row) + 0.5f) / 20,
                    .snr = 10,
-                   .noise_delta_e = static_cast<float>(x < 0.5f ? left_delta_e : right_delta_e)});
+                   .noise_delta_e = static_cast<float>(x < 0.5f ? residual_delta_e : right_delta_e)});
   }
   return out;
 }

@@ -3,7 +3,7 @@
 
 #include "isp/model/colour/colorimetry.h"
 #include "isp/model/colour/colour_difference.h"
-#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/noise_source_plan.h"
 
 namespace lowlux::isp {
 namespace {
@@ -30,7 +30,7 @@ struct Budget {
   double line_variance = 0;       // shared by a row or a column
 };
 
-Budget budget_of(const SensorModel& s, const Charge& q, EffectSet kept) {
+Budget budget_of(const SensorModel& s, const Charge& q, NoiseSourceSet kept) {
   Budget b;
   b.collected_mean = q.signal;
   if (kept.has(Effect::photon_noise)) b.collected_variance += q.signal;
@@ -47,7 +47,7 @@ Budget budget_of(const SensorModel& s, const Charge& q, EffectSet kept) {
 }
 
 /// Returns the probability that a normal variable lies between two bounds.
-double share_inside(const Moments& normal, double low, double high) {
+double fraction_inside(const Moments& normal, double low, double high) {
   if (normal.variance <= 0) return normal.mean >= low && normal.mean <= high ? 1 : 0;
   const double unit = std::sqrt(2 * normal.variance);
   return 0.5 * (std::erf((high - normal.mean) / unit) - std::erf((low - normal.mean) / unit));
@@ -67,7 +67,7 @@ struct ChannelMoments {
 struct Displaced {
   double more = 0, offset = 0;
 };
-Moments analogue_dn(const SensorModel& s, const Budget& b, EffectSet kept, const Displaced& by) {
+Moments analogue_dn(const SensorModel& s, const Budget& b, NoiseSourceSet kept, const Displaced& by) {
   Moments charge{b.collected_mean + by.more, b.collected_variance};
   if (kept.has(Effect::clipping)) charge = clamped_normal(charge, -INFINITY, s.full_well_e);
   const double k = s.system_gain_dn_per_e;
@@ -76,12 +76,12 @@ Moments analogue_dn(const SensorModel& s, const Budget& b, EffectSet kept, const
   return kept.has(Effect::clipping) ? clamped_normal(dn, 0, s.white_level_dn) : dn;
 }
 
-ChannelMoments moments_of(const SensorModel& s, const Budget& b, EffectSet kept) {
+ChannelMoments moments_of(const SensorModel& s, const Budget& b, NoiseSourceSet kept) {
   ChannelMoments out;
   const double k = s.system_gain_dn_per_e;
   const double before_e2 = b.collected_variance + b.pixel_variance + b.line_variance;
   const Moments unclipped = analogue_dn(s, b, kept.without(Effect::clipping), {});
-  out.inside = share_inside(unclipped, 1, std::min(s.white_level_dn, s.black_level_dn + k * s.full_well_e) - 1);
+  out.inside = fraction_inside(unclipped, 1, std::min(s.white_level_dn, s.black_level_dn + k * s.full_well_e) - 1);
   out.dn = analogue_dn(s, b, kept, {});
   if (before_e2 > 0) {
     const double step_e = std::sqrt(before_e2) / 4;
@@ -110,8 +110,8 @@ struct ChangeVariance {
   double pixel = 0, line = 0;
 };
 
-ChangeVariance change_variance(const SensorModel& s, const Charge& q, EffectSet kept) {
-  const Budget all = budget_of(s, q, EffectSet::all()), left = budget_of(s, q, kept);
+ChangeVariance change_variance(const SensorModel& s, const Charge& q, NoiseSourceSet kept) {
+  const Budget all = budget_of(s, q, NoiseSourceSet::all()), left = budget_of(s, q, kept);
   ChangeVariance v;
   v.line = std::max(0.0, all.line_variance - left.line_variance);
   v.pixel = std::max(0.0, all.collected_variance - left.collected_variance) +
@@ -138,7 +138,7 @@ double count_in_block(double fraction) {
 
 /// Returns how far the charge of a hot pixel can change: all of it if hot pixels are left out, the excess over
 /// saturation if clipping is.
-double changed_charge_of_hot_pixel(const SensorModel& s, const Charge& q, EffectSet kept) {
+double changed_charge_of_hot_pixel(const SensorModel& s, const Charge& q, NoiseSourceSet kept) {
   if (q.hot == 0) return 0;
   const double hot = q.hot * hottest, room = saturation_charge_e(s) - q.signal - q.dark;
   if (!kept.has(Effect::hot_pixels)) return kept.has(Effect::clipping) ? std::clamp(room, 0.0, hot) : hot;
@@ -153,8 +153,8 @@ struct ChannelChange {
   double relative_variance = 0;
 };
 
-ChannelChange channel_change(const SensorModel& s, const Charge& q, EffectSet kept) {
-  const ChannelMoments all = moments_of(s, budget_of(s, q, EffectSet::all()), EffectSet::all());
+ChannelChange channel_change(const SensorModel& s, const Charge& q, NoiseSourceSet kept) {
+  const ChannelMoments all = moments_of(s, budget_of(s, q, NoiseSourceSet::all()), NoiseSourceSet::all());
   const ChannelMoments left = moments_of(s, budget_of(s, q, kept), kept);
   const double k = s.system_gain_dn_per_e;
   const double passed = std::max(all.unclipped, left.unclipped);
@@ -217,12 +217,12 @@ double farthest(const SensorModel& s, const Developing& developing, const Vector
 }
 
 PredictedChange change_at(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                          const Vector3& signal_e, EffectSet kept) {
+                          const Vector3& signal_e, NoiseSourceSet kept) {
   PredictedChange out;
   Vector3 mean{}, shift{}, scatter{};
   for (int c = 0; c < 3; ++c) {
     const Charge charge = charge_of(sensor, exposure, c, signal_e[c]);
-    mean[c] = moments_of(sensor, budget_of(sensor, charge, EffectSet::all()), EffectSet::all()).dn.mean;
+    mean[c] = moments_of(sensor, budget_of(sensor, charge, NoiseSourceSet::all()), NoiseSourceSet::all()).dn.mean;
     const ChannelChange change = channel_change(sensor, charge, kept);
     shift[c] = change.shift_dn;
     scatter[c] = change.scatter_dn;
@@ -249,7 +249,7 @@ Developing developing_of(const SensorModel& sensor, const Exposure& exposure, co
   }
   level = std::min(level, saturation_charge_e(sensor));
   for (int c = 0; c < 3; ++c) {
-    const Budget black = budget_of(sensor, charge_of(sensor, exposure, c, 0), EffectSet::all());
+    const Budget black = budget_of(sensor, charge_of(sensor, exposure, c, 0), NoiseSourceSet::all());
     const double variance_e2 = black.collected_variance + black.pixel_variance + black.line_variance +
                                1 / (12 * square(sensor.system_gain_dn_per_e));
     level = std::max(level, std::sqrt(variance_e2) / (black_noise_of_white * neutral[c]));
@@ -258,13 +258,13 @@ Developing developing_of(const SensorModel& sensor, const Exposure& exposure, co
 }
 
 PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                               const BlockLevel& block, EffectSet kept) {
+                               const BlockLevel& block, NoiseSourceSet kept) {
   PredictedChange out = larger(change_at(sensor, exposure, developing, block.signal_e, kept),
                                change_at(sensor, exposure, developing, block.darkest_e, kept));
   if (kept.has(Effect::clipping)) return out;
   // The mean of a block does not show the loss of its brightest pixel: a block as bright as that is predicted too.
   const PredictedChange peak = change_at(sensor, exposure, developing, {block.peak_e, block.peak_e, block.peak_e},
-                                         EffectSet::all().without(Effect::clipping));
+                                         NoiseSourceSet::all().without(Effect::clipping));
   return larger(out, peak);
 }
 

@@ -1,4 +1,4 @@
-#include "isp/bench/pace.h"
+#include "isp/bench/speed_probe.h"
 
 #include "isp/bench/timing_frame.h"
 #include "isp/metrics/statistics.h"
@@ -6,13 +6,13 @@
 
 namespace lowlux::isp {
 
-Pace::Pace() : frame_(timing_frame({1024, 768}, {20, 20})) {
+SpeedProbe::SpeedProbe() : frame_(timing_frame({1024, 768}, {20, 20})) {
   options_.denoise.mode = DenoiseChoice::Mode::level;
   options_.denoise.level = denoise::Level::standard;
   options_.effects.emplace();
 }
 
-Result<double> Pace::seconds(Executor& executor) {
+Result<double> SpeedProbe::seconds(Executor& executor) {
   const Result<Developed> developed = develop(frame_, options_, executor);
   if (!developed) return tl::make_unexpected(developed.error());
   double sum = 0;
@@ -21,9 +21,9 @@ Result<double> Pace::seconds(Executor& executor) {
   return sum;
 }
 
-double Pace::usual_s() const { return median(taken_s_); }
+double SpeedProbe::usual_s() const { return median(taken_s_); }
 
-Result<double> pace_now(Pace& pace, Executor& executor) {
+Result<double> pace_now(SpeedProbe& pace, Executor& executor) {
   std::vector<double> taken_s;
   for (int run = 0; run < 8; ++run) {
     Result<double> seconds = pace.seconds(executor);

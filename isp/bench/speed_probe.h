@@ -11,9 +11,9 @@ namespace lowlux::isp {
 
 /// Measures the current speed of the machine, which varies with other load and with temperature. A fixed workload,
 /// developing a frame of 0.8 MP with denoise::Level::standard, is the unit of times that are to be compared.
-class Pace {
+class SpeedProbe {
  public:
-  Pace();
+  SpeedProbe();
 
   /// Returns the time of one run. Errors: those of develop().
   Result<double> seconds(Executor& executor);
@@ -27,6 +27,6 @@ class Pace {
 };
 
 /// Returns the median of seven runs, after one that does not count.
-Result<double> pace_now(Pace& pace, Executor& executor);
+Result<double> pace_now(SpeedProbe& pace, Executor& executor);
 
 }  // namespace lowlux::isp

@@ -1,4 +1,4 @@
-#include "isp/model/sensor/effect_plan.h"
+#include "isp/model/sensor/noise_source_plan.h"
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@
 namespace lowlux::isp {
 namespace {
 
-using Reason = EffectDecision::Reason;
+using Reason = NoiseSourceDecision::Reason;
 constexpr double inf = std::numeric_limits<double>::infinity();
 
 SensorModel rich_sensor() {
@@ -48,24 +48,26 @@ struct Case {
   Developing developing() const {
     return developing_of(sensor, exposure, *rgb_to_xyz(primaries_rec709), {1, 1, 1}, blocks);
   }
-  EffectPlan plan(const Tolerance& tolerance) const {
-    return plan_effects(sensor, exposure, developing(), blocks, tolerance);
+  NoiseSourcePlan plan(const Tolerance& tolerance) const {
+    return plan_noise_sources(sensor, exposure, developing(), blocks, tolerance);
   }
-  EffectPlan fixed(EffectSet wanted) const { return fixed_effects(sensor, exposure, developing(), blocks, wanted); }
+  NoiseSourcePlan fixed(NoiseSourceSet wanted) const {
+    return fixed_effects(sensor, exposure, developing(), blocks, wanted);
+  }
 };
 
-TEST(EffectSet, HoldsWhatIsPutInAndNothingElse) {
-  constexpr EffectSet none;
-  constexpr EffectSet two{Effect::prnu, Effect::photon_noise};
+TEST(NoiseSourceSet, HoldsWhatIsPutInAndNothingElse) {
+  constexpr NoiseSourceSet none;
+  constexpr NoiseSourceSet two{Effect::prnu, Effect::photon_noise};
   for (int i = 0; i < effect_count; ++i) {
     const auto effect = static_cast<Effect>(i);
     EXPECT_FALSE(none.has(effect));
-    EXPECT_TRUE(EffectSet::all().has(effect));
+    EXPECT_TRUE(NoiseSourceSet::all().has(effect));
     EXPECT_EQ(two.has(effect), effect == Effect::prnu || effect == Effect::photon_noise);
     EXPECT_EQ(none.with(effect).without(effect), none);
     EXPECT_EQ(two.with(effect).with(effect), two.with(effect));
-    EXPECT_FALSE(EffectSet::all().without(effect).has(effect));
-    EXPECT_EQ(EffectSet::all().without(effect).with(effect), EffectSet::all());
+    EXPECT_FALSE(NoiseSourceSet::all().without(effect).has(effect));
+    EXPECT_EQ(NoiseSourceSet::all().without(effect).with(effect), NoiseSourceSet::all());
   }
   EXPECT_EQ(two.without(Effect::prnu).without(Effect::photon_noise), none);
 }
@@ -78,39 +80,39 @@ TEST(EffectNames, AreAsManyAsEffectsAllDifferent) {
   EXPECT_EQ(names[static_cast<int>(Effect::column_noise)], "column-noise");
 }
 
-TEST(EffectPlan, ATinyToleranceKeepsEveryEffectThatIsThere) {
+TEST(NoiseSourcePlan, ATinyToleranceKeepsEveryEffectThatIsThere) {
   for (const double level : {0.0, 3.0, 1000.0, 1e6}) {
     Case c;
     c.blocks = {grey(level)};
-    const EffectPlan plan = c.plan({1e-12, 1e-12});
-    for (const EffectDecision& d : plan.regions[0].decisions) {
+    const NoiseSourcePlan plan = c.plan({1e-12, 1e-12});
+    for (const NoiseSourceDecision& d : plan.regions[0].decisions) {
       // What is nothing to 12 digits may go: clipping far from both ends, all others where every pixel is full.
       if (d.alone.delta_e < 1e-12 && d.alone.relative_variance < 1e-12) continue;
       EXPECT_TRUE(d.kept) << level << " " << effect_names()[static_cast<int>(d.effect)];
       EXPECT_EQ(d.reason, Reason::needed);
     }
   }
-  const EffectPlan plan = Case().plan({1e-12, 1e-12});
-  EXPECT_EQ(plan.regions[0].kept.with(Effect::clipping), EffectSet::all());
+  const NoiseSourcePlan plan = Case().plan({1e-12, 1e-12});
+  EXPECT_EQ(plan.regions[0].kept.with(Effect::clipping), NoiseSourceSet::all());
 }
 
-TEST(EffectPlan, AHugeToleranceLeavesEveryEffectOut) {
+TEST(NoiseSourcePlan, AHugeToleranceLeavesEveryEffectOut) {
   for (const double tolerance : {1e9, inf}) {
-    const EffectPlan plan = Case().plan({tolerance, tolerance});
-    EXPECT_EQ(plan.regions[0].kept, EffectSet());
-    for (const EffectDecision& d : plan.regions[0].decisions) EXPECT_EQ(d.reason, Reason::negligible);
+    const NoiseSourcePlan plan = Case().plan({tolerance, tolerance});
+    EXPECT_EQ(plan.regions[0].kept, NoiseSourceSet());
+    for (const NoiseSourceDecision& d : plan.regions[0].decisions) EXPECT_EQ(d.reason, Reason::negligible);
   }
 }
 
-TEST(EffectPlan, EffectsTheSensorHasNotAreAbsent) {
+TEST(NoiseSourcePlan, EffectsTheSensorHasNotAreAbsent) {
   Case c;
   c.sensor.prnu = c.sensor.read_noise_e = c.sensor.row_noise_e = c.sensor.column_noise_e = 0;
   c.sensor.dark_current_e_per_s = {};
   c.sensor.hot_pixel_fraction = 0;
-  const EffectPlan plan = c.plan({1e-12, 1e-12});
+  const NoiseSourcePlan plan = c.plan({1e-12, 1e-12});
   for (const Effect effect : {Effect::prnu, Effect::read_noise, Effect::row_noise, Effect::column_noise,
                               Effect::dark_current, Effect::dsnu, Effect::hot_pixels}) {
-    const EffectDecision& d = plan.regions[0].decisions[static_cast<std::size_t>(effect)];
+    const NoiseSourceDecision& d = plan.regions[0].decisions[static_cast<std::size_t>(effect)];
     EXPECT_EQ(d.effect, effect);
     EXPECT_EQ(d.reason, Reason::absent) << effect_names()[static_cast<int>(effect)];
     EXPECT_FALSE(d.kept);
@@ -124,11 +126,11 @@ TEST(EffectPlan, EffectsTheSensorHasNotAreAbsent) {
   EXPECT_EQ(decisions[static_cast<std::size_t>(Effect::hot_pixels)].reason, Reason::absent);
 }
 
-TEST(EffectPlan, AskedForEffectsAreKeptAndAllOthersLeftOut) {
-  const EffectSet wanted{Effect::photon_noise, Effect::clipping, Effect::row_noise};
+TEST(NoiseSourcePlan, AskedForEffectsAreKeptAndAllOthersLeftOut) {
+  const NoiseSourceSet wanted{Effect::photon_noise, Effect::clipping, Effect::row_noise};
   const RegionPlan region = Case().fixed(wanted).regions[0];
   EXPECT_EQ(region.kept, wanted);
-  for (const EffectDecision& d : region.decisions) {
+  for (const NoiseSourceDecision& d : region.decisions) {
     EXPECT_EQ(d.reason, Reason::asked_for);
     EXPECT_EQ(d.kept, wanted.has(d.effect));
   }
@@ -136,26 +138,26 @@ TEST(EffectPlan, AskedForEffectsAreKeptAndAllOthersLeftOut) {
   Case without;
   without.sensor.row_noise_e = 0;
   EXPECT_FALSE(without.fixed(wanted).regions[0].kept.has(Effect::row_noise)) << "nobody can keep what is not there";
-  EXPECT_EQ(Case().fixed({}).regions[0].kept, EffectSet());
+  EXPECT_EQ(Case().fixed({}).regions[0].kept, NoiseSourceSet());
 }
 
-TEST(EffectPlan, DarkNonUniformityIsNothingWithoutDarkCurrent) {
-  EXPECT_FALSE(Case().fixed(EffectSet::all().without(Effect::dark_current)).regions[0].kept.has(Effect::dsnu));
-  EXPECT_TRUE(Case().fixed(EffectSet::all()).regions[0].kept.has(Effect::dsnu));
+TEST(NoiseSourcePlan, DarkNonUniformityIsNothingWithoutDarkCurrent) {
+  EXPECT_FALSE(Case().fixed(NoiseSourceSet::all().without(Effect::dark_current)).regions[0].kept.has(Effect::dsnu));
+  EXPECT_TRUE(Case().fixed(NoiseSourceSet::all()).regions[0].kept.has(Effect::dsnu));
   for (const double level : {0.0, 1.0, 300.0, 20000.0}) {
     for (const double tolerance : test::ratios(1e-4, 1e4, 3)) {
       Case c;
       c.blocks = {grey(level)};
-      const EffectSet kept = c.plan({tolerance, tolerance}).regions[0].kept;
+      const NoiseSourceSet kept = c.plan({tolerance, tolerance}).regions[0].kept;
       EXPECT_TRUE(!kept.has(Effect::dsnu) || kept.has(Effect::dark_current)) << level << " " << tolerance;
     }
   }
 }
 
-TEST(EffectPlan, BlocksOfADecadeMakeARegion) {
+TEST(NoiseSourcePlan, BlocksOfADecadeMakeARegion) {
   Case c;
   c.blocks = {grey(55), grey(0.5), grey(5), grey(50), {{2, 90, 1}, {2, 90, 1}, 95}, grey(0), grey(5.5)};
-  const EffectPlan plan = c.plan({});
+  const NoiseSourcePlan plan = c.plan({});
   ASSERT_EQ(plan.regions.size(), 4u);
   EXPECT_EQ(plan.region_of_block, (std::vector<std::uint8_t>{3, 1, 2, 3, 3, 0, 2}));
   const int blocks[] = {1, 1, 2, 3};
@@ -167,7 +169,7 @@ TEST(EffectPlan, BlocksOfADecadeMakeARegion) {
   }
 }
 
-TEST(EffectPlan, WhatIsLeftOutTogetherStaysBelowTheTolerance) {
+TEST(NoiseSourcePlan, WhatIsLeftOutTogetherStaysBelowTheTolerance) {
   for (const double level : {0.0, 0.3, 10.0, 1000.0, 14000.0, 29000.0, 1e5}) {
     for (const double time_s : {1e-3, 1.0, 60.0}) {
       for (const Tolerance& tolerance : {Tolerance{0.01, 0.001}, Tolerance{}, {3, 0.5}}) {
@@ -180,21 +182,21 @@ TEST(EffectPlan, WhatIsLeftOutTogetherStaysBelowTheTolerance) {
         const PredictedChange again = predict_change(c.sensor, c.exposure, c.developing(), c.blocks[0], region.kept);
         EXPECT_EQ(again.delta_e, region.left_out_together.delta_e);
         EXPECT_EQ(again.relative_variance, region.left_out_together.relative_variance);
-        for (const EffectDecision& d : region.decisions) EXPECT_EQ(d.kept, region.kept.has(d.effect));
+        for (const NoiseSourceDecision& d : region.decisions) EXPECT_EQ(d.kept, region.kept.has(d.effect));
       }
     }
   }
 }
 
-TEST(EffectPlan, ALargerToleranceKeepsASubset) {
+TEST(NoiseSourcePlan, ALargerToleranceKeepsASubset) {
   for (const double level : {0.0, 0.3, 10.0, 1000.0, 14000.0, 29000.0}) {
     for (const double time_s : {1e-3, 1.0, 60.0}) {
       Case c;
       c.blocks = {grey(level)};
       c.exposure.time_s = time_s;
-      EffectSet before = EffectSet::all();
+      NoiseSourceSet before = NoiseSourceSet::all();
       for (const double scale : test::ratios(1e-3, 1e4, 1.5)) {
-        const EffectSet kept = c.plan({0.5 * scale, 0.05 * scale}).regions[0].kept;
+        const NoiseSourceSet kept = c.plan({0.5 * scale, 0.05 * scale}).regions[0].kept;
         for (int i = 0; i < effect_count; ++i) {
           const auto effect = static_cast<Effect>(i);
           EXPECT_TRUE(before.has(effect) || !kept.has(effect))
@@ -209,7 +211,8 @@ TEST(EffectPlan, ALargerToleranceKeepsASubset) {
 TEST(PredictChange, IsNothingWhereNothingIsLeftOut) {
   for (const double level : {0.0, 1.0, 1000.0, 1e6}) {
     const Case c;
-    const PredictedChange none = predict_change(c.sensor, c.exposure, c.developing(), grey(level), EffectSet::all());
+    const PredictedChange none =
+        predict_change(c.sensor, c.exposure, c.developing(), grey(level), NoiseSourceSet::all());
     EXPECT_EQ(none.delta_e, 0) << level;
     EXPECT_EQ(none.relative_variance, 0) << level;
   }
@@ -226,7 +229,7 @@ TEST(PredictChange, IsAtLeastTheShareOfTheVarianceThatIsLeftOut) {
                 {Effect::dsnu, 5.76},         {Effect::row_noise, 0.64},  {Effect::column_noise, 0.36}};
   for (const auto& share : shares) {
     const PredictedChange change =
-        predict_change(c.sensor, c.exposure, c.developing(), c.blocks[0], EffectSet::all().without(share.effect));
+        predict_change(c.sensor, c.exposure, c.developing(), c.blocks[0], NoiseSourceSet::all().without(share.effect));
     EXPECT_GE(change.relative_variance, share.variance_e2 / whole);
     EXPECT_GT(change.delta_e, 0);
   }
