@@ -211,7 +211,7 @@ TEST(HardCaseExtreme, TemperaturesOfMinus40To85) {
   row.none(levels, "dark charge of 0.1 to 200 e-: see the invariances")
       .on_each_set(5, frames)
       .on(Path::file, 5, frames);
-  row.none(Path::live, "streams are told their black, dark charge in it");
+  row.none(Path::live, "streams are given their black level, dark charge included");
 }
 
 }  // namespace
