@@ -12,6 +12,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <ImfChannelList.h>
@@ -298,12 +299,43 @@ class ByteReader {
   std::span<const std::byte> left_;
 };
 
-/// Returns whether the sizes inside an attribute of `type` agree with its own.
+/// An attribute type whose values all have one size. OpenEXR reads so many bytes of it, whatever size the file states,
+/// and takes what follows for the next attribute.
+struct FixedSize {
+  std::string_view type;
+  std::size_t bytes;
+};
+constexpr std::array fixed_sizes{
+    FixedSize{"box2f", 16},         FixedSize{"box2i", 16},    FixedSize{"chromaticities", 32},
+    FixedSize{"compression", 1},    FixedSize{"double", 8},    FixedSize{"envmap", 1},
+    FixedSize{"deepImageState", 1}, FixedSize{"float", 4},     FixedSize{"int", 4},
+    FixedSize{"keycode", 28},       FixedSize{"lineOrder", 1}, FixedSize{"m33d", 72},
+    FixedSize{"m33f", 36},          FixedSize{"m44d", 128},    FixedSize{"m44f", 64},
+    FixedSize{"rational", 8},       FixedSize{"tiledesc", 9},  FixedSize{"timecode", 8},
+    FixedSize{"v2d", 16},           FixedSize{"v2f", 8},       FixedSize{"v2i", 8},
+    FixedSize{"v3d", 24},           FixedSize{"v3f", 12},      FixedSize{"v3i", 12}};
+
+/// Returns whether a list of channels ends where its size says: each has a name, its type, a flag with three bytes that
+/// are reserved, and two sampling rates; an empty name ends the list.
+bool is_channel_list(ByteReader reader) {
+  constexpr std::size_t bytes_after_name = 16;
+  while (const auto name = reader.name()) {
+    if (name->empty()) return reader.at_end();
+    if (!reader.take(bytes_after_name)) return false;
+  }
+  return false;
+}
+
+/// Returns whether OpenEXR reads as many bytes of an attribute of `type` as its size states.
 bool is_consistent(const std::string& type, std::span<const std::byte> value) {
+  const auto* const fixed = std::ranges::find(fixed_sizes, type, &FixedSize::type);
+  if (fixed != fixed_sizes.end()) return value.size() == fixed->bytes;
   ByteReader reader(value);
+  if (type == "chlist") return is_channel_list(reader);
+  if (type == "floatvector") return value.size() % sizeof(float) == 0;
   if (type == "preview") {
     const auto width = reader.u32(), height = reader.u32();
-    return width && height && std::uint64_t{*width} * *height == (value.size() - 8) / 4;
+    return width && height && value.size() % 4 == 0 && std::uint64_t{*width} * *height == (value.size() - 8) / 4;
   }
   if (type == "stringvector") {
     while (!reader.at_end()) {

@@ -171,6 +171,35 @@ TEST(ExrHeader, AttributesMustEndWithinTheFile) {
   EXPECT_FALSE(check_exr_header(exr_header(attribute("stringvector", twelve, many + "texttext") + end)));
 }
 
+// OpenEXR reads as many bytes of a value as its type has, and of a channel list up to its end: where the stated size is
+// another, what follows would be read as attributes that were never checked.
+TEST(ExrHeader, SizesMustBeThoseThatOpenExrReads) {
+  const auto header = [](const std::string& type, const std::string& value) {
+    const std::string size = {static_cast<char>(value.size()), 0, 0, 0};
+    return exr_header("a" + std::string(1, '\0') + type + std::string(1, '\0') + size + value + std::string(1, '\0'));
+  };
+  const auto zeros = [](std::size_t count) { return std::string(count, '\0'); };
+  const std::string channel = "R" + zeros(1) + zeros(16);
+  for (const auto& [type, bytes] : {std::pair{"float", 4},
+                                    {"v2f", 8},
+                                    {"box2i", 16},
+                                    {"chromaticities", 32},
+                                    {"compression", 1},
+                                    {"tiledesc", 9},
+                                    {"keycode", 28},
+                                    {"m33f", 36}}) {
+    EXPECT_TRUE(check_exr_header(header(type, zeros(static_cast<std::size_t>(bytes))))) << type;
+    EXPECT_FALSE(check_exr_header(header(type, zeros(static_cast<std::size_t>(bytes) + 1)))) << type;
+    EXPECT_FALSE(check_exr_header(header(type, zeros(static_cast<std::size_t>(bytes) - 1)))) << type;
+  }
+  EXPECT_TRUE(check_exr_header(header("chlist", channel + channel + zeros(1))));
+  EXPECT_FALSE(check_exr_header(header("chlist", channel + channel)));
+  EXPECT_FALSE(check_exr_header(header("chlist", channel + zeros(1) + channel)));
+  EXPECT_FALSE(check_exr_header(header("chlist", zeros(0))));
+  EXPECT_FALSE(check_exr_header(header("floatvector", zeros(7))));
+  EXPECT_TRUE(check_exr_header(header("floatvector", zeros(8))));
+}
+
 TEST(ExrHeader, DeepFilesAndThoseOfSeveralPartsAreRefusedByName) {
   for (const char flags : {'\x08', '\x10'}) {
     const auto checked = check_exr_header(exr_header(std::string(1, '\0'), flags));
