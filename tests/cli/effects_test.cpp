@@ -113,7 +113,7 @@ TEST_F(EffectsCommand, RefuseWhatCannotBe) {
   refused({"--budget-ms", "0.001"}, 1, "cheapest plan");
   refused({"--budget-ms", "0"}, 2, "--budget-ms");
   refused({"--budget-ms", "nan"}, 2, "--budget-ms");
-  refused({"--budget-ms", "5", "--budget-mpps", "5"}, 2, "give one");
+  refused({"--budget-ms", "5", "--budget-mpps", "5"}, 2, "mutually exclusive");
   refused({"--budget-ms", "5", "--jobs", "2"}, 2, "--jobs");
   refused({"--effects", "all", "--tolerance", "1"}, 2, "--tolerance");
   refused({"--effects", "all", "--budget-ms", "5"}, 2, "budget");

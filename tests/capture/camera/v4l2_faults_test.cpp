@@ -136,7 +136,7 @@ TEST(V4l2Start, EachRefusalHasItsReasonAndTakesNothing) {
                         {VIDIOC_REQBUFS, {ENOMEM}, ErrorCode::too_large, "fewer buffers"},
                         {VIDIOC_REQBUFS, {EINVAL}, ErrorCode::unreadable, "gives no buffers"},
                         {VIDIOC_QUERYBUF, {EINVAL, 9, 2}, ErrorCode::unreadable, "does not describe its buffer"},
-                        {VIDIOC_G_FMT, {EIO}, ErrorCode::unreadable, "does not tell its format"},
+                        {VIDIOC_G_FMT, {EIO}, ErrorCode::unreadable, "does not state its format"},
                         {VIDIOC_QBUF, {EIO, 9, 3}, ErrorCode::unreadable, "takes no buffer"},
                         {VIDIOC_STREAMON, {EPIPE}, ErrorCode::unreadable, "set the sensor's format with media-ctl"},
                         {VIDIOC_STREAMON, {ENOSPC}, ErrorCode::unreadable, "bandwidth"},
