@@ -7,12 +7,12 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;
+constexpr double radians_per_degree = std::numbers::pi / 180.0;
 
 /// Returns the hue angle in [0, 360) degrees; 0 for a grey.
 double hue_degrees(double a, double b) {
   if (a == 0 && b == 0) return 0;
-  const double h = std::atan2(b, a) / degree;
+  const double h = std::atan2(b, a) / radians_per_degree;
   return h < 0 ? h + 360 : h;
 }
 
@@ -62,18 +62,20 @@ double ciede2000(const Lab& first, const Lab& second) {
 
   const double delta_l = second.l - first.l;
   const double delta_c = c2 - c1;
-  const double delta_h = 2 * std::sqrt(c1 * c2) * std::sin(0.5 * hue.difference * degree);
+  const double delta_h = 2 * std::sqrt(c1 * c2) * std::sin(0.5 * hue.difference * radians_per_degree);
 
   const double l_offset = 0.5 * (first.l + second.l) - 50;
   const double mean_c_prime = 0.5 * (c1 + c2);
-  const double t = 1 - 0.17 * std::cos((hue.mean - 30) * degree) + 0.24 * std::cos(2 * hue.mean * degree) +
-                   0.32 * std::cos((3 * hue.mean + 6) * degree) - 0.20 * std::cos((4 * hue.mean - 63) * degree);
+  const double t = 1 - 0.17 * std::cos((hue.mean - 30) * radians_per_degree) +
+                   0.24 * std::cos(2 * hue.mean * radians_per_degree) +
+                   0.32 * std::cos((3 * hue.mean + 6) * radians_per_degree) -
+                   0.20 * std::cos((4 * hue.mean - 63) * radians_per_degree);
   const double s_l = 1 + 0.015 * l_offset * l_offset / std::sqrt(20 + l_offset * l_offset);
   const double s_c = 1 + 0.045 * mean_c_prime;
   const double s_h = 1 + 0.015 * mean_c_prime * t;
   const double blue_angle = (hue.mean - 275) / 25;
   const double delta_theta = 30 * std::exp(-blue_angle * blue_angle);
-  const double r_t = -2 * std::sqrt(chroma_ratio(mean_c_prime)) * std::sin(2 * delta_theta * degree);
+  const double r_t = -2 * std::sqrt(chroma_ratio(mean_c_prime)) * std::sin(2 * delta_theta * radians_per_degree);
 
   const double l = delta_l / s_l;
   const double c = delta_c / s_c;
