@@ -114,7 +114,7 @@ void cut_by_level(const NoiseReduction& how, const Rect& core, int side, std::ve
   }
 }
 
-denoise::Level max_of(const NoiseReduction& how) {
+denoise::Level max_level_of(const NoiseReduction& how) {
   if (!how.regions) return *how.level;
   denoise::Level most = denoise::Level::draft;
   for (const auto& level : how.regions->level) most = std::max(most, level.value_or(denoise::Level::draft));

@@ -22,7 +22,7 @@ struct LevelPart {
 void cut_by_level(const NoiseReduction& how, const Rect& core, int side, std::vector<LevelPart>& parts);
 
 /// Returns the highest level of any region of the frame. Precondition: how.has_level().
-denoise::Level max_of(const NoiseReduction& how);
+denoise::Level max_level_of(const NoiseReduction& how);
 
 /// Subtracts dark charge from a tile whose noise stays.
 /// @param raw_e  its corner at an even column and row of the active area

@@ -146,14 +146,14 @@ std::size_t NoiseReducer::bytes(int width, int height, const NoiseReduction& how
   std::vector<LevelPart> parts;
   cut_by_level(how, frame.core, TileLimits{}.side_px, parts);
   const PartSize most = largest(parts, frame);
-  const std::size_t denoiser = denoise::Denoiser::bytes(most.width, most.height, threads, max_of(how));
+  const std::size_t denoiser = denoise::Denoiser::bytes(most.width, most.height, threads, max_level_of(how));
   if (parts.size() == 1) return denoiser;
   return denoiser + sizeof(float) * static_cast<std::size_t>(most.width) * static_cast<std::size_t>(most.height) +
          (maps ? maps_bytes(most.width, most.height) : 0);
 }
 
 void NoiseReducer::reserve_pieces(int width, int height, const NoiseReduction& how) {
-  if (how.has_level()) reserve_level(width, height, max_of(how));
+  if (how.has_level()) reserve_level(width, height, max_level_of(how));
 }
 
 void NoiseReducer::reduce_part(const LevelPart& part, const Piece& piece, const NoiseReduction& how,
@@ -191,7 +191,7 @@ void NoiseReducer::reduce_by_level(const Piece& piece, const NoiseReduction& how
     return denoiser_->run({raw_e, piece.phase}, how.noise, options, signal_e, maps, executor_);
   }
   if (const auto [width, height] = largest(parts_, piece); width > 0) {
-    reserve_level(width, height, max_of(how));
+    reserve_level(width, height, max_level_of(how));
     if (width > part_e_.width() || height > part_e_.height()) {
       part_e_ = Plane<float>(std::max(width, part_e_.width()), std::max(height, part_e_.height()));
     }

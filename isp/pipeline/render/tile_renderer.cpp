@@ -85,7 +85,7 @@ std::size_t TileRenderer::bytes(const RawDn& raw, const DevelopPlan& plan, const
   const NoiseReduction& how = plan.noise_reduction;
   std::size_t noise = 0;
   if (how.reduces()) {
-    noise = denoise::Denoiser::bytes(sizes.width, sizes.height, threads, max_of(how)) +
+    noise = denoise::Denoiser::bytes(sizes.width, sizes.height, threads, max_level_of(how)) +
             (how.regions ? 2 : 1) * sizeof(float) * piece;
   }
   return sizeof(float) * piece + noise +
