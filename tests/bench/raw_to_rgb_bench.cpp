@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "isp/base/executor.h"
 #include "isp/base/image.h"
 #include "isp/metrics/statistics.h"
@@ -171,8 +173,8 @@ std::vector<Task> tasks_of(Stage& s) {
   tasks.push_back({"memcpy 60 MB", 1, [&s] { std::memcpy(s.copy_to.data(), s.copy_from.data(), memcpy_bytes); }});
   for (const int threads : {1, 2}) {
     Executor& executor = threads == 1 ? static_cast<Executor&>(s.one) : s.two;
-    const auto add = [&](const char* name, std::function<void()> run) {
-      tasks.push_back({name, threads, std::move(run)});
+    const auto add = [&](std::string name, std::function<void()> run) {
+      tasks.push_back({std::move(name), threads, std::move(run)});
     };
     const auto to8 = [&s, &executor](const isp::RgbInput& in, bool move) {
       return [&s, &executor, in, move] { s.kernel.rgb8(in, transform(move), s.tone, s.codes8.codes.view(), executor); };
@@ -180,6 +182,12 @@ std::vector<Task> tasks_of(Stage& s) {
     add("u16 to rgb8, gamut move, natural", to8(Stage::dn(s.natural), true));
     add("u16 to rgb8, gamut move, saturated", to8(Stage::dn(s.saturated), true));
     add("u16 to rgb8, no gamut move", to8(Stage::dn(s.natural), false));
+    for (const isp::DemosaicMethod method : isp::all_demosaic_methods) {
+      if (method == isp::DemosaicMethod::malvar) continue;
+      isp::DnMosaic in = Stage::dn(s.natural);
+      in.demosaic = {.method = method, .noise_std = 0.005f};
+      add(fmt::format("the same, {}", name_of(method)), to8(in, false));
+    }
     add("float to rgb8, gamut move, natural", to8(s.floats(), true));
     add("planes to rgb8, gamut move", to8(isp::CameraPlanes{std::as_const(s.planes).view()}, true));
     add("u16 to rgb16, gamut move, natural", [&s, &executor] {

@@ -8,6 +8,7 @@
 
 #include "isp/raw/kernel/raw_to_rgb_bands.h"
 #include "isp/raw/kernel/raw_to_rgb_rows.h"
+#include "isp/raw/kernel/residual_band.h"
 
 namespace lowlux::isp {
 namespace {
@@ -17,13 +18,15 @@ using rows::LookRow;
 using rows::MosaicRows;
 using rows::PlaneRows;
 
+float clip_of(const RgbTransform& transform) { return std::isnan(transform.clip) ? 0.0f : transform.clip; }
+
 Colour colour_in_order(const RgbTransform& transform, const std::array<int, 3>& channel) {
   Colour colour{};
   for (int c = 0; c < 3; ++c) {
     for (int j = 0; j < 3; ++j) colour.column[c][j] = usable(transform.matrix[3 * j + channel[c]]);
     colour.luminance[c] = usable(transform.luminance[c]);
   }
-  colour.clip = std::isnan(transform.clip) ? 0.0f : transform.clip;
+  colour.clip = clip_of(transform);
   colour.move_into_gamut = transform.move_into_gamut;
   colour.look = nullptr;
   return colour;
@@ -111,18 +114,48 @@ class LookRows {
 };
 
 template <class Mosaic, class SinkOfRow>
-void convert_band(const Mosaic& in, const RgbTransform& transform, RowBand band, const Ring& ring, LookRows look,
+void convert_by_residual(const Mosaic& in, const RgbTransform& transform, RowBand band, const Scratch& memory,
+                         LookRows look, const SinkOfRow& sink_of_row) {
+  const ScratchUse use(memory);
+  ResidualBand<Mosaic> demosaiced(in, in.demosaic, clip_of(transform), band, static_cast<float*>(memory.data));
+  Colour colour = colour_in_order(transform, {0, 1, 2});
+  for (int y = band.first; y < band.last;) {
+    for (const int end = demosaiced.advance(); y < end; ++y) {
+      colour.look = look.at(y);
+      rows::convert_row(demosaiced.row(y), colour, width_of(in), sink_of_row(y));
+      sink_of_row.finish(y);
+    }
+  }
+}
+
+template <class Mosaic, class SinkOfRow>
+void convert_band(const Mosaic& in, const RgbTransform& transform, RowBand band, const BandScratch& own, LookRows look,
                   const SinkOfRow& sink_of_row) {
+  if (in.demosaic.method >= DemosaicMethod::residual) {
+    return convert_by_residual(in, transform, band, own.demosaic, look, sink_of_row);
+  }
+  const bool encoded = in.demosaic.method == DemosaicMethod::encoded_malvar;
+  const rows::Encoding encoding = rows::encoding_with(in.demosaic.offset);
+  const Ring& ring = encoded ? own.encoded : own.ring;
   const int width = width_of(in), height = height_of(in);
   Colour red_row_colour = colour_in_order(transform, {0, 1, 2});
   Colour blue_row_colour = colour_in_order(transform, {2, 1, 0});
   int next = std::max(0, band.first - 2);  // the first row not yet split
   for (int y = band.first; y < band.last; ++y) {
     for (; next < std::min(height, y + 3); ++next) {
-      split_row(in, next, ring.row(next));
-      mirror_ends(ring.row(next), width);
+      const SplitRow linear = own.ring.row(next);
+      split_row(in, next, linear);
+      mirror_ends(linear, width);
+      if (!encoded) continue;
+      const int pairs = (width + 1) / 2 + 2;  // and one before, mirrored samples included
+      rows::encode_row(linear.even - 1, clip_of(transform), encoding, pairs + 1, ring.row(next).even - 1);
+      rows::encode_row(linear.odd - 1, clip_of(transform), encoding, pairs + 1, ring.row(next).odd - 1);
     }
     MosaicRows around{};
+    around.encoded = encoded;
+    around.encoding = encoding;
+    around.linear_even = own.ring.row(y).even;
+    around.linear_odd = own.ring.row(y).odd;
     for (int k = 0; k < 5; ++k) {
       const SplitRow row = ring.row(mirror(y + k - 2, height));
       around.even[k] = row.even;
@@ -138,8 +171,9 @@ void convert_band(const Mosaic& in, const RgbTransform& transform, RowBand band,
 }
 
 template <class SinkOfRow>
-void convert_band(const CameraPlanes& in, const RgbTransform& transform, RowBand band, const Ring& ring, LookRows look,
-                  const SinkOfRow& sink_of_row) {
+void convert_band(const CameraPlanes& in, const RgbTransform& transform, RowBand band, const BandScratch& own,
+                  LookRows look, const SinkOfRow& sink_of_row) {
+  const Ring& ring = own.ring;
   Colour colour = colour_in_order(transform, {0, 1, 2});
   PlaneRows planes{};
   for (int y = band.first; y < band.last; ++y) {
@@ -180,19 +214,23 @@ std::size_t whole_lines(std::size_t bytes) { return (bytes + line_bytes - 1) / l
 struct ThreadBytes {
   std::size_t ring;
   std::size_t look;
-  std::size_t codes;  // a row of codes for a CodeChange or a RowSink
+  std::size_t codes;     // a row of codes for a CodeChange or a RowSink
+  std::size_t demosaic;  // of a ResidualBand
 
   explicit ThreadBytes(int width)
       : ring(run_stride_of(width) * runs_per_thread * sizeof(float)),
         look(whole_lines(look_run_of(width) * LookGrid::parts * sizeof(float))),
-        codes(whole_lines(3 * static_cast<std::size_t>(width) * sizeof(std::uint16_t))) {}
-  std::size_t all() const { return ring + look + codes + 3 * scratch_guard_bytes; }
+        codes(whole_lines(3 * static_cast<std::size_t>(width) * sizeof(std::uint16_t))),
+        demosaic(residual_floats(width) * sizeof(float)) {}
+  std::size_t all() const { return ring + look + codes + demosaic + 4 * scratch_guard_bytes; }
 };
 
-/// Returns the scratch memory of one thread: ring, look, codes.
-std::array<Scratch, 3> scratch_at(std::byte* start, const ThreadBytes& bytes) {
+/// Returns the scratch memory of one thread: ring, look, codes, demosaicing.
+std::array<Scratch, 4> scratch_at(std::byte* start, const ThreadBytes& bytes) {
   std::byte* const look = start + bytes.ring + scratch_guard_bytes;
-  return {{{start, bytes.ring}, {look, bytes.look}, {look + bytes.look + scratch_guard_bytes, bytes.codes}}};
+  std::byte* const codes = look + bytes.look + scratch_guard_bytes;
+  std::byte* const demosaic = codes + bytes.codes + scratch_guard_bytes;
+  return {{{start, bytes.ring}, {look, bytes.look}, {codes, bytes.codes}, {demosaic, bytes.demosaic}}};
 }
 
 /// Returns the first complete cache line of memory that is larger by one line.
@@ -218,11 +256,15 @@ std::size_t RawToRgb::bytes(int max_width, int threads) {
 
 BandScratch RawToRgb::scratch_of(int thread) const {
   const ThreadBytes each(max_width_);
-  const auto [ring, look, codes] = scratch_at(first_line(memory_.get()) + thread * each.all(), each);
+  const auto [ring, look, codes, demosaic] = scratch_at(first_line(memory_.get()) + thread * each.all(), each);
+  const std::size_t stride = run_stride_of(max_width_);
+  float* const linear = static_cast<float*>(ring.data) + rows::padding_before;
   return {thread,
-          {static_cast<float*>(ring.data) + rows::padding_before, run_stride_of(max_width_)},
+          {linear, stride},
+          {linear + 2 * ring_rows * stride, stride},
           static_cast<float*>(look.data),
           static_cast<std::uint16_t*>(codes.data),
+          demosaic,
           {ScratchUse(ring), ScratchUse(look), ScratchUse(codes)}};
 }
 
@@ -236,7 +278,7 @@ void RawToRgb::convert(const RgbInput& in, const RgbTransform& transform, const 
         if (width_of(input) == 0) return;
         run_bands(executor, threads_, height_of(input), [&](RowBand band, int thread) {
           const BandScratch own = scratch_of(thread);
-          convert_band(input, transform, band, own.ring, LookRows(transform.look, own.look, look_run_of(max_width_)),
+          convert_band(input, transform, band, own, LookRows(transform.look, own.look, look_run_of(max_width_)),
                        make_sink(own));
         });
       },

@@ -17,9 +17,9 @@ using rows::RowLevels;
 using rows::SplitRow;
 
 inline constexpr int ring_rows = 8;  // 5 are live; a power of two makes the slot of a row its low bits
-inline constexpr int runs_per_thread = 2 * ring_rows;
-inline constexpr std::size_t line_floats = 16;  // one cache line
-inline constexpr float largest = 1e9f;          // keeps every product of the pass finite
+inline constexpr int runs_per_thread = 2 * 2 * ring_rows;  // of two rings: linear and encoded values
+inline constexpr std::size_t line_floats = 16;             // one cache line
+inline constexpr float largest = 1e9f;                     // keeps every product of the pass finite
 
 inline float usable(float x) { return std::fabs(x) <= largest ? x : 0.0f; }
 
@@ -62,6 +62,16 @@ inline void split_row(const SignedMosaic& in, int y, const SplitRow& out) {
   rows::split_float(in.value.row(y), in.value.width, levels_of_row(in, y), out);
 }
 
+/// Returns the columns x to x + width - 1 of a mosaic. Precondition: x is even.
+inline DnMosaic columns_of(DnMosaic in, int x, int width) {
+  in.dn = in.dn.crop(x, 0, width, in.dn.height);
+  return in;
+}
+inline SignedMosaic columns_of(SignedMosaic in, int x, int width) {
+  in.value = in.value.crop(x, 0, width, in.value.height);
+  return in;
+}
+
 inline int width_of(const DnMosaic& in) { return in.dn.width; }
 inline int width_of(const SignedMosaic& in) { return in.value.width; }
 inline int width_of(const CameraPlanes& in) { return in.rgb[0].width; }
@@ -95,8 +105,10 @@ inline std::size_t run_of(int width) {
 struct BandScratch {
   int thread;
   Ring ring;
+  Ring encoded;
   float* look;
   std::uint16_t* codes;  // 3 for each pixel of a row
+  Scratch demosaic;      // of a ResidualBand; closed
   std::array<ScratchUse, 3> use;
 };
 

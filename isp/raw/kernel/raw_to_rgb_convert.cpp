@@ -210,7 +210,11 @@ HWY_INLINE void convert(const Source& source, const Colour& colour, int width, c
 
 template <class Sink>
 HWY_INLINE void convert_mosaic(const MosaicRows& in, const Colour& colour, int width, const Sink& sink) {
-  if (in.own_is_odd) {
+  if (in.encoded && in.own_is_odd) {
+    convert(EncodedMalvar<true>(in), colour, width, sink);
+  } else if (in.encoded) {
+    convert(EncodedMalvar<false>(in), colour, width, sink);
+  } else if (in.own_is_odd) {
     convert(Malvar<true>(in), colour, width, sink);
   } else {
     convert(Malvar<false>(in), colour, width, sink);

@@ -9,6 +9,7 @@
 
 #include <hwy/highway.h>
 
+#include "isp/raw/kernel/encoding-inl.h"
 #include "isp/raw/kernel/raw_to_rgb_rows.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -76,6 +77,30 @@ struct Malvar {
          hn::MulAdd(constant(0.5f), b_vertical,
                     hn::MulAdd(constant(-0.125f), far_vertical, hn::MulAdd(constant(0.0625f), far_horizontal, base)))}};
     return kOwnOdd ? SitePair{at_green, at_own} : SitePair{at_own, at_green};
+  }
+};
+
+/// Applies the same filters to encoded values and decodes what they interpolate.
+template <bool kOwnOdd>
+struct EncodedMalvar {
+  Malvar<kOwnOdd> filters;
+  EncodingVectors code;
+  const float* linear_even;
+  const float* linear_odd;
+
+  explicit HWY_INLINE EncodedMalvar(const MosaicRows& in)
+      : filters(in), code(in.encoding), linear_even(in.linear_even), linear_odd(in.linear_odd) {}
+
+  HWY_INLINE SitePair at(int i) const {
+    const SitePair u = filters.at(i);
+    const VF even = load(linear_even + i), odd = load(linear_odd + i);
+    constexpr int own = kOwnOdd ? 1 : 0, green = 1 - own;  // the channel measured at even and at odd columns
+    const auto decoded = [this](const Site& site, VF measured, int channel) HWY_ATTR {
+      Site out;
+      for (int c = 0; c < 3; ++c) out.c[c] = c == channel ? measured : code.decode(site.c[c]);
+      return out;
+    };
+    return {decoded(u.even, even, own), decoded(u.odd, odd, green)};
   }
 };
 

@@ -4,6 +4,7 @@
 
 #include "isp/base/look_grid.h"
 #include "isp/base/tone_table.h"
+#include "isp/raw/kernel/residual_rows.h"
 
 /// The row kernels of RawToRgb are dispatched at run time. They take plain types only: their sources are compiled for
 /// several instruction sets, which must not have inline code in common.
@@ -31,11 +32,15 @@ void split_dn(const std::uint16_t* in, int width, const RowLevels& levels, const
 void split_float(const float* in, int width, const RowLevels& levels, const SplitRow& out);
 
 /// Holds the rows y-2 .. y+2 around an output row, with mirrored borders. Each row holds green and one of red and blue:
-/// its own colour, at odd columns if own_is_odd.
+/// its own colour, at odd columns if own_is_odd. Where the rows are encoded, they come with the linear values of row y.
 struct MosaicRows {
   const float* even[5];
   const float* odd[5];
   bool own_is_odd;
+  bool encoded;
+  Encoding encoding;
+  const float* linear_even;
+  const float* linear_odd;
 };
 
 /// Holds three rows of camera RGB.

@@ -7,6 +7,7 @@
 #include "isp/base/cfa.h"
 #include "isp/base/image.h"
 #include "isp/base/plane.h"
+#include "isp/raw/kernel/demosaic.h"
 
 namespace lowlux::isp {
 
@@ -17,11 +18,13 @@ struct SiteLevels {
   PerSite<float> gain{1, 1, 1, 1};
 };
 
-/// Views a Bayer mosaic as read out. The rows are read once, front to back, so they may lie in uncached memory.
+/// Views a Bayer mosaic as read out. The rows are read front to back, and once but for those that bands have in common,
+/// so they may lie in uncached memory.
 struct DnMosaic {
   PlaneView<const std::uint16_t> dn;
   BayerPhase phase = BayerPhase::rggb;
   SiteLevels levels;
+  Demosaic demosaic;
 };
 
 /// Views a signed linear Bayer mosaic, black already subtracted; value = sample * gain[site].
@@ -30,6 +33,7 @@ struct SignedMosaic {
   PlaneView<const float> value;
   BayerPhase phase = BayerPhase::rggb;
   PerSite<float> gain{1, 1, 1, 1};
+  Demosaic demosaic;
 };
 
 /// Views camera RGB that needs no demosaicing; samples as in SignedMosaic. Monochrome data may use one plane for all
