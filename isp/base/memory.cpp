@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <cstring>
 
-#include <sanitizer/asan_interface.h>
 #include <sys/mman.h>
 
 #if defined(LOWLUX_ADDRESS_SANITIZED)
+#include <sanitizer/asan_interface.h>
 #endif
 
 namespace lowlux {

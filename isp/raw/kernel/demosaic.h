@@ -23,6 +23,9 @@ constexpr std::string_view name_of(DemosaicMethod method) {
   return names[static_cast<std::size_t>(method)];
 }
 
+/// Returns the number of rows and columns on which an interpolated pixel depends, to each side; even.
+constexpr int reach_px(DemosaicMethod method) { return method < DemosaicMethod::residual ? 2 : 12; }
+
 /// Describes how a mosaic of values x, white-balanced, 1 at the saturation of its first channel to saturate, is
 /// interpolated. All methods but `malvar` work on u = cbrt(x + offset), for x < 0 continued by its tangent, of values
 /// limited to the clip of the RgbTransform. Measured samples keep their linear value in every method.

@@ -9,7 +9,7 @@
 
 #include <hwy/highway.h>
 
-#include "isp/raw/kernel/residual_rows.h"
+#include "isp/raw/kernel/encoding.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::isp::rows::HWY_NAMESPACE {
@@ -21,7 +21,7 @@ class EncodingVectors {
 
  public:
   explicit HWY_INLINE EncodingVectors(const Encoding& from)
-      : offset_(set(from.offset)), root_(set(from.root)), slope_(set(from.slope)), width_(set(1 / from.slope)) {}
+      : offset_(set(from.offset)), root_(cube_root(offset_)), slope_(set(from.slope)) {}
 
   /// Encodes values in encoding_min..encoding_max.
   HWY_INLINE V encode(V x) const {
@@ -30,11 +30,12 @@ class EncodingVectors {
     return hn::MulAdd(slope_, hn::Min(x, zero), cube_root(hn::Add(hn::Max(x, zero), offset_)));
   }
 
+  /// Returns u^3 - r^3 = (u - r) (u^2 + r (u + r)) with r the code of 0, which decodes to 0 exactly. Below r, where the
+  /// second factor is held, this is the tangent.
   HWY_INLINE V decode(V u) const {
     namespace hn = hwy::HWY_NAMESPACE;
     const V above = hn::Max(u, root_);
-    const V light = hn::MulSub(hn::Mul(above, above), above, offset_);
-    return hn::MulAdd(width_, hn::Min(hn::Sub(u, root_), hn::Zero(D())), light);
+    return hn::Mul(hn::Sub(u, root_), hn::MulAdd(above, above, hn::Mul(root_, hn::Add(above, root_))));
   }
 
  private:
@@ -54,7 +55,7 @@ class EncodingVectors {
     return hn::Mul(x, hn::Mul(y, y));
   }
 
-  V offset_, root_, slope_, width_;
+  V offset_, root_, slope_;
 };
 
 }  // namespace lowlux::isp::rows::HWY_NAMESPACE

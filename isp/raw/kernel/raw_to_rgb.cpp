@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <optional>
 
 #include "isp/raw/kernel/raw_to_rgb_bands.h"
 #include "isp/raw/kernel/raw_to_rgb_rows.h"
 #include "isp/raw/kernel/residual_band.h"
+#include "isp/raw/kernel/residual_rows.h"
 
 namespace lowlux::isp {
 namespace {
@@ -135,8 +137,11 @@ void convert_band(const Mosaic& in, const RgbTransform& transform, RowBand band,
     return convert_by_residual(in, transform, band, own.demosaic, look, sink_of_row);
   }
   const bool encoded = in.demosaic.method == DemosaicMethod::encoded_malvar;
-  const rows::Encoding encoding = rows::encoding_with(in.demosaic.offset);
-  const Ring& ring = encoded ? own.encoded : own.ring;
+  std::optional<ScratchUse> use;
+  if (encoded) use.emplace(own.demosaic);
+  const rows::Encoding encoding = encoding_with(in.demosaic.offset);
+  const Ring ring =
+      encoded ? Ring{static_cast<float*>(own.demosaic.data) + rows::padding_before, own.ring.run_stride} : own.ring;
   const int width = width_of(in), height = height_of(in);
   Colour red_row_colour = colour_in_order(transform, {0, 1, 2});
   Colour blue_row_colour = colour_in_order(transform, {2, 1, 0});
@@ -215,13 +220,13 @@ struct ThreadBytes {
   std::size_t ring;
   std::size_t look;
   std::size_t codes;     // a row of codes for a CodeChange or a RowSink
-  std::size_t demosaic;  // of a ResidualBand
+  std::size_t demosaic;  // of a ResidualBand, or a second ring
 
   explicit ThreadBytes(int width)
       : ring(run_stride_of(width) * runs_per_thread * sizeof(float)),
         look(whole_lines(look_run_of(width) * LookGrid::parts * sizeof(float))),
         codes(whole_lines(3 * static_cast<std::size_t>(width) * sizeof(std::uint16_t))),
-        demosaic(residual_floats(width) * sizeof(float)) {}
+        demosaic(std::max(residual_floats(width) * sizeof(float), ring)) {}
   std::size_t all() const { return ring + look + codes + demosaic + 4 * scratch_guard_bytes; }
 };
 
@@ -261,7 +266,6 @@ BandScratch RawToRgb::scratch_of(int thread) const {
   float* const linear = static_cast<float*>(ring.data) + rows::padding_before;
   return {thread,
           {linear, stride},
-          {linear + 2 * ring_rows * stride, stride},
           static_cast<float*>(look.data),
           static_cast<std::uint16_t*>(codes.data),
           demosaic,

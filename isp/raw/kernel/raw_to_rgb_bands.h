@@ -17,11 +17,17 @@ using rows::RowLevels;
 using rows::SplitRow;
 
 inline constexpr int ring_rows = 8;  // 5 are live; a power of two makes the slot of a row its low bits
-inline constexpr int runs_per_thread = 2 * 2 * ring_rows;  // of two rings: linear and encoded values
-inline constexpr std::size_t line_floats = 16;             // one cache line
-inline constexpr float largest = 1e9f;                     // keeps every product of the pass finite
+inline constexpr int runs_per_thread = 2 * ring_rows;
+inline constexpr std::size_t line_floats = 16;  // one cache line
+inline constexpr float largest = 1e9f;          // keeps every product of the pass finite
 
 inline float usable(float x) { return std::fabs(x) <= largest ? x : 0.0f; }
+
+inline rows::Encoding encoding_with(float requested) {
+  const float offset = std::isnan(requested) ? 1.0f : std::clamp(requested, 1e-6f, 1.0f);
+  const float root = std::cbrt(offset);
+  return {offset, 1 / (3 * root * root)};
+}
 
 /// Returns the index in 0..n-1 of x in -2..n+2, mirrored without repeating the edge; x keeps its parity for n >= 2.
 inline int mirror(int x, int n) {
@@ -105,10 +111,9 @@ inline std::size_t run_of(int width) {
 struct BandScratch {
   int thread;
   Ring ring;
-  Ring encoded;
   float* look;
   std::uint16_t* codes;  // 3 for each pixel of a row
-  Scratch demosaic;      // of a ResidualBand; closed
+  Scratch demosaic;      // of a ResidualBand, or a second ring; closed
   std::array<ScratchUse, 3> use;
 };
 

@@ -4,7 +4,7 @@
 
 #include "isp/base/look_grid.h"
 #include "isp/base/tone_table.h"
-#include "isp/raw/kernel/residual_rows.h"
+#include "isp/raw/kernel/encoding.h"
 
 /// The row kernels of RawToRgb are dispatched at run time. They take plain types only: their sources are compiled for
 /// several instruction sets, which must not have inline code in common.

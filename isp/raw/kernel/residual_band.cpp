@@ -16,12 +16,12 @@ using rows::SiteRow;
 constexpr int reach = 12;          // rows and columns on which a result depends, to each side
 constexpr int halo = 16;           // columns of a block beyond those it makes
 constexpr int block_width = 1024;  // at most
-constexpr int chunk_rows = 16;     // made of one block before the next
+constexpr int chunk_rows = 8;      // made of one block before the next
 
 // Pairs of a run before the first and after the last of a block: what kernels and splitting may touch. The first pair
 // that kernels store starts a cache line.
 constexpr int run_before = 32 + rows::run_margin;
-constexpr int run_after = 64;
+constexpr int run_after = 32;
 
 std::size_t odd_lines(std::size_t floats) { return (((floats + line_floats - 1) / line_floats) | 1U) * line_floats; }
 
@@ -114,7 +114,7 @@ ResidualBand<Mosaic>::ResidualBand(const Mosaic& in, const Demosaic& how, float 
   const auto limited = [](float value, float low, float high) {
     return std::isnan(value) ? high : std::clamp(value, low, high);
   };
-  encoding_ = rows::encoding_with(how.offset);
+  encoding_ = encoding_with(how.offset);
   const float scale = std::cbrt(limited(how.white, 1e-3f, 1));
   ridge_ = 2e-3f * scale * scale;
   floor_ = 1e-4f * scale + 4.5f * std::sqrt(1.75f) * limited(how.noise_std, 0, 1);

@@ -1,8 +1,5 @@
 #include "isp/raw/kernel/residual_rows.h"
 
-#include <algorithm>
-#include <cmath>
-
 #if defined(__aarch64__)  // NEON only: the vectors of SVE have no size, so no structs can be made of them
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #endif
@@ -250,12 +247,6 @@ HWY_EXPORT(SlopeRow);
 HWY_EXPORT(RestRow);
 HWY_EXPORT(ColourDifferenceRow);
 HWY_EXPORT(FinishRow);
-
-Encoding encoding_with(float requested) {
-  const float offset = std::isnan(requested) ? 1.0f : std::clamp(requested, 1e-6f, 1.0f);
-  const float root = std::cbrt(offset);
-  return {offset, root, 1 / (3 * root * root)};
-}
 
 void encode_row(const float* in, float clip, const Encoding& encoding, int n, float* out) {
   HWY_DYNAMIC_DISPATCH(EncodeRow)(in, clip, encoding, n, out);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "isp/raw/kernel/encoding.h"
+
 /// The row kernels of demosaicing on encoded values are dispatched at run time and take plain types only: see
 /// raw_to_rgb_rows.h.
 ///
@@ -8,18 +10,6 @@
 /// neighbours of own[i] are then green[i] and green[i + 1], else green[i - 1] and green[i]. In the rows above and
 /// below, the columns of own[i] hold green[i], those of green[i] hold own[i].
 namespace lowlux::isp::rows {
-
-/// Holds the constants of u = cbrt(x + offset): its value and its slope at x = 0. The offset is limited to 1e-6..1.
-struct Encoding {
-  float offset;
-  float root;
-  float slope;
-};
-Encoding encoding_with(float requested);
-
-/// These are the limits of values that are encoded.
-inline constexpr float encoding_min = -1;
-inline constexpr float encoding_max = 1e9f;
 
 /// Kernels compute the pairs -run_margin to pairs + run_margin - 1 of a run, and read up to three more.
 inline constexpr int run_margin = 8;
