@@ -61,6 +61,7 @@ inline constexpr TagName calibration_illuminant[] = {{50778, "CalibrationIllumin
                                                      {50779, "CalibrationIlluminant2"}};
 inline constexpr TagName active_area{50829, "ActiveArea"};
 inline constexpr TagName masked_areas{50830, "MaskedAreas"};
+inline constexpr TagName noise_reduction_applied{50935, "NoiseReductionApplied"};
 inline constexpr TagName forward_matrix[] = {{50964, "ForwardMatrix1"}, {50965, "ForwardMatrix2"}};
 inline constexpr TagName opcode_list[] = {{51008, "OpcodeList1"}, {51009, "OpcodeList2"}, {51022, "OpcodeList3"}};
 inline constexpr TagName noise_profile{51041, "NoiseProfile"};

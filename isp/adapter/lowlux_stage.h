@@ -130,6 +130,16 @@ enum {
   LOWLUX_STAGE_LEVEL_HIGH = 3
 };
 
+/* Methods by which missing colours are interpolated, at most; frames of which better is not known or not possible get
+ * less: isp/adapter/README.md. */
+enum {
+  LOWLUX_STAGE_DEMOSAIC_DEFAULT = 0, /* ENCODED_MALVAR */
+  LOWLUX_STAGE_DEMOSAIC_MALVAR = 1,
+  LOWLUX_STAGE_DEMOSAIC_ENCODED_MALVAR = 2,
+  LOWLUX_STAGE_DEMOSAIC_RESIDUAL = 3,
+  LOWLUX_STAGE_DEMOSAIC_RESIDUAL_MEDIAN = 4
+};
+
 /* Settings that apply from lowlux_stage_open to lowlux_stage_release. */
 typedef struct {
   size_t size;
@@ -141,6 +151,7 @@ typedef struct {
   int32_t look;             /* LOWLUX_STAGE_LOOK_... */
   int32_t tone;             /* 1: the standard curve; 0: none, linear light in sRGB's encoding */
   double field_of_view_deg; /* of the image's longer side; 0: 50 */
+  int32_t demosaic;         /* LOWLUX_STAGE_DEMOSAIC_... */
 } lowlux_stage_settings;
 
 /* Validity of the members of lowlux_stage_params, and which of them took effect. */
@@ -206,7 +217,7 @@ typedef struct {
 enum {
   LOWLUX_STAGE_STEP_ALL = 0,           /* everything requested */
   LOWLUX_STAGE_STEP_STANDARD = 1,      /* the level standard in place of high */
-  LOWLUX_STAGE_STEP_DRAFT = 2,         /* the level draft in place of a higher one */
+  LOWLUX_STAGE_STEP_DRAFT = 2,         /* the level draft in place of a higher one; demosaicing by linear filters */
   LOWLUX_STAGE_STEP_FRAMES_BEFORE = 3, /* no level; previous frames, if the settings enable them */
   LOWLUX_STAGE_STEP_PLAIN = 4          /* straight from codes, without noise reduction */
 };

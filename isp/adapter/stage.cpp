@@ -66,6 +66,8 @@ Result<void> check(const lowlux_stage_settings& s) {
   if (s.threads < 0 || s.threads > max_threads) return wrong("a stage has 1 to 8 threads, or 0 for 2");
   if (s.most_denoise < 0 || s.most_denoise > LOWLUX_STAGE_LEVEL_HIGH) return wrong("no such level of noise reduction");
   if (s.look != LOWLUX_STAGE_LOOK_CAMERA && s.look != LOWLUX_STAGE_LOOK_EYE) return wrong("no such look");
+  if (s.demosaic < 0 || s.demosaic > LOWLUX_STAGE_DEMOSAIC_RESIDUAL_MEDIAN)
+    return wrong("no such method of demosaicing");
   if (s.tone != 0 && s.tone != 1) return wrong("no such tone curve");
   if (s.temporal != 0 && s.temporal != 1) return wrong("temporal is 0 or 1");
   if (!(s.field_of_view_deg == 0 || (s.field_of_view_deg >= 0.1 && s.field_of_view_deg <= 180))) {
@@ -134,7 +136,7 @@ std::uint64_t stage_memory_bytes(const LiveSetup& setup, int threads) {
   // A warm-up frame of the stream's own size is processed once.
   return 2 * area(setup.width, setup.height) +
          row_bytes(setup.format, setup.width) * static_cast<std::uint64_t>(setup.height) + for_each * rounded +
-         static_cast<std::uint64_t>(threads) * row * 700 + (std::uint64_t{4} << 20);
+         static_cast<std::uint64_t>(threads) * row * 1400 + (std::uint64_t{4} << 20);
 }
 
 Stage::Stage(const lowlux_stage_settings& settings, std::optional<StageProfile> profile)
@@ -172,6 +174,9 @@ Result<LiveSetup> Stage::setup_for(const lowlux_stage_input& in, const RawFormat
   setup.levels = settings_.most_denoise != LOWLUX_STAGE_LEVEL_NONE;
   setup.most = level_of(settings_.most_denoise);
   setup.temporal = settings_.temporal == 1;
+  if (settings_.demosaic != LOWLUX_STAGE_DEMOSAIC_DEFAULT) {
+    setup.max_demosaic = static_cast<DemosaicMethod>(settings_.demosaic - LOWLUX_STAGE_DEMOSAIC_MALVAR);
+  }
   if (!profile_) return setup;
   const BayerPhase phase = phase_of_crop(format.phase, setup.active.x & 1, setup.active.y & 1);
   if (Result<void> fits = profile_->prepare(format, phase); !fits) return tl::make_unexpected(fits.error());
@@ -291,6 +296,7 @@ int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& ou
   const StageWork most = has_budget ? stream_->budget.choose(params.budget_ms, asked) : asked;
   StageFacts facts = facts_of(params, stream_->stream, profile_ ? &*profile_ : nullptr, most);
   facts.live.follows = history_.follows(params);
+  if (most >= StageWork::draft && most > asked) facts.live.max_demosaic = DemosaicMethod::encoded_malvar;
   {
     const DmaAccess access(in.fd);
     pipeline.read({static_cast<const std::byte*>(in.data), in.length}, in.stride, facts.live,

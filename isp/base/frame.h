@@ -106,6 +106,7 @@ struct NoiseProfile {
   std::array<double, 3> scale{};
   std::array<double, 3> offset{};
   enum class Source : std::uint8_t { file, profile, picture } source = Source::file;  // origin of the figures
+  bool reduced = false;  // noise reduction was applied, and this is what it left (DNG NoiseReductionApplied)
 };
 
 /// Holds one colour calibration of a camera (DNG ColorMatrixN, CameraCalibrationN, ForwardMatrixN).

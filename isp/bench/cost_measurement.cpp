@@ -45,6 +45,7 @@ DevelopOptions options_for(std::optional<Level> level) {
   DevelopOptions options;
   options.denoise.mode = level ? DenoiseChoice::Mode::level : DenoiseChoice::Mode::off;
   options.denoise.level = level.value_or(Level::draft);
+  options.demosaic = DemosaicMethod::malvar;
   options.effects.emplace();
   return options;
 }
@@ -117,6 +118,15 @@ class Measurement {
       floats += taken->render() / static_cast<double>(defective_.size());
     }
     add(CostPart::floats, floats);
+    for (const auto& [method, part] : {std::pair{DemosaicMethod::encoded_malvar, CostPart::encoded_malvar},
+                                       std::pair{DemosaicMethod::residual, CostPart::residual},
+                                       std::pair{DemosaicMethod::residual_median, CostPart::residual_median}}) {
+      DevelopOptions by_method = plain;
+      by_method.demosaic = method;
+      const auto taken = steps(frames_[0], by_method);
+      if (!taken) return tl::make_unexpected(taken.error());
+      add(part, taken->render() - codes->render());
+    }
     plain.samples = SampleType::u16;
     const auto codes_16 = steps(frames_[0], plain);
     if (!codes_16) return tl::make_unexpected(codes_16.error());

@@ -13,6 +13,7 @@
 #include "isp/pipeline/noise_reduction.h"
 #include "isp/pipeline/plan/look.h"
 #include "isp/raw/black_point.h"
+#include "isp/raw/kernel/demosaic.h"
 #include "isp/render/output_space.h"
 #include "isp/render/tone.h"
 
@@ -40,8 +41,9 @@ struct DevelopOptions {
   std::optional<double> exposure_ev;  // absent: automatic
   ToneCurve tone = ToneCurve::standard;
   OutputSpace space = OutputSpace::srgb;
-  SampleType samples = SampleType::u8;  // f32 is scene-linear: signed, unbounded, without tone
-  bool half = false;                    // exact 2x2 binning instead of demosaicing
+  SampleType samples = SampleType::u8;     // f32 is scene-linear: signed, unbounded, without tone
+  bool half = false;                       // exact 2x2 binning instead of demosaicing
+  std::optional<DemosaicMethod> demosaic;  // absent: chosen by light, noise reduction and budget
   BlackRequest black;
   bool find_defects = true;                     // search for hot and dead pixels in addition to those the source lists
   std::shared_ptr<const DarkFrame> dark_frame;  // set: subtracted pixel by pixel instead of `black`

@@ -10,6 +10,7 @@
 #include "isp/pipeline/noise_reduction.h"
 #include "isp/pipeline/options.h"
 #include "isp/pipeline/plan/levels.h"
+#include "isp/pipeline/plan/plan_demosaic.h"
 #include "isp/pipeline/plan/rendering.h"
 #include "isp/pipeline/stage_clock.h"
 
@@ -22,6 +23,7 @@ struct DevelopPlan {
   RawLevels levels;
   Rendering rendering;
   NoiseReduction noise_reduction;
+  DemosaicPlan demosaic;
   std::shared_ptr<const DisplayTarget> display;  // set: codes are changed for it
   int width = 0;                                 // of the image, before orientation
   int height = 0;

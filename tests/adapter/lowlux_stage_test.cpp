@@ -61,6 +61,9 @@ TEST(LowluxStage, NamesSettingsThatCannotBe) {
   EXPECT_EQ(with([](S& s) { s.most_denoise = LOWLUX_STAGE_LEVEL_HIGH; }), LOWLUX_STAGE_OK);
   EXPECT_EQ(with([](S& s) { s.most_denoise = 4; }), LOWLUX_STAGE_BAD_ARGUMENT);
   EXPECT_EQ(with([](S& s) { s.most_denoise = -1; }), LOWLUX_STAGE_BAD_ARGUMENT);
+  EXPECT_EQ(with([](S& s) { s.demosaic = LOWLUX_STAGE_DEMOSAIC_RESIDUAL_MEDIAN; }), LOWLUX_STAGE_OK);
+  EXPECT_EQ(with([](S& s) { s.demosaic = 5; }), LOWLUX_STAGE_BAD_ARGUMENT);
+  EXPECT_EQ(with([](S& s) { s.demosaic = -1; }), LOWLUX_STAGE_BAD_ARGUMENT);
   EXPECT_EQ(with([](S& s) { s.look = 2; }), LOWLUX_STAGE_BAD_ARGUMENT);
   EXPECT_EQ(with([](S& s) { s.tone = 2; }), LOWLUX_STAGE_BAD_ARGUMENT);
   EXPECT_EQ(with([](S& s) { s.temporal = 2; }), LOWLUX_STAGE_BAD_ARGUMENT);

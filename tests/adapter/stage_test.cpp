@@ -87,6 +87,7 @@ TEST(Stage, DevelopsAFirstFrameAsFilesAreDeveloped) {
   auto settings = plain_settings(3);
   settings.profile_file = file.c_str();
   settings.most_denoise = LOWLUX_STAGE_LEVEL_HIGH;
+  settings.demosaic = LOWLUX_STAGE_DEMOSAIC_RESIDUAL_MEDIAN;
   using Mode = isp::DenoiseChoice::Mode;
   const RawFormatNames& names = names_of_bayer(12, BayerPhase::grbg);
   const Codes codes = scene(names.format, width, height);
@@ -256,6 +257,35 @@ TEST(Stage, OfAnAmpleBudgetGivesTheSameBytesAsWithoutOneOnceItHasSeenAFrame) {
       EXPECT_EQ(rig.result.temporal, free.result.temporal);
     }
   }
+}
+
+TEST(Stage, InterpolatesAsTheSettingsStateAndWithABudgetByLinearFilters) {
+  const RawFormatNames& names = names_of_bayer(10);
+  const Codes codes = scene(names.format, width, height);
+  auto params = numbered(names.format, 0);
+  params.denoise = LOWLUX_STAGE_DENOISE_FAST;
+  std::vector<std::vector<std::uint8_t>> pictures;
+  for (const std::int32_t method :
+       {LOWLUX_STAGE_DEMOSAIC_MALVAR, LOWLUX_STAGE_DEMOSAIC_ENCODED_MALVAR, LOWLUX_STAGE_DEMOSAIC_RESIDUAL}) {
+    auto settings = everything();
+    settings.demosaic = method;
+    Rig rig(settings, names, width, height, LOWLUX_STAGE_BGR888);
+    ASSERT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK) << rig.error();
+    EXPECT_EQ(std::count(pictures.begin(), pictures.end(), rig.planes[0]), 0) << method;
+    pictures.push_back(rig.planes[0]);
+  }
+  auto settings = everything();
+  Rig by_default(settings, names, width, height, LOWLUX_STAGE_BGR888);
+  ASSERT_EQ(by_default.process(codes, params), LOWLUX_STAGE_OK);
+  EXPECT_EQ(by_default.planes[0], pictures[1]);
+  settings.demosaic = LOWLUX_STAGE_DEMOSAIC_RESIDUAL;
+  Rig budget(settings, names, width, height, LOWLUX_STAGE_BGR888),
+      encoded(everything(), names, width, height, LOWLUX_STAGE_BGR888);
+  auto off = params;
+  off.denoise = LOWLUX_STAGE_DENOISE_OFF;
+  ASSERT_EQ(budget.process(codes, budgeted(params, 0.01F)), LOWLUX_STAGE_OK);
+  ASSERT_EQ(encoded.process(codes, off), LOWLUX_STAGE_OK);
+  EXPECT_EQ(budget.planes, encoded.planes);
 }
 
 TEST(Stage, KeepsWhatItKnowsOfTimesWhenResetAndForgetsItWhenConfigured) {

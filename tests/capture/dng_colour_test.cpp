@@ -182,6 +182,13 @@ TEST(DngColour, NoiseProfilesAreOneForAllOrOnePerColour) {
   EXPECT_EQ(each->scale, (std::array<double, 3>{1e-4, 2e-4, 3e-4}));
   EXPECT_EQ(each->offset, (std::array<double, 3>{1e-8, 2e-8, 3e-8}));
 
+  // NoiseReductionApplied: 0/0 is not known, as is what is not within 0 to 1.
+  for (const auto& [applied, reduced] : {std::pair{0.0, false}, {0.5, true}, {1.0, true}, {7.0, false}}) {
+    one.set(50935, Tag::numbers(TagType::rational, {applied}));
+    EXPECT_EQ(read_built(one).noise->reduced, reduced) << applied;
+  }
+  EXPECT_FALSE(all->reduced);
+
   EXPECT_FALSE(read_built(DngBuilder{}).noise);
   DngBuilder bad;
   bad.set(51041, Tag::numbers(TagType::f64, {std::numeric_limits<double>::quiet_NaN(), 0}));

@@ -183,12 +183,13 @@ struct YuvReference {
 TEST_F(CapturedNight, IsTheSamePictureLiveAsDeveloped) {
   use_format(bayer(12));
   capture_raw("live.dng");
-  const std::string png = developed("live.dng", "file.png", {"--denoise", "off", "--repair", "off", "--exposure", "5"});
+  const std::string png = developed("live.dng", "file.png",
+                                    {"--denoise", "off", "--repair", "off", "--exposure", "5", "--demosaic", "malvar"});
   const auto picture = isp::decode_png(std::as_bytes(std::span(png)));
   ASSERT_TRUE(picture);
   const YuvReference expected(std::get<Encoded8>(picture->picture).codes);
 
-  const cli::CaptureArgs args = args_of({"--live", "--denoise", "off", "--exposure", "5"});
+  const cli::CaptureArgs args = args_of({"--live", "--denoise", "off", "--exposure", "5", "--demosaic", "malvar"});
   const int film = open(file("film.y4m").c_str(), O_RDWR | O_CREAT | O_TRUNC, 0600);
   auto sink = cli::make_live_sink(args, stream(), film, stop_);
   ASSERT_TRUE(sink) << sink.error().message;

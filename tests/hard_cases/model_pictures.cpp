@@ -36,6 +36,7 @@ isp::DevelopOptions options_for(const isp::AppearanceModel& model, double mean_c
                               .tone = isp::ToneCurve::none,
                               .space = OutputSpace::linear_srgb,
                               .samples = SampleType::f32,
+                              .demosaic = isp::DemosaicMethod::malvar,  // other methods reach into the next patch
                               .find_defects = false};
   options.look.look = isp::Look::model;
   options.look.model = std::string(model.name);

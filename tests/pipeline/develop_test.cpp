@@ -27,10 +27,16 @@ RawFrame sample_frame(int width = 62, int height = 46) {
   return frame;
 }
 
-const DevelopOptions linear_float{
-    .exposure_ev = 0, .tone = ToneCurve::none, .space = OutputSpace::linear_srgb, .samples = SampleType::f32};
-const DevelopOptions camera_float{
-    .exposure_ev = 0, .tone = ToneCurve::none, .space = OutputSpace::camera, .samples = SampleType::f32};
+const DevelopOptions linear_float{.exposure_ev = 0,
+                                  .tone = ToneCurve::none,
+                                  .space = OutputSpace::linear_srgb,
+                                  .samples = SampleType::f32,
+                                  .demosaic = DemosaicMethod::malvar};
+const DevelopOptions camera_float{.exposure_ev = 0,
+                                  .tone = ToneCurve::none,
+                                  .space = OutputSpace::camera,
+                                  .samples = SampleType::f32,
+                                  .demosaic = DemosaicMethod::malvar};
 
 SceneLinear float_picture(const RawFrame& frame, const DevelopOptions& options) {
   Result<Developed> developed = develop(frame, options, executor);

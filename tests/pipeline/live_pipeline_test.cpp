@@ -47,7 +47,9 @@ TEST(LivePipeline, DecidesAndRendersAsDevelopDoesOfTheSameFacts) {
     auto expected = plan_develop(frame, options, one);
     ASSERT_TRUE(expected) << expected.error().message;
     expected->noise_reduction.options.variance_scale.fill(1);  // live frames are not checked against their model
-    const auto live = live_of(setup_of(frame), one);
+    LiveSetup setup = setup_of(frame);
+    setup.max_demosaic = DemosaicMethod::residual_median;
+    const auto live = live_of(setup, one);
     read(*live, frame);
     LiveFacts facts = known();
     if (level) facts.denoise = {.mode = LiveDenoise::Mode::level, .level = denoise::Level::draft};

@@ -238,12 +238,35 @@ TEST(PlanEffects, ABudgetTakesTheMostAccuratePlanThatFits) {
   EXPECT_EQ(both.level, std::nullopt) << "with a tolerance the cheapest plan within it";
 }
 
+TEST(PlanEffects, ABudgetLeavesOutDemosaicingByResidualsOnlyWhereItMust) {
+  const RawFrame frame = grey(2000);
+  const auto planned = [&](double budget_s) {
+    return plan_develop(frame, planned_options(std::nullopt, budget_s), executor);
+  };
+  const auto ample = planned(10);
+  ASSERT_TRUE(ample);
+  EXPECT_EQ(ample->demosaic.demosaic.method, DemosaicMethod::residual);
+  const double least_s = predicted_s(*test::reference_cost(), cost_size(320, 256),
+                                     {{CostPart::planning}, {CostPart::codes}, {CostPart::encoded_malvar}});
+  const auto tight = planned(1.01 * least_s);
+  ASSERT_TRUE(tight);
+  EXPECT_EQ(tight->demosaic.demosaic.method, DemosaicMethod::encoded_malvar);
+  EXPECT_FALSE(named(*tight->effects, "demosaicing by residuals").used);
+  EXPECT_GT(named(*ample->effects, "demosaicing by residuals").seconds, 0);
+  DevelopOptions fixed = planned_options(std::nullopt, 10);
+  fixed.demosaic = DemosaicMethod::malvar;
+  const auto given = plan_develop(frame, fixed, executor);
+  ASSERT_TRUE(given);
+  EXPECT_EQ(given->demosaic.demosaic.method, DemosaicMethod::malvar);
+  EXPECT_EQ(given->demosaic.reason, "given");
+}
+
 TEST(PlanEffects, ABudgetBelowTheCheapestPlanIsRefusedWithItsTime) {
   const auto refused = plan_develop(grey(20), planned_options(std::nullopt, 1e-6), executor);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::insufficient);
-  const double cheapest_s =
-      predicted_s(*test::reference_cost(), cost_size(320, 256), {{CostPart::planning}, {CostPart::codes}});
+  const double cheapest_s = predicted_s(*test::reference_cost(), cost_size(320, 256),
+                                        {{CostPart::planning}, {CostPart::codes}, {CostPart::encoded_malvar}});
   EXPECT_NE(refused.error().message.find("cheapest plan"), std::string::npos) << refused.error().message;
   const double told_ms =
       std::strtod(refused.error().message.c_str() + refused.error().message.find("take ") + 5, nullptr);

@@ -63,7 +63,9 @@ RC_GTEST_PROP(LiveProperty, AFrameIsRenderedAsDevelopingRendersIt, ()) {
   const RawFrame frame = any_frame();
   const auto level = any_level();
   PoolExecutor executor(size_between(1, 3));
-  const auto live = live_of(setup_of(frame), executor);
+  LiveSetup setup = setup_of(frame);
+  setup.max_demosaic = DemosaicMethod::residual_median;
+  const auto live = live_of(setup, executor);
   LiveFacts facts = known();
   if (level) facts.denoise = {.mode = LiveDenoise::Mode::level, .level = *level};
   const bool repeated = *rc::gen::arbitrary<bool>();  // a frame before, forgotten, changes nothing

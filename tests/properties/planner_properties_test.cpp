@@ -90,6 +90,11 @@ StepFacts any_facts(const ProcessingGoal& choice) {
   out.may_search = *rc::gen::arbitrary<bool>();
   out.may_take_lines = out.has_noise && *rc::gen::arbitrary<bool>();
   out.from_codes = *rc::gen::arbitrary<bool>();
+  if (*rc::gen::arbitrary<bool>()) {
+    out.demosaic_reduced = *rc::gen::element(DemosaicMethod::residual, DemosaicMethod::residual_median);
+    out.demosaic_noisy = *rc::gen::element(DemosaicMethod::malvar, *out.demosaic_reduced);
+    out.demosaic_is_fixed = *rc::gen::arbitrary<bool>();
+  }
   out.look = *rc::gen::arbitrary<bool>();
   out.display = *rc::gen::arbitrary<bool>();
   out.size = {any_decade(-2, 2), any_decade(-2, 2)};
@@ -113,9 +118,15 @@ std::vector<StepCandidate> all_plans(const StepFacts& facts) {
   std::vector<StepCandidate> out;
   for (const auto level : levels) {
     for (int bits = 0; bits < 8; ++bits) {
-      StepCandidate plan{.level = level, .defects = (bits & 1) != 0, .lines = (bits & 2) != 0, .dark = (bits & 4) != 0};
-      rate(facts, plan);
-      out.push_back(plan);
+      for (const DemosaicMethod method : {DemosaicMethod::encoded_malvar, DemosaicMethod::residual_median}) {
+        StepCandidate plan{.level = level,
+                           .defects = (bits & 1) != 0,
+                           .lines = (bits & 2) != 0,
+                           .dark = (bits & 4) != 0,
+                           .max_demosaic = method};
+        rate(facts, plan);
+        out.push_back(plan);
+      }
     }
   }
   return out;

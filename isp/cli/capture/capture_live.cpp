@@ -43,6 +43,7 @@ lowlux_stage_settings settings_of(const CaptureArgs& args) {
   out.profile_file = args.develop.profile.empty() ? nullptr : args.develop.profile.c_str();
   out.most_denoise = LOWLUX_STAGE_LEVEL_STANDARD;
   if (options.denoise.mode == isp::DenoiseChoice::Mode::off) out.most_denoise = LOWLUX_STAGE_LEVEL_NONE;
+  if (options.demosaic) out.demosaic = static_cast<std::int32_t>(*options.demosaic) + LOWLUX_STAGE_DEMOSAIC_MALVAR;
   if (options.denoise.mode == isp::DenoiseChoice::Mode::level) {
     out.most_denoise = static_cast<std::int32_t>(options.denoise.level) + LOWLUX_STAGE_LEVEL_DRAFT;
   }

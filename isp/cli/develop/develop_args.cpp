@@ -254,7 +254,12 @@ void add_rendering(CLI::App& app, DevelopArgs& args) {
   add_choice<OutputSpace>(
       app, "--space", space_names(), [&args](OutputSpace space) { args.space = space; },
       "what the numbers mean (default: srgb; linear-srgb for OpenEXR and PFM)");
-  app.add_flag("--half", o.half, "half size: exact 2x2 binning in place of demosaicing");
+  Names<std::optional<isp::DemosaicMethod>> methods{{"auto", std::nullopt}};
+  for (const isp::DemosaicMethod method : isp::all_demosaic_methods) methods.emplace(name_of(method), method);
+  CLI::Option* const demosaic = add_choice<std::optional<isp::DemosaicMethod>>(
+      app, "--demosaic", methods, [&o](std::optional<isp::DemosaicMethod> method) { o.demosaic = method; },
+      "how missing colours are interpolated (default: auto)");
+  app.add_flag("--half", o.half, "half size: exact 2x2 binning in place of demosaicing")->excludes(demosaic);
 }
 
 void add_camera(CLI::App& app, DevelopArgs& args) {

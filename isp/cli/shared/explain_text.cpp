@@ -108,6 +108,9 @@ std::string explain_text(const isp::DevelopPlan& plan) {
   if (plan.effects) add_effects(out, *plan.effects, *plan.options.effects);
   out.add("defects", fmt::format("{} pixels repaired", plan.levels.defects.size()));
   add_noise(out, plan.noise_reduction);
+  if (!plan.demosaic.reason.empty()) {
+    out.add("demosaic", fmt::format("{}: {}", name_of(plan.demosaic.demosaic.method), plan.demosaic.reason));
+  }
   out.add("white", plan.rendering.white
                        ? fmt::format("{}, {:.0f} K", plan.rendering.white_balance_rule, plan.rendering.white->cct_k)
                        : std::string(plan.rendering.white_balance_rule));

@@ -82,6 +82,11 @@ Json noise_json(const isp::NoiseReduction& noise) {
   return json;
 }
 
+Json demosaic_json(const isp::DemosaicPlan& plan) {
+  if (plan.reason.empty()) return nullptr;
+  return {{"method", name_of(plan.demosaic.method)}, {"reason", plan.reason}};
+}
+
 Json number_json(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json effects_json(const isp::DevelopPlan& plan) {
@@ -182,6 +187,7 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"defects_repaired", plan.levels.defects.size()},
             {"effects", effects_json(plan)},
             {"denoise", noise_json(plan.noise_reduction)},
+            {"demosaic", demosaic_json(plan.demosaic)},
             {"look", look_json(plan)},
             {"warnings", plan.warnings}};
   if (plan.display) {

@@ -18,7 +18,8 @@ constexpr std::array<std::uint32_t, 2> color_matrix{TIFFTAG_COLORMATRIX1, TIFFTA
 constexpr std::array<std::uint32_t, 2> camera_calibration{TIFFTAG_CAMERACALIBRATION1, TIFFTAG_CAMERACALIBRATION2};
 constexpr std::array<std::uint32_t, 2> illuminant{TIFFTAG_CALIBRATIONILLUMINANT1, TIFFTAG_CALIBRATIONILLUMINANT2};
 constexpr std::array<std::uint32_t, 2> forward_matrix{50964, 50965};
-constexpr std::uint32_t opcode_list1 = 51008, opcode_list2 = 51009, noise_profile = 51041;
+constexpr std::uint32_t opcode_list1 = 51008, opcode_list2 = 51009, noise_profile = 51041,
+                        noise_reduction_applied = 50935;
 
 /// Converts the values of rationals to float, as libtiff requires.
 template <class Numbers>
@@ -65,7 +66,8 @@ void set_opcodes(TIFF* tiff, std::uint32_t tag, const std::vector<std::byte>& li
 }  // namespace
 
 void declare_dng_tags(TIFF* file) {
-  static char names[][20] = {"ForwardMatrix1", "ForwardMatrix2", "OpcodeList1", "OpcodeList2", "NoiseProfile"};
+  static char names[][24] = {"ForwardMatrix1", "ForwardMatrix2", "OpcodeList1",
+                             "OpcodeList2",    "NoiseProfile",   "NoiseReductionApplied"};
   constexpr short any = TIFF_VARIABLE, any32 = TIFF_VARIABLE2;
   static const TIFFFieldInfo fields[] = {
       {50964, any, any, TIFF_SRATIONAL, FIELD_CUSTOM, 1, 1, names[0]},
@@ -73,6 +75,7 @@ void declare_dng_tags(TIFF* file) {
       {opcode_list1, any32, any32, TIFF_UNDEFINED, FIELD_CUSTOM, 1, 1, names[2]},
       {opcode_list2, any32, any32, TIFF_UNDEFINED, FIELD_CUSTOM, 1, 1, names[3]},
       {noise_profile, any, any, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, names[4]},
+      {noise_reduction_applied, any, any, TIFF_RATIONAL, FIELD_CUSTOM, 1, 1, names[5]},
   };
   TIFFMergeFieldInfo(file, fields, std::size(fields));
 }
@@ -121,6 +124,7 @@ void set_dng_noise_and_opcodes(TIFF* file, const RawFrame& frame) {
       pairs.push_back(frame.noise->offset[i]);
     }
     TIFFSetField(file, noise_profile, static_cast<int>(pairs.size()), pairs.data());
+    if (frame.noise->reduced) set_floats(file, noise_reduction_applied, std::array{1.0});
   }
   const OpcodeLists lists = opcode_lists(frame);
   set_opcodes(file, opcode_list1, lists.first);

@@ -13,9 +13,10 @@ namespace lowlux::isp {
 
 std::string_view name_of(CostPart part) {
   static constexpr std::array<std::string_view, cost_parts> names{
-      "planning", "samples", "defects", "lines",      "offsets",    "check",      "codes",  "floats",
-      "draft-0",  "draft-1", "draft-2", "standard-0", "standard-1", "standard-2", "high-0", "high-1",
-      "high-2",   "best-0",  "best-2",  "codes-16",   "floats-32",  "look",       "display"};
+      "planning", "samples", "defects",        "lines",    "offsets",        "check",      "codes",
+      "floats",   "draft-0", "draft-1",        "draft-2",  "standard-0",     "standard-1", "standard-2",
+      "high-0",   "high-1",  "high-2",         "best-0",   "best-2",         "codes-16",   "floats-32",
+      "look",     "display", "encoded-malvar", "residual", "residual-median"};
   return names[static_cast<std::size_t>(part)];
 }
 
@@ -91,6 +92,10 @@ CostModel made() {
       {{9.009, 0.00000}},  // floats-32
       {{9.009, 0.01160}},  // look
       {{9.009, 0.02373}},  // display
+      // These three follow from that of codes by the ratios that tests/bench/raw_to_rgb_bench.cpp prints.
+      {{9.009, 0.00416}},  // encoded-malvar
+      {{9.009, 0.01505}},  // residual
+      {{9.009, 0.01740}},  // residual-median
   }};
   return {.machine = std::string(reference_machine), .threads = 2, .pace_s = pace_s, .points = points};
 }

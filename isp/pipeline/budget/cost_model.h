@@ -35,10 +35,13 @@ enum class CostPart : std::uint8_t {
   best_2,
   codes_16,  // additional time of 16-bit codes over 8-bit ones
   floats_32,
-  look,     // additional time of the look of the eye
-  display,  // additional time of the change for a display
+  look,            // additional time of the look of the eye
+  display,         // additional time of the change for a display
+  encoded_malvar,  // additional time of demosaicing by this method over DemosaicMethod::malvar
+  residual,
+  residual_median,
 };
-inline constexpr int cost_parts = 23;
+inline constexpr int cost_parts = 26;
 
 /// Returns the name of a part: "planning", "draft-1" and so on.
 std::string_view name_of(CostPart part);

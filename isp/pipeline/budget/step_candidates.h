@@ -36,6 +36,7 @@ struct StepCandidate {
   bool lines = true;
   bool dark = true;
   bool display = true;
+  DemosaicMethod max_demosaic = DemosaicMethod::residual_median;
   double left = 0;   // relative to everything that can be done
   double error = 0;  // relative to the truth
   double seconds = 0;
@@ -54,6 +55,11 @@ struct StepFacts {
   bool may_search = true;
   bool may_take_lines = true;
   bool from_codes = false;  // can be rendered from codes unless reduction, repair or dark charge prevents it
+  /// States how the missing colours of the frame would be interpolated with and without noise reduction, given time;
+  /// absent where none are missing.
+  std::optional<DemosaicMethod> demosaic_reduced;
+  std::optional<DemosaicMethod> demosaic_noisy;
+  bool demosaic_is_fixed = false;
   bool look = false;
   bool display = false;
   SampleType samples = SampleType::u8;

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "isp/pipeline/budget/step_candidates.h"
+#include "isp/pipeline/plan/plan_demosaic.h"
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/pipeline/plan/plan_regions.h"
 
@@ -63,6 +64,20 @@ std::optional<double> cost_of_lines(const StepFacts& facts, StepCandidate plan) 
   return seconds_of(facts, plan) - seconds_of(facts, without);
 }
 
+/// Describes demosaicing better than by linear filters, and the time it takes in addition.
+PlannedStep demosaic_step(const StepFacts& facts, StepCandidate plan) {
+  PlannedStep out{.name = "demosaicing by residuals", .size = std::numeric_limits<double>::quiet_NaN()};
+  out.used = plan.max_demosaic >= DemosaicMethod::residual;
+  out.decision = out.used ? "where there is light enough for it" : "encoded linear filters instead";
+  if (facts.choice.cost) {
+    plan.max_demosaic = DemosaicMethod::residual_median;
+    StepCandidate without = plan;
+    without.max_demosaic = DemosaicMethod::encoded_malvar;
+    out.seconds = seconds_of(facts, plan) - seconds_of(facts, without);
+  }
+  return out;
+}
+
 StepPlan told(const StepFacts& facts, const StepCandidate& plan) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   StepPlan out;
@@ -95,6 +110,9 @@ StepPlan told(const StepFacts& facts, const StepCandidate& plan) {
     add({"change for the display", facts.sizes.display, left(plan.display, facts.sizes.display), plan.display,
          plan.display ? "made" : "left out", cost_of(facts, {{CostPart::display}})});
   }
+  if (facts.demosaic_reduced && !facts.demosaic_is_fixed) {
+    add(demosaic_step(facts, plan));
+  }
   const bool by_tolerance = facts.choice.tolerance_delta_e && !facts.choice.all && !facts.choice.budget_s;
   if (by_tolerance && plan.level && !facts.level_is_fixed) {
     out.regions =
@@ -106,17 +124,27 @@ StepPlan told(const StepFacts& facts, const StepCandidate& plan) {
   out.lines = plan.lines;
   out.dark = plan.dark || plan.level;
   out.display = plan.display;
+  out.max_demosaic = plan.max_demosaic;
   out.level = plan.level;
   out.level_decided = facts.has_noise;
   return out;
 }
 
-StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& o, const RawLevels& levels,
-                   const Rendering& rendering, Executor& executor) {
+StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thumbnail& light, const DevelopOptions& o,
+                   const RawLevels& levels, const Rendering& rendering, Executor& executor) {
   StepFacts facts{*o.effects, {}, {}};
   facts.size = cost_size(frame.raw);
   facts.samples = o.samples;
   facts.active = frame.raw.active;
+  if (frame.raw.layout == SensorLayout::bayer && !o.half) {
+    std::vector<float> memory;
+    DemosaicRequest request{.method = o.demosaic, .signal_e = median_green_e(frame, levels, light, memory)};
+    NoiseReduction noise;
+    facts.demosaic_noisy = plan_demosaic(frame, levels, rendering, noise, request).demosaic.method;
+    noise.level = Level::draft;
+    facts.demosaic_reduced = plan_demosaic(frame, levels, rendering, noise, request).demosaic.method;
+    facts.demosaic_is_fixed = o.demosaic.has_value();
+  }
   facts.look = rendering.look.has_value();
   facts.display = o.display != nullptr;
   std::optional<NoiseModel> model;
@@ -142,9 +170,10 @@ StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Deve
 
 }  // namespace
 
-Result<StepPlan> choose_steps(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& options,
-                              const RawLevels& levels, const Rendering& rendering, Executor& executor) {
-  const StepFacts facts = facts_of(frame, thumbnail, options, levels, rendering, executor);
+Result<StepPlan> choose_steps(const RawFrame& frame, const Thumbnail& thumbnail, const Thumbnail& light,
+                              const DevelopOptions& options, const RawLevels& levels, const Rendering& rendering,
+                              Executor& executor) {
+  const StepFacts facts = facts_of(frame, thumbnail, light, options, levels, rendering, executor);
   const Result<StepCandidate> best = choose_step_candidate(facts);
   if (!best) return tl::make_unexpected(best.error());
   return told(facts, *best);

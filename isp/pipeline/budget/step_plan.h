@@ -34,6 +34,7 @@ struct StepPlan {
   bool lines = true;  // row and column noise is subtracted with the noise
   bool dark = true;
   bool display = true;
+  DemosaicMethod max_demosaic = DemosaicMethod::residual_median;  // that there is time for
   std::optional<denoise::Level> level;
   bool level_decided = false;           // false: noise is reduced as the options state
   std::optional<NoiseRegions> regions;  // regions with levels of their own
@@ -42,9 +43,11 @@ struct StepPlan {
 /// Decides which effects a frame needs, from its levels, its noise and a sample of it. Without a budget it omits what
 /// stays below the tolerance, all of it together; with one it chooses the most accurate of all plans that are predicted
 /// to fit, or the cheapest of those within the tolerance, if one is given and one fits.
+/// @param light   the thumbnail, dark charge subtracted
 /// @param levels  before the search for defects
 /// Precondition: options.effects. Error: the budget is below the cheapest plan, whose time is stated (insufficient).
-Result<StepPlan> choose_steps(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& options,
-                              const RawLevels& levels, const Rendering& rendering, Executor& executor);
+Result<StepPlan> choose_steps(const RawFrame& frame, const Thumbnail& thumbnail, const Thumbnail& light,
+                              const DevelopOptions& options, const RawLevels& levels, const Rendering& rendering,
+                              Executor& executor);
 
 }  // namespace lowlux::isp

@@ -158,7 +158,7 @@ NoiseProfile residual_profile(const SignalElectrons& signal_e, const std::array<
       if (variance > 0) samples[colour].push_back({std::max(0.0, signal_e.value.at(x, y) * unit), variance});
     }
   }
-  NoiseProfile out;
+  NoiseProfile out{.reduced = true};
   for (std::size_t c = 0; c < 3; ++c) {
     const Line line = fitted(samples[c]);
     out.scale[c] = line.scale;

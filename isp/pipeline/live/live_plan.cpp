@@ -120,7 +120,8 @@ void LivePlanner::reset() {
 bool LivePlanner::needs_light(const LiveFacts& facts) const {
   const bool colour = setup_.format.layout == SensorLayout::bayer;
   return !facts.exposure_ev || (colour && !facts.neutral) || setup_.look.look == Look::eye ||
-         facts.denoise.mode == LiveDenoise::Mode::automatic;
+         facts.denoise.mode == LiveDenoise::Mode::automatic ||
+         (colour && setup_.max_demosaic >= DemosaicMethod::residual);
 }
 
 MeterWants LivePlanner::wants(const LiveFacts& facts, bool statistics) const {
@@ -341,6 +342,9 @@ Result<void> LivePlanner::plan(const LiveFacts& facts, FrameMeter& meter, RawFra
   if (Result<void> rendering = set_rendering(facts, frame); !rendering) return rendering;
   choose_level(facts.denoise, frame);
   set_temporal(facts, frame);
+  DemosaicRequest interpolation{.max_method = std::min(setup_.max_demosaic, facts.max_demosaic)};
+  if (needs_light(facts)) interpolation.signal_e = median_green_e(frame, plan_.levels, thumbnail_, memory_);
+  plan_.demosaic = plan_demosaic(frame, plan_.levels, plan_.rendering, plan_.noise_reduction, interpolation);
   plan_.from_codes = renders_from_codes(frame, plan_.levels, plan_.noise_reduction.reduces());
   if (plan_.from_codes || frame.raw.layout != SensorLayout::bayer) plan_.levels.electrons_at_white.reset();
   return {};

@@ -31,6 +31,7 @@ struct LiveSetup {
   bool levels = true;                              // frames may be denoised one by one, up to `most`
   denoise::Level most = denoise::Level::standard;  // highest level of frames denoised one by one
   bool temporal = false;                           // previous frames take part
+  DemosaicMethod max_demosaic = DemosaicMethod::encoded_malvar;
 };
 
 /// Describes the noise reduction of one frame.
@@ -61,6 +62,7 @@ struct LiveFacts {
   std::optional<Matrix3> colour_matrix;         // white-balanced camera RGB to linear sRGB, in place of calibrations
   std::optional<double> exposure_ev;            // absent: automatic
   double saturation = 1;                        // of the image's colours, 0..4
+  DemosaicMethod max_demosaic = DemosaicMethod::residual_median;  // that there is time for
   bool follows = true;                          // the previous frame; false forgets previous frames and their noise
   LiveDenoise denoise;
 };

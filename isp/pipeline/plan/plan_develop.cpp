@@ -107,13 +107,14 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   const Thumbnail thumbnail = make_thumbnail(measured, levels->black, executor);
   clock.lap("thumbnail");
 
-  Result<Rendering> rendering = decide_rendering(frame, light_of(thumbnail, frame.raw, *levels), options);
+  const Thumbnail light = light_of(thumbnail, frame.raw, *levels);
+  Result<Rendering> rendering = decide_rendering(frame, light, options);
   if (!rendering) return tl::make_unexpected(std::move(rendering.error()));
   append(plan.warnings, rendering->warnings);
   clock.lap("white and exposure");
 
   if (options.effects) {
-    Result<StepPlan> effects = choose_steps(frame, thumbnail, options, *levels, *rendering, executor);
+    Result<StepPlan> effects = choose_steps(frame, thumbnail, light, options, *levels, *rendering, executor);
     if (!effects) return tl::make_unexpected(std::move(effects.error()));
     if (!effects->dark) levels->black.dark_mean_e = {};
     if (!effects->display) plan.display.reset();
@@ -136,6 +137,12 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   append(plan.warnings, noise->warnings);
   if (rendering->look && rendering->look->noise_limit && !rendering->look->noise && !noise->has_level()) {
     plan.warnings.emplace_back("the noise of the frame is not known, so it is not held to a limit");
+  }
+  std::vector<float> memory;
+  DemosaicRequest interpolation{.method = options.demosaic, .signal_e = median_green_e(frame, *levels, light, memory)};
+  if (plan.effects) interpolation.max_method = plan.effects->max_demosaic;
+  if (frame.raw.layout == SensorLayout::bayer && !options.half) {
+    plan.demosaic = plan_demosaic(frame, *levels, *rendering, *noise, interpolation);
   }
   plan.from_codes = renders_from_codes(frame, *levels, noise->reduces());
   if (plan.from_codes || frame.raw.layout != SensorLayout::bayer) levels->electrons_at_white.reset();

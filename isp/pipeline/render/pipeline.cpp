@@ -35,7 +35,8 @@ DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
   for (int site = 0; site < 4; ++site) range[site] = white_at(raw, site) - plan.levels.black.pedestal_dn[site];
   return {raw.dn.view().crop(raw.active.x + crop.x, raw.active.y + crop.y, crop.width, crop.height),
           phase_of_crop(raw.phase, crop.x, crop.y),
-          {of_crop(plan.levels.black.pedestal_dn, crop), site_gains(raw, plan.rendering.white_gain, range, crop)}};
+          {of_crop(plan.levels.black.pedestal_dn, crop), site_gains(raw, plan.rendering.white_gain, range, crop)},
+          plan.demosaic.demosaic};
 }
 
 }  // namespace
@@ -79,7 +80,8 @@ RgbInput Pipeline::prepare_bayer(const RawFrame& frame, const DevelopPlan& plan)
   if (plan.from_codes) return half_or_whole(code_mosaic(raw, plan));
   float_mosaic(frame, plan);
   return half_or_whole(SignedMosaic{crop_of(mosaic_, crop), phase_of_crop(raw.phase, crop.x, crop.y),
-                                    site_gains(raw, plan.rendering.white_gain, units_at_white(plan.levels), crop)});
+                                    site_gains(raw, plan.rendering.white_gain, units_at_white(plan.levels), crop),
+                                    plan.demosaic.demosaic});
 }
 
 // Monochrome frames serve as R, G and B at once; demosaiced ones have three planes of their own.

@@ -14,17 +14,18 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int demosaic_reach_px = 2;
+constexpr int repair_reach_px = 6;
 
 /// Returns the margin of a tile: without noise reduction a pixel depends on its neighbours only, as far as demosaicing
 /// and repair reach.
 TileMargin margin_of(const DevelopPlan& plan) {
-  return plan.noise_reduction.reduces() ? TileMargin{} : TileMargin{.px = 8, .lattice = 2};
+  const int reach = reach_px(plan.demosaic.demosaic.method) + repair_reach_px;
+  return plan.noise_reduction.reduces() ? TileMargin{} : TileMargin{.px = reach, .lattice = 2};
 }
 
 /// Returns the region that is demosaiced: at the border of the image the mosaic ends, elsewhere it continues.
 Rect seen_of(const RawDn& raw, const DevelopPlan& plan, const Rect& core) {
-  constexpr int reach = demosaic_reach_px;
+  const int reach = reach_px(plan.demosaic.demosaic.method);
   if (plan.options.half) return core;
   return overlap({core.x - reach, core.y - reach, core.width + 2 * reach, core.height + 2 * reach}, raw.default_crop);
 }
@@ -144,7 +145,8 @@ void TileRenderer::render_core(const RawFrame& frame, const DevelopPlan& plan, c
   const RawDn& raw = frame.raw;
   const Rect seen = seen_of(raw, plan, core), pixels = pixels_of(raw, plan, core);
   const SignedMosaic in{crop_of(mosaic, whole_of(raw, plan, core), seen), phase_of_crop(raw.phase, seen.x, seen.y),
-                        site_gains(raw, plan.rendering.white_gain, units_at_white(plan.levels), seen)};
+                        site_gains(raw, plan.rendering.white_gain, units_at_white(plan.levels), seen),
+                        plan.demosaic.demosaic};
   if (plan.options.half) {
     RgbView<float> half;
     for (std::size_t c = 0; c < 3; ++c) half[c] = half_planes_[c].view().crop(0, 0, pixels.width, pixels.height);

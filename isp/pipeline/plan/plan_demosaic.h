@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "isp/base/frame.h"
+#include "isp/pipeline/noise_reduction.h"
+#include "isp/pipeline/plan/levels.h"
+#include "isp/pipeline/plan/rendering.h"
+#include "isp/raw/kernel/demosaic.h"
+#include "isp/raw/measure/thumbnail.h"
+
+namespace lowlux::isp {
+
+/// Holds the decision on how missing colours are interpolated.
+struct DemosaicPlan {
+  Demosaic demosaic;
+  std::string_view reason;  // empty: nothing is interpolated
+};
+
+/// Holds what the interpolation is decided by.
+struct DemosaicRequest {
+  std::optional<DemosaicMethod> method;                         // given; absent: chosen
+  DemosaicMethod max_method = DemosaicMethod::residual_median;  // that there is time for
+  std::optional<double> signal_e;  // of a green pixel in the median block; absent: not known
+};
+
+/// Decides how missing colours are interpolated: with medians of the colour differences where a green pixel of the
+/// median block has less than 100 e-, which is better there on all scenes; by linear filters where noise is not reduced
+/// and it has less than 50 e-, because the mean of encoded noise is biased.
+DemosaicPlan plan_demosaic(const RawFrame& frame, const RawLevels& levels, const Rendering& rendering,
+                           const NoiseReduction& noise, const DemosaicRequest& request);
+
+/// Returns the median over the blocks of a thumbnail of the signal of a green pixel [e-]; absent where the gain is not
+/// known.
+/// @param light   dark charge subtracted
+/// @param memory  grows to one value for each block
+std::optional<double> median_green_e(const RawFrame& frame, const RawLevels& levels, const Thumbnail& light,
+                                     std::vector<float>& memory);
+
+}  // namespace lowlux::isp
