@@ -53,16 +53,23 @@ TEST(DevelopingStages, DemosaicingFallsBehindTheTruthAsItDoesLess) {
   const auto outcome = run_demosaic_bench(quick());
   ASSERT_TRUE(outcome.has_value());
   const Rows rows = rows_of(outcome->table);
-  EXPECT_LT(error_of(rows, "no noise", "Malvar, kernel"), error_of(rows, "no noise", "bilinear, double"));
-  EXPECT_LT(error_of(rows, "no noise", "bilinear, double"), error_of(rows, "no noise", "half (2x2 means)"));
+  const auto error = [&](const char* group, const char* method) { return error_of(rows, group, method); };
+  EXPECT_LT(error("no noise", "malvar"), error("no noise", "bilinear, double"));
+  EXPECT_LT(error("no noise", "bilinear, double"), error("no noise", "half (2x2 means)"));
+  for (const char* group : {"no noise", "200 e-, denoised by standard", "20 e-, denoised by standard"}) {
+    EXPECT_LT(error(group, "encoded-malvar"), error(group, "malvar")) << group;
+    EXPECT_LT(error(group, "residual"), error(group, "encoded-malvar")) << group;
+  }
+  EXPECT_LT(error("20 e-, denoised by standard", "residual-median"), error("20 e-, denoised by standard", "residual"));
+  EXPECT_LT(error("no noise", "residual"), 0.75 * error("no noise", "malvar"));
   // CIEDE2000: float planes of values up to 1
-  EXPECT_NEAR(error_of(rows, "no noise", "Malvar, kernel"), error_of(rows, "no noise", "Malvar, double"), 1e-4);
-  EXPECT_GT(error_of(rows, "20 e-, noise left in", "Malvar, kernel"), error_of(rows, "no noise", "Malvar, kernel"));
-  EXPECT_EQ(error_of(rows, "rounding of the kernel", "Malvar, double"), 0);
-  EXPECT_GT(error_of(rows, "rounding of the kernel", "Malvar, kernel"), 0);
+  EXPECT_NEAR(error("no noise", "malvar"), error("no noise", "malvar, double"), 1e-4);
+  EXPECT_GT(error("20 e-, noise left in", "malvar"), error("no noise", "malvar"));
+  EXPECT_EQ(error("rounding of malvar", "malvar, double"), 0);
+  EXPECT_GT(error("rounding of malvar", "malvar"), 0);
   // Nine products of float, values up to 1 / the least gain: some 1e-7 each.
-  EXPECT_LT(rows.at({"rounding of the kernel", "Malvar, kernel"}).at("largest error"), 3);
-  EXPECT_EQ(outcome->plots.size(), 3u);
+  EXPECT_LT(rows.at({"rounding of malvar", "malvar"}).at("largest error"), 3);
+  EXPECT_EQ(outcome->plots.size(), 5u);
 }
 
 TEST(DevelopingStages, ChromaFromWhereTheSignalSaysIsAsGoodAsTheBetterStart) {
@@ -153,7 +160,13 @@ TEST(DevelopingStages, PlansOfDevelopGainByWhatTheyDoAndAreShownInPairs) {
     EXPECT_LT(error("draft"), 0.5 * error("off")) << group;
     EXPECT_LT(error("standard"), error("standard, no repairs")) << group;
     EXPECT_LT(error("off, half"), error("off")) << group;
+    EXPECT_LT(error("standard"), error("standard, malvar")) << group;
     EXPECT_GT(rows.at({group, "best"}).at("one thread [ms/MP]"), 0);
+    const auto noise_free = [&](const char* plan) { return error_of(rows, std::string(group) + ", no noise", plan); };
+    EXPECT_LT(noise_free("off, no repairs, residual"), 0.75 * noise_free("off, no repairs, malvar")) << group;
+    EXPECT_LT(noise_free("off, no repairs, malvar"), noise_free("off, no repairs, half")) << group;
+    EXPECT_LT(noise_free("off, no repairs, malvar"), error("standard"))
+        << group << ": the noise has a share of its own";
   }
   expect_pairs(*outcome,
                {"develop-plain develop-standard", "develop-draft develop-best", "develop-standard develop-eye"});
@@ -225,6 +238,28 @@ TEST(DevelopScene, TheMeanIsThatOfTheNoisyFrameWithoutItsDark) {
   EXPECT_NEAR(mean_e(raws->noisy), light.mean_e + light.dark_e + 2e-4 * 320, 5 * std::sqrt(variance_e2));
   EXPECT_EQ(raws->noisy.raw.masked.size(), 1u);
   EXPECT_TRUE(raws->noisy.noise.has_value());
+}
+
+TEST(DevelopScene, TheTruthHasTheColourOfEachSiteOfTheMean) {
+  InlineExecutor one;
+  const auto picture = read_bench_picture(LOWLUX_TESTDATA "/pictures/kodim19.png", 96, 64, one);
+  ASSERT_TRUE(picture.has_value());
+  const auto raws = simulated_raws(*picture, develop_lights(false).front(), 1, one);
+  ASSERT_TRUE(raws.has_value());
+  const RawDn &mean = raws->mean.raw, &truth = raws->truth.raw;
+  ASSERT_EQ(truth.dn.width(), 3 * mean.active.width);
+  const auto fraction = [](const RawDn& raw, double dn) {
+    const double black = raw.black_tag->pattern_dn[0];
+    return (dn - black) / (raw.white_dn[0] - black);
+  };
+  for (int y = 0; y < mean.active.height; ++y) {
+    for (int x = 0; x < mean.active.width; ++x) {
+      const int c = static_cast<int>(colour_at(mean.phase, x, y));
+      // A code of each, rounded.
+      EXPECT_NEAR(fraction(truth, truth.dn.at(3 * x + c, y)),
+                  fraction(mean, mean.dn.at(mean.active.x + x, mean.active.y + y)), 1.1e-4);
+    }
+  }
 }
 
 TEST(DevelopScene, TilesRepeatTheActiveArea) {

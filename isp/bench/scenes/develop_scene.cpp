@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -67,6 +68,33 @@ double mean_of(const Plane<float>& plane, int first_column) {
   return sum / pixels;
 }
 
+/// Returns a demosaiced frame of mean electrons, with the colour and crop of a mosaic of the same scene.
+RawFrame demosaiced_frame(const CameraRgb& signal_e, const RawFrame& mosaic, const DevelopLight& light) {
+  constexpr double black_dn = 2048, white_dn = 65535;
+  const NamedSensor sensor = sensor_of(light);
+  const double white_e =
+      (sensor.model.white_level_dn - sensor.model.black_level_dn) / sensor.model.system_gain_dn_per_e;
+  const Rect& active = mosaic.raw.active;
+  RawFrame out;
+  out.raw.dn = Plane<std::uint16_t>(3 * active.width, active.height);
+  for (int y = 0; y < active.height; ++y) {
+    for (int x = 0; x < active.width; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        const double e = signal_e.plane[static_cast<std::size_t>(c)].at(x, y);
+        const double dn = black_dn + e / white_e * (white_dn - black_dn);
+        out.raw.dn.at(3 * x + c, y) = static_cast<std::uint16_t>(std::lround(std::clamp(dn, 0.0, white_dn)));
+      }
+    }
+  }
+  out.raw.layout = SensorLayout::linear_rgb;
+  out.raw.active = out.raw.default_crop = {0, 0, active.width, active.height};
+  out.raw.black_tag = BlackLevel{.pattern_dn = {black_dn}};
+  out.raw.white_dn.fill(white_dn);
+  out.raw.info = mosaic.raw.info;
+  out.colour = mosaic.colour;
+  return out;
+}
+
 }  // namespace
 
 std::vector<DevelopLight> develop_lights(bool quick) {
@@ -97,7 +125,9 @@ Result<SimulatedRaws> simulated_raws(const BenchPicture& picture, const DevelopL
   options.effects.effects = NoiseSourceSet::all();
   const auto noisy = source_of(picture, light, luminance, options, executor);
   if (!noisy) return tl::make_unexpected(noisy.error());
-  return SimulatedRaws{noisy->frame(0, executor), mean->frame(0, executor)};
+  SimulatedRaws out{noisy->frame(0, executor), mean->frame(0, executor), {}};
+  out.truth = demosaiced_frame(mean->signal_e(executor), out.mean, light);
+  return out;
 }
 
 RawFrame tiled(const RawFrame& frame, int width, int height) {

@@ -25,10 +25,12 @@ struct DevelopLight {
 std::vector<DevelopLight> develop_lights(bool quick);
 
 /// Holds a scene as a 14-bit sensor records it: photon noise, dark charge, read noise, fixed patterns, hot pixels,
-/// noise of rows and columns; masked columns at the left measure pedestal and dark. The mean has none of these.
+/// noise of rows and columns; masked columns at the left measure pedestal and dark. The mean has none of these, and the
+/// truth all three colours of each pixel.
 struct SimulatedRaws {
   RawFrame noisy;
-  RawFrame mean;  // signal alone, in finer codes
+  RawFrame mean;   // signal alone, in finer codes
+  RawFrame truth;  // signal alone, demosaiced, in 16 bits
 };
 
 /// Simulates an image in front of a Nikon D5100's filters (capture/synthetic). Equal input gives equal frames.

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <string>
 #include <utility>
@@ -8,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "denoise/denoiser.h"
 #include "isp/base/executor.h"
 #include "isp/bench/accuracy_time.h"
 #include "isp/bench/peers/demosaic_reference.h"
@@ -18,10 +20,14 @@ namespace lowlux::isp {
 namespace {
 
 constexpr PicturePart quick_part{384, 256};
-constexpr DenoiseLight light{20, 2, 1.5};
+constexpr DenoiseLight dim{20, 2, 1.5};
+constexpr DenoiseLight bright{200, 2, 1.5};
 
 /// Transform that leaves the kernel's camera RGB unchanged, so that demosaicing alone is measured.
 constexpr RgbTransform untouched{.clip = std::numeric_limits<float>::infinity(), .move_into_gamut = false};
+
+/// What a mosaic contains of its noise.
+enum class Noise { none, all, reduced };
 
 /// A mosaic, the truth behind it, and memory for the results.
 struct Sample {
@@ -29,16 +35,35 @@ struct Sample {
   DenoiseShot shot;
   PictureTruth truth;
   Plane<float> noisy_e;  // dark subtracted
+  Plane<float> clean_e;  // by Level::standard
   SceneLinear light;
   SceneLinear half;
   DoublePlanes exact;
 
-  SignedMosaic mosaic(bool with_noise) const {
-    return mosaic_of(with_noise ? noisy_e.view() : shot.signal_e.view(), shot);
+  /// Returns a mosaic with the parameters that the pipeline would choose for it.
+  SignedMosaic mosaic(Noise noise, DemosaicMethod method = DemosaicMethod::malvar) const {
+    const Plane<float>& of = noise == Noise::none ? shot.signal_e : noise == Noise::all ? noisy_e : clean_e;
+    SignedMosaic out = mosaic_of(of.view(), shot);
+    const double kept = noise == Noise::none ? 0 : noise == Noise::all ? 1 : 1.0 / 16;
+    out.demosaic = {.method = method,
+                    .offset = static_cast<float>(4 / shot.white_e),
+                    .noise_std = static_cast<float>(std::sqrt(kept * shot.light.mean_e) / shot.white_e /
+                                                    (3 * std::pow((shot.light.mean_e + 4) / shot.white_e, 2.0 / 3)))};
+    return out;
   }
 };
 
-std::vector<Sample> samples_of(const std::vector<BenchPicture>& pictures, Executor& executor) {
+Plane<float> denoised(const DenoiseShot& shot, Executor& executor) {
+  const int width = shot.raw_e.width(), height = shot.raw_e.height();
+  Plane<float> out(width, height);
+  const denoise::DenoiseOptions options{.level = denoise::Level::standard, .white_gain = bench_white_gain};
+  denoise::Denoiser(width, height, executor.width())
+      .run({shot.raw_e.view(), BayerPhase::rggb}, shot.noise(), options, out.view(), {}, executor);
+  return out;
+}
+
+std::vector<Sample> samples_of(const std::vector<BenchPicture>& pictures, const DenoiseLight& light,
+                               Executor& executor) {
   std::vector<Sample> out;
   out.reserve(pictures.size());
   for (const BenchPicture& picture : pictures) {
@@ -47,12 +72,14 @@ std::vector<Sample> samples_of(const std::vector<BenchPicture>& pictures, Execut
                   take(picture, light, seed_of(picture, light)),
                   PictureTruth(picture.linear.view(), executor),
                   Plane<float>(width, height),
+                  {},
                   SceneLinear(width, height),
                   SceneLinear(width / 2, height / 2),
                   {Plane<double>(width, height), {width, height}, {width, height}}};
     const Plane<float>& raw = sample.shot.raw_e;
     std::transform(raw.data(), raw.data() + raw.size(), sample.noisy_e.data(),
                    [dark_e = static_cast<float>(light.dark_e)](float e) { return e - dark_e; });
+    sample.clean_e = denoised(sample.shot, executor);
     out.push_back(std::move(sample));
   }
   return out;
@@ -70,59 +97,66 @@ SceneLinear rounded(const DoublePlanes& exact) {
 /// One way from a sample's mosaic to RGB: the work, and its result as an image of full size.
 struct Method {
   std::string name;
-  void (*work)(Sample& sample, const SignedMosaic& mosaic, RawToRgb& kernel);
-  SceneLinear (*result)(const Sample& sample);
+  std::function<void(Sample& sample, Noise noise, RawToRgb& kernel)> work;
+  std::function<SceneLinear(const Sample& sample)> result;
 };
 
+SceneLinear copy_of(const SceneLinear& image) {
+  SceneLinear out(image.width(), image.height());
+  for (std::size_t c = 0; c < 3; ++c) out.plane[c] = image.plane[c].clone();
+  return out;
+}
+
+Method by_kernel(DemosaicMethod method) {
+  return {std::string(name_of(method)),
+          [method](Sample& sample, Noise noise, RawToRgb& kernel) {
+            InlineExecutor one;
+            kernel.linear(sample.mosaic(noise, method), untouched, sample.light.view(), one);
+          },
+          [](const Sample& sample) { return copy_of(sample.light); }};
+}
+
 std::vector<Method> methods() {
+  const auto exact = [](const Sample& sample) { return rounded(sample.exact); };
   return {
       {"half (2x2 means)",
-       [](Sample& sample, const SignedMosaic& mosaic, RawToRgb& kernel) {
+       [](Sample& sample, Noise noise, RawToRgb& kernel) {
          InlineExecutor one;
-         kernel.bin2x2(mosaic, sample.half.view(), one);
+         kernel.bin2x2(sample.mosaic(noise), sample.half.view(), one);
        },
        [](const Sample& sample) {
          return enlarged_twice(sample.half.view(), sample.light.width(), sample.light.height());
        }},
-      {"Malvar, kernel",
-       [](Sample& sample, const SignedMosaic& mosaic, RawToRgb& kernel) {
-         InlineExecutor one;
-         kernel.linear(mosaic, untouched, sample.light.view(), one);
-       },
-       [](const Sample& sample) {
-         SceneLinear out(sample.light.width(), sample.light.height());
-         for (std::size_t c = 0; c < 3; ++c) out.plane[c] = sample.light.plane[c].clone();
-         return out;
-       }},
+      by_kernel(DemosaicMethod::malvar),
+      by_kernel(DemosaicMethod::encoded_malvar),
+      by_kernel(DemosaicMethod::residual),
+      by_kernel(DemosaicMethod::residual_median),
       {"bilinear, double",
-       [](Sample& sample, const SignedMosaic& mosaic, RawToRgb& /*kernel*/) {
-         demosaic_bilinear(mosaic, sample.exact);
-       },
-       [](const Sample& sample) { return rounded(sample.exact); }},
-      {"Malvar, double",
-       [](Sample& sample, const SignedMosaic& mosaic, RawToRgb& /*kernel*/) { demosaic_malvar(mosaic, sample.exact); },
-       [](const Sample& sample) { return rounded(sample.exact); }}};
+       [](Sample& sample, Noise noise, RawToRgb&) { demosaic_bilinear(sample.mosaic(noise), sample.exact); }, exact},
+      {"malvar, double",
+       [](Sample& sample, Noise noise, RawToRgb&) { demosaic_malvar(sample.mosaic(noise), sample.exact); }, exact}};
 }
 
 /// Data that all groups use.
 struct Bench {
-  std::vector<Sample> samples;
+  std::vector<Sample> samples;         // in dim light
+  std::vector<Sample> bright_samples;  // brighter ones
   RawToRgb kernel;
   BenchRenderer renderer;
   Executor& executor;
 
-  AccuracyLevel level(const Method& method, bool with_noise) {
+  AccuracyLevel level(const Method& method, std::vector<Sample>& of, Noise noise) {
     AccuracyLevel out{.name = method.name,
                       .run =
-                          [this, method, with_noise] {
-                            for (Sample& sample : samples) method.work(sample, sample.mosaic(with_noise), kernel);
+                          [this, method, &of, noise] {
+                            for (Sample& sample : of) method.work(sample, noise, kernel);
                           },
                       .largest = 0};
-    for (Sample& sample : samples) {
-      method.work(sample, sample.mosaic(with_noise), kernel);
+    for (Sample& sample : of) {
+      method.work(sample, noise, kernel);
       const SceneLinear display = renderer.display_of(method.result(sample));
       const ColourDifference error = display_difference(display.view(), sample.truth, executor);
-      out.error += error.mean / static_cast<double>(samples.size());
+      out.error += error.mean / static_cast<double>(of.size());
       out.largest = std::max(out.largest, error.largest);
       out.megapixels += 1e-6 * static_cast<double>(sample.noisy_e.size());
     }
@@ -134,8 +168,8 @@ struct Bench {
     double sum = 0, values = 0, largest = 0;
     for (Sample& sample : samples) {
       InlineExecutor one;
-      kernel.linear(sample.mosaic(true), untouched, sample.light.view(), one);
-      demosaic_malvar(sample.mosaic(true), sample.exact);
+      kernel.linear(sample.mosaic(Noise::all), untouched, sample.light.view(), one);
+      demosaic_malvar(sample.mosaic(Noise::all), sample.exact);
       for (std::size_t c = 0; c < 3; ++c) {
         for (std::size_t i = 0; i < sample.exact[c].size(); ++i) {
           const double difference = std::abs(sample.light.plane[c].data()[i] - sample.exact[c].data()[i]);
@@ -153,16 +187,18 @@ struct Bench {
 std::vector<AccuracyGroup> groups_of(Bench& bench) {
   std::vector<AccuracyGroup> out;
   const std::vector<Method> all = methods();
-  for (const bool with_noise : {false, true}) {
-    AccuracyGroup group{with_noise ? fmt::format("{:g} e-, noise left in", light.mean_e) : "no noise",
-                        "mean CIEDE2000 against the truth",
-                        {}};
+  const auto add = [&](const std::string& name, std::vector<Sample>& samples, Noise noise) {
+    AccuracyGroup group{name, "mean CIEDE2000 against the truth", {}};
     group.levels.reserve(all.size());
-    for (const Method& method : all) group.levels.push_back(bench.level(method, with_noise));
+    for (const Method& method : all) group.levels.push_back(bench.level(method, samples, noise));
     out.push_back(std::move(group));
-  }
-  AccuracyGroup rounding{"rounding of the kernel", "mean difference from double [1e-6 of white]", {}};
-  for (const std::size_t i : {std::size_t{1}, std::size_t{3}}) {
+  };
+  add("no noise", bench.samples, Noise::none);
+  add(fmt::format("{:g} e-, denoised by standard", bright.mean_e), bench.bright_samples, Noise::reduced);
+  add(fmt::format("{:g} e-, denoised by standard", dim.mean_e), bench.samples, Noise::reduced);
+  add(fmt::format("{:g} e-, noise left in", dim.mean_e), bench.samples, Noise::all);
+  AccuracyGroup rounding{"rounding of malvar", "mean difference from double [1e-6 of white]", {}};
+  for (const std::size_t i : {std::size_t{1}, all.size() - 1}) {
     AccuracyLevel level = out.back().levels[i];
     level.error = level.largest = 0;
     if (i == 1) bench.set_rounding(level);
@@ -181,7 +217,8 @@ Result<BenchOutcome> run_demosaic_bench(const BenchOptions& options) {
       options.quick ? quick_part : PicturePart{}, executor);
   if (!pictures) return tl::make_unexpected(pictures.error());
   const int width = largest_of(*pictures).width;
-  Bench bench{samples_of(*pictures, executor), RawToRgb(width, 1), BenchRenderer(width, executor), executor};
+  Bench bench{samples_of(*pictures, dim, executor), samples_of(*pictures, bright, executor), RawToRgb(width, 1),
+              BenchRenderer(width, executor), executor};
   const AccuracyTiming timing{.rounds = options.quick ? 5 : 7, .min_s = 1e-3};
   const std::vector<AccuracyGroup> groups = groups_of(bench);
   std::vector<AccuracyRow> rows;

@@ -30,7 +30,7 @@ constexpr PicturePart quick_part{192, 128};
 constexpr PicturePart shown_part{288, 192};  // size of a crop in the report: enlarged twice, it fills its column
 constexpr std::size_t pictures_used = 3;
 constexpr int rounds_by_one = 3;
-constexpr std::size_t min_undominated = 4;
+constexpr std::size_t min_undominated = 6;
 constexpr double min_span = 50;
 constexpr std::string_view light_of_images = "20 e-";
 
@@ -39,10 +39,11 @@ struct PlanChoice {
   std::optional<Level> level;  // absent: off
   bool repairs = true;         // of detected defects, and of lines
   bool half = false;
+  std::optional<DemosaicMethod> demosaic;
 
   std::string name() const {
-    return fmt::format("{}{}{}", level ? denoise::name_of(*level) : "off", repairs ? "" : ", no repairs",
-                       half ? ", half" : "");
+    return fmt::format("{}{}{}{}", level ? denoise::name_of(*level) : "off", repairs ? "" : ", no repairs",
+                       half ? ", half" : "", demosaic ? fmt::format(", {}", name_of(*demosaic)) : "");
   }
 };
 
@@ -51,13 +52,27 @@ constexpr std::array plan_choices{
     PlanChoice{.half = true},
     PlanChoice{.level = Level::draft, .half = true},
     PlanChoice{.level = Level::standard, .half = true},
+    PlanChoice{.repairs = false, .demosaic = DemosaicMethod::malvar},
     PlanChoice{.repairs = false},
     PlanChoice{},
+    PlanChoice{.level = Level::draft, .demosaic = DemosaicMethod::encoded_malvar},
     PlanChoice{.level = Level::draft},
     PlanChoice{.level = Level::standard, .repairs = false},
+    PlanChoice{.level = Level::standard, .demosaic = DemosaicMethod::malvar},
+    PlanChoice{.level = Level::standard, .demosaic = DemosaicMethod::encoded_malvar},
     PlanChoice{.level = Level::standard},
     PlanChoice{.level = Level::high},
+    PlanChoice{.level = Level::best, .demosaic = DemosaicMethod::malvar},
     PlanChoice{.level = Level::best},
+};
+
+/// Plans of frames without noise: what half size and demosaicing change alone.
+constexpr std::array noise_free_choices{
+    PlanChoice{.repairs = false, .half = true},
+    PlanChoice{.repairs = false, .demosaic = DemosaicMethod::malvar},
+    PlanChoice{.repairs = false, .demosaic = DemosaicMethod::encoded_malvar},
+    PlanChoice{.repairs = false, .demosaic = DemosaicMethod::residual},
+    PlanChoice{.repairs = false, .demosaic = DemosaicMethod::residual_median},
 };
 
 DevelopOptions options_of(const PlanChoice& choice, Look look, const DevelopLight& light,
@@ -65,6 +80,7 @@ DevelopOptions options_of(const PlanChoice& choice, Look look, const DevelopLigh
   DevelopOptions out;
   out.exposure_ev = exposure_ev;
   out.half = choice.half;
+  out.demosaic = choice.demosaic;
   out.find_defects = choice.repairs;
   if (choice.level) out.denoise = {.mode = DenoiseChoice::Mode::level, .level = *choice.level};
   out.denoise.line_noise = choice.repairs;
@@ -87,9 +103,10 @@ Result<std::vector<SimulatedRaws>> raws_of(const std::vector<BenchPicture>& pict
   return out;
 }
 
-/// An image captured in one light, and its noise-free version developed.
+/// An image captured in one light, and its true colours developed.
 struct Scene {
   const RawFrame& noisy;
+  const RawFrame& mean;
   double exposure_ev = 0;  // automatic, of the mean frame
   PictureTruth truth;
 };
@@ -103,18 +120,18 @@ Result<std::vector<Scene>> scenes_of(const std::vector<SimulatedRaws>& raws, con
     const auto automatic = plan_develop(of.mean, options_of(untouched, Look::camera, light, {}), executor);
     if (!automatic) return tl::make_unexpected(automatic.error());
     const double ev = automatic->rendering.exposure_ev;
-    const auto truth = develop(of.mean, options_of(untouched, look, light, ev), executor);
+    const auto truth = develop(of.truth, options_of(untouched, look, light, ev), executor);
     if (!truth) return tl::make_unexpected(truth.error());
     const SceneLinear light_of_truth = linear_of(codes_of(*truth));
-    out.push_back({of.noisy, ev, PictureTruth(light_of_truth.view(), executor)});
+    out.push_back({of.noisy, of.mean, ev, PictureTruth(light_of_truth.view(), executor)});
   }
   return out;
 }
 
 /// Adds a scene's contribution to the errors of a level.
-Result<void> add_error(const Scene& scene, const DevelopOptions& options, double share, AccuracyLevel& level,
-                       Executor& executor) {
-  const auto developed = develop(scene.noisy, options, executor);
+Result<void> add_error(const Scene& scene, const RawFrame& frame, const DevelopOptions& options, double share,
+                       AccuracyLevel& level, Executor& executor) {
+  const auto developed = develop(frame, options, executor);
   if (!developed) return tl::make_unexpected(developed.error());
   SceneLinear picture = linear_of(codes_of(*developed));
   if (options.half) picture = enlarged_twice(std::as_const(picture).view(), scene.truth.width(), scene.truth.height());
@@ -130,19 +147,25 @@ struct MeasuredPlans {
   std::vector<AccuracyRow> by_one;
 };
 
-Result<MeasuredPlans> measured(const std::vector<Scene>& scenes, const DevelopLight& light, Look look,
+Result<MeasuredPlans> measured(const std::vector<Scene>& scenes, bool with_noise, const DevelopLight& light, Look look,
                                const AccuracyTiming& timing, Executor& executor) {
-  AccuracyGroup group{fmt::format("{}, {}", light.name, look == Look::eye ? "eye" : "camera"),
-                      "mean CIEDE2000 against developed without noise",
-                      {}};
+  AccuracyGroup group{
+      fmt::format("{}, {}{}", light.name, look == Look::eye ? "eye" : "camera", with_noise ? "" : ", no noise"),
+      "mean CIEDE2000 against the true scene",
+      {}};
   InlineExecutor one;
   Executor* executor_in_use = &executor;
-  const RawFrame& timed = scenes.front().noisy;
-  for (const PlanChoice& choice : plan_choices) {
+  const auto frame_of = [with_noise](const Scene& scene) -> const RawFrame& {
+    return with_noise ? scene.noisy : scene.mean;
+  };
+  const RawFrame& timed = frame_of(scenes.front());
+  const std::span<const PlanChoice> choices =
+      with_noise ? std::span<const PlanChoice>(plan_choices) : std::span<const PlanChoice>(noise_free_choices);
+  for (const PlanChoice& choice : choices) {
     AccuracyLevel level{
         .name = choice.name(), .megapixels = 1e-6 * timed.raw.active.width * timed.raw.active.height, .largest = 0};
     for (const Scene& scene : scenes) {
-      const auto added = add_error(scene, options_of(choice, look, light, scene.exposure_ev),
+      const auto added = add_error(scene, frame_of(scene), options_of(choice, look, light, scene.exposure_ev),
                                    1 / static_cast<double>(scenes.size()), level, executor);
       if (!added) return tl::make_unexpected(added.error());
     }
@@ -226,11 +249,13 @@ Result<void> gather(const std::vector<BenchPicture>& pictures, const DevelopLigh
   for (const Look look : {Look::camera, Look::eye}) {
     const auto scenes = scenes_of(*raws, light, look, executor);
     if (!scenes) return tl::make_unexpected(scenes.error());
-    const auto plans = measured(*scenes, light, look, timing, executor);
-    if (!plans) return tl::make_unexpected(plans.error());
-    out.findings.push_back(undominated_finding(plans->by_all));
-    out.rows.insert(out.rows.end(), plans->by_all.begin(), plans->by_all.end());
-    out.by_one.insert(out.by_one.end(), plans->by_one.begin(), plans->by_one.end());
+    for (const bool with_noise : {true, false}) {
+      const auto plans = measured(*scenes, with_noise, light, look, timing, executor);
+      if (!plans) return tl::make_unexpected(plans.error());
+      if (with_noise) out.findings.push_back(undominated_finding(plans->by_all));
+      out.rows.insert(out.rows.end(), plans->by_all.begin(), plans->by_all.end());
+      out.by_one.insert(out.by_one.end(), plans->by_one.begin(), plans->by_one.end());
+    }
   }
   if (light.name != light_of_images) return {};
   return add_pictures(raws->front().noisy, light, executor, out);
@@ -265,11 +290,10 @@ Result<BenchOutcome> run_develop_bench(const BenchOptions& options) {
     out.table.rows[i].emplace_back(100 * all_lights.by_one[i].spread);
   }
   out.remarks.push_back(fmt::format(
-      "{} pictures{} by a simulated camera of 14 bits, masked columns telling its dark; errors against what is "
-      "developed "
-      "of the mean of the signal, with the same exposure and look: demosaicing is in both, its noise in one; half "
-      "sizes "
-      "are enlarged to be compared; megapixels are those of the mosaic; times of the first picture, planning included; "
+      "{} pictures{} by a simulated camera of 14 bits, masked columns stating its dark; errors against what is "
+      "developed of the true colours of every pixel, with the same exposure and look; `no noise` is the mean of the "
+      "signal, whose error is that of demosaicing; half sizes are enlarged to be compared; megapixels are those of the "
+      "mosaic; times of the first picture, planning included; "
       "by one thread in {} rounds",
       pictures->size(), quick ? ", quick: parts of them," : "", rounds_by_one));
   return out;
