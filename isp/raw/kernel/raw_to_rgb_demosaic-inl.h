@@ -96,9 +96,8 @@ struct EncodedMalvar {
     const VF even = load(linear_even + i), odd = load(linear_odd + i);
     constexpr int own = kOwnOdd ? 1 : 0, green = 1 - own;  // the channel measured at even and at odd columns
     const auto decoded = [this](const Site& site, VF measured, int channel) HWY_ATTR {
-      Site out;
-      for (int c = 0; c < 3; ++c) out.c[c] = c == channel ? measured : code.decode(site.c[c]);
-      return out;
+      const auto value = [&](int c) HWY_ATTR { return c == channel ? measured : code.decode(site.c[c]); };
+      return Site{{value(0), value(1), value(2)}};
     };
     return {decoded(u.even, even, own), decoded(u.odd, odd, green)};
   }

@@ -203,24 +203,26 @@ HWY_INLINE void finish(const FinishRows& in, const Encoding& encoding, int pairs
   const int left = -in.shift, beside = in.shift - 1;
   for (int i = 0; i < pairs; i += lanes) {
     const VF green_at_own = load(in.green_at_own + i), green = load(in.green + i);
-    VF own_at_green, other_at_green, other_at_own;
-    if constexpr (kMedian) {
-      const auto at_green = [&](const DifferenceColumns& of)
-                                HWY_ATTR { return median_of(of.green, of.own, of.own, i, i + left, i + left + 1); };
-      own_at_green = at_green(in.own);
-      other_at_green = at_green(in.other);
-      other_at_own = median_of(in.other.own, in.other.green, in.other.green, i, i + beside, i + beside + 1);
-    } else {
-      own_at_green = load(in.own.green[1] + i);
-      other_at_green = load(in.other.green[1] + i);
-      other_at_own = load(in.other.own[1] + i);
-    }
+    const auto at_green = [&](const DifferenceColumns& of) HWY_ATTR {
+      if constexpr (kMedian) {
+        return median_of(of.green, of.own, of.own, i, i + left, i + left + 1);
+      } else {
+        return load(of.green[1] + i);
+      }
+    };
+    const auto at_own = [&](const DifferenceColumns& of) HWY_ATTR {
+      if constexpr (kMedian) {
+        return median_of(of.own, of.green, of.green, i, i + beside, i + beside + 1);
+      } else {
+        return load(of.own[1] + i);
+      }
+    };
     store(load(in.linear.own + i), in.at_own.own + i);
     store(code.decode(green_at_own), in.at_own.green + i);
-    store(code.decode(hn::Add(green_at_own, other_at_own)), in.at_own.other + i);
-    store(code.decode(hn::Add(green, own_at_green)), in.at_green.own + i);
+    store(code.decode(hn::Add(green_at_own, at_own(in.other))), in.at_own.other + i);
+    store(code.decode(hn::Add(green, at_green(in.own))), in.at_green.own + i);
     store(load(in.linear.green + i), in.at_green.green + i);
-    store(code.decode(hn::Add(green, other_at_green)), in.at_green.other + i);
+    store(code.decode(hn::Add(green, at_green(in.other))), in.at_green.other + i);
   }
 }
 
