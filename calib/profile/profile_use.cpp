@@ -144,9 +144,11 @@ double dark_variance_dn2(const SensorModel& s, double dark_mean_e) {
   return k * k * (s.read_noise_e * s.read_noise_e + dark_mean_e) + quantisation_dn2;
 }
 
+/// Returns the black level that is subtracted, dark charge included.
 double black_of(const RawDn& frame, int site, const ProfileAtFrame& out) {
   if (out.black) return out.black->pedestal_dn[site];
-  return frame.black_tag ? frame.black_tag->at(site & 1, site >> 1) : out.sensor->black_level_dn;
+  const double pedestal = frame.black_tag ? frame.black_tag->at(site & 1, site >> 1) : out.sensor->black_level_dn;
+  return pedestal + out.sensor->system_gain_dn_per_e * out.dark_mean_e[site];
 }
 
 /// Adds the noise profile. A sensor without filters has one value for the three channels.

@@ -28,6 +28,9 @@ struct DevelopPlan {
   int width = 0;                                 // of the image, before orientation
   int height = 0;
   bool from_codes = false;  // result of renders_from_codes
+  /// States the largest fraction of the charge of the median block that may be dark charge left in: of the darkest
+  /// blocks, which hold no more. Absent where the dark charge is known, or too small to matter.
+  std::optional<double> unknown_dark_fraction;
   std::vector<std::string> warnings;
   std::vector<StageTime> times;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -55,19 +56,51 @@ Result<BlackPoint> black_from_tag(const RawDn& raw, const std::string& why_not_m
   return black;
 }
 
+// Adds dark charge to a tag of any layout: its pattern is repeated until each entry belongs to one site.
+void add_to_pattern(const PerSite<double>& dark_dn, BlackLevel& tag) {
+  const int rows = tag.rows % 2 == 0 ? tag.rows : 2 * tag.rows;
+  const int columns = tag.columns % 2 == 0 ? tag.columns : 2 * tag.columns;
+  std::vector<double> pattern;
+  pattern.reserve(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns));
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      const int from = y % tag.rows * tag.columns + x % tag.columns;
+      pattern.push_back(tag.pattern_dn[static_cast<std::size_t>(from)] + dark_dn[site_of(x, y)]);
+    }
+  }
+  tag.pattern_dn = std::move(pattern);
+  tag.rows = rows;
+  tag.columns = columns;
+}
+
+// Adds known dark charge to a pedestal without. Demosaiced samples, which no profile describes, have none.
+BlackPoint with_dark(BlackPoint black, const PerSite<double>& dark_dn) {
+  if (dark_dn == PerSite<double>{}) return black;
+  for (int site = 0; site < 4; ++site) black.pedestal_dn[site] += dark_dn[site];
+  if (black.pattern && black.pattern->samples == 1) add_to_pattern(dark_dn, *black.pattern);
+  black.holds = BlackPoint::Holds::pedestal_and_dark;
+  return black;
+}
+
+Result<BlackPoint> tagged_black(const RawDn& raw, const BlackRequest& request, const std::string& why_not_measured) {
+  Result<BlackPoint> black = black_from_tag(raw, why_not_measured);
+  if (black) *black = with_dark(*std::move(black), request.dark_dn);
+  return black;
+}
+
 Result<BlackPoint> requested_black(const RawDn& raw, const BlackRequest& request) {
   if (request.choice == BlackChoice::given) {
-    return BlackPoint{.pedestal_dn = request.given_dn, .source = BlackPoint::Source::given};
+    return with_dark({.pedestal_dn = request.given_dn, .source = BlackPoint::Source::given}, request.dark_dn);
   }
   if (request.choice == BlackChoice::measured) return request.measured;
-  if (request.choice == BlackChoice::metadata) return black_from_tag(raw, "");
+  if (request.choice == BlackChoice::metadata) return tagged_black(raw, request, "");
   // A tag that is finer than four figures is not replaced with four figures.
   const bool tag_is_finer = raw.black_tag && !four_figures_do(*raw.black_tag);
-  if (request.choice == BlackChoice::automatic && tag_is_finer) return black_from_tag(raw, "");
+  if (request.choice == BlackChoice::automatic && tag_is_finer) return tagged_black(raw, request, "");
   MaskedBlack measured = measure_masked_black(raw);
   if (measured.black) return *measured.black;
   if (request.choice == BlackChoice::masked) return fail(ErrorCode::insufficient, measured.refusal);
-  return black_from_tag(raw, measured.refusal);
+  return tagged_black(raw, request, measured.refusal);
 }
 
 }  // namespace

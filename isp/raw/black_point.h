@@ -17,6 +17,9 @@ enum class BlackChoice {
 struct BlackRequest {
   BlackChoice choice = BlackChoice::automatic;
   PerSite<double> given_dn{};  // for BlackChoice::given
+  /// States the known dark charge of the frame, system gain times dark current times exposure time [DN]: it is added to
+  /// a pedestal that is tagged or given. Masked pixels and a measured black point include it already.
+  PerSite<double> dark_dn{};
   BlackPoint measured;         // for BlackChoice::measured
 };
 

@@ -173,10 +173,14 @@ TEST(ProfileUse, RefusesWhatItCannotTell) {
   const auto noise_only = profile_at(unmeasured, frame(100, 1, 20));
   ASSERT_TRUE(noise_only && noise_only->noise);
   EXPECT_FALSE(noise_only->black);
-  EXPECT_NEAR(noise_only->noise->scale[0], 1.0 / (16383 - 500), 1e-15);
+  // Range and noise are those above the pedestal and the known dark charge, which is then subtracted.
+  const double dark_dn =
+      noise_only->sensor->system_gain_dn_per_e * noise_only->sensor->dark_current_e_per_s[0];  // in 1 s
+  EXPECT_GT(dark_dn, 0);
+  EXPECT_NEAR(noise_only->noise->scale[0], 1.0 / (16383 - 500 - dark_dn), 1e-15);
   RawDn tagged = frame(100, 1, 20);
   tagged.black_tag = BlackLevel{.pattern_dn = {383}};
-  EXPECT_NEAR(profile_at(unmeasured, tagged)->noise->scale[0], 1.0 / 16000, 1e-15);
+  EXPECT_NEAR(profile_at(unmeasured, tagged)->noise->scale[0], 1.0 / (16000 - dark_dn), 1e-15);
   CameraProfile one = two_gains();
   one.gains.pop_back();
   const auto only = profile_at(one, frame(std::nullopt, 1, 20));

@@ -378,6 +378,33 @@ TEST_F(Calibrate, AProfileWithoutBlackGivesItsNoise) {
   EXPECT_NE(Json::parse(used.out)[0]["black"]["source"], "profile");
 }
 
+TEST_F(Calibrate, AProfileWithADarkCurrentAloneAddsItToTheFilesPedestal) {
+  ASSERT_EQ(lowlux({"calibrate", "quoted", "HWK4123_low_gain", "-o", file("p.json")}).exit_code, 0);
+  const auto shot = lowlux({"simulate", "flat", "-o", file("n.dng"), "--sensor", "HWK4123_low_gain", "--exposure", "30",
+                            "--temperature", "25", "--luminance", "0.02", "--white-luminance", "60", "--no-truth"});
+  ASSERT_EQ(shot.exit_code, 0) << shot.err;
+  const auto developed = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> words{"develop", file("n.dng"), "-o", file("n.png"), "--json", "--force"};
+    words.insert(words.end(), options.begin(), options.end());
+    const auto out = lowlux(words);
+    EXPECT_EQ(out.exit_code, 0) << out.err;
+    return Json::parse(out.out)[0];
+  };
+  const Json tagged = developed({});
+  EXPECT_GT(tagged["unknown_dark_fraction"], 0.1);
+  const double pedestal_dn = tagged["black"]["pedestal_dn"][0];
+  for (const char* option : {"--profile", "--black"}) {
+    const Json known = developed({option, file("p.json")});
+    // 0.1 e-/s at 0 C, doubling every 8.56 degrees.
+    const double dark_e = 0.1 * std::exp2(25 / 8.56) * 30;
+    const double range_dn = 4095 - pedestal_dn;
+    EXPECT_GT(known["black"]["pedestal_dn"][0], pedestal_dn) << option;
+    EXPECT_LT(known["black"]["pedestal_dn"][0], pedestal_dn + dark_e / 100 * range_dn) << option;
+    EXPECT_TRUE(known["unknown_dark_fraction"].is_null()) << option;
+    EXPECT_EQ(known["warnings"].dump().find("noise is suspicious"), std::string::npos) << known["warnings"].dump();
+  }
+}
+
 TEST_F(Calibrate, NothingIsOverwrittenWithoutForce) {
   ASSERT_EQ(lowlux({"calibrate", "quoted", "thesis", "-o", file("p.json")}).exit_code, 0);
   const std::string before = scratch_.read("p.json");

@@ -164,6 +164,36 @@ TEST(BlackPoint, GivenFiguresAreTakenAsTheyAre) {
   EXPECT_FALSE(choose_black(raw, {BlackChoice::given, {5000, 0, 0, 0}}));
 }
 
+TEST(BlackPoint, KnownDarkChargeIsAddedToATagAndToGivenFigures) {
+  RawDn raw = test::bayer_frame(8, 8, BayerPhase::rggb, [](int, int) { return 900; });
+  const PerSite<double> dark{10, 20, 30, 40};
+  raw.black_tag = BlackLevel{.pattern_dn = {520}};
+  for (const BlackChoice choice : {BlackChoice::automatic, BlackChoice::metadata, BlackChoice::given}) {
+    const auto black = choose_black(raw, {.choice = choice, .given_dn = {520, 520, 520, 520}, .dark_dn = dark});
+    ASSERT_TRUE(black);
+    EXPECT_EQ(black->pedestal_dn, (PerSite<double>{530, 540, 550, 560}));
+    EXPECT_EQ(black->holds, BlackPoint::Holds::pedestal_and_dark);
+    EXPECT_FALSE(black->pattern);
+  }
+  const auto without = choose_black(raw, {});
+  ASSERT_TRUE(without);
+  EXPECT_EQ(without->holds, BlackPoint::Holds::pedestal_only);
+  // A pattern of three columns, and offsets of its rows.
+  raw.black_tag = BlackLevel{.columns = 3, .pattern_dn = {1, 2, 3}, .row_dn = {0, 1, 2, 3, 4, 5, 6, 7}};
+  const auto fine = choose_black(raw, {.dark_dn = dark});
+  ASSERT_TRUE(fine && fine->pattern);
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 8; ++x) {
+      EXPECT_EQ(fine->pattern->at(x, y), raw.black_tag->at(x, y) + dark[site_of(x, y)]) << x << ' ' << y;
+    }
+  }
+  // Masked pixels hold it already.
+  const auto masked = choose_black(frame_with_masked_columns(3), {.dark_dn = dark});
+  const auto same = choose_black(frame_with_masked_columns(3), {});
+  ASSERT_TRUE(masked && same);
+  EXPECT_EQ(masked->pedestal_dn, same->pedestal_dn);
+}
+
 TEST(BlackPoint, LargePatternsAndRowOffsetsAreKeptWhole) {
   RawDn raw = frame_with_masked_columns(11);
   raw.black_tag = BlackLevel{.rows = 4, .columns = 4, .pattern_dn = std::vector<double>(16, 500.0)};

@@ -105,6 +105,10 @@ std::string explain_text(const isp::DevelopPlan& plan) {
       "black [DN]",
       fmt::format("{:.2f} from {}{}", fmt::join(plan.levels.black.pedestal_dn, " "), name_of(plan.levels.black.source),
                   plan.levels.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", dark charge in it" : ""));
+  if (plan.unknown_dark_fraction) {
+    out.add("dark", fmt::format("unknown; up to {:.0f} % of the charge of the median block",
+                                100 * *plan.unknown_dark_fraction));
+  }
   if (plan.effects) add_effects(out, *plan.effects, *plan.options.effects);
   out.add("defects", fmt::format("{} pixels repaired", plan.levels.defects.size()));
   add_noise(out, plan.noise_reduction);

@@ -25,10 +25,16 @@ Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choi
   isp::BlackRequest& black = options.black;
   auto found = calib::profile_at(profile, frame.raw, choice.gain_setting);
   if (!found) return tl::make_unexpected(found.error());
-  if (!found->black && !choice.everything) {
+  const bool knows_dark = found->dark_mean_e != PerSite<double>{};
+  if (!found->black && !knows_dark && !choice.everything) {
     return fail(ErrorCode::insufficient,
-                "the profile holds no black level: add one with `calibrate black --add-to`, or use what else it holds "
-                "with --profile");
+                "the profile holds no black level and no dark current: add them with `calibrate black --add-to`, "
+                "or use what else it holds with --profile");
+  }
+  if (!found->black && knows_dark) {  // the pedestal is the file's
+    for (int site = 0; site < 4; ++site) {
+      black.dark_dn[site] = found->sensor->system_gain_dn_per_e * found->dark_mean_e[site];
+    }
   }
   if (found->black && black.choice == isp::BlackChoice::automatic) {
     black.choice = isp::BlackChoice::measured;

@@ -181,6 +181,7 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"height", outcome.height},
             {"black", black_json(plan.levels.black)},
             {"dark_frame", dark_json(plan.levels.dark_frame.get())},
+            {"unknown_dark_fraction", plan.unknown_dark_fraction ? Json(*plan.unknown_dark_fraction) : Json(nullptr)},
             {"unit", plan.levels.electrons_at_white ? "electrons" : "fraction-of-white"},
             {"white_balance", white_json(plan)},
             {"exposure", {{"ev", plan.rendering.exposure_ev}, {"rule", plan.rendering.exposure_rule}}},

@@ -1,0 +1,92 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "isp/pipeline/develop.h"
+#include "isp/pipeline/plan/plan_develop.h"
+#include "isp/pipeline/render/pipeline.h"
+#include "tests/pipeline/night_frames.h"
+
+namespace lowlux::isp {
+namespace {
+
+PoolExecutor executor(2);
+
+/// A grey ramp, black at its left, over dark charge; black is tagged.
+RawFrame ramp_over_dark(double dark_e, double floor_e, double exposure_s) {
+  const auto scene = [floor_e](int x, int) {
+    const double e = floor_e + 0.5 * x;
+    return std::array{e / 2, e, e / 1.5};
+  };
+  RawFrame frame = test::night_frame({.dark_e = {dark_e, dark_e, dark_e, dark_e}}, scene, 320, 256);
+  frame.raw.info.exposure_s = exposure_s;
+  return frame;
+}
+
+DevelopPlan planned(const RawFrame& frame, const DevelopOptions& options = {}) {
+  Result<DevelopPlan> plan = plan_develop(frame, options, executor);
+  EXPECT_TRUE(plan) << plan.error().message;
+  return *std::move(plan);
+}
+
+bool warns(const DevelopPlan& plan) {
+  return std::ranges::any_of(plan.warnings, [](const std::string& warning) {
+    return warning.find("the dark charge is unknown") != std::string::npos;
+  });
+}
+
+TEST(UnknownDark, IsWarnedOfWithItsLargestSize) {
+  const DevelopPlan plan = planned(ramp_over_dark(200, 0, 1));
+  ASSERT_TRUE(plan.unknown_dark_fraction);
+  // Of 200 e- in the darkest block, the median has 0.71 * 80 e- more on average over the colours.
+  EXPECT_NEAR(*plan.unknown_dark_fraction, 200 / (200 + 0.79 * 80), 0.05);
+  EXPECT_TRUE(warns(plan));
+}
+
+TEST(UnknownDark, IsNotMentionedWhereItIsKnownOrCannotMatter) {
+  DevelopOptions with_dark;
+  with_dark.black.dark_dn.fill(200 * test::night_gain_dn_per_e);
+  EXPECT_FALSE(warns(planned(ramp_over_dark(200, 0, 1), with_dark))) << "known from a profile";
+  EXPECT_FALSE(warns(planned(ramp_over_dark(0, 0, 1)))) << "the darkest block has no charge";
+  EXPECT_FALSE(warns(planned(ramp_over_dark(0, 50, 1.0 / 60)))) << "a short exposure";
+  RawFrame cold = ramp_over_dark(0, 50, 1);
+  cold.raw.info.temperature_c = -20;
+  EXPECT_FALSE(warns(planned(cold))) << "a cooled sensor";
+  RawFrame unstated = ramp_over_dark(200, 0, 1);
+  unstated.raw.info.exposure_s.reset();
+  EXPECT_FALSE(warns(planned(unstated))) << "no exposure time";
+}
+
+TEST(UnknownDark, KnownChargeOfATaggedBlackKeepsColourAndNoiseModel) {
+  // Twice as much red as blue, over dark charge of four times the signal.
+  const auto scene = [](int x, int) {
+    const double e = 20 + 0.1 * x;
+    return std::array{e, e, e / 2};
+  };
+  RawFrame frame = test::night_frame({.dark_e = {100, 100, 100, 100}}, scene, 320, 256);
+  frame.raw.info.exposure_s = 1;
+  // A profile's noise is relative to white less pedestal and dark charge, and includes that of the dark charge.
+  const double full_e = test::night_full_e() - 100, wider = test::night_full_e() / full_e;
+  for (double& scale : frame.noise->scale) scale *= wider;
+  for (double& offset : frame.noise->offset) offset = offset * wider * wider + 100 / (full_e * full_e);
+  DevelopOptions options;
+  options.black.dark_dn.fill(100 * test::night_gain_dn_per_e);
+  options.denoise = {.mode = DenoiseChoice::Mode::level, .level = denoise::Level::standard};
+  const DevelopPlan plan = planned(frame, options);
+  EXPECT_FALSE(std::ranges::any_of(plan.warnings, [](const std::string& warning) {
+    return warning.find("noise is suspicious") != std::string::npos;
+  }));
+  Pipeline pipeline(executor);
+  const PlaneView<const float> signal = pipeline.signal(frame, plan);
+  double sum = 0;
+  for (int y = 0; y < signal.height; ++y) {
+    for (int x = 0; x < signal.width; ++x) sum += static_cast<double>(signal.at(x, y));
+  }
+  const double mean_e = (20 + 0.1 * 159.5) * (1 + 2 + 0.5) / 4;
+  // Five standard errors of photons, dark charge and read noise.
+  EXPECT_NEAR(sum / (320 * 256), mean_e, 5 * std::sqrt((mean_e + 100 + 4) / (320 * 256)));
+}
+
+}  // namespace
+}  // namespace lowlux::isp
