@@ -153,34 +153,48 @@ int ResidualBand<Mosaic>::advance() {
   return end;
 }
 
-/// Reads row y of a block, and takes each quantity as far as it then can be: the result is row y - 12.
+/// Reads row y of a block, and takes each quantity as far as it then can be: the result is row y - reach.
 template <class Mosaic>
 void ResidualBand<Mosaic>::add_row(const Block& block, int y) const {
+  read_row(block, y);
+  add_green(block, y);
+  add_differences(block, y);
+  if (y - reach >= band_.first) finish_row(block, y - reach);
+}
+
+template <class Mosaic>
+bool ResidualBand<Mosaic>::own_is_odd(int y) const {
+  const bool has_red = (y & 1) == red_row(in_.phase);
+  return (red_column(in_.phase) != 0) == has_red;
+}
+
+/// Reads and encodes row y, columns beyond the borders of the mosaic mirrored.
+template <class Mosaic>
+void ResidualBand<Mosaic>::read_row(const Block& block, int y) const {
   const int width = width_of(in_), height = height_of(in_), pairs = block.pairs;
-  const auto own_is_odd = [&](int row) {
-    const bool has_red = (row & 1) == red_row(in_.phase);
-    return (red_column(in_.phase) != 0) == has_red;
+  const auto runs = [&](Quantity quantity) {
+    const SiteRow sites = block.sites(quantity, y);
+    return own_is_odd(y) ? SplitRow{sites.green, sites.own} : SplitRow{sites.own, sites.green};
   };
-  const auto shift = [&](int row) { return own_is_odd(row) ? 1 : 0; };
-  const auto starts = [&](int row, int rows_beyond) { return row >= band_.first - rows_beyond; };
-  {
-    const auto runs = [&](Quantity quantity) {
-      const SiteRow sites = block.sites(quantity, y);
-      return own_is_odd(y) ? SplitRow{sites.green, sites.own} : SplitRow{sites.own, sites.green};
-    };
-    const SplitRow values = runs(linear), codes = runs(encoded);
-    const int begin = std::max(block.first - halo, 0), end = std::min(block.first + 2 * pairs + halo, width);
-    const int before = (block.first - begin) / 2;
-    split_row(columns_of(in_, begin, end - begin), mirror(y, height), {values.even - before, values.odd - before});
-    const auto copy_mirrored = [&](int x) {
-      ((x & 1) != 0 ? values.odd : values.even)[x >> 1] = at(values, mirror(block.first + x, width) - block.first);
-    };
-    for (int x = -halo; x < begin - block.first; ++x) copy_mirrored(x);
-    for (int x = end - block.first; x < 2 * pairs + halo; ++x) copy_mirrored(x);
-    for (const auto& [from, to] : {std::pair{values.even, codes.even}, std::pair{values.odd, codes.odd}}) {
-      rows::encode_row(from - rows::run_margin, clip_, encoding_, pairs + 2 * rows::run_margin, to - rows::run_margin);
-    }
+  const SplitRow values = runs(linear), codes = runs(encoded);
+  const int begin = std::max(block.first - halo, 0), end = std::min(block.first + 2 * pairs + halo, width);
+  const int before = (block.first - begin) / 2;
+  split_row(columns_of(in_, begin, end - begin), mirror(y, height), {values.even - before, values.odd - before});
+  const auto copy_mirrored = [&](int x) {
+    ((x & 1) != 0 ? values.odd : values.even)[x >> 1] = at(values, mirror(block.first + x, width) - block.first);
+  };
+  for (int x = -halo; x < begin - block.first; ++x) copy_mirrored(x);
+  for (int x = end - block.first; x < 2 * pairs + halo; ++x) copy_mirrored(x);
+  for (const auto& [from, to] : {std::pair{values.even, codes.even}, std::pair{values.odd, codes.odd}}) {
+    rows::encode_row(from - rows::run_margin, clip_, encoding_, pairs + 2 * rows::run_margin, to - rows::run_margin);
   }
+}
+
+/// Computes differences of row y - 2 to green of row y - 6, each where a row of the band needs it.
+template <class Mosaic>
+void ResidualBand<Mosaic>::add_green(const Block& block, int y) const {
+  const int pairs = block.pairs;
+  const auto starts = [&](int row, int rows_beyond) { return row >= band_.first - rows_beyond; };
   if (const int k = y - 2; starts(k, 10)) {
     rows::difference_row({{block.at(encoded, k - 2), block.at(encoded, k - 1), block.at(encoded, k),
                            block.at(encoded, k + 1), block.at(encoded, k + 2)},
@@ -216,6 +230,13 @@ void ResidualBand<Mosaic>::add_row(const Block& block, int y) const {
     for (int j = 0; j < 9; ++j) in.vertical[j] = block.at(vertical, k - 4 + j);
     rows::green_row(in, pairs);
   }
+}
+
+/// Computes slopes of row y - 8 to interpolated differences of row y - 11.
+template <class Mosaic>
+void ResidualBand<Mosaic>::add_differences(const Block& block, int y) const {
+  const int pairs = block.pairs;
+  const auto starts = [&](int row, int rows_beyond) { return row >= band_.first - rows_beyond; };
   if (const int k = y - 8; starts(k, 4)) {
     rows::slope_row({{block.run(green, k - 2), block.run(green, k), block.run(green, k + 2)},
                      {block.run(difference, k - 2), block.run(difference, k), block.run(difference, k + 2)},
@@ -242,25 +263,28 @@ void ResidualBand<Mosaic>::add_row(const Block& block, int y) const {
                                  block.sites(other, k)},
                                 pairs);
   }
-  if (const int k = y - reach; starts(k, 0)) {
-    const int own = (k & 1) == red_row(in_.phase) ? 0 : 2, first = block.first / 2;
-    const auto runs = [&](float* SplitRow::*column) -> rows::ColourRuns {
-      return {made(k, own).*column + first, made(k, 1).*column + first, made(k, 2 - own).*column + first};
-    };
-    const rows::FinishRows in{
-        .linear = block.at(linear, k),
-        .green_at_own = block.run(green, k),
-        .green = block.run(encoded, k, 1),
-        .own = {{block.run(other, k - 1, 1), block.run(difference, k), block.run(other, k + 1, 1)},
-                {block.run(other, k - 1), block.run(own_at_green, k), block.run(other, k + 1)}},
-        .other = {{block.run(own_at_green, k - 1), block.run(other, k), block.run(own_at_green, k + 1)},
-                  {block.run(difference, k - 1), block.run(other, k, 1), block.run(difference, k + 1)}},
-        .shift = shift(k),
-        .median = median_,
-        .at_own = runs(own_is_odd(k) ? &SplitRow::odd : &SplitRow::even),
-        .at_green = runs(own_is_odd(k) ? &SplitRow::even : &SplitRow::odd)};
-    rows::finish_row(in, encoding_, pairs);
-  }
+}
+
+template <class Mosaic>
+void ResidualBand<Mosaic>::finish_row(const Block& block, int k) const {
+  const int pairs = block.pairs;
+  const int own = (k & 1) == red_row(in_.phase) ? 0 : 2, first = block.first / 2;
+  const auto runs = [&](float* SplitRow::*column) -> rows::ColourRuns {
+    return {made(k, own).*column + first, made(k, 1).*column + first, made(k, 2 - own).*column + first};
+  };
+  const rows::FinishRows in{
+      .linear = block.at(linear, k),
+      .green_at_own = block.run(green, k),
+      .green = block.run(encoded, k, 1),
+      .own = {{block.run(other, k - 1, 1), block.run(difference, k), block.run(other, k + 1, 1)},
+              {block.run(other, k - 1), block.run(own_at_green, k), block.run(other, k + 1)}},
+      .other = {{block.run(own_at_green, k - 1), block.run(other, k), block.run(own_at_green, k + 1)},
+                {block.run(difference, k - 1), block.run(other, k, 1), block.run(difference, k + 1)}},
+      .shift = shift(k),
+      .median = median_,
+      .at_own = runs(own_is_odd(k) ? &SplitRow::odd : &SplitRow::even),
+      .at_green = runs(own_is_odd(k) ? &SplitRow::even : &SplitRow::odd)};
+  rows::finish_row(in, encoding_, pairs);
 }
 
 template class ResidualBand<DnMosaic>;

@@ -33,6 +33,12 @@ class ResidualBand {
  private:
   struct Block;
   void add_row(const Block& block, int y) const;
+  void read_row(const Block& block, int y) const;
+  void add_green(const Block& block, int y) const;
+  void add_differences(const Block& block, int y) const;
+  void finish_row(const Block& block, int y) const;
+  bool own_is_odd(int y) const;
+  int shift(int y) const { return own_is_odd(y) ? 1 : 0; }
   rows::SplitRow made(int y, int colour) const;
 
   Mosaic in_;
