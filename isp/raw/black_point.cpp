@@ -84,8 +84,8 @@ BlackPoint with_dark(BlackPoint black, const PerSite<double>& dark_dn) {
 
 Result<BlackPoint> tagged_black(const RawDn& raw, const BlackRequest& request, const std::string& why_not_measured) {
   Result<BlackPoint> black = black_from_tag(raw, why_not_measured);
-  if (black) *black = with_dark(*std::move(black), request.dark_dn);
-  return black;
+  if (!black) return black;
+  return with_dark(*std::move(black), request.dark_dn);
 }
 
 Result<BlackPoint> requested_black(const RawDn& raw, const BlackRequest& request) {
