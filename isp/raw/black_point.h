@@ -20,7 +20,7 @@ struct BlackRequest {
   /// States the known dark charge of the frame, system gain times dark current times exposure time [DN]: it is added to
   /// a pedestal that is tagged or given. Masked pixels and a measured black point include it already.
   PerSite<double> dark_dn{};
-  BlackPoint measured;         // for BlackChoice::measured
+  BlackPoint measured;  // for BlackChoice::measured
 };
 
 /// Returns the black point as requested. Errors: insufficient when the source has neither masked pixels nor a tag

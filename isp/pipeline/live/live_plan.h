@@ -63,7 +63,7 @@ struct LiveFacts {
   std::optional<double> exposure_ev;            // absent: automatic
   double saturation = 1;                        // of the image's colours, 0..4
   DemosaicMethod max_demosaic = DemosaicMethod::residual_median;  // that there is time for
-  bool follows = true;                          // the previous frame; false forgets previous frames and their noise
+  bool follows = true;  // the previous frame; false forgets previous frames and their noise
   LiveDenoise denoise;
 };
 
