@@ -53,6 +53,9 @@ TEST(UnknownDark, IsNotMentionedWhereItIsKnownOrCannotMatter) {
   RawFrame cold = ramp_over_dark(0, 50, 1);
   cold.raw.info.temperature_c = -20;
   EXPECT_FALSE(warns(planned(cold))) << "a cooled sensor";
+  RawFrame clean = ramp_over_dark(200, 0, 1);
+  clean.noise->reduced = true;
+  EXPECT_FALSE(warns(planned(clean))) << "denoised before";
   RawFrame unstated = ramp_over_dark(200, 0, 1);
   unstated.raw.info.exposure_s.reset();
   EXPECT_FALSE(warns(planned(unstated))) << "no exposure time";

@@ -10,8 +10,8 @@ constexpr double min_encoded_noisy_e = 50;  // encoded noise of less light has a
 constexpr double max_median_e = 100;        // from 200 e- on, medians cost detail where colours are weakly correlated
 constexpr double offset_e = 4;
 constexpr float offset_of_white = 3e-3f;  // where the gain is not known
-// Order of magnitude of the variance that noise reduction leaves of a raw value's. Ten times as much changes the result
-// by 0.02 dB.
+// Order of magnitude of the variance that noise reduction leaves of a raw value's: it sets the floor of gradients, on
+// which the result depends little.
 constexpr double residual_fraction = 1.0 / 16;
 
 bool came_reduced(const RawFrame& frame) { return frame.noise && frame.noise->reduced; }

@@ -72,13 +72,14 @@ Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels
   return out;
 }
 
-// Returns DevelopPlan::unknown_dark_fraction for a Bayer frame whose gain and exposure time are known.
+// Returns DevelopPlan::unknown_dark_fraction for a Bayer frame whose gain and exposure time are known. Of a raw that
+// came denoised its maker knew more: `lowlux denoise` subtracts dark charge, or warns.
 std::optional<double> find_unknown_dark(const RawFrame& frame, const RawLevels& levels, const Thumbnail& thumbnail) {
   // Dark current that few sensors exceed uncooled: that of the GSENSE4040BSI at 25 C by its data sheet.
   constexpr double high_current_e_per_s = 25, at_c = 25, doubling_c = 7, min_charge_e = 2, min_fraction = 0.1;
   const FrameInfo& info = frame.raw.info;
   const bool is_unknown = frame.raw.layout == SensorLayout::bayer && levels.electrons_at_white && !levels.dark_frame &&
-                          levels.black.holds == BlackPoint::Holds::pedestal_only &&
+                          !frame.noise->reduced && levels.black.holds == BlackPoint::Holds::pedestal_only &&
                           levels.black.dark_mean_e == PerSite<double>{};
   if (!is_unknown || !info.exposure_s) return std::nullopt;
   const double factor = std::exp2((info.temperature_c.value_or(at_c) - at_c) / doubling_c);
