@@ -64,11 +64,11 @@ struct Shrink {
   static rows::BlockSums sums(const BlockMemory& m, int y0) {
     rows::BlockSums out{};
     for (int p = 0; p < 4; ++p) {
-      for (int y = 0; y < block; ++y) out.value[p][y] = m.value[p][(y0 + y) % block];
-      for (int y = 0; y < block / 2; ++y) {
-        out.weight[p][y] = m.weight[p][(y0 / 2 + y) % 4];
-        out.residual[p][y] = m.residual[p][(y0 / 2 + y) % 4];
+      for (int y = 0; y < block; ++y) {
+        out.value[p][y] = m.value[p][(y0 + y) % block];
+        out.weight[p][y] = m.weight[p][(y0 + y) % block];
       }
+      for (int y = 0; y < block / 2; ++y) out.residual[p][y] = m.residual[p][(y0 / 2 + y) % 4];
     }
     return out;
   }
@@ -79,15 +79,18 @@ struct Shrink {
   void finish(const BlockMemory& m, int y, bool inside) const {
     const PyramidLevel& at = level();
     for (int p = 0; p < planes_of(frame, l); ++p) {
-      float *const upper = m.value[p][y % block], *const lower = m.value[p][(y + 1) % block];
-      float *const weight = m.weight[p][y / 2 % 4], *const residual = m.residual[p][y / 2 % 4];
+      const auto& value = m.value[p];
+      const auto& weight = m.weight[p];
+      const int upper = y % block, lower = (y + 1) % block;
+      float* const residual = m.residual[p][y / 2 % 4];
       if (inside) {
-        rows::finish_rows({{upper, lower}, weight, residual, at.width}, m.weights,
+        rows::finish_rows({{value[upper], value[lower]}, {weight[upper], weight[lower]}, residual, at.width},
                           {{at.value[pass].row(p, y), at.value[pass].row(p, y + 1)}, at.residual.row(p, y / 2)});
       }
-      clear(upper, at.width);
-      clear(lower, at.width);
-      clear(weight, at.width / 2);
+      for (const int row : {upper, lower}) {
+        clear(value[row], at.width);
+        clear(weight[row], at.width);
+      }
       clear(residual, at.width / 2);
     }
   }

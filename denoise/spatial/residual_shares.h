@@ -30,10 +30,10 @@ constexpr ResidualShares residual_fractions(PlaneKind kind, int pass, int step, 
     float coarser;
   };
   const int recipe = pass == 0 ? 0 : step == 4 ? 1 : 2;
-  constexpr Other other[2][3] = {{{50.6e-6f, 1.0e-6f}, {40.9e-6f, 4.9e-6f}, {17.1e-6f, 2.0e-6f}},
-                                 {{19.4e-6f, 4.2e-6f}, {20.2e-6f, 4.5e-6f}, {7.8e-6f, 2.0e-6f}}};
+  constexpr Other other[2][3] = {{{66.6e-6f, 2.5e-6f}, {40.6e-6f, 3.9e-6f}, {20.4e-6f, 1.1e-6f}},
+                                 {{10.0e-6f, 4.0e-6f}, {9.6e-6f, 4.1e-6f}, {7.7e-6f, 1.9e-6f}}};
   const Other& o = other[kind == PlaneKind::luma ? 0 : 1][recipe];
-  const float mean = (recipe == 2 ? 0.473f : 0.5625f) / 64;
+  const float mean = (recipe == 2 ? 0.473f : 0.623f) / 64;
   return {level == 0 ? 1.0f / 64 : 0.25f / 64, level == 0 ? o.finest : o.coarser, level + 1 == levels ? mean : 0};
 }
 
@@ -63,6 +63,6 @@ constexpr PatchShares patch_fractions(PlaneKind kind, FoundBy found_by) {
 
 /// Factor on the noise of a coarser level where chroma starts there: no finer level reduces it. It does not apply to
 /// the coarsest level.
-inline constexpr double as_finest = 2.8;
+inline constexpr double as_finest = 2.5;
 
 }  // namespace lowlux::denoise

@@ -9,6 +9,7 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cstddef>
 
 #include "denoise/spatial/dct-inl.h"
@@ -28,13 +29,35 @@ constexpr int places = lead + run;
 struct Strip {
   float noisy[8][4][run];  // vertical frequency, phase, place
   float pilot[8][4][run];
-  float luma[64][run];      // 1 where the luma coefficient is kept, else 0
+  /// Of luma, for chroma: with hard thresholds 1 where a coefficient is kept, else 0; with Wiener gains the square of
+  /// the pilot's coefficient, 0 for the mean.
+  float luma[64][run];
+  float luma_power[run];    // of the pilot's luma: the sum of these squares, and 4 V
   float value[64][places];  // vertical frequency and column of blocks, before the inverse vertical transform
-  float weight[places];
+  float weight[4][places];  // times each of the window's values
 };
+
+/// Returns which of the window's values row or column i of a block has: a block has eight rows and four values, of
+/// which blocks 2 cells apart use the first alone.
+template <int kStep>
+constexpr int window_index(int i) {
+  return kStep == 4 ? std::min(i, 7 - i) : 0;
+}
+
+/// Returns the window in row or column i of a block. Blocks 4 cells apart have one that rises towards the middle and
+/// adds up to the same in each cell, so that the edges of single blocks do not show; blocks 2 cells apart need none.
+template <int kStep>
+constexpr float window(int i) {
+  constexpr float rising[4] = {2, 3, 5, 6};
+  return kStep == 4 ? rising[window_index<kStep>(i)] : 1;
+}
 
 template <int kStep>
 struct Interleaved;
+template <>
+struct Interleaved<1> {
+  static HWY_INLINE void store(const VF (&v)[1], float* to) { hn::StoreU(v[0], Floats(), to); }
+};
 template <>
 struct Interleaved<2> {
   static HWY_INLINE void load(const float* from, VF (&v)[2]) { hn::LoadInterleaved2(Floats(), from, v[0], v[1]); }
@@ -115,25 +138,65 @@ HWY_INLINE VF threshold(Strip& s, int place, const Rule& rule) {
   return power;
 }
 
-/// Applies empirical Wiener gains to one group of blocks, and returns the sum of their squares.
+/// Stores the squares of the pilot's coefficients for one group of blocks, 0 for the mean, and returns their sum.
+/// @param square  64 vectors, `stride` floats apart
 template <int kStep>
-HWY_INLINE VF wiener(Strip& s, int place, VF variance) {
-  VF power = hn::Zero(Floats());
+HWY_INLINE VF pilot_squares(const Strip& s, int place, float* square, std::ptrdiff_t stride) {
+  VF sum = hn::Zero(Floats());
   for (int v = 0; v < 8; ++v) {
-    VF gain[8], x[8];
-    coefficients<kStep>(s.pilot[v], place, gain);
-    for (VF& g : gain) {
-      const VF square = hn::Mul(g, g);
-      g = hn::Div(square, hn::Add(square, variance));
+    VF x[8];
+    coefficients<kStep>(s.pilot[v], place, x);
+    if (v == 0) x[0] = hn::Zero(Floats());
+    for (int u = 0; u < 8; ++u) {
+      const VF power = hn::Mul(x[u], x[u]);
+      sum = hn::Add(sum, power);
+      store(power, square + (8 * v + u) * stride);
     }
-    if (v == 0) gain[0] = constant(1);
-    for (const VF& g : gain) power = hn::MulAdd(g, g, power);
+  }
+  return sum;
+}
+
+/// Applies the gains P / (P + V) to one group of blocks, with P = power(i) of coefficient i, and returns the sum of
+/// their squares. The gain of the mean is 1.
+template <int kStep, class Power>
+HWY_INLINE VF wiener(Strip& s, int place, VF variance, const Power& power) {
+  VF sum = hn::Zero(Floats());
+  for (int v = 0; v < 8; ++v) {
+    VF x[8];
     coefficients<kStep>(s.noisy[v], place, x);
-    for (int u = 0; u < 8; ++u) x[u] = hn::Mul(x[u], gain[u]);
+    for (int u = 0; u < 8; ++u) {
+      const VF expected = power(8 * v + u);
+      VF gain = hn::Div(expected, hn::Add(expected, variance));
+      if (u == 0 && v == 0) gain = constant(1);
+      sum = hn::MulAdd(gain, gain, sum);
+      x[u] = hn::Mul(x[u], gain);
+    }
     inverse8(x);
     for (int c = 0; c < 8; ++c) store(x[c], s.value[8 * v + c] + lead + place);
   }
-  return power;
+  return sum;
+}
+
+/// Empirical Wiener gains of luma: P is the pilot's.
+template <int kStep>
+HWY_INLINE VF wiener_luma(Strip& s, int place, VF variance) {
+  const VF sum = pilot_squares<kStep>(s, place, s.luma[0] + place, run);
+  store(hn::MulAdd(constant(4), variance, sum), s.luma_power + place);
+  return wiener<kStep>(s, place, variance, [&](int i) HWY_ATTR { return load(s.luma[i] + place); });
+}
+
+/// Empirical Wiener gains of chroma, after those of luma: P is the larger of the pilot's and of a spectrum shaped like
+/// that of the luma, with three times the power of the pilot's chroma. The pilot has lost the fine structure of colour,
+/// which mostly lies where luma has its own.
+template <int kStep>
+HWY_INLINE VF wiener_chroma(Strip& s, int place, VF variance) {
+  HWY_ALIGN float square[64 * hn::MaxLanes(Floats())];
+  const int n = lanes();
+  const VF sum = pilot_squares<kStep>(s, place, square, n);
+  const VF per_luma = hn::Div(hn::Mul(constant(3), sum), load(s.luma_power + place));
+  return wiener<kStep>(s, place, variance, [&](int i) HWY_ATTR {
+    return hn::Max(hn::Mul(per_luma, load(s.luma[i] + place)), load(square + i * n));
+  });
 }
 
 /// Adds weighted, overlapping blocks to eight rows, through the inverse vertical transform.
@@ -148,8 +211,9 @@ HWY_INLINE void add_columns(const Strip& s, int count, int first_cell, float* co
       for (int v = 0; v < 8; ++v) {
         x[v] = hn::Zero(Floats());
         for (int m = 0; m < 8 / kStep; ++m) {
-          const int place = lead + k - m;
-          x[v] = hn::MulAdd(load(s.weight + place), load(s.value[8 * v + j + kStep * m] + place), x[v]);
+          const int place = lead + k - m, column = j + kStep * m;
+          const VF weight = load(s.weight[window_index<kStep>(column)] + place);
+          x[v] = hn::MulAdd(weight, load(s.value[8 * v + column] + place), x[v]);
         }
       }
       inverse8(x);
@@ -158,7 +222,10 @@ HWY_INLINE void add_columns(const Strip& s, int count, int first_cell, float* co
     for (int y = 0; y < 8; ++y) {
       Interleaved<kStep>::store(out[y], row);
       float* const to = rows[y] + first_cell + kStep * k;
-      for (int part = 0; part < kStep; ++part) store(hn::Add(load(to + part * n), load(row + part * n)), to + part * n);
+      const VF factor = constant(window<kStep>(y));
+      for (int part = 0; part < kStep; ++part) {
+        store(hn::MulAdd(factor, load(row + part * n), load(to + part * n)), to + part * n);
+      }
     }
   }
 }

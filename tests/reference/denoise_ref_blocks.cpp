@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <vector>
 
 #include "denoise/spatial/layout.h"
@@ -163,13 +164,40 @@ Block hard_gains(int p, const std::array<Block, 4>& f, const std::array<double, 
   return gain;
 }
 
-Block wiener_gains(const Block& pilot, double variance) {
+/// Returns the squares of all coefficients but the mean.
+Block power_of(const Block& f) {
+  Block out{};
+  for (int v = 0; v < block; ++v) {
+    for (int u = 0; u < block; ++u) out[v][u] = u == 0 && v == 0 ? 0 : f[v][u] * f[v][u];
+  }
+  return out;
+}
+
+double sum_of(const Block& in) {
+  double sum = 0;
+  for (const auto& row : in) sum = std::accumulate(row.begin(), row.end(), sum);
+  return sum;
+}
+
+/// Returns the gains of the coefficients of plane p (section "pass 2" of denoise/README.md).
+Block wiener_gains(int p, const std::array<Block, 4>& pilot, const std::array<double, 4>& variance) {
+  const Block own = power_of(pilot[p]), luma = power_of(pilot[0]);
+  const double per_luma = p == 0 ? 1 : 3 * sum_of(own) / (sum_of(luma) + 4 * variance[0]);
   Block gain{};
   for (int v = 0; v < block; ++v) {
-    for (int u = 0; u < block; ++u) gain[v][u] = pilot[v][u] * pilot[v][u] / (pilot[v][u] * pilot[v][u] + variance);
+    for (int u = 0; u < block; ++u) {
+      const double power = std::max(own[v][u], per_luma * luma[v][u]);
+      gain[v][u] = power / (power + variance[p]);
+    }
   }
   gain[0][0] = 1;
   return gain;
+}
+
+/// Returns the factor of row or column i of a block.
+double window(int i, int stride) {
+  constexpr std::array<double, block> rising{2, 3, 5, 6, 6, 5, 3, 2};
+  return stride == 4 ? rising[i] : 1;
 }
 
 }  // namespace
@@ -181,14 +209,15 @@ Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride
   for (Four* four : {&out.value, &out.residual, &weight}) four->fill(Image(w, h));
   for (int y0 = 0; y0 + block <= h; y0 += stride) {
     for (int x0 = 0; x0 + block <= w; x0 += stride) {
-      std::array<Block, 4> f;
+      std::array<Block, 4> f, of_pilot;
       std::array<double, 4> v{};
       for (int p = 0; p < 4; ++p) {
         f[p] = dct(x[p], x0, y0);
+        if (pilot != nullptr) of_pilot[p] = dct((*pilot)[p], x0, y0);
         for (int i = 0; i < block * block; ++i) v[p] += variance[p].at(x0 + i % block, y0 + i / block) / 64;
       }
       for (int p = 0; p < 4; ++p) {
-        const Block gain = pilot == nullptr ? hard_gains(p, f, v) : wiener_gains(dct((*pilot)[p], x0, y0), v[p]);
+        const Block gain = pilot == nullptr ? hard_gains(p, f, v) : wiener_gains(p, of_pilot, v);
         Block kept{};
         double power = 0;
         for (int i = 0; i < block * block; ++i) {
@@ -203,17 +232,21 @@ Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride
         const double residual = v[p] * (left.kept * (power - 1) + left.other * (64 - power) + left.mean);
         for (int i = 0; i < block * block; ++i) {
           const int at_x = x0 + i % block, at_y = y0 + i / block;
-          out.value[p].at(at_x, at_y) += share * value[i / block][i % block];
-          out.residual[p].at(at_x, at_y) += share * residual;
-          weight[p].at(at_x, at_y) += share;
+          const double part = share * window(i % block, stride) * window(i / block, stride);
+          out.value[p].at(at_x, at_y) += part * value[i / block][i % block];
+          out.residual[p].at(at_x, at_y) += part * residual;
+          weight[p].at(at_x, at_y) += part;
         }
       }
     }
   }
   for (int p = 0; p < 4; ++p) {
-    for (std::size_t i = 0; i < weight[p].v.size(); ++i) {
-      out.value[p].v[i] /= weight[p].v[i];
-      out.residual[p].v[i] /= weight[p].v[i];
+    for (std::size_t i = 0; i < weight[p].v.size(); ++i) out.value[p].v[i] /= weight[p].v[i];
+    const Image residual = down2(out.residual[p]), of_four = down2(weight[p]);  // known for 2x2 cells
+    for (int at_y = 0; at_y < h; ++at_y) {
+      for (int at_x = 0; at_x < w; ++at_x) {
+        out.residual[p].at(at_x, at_y) = residual.at(at_x / 2, at_y / 2) / of_four.at(at_x / 2, at_y / 2);
+      }
     }
   }
   return out;
