@@ -47,7 +47,7 @@ TEST(DenoiseScene, GainsAreUndoneSoThatGreyIsGrey) {
   EXPECT_NEAR(shot.signal_e.at(1, 1) * 1.5, shot.signal_e.at(1, 0), 1e-5);  // blue's 1.5
   InlineExecutor one;
   BenchRenderer renderer(32, one);
-  const RenderedPicture picture = renderer.render(shot.signal_e.view(), shot);
+  const RenderedPicture picture = renderer.render(shot.signal_e.view(), shot, NoiseLeft::none);
   for (const auto& plane : picture.display.plane) EXPECT_NEAR(plane.at(10, 11), 0.5, 1e-5);  // float kernels
   EXPECT_NEAR(picture.light.plane[2].at(10, 11), 0.5, 1e-5);
 }
@@ -67,7 +67,7 @@ TEST(DenoiseScene, NegativeLightIsBlackOnDisplayAndKeptAsLight) {
   std::fill_n(dark.data(), dark.size(), -3.0f);
   InlineExecutor one;
   BenchRenderer renderer(16, one);
-  const RenderedPicture picture = renderer.render(dark.view(), shot);
+  const RenderedPicture picture = renderer.render(dark.view(), shot, NoiseLeft::reduced);
   EXPECT_EQ(picture.display.plane[1].at(5, 5), 0);
   EXPECT_LT(picture.light.plane[1].at(5, 5), 0);
 }
@@ -80,7 +80,7 @@ TEST(DenoiseScene, TheExposureWithDarkKeepsTheMeanLuminance) {
   for (std::size_t i = 0; i < mean_e.size(); ++i) mean_e.data()[i] += 200.0f;
   InlineExecutor one;
   BenchRenderer renderer(32, one);
-  const auto with_dark = renderer.render(mean_e.view(), shot, exposure_with_dark(picture, shot)).light;
+  const auto with_dark = renderer.render(mean_e.view(), shot, NoiseLeft::none, exposure_with_dark(picture, shot)).light;
   const SceneLinear& linear = with_dark;
   const SceneLinear& truth = picture.linear;
   EXPECT_NEAR(patch_means(linear.view())[0].y, patch_means(truth.view())[0].y, 1e-5);  // float kernels

@@ -53,19 +53,20 @@ void subtract_dark(const DenoiseShot& shot, Plane<float>& out) {
 }
 
 Result<MethodResult> run_noise_free(const MethodInput& input, Level /*level*/, MethodMemory& memory) {
-  return MethodResult{.picture = memory.renderer.render(input.shot.signal_e.view(), input.shot)};
+  return MethodResult{.picture = memory.renderer.render(input.shot.signal_e.view(), input.shot, NoiseLeft::none)};
 }
 
 Result<MethodResult> run_none(const MethodInput& input, Level /*level*/, MethodMemory& memory) {
   MethodResult result;
   Plane<float> out = same_size(input);
   time_rounds(input, result, [&] { subtract_dark(input.shot, out); });
-  result.picture = memory.renderer.render(out.view(), input.shot);
+  result.picture = memory.renderer.render(out.view(), input.shot, NoiseLeft::all);
   return result;
 }
 
 RenderedPicture with_dark(const MethodInput& input, MethodMemory& memory) {
-  return memory.renderer.render(input.shot.raw_e.view(), input.shot, exposure_with_dark(input.picture, input.shot));
+  return memory.renderer.render(input.shot.raw_e.view(), input.shot, NoiseLeft::all,
+                                exposure_with_dark(input.picture, input.shot));
 }
 
 Result<MethodResult> run_dark_left_in(const MethodInput& input, Level /*level*/, MethodMemory& memory) {
@@ -89,7 +90,7 @@ Result<MethodResult> run_nl_means(const MethodInput& input, Level /*level*/, Met
   MethodResult result;
   Plane<float> out = same_size(input);
   subtract_dark(input.shot, out);
-  Encoded8 noisy = nl_means_input(memory.renderer.render(out.view(), input.shot));
+  Encoded8 noisy = nl_means_input(memory.renderer.render(out.view(), input.shot, NoiseLeft::all));
   Encoded8 clean{Plane<std::uint8_t>(noisy.codes.width(), noisy.codes.height())};
   const NlMeansPicture from{noisy.codes.data(), noisy.width(), noisy.height()};
   const NlMeansPicture to{clean.codes.data(), clean.width(), clean.height()};
@@ -110,7 +111,7 @@ Result<MethodResult> run_gat(const MethodInput& input, Level level, MethodMemory
   InlineExecutor one;
   time_rounds(input, result,
               [&] { gat_denoise(memory.denoiser, input.shot, level, input.tuned.stabilised_gain, out.view(), one); });
-  result.picture = memory.renderer.render(out.view(), input.shot);
+  result.picture = memory.renderer.render(out.view(), input.shot, NoiseLeft::reduced);
   return result;
 }
 
@@ -124,7 +125,7 @@ Result<MethodResult> run_denoiser(const MethodInput& input, Level level, MethodM
     memory.denoiser.run({input.shot.raw_e.view(), BayerPhase::rggb}, input.shot.noise(),
                         {.level = level, .white_gain = bench_white_gain}, out.view(), {}, one);
   });
-  result.picture = memory.renderer.render(out.view(), input.shot);
+  result.picture = memory.renderer.render(out.view(), input.shot, NoiseLeft::reduced);
   return result;
 }
 

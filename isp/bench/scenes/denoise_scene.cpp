@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <vector>
@@ -31,6 +32,12 @@ double mean_of(const Plane<float>& plane) {
   double sum = 0;
   for (std::size_t i = 0; i < plane.size(); ++i) sum += static_cast<double>(plane.data()[i]);
   return sum / static_cast<double>(plane.size());
+}
+
+/// Returns the method that the pipeline chooses.
+DemosaicMethod method_for(const DenoiseLight& light, NoiseLeft left) {
+  if (left == NoiseLeft::all && light.mean_e < 50) return DemosaicMethod::malvar;
+  return left != NoiseLeft::none && light.mean_e < 100 ? DemosaicMethod::residual_median : DemosaicMethod::residual;
 }
 
 }  // namespace
@@ -76,11 +83,19 @@ DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::ui
   return shot;
 }
 
-SignedMosaic mosaic_of(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, double exposure) {
+SignedMosaic mosaic_of(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, NoiseLeft left,
+                       DemosaicMethod method, double exposure) {
+  const double per_e = exposure / shot.white_e, kept = left == NoiseLeft::none  ? 0
+                                                       : left == NoiseLeft::all ? 1
+                                                                                : 1.0 / 16;
   SignedMosaic out{.value = mosaic_e, .phase = phase};
+  out.demosaic = {.method = method,
+                  .offset = static_cast<float>(4 * per_e),
+                  .noise_std = static_cast<float>(std::sqrt(kept * shot.light.mean_e) * per_e /
+                                                  (3 * std::pow((shot.light.mean_e + 4) * per_e, 2.0 / 3)))};
   for (int y = 0; y < 2; ++y) {
     for (int x = 0; x < 2; ++x) {
-      out.gain[static_cast<std::size_t>(site_of(x, y))] = static_cast<float>(gain_at(x, y) * exposure / shot.white_e);
+      out.gain[static_cast<std::size_t>(site_of(x, y))] = static_cast<float>(gain_at(x, y) * per_e);
     }
   }
   return out;
@@ -89,9 +104,9 @@ SignedMosaic mosaic_of(const PlaneView<const float>& mosaic_e, const DenoiseShot
 BenchRenderer::BenchRenderer(int max_width, Executor& executor)
     : executor_(executor), kernel_(max_width, executor.width()) {}
 
-RenderedPicture BenchRenderer::render(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot,
+RenderedPicture BenchRenderer::render(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, NoiseLeft left,
                                       double exposure) {
-  const SignedMosaic in = mosaic_of(mosaic_e, shot, exposure);
+  const SignedMosaic in = mosaic_of(mosaic_e, shot, left, method_for(shot.light, left), exposure);
   RenderedPicture out{SceneLinear(mosaic_e.width, mosaic_e.height), SceneLinear(mosaic_e.width, mosaic_e.height)};
   kernel_.linear(in, transform(true), out.display.view(), executor_);
   kernel_.linear(in, transform(false), out.light.view(), executor_);

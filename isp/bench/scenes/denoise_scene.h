@@ -46,11 +46,17 @@ std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light);
 /// @param picture  not black; at most poisson_max_mean electrons anywhere
 DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::uint64_t seed);
 
-/// Returns a mosaic [e-] in the renderer's form: gains that scale white_e to 1 and make white neutral.
-/// @param exposure  1 maps white_e to display white
-SignedMosaic mosaic_of(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, double exposure = 1);
+/// How much of a shot's noise a mosaic contains.
+enum class NoiseLeft { none, reduced, all };
 
-/// Renders mosaics alike for all methods: gains, Malvar-He-Cutler demosaicing, exposure that undoes the light.
+/// Returns a mosaic [e-] in the renderer's form: gains that scale white_e to 1 and make white neutral, and parameters
+/// of demosaicing as the pipeline chooses them for the noise.
+/// @param exposure  1 maps white_e to display white
+SignedMosaic mosaic_of(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, NoiseLeft left,
+                       DemosaicMethod method, double exposure = 1);
+
+/// Renders mosaics by the same rules for all methods: gains, the demosaicing that the pipeline would choose (see
+/// `plan_demosaic`), an exposure that undoes the light.
 class BenchRenderer {
  public:
   BenchRenderer(int max_width, Executor& executor);
@@ -58,7 +64,8 @@ class BenchRenderer {
   /// Renders a mosaic.
   /// @param mosaic_e  signed, as large as the shot's
   /// @param exposure  1 maps white_e to display white
-  RenderedPicture render(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, double exposure = 1);
+  RenderedPicture render(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, NoiseLeft left,
+                         double exposure = 1);
   /// Returns display values of signed linear Rec. 709: colours outside 0..1 move to the neutral of their luminance.
   SceneLinear display_of(const SceneLinear& light);
 

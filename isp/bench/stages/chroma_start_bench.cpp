@@ -75,7 +75,8 @@ struct Bench {
                       .largest = 0};
     for (Sample& sample : samples) {
       lowlux::isp::run(sample, memory.denoiser, options);
-      const RenderedPicture picture = memory.renderer.render(std::as_const(sample.signal_e).view(), sample.shot);
+      const RenderedPicture picture =
+          memory.renderer.render(std::as_const(sample.signal_e).view(), sample.shot, NoiseLeft::reduced);
       const ColourDifference error = display_difference(picture.display.view(), sample.truth, executor);
       out.error += error.mean / static_cast<double>(samples.size());
       out.largest = std::max(out.largest, error.largest);

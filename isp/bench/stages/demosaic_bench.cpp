@@ -26,9 +26,6 @@ constexpr DenoiseLight bright{200, 2, 1.5};
 /// Transform that leaves the kernel's camera RGB unchanged, so that demosaicing alone is measured.
 constexpr RgbTransform untouched{.clip = std::numeric_limits<float>::infinity(), .move_into_gamut = false};
 
-/// What a mosaic contains of its noise.
-enum class Noise { none, all, reduced };
-
 /// A mosaic, the truth behind it, and memory for the results.
 struct Sample {
   const BenchPicture& picture;
@@ -40,16 +37,9 @@ struct Sample {
   SceneLinear half;
   DoublePlanes exact;
 
-  /// Returns a mosaic with the parameters that the pipeline would choose for it.
-  SignedMosaic mosaic(Noise noise, DemosaicMethod method = DemosaicMethod::malvar) const {
-    const Plane<float>& of = noise == Noise::none ? shot.signal_e : noise == Noise::all ? noisy_e : clean_e;
-    SignedMosaic out = mosaic_of(of.view(), shot);
-    const double kept = noise == Noise::none ? 0 : noise == Noise::all ? 1 : 1.0 / 16;
-    out.demosaic = {.method = method,
-                    .offset = static_cast<float>(4 / shot.white_e),
-                    .noise_std = static_cast<float>(std::sqrt(kept * shot.light.mean_e) / shot.white_e /
-                                                    (3 * std::pow((shot.light.mean_e + 4) / shot.white_e, 2.0 / 3)))};
-    return out;
+  SignedMosaic mosaic(NoiseLeft noise, DemosaicMethod method = DemosaicMethod::malvar) const {
+    const Plane<float>& of = noise == NoiseLeft::none ? shot.signal_e : noise == NoiseLeft::all ? noisy_e : clean_e;
+    return mosaic_of(of.view(), shot, noise, method);
   }
 };
 
@@ -97,7 +87,7 @@ SceneLinear rounded(const DoublePlanes& exact) {
 /// One way from a sample's mosaic to RGB: the work, and its result as an image of full size.
 struct Method {
   std::string name;
-  std::function<void(Sample& sample, Noise noise, RawToRgb& kernel)> work;
+  std::function<void(Sample& sample, NoiseLeft noise, RawToRgb& kernel)> work;
   std::function<SceneLinear(const Sample& sample)> result;
 };
 
@@ -109,7 +99,7 @@ SceneLinear copy_of(const SceneLinear& image) {
 
 Method by_kernel(DemosaicMethod method) {
   return {std::string(name_of(method)),
-          [method](Sample& sample, Noise noise, RawToRgb& kernel) {
+          [method](Sample& sample, NoiseLeft noise, RawToRgb& kernel) {
             InlineExecutor one;
             kernel.linear(sample.mosaic(noise, method), untouched, sample.light.view(), one);
           },
@@ -120,7 +110,7 @@ std::vector<Method> methods() {
   const auto exact = [](const Sample& sample) { return rounded(sample.exact); };
   return {
       {"half (2x2 means)",
-       [](Sample& sample, Noise noise, RawToRgb& kernel) {
+       [](Sample& sample, NoiseLeft noise, RawToRgb& kernel) {
          InlineExecutor one;
          kernel.bin2x2(sample.mosaic(noise), sample.half.view(), one);
        },
@@ -132,9 +122,10 @@ std::vector<Method> methods() {
       by_kernel(DemosaicMethod::residual),
       by_kernel(DemosaicMethod::residual_median),
       {"bilinear, double",
-       [](Sample& sample, Noise noise, RawToRgb&) { demosaic_bilinear(sample.mosaic(noise), sample.exact); }, exact},
+       [](Sample& sample, NoiseLeft noise, RawToRgb&) { demosaic_bilinear(sample.mosaic(noise), sample.exact); },
+       exact},
       {"malvar, double",
-       [](Sample& sample, Noise noise, RawToRgb&) { demosaic_malvar(sample.mosaic(noise), sample.exact); }, exact}};
+       [](Sample& sample, NoiseLeft noise, RawToRgb&) { demosaic_malvar(sample.mosaic(noise), sample.exact); }, exact}};
 }
 
 /// Data that all groups use.
@@ -145,7 +136,7 @@ struct Bench {
   BenchRenderer renderer;
   Executor& executor;
 
-  AccuracyLevel level(const Method& method, std::vector<Sample>& of, Noise noise) {
+  AccuracyLevel level(const Method& method, std::vector<Sample>& of, NoiseLeft noise) {
     AccuracyLevel out{.name = method.name,
                       .run =
                           [this, method, &of, noise] {
@@ -168,8 +159,8 @@ struct Bench {
     double sum = 0, values = 0, largest = 0;
     for (Sample& sample : samples) {
       InlineExecutor one;
-      kernel.linear(sample.mosaic(Noise::all), untouched, sample.light.view(), one);
-      demosaic_malvar(sample.mosaic(Noise::all), sample.exact);
+      kernel.linear(sample.mosaic(NoiseLeft::all), untouched, sample.light.view(), one);
+      demosaic_malvar(sample.mosaic(NoiseLeft::all), sample.exact);
       for (std::size_t c = 0; c < 3; ++c) {
         for (std::size_t i = 0; i < sample.exact[c].size(); ++i) {
           const double difference = std::abs(sample.light.plane[c].data()[i] - sample.exact[c].data()[i]);
@@ -187,16 +178,16 @@ struct Bench {
 std::vector<AccuracyGroup> groups_of(Bench& bench) {
   std::vector<AccuracyGroup> out;
   const std::vector<Method> all = methods();
-  const auto add = [&](const std::string& name, std::vector<Sample>& samples, Noise noise) {
+  const auto add = [&](const std::string& name, std::vector<Sample>& samples, NoiseLeft noise) {
     AccuracyGroup group{name, "mean CIEDE2000 against the truth", {}};
     group.levels.reserve(all.size());
     for (const Method& method : all) group.levels.push_back(bench.level(method, samples, noise));
     out.push_back(std::move(group));
   };
-  add("no noise", bench.samples, Noise::none);
-  add(fmt::format("{:g} e-, denoised by standard", bright.mean_e), bench.bright_samples, Noise::reduced);
-  add(fmt::format("{:g} e-, denoised by standard", dim.mean_e), bench.samples, Noise::reduced);
-  add(fmt::format("{:g} e-, noise left in", dim.mean_e), bench.samples, Noise::all);
+  add("no noise", bench.samples, NoiseLeft::none);
+  add(fmt::format("{:g} e-, denoised by standard", bright.mean_e), bench.bright_samples, NoiseLeft::reduced);
+  add(fmt::format("{:g} e-, denoised by standard", dim.mean_e), bench.samples, NoiseLeft::reduced);
+  add(fmt::format("{:g} e-, noise left in", dim.mean_e), bench.samples, NoiseLeft::all);
   AccuracyGroup rounding{"rounding of malvar", "mean difference from double [1e-6 of white]", {}};
   for (const std::size_t i : {std::size_t{1}, all.size() - 1}) {
     AccuracyLevel level = out.back().levels[i];

@@ -26,7 +26,8 @@ std::vector<Sample> samples_of(const std::vector<BenchPicture>& pictures, const 
   for (const BenchPicture& picture : pictures) {
     DenoiseShot shot = take(picture, light, tuning_seed + out.size());
     BenchRenderer renderer(picture.linear.width(), executor);
-    SceneLinear with_dark = renderer.render(shot.raw_e.view(), shot, exposure_with_dark(picture, shot)).light;
+    SceneLinear with_dark =
+        renderer.render(shot.raw_e.view(), shot, NoiseLeft::all, exposure_with_dark(picture, shot)).light;
     out.push_back({&picture, std::move(shot), PictureTruth(picture.linear.view(), executor), std::move(with_dark)});
   }
   return out;
@@ -69,7 +70,7 @@ double gat_psnr_db(const std::vector<Sample>& samples, const std::array<double, 
     MethodMemory memory(sample.truth.width(), sample.truth.height(), executor);
     Plane<float> out(sample.truth.width(), sample.truth.height());
     gat_denoise(memory.denoiser, sample.shot, denoise::Level::standard, gain, out.view(), one);
-    const SceneLinear display = memory.renderer.render(out.view(), sample.shot).display;
+    const SceneLinear display = memory.renderer.render(out.view(), sample.shot, NoiseLeft::reduced).display;
     sum += encoded_psnr_db(display.view(), sample.truth, executor);
   }
   return sum / static_cast<double>(samples.size());
