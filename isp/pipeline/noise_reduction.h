@@ -26,6 +26,7 @@ struct DenoiseChoice {
   bool line_noise = true;                           // also row and column noise where it is significant
   bool maps = false;                                // keep NoiseMaps
   bool always = false;                              // for Mode::automatic: draft at least
+  bool unbiased_chroma = false;  // no prior on colour (DenoiseOptions::rho): areas keep their mean, errors are larger
 };
 
 /// Describes noise reduction in which previous frames of the stream take part: see denoise::TemporalMean.

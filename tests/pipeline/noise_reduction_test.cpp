@@ -110,6 +110,14 @@ TEST(NoiseReduction, DarkChargeThatTheBlackPointKnowsIsTakenOffWithItsNoise) {
   EXPECT_LT(green_error(*out, 40 / test::night_full_e()), 1.5 / test::night_full_e());
 }
 
+// DenoiserColour has what the prior does to colours.
+TEST(NoiseReduction, ColourHasAPriorUnlessNoBiasIsAskedFor) {
+  const RawFrame frame = test::night_frame({}, grey(5), 64, 64);
+  EXPECT_EQ(planned(frame, {.mode = Mode::automatic}).noise_reduction.options.rho, denoise::DenoiseOptions{}.rho);
+  const auto unbiased = planned(frame, {.mode = Mode::automatic, .unbiased_chroma = true}).noise_reduction;
+  EXPECT_TRUE(std::isinf(unbiased.options.rho));
+}
+
 TEST(NoiseReduction, UnknownNoiseIsLeftOrAnErrorIfALevelWasAskedFor) {
   RawFrame frame = test::night_frame({}, grey(20), 64, 64);
   frame.noise.reset();

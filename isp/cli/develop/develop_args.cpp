@@ -309,6 +309,10 @@ void add_denoise(CLI::App& app, DevelopArgs& args) {
   add_choice<bool>(
       app, "--line-noise", {{"auto", true}, {"off", false}}, [&choice](bool lines) { choice.line_noise = lines; },
       "noise that whole rows or columns share: subtract it where it is significant (default) or leave it");
+  add_choice<bool>(
+      app, "--chroma-bias", {{"least-error", false}, {"none", true}},
+      [&choice](bool unbiased) { choice.unbiased_chroma = unbiased; },
+      "colour that noise hides: fade it, for the smallest error (default), or keep the mean colour of areas");
 }
 
 void add_samples(CLI::App& app, DevelopArgs& args) {

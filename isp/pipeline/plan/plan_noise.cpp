@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -201,6 +202,7 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   choose_level(request, out);
   if (!out.level) return out;
   out.options.level = *out.level;
+  if (choice.unbiased_chroma) out.options.rho = std::numeric_limits<double>::infinity();
   const RawElectrons charge = charge_to_check(frame, levels, choice.line_noise && request.lines, out, executor);
   const denoise::NoiseCheck check = denoise::check_noise({charge.value.view(), charge.phase}, out.noise, executor);
   for (const denoise::NoiseRemark& remark : denoise::remarks_on(check)) out.warnings.push_back(remark.text);
