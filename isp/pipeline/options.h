@@ -24,8 +24,8 @@ struct WhiteBalanceChoice {
   double cct_k = 0;  // for Mode::temperature, white_min_k..white_max_k
 };
 
-/// Describes how much is done of the steps that the options leave open: the search for defects, row and column noise,
-/// the level of noise reduction, dark charge, the change for a display. See step_plan.h.
+/// Describes how much is done of the steps that the options leave open: row and column noise, the level of noise
+/// reduction, dark charge, the change for a display. See step_plan.h.
 struct ProcessingGoal {
   bool all = false;  // every step, with Level::high
   /// States the CIEDE2000 that the omitted steps may change, as visible_noise.h measures it. With a budget it may be

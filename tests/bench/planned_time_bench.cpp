@@ -82,7 +82,6 @@ class Clock {
 
 struct Way {
   std::optional<denoise::Level> level;
-  bool defects = false;
   bool lines = false;
   double seconds = 0;
   double error = 0;
@@ -92,7 +91,6 @@ DevelopOptions by_hand(const Way& way) {
   DevelopOptions options;
   options.denoise.mode = way.level ? DenoiseChoice::Mode::level : DenoiseChoice::Mode::off;
   options.denoise.level = way.level.value_or(denoise::Level::draft);
-  options.find_defects = way.defects;
   options.denoise.line_noise = way.lines;
   options.effects.emplace().all = true;
   return options;
@@ -116,7 +114,9 @@ SceneLinear truth_of(const DenoiseShot& shot) {
   DenoiseShot mean{shot.light, shot.white_e, shot.signal_e.clone(), shot.signal_e.clone()};
   for (std::size_t i = 0; i < mean.raw_e.size(); ++i) mean.raw_e.data()[i] += static_cast<float>(shot.light.dark_e);
   Encoded8 picture;
-  seconds_of(raw_of(mean, {}, 7).frame, by_hand({}), &picture);
+  DevelopOptions options = by_hand({});
+  options.find_defects = false;
+  seconds_of(raw_of(mean, {}, 7).frame, options, &picture);
   return light_of_codes(picture);
 }
 
@@ -124,16 +124,14 @@ SceneLinear truth_of(const DenoiseShot& shot) {
 std::vector<Way> exhaustive(Clock& clock, const CostModel& cost, const RawFrame& frame, const PictureTruth& truth) {
   std::vector<Way> out;
   for (int level = 0; level <= 4; ++level) {
-    for (const bool defects : {false, true}) {
-      for (const bool lines : {false, true}) {
-        if (level == 0 && lines) continue;
-        Way way{level == 0 ? std::nullopt : std::optional(static_cast<denoise::Level>(level - 1)), defects, lines};
-        Encoded8 picture;
-        const int rounds = way.level == denoise::Level::best ? 1 : 5;
-        way.seconds = clock.time(cost, frame, by_hand(way), rounds, picture);
-        way.error = error_of(picture, truth);
-        out.push_back(way);
-      }
+    for (const bool lines : {false, true}) {
+      if (level == 0 && lines) continue;
+      Way way{level == 0 ? std::nullopt : std::optional(static_cast<denoise::Level>(level - 1)), lines};
+      Encoded8 picture;
+      const int rounds = way.level == denoise::Level::best ? 1 : 5;
+      way.seconds = clock.time(cost, frame, by_hand(way), rounds, picture);
+      way.error = error_of(picture, truth);
+      out.push_back(way);
     }
   }
   return out;
@@ -141,7 +139,6 @@ std::vector<Way> exhaustive(Clock& clock, const CostModel& cost, const RawFrame&
 
 std::string words_of(const StepPlan& plan) {
   std::string out(plan.level ? name_of(*plan.level) : "none");
-  if (plan.find_defects) out += ", defects";
   if (plan.lines && plan.level) out += ", lines";
   return out;
 }

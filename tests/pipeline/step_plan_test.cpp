@@ -246,8 +246,9 @@ TEST(PlanEffects, ABudgetLeavesOutDemosaicingByResidualsOnlyWhereItMust) {
   const auto ample = planned(10);
   ASSERT_TRUE(ample);
   EXPECT_EQ(ample->demosaic.demosaic.method, DemosaicMethod::residual);
-  const double least_s = predicted_s(*test::reference_cost(), cost_size(320, 256),
-                                     {{CostPart::planning}, {CostPart::codes}, {CostPart::encoded_malvar}});
+  const double least_s =
+      predicted_s(*test::reference_cost(), cost_size(320, 256),
+                  {{CostPart::planning}, {CostPart::defects}, {CostPart::codes}, {CostPart::encoded_malvar}});
   const auto tight = planned(1.01 * least_s);
   ASSERT_TRUE(tight);
   EXPECT_EQ(tight->demosaic.demosaic.method, DemosaicMethod::encoded_malvar);
@@ -265,8 +266,9 @@ TEST(PlanEffects, ABudgetBelowTheCheapestPlanIsRefusedWithItsTime) {
   const auto refused = plan_develop(grey(20), planned_options(std::nullopt, 1e-6), executor);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::insufficient);
-  const double cheapest_s = predicted_s(*test::reference_cost(), cost_size(320, 256),
-                                        {{CostPart::planning}, {CostPart::codes}, {CostPart::encoded_malvar}});
+  const double cheapest_s =
+      predicted_s(*test::reference_cost(), cost_size(320, 256),
+                  {{CostPart::planning}, {CostPart::defects}, {CostPart::codes}, {CostPart::encoded_malvar}});
   EXPECT_NE(refused.error().message.find("cheapest plan"), std::string::npos) << refused.error().message;
   const double told_ms =
       std::strtod(refused.error().message.c_str() + refused.error().message.find("take ") + 5, nullptr);

@@ -84,8 +84,7 @@ StepFacts any_facts(const ProcessingGoal& choice) {
     const double fine = any_between(0, 1);
     out.chroma.work = {fine, 1 - fine, any_between(0, 1)};
   }
-  out.sizes = {.sampled_fraction = any_between(0, 1), .defects = size(), .lines = size(), .display = size()};
-  out.sizes.has_defects = *rc::gen::arbitrary<bool>();
+  out.sizes = {.measured_fraction = any_between(0, 1), .defects = size(), .lines = size(), .display = size()};
   out.sizes.dark = *rc::gen::element(0.0, any_decade(-2, 1));
   out.may_search = *rc::gen::arbitrary<bool>();
   out.may_take_lines = out.has_noise && *rc::gen::arbitrary<bool>();
@@ -117,13 +116,9 @@ std::vector<StepCandidate> all_plans(const StepFacts& facts) {
   if (facts.has_noise) levels = {std::nullopt, Level::draft, Level::standard, Level::high, Level::best};
   std::vector<StepCandidate> out;
   for (const auto level : levels) {
-    for (int bits = 0; bits < 8; ++bits) {
+    for (int bits = 0; bits < 4; ++bits) {
       for (const DemosaicMethod method : {DemosaicMethod::encoded_malvar, DemosaicMethod::residual_median}) {
-        StepCandidate plan{.level = level,
-                           .defects = (bits & 1) != 0,
-                           .lines = (bits & 2) != 0,
-                           .dark = (bits & 4) != 0,
-                           .max_demosaic = method};
+        StepCandidate plan{.level = level, .lines = (bits & 1) != 0, .dark = (bits & 2) != 0, .max_demosaic = method};
         rate(facts, plan);
         out.push_back(plan);
       }
@@ -161,10 +156,9 @@ RC_GTEST_PROP(PlannerProperty, MoreWorkLeavesNoMoreAndTakesNoLess, ()) {
   const StepFacts facts = any_facts(choice);
   StepCandidate less{.level = *rc::gen::element<std::optional<Level>>(std::nullopt, Level::draft, Level::standard)};
   if (!facts.has_noise) less.level.reset();
-  less.defects = less.lines = less.dark = less.display = false;
+  less.lines = less.dark = less.display = false;
   auto more = less;
-  const auto part =
-      *rc::gen::element(&StepCandidate::defects, &StepCandidate::lines, &StepCandidate::dark, &StepCandidate::display);
+  const auto part = *rc::gen::element(&StepCandidate::lines, &StepCandidate::dark, &StepCandidate::display);
   more.*part = true;
   if (facts.has_noise && *rc::gen::arbitrary<bool>()) more.level = less.level ? Level::high : Level::draft;
   rate(facts, less);

@@ -15,7 +15,7 @@ namespace lowlux::isp {
 /// Lists the parts of the work in which plans differ.
 enum class CostPart : std::uint8_t {
   planning,  // black point, thumbnail, white, exposure, effects, signal-to-noise ratio: common to all plans
-  samples,   // samples of the frame, searched for hot pixels, row and column noise
+  samples,   // samples of the frame, searched for row and column noise
   defects,   // search for defects in the whole frame
   lines,     // search for row and column noise in the whole frame
   offsets,   // additional time of `lines` where line noise is significant

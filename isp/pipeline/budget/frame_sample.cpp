@@ -2,8 +2,7 @@
 
 #include <algorithm>
 
-#include "isp/raw/repair.h"
-#include "isp/raw/to_linear.h"
+#include "isp/pipeline/render/electron_mosaic.h"
 
 namespace lowlux::isp {
 namespace {
@@ -14,15 +13,6 @@ constexpr double min_gain = 2;  // a sample covers half the frame at most
 int place(int i, int count, int size) {
   const int room = size - sample_side_px;
   return (count == 1 ? room / 2 : room * i / (count - 1)) & ~1;
-}
-
-std::vector<Pixel> inside(const std::vector<Pixel>& defects, const Rect& square) {
-  std::vector<Pixel> out;
-  for (const Pixel& p : defects) {
-    const int x = p.x - square.x, y = p.y - square.y;
-    if (x >= 0 && y >= 0 && x < square.width && y < square.height) out.push_back({x, y});
-  }
-  return out;
 }
 
 }  // namespace
@@ -46,28 +36,13 @@ std::vector<Rect> sample_squares(const RawFrame& frame, const RawLevels& levels)
   return out;
 }
 
-RawDn square_codes(const RawDn& raw, const Rect& square) {
-  RawDn out;
-  out.dn = Plane<std::uint16_t>(square.width, square.height);
-  for (int y = 0; y < square.height; ++y) {
-    std::copy_n(raw.dn.row(raw.active.y + square.y + y) + raw.active.x + square.x, square.width, out.dn.row(y));
-  }
-  out.layout = raw.layout;
-  out.phase = raw.phase;
-  out.active = out.default_crop = {0, 0, square.width, square.height};
-  out.white_dn = raw.white_dn;
-  return out;
-}
-
 RawElectrons sample_electrons(const RawFrame& frame, const RawLevels& levels, std::span<const Rect> squares,
                               Executor& executor) {
   RawElectrons out{Plane<float>(sample_side_px, sample_side_px * static_cast<int>(squares.size())), frame.raw.phase};
   for (std::size_t i = 0; i < squares.size(); ++i) {
-    const RawDn codes = square_codes(frame.raw, squares[i]);
     const PlaneView<float> part =
         out.value.view().crop(0, sample_side_px * static_cast<int>(i), sample_side_px, sample_side_px);
-    to_electrons(codes, levels.black, *levels.electrons_at_white, part, executor);
-    repair(part, inside(levels.defects, squares[i]), 2);
+    raw_electrons(frame, levels, squares[i], part, executor);
   }
   return out;
 }

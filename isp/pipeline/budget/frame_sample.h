@@ -20,9 +20,6 @@ inline constexpr double sample_megapixels =
 /// the sample would be, or where each position has a black of its own: then the entire frame has to be examined.
 std::vector<Rect> sample_squares(const RawFrame& frame, const RawLevels& levels);
 
-/// Returns the codes of one square, as a frame that ends there. Tags about the entire readout are left out.
-RawDn square_codes(const RawDn& raw, const Rect& square);
-
 /// Returns the squares one below the other in electrons, dark charge included, defects repaired.
 /// Precondition: levels.electrons_at_white.
 RawElectrons sample_electrons(const RawFrame& frame, const RawLevels& levels, std::span<const Rect> squares,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -44,8 +45,8 @@ CostPart part_of(DemosaicMethod method) {
 
 std::vector<CostShare> work_of(const StepFacts& facts, const StepCandidate& plan) {
   std::vector<CostShare> work{{CostPart::planning}};
-  if (facts.sizes.sampled_fraction > 0) work.push_back({CostPart::samples, facts.sizes.sampled_fraction});
-  if (plan.defects && facts.may_search) work.push_back({CostPart::defects});
+  if (facts.sizes.measured_fraction > 0) work.push_back({CostPart::samples, facts.sizes.measured_fraction});
+  if (facts.may_search) work.push_back({CostPart::defects});
   if (plan.level) {
     if (plan.lines && facts.may_take_lines) {
       work.push_back({CostPart::lines});
@@ -58,9 +59,8 @@ std::vector<CostShare> work_of(const StepFacts& facts, const StepCandidate& plan
       if (share > 0) work.push_back({part_of(*plan.level, start), share});
     }
   } else {
-    const bool repairs = plan.defects && facts.sizes.has_defects;
     const bool takes_dark = plan.dark && facts.sizes.dark > 0;
-    work.push_back({facts.from_codes && !repairs && !takes_dark ? CostPart::codes : CostPart::floats});
+    work.push_back({facts.from_codes && !takes_dark ? CostPart::codes : CostPart::floats});
   }
   const auto demosaic = demosaic_of(facts, plan);
   if (demosaic && *demosaic != DemosaicMethod::malvar) work.push_back({part_of(*demosaic)});
@@ -94,8 +94,7 @@ StepCandidate within_tolerance(const StepFacts& facts, double tolerance) {
     bool StepCandidate::*used;
     double size;
   };
-  std::array options{Option{&StepCandidate::defects, facts.sizes.defects},
-                     Option{&StepCandidate::lines, facts.sizes.lines}, Option{&StepCandidate::dark, facts.sizes.dark},
+  std::array options{Option{&StepCandidate::lines, facts.sizes.lines}, Option{&StepCandidate::dark, facts.sizes.dark},
                      Option{&StepCandidate::display, facts.sizes.display}};
   std::ranges::sort(options, {}, &Option::size);
   for (const Option& option : options) {
@@ -113,17 +112,14 @@ StepCandidate within_tolerance(const StepFacts& facts, double tolerance) {
 std::vector<StepCandidate> candidates(const StepFacts& facts) {
   std::vector<StepCandidate> out;
   for (const std::optional<Level> level : levels_of(facts, true)) {
-    for (const bool defects : {false, true}) {
-      for (const bool lines : {false, true}) {
-        for (const bool dark : {false, true}) {
-          for (const DemosaicMethod method : {DemosaicMethod::encoded_malvar, DemosaicMethod::residual_median}) {
-            // A requested change for a display is omitted only within a tolerance: a budget never silently drops an
-            // explicit request.
-            StepCandidate plan{
-                .level = level, .defects = defects, .lines = lines, .dark = dark, .max_demosaic = method};
-            rate(facts, plan);
-            out.push_back(plan);
-          }
+    for (const bool lines : {false, true}) {
+      for (const bool dark : {false, true}) {
+        for (const DemosaicMethod method : {DemosaicMethod::encoded_malvar, DemosaicMethod::residual_median}) {
+          // A requested change for a display is omitted only within a tolerance: a budget never silently drops an
+          // explicit request. Nor does it drop the search for hot pixels, which no sample can replace.
+          StepCandidate plan{.level = level, .lines = lines, .dark = dark, .max_demosaic = method};
+          rate(facts, plan);
+          out.push_back(plan);
         }
       }
     }
@@ -174,10 +170,9 @@ void rate(const StepFacts& facts, StepCandidate& plan) {
   double squares = std::pow(error_fraction(plan.level) * facts.noise.all, 2);
   const auto leave = [&](bool used, double size) {
     if (used || size == 0) return;
-    if (!std::isnan(size)) plan.left += size;
+    plan.left += std::isnan(size) ? std::numeric_limits<double>::infinity() : size;
     squares += std::pow(std::isnan(size) ? size_of_unknown : size, 2);
   };
-  if (facts.may_search) leave(plan.defects, facts.sizes.defects);
   if (facts.may_take_lines) leave(plan.lines && plan.level, facts.sizes.lines);  // subtracted with the noise, or kept
   leave(plan.dark || plan.level, facts.sizes.dark);
   leave(plan.display, facts.sizes.display);

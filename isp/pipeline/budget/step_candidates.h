@@ -32,12 +32,11 @@ LevelNoise level_noise(const std::vector<SeenBlock>& blocks);
 /// Describes one way to develop the frame.
 struct StepCandidate {
   std::optional<denoise::Level> level;
-  bool defects = true;
   bool lines = true;
   bool dark = true;
   bool display = true;
   DemosaicMethod max_demosaic = DemosaicMethod::residual_median;
-  double left = 0;   // relative to everything that can be done
+  double left = 0;   // relative to everything that can be done; infinite where that is not known
   double error = 0;  // relative to the truth
   double seconds = 0;
 };
@@ -52,7 +51,8 @@ struct StepFacts {
   ChromaWork chroma;
   std::optional<denoise::Level> fixed_level;
   bool level_is_fixed = false;
-  bool may_search = true;
+  bool may_search = true;   // defects are searched for in the whole frame
+  std::size_t defects = 0;  // that are repaired
   bool may_take_lines = true;
   bool from_codes = false;  // can be rendered from codes unless reduction, repair or dark charge prevents it
   /// States how the missing colours of the frame would be interpolated with and without noise reduction, given time;

@@ -18,9 +18,20 @@ namespace {
 
 using denoise::Level;
 
+/// Returns whether the plan leaves out what the tolerance would call for: a budget alone calls for everything.
+bool is_short_of_time(const StepFacts& facts, const StepCandidate& plan) {
+  const auto& tolerance = facts.choice.tolerance_delta_e;
+  return facts.choice.budget_s && !(tolerance && plan.left < *tolerance);
+}
+
+/// Returns why a step is left out, as text.
+std::string reason_words(const StepFacts& facts, const StepCandidate& plan) {
+  return is_short_of_time(facts, plan) ? "for lack of time" : "below the tolerance";
+}
+
 std::string level_words(const StepFacts& facts, const StepCandidate& plan) {
   if (!facts.has_noise) return "the noise is not known, or not to be reduced";
-  if (!plan.level) return "left as it is";
+  if (!plan.level) return "left as it is, " + reason_words(facts, plan);
   std::array<double, 3> share = facts.chroma.start;
   if (*plan.level == Level::best) share = {share[0] + share[1], 0, share[2]};  // best starts level 1 on level 0
   return fmt::format("{}; chroma from level 0, 1, 2 in {:.0f}, {:.0f}, {:.0f} % of the frame", name_of(*plan.level),
@@ -68,7 +79,8 @@ std::optional<double> cost_of_lines(const StepFacts& facts, StepCandidate plan) 
 PlannedStep demosaic_step(const StepFacts& facts, StepCandidate plan) {
   PlannedStep out{.name = "demosaicing by residuals", .size = std::numeric_limits<double>::quiet_NaN()};
   out.used = plan.max_demosaic >= DemosaicMethod::residual;
-  out.decision = out.used ? "where there is light enough for it" : "encoded linear filters instead";
+  out.decision =
+      out.used ? "where there is light enough for it" : "encoded linear filters instead, " + reason_words(facts, plan);
   if (facts.choice.cost) {
     plan.max_demosaic = DemosaicMethod::residual_median;
     StepCandidate without = plan;
@@ -78,10 +90,16 @@ PlannedStep demosaic_step(const StepFacts& facts, StepCandidate plan) {
   return out;
 }
 
+std::string lines_words(const StepFacts& facts, const StepCandidate& plan) {
+  if (plan.lines && plan.level) return facts.sizes.lines_words;
+  const std::string measured = std::isfinite(facts.sizes.lines) ? facts.sizes.lines_words + "; " : std::string();
+  return measured + (plan.level ? "" : "subtracted with the noise or not at all, ") + reason_words(facts, plan);
+}
+
 StepPlan told(const StepFacts& facts, const StepCandidate& plan) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   StepPlan out;
-  const auto left = [](bool used, double size) { return used || !(size > 0) ? 0 : size; };
+  const auto left = [](bool used, double size) { return used ? 0 : size; };
   const auto add = [&](PlannedStep effect) { out.effects.push_back(std::move(effect)); };
   if (facts.has_noise) {
     const double all = facts.noise.all, kept = facts.noise.left_by(plan.level);
@@ -93,18 +111,19 @@ StepPlan told(const StepFacts& facts, const StepCandidate& plan) {
     add({"noise", nan, 0, false, level_words(facts, plan), {}});
   }
   if (facts.may_search) {
-    add({"hot pixels", facts.sizes.defects, left(plan.defects, facts.sizes.defects), plan.defects,
-         facts.sizes.defects_words, cost_of(facts, {{CostPart::defects}})});
+    add({"hot pixels", facts.sizes.defects, 0, true,
+         fmt::format("{} repaired; the strongest in its own pixel", facts.defects),
+         cost_of(facts, {{CostPart::defects}})});
   }
   if (facts.may_take_lines) {
     const bool taken = plan.lines && plan.level;
-    add({"row and column noise", facts.sizes.lines, left(taken, facts.sizes.lines), taken,
-         plan.level ? facts.sizes.lines_words : "subtracted with the noise or not at all", cost_of_lines(facts, plan)});
+    add({"row and column noise", facts.sizes.lines, left(taken, facts.sizes.lines), taken, lines_words(facts, plan),
+         cost_of_lines(facts, plan)});
   }
   if (facts.sizes.dark > 0) {
     const bool used = plan.dark || plan.level;
-    add({"dark charge", facts.sizes.dark, left(used, facts.sizes.dark), used, used ? "subtracted" : "left in",
-         std::nullopt});
+    add({"dark charge", facts.sizes.dark, left(used, facts.sizes.dark), used,
+         used ? "subtracted" : "left in, " + reason_words(facts, plan), std::nullopt});
   }
   if (facts.display) {
     add({"change for the display", facts.sizes.display, left(plan.display, facts.sizes.display), plan.display,
@@ -120,7 +139,6 @@ StepPlan told(const StepFacts& facts, const StepCandidate& plan) {
   }
   if (out.regions) out.effects.front().decision += region_words(*out.regions);
   if (facts.choice.cost) out.predicted_s = plan.seconds;
-  out.find_defects = plan.defects;
   out.lines = plan.lines;
   out.dark = plan.dark || plan.level;
   out.display = plan.display;
@@ -159,12 +177,21 @@ StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thum
   facts.level_is_fixed = o.denoise.mode != DenoiseChoice::Mode::automatic;
   if (o.denoise.mode == DenoiseChoice::Mode::level) facts.fixed_level = o.denoise.level;
   facts.may_search = o.find_defects && frame.raw.layout == SensorLayout::bayer;
+  facts.defects = levels.defects.size();
   facts.may_take_lines = facts.has_noise && o.denoise.line_noise;
-  facts.sizes =
-      step_sizes(frame, o, levels, thumbnail, facts.has_noise ? &model->noise : nullptr, facts.blocks, executor);
+  const double tolerance = o.effects->tolerance_delta_e.value_or(0);
+  const bool noise_may_stay =
+      !facts.level_is_fixed && facts.noise.left_by(std::nullopt) < fraction_for_level * tolerance;
+  facts.sizes = step_sizes(frame, o, levels,
+                           {.rendering = rendering,
+                            .light = light,
+                            .noise = facts.has_noise ? &model->noise : nullptr,
+                            .blocks = facts.blocks,
+                            .lines_may_stay = noise_may_stay && !o.effects->all},
+                           executor);
   RawLevels without_dark = levels;
   without_dark.black.dark_mean_e = {};
-  facts.from_codes = frame.corrections.defects.empty() && renders_from_codes(frame, without_dark, false);
+  facts.from_codes = renders_from_codes(frame, without_dark, false);
   return facts;
 }
 

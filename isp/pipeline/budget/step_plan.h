@@ -20,7 +20,7 @@ namespace lowlux::isp {
 struct PlannedStep {
   std::string_view name;
   double size = 0;  // CIEDE2000 that omitting it would change; not a number where that is not known
-  double left = 0;  // CIEDE2000 that the decision leaves of it, relative to everything that can be done
+  double left = 0;  // CIEDE2000 that the decision leaves of it, relative to everything; not a number if not known
   bool used = true;
   std::string decision;           // as text
   std::optional<double> seconds;  // time it is predicted to take, or would; excludes the work common to all plans
@@ -30,8 +30,7 @@ struct PlannedStep {
 struct StepPlan {
   std::vector<PlannedStep> effects;
   std::optional<double> predicted_s;  // for planning and rendering
-  bool find_defects = true;
-  bool lines = true;  // row and column noise is subtracted with the noise
+  bool lines = true;                  // row and column noise is subtracted with the noise
   bool dark = true;
   bool display = true;
   DemosaicMethod max_demosaic = DemosaicMethod::residual_median;  // that there is time for
@@ -42,9 +41,10 @@ struct StepPlan {
 
 /// Decides which effects a frame needs, from its levels, its noise and a sample of it. Without a budget it omits what
 /// stays below the tolerance, all of it together; with one it chooses the most accurate of all plans that are predicted
-/// to fit, or the cheapest of those within the tolerance, if one is given and one fits.
+/// to fit, or the cheapest of those within the tolerance, if one is given and one fits. Defects are not open to choice:
+/// no sample shows that a frame has none, so every plan has the time of the search and of the repair.
 /// @param light   the thumbnail, dark charge subtracted
-/// @param levels  before the search for defects
+/// @param levels  with all defects that are to be repaired
 /// Precondition: options.effects. Error: the budget is below the cheapest plan, whose time is stated (insufficient).
 Result<StepPlan> choose_steps(const RawFrame& frame, const Thumbnail& thumbnail, const Thumbnail& light,
                               const DevelopOptions& options, const RawLevels& levels, const Rendering& rendering,

@@ -9,32 +9,36 @@
 #include "isp/pipeline/budget/visible_noise.h"
 #include "isp/pipeline/options.h"
 #include "isp/pipeline/plan/levels.h"
+#include "isp/pipeline/plan/rendering.h"
 #include "isp/raw/measure/thumbnail.h"
-#include "isp/raw/repair.h"
 
 namespace lowlux::isp {
 
-/// States what omitting each effect would change: CIEDE2000 as visible_noise.h measures it. Not a number where that is
-/// not known, because the frame is too small, or too uneven, for a sample to save anything.
+/// States what omitting each effect would change [CIEDE2000]: single pixels and lines by their own contrast, which
+/// means over 8 x 8 pixels would hide, all else as visible_noise.h measures it. Not a number where that is not known.
 struct StepSizes {
-  double sampled_fraction = 0;  // fraction of the frame
-  double defects = 0;           // of the 8 x 8 pixels around the strongest defect of the sample
-  bool has_defects = false;
-  std::string defects_words;
-  double lines = 0;  // of row and column noise
+  double measured_fraction = 0;  // fraction of the frame that was searched for row and column noise
+  double defects = 0;            // of the strongest defect, in its pixel
+  double lines = 0;              // that 5 % of the places exceed, each averaged along its row and its column
   std::string lines_words;
   double dark = 0;     // of the mean dark charge that is known
   double display = 0;  // of the change for a display; not a number where the noise is not known
 };
 
-/// Predicts what omitting each effect would change.
-/// @param noise   of the frame; null where it is not known
-/// @param blocks  of the frame; none where the noise is not known
-StepSizes step_sizes(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
-                     const Thumbnail& thumbnail, const denoise::RawNoise* noise, std::span<const SeenBlock> blocks,
-                     Executor& executor);
+/// States what the predictions of step_sizes() are based on.
+struct SizeRequest {
+  const Rendering& rendering;
+  const Thumbnail& light;  // dark charge subtracted
+  /// States the noise of the frame; null where it is not known.
+  const denoise::RawNoise* noise = nullptr;
+  std::span<const SeenBlock> blocks;  // of the frame; none where the noise is not known
+  /// Row and column noise is measured in the whole frame where there is no sample, because a plan may leave it in.
+  bool lines_may_stay = false;
+};
 
-/// Returns the noise that the search for defects is based on.
-DefectNoise defect_noise(const RawFrame& frame, const BlackPoint& black, const Thumbnail& thumbnail);
+/// Predicts what omitting each effect would change.
+/// @param levels  with all defects that are to be repaired
+StepSizes step_sizes(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
+                     const SizeRequest& request, Executor& executor);
 
 }  // namespace lowlux::isp

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 
 #include "isp/model/colour/colorimetry.h"
@@ -149,7 +150,6 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
   const Lab lab = display.lab(lit);
   Vector3 with_dark = signal, with_line = lit;
   const double line_e = std::sqrt(std::max(mean_variance, min_variance_e2) / (seen_box_px * seen_box_px));
-  double point = 0;
   Vector3 pixel_std{};
   for (int c = 0; c < 3; ++c) {
     const double variance_e2 = std::max(charge_e[c], 0.0) + noise.variance_e2[c];
@@ -158,14 +158,12 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
     moved[c] += above_black_e(charge_e[c] - channels.dark_e[c], step_e) / channels.electrons_at_white[c];
     const double difference = ciede2000(lab, display.lab(moved));
     squares += difference * difference;
-    point = std::max(point, difference / (step_e * samples_in_box[c]));
     pixel_std[c] = std::sqrt(std::max(variance_e2, 0.0)) / channels.electrons_at_white[c];
     with_dark[c] += channels.dark_e[c] / channels.electrons_at_white[c];
     with_line[c] += line_e / channels.electrons_at_white[c];
   }
   SeenBlock out;
   out.line_delta_e = static_cast<float>(ciede2000(lab, display.lab(with_line)) / line_e);
-  out.point_delta_e = static_cast<float>(point);
   out.display_delta_e = static_cast<float>(display.changed_for_display(signal));
   out.snr = static_cast<float>(std::max(mean_signal, 0.0) / std::sqrt(std::max(mean_variance, min_variance_e2)));
   out.noise_delta_e = static_cast<float>(std::sqrt(squares));
@@ -217,13 +215,18 @@ class Charge {
   const denoise::RawNoise& noise_;
 };
 
+/// States the weight of a pixel's own value in R, G and B at its site, by the colour of the site (Malvar, He and
+/// Cutler, "High-quality linear interpolation for demosaicing of Bayer-patterned color images", ICASSP 2004, figure 2).
+constexpr std::array<std::array<double, 3>, 3> own_weight{{{1, 0.5, 0.75}, {0.625, 1, 0.625}, {0.75, 0.5, 1}}};
+
+bool has_primaries(OutputSpace space) { return space != OutputSpace::camera && space != OutputSpace::xyz; }
+
 }  // namespace
 
 std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
                                    const Rendering& rendering, const denoise::RawNoise& noise,
                                    const Thumbnail& thumbnail, Executor& executor) {
-  const OutputSpace space = options.space;
-  if (space == OutputSpace::camera || space == OutputSpace::xyz) return {};
+  if (!has_primaries(options.space)) return {};
   const Display display(options, rendering);
   const Channels channels = channels_of(frame, levels, noise);
   const int columns = thumbnail.mean.width(), rows = thumbnail.mean.height();
@@ -243,6 +246,27 @@ std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopOptions& 
     }
   });
   return out;
+}
+
+std::optional<double> pixel_delta_e(const RawDn& raw, const DevelopOptions& options, const Rendering& rendering,
+                                    const Thumbnail& light, const DeviatingPixel& pixel) {
+  if (!has_primaries(options.space)) return std::nullopt;
+  const CameraRgb& mean = light.mean;
+  const int x = static_cast<int>(std::int64_t{pixel.at.x} * mean.width() / raw.active.width);
+  const int y = static_cast<int>(std::int64_t{pixel.at.y} * mean.height() / raw.active.height);
+  Vector3 around{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto signal = static_cast<double>(mean.plane[c].at(x, y));
+    around[c] = std::isfinite(signal) ? std::max(signal, 0.0) : 0;
+  }
+  const auto site = static_cast<std::size_t>(colour_at(raw.phase, pixel.at.x, pixel.at.y));
+  const auto& gain = rendering.white_gain;
+  Vector3 deviating = around;
+  for (std::size_t c = 0; c < 3; ++c) {
+    deviating[c] += pixel.excess * own_weight[site][c] * static_cast<double>(gain[site] / gain[c]);
+  }
+  const Display display(options, rendering);
+  return ciede2000(display.lab(around), display.lab(deviating));
 }
 
 double seen_percentile(std::span<const float> rms_delta_e) {

@@ -10,10 +10,11 @@
 #include "isp/pipeline/plan/levels.h"
 #include "isp/pipeline/plan/rendering.h"
 #include "isp/raw/measure/thumbnail.h"
+#include "isp/raw/repair.h"
 
 /// This header predicts how visible errors of raw values are in the image. A difference of images is measured as it is
 /// perceived from some distance: means of light over 8 x 8 pixels, CIEDE2000 between them, and of that the 95th
-/// percentile over the pixels.
+/// percentile over the pixels. Such means hide single pixels and lines, which are rated by their own contrast.
 namespace lowlux::isp {
 
 inline constexpr int seen_box_px = 8;
@@ -21,15 +22,14 @@ inline constexpr double seen_fraction = 0.95;  // fraction of the pixels: the ot
 
 /// Describes a block of the frame: what is known of its light and of the effect of noise there.
 struct SeenBlock {
-  float x = 0;              // of its centre, fraction of the width
-  float y = 0;              // of its centre, fraction of the height
-  float snr = 0;            // of one mean pixel, dark charge subtracted
-  float surroundings = 1;   // standard deviation of the noise around it over its own, 1..2
-  float noise_delta_e = 0;  // root mean square CIEDE2000 of the noise, in means over 8 x 8 pixels
-  float clip_delta_e = 0;   // CIEDE2000 that clipping its noise at black causes in the means
-  float dark_delta_e = 0;   // CIEDE2000 of its mean dark charge, if it were left in
-  float line_delta_e = 0;   // CIEDE2000 for each excess electron in all its pixels
-  float point_delta_e = 0;  // CIEDE2000 for each excess electron in one pixel, of the colour where that is most visible
+  float x = 0;                // of its centre, fraction of the width
+  float y = 0;                // of its centre, fraction of the height
+  float snr = 0;              // of one mean pixel, dark charge subtracted
+  float surroundings = 1;     // standard deviation of the noise around it over its own, 1..2
+  float noise_delta_e = 0;    // root mean square CIEDE2000 of the noise, in means over 8 x 8 pixels
+  float clip_delta_e = 0;     // CIEDE2000 that clipping its noise at black causes in the means
+  float dark_delta_e = 0;     // CIEDE2000 of its mean dark charge, if it were left in
+  float line_delta_e = 0;     // CIEDE2000 for each excess electron in all its pixels
   float display_delta_e = 0;  // CIEDE2000 of the change for another display, if one is planned
 };
 
@@ -42,6 +42,18 @@ struct SeenBlock {
 std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
                                    const Rendering& rendering, const denoise::RawNoise& noise,
                                    const Thumbnail& thumbnail, Executor& executor);
+
+/// Describes a pixel of a Bayer frame that differs from its surroundings.
+struct DeviatingPixel {
+  Pixel at;
+  double excess = 0;  // fraction of white; negative where the pixel is too dark
+};
+
+/// Returns the CIEDE2000 between such a pixel and its block of the thumbnail, in the image, demosaiced by linear filters.
+/// Absent for spaces without primaries.
+/// @param light  dark charge subtracted
+std::optional<double> pixel_delta_e(const RawDn& raw, const DevelopOptions& options, const Rendering& rendering,
+                                    const Thumbnail& light, const DeviatingPixel& pixel);
 
 /// Returns the difference that 5 % of the pixels exceed, each block's being normal with this root mean square: to
 /// 1.5e-7 of the largest. Returns 0 where no more than 5 % of the blocks have any.

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "isp/pipeline/budget/step_plan.h"
-#include "isp/pipeline/budget/step_sizes.h"
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/pipeline/render/cell_figures.h"
 #include "isp/raw/corrections.h"
@@ -32,6 +31,16 @@ Result<void> check(const RawFrame& frame, const DevelopOptions& o) {
     return fail(ErrorCode::invalid_argument, "the picture is too small to halve");
   }
   return {};
+}
+
+// Returns the noise that the search for defects is based on.
+DefectNoise defect_noise(const RawFrame& frame, const BlackPoint& black, const Thumbnail& thumbnail) {
+  DefectNoise noise{thumbnail.black_noise_std * mean_range_dn(frame.raw, black)};
+  // A variance of scale * x at the fraction x of white is scale * range for each DN.
+  if (frame.noise) {
+    noise.shot_dn = *std::ranges::max_element(frame.noise->scale) * mean_range_dn(frame.raw, black);
+  }
+  return noise;
 }
 
 // Holds the defects that the source lists, those with an unknown dark value and, if requested, those found in the
@@ -157,6 +166,11 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   append(plan.warnings, rendering->warnings);
   clock.lap("white and exposure");
 
+  FoundDefects found = all_defects(frame, measured.raw, thumbnail, *levels, options.find_defects, executor);
+  levels->defects = std::move(found.defects);
+  append(plan.warnings, found.warnings);
+  clock.lap("defects");
+
   if (options.effects) {
     Result<StepPlan> effects = choose_steps(frame, thumbnail, light, options, *levels, *rendering, executor);
     if (!effects) return tl::make_unexpected(std::move(effects.error()));
@@ -165,12 +179,6 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
     plan.effects = *std::move(effects);
     clock.lap("effects");
   }
-  const bool search = options.find_defects && (!plan.effects || plan.effects->find_defects);
-  FoundDefects found = all_defects(frame, measured.raw, thumbnail, *levels, search, executor);
-  levels->defects = std::move(found.defects);
-  append(plan.warnings, found.warnings);
-  clock.lap("defects");
-
   NoiseRequest request{.choice = options.denoise, .space = options.space, .white_gain = rendering->white_gain};
   if (plan.effects) {
     if (plan.effects->level_decided) request.level.emplace(DecidedLevel{plan.effects->level, plan.effects->regions});
