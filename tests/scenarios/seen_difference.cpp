@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <utility>
 #include <vector>
 
@@ -80,7 +81,71 @@ void compare_band(const Work& work, int band) {
   }
 }
 
+SeenDifference statistics_of(std::vector<float> values) {
+  SeenDifference out;
+  for (const float d : values) out.mean += static_cast<double>(d) / static_cast<double>(values.size());
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(seen_fraction * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  out.percentile95 = static_cast<double>(*at);
+  out.largest = static_cast<double>(*std::max_element(at, values.end()));
+  return out;
+}
+
+Lab lab_of_part(const RgbView<const float>& light, const Rect& part, const Matrix3& to_xyz, const Xyz& white) {
+  Vector3 mean{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (int y = part.y; y < part.y + part.height; ++y) {
+      for (int x = part.x; x < part.x + part.width; ++x) mean[c] += static_cast<double>(light[c].at(x, y));
+    }
+    mean[c] /= part.width * part.height;
+  }
+  return lab_of(xyz_of(to_xyz * mean), white);
+}
+
 }  // namespace
+
+SeenDifference line_difference(const RgbView<const float>& first, const RgbView<const float>& second) {
+  constexpr int length = 256;
+  const Matrix3 to_xyz = *inverse(*xyz_to_output(OutputSpace::linear_srgb));
+  const Xyz white = *xyz_of(output_white);
+  const int width = first[0].width, height = first[0].height;
+  std::vector<float> differences;
+  const auto add = [&](const Rect& segment) {
+    const Lab a = lab_of_part(first, segment, to_xyz, white), b = lab_of_part(second, segment, to_xyz, white);
+    differences.push_back(static_cast<float>(ciede2000(a, b)));
+  };
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x + length <= width; x += length) add({x, y, length, 1});
+  }
+  for (int x = 0; x < width; ++x) {
+    for (int y = 0; y + length <= height; y += length) add({x, y, 1, length});
+  }
+  assert(!differences.empty());
+  return statistics_of(std::move(differences));
+}
+
+PixelDifference::PixelDifference(const RgbView<const float>& first, const RgbView<const float>& second)
+    : first_(first),
+      second_(second),
+      to_xyz_(*inverse(*xyz_to_output(OutputSpace::linear_srgb))),
+      white_(*xyz_of(output_white)) {}
+
+double PixelDifference::at(int x, int y) const {
+  const Rect pixel{x, y, 1, 1};
+  return ciede2000(lab_of_part(first_, pixel, to_xyz_, white_), lab_of_part(second_, pixel, to_xyz_, white_));
+}
+
+double PixelDifference::around(int x, int y) const {
+  constexpr int reach = 8, core = 2;
+  double largest = 0;
+  for (int j = std::max(y - reach, 0); j <= std::min(y + reach, first_[0].height - 1); ++j) {
+    for (int i = std::max(x - reach, 0); i <= std::min(x + reach, first_[0].width - 1); ++i) {
+      if (std::max(std::abs(i - x), std::abs(j - y)) <= core) continue;
+      largest = std::max(largest, at(i, j));
+    }
+  }
+  return largest;
+}
 
 SeenDifference seen_difference(const RgbView<const float>& first, const RgbView<const float>& second,
                                Executor& executor) {
@@ -89,14 +154,7 @@ SeenDifference seen_difference(const RgbView<const float>& first, const RgbView<
   Plane<float> difference(first[0].width - seen_box_px + 1, first[0].height - seen_box_px + 1);
   const Work work{first, second, difference, executor.width()};
   for_each_index(executor, work.bands, [&](int band) { compare_band(work, band); });
-  std::vector<float> sorted(difference.data(), difference.data() + difference.size());
-  SeenDifference out;
-  for (const float d : sorted) out.mean += static_cast<double>(d) / static_cast<double>(sorted.size());
-  const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(seen_fraction * static_cast<double>(sorted.size() - 1));
-  std::nth_element(sorted.begin(), at, sorted.end());
-  out.percentile95 = static_cast<double>(*at);
-  out.largest = static_cast<double>(*std::max_element(at, sorted.end()));
-  return out;
+  return statistics_of({difference.data(), difference.data() + difference.size()});
 }
 
 SceneLinear light_of_codes(const Encoded8& codes) {
