@@ -90,10 +90,10 @@ void visit_gain(Visitor& v, Gain& g) {
   v.optional_number("iso", g.iso, {tiny, 1e9});
   v.optional_object("sensor", g.sensor, [&](Visitor& inner, auto& sensor) { visit_sensor(inner, sensor, g.errors); });
   v.optional_object("pedestal_dn", g.pedestal_dn, [](Visitor& inner, auto& pedestal) {
-    inner.estimate("site_00", pedestal[0].value, pedestal[0].standard_error, {0, 65535});
-    inner.estimate("site_01", pedestal[1].value, pedestal[1].standard_error, {0, 65535});
-    inner.estimate("site_10", pedestal[2].value, pedestal[2].standard_error, {0, 65535});
-    inner.estimate("site_11", pedestal[3].value, pedestal[3].standard_error, {0, 65535});
+    inner.estimate("site_00", pedestal[0].value, pedestal[0].standard_error, {-1, 65535});
+    inner.estimate("site_01", pedestal[1].value, pedestal[1].standard_error, {-1, 65535});
+    inner.estimate("site_10", pedestal[2].value, pedestal[2].standard_error, {-1, 65535});
+    inner.estimate("site_11", pedestal[3].value, pedestal[3].standard_error, {-1, 65535});
   });
   v.choice("pedestal_holds", g.pedestal_holds, {"pedestal", "pedestal and dark"});
   v.optional_object("dark_exposure_s", g.dark_exposure_s,

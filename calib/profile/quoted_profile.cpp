@@ -20,7 +20,9 @@ GainProfile gain_of(const isp::NamedSensor& named) {
   out.iso = named.iso;
   out.sensor = named.model;
   if (named.black_level_is_sourced) {
-    const Estimate level{named.model.black_level_dn, 0};
+    // Noise crosses codes: their mean lies half a code below the pedestal where the converter rounds down.
+    const double lost_dn = named.model.quantisation == Quantisation::floor ? 0.5 : 0;
+    const Estimate level{named.model.black_level_dn - lost_dn, 0};
     out.pedestal_dn = PerSite<Estimate>{level, level, level, level};
   }
   out.provenance.push_back(quoted("sensor", named.source));

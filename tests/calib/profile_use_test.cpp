@@ -261,5 +261,15 @@ TEST(QuotedProfile, OfEverySensorThatSufficesIsAProfile) {
   EXPECT_FALSE(quoted_profile("no such sensor"));
 }
 
+// The mean of floor(v) over a spread of v is half a code below that of v.
+TEST(QuotedProfile, PedestalOfAConverterThatRoundsDownIsHalfACodeLower) {
+  const auto floor = quoted_profile("thesis"), round = quoted_profile("RaspberryPi_HQ");
+  ASSERT_TRUE(floor && round);
+  const GainProfile &down = floor->gains.front(), &nearest = round->gains.front();
+  ASSERT_TRUE(down.pedestal_dn && nearest.pedestal_dn);
+  EXPECT_EQ((*down.pedestal_dn)[0].value, down.sensor->black_level_dn - 0.5);
+  EXPECT_EQ((*nearest.pedestal_dn)[0].value, nearest.sensor->black_level_dn);
+}
+
 }  // namespace
 }  // namespace lowlux::calib

@@ -12,6 +12,8 @@
 namespace lowlux {
 namespace {
 
+using test::lowlux;
+
 using Words = std::vector<std::string>;
 
 /// What is wrong with a command line, and what its one line on stderr holds.
