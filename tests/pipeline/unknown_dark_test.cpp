@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <random>
 #include <string>
 
 #include "isp/pipeline/develop.h"
@@ -89,6 +92,34 @@ TEST(UnknownDark, KnownChargeOfATaggedBlackKeepsColourAndNoiseModel) {
   const double mean_e = (20 + 0.1 * 159.5) * (1 + 2 + 0.5) / 4;
   // Five standard errors of photons, dark charge and read noise.
   EXPECT_NEAR(sum / (320 * 256), mean_e, 5 * std::sqrt((mean_e + 100 + 4) / (320 * 256)));
+}
+
+// Masked pixels hold a dark charge of 0.05 e-, one pixel in twenty, at 40 DN/e-: with the gain of the noise profile its
+// mean of 2 DN is in the black point, without it would be taken for outliers.
+TEST(MaskedDark, OfFewElectronsIsMeasuredWithTheGainOfTheFrame) {
+  constexpr int border = 64, side = 512;
+  constexpr double gain_dn_per_e = 40, dark_e = 0.05, read_dn = 4;
+  RawFrame frame = test::night_frame({}, denoise_testing::flat(100, 200, 125), border + side, side);
+  std::mt19937_64 engine(3);
+  std::poisson_distribution<int> charge(dark_e);
+  std::normal_distribution<double> read(0, read_dn);
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < border; ++x) {
+      const double dn = test::night_black_dn + gain_dn_per_e * charge(engine) + read(engine);
+      frame.raw.dn.at(x, y) = static_cast<std::uint16_t>(std::lround(dn));
+    }
+  }
+  frame.raw.active = frame.raw.default_crop = {border, 0, side, side};
+  frame.raw.masked = {{0, 0, border, side}};
+  frame.raw.masked_is_stated = true;
+  frame.noise->scale.fill(gain_dn_per_e / (test::night_white_dn - test::night_black_dn));
+  const double error = std::sqrt((gain_dn_per_e * gain_dn_per_e * dark_e + read_dn * read_dn) / (12.0 * side));
+  const auto mean_dn = [](const BlackPoint& black) {
+    return (black.pedestal_dn[0] + black.pedestal_dn[1] + black.pedestal_dn[2] + black.pedestal_dn[3]) / 4;
+  };
+  EXPECT_NEAR(mean_dn(planned(frame).levels.black), test::night_black_dn + gain_dn_per_e * dark_e, 5 * error / 2);
+  frame.noise.reset();
+  EXPECT_NEAR(mean_dn(planned(frame).levels.black), test::night_black_dn, 5 * read_dn / std::sqrt(48.0 * side) + 0.1);
 }
 
 }  // namespace

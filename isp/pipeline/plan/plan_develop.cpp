@@ -11,6 +11,7 @@
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/pipeline/render/cell_figures.h"
 #include "isp/raw/corrections.h"
+#include "isp/raw/measure/masked_black.h"
 #include "isp/raw/measure/thumbnail.h"
 #include "isp/raw/subtract_dark_frame.h"
 #include "isp/raw/to_linear.h"
@@ -33,14 +34,14 @@ Result<void> check(const RawFrame& frame, const DevelopOptions& o) {
   return {};
 }
 
+// Returns the system gain [DN/e-]: a variance of scale * x at the fraction x of white is scale * range for each DN.
+double gain_dn_per_e(const RawFrame& frame, const BlackPoint& black) {
+  return frame.noise ? *std::ranges::max_element(frame.noise->scale) * mean_range_dn(frame.raw, black) : 0;
+}
+
 // Returns the noise that the search for defects is based on.
 DefectNoise defect_noise(const RawFrame& frame, const BlackPoint& black, const Thumbnail& thumbnail) {
-  DefectNoise noise{thumbnail.black_noise_std * mean_range_dn(frame.raw, black)};
-  // A variance of scale * x at the fraction x of white is scale * range for each DN.
-  if (frame.noise) {
-    noise.shot_dn = *std::ranges::max_element(frame.noise->scale) * mean_range_dn(frame.raw, black);
-  }
-  return noise;
+  return {thumbnail.black_noise_std * mean_range_dn(frame.raw, black), gain_dn_per_e(frame, black)};
 }
 
 // Holds the defects that the source lists, those with an unknown dark value and, if requested, those found in the
@@ -119,10 +120,19 @@ std::string dark_warning(const FrameInfo& info, double fraction) {
       *info.exposure_s, place, 100 * fraction);
 }
 
+// Measures masked pixels again with the gain, which follows from a first black level.
+Result<BlackPoint> choose_black_by_gain(const RawFrame& frame, const BlackRequest& request) {
+  Result<BlackPoint> black = choose_black(frame.raw, request);
+  if (!black || black->source != BlackPoint::Source::masked_pixels) return black;
+  MaskedBlack measured = measure_masked_black(frame.raw, gain_dn_per_e(frame, *black));
+  if (measured.black) black = *std::move(measured.black);
+  return black;
+}
+
 Result<RawLevels> choose_levels(const RawFrame& frame, const DevelopOptions& options) {
   RawLevels out{.dark_frame = options.dark_frame};
   Result<BlackPoint> black =
-      out.dark_frame ? black_of(frame.raw, *out.dark_frame) : choose_black(frame.raw, options.black);
+      out.dark_frame ? black_of(frame.raw, *out.dark_frame) : choose_black_by_gain(frame, options.black);
   if (!black) return tl::make_unexpected(std::move(black.error()));
   out.black = *std::move(black);
   if (frame.noise) out.electrons_at_white = electrons_at_white(frame.raw, *frame.noise);

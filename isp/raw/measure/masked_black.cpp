@@ -16,6 +16,8 @@ constexpr int inner_trim = 12;
 constexpr int min_side = 8;                // of the trimmed strip, in pixels
 constexpr int min_samples_per_site = 500;  // standard error below 0.05 standard deviations
 constexpr double cut_sigma = 5.0;
+constexpr double kept_above_e =
+    6;  // 1e-6 of the pixels hold more at a mean of 0.5 e-; from 1 e- on MAD shows the charge
 constexpr double max_offset_of_range = 0.005;  // of an undeclared border from the tag
 constexpr double max_offset_of_noise = 16;     // undeclared border to tag, in standard deviations of its pixels
 constexpr double mad_to_std = 1.4826;          // for a normal distribution
@@ -132,7 +134,7 @@ struct SiteEstimate {
 };
 
 // Values are taken relative to the median, so that the sums of squares keep their precision.
-SiteEstimate estimate_site(const RawDn& raw, const Rect& region, int site) {
+SiteEstimate estimate_site(const RawDn& raw, const Rect& region, int site, double gain_dn_per_e) {
   const auto first = [&](int start, int origin, int parity) { return start + (((start - origin) & 1) != parity); };
   const int x0 = first(region.x, raw.active.x, site & 1);
   const int y0 = first(region.y, raw.active.y, site >> 1);
@@ -150,7 +152,7 @@ SiteEstimate estimate_site(const RawDn& raw, const Rect& region, int site) {
   for (int y = y0; y < region.y + region.height; y += 2) {
     for (int x = x0; x < region.x + region.width; x += 2) {
       const double v = raw.dn.at(x, y) - median;
-      if (std::fabs(v) > cut) continue;
+      if (v < -cut || v > cut + kept_above_e * gain_dn_per_e) continue;
       all.add(v);
       rows[y - region.y].add(v);
       columns[x - region.x].add(v);
@@ -228,7 +230,7 @@ std::string why_not_dark(const RawDn& raw, const Rect& region, const BlackPoint&
 
 }  // namespace
 
-MaskedBlack measure_masked_black(const RawDn& raw) {
+MaskedBlack measure_masked_black(const RawDn& raw, double gain_dn_per_e) {
   MaskedBlack out;
   if (raw.layout == SensorLayout::linear_rgb) {
     out.refusal = "the file holds demosaiced samples, which have no masked pixels";
@@ -244,7 +246,7 @@ MaskedBlack measure_masked_black(const RawDn& raw) {
   black.source = BlackPoint::Source::masked_pixels;
   black.holds = BlackPoint::Holds::pedestal_and_dark;
   for (int site = 0; site < 4; ++site) {
-    const SiteEstimate estimate = estimate_site(raw, *region, site);
+    const SiteEstimate estimate = estimate_site(raw, *region, site, gain_dn_per_e);
     black.pedestal_dn[site] = estimate.mean;
     black.pedestal_standard_error_dn[site] = estimate.standard_error;
     black.noise_std_dn[site] = estimate.noise_std;
