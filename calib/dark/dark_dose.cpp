@@ -29,14 +29,20 @@ double degrees_off(const DarkExposure& a, const DarkExposure& b) {
   return a.temperature_c && b.temperature_c ? *a.temperature_c - *b.temperature_c : 0;
 }
 
-bool same_time_as(double a_s, double b_s) { return std::fabs(a_s - b_s) <= same_time * std::max(a_s, b_s); }
+}  // namespace
+
+bool is_same_exposure(const DarkExposure& a, const DarkExposure& b) {
+  if (std::fabs(a.time_s - b.time_s) > same_time * std::max(a.time_s, b.time_s)) return false;
+  return std::fabs(degrees_off(a, b)) <= same_temperature_c;
+}
+
+namespace {
 
 std::optional<DarkWeights> plain_mean(std::span<const DarkLevel> levels, const DarkExposure& picture) {
   DarkWeights out{.of_level = std::vector<double>(levels.size())};
   double frames = 0;
   for (std::size_t i = 0; i < levels.size(); ++i) {
-    const DarkExposure& e = levels[i].exposure;
-    if (!same_time_as(e.time_s, picture.time_s) || std::fabs(degrees_off(e, picture)) > same_temperature_c) continue;
+    if (!is_same_exposure(levels[i].exposure, picture)) continue;
     out.of_level[i] = levels[i].frames;
     frames += levels[i].frames;
   }
@@ -55,7 +61,7 @@ std::vector<Dose> doses_of(std::span<const DarkLevel> levels, const DarkExposure
     const double off_c = degrees_off(levels[i].exposure, picture);
     if (!doubling_c && std::fabs(off_c) > same_temperature_c) continue;
     const double current = doubling_c ? std::exp2(off_c / *doubling_c) : 1;
-    out.push_back({i, levels[i].exposure.time_s * current, static_cast<double>(levels[i].frames)});
+    out.push_back({i, levels[i].exposure.time_s * current, levels[i].frames});
   }
   return out;
 }

@@ -16,10 +16,13 @@ struct DarkExposure {
   std::optional<double> temperature_c;
 };
 
+/// Returns whether the times agree within 1 %, and the temperatures, where both are known, within a degree.
+bool is_same_exposure(const DarkExposure& a, const DarkExposure& b);
+
 /// Mean level of the darks of one setting.
 struct DarkLevel {
   DarkExposure exposure;
-  int frames = 1;
+  double frames = 1;
   double level_dn = 0;      // mean of the sites
   double variance_dn2 = 0;  // of that mean
 };

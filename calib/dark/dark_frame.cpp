@@ -26,9 +26,11 @@ constexpr double min_doubling_c = 2, max_doubling_c = 30;
 /// Inputs and intermediate results, before pixels are processed.
 struct Job {
   Groups groups;
-  std::vector<PerSite<DarkSite>> sites;  // for each group
+  std::vector<PerSite<DarkSite>> sites;  // for each group; the noise is that of one exposure
+  std::vector<double> per_file;          // for each group: exposures that a file is the mean of
+  std::vector<double> frames;            // for each group: single exposures whose mean has the same noise
   std::vector<double> hot_gain_dn;       // for each group
-  DarkWeights weights;
+  DarkWeights weights{};
   std::optional<PerSite<double>> pedestal_dn;
 };
 
@@ -42,6 +44,11 @@ Result<void> check_request(const DarkRequest& r) {
     return fail(ErrorCode::invalid_argument,
                 fmt::format("dark current doubling over {:g} degrees, expected {:g} to {:g}", *r.doubling_c,
                             min_doubling_c, max_doubling_c));
+  }
+  for (const double count : r.exposures_per_file) {
+    if (count >= 1 && count <= max_exposures) continue;
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("a dark frame of {:g} exposures, expected 1 to {}", count, max_exposures));
   }
   return {};
 }
@@ -72,23 +79,40 @@ std::vector<DarkLevel> levels_of(const Job& job) {
   out.reserve(job.groups.size());
   for (std::size_t g = 0; g < job.groups.size(); ++g) {
     const DarkGroup& group = job.groups[g];
-    DarkLevel level{{*group.setting.exposure_s, group.setting.temperature_c}, group.frames};
+    DarkLevel level{{*group.setting.exposure_s, group.setting.temperature_c}, job.frames[g]};
     for (const DarkSite& site : job.sites[g]) {
       level.level_dn += site.spread.median / 4;
-      level.variance_dn2 += site.noise_dn2 / (4 * static_cast<double>(group.mean_dn.size()) * group.frames);
+      level.variance_dn2 += site.noise_dn2 / (4 * static_cast<double>(group.mean_dn.size()) * job.frames[g]);
     }
     out.push_back(level);
   }
   return out;
 }
 
+/// Adds the statistics of a group whose files are means of `per_file` exposures each.
+void measure_group(const DarkGroup& group, double per_file, const DarkRequest& request, Job& job) {
+  PerSite<DarkSite> sites = sites_of(group);
+  double gain_dn = per_file * hot_pixel_gain_dn(group, sites), frames = group.frames * per_file;
+  if (group.frames == 1 && request.noise) {
+    gain_dn = mean_of(request.noise->gain_dn_per_e);
+    if (per_file > 1) {
+      const PerSite<double> exposure_dn2 = noise_of_one_exposure(*request.noise, sites, request.pedestal_dn);
+      frames = 1 / (1 / per_file + (group.rounded ? rounding_dn2 / mean_of(exposure_dn2) : 0));
+      for (int site = 0; site < 4; ++site) sites[site].noise_dn2 = exposure_dn2[site];
+    }
+  } else {
+    for (DarkSite& site : sites) site.noise_dn2 *= per_file;
+  }
+  job.sites.push_back(sites);
+  job.per_file.push_back(per_file);
+  job.frames.push_back(frames);
+  job.hot_gain_dn.push_back(gain_dn);
+}
+
 Result<Job> weigh(Groups groups, const FrameSetting& picture, const DarkRequest& request) {
-  Job job{.groups = groups, .sites = {}, .hot_gain_dn = {}, .weights = {}, .pedestal_dn = request.pedestal_dn};
-  job.sites.reserve(groups.size());
-  job.hot_gain_dn.reserve(groups.size());
-  for (const DarkGroup& group : groups) {
-    job.sites.push_back(sites_of(group));
-    job.hot_gain_dn.push_back(hot_pixel_gain_dn(group, job.sites.back()));
+  Job job{.groups = groups, .pedestal_dn = request.pedestal_dn};
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    measure_group(groups[g], request.exposures_per_file.empty() ? 1 : request.exposures_per_file[g], request, job);
   }
   const DarkScaling known{
       .doubling_c = request.doubling_c,
@@ -132,10 +156,10 @@ DarkNoise noise_of(const Job& job, int site) {
   for (std::size_t g = 0; g < job.groups.size(); ++g) {
     const double w = job.weights.of_level[g], noise = job.sites[g][site].noise_dn2;
     if (w == 0) continue;
-    const DarkGroup& group = job.groups[g];
     interpolated += w * noise;
     least = std::max(least, std::min(1.0, job.weights.scale) * noise);
-    out.estimate_dn2 += w * w * noise / group.frames;
+    const DarkGroup& group = job.groups[g];
+    out.estimate_dn2 += w * w * noise / job.frames[g];
     out.rows_dn2 += w * w * std::max(0.0, group.row_variance_dn2[site]) / group.frames;
     out.rows_known = out.rows_known && group.frames > 1;
   }
@@ -148,11 +172,12 @@ double pixel_noise(const Job& job, int x, int y) {
   double out = 0;
   for (std::size_t g = 0; g < job.groups.size(); ++g) {
     const double w = std::fabs(job.weights.of_level[g]);
-    if (w == 0 || job.groups[g].frames < 2) continue;
+    if (w == 0) continue;
     const DarkSite& site = job.sites[g][site_of(x, y)];
     const double charge = std::max(0.0, job.groups[g].mean_dn.at(x, y) - site.spread.median);
     const double expected = site.noise_dn2 + job.hot_gain_dn[g] * charge;
-    out += (w + w * w / job.groups[g].frames) * std::max<double>(job.groups[g].variance_dn2.at(x, y), expected);
+    const double measured = job.per_file[g] * job.groups[g].variance_dn2.at(x, y);
+    out += (w + w * w / job.frames[g]) * std::max(measured, expected);
   }
   return out;
 }
@@ -161,7 +186,7 @@ double site_noise(const Job& job, int site) {
   double out = 0;
   for (std::size_t g = 0; g < job.groups.size(); ++g) {
     const double w = std::fabs(job.weights.of_level[g]);
-    out += (w + w * w / job.groups[g].frames) * job.sites[g][site].noise_dn2;
+    out += (w + w * w / job.frames[g]) * job.sites[g][site].noise_dn2;
   }
   return out;
 }
@@ -203,10 +228,13 @@ Result<PixelMask> unknown_pixels(const Job& job, const RawDn& picture, DarkFrame
   return mask;
 }
 
-void describe(const Job& job, DarkFrame& out) {
+void describe(const Job& job, bool estimated, DarkFrame& out) {
+  double frames = 0;
   for (std::size_t g = 0; g < job.groups.size(); ++g) {
     if (job.weights.of_level[g] == 0) continue;
-    out.frames += job.groups[g].frames;
+    frames += job.groups[g].frames * job.per_file[g];
+    out.files += job.groups[g].frames;
+    out.estimated = out.estimated || (estimated && job.per_file[g] > 1);
     ++out.settings;
     const double zero = *std::ranges::max_element(job.groups[g].fraction_at_zero);
     if (zero > clipped_share) {
@@ -214,10 +242,11 @@ void describe(const Job& job, DarkFrame& out) {
           fmt::format("{:.2g} % of the darks' samples are cut off at code 0: their mean is too high", 100 * zero));
     }
   }
+  out.frames = static_cast<int>(std::lround(frames));
   if (out.frames == 1) {
     out.warnings.emplace_back(
         "a single dark does not separate its pattern from its noise: hot pixels and columns are taken from it, no "
-        "more");
+        "more; state the number of frames of a master dark with --dark-frame-count");
   }
   out.scale = job.weights.scale;
   out.doubling_c = job.weights.doubling_c.value_or(0);
@@ -251,7 +280,7 @@ Result<DarkFrame> make_dark_frame(Groups groups, const RawDn& picture, const Dar
   const auto job = weigh(groups, *setting, request);
   if (!job) return tl::make_unexpected(job.error());
   DarkFrame out;
-  describe(*job, out);
+  describe(*job, request.estimated, out);
   out.dn = weighted_sum(*job);
   const auto unknown = unknown_pixels(*job, picture, out);
   if (!unknown) return tl::make_unexpected(unknown.error());
@@ -273,6 +302,8 @@ DarkFrame at_masked_level(const DarkFrame& dark, const PerSite<double>& masked_d
                 .noise_std_dn = dark.noise_std_dn,
                 .added_variance_dn2 = dark.added_variance_dn2,
                 .frames = dark.frames,
+                .files = dark.files,
+                .estimated = dark.estimated,
                 .settings = dark.settings,
                 .scale = dark.scale,
                 .doubling_c = dark.doubling_c,

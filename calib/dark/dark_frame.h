@@ -2,9 +2,11 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "calib/dark/dark_image.h"
 #include "calib/dark/dark_stack.h"
+#include "calib/dark/master_dark.h"
 #include "isp/base/cfa.h"
 #include "isp/base/dark_frame.h"
 #include "isp/base/frame.h"
@@ -19,12 +21,17 @@ struct DarkRequest {
   std::optional<double> doubling_c;            // degrees over which dark charge doubles, 2..30; absent: fitted
   std::optional<PerSite<double>> masked_dn;    // the image's masked pixels: pedestal plus dark charge
   std::optional<PerSite<double>> pedestal_dn;  // the file's tag: level without charge
+  std::optional<DarkNoiseModel> noise;         // of the image
+  std::vector<double> exposures_per_file;      // one for each group, at least 1; empty: 1
+  bool estimated = false;                      // `exposures_per_file` was estimated
 };
 
 /// Makes the dark frame of an image: see weigh_darks for the scaling of times and temperatures, limit_noise for the
-/// weighting of a mean of few darks. Pixels are `unknown` whose darks come within 5 % of the range to white, or whose
-/// temporal noise in the image is more than 5 times that of their site. If there are masked pixels, they determine the
-/// pedestal: the one with which the scaled darks have the level of the masked pixels.
+/// weighting of a mean of few darks. The noise of a single file that is a mean of several exposures is that of the
+/// noise model divided by their number, plus the variance of rounding to whole codes, 1/12 DN^2; without a noise model
+/// it is its own spatial noise, pattern included. Pixels are `unknown` whose darks come within 5 % of the range to
+/// white, or whose temporal noise in the image is more than 5 times that of their site. If there are masked pixels,
+/// they determine the pedestal: the one with which the scaled darks have the level of the masked pixels.
 /// @param groups  of DarkLibrary
 /// Errors: those of weigh_darks; a request out of its range; an image without exposure time; darks of another camera,
 /// size, mosaic or gain; darks that hold light (one side brighter than the other by more than one frame's noise and a

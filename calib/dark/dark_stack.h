@@ -16,7 +16,8 @@ inline constexpr double same_temperature_c = 1;
 /// Dark frames of one exposure time and temperature, reduced to two planes of the active area.
 struct DarkGroup {
   FrameSetting setting;
-  int frames = 0;
+  int frames = 0;                      // files; each may itself be a mean of several exposures, a master dark
+  bool rounded = true;                 // the files hold whole codes
   Plane<float> mean_dn;                // of the frames, for each pixel
   Plane<float> variance_dn2;           // temporal, for each pixel, quantisation included; unbiased
   PerSite<double> row_variance_dn2{};  // temporal, common to whole rows; unbiased, may be negative

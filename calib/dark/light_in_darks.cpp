@@ -17,6 +17,8 @@ constexpr double far_off = 2, off = 0.5;  // standard deviations of a pixel
 constexpr double far_off_range = 1e-3;
 constexpr double below = 4;  // standard deviations
 constexpr double max_below = 0.01;
+constexpr int tile_px = 32;
+constexpr double dark_tiles = 0.1;  // of all tiles
 
 PixelMask outliers_of(const DarkGroup& group, const PerSite<DarkSite>& sites) {
   PixelMask mask(group.mean_dn.width(), group.mean_dn.height());
@@ -28,6 +30,45 @@ PixelMask outliers_of(const DarkGroup& group, const PerSite<DarkSite>& sites) {
     }
   }
   return mask;
+}
+
+struct Tile {
+  double mean_dn = 0, noise_dn2 = 0;
+};
+
+/// Returns the mean and the noise of one site in a tile, from pairs of neighbours that share no pixel.
+Tile measure_tile(const RawDn& picture, int site, const Rect& tile) {
+  double sum = 0, squares = 0, pairs = 0;
+  for (int y = tile.y + (site >> 1); y < tile.y + tile.height; y += 2) {
+    const std::uint16_t* codes = picture.dn.row(picture.active.y + y) + picture.active.x;
+    for (int x = tile.x + (site & 1); x + 2 < tile.x + tile.width; x += 4) {
+      const double difference = codes[x + 2] - codes[x];
+      sum += codes[x] + codes[x + 2];
+      squares += difference * difference;
+      ++pairs;
+    }
+  }
+  return {sum / pairs / 2, squares / pairs / 2};
+}
+
+/// Returns the variance of a pixel in the darkest tenth of an image's tiles [DN^2]: the median of these tiles.
+double darkest_noise_dn2(const RawDn& picture, int site) {
+  const Rect& active = picture.active;
+  std::vector<Tile> tiles;
+  for (int y = 0; y < active.height; y += tile_px) {
+    for (int x = 0; x < active.width; x += tile_px) {
+      const int width = std::min(tile_px, active.width - x), height = std::min(tile_px, active.height - y);
+      if (2 * width >= tile_px && 2 * height >= tile_px)
+        tiles.push_back(measure_tile(picture, site, {x, y, width, height}));
+    }
+  }
+  if (tiles.empty()) return 0;
+  const auto count = static_cast<std::ptrdiff_t>(1 + dark_tiles * static_cast<double>(tiles.size() - 1));
+  std::ranges::nth_element(tiles, tiles.begin() + count - 1, {}, &Tile::mean_dn);
+  const auto middle = tiles.begin() + count / 2;
+  std::nth_element(tiles.begin(), middle, tiles.begin() + count,
+                   [](const Tile& a, const Tile& b) { return a.noise_dn2 < b.noise_dn2; });
+  return middle->noise_dn2;
 }
 
 }  // namespace
@@ -75,7 +116,10 @@ Result<std::optional<std::string>> check_masked_level(const RawDn& picture, cons
 Result<void> check_below_picture(const RawDn& picture, const DarkFrame& dark) {
   std::int64_t count = 0;
   PerSite<double> margin{};
-  for (int site = 0; site < 4; ++site) margin[site] = below * dark.noise_std_dn[site] + 1;
+  for (int site = 0; site < 4; ++site) {
+    const double noise_dn = std::max(dark.noise_std_dn[site], std::sqrt(darkest_noise_dn2(picture, site)));
+    margin[site] = below * noise_dn + 1;
+  }
   for (int y = 0; y < dark.dn.height(); ++y) {
     const std::uint16_t* codes = picture.dn.row(picture.active.y + y) + picture.active.x;
     for (int x = 0; x < dark.dn.width(); ++x) count += codes[x] < dark.dn.at(x, y) - margin[site_of(x, y)];

@@ -42,7 +42,9 @@ Result<std::optional<std::string>> check_masked_level(const RawDn& picture, cons
                                                       const DarkFrame& dark);
 
 /// Checks whether the image is brighter than its dark frame. Error: more than 1 % of its pixels lie more than four
-/// standard deviations below (3e-5 of a normal distribution do): subtraction would leave black dots.
+/// standard deviations below (3e-5 of a normal distribution do): subtraction would leave black dots. The deviation is
+/// that of the darks or, if that is more, of a pixel in the darkest tenth of the image: a master dark scatters less
+/// than one exposure.
 Result<void> check_below_picture(const RawDn& picture, const DarkFrame& dark);
 
 }  // namespace lowlux::calib

@@ -20,7 +20,9 @@ struct DarkFrame {
   PerSite<double> noise_std_dn{};        // temporal noise of a pixel of the image without light
   PerSite<double> added_variance_dn2{};  // mean over the pixels of the variance that subtracting `dn` adds
 
-  int frames = 0;               // dark frames used
+  int frames = 0;               // exposures that the dark frames used are the mean of
+  int files = 0;                // files that hold them: fewer than `frames` if there are master darks
+  bool estimated = false;       // `frames` follows from the noise of the files, and is not counted or given
   int settings = 0;             // number of exposure times and temperatures among them
   double scale = 1;             // dark charge of the image over that of the longest or warmest darks used
   double doubling_c = 0;        // degrees over which dark charge is assumed to double; 0 if no temperature was scaled

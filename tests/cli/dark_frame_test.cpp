@@ -1,15 +1,23 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <filesystem>
+#include <fstream>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "capture/file/dng_source.h"
 #include "isp/cli/develop/dark_files.h"
 #include "isp/cli/shared/raw_files.h"
+#include "isp/codec/tiff.h"
+#include "isp/output/dng/dng_writer.h"
 #include "isp/raw/measure/masked_black.h"
 #include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
@@ -35,7 +43,7 @@ class DarkFrameCommand : public test::SimulateCommand {
   }
   void picture(const std::string& name, const std::vector<std::string>& more) {
     auto args = sensor(more);
-    args.insert(args.end(), {"--size", "96x64", "--exposure", "1"});
+    args.insert(args.end(), {"--size", size_, "--exposure", "1"});
     simulated("chart:macbeth", name, args);
   }
   void darks(const std::string& name, const std::string& exposure_s, int frames,
@@ -43,7 +51,7 @@ class DarkFrameCommand : public test::SimulateCommand {
     std::filesystem::create_directories(std::filesystem::path(file(name)).parent_path());
     auto args = sensor(more);
     args.insert(args.end(), {"--exposure", exposure_s, "--frames", std::to_string(frames)});
-    if (std::ranges::find(more, "--size") == more.end()) args.insert(args.end(), {"--size", "96x64"});
+    if (std::ranges::find(more, "--size") == more.end()) args.insert(args.end(), {"--size", size_});
     simulated("dark", name, args);
   }
   test::ProcessResult developed(const std::vector<std::string>& more) {
@@ -62,6 +70,8 @@ class DarkFrameCommand : public test::SimulateCommand {
     EXPECT_NE((result.err + result.out).find(why), std::string::npos) << why << "\n" << result.err << result.out;
     EXPECT_FALSE(std::filesystem::exists(file("out.png")));
   }
+
+  std::string size_ = "96x64";
 };
 
 TEST_F(DarkFrameCommand, AFolderOfDarksIsTakenOffAndTheReportSaysWhatWasDone) {
@@ -147,6 +157,110 @@ TEST_F(DarkFrameCommand, IsMadeOnceForAllPicturesOfASetting) {
   for (int site = 0; site < 4; ++site) {
     EXPECT_NEAR((*after)->mean_dn[site] - (*before)->mean_dn[site], level(later)[site] - level(first)[site], 1e-9);
   }
+}
+
+// Writes the mean of the frames as other programs do.
+class MasterDarkCommand : public DarkFrameCommand {
+ protected:
+  void SetUp() override {
+    size_ = "480x320";  // the exposure follows from the noise, which few pixels determine to 1 %
+    picture("night.dng", {"--luminance", "0.02", "--seed", "99"});
+    darks("darks/d.dng", "1", 16);
+    Plane<float> mean;
+    for (int i = 0; i < 16; ++i) {
+      last_ = *capture::read_raw(file(fmt::format("darks/d_{:04}.dng", i)));
+      const RawDn& raw = last_.raw;
+      if (i == 0) {
+        mean = Plane<float>(raw.dn.width(), raw.dn.height());
+        std::fill_n(mean.data(), mean.size(), 0.0f);
+      }
+      for (std::size_t k = 0; k < mean.size(); ++k) mean.data()[k] += static_cast<float>(raw.dn.data()[k]) / 16;
+    }
+    mean_ = std::move(mean);
+  }
+  void write_raw(const std::string& name) {
+    for (std::size_t k = 0; k < mean_.size(); ++k) {
+      last_.raw.dn.data()[k] = static_cast<std::uint16_t>(std::lround(mean_.data()[k]));
+    }
+    ASSERT_TRUE(isp::write_dng(last_, file(name)));
+  }
+  /// Writes `mean_` times `factor` as a grey float TIFF; of colours if `tint` is not 1.
+  void write_tiff(const std::string& name, float factor = 1, float tint = 1) {
+    SceneLinear grey(mean_.width(), mean_.height());
+    for (int c = 0; c < 3; ++c) {
+      const float gain = c == 1 ? factor * tint : factor;
+      std::transform(mean_.data(), mean_.data() + mean_.size(), grey.plane[c].data(),
+                     [=](float v) { return gain * v; });
+    }
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> out(std::fopen(file(name).c_str(), "w+b"), &std::fclose);
+    ASSERT_TRUE(isp::encode_tiff(Picture(std::move(grey)), {}, {}, out.get()));
+  }
+  double mean_ciede2000(const std::string& a, const std::string& b) {
+    const auto result = lowlux({"compare", file(a), file(b), "--json"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return Json::parse(result.out)["ciede2000"]["mean"];
+  }
+  Json developed_to(const std::string& output, const std::vector<std::string>& more) {
+    std::vector<std::string> args{"develop", file("night.dng"), "-o", file(output), "--bits", "16", "--json"};
+    args.insert(args.end(), more.begin(), more.end());
+    const auto result = lowlux(args);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return Json::parse(result.out)[0];
+  }
+
+  RawFrame last_;
+  Plane<float> mean_;
+};
+
+TEST_F(MasterDarkCommand, GivesThePictureOfTheFramesItIsTheMeanOf) {
+  write_raw("master.dng");
+  write_tiff("master.tif");
+  const Json frames = developed_to("frames.png", {"--dark-frame", file("darks")});
+  EXPECT_EQ(frames["dark_frame"]["files"], 16);
+  EXPECT_EQ(frames["dark_frame"]["frames_estimated"], false);
+  const Json given = developed_to("given.png", {"--dark-frame", file("master.dng"), "--dark-frame-count", "16"});
+  EXPECT_EQ(given["dark_frame"]["frames"], 16);
+  EXPECT_EQ(given["dark_frame"]["files"], 1);
+  EXPECT_EQ(given["dark_frame"]["frames_estimated"], false);
+  EXPECT_EQ(given["warnings"].dump().find("single dark"), std::string::npos);
+  // Rounding adds 1/12 DN^2 to about 15 DN^2 / 16.
+  EXPECT_GT(given["dark_frame"]["noise_share"], frames["dark_frame"]["noise_share"]);
+  const Json tiff = developed_to("tiff.png", {"--dark-frame", file("master.tif"), "--dark-frame-count", "16"});
+  EXPECT_NE(tiff["warnings"].dump().find("are assumed"), std::string::npos);
+  EXPECT_LT(mean_ciede2000("frames.png", "tiff.png"), 0.1);  // the figure
+}
+
+TEST_F(MasterDarkCommand, TheNumberOfItsFramesIsEstimated) {
+  write_tiff("master.tif");
+  write_tiff("fractions.tiff", 1.0f / 65535);
+  const Json report = developed_to("estimated.png", {"--dark-frame", file("master.tif")});
+  EXPECT_EQ(report["dark_frame"]["frames_estimated"], true);
+  // 38,400 pairs of pixels; with the noise of the image, about 3 times a dark's, an error of sqrt(50 / 38400) = 0.036.
+  EXPECT_NEAR(report["dark_frame"]["frames"].get<double>(), 16, 16 * 5 * 0.036);
+  const Json scaled = developed_to("scaled.png", {"--dark-frame", file("fractions.tiff")});
+  EXPECT_NE(scaled["warnings"].dump().find("65535"), std::string::npos);
+  EXPECT_EQ(scaled["dark_frame"]["frames"], report["dark_frame"]["frames"]);
+  const auto explained = developed({"--dark-frame", file("master.tif"), "--explain"});
+  EXPECT_EQ(explained.exit_code, 0);
+}
+
+TEST_F(MasterDarkCommand, WhatCannotBeIsRefusedInOneLine) {
+  write_tiff("tint.tif", 1, 0.9f);
+  write_tiff("half.tif", 0.5f);
+  mean_.at(3, 5) = std::nanf("");
+  write_tiff("nan.tif");
+  mean_ = Plane<float>(32, 32);
+  std::fill_n(mean_.data(), mean_.size(), 600.0f);
+  write_tiff("small.tif");
+  std::ofstream(file("text.tif")) << "no TIFF";
+  refused({"--dark-frame", file("tint.tif")}, 1, "has colours");
+  refused({"--dark-frame", file("half.tif")}, 1, "half.tif");
+  refused({"--dark-frame", file("nan.tif")}, 1, "column 3, row 5");
+  refused({"--dark-frame", file("small.tif")}, 1, "32 x 32");
+  refused({"--dark-frame", file("text.tif")}, 1, "text.tif");
+  refused({"--dark-frame", file("none.tif")}, 1, "none.tif");
+  refused({"--dark-frame", file("darks"), "--dark-frame-count", "0"}, 2, "--dark-frame-count");
+  refused({"--dark-frame-count", "16"}, 2, "--dark-frame");
 }
 
 TEST_F(DarkFrameCommand, DarksThatHoldLightAreRefused) {

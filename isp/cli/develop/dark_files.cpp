@@ -16,6 +16,7 @@
 #include "isp/cli/shared/raw_files.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/measure/masked_black.h"
+#include "isp/raw/to_linear.h"
 
 namespace lowlux::cli {
 namespace {
@@ -37,6 +38,30 @@ Result<double> doubling_of_profile(const std::string& file, const calib::FrameSe
   return fail(ErrorCode::insufficient,
               "the profile holds no measured doubling of the dark current; calibrate it with darks of two temperatures",
               file);
+}
+
+/// Returns the noise model of an image in codes, or nullopt where its gain is not known.
+std::optional<calib::DarkNoiseModel> noise_model_of(const RawDn& raw, const NoiseProfile& noise,
+                                                    const PerSite<double>& pedestal_dn) {
+  const auto electrons = isp::electrons_at_white(raw, noise);
+  if (!electrons) return std::nullopt;
+  calib::DarkNoiseModel out;
+  for (int site = 0; site < 4; ++site) {
+    const auto colour = static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1));
+    const double range_dn = isp::white_at(raw, site) - pedestal_dn[site];
+    out.gain_dn_per_e[site] = range_dn / (*electrons)[site];
+    out.read_variance_dn2[site] = std::max(0.0, noise.offset[colour] * range_dn * range_dn);
+  }
+  return out;
+}
+
+std::string unchecked_text(const MosaicTiff& master) {
+  std::string text = fmt::format(
+      "{}: a TIFF does not state all of camera, ISO, exposure time, temperature and orientation; those of the picture "
+      "are assumed",
+      master.file);
+  if (master.scaled) text += "; its values, at most 1, are taken as fractions of 65535";
+  return text;
 }
 
 }  // namespace
@@ -65,19 +90,30 @@ Result<std::vector<std::string>> dark_files(const DevelopArgs& args, const std::
 
 Result<std::shared_ptr<DarkSource>> read_darks(const std::vector<std::string>& files, const DarkArgs& args) {
   calib::DarkLibrary library;
+  DarkFiles read;
   for (const std::string& file : files) {
+    if (is_tiff_name(file)) {
+      auto master = read_mosaic_tiff(file);
+      if (!master) return tl::make_unexpected(with_file(master.error(), file));
+      read.masters.push_back(*std::move(master));
+      continue;
+    }
     const Result<RawFrame> frame = capture::read_raw(file);
     Result<void> added = frame ? library.add(frame->raw) : tl::make_unexpected(frame.error());
     if (!added) return tl::make_unexpected(with_file(added.error(), file));
   }
-  std::vector<calib::DarkGroup> groups = library.groups();
+  read.groups = library.groups();
   calib::DarkRequest request{.noise_fraction = args.noise_fraction, .doubling_c = args.doubling_c};
   if (!args.doubling_profile.empty()) {
-    const Result<double> doubling = doubling_of_profile(args.doubling_profile, groups.front().setting);
+    if (read.groups.empty()) {
+      return fail(ErrorCode::invalid_argument, "TIFF files state no temperature to scale from: leave it out",
+                  "--dark-doubling");
+    }
+    const Result<double> doubling = doubling_of_profile(args.doubling_profile, read.groups.front().setting);
     if (!doubling) return tl::make_unexpected(doubling.error());
     request.doubling_c = *doubling;
   }
-  return std::make_shared<DarkSource>(std::move(groups), request);
+  return std::make_shared<DarkSource>(std::move(read), request, args.count);
 }
 
 Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(RawFrame& picture) {
@@ -86,10 +122,9 @@ Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(RawFrame& picture
   if (const auto masked = isp::measure_masked_black(raw).black) request.masked_dn = masked->pedestal_dn;
   if (const auto tag = isp::choose_black(raw, {isp::BlackChoice::metadata}); tag) {
     request.pedestal_dn = tag->pedestal_dn;
+    if (picture.noise) request.noise = noise_model_of(raw, *picture.noise, tag->pedestal_dn);
   }
-  const auto setting = calib::setting_of(raw);
-  if (!setting) return tl::make_unexpected(setting.error());
-  auto dark = make_or_find(raw, {*setting, request.masked_dn.has_value(), request.pedestal_dn}, request);
+  auto dark = make_or_find(raw, request);
   if (!dark) return dark;
   if ((*dark)->masked_dn && (*dark)->masked_dn != request.masked_dn) {
     dark = std::make_shared<const DarkFrame>(calib::at_masked_level(**dark, *request.masked_dn));
@@ -100,15 +135,47 @@ Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(RawFrame& picture
     if (*warning) picture.warnings.push_back(*std::move(*warning));
   }
   if (const auto fits = calib::check_below_picture(raw, **dark); !fits) return tl::make_unexpected(fits.error());
+  for (const MosaicTiff& master : files_.masters) picture.warnings.push_back(unchecked_text(master));
   return dark;
 }
 
-Result<std::shared_ptr<const DarkFrame>> DarkSource::make_or_find(const RawDn& picture, const Key& key,
-                                                                  const calib::DarkRequest& request) {
+Result<void> DarkSource::adopt_masters(const RawDn& picture, const calib::FrameSetting& setting,
+                                       const calib::DarkRequest& request) {
+  if (files_.masters.empty() || master_setting_ == setting) return {};
+  files_.groups.resize(raw_groups_);
+  master_setting_.reset();
+  for (const MosaicTiff& master : files_.masters) {
+    auto group = calib::group_of_master(master.dn, master.rounded, master.info, picture, request.pedestal_dn);
+    if (!group) return tl::make_unexpected(with_file(group.error(), master.file));
+    files_.groups.push_back(*std::move(group));
+  }
+  master_setting_ = setting;
+  return {};
+}
+
+void DarkSource::count_exposures(const RawDn& picture, calib::DarkRequest& request) const {
+  request.estimated = !count_;
+  request.exposures_per_file.assign(files_.groups.size(), count_.value_or(1));
+  if (count_ || !request.noise) return;
+  for (std::size_t g = 0; g < files_.groups.size(); ++g) {
+    const calib::DarkGroup& group = files_.groups[g];
+    const bool fits = group.mean_dn.width() == picture.active.width && group.mean_dn.height() == picture.active.height;
+    if (group.frames > 1 || !fits) continue;
+    request.exposures_per_file[g] = calib::estimate_exposures(group, picture, *request.noise, request.pedestal_dn);
+  }
+}
+
+Result<std::shared_ptr<const DarkFrame>> DarkSource::make_or_find(const RawDn& picture, calib::DarkRequest& request) {
+  const auto setting = calib::setting_of(picture);
+  if (!setting) return tl::make_unexpected(setting.error());
   const std::lock_guard lock(mutex_);  // others that need the same frame wait for it
+  if (auto adopted = adopt_masters(picture, *setting, request); !adopted) return tl::make_unexpected(adopted.error());
+  count_exposures(picture, request);
+  const Key key{*setting, request.masked_dn.has_value(), request.pedestal_dn, request.noise,
+                request.exposures_per_file};
   auto found = std::ranges::find(made_, key, &Made::key);
   if (found == made_.end()) {
-    Result<DarkFrame> made = calib::make_dark_frame(groups_, picture, request);
+    Result<DarkFrame> made = calib::make_dark_frame(files_.groups, picture, request);
     if (!made) return tl::make_unexpected(std::move(made.error()));
     if (made_.size() == max_made) made_.pop_back();
     found = made_.insert(made_.end(), {key, std::make_shared<const DarkFrame>(*std::move(made))});

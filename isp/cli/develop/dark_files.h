@@ -15,6 +15,7 @@
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 #include "isp/cli/develop/develop_args.h"
+#include "isp/cli/develop/mosaic_tiff.h"
 #include "isp/cli/shared/outputs.h"
 
 namespace lowlux::cli {
@@ -23,16 +24,24 @@ namespace lowlux::cli {
 /// among its darks, a black point in addition to darks, which hold it already.
 Result<std::vector<std::string>> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs);
 
+/// Holds the dark frames of the files as they were read.
+struct DarkFiles {
+  std::vector<calib::DarkGroup> groups;  // of raw files
+  std::vector<MosaicTiff> masters;       // of TIFF files, which state no setting
+};
+
 /// Holds the data of the dark frames of all images, and the last frames that were made. It may be used from any thread.
 class DarkSource {
  public:
   /// @param request  values that are the same for all images
-  DarkSource(std::vector<calib::DarkGroup> groups, const calib::DarkRequest& request)
-      : groups_(std::move(groups)), request_(request) {}
+  /// @param count    exposures that each file is the mean of; absent: estimated where the noise of the image is known
+  DarkSource(DarkFiles files, const calib::DarkRequest& request, std::optional<int> count)
+      : files_(std::move(files)), request_(request), count_(count) {}
 
-  /// Returns the dark frame of one image: calib::make_dark_frame, once for all images of the same setting and black
-  /// tag; at the level of the image's masked pixels if the frame depends on them. Errors: those of make_dark_frame, of
-  /// calib::check_masked_level, whose warning is added to those of the image, and of calib::check_below_picture.
+  /// Returns the dark frame of one image: calib::make_dark_frame, once for all images of the same setting, black tag,
+  /// noise and estimated number of exposures; at the level of the image's masked pixels if the frame depends on them.
+  /// Errors: those of make_dark_frame, of calib::check_masked_level, whose warning is added to those of the image, and
+  /// of calib::check_below_picture.
   Result<std::shared_ptr<const DarkFrame>> frame_for(RawFrame& picture);
 
  private:
@@ -41,6 +50,8 @@ class DarkSource {
     calib::FrameSetting setting;
     bool has_masked_pixels;
     std::optional<PerSite<double>> pedestal_dn;
+    std::optional<calib::DarkNoiseModel> noise;
+    std::vector<double> exposures_per_file;
     friend bool operator==(const Key&, const Key&) = default;
   };
   struct Made {
@@ -49,17 +60,22 @@ class DarkSource {
   };
   static constexpr std::size_t max_made = 4;  // exposures of a bracket, and one more
 
-  Result<std::shared_ptr<const DarkFrame>> make_or_find(const RawDn& picture, const Key& key,
-                                                        const calib::DarkRequest& request);
+  Result<std::shared_ptr<const DarkFrame>> make_or_find(const RawDn& picture, calib::DarkRequest& request);
+  Result<void> adopt_masters(const RawDn& picture, const calib::FrameSetting& setting,
+                             const calib::DarkRequest& request);
+  void count_exposures(const RawDn& picture, calib::DarkRequest& request) const;
 
-  std::vector<calib::DarkGroup> groups_;
+  DarkFiles files_;
   calib::DarkRequest request_;
+  std::optional<int> count_;
+  std::size_t raw_groups_ = files_.groups.size();  // those after them are of `masters`, for images of master_setting_
+  std::optional<calib::FrameSetting> master_setting_;
   std::mutex mutex_;
   std::vector<Made> made_;  // most recently used first
 };
 
-/// Reads the files one by one and accumulates them. Errors: those of reading, of calib::DarkLibrary, and of the profile
-/// that --dark-doubling may name: another camera's, or one without the value.
+/// Reads the files one by one and accumulates raw files. Errors: those of reading, of calib::DarkLibrary, and of the
+/// profile that --dark-doubling may name: another camera's, or one without the value.
 Result<std::shared_ptr<DarkSource>> read_darks(const std::vector<std::string>& files, const DarkArgs& args);
 
 }  // namespace lowlux::cli

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "calib/dark/master_dark.h"
 #include "denoise/denoiser.h"
 #include "isp/cli/shared/option_values.h"
 #include "isp/model/colour/correlated_colour_temperature.h"
@@ -15,10 +16,15 @@ namespace lowlux::cli {
 namespace {
 
 void add_darks(CLI::App& app, DarkArgs& dark) {
-  CLI::Option* frames = app.add_option("--dark-frame", dark.words,
-                                       "dark frames to subtract: files, a folder or a quoted pattern; repeatable")
-                            ->type_name("FILE[,FILE...]|FOLDER")
-                            ->allow_extra_args(false);
+  CLI::Option* frames =
+      app.add_option("--dark-frame", dark.words,
+                     "dark frames or master darks to subtract: files, a folder or a pattern; repeatable")
+          ->type_name("FILE[,FILE...]|FOLDER")
+          ->allow_extra_args(false);
+  app.add_option("--dark-frame-count", dark.count, "frames averaged in each dark frame file (default: estimated)")
+      ->check(CLI::Range(1, calib::max_exposures))
+      ->type_name("N")
+      ->needs(frames);
   add_text(app, "--dark-noise", "SHARE",
            "most that the dark frames may add to a picture's own variance in the dark (default 0.1)",
            [&dark](const std::string& text) -> std::optional<std::string> {

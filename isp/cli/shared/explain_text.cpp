@@ -97,6 +97,13 @@ void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, co
   }
 }
 
+std::string dark_frame_text(const DarkFrame& dark) {
+  return fmt::format(
+      "mean of {} exposures{} in {} file{}; adds {:.2g} % to the variance without light; {} pixels unknown",
+      dark.frames, dark.estimated ? " (estimated from the noise)" : "", dark.files, dark.files == 1 ? "" : "s",
+      100 * dark.noise_fraction, dark.unknown.size());
+}
+
 }  // namespace
 
 std::string explain_text(const isp::DevelopPlan& plan) {
@@ -105,6 +112,7 @@ std::string explain_text(const isp::DevelopPlan& plan) {
       "black [DN]",
       fmt::format("{:.2f} from {}{}", fmt::join(plan.levels.black.pedestal_dn, " "), name_of(plan.levels.black.source),
                   plan.levels.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", dark charge in it" : ""));
+  if (plan.levels.dark_frame) out.add("dark frame", dark_frame_text(*plan.levels.dark_frame));
   if (plan.unknown_dark_fraction) {
     out.add("dark", fmt::format("unknown; up to {:.0f} % of the charge of the median block",
                                 100 * *plan.unknown_dark_fraction));

@@ -36,6 +36,8 @@ Json black_json(const BlackPoint& black) {
 Json dark_json(const DarkFrame* dark) {
   if (dark == nullptr) return nullptr;
   return {{"frames", dark->frames},
+          {"frames_estimated", dark->estimated},
+          {"files", dark->files},
           {"settings", dark->settings},
           {"scale", dark->scale},
           {"doubling_c", dark->doubling_c > 0 ? Json(dark->doubling_c) : Json(nullptr)},

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+
+#include "isp/base/frame.h"
+#include "isp/base/plane.h"
+#include "isp/base/result.h"
+
+namespace lowlux::cli {
+
+/// A mosaic that another program saved as a grey TIFF, for example the mean of dark frames.
+struct MosaicTiff {
+  std::string file;
+  Plane<float> dn;
+  bool rounded = true;  // the file holds whole codes
+  bool scaled = false;  // its values are at most 1 and were taken as fractions of 65535, as Siril and PixInsight save
+  FrameInfo info;       // what the file states
+};
+
+/// Returns whether the file has the extension of a TIFF: .tif or .tiff in any case.
+bool is_tiff_name(const std::string& file);
+
+/// Reads a grey TIFF of 16 bits or 32-bit floats. Errors: those of reading and of isp::decode_tiff; 8 bits; colours;
+/// values that are not finite.
+Result<MosaicTiff> read_mosaic_tiff(const std::string& file);
+
+}  // namespace lowlux::cli
