@@ -89,6 +89,27 @@ void apply_gains(const RawCorrections& corrections, PlaneView<float> mosaic, Exe
   apply_gains(corrections, whole_of(mosaic), mosaic, executor);
 }
 
+void apply_gains_to_variance(const RawCorrections& corrections, int frame_width, int frame_height,
+                             PlaneView<float> cells, Executor& executor) {
+  if (corrections.gain_maps.empty() && corrections.radial_gains.empty()) return;
+  for_each_band(executor, cells.height, [&](RowBand band, int) {
+    InlineExecutor inline_executor;
+    Plane<float> gains(frame_width, 2);
+    for (int y = band.first; y < band.last; ++y) {
+      const int rows = std::min(2, frame_height - 2 * y);
+      std::fill_n(gains.data(), gains.size(), 1.0f);
+      apply_gains(corrections, {0, 2 * y, frame_width, frame_height}, gains.view().crop(0, 0, frame_width, rows),
+                  inline_executor);
+      for (int x = 0; x < cells.width; ++x) {
+        const int columns = std::min(2, frame_width - 2 * x);
+        float squares = 0;
+        for (int k = 0; k < rows * columns; ++k) squares += std::pow(gains.at(2 * x + k % columns, k / columns), 2.0f);
+        cells.row(y)[x] *= squares / static_cast<float>(rows * columns);
+      }
+    }
+  });
+}
+
 void apply_gains(const RawCorrections& corrections, RgbView<float> rgb, Executor& executor) {
   for (int plane = 0; plane < 3; ++plane) {
     for (const GainMap& map : corrections.gain_maps) {

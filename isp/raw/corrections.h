@@ -24,6 +24,10 @@ struct FramePlace {
 };
 void apply_gains(const RawCorrections& corrections, const FramePlace& place, PlaneView<float> mosaic,
                  Executor& executor);
+/// Multiplies the variance of each 2x2 cell of a mosaic by the mean square of the gains of its pixels. A cell may reach
+/// beyond the frame's last column or row, where it has fewer pixels.
+void apply_gains_to_variance(const RawCorrections& corrections, int frame_width, int frame_height,
+                             PlaneView<float> cells, Executor& executor);
 /// Multiplies demosaiced planes by the gains; GainMap::first_plane and planes choose among R, G, B.
 void apply_gains(const RawCorrections& corrections, RgbView<float> rgb, Executor& executor);
 

@@ -50,6 +50,55 @@ TEST(GainMap, PitchAndAreaChooseOneCfaSite) {
   }
 }
 
+TEST(GainMap, WithAPointInTheMiddleOfEachPixelItMultipliesEachByItsOwn) {
+  constexpr int width = 37, height = 23;
+  GainMap map;
+  map.bottom = map.points_v = height;
+  map.right = map.points_h = width;
+  map.spacing_v = 1.0 / height;
+  map.spacing_h = 1.0 / width;
+  map.origin_v = 0.5 / height;
+  map.origin_h = 0.5 / width;
+  for (int i = 0; i < width * height; ++i) map.gain.push_back(static_cast<float>(1 + (i * 37 % 101) / 100.0));
+  const RawCorrections corrections{.gain_maps = {map}, .radial_gains = {}, .defects = {}};
+  Plane<float> whole = ones(width, height), tile = ones(10, 8);
+  apply_gains(corrections, whole.view(), executor);
+  apply_gains(corrections, {20, 12, width, height}, tile.view(), executor);
+  for (int y = 0; y < height; ++y) {
+    // Positions are rounded to 1e-14 of a pixel, gains to floats.
+    for (int x = 0; x < width; ++x) EXPECT_NEAR(whole.at(x, y), map.gain[y * width + x], 1e-6);
+  }
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 10; ++x) EXPECT_EQ(tile.at(x, y), whole.at(x + 20, y + 12));
+  }
+}
+
+TEST(GainMap, VarianceIsMultipliedByTheMeanSquareOfTheGainsOfItsCell) {
+  constexpr int width = 9, height = 7;
+  GainMap site;  // of every second pixel
+  site.bottom = height;
+  site.right = width;
+  site.column_pitch = 2;
+  site.gain = {3};
+  const RadialGain radial{.k = {0.5}};
+  const RawCorrections corrections{.gain_maps = {site}, .radial_gains = {radial}, .defects = {}};
+  Plane<float> gains = ones(width, height), cells = ones((width + 1) / 2, (height + 1) / 2);
+  apply_gains(corrections, gains.view(), executor);
+  apply_gains_to_variance(corrections, width, height, cells.view(), executor);
+  for (int y = 0; y < cells.height(); ++y) {
+    for (int x = 0; x < cells.width(); ++x) {
+      double squares = 0, n = 0;
+      for (int v = 2 * y; v < std::min(2 * y + 2, height); ++v) {
+        for (int u = 2 * x; u < std::min(2 * x + 2, width); ++u) squares += std::pow(gains.at(u, v), 2), ++n;
+      }
+      EXPECT_NEAR(cells.at(x, y), squares / n, 1e-5) << x << " " << y;  // 1e-6 relative: floats
+    }
+  }
+  Plane<float> plain = ones(4, 4);
+  apply_gains_to_variance({}, 8, 8, plain.view(), executor);
+  EXPECT_EQ(plain.at(3, 3), 1);
+}
+
 TEST(GainMap, OutsideItsPointsItKeepsTheNearest) {
   GainMap map = corner_map(8, {1, 5, 1, 5});
   map.origin_h = 0.5;

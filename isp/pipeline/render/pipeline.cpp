@@ -66,6 +66,10 @@ void Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& plan) {
     repair(mosaic_.view(), plan.levels.defects, 2);
   }
   apply_gains(frame.corrections, mosaic_.view(), executor_);
+  if (plan.noise_reduction.reduces() && keeps_maps(plan)) {
+    apply_gains_to_variance(frame.corrections, raw.active.width, raw.active.height,
+                            noise_maps_.residual_variance_e2.view(), executor_);
+  }
 }
 
 RgbInput Pipeline::prepare_bayer(const RawFrame& frame, const DevelopPlan& plan) {
