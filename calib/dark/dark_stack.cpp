@@ -47,7 +47,7 @@ Result<void> DarkStack::add(const RawDn& raw) {
   if (frames_ == 0) {
     if (auto begun = begin(raw, std::move(*setting)); !begun) return begun;
   } else {
-    const auto what = fmt::format("dark frame {}", frames_ + 1);
+    const auto what = fmt::format("{} {}", kind_, frames_ + 1);
     if (auto same = check_same_setting(setting_, *setting, what); !same) return same;
     const bool known = setting_.temperature_c.has_value();
     if (known != setting->temperature_c.has_value() ||
@@ -57,7 +57,7 @@ Result<void> DarkStack::add(const RawDn& raw) {
     }
   }
   if (frames_ == max_frames) {
-    return fail(ErrorCode::too_large, fmt::format("a stack holds at most {} dark frames", max_frames));
+    return fail(ErrorCode::too_large, fmt::format("a stack holds at most {} frames", max_frames));
   }
   for (int y = 0; y < setting_.height; ++y) add_row(raw, y);
   ++frames_;

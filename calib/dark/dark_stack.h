@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "calib/frame_setting.h"
@@ -27,9 +29,12 @@ struct DarkGroup {
 /// Returns an error for a single frame, which contains no information about noise.
 Result<void> check_noise_is_known(const DarkGroup& group);
 
-/// Accumulates dark frames as they are added: 10 bytes for each pixel, for any number of frames.
+/// Accumulates dark frames, or flats, as they are added: 10 bytes for each pixel, for any number of frames.
 class DarkStack {
  public:
+  /// @param kind  what the frames are called in errors
+  explicit DarkStack(std::string kind = "dark frame") : kind_(std::move(kind)) {}
+
   /// Adds a frame. Errors: those of setting_of; a frame that differs from the first in camera, size,
   /// mosaic, white level, gain, exposure time, or by more than a degree; more than 32,768 frames.
   Result<void> add(const RawDn& raw);
@@ -48,6 +53,7 @@ class DarkStack {
   Result<void> begin(const RawDn& raw, FrameSetting setting);
   void add_row(const RawDn& raw, int y);
 
+  std::string kind_;
   FrameSetting setting_;
   int frames_ = 0;
   Plane<std::uint16_t> first_;  // the accumulated values are differences to it, to avoid cancellation

@@ -40,7 +40,17 @@ Result<double> doubling_of_profile(const std::string& file, const calib::FrameSe
               file);
 }
 
-/// Returns the noise model of an image in codes, or nullopt where its gain is not known.
+std::string unchecked_text(const MosaicTiff& master) {
+  std::string text = fmt::format(
+      "{}: a TIFF does not state all of camera, ISO, exposure time, temperature and orientation; those of the picture "
+      "are assumed",
+      master.file);
+  if (master.scaled) text += "; its values, at most 1, are taken as fractions of 65535";
+  return text;
+}
+
+}  // namespace
+
 std::optional<calib::DarkNoiseModel> noise_model_of(const RawDn& raw, const NoiseProfile& noise,
                                                     const PerSite<double>& pedestal_dn) {
   const auto electrons = isp::electrons_at_white(raw, noise);
@@ -55,16 +65,18 @@ std::optional<calib::DarkNoiseModel> noise_model_of(const RawDn& raw, const Nois
   return out;
 }
 
-std::string unchecked_text(const MosaicTiff& master) {
-  std::string text = fmt::format(
-      "{}: a TIFF does not state all of camera, ISO, exposure time, temperature and orientation; those of the picture "
-      "are assumed",
-      master.file);
-  if (master.scaled) text += "; its values, at most 1, are taken as fractions of 65535";
-  return text;
+Result<void> check_no_picture(const std::vector<Job>& jobs, const std::vector<std::string>& files, const char* option,
+                              const char* kind) {
+  for (const Job& job : jobs) {
+    const auto same = std::ranges::find_if(files, [&](const std::string& file) {
+      std::error_code ignored;
+      return fs::equivalent(job.input, file, ignored);
+    });
+    if (same == files.end()) continue;
+    return fail(ErrorCode::invalid_argument, fmt::format("{} is a picture and one of its {}", job.input, kind), option);
+  }
+  return {};
 }
-
-}  // namespace
 
 Result<std::vector<std::string>> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs) {
   auto found = raw_files_of_lists(args.dark.words);
@@ -76,14 +88,8 @@ Result<std::vector<std::string>> dark_files(const DevelopArgs& args, const std::
                 "dark frames hold the black level already: taking both off leaves green shadows; give one of the two",
                 "--black");
   }
-  for (const Job& job : jobs) {
-    const auto same = std::ranges::find_if(files, [&](const std::string& file) {
-      std::error_code ignored;
-      return fs::equivalent(job.input, file, ignored);
-    });
-    if (same == files.end()) continue;
-    return fail(ErrorCode::invalid_argument, fmt::format("{} is a picture and one of its darks", job.input),
-                "--dark-frame");
+  if (const auto apart = check_no_picture(jobs, files, "--dark-frame", "darks"); !apart) {
+    return tl::make_unexpected(apart.error());
   }
   return found;
 }

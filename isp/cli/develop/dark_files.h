@@ -20,6 +20,14 @@
 
 namespace lowlux::cli {
 
+/// Returns an error of the option if an image is itself among the files.
+Result<void> check_no_picture(const std::vector<Job>& jobs, const std::vector<std::string>& files, const char* option,
+                              const char* kind);
+
+/// Returns the noise model of an image in codes, or nullopt where its gain is not known.
+std::optional<calib::DarkNoiseModel> noise_model_of(const RawDn& raw, const NoiseProfile& noise,
+                                                    const PerSite<double>& pedestal_dn);
+
 /// Returns the dark frames that the arguments name: see raw_files_of_lists. Errors: those, an image that is itself
 /// among its darks, a black point in addition to darks, which hold it already.
 Result<std::vector<std::string>> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs);

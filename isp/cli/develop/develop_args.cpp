@@ -50,6 +50,12 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
       ->needs(frames);
 }
 
+void add_flats(CLI::App& app, std::vector<std::string>& flats) {
+  app.add_option("--flat-frame", flats, "flat frames to divide by (vignetting, PRNU): files, a folder or a pattern")
+      ->type_name("FILE[,FILE...]|FOLDER")
+      ->allow_extra_args(false);
+}
+
 /// Adds the options of every verb that takes raw files one by one.
 /// @param explained  help for --explain
 void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
@@ -107,6 +113,7 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   add_camera(app, args);
   add_denoise(app, args);
   add_darks(app, args.dark);
+  add_flats(app, args.flats);
   add_budget(app, args.effects);
   add_batch(
       app,

@@ -51,6 +51,7 @@ struct DevelopArgs {
   bool explain = false;
   bool quiet = false;
   DarkArgs dark;
+  std::vector<std::string> flats;  // --flat-frame: files, lists separated by commas, folders, patterns; empty: none
   LookArgs look;
   EffectsArgs effects;
 };

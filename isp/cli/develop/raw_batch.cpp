@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include "capture/file/dng_source.h"
+#include "isp/cli/develop/flat_files.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/interruption.h"
 #include "isp/cli/shared/lines.h"
@@ -47,6 +48,9 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
     const ProfileChoice choice{!batch.args.profile.empty(), batch.args.gain_setting};
     const auto used = use_profile(*batch.profile, choice, frame, options);
     if (!used) return tl::make_unexpected(used.error());
+  }
+  if (batch.flat) {
+    if (const auto used = use_flat(*batch.flat, frame); !used) return tl::make_unexpected(used.error());
   }
   if (!batch.darks) return options;
   Result<std::shared_ptr<const DarkFrame>> dark = batch.darks->frame_for(frame);
@@ -112,7 +116,10 @@ Result<ReadyFrame> ready_frame(const RawBatch& batch, const Job& job, Executor& 
   if (!frame) return tl::make_unexpected(frame.error());
   Result<isp::DevelopOptions> options = options_for(batch, *frame);
   if (!options) return tl::make_unexpected(options.error());
-  if (batch.memory) batch.memory->report_size(batch.bytes_of(frame->raw, *options, executor.width()));
+  if (batch.memory) {
+    const std::size_t flat = batch.flat ? sizeof(float) * batch.flat->gain.gain.size() : 0;
+    batch.memory->report_size(flat + batch.bytes_of(frame->raw, *options, executor.width()));
+  }
   if (batch.darks) clock.lap("dark frame's making");
   if (const Result<void> found = find_noise(*options, *frame, executor); !found) {
     return tl::make_unexpected(found.error());
@@ -146,7 +153,8 @@ void print_outcome(const DevelopArgs& args, const DevelopOutcome& outcome) {
     }
   }
   if (args.json) return;
-  if (args.explain) print_out(fmt::format("{}\n{}", one_line(outcome.input), explain_text(*outcome.plan)));
+  if (args.explain)
+    print_out(fmt::format("{}\n{}", one_line(outcome.input), explain_text(*outcome.plan, outcome.flat.get())));
   if (args.timings) print_out(fmt::format("{}\n{}", one_line(outcome.input), times_text(outcome.times)));
 }
 
@@ -201,6 +209,7 @@ class BatchRun {
 
   DevelopOutcome outcome_of(const Job& job, Executor& executor) {
     DevelopOutcome out{job.input, job.output};
+    out.flat = batch_.flat;
     FileProgress progress(progress_, job.input);
     try {
       Job own = job;

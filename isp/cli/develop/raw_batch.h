@@ -35,6 +35,7 @@ struct RawBatch {
   std::vector<Job> jobs;
   std::optional<CameraProfile> profile = std::nullopt;
   std::shared_ptr<DarkSource> darks = nullptr;
+  std::shared_ptr<const calib::FlatField> flat = nullptr;
   isp::Sync sync = isp::Sync::no;
   std::shared_ptr<MemoryGate> memory = nullptr;   // absent: --jobs limits the files at a time
   EstimateBytes bytes_of = isp::expected_bytes;   // for one file

@@ -1,14 +1,18 @@
 #include <cstdio>
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "isp/cli/develop/develop_args.h"
+#include "isp/cli/develop/flat_files.h"
 #include "isp/cli/develop/raw_batch.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/outputs.h"
 #include "isp/cli/shared/picture_options.h"
+#include "isp/cli/shared/raw_files.h"
 #include "isp/cli/verbs.h"
 #include "isp/output/picture/image_writer.h"
 #include "isp/output/picture/orient.h"
@@ -68,15 +72,28 @@ int run_develop(const std::vector<std::string>& words) {
 
   const Result<std::vector<std::string>> darks = dark_files(args, *jobs);
   if (!darks) return print_argument_error("develop", darks.error());
+  const Result<std::vector<std::string>> flats = raw_files_of_lists(args.flats);
+  if (!flats) return print_argument_error("develop", flats.error());
+  if (const auto apart = check_no_picture(*jobs, *flats, "--flat-frame", "flats"); !apart) {
+    return print_argument_error("develop", apart.error());
+  }
   std::vector<std::string> only_read = *darks;
+  only_read.insert(only_read.end(), flats->begin(), flats->end());
   only_read.insert(only_read.end(),
                    {args.profile, args.black_profile, args.dark.doubling_profile, args.look.coefficients});
   if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed)
     return print_usage_error("develop", unharmed.error());
 
   if (const auto made = make_for_display(args, *options); !made) return print_failure(made.error());
-  const Result<RawBatch> batch = make_batch(args, *options, *std::move(jobs), *darks);
+  std::shared_ptr<const calib::FlatField> flat;
+  if (!flats->empty()) {
+    auto read = read_flats(*flats);
+    if (!read) return print_failure(read.error());
+    flat = *std::move(read);
+  }
+  Result<RawBatch> batch = make_batch(args, *options, *std::move(jobs), *darks);
   if (!batch) return print_failure(batch.error());
+  batch->flat = std::move(flat);
   return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {
     return develop_file(*batch, job, executor, progress, out);
   });

@@ -104,15 +104,24 @@ std::string dark_frame_text(const DarkFrame& dark) {
       100 * dark.noise_fraction, dark.unknown.size());
 }
 
+std::string flat_text(const calib::FlatField& flat) {
+  return fmt::format(
+      "mean of {} frame{}; gains to {:.3g}; PRNU {:.2g} %, {:.0f} % of it divided out; adds {:.2g} % of the signal as "
+      "noise",
+      flat.frames, flat.frames == 1 ? "" : "s", flat.max_gain, 100 * flat.prnu, 100 * flat.pixel_fraction,
+      100 * flat.noise);
+}
+
 }  // namespace
 
-std::string explain_text(const isp::DevelopPlan& plan) {
+std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* flat) {
   Lines out;
   out.add(
       "black [DN]",
       fmt::format("{:.2f} from {}{}", fmt::join(plan.levels.black.pedestal_dn, " "), name_of(plan.levels.black.source),
                   plan.levels.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", dark charge in it" : ""));
   if (plan.levels.dark_frame) out.add("dark frame", dark_frame_text(*plan.levels.dark_frame));
+  if (flat != nullptr) out.add("flat field", flat_text(*flat));
   if (plan.unknown_dark_fraction) {
     out.add("dark", fmt::format("unknown; up to {:.0f} % of the charge of the median block",
                                 100 * *plan.unknown_dark_fraction));

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "calib/flat/flat_field.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 #include "isp/pipeline/plan.h"
@@ -14,10 +16,11 @@ namespace lowlux::cli {
 struct DevelopOutcome {
   std::string input;
   std::string output;
-  std::optional<Error> error;            // set: not all files were written
-  std::optional<isp::DevelopPlan> plan;  // set without an error, unless skipped
-  bool skipped = false;                  // the outputs exist, and are kept
-  int width = 0;                         // of the written image, upright
+  std::optional<Error> error;                    // set: not all files were written
+  std::optional<isp::DevelopPlan> plan;          // set without an error, unless skipped
+  std::shared_ptr<const calib::FlatField> flat;  // set where the image was divided by flats
+  bool skipped = false;                          // the outputs exist, and are kept
+  int width = 0;                                 // of the written image, upright
   int height = 0;
   std::vector<isp::StageTime> times;  // all stages, in order
 };
@@ -25,7 +28,8 @@ struct DevelopOutcome {
 /// Returns one JSON object.
 std::string develop_json(const DevelopOutcome& outcome);
 /// Returns the decisions for a frame, with reasons, as text.
-std::string explain_text(const isp::DevelopPlan& plan);
+/// @param flat  nullptr: none was used
+std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* flat);
 /// Returns stage times as text, one line for each and their sum.
 std::string times_text(const std::vector<isp::StageTime>& times);
 

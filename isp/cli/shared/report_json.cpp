@@ -47,6 +47,15 @@ Json dark_json(const DarkFrame* dark) {
           {"unknown_pixels", dark->unknown.size()}};
 }
 
+Json flat_json(const calib::FlatField* flat) {
+  if (flat == nullptr) return nullptr;
+  return {{"frames", flat->frames},
+          {"max_gain", flat->max_gain},
+          {"prnu", flat->prnu},
+          {"pixel_share", flat->pixel_fraction},
+          {"noise_share", flat->noise}};
+}
+
 Json tag_json(const std::optional<BlackLevel>& tag) {
   if (!tag) return nullptr;
   return {{"rows", tag->rows},
@@ -183,6 +192,7 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"height", outcome.height},
             {"black", black_json(plan.levels.black)},
             {"dark_frame", dark_json(plan.levels.dark_frame.get())},
+            {"flat_frame", flat_json(outcome.flat.get())},
             {"unknown_dark_fraction", plan.unknown_dark_fraction ? Json(*plan.unknown_dark_fraction) : Json(nullptr)},
             {"unit", plan.levels.electrons_at_white ? "electrons" : "fraction-of-white"},
             {"white_balance", white_json(plan)},
