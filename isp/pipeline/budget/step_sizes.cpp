@@ -1,9 +1,11 @@
 #include "isp/pipeline/budget/step_sizes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
