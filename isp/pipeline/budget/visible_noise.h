@@ -49,8 +49,8 @@ struct DeviatingPixel {
   double excess = 0;  // fraction of white; negative where the pixel is too dark
 };
 
-/// Returns the CIEDE2000 between such a pixel and its block of the thumbnail, in the image, demosaiced by linear filters.
-/// Absent for spaces without primaries.
+/// Returns the CIEDE2000 between such a pixel and its block of the thumbnail, in the image, demosaiced by linear
+/// filters. Absent for spaces without primaries.
 /// @param light  dark charge subtracted
 std::optional<double> pixel_delta_e(const RawDn& raw, const DevelopOptions& options, const Rendering& rendering,
                                     const Thumbnail& light, const DeviatingPixel& pixel);
