@@ -275,8 +275,9 @@ void settle_noise(const Job& job, double share, const PixelMask& unknown, DarkFr
 
 Result<DarkFrame> make_dark_frame(Groups groups, const RawDn& picture, const DarkRequest& request) {
   if (auto good = check_request(request); !good) return tl::make_unexpected(good.error());
-  const auto setting = check_frames(groups, picture);
+  auto setting = check_frames(groups, picture);
   if (!setting) return tl::make_unexpected(setting.error());
+  if (request.is_bias) setting->exposure_s = groups[0].setting.exposure_s;
   const auto job = weigh(groups, *setting, request);
   if (!job) return tl::make_unexpected(job.error());
   DarkFrame out;
@@ -292,6 +293,11 @@ Result<DarkFrame> make_dark_frame(Groups groups, const RawDn& picture, const Dar
   }
   settle_noise(*job, request.noise_fraction, *unknown, out);
   if (job->weights.of_pedestal != 0) out.masked_dn = request.masked_dn;
+  if (request.is_bias) {
+    out.is_bias = true;
+    out.holds_dark = false;
+    out.masked_dn = out.mean_dn;
+  }
   return out;
 }
 
@@ -310,6 +316,7 @@ DarkFrame at_masked_level(const DarkFrame& dark, const PerSite<double>& masked_d
                 .noise_fraction = dark.noise_fraction,
                 .pattern_fraction = dark.pattern_fraction,
                 .masked_dn = masked_dn,
+                .is_bias = dark.is_bias,
                 .warnings = dark.warnings};
   PerSite<double> change_dn{};
   for (int site = 0; site < 4; ++site) {

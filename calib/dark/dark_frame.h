@@ -23,7 +23,8 @@ struct DarkRequest {
   std::optional<PerSite<double>> pedestal_dn;  // the file's tag: level without charge
   std::optional<DarkNoiseModel> noise;         // of the image
   std::vector<double> exposures_per_file;      // one for each group, at least 1; empty: 1
-  bool estimated = false;                      // `exposures_per_file` was estimated
+  bool is_bias = false;    // the darks are bias frames: their own exposure time stands for the image's
+  bool estimated = false;  // `exposures_per_file` was estimated
 };
 
 /// Makes the dark frame of an image: see weigh_darks for the scaling of times and temperatures, limit_noise for the
@@ -40,8 +41,8 @@ struct DarkRequest {
 /// check_masked_level and check_below_picture to check that it fits each of them.
 Result<DarkFrame> make_dark_frame(std::span<const DarkGroup> groups, const RawDn& picture, const DarkRequest& request);
 
-/// Returns the dark frame of another image of the same setting, adapted to its masked pixels. Precondition:
-/// dark.masked_dn.
+/// Returns the dark frame of another image of the same setting, adapted to its masked pixels; or a bias frame at the
+/// level of an image's black point, pedestal and dark charge. Precondition: dark.masked_dn.
 DarkFrame at_masked_level(const DarkFrame& dark, const PerSite<double>& masked_dn);
 
 /// Temporal noise of one site's pixels.

@@ -11,8 +11,8 @@
 namespace lowlux {
 
 /// Holds the output of a sensor without light at the settings of one image, per pixel: pedestal and dark charge
-/// together, so that nothing of either remains to be subtracted. It is made from dark frames by
-/// calib/dark/dark_frame.h.
+/// together, so that nothing of either remains to be subtracted; without `holds_dark` the pedestal alone. It is made
+/// from dark frames by calib/dark/dark_frame.h.
 struct DarkFrame {
   Plane<float> dn;                       // active height x width: the mean code expected without light
   std::vector<DefectRect> unknown;       // pixels whose dark value is unknown, ascending, 1 x 1; to be repaired
@@ -29,6 +29,8 @@ struct DarkFrame {
   double noise_fraction = 0;    // mean of added variance over the image's own variance without light
   double pattern_fraction = 1;  // fraction of each pixel's deviation that was kept; 1: all of it
   std::optional<PerSite<double>> masked_dn;  // masked pixels of the image, if they set the level of `dn`
+  bool is_bias = false;    // made from bias frames: of the shortest exposure time, without the image's dark charge
+  bool holds_dark = true;  // the level of `dn` includes the image's dark charge
   std::vector<std::string> warnings;
 };
 

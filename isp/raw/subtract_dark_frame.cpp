@@ -69,7 +69,7 @@ Result<BlackPoint> black_of(const RawDn& raw, const DarkFrame& dark) {
   BlackPoint black;
   black.pedestal_dn = dark.mean_dn;
   black.noise_std_dn = dark.noise_std_dn;
-  black.holds = BlackPoint::Holds::pedestal_and_dark;
+  if (dark.holds_dark) black.holds = BlackPoint::Holds::pedestal_and_dark;
   black.source = BlackPoint::Source::dark_frame;
   for (int site = 0; site < 4; ++site) {
     if (white_at(raw, site) > black.pedestal_dn[site]) continue;

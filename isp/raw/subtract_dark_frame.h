@@ -7,7 +7,8 @@
 
 namespace lowlux::isp {
 
-/// Returns the black point that a dark frame represents: its sites' means, with pedestal and dark charge in one.
+/// Returns the black point that a dark frame represents: its sites' means, with pedestal and dark charge in one, or of
+/// bias frames the pedestal.
 /// Errors: a frame that is not a mosaic (unsupported), a dark frame of another size than the active area
 /// (invalid_argument), white not above black (malformed).
 Result<BlackPoint> black_of(const RawDn& raw, const DarkFrame& dark);

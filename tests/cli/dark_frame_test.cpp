@@ -147,12 +147,12 @@ TEST_F(DarkFrameCommand, IsMadeOnceForAllPicturesOfASetting) {
   RawFrame first = *capture::read_raw(file("night.dng")), later = *capture::read_raw(file("later.dng"));
   const auto level = [](const RawFrame& frame) { return isp::measure_masked_black(frame.raw).black->pedestal_dn; };
   ASSERT_NE(level(first), level(later));
-  const auto same = *cli::read_darks(*cli::raw_files_of(file("same")), {});
-  const auto made = same->frame_for(first);
+  const auto same = *cli::read_darks({*cli::raw_files_of(file("same"))}, {});
+  const auto made = same->frame_for(first, {});
   ASSERT_TRUE(made) << made.error().message;
-  EXPECT_EQ(*same->frame_for(later), *made);
-  const auto scaled = *cli::read_darks(*cli::raw_files_of(file("long")), {});
-  const auto before = scaled->frame_for(first), after = scaled->frame_for(later);
+  EXPECT_EQ(*same->frame_for(later, {}), *made);
+  const auto scaled = *cli::read_darks({*cli::raw_files_of(file("long"))}, {});
+  const auto before = scaled->frame_for(first, {}), after = scaled->frame_for(later, {});
   ASSERT_TRUE(before && after);
   for (int site = 0; site < 4; ++site) {
     EXPECT_NEAR((*after)->mean_dn[site] - (*before)->mean_dn[site], level(later)[site] - level(first)[site], 1e-9);
@@ -261,6 +261,45 @@ TEST_F(MasterDarkCommand, WhatCannotBeIsRefusedInOneLine) {
   refused({"--dark-frame", file("none.tif")}, 1, "none.tif");
   refused({"--dark-frame", file("darks"), "--dark-frame-count", "0"}, 2, "--dark-frame-count");
   refused({"--dark-frame-count", "16"}, 2, "--dark-frame");
+}
+
+TEST_F(DarkFrameCommand, BiasFramesScaleDarksOfAnotherTime) {
+  darks("bias/b.dng", "0.0001", 8);
+  darks("long/d.dng", "3", 8);
+  const Json both = report({"--bias-frame", file("bias"), "--dark-frame", file("long")});
+  const Json library = report({"--dark-frame", file("bias"), "--dark-frame", file("long")});
+  EXPECT_EQ(both["black"]["pedestal_dn"], library["black"]["pedestal_dn"]);
+  EXPECT_EQ(both["dark_frame"]["settings"], 2);
+  EXPECT_EQ(both["dark_frame"]["is_bias"], false);
+  EXPECT_EQ(both["black"]["holds_dark"], true);
+}
+
+TEST_F(DarkFrameCommand, BiasFramesAloneGiveThePatternAndMaskedPixelsTheLevel) {
+  darks("bias/b.dng", "0.0001", 16);
+  const Json masked = report({"--bias-frame", file("bias")});
+  EXPECT_EQ(masked["dark_frame"]["is_bias"], true);
+  EXPECT_EQ(masked["black"]["holds_dark"], true);
+  const Json plain = report({});
+  for (int site = 0; site < 4; ++site) {
+    EXPECT_NEAR(masked["black"]["pedestal_dn"][site].get<double>(), plain["black"]["pedestal_dn"][site].get<double>(),
+                1e-9);
+  }
+  RawFrame bare = *capture::read_raw(file("night.dng"));
+  bare.raw.masked.clear();
+  const auto source = *cli::read_darks({{}, *cli::raw_files_of(file("bias"))}, {});
+  const auto dark = source->frame_for(bare, {isp::BlackChoice::metadata});
+  ASSERT_TRUE(dark) << dark.error().message;
+  EXPECT_FALSE((*dark)->holds_dark);  // 60 e- of dark charge are left
+  // 6144 pixels of 16 frames of 3 e- at 0.41 DN/e-: 0.02 DN for each site; the pedestal is 1024.
+  for (const double level : (*dark)->mean_dn) EXPECT_NEAR(level, 1024, 0.1);
+}
+
+TEST_F(DarkFrameCommand, BiasFramesThatAreNoneAreRefused) {
+  darks("brief/d.dng", "0.3", 2);
+  refused({"--bias-frame", file("brief")}, 1, "bias frame is exposed 0.3 s");
+  refused({"--bias-frame", file("brief"), "--black", "600"}, 2, "green shadows");
+  refused({"--bias-frame", file("night.dng")}, 2, "one of its bias frames");
+  refused({"--bias-frame", file("some.tif")}, 1, "exposure time");
 }
 
 TEST_F(DarkFrameCommand, DarksThatHoldLightAreRefused) {

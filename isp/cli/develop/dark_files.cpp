@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <system_error>
 #include <utility>
 
@@ -78,53 +79,88 @@ Result<void> check_no_picture(const std::vector<Job>& jobs, const std::vector<st
   return {};
 }
 
-Result<std::vector<std::string>> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs) {
-  auto found = raw_files_of_lists(args.dark.words);
-  if (!found) return found;
-  const std::vector<std::string>& files = *found;
-  const bool black_asked = args.options.black.choice != isp::BlackChoice::automatic || !args.black_profile.empty();
-  if (!files.empty() && black_asked) {
+std::vector<std::string> DarkNames::all() const {
+  std::vector<std::string> out = darks;
+  out.insert(out.end(), bias.begin(), bias.end());
+  return out;
+}
+
+Result<DarkNames> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs) {
+  auto darks = raw_files_of_lists(args.dark.words);
+  if (!darks) return tl::make_unexpected(darks.error());
+  auto bias = raw_files_of_lists(args.dark.bias);
+  if (!bias) return tl::make_unexpected(bias.error());
+  const bool level_given = args.options.black.choice != isp::BlackChoice::automatic;
+  if ((!darks->empty() && (level_given || !args.black_profile.empty())) || (!bias->empty() && level_given)) {
     return fail(ErrorCode::invalid_argument,
                 "dark frames hold the black level already: taking both off leaves green shadows; give one of the two",
                 "--black");
   }
-  if (const auto apart = check_no_picture(jobs, files, "--dark-frame", "darks"); !apart) {
+  if (const auto apart = check_no_picture(jobs, *darks, "--dark-frame", "darks"); !apart) {
     return tl::make_unexpected(apart.error());
   }
-  return found;
+  if (const auto apart = check_no_picture(jobs, *bias, "--bias-frame", "bias frames"); !apart) {
+    return tl::make_unexpected(apart.error());
+  }
+  return DarkNames{*std::move(darks), *std::move(bias)};
 }
 
-Result<std::shared_ptr<DarkSource>> read_darks(const std::vector<std::string>& files, const DarkArgs& args) {
-  calib::DarkLibrary library;
+namespace {
+
+Result<void> add_raw(const std::string& file, calib::DarkLibrary& library) {
+  const Result<RawFrame> frame = capture::read_raw(file);
+  Result<void> added = frame ? library.add(frame->raw) : tl::make_unexpected(frame.error());
+  if (!added) return tl::make_unexpected(with_file(added.error(), file));
+  return {};
+}
+
+Result<DarkFiles> read_files(const DarkNames& names) {
+  calib::DarkLibrary darks, bias;
   DarkFiles read;
-  for (const std::string& file : files) {
+  for (const std::string& file : names.darks) {
     if (is_tiff_name(file)) {
       auto master = read_mosaic_tiff(file);
       if (!master) return tl::make_unexpected(with_file(master.error(), file));
       read.masters.push_back(*std::move(master));
-      continue;
+    } else if (auto added = add_raw(file, darks); !added) {
+      return tl::make_unexpected(added.error());
     }
-    const Result<RawFrame> frame = capture::read_raw(file);
-    Result<void> added = frame ? library.add(frame->raw) : tl::make_unexpected(frame.error());
-    if (!added) return tl::make_unexpected(with_file(added.error(), file));
   }
-  read.groups = library.groups();
+  for (const std::string& file : names.bias) {
+    if (is_tiff_name(file)) {
+      return fail(ErrorCode::unsupported, "a TIFF states no exposure time; give bias frames as raw files", file);
+    }
+    if (auto added = add_raw(file, bias); !added) return tl::make_unexpected(added.error());
+  }
+  read.groups = darks.groups();
+  read.darks = read.groups.size();
+  std::ranges::move(bias.groups(), std::back_inserter(read.groups));
+  return read;
+}
+
+}  // namespace
+
+Result<std::shared_ptr<DarkSource>> read_darks(const DarkNames& names, const DarkArgs& args) {
+  auto read = read_files(names);
+  if (!read) return tl::make_unexpected(read.error());
   calib::DarkRequest request{.noise_fraction = args.noise_fraction, .doubling_c = args.doubling_c};
   if (!args.doubling_profile.empty()) {
-    if (read.groups.empty()) {
+    if (read->groups.empty()) {
       return fail(ErrorCode::invalid_argument, "TIFF files state no temperature to scale from: leave it out",
                   "--dark-doubling");
     }
-    const Result<double> doubling = doubling_of_profile(args.doubling_profile, read.groups.front().setting);
+    const Result<double> doubling = doubling_of_profile(args.doubling_profile, read->groups.front().setting);
     if (!doubling) return tl::make_unexpected(doubling.error());
     request.doubling_c = *doubling;
   }
-  return std::make_shared<DarkSource>(std::move(read), request, args.count);
+  return std::make_shared<DarkSource>(*std::move(read), request, args.count);
 }
 
-Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(RawFrame& picture) {
+Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(RawFrame& picture, const isp::BlackRequest& black) {
   const RawDn& raw = picture.raw;
+  if (const auto brief = check_bias_times(raw); !brief) return tl::make_unexpected(brief.error());
   calib::DarkRequest request = request_;
+  request.is_bias = is_bias();
   if (const auto masked = isp::measure_masked_black(raw).black) request.masked_dn = masked->pedestal_dn;
   if (const auto tag = isp::choose_black(raw, {isp::BlackChoice::metadata}); tag) {
     request.pedestal_dn = tag->pedestal_dn;
@@ -132,10 +168,15 @@ Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(RawFrame& picture
   }
   auto dark = make_or_find(raw, request);
   if (!dark) return dark;
-  if ((*dark)->masked_dn && (*dark)->masked_dn != request.masked_dn) {
+  if (request.is_bias) {
+    const auto level = isp::choose_black(raw, black);
+    if (level && level->holds == BlackPoint::Holds::pedestal_and_dark) {
+      dark = std::make_shared<const DarkFrame>(calib::at_masked_level(**dark, level->pedestal_dn));
+    }
+  } else if ((*dark)->masked_dn && (*dark)->masked_dn != request.masked_dn) {
     dark = std::make_shared<const DarkFrame>(calib::at_masked_level(**dark, *request.masked_dn));
   }
-  if (request.masked_dn) {
+  if (request.masked_dn && (*dark)->holds_dark) {
     auto warning = calib::check_masked_level(raw, *request.masked_dn, **dark);
     if (!warning) return tl::make_unexpected(std::move(warning.error()));
     if (*warning) picture.warnings.push_back(*std::move(*warning));
@@ -159,15 +200,32 @@ Result<void> DarkSource::adopt_masters(const RawDn& picture, const calib::FrameS
   return {};
 }
 
+Result<void> DarkSource::check_bias_times(const RawDn& picture) const {
+  constexpr double max_time = 0.1;  // of the image's
+  for (std::size_t g = files_.darks; g < raw_groups_; ++g) {
+    const auto& bias_s = files_.groups[g].setting.exposure_s;
+    if (!bias_s || !picture.info.exposure_s || *bias_s <= max_time * *picture.info.exposure_s) continue;
+    return fail(
+        ErrorCode::invalid_argument,
+        fmt::format("a bias frame is exposed {:g} s, the picture {:g} s; take bias frames of the shortest time, "
+                    "or give darks with --dark-frame",
+                    *bias_s, *picture.info.exposure_s));
+  }
+  return {};
+}
+
 void DarkSource::count_exposures(const RawDn& picture, calib::DarkRequest& request) const {
   request.estimated = !count_;
-  request.exposures_per_file.assign(files_.groups.size(), count_.value_or(1));
-  if (count_ || !request.noise) return;
+  request.exposures_per_file.assign(files_.groups.size(), 1);
   for (std::size_t g = 0; g < files_.groups.size(); ++g) {
     const calib::DarkGroup& group = files_.groups[g];
+    const bool is_bias_group = g >= files_.darks && g < raw_groups_;
     const bool fits = group.mean_dn.width() == picture.active.width && group.mean_dn.height() == picture.active.height;
-    if (group.frames > 1 || !fits) continue;
-    request.exposures_per_file[g] = calib::estimate_exposures(group, picture, *request.noise, request.pedestal_dn);
+    if (count_ && !is_bias_group) {
+      request.exposures_per_file[g] = *count_;
+    } else if (group.frames == 1 && fits && request.noise) {
+      request.exposures_per_file[g] = calib::estimate_exposures(group, picture, *request.noise, request.pedestal_dn);
+    }
   }
 }
 

@@ -17,6 +17,7 @@
 #include "isp/cli/develop/develop_args.h"
 #include "isp/cli/develop/mosaic_tiff.h"
 #include "isp/cli/shared/outputs.h"
+#include "isp/raw/black_point.h"
 
 namespace lowlux::cli {
 
@@ -28,13 +29,23 @@ Result<void> check_no_picture(const std::vector<Job>& jobs, const std::vector<st
 std::optional<calib::DarkNoiseModel> noise_model_of(const RawDn& raw, const NoiseProfile& noise,
                                                     const PerSite<double>& pedestal_dn);
 
-/// Returns the dark frames that the arguments name: see raw_files_of_lists. Errors: those, an image that is itself
-/// among its darks, a black point in addition to darks, which hold it already.
-Result<std::vector<std::string>> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs);
+/// Names of the files of dark and bias frames.
+struct DarkNames {
+  std::vector<std::string> darks;
+  std::vector<std::string> bias;
+  bool empty() const { return darks.empty() && bias.empty(); }
+  std::vector<std::string> all() const;
+};
+
+/// Returns the dark and bias frames that the arguments name: see raw_files_of_lists. Errors: those, an image that is
+/// itself among them, a black level in addition to them, which they hold already. Bias frames alone may go with a
+/// profile, which knows the dark current.
+Result<DarkNames> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs);
 
 /// Holds the dark frames of the files as they were read.
 struct DarkFiles {
-  std::vector<calib::DarkGroup> groups;  // of raw files
+  std::vector<calib::DarkGroup> groups;  // of raw files: dark frames, then bias frames
+  std::size_t darks = 0;                 // number of groups that are of dark frames
   std::vector<MosaicTiff> masters;       // of TIFF files, which state no setting
 };
 
@@ -49,8 +60,9 @@ class DarkSource {
   /// Returns the dark frame of one image: calib::make_dark_frame, once for all images of the same setting, black tag,
   /// noise and estimated number of exposures; at the level of the image's masked pixels if the frame depends on them.
   /// Errors: those of make_dark_frame, of calib::check_masked_level, whose warning is added to those of the image, and
-  /// of calib::check_below_picture.
-  Result<std::shared_ptr<const DarkFrame>> frame_for(RawFrame& picture);
+  /// of calib::check_below_picture; bias frames of more than a tenth of the image's exposure time.
+  /// @param black  with bias frames alone: if the black point that it requests holds the dark charge, it is the level
+  Result<std::shared_ptr<const DarkFrame>> frame_for(RawFrame& picture, const isp::BlackRequest& black);
 
  private:
   /// Identifies a dark frame by the values it depends on.
@@ -71,6 +83,9 @@ class DarkSource {
   Result<std::shared_ptr<const DarkFrame>> make_or_find(const RawDn& picture, calib::DarkRequest& request);
   Result<void> adopt_masters(const RawDn& picture, const calib::FrameSetting& setting,
                              const calib::DarkRequest& request);
+  /// Returns whether there are bias frames alone.
+  bool is_bias() const { return files_.darks == 0 && !files_.groups.empty() && files_.masters.empty(); }
+  Result<void> check_bias_times(const RawDn& picture) const;
   void count_exposures(const RawDn& picture, calib::DarkRequest& request) const;
 
   DarkFiles files_;
@@ -84,6 +99,6 @@ class DarkSource {
 
 /// Reads the files one by one and accumulates raw files. Errors: those of reading, of calib::DarkLibrary, and of the
 /// profile that --dark-doubling may name: another camera's, or one without the value.
-Result<std::shared_ptr<DarkSource>> read_darks(const std::vector<std::string>& files, const DarkArgs& args);
+Result<std::shared_ptr<DarkSource>> read_darks(const DarkNames& names, const DarkArgs& args);
 
 }  // namespace lowlux::cli

@@ -21,6 +21,9 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
                      "dark frames or master darks to subtract: files, a folder or a pattern; repeatable")
           ->type_name("FILE[,FILE...]|FOLDER")
           ->allow_extra_args(false);
+  app.add_option("--bias-frame", dark.bias, "bias frames: pedestal of each pixel, also to scale darks of another time")
+      ->type_name("FILE[,FILE...]|FOLDER")
+      ->allow_extra_args(false);
   app.add_option("--dark-frame-count", dark.count, "frames averaged in each dark frame file (default: estimated)")
       ->check(CLI::Range(1, calib::max_exposures))
       ->type_name("N")

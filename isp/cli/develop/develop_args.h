@@ -18,9 +18,10 @@ class App;
 
 namespace lowlux::cli {
 
-/// Holds the arguments of dark frames: --dark-frame, --dark-frame-count, --dark-noise, --dark-doubling.
+/// Holds the arguments of dark frames: --dark-frame, --bias-frame, --dark-frame-count, --dark-noise, --dark-doubling.
 struct DarkArgs {
   std::vector<std::string> words;    // files, lists separated by commas, folders, patterns; empty: none
+  std::vector<std::string> bias;     // --bias-frame, in the same form
   std::optional<int> count;          // exposures that each file is the mean of; absent: estimated
   double noise_fraction = 0.1;       // maximum fraction they may add to an image's variance in the dark
   std::optional<double> doubling_c;  // given as a number

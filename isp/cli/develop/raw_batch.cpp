@@ -53,7 +53,7 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
     if (const auto used = use_flat(*batch.flat, frame); !used) return tl::make_unexpected(used.error());
   }
   if (!batch.darks) return options;
-  Result<std::shared_ptr<const DarkFrame>> dark = batch.darks->frame_for(frame);
+  Result<std::shared_ptr<const DarkFrame>> dark = batch.darks->frame_for(frame, options.black);
   if (!dark) return tl::make_unexpected(dark.error());
   options.dark_frame = std::move(*dark);
   options.black = batch.options.black;  // the darks include it
@@ -76,7 +76,7 @@ void FileProgress::reach(double share) {
 }
 
 Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& options, std::vector<Job> jobs,
-                            const std::vector<std::string>& darks) {
+                            const DarkNames& darks) {
   RawBatch batch{.args = args, .options = options, .jobs = std::move(jobs)};
   if (const std::string& file = args.profile.empty() ? args.black_profile : args.profile; !file.empty()) {
     auto profile = read_profile(file);

@@ -46,7 +46,7 @@ struct RawBatch {
 
 /// Reads profile and darks and makes the output folder. Errors name their file.
 Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& options, std::vector<Job> jobs,
-                            const std::vector<std::string>& darks);
+                            const DarkNames& darks);
 
 /// Returns all files written for one input: the output, and its maps.
 std::vector<std::string> files_of(const RawBatch& batch, const Job& job);

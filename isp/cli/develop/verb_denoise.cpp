@@ -78,9 +78,9 @@ int run_denoise(const std::vector<std::string>& words) {
     return print_usage_error("denoise",
                              {ErrorCode::invalid_argument, "a clean raw is a DNG: its name ends with .dng", "-o"});
   }
-  const Result<std::vector<std::string>> darks = dark_files(args, *jobs);
+  const Result<DarkNames> darks = dark_files(args, *jobs);
   if (!darks) return print_argument_error("denoise", darks.error());
-  std::vector<std::string> only_read = *darks;
+  std::vector<std::string> only_read = darks->all();
   only_read.insert(only_read.end(), {args.profile, args.black_profile, args.dark.doubling_profile});
   if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed)
     return print_usage_error("denoise", unharmed.error());

@@ -70,14 +70,14 @@ int run_develop(const std::vector<std::string>& words) {
   Result<isp::DevelopOptions> options = complete_options(args, *format);
   if (!options) return print_usage_error("develop", options.error());
 
-  const Result<std::vector<std::string>> darks = dark_files(args, *jobs);
+  const Result<DarkNames> darks = dark_files(args, *jobs);
   if (!darks) return print_argument_error("develop", darks.error());
   const Result<std::vector<std::string>> flats = raw_files_of_lists(args.flats);
   if (!flats) return print_argument_error("develop", flats.error());
   if (const auto apart = check_no_picture(*jobs, *flats, "--flat-frame", "flats"); !apart) {
     return print_argument_error("develop", apart.error());
   }
-  std::vector<std::string> only_read = *darks;
+  std::vector<std::string> only_read = darks->all();
   only_read.insert(only_read.end(), flats->begin(), flats->end());
   only_read.insert(only_read.end(),
                    {args.profile, args.black_profile, args.dark.doubling_profile, args.look.coefficients});

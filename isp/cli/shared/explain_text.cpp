@@ -120,7 +120,9 @@ std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* f
       "black [DN]",
       fmt::format("{:.2f} from {}{}", fmt::join(plan.levels.black.pedestal_dn, " "), name_of(plan.levels.black.source),
                   plan.levels.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", dark charge in it" : ""));
-  if (plan.levels.dark_frame) out.add("dark frame", dark_frame_text(*plan.levels.dark_frame));
+  if (const DarkFrame* const dark = plan.levels.dark_frame.get()) {
+    out.add(dark->is_bias ? "bias frame" : "dark frame", dark_frame_text(*dark));
+  }
   if (flat != nullptr) out.add("flat field", flat_text(*flat));
   if (plan.unknown_dark_fraction) {
     out.add("dark", fmt::format("unknown; up to {:.0f} % of the charge of the median block",

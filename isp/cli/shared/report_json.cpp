@@ -38,6 +38,7 @@ Json dark_json(const DarkFrame* dark) {
   return {{"frames", dark->frames},
           {"frames_estimated", dark->estimated},
           {"files", dark->files},
+          {"is_bias", dark->is_bias},
           {"settings", dark->settings},
           {"scale", dark->scale},
           {"doubling_c", dark->doubling_c > 0 ? Json(dark->doubling_c) : Json(nullptr)},

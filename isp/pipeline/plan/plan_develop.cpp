@@ -88,7 +88,7 @@ std::optional<double> find_unknown_dark(const RawFrame& frame, const RawLevels& 
   // Dark current that few sensors exceed uncooled: that of the GSENSE4040BSI at 25 C by its data sheet.
   constexpr double high_current_e_per_s = 25, at_c = 25, doubling_c = 7, min_charge_e = 2, min_fraction = 0.1;
   const FrameInfo& info = frame.raw.info;
-  const bool is_unknown = frame.raw.layout == SensorLayout::bayer && levels.electrons_at_white && !levels.dark_frame &&
+  const bool is_unknown = frame.raw.layout == SensorLayout::bayer && levels.electrons_at_white &&
                           !frame.noise->reduced && levels.black.holds == BlackPoint::Holds::pedestal_only &&
                           levels.black.dark_mean_e == PerSite<double>{};
   if (!is_unknown || !info.exposure_s) return std::nullopt;
