@@ -23,7 +23,7 @@ namespace {
 using Json = nlohmann::json;
 using Words = std::vector<std::string>;
 
-constexpr int columns = 6, rows = 3;  // the coloured patches; the fourth row is grey
+constexpr int patch_columns = 6, patch_rows = 3;  // the coloured patches; the fourth row is grey
 constexpr int width = 600, height = 400;
 
 /// Chromaticity of a patch relative to white, CIE 1976 u'v'.
@@ -46,8 +46,8 @@ class ShippedProfiles : public test::SimulateCommand {
     };
     const Colour white = uv(*isp::xyz_of(isp::output_white));
     std::vector<Colour> out;
-    for (int row = 0; row < rows; ++row) {
-      for (int column = 0; column < columns; ++column) {
+    for (int row = 0; row < patch_rows; ++row) {
+      for (int column = 0; column < patch_columns; ++column) {
         Vector3 sum{};
         for (int y = (3 * row + 1) * height / 12; y < (3 * row + 2) * height / 12; ++y) {
           for (int x = (3 * column + 1) * width / 18; x < (3 * column + 2) * width / 18; ++x) {
