@@ -11,7 +11,6 @@
 namespace lowlux::denoise {
 namespace {
 
-constexpr int step = 2;                                      // cells from one patch to the next
 constexpr int below = rows::search_reach + rows::patch - 1;  // rows that patches found from one row extend down
 
 rows::ResidualOfPatches left_by(PlaneKind kind, FoundBy found_by) {
@@ -33,7 +32,7 @@ struct NlBayes {
     const unsigned char* const has = s.has_chroma.data() + l * s.columns * s.rows;
     const unsigned char* const upper = has + tile_of(y << l, s.rows) * s.columns;
     const unsigned char* const lower = has + tile_of((y + rows::patch - 1) << l, s.rows) * s.columns;
-    for (int x = 0; x + rows::patch <= level().width; x += step) {
+    for (int x = 0; x < level().width; x += rows::patch) {
       const int left = tile_of(x << l, s.columns), right = tile_of((x + rows::patch - 1) << l, s.columns);
       const bool any = upper[left] != 0 || upper[right] != 0 || lower[left] != 0 || lower[right] != 0;
       *out++ = any ? 1 : 0;
@@ -60,14 +59,14 @@ struct NlBayes {
     return in;
   }
 
-  static rows::PatchSums sums(const PatchMemory& m, int y) {
+  static rows::PatchSums sums(const PatchMemory& m) {
     rows::PatchSums out{};
     for (int p = 0; p < 4; ++p) {
       std::copy(m.change[p].begin(), m.change[p].end(), out.change[p]);
       std::copy(m.weight[p].begin(), m.weight[p].end(), out.weight[p]);
       for (int i = 0; i < 2; ++i) {
-        out.residual[p][i] = m.residual[p][(y / 2 + i) % 2];
-        out.residual_weight[p][i] = m.residual_weight[p][(y / 2 + i) % 2];
+        out.residual[p][i] = m.residual[p][i];
+        out.residual_weight[p][i] = m.residual_weight[p][i];
       }
     }
     return out;
@@ -86,39 +85,42 @@ struct NlBayes {
     }
   }
 
+  /// Finishes the two rows of residual variances that patches cover, and clears their memory.
   void finish_residual(const PatchMemory& m, int y, bool inside) const {
     const PyramidLevel& at = level();
     for (int p = 0; p < planes(); ++p) {
-      float *const residual = m.residual[p][y % 2], *const weight = m.residual_weight[p][y % 2];
-      if (inside) rows::add_mean_row(residual, weight, at.width / 2, nullptr, at.residual.row(p, y));
-      clear(residual, at.width / 2);
-      clear(weight, at.width / 2);
+      for (int i = 0; i < 2; ++i) {
+        float *const residual = m.residual[p][i], *const weight = m.residual_weight[p][i];
+        if (inside) rows::add_mean_row(residual, weight, at.width / 2, nullptr, at.residual.row(p, y + i));
+        clear(residual, at.width / 2);
+        clear(weight, at.width / 2);
+      }
     }
   }
 
-  /// Filters rows first .. last - 1, even. Patches that reach in from outside the strip are found again.
+  /// Filters rows first .. last - 1, multiples of 4. Patches that reach in from outside the strip are found again.
   void band(int first, int last, const PatchMemory& m) const {
     const ScratchUse use(m.scratch);
     const int height = level().height;
-    const int start = std::max(0, first - below + 1),
-              end = std::min(height - rows::patch, last - step + rows::search_reach);
+    const int start = std::max(0, (first - below + rows::patch - 1) / rows::patch * rows::patch);
+    const int end = std::min(height, last + rows::search_reach);
     int done = std::max(0, start - rows::search_reach);
     const auto finish_up_to = [&](int y) {
       for (; done < y; ++done) finish(m, done, done >= first && done < last);
     };
-    for (int y = start; y <= end; y += step) {
+    for (int y = start; y < end; y += rows::patch) {
       wanted(y, m.chroma);
-      rows::nl_bayes_row(patch_row(y, m.chroma), m.patches, sums(m, y));
+      rows::nl_bayes_row(patch_row(y, m.chroma), m.patches, sums(m));
       finish_residual(m, y / 2, y >= first && y < last);
-      if (y == height - rows::patch) finish_residual(m, y / 2 + 1, y + 2 < last);
-      finish_up_to(y == height - rows::patch ? height : y + step - rows::search_reach);
+      finish_up_to(y + rows::patch == height ? height : y + rows::patch - rows::search_reach);
     }
     finish_up_to(std::min(height, last));
   }
 
   void run() const {
-    in_bands(frame.workers, level().height / 2,
-             [this](int first, int last, int thread) { band(2 * first, 2 * last, frame.memory.patches[thread]); });
+    in_bands(frame.workers, level().height / rows::patch, [this](int first, int last, int thread) {
+      band(rows::patch * first, rows::patch * last, frame.memory.patches[thread]);
+    });
   }
 };
 

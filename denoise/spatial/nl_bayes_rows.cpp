@@ -54,10 +54,10 @@ void NlBayesRow(const PatchRow& in, float* scratch, const PatchSums& sums) {
   auto* const bytes = reinterpret_cast<std::byte*>(scratch);
   const std::size_t beyond = reinterpret_cast<std::uintptr_t>(bytes) % alignof(Scratch);
   Scratch& s = *reinterpret_cast<Scratch*>(bytes + (alignof(Scratch) - beyond));
-  for (int x0 = 0; x0 + patch <= in.width; x0 += 2) {
+  for (int x0 = 0; x0 < in.width; x0 += patch) {
     search(in, x0, s.keys);
     choose(in, x0, s.keys, s.members);
-    const int planes = in.chroma != nullptr && in.chroma[x0 / 2] != 0 ? 4 : 1;
+    const int planes = in.chroma != nullptr && in.chroma[x0 / patch] != 0 ? 4 : 1;
     for (int p = 0; p < planes; ++p) {
       gather(in, p, s.members, s.patches);
       const float variance = group_variance(in, p, s.members);

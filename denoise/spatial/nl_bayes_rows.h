@@ -20,7 +20,7 @@ struct ResidualOfPatches {
   float other;
 };
 
-/// Input of the patches with their corner on one row of cells, 2 cells apart.
+/// Input of a row of patches, side by side.
 struct PatchRow {
   const float* noisy[4];  // row 0 of L, C1, C2, C3
   const float* pilot[4];
@@ -29,7 +29,7 @@ struct PatchRow {
   std::ptrdiff_t variance_stride;
   int width;  // cells, a multiple of 4, as is `height`
   int height;
-  int y;                       // row of the corners, even
+  int y;                       // first row of the patches, a multiple of 4
   const std::uint8_t* chroma;  // for each patch, whether C1, C2, C3 are wanted; null: nowhere
   ResidualOfPatches left[3];   // luma, chroma, luma where chroma is not wanted
 };
@@ -37,7 +37,7 @@ struct PatchRow {
 struct PatchSums {
   float* change[4][ring];  // change of the pilot, times weight; row y at index y % ring
   float* weight[4][ring];
-  float* residual[4][2];  // rows of half width below the corners
+  float* residual[4][2];  // rows of half width
   float* residual_weight[4][2];
 };
 std::size_t patch_scratch();

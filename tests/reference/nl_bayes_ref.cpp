@@ -180,8 +180,8 @@ Shrunk nl_bayes(const Four& x, const Four& variance, const Four& pilot, int leve
   for (Four* four : {&out.sum.value, &out.sum.residual, &out.weight, &out.own_weight}) {
     four->fill(Image(x[0].width, x[0].height));
   }
-  for (int y = 0; y + side <= x[0].height; y += 2) {
-    for (int column = 0; column + side <= x[0].width; column += 2) {
+  for (int y = 0; y < x[0].height; y += side) {
+    for (int column = 0; column < x[0].width; column += side) {
       const auto places = nearest(pilot, variance, {column, y});
       const FoundBy found = found_by(starts, level, {column, y});
       for (int p = 0; p < 4; ++p) {
