@@ -19,6 +19,11 @@ constexpr int levels_of(int columns, int rows) {
   return levels;
 }
 
+/// Returns the power of the luma-shaped spectrum that is expected of chroma, over that of the chroma that is known. On
+/// the coarsest level it is 0: blocks are as wide as the margin of a tile there, and would carry what lies behind it
+/// into the tile.
+constexpr float luma_shaped_power(int level, int levels) { return level + 1 == levels ? 0.0f : 3.0f; }
+
 /// Returns the number of cells after mirrored ones are appended, so that on each level the blocks, 4 cells apart, end
 /// with the last cell.
 constexpr int padded(int cells, int levels) {

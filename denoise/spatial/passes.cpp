@@ -58,6 +58,7 @@ struct Shrink {
       in.left[kind == PlaneKind::luma ? 0 : 1] = {shares.kept, shares.other, shares.mean};
     }
     in.chroma = planes_of(frame, l) == 4 ? chroma : nullptr;
+    in.luma_shaped = luma_shaped_power(l, frame.levels);
     return in;
   }
 

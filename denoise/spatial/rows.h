@@ -94,6 +94,8 @@ struct BlockRow {
   int step;                    // cells from one block to the next, 2 or 4
   ResidualOfBlocks left[2];    // luma, chroma
   const std::uint8_t* chroma;  // for each strip, whether C1, C2, C3 are wanted; null: nowhere
+  /// Power of a spectrum shaped like that of luma over that of the chroma that is known: at least as much is expected.
+  float luma_shaped;
 };
 /// Weighted sums of blocks: 8 rows of cells, and of residual variances 4 rows of half width.
 struct BlockSums {

@@ -79,11 +79,10 @@ HWY_INLINE void shrink_strip(const BlockRow& in, int plane, int first, int count
     const VF variance = load(m.variance + first + i);
     VF power;
     if (in.pilot[0] != nullptr) {
-      power = plane == 0 ? wiener_luma<kStep>(s, i, variance) : wiener_chroma<kStep>(s, i, variance);
-    } else if (plane == 0) {
-      power = threshold<kStep>(s, i, HardLuma(variance));
+      power = plane == 0 ? wiener_luma<kStep>(s, i, variance) : wiener_chroma<kStep>(s, i, variance, in.luma_shaped);
     } else {
-      power = threshold<kStep>(s, i, HardChroma(variance));
+      power =
+          plane == 0 ? threshold_luma<kStep>(s, i, variance) : threshold_chroma<kStep>(s, i, variance, in.luma_shaped);
     }
     const VF exists = hn::IfThenElseZero(
         hn::Lt(hn::Iota(f, static_cast<float>(i)), constant(static_cast<float>(count))), constant(1));

@@ -99,43 +99,70 @@ HWY_INLINE void coefficients(const float (*from)[run], int place, VF (&x)[8]) {
   forward8(x);
 }
 
-/// Hard threshold of the luma of a group of blocks, with gains 0 or 1.
-struct HardLuma {
-  VF least;
-  HWY_INLINE explicit HardLuma(VF variance) : least(hn::Mul(constant(9), variance)) {}
-  HWY_INLINE VF gain(VF x, float* luma) const {
-    const VF kept = hn::IfThenElseZero(hn::Gt(hn::Mul(x, x), least), constant(1));
-    store(kept, luma);
-    return kept;
-  }
-};
-struct HardChroma {
-  VF least, least_beside_luma;
-  HWY_INLINE explicit HardChroma(VF variance)
-      : least(hn::Mul(constant(16), variance)), least_beside_luma(hn::Mul(constant(6.25f), variance)) {}
-  HWY_INLINE VF gain(VF x, const float* luma) const {
-    const VF enough = hn::IfThenElse(hn::Gt(load(luma), hn::Zero(Floats())), least_beside_luma, least);
-    return hn::IfThenElseZero(hn::Gt(hn::Mul(x, x), enough), constant(1));
-  }
-};
-
-/// Applies hard thresholds to one group of blocks, and returns the sum of the gains.
-template <int kStep, class Rule>
-HWY_INLINE VF threshold(Strip& s, int place, const Rule& rule) {
-  VF power = hn::Zero(Floats());
+/// Transforms one group of blocks with the gains gain(i, x) of coefficient i of value x, and returns the sum of their
+/// squares. The gain of the mean is 1.
+template <int kStep, class Gain>
+HWY_INLINE VF filter(Strip& s, int place, const Gain& gain) {
+  VF sum = hn::Zero(Floats());
   for (int v = 0; v < 8; ++v) {
     VF x[8];
     coefficients<kStep>(s.noisy[v], place, x);
     for (int u = 0; u < 8; ++u) {
-      VF gain = rule.gain(x[u], s.luma[8 * v + u] + place);
-      if (u == 0 && v == 0) gain = constant(1);
-      power = hn::Add(power, gain);
-      x[u] = hn::Mul(x[u], gain);
+      const VF g = u == 0 && v == 0 ? constant(1) : gain(8 * v + u, x[u]);
+      sum = hn::MulAdd(g, g, sum);
+      x[u] = hn::Mul(x[u], g);
     }
     inverse8(x);
     for (int c = 0; c < 8; ++c) store(x[c], s.value[8 * v + c] + lead + place);
   }
-  return power;
+  return sum;
+}
+
+HWY_INLINE VF wiener_gain(VF power, VF variance) { return hn::Div(power, hn::Add(power, variance)); }
+
+/// Hard threshold of luma.
+template <int kStep>
+HWY_INLINE VF threshold_luma(Strip& s, int place, VF variance) {
+  const Floats f;
+  const VF least = hn::Mul(constant(9), variance);
+  VF kept_power = hn::Zero(f);
+  store(hn::Zero(f), s.luma[0] + place);
+  const VF sum = filter<kStep>(s, place, [&](int i, VF x) HWY_ATTR {
+    const VF square = hn::Mul(x, x);
+    const auto kept = hn::Gt(square, least);
+    const VF power = hn::IfThenElseZero(kept, square);
+    kept_power = hn::Add(kept_power, power);
+    store(power, s.luma[i] + place);
+    return hn::IfThenElseZero(kept, constant(1));
+  });
+  store(hn::MulAdd(constant(4), variance, kept_power), s.luma_power + place);
+  return sum;
+}
+
+/// Thresholds of chroma, after that of luma: lower where luma is kept. What falls below gets the gain P / (P + V),
+/// where P is a spectrum shaped like that of the luma.
+/// @param luma_shaped  power of that spectrum over that of what is kept
+template <int kStep>
+HWY_INLINE VF threshold_chroma(Strip& s, int place, VF variance, float luma_shaped) {
+  const Floats f;
+  const VF least = hn::Mul(constant(16), variance), least_beside_luma = hn::Mul(constant(6.25f), variance);
+  const auto is_kept = [&](VF square, VF luma) HWY_ATTR {
+    return hn::Gt(square, hn::IfThenElse(hn::Gt(luma, hn::Zero(f)), least_beside_luma, least));
+  };
+  VF kept_power = hn::Zero(f);
+  for (int v = 0; v < 8; ++v) {
+    VF x[8];
+    coefficients<kStep>(s.noisy[v], place, x);
+    for (int u = v == 0 ? 1 : 0; u < 8; ++u) {
+      const VF square = hn::Mul(x[u], x[u]);
+      kept_power = hn::Add(kept_power, hn::IfThenElseZero(is_kept(square, load(s.luma[8 * v + u] + place)), square));
+    }
+  }
+  const VF per_luma = hn::Div(hn::Mul(constant(luma_shaped), kept_power), load(s.luma_power + place));
+  return filter<kStep>(s, place, [&](int i, VF x) HWY_ATTR {
+    const VF luma = load(s.luma[i] + place);
+    return hn::IfThenElse(is_kept(hn::Mul(x, x), luma), constant(1), wiener_gain(hn::Mul(per_luma, luma), variance));
+  });
 }
 
 /// Stores the squares of the pilot's coefficients for one group of blocks, 0 for the mean, and returns their sum.
@@ -156,46 +183,26 @@ HWY_INLINE VF pilot_squares(const Strip& s, int place, float* square, std::ptrdi
   return sum;
 }
 
-/// Applies the gains P / (P + V) to one group of blocks, with P = power(i) of coefficient i, and returns the sum of
-/// their squares. The gain of the mean is 1.
-template <int kStep, class Power>
-HWY_INLINE VF wiener(Strip& s, int place, VF variance, const Power& power) {
-  VF sum = hn::Zero(Floats());
-  for (int v = 0; v < 8; ++v) {
-    VF x[8];
-    coefficients<kStep>(s.noisy[v], place, x);
-    for (int u = 0; u < 8; ++u) {
-      const VF expected = power(8 * v + u);
-      VF gain = hn::Div(expected, hn::Add(expected, variance));
-      if (u == 0 && v == 0) gain = constant(1);
-      sum = hn::MulAdd(gain, gain, sum);
-      x[u] = hn::Mul(x[u], gain);
-    }
-    inverse8(x);
-    for (int c = 0; c < 8; ++c) store(x[c], s.value[8 * v + c] + lead + place);
-  }
-  return sum;
-}
-
 /// Empirical Wiener gains of luma: P is the pilot's.
 template <int kStep>
 HWY_INLINE VF wiener_luma(Strip& s, int place, VF variance) {
   const VF sum = pilot_squares<kStep>(s, place, s.luma[0] + place, run);
   store(hn::MulAdd(constant(4), variance, sum), s.luma_power + place);
-  return wiener<kStep>(s, place, variance, [&](int i) HWY_ATTR { return load(s.luma[i] + place); });
+  return filter<kStep>(s, place, [&](int i, VF) HWY_ATTR { return wiener_gain(load(s.luma[i] + place), variance); });
 }
 
 /// Empirical Wiener gains of chroma, after those of luma: P is the larger of the pilot's and of a spectrum shaped like
-/// that of the luma, with three times the power of the pilot's chroma. The pilot has lost the fine structure of colour,
-/// which mostly lies where luma has its own.
+/// that of the luma. The pilot has lost the fine structure of colour, which mostly lies where luma has its own.
+/// @param luma_shaped  power of that spectrum over the pilot's
 template <int kStep>
-HWY_INLINE VF wiener_chroma(Strip& s, int place, VF variance) {
+HWY_INLINE VF wiener_chroma(Strip& s, int place, VF variance, float luma_shaped) {
   HWY_ALIGN float square[64 * hn::MaxLanes(Floats())];
   const int n = lanes();
   const VF sum = pilot_squares<kStep>(s, place, square, n);
-  const VF per_luma = hn::Div(hn::Mul(constant(3), sum), load(s.luma_power + place));
-  return wiener<kStep>(s, place, variance, [&](int i) HWY_ATTR {
-    return hn::Max(hn::Mul(per_luma, load(s.luma[i] + place)), load(square + i * n));
+  const VF per_luma = hn::Div(hn::Mul(constant(luma_shaped), sum), load(s.luma_power + place));
+  return filter<kStep>(s, place, [&](int i, VF) HWY_ATTR {
+    const VF power = hn::Max(hn::Mul(per_luma, load(s.luma[i] + place)), load(square + i * n));
+    return wiener_gain(power, variance);
   });
 }
 

@@ -172,7 +172,7 @@ TEST(HardCaseDenoise7, OddSizesAndBordersAreThoseOfTheReference) {
     Camera camera = with_dark(10, 1.5);
     camera.phase = phase;
     camera.white_gain = {1.9, 1, 1.4};
-    cases.push_back(case_of(camera, denoise_testing::waves(20), width, height, 67));
+    cases.push_back(case_of(camera, denoise_testing::waves(20), width, height, 68));
     cases.back().options.keep_point_sources = false;
   }
   const auto against = [&](denoise::Level level) {

@@ -150,25 +150,21 @@ Block inverse_dct(const Block& in) {
   return out;
 }
 
-/// Returns the gains of the coefficients of plane p, 0 or 1 (section "pass 1" of denoise/README.md).
-Block hard_gains(int p, const std::array<Block, 4>& f, const std::array<double, 4>& variance) {
-  Block gain{};
-  for (int v = 0; v < block; ++v) {
-    for (int u = 0; u < block; ++u) {
-      const double power = f[p][v][u] * f[p][v][u];
-      const bool luma = f[0][v][u] * f[0][v][u] > 9 * variance[0];
-      const double least = p == 0 ? 9 : luma ? 6.25 : 16;
-      gain[v][u] = (u == 0 && v == 0) || power > least * variance[p] ? 1 : 0;
-    }
-  }
-  return gain;
+/// Returns whether coefficient (u, v) of plane p exceeds its threshold.
+bool is_kept(int p, int u, int v, const std::array<Block, 4>& f, const std::array<double, 4>& variance) {
+  const bool luma = f[0][v][u] * f[0][v][u] > 9 * variance[0];
+  const double least = p == 0 ? 9 : luma && u + v > 0 ? 6.25 : 16;
+  return f[p][v][u] * f[p][v][u] > least * variance[p];
 }
 
-/// Returns the squares of all coefficients but the mean.
-Block power_of(const Block& f) {
+/// Returns the squares of all coefficients but the mean; with hard thresholds of those that are kept.
+Block power_of(int p, const std::array<Block, 4>& f, const std::array<double, 4>& variance, bool hard) {
   Block out{};
   for (int v = 0; v < block; ++v) {
-    for (int u = 0; u < block; ++u) out[v][u] = u == 0 && v == 0 ? 0 : f[v][u] * f[v][u];
+    for (int u = 0; u < block; ++u) {
+      const bool counts = u + v > 0 && (!hard || is_kept(p, u, v, f, variance));
+      out[v][u] = counts ? f[p][v][u] * f[p][v][u] : 0;
+    }
   }
   return out;
 }
@@ -179,15 +175,18 @@ double sum_of(const Block& in) {
   return sum;
 }
 
-/// Returns the gains of the coefficients of plane p (section "pass 2" of denoise/README.md).
-Block wiener_gains(int p, const std::array<Block, 4>& pilot, const std::array<double, 4>& variance) {
-  const Block own = power_of(pilot[p]), luma = power_of(pilot[0]);
-  const double per_luma = p == 0 ? 1 : 3 * sum_of(own) / (sum_of(luma) + 4 * variance[0]);
+/// Returns the gains of the coefficients of plane p (sections "pass 1" and "pass 2" of denoise/README.md).
+/// @param known  the noisy coefficients, of which those above thresholds are known, or the pilot's
+/// @param luma_shaped  see denoise::luma_shaped_power
+Block gains(int p, const std::array<Block, 4>& known, const std::array<double, 4>& variance, bool hard,
+            double luma_shaped) {
+  const Block own = power_of(p, known, variance, hard), luma = power_of(0, known, variance, hard);
+  const double per_luma = p == 0 ? 0 : luma_shaped * sum_of(own) / (sum_of(luma) + 4 * variance[0]);
   Block gain{};
   for (int v = 0; v < block; ++v) {
     for (int u = 0; u < block; ++u) {
-      const double power = std::max(own[v][u], per_luma * luma[v][u]);
-      gain[v][u] = power / (power + variance[p]);
+      const double power = std::max(hard ? 0 : own[v][u], per_luma * luma[v][u]);
+      gain[v][u] = hard && is_kept(p, u, v, known, variance) ? 1 : power / (power + variance[p]);
     }
   }
   gain[0][0] = 1;
@@ -217,7 +216,8 @@ Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride
         for (int i = 0; i < block * block; ++i) v[p] += variance[p].at(x0 + i % block, y0 + i / block) / 64;
       }
       for (int p = 0; p < 4; ++p) {
-        const Block gain = pilot == nullptr ? hard_gains(p, f, v) : wiener_gains(p, of_pilot, v);
+        const Block gain =
+            gains(p, pilot == nullptr ? f : of_pilot, v, pilot == nullptr, denoise::luma_shaped_power(level, levels));
         Block kept{};
         double power = 0;
         for (int i = 0; i < block * block; ++i) {
