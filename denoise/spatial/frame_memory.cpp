@@ -72,14 +72,15 @@ void lay_out(Rows& from, int width, FrontMemory& out) {
 
 void lay_out(Rows& from, int width, BlockMemory& out) {
   out.scratch = from.scratch([&] {
-    for (auto* sums : {&out.value, &out.weight}) {
+    for (auto& plane : out.value) {
+      for (float*& r : plane) r = from.take(row_size(width), 1);
+    }
+    for (auto* sums : {&out.weight, &out.residual}) {
       for (auto& plane : *sums) {
-        for (float*& r : plane) r = from.take(row_size(width), 1);
+        for (float*& r : plane) r = from.take(row_size(width / 2), 1);
       }
     }
-    for (auto& plane : out.residual) {
-      for (float*& r : plane) r = from.take(row_size(width / 2), 1);
-    }
+    out.weights = from.kernel(rows::finish_scratch(width));
     out.blocks = from.kernel(rows::block_scratch(width));
   });
 }

@@ -48,9 +48,10 @@ struct FrontMemory {
 /// Block sums of one thread.
 struct BlockMemory {
   Scratch scratch;
-  std::array<std::array<float*, 8>, 4> value{};  // of 8 rows
-  std::array<std::array<float*, 8>, 4> weight{};
-  std::array<std::array<float*, 4>, 4> residual{};  // of 4 rows of half width
+  std::array<std::array<float*, 8>, 4> value{};   // of 8 rows
+  std::array<std::array<float*, 4>, 4> weight{};  // of 4 rows of half width
+  std::array<std::array<float*, 4>, 4> residual{};
+  rows::RowScratch weights{};  // one row
   rows::RowScratch blocks{};
 };
 

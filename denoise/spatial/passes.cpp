@@ -65,11 +65,11 @@ struct Shrink {
   static rows::BlockSums sums(const BlockMemory& m, int y0) {
     rows::BlockSums out{};
     for (int p = 0; p < 4; ++p) {
-      for (int y = 0; y < block; ++y) {
-        out.value[p][y] = m.value[p][(y0 + y) % block];
-        out.weight[p][y] = m.weight[p][(y0 + y) % block];
+      for (int y = 0; y < block; ++y) out.value[p][y] = m.value[p][(y0 + y) % block];
+      for (int y = 0; y < block / 2; ++y) {
+        out.weight[p][y] = m.weight[p][(y0 / 2 + y) % 4];
+        out.residual[p][y] = m.residual[p][(y0 / 2 + y) % 4];
       }
-      for (int y = 0; y < block / 2; ++y) out.residual[p][y] = m.residual[p][(y0 / 2 + y) % 4];
     }
     return out;
   }
@@ -80,18 +80,15 @@ struct Shrink {
   void finish(const BlockMemory& m, int y, bool inside) const {
     const PyramidLevel& at = level();
     for (int p = 0; p < planes_of(frame, l); ++p) {
-      const auto& value = m.value[p];
-      const auto& weight = m.weight[p];
-      const int upper = y % block, lower = (y + 1) % block;
-      float* const residual = m.residual[p][y / 2 % 4];
+      float *const upper = m.value[p][y % block], *const lower = m.value[p][(y + 1) % block];
+      float *const weight = m.weight[p][y / 2 % 4], *const residual = m.residual[p][y / 2 % 4];
       if (inside) {
-        rows::finish_rows({{value[upper], value[lower]}, {weight[upper], weight[lower]}, residual, at.width},
+        rows::finish_rows({{upper, lower}, weight, residual, at.width}, m.weights,
                           {{at.value[pass].row(p, y), at.value[pass].row(p, y + 1)}, at.residual.row(p, y / 2)});
       }
-      for (const int row : {upper, lower}) {
-        clear(value[row], at.width);
-        clear(weight[row], at.width);
-      }
+      clear(upper, at.width);
+      clear(lower, at.width);
+      clear(weight, at.width / 2);
       clear(residual, at.width / 2);
     }
   }

@@ -97,21 +97,20 @@ struct BlockRow {
   /// Power of a spectrum shaped like that of luma over that of the chroma that is known: at least as much is expected.
   float luma_shaped;
 };
-/// Weighted sums of blocks: 8 rows of cells, and of residual variances 4 rows of half width.
+/// Weighted sums of blocks: 8 rows of cells, 4 rows of half width.
 struct BlockSums {
   float* value[4][8];
-  float* weight[4][8];
+  float* weight[4][4];
   float* residual[4][4];
 };
 /// Returns the scratch size for rows of up to `cells` cells.
 std::size_t block_scratch(int cells);
 void shrink_block_row(const BlockRow& in, const RowScratch& scratch, const BlockSums& sums);
 
-/// Two rows of sums, and one of half width, to be divided by their weight or by that of 2x2 cells; a sum without weight
-/// gives 0.
+/// Two rows of sums, and one of half width, to be divided by their weight; a sum without weight gives 0.
 struct SumRows {
   const float* value[2];
-  const float* weight[2];
+  const float* weight;
   const float* residual;
   int cells;
 };
@@ -119,7 +118,8 @@ struct FinishedRows {
   float* value[2];
   float* residual;
 };
-void finish_rows(const SumRows& in, const FinishedRows& out);
+std::size_t finish_scratch(int cells);
+void finish_rows(const SumRows& in, const RowScratch& scratch, const FinishedRows& out);
 
 /// Factors of the slopes gx and gy, as in SiteSlopes.
 struct Slopes {

@@ -91,8 +91,8 @@ HWY_INLINE void shrink_strip(const BlockRow& in, int plane, int first, int count
     const VF rest = hn::MulAdd(constant(shares.other), hn::Sub(constant(64), power), constant(shares.mean));
     const VF left = hn::MulAdd(constant(shares.kept), hn::Sub(power, constant(1)), rest);
     const VF weight = hn::Div(per_power, variance);
-    for (int k = 0; k < (kStep == 4 ? 4 : 1); ++k) {
-      store(hn::Mul(constant(window<kStep>(k)), weight), s.weight[k] + lead + i);
+    for (int k = 0; k < (kStep == 4 ? 2 : 1); ++k) {
+      store(hn::Mul(constant(window<kStep>(2 * k)), weight), s.weight[k] + lead + i);
     }
     store(weight, m.weight + first + i);
     store(hn::Mul(per_power, left), m.residual + first + i);
@@ -100,19 +100,10 @@ HWY_INLINE void shrink_strip(const BlockRow& in, int plane, int first, int count
   add_columns<kStep>(s, count, kStep * first, sums.value[plane]);
 }
 
-/// Returns the sum of the window over the kCells cells of entry i of a row.
-template <int kStep, int kCells>
-constexpr float window_of_entry(int i) {
-  float sum = 0;
-  for (int cell = kCells * i; cell < kCells * (i + 1); ++cell) sum += window<kStep>(cell);
-  return sum;
-}
-
-/// Adds one value of each block, times the window, to the rows that the block covers. Their entries are kCells x kCells
-/// cells, 1 or 2, and get the sum over these.
-template <int kStep, int kCells>
-HWY_INLINE void add_blocks(const float* of_block, int blocks, float* const (&rows)[8 / kCells]) {
-  constexpr int parts = kStep / kCells;  // entries from one block to the next
+/// Adds one value of each block, times the window, to the four rows of half width that the block covers.
+template <int kStep>
+HWY_INLINE void add_blocks(const float* of_block, int blocks, float* const (&rows)[4]) {
+  constexpr int parts = kStep / 2;  // cells of half width from one block to the next
   const int n = lanes();
   for (int i = 0; i < blocks + 8 / kStep - 1; i += n) {
     HWY_ALIGN float row[parts * hn::MaxLanes(Floats())];
@@ -120,14 +111,14 @@ HWY_INLINE void add_blocks(const float* of_block, int blocks, float* const (&row
     for (int part = 0; part < parts; ++part) {
       sum[part] = hn::Zero(Floats());
       for (int m = 0; m < 8 / kStep; ++m) {
-        const VF factor = constant(window_of_entry<kStep, kCells>(part + parts * m));
+        const VF factor = constant(window<kStep>(2 * (part + parts * m)));
         sum[part] = hn::MulAdd(factor, load(of_block + i - m), sum[part]);
       }
     }
     Interleaved<parts>::store(sum, row);
-    for (int y = 0; y < 8 / kCells; ++y) {
+    for (int y = 0; y < 4; ++y) {
       float* const to = rows[y] + parts * i;
-      const VF factor = constant(window_of_entry<kStep, kCells>(y));
+      const VF factor = constant(window<kStep>(2 * y));
       for (int part = 0; part < parts; ++part) {
         store(hn::MulAdd(factor, load(row + part * n), load(to + part * n)), to + part * n);
       }
@@ -160,8 +151,8 @@ HWY_INLINE void shrink_row(const BlockRow& in, const RowMemory& m, std::size_t r
   }
   for (int plane = 0; plane < planes; ++plane) {
     const RowMemory own = of_plane(plane);
-    add_blocks<kStep, 1>(own.weight, in.blocks, sums.weight[plane]);
-    add_blocks<kStep, 2>(own.residual, in.blocks, sums.residual[plane]);
+    add_blocks<kStep>(own.weight, in.blocks, sums.weight[plane]);
+    add_blocks<kStep>(own.residual, in.blocks, sums.residual[plane]);
   }
 }
 
@@ -179,23 +170,18 @@ void ShrinkBlockRow(const BlockRow& in, float* scratch, const BlockSums& sums) {
   }
 }
 
-/// Returns 1 / weight, or 0 without weight.
-HWY_INLINE VF per(VF weight) {
-  return hn::IfThenElseZero(hn::Gt(weight, hn::Zero(Floats())), hn::Div(constant(1), weight));
-}
-
-void FinishRows(const SumRows& in, const FinishedRows& out) {
+void FinishRows(const SumRows& in, float* scratch, const FinishedRows& out) {
   const Floats f;
-  const int n = lanes();
-  for (int i = 0; i < in.cells; i += n) {
-    for (int y = 0; y < 2; ++y) store(hn::Mul(load(in.value[y] + i), per(load(in.weight[y] + i))), out.value[y] + i);
+  const int n = lanes(), half = in.cells / 2;
+  for (int i = 0; i < half; i += n) {
+    const VF weight = load(in.weight + i);
+    const VF per_weight = hn::IfThenElseZero(hn::Gt(weight, hn::Zero(f)), hn::Div(constant(1), weight));
+    hn::StoreInterleaved2(per_weight, per_weight, f, scratch + 2 * i);
+    store(hn::Mul(load(in.residual + i), per_weight), out.residual + i);
   }
-  for (int i = 0; i < in.cells / 2; i += n) {
-    VF even, odd, even_below, odd_below;
-    hn::LoadInterleaved2(f, in.weight[0] + 2 * i, even, odd);
-    hn::LoadInterleaved2(f, in.weight[1] + 2 * i, even_below, odd_below);
-    const VF weight = hn::Add(hn::Add(even, odd), hn::Add(even_below, odd_below));
-    store(hn::Mul(load(in.residual + i), per(weight)), out.residual + i);
+  for (int i = 0; i < in.cells; i += n) {
+    const VF per_weight = load(scratch + i);
+    for (int y = 0; y < 2; ++y) store(hn::Mul(load(in.value[y] + i), per_weight), out.value[y] + i);
   }
 }
 
@@ -214,7 +200,11 @@ void shrink_block_row(const BlockRow& in, const RowScratch& scratch, const Block
   assert(scratch.floats >= block_scratch(in.step * (in.blocks - 1) + 8));
   HWY_DYNAMIC_DISPATCH(ShrinkBlockRow)(in, scratch.data, sums);
 }
-void finish_rows(const SumRows& in, const FinishedRows& out) { HWY_DYNAMIC_DISPATCH(FinishRows)(in, out); }
+std::size_t finish_scratch(int cells) { return static_cast<std::size_t>(cells) + padding; }
+void finish_rows(const SumRows& in, const RowScratch& scratch, const FinishedRows& out) {
+  assert(scratch.floats >= finish_scratch(in.cells));
+  HWY_DYNAMIC_DISPATCH(FinishRows)(in, scratch.data, out);
+}
 
 }  // namespace lowlux::denoise::rows
 #endif

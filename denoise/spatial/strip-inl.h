@@ -9,7 +9,6 @@
 
 #include <hwy/highway.h>
 
-#include <algorithm>
 #include <cstddef>
 
 #include "denoise/spatial/dct-inl.h"
@@ -34,22 +33,22 @@ struct Strip {
   float luma[64][run];
   float luma_power[run];    // of the pilot's luma: the sum of these squares, and 4 V
   float value[64][places];  // vertical frequency and column of blocks, before the inverse vertical transform
-  float weight[4][places];  // times each of the window's values
+  float weight[2][places];  // times each of the window's values
 };
 
-/// Returns which of the window's values row or column i of a block has: a block has eight rows and four values, of
-/// which blocks 2 cells apart use the first alone.
+/// Returns which of the window's values row or column i of a block has: 1 in the middle half, else 0; blocks 2 cells
+/// apart have the first alone.
 template <int kStep>
 constexpr int window_index(int i) {
-  return kStep == 4 ? std::min(i, 7 - i) : 0;
+  return kStep == 4 && i >= 2 && i < 6 ? 1 : 0;
 }
 
-/// Returns the window in row or column i of a block. Blocks 4 cells apart have one that rises towards the middle and
-/// adds up to the same in each cell, so that the edges of single blocks do not show; blocks 2 cells apart need none.
+/// Returns the window in row or column i of a block. Blocks 4 cells apart have one that is higher in their middle and
+/// adds up to the same in each cell, so that the edges of single blocks do not show; blocks 2 cells apart need none. It
+/// is the same for pairs of cells, so that half the weights suffice each way.
 template <int kStep>
 constexpr float window(int i) {
-  constexpr float rising[4] = {2, 3, 5, 6};
-  return kStep == 4 ? rising[window_index<kStep>(i)] : 1;
+  return kStep == 2 ? 1 : window_index<kStep>(i) == 1 ? 5 : 2;
 }
 
 template <int kStep>

@@ -195,7 +195,7 @@ Block gains(int p, const std::array<Block, 4>& known, const std::array<double, 4
 
 /// Returns the factor of row or column i of a block.
 double window(int i, int stride) {
-  constexpr std::array<double, block> rising{2, 3, 5, 6, 6, 5, 3, 2};
+  constexpr std::array<double, block> rising{2, 2, 5, 5, 5, 5, 2, 2};
   return stride == 4 ? rising[i] : 1;
 }
 
@@ -241,12 +241,9 @@ Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride
     }
   }
   for (int p = 0; p < 4; ++p) {
-    for (std::size_t i = 0; i < weight[p].v.size(); ++i) out.value[p].v[i] /= weight[p].v[i];
-    const Image residual = down2(out.residual[p]), of_four = down2(weight[p]);  // known for 2x2 cells
-    for (int at_y = 0; at_y < h; ++at_y) {
-      for (int at_x = 0; at_x < w; ++at_x) {
-        out.residual[p].at(at_x, at_y) = residual.at(at_x / 2, at_y / 2) / of_four.at(at_x / 2, at_y / 2);
-      }
+    for (std::size_t i = 0; i < weight[p].v.size(); ++i) {
+      out.value[p].v[i] /= weight[p].v[i];
+      out.residual[p].v[i] /= weight[p].v[i];
     }
   }
   return out;
