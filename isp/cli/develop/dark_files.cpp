@@ -15,6 +15,7 @@
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/profile_option.h"
 #include "isp/cli/shared/raw_files.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/measure/masked_black.h"
 #include "isp/raw/to_linear.h"
@@ -169,7 +170,7 @@ Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(RawFrame& picture
   auto dark = make_or_find(raw, request);
   if (!dark) return dark;
   if (request.is_bias) {
-    const auto level = isp::choose_black(raw, black);
+    const auto level = isp::choose_black_by_gain(picture, black);
     if (level && level->holds == BlackPoint::Holds::pedestal_and_dark) {
       dark = std::make_shared<const DarkFrame>(calib::at_masked_level(**dark, level->pedestal_dn));
     }

@@ -120,15 +120,6 @@ std::string dark_warning(const FrameInfo& info, double fraction) {
       *info.exposure_s, place, 100 * fraction);
 }
 
-// Measures masked pixels again with the gain, which follows from a first black level.
-Result<BlackPoint> choose_black_by_gain(const RawFrame& frame, const BlackRequest& request) {
-  Result<BlackPoint> black = choose_black(frame.raw, request);
-  if (!black || black->source != BlackPoint::Source::masked_pixels) return black;
-  MaskedBlack measured = measure_masked_black(frame.raw, gain_dn_per_e(frame, *black));
-  if (measured.black) black = *std::move(measured.black);
-  return black;
-}
-
 Result<RawLevels> choose_levels(const RawFrame& frame, const DevelopOptions& options) {
   RawLevels out{.dark_frame = options.dark_frame};
   Result<BlackPoint> black =
@@ -145,6 +136,14 @@ void append(std::vector<std::string>& to, std::vector<std::string>& from) {
 }
 
 }  // namespace
+
+Result<BlackPoint> choose_black_by_gain(const RawFrame& frame, const BlackRequest& request) {
+  Result<BlackPoint> black = choose_black(frame.raw, request);
+  if (!black || black->source != BlackPoint::Source::masked_pixels) return black;
+  MaskedBlack measured = measure_masked_black(frame.raw, gain_dn_per_e(frame, *black));
+  if (measured.black) black = *std::move(measured.black);
+  return black;
+}
 
 Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
   if (const Result<void> checked = check(frame, options); !checked) return tl::make_unexpected(checked.error());

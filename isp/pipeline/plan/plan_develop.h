@@ -4,8 +4,13 @@
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 #include "isp/pipeline/plan.h"
+#include "isp/raw/black_point.h"
 
 namespace lowlux::isp {
+
+/// Returns the black point as requested; masked pixels are measured again with the gain that the noise profile states,
+/// which follows from a first black level. Errors: those of choose_black.
+Result<BlackPoint> choose_black_by_gain(const RawFrame& frame, const BlackRequest& request);
 
 /// Measures black, noise, exposure and white of a frame, and decides how to develop it. With a dark frame, everything
 /// is measured after it is subtracted. Errors: no black point (insufficient), those of black_of, no colour calibration
