@@ -104,7 +104,7 @@ Vector3 developed_light(double mean_e) {
   const Result<Developed> image = develop(frame, options, executor);
   EXPECT_TRUE(image);
   Vector3 sum{};
-  const Encoded8& codes = std::get<Encoded8>(image->picture);
+  const auto& codes = std::get<Encoded8>(image->picture);
   for (int y = 0; y < codes.height(); ++y) {
     for (int x = 0; x < codes.width(); ++x) {
       for (std::size_t c = 0; c < 3; ++c) {

@@ -81,6 +81,7 @@ void fill_coarsest(const Image& seen, Image& value) {
   }
   for (int x = 0; x < value.width; ++x) {
     std::vector<double> column;
+    column.reserve(static_cast<std::size_t>(value.height));
     for (int y = 0; y < value.height; ++y) column.push_back(value.at(x, y));
     column = interpolated(column, row_seen);
     for (int y = 0; y < value.height; ++y) value.at(x, y) = column[y];

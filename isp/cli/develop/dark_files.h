@@ -54,8 +54,8 @@ class DarkSource {
  public:
   /// @param request  values that are the same for all images
   /// @param count    exposures that each file is the mean of; absent: estimated where the noise of the image is known
-  DarkSource(DarkFiles files, const calib::DarkRequest& request, std::optional<int> count)
-      : files_(std::move(files)), request_(request), count_(count) {}
+  DarkSource(DarkFiles files, calib::DarkRequest request, std::optional<int> count)
+      : files_(std::move(files)), request_(std::move(request)), count_(count) {}
 
   /// Returns the dark frame of one image: calib::make_dark_frame, once for all images of the same setting, black tag,
   /// noise and estimated number of exposures; at the level of the image's masked pixels if the frame depends on them.
