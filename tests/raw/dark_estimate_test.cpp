@@ -1,0 +1,192 @@
+#include "isp/raw/measure/dark_estimate.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <random>
+#include <vector>
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double electrons_at_white = 8000;
+
+/// Describes blocks m = d + L n (1 + deviation) whose light L rises evenly from `min_light_e`.
+struct Scene {
+  std::array<double, 3> dark_e{};
+  Vector3 neutral{0.5, 1, 0.66};  // relative to green
+  Vector3 deviation{};            // of the darkest surfaces from neutral, natural logarithm
+  double min_light_e = 0;
+  double max_light_e = 200;
+  int width = 60, height = 40;
+};
+
+CameraRgb blocks_of(const Scene& s) {
+  CameraRgb out(s.width, s.height);
+  const int n = s.width * s.height;
+  for (int i = 0; i < n; ++i) {
+    // Neighbours are alike, as those that are joined are in pictures.
+    const double place = static_cast<double>(i / s.width) / s.height + 1e-6 * (i % s.width);
+    const double light = s.min_light_e + (s.max_light_e - s.min_light_e) * place;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double colour = s.neutral[c] * std::exp(s.deviation[c] * (1 - place));
+      out.plane[c].data()[i] = static_cast<float>((s.dark_e[c] + light * colour) / electrons_at_white);
+    }
+  }
+  return out;
+}
+
+/// Returns the mean charge of the darkest fiftieth, over the pixels.
+double darkest_charge_e(const Scene& s) {
+  const double light = s.min_light_e + (s.max_light_e - s.min_light_e) * 0.5 / s.height;  // two rows are joined
+  double sum = 0;
+  for (const std::size_t c : {0, 1, 1, 2}) sum += s.dark_e[c] + light * s.neutral[c] * std::exp(s.deviation[c]);
+  return sum / 4;
+}
+
+std::optional<DarkEstimate> estimate_of(const CameraRgb& blocks, std::optional<Vector3> neutral = {},
+                                        double pixels = 1e4) {
+  return estimate_dark_charge({.mean = blocks,
+                               .electrons_at_white = {electrons_at_white, electrons_at_white, electrons_at_white},
+                               .variance_e2 = {4, 4, 4},
+                               .pixels = pixels,
+                               .neutral = neutral});
+}
+
+TEST(DarkEstimate, IsExactForGreySurfacesAndEqualDarkCharge) {
+  std::mt19937_64 engine(20261123);
+  const auto log_uniform = [&](double low, double high) {
+    return low * std::pow(high / low, std::uniform_real_distribution<double>()(engine));
+  };
+  for (int i = 0; i < 300; ++i) {
+    const double dark = log_uniform(1, 1000);
+    const Scene scene{.dark_e = {dark, dark, dark},
+                      .neutral = {log_uniform(0.3, 0.75), 1, log_uniform(0.3, 0.75)},
+                      .max_light_e = log_uniform(30, 3000)};
+    const auto found = estimate_of(blocks_of(scene));
+    ASSERT_TRUE(found) << "draw " << i;
+    // Blocks are floats: half a unit in the last place of the brightest.
+    EXPECT_NEAR(found->mean_e, dark, 2e-6 * (dark + scene.max_light_e)) << "draw " << i;
+    EXPECT_LT(found->misfit, 1e-3);
+    EXPECT_GT(found->standard_error_e, 0);
+  }
+}
+
+TEST(DarkEstimate, OfBlocksWithoutLightIsTheirChargeInEachChannel) {
+  // Channels that deviate by 5 % (rms), and a darkest fiftieth with next to no light.
+  std::mt19937_64 engine(3);
+  std::normal_distribution<double> normal;
+  constexpr int draws = 300;
+  int beyond = 0;
+  double cast_squares = 0;
+  for (int i = 0; i < draws; ++i) {
+    Scene scene{.max_light_e = 300};
+    for (double& charge : scene.dark_e) charge = 200 * (1 + 0.05 * normal(engine));
+    const auto found = estimate_of(blocks_of(scene), scene.neutral);
+    ASSERT_TRUE(found);
+    const double truth = (scene.dark_e[0] + 2 * scene.dark_e[1] + scene.dark_e[2]) / 4;
+    beyond += std::fabs(found->mean_e - truth) > 3 * found->standard_error_e ? 1 : 0;
+    // What stays of the charge has the colour of light: hardly a cast.
+    const double light = scene.dark_e[1] - found->charge_e[1];
+    for (const std::size_t c : {0, 2}) {
+      cast_squares += std::pow(scene.dark_e[c] - found->charge_e[c] - light * scene.neutral[c], 2);
+    }
+  }
+  EXPECT_LE(beyond, draws / 50);
+  EXPECT_LT(std::sqrt(cast_squares / (2 * draws)), 0.5 * 0.05 * 200) << "half of the deviation between channels";
+}
+
+TEST(DarkEstimate, CoversDeviationsOfDarkSurfacesByItsStandardError) {
+  std::mt19937_64 engine(7);
+  std::normal_distribution<double> normal;
+  constexpr int draws = 400;
+  int beyond = 0, false_alarms = 0;
+  for (int i = 0; i < draws; ++i) {
+    const double dark = i % 2 == 0 ? 0 : 20, t = 0.17 * normal(engine), k = 0.4 * normal(engine);
+    const Scene scene{
+        .dark_e = {dark, dark, dark},
+        .deviation = {t / std::sqrt(6) + k / std::sqrt(2), -2 * t / std::sqrt(6), t / std::sqrt(6) - k / std::sqrt(2)},
+        .min_light_e = 10,
+        .max_light_e = 400};
+    const auto found = estimate_of(blocks_of(scene), Vector3{0.5, 1, 0.66});
+    ASSERT_TRUE(found);
+    beyond += std::fabs(found->mean_e - dark) > 3 * found->standard_error_e ? 1 : 0;
+    if (dark == 0) {
+      false_alarms += found->is_significant() ? 1 : 0;
+      EXPECT_LE(found->mean_e, 1.01 * darkest_charge_e(scene)) << "draw " << i;
+    }
+  }
+  // One frame in twenty, as the header says.
+  EXPECT_LE(beyond, draws / 20);
+  EXPECT_LE(false_alarms, draws / 2 / 20);
+}
+
+TEST(DarkEstimate, IsCoveredUnderPhotonNoise) {
+  constexpr double pixels = 64, dark = 12;
+  std::mt19937_64 engine(11);
+  std::normal_distribution<double> normal;
+  const CameraRgb mean = blocks_of({.dark_e = {dark, dark, dark}, .max_light_e = 60});
+  double sum = 0, squares = 0;
+  constexpr int draws = 200;
+  for (int i = 0; i < draws; ++i) {
+    CameraRgb noisy(mean.width(), mean.height());
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t k = 0; k < mean.plane[c].size(); ++k) {
+        const double e = static_cast<double>(mean.plane[c].data()[k]) * electrons_at_white;
+        const double std_e = std::sqrt((e + 4) / (pixels * (c == 1 ? 0.5 : 0.25)));
+        noisy.plane[c].data()[k] = static_cast<float>((e + std_e * normal(engine)) / electrons_at_white);
+      }
+    }
+    const auto found = estimate_of(noisy, Vector3{0.5, 1, 0.66}, pixels);
+    ASSERT_TRUE(found) << "seed 11, draw " << i;
+    EXPECT_TRUE(found->is_significant());
+    sum += found->mean_e - dark;
+    squares += std::pow((found->mean_e - dark) / found->standard_error_e, 2);
+  }
+  EXPECT_LT(squares / draws, 1) << "mean square of the errors in standard errors";
+  EXPECT_LT(std::fabs(sum / draws), 0.1 * dark);
+}
+
+TEST(DarkEstimate, IsRefusedWhereDarkAndLightCannotBeToldApart) {
+  EXPECT_FALSE(estimate_of(blocks_of({.dark_e = {50, 50, 50}, .max_light_e = 0}))) << "no light";
+  EXPECT_FALSE(estimate_of(blocks_of({.dark_e = {50, 50, 50}, .neutral = {1, 1, 1}}))) << "light equal in all channels";
+  EXPECT_FALSE(estimate_of(blocks_of({.dark_e = {50, 50, 50}, .width = 7, .height = 9}))) << "63 blocks";
+  EXPECT_TRUE(estimate_of(blocks_of({.dark_e = {50, 50, 50}, .width = 8, .height = 8}))) << "64 blocks";
+  const Scene saturated{.dark_e = {50, 50, 50}, .min_light_e = 9000, .max_light_e = 9001};
+  EXPECT_FALSE(estimate_of(blocks_of(saturated)));
+  EXPECT_FALSE(estimate_of(CameraRgb(0, 0)));
+}
+
+TEST(DarkEstimate, IsNotSignificantWithoutDarkCharge) {
+  std::mt19937_64 engine(5);
+  for (int i = 0; i < 100; ++i) {
+    const double light = std::exp(std::uniform_real_distribution<double>(0, 5)(engine));
+    const auto found = estimate_of(blocks_of({.min_light_e = light, .max_light_e = 40 * light}));
+    ASSERT_TRUE(found);
+    EXPECT_FALSE(found->is_significant()) << light;
+    EXPECT_GE(*std::ranges::min_element(found->charge_e), 0);
+  }
+}
+
+// A pedestal that is stated too high leaves less than no charge: that is no dark charge.
+TEST(DarkEstimate, IsNoneBelowBlack) {
+  const auto found = estimate_of(blocks_of({.dark_e = {-20, -20, -20}, .max_light_e = 500}));
+  ASSERT_TRUE(found);
+  EXPECT_FALSE(found->is_significant());
+  EXPECT_EQ(found->mean_e, 0);
+}
+
+// Stated neutrals that are not positive are not used, and do no harm.
+TEST(DarkEstimate, IgnoresImpossibleNeutrals) {
+  const CameraRgb blocks = blocks_of({.dark_e = {30, 30, 30}});
+  const auto plain = estimate_of(blocks);
+  for (const Vector3& neutral : {Vector3{0, 1, 1}, Vector3{-1, 1, 1}, Vector3{NAN, 1, 1}, Vector3{1, INFINITY, 1}}) {
+    EXPECT_EQ(estimate_of(blocks, neutral)->mean_e, plain->mean_e);
+  }
+}
+
+}  // namespace
+}  // namespace lowlux::isp
