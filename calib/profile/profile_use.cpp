@@ -99,7 +99,7 @@ Result<PerSite<double>> find_dark_charge(const GainProfile& gain, const RawDn& f
   SensorModel& sensor = *out.sensor;
   const double fastest = *std::max_element(sensor.dark_current_e_per_s.begin(), sensor.dark_current_e_per_s.end());
   if (fastest == 0) {
-    if (!gain.dark_exposure_s) out.warnings.emplace_back("the profile knows no dark current: its charge stays in");
+    if (!gain.dark_exposure_s) out.warnings.emplace_back("the profile knows no dark current");
     return PerSite<double>{};
   }
   if (!frame.info.exposure_s) {

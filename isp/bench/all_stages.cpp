@@ -20,6 +20,8 @@ constexpr std::array registry{
                run_photon_sampling_bench},
     BenchStage{"simulation-effects", "Effects of a simulated sensor, left out", run_simulation_effects_bench},
     BenchStage{"black-point", "Black by the number of dark pixels", run_black_point_bench},
+    BenchStage{"dark-estimate", "Dark charge estimated from the frame itself: bias, standard error, refusals",
+               run_dark_estimate_bench},
     BenchStage{"noise-fit", "System gain and noise, of flats and of pictures", run_noise_fit_bench},
     BenchStage{"simulate", "Whole simulated files: photon sampling and effects", run_simulate_bench},
     BenchStage{"chroma-start", "Where the denoiser's chroma starts: error against time", run_chroma_start_bench},

@@ -45,6 +45,7 @@ struct DevelopOptions {
   bool half = false;                       // exact 2x2 binning instead of demosaicing
   std::optional<DemosaicMethod> demosaic;  // absent: chosen by light, noise reduction and budget
   BlackRequest black;
+  bool estimate_dark = true;                    // dark charge that is not known is estimated from the frame itself
   bool find_defects = true;                     // search for hot and dead pixels in addition to those the source lists
   std::shared_ptr<const DarkFrame> dark_frame;  // set: subtracted pixel by pixel instead of `black`
   DenoiseChoice denoise;

@@ -9,6 +9,7 @@
 #include "isp/pipeline/finished/display_target.h"
 #include "isp/pipeline/noise_reduction.h"
 #include "isp/pipeline/options.h"
+#include "isp/pipeline/plan/dark_charge.h"
 #include "isp/pipeline/plan/levels.h"
 #include "isp/pipeline/plan/plan_demosaic.h"
 #include "isp/pipeline/plan/rendering.h"
@@ -28,9 +29,7 @@ struct DevelopPlan {
   int width = 0;                                 // of the image, before orientation
   int height = 0;
   bool from_codes = false;  // result of renders_from_codes
-  /// States the largest fraction of the charge of the median block that may be dark charge left in: of the darkest
-  /// blocks, which hold no more. Absent where the dark charge is known, or too small to matter.
-  std::optional<double> unknown_dark_fraction;
+  DarkCharge dark;
   std::vector<std::string> warnings;
   std::vector<StageTime> times;
 };

@@ -39,29 +39,97 @@ bool warns(const DevelopPlan& plan) {
   });
 }
 
+DevelopOptions without_estimate() {
+  DevelopOptions out;
+  out.estimate_dark = false;
+  return out;
+}
+
 TEST(UnknownDark, IsWarnedOfWithItsLargestSize) {
-  const DevelopPlan plan = planned(ramp_over_dark(200, 0, 1));
-  ASSERT_TRUE(plan.unknown_dark_fraction);
+  const DevelopPlan plan = planned(ramp_over_dark(200, 0, 1), without_estimate());
+  EXPECT_EQ(plan.dark.state, DarkCharge::State::unknown);
+  ASSERT_TRUE(plan.dark.max_fraction);
   // Of 200 e- in the darkest block, the median has 0.71 * 80 e- more on average over the colours.
-  EXPECT_NEAR(*plan.unknown_dark_fraction, 200 / (200 + 0.79 * 80), 0.05);
+  EXPECT_NEAR(*plan.dark.max_fraction, 200 / (200 + 0.79 * 80), 0.05);
   EXPECT_TRUE(warns(plan));
+  EXPECT_EQ(plan.levels.black.dark_mean_e, PerSite<double>{});
 }
 
 TEST(UnknownDark, IsNotMentionedWhereItIsKnownOrCannotMatter) {
-  DevelopOptions with_dark;
+  DevelopOptions with_dark = without_estimate();
   with_dark.black.dark_dn.fill(200 * test::night_gain_dn_per_e);
-  EXPECT_FALSE(warns(planned(ramp_over_dark(200, 0, 1), with_dark))) << "known from a profile";
-  EXPECT_FALSE(warns(planned(ramp_over_dark(0, 0, 1)))) << "the darkest block has no charge";
-  EXPECT_FALSE(warns(planned(ramp_over_dark(0, 50, 1.0 / 60)))) << "a short exposure";
-  RawFrame cold = ramp_over_dark(0, 50, 1);
-  cold.raw.info.temperature_c = -20;
-  EXPECT_FALSE(warns(planned(cold))) << "a cooled sensor";
-  RawFrame clean = ramp_over_dark(200, 0, 1);
-  clean.noise->reduced = true;
-  EXPECT_FALSE(warns(planned(clean))) << "denoised before";
-  RawFrame unstated = ramp_over_dark(200, 0, 1);
-  unstated.raw.info.exposure_s.reset();
-  EXPECT_FALSE(warns(planned(unstated))) << "no exposure time";
+  RawFrame profiled = ramp_over_dark(200, 0, 1);  // a profile's noise is relative to white less pedestal and charge
+  for (double& scale : profiled.noise->scale) scale *= test::night_full_e() / (test::night_full_e() - 200);
+  const DevelopPlan known = planned(profiled, with_dark);
+  EXPECT_FALSE(warns(known)) << "known from a profile";
+  EXPECT_EQ(known.dark.state, DarkCharge::State::in_black_point);
+  EXPECT_NEAR(*known.dark.mean_e, 200, 1e-9);
+  for (const bool estimates : {false, true}) {
+    DevelopOptions options;
+    options.estimate_dark = estimates;
+    const auto is_silent = [&](const RawFrame& frame) {
+      const DevelopPlan plan = planned(frame, options);
+      return !warns(plan) && plan.dark.state == DarkCharge::State::not_expected;
+    };
+    EXPECT_TRUE(is_silent(ramp_over_dark(0, 0, 1))) << "the darkest block has no charge";
+    EXPECT_TRUE(is_silent(ramp_over_dark(0, 50, 1.0 / 60))) << "a short exposure";
+    RawFrame cold = ramp_over_dark(0, 50, 1);
+    cold.raw.info.temperature_c = -20;
+    EXPECT_TRUE(is_silent(cold)) << "a cooled sensor";
+    RawFrame clean = ramp_over_dark(200, 0, 1);
+    clean.noise->reduced = true;
+    EXPECT_TRUE(is_silent(clean)) << "denoised before";
+    RawFrame unstated = ramp_over_dark(200, 0, 1);
+    unstated.raw.info.exposure_s.reset();
+    EXPECT_TRUE(is_silent(unstated)) << "no exposure time";
+  }
+}
+
+// Light whose darkest block has no light: the estimate, the signal and alpha follow from the scene.
+TEST(UnknownDark, IsEstimatedAndSubtractedWhereTheFrameShowsIt) {
+  const RawFrame frame = ramp_over_dark(200, 0, 1);
+  const DevelopPlan plan = planned(frame);
+  EXPECT_FALSE(warns(plan));
+  ASSERT_EQ(plan.dark.state, DarkCharge::State::estimated);
+  EXPECT_NEAR(*plan.dark.mean_e, 200, 0.02 * 200);
+  EXPECT_LT(*plan.dark.standard_error_e, 0.15 * 200);
+  for (const double charge : plan.levels.black.dark_mean_e) EXPECT_NEAR(charge, 200, 0.03 * 200);
+  // Camera RGB: the median column has light of 40, 80 and 53.3 e-.
+  ASSERT_TRUE(plan.dark.alpha);
+  EXPECT_NEAR(*plan.dark.alpha, (40 + 80 + 53.3) / (40 + 80 + 53.3 + 600), 0.02);
+}
+
+// A dark surface of any colour that light of 50 e- shows is no dark charge, although a long exposure could have it.
+TEST(UnknownDark, IsNotEstimatedFromAFrameWithoutIt) {
+  const DevelopPlan plan = planned(ramp_over_dark(0, 50, 10));
+  EXPECT_EQ(plan.dark.state, DarkCharge::State::unknown);
+  EXPECT_TRUE(warns(plan));
+  EXPECT_EQ(plan.levels.black.dark_mean_e, PerSite<double>{});
+}
+
+// More charge than any dark current makes is an offset of another kind.
+TEST(UnknownDark, IsNotEstimatedBeyondAnyDarkCurrent) {
+  RawFrame frame = ramp_over_dark(400, 0, 1);
+  frame.raw.info.temperature_c = 15;  // at most 1000 / 2^(10 / 7) = 371 e-
+  EXPECT_EQ(planned(frame).dark.state, DarkCharge::State::unknown);
+  frame.raw.info.temperature_c = 17;  // 453 e-
+  EXPECT_EQ(planned(frame).dark.state, DarkCharge::State::estimated);
+}
+
+// The planner leaves the estimate in only where that changes less than the tolerance.
+TEST(UnknownDark, IsACandidateOfThePlanner) {
+  const auto left_in = [](double tolerance, DenoiseChoice::Mode mode) {
+    DevelopOptions options{.denoise = {.mode = mode}};
+    options.effects.emplace(ProcessingGoal{.tolerance_delta_e = tolerance});
+    const DevelopPlan plan = planned(ramp_over_dark(200, 0, 1), options);
+    EXPECT_TRUE(
+        std::ranges::any_of(plan.effects->effects, [](const PlannedStep& step) { return step.name == "dark charge"; }));
+    return plan.levels.black.dark_mean_e == PerSite<double>{};
+  };
+  EXPECT_FALSE(left_in(0.5, DenoiseChoice::Mode::off));
+  EXPECT_TRUE(left_in(200, DenoiseChoice::Mode::off));
+  EXPECT_FALSE(left_in(0.5, DenoiseChoice::Mode::automatic));
+  EXPECT_FALSE(left_in(0.5, DenoiseChoice::Mode::level));
 }
 
 TEST(UnknownDark, KnownChargeOfATaggedBlackKeepsColourAndNoiseModel) {

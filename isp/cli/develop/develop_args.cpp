@@ -293,6 +293,10 @@ void add_camera(CLI::App& app, DevelopArgs& args) {
                  "gain setting of the profile to use: its name or an ISO (default: the raw's ISO)")
       ->type_name("SETTING");
   add_choice<bool>(
+      app, "--dark-estimate", {{"auto", true}, {"off", false}}, [&o](bool estimate) { o.estimate_dark = estimate; },
+      "dark charge that no profile and no dark frame tells: estimate it from long exposures themselves where they show "
+      "it (default), or leave it in");
+  add_choice<bool>(
       app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
       "hot and dead pixels: look for them (default), or repair only those the file names");
 }

@@ -97,6 +97,36 @@ void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, co
   }
 }
 
+std::string dark_text(const isp::DevelopPlan& plan) {
+  const isp::DarkCharge& dark = plan.dark;
+  std::string text;
+  if (dark.mean_e) {
+    text = fmt::format("{:.3g} e-", *dark.mean_e);
+    if (dark.standard_error_e) text += fmt::format(" (standard error {:.2g} e-)", *dark.standard_error_e);
+    text += ", ";
+  }
+  switch (dark.state) {
+    case isp::DarkCharge::State::not_expected:
+      return "none expected: " + dark.reason;
+    case isp::DarkCharge::State::unknown:
+      return fmt::format("unknown, up to {:.0f} % of the charge of the median block: {}", 100 * *dark.max_fraction,
+                         dark.reason);
+    case isp::DarkCharge::State::in_black_point:
+      text += "subtracted with the black level";
+      break;
+    case isp::DarkCharge::State::estimated:
+      text += "estimated from the frame, ";
+      text += plan.levels.black.dark_mean_e == PerSite<double>{} ? "left in" : "subtracted";
+      break;
+  }
+  text += ": " + dark.reason;
+  if (dark.alpha) {
+    text += fmt::format("; left in, it takes {:.0f} % of the saturation of the median block (alpha {:.3f})",
+                        100 * (1 - *dark.alpha), *dark.alpha);
+  }
+  return text;
+}
+
 std::string dark_frame_text(const DarkFrame& dark) {
   return fmt::format(
       "mean of {} exposures{} in {} file{}; adds {:.2g} % to the variance without light; {} pixels unknown",
@@ -124,10 +154,7 @@ std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* f
     out.add(dark->is_bias ? "bias frame" : "dark frame", dark_frame_text(*dark));
   }
   if (flat != nullptr) out.add("flat field", flat_text(*flat));
-  if (plan.unknown_dark_fraction) {
-    out.add("dark", fmt::format("unknown; up to {:.0f} % of the charge of the median block",
-                                100 * *plan.unknown_dark_fraction));
-  }
+  out.add("dark charge", dark_text(plan));
   if (plan.effects) add_effects(out, *plan.effects, *plan.options.effects);
   out.add("defects", fmt::format("{} pixels repaired", plan.levels.defects.size()));
   add_noise(out, plan.noise_reduction);
@@ -162,6 +189,20 @@ std::string_view name_of(BlackPoint::Source source) {
       return "profile";
     case BlackPoint::Source::dark_frame:
       return "dark-frame";
+  }
+  return "";
+}
+
+std::string_view name_of(isp::DarkCharge::State state) {
+  switch (state) {
+    case isp::DarkCharge::State::not_expected:
+      return "not-expected";
+    case isp::DarkCharge::State::in_black_point:
+      return "in-black-point";
+    case isp::DarkCharge::State::estimated:
+      return "estimated";
+    case isp::DarkCharge::State::unknown:
+      return "unknown";
   }
   return "";
 }

@@ -8,6 +8,7 @@ namespace lowlux::cli {
 
 /// Returns "masked-pixels" and so on, the names in reports.
 std::string_view name_of(BlackPoint::Source source);
+std::string_view name_of(isp::DarkCharge::State state);
 
 /// Returns "profile", "file" or "picture".
 std::string_view name_of(NoiseProfile::Source source);

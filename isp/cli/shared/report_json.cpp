@@ -33,6 +33,20 @@ Json black_json(const BlackPoint& black) {
           {"holds_dark", black.holds == BlackPoint::Holds::pedestal_and_dark}};
 }
 
+Json dark_charge_json(const isp::DevelopPlan& plan) {
+  const isp::DarkCharge& dark = plan.dark;
+  const BlackPoint& black = plan.levels.black;
+  const bool is_subtracted =
+      black.holds == BlackPoint::Holds::pedestal_and_dark || black.dark_mean_e != PerSite<double>{};
+  return {{"state", name_of(dark.state)},
+          {"mean_e", optional_json(dark.mean_e)},
+          {"standard_error_e", optional_json(dark.standard_error_e)},
+          {"subtracted", is_subtracted},
+          {"alpha", optional_json(dark.alpha)},
+          {"predicted_desaturation", dark.alpha ? Json(1 - *dark.alpha) : Json(nullptr)},
+          {"reason", dark.reason}};
+}
+
 Json dark_json(const DarkFrame* dark) {
   if (dark == nullptr) return nullptr;
   return {{"frames", dark->frames},
@@ -194,7 +208,8 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"black", black_json(plan.levels.black)},
             {"dark_frame", dark_json(plan.levels.dark_frame.get())},
             {"flat_frame", flat_json(outcome.flat.get())},
-            {"unknown_dark_fraction", plan.unknown_dark_fraction ? Json(*plan.unknown_dark_fraction) : Json(nullptr)},
+            {"dark", dark_charge_json(plan)},
+            {"unknown_dark_fraction", optional_json(plan.dark.max_fraction)},
             {"unit", plan.levels.electrons_at_white ? "electrons" : "fraction-of-white"},
             {"white_balance", white_json(plan)},
             {"exposure", {{"ev", plan.rendering.exposure_ev}, {"rule", plan.rendering.exposure_rule}}},

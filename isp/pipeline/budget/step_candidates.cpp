@@ -59,7 +59,7 @@ std::vector<CostShare> work_of(const StepFacts& facts, const StepCandidate& plan
       if (share > 0) work.push_back({part_of(*plan.level, start), share});
     }
   } else {
-    const bool takes_dark = plan.dark && facts.sizes.dark > 0;
+    const bool takes_dark = plan.dark && facts.sizes.dark != 0;
     work.push_back({facts.from_codes && !takes_dark ? CostPart::codes : CostPart::floats});
   }
   const auto demosaic = demosaic_of(facts, plan);

@@ -120,7 +120,7 @@ StepPlan told(const StepFacts& facts, const StepCandidate& plan) {
     add({"row and column noise", facts.sizes.lines, left(taken, facts.sizes.lines), taken, lines_words(facts, plan),
          cost_of_lines(facts, plan)});
   }
-  if (facts.sizes.dark > 0) {
+  if (facts.sizes.dark != 0) {
     const bool used = plan.dark || plan.level;
     add({"dark charge", facts.sizes.dark, left(used, facts.sizes.dark), used,
          used ? "subtracted" : "left in, " + reason_words(facts, plan), std::nullopt});
@@ -166,11 +166,14 @@ StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thum
   facts.look = rendering.look.has_value();
   facts.display = o.display != nullptr;
   std::optional<NoiseModel> model;
+  const bool has_dark = levels.black.dark_mean_e != PerSite<double>{};
   facts.has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !noise_obstacle(frame, levels);
-  if (facts.has_noise) {
+  if (facts.has_noise || (has_dark && levels.electrons_at_white)) {
     model = noise_model(frame, levels, rendering.white_gain, o.space);
     facts.blocks = seen_blocks(frame, o, levels, rendering, model->noise, thumbnail, executor);
-    facts.has_noise = !facts.blocks.empty();
+  }
+  facts.has_noise = facts.has_noise && !facts.blocks.empty();
+  if (facts.has_noise) {
     facts.noise = level_noise(facts.blocks);
     facts.chroma = chroma_work(frame, levels, model->noise, thumbnail);
   }

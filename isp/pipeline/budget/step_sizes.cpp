@@ -145,9 +145,10 @@ StepSizes step_sizes(const RawFrame& frame, const DevelopOptions& options, const
   StepSizes out;
   out.defects = size_of_defects(frame, options, levels, request);
   if (options.display) out.display = request.noise ? percentile_of(request.blocks, &SeenBlock::display_delta_e) : nan;
-  if (!request.noise) return out;
-  if (options.denoise.line_noise) set_lines(frame, levels, request, out, executor);
-  out.dark = percentile_of(request.blocks, &SeenBlock::dark_delta_e);
+  if (levels.black.dark_mean_e != PerSite<double>{}) {
+    out.dark = request.blocks.empty() ? nan : percentile_of(request.blocks, &SeenBlock::dark_delta_e);
+  }
+  if (request.noise && options.denoise.line_noise) set_lines(frame, levels, request, out, executor);
   return out;
 }
 

@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "isp/pipeline/budget/step_plan.h"
+#include "isp/pipeline/plan/dark_charge.h"
 #include "isp/pipeline/plan/plan_noise.h"
-#include "isp/pipeline/render/cell_figures.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/measure/masked_black.h"
 #include "isp/raw/measure/thumbnail.h"
@@ -66,60 +66,6 @@ FoundDefects all_defects(const RawFrame& frame, const RawDn& measured, const Thu
   return out;
 }
 
-// Returns the thumbnail without the dark charge that is known and still in the codes: it is not light.
-Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels& levels) {
-  Thumbnail out{CameraRgb(thumbnail.mean.width(), thumbnail.mean.height()), thumbnail.black_noise_std};
-  std::array<double, 3> dark{};
-  for (int site = 0; site < 4 && levels.electrons_at_white; ++site) {
-    const auto c = static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1));
-    dark[c] += levels.black.dark_mean_e[site] / (*levels.electrons_at_white)[site] * (c == 1 ? 0.5 : 1);
-  }
-  for (std::size_t c = 0; c < 3; ++c) {
-    const Plane<float>& from = thumbnail.mean.plane[c];
-    std::transform(from.data(), from.data() + from.size(), out.mean.plane[c].data(),
-                   [&](float mean) { return mean - static_cast<float>(dark[c]); });
-  }
-  return out;
-}
-
-// Returns DevelopPlan::unknown_dark_fraction for a Bayer frame whose gain and exposure time are known. Of a raw that
-// came denoised its maker knew more: `lowlux denoise` subtracts dark charge, or warns.
-std::optional<double> find_unknown_dark(const RawFrame& frame, const RawLevels& levels, const Thumbnail& thumbnail) {
-  // Dark current that few sensors exceed uncooled: that of the GSENSE4040BSI at 25 C by its data sheet.
-  constexpr double high_current_e_per_s = 25, at_c = 25, doubling_c = 7, min_charge_e = 2, min_fraction = 0.1;
-  const FrameInfo& info = frame.raw.info;
-  const bool is_unknown = frame.raw.layout == SensorLayout::bayer && levels.electrons_at_white &&
-                          !frame.noise->reduced && levels.black.holds == BlackPoint::Holds::pedestal_only &&
-                          levels.black.dark_mean_e == PerSite<double>{};
-  if (!is_unknown || !info.exposure_s) return std::nullopt;
-  const double factor = std::exp2((info.temperature_c.value_or(at_c) - at_c) / doubling_c);
-  if (!(high_current_e_per_s * factor * *info.exposure_s >= min_charge_e)) return std::nullopt;
-  const std::array<double, 3> electrons = electrons_by_colour(frame.raw, levels);
-  std::vector<double> charge(thumbnail.mean.plane[0].size());
-  for (std::size_t i = 0; i < charge.size(); ++i) {
-    for (std::size_t c = 0; c < 3; ++c)
-      charge[i] += fraction_of_sites[c] * electrons[c] * thumbnail.mean.plane[c].data()[i];
-  }
-  if (charge.empty()) return std::nullopt;
-  const auto at_fraction = [&](double fraction) {
-    const auto place = charge.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(charge.size()));
-    std::nth_element(charge.begin(), place, charge.end());
-    return *place;
-  };
-  const double median = at_fraction(0.5), darkest = at_fraction(0.01);
-  if (!(median > 0)) return std::nullopt;
-  const double fraction = std::clamp(darkest / median, 0.0, 1.0);
-  return fraction >= min_fraction ? std::optional(fraction) : std::nullopt;
-}
-
-std::string dark_warning(const FrameInfo& info, double fraction) {
-  const std::string place = info.temperature_c ? fmt::format(" and {:g} C", *info.temperature_c) : std::string();
-  return fmt::format(
-      "the dark charge is unknown: at {:g} s{} it may take up to {:.0f} % of the saturation; use "
-      "--dark-frame, or --profile with a dark current",
-      *info.exposure_s, place, 100 * fraction);
-}
-
 Result<RawLevels> choose_levels(const RawFrame& frame, const DevelopOptions& options) {
   RawLevels out{.dark_frame = options.dark_frame};
   Result<BlackPoint> black =
@@ -167,12 +113,16 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   const Thumbnail thumbnail = make_thumbnail(measured, levels->black, executor);
   clock.lap("thumbnail");
 
-  plan.unknown_dark_fraction = find_unknown_dark(frame, *levels, thumbnail);
-  if (plan.unknown_dark_fraction) plan.warnings.push_back(dark_warning(frame.raw.info, *plan.unknown_dark_fraction));
+  plan.dark = find_dark_charge(frame, *levels, thumbnail, options.estimate_dark);
+  if (plan.dark.state == DarkCharge::State::estimated) levels->black.dark_mean_e = plan.dark.estimated_e;
+  if (plan.dark.state == DarkCharge::State::unknown) plan.warnings.push_back(warning_of(plan.dark, frame.raw.info));
   const Thumbnail light = light_of(thumbnail, frame.raw, *levels);
   Result<Rendering> rendering = decide_rendering(frame, light, options);
   if (!rendering) return tl::make_unexpected(std::move(rendering.error()));
   append(plan.warnings, rendering->warnings);
+  if (plan.dark.mean_e) {
+    plan.dark.alpha = signal_fraction_at_median(frame, *levels, *rendering, light, *plan.dark.mean_e);
+  }
   clock.lap("white and exposure");
 
   FoundDefects found = all_defects(frame, measured.raw, thumbnail, *levels, options.find_defects, executor);

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "isp/base/frame.h"
+#include "isp/pipeline/plan/levels.h"
+#include "isp/pipeline/plan/rendering.h"
+#include "isp/raw/measure/thumbnail.h"
+
+namespace lowlux::isp {
+
+/// States what is known of the dark charge of a frame, and what was done about it.
+struct DarkCharge {
+  enum class State : std::uint8_t {
+    not_expected,    // too small to matter at this exposure time and temperature, or not separable from the light
+    in_black_point,  // measured or computed: the black point that is subtracted holds it
+    estimated,       // the frame itself shows it significantly: it is subtracted unless a planner leaves it in
+    unknown          // it may matter, and stays in
+  } state = State::not_expected;
+  std::optional<double> mean_e;            // mean over pixels, where it is known or estimated
+  std::optional<double> standard_error_e;  // of mean_e; absent where figures are quoted without one
+  PerSite<double> estimated_e{};           // State::estimated: charge of each site
+  std::optional<double> alpha;             // result of signal_fraction_at_median
+  /// State::unknown: the largest fraction of the charge of the median block that may be dark charge, that of the
+  /// darkest blocks, which hold no more.
+  std::optional<double> max_fraction;
+  std::string reason;  // of the state, as text
+};
+
+/// Finds the dark charge of a frame. Where the black point holds only a pedestal, the gain is known and the exposure
+/// was long, it is estimated from the frame itself (estimate_dark_charge), if `may_estimate`. A significant estimate
+/// must also be within 1000 e-/s at 25 C, doubling every 7 C: three times the highest dark current of the sensors in
+/// isp/model/data/sensors.csv.
+/// @param thumbnail  dark charge included
+DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, const Thumbnail& thumbnail,
+                            bool may_estimate);
+
+/// Returns the warning of State::unknown; empty in other states.
+std::string warning_of(const DarkCharge& dark, const FrameInfo& info);
+
+/// Returns the thumbnail without the dark charge that is known and still in the codes: it is not light.
+Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels& levels);
+
+/// Returns alpha of thesis Eq. 4.24 for the median of the light of the blocks: the fraction of X + Y + Z that is light,
+/// were the dark charge not subtracted; 1 - alpha of the saturation would then be lost. Without colour matrices it is
+/// the fraction of the sum of camera RGB. nullopt where mean_e is not known, or the light is not positive.
+std::optional<double> signal_fraction_at_median(const RawFrame& frame, const RawLevels& levels,
+                                                const Rendering& rendering, const Thumbnail& light, double mean_e);
+
+}  // namespace lowlux::isp
