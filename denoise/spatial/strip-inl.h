@@ -28,10 +28,10 @@ constexpr int places = lead + run;
 struct Strip {
   float noisy[8][4][run];  // vertical frequency, phase, place
   float pilot[8][4][run];
-  /// Of luma, for chroma: with hard thresholds 1 where a coefficient is kept, else 0; with Wiener gains the square of
-  /// the pilot's coefficient, 0 for the mean.
+  /// Of luma, for chroma: the square of a coefficient, with hard thresholds where it is kept, with Wiener gains that of
+  /// the pilot; 0 elsewhere and for the mean.
   float luma[64][run];
-  float luma_power[run];    // of the pilot's luma: the sum of these squares, and 4 V
+  float luma_power[run];    // the sum of these squares, and 4 V
   float value[64][places];  // vertical frequency and column of blocks, before the inverse vertical transform
   float weight[2][places];  // times each of the window's values
 };

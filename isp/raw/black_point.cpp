@@ -8,8 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "isp/raw/measure/masked_black.h"
-
 namespace lowlux::isp {
 namespace {
 
@@ -92,18 +90,28 @@ Result<BlackPoint> requested_black(const RawDn& raw, const BlackRequest& request
   if (request.choice == BlackChoice::given) {
     return with_dark({.pedestal_dn = request.given_dn, .source = BlackPoint::Source::given}, request.dark_dn);
   }
-  if (request.choice == BlackChoice::measured) return request.measured;
+  if (request.choice == BlackChoice::measured) return *request.measured;
   if (request.choice == BlackChoice::metadata) return tagged_black(raw, request, "");
   // A tag that is finer than four figures is not replaced with four figures.
   const bool tag_is_finer = raw.black_tag && !four_figures_do(*raw.black_tag);
-  if (request.choice == BlackChoice::automatic && tag_is_finer) return tagged_black(raw, request, "");
+  if (request.choice == BlackChoice::automatic && tag_is_finer) {
+    return request.measured ? *request.measured : tagged_black(raw, request, "");
+  }
   MaskedBlack measured = measure_masked_black(raw);
   if (measured.black) return *measured.black;
   if (request.choice == BlackChoice::masked) return fail(ErrorCode::insufficient, measured.refusal);
+  if (request.measured) return *request.measured;
   return tagged_black(raw, request, measured.refusal);
 }
 
 }  // namespace
+
+MaskedBlack masked_black_of(const RawFrame& frame) {
+  MaskedBlack measured = measure_masked_black(frame.raw);
+  if (!measured.black || !frame.noise) return measured;
+  const double scale = *std::ranges::max_element(frame.noise->scale);
+  return measure_masked_black(frame.raw, scale * mean_range_dn(frame.raw, *measured.black));
+}
 
 double white_at(const RawDn& raw, int site) {
   if (raw.layout != SensorLayout::bayer) return raw.white_dn[std::min(site, 2)];

@@ -1,17 +1,21 @@
 #pragma once
 
+#include <optional>
+
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
+#include "isp/raw/measure/masked_black.h"
 
 namespace lowlux::isp {
 
 /// Names the source of the black point.
 enum class BlackChoice {
-  automatic,  // a tag finer than one figure per site, else masked pixels where there are enough, else the tag
+  automatic,  // masked pixels where there are enough, else BlackRequest::measured, else the tag; instead of masked
+              // pixels a tag finer than one figure per site, or, if there is one, BlackRequest::measured
   metadata,   // the tag only
   masked,     // the masked pixels only
   given,      // figures given by the user
-  measured,   // a black point measured earlier, stored in a camera's profile
+  measured,   // only BlackRequest::measured
 };
 
 struct BlackRequest {
@@ -20,8 +24,11 @@ struct BlackRequest {
   /// States the known dark charge of the frame, system gain times dark current times exposure time [DN]: it is added to
   /// a pedestal that is tagged or given. Masked pixels and a measured black point include it already.
   PerSite<double> dark_dn{};
-  BlackPoint measured;  // for BlackChoice::measured
+  std::optional<BlackPoint> measured;  // measured earlier and stored in a camera's profile
 };
+
+/// Returns measure_masked_black with the gain that the noise profile of the frame states, if it states one.
+MaskedBlack masked_black_of(const RawFrame& frame);
 
 /// Returns the black point as requested. Errors: insufficient when the source has neither masked pixels nor a tag
 /// (black is not guessed), malformed when white is not above black.

@@ -101,8 +101,8 @@ TEST(NoiseReduction, DarkChargeThatTheBlackPointKnowsIsTakenOffWithItsNoise) {
   RawFrame frame = test::night_frame(camera, grey(40), 160, 128);
   DevelopOptions options = linear({Mode::level, Level::standard});
   options.black.choice = BlackChoice::measured;
-  options.black.measured.pedestal_dn.fill(test::night_black_dn);
-  options.black.measured.dark_mean_e = camera.dark_e;
+  options.black.measured.emplace().pedestal_dn.fill(test::night_black_dn);
+  options.black.measured->dark_mean_e = camera.dark_e;
   const auto out = develop(frame, options, executor);
   ASSERT_TRUE(out);
   EXPECT_EQ(out->plan.noise_reduction.noise.dark_mean_e, camera.dark_e);

@@ -280,12 +280,12 @@ TEST(PlanEffects, DarkChargeIsLeftInWhereItCannotBeSeen) {
   const RawFrame frame = grey(2000);
   DevelopOptions options = planned_options(2);
   options.black.choice = BlackChoice::measured;
-  options.black.measured.pedestal_dn.fill(test::night_black_dn);
-  options.black.measured.dark_mean_e.fill(500);
+  options.black.measured.emplace().pedestal_dn.fill(test::night_black_dn);
+  options.black.measured->dark_mean_e.fill(500);
   const StepPlan large = effects_of(frame, options);
   EXPECT_TRUE(large.dark);
   EXPECT_GT(named(large, "dark charge").size, 2);
-  options.black.measured.dark_mean_e.fill(1);
+  options.black.measured->dark_mean_e.fill(1);
   const auto small = plan_develop(frame, options, executor);
   ASSERT_TRUE(small);
   EXPECT_FALSE(small->effects->dark);
@@ -296,9 +296,9 @@ TEST(PlanEffects, DarkChargeIsLeftInWhereItCannotBeSeen) {
 TEST(PlanEffects, DarkChargeDoesNotCountForTheExposure) {
   DevelopOptions options;
   options.black.choice = BlackChoice::measured;
-  options.black.measured.pedestal_dn.fill(test::night_black_dn);
+  options.black.measured.emplace().pedestal_dn.fill(test::night_black_dn);
   const auto with = [&](double signal_e, double dark_e) {
-    options.black.measured.dark_mean_e.fill(dark_e);
+    options.black.measured->dark_mean_e.fill(dark_e);
     Camera camera;
     camera.dark_e.fill(dark_e);
     const RawFrame frame = test::night_frame(camera, flat(0.5 * signal_e, signal_e, 0.625 * signal_e), 256, 256);

@@ -168,6 +168,26 @@ TEST(BlackPoint, AutomaticPrefersMaskedPixelsAndSaysThatTheyHoldTheDarkCharge) {
   EXPECT_EQ(black->dark_mean_e, (PerSite<double>{}));
 }
 
+// Masked pixels of the frame know its temperature; a profile's level comes next, and replaces a tag of any layout.
+TEST(BlackPoint, AProfilesLevelComesBetweenMaskedPixelsAndTheTag) {
+  const BlackPoint of_profile{.pedestal_dn = {500, 501, 502, 503}, .source = BlackPoint::Source::profile};
+  RawDn raw = frame_with_masked_columns(2);
+  EXPECT_EQ(choose_black(raw, {.measured = of_profile})->source, BlackPoint::Source::masked_pixels);
+  EXPECT_EQ(choose_black(raw, {.choice = BlackChoice::measured, .measured = of_profile})->source,
+            BlackPoint::Source::profile);
+  raw.masked.clear();
+  EXPECT_EQ(choose_black(raw, {.measured = of_profile})->pedestal_dn, of_profile.pedestal_dn);
+  EXPECT_EQ(choose_black(raw, {})->source, BlackPoint::Source::tag);
+  EXPECT_EQ(choose_black(raw, {.choice = BlackChoice::metadata, .measured = of_profile})->source,
+            BlackPoint::Source::tag);
+  EXPECT_FALSE(choose_black(raw, {.choice = BlackChoice::masked, .measured = of_profile}));
+  raw.black_tag->column_dn.assign(side, 0.5);
+  EXPECT_EQ(choose_black(raw, {})->source, BlackPoint::Source::tag);
+  EXPECT_EQ(choose_black(raw, {.measured = of_profile})->source, BlackPoint::Source::profile);
+  raw.black_tag.reset();
+  EXPECT_EQ(choose_black(raw, {.measured = of_profile})->source, BlackPoint::Source::profile);
+}
+
 TEST(BlackPoint, MetadataTakesTheTagWithItsFractions) {
   RawDn raw = frame_with_masked_columns(9);
   raw.black_tag->pattern_dn = {12.5};

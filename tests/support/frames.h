@@ -28,7 +28,7 @@ class NormalDn {
   explicit NormalDn(unsigned seed) : engine_(seed) {}
   int operator()(double mean, double std) {
     const double v = mean + std * normal_(engine_);
-    return v < 0 ? 0 : static_cast<int>(v + 0.5);
+    return v < 0 ? 0 : static_cast<int>(std::lround(v));
   }
 
  private:

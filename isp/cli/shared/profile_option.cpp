@@ -36,9 +36,10 @@ Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choi
       black.dark_dn[site] = found->sensor->system_gain_dn_per_e * found->dark_mean_e[site];
     }
   }
-  if (found->black && black.choice == isp::BlackChoice::automatic) {
-    black.choice = isp::BlackChoice::measured;
+  if (found->black) {
     black.measured = *found->black;
+    const bool is_asked_for = !choice.everything;
+    if (is_asked_for && black.choice == isp::BlackChoice::automatic) black.choice = isp::BlackChoice::measured;
   }
   options.look.profile_iso = found->iso;
   if (found->noise) {

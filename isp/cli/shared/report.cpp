@@ -10,7 +10,7 @@
 #include "isp/cli/shared/lines.h"
 #include "isp/model/colour/camera_colour.h"
 #include "isp/model/sensor/scene_luminance.h"
-#include "isp/raw/measure/masked_black.h"
+#include "isp/raw/black_point.h"
 #include "isp/raw/to_linear.h"
 
 namespace lowlux::cli {
@@ -30,8 +30,9 @@ void add_layout(Lines& out, const RawDn& raw) {
     out.add("orientation", fmt::format("EXIF {}", static_cast<int>(raw.info.orientation)));
 }
 
-void add_black(Lines& out, const RawDn& raw) {
-  const isp::MaskedBlack measured = isp::measure_masked_black(raw);
+void add_black(Lines& out, const RawFrame& frame) {
+  const RawDn& raw = frame.raw;
+  const isp::MaskedBlack measured = isp::masked_black_of(frame);
   out.add("black [DN]", fmt::format("{:>9} {:>9} {:>9} {:>9}", "site 00", "site 01", "site 10", "site 11"));
   if (raw.black_tag) {
     const int last = raw.black_tag->samples - 1;
@@ -128,7 +129,7 @@ std::string info_text(const std::string& file, const RawFrame& frame) {
   const FrameInfo& info = frame.raw.info;
   out.add("camera", camera_name(info.make, info.model) + (info.date_time.empty() ? "" : ", " + info.date_time));
   add_layout(out, frame.raw);
-  add_black(out, frame.raw);
+  add_black(out, frame);
   out.add("white [DN]",
           fmt::format("{:g} {:g} {:g}", frame.raw.white_dn[0], frame.raw.white_dn[1], frame.raw.white_dn[2]));
   add_noise(out, frame);

@@ -7,7 +7,7 @@
 #include "isp/cli/shared/report.h"
 #include "isp/model/colour/camera_colour.h"
 #include "isp/model/sensor/scene_luminance.h"
-#include "isp/raw/measure/masked_black.h"
+#include "isp/raw/black_point.h"
 #include "isp/raw/to_linear.h"
 
 namespace lowlux::cli {
@@ -250,7 +250,7 @@ std::string info_json(const std::string& file, const RawFrame& frame) {
   json["masked"] = Json::array();
   for (const Rect& r : raw.masked) json["masked"].push_back(rect_json(r));
   json["masked_is_stated"] = raw.masked_is_stated;
-  const isp::MaskedBlack measured = isp::measure_masked_black(raw);
+  const isp::MaskedBlack measured = isp::masked_black_of(frame);
   json["black"] = {{"tag", tag_json(raw.black_tag)}};
   json["black"]["measured"] = measured.black ? black_json(*measured.black) : Json(nullptr);
   if (measured.black) {

@@ -96,7 +96,9 @@ DarkCharge in_black_point(const RawFrame& frame, const RawLevels& levels) {
   }
   double mean_e = 0, variance_e2 = 0;
   for (int site = 0; site < 4; ++site) {
-    const double tag = frame.raw.black_tag->at(site & 1, site >> 1);
+    const Rect& active = frame.raw.active;
+    const double tag =
+        frame.raw.black_tag->at(std::min(site & 1, active.width - 1), std::min(site >> 1, active.height - 1));
     const double per_dn =
         (*levels.electrons_at_white)[site] / (white_at(frame.raw, site) - levels.black.pedestal_dn[site]);
     const double error = levels.black.pedestal_standard_error_dn[site] * per_dn;

@@ -11,7 +11,6 @@
 #include "isp/pipeline/plan/dark_charge.h"
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/raw/corrections.h"
-#include "isp/raw/measure/masked_black.h"
 #include "isp/raw/measure/thumbnail.h"
 #include "isp/raw/subtract_dark_frame.h"
 #include "isp/raw/to_linear.h"
@@ -86,7 +85,7 @@ void append(std::vector<std::string>& to, std::vector<std::string>& from) {
 Result<BlackPoint> choose_black_by_gain(const RawFrame& frame, const BlackRequest& request) {
   Result<BlackPoint> black = choose_black(frame.raw, request);
   if (!black || black->source != BlackPoint::Source::masked_pixels) return black;
-  MaskedBlack measured = measure_masked_black(frame.raw, gain_dn_per_e(frame, *black));
+  MaskedBlack measured = masked_black_of(frame);
   if (measured.black) black = *std::move(measured.black);
   return black;
 }
