@@ -15,8 +15,11 @@
 #include "isp/model/sensor/photon.h"
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/live/live_pipeline.h"
+#include "isp/pipeline/plan/plan_develop.h"
+#include "isp/raw/measure/dark_estimate.h"
 #include "tests/hard_cases/mosaics.h"
 #include "tests/hard_cases/simulated.h"
+#include "tests/pipeline/night_frames.h"
 #include "tests/reference/exact_ref.h"
 #include "tests/reference/poisson_ref.h"
 
@@ -31,6 +34,8 @@ constexpr std::string_view drawn_before = "light is drawn by the camera";
 constexpr std::string_view no_colour_yet = "chromaticities are made later";
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double inf = std::numeric_limits<double>::infinity();
+
+PoolExecutor executor(2);
 
 MosaicCase without_light(double read_noise_e, int width, int height) {
   return case_of({.read_noise_e = read_noise_e}, flat(0, 0, 0), width, height, 91);
@@ -65,6 +70,51 @@ TEST(HardCaseSensor, NoPhotonIsNoElectronAndNoSpectrum) {
   }
   row.on(Path::file, 0, [&](Denormals m) { return not_zero(by_file(c, m)); });
   row.on(Path::live, 0, [&](Denormals m) { return not_zero(by_live(c, m)); });
+}
+
+// Section 8: the dark charge has to come from somewhere, and a tagged pedestal is silent about it.
+TEST(HardCaseSensor, DarkChargeThatNoSourceStatesIsInTheFrame) {
+  HardCase row({group, "dark charge of 0.1 to 1e5 e- that no source states, under light of 1e-2 to 1e4 times as much",
+                "closed form: grey surfaces down to black (reference); charge of the scene (file)",
+                "of charge and light; standard errors"});
+  constexpr std::array light{0.5, 1.0, 0.66};
+  constexpr double white_e = 1e10;
+  row.on(Path::reference, {2e-7, rounding}, [&](Denormals m) {
+    double worst = 0;
+    for (const double dark_e : {0.1, 1.0, 30.0, 1e3, 1e5}) {
+      for (const double ratio : {1e-2, 1.0, 1e2, 1e4}) {
+        CameraRgb blocks(48, 48);
+        for (std::size_t c = 0; c < 3; ++c) {
+          for (int i = 0; i < 48 * 48; ++i) {
+            const double place = static_cast<double>(i / 48) / 47;
+            blocks.plane[c].data()[i] = static_cast<float>(dark_e * (1 + ratio * place * light[c]) / white_e);
+          }
+        }
+        const isp::DarkEvidence evidence{
+            .mean = blocks, .electrons_at_white = {white_e, white_e, white_e}, .pixels = 1e12};
+        const auto found = in_mode(m, [&] { return isp::estimate_dark_charge(evidence); });
+        keep_worst(worst, found ? std::abs(found->mean_e - dark_e) / (dark_e * (1 + ratio)) : nan);
+      }
+    }
+    return worst;
+  });
+  row.none(levels, "subtracted after noise reduction").none(instruction_sets, scalar_code);
+  row.on(Path::file, {3, "three standard errors"}, [&](Denormals m) {
+    double worst = 0;
+    for (const double dark_e : {20.0, 200.0, 800.0}) {
+      const auto scene = [&](int x, int) {
+        const double e = 0.5 * x;
+        return std::array{e * light[0], e * light[1], e * light[2]};
+      };
+      RawFrame frame = test::night_frame({.dark_e = {dark_e, dark_e, dark_e, dark_e}}, scene, 320, 256);
+      frame.raw.info.exposure_s = 2;
+      const auto plan = in_mode(m, [&] { return isp::plan_develop(frame, {}, executor); });
+      const bool is_found = plan && plan->dark.state == isp::DarkCharge::State::estimated;
+      keep_worst(worst, is_found ? std::abs(*plan->dark.mean_e - dark_e) / *plan->dark.standard_error_e : nan);
+    }
+    return worst;
+  });
+  row.none(Path::live, "exposures of films are short");
 }
 
 const std::array means_e{1e-12, 1e-9, 1e-6, 1e-3, 0.3, 1.0, 30.0, 1e3, 1e5, 1e6};

@@ -99,7 +99,7 @@ TEST(UnknownDark, IsEstimatedAndSubtractedWhereTheFrameShowsIt) {
   EXPECT_NEAR(*plan.dark.alpha, (40 + 80 + 53.3) / (40 + 80 + 53.3 + 600), 0.02);
 }
 
-// A dark surface of any colour that light of 50 e- shows is no dark charge, although a long exposure could have it.
+// Light of 50 e- in the darkest places is not taken for dark charge, although so long an exposure could have that.
 TEST(UnknownDark, IsNotEstimatedFromAFrameWithoutIt) {
   const DevelopPlan plan = planned(ramp_over_dark(0, 50, 10));
   EXPECT_EQ(plan.dark.state, DarkCharge::State::unknown);

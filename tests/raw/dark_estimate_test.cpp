@@ -171,7 +171,7 @@ TEST(DarkEstimate, IsNotSignificantWithoutDarkCharge) {
   }
 }
 
-// A pedestal that is stated too high leaves less than no charge: that is no dark charge.
+// A pedestal that is stated too high makes charges negative: then there is no dark charge to subtract.
 TEST(DarkEstimate, IsNoneBelowBlack) {
   const auto found = estimate_of(blocks_of({.dark_e = {-20, -20, -20}, .max_light_e = 500}));
   ASSERT_TRUE(found);

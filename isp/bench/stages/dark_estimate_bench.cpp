@@ -15,6 +15,7 @@
 #include "isp/bench/scenes/simulated_camera.h"
 #include "isp/bench/stages/simulation_stages.h"
 #include "isp/bench/stages/stage_rows.h"
+#include "isp/metrics/statistics.h"
 #include "isp/model/sensor/noise_budget.h"
 #include "isp/model/sensor/sensor_db.h"
 #include "isp/model/spectrum/spectral_response.h"
@@ -165,13 +166,6 @@ struct Tally {
     worse += std::fabs(error) > truth_e ? 1 : 0;
   }
 };
-
-double median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double median_of_sizes(std::vector<double> values) {
   for (double& value : values) value = std::fabs(value);
