@@ -86,7 +86,8 @@ TEST(HardCaseSensor, DarkChargeThatNoSourceStatesIsInTheFrame) {
         CameraRgb blocks(48, 48);
         for (std::size_t c = 0; c < 3; ++c) {
           for (int i = 0; i < 48 * 48; ++i) {
-            const double place = static_cast<double>(i / 48) / 47;
+            const int line = i / 48;
+            const double place = line / 47.0;
             blocks.plane[c].data()[i] = static_cast<float>(dark_e * (1 + ratio * place * light[c]) / white_e);
           }
         }

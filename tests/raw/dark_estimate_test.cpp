@@ -29,7 +29,8 @@ CameraRgb blocks_of(const Scene& s) {
   const int n = s.width * s.height;
   for (int i = 0; i < n; ++i) {
     // Neighbours are alike, as those that are joined are in pictures.
-    const double place = static_cast<double>(i / s.width) / s.height + 1e-6 * (i % s.width);
+    const int row = i / s.width;
+    const double place = 1.0 * row / s.height + 1e-6 * (i % s.width);
     const double light = s.min_light_e + (s.max_light_e - s.min_light_e) * place;
     for (std::size_t c = 0; c < 3; ++c) {
       const double colour = s.neutral[c] * std::exp(s.deviation[c] * (1 - place));

@@ -117,7 +117,7 @@ Result<std::string> spread_of_dark_colours(const std::vector<BenchPicture>& pict
     tint += std::pow(red - 2 * green + blue, 2) / 6;
     temperature += std::pow(red - blue, 2) / 2;
   }
-  const double n = static_cast<double>(pictures.size());
+  const auto n = static_cast<double>(pictures.size());
   return fmt::format(
       "The darkest fiftieth of the blocks of these images deviates from neutral by {:.2f} between green and the other "
       "two and by {:.2f} between red and blue (rms of natural logarithms); the standard error assumes 0.17 and 0.4",

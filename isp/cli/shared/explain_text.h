@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "isp/base/frame.h"
+#include "isp/pipeline/plan/dark_charge.h"
 
 namespace lowlux::cli {
 
