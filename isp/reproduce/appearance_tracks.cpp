@@ -112,10 +112,13 @@ Result<AppearanceTracks> tracks_by_colour(std::string_view model, const TrackRea
     conditions.shin_units = reading.shin_units;
     const auto map = found->at(conditions);
     if (!map) return tl::make_unexpected(map.error());
+    const double white = (*map)(equal_energy).y;
+    if (!(white > 0)) return fail(ErrorCode::insufficient, fmt::format("{} finds no white at {} cd/m2", model, level));
     for (std::size_t chip = 0; chip < chips.size(); ++chip) {
       const auto colour = xyz_of_reflectance(chips[chip].spectrum, light);
       assert(colour);  // the equal-energy light has luminance
-      out.seen[chip].push_back((*map)(*colour));
+      const Xyz seen = (*map)(*colour);
+      out.seen[chip].push_back({seen.x / white, seen.y / white, seen.z / white});
     }
   }
   return out;

@@ -27,14 +27,17 @@ struct TrackReading {
   EntropyVariant variant = EntropyVariant::rendering;
 };
 
-/// Appearance of chips under the equal-energy light by one model, relative to the equal-energy white of Y = 1.
+/// Appearance of chips under the equal-energy light by one model, relative to the equal-energy white of Y = 1. Each
+/// level is scaled so that the white of that level has Y = 1, as the thesis shows its patches: the intensity of the
+/// white point is mapped to 255 (section 5.2.1).
 struct AppearanceTracks {
   std::string model;
   std::vector<std::vector<Xyz>> seen;  // by chip, then by level
 };
 
 /// Applies a model of appearance_models() that leaves the equal-energy white its chromaticity or moves it permanently:
-/// all but `entropy`, which shows it as D65. Errors: those of finding and applying the model.
+/// all but `entropy`, which shows it as D65. Errors: those of finding and applying the model; a model that shows the
+/// white of a level black.
 Result<AppearanceTracks> tracks_by_colour(std::string_view model, const TrackReading& reading,
                                           const std::vector<NamedSpectrum>& chips,
                                           const std::vector<double>& levels_cd_m2);

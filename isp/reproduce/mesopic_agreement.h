@@ -25,7 +25,8 @@ inline constexpr std::string_view agreement_chip = "10GY_6_10";
 /// fifth of the white for adaptation, coefficients by lux, Eq. 5.1 as printed.
 std::span<const TrackReading> track_readings();
 inline constexpr std::size_t readings = 8;
-inline constexpr std::size_t reading_by_lux = 2;  // the first except for the unit of Shin's coefficients
+inline constexpr std::size_t reading_as_printed = 1;  // the first except for Eq. 5.1, which is taken as printed
+inline constexpr std::size_t reading_by_lux = 2;      // the first except for the unit of Shin's coefficients
 
 /// A value of the tables: mean Delta E ab between two models' appearances of the patch at 14 levels.
 struct PublishedPair {
@@ -46,7 +47,8 @@ Result<std::vector<Agreement>> agreements(std::span<const PublishedPair> pairs, 
 /// Returns the agreement of a pair that is in `all`, in either order.
 const Agreement& agreement_of(std::span<const Agreement> all, std::string_view first, std::string_view second);
 
-/// Returns the finding that the published value is within the range of the readings.
+/// Returns the finding of a published value. It agrees if the first reading or the one with Eq. 5.1 as printed is
+/// within a tenth of it, has the same direction if the range of the readings contains it, and else does not hold.
 /// @param experiment, table  "mesopic-tracks", "Table 5-1"
 Finding figure_of(const std::string& experiment, const std::string& table, const Agreement& agreement);
 
