@@ -7,6 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "isp/model/appearance/icam06.h"
+#include "isp/model/colour/colorimetry.h"
+#include "isp/render/output_space.h"
+
 namespace lowlux::isp {
 namespace {
 
@@ -18,6 +22,9 @@ double mean(const PictureScores& scores, double RetargetScore::*figure) {
 
 Result<RetargetTable> table_of(RetargetMethod method, double display_cd_m2, ShinUnits units,
                                const RetargetingWork& work) {
+  if (method == RetargetMethod::icam06) {
+    return tabulated(icam06_forward(display_cd_m2), work.table_levels, work.executor);
+  }
   RetargetOptions options;
   options.method = method;
   options.source_cd_m2 = retargeting_source_cd_m2;
@@ -52,6 +59,24 @@ Plot plot_over(const std::string& id, const std::string& title, const std::strin
 }
 
 }  // namespace
+
+CodeMap icam06_forward(double display_cd_m2) {
+  const Matrix3 to_xyz = rgb_to_xyz(primaries_rec709).value();  // cannot fail for constants
+  const Matrix3 adapt = *bradford_adaptation(white_d65, white_e);
+  const Matrix3 to_cd_m2 = display_cd_m2 * adapt * to_xyz;
+  const Matrix3 to_rgb = *inverse(adapt * to_xyz);
+  const Icam06State state{.white_cd_m2 = display_cd_m2, .scotopic_white_cd_m2 = display_cd_m2};
+  const double white_response = icam06_compress(to_cd_m2 * Vector3{1, 1, 1}, state).xyz_tc[1];
+  return [=](const Vector3& code) {
+    Vector3 light{}, out{};
+    for (std::size_t c = 0; c < 3; ++c) light[c] = decode_transfer(OutputSpace::srgb, code[c]);
+    const Vector3 rgb = to_rgb * icam06_compress(to_cd_m2 * light, state).xyz_tc;
+    for (std::size_t c = 0; c < 3; ++c) {
+      out[c] = encode_transfer(OutputSpace::srgb, std::clamp(rgb[c] / white_response, 0.0, 1.0));
+    }
+    return out;
+  };
+}
 
 double mean_delta_e(const PictureScores& scores) { return mean(scores, &RetargetScore::delta_e_94c); }
 double mean_gamut(const PictureScores& scores) { return mean(scores, &RetargetScore::gamut_percent); }

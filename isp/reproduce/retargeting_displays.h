@@ -8,6 +8,7 @@
 #include "isp/base/executor.h"
 #include "isp/base/result.h"
 #include "isp/render/retarget/retarget.h"
+#include "isp/render/retarget/retarget_table.h"
 #include "isp/reproduce/reproduce.h"
 #include "isp/reproduce/retargeting_pictures.h"
 
@@ -16,7 +17,8 @@ namespace lowlux::isp {
 /// White of the display for which the images are correct.
 inline constexpr double retargeting_source_cd_m2 = 250;
 
-/// The compared methods are listed in the order of plots.
+/// The compared methods are listed in the order of plots. RetargetMethod::icam06 stands for the forward model here,
+/// icam06_forward(), and not for the inverse that `lowlux develop` offers.
 inline constexpr std::array retargeting_rows{RetargetMethod::none,   RetargetMethod::shin,
                                              RetargetMethod::cao,    RetargetMethod::wanat,
                                              RetargetMethod::icam06, RetargetMethod::constrained};
@@ -41,6 +43,13 @@ struct DisplayScores {
   const Row& row(RetargetMethod method) const;
   const PictureScores& of(RetargetMethod method) const { return row(method).scores; }
 };
+
+/// Returns the image that iCAM06 predicts for a display, without compensation: tone compression (Eq. 2.19 to 2.21, p =
+/// 0.7) of the light that the display would emit, a white of display_cd_m2 being both the largest luminance and Y_w,
+/// and the response shown as light, with gamma = 1, relative to the response to white. The thesis applies iCAM06 so
+/// (section 5.4.2: max_L = 2 cd/m2; it predicts and is not designed for compensation). Local contrast is left out.
+/// @return map of sRGB codes; white stays white, colours outside of the gamut are clipped
+CodeMap icam06_forward(double display_cd_m2);
 
 /// Inputs that all measurements have in common; borrowed.
 struct RetargetingWork {

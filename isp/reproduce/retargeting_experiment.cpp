@@ -22,7 +22,7 @@ constexpr std::array inverse_and_ours{RetargetMethod::shin, RetargetMethod::cons
 constexpr std::array<std::string_view, 3> other_judges{"wanat_mantiuk", "mikamo", "icam06"};
 constexpr std::size_t enough_pictures = 7, enough_judges = 2;
 
-// Means over seven images of the thesis' own, from its Table 5-6.
+// Means over seven images of the thesis' own: Delta E 94c from its Table 5-5, EGR from its Table 5-6.
 struct PublishedMeans {
   double delta_e_94c, gamut_percent;
 };
@@ -42,29 +42,55 @@ bool agree(const PublishedMeans& means, const PictureScores& scores) {
   return figures_agree({{means.delta_e_94c, mean_delta_e(scores)}, {means.gamut_percent, mean_gamut(scores)}});
 }
 
+Finding forward_is_farther(const DisplayScores& at) {
+  const double none = mean_delta_e(at.of(RetargetMethod::none)), icam = mean_delta_e(at.of(RetargetMethod::icam06));
+  const double published = by_icam06.delta_e_94c / unprocessed.delta_e_94c;
+  return {"retargeting/icam06-farther",
+          "iCAM06, applied forward, leaves pictures farther from their look at 250 cd/m2 than unprocessed ones: mean "
+          "Delta E 94c (Table 5-5)",
+          fmt::format("{:.2f} for {:.2f}, {:.2f} times", by_icam06.delta_e_94c, unprocessed.delta_e_94c, published),
+          fmt::format("{:.2f} for {:.2f}, {:.2f} times", icam, none, icam / none),
+          icam > none,
+          "max_L = 2 cd/m2, p = 0.7, gamma = 1 (section 5.4.2), without local contrast; the factors are compared, "
+          "because the pictures are others",
+          Finding::Kind::published,
+          !figures_agree({{published, icam / none}})};
+}
+
+Finding forward_shows_more(const DisplayScores& at) {
+  const double none = mean_gamut(at.of(RetargetMethod::none)), icam = mean_gamut(at.of(RetargetMethod::icam06));
+  return {"retargeting/icam06-gamut",
+          "iCAM06, applied forward, shows more of the pictures' gamut than unprocessed ones: mean EGR (Table 5-6)",
+          fmt::format("{:.1f} % for {:.1f} %", by_icam06.gamut_percent, unprocessed.gamut_percent),
+          fmt::format("{} for {}", percent_text(icam), percent_text(none)),
+          icam > none,
+          "the thesis does not state how the response becomes light again: here relative to the response to white, so "
+          "that the rods' share of it greys all colours; iCAM06's adjustment of colourfulness is left out",
+          Finding::Kind::published,
+          !figures_agree({{by_icam06.gamut_percent, icam}})};
+}
+
 std::vector<Finding> published_findings(const DisplayScores& at, const RetargetingWork& work) {
   const PictureScores &none = at.of(RetargetMethod::none), &shin = at.of(RetargetMethod::shin);
-  const PictureScores &cao = at.of(RetargetMethod::cao), &icam = at.of(RetargetMethod::icam06);
-  return {
-      {"retargeting/closer",
-       "Shin's inverse brings pictures at 2 cd/m2 closer to their look at 250: mean Delta E 94c (Table 5-6)",
-       fmt::format("{:.2f} for {:.2f}", inverse.delta_e_94c, unprocessed.delta_e_94c),
-       fmt::format("{:.2f} for {:.2f}", mean_delta_e(shin), mean_delta_e(none)),
-       mean_delta_e(shin) < mean_delta_e(none), measured_how(work), Finding::Kind::published,
-       !figures_agree({{inverse.delta_e_94c, mean_delta_e(shin)}, {unprocessed.delta_e_94c, mean_delta_e(none)}})},
-      {"retargeting/gamut", "and shows more of their gamut: mean EGR",
-       fmt::format("{:.1f} % for {:.1f} %", inverse.gamut_percent, unprocessed.gamut_percent),
-       fmt::format("{} for {}", percent_text(mean_gamut(shin)), percent_text(mean_gamut(none))),
-       mean_gamut(shin) > mean_gamut(none), "convex hulls in a*, b*", Finding::Kind::published,
-       !figures_agree({{inverse.gamut_percent, mean_gamut(shin)}, {unprocessed.gamut_percent, mean_gamut(none)}})},
-      {"retargeting/cao", "Cao's model, which the thesis calls Wanat & Mantiuk's, gains less than Shin's in both",
-       both(by_cao), both(cao), mean_delta_e(cao) > mean_delta_e(shin) && mean_gamut(cao) < mean_gamut(shin),
-       fmt::format("mean Delta E 94c and EGR; unprocessed {}", both(none)), Finding::Kind::published,
-       !agree(by_cao, cao)},
-      {"retargeting/icam06", "iCAM06 leaves pictures farther than they were, with more of the gamut", both(by_icam06),
-       both(icam), mean_delta_e(icam) > mean_delta_e(none) && mean_gamut(icam) > mean_gamut(none),
-       "here the displayable colour that looks most alike by iCAM06; how the thesis retargets by it is not published",
-       Finding::Kind::published, !agree(by_icam06, icam)}};
+  const PictureScores& cao = at.of(RetargetMethod::cao);
+  return {{"retargeting/closer",
+           "Shin's inverse brings pictures at 2 cd/m2 closer to their look at 250: mean Delta E 94c (Table 5-5)",
+           fmt::format("{:.2f} for {:.2f}", inverse.delta_e_94c, unprocessed.delta_e_94c),
+           fmt::format("{:.2f} for {:.2f}", mean_delta_e(shin), mean_delta_e(none)),
+           mean_delta_e(shin) < mean_delta_e(none), measured_how(work), Finding::Kind::published,
+           !figures_agree({{inverse.delta_e_94c, mean_delta_e(shin)}, {unprocessed.delta_e_94c, mean_delta_e(none)}})},
+          {"retargeting/gamut", "Shin's inverse shows more of the pictures' gamut at 2 cd/m2: mean EGR (Table 5-6)",
+           fmt::format("{:.1f} % for {:.1f} %", inverse.gamut_percent, unprocessed.gamut_percent),
+           fmt::format("{} for {}", percent_text(mean_gamut(shin)), percent_text(mean_gamut(none))),
+           mean_gamut(shin) > mean_gamut(none), "convex hulls in a*, b*", Finding::Kind::published,
+           !figures_agree({{inverse.gamut_percent, mean_gamut(shin)}, {unprocessed.gamut_percent, mean_gamut(none)}})},
+          {"retargeting/cao",
+           "Cao's model, which the thesis calls Wanat & Mantiuk's, gains less than Shin's in both (Tables 5-5 and 5-6)",
+           both(by_cao), both(cao), mean_delta_e(cao) > mean_delta_e(shin) && mean_gamut(cao) < mean_gamut(shin),
+           fmt::format("mean Delta E 94c and EGR; unprocessed {}", both(none)), Finding::Kind::published,
+           !agree(by_cao, cao)},
+          forward_is_farther(at),
+          forward_shows_more(at)};
 }
 
 /// Numbers of images in which this project's method is better than the published inverse.
@@ -163,6 +189,34 @@ Result<std::vector<Finding>> by_other_judges(const DisplayScores& at, const Reta
                "far out of all gamuts")};
 }
 
+/// Reports the four claims on Figure 5-16 about displays of 1, 2, 5 and 10 cd/m2.
+std::vector<Finding> of_figure_5_16(std::span<const DisplayScores> all) {
+  bool closer = true, wider = true, falls = true, rises = true;
+  std::string delta_e, gamut;
+  const DisplayScores* dimmer = nullptr;
+  for (const DisplayScores& at : all) {
+    const PictureScores &shin = at.of(RetargetMethod::shin), &none = at.of(RetargetMethod::none);
+    closer = closer && mean_delta_e(shin) < mean_delta_e(none);
+    wider = wider && mean_gamut(shin) > mean_gamut(none);
+    falls = falls && (dimmer == nullptr || mean_delta_e(shin) < mean_delta_e(dimmer->of(RetargetMethod::shin)));
+    rises = rises && (dimmer == nullptr || mean_gamut(shin) > mean_gamut(dimmer->of(RetargetMethod::shin)));
+    dimmer = &at;
+    delta_e += fmt::format("{}{:.2f} for {:.2f}", delta_e.empty() ? "" : ", ", mean_delta_e(shin), mean_delta_e(none));
+    gamut += fmt::format("{}{} for {}", gamut.empty() ? "" : ", ", percent_text(mean_gamut(shin)),
+                         percent_text(mean_gamut(none)));
+  }
+  const std::string on = "on displays of 1, 2, 5 and 10 cd/m2 (Fig. 5-16)", note = "Shin's inverse for unprocessed";
+  const std::string order = "no figures are published with this claim; order of the means over the pictures";
+  return {{"retargeting/displays-closer", "compensated pictures are closer than unprocessed ones " + on, "closer",
+           delta_e, closer, note + "; " + order},
+          {"retargeting/displays-gamut", "compensated pictures show more of the gamut than unprocessed ones " + on,
+           "more", gamut, wider, note + "; " + order},
+          {"retargeting/displays-delta-e-falls", "Delta E 94c of compensated pictures falls with luminance " + on,
+           "falls", delta_e, falls, order},
+          {"retargeting/displays-gamut-rises", "EGR of compensated pictures rises with luminance " + on, "rises", gamut,
+           rises, order}};
+}
+
 Finding on_other_displays(std::span<const DisplayScores> all) {
   bool holds = true;
   std::string text;
@@ -200,7 +254,9 @@ Result<Outcome> run_retargeting(const RunOptions& options) {
   for (const Finding& finding : our_findings(at, work)) out.findings.push_back(finding);
   for (const Finding& finding : *judged) out.findings.push_back(finding);
   for (const Finding& finding : our_findings(*by_lux, work)) out.findings.push_back(finding);
-  if (!options.quick) out.findings.push_back(on_other_displays(all));
+  if (options.quick) return out;  // one display only
+  for (const Finding& finding : of_figure_5_16(all)) out.findings.push_back(finding);
+  out.findings.push_back(on_other_displays(all));
   return out;
 }
 
