@@ -157,9 +157,11 @@ std::vector<Finding> findings_on_line(const Law& law, double sampled, int sample
   return {
       {"dark-desaturation/line", "measured, true and black-point chromaticity are collinear (Eq. 4.23), expectations",
        "0", fmt::format("{:.1e} in xy at most", law.worst_line), law.worst_line <= rounding,
-       fmt::format("{} patches at {} levels, alpha down to {:.4f}", scenario_ii_patches, std::size(sensor_levels),
-                   law.smallest_alpha)},
-      {"dark-desaturation/sampled-line", fmt::format("so are the means of {} samples (scenario II)", samples),
+       fmt::format("an identity of Eq. 4.23; {} patches at {} levels, alpha down to {:.4f}", scenario_ii_patches,
+                   std::size(sensor_levels), law.smallest_alpha),
+       Finding::Kind::check},
+      {"dark-desaturation/sampled-line",
+       fmt::format("the means of {} samples are on the line of Eq. 4.23 (scenario II)", samples),
        "within the confidence interval", fmt::format("{:.1f} standard errors at most", sampled),
        sampled <= confidence_errors, "chromaticity of the mean code against Eq. 4.23, first-order covariance"}};
 }
@@ -167,9 +169,9 @@ std::vector<Finding> findings_on_line(const Law& law, double sampled, int sample
 std::vector<Finding> findings_on_undoing(const Law& law, double sampled) {
   return {{"dark-desaturation/undo", "the true chromaticity follows by undoing Eq. 4.23 (expectations)", "exact",
            fmt::format("{:.1e} / alpha in xy at most", law.worst_undo), law.worst_undo <= rounding,
-           "what rounding leaves grows by 1 / alpha"},
-          {"dark-desaturation/undo-sampled", "the same on means of samples: less the mean dark, the colour is back",
-           "-", fmt::format("{:.1f} standard errors at most", sampled), sampled <= confidence_errors,
+           "an identity of Eq. 4.23; the error of rounding grows by 1 / alpha", Finding::Kind::check},
+          {"dark-desaturation/undo-sampled", "means of samples, less the mean dark, have the true chromaticity", "-",
+           fmt::format("{:.1f} standard errors at most", sampled), sampled <= confidence_errors,
            "patches and levels where the sum's own relative error is below 2 %", Finding::Kind::check}};
 }
 

@@ -1,8 +1,11 @@
 #include "isp/reproduce/sensor_scenario.h"
 
 #include <algorithm>
+#include <cmath>
+#include <set>
 
 #include "isp/metrics/statistics.h"
+#include "isp/model/colour/colour_difference.h"
 #include "isp/model/colour/dark_desaturation.h"
 
 namespace lowlux::isp {
@@ -36,12 +39,16 @@ Result<PatchResult> run_patch(const ThesisCamera& camera, const Patch& patch, do
   const auto expected = sensor_cloud(camera, charge.total_e, charge.variance_e2);
   if (!truth || !expected)
     return fail(ErrorCode::insufficient, "the camera's matrix gives " + patch.name + " no colour");
-  PatchResult out{*truth, *expected, {}, {}, {}, {}, 0, 0};
+  PatchResult out;
+  out.truth = *truth;
+  out.expected = *expected;
   const PatchSamples samples = photograph(camera, patch, level, scenario.noises, place, scenario.samples);
   out.saturated = samples.saturated;
   out.unsaturated = static_cast<int>(samples.dn.size());
   out.xy = chromaticities(camera, samples.dn);
   out.sampled = cloud_of(out.xy);
+  out.delta_e_ab = mean_delta_e_ab(camera, xyz_of_charge(camera, charge.signal_e), samples.dn);
+  out.codes = static_cast<int>(std::set<Vector3>(samples.dn.begin(), samples.dn.end()).size());
   if (const auto code = mean_code(samples.dn)) {
     const Xyz measured = xyz_of(camera.dn_to_xyz * *code);
     const Xyz dark = scenario.noises.dark ? xyz_of_charge(camera, dark_charge_e(camera)) : Xyz{};
@@ -53,14 +60,27 @@ Result<PatchResult> run_patch(const ThesisCamera& camera, const Patch& patch, do
 
 }  // namespace
 
+double mean_delta_e_ab(const ThesisCamera& camera, const Xyz& truth, const std::vector<Vector3>& dn) {
+  const auto lab = [](const Xyz& c) { return lab_of({c.x / c.y, 1, c.z / c.y}, *xyz_of(white_d65)); };
+  double sum = 0;
+  int counted = 0;
+  for (const Vector3& code : dn) {
+    const Xyz sample = xyz_of(camera.dn_to_xyz * code);
+    if (!(sample.y > 0)) continue;
+    sum += delta_e_ab(lab(truth), lab(sample));
+    ++counted;
+  }
+  return counted > 0 ? sum / counted : std::nan("");
+}
+
 Result<std::vector<LevelResult>> run_scenario(const ThesisCamera& camera, const std::vector<Patch>& patches,
                                               const Scenario& scenario, std::uint64_t seed) {
   std::vector<LevelResult> out;
-  for (const double level : sensor_levels) {
+  for (const double level : scenario.levels) {
     LevelResult result{level, {}};
     PatchPlace place{seed, scenario.frame + static_cast<std::uint32_t>(out.size()), 0};
     for (const Patch& patch : patches) {
-      auto one = run_patch(camera, patch, level, scenario, place);
+      auto one = run_patch(camera, patch, scenario.light_factor * level, scenario, place);
       if (!one) return tl::make_unexpected(one.error());
       result.patches.push_back(*std::move(one));
       ++place.patch;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <iterator>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -9,37 +10,36 @@
 #include "isp/model/sensor/photon.h"
 #include "isp/reproduce/reproduce.h"
 #include "isp/reproduce/sampled_light.h"
-#include "isp/reproduce/sensor_scenario.h"
+#include "isp/reproduce/sensor_scatter.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double cd_m2_per_level = 100;
 constexpr double half = 0.5;
 
-struct Scenarios {
-  std::vector<LevelResult> photons;  // I: photon noise alone
-  std::vector<LevelResult> dark;     // II: with dark current
-  std::vector<LevelResult> all;      // III: all noises, codes rounded down (Eq. 4.10)
-  std::vector<LevelResult> nearest;  // III with codes rounded to the nearest
-};
-
-Result<Scenarios> run_all(const ThesisCamera& camera, const RunOptions& options) {
-  const auto twenty = thesis_patches(camera, scenario_ii_patches);
+Result<SensorScenarios> run_all(const ThesisCamera& camera, const RunOptions& options) {
+  const auto twenty = thesis_patches(camera, scenario_i_patches);
   if (!twenty) return tl::make_unexpected(twenty.error());
-  const std::vector<Patch> thirteen(twenty->begin(), twenty->begin() + scenario_iii_patches);
+  const std::vector<Patch> thirteen(twenty->begin(), twenty->begin() + scenario_ii_patches);
   const int samples = options.quick ? 60 : 200;
+  const double published_light = published_etendue_m2_sr / camera.response.etendue_m2_sr;
   constexpr Quantisation below = Quantisation::floor, nearest = Quantisation::round;
-  const Scenario kinds[] = {{{}, frames_of_sensor + 0x10, samples},
-                            {{.dark = true}, frames_of_sensor + 0x20, samples},
-                            {{true, true, true, below}, frames_of_sensor + 0x30, samples},
-                            {{true, true, true, nearest}, frames_of_sensor + 0x40, samples}};
-  Scenarios out;
-  std::vector<LevelResult>* const results[] = {&out.photons, &out.dark, &out.all, &out.nearest};
-  for (int i = 0; i < 4; ++i) {
-    auto result = run_scenario(camera, i < 2 ? *twenty : thirteen, kinds[i], options.seed);
+  struct Run {
+    Scenario scenario;
+    const std::vector<Patch>& patches;
+    std::vector<LevelResult> SensorScenarios::*result;
+  };
+  const Run runs[] = {
+      {{{}, frames_of_sensor + 0x60, samples, photon_levels, published_light}, *twenty, &SensorScenarios::published},
+      {{{}, frames_of_sensor + 0x10, samples}, *twenty, &SensorScenarios::photons},
+      {{{.dark = true}, frames_of_sensor + 0x20, samples}, thirteen, &SensorScenarios::dark},
+      {{{true, true, true, below}, frames_of_sensor + 0x30, samples}, thirteen, &SensorScenarios::all},
+      {{{true, true, true, nearest}, frames_of_sensor + 0x40, samples}, thirteen, &SensorScenarios::nearest}};
+  SensorScenarios out;
+  for (const Run& run : runs) {
+    auto result = run_scenario(camera, run.patches, run.scenario, options.seed);
     if (!result) return tl::make_unexpected(result.error());
-    *results[i] = *std::move(result);
+    out.*run.result = *std::move(result);
   }
   return out;
 }
@@ -48,21 +48,13 @@ double jnd_of_dark(const LevelResult& level) {
   return mean_over(level, [](const PatchResult& p) { return noticeable_differences(p.truth, p.expected.mean); });
 }
 
-// Returns the distance of the mean of the samples' chromaticities from the truth; photon noise alone causes one by the
-// bias of the ratio.
-double jnd_of_mean(const LevelResult& level) {
-  return mean_over(level, [](const PatchResult& p) {
-    return p.sampled ? noticeable_differences(p.truth, p.sampled->mean) : std::numeric_limits<double>::infinity();
-  });
-}
-
 double area_of(const LevelResult& level, bool with_dark) {
   std::vector<Xy> points;
   for (const PatchResult& p : level.patches) points.push_back(with_dark ? p.expected.mean : p.truth);
   return hull_area(points);
 }
 
-Finding dark_matters(const Scenarios& s) {
+Finding dark_matters(const SensorScenarios& s) {
   double first = 0;
   for (const LevelResult& level : s.dark) {
     if (first == 0 && area_of(level, true) < half * area_of(level, false)) first = cd_m2_per_level * level.level;
@@ -77,40 +69,25 @@ Finding dark_matters(const Scenarios& s) {
                       jnd_of_dark(s.dark[0]), jnd_of_dark(s.dark[2]), jnd_of_dark(s.dark[6]))};
 }
 
-Finding photons_matter_later(const Scenarios& s) {
-  double first = 0;
-  for (const LevelResult& level : s.photons) {
-    if (first == 0 && jnd_of_mean(level) > 1) first = cd_m2_per_level * level.level;
-  }
-  const double scatter = mean_over(s.photons[2], [](const PatchResult& p) {
-    return std::sqrt(p.expected.covariance.xx + p.expected.covariance.yy);
-  });
-  return {
-      "sensor-scenarios/photons-matter-later",
-      "photon noise alone matters only far below that (scenario I)",
-      "far below 10 cd/m2",
-      fmt::format("{:.3g} cd/m2", first),
-      first <= 1,
-      fmt::format("first level where the patches' means are more than one just noticeable difference off (here only "
-                  "the ratio's bias and the sampling error move them); single pixels scatter by {:.3f} in xy already "
-                  "at 10 cd/m2",
-                  scatter)};
-}
-
-Finding means_stay(const Scenarios& s) {
+Finding means_stay(const SensorScenarios& s) {
   const double worst = worst_mean_error(s.photons);
-  return {
-      "sensor-scenarios/photons-scatter", "photon noise scatters chromaticities and does not move them (scenario I)",
-      "scatters, does not move",          fmt::format("{:.1f} standard errors at most", worst),
-      worst <= confidence_errors,         "chromaticity of the mean code, 20 patches at 7 levels"};
+  return {"sensor-scenarios/photons-scatter",
+          "photon noise scatters chromaticities and does not move them (scenario I)",
+          "scatters, does not move",
+          fmt::format("{:.1f} standard errors at most", worst),
+          worst <= confidence_errors,
+          fmt::format("chromaticity of the mean code, {} patches at {} levels", scenario_i_patches,
+                      std::size(sensor_levels))};
 }
 
-Finding means_on_line(const Scenarios& s) {
+Finding means_on_line(const SensorScenarios& s) {
   const double worst = worst_mean_error(s.dark);
-  return {
-      "sensor-scenarios/dark-moves",    "dark current moves the means along the line to the black point (scenario II)",
-      "within the confidence interval", fmt::format("{:.1f} standard errors at most", worst),
-      worst <= confidence_errors,       "against Eq. 4.23, 20 patches at 7 levels"};
+  return {"sensor-scenarios/dark-moves",
+          "dark current moves the means along the line to the black point (scenario II)",
+          "within the confidence interval",
+          fmt::format("{:.1f} standard errors at most", worst),
+          worst <= confidence_errors,
+          fmt::format("against Eq. 4.23, {} patches at {} levels", scenario_ii_patches, std::size(sensor_levels))};
 }
 
 struct Movement {
@@ -134,7 +111,7 @@ Movement movement(const std::vector<LevelResult>& levels) {
   return out;
 }
 
-Finding dark_moves_most(const Scenarios& s, bool rounded) {
+Finding dark_moves_most(const SensorScenarios& s, bool rounded) {
   const Movement m = movement(rounded ? s.nearest : s.all);
   const double ratio = m.by_dark / m.by_others;
   const std::string how = rounded ? "nearest" : "below";
@@ -149,7 +126,7 @@ Finding dark_moves_most(const Scenarios& s, bool rounded) {
                   rounded ? "" : "; the integer part of Eq. 4.10 takes half a code, 18 e-, from each channel")};
 }
 
-Finding saturation(const Scenarios& s) {
+Finding saturation(const SensorScenarios& s) {
   int flagged = 0, dim = 0, total = 0;
   for (const LevelResult& level : s.all) {
     for (const PatchResult& p : level.patches) {
@@ -207,7 +184,7 @@ Result<Finding> published_sampling(const ThesisCamera& camera, const RunOptions&
                  Finding::Kind::check};
 }
 
-Plot shift_plot(const Scenarios& s) {
+Plot shift_plot(const SensorScenarios& s) {
   Plot plot{"sensor-scenarios-shift", "What moves and what scatters chromaticities",
             "luminance [cd/m2]",      "distance in xy",
             AxisScale::logarithmic,   AxisScale::logarithmic};
@@ -233,7 +210,7 @@ Plot shift_plot(const Scenarios& s) {
   return plot;
 }
 
-Plot cloud_plot(const Scenarios& s) {
+Plot cloud_plot(const SensorScenarios& s) {
   Plot plot{"sensor-scenarios-clouds", "Scenario III at 10 cd/m2: everything on", "x", "y"};
   plot.equal_scales = true;
   plot.series.push_back(spectral_locus());
@@ -261,12 +238,14 @@ Result<Outcome> run_sensor_scenarios(const RunOptions& options) {
   out.findings = {means_stay(*scenarios),
                   means_on_line(*scenarios),
                   dark_matters(*scenarios),
-                  photons_matter_later(*scenarios),
                   dark_moves_most(*scenarios, false),
                   dark_moves_most(*scenarios, true),
                   saturation(*scenarios),
                   *published};
+  for (const Finding& finding : scatter_findings(*scenarios)) out.findings.push_back(finding);
   out.plots = {shift_plot(*scenarios), cloud_plot(*scenarios)};
+  for (Plot& plot : scatter_plots(*scenarios)) out.plots.push_back(std::move(plot));
+  out.plots.push_back(photons_plot(*camera));
   return out;
 }
 

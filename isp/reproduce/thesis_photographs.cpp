@@ -66,14 +66,24 @@ PatchSamples photograph(const ThesisCamera& camera, const Patch& patch, double l
   const bool published = noises.sampling == capture::PhotonSampling::published;
   const Vector3 dark_e = noises.dark ? dark_charge_e(camera) : Vector3{};
   const capture::ReadoutParameters readout = readout_of(camera.sensor, noises);
-  std::array<Row, 3> steady, dn;
+  std::array<Row, 3> steady;
+  std::array<std::vector<double>, 3> dn;
   if (published) steady = weighted_photons(camera, patch, level, place, samples);
   for (std::uint32_t k = 0; k < 3; ++k) {
     const double mean_e = dark_e[k] + (published ? 0 : level * patch.signal_e[k]);
-    const Row means(static_cast<std::size_t>(samples), static_cast<float>(mean_e));
-    dn[k].resize(means.size());
     const DrawStream stream{place.seed, place.frame, draw_purpose::electrons};
-    capture::read_out_row(stream, 0, 3 * place.patch + k, {means, steady[k], {}}, readout, std::span<float>(dn[k]));
+    const std::uint32_t row = 3 * place.patch + k;
+    if (mean_e > poisson_max_mean) {
+      assert(!noises.read && !noises.converter && "a charge beyond any full well");
+      for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(samples); ++i) {
+        dn[k].push_back(camera.sensor.system_gain_dn_per_e * poisson_count(stream, i, row, mean_e));
+      }
+      continue;
+    }
+    const Row means(static_cast<std::size_t>(samples), static_cast<float>(mean_e));
+    Row codes(means.size());
+    capture::read_out_row(stream, 0, row, {means, steady[k], {}}, readout, std::span<float>(codes));
+    dn[k].assign(codes.begin(), codes.end());
   }
   PatchSamples out;
   for (int i = 0; i < samples; ++i) {

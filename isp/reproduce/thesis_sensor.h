@@ -16,6 +16,9 @@ namespace lowlux::isp {
 inline constexpr double thesis_volt_per_e = 2e-4;     // G_Ve, Table 4-1
 inline constexpr double thesis_dn_per_volt = 141.67;  // G, Table 4-1
 
+/// Gives the etendue that Qe in e- m2 sr per photon implies where no area of a pixel is stated, as in the thesis.
+inline constexpr double published_etendue_m2_sr = 1;
+
 /// The image sensor of the thesis' chapter 4 and the colour transform it computes.
 struct ThesisCamera {
   SensorModel sensor;         // Table 4-1: a Sony DXC-930 like sensor at 20 C
@@ -48,8 +51,8 @@ struct Patch {
 /// in xy, then always the one farthest from all chosen before. So the first 13 of 20 are those of a selection of 13.
 Result<std::vector<Patch>> thesis_patches(const ThesisCamera& camera, int count);
 
-inline constexpr int scenario_ii_patches = 20;
-inline constexpr int scenario_iii_patches = 13;
+inline constexpr int scenario_i_patches = 20;
+inline constexpr int scenario_ii_patches = 13;  // also of scenario III
 
 /// Returns the mean dark charge of one exposure [e-].
 Vector3 dark_charge_e(const ThesisCamera& camera);
@@ -85,6 +88,8 @@ struct PatchPlace {
   std::uint32_t patch = 0;
 };
 
+/// Photographs a patch under `level` times its light. Charges above the exact sampler's limit, poisson_max_mean, have
+/// poisson_count() for their distribution; read noise and converter are off then.
 PatchSamples photograph(const ThesisCamera& camera, const Patch& patch, double level, const Noises& noises,
                         const PatchPlace& place, int samples);
 

@@ -113,6 +113,17 @@ TEST(Photographs, PhysicalElectronsArePoissonAndChannelsIndependent) {
   }
 }
 
+TEST(Photographs, ChargesBeyondTheExactSamplerKeepMeanAndVariance) {
+  const Patch white = white_patch();
+  const double level = 1e9;  // 9e12 e-: scenario I with the light of 1 m2 sr
+  const auto samples = photograph(camera(), white, level, {}, {3, 0, 0}, 20000);
+  for (int k = 0; k < 3; ++k) {
+    std::vector<double> e;
+    for (const Vector3& dn : samples.dn) e.push_back(dn[k] / camera().sensor.system_gain_dn_per_e);
+    expect_poisson(e, level * white.signal_e[k]);
+  }
+}
+
 TEST(Photographs, PublishedSamplingHasTooLittleVarianceAndCorrelatesTheChannels) {
   const Patch white = white_patch();
   const int n = 4000;
