@@ -1,5 +1,8 @@
+#include "isp/reproduce/chromaticity_clouds.h"
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -13,22 +16,8 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double drawn_deviations = 10;  // scale of the thesis' ellipses, in standard deviations
+constexpr const char* colour_checker = "checker";
 constexpr double degree = std::numbers::pi / 180;
-
-/// Holds the samples of one colour at one level.
-struct Cloud {
-  double power_w = 0;
-  std::vector<Xy> samples;
-  ChromaticityCloud sampled;
-  ChromaticityCloud predicted;
-};
-
-struct Colour {
-  std::string name;
-  Spectrum light;
-  std::vector<Cloud> clouds;  // by level, brightest first
-};
 
 Result<Cloud> sample_cloud(const Colour& colour, double power_w, DrawPlace place, std::uint32_t samples) {
   const auto means = mean_photons(colour.light, power_w, photon_exposure_s);
@@ -59,6 +48,11 @@ Result<void> sample_colours(std::vector<Colour>& colours, std::uint32_t first_fr
   return {};
 }
 
+/// Returns what a finding calls the colours of a scenario.
+std::string colours_of(const std::string& scenario) {
+  return scenario == colour_checker ? "24 ColorChecker reflectances" : "scenario " + scenario;
+}
+
 /// Reports the exponent that is farthest from -1/2 in units of its own standard error, over all colours.
 Finding size_law(const std::vector<Colour>& colours, const std::string& scenario) {
   Estimate worst{-0.5, 1};
@@ -73,12 +67,31 @@ Finding size_law(const std::vector<Colour>& colours, const std::string& scenario
     const Estimate fit = power_law_exponent(x, y);
     if (errors_off(fit) >= errors_off(worst)) worst = fit;
   }
-  return {"chromaticity-clouds/size-" + scenario,
-          "ellipses grow as light falls, scenario " + scenario,
-          "about F^-0.5",
+  return {"chromaticity-clouds/size-law-" + scenario,
+          "the ellipses' size follows the photons' relative noise, " + colours_of(scenario),
+          "F^-0.5",
           fmt::format("F^{:.5f} +- {:.5f} (the colour farthest off)", worst.value, worst.standard_error),
           errors_off(worst) <= confidence_errors,
-          fmt::format("fitted from 1 W to 6e-15 W over {} colours", colours.size())};
+          fmt::format("fitted from 1 W to 6e-15 W over {} colours", colours.size()),
+          Finding::Kind::check};
+}
+
+/// Returns the size of a colour's sampled ellipse of one deviation at a level.
+double sampled_size(const Cloud& cloud) { return size_of(principal_ellipse(cloud.sampled, 1)); }
+
+Finding ellipses_grow(const std::vector<Colour>& colours, const std::string& scenario) {
+  double least = std::numeric_limits<double>::infinity(), most = 0;
+  for (const Colour& colour : colours) {
+    const double factor = sampled_size(colour.clouds.back()) / sampled_size(colour.clouds.front());
+    least = std::min(least, factor);
+    most = std::max(most, factor);
+  }
+  return {"chromaticity-clouds/size-" + scenario,
+          "ellipses grow as light falls, " + colours_of(scenario),
+          "grow",
+          fmt::format("{:.1e} to {:.1e} times from 1 W to 6e-15 W", least, most),
+          least > 1,
+          fmt::format("sampled ellipses of {} colours", colours.size())};
 }
 
 Finding orientation(const std::vector<Colour>& colours, const std::string& scenario) {
@@ -96,7 +109,7 @@ Finding orientation(const std::vector<Colour>& colours, const std::string& scena
     }
   }
   return {"chromaticity-clouds/orientation-" + scenario,
-          "the ellipses' orientation does not change with light, scenario " + scenario,
+          "the ellipses' orientation does not change with light, " + colours_of(scenario),
           "constant",
           fmt::format("within {:.1f} standard errors ({:.1f} degrees) at all levels", worst_errors, worst_deg),
           worst_errors <= confidence_errors,
@@ -114,7 +127,7 @@ Finding covariance(const std::vector<Colour>& colours, const std::string& scenar
     }
   }
   return {"chromaticity-clouds/covariance-" + scenario,
-          "clouds are those of independent Poisson bins, scenario " + scenario,
+          "clouds are those of independent Poisson bins, " + colours_of(scenario),
           "0 standard errors",
           fmt::format("{:.1f} standard errors at most", worst),
           worst <= confidence_errors,
@@ -203,23 +216,24 @@ Plot cloud_plot(const Colour& white) {
   for (const Xy& xy : cloud.samples) points.x.push_back(xy.x), points.y.push_back(xy.y);
   plot.series = {points, drawn("principal axes, 2 deviations", principal_ellipse(cloud.sampled, 2), Mark::line),
                  drawn("predicted, 2 deviations", principal_ellipse(cloud.predicted, 2), Mark::dashed)};
-  if (const auto least = enclosing_ellipse(cloud.samples)) {
-    plot.series.push_back(drawn("least area around all", *least, Mark::line));
+  if (const auto least = centred_ellipse(white.clouds.front().predicted.mean, cloud.samples)) {
+    plot.series.push_back(drawn("least area around all, centred", *least, Mark::line));
   }
-  plot.caption = "Scenario I: as Figure 3-3, with the ellipse of least area and that of the principal axes.";
+  plot.caption =
+      "Scenario I: as Figure 3-3a, with the ellipse of least area centred at the bright chromaticity, and that of the "
+      "principal axes.";
   return plot;
 }
 
-Plot chip_plot(const std::vector<Colour>& chips) {
-  Plot plot{"chromaticity-clouds-II", "Ten Munsell chips at 6e-15 W, and MacAdam's ellipses", "x", "y"};
+Plot chip_plot(const std::string& id, const std::string& title, const std::vector<Colour>& chips) {
+  Plot plot{id, title + " at 6e-15 W, and MacAdam's ellipses", "x", "y"};
   plot.equal_scales = true;
   plot.series = {spectral_locus(), macadam_ellipses()};
   for (const Colour& chip : chips) {
     plot.series.push_back(drawn(chip.name, principal_ellipse(chip.clouds.back().sampled, 1), Mark::line));
   }
   plot.caption =
-      "Scenario II: one standard deviation of each chip's chromaticity; MacAdam's standard deviations drawn ten times "
-      "as large.";
+      "One standard deviation of each colour's chromaticity; MacAdam's standard deviations drawn ten times as large.";
   return plot;
 }
 
@@ -238,24 +252,48 @@ Plot size_plot(const std::vector<Colour>& chips) {
   return plot;
 }
 
+std::vector<Colour> colours_under(const Spectrum& light, SpectrumSet set) {
+  std::vector<Colour> out;
+  for (const NamedSpectrum& chip : spectra_of(set)) {
+    out.push_back({std::string(chip.name), reflected(light, chip.spectrum), {}});
+  }
+  return out;
+}
+
+/// Reports on the reflectances of the ColorChecker, the colours of MetaCow's animals: the image and the spectra of its
+/// metameric halves are not bundled.
+std::vector<Finding> checker_findings(const std::vector<Colour>& checker) {
+  std::vector<Finding> out{size_law(checker, colour_checker), orientation(checker, colour_checker)};
+  for (Finding& finding : out) finding.kind = Finding::Kind::check;
+  return out;
+}
+
 }  // namespace
 
 Result<Outcome> run_chromaticity_clouds(const RunOptions& options) {
   const Spectrum light = *light_named("E");
-  std::vector<Colour> white{{"equi-energy", light, {}}};
-  std::vector<Colour> chips;
-  for (const NamedSpectrum& chip : spectra_of(SpectrumSet::munsell_ten)) {
-    chips.push_back({std::string(chip.name), reflected(light, chip.spectrum), {}});
-  }
+  std::vector<Colour> white{{"equi-energy", light, {}}}, chips = colours_under(light, SpectrumSet::munsell_ten);
+  std::vector<Colour> checker = colours_under(light, SpectrumSet::colorchecker);
   const auto first = sample_colours(white, frames_of_clouds_i, options.quick ? 50 : 100, options.seed);
   if (!first) return tl::make_unexpected(first.error());
-  const auto second = sample_colours(chips, frames_of_clouds_ii, options.quick ? 60 : 200, options.seed);
+  const std::uint32_t samples = options.quick ? 60 : 200;
+  const auto second = sample_colours(chips, frames_of_clouds_ii, samples, options.seed);
   if (!second) return tl::make_unexpected(second.error());
+  const auto third = sample_colours(checker, frames_of_checker, samples, options.seed);
+  if (!third) return tl::make_unexpected(third.error());
   Outcome out;
-  out.findings = {size_law(white, "I"),  orientation(white, "I"),  covariance(white, "I"),
-                  size_law(chips, "II"), orientation(chips, "II"), covariance(chips, "II")};
-  for (const Finding& finding : blue_and_red(chips)) out.findings.push_back(finding);
-  out.plots = {cloud_plot(white.front()), chip_plot(chips), size_plot(chips)};
+  out.findings = {ellipses_grow(white, "I"),  size_law(white, "I"),  orientation(white, "I"),  covariance(white, "I"),
+                  ellipses_grow(chips, "II"), size_law(chips, "II"), orientation(chips, "II"), covariance(chips, "II")};
+  for (const auto& more :
+       {error_findings(white.front()), blue_and_red(chips), pooled_findings(chips), checker_findings(checker)}) {
+    out.findings.insert(out.findings.end(), more.begin(), more.end());
+  }
+  out.plots = {cloud_plot(white.front()),
+               error_plot(white.front()),
+               chip_plot("chromaticity-clouds-II", "Ten Munsell chips", chips),
+               chip_plot("chromaticity-clouds-checker", "24 ColorChecker reflectances", checker),
+               size_plot(chips),
+               pooled_plot(chips)};
   return out;
 }
 

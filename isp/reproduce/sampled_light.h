@@ -16,6 +16,7 @@ inline constexpr std::uint32_t frames_of_clouds_i = 0x100;
 inline constexpr std::uint32_t frames_of_clouds_ii = 0x200;
 inline constexpr std::uint32_t frames_of_flashes = 0x300;
 inline constexpr std::uint32_t frames_of_sensor = 0x400;
+inline constexpr std::uint32_t frames_of_checker = 0x500;
 
 /// Returns a Poisson count of a mean >= 0: exact up to poisson_max_mean, above it the nearest integer to a normal
 /// deviate of equal mean and variance, whose skewness is off by less than 1e-3.
