@@ -95,7 +95,7 @@ Finding distance_predicted(const std::vector<Level>& levels) {
     worst = std::max(worst, std::fabs(square.value - level.expected_square) / square.standard_error);
   }
   return {"few-photons/distance-predicted",
-          "its mean square is that of independent Poisson bins (Eq. 3.1, 3.2)",
+          "its mean square is that of independent Poisson bins (Eq. 3.5)",
           "0 standard errors",
           fmt::format("{:.1f} standard errors at most", worst),
           worst <= confidence_errors,
@@ -114,7 +114,7 @@ Finding no_photon(const std::vector<Level>& levels, std::uint32_t samples) {
   }
   const Level& last = levels.back();
   return {"few-photons/no-photon",
-          "without a photon there is no spectrum (section 3.2)",
+          "without a photon there is no spectrum (section 3.3)",
           fmt::format("{:.1f} of {} samples at {:.0e} W", std::exp(-last.photons) * samples, samples, last.power_w),
           fmt::format("{} of {}", last.without_photon, samples),
           worst <= confidence_errors,

@@ -12,13 +12,15 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::array registry{
-    Experiment{"few-photons", "Spectra seen through few photons (section 3.2, Fig. 3-1 and 3-2)", run_few_photons},
-    Experiment{"chromaticity-clouds", "Chromaticities of ideal cones (section 3.3, Fig. 3-3 onwards)",
+    Experiment{"few-photons", "Spectra seen through few photons (section 3.3, Fig. 3-1 and 3-2)", run_few_photons},
+    Experiment{"chromaticity-clouds", "Chromaticities of ideal cones (section 3.4, Fig. 3-3 onwards)",
                run_chromaticity_clouds},
     Experiment{"frequency-of-seeing", "Seeing a flash of few photons (Eq. 2.1 to 2.7)", run_frequency_of_seeing},
     Experiment{"sensor-scenarios", "Noise of the image sensor (section 4, scenarios I to III)", run_sensor_scenarios},
     Experiment{"dark-desaturation", "Dark current desaturates (Eq. 4.16 to 4.24)", run_dark_desaturation},
     Experiment{"snr-sensitivity", "What the signal-to-noise ratio depends on (Eq. 4.12, 4.13)", run_snr_sensitivity},
+    Experiment{"mesopic-photometry", "Adaptation between rods and cones by CIE 191 (Eq. 2.8, 2.9, Fig. 5-5)",
+               run_mesopic_photometry},
     Experiment{"mesopic-tracks", "Colours under falling light by all models (section 5.2, Table 5-1)",
                run_mesopic_tracks},
     Experiment{"mesopic-fixed-gamma", "The spectral model without adaptation, gamma = 2 (Table 5-2)",
@@ -26,7 +28,27 @@ constexpr std::array registry{
     Experiment{"retargeting", "Pictures made for dim displays (section 5.3, Eq. 5.13 to 5.16)", run_retargeting, true},
 };
 
+constexpr std::array left_out{
+    NotReproduced{"photons at the retina, absorption by cones and rods (Eq. 2.3, 3.3)",
+                  "lowlux has no model of the eye's optics and receptors that takes cd/m2 to photons"},
+    NotReproduced{"measured frequencies of seeing next to Fig. 2-2, curves with dark light",
+                  "the observers' data are not bundled"},
+    NotReproduced{"clouds by cones (Eq. 3.9, 3.10)",
+                  "the colour-matching functions of CIE 1931 are used: cones that are linear combinations of them give "
+                  "the same chromaticities"},
+    NotReproduced{"MetaCow (Fig. 3-4, 3-7, 3-8)",
+                  "neither the image nor the spectra of its metameric halves are bundled; chromaticity-clouds plots "
+                  "the ellipses of 24 ColorChecker reflectances, the colours of its other halves, instead"},
+    NotReproduced{"the thesis' 598 spectra, its seven pictures, Shin's table of coefficients",
+                  "they are not public: README.md of isp/reproduce names the substitutes"},
+    NotReproduced{"Cao's model below 0.1 cd/m2 as in Tables 5-1 and 5-2",
+                  "its weights end there; how the thesis extrapolates them is not known"},
+    NotReproduced{"observers' judgements of retargeted pictures", "lowlux computes, it asks no observers"},
+};
+
 }  // namespace
+
+std::span<const NotReproduced> not_reproduced() { return left_out; }
 
 std::span<const Experiment> experiments() { return registry; }
 

@@ -33,7 +33,7 @@ struct FigurePair {
   double ours;
 };
 
-/// Returns whether each computed value is within a tenth of the published one.
+/// Returns whether each computed value agrees with the published one: within a tenth of it.
 bool figures_agree(std::initializer_list<FigurePair> figures);
 
 /// Holds the results of one experiment.
@@ -63,14 +63,30 @@ std::span<const Experiment> experiments();
 /// Returns the experiment of an id. Error: no such experiment; the message names similar ids.
 Result<Experiment> experiment_named(std::string_view id);
 
+/// A part of the thesis that no experiment reproduces.
+struct NotReproduced {
+  std::string_view what;  // with its figures and equations
+  std::string_view why;
+};
+
+/// Returns the parts of the thesis that are not reproduced, in its order.
+std::span<const NotReproduced> not_reproduced();
+
 /// Returns findings as a table: finding, kind, claim, published, ours, verdict, note.
 Table table_of(std::span<const Finding> findings);
 
 /// Returns "published" or "check".
 std::string_view kind_of(const Finding& finding);
 
-/// Returns "agrees", "same direction" (the claim holds, its values do not) or "does not hold".
+/// Returns "agrees" (the claim holds, and its values within their tolerance), "same direction" (the claim holds, its
+/// values do not) or "does not hold".
 std::string_view verdict_of(const Finding& finding);
+
+/// States the tolerances of the verdict "agrees".
+inline constexpr std::string_view tolerance_of_verdicts =
+    "agrees: the order, sign or pattern is as claimed, published values are met within a tenth, sampled ones within "
+    "five "
+    "standard errors, unless the note states another tolerance";
 
 /// Returns the number of findings of a kind with each verdict: "20 agree, 10 have the same direction, 2 do not hold".
 std::string count_of_verdicts(std::span<const Finding> findings, Finding::Kind kind);
@@ -82,6 +98,7 @@ Result<Outcome> run_frequency_of_seeing(const RunOptions& options);
 Result<Outcome> run_sensor_scenarios(const RunOptions& options);
 Result<Outcome> run_dark_desaturation(const RunOptions& options);
 Result<Outcome> run_snr_sensitivity(const RunOptions& options);
+Result<Outcome> run_mesopic_photometry(const RunOptions& options);
 Result<Outcome> run_mesopic_tracks(const RunOptions& options);
 Result<Outcome> run_mesopic_fixed_gamma(const RunOptions& options);
 Result<Outcome> run_retargeting(const RunOptions& options);

@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -79,11 +80,10 @@ std::vector<TextFile> files_of(const std::vector<Done>& done, const ReproduceArg
   std::vector<TextFile> out{{"findings.csv", isp::csv_of(isp::table_of(findings))}};
   isp::Report report{"lowlux reproduce: published experiments and ours",
                      fmt::format("Seed {}{}. Each published finding is listed next to the same quantity computed here, "
-                                 "each check of our own next to what is expected; a sampled figure agrees within five "
-                                 "standard errors, any other within a tenth; where only the order or the sign of a "
-                                 "claim is found, the verdict is 'same direction'. Published findings: {}. Checks of "
-                                 "our own: {}.",
-                                 args.seed, args.quick ? ", quick: fewer samples" : "",
+                                 "each check of our own next to what is expected. Verdicts: {}; where only the order "
+                                 "or the sign of a claim is found, the verdict is 'same direction'. Published "
+                                 "findings: {}. Checks of our own: {}.",
+                                 args.seed, args.quick ? ", quick: fewer samples" : "", isp::tolerance_of_verdicts,
                                  isp::count_of_verdicts(findings, isp::Finding::Kind::published),
                                  isp::count_of_verdicts(findings, isp::Finding::Kind::check)),
                      {}};
@@ -92,6 +92,11 @@ std::vector<TextFile> files_of(const std::vector<Done>& done, const ReproduceArg
         {std::string(d.experiment.title), {}, isp::table_of(d.outcome.findings), d.outcome.plots});
     for (const isp::Plot& plot : d.outcome.plots) out.push_back({plot.id + ".csv", isp::csv_of(plot)});
   }
+  isp::Table left_out{{"not reproduced", "reason"}, {}};
+  for (const isp::NotReproduced& part : isp::not_reproduced()) {
+    left_out.rows.push_back({std::string(part.what), std::string(part.why)});
+  }
+  report.sections.push_back({"Not reproduced", {}, std::move(left_out), {}});
   out.push_back({"report.html", isp::html_of(report)});
   return out;
 }
@@ -149,6 +154,7 @@ int run_reproduce(const std::vector<std::string>& words) {
   }
   const std::vector<isp::Finding> findings = findings_of(done);
   print_out(args.json ? findings_json(findings) + '\n' : findings_text(findings));
+  if (!args.json && args.experiments.empty()) print_out(not_reproduced_text());
   return done.size() == experiments->size() ? exit_done : exit_failed;
 }
 

@@ -56,9 +56,21 @@ std::string findings_text(std::span<const isp::Finding> findings) {
     if (f.holds && !f.direction_only) continue;
     for (const std::string& line : wrapped(f.claim + ": " + f.note, note_width)) out += fmt::format("    {}\n", line);
   }
-  return out + fmt::format("published findings: {}\nchecks of our own: {}\n",
-                           isp::count_of_verdicts(findings, isp::Finding::Kind::published),
-                           isp::count_of_verdicts(findings, isp::Finding::Kind::check));
+  out += fmt::format("published findings: {}\nchecks of our own: {}\n",
+                     isp::count_of_verdicts(findings, isp::Finding::Kind::published),
+                     isp::count_of_verdicts(findings, isp::Finding::Kind::check));
+  for (const std::string& line : wrapped(std::string(isp::tolerance_of_verdicts), note_width)) out += line + '\n';
+  return out;
+}
+
+std::string not_reproduced_text() {
+  std::string out = "not reproduced:\n";
+  for (const isp::NotReproduced& part : isp::not_reproduced()) {
+    for (const std::string& line : wrapped(fmt::format("{}: {}", part.what, part.why), note_width)) {
+      out += fmt::format("    {}\n", line);
+    }
+  }
+  return out;
 }
 
 std::string findings_json(std::span<const isp::Finding> findings) {
