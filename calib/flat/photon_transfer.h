@@ -21,8 +21,10 @@ struct Saturation {
   enum class LimitedBy { full_well, converter } limited_by = LimitedBy::full_well;
 };
 
-/// Results for one gain setting by the photon transfer method of EMVA 1288 (release 4.0 linear, sections 6 to 8).
-/// Standard errors are those of the fit, multiplied by sqrt(reduced chi square) where that exceeds 1.
+/// Results for one gain setting by the photon transfer method of EMVA 1288 (release 4.0 linear): a part of its data
+/// sheet. Irradiance is not measured, so that quantum efficiency, sensitivity threshold, dynamic range and maximum SNR
+/// are left out; so are the row, column and pixel parts of PRNU and DSNU, spectrograms and histograms. Standard errors
+/// are those of the fit, multiplied by sqrt(reduced chi square) where that exceeds 1.
 struct PhotonTransfer {
   Estimate system_gain_dn_per_e;              // K: one for all sites
   PerSite<Estimate> gain_of_site_dn_per_e{};  // each site fitted alone: should agree with K

@@ -28,7 +28,7 @@ Estimate mean_of(std::span<const double> samples);
 /// @param log_y  natural logarithms with their standard errors (> 0), as many
 Estimate power_law_exponent(std::span<const double> x, std::span<const Estimate> log_y);
 
-/// Returns the natural logarithm of the size (thesis 3.3) of a cloud's ellipse, as sampled by a normal cloud of n
+/// Returns the natural logarithm of the size (thesis 4.5.2) of a cloud's ellipse, as sampled by a normal cloud of n
 /// points: size^2 is the trace t of C, and Var(t) = 2 trace(C^2) / (n - 1).
 Estimate log_size_of(const XyCovariance& covariance, std::size_t n);
 

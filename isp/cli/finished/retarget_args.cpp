@@ -16,7 +16,7 @@ void add_model(CLI::App& app, RetargetArgs& args) {
   for (const auto& [method, name] : isp::retarget_methods) methods.emplace(name, method);
   add_choice(
       app, "--model", methods, [&args](isp::RetargetMethod method) { args.options.method = method; },
-      "how colours are found (default constrained)");
+      "how colours are found (default constrained: best by Shin's model alone)");
   app.add_option(
          "--coefficients", args.coefficients,
          "coefficients of Shin's model: lines of E, alpha, beta, l, a, m, b (default: SHIN-SUB-1, a substitute)")

@@ -11,7 +11,7 @@ struct GamutMapped {
 };
 
 /// Moves a colour towards the grey of its luminance until it is within 0..1: Y (1, 1, 1) + t (rgb - Y (1, 1, 1)) with
-/// the largest t in 0..1 (thesis, Fig. 5-9). Luminance and direction of chroma are kept. A luminance of 0 or less gives
+/// the largest t in 0..1. Luminance and direction of chroma are kept. A luminance of 0 or less gives
 /// black, one of 1 or more white, the only colours of that luminance or nearest to it.
 /// @param luminance_weights  of R, G and B; they sum to 1
 GamutMapped toward_white(const Vector3& rgb, const Vector3& luminance_weights);

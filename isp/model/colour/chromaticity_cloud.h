@@ -35,7 +35,7 @@ struct XyEllipse {
   double inclination_deg = 0;  // angle of the major axis to the x axis, anticlockwise, [0, 180); 0 for a circle
 };
 
-/// Returns the size of an ellipse: sqrt(a^2 + b^2) (thesis section 3.3).
+/// Returns the size of an ellipse: sqrt(a^2 + b^2) (thesis section 4.5.2).
 double size_of(const XyEllipse& ellipse);
 
 /// Returns the ellipse of a cloud by its principal axes: the semi-axes are `deviations` standard deviations along them.
@@ -45,9 +45,9 @@ XyEllipse principal_ellipse(const ChromaticityCloud& cloud, double deviations);
 /// Returns the smallest difference of two inclinations [degrees], -90..90: an axis has no direction.
 double inclination_difference_deg(double first_deg, double second_deg);
 
-/// Returns the ellipse of least area around all samples, as in the thesis' Figure 3-3: Khachiyan's algorithm with away
-/// steps (Todd & Yildirim, Discrete Appl. Math. 155 (2007) 1731-1744), scaled at the end so that no sample lies
-/// outside. Its area is within 1e-6 of the least.
+/// Returns the ellipse of least area around all samples: Khachiyan's algorithm with away steps (Todd & Yildirim,
+/// Discrete Appl. Math. 155 (2007) 1731-1744), scaled at the end so that no sample lies outside. Its area is within
+/// 1e-6 of the least.
 /// @return nullopt for fewer than three samples, one that is not finite, or samples that are all on one line
 std::optional<XyEllipse> enclosing_ellipse(std::span<const Xy> samples);
 
@@ -56,8 +56,8 @@ std::optional<XyEllipse> enclosing_ellipse(std::span<const Xy> samples);
 /// @return nullopt if the mean has no chromaticity
 std::optional<ChromaticityCloud> propagated_cloud(const Xyz& mean, const Matrix3& covariance);
 
-/// Returns the cloud of an ideal observer who counts photons, to first order (spec of the thesis' section 3.3): with
-/// v_i the colour-matching functions at lambda_i, mean sum of x_i (h c / lambda_i) v_i, covariance sum of x_i (h c /
+/// Returns the cloud of an ideal observer who counts photons, to first order (thesis section 3.4): with v_i the
+/// colour-matching functions at lambda_i, mean sum of x_i (h c / lambda_i) v_i, covariance sum of x_i (h c /
 /// lambda_i)^2 v_i v_i^T. It scales with 1 / photons, so that its inclination is the same at all light levels. Ideal
 /// cones give the same cloud, being linear combinations of the colour-matching functions.
 /// @return nullopt if no photon reaches a wavelength the observer sees

@@ -37,7 +37,7 @@ struct PhotonMeans {
 };
 
 /// Returns the photons of a source in a time: x_i = F T s_i lambda_i dlambda_i / (h c), with s the normalised power
-/// (thesis Eq. 3.1).
+/// (thesis Eq. 3.5).
 /// @param power       relative spectral power, any scale
 /// @param power_w     F, over all wavelengths [W], >= 0
 /// @param exposure_s  T, >= 0

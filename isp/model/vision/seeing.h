@@ -12,7 +12,7 @@ struct RetinalPath {
   double isomerisation_efficiency = 1;  // gamma, isomerisations per absorbed photon
 };
 
-/// Returns the isomerisations per photon at the cornea: alpha = tau f (1 - 10^-D) gamma (thesis Eq. 2.3).
+/// Returns the isomerisations per photon at the cornea: alpha = tau f (1 - 10^-D) gamma (thesis Eq. 2.5).
 /// Errors: a fraction outside 0..1, a density that is negative or not a number.
 Result<double> isomerisations_per_photon(const RetinalPath& path);
 
