@@ -159,6 +159,13 @@ TEST(SensorDb, DarkCurrentOfTheTableHasItsOwnTemperatureAndDoubling) {
   EXPECT_FALSE(assumes(*sensor, "at 20 C"));
 }
 
+TEST(SensorDb, OwnCamerasAreThoseOfSensorsWithoutAStandIn) {
+  EXPECT_EQ(own_camera("ELD_NikonD850"), "Nikon_D850");
+  EXPECT_EQ(own_camera("ELD_CanonEOS70D"), "") << "the colours of an EOS 600D stand in";
+  EXPECT_EQ(own_camera("QSI_532"), "");
+  EXPECT_EQ(own_camera("no such sensor"), "");
+}
+
 TEST(SensorDb, UnknownNamesAndSettingsAreAnsweredWithWhatThereIs) {
   const auto near = sensor_named("ELD_NikonD580", "", {});
   ASSERT_FALSE(near);

@@ -108,6 +108,11 @@ TEST(SpectralData, CamerasPeakWhereTheirSourcesSayAndAtOne) {
   EXPECT_FALSE(camera_sensitivity("Nikon_D5100/R"));
   EXPECT_FALSE(camera_sensitivity(""));
   EXPECT_FALSE(camera_sensitivity("Box_Brownie"));
+  EXPECT_EQ(known_camera("NIKON D850"), "Nikon_D850");
+  EXPECT_EQ(known_camera("SONY ILCE-7SM2"), "Sony_ILCE-7SM2");
+  for (const std::string_view name : names) EXPECT_EQ(known_camera(name), name);
+  EXPECT_FALSE(known_camera("Box Brownie"));
+  EXPECT_FALSE(known_camera(""));
 }
 
 TEST(SpectralData, ConesPeakAtOneWhereTheirAuthorsSay) {

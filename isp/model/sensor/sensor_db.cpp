@@ -233,6 +233,11 @@ std::vector<std::string_view> gain_settings(std::string_view name) {
   return settings;
 }
 
+std::string_view own_camera(std::string_view sensor) {
+  const auto* const own = std::ranges::find_if(cameras, [&](const CameraOf& c) { return c.sensor == sensor && c.own; });
+  return own == cameras.end() ? std::string_view() : own->camera;
+}
+
 std::vector<std::string_view> options_needed(std::string_view name, std::string_view gain) {
   const Result<int> row = find_row(name, gain);
   if (!row) return {};

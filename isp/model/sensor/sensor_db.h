@@ -58,6 +58,10 @@ std::vector<std::string_view> sensor_names();
 /// Returns the gain settings of a sensor, as its source names them.
 std::vector<std::string_view> gain_settings(std::string_view name);
 
+/// Returns the camera of camera_sensitivity() that is the camera of a sensor, empty where another camera's
+/// sensitivities stand in for unknown ones.
+std::string_view own_camera(std::string_view sensor);
+
 /// Returns the options without which a sensor at a gain setting cannot be simulated, none if its sources suffice: those
 /// that sensor_named() and spectral_response() would require. Empty for an unknown sensor or setting.
 std::vector<std::string_view> options_needed(std::string_view name, std::string_view gain);

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "isp/base/text.h"
 #include "isp/model/spectrum/cie_data.h"
 
 namespace lowlux::isp {
@@ -74,6 +75,14 @@ std::vector<std::string_view> camera_names() {
   }
   names.push_back(thesis_camera);
   return names;
+}
+
+std::optional<std::string_view> known_camera(std::string_view usual_name) {
+  const auto plain = [](char c) { return c == ' ' ? '_' : ascii_lower(c); };
+  const std::vector<std::string_view> names = camera_names();
+  const auto found = std::ranges::find_if(
+      names, [&](std::string_view name) { return std::ranges::equal(name, usual_name, {}, plain, plain); });
+  return found == names.end() ? std::nullopt : std::optional(*found);
 }
 
 std::array<Spectrum, 3> cone_fundamentals(ConeSet set) {

@@ -38,6 +38,10 @@ std::optional<std::array<Spectrum, 3>> camera_sensitivity(std::string_view camer
 /// Returns all names that camera_sensitivity() accepts.
 std::vector<std::string_view> camera_names();
 
+/// Returns the name that camera_sensitivity() accepts for a camera's usual name: case is ignored and blanks count as _,
+/// so that "NIKON D850" is "Nikon_D850". nullopt for a camera that is not in the tables.
+std::optional<std::string_view> known_camera(std::string_view usual_name);
+
 /// Selects a measurement of the cones' sensitivities.
 enum class ConeSet : std::uint8_t { smith_pokorny_1975, stockman_sharpe_2000 };
 

@@ -54,7 +54,8 @@ LuminancePair luminance_of(const Spectrum& radiance);
 
 /// Gives the weights of X, Y and Z in scotopic luminance. V' is not in the span of the colour-matching functions: this
 /// least squares fit over 4000 smooth reflectances under nine lights (S/P 0.37 to 9) is off by 0.4 % in the mean and
-/// 9.3 % rms; its S/P of D65 is 2.457 (exactly 2.463), of illuminant A 1.427 (1.412).
+/// 9.3 % rms; its S/P of D65 is 2.457 (exactly 2.463), of illuminant A 1.427 (1.412). Lamps of few lines differ from
+/// smooth lights of their chromaticity: it is 50 % too high under high-pressure sodium (`bench --stage scene-light`).
 inline constexpr Vector3 scotopic_weights{-1.52356, 2.71012, 1.09735};
 
 /// Returns the scotopic luminance estimated from tristimulus values, by scotopic_weights; at least 0.

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "isp/model/colour/camera_matrix.h"
 #include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
 #include "isp/model/vision/mesopic.h"
 
 namespace lowlux::isp {
@@ -94,6 +96,17 @@ std::optional<ScotopicFit> fit_scotopic(const std::array<Spectrum, 3>& sensitivi
     for (int i = 0; i < 3; ++i) through[j] += scotopic_weights[i] * (*matrix)[i][j];
   }
   return ScotopicFit{*weights, ratio, rms_relative(all, *weights), rms_relative(all, through)};
+}
+
+const std::vector<Spectrum>& pigment_reflectances() {
+  static const std::vector<Spectrum> all = [] {
+    std::vector<Spectrum> out;
+    for (const SpectrumSet set : {SpectrumSet::munsell_ten, SpectrumSet::macbeth}) {
+      for (NamedSpectrum& one : spectra_of(set)) out.push_back(std::move(one.spectrum));
+    }
+    return out;
+  }();
+  return all;
 }
 
 }  // namespace lowlux::isp

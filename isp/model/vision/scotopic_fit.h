@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "isp/base/matrix3.h"
 #include "isp/base/spectrum.h"
@@ -28,5 +29,10 @@ struct ScotopicFit {
 /// depend on one another over the reflectances
 std::optional<ScotopicFit> fit_scotopic(const std::array<Spectrum, 3>& sensitivity, const Spectrum& light,
                                         std::span<const Spectrum> reflectances);
+
+/// Returns real reflectances to fit weights on: the ten Munsell chips and the 24 patches of the older chart
+/// (SpectrumSet `munsell_ten` and `macbeth`). Weights fitted on smooth synthetic reflectances are off by half as much
+/// again on a ColorChecker.
+const std::vector<Spectrum>& pigment_reflectances();
 
 }  // namespace lowlux::isp
