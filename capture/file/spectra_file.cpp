@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -33,6 +34,14 @@ std::vector<std::string_view> cells_of(std::string_view line) {
   return cells;
 }
 
+/// Returns a cell as a finite number with a decimal point; nullopt for any other text.
+std::optional<double> finite_number_of(std::string_view cell) {
+  double value = 0;
+  const auto read = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  const bool whole = read.ec == std::errc() && read.ptr == cell.data() + cell.size();
+  return whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
 class Table {
  public:
   explicit Table(std::string name) : name_(std::move(name)) {}
@@ -48,16 +57,15 @@ class Table {
     }
     if (columns_.front().size() == most_rows) return wrong("is one row too many: at most " + std::to_string(most_rows));
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      double value = 0;
-      const auto read = std::from_chars(cells[i].data(), cells[i].data() + cells[i].size(), value);
-      if (read.ec != std::errc() || read.ptr != cells[i].data() + cells[i].size() || !std::isfinite(value)) {
+      const std::optional<double> value = finite_number_of(cells[i]);
+      if (!value) {
         return wrong("holds '" + std::string(cells[i].substr(0, 40)) + "', which is not a finite number");
       }
-      if (i == 0 && !columns_[0].empty() && value <= columns_[0].back()) {
-        return wrong("goes from " + number_text(columns_[0].back()) + " nm to " + number_text(value) +
+      if (i == 0 && !columns_[0].empty() && *value <= columns_[0].back()) {
+        return wrong("goes from " + number_text(columns_[0].back()) + " nm to " + number_text(*value) +
                      " nm: wavelengths must rise");
       }
-      columns_[i].push_back(value);
+      columns_[i].push_back(*value);
     }
     return {};
   }
@@ -79,6 +87,7 @@ class Table {
       return wrong("names " + std::to_string(cells.size()) +
                    " columns: a table has the wavelength and 1 to 4095 spectra");
     }
+    if (finite_number_of(cells[0])) return wrong("holds numbers; it must name the columns: wavelength_nm,power");
     for (const std::string_view cell : cells) names_.emplace_back(cell);
     columns_.resize(cells.size());
     return {};

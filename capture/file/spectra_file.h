@@ -16,7 +16,8 @@ struct SpectrumColumn {
 
 /// Reads a table of spectra: lines starting with '#' are comments; then a row of names, the first column being the
 /// wavelength [nm]; then rows of numbers separated by commas. At most 16 MB, 4096 columns and 100000 rows.
-/// Errors name the line: a cell that is not a finite number, a row of another length, wavelengths that do not rise.
+/// Errors name the line: a first row of numbers, a cell that is not a finite number, a row of another length,
+/// wavelengths that do not rise.
 Result<std::vector<SpectrumColumn>> read_spectra(const std::string& path);
 
 /// Parses a table of spectra; errors refer to it as `name`.
