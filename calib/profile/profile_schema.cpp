@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "isp/model/sensor/noise_budget.h"
+#include "isp/model/vision/scene_light.h"
 
 namespace lowlux::calib {
 
@@ -45,8 +46,17 @@ void check_together(const CameraProfile& profile, ProfileFailure& failure) {
     check_gain(profile.gains[i], indexed("gains", i), failure);
   }
   for (std::size_t i = 0; i < profile.colours.size() && !failure.error; ++i) {
-    if (inverse(profile.colours[i].calibration.xyz_to_camera)) continue;
-    failure.set(ErrorCode::malformed, indexed("colours", i) + ".xyz_to_camera", "the matrix is singular");
+    const ColourProfile& colour = profile.colours[i];
+    if (!inverse(colour.calibration.xyz_to_camera)) {
+      failure.set(ErrorCode::malformed, indexed("colours", i) + ".xyz_to_camera", "the matrix is singular");
+    }
+    if (colour.scotopic_weights) {
+      const auto& [red, green, blue] = *colour.scotopic_weights;
+      if (const auto light = isp::light_of_ratio(red + green + blue); !light) {
+        failure.set(ErrorCode::malformed, indexed("colours", i) + ".scotopic_weights",
+                    "their sum is the S/P of the illuminant: " + light.error().message);
+      }
+    }
   }
 }
 

@@ -124,6 +124,11 @@ void visit_colour(Visitor& v, Colour& c) {
   v.optional_number("patches_ciede2000", c.patches_ciede2000, {});
   v.optional_number("cross_validated_ciede2000", c.cross_validated_ciede2000, {});
   v.optional_number("condition_number", c.condition_number, {1, 1e300});
+  v.optional_object("scotopic_weights", c.scotopic_weights, [](Visitor& inner, auto& weight) {
+    inner.number("red", weight[0], matrix_entries);
+    inner.number("green", weight[1], matrix_entries);
+    inner.number("blue", weight[2], matrix_entries);
+  });
   v.object("provenance", [&](Visitor& inner) { visit_provenance(inner, c.provenance); });
 }
 

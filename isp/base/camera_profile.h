@@ -73,6 +73,8 @@ struct ColourProfile {
   std::optional<double> patches_ciede2000;          // error of the patches the matrix was fitted to
   std::optional<double> cross_validated_ciede2000;  // error of patches left out of the fit
   std::optional<double> condition_number;           // condition number of the equations solved
+  /// Holds the weights of white-balanced R, G and B in scotopic luminance; their sum is S/P of the illuminant.
+  std::optional<std::array<double, 3>> scotopic_weights{};
   Provenance provenance;
 };
 

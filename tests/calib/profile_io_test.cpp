@@ -55,6 +55,7 @@ CameraProfile awkward_profile() {
   colour.calibration.forward = Matrix3{{{0.1 / 3, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   colour.patches_ciede2000 = 1.0 / 7;
   colour.condition_number = 31.4;
+  colour.scotopic_weights = {-0.1, 1.0 / 3, 0.5};
   colour.provenance = provenance;
   CameraProfile profile{"Maker", "Model 1", {gain, gain}, {colour, colour}};
   profile.colours[1].calibration.forward.reset();
@@ -133,6 +134,7 @@ TEST(ProfileIo, ReadingBackGivesTheSameBits) {
   EXPECT_EQ(colour.patches_ciede2000, 1.0 / 7);
   EXPECT_FALSE(colour.cross_validated_ciede2000);
   EXPECT_EQ(colour.condition_number, 31.4);
+  EXPECT_EQ(colour.scotopic_weights, (std::array<double, 3>{-0.1, 1.0 / 3, 0.5}));
   EXPECT_EQ(colour.provenance.files, truth.provenance[0].files);
   EXPECT_FALSE(read->colours[1].calibration.forward);
 }
@@ -194,6 +196,7 @@ TEST(ProfileIo, EveryErrorNamesTheKeysPath) {
       {"colours[1].xyz_to_camera", [](Json& j) { j["colours"][1]["xyz_to_camera"][1][1] = 0; }},  // singular
       {"colours[0].forward.balanced_camera_to_xyz",
        [](Json& j) { j["colours"][0]["forward"]["balanced_camera_to_xyz"] = 1; }},
+      {"colours[0].scotopic_weights", [](Json& j) { j["colours"][0]["scotopic_weights"]["green"] = -1; }},
       {"colours[0].condition_number", [](Json& j) { j["colours"][0]["condition_number"] = 0.5; }},
       {"gains[0].hot_pixels[1].x_px", [](Json& j) { j["gains"][0]["hot_pixels"][1]["x_px"] = -1; }},
       {"gains[0].provenance[0].files[1]", [](Json& j) { j["gains"][0]["provenance"][0]["files"][1] = 1; }},

@@ -12,6 +12,8 @@
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/simulate/scene_argument.h"
 #include "isp/model/spectrum/spectral_data.h"
+#include "isp/model/vision/scene_light.h"
+#include "isp/model/vision/scotopic_fit.h"
 
 namespace lowlux::cli {
 namespace {
@@ -78,6 +80,10 @@ Result<ColourOutcome> colour_from_spectra(const CalibrateColourArgs& args) {
   out.colour.patches_ciede2000 = colour->training_ciede2000;
   out.colour.cross_validated_ciede2000 = summary_of(out.matrices.back()).mean;
   out.colour.condition_number = colour->corrected.condition_number;
+  if (isp::light_of_spectrum(light_name, *light)) {  // S/P is within the supported range
+    const auto rods = isp::fit_scotopic(*sensitivity, *light, isp::pigment_reflectances());
+    if (rods) out.colour.scotopic_weights = rods->weights;
+  }
   out.colour.provenance = provenance_of(args.camera);
   return out;
 }
