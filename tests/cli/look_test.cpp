@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "isp/model/vision/scene_light.h"
 #include "tests/cli/simulate_command.h"
 
 namespace lowlux {
@@ -101,6 +103,89 @@ TEST_F(LookCommand, AsksForTheLuminanceThatTheFileDoesNotTell) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_NE(result.err.find("--scene-luminance"), std::string::npos) << result.err;
   EXPECT_FALSE(std::filesystem::exists(file("seen.png")));
+}
+
+TEST_F(LookCommand, TakesTheLightByNameRatioAndSpectrum) {
+  const Json unknown = look_of({"--look", "eye"})["look"];
+  EXPECT_TRUE(unknown["light"].is_null());
+  EXPECT_EQ(unknown["light_rule"], "white");
+  EXPECT_EQ(unknown["adaptation_degree"], 1);
+  const Json sodium = look_of({"--look", "eye", "--light", "hps_GENERIC"})["look"];
+  EXPECT_EQ(sodium["light"], "HPS_generic");
+  EXPECT_EQ(sodium["light_rule"], "spectrum");
+  EXPECT_LT(sodium["white_scotopic_ratio"], 0.7);
+  EXPECT_LT(sodium["adaptation_degree"], 0.83) << "CIE 159 in the dark: 0.824";
+  EXPECT_EQ(sodium["rods_source"], "xyz") << "the file states no camera";
+  const Json given = look_of({"--look", "wanat_mantiuk", "--light", "0.6", "--adaptation-degree", "0.5"})["look"];
+  EXPECT_TRUE(given["light"].is_null());
+  EXPECT_EQ(given["light_rule"], "given");
+  EXPECT_EQ(given["white_scotopic_ratio"], 0.6);
+  EXPECT_EQ(given["adaptation_degree"], 0.5);
+  std::ofstream(file("even.csv")) << "wavelength_nm,power\n360,1\n830,1\n";
+  const Json even = look_of({"--look", "eye", "--light", file("even.csv")})["look"];
+  EXPECT_EQ(even["light"], file("even.csv"));
+  EXPECT_NEAR(even["white_scotopic_ratio"], 2.26, 0.005) << "equal energy";
+  const auto explained = lowlux({"develop", file("night.dng"), "-o", file("seen.png"), "--force", "--look", "eye",
+                                 "--light", "LPS", "--explain"});
+  EXPECT_NE(explained.out.find("LPS, S/P 0.2"), std::string::npos) << explained.out;
+}
+
+TEST_F(LookCommand, FitsRodsOnTheCameraOfAProfile) {
+  simulated("chart:macbeth", "d850.dng",
+            {"--luminance", "0.2", "--size", "96x64", "--no-truth", "--sensor", "ELD_NikonD850", "--gain", "ISO 1600"});
+  const std::string profile = std::string(LOWLUX_TESTDATA) + "/../calib/profiles/ELD_NikonD850.json";
+  const auto result = developed({"--look", "eye", "--light", "HPS_generic", "--profile", profile}, file("d850.dng"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(Json::parse(result.out)[0]["look"]["rods_source"], "Nikon_D850");
+}
+
+TEST_F(LookCommand, TakesWeightsOfRodsFromAProfile) {
+  const std::string own = file("own.json");
+  ASSERT_EQ(
+      lowlux({"calibrate", "colour", "--camera", "Nikon_D5100", "--illuminant", "HPS_generic", "-o", own}).exit_code,
+      0);
+  Json profile = Json::parse(std::ifstream(own));
+  const Json weights = profile["colours"][0]["scotopic_weights"];
+  const double ratio = isp::light_of_lamp("HPS_generic")->scotopic_ratio;
+  EXPECT_NEAR(weights["red"].get<double>() + weights["green"].get<double>() + weights["blue"].get<double>(), ratio,
+              1e-12);
+  profile["model"] = "";
+  std::ofstream(own) << profile;
+  const auto source_under = [&](const char* light) {
+    return look_of({"--look", "eye", "--light", light, "--profile", own})["look"]["rods_source"];
+  };
+  EXPECT_EQ(source_under("hps_generic"), "profile");
+  EXPECT_EQ(source_under("LPS"), "xyz") << "the weights are those of another lamp";
+}
+
+TEST_F(LookCommand, RefusesLightsThatAreNone) {
+  refused({"--light", "LPS"}, "--look eye");
+  refused({"--adaptation-degree", "0.5"}, "--look eye");
+  refused({"--look", "eye", "--light", "candle"}, "the lights are HPS_generic, ");
+  refused({"--look", "eye", "--light", "0.05"}, "0.1 to 60");
+  refused({"--look", "eye", "--light", "2,4"}, "write decimals with a point: 2.4");
+  refused({"--look", "eye", "--adaptation-degree", "2"}, "from 0 to 1");
+  const auto broken = [&](const std::string& table, const std::string& why) {
+    std::ofstream(file("light.csv")) << table;
+    std::filesystem::remove(file("seen.png"));
+    const auto result = developed({"--look", "eye", "--light", file("light.csv")}, file("night.dng"));
+    EXPECT_EQ(result.exit_code, 1) << table;
+    EXPECT_NE(result.err.find("light.csv"), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find(why), std::string::npos) << why << "\n" << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_FALSE(std::filesystem::exists(file("seen.png"))) << table;
+  };
+  broken("", "no row of names");
+  broken("400,1\n700,1\n", "must name the columns");
+  broken("wavelength_nm,power\n", "at least two wavelengths");
+  broken("wavelength_nm,power\n400,1\n700,-1\n", "negative");
+  broken("wavelength_nm,power\n400,1\n700,nan\n", "not a finite number");
+  broken("wavelength_nm,power\n700,1\n400,1\n", "must rise");
+  broken("wavelength_nm,a,b\n400,1,1\n700,1,1\n", "a light is one spectrum");
+  broken("wavelength_nm,power\n400,0\n700,0\n", "no luminance");
+  broken("wavelength_nm,power\n699,0\n700,1\n701,0\n", "0.1 to 60");
+  std::filesystem::remove(file("light.csv"));
+  EXPECT_EQ(developed({"--look", "eye", "--light", file("light.csv")}, file("night.dng")).exit_code, 1);
 }
 
 }  // namespace

@@ -4,12 +4,15 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "isp/model/vision/night_eye.h"
+#include "isp/model/vision/scene_light.h"
 #include "isp/pipeline/develop.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/render/output_space.h"
 #include "tests/pipeline/night_frames.h"
 
@@ -285,6 +288,127 @@ TEST(NoiseLimit, HoldsInThePicture) {
     options.look.noise_limit = 0.4 * free_noise;
     EXPECT_LT(noise_of(options), 1.05 * 0.4 * free_noise) << "statistics of 37,000 pixels that are not independent";
   }
+}
+
+std::shared_ptr<const SceneLight> lamp(const char* name) {
+  return std::make_shared<const SceneLight>(*light_of_lamp(name));
+}
+
+LookPlan planned(const RawFrame& frame, const DevelopOptions& options) {
+  InlineExecutor executor;
+  const auto plan = plan_develop(frame, options, executor);
+  EXPECT_TRUE(plan) << plan.error().message;
+  return *plan->rendering.look;
+}
+
+TEST(StatedLight, DecidesTheRatioOfTheWhite) {
+  const RawFrame frame = coloured_frame();
+  DevelopOptions options = eye_at(0.1);
+  const LookPlan unknown = planned(frame, options);
+  EXPECT_EQ(unknown.light_rule, "white");
+  EXPECT_EQ(unknown.adaptation_degree, 1);
+  options.look.light = lamp("HPS_generic");
+  const LookPlan sodium = planned(frame, options);
+  EXPECT_EQ(sodium.light_rule, "spectrum");
+  EXPECT_EQ(sodium.look.scotopic_ratio_of_white, options.look.light->scotopic_ratio);
+  EXPECT_EQ(sodium.adaptation_degree, degree_of_adaptation(0.1));
+  EXPECT_LT(sodium.state.luminance_cd_m2, unknown.state.luminance_cd_m2) << "less light for the rods";
+  options.look.light = std::make_shared<const SceneLight>(*light_of_ratio(0.6));
+  const LookPlan given = planned(frame, options);
+  EXPECT_EQ(given.light_rule, "given");
+  EXPECT_EQ(given.look.scotopic_ratio_of_white, 0.6);
+}
+
+TEST(StatedLight, GivesRodsTheChannelsOfAKnownCamera) {
+  RawFrame frame = coloured_frame();
+  DevelopOptions options = eye_at(0.1);
+  options.look.light = lamp("LED-B3");
+  EXPECT_FALSE(planned(frame, options).rods) << "the camera is unknown";
+  frame.raw.info.make = "NIKON CORPORATION";
+  frame.raw.info.model = "NIKON D850";
+  const LookPlan known = planned(frame, options);
+  ASSERT_TRUE(known.rods);
+  EXPECT_EQ(known.rods->source, "Nikon_D850");
+  options.look.camera = "Canon EOS R6";
+  EXPECT_EQ(planned(frame, options).rods->source, "Canon_EOS_R6") << "that of the profile";
+  options.look.rod_weights = Vector3{0, 2, 1};
+  EXPECT_EQ(planned(frame, options).rods->source, "profile");
+  options.look.light = std::make_shared<const SceneLight>(*light_of_ratio(2));
+  EXPECT_FALSE(planned(frame, options).rods) << "a ratio is not a spectrum";
+  options.look.light.reset();
+  EXPECT_FALSE(planned(frame, options).rods);
+}
+
+// White has the rods' luminance 1 whatever the weights and the degree of adaptation are.
+TEST(StatedLight, KeepsTheWhite) {
+  RawFrame frame = coloured_frame();
+  DevelopOptions options = eye_at(0.1);
+  options.look.light = lamp("HPS_generic");
+  for (const char* model : {"", "Nikon D850"}) {
+    frame.raw.info.model = model;
+    for (const double degree : {0.0, 0.8, 1.0}) {
+      options.look.adaptation_degree = degree;
+      const LookPlan plan = planned(frame, options);
+      const Vector3 white = plan.adaptation * Vector3{1, 1, 1};
+      double rods = 0, luminance = 0;
+      for (int c = 0; c < 3; ++c) {
+        rods += static_cast<double>(plan.look.rods[c]) * white[c];
+        luminance += static_cast<double>(plan.look.luminance[c]) * white[c];
+      }
+      EXPECT_NEAR(luminance, 1, 1e-5) << "weights of float; the matrices of sRGB have seven digits";
+      EXPECT_NEAR(rods, 1, 1e-5) << degree << model;
+    }
+  }
+}
+
+// The picture is that of complete adaptation, multiplied by the matrix of CAT02.
+TEST(StatedLight, LeavesAPartOfItsColour) {
+  DevelopOptions whole = eye_at(1000);
+  whole.look.which = LookChoice::Which::listed;
+  whole.look.listed = {false, false, false, false, false, false};
+  DevelopOptions part = whole;
+  part.look.light = lamp("LPS");
+  part.look.adaptation_degree = 0.7;
+  const SceneLinear adapted = seen(whole), tinted = seen(part);
+  const Matrix3 from_xyz = *xyz_to_output(OutputSpace::linear_srgb);
+  const Matrix3 change =
+      from_xyz * *incomplete_adaptation(*part.look.light->white, white_d65, 0.7) * *inverse(from_xyz);
+  for (std::size_t i = 0; i < adapted.plane[0].size(); i += 7) {
+    const Vector3 expected =
+        change * Vector3{adapted.plane[0].data()[i], adapted.plane[1].data()[i], adapted.plane[2].data()[i]};
+    for (int c = 0; c < 3; ++c) ASSERT_NEAR(tinted.plane[c].data()[i], expected[c], 1e-5) << "float, values below 2";
+  }
+}
+
+TEST(StatedLight, OfDaylightChangesNothingThatCanBeSeen) {
+  DevelopOptions stated = eye_at(0.1);
+  stated.look.light = lamp("D65");
+  const SceneLinear with = seen(stated), without = seen(eye_at(0.1));
+  const Xyz white = *xyz_of(white_d65);
+  const Matrix3 to_xyz = *rgb_to_xyz(primaries_rec709);
+  for (int field = 0; field < 4; ++field) {
+    const auto lab = [&](const SceneLinear& picture) {
+      const auto rgb = field_of(picture, field);
+      return lab_of(xyz_of(to_xyz * Vector3{rgb[0], rgb[1], rgb[2]}), white);
+    };
+    EXPECT_LT(ciede2000(lab(with), lab(without)), 0.1) << "S/P of 2.457 by xy, 2.464 by the spectrum";
+  }
+}
+
+TEST(StatedLight, RefusesDegreesThatAreNone) {
+  InlineExecutor executor;
+  for (const double degree : {-0.1, 1.1, std::numeric_limits<double>::quiet_NaN()}) {
+    DevelopOptions options = eye_at(1);
+    options.look.adaptation_degree = degree;
+    EXPECT_FALSE(develop(coloured_frame(), options, executor)) << degree;
+  }
+  DevelopOptions options = eye_at(1);
+  options.look.adaptation_degree = 0;
+  SceneLight red{"red", 1, Xy{0.7347, 0.2653}, {}};
+  options.look.light = std::make_shared<const SceneLight>(red);
+  const auto refused = develop(coloured_frame(), options, executor);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("--adaptation-degree 1"), std::string::npos) << refused.error().message;
 }
 
 }  // namespace

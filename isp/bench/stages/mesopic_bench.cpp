@@ -20,13 +20,13 @@
 #include "isp/render/colour_table.h"
 #include "isp/render/night/eye_rows.h"
 #include "isp/render/night/eye_tables.h"
+#include "isp/render/night/night_look.h"
 
 namespace lowlux::isp {
 namespace {
 
 constexpr PicturePart part{384, 256}, quick_part{96, 64};
 constexpr double pixels_of_cell = LookGrid::cell * LookGrid::cell;
-constexpr double min_field_ratio = 0.27;  // as in NightLookGrid
 constexpr float dark = 1e-6f;
 constexpr AccuracyTiming timing{.rounds = 5, .min_s = 1e-3};
 

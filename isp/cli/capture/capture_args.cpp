@@ -164,7 +164,7 @@ void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
 constexpr std::array of_pictures{"--bits",         "--quality",     "--space",        "--half",
                                  "--repair",       "--line-noise",  "--effects",      "--tolerance",
                                  "--dimming",      "--noise-limit", "--coefficients", "--display-luminance",
-                                 "--gain-setting", "--chroma-bias"};
+                                 "--gain-setting", "--chroma-bias", "--light",        "--adaptation-degree"};
 constexpr std::array of_pictures_and_films{"--exposure",      "--wb",      "--tone",   "--look", "--scene-luminance",
                                            "--field-of-view", "--profile", "--denoise"};
 

@@ -9,6 +9,7 @@
 
 #include "isp/cli/shared/option_values.h"
 #include "isp/model/appearance/appearance_model.h"
+#include "isp/model/vision/scene_light.h"
 
 namespace lowlux::cli {
 namespace {
@@ -80,6 +81,41 @@ void add_scene(CLI::App& app, LookArgs& args) {
       });
 }
 
+/// Stores a lamp or an S/P; the file of a spectrum is read later.
+Wrong set_light(const std::string& text, LookArgs& args) {
+  args.choice.light.reset();
+  args.light_file.clear();
+  if (text.ends_with(".csv")) {
+    args.light_file = text;
+    return std::nullopt;
+  }
+  const std::optional<double> ratio = number_of(text);
+  auto light = ratio ? isp::light_of_ratio(*ratio) : isp::light_of_lamp(text);
+  if (!light) return "is not valid: " + light.error().message;
+  args.choice.light = std::make_shared<const isp::SceneLight>(*std::move(light));
+  return std::nullopt;
+}
+
+void add_light(CLI::App& app, LookArgs& args) {
+  add_text(app, "--light", "NAME|FILE.csv|S/P",
+           "light of the scene, for --look eye and models: a lamp, its spectrum, or its S/P from 0.1 to 60",
+           [&args](const std::string& text) {
+             args.given.emplace_back("--light");
+             return set_light(text, args);
+           });
+  add_text(app, "--adaptation-degree", "auto|DEGREE",
+           "adaptation to the colour of the light, 0 to 1 (auto: CIE 159 with --light, else 1)",
+           [&args](const std::string& text) -> Wrong {
+             args.given.emplace_back("--adaptation-degree");
+             args.choice.adaptation_degree.reset();
+             if (text == "auto") return std::nullopt;
+             double degree = 0;
+             if (auto wrong = store_number(text, {0, 1, "is neither auto nor a degree"}, degree)) return wrong;
+             args.choice.adaptation_degree = degree;
+             return std::nullopt;
+           });
+}
+
 void add_effects(CLI::App& app, LookArgs& args) {
   add_text(app, "--effects", "auto|all|none|LIST",
            fmt::format("what is done to the frame: what can be seen here (auto, default) or everything (all), of "
@@ -131,6 +167,7 @@ void add_look(CLI::App& app, LookArgs& args) {
              return std::nullopt;
            });
   add_scene(app, args);
+  add_light(app, args);
   add_effects(app, args);
   add_text(app, "--noise-limit", "off|LIGHTNESS",
            "CIE L* that noise may reach in even parts of the picture: shadows whose noise would exceed it are lifted "

@@ -22,6 +22,7 @@ namespace lowlux::cli {
 struct LookArgs {
   isp::LookChoice choice;
   bool noise_limit_given = false;
+  std::string light_file;               // spectrum of the light (.csv); empty: choice.light
   std::string coefficients;             // file of a table for Shin's model; empty: the substitute
   std::optional<double> display_cd_m2;  // white of the display for which images are made
   std::vector<std::string> given;       // options that are not valid for every look

@@ -79,8 +79,8 @@ int run_develop(const std::vector<std::string>& words) {
   }
   std::vector<std::string> only_read = darks->all();
   only_read.insert(only_read.end(), flats->begin(), flats->end());
-  only_read.insert(only_read.end(),
-                   {args.profile, args.black_profile, args.dark.doubling_profile, args.look.coefficients});
+  only_read.insert(only_read.end(), {args.profile, args.black_profile, args.dark.doubling_profile,
+                                     args.look.coefficients, args.look.light_file});
   if (const auto unharmed = check_unharmed(*jobs, only_read); !unharmed)
     return print_usage_error("develop", unharmed.error());
 

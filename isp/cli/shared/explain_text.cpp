@@ -77,6 +77,19 @@ void add_look_effects(Lines& out, std::span<const isp::LookEffect> effects) {
   }
 }
 
+void add_light(Lines& out, const isp::LookPlan& look, const isp::SceneLight* light) {
+  const std::string name = light != nullptr && !light->name.empty() ? light->name + ", " : "";
+  out.add("light", fmt::format("{}S/P {:.3g} ({}), degree of adaptation {:.2f}", name,
+                               look.look.scotopic_ratio_of_white, look.light_rule, look.adaptation_degree));
+  if (look.rods) {
+    out.add("",
+            fmt::format("rods by weights of {}{}", look.rods->source == "profile" ? "the " : "", look.rods->source) +
+                (look.rods->relative_error
+                     ? fmt::format(": off by {:.1f} % rms over reflectances", 100 * *look.rods->relative_error)
+                     : std::string()));
+  }
+}
+
 void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, const std::string& coefficients,
               bool noise_known) {
   if (look.kind != isp::Look::camera) {
@@ -165,9 +178,13 @@ std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* f
                        ? fmt::format("{}, {:.0f} K", plan.rendering.white_balance_rule, plan.rendering.white->cct_k)
                        : std::string(plan.rendering.white_balance_rule));
   out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.rendering.exposure_ev, plan.rendering.exposure_rule));
-  if (plan.rendering.look)
+  if (plan.rendering.look) {
     add_look(out, *plan.rendering.look, look_name(plan), coefficients_of(plan.options.look),
              plan.rendering.look->noise || plan.noise_reduction.has_level());
+    if (plan.rendering.look->kind != isp::Look::camera) {
+      add_light(out, *plan.rendering.look, plan.options.look.light.get());
+    }
+  }
   if (plan.display) {
     const isp::DisplayTarget& display = *plan.display;
     out.add("display", fmt::format("{:g} to {:g} cd/m2, coefficients {}, table off by {:.2f} CIEDE2000 in the mean",

@@ -7,6 +7,8 @@
 #include "capture/file/file_bytes.h"
 #include "isp/base/executor.h"
 #include "isp/cli/shared/machine.h"
+#include "isp/cli/simulate/scene_argument.h"
+#include "isp/model/vision/scene_light.h"
 
 namespace lowlux::cli {
 
@@ -19,11 +21,28 @@ isp::WriteOptions write_options(const DevelopArgs& args) {
   return write;
 }
 
+namespace {
+
+Result<isp::SceneLight> read_light(const std::string& file) {
+  auto spectrum = light_of(file, "--light");
+  if (!spectrum) return tl::make_unexpected(spectrum.error());
+  auto light = isp::light_of_spectrum(file, *std::move(spectrum));
+  if (!light) return fail(light.error().code, light.error().message, file);
+  return light;
+}
+
+}  // namespace
+
 Result<void> make_for_display(const DevelopArgs& args, isp::DevelopOptions& options) {
   if (const std::string& file = args.look.coefficients; !file.empty()) {
     auto table = read_shin_file(file);
     if (!table) return tl::make_unexpected(table.error());
     options.look.shin = std::make_shared<const isp::ShinTable>(*std::move(table));
+  }
+  if (const std::string& file = args.look.light_file; !file.empty()) {
+    auto light = read_light(file);
+    if (!light) return tl::make_unexpected(light.error());
+    options.look.light = std::make_shared<const isp::SceneLight>(*std::move(light));
   }
   if (!args.look.display_cd_m2) return {};
   PoolExecutor executor(2);

@@ -1,21 +1,41 @@
 #include "isp/cli/shared/profile_option.h"
 
+#include <algorithm>
+#include <optional>
 #include <string_view>
 #include <utility>
 
 #include "calib/profile/profile_io.h"
 #include "calib/profile/profile_use.h"
 #include "capture/file/file_bytes.h"
+#include "isp/base/text.h"
+#include "isp/model/sensor/sensor_db.h"
 #include "isp/output/report/report.h"
 
 namespace lowlux::cli {
 namespace {
 
-void use_colours(const CameraProfile& profile, RawFrame& frame) {
+/// Returns the weights that a profile holds for the rods under a light.
+std::optional<Vector3> rod_weights_of(const CameraProfile& profile, const isp::SceneLight& light) {
+  const auto found = std::ranges::find_if(profile.colours, [&](const ColourProfile& colour) {
+    return colour.scotopic_weights && std::ranges::equal(colour.illuminant, light.name, {}, ascii_lower, ascii_lower);
+  });
+  return found == profile.colours.end() ? std::nullopt : found->scotopic_weights;
+}
+
+void use_colours(const CameraProfile& profile, RawFrame& frame, isp::LookChoice& look) {
   if (profile.colours.empty()) return;
+  if (look.light) look.rod_weights = rod_weights_of(profile, *look.light);
   frame.colour.calibrations = calib::calibrations_of(profile);
   frame.colour.analog_balance = {1, 1, 1};  // the matrices were fitted to the camera's unscaled values
   frame.colour.source = CameraColour::Source::profile;
+}
+
+/// Returns the camera of a profile: by its make and model, or by the name of its sensor; empty if it states neither.
+std::string camera_of(const CameraProfile& profile) {
+  if (!profile.make.empty() || !profile.model.empty()) return camera_name(profile.make, profile.model);
+  if (profile.gains.empty() || !profile.gains.front().sensor) return {};
+  return std::string(isp::own_camera(profile.gains.front().sensor->name));
 }
 
 }  // namespace
@@ -42,6 +62,7 @@ Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choi
     if (is_asked_for && black.choice == isp::BlackChoice::automatic) black.choice = isp::BlackChoice::measured;
   }
   options.look.profile_iso = found->iso;
+  options.look.camera = camera_of(profile);
   if (found->noise) {
     frame.noise = found->noise;
     frame.noise->source = NoiseProfile::Source::profile;
@@ -49,7 +70,7 @@ Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choi
   auto& defects = frame.corrections.defects;
   defects.insert(defects.end(), found->hot_pixels.begin(), found->hot_pixels.end());
   frame.warnings.insert(frame.warnings.end(), found->warnings.begin(), found->warnings.end());
-  if (choice.everything) use_colours(profile, frame);
+  if (choice.everything) use_colours(profile, frame, options.look);
   return {};
 }
 

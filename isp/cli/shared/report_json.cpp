@@ -153,6 +153,11 @@ Json look_json(const isp::DevelopPlan& plan) {
   json["adaptation_m"] = look.state.m;
   json["mesopic_luminance_cd_m2"] = look.state.luminance_cd_m2;
   json["white_scotopic_ratio"] = look.look.scotopic_ratio_of_white;
+  const isp::SceneLight* const light = plan.options.look.light.get();
+  json["light"] = light != nullptr && !light->name.empty() ? Json(light->name) : Json(nullptr);
+  json["light_rule"] = look.light_rule;
+  json["rods_source"] = look.rods ? look.rods->source : "xyz";
+  json["adaptation_degree"] = look.adaptation_degree;
   json["dimming_ev"] = look.dimming_ev;
   json["effects"] = Json::array();
   if (!look.effects) return json;

@@ -259,11 +259,11 @@ Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame)
     out.exposure_rule = name_of(automatic.rule);
   }
   Result<std::optional<LookPlan>> look =
-      plan_look(frame, {blocks_, noise_std, out.white, out.exposure_ev}, plan_.options);
+      plan_look(frame, {blocks_, noise_std, out.white, out.exposure_ev, *balanced}, plan_.options);
   if (!look) return tl::make_unexpected(std::move(look.error()));
   out.look = *std::move(look);
   if (out.look) out.exposure_ev += out.look->dimming_ev;
-  out.transform = transform_of(*balanced, out.exposure_ev, plan_.options);
+  out.transform = transform_of(out.look ? out.look->adaptation * *balanced : *balanced, out.exposure_ev, plan_.options);
   if (const double limit = tone_limit(plan_.options.tone, out.exposure_ev); limit != tone_limit_) {
     out.tone = tone_of(out.exposure_ev, plan_.options);
     tone_limit_ = limit;

@@ -9,9 +9,11 @@
 #include <vector>
 
 #include "isp/base/frame.h"
+#include "isp/base/matrix3.h"
 #include "isp/base/result.h"
 #include "isp/model/appearance/shin_table.h"
 #include "isp/model/vision/night_eye.h"
+#include "isp/model/vision/scene_light.h"
 #include "isp/render/colour_table.h"
 #include "isp/render/night/night_look.h"
 
@@ -28,6 +30,12 @@ struct LookChoice {
   std::shared_ptr<const ShinTable> shin;        // coefficients of the model shin; absent: the substitute
   std::optional<double> scene_luminance_cd_m2;  // mean over the image; absent: estimated from its exposure
   std::optional<double> profile_iso;            // ISO speed from the camera's profile, where the frame states none
+  std::shared_ptr<const SceneLight> light;      // absent: S/P is estimated from the chromaticity of the white
+  std::string camera;                           // usual name, from its profile; empty: that of the frame
+  std::optional<Vector3> rod_weights;           // of white-balanced R, G, B under `light`, from the camera's profile
+  /// States the degree of chromatic adaptation, 0..1. Absent: that of degree_of_adaptation() where `light` is set, else
+  /// 1, for the white balance of a camera is not known to be the chromaticity of the light.
+  std::optional<double> adaptation_degree;
   /// Selects the effects: those that are visible, all, or those in `listed`.
   enum class Which : std::uint8_t { automatic, all, listed } which = Which::automatic;
   VisionEffects listed;
@@ -50,6 +58,13 @@ struct LookEffect {
   bool used = false;
 };
 
+/// Holds how the rods' luminance follows from the channels of a camera under a stated light.
+struct RodWeights {
+  std::string_view source;               // "profile", or the camera as known_camera() names it
+  Vector3 weights{};                     // of white-balanced R, G and B, up to a factor
+  std::optional<double> relative_error;  // rms over the reflectances they were fitted on; unknown of a profile
+};
+
 /// States the mean of a scene as a fraction of white.
 inline constexpr double scene_mean_of_white = 0.18;
 
@@ -63,6 +78,10 @@ struct LookPlan {
   std::string_view luminance_rule;  // "given", "exposure", or "profile" where the ISO speed is from there
   MesopicState state;               // of an eye adapted to the mean
   double dimming_ev = 0;
+  std::string_view light_rule;       // of S/P: "spectrum", "given", or "white" where it is estimated from its xy
+  std::optional<RodWeights> rods;    // absent: the weights of XYZ
+  double adaptation_degree = 1;      // D of incomplete_adaptation()
+  Matrix3 adaptation = identity3();  // of completely adapted values in the output's primaries
   std::optional<std::array<LookEffect, 6>> effects;  // set for Look::eye
   std::optional<double> noise_limit;
   std::optional<NoiseProfile> noise;  // of the raw frame; absent: not known

@@ -11,6 +11,7 @@
 #include "isp/model/appearance/entropy_model.h"
 #include "isp/model/sensor/scene_luminance.h"
 #include "isp/model/vision/night_eye.h"
+#include "isp/pipeline/plan/plan_light.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {
@@ -38,6 +39,8 @@ Result<void> check(const LookChoice& o, OutputSpace space) {
   if (!(o.field_of_view_deg >= 0.1 && o.field_of_view_deg <= 180))
     return wrong("a field of view has 0.1 to 180 degrees");
   if (!(o.tolerance > 0 && o.tolerance <= 100)) return wrong("a tolerance lies above 0 and at most at 100");
+  if (o.adaptation_degree && !(*o.adaptation_degree >= 0 && *o.adaptation_degree <= 1))
+    return wrong("a degree of adaptation is between 0 and 1");
   if (o.noise_limit && !(*o.noise_limit > 0 && *o.noise_limit <= 100)) {
     return wrong("the limit of noise is a CIE lightness above 0 and at most 100");
   }
@@ -71,27 +74,9 @@ Result<double> white_level_cd_m2(const RawFrame& frame, double mean, LookPlan& l
   return *saturation;
 }
 
-// Sets the weights of scotopic luminance relative to white, and the rods' tint, in the primaries of the pixels.
-void set_primaries(OutputSpace space, NightLook& look) {
-  const Matrix3 from_xyz = *xyz_to_output(space), to_xyz = *inverse(from_xyz);
-  const Vector3 luminance = *luminance_weights(space);
-  const Vector3 tint = from_xyz * (*rgb_to_xyz(primaries_rec709) * rod_tint);
-  double sum = 0;
-  Vector3 rods{};
-  for (int j = 0; j < 3; ++j) {
-    for (int i = 0; i < 3; ++i) rods[j] += scotopic_weights[i] * to_xyz[i][j];
-    sum += rods[j];
-  }
-  for (int j = 0; j < 3; ++j) {
-    look.luminance[j] = static_cast<float>(luminance[j]);
-    look.rods[j] = static_cast<float>(rods[j] / sum);
-    look.tint[j] = static_cast<float>(tint[j]);
-  }
-}
-
-double ratio_of_white(const std::optional<WhitePoint>& white) {
-  const std::optional<Xyz> colour = xyz_of(white ? white->xy : output_white);
-  return std::clamp(colour ? scotopic_luminance(*colour) : 0.0, 0.1, 60.0);
+// Returns the light of an even field, as the eye adapts to it.
+LuminancePair field_of(double luminance_cd_m2, const NightLook& look) {
+  return {luminance_cd_m2, luminance_cd_m2 * std::max(look.scotopic_ratio_of_white, min_field_ratio)};
 }
 
 // Returns the darkest and the brightest luminance that an eye adapts to, from blocks of the frame [cd/m2].
@@ -115,8 +100,8 @@ std::array<LookEffect, 6> largest_effects(const std::array<double, 2>& fields_cd
   const double least = std::max(fields_cd_m2[0], min_cd_m2), most = std::max(fields_cd_m2[1], least);
   for (int i = 0; i <= steps; ++i) {
     const double field = least * std::pow(most / least, static_cast<double>(i) / steps);
-    const auto here = predict_effects(night_eye({field, field * look.scotopic_ratio_of_white}),
-                                      look.scotopic_ratio_of_white, look.pixels_per_degree);
+    const auto here =
+        predict_effects(night_eye(field_of(field, look)), look.scotopic_ratio_of_white, look.pixels_per_degree);
     for (std::size_t k = 0; k < out.size(); ++k) {
       if (i == 0 || here[k].size > out[k].size) out[k] = here[k];
     }
@@ -169,8 +154,7 @@ void choose_steps(const LookChoice& choice, const std::array<double, 2>& fields_
 // Decides the state of the eye, the effects it requires, and how much darker the image gets.
 void decide_eye(const FrameLight& light, double white_cd_m2, const DevelopOptions& options, LookPlan& look) {
   const LookChoice& choice = options.look;
-  const double ratio = look.look.scotopic_ratio_of_white;
-  look.state = mesopic_state({look.mean_cd_m2, look.mean_cd_m2 * ratio});
+  look.state = mesopic_state(field_of(look.mean_cd_m2, look.look));
   look.white_cd_m2 = look.mean_cd_m2 / scene_mean_of_white;
   if (choice.look == Look::eye) {
     choose_steps(choice, range_of_fields(light.block_luminance, white_cd_m2, look), !light.white, look);
@@ -203,7 +187,7 @@ Result<std::optional<LookPlan>> plan_look(const RawFrame& frame, const FrameLigh
   LookPlan look{.kind = choice.look, .noise_limit = choice.noise_limit, .noise = frame.noise};
   NightLook& eye = look.look;
   eye.effects = {false, false, false, false, false, false};
-  eye.scotopic_ratio_of_white = ratio_of_white(light.white);
+  decide_light(frame, light, choice, look);
   const PictureSize size = picture_size(frame.raw, options);
   eye.pixels_per_degree = std::max(size.width, size.height) / choice.field_of_view_deg;
   double white_cd_m2 = 100;
@@ -213,12 +197,13 @@ Result<std::optional<LookPlan>> plan_look(const RawFrame& frame, const FrameLigh
     if (!found) return tl::make_unexpected(found.error());
     white_cd_m2 = *found;
     decide_eye(light, white_cd_m2, options, look);
+    if (auto adapted = decide_adaptation(light, options, look); !adapted) return tl::make_unexpected(adapted.error());
   }
   const double exposure_ev = light.exposure_ev + look.dimming_ev;
   const double units = std::exp2(exposure_ev) / tone_limit(options.tone, exposure_ev);
   eye.cd_m2_per_unit = white_cd_m2 / units;
   eye.dark = static_cast<float>(std::clamp(light.black_noise_std * units, min_dark, 1.0));
-  set_primaries(options.space, eye);
+  set_primaries(options.space, light.balanced, look);
   return look;
 }
 

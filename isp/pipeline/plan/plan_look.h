@@ -1,7 +1,6 @@
 #pragma once
 
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -10,22 +9,16 @@
 #include "isp/model/colour/camera_colour.h"
 #include "isp/pipeline/options.h"
 #include "isp/pipeline/plan/look.h"
+#include "isp/pipeline/plan/plan_light.h"
 #include "isp/raw/kernel/raw_to_rgb.h"
 
 namespace lowlux::isp {
 
-/// Holds what a look is decided by: the light of a frame, and how it would be rendered without the look.
-struct FrameLight {
-  std::span<const float> block_luminance;  // white balanced, 1 at the white level, signed
-  double black_noise_std = 0;              // of one pixel, same unit
-  std::optional<WhitePoint> white;         // absent without a colour calibration
-  double exposure_ev = 0;
-};
-
 /// Decides the look: how bright the scene was, how an eye adapted to it perceives it, which effects that requires, and
 /// by how much an automatic exposure is lowered for it (LookPlan::dimming_ev). Returns nullopt where none is requested.
-/// Allocates only to report an error. Errors: insufficient where the luminance is neither given nor known from the
-/// exposure; invalid_argument for values out of range, or a space without RGB primaries (camera, xyz).
+/// Allocates only to report an error, and where a light of known spectrum is stated. Errors: insufficient where the
+/// luminance is neither given nor known from the exposure; invalid_argument for values out of range, or a space without
+/// RGB primaries (camera, xyz).
 Result<std::optional<LookPlan>> plan_look(const RawFrame& frame, const FrameLight& light,
                                           const DevelopOptions& options);
 

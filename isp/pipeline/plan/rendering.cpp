@@ -132,11 +132,12 @@ Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light
   rendered_luminance(light.mean, options.space, out.white_gain, *balanced, blocks);
   const double noise_std = light.black_noise_std * *std::ranges::max_element(out.white_gain);
   decide_exposure(options, blocks, noise_std, out);
-  Result<std::optional<LookPlan>> look = plan_look(frame, {blocks, noise_std, out.white, out.exposure_ev}, options);
+  Result<std::optional<LookPlan>> look =
+      plan_look(frame, {blocks, noise_std, out.white, out.exposure_ev, *balanced}, options);
   if (!look) return tl::make_unexpected(std::move(look.error()));
   out.look = *std::move(look);
   if (out.look) out.exposure_ev += out.look->dimming_ev;
-  out.transform = transform_of(*balanced, out.exposure_ev, options);
+  out.transform = transform_of(out.look ? out.look->adaptation * *balanced : *balanced, out.exposure_ev, options);
   out.tone = tone_of(out.exposure_ev, options);
   if (!out.look || out.look->kind != Look::model) return out;
   Result<ModelTable> model =

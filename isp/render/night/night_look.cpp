@@ -17,9 +17,6 @@ namespace {
 // Box and linear interpolation of a cell of 4 pixels blur it by half its side, 2 pixels.
 constexpr double cell_variance_px2 = 0.25 * LookGrid::cell * LookGrid::cell;
 
-// Fields of adaptation have at least this S/P: below 0.265 CIE 191 has several solutions and jumps between them.
-constexpr float min_field_ratio = 0.27f;
-
 double mean_of(const PlaneView<const float>& plane) {
   double sum = 0;
   for (int y = 0; y < plane.height; ++y) {
@@ -124,6 +121,7 @@ void NightLookGrid::State::take_light(const RgbView<const float>& camera, const 
   const PlaneView<float> y = seen[0], s = variance[0], field_y = photopic[0], field_s = scotopic[0];
   const auto cones = static_cast<float>(look.cd_m2_per_unit);
   const auto rods = static_cast<float>(look.cd_m2_per_unit * look.scotopic_ratio_of_white);
+  constexpr auto min_ratio = static_cast<float>(min_field_ratio);
   for_each_row(executor, y.height, [&](int row) {
     rows::light_row({{camera[0].row(row), camera[1].row(row), camera[2].row(row)}}, weights, y.width, y.row(row),
                     s.row(row));
@@ -136,7 +134,7 @@ void NightLookGrid::State::take_light(const RgbView<const float>& camera, const 
     }
     for (int x = 0; x < y.width; ++x) cones_field[x] = std::min(std::max(cones * light[x], 0.0f), 1e9f);
     for (int x = 0; x < y.width; ++x) {
-      rods_field[x] = std::min(std::max(rods * own_rods[x], min_field_ratio * cones_field[x]), 1e9f);
+      rods_field[x] = std::min(std::max(rods * own_rods[x], min_ratio * cones_field[x]), 1e9f);
     }
   });
 }

@@ -54,6 +54,10 @@ float gain_within_noise_limit(double y, double noise_std, double lightness);
 inline constexpr double adaptation_field_std_deg = 1.0;
 inline constexpr double adaptation_fraction_of_mean = 0.1;
 
+/// Fields of adaptation count as having at least this S/P: below 0.265 CIE 191 has several solutions and jumps between
+/// them.
+inline constexpr double min_field_ratio = 0.27;
+
 /// Makes LookGrids. It owns its memory and allocates only in the constructor.
 class NightLookGrid {
  public:
