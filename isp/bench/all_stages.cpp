@@ -27,6 +27,8 @@ constexpr std::array registry{
     BenchStage{"chroma-start", "Where the denoiser's chroma starts: error against time", run_chroma_start_bench},
     BenchStage{"demosaic", "Demosaicing: error against time", run_demosaic_bench},
     BenchStage{"mesopic", "Mesopic vision, exact and by tables: error against time", run_mesopic_bench},
+    BenchStage{"scene-light", "Rods' luminance under every lamp, with the light unknown and stated",
+               run_scene_light_bench},
     BenchStage{"retarget", "Retargeting to a dim display, exact and by tables: error against time", run_retarget_bench},
     BenchStage{"develop", "Whole plans of develop: error against time", run_develop_bench},
     BenchStage{"scaling", "Developing over frame size and threads: time and memory", run_scaling_bench},

@@ -14,6 +14,7 @@
 #include "isp/bench/accuracy_time.h"
 #include "isp/bench/scenes/develop_scene.h"
 #include "isp/bench/stages/developing_memory.h"
+#include "isp/model/vision/scene_light.h"
 
 namespace lowlux::isp {
 namespace {
@@ -104,6 +105,24 @@ TEST(DevelopingStages, TablesOfMesopicVisionAreNoBetterThanWhatTheyAreMadeOf) {
     const std::string group = std::string("state of the eye, white ") + white + " cd/m2";
     EXPECT_LT(rows.at({group, "table"}).at("largest error"), 0.05) << white;  // CIEDE2000: not to be seen
     EXPECT_GT(error_of(rows, group, "one for the frame"), 10 * error_of(rows, group, "table")) << white;
+  }
+}
+
+// The estimates from the exact chromaticity were recomputed from the tables by other means, to 0.1 %.
+TEST(DevelopingStages, StatingTheLightGivesRodsTheirLuminanceUnderEveryLamp) {
+  const auto outcome = run_scene_light_bench(quick());
+  ASSERT_TRUE(outcome.has_value()) << outcome.error().message;
+  std::map<std::string, std::vector<double>> rows;
+  for (const auto& row : outcome->table.rows) {
+    for (std::size_t i = 1; i < row.size(); ++i)
+      rows[std::get<std::string>(row[0])].push_back(std::get<double>(row[i]));
+  }
+  ASSERT_EQ(rows.size(), lamp_names().size());
+  EXPECT_NEAR(rows["HPS_generic"][2], 49.8, 0.06);
+  EXPECT_NEAR(rows["LPS"][2], 200.0, 0.06);
+  EXPECT_NEAR(rows["mercury_generic"][2], 69.1, 0.06);
+  for (const auto& [name, row] : rows) {
+    EXPECT_LT(row[6], 6) << name << ": percent; what three channels leave of V' on pigments";
   }
 }
 

@@ -17,6 +17,9 @@ Result<BenchOutcome> run_demosaic_bench(const BenchOptions& options);
 /// Runs the stage `mesopic`: states of CIE 191 and appearance models, tables against the exact results.
 Result<BenchOutcome> run_mesopic_bench(const BenchOptions& options);
 
+/// Runs the stage `scene-light`: the rods' luminance under every lamp, with and without the light stated.
+Result<BenchOutcome> run_scene_light_bench(const BenchOptions& options);
+
 /// Runs the stage `retarget`: tables against the exact result for each colour.
 Result<BenchOutcome> run_retarget_bench(const BenchOptions& options);
 
