@@ -229,11 +229,11 @@ TEST(SimulationStages, PhotonSamplingTellsTheSamplersApart) {
 
 TEST(SimulationStages, EffectsAreWithinWhatIsPredictedAndAllChangeNothing) {
   const BenchOutcome out = quickly(run_simulation_effects_bench);
-  EXPECT_EQ(out.table.rows.size(), scene_lights.size() * (1 + effect_count + 3 + 1));
+  EXPECT_EQ(out.table.rows.size(), bench_lights.size() * (1 + effect_count + 3 + 1));
   EXPECT_EQ(figure_of(out, "all", "error"), 0);
   EXPECT_GT(figure_of(out, "without photon-noise", "error"), 0);
   EXPECT_GT(figure_of(out, "none", "relative variance"), 0.5);
-  ASSERT_EQ(out.images.size(), scene_lights.size());
+  ASSERT_EQ(out.images.size(), bench_lights.size());
   EXPECT_EQ(out.images[2].id, "simulation-effects-very-dark");
   EXPECT_EQ(out.images[2].codes.width(), 5 * 192 / 2);
 }

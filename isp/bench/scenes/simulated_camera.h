@@ -33,15 +33,15 @@ capture::Scene bench_scene(const BenchPicture& picture, double white_cd_m2);
 
 /// Lights of the scenes: white gives about 1200, 24 and 2.4 e-; the exposure of the last is long enough for dark
 /// current to matter.
-struct SceneLight {
+struct BenchLight {
   const char* name;
   double white_cd_m2;
   double time_s;
 
   Exposure exposure() const { return {.time_s = time_s, .temperature_c = 20}; }
 };
-inline constexpr std::array scene_lights{SceneLight{"bright", 1500, 1.0 / 30}, SceneLight{"dim", 30, 1.0 / 30},
-                                         SceneLight{"very dark", 0.1, 1}};
+inline constexpr std::array bench_lights{BenchLight{"bright", 1500, 1.0 / 30}, BenchLight{"dim", 30, 1.0 / 30},
+                                         BenchLight{"very dark", 0.1, 1}};
 
 /// Reads central crops of the requested images.
 /// @param most  number of images, the first ones; 0: all

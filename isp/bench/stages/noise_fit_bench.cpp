@@ -142,7 +142,7 @@ struct NoisyPicture {
   PerSite<double> black_dn{};  // dark charge included
 };
 
-Result<std::vector<NoisyPicture>> take_pictures(const std::vector<BenchPicture>& pictures, const SceneLight& light,
+Result<std::vector<NoisyPicture>> take_pictures(const std::vector<BenchPicture>& pictures, const BenchLight& light,
                                                 int frames, Executor& executor) {
   const NamedSensor camera = bench_camera();
   const double dark_e = dark_mean_e(camera.model, light.exposure())[1];
@@ -205,7 +205,7 @@ std::vector<PictureWay> picture_ways(bool quick) {
 }
 
 /// Measures a light's images by each method; methods for which no image was suitable are reported in the remarks.
-Result<void> measure_pictures(const std::vector<BenchPicture>& pictures, const SceneLight& light,
+Result<void> measure_pictures(const std::vector<BenchPicture>& pictures, const BenchLight& light,
                               const BenchOptions& options, StageRows& rows, std::vector<std::string>& remarks) {
   PoolExecutor executor(options.threads);
   auto taken = take_pictures(pictures, light, options.quick ? 1 : 3, executor);
@@ -244,8 +244,8 @@ Result<BenchOutcome> run_noise_fit_bench(const BenchOptions& options) {
   std::vector<Finding> findings;
   std::vector<std::string> left_out;
   if (const auto done = measure_flats(options, rows, findings); !done) return tl::make_unexpected(done.error());
-  const auto lights = std::span(scene_lights).first(options.quick ? 1 : 2);  // the last light contains little but noise
-  for (const SceneLight& light : lights) {
+  const auto lights = std::span(bench_lights).first(options.quick ? 1 : 2);  // the last light contains little but noise
+  for (const BenchLight& light : lights) {
     const auto done = measure_pictures(*pictures, light, options, rows, left_out);
     if (!done) return tl::make_unexpected(done.error());
     options.advance(0.5 / static_cast<double>(lights.size()), light.name);

@@ -65,7 +65,7 @@ struct PlanSources {
   double megapixels = 0;
 };
 
-Result<PlanSources> sources_of(const std::vector<BenchPicture>& pictures, const SceneLight& light,
+Result<PlanSources> sources_of(const std::vector<BenchPicture>& pictures, const BenchLight& light,
                                const SimulatePlan& plan, Executor& executor) {
   PlanSources out;
   out.sources.reserve(pictures.size());
@@ -124,7 +124,7 @@ class LightErrors {
 };
 
 /// Measures the levels of a light: the same work on one thread and on all.
-Result<void> measure_light(const std::vector<BenchPicture>& pictures, const SceneLight& light,
+Result<void> measure_light(const std::vector<BenchPicture>& pictures, const BenchLight& light,
                            const BenchOptions& options, Executor& executor, StageRows& rows) {
   InlineExecutor one;
   AccuracyGroup single{fmt::format("{}, one thread", light.name), "CIEDE2000 of 8 x 8 boxes, 95th percentile", {}};
@@ -161,8 +161,8 @@ Result<BenchOutcome> run_simulate_bench(const BenchOptions& options) {
                                       : read_bench_pictures(options, 256, 256, 2, executor);
   if (!pictures) return tl::make_unexpected(pictures.error());
   StageRows rows{.further = {"relative error of the noise variance"}};
-  const auto lights = options.quick ? std::span(scene_lights).last(1) : std::span(scene_lights);
-  for (const SceneLight& light : lights) {
+  const auto lights = options.quick ? std::span(bench_lights).last(1) : std::span(bench_lights);
+  for (const BenchLight& light : lights) {
     if (const auto done = measure_light(*pictures, light, options, executor, rows); !done) {
       return tl::make_unexpected(done.error());
     }

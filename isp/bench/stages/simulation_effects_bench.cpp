@@ -26,7 +26,7 @@ std::string name_of(const Tolerance& tolerance) {
   return fmt::format("auto {:g},{:g}", tolerance.delta_e, tolerance.relative_variance);
 }
 
-std::string id_of(const SceneLight& light) {
+std::string id_of(const BenchLight& light) {
   std::string id = light.name;
   std::ranges::replace(id, ' ', '-');
   return id;
@@ -62,7 +62,7 @@ std::vector<Choice> choices() {
 /// Measures all images in one light.
 class EffectsLight {
  public:
-  static Result<EffectsLight> of(const std::vector<BenchPicture>& pictures, const SceneLight& light,
+  static Result<EffectsLight> of(const std::vector<BenchPicture>& pictures, const BenchLight& light,
                                  Executor& executor) {
     EffectsLight out(light);
     for (const BenchPicture& picture : pictures) {
@@ -133,7 +133,7 @@ class EffectsLight {
   }
 
  private:
-  explicit EffectsLight(const SceneLight& light) : light_(light), camera_(bench_camera()) {}
+  explicit EffectsLight(const BenchLight& light) : light_(light), camera_(bench_camera()) {}
 
   std::vector<BlockLevel> block_levels_of(const capture::SyntheticSource& source) const {
     return capture::block_levels(source.rate_e_per_s().view(), BayerPhase::rggb, light_.time_s);
@@ -210,7 +210,7 @@ class EffectsLight {
                     closest.share <= 1);
   }
 
-  SceneLight light_;
+  BenchLight light_;
   NamedSensor camera_;
   std::vector<PictureShot> shots_;
   double megapixels_ = 0;
@@ -228,15 +228,15 @@ Result<BenchOutcome> run_simulation_effects_bench(const BenchOptions& options) {
   StageRows rows{.further = {"predicted CIEDE2000", "relative variance", "predicted variance"}};
   std::vector<Finding> findings;
   std::vector<BenchImage> images;
-  images.reserve(scene_lights.size());
-  for (const SceneLight& scene_light : scene_lights) {
+  images.reserve(bench_lights.size());
+  for (const BenchLight& scene_light : bench_lights) {
     auto light = EffectsLight::of(*pictures, scene_light, executor);
     if (!light) return tl::make_unexpected(light.error());
     std::vector<std::vector<double>> figures;
     const AccuracyGroup group = light->measure(figures, findings);
     rows.add(group, std::move(figures), timing);
     images.push_back({"simulation-effects-" + id_of(scene_light), light->strip()});
-    options.advance(1.0 / scene_lights.size(), scene_light.name);
+    options.advance(1.0 / bench_lights.size(), scene_light.name);
   }
   BenchOutcome out = outcome_of("simulation-effects", rows, TimeOf::megapixel);
   out.findings = std::move(findings);
