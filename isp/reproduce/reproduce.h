@@ -85,8 +85,7 @@ std::string_view verdict_of(const Finding& finding);
 /// States the tolerances of the verdict "agrees".
 inline constexpr std::string_view tolerance_of_verdicts =
     "agrees: the order, sign or pattern is as claimed, published values are met within a tenth, sampled ones within "
-    "five "
-    "standard errors, unless the note states another tolerance";
+    "five standard errors, unless the note states another tolerance";
 
 /// Returns the number of findings of a kind with each verdict: "20 agree, 10 have the same direction, 2 do not hold".
 std::string count_of_verdicts(std::span<const Finding> findings, Finding::Kind kind);

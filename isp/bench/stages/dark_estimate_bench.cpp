@@ -148,6 +148,7 @@ struct Tally {
   std::vector<double> relative_errors;  // of estimates that were used
   std::vector<double> relative_standard_errors;
   double deviation_squares = 0;  // of errors in standard errors
+  Series estimates;              // over the truth
 
   void add(const DarkCharge& found, double truth_e, double mean_e) {
     ++frames;
@@ -158,6 +159,8 @@ struct Tally {
       return;
     }
     ++used;
+    estimates.x.push_back(truth_e);
+    estimates.y.push_back(*found.mean_e);
     used_where_it_matters += matters ? 1 : 0;
     const double error = *found.mean_e - truth_e;
     relative_errors.push_back(error / truth_e);
@@ -208,6 +211,13 @@ Result<BenchOutcome> run_dark_estimate_bench(const BenchOptions& options) {
                        "median standard error [%]",
                        "rms error / standard error",
                        "error above dark"};
+  out.plots = {{.id = "estimates",
+                .title = "Dark charge estimated from the frame itself",
+                .x_label = "true dark charge [e-]",
+                .y_label = "estimate [e-]",
+                .x_scale = AxisScale::logarithmic,
+                .y_scale = AxisScale::logarithmic,
+                .caption = "Each point is a frame whose estimate is used."}};
   for (std::size_t s = 0; s < sensors.size(); ++s) {
     const NamedSensor sensor = sensor_of(sensors[s]);
     Draws draws(s + 1);
@@ -223,6 +233,8 @@ Result<BenchOutcome> run_dark_estimate_bench(const BenchOptions& options) {
       options.advance(1.0 / static_cast<double>(sensors.size()) / frames, std::string(sensors[s].name));
     }
     out.table.rows.push_back(row_of(std::string(sensors[s].name), tally));
+    out.plots.front().series.push_back(
+        {std::string(sensors[s].name), tally.estimates.x, tally.estimates.y, Mark::points});
     worse += tally.worse;
   }
   const Result<std::string> spread = spread_of_dark_colours(*pictures, executor);

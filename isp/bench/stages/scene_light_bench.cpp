@@ -124,6 +124,25 @@ Result<std::vector<BenchCell>> row_of(std::string_view name) {
                                 100 * with_camera->rms};
 }
 
+/// Draws the three rms errors of the table over the S/P of the lights.
+Plot errors_over_ratio(const BenchTable& table) {
+  Plot out{.id = "rods",
+           .title = "Error of the rods' luminance",
+           .x_label = "S/P of the light",
+           .y_label = "rms error [%]",
+           .caption = "Each point is a lamp."};
+  constexpr std::array names{"light unknown", "--light", "--light and camera"};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    Series series{.name = names[i], .mark = Mark::points};
+    for (const std::vector<BenchCell>& row : table.rows) {
+      series.x.push_back(std::get<double>(row[1]));
+      series.y.push_back(std::get<double>(row[5 + i]));
+    }
+    out.series.push_back(std::move(series));
+  }
+  return out;
+}
+
 }  // namespace
 
 Result<BenchOutcome> run_scene_light_bench(const BenchOptions& options) {
@@ -143,12 +162,12 @@ Result<BenchOutcome> run_scene_light_bench(const BenchOptions& options) {
     out.table.rows.push_back(*std::move(row));
     options.advance(1 / static_cast<double>(names.size()), std::string(name));
   }
-  out.remarks.push_back(
-      fmt::format("scotopic luminance of the 24 patches of the ColorChecker, relative error; a {} whose matrices are "
-                  "those for A and "
-                  "D65, balanced for the light. Weights of the camera are fitted on Munsell chips and on an older "
-                  "chart of the same pigments",
-                  usual_name));
+  out.plots = {errors_over_ratio(out.table)};
+  out.remarks.push_back(fmt::format(
+      "scotopic luminance of the 24 patches of the ColorChecker, relative error; a {} whose matrices are "
+      "those for A and D65, balanced for the light. Weights of the camera are fitted on Munsell chips and on an older "
+      "chart of the same pigments",
+      usual_name));
   return out;
 }
 

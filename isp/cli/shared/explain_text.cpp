@@ -119,6 +119,8 @@ std::string dark_text(const isp::DevelopPlan& plan) {
     text += ", ";
   }
   switch (dark.state) {
+    case isp::DarkCharge::State::not_examined:
+      return "not examined: " + dark.reason;
     case isp::DarkCharge::State::not_expected:
       return "none expected: " + dark.reason;
     case isp::DarkCharge::State::unknown:
@@ -133,7 +135,7 @@ std::string dark_text(const isp::DevelopPlan& plan) {
       break;
   }
   text += ": " + dark.reason;
-  if (dark.alpha) {
+  if (dark.alpha && *dark.mean_e > 0) {
     text += fmt::format("; left in, it takes {:.0f} % of the saturation of the median block (alpha {:.3f})",
                         100 * (1 - *dark.alpha), *dark.alpha);
   }
@@ -212,6 +214,8 @@ std::string_view name_of(BlackPoint::Source source) {
 
 std::string_view name_of(isp::DarkCharge::State state) {
   switch (state) {
+    case isp::DarkCharge::State::not_examined:
+      return "not-examined";
     case isp::DarkCharge::State::not_expected:
       return "not-expected";
     case isp::DarkCharge::State::in_black_point:

@@ -128,8 +128,11 @@ DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, cons
   if (!levels.electrons_at_white) return {.reason = "the gain is not known"};
   if (frame.noise->reduced) return {.reason = "noise was reduced before"};
   if (!info.exposure_s) return {.reason = "the exposure time is not known"};
-  if (!(charge_of(high_current_e_per_s, info) >= min_charge_e)) return {.reason = "the exposure was short, or cold"};
-  DarkCharge out;
+  DarkCharge out{.state = DarkCharge::State::not_expected};
+  if (!(charge_of(high_current_e_per_s, info) >= min_charge_e)) {
+    out.reason = "the exposure was short, or cold";
+    return out;
+  }
   if (may_estimate) {
     const std::optional<DarkEstimate> found = estimate(frame, levels, thumbnail);
     if (found && found->is_significant() && found->mean_e <= charge_of(max_current_e_per_s, info)) {

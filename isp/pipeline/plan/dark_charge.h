@@ -14,11 +14,12 @@ namespace lowlux::isp {
 /// States what is known of the dark charge of a frame, and what was done about it.
 struct DarkCharge {
   enum class State : std::uint8_t {
-    not_expected,    // too small to matter at this exposure time and temperature, or not separable from the light
+    not_examined,    // the gain or the exposure time is not known, noise was reduced before, or this is no mosaic
+    not_expected,    // too small to matter at this exposure time and temperature, or beside the light of this frame
     in_black_point,  // measured or computed: the black point that is subtracted holds it
     estimated,       // the frame itself shows it significantly: it is subtracted unless a planner leaves it in
     unknown          // it may matter, and stays in
-  } state = State::not_expected;
+  } state = State::not_examined;
   std::optional<double> mean_e;            // mean over pixels, where it is known or estimated
   std::optional<double> standard_error_e;  // of mean_e; absent where figures are quoted without one
   PerSite<double> estimated_e{};           // State::estimated: charge of each site
