@@ -14,9 +14,8 @@ namespace lowlux::isp {
 /// States what is known of the dark charge of a frame, and what was done about it.
 struct DarkCharge {
   enum class State : std::uint8_t {
-    not_examined,  // the gain or the exposure time is not known, noise was reduced before, or the frame is not a mosaic
-    not_expected,  // too small to matter at this exposure time and temperature, or compared with the light of this
-                   // frame
+    not_examined,    // gain or exposure time is not known, noise was reduced before, or the frame is not a mosaic
+    not_expected,    // too small to matter at this exposure time and temperature, or in the light of this frame
     in_black_point,  // measured or computed: the black point that is subtracted holds it
     estimated,       // the frame itself shows it significantly: it is subtracted unless a planner leaves it in
     unknown          // it may matter, and stays in
