@@ -162,7 +162,11 @@ std::optional<DarkEstimate> estimate_dark_charge(const DarkEvidence& e) {
   const Vector3 darkest = mean_of(blocks.charge_e, 0, std::max<std::size_t>(count, 4));
   std::optional<Vector3> neutral = colour_of_contrast(e, blocks, darkest);
   if (!neutral) return std::nullopt;
-  if (e.neutral && is_positive(*e.neutral)) neutral = mean_colour(*neutral, *e.neutral);
+  if (e.neutral && is_positive(*e.neutral)) {
+    Vector3 stated_e = *e.neutral;
+    for (std::size_t c = 0; c < 3; ++c) stated_e[c] *= e.electrons_at_white[c];
+    neutral = mean_colour(*neutral, stated_e);
+  }
   // The darkest blocks were chosen by their noise too: it is counted as that of a single one.
   const std::optional<Fit> fit = solved(darkest, block_variance(e, blocks, darkest), *neutral);
   if (!fit) return std::nullopt;
