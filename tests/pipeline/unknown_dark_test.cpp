@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -98,6 +99,46 @@ TEST(UnknownDark, IsEstimatedAndSubtractedWhereTheFrameShowsIt) {
   // Camera RGB: the median column has light of 40, 80 and 53.3 e-.
   ASSERT_TRUE(plan.dark.alpha);
   EXPECT_NEAR(*plan.dark.alpha, (40 + 80 + 53.3) / (40 + 80 + 53.3 + 600), 0.02);
+}
+
+/// Returns R, G and B in the middle of a saturated square of a ramp over dark charge, exposed as it is.
+std::array<double, 3> saturated_colour(double dark_e, const DenoiseChoice& denoise, bool half) {
+  constexpr int side = 64;
+  RawFrame frame = ramp_over_dark(dark_e, 0, 1);
+  for (int y = 0; y < side; ++y)
+    std::fill_n(frame.raw.dn.row(y), side, static_cast<std::uint16_t>(frame.raw.white_dn[0]));
+  const DevelopOptions options{.exposure_ev = 0,
+                               .tone = ToneCurve::none,
+                               .space = OutputSpace::linear_srgb,
+                               .samples = SampleType::f32,
+                               .half = half,
+                               .denoise = denoise};
+  const Result<Developed> out = develop(frame, options, executor);
+  EXPECT_TRUE(out) << out.error().message;
+  EXPECT_EQ(out->plan.dark.state, DarkCharge::State::estimated);
+  const auto& picture = std::get<SceneLinear>(out->picture);
+  const int middle = half ? side / 4 : side / 2;
+  std::array<double, 3> rgb{};
+  for (std::size_t c = 0; c < 3; ++c) rgb[c] = static_cast<double>(picture.plane[c].at(middle, middle));
+  return rgb;
+}
+
+// Light and dark charge saturate a pixel together: white is full without the charge that is subtracted. The charge is
+// drawn up to a tenth of the full well, of which green would otherwise lack its part and turn magenta.
+TEST(UnknownDark, SaturatedPixelsStayWhiteWhereAnEstimateIsSubtracted) {
+  const std::uint64_t seed = 20261124;
+  std::mt19937_64 engine(seed);
+  std::uniform_real_distribution<double> log_dark(std::log(60.0), std::log(600.0));
+  for (const bool half : {false, true}) {
+    for (const DenoiseChoice& denoise :
+         {DenoiseChoice{.mode = DenoiseChoice::Mode::off},
+          DenoiseChoice{.mode = DenoiseChoice::Mode::level, .level = denoise::Level::draft},
+          DenoiseChoice{.mode = DenoiseChoice::Mode::level, .level = denoise::Level::standard}}) {
+      const double dark_e = std::exp(log_dark(engine));
+      const std::array<double, 3> rgb = saturated_colour(dark_e, denoise, half);
+      for (const double value : rgb) EXPECT_NEAR(value, 1, 1e-4) << dark_e << " e-, seed " << seed;
+    }
+  }
 }
 
 // Light of 50 e- in the darkest places is not taken for dark charge, although so long an exposure could have that.

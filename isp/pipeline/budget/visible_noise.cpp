@@ -115,11 +115,13 @@ class Display {
 /// Holds values of the frame for each colour.
 struct Channels {
   std::array<double, 3> electrons_at_white{};
+  std::array<double, 3> light_at_white_e{};
   std::array<double, 3> dark_e{};
 };
 
 Channels channels_of(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise) {
-  Channels out{.electrons_at_white = electrons_by_colour(frame.raw, levels)};
+  Channels out{.electrons_at_white = electrons_by_colour(frame.raw, levels),
+               .light_at_white_e = light_at_white_by_colour(frame.raw, levels)};
   for (int site = 0; site < 4; ++site) {
     const auto c = static_cast<std::size_t>(colour_at(frame.raw.phase, site & 1, site >> 1));
     out.dark_e[c] += noise.dark_mean_e[site] * (c == 1 ? 0.5 : 1);
@@ -141,7 +143,7 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
   Vector3 signal{};
   double mean_signal = 0, mean_variance = 0, squares = 0;
   for (int c = 0; c < 3; ++c) {
-    signal[c] = (charge_e[c] - channels.dark_e[c]) / channels.electrons_at_white[c];
+    signal[c] = (charge_e[c] - channels.dark_e[c]) / channels.light_at_white_e[c];
     mean_signal += fraction_of_sites[c] * (charge_e[c] - channels.dark_e[c]);
     mean_variance += fraction_of_sites[c] * (std::max(charge_e[c], 0.0) + noise.variance_e2[c]);
   }
@@ -155,12 +157,12 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
     const double variance_e2 = std::max(charge_e[c], 0.0) + noise.variance_e2[c];
     const double step_e = std::sqrt(std::max(variance_e2, min_variance_e2) / samples_in_box[c]);
     Vector3 moved = lit;
-    moved[c] += above_black_e(charge_e[c] - channels.dark_e[c], step_e) / channels.electrons_at_white[c];
+    moved[c] += above_black_e(charge_e[c] - channels.dark_e[c], step_e) / channels.light_at_white_e[c];
     const double difference = ciede2000(lab, display.lab(moved));
     squares += difference * difference;
-    pixel_std[c] = std::sqrt(std::max(variance_e2, 0.0)) / channels.electrons_at_white[c];
-    with_dark[c] += channels.dark_e[c] / channels.electrons_at_white[c];
-    with_line[c] += line_e / channels.electrons_at_white[c];
+    pixel_std[c] = std::sqrt(std::max(variance_e2, 0.0)) / channels.light_at_white_e[c];
+    with_dark[c] += channels.dark_e[c] / channels.light_at_white_e[c];
+    with_line[c] += line_e / channels.light_at_white_e[c];
   }
   SeenBlock out;
   out.line_delta_e = static_cast<float>(ciede2000(lab, display.lab(with_line)) / line_e);

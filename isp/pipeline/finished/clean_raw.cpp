@@ -28,11 +28,12 @@ struct Levels {
 
 /// Returns the levels of the new codes: black is a multiple of 256 from 1024 on, at most a quarter of the codes.
 Levels levels_for(const DevelopPlan& plan) {
+  const PerSite<double> light_e = light_at_white_e(plan.levels);
   double noise = 0;  // of a dark pixel, in fractions of white
   for (int site = 0; site < 4; ++site) {
     const denoise::RawNoise& n = plan.noise_reduction.noise;
     const double variance = *std::ranges::max_element(n.variance_e2) + n.dark_mean_e[site];
-    noise = std::max(noise, std::sqrt(variance) / (*plan.levels.electrons_at_white)[site]);
+    noise = std::max(noise, std::sqrt(variance) / light_e[site]);
   }
   const double wanted = 8 * noise / (1 + 8 * noise) * most_dn;
   const double black_dn = std::clamp(256 * std::ceil(wanted / 256), 1024.0, 16384.0);
@@ -49,8 +50,8 @@ Plane<std::uint16_t> coded(const SignalElectrons& signal, const RawElectrons& ra
   const int width = signal.value.width(), height = signal.value.height();
   const std::array<double, 3>& saturation_e = plan.noise_reduction.noise.saturation_e;
   Plane<std::uint16_t> out(width, height);
-  PerSite<double> dn_per_e{};
-  for (int site = 0; site < 4; ++site) dn_per_e[site] = levels.range_dn / (*plan.levels.electrons_at_white)[site];
+  PerSite<double> dn_per_e = light_at_white_e(plan.levels);
+  for (double& per_e : dn_per_e) per_e = levels.range_dn / per_e;
   for_each_band(executor, height, [&](RowBand band, int) {
     std::vector<std::uint32_t> words(width);
     for (int y = band.first; y < band.last; ++y) {
@@ -97,7 +98,7 @@ Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options,
   out.frame.corrections = frame.corrections;
   out.frame.corrections.defects.clear();
   const double step = 1 / levels.range_dn;
-  out.frame.noise = residual_profile(signal, out.maps.site_variance_e2, *out.plan.levels.electrons_at_white,
+  out.frame.noise = residual_profile(signal, out.maps.site_variance_e2, light_at_white_e(out.plan.levels),
                                      rounding_dn2 * step * step);
   if (!options.denoise.maps) out.maps = {};
   clock.lap("codes");
@@ -143,7 +144,7 @@ Line fitted(const std::vector<Sample>& samples) {
 }  // namespace
 
 NoiseProfile residual_profile(const SignalElectrons& signal_e, const std::array<Plane<float>, 3>& site_variance_e2,
-                              const PerSite<double>& electrons_at_white, double added) {
+                              const PerSite<double>& light_e, double added) {
   std::array<std::vector<Sample>, 3> samples;
   const int columns = signal_e.value.width() / 2, rows = signal_e.value.height() / 2;
   const std::int64_t cells = static_cast<std::int64_t>(columns) * rows;
@@ -153,7 +154,7 @@ NoiseProfile residual_profile(const SignalElectrons& signal_e, const std::array<
     for (int site = 0; site < 4; ++site) {
       const int x = 2 * cell_x + (site & 1), y = 2 * cell_y + (site >> 1);
       const auto colour = static_cast<std::size_t>(colour_at(signal_e.phase, x, y));
-      const double unit = 1 / electrons_at_white[site];
+      const double unit = 1 / light_e[site];
       const double variance = site_variance_e2[colour].at(cell_x, cell_y) * unit * unit + added;
       if (variance > 0) samples[colour].push_back({std::max(0.0, signal_e.value.at(x, y) * unit), variance});
     }

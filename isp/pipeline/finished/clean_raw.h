@@ -18,7 +18,7 @@ struct CleanRaw {
 /// Subtracts lines and dark charge from a Bayer frame, reduces its noise, repairs its defects, and encodes it again in
 /// 16 bits.
 ///
-/// Codes are black + (white - black) * signal / electrons at white. Black is so far above 0 that 8 standard deviations
+/// Codes are black + (white - black) * signal / light_at_white_e. Black is so far above 0 that 8 standard deviations
 /// of a dark pixel stay positive: negative electrons survive. Codes are rounded up with the probability of their
 /// fraction, so that no mean is biased and smooth shadows do not break into steps; that adds 1/6 DN^2 on average.
 /// Saturated pixels get the code of white. Corrections that the source requests for linear values (gain maps) are still
@@ -32,8 +32,9 @@ Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options,
 /// offsets at least 0.
 /// @param signal_e         the clean mosaic
 /// @param site_variance_e2 of R, G, B in each 2x2 cell
+/// @param light_e          signal of a white pixel
 /// @param added            variance of the codes' rounding, in fractions of white squared
 NoiseProfile residual_profile(const SignalElectrons& signal_e, const std::array<Plane<float>, 3>& site_variance_e2,
-                              const PerSite<double>& electrons_at_white, double added);
+                              const PerSite<double>& light_e, double added);
 
 }  // namespace lowlux::isp

@@ -159,27 +159,32 @@ std::string warning_of(const DarkCharge& dark, const FrameInfo& info) {
 
 Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels& levels) {
   Thumbnail out{CameraRgb(thumbnail.mean.width(), thumbnail.mean.height()), thumbnail.black_noise_std};
-  std::array<double, 3> dark{};
-  for (int site = 0; site < 4 && levels.electrons_at_white; ++site) {
-    const auto c = static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1));
-    dark[c] += levels.black.dark_mean_e[site] / (*levels.electrons_at_white)[site] * (c == 1 ? 0.5 : 1);
+  std::array<double, 3> electrons{1, 1, 1}, light_e{1, 1, 1};
+  if (levels.electrons_at_white) {
+    electrons = electrons_by_colour(raw, levels);
+    light_e = light_at_white_by_colour(raw, levels);
   }
+  double gain = 0;  // of the noise, as the mean over pixels
   for (std::size_t c = 0; c < 3; ++c) {
+    const auto per_light = static_cast<float>(electrons[c] / light_e[c]);
+    const auto dark = static_cast<float>(1 - light_e[c] / electrons[c]);
+    gain += fraction_of_sites[c] * static_cast<double>(per_light);
     const Plane<float>& from = thumbnail.mean.plane[c];
     std::transform(from.data(), from.data() + from.size(), out.mean.plane[c].data(),
-                   [&](float mean) { return mean - static_cast<float>(dark[c]); });
+                   [&](float mean) { return per_light * (mean - dark); });
   }
+  out.black_noise_std *= gain;
   return out;
 }
 
 std::optional<double> signal_fraction_at_median(const RawFrame& frame, const RawLevels& levels,
                                                 const Rendering& rendering, const Thumbnail& light, double mean_e) {
   if (!levels.electrons_at_white) return std::nullopt;
-  const std::array<double, 3> electrons = electrons_by_colour(frame.raw, levels);
+  const std::array<double, 3> light_e = light_at_white_by_colour(frame.raw, levels);
   Vector3 signal{}, dark{};
   for (std::size_t c = 0; c < 3; ++c) {
     signal[c] = median_of(light.mean.plane[c]);
-    dark[c] = std::max(mean_e, 0.0) / electrons[c];
+    dark[c] = std::max(mean_e, 0.0) / light_e[c];
   }
   if (rendering.white) {
     const Result<Matrix3> to_xyz = camera_to_xyz(frame.colour, rendering.white->xy, rendering.white->xy);

@@ -41,7 +41,8 @@ DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, cons
 /// Returns the warning of State::unknown; empty in other states.
 std::string warning_of(const DarkCharge& dark, const FrameInfo& info);
 
-/// Returns the thumbnail without the dark charge that is known and still in the codes: it is not light.
+/// Returns the thumbnail without the dark charge that is known and still in the codes, which is not light, in fractions
+/// of light_at_white_e.
 Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels& levels);
 
 /// Returns alpha of thesis Eq. 4.24 for the median of the light of the blocks: the fraction of X + Y + Z that is light,

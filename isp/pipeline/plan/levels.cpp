@@ -1,10 +1,23 @@
 #include "isp/pipeline/plan/levels.h"
 
 #include <algorithm>
+#include <cassert>
+#include <cstddef>
 
 #include "isp/raw/corrections.h"
 
 namespace lowlux::isp {
+namespace {
+
+std::array<double, 3> by_colour(const RawDn& raw, const PerSite<double>& sites) {
+  std::array<double, 3> out{};
+  for (int site = 0; site < 4; ++site) {
+    out[static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1))] = sites[site];
+  }
+  return out;
+}
+
+}  // namespace
 
 bool renders_from_codes(const RawFrame& frame, const RawLevels& levels, bool reduces_noise) {
   return frame.raw.layout == SensorLayout::bayer && !reduces_noise && levels.defects.empty() && !levels.dark_frame &&
@@ -13,11 +26,20 @@ bool renders_from_codes(const RawFrame& frame, const RawLevels& levels, bool red
 }
 
 std::array<double, 3> electrons_by_colour(const RawDn& raw, const RawLevels& levels) {
-  std::array<double, 3> out{};
+  return by_colour(raw, *levels.electrons_at_white);
+}
+
+PerSite<double> light_at_white_e(const RawLevels& levels) {
+  PerSite<double> out = *levels.electrons_at_white;
   for (int site = 0; site < 4; ++site) {
-    out[static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1))] = (*levels.electrons_at_white)[site];
+    out[site] -= levels.black.dark_mean_e[site];
+    assert(out[site] > 0);
   }
   return out;
+}
+
+std::array<double, 3> light_at_white_by_colour(const RawDn& raw, const RawLevels& levels) {
+  return by_colour(raw, light_at_white_e(levels));
 }
 
 }  // namespace lowlux::isp

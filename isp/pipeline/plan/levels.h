@@ -28,4 +28,10 @@ bool renders_from_codes(const RawFrame& frame, const RawLevels& levels, bool red
 /// levels.electrons_at_white.
 std::array<double, 3> electrons_by_colour(const RawDn& raw, const RawLevels& levels);
 
+/// Returns the charge of light in a white pixel of each site [e-], electrons at white less the dark charge that is
+/// subtracted: light and dark charge saturate a pixel together. Precondition: levels.electrons_at_white.
+PerSite<double> light_at_white_e(const RawLevels& levels);
+/// Returns light_at_white_e of each colour. Precondition: levels.electrons_at_white.
+std::array<double, 3> light_at_white_by_colour(const RawDn& raw, const RawLevels& levels);
+
 }  // namespace lowlux::isp

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "isp/pipeline/render/cell_figures.h"
+
 namespace lowlux::isp {
 namespace {
 
@@ -16,10 +18,10 @@ constexpr double residual_fraction = 1.0 / 16;
 
 bool came_reduced(const RawFrame& frame) { return frame.noise && frame.noise->reduced; }
 
-/// Returns the electrons at white of green. A noise profile of what noise reduction left states less variance for each
-/// electron.
+/// Returns the charge of light in a white green pixel [e-]. A noise profile of what noise reduction left states less
+/// variance for each electron.
 double green_e_at_white(const RawFrame& frame, const RawLevels& levels) {
-  return electrons_by_colour(frame.raw, levels)[1] * (came_reduced(frame) ? residual_fraction : 1);
+  return light_at_white_by_colour(frame.raw, levels)[1] * (came_reduced(frame) ? residual_fraction : 1);
 }
 
 DemosaicPlan chosen(const RawFrame& frame, const NoiseReduction& noise, const DemosaicRequest& request) {
@@ -59,8 +61,9 @@ DemosaicPlan plan_demosaic(const RawFrame& frame, const RawLevels& levels, const
     // The variance of u = cbrt(x + offset) is that of x over 9 (x + offset)^(4/3).
     const double signal_e = std::max(*request.signal_e, 0.0), x = signal_e * per_e;
     const bool is_reduced = noise.reduces() && !came_reduced(frame);
-    const double variance_of_white = frame.noise->scale[1] * signal_e / green_e + frame.noise->offset[1];
-    const double variance = variance_of_white * (is_reduced ? residual_fraction : 1) * std::pow(per_e * green_e, 2);
+    const double dark_e = mean_of_sites(levels.black.dark_mean_e), full_e = green_e + dark_e;
+    const double variance_of_white = frame.noise->scale[1] * (signal_e + dark_e) / full_e + frame.noise->offset[1];
+    const double variance = variance_of_white * (is_reduced ? residual_fraction : 1) * std::pow(per_e * full_e, 2);
     how.noise_std = static_cast<float>(std::sqrt(std::max(variance, 0.0)) / (3 * std::pow(x + how.offset, 2.0 / 3)));
   }
   return out;

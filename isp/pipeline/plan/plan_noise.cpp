@@ -59,9 +59,10 @@ std::array<double, 3> balance_of(const RawFrame& frame, const RawLevels& levels,
   if (space == OutputSpace::camera && frame.colour.as_shot_neutral) {
     for (int c = 0; c < 3; ++c) gain[c] = 1 / (*frame.colour.as_shot_neutral)[c];
   }
+  const PerSite<double> light_e = light_at_white_e(levels);
   for (int site = 0; site < 4; ++site) {
     const int colour = colour_of(frame.raw, site);
-    gain[colour] /= std::pow((*levels.electrons_at_white)[site], colour == 1 ? 0.5 : 1.0);
+    gain[colour] /= std::pow(light_e[site], colour == 1 ? 0.5 : 1.0);
   }
   const double green = gain[1];
   for (double& g : gain) g = std::clamp(g / green, 1e-3, 1e3);

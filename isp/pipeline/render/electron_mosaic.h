@@ -25,9 +25,10 @@ void raw_electrons(const RawFrame& frame, const RawLevels& levels, const Rect& p
 /// Returns values of the active area's sites in the order of the sites of a crop of it.
 PerSite<float> of_crop(const PerSite<double>& active, const Rect& crop);
 
-/// Returns the value of a white pixel of each site in the mosaic: electrons, or 1 where it is in fractions of white.
+/// Returns the value of a white pixel of each site in the mosaic without dark charge: electrons, or 1 where it is in
+/// fractions of white.
 inline PerSite<double> units_at_white(const RawLevels& levels) {
-  return levels.electrons_at_white.value_or(PerSite<double>{1, 1, 1, 1});
+  return levels.electrons_at_white ? light_at_white_e(levels) : PerSite<double>{1, 1, 1, 1};
 }
 
 /// Returns the white-balance gain of each site of a crop of the active area, divided by the site's value at white.
