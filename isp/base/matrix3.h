@@ -28,6 +28,14 @@ constexpr Matrix3 operator*(const Matrix3& a, const Matrix3& b) {
   return out;
 }
 
+constexpr Matrix3 transposed(const Matrix3& m) {
+  Matrix3 out{};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) out[i][j] = m[j][i];
+  }
+  return out;
+}
+
 constexpr Matrix3 operator*(double s, const Matrix3& m) { return diagonal3({s, s, s}) * m; }
 
 /// Returns the inverse by cofactors; nullopt if a value is not finite or the matrix is singular to about 1e-12 of its

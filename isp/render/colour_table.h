@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "isp/base/executor.h"
@@ -36,6 +37,9 @@ struct ColourTableError {
 /// two, linear between levels, proportional below the lowest (2^-18 of the brightest) and above the highest. The
 /// identity is linear in the fractions, so it is reproduced exactly.
 ///
+/// A table by noise has a level for each octave or part of an octave of the ratio of noise to signal, from 2^-5 to 2^5,
+/// each with a homogeneous map, and is linear between them; ratios outside take the outermost level.
+///
 /// Fractions below -margin are moved to it, towards the grey of equal luminance; margin is small enough for every
 /// colour within to have positive luminance, so that there is no step where luminance becomes 0. Negative luminance
 /// gives the grey that colours next to black map to, scaled.
@@ -44,6 +48,7 @@ struct ColourTable {
   Vector3 grey{};       // result for a grey of Y = 1, taken from the darkest level
   double margin = 0;
   int cells = 0;              // in either direction
+  bool by_noise = false;      // levels are ratios of noise to signal, not sums
   int levels = 1;             // 1: the map is homogeneous
   int levels_per_octave = 1;  // a power of two
   int first_level_log2 = 0;   // the lowest level is 2^this
@@ -60,9 +65,28 @@ struct ColourTable {
 /// whose result is not finite.
 Result<ColourTable> make_colour_table(const ColourMap& map, const ColourTableRequest& request);
 
+/// Makes a homogeneous map for a ratio of noise to signal.
+using NoiseColourMap = std::function<Result<ColourMap>(double noise_to_signal)>;
+
+/// Tabulates a map over chromaticity and the ratio of noise to signal, as make_colour_table does over brightness.
+/// Errors: as make_colour_table, and those of the maps.
+Result<ColourTable> make_noise_colour_table(const NoiseColourMap& maps, const ColourTableRequest& request);
+
 /// Applies the table to every pixel; planes have equal size, `out` may be `in`. A sample that is not a number counts as
-/// 0, one beyond +-1e30 as +-1e30.
+/// 0, one beyond +-1e30 as +-1e30. Precondition: !table.by_noise.
 void apply_colour_table(const ColourTable& table, const RgbView<const float>& in, const RgbView<float>& out,
                         Executor& executor);
+
+/// Holds the ratio of noise to signal around the centres of cells of `cell` x `cell` pixels, linear between them.
+struct NoiseGrid {
+  static constexpr int cell = 16;
+  static constexpr int cells_along(int pixels) { return (pixels + cell - 1) / cell; }
+  PlaneView<const float> noise_to_signal;  // at least 0, not NaN
+};
+
+/// Applies a table by noise to every pixel. Precondition: table.by_noise.
+/// @param noise  cells_along(height) x cells_along(width)
+void apply_colour_table(const ColourTable& table, const RgbView<const float>& in, const NoiseGrid& noise,
+                        const RgbView<float>& out, Executor& executor);
 
 }  // namespace lowlux::isp

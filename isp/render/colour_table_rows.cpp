@@ -67,7 +67,7 @@ struct Kernel {
   }
 
   /// Returns the table's result for a colour within it, for a sum of 1.
-  HWY_INLINE Colour looked_up(const Colour& in, VF sum) const {
+  HWY_INLINE Colour looked_up(const Colour& in, VF sum, VF level_value) const {
     const VF per_sum = hn::Div(constant(table.nodes_per_fraction), sum);
     const VF first = constant(table.margin * table.nodes_per_fraction);
     const Place x = place_of(hn::MulAdd(in.c[0], per_sum, first), table.cells);
@@ -80,7 +80,7 @@ struct Kernel {
       for (int c = 0; c < 3; ++c) out.c[c] = of_level(table.node + c, at, x, y);
       return out;
     }
-    const VI bits = hn::Sub(hn::BitCast(Ints(), sum), hn::Set(Ints(), table.first_level_bits));
+    const VI bits = hn::Sub(hn::BitCast(Ints(), level_value), hn::Set(Ints(), table.first_level_bits));
     const Place z = place_of(hn::Mul(hn::ConvertTo(Floats(), bits), constant(table.levels_per_bit)), table.levels - 1);
     const VI at = index(hn::MulAdd(hn::MulAdd(z.node, side, y.node), side, x.node));
     for (int c = 0; c < 3; ++c) {
@@ -90,7 +90,8 @@ struct Kernel {
     return out;
   }
 
-  HWY_INLINE Colour operator()(const Colour& from) const {
+  /// @param level_value  null: the sum
+  HWY_INLINE Colour operator()(const Colour& from, const float* level_value) const {
     const VF zero = hn::Zero(Floats());
     Colour in{{usable(from.c[0]), usable(from.c[1]), usable(from.c[2])}};
     const VF y =
@@ -106,7 +107,7 @@ struct Kernel {
     for (VF& c : in.c) c = hn::MulAdd(t, hn::Sub(c, grey), grey);
     const VF sum = hn::IfThenElse(lit, hn::Add(hn::Add(in.c[0], in.c[1]), in.c[2]), constant(1));
     for (VF& c : in.c) c = hn::IfThenElseZero(lit, c);
-    Colour out = looked_up(in, sum);
+    Colour out = looked_up(in, sum, level_value == nullptr ? sum : hn::LoadU(Floats(), level_value));
     for (int c = 0; c < 3; ++c) {
       out.c[c] = hn::IfThenElse(lit, hn::Mul(out.c[c], sum), hn::Mul(constant(table.grey[c]), y));
     }
@@ -114,14 +115,17 @@ struct Kernel {
   }
 };
 
-void ConvertRow(const float* const (&in)[3], int width, const Table& table, float* const (&out)[3]) {
+void ConvertRow(const float* const (&in)[3], const float* level_value, int width, const Table& table,
+                float* const (&out)[3]) {
   const Floats f;
   const Kernel kernel(table);
   const int n = static_cast<int>(hn::Lanes(f));
   HWY_ALIGN float ends[2][3][hn::MaxLanes(Floats())] = {};
+  HWY_ALIGN float end_of_levels[hn::MaxLanes(Floats())] = {};
   for (int x = 0; x < width; x += n) {
     const float* from[3] = {in[0] + x, in[1] + x, in[2] + x};
     float* to[3] = {out[0] + x, out[1] + x, out[2] + x};
+    const float* level = level_value == nullptr ? nullptr : level_value + x;
     const bool whole = x + n <= width;
     const std::size_t bytes = static_cast<std::size_t>(width - x) * sizeof(float);
     if (!whole) {
@@ -130,8 +134,12 @@ void ConvertRow(const float* const (&in)[3], int width, const Table& table, floa
         from[c] = ends[0][c];
         to[c] = ends[1][c];
       }
+      if (level != nullptr) {
+        std::memcpy(end_of_levels, level, bytes);
+        level = end_of_levels;
+      }
     }
-    const Colour seen = kernel({{hn::LoadU(f, from[0]), hn::LoadU(f, from[1]), hn::LoadU(f, from[2])}});
+    const Colour seen = kernel({{hn::LoadU(f, from[0]), hn::LoadU(f, from[1]), hn::LoadU(f, from[2])}}, level);
     for (int c = 0; c < 3; ++c) hn::StoreU(seen.c[c], f, to[c]);
     if (!whole) {
       for (int c = 0; c < 3; ++c) std::memcpy(out[c] + x, to[c], bytes);
@@ -150,8 +158,9 @@ namespace lowlux::isp::table_rows {
 HWY_EXPORT(ConvertRow);
 HWY_EXPORT(TargetName);
 
-void convert_row(const float* const (&in)[3], int width, const Table& table, float* const (&out)[3]) {
-  HWY_DYNAMIC_DISPATCH(ConvertRow)(in, width, table, out);
+void convert_row(const float* const (&in)[3], const float* level_value, int width, const Table& table,
+                 float* const (&out)[3]) {
+  HWY_DYNAMIC_DISPATCH(ConvertRow)(in, level_value, width, table, out);
 }
 const char* target_name() { return HWY_DYNAMIC_DISPATCH(TargetName)(); }
 

@@ -20,7 +20,10 @@ struct Table {
 };
 
 /// Converts one row of planar R, G, B; `out` may be `in`.
-void convert_row(const float* const (&in)[3], int width, const Table& table, float* const (&out)[3]);
+/// @param level_value  what the levels of the table stand for, if it is not the sum of R, G and B: a value above 0 for
+///                     each pixel; else null
+void convert_row(const float* const (&in)[3], const float* level_value, int width, const Table& table,
+                 float* const (&out)[3]);
 
 /// Returns the name of the instruction set in use.
 const char* target_name();

@@ -105,11 +105,7 @@ Xyz xyz_of_charge(const ThesisCamera& camera, const Vector3& charge) {
 std::optional<ChromaticityCloud> sensor_cloud(const ThesisCamera& camera, const Vector3& mean_e,
                                               const Vector3& variance_e2) {
   const Matrix3 m = camera.sensor.system_gain_dn_per_e * camera.dn_to_xyz;
-  Matrix3 transposed{};
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) transposed[i][j] = m[j][i];
-  }
-  return propagated_cloud(xyz_of(m * mean_e), m * diagonal3(variance_e2) * transposed);
+  return propagated_cloud(xyz_of(m * mean_e), m * diagonal3(variance_e2) * transposed(m));
 }
 
 std::vector<Xy> chromaticities(const ThesisCamera& camera, const std::vector<Vector3>& dn) {

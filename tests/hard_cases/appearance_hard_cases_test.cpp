@@ -214,6 +214,34 @@ TEST(HardCaseMesopic, EntropyOfWhatNoSpectrumGives) {
             });
 }
 
+// Noise from a thousandth to a thousand times the signal, equal in R, G and B behind the matrix of sRGB.
+TEST(HardCaseMesopic, EntropyOfNoisyPixels) {
+  model_row(
+      {group, "spectral model: noise of 1e-3 to 1e3 times the signal", "its gradient in 50 digits", "gradient"},
+      {1e-10, rounding}, [](Denormals m) {
+        isp::NodePower even{};
+        even.fill(1);
+        const Matrix3 noise = isp::noise_covariance_of_xyz({.variance_e2 = {1, 1, 1}, .camera_to_xyz = srgb_to_xyz});
+        double worst = 0;
+        for (const double adaptation : {0.0, 0.48, 1.0}) {
+          const isp::EntropyModel model = *isp::entropy_model(adaptation, even, {.noise_covariance = noise});
+          for (const Vector3& eta : {Vector3{0.1, 0.9, 0.1}, {0.6, 0.57, 0.1}, {0.0, 0.0, 1.0}}) {
+            for (double ratio = 1e-3; ratio < 2e3; ratio *= 10) {
+              const double variance = 0.09 * ratio * ratio;  // the eye's weight of an even spectrum is 0.3
+              const auto fit = in_mode(m, [&] { return isp::entropy_fit(model, eta, variance); });
+              if (!fit) return nan;
+              const Vector3 by_noise = model.noise * fit->theta;
+              Vector3 target = eta;
+              for (std::size_t c = 0; c < 3; ++c) target[c] -= variance * by_noise[c];
+              keep_worst(worst, reference::entropy_gradient(model.explained.f, model.explained.weight_nm, fit->theta,
+                                                            target, model.gamma));
+            }
+          }
+        }
+        return worst;
+      });
+}
+
 TEST(HardCaseMesopic, EveryModelKeepsFiniteColoursFinite) {
   HardCase row({group, "every model: black, negative, 1e-300 and 1e300, in light of 1e-11 to 1e12 cd/m2",
                 "finite figures", "answers that are not; pictures with other numbers (file)"});

@@ -251,6 +251,47 @@ TEST(EyeLook, DimsOnlyAnAutomaticExposure) {
               bright->plan.rendering.exposure_ev + dimmed->plan.rendering.look->dimming_ev, 1e-12);
 }
 
+/// The saturation of an orange field of this charge in green by day, as the spectral model shows it to an observer who
+/// knows the noise, relative to that without noise.
+double saturation_by_noise(double green_e, const DenoiseChoice& denoise) {
+  denoise_testing::Camera camera;
+  camera.read_noise_e = 2;
+  RawFrame frame = test::night_frame(camera, denoise_testing::flat(0.5 * 1.8 * green_e, green_e, 0.625 * 0.5 * green_e),
+                                     width, height);
+  frame.raw.info.exposure_s = 0.01;
+  DevelopOptions options = eye_at(200);
+  options.look.look = Look::model;
+  options.look.model = "entropy";
+  options.exposure_ev = std::log2(0.18 * test::night_full_e() / green_e);
+  options.denoise = denoise;
+  options.denoise.unbiased_chroma = true;
+  const auto mean = [&] {
+    InlineExecutor executor;
+    Result<Developed> developed = develop(frame, options, executor);
+    EXPECT_TRUE(developed) << developed.error().message;
+    EXPECT_EQ(developed->plan.rendering.look->table->by_noise, frame.noise.has_value());
+    return field_of(std::get<SceneLinear>(developed->picture), 1);
+  };
+  const double weighed = saturation(mean());
+  frame.noise.reset();
+  options.denoise = {};
+  return weighed / saturation(mean());
+}
+
+// The covariance enters with its size: a pixel of one electron keeps less of its colour than one of thousands, and what
+// noise reduction leaves counts, not what came in.
+TEST(ModelLook, TheSpectralModelWeighsTheNoiseThatIsLeft) {
+  using Mode = DenoiseChoice::Mode;
+  const double dark = saturation_by_noise(1, {.mode = Mode::off});
+  const double bright = saturation_by_noise(2000, {.mode = Mode::off});
+  const double reduced = saturation_by_noise(1, {.mode = Mode::level, .level = denoise::Level::high});
+  RecordProperty("one_electron", std::to_string(dark));
+  RecordProperty("one_electron_reduced", std::to_string(reduced));
+  EXPECT_LT(dark, 0.7);
+  EXPECT_GT(reduced, 1.2 * dark);
+  EXPECT_NEAR(bright, 1, 0.02);
+}
+
 // A grey in the dark, by codes and by what the noise model says: its noise as it comes out, in L*.
 TEST(NoiseLimit, HoldsInThePicture) {
   InlineExecutor executor;

@@ -18,15 +18,15 @@ Step step_of(double place, int cells) {
   return {node, {1 - (inside - node), inside - node}};
 }
 
-/// Returns the position of a sum among the levels: octaves above the lowest, linear within each.
-double level_of(const isp::ColourTable& table, double sum) {
-  const int octave = std::ilogb(sum);
-  return (octave - table.first_level_log2 + std::ldexp(sum, -octave) - 1) * table.levels_per_octave;
+/// Returns the position of a sum or ratio among the levels: octaves above the lowest, linear within each.
+double level_of(const isp::ColourTable& table, double value) {
+  const int octave = std::ilogb(value);
+  return (octave - table.first_level_log2 + std::ldexp(value, -octave) - 1) * table.levels_per_octave;
 }
 
 }  // namespace
 
-Vector3 through_colour_table(const isp::ColourTable& table, const Vector3& rgb) {
+Vector3 through_colour_table(const isp::ColourTable& table, const Vector3& rgb, double noise_to_signal) {
   Vector3 in{};
   for (int c = 0; c < 3; ++c) in[c] = std::isnan(rgb[c]) ? 0 : std::clamp(rgb[c], -1e30, 1e30);
   const Vector3& w = table.luminance;
@@ -45,7 +45,8 @@ Vector3 through_colour_table(const isp::ColourTable& table, const Vector3& rgb) 
   const double nodes = table.cells / (1 + 3 * table.margin);
   const Step x = step_of((in[0] / sum + table.margin) * nodes, table.cells);
   const Step y = step_of((in[1] / sum + table.margin) * nodes, table.cells);
-  const Step z = table.levels == 1 ? Step{0, {1, 0}} : step_of(level_of(table, sum), table.levels - 1);
+  const double level_value = table.by_noise ? std::clamp(noise_to_signal, 1e-6, 1e6) : sum;
+  const Step z = table.levels == 1 ? Step{0, {1, 0}} : step_of(level_of(table, level_value), table.levels - 1);
   const int side = table.cells + 1;
   Vector3 out{};
   for (int corner = 0; corner < 8; ++corner) {

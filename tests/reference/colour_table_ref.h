@@ -6,6 +6,7 @@
 namespace lowlux::reference {
 
 /// Passes one pixel through a ColourTable, in double.
-Vector3 through_colour_table(const isp::ColourTable& table, const Vector3& rgb);
+/// @param noise_to_signal  for a table by noise
+Vector3 through_colour_table(const isp::ColourTable& table, const Vector3& rgb, double noise_to_signal = 0);
 
 }  // namespace lowlux::reference

@@ -10,6 +10,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "isp/base/random/philox.h"
@@ -94,6 +95,111 @@ const ColourTable& compressive_table() {
 // Float against double: 2^-24 in each of about ten steps, and in the place within a cell, where neighbouring nodes can
 // differ by their own size; times the number of cells. Relative to the sum of what is interpolated.
 constexpr double rounding = 1e-5;
+
+Result<ColourMap> entropy_with_noise(double noise_to_signal) {
+  ViewingConditions scene{.white_cd_m2 = 5};
+  scene.noise = ColourNoise{.covariance = noise_covariance_of_xyz({.variance_e2 = {1, 1, 1}, .camera_to_xyz = rec709}),
+                            .to_signal = noise_to_signal};
+  return entropy_appearance().at(scene);
+}
+
+const ColourTable& noise_table() {
+  static const ColourTable table = *make_noise_colour_table(entropy_with_noise, {});
+  return table;
+}
+
+/// Passes colours through noise_table(); planes of `width` pixels, ratios linear between cells.
+Pixels shown_with_noise(const Pixels& in, int width, const Plane<float>& ratios) {
+  const int height = static_cast<int>(in.size()) / width;
+  SceneLinear planes(width, height);
+  for (std::size_t i = 0; i < in.size(); ++i) {
+    for (int c = 0; c < 3; ++c) planes.plane[c].data()[i] = in[i][c];
+  }
+  PoolExecutor two(2);
+  apply_colour_table(noise_table(), std::as_const(planes).view(), NoiseGrid{ratios.view()}, planes.view(), two);
+  Pixels out(in.size());
+  for (std::size_t i = 0; i < in.size(); ++i) {
+    for (int c = 0; c < 3; ++c) out[i][c] = planes.plane[c].data()[i];
+  }
+  return out;
+}
+
+/// The ratio at a pixel, by the definition of NoiseGrid.
+double ratio_at(const Plane<float>& ratios, int x, int y) {
+  const auto axis = [](int pixel, int cells) {
+    const double place = std::clamp((pixel + 0.5) / NoiseGrid::cell - 0.5, 0.0, cells - 1.0);
+    const int cell = std::min(static_cast<int>(place), std::max(cells - 2, 0));
+    return std::pair(cell, place - cell);
+  };
+  const auto [i, s] = axis(x, ratios.width());
+  const auto [j, t] = axis(y, ratios.height());
+  const int right = std::min(i + 1, ratios.width() - 1), down = std::min(j + 1, ratios.height() - 1);
+  const double top = (1 - s) * ratios.at(i, j) + s * ratios.at(right, j);
+  const double bottom = (1 - s) * ratios.at(i, down) + s * ratios.at(right, down);
+  return (1 - t) * top + t * bottom;
+}
+
+// Widths and heights below, at and above a cell, ratios from nothing to no signal at all.
+TEST(ColourTable, KernelByNoiseIsTheReferenceForEveryInstructionSet) {
+  Draws draw{1000};
+  for (const auto& [width, height] : {std::pair(1, 1), {3, 40}, {16, 16}, {17, 33}, {131, 29}}) {
+    const Pixels in = any_colours(width * height);
+    Plane<float> ratios(NoiseGrid::cells_along(width), NoiseGrid::cells_along(height));
+    for (std::size_t i = 0; i < ratios.size(); ++i) {
+      ratios.data()[i] = i % 7 == 3 ? 1e6f : i % 5 == 2 ? 0.0f : static_cast<float>(std::exp2(16 * draw() - 9));
+    }
+    for (const std::int64_t target : test::kernel_targets()) {
+      const test::OnlyTarget only(target);
+      const Pixels out = shown_with_noise(in, width, ratios);
+      for (std::size_t i = 0; i < in.size(); ++i) {
+        const double ratio = ratio_at(ratios, static_cast<int>(i) % width, static_cast<int>(i) / width);
+        const Vector3 expected = reference::through_colour_table(noise_table(), {in[i][0], in[i][1], in[i][2]}, ratio);
+        const double size = std::fabs(in[i][0]) + std::fabs(in[i][1]) + std::fabs(in[i][2]);
+        const double gain = std::fabs(noise_table().grey[0]) + 1;
+        for (int c = 0; c < 3; ++c) {
+          ASSERT_NEAR(out[i][c], expected[c], rounding * gain * size) << i << " " << hwy::TargetName(target);
+        }
+      }
+    }
+  }
+}
+
+// Ratios and colours within the gamut drawn anew, not at the centres that the table was measured at.
+TEST(ColourTable, ByNoiseIsWithinItsBoundOfTheMap) {
+  EXPECT_TRUE(noise_table().within_bound);
+  EXPECT_TRUE(noise_table().by_noise);
+  Draws draw{5000};
+  std::vector<double> errors;
+  for (int i = 0; i < 60; ++i) {
+    const auto ratio = static_cast<float>(std::exp2(16 * draw() - 9));
+    const ColourMap map = *entropy_with_noise(ratio);
+    Plane<float> ratios(1, 1);
+    ratios.at(0, 0) = ratio;
+    Pixels in;
+    for (int k = 0; k < 16; ++k) {
+      in.push_back({static_cast<float>(draw()), static_cast<float>(draw()), static_cast<float>(draw())});
+    }
+    const Pixels out = shown_with_noise(in, 16, ratios);
+    for (std::size_t k = 0; k < in.size(); ++k) errors.push_back(difference(map, in[k], out[k]));
+  }
+  // Of n colours, 1 % may be beyond the bound, and 5 standard errors.
+  const auto n = static_cast<double>(errors.size());
+  EXPECT_LE(static_cast<double>(std::ranges::count_if(errors, [](double error) { return error > 0.5; })),
+            0.01 * n + 5 * std::sqrt(0.0099 * n));
+}
+
+TEST(ColourTable, ByNoiseReportsTheErrorsOfItsMaps) {
+  const auto refuses = [](double) -> Result<ColourMap> { return fail(ErrorCode::invalid_argument, "no such map"); };
+  const auto table = make_noise_colour_table(refuses, {});
+  ASSERT_FALSE(table);
+  EXPECT_EQ(table.error().message, "no such map");
+  const auto from_one = [](double ratio) -> Result<ColourMap> {
+    if (ratio > 1) return fail(ErrorCode::invalid_argument, "too much noise");
+    return identity;
+  };
+  EXPECT_FALSE(make_noise_colour_table(from_one, {}));
+  EXPECT_FALSE(make_noise_colour_table(entropy_with_noise, {.limit = 0}));
+}
 
 TEST(ColourTable, KernelIsTheReferenceForEveryInstructionSet) {
   const Pixels in = any_colours(4001);

@@ -15,6 +15,7 @@
 #include "isp/bench/stages/developing_stages.h"
 #include "isp/metrics/picture_metrics.h"
 #include "isp/model/appearance/appearance_model.h"
+#include "isp/model/appearance/entropy_model.h"
 #include "isp/model/vision/mesopic.h"
 #include "isp/model/vision/night_eye.h"
 #include "isp/render/colour_table.h"
@@ -178,9 +179,15 @@ std::vector<AccuracyRow> state_rows(const Colours& colours, double white_cd_m2) 
 struct ModelCase {
   const char* model;
   double white_cd_m2;
+  double noise_to_signal = 0;  // above 0: tables over this ratio, equal noise in R, G and B
 };
-constexpr std::array<ModelCase, 6> model_cases{
-    {{"entropy", 0.5}, {"shin", 0.5}, {"wanat_mantiuk", 0.5}, {"icam06", 0.5}, {"entropy", 5}, {"hunt", 0.5}}};
+constexpr std::array<ModelCase, 7> model_cases{{{"entropy", 0.5},
+                                                {"shin", 0.5},
+                                                {"wanat_mantiuk", 0.5},
+                                                {"icam06", 0.5},
+                                                {"entropy", 5},
+                                                {"hunt", 0.5},
+                                                {"entropy", 100, 0.7}}};
 constexpr std::size_t quick_models = 2;
 constexpr std::array bounds{2.0, 0.5, 0.1, 0.02};
 constexpr std::size_t quick_bounds = 2;
@@ -210,13 +217,33 @@ struct MadeTable {
   double made_s = 0;
 };
 
+ViewingConditions scene_of(const ModelCase& of, double noise_to_signal) {
+  ViewingConditions out{.white_cd_m2 = of.white_cd_m2, .white = white()};
+  if (of.noise_to_signal > 0) {
+    const ChannelNoise equal{.variance_e2 = {1, 1, 1}, .camera_to_xyz = to_xyz()};
+    out.noise = ColourNoise{.covariance = noise_covariance_of_xyz(equal), .to_signal = noise_to_signal};
+  }
+  return out;
+}
+
+Result<ColourTable> table_within(const AppearanceModel& model, const ModelCase& of, double bound) {
+  if (of.noise_to_signal > 0) {
+    return make_noise_colour_table([&](double ratio) { return model.at(scene_of(of, ratio)); },
+                                   {.error_bound = bound, .largest_bytes = std::size_t{4} << 20});
+  }
+  const Result<ColourMap> map = model.at(scene_of(of, 0));
+  if (!map) return tl::make_unexpected(map.error());
+  return make_colour_table(*map, {.error_bound = bound});
+}
+
 /// Returns tables of rising size; if several bounds give one size, only the first is kept.
-Result<std::vector<MadeTable>> tables_of(const ColourMap& map, std::span<const double> of_bounds) {
+Result<std::vector<MadeTable>> tables_of(const AppearanceModel& model, const ModelCase& of,
+                                         std::span<const double> of_bounds) {
   std::vector<MadeTable> out;
   out.reserve(of_bounds.size());
   for (const double bound : of_bounds) {
     const auto start = std::chrono::steady_clock::now();
-    auto table = make_colour_table(map, {.error_bound = bound});
+    auto table = table_within(model, of, bound);
     if (!table) return tl::make_unexpected(table.error());
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     if (!out.empty() && out.back().table.node.size() == table->node.size()) continue;
@@ -229,20 +256,29 @@ Result<std::vector<AccuracyRow>> model_rows(const Colours& colours, const ModelC
                                             std::span<const double> of_bounds, std::vector<std::string>& remarks) {
   const auto model = appearance_model_named(of.model);
   if (!model) return tl::make_unexpected(model.error());
-  const auto map = model->at({.white_cd_m2 = of.white_cd_m2, .white = white()});
+  const auto map = model->at(scene_of(of, of.noise_to_signal));
   if (!map) return tl::make_unexpected(map.error());
-  const auto tables = tables_of(*map, of_bounds);
+  const auto tables = tables_of(*model, of, of_bounds);
   if (!tables) return tl::make_unexpected(tables.error());
   InlineExecutor one;
   SceneLinear out(colours.rgb.width(), 1);
   map_each(*map, colours.rgb, out);
   const std::vector<Lab> exact = lab_of_planes(out);
-  AccuracyGroup group{
-      fmt::format("{}, white {:g} cd/m2", of.model, of.white_cd_m2), "mean CIEDE2000 against exact", {}};
+  std::string name = fmt::format("{}, white {:g} cd/m2", of.model, of.white_cd_m2);
+  if (of.noise_to_signal > 0) name += fmt::format(", noise of {:g} of the signal", of.noise_to_signal);
+  AccuracyGroup group{std::move(name), "mean CIEDE2000 against exact", {}};
+  Plane<float> ratio(NoiseGrid::cells_along(colours.rgb.width()), 1);
+  std::fill_n(ratio.data(), ratio.size(), static_cast<float>(of.noise_to_signal));
   const double megapixels = 1e-6 * static_cast<double>(colours.size());
   std::string made = group.name + ": tables made in";
   for (const MadeTable& each : *tables) {
-    const auto look_up = [&] { apply_colour_table(each.table, colours.rgb.view(), out.view(), one); };
+    const auto look_up = [&] {
+      if (each.table.by_noise) {
+        apply_colour_table(each.table, colours.rgb.view(), NoiseGrid{ratio.view()}, out.view(), one);
+      } else {
+        apply_colour_table(each.table, colours.rgb.view(), out.view(), one);
+      }
+    };
     look_up();
     const ColourDifference error = difference_of(lab_of_planes(out), exact);
     group.levels.push_back({.name = fmt::format("table, {} cells x {} levels", each.table.cells, each.table.levels),

@@ -102,6 +102,7 @@ void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, co
                     "table of {0} x {0} chromaticities, {1} levels: off by {2:.2f} CIEDE2000 in the mean, {3:.2f} at "
                     "most",
                     look.table->cells, look.table->levels, look.table->error.mean, look.table->error.largest));
+    if (look.table->by_noise) out.add("", "colours weighed by the noise that is left at each place");
     if (name == "shin") out.add("", fmt::format("coefficients = {}", coefficients));
   }
   if (look.noise_limit) {

@@ -146,6 +146,7 @@ Json look_json(const isp::DevelopPlan& plan) {
   if (look.table) {
     json["table_mean_ciede2000"] = look.table->error.mean;
     json["table_max_ciede2000"] = look.table->error.largest;
+    json["weighed_by_noise"] = look.table->by_noise;
     if (model == "shin") json["coefficients"] = coefficients_of(plan.options.look);
   }
   json["scene_luminance_cd_m2"] = look.mean_cd_m2;

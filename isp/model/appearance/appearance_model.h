@@ -19,6 +19,12 @@ struct ShinTable;
 /// authors measured them, or by the unconverted figure in cd/m2, as the thesis does.
 enum class ShinUnits : std::uint8_t { lux, luminance_as_is };
 
+/// States the noise of a measured colour, for models that weigh it.
+struct ColourNoise {
+  Matrix3 covariance = identity3();  // of X, Y and Z where the noise of Y has a variance of 1
+  double to_signal = 0;              // standard deviation of Y over Y
+};
+
 /// Describes how a scene is seen.
 struct ViewingConditions {
   double white_cd_m2 = 100;  // luminance of a perfect white diffuser in the scene
@@ -28,7 +34,7 @@ struct ViewingConditions {
   std::optional<double> colour_temperature_k;  // of the light
   const ShinTable* shin = nullptr;             // absent: the substitute SHIN-SUB-1
   ShinUnits shin_units = ShinUnits::lux;
-  std::optional<Matrix3> noise_covariance;  // of cone responses, up to a factor: for the spectral model
+  std::optional<ColourNoise> noise;  // for AppearanceModel::uses_noise
 
   double adaptation() const { return adaptation_cd_m2.value_or(0.2 * white_cd_m2); }
 };
@@ -45,6 +51,7 @@ struct AppearanceModel {
   std::string_view limits;      // effects not modelled, in a sentence
   double valid_from_cd_m2 = 0;  // luminance of the scene's white; outside, results are extrapolated
   double valid_to_cd_m2 = 0;
+  bool uses_noise = false;  // results depend on ViewingConditions::noise
   /// Makes the map for given conditions; everything that does not depend on the colour is computed here, once. Errors:
   /// invalid_argument for conditions that are not positive and finite (luminances within 1e-12..1e12 cd/m2), or a white
   /// that leaves a cone or the rods dark.

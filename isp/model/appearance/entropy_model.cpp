@@ -63,11 +63,10 @@ Vector3 moments_of(const SpectralBasis<3>& basis, const NodePower& power) {
   return sum;
 }
 
-/// Returns A^-1 = 3 / trace(S) S of a covariance S, so that A = I where noise is the same in all directions.
-Result<Matrix3> inverse_weight(const Matrix3& covariance) {
+Result<void> check_covariance(const Matrix3& covariance) {
   const double trace = covariance[0][0] + covariance[1][1] + covariance[2][2];
-  const auto refuse = [](const std::string& found) {
-    return fail(ErrorCode::invalid_argument, "the noise covariance of cone responses must be " + found +
+  const auto refuse = [](const std::string& expected) {
+    return fail(ErrorCode::invalid_argument, "the noise covariance of X, Y and Z must be " + expected +
                                                  "; give one of three channels that each have noise");
   };
   if (!std::isfinite(trace) || !(trace > 0)) return refuse("finite with a positive trace, found " + number_text(trace));
@@ -81,7 +80,13 @@ Result<Matrix3> inverse_weight(const Matrix3& covariance) {
   const double mixed = s[1][2] - s[0][1] * s[0][2] / s[0][0];
   const double third = s[2][2] - s[0][2] * s[0][2] / s[0][0] - mixed * mixed / second;
   if (!(s[0][0] > 1e-12 && second > 1e-12 && third > 1e-12)) return refuse("positive definite");
-  return s;
+  return {};
+}
+
+void carry_noise(const EntropyOptions& options, EntropyModel& model) {
+  if (!options.noise_covariance) return;
+  const Matrix3 to_eta = diagonal3(model.adaptation) * response_matrix(model.measured);
+  model.noise = to_eta * *options.noise_covariance * transposed(to_eta);
 }
 
 }  // namespace
@@ -103,12 +108,13 @@ Result<EntropyModel> entropy_model(double m, const NodePower& white, const Entro
     return fail(ErrorCode::invalid_argument, "the white needs power between 390 and 730 nm to compare colours with");
   }
   if (options.noise_covariance) {
-    const Result<Matrix3> weight = inverse_weight(*options.noise_covariance);
-    if (!weight) return tl::make_unexpected(weight.error());
-    model.inverse_a = *weight;
+    if (const auto checked = check_covariance(*options.noise_covariance); !checked) {
+      return tl::make_unexpected(checked.error());
+    }
   }
   if (options.variant == EntropyVariant::thesis) {
     model.explained = model.measured;
+    carry_noise(options, model);
     return model;
   }
   model.explained = basis_of(options.cones, 0);
@@ -119,6 +125,7 @@ Result<EntropyModel> entropy_model(double m, const NodePower& white, const Entro
     }
     model.adaptation[c] = by_cones[c] / seen[c];
   }
+  carry_noise(options, model);
   return model;
 }
 
@@ -126,12 +133,16 @@ Vector3 entropy_moments(const EntropyModel& model, const NodePower& power) {
   return diagonal3(model.adaptation) * moments_of(model.measured, power);
 }
 
-std::optional<MaxEntropyFit<3>> entropy_fit(const EntropyModel& model, const Vector3& eta) {
-  return fit_max_entropy<3>(model.explained, eta, model.inverse_a, model.gamma);
+std::optional<MaxEntropyFit<3>> entropy_fit(const EntropyModel& model, const Vector3& eta, double luminance_variance) {
+  Matrix3 inverse_a = identity3();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) inverse_a[i][j] += 2 * luminance_variance / model.gamma * model.noise[i][j];
+  }
+  return fit_max_entropy<3>(model.explained, eta, inverse_a, model.gamma);
 }
 
 std::optional<MaxEntropyFit<3>> entropy_fit_of_luminance(const EntropyModel& model, const Vector3& responses,
-                                                         double luminance) {
+                                                         double luminance, double noise_to_signal) {
   NodePower even;
   even.fill(1);
   double luminance_of_fit = 0;  // luminance at power 1
@@ -139,7 +150,8 @@ std::optional<MaxEntropyFit<3>> entropy_fit_of_luminance(const EntropyModel& mod
   std::optional<MaxEntropyFit<3>> fit;
   for (int round = 0; round < luminance_rounds; ++round) {
     const double power = luminance / luminance_of_fit;
-    fit = entropy_fit(model, {responses[0] / power, responses[1] / power, responses[2] / power});
+    const double noise = noise_to_signal * luminance_of_fit;
+    fit = entropy_fit(model, {responses[0] / power, responses[1] / power, responses[2] / power}, noise * noise);
     if (!fit) break;
     luminance_of_fit = xyz_of(model, *fit).y;
   }
@@ -157,8 +169,7 @@ Xyz xyz_of(const EntropyModel& model, const MaxEntropyFit<3>& fit) {
   return xyz_of(sum);
 }
 
-Matrix3 cone_matrix(ConeSet cones) {
-  const SpectralBasis<3> basis = basis_of(cones, 0);
+Matrix3 response_matrix(const SpectralBasis<3>& basis) {
   Matrix3 cross{}, gram{};
   for (int k = 0; k < entropy_nodes; ++k) {
     const Vector3& x = matching_functions()[k];
@@ -172,8 +183,8 @@ Matrix3 cone_matrix(ConeSet cones) {
   return cross * *inverse(gram);  // the functions are linearly independent
 }
 
-Matrix3 noise_covariance_of_cones(const ChannelNoise& noise, ConeSet cones) {
-  const Matrix3 m = cone_matrix(cones) * noise.camera_to_xyz;
+Matrix3 noise_covariance_of_xyz(const ChannelNoise& noise) {
+  const Matrix3& m = noise.camera_to_xyz;
   Matrix3 out{};
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
@@ -182,7 +193,7 @@ Matrix3 noise_covariance_of_cones(const ChannelNoise& noise, ConeSet cones) {
       }
     }
   }
-  return out;
+  return 1 / out[1][1] * out;
 }
 
 namespace {
@@ -230,15 +241,18 @@ struct EntropyMap {
   EntropyModel model;
   PixelPower power = PixelPower::lifted;
   double m = 0;
+  double noise_to_signal = 0;
   double white_luminance = 1;  // L_mes of the white of Y = 1
   Matrix3 to_display = identity3();
 
   std::optional<MaxEntropyFit<3>> fit(const NodePower& light, double luminance) const {
     const Vector3 eta = entropy_moments(model, light);
-    if (power == PixelPower::lifted) return entropy_fit(model, eta);
-    const double whole = total(light) * 5;
-    return entropy_fit_of_luminance(model, {eta[0] * whole, eta[1] * whole, eta[2] * whole},
-                                    luminance / luminous_efficacy_lm_w);
+    const double whole = total(light) * node_width_nm, visible = luminance / luminous_efficacy_lm_w;
+    if (power == PixelPower::lifted) {
+      const double noise = noise_to_signal * visible / whole;
+      return entropy_fit(model, eta, noise * noise);
+    }
+    return entropy_fit_of_luminance(model, {eta[0] * whole, eta[1] * whole, eta[2] * whole}, visible, noise_to_signal);
   }
 
   /// Returns the XYZ of the fitted spectrum, before adaptation to the display, of any luminance; nullopt if there is no
@@ -286,9 +300,19 @@ Result<ColourMap> entropy_colour_map(const ViewingConditions& conditions, const 
   if (!positive(conditions.white.y) || !white_xy || !(liftable(*white_xy) == *white_xy)) return no_white();
   const std::optional<NodePower> white = power_of(scaled(conditions.white, 1 / conditions.white.y));
   if (!white) return no_white();
-  Result<EntropyModel> model = entropy_model(m, *white, options);
+  EntropyOptions with_noise = options;
+  double noise_to_signal = 0;
+  if (conditions.noise) {
+    noise_to_signal = conditions.noise->to_signal;
+    with_noise.noise_covariance = conditions.noise->covariance;
+    if (!(noise_to_signal >= 0) || !std::isfinite(noise_to_signal)) {
+      return fail(ErrorCode::invalid_argument,
+                  "the ratio of noise to signal must be 0 or more and finite, found " + number_text(noise_to_signal));
+    }
+  }
+  Result<EntropyModel> model = entropy_model(m, *white, with_noise);
   if (!model) return tl::make_unexpected(model.error());
-  EntropyMap map{.model = std::move(*model), .power = options.power, .m = m};
+  EntropyMap map{.model = std::move(*model), .power = options.power, .m = m, .noise_to_signal = noise_to_signal};
   map.white_luminance = mesopic_luminance_cd_m2(m, {1, scotopic_of(*white)});
   const std::optional<Xyz> seen = map.appearance(*white, 1);
   const std::optional<Xy> from = seen ? xy_of(*seen) : std::nullopt;
@@ -301,13 +325,12 @@ Result<ColourMap> entropy_colour_map(const ViewingConditions& conditions, const 
 AppearanceModel entropy_appearance() {
   return {.name = "entropy",
           .source = "Clark & Skaff 2009, with rods",
-          .needs = "luminance and S/P of the adaptation field; the noise of cone responses if it is known",
+          .needs = "luminance and S/P of the adaptation field; the noise of each pixel if it is known",
           .limits = "spectra are the smoothest of their colours; no lightness beyond mesopic luminance, no acuity",
           .valid_from_cd_m2 = 0.025,  // five times the adaptation fields of CIE 191, 0.005 to 5 cd/m2
           .valid_to_cd_m2 = 25,
-          .at = [](const ViewingConditions& conditions) {
-            return entropy_colour_map(conditions, {.noise_covariance = conditions.noise_covariance});
-          }};
+          .uses_noise = true,
+          .at = [](const ViewingConditions& conditions) { return entropy_colour_map(conditions, {}); }};
 }
 
 }  // namespace lowlux::isp

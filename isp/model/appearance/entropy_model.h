@@ -17,6 +17,13 @@ namespace lowlux::isp {
 // luminance the rods' weight in the responses grows and the confidence in them falls (thesis Eq. 5.1 to 5.9; Clark &
 // Skaff, J. Opt. Soc. Am. A 26 (2009)). A response is f_i = cone_i + xi w_i V', w = (3, 3, 5), cones and V' with peak
 // 1.
+//
+// The noise of a pixel lowers that confidence further. The fit minimises |moments - eta|^2 weighted by A, less gamma
+// times the entropy, and depends on gamma A^-1 alone. With responses eta to a light of power 1 and their covariance C,
+//     gamma A^-1 = 2 (1 - m) I + 2 C,
+// for then the data term is chi-square and the entropy counts as the logarithm of a prior: 2 (1 - m) I is what the
+// model has without noise, and acts as a standard deviation of sqrt(1 - m). Without noise the result is that of the
+// published model, with much noise it is the grey of the luminance.
 
 /// The model's integrals have these nodes: 390, 395 ... 730 nm, each 5 nm wide.
 inline constexpr int entropy_nodes = 69;
@@ -40,7 +47,7 @@ struct EntropyOptions {
   ConeSet cones = ConeSet::stockman_sharpe_2000;
   PixelPower power = PixelPower::lifted;
   std::optional<double> gamma_fixed;        // 2 is the thesis' run without adaptation (Table 5-2)
-  std::optional<Matrix3> noise_covariance;  // of the responses, up to a factor; absent: equal and independent
+  std::optional<Matrix3> noise_covariance;  // of X, Y and Z as in ColourNoise; absent: there is no noise
 };
 
 /// Returns the weight of entropy, gamma = 2 (1 - m), at least 1e-4; m in 0..1 as in mesopic.h.
@@ -53,8 +60,8 @@ struct EntropyModel {
   SpectralBasis<3> measured;    // f that weights the light
   SpectralBasis<3> explained;   // f of the reconstructed spectrum
   Vector3 adaptation{1, 1, 1};  // von Kries factors from `measured` to `explained`
-  Matrix3 inverse_a = identity3();
   double gamma = 2;
+  Matrix3 noise{};  // covariance of eta of a light of power 1, for noise of luminance (integral of V p) of variance 1
 };
 
 /// Makes the model for an adaptation coefficient and a white.
@@ -70,21 +77,25 @@ Result<EntropyModel> entropy_model(double m, const NodePower& white, const Entro
 Vector3 entropy_moments(const EntropyModel& model, const NodePower& power);
 
 /// Returns the fitted spectrum from responses to a light of power 1; nullopt as fit_max_entropy.
-std::optional<MaxEntropyFit<3>> entropy_fit(const EntropyModel& model, const Vector3& eta);
+/// @param luminance_variance  of the noise of the integral of V p; 0 where the model has no covariance
+std::optional<MaxEntropyFit<3>> entropy_fit(const EntropyModel& model, const Vector3& eta,
+                                            double luminance_variance = 0);
 
 /// Returns the fitted spectrum from responses to a light of unknown power and its luminance, beta = Y / integral of V
 /// p.
 /// @param responses        integral of f times power, von Kries factors included
 /// @param luminance        integral of V times power, > 0
+/// @param noise_to_signal  standard deviation of the luminance over the luminance
 std::optional<MaxEntropyFit<3>> entropy_fit_of_luminance(const EntropyModel& model, const Vector3& responses,
-                                                         double luminance);
+                                                         double luminance, double noise_to_signal = 0);
 
 /// Returns the XYZ of the spectrum of a fit, whose power is 1.
 Xyz xyz_of(const EntropyModel& model, const MaxEntropyFit<3>& fit);
 
-/// Returns the matrix from XYZ to responses of the cones, by least squares over the wavelengths. It is off by up to
-/// 0.03, 0.03 and 0.2 of the peak for Stockman & Sharpe's L, M and S, which are not sums of the CIE 1931 functions.
-Matrix3 cone_matrix(ConeSet cones);
+/// Returns the matrix from XYZ to the responses of a basis, by least squares over the wavelengths. For cones alone (m =
+/// 1) it is off by up to 0.03, 0.03 and 0.2 of the peak for Stockman & Sharpe's L, M and S, which are not sums of the
+/// CIE 1931 functions.
+Matrix3 response_matrix(const SpectralBasis<3>& basis);
 
 /// Describes the noise of one pixel and the camera's colour matrix.
 struct ChannelNoise {
@@ -93,17 +104,18 @@ struct ChannelNoise {
   Matrix3 camera_to_xyz = identity3();
 };
 
-/// Returns the covariance of cone responses, M diag(rgb_per_e^2 variance) M^T with M = cone_matrix() camera_to_xyz, for
-/// ViewingConditions::noise_covariance. Its factor does not matter.
-Matrix3 noise_covariance_of_cones(const ChannelNoise& noise, ConeSet cones = ConeSet::stockman_sharpe_2000);
+/// Returns the covariance of X, Y and Z, M diag(rgb_per_e^2 variance) M^T with M = camera_to_xyz, divided by the
+/// variance of Y: ColourNoise::covariance.
+Matrix3 noise_covariance_of_xyz(const ChannelNoise& noise);
 
 /// Returns the model as a map of colours. The white goes to the D65 white of ViewingConditions{}, chromaticities by
 /// Bradford's matrix from the model's output for the white. Luminance is L_mes over that of the white, with the rods'
 /// part from the lifted spectrum. A colour without positive luminance has no spectrum and becomes the grey of its
 /// luminance; one outside of the spectral locus keeps its luminance and is treated as the nearest liftable()
 /// chromaticity. Values that are not finite become black. The map is homogeneous: s times a colour gives s times the
-/// result, s > 0. Errors: invalid_argument for conditions that are not positive and finite, a white without a spectrum,
-/// and as entropy_model().
+/// result, s > 0. With noise the white is seen with the same ratio of noise to signal, so that neutrals stay neutral
+/// and colours fade to the grey of their luminance. Errors: invalid_argument for conditions that are not positive and
+/// finite, a ratio that is negative or not finite, a white without a spectrum, and as entropy_model().
 Result<ColourMap> entropy_colour_map(const ViewingConditions& conditions, const EntropyOptions& options);
 
 /// Returns the entry for appearance_models(): entropy_colour_map() in the variant `rendering`.

@@ -1,6 +1,7 @@
 #include "isp/model/spectrum/max_entropy.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -87,28 +88,29 @@ std::optional<MaxEntropyFit<N>> fit_max_entropy(const SpectralBasis<N>& basis, c
     for (std::size_t j = 0; j < N; ++j) ridge(static_cast<int>(i), static_cast<int>(j)) = gamma / 4 * inverse_a[i][j];
   }
   if (!target.allFinite() || !ridge.allFinite() || !(gamma >= smallest_gamma)) return std::nullopt;
-  Dual<N> here(basis, target, ridge), next(basis, target, ridge);
+  std::array<Dual<N>, 2> places{Dual<N>(basis, target, ridge), Dual<N>(basis, target, ridge)};
+  Dual<N>*here = &places[0], *next = &places[1];
   Vector theta(start.data());
-  here.move(theta);
+  here->move(theta);
   int iteration = 0;
-  for (; !here.settled(); ++iteration) {
-    if (iteration == max_newton_steps || !std::isfinite(here.value)) return std::nullopt;
-    const Vector direction = here.hessian().llt().solve(-here.gradient);
-    const double slope = here.gradient.dot(direction);
-    const double rounding = 1e-14 * (1 + std::fabs(here.value));  // below the resolution of the comparison
+  for (; !here->settled(); ++iteration) {
+    if (iteration == max_newton_steps || !std::isfinite(here->value)) return std::nullopt;
+    const Vector direction = here->hessian().llt().solve(-here->gradient);
+    const double slope = here->gradient.dot(direction);
+    const double rounding = 1e-14 * (1 + std::fabs(here->value));  // below the resolution of the comparison
     double step = 1;
-    for (next.move(theta + direction); step > smallest_step; next.move(theta + step * direction)) {
-      if (next.value <= here.value + 1e-4 * step * slope + rounding) break;
+    for (next->move(theta + direction); step > smallest_step; next->move(theta + step * direction)) {
+      if (next->value <= here->value + 1e-4 * step * slope + rounding) break;
       step /= 2;
     }
     theta += step * direction;
-    here.move(theta);
+    std::swap(here, next);
   }
   MaxEntropyFit<N> fit;
   std::copy_n(theta.data(), N, fit.theta.begin());
-  std::copy_n(here.moments.data(), N, fit.moments.begin());
-  fit.psi = here.psi;
-  fit.entropy = here.psi - theta.dot(here.moments);
+  std::copy_n(here->moments.data(), N, fit.moments.begin());
+  fit.psi = here->psi;
+  fit.entropy = here->psi - theta.dot(here->moments);
   fit.iterations = iteration;
   return fit;
 }

@@ -162,8 +162,8 @@ void decide_eye(const FrameLight& light, double white_cd_m2, const DevelopOption
   if (!options.exposure_ev) look.dimming_ev = choice.dimming * apparent_dimming_ev(look.state.luminance_cd_m2);
 }
 
-// Returns the covariance of the cones' responses to the noise of a mid-grey pixel, up to a factor.
-Matrix3 noise_of_cones(const NoiseProfile& noise, const ModelBasis& basis, const Matrix3& rgb_to_xyz) {
+// Returns ColourNoise::covariance for a mid-grey pixel.
+Matrix3 covariance_of_xyz(const NoiseProfile& noise, const ModelBasis& basis, const Matrix3& rgb_to_xyz) {
   ChannelNoise channels;
   Matrix3 balanced_to_rgb{};
   for (int c = 0; c < 3; ++c) {
@@ -174,7 +174,23 @@ Matrix3 noise_of_cones(const NoiseProfile& noise, const ModelBasis& basis, const
     for (int j = 0; j < 3; ++j) balanced_to_rgb[j][c] = basis.transform.matrix[3 * j + c];
   }
   channels.camera_to_xyz = rgb_to_xyz * balanced_to_rgb;
-  return noise_covariance_of_cones(channels);
+  return noise_covariance_of_xyz(channels);
+}
+
+// Returns the table of a model: over ratios of noise to signal where the model weighs noise, and the noise is known.
+Result<ColourTable> table_of(const AppearanceModel& model, ViewingConditions scene,
+                             const std::optional<Matrix3>& covariance, const ColourTableRequest& request) {
+  if (model.uses_noise && covariance) {
+    return make_noise_colour_table(
+        [&](double noise_to_signal) {
+          scene.noise = ColourNoise{.covariance = *covariance, .to_signal = noise_to_signal};
+          return model.at(scene);
+        },
+        request);
+  }
+  const Result<ColourMap> map = model.at(scene);
+  if (!map) return tl::make_unexpected(map.error());
+  return make_colour_table(*map, request);
 }
 
 }  // namespace
@@ -216,11 +232,10 @@ Result<ModelTable> tabulate_model(const LookPlan& look, const ModelBasis& basis,
   scene.shin = options.look.shin.get();
   scene.scotopic_ratio = look.look.scotopic_ratio_of_white;
   if (basis.white) scene.colour_temperature_k = basis.white->cct_k;
-  if (look.noise && basis.white) scene.noise_covariance = noise_of_cones(*look.noise, basis, rgb_to_xyz);
-  const Result<ColourMap> map = model->at(scene);
-  if (!map) return tl::make_unexpected(map.error());
   const double limit = std::clamp(look.look.cd_m2_per_unit / look.white_cd_m2, 1e-6, 1e6);
-  Result<ColourTable> table = make_colour_table(*map, {.rgb_to_xyz = rgb_to_xyz, .limit = limit});
+  std::optional<Matrix3> covariance;
+  if (look.noise && basis.white) covariance = covariance_of_xyz(*look.noise, basis, rgb_to_xyz);
+  Result<ColourTable> table = table_of(*model, scene, covariance, {.rgb_to_xyz = rgb_to_xyz, .limit = limit});
   if (!table) return tl::make_unexpected(table.error());
   ModelTable out{*std::move(table), {}};
   if (!(look.white_cd_m2 >= model->valid_from_cd_m2 && look.white_cd_m2 <= model->valid_to_cd_m2)) {

@@ -12,6 +12,13 @@ inline bool bounds_noise(const DevelopPlan& plan) {
   return look && look->noise_limit && (look->noise || plan.noise_reduction.has_level());
 }
 
+inline bool needs_table(const DevelopPlan& plan) { return plan.rendering.look && plan.rendering.look->table; }
+
+/// Returns whether the noise of each part of the image is needed: to hold it to a limit, or by a model that weighs it.
+inline bool needs_noise(const DevelopPlan& plan) {
+  return bounds_noise(plan) || (needs_table(plan) && plan.rendering.look->table->by_noise);
+}
+
 inline bool needs_grid(const DevelopPlan& plan) {
   const std::optional<LookPlan>& look = plan.rendering.look;
   const auto shows_effects = [](const LookPlan& of) {
@@ -20,10 +27,8 @@ inline bool needs_grid(const DevelopPlan& plan) {
   return look && (shows_effects(*look) || bounds_noise(plan));
 }
 
-inline bool needs_table(const DevelopPlan& plan) { return plan.rendering.look && plan.rendering.look->table; }
-
 inline bool keeps_maps(const DevelopPlan& plan) {
-  return plan.noise_reduction.has_level() && (plan.options.denoise.maps || bounds_noise(plan));
+  return plan.noise_reduction.has_level() && (plan.options.denoise.maps || needs_noise(plan));
 }
 
 }  // namespace lowlux::isp

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 
 #include "isp/base/look_grid.h"
 #include "isp/pipeline/render/cell_figures.h"
+#include "isp/render/colour_table.h"
 
 namespace lowlux::isp {
 namespace {
@@ -24,7 +26,7 @@ std::array<float, 3> weights_of(const DevelopPlan& plan) {
 void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const float>& residual, PlaneView<float> out,
              Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
-  const auto electrons = static_cast<float>(mean_of_sites(*plan.levels.electrons_at_white));
+  const auto electrons = static_cast<float>(mean_of_sites(light_at_white_e(plan.levels)));
   const float unit = (weights[0] + weights[1] + weights[2]) / electrons;
   const int cells = plan.options.half ? 4 : 2;  // cells of the map along a side of the grid's
   for_each_band(executor, out.height, [&](RowBand band, int) {
@@ -41,11 +43,27 @@ void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const fl
   });
 }
 
+// Returns the noise profile at fractions of light_at_white_e: with dark charge d and E electrons at white, raw values
+// are d / E + (1 - d / E) x.
+NoiseProfile profile_of_light(const DevelopPlan& plan, BayerPhase phase) {
+  NoiseProfile out = *plan.rendering.look->noise;
+  const PerSite<double>& dark_e = plan.levels.black.dark_mean_e;
+  if (dark_e == PerSite<double>{}) return out;
+  for (int site = 0; site < 4; ++site) {
+    const auto c = static_cast<std::size_t>(colour_at(phase, site & 1, site >> 1));
+    const double dark = dark_e[site] / (*plan.levels.electrons_at_white)[site], light = 1 - dark;
+    const NoiseProfile& raw = *plan.rendering.look->noise;
+    out.scale[c] = raw.scale[c] / light;
+    out.offset[c] = (raw.offset[c] + raw.scale[c] * dark) / (light * light);
+  }
+  return out;
+}
+
 // Applies the raw frame's variance at the fraction x of white, scale x + offset, to each channel, as if each pixel had
 // its own three, except for monochrome frames.
-void of_model(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
+void of_model(const DevelopPlan& plan, const NoiseProfile& noise, const RgbView<const float>& quarter,
+              PlaneView<float> out, Executor& executor) {
   const std::array<float, 3> weights = weights_of(plan);
-  const NoiseProfile& noise = *plan.rendering.look->noise;
   const bool monochrome = !plan.rendering.white;  // one plane serves for all three
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
@@ -67,13 +85,37 @@ void of_model(const DevelopPlan& plan, const RgbView<const float>& quarter, Plan
 
 }  // namespace
 
-void noise_of_luminance(const DevelopPlan& plan, const Rect& crop, const NoiseMaps& maps,
+void noise_of_luminance(const DevelopPlan& plan, const RawDn& raw, const NoiseMaps& maps,
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
   if (plan.noise_reduction.has_level()) {
-    of_maps(plan, crop, maps.residual_variance_e2.view(), out, executor);
+    of_maps(plan, raw.default_crop, maps.residual_variance_e2.view(), out, executor);
   } else {
-    of_model(plan, quarter, out, executor);
+    of_model(plan, profile_of_light(plan, raw.phase), quarter, out, executor);
   }
+}
+
+void noise_to_signal(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<const float> variance,
+                     PlaneView<float> out, Executor& executor) {
+  constexpr int joined = NoiseGrid::cell / LookGrid::cell;
+  constexpr float max_ratio = 1e6f;
+  const std::array<float, 3> weights = weights_of(plan);
+  for_each_band(executor, out.height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      const int bottom = std::min(joined * (y + 1), variance.height);
+      for (int x = 0; x < out.width; ++x) {
+        const int right = std::min(joined * (x + 1), variance.width);
+        double light = 0, noise = 0, count = 0;
+        for (int j = joined * y; j < bottom; ++j) {
+          for (int i = joined * x; i < right; ++i, ++count) {
+            for (std::size_t c = 0; c < 3; ++c) light += static_cast<double>(weights[c] * quarter[c].row(j)[i]);
+            noise += static_cast<double>(variance.row(j)[i]);
+          }
+        }
+        const double ratio = std::sqrt(std::max(noise, 0.0) * count) / std::max(light, 0.0);
+        out.row(y)[x] = ratio < max_ratio ? static_cast<float>(ratio) : max_ratio;
+      }
+    }
+  });
 }
 
 }  // namespace lowlux::isp

@@ -12,7 +12,13 @@ namespace lowlux::isp {
 /// @param maps  of the active area; read where noise was reduced
 /// @param quarter  means of camera RGB (RawToRgb::quarter), read where noise was not reduced
 /// @param out  ceil(plan.height / 4) x ceil(plan.width / 4)
-void noise_of_luminance(const DevelopPlan& plan, const Rect& crop, const NoiseMaps& maps,
+void noise_of_luminance(const DevelopPlan& plan, const RawDn& raw, const NoiseMaps& maps,
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor);
+
+/// Computes NoiseGrid from the result of noise_of_luminance: the root of the mean variance in each cell over the mean
+/// luminance. A cell without light has a ratio of 1e6.
+/// @param out  NoiseGrid::cells_along(plan.height) x NoiseGrid::cells_along(plan.width)
+void noise_to_signal(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<const float> variance,
+                     PlaneView<float> out, Executor& executor);
 
 }  // namespace lowlux::isp

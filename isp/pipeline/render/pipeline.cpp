@@ -126,27 +126,34 @@ void Pipeline::reserve(const RawFrame& frame, const DevelopPlan& plan) {
   }
 }
 
-// Makes the grid from means of the frame that is rendered.
-LookGrid Pipeline::look_grid(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan) {
+// Computes means of the frame that is rendered, and their noise where it is needed.
+void Pipeline::measure_cells(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan) {
+  const int width = cells_along(plan.width), height = cells_along(plan.height);
+  for (Plane<float>& plane : quarter_) fit(plane, width, height);
+  kernel_->quarter(in, {quarter_[0].view(), quarter_[1].view(), quarter_[2].view()}, executor_);
+  if (!needs_noise(plan)) return;
+  fit(luminance_noise_, width, height);
+  noise_of_luminance(plan, frame.raw, noise_maps_, quarter_view(), luminance_noise_.view(), executor_);
+}
+
+RgbView<const float> Pipeline::quarter_view() const {
+  return {quarter_[0].view(), quarter_[1].view(), quarter_[2].view()};
+}
+
+LookGrid Pipeline::look_grid(const DevelopPlan& plan) {
   if (!look_ || look_width_ < plan.width || look_height_ < plan.height) {
     look_width_ = std::max(plan.width, look_width_);
     look_height_ = std::max(plan.height, look_height_);
     look_.reset();  // frees its memory before the next one is allocated
     look_ = std::make_unique<NightLookGrid>(look_width_, look_height_);
   }
-  const int width = cells_along(plan.width), height = cells_along(plan.height);
-  for (Plane<float>& plane : quarter_) fit(plane, width, height);
-  kernel_->quarter(in, {quarter_[0].view(), quarter_[1].view(), quarter_[2].view()}, executor_);
-  const RgbView<const float> quarter{quarter_[0].view(), quarter_[1].view(), quarter_[2].view()};
   std::optional<NoiseLimit> limit;
   if (bounds_noise(plan)) {
-    fit(luminance_noise_, width, height);
-    noise_of_luminance(plan, frame.raw.default_crop, noise_maps_, quarter, luminance_noise_.view(), executor_);
     limit = {*plan.rendering.look->noise_limit, tone_limit(plan.options.tone, plan.rendering.exposure_ev),
              luminance_noise_.view()};
   }
-  return look_->make(quarter, plan.rendering.transform.matrix, plan.rendering.transform.clip, plan.rendering.look->look,
-                     limit, executor_);
+  return look_->make(quarter_view(), plan.rendering.transform.matrix, plan.rendering.transform.clip,
+                     plan.rendering.look->look, limit, executor_);
 }
 
 template <class Encode>
@@ -156,9 +163,10 @@ void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const E
   const RgbInput in =
       frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);
   RgbTransform transform = plan.rendering.transform;
+  if (needs_grid(plan) || needs_noise(plan)) measure_cells(in, frame, plan);
   LookGrid look;
   if (needs_grid(plan)) {
-    look = look_grid(in, frame, plan);
+    look = look_grid(plan);
     transform.look = &look;
   }
   if (needs_table(plan)) {
@@ -204,7 +212,15 @@ CameraPlanes Pipeline::as_modelled(const RgbInput& in, const DevelopPlan& plan) 
   for (float& coefficient : to_light.matrix) coefficient *= limit;
   to_light.move_into_gamut = false;
   kernel_->linear(in, to_light, planes, executor_);
-  apply_colour_table(*plan.rendering.look->table, {planes[0], planes[1], planes[2]}, planes, executor_);
+  const ColourTable& table = *plan.rendering.look->table;
+  const RgbView<const float> light{planes[0], planes[1], planes[2]};
+  if (table.by_noise) {
+    fit(noise_to_signal_, NoiseGrid::cells_along(plan.width), NoiseGrid::cells_along(plan.height));
+    noise_to_signal(plan, quarter_view(), luminance_noise_.view(), noise_to_signal_.view(), executor_);
+    apply_colour_table(table, light, NoiseGrid{noise_to_signal_.view()}, planes, executor_);
+  } else {
+    apply_colour_table(table, light, planes, executor_);
+  }
   return {{planes[0], planes[1], planes[2]}, {1 / limit, 1 / limit, 1 / limit}};
 }
 

@@ -49,7 +49,9 @@ class Pipeline {
   void reserve(const RawFrame& frame, const DevelopPlan& plan);
   RgbInput prepare_bayer(const RawFrame& frame, const DevelopPlan& plan);
   RgbInput prepare_planes(const RawFrame& frame, const DevelopPlan& plan);
-  LookGrid look_grid(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan);
+  void measure_cells(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan);
+  RgbView<const float> quarter_view() const;
+  LookGrid look_grid(const DevelopPlan& plan);
   CameraPlanes as_modelled(const RgbInput& in, const DevelopPlan& plan);
   SignalElectrons signal_electrons(const RawFrame& frame, const DevelopPlan& plan);
   void float_mosaic(const RawFrame& frame, const DevelopPlan& plan);
@@ -67,8 +69,9 @@ class Pipeline {
   std::unique_ptr<NightLookGrid> look_;
   int look_width_ = 0;
   int look_height_ = 0;
-  std::array<Plane<float>, 3> quarter_;  // for the look: means of 4 x 4 pixels
-  Plane<float> luminance_noise_;
+  std::array<Plane<float>, 3> quarter_;   // for the look: means of 4 x 4 pixels
+  Plane<float> luminance_noise_;          // variance, for the cells of quarter_
+  Plane<float> noise_to_signal_;          // for the cells of NoiseGrid
   std::array<Plane<float>, 3> modelled_;  // light as changed by a model of appearance
   std::array<Plane<float>, 3> planes_;    // camera RGB of frames that need no demosaicing
   std::array<Plane<float>, 3> half_planes_;
