@@ -1,4 +1,5 @@
 #include "isp/render/colour_table.h"
+#include "isp/base/look_grid.h"
 #include "isp/base/text.h"
 #include "isp/model/colour/colour_difference.h"
 
@@ -349,12 +350,12 @@ struct CellPlace {
   float t;
 };
 CellPlace cell_place(int pixel, int cells) {
-  const float place = std::max((static_cast<float>(pixel) + 0.5f) / NoiseGrid::cell - 0.5f, 0.0f);
+  const float place = std::max((static_cast<float>(pixel) + 0.5f) / LookGrid::cell - 0.5f, 0.0f);
   const int cell = std::min(static_cast<int>(place), cells - 1);
   return {cell, std::min(cell + 1, cells - 1), place - static_cast<float>(cell)};
 }
 
-/// Interpolates the ratios of noise to signal of row y of pixels, limited to what a level can be found for.
+/// Interpolates row y of the pixels' ratios of signal to noise, and inverts it.
 void ratio_row(const PlaneView<const float>& grid, int y, std::span<float> out) {
   const CellPlace down = cell_place(y, grid.height);
   const float *const top = grid.row(down.cell), *const bottom = grid.row(down.next);
@@ -362,7 +363,7 @@ void ratio_row(const PlaneView<const float>& grid, int y, std::span<float> out) 
   for (std::size_t x = 0; x < out.size(); ++x) {
     const CellPlace across = cell_place(static_cast<int>(x), grid.width);
     const float left = at(across.cell);
-    out[x] = std::clamp(left + across.t * (at(across.next) - left), 1e-6f, 1e6f);
+    out[x] = 1 / std::clamp(left + across.t * (at(across.next) - left), 1e-6f, 1e6f);
   }
 }
 
@@ -384,14 +385,14 @@ void apply_colour_table(const ColourTable& table, const RgbView<const float>& in
 void apply_colour_table(const ColourTable& table, const RgbView<const float>& in, const NoiseGrid& noise,
                         const RgbView<float>& out, Executor& executor) {
   assert(table.by_noise && equal_sizes(in, out));
-  assert(noise.noise_to_signal.width == NoiseGrid::cells_along(in[0].width));
-  assert(noise.noise_to_signal.height == NoiseGrid::cells_along(in[0].height));
+  assert(noise.signal_to_noise.width == cells_along(in[0].width));
+  assert(noise.signal_to_noise.height == cells_along(in[0].height));
   const table_rows::Table view = view_of(table);
   const int width = in[0].width;
   for_each_band(executor, in[0].height, [&](RowBand band, int) {
     std::vector<float> ratio(static_cast<std::size_t>(width));
     for (int y = band.first; y < band.last; ++y) {
-      ratio_row(noise.noise_to_signal, y, ratio);
+      ratio_row(noise.signal_to_noise, y, ratio);
       float* const to[3] = {out[0].row(y), out[1].row(y), out[2].row(y)};
       table_rows::convert_row({in[0].row(y), in[1].row(y), in[2].row(y)}, ratio.data(), width, view, to);
     }

@@ -77,15 +77,15 @@ Result<ColourTable> make_noise_colour_table(const NoiseColourMap& maps, const Co
 void apply_colour_table(const ColourTable& table, const RgbView<const float>& in, const RgbView<float>& out,
                         Executor& executor);
 
-/// Holds the ratio of noise to signal around the centres of cells of `cell` x `cell` pixels, linear between them.
+/// Holds the ratio of signal to noise at the centres of cells of 4 x 4 pixels, as of LookGrid, linear between them. The
+/// inverse of what a table has for its levels is bounded where there is no light: a dark cell does not grey those next
+/// to it.
 struct NoiseGrid {
-  static constexpr int cell = 16;
-  static constexpr int cells_along(int pixels) { return (pixels + cell - 1) / cell; }
-  PlaneView<const float> noise_to_signal;  // at least 0, not NaN
+  PlaneView<const float> signal_to_noise;  // not NaN; negative counts as 0
 };
 
 /// Applies a table by noise to every pixel. Precondition: table.by_noise.
-/// @param noise  cells_along(height) x cells_along(width)
+/// @param noise  ceil(height / 4) x ceil(width / 4)
 void apply_colour_table(const ColourTable& table, const RgbView<const float>& in, const NoiseGrid& noise,
                         const RgbView<float>& out, Executor& executor);
 

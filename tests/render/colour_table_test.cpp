@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "isp/base/look_grid.h"
 #include "isp/base/random/philox.h"
 #include "isp/model/appearance/entropy_model.h"
 #include "isp/model/spectrum/cie_data.h"
@@ -108,7 +109,7 @@ const ColourTable& noise_table() {
   return table;
 }
 
-/// Passes colours through noise_table(); planes of `width` pixels, ratios linear between cells.
+/// Passes colours through noise_table(); planes of `width` pixels, ratios of signal to noise linear between cells.
 Pixels shown_with_noise(const Pixels& in, int width, const Plane<float>& ratios) {
   const int height = static_cast<int>(in.size()) / width;
   SceneLinear planes(width, height);
@@ -124,10 +125,10 @@ Pixels shown_with_noise(const Pixels& in, int width, const Plane<float>& ratios)
   return out;
 }
 
-/// The ratio at a pixel, by the definition of NoiseGrid.
+/// The ratio of noise to signal at a pixel, by the definition of NoiseGrid.
 double ratio_at(const Plane<float>& ratios, int x, int y) {
   const auto axis = [](int pixel, int cells) {
-    const double place = std::clamp((pixel + 0.5) / NoiseGrid::cell - 0.5, 0.0, cells - 1.0);
+    const double place = std::clamp((pixel + 0.5) / LookGrid::cell - 0.5, 0.0, cells - 1.0);
     const int cell = std::min(static_cast<int>(place), std::max(cells - 2, 0));
     return std::pair(cell, place - cell);
   };
@@ -136,7 +137,7 @@ double ratio_at(const Plane<float>& ratios, int x, int y) {
   const int right = std::min(i + 1, ratios.width() - 1), down = std::min(j + 1, ratios.height() - 1);
   const double top = (1 - s) * ratios.at(i, j) + s * ratios.at(right, j);
   const double bottom = (1 - s) * ratios.at(i, down) + s * ratios.at(right, down);
-  return (1 - t) * top + t * bottom;
+  return 1 / std::clamp((1 - t) * top + t * bottom, 1e-6, 1e6);
 }
 
 // Widths and heights below, at and above a cell, ratios from nothing to no signal at all.
@@ -144,9 +145,9 @@ TEST(ColourTable, KernelByNoiseIsTheReferenceForEveryInstructionSet) {
   Draws draw{1000};
   for (const auto& [width, height] : {std::pair(1, 1), {3, 40}, {16, 16}, {17, 33}, {131, 29}}) {
     const Pixels in = any_colours(width * height);
-    Plane<float> ratios(NoiseGrid::cells_along(width), NoiseGrid::cells_along(height));
+    Plane<float> ratios(cells_along(width), cells_along(height));
     for (std::size_t i = 0; i < ratios.size(); ++i) {
-      ratios.data()[i] = i % 7 == 3 ? 1e6f : i % 5 == 2 ? 0.0f : static_cast<float>(std::exp2(16 * draw() - 9));
+      ratios.data()[i] = i % 7 == 3 ? 1e6f : i % 5 == 2 ? -1.0f : static_cast<float>(std::exp2(16 * draw() - 7));
     }
     for (const std::int64_t target : test::kernel_targets()) {
       const test::OnlyTarget only(target);
@@ -173,8 +174,8 @@ TEST(ColourTable, ByNoiseIsWithinItsBoundOfTheMap) {
   for (int i = 0; i < 60; ++i) {
     const auto ratio = static_cast<float>(std::exp2(16 * draw() - 9));
     const ColourMap map = *entropy_with_noise(ratio);
-    Plane<float> ratios(1, 1);
-    ratios.at(0, 0) = ratio;
+    Plane<float> ratios(4, 1);
+    std::fill_n(ratios.data(), ratios.size(), 1 / ratio);
     Pixels in;
     for (int k = 0; k < 16; ++k) {
       in.push_back({static_cast<float>(draw()), static_cast<float>(draw()), static_cast<float>(draw())});

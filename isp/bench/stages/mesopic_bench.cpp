@@ -267,8 +267,8 @@ Result<std::vector<AccuracyRow>> model_rows(const Colours& colours, const ModelC
   std::string name = fmt::format("{}, white {:g} cd/m2", of.model, of.white_cd_m2);
   if (of.noise_to_signal > 0) name += fmt::format(", noise of {:g} of the signal", of.noise_to_signal);
   AccuracyGroup group{std::move(name), "mean CIEDE2000 against exact", {}};
-  Plane<float> ratio(NoiseGrid::cells_along(colours.rgb.width()), 1);
-  std::fill_n(ratio.data(), ratio.size(), static_cast<float>(of.noise_to_signal));
+  Plane<float> ratio(cells_along(colours.rgb.width()), 1);
+  std::fill_n(ratio.data(), ratio.size(), static_cast<float>(1 / of.noise_to_signal));
   const double megapixels = 1e-6 * static_cast<double>(colours.size());
   std::string made = group.name + ": tables made in";
   for (const MadeTable& each : *tables) {

@@ -7,7 +7,6 @@
 
 #include "isp/base/look_grid.h"
 #include "isp/pipeline/render/cell_figures.h"
-#include "isp/render/colour_table.h"
 
 namespace lowlux::isp {
 namespace {
@@ -94,25 +93,17 @@ void noise_of_luminance(const DevelopPlan& plan, const RawDn& raw, const NoiseMa
   }
 }
 
-void noise_to_signal(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<const float> variance,
+void signal_to_noise(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<const float> variance,
                      PlaneView<float> out, Executor& executor) {
-  constexpr int joined = NoiseGrid::cell / LookGrid::cell;
-  constexpr float max_ratio = 1e6f;
+  constexpr float min_variance = 1e-20f, max_ratio = 1e6f;
   const std::array<float, 3> weights = weights_of(plan);
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
-      const int bottom = std::min(joined * (y + 1), variance.height);
       for (int x = 0; x < out.width; ++x) {
-        const int right = std::min(joined * (x + 1), variance.width);
-        double light = 0, noise = 0, count = 0;
-        for (int j = joined * y; j < bottom; ++j) {
-          for (int i = joined * x; i < right; ++i, ++count) {
-            for (std::size_t c = 0; c < 3; ++c) light += static_cast<double>(weights[c] * quarter[c].row(j)[i]);
-            noise += static_cast<double>(variance.row(j)[i]);
-          }
-        }
-        const double ratio = std::sqrt(std::max(noise, 0.0) * count) / std::max(light, 0.0);
-        out.row(y)[x] = ratio < max_ratio ? static_cast<float>(ratio) : max_ratio;
+        float light = 0;
+        for (std::size_t c = 0; c < 3; ++c) light += weights[c] * quarter[c].row(y)[x];
+        const float ratio = light / std::sqrt(std::max(variance.row(y)[x], min_variance));
+        out.row(y)[x] = ratio > 0 ? std::min(ratio, max_ratio) : 0;
       }
     }
   });

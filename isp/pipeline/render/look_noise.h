@@ -15,10 +15,10 @@ namespace lowlux::isp {
 void noise_of_luminance(const DevelopPlan& plan, const RawDn& raw, const NoiseMaps& maps,
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor);
 
-/// Computes NoiseGrid from the result of noise_of_luminance: the root of the mean variance in each cell over the mean
-/// luminance. A cell without light has a ratio of 1e6.
-/// @param out  NoiseGrid::cells_along(plan.height) x NoiseGrid::cells_along(plan.width)
-void noise_to_signal(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<const float> variance,
+/// Computes NoiseGrid from the result of noise_of_luminance: the mean luminance of each cell over the standard
+/// deviation of its pixels' noise, 0 where there is no light and at most 1e6.
+/// @param out  as `variance`
+void signal_to_noise(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<const float> variance,
                      PlaneView<float> out, Executor& executor);
 
 }  // namespace lowlux::isp

@@ -215,9 +215,9 @@ CameraPlanes Pipeline::as_modelled(const RgbInput& in, const DevelopPlan& plan) 
   const ColourTable& table = *plan.rendering.look->table;
   const RgbView<const float> light{planes[0], planes[1], planes[2]};
   if (table.by_noise) {
-    fit(noise_to_signal_, NoiseGrid::cells_along(plan.width), NoiseGrid::cells_along(plan.height));
-    noise_to_signal(plan, quarter_view(), luminance_noise_.view(), noise_to_signal_.view(), executor_);
-    apply_colour_table(table, light, NoiseGrid{noise_to_signal_.view()}, planes, executor_);
+    fit(signal_to_noise_, cells_along(plan.width), cells_along(plan.height));
+    signal_to_noise(plan, quarter_view(), luminance_noise_.view(), signal_to_noise_.view(), executor_);
+    apply_colour_table(table, light, NoiseGrid{signal_to_noise_.view()}, planes, executor_);
   } else {
     apply_colour_table(table, light, planes, executor_);
   }

@@ -71,7 +71,7 @@ class Pipeline {
   int look_height_ = 0;
   std::array<Plane<float>, 3> quarter_;   // for the look: means of 4 x 4 pixels
   Plane<float> luminance_noise_;          // variance, for the cells of quarter_
-  Plane<float> noise_to_signal_;          // for the cells of NoiseGrid
+  Plane<float> signal_to_noise_;          // for the cells of quarter_
   std::array<Plane<float>, 3> modelled_;  // light as changed by a model of appearance
   std::array<Plane<float>, 3> planes_;    // camera RGB of frames that need no demosaicing
   std::array<Plane<float>, 3> half_planes_;
