@@ -12,9 +12,10 @@
 
 #include "isp/base/executor.h"
 #include "isp/model/vision/night_eye.h"
-#include "isp/model/vision/seeing.h"
+#include "isp/model/vision/retina.h"
 #include "isp/render/night/eye_rows.h"
 #include "isp/render/night/grid.h"
+#include "isp/render/night/visual_noise.h"
 #include "tests/reference/night_look_ref.h"
 
 namespace lowlux::isp {
@@ -212,27 +213,144 @@ TEST(NightLook, GlareSpreadsTheLightOfALampAndAddsNothingFarAway) {
   }
 }
 
-TEST(NightLook, GrainHasTheContrastThatIsJustSeen) {
+/// Mean and variance of a plane, of a Poisson variable's deviations.
+struct Moments {
+  double mean = 0;
+  double variance = 0;
+};
+Moments moments_of(const PlaneView<const float>& plane) {
+  Moments out;
+  const double n = static_cast<double>(plane.width) * plane.height;
+  for (int y = 0; y < plane.height; ++y) {
+    for (int x = 0; x < plane.width; ++x) out.mean += plane.at(x, y) / n;
+  }
+  for (int y = 0; y < plane.height; ++y) {
+    for (int x = 0; x < plane.width; ++x) out.variance += std::pow(plane.at(x, y) - out.mean, 2) / n;
+  }
+  return out;
+}
+
+NightLook noise_alone(double cd_m2) {
+  NightLook look = rec709_look(cd_m2);
+  look.effects = {false, false, false, false, false, true};
+  look.scene_cd_m2 = cd_m2;
+  look.pixels_per_degree = 20;
+  return look;
+}
+
+// A flat over all of vision, from fields in which rods count less than one isomerisation to more than the sampler's
+// limit. The noise is (1 - r) that of cones + r that of rods: its variance from the means of both counts, and standard
+// errors from the fourth moment of a Poisson variable, mu + 3 mu^2.
+TEST(NightLook, VisualNoiseHasMeanZeroAndTheVarianceOfPhotonsAndDarkLight) {
+  constexpr int side = 192;
+  constexpr double n = side * side;
+  InlineExecutor executor;
+  NightLookGrid maker(4 * side, 4 * side);
+  for (const double light : {1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 0.7, 3.0, 100.0, 1e4, 1e6, 1e9}) {
+    for (const double pixels_per_degree : {400.0, 20.0, 1.0}) {
+      NightLook look = noise_alone(light);
+      look.pixels_per_degree = pixels_per_degree;
+      NightLook with_rods = look;
+      with_rods.effects = {true, false, false, false, false, false};
+      const CameraRgb camera = flat(side, side, {0.5f, 0.5f, 0.5f});
+      const double r = part_at(maker.make(camera.view(), as_it_is, 1, with_rods, std::nullopt, executor),
+                               LookGrid::rod_fraction, 0, 0);
+      const LookGrid grid = maker.make(camera.view(), as_it_is, 1, look, std::nullopt, executor);
+      const double area = std::pow(4 / pixels_per_degree, 2), pupil = pupil_area_mm2(adapted_pupil_mm(light));
+      double variance = 0, fourth = 0;
+      for (const auto& [cell, weight, unit] :
+           {std::tuple{cones_in(area, pupil), 1 - r, light}, {rods_in(area, pupil), r, 2.46 * light}}) {
+        const double mean = cell.counts_per_cd_m2 * 0.5 * unit + cell.dark_counts;
+        const double per_count = weight / (cell.counts_per_cd_m2 * unit);
+        variance += per_count * per_count * mean;
+        fourth += std::pow(per_count, 4) * mean;  // the fourth cumulant of a Poisson variable is its mean
+      }
+      const Moments found = moments_of(grid.part[LookGrid::base]);
+      EXPECT_NEAR(found.mean, 0, 5 * std::sqrt(variance / n)) << light << " " << pixels_per_degree;
+      // The rods' fraction is that of the table, and means are floats.
+      EXPECT_NEAR(found.variance, variance, 5 * std::sqrt((fourth + 2 * variance * variance) / n) + 1e-4 * variance)
+          << light << " " << pixels_per_degree;
+      for (int x = 0; x < side; ++x) {
+        ASSERT_EQ(part_at(grid, LookGrid::detail, x, 0), 1) << "nothing is softened";
+        ASSERT_EQ(part_at(grid, LookGrid::rod_fraction, x, 0), 0) << "nor shifted";
+      }
+    }
+  }
+}
+
+// Means on both sides of the sampler's branch at 12 and of its limit at 1e6.
+TEST(VisualNoise, DrawsMeanAndVarianceOnBothSidesOfEachBranch) {
+  constexpr int n = 200000;
+  VisualNoise noise = visual_noise(noise_alone(1));
+  noise.rods = {1, 0.25f, 1};
+  noise.cones = {2, 0.5f, 0.125f};
+  for (const double light : {0.0, 0.1, 1.0, 11.5, 12.5, 1e4, 9e5, 1.1e6, 1e9}) {
+    const std::vector<float> luminance(n, static_cast<float>(light));
+    std::vector<float> cones(n), rods(n), scratch(n);
+    visual_noise_row(noise, 3, n, luminance.data(), luminance.data(), cones.data(), rods.data(), scratch.data());
+    for (const auto& [row, kind] : {std::pair{&cones, noise.cones}, {&rods, noise.rods}}) {
+      const double mean = kind.counts_per_cd_m2 * light + kind.dark_counts;
+      const double unit = kind.units_per_count;
+      double sum = 0, squares = 0;
+      for (const float v : *row) sum += v / unit, squares += v / unit * (v / unit);
+      EXPECT_NEAR(sum / n, 0, 5 * std::sqrt(mean / n) + 4e-8 * mean) << light << ": and rounding of the mean to float";
+      EXPECT_NEAR(squares / n, mean, 5 * std::sqrt((mean + 2 * mean * mean) / n) + 1e-6 * mean) << light;
+    }
+  }
+}
+
+TEST(NightLook, VisualNoiseVanishesByDayWithTheRootOfLight) {
   constexpr int side = 128;
   InlineExecutor executor;
   NightLookGrid maker(4 * side, 4 * side);
-  for (const double light : {0.003, 0.3, 30.0}) {
-    NightLook look = rec709_look(light);
-    look.effects = {false, false, false, false, false, true};
-    const CameraRgb camera = flat(side, side, {0.5f, 0.5f, 0.5f});
-    const LookGrid grid = maker.make(camera.view(), as_it_is, 1, look, std::nullopt, executor);
-    double sum = 0, squares = 0;
-    for (int y = 0; y < side; ++y) {
-      for (int x = 0; x < side; ++x) {
-        sum += part_at(grid, LookGrid::base, x, y);
-        squares += part_at(grid, LookGrid::base, x, y) * part_at(grid, LookGrid::base, x, y);
-      }
+  const CameraRgb camera = flat(side, side, {0.5f, 0.5f, 0.5f});
+  double last = 0;
+  for (const double light : {100.0, 1e4, 1e6}) {
+    NightLook look = noise_alone(light);
+    look.scene_cd_m2 = 100;  // one pupil
+    const double std_dev = std::sqrt(
+        moments_of(maker.make(camera.view(), as_it_is, 1, look, std::nullopt, executor).part[LookGrid::base]).variance);
+    EXPECT_LT(std_dev, 0.005) << "of white, a code of 8 bits";
+    if (last > 0) {
+      EXPECT_NEAR(std_dev, last / 10, 0.02 * last / 10) << "dark light adds 1 % at 100 cd/m2";
     }
-    constexpr double n = side * side;
-    const double expected = 0.5 * threshold_contrast(0.5 * light);
-    EXPECT_NEAR(sum / n, 0, 5 * expected / std::sqrt(n));
-    EXPECT_NEAR(std::sqrt(squares / n), expected, 5 * expected / std::sqrt(2 * n) + 0.003 * expected) << light;
+    last = std_dev;
   }
+}
+
+// Pooling keeps the mean, and leaves less variance the darker it is; the noise is pooled like the light.
+TEST(NightLook, VisualNoiseIsPooledWithTheLight) {
+  constexpr int side = 256;
+  InlineExecutor executor;
+  NightLookGrid maker(4 * side, 4 * side);
+  const CameraRgb camera = flat(side, side, {0.5f, 0.5f, 0.5f});
+  for (const double light : {1e-4, 0.01}) {
+    NightLook look = noise_alone(light);
+    const Moments own =
+        moments_of(maker.make(camera.view(), as_it_is, 1, look, std::nullopt, executor).part[LookGrid::base]);
+    look.effects.acuity = true;
+    const LookGrid grid = maker.make(camera.view(), as_it_is, 1, look, std::nullopt, executor);
+    const Moments pooled = moments_of(grid.part[LookGrid::base]);
+    const double kept = 1 - part_at(grid, LookGrid::detail, 0, 0);
+    EXPECT_NEAR(pooled.mean, 0.5 * kept, 5 * std::sqrt(own.variance / (side * side)) + 1e-6) << light;
+    EXPECT_LT(pooled.variance, own.variance) << light;
+  }
+}
+
+TEST(NightLook, AnotherSeedIsAnotherNoise) {
+  InlineExecutor executor;
+  NightLookGrid maker(64, 64);
+  const CameraRgb camera = flat(16, 16, {0.5f, 0.5f, 0.5f});
+  const auto drawn = [&](std::uint64_t seed) {
+    NightLook look = noise_alone(0.01);
+    look.seed = seed;
+    const LookGrid grid = maker.make(camera.view(), as_it_is, 1, look, std::nullopt, executor);
+    std::vector<float> row;
+    for (int x = 0; x < 16; ++x) row.push_back(part_at(grid, LookGrid::base, x, 5));
+    return row;
+  };
+  EXPECT_EQ(drawn(1), drawn(1));
+  EXPECT_NE(drawn(1), drawn(2));
 }
 
 TEST(NightLook, KeepsNoiseBelowItsLimit) {
@@ -281,12 +399,14 @@ TEST(NightLook, IsFiniteForAnyLight) {
   for (Plane<float>& plane : camera.plane) {
     for (std::size_t i = 0; i < plane.size(); ++i) plane.data()[i] = values[random() % values.size()];
   }
-  NightLook look = rec709_look(1);
-  look.effects.glare = true;
-  const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1, look, std::nullopt, executor);
-  for (const PlaneView<const float>& part : grid.part) {
-    for (int y = 0; y < 16; ++y) {
-      for (int x = 0; x < 16; ++x) ASSERT_TRUE(std::isfinite(part.at(x, y)));
+  for (const double light : {1e-7, 1.0, 1e9}) {
+    NightLook look = rec709_look(light);
+    look.effects.glare = look.effects.visual_noise = true;
+    const LookGrid grid = maker.make(std::as_const(camera).view(), as_it_is, 1, look, std::nullopt, executor);
+    for (const PlaneView<const float>& part : grid.part) {
+      for (int y = 0; y < 16; ++y) {
+        for (int x = 0; x < 16; ++x) ASSERT_TRUE(std::isfinite(part.at(x, y)));
+      }
     }
   }
 }
@@ -299,7 +419,7 @@ TEST(NightLook, GivesTheSameGridWithAnyNumberOfThreads) {
     for (std::size_t i = 0; i < plane.size(); ++i) plane.data()[i] = value(random);
   }
   NightLook look = rec709_look(0.02);
-  look.effects.glare = true;
+  look.effects.glare = look.effects.visual_noise = true;
   std::vector<float> first;
   for (const int threads : {1, 2, 3, 7}) {
     PoolExecutor executor(threads);

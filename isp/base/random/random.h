@@ -18,15 +18,16 @@ struct DrawStream {
 /// Lists the `purpose` of each quantity. No counter serves two quantities; the four words of one counter are
 /// independent.
 namespace draw_purpose {
-inline constexpr std::uint32_t electrons = 0;        // word 0: collected electrons, word 1: read noise
-inline constexpr std::uint32_t fixed_pattern = 2;    // frame 0. Words 0: PRNU, 1: DSNU, 2: is it hot, 3: how hot
-inline constexpr std::uint32_t row_noise = 3;        // x = 0, word 0
-inline constexpr std::uint32_t column_noise = 4;     // y = 0, frame 0, word 0: a fixed pattern
-inline constexpr std::uint32_t scene = 5;            // random scene content: stars
-inline constexpr std::uint32_t risk_probe = 8;       // perturbation of a denoiser's input, to measure its response
-inline constexpr std::uint32_t code_dither = 9;      // word 0: rounds electrons to codes without bias
-inline constexpr std::uint32_t visual_noise = 10;    // word 0: the eye's own noise, by cells of 4 pixels
-inline constexpr std::uint32_t wavelength_bin = 16;  // + i, for photons sampled by wavelength
+inline constexpr std::uint32_t electrons = 0;            // word 0: collected electrons, word 1: read noise
+inline constexpr std::uint32_t fixed_pattern = 2;        // frame 0. Words 0: PRNU, 1: DSNU, 2: is it hot, 3: how hot
+inline constexpr std::uint32_t row_noise = 3;            // x = 0, word 0
+inline constexpr std::uint32_t column_noise = 4;         // y = 0, frame 0, word 0: a fixed pattern
+inline constexpr std::uint32_t scene = 5;                // random scene content: stars
+inline constexpr std::uint32_t risk_probe = 8;           // perturbation of a denoiser's input, to measure its response
+inline constexpr std::uint32_t code_dither = 9;          // word 0: rounds electrons to codes without bias
+inline constexpr std::uint32_t visual_noise_rods = 10;   // word 0: isomerisations in rods, by cells of 4 pixels
+inline constexpr std::uint32_t visual_noise_cones = 11;  // word 0: isomerisations in cones, by cells of 4 pixels
+inline constexpr std::uint32_t wavelength_bin = 16;      // + i, for photons sampled by wavelength
 }  // namespace draw_purpose
 
 using PhiloxWords = std::array<std::uint32_t, 4>;

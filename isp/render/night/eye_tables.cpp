@@ -1,13 +1,10 @@
 #include "isp/render/night/eye_tables.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 
 #include "isp/model/vision/mesopic.h"
 #include "isp/model/vision/night_eye.h"
-#include "isp/model/vision/seeing.h"
 
 namespace lowlux::isp {
 namespace {
@@ -44,34 +41,11 @@ EyeTables make_tables() {
   return t;
 }
 
-constexpr int contrast_nodes = 256;  // log2 L as in EyeTables
-
-const std::array<float, contrast_nodes>& thresholds() {
-  static const std::array<float, contrast_nodes> table = [] {
-    std::array<float, contrast_nodes> out{};
-    for (int i = 0; i < contrast_nodes; ++i) {
-      out[i] = static_cast<float>(threshold_contrast(
-          std::exp2(node(i, contrast_nodes, EyeTables::first_log2_light, EyeTables::last_log2_light))));
-    }
-    return out;
-  }();
-  return table;
-}
-
 }  // namespace
 
 const EyeTables& eye_tables() {
   static const EyeTables tables = make_tables();
   return tables;
-}
-
-float tabulated_threshold_contrast(float luminance_cd_m2) {
-  const std::array<float, contrast_nodes>& threshold = thresholds();
-  constexpr float first = EyeTables::first_log2_light, last = EyeTables::last_log2_light;
-  const float at = (std::log2(std::max(luminance_cd_m2, 1e-7f)) - first) * (contrast_nodes - 1) / (last - first);
-  const int low = std::clamp(static_cast<int>(at), 0, contrast_nodes - 2);
-  const float way = std::clamp(at - static_cast<float>(low), 0.0f, 1.0f);
-  return threshold[low] + way * (threshold[low + 1] - threshold[low]);
 }
 
 }  // namespace lowlux::isp

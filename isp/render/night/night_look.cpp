@@ -4,12 +4,12 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
-#include <span>
 
-#include "isp/base/random/random.h"
 #include "isp/render/night/eye_rows.h"
 #include "isp/render/night/eye_tables.h"
 #include "isp/render/night/grid.h"
+#include "isp/render/night/light_fields.h"
+#include "isp/render/night/visual_noise.h"
 
 namespace lowlux::isp {
 namespace {
@@ -33,17 +33,6 @@ float largest_of(const PlaneView<const float>& plane) {
     for (int x = 0; x < plane.width; ++x) largest = std::max(largest, plane.row(y)[x]);
   }
   return largest;
-}
-
-rows::LightWeights weights_of(const NightLook& look, const std::array<float, 9>& matrix, float clip) {
-  rows::LightWeights out{{}, {}, clip};
-  for (int c = 0; c < 3; ++c) {
-    for (int j = 0; j < 3; ++j) {
-      out.photopic[c] += look.luminance[j] * matrix[3 * j + c];
-      out.scotopic[c] += look.rods[j] * matrix[3 * j + c];
-    }
-  }
-  return out;
 }
 
 }  // namespace
@@ -99,8 +88,10 @@ struct NightLookGrid::State {
   void soften(Executor& executor);
   void scatter(const NightLook& look, Executor& executor);
   void add_veil(Executor& executor);
-  void draw_grain(const NightLook& look, Executor& executor);
-  void add_grain(Executor& executor);
+  void draw_noise(const NightLook& look, Executor& executor);
+  void weight_noise(Executor& executor);
+  void add_noise(Executor& executor);
+  void add_detail_noise(Executor& executor);
   void bound_noise(const NoiseLimit& limit, Executor& executor);
 
   int levels;
@@ -111,7 +102,7 @@ struct NightLookGrid::State {
   Pyramid variance;  // variance of the blur [px^2]
   Pyramid between;
   Plane<float> base, detail;
-  Plane<float> grain;
+  Plane<float> grain;  // deviation of E by the noise of vision
 };
 
 // Computes the light in the pixels' unit, photopic into `seen` and scotopic into `variance`, and the non-negative
@@ -119,23 +110,10 @@ struct NightLookGrid::State {
 void NightLookGrid::State::take_light(const RgbView<const float>& camera, const rows::LightWeights& weights,
                                       const NightLook& look, Executor& executor) {
   const PlaneView<float> y = seen[0], s = variance[0], field_y = photopic[0], field_s = scotopic[0];
-  const auto cones = static_cast<float>(look.cd_m2_per_unit);
-  const auto rods = static_cast<float>(look.cd_m2_per_unit * look.scotopic_ratio_of_white);
-  constexpr auto min_ratio = static_cast<float>(min_field_ratio);
   for_each_row(executor, y.height, [&](int row) {
     rows::light_row({{camera[0].row(row), camera[1].row(row), camera[2].row(row)}}, weights, y.width, y.row(row),
                     s.row(row));
-    const float* const light = y.row(row);
-    float* const own_rods = s.row(row);
-    float* const cones_field = field_y.row(row);
-    float* const rods_field = field_s.row(row);
-    for (int x = 0; x < y.width; ++x) {
-      own_rods[x] = std::max(own_rods[x], std::min(LookGrid::min_rods * light[x], light[x]));
-    }
-    for (int x = 0; x < y.width; ++x) cones_field[x] = std::min(std::max(cones * light[x], 0.0f), 1e9f);
-    for (int x = 0; x < y.width; ++x) {
-      rods_field[x] = std::min(std::max(rods * own_rods[x], min_ratio * cones_field[x]), 1e9f);
-    }
+    field_row(look, y.width, y.row(row), s.row(row), field_y.row(row), field_s.row(row));
   });
 }
 
@@ -177,7 +155,10 @@ void NightLookGrid::State::see(const NightLook& look, Executor& executor) {
       for_each_row(executor, part[0].height, [&](int y) { std::fill_n(part[0].row(y), part[0].width, without); });
     }
   };
-  everywhere(rod_fraction, look.effects.purkinje, 0);
+  const bool noise = look.effects.visual_noise;
+  everywhere(rod_fraction, look.effects.purkinje || noise, 0);
+  if (noise) weight_noise(executor);
+  if (noise && !look.effects.purkinje) everywhere(rod_fraction, false, 0);
   everywhere(chroma, look.effects.chroma, 1);
   everywhere(blue, look.effects.hue, 0);
   const PlaneView<float> e = seen[0], s = variance[0], share = rod_fraction[0];
@@ -260,24 +241,38 @@ void NightLookGrid::State::add_veil(Executor& executor) {
   });
 }
 
-// Draws normal deviates whose contrast is just visible in the field of adaptation.
-void NightLookGrid::State::draw_grain(const NightLook& look, Executor& executor) {
-  photopic.interpolate(smooth, 0, executor);
-  const PlaneView<float> field = photopic[0];
-  const DrawStream stream{.seed = look.seed, .frame = 0, .purpose = draw_purpose::visual_noise};
-  for_each_row(executor, field.height, [&](int y) {
-    const std::span<float> row(grain.row(y), static_cast<std::size_t>(field.width));
-    normal_row(stream, 0, static_cast<std::uint32_t>(y), 0, row);
-    for (int x = 0; x < field.width; ++x) {
-      const float light = field.row(y)[x];
-      row[x] *= tabulated_threshold_contrast(light) * light / static_cast<float>(look.cd_m2_per_unit);
+// Draws the noise of rods into `detail` and of cones into `base`: soften() writes both only later. Needs the light of
+// take_light().
+void NightLookGrid::State::draw_noise(const NightLook& look, Executor& executor) {
+  const VisualNoise noise = visual_noise(look);
+  const PlaneView<float> cones = photopic[0], rods = scotopic[0];
+  for_each_row(executor, cones.height, [&](int y) {
+    visual_noise_row(noise, y, cones.width, cones.row(y), rods.row(y), base.row(y), detail.row(y), grain.row(y));
+  });
+}
+
+// Weights the noise of rods and cones as E weights their light, into `grain`.
+void NightLookGrid::State::weight_noise(Executor& executor) {
+  const PlaneView<float> share = rod_fraction[0];
+  for_each_row(executor, share.height, [&](int y) {
+    for (int x = 0; x < share.width; ++x) {
+      grain.row(y)[x] = base.row(y)[x] + share.row(y)[x] * (detail.row(y)[x] - base.row(y)[x]);
     }
   });
 }
 
-void NightLookGrid::State::add_grain(Executor& executor) {
+// Adds the noise to E, so that it is pooled like the light.
+void NightLookGrid::State::add_noise(Executor& executor) {
+  const PlaneView<float> e = seen[0];
+  for_each_row(executor, e.height, [&](int y) {
+    for (int x = 0; x < e.width; ++x) e.row(y)[x] += grain.row(y)[x];
+  });
+}
+
+// Adds the noise of the fraction of light that is not pooled, which the pixels show as they are.
+void NightLookGrid::State::add_detail_noise(Executor& executor) {
   for_each_row(executor, seen[0].height, [&](int y) {
-    for (int x = 0; x < seen[0].width; ++x) base.row(y)[x] += grain.row(y)[x];
+    for (int x = 0; x < seen[0].width; ++x) base.row(y)[x] += detail.row(y)[x] * grain.row(y)[x];
   });
 }
 
@@ -319,14 +314,16 @@ LookGrid NightLookGrid::make(const RgbView<const float>& camera, const std::arra
   State& s = *state_;
   assert(camera[0].width <= s.base.width() && camera[0].height <= s.base.height());
   s.fit(camera[0].width, camera[0].height);
-  s.take_light(camera, weights_of(look, matrix, clip), look, executor);
+  const VisionEffects& effects = look.effects;
+  s.take_light(camera, light_weights(look, matrix, clip), look, executor);
+  if (effects.visual_noise) s.draw_noise(look, executor);
   s.adapt(look, executor);
   s.see(look, executor);
-  if (look.effects.visual_noise) s.draw_grain(look, executor);
-  if (look.effects.glare) s.scatter(look, executor);
+  if (effects.glare) s.scatter(look, executor);
+  if (effects.visual_noise) s.add_noise(executor);
   s.soften(executor);
-  if (look.effects.glare) s.add_veil(executor);
-  if (look.effects.visual_noise) s.add_grain(executor);
+  if (effects.glare) s.add_veil(executor);
+  if (effects.visual_noise) s.add_detail_noise(executor);
   if (limit) s.bound_noise(*limit, executor);
   LookGrid out{{}, look.luminance, look.rods, look.tint, look.dark};
   for (int k = 0; k < LookGrid::parts; ++k) out.part[k] = s.part(static_cast<LookGrid::Part>(k));

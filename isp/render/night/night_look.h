@@ -1,39 +1,15 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <memory>
 #include <optional>
 
 #include "isp/base/executor.h"
 #include "isp/base/image.h"
 #include "isp/base/look_grid.h"
-#include "isp/base/matrix3.h"
+#include "isp/render/night/look_parameters.h"
 
 namespace lowlux::isp {
-
-/// Selects the effects of darkness on vision that are applied, each of which can be left out.
-struct VisionEffects {
-  bool purkinje = true;       // reds darken and blues brighten, as rods take over
-  bool chroma = true;         // colours fade
-  bool hue = true;            // remaining colour moves towards blue
-  bool acuity = true;         // detail softens
-  bool glare = false;         // light of lamps scatters in the eye
-  bool visual_noise = false;  // noise of the eye itself
-};
-
-/// Parameters of a look, decided for one frame: the scene as perceived by an eye that is adapted to it.
-struct NightLook {
-  VisionEffects effects;
-  double cd_m2_per_unit = 100;            // luminance in the scene of Y = 1 of the pixels
-  double scotopic_ratio_of_white = 2.46;  // S/P of the white of the pixels
-  double pixels_per_degree = 60;          // of the image
-  std::array<float, 3> luminance{};       // weights in the pixels' primaries, as in LookGrid
-  std::array<float, 3> rods{};
-  std::array<float, 3> tint{};
-  float dark = 1e-6f;      // as in LookGrid: about the noise of a pixel
-  std::uint64_t seed = 1;  // seed of visual_noise
-};
 
 /// Bounds the amplification of noise: where the standard deviation of the remaining noise would exceed `lightness` (CIE
 /// L*) in the image, gain is reduced until it does not. The bound holds for every tone curve y(x) with y >= 0.7 x and
@@ -53,10 +29,6 @@ float gain_within_noise_limit(double y, double noise_std, double lightness);
 /// the entire scene's mean in it, due to scatter in the eye. Both values are chosen, not measured.
 inline constexpr double adaptation_field_std_deg = 1.0;
 inline constexpr double adaptation_fraction_of_mean = 0.1;
-
-/// Fields of adaptation count as having at least this S/P: below 0.265 CIE 191 has several solutions and jumps between
-/// them.
-inline constexpr double min_field_ratio = 0.27;
 
 /// Makes LookGrids. It owns its memory and allocates only in the constructor.
 class NightLookGrid {
