@@ -97,6 +97,66 @@ TEST_F(LookCommand, RefusesWhatDoesNotFit) {
   refused({"--display-luminance", "2", "--space", "linear-srgb"}, "sRGB");
 }
 
+TEST_F(LookCommand, WritesTheProbabilityOfSeeingNextToThePicture) {
+  const auto plain = lowlux({"develop", file("night.dng"), "-o", file("plain.png"), "--look", "eye"});
+  ASSERT_EQ(plain.exit_code, 0) << plain.err;
+  const std::vector<std::string> args{"develop", file("night.dng"), "-o",     file("seen.png"),    "--look",
+                                      "eye",     "--seeing-map",    "--json", "--scene-luminance", "0.00003"};
+  const auto first = lowlux(args);
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  const Json retina = Json::parse(first.out)[0]["look"]["retina"];
+  EXPECT_GT(retina["pupil_mm"], 7);
+  EXPECT_LT(retina["pupil_mm"], 8);
+  EXPECT_GT(retina["rod_isomerisations_per_s"], 0.001);
+  EXPECT_LT(retina["rod_isomerisations_per_s"], 0.1) << "one in a rod every half minute or so";
+  EXPECT_GT(retina["rod_threshold"], 5);
+  EXPECT_LE(retina["false_alarm_rate"], 0.01);
+  EXPECT_GT(retina["seen_fraction"], 0.1);
+  EXPECT_LT(retina["seen_fraction"], 1);
+  std::ifstream map(file("seen.seeing.pfm"), std::ios::binary);
+  std::string kind, width, height;
+  map >> kind >> width >> height;
+  EXPECT_EQ(kind, "Pf");
+  EXPECT_EQ(width + "x" + height, "24x16") << "a sample for 4x4 pixels";
+
+  std::filesystem::remove(file("seen.png"));
+  const auto again = lowlux(args);
+  EXPECT_EQ(again.exit_code, 1) << "the map exists";
+  EXPECT_NE(again.err.find("seen.seeing.pfm"), std::string::npos) << again.err;
+  EXPECT_FALSE(std::filesystem::exists(file("seen.png")));
+
+  const auto explained = lowlux(
+      {"develop", file("night.dng"), "-o", file("seen.png"), "--look", "eye", "--seeing-map", "--force", "--explain"});
+  EXPECT_EQ(explained.exit_code, 0) << explained.err;
+  for (const char* word : {"retina", "pupil", "in a rod", "seeing", "false alarms"}) {
+    EXPECT_NE(explained.out.find(word), std::string::npos) << word << explained.out;
+  }
+  EXPECT_EQ(test::read_file(file("seen.png")), test::read_file(file("plain.png"))) << "the picture stays as it is";
+}
+
+TEST_F(LookCommand, WritesAMapOfSeeingForEachFileOfABatch) {
+  std::filesystem::copy_file(file("night.dng"), file("other.dng"));
+  const auto both =
+      lowlux({"develop", file("night.dng"), file("other.dng"), "-o", file("out/"), "--look", "eye", "--seeing-map"});
+  ASSERT_EQ(both.exit_code, 0) << both.err;
+  for (const char* map : {"out/night.seeing.pfm", "out/other.seeing.pfm"}) {
+    EXPECT_TRUE(std::filesystem::exists(file(map))) << map;
+  }
+}
+
+TEST_F(LookCommand, HasAMapOfSeeingForFilesAndTheEyeAlone) {
+  refused({"--seeing-map"}, "--seeing-map goes with --look eye");
+  refused({"--look", "shin", "--seeing-map"}, "--seeing-map goes with --look eye");
+  const auto live = lowlux({"capture", "--v4l2", "/dev/video0", "--live", "--look", "eye", "--seeing-map"});
+  EXPECT_EQ(live.exit_code, 2);
+  EXPECT_NE(live.err.find("--seeing-map"), std::string::npos) << live.err;
+  const Json plain = look_of({"--look", "eye"})["look"];
+  EXPECT_TRUE(plain["retina"].is_null());
+  const Json noisy = look_of({"--look", "eye", "--effects", "visual-noise"})["look"];
+  EXPECT_GT(noisy["retina"]["cone_isomerisations_per_s"], 0);
+  EXPECT_TRUE(noisy["retina"]["seen_fraction"].is_null()) << "no map, no count";
+}
+
 TEST_F(LookCommand, AsksForTheLuminanceThatTheFileDoesNotTell) {
   const std::string raw = std::string(LOWLUX_TESTDATA) + "/raws/infiniteisp_indoor1_grbg8.dng";
   const auto result = developed({"--look", "eye"}, raw);

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "isp/model/vision/night_eye.h"
+#include "isp/model/vision/retina.h"
 #include "isp/model/vision/scene_light.h"
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/plan/plan_develop.h"
@@ -92,6 +93,56 @@ TEST(EyeLook, WithoutEffectsChangesNoBit) {
       ASSERT_EQ(seen_so.plane[c].data()[i], plain.plane[c].data()[i]);
     }
   }
+}
+
+TEST(EyeLook, MapsTheProbabilityOfSeeingAndLeavesThePictureAsItIs) {
+  InlineExecutor executor;
+  double last = 0;
+  for (const double cd_m2 : {1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1.0, 1e4}) {
+    DevelopOptions with = eye_at(cd_m2);
+    with.look.seeing_map = true;
+    const auto mapped = develop(coloured_frame(), with, executor),
+               plain = develop(coloured_frame(), eye_at(cd_m2), executor);
+    ASSERT_TRUE(mapped && plain);
+    EXPECT_EQ(plain->seeing_map.size(), 0);
+    EXPECT_FALSE(plain->plan.rendering.look->retina);
+    ASSERT_EQ(mapped->seeing_map.width(), (mapped->plan.width + 3) / 4);
+    ASSERT_EQ(mapped->seeing_map.height(), (mapped->plan.height + 3) / 4);
+    const RetinaPlan& retina = *mapped->plan.rendering.look->retina;
+    EXPECT_GE(*retina.seen_fraction, last) << cd_m2;
+    last = *retina.seen_fraction;
+    EXPECT_NEAR(retina.pupil_mm, adapted_pupil_mm(cd_m2), 1e-12);
+    const auto& a = std::get<SceneLinear>(mapped->picture);
+    const auto& b = std::get<SceneLinear>(plain->picture);
+    for (int c = 0; c < 3; ++c) {
+      for (std::size_t i = 0; i < a.plane[c].size(); ++i) ASSERT_EQ(a.plane[c].data()[i], b.plane[c].data()[i]);
+    }
+  }
+  EXPECT_EQ(last, 1) << "all is seen by day";
+}
+
+// The mean of fields of 32 x 32 pixels stays within five standard errors, which visual noise itself predicts: the
+// difference of two pictures is that noise.
+TEST(EyeLook, ShowsVisualNoiseAroundTheSameMeanAndLessOfItByDay) {
+  double last = 1;
+  for (const double cd_m2 : {1e-3, 0.1, 100.0, 1e4}) {
+    DevelopOptions noisy = eye_at(cd_m2), clean = eye_at(cd_m2);
+    noisy.look.which = clean.look.which = LookChoice::Which::listed;
+    clean.look.listed = noisy.look.listed = {false, false, false, false, false, false};
+    noisy.look.listed.visual_noise = true;
+    const SceneLinear a = seen(noisy), b = seen(clean);
+    double sum = 0, squares = 0;
+    for (std::size_t i = 0; i < a.plane[1].size(); ++i) {
+      const double difference = a.plane[1].data()[i] - b.plane[1].data()[i];
+      sum += difference, squares += difference * difference;
+    }
+    const double n = static_cast<double>(a.plane[1].size()), std_dev = std::sqrt(squares / n);
+    // Pixels between the centres of cells of 16 share them: one draw counts for each cell.
+    EXPECT_NEAR(sum / n, 0, 5 * std_dev / std::sqrt(n / 16)) << cd_m2;
+    EXPECT_LT(std_dev, last) << cd_m2;
+    last = std_dev;
+  }
+  EXPECT_LT(last, 1e-3) << "of white, by day";
 }
 
 TEST(EyeLook, DarkensRedsAndFadesColoursAsTheLightGoes) {

@@ -113,6 +113,7 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   add_output(app, args);
   add_rendering(app, args);
   add_look(app, args.look);
+  add_seeing_map(app, args.look);
   add_camera(app, args);
   add_denoise(app, args);
   add_darks(app, args.dark);

@@ -199,12 +199,22 @@ void add_look(CLI::App& app, LookArgs& args) {
            });
 }
 
+void add_seeing_map(CLI::App& app, LookArgs& args) {
+  app.add_flag_callback(
+      "--seeing-map",
+      [&args] {
+        args.given.emplace_back("--seeing-map");
+        args.choice.seeing_map = true;
+      },
+      "also write the probability of seeing each 4x4 pixels with --look eye: OUT.seeing.pfm");
+}
+
 std::optional<std::string> complete_look(const LookArgs& args, Planner planner, isp::LookChoice& choice) {
   choice = args.choice;
   if (!args.coefficients.empty() && choice.model != "shin" && !args.display_cd_m2) {
     return "--coefficients go with --look shin or --display-luminance";
   }
-  constexpr std::array only_eye{"--effects", "--tolerance", "--field-of-view"};
+  constexpr std::array only_eye{"--effects", "--tolerance", "--field-of-view", "--seeing-map"};
   const bool lists =
       choice.which == isp::LookChoice::Which::listed &&
       std::ranges::any_of(isp::night_effect_names, [&](auto name) { return *isp::effect_named(choice.listed, name); });

@@ -29,6 +29,8 @@ struct LookArgs {
 };
 
 void add_look(CLI::App& app, LookArgs& args);
+/// Adds --seeing-map, which only developing files has.
+void add_seeing_map(CLI::App& app, LookArgs& args);
 
 /// Names what decides on corrections: the look alone, or a planner for all corrections, for which --effects auto,
 /// --effects all and --tolerance are valid with any look.

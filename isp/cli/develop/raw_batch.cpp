@@ -67,6 +67,7 @@ std::vector<std::string> files_of(const RawBatch& batch, const Job& job) {
   if (batch.options.denoise.maps) {
     for (std::string& map : noise_map_names(job.output)) files.push_back(std::move(map));
   }
+  if (batch.options.look.seeing_map) files.push_back(seeing_map_name(job.output));
   return files;
 }
 
@@ -140,6 +141,12 @@ Result<void> write_noise_maps(const RawBatch& batch, const Job& job, isp::NoiseM
     if (Result<void> written = write_map(map, job.overwrite, batch.sync); !written) return written;
   }
   return {};
+}
+
+Result<void> write_seeing_map(const RawBatch& batch, const Job& job, Plane<float> map, const RawDn& raw,
+                              Executor& executor) {
+  if (map.size() == 0) return {};
+  return write_map(seeing_map_file(std::move(map), raw, job.output, executor), job.overwrite, batch.sync);
 }
 
 namespace {

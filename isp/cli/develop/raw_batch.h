@@ -64,6 +64,10 @@ Result<ReadyFrame> ready_frame(const RawBatch& batch, const Job& job, Executor& 
 Result<void> write_noise_maps(const RawBatch& batch, const Job& job, isp::NoiseMaps maps, const RawDn& raw,
                               Executor& executor);
 
+/// Writes the map of seeing to the folder of the output; nothing if there is none.
+Result<void> write_seeing_map(const RawBatch& batch, const Job& job, Plane<float> map, const RawDn& raw,
+                              Executor& executor);
+
 /// Advances the progress bar for one file: roughly by the fraction of its time that has passed, to 1 in the end.
 class FileProgress {
  public:

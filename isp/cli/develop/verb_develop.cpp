@@ -41,6 +41,8 @@ Result<void> develop_file(const RawBatch& batch, const Job& job, Executor& execu
   // The output is written last: if it exists, --skip-existing takes all as done.
   Result<void> maps = write_noise_maps(batch, job, std::move(developed->noise_maps), raw, executor);
   if (!maps) return maps;
+  maps = write_seeing_map(batch, job, std::move(developed->seeing_map), raw, executor);
+  if (!maps) return maps;
   const Result<void> written = isp::write_picture(upright, batch.options.space, raw.info, job.output, write, executor);
   finish.lap("encode and write");
   if (!written) return fail(written.error().code, written.error().message, job.output);

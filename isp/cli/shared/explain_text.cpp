@@ -90,12 +90,24 @@ void add_light(Lines& out, const isp::LookPlan& look, const isp::SceneLight* lig
   }
 }
 
+void add_retina(Lines& out, const isp::RetinaPlan& retina) {
+  out.add("retina", fmt::format("pupil {:.1f} mm; the scene's mean isomerises {:.3g}/s in a rod, {:.3g}/s in a cone",
+                                retina.pupil_mm, retina.mean.rods, retina.mean.cones));
+  if (!retina.seen_fraction) return;
+  const isp::SeeingModel& seeing = retina.seeing;
+  out.add("seeing", fmt::format("{:.1f} % of the picture seen in more than half of the cases, by {} isomerisations of "
+                                "rods or {} of cones; {:.2g} % false alarms",
+                                100 * *retina.seen_fraction, seeing.rods.threshold, seeing.cones.threshold,
+                                100 * seeing.false_alarm_rate));
+}
+
 void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, const std::string& coefficients,
               bool noise_known) {
   if (look.kind != isp::Look::camera) {
     out.add("look", fmt::format("{}; scene {:.3g} cd/m2 ({}), adaptation m {:.2f}, {:+.2f} EV of darkness kept", name,
                                 look.mean_cd_m2, look.luminance_rule, look.state.m, look.dimming_ev));
     if (look.effects) add_look_effects(out, *look.effects);
+    if (look.retina) add_retina(out, *look.retina);
   }
   if (look.table) {
     out.add("", fmt::format(

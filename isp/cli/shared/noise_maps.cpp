@@ -42,6 +42,18 @@ std::vector<PixelMap> noise_map_files(isp::NoiseMaps maps, const RawDn& raw, con
   return out;
 }
 
+std::string seeing_map_name(const std::string& picture) {
+  return std::filesystem::path(picture).replace_extension().string() + ".seeing.pfm";
+}
+
+PixelMap seeing_map_file(Plane<float> map, const RawDn& raw, const std::string& picture, Executor& executor) {
+  SceneLinear only;
+  for (Plane<float>& plane : only.plane) plane = Plane<float>(map.width(), map.height());
+  only.plane[0] = std::move(map);
+  auto upright = std::get<SceneLinear>(isp::oriented(std::move(only), raw.info.orientation, executor));
+  return {seeing_map_name(picture), std::move(upright.plane[0])};
+}
+
 Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite, isp::Sync sync) {
   auto file = isp::AtomicFile::create(map.path, overwrite, sync);
   if (!file) return tl::make_unexpected(with_file(file.error(), map.path));

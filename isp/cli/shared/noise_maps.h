@@ -28,4 +28,10 @@ std::vector<std::string> noise_map_names(const std::string& picture);
 std::vector<PixelMap> noise_map_files(isp::NoiseMaps maps, const RawDn& raw, const std::string& picture,
                                       Executor& executor);
 
+/// Returns the file of an image's map of seeing: OUT.seeing.pfm for OUT.png.
+std::string seeing_map_name(const std::string& picture);
+
+/// Returns the map of seeing turned upright like its image, one pixel per 4x4 pixels.
+PixelMap seeing_map_file(Plane<float> map, const RawDn& raw, const std::string& picture, Executor& executor);
+
 }  // namespace lowlux::cli

@@ -135,6 +135,18 @@ Json effects_json(const isp::DevelopPlan& plan) {
   return json;
 }
 
+Json retina_json(const std::optional<isp::RetinaPlan>& retina) {
+  if (!retina) return nullptr;
+  const isp::SeeingModel& seeing = retina->seeing;
+  return {{"pupil_mm", retina->pupil_mm},
+          {"rod_isomerisations_per_s", retina->mean.rods},
+          {"cone_isomerisations_per_s", retina->mean.cones},
+          {"rod_threshold", seeing.rods.threshold},
+          {"cone_threshold", seeing.cones.threshold},
+          {"false_alarm_rate", seeing.false_alarm_rate},
+          {"seen_fraction", optional_json(retina->seen_fraction)}};
+}
+
 Json look_json(const isp::DevelopPlan& plan) {
   if (!plan.rendering.look) return nullptr;
   const isp::LookPlan& look = *plan.rendering.look;
@@ -160,6 +172,7 @@ Json look_json(const isp::DevelopPlan& plan) {
   json["rods_source"] = look.rods ? look.rods->source : "xyz";
   json["adaptation_degree"] = look.adaptation_degree;
   json["dimming_ev"] = look.dimming_ev;
+  json["retina"] = retina_json(look.retina);
   json["effects"] = Json::array();
   if (!look.effects) return json;
   for (const isp::LookEffect& effect : *look.effects) {

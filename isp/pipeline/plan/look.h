@@ -12,7 +12,9 @@
 #include "isp/base/matrix3.h"
 #include "isp/base/result.h"
 #include "isp/model/appearance/shin_table.h"
+#include "isp/model/vision/detection.h"
 #include "isp/model/vision/night_eye.h"
+#include "isp/model/vision/retina.h"
 #include "isp/model/vision/scene_light.h"
 #include "isp/render/colour_table.h"
 #include "isp/render/night/night_look.h"
@@ -42,6 +44,7 @@ struct LookChoice {
   double tolerance = 0.5;         // CIEDE2000: effects below it are left out by Which::automatic
   double dimming = 0.4;           // fraction of the darkness that the image keeps, 0..1; see apparent_dimming_ev
   double field_of_view_deg = 50;  // of the image's longer side
+  bool seeing_map = false;        // the probability of seeing is requested for each cell, see map_seeing(); Look::eye
   /// States the CIE L* that noise may reach, see NoiseLimit; absent: no limit.
   std::optional<double> noise_limit;
 };
@@ -65,6 +68,14 @@ struct RodWeights {
   std::optional<double> relative_error;  // rms over the reflectances they were fitted on; unknown of a profile
 };
 
+/// Holds the light that receptors get from the mean of a scene, and what is seen by it.
+struct RetinaPlan {
+  double pupil_mm = 0;                  // diameter
+  ReceptorRates mean;                   // isomerisations by the mean of the scene in one receptor [s-1]
+  SeeingModel seeing;                   // thresholds and false alarms
+  std::optional<double> seen_fraction;  // of the image, with more than 0.5; set once a map is rendered
+};
+
 /// States the mean of a scene as a fraction of white.
 inline constexpr double scene_mean_of_white = 0.18;
 
@@ -83,6 +94,7 @@ struct LookPlan {
   double adaptation_degree = 1;      // D of incomplete_adaptation()
   Matrix3 adaptation = identity3();  // of completely adapted values in the output's primaries
   std::optional<std::array<LookEffect, 6>> effects;  // set for Look::eye
+  std::optional<RetinaPlan> retina;  // set where visual noise is shown or the map of seeing is requested
   std::optional<double> noise_limit;
   std::optional<NoiseProfile> noise;  // of the raw frame; absent: not known
 };

@@ -151,6 +151,15 @@ void choose_steps(const LookChoice& choice, const std::array<double, 2>& fields_
   for (const LookEffect& effect : effects) *effect_named(look.look.effects, effect.name) = effect.used;
 }
 
+// Computes what receptors get from the mean of the scene.
+RetinaPlan retina_of(const LookPlan& look) {
+  RetinaPlan out{.pupil_mm = adapted_pupil_mm(look.mean_cd_m2)};
+  const double pupil_mm2 = pupil_area_mm2(out.pupil_mm);
+  out.mean = receptor_rates(field_of(look.mean_cd_m2, look.look), pupil_mm2);
+  out.seeing = *seeing_model(pupil_mm2);
+  return out;
+}
+
 // Decides the state of the eye, the effects it requires, and how much darker the image gets.
 void decide_eye(const FrameLight& light, double white_cd_m2, const DevelopOptions& options, LookPlan& look) {
   const LookChoice& choice = options.look;
@@ -158,6 +167,8 @@ void decide_eye(const FrameLight& light, double white_cd_m2, const DevelopOption
   look.white_cd_m2 = look.mean_cd_m2 / scene_mean_of_white;
   if (choice.look == Look::eye) {
     choose_steps(choice, range_of_fields(light.block_luminance, white_cd_m2, look), !light.white, look);
+    look.look.scene_cd_m2 = look.mean_cd_m2;
+    if (choice.seeing_map || look.look.effects.visual_noise) look.retina = retina_of(look);
   }
   if (!options.exposure_ev) look.dimming_ev = choice.dimming * apparent_dimming_ev(look.state.luminance_cd_m2);
 }

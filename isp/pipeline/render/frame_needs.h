@@ -27,6 +27,11 @@ inline bool needs_grid(const DevelopPlan& plan) {
   return look && (shows_effects(*look) || bounds_noise(plan));
 }
 
+inline bool needs_seeing_map(const DevelopPlan& plan) {
+  const std::optional<LookPlan>& look = plan.rendering.look;
+  return plan.options.look.seeing_map && look && look->kind == Look::eye;
+}
+
 inline bool keeps_maps(const DevelopPlan& plan) {
   return plan.noise_reduction.has_level() && (plan.options.denoise.maps || needs_noise(plan));
 }

@@ -11,6 +11,7 @@
 #include "isp/raw/bin_plane.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/to_linear.h"
+#include "isp/render/night/seeing_map.h"
 
 namespace lowlux::isp {
 namespace {
@@ -140,6 +141,14 @@ RgbView<const float> Pipeline::quarter_view() const {
   return {quarter_[0].view(), quarter_[1].view(), quarter_[2].view()};
 }
 
+void Pipeline::map_seeing_of(const DevelopPlan& plan) {
+  SeeingMap& map = seeing_.emplace();
+  map.probability = Plane<float>(quarter_[0].width(), quarter_[0].height());
+  const RgbTransform& transform = plan.rendering.transform;
+  map.seen_fraction = map_seeing(quarter_view(), transform.matrix, transform.clip, plan.rendering.look->look,
+                                 map.probability.view(), executor_);
+}
+
 LookGrid Pipeline::look_grid(const DevelopPlan& plan) {
   if (!look_ || look_width_ < plan.width || look_height_ < plan.height) {
     look_width_ = std::max(plan.width, look_width_);
@@ -163,12 +172,14 @@ void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const E
   const RgbInput in =
       frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);
   RgbTransform transform = plan.rendering.transform;
-  if (needs_grid(plan) || needs_noise(plan)) measure_cells(in, frame, plan);
+  if (needs_grid(plan) || needs_noise(plan) || needs_seeing_map(plan)) measure_cells(in, frame, plan);
   LookGrid look;
   if (needs_grid(plan)) {
     look = look_grid(plan);
     transform.look = &look;
   }
+  seeing_.reset();
+  if (needs_seeing_map(plan)) map_seeing_of(plan);
   if (needs_table(plan)) {
     encode(as_modelled(in, plan), of_modelled(plan, transform.look));
   } else {
@@ -179,6 +190,7 @@ void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const E
 void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
   if (is_tiled(frame.raw, plan, limits_)) {
     has_noise_maps_ = false;
+    seeing_.reset();
     return tiles_.render(frame, plan, noise_reducer_, out);
   }
   render_to(frame, plan, [&](const RgbInput& in, const RgbTransform& transform) {

@@ -43,6 +43,14 @@ class Pipeline {
     return std::exchange(has_noise_maps_, false) ? std::exchange(noise_maps_, {}) : NoiseMaps{};
   }
 
+  /// Holds the probability of seeing of each cell of 4 x 4 pixels, and the fraction of cells above 0.5.
+  struct SeeingMap {
+    Plane<float> probability;
+    double seen_fraction = 0;
+  };
+  /// Returns the map of seeing of the frame rendered last; absent unless the plan requested it.
+  std::optional<SeeingMap> take_seeing_map() { return std::exchange(seeing_, std::nullopt); }
+
  private:
   template <class Encode>
   void render_to(const RawFrame& frame, const DevelopPlan& plan, const Encode& encode);
@@ -51,6 +59,7 @@ class Pipeline {
   RgbInput prepare_planes(const RawFrame& frame, const DevelopPlan& plan);
   void measure_cells(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan);
   RgbView<const float> quarter_view() const;
+  void map_seeing_of(const DevelopPlan& plan);
   LookGrid look_grid(const DevelopPlan& plan);
   CameraPlanes as_modelled(const RgbInput& in, const DevelopPlan& plan);
   SignalElectrons signal_electrons(const RawFrame& frame, const DevelopPlan& plan);
@@ -69,9 +78,10 @@ class Pipeline {
   std::unique_ptr<NightLookGrid> look_;
   int look_width_ = 0;
   int look_height_ = 0;
-  std::array<Plane<float>, 3> quarter_;   // for the look: means of 4 x 4 pixels
-  Plane<float> luminance_noise_;          // variance, for the cells of quarter_
-  Plane<float> signal_to_noise_;          // for the cells of quarter_
+  std::array<Plane<float>, 3> quarter_;  // for the look: means of 4 x 4 pixels
+  Plane<float> luminance_noise_;         // variance, for the cells of quarter_
+  Plane<float> signal_to_noise_;         // for the cells of quarter_
+  std::optional<SeeingMap> seeing_;
   std::array<Plane<float>, 3> modelled_;  // light as changed by a model of appearance
   std::array<Plane<float>, 3> planes_;    // camera RGB of frames that need no demosaicing
   std::array<Plane<float>, 3> half_planes_;

@@ -31,7 +31,7 @@ std::size_t whole_frame_bytes(const RawDn& raw, const DevelopPlan& plan, int thr
 }  // namespace
 
 std::size_t pipeline_bytes(const RawDn& raw, const DevelopPlan& plan, int threads, const TileLimits& limits) {
-  assert(!needs_grid(plan) && !needs_table(plan) && !plan.noise_reduction.temporal);
+  assert(!needs_grid(plan) && !needs_seeing_map(plan) && !needs_table(plan) && !plan.noise_reduction.temporal);
   if (is_tiled(raw, plan, limits)) return TileRenderer::bytes(raw, plan, limits, threads);
   return whole_frame_bytes(raw, plan, threads);
 }
