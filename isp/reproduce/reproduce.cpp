@@ -16,6 +16,7 @@ constexpr std::array registry{
     Experiment{"chromaticity-clouds", "Chromaticities of ideal cones (section 3.4, Fig. 3-3 onwards)",
                run_chromaticity_clouds},
     Experiment{"frequency-of-seeing", "Seeing a flash of few photons (Eq. 2.1 to 2.7)", run_frequency_of_seeing},
+    Experiment{"retina", "Light at the retina, and flashes that observers saw (Eq. 2.3, 3.3, Fig. 2-2)", run_retina},
     Experiment{"sensor-scenarios", "Noise of the image sensor (section 4, scenarios I to III)", run_sensor_scenarios},
     Experiment{"dark-desaturation", "Dark current desaturates (Eq. 4.16 to 4.24)", run_dark_desaturation},
     Experiment{"snr-sensitivity", "What the signal-to-noise ratio depends on (Eq. 4.12, 4.13)", run_snr_sensitivity},
@@ -29,10 +30,6 @@ constexpr std::array registry{
 };
 
 constexpr std::array left_out{
-    NotReproduced{"photons at the retina, absorption by cones and rods (Eq. 2.3, 3.3)",
-                  "lowlux has no model of the eye's optics and receptors that takes cd/m2 to photons"},
-    NotReproduced{"measured frequencies of seeing next to Fig. 2-2, curves with dark light",
-                  "the observers' data are not bundled"},
     NotReproduced{"clouds by cones (Eq. 3.9, 3.10)",
                   "the colour-matching functions of CIE 1931 are used: cones that are linear combinations of them give "
                   "the same chromaticities"},

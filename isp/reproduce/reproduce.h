@@ -94,6 +94,7 @@ std::string count_of_verdicts(std::span<const Finding> findings, Finding::Kind k
 Result<Outcome> run_few_photons(const RunOptions& options);
 Result<Outcome> run_chromaticity_clouds(const RunOptions& options);
 Result<Outcome> run_frequency_of_seeing(const RunOptions& options);
+Result<Outcome> run_retina(const RunOptions& options);
 Result<Outcome> run_sensor_scenarios(const RunOptions& options);
 Result<Outcome> run_dark_desaturation(const RunOptions& options);
 Result<Outcome> run_snr_sensitivity(const RunOptions& options);

@@ -21,9 +21,9 @@ test::ProcessResult reproduce(std::vector<std::string> args) {
 TEST(Reproduce, ListNamesTheExperimentsAndRunsNone) {
   const auto list = reproduce({"--list"});
   EXPECT_EQ(list.exit_code, 0);
-  EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), 10);
+  EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), 11);
   for (const char* id :
-       {"few-photons", "chromaticity-clouds", "frequency-of-seeing", "sensor-scenarios", "dark-desaturation",
+       {"few-photons", "chromaticity-clouds", "frequency-of-seeing", "retina", "sensor-scenarios", "dark-desaturation",
         "snr-sensitivity", "mesopic-photometry", "mesopic-tracks", "mesopic-fixed-gamma", "retargeting"}) {
     EXPECT_NE(list.out.find(id), std::string::npos);
   }

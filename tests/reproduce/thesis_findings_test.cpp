@@ -37,6 +37,7 @@ const std::set<std::string> checks{
     "chromaticity-clouds/error-predicted",
     "frequency-of-seeing/drawn",
     "frequency-of-seeing/tail",
+    "retina/absorption",
     "sensor-scenarios/saturation",
     "sensor-scenarios/published-sampling",
     "dark-desaturation/line",
@@ -51,7 +52,7 @@ const std::set<std::string> checks{
 };
 
 // These come first in the registry; mesopic_agreement_test.cpp and retargeting_experiment_test.cpp run the others.
-constexpr int sampled_experiments = 7;
+constexpr int sampled_experiments = 8;
 
 class PublishedExperiment : public testing::TestWithParam<int> {};
 
