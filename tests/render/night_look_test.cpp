@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <random>
 #include <tuple>
@@ -296,6 +297,25 @@ TEST(VisualNoise, DrawsMeanAndVarianceOnBothSidesOfEachBranch) {
       EXPECT_NEAR(sum / n, 0, 5 * std::sqrt(mean / n) + 4e-8 * mean) << light << ": and rounding of the mean to float";
       EXPECT_NEAR(squares / n, mean, 5 * std::sqrt((mean + 2 * mean * mean) / n) + 1e-6 * mean) << light;
     }
+  }
+}
+
+// Prints the table of isp/render/README.md: a grey of half the white, cells of 0.2 degrees.
+TEST(VisualNoise, OfAGreyFallsWithLight) {
+  double last_rods = 1e9, last_cones = 1e9;
+  for (const double white : {1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0, 100.0, 1e4}) {
+    const VisualNoise noise = visual_noise(noise_alone(white));
+    const auto contrast = [&](const VisualNoise::Kind& kind, double grey) {
+      const double light = kind.counts_per_cd_m2 * grey;
+      return std::sqrt(light + kind.dark_counts) / light;
+    };
+    const double cones = contrast(noise.cones, 0.5 * white), rods = contrast(noise.rods, 1.23 * white);
+    std::printf("| %g | %.3g, %.2g | %.2g %% | %.3g, %.4g | %.2g %% |\n", white,
+                noise.rods.counts_per_cd_m2 * 1.23 * white, static_cast<double>(noise.rods.dark_counts), 100 * rods,
+                noise.cones.counts_per_cd_m2 * 0.5 * white, static_cast<double>(noise.cones.dark_counts), 100 * cones);
+    EXPECT_LT(rods, last_rods) << white;
+    EXPECT_LT(cones, last_cones) << white;
+    last_rods = rods, last_cones = cones;
   }
 }
 

@@ -16,6 +16,7 @@ const std::set<std::string> known_not_to_hold{
     "chromaticity-clouds/blue-and-red-each",  // a purple is larger than an orange
     "chromaticity-clouds/pooled-variation",   // all sizes are proportional to F^-1/2
     "frequency-of-seeing/tail",               // 1 - sum cancels
+    "retina/absorbed",                        // today's density of the pigment is higher
     "sensor-scenarios/photons-matter",        // a pixel collects far less light than 1 m2 sr
     "sensor-scenarios/published-sampling",    // photons weighted by Qe are no Poisson variable
     "snr-sensitivity/read",                   // volts beside volts squared

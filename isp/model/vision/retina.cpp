@@ -107,7 +107,7 @@ Result<Spectrum> corneal_photons(const Spectrum& radiance, double pupil_mm2) {
     return fail(ErrorCode::invalid_argument,
                 "the area of a pupil must be 0 or more and finite [mm2], found " + number_text(pupil_mm2));
   }
-  const Result<Spectrum> photons = photon_radiance(radiance);
+  Result<Spectrum> photons = photon_radiance(radiance);
   if (!photons) return photons;
   return photons->mapped([&](double, double value) { return value * pupil_mm2 * m2_per_mm2 * sr_per_deg2; });
 }

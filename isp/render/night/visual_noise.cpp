@@ -16,11 +16,20 @@ VisualNoise::Kind kind_of(const ReceptorField& cell, double cd_m2_per_unit) {
           static_cast<float>(1 / (cell.counts_per_cd_m2 * cd_m2_per_unit))};
 }
 
-void deviations_row(const DrawStream& stream, const VisualNoise::Kind& kind, int y, int n, const float* cd_m2,
-                    float* out, float* counts) {
+/// Holds what is drawn from, and what for, in one row of cells.
+struct KindOfRow {
+  DrawStream stream;
+  VisualNoise::Kind kind;
+  const float* cd_m2;
+  float* deviation;
+};
+
+void deviations_row(const KindOfRow& row, int y, int n, float* counts) {
+  const VisualNoise::Kind& kind = row.kind;
+  float* const out = row.deviation;
   const auto size = static_cast<std::size_t>(n);
-  for (int x = 0; x < n; ++x) out[x] = kind.counts_per_cd_m2 * cd_m2[x] + kind.dark_counts;
-  poisson_row(stream, 0, static_cast<std::uint32_t>(y), std::span<const float>(out, size),
+  for (int x = 0; x < n; ++x) out[x] = kind.counts_per_cd_m2 * row.cd_m2[x] + kind.dark_counts;
+  poisson_row(row.stream, 0, static_cast<std::uint32_t>(y), std::span<const float>(out, size),
               std::span<float>(counts, size));
   for (int x = 0; x < n; ++x) {
     const float drawn = std::min(out[x], poisson_max_mean);
@@ -41,10 +50,10 @@ VisualNoise visual_noise(const NightLook& look) {
 
 void visual_noise_row(const VisualNoise& noise, int y, int n, const float* cones_cd_m2, const float* rods_cd_m2,
                       float* cones, float* rods, float* scratch) {
-  deviations_row({.seed = noise.seed, .frame = 0, .purpose = draw_purpose::visual_noise_rods}, noise.rods, y, n,
-                 rods_cd_m2, rods, scratch);
-  deviations_row({.seed = noise.seed, .frame = 0, .purpose = draw_purpose::visual_noise_cones}, noise.cones, y, n,
-                 cones_cd_m2, cones, scratch);
+  const DrawStream of_rods{.seed = noise.seed, .frame = 0, .purpose = draw_purpose::visual_noise_rods};
+  const DrawStream of_cones{.seed = noise.seed, .frame = 0, .purpose = draw_purpose::visual_noise_cones};
+  deviations_row({of_rods, noise.rods, rods_cd_m2, rods}, y, n, scratch);
+  deviations_row({of_cones, noise.cones, cones_cd_m2, cones}, y, n, scratch);
 }
 
 }  // namespace lowlux::isp
