@@ -13,6 +13,12 @@
 
 namespace lowlux::isp {
 
+/// Holds the probability of seeing of each cell of 4 x 4 pixels, and the fraction of cells above 0.5.
+struct SeeingMap {
+  Plane<float> probability;
+  double seen_fraction = 0;
+};
+
 /// Renders raw frames to images as their plans state. Owns every buffer between the two: the first frame of a size
 /// allocates them, later ones of that size allocate nothing. Processes one frame at a time.
 class Pipeline {
@@ -43,11 +49,6 @@ class Pipeline {
     return std::exchange(has_noise_maps_, false) ? std::exchange(noise_maps_, {}) : NoiseMaps{};
   }
 
-  /// Holds the probability of seeing of each cell of 4 x 4 pixels, and the fraction of cells above 0.5.
-  struct SeeingMap {
-    Plane<float> probability;
-    double seen_fraction = 0;
-  };
   /// Returns the map of seeing of the frame rendered last; absent unless the plan requested it.
   std::optional<SeeingMap> take_seeing_map() { return std::exchange(seeing_, std::nullopt); }
 
