@@ -12,6 +12,7 @@
 #include "isp/metrics/gamut_ratio.h"
 #include "isp/model/colour/colour_difference.h"
 #include "isp/model/spectrum/spectral_divergence.h"
+#include "isp/model/vision/detection.h"
 #include "isp/model/vision/seeing.h"
 #include "isp/render/retarget/retarget.h"
 #include "isp/render/retarget/retarget_rows.h"
@@ -20,6 +21,7 @@
 #include "tests/hard_cases/rendering.h"
 #include "tests/reference/exact_ref.h"
 #include "tests/reference/retarget_ref.h"
+#include "tests/support/sweep.h"
 
 // Seeing, and what compares colours: section 4 of the sensor model; sections 4 and 5 of the mesopic specification.
 namespace lowlux::hard_cases {
@@ -47,6 +49,31 @@ TEST(HardCaseColour, FrequencyOfSeeingWhereItIsTiny) {
           for (const double mean : {1e-3, 0.1, 1.0, 5.0, 40.0}) {
             const double found = in_mode(m, [&] { return *isp::frequency_of_seeing({mean, 1, 0}, threshold); });
             keep_worst(worst, std::abs(found / reference::poisson_at_least(threshold, mean) - 1));
+          }
+        }
+        return worst;
+      },
+      no_image);
+}
+
+// Both tails at any light; the means are rounded before: a last digit of 400 moves the tail beyond 430 by 1e-14 of it.
+TEST(HardCaseColour, SeeingAPatchAtAnyLight) {
+  figures_row(
+      {group, "probability of seeing a patch in 1e-9 to 1e9 cd/m2", "two sums of Poisson terms in 50 digits",
+       "relative"},
+      {1e-13, rounding},
+      [](Denormals m) {
+        double worst = 0;
+        for (const double pupil_mm2 : {3.14, 12.0, 47.0}) {
+          const isp::SeeingModel model = *isp::seeing_model(pupil_mm2);
+          const auto missed = [](const isp::DetectionLimit& limit, double cd_m2) {
+            const double mean = limit.patch.dark_counts + cd_m2 * limit.patch.counts_per_cd_m2;
+            return mean > 5000 ? 0 : 1 - reference::poisson_at_least(limit.threshold, mean);
+          };
+          for (const double light : test::ratios(1e-9, 1e9, 2.3)) {
+            const double found = in_mode(m, [&] { return isp::probability_of_seeing(model, {light, 2.46 * light}); });
+            const double truth = 1 - missed(model.rods, 2.46 * light) * missed(model.cones, light);
+            keep_worst(worst, std::abs(found / truth - 1));
           }
         }
         return worst;

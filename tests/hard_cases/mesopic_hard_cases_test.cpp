@@ -3,14 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "isp/base/random/exact_draw.h"
+#include "isp/base/random/random.h"
 #include "isp/model/vision/mesopic.h"
 #include "isp/render/night/eye_rows.h"
 #include "isp/render/night/eye_tables.h"
+#include "isp/render/night/visual_noise.h"
 #include "tests/hard_cases/hard_case.h"
 #include "tests/hard_cases/looks.h"
 #include "tests/hard_cases/rec709_camera.h"
@@ -60,6 +65,45 @@ void figures_row(const About& about, const Bound& bound, const Measure& measure,
 constexpr Xyz daylight{0.95047, 1, 1.08883};
 constexpr Xyz blue_light{1.9, 1, 11.2};    // S/P 12.1
 constexpr Xyz amber_light{1.66, 1, 0.02};  // S/P 0.203
+
+// Means are floats: half a last digit of 1e6 counts is 3e-5 of their standard deviation, and above that the scale of
+// the limit applies. Fields of less than one isomerisation up to 1e15 of them.
+TEST(HardCaseMesopic, VisualNoiseAtAnyLight) {
+  HardCase row({group, "visual noise in 1e-7 to 1e9 cd/m2, 1 to 1000 pixels per degree",
+                "the same words drawn in double", "standard deviations"});
+  row.on_each_set({1e-4, rounding}, [](Denormals m) {
+    constexpr int cells = 64;
+    double worst = 0;
+    for (const double pixels_per_degree : {1.0, 30.0, 1000.0}) {
+      for (const double light : test::ratios(1e-7, 1e9, 3.1)) {
+        isp::NightLook look;
+        look.cd_m2_per_unit = look.scene_cd_m2 = light;
+        look.pixels_per_degree = pixels_per_degree;
+        const isp::VisualNoise noise = isp::visual_noise(look);
+        const std::vector<float> cd_m2(cells, static_cast<float>(light));
+        std::vector<float> cones(cells), rods(cells), scratch(cells);
+        in_mode(m, [&] {
+          isp::visual_noise_row(noise, 9, cells, cd_m2.data(), cd_m2.data(), cones.data(), rods.data(), scratch.data());
+          return 0;
+        });
+        for (const auto& [found, kind, purpose] : {std::tuple{&rods, noise.rods, draw_purpose::visual_noise_rods},
+                                                   {&cones, noise.cones, draw_purpose::visual_noise_cones}}) {
+          const double mean = static_cast<double>(kind.counts_per_cd_m2) * cd_m2[0] + kind.dark_counts;
+          const double drawn = std::min(mean, static_cast<double>(poisson_max_mean));
+          for (int x = 0; x < cells; ++x) {
+            const std::uint32_t word = words_at({look.seed, 0, purpose}, static_cast<std::uint32_t>(x), 9)[0];
+            const double count = exact_poisson(word, static_cast<double>(static_cast<float>(drawn)));
+            const double expected = (count - drawn) / std::sqrt(drawn);
+            keep_worst(worst, std::abs((*found)[x] / kind.units_per_count / std::sqrt(mean) - expected));
+          }
+        }
+      }
+    }
+    return worst;
+  });
+  row.none(Path::reference, "the sampler in double is the oracle").none(levels, "looks come after");
+  row.none(pipelines, "each row of cells is drawn by that call");
+}
 
 TEST(HardCaseMesopic, NoLightAtAll) {
   HardCase row({group, "1.1 both luminances 0", "closed form: m = 0, luminance 0, and black", look_unit});
