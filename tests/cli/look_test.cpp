@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -132,6 +134,33 @@ TEST_F(LookCommand, WritesTheProbabilityOfSeeingNextToThePicture) {
     EXPECT_NE(explained.out.find(word), std::string::npos) << word << explained.out;
   }
   EXPECT_EQ(test::read_file(file("seen.png")), test::read_file(file("plain.png"))) << "the picture stays as it is";
+}
+
+TEST_F(LookCommand, TurnsTheMapOfSeeingUprightLikeThePicture) {
+  const auto map_of = [&](const std::string& raw) {
+    const auto made = lowlux({"develop", raw, "-o", file("seen.png"), "--look", "eye", "--seeing-map", "--force",
+                              "--scene-luminance", "0.00003"});
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    std::string map = test::read_file(file("seen.seeing.pfm"));
+    std::vector<float> samples(24 * 16);
+    EXPECT_GT(map.size(), sizeof(float) * samples.size());
+    std::memcpy(samples.data(), map.data() + map.size() - sizeof(float) * samples.size(),
+                sizeof(float) * samples.size());
+    return std::pair(map.substr(3, 5), samples);
+  };
+  std::string raw = test::read_file(file("night.dng"));
+  const std::string orientation{"\x12\x01\x03\0\x01\0\0\0\x01", 9};  // tag 274, a short: 1, normal
+  const std::size_t at = raw.find(orientation);
+  ASSERT_NE(at, std::string::npos);
+  raw[at + 8] = 6;  // turned by 90 degrees
+  std::ofstream(file("turned.dng"), std::ios::binary) << raw;
+  const auto [size, normal] = map_of(file("night.dng"));
+  const auto [turned_size, turned] = map_of(file("turned.dng"));
+  EXPECT_EQ(size, "24 16");
+  EXPECT_EQ(turned_size, "16 24");
+  for (int y = 0; y < 16; ++y) {  // rows of a PFM go from the bottom up
+    for (int x = 0; x < 24; ++x) ASSERT_EQ(turned[(23 - x) * 16 + y], normal[y * 24 + x]) << x << "," << y;
+  }
 }
 
 TEST_F(LookCommand, WritesAMapOfSeeingForEachFileOfABatch) {

@@ -53,7 +53,8 @@ Result<SeeingModel> seeing_model(double pupil_mm2, double false_alarms) {
 }
 
 double probability_of_seeing(const SeeingModel& model, const LuminancePair& light) {
-  return either(detected(model.rods, light.scotopic), detected(model.cones, light.photopic));
+  const double by_rods = detected(model.rods, light.scotopic);
+  return by_rods == 1 ? 1 : either(by_rods, detected(model.cones, light.photopic));
 }
 
 }  // namespace lowlux::isp
