@@ -65,13 +65,16 @@ BenchRaw raw_of(const DenoiseShot& shot, const SensorFlaws& flaws, std::uint64_t
   raw.active = raw.default_crop = {0, 0, width, height};
   raw.black_tag = BlackLevel{.pattern_dn = {black_dn + dn_per_e * dark_e}};
   raw.white_dn.fill(white_dn);
-  // Of a fraction of the range above the tagged black: what is dark charge adds its variance to the offset.
-  const double range_e = (white_dn - black_dn) / dn_per_e - dark_e;
   const double read_e2 = shot.light.read_noise_e * shot.light.read_noise_e + 1 / (12 * dn_per_e * dn_per_e);
-  NoiseProfile noise;
-  noise.scale.fill(1 / range_e);
-  noise.offset.fill((read_e2 + dark_e) / (range_e * range_e));
-  out.frame.noise = noise;
+  const auto noise_over = [](double range_e, double variance_e2) {
+    NoiseProfile noise;
+    noise.scale.fill(1 / range_e);
+    noise.offset.fill(variance_e2 / (range_e * range_e));
+    return noise;
+  };
+  const double range_e = (white_dn - black_dn) / dn_per_e;
+  out.frame.noise = noise_over(range_e - dark_e, read_e2 + dark_e);  // the tagged black holds the dark charge
+  out.noise_over_pedestal = noise_over(range_e, read_e2);
   out.frame.colour = colour();
   out.black.pedestal_dn.fill(black_dn);
   out.black.dark_mean_e.fill(dark_e);

@@ -17,8 +17,9 @@ struct SensorFlaws {
 
 /// A raw file as a camera would write it.
 struct BenchRaw {
-  RawFrame frame;    // its black tag holds pedestal and dark charge
-  BlackPoint black;  // pedestal and dark charge apart, as a profile has them
+  RawFrame frame;                    // its black tag holds pedestal and dark charge
+  BlackPoint black;                  // pedestal and dark charge apart, as a profile has them
+  NoiseProfile noise_over_pedestal;  // for `black`
 };
 
 /// Codes of a shot: RGGB, white gains as in denoise_scene.h, saturated two stops above display white, colours of linear

@@ -92,6 +92,7 @@ PlannerScene planner_scene(std::uint32_t index, int width, int height, Executor&
   if (draws.uniform() < 0.5) {  // a profile knows the dark charge
     out.options.black.choice = BlackChoice::measured;
     out.options.black.measured = out.raw.black;
+    out.raw.frame.noise = out.raw.noise_over_pedestal;
   }
   out.options.denoise.mode = DenoiseChoice::Mode::automatic;
   return out;
