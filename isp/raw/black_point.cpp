@@ -90,7 +90,11 @@ Result<BlackPoint> requested_black(const RawDn& raw, const BlackRequest& request
   if (request.choice == BlackChoice::given) {
     return with_dark({.pedestal_dn = request.given_dn, .source = BlackPoint::Source::given}, request.dark_dn);
   }
-  if (request.choice == BlackChoice::measured) return *request.measured;
+  if (request.choice == BlackChoice::measured) {
+    if (request.measured) return *request.measured;
+    return fail(ErrorCode::invalid_argument,
+                "a measured black level is requested and none is given: use a profile that holds one, or --black DN");
+  }
   if (request.choice == BlackChoice::metadata) return tagged_black(raw, request, "");
   // A tag that is finer than four figures is not replaced with four figures.
   const bool tag_is_finer = raw.black_tag && !four_figures_do(*raw.black_tag);

@@ -15,14 +15,14 @@ enum class BlackChoice {
   metadata,   // the tag only
   masked,     // the masked pixels only
   given,      // figures given by the user
-  measured,   // only BlackRequest::measured
+  measured,   // only BlackRequest::measured, which must be set
 };
 
 struct BlackRequest {
   BlackChoice choice = BlackChoice::automatic;
   PerSite<double> given_dn{};  // for BlackChoice::given
-  /// States the known dark charge of the frame, system gain times dark current times exposure time [DN]: it is added to
-  /// a pedestal that is tagged or given. Masked pixels and a measured black point include it already.
+  /// States the known dark charge of the frame, system gain times dark current times exposure time [DN]; 0 if unknown.
+  /// It is added to a pedestal that is tagged or given. Masked pixels include theirs, and `measured` includes this one.
   PerSite<double> dark_dn{};
   std::optional<BlackPoint> measured;  // measured earlier and stored in a camera's profile
 };
@@ -31,7 +31,8 @@ struct BlackRequest {
 MaskedBlack masked_black_of(const RawFrame& frame);
 
 /// Returns the black point as requested. Errors: insufficient when the source has neither masked pixels nor a tag
-/// (black is not guessed), malformed when white is not above black.
+/// (black is not guessed), malformed when white is not above black, invalid_argument for BlackChoice::measured without
+/// BlackRequest::measured.
 Result<BlackPoint> choose_black(const RawDn& raw, const BlackRequest& request);
 
 /// Returns the white level of the site's colour [DN]; for SensorLayout::linear_rgb sites 0 to 3 are R, G, B and B.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <random>
+#include <string>
 
 #include "isp/raw/measure/masked_black.h"
 #include "tests/support/frames.h"
@@ -186,6 +187,13 @@ TEST(BlackPoint, AProfilesLevelComesBetweenMaskedPixelsAndTheTag) {
   EXPECT_EQ(choose_black(raw, {.measured = of_profile})->source, BlackPoint::Source::profile);
   raw.black_tag.reset();
   EXPECT_EQ(choose_black(raw, {.measured = of_profile})->source, BlackPoint::Source::profile);
+}
+
+TEST(BlackPoint, AMeasuredLevelThatIsMissingIsAnError) {
+  const auto black = choose_black(frame_with_masked_columns(2), {.choice = BlackChoice::measured});
+  ASSERT_FALSE(black);
+  EXPECT_EQ(black.error().code, ErrorCode::invalid_argument);
+  EXPECT_NE(black.error().message.find("none is given"), std::string::npos);
 }
 
 TEST(BlackPoint, MetadataTakesTheTagWithItsFractions) {
