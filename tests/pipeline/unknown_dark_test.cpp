@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <random>
 #include <string>
@@ -202,6 +203,59 @@ TEST(UnknownDark, KnownChargeOfATaggedBlackKeepsColourAndNoiseModel) {
   const double mean_e = (20 + 0.1 * 159.5) * (1 + 2 + 0.5) / 4;
   // Five standard errors of photons, dark charge and read noise.
   EXPECT_NEAR(sum / (320 * 256), mean_e, 5 * std::sqrt((mean_e + 100 + 4) / (320 * 256)));
+}
+
+// The difference of a level that the user states from the tag is not dark charge.
+TEST(KnownDark, IsTheStatedChargeWhateverPedestalIsGivenOrTagged) {
+  DevelopOptions options;
+  options.black = {.choice = BlackChoice::given, .dark_dn = {80, 40, 40, 120}};
+  options.black.given_dn.fill(test::night_black_dn + 20);  // the tag is 20 DN lower
+  const RawFrame frame = ramp_over_dark(20, 0, 1);
+  const DarkCharge given = planned(frame, options).dark;
+  EXPECT_EQ(given.state, DarkCharge::State::in_black_point);
+  EXPECT_NEAR(*given.mean_e, 70 / test::night_gain_dn_per_e, 0.02 * 70 / test::night_gain_dn_per_e);
+  EXPECT_NEAR(given.charge_e[3], 120 / test::night_gain_dn_per_e, 0.02 * 120 / test::night_gain_dn_per_e);
+  options.black.choice = BlackChoice::metadata;
+  EXPECT_NEAR(*planned(frame, options).dark.mean_e, 70 / test::night_gain_dn_per_e,
+              0.02 * 70 / test::night_gain_dn_per_e);
+  options.black.choice = BlackChoice::given;
+  options.black.dark_dn = {};
+  EXPECT_NE(planned(frame, options).dark.state, DarkCharge::State::in_black_point) << "a pedestal alone";
+}
+
+TEST(KnownDark, OfMaskedPixelsIsTheirDifferenceFromTheMeanOfTheTag) {
+  constexpr int border = 64, side = 256;
+  RawFrame frame = test::night_frame({.dark_e = {30, 30, 30, 30}}, denoise_testing::flat(0, 0, 0), border + side, side);
+  frame.raw.active = frame.raw.default_crop = {border, 0, side, side};
+  frame.raw.masked = {{0, 0, border, side}};
+  frame.raw.masked_is_stated = true;
+  // A pattern of four rows whose first cell is 25 DN above its mean, the pedestal.
+  frame.raw.black_tag = BlackLevel{.rows = 4, .pattern_dn = {25, 25, -25, -25}};
+  for (double& dn : frame.raw.black_tag->pattern_dn) dn += test::night_black_dn;
+  DevelopOptions options;
+  options.black.choice = BlackChoice::masked;
+  const DarkCharge dark = planned(frame, options).dark;
+  ASSERT_TRUE(dark.mean_e && dark.standard_error_e);
+  EXPECT_NEAR(*dark.mean_e, 30, 5 * *dark.standard_error_e);
+  EXPECT_LT(*dark.standard_error_e, 1);
+}
+
+TEST(SignalFraction, CountsTheChargeOfEachChannel) {
+  RawFrame frame = ramp_over_dark(0, 0, 1);
+  RawLevels levels;
+  levels.electrons_at_white = PerSite<double>{1000, 1000, 1000, 1000};
+  Thumbnail light{.mean = CameraRgb(8, 8)};
+  constexpr std::array<float, 3> fraction{0.125F, 0.25F, 0.375F};
+  for (std::size_t c = 0; c < 3; ++c) std::fill_n(light.mean.plane[c].data(), 64, fraction[c]);
+  PerSite<double> charge_e{};
+  constexpr std::array<double, 3> of_colour{40, 20, 60};
+  for (int site = 0; site < 4; ++site) {
+    const auto c = static_cast<std::size_t>(colour_at(frame.raw.phase, site & 1, site >> 1));
+    charge_e[site] = of_colour[c] + (c == 1 ? (site < 2 ? 10 : -10) : 0);  // the greens differ too
+  }
+  const auto alpha = signal_fraction_at_median(frame, levels, {}, light, charge_e);
+  ASSERT_TRUE(alpha);
+  EXPECT_NEAR(*alpha, 0.75 / (0.75 + 0.120), 1e-7);  // floats
 }
 
 // Masked pixels hold a dark charge of 0.05 e-, one pixel in twenty, at 40 DN/e-: with the gain of the noise profile its

@@ -69,6 +69,7 @@ void use(const DarkEstimate& found, const RawDn& raw, DarkCharge& out) {
   for (int site = 0; site < 4; ++site) {
     out.estimated_e[site] = found.charge_e[static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1))];
   }
+  out.charge_e = out.estimated_e;
 }
 
 std::string refusal_of(const std::optional<DarkEstimate>& found, const FrameInfo& info) {
@@ -82,32 +83,44 @@ std::string refusal_of(const std::optional<DarkEstimate>& found, const FrameInfo
       found->mean_e, *info.exposure_s);
 }
 
-/// Returns what a black point that holds dark charge has above the tagged pedestal, or states apart from its pedestal.
+/// Returns the dark charge in the black point [DN]: as stated in addition to a pedestal, else the difference from the
+/// tagged pedestal; nullopt without a tag.
+std::optional<PerSite<double>> dark_of_black_point(const RawFrame& frame, const RawLevels& levels) {
+  if (levels.stated_dark_dn != PerSite<double>{}) return levels.stated_dark_dn;
+  const Result<BlackPoint> tag = choose_black(frame.raw, {.choice = BlackChoice::metadata});
+  if (!tag) return std::nullopt;
+  PerSite<double> out = levels.black.pedestal_dn;
+  for (int site = 0; site < 4; ++site) out[site] -= tag->pedestal_dn[site];
+  return out;
+}
+
+/// Describes the dark charge of a black point that holds it, or states it apart from its pedestal.
 DarkCharge in_black_point(const RawFrame& frame, const RawLevels& levels) {
   DarkCharge out{.state = DarkCharge::State::in_black_point};
   if (levels.black.dark_mean_e != PerSite<double>{}) {
-    out.mean_e = mean_of_sites(levels.black.dark_mean_e);
+    out.charge_e = levels.black.dark_mean_e;
+    out.mean_e = mean_of_sites(out.charge_e);
     out.reason = "the black point states it apart from its pedestal";
     return out;
   }
-  if (!frame.raw.black_tag || !levels.electrons_at_white) {
+  const std::optional<PerSite<double>> dark_dn = dark_of_black_point(frame, levels);
+  if (!dark_dn || !levels.electrons_at_white) {
     out.reason = "its size is not known without a tagged pedestal and a gain";
     return out;
   }
-  double mean_e = 0, variance_e2 = 0;
+  double variance_e2 = 0;
   for (int site = 0; site < 4; ++site) {
-    const Rect& active = frame.raw.active;
-    const double tag =
-        frame.raw.black_tag->at(std::min(site & 1, active.width - 1), std::min(site >> 1, active.height - 1));
     const double per_dn =
         (*levels.electrons_at_white)[site] / (white_at(frame.raw, site) - levels.black.pedestal_dn[site]);
     const double error = levels.black.pedestal_standard_error_dn[site] * per_dn;
-    mean_e += (levels.black.pedestal_dn[site] - tag) * per_dn / 4;
+    out.charge_e[site] = (*dark_dn)[site] * per_dn;
     variance_e2 += error * error / 16;
   }
-  out.mean_e = mean_e;
+  out.mean_e = mean_of_sites(out.charge_e);
   if (variance_e2 > 0) out.standard_error_e = std::sqrt(variance_e2);
-  out.reason = "the black point less the tagged pedestal";
+  const bool is_stated = levels.stated_dark_dn != PerSite<double>{};
+  out.reason =
+      is_stated ? "added to the pedestal, as the profile states it" : "the black point less the tagged pedestal";
   return out;
 }
 
@@ -178,13 +191,17 @@ Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels
 }
 
 std::optional<double> signal_fraction_at_median(const RawFrame& frame, const RawLevels& levels,
-                                                const Rendering& rendering, const Thumbnail& light, double mean_e) {
+                                                const Rendering& rendering, const Thumbnail& light,
+                                                const PerSite<double>& charge_e) {
   if (!levels.electrons_at_white) return std::nullopt;
   const std::array<double, 3> light_e = light_at_white_by_colour(frame.raw, levels);
   Vector3 signal{}, dark{};
   for (std::size_t c = 0; c < 3; ++c) {
     signal[c] = median_of(light.mean.plane[c]);
-    dark[c] = std::max(mean_e, 0.0) / light_e[c];
+  }
+  for (int site = 0; site < 4; ++site) {
+    const auto c = static_cast<std::size_t>(colour_at(frame.raw.phase, site & 1, site >> 1));
+    dark[c] += std::max(charge_e[site], 0.0) / light_e[c] * (c == 1 ? 0.5 : 1);
   }
   if (rendering.white) {
     const Result<Matrix3> to_xyz = camera_to_xyz(frame.colour, rendering.white->xy, rendering.white->xy);

@@ -21,6 +21,7 @@ struct DarkCharge {
     unknown          // it may matter, and stays in
   } state = State::not_examined;
   std::optional<double> mean_e;            // mean over pixels, where it is known or estimated
+  PerSite<double> charge_e{};              // charge of each site, where mean_e is set
   std::optional<double> standard_error_e;  // of mean_e; absent where figures are quoted without one
   PerSite<double> estimated_e{};           // State::estimated: charge of each site
   std::optional<double> alpha;             // result of signal_fraction_at_median
@@ -47,8 +48,10 @@ Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels
 
 /// Returns alpha of thesis Eq. 4.24 for the median of the light of the blocks: the fraction of X + Y + Z that is light,
 /// were the dark charge not subtracted; 1 - alpha of the saturation would then be lost. Without colour matrices it is
-/// the fraction of the sum of camera RGB. nullopt where mean_e is not known, or the light is not positive.
+/// the fraction of the sum of camera RGB. nullopt without a gain, or where the light is not positive.
+/// @param charge_e  dark charge of each site: channels of unequal dark current have their own
 std::optional<double> signal_fraction_at_median(const RawFrame& frame, const RawLevels& levels,
-                                                const Rendering& rendering, const Thumbnail& light, double mean_e);
+                                                const Rendering& rendering, const Thumbnail& light,
+                                                const PerSite<double>& charge_e);
 
 }  // namespace lowlux::isp

@@ -15,6 +15,7 @@ namespace lowlux::isp {
 /// States what the raw values of a frame mean, and which of them are to be repaired.
 struct RawLevels {
   BlackPoint black;
+  PerSite<double> stated_dark_dn{};  // part of the pedestal of `black` that was stated as dark charge; 0 if unknown
   std::shared_ptr<const DarkFrame> dark_frame;        // set: subtracted pixel by pixel instead of the pedestal
   std::optional<PerSite<double>> electrons_at_white;  // set where the mosaic is converted to electrons
   std::vector<Pixel> defects;                         // ascending

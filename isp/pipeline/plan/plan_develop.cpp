@@ -71,6 +71,9 @@ Result<RawLevels> choose_levels(const RawFrame& frame, const DevelopOptions& opt
       out.dark_frame ? black_of(frame.raw, *out.dark_frame) : choose_black_by_gain(frame, options.black);
   if (!black) return tl::make_unexpected(std::move(black.error()));
   out.black = *std::move(black);
+  const bool is_measured = out.black.source == BlackPoint::Source::masked_pixels || out.dark_frame;
+  const bool holds_dark = out.black.holds == BlackPoint::Holds::pedestal_and_dark;
+  if (holds_dark && !is_measured) out.stated_dark_dn = options.black.dark_dn;
   if (frame.noise) out.electrons_at_white = electrons_at_white(frame.raw, *frame.noise);
   return out;
 }
@@ -120,7 +123,7 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   if (!rendering) return tl::make_unexpected(std::move(rendering.error()));
   append(plan.warnings, rendering->warnings);
   if (plan.dark.mean_e) {
-    plan.dark.alpha = signal_fraction_at_median(frame, *levels, *rendering, light, *plan.dark.mean_e);
+    plan.dark.alpha = signal_fraction_at_median(frame, *levels, *rendering, light, plan.dark.charge_e);
   }
   clock.lap("white and exposure");
 
