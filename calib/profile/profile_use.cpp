@@ -10,6 +10,7 @@
 #include "calib/profile/gain_interpolation.h"
 #include "isp/base/camera_profile.h"
 #include "isp/base/sensor.h"
+#include "isp/model/sensor/masked_noise.h"
 
 namespace lowlux::calib {
 namespace {
@@ -132,8 +133,11 @@ void set_black(const GainProfile& gain, const PerSite<double>& dark_error_e, Pro
                     ? BlackPoint::Holds::pedestal_and_dark
                     : BlackPoint::Holds::pedestal_only;
   const double k = out.sensor ? out.sensor->system_gain_dn_per_e : 0;
+  const bool is_apart = gain.pedestal_holds == BlackPoint::Holds::pedestal_only;
+  if (is_apart) out.pedestal_dn.emplace();
   for (int site = 0; site < 4; ++site) {
     const Estimate& pedestal = (*gain.pedestal_dn)[site];
+    if (is_apart) (*out.pedestal_dn)[site] = pedestal.value;
     black.pedestal_dn[site] = pedestal.value + k * out.dark_mean_e[site];
     black.pedestal_standard_error_dn[site] = std::hypot(pedestal.standard_error, k * dark_error_e[site]);
   }
@@ -151,27 +155,38 @@ double black_of(const RawDn& frame, int site, const ProfileAtFrame& out) {
   return pedestal + out.sensor->system_gain_dn_per_e * out.dark_mean_e[site];
 }
 
-/// Adds the noise profile. A sensor without filters has one value for the three channels.
-void add_noise(const RawDn& frame, ProfileAtFrame& out) {
-  const SensorModel& sensor = *out.sensor;
+/// Returns the noise of sites as that of the channels; nullopt if black is not below white. A sensor without filters
+/// has one value for the three channels.
+std::optional<NoiseProfile> by_channel(const RawDn& frame, double gain_dn_per_e, const PerSite<double>& black_dn,
+                                       const PerSite<double>& variance_dn2) {
   NoiseProfile sum;
   std::array<double, 3> sites{};
   for (int site = 0; site < 4; ++site) {
     const int k = channel_of(frame, site);
-    const double range_dn = frame.white_dn[k] - black_of(frame, site, out);
-    const double variance = dark_variance_dn2(sensor, out.dark_mean_e[site]);
-    if (out.black) out.black->noise_std_dn[site] = std::sqrt(variance);
-    if (!(range_dn > 0)) return;  // choose_black rejects such a frame
-    sum.scale[k] += sensor.system_gain_dn_per_e / range_dn;
-    sum.offset[k] += variance / (range_dn * range_dn);
+    const double range_dn = frame.white_dn[k] - black_dn[site];
+    if (!(range_dn > 0)) return std::nullopt;  // choose_black rejects such a frame
+    sum.scale[k] += gain_dn_per_e / range_dn;
+    sum.offset[k] += variance_dn2[site] / (range_dn * range_dn);
     ++sites[k];
   }
-  out.noise.emplace();
+  NoiseProfile out;
   for (int k = 0; k < 3; ++k) {
     const int own = sites[k] > 0 ? k : 1;
-    out.noise->scale[k] = sum.scale[own] / sites[own];
-    out.noise->offset[k] = sum.offset[own] / sites[own];
+    out.scale[k] = sum.scale[own] / sites[own];
+    out.offset[k] = sum.offset[own] / sites[own];
   }
+  return out;
+}
+
+/// Adds the noise above the profile's black point, or above that of the frame where the profile has none.
+void add_noise(const RawDn& frame, ProfileAtFrame& out) {
+  PerSite<double> black_dn{}, variance_dn2{};
+  for (int site = 0; site < 4; ++site) {
+    black_dn[site] = black_of(frame, site, out);
+    variance_dn2[site] = dark_variance_dn2(*out.sensor, out.dark_mean_e[site]);
+    if (out.black) out.black->noise_std_dn[site] = std::sqrt(variance_dn2[site]);
+  }
+  out.noise = by_channel(frame, out.sensor->system_gain_dn_per_e, black_dn, variance_dn2);
 }
 
 /// Lists the hot pixels. Excess currents are those at the profile's temperature, as the dark current is.
@@ -188,6 +203,23 @@ void list_hot_pixels(const GainProfile& gain, const RawDn& frame, ProfileAtFrame
 }
 
 }  // namespace
+
+std::optional<NoiseProfile> noise_above(const BlackPoint& black, const ProfileAtFrame& found, const RawDn& frame) {
+  if (!found.sensor) return std::nullopt;
+  PerSite<double> variance_dn2{};
+  for (int site = 0; site < 4; ++site) {
+    variance_dn2[site] = dark_variance_dn2(*found.sensor, found.dark_mean_e[site]);
+    if (black.source != BlackPoint::Source::masked_pixels) continue;
+    const auto measured = isp::masked_variance_dn2(
+        {.gain_dn_per_e = found.sensor->system_gain_dn_per_e,
+         .read_variance_dn2 = dark_variance_dn2(*found.sensor, 0),
+         .level_dn = black.pedestal_dn[site],
+         .pedestal_dn = found.pedestal_dn ? std::optional((*found.pedestal_dn)[site]) : std::nullopt,
+         .std_dn = black.noise_std_dn[site]});
+    variance_dn2[site] = measured.value_or(variance_dn2[site]);
+  }
+  return by_channel(frame, found.sensor->system_gain_dn_per_e, black.pedestal_dn, variance_dn2);
+}
 
 std::string mosaic_of(const RawDn& frame) {
   if (frame.layout == SensorLayout::linear_rgb) return "";

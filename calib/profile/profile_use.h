@@ -15,14 +15,15 @@ std::string mosaic_of(const RawDn& frame);
 
 /// Properties of a camera's profile at the setting of one frame.
 struct ProfileAtFrame {
-  std::optional<BlackPoint> black;     // at the frame's gain, exposure and temperature, dark charge included; absent if
-                                       // not in the profile: then the frame's own applies
-  std::optional<SensorModel> sensor;   // at the frame's gain and temperature; absent if the gain is unknown
-  PerSite<double> dark_mean_e{};       // of the frame; 0 if unknown
-  std::optional<NoiseProfile> noise;   // of the sensor, with that of the dark charge in `dark_mean_e`
-  std::vector<DefectRect> hot_pixels;  // those whose excess charge is above 6 standard deviations in this frame
-  std::vector<std::string> warnings;   // what was extrapolated or assumed
-  std::optional<double> iso;           // of the setting, if known to the profile
+  std::optional<BlackPoint> black;  // at the frame's gain, exposure and temperature, dark charge included; absent if
+                                    // not in the profile: then the frame's own applies
+  std::optional<PerSite<double>> pedestal_dn;  // of `black`, dark charge not included; absent if not known apart
+  std::optional<SensorModel> sensor;           // at the frame's gain and temperature; absent if the gain is unknown
+  PerSite<double> dark_mean_e{};               // of the frame; 0 if unknown
+  std::optional<NoiseProfile> noise;           // of the sensor, with that of the dark charge in `dark_mean_e`
+  std::vector<DefectRect> hot_pixels;          // those whose excess charge is above 6 standard deviations in this frame
+  std::vector<std::string> warnings;           // what was extrapolated or assumed
+  std::optional<double> iso;                   // of the setting, if known to the profile
 };
 
 /// Evaluates the profile at a frame's setting. Gain: between two measured ISO settings gain and read noise follow
@@ -35,6 +36,12 @@ struct ProfileAtFrame {
 /// @param gain_setting  of the profile, as for gain_named; empty: by the frame's ISO
 Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame,
                                   const std::string& gain_setting = {});
+
+/// Returns the noise of a frame relative to white less the black point that is subtracted. Where that was measured on
+/// masked pixels of the frame, the dark charge is theirs (isp::masked_variance_dn2), not that of the profile at a
+/// temperature that may have been assumed; else it is `found.dark_mean_e`. nullopt if the gain is unknown, or black is
+/// not below white.
+std::optional<NoiseProfile> noise_above(const BlackPoint& black, const ProfileAtFrame& found, const RawDn& frame);
 
 /// Returns a profile's colour calibrations as a frame has them: at most two, as in a DNG, those of the illuminants of
 /// lowest and highest temperature; by rising temperature.

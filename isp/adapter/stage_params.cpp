@@ -63,8 +63,10 @@ void set_levels(const lowlux_stage_params& params, const StageStream& stream, co
   if (gain_dn <= 0) return;
   LiveNoise& noise = out.live.noise.emplace();
   noise.gain_dn = gain_dn;
+  noise.read_variance_dn2 = read_dn * read_dn + quantisation_dn2;
+  if (sensor && sensor->dark_is_apart) noise.pedestal_dn = sensor->pedestal_dn;
   for (int site = 0; site < 4; ++site) {
-    noise.black_variance_dn2[site] = read_dn * read_dn + gain_dn * gain_dn * dark_e[site] + quantisation_dn2;
+    noise.black_variance_dn2[site] = noise.read_variance_dn2 + gain_dn * gain_dn * dark_e[site];
   }
 }
 

@@ -121,7 +121,8 @@ Result<void> StageProfile::prepare(const RawFormat& format, BayerPhase phase) {
             .dark_current_e_per_s = dark_current_of(gain),
             .dark_temperature_c = gain.sensor->dark_temperature_c,
             .dark_doubling_c = dark_doubling_of(gain),
-            .codes = std::exp2(format.bits - gain.sensor->bits)};
+            .codes = std::exp2(format.bits - gain.sensor->bits),
+            .dark_is_apart = gain.pedestal_holds == BlackPoint::Holds::pedestal_only};
     if (gain.pedestal_dn) {
       row.pedestal_dn.emplace();
       for (int site = 0; site < 4; ++site) (*row.pedestal_dn)[site] = (*gain.pedestal_dn)[site].value;
@@ -150,6 +151,7 @@ std::optional<StageSensor> StageProfile::at(std::optional<double> analogue_gain,
     const auto colour = bayer ? static_cast<std::size_t>(colour_at(phase_, site & 1, site >> 1)) : 1;
     out.dark_e[site] = nearer.dark_current_e_per_s[colour] * charge_s;
   }
+  out.dark_is_apart = a.dark_is_apart && b.dark_is_apart;
   if (a.pedestal_dn && b.pedestal_dn) {
     out.pedestal_dn.emplace();
     for (int site = 0; site < 4; ++site) {

@@ -18,6 +18,7 @@ struct StageSensor {
   double read_noise_dn = 0;
   PerSite<double> dark_e{};  // mean charge at the frame's exposure and temperature
   std::optional<PerSite<double>> pedestal_dn;
+  bool dark_is_apart = true;  // the pedestal does not include dark charge
 };
 
 /// Prepares a profile for frames that arrive too fast for a full look-up: the gain settings on a grid of ISO speeds,
@@ -54,6 +55,7 @@ class StageProfile {
     double dark_doubling_c = 7;
     double codes = 1;  // codes of the stream per code of the profile
     std::optional<PerSite<double>> pedestal_dn;
+    bool dark_is_apart = true;
   };
   CameraProfile profile_;
   std::vector<Row> rows_;  // by rising ISO

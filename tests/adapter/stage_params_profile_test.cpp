@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 
 #include "calib/profile/profile_io.h"
@@ -92,6 +95,35 @@ TEST(StageParamsWithProfile, OfTheCallersGoBeforeTheProfiles) {
   EXPECT_EQ(rig.result.noise_from, LOWLUX_STAGE_FROM_PARAMS);
   EXPECT_EQ(rig.result.black_from, LOWLUX_STAGE_FROM_PARAMS);
   EXPECT_EQ(rig.result.black_level[0], 256);
+}
+
+// No temperature is stated: dark charge would be that at the profile's 20 C. The masked pixels hold less, and more.
+TEST(StageParamsWithProfile, NoiseFollowsFromTheDarkChargeOfMaskedPixels) {
+  const test::ScratchDirectory scratch;
+  const std::string file = profile_file(scratch);
+  auto settings = plain_settings();
+  settings.profile_file = file.c_str();
+  const RawFormatNames& names = names_of_bayer(12);
+  constexpr int masked = 8;  // rows
+  auto in = input_of(names, width, height);
+  in.masked = {0, 0, width, masked};
+  in.crop = {0, masked, width, height - masked};
+  Rig rig(settings, names, in, LOWLUX_STAGE_BGR888);
+  ASSERT_EQ(rig.configured, LOWLUX_STAGE_OK) << rig.error();
+  auto params = no_params();
+  params.valid = LOWLUX_STAGE_HAS_EXPOSURE;
+  params.exposure_s = 20;  // 20, 40 and 60 e- at 20 C
+  for (const double above_dn : {0.0, 2.0, 100.0, -3.0}) {
+    Codes codes = scene(names.format, width, height);
+    for (int i = 0; i < width * masked; ++i) {
+      codes[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(240 + above_dn + site_of(i % width, i / width));
+    }
+    ASSERT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK) << rig.error();
+    EXPECT_EQ(rig.result.black_from, LOWLUX_STAGE_FROM_MASKED);
+    // 0.5 DN/e-, 4 e- of read noise.
+    EXPECT_NEAR(rig.result.noise_read, std::sqrt(0.5 * std::max(0.0, above_dn) + 4 + 1.0 / 12), 1e-4) << above_dn;
+    EXPECT_NEAR(rig.result.noise_gain, 0.5, 1e-5);
+  }
 }
 
 TEST(StageParamsWithProfile, WithoutAGainTheProfilesThatShipServeAllTheirMosaics) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -77,6 +78,64 @@ TEST(ProfileUse, NoiseIsTheSensorsInSharesOfTheRange) {
   EXPECT_NEAR(found->noise->offset[0], (16 + 10 + 1.0 / 12) / (range * range), 1e-15);
   const double ranges[] = {16383 - 520.0, 16383 - 523.0};  // green: two sites
   EXPECT_NEAR(found->noise->scale[1], (1 / ranges[0] + 1 / ranges[1]) / 2, 1e-15);
+}
+
+/// A black point as masked pixels measure it: pedestal of the profile at ISO 100 plus so much charge.
+BlackPoint masked_black(double charge_e, double std_dn) {
+  BlackPoint out{.holds = BlackPoint::Holds::pedestal_and_dark, .source = BlackPoint::Source::masked_pixels};
+  for (int site = 0; site < 4; ++site) out.pedestal_dn[site] = 500 + site + charge_e;  // 1 DN/e-
+  out.noise_std_dn.fill(std_dn);
+  return out;
+}
+
+/// Returns the variance of black in green [DN^2] that a noise profile states above a black point.
+double green_variance_dn2(const NoiseProfile& noise, const BlackPoint& black) {
+  const double range = 16383 - (black.pedestal_dn[0] + black.pedestal_dn[3]) / 2;
+  return noise.offset[1] * range * range;
+}
+
+// The frame states no temperature: the profile assumes that of its darks, and its charge is up to a thousand times that
+// of the frame, or a thousandth of it. The noise is that of the masked pixels all the same.
+TEST(ProfileUse, NoiseFollowsFromTheDarkChargeOfMaskedPixels) {
+  const RawDn raw = frame(100, 10, std::nullopt);
+  const auto found = profile_at(two_gains(), raw);
+  ASSERT_TRUE(found && found->noise);
+  const double assumed = green_variance_dn2(*found->noise, *found->black);
+  EXPECT_NEAR(assumed, 16 + 40 + 1.0 / 12, 1e-3) << "10 s at 20 C";
+  constexpr unsigned seed = 20261124;
+  std::mt19937_64 engine(seed);
+  for (int i = 0; i < 200; ++i) {
+    const double charge_e = std::pow(10, std::uniform_real_distribution(-2.0, 4.0)(engine));
+    const double truth = 16 + charge_e + 1.0 / 12;
+    const BlackPoint black = masked_black(charge_e, std::sqrt(truth));
+    const auto noise = noise_above(black, *found, raw);
+    ASSERT_TRUE(noise);
+    EXPECT_NEAR(noise->scale[0], 1 / (16383 - black.pedestal_dn[1]), 1e-15) << "seed " << seed << " draw " << i;
+    // Greens of ranges one part in 4000 apart.
+    EXPECT_NEAR(green_variance_dn2(*noise, black), truth, 1e-6 * truth) << "seed " << seed << " draw " << i;
+  }
+}
+
+TEST(ProfileUse, ALevelThatDriftedAddsNoNoiseThatMaskedPixelsDoNotShow) {
+  const RawDn raw = frame(100, 10, std::nullopt);
+  auto found = profile_at(two_gains(), raw);
+  ASSERT_TRUE(found && found->pedestal_dn);
+  const auto variance = [&](double above_dn, double variance_dn2) {
+    const BlackPoint black = masked_black(above_dn, std::sqrt(variance_dn2));
+    return green_variance_dn2(*noise_above(black, *found, raw), black);
+  };
+  constexpr double reading = 16 + 1.0 / 12;
+  EXPECT_NEAR(variance(30, 20), 20, 1e-3);  // 30 DN above the pedestal, without the shot noise of as much charge
+  EXPECT_NEAR(variance(3, 30), reading + 3, 1e-3);  // masked pixels with a fixed pattern
+  EXPECT_NEAR(variance(-5, 30), reading, 1e-3);     // below the pedestal
+  EXPECT_NEAR(variance(3, 10), reading, 1e-3);      // at least that of reading
+  found->pedestal_dn.reset();                       // the profile does not know the level without dark charge
+  EXPECT_NEAR(variance(30, 25), 25, 1e-3);
+  BlackPoint tagged = masked_black(0, 0);
+  tagged.source = BlackPoint::Source::tag;  // nothing was measured: the charge is the profile's
+  EXPECT_NEAR(green_variance_dn2(*noise_above(tagged, *found, raw), tagged), reading + 40, 1e-3);
+  tagged.pedestal_dn.fill(20000);
+  EXPECT_FALSE(noise_above(tagged, *found, raw)) << "black is not below white";
 }
 
 TEST(ProfileUse, BetweenTwoGainsLinesAreStraightInLogarithms) {

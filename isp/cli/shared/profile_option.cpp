@@ -11,6 +11,7 @@
 #include "isp/base/text.h"
 #include "isp/model/sensor/sensor_db.h"
 #include "isp/output/report/report.h"
+#include "isp/pipeline/plan/plan_develop.h"
 
 namespace lowlux::cli {
 namespace {
@@ -29,6 +30,16 @@ void use_colours(const CameraProfile& profile, RawFrame& frame, isp::LookChoice&
   frame.colour.calibrations = calib::calibrations_of(profile);
   frame.colour.analog_balance = {1, 1, 1};  // the matrices were fitted to the camera's unscaled values
   frame.colour.source = CameraColour::Source::profile;
+}
+
+/// Sets the noise of the profile, relative to the black point that is going to be subtracted.
+void set_noise(const calib::ProfileAtFrame& found, const isp::BlackRequest& request, RawFrame& frame) {
+  if (!found.noise) return;
+  frame.noise = found.noise;
+  if (const Result<BlackPoint> black = isp::choose_black_by_gain(frame, request)) {
+    if (const auto above = calib::noise_above(*black, found, frame.raw)) frame.noise = above;
+  }
+  frame.noise->source = NoiseProfile::Source::profile;
 }
 
 /// Returns the camera of a profile: by its make and model, or by the name of its sensor; empty if it states neither.
@@ -51,7 +62,7 @@ Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choi
                 "the profile holds no black level and no dark current: add them with `calibrate black --add-to`, "
                 "or use what else it holds with --profile");
   }
-  if (!found->black && knows_dark) {  // the pedestal is the file's
+  if (knows_dark) {  // for a pedestal of the file or of the user, which does not include it
     for (int site = 0; site < 4; ++site) {
       black.dark_dn[site] = found->sensor->system_gain_dn_per_e * found->dark_mean_e[site];
     }
@@ -63,10 +74,7 @@ Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choi
   }
   options.look.profile_iso = found->iso;
   options.look.camera = camera_of(profile);
-  if (found->noise) {
-    frame.noise = found->noise;
-    frame.noise->source = NoiseProfile::Source::profile;
-  }
+  set_noise(*found, black, frame);
   auto& defects = frame.corrections.defects;
   defects.insert(defects.end(), found->hot_pixels.begin(), found->hot_pixels.end());
   frame.warnings.insert(frame.warnings.end(), found->warnings.begin(), found->warnings.end());

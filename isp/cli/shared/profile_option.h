@@ -19,8 +19,10 @@ struct ProfileChoice {
 /// Replaces values of a frame's file with those of a camera's profile: noise, hot pixels to be repaired, warnings, and
 /// with `everything` the profile's matrices if it holds any. The black point is put into the options: with
 /// `everything` masked pixels of the frame itself come first, without it the profile's is used unless the options
-/// request another. So are the ISO speed of the setting and the camera, for looks that need the luminance and the light
-/// of the scene. Errors: those of calib::profile_at; without `everything` a profile without a black level.
+/// request another; a pedestal that these state, of the file or given, has the profile's dark charge added. The noise
+/// is that above this black point. So are the ISO speed of the setting and the camera, for looks that need the
+/// luminance and the light of the scene. Errors: those of calib::profile_at; without `everything` a profile without a
+/// black level.
 Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choice, RawFrame& frame,
                          isp::DevelopOptions& options);
 

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/model/sensor/masked_noise.h"
 #include "isp/pipeline/plan/plan_look.h"
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/pipeline/plan/rendering.h"
@@ -71,7 +72,19 @@ NoiseLine at_gain(const NoiseLine& line, double factor) {
 
 LiveNoise noise_of(const NoiseLine& line) {
   const double variance = line.offset_dn2;
-  return {line.gain_dn, {variance, variance, variance, variance}};
+  return {.gain_dn = line.gain_dn, .black_variance_dn2 = {variance, variance, variance, variance}};
+}
+
+/// Returns noise whose dark charge is that of the masked pixels, where they made the black point.
+LiveNoise with_masked_charge(LiveNoise noise, const BlackPoint& black) {
+  if (!noise.pedestal_dn || black.source != BlackPoint::Source::masked_pixels) return noise;
+  for (int site = 0; site < 4; ++site) {
+    noise.black_variance_dn2[site] = *masked_variance_dn2({.gain_dn_per_e = noise.gain_dn,
+                                                           .read_variance_dn2 = noise.read_variance_dn2,
+                                                           .level_dn = black.pedestal_dn[site],
+                                                           .pedestal_dn = (*noise.pedestal_dn)[site]});
+  }
+  return noise;
 }
 
 /// Returns the matrix that moves linear colours away from the neutral of their luminance, or to it.
@@ -163,7 +176,7 @@ void LivePlanner::set_noise(const LiveFacts& facts, const FrameMeter& meter, Raw
     decision_.measured = meter.tiles().line(plan_.levels.black.pedestal_dn, frame.raw.white_dn[1]);
   }
   if (facts.noise) {
-    frame.noise = profile_of(*facts.noise, frame.raw, plan_.levels.black);
+    frame.noise = profile_of(with_masked_charge(*facts.noise, plan_.levels.black), frame.raw, plan_.levels.black);
     decision_.noise = LiveSource::given;
   } else {
     if (!facts.follows) line_.reset();

@@ -47,6 +47,10 @@ struct LiveDenoise {
 struct LiveNoise {
   double gain_dn = 0;  // the system gain [DN/e-]
   PerSite<double> black_variance_dn2{};
+  /// Set where the code without dark charge is known: the dark charge of masked pixels, and with it the variance of
+  /// black, then follows from their level (masked_variance_dn2).
+  std::optional<PerSite<double>> pedestal_dn;
+  double read_variance_dn2 = 0;  // of black without dark charge; only for `pedestal_dn`
 };
 
 /// Holds what is known of one frame. What is absent is measured on it or left out; so is an exposure time or ISO speed
