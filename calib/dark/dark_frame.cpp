@@ -11,6 +11,7 @@
 #include "calib/dark/dark_dose.h"
 #include "calib/dark/dark_image.h"
 #include "calib/dark/light_in_darks.h"
+#include "isp/model/sensor/masked_noise.h"
 
 namespace lowlux::calib {
 namespace {
@@ -18,6 +19,7 @@ namespace {
 using Groups = std::span<const DarkGroup>;
 
 constexpr double near_white = 0.05;  // of the range
+constexpr double level_cut = 5;      // standard deviations
 constexpr double max_noise = 5;      // relative to the noise of a pixel's site
 constexpr double max_unknown = 1.0 / 16;
 constexpr double clipped_share = 1e-3;
@@ -26,10 +28,11 @@ constexpr double min_doubling_c = 2, max_doubling_c = 30;
 /// Inputs and intermediate results, before pixels are processed.
 struct Job {
   Groups groups;
-  std::vector<PerSite<DarkSite>> sites;  // for each group; the noise is that of one exposure
-  std::vector<double> per_file;          // for each group: exposures that a file is the mean of
-  std::vector<double> frames;            // for each group: single exposures whose mean has the same noise
-  std::vector<double> hot_gain_dn;       // for each group
+  std::vector<PerSite<DarkSite>> sites;    // for each group; the noise is that of one exposure
+  std::vector<PerSite<double>> levels_dn;  // for each group: mean_level, or the median where the gain is not known
+  std::vector<double> per_file;            // for each group: exposures that a file is the mean of
+  std::vector<double> frames;              // for each group: single exposures whose mean has the same noise
+  std::vector<double> hot_gain_dn;         // for each group
   DarkWeights weights{};
   std::optional<PerSite<double>> pedestal_dn;
 };
@@ -80,13 +83,31 @@ std::vector<DarkLevel> levels_of(const Job& job) {
   for (std::size_t g = 0; g < job.groups.size(); ++g) {
     const DarkGroup& group = job.groups[g];
     DarkLevel level{{*group.setting.exposure_s, group.setting.temperature_c}, job.frames[g]};
+    level.level_dn = mean_of(job.levels_dn[g]);
     for (const DarkSite& site : job.sites[g]) {
-      level.level_dn += site.spread.median / 4;
       level.variance_dn2 += site.noise_dn2 / (4 * static_cast<double>(group.mean_dn.size()) * job.frames[g]);
     }
     out.push_back(level);
   }
   return out;
+}
+
+/// Returns the mean of a site's pixels without outliers, as masked pixels are measured where the gain is known: a dark
+/// charge of less than an electron is in few pixels, and not in the median.
+/// @param exposures  of which each pixel is the mean
+double mean_level_dn(const DarkGroup& group, int site, const SiteSpread& spread, double gain_dn_per_e,
+                     double exposures) {
+  const double cut = level_cut * std::max(spread.deviation, 0.5 / exposures);
+  const double low = spread.median - cut;
+  const double high = spread.median + cut + isp::max_hidden_charge_e * gain_dn_per_e / exposures;
+  double sum = 0, n = 0;
+  for (int y = site >> 1; y < group.mean_dn.height(); y += 2) {
+    for (int x = site & 1; x < group.mean_dn.width(); x += 2) {
+      const double dn = group.mean_dn.at(x, y);
+      if (dn >= low && dn <= high) sum += dn, ++n;
+    }
+  }
+  return n > 0 ? sum / n : spread.median;
 }
 
 /// Adds the statistics of a group whose files are means of `per_file` exposures each.
@@ -103,7 +124,14 @@ void measure_group(const DarkGroup& group, double per_file, const DarkRequest& r
   } else {
     for (DarkSite& site : sites) site.noise_dn2 *= per_file;
   }
+  PerSite<double> levels_dn{};
+  for (int site = 0; site < 4; ++site) {
+    levels_dn[site] = request.noise ? mean_level_dn(group, site, sites[site].spread, request.noise->gain_dn_per_e[site],
+                                                    group.frames * per_file)
+                                    : sites[site].spread.median;
+  }
   job.sites.push_back(sites);
+  job.levels_dn.push_back(levels_dn);
   job.per_file.push_back(per_file);
   job.frames.push_back(frames);
   job.hot_gain_dn.push_back(gain_dn);
@@ -126,7 +154,7 @@ Result<Job> weigh(Groups groups, const FrameSetting& picture, const DarkRequest&
     for (int site = 0; site < 4; ++site) {
       double level = (*request.masked_dn)[site];
       for (std::size_t g = 0; g < groups.size(); ++g) {
-        level -= job.weights.of_level[g] * job.sites[g][site].spread.median;
+        level -= job.weights.of_level[g] * job.levels_dn[g][site];
       }
       (*job.pedestal_dn)[site] = level / job.weights.of_pedestal;
     }
@@ -360,8 +388,10 @@ struct Lines {
 struct Parts {
   double mean = 0;
   Lines columns, rows;
-  double variance = 0;  // of the remainder, in pixels that are not outliers
-  double inside = 0;    // fraction of pixels that are not outliers
+  double low_dn = 0, high_dn = 0;  // limits of outliers
+  double variance = 0;             // of the remainder, in pixels that are not outliers
+  double inside = 0;               // fraction of pixels that are not outliers
+  bool is_inside(double dn) const { return dn >= low_dn && dn <= high_dn; }
   double rest(const Plane<float>& dn, int x, int y) const {
     return dn.at(x, y) - mean - columns.deviation(x, mean) - rows.deviation(y, mean);
   }
@@ -380,11 +410,13 @@ Parts take_apart(const Plane<float>& dn, int site, const PixelMask& unknown) {
   const SiteSpread spread = spread_of(dn, site, min_deviation_dn);
   const double cut = stands_out * std::max(spread.deviation, min_deviation_dn);
   Parts out{.columns = Lines(dn.width()), .rows = Lines(dn.height())};
+  out.low_dn = spread.median - cut;
+  out.high_dn = spread.median + cut;
   double sum = 0, n = 0, all = 0, squares = 0;
   for_each_of_site(dn, site, unknown, [&](int x, int y) {
     ++all;
     const double v = dn.at(x, y);
-    if (std::fabs(v - spread.median) > cut) return;
+    if (!out.is_inside(v)) return;
     ++n, sum += v;
     out.columns.sum[x] += v, ++out.columns.n[x];
     out.rows.sum[y] += v, ++out.rows.n[y];
@@ -392,7 +424,7 @@ Parts take_apart(const Plane<float>& dn, int site, const PixelMask& unknown) {
   if (n == 0) return out;
   out.mean = sum / n;
   for_each_of_site(dn, site, unknown, [&](int x, int y) {
-    if (std::fabs(dn.at(x, y) - spread.median) <= cut) squares += std::pow(out.rest(dn, x, y), 2);
+    if (out.is_inside(dn.at(x, y))) squares += std::pow(out.rest(dn, x, y), 2);
   });
   out.variance = squares / n;
   out.inside = n / all;
@@ -423,7 +455,8 @@ KeptPattern limit_noise(Plane<float>& dn, int site, const DarkNoise& noise, doub
   const double cut = stands_out * std::sqrt(parts.variance);
   for_each_of_site(dn, site, unknown, [&](int x, int y) {
     const double rest = parts.rest(dn, x, y);
-    if (std::fabs(rest) > cut) return;
+    // Pixels that are not in the mean are not moved to it: where few pixels hold an electron these are its charge.
+    if (std::fabs(rest) > cut || !parts.is_inside(dn.at(x, y))) return;
     dn.at(x, y) = static_cast<float>(parts.mean + of_columns * parts.columns.deviation(x, parts.mean) +
                                      of_rows * parts.rows.deviation(y, parts.mean) + of_pixels * rest);
   });

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "calib/dark/dark_image.h"
+#include "isp/model/sensor/masked_noise.h"
 
 namespace lowlux::calib {
 namespace {
@@ -265,12 +266,14 @@ LineScatter scatter_of(double common_variance, double pixel_variance, double pix
   return {std::sqrt(std::max(0.0, common_variance + white)), std::sqrt(white)};
 }
 
-void exclude(const Plane<float>& mean_dn, int site, int frames, PixelMask& mask) {
+void exclude(const Plane<float>& mean_dn, int site, int frames, double gain_dn_per_e, PixelMask& mask) {
   const SiteSpread spread = spread_of(mean_dn, site, 0.5 / frames);
   const double cut = cut_deviations * std::max(spread.deviation, 0.5 / frames);
+  const double low = spread.median - cut;
+  const double high = spread.median + cut + isp::max_hidden_charge_e * gain_dn_per_e / frames;
   for (int y = site >> 1; y < mask.height(); y += 2) {
     for (int x = site & 1; x < mask.width(); x += 2) {
-      mask.at(x, y) = std::fabs(mean_dn.at(x, y) - spread.median) > cut ? 1 : 0;
+      mask.at(x, y) = mean_dn.at(x, y) < low || mean_dn.at(x, y) > high ? 1 : 0;
     }
   }
 }
@@ -296,7 +299,7 @@ Result<void> check_codes(const DarkGroup& group) {
 
 }  // namespace
 
-Result<BlackFigures> measure_black(const DarkGroup& group) {
+Result<BlackFigures> measure_black(const DarkGroup& group, double gain_dn_per_e) {
   if (auto good = check_codes(group); !good) return tl::make_unexpected(good.error());
   BlackFigures out;
   out.frames = group.frames;
@@ -304,7 +307,7 @@ Result<BlackFigures> measure_black(const DarkGroup& group) {
   double row = 0, column = 0;
   const double one = 1;
   for (int site = 0; site < 4; ++site) {
-    exclude(group.mean_dn, site, group.frames, mask);
+    exclude(group.mean_dn, site, group.frames, gain_dn_per_e, mask);
     const ImageFigures f = figures_of({{&group, 1}, {&one, 1}}, mask, site);
     if (f.pixels < fewest_pixels) {
       return fail(ErrorCode::insufficient,
@@ -329,10 +332,10 @@ Result<BlackFigures> measure_black(const DarkGroup& group) {
                           100 * out.excluded_fraction, 100 * max_excluded));
 }
 
-Result<BlackFigures> measure_black(const RawDn& frame) {
+Result<BlackFigures> measure_black(const RawDn& frame, double gain_dn_per_e) {
   DarkStack stack;
   if (auto added = stack.add(frame); !added) return tl::make_unexpected(added.error());
-  return measure_black(stack.average());
+  return measure_black(stack.average(), gain_dn_per_e);
 }
 
 Result<RawDn> part_of(const RawDn& frame, const Rect& part) {

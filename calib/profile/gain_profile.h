@@ -37,10 +37,13 @@ struct BlackFigures {
 };
 
 /// Measures the means of the pixels within 5 standard deviations (robust estimates) of their site's median: the limits
-/// exclude 6e-7 of a normal distribution, equally on both sides.
+/// exclude 6e-7 of a normal distribution, equally on both sides. Where the gain is known, pixels up to
+/// isp::max_hidden_charge_e above that, in the sum of the frames, are kept: a dark charge of less than an electron is
+/// in few pixels.
+/// @param gain_dn_per_e  the system gain; 0 where it is not known
 /// Errors: those of setting_of; fewer than 500 pixels of a site; more than 5 % excluded; codes at 0 or white.
-Result<BlackFigures> measure_black(const RawDn& frame);
-Result<BlackFigures> measure_black(const DarkGroup& group);
+Result<BlackFigures> measure_black(const RawDn& frame, double gain_dn_per_e = 0);
+Result<BlackFigures> measure_black(const DarkGroup& group, double gain_dn_per_e = 0);
 
 /// Returns the frame with a region of its readout as active area: masked pixels to be measured as dark frames are. The
 /// region is cropped so that its corner is of the active area's first colour.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <random>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -35,6 +36,8 @@ SensorModel dark_200() {
   s.prnu = 0;
   return s;
 }
+
+double mean_of(const PerSite<Estimate>& v) { return (v[0].value + v[1].value + v[2].value + v[3].value) / 4; }
 
 double law_of_mean(const SensorModel& s, double time_s) {
   return s.black_level_dn + s.system_gain_dn_per_e * s.dark_current_e_per_s[1] * time_s;
@@ -84,6 +87,47 @@ TEST(BlackFigures, OverManySeedsHaveNoBiasBeyondAFifthOfTheirError) {
   }
   const double one_error = 2 * std::sqrt(216.0 / 4096);
   EXPECT_LT(std::fabs(sum), 0.2 * one_error);  // its own deviation is a twentieth of the error
+}
+
+/// A sensor that counts photons, at 20 DN/e-.
+SensorModel counting(double dark_e_per_s, double read_noise_e) {
+  SensorModel s = dark_200();
+  s.system_gain_dn_per_e = 20;
+  s.read_noise_e = read_noise_e;
+  s.full_well_e = 180;
+  s.dark_current_e_per_s = {dark_e_per_s, dark_e_per_s, dark_e_per_s};
+  return s;
+}
+
+// Over two decades of charge and one of read noise. A symmetric limit would exclude the pixels that hold an electron.
+TEST(BlackFigures, KeepTheFewPixelsThatHoldDarkChargeWhereTheGainIsKnown) {
+  constexpr unsigned seed = 20261125;
+  std::mt19937_64 engine(seed);
+  const auto log_uniform = [&](double low, double high) {
+    return low * std::pow(high / low, std::uniform_real_distribution<double>()(engine));
+  };
+  for (int i = 0; i < 40; ++i) {
+    const double dark_e = log_uniform(0.02, 5), read_e = log_uniform(0.1, 1);
+    SensorBench bench{.sensor = counting(dark_e, read_e), .width = 256, .height = 256};
+    bench.seed = seed + static_cast<unsigned>(i);
+    for (const int frames : {1, 3}) {
+      DarkStack stack;
+      for (int k = 0; k < frames; ++k) ASSERT_TRUE(stack.add(bench.frame({1, 20}, static_cast<std::uint32_t>(k))));
+      const auto found = measure_black(stack.average(), 20);
+      ASSERT_TRUE(found) << found.error().message << ": seed " << seed << ", draw " << i;
+      const double level_dn = mean_of(found->level_dn);
+      const double error_dn = 20 * std::sqrt((dark_e + read_e * read_e + 1.0 / 4800) / (256 * 256 * frames));
+      EXPECT_NEAR(level_dn, bench.sensor.black_level_dn + 20 * dark_e, 5 * error_dn)
+          << dark_e << " e- over " << read_e << " e-, seed " << seed << ", draw " << i;
+    }
+  }
+}
+
+TEST(BlackFigures, LoseThatChargeWhereTheGainIsNotKnown) {
+  const SensorBench bench{.sensor = counting(0.05, 0.15), .width = 256, .height = 256};
+  const auto found = measure_black(bench.frame({1, 20}, 0));
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_LT(mean_of(found->level_dn), bench.sensor.black_level_dn + 20 * 0.01) << "of 0.05 e-";
 }
 
 TEST(BlackFigures, TellRowsFromColumnsAndBothFromPixels) {

@@ -211,6 +211,31 @@ TEST(DarkFrame, MaskedPixelsOfThePictureSetTheLevelOfOneScaledDark) {
   for (std::size_t i = 0; i < moved.dn.size(); ++i) ASSERT_NEAR(moved.dn.data()[i], made->dn.data()[i], 1e-3);
 }
 
+// Of 0.1 e- in the darks, one pixel in ten holds an electron and the median none: scaled to half the time, the level of
+// the dark frame is that of the masked pixels, 0.05 e-.
+TEST(DarkFrame, MaskedPixelsSetTheLevelOfDarksOfFewElectrons) {
+  SensorModel sensor = test::modern_small();
+  sensor.system_gain_dn_per_e = 20;
+  sensor.read_noise_e = 0.15;
+  sensor.dsnu = sensor.prnu = sensor.hot_pixel_fraction = sensor.row_noise_e = sensor.column_noise_e = 0;
+  sensor.dark_current_e_per_s = {0.0125, 0.0125, 0.0125};
+  sensor.full_well_e = 150;
+  const SensorBench bench{.sensor = sensor, .width = 256, .height = 256};
+  PerSite<double> masked{};
+  masked.fill(sensor.black_level_dn + 20 * 0.05);
+  DarkNoiseModel noise;
+  noise.gain_dn_per_e.fill(20);
+  noise.read_variance_dn2.fill(9 + 1.0 / 12);
+  for (const int frames : {1, 4}) {
+    const auto dark = make_dark_frame(darks_of(bench, {{8, 20}}, frames), picture_of(bench, {4, 20}, 20),
+                                      {.masked_dn = masked, .noise = noise});
+    ASSERT_TRUE(dark) << dark.error().message;
+    // Half of the mean of the darks is in the level, whose error is that of 65,536 pixels.
+    const double error_dn = 20 * std::sqrt((0.1 + 0.0225) / (65536.0 * frames));
+    EXPECT_NEAR(mean_of(site_means(dark->dn)), masked[0], 5 * error_dn + 1e-3) << frames;
+  }
+}
+
 TEST(DarkFrame, PixelsThatAreFullOrTooNoisyAreToBeRepaired) {
   SensorBench bench{.sensor = test::hot_sensor(), .width = 256, .height = 256};
   bench.sensor.hot_pixel_current_e_per_s = 2000;

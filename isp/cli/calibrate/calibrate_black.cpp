@@ -25,8 +25,9 @@ constexpr double light_of_noise = 10;     // the maximum in standard deviations 
 double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
 
 /// Checks that a dark frame is as dark as its own masked pixels, if it has some.
-Result<void> check_dark(const RawDn& raw) {
-  const isp::MaskedBlack masked = isp::measure_masked_black(raw);
+Result<void> check_dark(const RawFrame& frame) {
+  const RawDn& raw = frame.raw;
+  const isp::MaskedBlack masked = isp::masked_black_of(frame);
   if (!masked.black) return {};
   const double black = mean_of(masked.black->pedestal_dn), mean = calib::mean_dn(raw);
   const double tolerated = std::max(light_of_noise * mean_of(masked.black->noise_std_dn),
@@ -38,14 +39,14 @@ Result<void> check_dark(const RawDn& raw) {
                           mean, black));
 }
 
-Result<RawDn> dark_part(RawDn raw, const CalibrateBlackArgs& args) {
+Result<RawDn> dark_part(RawFrame frame, const CalibrateBlackArgs& args) {
   if (!args.masked) {
-    if (const auto dark = check_dark(raw); !dark) return tl::make_unexpected(dark.error());
-    return raw;
+    if (const auto dark = check_dark(frame); !dark) return tl::make_unexpected(dark.error());
+    return std::move(frame.raw);
   }
-  const isp::MaskedBlack masked = isp::measure_masked_black(raw);
+  const isp::MaskedBlack masked = isp::measure_masked_black(frame.raw);  // only the region is used
   if (!masked.black) return fail(ErrorCode::insufficient, masked.refusal);
-  return calib::part_of(raw, masked.region);
+  return calib::part_of(frame.raw, masked.region);
 }
 
 /// Holds the darks by setting, and the camera.
@@ -55,7 +56,17 @@ struct Darks {
   FrameInfo camera;
   std::string mosaic;
   isp::Table frames;
+  std::vector<std::pair<std::optional<double>, double>> gains_dn_per_e;  // that files state, with the ISO of each
 };
+
+/// Returns the system gain that the noise profile of a frame states [DN/e-]; nullopt if there is none.
+std::optional<double> stated_gain(const RawFrame& frame) {
+  if (!frame.noise) return std::nullopt;
+  const auto tag = isp::choose_black(frame.raw, {});
+  if (!tag) return std::nullopt;
+  const double gain = *std::ranges::max_element(frame.noise->scale) * isp::mean_range_dn(frame.raw, *tag);
+  return gain > 0 ? std::optional(gain) : std::nullopt;
+}
 
 calib::Measured measured_on(const Darks& darks, const std::optional<double>& iso) {
   std::vector<std::string> files;
@@ -76,7 +87,8 @@ Result<Darks> read_darks(const CalibrateBlackArgs& args) {
     out.mosaic = calib::mosaic_of(frame->raw);
     out.files.emplace_back(frame->raw.info.iso, file);
     list_frame(file, args.masked ? "masked pixels" : "dark", frame->raw.info, out.frames);
-    const auto dark = dark_part(std::move(frame->raw), args);
+    if (const auto gain = stated_gain(*frame)) out.gains_dn_per_e.emplace_back(frame->raw.info.iso, *gain);
+    const auto dark = dark_part(*std::move(frame), args);
     if (!dark) return tl::make_unexpected(with_file(dark.error(), file));
     if (const auto added = sorter.add(*dark); !added) return tl::make_unexpected(with_file(added.error(), file));
     progress.advance(1, file);
@@ -90,16 +102,32 @@ struct Gain {
   std::string source;
 };
 
-Result<Gain> gain_of(const calib::DarkSet& set, const CalibrateBlackArgs& args, const CameraProfile& profile) {
+/// Returns the gain that is given, or that the profile to be extended holds.
+std::optional<Gain> known_gain(const calib::DarkSet& set, const CalibrateBlackArgs& args,
+                               const CameraProfile& profile) {
   if (args.system_gain_dn_per_e) return Gain{{*args.system_gain_dn_per_e, 0}, "given"};
   for (const GainProfile& g : profile.gains) {
     if (g.iso == set.iso && g.sensor) {
       return Gain{{g.sensor->system_gain_dn_per_e, g.errors.system_gain_dn_per_e}, "from " + args.common.add_to};
     }
   }
+  return std::nullopt;
+}
+
+Result<Gain> gain_of(const calib::DarkSet& set, const CalibrateBlackArgs& args, const CameraProfile& profile) {
+  if (auto known = known_gain(set, args, profile)) return *std::move(known);
   const auto gain = calib::gain_of_darks(set.groups);
   if (!gain) return tl::make_unexpected(gain.error());
   return Gain{*gain, "from the noise of the dark charge"};
+}
+
+/// Returns the gain by which a level of one exposure time keeps the pixels that hold single electrons: 0 if none is
+/// known.
+double level_gain(const calib::DarkSet& set, const Darks& darks, const CalibrateBlackArgs& args,
+                  const CameraProfile& profile) {
+  if (const auto known = known_gain(set, args, profile)) return known->dn_per_e.value;
+  const auto stated = std::ranges::find(darks.gains_dn_per_e, set.iso, [](const auto& gain) { return gain.first; });
+  return stated == darks.gains_dn_per_e.end() ? 0 : stated->second;
 }
 
 bool tells_dark_current(const calib::DarkSet& set) {
@@ -114,7 +142,8 @@ std::string map_name(const CalibrateBlackArgs& args, const calib::DarkSet& set, 
 }
 
 /// Calibrates from one exposure time, which determines only the black level including dark charge.
-Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measured& measured,
+/// @param gain_dn_per_e  0 if it is not known
+Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measured& measured, double gain_dn_per_e,
                                    const CalibrateBlackArgs& args, Calibration& found) {
   if (set.groups.size() > 1) {
     return fail(ErrorCode::insufficient,
@@ -122,12 +151,11 @@ Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measu
                             "time, a black level frames of one temperature",
                             set.groups.size()));
   }
-  if (!args.map.empty() || args.system_gain_dn_per_e) {
-    found.warnings.emplace_back(
-        "one exposure time does not determine dark current: --map and --system-gain do nothing");
+  if (!args.map.empty()) {
+    found.warnings.emplace_back("one exposure time does not determine dark current: --map has no effect");
   }
   const calib::DarkGroup& group = set.groups.front();
-  const auto black = calib::measure_black(group);
+  const auto black = calib::measure_black(group, gain_dn_per_e);
   if (!black) return tl::make_unexpected(black.error());
   calib::put_black(*black, group.setting, measured, calib::gain_at(found.profile, group.setting));
   show_black(*black, group.setting, found);
@@ -138,7 +166,9 @@ Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measu
 Result<void> calibrate_set(const calib::DarkSet& set, const Darks& darks, const CalibrateBlackArgs& args,
                            Calibration& found) {
   const calib::Measured measured = measured_on(darks, set.iso);
-  if (!tells_dark_current(set)) return calibrate_black_level(set, measured, args, found);
+  if (!tells_dark_current(set)) {
+    return calibrate_black_level(set, measured, level_gain(set, darks, args, found.profile), args, found);
+  }
   const auto gain = gain_of(set, args, found.profile);
   if (!gain) return tl::make_unexpected(gain.error());
   auto series = calib::fit_dark_series(set.groups, gain->dn_per_e);

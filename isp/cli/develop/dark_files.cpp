@@ -162,7 +162,7 @@ Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(RawFrame& picture
   if (const auto brief = check_bias_times(raw); !brief) return tl::make_unexpected(brief.error());
   calib::DarkRequest request = request_;
   request.is_bias = is_bias();
-  if (const auto masked = isp::measure_masked_black(raw).black) request.masked_dn = masked->pedestal_dn;
+  if (const auto masked = isp::masked_black_of(picture).black) request.masked_dn = masked->pedestal_dn;
   if (const auto tag = isp::choose_black(raw, {isp::BlackChoice::metadata}); tag) {
     request.pedestal_dn = tag->pedestal_dn;
     if (picture.noise) request.noise = noise_model_of(raw, *picture.noise, tag->pedestal_dn);

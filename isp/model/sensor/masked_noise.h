@@ -5,6 +5,11 @@
 
 namespace lowlux::isp {
 
+/// Charge above the limit of outliers that means of dark pixels keep [e-]. A dark charge of less than an electron is in
+/// few pixels, which robust deviations do not show: at a mean of 0.5 e- 1e-6 of the pixels hold more than 6 e-, and
+/// from 1 e- on the median absolute deviation shows the charge.
+inline constexpr double max_hidden_charge_e = 6;
+
 /// Describes the masked pixels of one site, and what a camera's profile states of the sensor.
 struct MaskedLevel {
   double gain_dn_per_e = 0;           // system gain K

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "isp/model/sensor/masked_noise.h"
+
 namespace lowlux::isp {
 namespace {
 
@@ -16,8 +18,6 @@ constexpr int inner_trim = 12;
 constexpr int min_side = 8;                // of the trimmed strip, in pixels
 constexpr int min_samples_per_site = 500;  // standard error below 0.05 standard deviations
 constexpr double cut_sigma = 5.0;
-constexpr double kept_above_e =
-    6;  // 1e-6 of the pixels hold more at a mean of 0.5 e-; from 1 e- on MAD shows the charge
 constexpr double max_offset_of_range = 0.005;  // of an undeclared border from the tag
 constexpr double max_offset_of_noise = 16;     // undeclared border to tag, in standard deviations of its pixels
 constexpr double mad_to_std = 1.4826;          // for a normal distribution
@@ -152,7 +152,7 @@ SiteEstimate estimate_site(const RawDn& raw, const Rect& region, int site, doubl
   for (int y = y0; y < region.y + region.height; y += 2) {
     for (int x = x0; x < region.x + region.width; x += 2) {
       const double v = raw.dn.at(x, y) - median;
-      if (v < -cut || v > cut + kept_above_e * gain_dn_per_e) continue;
+      if (v < -cut || v > cut + max_hidden_charge_e * gain_dn_per_e) continue;
       all.add(v);
       rows[y - region.y].add(v);
       columns[x - region.x].add(v);
