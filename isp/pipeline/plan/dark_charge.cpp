@@ -53,7 +53,8 @@ std::optional<DarkEstimate> estimate(const RawFrame& frame, const RawLevels& lev
       .mean = thumbnail.mean,
       .electrons_at_white = electrons_by_colour(frame.raw, levels),
       .pixels = static_cast<double>(active.width) * active.height / static_cast<double>(thumbnail.mean.plane[0].size()),
-      .neutral = frame.colour.as_shot_neutral};
+      .neutral = frame.colour.as_shot_neutral,
+      .clipped = &thumbnail.clipped};
   for (std::size_t c = 0; c < 3; ++c) {
     const double electrons = evidence.electrons_at_white[c];
     evidence.variance_e2[c] = std::max(frame.noise->offset[c], 0.0) * electrons * electrons;
@@ -171,7 +172,9 @@ std::string warning_of(const DarkCharge& dark, const FrameInfo& info) {
 }
 
 Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels& levels) {
-  Thumbnail out{CameraRgb(thumbnail.mean.width(), thumbnail.mean.height()), thumbnail.black_noise_std};
+  Thumbnail out{.mean = CameraRgb(thumbnail.mean.width(), thumbnail.mean.height()),
+                .clipped = thumbnail.clipped.clone(),
+                .black_noise_std = thumbnail.black_noise_std};
   std::array<double, 3> electrons{1, 1, 1}, light_e{1, 1, 1};
   if (levels.electrons_at_white) {
     electrons = electrons_by_colour(raw, levels);

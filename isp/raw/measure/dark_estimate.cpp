@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 namespace lowlux::isp {
@@ -11,15 +12,21 @@ namespace {
 constexpr int max_side = 48;  // blocks are joined until no side has more: their noise is then small
 constexpr std::size_t min_blocks = 64;
 constexpr double darkest_fraction = 0.02, unsaturated = 0.9;
-constexpr double min_contrast = 5;  // of brighter over darkest blocks, in standard deviations of a block's noise
+constexpr double max_clipped = 0.05;  // of a block's difference from the darkest, by saturated pixels
+constexpr double min_contrast = 5;    // of brighter over darkest blocks, in standard deviations of a block's noise
 constexpr double std_tint = 0.17, std_temperature = 0.4, std_between_channels = 0.05;
 constexpr Vector3 fraction_of_pixels{0.25, 0.5, 0.25};
 constexpr Vector3 tint{0.408248290463863, -0.816496580927726, 0.408248290463863};  // (1, -2, 1) / sqrt(6)
 constexpr Vector3 temperature{0.707106781186548, 0, -0.707106781186548};           // (1, 0, -1) / sqrt(2)
 
+struct Block {
+  Vector3 charge_e{};
+  double clipped = 0;  // fraction of its samples
+};
+
 /// Holds joined blocks in ascending order of their charge.
 struct Blocks {
-  std::vector<Vector3> charge_e;
+  std::vector<Block> block;
   double pixels = 1;  // in a block
 };
 
@@ -29,17 +36,19 @@ Blocks joined_blocks(const DarkEvidence& e) {
   Blocks out{{}, e.pixels * side * side};
   for (int top = 0; top + side <= height; top += side) {
     for (int left = 0; left + side <= width; left += side) {
-      Vector3 sum{};
+      const auto mean_of_plane = [&](const Plane<float>& plane) {
+        double sum = 0;
+        for (int i = 0; i < side * side; ++i) sum += static_cast<double>(plane.at(left + i % side, top + i / side));
+        return sum / (side * side);
+      };
+      Block& joined = out.block.emplace_back();
       for (std::size_t c = 0; c < 3; ++c) {
-        for (int i = 0; i < side * side; ++i) {
-          sum[c] += static_cast<double>(e.mean.plane[c].at(left + i % side, top + i / side));
-        }
-        sum[c] *= e.electrons_at_white[c] / (side * side);
+        joined.charge_e[c] = mean_of_plane(e.mean.plane[c]) * e.electrons_at_white[c];
       }
-      out.charge_e.push_back(sum);
+      if (e.clipped != nullptr) joined.clipped = mean_of_plane(*e.clipped);
     }
   }
-  std::ranges::sort(out.charge_e, {}, [](const Vector3& charge) { return dot(fraction_of_pixels, charge); });
+  std::ranges::sort(out.block, {}, [](const Block& block) { return dot(fraction_of_pixels, block.charge_e); });
   return out;
 }
 
@@ -52,29 +61,37 @@ Vector3 block_variance(const DarkEvidence& e, const Blocks& blocks, const Vector
   return out;
 }
 
-Vector3 mean_of(const std::vector<Vector3>& charge_e, std::size_t from, std::size_t to) {
-  Vector3 out{};
-  for (std::size_t i = from; i < to; ++i) {
-    for (std::size_t c = 0; c < 3; ++c) out[c] += charge_e[i][c] / static_cast<double>(to - from);
+Block mean_of(std::span<const Block> blocks) {
+  Block out;
+  const auto n = static_cast<double>(blocks.size());
+  for (const Block& block : blocks) {
+    for (std::size_t c = 0; c < 3; ++c) out.charge_e[c] += block.charge_e[c] / n;
+    out.clipped += block.clipped / n;
   }
   return out;
 }
 
+/// Returns whether saturation changes the colour of a block's difference from the darkest blocks.
+bool is_saturated(const DarkEvidence& e, const Block& block, const Block& darkest) {
+  double difference = 0;  // in fractions of white
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (block.charge_e[c] > unsaturated * e.electrons_at_white[c]) return true;
+    difference += fraction_of_pixels[c] * (block.charge_e[c] - darkest.charge_e[c]) / e.electrons_at_white[c];
+  }
+  return block.clipped - darkest.clipped > max_clipped * difference;
+}
+
 /// Returns the colour of the light, relative to green, from the differences that it makes between blocks.
-std::optional<Vector3> colour_of_contrast(const DarkEvidence& e, const Blocks& blocks, const Vector3& darkest) {
-  std::vector<Vector3> brighter(blocks.charge_e.begin() + static_cast<std::ptrdiff_t>(blocks.charge_e.size() / 2),
-                                blocks.charge_e.end());
-  std::erase_if(brighter, [&](const Vector3& charge) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      if (charge[c] > unsaturated * e.electrons_at_white[c]) return true;
-    }
-    return false;
-  });
+std::optional<Vector3> colour_of_contrast(const DarkEvidence& e, const Blocks& blocks, const Block& darkest) {
+  std::vector<Block> brighter(blocks.block.begin() + static_cast<std::ptrdiff_t>(blocks.block.size() / 2),
+                              blocks.block.end());
+  std::erase_if(brighter, [&](const Block& block) { return is_saturated(e, block, darkest); });
   if (brighter.empty()) return std::nullopt;
-  const Vector3 bright = mean_of(brighter, 0, brighter.size()), variance = block_variance(e, blocks, darkest);
+  const Block bright = mean_of(brighter);
+  const Vector3 variance = block_variance(e, blocks, darkest.charge_e);
   Vector3 out{};
   for (std::size_t c = 0; c < 3; ++c) {
-    out[c] = bright[c] - darkest[c];
+    out[c] = bright.charge_e[c] - darkest.charge_e[c];
     if (!(out[c] > min_contrast * std::sqrt(variance[c]))) return std::nullopt;
   }
   for (const std::size_t c : {0, 2}) out[c] /= out[1];
@@ -157,10 +174,11 @@ bool is_positive(const Vector3& v) {
 
 std::optional<DarkEstimate> estimate_dark_charge(const DarkEvidence& e) {
   const Blocks blocks = joined_blocks(e);
-  if (blocks.charge_e.size() < min_blocks) return std::nullopt;
-  const auto count = static_cast<std::size_t>(darkest_fraction * static_cast<double>(blocks.charge_e.size()));
-  const Vector3 darkest = mean_of(blocks.charge_e, 0, std::max<std::size_t>(count, 4));
-  std::optional<Vector3> neutral = colour_of_contrast(e, blocks, darkest);
+  if (blocks.block.size() < min_blocks) return std::nullopt;
+  const auto count = static_cast<std::size_t>(darkest_fraction * static_cast<double>(blocks.block.size()));
+  const Block darkest_blocks = mean_of(std::span(blocks.block).first(std::max<std::size_t>(count, 4)));
+  const Vector3& darkest = darkest_blocks.charge_e;
+  std::optional<Vector3> neutral = colour_of_contrast(e, blocks, darkest_blocks);
   if (!neutral) return std::nullopt;
   if (e.neutral && is_positive(*e.neutral)) {
     Vector3 stated_e = *e.neutral;

@@ -15,6 +15,7 @@ struct DarkEvidence {
   std::array<double, 3> variance_e2{};         // of one pixel without charge
   double pixels = 1;                           // in a block
   std::optional<Vector3> neutral;              // camera RGB of a neutral, if the source states it
+  const Plane<float>* clipped = nullptr;       // fraction of each block's samples at white; null: not known
 };
 
 /// States the dark charge that the darkest blocks of a frame show.
@@ -39,8 +40,11 @@ struct DarkEstimate {
 /// charge whose darkest surfaces deviate so, up to one in twenty seems to have some, at most the charge of these
 /// surfaces. n is the geometric mean of the stated neutral and of the direction from the darkest blocks to the brighter
 /// half of those that are not saturated, which dark charge does not change; without a stated neutral it is the latter
-/// alone. That differences of brightness show the colour of light without an additive offset is the idea of the
-/// regression intersection method of remote sensing (crippen-1987, docs/references.md).
+/// alone. Saturated pixels are as bright in each colour: a block counts as saturated if a colour's mean exceeds 0.9 of
+/// white, or if it holds so many more of them than the darkest blocks do that they make more than 5 % of its difference
+/// from these. Hot pixels, which are in all blocks, cancel in this comparison. That differences of brightness show the colour of light
+/// without an additive offset is the idea of the regression intersection method of remote sensing (crippen-1987,
+/// docs/references.md).
 /// @return nullopt where there are fewer than 64 blocks, where no light shows, or where light is as equal in the
 ///         channels as dark charge, so that the two cannot be separated
 std::optional<DarkEstimate> estimate_dark_charge(const DarkEvidence& evidence);

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstdlib>
+#include <numeric>
 
 #include "isp/raw/black_point.h"
 
@@ -156,7 +157,10 @@ double ThumbnailSums::black_noise(const RawFrame& frame, const BlackPoint& black
 }
 
 void ThumbnailSums::make(const RawFrame& frame, const BlackPoint& black, Thumbnail& out) {
-  if (out.mean.width() != columns_ || out.mean.height() != rows_) out.mean = CameraRgb(columns_, rows_);
+  if (out.mean.width() != columns_ || out.mean.height() != rows_) {
+    out.mean = CameraRgb(columns_, rows_);
+    out.clipped = Plane<float>(columns_, rows_);
+  }
   differences_dn_.clear();
   PerSite<double> per_dn{};
   for (int i = 0; i < 4; ++i) per_dn[i] = 1 / (white_at(frame.raw, i) - black.pedestal_dn[i]);
@@ -170,6 +174,8 @@ void ThumbnailSums::make(const RawFrame& frame, const BlackPoint& black, Thumbna
       }
       const std::array<double, 3> mean = colour_means(frame.raw, black, per_dn, block, beside);
       for (int c = 0; c < 3; ++c) out.mean.plane[c].at(x, y) = static_cast<float>(mean[c]);
+      const auto samples = std::accumulate(block.n.begin(), block.n.end(), std::int64_t{0});
+      out.clipped.at(x, y) = static_cast<float>(static_cast<double>(block.clipped) / static_cast<double>(samples));
       if (block.difference > 0 && block.clipped == 0)
         differences_dn_.push_back(static_cast<double>(block.difference) / static_cast<double>(block.differences));
     }

@@ -14,6 +14,8 @@ namespace lowlux::isp {
 struct Thumbnail {
   CameraRgb mean;  // block means, fraction of white, signed, not white balanced; at most 256 x 256. A colour without a
                    // pixel in a block at an odd edge takes the value of the preceding block
+  /// Fraction of the samples of each block that are at white or above. Blocks of live frames are not examined: 0.
+  Plane<float> clipped;
   double black_noise_std = 0;  // of one raw pixel without light, fraction of white; 0 if unknown
 };
 
