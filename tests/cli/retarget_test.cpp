@@ -18,6 +18,7 @@ namespace lowlux {
 namespace {
 
 using Json = nlohmann::json;
+using test::lowlux;
 
 // A ramp of grey above a ramp of a muted red.
 class RetargetCommand : public test::SimulateCommand {
