@@ -31,6 +31,7 @@ struct SiteFlat {
   double noise2 = 0;     // relative variance of the noise of a pixel
   double pattern2 = 0;   // relative variance of the response of a pixel
   double weight = 0;     // w
+  GainNoise noise;       // of the gains
 };
 
 Plane<float> signal_of(const DarkGroup& flats, int site, double black_dn) {
@@ -120,6 +121,23 @@ std::optional<double> relative_noise(const DarkGroup& flats, const FlatLevels& l
   return sum / static_cast<double>(flat.local.size()) / flats.frames;
 }
 
+/// Returns the fraction of the noise of a pixel that its gain contains.
+double kept_noise(double weight) { return weight * weight * (1 - 1 / window) + 1 / window; }
+
+/// Returns the noise of the gains as a function of the gain S_centre / L. Without a noise model all noise is taken for
+/// shot noise.
+GainNoise gain_noise(const FlatLevels& levels, int site, const SiteFlat& flat) {
+  const double k = levels.noise ? levels.noise->gain_dn_per_e[site] : 1;
+  const double read = levels.noise ? levels.noise->read_variance_dn2[site] : 0;
+  double sum = 0;
+  for (std::size_t i = 0; i < flat.local.size(); ++i) {
+    const double local = flat.local.data()[i];
+    sum += (read + k * local) / (local * local);
+  }
+  const double scale = kept_noise(flat.weight) * flat.noise2 * static_cast<double>(flat.local.size()) / sum;
+  return {.shot = scale * k / flat.centre_dn, .read = scale * read / (flat.centre_dn * flat.centre_dn)};
+}
+
 tl::unexpected<Error> unfit(std::string message) { return fail(ErrorCode::malformed, std::move(message)); }
 
 Result<SiteFlat> measure_site(const DarkGroup& flats, const FlatLevels& levels, int site) {
@@ -150,6 +168,7 @@ Result<SiteFlat> measure_site(const DarkGroup& flats, const FlatLevels& levels, 
   out.noise2 = relative_noise(flats, levels, site, out).value_or(spread2);
   out.pattern2 = std::max(0.0, spread2 - out.noise2);
   out.weight = out.pattern2 > 0 ? out.pattern2 / (out.pattern2 + out.noise2) : 0;
+  out.noise = gain_noise(levels, site, out);
   return out;
 }
 
@@ -209,7 +228,8 @@ Result<FlatField> make_flat_field(const DarkGroup& flats, const FlatLevels& leve
     out.max_gain = std::max(out.max_gain, flat->centre_dn / least);
     out.pixel_fraction = std::min(out.pixel_fraction, flat->weight);
     pattern2 += flat->pattern2 / 4;
-    added2 += (flat->weight * flat->weight * (1 - 1 / window) + 1 / window) * flat->noise2 / 4;
+    added2 += kept_noise(flat->weight) * flat->noise2 / 4;
+    out.gain.noise[static_cast<std::size_t>(site)] = flat->noise;
   }
   out.prnu = std::sqrt(pattern2);
   out.noise = std::sqrt(added2);

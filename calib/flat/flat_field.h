@@ -19,7 +19,8 @@ struct FlatLevels {
 
 /// Flat field of a sensor behind a lens: the gains that divide out vignetting and photo response non-uniformity.
 struct FlatField {
-  GainMap gain;          // one gain for each pixel of the active area, 1 at the centre in the mean of each site
+  GainMap gain;          // one gain for each pixel of the active area, 1 at the centre in the mean of each site; its
+                         // noise is that of the flats
   FrameSetting setting;  // of the flats
   std::optional<double> f_number;  // of the first flat
   int frames = 0;
@@ -31,6 +32,8 @@ struct FlatField {
 
 /// Computes the flat field of the mean S of flat frames, black subtracted. For each site
 ///     gain = S_centre / (L (1 + w d)),  d = S / L - 1,  w = P / (P + N)        (Wiener)
+/// The relative variance of a gain is F N, with F = w^2 (1 - 1 / 81) + 1 / 81 for the 81 neighbours of L, and
+/// N = (R + K L) / (n L^2) for n flats of the read variance R and the gain K.
 /// L is the mean of S over 9 x 9 neighbours of the site, fewer at the borders; S_centre that of the middle quarter of
 /// width and height; P the variance of d without noise, N the variance of the noise in d. Noise follows from the
 /// frames, or for a single frame from its noise model; without one w is 0. Deviations beyond five standard deviations,

@@ -24,10 +24,15 @@ struct FramePlace {
 };
 void apply_gains(const RawCorrections& corrections, const FramePlace& place, PlaneView<float> mosaic,
                  Executor& executor);
-/// Multiplies the variance of each 2x2 cell of a mosaic by the mean square of the gains of its pixels. A cell may reach
-/// beyond the frame's last column or row, where it has fewer pixels.
-void apply_gains_to_variance(const RawCorrections& corrections, int frame_width, int frame_height,
-                             PlaneView<float> cells, Executor& executor);
+/// Propagates the gains g of a mosaic, and the relative variance r of those that were measured, to the variance of each
+/// 2x2 cell:
+///     V -> mean(g^2) V + mean(r s^2)
+/// s is a pixel after the gains, and the means are over the pixels of the cell. For g = 1 / f of a flat f this is
+/// V / f^2 + s0^2 V_f / f^4, with s0 the signal before the gains. A cell may reach beyond the frame's last column or
+/// row, where it has fewer pixels.
+/// @param gained  the frame after apply_gains
+void apply_gains_to_variance(const RawCorrections& corrections, PlaneView<const float> gained, PlaneView<float> cells,
+                             Executor& executor);
 /// Multiplies demosaiced planes by the gains; GainMap::first_plane and planes choose among R, G, B.
 void apply_gains(const RawCorrections& corrections, RgbView<float> rgb, Executor& executor);
 

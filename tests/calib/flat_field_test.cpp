@@ -109,6 +109,36 @@ TEST(FlatField, TheGainsOfTwoSetsOfFlatsDifferByTheNoiseThatIsStated) {
   }
 }
 
+// Vignetting to 0.43 of the brightest place: the noise of the gains is stated for each of them.
+TEST(FlatField, TheNoiseOfEachGainIsStatedAsAFunctionOfTheGain) {
+  const SensorBench bench = bench_with(0.8);
+  for (const bool modelled : {true, false}) {
+    const FlatLevels levels = levels_of(bench.sensor, modelled);
+    const auto a = make_flat_field(flats_of(bench, 4), levels);
+    const auto b = make_flat_field(flats_of(bench, 4, 5000), levels);
+    ASSERT_TRUE(a && b);
+    constexpr int bands = 4;
+    double found_first = 0, found_last = 0;
+    for (int band = 0; band < bands; ++band) {
+      double found = 0, stated = 0, n = 0;
+      for (int y = 8; y < bench.height - 8; ++y) {
+        for (int x = 8 + band * 60; x < 8 + (band + 1) * 60; ++x) {
+          const std::size_t i = static_cast<std::size_t>(y) * bench.width + x;
+          const double gain = a->gain.gain[i];
+          const GainNoise& noise = a->gain.noise[static_cast<std::size_t>(site_of(x, y))];
+          found += std::pow(gain / b->gain.gain[i] - 1, 2) / 2;
+          stated += noise.shot * gain + noise.read * gain * gain;
+          ++n;
+        }
+      }
+      // The mean weight of the frame is used in bright and dark parts: 5 %, as above.
+      EXPECT_NEAR(found / n, stated / n, stated / n * (5 * std::sqrt(2 / n) + 0.05)) << modelled << " " << band;
+      (band == 0 ? found_first : found_last) = found / n;
+    }
+    EXPECT_GT(found_last, 1.5 * found_first) << "the noise of the gains is not even";
+  }
+}
+
 TEST(FlatField, ASingleFlatOfUnknownNoiseGivesVignettingOnly) {
   const SensorBench bench = bench_with(0.4);
   const auto flat = make_flat_field(flats_of(bench, 1), levels_of(bench.sensor, false));

@@ -68,8 +68,8 @@ void Pipeline::float_mosaic(const RawFrame& frame, const DevelopPlan& plan) {
   }
   apply_gains(frame.corrections, mosaic_.view(), executor_);
   if (plan.noise_reduction.reduces() && keeps_maps(plan)) {
-    apply_gains_to_variance(frame.corrections, raw.active.width, raw.active.height,
-                            noise_maps_.residual_variance_e2.view(), executor_);
+    apply_gains_to_variance(frame.corrections, std::as_const(mosaic_).view(), noise_maps_.residual_variance_e2.view(),
+                            executor_);
   }
 }
 
