@@ -95,5 +95,19 @@ TEST(ProfileOption, TakesTheNoiseFromTheMaskedPixelsWhereTheyGiveTheLevel) {
   }
 }
 
+// Dark frames are made once for all images of one noise model: it must not follow the masked pixels of each.
+TEST(ProfileOption, HasOneNoiseForAllImagesThatDarkFramesAreSubtractedFrom) {
+  const auto noise_of = [](double dark_e) {
+    RawFrame frame = frame_of(dark_e);
+    mask_border(frame);
+    isp::DevelopOptions options;
+    EXPECT_TRUE(use_profile(profile(), {.everything = true, .with_darks = true}, frame, options));
+    return *frame.noise;
+  };
+  const NoiseProfile one = noise_of(5), other = noise_of(50);
+  EXPECT_EQ(one.scale, other.scale);
+  EXPECT_EQ(one.offset, other.offset);
+}
+
 }  // namespace
 }  // namespace lowlux::cli

@@ -54,7 +54,7 @@ class PictureSink final : public CaptureSink {
     isp::DevelopOptions options = options_;
     if (profile_) {
       const bool everything = !args_.develop.profile.empty();
-      const ProfileChoice choice{everything, args_.develop.gain_setting};
+      const ProfileChoice choice{.everything = everything, .gain_setting = args_.develop.gain_setting};
       if (const auto used = use_profile(*profile_, choice, frame, options); !used) {
         return tl::make_unexpected(
             with_file(used.error(), everything ? args_.develop.profile : args_.develop.black_profile));

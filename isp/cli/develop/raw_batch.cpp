@@ -45,7 +45,9 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
     options.effects->budget_s = budget_s(batch.args.effects, 1e-6 * crop.width * crop.height);
   }
   if (batch.profile) {
-    const ProfileChoice choice{!batch.args.profile.empty(), batch.args.gain_setting};
+    const ProfileChoice choice{.everything = !batch.args.profile.empty(),
+                               .with_darks = batch.darks != nullptr,
+                               .gain_setting = batch.args.gain_setting};
     const auto used = use_profile(*batch.profile, choice, frame, options);
     if (!used) return tl::make_unexpected(used.error());
   }

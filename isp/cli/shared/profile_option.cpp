@@ -33,11 +33,14 @@ void use_colours(const CameraProfile& profile, RawFrame& frame, isp::LookChoice&
 }
 
 /// Sets the noise of the profile, relative to the black point that is going to be subtracted.
-void set_noise(const calib::ProfileAtFrame& found, const isp::BlackRequest& request, RawFrame& frame) {
+void set_noise(const calib::ProfileAtFrame& found, const ProfileChoice& choice, const isp::BlackRequest& request,
+               RawFrame& frame) {
   if (!found.noise) return;
   frame.noise = found.noise;
-  if (const Result<BlackPoint> black = isp::choose_black_by_gain(frame, request)) {
-    if (const auto above = calib::noise_above(*black, found, frame.raw)) frame.noise = above;
+  if (!choice.with_darks) {
+    const Result<BlackPoint> black = isp::choose_black_by_gain(frame, request);
+    const auto above = black ? calib::noise_above(*black, found, frame.raw) : std::nullopt;
+    if (above) frame.noise = above;
   }
   frame.noise->source = NoiseProfile::Source::profile;
 }
@@ -74,7 +77,7 @@ Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choi
   }
   options.look.profile_iso = found->iso;
   options.look.camera = camera_of(profile);
-  set_noise(*found, black, frame);
+  set_noise(*found, choice, black, frame);
   auto& defects = frame.corrections.defects;
   defects.insert(defects.end(), found->hot_pixels.begin(), found->hot_pixels.end());
   frame.warnings.insert(frame.warnings.end(), found->warnings.begin(), found->warnings.end());

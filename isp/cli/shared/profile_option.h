@@ -13,6 +13,7 @@ namespace lowlux::cli {
 /// Selects the parts of a camera's profile that are used.
 struct ProfileChoice {
   bool everything = false;   // includes its colour matrices
+  bool with_darks = false;   // dark frames give the level: the noise is that of the profile, the same for all images
   std::string gain_setting;  // as in calib::gain_named; empty: by the frame's ISO
 };
 
