@@ -51,7 +51,8 @@ Tile measure_tile(const RawDn& picture, int site, const Rect& tile) {
   return {sum / pairs / 2, squares / pairs / 2};
 }
 
-/// Returns the variance of a pixel in the darkest tenth of an image's tiles [DN^2]: the median of these tiles.
+}  // namespace
+
 double darkest_noise_dn2(const RawDn& picture, int site) {
   const Rect& active = picture.active;
   std::vector<Tile> tiles;
@@ -70,8 +71,6 @@ double darkest_noise_dn2(const RawDn& picture, int site) {
                    [](const Tile& a, const Tile& b) { return a.noise_dn2 < b.noise_dn2; });
   return middle->noise_dn2;
 }
-
-}  // namespace
 
 Result<void> check_even_dark(const DarkGroup& group, const PerSite<DarkSite>& sites,
                              const std::optional<PerSite<double>>& pedestal_dn) {

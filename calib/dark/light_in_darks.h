@@ -41,6 +41,10 @@ Result<void> check_even_dark(const DarkGroup& group, const PerSite<DarkSite>& si
 Result<std::optional<std::string>> check_masked_level(const RawDn& picture, const PerSite<double>& masked_dn,
                                                       const DarkFrame& dark);
 
+/// Returns the variance of a pixel of one site in the darkest tenth of an image's tiles [DN^2]: the median of these
+/// tiles, from differences of neighbours.
+double darkest_noise_dn2(const RawDn& picture, int site);
+
 /// Checks whether the image is brighter than its dark frame. Error: more than 1 % of its pixels lie more than four
 /// standard deviations below (3e-5 of a normal distribution do): subtraction would leave black dots. The deviation is
 /// that of the darks or, if that is more, of a pixel in the darkest tenth of the image: a master dark scatters less

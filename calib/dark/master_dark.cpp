@@ -15,6 +15,7 @@ namespace {
 constexpr double far_out = 5;                // standard deviations
 constexpr double mad_to_deviation = 1.4826;  // of a normal distribution
 constexpr std::int64_t max_pairs = std::int64_t{1} << 20;
+constexpr double min_exposures_between = 4;
 constexpr double far_below = 2, far_below_range = 1e-3;
 
 /// Differences of neighbours of a site, from pairs that share no pixel.
@@ -96,6 +97,23 @@ double estimate_exposures(const DarkGroup& group, const RawDn& picture, const Da
   const double rest_dn2 = dark_dn2 - pattern_dn2 - (group.rounded ? rounding_dn2 : 0);
   const double one_dn2 = mean_of(noise_of_one_exposure(noise, sites_of(group), pedestal_dn));
   return rounded_count(one_dn2 / std::max({rest_dn2, error_dn2, one_dn2 / max_exposures}));
+}
+
+double estimate_exposures_between(const DarkGroup& group, const RawDn& picture, const DarkNoiseModel& noise,
+                                  const std::optional<PerSite<double>>& pedestal_dn) {
+  const PerSite<DarkSite> sites = sites_of(group);
+  PerSite<double> one_dn2 = noise_of_one_exposure(noise, sites, pedestal_dn);
+  double between_dn2 = 0;
+  for (int site = 0; site < 4; ++site) {
+    one_dn2[site] = std::min(one_dn2[site], darkest_noise_dn2(picture, site));
+    between_dn2 += sites[site].noise_dn2 / 4;
+  }
+  const double one = mean_of(one_dn2);
+  const auto degrees = static_cast<double>(group.mean_dn.size()) * (group.frames - 1);
+  const double rounding = group.rounded ? rounding_dn2 : 0, error_dn2 = between_dn2 * std::sqrt(2 / degrees);
+  const double rest_dn2 = std::max({between_dn2 - rounding, rounding, error_dn2, one / max_exposures});
+  const double count = rounded_count(one / rest_dn2);
+  return count < min_exposures_between ? 1 : count;
 }
 
 Result<DarkGroup> group_of_master(const Plane<float>& dn, bool rounded, const FrameInfo& stated, const RawDn& picture,

@@ -40,6 +40,17 @@ PerSite<double> noise_of_one_exposure(const DarkNoiseModel& noise, const PerSite
 double estimate_exposures(const DarkGroup& group, const RawDn& picture, const DarkNoiseModel& noise,
                           const std::optional<PerSite<double>>& pedestal_dn);
 
+/// Estimates how many exposures each of several files of one setting is the mean of, at least 1 and at most
+/// max_exposures:
+///     N = V / (v - 1/12)
+/// v is the variance between the files, so that the fixed pattern does not count; V as in estimate_exposures, but at
+/// most the variance of a pixel in the darkest places of the image, which is that of one exposure and more: a noise
+/// model that states too much makes no master darks of ordinary ones. For the same reason the result is 1 below 4. The
+/// divisor is at least 1/12 for whole codes, as the rounding of values that scatter less is not noise, and at least its
+/// standard error. The result is rounded as that of estimate_exposures. Precondition: group.frames > 1.
+double estimate_exposures_between(const DarkGroup& group, const RawDn& picture, const DarkNoiseModel& noise,
+                                  const std::optional<PerSite<double>>& pedestal_dn);
+
 /// Returns the group of a master dark that states no exposure settings: those of the image are assumed, except for what
 /// `stated` holds. The dark is cut to the active area if it has the size of the readout. Errors: another size; a level
 /// below the pedestal by more than two standard deviations of a pixel and 0.1 % of the range, which a master has after

@@ -75,6 +75,49 @@ TEST(MasterDark, TheNumberOfExposuresFollowsFromTheNoiseInSpiteOfPatternAndHotPi
   }
 }
 
+/// Several masters as raw files, each the rounded mean of so many frames.
+DarkGroup masters_of(const SensorBench& bench, int files, int frames) {
+  DarkLibrary library;
+  for (int file = 0; file < files; ++file) {
+    const DarkGroup darks = darks_of(bench, frames, static_cast<std::uint32_t>(100 + 1000 * file));
+    RawDn raw = bench.frame(exposure, 0);
+    for (int y = 0; y < raw.dn.height(); ++y) {
+      for (int x = 0; x < raw.dn.width(); ++x) {
+        raw.dn.at(x, y) = static_cast<std::uint16_t>(std::lround(darks.mean_dn.at(x, y)));
+      }
+    }
+    EXPECT_TRUE(library.add(raw));
+  }
+  return std::move(library.groups().front());
+}
+
+TEST(MasterDark, TheNumberOfExposuresOfSeveralMastersFollowsFromTheNoiseBetweenThem) {
+  SensorModel sensor = test::hot_sensor();
+  sensor.system_gain_dn_per_e = 2;  // the means of 16 frames scatter by more than half a code
+  sensor.full_well_e /= 3;
+  const SensorBench bench{.sensor = sensor, .width = 128, .height = 128};
+  const RawDn picture = picture_of(bench, 5);
+  DarkNoiseModel tripled = noise_of(sensor);
+  for (double& gain : tripled.gain_dn_per_e) gain *= 3;
+  for (double& variance : tripled.read_variance_dn2) variance *= 3;
+  for (const int files : {2, 3, 5}) {
+    for (const int frames : {1, 2, 5, 8, 16}) {
+      const DarkGroup group = masters_of(bench, files, frames);
+      const double found = estimate_exposures_between(group, picture, noise_of(sensor), pedestal_of(sensor));
+      if (frames < 4) {
+        EXPECT_EQ(found, 1) << frames << " exposures in " << files << " files";
+        if (frames > 1) continue;
+        EXPECT_EQ(estimate_exposures_between(group, picture, tripled, pedestal_of(sensor)), 1) << "of a wrong model";
+        continue;
+      }
+      // The variance between the files, of 16,384 pixels, is known to sqrt(2 / n); rounding adds 1/12 DN^2 to it, and a
+      // tenth is for the charge of single pixels, as above.
+      const double error = std::sqrt(2 / (16384.0 * (files - 1)));
+      EXPECT_NEAR(found, frames, frames * (5 * error + 0.1) + 0.5) << files << " files";
+    }
+  }
+}
+
 TEST(MasterDark, OfAnotherExposureTimeThePatternCountsAsNoiseSoThatTheNumberIsALowerBound) {
   const SensorBench bench{.sensor = test::hot_sensor(), .width = 256, .height = 256};
   const DarkGroup master = master_of(darks_of(bench, 16), false);

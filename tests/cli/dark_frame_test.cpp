@@ -18,7 +18,7 @@
 #include "isp/cli/shared/raw_files.h"
 #include "isp/codec/tiff.h"
 #include "isp/output/dng/dng_writer.h"
-#include "isp/raw/measure/masked_black.h"
+#include "isp/raw/black_point.h"
 #include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 
@@ -145,7 +145,7 @@ TEST_F(DarkFrameCommand, IsMadeOnceForAllPicturesOfASetting) {
   darks("same/d.dng", "1", 4);
   darks("long/d.dng", "2", 4);
   RawFrame first = *capture::read_raw(file("night.dng")), later = *capture::read_raw(file("later.dng"));
-  const auto level = [](const RawFrame& frame) { return isp::measure_masked_black(frame.raw).black->pedestal_dn; };
+  const auto level = [](const RawFrame& frame) { return isp::masked_black_of(frame).black->pedestal_dn; };
   ASSERT_NE(level(first), level(later));
   const auto same = *cli::read_darks({*cli::raw_files_of(file("same"))}, {});
   const auto made = same->frame_for(first, {});
@@ -228,6 +228,24 @@ TEST_F(MasterDarkCommand, GivesThePictureOfTheFramesItIsTheMeanOf) {
   const Json tiff = developed_to("tiff.png", {"--dark-frame", file("master.tif"), "--dark-frame-count", "16"});
   EXPECT_NE(tiff["warnings"].dump().find("are assumed"), std::string::npos);
   EXPECT_LT(mean_ciede2000("frames.png", "tiff.png"), 0.1);  // the figure
+}
+
+TEST_F(MasterDarkCommand, TheNumberOfFramesOfSeveralRawMastersIsEstimated) {
+  for (const char* const name : {"one", "two"}) {
+    mean_ = Plane<float>(mean_.width(), mean_.height());
+    std::fill_n(mean_.data(), mean_.size(), 0.0f);
+    darks(fmt::format("{}/d.dng", name), "1", 8, {"--seed", name == std::string("one") ? "700" : "800"});
+    for (int i = 0; i < 8; ++i) {
+      last_ = *capture::read_raw(file(fmt::format("{}/d_{:04}.dng", name, i)));
+      for (std::size_t k = 0; k < mean_.size(); ++k) mean_.data()[k] += static_cast<float>(last_.raw.dn.data()[k]) / 8;
+    }
+    write_raw(fmt::format("master_{}.dng", name));
+  }
+  const Json report =
+      developed_to("x.png", {"--dark-frame", file("master_one.dng") + "," + file("master_two.dng")})["dark_frame"];
+  EXPECT_EQ(report["files"], 2);
+  EXPECT_EQ(report["frames_estimated"], true);
+  EXPECT_NEAR(report["frames"].get<double>(), 16, 3);  // whole numbers of two files
 }
 
 TEST_F(MasterDarkCommand, TheNumberOfItsFramesIsEstimated) {

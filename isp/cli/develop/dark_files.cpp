@@ -226,6 +226,9 @@ void DarkSource::count_exposures(const RawDn& picture, calib::DarkRequest& reque
       request.exposures_per_file[g] = *count_;
     } else if (group.frames == 1 && fits && request.noise) {
       request.exposures_per_file[g] = calib::estimate_exposures(group, picture, *request.noise, request.pedestal_dn);
+    } else if (group.frames > 1 && fits && request.noise) {
+      request.exposures_per_file[g] =
+          calib::estimate_exposures_between(group, picture, *request.noise, request.pedestal_dn);
     }
   }
 }
