@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,6 +22,7 @@
 #include "isp/raw/black_point.h"
 #include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
+#include "tests/support/float_dng.h"
 
 namespace lowlux {
 namespace {
@@ -246,6 +248,32 @@ TEST_F(MasterDarkCommand, TheNumberOfFramesOfSeveralRawMastersIsEstimated) {
   EXPECT_EQ(report["files"], 2);
   EXPECT_EQ(report["frames_estimated"], true);
   EXPECT_NEAR(report["frames"].get<double>(), 16, 3);  // whole numbers of two files
+}
+
+// In codes, and as fractions of white, which DNG has where no white level is stated.
+TEST_F(MasterDarkCommand, AFloatingPointDngGivesTheImageOfTheSameTiff) {
+  write_tiff("master.tif");
+  developed_to("tiff.png", {"--dark-frame", file("master.tif"), "--dark-frame-count", "16"});
+  const double white = last_.raw.white_dn[0];
+  for (const bool in_codes : {true, false}) {
+    Plane<float> values = mean_.clone();
+    const auto scale = static_cast<float>(in_codes ? 1 : 1 / white);
+    std::transform(values.data(), values.data() + values.size(), values.data(), [=](float v) { return scale * v; });
+    test::DngBuilder dng = test::float_dng(values, in_codes ? std::optional(white) : std::nullopt);
+    dng.remove(271).remove(272);  // Make and Model
+    const auto bytes = dng.build();
+    std::ofstream(file("master.dng"), std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    const std::string name = in_codes ? "codes.png" : "fractions.png";
+    const Json report = developed_to(name, {"--dark-frame", file("master.dng"), "--dark-frame-count", "16"});
+    EXPECT_NE(report["warnings"].dump().find("a floating-point DNG does not state"), std::string::npos);
+    EXPECT_LT(mean_ciede2000("tiff.png", name), 0.01) << "floats";
+  }
+  mean_.at(3, 5) = std::nanf("");
+  const auto bytes = test::float_dng(mean_, white).build();
+  std::ofstream(file("nan.dng"), std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  refused({"--dark-frame", file("nan.dng")}, 1, "column 3, row 5");
 }
 
 TEST_F(MasterDarkCommand, TheNumberOfItsFramesIsEstimated) {

@@ -42,11 +42,20 @@ Result<double> doubling_of_profile(const std::string& file, const calib::FrameSe
               file);
 }
 
+/// Returns the values of a master in the codes of an image.
+Plane<float> in_codes(const MosaicTiff& master, const RawDn& picture) {
+  Plane<float> out = master.dn.clone();
+  if (!master.white) return out;
+  const auto scale = static_cast<float>(*std::ranges::min_element(picture.white_dn) / *master.white);
+  std::transform(out.data(), out.data() + out.size(), out.data(), [=](float v) { return v * scale; });
+  return out;
+}
+
 std::string unchecked_text(const MosaicTiff& master) {
   std::string text = fmt::format(
-      "{}: a TIFF does not state all of camera, ISO, exposure time, temperature and orientation; those of the picture "
+      "{}: a {} does not state all of camera, ISO, exposure time, temperature and orientation; those of the picture "
       "are assumed",
-      master.file);
+      master.file, master.white ? "floating-point DNG" : "TIFF");
   if (master.scaled) text += "; its values, at most 1, are taken as fractions of 65535";
   return text;
 }
@@ -124,7 +133,13 @@ Result<DarkFiles> read_files(const DarkNames& names) {
       if (!master) return tl::make_unexpected(with_file(master.error(), file));
       read.masters.push_back(*std::move(master));
     } else if (auto added = add_raw(file, darks); !added) {
-      return tl::make_unexpected(added.error());
+      if (added.error().code != ErrorCode::unsupported) return tl::make_unexpected(added.error());
+      auto master = read_float_dng(file);  // the readers of raw files refuse floats, which masters may hold
+      if (!master) {
+        const bool is_other = master.error().code == ErrorCode::unsupported;
+        return tl::make_unexpected(is_other ? added.error() : with_file(master.error(), file));
+      }
+      read.masters.push_back(*std::move(master));
     }
   }
   for (const std::string& file : names.bias) {
@@ -193,7 +208,8 @@ Result<void> DarkSource::adopt_masters(const RawDn& picture, const calib::FrameS
   files_.groups.resize(raw_groups_);
   master_setting_.reset();
   for (const MosaicTiff& master : files_.masters) {
-    auto group = calib::group_of_master(master.dn, master.rounded, master.info, picture, request.pedestal_dn);
+    auto group =
+        calib::group_of_master(in_codes(master, picture), master.rounded, master.info, picture, request.pedestal_dn);
     if (!group) return tl::make_unexpected(with_file(group.error(), master.file));
     files_.groups.push_back(*std::move(group));
   }

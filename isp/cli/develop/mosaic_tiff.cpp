@@ -38,13 +38,21 @@ Result<Plane<float>> grey_of(const Encoded16& picture) {
   return out;
 }
 
+Result<void> check_finite(const Plane<float>& plane) {
+  for (int y = 0; y < plane.height(); ++y) {
+    for (int x = 0; x < plane.width(); ++x) {
+      if (std::isfinite(plane.at(x, y))) continue;
+      return fail(ErrorCode::malformed, fmt::format("the value at column {}, row {} is not a finite number", x, y));
+    }
+  }
+  return {};
+}
+
 Result<Plane<float>> grey_of(const SceneLinear& picture) {
+  if (const auto finite = check_finite(picture.plane[0]); !finite) return tl::make_unexpected(finite.error());
   for (int y = 0; y < picture.height(); ++y) {
     for (int x = 0; x < picture.width(); ++x) {
       const float red = picture.plane[0].at(x, y);
-      if (!std::isfinite(red)) {
-        return fail(ErrorCode::malformed, fmt::format("the value at column {}, row {} is not a finite number", x, y));
-      }
       if (red != picture.plane[1].at(x, y) || red != picture.plane[2].at(x, y)) return coloured();
     }
   }
@@ -58,6 +66,19 @@ bool is_tiff_name(const std::string& file) {
   std::ranges::transform(name, name.begin(),
                          [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
   return name.ends_with(".tif") || name.ends_with(".tiff");
+}
+
+Result<MosaicTiff> read_float_dng(const std::string& file) {
+  const auto bytes = capture::read_file_bytes(file, capture::ReadLimits{}.max_file_bytes);
+  if (!bytes) return tl::make_unexpected(bytes.error());
+  auto decoded = isp::decode_float_mosaic(*bytes, {capture::ReadLimits{}.max_pixels});
+  if (!decoded) return tl::make_unexpected(decoded.error());
+  if (const auto finite = check_finite(decoded->value); !finite) return tl::make_unexpected(finite.error());
+  return MosaicTiff{.file = file,
+                    .dn = std::move(decoded->value),
+                    .rounded = false,
+                    .white = decoded->white,
+                    .info = std::move(decoded->metadata.info)};
 }
 
 Result<MosaicTiff> read_mosaic_tiff(const std::string& file) {

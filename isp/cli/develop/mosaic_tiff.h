@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "isp/base/frame.h"
@@ -8,17 +9,23 @@
 
 namespace lowlux::cli {
 
-/// A mosaic that another program saved as a grey TIFF, for example the mean of dark frames.
+/// A mosaic that another program saved as a grey TIFF or as a floating-point DNG, for example the mean of dark frames.
 struct MosaicTiff {
   std::string file;
   Plane<float> dn;
   bool rounded = true;  // the file holds whole codes
   bool scaled = false;  // its values are at most 1 and were taken as fractions of 65535, as Siril and PixInsight save
-  FrameInfo info;       // what the file states
+  /// White level of a DNG, in its own units: values are scaled to the white level of the image. Absent: codes.
+  std::optional<double> white;
+  FrameInfo info;  // what the file states
 };
 
 /// Returns whether the file has the extension of a TIFF: .tif or .tiff in any case.
 bool is_tiff_name(const std::string& file);
+
+/// Reads the mosaic of a floating-point DNG. Errors: those of reading and of isp::decode_float_mosaic; values that are
+/// not finite.
+Result<MosaicTiff> read_float_dng(const std::string& file);
 
 /// Reads a grey TIFF of 16 bits or 32-bit floats. Errors: those of reading and of isp::decode_tiff; 8 bits; colours;
 /// values that are not finite.
