@@ -211,6 +211,24 @@ TEST(NoiseReduction, MapsAreThoseOfTheActiveAreaIfAskedFor) {
   EXPECT_EQ(std::get<SceneLinear>(out.picture).width(), 64);
 }
 
+// A flat of gain 2 and 10 % of noise: the map has 4 V, and with that noise 1 % of the square of the signal in addition.
+TEST(NoiseReduction, MapsHoldTheNoiseOfMeasuredGains) {
+  RawFrame frame = test::night_frame({}, grey(200), 128, 96);
+  GainMap flat{.bottom = 96, .right = 128};
+  flat.gain = {2};
+  frame.corrections.gain_maps = {flat};
+  const Developed exact = developed(frame, {.mode = Mode::level, .maps = true});
+  frame.corrections.gain_maps[0].noise.fill({.shot = 0.003, .read = 0.001});
+  const Developed measured = developed(frame, {.mode = Mode::level, .maps = true});
+  const Plane<float>&before = exact.noise_maps.residual_variance_e2, &after = measured.noise_maps.residual_variance_e2;
+  double added = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) added += (after.data()[i] - before.data()[i]) / before.size();
+  const double square_e2 = 400.0 * 400 * (0.25 + 1 + 1 + 0.625 * 0.625) / 4;
+  // The signal is denoised: its own variance adds less than 1 % to its square, and the mean of the frame is known to 1
+  // %.
+  EXPECT_NEAR(added, (0.003 * 2 + 0.001 * 4) * square_e2, 0.03 * 0.01 * square_e2);
+}
+
 TEST(NoiseReduction, OnePipelineTakesFramesOfAnySizeAndLevelOneAfterTheOther) {
   Pipeline pipeline(executor);
   for (const Level level : {Level::draft, Level::best, Level::high}) {

@@ -42,9 +42,9 @@ struct DarkEstimate {
 /// half of those that are not saturated, which dark charge does not change; without a stated neutral it is the latter
 /// alone. Saturated pixels are as bright in each colour: a block counts as saturated if a colour's mean exceeds 0.9 of
 /// white, or if it holds so many more of them than the darkest blocks do that they make more than 5 % of its difference
-/// from these. Hot pixels, which are in all blocks, cancel in this comparison. That differences of brightness show the colour of light
-/// without an additive offset is the idea of the regression intersection method of remote sensing (crippen-1987,
-/// docs/references.md).
+/// from these. Hot pixels, which are in all blocks, cancel in this comparison. That differences of brightness show the
+/// colour of light without an additive offset is the idea of the regression intersection method of remote sensing
+/// (crippen-1987, docs/references.md).
 /// @return nullopt where there are fewer than 64 blocks, where no light shows, or where light is as equal in the
 ///         channels as dark charge, so that the two cannot be separated
 std::optional<DarkEstimate> estimate_dark_charge(const DarkEvidence& evidence);
