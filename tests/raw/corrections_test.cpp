@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "isp/base/cfa.h"
+
 namespace lowlux::isp {
 namespace {
 
@@ -109,8 +111,8 @@ TEST(GainMap, NoiseOfMeasuredGainsIsAddedToTheVariance) {
         double sum = 0, n = 0;
         for (int v = 2 * y; v < std::min(2 * y + 2, height); ++v) {
           for (int u = 2 * x; u < std::min(2 * x + 2, width); ++u) {
-            const auto i = static_cast<std::size_t>(v * width + u);
-            const GainNoise& noise = flat.noise[static_cast<std::size_t>(2 * (v & 1) + (u & 1))];
+            const auto i = static_cast<std::size_t>(v) * width + u;
+            const GainNoise& noise = flat.noise[static_cast<std::size_t>(site_of(u, v))];
             const double f = response[i], variance_f = f * f * (noise.shot / f + noise.read / (f * f));
             sum += 100 / (f * f) + signal[i] * signal[i] * variance_f / std::pow(f, 4);
             ++n;

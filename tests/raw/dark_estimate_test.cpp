@@ -166,7 +166,7 @@ TEST(DarkEstimate, CoversDeviationsOfDarkSurfacesByItsStandardError) {
     ASSERT_TRUE(found);
     beyond += std::fabs(found->mean_e - dark) > 3 * found->standard_error_e ? 1 : 0;
     if (dark == 0) false_alarms += found->is_significant() ? 1 : 0;
-    if (dark > 0) squares += std::pow((found->mean_e - dark) / found->standard_error_e, 2) / (draws / 2);
+    if (dark > 0) squares += std::pow((found->mean_e - dark) / found->standard_error_e, 2) / (draws / 2.0);
   }
   // One frame in twenty, as the header says.
   EXPECT_LE(beyond, draws / 20);
