@@ -6,10 +6,12 @@
 #include <fmt/format.h>
 
 #include "isp/metrics/statistics.h"
-#include "isp/reproduce/chromaticity_clouds.h"
+#include "isp/reproduce/clouds/chromaticity_clouds.h"
 
 namespace lowlux::isp {
 namespace {
+
+constexpr std::size_t second_level = 1;
 
 double pooled_size(const XyCovariance& covariance) {
   return size_of(principal_ellipse({{}, covariance}, drawn_deviations));
@@ -101,13 +103,16 @@ Plot error_plot(const Colour& colour) {
   return plot;
 }
 
+bool pooled_ellipses_grow(const std::vector<Colour>& colours) {
+  return std::ranges::all_of(colours, [](const Colour& colour) {
+    return pooled_size(pooled_cloud(colour, colour.clouds.size() - 1).sampled.covariance) >
+           pooled_size(pooled_cloud(colour, second_level).sampled.covariance);
+  });
+}
+
 std::vector<Finding> pooled_findings(const std::vector<Colour>& chips) {
-  const std::size_t first = 1, last = chips.front().clouds.size() - 1;
-  bool grow = true;
-  for (const Colour& chip : chips) {
-    grow = grow && pooled_size(pooled_cloud(chip, last).sampled.covariance) >
-                       pooled_size(pooled_cloud(chip, first).sampled.covariance);
-  }
+  const std::size_t first = second_level, last = chips.front().clouds.size() - 1;
+  const bool grow = pooled_ellipses_grow(chips);
   const double before = variation_of_sizes(chips, first), after = variation_of_sizes(chips, last);
   constexpr double noticeably = 0.99;
   return {

@@ -1,4 +1,4 @@
-#include "isp/reproduce/chromaticity_clouds.h"
+#include "isp/reproduce/clouds/chromaticity_clouds.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,45 +16,13 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr const char* colour_checker = "checker";
 constexpr double degree = std::numbers::pi / 180;
 
-Result<Cloud> sample_cloud(const Colour& colour, double power_w, DrawPlace place, std::uint32_t samples) {
-  const auto means = mean_photons(colour.light, power_w, photon_exposure_s);
-  if (!means) return tl::make_unexpected(means.error());
-  const auto predicted = predicted_cloud(*means);
-  Cloud out{power_w, {}, {}, predicted.value_or(ChromaticityCloud{})};
-  for (place.sample = 0; place.sample < samples; ++place.sample) {
-    if (const auto xy = xy_of(xyz_of_photons(*means, draw_photons(*means, place)))) out.samples.push_back(*xy);
-  }
-  const auto sampled = cloud_of(out.samples);
-  if (!sampled || !predicted) {
-    return fail(ErrorCode::insufficient, fmt::format("too few photons at {} W for a cloud of chromaticities", power_w));
-  }
-  out.sampled = *sampled;
-  return out;
-}
+const ColourSet scenario_i{"I", "scenario I", ""}, scenario_ii{"II", "scenario II", ""};
 
-Result<void> sample_colours(std::vector<Colour>& colours, std::uint32_t first_frame, std::uint32_t samples,
-                            std::uint64_t seed) {
-  const std::vector<double> levels = photon_levels_w();
-  for (std::uint32_t c = 0; c < colours.size(); ++c) {
-    for (std::uint32_t l = 0; l < levels.size(); ++l) {
-      auto cloud = sample_cloud(colours[c], levels[l], {seed, first_frame + l, c, 0}, samples);
-      if (!cloud) return tl::make_unexpected(cloud.error());
-      colours[c].clouds.push_back(*std::move(cloud));
-    }
-  }
-  return {};
-}
+}  // namespace
 
-/// Returns what a finding calls the colours of a scenario.
-std::string colours_of(const std::string& scenario) {
-  return scenario == colour_checker ? "24 ColorChecker reflectances" : "scenario " + scenario;
-}
-
-/// Reports the exponent that is farthest from -1/2 in units of its own standard error, over all colours.
-Finding size_law(const std::vector<Colour>& colours, const std::string& scenario) {
+Finding size_law(const std::vector<Colour>& colours, const ColourSet& set) {
   Estimate worst{-0.5, 1};
   const auto errors_off = [](const Estimate& e) { return std::fabs(e.value + 0.5) / e.standard_error; };
   for (const Colour& colour : colours) {
@@ -67,8 +35,8 @@ Finding size_law(const std::vector<Colour>& colours, const std::string& scenario
     const Estimate fit = power_law_exponent(x, y);
     if (errors_off(fit) >= errors_off(worst)) worst = fit;
   }
-  return {"chromaticity-clouds/size-law-" + scenario,
-          "the ellipses' size follows the photons' relative noise, " + colours_of(scenario),
+  return {"chromaticity-clouds/size-law-" + set.id,
+          "the ellipses' size follows the photons' relative noise, " + set.text,
           "F^-0.5",
           fmt::format("F^{:.5f} +- {:.5f} (the colour farthest off)", worst.value, worst.standard_error),
           errors_off(worst) <= confidence_errors,
@@ -76,25 +44,29 @@ Finding size_law(const std::vector<Colour>& colours, const std::string& scenario
           Finding::Kind::check};
 }
 
+namespace {
+
 /// Returns the size of a colour's sampled ellipse of one deviation at a level.
 double sampled_size(const Cloud& cloud) { return size_of(principal_ellipse(cloud.sampled, 1)); }
 
-Finding ellipses_grow(const std::vector<Colour>& colours, const std::string& scenario) {
+}  // namespace
+
+Finding ellipses_grow(const std::vector<Colour>& colours, const ColourSet& set) {
   double least = std::numeric_limits<double>::infinity(), most = 0;
   for (const Colour& colour : colours) {
     const double factor = sampled_size(colour.clouds.back()) / sampled_size(colour.clouds.front());
     least = std::min(least, factor);
     most = std::max(most, factor);
   }
-  return {"chromaticity-clouds/size-" + scenario,
-          "ellipses grow as light falls, " + colours_of(scenario),
+  return {"chromaticity-clouds/size-" + set.id,
+          "ellipses grow as light falls, " + set.text,
           "grow",
           fmt::format("{:.1e} to {:.1e} times from 1 W to 6e-15 W", least, most),
           least > 1,
           fmt::format("sampled ellipses of {} colours", colours.size())};
 }
 
-Finding orientation(const std::vector<Colour>& colours, const std::string& scenario) {
+Finding orientation(const std::vector<Colour>& colours, const ColourSet& set) {
   double worst_errors = 0, worst_deg = 0, drift_deg = 0;
   for (const Colour& colour : colours) {
     const double bright = principal_ellipse(colour.clouds.front().predicted, 1).inclination_deg;
@@ -108,8 +80,8 @@ Finding orientation(const std::vector<Colour>& colours, const std::string& scena
       drift_deg = std::max(drift_deg, off(cloud.predicted));
     }
   }
-  return {"chromaticity-clouds/orientation-" + scenario,
-          "the ellipses' orientation does not change with light, " + colours_of(scenario),
+  return {"chromaticity-clouds/orientation-" + set.id,
+          "the ellipses' orientation does not change with light, " + set.text,
           "constant",
           fmt::format("within {:.1f} standard errors ({:.1f} degrees) at all levels", worst_errors, worst_deg),
           worst_errors <= confidence_errors,
@@ -118,7 +90,7 @@ Finding orientation(const std::vector<Colour>& colours, const std::string& scena
                       drift_deg)};
 }
 
-Finding covariance(const std::vector<Colour>& colours, const std::string& scenario) {
+Finding covariance(const std::vector<Colour>& colours, const ColourSet& set) {
   double worst = 0;
   for (const Colour& colour : colours) {
     for (const Cloud& cloud : colour.clouds) {
@@ -126,14 +98,16 @@ Finding covariance(const std::vector<Colour>& colours, const std::string& scenar
           worst, worst_covariance_error(cloud.sampled.covariance, cloud.predicted.covariance, cloud.samples.size()));
     }
   }
-  return {"chromaticity-clouds/covariance-" + scenario,
-          "clouds are those of independent Poisson bins, " + colours_of(scenario),
+  return {"chromaticity-clouds/covariance-" + set.id,
+          "clouds are those of independent Poisson bins, " + set.text,
           "0 standard errors",
           fmt::format("{:.1f} standard errors at most", worst),
           worst <= confidence_errors,
           "each entry of each covariance against the first-order prediction",
           Finding::Kind::check};
 }
+
+namespace {
 
 bool is_one_of(const std::string& name, std::initializer_list<std::string_view> families) {
   return std::ranges::any_of(families, [&](std::string_view family) { return name.starts_with(family); });
@@ -165,21 +139,26 @@ Family family_of(const std::vector<Colour>& chips, std::initializer_list<std::st
   return out;
 }
 
-std::vector<Finding> blue_and_red(const std::vector<Colour>& chips) {
+}  // namespace
+
+std::vector<Finding> blue_and_red(const std::vector<Colour>& chips, const ColourSet& set) {
   const Family blue = family_of(chips, {"5B_", "5PB_", "2p5P_"});
   const Family red = family_of(chips, {"10R_", "10RP_", "7p5YR_"});
-  const std::string claim = "bluish patches have smaller ellipses than reddish ones (scenario II), ";
+  const std::string claim = "bluish patches have smaller ellipses than reddish ones, " + set.text + ", ";
+  const std::string id = "chromaticity-clouds/blue-and-red" + set.cones;
   return {
-      {"chromaticity-clouds/blue-and-red", claim + "in the mean", "smaller",
+      {id, claim + "in the mean", "smaller",
        fmt::format("{:.4f} bluish, {:.4f} reddish at 6e-15 W", blue.mean, red.mean), blue.mean < red.mean,
        "one predicted standard deviation in xy; bluish 5B, 5PB, 2.5P, reddish 10R, 10RP, 7.5YR"},
-      {"chromaticity-clouds/blue-and-red-each", claim + "each of them", "smaller",
+      {id + "-each", claim + "each of them", "smaller",
        fmt::format("largest bluish {:.4f}, smallest reddish {:.4f}", blue.largest.size, red.smallest.size),
        blue.largest.size < red.smallest.size,
        fmt::format("{} against {}, at equal radiant power after reflection; sampled ellipses have standard errors of "
                    "{:.4f} and {:.4f}",
                    blue.largest.name, red.smallest.name, blue.largest.error, red.smallest.error)}};
 }
+
+namespace {
 
 Series drawn(const std::string& name, const XyEllipse& e, Mark mark) {
   Series out{name, {}, {}, mark};
@@ -225,6 +204,8 @@ Plot cloud_plot(const Colour& white) {
   return plot;
 }
 
+}  // namespace
+
 Plot chip_plot(const std::string& id, const std::string& title, const std::vector<Colour>& chips) {
   Plot plot{id, title + " at 6e-15 W, and MacAdam's ellipses", "x", "y"};
   plot.equal_scales = true;
@@ -236,6 +217,8 @@ Plot chip_plot(const std::string& id, const std::string& title, const std::vecto
       "One standard deviation of each colour's chromaticity; MacAdam's standard deviations drawn ten times as large.";
   return plot;
 }
+
+namespace {
 
 Plot size_plot(const std::vector<Colour>& chips) {
   Plot plot{"chromaticity-clouds-size", "Size of the ellipses", "F [W]",
@@ -252,20 +235,8 @@ Plot size_plot(const std::vector<Colour>& chips) {
   return plot;
 }
 
-std::vector<Colour> colours_under(const Spectrum& light, SpectrumSet set) {
-  std::vector<Colour> out;
-  for (const NamedSpectrum& chip : spectra_of(set)) {
-    out.push_back({std::string(chip.name), reflected(light, chip.spectrum), {}});
-  }
-  return out;
-}
-
-/// Reports on the reflectances of the ColorChecker, the colours of MetaCow's animals: the image and the spectra of its
-/// metameric halves are not bundled.
-std::vector<Finding> checker_findings(const std::vector<Colour>& checker) {
-  std::vector<Finding> out{size_law(checker, colour_checker), orientation(checker, colour_checker)};
-  for (Finding& finding : out) finding.kind = Finding::Kind::check;
-  return out;
+CloudDraws draws_of_chips(const RunOptions& options) {
+  return {options.seed, frames_of_clouds_ii, options.quick ? 60u : 200u};
 }
 
 }  // namespace
@@ -273,27 +244,26 @@ std::vector<Finding> checker_findings(const std::vector<Colour>& checker) {
 Result<Outcome> run_chromaticity_clouds(const RunOptions& options) {
   const Spectrum light = *light_named("E");
   std::vector<Colour> white{{"equi-energy", light, {}}}, chips = colours_under(light, SpectrumSet::munsell_ten);
-  std::vector<Colour> checker = colours_under(light, SpectrumSet::colorchecker);
-  const auto first = sample_colours(white, frames_of_clouds_i, options.quick ? 50 : 100, options.seed);
+  const Observer observer = standard_observer();
+  const auto first = sample_colours(white, observer, {options.seed, frames_of_clouds_i, options.quick ? 50u : 100u});
   if (!first) return tl::make_unexpected(first.error());
-  const std::uint32_t samples = options.quick ? 60 : 200;
-  const auto second = sample_colours(chips, frames_of_clouds_ii, samples, options.seed);
+  const CloudDraws draws = draws_of_chips(options);
+  const auto second = sample_colours(chips, observer, draws);
   if (!second) return tl::make_unexpected(second.error());
-  const auto third = sample_colours(checker, frames_of_checker, samples, options.seed);
-  if (!third) return tl::make_unexpected(third.error());
   Outcome out;
-  out.findings = {ellipses_grow(white, "I"),  size_law(white, "I"),  orientation(white, "I"),  covariance(white, "I"),
-                  ellipses_grow(chips, "II"), size_law(chips, "II"), orientation(chips, "II"), covariance(chips, "II")};
-  for (const auto& more :
-       {error_findings(white.front()), blue_and_red(chips), pooled_findings(chips), checker_findings(checker)}) {
+  out.findings = {ellipses_grow(white, scenario_i), size_law(white, scenario_i),       orientation(white, scenario_i),
+                  covariance(white, scenario_i),    ellipses_grow(chips, scenario_ii), size_law(chips, scenario_ii),
+                  orientation(chips, scenario_ii),  covariance(chips, scenario_ii)};
+  for (const auto& more : {error_findings(white.front()), blue_and_red(chips, scenario_ii), pooled_findings(chips)}) {
     out.findings.insert(out.findings.end(), more.begin(), more.end());
   }
-  out.plots = {cloud_plot(white.front()),
-               error_plot(white.front()),
-               chip_plot("chromaticity-clouds-II", "Ten Munsell chips", chips),
-               chip_plot("chromaticity-clouds-checker", "24 ColorChecker reflectances", checker),
-               size_plot(chips),
-               pooled_plot(chips)};
+  out.plots = {cloud_plot(white.front()), error_plot(white.front()),
+               chip_plot("chromaticity-clouds-II", "Ten Munsell chips", chips), size_plot(chips), pooled_plot(chips)};
+  for (const auto& run : {cone_clouds(chips, draws), metameric_clouds(options)}) {
+    if (!run) return tl::make_unexpected(run.error());
+    out.findings.insert(out.findings.end(), run->findings.begin(), run->findings.end());
+    out.plots.insert(out.plots.end(), run->plots.begin(), run->plots.end());
+  }
   return out;
 }
 

@@ -1,4 +1,4 @@
-#include "isp/reproduce/chromaticity_clouds.h"
+#include "isp/reproduce/clouds/chromaticity_clouds.h"
 
 #include <gtest/gtest.h>
 
