@@ -74,9 +74,9 @@ bool has(const PublishedPair& pair, std::string_view model) { return pair.first 
 /// Returns the reason why the values computed here differ.
 std::string note_on(const Agreement& a) {
   if (has(a.pair, "cao")) {
-    return "the scale of Cao's rods is not published; the weights end at 0.1 cd/m2 and are kept below, where the "
+    return "the scale of Cao's rods is not published; the weights end at 0.1 cd/m2 and are held below, where the "
            "thesis "
-           "met negative chromaticities and these are none";
+           "extrapolated them: see mesopic-tracks/cao-extrapolated";
   }
   if (has(a.pair, "khan_pattanaik")) {
     return "Khan & Pattanaik leave luminance and the mixture with daylight open: both are ours";

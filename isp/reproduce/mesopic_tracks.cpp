@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/reproduce/cao_extrapolation.h"
 #include "isp/reproduce/mesopic_agreement.h"
 #include "isp/reproduce/reproduce.h"
 
@@ -154,7 +155,9 @@ Result<Outcome> run_mesopic_tracks(const RunOptions& /*options*/) {
       cao_is_far(*all, spectral_model,
                  "Eq. 5.1 as printed turns the patch greenish, as Cao's model does; with whites kept "
                  "white Cao is the farther"));
-  for (const Finding& finding : ends_of_tracks(*tracks)) out.findings.push_back(finding);
+  for (const auto& more : {cao_extrapolation_findings(chips, *tracks), ends_of_tracks(*tracks)}) {
+    out.findings.insert(out.findings.end(), more.begin(), more.end());
+  }
   for (const AppearanceTracks& model : *tracks) {
     out.plots.push_back(track_plot("mesopic-tracks-" + model.model, model, chips));
   }
