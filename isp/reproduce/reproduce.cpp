@@ -30,16 +30,16 @@ constexpr std::array registry{
 };
 
 constexpr std::array left_out{
-    NotReproduced{"clouds by cones (Eq. 3.9, 3.10)",
-                  "the colour-matching functions of CIE 1931 are used: cones that are linear combinations of them give "
-                  "the same chromaticities"},
-    NotReproduced{"MetaCow (Fig. 3-4, 3-7, 3-8)",
-                  "neither the image nor the spectra of its metameric halves are bundled; chromaticity-clouds plots "
-                  "the ellipses of 24 ColorChecker reflectances, the colours of its other halves, instead"},
+    NotReproduced{
+        "MetaCow's image and the second halves of its objects (Fig. 3-4, 3-7, 3-8)",
+        "its spectra are published for research only and are not bundled: the first halves are 24 ColorChecker "
+        "reflectances, and the smoothest lights of the same colours under D65 stand for the second halves, "
+        "whose difference under illuminant A is the largest possible"},
     NotReproduced{"the thesis' 598 spectra, its seven pictures, Shin's table of coefficients",
                   "they are not public: README.md of isp/reproduce names the substitutes"},
-    NotReproduced{"Cao's model below 0.1 cd/m2 as in Tables 5-1 and 5-2",
-                  "its weights end there; how the thesis extrapolates them is not known"},
+    NotReproduced{"the extrapolation of Cao's weights below 0.1 cd/m2 in Table 5-1",
+                  "it is not published; none of three extrapolations in either direction gives the published figures: "
+                  "see mesopic-tracks/cao-extrapolated"},
     NotReproduced{"observers' judgements of retargeted pictures", "lowlux computes, it asks no observers"},
 };
 
