@@ -176,6 +176,7 @@ std::optional<double> negative_from_cd_m2(const CaoReading& reading, std::span<c
 std::vector<Finding> cao_extrapolation_findings(const std::vector<NamedSpectrum>& chips,
                                                 std::span<const AppearanceTracks> tracks) {
   std::vector<Xyz> colours;
+  colours.reserve(chips.size());
   for (const NamedSpectrum& chip : chips) colours.push_back(*xyz_of_reflectance(chip.spectrum, *light_named("E")));
   std::vector<Finding> out{negative_as_appearance(colours), negative_as_compensation(colours)};
   const auto patch =
