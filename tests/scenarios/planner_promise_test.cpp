@@ -108,7 +108,7 @@ Judged judged(const test::PlannerScene& scene, const Developed& planned, const D
   return out;
 }
 
-// Frames of 3.5 MP are sampled, those of 26 MP rendered in tiles. Scene 15 of 6.3 MP is planned by regions.
+// Frames of 3.5 MP are sampled, those of 26 MP rendered in tiles. Scene 24 of 6.3 MP is planned by regions.
 TEST(PlannerPromise, LargeFramesKeepItForLinesAndSinglePixelsToo) {
   const bool nightly = std::getenv("LOWLUX_NIGHTLY") != nullptr;
   const std::uint32_t scenes = nightly ? 160 : 16;
@@ -119,15 +119,16 @@ TEST(PlannerPromise, LargeFramesKeepItForLinesAndSinglePixelsToo) {
   for (std::uint32_t i = 0; i < scenes; ++i) {
     const bool tiled = i % 16 == 9;
     const Size size = tiled ? Size{6272, 4160} : i % 16 == 15 ? Size{3072, 2048} : Size{};
-    const test::PlannerScene scene = test::planner_scene(i, size.width, size.height, executor);
+    const std::uint32_t index = i % 16 == 15 ? i + 9 : i;
+    const test::PlannerScene scene = test::planner_scene(index, size.width, size.height, executor);
     const Developed planned = developed(scene, false), everything = developed(scene, true);
     branches.count(planned.plan);
     const Judged by = judged(scene, planned, everything);
-    std::printf("  scene %2u%s: of the tolerance %.2f in 8 x 8, %.2f along lines; single pixels %.2f of %zu\n", i,
+    std::printf("  scene %2u%s: of the tolerance %.2f in 8 x 8, %.2f along lines; single pixels %.2f of %zu\n", index,
                 tiled ? ", tiled" : "", by.seen, by.lines, by.pixels, everything.plan.levels.defects.size());
-    EXPECT_LT(by.seen, 1) << "scene " << i;
-    EXPECT_LT(by.lines, 1) << "scene " << i;
-    EXPECT_LT(by.pixels, 2) << "scene " << i;
+    EXPECT_LT(by.seen, 1) << "scene " << index;
+    EXPECT_LT(by.lines, 1) << "scene " << index;
+    EXPECT_LT(by.pixels, 2) << "scene " << index;
   }
   std::printf("  sampled %d, tiled %d, by regions %d, from codes %d, lines taken %d, left %d, with defects %d\n",
               branches.sampled, branches.tiled, branches.by_regions, branches.from_codes, branches.lines_taken,
