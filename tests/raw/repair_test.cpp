@@ -62,7 +62,8 @@ TEST(FindDefects, KeepsStarsWhereverTheyFallOnTheGrid) {
     for (const double peak : {300.0, 1000.0, 3500.0}) {
       for (int step = 0; step < 16; ++step) {
         RawDn raw = dark_sky(100 + step);
-        add_star(raw, 40 + 0.25 * (step % 4), 41 + 0.25 * (step / 4), fwhm, peak);
+        const int column = step % 4, row = step / 4;
+        add_star(raw, 40 + 0.25 * column, 41 + 0.25 * row, fwhm, peak);
         EXPECT_TRUE(defects_of(raw).empty()) << "fwhm " << fwhm << " peak " << peak << " step " << step;
       }
     }
