@@ -78,8 +78,8 @@ void apply_colour_table(const ColourTable& table, const RgbView<const float>& in
                         Executor& executor);
 
 /// Holds the ratio of signal to noise at the centres of cells of 4 x 4 pixels, as of LookGrid, linear between them. The
-/// inverse of what a table has for its levels is bounded where there is no light: a dark cell does not grey those next
-/// to it.
+/// levels of a table are ratios of noise to signal, which are infinite in cells without light; interpolated, they would
+/// turn the pixels of neighbouring cells grey.
 struct NoiseGrid {
   PlaneView<const float> signal_to_noise;  // not NaN; negative counts as 0
 };

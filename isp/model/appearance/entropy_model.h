@@ -47,7 +47,7 @@ struct EntropyOptions {
   ConeSet cones = ConeSet::stockman_sharpe_2000;
   PixelPower power = PixelPower::lifted;
   std::optional<double> gamma_fixed;        // 2 is the thesis' run without adaptation (Table 5-2)
-  std::optional<Matrix3> noise_covariance;  // of X, Y and Z as in ColourNoise; absent: there is no noise
+  std::optional<Matrix3> noise_covariance;  // of X, Y and Z as in ColourNoise; absent: without noise
 };
 
 /// Returns the weight of entropy, gamma = 2 (1 - m), at least 1e-4; m in 0..1 as in mesopic.h.

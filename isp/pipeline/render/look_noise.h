@@ -16,7 +16,7 @@ void noise_of_luminance(const DevelopPlan& plan, const RawDn& raw, const NoiseMa
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor);
 
 /// Computes NoiseGrid from the result of noise_of_luminance: the mean luminance of each cell over the standard
-/// deviation of its pixels' noise, 0 where there is no light and at most 1e6.
+/// deviation of its pixels' noise, 0 for cells without light and at most 1e6.
 /// @param out  as `variance`
 void signal_to_noise(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<const float> variance,
                      PlaneView<float> out, Executor& executor);
