@@ -17,6 +17,7 @@
 #include "tests/hard_cases/hard_case.h"
 #include "tests/hard_cases/model_pictures.h"
 #include "tests/reference/exact_ref.h"
+#include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
 // Models of appearance: sections 2 to 4 of the mesopic specification.
@@ -24,11 +25,11 @@ namespace lowlux::hard_cases {
 namespace {
 
 using isp::Xyz;
+using test::inf;
+using test::nan;
 
-constexpr std::string_view group = "Mesopic vision";
+constexpr std::string_view appearance_group = "Mesopic vision";
 constexpr double eps = std::numeric_limits<double>::epsilon();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
 const Matrix3 srgb_to_xyz{{{0.4124, 0.3576, 0.1805}, {0.2126, 0.7152, 0.0722}, {0.0193, 0.1192, 0.9505}}};
 
 double relative(double found, double expected) {
@@ -36,7 +37,7 @@ double relative(double found, double expected) {
 }
 
 TEST(HardCaseMesopic, HuntsRodSignal) {
-  model_row({group, "2.1 Hunt: L_AS of 1e-9 to 1e4, none, below 1600 K, S below 0",
+  model_row({appearance_group, "2.1 Hunt: L_AS of 1e-9 to 1e4, none, below 1600 K, S below 0",
              "50 digits; 1 - j^2 cancels to 4 eps / (2 u / 1e-5), to the fourth", "relative to 16 eps"},
             {1, rounding}, [](Denormals m) {
               const auto found = [&](double l_as, double s) {
@@ -53,7 +54,8 @@ TEST(HardCaseMesopic, HuntsRodSignal) {
 }
 
 TEST(HardCaseMesopic, KwaksPower) {
-  model_row({group, "2.2 Kwak: cones from -100 to 1e9, odd", "50 digits; power 0.42 of a double", "relative to 16 eps"},
+  model_row({appearance_group, "2.2 Kwak: cones from -100 to 1e9, odd", "50 digits; power 0.42 of a double",
+             "relative to 16 eps"},
             {1, rounding}, [](Denormals m) {
               double worst = 0;
               for (const double cone : {-100.0, -1e-9, 0.0, 1e-30, 1e-9, 1.0, 100.0, 1e9}) {
@@ -68,8 +70,8 @@ TEST(HardCaseMesopic, KwaksPower) {
 
 // Without rods both signals vanish with light, and their ratio does not.
 TEST(HardCaseMesopic, KwaksLightnessWithoutRods) {
-  model_row({group, "2.2 Kwak: lightness at alpha 0 and F_L of 1e-15 to 1, negative cones", "responses in 50 digits",
-             "relative to 16 eps"},
+  model_row({appearance_group, "2.2 Kwak: lightness at alpha 0 and F_L of 1e-15 to 1, negative cones",
+             "responses in 50 digits", "relative to 16 eps"},
             {1, rounding}, [](Denormals m) {
               constexpr Vector3 white{95, 101, 108};
               const double power = 0.69 * (1.48 + std::sqrt(0.2));
@@ -94,8 +96,8 @@ TEST(HardCaseMesopic, KwaksLightnessWithoutRods) {
 }
 
 TEST(HardCaseMesopic, KhansResponseAndItsInverse) {
-  model_row({group, "2.3 Khan: intensities of 1e-12 to 1e3, none, and back", "50 digits, and the intensity itself",
-             "relative to 64 eps"},
+  model_row({appearance_group, "2.3 Khan: intensities of 1e-12 to 1e3, none, and back",
+             "50 digits, and the intensity itself", "relative to 64 eps"},
             {1, rounding}, [](Denormals m) {
               const auto rods = in_mode(m, [] { return isp::khan_rods(0.03); });
               double worst = std::abs(in_mode(m, [&] { return isp::khan_response(rods, -1); }));
@@ -113,26 +115,26 @@ TEST(HardCaseMesopic, KhansResponseAndItsInverse) {
 
 // Conditions of 15 to 17, twice, which add up: rounding seldom takes the worst direction of both.
 TEST(HardCaseMesopic, CaosMatricesThereAndBack) {
-  model_row(
-      {group, "2.4 Cao: 1e-4 to 100 cd/m2 and back, condition 17", "closed form: the identity", "largest element off"},
-      {17 * 2 * eps, rounding}, [](Denormals m) {
-        const auto receptors = isp::cao_receptors(srgb_to_xyz, isp::scotopic_weights);
-        double worst = 0;
-        for (const double from : {1e-4, 0.1, 0.3, 2.0, 100.0}) {
-          const auto there = in_mode(m, [&] { return *isp::cao_retargeting(from, 1, receptors); });
-          const auto back = in_mode(m, [&] { return *isp::cao_retargeting(1, from, receptors); });
-          const Matrix3 one = reference::product(back, there);
-          for (int i = 0; i < 3; ++i) {
-            for (int j = 0; j < 3; ++j) keep_worst(worst, std::abs(one[i][j] - (i == j ? 1 : 0)));
-          }
-        }
-        return worst;
-      });
+  model_row({appearance_group, "2.4 Cao: 1e-4 to 100 cd/m2 and back, condition 17", "closed form: the identity",
+             "largest element off"},
+            {17 * 2 * eps, rounding}, [](Denormals m) {
+              const auto receptors = isp::cao_receptors(srgb_to_xyz, isp::scotopic_weights);
+              double worst = 0;
+              for (const double from : {1e-4, 0.1, 0.3, 2.0, 100.0}) {
+                const auto there = in_mode(m, [&] { return *isp::cao_retargeting(from, 1, receptors); });
+                const auto back = in_mode(m, [&] { return *isp::cao_retargeting(1, from, receptors); });
+                const Matrix3 one = reference::product(back, there);
+                for (int i = 0; i < 3; ++i) {
+                  for (int j = 0; j < 3; ++j) keep_worst(worst, std::abs(one[i][j] - (i == j ? 1 : 0)));
+                }
+              }
+              return worst;
+            });
 }
 
 TEST(HardCaseMesopic, WanatsExponentAndLuminance) {
-  model_row({group, "2.5 Wanat: no light, negative channels, exponents held to 0..4", "closed form: luminance stays",
-             "relative to 4 eps"},
+  model_row({appearance_group, "2.5 Wanat: no light, negative channels, exponents held to 0..4",
+             "closed form: luminance stays", "relative to 4 eps"},
             {1, rounding}, [](Denormals m) {
               const Vector3 weights{0.2126, 0.7152, 0.0722};
               double worst = 0;
@@ -156,7 +158,8 @@ TEST(HardCaseMesopic, WanatsExponentAndLuminance) {
 }
 
 TEST(HardCaseMesopic, MikamoInTheDark) {
-  model_row({group, "2.8 Mikamo: 0 Td, powers of 0", "closed form: the coefficients of 1e-4 Td", "largest difference"},
+  model_row({appearance_group, "2.8 Mikamo: 0 Td, powers of 0", "closed form: the coefficients of 1e-4 Td",
+             "largest difference"},
             0, [](Denormals m) {
               const auto zero = in_mode(m, [] { return isp::mikamo_coefficients(0); });
               const auto least = in_mode(m, [] { return isp::mikamo_coefficients(1e-4); });
@@ -172,27 +175,27 @@ TEST(HardCaseMesopic, MikamoInTheDark) {
 
 // Compression by the power 0.7 of what is near its floor: an error of R is that of I times R / (0.7 I).
 TEST(HardCaseMesopic, Icam06AndBack) {
-  model_row(
-      {group, "2.9 iCAM06: white of 1e-6 to 1e4 cd/m2 and back", "closed form: the colour itself", "relative to white"},
-      {1.5e-11, rounding}, [](Denormals m) {
-        double worst = 0;
-        for (const double white : {1e-6, 1e-3, 0.1, 10.0, 1e4}) {
-          const isp::Icam06State state{white, white};
-          for (const Vector3& rgb : {Vector3{0.5, 0.2, 0.1}, {1, 1, 1}, {0, 0, 0}, {1e-3, 1e-3, 2e-3}}) {
-            Vector3 xyz = srgb_to_xyz * rgb;
-            for (double& v : xyz) v *= white;
-            const Vector3 back =
-                in_mode(m, [&] { return isp::icam06_expand(isp::icam06_compress(xyz, state).xyz_tc, state); });
-            for (int i = 0; i < 3; ++i) keep_worst(worst, std::abs(back[i] - xyz[i]) / white);
-          }
-        }
-        return worst;
-      });
+  model_row({appearance_group, "2.9 iCAM06: white of 1e-6 to 1e4 cd/m2 and back", "closed form: the colour itself",
+             "relative to white"},
+            {1.5e-11, rounding}, [](Denormals m) {
+              double worst = 0;
+              for (const double white : {1e-6, 1e-3, 0.1, 10.0, 1e4}) {
+                const isp::Icam06State state{white, white};
+                for (const Vector3& rgb : {Vector3{0.5, 0.2, 0.1}, {1, 1, 1}, {0, 0, 0}, {1e-3, 1e-3, 2e-3}}) {
+                  Vector3 xyz = srgb_to_xyz * rgb;
+                  for (double& v : xyz) v *= white;
+                  const Vector3 back =
+                      in_mode(m, [&] { return isp::icam06_expand(isp::icam06_compress(xyz, state).xyz_tc, state); });
+                  for (int i = 0; i < 3; ++i) keep_worst(worst, std::abs(back[i] - xyz[i]) / white);
+                }
+              }
+              return worst;
+            });
 }
 
 // The fit stops at a gradient of 1e-10 (spec 3.2).
 TEST(HardCaseMesopic, EntropyOfWhatNoSpectrumGives) {
-  model_row({group, "3.2 largest entropy: moments outside the hull, rods alone, gamma 1e-4",
+  model_row({appearance_group, "3.2 largest entropy: moments outside the hull, rods alone, gamma 1e-4",
              "its gradient in 50 digits", "gradient"},
             {1e-10, rounding}, [](Denormals m) {
               isp::NodePower even{};
@@ -217,7 +220,8 @@ TEST(HardCaseMesopic, EntropyOfWhatNoSpectrumGives) {
 // Noise from a thousandth to a thousand times the signal, equal in R, G and B behind the matrix of sRGB.
 TEST(HardCaseMesopic, EntropyOfNoisyPixels) {
   model_row(
-      {group, "spectral model: noise of 1e-3 to 1e3 times the signal", "its gradient in 50 digits", "gradient"},
+      {appearance_group, "spectral model: noise of 1e-3 to 1e3 times the signal", "its gradient in 50 digits",
+       "gradient"},
       {1e-10, rounding}, [](Denormals m) {
         isp::NodePower even{};
         even.fill(1);
@@ -243,7 +247,7 @@ TEST(HardCaseMesopic, EntropyOfNoisyPixels) {
 }
 
 TEST(HardCaseMesopic, EveryModelKeepsFiniteColoursFinite) {
-  HardCase row({group, "every model: black, negative, 1e-300 and 1e300, in light of 1e-11 to 1e12 cd/m2",
+  HardCase row({appearance_group, "every model: black, negative, 1e-300 and 1e300, in light of 1e-11 to 1e12 cd/m2",
                 "finite figures", "answers that are not; pictures with other numbers (file)"});
   row.on(Path::reference, 0, [](Denormals m) {
     double wrong = 0;
@@ -272,7 +276,7 @@ TEST(HardCaseMesopic, EveryModelKeepsFiniteColoursFinite) {
 }
 
 TEST(HardCaseMesopic, PicturesAreWhatTheModelsSay) {
-  HardCase row({group, "tables of models: every one of `develop --look`, 768 colours at 0.05 and 2 cd/m2",
+  HardCase row({appearance_group, "tables of models: every one of `develop --look`, 768 colours at 0.05 and 2 cd/m2",
                 "the table in plain double (sets); the model itself, from which a hundredth may be farther off (file)",
                 "relative (sets), CIEDE2000 (file)"});
   row.none(Path::reference, "is the oracle").none(levels, "looks come after");

@@ -29,7 +29,7 @@ namespace {
 
 using isp::Lab;
 
-constexpr std::string_view group = "Colour and light";
+constexpr std::string_view colour_group = "Colour and light";
 constexpr std::string_view no_picture = "a measure of pictures, none itself";
 constexpr double eps = std::numeric_limits<double>::epsilon();
 
@@ -41,7 +41,7 @@ void figures_row(const About& about, const Bound& bound, const Measure& measure,
 
 TEST(HardCaseColour, FrequencyOfSeeingWhereItIsTiny) {
   figures_row(
-      {group, "probability of seeing from 1e-180 up", "sum of Poisson terms in 50 digits", "relative"},
+      {colour_group, "probability of seeing from 1e-180 up", "sum of Poisson terms in 50 digits", "relative"},
       {2e-14, rounding},
       [](Denormals m) {
         double worst = 0;
@@ -59,7 +59,7 @@ TEST(HardCaseColour, FrequencyOfSeeingWhereItIsTiny) {
 // Both tails at any light; the means are rounded before: a last digit of 400 moves the tail beyond 430 by 1e-14 of it.
 TEST(HardCaseColour, SeeingAPatchAtAnyLight) {
   figures_row(
-      {group, "probability of seeing a patch in 1e-9 to 1e9 cd/m2", "two sums of Poisson terms in 50 digits",
+      {colour_group, "probability of seeing a patch in 1e-9 to 1e9 cd/m2", "two sums of Poisson terms in 50 digits",
        "relative"},
       {1e-13, rounding},
       [](Denormals m) {
@@ -83,40 +83,40 @@ TEST(HardCaseColour, SeeingAPatchAtAnyLight) {
 
 // Hue angles near their branches: errors of an atan2 of 1e-16 over chroma; 1e-13 of what is 7 or less elsewhere.
 TEST(HardCaseColour, Ciede2000AtItsBranches) {
-  figures_row({group, "5.3 CIEDE2000: opposite hues, grey, blue's turn, 27 x 27 colours", "50 digits", "CIEDE2000"},
-              {5e-13, rounding}, [](Denormals m) {
-                std::vector<std::pair<Lab, Lab>> pairs{{{50, 2.49, -0.001}, {50, -2.49, 0.0009}},
-                                                       {{50, 2.49, -0.001}, {50, -2.49, 0.0011}},
-                                                       {{50, -0.001, 2.49}, {50, 0.0009, -2.49}},
-                                                       {{50, -0.001, 2.49}, {50, 0.0011, -2.49}},
-                                                       {{50, 0, 0}, {50, -1, 2}},
-                                                       {{50, 2.5, 0}, {50, 0, -2.5}},
-                                                       {{0, 0, 0}, {100, 0, 0}},
-                                                       {{22.7233, 20.0904, -46.694}, {23.0331, 14.973, -42.5619}}};
-                std::vector<Lab> colours;
-                colours.reserve(27);
-                colours.reserve(27);
-                for (const double l : {0.0, 40.0, 90.0}) {
-                  for (const double a : {-70.0, 0.0, 55.0}) {
-                    for (const double b : {-110.0, 0.0, 75.0}) colours.push_back({l, a, b});
-                  }
-                }
-                for (const Lab& first : colours) {
-                  // Opposite hues exactly have two mean hues; rounding chooses, and either is right.
-                  for (const Lab& second : colours)
-                    pairs.push_back({first, {second.l, second.a + 1.3, second.b + 0.7}});
-                }
-                double worst = 0;
-                for (const auto& [first, second] : pairs) {
-                  const double found = in_mode(m, [&, a = first, b = second] { return isp::ciede2000(a, b); });
-                  keep_worst(worst, std::abs(found - reference::ciede2000(first, second)));
-                }
-                return worst;
-              });
+  figures_row(
+      {colour_group, "5.3 CIEDE2000: opposite hues, grey, blue's turn, 27 x 27 colours", "50 digits", "CIEDE2000"},
+      {5e-13, rounding}, [](Denormals m) {
+        std::vector<std::pair<Lab, Lab>> pairs{{{50, 2.49, -0.001}, {50, -2.49, 0.0009}},
+                                               {{50, 2.49, -0.001}, {50, -2.49, 0.0011}},
+                                               {{50, -0.001, 2.49}, {50, 0.0009, -2.49}},
+                                               {{50, -0.001, 2.49}, {50, 0.0011, -2.49}},
+                                               {{50, 0, 0}, {50, -1, 2}},
+                                               {{50, 2.5, 0}, {50, 0, -2.5}},
+                                               {{0, 0, 0}, {100, 0, 0}},
+                                               {{22.7233, 20.0904, -46.694}, {23.0331, 14.973, -42.5619}}};
+        std::vector<Lab> colours;
+        colours.reserve(27);
+        colours.reserve(27);
+        for (const double l : {0.0, 40.0, 90.0}) {
+          for (const double a : {-70.0, 0.0, 55.0}) {
+            for (const double b : {-110.0, 0.0, 75.0}) colours.push_back({l, a, b});
+          }
+        }
+        for (const Lab& first : colours) {
+          // Opposite hues exactly have two mean hues; rounding chooses, and either is right.
+          for (const Lab& second : colours) pairs.push_back({first, {second.l, second.a + 1.3, second.b + 0.7}});
+        }
+        double worst = 0;
+        for (const auto& [first, second] : pairs) {
+          const double found = in_mode(m, [&, a = first, b = second] { return isp::ciede2000(a, b); });
+          keep_worst(worst, std::abs(found - reference::ciede2000(first, second)));
+        }
+        return worst;
+      });
 }
 
 TEST(HardCaseColour, CielabOfNegativeLight) {
-  figures_row({group, "5 CIELAB of negative, zero, tiny, 1e6 times white", "50 digits: the line goes on below 0",
+  figures_row({colour_group, "5 CIELAB of negative, zero, tiny, 1e6 times white", "50 digits: the line goes on below 0",
                "relative to 8 eps"},
               {1, rounding}, [](Denormals m) {
                 double worst = 0;
@@ -130,52 +130,52 @@ TEST(HardCaseColour, CielabOfNegativeLight) {
 }
 
 TEST(HardCaseColour, ChromaAloneHasNoHueDifference) {
-  figures_row(
-      {group, "5.2 Delta E 94c where rounding makes dH^2 negative", "closed form: dC / S_C", "relative to 32 eps"},
-      {1, rounding}, [](Denormals m) {
-        double worst = 0;
-        for (int i = 1; i < 400; ++i) {
-          const double angle = 0.0157 * i, from = 0.37 * i, to = 0.11 * i;
-          const Lab first{50, from * std::cos(angle), from * std::sin(angle)};
-          const Lab second{50, to * std::cos(angle), to * std::sin(angle)};
-          const double found = in_mode(m, [&] { return isp::delta_e_94c(first, second); });
-          keep_worst(worst, std::abs(found / ((from - to) / (1 + 0.045 * from)) - 1) / (32 * eps));
-        }
-        return worst;
-      });
+  figures_row({colour_group, "5.2 Delta E 94c where rounding makes dH^2 negative", "closed form: dC / S_C",
+               "relative to 32 eps"},
+              {1, rounding}, [](Denormals m) {
+                double worst = 0;
+                for (int i = 1; i < 400; ++i) {
+                  const double angle = 0.0157 * i, from = 0.37 * i, to = 0.11 * i;
+                  const Lab first{50, from * std::cos(angle), from * std::sin(angle)};
+                  const Lab second{50, to * std::cos(angle), to * std::sin(angle)};
+                  const double found = in_mode(m, [&] { return isp::delta_e_94c(first, second); });
+                  keep_worst(worst, std::abs(found / ((from - to) / (1 + 0.045 * from)) - 1) / (32 * eps));
+                }
+                return worst;
+              });
 }
 
 TEST(HardCaseColour, DivergencesOfSpectraWithZeros) {
-  figures_row(
-      {group, "5.5 Kullback-Leibler of spectra that are 0 in places", "sum in 50 digits, floors of 1e-12", "relative"},
-      {2e-15, rounding}, [](Denormals m) {
-        const std::vector<double> nm{400, 410, 430, 500, 505, 700};
-        const std::vector<double> p{0, 1, 3, 0, 2, 0.5}, q{1, 0, 0, 2, 1e-300, 4};
-        const Spectrum first = *Spectrum::of(nm, p), second = *Spectrum::of(nm, q);
-        const double found = in_mode(m, [&] { return *isp::kullback_leibler(first, second); });
-        return std::abs(found / reference::kullback_leibler(nm, p, q, 1e-12) - 1);
-      });
+  figures_row({colour_group, "5.5 Kullback-Leibler of spectra that are 0 in places",
+               "sum in 50 digits, floors of 1e-12", "relative"},
+              {2e-15, rounding}, [](Denormals m) {
+                const std::vector<double> nm{400, 410, 430, 500, 505, 700};
+                const std::vector<double> p{0, 1, 3, 0, 2, 0.5}, q{1, 0, 0, 2, 1e-300, 4};
+                const Spectrum first = *Spectrum::of(nm, p), second = *Spectrum::of(nm, q);
+                const double found = in_mode(m, [&] { return *isp::kullback_leibler(first, second); });
+                return std::abs(found / reference::kullback_leibler(nm, p, q, 1e-12) - 1);
+              });
 }
 
 TEST(HardCaseColour, GamutsWithoutArea) {
-  figures_row(
-      {group, "5.4 gamuts of no area, of one line, of no colour", "closed form: no number, 0", "answers that are not"},
-      0, [](Denormals m) {
-        return in_mode(m, [] {
-          const isp::GamutBins none;
-          const std::vector<isp::Xy> line{{0, 0}, {1, 1}, {2, 2}}, square{{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-          double wrong = isp::convex_hull(line).empty() && isp::hull_area(line) == 0 ? 0 : 1;
-          wrong += isp::shared_area(isp::convex_hull(square), isp::convex_hull(line)) == 0 ? 0 : 1;
-          wrong += std::isnan(isp::gamut_ratio(none, none).occupancy_percent) ? 0 : 1;
-          wrong += std::isnan(isp::gamut_ratio(none, none).convex_percent) ? 0 : 1;
-          return wrong;
-        });
-      });
+  figures_row({colour_group, "5.4 gamuts of no area, of one line, of no colour", "closed form: no number, 0",
+               "answers that are not"},
+              0, [](Denormals m) {
+                return in_mode(m, [] {
+                  const isp::GamutBins none;
+                  const std::vector<isp::Xy> line{{0, 0}, {1, 1}, {2, 2}}, square{{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+                  double wrong = isp::convex_hull(line).empty() && isp::hull_area(line) == 0 ? 0 : 1;
+                  wrong += isp::shared_area(isp::convex_hull(square), isp::convex_hull(line)) == 0 ? 0 : 1;
+                  wrong += std::isnan(isp::gamut_ratio(none, none).occupancy_percent) ? 0 : 1;
+                  wrong += std::isnan(isp::gamut_ratio(none, none).convex_percent) ? 0 : 1;
+                  return wrong;
+                });
+              });
 }
 
 // Single precision: 8 products and sums of values up to 65535, and half a code of rounding.
 TEST(HardCaseColour, RetargetingToADisplayThatIsNearlyDark) {
-  HardCase row({group, "4 retargeted from 250 to 0.05 cd/m2: colours no display shows",
+  HardCase row({colour_group, "4 retargeted from 250 to 0.05 cd/m2: colours no display shows",
                 "tetrahedra in plain double; half a code, and float", "codes of 16 bits"});
   row.none(Path::reference, "is the oracle").none(levels, "pictures are finished");
   isp::RetargetOptions options;
@@ -201,7 +201,7 @@ TEST(HardCaseColour, RetargetingToADisplayThatIsNearlyDark) {
 }
 
 TEST(HardCaseColour, ColoursOutsideTheGamut) {
-  HardCase row({group, "negative and over-white colours moved into the gamut",
+  HardCase row({colour_group, "negative and over-white colours moved into the gamut",
                 "plain double; float, 1e-6 of the largest term", "of white"});
   row.none(Path::reference, "is the oracle").none(levels, "looks come after");
   const isp::RgbTransform transform{

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,18 +12,20 @@
 #include "denoise/lines/line_noise.h"
 #include "isp/base/executor.h"
 #include "tests/hard_cases/mosaics.h"
+#include "tests/support/executors.h"
+#include "tests/support/numbers.h"
 
 // Section 9 of the denoising specification, number by number.
 namespace lowlux::hard_cases {
 namespace {
 
-InlineExecutor executor;
+using test::inf;
+using test::one_thread;
 
 using denoise_testing::Camera;
 using denoise_testing::flat;
 
-constexpr std::string_view group = "Noise reduction";
-constexpr double inf = std::numeric_limits<double>::infinity();
+constexpr std::string_view denoise_group = "Noise reduction";
 
 // No cell weighs more than twice in the mean, so that it changes by one standard error at most, one standard deviation
 // of it: see denoiser_properties_test.cpp. Three times that.
@@ -38,13 +39,14 @@ Camera with_dark(double dark_e, double read_noise_e) {
 }
 
 TEST(HardCaseDenoise1, LightFarBelowTheDarkChargeIsNotRectified) {
-  HardCase row({group, "9.1 less than 1 e- over 200 e- of dark", mean_oracle, "standard errors of the mean"});
+  HardCase row({denoise_group, "9.1 less than 1 e- over 200 e- of dark", mean_oracle, "standard errors of the mean"});
   const MosaicCase c = case_of(with_dark(200, 4), flat(0.3, 0.3, 0.3), 256, 192, 61);
   measure(row, c, mean_bounds, change_of_means(c));
 }
 
 TEST(HardCaseDenoise2, AColourWhoseGainIsAboveThreeHasAThresholdOfItsOwn) {
-  HardCase row({group, "9.2 white balance of blue 4.5", "closed form: noise of a flat falls tenfold in every colour",
+  HardCase row({denoise_group, "9.2 white balance of blue 4.5",
+                "closed form: noise of a flat falls tenfold in every colour",
                 "residual over raw noise of the worst colour"});
   Camera camera = with_dark(2, 1.5);
   camera.white_gain = {1.6, 1, 4.5};
@@ -72,13 +74,14 @@ TEST(HardCaseDenoise3, AnOversubtractedPedestalMovesTheMeanAndNothingElse) {
   c.options.rho = inf;
   for (std::size_t i = 0; i < c.raw_e.size(); ++i) c.raw_e.data()[i] -= 60;
   {
-    HardCase row({group, "9.3 local means below 0: 60 e- too much black", mean_oracle, "standard errors of the mean"});
+    HardCase row(
+        {denoise_group, "9.3 local means below 0: 60 e- too much black", mean_oracle, "standard errors of the mean"});
     // Without light the prior of streams makes colours neutral: each gets the mean of all, five standard errors more.
     measure(row, c, {mean_bound, mean_bound, mean_bound, mean_bound.value + 5}, change_of_means(c));
   }
-  HardCase said({group, "9.3 the same is reported", "what was built in", "remarks that are missing"});
+  HardCase said({denoise_group, "9.3 the same is reported", "what was built in", "remarks that are missing"});
   said.on(Path::reference, 0, [&](Denormals m) {
-    const auto check = in_mode(m, [&] { return denoise::check_noise({c.raw_e.view(), c.phase}, c.noise, executor); });
+    const auto check = in_mode(m, [&] { return denoise::check_noise({c.raw_e.view(), c.phase}, c.noise, one_thread); });
     const auto remarks = denoise::remarks_on(check);
     return !remarks.empty() && remarks[0].finding == denoise::NoiseFinding::black_suspicious ? 0.0 : 1.0;
   });
@@ -88,7 +91,7 @@ TEST(HardCaseDenoise3, AnOversubtractedPedestalMovesTheMeanAndNothingElse) {
 }
 
 TEST(HardCaseDenoise4, ALightBesideTheDarkLeavesNoMoreThanItsOwnNoise) {
-  HardCase row({group, "9.4 variances 1 : 540 within a block",
+  HardCase row({denoise_group, "9.4 variances 1 : 540 within a block",
                 "truth of the scene; bound: the noise of the dark side, which nothing may add to",
                 "rms error of the dark side over the noise of the light"});
   const auto edge = [](int x, int) {
@@ -108,7 +111,7 @@ TEST(HardCaseDenoise4, ALightBesideTheDarkLeavesNoMoreThanItsOwnNoise) {
 
 // Of coefficients of noise, 6.3e-5 lie beyond four standard deviations: they leave 0.034 of it.
 TEST(HardCaseDenoise5, GreensShareTheirParameters) {
-  HardCase row({group, "9.5 flat greens show no maze",
+  HardCase row({denoise_group, "9.5 flat greens show no maze",
                 "closed form: noise of G1 - G2 beyond four deviations, 0.034; half more, borders being counted twice",
                 "residual over raw noise of G1 - G2"});
   const MosaicCase c = case_of(with_dark(20, 1.5), flat(20, 20, 20), 256, 192, 65);
@@ -122,8 +125,8 @@ TEST(HardCaseDenoise5, GreensShareTheirParameters) {
 }
 
 TEST(HardCaseDenoise5, SaturatedFramesAreNeutral) {
-  HardCase row({group, "9.5 every site saturated", "closed form: the largest value of a cell, balanced, in all sites",
-                "relative"});
+  HardCase row({denoise_group, "9.5 every site saturated",
+                "closed form: the largest value of a cell, balanced, in all sites", "relative"});
   MosaicCase c{.raw_e = Plane<float>(150, 97)};
   std::fill_n(c.raw_e.data(), c.raw_e.size(), 1000.0f);
   c.noise = {.variance_e2 = {4, 4, 4}, .saturation_e = {1000, 1000, 1000}};
@@ -142,7 +145,7 @@ TEST(HardCaseDenoise5, SaturatedFramesAreNeutral) {
 }
 
 TEST(HardCaseDenoise6, AStarOfOneCellKeepsItsFlux) {
-  HardCase row({group, "9.6 a star of one cell, 12 times its noise",
+  HardCase row({denoise_group, "9.6 a star of one cell, 12 times its noise",
                 "what was measured; five standard errors of the background, mean of 48 sites", "relative flux"});
   MosaicCase c = case_of(with_dark(2, 1.5), flat(20, 20, 20), 128, 96, 66);
   for (const auto& [x, y] : {std::pair{60, 40}, {61, 40}, {60, 41}, {61, 41}}) c.raw_e.at(x, y) += 60;
@@ -160,7 +163,7 @@ TEST(HardCaseDenoise6, AStarOfOneCellKeepsItsFlux) {
 }
 
 TEST(HardCaseDenoise7, OddSizesAndBordersAreThoseOfTheReference) {
-  HardCase row({group, "9.7 borders of 37 x 29, 2 x 2, 3 x 5, every phase",
+  HardCase row({denoise_group, "9.7 borders of 37 x 29, 2 x 2, 3 x 5, every phase",
                 "plain double; 600 float operations add up to 1.5e-6 of the largest value",
                 "relative to the largest value"});
   std::vector<MosaicCase> cases;
@@ -202,7 +205,7 @@ TEST(HardCaseDenoise7, OddSizesAndBordersAreThoseOfTheReference) {
 
 TEST(HardCaseDenoise8, CodesOf35ElectronsKeepTheirMean) {
   HardCase row(
-      {group, "9.8 codes of 35 e-, not dithered",
+      {denoise_group, "9.8 codes of 35 e-, not dithered",
        "closed form: the mean stays; three standard errors, borders being counted twice, and half a code of 8.8 "
        "e- (live), 47 of them",
        "standard errors of the mean"});
@@ -223,7 +226,7 @@ TEST(HardCaseDenoise8, CodesOf35ElectronsKeepTheirMean) {
 // noise's, sqrt(2 / 48) for each block. They go with those by which the blocks are chosen, too: a twentieth less is
 // left.
 TEST(HardCaseDenoise8, WhatWasDenoisedBeforeIsFound) {
-  HardCase row({group, "9.8 denoised before: means of 2 x 2",
+  HardCase row({denoise_group, "9.8 denoised before: means of 2 x 2",
                 "closed form: 1/16 of the diagonal variance; five standard errors, and how blocks are chosen",
                 "relative"});
   const MosaicCase white = case_of(with_dark(0, 20), flat(0, 0, 0), 512, 384, 69);
@@ -236,7 +239,7 @@ TEST(HardCaseDenoise8, WhatWasDenoisedBeforeIsFound) {
   }
   const double error = 1.5 * std::sqrt(2 / (48 * std::floor(0.1 * 31 * 23)));
   row.on(Path::reference, 0.05 + 5 * error, [&](Denormals m) {
-    const auto check = in_mode(m, [&] { return denoise::check_noise({c.raw_e.view(), c.phase}, c.noise, executor); });
+    const auto check = in_mode(m, [&] { return denoise::check_noise({c.raw_e.view(), c.phase}, c.noise, one_thread); });
     return std::abs(check.measured_over_model[0].value_or(inf) * 16 - 1);
   });
   row.none(levels, "checked before").none(instruction_sets, scalar_code);
@@ -256,7 +259,7 @@ double rms_of_rows(PlaneView<const double> out) {
 }
 
 TEST(HardCaseDenoise9, RowNoiseOfOneElectronIsTakenOffBefore) {
-  HardCase row({group, "9.9 1 e- of row noise",
+  HardCase row({denoise_group, "9.9 1 e- of row noise",
                 "its own prediction, and the noise of a row's mean; five standard errors above", "e- rms of rows"});
   MosaicCase c = case_of(with_dark(2, 1.5), flat(20, 20, 20), 256, 256, 70);
   std::vector<float> offset(256);

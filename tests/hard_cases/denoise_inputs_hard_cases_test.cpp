@@ -4,22 +4,22 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numbers>
 #include <string_view>
 
 #include "denoise/check/noise_check.h"
 #include "isp/base/executor.h"
 #include "tests/hard_cases/mosaics.h"
+#include "tests/support/numbers.h"
 
 // What sections 9.5 and 9.8 of the denoising specification say of saturated sites, and of raws that were compressed.
 namespace lowlux::hard_cases {
 namespace {
 
 using denoise_testing::flat;
+using test::inf;
 
-constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr std::string_view group = "Noise reduction";
+constexpr std::string_view denoise_inputs_group = "Noise reduction";
 
 /// Lamps on grey that are saturated in green, in red and green, in green and blue, in all, and of another colour each.
 /// No noise; every value is a code of files.
@@ -41,7 +41,7 @@ MosaicCase lamps() {
 
 // Red less blue, and green less green, have what slopes of the luma explain; between green and magenta there is none.
 TEST(HardCaseDenoise5, SaturatedLampsGiveNoColourToWhatIsAround) {
-  HardCase row({group, "9.5 lamps saturated in one, two, three colours, on grey",
+  HardCase row({denoise_inputs_group, "9.5 lamps saturated in one, two, three colours, on grey",
                 "closed form: R + B = G1 + G2 in every cell, balanced", "relative to white"});
   const MosaicCase c = lamps();
   // Four live codes of 1/16 e-, rounded and balanced.
@@ -103,7 +103,7 @@ void compress(PlaneView<float> mosaic, double threshold) {
 // Of a normal figure T deviations are dropped: 2 (T phi(T) + Q(T)) of its square is left, in coefficients as in sites.
 // Blocks with few coefficients are flatter as well, and the flattest tenth is measured: a sixth less, or so.
 TEST(HardCaseDenoise8, WhatWasCompressedWithLossIsFound) {
-  HardCase row({group, "9.8 compressed: coefficients below 1.5 deviations dropped",
+  HardCase row({denoise_inputs_group, "9.8 compressed: coefficients below 1.5 deviations dropped",
                 "closed form: 0.52 of the variance; five standard errors, and how blocks are chosen", "relative"});
   MosaicCase c = case_of({.read_noise_e = 2}, flat(100, 100, 100), 512, 384, 72);
   constexpr double dropped = 1.5;
@@ -123,7 +123,7 @@ TEST(HardCaseDenoise8, WhatWasCompressedWithLossIsFound) {
 
 // Codes of sqrt(e + 4), whose noise has a deviation of 1/2 at any light: a twelfth of 1/16 is added to a quarter.
 TEST(HardCaseDenoise8, CodesOfSquareRootsKeepTheirMean) {
-  HardCase row({group, "9.8 packed: codes of square roots, half a deviation apart",
+  HardCase row({denoise_inputs_group, "9.8 packed: codes of square roots, half a deviation apart",
                 "closed form: the mean stays; three standard errors, borders being counted twice",
                 "standard errors of the mean"});
   MosaicCase c = case_of({.read_noise_e = 2}, flat(30, 100, 50), 256, 192, 73);

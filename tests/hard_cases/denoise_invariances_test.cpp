@@ -12,6 +12,7 @@
 #include "denoise/temporal/temporal.h"
 #include "tests/hard_cases/mosaics.h"
 #include "tests/reference/temporal_ref.h"
+#include "tests/support/numbers.h"
 
 // Section 10 of the denoising specification, and what 9.11 and 9.12 ask of threads and of values.
 namespace lowlux::hard_cases {
@@ -20,9 +21,9 @@ namespace {
 using denoise_testing::Camera;
 using denoise_testing::flat;
 using denoise_testing::waves;
+using test::inf;
 
-constexpr std::string_view group = "Noise reduction: invariances", hard_cases = "Noise reduction";
-constexpr double inf = std::numeric_limits<double>::infinity();
+constexpr std::string_view denoise_invariances_group = "Noise reduction: invariances", hard_cases = "Noise reduction";
 
 // Values of up to 200 e-.
 constexpr Bound double_sums_e{200 * double_sums.value, rounding}, float_sums_e{200 * float_sums.value, rounding};
@@ -32,7 +33,7 @@ Camera with_dark(double dark_e, double read_noise_e) {
 }
 
 TEST(HardCaseInvariance, ConstantFramesKeepTheirMeans) {
-  HardCase row({group, "10 flats of 0.1 to 200 e- keep their means",
+  HardCase row({denoise_invariances_group, "10 flats of 0.1 to 200 e- keep their means",
                 "closed form: the gain of a mean is 1; three standard errors, borders being counted twice",
                 "standard errors of the mean"});
   constexpr Bound bound{3, any_draw};
@@ -47,7 +48,8 @@ TEST(HardCaseInvariance, ConstantFramesKeepTheirMeans) {
 }
 
 TEST(HardCaseInvariance, OneUnitIsAsGoodAsAnother) {
-  HardCase row({group, "10 another unit: all gains times eight, codes doubled", "the same in the first unit", "e-"});
+  HardCase row({denoise_invariances_group, "10 another unit: all gains times eight, codes doubled",
+                "the same in the first unit", "e-"});
   MosaicCase c = case_of(with_dark(5, 1.5), waves(30), 200, 150, 82);
   c.gain_dn_per_e = 8;
   for (std::size_t i = 0; i < c.raw_e.size(); ++i) c.raw_e.data()[i] = std::round(4 * c.raw_e.data()[i]) / 4;
@@ -67,8 +69,8 @@ TEST(HardCaseInvariance, OneUnitIsAsGoodAsAnother) {
 }
 
 TEST(HardCaseInvariance, ExchangeOfRedAndBlueCommutes) {
-  HardCase row(
-      {group, "10 red and blue exchanged with their parameters", "the same before; float sums in another order", "e-"});
+  HardCase row({denoise_invariances_group, "10 red and blue exchanged with their parameters",
+                "the same before; float sums in another order", "e-"});
   MosaicCase c = case_of({.dark_e = {5, 6, 6, 9}}, waves(30), 203, 150, 83);
   c.options.white_gain = {2, 1, 1.5};
   MosaicCase other = c.with_values(c.raw_e.clone());
@@ -79,8 +81,8 @@ TEST(HardCaseInvariance, ExchangeOfRedAndBlueCommutes) {
 }
 
 TEST(HardCaseInvariance, DarkChargeActsThroughTheVarianceOnly) {
-  HardCase row(
-      {group, "10 64 e- more of values and dark, less of read noise squared", "the same without; float sums", "e-"});
+  HardCase row({denoise_invariances_group, "10 64 e- more of values and dark, less of read noise squared",
+                "the same without; float sums", "e-"});
   const MosaicCase c = case_of(with_dark(40, 10), waves(50), 200, 150, 84);
   MosaicCase more = c.with_values(c.raw_e.clone());
   for (std::size_t i = 0; i < more.raw_e.size(); ++i) more.raw_e.data()[i] += 64;
@@ -100,8 +102,8 @@ std::pair<double, double> chromaticity(const std::array<double, 3>& mean) {
 }
 
 TEST(HardCaseInvariance, TwiceTheDarkDoesNotMoveTheMeanChromaticity) {
-  HardCase row({group, "10 twice the dark charge, subtracted: chromaticity", "closed form: that of the light",
-                "standard errors of the ratio"});
+  HardCase row({denoise_invariances_group, "10 twice the dark charge, subtracted: chromaticity",
+                "closed form: that of the light", "standard errors of the ratio"});
   measure(row, {5, 5, 5, 5}, [](const PathRun& run) {
     double worst = 0;
     for (const double dark_e : {20.0, 40.0}) {
@@ -150,7 +152,7 @@ double live_against_reference(const Camera& camera, Denormals mode) {
 }
 
 TEST(HardCaseTemporal, MeansOverFramesAreThoseOfTheReference) {
-  HardCase row({group, "means over frames whose light changes by 1e-6 and 1e6",
+  HardCase row({denoise_invariances_group, "means over frames whose light changes by 1e-6 and 1e6",
                 "plain double; two roundings in float of what 0.1 e- of noise is times 1e6", "e-"});
   const Camera camera = with_dark(5, 2);
   // A frame in the dark weighs 1/32 and has noise of 3 e-, up to five times that.

@@ -17,6 +17,7 @@
 #include "tests/hard_cases/rendering.h"
 #include "tests/hard_cases/simulated.h"
 #include "tests/reference/exact_ref.h"
+#include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
 // What no specification names and every frame may hold.
@@ -24,14 +25,15 @@ namespace lowlux::hard_cases {
 namespace {
 
 using denoise_testing::flat;
+using test::inf;
 
-constexpr std::string_view group = "What the specifications do not name";
+constexpr std::string_view extremes_group = "What the specifications do not name";
 constexpr std::string_view codes_are_whole = "codes are whole numbers";
 constexpr double eps = std::numeric_limits<double>::epsilon();
-constexpr double inf = std::numeric_limits<double>::infinity();
 
 TEST(HardCaseExtreme, DenormalElectrons) {
-  HardCase row({group, "mosaics of +-1e-40 e- without noise", "closed form: within the values themselves", "1e-40 e-"});
+  HardCase row(
+      {extremes_group, "mosaics of +-1e-40 e- without noise", "closed form: within the values themselves", "1e-40 e-"});
   MosaicCase c{.raw_e = Plane<float>(150, 97)};
   for (std::size_t i = 0; i < c.raw_e.size(); ++i) c.raw_e.data()[i] = i % 3 == 0 ? -1e-40f : 1e-40f;
   measure(row, c, {1, 1, -1, -1}, [](PlaneView<const double> out) { return distance_from(0)(out) / 1e-40; });
@@ -39,7 +41,7 @@ TEST(HardCaseExtreme, DenormalElectrons) {
 }
 
 TEST(HardCaseExtreme, DenormalsInRendering) {
-  HardCase row({group, "samples of 1e-39, gains and matrices of 1e-30 and 1e30",
+  HardCase row({extremes_group, "samples of 1e-39, gains and matrices of 1e-30 and 1e30",
                 "plain double; 1e-6 of the largest term, or the smallest normal number", "relative"});
   row.none(Path::reference, "is the oracle").none(levels, "looks come after");
   row.on_each_set({1e-6, rounding}, [](Denormals m) {
@@ -58,7 +60,7 @@ TEST(HardCaseExtreme, DenormalsInRendering) {
 }
 
 TEST(HardCaseExtreme, LuminancesBeyondNormal) {
-  HardCase row({group, "luminances of 5e-324 to 1e300, NaN, negative",
+  HardCase row({extremes_group, "luminances of 5e-324 to 1e300, NaN, negative",
                 "closed form: m is 0 or 1, luminance that of the end", "m"});
   row.on(Path::reference, 0, [](Denormals m) {
     const auto state = [&](double p, double s) { return in_mode(m, [&] { return isp::mesopic_state({p, s}); }); };
@@ -80,7 +82,7 @@ TEST(HardCaseExtreme, LuminancesBeyondNormal) {
 
 // Luma is of balanced colours, so that what passes of the noisiest one's noise is in all of them.
 TEST(HardCaseExtreme, WhiteBalanceOfAThousandInNoiseReduction) {
-  HardCase row({group, "white balance 1000 : 1 : 0.001, denoised",
+  HardCase row({extremes_group, "white balance 1000 : 1 : 0.001, denoised",
                 "closed form: means stay within three standard errors of the noisiest colour, all balanced",
                 "standard errors of the noisiest balanced mean"});
   denoise_testing::Camera camera{.dark_e = {2, 2, 2, 2}};
@@ -102,7 +104,7 @@ TEST(HardCaseExtreme, WhiteBalanceOfAThousandInNoiseReduction) {
 }
 
 TEST(HardCaseExtreme, WhiteBalanceOfAThousandInRendering) {
-  HardCase row({group, "white balance 1000 : 1 : 1, rendered",
+  HardCase row({extremes_group, "white balance 1000 : 1 : 1, rendered",
                 "plain double (sets); the neutral it stands for (others)", "relative; pixels that are no neutral"});
   row.none(Path::reference, "is the oracle").none(levels, "looks come after");
   row.on_each_set({3e-7, rounding}, [](Denormals m) { return linear_error({.gain = {1, 1000, 1e-3f, 1}}, m); });
@@ -131,7 +133,7 @@ double relative_error(const Matrix3& found, const Matrix3& expected) {
 
 // An inverse by cofactors is off by about the condition times rounding.
 TEST(HardCaseExtreme, MatricesOfConditionAMillion) {
-  HardCase row({group, "matrices of condition 1e6",
+  HardCase row({extremes_group, "matrices of condition 1e6",
                 "inverse in 50 digits; condition times 8 roundings (double), of the largest term (sets)", "relative"});
   const double condition = reference::condition_number(nearly_singular);
   ASSERT_GT(condition, 1e6);
@@ -162,7 +164,7 @@ TEST(HardCaseExtreme, MatricesOfConditionAMillion) {
 }
 
 TEST(HardCaseExtreme, ExposuresOfAMicrosecondToAnHour) {
-  HardCase row({group, "exposures of 1e-6 to 3600 s",
+  HardCase row({extremes_group, "exposures of 1e-6 to 3600 s",
                 "closed form: 50 digits (reference), five standard errors (frames)",
                 "relative to 8 eps; standard errors"});
   row.on(Path::reference, {1, rounding}, [](Denormals m) {
@@ -187,7 +189,8 @@ TEST(HardCaseExtreme, ExposuresOfAMicrosecondToAnHour) {
 }
 
 TEST(HardCaseExtreme, TemperaturesOfMinus40To85) {
-  HardCase row({group, "sensors of -40 to 85 C", "closed form: 50 digits (reference), five standard errors (frames)",
+  HardCase row({extremes_group, "sensors of -40 to 85 C",
+                "closed form: 50 digits (reference), five standard errors (frames)",
                 "relative to 16 eps; standard errors"});
   row.on(Path::reference, {1, rounding}, [](Denormals m) {
     SensorModel sensor;

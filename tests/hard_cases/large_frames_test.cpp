@@ -20,7 +20,7 @@
 namespace lowlux::hard_cases {
 namespace {
 
-constexpr std::string_view group = "What the specifications do not name";
+constexpr std::string_view large_frames_group = "What the specifications do not name";
 
 /// Codes of a row, the largest among them.
 std::vector<std::uint16_t> row_of_codes(int width) {
@@ -68,7 +68,7 @@ double error_by_columns(int width, int height, Denormals m) {
 }
 
 TEST(HardCaseExtreme, SumsOverAHundredMegapixels) {
-  HardCase row({group, "sums of 100 megapixels of codes up to 65535", "exact integers", "relative"});
+  HardCase row({large_frames_group, "sums of 100 megapixels of codes up to 65535", "exact integers", "relative"});
   row.none(Path::reference, "is the oracle").none(levels, "noise is reduced block by block");
   row.on_each_set(0, [](Denormals m) { return error_by_columns(10000, 10000, m); });
   row.on(Path::file, 0, [](Denormals m) {
@@ -113,8 +113,8 @@ TEST(HardCaseDenoise10, SumsOfTwelveMegapixels) {
 }
 
 TEST(HardCaseExtreme, FramesOfOneRowOrColumn) {
-  HardCase row({group, "1 x N and N x 1, N to 5000; 1 x 1", "plain double (sets), a picture or an error (others)",
-                "relative; sizes without either"});
+  HardCase row({large_frames_group, "1 x N and N x 1, N to 5000; 1 x 1",
+                "plain double (sets), a picture or an error (others)", "relative; sizes without either"});
   row.none(Path::reference, "is the oracle").none(levels, "2 x 2 at least: NoiseReduction says why not");
   row.on_each_set({4e-7, rounding}, [](Denormals m) {
     double worst = 0;

@@ -28,7 +28,7 @@ namespace {
 
 using isp::Xyz;
 
-constexpr std::string_view group = "Mesopic vision";
+constexpr std::string_view mesopic_group = "Mesopic vision";
 constexpr double eps = std::numeric_limits<double>::epsilon();
 
 double relative(double found, double expected) {
@@ -69,7 +69,7 @@ constexpr Xyz amber_light{1.66, 1, 0.02};  // S/P 0.203
 // Means are floats: half a last digit of 1e6 counts is 3e-5 of their standard deviation, and above that the scale of
 // the limit applies. Fields of less than one isomerisation up to 1e15 of them.
 TEST(HardCaseMesopic, VisualNoiseAtAnyLight) {
-  HardCase row({group, "visual noise in 1e-7 to 1e9 cd/m2, 1 to 1000 pixels per degree",
+  HardCase row({mesopic_group, "visual noise in 1e-7 to 1e9 cd/m2, 1 to 1000 pixels per degree",
                 "the same words drawn in double", "standard deviations"});
   row.on_each_set({1e-4, rounding}, [](Denormals m) {
     constexpr int cells = 64;
@@ -106,7 +106,7 @@ TEST(HardCaseMesopic, VisualNoiseAtAnyLight) {
 }
 
 TEST(HardCaseMesopic, NoLightAtAll) {
-  HardCase row({group, "1.1 both luminances 0", "closed form: m = 0, luminance 0, and black", look_unit});
+  HardCase row({mesopic_group, "1.1 both luminances 0", "closed form: m = 0, luminance 0, and black", look_unit});
   row.on(Path::reference, 0, [](Denormals m) {
     const auto state = in_mode(m, [] { return isp::mesopic_state({0, 0}); });
     return std::abs(state.m) + std::abs(state.luminance_cd_m2);
@@ -116,7 +116,7 @@ TEST(HardCaseMesopic, NoLightAtAll) {
 
 // |h| of the answer is below 1e-12 (mesopic.cpp) and dh/dm is -1 or steeper where S/P is above 1.
 TEST(HardCaseMesopic, TheCycleOfTwo) {
-  HardCase row({group, "1.1 S/P of 18 to 60, where the plain iteration never ends",
+  HardCase row({mesopic_group, "1.1 S/P of 18 to 60, where the plain iteration never ends",
                 "root by bisection in 50 digits (reference); the look in plain double and its formula (others)",
                 look_unit});
   row.on(Path::reference, {1.1e-12, rounding}, [](Denormals m) {
@@ -141,7 +141,7 @@ TEST(HardCaseMesopic, TheCycleOfTwo) {
 
 TEST(HardCaseMesopic, ThreeFixedPoints) {
   figures_row(
-      {group, "1.1 S/P of 0.05 to 0.26, where there may be three roots",
+      {mesopic_group, "1.1 S/P of 0.05 to 0.26, where there may be three roots",
        "a + b log10 L - m in 50 digits at the answer, or 0 where it is not positive at 0", "m"},
       {1.1e-12, rounding},
       [](Denormals m) {
@@ -165,7 +165,7 @@ TEST(HardCaseMesopic, ThreeFixedPoints) {
 // as fast under this light: by 0.25, a quarter of what rods and cones differ by in orange, 0.23. Its channels keep a
 // fifth of their distance, and codes rise by at most 257 over the light that is left.
 TEST(HardCaseMesopic, FieldsOfALookAreHeldAboveTheThreeFixedPoints) {
-  HardCase row({group, "1.1 looks under lights of S/P 0.2, whose fields are held at 0.27",
+  HardCase row({mesopic_group, "1.1 looks under lights of S/P 0.2, whose fields are held at 0.27",
                 "the look in plain double, and its formula", look_unit});
   row.none(Path::reference, "is the oracle");
   // Luminances of 0.01 to 0.2 cd/m2; at 0.0186 the table of m is farthest off.
@@ -223,7 +223,7 @@ double error_of_lookup(Denormals mode) {
 
 // The answer's |h| is below 1e-12, and dh/dm no nearer to 0 than 0.36 (1 / 0.27 - 1) - 1 = -0.027.
 TEST(HardCaseMesopic, KinksOfTheState) {
-  HardCase row({group, "1.2 kinks of m at 0 and 1, S/P of 0.27 to 60",
+  HardCase row({mesopic_group, "1.2 kinks of m at 0 and 1, S/P of 0.27 to 60",
                 "root by bisection in 50 digits (reference, sets); the look in plain double and its formula (others)",
                 "m (reference, sets), of white (file), codes (live)"});
   row.on(Path::reference, {1e-12 / 0.026, rounding}, [](Denormals m) {
@@ -241,7 +241,7 @@ TEST(HardCaseMesopic, KinksOfTheState) {
 
 // By the weights, exactly: three products and two sums.
 TEST(HardCaseMesopic, NegativeScotopicLuminance) {
-  HardCase row({group, "0.1 saturated reds: negative scotopic luminance",
+  HardCase row({mesopic_group, "0.1 saturated reds: negative scotopic luminance",
                 "closed form: 0, and the weighted sum elsewhere (reference); the look in plain double and its formula "
                 "(others)",
                 look_unit});
@@ -258,7 +258,8 @@ TEST(HardCaseMesopic, NegativeScotopicLuminance) {
 
 TEST(HardCaseMesopic, WardWithoutX) {
   figures_row(
-      {group, "0.1 Ward's formula where X vanishes", "closed form: the weighted sum from 1e-9 down", "relative"},
+      {mesopic_group, "0.1 Ward's formula where X vanishes", "closed form: the weighted sum from 1e-9 down",
+       "relative"},
       {eps, rounding},
       [](Denormals m) {
         double worst = 0;

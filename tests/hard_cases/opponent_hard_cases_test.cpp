@@ -10,6 +10,7 @@
 #include "isp/model/appearance/shin.h"
 #include "tests/hard_cases/model_pictures.h"
 #include "tests/reference/exact_ref.h"
+#include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
 // Models whose rods speak through opponent channels: sections 2.6, 2.7 and 4 of the mesopic specification.
@@ -17,10 +18,10 @@ namespace lowlux::hard_cases {
 namespace {
 
 using isp::Xyz;
+using test::inf;
 
-constexpr std::string_view group = "Mesopic vision";
+constexpr std::string_view opponent_group = "Mesopic vision";
 constexpr double eps = std::numeric_limits<double>::epsilon();
-constexpr double inf = std::numeric_limits<double>::infinity();
 const Matrix3 srgb_to_xyz{{{0.4124, 0.3576, 0.1805}, {0.2126, 0.7152, 0.0722}, {0.0193, 0.1192, 0.9505}}};
 
 /// Of the gains and of the changes of opponent signals, over what the terms of each round to: some ten roundings, and
@@ -43,7 +44,7 @@ double error_of_kirk(const Vector3& cones_td, double rods_td, Denormals mode) {
 }
 
 TEST(HardCaseMesopic, KirksNegativeCones) {
-  model_row({group, "2.6 Kirk: cones of -100 to 100 Td, gain held to 1000, no rods", "50 digits",
+  model_row({opponent_group, "2.6 Kirk: cones of -100 to 100 Td, gain held to 1000, no rods", "50 digits",
              "relative to 16 eps of its terms"},
             {1, rounding}, [](Denormals m) {
               double worst = 0;
@@ -68,8 +69,8 @@ constexpr std::array<Vector3, 5> shin_colours{{{0.5, 0.2, 0.1}, {1, 0, 0}, {0, 0
 
 // The smallest coefficient is 0.1: condition 10, 4.6 of the cones, a root to 1e-14.
 TEST(HardCaseMesopic, ShinForwardAndInverse) {
-  model_row({group, "2.7, 4 Shin: 0.01 to 1000 lx and back, reds, Y' below 0", "closed form: the colour itself",
-             "relative to white"},
+  model_row({opponent_group, "2.7, 4 Shin: 0.01 to 1000 lx and back, reds, Y' below 0",
+             "closed form: the colour itself", "relative to white"},
             {1e-14, rounding}, [](Denormals m) {
               const isp::ShinEye eye = isp::shin_eye({});
               double worst = 0;
@@ -90,8 +91,8 @@ TEST(HardCaseMesopic, ShinForwardAndInverse) {
 
 // Cones have next to no part in what is seen, so that no colour can come back: the answer is that of 0.05.
 TEST(HardCaseMesopic, ShinWhereAlphaIsHeld) {
-  model_row({group, "4 Shin: 1e-3 and 3e-3 lx, where alpha is held to 0.05", "the signals, by the coefficients held",
-             "relative to white"},
+  model_row({opponent_group, "4 Shin: 1e-3 and 3e-3 lx, where alpha is held to 0.05",
+             "the signals, by the coefficients held", "relative to white"},
             {5e-14, rounding}, [](Denormals m) {
               const isp::ShinEye eye = isp::shin_eye({});
               double worst = 0;
@@ -116,8 +117,8 @@ TEST(HardCaseMesopic, ShinWhereAlphaIsHeld) {
 
 // Y' of white is 0 for X = 1.7788, Z = 0; L_w + M_w = Y_w.
 TEST(HardCaseMesopic, WhitesThatLeaveRodsOrConesDark) {
-  HardCase row(
-      {group, "2.7 Shin: whites of Y'_w = 0, L_w + M_w = 0, below 0, not a number", "an error", "of six, taken"});
+  HardCase row({opponent_group, "2.7 Shin: whites of Y'_w = 0, L_w + M_w = 0, below 0, not a number", "an error",
+                "of six, taken"});
   row.on(Path::reference, 0, [](Denormals m) {
     double taken = 0;
     for (const Xyz& white : {Xyz{2.71012 / 1.52356, 1, 0}, Xyz{2, 1, 0.2}, Xyz{1, 0, 1}, Xyz{0, 0, 0},

@@ -25,7 +25,7 @@ namespace {
 
 using denoise::Level;
 
-constexpr std::string_view group = "What the specifications do not name";
+constexpr std::string_view pieces_group = "What the specifications do not name";
 constexpr int period = 512;  // px, a multiple of tile_lattice_px
 constexpr double mean_e = 20, read_noise_e = 1.5;
 
@@ -105,8 +105,8 @@ double rows_of_100_megapixels(Denormals mode) {
 }
 
 TEST(HardCaseExtreme, AHundredMegapixelsAtOnce) {
-  HardCase row({group, "100 megapixels: rendered in one call, by pieces (file)", "the same rows of a small picture",
-                "rows that differ"});
+  HardCase row({pieces_group, "100 megapixels: rendered in one call, by pieces (file)",
+                "the same rows of a small picture", "rows that differ"});
   row.none(Path::reference, "is plain loops").none(levels, "frames above 25 megapixels: see the next row");
   row.on_each_set(0, codes_of_100_megapixels);
   row.on(Path::file, 0, rows_of_100_megapixels);
@@ -175,7 +175,7 @@ double error_of_26_megapixels(Denormals mode) {
 
 // At most 3 % of the noise of a raw value (frame_tiles.h), of which the levels leave 5 % and more.
 TEST(HardCaseExtreme, AQuarterOfAHundredMegapixelsByPieces) {
-  HardCase row({group, "frames above 25 megapixels: 26 (file), cores of 256 px (others), denoised",
+  HardCase row({pieces_group, "frames above 25 megapixels: 26 (file), cores of 256 px (others), denoised",
                 "the same developed whole: inner parts of 2.4 megapixels (file), all (others)",
                 "noise of a raw value"});
   row.none(Path::reference, "has no pieces");

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -22,27 +21,28 @@
 #include "tests/pipeline/night_frames.h"
 #include "tests/reference/exact_ref.h"
 #include "tests/reference/poisson_ref.h"
+#include "tests/support/executors.h"
+#include "tests/support/numbers.h"
 
 // Section 10 of the sensor and photon model.
 namespace lowlux::hard_cases {
 namespace {
 
 using denoise_testing::flat;
+using test::inf;
+using test::nan;
+using test::two_threads;
 
-constexpr std::string_view group = "Sensor and photons";
+constexpr std::string_view sensor_group = "Sensor and photons";
 constexpr std::string_view drawn_before = "light is drawn by the camera";
 constexpr std::string_view no_colour_yet = "chromaticities are made later";
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
-
-PoolExecutor executor(2);
 
 MosaicCase without_light(double read_noise_e, int width, int height) {
   return case_of({.read_noise_e = read_noise_e}, flat(0, 0, 0), width, height, 91);
 }
 
 TEST(HardCaseSensor, NoPhotonIsNoElectronAndNoSpectrum) {
-  HardCase row({group, "no photon at all", "closed form: black, and no spectrum", "values that are not"});
+  HardCase row({sensor_group, "no photon at all", "closed form: black, and no spectrum", "values that are not"});
   row.on(Path::reference, 0, [](Denormals m) {
     return in_mode(m, [] {
       const auto means = isp::mean_photons(*isp::light_named("D65"), 0, 0.2);
@@ -74,7 +74,8 @@ TEST(HardCaseSensor, NoPhotonIsNoElectronAndNoSpectrum) {
 
 // Section 8: the dark charge has to come from somewhere, and a tagged pedestal is silent about it.
 TEST(HardCaseSensor, DarkChargeThatNoSourceStatesIsInTheFrame) {
-  HardCase row({group, "dark charge of 0.1 to 1e5 e- that no source states, under light of 1e-2 to 1e4 times as much",
+  HardCase row({sensor_group,
+                "dark charge of 0.1 to 1e5 e- that no source states, under light of 1e-2 to 1e4 times as much",
                 "closed form: grey surfaces down to black (reference); charge of the scene (file)",
                 "of charge and light; standard errors"});
   constexpr std::array light{0.5, 1.0, 0.66};
@@ -109,7 +110,7 @@ TEST(HardCaseSensor, DarkChargeThatNoSourceStatesIsInTheFrame) {
       };
       RawFrame frame = test::night_frame({.dark_e = {dark_e, dark_e, dark_e, dark_e}}, scene, 320, 256);
       frame.raw.info.exposure_s = 2;
-      const auto plan = in_mode(m, [&] { return isp::plan_develop(frame, {}, executor); });
+      const auto plan = in_mode(m, [&] { return isp::plan_develop(frame, {}, two_threads); });
       const bool is_found = plan && plan->dark.state == isp::DarkCharge::State::estimated;
       keep_worst(worst, is_found ? std::abs(*plan->dark.mean_e - dark_e) / *plan->dark.standard_error_e : nan);
     }
@@ -122,7 +123,7 @@ const std::array means_e{1e-12, 1e-9, 1e-6, 1e-3, 0.3, 1.0, 30.0, 1e3, 1e5, 1e6}
 
 TEST(HardCaseSensor, MeansFromOneInABillionToAMillionAreExact) {
   HardCase row(
-      {group, "means of 1e-12 to 1e6 photons",
+      {sensor_group, "means of 1e-12 to 1e6 photons",
        "Poisson's distribution in 50 digits, to 1e5 (reference); its plain sum (sets); 5 standard errors (file)",
        "relative; counts that differ; standard errors"});
   row.on(Path::reference, {4e-13, rounding}, [](Denormals m) {
@@ -162,7 +163,7 @@ TEST(HardCaseSensor, MeansFromOneInABillionToAMillionAreExact) {
 
 TEST(HardCaseSensor, WhatCannotBeDrawnIsRefused) {
   HardCase row(
-      {group, "means above 1e6 that no full well holds", "an error that names the limit", "frames made of it"});
+      {sensor_group, "means above 1e6 that no full well holds", "an error that names the limit", "frames made of it"});
   row.none(Path::reference, "refused before it is drawn").none(levels, not_denoised);
   row.none(instruction_sets, "refused before it is drawn");
   row.on(Path::file, 0, [](Denormals m) {
@@ -175,7 +176,8 @@ TEST(HardCaseSensor, WhatCannotBeDrawnIsRefused) {
 }
 
 TEST(HardCaseSensor, AFrameWithoutLightStaysAtZero) {
-  HardCase row({group, "an all-dark frame", "closed form: a mean of 0; five standard errors, and one that borders add",
+  HardCase row({sensor_group, "an all-dark frame",
+                "closed form: a mean of 0; five standard errors, and one that borders add",
                 "standard errors of the mean"});
   const MosaicCase c = without_light(3, 256, 192);
   constexpr Bound bound{6, any_draw};
@@ -190,7 +192,7 @@ TEST(HardCaseSensor, AFrameWithoutLightStaysAtZero) {
 }
 
 TEST(HardCaseSensor, NegativeSumsHaveNoChromaticity) {
-  HardCase row({group, "X + Y + Z of 0 or less after subtraction", "there is none", "chromaticities given"});
+  HardCase row({sensor_group, "X + Y + Z of 0 or less after subtraction", "there is none", "chromaticities given"});
   row.on(Path::reference, 0, [](Denormals m) {
     const isp::Xyz dark{5, 6, 7};
     double given = 0;
@@ -208,7 +210,8 @@ TEST(HardCaseSensor, NegativeSumsHaveNoChromaticity) {
 }
 
 TEST(HardCaseSensor, AsAlphaVanishesErrorsGrowByItsReciprocal) {
-  HardCase row({group, "alpha from 0.1 to 1e-12", "closed form: rounding of 0.3, 2e-16 (float 6e-8), divided by alpha",
+  HardCase row({sensor_group, "alpha from 0.1 to 1e-12",
+                "closed form: rounding of 0.3, 2e-16 (float 6e-8), divided by alpha",
                 "error times alpha over rounding"});
   row.on(Path::reference, {1, rounding}, [](Denormals m) {
     const isp::Xy light{0.6, 0.3}, black{0.31, 0.33};
@@ -230,7 +233,7 @@ TEST(HardCaseSensor, AsAlphaVanishesErrorsGrowByItsReciprocal) {
 }
 
 TEST(HardCaseSensor, SaturatedChannelsAreFlagged) {
-  HardCase row({group, "channels full by well, converter, both", "which are, by the exposure", "wrong flags"});
+  HardCase row({sensor_group, "channels full by well, converter, both", "which are, by the exposure", "wrong flags"});
   const auto wrong = [](Denormals m) {
     double count = 0;
     for (const double gain : {0.1, 0.5, 5.0}) {
@@ -246,7 +249,7 @@ TEST(HardCaseSensor, SaturatedChannelsAreFlagged) {
 }
 
 TEST(HardCaseSensor, WhiteNotAboveBlackIsRefused) {
-  HardCase row({group, "white level at or below black, or NaN", "an error", "of three, taken"});
+  HardCase row({sensor_group, "white level at or below black, or NaN", "an error", "of three, taken"});
   const std::array whites{512.0, 100.0, nan};
   row.on(Path::reference, 0, [&](Denormals m) {
     double taken = 0;
@@ -276,8 +279,8 @@ TEST(HardCaseSensor, WhiteNotAboveBlackIsRefused) {
 }
 
 TEST(HardCaseSensor, ExposuresThatCannotBeAreRefused) {
-  HardCase row(
-      {group, "exposures that are negative, infinite, NaN", "an error; streams measure instead", "of four, taken"});
+  HardCase row({sensor_group, "exposures that are negative, infinite, NaN", "an error; streams measure instead",
+                "of four, taken"});
   const std::array times_s{-1e-9, -inf, inf, nan};
   const auto taken = [&](const auto& takes) {
     return static_cast<double>(std::count_if(times_s.begin(), times_s.end(), takes));
@@ -300,7 +303,7 @@ TEST(HardCaseSensor, ExposuresThatCannotBeAreRefused) {
 }
 
 TEST(HardCaseSensor, SingularSensitivitiesAreRefused) {
-  HardCase row({group, "singular matrix of sensitivities", "an error", "matrices made of it"});
+  HardCase row({sensor_group, "singular matrix of sensitivities", "an error", "matrices made of it"});
   row.on(Path::reference, 0, [](Denormals m) {
     const auto nikon = *isp::camera_sensitivity("Nikon_D5100");
     return in_mode(m, [&] { return isp::spectral_matrix({nikon[0], nikon[0], nikon[2]}).has_value(); }) ? 1.0 : 0.0;
@@ -321,7 +324,7 @@ TEST(HardCaseSensor, SingularSensitivitiesAreRefused) {
 }
 
 void spectrum_row(std::string_view name, const Spectrum& light, const std::vector<double>& widths_nm) {
-  HardCase row({group, name, "closed form: photons bin by bin (reference, relative), 5 standard errors (others)",
+  HardCase row({sensor_group, name, "closed form: photons bin by bin (reference, relative), 5 standard errors (others)",
                 "relative to 1e-15; standard errors"});
   row.on(Path::reference, {1, rounding}, [&](Denormals m) {
     const auto found = in_mode(m, [&] { return isp::bin_widths_nm(light); });

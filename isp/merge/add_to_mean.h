@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+
+#include "isp/base/executor.h"
+#include "isp/base/image.h"
+#include "isp/base/plane.h"
+#include "isp/merge/mosaic_mean.h"
+#include "isp/merge/motion.h"
+
+/// Adds frames that lie in the place of the reference to a mean.
+namespace lowlux::merge {
+
+/// States what of a frame counts.
+struct MeanPart {
+  PlaneView<const float> site_weight;           // inverse variance of one sample; without data all sites weigh the same
+  PlaneView<const std::uint8_t> block_matches;  // as Comparison has them; without data all count
+};
+
+/// Adds a mosaic that was placed in whole cells.
+void add_placed(PlaneView<const float> placed, const MeanPart& part, MosaicMean& mean, Executor& executor);
+
+/// Adds differences as drops (DropRows). The weights of each colour are divided by their mean over the frame, so that a
+/// frame counts as one sample for each site, wherever its samples lie.
+/// @param prediction  that the differences were formed with
+void add_drops(PlaneView<const float> differences, BayerPhase phase, const Motion& motion,
+               const RgbView<const float>& prediction, double radius_px, const MeanPart& part, MosaicMean& mean,
+               Executor& executor);
+
+}  // namespace lowlux::merge

@@ -1,0 +1,122 @@
+#include "isp/merge/mosaic_mean.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "isp/base/cfa.h"
+
+namespace lowlux::merge {
+namespace {
+
+constexpr std::size_t max_mosaics = 16;
+constexpr float far_z2 = 16;
+constexpr int max_fill_px = 32;
+
+/// Returns the mean of the values that are near their median; `value` is reordered.
+float mean_near_median(std::span<float> value, float fraction, float offset) {
+  const auto middle = value.begin() + static_cast<std::ptrdiff_t>((value.size() - 1) / 2);
+  std::nth_element(value.begin(), middle, value.end());
+  const float median = *middle;
+  const float variance = fraction * std::max(median, 0.0F) + offset;
+  float sum = 0, count = 0;
+  for (const float v : value) {
+    if ((v - median) * (v - median) > far_z2 * variance) continue;
+    sum += v;
+    count += 1;
+  }
+  return count > 0 ? sum / count : median;
+}
+
+/// Returns the mean of the nearest sites of the same colour that have a weight: of those in the smallest square ring
+/// around (x, y) that contains one; 0 if there is none within 32 pixels.
+float nearest_mean(const Plane<float>& mean, const Plane<float>& weight, int x, int y) {
+  for (int ring = 2; ring <= max_fill_px; ring += 2) {
+    float sum = 0, count = 0;
+    const auto add = [&](int u, int v) {
+      if (u < 0 || v < 0 || u >= mean.width() || v >= mean.height() || !(weight.at(u, v) > 0)) return;
+      sum += mean.at(u, v);
+      count += 1;
+    };
+    for (int d = -ring; d <= ring; d += 2) {
+      add(x + d, y - ring);
+      add(x + d, y + ring);
+      if (d == -ring || d == ring) continue;
+      add(x - ring, y + d);
+      add(x + ring, y + d);
+    }
+    if (count > 0) return sum / count;
+  }
+  return 0;
+}
+
+/// Calls add(x) for each site of a row whose block counts.
+template <class Add>
+void for_matching(int y, int width, PlaneView<const std::uint8_t> block_matches, const Add& add) {
+  for (int x0 = 0; x0 < width; x0 += block_px) {
+    if (block_matches.data != nullptr && block_matches.at(x0 / block_px, y / block_px) == 0) continue;
+    for (int x = x0; x < std::min(x0 + block_px, width); ++x) add(x);
+  }
+}
+
+}  // namespace
+
+void robust_mean(std::span<Plane<float>> mosaics, const MosaicNoise& noise, Executor& executor) {
+  assert(!mosaics.empty() && mosaics.size() <= max_mosaics);
+  const auto fraction = static_cast<float>(noise.fraction);
+  std::array<float, 4> offset{};
+  for (int i = 0; i < 4; ++i) offset[i] = static_cast<float>(noise.fraction * noise.variance_e2[i]);
+  for_each_index(executor, mosaics[0].height(), [&](int y) {
+    std::array<float, max_mosaics> value{};
+    for (int x = 0; x < mosaics[0].width(); ++x) {
+      std::size_t count = 0;
+      for (const Plane<float>& mosaic : mosaics) {
+        const float v = mosaic.at(x, y);
+        if (v == v) value[count++] = v;
+      }
+      mosaics[0].at(x, y) = count > 0 ? mean_near_median({value.data(), count}, fraction, offset[site_of(x, y)])
+                                      : std::numeric_limits<float>::quiet_NaN();
+    }
+  });
+}
+
+MosaicMean::MosaicMean(int width, int height) : sum_(width, height), weight_(width, height) {
+  for (Plane<float>* plane : {&sum_, &weight_}) std::fill_n(plane->data(), plane->size(), 0.0F);
+}
+
+void MosaicMean::add_row(int y, const WeightedRow& row, PlaneView<const std::uint8_t> block_matches) {
+  float* const sum = sum_.row(y);
+  float* const weight = weight_.row(y);
+  for_matching(y, sum_.width(), block_matches, [&](int x) {
+    const float site = row.site_weight != nullptr ? row.site_weight[x] : 1;
+    const float w = site * (row.weight != nullptr ? row.weight[x] : 1);
+    if (!(row.value[x] == row.value[x]) || !(w > 0)) return;
+    sum[x] += w * row.value[x];
+    weight[x] += w;
+  });
+}
+
+void MosaicMean::add(PlaneView<const float> mosaic, PlaneView<const std::uint8_t> block_matches, Executor& executor) {
+  for_each_index(executor, sum_.height(), [&](int y) { add_row(y, {.value = mosaic.row(y)}, block_matches); });
+}
+
+Plane<float> MosaicMean::take_mean(Executor& executor) {
+  Plane<float> mean = std::move(sum_);
+  for_each_index(executor, mean.height(), [&](int y) {
+    for (int x = 0; x < mean.width(); ++x) {
+      if (weight_.at(x, y) > 0) mean.at(x, y) /= weight_.at(x, y);
+    }
+  });
+  for_each_index(executor, mean.height(), [&](int y) {
+    for (int x = 0; x < mean.width(); ++x) {
+      if (!(weight_.at(x, y) > 0)) mean.at(x, y) = nearest_mean(mean, weight_, x, y);
+    }
+  });
+  return mean;
+}
+
+}  // namespace lowlux::merge

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "isp/base/executor.h"
+#include "isp/base/plane.h"
+#include "isp/merge/block_test.h"
+
+namespace lowlux::merge {
+
+/// Returns the mean of a few mosaics of one light at every site, without values that are far from the median:
+///     |y - median| > z sqrt(V), V = the noise of one mosaic at the median, z^2 = 16.
+/// Values that differ from it are those of a minority: a walker, a satellite, a cosmic ray. NaN where no mosaic has a
+/// value. The result replaces the first mosaic.
+/// @param mosaics  1..16 of equal size
+void robust_mean(std::span<Plane<float>> mosaics, const MosaicNoise& noise, Executor& executor);
+
+/// Holds a row of a mosaic that is added to a mean. Pointers that are null stand for rows of 1.
+struct WeightedRow {
+  const float* value = nullptr;        // NaN: none
+  const float* weight = nullptr;       // >= 0, samples for each site; may not depend on the noise of the value
+  const float* site_weight = nullptr;  // inverse variance of one sample, which multiplies it
+};
+
+/// Adds weighted mosaics of one light, and returns their mean. Memory does not depend on their number: 8 bytes for
+/// each site. NaN sites, and blocks that do not match, do not count.
+class MosaicMean {
+ public:
+  MosaicMean(int width, int height);
+
+  /// Adds a row of a mosaic. Different rows may be added at the same time.
+  /// @param block_matches  as in Comparison; without data all count
+  void add_row(int y, const WeightedRow& row, PlaneView<const std::uint8_t> block_matches);
+  /// Adds a mosaic with the weight 1, as for frames of equal noise.
+  void add(PlaneView<const float> mosaic, PlaneView<const std::uint8_t> block_matches, Executor& executor);
+
+  /// Returns the sum of the weights of each site: 1 / weight is the variance of the mean over that of one sample, or
+  /// the variance itself where site weights are inverse variances.
+  const Plane<float>& weight() const { return weight_; }
+
+  /// Returns the mean, and fills sites without any value by the mean of the nearest sites of their colour that have
+  /// one; 0 where there is none within 32 pixels. Empties the sum; the weights stay.
+  Plane<float> take_mean(Executor& executor);
+
+ private:
+  Plane<float> sum_;
+  Plane<float> weight_;
+};
+
+}  // namespace lowlux::merge

@@ -1,0 +1,68 @@
+#include "isp/pipeline/merge/frame_electrons.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "denoise/lines/line_noise.h"
+#include "isp/pipeline/plan/plan_develop.h"
+#include "isp/pipeline/plan/plan_noise.h"
+#include "isp/pipeline/render/electron_mosaic.h"
+#include "isp/raw/black_point.h"
+#include "isp/raw/to_linear.h"
+
+namespace lowlux::isp {
+namespace {
+
+void describe_noise(const RawFrame& frame, const DevelopPlan& plan, FrameElectrons& out) {
+  const denoise::RawNoise& noise = plan.noise_reduction.noise;
+  out.light_at_white_e = light_at_white_e(plan.levels);
+  out.saturation_e.fill(std::numeric_limits<double>::infinity());
+  for (int site = 0; site < 4; ++site) {
+    const auto colour = static_cast<std::size_t>(colour_at(out.phase, site & 1, site >> 1));
+    const double electrons = (*plan.levels.electrons_at_white)[site];
+    if (plan.levels.dark_frame) {
+      const double e_per_dn = electrons / (white_at(frame.raw, site) - plan.levels.black.pedestal_dn[site]);
+      out.common_variance_e2[site] = plan.levels.dark_frame->added_variance_dn2[site] * e_per_dn * e_per_dn;
+    }
+    out.dark_charge_e[site] = noise.dark_mean_e[site];
+    out.variance_e2[site] =
+        std::max(noise.variance_e2[colour] + noise.dark_mean_e[site] - out.common_variance_e2[site], 0.0);
+    out.saturation_e[colour] =
+        std::min(out.saturation_e[colour], noise.saturation_e[colour] - plan.levels.black.dark_mean_e[site]);
+  }
+}
+
+}  // namespace
+
+DevelopOptions without_rendering(DevelopOptions options, denoise::Level level) {
+  options.space = OutputSpace::camera;
+  options.samples = SampleType::f32;
+  options.tone = ToneCurve::none;
+  options.exposure_ev = 0;
+  options.half = false;
+  options.look = {};
+  options.display = nullptr;
+  options.effects.reset();
+  options.denoise.mode = DenoiseChoice::Mode::level;
+  options.denoise.level = level;
+  options.denoise.maps = false;
+  return options;
+}
+
+Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
+  Result<DevelopPlan> plan = plan_develop(frame, without_rendering(options, denoise::Level::draft), executor);
+  if (!plan) return tl::make_unexpected(std::move(plan.error()));
+  FrameElectrons out{.phase = frame.raw.phase, .warnings = std::move(plan->warnings)};
+  describe_noise(frame, *plan, out);
+  const std::vector<Pixel> defects = std::exchange(plan->levels.defects, {});
+  RawElectrons charge = raw_electrons(frame, plan->levels, {}, executor);
+  for (const denoise::LineOffsets& lines : plan->noise_reduction.lines) {
+    denoise::subtract_lines(lines, charge.value.view());
+  }
+  out.signal_e = subtract_dark(std::move(charge), plan->levels.black, executor).value;
+  for (const Pixel& defect : defects) out.signal_e.at(defect.x, defect.y) = std::numeric_limits<float>::quiet_NaN();
+  return out;
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/plane.h"
+#include "isp/base/result.h"
+#include "isp/merge/frame.h"
+#include "isp/pipeline/options.h"
+
+namespace lowlux::isp {
+
+/// Holds a Bayer frame as signed electrons of light, with what is known of its noise. Sites are those of the active
+/// area.
+struct FrameElectrons {
+  Plane<float> signal_e;  // pedestal, dark charge, row and column noise subtracted; NaN at defects
+  BayerPhase phase = BayerPhase::rggb;
+  PerSite<double> variance_e2{};         // without light: read noise, dark charge, quantisation
+  PerSite<double> dark_charge_e{};       // mean that was subtracted; 0 if unknown
+  PerSite<double> common_variance_e2{};  // of the subtracted dark frame, which frames of one exposure share
+  std::array<double, 3> saturation_e{};  // signal from which on a site of R, G, B is saturated
+  PerSite<double> light_at_white_e{};
+  std::vector<std::string> warnings;
+};
+
+inline merge::FrameView view_of(const FrameElectrons& frame) {
+  return {frame.signal_e.view(), frame.phase, frame.variance_e2};
+}
+
+/// Returns options under which a frame is developed to camera RGB at a level, without look, tone and exposure. The
+/// options of black level, dark frame, defects and line noise stay.
+DevelopOptions without_rendering(DevelopOptions options, denoise::Level level);
+
+/// Measures a frame as plan_develop does and converts it. The options that matter are those of black level, dark frame,
+/// defects and line noise. Errors: those of plan_develop; unknown noise (insufficient), no Bayer mosaic (unsupported).
+Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
+
+}  // namespace lowlux::isp

@@ -1,0 +1,150 @@
+#include "isp/pipeline/merge/frame_loader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/base/camera_profile.h"
+#include "isp/pipeline/plan/plan_develop.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double max_noise_ratio = 1.2;  // of the variance of frames of one ISO
+
+bool differ(const std::optional<double>& a, const std::optional<double>& b) {
+  if (!a || !b) return a.has_value() != b.has_value();
+  return std::fabs(*a - *b) > 1e-3 * std::max(std::fabs(*a), std::fabs(*b));
+}
+
+std::string camera_of(const FrameInfo& info) {
+  const std::string name = camera_name(info.make, info.model);
+  return name.empty() ? "an unnamed camera" : name;
+}
+
+/// Returns why a frame cannot be merged with the reference; nullopt if it can.
+std::optional<std::string> difference_to(const RawDn& reference, const RawDn& frame) {
+  if (reference.info.make != frame.info.make || reference.info.model != frame.info.model) {
+    return fmt::format("it was taken with {}, the reference with {}", camera_of(frame.info), camera_of(reference.info));
+  }
+  if (reference.layout != frame.layout || reference.phase != frame.phase) {
+    return "its mosaic is not that of the reference";
+  }
+  const Rect &a = reference.active, &b = frame.active;
+  if (a.width != b.width || a.height != b.height) {
+    return fmt::format("it has {} x {} pixels, the reference {} x {}", b.width, b.height, a.width, a.height);
+  }
+  if (a.x != b.x || a.y != b.y) {
+    return fmt::format("its active area begins at {}, {}, that of the reference at {}, {}", b.x, b.y, a.x, a.y);
+  }
+  return std::nullopt;
+}
+
+/// Returns the noise of the reference in the units of a frame of the same gain [DN/e-], whose black or white level may
+/// differ: a raw value of 1 stands for another charge then.
+Result<std::optional<NoiseProfile>> noise_at_levels(const FrameToMerge& reference, const FrameToMerge& to) {
+  std::optional<NoiseProfile> out = reference.frame.noise;
+  if (!out) return out;
+  const Result<BlackPoint> reference_black = choose_black_point(reference.frame, reference.options);
+  if (!reference_black) return tl::make_unexpected(reference_black.error());
+  const Result<BlackPoint> black = choose_black_point(to.frame, to.options);
+  if (!black) return tl::make_unexpected(black.error());
+  const double ratio = mean_range_dn(reference.frame.raw, *reference_black) / mean_range_dn(to.frame.raw, *black);
+  for (double& scale : out->scale) scale *= ratio;
+  for (double& offset : out->offset) offset *= ratio * ratio;
+  return out;
+}
+
+/// Returns whether both frames state their noise, and differently: one of them was processed.
+bool noise_differs(const std::optional<NoiseProfile>& expected, const std::optional<NoiseProfile>& noise) {
+  const auto is_stated = [](const auto& n) { return n && n->source != NoiseProfile::Source::picture; };
+  if (!is_stated(expected) || !is_stated(noise)) return false;
+  const double ratio = noise->scale[1] / expected->scale[1];
+  return !(ratio > 1 / max_noise_ratio && ratio < max_noise_ratio);
+}
+
+}  // namespace
+
+Error at_frame(Error error, const std::string& name) {
+  if (error.where.empty()) error.where = name;
+  return error;
+}
+
+FrameLoader::~FrameLoader() {
+  if (next_.valid()) next_.wait();
+}
+
+Result<FrameElectrons> FrameLoader::read_reference(int index) {
+  Result<FrameToMerge> frame = read_(index);
+  if (!frame) return tl::make_unexpected(frame.error());
+  clock_.lap(waiting_stage);
+  Result<FrameElectrons> electrons = frame_electrons(frame->frame, frame->options, executor_);
+  if (!electrons) return tl::make_unexpected(at_frame(electrons.error(), frame->name));
+  clock_.lap("black and noise");
+  reference_ = *std::move(frame);
+  return electrons;
+}
+
+void FrameLoader::expect(std::vector<int> order) {
+  if (next_.valid()) next_.wait();
+  order_ = std::move(order);
+  position_ = 0;
+  begin();
+}
+
+void FrameLoader::begin() {
+  if (position_ == order_.size()) return;
+  next_ = std::async(std::launch::async, [this, index = order_[position_]] { return read_(index); });
+}
+
+Result<FrameElectrons> FrameLoader::next() {
+  Result<FrameToMerge> read = next_.get();
+  ++position_;
+  begin();
+  if (!read) return tl::make_unexpected(read.error());
+  clock_.lap(waiting_stage);
+  RawFrame& frame = read->frame;
+  last_ = frame.raw.info;
+  last_name_ = read->name;
+  const FrameInfo& info = reference_.frame.raw.info;
+  if (auto difference = difference_to(reference_.frame.raw, frame.raw)) {
+    return tl::make_unexpected(at_frame({ErrorCode::invalid_argument, *std::move(difference), {}}, last_name_));
+  }
+  const bool same_gain = !differ(info.iso, last_.iso);
+  if (!same_gain || differ(info.exposure_s, last_.exposure_s) || differ(info.f_number, last_.f_number)) {
+    exposures_differ_ = true;
+  }
+  if (same_gain) {
+    Result<std::optional<NoiseProfile>> expected = noise_at_levels(reference_, *read);
+    if (!expected) return tl::make_unexpected(at_frame(expected.error(), last_name_));
+    if (noise_differs(*expected, frame.noise)) {
+      return tl::make_unexpected(at_frame({ErrorCode::invalid_argument,
+                                           "its noise is not that of the reference at the same ISO: raw files have to "
+                                           "be merged as the camera wrote them",
+                                           {}},
+                                          last_name_));
+    }
+    frame.noise = *std::move(expected);  // a profile that is measured in an image has an error of its own
+  }
+  Result<FrameElectrons> electrons = frame_electrons(frame, read->options, executor_);
+  if (!electrons) return tl::make_unexpected(at_frame(electrons.error(), last_name_));
+  clock_.lap("black and noise");
+  return electrons;
+}
+
+Result<double> FrameLoader::stated_light() const {
+  const FrameInfo& info = reference_.frame.raw.info;
+  if (!info.exposure_s || !last_.exposure_s || !(*info.exposure_s > 0) || !(*last_.exposure_s > 0)) {
+    return tl::make_unexpected(at_frame(
+        {ErrorCode::insufficient, "frames of different exposure have to state their exposure times", {}}, last_name_));
+  }
+  double light = *last_.exposure_s / *info.exposure_s;
+  if (info.f_number && last_.f_number) light *= std::pow(*info.f_number / *last_.f_number, 2);
+  return light;
+}
+
+}  // namespace lowlux::isp

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <future>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+#include "isp/pipeline/merge/frame_electrons.h"
+#include "isp/pipeline/merge/merged_raw.h"
+#include "isp/pipeline/stage_clock.h"
+
+namespace lowlux::isp {
+
+/// Names the time in which the work waits for files.
+inline constexpr std::string_view waiting_stage = "read";
+
+/// Reads the frames of a merge in a given order, each while the one before is processed, checks that they fit the
+/// reference, and converts them to electrons.
+class FrameLoader {
+ public:
+  FrameLoader(const FrameReader& read, Executor& executor, StageClock& clock)
+      : read_(read), executor_(executor), clock_(clock) {}
+  ~FrameLoader();
+  FrameLoader(const FrameLoader&) = delete;
+  FrameLoader& operator=(const FrameLoader&) = delete;
+
+  /// Reads the frame that the others have to fit.
+  Result<FrameElectrons> read_reference(int index);
+  const RawFrame& reference() const { return reference_.frame; }
+  RawFrame& reference() { return reference_.frame; }
+  const DevelopOptions& reference_options() const { return reference_.options; }
+  const std::string& reference_name() const { return reference_.name; }
+
+  /// States the frames that next() returns, in this order.
+  void expect(std::vector<int> order);
+  /// Returns the next frame. Errors: those of reading and of frame_electrons; a frame that does not fit.
+  Result<FrameElectrons> next();
+
+  /// Returns whether a frame that was read differed from the reference in exposure time, aperture or gain.
+  bool exposures_differ() const { return exposures_differ_; }
+  /// Returns the ratio of the light of the frame last read to that of the reference, by the stated exposures. Error: a
+  /// frame that does not state its exposure time.
+  Result<double> stated_light() const;
+
+ private:
+  void begin();
+
+  const FrameReader& read_;
+  Executor& executor_;
+  StageClock& clock_;
+  FrameToMerge reference_;
+  FrameInfo last_;  // of the frame that was read last
+  std::string last_name_;
+  bool exposures_differ_ = false;
+  std::vector<int> order_;
+  std::size_t position_ = 0;
+  std::future<Result<FrameToMerge>> next_;
+};
+
+/// Returns the error with the name of the frame as its place, unless it has one.
+Error at_frame(Error error, const std::string& name);
+
+}  // namespace lowlux::isp

@@ -1,0 +1,78 @@
+#include "isp/pipeline/merge/predicted_frame.h"
+
+#include <array>
+#include <utility>
+#include <variant>
+
+#include "isp/pipeline/merge/merged_mosaic.h"
+#include "isp/pipeline/plan/plan_develop.h"
+#include "isp/pipeline/render/pipeline.h"
+
+namespace lowlux::isp {
+namespace {
+
+/// Returns the description of a frame whose image is its whole active area, without gains. The samples are borrowed
+/// from `frame` and have to be given back.
+RawFrame whole_area(RawFrame& frame) {
+  RawFrame out;
+  out.raw = std::move(frame.raw);
+  out.raw.default_crop = {0, 0, out.raw.active.width, out.raw.active.height};
+  out.colour = frame.colour;
+  out.noise = frame.noise;
+  out.corrections.defects = frame.corrections.defects;
+  return out;
+}
+
+}  // namespace
+
+Result<CameraRgb> predicted_electrons(RawFrame& frame, const DevelopOptions& options, Executor& executor) {
+  const Rect crop = frame.raw.default_crop;
+  RawFrame whole = whole_area(frame);
+  const auto give_back = [&] {
+    frame.raw = std::move(whole.raw);
+    frame.raw.default_crop = crop;
+  };
+  Result<DevelopPlan> plan = plan_develop(whole, without_rendering(options, denoise::Level::standard), executor);
+  if (!plan) {
+    give_back();
+    return tl::make_unexpected(std::move(plan.error()));
+  }
+  Picture picture = make_picture(*plan);
+  Pipeline(executor).render(whole, *plan, picture);
+  give_back();
+  CameraRgb out;
+  out.plane = std::move(std::get<SceneLinear>(picture).plane);
+  const std::array<double, 3> light_e = light_at_white_by_colour(frame.raw, plan->levels);
+  for_each_index(executor, out.height(), [&](int y) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto scale = static_cast<float>(light_e[c]);
+      float* const row = out.plane[c].row(y);
+      for (int x = 0; x < out.width(); ++x) row[x] *= scale;
+    }
+  });
+  return out;
+}
+
+Result<CameraRgb> predicted_electrons(merge::MosaicMean mean, const FrameElectrons& reference, const RawFrame& frame,
+                                      const DevelopOptions& options, Executor& executor) {
+  RawFrame like{.colour = frame.colour, .noise = frame.noise};
+  like.raw.phase = reference.phase;
+  MergedRaw merged;
+  merged.frames.resize(1);
+  encode_merged(mean, reference, {}, like, merged, executor);
+  mean = merge::MosaicMean(0, 0);
+  DevelopOptions options_of_mean = options;
+  options_of_mean.black = {};
+  options_of_mean.estimate_dark = options_of_mean.find_defects = false;
+  Result<CameraRgb> predicted = predicted_electrons(merged.frame, options_of_mean, executor);
+  if (!predicted) return predicted;
+  // The NoiseProfile of a mean counts as electrons those of all its frames.
+  for (Plane<float>& plane : predicted->plane) {
+    for_each_index(executor, plane.height(), [&](int y) {
+      for (int x = 0; x < plane.width(); ++x) plane.at(x, y) /= static_cast<float>(merged.mean_count);
+    });
+  }
+  return predicted;
+}
+
+}  // namespace lowlux::isp
