@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <vector>
 
 #include "isp/model/spectrum/cie_data.h"
@@ -54,20 +55,33 @@ template <class Add>
 void spread_point(const PointSource& point, int width, int height, const Add& add) {
   const int reach = static_cast<int>(std::ceil(6 * point.spread_px)) + 1;
   const int cx = static_cast<int>(std::lround(point.x_px)), cy = static_cast<int>(std::lround(point.y_px));
+  const int left = std::max(0, cx - reach), right = std::min(width - 1, cx + reach);
+  std::vector<double> column_fraction;
+  for (int x = left; x <= right; ++x) column_fraction.push_back(share_of(x - point.x_px, point.spread_px));
   for (int y = std::max(0, cy - reach); y <= std::min(height - 1, cy + reach); ++y) {
     const double row_fraction = share_of(y - point.y_px, point.spread_px);
-    for (int x = std::max(0, cx - reach); x <= std::min(width - 1, cx + reach); ++x) {
-      add(x, y, row_fraction * share_of(x - point.x_px, point.spread_px));
-    }
+    for (int x = left; x <= right; ++x) add(x, y, row_fraction * column_fraction[static_cast<std::size_t>(x - left)]);
   }
 }
 
-/// Returns the rates of each point light at 1 cd/m2.
-std::vector<Vector3> point_rates(const Scene& scene, const SpectralResponse& response) {
+/// Returns the rates of each light at 1 cd/m2.
+std::vector<Vector3> light_rates(std::span<const Spectrum> lights, const SpectralResponse& response) {
   std::vector<Vector3> rates;
-  rates.reserve(scene.point_lights.size());
-  for (const Spectrum& light : scene.point_lights) rates.push_back(isp::electron_rate(response, light));
+  rates.reserve(lights.size());
+  for (const Spectrum& light : lights) rates.push_back(isp::electron_rate(response, light));
   return rates;
+}
+
+/// Adds points to three planes, `colours` being the channels of each light at 1 cd/m2.
+template <class Planes>
+void add_to_planes(std::span<const PointSource> points, std::span<const Vector3> colours, Planes& out) {
+  for (const PointSource& point : points) {
+    const Vector3& colour = colours[static_cast<std::size_t>(point.light)];
+    spread_point(point, out.width(), out.height(), [&](int x, int y, double share) {
+      for (int k = 0; k < 3; ++k)
+        out.plane[k].at(x, y) += static_cast<float>(point.luminance_cd_m2 * share * colour[k]);
+    });
+  }
 }
 
 /// Calls put(x, y, rates) for every pixel, where rates(k) gives channel k without the points.
@@ -108,46 +122,44 @@ ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, con
   out.moved_pixels = for_each_pixel(scene, response, table, executor, [&](int x, int y, const auto& rate) {
     out.e_per_s.row(y)[x] = rate(static_cast<int>(colour_at(phase, x, y)));
   });
-  const std::vector<Vector3> lights = point_rates(scene, response);
-  for (const PointSource& point : scene.points) {
-    const Vector3& rate = lights[point.light];
-    spread_point(point, width, height, [&](int x, int y, double share) {
-      out.e_per_s.at(x, y) +=
-          static_cast<float>(point.luminance_cd_m2 * share * rate[static_cast<int>(colour_at(phase, x, y))]);
-    });
-  }
+  add_points(scene.points, scene.point_lights, response, phase, out.e_per_s);
   return out;
 }
 
 CameraRgb charge_rate_rgb(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
-                          Executor& executor) {
+                          Executor& executor, std::int64_t* moved_pixels) {
   const int width = scene.xyz_cd_m2.width(), height = scene.xyz_cd_m2.height();
   CameraRgb out(width, height);
-  for_each_pixel(scene, response, table, executor, [&](int x, int y, const auto& rate) {
+  const std::int64_t moved = for_each_pixel(scene, response, table, executor, [&](int x, int y, const auto& rate) {
     for (int k = 0; k < 3; ++k) out.plane[k].row(y)[x] = rate(k);
   });
-  const std::vector<Vector3> lights = point_rates(scene, response);
-  for (const PointSource& point : scene.points) {
-    const Vector3& rate = lights[point.light];
-    spread_point(point, width, height, [&](int x, int y, double share) {
-      for (int k = 0; k < 3; ++k) out.plane[k].at(x, y) += static_cast<float>(point.luminance_cd_m2 * share * rate[k]);
-    });
-  }
+  if (moved_pixels != nullptr) *moved_pixels = moved;
+  add_points(scene.points, scene.point_lights, response, out);
   return out;
 }
 
-void add_points(const Scene& scene, SceneLinear& xyz_cd_m2) {
-  std::vector<Vector3> lights;
-  lights.reserve(scene.point_lights.size());
-  for (const Spectrum& light : scene.point_lights) lights.push_back(isp::vector_of(isp::xyz_cd_m2(light)));
-  for (const PointSource& point : scene.points) {
-    const Vector3& xyz = lights[point.light];
-    spread_point(point, xyz_cd_m2.width(), xyz_cd_m2.height(), [&](int x, int y, double share) {
-      for (int k = 0; k < 3; ++k) {
-        xyz_cd_m2.plane[k].at(x, y) += static_cast<float>(point.luminance_cd_m2 * share * xyz[k]);
-      }
+void add_points(std::span<const PointSource> points, std::span<const Spectrum> lights, const SpectralResponse& response,
+                BayerPhase phase, Plane<float>& e_per_s) {
+  const std::vector<Vector3> rates = light_rates(lights, response);
+  for (const PointSource& point : points) {
+    const Vector3& rate = rates[static_cast<std::size_t>(point.light)];
+    spread_point(point, e_per_s.width(), e_per_s.height(), [&](int x, int y, double share) {
+      e_per_s.at(x, y) +=
+          static_cast<float>(point.luminance_cd_m2 * share * rate[static_cast<int>(colour_at(phase, x, y))]);
     });
   }
+}
+
+void add_points(std::span<const PointSource> points, std::span<const Spectrum> lights, const SpectralResponse& response,
+                CameraRgb& e_per_s) {
+  add_to_planes(points, light_rates(lights, response), e_per_s);
+}
+
+void add_points(std::span<const PointSource> points, std::span<const Spectrum> lights, SceneLinear& xyz_cd_m2) {
+  std::vector<Vector3> colours;
+  colours.reserve(lights.size());
+  for (const Spectrum& light : lights) colours.push_back(isp::vector_of(isp::xyz_cd_m2(light)));
+  add_to_planes(points, colours, xyz_cd_m2);
 }
 
 }  // namespace lowlux::capture

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "capture/synthetic/scene.h"
 #include "isp/base/cfa.h"
@@ -24,10 +25,17 @@ ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, con
 
 /// Computes the charge rate under all three filters at every pixel: the noise-free truth of a demosaiced,
 /// black-subtracted frame [e- per s].
+/// @param moved_pixels if not null, set to ChargeRate::moved_pixels
 CameraRgb charge_rate_rgb(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
-                          Executor& executor);
+                          Executor& executor, std::int64_t* moved_pixels = nullptr);
 
-/// Adds the point sources to the scene's colours: the truth as XYZ [cd/m2].
-void add_points(const Scene& scene, SceneLinear& xyz_cd_m2);
+/// The functions below add points at their positions: to charge rates under each pixel's own filter, under all three
+/// filters at every pixel [e- per s], and to colours as XYZ [cd/m2].
+/// @param lights radiances at 1 cd/m2, see Scene::point_lights
+void add_points(std::span<const PointSource> points, std::span<const Spectrum> lights, const SpectralResponse& response,
+                BayerPhase phase, Plane<float>& e_per_s);
+void add_points(std::span<const PointSource> points, std::span<const Spectrum> lights, const SpectralResponse& response,
+                CameraRgb& e_per_s);
+void add_points(std::span<const PointSource> points, std::span<const Spectrum> lights, SceneLinear& xyz_cd_m2);
 
 }  // namespace lowlux::capture

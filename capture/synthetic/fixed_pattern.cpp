@@ -17,6 +17,9 @@ void multiply(const PatternRow& row, int word, float deviation, std::span<float>
   for (std::size_t i = 0; i < values.size(); ++i) values[i] *= std::max(0.0f, 1.0f + deviation * z[i]);
 }
 
+/// Returns whether a pixel is hot by its word.
+bool is_hot_pixel(std::uint32_t word, double fraction) { return word + 0.5 < fraction * 0x1p32; }
+
 }  // namespace
 
 void apply_prnu(const PatternRow& row, float deviation, std::span<float> values, std::span<float> scratch) {
@@ -32,12 +35,18 @@ void add_hot_pixels(const PatternRow& row, double fraction, double mean_e, std::
   const DrawStream stream{row.seed, 0, draw_purpose::fixed_pattern};
   const auto is_hot = scratch.first(charge_e.size());
   words_row(stream, row.x0, row.y, is_hot_word, is_hot);
-  const double threshold = fraction * 0x1p32;
   for (std::size_t i = 0; i < charge_e.size(); ++i) {
-    if (is_hot[i] + 0.5 >= threshold) continue;
+    if (!is_hot_pixel(is_hot[i], fraction)) continue;
     const PhiloxWords words = words_at(stream, row.x0 + static_cast<std::uint32_t>(i), row.y);
     charge_e[i] += static_cast<float>(-mean_e * std::log((words[how_hot_word] + 0.5) * 0x1p-32));
   }
+}
+
+void find_hot_pixels(const PatternRow& row, double fraction, std::span<std::uint32_t> scratch,
+                     std::span<std::uint8_t> hot) {
+  const auto words = scratch.first(hot.size());
+  words_row({row.seed, 0, draw_purpose::fixed_pattern}, row.x0, row.y, is_hot_word, words);
+  for (std::size_t i = 0; i < hot.size(); ++i) hot[i] = is_hot_pixel(words[i], fraction) ? 1 : 0;
 }
 
 void add_column_pattern(const PatternRow& row, float deviation_e, std::span<float> offset_e, std::span<float> scratch) {

@@ -25,6 +25,11 @@ void apply_dsnu(const PatternRow& row, float deviation, std::span<float> values,
 void add_hot_pixels(const PatternRow& row, double fraction, double mean_e, std::span<float> charge_e,
                     std::span<std::uint32_t> scratch);
 
+/// Sets each element to 1 where add_hot_pixels() adds charge, else to 0.
+/// @param scratch as long as `hot`
+void find_hot_pixels(const PatternRow& row, double fraction, std::span<std::uint32_t> scratch,
+                     std::span<std::uint8_t> hot);
+
 /// Adds the column pattern to a row of offsets [e-].
 void add_column_pattern(const PatternRow& row, float deviation_e, std::span<float> offset_e, std::span<float> scratch);
 

@@ -40,7 +40,7 @@ Result<Scene> empty_scene(const SceneSetup& setup) {
   auto white = isp::radiance_of(setup.light, setup.luminance_cd_m2);
   if (!white)
     return wrong("a light needs power between 380 and 780 nm that adds up to a finite number", setup.light_name);
-  Scene scene{SceneLinear(setup.width, setup.height), {}, {}, {}, {}, *std::move(white), {}};
+  Scene scene{.xyz_cd_m2 = SceneLinear(setup.width, setup.height), .white = *std::move(white)};
   for (Plane<float>& plane : scene.xyz_cd_m2.plane) std::fill_n(plane.data(), plane.size(), 0.0f);
   return scene;
 }
@@ -145,32 +145,64 @@ Result<Scene> picture_scene(SceneLinear xyz, double luminance_cd_m2) {
     }
   }
   const isp::Xyz d65 = *isp::xyz_of(isp::white_d65, luminance_cd_m2 > 0 ? luminance_cd_m2 : 1);
-  return Scene{std::move(xyz), {}, {}, {}, {}, *isp::lift(d65), "a picture"};
+  return Scene{.xyz_cd_m2 = std::move(xyz), .white = *isp::lift(d65), .description = "a picture"};
 }
 
 Result<void> add_lamp(Scene& scene, double x_px, double y_px, const Spectrum& light, double luminance_cd_m2) {
   if (auto good = check_luminance(luminance_cd_m2); !good) return good;
   auto unit = isp::radiance_of(light, 1);
   if (!unit) return wrong("the lamp's light has no luminance");
-  scene.points.push_back({x_px, y_px, static_cast<int>(scene.point_lights.size()), luminance_cd_m2});
+  scene.points.push_back({.x_px = x_px,
+                          .y_px = y_px,
+                          .light = static_cast<int>(scene.point_lights.size()),
+                          .luminance_cd_m2 = luminance_cd_m2});
   scene.point_lights.push_back(*std::move(unit));
   return {};
 }
 
-Result<void> add_stars(Scene& scene, int count, double faintest_cd_m2, std::uint64_t seed) {
+std::vector<PointSource> stars_of_cell(const StarField& field, int column, int row) {
+  constexpr double brightest = 1e6;  // in units of the faintest
+  const DrawStream stream{field.seed, static_cast<std::uint32_t>(column), draw_purpose::scene};
+  std::vector<PointSource> stars;
+  stars.reserve(static_cast<std::size_t>(field.count));
+  for (int i = 0; i < field.count; ++i) {
+    const PhiloxWords w = words_at(stream, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(row));
+    const double flux = field.faintest_cd_m2 * std::min(brightest, std::pow(unit_of(w[2]), -2.0 / 3));
+    const double x = unit_of(w[0]) * field.width_px - 0.5, y = unit_of(w[1]) * field.height_px - 0.5;
+    stars.push_back({.x_px = x + static_cast<double>(column) * field.width_px,
+                     .y_px = y + static_cast<double>(row) * field.height_px,
+                     .light = field.first_light + static_cast<int>(w[3] >> 30),
+                     .luminance_cd_m2 = flux,
+                     .is_star = true});
+  }
+  return stars;
+}
+
+Result<void> add_stars(Scene& scene, int count, double faintest_cd_m2, std::uint64_t seed, int reduction) {
   if (count < 0 || count > 1000000) return wrong("there are 0 to 1000000 stars, found " + std::to_string(count));
   if (auto good = check_luminance(faintest_cd_m2); !good) return good;
-  constexpr double brightest = 1e6;  // in units of the faintest
-  const int width = scene.xyz_cd_m2.width(), height = scene.xyz_cd_m2.height();
-  const int first_light = static_cast<int>(scene.point_lights.size());
+  const StarField field{count,
+                        faintest_cd_m2,
+                        seed,
+                        scene.xyz_cd_m2.width() / reduction,
+                        scene.xyz_cd_m2.height() / reduction,
+                        static_cast<int>(scene.point_lights.size())};
   for (const char* light : {"A", "D50", "D65", "D75"}) {
     scene.point_lights.push_back(*isp::radiance_of(*isp::light_named(light), 1));
   }
-  for (int i = 0; i < count; ++i) {
-    const PhiloxWords w = words_at({seed, 0, draw_purpose::scene}, static_cast<std::uint32_t>(i), 0);
-    const double flux = faintest_cd_m2 * std::min(brightest, std::pow(unit_of(w[2]), -2.0 / 3));
-    scene.points.push_back(
-        {unit_of(w[0]) * width - 0.5, unit_of(w[1]) * height - 0.5, first_light + static_cast<int>(w[3] >> 30), flux});
+  const std::vector<PointSource> stars = stars_of_cell(field, 0, 0);
+  scene.points.insert(scene.points.end(), stars.begin(), stars.end());
+  if (count > 0) scene.star_fields.push_back(field);
+  return {};
+}
+
+Result<void> check_points(const Scene& scene) {
+  for (const PointSource& p : scene.points) {
+    const bool near = std::fabs(p.x_px) <= 1e6 && std::fabs(p.y_px) <= 1e6;
+    const bool lit = p.light >= 0 && p.light < static_cast<int>(scene.point_lights.size()) && p.luminance_cd_m2 >= 0;
+    if (!near || !lit || !(p.spread_px > 0) || !(p.spread_px <= 1000)) {
+      return wrong("a point source lies within a million pixels and spreads over more than 0 and at most 1000");
+    }
   }
   return {};
 }

@@ -20,7 +20,21 @@ struct PointSource {
   int light = 0;               // index in Scene::point_lights
   double luminance_cd_m2 = 0;  // of a pixel that it fills uniformly: the light of one pixel's area
   double spread_px = 0.7;      // standard deviation
+  bool is_star = false;        // moves with the sky, see BurstOptions
 };
+
+/// Stars that continue in all directions, in cells of the image's size. Cell (0, 0) is the image itself.
+struct StarField {
+  int count = 0;              // in each cell
+  double faintest_cd_m2 = 0;  // see add_stars
+  std::uint64_t seed = 0;
+  int width_px = 0;  // of a cell
+  int height_px = 0;
+  int first_light = 0;  // index in Scene::point_lights of the first of their four lights
+};
+
+/// Returns the stars of a cell: a pure function of the field and the cell.
+std::vector<PointSource> stars_of_cell(const StarField& field, int column, int row);
 
 /// A scene in front of the camera: one radiance for each pixel, as a colour or as a spectrum.
 struct Scene {
@@ -31,6 +45,7 @@ struct Scene {
   std::vector<Spectrum> point_lights;  // radiance at 1 cd/m2
   Spectrum white;                      // radiance of a white diffuser in the scene: the camera's white balance
   std::string description;
+  std::vector<StarField> star_fields;  // cell (0, 0) of each is in `points`
 };
 
 /// Size and light of a generated scene.
@@ -65,7 +80,12 @@ Result<void> add_lamp(Scene& scene, double x_px, double y_px, const Spectrum& li
 
 /// Adds stars: uniformly distributed positions, fluxes distributed as their power -1.5 above the faintest, lights
 /// between A and D75.
-/// @param faintest luminance of the faintest star's light spread over one pixel [cd/m2]
-Result<void> add_stars(Scene& scene, int count, double faintest_cd_m2, std::uint64_t seed);
+/// @param faintest_cd_m2 luminance of the faintest star's light spread over one pixel
+/// @param reduction      samples of the scene for each pixel of the image and axis, see BurstOptions
+Result<void> add_stars(Scene& scene, int count, double faintest_cd_m2, std::uint64_t seed, int reduction = 1);
+
+/// Checks points that were not made by the functions above. Error: a point without a light, farther away than a million
+/// pixels, or with a spread that is not above 0 or exceeds 1000 pixels.
+Result<void> check_points(const Scene& scene);
 
 }  // namespace lowlux::capture

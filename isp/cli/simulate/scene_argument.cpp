@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <string_view>
 #include <utility>
 
@@ -40,7 +41,8 @@ Result<Spectrum> finely_sampled(const Spectrum& light) {
 Result<capture::SceneSetup> setup_of(const SceneArgs& args) {
   auto light = light_of(args.light, "--light");
   if (!light) return tl::make_unexpected(light.error());
-  return capture::SceneSetup{args.width, args.height, *std::move(light), args.light, args.luminance_cd_m2};
+  return capture::SceneSetup{args.reduction * args.width, args.reduction * args.height, *std::move(light),
+                             std::filesystem::path(args.light).filename().string(), args.luminance_cd_m2};
 }
 
 Result<std::vector<capture::SpectrumColumn>> read_reflectances(const std::string& file) {
@@ -148,7 +150,7 @@ Result<SceneOfArgs> scene_of(const SceneArgs& args, std::uint64_t seed, Executor
     if (!lit) return fail(lit.error().code, lit.error().message, "--lamp");
   }
   const double faintest = args.star_luminance_cd_m2.value_or(args.luminance_cd_m2 / 10);
-  if (const auto stars = capture::add_stars(out->scene, args.stars, faintest, seed); !stars) {
+  if (const auto stars = capture::add_stars(out->scene, args.stars, faintest, seed, args.reduction); !stars) {
     return tl::make_unexpected(stars.error());
   }
   return out;

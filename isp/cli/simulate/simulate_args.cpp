@@ -140,12 +140,12 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
   isp::SensorFigures& f = args.figures;
   const auto figure = [&app](const std::string& flag, const std::string& type, const std::string& help,
                              std::optional<double>& out) {
-    add_number(app, flag, type, help, [&out](double value) { out = value; })->group("sensor figures");
+    add_number(app, flag, type, help, [&out](double value) { out = value; })->group("Sensor figures");
   };
   figure("--system-gain", "DN_PER_E", "codes per electron", f.system_gain_dn_per_e);
   figure("--read-noise", "E", "standard deviation", f.read_noise_e);
   figure("--full-well", "E", "charge of a full pixel", f.full_well_e);
-  app.add_option("--bits", f.bits, "of the converter")->group("sensor figures");
+  app.add_option("--bits", f.bits, "of the converter")->group("Sensor figures");
   figure("--black-level", "DN", "pedestal", f.black_level_dn);
   figure("--white-level", "DN", "largest code", f.white_level_dn);
   add_text(app, "--dark-current", "E_PER_S[,G,B]", "for all channels, or for red, green and blue",
@@ -156,7 +156,7 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
                  n->size() == 1 ? std::array{(*n)[0], (*n)[0], (*n)[0]} : std::array{(*n)[0], (*n)[1], (*n)[2]};
              return std::nullopt;
            })
-      ->group("sensor figures");
+      ->group("Sensor figures");
   figure("--dark-temperature", "C", "at which the dark current is that", f.dark_temperature_c);
   figure("--dark-doubling", "C", "degrees over which it doubles", f.dark_doubling_c);
   figure("--prnu", "RATIO", "photo response non-uniformity", f.prnu);
@@ -172,7 +172,7 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
   add_choice<Quantisation>(
       app, "--quantise", {{"round", Quantisation::round}, {"floor", Quantisation::floor}},
       [&f](Quantisation q) { f.quantisation = q; }, "how the converter makes codes")
-      ->group("sensor figures");
+      ->group("Sensor figures");
 }
 
 void add_camera(CLI::App& app, SimulateArgs& args) {
@@ -193,7 +193,7 @@ void add_camera(CLI::App& app, SimulateArgs& args) {
       ->type_name("N");
 }
 
-void add_work(CLI::App& app, SimulateArgs& args) {
+void add_work(CLI::App& app, SimulateArgs& args, std::optional<int>& frames) {
   capture::SyntheticOptions& o = args.options;
   add_text(app, "--effects", "auto|all|none|LIST",
            "what is simulated: what the scene calls for (auto; default, but with --sampling published all), or names "
@@ -209,12 +209,12 @@ void add_work(CLI::App& app, SimulateArgs& args) {
       "photons: one Poisson draw for each pixel (default), or one for each wavelength as the thesis has it");
   add_text(
       app, "--seed", "N",
-      "of the noise, and of where stars are (default 1); darks and lights that are to have noise of their own need "
+      "of the noise, the stars and the motion (default 1); darks and lights that are to have noise of their own need "
       "seeds of their own",
       [&o](const std::string& text) { return set_seed(text, o.seed); });
   add_text(app, "--sensor-seed", "N", "of the fixed pattern: which specimen of the sensor it is (default 1)",
            [&o](const std::string& text) { return set_seed(text, o.sensor_seed); });
-  app.add_option("--frames", args.frames, "frames of the same scene, OUT_0000.dng and on (default 1)")
+  app.add_option("--frames", frames, "frames OUT_0000.dng and on (default 1, or the exposures of --bracket)")
       ->check(CLI::Range(1, 10000))
       ->type_name("N");
   app.add_flag("--explain", args.explain, "what each effect was predicted to change, what was decided, what it saved");
@@ -248,11 +248,13 @@ Parsed<SimulateArgs> parse_simulate(const std::vector<std::string>& words) {
   add_scene(app, args.scene);
   add_files(app, args);
   add_camera(app, args);
-  add_work(app, args);
+  std::optional<int> frames;
+  add_work(app, args, frames);
   add_text(app, "--tolerance", "DE[,VARIANCE]",
            "what leaving effects out may change: CIEDE2000 of 32x32 block means, relative variance of blocks "
            "(default 0.5,0.05)",
            [&tolerance](const std::string& text) { return set_tolerance(text, tolerance.emplace()); });
+  add_burst(app, args.burst);
   add_figures(app, args);
   if (const auto code = parse_words(app, words)) return *code;
   if (tolerance) {
@@ -263,6 +265,11 @@ Parsed<SimulateArgs> parse_simulate(const std::vector<std::string>& words) {
     args.options.effects.tolerance.reset();  // the planner supports physical photons only
   }
   args.options.f_number = args.optics.f_number;
+  if (const auto good = complete_burst(args.burst, args.scene.what, frames); !good) {
+    return refuse(app, good.error().message);
+  }
+  args.frames = frames.value_or(1);
+  args.scene.reduction = args.burst.options.reduction.value_or(1);
   return args;
 }
 

@@ -4,8 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "capture/synthetic/synthetic_source.h"
+#include "capture/synthetic/synthetic_camera.h"
 #include "isp/cli/develop/develop_args.h"
+#include "isp/cli/simulate/burst_args.h"
 #include "isp/model/sensor/sensor_db.h"
 #include "isp/model/spectrum/spectral_response.h"
 
@@ -35,6 +36,7 @@ struct SceneArgs {
   int stars = 0;
   std::optional<double> star_luminance_cd_m2;  // of the faintest star; absent: a tenth of the scene's
   std::vector<LampArgs> lamps;
+  int reduction = 1;  // generated scenes have so many samples for each pixel of --size and axis
 };
 
 struct SimulateArgs {
@@ -49,6 +51,7 @@ struct SimulateArgs {
   isp::Optics optics;
   capture::SyntheticOptions options;
   int frames = 1;
+  BurstArgs burst;
   std::string effects;  // as given; empty: auto, or all for published sampling
   bool list = false;
   bool explain = false;

@@ -1,0 +1,74 @@
+#include "capture/synthetic/synthetic_camera.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "isp/model/colour/camera_colour.h"
+#include "isp/model/colour/camera_matrix.h"
+#include "isp/model/sensor/photon.h"
+#include "isp/model/spectrum/cie_data.h"
+#include "isp/model/spectrum/spectral_data.h"
+#include "isp/model/spectrum/spectral_response.h"
+
+namespace lowlux::capture {
+namespace {
+
+/// Returns matrices for A and D65 fitted to the camera's sensitivities, and the neutral of the scene's white.
+Result<CameraColour> colour_of(const isp::NamedSensor& sensor, const SpectralResponse& response,
+                               const Spectrum& white) {
+  const auto sensitivity = *isp::camera_sensitivity(sensor.camera);
+  CameraColour colour;
+  for (const char* light : {"A", "D65"}) {
+    auto calibration = isp::fit_calibration(sensitivity, *isp::light_named(light), isp::ForwardMatrix::fit);
+    if (!calibration) return tl::make_unexpected(calibration.error());
+    colour.calibrations.push_back(*calibration);
+  }
+  Vector3 neutral = isp::electron_rate(response, white);
+  const double largest = *std::max_element(neutral.begin(), neutral.end());
+  if (!(*std::min_element(neutral.begin(), neutral.end()) > 1e-6 * largest)) {
+    // A light that leaves a channel dark (or no light) gives no white balance: daylight replaces it.
+    neutral = isp::electron_rate(response, *isp::radiance_of(*isp::light_named("D65"), 1));
+  }
+  const double scale = *std::max_element(neutral.begin(), neutral.end());
+  colour.as_shot_neutral = Vector3{neutral[0] / scale, neutral[1] / scale, neutral[2] / scale};
+  colour.source = CameraColour::Source::file_tags;
+  return colour;
+}
+
+Result<void> check_options(const SyntheticOptions& options) {
+  if (options.masked_columns < 0 || options.masked_columns > 4096 || options.masked_columns % 2 != 0) {
+    return fail(ErrorCode::invalid_argument, "masked columns are an even number between 0 and 4096");
+  }
+  if (const auto& t = options.effects.tolerance; t && (!(t->delta_e > 0) || !(t->relative_variance > 0))) {
+    return fail(ErrorCode::invalid_argument, "a tolerance must be above 0: ask for all effects to leave none out");
+  }
+  if (options.sampling == PhotonSampling::published && options.effects.tolerance) {
+    return fail(ErrorCode::invalid_argument,
+                "the planner knows the variance of physical photons only: name the effects of published sampling");
+  }
+  if (!(options.f_number >= 0.5) || !(options.f_number <= 1000)) {
+    return fail(ErrorCode::invalid_argument, "the f-number must lie between 0.5 and 1000");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<SyntheticCamera> make_camera(isp::NamedSensor sensor, const SpectralResponse& response, const Spectrum& white,
+                                    const SyntheticOptions& options) {
+  if (const auto good = isp::check_sensor(sensor.model); !good) return tl::make_unexpected(good.error());
+  if (const auto good = isp::check_exposure(options.exposure); !good) return tl::make_unexpected(good.error());
+  if (const auto good = check_options(options); !good) return tl::make_unexpected(good.error());
+  auto colour = colour_of(sensor, response, white);
+  if (!colour) return tl::make_unexpected(colour.error());
+  const auto seen = isp::white_of_neutral(*colour, *colour->as_shot_neutral);
+  const auto to_xyz =
+      seen ? isp::camera_to_xyz(*colour, seen->xy, isp::white_d65) : Result<Matrix3>(tl::make_unexpected(seen.error()));
+  if (!to_xyz) return tl::make_unexpected(to_xyz.error());
+  // The ISO speed at which the frame's exposure, f-number and saturation agree (isp/model/sensor/scene_luminance.h).
+  const double saturation_cd_m2 = isp::saturation_luminance_cd_m2(sensor.model, response, 1);
+  const double iso = 78 * options.f_number * options.f_number / (0.65 * saturation_cd_m2);
+  return SyntheticCamera{std::move(sensor), options, *std::move(colour), *to_xyz, iso};
+}
+
+}  // namespace lowlux::capture

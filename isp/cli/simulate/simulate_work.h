@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isp/base/frame.h"
+#include "isp/base/image.h"
+#include "isp/base/result.h"
+#include "isp/cli/simulate/simulate_args.h"
+#include "isp/cli/simulate/simulate_report.h"
+
+namespace lowlux::cli {
+
+/// Holds what a simulation makes, for callers that keep it in memory.
+struct SimulatedData {
+  std::vector<RawFrame> frames;
+  std::optional<SceneLinear> truth;    // linear sRGB with the scene's white at 1
+  std::optional<SceneLinear> truth_e;  // mean electrons of R, G, B at each pixel
+  std::string burst_truth;             // JSON, see burst_truth_json; empty: not a burst
+};
+
+/// Does the work of `simulate`: writes the files that the arguments name, and prints nothing.
+/// @param keep  set: frames and truths are also put there; arguments without an output then write no file
+/// Errors: outputs that exist, those of scene, sensor and writers.
+Result<SimulateOutcome> simulate(const SimulateArgs& args, SimulatedData* keep = nullptr);
+
+}  // namespace lowlux::cli
