@@ -8,6 +8,7 @@
 
 #include "denoise/spatial/layout.h"
 #include "isp/base/cfa.h"
+#include "isp/base/noise_ratio.h"
 #include "isp/base/plane.h"
 
 namespace lowlux::denoise {
@@ -34,12 +35,13 @@ inline constexpr double largest_e = 1e9;
 struct RawElectronsView {
   PlaneView<const float> value;
   BayerPhase phase = BayerPhase::rggb;
+  NoiseRatioView noise_ratio{};  // of each value's variance to that of RawNoise; 1e-6..1e6
 };
 
 inline constexpr double unsaturated_e = std::numeric_limits<double>::infinity();
 
-/// Noise of a raw value y [e-] of one colour: Var[y] = max(E[y], 0) + variance_e2. All members are in 0..largest_e,
-/// except saturation_e.
+/// Noise of a raw value y [e-] of one colour: Var[y] = r (max(E[y], 0) + variance_e2), where r is
+/// RawElectronsView::noise_ratio, usually 1. All members are in 0..largest_e, except saturation_e.
 struct RawNoise {
   PerSite<double>
       dark_mean_e{};  // subtracted, sites as in site_of(); both greens get their mean, to avoid maze patterns

@@ -9,6 +9,7 @@
 #include "denoise/spatial/bands.h"
 #include "denoise/spatial/chroma_start.h"
 #include "denoise/spatial/frame_memory.h"
+#include "denoise/spatial/local_noise.h"
 #include "denoise/spatial/nl_bayes.h"
 #include "denoise/spatial/passes.h"
 #include "denoise/spatial/point_sources.h"
@@ -103,7 +104,7 @@ ChromaStarts Run::starts() const {
         double sum = 0;
         for (int row = top; row < bottom; ++row) sum += rows::sum_of(raw.value.row(row) + left, right - left);
         const double mean = sum / (static_cast<double>(right - left) * (bottom - top));
-        start = start_of(mean - dark, dark, variance);
+        start = start_of(mean - dark, dark, variance, raw.noise_ratio.mean(left, top, right - left, bottom - top));
         if (options.level == Level::best && start == 1) start = 0;
       }
       out.start[i] = static_cast<float>(std::min(start, levels - 1));
@@ -172,6 +173,10 @@ void Run::front() const {
         in.variance_e2[k] = static_cast<float>(noise.variance_e2[k]);
       }
       in.cells = level.width;
+      if (!raw.noise_ratio.is_one()) {
+        ratio_of_squares(raw.noise_ratio, columns, rows, pair, {m.ratio, static_cast<std::size_t>(level.width / 2)});
+        in.ratio = m.ratio;
+      }
       float* const out[4] = {level.variance.row(0, pair), level.variance.row(1, pair), level.variance.row(2, pair),
                              level.variance.row(3, pair)};
       rows::variance_row(in, m.variance, out);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include <fmt/format.h>
@@ -38,6 +39,7 @@ struct Check {
   const RawElectronsView& raw;
   std::array<ColourModel, 3> model;
   std::array<std::vector<float>, 3> cells;  // of one tile, part x part, dark charge included
+  int tile_x = 0, tile_y = 0;               // first cell of the tile
   std::array<std::vector<BlockDetail>, max_levels> blocks;
   NoiseCheck out;
   std::array<long, 3> negative{};
@@ -60,7 +62,12 @@ struct Check {
   void add_windows(int columns, int rows);
   void add_window(int x0, int y0);
   void add_blocks(int level, int columns, int rows);
-  std::optional<BlockDetail> detail(int x0, int y0, double averaged) const;
+  std::optional<BlockDetail> detail(int x0, int y0, int level) const;
+  /// Returns the noise ratio of a square of `side` cells of a level of the tile.
+  double ratio_of(int x0, int y0, int side, int level) const {
+    const int px = 2 << level;  // of a cell
+    return raw.noise_ratio.mean(2 * tile_x + px * x0, 2 * tile_y + px * y0, px * side, px * side);
+  }
   void halve(int columns, int rows);
   /// Measures the rows of tiles first .. last - 1.
   void measure(int first, int last);
@@ -79,6 +86,8 @@ void Check::load(int x0, int y0, int columns, int rows) {
     return std::isnan(e) ? none : std::clamp(e, -1e9f, 1e9f);
   };
   const int red_x = red_column(raw.phase), red_y = red_row(raw.phase);
+  tile_x = x0;
+  tile_y = y0;
   for (int y = 0; y < rows; ++y) {
     const float* const with_red = raw.value.row(2 * (y0 + y) + red_y) + std::ptrdiff_t{2} * x0;
     const float* const with_blue = raw.value.row(2 * (y0 + y) + 1 - red_y) + std::ptrdiff_t{2} * x0;
@@ -93,6 +102,7 @@ void Check::load(int x0, int y0, int columns, int rows) {
 
 void Check::add_window(int x0, int y0) {
   std::array<double, 3> deviations{};  // of the mean signal from 0, in standard deviations
+  const double ratio = ratio_of(x0, y0, window, 0);
   for (int c = 0; c < 3; ++c) {
     double sum = 0, squares = 0;
     const auto about = static_cast<double>(cells[c][static_cast<std::size_t>(y0) * part + x0]);
@@ -106,7 +116,7 @@ void Check::add_window(int x0, int y0) {
     constexpr double count = window * window;
     const double mean = sum / count, own = (squares - sum * mean) / (count - 1);
     if (std::isnan(mean)) return;
-    const double variance = std::max(own, model[c].variance_of(mean + about));
+    const double variance = std::max(own, ratio * model[c].variance_of(mean + about));
     deviations[c] = (mean + about - model[c].dark_e) / std::sqrt(variance / count);
   }
   ++out.windows;
@@ -121,8 +131,8 @@ void Check::add_windows(int columns, int rows) {
 }
 
 /// Returns the details of one block, or nullopt if one is not finite.
-/// @param averaged  number of finest cells of which each cell is the mean
-std::optional<BlockDetail> Check::detail(int x0, int y0, double averaged) const {
+std::optional<BlockDetail> Check::detail(int x0, int y0, int level) const {
+  const double finest_cells = std::ldexp(1.0, 2 * level), ratio = ratio_of(x0, y0, block, level);
   BlockDetail sum{0, 0};
   for (int c = 0; c < 3; ++c) {
     double mean = 0, across = 0, diagonal = 0;
@@ -139,7 +149,7 @@ std::optional<BlockDetail> Check::detail(int x0, int y0, double averaged) const 
       }
     }
     constexpr double details = block * block / 4.0;
-    const double variance = model[c].variance_of(mean / (block * block)) / averaged;
+    const double variance = ratio * model[c].variance_of(mean / (block * block)) / finest_cells;
     sum.across += across / (2 * details * variance) / 3;
     sum.diagonal += diagonal / (details * variance) / 3;
   }
@@ -150,7 +160,7 @@ std::optional<BlockDetail> Check::detail(int x0, int y0, double averaged) const 
 void Check::add_blocks(int level, int columns, int rows) {
   for (int y = 0; y + block <= rows; y += block) {
     for (int x = 0; x + block <= columns; x += block) {
-      if (const auto found = detail(x, y, std::ldexp(1.0, 2 * level))) blocks[level].push_back(*found);
+      if (const auto found = detail(x, y, level)) blocks[level].push_back(*found);
     }
   }
 }
@@ -158,8 +168,8 @@ void Check::add_blocks(int level, int columns, int rows) {
 void Check::halve(int columns, int rows) {
   for (auto& colour : cells) {
     for (int y = 0; y < rows; ++y) {
-      const float *const upper = colour.data() + static_cast<std::ptrdiff_t>(2 * y) * part, *const lower = upper + part;
-      float* const to = colour.data() + static_cast<std::ptrdiff_t>(y) * part;
+      const float *const upper = colour.data() + std::ptrdiff_t{2} * y * part, *const lower = upper + part;
+      float* const to = colour.data() + std::ptrdiff_t{y} * part;
       for (int x = 0; x < columns; ++x) {
         to[x] = 0.25f * (upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1]);
       }
@@ -183,8 +193,7 @@ void Check::measure(int first, int last) {
 }
 
 void Check::add(const Check& other) {
-  for (int l = 0; l < max_levels; ++l)
-    blocks[l].insert(blocks[l].end(), other.blocks[l].begin(), other.blocks[l].end());
+  for (int l = 0; l < max_levels; ++l) std::ranges::copy(other.blocks[l], std::back_inserter(blocks[l]));
   for (int c = 0; c < 3; ++c) negative[c] += other.negative[c];
   out.windows += other.out.windows;
   without_signal += other.without_signal;

@@ -16,11 +16,11 @@ namespace lowlux::denoise {
 /// Results over non-overlapping windows of 9 x 9 cells (2x2 sites) and over all sites.
 struct NoiseCheck {
   /// Ratio, on each pyramid level (2x2 means of each colour, finest first), of the variance of the diagonal Haar detail
-  /// to that of the model, max(mean of a block of 8 x 8, 0.3 dark + 0.02) + variance. It is the mean over the tenth of
-  /// the blocks, at least 8, whose horizontal and vertical details are smallest against the model. In white noise these
-  /// are independent of the diagonal ones, so that the selection does not bias the mean: it is 1 if the model holds;
-  /// texture raises it. The excess fourth moment of few electrons correlates the three details of one place: 2 % too
-  /// low at 0.5 e-^2. Absent where there are fewer than 8 blocks without saturated sites.
+  /// to that of the model, r (max(mean of a block of 8 x 8, 0.3 dark + 0.02) + variance). It is the mean over the tenth
+  /// of the blocks, at least 8, whose horizontal and vertical details are smallest against the model. In white noise
+  /// these are independent of the diagonal ones, so that the selection does not bias the mean: it is 1 if the model
+  /// holds; texture raises it. The excess fourth moment of few electrons correlates the three details of one place: 2 %
+  /// too low at 0.5 e-^2. Absent where there are fewer than 8 blocks without saturated sites.
   std::array<std::optional<double>, max_levels> measured_over_model;
   /// Ratio as in measured_over_model, but of horizontal and vertical details, on the tenth of the blocks with the
   /// smallest diagonal ones. It is nearer to the mean of a level where noise is not white: averaged data has least

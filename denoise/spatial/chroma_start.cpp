@@ -29,9 +29,9 @@ int next_centre(int column, int grid) {
 
 }  // namespace
 
-int start_of(double mean_signal_e, double mean_dark_e, double variance_e2) {
+int start_of(double mean_signal_e, double mean_dark_e, double variance_e2, double noise_ratio) {
   if (!(mean_signal_e > 0)) return 2;
-  const double q = mean_signal_e / std::sqrt(mean_signal_e + mean_dark_e + variance_e2);
+  const double q = mean_signal_e / std::sqrt(noise_ratio * (mean_signal_e + mean_dark_e + variance_e2));
   return q >= 3 ? 0 : q >= 0.7 ? 1 : 2;
 }
 

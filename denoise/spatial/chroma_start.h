@@ -21,9 +21,9 @@ struct ChromaStarts {
   bool nowhere(int level) const { return least >= static_cast<float>(level + 1); }
 };
 
-/// Returns 0, 1 or 2 for a mean signal to noise ratio of one site, q = s / sqrt(s + dark + variance), of at least 3, of
-/// at least 0.7, or below. Returns 2 without signal.
-int start_of(double mean_signal_e, double mean_dark_e, double variance_e2);
+/// Returns 0, 1 or 2 for a mean signal to noise ratio of one site, q = s / sqrt(r (s + dark + variance)) with the noise
+/// ratio r, of at least 3, of at least 0.7, or below. Returns 2 without signal.
+int start_of(double mean_signal_e, double mean_dark_e, double variance_e2, double noise_ratio = 1);
 
 /// Fills least, most and has_chroma. A tile needs chroma on a level if a tile up to two tiles away starts on that level
 /// or finer: one tile for the blend, one for the cells that recomposition reads around a cell.

@@ -66,6 +66,7 @@ void lay_out(Rows& from, int width, FrontMemory& out) {
       for (float*& r : plane) r = from.take(row_size(width), 1);
     }
     out.saturated = from.take(row_size(width), 1);
+    out.ratio = from.take(row_size(width / 2), 1);
     out.variance = from.kernel(rows::variance_scratch(width));
   });
 }
@@ -106,6 +107,7 @@ void lay_out(Rows& from, int width, SearchMemory& out) {
   out.scratch = from.scratch([&] {
     for (float*& r : out.pair) r = from.take(row_size(2 * width), 1);
     for (float*& r : out.sums) r = from.take(row_size(2 * width), 1);
+    out.ratio = from.take(row_size(2 * width), 1);
   });
 }
 

@@ -42,6 +42,7 @@ struct FrontMemory {
   std::array<float*, 2> raw{};                     // raw samples
   std::array<std::array<float*, 16>, 3> window{};  // R, G, B with dark charge, last 16 rows
   float* saturated = nullptr;
+  float* ratio = nullptr;  // of half width
   rows::RowScratch variance{};
 };
 

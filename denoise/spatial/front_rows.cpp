@@ -114,6 +114,12 @@ void VarianceCells(const VarianceRow& in, float* scratch, float* const out[4]) {
     store(hn::Mul(constant(0.5f), other), out[2] + i);
     store(hn::Mul(constant(2), green), out[3] + i);
   }
+  if (in.ratio == nullptr) return;
+  for (int p = 0; p < 4; ++p) {
+    for (int i = 0; i < in.cells / 2; i += lanes()) {
+      store(hn::Mul(load(in.ratio + i), load(out[p] + i)), out[p] + i);
+    }
+  }
 }
 
 double SumOf(const float* in, int count) {

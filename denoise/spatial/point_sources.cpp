@@ -2,14 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
+#include <span>
 
+#include "denoise/spatial/local_noise.h"
 #include "denoise/spatial/rows.h"
 
 namespace lowlux::denoise {
 namespace {
 
 constexpr int ring_windows = 40;  // 14 x 14 sites less 6 x 6, in windows of 4
+
+constexpr int ring_side = 2 * source_margin + 2;  // sites
 
 /// Returns the limit for the sum of the squares of 40 Poisson-like windows over their variance: five standard
 /// deviations above its mean.
@@ -19,12 +24,18 @@ struct Search {
   PlaneView<const float> raw;
   double floor_e;      // smallest mean of a window
   double variance_e2;  // of a window, in addition to its mean
+  NoiseRatioView ratio{};
 
   double value(int x, int y) const {
     const auto e = static_cast<double>(raw.at(x, y));
     return std::isnan(e) ? 0 : std::clamp(e, -1e9, 1e9);
   }
   double window(int x, int y) const { return value(x, y) + value(x + 1, y) + value(x, y + 1) + value(x + 1, y + 1); }
+
+  double own_ratio(int x, int y) const { return ratio.mean(x, y, 2, 2); }
+  double ring_ratio(int x, int y) const {
+    return ratio.mean(x - source_margin, y - source_margin, ring_side, ring_side);
+  }
 
   /// Returns whether a window is the largest of the 3 x 3 windows around; of equal ones, the first is.
   bool is_peak(int x, int y, double own) const {
@@ -64,9 +75,10 @@ struct Search {
     if (!is_peak(x, y, own)) return false;
     const Surroundings s = around(x, y);
     const double one = std::max(s.mean, floor_e) + variance_e2;
-    const double variance = one * (1 + 1.0 / ring_windows), excess = own - s.mean, u = excess / variance;
-    if (!(excess > 0) || variance * ((1 + u) * std::log1p(u) - u) < min_significance) return false;
-    if (s.spread / one > max_spread(one)) return false;
+    const double r = own_ratio(x, y), of_ring = ring_ratio(x, y);
+    const double variance = one * (r + of_ring / ring_windows), excess = own - s.mean, u = r * excess / variance;
+    if (!(excess > 0) || variance / (r * r) * ((1 + u) * std::log1p(u) - u) < min_significance) return false;
+    if (s.spread / (of_ring * one) > max_spread(one / of_ring)) return false;
     double brightest = value(x, y) - s.site[0];
     for (int i = 1; i < 4; ++i) brightest = std::max(brightest, value(x + i % 2, y + i / 2) - s.site[i]);
     return excess - brightest > 2.5 * std::sqrt(0.75 * variance);
@@ -87,7 +99,7 @@ struct Band {
 
   /// Returns a necessary condition of is_source, in single precision: the surroundings are not clearly more uneven than
   /// noise.
-  bool may_be_alone(const rows::WindowRow& in, int x) const {
+  bool may_be_alone(const rows::WindowRow& in, int x, int y) const {
     std::array<float, ring_windows> windows{};
     double mean = 0, spread = 0;
     int count = 0;
@@ -99,8 +111,20 @@ struct Band {
     }
     for (const float w : windows) mean += static_cast<double>(w) / ring_windows;
     for (const float w : windows) spread += (w - mean) * (w - mean);
-    const double one = std::max(mean, search.floor_e) + search.variance_e2;
-    return spread / one <= 1.001 * max_spread(one) + 1;
+    const double one = std::max(mean, search.floor_e) + search.variance_e2, ratio = search.ring_ratio(x, y);
+    return spread / (ratio * one) <= 1.001 * max_spread(one / ratio) + 1;
+  }
+
+  /// Returns the noise ratio of the windows of row y without that of their rings, of which WindowRow includes 1/40;
+  /// null where it is 1. The memory keeps it for later rows of the same blocks.
+  const float* ratio_row(int y, bool first) const {
+    if (search.ratio.is_one()) return nullptr;
+    if (first || !same_blocks(search.ratio, y - 1, y)) {
+      const std::span<float> row{memory.ratio, static_cast<std::size_t>(search.raw.width)};
+      ratio_of_windows(search.ratio, y, row);
+      for (float& ratio : row) ratio *= 1 / 1.025f;
+    }
+    return memory.ratio;
   }
 
   void run(int first, int last) const {
@@ -126,9 +150,10 @@ struct Band {
       in.inner = memory.sums[0];
       in.outer = memory.sums[1];
       in.significance = static_cast<float>(0.999 * min_significance);  // for rounding: is_source decides in double
+      in.ratio = ratio_row(y, y == top);
       const int found = rows::bright_windows(in, memory.found);
       for (int i = 0; i < found; ++i) {
-        if (may_be_alone(in, memory.found[i]) && search.is_source(memory.found[i], y))
+        if (may_be_alone(in, memory.found[i], y) && search.is_source(memory.found[i], y))
           mark(memory.found[i], y, first, last);
       }
     }
@@ -141,7 +166,8 @@ void find_point_sources(const RawElectronsView& raw, const RawNoise& noise, cons
                         const SearchMemory* memory, PlaneView<std::uint8_t> cells) {
   double floor_e = 0;
   for (const double dark : noise.dark_mean_e) floor_e += 0.3 * dark + 0.02;
-  const Search search{raw.value, floor_e, noise.variance_e2[0] + 2 * noise.variance_e2[1] + noise.variance_e2[2]};
+  const Search search{raw.value, floor_e, noise.variance_e2[0] + 2 * noise.variance_e2[1] + noise.variance_e2[2],
+                      raw.noise_ratio};
   in_bands(workers, cells.height, [&](int first, int last, int thread) {
     const ScratchUse use(memory[thread].scratch);
     Band{search, memory[thread], cells}.run(first, last);

@@ -15,7 +15,9 @@ namespace lowlux::denoise {
 
 /// Minimum significance of a source: V h(t / V) with h(u) = (1 + u) ln(1 + u) - u, t the sum of a 2x2 window less its
 /// expected value and V its variance. By Bennett's inequality, flat noise exceeds it with a probability below exp(-13);
-/// for normal noise it is 5.1 standard deviations, 1.7e-7, and there are four windows for each cell.
+/// for normal noise it is 5.1 standard deviations, 1.7e-7, and there are four windows for each cell. Where the noise
+/// ratio is r, values over r are as Poisson-like as values are where it is 1: they have variance V / r^2, and excess t
+/// / r.
 inline constexpr double min_significance = 13;
 
 /// Minimum distance in sites from each side of a source's window to the border of the frame.
@@ -26,6 +28,7 @@ struct SearchMemory {
   Scratch scratch;                // of the rows below
   std::array<float*, 14> pair{};  // sums of two rows; each as long as a row and its padding
   std::array<float*, 2> sums{};
+  float* ratio = nullptr;         // as long as a row and its padding
   std::int32_t* found = nullptr;  // as long as the frame is wide
 };
 

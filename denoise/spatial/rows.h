@@ -45,6 +45,7 @@ struct VarianceRow {
   float min_e[3];  // floor of the local mean
   float variance_e2[3];
   float gain[3];
+  const float* ratio;  // factor of each variance of the row; null: 1
 };
 std::size_t variance_scratch(int cells);
 void variance_row(const VarianceRow& in, const RowScratch& scratch, float* const out[4]);
@@ -160,6 +161,7 @@ struct WindowRow {
   int last;   // one beyond the last; 8 columns more are read
   float floor_e;
   float variance_e2;
+  const float* ratio;  // factor of the variance of the window of each column; null: 1
   float significance;
   float* inner;  // scratch, as long as a row and its padding
   float* outer;

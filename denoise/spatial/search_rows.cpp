@@ -63,7 +63,8 @@ int BrightWindows(const WindowRow& in, std::int32_t* columns) {
     }
     const VF mean = hn::Mul(constant(1.0f / 40), ring);
     const VF own = hn::Add(load(in.pair[3] + x), load(in.pair[3] + x + 1));
-    const VF one = hn::Add(hn::Max(mean, constant(in.floor_e)), constant(in.variance_e2));
+    VF one = hn::Add(hn::Max(mean, constant(in.floor_e)), constant(in.variance_e2));
+    if (in.ratio != nullptr) one = hn::Mul(load(in.ratio + x), one);
     const VF excess = hn::Max(hn::Sub(own, mean), hn::Zero(f));
     const auto bright = hn::Ge(hn::Mul(excess, excess), hn::Mul(constant(2 * 1.025f * in.significance), one));
     if (HWY_LIKELY(hn::AllFalse(f, bright))) continue;

@@ -272,7 +272,7 @@ double TemporalMean::run(const RawElectronsView& raw, const RawNoise& noise, dou
   assert(raw.value.width <= memory.share.width() * motion_block);
   assert(raw.value.height <= memory.share.height() * motion_block);
   assert(mean_e.width == raw.value.width && mean_e.height == raw.value.height);
-  assert(usable(noise, light, options));
+  assert(usable(noise, light, options) && raw.noise_ratio.is_one());
   const bool known = memory.width == raw.value.width && memory.height == raw.value.height && memory.phase == raw.phase;
   const bool worthless = light > max_light || light < 1 / max_light;
   const Frame frame{memory, raw, site_noise(noise, raw.phase), light, options, memory.empty || !known || worthless};

@@ -36,7 +36,7 @@ class TemporalMean {
 
   /// Adds a frame to the mean. If its size or phase differs from that of the previous frame, it is the first, as after
   /// reset().
-  /// @param raw  at least 2 x 2 pixels; any phase, odd sizes too
+  /// @param raw  at least 2 x 2 pixels; any phase, odd sizes too; without a noise ratio
   /// @param noise  of this frame; the dark charge and the variance may change from frame to frame
   /// @param light  ratio of the signal [e-] of a scene in this frame to that in the previous frame: the ratio of
   /// exposure times, where only they change. > 0 and finite; beyond 1e-6..1e6 the frame is the first

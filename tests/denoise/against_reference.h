@@ -42,16 +42,16 @@ inline void expect_near(PlaneView<const float> got, PlaneView<const double> expe
 // for the worst of 1e5 samples. Confidence is the ratio of squares of luma, whose relative error is larger where it is
 // dark.
 inline void compare(const Camera& camera, const denoise::RawNoise& noise, const Plane<float>& raw,
-                    const denoise::DenoiseOptions& options) {
+                    const denoise::DenoiseOptions& options, const NoiseRatioView& ratio = {}) {
   const int columns = (raw.width() + 1) / 2, rows = (raw.height() + 1) / 2;
   Plane<float> signal(raw.width(), raw.height()), residual(columns, rows), confidence(columns, rows);
   InlineExecutor one;
   denoise::Denoiser denoiser(raw.width(), raw.height(), 1, options.level);
   std::array<Plane<float>, 3> site;
   for (auto& plane : site) plane = Plane<float>(columns, rows);
-  denoiser.run({raw.view(), camera.phase}, noise, options, signal.view(),
+  denoiser.run({raw.view(), camera.phase, ratio}, noise, options, signal.view(),
                {residual.view(), confidence.view(), {site[0].view(), site[1].view(), site[2].view()}}, one);
-  const auto expected = reference::denoise({raw.view(), camera.phase}, noise, options);
+  const auto expected = reference::denoise({raw.view(), camera.phase, ratio}, noise, options);
   const double scale = scale_of(raw) * *std::max_element(options.white_gain.begin(), options.white_gain.end());
   expect_near(signal.view(), expected.signal_e.view(), 5e-6 * scale, "signal");
   expect_near(residual.view(), expected.residual_variance.view(), 5e-6 * scale, "residual");

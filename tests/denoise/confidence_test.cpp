@@ -4,21 +4,20 @@
 
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <utility>
 
 #include "tests/denoise/patch_draws.h"
+#include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::denoise {
 namespace {
 
+using test::inf;
 using test::MeanOf;
+using test::nan;
 using test::table_camera;
 using test::TruePatch;
-
-constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 isp::FlatPatch flat_patch(const TruePatch& truth) {
   isp::FlatPatch patch;

@@ -11,12 +11,13 @@
 #include "isp/model/colour/chromaticity_cloud.h"
 #include "isp/model/colour/dark_desaturation.h"
 #include "tests/denoise/draws.h"
+#include "tests/support/numbers.h"
 
 namespace lowlux::denoise {
 namespace {
 
 using isp::Xyz;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 constexpr float inf = std::numeric_limits<float>::infinity();
 
 /// Three planes of one colour.

@@ -14,11 +14,12 @@
 #include "denoise/spatial/rows.h"
 #include "isp/base/executor.h"
 #include "tests/denoise/flat_charts.h"
+#include "tests/support/executors.h"
 
 namespace lowlux {
 namespace {
 
-PoolExecutor executor(2);
+using test::two_threads;
 
 using namespace denoise_testing;
 using denoise::DenoiseOptions;
@@ -183,7 +184,7 @@ TEST(DenoiserInputs, ThatWereDenoisedBeforeKeepMoreDetailWithTheirNoiseAsMeasure
       raw.at(x, y) = sum / 9;
     }
   }
-  const auto check = denoise::check_noise({raw.view(), camera.phase}, camera.noise(), executor);
+  const auto check = denoise::check_noise({raw.view(), camera.phase}, camera.noise(), two_threads);
   DenoiseOptions aware;
   aware.variance_scale = denoise::variance_scale_of(check);
   EXPECT_LT(aware.variance_scale[0], 0.3);

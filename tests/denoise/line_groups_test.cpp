@@ -9,12 +9,13 @@
 #include <random>
 #include <vector>
 
+#include "tests/support/numbers.h"
 #include "tests/support/only_target.h"
 
 namespace lowlux::denoise {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 Plane<float> noise(int width, int height, double fraction_of_nan, std::uint32_t seed) {
   std::mt19937 draw(seed);

@@ -9,11 +9,12 @@
 
 #include "isp/base/executor.h"
 #include "tests/denoise/frames.h"
+#include "tests/support/executors.h"
 
 namespace lowlux {
 namespace {
 
-PoolExecutor executor(2);
+using test::two_threads;
 
 using namespace denoise_testing;
 using denoise::check_noise;
@@ -40,7 +41,7 @@ TEST(NoiseCheck, FindsNothingInTheModelsOwnNoiseAndOneForItsRatio) {
     const Camera camera{
         .phase = BayerPhase::gbrg, .dark_e = {c.dark_e, c.dark_e, c.dark_e, c.dark_e}, .read_noise_e = c.read_noise_e};
     const auto raw = exposed(camera, flat(c.signal_e, 2 * c.signal_e, 0.5 * c.signal_e), 2048, 1536, 91);
-    const auto check = check_noise({raw.view(), camera.phase}, camera.noise(), executor);
+    const auto check = check_noise({raw.view(), camera.phase}, camera.noise(), two_threads);
     for (int l = 0; l < denoise::max_levels; ++l) {
       // 0.002: the model's mean is that of 64 cells, and 1 / (1 + error) is in the mean above 1 by the error's square.
       EXPECT_NEAR(check.measured_over_model[l].value(), 1, 5 * ratio_error(raw, l) + 0.002) << l;
@@ -76,13 +77,13 @@ TEST(NoiseCheck, FindsAGainThatIsOffByFourInBothDirectionsOnFlatsAndOnTexture) {
   for (const double mean_e : {3.0, 20.0, 200.0, 2000.0}) {
     for (const bool textured : {false, true}) {
       const auto raw = exposed(camera, textured ? streets(mean_e) : flat(mean_e, mean_e, mean_e), 1200, 880, 92);
-      const auto right = check_noise({raw.view(), camera.phase}, camera.noise(), executor);
+      const auto right = check_noise({raw.view(), camera.phase}, camera.noise(), two_threads);
       EXPECT_FALSE(has(right, NoiseFinding::noise_above_model)) << mean_e << textured;
       EXPECT_FALSE(has(right, NoiseFinding::noise_below_model)) << mean_e << textured;
-      const auto high = check_noise({times(raw, 4).view(), camera.phase}, camera.noise(), executor);
+      const auto high = check_noise({times(raw, 4).view(), camera.phase}, camera.noise(), two_threads);
       EXPECT_TRUE(has(high, NoiseFinding::noise_above_model)) << mean_e << textured;
       EXPECT_FALSE(has(high, NoiseFinding::noise_below_model)) << mean_e << textured;
-      const auto low = check_noise({times(raw, 0.25).view(), camera.phase}, camera.noise(), executor);
+      const auto low = check_noise({times(raw, 0.25).view(), camera.phase}, camera.noise(), two_threads);
       EXPECT_TRUE(has(low, NoiseFinding::noise_below_model)) << mean_e << textured;
       EXPECT_FALSE(has(low, NoiseFinding::noise_above_model)) << mean_e << textured;
     }
@@ -94,7 +95,7 @@ TEST(NoiseCheck, SpeaksFromTheStatedThresholdsOn) {
   const Camera camera{.read_noise_e = 0};
   const auto raw = exposed(camera, flat(200, 200, 200), 2048, 1536, 93);
   const auto of = [&](double gain) {
-    return check_noise({times(raw, gain).view(), camera.phase}, camera.noise(), executor);
+    return check_noise({times(raw, gain).view(), camera.phase}, camera.noise(), two_threads);
   };
   EXPECT_NEAR(of(0.8).measured_over_model[0].value(), 0.8, 0.8 * 5 * ratio_error(raw, 0) + 0.002);
   NoiseCheck check = of(1);
@@ -136,7 +137,7 @@ TEST(NoiseCheck, FindsRawsThatWereDenoisedBeforeAndTakesTheirNoiseAsMeasured) {
       smooth.at(x, y) = sum / 9;
     }
   }
-  const auto check = check_noise({smooth.view(), camera.phase}, camera.noise(), executor);
+  const auto check = check_noise({smooth.view(), camera.phase}, camera.noise(), two_threads);
   EXPECT_TRUE(has(check, NoiseFinding::noise_below_model));
   // (1 - z) (1 + z + z^2) / 3 = (1 - z^3) / 3 has 1/9 of the variance of 1 - z, each way. Values three cells apart go
   // with each other by -1/2: 1.5 times the error of white noise, of the tenth of 128 x 96 blocks of 48 details. The
@@ -161,7 +162,7 @@ TEST(NoiseCheck, FindsAPedestalThatIsTooHighAndNotOneThatIsRight) {
     for (int y = 0; y < (everywhere ? 768 : 16); ++y) {
       for (int x = 0; x < (everywhere ? 1024 : 200); ++x) out.at(x, y) -= static_cast<float>(by_e);
     }
-    return check_noise({out.view(), camera.phase}, camera.noise(), executor);
+    return check_noise({out.view(), camera.phase}, camera.noise(), two_threads);
   };
   // Normal tails: beyond 4 standard deviations 3.2e-5, 3 of them 1.3e-3, none a half.
   EXPECT_FALSE(has(lowered(0, true), NoiseFinding::black_suspicious));
@@ -181,7 +182,7 @@ TEST(NoiseCheck, DoesNotTakeUnknownNoiseForAPedestal) {
   Camera camera{.read_noise_e = 6};
   const auto raw = exposed(camera, flat(0, 0, 0), 1024, 768, 96);
   camera.read_noise_e = 3;
-  const auto check = check_noise({raw.view(), camera.phase}, camera.noise(), executor);
+  const auto check = check_noise({raw.view(), camera.phase}, camera.noise(), two_threads);
   EXPECT_FALSE(has(check, NoiseFinding::black_suspicious));
   EXPECT_TRUE(has(check, NoiseFinding::noise_above_model));
 }
@@ -189,11 +190,11 @@ TEST(NoiseCheck, DoesNotTakeUnknownNoiseForAPedestal) {
 TEST(NoiseCheck, FindsDarkFramesAndNotThoseWithALight) {
   const Camera camera{.dark_e = {20, 20, 20, 20}};
   auto raw = exposed(camera, flat(0, 0, 0), 1024, 768, 97);
-  EXPECT_TRUE(has(check_noise({raw.view(), camera.phase}, camera.noise(), executor), NoiseFinding::all_dark));
+  EXPECT_TRUE(has(check_noise({raw.view(), camera.phase}, camera.noise(), two_threads), NoiseFinding::all_dark));
   for (int y = 300; y < 360; ++y) {
     for (int x = 500; x < 560; ++x) raw.at(x, y) += 20;
   }
-  const auto lit = check_noise({raw.view(), camera.phase}, camera.noise(), executor);
+  const auto lit = check_noise({raw.view(), camera.phase}, camera.noise(), two_threads);
   EXPECT_FALSE(has(lit, NoiseFinding::all_dark));
   EXPECT_LT(lit.fraction_without_signal, 1);
 }
@@ -204,12 +205,12 @@ TEST(NoiseCheck, CountsSaturatedSites) {
   auto noise = camera.noise();
   noise.saturation_e = {1000, 1000, 1000};
   for (int y = 0; y < 200; ++y) std::fill(raw.row(y), raw.row(y) + 512, 1000.0f);
-  const auto half = check_noise({raw.view(), camera.phase}, noise, executor);
+  const auto half = check_noise({raw.view(), camera.phase}, noise, two_threads);
   EXPECT_EQ(half.fraction_saturated, 0.5);
   EXPECT_FALSE(has(half, NoiseFinding::all_saturated));
   EXPECT_NEAR(half.measured_over_model[0].value(), 1, 5 * std::sqrt(2 / (48 * 38.0)) + 0.002);  // 384 blocks are left
   for (int y = 0; y < 398; ++y) std::fill(raw.row(y), raw.row(y) + 512, 2000.0f);
-  const auto all = check_noise({raw.view(), camera.phase}, noise, executor);
+  const auto all = check_noise({raw.view(), camera.phase}, noise, two_threads);
   EXPECT_TRUE(has(all, NoiseFinding::all_saturated));
   EXPECT_FALSE(has(all, NoiseFinding::all_dark)) << "nothing is known of what is saturated";
   EXPECT_FALSE(all.measured_over_model[0].has_value());
@@ -219,7 +220,7 @@ TEST(NoiseCheck, MeasuresNoLevelOfWhichThereAreNotEightBlocks) {
   const Camera camera{.dark_e = {2, 2, 2, 2}};
   for (const int width : {2, 17, 18, 63, 64, 130}) {
     const auto raw = exposed(camera, flat(5, 5, 5), width, 33, 99);
-    const auto check = check_noise({raw.view(), camera.phase}, camera.noise(), executor);
+    const auto check = check_noise({raw.view(), camera.phase}, camera.noise(), two_threads);
     EXPECT_EQ(check.measured_over_model[0].has_value(), width / 16 * 2 >= 8) << width;
     EXPECT_FALSE(check.measured_over_model[1].has_value());
     EXPECT_EQ(check.windows, width / 18);
@@ -232,7 +233,7 @@ TEST(NoiseCheck, OfHugeNegativeAndMissingValuesIsFinite) {
   for (const float e : {0.0f, -1e30f, 3e38f, -inf, inf, nan, 1e-40f}) {
     Plane<float> raw(300, 200);
     std::fill(raw.data(), raw.data() + raw.size(), e);
-    const auto check = check_noise({raw.view(), camera.phase}, {}, executor);
+    const auto check = check_noise({raw.view(), camera.phase}, {}, two_threads);
     for (const auto& ratio : check.measured_over_model) EXPECT_TRUE(std::isfinite(ratio.value_or(0)));
     for (const double share : check.fraction_negative) EXPECT_TRUE(share >= 0 && share <= 1);
     EXPECT_TRUE(check.fraction_without_signal >= 0 && check.fraction_without_signal <= 1);

@@ -2,48 +2,17 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <vector>
 
 #include "tests/denoise/frames.h"
+#include "tests/denoise/searcher.h"
 
 namespace lowlux {
 namespace {
 
 using namespace denoise_testing;
 using denoise::Level;
-
-/// Memory for one thread, and a search on it.
-struct Searcher {
-  explicit Searcher(int width) : rows(17 * (width + 512)), found(width) {
-    const auto row = [&](int i) { return rows.data() + static_cast<std::ptrdiff_t>(i) * (width + 512) + 32; };
-    for (int i = 0; i < 14; ++i) memory.pair[i] = row(i);
-    for (int i = 0; i < 2; ++i) memory.sums[i] = row(14 + i);
-    memory.scratch = {rows.data(), 16 * (width + 512) * sizeof(float)};
-    close_scratch(memory.scratch);
-    memory.found = found.data();
-  }
-  Plane<std::uint8_t> operator()(const Plane<float>& raw, const Camera& camera) {
-    Plane<std::uint8_t> cells((raw.width() + 1) / 2, (raw.height() + 1) / 2);
-    InlineExecutor one;
-    denoise::find_point_sources({raw.view(), camera.phase}, camera.noise(), {one, 1}, &memory, cells.view());
-    return cells;
-  }
-  std::vector<float> rows;
-  std::vector<std::int32_t> found;
-  denoise::SearchMemory memory;
-};
-
-long marked(const Plane<std::uint8_t>& cells) { return std::count(cells.data(), cells.data() + cells.size(), 1); }
-
-/// Noise of the sum of one cell.
-double cell_sigma_e(const Camera& camera, double signal_e) {
-  double variance = 0;
-  for (const double dark : camera.dark_e) variance += signal_e + dark + camera.read_noise_e * camera.read_noise_e;
-  return std::sqrt(variance);
-}
 
 // Four windows a cell, each with a probability of 1.7e-7 (normal tail at 5.1 standard deviations; Bennett's bound makes
 // up for the heavier tail of few counts). The limit is 1e-6 of the cells and five standard errors of that count.

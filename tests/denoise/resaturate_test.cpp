@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "isp/model/colour/dark_desaturation.h"
+#include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::denoise {
@@ -14,8 +15,8 @@ namespace {
 
 using isp::Xy;
 using isp::Xyz;
+using test::nan;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double eps = std::numeric_limits<double>::epsilon();
 
 Matrix3 srgb() {
