@@ -32,23 +32,7 @@ std::optional<T> or_ignored(Result<std::optional<T>> tag, std::vector<std::strin
   return std::nullopt;
 }
 
-/// Layout and storage of the samples of one raw image.
-struct DngImage {
-  int width = 0, height = 0;  // of the readout
-  int samples = 1;            // per pixel
-  int bits = 0;               // per sample, as stored
-  SensorLayout layout = SensorLayout::bayer;
-  BayerPhase phase = BayerPhase::rggb;
-};
-
 /// Opens a DNG; nullopt: not a TIFF, or a TIFF without the tag DNGVersion. Fails on a DNG without a raw image.
 Result<std::optional<DngFile>> open_dng(std::span<const std::byte> bytes);
-
-/// Returns the size and layout of a raw image; a specific error for an image that cannot be decoded or developed, and
-/// for image data that extend beyond the file. `file_bytes` is the size of the file.
-Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_bytes);
-
-/// Returns a compression's name for messages, "JPEG XL (52546)".
-std::string compression_name(std::uint32_t compression);
 
 }  // namespace lowlux::capture

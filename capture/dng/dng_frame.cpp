@@ -1,14 +1,21 @@
 #include "capture/dng/dng_frame.h"
 
+#include <cstddef>
+#include <memory>
+#include <span>
 #include <utility>
 
 #include "capture/dng/dng_colour.h"
+#include "capture/dng/dng_image.h"
 #include "capture/dng/dng_info.h"
 #include "capture/dng/dng_levels.h"
+#include "capture/dng/dng_lossy.h"
 #include "capture/dng/dng_opcodes.h"
 #include "capture/dng/dng_tags.h"
 #include "capture/file/decoder_frame.h"
 #include "capture/file/pass_on.h"
+#include "isp/base/float_samples.h"
+#include "isp/codec/noise_ratio_bytes.h"
 
 namespace lowlux::capture {
 namespace {
@@ -23,7 +30,8 @@ Result<DngDescription> decoded_image(const DngFile& dng, DngDescription expected
   if (fits(expected.image, h)) return expected;
   for (const TiffDirectory& directory : dng.raw_images) {
     const auto image = dng_image(directory, file_bytes);
-    if (image && fits(*image, h)) return describe_dng(dng, directory, file_bytes);
+    if (image && !image->is_float && !image->is_lossy && fits(*image, h))
+      return describe_dng(dng, directory, file_bytes);
   }
   return fail(ErrorCode::malformed, "the decoder delivers " + std::to_string(h.raw_width) + " x " +
                                         std::to_string(h.raw_height) +
@@ -36,16 +44,41 @@ void read_colour_and_noise(const DngFile& dng, const TiffDirectory& directory, R
   if (coloured) frame.colour = read_colour(dng, directory, frame.warnings);
 }
 
-void read_corrections(const DngFile& dng, const TiffDirectory& directory, RawFrame& frame) {
-  const bool linearized = directory.find(tag::linearization_table) != nullptr;
+/// Reads the noise ratio that lowlux wrote; DNGPrivateData of other makers is ignored, as is a tag without values.
+void read_noise_ratio(const DngFile& dng, const TiffDirectory& directory, RawFrame& frame) {
+  const TiffDirectory& home = dng.main.find(tag::dng_private_data) != nullptr ? dng.main : directory;
+  const auto bytes = home.bytes(tag::dng_private_data);
+  if (!bytes) return;
+  const Rect& active = frame.raw.active;
+  auto ratio = or_ignored(isp::decode_noise_ratio(*bytes, active.width, active.height), frame.warnings);
+  if (ratio) frame.noise_ratio = std::make_shared<const NoiseRatio>(*std::move(ratio));
+}
+
+/// Returns the directory with an opcode list: that of the raw image, where DNG requires it, or the first one.
+const TiffDirectory& directory_of_list(const DngFile& dng, const TiffDirectory& directory, int list) {
+  return directory.find(tag::opcode_list[list - 1]) != nullptr ? directory : dng.main;
+}
+
+void read_corrections(const DngFile& dng, const TiffDirectory& directory, SampleState samples, RawFrame& frame) {
   for (int list = 1; list <= 3; ++list) {
     const TagName name = tag::opcode_list[list - 1];
-    const TiffDirectory& home = directory.find(name) != nullptr ? directory : dng.main;
+    const TiffDirectory& home = directory_of_list(dng, directory, list);
     if (home.find(name) == nullptr) continue;
     auto read = home.bytes(name).and_then(
-        [&](std::span<const std::byte> bytes) { return read_opcodes(bytes, list, linearized, frame); });
+        [&](std::span<const std::byte> bytes) { return read_opcodes(bytes, list, samples, frame); });
     if (!read) frame.warnings.push_back(ignored(read.error()));
   }
+}
+
+/// Finishes a frame that has its samples.
+Result<RawFrame> finished(const DngFile& dng, const TiffDirectory& directory, RawFrame frame, bool is_lossy = false) {
+  if (frame.colour.calibrations.empty() && frame.raw.layout != SensorLayout::monochrome) {
+    if (auto sound = check_colour_matrices(dng, directory); !sound) return pass_on(sound);
+  }
+  const bool linearized = is_lossy || directory.find(tag::linearization_table) != nullptr;
+  read_corrections(dng, directory, {.linearized = linearized, .polynomials = is_lossy}, frame);
+  ignore_impossible_white(frame.colour, frame.warnings);
+  return frame;
 }
 
 }  // namespace
@@ -62,6 +95,7 @@ Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw
   if (auto read = read_geometry(raw_image, *image, frame.raw, frame.warnings); !read) return pass_on(read);
   if (auto read = read_levels(raw_image, *image, frame.raw); !read) return pass_on(read);
   read_colour_and_noise(dng, raw_image, frame);
+  read_noise_ratio(dng, raw_image, frame);
   return described;
 }
 
@@ -78,12 +112,26 @@ Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std:
     frame.colour.calibrations.push_back(*table);
     frame.colour.source = CameraColour::Source::decoder_table;
   }
-  if (frame.colour.calibrations.empty() && frame.raw.layout != SensorLayout::monochrome) {
-    if (auto sound = check_colour_matrices(dng, *chosen->directory); !sound) return pass_on(sound);
+  return finished(dng, *chosen->directory, std::move(frame));
+}
+
+Result<RawFrame> complete_lossy_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes) {
+  RawFrame frame = std::move(described.frame);
+  const TiffDirectory& directory = *described.directory;
+  frame.raw.dn = std::move(codes);
+  auto linear = linearize_lossy(directory, directory_of_list(dng, directory, 2), frame.raw);
+  if (!linear) return pass_on(linear);
+  return finished(dng, directory, std::move(frame), true);
+}
+
+Result<RawFrame> complete_float_dng(const DngFile& dng, DngDescription described, Plane<float> samples) {
+  RawFrame frame = std::move(described.frame);
+  frame.raw.dn_float = std::move(samples);
+  if (auto unusable = unusable_sample(frame.raw)) return fail(ErrorCode::malformed, *std::move(unusable));
+  if (described.directory->find(tag::linearization_table) != nullptr) {
+    frame.warnings.emplace_back("LinearizationTable is not applied: the samples are floating-point numbers");
   }
-  read_corrections(dng, *chosen->directory, frame);
-  ignore_impossible_white(frame.colour, frame.warnings);
-  return frame;
+  return finished(dng, *described.directory, std::move(frame));
 }
 
 }  // namespace lowlux::capture

@@ -2,6 +2,7 @@
 
 #include "capture/decoder/decoded_raw.h"
 #include "capture/dng/dng_file.h"
+#include "capture/dng/dng_storage.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 
@@ -21,5 +22,11 @@ Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw
 /// decoder chose another one of its size, that one is described instead. Without a colour matrix in the file the
 /// decoder's table is used, if it has the camera.
 Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std::size_t file_bytes, DecodedRaw decoded);
+
+/// Adds the samples of a lossy image, given its codes. Errors: those of linearize_lossy.
+Result<RawFrame> complete_lossy_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes);
+
+/// Adds floating-point samples to the frame. Errors: those of unusable_sample (isp/base/float_samples.h).
+Result<RawFrame> complete_float_dng(const DngFile& dng, DngDescription described, Plane<float> samples);
 
 }  // namespace lowlux::capture

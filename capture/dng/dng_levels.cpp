@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "capture/dng/dng_file.h"
 #include "capture/dng/dng_tags.h"
 #include "capture/file/pass_on.h"
 #include "isp/base/text.h"
@@ -15,6 +16,7 @@ namespace {
 constexpr int max_pattern = 4096;  // maximum number of values of a black level pattern: more indicate damage
 constexpr std::size_t max_masked_numbers = 1024;  // four for each area
 constexpr double max_level_dn = 65535;
+constexpr double min_float_white_dn = 1e-6, max_float_white_dn = 4294967295.0;
 
 /// Returns the rectangle of four numbers top, left, bottom, right; nullopt unless all are valid and it is not empty and
 /// in the readout.
@@ -138,17 +140,21 @@ Result<BlackLevel> read_black(const TiffDirectory& directory, std::vector<double
   return black;
 }
 
-/// Reads the white level: one for each sample, or one for all; 2^bits - 1 if the file does not state it.
+/// Reads the white level: one for each sample, or one for all; 2^bits - 1 if the file does not state it, and 1 for
+/// floating-point samples (DNG 1.4, WhiteLevel).
 Result<std::array<double, 3>> read_white(const TiffDirectory& directory, const DngImage& image) {
   auto stated = directory.numbers(tag::white_level, 1, 16);
   if (!stated) return pass_on(stated);
   std::array<double, 3> white{};
-  white.fill(std::exp2(image.bits) - 1);
+  white.fill(image.is_float ? 1 : std::exp2(image.bits) - 1);
+  const double least = image.is_float ? min_float_white_dn : 0,
+               most = image.is_float ? max_float_white_dn : max_level_dn;
   if (!*stated) return white;
   for (std::size_t i = 0; i < 3; ++i) {
     const double level = (**stated)[std::min(i, std::min<std::size_t>((*stated)->size(), image.samples) - 1)];
-    if (!(level > 0 && level <= max_level_dn)) {
-      return fail(ErrorCode::malformed, "the tag WhiteLevel says " + number_text(level) + ", expected 1 to 65535",
+    if (!(level > least && level <= most)) {
+      return fail(ErrorCode::malformed,
+                  "the tag WhiteLevel says " + number_text(level) + ", expected 1 to " + number_text(most),
                   tag::white_level.name);
     }
     white[i] = level;
@@ -234,6 +240,9 @@ Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, 
     auto black = read_black(directory, **std::move(stated), raw, image.samples);
     if (!black) return pass_on(black);
     raw.black_tag = *std::move(black);
+  } else if (image.is_float) {  // DNG's default, which does not hold for the codes of cameras
+    raw.black_tag = BlackLevel{.samples = image.samples,
+                               .pattern_dn = std::vector<double>(static_cast<std::size_t>(image.samples), 0.0)};
   }
   return check_levels(raw, "tags WhiteLevel and BlackLevel");
 }

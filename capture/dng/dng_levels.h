@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "capture/dng/dng_file.h"
+#include "capture/dng/dng_storage.h"
 #include "capture/dng/tiff_directory.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
@@ -19,7 +19,8 @@ Result<void> read_geometry(const TiffDirectory& directory, const DngImage& image
 /// Reads DefaultScale, two numbers above zero; nullopt if there is no such tag.
 Result<std::optional<std::vector<double>>> read_scale(const TiffDirectory& directory);
 
-/// Reads black and white levels. Precondition: the geometry is filled. White levels not above black are an error.
+/// Reads black and white levels. Precondition: the geometry is filled. White levels not above black are an error. Black
+/// that is not stated is 0 for floating-point samples, and otherwise absent.
 Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw);
 
 /// Returns the regions of a readout outside its active area, as up to four rectangles that do not overlap.

@@ -9,47 +9,17 @@
 #include <optional>
 #include <utility>
 
-#include "capture/dng/tiff_directory.h"
+#include "capture/dng/opcode_reader.h"
 #include "capture/file/pass_on.h"
 
 namespace lowlux::capture {
 namespace {
 
-// Cameras write some opcodes a list, four gain maps and some thousand defects.
-constexpr std::size_t max_opcodes = 64;                    // in one list
+// Cameras write four gain maps and some thousand defects.
 constexpr std::size_t max_defects = std::size_t{1} << 20;  // in all lists
 constexpr std::size_t max_gains = 64;                      // in all lists
-constexpr std::size_t opcode_header_bytes = 16;
-constexpr std::uint32_t fix_vignette_radial = 3, fix_bad_pixels_constant = 4, fix_bad_pixels_list = 5, gain_map = 9;
-
-/// Reads consecutive big-endian numbers. Beyond the end it returns zeros and sets a flag.
-class Reader {
- public:
-  explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
-
-  std::uint32_t u32() { return take(4) ? load_u32(bytes_.data() + at_ - 4, true) : 0; }
-  double f64() { return take(8) ? load_f64(bytes_.data() + at_ - 8, true) : 0; }
-  float f32() { return take(4) ? load_f32(bytes_.data() + at_ - 4, true) : 0; }
-  std::span<const std::byte> block(std::size_t size) {
-    return take(size) ? bytes_.subspan(at_ - size, size) : std::span<const std::byte>{};
-  }
-  std::size_t left() const { return bytes_.size() - at_; }
-  bool complete() const { return complete_; }
-
- private:
-  bool take(std::size_t size) {
-    if (size > left()) {
-      complete_ = false;
-      return false;
-    }
-    at_ += size;
-    return true;
-  }
-
-  std::span<const std::byte> bytes_;
-  std::size_t at_ = 0;
-  bool complete_ = true;
-};
+constexpr std::uint32_t fix_vignette_radial = 3, fix_bad_pixels_constant = 4, fix_bad_pixels_list = 5,
+                        map_polynomial = 8, gain_map = 9;
 
 /// Returns the name of an opcode, DNG 1.4 chapter 7 and DNG 1.6.
 std::string opcode_name(std::uint32_t id) {
@@ -63,7 +33,7 @@ std::string opcode_name(std::uint32_t id) {
 /// State of one list while it is read. Its results are added to the frame only when all of the list has been read.
 struct OpcodeContext {
   int list;
-  bool linearized;
+  SampleState samples;
   const RawFrame& frame;
   RawCorrections& found;
   std::bitset<65536>& constants;  // values of defective pixels
@@ -124,7 +94,7 @@ bool is_usable(const GainMap& map) {
 
 int small(std::uint32_t value) { return static_cast<int>(std::min<std::uint32_t>(value, 1U << 30)); }
 
-Result<void> read_gain_map(const OpcodeContext& context, Reader in) {
+Result<void> read_gain_map(const OpcodeContext& context, OpcodeReader in) {
   const Rect& active = context.frame.raw.active;
   GainMap map;
   map.top = small(in.u32());
@@ -165,7 +135,7 @@ Result<void> read_gain_map(const OpcodeContext& context, Reader in) {
   return {};
 }
 
-Result<void> read_vignette(const OpcodeContext& context, Reader in) {
+Result<void> read_vignette(const OpcodeContext& context, OpcodeReader in) {
   RadialGain radial;
   for (double& k : radial.k) k = in.f64();
   radial.centre_x = in.f64();
@@ -197,7 +167,7 @@ void add_defect(const OpcodeContext& context, std::uint32_t top, std::uint32_t l
       {static_cast<int>(x0), static_cast<int>(y0), static_cast<int>(x1 - x0), static_cast<int>(y1 - y0)});
 }
 
-Result<void> read_defect_list(const OpcodeContext& context, Reader in) {
+Result<void> read_defect_list(const OpcodeContext& context, OpcodeReader in) {
   in.u32();  // the Bayer phase; the frame's is known
   const std::uint64_t points = in.u32(), rects = in.u32();
   if (!in.complete() || points * 8 + rects * 16 > in.left()) return context.damaged(fix_bad_pixels_list);
@@ -216,10 +186,11 @@ Result<void> read_defect_list(const OpcodeContext& context, Reader in) {
 }
 
 /// Marks pixels of a constant value as defective: they are found in the readout, once it is complete.
-Result<void> read_defect_constant(const OpcodeContext& context, Reader in) {
+Result<void> read_defect_constant(const OpcodeContext& context, OpcodeReader in) {
   const std::uint32_t constant = in.u32();
   if (!in.complete()) return context.damaged(fix_bad_pixels_constant);
-  if (context.linearized || context.list != 1 || context.frame.raw.layout == SensorLayout::linear_rgb) {
+  const RawDn& raw = context.frame.raw;
+  if (context.samples.linearized || context.list != 1 || raw.layout == SensorLayout::linear_rgb || raw.is_float()) {
     context.not_applied(fix_bad_pixels_constant, ": its constant does not refer to the decoded values");
   } else if (constant < context.constants.size()) {
     context.constants.set(constant);
@@ -252,40 +223,20 @@ void find_constants(const OpcodeContext& context) {
 Result<void> read_opcode(const OpcodeContext& context, std::uint32_t id, std::span<const std::byte> parameters) {
   switch (id) {
     case gain_map:
-      return read_gain_map(context, Reader(parameters));
+      return read_gain_map(context, OpcodeReader(parameters));
     case fix_vignette_radial:
-      return read_vignette(context, Reader(parameters));
+      return read_vignette(context, OpcodeReader(parameters));
     case fix_bad_pixels_list:
-      return read_defect_list(context, Reader(parameters));
+      return read_defect_list(context, OpcodeReader(parameters));
     case fix_bad_pixels_constant:
-      return read_defect_constant(context, Reader(parameters));
+      return read_defect_constant(context, OpcodeReader(parameters));
+    case map_polynomial:
+      if (!(context.list == 2 && context.samples.polynomials)) context.not_applied(id);
+      return {};
     default:
       context.not_applied(id);
       return {};
   }
-}
-
-Result<void> read_list(const OpcodeContext& context, std::span<const std::byte> bytes) {
-  const auto damaged = [&] {
-    return fail(ErrorCode::malformed, "the tag " + context.tag() + " is damaged", context.tag());
-  };
-  Reader in(bytes);
-  const std::uint32_t count = in.u32();
-  if (!in.complete() || count > in.left() / opcode_header_bytes) return damaged();
-  if (count > max_opcodes) {
-    return fail(ErrorCode::malformed, "the tag " + context.tag() + " holds more opcodes than any camera writes",
-                context.tag());
-  }
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const std::uint32_t id = in.u32();
-    in.u32();  // the DNG version that introduced it
-    in.u32();  // flags: whether a reader may skip it; a skipped opcode becomes a warning in any case
-    const auto parameters = in.block(in.u32());
-    if (!in.complete()) return damaged();
-    if (auto read = read_opcode(context, id, parameters); !read) return read;
-  }
-  if (context.constants.any()) find_constants(context);
-  return {};
 }
 
 template <class T>
@@ -295,11 +246,16 @@ void append(std::vector<T>& to, std::vector<T>& from) {
 
 }  // namespace
 
-Result<void> read_opcodes(std::span<const std::byte> bytes, int list, bool linearized, RawFrame& frame) {
+Result<void> read_opcodes(std::span<const std::byte> bytes, int list, SampleState samples, RawFrame& frame) {
   RawCorrections found;
   std::bitset<65536> constants;
   std::vector<std::string> warnings;
-  if (auto read = read_list({list, linearized, frame, found, constants, warnings}, bytes); !read) return read;
+  const OpcodeContext context{list, samples, frame, found, constants, warnings};
+  auto read = each_opcode(bytes, list, [&](std::uint32_t id, std::span<const std::byte> parameters) {
+    return read_opcode(context, id, parameters);
+  });
+  if (!read) return read;
+  if (constants.any()) find_constants(context);
   append(frame.corrections.gain_maps, found.gain_maps);
   append(frame.corrections.radial_gains, found.radial_gains);
   append(frame.corrections.defects, found.defects);

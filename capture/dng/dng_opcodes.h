@@ -10,6 +10,12 @@
 
 namespace lowlux::capture {
 
+/// States what the samples went through before the opcodes are read.
+struct SampleState {
+  bool linearized = false;   // a LinearizationTable, which opcodes of list 1 precede
+  bool polynomials = false;  // MapPolynomial of list 2
+};
+
 /// Reads a DNG opcode list (DNG 1.4, chapter 7) into the corrections of a frame. Precondition: the geometry, layout,
 /// phase and samples of `frame.raw` are filled.
 ///
@@ -24,7 +30,19 @@ namespace lowlux::capture {
 /// of the active pixels are not applied, with a warning.
 ///
 /// @param list        1, 2 or 3: positions count from the readout (1) or the active area (2, 3)
-/// @param linearized  whether the samples went through a LinearizationTable, which opcodes of list 1 precede
-Result<void> read_opcodes(std::span<const std::byte> bytes, int list, bool linearized, RawFrame& frame);
+/// @param samples     which opcodes of list 1 and 2 the samples went through
+Result<void> read_opcodes(std::span<const std::byte> bytes, int list, SampleState samples, RawFrame& frame);
+
+/// Holds a MapPolynomial opcode: the sum of coefficient[i] x^i, for planes first_plane to first_plane + planes - 1.
+struct Polynomial {
+  int first_plane = 0, planes = 1;
+  std::vector<double> coefficient;
+
+  bool applies_to(int plane) const { return plane >= first_plane && plane - first_plane < planes; }
+};
+
+/// Returns the MapPolynomial opcodes of a list, in their order; other opcodes are skipped. Errors: a damaged list, or
+/// a polynomial that is damaged, has a degree above 8 or leaves out a part of the active area.
+Result<std::vector<Polynomial>> read_polynomials(std::span<const std::byte> bytes, const Rect& active);
 
 }  // namespace lowlux::capture

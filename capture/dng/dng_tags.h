@@ -21,6 +21,7 @@ inline constexpr TagName strip_byte_counts{279, "StripByteCounts"};
 inline constexpr TagName planar_configuration{284, "PlanarConfiguration"};
 inline constexpr TagName software{305, "Software"};
 inline constexpr TagName date_time{306, "DateTime"};
+inline constexpr TagName predictor{317, "Predictor"};
 inline constexpr TagName tile_width{322, "TileWidth"};
 inline constexpr TagName tile_length{323, "TileLength"};
 inline constexpr TagName tile_offsets{324, "TileOffsets"};
@@ -57,6 +58,8 @@ inline constexpr TagName camera_calibration[] = {{50723, "CameraCalibration1"}, 
 inline constexpr TagName analog_balance{50727, "AnalogBalance"};
 inline constexpr TagName as_shot_neutral{50728, "AsShotNeutral"};
 inline constexpr TagName as_shot_white_xy{50729, "AsShotWhiteXY"};
+inline constexpr TagName baseline_exposure{50730, "BaselineExposure"};
+inline constexpr TagName dng_private_data{50740, "DNGPrivateData"};
 inline constexpr TagName calibration_illuminant[] = {{50778, "CalibrationIlluminant1"},
                                                      {50779, "CalibrationIlluminant2"}};
 inline constexpr TagName active_area{50829, "ActiveArea"};
@@ -70,5 +73,13 @@ inline constexpr TagName color_matrix_3{52531, "ColorMatrix3"};
 /// Values of PhotometricInterpretation.
 inline constexpr std::uint32_t photometric_cfa = 32803;
 inline constexpr std::uint32_t photometric_linear_raw = 34892;
+
+/// Values of Compression.
+inline constexpr std::uint32_t compression_none = 1;
+inline constexpr std::uint32_t compression_jpeg = 7;
+inline constexpr std::uint32_t compression_deflate = 8;
+inline constexpr std::uint32_t compression_vc5 = 9;
+inline constexpr std::uint32_t compression_lossy_jpeg = 34892;
+inline constexpr std::uint32_t compression_old_deflate = 32946;
 
 }  // namespace lowlux::capture::tag

@@ -196,6 +196,7 @@ Result<TiffDirectory> TiffFile::directory(std::uint32_t offset) const {
   const std::uint64_t end = std::uint64_t{offset} + 2 + count * entry_bytes;
   if (end > bytes_.size()) return outside();
   TiffDirectory directory;
+  directory.big_endian = big_endian_;
   directory.entries.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     directory.entries.push_back(read_entry(bytes_, bytes_.data() + offset + 2 + i * entry_bytes, big_endian_));

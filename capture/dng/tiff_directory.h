@@ -57,7 +57,8 @@ class TiffEntry {
 class TiffDirectory {
  public:
   std::vector<TiffEntry> entries;
-  std::uint32_t next = 0;  // offset of the next directory; 0: none
+  bool big_endian = false;  // of the file
+  std::uint32_t next = 0;   // offset of the next directory; 0: none
 
   /// Returns the entry of a tag; nullptr if there is none.
   const TiffEntry* find(TagName tag) const;

@@ -11,8 +11,10 @@
 #include "capture/decoder/libraw_decoder.h"
 #include "capture/dng/dng_colour.h"
 #include "capture/dng/dng_file.h"
+#include "capture/dng/dng_floats.h"
 #include "capture/dng/dng_frame.h"
 #include "capture/dng/dng_levels.h"
+#include "capture/dng/dng_lossy.h"
 #include "capture/dng/dng_tags.h"
 #include "capture/dng/tiff_directory.h"
 #include "capture/file/decoder_frame.h"
@@ -35,9 +37,9 @@ std::size_t printable_bytes(std::string_view text) {
   return std::all_of(text.begin() + 1, text.begin() + static_cast<std::ptrdiff_t>(size), follows) ? size : 0;
 }
 
-/// Returns whether the file is text: all of its first megabyte is printable UTF-8. Less is not sufficient: the samples
-/// of a raw without a header can be printable for some rows.
-bool is_text(std::string_view file) {
+/// Returns whether all of the first megabyte of the file is printable UTF-8. Less is not sufficient: the samples of a
+/// raw without a header can be printable for some rows.
+bool is_printable(std::string_view file) {
   constexpr std::size_t longest_character = 4;
   const std::size_t end = std::min(file.size(), text_sample_bytes);
   for (std::size_t at = 0; at < end;) {
@@ -46,6 +48,22 @@ bool is_text(std::string_view file) {
     at += size;
   }
   return true;
+}
+
+/// Returns whether the file is text: printable, in lines. The samples of an evenly lit 8-bit raw without a header can
+/// be printable for a megabyte, but then none of them is the end of a line.
+bool is_text(std::string_view file) {
+  constexpr std::size_t longest_line = 65536;
+  for (std::size_t at = 0; at < std::min(file.size(), text_sample_bytes);) {
+    const std::size_t end = std::min(file.find('\n', at), file.size());
+    if (end - at > longest_line) return false;
+    at = end + 1;
+  }
+  return is_printable(file);
+}
+
+std::string_view text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 struct Kind {
@@ -57,7 +75,7 @@ struct Kind {
 /// the decoder, which accepts anything of certain sizes as a headerless dump.
 std::string other_kind(std::span<const std::byte> bytes) {
   using std::string_view_literals::operator""sv;
-  const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::string_view file = text_of(bytes);
   constexpr Kind kinds[] = {{"\x89PNG"sv, "a PNG picture"},
                             {"GIF8"sv, "a GIF picture"},
                             {"%PDF"sv, "a PDF document"},
@@ -76,6 +94,7 @@ bool is_jpeg(std::span<const std::byte> bytes) {
 /// image, and most raws begin as TIFF: only now is it known that they are ordinary images.
 Error not_decoded(std::span<const std::byte> bytes, Error error) {
   if (is_jpeg(bytes)) return {ErrorCode::unsupported, "this is a JPEG picture, not a raw file", {}};
+  if (is_printable(text_of(bytes))) return {ErrorCode::unsupported, "this is text, not a raw file", {}};
   if (error.code == ErrorCode::unsupported && TiffFile::open(bytes)) {
     error.message = "this is a TIFF picture, or a raw file that is damaged or unknown to " + decoder_name();
   }
@@ -111,6 +130,16 @@ Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, 
     return fail(ErrorCode::too_large, "the raw image of " + std::to_string(image.width) + " x " +
                                           std::to_string(image.height) + " pixels is over the limit of " +
                                           std::to_string(limits.max_pixels) + " pixels");
+  }
+  if (image.is_lossy) {
+    auto codes = decode_lossy_image(bytes, *described->directory, image);
+    if (!codes) return pass_on(codes);
+    return complete_lossy_dng(dng, *std::move(described), *std::move(codes));
+  }
+  if (image.is_float) {
+    auto samples = decode_float_image(bytes, *described->directory, image);
+    if (!samples) return pass_on(samples);
+    return complete_float_dng(dng, *std::move(described), *std::move(samples));
   }
   auto decoded = decode_dng(dng, bytes, limits);
   if (!decoded) return pass_on(decoded);

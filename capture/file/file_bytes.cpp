@@ -12,7 +12,9 @@
 namespace lowlux::capture {
 namespace {
 
-std::string mebibytes(std::uint64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; }
+std::string size_text(std::uint64_t bytes) {
+  return bytes < std::uint64_t{1} << 20 ? std::to_string(bytes >> 10) + " KiB" : std::to_string(bytes >> 20) + " MiB";
+}
 
 Error system_error(ErrorCode code, const char* what) {
   return {code, std::string(what) + ": " + std::system_category().message(errno), {}};
@@ -41,7 +43,7 @@ Result<std::vector<std::byte>> load(int fd, std::uint64_t max_bytes) {
 }  // namespace
 
 tl::unexpected<Error> too_many_bytes(std::uint64_t bytes, std::uint64_t max_bytes) {
-  return fail(ErrorCode::too_large, "the file has " + mebibytes(bytes) + ", over the limit of " + mebibytes(max_bytes));
+  return fail(ErrorCode::too_large, "the file has " + size_text(bytes) + ", over the limit of " + size_text(max_bytes));
 }
 
 Result<std::vector<std::byte>> read_file_bytes(const std::filesystem::path& file, std::uint64_t max_bytes) {

@@ -8,7 +8,7 @@ namespace lowlux::capture {
 namespace {
 
 constexpr std::uint32_t largest_side_px = 65535;
-constexpr std::uint64_t max_buffer_bytes = std::uint64_t{4} << 30;
+constexpr std::uint64_t max_stream_bytes = std::uint64_t{4} << 30;
 
 std::string pixels_text(std::int64_t width, std::int64_t height) {
   return std::to_string(width) + "x" + std::to_string(height);
@@ -54,7 +54,7 @@ Result<void> check_bytes(const AgreedStream& agreed, const CameraFormat& format)
                                           " of " + name_of(format.raw) + ", whose rows take " +
                                           std::to_string(row_bytes(format.raw, format.width)));
   }
-  if (std::uint64_t{agreed.frame_bytes} * agreed.buffers > max_buffer_bytes) {
+  if (std::uint64_t{agreed.frame_bytes} * agreed.buffers > max_stream_bytes) {
     return fail(ErrorCode::too_large, std::to_string(agreed.buffers) + " buffers of " +
                                           std::to_string(agreed.frame_bytes) +
                                           " bytes are more than 4 GiB: ask for fewer or a smaller size");

@@ -18,7 +18,7 @@ using std::chrono::nanoseconds;
 
 // A wait may continue after a device vanishes: the node is tested again after at most this time.
 constexpr milliseconds longest_slice{500};
-constexpr milliseconds longest_timeout = std::chrono::hours(24);
+constexpr milliseconds max_wait = std::chrono::hours(24);
 // Pause after a buffer that was announced but not available.
 constexpr int pause_ms = 1;
 
@@ -84,8 +84,7 @@ std::optional<Error> V4l2Camera::not_ready() const {
 Result<CameraFrame> V4l2Camera::next(milliseconds timeout) {
   if (auto error = not_ready()) return tl::make_unexpected(*std::move(error));
   const V4l2System& system = device_->system();
-  const nanoseconds until =
-      system.now(system.context) + nanoseconds(std::clamp(timeout, milliseconds(0), longest_timeout));
+  const nanoseconds until = system.now(system.context) + nanoseconds(std::clamp(timeout, milliseconds(0), max_wait));
   short happened = 0;
   for (;;) {
     V4l2Taken taken;

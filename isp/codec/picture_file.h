@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -11,6 +12,7 @@
 #include "isp/base/frame.h"
 #include "isp/base/image.h"
 #include "isp/base/result.h"
+#include "isp/base/source_tags.h"
 
 namespace lowlux::isp {
 
@@ -30,8 +32,9 @@ struct FileMetadata {
   std::vector<std::byte> icc;   // ICC profile; empty: none (PNG, JPEG, TIFF)
   std::vector<std::byte> exif;  // EXIF block from its TIFF header on, without "Exif\0\0"; empty: none (PNG, JPEG)
   FrameInfo info;               // stored in the format's own fields (TIFF, OpenEXR)
-  std::optional<Chromaticities> chromaticities;  // OpenEXR
-  std::optional<double> white_luminance_cd_m2;   // luminance of RGB (1, 1, 1) (OpenEXR whiteLuminance)
+  std::shared_ptr<const SourceTags> source_tags;  // of the raw file, to be added as they are (TIFF); null: none
+  std::optional<Chromaticities> chromaticities;   // OpenEXR
+  std::optional<double> white_luminance_cd_m2;    // luminance of RGB (1, 1, 1) (OpenEXR whiteLuminance)
 };
 
 struct DecodedPicture {

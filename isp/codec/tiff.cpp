@@ -1,7 +1,6 @@
 #include "isp/codec/tiff.h"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -11,6 +10,7 @@
 
 #include <tiffio.h>
 
+#include "isp/codec/source_tags_output.h"
 #include "isp/codec/tiff_info.h"
 #include "isp/codec/tiff_output.h"
 
@@ -18,8 +18,6 @@ namespace lowlux::isp {
 namespace {
 
 constexpr tmsize_t max_one_allocation = tmsize_t{1} << 30;
-constexpr std::size_t max_sub_ifds = 16;         // that are searched for a mosaic
-constexpr std::uint64_t max_compression = 1100;  // deflate reaches 1032
 
 struct Input {
   std::span<const std::byte> bytes;
@@ -237,62 +235,7 @@ Result<DecodedPicture> read_picture(TIFF* tiff, const Layout& layout, const Deco
   return DecodedPicture{std::move(picture), metadata_of(tiff)};
 }
 
-/// Selects the page or SubIFD of the mosaic. @return false if there is none
-bool select_mosaic(TIFF* tiff) {
-  if (layout_of(tiff).photometric == PHOTOMETRIC_CFA) return true;
-  std::uint16_t count = 0;
-  std::uint64_t* places = nullptr;
-  if (TIFFGetField(tiff, TIFFTAG_SUBIFD, &count, &places) == 0 || places == nullptr) return false;
-  std::array<std::uint64_t, max_sub_ifds> own{};  // libtiff's array belongs to the directory that is left
-  const std::size_t searched = std::min<std::size_t>(count, own.size());
-  std::copy_n(places, searched, own.begin());
-  for (std::size_t i = 0; i < searched; ++i) {
-    if (TIFFSetSubDirectory(tiff, own[i]) != 0 && layout_of(tiff).photometric == PHOTOMETRIC_CFA) return true;
-  }
-  return false;
-}
-
-Result<void> check_float_mosaic(const Layout& layout, std::size_t file_bytes, const DecodeLimits& limits) {
-  if (auto size = check_size(layout.width, layout.height, limits); !size) return size;
-  const std::uint64_t pixel_bytes = std::uint64_t{layout.width} * layout.height * sizeof(float);
-  if (pixel_bytes / max_compression > file_bytes) {
-    return fail(ErrorCode::malformed, "the file of " + std::to_string(file_bytes) + " bytes is too short for " +
-                                          std::to_string(layout.width) + " x " + std::to_string(layout.height) +
-                                          " floats");
-  }
-  if (layout.format == SAMPLEFORMAT_IEEEFP && layout.bits == 32 && layout.samples == 1) return {};
-  return fail(ErrorCode::unsupported, "the mosaic has " + std::to_string(layout.samples) + " samples of " +
-                                          std::to_string(layout.bits) + " bits and format " +
-                                          std::to_string(layout.format) + ": one 32-bit float is expected");
-}
-
-double white_of_mosaic(TIFF* tiff) {
-  std::uint16_t count = 0;
-  const std::uint32_t* white = nullptr;
-  const bool states_it = TIFFGetField(tiff, TIFFTAG_WHITELEVEL, &count, &white) != 0 && count > 0 && white != nullptr;
-  return states_it && *white > 0 ? *white : 1;
-}
-
 }  // namespace
-
-Result<FloatMosaic> decode_float_mosaic(std::span<const std::byte> bytes, const DecodeLimits& limits) try {
-  Input input{bytes, 0, {}};
-  const TiffHandle tiff = open_input(input);
-  if (tiff == nullptr) return malformed(input);
-  FileMetadata first_page{.info = read_tiff_info(tiff.get())};  // of the first page, and left at its EXIF directory
-  if (TIFFSetDirectory(tiff.get(), 0) == 0) return malformed(input);
-  if (!select_mosaic(tiff.get())) return fail(ErrorCode::unsupported, "the file has no mosaic");
-  const Layout layout = layout_of(tiff.get());
-  if (auto possible = check_float_mosaic(layout, bytes.size(), limits); !possible)
-    return tl::make_unexpected(possible.error());
-  const double white = white_of_mosaic(tiff.get());
-  const int width = static_cast<int>(layout.width), height = static_cast<int>(layout.height);
-  auto read = read_picture<float>(tiff.get(), layout, limits, input, SceneLinear(width, height));
-  if (!read) return tl::make_unexpected(read.error());
-  return FloatMosaic{std::move(std::get<SceneLinear>(read->picture).plane[0]), white, std::move(first_page)};
-} catch (const std::bad_alloc&) {
-  return fail(ErrorCode::too_large, "no memory for the pixels of the DNG");
-}
 
 Result<DecodedPicture> decode_tiff(std::span<const std::byte> bytes, const DecodeLimits& limits) try {
   Input input{bytes, 0, {}};
@@ -395,7 +338,9 @@ Result<void> encode(const Image& picture, const FileMetadata& metadata, const Ti
   const std::uint64_t exif = write_tiff_exif(tiff, metadata.info);
   set_tags(tiff, layout, metadata, options);
   if (exif != 0) TIFFSetField(tiff, TIFFTAG_EXIFIFD, exif);
-  return output.finish(write_strips(tiff, picture, layout) && TIFFWriteDirectory(tiff) != 0);
+  return output.finish(write_strips(tiff, picture, layout) && TIFFWriteDirectory(tiff) != 0).and_then([&] {
+    return metadata.source_tags ? add_source_tags(file, *metadata.source_tags) : Result<void>{};
+  });
 }
 
 }  // namespace

@@ -26,16 +26,4 @@ Result<void> encode_tiff(const Picture& picture, const FileMetadata& metadata, c
 /// libtiff supports. Samples beyond the colours (alpha, depth) are dropped. Other kinds are errors that name the kind.
 Result<DecodedPicture> decode_tiff(std::span<const std::byte> bytes, const DecodeLimits& limits = {});
 
-/// Holds the mosaic of a floating-point DNG.
-struct FloatMosaic {
-  Plane<float> value;  // the entire readout, as stored
-  double white = 1;    // WhiteLevel; 1 where the file does not state it, as DNG defines for floats
-  FileMetadata metadata;
-};
-
-/// Reads the mosaic of 32-bit floats of a DNG: the first page or SubIFD with PhotometricInterpretation CFA, in strips
-/// or tiles, any compression libtiff supports. Levels and crops are not applied. Other kinds are errors that name the
-/// kind.
-Result<FloatMosaic> decode_float_mosaic(std::span<const std::byte> bytes, const DecodeLimits& limits = {});
-
 }  // namespace lowlux::isp

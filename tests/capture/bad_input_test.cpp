@@ -92,8 +92,21 @@ TEST(BadInput, FlippedBitsGiveAnErrorOrAFrameButNeverACrash) {
 TEST(BadInput, AnEmptyFileIsCalledEmpty) { EXPECT_TRUE(has(refused(std::vector<std::byte>{}), "empty")); }
 
 TEST(BadInput, TextIsNotTakenForTheDumpOfACameraThatHasItsSize) {
-  const std::string letters(std::size_t{1024} * 768, 'a');
+  std::string letters(std::size_t{1024} * 768, 'a');
+  for (std::size_t i = 1023; i < letters.size(); i += 1024) letters[i] = '\n';
   EXPECT_TRUE(has(refused(bytes_of(letters)), "this is text"));
+}
+
+TEST(BadInput, ADumpWhoseSamplesCanBePrintedIsNotTakenForText) {
+  // LibRaw knows a Kodak C603 by the size of its YCbCr samples, 2848 x 2134 x 1.5 bytes.
+  const auto frame = read_bytes(bytes_of(std::string(9116448, 'a')));
+  ASSERT_TRUE(frame) << frame.error().message;
+  EXPECT_EQ(frame->raw.info.make, "Kodak");
+  EXPECT_EQ(frame->raw.layout, SensorLayout::linear_rgb);
+}
+
+TEST(BadInput, TextInOneLineIsTextUnlessItIsARaw) {
+  EXPECT_TRUE(has(refused(bytes_of(std::string(100'000, 'a'))), "this is text"));
 }
 
 TEST(BadInput, WhatIsNotARawIsCalledWhatItIs) {

@@ -23,9 +23,12 @@
 #include "isp/model/colour/colorimetry.h"
 #include "tests/codec/pictures.h"
 #include "tests/support/dng_builder.h"
+#include "tests/support/error_words.h"
 
 /// Picture files of every format in memory, and what read_picture makes of them.
 namespace lowlux::capture {
+
+using test::has;
 
 using Bytes = std::vector<std::byte>;
 inline constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -56,8 +59,6 @@ inline Error refused(const Bytes& bytes) {
   EXPECT_FALSE(error.message.empty() || error.message.back() == '.');
   return error;
 }
-
-inline bool has(const Error& error, const std::string& words) { return error.message.find(words) != std::string::npos; }
 
 template <class Code>
 Bytes png_of(const Encoded<Code>& picture, const isp::FileMetadata& metadata = {}) {

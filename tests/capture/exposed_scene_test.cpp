@@ -74,7 +74,7 @@ TEST(ExposedScene, AStarKeepsAllItsLightAwayFromTheBorders) {
       const CameraRgb truth = charge_rate_rgb(scene, response(), &table(), executor);
       SceneLinear xyz(81, 81);
       for (Plane<float>& plane : xyz.plane) std::fill_n(plane.data(), plane.size(), 0.0f);
-      add_points(scene, xyz);
+      add_points(scene.points, scene.point_lights, xyz);
       for (int k = 0; k < 3; ++k) EXPECT_NEAR(total(truth.plane[k]) / expected[k], 1, 1e-6) << "float sums";
       EXPECT_NEAR(total(xyz.plane[1]), 3, 3e-6);
     }

@@ -8,6 +8,7 @@
 
 #include "capture/file/dng_source.h"
 #include "tests/support/dng_builder.h"
+#include "tests/support/error_words.h"
 
 namespace lowlux::test {
 
@@ -47,8 +48,6 @@ inline std::string warned(const DngBuilder& dng) {
   EXPECT_EQ(frame.warnings.size(), 1u);
   return frame.warnings.empty() ? "" : frame.warnings.front();
 }
-
-inline bool has(const Error& error, const std::string& words) { return error.message.find(words) != std::string::npos; }
 
 /// Samples of a frame, row after row.
 inline std::vector<std::uint16_t> samples_of(const RawFrame& frame) {

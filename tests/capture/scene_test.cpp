@@ -11,13 +11,14 @@
 #include <vector>
 
 #include "isp/model/spectrum/cie_data.h"
+#include "tests/support/numbers.h"
 #include "tests/support/synthetic_camera.h"
 
 namespace lowlux::capture {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
+using test::inf;
+using test::nan;
 
 void expect_refused(const auto& result, const std::string& part) {
   ASSERT_FALSE(result);

@@ -39,7 +39,8 @@ TEST(BlockLevels, AreTheMeansOfEachChannelAndTheBrightestPixel) {
   Plane<float> rate(70, 33);
   for (int y = 0; y < 33; ++y) {
     for (int x = 0; x < 70; ++x) {
-      rate.at(x, y) = static_cast<float>(1 + static_cast<int>(colour_at(BayerPhase::grbg, x, y)) + 10 * (x / 32));
+      const int column = x / 32, electrons = 1 + static_cast<int>(colour_at(BayerPhase::grbg, x, y)) + 10 * column;
+      rate.at(x, y) = static_cast<float>(electrons);
     }
   }
   rate.at(69, 32) += 5;
@@ -72,7 +73,8 @@ TEST(ReadOut, GivesEachRegionItsOwnEffects) {
   read_out(frame, test::plan_of(96, 40, {Effect::read_noise}), executor, noisy.view());
   for (int y = 0; y < 40; ++y) {
     for (int x = 0; x < 96; ++x) {
-      const bool is_noisy = plan.region_of_block[static_cast<std::size_t>(y / 32 * 3 + x / 32)] == 1;
+      const int block = y / 32 * 3 + x / 32;
+      const bool is_noisy = plan.region_of_block[static_cast<std::size_t>(block)] == 1;
       ASSERT_EQ(dn.at(x, y), is_noisy ? noisy.at(x, y) : 512 + 50) << x << " " << y;
     }
   }

@@ -11,7 +11,6 @@
 #include "isp/codec/png.h"
 #include "isp/codec/tiff.h"
 #include "tests/codec/pictures.h"
-#include "tests/support/float_dng.h"
 
 namespace lowlux::isp {
 namespace {
@@ -36,14 +35,6 @@ FileMetadata some_metadata() {
   return metadata;
 }
 
-Result<DecodedPicture> decode_mosaic(std::span<const std::byte> bytes, const DecodeLimits& limits) {
-  auto found = decode_float_mosaic(bytes, limits);
-  if (!found) return tl::make_unexpected(found.error());
-  SceneLinear picture;
-  for (Plane<float>& plane : picture.plane) plane = found->value.clone();
-  return DecodedPicture{std::move(picture), std::move(found->metadata)};
-}
-
 std::vector<Format> formats() {
   static InlineExecutor executor;
   const auto codes = test::noisy_codes<std::uint8_t>(40, 30);
@@ -59,7 +50,6 @@ std::vector<Format> formats() {
        bytes([&](std::FILE* f) { return encode_tiff(deep, metadata, {TiffOptions::Compression::deflate}, f); })},
       {"tifff", decode_tiff,
        bytes([&](std::FILE* f) { return encode_tiff(floats, metadata, {TiffOptions::Compression::none}, f); })},
-      {"float dng", decode_mosaic, test::float_dng(linear.plane[0], 1).build()},
       {"pfm", decode_pfm, bytes([&](std::FILE* f) { return encode_pfm(linear, f); })},
       {"piz", decode_exr, bytes([&](std::FILE* f) {
          return encode_exr(linear, metadata, {ExrOptions::Depth::half, ExrOptions::Compression::piz}, f);

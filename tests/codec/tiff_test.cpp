@@ -10,7 +10,6 @@
 #include <string>
 
 #include "tests/codec/pictures.h"
-#include "tests/support/float_dng.h"
 
 namespace lowlux::isp {
 namespace {
@@ -209,41 +208,6 @@ TEST(TiffOfOthers, OtherKindsAreRefusedByName) {
   EXPECT_NE(refusal({.samples = 4, .photometric = PHOTOMETRIC_SEPARATED}, {1, 2, 3, 4}).find("interpretation 5"),
             std::string::npos);
   EXPECT_NE(refusal({.samples = 1, .photometric = PHOTOMETRIC_RGB}, {1}).find("1 samples"), std::string::npos);
-}
-
-TEST(FloatMosaic, IsReadExactlyFromTheFirstPageOrASubIfd) {
-  Plane<float> mosaic(14, 6);
-  for (std::size_t i = 0; i < mosaic.size(); ++i) mosaic.data()[i] = 1.5F * static_cast<float>(i) - 7;
-  for (const bool in_sub_ifd : {false, true}) {
-    test::DngBuilder dng = test::float_dng(mosaic, 16383);
-    dng.raw_in_sub_ifd = in_sub_ifd;
-    dng.set(33434, test::Tag::rationals(test::TagType::rational, {{5, 2}}));  // ExposureTime
-    const auto found = decode_float_mosaic(dng.build());
-    ASSERT_TRUE(found) << found.error().message;
-    EXPECT_TRUE(std::equal(mosaic.data(), mosaic.data() + mosaic.size(), found->value.data()));
-    EXPECT_EQ(found->value.width(), 14);
-    EXPECT_EQ(found->white, 16383);
-    EXPECT_EQ(found->metadata.info.model, "Camera");
-    EXPECT_EQ(found->metadata.info.exposure_s, 2.5);
-  }
-  EXPECT_EQ(decode_float_mosaic(test::float_dng(mosaic, {}).build())->white, 1) << "the default of DNG for floats";
-}
-
-TEST(FloatMosaic, OfAnotherKindOrSizeIsAnError) {
-  const Plane<float> mosaic(16, 8);
-  const auto refusal = [](const test::DngBuilder& dng, const DecodeLimits& limits = {}) {
-    const auto found = decode_float_mosaic(dng.build(), limits);
-    return found ? std::string("decoded") : found.error().message;
-  };
-  EXPECT_NE(refusal(test::DngBuilder{}).find("16 bits and format 1"), std::string::npos);
-  EXPECT_NE(refusal(test::float_dng(mosaic, 1), {.max_pixels = 127}).find("the limit is 127"), std::string::npos);
-  test::DngBuilder grey = test::float_dng(mosaic, 1);
-  grey.set(262, test::Tag::numbers(test::TagType::u16, {1}));
-  EXPECT_NE(refusal(grey).find("no mosaic"), std::string::npos);
-  test::DngBuilder huge = test::float_dng(mosaic, 1);  // 16,384 x 16,384 in a file of less than 2 kB
-  huge.set(256, test::Tag::numbers(test::TagType::u32, {16384}));
-  huge.set(257, test::Tag::numbers(test::TagType::u32, {16384}));
-  EXPECT_NE(refusal(huge).find("too short for 16384 x 16384"), std::string::npos);
 }
 
 TEST(TiffOfOthers, MorePixelsThanTheLimitAreTooLarge) {

@@ -5,17 +5,22 @@
 #include <tiffio.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <csignal>
+#include <cstring>
 #include <filesystem>
 #include <functional>
 #include <iterator>
 #include <limits>
+#include <memory>
 #include <sstream>
 
 #include "isp/output/dng/dng_check.h"
 #include "isp/output/dng/dng_tags.h"
+#include "tests/support/as_floats.h"
+#include "tests/support/numbers.h"
 #include "tests/support/process.h"
 #include "tests/support/raw_frames.h"
 #include "tests/support/scratch_directory.h"
@@ -23,10 +28,17 @@
 namespace lowlux::isp {
 namespace {
 
+using test::nan;
 using test::plain_frame;
 using test::ScratchDirectory;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
+
+std::shared_ptr<const NoiseRatio> ratio_of(const Rect& active, int block_px) {
+  NoiseRatio out{.block_px = block_px,
+                 .ratio = Plane<float>(ratio_blocks(active.width, block_px), ratio_blocks(active.height, block_px))};
+  for (std::size_t i = 0; i < out.ratio.size(); ++i) out.ratio.data()[i] = i % 3 == 0 ? 1 : 0.125f;
+  return std::make_shared<const NoiseRatio>(std::move(out));
+}
 
 /// A frame that has every tag the writer knows.
 RawFrame full_frame(SensorLayout layout) {
@@ -46,6 +58,7 @@ RawFrame full_frame(SensorLayout layout) {
   info.temperature_c = -3.5;
   info.orientation = Orientation::rotate_90;
   frame.noise = NoiseProfile{{1e-4, 1e-4, 1e-4}, {1e-7, 1e-7, 1e-7}};
+  frame.noise_ratio = ratio_of(frame.raw.active, 8);
   frame.corrections.defects = {{3, 4, 1, 2}};
   frame.corrections.radial_gains = {{{0.1, 0, 0, 0, 0}, 0.5, 0.5}};
   if (layout == SensorLayout::monochrome) return frame;
@@ -66,8 +79,9 @@ TEST(DngWriter, ExiftoolFindsNothingWrong) {
   if (!is_installed("exiftool")) GTEST_SKIP() << "exiftool is not installed";
   const ScratchDirectory scratch;
   for (const SensorLayout layout : {SensorLayout::bayer, SensorLayout::monochrome, SensorLayout::linear_rgb}) {
-    for (const bool full : {true, false}) {
-      const RawFrame frame = full ? full_frame(layout) : plain_frame(50, 41, layout);
+    for (const auto& [full, floats] : {std::pair{true, false}, {false, false}, {true, true}, {false, true}}) {
+      RawFrame frame = full ? full_frame(layout) : plain_frame(50, 41, layout);
+      if (floats) test::make_floats(frame.raw);
       const auto written = write_dng(frame, scratch.file("a.dng"), {.overwrite = Overwrite::yes});
       ASSERT_TRUE(written) << written.error().message;
       const auto said = test::run_process({"exiftool", "-validate", "-warning", "-error", "-a", scratch.file("a.dng")});
@@ -169,6 +183,41 @@ TEST(DngWriter, StripsAreAboutOneMegabyteAndAdjacent) {
   TIFFClose(tiff);
 }
 
+TEST(DngWriter, FloatingPointSamplesAreWrittenBitByBitWithTheirTags) {
+  const ScratchDirectory scratch;
+  for (const SensorLayout layout : {SensorLayout::bayer, SensorLayout::monochrome, SensorLayout::linear_rgb}) {
+    RawFrame frame = plain_frame(500, 700, layout);
+    test::make_floats(frame.raw, 1.0 / 65536);
+    frame.raw.black_tag->pattern_dn.assign(static_cast<std::size_t>(samples_of(layout)), 0.125);
+    frame.raw.white_dn.fill(3);
+    const float special[] = {-0.0F, 1e-45F, -2.5F, 5e7F, std::numeric_limits<float>::min()};
+    std::ranges::copy(special, frame.raw.dn_float.data());
+    ASSERT_TRUE(write_dng(frame, scratch.file("a.dng"), {.overwrite = Overwrite::yes, .baseline_exposure_ev = 7.5}));
+    TIFF* const tiff = TIFFOpen(scratch.file("a.dng").c_str(), "r");
+    ASSERT_NE(tiff, nullptr);
+    std::uint16_t bits = 0, format = 0, count = 0;
+    const std::uint8_t* backward = nullptr;
+    const std::uint32_t* white = nullptr;
+    float baseline = 0;
+    TIFFGetField(tiff, TIFFTAG_BITSPERSAMPLE, &bits);
+    TIFFGetField(tiff, TIFFTAG_SAMPLEFORMAT, &format);
+    TIFFGetField(tiff, TIFFTAG_DNGBACKWARDVERSION, &backward);
+    TIFFGetField(tiff, TIFFTAG_WHITELEVEL, &count, &white);
+    TIFFGetField(tiff, TIFFTAG_BASELINEEXPOSURE, &baseline);
+    EXPECT_EQ(bits, 32);
+    EXPECT_EQ(format, SAMPLEFORMAT_IEEEFP);
+    EXPECT_EQ(backward[1], 4) << "floating-point samples came with DNG 1.4";
+    EXPECT_EQ(white[0], 3U);
+    EXPECT_EQ(baseline, 7.5F);
+    std::vector<float> row(static_cast<std::size_t>(frame.raw.row_samples()));
+    for (int y = 0; y < 700; ++y) {
+      ASSERT_EQ(TIFFReadScanline(tiff, row.data(), static_cast<std::uint32_t>(y), 0), 1);
+      ASSERT_EQ(std::memcmp(row.data(), frame.raw.dn_float.row(y), row.size() * sizeof(float)), 0) << y;
+    }
+    TIFFClose(tiff);
+  }
+}
+
 TEST(DngWriter, TheLightSourceIsTheNearestOfExif) {
   for (const auto& [cct_k, code] : {std::pair{2856.0, 17},
                                     {6504.0, 21},
@@ -193,6 +242,8 @@ TEST(DngWriter, MoreThanFourGigabytesAreRefused) {
   const auto refused = check_dng_size(1'950'000'001);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::too_large);
+  EXPECT_TRUE(check_dng_size(975'000'000, sizeof(float)));
+  EXPECT_FALSE(check_dng_size(975'000'001, sizeof(float)));
 }
 
 TEST(DngWriter, AnExistingFileIsKeptUnlessOverwritingIsAskedFor) {
@@ -276,6 +327,33 @@ struct Fault {
   std::function<void(RawFrame&)> make;
 };
 
+TEST(DngWriter, FloatsADngCannotHoldAreRefusedByTheTagsName) {
+  const std::vector<Fault> faults{
+      {"image", [](RawFrame& f) { f.raw.dn = Plane<std::uint16_t>(50, 41); }},
+      {"sample", [](RawFrame& f) { f.raw.dn_float.at(7, 9) = std::nanf(""); }},
+      {"sample", [](RawFrame& f) { f.raw.dn_float.at(7, 9) = -std::numeric_limits<float>::infinity(); }},
+      {"sample", [](RawFrame& f) { f.raw.dn_float.at(7, 9) = 1.2e12F; }},
+      {"WhiteLevel", [](RawFrame& f) { f.raw.white_dn.fill(65534.5); }},
+      {"WhiteLevel", [](RawFrame& f) { f.raw.white_dn.fill(4294967296.0); }},
+      {"BlackLevel", [](RawFrame& f) { f.raw.black_tag->pattern_dn = {-1}; }},
+  };
+  const ScratchDirectory scratch;
+  for (const Fault& fault : faults) {
+    RawFrame frame = full_frame(SensorLayout::bayer);
+    test::make_floats(frame.raw);
+    ASSERT_TRUE(write_dng(frame, scratch.file("good.dng"), {.overwrite = Overwrite::yes}));
+    fault.make(frame);
+    const auto written = write_dng(frame, scratch.file("a.dng"));
+    ASSERT_FALSE(written) << fault.tag;
+    EXPECT_EQ(written.error().code, ErrorCode::invalid_argument);
+    EXPECT_NE(written.error().message.find(std::string("this ") + fault.tag + ":"), std::string::npos)
+        << fault.tag << ": " << written.error().message;
+  }
+  for (const double ev : {101.0, -101.0, nan}) {
+    EXPECT_FALSE(write_dng(plain_frame(24, 24), scratch.file("a.dng"), {.baseline_exposure_ev = ev}));
+  }
+}
+
 TEST(DngWriter, FiguresADngCannotHoldAreRefusedByTheTagsName) {
   const std::vector<Fault> faults{
       {"image", [](RawFrame& f) { f.raw.dn = {}; }},
@@ -314,6 +392,16 @@ TEST(DngWriter, FiguresADngCannotHoldAreRefusedByTheTagsName) {
        }},
       {"NoiseProfile", [](RawFrame& f) { f.noise->scale[1] = nan; }},
       {"NoiseProfile", [](RawFrame& f) { f.noise->offset[1] = 2; }},
+      {"DNGPrivateData",
+       [](RawFrame& f) {
+         f.noise_ratio = ratio_of({0, 0, 50, 41}, 8);
+       }},
+      {"DNGPrivateData",
+       [](RawFrame& f) {
+         NoiseRatio none{.block_px = 50, .ratio = Plane<float>(1, 1)};
+         none.ratio.at(0, 0) = 0;
+         f.noise_ratio = std::make_shared<const NoiseRatio>(std::move(none));
+       }},
       {"GainMap", [](RawFrame& f) { f.corrections.gain_maps.emplace_back(); }},
       {"FixVignetteRadial", [](RawFrame& f) { f.corrections.radial_gains[0].k[4] = nan; }},
       {"FixBadPixelsList", [](RawFrame& f) { f.corrections.defects[0].x = 43; }},

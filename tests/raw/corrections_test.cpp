@@ -10,11 +10,12 @@
 #include <vector>
 
 #include "isp/base/cfa.h"
+#include "tests/support/executors.h"
 
 namespace lowlux::isp {
 namespace {
 
-InlineExecutor executor;
+using test::one_thread;
 
 Plane<float> ones(int width, int height) {
   Plane<float> plane(width, height);
@@ -33,7 +34,8 @@ GainMap corner_map(int size, std::vector<float> gain) {
 
 TEST(GainMap, IsBilinearBetweenItsPoints) {
   Plane<float> plane = ones(10, 10);
-  apply_gains({.gain_maps = {corner_map(10, {1, 2, 3, 4})}, .radial_gains = {}, .defects = {}}, plane.view(), executor);
+  apply_gains({.gain_maps = {corner_map(10, {1, 2, 3, 4})}, .radial_gains = {}, .defects = {}}, plane.view(),
+              one_thread);
   for (int y = 0; y < 10; ++y) {
     for (int x = 0; x < 10; ++x) EXPECT_NEAR(plane.at(x, y), 1 + (x + 0.5) / 10 + 2 * (y + 0.5) / 10, 1e-6);
   }
@@ -69,8 +71,8 @@ TEST(GainMap, WithAPointInTheMiddleOfEachPixelItMultipliesEachByItsOwn) {
   for (int i = 0; i < width * height; ++i) map.gain.push_back(static_cast<float>(1 + (i * 37 % 101) / 100.0));
   const RawCorrections corrections{.gain_maps = {map}, .radial_gains = {}, .defects = {}};
   Plane<float> whole = ones(width, height), tile = ones(10, 8);
-  apply_gains(corrections, whole.view(), executor);
-  apply_gains(corrections, {20, 12, width, height}, tile.view(), executor);
+  apply_gains(corrections, whole.view(), one_thread);
+  apply_gains(corrections, {20, 12, width, height}, tile.view(), one_thread);
   for (int y = 0; y < height; ++y) {
     // Positions are rounded to 1e-14 of a pixel, gains to floats.
     for (int x = 0; x < width; ++x) EXPECT_NEAR(whole.at(x, y), map.gain[y * width + x], 1e-6);
@@ -104,8 +106,8 @@ TEST(GainMap, NoiseOfMeasuredGainsIsAddedToTheVariance) {
     }
     std::fill_n(cells.data(), cells.size(), 100.0F);
     const RawCorrections corrections{.gain_maps = {flat}, .radial_gains = {}, .defects = {}};
-    apply_gains(corrections, pixels.view(), executor);
-    apply_gains_to_variance(corrections, std::as_const(pixels).view(), cells.view(), executor);
+    apply_gains(corrections, pixels.view(), one_thread);
+    apply_gains_to_variance(corrections, std::as_const(pixels).view(), cells.view(), one_thread);
     for (int y = 0; y < cells.height(); ++y) {
       for (int x = 0; x < cells.width(); ++x) {
         double sum = 0, n = 0;
@@ -135,8 +137,8 @@ TEST(GainMap, VarianceIsMultipliedByTheMeanSquareOfTheGainsOfItsCell) {
   const RadialGain radial{.k = {0.5}};
   const RawCorrections corrections{.gain_maps = {site}, .radial_gains = {radial}, .defects = {}};
   Plane<float> gains = ones(width, height), cells = ones((width + 1) / 2, (height + 1) / 2);
-  apply_gains(corrections, gains.view(), executor);
-  apply_gains_to_variance(corrections, std::as_const(gains).view(), cells.view(), executor);
+  apply_gains(corrections, gains.view(), one_thread);
+  apply_gains_to_variance(corrections, std::as_const(gains).view(), cells.view(), one_thread);
   for (int y = 0; y < cells.height(); ++y) {
     for (int x = 0; x < cells.width(); ++x) {
       double squares = 0, n = 0;
@@ -147,7 +149,7 @@ TEST(GainMap, VarianceIsMultipliedByTheMeanSquareOfTheGainsOfItsCell) {
     }
   }
   Plane<float> plain = ones(4, 4);
-  apply_gains_to_variance({}, std::as_const(gains).view(), plain.view(), executor);
+  apply_gains_to_variance({}, std::as_const(gains).view(), plain.view(), one_thread);
   EXPECT_EQ(plain.at(3, 3), 1);
 }
 
@@ -156,7 +158,7 @@ TEST(GainMap, OutsideItsPointsItKeepsTheNearest) {
   map.origin_h = 0.5;
   map.spacing_h = 0.25;
   Plane<float> plane = ones(8, 8);
-  apply_gains({.gain_maps = {map}, .radial_gains = {}, .defects = {}}, plane.view(), executor);
+  apply_gains({.gain_maps = {map}, .radial_gains = {}, .defects = {}}, plane.view(), one_thread);
   EXPECT_FLOAT_EQ(plane.at(0, 3), 1);
   EXPECT_FLOAT_EQ(plane.at(7, 3), 5);
 }
@@ -167,7 +169,7 @@ TEST(GainMap, ASinglePointIsOneGainAndNegativeValuesStayNegative) {
   map.gain = {1.5f};
   Plane<float> plane = ones(4, 4);
   plane.at(1, 1) = -2;
-  apply_gains({.gain_maps = {map}, .radial_gains = {}, .defects = {}}, plane.view(), executor);
+  apply_gains({.gain_maps = {map}, .radial_gains = {}, .defects = {}}, plane.view(), one_thread);
   EXPECT_FLOAT_EQ(plane.at(1, 1), -3);
   EXPECT_FLOAT_EQ(plane.at(3, 0), 1.5);
 }
@@ -177,7 +179,7 @@ TEST(GainMap, PlanesOfRgbAreChosenByTheMap) {
   map.first_plane = 1;
   map.planes = 2;
   Plane<float> r = ones(4, 4), g = ones(4, 4), b = ones(4, 4);
-  apply_gains({.gain_maps = {map}, .radial_gains = {}, .defects = {}}, {r.view(), g.view(), b.view()}, executor);
+  apply_gains({.gain_maps = {map}, .radial_gains = {}, .defects = {}}, {r.view(), g.view(), b.view()}, one_thread);
   EXPECT_EQ(r.at(2, 2), 1);
   EXPECT_EQ(g.at(2, 2), 2);
   EXPECT_EQ(b.at(2, 2), 2);
@@ -186,7 +188,7 @@ TEST(GainMap, PlanesOfRgbAreChosenByTheMap) {
 TEST(RadialGain, IsOneAtTheCentreAndTheSumOfItsTermsInTheFarthestCorner) {
   RadialGain gain{.k = {0.1, 0.2, 0.3, 0.4, 0.5}, .centre_x = 0.25, .centre_y = 0.25};
   Plane<float> plane = ones(9, 9);
-  apply_gains({.gain_maps = {}, .radial_gains = {gain}, .defects = {}}, plane.view(), executor);
+  apply_gains({.gain_maps = {}, .radial_gains = {gain}, .defects = {}}, plane.view(), one_thread);
   EXPECT_FLOAT_EQ(plane.at(2, 2), 1);
   EXPECT_FLOAT_EQ(plane.at(8, 8), 2.5);
   const double r2 = 0.5;  // (8, 2) is at distance 6 of 6 sqrt(2)

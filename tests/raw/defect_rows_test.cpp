@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <type_traits>
 #include <vector>
 
 #include "tests/support/guarded_memory.h"
@@ -16,30 +17,32 @@ namespace {
 
 constexpr int beside = 2;  // read on either side
 
-/// Three rows, the last code of each right before a page that must not be read.
+/// Three rows, the last sample of each right before a page that must not be read.
+template <class Sample>
 struct ThreeRows {
   explicit ThreeRows(int count)
       : width(count + 2 * beside),
         memory{test::GuardedMemory(bytes()), test::GuardedMemory(bytes()), test::GuardedMemory(bytes())} {}
-  std::size_t bytes() const { return static_cast<std::size_t>(width) * sizeof(std::uint16_t); }
-  std::uint16_t* row(int r) { return reinterpret_cast<std::uint16_t*>(memory[r].last(bytes()).data()); }
-  defect_rows::Rows rows() { return {row(0) + beside, row(1) + beside, row(2) + beside}; }
+  std::size_t bytes() const { return static_cast<std::size_t>(width) * sizeof(Sample); }
+  Sample* row(int r) { return reinterpret_cast<Sample*>(memory[r].last(bytes()).data()); }
+  defect_rows::Rows<Sample> rows() { return {row(0) + beside, row(1) + beside, row(2) + beside}; }
 
   int width;
   std::array<test::GuardedMemory, 3> memory;
 };
 
-/// How far code i is out of its neighbours' range, over what the bounds ask; below 0 inside of it.
-double beyond(const defect_rows::Rows& rows, int i, const defect_rows::Bounds& bounds) {
-  std::vector<int> around;
+/// How far sample i is out of its neighbours' range, over what the bounds ask; below 0 inside of it.
+template <class Sample>
+double beyond(const defect_rows::Rows<Sample>& rows, int i, const defect_rows::Bounds& bounds) {
+  std::vector<double> around;
   for (const int dx : {-2, 0, 2}) {
     around.push_back(rows.above[i + dx]);
     around.push_back(rows.below[i + dx]);
     if (dx != 0) around.push_back(rows.here[i + dx]);
   }
   const auto [low, high] = std::ranges::minmax(around);
-  const int code = rows.here[i];
-  const int distance = std::max(code - high, low - code);
+  const double code = rows.here[i];
+  const double distance = std::max(code - high, low - code);
   if (distance <= 0) return -1;
   const double level = std::max((code > high ? high : low) - static_cast<double>(bounds.black_dn[i % 2]), 0.0);
   const double plain = static_cast<double>(bounds.range_factor) * (high - low) + static_cast<double>(bounds.floor_dn);
@@ -48,7 +51,8 @@ double beyond(const defect_rows::Rows& rows, int i, const defect_rows::Bounds& b
   return bound > 0 ? distance / bound : INFINITY;
 }
 
-void expect_marks(ThreeRows& of, int count, const defect_rows::Bounds& bounds) {
+template <class Sample>
+void expect_marks(ThreeRows<Sample>& of, int count, const defect_rows::Bounds& bounds) {
   std::vector<std::uint8_t> marked(static_cast<std::size_t>(count) + 1, 77);
   defect_rows::mark_outliers(of.rows(), count, bounds, marked.data());
   EXPECT_EQ(marked[static_cast<std::size_t>(count)], 77);
@@ -62,6 +66,22 @@ void expect_marks(ThreeRows& of, int count, const defect_rows::Bounds& bounds) {
   }
 }
 
+template <class Sample>
+void expect_marks_of_noise(std::mt19937& draw, int count, const defect_rows::Bounds& bounds) {
+  ThreeRows<Sample> of(count);
+  for (const int spread : {3, 40, 65535}) {
+    std::uniform_int_distribution<int> code(spread == 65535 ? 0 : 600, spread == 65535 ? 65535 : 600 + spread);
+    for (int r = 0; r < 3; ++r) {
+      for (int x = 0; x < of.width; ++x) {
+        const bool hot = draw() % 13 == 0;
+        of.row(r)[x] = static_cast<Sample>(hot ? draw() % 2000 : static_cast<unsigned>(code(draw)));
+        if constexpr (std::is_same_v<Sample, float>) of.row(r)[x] += static_cast<float>(draw() % 1000) / 1000 - 300;
+      }
+    }
+    expect_marks(of, count, bounds);
+  }
+}
+
 TEST(DefectRows, MarkWhatIsOutsideAsFarAsAskedWithEachInstructionSet) {
   const defect_rows::Bounds known{{512, 530}, 0, 0, 25 * 9.0f, 25 * 0.5f}, unknown{{512, 530}, 4, 30, 0, 0};
   ASSERT_FALSE(test::kernel_targets().empty());
@@ -69,24 +89,16 @@ TEST(DefectRows, MarkWhatIsOutsideAsFarAsAskedWithEachInstructionSet) {
     const test::OnlyTarget only(target);
     std::mt19937 draw(11);
     for (const int count : {1, 3, 15, 16, 17, 100, 512}) {
-      ThreeRows of(count);
-      for (const int spread : {3, 40, 65535}) {
-        std::uniform_int_distribution<int> code(spread == 65535 ? 0 : 600, spread == 65535 ? 65535 : 600 + spread);
-        for (int r = 0; r < 3; ++r) {
-          for (int x = 0; x < of.width; ++x) {
-            const bool hot = draw() % 13 == 0;
-            of.row(r)[x] = static_cast<std::uint16_t>(hot ? draw() % 2000 : code(draw));
-          }
-        }
-        expect_marks(of, count, known);
-        expect_marks(of, count, unknown);
+      for (const defect_rows::Bounds& bounds : {known, unknown}) {
+        expect_marks_of_noise<std::uint16_t>(draw, count, bounds);
+        expect_marks_of_noise<float>(draw, count, bounds);
       }
     }
   }
 }
 
 TEST(DefectRows, MarkNothingInAFlatAndAllThatDiffersWithoutBounds) {
-  ThreeRows of(64);
+  ThreeRows<std::uint16_t> of(64);
   for (int r = 0; r < 3; ++r) std::fill_n(of.row(r), of.width, std::uint16_t{65535});
   expect_marks(of, 64, {});
   of.row(1)[20] = 65534;

@@ -5,19 +5,20 @@
 #include <cstring>
 
 #include "isp/raw/black_point.h"
+#include "tests/support/executors.h"
 #include "tests/support/frames.h"
 
 namespace lowlux::isp {
 namespace {
 
-InlineExecutor executor;
+using test::one_thread;
 
 TEST(ToFraction, KeepsValuesBelowBlackAndAboveWhite) {
   RawDn raw = test::bayer_frame(6, 5, BayerPhase::grbg, [](int x, int y) { return 100 + 50 * x + y; });
   raw.white_dn = {300, 310, 320};
   raw.black_tag = BlackLevel{.rows = 2, .columns = 2, .pattern_dn = {150.25, 151, 152, 153}};
   const BlackPoint black = *choose_black(raw, {BlackChoice::metadata});
-  const RawFraction out = to_fraction(raw, black, executor);
+  const RawFraction out = to_fraction(raw, black, one_thread);
   for (int y = 0; y < 5; ++y) {
     for (int x = 0; x < 6; ++x) {
       const double b = black.pedestal_dn[site_of(x, y)];
@@ -39,7 +40,7 @@ TEST(ToElectrons, InOnePassHasTheBitsOfBothSteps) {
   PoolExecutor three(3);
   for (const bool pattern : {false, true}) {
     if (pattern) black.pattern = BlackLevel{.rows = 1, .columns = 3, .pattern_dn = {150, 151.5, 149}};
-    const RawElectrons expected = to_electrons(to_fraction(raw, black, executor), electrons, executor);
+    const RawElectrons expected = to_electrons(to_fraction(raw, black, one_thread), electrons, one_thread);
     Plane<float> found(37, 27);
     to_electrons(raw, black, electrons, found.view(), three);
     EXPECT_EQ(std::memcmp(found.data(), expected.value.data(), found.size() * sizeof(float)), 0);
@@ -52,7 +53,7 @@ TEST(ToFraction, FourByFourPatternsAndRowOffsetsReachEveryPixel) {
   for (int i = 0; i < 16; ++i) tag.pattern_dn[i] = 100 + i;
   tag.row_dn = {0, 1, 2, 3, 4, 5, 6};
   raw.black_tag = tag;
-  const RawFraction out = to_fraction(raw, *choose_black(raw, {BlackChoice::automatic}), executor);
+  const RawFraction out = to_fraction(raw, *choose_black(raw, {BlackChoice::automatic}), one_thread);
   for (int y = 0; y < 7; ++y) {
     for (int x = 0; x < 9; ++x) {
       const double b = 100 + 4 * (y % 4) + x % 4 + y;
@@ -65,7 +66,7 @@ TEST(ToFraction, UsesTheActiveAreaOnlyAndAnyThreadCountAgrees) {
   RawDn raw = test::bayer_frame(41, 33, BayerPhase::bggr, [](int x, int y) { return 7 * x + 3 * y; });
   raw.active = {3, 5, 30, 21};
   const BlackPoint black = *choose_black(raw, {BlackChoice::metadata});
-  const RawFraction one = to_fraction(raw, black, executor);
+  const RawFraction one = to_fraction(raw, black, one_thread);
   EXPECT_EQ(one.value.width(), 30);
   EXPECT_EQ(one.value.height(), 21);
   EXPECT_FLOAT_EQ(one.value.at(0, 0), (7 * 3 + 3 * 5) / 4095.0f);
@@ -86,7 +87,7 @@ TEST(ToFractionRgb, ScalesEachSampleByItsOwnBlackAndWhite) {
   raw.black_tag = BlackLevel{.samples = 3, .pattern_dn = {10, 20, 30}};
   Plane<float> planes[3] = {{2, 1}, {2, 1}, {2, 1}};
   to_fraction_rgb(raw, *choose_black(raw, {BlackChoice::metadata}),
-                  {planes[0].view(), planes[1].view(), planes[2].view()}, executor);
+                  {planes[0].view(), planes[1].view(), planes[2].view()}, one_thread);
   EXPECT_FLOAT_EQ(planes[0].at(1, 0), (400 - 10) / 990.0f);
   EXPECT_FLOAT_EQ(planes[1].at(0, 0), (200 - 20) / 1980.0f);
   EXPECT_FLOAT_EQ(planes[2].at(1, 0), (600 - 30) / 2970.0f);
@@ -108,7 +109,7 @@ TEST(Electrons, DarkIsSubtractedOnlyWhereTheBlackPointDidNotHoldIt) {
   BlackPoint black = *choose_black(raw, {BlackChoice::metadata});
   const PerSite<double> electrons{1000, 1000, 1000, 1000};
   const auto signal_of = [&](const BlackPoint& b) {
-    return subtract_dark(to_electrons(to_fraction(raw, b, executor), electrons, executor), b, executor);
+    return subtract_dark(to_electrons(to_fraction(raw, b, one_thread), electrons, one_thread), b, one_thread);
   };
   EXPECT_FLOAT_EQ(signal_of(black).value.at(2, 2), 200);
   black.dark_mean_e = {150, 250, 250, 150};

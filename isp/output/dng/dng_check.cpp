@@ -6,13 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "isp/base/float_samples.h"
 #include "isp/base/text.h"
 
 namespace lowlux::isp {
 namespace {
 
 constexpr double max_level_dn = 65535;
-constexpr std::size_t max_values = 65535;  // libtiff counts the values of these tags in 16 bits
+constexpr double max_float_level_dn = 4294967295.0;  // WhiteLevel is an integer of up to 32 bits
+constexpr std::size_t max_values = 65535;            // libtiff counts the values of these tags in 16 bits
 constexpr double largest_coefficient =
     1000;  // of a matrix or gain: above it no camera is plausible, and rationals are too coarse
 constexpr double smallest_gain = 1e-4;
@@ -43,11 +45,12 @@ double largest(const std::vector<double>& values) {
 
 Result<void> check_geometry(const RawDn& raw) {
   const int samples = samples_of(raw.layout);
-  if (raw.dn.empty() || raw.dn.width() % samples != 0) {
-    return cannot("image", std::to_string(raw.dn.width()) + " x " + std::to_string(raw.dn.height()) +
+  if (raw.samples() == 0 || raw.row_samples() % samples != 0) {
+    return cannot("image", std::to_string(raw.row_samples()) + " x " + std::to_string(raw.rows()) +
                                " samples are no pixels of " + std::to_string(samples) + " samples");
   }
-  const int width = raw.dn.width() / samples, height = raw.dn.height();
+  if (raw.is_float() && !raw.dn.empty()) return cannot("image", "it has both codes and floating-point samples");
+  const int width = raw.row_samples() / samples, height = raw.rows();
   const std::string readout = " do not lie in the readout of " + std::to_string(width) + " x " + std::to_string(height);
   if (!inside(raw.active, width, height)) return cannot("ActiveArea", text_of(raw.active) + readout);
   if (!inside(raw.default_crop, raw.active.width, raw.active.height)) {
@@ -61,14 +64,25 @@ Result<void> check_geometry(const RawDn& raw) {
   return {};
 }
 
-Result<void> check_deltas(const std::vector<double>& deltas, int expected, const char* tag) {
+double max_level(const RawDn& raw) { return raw.is_float() ? max_float_level_dn : max_level_dn; }
+
+std::string levels_text(double low, const RawDn& raw) {
+  return "expected " + number_text(low) + " to " + number_text(max_level(raw)) + " DN";
+}
+
+Result<void> check_deltas(const RawDn& raw, const std::vector<double>& deltas, int expected, const char* tag) {
   if (deltas.empty()) return {};
   if (deltas.size() != static_cast<std::size_t>(expected) || deltas.size() > max_values) {
     return cannot(tag, std::to_string(deltas.size()) + " values for " + std::to_string(expected) +
                            " columns or rows, at most 65535");
   }
-  if (!all_within(deltas, -max_level_dn, max_level_dn)) return cannot(tag, "expected -65535 to 65535 DN");
+  if (!all_within(deltas, -max_level(raw), max_level(raw))) return cannot(tag, levels_text(-max_level(raw), raw));
   return {};
+}
+
+Result<void> check_samples(const RawDn& raw) {
+  const auto unusable = unusable_sample(raw);
+  return unusable ? cannot("sample", *unusable) : Result<void>{};
 }
 
 Result<void> check_black(const RawDn& raw) {
@@ -82,14 +96,17 @@ Result<void> check_black(const RawDn& raw) {
                                     " x " + std::to_string(black.columns) + " sites of " +
                                     std::to_string(black.samples) + " samples, at most 65535");
   }
-  if (!all_within(black.pattern_dn, 0, max_level_dn)) return cannot("BlackLevel", "expected 0 to 65535 DN");
-  if (auto fits = check_deltas(black.column_dn, raw.active.width, "BlackLevelDeltaH"); !fits) return fits;
-  return check_deltas(black.row_dn, raw.active.height, "BlackLevelDeltaV");
+  if (!all_within(black.pattern_dn, 0, max_level(raw))) return cannot("BlackLevel", levels_text(0, raw));
+  if (auto fits = check_deltas(raw, black.column_dn, raw.active.width, "BlackLevelDeltaH"); !fits) return fits;
+  return check_deltas(raw, black.row_dn, raw.active.height, "BlackLevelDeltaV");
 }
 
 Result<void> check_white(const RawDn& raw) {
   for (const double white : raw.white_dn) {
-    if (!within(white, 1, max_level_dn)) return cannot("WhiteLevel", number_text(white) + ", expected 1 to 65535 DN");
+    if (!within(white, 1, max_level(raw))) return cannot("WhiteLevel", number_text(white) + ", " + levels_text(1, raw));
+    if (raw.is_float() && white != std::round(white)) {
+      return cannot("WhiteLevel", number_text(white) + " is not an integer: scale the samples, for example to 1");
+    }
     if (raw.layout != SensorLayout::linear_rgb && white != raw.white_dn[0]) {
       return cannot("WhiteLevel",
                     "a mosaic has one, found " + number_text(raw.white_dn[0]) + " and " + number_text(white));
@@ -152,6 +169,15 @@ Result<void> check_noise(const NoiseProfile& noise) {
   return {};
 }
 
+Result<void> check_ratio(const NoiseRatio& of, const Rect& active) {
+  const bool fits = within(of.block_px, 1, 65535) && of.ratio.width() == ratio_blocks(active.width, of.block_px) &&
+                    of.ratio.height() == ratio_blocks(active.height, of.block_px) &&
+                    std::all_of(of.ratio.data(), of.ratio.data() + of.ratio.size(),
+                                [](float ratio) { return std::isfinite(ratio) && ratio > 0; });
+  if (!fits) return cannot("DNGPrivateData", "expected positive noise ratios in blocks that cover the active area");
+  return {};
+}
+
 bool is_consistent(const GainMap& map) {
   const bool positive = map.top >= 0 && map.left >= 0 && map.bottom > map.top && map.right > map.left &&
                         map.row_pitch > 0 && map.column_pitch > 0 && map.first_plane >= 0 && map.planes > 0 &&
@@ -188,10 +214,12 @@ Result<void> check_corrections(const RawFrame& frame) {
 
 Result<void> check_dng_frame(const RawFrame& frame) {
   return check_geometry(frame.raw)
+      .and_then([&] { return check_samples(frame.raw); })
       .and_then([&] { return check_black(frame.raw); })
       .and_then([&] { return check_white(frame.raw); })
       .and_then([&] { return check_colour(frame.colour); })
       .and_then([&] { return frame.noise ? check_noise(*frame.noise) : Result<void>{}; })
+      .and_then([&] { return frame.noise_ratio ? check_ratio(*frame.noise_ratio, frame.raw.active) : Result<void>{}; })
       .and_then([&] { return check_corrections(frame); });
 }
 

@@ -9,6 +9,7 @@
 
 #include <tiffio.h>
 
+#include "isp/codec/noise_ratio_bytes.h"
 #include "isp/output/dng/dng_check.h"
 
 namespace lowlux::isp {
@@ -125,6 +126,10 @@ void set_dng_noise_and_opcodes(TIFF* file, const RawFrame& frame) {
     }
     TIFFSetField(file, noise_profile, static_cast<int>(pairs.size()), pairs.data());
     if (frame.noise->reduced) set_floats(file, noise_reduction_applied, std::array{1.0});
+  }
+  if (frame.noise_ratio) {
+    const std::vector<std::byte> bytes = encode_noise_ratio(*frame.noise_ratio);
+    TIFFSetField(file, TIFFTAG_DNGPRIVATEDATA, static_cast<int>(bytes.size()), bytes.data());
   }
   const OpcodeLists lists = opcode_lists(frame);
   set_opcodes(file, opcode_list1, lists.first);

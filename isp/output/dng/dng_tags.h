@@ -20,7 +20,7 @@ void set_dng_levels(tiff* file, const RawDn& raw);
 /// Sets matrices, illuminants, analogue gains and the as-shot white. Precondition: check_dng_frame.
 void set_dng_colour(tiff* file, const CameraColour& colour);
 
-/// Sets NoiseProfile and the opcode lists. Precondition: check_dng_frame.
+/// Sets NoiseProfile, the noise ratio (noise_ratio_bytes.h) and the opcode lists. Precondition: check_dng_frame.
 void set_dng_noise_and_opcodes(tiff* file, const RawFrame& frame);
 
 /// Holds the corrections of a frame as the opcode lists of DNG 1.4 (chapter 7); empty where there is nothing to

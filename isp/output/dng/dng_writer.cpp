@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <new>
 #include <utility>
 
+#include "isp/base/text.h"
+#include "isp/codec/source_tags_output.h"
 #include "isp/codec/tiff_info.h"
 #include "isp/codec/tiff_output.h"
 #include "isp/output/dng/dng_check.h"
@@ -18,6 +21,8 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::size_t longest_description = 4000;
+constexpr double max_baseline_exposure_ev = 100;
+constexpr std::uint16_t opcode_list3 = 51022;
 constexpr int photometric_linear_raw = 34892;  // DNG LinearRaw
 
 std::string unique_camera_model(const FrameInfo& info) {
@@ -30,9 +35,10 @@ void set_image(TIFF* tiff, const RawDn& raw, int rows_per_strip) {
   const int samples = samples_of(raw.layout);
   const bool mosaic = raw.layout == SensorLayout::bayer;
   TIFFSetField(tiff, TIFFTAG_SUBFILETYPE, 0);
-  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, raw.dn.width() / samples);
-  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, raw.dn.height());
-  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 16);
+  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, raw.row_samples() / samples);
+  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, raw.rows());
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, static_cast<int>(8 * raw.sample_bytes()));
+  if (raw.is_float()) TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_IEEEFP);
   TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, samples);
   TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_NONE);
   TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, mosaic ? PHOTOMETRIC_CFA : photometric_linear_raw);
@@ -49,12 +55,39 @@ void set_image(TIFF* tiff, const RawDn& raw, int rows_per_strip) {
   TIFFSetField(tiff, TIFFTAG_CFALAYOUT, 1);  // rectangular
 }
 
+double baseline_exposure_ev(const DngWriteOptions& options) {
+  return options.baseline_exposure_ev + (options.source_tags ? options.source_tags->baseline_exposure_ev : 0);
+}
+
+/// Returns whether the tags of the source hold opcodes.
+bool has_opcodes(const DngWriteOptions& options) {
+  if (!options.source_tags) return false;
+  const auto& tags = options.source_tags->main;
+  return std::any_of(tags.begin(), tags.end(), [](const SourceTag& tag) { return tag.id == opcode_list3; });
+}
+
+/// Returns whether a tag belongs to the source's camera profile, which refers to its colour matrices.
+bool is_of_profile(const SourceTag& tag) {
+  constexpr std::array<std::uint16_t, 11> ids{50932, 50934, 50936, 50937, 50938, 50939,
+                                              50940, 50981, 50982, 51107, 51108};
+  return std::find(ids.begin(), ids.end(), tag.id) != ids.end();
+}
+
+Result<void> add_tags_of_source(std::FILE* file, const CameraColour& colour, const DngWriteOptions& options) {
+  if (!options.source_tags) return {};
+  if (colour.source == CameraColour::Source::file_tags) return add_source_tags(file, *options.source_tags);
+  SourceTags tags = *options.source_tags;
+  std::erase_if(tags.main, is_of_profile);
+  return add_source_tags(file, tags);
+}
+
 void set_identity(TIFF* tiff, const RawFrame& frame, const FrameInfo& info, const DngWriteOptions& options) {
   constexpr std::array<std::uint8_t, 4> version{1, 4, 0, 0};
-  // MaskedAreas came with 1.1; opcodes came with 1.3 and must not be skipped.
+  // MaskedAreas came with 1.1; opcodes came with 1.3 and must not be skipped; floating-point samples came with 1.4.
   const RawCorrections& c = frame.corrections;
-  const bool opcodes = !c.gain_maps.empty() || !c.radial_gains.empty() || !c.defects.empty();
-  const std::array<std::uint8_t, 4> backward{1, static_cast<std::uint8_t>(opcodes ? 3 : 1), 0, 0};
+  const bool opcodes = !c.gain_maps.empty() || !c.radial_gains.empty() || !c.defects.empty() || has_opcodes(options);
+  const int needed = frame.raw.is_float() ? 4 : opcodes ? 3 : 1;
+  const std::array<std::uint8_t, 4> backward{1, static_cast<std::uint8_t>(needed), 0, 0};
   TIFFSetField(tiff, TIFFTAG_DNGVERSION, version.data());
   TIFFSetField(tiff, TIFFTAG_DNGBACKWARDVERSION, backward.data());
   TIFFSetField(tiff, TIFFTAG_UNIQUECAMERAMODEL, unique_camera_model(info).c_str());
@@ -66,13 +99,14 @@ void set_identity(TIFF* tiff, const RawFrame& frame, const FrameInfo& info, cons
   if (!description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
 }
 
-bool write_strips(TIFF* tiff, const Plane<std::uint16_t>& dn, int rows_per_strip) {
+template <class Sample>
+bool write_strips(TIFF* tiff, const PlaneView<const Sample>& dn, int rows_per_strip) {
   std::uint32_t index = 0;
-  for (int y = 0; y < dn.height(); y += rows_per_strip, ++index) {
-    const int rows = std::min(rows_per_strip, dn.height() - y);
-    const auto size = static_cast<tmsize_t>(sizeof(std::uint16_t) * dn.width() * rows);
+  for (int y = 0; y < dn.height; y += rows_per_strip, ++index) {
+    const int rows = std::min(rows_per_strip, dn.height - y);
+    const auto size = static_cast<tmsize_t>(sizeof(Sample) * dn.width * rows);
     // libtiff's interface is not const-correct; it only reads data that needs no change of byte order.
-    auto* samples = const_cast<std::uint16_t*>(dn.row(y));
+    auto* samples = const_cast<Sample*>(dn.row(y));
     if (TIFFWriteEncodedStrip(tiff, index, samples, size) != size) return false;
   }
   return true;
@@ -90,8 +124,8 @@ Result<void> pad(std::FILE* file) {
 Result<void> encode(const RawFrame& frame, const DngWriteOptions& options, std::FILE* file) {
   FrameInfo info = written_info(frame.raw.info, options.software);
   info.orientation = frame.raw.info.orientation;
-  const std::size_t row_bytes = sizeof(std::uint16_t) * frame.raw.dn.width();
-  const int rows = static_cast<int>(std::clamp<std::size_t>(tiff_strip_bytes / row_bytes, 1, frame.raw.dn.height()));
+  const std::size_t row_bytes = frame.raw.sample_bytes() * frame.raw.row_samples();
+  const int rows = static_cast<int>(std::clamp<std::size_t>(tiff_strip_bytes / row_bytes, 1, frame.raw.rows()));
   TiffOutput output(file, false);
   TIFF* tiff = output.handle();
   if (tiff == nullptr) return output.finish(false);
@@ -101,20 +135,29 @@ Result<void> encode(const RawFrame& frame, const DngWriteOptions& options, std::
   set_identity(tiff, frame, info, options);
   set_dng_levels(tiff, frame.raw);
   if (frame.raw.layout != SensorLayout::monochrome) set_dng_colour(tiff, frame.colour);
-  TIFFSetField(tiff, TIFFTAG_BASELINEEXPOSURE, 0.0);
+  TIFFSetField(tiff, TIFFTAG_BASELINEEXPOSURE, baseline_exposure_ev(options));
   set_dng_noise_and_opcodes(tiff, frame);
   if (exif != 0) TIFFSetField(tiff, TIFFTAG_EXIFIFD, exif);
-  return output.finish(write_strips(tiff, frame.raw.dn, rows) && TIFFWriteDirectory(tiff) != 0).and_then([&] {
-    return pad(file);
-  });
+  const bool stored = with_samples(frame.raw, [&](const auto& dn) { return write_strips(tiff, dn, rows); });
+  return output.finish(stored && TIFFWriteDirectory(tiff) != 0)
+      .and_then([&] { return add_tags_of_source(file, frame.colour, options); })
+      .and_then([&] { return pad(file); });
+}
+
+Result<void> check_baseline_exposure(double ev) {
+  if (std::fabs(ev) <= max_baseline_exposure_ev) return {};
+  return fail(ErrorCode::invalid_argument,
+              "a DNG cannot hold this BaselineExposure: " + number_text(ev) + " EV, expected -100 to 100");
 }
 
 }  // namespace
 
-Result<void> check_dng_size(std::int64_t samples) {
-  if (samples <= static_cast<std::int64_t>(tiff_classic_limit / sizeof(std::uint16_t))) return {};
-  return fail(ErrorCode::too_large, "a DNG holds " + std::to_string(tiff_classic_limit / sizeof(std::uint16_t)) +
-                                        " samples, the frame has " + std::to_string(samples) + ": crop it");
+Result<void> check_dng_size(std::int64_t samples, std::size_t sample_bytes) {
+  const auto most = static_cast<std::int64_t>(tiff_classic_limit / sample_bytes);
+  if (samples <= most) return {};
+  return fail(ErrorCode::too_large, "a DNG holds " + std::to_string(most) + " samples of " +
+                                        std::to_string(8 * sample_bytes) + " bits, the frame has " +
+                                        std::to_string(samples) + ": crop it");
 }
 
 Result<void> write_dng(const RawFrame& frame, const std::string& path, const DngWriteOptions& options) try {
@@ -123,7 +166,9 @@ Result<void> write_dng(const RawFrame& frame, const std::string& path, const Dng
     return error;
   };
   return check_dng_frame(frame)
-      .and_then([&] { return check_dng_size(static_cast<std::int64_t>(frame.raw.dn.size())); })
+      .and_then([&] { return check_baseline_exposure(baseline_exposure_ev(options)); })
+      .and_then(
+          [&] { return check_dng_size(static_cast<std::int64_t>(frame.raw.samples()), frame.raw.sample_bytes()); })
       .and_then([&] { return AtomicFile::create(path, options.overwrite, options.sync); })
       .and_then(
           [&](AtomicFile out) { return encode(frame, options, out.file()).and_then([&] { return out.commit(); }); })

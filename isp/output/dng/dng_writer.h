@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
+#include "isp/base/source_tags.h"
 #include "isp/output/atomic_file.h"
 
 namespace lowlux::isp {
@@ -14,9 +17,17 @@ struct DngWriteOptions {
   std::string software = "lowlux";  // with its version; replaces the name in the frame
   std::string description;          // ImageDescription, the processing of the frame; printable ASCII is kept
   Sync sync = Sync::no;
+  /// Of the raw file, to be written as they are, those of its camera profile only with its colour matrices. Their
+  /// UniqueCameraModel takes the place of make and model. Null: none.
+  std::shared_ptr<const SourceTags> source_tags;
+  /// By how much raw developers brighten the image by default (BaselineExposure), in addition to what the source
+  /// states; the sum is -100 to 100. For a merge of exposures the ratio of the exposure that the image is to have to
+  /// the one that white belongs to.
+  double baseline_exposure_ev = 0;
 };
 
-/// Writes a raw frame as DNG 1.4, completely or not at all: 16 bits, uncompressed, in adjacent strips of about 1 MB.
+/// Writes a raw frame as DNG 1.4, completely or not at all: 16 bits, or 32-bit floats if the frame has floating-point
+/// samples, uncompressed, in adjacent strips of about 1 MB. Floats are preserved bit by bit.
 /// Mosaics and monochrome have one sample per pixel, SensorLayout::linear_rgb three. Every figure of the frame that has
 /// a DNG tag is written; what is absent stays absent. Rationals are within 1e-7 of the figure, relative.
 ///
@@ -24,13 +35,15 @@ struct DngWriteOptions {
 /// light source of EXIF (light_source_of). UniqueCameraModel, which DNG requires, is make and model, or "Unknown".
 ///
 /// Errors
-///     invalid_argument  a figure that DNG cannot hold or that contradicts another (the message names it)
+///     invalid_argument  a figure that DNG cannot hold or that contradicts another (the message names it); samples
+///                       that are not finite or too large (unusable_sample); with floats a white level that is no
+///                       integer
 ///     too_large         as check_dng_size
 ///     exists, unwritable  as AtomicFile
 Result<void> write_dng(const RawFrame& frame, const std::string& path, const DngWriteOptions& options = {});
 
-/// Returns an error if this number of 16-bit samples would need offsets of 64 bits (BigTIFF), which raw developers do
-/// not read.
-Result<void> check_dng_size(std::int64_t samples);
+/// Returns an error if this number of samples would need offsets of 64 bits (BigTIFF), which raw developers do not
+/// read.
+Result<void> check_dng_size(std::int64_t samples, std::size_t sample_bytes = 2);
 
 }  // namespace lowlux::isp

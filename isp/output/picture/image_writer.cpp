@@ -12,6 +12,7 @@
 #include "isp/base/text.h"
 #include "isp/codec/pfm.h"
 #include "isp/codec/png.h"
+#include "isp/codec/source_tags_output.h"
 #include "isp/output/picture/icc.h"
 #include "isp/output/picture/metadata.h"
 
@@ -83,7 +84,9 @@ int height_of(const Picture& picture) {
 FileMetadata metadata_for(const Picture& picture, OutputSpace space, const FrameInfo& info, const WriteOptions& o) {
   FileMetadata metadata;
   metadata.icc = icc_profile(space);
-  metadata.exif = exif_block(info, {width_of(picture), height_of(picture), space, o.software});
+  if (o.source_tags) metadata.source_tags = std::make_shared<const SourceTags>(picture_tags(*o.source_tags));
+  metadata.exif =
+      exif_block(info, {width_of(picture), height_of(picture), space, o.software, metadata.source_tags.get()});
   metadata.info = written_info(info, o.software);
   metadata.chromaticities = chromaticities_of(space);
   metadata.white_luminance_cd_m2 = o.white_luminance_cd_m2;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "isp/base/frame.h"
 #include "isp/base/image.h"
 #include "isp/base/result.h"
+#include "isp/base/source_tags.h"
 #include "isp/codec/exr.h"
 #include "isp/codec/jpeg.h"
 #include "isp/codec/tiff.h"
@@ -34,8 +36,9 @@ Result<void> check_writable(FileFormat format, SampleType type, OutputSpace spac
 struct WriteOptions {
   Overwrite overwrite = Overwrite::no;
   Sync sync = Sync::no;
-  std::string software = "lowlux";              // with its version, for the metadata
-  std::optional<double> white_luminance_cd_m2;  // luminance of (1, 1, 1); OpenEXR keeps it
+  std::string software = "lowlux";                // with its version, for the metadata
+  std::shared_ptr<const SourceTags> source_tags;  // of the raw file: picture_tags of them are added to EXIF; null: none
+  std::optional<double> white_luminance_cd_m2;    // luminance of (1, 1, 1); OpenEXR keeps it
   JpegOptions jpeg;
   TiffOptions tiff;
   ExrOptions exr;

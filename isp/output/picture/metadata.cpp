@@ -67,6 +67,14 @@ class Block {
     add(EXIF_IFD_EXIF, tag, EXIF_FORMAT_RATIONAL, 1, bytes, sizeof bytes);
   }
 
+  /// Adds tags of the raw file; those that the block has stay as they are.
+  void add_source(ExifIfd ifd, const std::vector<SourceTag>& tags) {
+    for (const SourceTag& tag : tags) {
+      if (exif_content_get_entry(data_->ifd[ifd], static_cast<ExifTag>(tag.id)) != nullptr) continue;
+      add(ifd, tag.id, static_cast<ExifFormat>(tag.type), tag.count, tag.values.data(), tag.values.size());
+    }
+  }
+
   std::vector<std::byte> bytes() const {
     unsigned char* saved = nullptr;
     unsigned size = 0;
@@ -157,6 +165,11 @@ std::vector<std::byte> exif_block(const FrameInfo& info, const ExifPicture& pict
   block.add_short(EXIF_IFD_EXIF, EXIF_TAG_COLOR_SPACE, picture.space == OutputSpace::srgb ? 1 : 0xFFFF);
   block.add_long(EXIF_TAG_PIXEL_X_DIMENSION, static_cast<ExifLong>(picture.width));
   block.add_long(EXIF_TAG_PIXEL_Y_DIMENSION, static_cast<ExifLong>(picture.height));
+  if (picture.source_tags != nullptr) {
+    block.add_source(EXIF_IFD_0, picture.source_tags->main);
+    block.add_source(EXIF_IFD_EXIF, picture.source_tags->exif);
+    block.add_source(EXIF_IFD_GPS, picture.source_tags->gps);
+  }
   return block.bytes();
 }
 

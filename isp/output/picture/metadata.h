@@ -6,6 +6,7 @@
 
 #include "isp/base/frame.h"
 #include "isp/base/image.h"
+#include "isp/base/source_tags.h"
 
 namespace lowlux::isp {
 
@@ -14,7 +15,8 @@ struct ExifPicture {
   int width = 0;
   int height = 0;
   OutputSpace space = OutputSpace::srgb;
-  std::string software;  // producer of the image, e.g. "lowlux 0.1.0"
+  std::string software;                     // producer of the image, e.g. "lowlux 0.1.0"
+  const SourceTags* source_tags = nullptr;  // of the raw file; tags that the block has stay as they are
 };
 
 /// Returns an EXIF 2.32 block from its TIFF header on (little-endian). What is absent in `info` stays absent;

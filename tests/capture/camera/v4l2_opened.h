@@ -9,13 +9,12 @@
 
 #include "capture/v4l2/v4l2_source.h"
 #include "isp/base/packed/raw_format.h"
+#include "tests/support/error_words.h"
 #include "tests/support/fake_v4l2.h"
 
 namespace lowlux::test {
 
 inline constexpr RawFormat srggb10{10, RawPacking::little16, SensorLayout::bayer, BayerPhase::rggb};
-
-inline bool has(const Error& error, const std::string& words) { return error.message.find(words) != std::string::npos; }
 
 inline std::string joined(const std::vector<std::string>& lines) {
   std::string text;

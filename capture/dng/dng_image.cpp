@@ -1,0 +1,198 @@
+#include "capture/dng/dng_image.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "capture/dng/dng_floats.h"
+#include "capture/dng/dng_lossy.h"
+#include "capture/dng/dng_tags.h"
+#include "capture/file/pass_on.h"
+#include "isp/base/text.h"
+
+namespace lowlux::capture {
+namespace {
+
+constexpr std::uint32_t min_size = 22;     // LibRaw treats smaller ones as thumbnails
+constexpr std::uint32_t max_size = 65535;  // LibRaw keeps sizes in 16 bits
+
+Result<void> check_compression(std::uint32_t compression) {
+  if (compression == tag::compression_none || compression == tag::compression_jpeg) return {};
+  std::string message =
+      "the raw image is compressed with " + compression_name(compression) + ", which lowlux does not decode: ";
+  message += compression == tag::compression_vc5 ? "convert it with GoPro's or Adobe's DNG converter"
+                                                 : "convert it to a DNG with lossless JPEG or no compression";
+  return fail(ErrorCode::unsupported, std::move(message), tag::compression.name);
+}
+
+/// Returns whether the samples are floating-point numbers.
+Result<bool> holds_floats(const TiffDirectory& directory) {
+  return directory.whole_or(tag::sample_format, 1).map([](std::uint32_t format) { return format == 3; });
+}
+
+Result<void> check_bits(double bits, bool is_float) {
+  if (is_float) {
+    if (bits == 16 || bits == 24 || bits == 32) return {};
+    return fail(ErrorCode::unsupported,
+                "floating-point raws of " + number_text(bits) + " bits per sample are not supported, 16, 24 and 32 are",
+                tag::bits_per_sample.name);
+  }
+  if (bits >= 8 && bits <= 16 && bits == std::floor(bits)) return {};
+  return fail(ErrorCode::unsupported,
+              "raws of " + number_text(bits) + " bits per sample are not supported, 8 to 16 are",
+              tag::bits_per_sample.name);
+}
+
+Result<int> bits_of(const TiffDirectory& directory, std::size_t samples, bool is_float) {
+  auto bits = directory.numbers(tag::bits_per_sample, 1, 16);
+  if (!bits) return pass_on(bits);
+  if (!*bits) return fail(ErrorCode::malformed, "the tag BitsPerSample is missing", tag::bits_per_sample.name);
+  const std::vector<double>& values = **bits;
+  const bool equal = std::all_of(values.begin(), values.end(), [&](double b) { return b == values.front(); });
+  if (!equal || (values.size() != 1 && values.size() < samples)) {
+    return fail(ErrorCode::malformed, "the tag BitsPerSample does not agree with the samples",
+                tag::bits_per_sample.name);
+  }
+  if (auto known = check_bits(values.front(), is_float); !known) return pass_on(known);
+  return static_cast<int>(values.front());
+}
+
+Result<BayerPhase> phase_of(const TiffDirectory& directory) {
+  auto size = directory.numbers(tag::cfa_repeat_pattern_dim, 2, 2);
+  if (!size) return pass_on(size);
+  if (*size && **size != std::vector<double>{2, 2}) {
+    const bool x_trans = **size == std::vector<double>{6, 6};
+    return fail(ErrorCode::unsupported,
+                std::string(x_trans ? "X-Trans" : "repeating") + " mosaics of " + number_text((**size)[0]) + " x " +
+                    number_text((**size)[1]) + " sites are not supported: only Bayer mosaics and monochrome are",
+                tag::cfa_repeat_pattern_dim.name);
+  }
+  auto layout = directory.whole_or(tag::cfa_layout, 1);
+  if (!layout) return pass_on(layout);
+  if (*layout != 1) {
+    return fail(ErrorCode::unsupported, "mosaics that are not rectangular are not supported", tag::cfa_layout.name);
+  }
+  auto planes = directory.numbers(tag::cfa_plane_color, 1, 16);
+  if (!planes) return pass_on(planes);
+  if (*planes && **planes != std::vector<double>{0, 1, 2}) {
+    return fail(ErrorCode::unsupported, "mosaics of colours other than R, G, B are not supported",
+                tag::cfa_plane_color.name);
+  }
+  auto pattern = directory.numbers(tag::cfa_pattern, 4, 4);
+  if (!pattern) return pass_on(pattern);
+  if (!*pattern) return fail(ErrorCode::malformed, "the tag CFAPattern is missing", tag::cfa_pattern.name);
+  const std::vector<double> patterns[] = {{0, 1, 1, 2}, {1, 0, 2, 1}, {1, 2, 0, 1}, {2, 1, 1, 0}};
+  const auto* const at = std::find(std::begin(patterns), std::end(patterns), **pattern);
+  if (at == std::end(patterns)) {
+    return fail(ErrorCode::unsupported, "this mosaic is not one of the four Bayer patterns of R, G, B",
+                tag::cfa_pattern.name);
+  }
+  return static_cast<BayerPhase>(at - std::begin(patterns));
+}
+
+/// Returns the tile width; 0 for strips.
+Result<std::uint32_t> tile_width_of(const TiffDirectory& directory, const DngParts& parts) {
+  if (!parts.tiled) return 0;
+  return required_whole(directory, tag::tile_width);
+}
+
+/// Checks that image data lie inside the file, and where LibRaw reads them: without compression contiguously, row after
+/// row; with lossless JPEG in one strip, or in tiles.
+Result<void> check_storage(const TiffDirectory& directory, const DngImage& image, bool compressed,
+                           std::size_t file_bytes) {
+  auto parts = dng_parts(directory, file_bytes);
+  if (!parts) return pass_on(parts);
+  auto tile_width = tile_width_of(directory, *parts);
+  if (!tile_width) return pass_on(tile_width);
+  double total = 0;
+  bool in_one_piece = true;
+  for (std::size_t i = 0; i < parts->offset.size(); ++i) {
+    total += parts->bytes[i];
+    if (i > 0 && parts->offset[i] != parts->offset[i - 1] + parts->bytes[i - 1]) in_one_piece = false;
+  }
+  const bool side_by_side = parts->tiled && *tile_width != static_cast<std::uint32_t>(image.width);
+  if (compressed ? !parts->tiled && parts->offset.size() > 1 : side_by_side || !in_one_piece) {
+    return fail(ErrorCode::unsupported,
+                compressed ? "lossless JPEG in more than one strip is not supported: convert to tiles or one strip"
+                           : "uncompressed image data in more than one piece is not supported: convert to one strip");
+  }
+  const std::int64_t row_bits = std::int64_t{image.width} * image.samples * image.bits;
+  const std::int64_t needed = (row_bits + 7) / 8 * image.height;
+  if (!compressed && total < static_cast<double>(needed)) {
+    return fail(ErrorCode::malformed, "the image data has " + number_text(total) + " bytes, " +
+                                          std::to_string(image.width) + " x " + std::to_string(image.height) +
+                                          " pixels of " + std::to_string(image.bits) + " bits need " +
+                                          std::to_string(needed));
+  }
+  return {};
+}
+
+Result<void> fill_layout(const TiffDirectory& directory, DngImage& image) {
+  auto photometric = required_whole(directory, tag::photometric);
+  if (!photometric) return pass_on(photometric);
+  if (*photometric == tag::photometric_cfa) {
+    if (image.samples != 1) {
+      return fail(ErrorCode::unsupported, "mosaics with more than one sample per pixel are not supported",
+                  tag::samples_per_pixel.name);
+    }
+    auto phase = phase_of(directory);
+    if (!phase) return pass_on(phase);
+    image.phase = *phase;
+    return {};
+  }
+  if (image.samples != 1 && image.samples != 3) {
+    return fail(ErrorCode::unsupported,
+                "LinearRaw images of " + std::to_string(image.samples) + " samples are not supported, 1 and 3 are",
+                tag::samples_per_pixel.name);
+  }
+  auto planar = directory.whole_or(tag::planar_configuration, 1);
+  if (!planar) return pass_on(planar);
+  if (image.samples == 3 && *planar != 1) {
+    return fail(ErrorCode::unsupported, "images stored colour after colour are not supported",
+                tag::planar_configuration.name);
+  }
+  image.layout = image.samples == 1 ? SensorLayout::monochrome : SensorLayout::linear_rgb;
+  return {};
+}
+
+}  // namespace
+
+Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_bytes) {
+  auto width = required_whole(directory, tag::image_width);
+  if (!width) return pass_on(width);
+  auto height = required_whole(directory, tag::image_length);
+  if (!height) return pass_on(height);
+  auto samples = directory.whole_or(tag::samples_per_pixel, 1);
+  if (!samples) return pass_on(samples);
+  auto compression = directory.whole_or(tag::compression, tag::compression_none);
+  if (!compression) return pass_on(compression);
+  auto is_float = holds_floats(directory);
+  if (!is_float) return pass_on(is_float);
+  const std::uint32_t least = *is_float ? 1 : min_size;
+  if (std::min(*width, *height) < least || std::max(*width, *height) > max_size) {
+    return fail(ErrorCode::malformed, "a raw image of " + std::to_string(*width) + " x " + std::to_string(*height) +
+                                          " pixels cannot be decoded, " + std::to_string(least) +
+                                          " to 65535 each way can");
+  }
+  const bool is_lossy = !*is_float && *compression == tag::compression_lossy_jpeg;
+  if (!*is_float && !is_lossy) {
+    if (auto known = check_compression(*compression); !known) return pass_on(known);
+  }
+  DngImage image;
+  image.is_float = *is_float;
+  image.is_lossy = is_lossy;
+  image.width = static_cast<int>(*width);
+  image.height = static_cast<int>(*height);
+  image.samples = static_cast<int>(std::min<std::uint32_t>(*samples, 65535));
+  auto bits = bits_of(directory, image.samples, image.is_float);
+  if (!bits) return pass_on(bits);
+  image.bits = *bits;
+  if (auto layout = fill_layout(directory, image); !layout) return pass_on(layout);
+  auto stored = image.is_float   ? check_float_image(directory, image, file_bytes)
+                : image.is_lossy ? check_lossy_image(directory, image, file_bytes)
+                                 : check_storage(directory, image, *compression == tag::compression_jpeg, file_bytes);
+  if (!stored) return pass_on(stored);
+  return image;
+}
+
+}  // namespace lowlux::capture

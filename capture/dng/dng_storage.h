@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "capture/dng/tiff_directory.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+
+namespace lowlux::capture {
+
+/// Layout and storage of the samples of one raw image.
+struct DngImage {
+  int width = 0, height = 0;  // of the readout
+  int samples = 1;            // per pixel
+  int bits = 0;               // per sample, as stored
+  bool is_float = false;      // floating-point samples, of 16, 24 or 32 bits
+  bool is_lossy = false;      // 8-bit codes in baseline JPEG, one for each strip or tile
+  SensorLayout layout = SensorLayout::bayer;
+  BayerPhase phase = BayerPhase::rggb;
+};
+
+/// Locations of the parts (strips or tiles) of an image, all inside the file.
+struct DngParts {
+  std::vector<double> offset, bytes;
+  bool tiled = false;
+
+  /// Returns the bytes of part i.
+  std::span<const std::byte> part(std::span<const std::byte> file, std::size_t i) const {
+    return file.subspan(static_cast<std::size_t>(offset[i]), static_cast<std::size_t>(bytes[i]));
+  }
+};
+
+Result<DngParts> dng_parts(const TiffDirectory& directory, std::size_t file_bytes);
+
+/// Parts of equal size that cover an image row after row; the last ones may extend beyond it.
+struct DngGrid {
+  DngParts at;
+  int width = 0, height = 0;  // of one part [pixels]
+  int across = 0;             // parts next to each other
+  std::size_t count = 0;      // parts that the image needs
+
+  /// Returns the first column and row of part i.
+  int left(std::size_t i) const { return static_cast<int>(i % static_cast<std::size_t>(across)) * width; }
+  int top(std::size_t i) const { return static_cast<int>(i / static_cast<std::size_t>(across)) * height; }
+};
+
+/// Returns the grid of an image. Errors: parts without pixels, far larger than the image, too few or outside the file.
+Result<DngGrid> dng_grid(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes);
+
+/// Returns the value of a tag that must be there and be an integer.
+Result<std::uint32_t> required_whole(const TiffDirectory& directory, TagName name);
+
+/// Returns a compression's name for messages, "JPEG XL (52546)".
+std::string compression_name(std::uint32_t compression);
+
+}  // namespace lowlux::capture

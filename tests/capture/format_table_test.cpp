@@ -1,0 +1,149 @@
+// The table of formats in docs/formats.md is what this test reads and is refused. It fails where the page says
+// otherwise; LOWLUX_WRITE_FORMATS=1 writes the page.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "capture/decoder/libraw_decoder.h"
+#include "tests/capture/read_built.h"
+#include "tests/support/float_dng.h"
+
+namespace lowlux::capture {
+namespace {
+
+using test::DngBuilder;
+using test::DngStorage;
+using test::Tag;
+using test::TagType;
+
+struct Format {
+  std::string name;
+  std::function<std::vector<std::byte>()> file;
+};
+
+std::vector<std::byte> file_of(const std::string& name) {
+  std::ifstream in(LOWLUX_TESTDATA "/raws/" + name, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+std::vector<std::byte> dump(std::size_t size) { return std::vector<std::byte>(size, std::byte{'a'}); }
+
+DngBuilder plain(int samples = 1, int bits = 16, DngStorage storage = DngStorage::uncompressed) {
+  DngBuilder dng;
+  dng.width = dng.height = 64;
+  dng.samples = samples, dng.bits = bits, dng.storage = storage;
+  dng.tile_width = dng.tile_height = 32;
+  return dng;
+}
+
+std::vector<std::byte> with(DngBuilder dng, std::uint16_t id, const std::vector<double>& numbers) {
+  return dng.set(id, Tag::numbers(TagType::u16, numbers)).build();
+}
+
+std::vector<std::byte> floats(int bits, bool deflate, int predictor) {
+  Plane<std::uint32_t> zeros(32, 32);
+  std::fill_n(zeros.data(), zeros.size(), 0U);
+  return test::float_dng(zeros, {.bits = bits, .deflate = deflate, .predictor = predictor}).build();
+}
+
+std::vector<Format> stored_formats() {
+  std::vector<Format> out;
+  for (const int bits : {8, 10, 12, 14, 16}) {
+    out.push_back(
+        {"DNG, Bayer, " + std::to_string(bits) + " bits, uncompressed", [bits] { return plain(1, bits).build(); }});
+  }
+  out.push_back(
+      {"DNG, Bayer, lossless JPEG, one strip", [] { return plain(1, 14, DngStorage::lossless_jpeg).build(); }});
+  out.push_back(
+      {"DNG, Bayer, lossless JPEG, tiles", [] { return plain(1, 14, DngStorage::tiled_lossless_jpeg).build(); }});
+  out.push_back({"DNG, monochrome", [] {
+                   DngBuilder dng = plain();
+                   dng.monochrome = true;
+                   return dng.build();
+                 }});
+  out.push_back({"DNG, LinearRaw, uncompressed", [] { return plain(3).build(); }});
+  out.push_back({"DNG, LinearRaw, lossless JPEG", [] { return plain(3, 16, DngStorage::lossless_jpeg).build(); }});
+  out.push_back({"DNG, 16-bit floats, uncompressed", [] { return floats(16, false, 1); }});
+  out.push_back({"DNG, 24-bit floats, Deflate, predictor 3", [] { return floats(24, true, 3); }});
+  out.push_back({"DNG, 32-bit floats, Deflate, predictor 34894", [] { return floats(32, true, 34894); }});
+  return out;
+}
+
+std::vector<Format> other_formats() {
+  return {{"DNG, Bayer, uncompressed, several pieces",
+           [] {
+             DngBuilder dng = plain();
+             dng.tile_width = dng.tile_height = 32;
+             dng.stored_parts.assign(4, std::vector<std::byte>(std::size_t{32} * 32 * 2));
+             dng.parts_are_tiles = true;
+             return dng.build();
+           }},
+          {"DNG, Bayer, lossy JPEG", [] { return with(plain(1, 8), 259, {34892}); }},
+          {"DNG, integers, Deflate", [] { return with(plain(), 259, {8}); }},
+          {"DNG, JPEG XL", [] { return with(plain(), 259, {52546}); }},
+          {"DNG, VC-5 (GoPro GPR)", [] { return file_of("gopro_hero6_GOPR0024.gpr"); }},
+          {"DNG, X-Trans",
+           [] {
+             DngBuilder dng = plain();
+             dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
+             return dng.set(33422, Tag::numbers(TagType::byte, std::vector<double>(36, 1))).build();
+           }},
+          {"DNG, mosaic of cyan, magenta, yellow",
+           [] {
+             return plain().set(50710, Tag::numbers(TagType::byte, {3, 4, 5})).build();
+           }},
+          {"DNG, mosaic that is not rectangular", [] { return with(plain(), 50711, {2}); }},
+          {"DNG, integers of 32 bits", [] { return with(plain(), 258, {32}); }},
+          {"DNG, LinearRaw, colour after colour", [] { return with(plain(3), 284, {2}); }},
+          {"Kodak C603, YCbCr without a header", [] { return dump(9116448); }},
+          {"text", [] { return dump(1000); }},
+          {"TIFF image", [] { return with(plain(3).remove(50706).remove(50707), 262, {2}); }}};
+}
+
+/// Returns a row: decoded with its layout, or refused with the reason.
+std::string row_of(const Format& format) {
+  const auto frame = test::read_bytes(format.file());
+  if (!frame) {
+    std::string why = frame.error().message;
+    if (const auto at = why.find(decoder_name()); at != std::string::npos) {
+      why.replace(at, decoder_name().size(), "LibRaw");  // without its version
+    }
+    return "| " + format.name + " | refused | " + why + " |\n";
+  }
+  const char* const layouts[] = {"mosaic", "monochrome", "three colours"};
+  const RawDn& raw = frame->raw;
+  return "| " + format.name + " | decoded | " + layouts[static_cast<std::size_t>(raw.layout)] +
+         (raw.is_float() ? ", floats" : "") + " |\n";
+}
+
+std::string page() {
+  std::string out =
+      "# Formats\n\nEach row is a file that `tests/capture/format_table_test.cpp` builds or has, and what reading it "
+      "gives: the layout\nof the samples, or the message of the refusal. LibRaw decodes raws other than DNG, of which "
+      "no camera's file of a free\nlicence is small enough to be kept here; its list of cameras applies, without "
+      "X-Trans, Foveon, rotated and four-colour\nmosaics and sRAW. `tests/capture/lossy_dng_test.cpp` has lossy "
+      "LinearRaw, which is decoded.\n\n| format | result | layout or reason |\n|---|---|---|\n";
+  for (const auto& formats : {stored_formats(), other_formats()}) {
+    for (const Format& format : formats) out += row_of(format);
+  }
+  return out;
+}
+
+TEST(FormatTable, IsWhatThePageSays) {
+  const std::string path = LOWLUX_TESTDATA "/../docs/formats.md", now = page();
+  if (std::getenv("LOWLUX_WRITE_FORMATS") != nullptr) std::ofstream(path) << now;
+  std::ifstream in(path);
+  const std::string stated{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_EQ(now, stated);
+}
+
+}  // namespace
+}  // namespace lowlux::capture

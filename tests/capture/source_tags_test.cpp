@@ -1,0 +1,113 @@
+// Tags that are passed on, as they are collected from a file.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "capture/dng/source_tags.h"
+#include "capture/dng/tiff_directory.h"
+#include "tests/support/dng_builder.h"
+
+namespace lowlux::capture {
+namespace {
+
+using test::DngBuilder;
+using test::Tag;
+using test::TagType;
+
+std::vector<std::byte> values_of(const SourceTags& tags, std::uint16_t id) {
+  const auto at = std::find_if(tags.main.begin(), tags.main.end(), [id](const SourceTag& tag) { return tag.id == id; });
+  return at == tags.main.end() ? std::vector<std::byte>{} : at->values;
+}
+
+TEST(SourceTags, TablesOfTheProfileFollowTheSortedCalibrations) {
+  for (const bool daylight_first : {false, true}) {
+    for (const bool big_endian : {false, true}) {
+      DngBuilder dng;
+      dng.big_endian = big_endian;
+      for (const std::uint16_t id : {50721, 50722}) {
+        dng.set(id, Tag::numbers(TagType::srational, {1, 0, 0, 0, 1, 0, 0, 0, 1}));
+      }
+      dng.set(50778, Tag::numbers(TagType::u16, {daylight_first ? 21.0 : 17.0}));
+      dng.set(50779, Tag::numbers(TagType::u16, {daylight_first ? 17.0 : 21.0}));
+      dng.set(50938, Tag::numbers(TagType::f32, {1, 1, 1}));
+      dng.set(50939, Tag::numbers(TagType::f32, {2, 2, 2}));
+      std::vector<std::string> warnings;
+      const auto tags = read_source_tags(dng.build(), warnings);
+      ASSERT_TRUE(tags);
+      for (const auto& [id, written] : {std::pair<std::uint16_t, float>{50938, daylight_first ? 2.0F : 1.0F},
+                                        {50939, daylight_first ? 1.0F : 2.0F}}) {
+        const auto values = values_of(*tags, id);
+        ASSERT_EQ(values.size(), 12u);
+        EXPECT_EQ(load_f32(values.data(), false), written) << id;
+      }
+    }
+  }
+}
+
+TEST(SourceTags, DataOfLowluxItselfAreNotPassedOn) {
+  for (const std::string maker : {"lowlux", "Maker!"}) {
+    std::vector<std::byte> bytes(40);
+    std::transform(maker.begin(), maker.end(), bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
+    DngBuilder dng;
+    std::vector<std::string> warnings;
+    const auto tags = read_source_tags(dng.set(50740, Tag::opaque(bytes)).build(), warnings);
+    ASSERT_TRUE(tags);
+    EXPECT_EQ(values_of(*tags, 50740).empty(), maker == "lowlux");
+  }
+}
+
+TEST(SourceTags, ManyTagsOfTheSameBytesAreBounded) {
+  // 100 EXIF tags, each of which names the same megabyte.
+  constexpr std::size_t megabyte = std::size_t{1} << 20;
+  DngBuilder dng;
+  for (std::uint16_t i = 0; i < 100; ++i) {
+    dng.set(static_cast<std::uint16_t>(41000 + i), Tag::opaque(std::vector<std::byte>(16, std::byte{1})));
+  }
+  auto bytes = dng.build();
+  const auto tiff = TiffFile::open(bytes);
+  const auto main = tiff->directory(tiff->first_directory());
+  const auto exif = tiff->directory(**main->whole({34665, "ExifIFD"}));
+  std::vector<std::size_t> places;
+  for (const TiffEntry& entry : exif->entries) {
+    if (entry.id >= 41000 && entry.id < 41100) places.push_back(entry.place);
+  }
+  ASSERT_EQ(places.size(), 100u);
+  bytes.resize(bytes.size() + megabyte + 8);
+  for (const std::size_t place : places) {
+    for (const auto& [at, number] : {std::pair{place + 4, megabyte}, {place + 8, std::size_t{8}}}) {
+      for (std::size_t i = 0; i < 4; ++i) bytes[at + i] = static_cast<std::byte>(number >> (8 * i) & 255);
+    }
+  }
+  std::vector<std::string> warnings;
+  const auto tags = read_source_tags(bytes, warnings);
+  ASSERT_TRUE(tags);
+  std::size_t sum = 0;
+  for (const SourceTag& tag : tags->exif) sum += tag.values.size();
+  EXPECT_LE(sum, 64 * megabyte);
+  EXPECT_GE(sum, 60 * megabyte);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("too many or too large"), std::string::npos) << warnings[0];
+}
+
+TEST(SourceTags, BaselineExposureIsBoundedAndOfNumbers) {
+  for (const auto& [tag, expected] : {std::pair{Tag::rationals(TagType::srational, {{-7, 4}}), -1.75},
+                                      {Tag::rationals(TagType::srational, {{1, 0}}), 0.0},
+                                      {Tag::rationals(TagType::srational, {{1000, 1}}), 0.0},
+                                      {Tag::text("bright"), 0.0}}) {
+    DngBuilder dng;
+    std::vector<std::string> warnings;
+    EXPECT_EQ(read_source_tags(dng.set(50730, tag).build(), warnings)->baseline_exposure_ev, expected);
+  }
+}
+
+TEST(SourceTags, FilesThatAreNoTiffHaveNone) {
+  std::vector<std::string> warnings;
+  EXPECT_EQ(read_source_tags(std::vector<std::byte>(100, std::byte{'a'}), warnings), nullptr);
+  EXPECT_EQ(read_source_tags(std::filesystem::path("/nonexistent"), warnings), nullptr);
+  EXPECT_TRUE(warnings.empty());
+}
+
+}  // namespace
+}  // namespace lowlux::capture
