@@ -1,0 +1,57 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/base/image.h"
+#include "isp/base/matrix3.h"
+#include "isp/base/source_tags.h"
+#include "isp/render/hue_sat_map.h"
+
+namespace lowlux::isp {
+
+/// Holds the tables of the profile in a DNG.
+struct ProfileTables {
+  std::optional<HueSatMap> low;   // of the calibration with the lower temperature, or the only one
+  std::optional<HueSatMap> high;  // of the other calibration
+  std::optional<HueSatMap> look;  // applied after exposure
+};
+
+/// Reads the tables of a DNG's profile; null if it has none that change a colour. Left out with a warning is a table
+/// whose divisions are not within the limits of hue_sat_map.h, whose values are absent, not FLOAT or not as many as the
+/// divisions require, or which has a shift beyond +-360 degrees or a factor not in 0..1000; and the hue and saturation
+/// map as a whole if one of its two tables is. The specification requires a factor of value of 1 at saturation 0, so it
+/// is read as 1 there.
+/// @param two_maps  the file has two calibrations, so that the map of the second may not be absent
+std::shared_ptr<const ProfileTables> read_profile_tables(const SourceTags& tags, bool two_maps,
+                                                         std::vector<std::string>& warnings);
+
+/// Returns the map for a white: between two maps linear in the inverse of the correlated colour temperature, as
+/// matrices are; absent if there is none.
+/// @param weight  of the calibration with the higher temperature, 0..1
+std::optional<HueSatMap> map_at(const ProfileTables& tables, double weight);
+
+/// Holds the tables in use for a frame. With v a pixel of linear values after exposure, divided by the tone curve's
+/// limit, the result is
+///     from_prophoto look(map(to_prophoto v / map_scale) map_scale limit) / limit
+struct ProfileRendering {
+  std::optional<HueSatMap> map;
+  std::optional<HueSatMap> look;
+  Matrix3 to_prophoto = identity3();
+  Matrix3 from_prophoto = identity3();
+  double map_scale = 1;  // v of a value of 1 before exposure
+  double limit = 1;      // value after exposure for v = 1
+};
+
+/// Returns the matrix from XYZ under D65 to linear ProPhoto RGB, whose white is D50 (ISO 22028-2).
+Matrix3 xyz_to_prophoto();
+
+/// Applies the tables to every pixel; planes have equal size, `out` may be `in`. A sample that is not finite counts as
+/// 0.
+void apply_profile(const ProfileRendering& profile, const RgbView<const float>& in, const RgbView<float>& out,
+                   Executor& executor);
+
+}  // namespace lowlux::isp
