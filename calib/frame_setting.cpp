@@ -25,6 +25,11 @@ Result<FrameSetting> setting_of(const RawDn& raw) {
     return fail(ErrorCode::unsupported,
                 "the frame is already demosaiced; calibration needs the mosaic as the sensor gave it");
   }
+  if (raw.is_float()) {
+    return fail(ErrorCode::unsupported,
+                "the frame has floating-point samples, which are computed; darks, flats and calibration need the codes "
+                "of the sensor");
+  }
   const Rect& a = raw.active;
   if (a.width < smallest_side || a.height < smallest_side) {
     return fail(ErrorCode::insufficient, fmt::format("the active area is {} x {} pixels, calibration needs {} x {}",
@@ -79,12 +84,16 @@ Result<void> check_same_setting(const FrameSetting& first, const FrameSetting& s
 }
 
 double mean_dn(const RawDn& raw) {
-  double sum = 0;
-  for (int y = 0; y < raw.active.height; ++y) {
-    const std::uint16_t* row = raw.dn.row(raw.active.y + y) + raw.active.x;
-    for (int x = 0; x < raw.active.width; ++x) sum += row[x];
-  }
-  return sum / (static_cast<double>(raw.active.width) * raw.active.height);
+  const Rect& a = raw.active;
+  const double sum = with_samples(raw, [&](const auto& dn) {
+    double total = 0;
+    for (int y = 0; y < a.height; ++y) {
+      const auto* row = dn.row(a.y + y) + a.x;
+      for (int x = 0; x < a.width; ++x) total += row[x];
+    }
+    return total;
+  });
+  return sum / (static_cast<double>(a.width) * a.height);
 }
 
 int channel_of_site(const FrameSetting& setting, int site) {

@@ -25,8 +25,8 @@ struct FrameSetting {
 };
 
 /// Returns the setting of a frame.
-/// Errors: a layout that is not a mosaic, an active area below 16 x 16 or outside the readout, a white level that is
-/// not positive, an exposure time that is negative or NaN.
+/// Errors: a layout that is not a mosaic, floating-point samples, an active area below 16 x 16 or outside the readout,
+/// a white level that is not positive, an exposure time that is negative or NaN.
 Result<FrameSetting> setting_of(const RawDn& raw);
 
 /// Returns an error unless both are of the same camera, size, mosaic, white level and gain; `what` names the second.

@@ -137,7 +137,9 @@ ChartPicture chart_picture(const SignalFraction& mosaic, const RawDn& raw) {
   assert(mosaic.value.width() == raw.active.width && mosaic.value.height() == raw.active.height);
   const int width = raw.active.width / 2, height = raw.active.height / 2;
   ChartPicture out{CameraRgb(width, height), Plane<std::uint8_t>(width, height)};
-  const auto codes = raw.dn.view().crop(raw.active.x, raw.active.y, raw.active.width, raw.active.height);
+  const auto is_clipped = [&](int x, int y, double white_dn) {
+    return with_samples(raw, [&](const auto& dn) { return dn.at(raw.active.x + x, raw.active.y + y) >= white_dn; });
+  };
   for (int y = 0; y < height; ++y) {
     std::fill_n(out.clipped.row(y), width, std::uint8_t{0});
     for (const auto& plane : out.rgb.view()) std::fill_n(plane.row(y), width, 0.0F);
@@ -146,7 +148,7 @@ ChartPicture chart_picture(const SignalFraction& mosaic, const RawDn& raw) {
         const int column = 2 * x + (site & 1), row = 2 * y + (site >> 1);
         const auto colour = static_cast<std::size_t>(colour_at(mosaic.phase, column, row));
         out.rgb.plane[colour].at(x, y) += mosaic.value.at(column, row) * (colour == 1 ? 0.5F : 1.0F);
-        if (codes.at(column, row) >= raw.white_dn[colour]) out.clipped.at(x, y) = 1;
+        if (is_clipped(column, row, raw.white_dn[colour])) out.clipped.at(x, y) = 1;
       }
     }
   }

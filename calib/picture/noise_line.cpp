@@ -11,6 +11,7 @@
 namespace lowlux::calib {
 namespace {
 
+constexpr int max_steps = 40;
 constexpr double far_sigmas = 6;  // a bound further away than this clips one pixel in 1e9
 
 /// Returns the normal distribution before clipping.
@@ -121,6 +122,8 @@ NoiseLine moved(const NoiseLine& line, const Step& by) {
   return out;
 }
 
+Step halved(const Step& by) { return {by.gain / 2, by.offset / 2, by.contrast_squared / 2}; }
+
 /// @param expected  prior standard deviation of the contrast squared; 0: it is not fitted
 Normal normal_equations(std::span<const NoisePoint> points, const NoiseLine& line, double expected) {
   Normal out;
@@ -156,6 +159,17 @@ Normal normal_equations(std::span<const NoisePoint> points, const NoiseLine& lin
   return out;
 }
 
+/// Adds the prior's information to the equations, to first order about the line.
+void add_prior(const NoisePrior& prior, const NoiseLine& line, Normal& out) {
+  const auto add = [](double expected, double log_std, double value, double& information, double& pull) {
+    const double std = log_std * value;
+    information += 1 / (std * std);
+    pull += std::log(expected / value) * value / (std * std);
+  };
+  add(prior.gain_dn_per_e, prior.gain_log_std, line.gain_dn_per_e.value, out.aa, out.ra);
+  add(prior.offset_dn2, prior.offset_log_std, line.offset_dn2.value, out.bb, out.rb);
+}
+
 /// Returns an initial line: clipping ignored, weights from the measured variances.
 NoiseLine first_line(std::span<const NoisePoint> points) {
   double w0 = 0, w1 = 0, w2 = 0, v0 = 0, v1 = 0, least = INFINITY;
@@ -173,6 +187,18 @@ NoiseLine first_line(std::span<const NoisePoint> points) {
   line.gain_dn_per_e.value = std::isfinite(slope) ? std::max(slope, 0.0) : 0;
   line.offset_dn2.value = std::max((v0 - line.gain_dn_per_e.value * w1) / w0, 0.1 * least);
   return line;
+}
+
+/// Sets the standard errors, and how well the points agree with the line. Scatter beyond that of the points widens the
+/// errors.
+void add_errors(const Normal& n, std::size_t points, int degrees_of_freedom, NoiseLine& line) {
+  line.degrees_of_freedom = degrees_of_freedom;
+  line.reduced_chi_square =
+      degrees_of_freedom > 0 ? n.chi_square / n.weight * static_cast<double>(points) / degrees_of_freedom : 0;
+  const double scatter = std::max(line.reduced_chi_square, 1.0) / n.determinant();
+  line.gain_dn_per_e.standard_error = std::sqrt(scatter * n.bb);
+  line.offset_dn2.standard_error = std::sqrt(scatter * n.aa);
+  line.covariance = -scatter * n.ab;
 }
 
 /// Returns whether every point keeps a positive variance: steps for which one does not are halved.
@@ -205,23 +231,38 @@ std::optional<NoiseLine> fit_noise_line(std::span<const NoisePoint> points, doub
   const double expected = expected_contrast * expected_contrast;
   NoiseLine line = first_line(points);
   Normal n;
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < max_steps; ++i) {
     const Normal all = normal_equations(points, line, expected);
     n = all.without_contrast();
     if (!n.solvable()) return std::nullopt;
     Step by = all.solved(line.contrast_squared);
-    for (int halving = 0; halving < 30 && !is_lawful(points, moved(line, by)); ++halving) {
-      by = {by.gain / 2, by.offset / 2, by.contrast_squared / 2};
-    }
+    for (int halving = 0; halving < 30 && !is_lawful(points, moved(line, by)); ++halving) by = halved(by);
     line = moved(line, by);
     if (by.gain * by.gain * n.aa + by.offset * by.offset * n.bb < 1e-8) break;
   }
-  line.degrees_of_freedom = static_cast<int>(points.size()) - 2;
-  line.reduced_chi_square = n.chi_square / n.weight * static_cast<double>(points.size()) / line.degrees_of_freedom;
-  const double scatter = std::max(line.reduced_chi_square, 1.0) / n.determinant();
-  line.gain_dn_per_e.standard_error = std::sqrt(scatter * n.bb);
-  line.offset_dn2.standard_error = std::sqrt(scatter * n.aa);
-  line.covariance = -scatter * n.ab;
+  add_errors(n, points.size(), static_cast<int>(points.size()) - 2, line);
+  return line;
+}
+
+NoiseLine fit_noise_line(std::span<const NoisePoint> points, double expected_contrast, const NoisePrior& prior) {
+  const double expected = expected_contrast * expected_contrast;
+  NoiseLine line;
+  line.gain_dn_per_e.value = prior.gain_dn_per_e;
+  line.offset_dn2.value = prior.offset_dn2;
+  const auto is_possible = [](const NoiseLine& from, const NoiseLine& to) {
+    return to.gain_dn_per_e.value > 0.2 * from.gain_dn_per_e.value && to.offset_dn2.value > 0.2 * from.offset_dn2.value;
+  };
+  Normal n;
+  for (int i = 0; i < max_steps; ++i) {
+    Normal all = normal_equations(points, line, expected);
+    add_prior(prior, line, all);
+    n = all.without_contrast();
+    Step by = all.solved(line.contrast_squared);
+    for (int halving = 0; halving < 30 && !is_possible(line, moved(line, by)); ++halving) by = halved(by);
+    line = moved(line, by);
+    if (by.gain * by.gain * n.aa + by.offset * by.offset * n.bb < 1e-8) break;
+  }
+  add_errors(n, points.size(), static_cast<int>(points.size()), line);  // the prior stands for two points
   return line;
 }
 

@@ -40,6 +40,15 @@ double read_variance_dn2(const NoiseLine& line, double mean_dn, const ClipRange&
 /// Returns the fraction of pixels whose clipped mean is `mean_dn` that is clipped, according to the line.
 double clipped_share(const NoiseLine& line, double mean_dn, const ClipRange& clip);
 
+/// What is known of a line before any point is measured: gain and offset are distributed log-normally about these
+/// values, independent of each other.
+struct NoisePrior {
+  double gain_dn_per_e = 0;  // above 0, as the others
+  double offset_dn2 = 0;
+  double gain_log_std = 0;  // standard deviations of the natural logarithms
+  double offset_log_std = 0;
+};
+
 /// Fits the most likely line by iterated weighted least squares. A point's variance is 2 V^2 / degrees of freedom, V
 /// being that of the line and not the measured one, which would favour points with low measured values. Points that are
 /// off by several standard deviations have less weight (Cauchy's weights). Standard errors are multiplied by
@@ -48,5 +57,9 @@ double clipped_share(const NoiseLine& line, double mean_dn, const ClipRange& cli
 /// contrast's square (a normal prior, cut at 0); gain and offset are less certain by it, whether or not any is found
 /// @return nullopt: fewer than three points, or means that do not separate gain from offset
 std::optional<NoiseLine> fit_noise_line(std::span<const NoisePoint> points, double expected_contrast = 0);
+
+/// Fits the line of the largest posterior probability: as above, with a prior on gain and offset, which separates them
+/// where the points do not. Both stay above 0. Without points it is the prior's line.
+NoiseLine fit_noise_line(std::span<const NoisePoint> points, double expected_contrast, const NoisePrior& prior);
 
 }  // namespace lowlux::calib

@@ -67,6 +67,11 @@ Result<void> check(const RawDn& raw, const PerSite<double>& black_dn, const Pict
     return fail(ErrorCode::unsupported,
                 "demosaiced pixels: their noise is that of the demosaicing too: give the raw with its mosaic");
   }
+  if (raw.is_float()) {
+    return fail(ErrorCode::unsupported,
+                "floating-point samples are computed, as by a merge of exposures: no straight line describes their "
+                "noise: give the raw with the codes of the sensor");
+  }
   if (options.max_samples < 1 || options.max_samples > 10'000'000) {
     return fail(ErrorCode::invalid_argument,
                 fmt::format("most_samples is {}: it must be 1 to 10000000", options.max_samples), "most_samples");
@@ -105,6 +110,28 @@ std::optional<Fit> settle(const NoiseSamples& samples, const PerSite<ClipRange>&
   return out;
 }
 
+/// Iterates as above, with a prior: it is the line where no sample is flat.
+Fit settle(const NoiseSamples& samples, const PerSite<ClipRange>& clip, const NoisePrior& prior) {
+  Fit out;
+  out.line = fit_noise_line(quietest_points(samples, clip, first_fraction).points, 0, prior);
+  for (int i = 0; i < max_rounds && !out.converged; ++i) {
+    out.flat = flat_points(samples, out.line, clip, {});
+    const NoiseLine next = fit_noise_line(out.flat.points, expected_contrast, prior);
+    const double gain = out.line.gain_dn_per_e.value;
+    out.converged = std::abs(next.gain_dn_per_e.value - gain) < settled * gain;
+    out.line = next;
+  }
+  return out;
+}
+
+Result<void> check_straight(const NoiseLine& line) {
+  if (line.reduced_chi_square <= largest_chi_square) return {};
+  return fail(ErrorCode::insufficient,
+              fmt::format("variance against mean is no straight line (reduced chi square {:.1f}, at most 5): give "
+                          "a raw that is linear, or flat fields",
+                          line.reduced_chi_square));
+}
+
 Result<void> check_fit(const NoiseLine& line) {
   const Estimate& gain = line.gain_dn_per_e;
   if (!(gain.value > 0) || !(gain.standard_error < largest_gain_error * gain.value)) {
@@ -120,13 +147,55 @@ Result<void> check_fit(const NoiseLine& line) {
                             "level, or a picture with more of it above black",
                             offset.value, offset.standard_error));
   }
-  if (line.reduced_chi_square > largest_chi_square) {
-    return fail(ErrorCode::insufficient,
-                fmt::format("variance against mean is no straight line (reduced chi square {:.1f}, at most 5): give "
-                            "a raw that is linear, or flat fields",
-                            line.reduced_chi_square));
+  return check_straight(line);
+}
+
+/// The samples of a frame, and what is known of their pixels.
+struct Evidence {
+  NoiseSamples samples;
+  PerSite<ClipRange> clip;
+  RawTraces traces;
+};
+
+/// Returns the range of codes of each site, or the error of a frame that is clipped nearly everywhere.
+Result<PerSite<ClipRange>> clip_ranges(const RawDn& raw, const PerSite<double>& black_dn) {
+  PerSite<ClipRange> clip;
+  double clipped = 0, pixels = 0;
+  for (int site = 0; site < 4; ++site) {
+    const SiteRange range = range_of(raw, black_dn[site], site);
+    clip[site] = range.clip;
+    clipped += range.clipped;
+    pixels += range.pixels;
   }
-  return {};
+  join_greens(raw, clip);
+  if (clipped > most_clipped_share * pixels) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("{:.0f} % of the pixels are clipped: change the exposure", 100 * clipped / pixels));
+  }
+  return clip;
+}
+
+Result<Evidence> make_evidence(const RawDn& raw, const PerSite<double>& black_dn, const PictureNoiseOptions& options,
+                               Executor& executor) {
+  if (const auto good = check(raw, black_dn, options); !good) return tl::make_unexpected(good.error());
+  const SamplePlan plan{black_dn, options.max_samples};
+  NoiseSamples blocks = block_samples(raw, plan, executor);
+  if (blocks.sample.size() < min_samples) {
+    return fail(ErrorCode::insufficient,
+                fmt::format("{} x {} pixels give {} blocks of 16 x 16, and 100 are needed: give a larger picture",
+                            raw.active.width, raw.active.height, blocks.sample.size()));
+  }
+  const auto clip = clip_ranges(raw, black_dn);
+  if (!clip) return tl::make_unexpected(clip.error());
+  sort_by_surroundings(blocks);
+  Evidence out{.samples = {}, .clip = *clip, .traces = code_traces(raw)};
+  add_filter_trace(blocks, out.traces);
+  out.samples = std::move(blocks);
+  if (options.method == PictureNoiseMethod::foi) {
+    out.samples = detail_samples(raw, plan, executor);
+    sort_by_surroundings(out.samples);
+  }
+  return out;
 }
 
 void judge(PictureNoise& out) {
@@ -157,20 +226,21 @@ void judge(PictureNoise& out) {
   if (!out.converged) out.reasons.emplace_back("the choice of flat samples did not settle");
 }
 
-PictureNoise described(const Fit& fit, double samples, const RawTraces& traces) {
+PictureNoise described(const Fit& fit, const Evidence& evidence) {
   const auto [darkest, brightest] =
       std::minmax_element(fit.flat.points.begin(), fit.flat.points.end(),
                           [](const NoisePoint& a, const NoisePoint& b) { return a.mean_dn < b.mean_dn; });
+  const bool is_measured = darkest != fit.flat.points.end();
   PictureNoise out{.gain_dn_per_e = fit.line.gain_dn_per_e,
                    .offset_dn2 = fit.line.offset_dn2,
                    .covariance = fit.line.covariance,
                    .reduced_chi_square = fit.line.reduced_chi_square,
                    .degrees_of_freedom = fit.line.degrees_of_freedom,
-                   .darkest_dn = darkest->mean_dn,
-                   .brightest_dn = brightest->mean_dn,
-                   .flat_fraction = fit.flat.samples / samples,
+                   .darkest_dn = is_measured ? darkest->mean_dn : 0,
+                   .brightest_dn = is_measured ? brightest->mean_dn : 0,
+                   .flat_fraction = fit.flat.samples / static_cast<double>(evidence.samples.sample.size()),
                    .converged = fit.converged,
-                   .traces = traces,
+                   .traces = evidence.traces,
                    .contrast_squared = fit.line.contrast_squared};
   judge(out);
   return out;
@@ -188,44 +258,26 @@ double chi_square_of(const PictureNoise& noise, double gain, double offset) {
 
 Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& black_dn,
                                        const PictureNoiseOptions& options, Executor& executor) {
-  if (const auto good = check(raw, black_dn, options); !good) return tl::make_unexpected(good.error());
-  const SamplePlan plan{black_dn, options.max_samples};
-  NoiseSamples blocks = block_samples(raw, plan, executor);
-  if (blocks.sample.size() < min_samples) {
-    return fail(ErrorCode::insufficient,
-                fmt::format("{} x {} pixels give {} blocks of 16 x 16, and 100 are needed: give a larger picture",
-                            raw.active.width, raw.active.height, blocks.sample.size()));
-  }
-  PerSite<ClipRange> clip;
-  double clipped = 0, pixels = 0;
-  for (int site = 0; site < 4; ++site) {
-    const SiteRange range = range_of(raw, black_dn[site], site);
-    clip[site] = range.clip;
-    clipped += range.clipped;
-    pixels += range.pixels;
-  }
-  join_greens(raw, clip);
-  if (clipped > most_clipped_share * pixels) {
-    return fail(ErrorCode::insufficient,
-                fmt::format("{:.0f} % of the pixels are clipped: change the exposure", 100 * clipped / pixels));
-  }
-  sort_by_surroundings(blocks);
-  RawTraces traces = code_traces(raw);
-  add_filter_trace(blocks, traces);
-  NoiseSamples samples = std::move(blocks);
-  if (options.method == PictureNoiseMethod::foi) {
-    samples = detail_samples(raw, plan, executor);
-    sort_by_surroundings(samples);
-  }
-  const auto fit = settle(samples, clip);
+  const auto made = make_evidence(raw, black_dn, options, executor);
+  if (!made) return tl::make_unexpected(made.error());
+  const auto fit = settle(made->samples, made->clip);
   if (!fit) {
     return fail(ErrorCode::insufficient,
                 fmt::format("too few flat parts of different brightness among {} samples (finest details at {:.2f} of "
                             "the next coarser ones): take a picture with smooth surfaces",
-                            samples.sample.size(), traces.fine_to_coarse));
+                            made->samples.sample.size(), made->traces.fine_to_coarse));
   }
   if (const auto good = check_fit(fit->line); !good) return tl::make_unexpected(good.error());
-  return described(*fit, static_cast<double>(samples.sample.size()), traces);
+  return described(*fit, *made);
+}
+
+Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& black_dn, const NoisePrior& prior,
+                                       const PictureNoiseOptions& options, Executor& executor) {
+  const auto made = make_evidence(raw, black_dn, options, executor);
+  if (!made) return tl::make_unexpected(made.error());
+  const Fit fit = settle(made->samples, made->clip, prior);
+  if (const auto straight = check_straight(fit.line); !straight) return tl::make_unexpected(straight.error());
+  return described(fit, *made);
 }
 
 std::array<NoiseAgreement, 3> compare_with(const NoiseProfile& profile, const PictureNoise& noise, double range_dn) {

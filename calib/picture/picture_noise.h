@@ -52,11 +52,17 @@ struct PictureNoise {
 /// Fits gain and offset to the active area: one of each for all sites, each colour measured on its own pixels. Clipping
 /// at the smallest code in use and at white is modelled (noise_line.h).
 /// @param black_dn of each site
-/// Errors: a layout other than Bayer or monochrome; black that is not below white; options outside their range; fewer
-/// than 100 samples; more than 90 % of the pixels clipped; too few flat samples; levels too similar to separate gain
-/// from offset (a gain that is not positive, or known to less than 15 %); an offset below 0 by three standard errors; a
-/// reduced chi square above 5.
+/// Errors: a layout other than Bayer or monochrome; floating-point samples; black that is not below white; options
+/// outside their range; fewer than 100 samples; more than 90 % of the pixels clipped; too few flat samples; levels too
+/// similar to separate gain from offset (a gain that is not positive, or known to less than 15 %); an offset below 0 by
+/// three standard errors; a reduced chi square above 5.
 Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& black_dn,
+                                       const PictureNoiseOptions& options, Executor& executor);
+
+/// Fits gain and offset where the image alone does not separate them, with a prior (noise_line.h): what the image does
+/// not show stays as the prior has it. Standard errors include the prior's. `reasons` are those of the image.
+/// Errors: those of fit_picture_noise but for levels, flat samples and an offset below 0.
+Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& black_dn, const NoisePrior& prior,
                                        const PictureNoiseOptions& options, Executor& executor);
 
 /// Comparison of one channel of a file's noise profile with the noise of the image.

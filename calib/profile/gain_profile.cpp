@@ -339,6 +339,7 @@ Result<BlackFigures> measure_black(const RawDn& frame, double gain_dn_per_e) {
 }
 
 Result<RawDn> part_of(const RawDn& frame, const Rect& part) {
+  if (frame.is_float()) return fail(ErrorCode::unsupported, "floating-point samples have no masked pixels");
   Rect even = part;
   const auto align = [](int& start, int& length, int origin) {
     if (((start - origin) & 1) != 0) {

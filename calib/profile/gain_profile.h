@@ -47,7 +47,7 @@ Result<BlackFigures> measure_black(const DarkGroup& group, double gain_dn_per_e 
 
 /// Returns the frame with a region of its readout as active area: masked pixels to be measured as dark frames are. The
 /// region is cropped so that its corner is of the active area's first colour.
-/// Errors: a region that is not in the readout.
+/// Errors: a region that is not in the readout; floating-point samples.
 Result<RawDn> part_of(const RawDn& frame, const Rect& part);
 
 /// Source of the measurements: files, date and program; the put functions add what was fitted and how well.

@@ -245,6 +245,12 @@ Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& fra
   ProfileAtFrame out;
   if (const auto fits = check_mosaic(profile, frame, out.warnings); !fits) return tl::make_unexpected(fits.error());
   if (profile.gains.empty()) return out;
+  if (frame.is_float()) {
+    out.warnings.emplace_back(
+        "the frame has floating-point samples: the profile's black level, noise and hot pixels, which are those of the "
+        "sensor's codes, are not used");
+    return out;
+  }
   auto found = gain_setting.empty() ? gain_at_iso(profile, frame.info.iso) : gain_named(profile, gain_setting);
   if (!found) return tl::make_unexpected(found.error());
   const GainProfile& gain = found->gain;

@@ -32,7 +32,7 @@ struct ProfileAtFrame {
 /// mosaic and the other monochrome (error); the phases differ (warning: levels of sites may belong to others). Warnings
 /// for exposures and temperatures beyond those of the darks. Errors: another camera; a frame that states no ISO where
 /// the profile has several; no exposure time where dark current needs it. A profile without gain settings has no effect
-/// on a frame.
+/// on a frame; on one of floating-point samples none has, except for its colours, with a warning.
 /// @param gain_setting  of the profile, as for gain_named; empty: by the frame's ISO
 Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame,
                                   const std::string& gain_setting = {});

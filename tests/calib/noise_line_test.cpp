@@ -164,5 +164,29 @@ TEST(ChiSquare, MeanBelowALimitIsThatOfDraws) {
   EXPECT_NEAR(chi_square_mean_below(24, 1000), 1, 1e-12);
 }
 
+// With a single level of light the points give one sum, and the prior separates it.
+TEST(FitNoiseLineWithPrior, IsThePriorWhereThereAreNoPoints) {
+  const NoisePrior prior{.gain_dn_per_e = 0.5, .offset_dn2 = 4, .gain_log_std = 0.4, .offset_log_std = 1};
+  const NoiseLine line = fit_noise_line({}, 0, prior);
+  EXPECT_NEAR(line.gain_dn_per_e.value, 0.5, 1e-9);
+  EXPECT_NEAR(line.offset_dn2.value, 4, 1e-9);
+  EXPECT_NEAR(line.gain_dn_per_e.standard_error, 0.4 * 0.5, 1e-9);
+  EXPECT_NEAR(line.offset_dn2.standard_error, 4, 1e-9);
+}
+
+TEST(FitNoiseLineWithPrior, KeepsWhatThePointsStateAndTheRestOfThePrior) {
+  const NoisePrior prior{.gain_dn_per_e = 0.5, .offset_dn2 = 4, .gain_log_std = 0.4, .offset_log_std = 1};
+  std::vector<NoisePoint> points(20, {0, 9, 4000, wide});  // in the dark: the offset is 9
+  const NoiseLine dark = fit_noise_line(points, 0, prior);
+  EXPECT_NEAR(dark.offset_dn2.value, 9, 0.05);
+  EXPECT_NEAR(dark.gain_dn_per_e.value, 0.5, 1e-6);
+  points.clear();
+  for (int i = 0; i < 40; ++i) points.push_back({20.0 * i, 0.8 * 20 * i + 9, 4000, wide});
+  const NoiseLine all = fit_noise_line(points, 0, prior);
+  EXPECT_NEAR(all.gain_dn_per_e.value, 0.8, 5 * all.gain_dn_per_e.standard_error);
+  EXPECT_NEAR(all.offset_dn2.value, 9, 5 * all.offset_dn2.standard_error);
+  EXPECT_LT(all.gain_dn_per_e.standard_error, 0.02 * 0.8);
+}
+
 }  // namespace
 }  // namespace lowlux::calib

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "calib/noise/noise_figures.h"
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/result.h"
+#include "isp/cli/noise/noise_origin.h"
+#include "isp/pipeline/options.h"
+
+namespace lowlux::cli {
+
+/// Reads the argument of --noise, "GAIN,READ": DN per electron and electrons rms.
+/// @return nullopt: not two numbers, or not within 1e-6 to 1e6 DN/e- and 0 to 1e5 e-
+std::optional<calib::NoiseFigures> noise_figures_of(const std::string& text);
+
+/// Sets the noise model of a frame: the figures given, else those of a profile or of the file that are in the frame
+/// already, else those measured on the image, else those known of the sensor (known_noise.h), adjusted to the image as
+/// far as it shows them. A warning states the last three, with their uncertainty. Where noise is not to be reduced, and
+/// for frames that are not Bayer mosaics, nothing is measured or assumed. Frames of floating-point samples are not
+/// those of a sensor: their noise is given, stated, or left as it is with a warning.
+/// @return where the noise comes from; nullopt: the frame is unchanged
+/// Errors: those of the black point; figures given that are not possible for the frame; unknown noise of floats where
+/// noise has to be reduced (a level was requested, or DenoiseChoice::always).
+Result<std::optional<NoiseOrigin>> find_noise(const isp::DevelopOptions& options,
+                                              const std::optional<calib::NoiseFigures>& given, RawFrame& frame,
+                                              Executor& executor);
+
+}  // namespace lowlux::cli
