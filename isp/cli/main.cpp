@@ -4,15 +4,20 @@
 #include <algorithm>
 #include <array>
 #include <csignal>
+#include <cstddef>
 #include <cstdio>
 #include <exception>
 #include <new>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "isp/cli/help/completion.h"
+#include "isp/cli/help/man_page.h"
+#include "isp/cli/help/suggestion.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/interruption.h"
 #include "isp/cli/shared/lines.h"
@@ -32,26 +37,34 @@ struct Verb {
 };
 
 constexpr std::array verbs{
-    Verb{"bench", "accuracy against time, compared with other methods", run_bench},
-    Verb{"calibrate", "a camera's black point, noise and colour, measured", run_calibrate},
-    Verb{"capture", "frames of a camera to pictures, raw files or video", run_capture},
-    Verb{"compare", "how far one picture is from another", run_compare},
-    Verb{"denoise", "raw files without noise, for any raw developer", run_denoise},
-    Verb{"develop", "raw files to pictures", run_develop},
-    Verb{"info", "what a raw file says, and what was measured on it", run_info},
-    Verb{"reproduce", "the published experiments, each finding next to ours", run_reproduce},
-    Verb{"resaturate", "pictures whose colours dark current took", run_resaturate},
-    Verb{"retarget", "pictures made to look right on dim displays", run_retarget},
-    Verb{"simulate", "raw files of scenes of known truth", run_simulate},
+    Verb{"develop", "develop raw files to images", run_develop},
+    Verb{"denoise", "denoise raw files and write DNG for other raw developers", run_denoise},
+    Verb{"merge", "merge several raw files of one scene to one with less noise", run_merge},
+    Verb{"info", "print what a raw file states and what was measured on it; exposure advice", run_info},
+    Verb{"capture", "take images, raw files or video from a camera", run_capture},
+    Verb{"calibrate", "measure black level, noise and colour of a camera", run_calibrate},
+    Verb{"retarget", "compensate images for dim displays", run_retarget},
+    Verb{"resaturate", "restore colour lost to dark current in finished images", run_resaturate},
+    Verb{"doctor", "state what is installed, what is missing, and what would help", run_doctor},
+    Verb{"simulate", "simulate raw files with a known noise-free reference", run_simulate},
+    Verb{"dataset", "simulate data sets: scenes, sensors and settings from distributions", run_dataset},
+    Verb{"compare", "compare two images: CIEDE2000, gamut, PSNR, SSIM", run_compare},
+    Verb{"bench", "measure accuracy against time, compared with other methods", run_bench},
+    Verb{"reproduce", "run the published experiments and compare the findings", run_reproduce},
 };
+constexpr std::size_t photographers_verbs = 9;  // the first ones; the others are for measurement
 
 std::string help_text() {
-  std::string out =
-      "lowlux: a raw developer for pictures taken in the dark\n\nusage: lowlux VERB [OPTIONS]\n\nverbs:\n";
-  for (const Verb& verb : verbs) out += fmt::format("  {:<10} {}\n", verb.name, verb.summary);
+  std::string out = "lowlux: a raw developer for low light\n\nUsage: lowlux VERB [OPTIONS]\n\nPhotographs:\n";
+  for (std::size_t i = 0; i < verbs.size(); ++i) {
+    if (i == photographers_verbs) out += "\nMeasurement:\n";
+    out += fmt::format("  {:<10}  {}\n", verbs[i].name, verbs[i].summary);
+  }
   return out +
-         "\n`lowlux VERB --help` lists a verb's options, `lowlux --version` what is built in.\n"
-         "exit codes: 0 done, 1 an input or the work failed, 2 the command line is wrong\n";
+         "\nExamples:\n  lowlux develop night.nef -o night.jpg\n  lowlux develop raws/ -o pictures/ --format jpg\n\n"
+         "`lowlux VERB --help` prints the most used options of a verb, `lowlux VERB --help-all` all,\n"
+         "`lowlux --version` what is built in.\n"
+         "Exit status: 0 success, 1 an input or the work failed, 2 usage error\n";
 }
 
 int run_verb(const std::vector<std::string>& args) {
@@ -66,17 +79,50 @@ int run_verb(const std::vector<std::string>& args) {
   return exit_usage;
 }
 
+void run_all(const std::string& argument) {
+  for (const Verb& verb : verbs) verb.run({argument});
+}
+
+/// Prints what the build makes files of: names of pages, a manual page, a completion script. Its arguments begin with
+/// --pages, --man or --completion.
+int run_help(const std::vector<std::string>& args) {
+  if (args.front() == "--man" && args.size() > 1) {
+    std::vector<std::string> verb(args.begin() + 1, args.end());
+    verb.emplace_back("--help-man");
+    return run_verb(verb);
+  }
+  if (args.front() == "--man") {
+    std::vector<std::pair<std::string_view, std::string_view>> names;
+    for (const Verb& verb : verbs) names.emplace_back(verb.name, verb.summary);
+    print_out(command_man_page(names));
+  } else if (args.front() == "--pages") {
+    run_all("--help-name");
+  } else if (const auto shell = args.size() > 1 ? shell_named(args[1]) : std::nullopt) {
+    print_out(completion_begin(*shell));
+    run_all("--help-" + args[1]);
+    print_out(completion_end(*shell));
+  } else {
+    print_err("lowlux help: --completion is for bash, zsh or fish\n");
+    return exit_usage;
+  }
+  return exit_done;
+}
+
 int run(std::vector<std::string> args) {
   if (args.empty()) {
     print_err(help_text());
     return exit_usage;
+  }
+  if (args.front() == "help" && args.size() > 1 &&
+      (args[1] == "--man" || args[1] == "--pages" || args[1] == "--completion")) {
+    return run_help({args.begin() + 1, args.end()});
   }
   if (args.front() == "help" && args.size() > 1) {  // help VERB is VERB --help
     args.erase(args.begin());
     args.emplace_back("--help");
   }
   const std::string& first = args.front();
-  if (first == "--help" || first == "-h" || first == "help") {
+  if (first == "--help" || first == "-h" || first == "--help-all" || first == "help") {
     print_out(help_text());
     return exit_done;
   }

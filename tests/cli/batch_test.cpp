@@ -56,7 +56,8 @@ TEST_F(Batch, ExistingOutputsAreSkippedAndCounted) {
   args.insert(args.end(), {"--skip-existing", "--json"});
   const auto result = lowlux(args);
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(result.err, "lowlux: 1 of 3 files skipped: their outputs exist\n");
+  EXPECT_TRUE(result.err.starts_with("lowlux: 2 of 3 files written to " + file("out/") + ", ")) << result.err;
+  EXPECT_TRUE(result.err.ends_with(" s\nlowlux: 1 of 3 files skipped: their outputs exist\n")) << result.err;
   const Json report = Json::parse(result.out);
   ASSERT_EQ(report.size(), 3U);
   EXPECT_FALSE(report[0].contains("skipped"));
@@ -70,6 +71,22 @@ TEST_F(Batch, ExistingOutputsAreSkippedAndCounted) {
   };
   EXPECT_EQ(cleaned().err, "");
   EXPECT_EQ(cleaned().err, "lowlux: 1 of 1 files skipped: their outputs exist\n");
+}
+
+TEST_F(Batch, AFolderOfRawFilesEndsWithALineOfSummary) {
+  fs::create_directories(file("in"));
+  raw("a.dng");
+  copies("a.dng", {"in/b.dng", "in/a.DNG"});
+  scratch_.write("in/notes.txt", "not a raw file");
+  for (const char* verb : {"develop", "denoise"}) {
+    const std::string out = file(std::string(verb) + "/");
+    const auto result = lowlux({verb, file("in"), "-o", out});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_TRUE(result.err.starts_with("lowlux: 2 of 2 files written to " + out + ", ")) << result.err;
+    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+    EXPECT_EQ(names_in(verb).size(), 2U);
+    EXPECT_EQ(lowlux({verb, file("in"), "-o", out, "--force", "--quiet"}).err, "");
+  }
 }
 
 // A run that was killed between a picture and its maps has not done that file.

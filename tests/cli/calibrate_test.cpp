@@ -405,6 +405,28 @@ TEST_F(Calibrate, AProfileWithADarkCurrentAloneAddsItToTheFilesPedestal) {
   }
 }
 
+TEST_F(Calibrate, RaspberryPiSensorsAreQuotedByNameAndFromTuningFiles) {
+  ASSERT_EQ(lowlux({"calibrate", "quoted", "imx477", "-o", file("p.json")}).exit_code, 0);
+  const double shipped = profile("p.json")["gains"][0]["sensor"]["system_gain_dn_per_e"]["value"];
+  EXPECT_NEAR(shipped, 2.767 * 2.767 / 16, 1e-12);
+  const std::string tuning = R"({"version": 2.0, "target": "bcm2835", "algorithms": [
+      {"rpi.black_level": {"black_level": 4096}},
+      {"rpi.noise": {"reference_constant": 0, "reference_slope": 5.534}}]})";
+  for (const char* name : {"imx477_own.json", "nosuch.json", "imx219.json"}) {
+    scratch_.write(name, std::string(name) == "imx219.json" ? "{}" : tuning);
+  }
+  ASSERT_EQ(lowlux({"calibrate", "quoted", file("imx477_own.json"), "-o", file("p.json"), "--force"}).exit_code, 0);
+  const double own = profile("p.json")["gains"][0]["sensor"]["system_gain_dn_per_e"]["value"];
+  EXPECT_NEAR(own, 4 * shipped, 1e-12);
+  for (const char* name : {"nosuch.json", "imx219.json", "absent_imx477.json"}) {
+    const auto wrong = lowlux({"calibrate", "quoted", file(name), "-o", file("no.json")});
+    EXPECT_NE(wrong.exit_code, 0) << name;
+    EXPECT_TRUE(holds(wrong.err, name)) << wrong.err;
+    EXPECT_EQ(std::count(wrong.err.begin(), wrong.err.end(), '\n'), 1) << wrong.err;
+    EXPECT_FALSE(exists("no.json")) << name;
+  }
+}
+
 TEST_F(Calibrate, NothingIsOverwrittenWithoutForce) {
   ASSERT_EQ(lowlux({"calibrate", "quoted", "thesis", "-o", file("p.json")}).exit_code, 0);
   const std::string before = scratch_.read("p.json");

@@ -26,6 +26,8 @@
 namespace lowlux {
 namespace {
 
+using test::lowlux;
+
 /// A simulated night, as cameras deliver it.
 class CapturedNight : public test::SimulateCommand {
  protected:

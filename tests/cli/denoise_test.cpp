@@ -163,15 +163,32 @@ TEST_F(DevelopDenoise, TheNoiseOfARealFileThatStatesNoneIsMeasuredAndTheCommandS
   EXPECT_NE(warning.find("measured on the picture itself"), std::string::npos) << warning;
 }
 
-TEST_F(DevelopDenoise, WherePicturesTellNothingTheyAreLeftOrRefused) {
+TEST_F(DevelopDenoise, WherePicturesTellNothingTheNoiseIsThatOfTheClassOfTheSensor) {
   const std::string raw = real("openisp_test_rggb10.dng");
   const Json json = report(raw, {});
-  EXPECT_EQ(json["denoise"]["level"], "off");
-  EXPECT_NE(json["warnings"].dump().find("it is left as it is"), std::string::npos);
-  const auto asked = lowlux({"develop", raw, "-o", file("asked.png"), "--denoise", "draft"});
-  EXPECT_EQ(asked.exit_code, 1);
-  EXPECT_NE(asked.err.find("--profile"), std::string::npos) << asked.err;
-  EXPECT_FALSE(std::filesystem::exists(file("asked.png")));
+  EXPECT_EQ(json["denoise"]["noise_source"], "sensor-class");
+  EXPECT_NE(json["denoise"]["level"], "off");
+  const Json& model = json["denoise"]["noise_model"];
+  EXPECT_EQ(model["basis"], "small sensor, ISO not stated");
+  EXPECT_GT(model["gain_factor"].get<double>(), 1.2);
+  EXPECT_NE(model["unmeasurable"], "");
+  EXPECT_NE(json["warnings"].dump().find("--noise or --profile"), std::string::npos);
+  const Json info = Json::parse(lowlux({"info", "--json", raw}).out)[0];
+  EXPECT_EQ(info["noise_model"], model);
+  EXPECT_EQ(info["noise_profile"], nullptr);  // of the file, which states none
+}
+
+TEST_F(DevelopDenoise, NoiseThatIsGivenIsUsedBeforeThatOfTheFile) {
+  const Json json = report(file("night.dng"), {"--noise", "2,3.5"});
+  EXPECT_EQ(json["denoise"]["noise_source"], "given");
+  // Quantisation is not part of read noise: 3.5^2 + 1 / (12 * 2^2) e-^2, and the dark charge.
+  EXPECT_GE(json["denoise"]["variance_e2"][1].get<double>(), 3.5 * 3.5 + 1.0 / 48 - 1e-6);
+  for (const char* wrong : {"2", "2,3,4", "0,3", "-1,3", "nan,3", "2,-1", "2,x", "1e7,3", ""}) {
+    const auto refused = lowlux({"develop", file("night.dng"), "-o", file("no.png"), "--noise", wrong});
+    EXPECT_EQ(refused.exit_code, 2) << wrong;
+    EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(file("no.png")));
+  }
 }
 
 TEST_F(DevelopDenoise, OffLeavesEverythingAsItIs) {

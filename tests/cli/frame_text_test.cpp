@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "isp/cli/shared/ratio_report.h"
+
 namespace lowlux {
 namespace {
 
@@ -17,6 +19,14 @@ TEST(FrameText, ExposuresAndFNumbersAreAsPhotographersWriteThem) {
   const std::vector<std::pair<double, std::string>> stops{
       {5.59592, "f/5.6"}, {8, "f/8"}, {2.8, "f/2.8"}, {0.95, "f/0.95"}, {22.1, "f/22.1"}};
   for (const auto& [stop, text] : stops) EXPECT_EQ(cli::f_number_text(stop), text);
+}
+
+TEST(FrameText, NoiseThatDiffersFromPlaceToPlaceHasARange) {
+  NoiseRatio ratio{.block_px = 8, .ratio = Plane<float>(3, 1)};
+  ratio.ratio.at(0, 0) = 1;
+  ratio.ratio.at(1, 0) = 0.125f;
+  ratio.ratio.at(2, 0) = 0.25f;
+  EXPECT_EQ(cli::ratio_text(ratio), "0.125 to 1 times this variance in blocks of 8 px, median 0.25");
 }
 
 }  // namespace

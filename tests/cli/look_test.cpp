@@ -16,6 +16,8 @@
 namespace lowlux {
 namespace {
 
+using test::lowlux;
+
 using Json = nlohmann::json;
 
 class LookCommand : public test::SimulateCommand {

@@ -102,7 +102,7 @@ TEST_F(SimulateInput, ImpossibleSensorsAreRefused) {
                 {{"--iso", "0"}, "ISO"},
                 {{"--iso", "1e-300"}, "ISO"},
                 {{"--white-luminance", "0"}, "fills a pixel"},
-                {{"--quantise", "up"}, "floor, round"}});
+                {{"--quantise", "up"}, "round, floor"}});
 }
 
 TEST_F(SimulateInput, OptionsThatWouldDoNothingNameTheOneThatIsMissing) {
@@ -174,7 +174,7 @@ TEST_F(SimulateInput, UnknownNamesAreRefusedWithTheNearest) {
                 {{"--effects", "photon-nois"}, "near it: photon-noise"},
                 {{"--effects", "all,-prun"}, "near it: prnu"},
                 {{"--effects", ""}, "none of auto"},
-                {{"--cfa", "rgbg"}, "bggr, gbrg, grbg, rggb"},
+                {{"--cfa", "rgbg"}, "rggb, grbg, gbrg, bggr"},
                 {{"--sampling", "poisson"}, "physical, published"},
                 {{"--exposuer", "1"}, "--exposuer"}});
   expect_usage({{{}, "colorchecker, macbeth, munsell"}}, "chart:macbet");

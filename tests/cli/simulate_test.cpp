@@ -94,8 +94,11 @@ TEST_F(Simulate, EveryOptionOfTheHelpWorks) {
        "--quantise",
        "floor"},
       {"--white-luminance", "20", "--size", "64x48", "--force"},
+      {"--frames", "2", "--shake", "3", "--roll", "1", "--dither", "0.5", "--bracket", "0,-1", "--reduce", "3"},
+      {"--frames", "2", "--stars", "9", "--field-rotation", "1", "--field-centre", "10,-5.5", "--drift", "0.5,-1",
+       "--horizon", "30", "--movers", "1", "--mover-size", "9.5", "--mover-speed", "2"},
   };
-  std::set<std::string> used{"--help", "--output", "--list"};
+  std::set<std::string> used{"--help", "--help-all", "--no-config", "--output", "--list"};
   for (std::size_t i = 0; i < commands.size(); ++i) {
     simulated("chart", "out" + std::to_string(i) + ".dng", commands[i]);
     for (const std::string& word : commands[i]) {
@@ -103,8 +106,8 @@ TEST_F(Simulate, EveryOptionOfTheHelpWorks) {
     }
   }
   EXPECT_EQ(lowlux({"simulate", "chart", "--output", file("long.dng"), "--size", "64x48"}).exit_code, 0);
-  std::istringstream help(lowlux({"simulate", "--help"}).out);
-  const std::regex option("^  (?:-.,)?(--[a-z-]+).*");
+  std::istringstream help(lowlux({"simulate", "--help-all"}).out);
+  const std::regex option("^  (?:-., )?(--[a-z-]+).*");
   std::set<std::string> offered;
   std::smatch found;
   for (std::string line; std::getline(help, line);) {

@@ -44,15 +44,6 @@ Result<std::string> existing_pictures_folder(const BenchArgs& args) {
               folder);
 }
 
-Result<const isp::NlMeans*> load_nl_means() {
-  const auto found = load_module({.file = "liblowlux_nlm.so",
-                                  .function = isp::nl_means_name,
-                                  .purpose = "OpenCV's non-local means",
-                                  .needs = "OpenCV's photo module (Debian: libopencv-photo-dev)"});
-  if (!found) return tl::make_unexpected(found.error());
-  return reinterpret_cast<isp::GetNlMeans*>(*found)();
-}
-
 /// Runs every stage; a failed stage is reported at once, and the others continue.
 std::vector<MeasuredStage> run_each(const std::vector<isp::BenchStage>& stages, const isp::BenchOptions& options) {
   std::vector<MeasuredStage> out;

@@ -26,7 +26,9 @@ void add_output(CLI::App& app, CalibrateArgs& args) {
 
 void add_settings(CLI::App& app, CalibrateArgs& args) {
   const auto setting = [&app](const char* flag, const char* type, const char* help, std::optional<double>& out) {
-    add_number(app, flag, type, help, [&out](double value) { out = value; })->group("of frames that do not say");
+    add_number(app, flag, type, help, [&out](double value) {
+      out = value;
+    })->group("Frames that do not state their settings");
   };
   setting("--iso", "ISO", "gain setting of all frames", args.iso);
   setting("--exposure-time", "S", "exposure time of all frames", args.exposure_s);
@@ -61,8 +63,7 @@ Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>&
                "lowlux calibrate black");
   app.footer(
       "Frames are put together by gain, exposure time and temperature. Two exposure times separate dark current from "
-      "the\n"
-      "pedestal, two temperatures give its law; with one exposure time, or one frame, both stay in one figure. The\n"
+      "the pedestal, two temperatures give its law; with one exposure time, or one frame, both stay in one figure. The "
       "system gain comes from --system-gain, else from --add-to, else from the noise of the dark charge itself.");
   CalibrateBlackArgs args;
   app.add_option("FRAMES", args.common.frames, "dark frames: lens covered; with --masked any frames")->required();
@@ -85,8 +86,8 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
   CLI::App app("System gain, read noise, full well, PRNU and linearity by photon transfer (EMVA 1288).",
                "lowlux calibrate noise");
   app.footer(
-      "Two flats of the same light make a pair, and four pairs of different light a curve; frames are paired by\n"
-      "gain, exposure time and level, in the order given. Darks are of one exposure time, the shorter the better.\n"
+      "Two flats of the same light make a pair, and four pairs of different light a curve; frames are paired by "
+      "gain, exposure time and level, in the order given. Darks are of one exposure time, the shorter the better. "
       "Without --darks there is one ordinary picture: noise is then measured in its even parts.");
   CalibrateNoiseArgs args;
   app.add_option("FRAMES", args.common.frames, "flats in pairs, or one ordinary picture")->required();
@@ -122,7 +123,10 @@ Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string
   CLI::App app("The profile of a sensor whose figures are published; `lowlux simulate --list` names them.",
                "lowlux calibrate quoted");
   CalibrateQuotedArgs args;
-  app.add_option("SENSOR", args.common.frames, "its name")->required()->expected(1);
+  app.add_option("SENSOR", args.common.frames,
+                 "its name; of a Raspberry Pi camera also imx219, imx477, ... or its tuning file (imx477.json)")
+      ->required()
+      ->expected(1);
   app.add_option("-o,--output", args.common.output, "profile to write (JSON)")->required()->type_name("PROFILE.json");
   app.add_flag("--force", args.common.force, "overwrite files that exist");
   app.add_flag("--json", args.common.json, "JSON instead of text");

@@ -184,7 +184,9 @@ Result<void> calibrate_set(const calib::DarkSet& set, const Darks& darks, const 
   return {};
 }
 
-Result<Calibration> calibrate(const CalibrateBlackArgs& args) {
+}  // namespace
+
+Result<Calibration> calibrate_black(const CalibrateBlackArgs& args) {
   if (const auto good = check_outputs(args.common); !good) return tl::make_unexpected(good.error());
   auto profile = starting_profile(args.common);
   if (!profile) return tl::make_unexpected(profile.error());
@@ -203,13 +205,11 @@ Result<Calibration> calibrate(const CalibrateBlackArgs& args) {
   return found;
 }
 
-}  // namespace
-
 int run_calibrate_black(const std::vector<std::string>& words) {
   const auto parsed = parse_calibrate_black(words);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<CalibrateBlackArgs>(parsed);
-  const auto found = calibrate(args);
+  const auto found = calibrate_black(args);
   return found ? finish(args.common, *found) : calibration_failed(args.common, found.error());
 }
 

@@ -31,8 +31,29 @@ Result<void> check_places(const CalibrateColourArgs& args) {
   return {};
 }
 
-/// Returns a profile with the new colours, which replace those under the same illuminant.
-Result<CameraProfile> profile_of(const CalibrateColourArgs& args, const ColourOutcome& outcome) {
+Result<void> write_files(const CalibrateColourArgs& args, const ColourOutcome& outcome, Executor& executor) {
+  if (args.output.empty()) return {};
+  const auto profile = colour_profile(args, outcome);
+  if (!profile) return tl::make_unexpected(profile.error());
+  const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
+  if (!args.overlay.empty() && outcome.chart) {
+    isp::WriteOptions write;
+    write.overwrite = overwrite;
+    write.software = "lowlux " + version_number();
+    auto written =
+        isp::write_picture(colour_overlay(*outcome.chart), OutputSpace::srgb, {}, args.overlay, write, executor);
+    if (!written) return written;
+  }
+  if (!args.report.empty()) {
+    auto written = isp::write_text(args.report, isp::html_of(colour_report(outcome, args.output)), overwrite);
+    if (!written) return written;
+  }
+  return write_profile(args.output, *profile, overwrite);
+}
+
+}  // namespace
+
+Result<CameraProfile> colour_profile(const CalibrateColourArgs& args, const ColourOutcome& outcome) {
   CameraProfile profile;
   if (!args.add_to.empty()) {
     auto before = read_profile(args.add_to);
@@ -53,26 +74,7 @@ Result<CameraProfile> profile_of(const CalibrateColourArgs& args, const ColourOu
   return profile;
 }
 
-Result<void> write_files(const CalibrateColourArgs& args, const ColourOutcome& outcome, Executor& executor) {
-  const auto profile = profile_of(args, outcome);
-  if (!profile) return tl::make_unexpected(profile.error());
-  const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
-  if (!args.overlay.empty() && outcome.chart) {
-    isp::WriteOptions write;
-    write.overwrite = overwrite;
-    write.software = "lowlux " + version_number();
-    auto written =
-        isp::write_picture(colour_overlay(*outcome.chart), OutputSpace::srgb, {}, args.overlay, write, executor);
-    if (!written) return written;
-  }
-  if (!args.report.empty()) {
-    auto written = isp::write_text(args.report, isp::html_of(colour_report(outcome, args.output)), overwrite);
-    if (!written) return written;
-  }
-  return write_profile(args.output, *profile, overwrite);
-}
-
-Result<ColourOutcome> calibrated(const CalibrateColourArgs& args, Executor& executor) {
+Result<ColourOutcome> calibrate_colour(const CalibrateColourArgs& args, Executor& executor) {
   if (auto free = check_places(args); !free) return tl::make_unexpected(free.error());
   auto outcome = args.chart.empty() ? colour_from_spectra(args) : colour_from_chart(args, executor);
   if (!outcome) return outcome;
@@ -80,14 +82,12 @@ Result<ColourOutcome> calibrated(const CalibrateColourArgs& args, Executor& exec
   return outcome;
 }
 
-}  // namespace
-
 int run_calibrate_colour(const std::vector<std::string>& words) {
   const Parsed<CalibrateColourArgs> parsed = parse_calibrate_colour(words);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<CalibrateColourArgs>(parsed);
   PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));
-  const auto outcome = calibrated(args, executor);
+  const auto outcome = calibrate_colour(args, executor);
   if (!outcome) {
     const std::string& input = args.chart.empty() ? args.camera : args.chart;
     const std::string& where = outcome.error().where;

@@ -137,12 +137,16 @@ Result<Calibration> calibrate_picture(const CalibrateNoiseArgs& args) {
 
 }  // namespace
 
+Result<Calibration> calibrate_noise(const CalibrateNoiseArgs& args) {
+  if (const auto good = check_outputs(args.common); !good) return tl::make_unexpected(good.error());
+  return args.darks.empty() ? calibrate_picture(args) : calibrate_flats(args);
+}
+
 int run_calibrate_noise(const std::vector<std::string>& words) {
   const auto parsed = parse_calibrate_noise(words);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<CalibrateNoiseArgs>(parsed);
-  if (const auto good = check_outputs(args.common); !good) return calibration_failed(args.common, good.error());
-  const auto found = args.darks.empty() ? calibrate_picture(args) : calibrate_flats(args);
+  const auto found = calibrate_noise(args);
   return found ? finish(args.common, *found) : calibration_failed(args.common, found.error());
 }
 

@@ -108,32 +108,37 @@ int calibration_failed(const CalibrateArgs& args, const Error& error) {
   return print_failure(what, error);
 }
 
-int finish(const CalibrateArgs& args, const Calibration& found) {
+Result<void> write_calibration(const CalibrateArgs& args, const Calibration& found) {
+  if (args.output.empty()) return {};
   const auto text = calib::profile_text(found.profile);
-  if (!text) return calibration_failed(args, with_file(text.error(), args.output));
+  if (!text) return tl::make_unexpected(with_file(text.error(), args.output));
   const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
   for (const PixelMap& map : found.maps) {
-    if (const auto free = check_place(map.path, args.force); !free) return calibration_failed(args, free.error());
+    if (auto free = check_place(map.path, args.force); !free) return free;
   }
   for (const PixelMap& map : found.maps) {
-    const auto written = write_map(map, overwrite);
-    if (!written) return calibration_failed(args, written.error());
+    if (auto written = write_map(map, overwrite); !written) return written;
   }
   if (!args.report.empty()) {
     const auto written = isp::write_text(args.report, isp::html_of(whole_report(args, found)), overwrite);
-    if (!written) return calibration_failed(args, with_file(written.error(), args.report));
+    if (!written) return tl::make_unexpected(with_file(written.error(), args.report));
   }
-  if (const auto written = isp::write_text(args.output, *text, overwrite); !written) {
-    return calibration_failed(args, with_file(written.error(), args.output));
-  }
+  const auto written = isp::write_text(args.output, *text, overwrite);
+  if (!written) return tl::make_unexpected(with_file(written.error(), args.output));
+  return {};
+}
+
+int finish(const CalibrateArgs& args, const Calibration& found) {
+  if (const auto written = write_calibration(args, found); !written) return calibration_failed(args, written.error());
   if (!args.quiet) {
     for (const std::string& warning : found.warnings) {
       print_err(fmt::format("{}\n", one_line("lowlux: warning: " + warning)));
     }
   }
   if (args.json) {
-    const nlohmann::ordered_json json{
-        {"output", args.output}, {"warnings", found.warnings}, {"profile", nlohmann::ordered_json::parse(*text)}};
+    const nlohmann::ordered_json json{{"output", args.output},
+                                      {"warnings", found.warnings},
+                                      {"profile", nlohmann::ordered_json::parse(*calib::profile_text(found.profile))}};
     print_out(fmt::format("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
   } else {
     print_out(fmt::format("{}", found.text));

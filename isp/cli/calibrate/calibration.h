@@ -49,11 +49,19 @@ std::string measurement_text(const std::string& profile);
 /// Returns the source and date of values measured today.
 calib::Measured measured_today(std::vector<std::string> files);
 
-/// Writes maps, report and profile, prints the text or JSON. @return the exit code
+/// Writes maps, report and profile; without an output none of them. Errors name the file.
+Result<void> write_calibration(const CalibrateArgs& args, const Calibration& found);
+
+/// Writes the files, prints the text or JSON. @return the exit code
 int finish(const CalibrateArgs& args, const Calibration& found);
 
 /// Prints an error. @return the exit code
 int calibration_failed(const CalibrateArgs& args, const Error& error);
+
+/// Each does the work of a kind of calibration; none writes a file.
+Result<Calibration> calibrate_black(const CalibrateBlackArgs& args);
+Result<Calibration> calibrate_noise(const CalibrateNoiseArgs& args);
+Result<Calibration> calibrate_quoted(const CalibrateQuotedArgs& args);
 
 int run_calibrate_black(const std::vector<std::string>& words);
 int run_calibrate_noise(const std::vector<std::string>& words);

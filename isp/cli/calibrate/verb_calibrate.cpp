@@ -1,14 +1,21 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <filesystem>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "calib/noise/raspberry_sensors.h"
+#include "calib/noise/raspberry_tuning.h"
 #include "calib/profile/quoted_profile.h"
+#include "capture/file/file_bytes.h"
 #include "isp/cli/calibrate/calibrate_colour.h"
 #include "isp/cli/calibrate/calibration.h"
+#include "isp/cli/help/help_form.h"
+#include "isp/cli/help/suggestion.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/option_values.h"
@@ -33,8 +40,8 @@ constexpr std::array kinds{
 
 void print_help() {
   print_out(
-      "Measures a camera and writes what was found to a profile.\n\nusage: lowlux calibrate KIND [OPTIONS]\n\n"
-      "kinds:\n");
+      "Measures a camera and writes what was found to a profile.\n\nUsage: lowlux calibrate KIND [OPTIONS]\n\n"
+      "Kinds:\n");
   for (const Kind& kind : kinds) print_out(fmt::format("  {:<10} {}\n", kind.name, kind.summary));
   print_out(
       "\n`lowlux calibrate KIND --help` lists a kind's options. `lowlux develop --black PROFILE.json` uses the "
@@ -54,25 +61,57 @@ std::string profile_text(const CameraProfile& profile) {
   return text;
 }
 
+/// Returns the profile that a tuning file of libcamera's Raspberry Pi pipelines describes. The file is named after its
+/// sensor, "imx477.json".
+Result<CameraProfile> profile_of_file(const std::string& file) {
+  const std::string name = std::filesystem::path(file).filename().string();
+  auto sensor = calib::tuned_sensor(name);
+  if (!sensor) {
+    return fail(ErrorCode::invalid_argument,
+                "a tuning file has the name of its sensor, such as imx477.json, and this sensor is not known", file);
+  }
+  const auto bytes = capture::read_file_bytes(file, calib::max_tuning_bytes);
+  if (!bytes) return tl::make_unexpected(bytes.error());
+  const auto tuning = calib::parse_raspberry_tuning({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+  if (!tuning) return fail(tuning.error().code, tuning.error().message, file);
+  sensor->source = "libcamera, " + name;
+  return calib::profile_of_tuning(*tuning, *sensor);
+}
+
+Result<CameraProfile> quoted_profile_of(const std::string& sensor) {
+  if (sensor.ends_with(".json")) return profile_of_file(sensor);
+  if (auto known = calib::raspberry_profile(sensor)) return *std::move(known);
+  return calib::quoted_profile(sensor);
+}
+
 }  // namespace
+
+Result<Calibration> calibrate_quoted(const CalibrateQuotedArgs& args) {
+  if (const auto good = check_outputs(args.common); !good) return tl::make_unexpected(good.error());
+  auto profile = quoted_profile_of(args.common.frames.front());
+  if (!profile) return tl::make_unexpected(profile.error());
+  Calibration found;
+  found.profile = *std::move(profile);
+  found.text = profile_text(found.profile);
+  return found;
+}
 
 int run_calibrate_quoted(const std::vector<std::string>& words) {
   const auto parsed = parse_calibrate_quoted(words);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<CalibrateQuotedArgs>(parsed);
-  if (const auto good = check_outputs(args.common); !good) return calibration_failed(args.common, good.error());
-  const auto profile = calib::quoted_profile(args.common.frames.front());
-  if (!profile) return calibration_failed(args.common, profile.error());
-  Calibration found;
-  found.profile = *profile;
-  found.text = profile_text(*profile);
-  return finish(args.common, found);
+  const auto found = calibrate_quoted(args);
+  return found ? finish(args.common, *found) : calibration_failed(args.common, found.error());
 }
 
 int run_calibrate(const std::vector<std::string>& words) {
   const std::string_view first = words.empty() ? std::string_view() : words.front();
-  if (first == "--help" || first == "-h") {
+  if (first == "--help" || first == "-h" || first == "--help-all") {
     print_help();
+    return exit_done;
+  }
+  if (words.size() == 1 && is_help_form(words.front())) {
+    for (const Kind& kind : kinds) kind.run(words);
     return exit_done;
   }
   for (const Kind& kind : kinds) {

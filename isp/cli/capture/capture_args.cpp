@@ -164,7 +164,8 @@ void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
 constexpr std::array of_pictures{"--bits",         "--quality",     "--space",        "--half",
                                  "--repair",       "--line-noise",  "--effects",      "--tolerance",
                                  "--dimming",      "--noise-limit", "--coefficients", "--display-luminance",
-                                 "--gain-setting", "--chroma-bias", "--light",        "--adaptation-degree"};
+                                 "--gain-setting", "--chroma-bias", "--light",        "--adaptation-degree",
+                                 "--noise"};
 constexpr std::array of_pictures_and_films{"--exposure",      "--wb",      "--tone",   "--look", "--scene-luminance",
                                            "--field-of-view", "--profile", "--denoise"};
 
@@ -251,7 +252,12 @@ Wrong complete(const CLI::App& app, const Words& words, CaptureArgs& args) {
   if (auto wrong = set_kind(words, args)) return wrong;
   DevelopArgs& develop = args.develop;
   if (auto wrong = wrong_profiles(develop)) return wrong;
-  if (auto wrong = complete_look(develop.look, Planner::of_look, develop.options.look)) return wrong;
+  const bool as_develop = args.kind == CaptureKind::pictures;
+  const Planner planner = as_develop ? Planner::of_everything : Planner::of_look;
+  if (auto wrong = complete_look(develop.look, planner, develop.options.look)) return wrong;
+  if (as_develop) {
+    if (auto wrong = complete_effects(develop.look, develop.effects)) return wrong;
+  }
   const bool endless = args.folder || args.kind == CaptureKind::live;
   args.limits.frames = static_cast<std::uint64_t>(words.frames.value_or(endless ? 0 : 1));
   if (args.kind == CaptureKind::raw) return wrong_for_raw(app, args);
@@ -263,13 +269,6 @@ Wrong complete(const CLI::App& app, const Words& words, CaptureArgs& args) {
 Parsed<CaptureArgs> parse_capture(const std::vector<std::string>& words) {
   CLI::App app("Takes raw frames from a camera: to pictures, raw files, or video on standard output.",
                "lowlux capture");
-  app.footer(
-      "Examples:\n"
-      "  lowlux capture --list\n"
-      "  lowlux capture --v4l2 /dev/video0 -o night.png --black 64\n"
-      "  lowlux capture --libcamera 0 --exposure-time 0.5 --gain 8 --skip 3 -o night.dng\n"
-      "  lowlux capture --v4l2 /dev/video0 -o frames/ --as dng --frames 100\n"
-      "  lowlux capture --v4l2 /dev/video0 --live --temporal | ffplay -");
   CaptureArgs args;
   Words said;
   add_source(app, args);

@@ -5,9 +5,9 @@
 #include "capture/camera/camera_frame.h"
 #include "isp/base/camera_profile.h"
 #include "isp/cli/capture/capture_sink.h"
+#include "isp/cli/noise/noise_source.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/machine.h"
-#include "isp/cli/shared/noise_source.h"
 #include "isp/cli/shared/outputs.h"
 #include "isp/cli/shared/picture_options.h"
 #include "isp/cli/shared/profile_option.h"
@@ -52,6 +52,7 @@ class PictureSink final : public CaptureSink {
   Result<Picture> developed(const capture::CameraFrame& camera_frame, CaptureWork& work) {
     RawFrame frame = capture::raw_frame_of(camera_frame, stream_.format, stream_.camera);
     isp::DevelopOptions options = options_;
+    options.effects = args_.develop.effects.effects;
     if (profile_) {
       const bool everything = !args_.develop.profile.empty();
       const ProfileChoice choice{.everything = everything, .gain_setting = args_.develop.gain_setting};
@@ -61,7 +62,8 @@ class PictureSink final : public CaptureSink {
       }
       if (everything && !profile_->colours.empty()) std::erase(frame.warnings, capture::colours_unknown);
     }
-    if (const auto found = find_noise(options, frame, executor_); !found) return tl::make_unexpected(found.error());
+    if (const auto found = find_noise(options, args_.develop.noise, frame, executor_); !found)
+      return tl::make_unexpected(found.error());
     auto plan = isp::plan_develop(frame, options, executor_);
     if (!plan) return tl::make_unexpected(plan.error());
     for (std::string& warning : plan->warnings) warn_once(std::move(warning), work);

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "capture/camera/camera.h"
 #include "capture/v4l2/v4l2_source.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
@@ -19,24 +18,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using capture::CameraListing;
-
-struct Found {
-  std::vector<CameraListing> v4l2;
-  std::vector<CameraListing> libcamera;
-  std::string note;  // reason why libcamera was not used; empty: it was
-};
-
-Found find_cameras() {
-  Found found;
-  found.v4l2 = capture::list_v4l2_cameras();
-  auto listed = load_libcamera().and_then([](const capture::LibcameraModule& module) { return module.list(); });
-  if (listed) {
-    found.libcamera = *std::move(listed);
-  } else {
-    found.note = listed.error().message;
-  }
-  return found;
-}
 
 Json listing_json(const std::vector<CameraListing>& cameras) {
   Json json = Json::array();
@@ -56,8 +37,20 @@ void print_listing(const char* option, const std::vector<CameraListing>& cameras
 
 }  // namespace
 
+CameraList find_cameras() {
+  CameraList found;
+  found.v4l2 = capture::list_v4l2_cameras();
+  auto listed = load_libcamera().and_then([](const capture::LibcameraModule& module) { return module.list(); });
+  if (listed) {
+    found.libcamera = *std::move(listed);
+  } else {
+    found.note = listed.error().message;
+  }
+  return found;
+}
+
 int list_cameras(bool json) {
-  const Found found = find_cameras();
+  const CameraList found = find_cameras();
   if (json) {
     const Json all{{"v4l2", listing_json(found.v4l2)},
                    {"libcamera", listing_json(found.libcamera)},

@@ -117,10 +117,24 @@ Result<DarkNames> dark_files(const DevelopArgs& args, const std::vector<Job>& jo
 
 namespace {
 
-Result<void> add_raw(const std::string& file, calib::DarkLibrary& library) {
+Result<void> add_bias(const std::string& file, calib::DarkLibrary& bias) {
   const Result<RawFrame> frame = capture::read_raw(file);
-  Result<void> added = frame ? library.add(frame->raw) : tl::make_unexpected(frame.error());
-  if (!added) return tl::make_unexpected(with_file(added.error(), file));
+  return frame ? bias.add(frame->raw) : tl::make_unexpected(frame.error());
+}
+
+/// Adds a file to the masters if it is a TIFF or has floating-point samples, else to the darks.
+Result<void> add_dark(const std::string& file, calib::DarkLibrary& darks, std::vector<MosaicTiff>& masters) {
+  Result<MosaicTiff> master;
+  if (is_tiff_name(file)) {
+    master = read_mosaic_tiff(file);
+  } else {
+    Result<RawFrame> frame = capture::read_raw(file);
+    if (!frame) return tl::make_unexpected(frame.error());
+    if (!frame->raw.is_float()) return darks.add(frame->raw);
+    master = mosaic_of(*std::move(frame), file);
+  }
+  if (!master) return tl::make_unexpected(master.error());
+  masters.push_back(*std::move(master));
   return {};
 }
 
@@ -128,25 +142,15 @@ Result<DarkFiles> read_files(const DarkNames& names) {
   calib::DarkLibrary darks, bias;
   DarkFiles read;
   for (const std::string& file : names.darks) {
-    if (is_tiff_name(file)) {
-      auto master = read_mosaic_tiff(file);
-      if (!master) return tl::make_unexpected(with_file(master.error(), file));
-      read.masters.push_back(*std::move(master));
-    } else if (auto added = add_raw(file, darks); !added) {
-      if (added.error().code != ErrorCode::unsupported) return tl::make_unexpected(added.error());
-      auto master = read_float_dng(file);  // the readers of raw files refuse floats, which masters may hold
-      if (!master) {
-        const bool is_other = master.error().code == ErrorCode::unsupported;
-        return tl::make_unexpected(is_other ? added.error() : with_file(master.error(), file));
-      }
-      read.masters.push_back(*std::move(master));
+    if (auto added = add_dark(file, darks, read.masters); !added) {
+      return tl::make_unexpected(with_file(added.error(), file));
     }
   }
   for (const std::string& file : names.bias) {
     if (is_tiff_name(file)) {
       return fail(ErrorCode::unsupported, "a TIFF states no exposure time; give bias frames as raw files", file);
     }
-    if (auto added = add_raw(file, bias); !added) return tl::make_unexpected(added.error());
+    if (auto added = add_bias(file, bias); !added) return tl::make_unexpected(with_file(added.error(), file));
   }
   read.groups = darks.groups();
   read.darks = read.groups.size();

@@ -7,6 +7,7 @@
 
 #include "calib/dark/master_dark.h"
 #include "denoise/denoiser.h"
+#include "isp/cli/noise/noise_source.h"
 #include "isp/cli/shared/option_values.h"
 #include "isp/model/colour/correlated_colour_temperature.h"
 #include "isp/render/output_space.h"
@@ -15,57 +16,13 @@
 namespace lowlux::cli {
 namespace {
 
-void add_darks(CLI::App& app, DarkArgs& dark) {
-  CLI::Option* frames =
-      app.add_option("--dark-frame", dark.words,
-                     "dark frames or master darks to subtract: files, a folder or a pattern; repeatable")
-          ->type_name("FILE[,FILE...]|FOLDER")
-          ->allow_extra_args(false);
-  app.add_option("--bias-frame", dark.bias, "bias frames: pedestal of each pixel, also to scale darks of another time")
-      ->type_name("FILE[,FILE...]|FOLDER")
-      ->allow_extra_args(false);
-  app.add_option("--dark-frame-count", dark.count, "frames averaged in each dark frame file (default: estimated)")
-      ->check(CLI::Range(1, calib::max_exposures))
-      ->type_name("N")
-      ->needs(frames);
-  add_text(app, "--dark-noise", "SHARE",
-           "most that the dark frames may add to a picture's own variance in the dark (default 0.1)",
-           [&dark](const std::string& text) -> std::optional<std::string> {
-             const auto share = number_of(text);
-             if (!share || !(*share > 0 && *share <= 1)) return "is no share above 0 and at most 1";
-             dark.noise_fraction = *share;
-             return std::nullopt;
-           })
-      ->needs(frames);
-  add_text(app, "--dark-doubling", "C|PROFILE.json",
-           "degrees over which dark current doubles, for darks of another temperature, or a profile that states it "
-           "(default: as measured on the darks)",
-           [&dark](const std::string& text) -> std::optional<std::string> {
-             dark.doubling_c = quantity_of(text, "C");
-             if (!dark.doubling_c) {
-               if (!text.ends_with(".json")) return "is neither a number of degrees nor a profile (.json)";
-               dark.doubling_profile = text;
-             } else if (!(*dark.doubling_c >= 2 && *dark.doubling_c <= 30)) {
-               return "is not within 2 to 30 degrees";
-             }
-             return std::nullopt;
-           })
-      ->needs(frames);
-}
-
-void add_flats(CLI::App& app, std::vector<std::string>& flats) {
-  app.add_option("--flat-frame", flats, "flat frames to divide by (vignetting, PRNU): files, a folder or a pattern")
-      ->type_name("FILE[,FILE...]|FOLDER")
-      ->allow_extra_args(false);
-}
-
 /// Adds the options of every verb that takes raw files one by one.
 /// @param explained  help for --explain
 void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
   app.add_option("RAW", args.inputs, "raw files, or folders of them")->required();
   app.add_flag("--maps", args.options.denoise.maps,
-               "also write what is left of the noise [e-^2] and how far colour can be believed (0 to 1), for each 2x2 "
-               "cell: OUT.noise.pfm and OUT.confidence.pfm");
+               "also write maps of residual noise variance [e-^2] and colour confidence (0 to 1) of each 2x2 cell: "
+               "OUT.noise.pfm and OUT.confidence.pfm");
   app.add_flag("--skip-existing", args.skip_existing, "leave out raw files whose outputs exist")
       ->excludes(app.add_flag("--force", args.force, "overwrite files that exist"));
   app.add_flag("--sync", args.sync, "wait until each file is on the disk (fsync)");
@@ -79,21 +36,20 @@ void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
 
 void add_output(CLI::App& app, DevelopArgs& args) {
   app.add_option("-o,--output", args.output,
-                 "picture to write (.png .jpg .tif .exr .pfm), or a folder for several (made if it ends with /)")
+                 "image to write (.png .jpg .tif .exr .pfm), or a folder for several (made if it ends with /)")
       ->required()
       ->type_name("OUT");
-  app.add_option("--format", args.format, "format of pictures written to a folder: png (default), jpg, tif, exr or pfm")
+  app.add_option("--format", args.format, "format of images written to a folder (default: png)")
       ->check(CLI::IsMember({"png", "jpg", "tif", "exr", "pfm"}));
   add_samples(app, args);
 }
 
-template <class Args>
-Parsed<Args> parse(CLI::App& app, const std::vector<std::string>& words, const Args& args) {
-  if (const auto code = parse_words(app, words)) return *code;
+Parsed<DevelopArgs> parse(CLI::App& app, const std::vector<std::string>& words, DevelopArgs& args) {
+  if (const auto code = parse_words(app, words, &args.defaults)) return *code;
   return args;
 }
 
-Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& words, const DevelopArgs& args) {
+Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& words, DevelopArgs& args) {
   Parsed<DevelopArgs> parsed = parse(app, words, args);
   const isp::DenoiseChoice& choice = args.options.denoise;
   if (std::holds_alternative<DevelopArgs>(parsed) && choice.maps && choice.mode == isp::DenoiseChoice::Mode::off) {
@@ -108,10 +64,18 @@ Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& w
 }  // namespace
 
 Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
-  CLI::App app("Develops raw files to pictures.", "lowlux develop");
+  CLI::App app("Develops raw files to images.", "lowlux develop");
   DevelopArgs args;
   add_output(app, args);
   add_rendering(app, args);
+  add_choice<bool>(
+      app, "--baseline-exposure", {{"on", true}, {"off", false}}, [&args](bool on) { args.baseline_exposure = on; },
+      "add the raw file's BaselineExposure to a given --exposure (default: on)");
+  add_choice<bool>(
+      app, "--camera-profile", {{"embedded", true}, {"none", false}},
+      [&args](bool embedded) { args.camera_profile = embedded; },
+      "hue, saturation and look tables of the DNG: apply or ignore them (default: embedded; never in linear spaces, "
+      "with --look or with colours of --profile)");
   add_look(app, args.look);
   add_seeing_map(app, args.look);
   add_camera(app, args);
@@ -119,6 +83,12 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   add_darks(app, args.dark);
   add_flats(app, args.flats);
   add_budget(app, args.effects);
+  CLI::Option* const merge = app.add_flag("--merge", args.merge, "merge all raw files first: see lowlux merge");
+  add_merging(app, args.merging);
+  for (const char* name :
+       {"--align", "--foreground", "--drizzle", "--pixfrac", "--mean", "--reference", "--false-alarm"}) {
+    app.get_option(name)->needs(merge);
+  }
   add_batch(
       app,
       "what was decided for each file, why, and, where this machine's speed is known (bench --calibrate-cost), what "
@@ -130,6 +100,10 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
       return refuse(app, *wrong);
     }
     if (const auto wrong = complete_effects(good->look, good->effects)) return refuse(app, *wrong);
+    if (const auto wrong = settle_merging(good->merging, good->effects.budgeted())) return refuse(app, *wrong);
+    if (good->merging.drizzle_scale && good->options.denoise.mode == isp::DenoiseChoice::Mode::level) {
+      return refuse(app, "a level of --denoise is for mosaics, and --drizzle makes none: leave one of them out");
+    }
     if (good->effects.budgeted() && good->jobs > 1) {
       return refuse(app, "a budget is for one file at a time: leave --jobs out");
     }
@@ -138,7 +112,7 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
 }
 
 Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
-  CLI::App app("Removes noise, dark charge and defects from raw files and writes raw files for any raw developer.",
+  CLI::App app("Removes noise, dark signal and defects from raw files and writes DNG files for any raw developer.",
                "lowlux denoise");
   DevelopArgs args;
   app.add_option("-o,--output", args.output,
@@ -156,6 +130,35 @@ Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
   return parsed;
 }
 
+Parsed<DevelopArgs> parse_merge(const std::vector<std::string>& words) {
+  CLI::App app("Merges raw files of one scene to one raw file with less noise.", "lowlux merge");
+  DevelopArgs args;
+  args.merge = true;
+  args.options.denoise.mode = isp::DenoiseChoice::Mode::automatic;
+  args.options.denoise.always = true;
+  app.add_option("RAW", args.inputs, "raw files, or folders of them")->required();
+  app.add_option("-o,--output", args.output, "raw file to write (.dng)")->required()->type_name("MERGED.dng");
+  add_merging(app, args.merging);
+  add_camera(app, args);
+  add_line_noise(app, args);
+  add_darks(app, args.dark);
+  add_flats(app, args.flats);
+  add_merge_budget(app, args.effects);
+  app.add_flag("--force", args.force, "overwrite the file if it exists");
+  app.add_flag("--sync", args.sync, "wait until the file is on the disk (fsync)");
+  app.add_flag("--explain", args.explain, "how much of each frame was used, and why");
+  app.add_flag("--json", args.json, "one JSON object on stdout");
+  app.add_flag("--timings", args.timings, "time of each stage");
+  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+  Parsed<DevelopArgs> parsed = parse(app, words, args);
+  if (auto* const good = std::get_if<DevelopArgs>(&parsed)) {
+    if (const auto wrong = wrong_profiles(*good)) return refuse(app, *wrong);
+    if (const auto wrong = settle_merging(good->merging, good->effects.budgeted())) return refuse(app, *wrong);
+    if (good->effects.budgeted()) good->effects.effects.emplace();  // the budget of each frame is part of it
+  }
+  return parsed;
+}
+
 Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
   CLI::App app("Prints what raw files say, and what was measured on them.", "lowlux info");
   InfoArgs args;
@@ -163,7 +166,7 @@ Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
   app.add_flag("--json", args.json, "JSON instead of text");
   add_advise(app, args.advise);
   if (const auto code = parse_words(app, words)) return *code;
-  const std::string wrong = validate_advise(args.advise, args.inputs.size());
+  const std::string wrong = validate_advise(app, args.advise, args.inputs.size());
   if (!wrong.empty()) return refuse(app, wrong);
   return args;
 }
@@ -187,12 +190,11 @@ Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words) {
       ->type_name("N");
   app.add_flag("--json", args.json, "JSON instead of a table");
   app.add_flag("--force", args.force, "overwrite files that exist");
-  return parse(app, words, args);
+  if (const auto code = parse_words(app, words)) return *code;
+  return args;
 }
 
 namespace {
-
-constexpr double max_exposure_ev = 12;  // the tone curve's range
 
 Names<OutputSpace> space_names() {
   Names<OutputSpace> names;
@@ -258,48 +260,55 @@ std::optional<std::string> set_exposure(const std::string& text, DevelopArgs& ar
 
 void add_rendering(CLI::App& app, DevelopArgs& args) {
   isp::DevelopOptions& o = args.options;
-  add_text(app, "--exposure", "auto|EV",
-           "gain in EV; auto brings the middle of the picture to mid-grey without lifting the black noise "
-           "(default: auto, in linear spaces 0)",
-           [&args](const std::string& text) { return set_exposure(text, args); });
+  add_text(
+      app, "--exposure", "auto|EV",
+      "exposure compensation in EV; auto places the median at middle grey, limited by shadow noise (default: auto; "
+      "in linear spaces 0)",
+      [&args](const std::string& text) { return set_exposure(text, args); });
   add_text(app, "--wb", "as-shot|auto|KELVIN",
-           "white balance: as the camera chose (default), estimated from the picture, or by colour temperature",
+           "white balance: of the camera, estimated from the image, or a colour temperature (default: as-shot)",
            [&o](const std::string& text) { return set_white_balance(text, o.white_balance); });
   add_choice<isp::ToneCurve>(
       app, "--tone", {{"standard", isp::ToneCurve::standard}, {"none", isp::ToneCurve::none}},
       [&args](isp::ToneCurve tone) { args.tone = tone; }, "tone curve (default: standard, in linear spaces none)");
   add_choice<OutputSpace>(
       app, "--space", space_names(), [&args](OutputSpace space) { args.space = space; },
-      "what the numbers mean (default: srgb; linear-srgb for OpenEXR and PFM)");
+      "output colour space (default: srgb; OpenEXR and PFM linear-srgb)");
   Names<std::optional<isp::DemosaicMethod>> methods{{"auto", std::nullopt}};
   for (const isp::DemosaicMethod method : isp::all_demosaic_methods) methods.emplace(name_of(method), method);
   CLI::Option* const demosaic = add_choice<std::optional<isp::DemosaicMethod>>(
       app, "--demosaic", methods, [&o](std::optional<isp::DemosaicMethod> method) { o.demosaic = method; },
       "how missing colours are interpolated (default: auto)");
-  app.add_flag("--half", o.half, "half size: exact 2x2 binning in place of demosaicing")->excludes(demosaic);
+  app.add_flag("--half", o.half, "half size: exact 2x2 binning instead of demosaicing")->excludes(demosaic);
 }
 
 void add_camera(CLI::App& app, DevelopArgs& args) {
   isp::DevelopOptions& o = args.options;
-  add_text(app, "--black", "auto|metadata|masked|DN[,DN,DN,DN]|PROFILE.json",
-           "black point: measured on masked pixels where there are any, else the file's figure (auto, default); one of "
-           "the two; given in DN, for all pixels or for the four sites of the 2x2 cell; or a camera's profile, whose "
-           "noise and hot pixels are used too",
-           [&args](const std::string& text) { return set_black(text, args); });
+  add_text(
+      app, "--black", "auto|metadata|masked|DN[,DN,DN,DN]|PROFILE.json",
+      "black level: auto (masked pixels if present, otherwise metadata), masked, metadata, values in DN (one, or four "
+      "in CFA order), or that of a profile, whose noise and hot pixels are used too (default: auto)",
+      [&args](const std::string& text) { return set_black(text, args); });
   app.add_option("--profile", args.profile,
-                 "a camera's profile (see calibrate): black point, noise and hot pixels, and its colour matrices if it "
-                 "holds any")
+                 "camera profile (see calibrate): black level, noise, hot pixels, and colour matrices if it has any")
       ->type_name("PROFILE.json");
   app.add_option("--gain-setting", args.gain_setting,
                  "gain setting of the profile to use: its name or an ISO (default: the raw's ISO)")
       ->type_name("SETTING");
+  add_text(app, "--noise", "GAIN,READ",
+           "system gain in DN per electron and read noise in electrons rms, for raw files of one ISO",
+           [&args](const std::string& text) -> std::optional<std::string> {
+             args.noise = noise_figures_of(text);
+             if (args.noise) return std::nullopt;
+             return "is not GAIN,READ: 1e-6 to 1e6 DN per electron and 0 to 1e5 electrons";
+           });
   add_choice<bool>(
       app, "--dark-estimate", {{"auto", true}, {"off", false}}, [&o](bool estimate) { o.estimate_dark = estimate; },
-      "dark charge that no profile and no dark frame tells: estimate it from long exposures themselves where they show "
-      "it (default), or leave it in");
+      "dark signal that no profile and no dark frame states: estimate it from long exposures, or leave it in "
+      "(default: auto)");
   add_choice<bool>(
       app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
-      "hot and dead pixels: look for them (default), or repair only those the file names");
+      "search for hot and dead pixels, or repair only those the file lists (default: auto)");
 }
 
 std::optional<std::string> wrong_profiles(const DevelopArgs& args) {
@@ -326,14 +335,64 @@ void add_denoise(CLI::App& app, DevelopArgs& args) {
         choice.mode = named.mode;
         choice.level = named.level;
       },
-      "noise reduction, by how much work it is; auto (default) chooses by how much noise there is");
-  add_choice<bool>(
-      app, "--line-noise", {{"auto", true}, {"off", false}}, [&choice](bool lines) { choice.line_noise = lines; },
-      "noise that whole rows or columns share: subtract it where it is significant (default) or leave it");
+      "noise reduction, from fastest to best; auto chooses by the visible noise (default: auto)");
+  add_line_noise(app, args);
   add_choice<bool>(
       app, "--chroma-bias", {{"least-error", false}, {"none", true}},
       [&choice](bool unbiased) { choice.unbiased_chroma = unbiased; },
-      "colour that noise hides: fade it, for the smallest error (default), or keep the mean colour of areas");
+      "colour hidden by noise: fade it, for the smallest error, or keep the mean colour of areas (default: "
+      "least-error)");
+}
+
+void add_line_noise(CLI::App& app, DevelopArgs& args) {
+  isp::DenoiseChoice& choice = args.options.denoise;
+  add_choice<bool>(
+      app, "--line-noise", {{"auto", true}, {"off", false}}, [&choice](bool lines) { choice.line_noise = lines; },
+      "correct row and column banding when detected, or never (default: auto)");
+}
+
+void add_darks(CLI::App& app, DarkArgs& dark) {
+  CLI::Option* frames =
+      app.add_option("--dark-frame", dark.words,
+                     "dark frames or master darks to subtract: files, a folder or a pattern; repeatable")
+          ->type_name("FILE[,FILE...]|FOLDER")
+          ->allow_extra_args(false);
+  app.add_option("--bias-frame", dark.bias, "bias frames: pedestal of each pixel, also to scale darks of another time")
+      ->type_name("FILE[,FILE...]|FOLDER")
+      ->allow_extra_args(false);
+  app.add_option("--dark-frame-count", dark.count, "frames averaged in each dark frame file (default: estimated)")
+      ->check(CLI::Range(1, calib::max_exposures))
+      ->type_name("N")
+      ->needs(frames);
+  add_text(app, "--dark-noise", "SHARE",
+           "maximum increase of the shadow noise variance by dark subtraction (default: 0.1)",
+           [&dark](const std::string& text) -> std::optional<std::string> {
+             const auto share = number_of(text);
+             if (!share || !(*share > 0 && *share <= 1)) return "is not a share above 0 and at most 1";
+             dark.noise_fraction = *share;
+             return std::nullopt;
+           })
+      ->needs(frames);
+  add_text(app, "--dark-doubling", "C|PROFILE.json",
+           "degrees over which dark current doubles, for darks of another temperature, or a profile that states it "
+           "(default: as measured on the darks)",
+           [&dark](const std::string& text) -> std::optional<std::string> {
+             dark.doubling_c = quantity_of(text, "C");
+             if (!dark.doubling_c) {
+               if (!text.ends_with(".json")) return "is neither a number of degrees nor a profile (.json)";
+               dark.doubling_profile = text;
+             } else if (!(*dark.doubling_c >= 2 && *dark.doubling_c <= 30)) {
+               return "is not within 2 to 30 degrees";
+             }
+             return std::nullopt;
+           })
+      ->needs(frames);
+}
+
+void add_flats(CLI::App& app, std::vector<std::string>& flats) {
+  app.add_option("--flat-frame", flats, "flat frames to divide by (vignetting, PRNU): files, a folder or a pattern")
+      ->type_name("FILE[,FILE...]|FOLDER")
+      ->allow_extra_args(false);
 }
 
 void add_samples(CLI::App& app, DevelopArgs& args) {

@@ -6,8 +6,11 @@
 #include <variant>
 #include <vector>
 
+#include "calib/noise/noise_figures.h"
+#include "isp/cli/config/config_file.h"
 #include "isp/cli/develop/look_args.h"
 #include "isp/cli/info/advise_args.h"
+#include "isp/cli/merge/merge_args.h"
 #include "isp/pipeline/options.h"
 
 namespace CLI {
@@ -28,8 +31,11 @@ struct DarkArgs {
   std::string doubling_profile;      // or as the file of a profile
 };
 
-/// Holds the arguments of `develop`, and of `denoise` where it has the option, checked as far as that is possible
-/// without opening a file.
+/// Limits exposures [EV]: the range of the tone curve.
+inline constexpr double max_exposure_ev = 12;
+
+/// Holds the arguments of `develop`, and of `denoise` and `merge` where they have the option, checked as far as that is
+/// possible without opening a file.
 struct DevelopArgs {
   std::vector<std::string> inputs;
   std::string output;                  // a file, or a folder
@@ -38,10 +44,13 @@ struct DevelopArgs {
   std::optional<isp::ToneCurve> tone;  // absent: standard, or none for linear spaces
   std::optional<OutputSpace> space;    // absent: srgb, or linear-srgb for OpenEXR and PFM
   bool exposure_given = false;
-  isp::DevelopOptions options;  // white balance, black, half, defects, exposure
-  std::string black_profile;    // a camera's profile for black and noise; empty: none
-  std::string profile;          // a camera's profile for everything, colour too; empty: none
-  std::string gain_setting;     // of the profile; empty: by the frame's ISO
+  bool baseline_exposure = true;             // add the source's BaselineExposure to a given exposure
+  bool camera_profile = true;                // apply the tables of the profile in the source
+  isp::DevelopOptions options;               // white balance, black, half, defects, exposure
+  std::string black_profile;                 // a camera's profile for black and noise; empty: none
+  std::string profile;                       // a camera's profile for everything, colour too; empty: none
+  std::string gain_setting;                  // of the profile; empty: by the frame's ISO
+  std::optional<calib::NoiseFigures> noise;  // --noise
   int jpeg_quality = 92;
   int jobs = 0;  // files at a time; 0: one for each processor
   bool force = false;
@@ -55,6 +64,9 @@ struct DevelopArgs {
   std::vector<std::string> flats;  // --flat-frame: files, lists separated by commas, folders, patterns; empty: none
   LookArgs look;
   EffectsArgs effects;
+  bool merge = false;  // all inputs are frames of one scene
+  MergeArgs merging;
+  Defaults defaults;  // of the user's file
 };
 
 struct InfoArgs {
@@ -80,6 +92,7 @@ using Parsed = std::variant<Args, int>;
 
 Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words);
 Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words);
+Parsed<DevelopArgs> parse_merge(const std::vector<std::string>& words);
 Parsed<InfoArgs> parse_info(const std::vector<std::string>& words);
 Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words);
 
@@ -90,6 +103,11 @@ void add_camera(CLI::App& app, DevelopArgs& args);
 /// Returns the error of the options of add_camera in combination, or nothing.
 std::optional<std::string> wrong_profiles(const DevelopArgs& args);
 void add_denoise(CLI::App& app, DevelopArgs& args);
+/// Adds the option of row and column noise.
+void add_line_noise(CLI::App& app, DevelopArgs& args);
+/// Adds the options of dark and bias frames, and those of flat frames.
+void add_darks(CLI::App& app, DarkArgs& dark);
+void add_flats(CLI::App& app, std::vector<std::string>& flats);
 /// Adds the options of image files: bits, JPEG quality.
 void add_samples(CLI::App& app, DevelopArgs& args);
 

@@ -117,30 +117,31 @@ void add_light(CLI::App& app, LookArgs& args) {
 }
 
 void add_effects(CLI::App& app, LookArgs& args) {
-  add_text(app, "--effects", "auto|all|none|LIST",
-           fmt::format("what is done to the frame: what can be seen here (auto, default) or everything (all), of "
-                       "corrections and of what --look eye shows of the dark (auto never shows glare and "
-                       "visual-noise); or none of the latter, or a comma-separated list of them ({})",
-                       fmt::join(isp::night_effect_names, ", ")),
-           [&args](const std::string& text) {
-             args.given.emplace_back("--effects");
-             return set_effects(text, args.choice);
-           });
-  add_text(app, "--tolerance", "DELTA_E",
-           "CIEDE2000 that --effects auto may leave out: as 95 % of the picture have it, seen in means over 8 x 8 "
-           "pixels (default 0.5)",
-           [&args](const std::string& text) {
-             args.given.emplace_back("--tolerance");
-             return store_number(text, {1e-3, 100, "is not a colour difference"}, args.choice.tolerance);
-           });
-  add_text(app, "--dimming", "SHARE",
-           "how much of its darkness the picture keeps: 0 is as bright as by day, 1 as dark as it was compared with a "
-           "room with "
-           "100 cd/m2 (default 0.4; automatic exposure only)",
-           [&args](const std::string& text) {
-             args.given.emplace_back("--dimming");
-             return store_number(text, {0, 1, "is not a fraction"}, args.choice.dimming);
-           });
+  add_text(
+      app, "--effects", "auto|all|none|LIST",
+      fmt::format("corrections and night-vision effects to apply: auto (only those visible in this image, never glare "
+                  "and visual-noise), all, none, or a comma-separated list of the effects ({}) (default: auto)",
+                  fmt::join(isp::night_effect_names, ", ")),
+      [&args](const std::string& text) {
+        args.given.emplace_back("--effects");
+        return set_effects(text, args.choice);
+      });
+  add_text(
+      app, "--tolerance", "DELTA_E",
+      "largest visible change that --effects auto may skip: CIEDE2000, 95th percentile of 8x8 block means (default: "
+      "0.5)",
+      [&args](const std::string& text) {
+        args.given.emplace_back("--tolerance");
+        return store_number(text, {1e-3, 100, "is not a colour difference"}, args.choice.tolerance);
+      });
+  add_text(
+      app, "--dimming", "SHARE",
+      "darkness of the result: 0 is normal exposure, 1 as dark as the scene relative to an indoor 100 cd/m2 (default: "
+      "0.4; automatic exposure only)",
+      [&args](const std::string& text) {
+        args.given.emplace_back("--dimming");
+        return store_number(text, {0, 1, "is not a fraction"}, args.choice.dimming);
+      });
 }
 
 }  // namespace
@@ -150,22 +151,22 @@ void add_look(CLI::App& app, LookArgs& args) {
   for (const isp::AppearanceModel& model : isp::appearance_models()) {
     models += (models.empty() ? "" : ", ") + std::string(model.name);
   }
-  add_text(app, "--look", "camera|eye|MODEL",
-           "as a camera in daylight would have it (default), as an observer on site would have seen it (reds darken, "
-           "colours "
-           "fade, detail softens), or its colours by one published model (" +
-               models + ")",
-           [&args, models](const std::string& text) -> Wrong {
-             args.choice.model.clear();
-             if (text == "camera" || text == "eye") {
-               args.choice.look = text == "eye" ? isp::Look::eye : isp::Look::camera;
-               return std::nullopt;
-             }
-             if (!isp::appearance_model_named(text)) return "is none of camera, eye, " + models;
-             args.choice.look = isp::Look::model;
-             args.choice.model = text;
-             return std::nullopt;
-           });
+  add_text(
+      app, "--look", "camera|eye|MODEL",
+      "normal rendering (camera, default), as a dark-adapted observer on site would have seen it (eye), or colours by "
+      "a published model (" +
+          models + ")",
+      [&args, models](const std::string& text) -> Wrong {
+        args.choice.model.clear();
+        if (text == "camera" || text == "eye") {
+          args.choice.look = text == "eye" ? isp::Look::eye : isp::Look::camera;
+          return std::nullopt;
+        }
+        if (!isp::appearance_model_named(text)) return "is none of camera, eye, " + models;
+        args.choice.look = isp::Look::model;
+        args.choice.model = text;
+        return std::nullopt;
+      });
   add_scene(app, args);
   add_light(app, args);
   add_effects(app, args);
@@ -249,13 +250,19 @@ void add_positive(CLI::App& app, const char* flag, const char* type, const char*
 
 }  // namespace
 
+void add_merge_budget(CLI::App& app, EffectsArgs& args) {
+  add_positive(app, "--budget-ms", "MS", "ms", "time for merging without reading files; decides on --align and --mean",
+               args.budget_ms);
+}
+
 void add_budget(CLI::App& app, EffectsArgs& args) {
   add_positive(
       app, "--budget-ms", "MS", "ms",
       "time for developing each frame, from decoded codes to a finished picture (files are read and written "
       "besides): the most accurate way that is predicted to fit, or with --tolerance the fastest within it. "
       "Times are rough estimates until bench --calibrate-cost has measured this machine; before each file how busy it "
-      "is is measured, which takes a tenth of a second or two more; one file at a time",
+      "is is measured, which takes a tenth of a second or two more; one file at a time; with --merge the time is for "
+      "merging and developing",
       args.budget_ms);
   add_positive(app, "--budget-mpps", "MP_PER_S", "MP/s", "the same as megapixels in a second", args.budget_mpps);
 }

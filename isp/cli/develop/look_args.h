@@ -50,6 +50,9 @@ struct EffectsArgs {
 /// Adds --budget-ms and --budget-mpps; --effects and --tolerance belong to the look's options too.
 void add_budget(CLI::App& app, EffectsArgs& args);
 
+/// Adds --budget-ms of merging.
+void add_merge_budget(CLI::App& app, EffectsArgs& args);
+
 /// Combines these options with those of the look. @return the error of their combination, or nothing
 std::optional<std::string> complete_effects(const LookArgs& look, EffectsArgs& args);
 

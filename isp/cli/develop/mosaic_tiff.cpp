@@ -68,17 +68,15 @@ bool is_tiff_name(const std::string& file) {
   return name.ends_with(".tif") || name.ends_with(".tiff");
 }
 
-Result<MosaicTiff> read_float_dng(const std::string& file) {
-  const auto bytes = capture::read_file_bytes(file, capture::ReadLimits{}.max_file_bytes);
-  if (!bytes) return tl::make_unexpected(bytes.error());
-  auto decoded = isp::decode_float_mosaic(*bytes, {capture::ReadLimits{}.max_pixels});
-  if (!decoded) return tl::make_unexpected(decoded.error());
-  if (const auto finite = check_finite(decoded->value); !finite) return tl::make_unexpected(finite.error());
+Result<MosaicTiff> mosaic_of(RawFrame frame, const std::string& file) {
+  if (frame.raw.layout == SensorLayout::linear_rgb) {
+    return fail(ErrorCode::unsupported, "this DNG has colours; save the mosaic as the sensor gave it, not demosaiced");
+  }
   return MosaicTiff{.file = file,
-                    .dn = std::move(decoded->value),
+                    .dn = std::move(frame.raw.dn_float),
                     .rounded = false,
-                    .white = decoded->white,
-                    .info = std::move(decoded->metadata.info)};
+                    .white = frame.raw.white_dn[0],
+                    .info = std::move(frame.raw.info)};
 }
 
 Result<MosaicTiff> read_mosaic_tiff(const std::string& file) {

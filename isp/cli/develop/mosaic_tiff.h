@@ -23,9 +23,8 @@ struct MosaicTiff {
 /// Returns whether the file has the extension of a TIFF: .tif or .tiff in any case.
 bool is_tiff_name(const std::string& file);
 
-/// Reads the mosaic of a floating-point DNG. Errors: those of reading and of isp::decode_float_mosaic; values that are
-/// not finite.
-Result<MosaicTiff> read_float_dng(const std::string& file);
+/// Returns the mosaic of a frame of floating-point samples, borders included. Error: demosaiced samples.
+Result<MosaicTiff> mosaic_of(RawFrame frame, const std::string& file);
 
 /// Reads a grey TIFF of 16 bits or 32-bit floats. Errors: those of reading and of isp::decode_tiff; 8 bits; colours;
 /// values that are not finite.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <exception>
 #include <filesystem>
 #include <new>
@@ -13,13 +14,16 @@
 
 #include <fmt/format.h>
 
+#include "capture/dng/source_tags.h"
 #include "capture/file/dng_source.h"
+#include "isp/cli/develop/batch_report.h"
 #include "isp/cli/develop/flat_files.h"
+#include "isp/cli/noise/noise_source.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/interruption.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/noise_maps.h"
-#include "isp/cli/shared/noise_source.h"
+#include "isp/cli/shared/picture_options.h"
 #include "isp/cli/shared/profile_option.h"
 
 namespace lowlux::cli {
@@ -37,13 +41,7 @@ Result<void> check_free(const std::string& output, isp::Overwrite overwrite) {
 
 /// Returns the options of one frame: profile and darks; values of the profile are put into the frame.
 Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) {
-  isp::DevelopOptions options = batch.options;
-  options.effects = batch.args.effects.effects;
-  if (options.effects) options.effects->cost = batch.kept_cost;
-  if (batch.speed) {
-    const Rect& crop = frame.raw.default_crop;
-    options.effects->budget_s = budget_s(batch.args.effects, 1e-6 * crop.width * crop.height);
-  }
+  isp::DevelopOptions options = options_of_goal(batch, frame);
   if (batch.profile) {
     const ProfileChoice choice{.everything = !batch.args.profile.empty(),
                                .with_darks = batch.darks != nullptr,
@@ -64,6 +62,17 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
 
 }  // namespace
 
+isp::DevelopOptions options_of_goal(const RawBatch& batch, const RawFrame& frame) {
+  isp::DevelopOptions options = batch.options;
+  options.effects = batch.args.effects.effects;
+  if (options.effects) options.effects->cost = batch.kept_cost;
+  if (batch.speed) {
+    const Rect& crop = frame.raw.default_crop;
+    options.effects->budget_s = budget_s(batch.args.effects, 1e-6 * crop.width * crop.height);
+  }
+  return options;
+}
+
 std::vector<std::string> files_of(const RawBatch& batch, const Job& job) {
   std::vector<std::string> files{job.output};
   if (batch.options.denoise.maps) {
@@ -78,9 +87,17 @@ void FileProgress::reach(double share) {
   reached_ = share;
 }
 
-Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& options, std::vector<Job> jobs,
-                            const DarkNames& darks) {
-  RawBatch batch{.args = args, .options = options, .jobs = std::move(jobs)};
+Result<RawFrame> read_file(const std::string& file) { return capture::read_raw(file); }
+
+Result<RawBatch> make_batch(const DevelopArgs& args, isp::DevelopOptions options, std::vector<Job> jobs,
+                            const CalibrationFiles& calibration) {
+  if (const auto made = make_for_display(args, options); !made) return tl::make_unexpected(made.error());
+  RawBatch batch{.args = args, .options = std::move(options), .jobs = std::move(jobs)};
+  if (!calibration.flats.empty()) {
+    auto flat = read_flats(calibration.flats);
+    if (!flat) return tl::make_unexpected(flat.error());
+    batch.flat = *std::move(flat);
+  }
   if (const std::string& file = args.profile.empty() ? args.black_profile : args.profile; !file.empty()) {
     auto profile = read_profile(file);
     if (!profile) return tl::make_unexpected(with_file(profile.error(), file));
@@ -99,8 +116,8 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
       batch.kept_cost = std::make_shared<const isp::CostModel>(*std::move(cost));
     }
   }
-  if (!darks.empty()) {
-    auto source = read_darks(darks, args.dark);
+  if (!calibration.darks.empty()) {
+    auto source = read_darks(calibration.darks, args.dark);
     if (!source) return tl::make_unexpected(source.error());
     batch.darks = *std::move(source);
   }
@@ -110,62 +127,67 @@ Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& 
   return batch;
 }
 
-Result<ReadyFrame> ready_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock) {
-  for (const std::string& output : files_of(batch, job)) {
+Result<ReadyFrame> read_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock) {
+  for (const std::string& output : job.output.empty() ? std::vector<std::string>() : files_of(batch, job)) {
     if (const auto free = check_free(output, job.overwrite); !free) return tl::make_unexpected(free.error());
   }
-  Result<RawFrame> frame = capture::read_raw(job.input);
+  Result<RawFrame> frame = batch.read(job.input);
   clock.lap("read and decode");
   if (!frame) return tl::make_unexpected(frame.error());
   Result<isp::DevelopOptions> options = options_for(batch, *frame);
   if (!options) return tl::make_unexpected(options.error());
+  ReadyFrame ready{*std::move(frame), *std::move(options)};
+  if (!batch.args.merge) {
+    ready.source_tags = capture::read_source_tags(job.input, ready.frame.warnings);
+    set_profile_tables(batch.args, ready);
+  }
   if (batch.memory) {
     const std::size_t flat = batch.flat ? sizeof(float) * batch.flat->gain.gain.size() : 0;
-    batch.memory->report_size(flat + batch.bytes_of(frame->raw, *options, executor.width()));
+    batch.memory->report_size(flat + batch.bytes_of(ready.frame.raw, ready.options, executor.width()));
   }
   if (batch.darks) clock.lap("dark frame's making");
-  if (const Result<void> found = find_noise(*options, *frame, executor); !found) {
-    return tl::make_unexpected(found.error());
-  }
-  if (frame->noise && frame->noise->source == NoiseProfile::Source::picture) clock.lap("noise of the picture");
-  if (batch.speed) {
-    auto cost = batch.speed->now(executor);
-    if (!cost) return tl::make_unexpected(cost.error());
-    options->effects->cost = *std::move(cost);
-    clock.lap("machine's pace");
-  }
-  return ReadyFrame{*std::move(frame), *std::move(options)};
+  return ready;
 }
 
-Result<void> write_noise_maps(const RawBatch& batch, const Job& job, isp::NoiseMaps maps, const RawDn& raw,
-                              Executor& executor) {
-  for (const PixelMap& map : noise_map_files(std::move(maps), raw, job.output, executor)) {
+void set_profile_tables(const DevelopArgs& args, ReadyFrame& ready) {
+  const CameraColour& colour = ready.frame.colour;
+  if (!args.camera_profile || !ready.source_tags || is_linear(ready.options.space) ||
+      ready.options.look.look != isp::Look::camera || colour.source != CameraColour::Source::file_tags) {
+    return;
+  }
+  ready.options.profile_tables =
+      isp::read_profile_tables(*ready.source_tags, colour.calibrations.size() == 2, ready.frame.warnings);
+}
+
+Result<ReadyFrame> ready_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock) {
+  Result<ReadyFrame> ready = read_frame(batch, job, executor, clock);
+  if (!ready) return ready;
+  auto origin = find_noise(ready->options, batch.args.noise, ready->frame, executor);
+  if (!origin) return tl::make_unexpected(origin.error());
+  ready->noise = *std::move(origin);
+  const auto& noise = ready->frame.noise;
+  if (noise && noise->source == NoiseProfile::Source::picture) clock.lap("noise of the picture");
+  if (const auto set = set_cost(batch, ready->options, executor, clock); !set) return tl::make_unexpected(set.error());
+  return ready;
+}
+
+Result<void> set_cost(const RawBatch& batch, isp::DevelopOptions& options, Executor& executor, isp::StageClock& clock) {
+  if (!batch.speed) return {};
+  auto cost = batch.speed->now(executor);
+  if (!cost) return tl::make_unexpected(cost.error());
+  options.effects->cost = *std::move(cost);
+  clock.lap("machine's pace");
+  return {};
+}
+
+Result<void> write_maps(const RawBatch& batch, const Job& job, const std::vector<PixelMap>& maps) {
+  for (const PixelMap& map : maps) {
     if (Result<void> written = write_map(map, job.overwrite, batch.sync); !written) return written;
   }
   return {};
 }
 
-Result<void> write_seeing_map(const RawBatch& batch, const Job& job, Plane<float> map, const RawDn& raw,
-                              Executor& executor) {
-  if (map.size() == 0) return {};
-  return write_map(seeing_map_file(std::move(map), raw, job.output, executor), job.overwrite, batch.sync);
-}
-
 namespace {
-
-void print_outcome(const DevelopArgs& args, const DevelopOutcome& outcome) {
-  if (outcome.error) return print_err(fmt::format("{}\n", error_line(outcome.input, *outcome.error)));
-  if (!outcome.plan) return;  // skipped
-  if (!args.quiet) {
-    for (const std::string& warning : outcome.plan->warnings) {
-      print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", outcome.input, warning))));
-    }
-  }
-  if (args.json) return;
-  if (args.explain)
-    print_out(fmt::format("{}\n{}", one_line(outcome.input), explain_text(*outcome.plan, outcome.flat.get())));
-  if (args.timings) print_out(fmt::format("{}\n{}", one_line(outcome.input), times_text(outcome.times)));
-}
 
 /// Processes all files. Of a finished file only counts and the text to be printed at the end are kept: memory does not
 /// grow with the number of files.
@@ -181,6 +203,7 @@ class BatchRun {
   int run() {
     std::optional<InterruptionReport> interruption;
     if (!batch_.args.quiet) interruption.emplace([this] { return interruption_text(); });
+    print_defaults(batch_.args);
     work_on_all();
     print_summary();
     return failed_ > 0 || reports_lost_ ? exit_failed : exit_done;
@@ -250,7 +273,7 @@ class BatchRun {
   void finish(int index, const DevelopOutcome& outcome) {
     ++(outcome.error ? failed_ : outcome.skipped ? skipped_ : done_);
     try {
-      if (batch_.args.json) json_[static_cast<std::size_t>(index)] = develop_json(outcome);
+      if (batch_.args.json) json_[static_cast<std::size_t>(index)] = develop_json(outcome, batch_.args.defaults);
       progress_.print([&] { print_outcome(batch_.args, outcome); });
     } catch (const std::bad_alloc&) {
       print_err("lowlux: not enough memory to print what was done\n");
@@ -264,10 +287,7 @@ class BatchRun {
     if (batch_.memory && chatty && !batch_.args.json) {
       if (const auto text = batch_.memory->limit_text()) print_out(fmt::format("{} files: {}\n", files_, *text));
     }
-    if (skipped_ > 0 && !batch_.args.quiet) {
-      print_err(fmt::format("lowlux: {} of {} files skipped: their outputs exist\n", skipped_.load(), files_));
-    }
-    if (failed_ > 0 && files_ > 1) print_err(fmt::format("lowlux: {} of {} files failed\n", failed_.load(), files_));
+    print_counts(batch_.args, {files_, done_, skipped_, failed_}, std::chrono::steady_clock::now() - begin_);
   }
 
   std::string interruption_text() const {
@@ -278,6 +298,7 @@ class BatchRun {
   const RawBatch& batch_;
   const RawWork& work_;
   int files_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   Progress progress_;
   std::vector<std::string> json_;  // in the order of the files
   std::atomic<int> next_{0};

@@ -10,10 +10,13 @@
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
+#include "isp/base/source_tags.h"
+#include "isp/cli/develop/calibration_files.h"
 #include "isp/cli/develop/cost_file.h"
 #include "isp/cli/develop/dark_files.h"
 #include "isp/cli/develop/develop_args.h"
 #include "isp/cli/develop/memory_gate.h"
+#include "isp/cli/noise/noise_origin.h"
 #include "isp/cli/shared/noise_maps.h"
 #include "isp/cli/shared/outputs.h"
 #include "isp/cli/shared/progress.h"
@@ -27,6 +30,12 @@ namespace lowlux::cli {
 
 /// Estimates the peak memory of the work on one frame.
 using EstimateBytes = std::size_t (*)(const RawDn& raw, const isp::DevelopOptions& options, int threads);
+
+/// Returns the raw frame of a job's input. It may be called from several threads.
+using ReadRaw = std::function<Result<RawFrame>(const std::string& input)>;
+
+/// Reads a raw file, see capture::read_raw.
+Result<RawFrame> read_file(const std::string& file);
 
 /// Holds the data that all files have in common.
 struct RawBatch {
@@ -42,11 +51,13 @@ struct RawBatch {
   std::shared_ptr<MachineSpeed> speed = nullptr;  // set with a budget: files are then processed one by one
   std::shared_ptr<const isp::CostModel> kept_cost =
       nullptr;  // set without a budget, where decisions are printed and it is known
+  ReadRaw read = read_file;
 };
 
-/// Reads profile and darks and makes the output folder. Errors name their file.
-Result<RawBatch> make_batch(const DevelopArgs& args, const isp::DevelopOptions& options, std::vector<Job> jobs,
-                            const DarkNames& darks);
+/// Makes the data of looks and displays, reads profile, darks and flats, and makes the output folder. Errors name their
+/// file or option.
+Result<RawBatch> make_batch(const DevelopArgs& args, isp::DevelopOptions options, std::vector<Job> jobs,
+                            const CalibrationFiles& calibration);
 
 /// Returns all files written for one input: the output, and its maps.
 std::vector<std::string> files_of(const RawBatch& batch, const Job& job);
@@ -55,18 +66,30 @@ std::vector<std::string> files_of(const RawBatch& batch, const Job& job);
 struct ReadyFrame {
   RawFrame frame;
   isp::DevelopOptions options;
+  std::optional<NoiseOrigin> noise = std::nullopt;          // set by ready_frame where it is known
+  std::shared_ptr<const SourceTags> source_tags = nullptr;  // for the output; null: none
+  double merged_exposure_ev = 0;                            // BaselineExposure that a merge adds to that of the source
 };
 
-/// Reads one file. Existing outputs, including maps, are an error before any work is done.
+/// Reads one file with its profile, darks and flats, and, unless it is merged with others, its source tags. Existing
+/// outputs, including maps, are an error before any work is done; a job without an output writes none.
+Result<ReadyFrame> read_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock);
+
+/// Sets the tables of the profile in the source where they are applied: to images to be looked at, without a look, with
+/// the colours of the file. Tables that are not valid are left out with a warning.
+void set_profile_tables(const DevelopArgs& args, ReadyFrame& ready);
+
+/// Does read_frame, then finds the noise of the frame (find_noise) and sets the cost of the machine (set_cost).
 Result<ReadyFrame> ready_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock);
 
-/// Writes the maps to the folder of the output; nothing if there are none.
-Result<void> write_noise_maps(const RawBatch& batch, const Job& job, isp::NoiseMaps maps, const RawDn& raw,
-                              Executor& executor);
+/// Returns the options of the batch with what is predicted and allowed for a frame.
+isp::DevelopOptions options_of_goal(const RawBatch& batch, const RawFrame& frame);
 
-/// Writes the map of seeing to the folder of the output; nothing if there is none.
-Result<void> write_seeing_map(const RawBatch& batch, const Job& job, Plane<float> map, const RawDn& raw,
-                              Executor& executor);
+/// Sets the cost of the machine as it is now, where there is a budget. Errors: those of MachineSpeed::now.
+Result<void> set_cost(const RawBatch& batch, isp::DevelopOptions& options, Executor& executor, isp::StageClock& clock);
+
+/// Writes maps of an image.
+Result<void> write_maps(const RawBatch& batch, const Job& job, const std::vector<PixelMap>& maps);
 
 /// Advances the progress bar for one file: roughly by the fraction of its time that has passed, to 1 in the end.
 class FileProgress {

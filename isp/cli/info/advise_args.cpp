@@ -1,7 +1,9 @@
 #include "isp/cli/info/advise_args.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 
@@ -10,7 +12,7 @@
 namespace lowlux::cli {
 namespace {
 
-constexpr const char* group = "advice";
+constexpr const char* group = "Advice (with --advise)";
 
 void add_optional(CLI::App& app, const char* flag, const char* type, const char* help, std::optional<double>& out) {
   add_number(app, flag, type, help, [&out](double value) { out = value; })->group(group);
@@ -78,7 +80,8 @@ void add_scene(CLI::App& app, AdviseArgs& args) {
 void add_advise(CLI::App& app, AdviseArgs& args) {
   CLI::Option* wanted =
       app.add_flag("--advise", args.wanted,
-                   "the exposure and gain that would give the mid tone the best signal-to-noise ratio and chromaticity")
+                   "with --sensor: exposure and gain for the best signal-to-noise ratio and chromaticity of the mid "
+                   "tone; without: how many frames of which exposures to take for `lowlux merge`")
           ->group(group);
   add_camera(app, args);
   add_figures(app, args);
@@ -86,9 +89,11 @@ void add_advise(CLI::App& app, AdviseArgs& args) {
   add_optional(app, "--max-exposure", "S", "longest exposure", args.longest_exposure_s);
   add_optional(app, "--motion", "PX_PER_S", "how fast the scene moves; goes with --blur", args.speed_px_per_s);
   add_optional(app, "--blur", "PX", "how far it may move during the exposure", args.blur_px);
-  add_number(app, "--clip", "SHARE", "fraction of pixels that may clip (default 0.001)", [&args](double share) {
-    args.clipped_share = share;
-  })->group(group);
+  add_number(app, "--clip", "SHARE", "fraction of pixels that may clip (default 0.001; without --sensor 0.00001)",
+             [&args](double share) { args.clipped_share = share; })
+      ->group(group);
+  add_optional(app, "--snr", "DB", "that the darkest tenth is to reach in a merged raw (default 20); without --sensor",
+               args.snr_db);
   add_number(app, "--patch", "PIXELS", "red pixels of the patch whose chromaticity is judged (default 256)",
              [&args](double pixels) { args.patch_pixels = pixels; })
       ->group(group);
@@ -103,15 +108,40 @@ void add_advise(CLI::App& app, AdviseArgs& args) {
   }
 }
 
-std::string validate_advise(const AdviseArgs& args, std::size_t files) {
+namespace {
+
+constexpr const char* needs_sensor = " needs --sensor: a name (`lowlux simulate --list`) or a profile's file";
+
+/// Returns the error of options without a sensor.
+std::string validate_bracket(const CLI::App& app, const AdviseArgs& args, std::size_t files) {
+  static constexpr std::array<std::string_view, 6> allowed{"--advise", "--snr",    "--max-exposure",
+                                                           "--clip",   "--motion", "--blur"};
+  for (const CLI::Option* option : app.get_options([](const CLI::Option* o) { return o->get_group() == group; })) {
+    if (option->count() > 0 && std::ranges::find(allowed, option->get_name()) == allowed.end()) {
+      return option->get_name() + needs_sensor;
+    }
+  }
+  if (files == 0) return std::string("--advise without a raw file") + needs_sensor;
+  if (args.snr_db && !(*args.snr_db >= -20 && *args.snr_db <= 60)) return "--snr is not within -20 to 60 dB";
+  if (args.clipped_share && !(*args.clipped_share >= 1e-9 && *args.clipped_share <= 0.5)) {
+    return "--clip is not within 1e-9 to 0.5";
+  }
+  if (args.longest_exposure_s && !(*args.longest_exposure_s > 0)) return "--max-exposure is not above 0";
+  return {};
+}
+
+}  // namespace
+
+std::string validate_advise(const CLI::App& app, const AdviseArgs& args, std::size_t files) {
   if (!args.wanted) return files == 0 ? "RAW is required" : "";
-  if (args.sensor.empty()) return "--advise needs --sensor: a name (`lowlux simulate --list`) or a profile's file";
+  if (args.speed_px_per_s.has_value() != args.blur_px.has_value()) return "--motion and --blur go together";
+  if (args.sensor.empty() && files <= 1) return validate_bracket(app, args, files);
   if (files > 1) return "--advise takes one raw file, or none with --luminance and --highlight";
   if (files == 0 && !args.midtone_cd_m2) return "--advise without a raw file needs --luminance";
   if (files == 0 && !args.highlight_cd_m2 && !args.highlight_ratio) {
     return "--advise without a raw file needs --highlight, as a luminance or as 20x";
   }
-  if (args.speed_px_per_s.has_value() != args.blur_px.has_value()) return "--motion and --blur go together";
+  if (args.snr_db) return "--snr is for the frames of a merge: leave --sensor out";
   if (!args.report.empty() && !args.report.ends_with(".html")) {
     return "--report is a page, its name ends with .html, found " + args.report;
   }

@@ -13,7 +13,8 @@ class App;
 
 namespace lowlux::cli {
 
-/// Holds the arguments of `info --advise`; absent values come from the raw file.
+/// Holds the arguments of `info --advise`; absent values come from the raw file, or are defaults. Without a sensor the
+/// advice is for the frames of a merge.
 struct AdviseArgs {
   bool wanted = false;
   std::string sensor;                     // by name, or a camera profile's file (.json)
@@ -29,7 +30,8 @@ struct AdviseArgs {
   std::optional<double> speed_px_per_s;
   std::optional<double> blur_px;
   std::optional<double> temperature_c;
-  double clipped_share = 1e-3;
+  std::optional<double> clipped_share;
+  std::optional<double> snr_db;  // of the darkest tenth of a raw file, once frames are merged
   double patch_pixels = 256;
   int frames = 1;
   std::string report;  // HTML page to write; empty: none
@@ -40,7 +42,8 @@ struct AdviseArgs {
 void add_advise(CLI::App& app, AdviseArgs& args);
 
 /// Returns the error of the options in combination; empty if there is none.
+/// @param app    after parsing: which options were given
 /// @param files  number of raw files among the arguments
-std::string validate_advise(const AdviseArgs& args, std::size_t files);
+std::string validate_advise(const CLI::App& app, const AdviseArgs& args, std::size_t files);
 
 }  // namespace lowlux::cli

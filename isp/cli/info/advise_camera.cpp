@@ -211,11 +211,12 @@ Result<void> take_profile(const AdviseArgs& args, const Spectrum& light, const i
 
 Result<void> take_scene(const AdviseArgs& args, const RawFrame* frame, AdviceCase& out) {
   isp::AdviceRequest& r = out.request;
+  r.clipped_share = args.clipped_share.value_or(r.clipped_share);
   std::optional<double> midtone = args.midtone_cd_m2, highlight = args.highlight_cd_m2;
   if (frame != nullptr && (!midtone || (!highlight && !args.highlight_ratio))) {
     FrameInfo info = frame->raw.info;
     if (args.f_number) info.f_number = args.f_number;
-    const auto seen = raw_luminance(*frame, info, args.clipped_share);
+    const auto seen = raw_luminance(*frame, info, r.clipped_share);
     if (!seen) return tl::make_unexpected(seen.error());
     if (!midtone) midtone = seen->median_cd_m2;
     if (!highlight && !args.highlight_ratio) highlight = std::max(seen->highlight_cd_m2, *midtone);
@@ -232,7 +233,6 @@ Result<void> take_scene(const AdviseArgs& args, const RawFrame* frame, AdviceCas
     r.longest_exposure_s = *limit;
   }
   if (args.longest_exposure_s) r.longest_exposure_s = std::min(r.longest_exposure_s, *args.longest_exposure_s);
-  r.clipped_share = args.clipped_share;
   r.patch_pixels = args.patch_pixels;
   r.frames = args.frames;
   const auto of_file = frame != nullptr ? frame->raw.info.temperature_c : std::nullopt;

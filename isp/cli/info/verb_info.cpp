@@ -1,15 +1,21 @@
 #include "isp/cli/info/verb_info.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "capture/file/dng_source.h"
+#include "isp/base/executor.h"
 #include "isp/cli/develop/develop_args.h"
+#include "isp/cli/info/advise_bracket.h"
 #include "isp/cli/info/advise_camera.h"
 #include "isp/cli/info/advise_report.h"
+#include "isp/cli/noise/noise_source.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/report.h"
@@ -17,6 +23,21 @@
 #include "isp/output/report/report.h"
 
 namespace lowlux::cli {
+namespace {
+
+/// Returns where `develop` takes the noise model of a frame from; nullopt: it finds none. The frame stays as it is.
+std::optional<NoiseOrigin> noise_of(RawFrame& frame, Executor& executor) {
+  const auto noise = frame.noise;
+  auto warnings = frame.warnings;
+  isp::DevelopOptions options;
+  options.denoise.mode = isp::DenoiseChoice::Mode::automatic;
+  const auto found = find_noise(options, {}, frame, executor);
+  frame.noise = noise;
+  frame.warnings = std::move(warnings);
+  return found ? *found : std::nullopt;
+}
+
+}  // namespace
 
 int run_info(const std::vector<std::string>& words) {
   const Parsed<InfoArgs> parsed = parse_info(words);
@@ -24,18 +45,20 @@ int run_info(const std::vector<std::string>& words) {
   const auto& args = std::get<InfoArgs>(parsed);
   if (args.advise.wanted) return run_advise(args);
 
+  PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64));
   int code = exit_done;
   std::string json;
   for (const std::string& file : args.inputs) {
-    const Result<RawFrame> frame = capture::read_raw(file);
+    Result<RawFrame> frame = capture::read_raw(file);
+    const std::optional<NoiseOrigin> noise = frame ? noise_of(*frame, executor) : std::nullopt;
     if (!frame) {
       code = exit_failed;
       print_err(fmt::format("{}\n", error_line(file, frame.error())));
     }
     if (args.json) {
-      json += (json.empty() ? "" : ",\n") + (frame ? info_json(file, *frame) : error_json(file, frame.error()));
+      json += (json.empty() ? "" : ",\n") + (frame ? info_json(file, *frame, noise) : error_json(file, frame.error()));
     } else if (frame) {
-      print_out(fmt::format("{}", info_text(file, *frame)));
+      print_out(fmt::format("{}", info_text(file, *frame, noise)));
     }
   }
   if (args.json) print_out(fmt::format("[{}]\n", json));
@@ -50,6 +73,15 @@ int failed(const std::string& file, const Error& error) {
   return print_usage_error("info", {error.code, error.message + place, {}});
 }
 
+/// Advises on the frames of a merge.
+int run_bracket(const InfoArgs& args, RawFrame& frame) {
+  const Result<BracketCase> found = bracket_case(args.advise, frame);
+  if (!found) return failed(args.inputs.front(), found.error());
+  const FrameInfo& info = frame.raw.info;
+  print_out(args.json ? bracket_json(*found, info) + "\n" : bracket_text(*found, info));
+  return exit_done;
+}
+
 }  // namespace
 
 int run_advise(const InfoArgs& args) {
@@ -60,6 +92,7 @@ int run_advise(const InfoArgs& args) {
     if (!read) return failed(subject, read.error());
     frame = *std::move(read);
   }
+  if (frame && args.advise.sensor.empty()) return run_bracket(args, *frame);
   const auto asked = advice_case(args.advise, frame ? &*frame : nullptr);
   if (!asked) return failed(subject, asked.error());
   const auto advice = isp::advise_exposure(asked->request);

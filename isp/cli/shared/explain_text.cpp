@@ -7,17 +7,22 @@
 #include <fmt/ranges.h>
 
 #include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/ratio_report.h"
 #include "isp/cli/shared/report.h"
 #include "isp/pipeline/budget/cost_model.h"
 
 namespace lowlux::cli {
 namespace {
 
-void add_noise(Lines& out, const isp::NoiseReduction& noise) {
+void add_noise(Lines& out, const isp::NoiseReduction& noise, const std::optional<NoiseOrigin>& origin) {
   if (noise.snr) {
     const auto& variance = noise.noise.variance_e2;
-    out.add("noise", fmt::format("from {}; without light {:.3g} {:.3g} {:.3g} e- (R, G, B)", name_of(noise.source),
-                                 std::sqrt(variance[0]), std::sqrt(variance[1]), std::sqrt(variance[2])));
+    out.add("noise", fmt::format("from {}; without light {:.3g} {:.3g} {:.3g} e- (R, G, B)",
+                                 origin ? name_of(origin->source) : name_of(noise.source), std::sqrt(variance[0]),
+                                 std::sqrt(variance[1]), std::sqrt(variance[2])));
+    if (origin && origin->figures) out.add("", origin_text(*origin));
+    if (origin && !origin->unmeasurable.empty()) out.add("", "not by the image alone: " + origin->unmeasurable);
+    if (noise.noise_ratio) out.add("", ratio_text(*noise.noise_ratio));
   }
   out.add("denoise", fmt::format("{}: {}", noise.level ? denoise::name_of(*noise.level) : "off", noise.reason));
   for (const denoise::LineOffsets& lines : noise.lines) {
@@ -123,6 +128,17 @@ void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, co
   }
 }
 
+void add_table(Lines& out, const char* head, const char* name, const isp::HueSatMap& map) {
+  out.add(head,
+          fmt::format("{} of {} hues, {} saturations and {} values", name, map.hues, map.saturations, map.values));
+}
+
+void add_profile(Lines& out, const isp::ProfileRendering& profile) {
+  if (profile.map) add_table(out, "profile", "embedded, map", *profile.map);
+  if (profile.look)
+    add_table(out, profile.map ? "" : "profile", profile.map ? "look table" : "embedded, look table", *profile.look);
+}
+
 std::string dark_text(const isp::DevelopPlan& plan) {
   const isp::DarkCharge& dark = plan.dark;
   std::string text;
@@ -172,7 +188,8 @@ std::string flat_text(const calib::FlatField& flat) {
 
 }  // namespace
 
-std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* flat) {
+std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* flat,
+                         const std::optional<NoiseOrigin>& noise) {
   Lines out;
   out.add(
       "black [DN]",
@@ -185,7 +202,7 @@ std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* f
   out.add("dark charge", dark_text(plan));
   if (plan.effects) add_effects(out, *plan.effects, *plan.options.effects);
   out.add("defects", fmt::format("{} pixels repaired", plan.levels.defects.size()));
-  add_noise(out, plan.noise_reduction);
+  add_noise(out, plan.noise_reduction, noise);
   if (!plan.demosaic.reason.empty()) {
     out.add("demosaic", fmt::format("{}: {}", name_of(plan.demosaic.demosaic.method), plan.demosaic.reason));
   }
@@ -193,6 +210,7 @@ std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* f
                        ? fmt::format("{}, {:.0f} K", plan.rendering.white_balance_rule, plan.rendering.white->cct_k)
                        : std::string(plan.rendering.white_balance_rule));
   out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.rendering.exposure_ev, plan.rendering.exposure_rule));
+  if (plan.rendering.profile) add_profile(out, *plan.rendering.profile);
   if (plan.rendering.look) {
     add_look(out, *plan.rendering.look, look_name(plan), coefficients_of(plan.options.look),
              plan.rendering.look->noise || plan.noise_reduction.has_level());

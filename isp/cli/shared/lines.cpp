@@ -2,11 +2,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 namespace lowlux::cli {
+namespace {
+
+thread_local std::string* collected_errors = nullptr;  // null: they are printed
+
+}  // namespace
+
+void print_err(std::string_view text) {
+  if (collected_errors == nullptr) return print_text(stderr, text);
+  collected_errors->append(text);
+}
+
+ErrorText::ErrorText() : previous_(std::exchange(collected_errors, &text_)) {}
+
+ErrorText::~ErrorText() { collected_errors = previous_; }
 
 std::string aligned_text(const isp::Table& table, std::size_t words_from) {
   std::vector<std::size_t> widths(table.columns.size());

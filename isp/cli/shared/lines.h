@@ -40,7 +40,21 @@ std::string aligned_text(const isp::Table& table, std::size_t words_from);
 
 inline void print_text(std::FILE* stream, std::string_view text) { std::fwrite(text.data(), 1, text.size(), stream); }
 inline void print_out(std::string_view text) { print_text(stdout, text); }
-inline void print_err(std::string_view text) { print_text(stderr, text); }
+void print_err(std::string_view text);
+
+/// Collects the text that print_err() is given on this thread, in place of stderr, while it exists.
+class ErrorText {
+ public:
+  ErrorText();
+  ~ErrorText();
+  ErrorText(const ErrorText&) = delete;
+  ErrorText& operator=(const ErrorText&) = delete;
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+  std::string* previous_;
+};
 
 /// Names of the pixels of the 2x2 cell, for a table.
 inline constexpr std::array site_names = {"site 00", "site 01", "site 10", "site 11"};

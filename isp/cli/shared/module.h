@@ -6,6 +6,7 @@
 #include "calib/chart/chart_detector.h"
 #include "capture/libcamera/libcamera_module.h"
 #include "isp/base/result.h"
+#include "isp/bench/peers/nl_means.h"
 
 namespace lowlux::cli {
 
@@ -25,7 +26,7 @@ struct Module {
 };
 
 /// Returns the address of the module's function. The module is searched for in the command's folder, then in the
-/// installation's library folder; it stays loaded.
+/// installation's library folder, then next to lowlux's library, which Python loads; it stays loaded.
 /// Errors: unreadable, with the loader's message (a library is not installed, the file is missing), or that the module
 /// is of another build: it carries the version and a hash of all headers, the compiler and its flags, which must be
 /// those of the command.
@@ -40,5 +41,8 @@ Result<calib::DetectCharts*> load_chart_detector();
 /// camera is opened (capture/libcamera/libcamera_module.h).
 /// Errors: unreadable, as load_module(); also where lowlux was built without libcamera.
 Result<capture::LibcameraModule> load_libcamera();
+
+/// Returns OpenCV's non-local means, loaded from liblowlux_nlm.so (isp/bench/peers). Errors: as load_module().
+Result<const isp::NlMeans*> load_nl_means();
 
 }  // namespace lowlux::cli

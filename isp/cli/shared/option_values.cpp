@@ -10,10 +10,14 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include "isp/base/text.h"
+#include "isp/cli/config/config_file.h"
+#include "isp/cli/help/help_form.h"
+#include "isp/cli/help/help_page.h"
+#include "isp/cli/help/help_text.h"
+#include "isp/cli/help/suggestion.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/report.h"
@@ -152,21 +156,56 @@ int refuse(const CLI::App& app, const std::string& wrong) {
   return exit_usage;
 }
 
-std::string suggestion(std::string_view wanted, std::span<const std::string_view> known) {
-  const auto near = near_matches(wanted, known);
-  return near.empty() ? std::string() : fmt::format(" (did you mean {}?)", fmt::join(near, " or "));
+namespace {
+
+/// Parses arguments and defaults. Help and errors are exceptions.
+void parse_all(CLI::App& app, const std::vector<std::string>& words, const Defaults& defaults) {
+  std::vector<std::string> last_first(words.rbegin(), words.rend());  // as CLI11 takes them
+  for (const Defaults::Item& item : defaults.items) last_first.push_back(item.word);
+  app.parse(last_first);
 }
 
-std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words) {
-  try {
-    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // CLI11 takes them last first
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);  // help
-    if (const auto unknown = unknown_option(app)) return refuse(app, *unknown);
-    std::string text = error.what();
-    std::replace(text.begin(), text.end(), '\n', ' ');
-    return refuse(app, text);
+/// Returns the text of an error; that of a default begins with its file and line.
+std::string error_text(const CLI::ParseError& error, const Defaults& defaults) {
+  std::string text = error.what();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  for (const Defaults::Item& item : defaults.items) {
+    if (text.starts_with(item.flag + ":") || text.starts_with(item.flag + " ")) return item.line + ": " + text;
   }
+  return text;
+}
+
+}  // namespace
+
+std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words, Defaults* used) {
+  app.set_help_flag("-h,--help", "print the most used options")->group("General");
+  app.set_help_all_flag("--help-all", "print all options")->group("General");
+  bool no_config = false;  // find_defaults looks for the flag itself: defaults are arguments of the parser
+  app.add_flag("--no-config", no_config, "ignore the file of defaults: ~/.config/lowlux/config")->group("General");
+  if (words.size() == 1 && is_help_form(words.front())) {
+    print_out(help_in_form(help_page(app), words.front()).value_or(""));
+    return exit_done;
+  }
+  for (const std::string& word : words) {
+    if (word == "--") break;
+    if (!word.starts_with("--") || !word.ends_with('=')) continue;
+    const std::string flag = word.substr(0, word.size() - 1);
+    if (app.get_option_no_throw(flag) != nullptr) return refuse(app, flag + " has no value");
+  }
+  const Result<Defaults> defaults = find_defaults(app, words);
+  if (!defaults) return print_failure(defaults.error()), exit_usage;
+  try {
+    parse_all(app, words, *defaults);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) {
+      const HelpPage page = help_page(app);
+      print_out(error.get_name() == "CallForAllHelp" ? full_help(page) : short_help(page));
+      return exit_done;
+    }
+    if (const auto unknown = unknown_option(app)) return refuse(app, *unknown);
+    return refuse(app, error_text(error, *defaults));
+  }
+  if (used != nullptr) *used = *defaults;
   return std::nullopt;
 }
 

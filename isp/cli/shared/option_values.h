@@ -1,11 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <functional>
-#include <map>
+#include <initializer_list>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace CLI {
@@ -14,6 +15,8 @@ class Option;
 }  // namespace CLI
 
 namespace lowlux::cli {
+
+struct Defaults;
 
 /// Returns the entire text as a finite number with a decimal point, with or without a sign; nullopt for other text.
 std::optional<double> number_of(std::string_view text);
@@ -28,13 +31,28 @@ std::optional<std::vector<double>> numbers_of(const std::string& text, std::size
 /// Returns words separated by commas.
 std::vector<std::string> words_of(const std::string& text);
 
+/// Holds the values of an option by name, in the order in which help lists them.
 template <class Enum>
-using Names = std::map<std::string, Enum>;
+class Names {
+ public:
+  using Item = std::pair<std::string, Enum>;
+  Names() = default;
+  Names(std::initializer_list<Item> items) : items_(items) {}
+  void emplace(std::string_view name, Enum value) { items_.emplace_back(std::string(name), std::move(value)); }
+  auto begin() const { return items_.begin(); }
+  auto end() const { return items_.end(); }
+  auto find(std::string_view name) const {
+    return std::find_if(begin(), end(), [name](const Item& item) { return item.first == name; });
+  }
+
+ private:
+  std::vector<Item> items_;
+};
 
 template <class Enum>
-std::string joined(const Names<Enum>& names) {
+std::string joined(const Names<Enum>& names, std::string_view separator = ", ") {
   std::string text;
-  for (const auto& [name, value] : names) text += (text.empty() ? "" : ", ") + name;
+  for (const auto& [name, value] : names) text.append(text.empty() ? "" : separator).append(name);
   return text;
 }
 
@@ -49,11 +67,11 @@ CLI::Option* add_text(CLI::App& app, const std::string& flag, const std::string&
 CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
                         std::function<void(double)> store);
 
-/// Adds an option whose values are names; the message for any other lists them.
+/// Adds an option whose values are names, which are its placeholder; the message for any other lists them.
 template <class Enum, class Store>
 CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum>& names, Store store,
                         const std::string& help) {
-  return add_text(app, flag, "NAME", help + " (" + joined(names) + ")",
+  return add_text(app, flag, joined(names, "|"), help,
                   [names, store](const std::string& name) -> std::optional<std::string> {
                     const auto found = names.find(name);
                     if (found == names.end()) return "is none of " + joined(names);
@@ -61,9 +79,6 @@ CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum
                     return std::nullopt;
                   });
 }
-
-/// Returns " (did you mean --exposure?)" for a name that is similar to a known one, empty if none is.
-std::string suggestion(std::string_view wanted, std::span<const std::string_view> known);
 
 /// Help text of --bits, for all verbs that write images.
 inline constexpr const char* bits_help = "bits per sample: 8, 16 or 32 (default: PNG, JPEG 8, TIFF, EXR 16, PFM 32)";
@@ -73,6 +88,7 @@ int refuse(const CLI::App& app, const std::string& wrong);
 
 /// Parses the arguments after a verb. @return nullopt if they are valid, else the exit code, after help or an error was
 /// printed
-std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words);
+/// @param used  receives the defaults of the user's file that complete the arguments; nullptr: not of interest
+std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words, Defaults* used = nullptr);
 
 }  // namespace lowlux::cli

@@ -60,6 +60,10 @@ Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choi
   auto found = calib::profile_at(profile, frame.raw, choice.gain_setting);
   if (!found) return tl::make_unexpected(found.error());
   const bool knows_dark = found->dark_mean_e != PerSite<double>{};
+  if (frame.raw.is_float() && !choice.everything) {
+    return fail(ErrorCode::unsupported,
+                "the profile's black level is one of the sensor's codes, and the frame has floating-point samples");
+  }
   if (!found->black && !knows_dark && !choice.everything) {
     return fail(ErrorCode::insufficient,
                 "the profile holds no black level and no dark current: add them with `calibrate black --add-to`, "

@@ -8,6 +8,7 @@
 #include "calib/profile/profile_use.h"
 #include "isp/base/camera_profile.h"
 #include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/ratio_report.h"
 #include "isp/model/colour/camera_colour.h"
 #include "isp/model/sensor/scene_luminance.h"
 #include "isp/raw/black_point.h"
@@ -21,7 +22,8 @@ std::string rect_text(const Rect& r) { return fmt::format("{} x {} at ({}, {})",
 void add_layout(Lines& out, const RawDn& raw) {
   const bool rgb = raw.layout == SensorLayout::linear_rgb;
   const std::string layout = rgb ? "demosaiced RGB" : calib::mosaic_of(raw);
-  out.add("readout", fmt::format("{} x {}, {}", raw.dn.width() / (rgb ? 3 : 1), raw.dn.height(), layout));
+  const std::string floats = raw.is_float() ? ", floating-point" : "";
+  out.add("readout", fmt::format("{} x {}, {}{}", raw.row_samples() / (rgb ? 3 : 1), raw.rows(), layout, floats));
   out.add("active area", rect_text(raw.active));
   if (raw.default_crop != Rect{0, 0, raw.active.width, raw.active.height})
     out.add("default crop", rect_text(raw.default_crop));
@@ -72,6 +74,7 @@ void add_noise(Lines& out, const RawFrame& frame) {
     out.add("  says", fmt::format("{:.0f} e- at white, read noise {:.1f} e- (green)", green,
                                   std::sqrt(std::max(0.0, n.offset[1])) * green));
   }
+  if (frame.noise_ratio) out.add("  differs", ratio_text(*frame.noise_ratio));
 }
 
 void add_exposure(Lines& out, const FrameInfo& info) {
@@ -124,7 +127,7 @@ std::string times_text(const std::vector<isp::StageTime>& times) {
   return text + fmt::format("  {:<20} {:8.1f} ms\n", "sum", 1e3 * total);
 }
 
-std::string info_text(const std::string& file, const RawFrame& frame) {
+std::string info_text(const std::string& file, const RawFrame& frame, const std::optional<NoiseOrigin>& noise) {
   Lines out;
   const FrameInfo& info = frame.raw.info;
   out.add("camera", camera_name(info.make, info.model) + (info.date_time.empty() ? "" : ", " + info.date_time));
@@ -133,6 +136,7 @@ std::string info_text(const std::string& file, const RawFrame& frame) {
   out.add("white [DN]",
           fmt::format("{:g} {:g} {:g}", frame.raw.white_dn[0], frame.raw.white_dn[1], frame.raw.white_dn[2]));
   add_noise(out, frame);
+  if (noise) out.add("noise model", origin_text(*noise));
   add_exposure(out, info);
   add_colour(out, frame.colour);
   const RawCorrections& c = frame.corrections;

@@ -8,6 +8,9 @@
 #include "calib/flat/flat_field.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
+#include "isp/cli/config/config_file.h"
+#include "isp/cli/merge/merge_report.h"
+#include "isp/cli/noise/noise_origin.h"
 #include "isp/pipeline/plan.h"
 
 namespace lowlux::cli {
@@ -19,6 +22,8 @@ struct DevelopOutcome {
   std::optional<Error> error;                    // set: not all files were written
   std::optional<isp::DevelopPlan> plan;          // set without an error, unless skipped
   std::shared_ptr<const calib::FlatField> flat;  // set where the image was divided by flats
+  std::optional<MergeReport> merged;             // set where several frames were merged first
+  std::optional<NoiseOrigin> noise;              // set where it is known where the noise model comes from
   bool skipped = false;                          // the outputs exist, and are kept
   int width = 0;                                 // of the written image, upright
   int height = 0;
@@ -26,16 +31,19 @@ struct DevelopOutcome {
 };
 
 /// Returns one JSON object.
-std::string develop_json(const DevelopOutcome& outcome);
+std::string develop_json(const DevelopOutcome& outcome, const Defaults& defaults);
 /// Returns the decisions for a frame, with reasons, as text.
 /// @param flat  nullptr: none was used
-std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* flat);
+/// @param noise  where the noise model comes from; nullopt: not known, as for merged frames
+std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* flat,
+                         const std::optional<NoiseOrigin>& noise);
 /// Returns stage times as text, one line for each and their sum.
 std::string times_text(const std::vector<isp::StageTime>& times);
 
 /// Returns the metadata of a raw file and values measured on it: text for people, or one JSON object.
-std::string info_text(const std::string& file, const RawFrame& frame);
-std::string info_json(const std::string& file, const RawFrame& frame);
+/// @param noise  of the image as `develop` finds it; nullopt: none was found
+std::string info_text(const std::string& file, const RawFrame& frame, const std::optional<NoiseOrigin>& noise);
+std::string info_json(const std::string& file, const RawFrame& frame, const std::optional<NoiseOrigin>& noise);
 std::string error_json(const std::string& file, const Error& error);
 
 /// Returns "lowlux: FILE: what is wrong", one line.

@@ -4,6 +4,7 @@
 
 #include "calib/profile/profile_use.h"
 #include "isp/cli/shared/explain_text.h"
+#include "isp/cli/shared/ratio_report.h"
 #include "isp/cli/shared/report.h"
 #include "isp/model/colour/camera_colour.h"
 #include "isp/model/sensor/scene_luminance.h"
@@ -96,13 +97,15 @@ Json lines_json(const denoise::LineOffsets& lines) {
           {"residual_std_e", lines.residual_std_e}};
 }
 
-Json noise_json(const isp::NoiseReduction& noise) {
+Json noise_json(const isp::NoiseReduction& noise, const std::optional<NoiseOrigin>& origin) {
   Json json{{"level", noise.level ? Json(denoise::name_of(*noise.level)) : Json("off")}, {"reason", noise.reason}};
+  if (origin) json["noise_model"] = Json::parse(origin_json(*origin));
   if (!noise.snr) return json;
   json["snr"] = *noise.snr;
-  json["noise_source"] = name_of(noise.source);
+  json["noise_source"] = origin ? name_of(origin->source) : name_of(noise.source);
   json["variance_e2"] = noise.noise.variance_e2;
   json["dark_mean_e"] = noise.noise.dark_mean_e;
+  if (noise.noise_ratio) json["noise_ratio_range"] = ratio_range(*noise.noise_ratio);
   json["lines"] = Json::array();
   for (const denoise::LineOffsets& lines : noise.lines) json["lines"].push_back(lines_json(lines));
   return json;
@@ -211,9 +214,18 @@ Json exposure_json(const FrameInfo& info) {
           {"saturation_luminance_cd_m2", optional_json(isp::saturation_luminance_cd_m2(info))}};
 }
 
+Json table_json(const std::optional<isp::HueSatMap>& map) {
+  return map ? Json{map->hues, map->saturations, map->values} : Json(nullptr);
+}
+
+Json profile_json(const std::optional<isp::ProfileRendering>& profile) {
+  if (!profile) return nullptr;
+  return {{"hue_sat_map", table_json(profile->map)}, {"look_table", table_json(profile->look)}};
+}
+
 }  // namespace
 
-std::string develop_json(const DevelopOutcome& outcome) {
+std::string develop_json(const DevelopOutcome& outcome, const Defaults& defaults) {
   if (outcome.error) return error_json(outcome.input, *outcome.error);
   if (outcome.skipped) {
     return dumped(Json{{"file", outcome.input}, {"ok", true}, {"output", outcome.output}, {"skipped", true}});
@@ -234,9 +246,11 @@ std::string develop_json(const DevelopOutcome& outcome) {
             {"exposure", {{"ev", plan.rendering.exposure_ev}, {"rule", plan.rendering.exposure_rule}}},
             {"defects_repaired", plan.levels.defects.size()},
             {"effects", effects_json(plan)},
-            {"denoise", noise_json(plan.noise_reduction)},
+            {"denoise", noise_json(plan.noise_reduction, outcome.noise)},
             {"demosaic", demosaic_json(plan.demosaic)},
             {"look", look_json(plan)},
+            {"camera_profile", profile_json(plan.rendering.profile)},
+            {"defaults", defaults.items.empty() ? Json(nullptr) : Json(defaults_text(defaults))},
             {"warnings", plan.warnings}};
   if (plan.display) {
     const isp::DisplayTarget& display = *plan.display;
@@ -246,25 +260,26 @@ std::string develop_json(const DevelopOutcome& outcome) {
                        {"table_mean_ciede2000", display.made.error.mean_ciede2000},
                        {"table_max_ciede2000", display.made.error.max_ciede2000}};
   }
+  if (outcome.merged) json["merge"] = Json::parse(merge_json(*outcome.merged));
   for (const isp::StageTime& time : outcome.times) json["timings_s"][std::string(time.stage)] = time.seconds;
   return dumped(json);
 }
 
-std::string info_json(const std::string& file, const RawFrame& frame) {
+std::string info_json(const std::string& file, const RawFrame& frame, const std::optional<NoiseOrigin>& noise) {
   const RawDn& raw = frame.raw;
-  Json json{
-      {"file", file},
-      {"ok", true},
-      {"make", raw.info.make},
-      {"model", raw.info.model},
-      {"date_time", raw.info.date_time},
-      {"layout", layout_name(raw.layout)},
-      {"readout",
-       {{"width", raw.dn.width() / (raw.layout == SensorLayout::linear_rgb ? 3 : 1)}, {"height", raw.dn.height()}}},
-      {"active", rect_json(raw.active)},
-      {"default_crop", rect_json(raw.default_crop)},
-      {"orientation", static_cast<int>(raw.info.orientation)},
-      {"white_dn", raw.white_dn}};
+  Json json{{"file", file},
+            {"ok", true},
+            {"make", raw.info.make},
+            {"model", raw.info.model},
+            {"date_time", raw.info.date_time},
+            {"layout", layout_name(raw.layout)},
+            {"readout",
+             {{"width", raw.row_samples() / (raw.layout == SensorLayout::linear_rgb ? 3 : 1)}, {"height", raw.rows()}}},
+            {"floating_point", raw.is_float()},
+            {"active", rect_json(raw.active)},
+            {"default_crop", rect_json(raw.default_crop)},
+            {"orientation", static_cast<int>(raw.info.orientation)},
+            {"white_dn", raw.white_dn}};
   if (raw.layout == SensorLayout::bayer) json["cfa"] = calib::mosaic_of(raw);
   json["masked"] = Json::array();
   for (const Rect& r : raw.masked) json["masked"].push_back(rect_json(r));
@@ -279,6 +294,8 @@ std::string info_json(const std::string& file, const RawFrame& frame) {
   }
   json["noise_profile"] =
       frame.noise ? Json{{"scale", frame.noise->scale}, {"offset", frame.noise->offset}} : Json(nullptr);
+  json["noise_model"] = noise ? Json::parse(origin_json(*noise)) : Json(nullptr);
+  if (frame.noise_ratio) json["noise_ratio_range"] = ratio_range(*frame.noise_ratio);
   json["exposure"] = exposure_json(raw.info);
   json["colour"] = colour_json(frame.colour);
   json["corrections"] = {{"gain_maps", frame.corrections.gain_maps.size()},

@@ -1,0 +1,154 @@
+#include "isp/cli/dataset/dataset_sample.h"
+
+#include <filesystem>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "capture/file/file_bytes.h"
+#include "isp/cli/dataset/dataset_draw.h"
+#include "isp/cli/dataset/pixel_mask.h"
+#include "isp/cli/shared/machine.h"
+#include "isp/cli/simulate/simulate_files.h"
+#include "isp/cli/simulate/simulate_work.h"
+#include "isp/output/report/report.h"
+
+namespace lowlux::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+std::string stem_of(std::uint64_t index, const std::string& folder) {
+  return (fs::path(folder) / fmt::format("{:012}", index)).string();
+}
+
+Json file_json(const std::string& name, std::uint64_t bytes, const std::string& sha256) {
+  return {{"name", name}, {"bytes", bytes}, {"sha256", sha256}};
+}
+
+std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+/// Returns the sample that a text of parameters describes.
+DatasetSample sample_of(Json files, const std::string& name, std::string_view parameters) {
+  files.push_back(file_json(name, parameters.size(), sha256_of(parameters)));
+  DatasetSample sample{text_of(files), 0};
+  for (const Json& file : files) sample.bytes += file["bytes"].get<std::uint64_t>();
+  return sample;
+}
+
+/// Writes one sample, and removes its files unless they are complete.
+class SampleFiles {
+ public:
+  SampleFiles(const DatasetSpec& spec, std::uint64_t index, const std::string& folder)
+      : spec_(spec), index_(index), stem_(stem_of(index, folder)), draw_(draw_sample(spec, index)) {}
+  SampleFiles(const SampleFiles&) = delete;
+  SampleFiles& operator=(const SampleFiles&) = delete;
+  ~SampleFiles() {
+    std::error_code ignored;
+    for (const std::string& file : started_) fs::remove(file, ignored);
+  }
+
+  Result<DatasetSample> make() {
+    auto args = simulate_args(spec_, draw_);
+    if (!args) return tl::make_unexpected(args.error());
+    args->output = stem_ + ".dng";
+    args->force = true;
+    if (spec_.truth_electrons) args->truth_electrons = stem_ + ".electrons.exr";
+    const SimulateFiles files = files_of(*args);
+    started_ = files.frames;
+    for (const std::string& file : {files.truth, files.truth_electrons, stem_ + ".json"}) {
+      if (!file.empty()) started_.push_back(file);
+    }
+    std::error_code ignored;
+    fs::remove(stem_ + ".json", ignored);  // the old one describes files that are replaced now
+    SimulatedData data;
+    const auto outcome = simulate(*args, spec_.mask ? &data : nullptr);
+    if (!outcome) return tl::make_unexpected(with_index(outcome.error()));
+    std::vector<std::string> written = outcome->files;
+    for (std::size_t i = 0; i < data.frames.size(); ++i) {
+      const std::string file = files.frames[i].substr(0, files.frames[i].size() - 4) + ".mask.npy";
+      started_.push_back(file);
+      if (const auto done = write_mask(data.frames[i], *args, outcome->sensor.model, file); !done) {
+        return tl::make_unexpected(done.error());
+      }
+      written.push_back(file);
+    }
+    return finish(written, Json::parse(simulate_json(*args, *outcome)));
+  }
+
+ private:
+  /// Writes the parameters.
+  Result<DatasetSample> finish(const std::vector<std::string>& written, const Json& report) {
+    Json files = Json::array();
+    for (const std::string& file : written) {
+      const auto hash = sha256_of_file(file);
+      if (!hash) return tl::make_unexpected(hash.error());
+      files.push_back(file_json(fs::path(file).filename().string(), hash->bytes, hash->sha256));
+    }
+    Json out{{"lowlux", version_number()},
+             {"spec_sha256", spec_.sha256},
+             {"index", index_},
+             {"scene", draw_.scene},
+             {"drawn", Json::object()}};
+    for (const auto& [key, value] : draw_.settings) out["drawn"][key] = Json::parse(value);
+    for (const char* key : {"exposure_s", "temperature_c", "f_number", "white_luminance_cd_m2",
+                            "saturation_luminance_cd_m2", "sensor", "warnings"}) {
+      if (report.contains(key)) out[key] = report[key];
+    }
+    out["files"] = files;
+    const std::string text = out.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+    if (const auto done = isp::write_text(stem_ + ".json", text, isp::Overwrite::yes); !done) {
+      return tl::make_unexpected(done.error());
+    }
+    started_.clear();
+    return sample_of(std::move(files), fs::path(stem_ + ".json").filename().string(), text);
+  }
+
+  /// Returns the error with scene and index, which find the sample again.
+  Error with_index(Error error) const {
+    if (error.code == ErrorCode::unwritable) return error;
+    error.message = fmt::format("sample {}, scene {}: {}", index_, draw_.scene, in_keys(error.message));
+    return error;
+  }
+
+  const DatasetSpec& spec_;
+  std::uint64_t index_;
+  std::string stem_;
+  DatasetDraw draw_;
+  std::vector<std::string> started_;  // removed by the destructor
+};
+
+}  // namespace
+
+std::optional<DatasetSample> find_sample(const DatasetSpec& spec, std::uint64_t index, const std::string& folder) {
+  constexpr std::uint64_t max_bytes = 4 << 20;
+  const std::string file = stem_of(index, folder) + ".json";
+  const auto bytes = capture::read_file_bytes(file, max_bytes);
+  if (!bytes) return std::nullopt;
+  const std::string text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  try {
+    const Json json = Json::parse(text);
+    if (json.at("lowlux") != version_number() || json.at("spec_sha256") != spec.sha256 || json.at("index") != index) {
+      return std::nullopt;
+    }
+    for (const Json& part : json.at("files")) {
+      std::error_code failed;
+      const auto found = fs::file_size(fs::path(folder) / part.at("name").get<std::string>(), failed);
+      if (failed || found != part.at("bytes").get<std::uint64_t>()) return std::nullopt;
+      if (part.at("sha256").get<std::string>().size() != 64) return std::nullopt;
+    }
+    return sample_of(json.at("files"), fs::path(file).filename().string(), text);
+  } catch (const Json::exception&) {
+    return std::nullopt;  // of another program, or damaged: the sample is made again
+  }
+}
+
+Result<DatasetSample> make_sample(const DatasetSpec& spec, std::uint64_t index, const std::string& folder) {
+  return SampleFiles(spec, index, folder).make();
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "isp/base/result.h"
+#include "isp/cli/dataset/dataset_settings.h"
+#include "isp/cli/dataset/sha256.h"
+
+namespace lowlux::cli {
+
+/// Describes how a setting is drawn.
+struct Distribution {
+  enum class Kind : std::uint8_t { choice, uniform, log_uniform };
+  Kind kind = Kind::choice;
+  std::vector<std::string> choices;  // as JSON; each equally likely; one: a constant
+  double low = 0, high = 0;          // of ranges, low < high
+};
+
+struct DrawnSetting {
+  const Setting* setting = nullptr;
+  Distribution distribution;
+};
+
+/// Describes a sensor, with the settings that its entry has in place of those of all sensors.
+struct DatasetSensor {
+  std::string name;
+  std::vector<DrawnSetting> settings;
+};
+
+/// Describes a file that a spec names.
+struct DatasetInput {
+  std::string name;  // as the spec has it
+  FileHash hash;
+};
+
+/// Describes a data set.
+struct DatasetSpec {
+  std::string folder;  // of the spec's file: names of files are relative to it
+  std::uint64_t first_index = 0;
+  std::uint64_t count = 0;  // first_index + count is at most 2^63
+  std::vector<std::string> scenes;
+  std::vector<DatasetSensor> sensors;
+  bool mask = true;
+  bool truth_electrons = false;
+  std::vector<DatasetInput> inputs;
+  std::string identity;  // JSON: the spec without first_index and count, and the hashes of its files
+  std::string sha256;    // of `identity`: together with an index it determines a sample
+};
+
+/// Returns whether a scene is generated: any other is an image file.
+bool is_generated(const std::string& scene);
+
+/// Returns a file's name as it is opened: relative to the folder of the spec.
+std::string path_in(const DatasetSpec& spec, const std::string& file);
+
+/// Reads a spec, and the files it names for their hashes. Errors, with the file and the key: it is not JSON; a key that
+/// is missing, unknown or given twice; a value of another type; an empty or reversed range; no choice.
+Result<DatasetSpec> read_dataset_spec(const std::string& file);
+
+}  // namespace lowlux::cli

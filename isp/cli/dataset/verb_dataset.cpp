@@ -1,0 +1,212 @@
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <variant>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "isp/cli/dataset/dataset_args.h"
+#include "isp/cli/dataset/dataset_check.h"
+#include "isp/cli/dataset/dataset_sample.h"
+#include "isp/cli/dataset/dataset_spec.h"
+#include "isp/cli/dataset/manifest.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/interruption.h"
+#include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/progress.h"
+#include "isp/cli/verbs.h"
+
+namespace lowlux::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// Holds size and time of one sample.
+struct SampleCost {
+  double bytes = 0;
+  double seconds = 0;
+};
+
+struct DatasetOutcome {
+  std::uint64_t samples = 0;   // of the shard
+  std::uint64_t made = 0;      // in this run; the others were complete
+  std::uint64_t measured = 1;  // samples whose mean cost is `cost`
+  std::optional<SampleCost> cost;
+  double bytes = 0;  // of all complete samples
+};
+
+Result<DatasetSample> measured_sample(const DatasetSpec& spec, std::uint64_t index, const std::string& folder,
+                                      SampleCost& cost) {
+  const auto start = std::chrono::steady_clock::now();
+  auto sample = make_sample(spec, index, folder);
+  cost.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (sample) cost.bytes = static_cast<double>(sample->bytes);
+  return sample;
+}
+
+std::string time_text(double seconds) {
+  if (seconds < 120) return fmt::format("{:.3g} s", seconds);
+  if (seconds < 7200) return fmt::format("{:.3g} min", seconds / 60);
+  return fmt::format("{:.3g} h", seconds / 3600);
+}
+
+std::string size_text(double bytes) {
+  return bytes < 1e9 ? fmt::format("{:.3g} MB", bytes / 1e6) : fmt::format("{:.4g} GB", bytes / 1e9);
+}
+
+std::string prediction_text(std::uint64_t samples, std::uint64_t measured, const SampleCost& cost) {
+  const auto count = static_cast<double>(samples);
+  return fmt::format("{} samples, predicted from {}: {} and {}, {:.3g} samples/s", samples, measured,
+                     size_text(count * cost.bytes), time_text(count * cost.seconds), 1 / cost.seconds);
+}
+
+/// Warns if the predicted bytes exceed the free space of a folder.
+void warn_of_space(double bytes, const std::string& folder) {
+  std::error_code failed;
+  const fs::space_info space = fs::space(folder, failed);
+  if (failed || static_cast<double>(space.available) >= bytes) return;
+  print_err(one_line(fmt::format("lowlux: {}: warning: {} are free, and {} are predicted", folder,
+                                 size_text(static_cast<double>(space.available)), size_text(bytes))) +
+            "\n");
+}
+
+/// Makes a shard.
+class ShardRun {
+ public:
+  ShardRun(const DatasetSpec& spec, const DatasetArgs& args) : spec_(spec), args_(args), progress_(100, !args.quiet) {
+    out_.samples = samples_in(spec, args.shard);
+  }
+
+  Result<DatasetOutcome> run() {
+    std::error_code failed;
+    fs::create_directories(args_.output, failed);
+    if (!fs::is_directory(args_.output)) {
+      return fail(ErrorCode::unwritable, "is not a folder, and cannot be made one", args_.output);
+    }
+    if (const auto claimed = claim_folder(spec_, args_.output, args_.force); !claimed) {
+      return tl::make_unexpected(claimed.error());
+    }
+    auto manifest = Manifest::create(spec_, args_.shard, args_.output);
+    if (!manifest) return tl::make_unexpected(manifest.error());
+    const InterruptionReport report([this] {
+      return fmt::format("the same command continues after {} of {} samples", done_.load(), out_.samples);
+    });
+    for (std::uint64_t i = 0; i < out_.samples; ++i) {
+      const std::uint64_t index = index_in(spec_, args_.shard, i);
+      const auto sample = complete_sample(index, out_.samples - i);
+      if (!sample) return tl::make_unexpected(sample.error());
+      if (auto added = manifest->add(index, *sample); !added) return tl::make_unexpected(added.error());
+      out_.bytes += static_cast<double>(sample->bytes);
+      done_ = i + 1;
+      progress_.advance(100.0 / static_cast<double>(out_.samples), fmt::format("sample {}", index));
+    }
+    if (const auto done = manifest->commit(); !done) return tl::make_unexpected(done.error());
+    return out_;
+  }
+
+ private:
+  /// Returns a sample that is complete, or makes it; the first that is made gives the prediction.
+  /// @param left  samples from this one on
+  Result<DatasetSample> complete_sample(std::uint64_t index, std::uint64_t left) {
+    if (auto found = find_sample(spec_, index, args_.output)) return *std::move(found);
+    SampleCost cost;
+    auto sample = measured_sample(spec_, index, args_.output, cost);
+    if (!sample) return sample;
+    ++out_.made;
+    if (out_.cost) return sample;
+    out_.cost = cost;
+    if (args_.quiet) return sample;
+    progress_.print([&] {
+      if (!args_.json) print_out(prediction_text(left, out_.measured, cost) + "\n");
+      warn_of_space(static_cast<double>(left - 1) * cost.bytes, args_.output);
+    });
+    return sample;
+  }
+
+  const DatasetSpec& spec_;
+  const DatasetArgs& args_;
+  Progress progress_;
+  DatasetOutcome out_;
+  std::atomic<std::uint64_t> done_{0};  // also read when the run is interrupted
+};
+
+/// Makes up to 8 samples of a shard, evenly spaced, in a folder that is removed, and returns their mean cost. The first
+/// is made twice, as it also takes the time of the first use of code and tables.
+Result<DatasetOutcome> dry_run(const DatasetSpec& spec, const DatasetArgs& args) {
+  constexpr std::uint64_t max_measured = 8;
+  DatasetOutcome out{.samples = samples_in(spec, args.shard)};
+  if (out.samples == 0) return out;
+  std::string folder = (fs::temp_directory_path() / "lowlux-dataset-XXXXXX").string();
+  if (mkdtemp(folder.data()) == nullptr) {
+    return fail(ErrorCode::unwritable, "no folder can be made for the measured samples", folder);
+  }
+  out.measured = std::min(out.samples, max_measured);
+  SampleCost cost, sum;
+  auto sample = measured_sample(spec, index_in(spec, args.shard, 0), folder, cost);
+  for (std::uint64_t i = 0; sample && i < out.measured; ++i) {
+    sample = measured_sample(spec, index_in(spec, args.shard, out.samples / out.measured * i), folder, cost);
+    sum.bytes += cost.bytes, sum.seconds += cost.seconds;
+  }
+  std::error_code ignored;
+  fs::remove_all(folder, ignored);
+  if (!sample) return tl::make_unexpected(sample.error());
+  const auto count = static_cast<double>(out.measured);
+  out.cost = SampleCost{sum.bytes / count, sum.seconds / count};
+  return out;
+}
+
+std::string outcome_json(const DatasetSpec& spec, const DatasetArgs& args, const DatasetOutcome& outcome) {
+  Json json{{"spec_sha256", spec.sha256},
+            {"shard", fmt::format("{}/{}", args.shard.number, args.shard.count)},
+            {"samples", outcome.samples}};
+  if (outcome.cost) {
+    const auto count = static_cast<double>(outcome.samples);
+    json["measured_samples"] = outcome.measured;
+    json["bytes_per_sample"] = outcome.cost->bytes;
+    json["seconds_per_sample"] = outcome.cost->seconds;
+    json["predicted_bytes"] = count * outcome.cost->bytes;
+    json["predicted_seconds"] = count * outcome.cost->seconds;
+  }
+  if (!args.dry_run) {
+    json["made"] = outcome.made;
+    json["bytes"] = outcome.bytes;
+  }
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+void print_outcome(const DatasetSpec& spec, const DatasetArgs& args, const DatasetOutcome& outcome) {
+  if (args.json) return print_out(outcome_json(spec, args, outcome) + "\n");
+  if (args.dry_run && outcome.cost)
+    return print_out(prediction_text(outcome.samples, outcome.measured, *outcome.cost) + "\n");
+  if (args.quiet && !args.dry_run) return;
+  print_out(fmt::format("{} samples, {} made, {}\n", outcome.samples, outcome.made, size_text(outcome.bytes)));
+}
+
+}  // namespace
+
+int run_dataset(const std::vector<std::string>& words) {
+  const Parsed<DatasetArgs> parsed = parse_dataset(words);
+  if (const int* code = std::get_if<int>(&parsed)) return *code;
+  const auto& args = std::get<DatasetArgs>(parsed);
+  const Result<DatasetSpec> spec = read_dataset_spec(args.spec);
+  if (!spec) return print_failure(args.spec, spec.error());
+  {
+    InlineExecutor executor;
+    if (const auto good = check_dataset(*spec, executor); !good) return print_failure(args.spec, good.error());
+  }
+  const Result<DatasetOutcome> outcome = args.dry_run ? dry_run(*spec, args) : ShardRun(*spec, args).run();
+  if (!outcome) return print_failure(with_file(outcome.error(), args.spec));
+  print_outcome(*spec, args, *outcome);
+  return exit_done;
+}
+
+}  // namespace lowlux::cli

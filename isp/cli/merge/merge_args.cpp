@@ -1,0 +1,76 @@
+#include "isp/cli/merge/merge_args.h"
+
+#include <functional>
+#include <utility>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "isp/cli/shared/option_values.h"
+
+namespace lowlux::cli {
+namespace {
+
+/// Adds an option whose value is a number from `low` to `high`.
+void add_within(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help, double low,
+                double high, std::function<void(double)> store) {
+  add_text(app, flag, type, help,
+           [low, high, store = std::move(store)](const std::string& text) -> std::optional<std::string> {
+             const auto number = number_of(text);
+             if (!number || !(*number >= low && *number <= high)) {
+               return fmt::format("is not within {} to {}", low, high);
+             }
+             store(*number);
+             return std::nullopt;
+           });
+}
+
+}  // namespace
+
+void add_merging(CLI::App& app, MergeArgs& args) {
+  using Alignment = std::optional<isp::MergeAlignment>;
+  isp::MergeOptions& options = args.options;
+  add_choice<Alignment>(
+      app, "--align",
+      {{"auto", std::nullopt},
+       {"none", isp::MergeAlignment::none},
+       {"cells", isp::MergeAlignment::cells},
+       {"subpixel", isp::MergeAlignment::subpixel},
+       {"stars", isp::MergeAlignment::stars}},
+      [&options](Alignment alignment) { options.alignment = alignment; },
+      "how frames are brought to one place (auto: subpixel if the camera moved, else none)");
+  add_choice<bool>(
+      app, "--foreground", {{"move", false}, {"keep", true}}, [&options](bool keep) { options.keep_foreground = keep; },
+      "with --align stars: what stands still on the ground moves with them, or keeps its place");
+  add_within(app, "--drizzle", "SCALE", "make a LinearRaw image of measured colours, SCALE times as wide (1 to 3)", 1,
+             3, [&args](double scale) { args.drizzle_scale = scale; });
+  add_within(app, "--pixfrac", "SIDE", "with --drizzle: side of a drop in pixels (default 1)", 0.05, 1,
+             [&args](double side) { args.pixfrac = side; });
+  add_choice<bool>(
+      app, "--mean", {{"robust", true}, {"plain", false}}, [&options](bool robust) { options.robust = robust; },
+      "leave out what does not match (default; a budget may decide), or average everything");
+  app.add_option("--reference", args.reference,
+                 "raw file that the others are brought to (default: the first; the middle one if aligned by stars)")
+      ->type_name("RAW");
+  add_within(app, "--false-alarm", "RATE", "fraction of a static scene that is left out by chance (default 0.001)",
+             1e-6, 0.5, [&options](double rate) { options.false_alarm = rate; });
+}
+
+std::optional<std::string> settle_merging(MergeArgs& args, bool budgeted) {
+  const std::optional<isp::MergeAlignment>& alignment = args.options.alignment;
+  const bool stars = alignment == isp::MergeAlignment::stars;
+  if (args.options.keep_foreground && !stars) return "--foreground keep needs --align stars";
+  if (args.options.keep_foreground && args.options.robust == false) return "--foreground keep needs --mean robust";
+  if (budgeted && (stars || args.drizzle_scale))
+    return "--budget-ms does not know the times of --align stars and --drizzle: leave it out";
+  if (args.pixfrac && !args.drizzle_scale) return "--pixfrac needs --drizzle";
+  if (!args.drizzle_scale) return std::nullopt;
+  if (alignment == isp::MergeAlignment::none) return "--drizzle needs frames that moved, and --align none moves none";
+  if (args.options.keep_foreground) {
+    return "--drizzle measures colours at displaced places, and --foreground keep displaces nothing: choose one";
+  }
+  args.options.drizzle = merge::DrizzleOptions{.scale = *args.drizzle_scale, .pixfrac = args.pixfrac.value_or(1)};
+  return std::nullopt;
+}
+
+}  // namespace lowlux::cli

@@ -1,0 +1,124 @@
+#include "isp/cli/merge/merge_files.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "capture/dng/source_tags.h"
+#include "isp/cli/develop/memory_gate.h"
+#include "isp/cli/noise/noise_source.h"
+#include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/machine.h"
+#include "isp/cli/shared/outputs.h"
+#include "isp/cli/shared/raw_files.h"
+#include "isp/output/dng/dng_writer.h"
+
+namespace lowlux::cli {
+namespace {
+
+/// Returns the index of the reference, which is one of the inputs.
+std::optional<int> reference_index(const MergeArgs& args, const std::vector<std::string>& inputs) {
+  if (args.reference.empty()) return std::nullopt;
+  const auto found = std::ranges::find_if(inputs, [&](const auto& file) { return same_name(file, args.reference); });
+  if (found == inputs.end()) return std::nullopt;
+  return static_cast<int>(found - inputs.begin());
+}
+
+std::string description_of(const isp::MergedRaw& merged) {
+  std::string text = fmt::format("merged by lowlux from {} frames", merged.frames.size());
+  if (!merged.bracket) text += fmt::format(", noise of a mean of {:.4g}", merged.mean_count);
+  return text;
+}
+
+/// Returns the tags without OpcodeList3, whose operations are for the pixels of a frame, not for those of a drizzled
+/// image.
+std::shared_ptr<const SourceTags> without_opcodes(SourceTags tags) {
+  constexpr std::uint16_t opcode_list_3 = 51022;
+  std::erase_if(tags.main, [](const SourceTag& tag) { return tag.id == opcode_list_3; });
+  return std::make_shared<const SourceTags>(std::move(tags));
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> files_to_merge(const DevelopArgs& args) {
+  std::vector<std::string> files;
+  for (const std::string& input : args.inputs) {
+    Result<std::vector<std::string>> named = raw_files_of(input);
+    if (!named) return named;
+    std::ranges::move(*named, std::back_inserter(files));
+  }
+  if (const std::string wrong = wrong_names({}, files); !wrong.empty()) {
+    return fail(ErrorCode::invalid_argument, wrong);
+  }
+  if (!args.merging.reference.empty() && !reference_index(args.merging, files)) {
+    return fail(ErrorCode::invalid_argument, "the reference is not one of the raw files", "--reference");
+  }
+  return files;
+}
+
+Result<MergeReport> merge_files(const RawBatch& batch, const std::vector<std::string>& inputs, const Job& output,
+                                Executor& executor, FileProgress& progress) {
+  const MergeArgs& args = batch.args.merging;
+  isp::MergeOptions options = args.options;
+  options.reference = reference_index(args, inputs);
+  if (!options.reference && options.alignment == isp::MergeAlignment::stars) {
+    options.reference = static_cast<int>(inputs.size() / 2);  // half of the way to the last frame
+  }
+  options.memory_limit_bytes = available_memory();
+  std::shared_ptr<const isp::CostModel> cost;
+  if (batch.speed) {
+    auto now = batch.speed->now(executor);
+    if (!now) return tl::make_unexpected(now.error());
+    cost = *std::move(now);
+  }
+  std::optional<NoiseOrigin> origin;
+  const auto read_input = [&](int index) -> Result<isp::FrameToMerge> {
+    InlineExecutor alone;  // the other threads are at work on the previous frame
+    std::vector<isp::StageTime> times;
+    isp::StageClock clock(times);
+    const std::string& file = inputs[static_cast<std::size_t>(index)];
+    Result<ReadyFrame> read = read_frame(batch, {file, output.output, output.overwrite}, alone, clock);
+    if (!read) return tl::make_unexpected(with_file(read.error(), file));
+    if (cost) read->options.effects->cost = cost;
+    const bool is_reference = index == options.reference.value_or(0);
+    if (is_reference || batch.args.noise) {
+      const auto found = find_noise(read->options, batch.args.noise, read->frame, alone);
+      if (!found) return tl::make_unexpected(with_file(found.error(), file));
+      if (is_reference) origin = *found;
+    }
+    return isp::FrameToMerge{std::move(read->frame), std::move(read->options), file};
+  };
+  auto merged = isp::merge_frames(static_cast<int>(inputs.size()), read_input, options, executor,
+                                  [&](double fraction) { progress.reach(0.9 * fraction); });
+  if (!merged) return tl::make_unexpected(merged.error());
+  return MergeReport{inputs, *std::move(merged), std::move(origin)};
+}
+
+Result<void> write_merged(const RawBatch& batch, const Job& output, MergeReport& report) {
+  isp::MergedRaw& merged = report.merged;
+  const std::string& reference = report.inputs[static_cast<std::size_t>(merged.reference)];
+  auto source_tags = capture::read_source_tags(reference, merged.warnings);
+  if (source_tags && batch.args.merging.options.drizzle) source_tags = without_opcodes(*source_tags);
+  const Result<void> written = isp::write_dng(merged.frame, output.output,
+                                              {.overwrite = output.overwrite,
+                                               .software = "lowlux " + version_number(),
+                                               .description = description_of(merged),
+                                               .sync = batch.sync,
+                                               .source_tags = source_tags,
+                                               .baseline_exposure_ev = merged.baseline_exposure_ev});
+  if (!written) return fail(written.error().code, written.error().message, output.output);
+  return {};
+}
+
+isp::DevelopOptions options_of_merged(const RawBatch& batch, const RawFrame& merged) {
+  isp::DevelopOptions options = options_of_goal(batch, merged);
+  options.black = {};
+  options.estimate_dark = false;
+  options.find_defects = false;
+  return options;
+}
+
+}  // namespace lowlux::cli

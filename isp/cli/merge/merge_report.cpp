@@ -1,0 +1,130 @@
+#include "isp/cli/merge/merge_report.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "isp/cli/shared/lines.h"
+
+namespace lowlux::cli {
+namespace {
+
+std::string_view alignment_name(isp::MergeAlignment alignment) {
+  switch (alignment) {
+    case isp::MergeAlignment::none:
+      return "none";
+    case isp::MergeAlignment::cells:
+      return "cells";
+    case isp::MergeAlignment::subpixel:
+      return "subpixel";
+    case isp::MergeAlignment::stars:
+      return "stars";
+  }
+  return {};
+}
+
+std::string reason_of(const isp::FrameUse& use, bool by_stars) {
+  if (!use.aligned) return by_stars ? "its stars do not match" : "its displacement could not be found";
+  if (use.used_fraction > 0.99) return "it matches the reference";
+  if (use.mean_chi_square > 2) return "it differs from the reference by more than noise";
+  return "parts of it moved";
+}
+
+std::string method_name(const isp::MergeMethod& method) {
+  return fmt::format("{} mean, alignment {}", method.robust ? "robust" : "plain", alignment_name(method.alignment));
+}
+
+/// Returns why no better method was chosen.
+std::string reason_of(const isp::MergePlan& plan) {
+  if (!plan.fits) return "nothing fits, and this is the cheapest";
+  if (plan.better) return fmt::format("{} would take {:.0f} ms", method_name(*plan.better), 1e3 * plan.better_s);
+  return "nothing better is open to choice";
+}
+
+std::string budget_text(const isp::MergePlan& plan) {
+  return fmt::format("{:.0f} ms: {}; predicted {:.0f} ms, took {:.0f} ms; {}", 1e3 * plan.budget_s,
+                     method_name(plan.method), 1e3 * plan.predicted_s, 1e3 * plan.taken_s, reason_of(plan));
+}
+
+nlohmann::ordered_json budget_json(const isp::MergePlan& plan) {
+  return {{"budget_ms", 1e3 * plan.budget_s},
+          {"mean", plan.method.robust ? "robust" : "plain"},
+          {"alignment", alignment_name(plan.method.alignment)},
+          {"predicted_ms", 1e3 * plan.predicted_s},
+          {"taken_ms", 1e3 * plan.taken_s},
+          {"motion_measured", plan.motion_measured},
+          {"fits", plan.fits},
+          {"reason", reason_of(plan)}};
+}
+
+}  // namespace
+
+std::string merge_text(const MergeReport& report) {
+  const auto& [inputs, merged, origin] = report;
+  Lines out;
+  const bool by_stars = merged.alignment == isp::MergeAlignment::stars;
+  std::string frames = fmt::format("{}, alignment {}", inputs.size(), alignment_name(merged.alignment));
+  if (!merged.bracket) frames += fmt::format("; noise of a mean of {:.2f}", merged.mean_count);
+  out.add("frames", frames);
+  if (origin) out.add("noise model", origin_text(*origin));
+  if (merged.plan) out.add("budget", budget_text(*merged.plan));
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const isp::FrameUse& use = merged.frames[i];
+    const bool moved = merged.alignment != isp::MergeAlignment::none;
+    if (moved && !by_stars && static_cast<int>(i) == merged.reference) {
+      out.add(i == 0 ? "used" : "", fmt::format("{}: all, it is the reference", inputs[i]));
+      continue;
+    }
+    std::string text = fmt::format("{}: {:.1f} %: {}", inputs[i], 100 * use.used_fraction, reason_of(use, by_stars));
+    if (moved) text += fmt::format("; moved by up to {:.2f} px (+- {:.2f})", use.largest_shift_px, use.shift_error_px);
+    if (by_stars && static_cast<int>(i) == merged.reference)
+      text += "; it is the reference";
+    else if (by_stars)
+      text += fmt::format("; {} of {} stars", use.stars_matched, merged.stars);
+    if (merged.bracket) text += fmt::format("; {:.4g} times the light", use.light);
+    if (use.outliers > 0) text += fmt::format("; {} sites left out", use.outliers);
+    out.add(i == 0 ? "used" : "", text);
+  }
+  if (merged.still_fraction > 0) {
+    out.add("foreground", fmt::format("{:.1f} % of the image stands still", 100 * merged.still_fraction));
+  }
+  return out.text();
+}
+
+std::string merge_json(const MergeReport& report) {
+  const auto& [inputs, merged, origin] = report;
+  using Json = nlohmann::ordered_json;
+  const bool by_stars = merged.alignment == isp::MergeAlignment::stars;
+  Json frames = Json::array();
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const isp::FrameUse& use = merged.frames[i];
+    frames.push_back({{"file", inputs[i]},
+                      {"reference", static_cast<int>(i) == merged.reference},
+                      {"used_fraction", use.used_fraction},
+                      {"outliers", use.outliers},
+                      {"stars_matched", use.stars_matched},
+                      {"light", use.light},
+                      {"mean_chi_square", use.mean_chi_square},
+                      {"aligned", use.aligned},
+                      {"largest_shift_px", use.largest_shift_px},
+                      {"shift_error_px", use.shift_error_px},
+                      {"reason", reason_of(use, by_stars)}});
+  }
+  Json times = Json::array();
+  for (const isp::StageTime& time : merged.times) times.push_back({{"stage", time.stage}, {"seconds", time.seconds}});
+  const NoiseProfile& noise = *merged.frame.noise;
+  Json json{{"alignment", alignment_name(merged.alignment)},
+            {"bracket", merged.bracket},
+            {"mean_count", merged.mean_count},
+            {"stars", merged.stars},
+            {"still_fraction", merged.still_fraction},
+            {"empty_fraction", merged.empty_fraction},
+            {"noise_profile", {{"scale", noise.scale}, {"offset", noise.offset}}},
+            {"frames", frames},
+            {"warnings", merged.warnings},
+            {"times", times}};
+  if (origin) json["noise_model"] = Json::parse(origin_json(*origin));
+  if (merged.plan) json["budget"] = budget_json(*merged.plan);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace lowlux::cli

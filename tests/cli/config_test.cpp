@@ -1,0 +1,135 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "isp/cli/config/config_file.h"
+#include "tests/cli/command.h"
+#include "tests/support/scratch_directory.h"
+
+namespace lowlux {
+namespace {
+
+using test::dog;
+using test::holds;
+using Json = nlohmann::json;
+using Words = std::vector<std::string>;
+
+class Config : public testing::Test {
+ protected:
+  void write(const std::string& text) {
+    std::filesystem::create_directories(scratch_.path() + "/lowlux");
+    scratch_.write("lowlux/config", text);
+  }
+  std::string file(const std::string& name) const { return scratch_.file(name); }
+
+  /// Runs develop of a small file at half size with the configuration, to x.png.
+  test::ProcessResult develop(const Words& more = {}) const {
+    Words words{"develop", dog, "-o", file("x.png"), "--half", "--force", "--denoise", "off"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(words);
+  }
+  test::ProcessResult run(Words words) const {
+    words.insert(words.begin(), {"env", "XDG_CONFIG_HOME=" + scratch_.path(), LOWLUX_COMMAND});
+    return test::run_process(words);
+  }
+
+  /// Expects one line that names the file and a line of it.
+  void refused(const std::string& text, int line, const std::string& why) {
+    write(text);
+    const auto result = develop();
+    EXPECT_EQ(result.exit_code, 2) << text;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_TRUE(holds(result.err, file("lowlux/config") + ":" + std::to_string(line) + ": ")) << result.err;
+    EXPECT_TRUE(holds(result.err, why)) << result.err;
+    EXPECT_FALSE(scratch_.holds("x.png"));
+  }
+
+  test::ScratchDirectory scratch_;
+};
+
+TEST_F(Config, DefaultsAreUsedAndStated) {
+  write("# mine\n\n[ develop ]\nexposure = +1 EV\r\n  space=p3\nhalf = no\n[denoise]\ndenoise = best\n");
+  const auto text = develop({"--explain"});
+  EXPECT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_TRUE(text.out.starts_with("defaults: --exposure=+1 EV --space=p3 (" + file("lowlux/config") + ")\n"))
+      << text.out;
+  const Json json = Json::parse(develop({"--json"}).out)[0];
+  EXPECT_EQ(json["exposure"]["ev"], 1);
+  EXPECT_EQ(json["defaults"], "--exposure=+1 EV --space=p3 (" + file("lowlux/config") + ")");
+}
+
+TEST_F(Config, GivenOptionsComeBeforeDefaults) {
+  write("[develop]\nexposure = 2\nquiet = yes\n");
+  for (const Words& more : {Words{"--exposure", "-1"}, Words{"--exposure=-1"}}) {
+    Words with = more;
+    with.emplace_back("--json");
+    const Json json = Json::parse(develop(with).out)[0];
+    EXPECT_EQ(json["exposure"]["ev"], -1);
+    EXPECT_TRUE(holds(json["defaults"].get<std::string>(), "--quiet (")) << json["defaults"];
+  }
+  const Json without = Json::parse(develop({"--no-config", "--exposure", "0", "--json"}).out)[0];
+  EXPECT_TRUE(without["defaults"].is_null());
+}
+
+TEST_F(Config, DefaultsThatContradictTheArgumentsAreLeftOut) {
+  // --half excludes --demosaic; --dark-noise needs --dark-frame; --format is for folders.
+  write("[develop]\ndemosaic = malvar\ndark-noise = 0.2\nformat = jpg\n");
+  const auto one = develop({"--explain"});
+  EXPECT_EQ(one.exit_code, 0) << one.err;
+  EXPECT_TRUE(holds(one.out, "defaults: --format=jpg (")) << one.out;
+  EXPECT_EQ(run({"develop", dog, "-o", file("out/"), "--half"}).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(file("out/n900_dog_small_grbg10in16.jpg")));
+}
+
+TEST_F(Config, WrongLinesAreNamed) {
+  refused("[develop]\nexposre = 1\n", 2, "develop has no option 'exposre' (did you mean exposure");
+  refused("[devlop]\n", 1, "there is no verb 'devlop'");
+  refused("\nexposure = 1\n", 2, "[develop]");
+  refused("[develop]\nexposure\n", 2, "option = value");
+  refused("[develop]\n= 1\n", 2, "option = value");
+  refused("[develop]\nquiet = perhaps\n", 2, "yes or no");
+  refused("[develop]\nquiet = no\n#\nexposure = bright\n", 4, "--exposure: 'bright' is neither");
+  refused("[develop]\nquality = 95\nquality = 96\n", 3, "quality is set twice");
+  refused("[develop]\nquality = 101\n", 2, "--quality");
+  refused("[develop]\nhelp = yes\n", 2, "no option 'help'");
+  refused("[develop]\ndark-frame =\n", 2, "dark-frame has no value");
+  refused("[develop]\ninclude other\n", 2, "option = value");
+}
+
+TEST_F(Config, AnOptionWithoutItsValueTakesNoWordAfterIt) {
+  const auto result = run({"develop", "--dark-frame=", dog, "-o", file("taken.png")});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_TRUE(holds(result.err, "--dark-frame has no value")) << result.err;
+}
+
+TEST_F(Config, AFileOfMoreThanItMayHoldIsRefused) {
+  write(std::string(1 << 17, '#'));
+  const auto result = develop();
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_TRUE(holds(result.err, file("lowlux/config"))) << result.err;
+}
+
+TEST_F(Config, HelpAndDoctorWorkWithABrokenFile) {
+  write("[develop]\nexposre = 1\n[fry]\n");
+  const auto doctor = run({"doctor"});
+  EXPECT_TRUE(holds(doctor.out + doctor.err, "config:3: there is no verb 'fry'")) << doctor.out << doctor.err;
+  EXPECT_EQ(develop({"--no-config"}).exit_code, 0);
+  EXPECT_EQ(run({"develop", "--help"}).exit_code, 0);
+}
+
+TEST(ConfigText, LinesKeepTheirNumbersAndVerbs) {
+  const auto lines = cli::parse_config("[calibrate black]\n\nquiet = yes\n[info]\njson=yes", "f");
+  ASSERT_TRUE(lines);
+  ASSERT_EQ(lines->size(), 2U);
+  EXPECT_EQ((*lines)[0].verb, "calibrate black");
+  EXPECT_EQ((*lines)[0].number, 3);
+  EXPECT_EQ((*lines)[1].option, "json");
+  EXPECT_EQ((*lines)[1].value, "yes");
+}
+
+}  // namespace
+}  // namespace lowlux

@@ -1,0 +1,187 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "capture/file/dng_source.h"
+#include "tests/cli/command.h"
+#include "tests/cli/simulate_command.h"
+
+namespace lowlux {
+namespace {
+
+using test::lowlux;
+using Json = nlohmann::json;
+
+class MergeCommand : public test::SimulateCommand {
+ protected:
+  void SetUp() override {
+    simulated("chart:macbeth", "night.dng",
+              {"--luminance", "0.2", "--size", "192x128", "--frames", "4", "--exposure", "0.02", "--no-truth"});
+    for (int i = 0; i < 4; ++i) frames_.push_back(file("night_000" + std::to_string(i) + ".dng"));
+  }
+
+  test::ProcessResult merge(const std::vector<std::string>& inputs, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> args{"merge", "-o", file("merged.dng")};
+    args.insert(args.end(), inputs.begin(), inputs.end());
+    args.insert(args.end(), more.begin(), more.end());
+    return lowlux(args);
+  }
+
+  void refused(const std::vector<std::string>& inputs, const std::vector<std::string>& more, int exit_code,
+               const std::string& why) {
+    const auto result = merge(inputs, more);
+    EXPECT_EQ(result.exit_code, exit_code) << result.err;
+    EXPECT_NE(result.err.find(why), std::string::npos) << why << "\n" << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_FALSE(std::filesystem::exists(file("merged.dng")));
+  }
+
+  std::vector<std::string> frames_;
+};
+
+TEST_F(MergeCommand, WritesARawFileWithTheNoiseOfTheMean) {
+  const auto result = merge(frames_, {"--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(result.out);
+  EXPECT_EQ(report["alignment"], "none");
+  EXPECT_EQ(report["frames"].size(), 4);
+  EXPECT_NEAR(report["mean_count"], 4, 0.1);
+  const auto one = capture::read_raw(frames_[0]), merged = capture::read_raw(file("merged.dng"));
+  ASSERT_TRUE(one && merged) << merged.error().message;
+  ASSERT_TRUE(merged->noise);
+  EXPECT_NEAR(merged->noise->scale[1] / one->noise->scale[1], 0.25, 0.01);
+  EXPECT_NEAR(merged->noise->offset[1] / one->noise->offset[1], 0.25, 0.02);
+  EXPECT_FALSE(merged->noise->reduced);
+  EXPECT_EQ(merged->raw.info.model, one->raw.info.model);
+  EXPECT_EQ(merged->raw.info.exposure_s, one->raw.info.exposure_s);
+  EXPECT_EQ(merged->colour.calibrations.size(), one->colour.calibrations.size());
+}
+
+TEST_F(MergeCommand, DevelopMergesFirst) {
+  const auto result = lowlux({"develop", "--merge", frames_[0], frames_[1], frames_[2], "-o", file("out.png"), "--json",
+                              "--mean", "plain", "--align", "none"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(result.out)[0];
+  EXPECT_EQ(report["merge"]["frames"].size(), 3);
+  EXPECT_NEAR(report["merge"]["mean_count"], 3, 1e-6);
+  EXPECT_EQ(report["width"], 192);
+  EXPECT_TRUE(std::filesystem::exists(file("out.png")));
+  const auto explained = lowlux({"develop", "--merge", scratch_.path(), "-o", file("two.png"), "--explain"});
+  ASSERT_EQ(explained.exit_code, 0) << explained.err;
+  EXPECT_NE(explained.out.find("alignment none"), std::string::npos) << explained.out;
+}
+
+TEST_F(MergeCommand, ABudgetChoosesWhatIsOpenAndSaysWhy) {
+  const auto wide = merge(frames_, {"--budget-ms", "100000", "--json"});
+  ASSERT_EQ(wide.exit_code, 0) << wide.err;
+  const Json all = Json::parse(wide.out)["budget"];
+  EXPECT_EQ(all["mean"], "robust");
+  EXPECT_EQ(all["alignment"], "none");  // measured: the camera stood still
+  EXPECT_EQ(all["motion_measured"], true);
+  EXPECT_EQ(all["fits"], true);
+  EXPECT_GT(all["predicted_ms"], 0);
+  EXPECT_GT(all["taken_ms"], 0);
+  const auto tight = merge(frames_, {"--budget-ms", "0.01", "--force", "--explain"});
+  ASSERT_EQ(tight.exit_code, 0) << tight.err;
+  EXPECT_NE(tight.out.find("plain mean, alignment none"), std::string::npos) << tight.out;
+  EXPECT_NE(tight.out.find("nothing fits, and this is the cheapest"), std::string::npos) << tight.out;
+  EXPECT_NE(tight.err.find("warning: merging takes at least"), std::string::npos) << tight.err;
+  const auto fixed =
+      merge(frames_, {"--budget-ms", "0.01", "--force", "--json", "--align", "cells", "--mean", "robust"});
+  ASSERT_EQ(fixed.exit_code, 0) << fixed.err;
+  EXPECT_EQ(Json::parse(fixed.out)["budget"]["mean"], "robust");
+  EXPECT_EQ(Json::parse(fixed.out)["alignment"], "cells");
+  EXPECT_EQ(merge(frames_, {"--budget-ms", "soon", "--force"}).exit_code, 2);
+}
+
+TEST_F(MergeCommand, ABudgetOfDevelopIsForMergingToo) {
+  const auto result = lowlux({"develop", "--merge", frames_[0], frames_[1], frames_[2], "-o", file("out.png"), "--json",
+                              "--budget-ms", "100000"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(result.out)[0];
+  EXPECT_LT(report["merge"]["budget"]["budget_ms"], 100000);
+  EXPECT_EQ(report["merge"]["budget"]["fits"], true);
+}
+
+TEST_F(MergeCommand, MergesABracketByItsExposureTimes) {
+  simulated("chart:macbeth", "long.dng",
+            {"--luminance", "0.2", "--size", "192x128", "--exposure", "0.08", "--seed", "9", "--no-truth"});
+  const auto result = merge({frames_[0], file("long.dng")}, {"--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(result.out);
+  EXPECT_EQ(report["bracket"], true);
+  EXPECT_NEAR(report["frames"][1]["light"], 4, 0.2);
+}
+
+TEST_F(MergeCommand, DrizzlesANightThatOtherCommandsDevelop) {
+  std::filesystem::create_directory(file("night"));
+  const auto made =
+      lowlux({"simulate", "flat", "--size",           "300x200", "--luminance", "0.02",    "--exposure",         "2",
+              "--stars",  "60",   "--star-luminance", "0.3",     "--drift",     "2.7,1.3", "--field-rotation",   "0.3",
+              "--frames", "8",    "--dark-current",   "0.1",     "--no-truth",  "-o",      file("night/sky.dng")});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto result = lowlux({"merge", file("night"), "-o", file("sky.dng"), "--align", "stars", "--drizzle", "1.5",
+                              "--pixfrac", "0.9", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(result.out);
+  EXPECT_EQ(report["alignment"], "stars");
+  EXPECT_EQ(report["frames"][4]["reference"], true);
+  for (const Json& frame : report["frames"]) EXPECT_TRUE(frame["aligned"]);
+  EXPECT_GT(report["stars"], 20);
+  EXPECT_LT(report["empty_fraction"][1], report["empty_fraction"][0]);
+  EXPECT_NE(result.err.find("no data of one colour"), std::string::npos) << result.err;
+  const auto developed = lowlux({"develop", file("sky.dng"), "-o", file("sky.png"), "--json"});
+  ASSERT_EQ(developed.exit_code, 0) << developed.err;
+  const Json picture = Json::parse(developed.out)[0];
+  EXPECT_EQ(picture["width"], 450);
+  EXPECT_EQ(picture["height"], 300);
+  const auto kept =
+      lowlux({"merge", file("night"), "-o", file("kept.dng"), "--align", "stars", "--foreground", "keep", "--explain"});
+  ASSERT_EQ(kept.exit_code, 0) << kept.err;
+  EXPECT_NE(kept.out.find("alignment stars"), std::string::npos);
+}
+
+TEST_F(MergeCommand, OptionsOfStarsThatContradictEachOtherAreRefused) {
+  refused(frames_, {"--foreground", "keep"}, 2, "--foreground");
+  refused(frames_, {"--align", "stars", "--foreground", "keep", "--mean", "plain"}, 2, "--foreground");
+  refused(frames_, {"--align", "stars", "--foreground", "keep", "--drizzle", "1"}, 2, "--drizzle");
+  refused(frames_, {"--align", "none", "--drizzle", "1"}, 2, "--drizzle");
+  refused(frames_, {"--pixfrac", "0.5"}, 2, "--pixfrac");
+  refused(frames_, {"--align", "stars", "--budget-ms", "1000"}, 2, "--budget-ms");
+  refused(frames_, {"--drizzle", "2", "--budget-ms", "1000"}, 2, "--budget-ms");
+  refused(frames_, {"--drizzle", "3.1"}, 2, "--drizzle");
+  refused(frames_, {"--drizzle", "nan"}, 2, "--drizzle");
+  refused(frames_, {"--drizzle", "1", "--pixfrac", "0.01"}, 2, "--pixfrac");
+  refused(frames_, {"--drizzle", "1"}, 1, "did not move");
+  refused(frames_, {"--align", "stars"}, 1, "stars were found");
+}
+
+TEST_F(MergeCommand, RefusesWhatCannotBeMerged) {
+  refused({}, {}, 2, "RAW");
+  refused({frames_[0], frames_[0]}, {}, 2, "given twice");
+  refused({frames_[0], file("none.dng")}, {}, 1, "none.dng");
+  refused({frames_[0], test::dog}, {}, 1, test::dog + ": it was taken with");
+  std::ofstream(file("frame of mine.dng")) << "no raw file";
+  refused({frames_[0], file("frame of mine.dng")}, {}, 1, "frame of mine.dng");
+  refused(frames_, {"--reference", test::dog}, 2, "--reference");
+  refused(frames_, {"--align", "sideways"}, 2, "--align");
+  refused(frames_, {"--false-alarm", "2"}, 2, "--false-alarm");
+  std::ofstream(file("broken.dng")) << "no raw file";
+  refused({frames_[0], file("broken.dng")}, {}, 1, "broken.dng");
+  EXPECT_EQ(lowlux({"merge", frames_[0], "-o", frames_[0], "--force"}).exit_code, 2);
+  EXPECT_EQ(lowlux({"merge", frames_[0], "-o", file("merged.png")}).exit_code, 2);
+  EXPECT_EQ(lowlux({"develop", frames_[0], "-o", file("out.png"), "--align", "none"}).exit_code, 2);
+  ASSERT_EQ(merge(frames_).exit_code, 0);
+  const auto again = merge(frames_);
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_NE(again.err.find("exists"), std::string::npos);
+  EXPECT_EQ(merge(frames_, {"--force"}).exit_code, 0);
+}
+
+}  // namespace
+}  // namespace lowlux
