@@ -1,0 +1,74 @@
+#include "isp/python/call.h"
+
+#include <memory>
+
+#include "isp/base/float_samples.h"
+#include "isp/python/frame_copy.h"
+
+namespace lowlux::python {
+namespace {
+
+namespace py = pybind11;
+
+/// Returns an array of the plane's samples, without copying them.
+template <class Sample>
+py::array owned(Plane<Sample> plane, std::vector<py::ssize_t> shape) {
+  auto* const kept = new Plane<Sample>(std::move(plane));
+  const py::capsule owner(kept, [](void* held) { delete static_cast<Plane<Sample>*>(held); });
+  return py::array_t<Sample>(std::move(shape), kept->data(), owner);
+}
+
+py::array array_of_codes(Encoded8 picture) {
+  const int height = picture.height(), width = picture.width();
+  return owned(std::move(picture.codes), {height, width, 3});
+}
+py::array array_of_codes(Encoded16 picture) {
+  const int height = picture.height(), width = picture.width();
+  return owned(std::move(picture.codes), {height, width, 3});
+}
+
+/// Returns planes as an array of interleaved values, in NumPy's usual order of images.
+py::array array_of_codes(SceneLinear picture) {
+  const int height = picture.height(), width = picture.width();
+  Plane<float> values(3 * width, height);
+  for (int y = 0; y < height; ++y) {
+    float* const out = values.row(y);
+    for (int c = 0; c < 3; ++c) {
+      const float* const in = picture.plane[static_cast<std::size_t>(c)].row(y);
+      for (int x = 0; x < width; ++x) out[3 * x + c] = in[x];
+    }
+  }
+  return owned(std::move(values), {height, width, 3});
+}
+
+}  // namespace
+
+cli::ReadRaw reader_of(const std::vector<Input>& inputs) {
+  return [&inputs](const std::string& name) -> Result<RawFrame> {
+    for (const Input& input : inputs) {
+      if (!input.frame || input.name != name) continue;
+      const RawFrame& frame = input.frame->frame;
+      if (const auto wrong = unusable_sample(frame.raw)) return fail(ErrorCode::invalid_argument, *wrong, name);
+      return clone(frame);
+    }
+    return cli::read_file(name);
+  };
+}
+
+void set_call(const std::string& output, bool overwrite, cli::DevelopArgs& args) {
+  args.output = output;
+  args.force = overwrite;
+  args.quiet = true;
+  args.json = true;  // costs are then part of the plan
+}
+
+py::array array_of(Picture picture) {
+  return std::visit([](auto& samples) { return array_of_codes(std::move(samples)); }, picture);
+}
+
+py::array array_of(Plane<float> plane) {
+  const int height = plane.height(), width = plane.width();
+  return owned(std::move(plane), {height, width});
+}
+
+}  // namespace lowlux::python

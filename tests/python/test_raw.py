@@ -1,0 +1,181 @@
+"""Raw frames: views, and files written of arrays of all kinds, against what NumPy itself makes of them."""
+import gc
+import pickle
+
+import numpy as np
+import pytest
+
+import lowlux
+
+LEVELS = dict(black=64, white=4095)
+PHASES = {"RGGB": [[0, 1], [3, 2]], "GRBG": [[1, 0], [2, 3]], "GBRG": [[3, 2], [0, 1]], "BGGR": [[2, 3], [1, 0]]}
+
+
+def codes(rng, height=24, width=36):
+    return rng.integers(0, 4096, (height, width), dtype=np.uint16)
+
+
+def written(path, mosaic, **figures):
+    lowlux.write_dng(path, mosaic, **{**LEVELS, **figures})
+    return lowlux.read_raw(path)
+
+
+LAYOUTS = {
+    "contiguous": lambda a: a,
+    "columns first": np.asfortranarray,
+    "transposed twice": lambda a: np.ascontiguousarray(a.T).T,
+    "every second pixel": lambda a: np.repeat(np.repeat(a, 2, 0), 2, 1)[::2, ::2],
+    "upside down": lambda a: a[::-1][::1],
+    "mirrored": lambda a: a[:, ::-1],
+    "negative strides in memory": lambda a: np.ascontiguousarray(a[::-1, ::-1])[::-1, ::-1],
+    "one row repeated": lambda a: np.broadcast_to(a[:1], a.shape),
+    "unaligned": lambda a: np.frombuffer(b"\0" + a.tobytes(), np.uint8)[1:].view(a.dtype).reshape(a.shape),
+    "big endian": lambda a: a.astype(">u2"),
+    "little endian": lambda a: a.astype("<u2"),
+    "int64": lambda a: a.astype(np.int64),
+    "big-endian uint32": lambda a: a.astype(">u4"),
+    "uint8": lambda a: (a >> 4).astype(np.uint8),
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_a_mosaic_of_any_layout_is_written_as_numpy_reads_it(layout, tmp_path, rng):
+    mosaic = LAYOUTS[layout](codes(rng))
+    mosaic.flags.writeable = False
+    raw = written(tmp_path / "a.dng", mosaic)
+    assert raw.raw_image.dtype == np.uint16
+    np.testing.assert_array_equal(raw.raw_image, mosaic.astype(np.uint16))
+
+
+@pytest.mark.parametrize("kind", ["<f4", ">f4", "<f8", ">f8", "f2"])
+def test_floats_below_black_and_above_white_keep_their_bits(kind, tmp_path, rng):
+    mosaic = rng.normal(0.3, 0.8, (24, 36)).astype(kind)[::-1]
+    raw = written(tmp_path / "f.dng", mosaic, black=0, white=1)
+    assert raw.raw_image.dtype == np.float32
+    assert raw.raw_image.tobytes() == mosaic.astype(np.float32).tobytes()
+
+
+@pytest.mark.parametrize("cfa", PHASES)
+def test_the_pattern_is_the_one_that_was_written(cfa, tmp_path, rng):
+    raw = written(tmp_path / "p.dng", codes(rng), cfa=cfa)
+    assert raw.cfa == cfa
+    assert raw.raw_pattern.tolist() == PHASES[cfa]
+    assert raw.color_desc == b"RGBG"
+    assert raw.raw_colors[3, 5] == raw.raw_color(3, 5) == PHASES[cfa][1][1]
+
+
+def test_figures_come_back(tmp_path, rng):
+    matrix = np.eye(3) + 0.1 * rng.random((3, 3))
+    noise = [(1e-4, 1e-6), (2e-4, 2e-6), (3e-4, 3e-6)]
+    raw = written(tmp_path / "f.dng", codes(rng), black=[[60, 61], [62, 63]], cfa="GRBG", noise=noise, matrix=matrix,
+                  exposure_s=0.125, iso=1600)
+    assert raw.black_dn.tolist() == [[60, 61], [62, 63]]
+    assert raw.black_level_per_channel == [61, 60, 62, 63]  # red, green of its rows, blue, green of its rows
+    assert raw.white_dn.tolist() == [4095] * 3 and raw.white_level == 4095
+    np.testing.assert_allclose(raw.noise, noise, rtol=1e-12)
+    np.testing.assert_allclose(raw.matrices[0], matrix, rtol=1e-6)  # rationals of the file
+    assert (raw.exposure_s, raw.iso) == (0.125, 1600)
+
+
+def test_rgb_and_grey_arrays(tmp_path, rng):
+    rgb = rng.random((30, 40, 3), dtype=np.float32)[:, ::-1]
+    raw = written(tmp_path / "rgb.dng", rgb, black=0, white=1)
+    assert raw.cfa == "RGB" and raw.raw_pattern is None
+    np.testing.assert_array_equal(raw.raw_image, rgb)
+    grey = written(tmp_path / "grey.dng", codes(rng), cfa="MONO")
+    assert grey.cfa == "MONO" and grey.num_colors == 1 and grey.raw_colors is None
+
+
+def test_views_share_memory_and_keep_the_frame(night):
+    raw = lowlux.read_raw(night)
+    whole, visible = raw.raw_image, raw.raw_image_visible
+    sizes = raw.sizes
+    assert whole.shape == (sizes.raw_height, sizes.raw_width)
+    assert np.shares_memory(whole, visible) and np.shares_memory(whole, raw.raw_image)
+    visible[1, 2] = 77
+    assert raw.raw_value(sizes.top_margin + 1, sizes.left_margin + 2) == 77
+    copy = whole.copy()
+    del raw, visible
+    gc.collect()
+    np.testing.assert_array_equal(whole, copy)
+
+
+def test_metadata_like_another_frame(raws, tmp_path):
+    source = lowlux.read_raw(raws / "canon_kissx4_ml_colorchart.dng")
+    visible = source.raw_image_visible // 2
+    raw = lowlux.raw_from_array(visible, like=source)
+    assert raw.sizes.height == raw.sizes.raw_height == source.sizes.height
+    assert (raw.make, raw.model, raw.iso, raw.cfa) == (source.make, source.model, source.iso, source.cfa)
+    whole = lowlux.raw_from_array(source.raw_image, like=source)
+    assert whole.sizes == source.sizes
+    lowlux.write_dng(tmp_path / "a.dng", source)
+    lowlux.write_dng(tmp_path / "b.dng", whole)
+    assert (tmp_path / "a.dng").read_bytes() == (tmp_path / "b.dng").read_bytes()
+    with pytest.raises(lowlux.ArgumentError, match="its visible part"):
+        lowlux.raw_from_array(visible[2:], like=source)
+
+
+BAD = {
+    "complex": (np.zeros((24, 24), complex), {}, "complex128"),
+    "bool": (np.zeros((24, 24), bool), {}, "bool"),
+    "objects": (np.full((24, 24), None), {}, "object"),
+    "text": (np.full((24, 24), "a"), {}, "expected integers"),
+    "empty": (np.zeros((0, 24), np.uint16), {}, "empty"),
+    "one dimension": (np.zeros(24, np.uint16), {}, r"\(24,\)"),
+    "two channels": (np.zeros((24, 24, 2), np.uint16), {}, r"\(24, 24, 2\)"),
+    "negative": (np.full((24, 24), -1), {}, "range from -1"),
+    "too large": (np.full((24, 24), 65536, np.uint32), {}, "65536"),
+    "beyond int64": (np.full((24, 24), 2**63, np.uint64), {}, "9223372036854775808"),
+    "NaN": (np.full((24, 24), np.nan), {}, "sample"),
+    "infinite in 32 bits": (np.full((24, 24), 1e300), {}, "sample"),
+    "no black": (np.zeros((24, 24), np.uint16), dict(black=None), "black"),
+    "no white": (np.zeros((24, 24), np.uint16), dict(white=None), "white"),
+    "NaN black": (np.zeros((24, 24), np.uint16), dict(black=np.nan), "BlackLevel"),
+    "two blacks": (np.zeros((24, 24), np.uint16), dict(black=(1, 2)), "2 values"),
+    "black above white": (np.zeros((24, 24), np.uint16), dict(black=5000), "black level"),
+    "words": (np.zeros((24, 24), np.uint16), dict(black="dark"), "'dark'"),
+    "mosaic": (np.zeros((24, 24), np.uint16), dict(cfa="XTRANS"), "XTRANS"),
+    "noise": (np.zeros((24, 24), np.uint16), dict(noise=(1, 2, 3)), "3 values"),
+    "negative noise": (np.zeros((24, 24), np.uint16), dict(noise=(-1, 0)), "NoiseProfile"),
+    "singular matrix": (np.zeros((24, 24), np.uint16), dict(matrix=np.zeros((3, 3))), "ColorMatrix"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_arrays_are_refused_and_nothing_is_written(case, tmp_path):
+    mosaic, figures, message = BAD[case]
+    with pytest.raises(lowlux.ArgumentError, match=message) as caught:
+        lowlux.write_dng(tmp_path / "bad.dng", mosaic, **{**LEVELS, **figures})
+    assert isinstance(caught.value, ValueError)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_errors_are_those_of_the_command(tmp_path, command):
+    missing = tmp_path / "missing.dng"
+    with pytest.raises(FileNotFoundError) as caught:
+        lowlux.read_raw(missing)
+    assert isinstance(caught.value, lowlux.NotFoundError) and caught.value.where == str(missing)
+    assert command("develop", missing, "-o", tmp_path / "o.png", fails=True) == f"lowlux: {caught.value}\n"
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert str(again) == str(caught.value)
+    (tmp_path / "noise.dng").write_bytes(bytes(range(256)) * 64)
+    with pytest.raises(lowlux.Error) as caught:
+        lowlux.read_raw(tmp_path / "noise.dng")
+    assert command("develop", tmp_path / "noise.dng", "-o", tmp_path / "o.png", fails=True) == f"lowlux: {caught.value}\n"
+
+
+def test_existing_files_and_missing_folders(tmp_path, rng):
+    path = tmp_path / "a.dng"
+    first = codes(rng)
+    lowlux.write_dng(path, first, **LEVELS)
+    with pytest.raises(FileExistsError):
+        lowlux.write_dng(path, first + 1, **LEVELS)
+    np.testing.assert_array_equal(lowlux.read_raw(path).raw_image, first)
+    lowlux.write_dng(path, first + 1, **LEVELS, overwrite=True)
+    np.testing.assert_array_equal(lowlux.read_raw(path).raw_image, first + 1)
+    with pytest.raises(lowlux.UnwritableError, match="none"):
+        lowlux.write_dng(tmp_path / "none" / "a.dng", first, **LEVELS)
+    with pytest.raises(lowlux.ArgumentError, match=".dng"):
+        lowlux.write_dng(tmp_path / "a.tif", first, **LEVELS)
+    with pytest.raises(lowlux.ArgumentError, match="black"):
+        lowlux.write_dng(tmp_path / "b.dng", lowlux.read_raw(path), black=3)
