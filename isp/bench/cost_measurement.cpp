@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/bench/merge_cost.h"
 #include "isp/bench/speed_probe.h"
 #include "isp/bench/timing_frame.h"
 #include "isp/metrics/statistics.h"
@@ -259,6 +260,8 @@ Result<CostModel> measure_cost(Executor& executor, const std::function<void(doub
   model.threads = executor.width();
   model.pace_s = pace.usual_s();
   for (const Measurement& at : all) at.tell(model, model.pace_s);
+  if (auto done = measure_merge_cost(pace, model.pace_s, executor, model); !done)
+    return tl::make_unexpected(done.error());
   return model;
 }
 

@@ -52,4 +52,19 @@ RawFrame timing_frame(const FrameSize& size, const TimingLight& light, double li
   return frame;
 }
 
+RawFrame copy_of(const RawFrame& frame) {
+  RawFrame out;
+  out.raw.dn = frame.raw.dn.clone();
+  out.raw.layout = frame.raw.layout;
+  out.raw.phase = frame.raw.phase;
+  out.raw.active = frame.raw.active;
+  out.raw.default_crop = frame.raw.default_crop;
+  out.raw.black_tag = frame.raw.black_tag;
+  out.raw.white_dn = frame.raw.white_dn;
+  out.raw.info = frame.raw.info;
+  out.colour = frame.colour;
+  out.noise = frame.noise;
+  return out;
+}
+
 }  // namespace lowlux::isp

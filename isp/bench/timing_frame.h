@@ -21,4 +21,7 @@ struct TimingLight {
 /// @param line_noise_e  standard deviation of the offset of each row, and of each column
 RawFrame timing_frame(const FrameSize& size, const TimingLight& light, double line_noise_e = 0);
 
+/// Returns a copy of a simulated frame: its codes, levels, colour and noise.
+RawFrame copy_of(const RawFrame& frame);
+
 }  // namespace lowlux::isp

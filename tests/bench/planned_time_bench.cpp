@@ -33,16 +33,18 @@
 #include "tests/scenarios/bench_raw.h"
 #include "tests/scenarios/planner_scene.h"
 #include "tests/scenarios/seen_difference.h"
+#include "tests/support/executors.h"
 
 namespace lowlux::isp {
 namespace {
 
-PoolExecutor executor(2);
+using test::two_threads;
+
 constexpr double min_kept = 0.95;  // of the frames
 
 double seconds_of(const RawFrame& frame, const DevelopOptions& options, Encoded8* picture = nullptr) {
   const auto start = std::chrono::steady_clock::now();
-  Result<Developed> done = develop(frame, options, executor);
+  Result<Developed> done = develop(frame, options, two_threads);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!done) std::printf("failed: %s\n", done.error().message.c_str());
   if (done && picture != nullptr) *picture = std::get<Encoded8>(std::move(done->picture));
@@ -52,14 +54,14 @@ double seconds_of(const RawFrame& frame, const DevelopOptions& options, Encoded8
 /// The machine when it is calibrated, and after.
 class Clock {
  public:
-  Clock() : cost_(*measure_cost(executor, [](double, const std::string&) {})) {
+  Clock() : cost_(*measure_cost(two_threads, [](double, const std::string&) {})) {
     std::printf("calibrated at a pace of %.1f ms\n", 1e3 * cost_.pace_s);
   }
 
   /// What things cost at the moment, as the command line takes it before each file.
   std::shared_ptr<const CostModel> now() {
     auto cost = std::make_shared<CostModel>(cost_);
-    cost->pace = *pace_now(pace_, executor) / cost_.pace_s;
+    cost->pace = *pace_now(pace_, two_threads) / cost_.pace_s;
     return cost;
   }
   /// @param cost    of the moment whose pace is meant
@@ -69,7 +71,7 @@ class Clock {
               Encoded8& picture) {
     std::vector<double> ratios;
     for (int i = 0; i < rounds; ++i) {
-      const double unit_s = *pace_.seconds(executor);
+      const double unit_s = *pace_.seconds(two_threads);
       ratios.push_back(seconds_of(frame, options, &picture) / unit_s);
     }
     return median(ratios) * cost.pace * cost_.pace_s;
@@ -106,7 +108,7 @@ DevelopOptions min_work() {
 
 double error_of(const Encoded8& picture, const PictureTruth& truth) {
   RenderedPicture rendered{light_of_codes(picture), light_of_codes(picture)};
-  return picture_error(rendered, truth, executor).ciede2000;
+  return picture_error(rendered, truth, two_threads).ciede2000;
 }
 
 /// The same camera without noise.
@@ -165,7 +167,7 @@ WallShares by_the_wall(Clock& clock, const RawFrame& frame, DevelopOptions optio
   for (int round = 0; round < 5; ++round) {
     options.effects->cost = clock.now();
     const auto start = std::chrono::steady_clock::now();
-    const Result<Developed> done = develop(frame, options, executor);
+    const Result<Developed> done = develop(frame, options, two_threads);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!done) {
       ++refused;
@@ -190,7 +192,7 @@ int budgets(std::uint64_t draw, std::uint32_t frames) {
   std::printf("  # picture            light   MP   budget predicted  taken wall/pred  error   best  plan\n");
   for (std::uint32_t i = 0; i < frames; ++i) {
     test::Draws draws(20261123 + draw, 79, i);
-    const BenchPicture& whole = test::held_out_picture(draws.below(4), executor);
+    const BenchPicture& whole = test::held_out_picture(draws.below(4), two_threads);
     const double megapixels = draws.log_uniform(0.3, 4);
     const int width = 2 * static_cast<int>(std::sqrt(1.5e6 * megapixels) / 2), height = 2 * (width / 3);
     const BenchPicture picture = test::drawn_part(whole, draws, width, height);
@@ -200,7 +202,7 @@ int budgets(std::uint64_t draw, std::uint32_t frames) {
     const DenoiseShot shot = take(picture, light, i);
     const BenchRaw raw = raw_of(shot, flaws, i);
     const SceneLinear truth_light = truth_of(shot);
-    const PictureTruth truth(truth_light.view(), executor);
+    const PictureTruth truth(truth_light.view(), two_threads);
     const auto cost = clock.now();
     const std::vector<Way> ways = exhaustive(clock, *cost, raw.frame, truth);
     Encoded8 made;
@@ -212,7 +214,7 @@ int budgets(std::uint64_t draw, std::uint32_t frames) {
     options.effects->tolerance_delta_e.reset();
     const double budget_s = draws.log_uniform(1.3 * min_s, 1.3 * max_s);
     options.effects->budget_s = budget_s;
-    const Result<Developed> planned = develop(raw.frame, options, executor);
+    const Result<Developed> planned = develop(raw.frame, options, two_threads);
     if (!planned) {
       ++refused;
       std::printf("%3u %.1f MP, refused: %s\n", i, 1e-6 * width * height, planned.error().message.c_str());
@@ -263,8 +265,8 @@ void print_quantiles(const char* what, std::vector<double> values) {
 int saved() {
   std::vector<double> shares, of_tolerance;
   for (std::uint32_t i = 0; i < 300; ++i) {
-    const test::PlannerScene scene = test::planner_scene(i, 3072, 2048, executor);
-    const Result<Developed> done = develop(scene.raw.frame, scene.ways(false), executor);
+    const test::PlannerScene scene = test::planner_scene(i, 3072, 2048, two_threads);
+    const Result<Developed> done = develop(scene.raw.frame, scene.ways(false), two_threads);
     if (!done) {
       std::printf("%3u not developed: %s\n", i, done.error().message.c_str());
       return 1;
@@ -277,7 +279,7 @@ int saved() {
       everything.push_back(seconds_of(scene.raw.frame, scene.ways(true), &with_everything));
     }
     shares.push_back(1 - median(planned) / median(everything));
-    of_tolerance.push_back(seen_difference(by_plan, with_everything, executor).percentile95 / scene.tolerance);
+    of_tolerance.push_back(seen_difference(by_plan, with_everything, two_threads).percentile95 / scene.tolerance);
     std::printf("%3u %9s tolerance %4.2f%s  %6.1f of %6.1f ms: %5.2f; seen over tolerance %.2f  %s%s\n", i,
                 name_of(DenoiseLight{std::round(scene.light.mean_e), std::round(scene.light.dark_e), 0}).c_str(),
                 scene.tolerance, scene.options.look.look == Look::eye ? ", eye" : "     ", 1e3 * median(planned),

@@ -22,11 +22,12 @@
 #include "tests/scenarios/bench_raw.h"
 #include "tests/scenarios/planner_scene.h"
 #include "tests/scenarios/seen_difference.h"
+#include "tests/support/executors.h"
 
 namespace lowlux::isp {
 namespace {
 
-PoolExecutor executor(2);
+using test::two_threads;
 
 struct Reduction {
   std::optional<denoise::Level> level;
@@ -39,9 +40,9 @@ Encoded8 developed(const BenchRaw& raw, const Reduction& how) {
   options.denoise.level = how.level.value_or(denoise::Level::draft);
   options.find_defects = false;
   options.denoise.line_noise = false;
-  Result<DevelopPlan> plan = plan_develop(raw.frame, options, executor);
+  Result<DevelopPlan> plan = plan_develop(raw.frame, options, two_threads);
   plan->noise_reduction.options.chroma_start = how.start;
-  Pipeline pipeline(executor);
+  Pipeline pipeline(two_threads);
   Picture picture = make_picture(*plan);
   pipeline.render(raw.frame, *plan, picture);
   return std::get<Encoded8>(std::move(picture));
@@ -57,10 +58,10 @@ Predicted predicted(const BenchRaw& raw) {
   options.denoise.mode = DenoiseChoice::Mode::level;
   options.denoise.level = denoise::Level::draft;
   options.find_defects = false;
-  const Result<DevelopPlan> plan = plan_develop(raw.frame, options, executor);
-  const Thumbnail thumbnail = make_thumbnail(raw.frame, plan->levels.black, executor);
-  const auto blocks =
-      seen_blocks(raw.frame, options, plan->levels, plan->rendering, plan->noise_reduction.noise, thumbnail, executor);
+  const Result<DevelopPlan> plan = plan_develop(raw.frame, options, two_threads);
+  const Thumbnail thumbnail = make_thumbnail(raw.frame, plan->levels.black, two_threads);
+  const auto blocks = seen_blocks(raw.frame, options, plan->levels, plan->rendering, plan->noise_reduction.noise,
+                                  thumbnail, two_threads);
   return {*plan->noise_reduction.snr, level_noise(blocks)};
 }
 
@@ -76,7 +77,7 @@ int against_truth(PictureSet set) {
   std::printf("picture e-/dark pred | none draft standard high best: p95 and mean against the noise-free, over pred\n");
   for (const std::string_view name : files_of(set)) {
     const auto path = (std::filesystem::path(LOWLUX_TESTDATA) / "pictures" / name).string();
-    const auto picture = read_bench_picture(path, 384, 256, executor);
+    const auto picture = read_bench_picture(path, 384, 256, two_threads);
     for (const DenoiseLight light :
          {DenoiseLight{2000, 2, 1.5}, DenoiseLight{200, 2, 1.5}, DenoiseLight{60, 2, 1.5}, DenoiseLight{20, 2, 1.5},
           DenoiseLight{6, 2, 1.5}, DenoiseLight{2, 2, 1.5}, DenoiseLight{4, 200, 4}}) {
@@ -88,7 +89,7 @@ int against_truth(PictureSet set) {
       std::printf("%-12s %8s %6.2f | %6.2f", std::string(name).c_str(), name_of(light).c_str(), snr, expected);
       for (const Reduction& way : {Reduction{}, Reduction{Level::draft, {}}, Reduction{Level::standard, {}},
                                    Reduction{Level::high, {}}, Reduction{Level::best, {}}}) {
-        const SeenDifference seen = seen_difference(developed(raw, way), truth, executor);
+        const SeenDifference seen = seen_difference(developed(raw, way), truth, two_threads);
         std::printf(" %5.3f %5.3f,", seen.percentile95 / expected, seen.mean / expected);
       }
       std::printf("\n");
@@ -112,7 +113,7 @@ int levels(PictureSet set) {
               "picture", "e-/dark", "snr", "pred", "none");
   for (const std::string_view name : files_of(set)) {
     const auto path = (std::filesystem::path(LOWLUX_TESTDATA) / "pictures" / name).string();
-    const auto picture = read_bench_picture(path, 512, 384, executor);
+    const auto picture = read_bench_picture(path, 512, 384, two_threads);
     for (const DenoiseLight light : {DenoiseLight{2000, 2, 1.5}, DenoiseLight{600, 2, 1.5}, DenoiseLight{200, 2, 1.5},
                                      DenoiseLight{60, 2, 1.5}, DenoiseLight{20, 2, 1.5}, DenoiseLight{6, 2, 1.5},
                                      DenoiseLight{2, 2, 1.5}, DenoiseLight{20, 200, 4}, DenoiseLight{4, 200, 4}}) {
@@ -122,7 +123,7 @@ int levels(PictureSet set) {
       const Encoded8 best = developed(raw, {Level::high, {}});
       std::printf("%-12s %8s %6.2f | %6.2f", std::string(name).c_str(), name_of(light).c_str(), snr, expected);
       for (const Reduction& way : ways) {
-        const double seen = seen_difference(developed(raw, way), best, executor).percentile95;
+        const double seen = seen_difference(developed(raw, way), best, two_threads).percentile95;
         if (!way.level) std::printf(" %6.2f |", seen);
         std::printf(" %5.3f", seen / expected);
       }
@@ -144,7 +145,7 @@ int bounds(PictureSet set) {
   std::vector<BenchPicture> pictures;
   for (const std::string_view name : files_of(set)) {
     const auto path = (std::filesystem::path(LOWLUX_TESTDATA) / "pictures" / name).string();
-    pictures.push_back(*read_bench_picture(path, 0, 0, executor));
+    pictures.push_back(*read_bench_picture(path, 0, 0, two_threads));
   }
   std::map<std::pair<std::string, std::size_t>, std::vector<double>> found;
   for (std::uint32_t i = 0; i < 300; ++i) {
@@ -155,7 +156,7 @@ int bounds(PictureSet set) {
     const LevelNoise noise = predicted(raw).noise;
     const Encoded8 best = developed(raw, {Level::high, {}});
     for (std::size_t way = 0; way < ways.size(); ++way) {
-      const double seen = seen_difference(developed(raw, {ways[way], {}}), best, executor).percentile95;
+      const double seen = seen_difference(developed(raw, {ways[way], {}}), best, two_threads).percentile95;
       if (seen >= min_delta_e) found[{part.name, way}].push_back(seen / noise.left_by(ways[way]));
     }
   }

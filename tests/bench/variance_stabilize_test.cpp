@@ -5,17 +5,17 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <numbers>
 #include <vector>
 
+#include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::denoise {
 namespace {
 
-constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::inf;
+using test::nan;
 
 struct Moments {
   long double mean = 0, second = 0;

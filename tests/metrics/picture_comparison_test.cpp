@@ -12,11 +12,13 @@
 #include "isp/metrics/ssim.h"
 #include "isp/model/colour/colour_difference.h"
 #include "isp/render/output_space.h"
+#include "tests/support/numbers.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
+
 constexpr int width = 67, height = 33;  // one piece of a row and a rest
 
 /// A picture whose pixels have the CIELAB colour of(x, y) under D65.

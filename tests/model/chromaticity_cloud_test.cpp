@@ -3,18 +3,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <random>
 
 #include "isp/model/spectrum/cie_data.h"
 #include "isp/model/spectrum/spectral_data.h"
+#include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
+
 constexpr double degree = std::numbers::pi / 180;
 
 Xy on_ellipse(const XyEllipse& e, double angle_deg, double scale = 1) {

@@ -9,14 +9,16 @@
 #include <boost/math/quadrature/gauss.hpp>
 
 #include "isp/model/sensor/noise_budget.h"
+#include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
 // Two laws of a noise budget near the ends of a range, against quadrature and sums over codes.
 namespace lowlux::isp {
 namespace {
 
+using test::inf;
+
 constexpr double eps = std::numeric_limits<double>::epsilon();
-constexpr double inf = std::numeric_limits<double>::infinity();
 
 long double tail(long double z) { return 0.5L * std::erfc(z / std::numbers::sqrt2_v<long double>); }
 

@@ -1,15 +1,15 @@
 #include "isp/model/colour/colour_difference.h"
+#include "tests/support/numbers.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <iterator>
-#include <limits>
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 TEST(DeltaEab, IsTheDistance) {
   EXPECT_DOUBLE_EQ(delta_e_ab({50, 1, 2}, {53, 5, 14}), 13);

@@ -7,15 +7,17 @@
 
 #include <boost/multiprecision/cpp_bin_float.hpp>
 
+#include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::isp {
 namespace {
 
+using test::inf;
+using test::nan;
+
 using Exact = boost::multiprecision::cpp_bin_float_100;
 constexpr double eps = std::numeric_limits<double>::epsilon();
-constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 const Xyz dark{5.1, 5.6, 6.9};
 

@@ -4,17 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 
 #include "isp/model/vision/seeing.h"
 #include "tests/reference/exact_ref.h"
+#include "tests/support/numbers.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
+using test::inf;
+using test::nan;
 
 double log_uniform(std::mt19937& random, double from, double to) {
   return std::exp(std::uniform_real_distribution<double>(std::log(from), std::log(to))(random));

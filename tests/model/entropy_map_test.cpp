@@ -2,18 +2,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <random>
 #include <string>
 
 #include "isp/model/appearance/entropy_model.h"
 #include "isp/model/colour/colour_difference.h"
+#include "tests/support/numbers.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::inf;
+using test::nan;
 
 ColourMap map_at(double white_cd_m2, const EntropyOptions& options = {}) {
   return *entropy_colour_map({.white_cd_m2 = white_cd_m2}, options);

@@ -6,18 +6,18 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <limits>
 #include <optional>
 
 #include "isp/base/random/philox.h"
 #include "isp/model/spectrum/cie_data.h"
 #include "isp/model/vision/mesopic.h"
+#include "tests/support/numbers.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::inf;
+using test::nan;
 
 NodePower even_power() {
   NodePower power;

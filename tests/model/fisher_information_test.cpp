@@ -1,4 +1,5 @@
 #include "isp/model/colour/chroma_bound.h"
+#include "tests/support/numbers.h"
 
 #include <gtest/gtest.h>
 
@@ -6,14 +7,13 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numbers>
 #include <vector>
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double inf = std::numeric_limits<double>::infinity();
+using test::inf;
 
 /// The same information from another form of it: with dp/dlambda = p(y - 1) - p(y), J = int p(y - 1)^2 / p(y) dy - 1.
 /// In long double, steps four times as fine as those under test and a wider range.

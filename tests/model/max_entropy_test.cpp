@@ -5,20 +5,21 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <utility>
 
 #include "isp/model/spectrum/cie_data.h"
 #include "isp/model/spectrum/spectral_data.h"
+#include "tests/support/numbers.h"
 
 namespace lowlux::isp {
 namespace {
 
+using test::inf;
+using test::nan;
+
 using Vector = std::array<double, 3>;
 using Matrix = std::array<Vector, 3>;
 constexpr Matrix unit{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
 
 /// Cones with a share xi of the rods: f_i = cone_i + xi w_i V', w = (3, 3, 5); 390 to 730 nm by 5.
 SpectralBasis<3> basis_of(double xi) {

@@ -1,10 +1,10 @@
 #include "isp/model/sensor/noise_budget.h"
+#include "tests/support/numbers.h"
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,8 +12,8 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
+using test::inf;
+using test::nan;
 
 SensorModel good_sensor() {
   SensorModel s;

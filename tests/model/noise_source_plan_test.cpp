@@ -6,19 +6,20 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <set>
 #include <string_view>
 #include <vector>
 
 #include "isp/model/colour/colorimetry.h"
+#include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::isp {
 namespace {
 
+using test::inf;
+
 using Reason = NoiseSourceDecision::Reason;
-constexpr double inf = std::numeric_limits<double>::infinity();
 
 SensorModel rich_sensor() {
   SensorModel m;

@@ -1,16 +1,16 @@
 #include "isp/model/sensor/photon.h"
+#include "tests/support/numbers.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
+using test::inf;
+using test::nan;
 
 Spectrum spectrum(std::vector<double> nm, std::vector<double> values) {
   return *Spectrum::of(std::move(nm), std::move(values));

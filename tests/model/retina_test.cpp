@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -11,13 +10,14 @@
 #include "isp/model/sensor/photon.h"
 #include "isp/model/spectrum/cie_data.h"
 #include "isp/model/spectrum/spectral_data.h"
+#include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
+using test::inf;
+using test::nan;
 
 double log_uniform(std::mt19937& random, double from, double to) {
   return std::exp(std::uniform_real_distribution<double>(std::log(from), std::log(to))(random));

@@ -1,17 +1,17 @@
 #include "isp/model/vision/seeing.h"
+#include "tests/support/numbers.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
 #include <boost/multiprecision/cpp_bin_float.hpp>
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
+using test::inf;
+using test::nan;
 
 double seen(double mean, int threshold) { return *frequency_of_seeing({mean, 1, 0}, threshold); }
 

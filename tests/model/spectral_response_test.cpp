@@ -5,19 +5,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <string>
 
 #include "isp/model/sensor/noise_budget.h"
 #include "isp/model/sensor/photon.h"
 #include "isp/model/spectrum/cie_data.h"
+#include "tests/support/numbers.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
+using test::inf;
+using test::nan;
 
 double largest(const Vector3& v) { return *std::max_element(v.begin(), v.end()); }
 

@@ -3,10 +3,13 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
+#include <utility>
 
 #include "capture/file/dng_source.h"
 #include "isp/output/dng/dng_writer.h"
 #include "tests/codec/pictures.h"
+#include "tests/support/as_floats.h"
 #include "tests/support/raw_frames.h"
 #include "tests/support/scratch_directory.h"
 
@@ -56,6 +59,26 @@ TEST(DngRoundTrip, EveryPhaseAndLayoutAtOddAndEvenSizesIsBitExact) {
   }
 }
 
+TEST(DngRoundTrip, FloatingPointSamplesOfAnyLayoutAndSizeAreBitExact) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {1, 30}, {22, 22}, {701, 1503}}) {
+    for (const SensorLayout layout : {SensorLayout::bayer, SensorLayout::monochrome, SensorLayout::linear_rgb}) {
+      RawFrame frame = plain_frame(width, height, layout);
+      test::make_floats(frame.raw, 1.0 / 65535);  // not exact, so that all bits are used
+      frame.raw.white_dn.fill(1);
+      frame.raw.dn_float.data()[0] = -1e-30F;
+      frame.raw.dn_float.data()[frame.raw.samples() - 1] = 16'777'216.0F;
+      frame.noise = NoiseProfile{{1e-9, 1e-9, 1e-9}, {1e-17, 1e-17, 1e-17}};
+      const RawFrame read = round_trip(frame);
+      EXPECT_EQ(read.raw.layout, layout);
+      EXPECT_TRUE(test::same_bits(read.raw.dn_float, frame.raw.dn_float)) << width << " x " << height;
+      EXPECT_EQ(read.raw.white_dn, frame.raw.white_dn);
+      EXPECT_EQ(read.noise->scale, frame.noise->scale);
+      EXPECT_EQ(read.noise->offset, frame.noise->offset);
+      EXPECT_NEAR(read.raw.black_tag->pattern_dn[0], 256.0 / 65535, rational_tolerance);
+    }
+  }
+}
+
 TEST(DngRoundTrip, BordersMasksAndCropKeepTheirPlacesAndThePhaseItsCorner) {
   RawFrame frame = plain_frame(40, 36, SensorLayout::bayer, BayerPhase::gbrg);
   frame.raw.active = {5, 3, 33, 31};
@@ -71,6 +94,26 @@ TEST(DngRoundTrip, BordersMasksAndCropKeepTheirPlacesAndThePhaseItsCorner) {
 
   frame.raw.masked_is_stated = false;  // taken to be masked, and not written as if the source had said so
   EXPECT_FALSE(round_trip(frame).raw.masked_is_stated);
+}
+
+// 90,000 blocks: more bytes than a count of 16 bits states.
+TEST(DngRoundTrip, TheNoiseRatioKeepsItsBlocksAndPowersOfTwo) {
+  RawFrame frame = plain_frame(610, 607);
+  frame.raw.active = {4, 6, 600, 600};
+  frame.raw.default_crop = {0, 0, 600, 600};
+  NoiseRatio ratio{.block_px = 2, .ratio = Plane<float>(300, 300)};
+  for (std::size_t i = 0; i < ratio.ratio.size(); ++i) {
+    ratio.ratio.data()[i] = std::exp2(static_cast<float>(i * i % 15) - 6);
+  }
+  const Plane<float> expected = ratio.ratio.clone();
+  frame.noise_ratio = std::make_shared<const NoiseRatio>(std::move(ratio));
+  const RawFrame read = round_trip(frame);
+  ASSERT_NE(read.noise_ratio, nullptr);
+  EXPECT_EQ(read.noise_ratio->block_px, 2);
+  EXPECT_TRUE(test::same_bits(read.noise_ratio->ratio, expected));
+  EXPECT_TRUE(test::same_bits(read.raw.dn, frame.raw.dn));
+  frame.noise_ratio = nullptr;
+  EXPECT_EQ(round_trip(frame).noise_ratio, nullptr);
 }
 
 TEST(DngRoundTrip, BlackLevelsKeepFractionsSitesAndDeltas) {

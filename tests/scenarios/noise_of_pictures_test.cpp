@@ -8,11 +8,12 @@
 #include "denoise/check/noise_check.h"
 #include "isp/base/executor.h"
 #include "tests/sensor_bench/picture_raw.h"
+#include "tests/support/executors.h"
 
 namespace lowlux {
 namespace {
 
-PoolExecutor executor(2);
+using test::two_threads;
 
 using denoise::NoiseFinding;
 
@@ -34,7 +35,7 @@ denoise::NoiseCheck checked(const RawDn& raw, const SensorModel& sensor, double 
   const denoise::RawNoise noise{
       .dark_mean_e = {dark_e, dark_e, dark_e, dark_e},
       .variance_e2 = {read_noise_e * read_noise_e, read_noise_e * read_noise_e, read_noise_e * read_noise_e}};
-  return denoise::check_noise({electrons(raw, sensor, factor).view(), raw.phase}, noise, executor);
+  return denoise::check_noise({electrons(raw, sensor, factor).view(), raw.phase}, noise, two_threads);
 }
 
 bool has(const denoise::NoiseCheck& check, NoiseFinding finding) {

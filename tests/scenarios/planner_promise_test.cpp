@@ -17,14 +17,15 @@
 #include "isp/pipeline/render/frame_tiles.h"
 #include "tests/scenarios/planner_scene.h"
 #include "tests/scenarios/seen_difference.h"
+#include "tests/support/executors.h"
 
 namespace lowlux::isp {
 namespace {
 
-PoolExecutor executor(2);
+using test::two_threads;
 
 Developed developed(const test::PlannerScene& scene, bool all) {
-  Result<Developed> out = develop(scene.raw.frame, scene.ways(all), executor);
+  Result<Developed> out = develop(scene.raw.frame, scene.ways(all), two_threads);
   EXPECT_TRUE(out) << (out ? "" : out.error().message);
   return *std::move(out);
 }
@@ -41,10 +42,10 @@ TEST(PlannerPromise, WhatIsLeftOutStaysBelowTheToleranceOver300Scenes) {
   std::vector<double> saved, of_tolerance;
   std::array<int, 4> levels{};
   for (std::uint32_t i = 0; i < scenes; ++i) {
-    const test::PlannerScene scene = test::planner_scene(i, 256, 192, executor);
+    const test::PlannerScene scene = test::planner_scene(i, 256, 192, two_threads);
     const Developed planned = developed(scene, false), everything = developed(scene, true);
     const double seen =
-        seen_difference(std::get<Encoded8>(planned.picture), std::get<Encoded8>(everything.picture), executor)
+        seen_difference(std::get<Encoded8>(planned.picture), std::get<Encoded8>(everything.picture), two_threads)
             .percentile95;
     of_tolerance.push_back(seen / scene.tolerance);
     if (seen >= scene.tolerance) {
@@ -98,7 +99,7 @@ struct Judged {
 Judged judged(const test::PlannerScene& scene, const Developed& planned, const Developed& everything) {
   const SceneLinear a = light_of_codes(std::get<Encoded8>(planned.picture));
   const SceneLinear b = light_of_codes(std::get<Encoded8>(everything.picture));
-  Judged out{.seen = seen_difference(a.view(), b.view(), executor).percentile95 / scene.tolerance,
+  Judged out{.seen = seen_difference(a.view(), b.view(), two_threads).percentile95 / scene.tolerance,
              .lines = line_difference(a.view(), b.view()).percentile95 / scene.tolerance};
   const PixelDifference pixels(a.view(), b.view());
   for (const Pixel& p : everything.plan.levels.defects) {
@@ -120,7 +121,7 @@ TEST(PlannerPromise, LargeFramesKeepItForLinesAndSinglePixelsToo) {
     const bool tiled = i % 16 == 9;
     const Size size = tiled ? Size{6272, 4160} : i % 16 == 15 ? Size{3072, 2048} : Size{};
     const std::uint32_t index = i % 16 == 15 ? i + 9 : i;
-    const test::PlannerScene scene = test::planner_scene(index, size.width, size.height, executor);
+    const test::PlannerScene scene = test::planner_scene(index, size.width, size.height, two_threads);
     const Developed planned = developed(scene, false), everything = developed(scene, true);
     branches.count(planned.plan);
     const Judged by = judged(scene, planned, everything);

@@ -26,6 +26,9 @@ Result<BenchOutcome> run_retarget_bench(const BenchOptions& options);
 /// Runs the stage `develop`: complete plans, against the noise-free mean developed.
 Result<BenchOutcome> run_develop_bench(const BenchOptions& options);
 
+/// Runs the stage `merge`: ways to merge bursts to one raw frame, against the truth of their first frame.
+Result<BenchOutcome> run_merge_bench(const BenchOptions& options);
+
 /// Runs the stage `scaling`: time and memory of developing over the size of the frame and the threads; time per file
 /// for a few files. Errors: those of writing and reading these.
 Result<BenchOutcome> run_scaling_bench(const BenchOptions& options);

@@ -204,6 +204,10 @@ Result<Matrix3> xyz_to_camera(const CameraColour& colour, const Xy& scene_white)
   return calibration_at(colour, scene_white).map([](const Calibration& c) { return c.xyz_to_camera; });
 }
 
+double calibration_weight(const CameraColour& colour, const Xy& scene_white) {
+  return weight_of(bracket_of(colour), scene_white);
+}
+
 Result<WhitePoint> white_of_neutral(const CameraColour& colour, const Vector3& neutral) {
   if (auto fault = fault_of(colour)) return tl::make_unexpected(*std::move(fault));
   if (!is_positive(neutral)) {

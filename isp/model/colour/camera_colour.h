@@ -25,6 +25,10 @@ struct WhitePoint {
 /// or the last.
 Result<Matrix3> xyz_to_camera(const CameraColour& colour, const Xy& scene_white);
 
+/// Returns the weight of the calibration with the higher temperature at a scene white: linear in 1/CCT, constant beyond
+/// the ends; 1 where interpolation is not possible. Precondition: a calibration.
+double calibration_weight(const CameraColour& colour, const Xy& scene_white);
+
 /// Returns the scene white that makes camera RGB `neutral` a neutral. The matrix depends on the white and the white on
 /// the matrix: the iteration of the specification starts at D50; where it does not converge (a cycle between steep
 /// calibrations), the interpolation weight is bisected instead. The white that a weight leads to has a weight in 0..1

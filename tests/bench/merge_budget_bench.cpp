@@ -1,0 +1,120 @@
+// Measures how well the times of merging are predicted and budgets kept:
+//     merge_budget_bench [DRAW] [MERGES]
+// Frames of 0.4 to 9 MP, 2 to 12 of them, at rest or hand-held, with budgets between the cheapest and the best method.
+// DRAW is the seed (default 1). The machine is measured first.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "isp/base/executor.h"
+#include "isp/bench/merge_cost.h"
+#include "isp/bench/speed_probe.h"
+#include "isp/bench/timing_frame.h"
+#include "isp/metrics/statistics.h"
+#include "isp/pipeline/merge/merge_budget.h"
+#include "isp/pipeline/merge/merge_frames.h"
+
+namespace {
+
+using namespace lowlux;
+using namespace lowlux::isp;
+
+constexpr double tolerance = 0.2;  // of budget and prediction
+
+const char* name_of_alignment(MergeAlignment alignment) {
+  return alignment == MergeAlignment::none ? "none" : alignment == MergeAlignment::cells ? "cells" : "subpixel";
+}
+
+/// Returns the codes of a frame displaced by whole cells.
+RawFrame displaced(const RawFrame& frame, int cells) {
+  RawFrame out = copy_of(frame);
+  const int width = out.raw.dn.width(), height = out.raw.dn.height(), px = 2 * cells;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      out.raw.dn.at(x, y) =
+          frame.raw.dn.at(std::min(x + px, width - 2 + (x & 1)), std::min(y + px, height - 2 + (y & 1)));
+    }
+  }
+  return out;
+}
+
+struct Draw {
+  int frames;
+  FrameSize size;
+  bool moves;
+  double place;  // of the budget between the times of the cheapest and the best method, logarithmic
+};
+
+/// Returns whether budget and prediction were kept.
+bool run(const Draw& draw, std::shared_ptr<CostModel> cost, SpeedProbe& pace, Executor& executor) {
+  std::vector<RawFrame> frames;
+  frames.reserve(static_cast<std::size_t>(draw.frames));
+  const RawFrame first = timing_frame(draw.size, {20, 5});
+  for (int i = 0; i < draw.frames; ++i) frames.push_back(displaced(first, draw.moves ? i : 0));
+  const auto now_s = pace_now(pace, executor);
+  if (!now_s) return false;
+  cost->pace = *now_s / cost->pace_s;
+  const MergeWork work{.frames = draw.frames, .size = cost_size(draw.size.width, draw.size.height)};
+  const double least_s = predicted_merge_s(*cost, work, {MergeAlignment::none, false}, false);
+  const double most_s = predicted_merge_s(*cost, work, {MergeAlignment::subpixel, true}, true);
+  const double budget_s = 1.05 * least_s * std::pow(most_s / least_s, draw.place);
+  const FrameReader read = [&](int index) {
+    DevelopOptions options;
+    options.denoise.mode = DenoiseChoice::Mode::automatic;
+    options.effects = ProcessingGoal{.budget_s = budget_s, .cost = cost};
+    return Result<FrameToMerge>({copy_of(frames[static_cast<std::size_t>(index)]), options, {}});
+  };
+  const auto merged = merge_frames(draw.frames, read, {}, executor);
+  if (!merged) {
+    std::printf("%s\n", merged.error().message.c_str());
+    return false;
+  }
+  const MergePlan& plan = *merged->plan;
+  const double ratio = plan.taken_s / plan.predicted_s;
+  std::printf("%4.1f MP  %2d frames %-9s budget %6.0f ms  %-6s %-8s  predicted %6.0f  taken %6.0f  ratio %.2f\n",
+              work.size.megapixels, draw.frames, draw.moves ? "hand-held" : "at rest", 1e3 * budget_s,
+              plan.method.robust ? "robust" : "plain", name_of_alignment(plan.method.alignment), 1e3 * plan.predicted_s,
+              1e3 * plan.taken_s, ratio);
+  return std::fabs(ratio - 1) <= tolerance && plan.taken_s <= (1 + tolerance) * budget_s;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const unsigned seed = argc > 1 ? static_cast<unsigned>(std::atoi(argv[1])) : 1;
+  const int merges = argc > 2 ? std::atoi(argv[2]) : 30;
+  PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));
+  SpeedProbe pace;
+  const auto warm_s = pace_now(pace, executor);
+  if (!warm_s) return 1;
+  auto cost = std::make_shared<CostModel>();
+  cost->pace_s = *warm_s;
+  if (const auto measured = measure_merge_cost(pace, cost->pace_s, executor, *cost); !measured) return 1;
+  for (int i = static_cast<int>(CostPart::merge_frame); i < cost_parts; ++i) {
+    const auto part = static_cast<CostPart>(i);
+    const double ms = 1e3 * cost->seconds(part, cost_size(3680, 2448)) / cost_size(3680, 2448).megapixels;
+    std::printf("%-18s %7.2f ms per MP, %.3f of the fixed workload\n", std::string(name_of(part)).c_str(), ms,
+                1e-3 * ms / cost->pace_s);
+  }
+  std::mt19937 random(seed);
+  const auto whole = [&](int least, int most) { return std::uniform_int_distribution<>(least, most)(random); };
+  int kept = 0;
+  for (int i = 0; i < merges; ++i) {
+    const int width = 2 * whole(400, 1840);
+    const Draw draw{whole(2, 12),
+                    {width, width * 2 / 3 / 2 * 2},
+                    whole(0, 1) == 1,
+                    std::uniform_real_distribution<>(0, 1.2)(random)};
+    kept += run(draw, cost, pace, executor) ? 1 : 0;
+  }
+  std::printf("%d of %d within %.0f %% of budget and prediction\n", kept, merges, 100 * tolerance);
+  return kept >= 0.9 * merges ? 0 : 1;
+}
