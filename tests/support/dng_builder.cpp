@@ -50,6 +50,7 @@ std::vector<std::byte> jpeg_part(const DngBuilder& dng, const std::vector<std::u
 }
 
 std::vector<std::vector<std::byte>> image_parts(const DngBuilder& dng) {
+  if (!dng.stored_parts.empty()) return dng.stored_parts;
   const std::vector<std::uint16_t> pixels = dng.pixels.empty() ? ramp(dng) : dng.pixels;
   std::vector<std::vector<std::byte>> parts;
   if (dng.storage == DngStorage::lossless_jpeg) return {jpeg_part(dng, pixels, 0, 0, dng.width, dng.height)};
@@ -78,17 +79,17 @@ bool belongs_to_image(std::uint16_t id) {
   constexpr std::uint16_t others[] = {322,   323,   324,   325,   33421, 33422, 50710, 50711,
                                       50712, 50713, 50714, 50715, 50716, 50717, 50718, 50719,
                                       50720, 50829, 50830, 51008, 51009, 51022, 51041};
-  return (id >= 254 && id <= 262) || id == 273 || (id >= 277 && id <= 284) || id == 339 ||
+  return (id >= 254 && id <= 262) || id == 273 || (id >= 277 && id <= 284) || id == 317 || id == 339 ||
          std::find(std::begin(others), std::end(others), id) != std::end(others);
 }
 
 bool belongs_to_exif(std::uint16_t id) {
-  return id == 33434 || id == 33437 || (id >= 34850 && id <= 34867) || (id >= 36864 && id <= 42080);
+  return id == 33434 || id == 33437 || (id >= 34850 && id <= 34867 && id != 34853) || (id >= 36864 && id <= 42080);
 }
 
 void add_image_tags(const DngBuilder& dng, const std::vector<double>& offsets, const std::vector<double>& sizes,
                     TagDirectory& directory) {
-  const bool tiled = dng.storage == DngStorage::tiled_lossless_jpeg;
+  const bool tiled = dng.stored_parts.empty() ? dng.storage == DngStorage::tiled_lossless_jpeg : dng.parts_are_tiles;
   const bool mosaic = dng.samples == 1 && !dng.monochrome;
   directory[254] = one(TagType::u32, 0);
   directory[256] = one(TagType::u32, dng.width);

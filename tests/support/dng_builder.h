@@ -34,7 +34,9 @@ struct DngBuilder {
   DngStorage storage = DngStorage::uncompressed;
   int jpeg_components = 2;  // components that a mosaic's row is split into; LinearRaw has one for each sample
   int tile_width = 16, tile_height = 16;
-  int rows_per_strip = 0;  // 0: one strip
+  int rows_per_strip = 0;                            // 0: one strip
+  std::vector<std::vector<std::byte>> stored_parts;  // strips or tiles as stored, instead of pixels and storage
+  bool parts_are_tiles = false;
   bool big_endian = false;
   bool raw_in_sub_ifd = false;  // a small RGB preview comes first, the raw image is its SubIFD
 

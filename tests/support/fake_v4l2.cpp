@@ -15,11 +15,11 @@ constexpr int camera = -1;  // value in files_
 }  // namespace
 
 FakeV4l2::FakeV4l2(bool is_multi_planar)
-    : capabilities(V4L2_CAP_STREAMING | (is_multi_planar ? V4L2_CAP_VIDEO_CAPTURE_MPLANE : V4L2_CAP_VIDEO_CAPTURE)),
-      formats{{V4L2_PIX_FMT_YUYV, 2, {{640, 480}}},
+    : formats{{V4L2_PIX_FMT_YUYV, 2, {{640, 480}}},
               {V4L2_PIX_FMT_SRGGB8, 1, {{32, 24}, {16, 12}}},
               {V4L2_PIX_FMT_SRGGB10, 2, {{16, 12}, {32, 24}}},
               {V4L2_PIX_FMT_Y12, 2, {{16, 12}}}},
+      capabilities(V4L2_CAP_STREAMING | (is_multi_planar ? V4L2_CAP_VIDEO_CAPTURE_MPLANE : V4L2_CAP_VIDEO_CAPTURE)),
       layout{V4L2_PIX_FMT_YUYV, 640, 480, 1280, 1280 * 480},
       is_multi_planar_(is_multi_planar) {}
 

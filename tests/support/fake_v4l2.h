@@ -62,12 +62,12 @@ class FakeV4l2 {
   capture::V4l2System system();
 
   // The camera; to be changed before it is opened.
-  std::uint32_t capabilities;
   std::vector<std::string> paths{"/dev/video0"};
   std::vector<Format> formats;
   std::map<std::uint32_t, Control> controls;
   std::int64_t pixel_rate_hz = 0;  // 0: no such control
-  std::uint32_t crop_width = 0;    // 0: no selections
+  std::uint32_t capabilities;
+  std::uint32_t crop_width = 0;  // 0: no selections
   std::uint32_t interval[2] = {1, 30};
   bool sets_interval = true;
   std::optional<std::uint32_t> only_interval;  // frames per second that it keeps to
@@ -86,8 +86,8 @@ class FakeV4l2 {
   int calls_before_unplugging = 1 << 30;
   bool unplugged = false;
   bool wakes_on_unplugging = true;
-  int poll_errno = 0;
   short poll_answer = 0;  // bits that are returned at once, whatever is waited for
+  int poll_errno = 0;
 
   // The stream.
   std::deque<Frame> frames;  // frames to come
