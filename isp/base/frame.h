@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +11,7 @@
 #include "isp/base/cfa.h"
 #include "isp/base/correction.h"
 #include "isp/base/matrix3.h"
+#include "isp/base/noise_ratio.h"
 #include "isp/base/plane.h"
 
 namespace lowlux {
@@ -74,8 +77,13 @@ struct BlackLevel {
 /// Holds one readout, as the source delivers it after its own LinearizationTable and before anything else. `dn` holds
 /// the complete readout, borders included: readout height x width (x 3 interleaved for linear_rgb). `active` is in
 /// readout pixels; `phase`, `black_tag` and `default_crop` count from the corner of `active`.
+///
+/// Frames that were computed, such as merges of several exposures, may hold floating-point samples: these are in
+/// `dn_float`, and `dn` is empty. They are in the units of the black and white levels, signed and finite, may exceed
+/// white, and have no quantisation noise. Frames of cameras hold codes in `dn`, and `dn_float` is empty.
 struct RawDn {
   Plane<std::uint16_t> dn;
+  Plane<float> dn_float;
   SensorLayout layout = SensorLayout::bayer;
   BayerPhase phase = BayerPhase::rggb;  // only for SensorLayout::bayer
   Rect active;
@@ -85,7 +93,20 @@ struct RawDn {
   std::optional<BlackLevel> black_tag;  // what the source states; absent if it states nothing
   std::array<double, 3> white_dn{};     // saturation of R, G, B (all equal for monochrome)
   FrameInfo info;
+
+  bool is_float() const { return !dn_float.empty(); }
+  int row_samples() const { return is_float() ? dn_float.width() : dn.width(); }  // in one row of the readout
+  int rows() const { return is_float() ? dn_float.height() : dn.height(); }       // of the readout
+  std::size_t samples() const { return is_float() ? dn_float.size() : dn.size(); }
+  std::size_t sample_bytes() const { return is_float() ? sizeof(float) : sizeof(std::uint16_t); }
 };
+
+/// Calls `use` with a view of the readout's samples, of const std::uint16_t or const float, and returns its result.
+template <class Use>
+decltype(auto) with_samples(const RawDn& raw, Use&& use) {
+  if (raw.is_float()) return use(raw.dn_float.view());
+  return use(raw.dn.view());
+}
 
 /// Holds the black point of one frame, per CFA site. The pedestal [DN] is subtracted, or is the mean of what is
 /// subtracted where `pattern` is set. If it was measured on masked pixels or dark frames it holds the dark charge too,
@@ -131,6 +152,7 @@ struct RawFrame {
   RawDn raw;
   CameraColour colour;
   std::optional<NoiseProfile> noise;
+  std::shared_ptr<const NoiseRatio> noise_ratio;  // of a mosaic; null: the noise is that of `noise` everywhere
   RawCorrections corrections;
   std::vector<std::string> warnings;  // requests of the source that were not met, by name; one line each
 };

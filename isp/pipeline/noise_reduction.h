@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -59,6 +60,7 @@ struct NoiseReduction {
   std::optional<double> snr;            // of one pixel in the median block of the frame, by the noise model
   NoiseProfile::Source source = NoiseProfile::Source::file;
   denoise::RawNoise noise;
+  std::shared_ptr<const NoiseRatio> noise_ratio;  // RawFrame::noise_ratio, also where nothing is reduced
   denoise::DenoiseOptions options;
   std::vector<denoise::LineOffsets> lines;  // subtracted before noise reduction
   std::optional<TemporalReduction> temporal;

@@ -15,6 +15,7 @@
 #include "isp/raw/black_point.h"
 #include "isp/raw/kernel/demosaic.h"
 #include "isp/render/output_space.h"
+#include "isp/render/profile_tables.h"
 #include "isp/render/tone.h"
 
 namespace lowlux::isp {
@@ -50,6 +51,9 @@ struct DevelopOptions {
   std::shared_ptr<const DarkFrame> dark_frame;  // set: subtracted pixel by pixel instead of `black`
   DenoiseChoice denoise;
   LookChoice look;
+  /// Holds the tables of the profile in the file; null: none. They are applied where an image is made to be looked at:
+  /// in spaces that are not linear, without a look of the eye or of a model.
+  std::shared_ptr<const ProfileTables> profile_tables;
   std::shared_ptr<const DisplayTarget> display;  // set: sRGB codes are changed for it
   std::optional<ProcessingGoal> effects;         // absent: each option above decides for itself
 };

@@ -24,44 +24,50 @@ constexpr double star_fraction = 0.2187, star_fraction_green = 0.11;
 constexpr double shared_deviation = 0.44;  // of the neighbours' mean excess, in standard deviations of a pixel
 constexpr double certain = 3.5;            // required margin in standard deviations
 
+template <class Sample>
 struct Neighbours {
-  int low;
-  int high;
+  Sample low;
+  Sample high;
 };
 
-Neighbours eight_same_colour(const PlaneView<const std::uint16_t>& dn, int x, int y) {
-  const std::uint16_t* above = dn.row(y - 2) + x;
-  const std::uint16_t* here = dn.row(y) + x;
-  const std::uint16_t* below = dn.row(y + 2) + x;
-  const std::array<int, 8> v{above[-2], above[0], above[2], here[-2], here[2], below[-2], below[0], below[2]};
+template <class Sample>
+Neighbours<Sample> eight_same_colour(const PlaneView<const Sample>& dn, int x, int y) {
+  const Sample* above = dn.row(y - 2) + x;
+  const Sample* here = dn.row(y) + x;
+  const Sample* below = dn.row(y + 2) + x;
+  const std::array<Sample, 8> v{above[-2], above[0], above[2], here[-2], here[2], below[-2], below[0], below[2]};
   return {*std::min_element(v.begin(), v.end()), *std::max_element(v.begin(), v.end())};
 }
 
 // Returns the difference of a pixel from the median of its four nearest neighbours of the same colour that lie inside
 // the plane; a star next to them reaches one or two of the neighbours.
-double excess(const PlaneView<const std::uint16_t>& dn, int x, int y) {
-  int sum = 0, n = 0, low = 65535, high = 0;
+template <class Sample>
+double excess(const PlaneView<const Sample>& dn, int x, int y) {
+  double sum = 0, low = INFINITY, high = -INFINITY;
+  int n = 0;
   for (const auto [dx, dy] : {std::array{-2, 0}, {2, 0}, {0, -2}, {0, 2}}) {
     if (x + dx < 0 || x + dx >= dn.width || y + dy < 0 || y + dy >= dn.height) continue;
-    const int value = dn.at(x + dx, y + dy);
+    const double value = dn.at(x + dx, y + dy);
     sum += value;
     low = std::min(low, value);
     high = std::max(high, value);
     ++n;
   }
   if (n == 0) return 0;
-  const double median = n > 2 ? static_cast<double>(sum - low - high) / (n - 2) : static_cast<double>(sum) / n;
+  const double median = n > 2 ? (sum - low - high) / (n - 2) : sum / n;
   return dn.at(x, y) - median;
 }
 
 // Returns the direct neighbours' mean excess over their same-colour neighbours.
-double shared_excess(const PlaneView<const std::uint16_t>& dn, int x, int y) {
+template <class Sample>
+double shared_excess(const PlaneView<const Sample>& dn, int x, int y) {
   return (excess(dn, x - 1, y) + excess(dn, x + 1, y) + excess(dn, x, y - 1) + excess(dn, x, y + 1)) / 4;
 }
 
 // Data of the defect test that depends on the frame, not on the pixel.
+template <class Sample>
 struct Criterion {
-  PlaneView<const std::uint16_t> dn;
+  PlaneView<const Sample> dn;
   BayerPhase phase;
   PerSite<double> black_dn;
   DefectNoise noise;
@@ -69,19 +75,22 @@ struct Criterion {
 
   double variance(int x, int y, double dn_value) const {
     const double level = std::max(0.0, dn_value - black_dn[site_of(x, y)]);
-    return noise.black_std_dn * noise.black_std_dn + noise.shot_dn * level;
+    return static_cast<double>(noise.ratio.at(x, y)) *
+           (noise.black_std_dn * noise.black_std_dn + noise.shot_dn * level);
   }
   bool noise_is_known() const { return noise.shot_dn > 0 && noise.black_std_dn > 0; }
 };
 
-double min_distance(const Criterion& judge, int x, int y, const Neighbours& n, int nearer) {
-  const double range = n.high - n.low;
+template <class Sample>
+double min_distance(const Criterion<Sample>& judge, int x, int y, const Neighbours<Sample>& n, double nearer) {
+  const double range = static_cast<double>(n.high) - n.low;
   if (!judge.noise_is_known()) return range_factor * range + judge.floor_dn;
   const double sigma = std::sqrt(judge.variance(x, y, nearer));
   return detail_factor * std::max(0.0, range - noise_range * sigma) + known_noise_factor * sigma;
 }
 
-double most_shared(const Criterion& judge, int x, int y, double own) {
+template <class Sample>
+double most_shared(const Criterion<Sample>& judge, int x, int y, double own) {
   const bool green = colour_at(judge.phase, x, y) == CfaColour::green;
   const double cap = (green ? max_shared_green : max_shared) * own;
   if (!judge.noise_is_known()) return cap;
@@ -93,9 +102,10 @@ double most_shared(const Criterion& judge, int x, int y, double own) {
   return std::min(cap, (green ? star_fraction_green : star_fraction) * own - certain * scatter);
 }
 
-bool is_defect(const Criterion& judge, int x, int y) {
-  const Neighbours n = eight_same_colour(judge.dn, x, y);
-  const int value = judge.dn.at(x, y);
+template <class Sample>
+bool is_defect(const Criterion<Sample>& judge, int x, int y) {
+  const Neighbours<Sample> n = eight_same_colour(judge.dn, x, y);
+  const double value = judge.dn.at(x, y);
   const bool hot = value > n.high;
   const double beyond = hot ? value - n.high : n.low - value;
   if (beyond <= min_distance(judge, x, y, n, hot ? n.high : n.low)) return false;
@@ -103,12 +113,21 @@ bool is_defect(const Criterion& judge, int x, int y) {
   return shared_excess(judge.dn, x, y) * (own > 0 ? 1 : -1) < most_shared(judge, x, y, std::fabs(own));
 }
 
-// Returns lower bounds on the distances that is_defect() requires, with a margin for rounding.
-defect_rows::Bounds min_bounds(const Criterion& judge, int x, int y) {
+// Returns the smallest noise ratio of pixels x .. x + count - 1 of a row.
+double min_ratio(const NoiseRatioView& ratio, int x, int count, int y) {
+  float least = ratio.at(x + count - 1, y);
+  if (ratio.is_one()) return 1;
+  for (int i = 0; i < count; i += ratio.block_px) least = std::min(least, ratio.at(x + i, y));
+  return static_cast<double>(least);
+}
+
+// Returns lower bounds on the distances that is_defect() requires, with a margin for rounding, for `count` pixels.
+template <class Sample>
+defect_rows::Bounds min_bounds(const Criterion<Sample>& judge, int x, int count, int y) {
   constexpr double nearly = 0.999;
   defect_rows::Bounds bounds;
   if (judge.noise_is_known()) {
-    constexpr double squared = nearly * known_noise_factor * known_noise_factor;
+    const double squared = nearly * known_noise_factor * known_noise_factor * min_ratio(judge.noise.ratio, x, count, y);
     bounds.black_dn = {static_cast<float>(judge.black_dn[site_of(x, y)]),
                        static_cast<float>(judge.black_dn[site_of(x + 1, y)])};
     bounds.variance_dn2 = static_cast<float>(squared * judge.noise.black_std_dn * judge.noise.black_std_dn);
@@ -121,14 +140,16 @@ defect_rows::Bounds min_bounds(const Criterion& judge, int x, int y) {
 }
 
 // Tests a run of the row with the fast kernel first, so that the slower exact test runs on few pixels.
-void judge_row(const Criterion& judge, int y, std::vector<Pixel>& found) {
+template <class Sample>
+void judge_row(const Criterion<Sample>& judge, int y, std::vector<Pixel>& found) {
   std::array<std::uint8_t, 512> marked;
   constexpr int most = marked.size();
-  const defect_rows::Bounds bounds = min_bounds(judge, 2, y);
   for (int first = 2; first < judge.dn.width - 2; first += most) {
     const int count = std::min(most, judge.dn.width - 2 - first);
-    defect_rows::mark_outliers({judge.dn.row(y - 2) + first, judge.dn.row(y) + first, judge.dn.row(y + 2) + first},
-                               count, bounds, marked.data());
+    const defect_rows::Bounds bounds = min_bounds(judge, first, count, y);
+    const defect_rows::Rows<Sample> rows{judge.dn.row(y - 2) + first, judge.dn.row(y) + first,
+                                         judge.dn.row(y + 2) + first};
+    defect_rows::mark_outliers(rows, count, bounds, marked.data());
     const std::uint8_t *const begin = marked.data(), *const end = begin + count;
     for (const std::uint8_t* at = std::find(begin, end, 1); at != end; at = std::find(at + 1, end, 1)) {
       const int x = first + static_cast<int>(at - begin);
@@ -139,25 +160,32 @@ void judge_row(const Criterion& judge, int y, std::vector<Pixel>& found) {
 
 bool before(const Pixel& a, const Pixel& b) { return a.y != b.y ? a.y < b.y : a.x < b.x; }
 
+template <class Sample>
+std::vector<Pixel> judge_all(const Criterion<Sample>& judge, Executor& executor) {
+  std::vector<std::vector<Pixel>> found(executor.width());
+  for_each_band(executor, judge.dn.height, [&](RowBand band, int index) {
+    const int last = std::min(band.last, judge.dn.height - 2);
+    for (int y = std::max(band.first, 2); y < last; ++y) judge_row(judge, y, found[index]);
+  });
+  std::vector<Pixel> all;
+  for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
 }  // namespace
 
 std::vector<Pixel> find_defects(const RawDn& raw, const BlackPoint& black, const DefectNoise& noise,
                                 Executor& executor) {
   const Rect& a = raw.active;
   if (raw.layout != SensorLayout::bayer || a.width < 5 || a.height < 5) return {};
-  const PlaneView<const std::uint16_t> dn = raw.dn.view().crop(a.x, a.y, a.width, a.height);
   double range = 0;
   for (int site = 0; site < 4; ++site) range = std::max(range, white_at(raw, site) - black.pedestal_dn[site]);
-  Criterion judge{dn, raw.phase, black.pedestal_dn, noise, noise_factor * noise.black_std_dn + floor_of_white * range};
-  if (judge.noise_is_known()) judge.floor_dn = known_noise_factor * noise.black_std_dn;
-  std::vector<std::vector<Pixel>> found(executor.width());
-  for_each_band(executor, a.height, [&](RowBand band, int index) {
-    const int last = std::min(band.last, a.height - 2);
-    for (int y = std::max(band.first, 2); y < last; ++y) judge_row(judge, y, found[index]);
+  return with_samples(raw, [&]<class Sample>(PlaneView<const Sample> readout) {
+    Criterion<Sample> judge{readout.crop(a.x, a.y, a.width, a.height), raw.phase, black.pedestal_dn, noise,
+                            noise_factor * noise.black_std_dn + floor_of_white * range};
+    if (judge.noise_is_known()) judge.floor_dn = known_noise_factor * noise.black_std_dn;
+    return judge_all(judge, executor);
   });
-  std::vector<Pixel> all;
-  for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
-  return all;
 }
 
 std::optional<std::vector<Pixel>> named_defects(const RawDn& raw, const std::vector<DefectRect>& defects) {

@@ -57,6 +57,11 @@ Result<BlackPoint> black_of(const RawDn& raw, const DarkFrame& dark) {
     return fail(ErrorCode::unsupported,
                 "the picture is already demosaiced; dark frames are subtracted from the mosaic as the sensor gave it");
   }
+  if (raw.is_float()) {
+    return fail(ErrorCode::unsupported,
+                "the picture has floating-point samples, which are computed; dark frames are subtracted from the codes "
+                "of the sensor");
+  }
   if (dark.dn.width() != raw.active.width || dark.dn.height() != raw.active.height) {
     return fail(ErrorCode::invalid_argument,
                 fmt::format("the dark frame has {} x {} pixels, the picture {} x {}; take darks with its camera and "
@@ -103,6 +108,7 @@ RawFrame measurable_without_dark(const RawFrame& frame, const DarkFrame& dark, c
   out.raw.default_crop = raw.default_crop;
   out.raw.white_dn = raw.white_dn;
   out.noise = frame.noise;
+  out.noise_ratio = frame.noise_ratio;
   for_each_pixel(raw, dark, black, whole_of(raw), executor, [&](int x, int y, float light, const Site& site) {
     const float code = std::clamp(light + site.mean, 0.0f, 65535.0f);
     out.raw.dn.row(y)[x] = static_cast<std::uint16_t>(std::lround(code));

@@ -9,8 +9,8 @@ namespace lowlux::isp {
 
 /// Returns the black point that a dark frame represents: its sites' means, with pedestal and dark charge in one, or of
 /// bias frames the pedestal.
-/// Errors: a frame that is not a mosaic (unsupported), a dark frame of another size than the active area
-/// (invalid_argument), white not above black (malformed).
+/// Errors: a frame that is not a mosaic or has floating-point samples (unsupported), a dark frame of another size than
+/// the active area (invalid_argument), white not above black (malformed).
 Result<BlackPoint> black_of(const RawDn& raw, const DarkFrame& dark);
 
 /// Subtracts the dark frame from the active area, pixel by pixel: value = (dn - dark) / (white - mean dark of the

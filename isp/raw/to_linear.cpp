@@ -30,26 +30,21 @@ Rect whole_of(const RawDn& raw) { return {0, 0, raw.active.width, raw.active.hei
          part.y + part.height <= raw.active.height && out.width == part.width && out.height == part.height;
 }
 
-// Returns the codes of row y of a region of the active area.
-const std::uint16_t* codes_of(const RawDn& raw, const Rect& part, int y) {
-  return raw.dn.row(raw.active.y + part.y + y) + raw.active.x + part.x;
-}
-
 // Subtracts the pattern of a tag that four figures cannot express; white stays that of the site.
-void row_by_pattern(const RawDn& raw, const BlackLevel& pattern, const Rect& part, int y, float* out) {
-  const std::uint16_t* dn = codes_of(raw, part, y);
+template <class Sample>
+void row_by_pattern(const RawDn& raw, const Sample* dn, const BlackLevel& pattern, const Rect& part, int y,
+                    float* out) {
   for (int x = 0; x < part.width; ++x) {
     const double black = pattern.at(part.x + x, part.y + y);
     out[x] = static_cast<float>((dn[x] - black) / (white_at(raw, site_of(x, y)) - black));
   }
 }
 
-void row_by_site(const RawDn& raw, const SiteScale& scale, const Rect& part, int y, float* out) {
-  const std::uint16_t* dn = codes_of(raw, part, y);
+template <class Sample>
+void row_by_site(const Sample* dn, const SiteScale& scale, int width, int y, float* out) {
   const int left = site_of(0, y);
   const float black[2] = {scale.black[left], scale.black[left + 1]};
   const float gain[2] = {scale.gain[left], scale.gain[left + 1]};
-  const int width = part.width;
   int x = 0;
   for (; x + 1 < width; x += 2) {  // complete pairs, which compilers vectorise
     out[x] = (static_cast<float>(dn[x]) - black[0]) * gain[0];
@@ -58,12 +53,16 @@ void row_by_site(const RawDn& raw, const SiteScale& scale, const Rect& part, int
   if (x < width) out[x] = (static_cast<float>(dn[x]) - black[0]) * gain[0];
 }
 
+// Subtracts the black point from row y of a region of the active area.
 void row_of(const RawDn& raw, const BlackPoint& black, const SiteScale& scale, const Rect& part, int y, float* out) {
-  if (black.pattern) {
-    row_by_pattern(raw, *black.pattern, part, y, out);
-  } else {
-    row_by_site(raw, scale, part, y, out);
-  }
+  with_samples(raw, [&](const auto& samples) {
+    const auto* const dn = samples.row(raw.active.y + part.y + y) + raw.active.x + part.x;
+    if (black.pattern) {
+      row_by_pattern(raw, dn, *black.pattern, part, y, out);
+    } else {
+      row_by_site(dn, scale, part.width, y, out);
+    }
+  });
 }
 
 // Calls `apply` (which multiplies or shifts) on each pixel with the index of its site.
@@ -99,16 +98,18 @@ RawFraction to_fraction(const RawDn& raw, const BlackPoint& black, Executor& exe
 }
 
 void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, RgbView<float> out, Executor& executor) {
+  const auto subtract = [&](const auto* dn, int y, int c) {
+    float* row = out[c].row(y);
+    for (int x = 0; x < raw.active.width; ++x) {
+      const double level = black.pattern ? black.pattern->at(x, y, c) : black.pedestal_dn[c];
+      row[x] = static_cast<float>((dn[3 * x + c] - level) / (raw.white_dn[c] - level));
+    }
+  };
   for_each_band(executor, raw.active.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
-      const std::uint16_t* dn = raw.dn.row(raw.active.y + y) + 3 * raw.active.x;
-      for (int c = 0; c < 3; ++c) {
-        float* row = out[c].row(y);
-        for (int x = 0; x < raw.active.width; ++x) {
-          const double level = black.pattern ? black.pattern->at(x, y, c) : black.pedestal_dn[c];
-          row[x] = static_cast<float>((dn[3 * x + c] - level) / (raw.white_dn[c] - level));
-        }
-      }
+      with_samples(raw, [&](const auto& samples) {
+        for (int c = 0; c < 3; ++c) subtract(samples.row(raw.active.y + y) + 3 * raw.active.x, y, c);
+      });
     }
   });
 }

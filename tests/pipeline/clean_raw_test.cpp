@@ -9,6 +9,7 @@
 
 #include "isp/base/random/random.h"
 #include "tests/pipeline/night_frames.h"
+#include "tests/support/executors.h"
 
 namespace lowlux::isp {
 namespace {
@@ -16,9 +17,8 @@ namespace {
 using denoise::Level;
 using denoise_testing::Camera;
 using denoise_testing::flat;
+using test::one_thread;
 using Mode = DenoiseChoice::Mode;
-
-InlineExecutor executor;
 
 DevelopOptions options_for(Level level) {
   DevelopOptions options{
@@ -29,7 +29,7 @@ DevelopOptions options_for(Level level) {
 }
 
 CleanRaw cleaned(const RawFrame& frame, const DevelopOptions& options = options_for(Level::standard)) {
-  Result<CleanRaw> out = clean_raw(frame, options, executor);
+  Result<CleanRaw> out = clean_raw(frame, options, one_thread);
   EXPECT_TRUE(out) << out.error().message;
   return *std::move(out);
 }
@@ -147,7 +147,7 @@ TEST(CleanRaw, FramesWithoutMosaicOrNoiseModelAreErrors) {
   unknown.noise.reset();
   DevelopOptions automatic = options_for(Level::standard);
   automatic.denoise = {.mode = Mode::automatic, .always = true};
-  const auto out = clean_raw(unknown, automatic, executor);
+  const auto out = clean_raw(unknown, automatic, one_thread);
   ASSERT_FALSE(out);
   EXPECT_EQ(out.error().code, ErrorCode::insufficient);
   EXPECT_NE(out.error().message.find("noise is unknown"), std::string::npos);

@@ -7,12 +7,13 @@
 
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
+#include "tests/support/executors.h"
 #include "tests/support/frames.h"
 
 namespace lowlux::isp {
 namespace {
 
-InlineExecutor executor;
+using test::one_thread;
 
 // A smooth scene with a camera whose RGB is linear sRGB, seen through a neutral of (0.5, 1, 0.625).
 RawFrame sample_frame(int width = 62, int height = 46) {
@@ -39,7 +40,7 @@ const DevelopOptions camera_float{.exposure_ev = 0,
                                   .demosaic = DemosaicMethod::malvar};
 
 SceneLinear float_picture(const RawFrame& frame, const DevelopOptions& options) {
-  Result<Developed> developed = develop(frame, options, executor);
+  Result<Developed> developed = develop(frame, options, one_thread);
   EXPECT_TRUE(developed) << developed.error().message;
   return std::get<SceneLinear>(std::move(developed->picture));
 }
@@ -62,7 +63,7 @@ TEST(Develop, ClippedHighlightsAreNeutralWhite) {
   const SceneLinear out = float_picture(frame, linear_float);
   for (int c = 0; c < 3; ++c)
     EXPECT_NEAR(out.plane[c].at(30, 20), 1.0, 2e-4);  // rounded sRGB matrix of the sample camera
-  const auto coded = develop(frame, {}, executor);
+  const auto coded = develop(frame, {}, one_thread);
   ASSERT_TRUE(coded);
   for (int c = 0; c < 3; ++c) EXPECT_EQ(std::get<Encoded8>(coded->picture).codes.at(3 * 30 + c, 20), 255);
 }
@@ -74,8 +75,8 @@ TEST(Develop, CodesAndFloatMosaicsGiveTheSamePicture) {
   RawFrame from_electrons = sample_frame();
   from_electrons.corrections = from_floats.corrections;
   from_electrons.noise = NoiseProfile{.scale = {1e-4, 2e-4, 3e-4}, .offset = {1e-6, 1e-6, 1e-6}};
-  const auto plan = plan_develop(from_codes, linear_float, executor);
-  const auto float_plan = plan_develop(from_floats, linear_float, executor);
+  const auto plan = plan_develop(from_codes, linear_float, one_thread);
+  const auto float_plan = plan_develop(from_floats, linear_float, one_thread);
   ASSERT_TRUE(plan && float_plan);
   EXPECT_TRUE(plan->from_codes);
   EXPECT_FALSE(float_plan->from_codes);
@@ -106,7 +107,7 @@ TEST(Develop, NamedDefectsAreRepaired) {
   DevelopOptions options = linear_float;
   options.find_defects = false;
   EXPECT_LT(largest_difference(float_picture(sound, options), float_picture(broken, options)), 1e-6);
-  EXPECT_EQ(plan_develop(broken, options, executor)->levels.defects.size(), 2u);
+  EXPECT_EQ(plan_develop(broken, options, one_thread)->levels.defects.size(), 2u);
 }
 
 TEST(Develop, DefaultCropIsAWindowOfTheActiveArea) {
@@ -161,7 +162,7 @@ TEST(Develop, MonochromeFramesAreGreyInEverySpace) {
   RawFrame frame = sample_frame();
   frame.raw.layout = SensorLayout::monochrome;
   frame.colour = {};
-  const auto coded = develop(frame, {}, executor);
+  const auto coded = develop(frame, {}, one_thread);
   ASSERT_TRUE(coded) << coded.error().message;
   const auto& codes = std::get<Encoded8>(coded->picture).codes;
   for (int y = 0; y < codes.height(); ++y) {
@@ -206,7 +207,7 @@ TEST(Develop, AFrameOfBlackNoiseStaysBlack) {
   RawFrame frame = sample_frame();
   frame.raw = test::bayer_frame(256, 256, BayerPhase::rggb, [&](int, int) { return normal(256, 8); });
   frame.raw.black_tag->pattern_dn = {256};
-  const auto developed = develop(frame, {}, executor);
+  const auto developed = develop(frame, {}, one_thread);
   ASSERT_TRUE(developed);
   double mean = 0;
   const auto& codes = std::get<Encoded8>(developed->picture).codes;
@@ -217,48 +218,48 @@ TEST(Develop, AFrameOfBlackNoiseStaysBlack) {
 TEST(Develop, MissingColourIsAnErrorThatNamesTheWayOut) {
   RawFrame frame = sample_frame();
   frame.colour = {};
-  const auto developed = develop(frame, {}, executor);
+  const auto developed = develop(frame, {}, one_thread);
   ASSERT_FALSE(developed);
   EXPECT_NE(developed.error().message.find("--space camera"), std::string::npos);
-  EXPECT_TRUE(develop(frame, camera_float, executor));
+  EXPECT_TRUE(develop(frame, camera_float, one_thread));
 }
 
 TEST(Develop, MatricesThatMakeNoLightOfTheWhiteAreErrorsThatNameTheWayOut) {
   RawFrame frame = sample_frame();
   frame.colour.calibrations[0].xyz_to_camera = diagonal3({1, -1, 1});  // every camera RGB becomes a negative luminance
   for (const auto mode : {WhiteBalanceChoice::Mode::as_shot, WhiteBalanceChoice::Mode::automatic}) {
-    const auto developed = develop(frame, {.white_balance = {mode}}, executor);
+    const auto developed = develop(frame, {.white_balance = {mode}}, one_thread);
     ASSERT_FALSE(developed);
     EXPECT_NE(developed.error().message.find("--space camera"), std::string::npos) << developed.error().message;
   }
-  EXPECT_TRUE(develop(frame, camera_float, executor));
+  EXPECT_TRUE(develop(frame, camera_float, one_thread));
 }
 
 TEST(Develop, OptionsThatContradictEachOtherAreErrors) {
   EXPECT_FALSE(develop(sample_frame(),
                        {.tone = ToneCurve::standard, .space = OutputSpace::linear_srgb, .samples = SampleType::f32},
-                       executor));
+                       one_thread));
   EXPECT_FALSE(develop(sample_frame(),
-                       {.tone = ToneCurve::none, .space = OutputSpace::srgb, .samples = SampleType::f32}, executor));
-  EXPECT_FALSE(develop(sample_frame(), {.space = OutputSpace::camera, .samples = SampleType::u16}, executor));
+                       {.tone = ToneCurve::none, .space = OutputSpace::srgb, .samples = SampleType::f32}, one_thread));
+  EXPECT_FALSE(develop(sample_frame(), {.space = OutputSpace::camera, .samples = SampleType::u16}, one_thread));
   DevelopOptions half{.half = true};
-  EXPECT_FALSE(develop(sample_frame(1, 1), half, executor));
+  EXPECT_FALSE(develop(sample_frame(1, 1), half, one_thread));
 }
 
 TEST(Develop, TheSmallestFramesDevelop) {
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 7}, {7, 1}, {2, 2}, {3, 3}, {5, 4}}) {
-    EXPECT_TRUE(develop(sample_frame(width, height), {}, executor)) << width << "x" << height;
+    EXPECT_TRUE(develop(sample_frame(width, height), {}, one_thread)) << width << "x" << height;
   }
 }
 
 TEST(Pipeline, ReusedForManyFramesGivesWhatASingleUseGives) {
-  Pipeline pipeline(executor);
+  Pipeline pipeline(one_thread);
   for (const int width : {62, 30, 62, 90}) {
     const RawFrame frame = sample_frame(width, 46);
     for (const bool half : {false, true}) {
       DevelopOptions options = linear_float;
       options.half = half;
-      const auto plan = plan_develop(frame, options, executor);
+      const auto plan = plan_develop(frame, options, one_thread);
       ASSERT_TRUE(plan);
       Picture picture = make_picture(*plan);
       pipeline.render(frame, *plan, picture);
@@ -271,7 +272,7 @@ TEST(Pipeline, AnyThreadCountGivesTheSameBytes) {
   RawFrame frame = sample_frame(301, 203);
   frame.corrections.gain_maps = {
       {.bottom = 203, .right = 301, .points_v = 2, .points_h = 2, .gain = {1, 1.1f, 1.2f, 1.4f}}};
-  const auto one = develop(frame, {}, executor);
+  const auto one = develop(frame, {}, one_thread);
   ASSERT_TRUE(one);
   for (const int threads : {2, 3, 7}) {
     PoolExecutor pool(threads);

@@ -8,6 +8,7 @@
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "tests/pipeline/night_frames.h"
+#include "tests/support/executors.h"
 
 namespace lowlux::isp {
 namespace {
@@ -15,9 +16,8 @@ namespace {
 using denoise::Level;
 using denoise_testing::Camera;
 using denoise_testing::flat;
+using test::one_thread;
 using Mode = DenoiseChoice::Mode;
-
-InlineExecutor executor;
 
 DevelopOptions linear(const DenoiseChoice& choice) {
   DevelopOptions options{
@@ -28,13 +28,13 @@ DevelopOptions linear(const DenoiseChoice& choice) {
 }
 
 DevelopPlan planned(const RawFrame& frame, const DenoiseChoice& choice) {
-  Result<DevelopPlan> plan = plan_develop(frame, linear(choice), executor);
+  Result<DevelopPlan> plan = plan_develop(frame, linear(choice), one_thread);
   EXPECT_TRUE(plan) << plan.error().message;
   return *std::move(plan);
 }
 
 Developed developed(const RawFrame& frame, const DenoiseChoice& choice) {
-  Result<Developed> out = develop(frame, linear(choice), executor);
+  Result<Developed> out = develop(frame, linear(choice), one_thread);
   EXPECT_TRUE(out) << out.error().message;
   return *std::move(out);
 }
@@ -103,7 +103,7 @@ TEST(NoiseReduction, DarkChargeThatTheBlackPointKnowsIsTakenOffWithItsNoise) {
   options.black.choice = BlackChoice::measured;
   options.black.measured.emplace().pedestal_dn.fill(test::night_black_dn);
   options.black.measured->dark_mean_e = camera.dark_e;
-  const auto out = develop(frame, options, executor);
+  const auto out = develop(frame, options, one_thread);
   ASSERT_TRUE(out);
   EXPECT_EQ(out->plan.noise_reduction.noise.dark_mean_e, camera.dark_e);
   // 15.5 e- of noise, a twentieth of it left
@@ -127,7 +127,7 @@ TEST(NoiseReduction, UnknownNoiseIsLeftOrAnErrorIfALevelWasAskedFor) {
   EXPECT_NE(automatic.plan.noise_reduction.reason.find("NoiseProfile"), std::string::npos);
   const auto &a = std::get<SceneLinear>(off.picture).plane[0], &b = std::get<SceneLinear>(automatic.picture).plane[0];
   EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(float)), 0);
-  const auto asked = plan_develop(frame, linear({Mode::level, Level::draft}), executor);
+  const auto asked = plan_develop(frame, linear({Mode::level, Level::draft}), one_thread);
   ASSERT_FALSE(asked);
   EXPECT_EQ(asked.error().code, ErrorCode::insufficient);
 }
@@ -136,7 +136,7 @@ TEST(NoiseReduction, FramesWithoutMosaicAreLeftOrAnErrorIfALevelWasAskedFor) {
   RawFrame frame = test::night_frame({}, grey(20), 64, 64);
   frame.raw.layout = SensorLayout::monochrome;
   EXPECT_EQ(planned(frame, {.mode = Mode::automatic}).noise_reduction.level, std::nullopt);
-  const auto asked = plan_develop(frame, linear({Mode::level, Level::draft}), executor);
+  const auto asked = plan_develop(frame, linear({Mode::level, Level::draft}), one_thread);
   ASSERT_FALSE(asked);
   EXPECT_EQ(asked.error().code, ErrorCode::unsupported);
 }
@@ -172,7 +172,7 @@ TEST(NoiseReduction, APedestalThatIsTooHighIsWarnedOf) {
   DevelopOptions options = linear({.mode = Mode::level});
   options.black.choice = BlackChoice::given;
   options.black.given_dn.fill(test::night_black_dn + 20);
-  const auto plan = plan_develop(frame, options, executor);
+  const auto plan = plan_develop(frame, options, one_thread);
   ASSERT_TRUE(plan);
   ASSERT_FALSE(plan->warnings.empty());
   EXPECT_NE(plan->warnings.front().find("black level is suspicious"), std::string::npos) << plan->warnings.front();
@@ -230,7 +230,7 @@ TEST(NoiseReduction, MapsHoldTheNoiseOfMeasuredGains) {
 }
 
 TEST(NoiseReduction, OnePipelineTakesFramesOfAnySizeAndLevelOneAfterTheOther) {
-  Pipeline pipeline(executor);
+  Pipeline pipeline(one_thread);
   for (const Level level : {Level::draft, Level::best, Level::high}) {
     for (const int width : {96, 40, 122}) {
       const RawFrame frame = test::night_frame({}, grey(20), width, 70);

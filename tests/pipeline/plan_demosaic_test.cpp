@@ -7,18 +7,19 @@
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/plan/plan_develop.h"
 #include "tests/pipeline/night_frames.h"
+#include "tests/support/executors.h"
 
 namespace lowlux::isp {
 namespace {
 
-PoolExecutor executor(2);
+using test::two_threads;
 
 RawFrame flat_frame(double green_e) {
   return test::night_frame({}, denoise_testing::flat(green_e / 2, green_e, green_e / 1.5), 160, 128);
 }
 
 DemosaicPlan decided(const RawFrame& frame, const DevelopOptions& options) {
-  const Result<DevelopPlan> plan = plan_develop(frame, options, executor);
+  const Result<DevelopPlan> plan = plan_develop(frame, options, two_threads);
   EXPECT_TRUE(plan) << plan.error().message;
   return plan->demosaic;
 }
@@ -57,7 +58,7 @@ TEST(PlanDemosaic, TheOffsetIsFourElectronsAndFollowsNoTransformButWhiteBalance)
   const RawFrame frame = flat_frame(200);
   DevelopOptions options;
   options.exposure_ev = 0;
-  const Result<DevelopPlan> plan = plan_develop(frame, options, executor);
+  const Result<DevelopPlan> plan = plan_develop(frame, options, two_threads);
   ASSERT_TRUE(plan);
   const double white_e = 1 / frame.noise->scale[1];
   EXPECT_NEAR(plan->demosaic.demosaic.offset, 4 * plan->rendering.white_gain[1] / white_e, 1e-3 * 4 / white_e);

@@ -7,11 +7,12 @@
 #include <utility>
 
 #include "isp/base/random/random.h"
+#include "tests/support/executors.h"
 
 namespace lowlux::isp {
 namespace {
 
-InlineExecutor executor;
+using test::one_thread;
 
 const Xyz dark{0.02, 0.021, 0.03};
 
@@ -36,7 +37,7 @@ ResaturateOptions exact_to_xyz() {
 TEST(ResaturatePicture, GivesBackTheChromaticityThatDarkTook) {
   const Xyz light{0.05, 0.04, 0.02};
   auto out = resaturate_picture(filled(24, 16, {light.x + dark.x, light.y + dark.y, light.z + dark.z}), exact_to_xyz(),
-                                executor);
+                                one_thread);
   const auto& xyz = std::get<SceneLinear>(out.picture);
   const auto got = xy_of(Xyz{xyz.plane[0].at(9, 9), xyz.plane[1].at(9, 9), xyz.plane[2].at(9, 9)});
   const auto expected = xy_of(light);
@@ -49,7 +50,7 @@ TEST(ResaturatePicture, GivesBackTheChromaticityThatDarkTook) {
 }
 
 TEST(ResaturatePicture, WhatIsNoBrighterThanBlackBecomesGrey) {
-  const auto out = resaturate_picture(filled(24, 16, {0.01, 0.02, 0.005}), exact_to_xyz(), executor);
+  const auto out = resaturate_picture(filled(24, 16, {0.01, 0.02, 0.005}), exact_to_xyz(), one_thread);
   const auto& xyz = std::get<SceneLinear>(out.picture);
   const auto got = xy_of(Xyz{xyz.plane[0].at(3, 3), xyz.plane[1].at(3, 3), xyz.plane[2].at(3, 3)});
   ASSERT_TRUE(got);
@@ -59,7 +60,7 @@ TEST(ResaturatePicture, WhatIsNoBrighterThanBlackBecomesGrey) {
 
 TEST(ResaturatePicture, SaturatedPixelsStayAsTheyAre) {
   const Xyz white{0.9505, 1, 1.089};
-  const auto out = resaturate_picture(filled(8, 8, white), exact_to_xyz(), executor);
+  const auto out = resaturate_picture(filled(8, 8, white), exact_to_xyz(), one_thread);
   EXPECT_EQ(out.fraction_saturated, 1);
   EXPECT_EQ(std::get<SceneLinear>(out.picture).plane[2].at(4, 4), static_cast<float>(white.z));
 }
@@ -70,7 +71,7 @@ TEST(ResaturatePicture, NoiseMakesItBelieveLess) {
   noisy.chroma_noise = 0.05;
   const auto picture = [&](const ResaturateOptions& options) {
     auto out =
-        resaturate_picture(filled(24, 16, {light.x + dark.x, light.y + dark.y, light.z + dark.z}), options, executor);
+        resaturate_picture(filled(24, 16, {light.x + dark.x, light.y + dark.y, light.z + dark.z}), options, one_thread);
     const auto& xyz = std::get<SceneLinear>(out.picture);
     return xy_of(Xyz{xyz.plane[0].at(9, 9), xyz.plane[1].at(9, 9), xyz.plane[2].at(9, 9)})->x - white_d65.x;
   };
@@ -82,7 +83,7 @@ TEST(ResaturatePicture, DisplayCodesAreWithinTheGamut) {
   ResaturateOptions options = exact_to_xyz();
   options.space = OutputSpace::srgb;
   options.samples = SampleType::u8;
-  const auto out = resaturate_picture(filled(16, 16, {0.03, 0.03, 0.2}), options, executor);
+  const auto out = resaturate_picture(filled(16, 16, {0.03, 0.03, 0.2}), options, one_thread);
   const auto& codes = std::get<Encoded8>(out.picture).codes;
   EXPECT_GT(codes.at(2, 5), codes.at(0, 5)) << "blue";
 }

@@ -17,14 +17,15 @@
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/render/output_space.h"
 #include "tests/pipeline/night_frames.h"
+#include "tests/support/executors.h"
 #include "tests/support/reference_cost.h"
 
 namespace lowlux::isp {
 namespace {
 
-constexpr int width = 6000, height = 4000, seeds = 10, hot_pixels = 8;
+using test::two_threads;
 
-PoolExecutor executor(2);
+constexpr int width = 6000, height = 4000, seeds = 10, hot_pixels = 8;
 
 /// A grey of 24 MP whose noise stays below a tolerance of 4.
 const RawFrame& clean_frame() {
@@ -116,7 +117,7 @@ DevelopOptions planned(std::optional<double> tolerance, std::optional<double> bu
 
 /// Returns the predicted time of the cheapest plan: within any tolerance it is chosen.
 double cheapest_s(const RawFrame& frame) {
-  return plan_develop(frame, planned(100, 10), executor)->effects->predicted_s.value();
+  return plan_develop(frame, planned(100, 10), two_threads)->effects->predicted_s.value();
 }
 
 void expect_all_found(const DevelopPlan& plan, const std::vector<HotPixel>& pixels, unsigned seed) {
@@ -129,14 +130,14 @@ void expect_all_found(const DevelopPlan& plan, const std::vector<HotPixel>& pixe
 // Six squares of 512 x 512 hold 6.6 % of this frame: a search of them alone misses all eight in 58 of 100 frames.
 TEST(SingleDefects, NoneOfEightHotPixelsIn24MegapixelsIsLeft) {
   RawFrame frame = copy_of(clean_frame());
-  const Result<Developed> clean = develop(frame, planned(4), executor);
+  const Result<Developed> clean = develop(frame, planned(4), two_threads);
   ASSERT_TRUE(clean);
   const PixelJudge truth(std::get<Encoded8>(clean->picture));
   const double noise = truth.noise_delta_e();
   double largest = 0;
   for (unsigned seed = 1; seed <= seeds; ++seed) {
     const auto pixels = add_hot_pixels(frame, seed);
-    const Result<Developed> repaired = develop(frame, planned(4), executor);
+    const Result<Developed> repaired = develop(frame, planned(4), two_threads);
     restore(frame, pixels);
     ASSERT_TRUE(repaired);
     expect_all_found(repaired->plan, pixels, seed);
@@ -152,9 +153,9 @@ TEST(SingleDefects, WithoutTheSearchTheyStay) {
   RawFrame frame = copy_of(clean_frame());
   DevelopOptions off = planned(4);
   off.find_defects = false;
-  const Result<Developed> clean = develop(frame, off, executor);
+  const Result<Developed> clean = develop(frame, off, two_threads);
   const auto pixels = add_hot_pixels(frame, 1);
-  const Result<Developed> kept = develop(frame, off, executor);
+  const Result<Developed> kept = develop(frame, off, two_threads);
   ASSERT_TRUE(clean && kept);
   EXPECT_TRUE(kept->plan.levels.defects.empty());
   const PixelJudge truth(std::get<Encoded8>(clean->picture)), left(std::get<Encoded8>(kept->picture));
@@ -168,17 +169,18 @@ TEST(SingleDefects, NoToleranceAndNoBudgetLeavesThemOut) {
   const double least_s = cheapest_s(frame);
   for (const DevelopOptions& options :
        {planned(100), planned(std::nullopt, 1.001 * least_s), planned(std::nullopt, 10), planned(50, 1)}) {
-    const auto plan = plan_develop(frame, options, executor);
+    const auto plan = plan_develop(frame, options, two_threads);
     ASSERT_TRUE(plan) << plan.error().message;
     expect_all_found(*plan, pixels, seed);
     const PlannedStep& step = *std::ranges::find(plan->effects->effects, "hot pixels", &PlannedStep::name);
     EXPECT_TRUE(step.used);
     EXPECT_EQ(step.left, 0);
   }
-  EXPECT_FALSE(plan_develop(frame, planned(std::nullopt, 0.999 * least_s), executor)) << "a smaller budget is refused";
+  EXPECT_FALSE(plan_develop(frame, planned(std::nullopt, 0.999 * least_s), two_threads))
+      << "a smaller budget is refused";
   DevelopOptions off = planned(std::nullopt, 1.001 * least_s);
   off.find_defects = false;
-  EXPECT_TRUE(plan_develop(frame, off, executor)->levels.defects.empty());
+  EXPECT_TRUE(plan_develop(frame, off, two_threads)->levels.defects.empty());
 }
 
 // The stated size is that of the strongest pixel in the image. The prediction is for the mean of its surroundings, the
@@ -193,11 +195,11 @@ TEST(SingleDefects, TheirStatedSizeIsTheirContrastInTheImage) {
       code = static_cast<std::uint16_t>(test::night_black_dn + test::night_gain_dn_per_e * (mean_e + excess_e));
       DevelopOptions options = planned(100);
       options.demosaic = DemosaicMethod::malvar;
-      const auto plan = plan_develop(frame, options, executor);
+      const auto plan = plan_develop(frame, options, two_threads);
       options.find_defects = false;
-      const Result<Developed> kept = develop(frame, options, executor);
+      const Result<Developed> kept = develop(frame, options, two_threads);
       code = was_dn;
-      const Result<Developed> without = develop(frame, options, executor);
+      const Result<Developed> without = develop(frame, options, two_threads);
       ASSERT_TRUE(plan && kept && without);
       const PlannedStep& step = *std::ranges::find(plan->effects->effects, "hot pixels", &PlannedStep::name);
       const PixelJudge hot(std::get<Encoded8>(kept->picture)), cold(std::get<Encoded8>(without->picture));

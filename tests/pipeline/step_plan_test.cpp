@@ -19,6 +19,7 @@
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/plan/plan_regions.h"
 #include "tests/pipeline/night_frames.h"
+#include "tests/support/executors.h"
 #include "tests/support/reference_cost.h"
 
 namespace lowlux::isp {
@@ -27,8 +28,7 @@ namespace {
 using denoise::Level;
 using denoise_testing::Camera;
 using denoise_testing::flat;
-
-InlineExecutor executor;
+using test::one_thread;
 
 DevelopOptions planned_options(std::optional<double> tolerance, std::optional<double> budget_s = {}) {
   DevelopOptions options;
@@ -45,7 +45,7 @@ RawFrame grey(double green_e, int width = 320, int height = 256) {
 }
 
 StepPlan effects_of(const RawFrame& frame, const DevelopOptions& options) {
-  const auto plan = plan_develop(frame, options, executor);
+  const auto plan = plan_develop(frame, options, one_thread);
   EXPECT_TRUE(plan) << (plan ? "" : plan.error().message);
   return plan ? *plan->effects : StepPlan{};
 }
@@ -69,9 +69,9 @@ TEST(VisibleNoise, PercentileIsThatOfNormalDifferences) {
 TEST(VisibleNoise, OfAGreyIsWhatFramesDifferBy) {
   const RawFrame frame = grey(400);
   DevelopOptions options = planned_options(0.5);
-  const auto plan = plan_develop(frame, options, executor);
+  const auto plan = plan_develop(frame, options, one_thread);
   ASSERT_TRUE(plan);
-  const Thumbnail thumbnail = make_thumbnail(frame, plan->levels.black, executor);
+  const Thumbnail thumbnail = make_thumbnail(frame, plan->levels.black, one_thread);
   denoise::RawNoise noise = plan->noise_reduction.noise;
   DevelopPlan with_electrons = *plan_develop(
       frame,
@@ -79,10 +79,10 @@ TEST(VisibleNoise, OfAGreyIsWhatFramesDifferBy) {
         options.denoise = {DenoiseChoice::Mode::level, Level::draft};
         return options;
       }(),
-      executor);
+      one_thread);
   noise = with_electrons.noise_reduction.noise;
   const auto blocks = seen_blocks(frame, with_electrons.options, with_electrons.levels, with_electrons.rendering, noise,
-                                  thumbnail, executor);
+                                  thumbnail, one_thread);
   ASSERT_FALSE(blocks.empty());
   for (const SeenBlock& block : blocks) {
     EXPECT_NEAR(block.snr, 17, 1.5);  // mean of 200, 400, 400 and 250 e-, its noise and that of readout
@@ -93,14 +93,15 @@ TEST(VisibleNoise, OfAGreyIsWhatFramesDifferBy) {
 }
 
 std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopPlan& plan, const Thumbnail& thumbnail) {
-  return seen_blocks(frame, plan.options, plan.levels, plan.rendering, plan.noise_reduction.noise, thumbnail, executor);
+  return seen_blocks(frame, plan.options, plan.levels, plan.rendering, plan.noise_reduction.noise, thumbnail,
+                     one_thread);
 }
 
 DevelopPlan exposed(const RawFrame& frame, double ev) {
   DevelopOptions options = planned_options(0.5);
   options.denoise = {DenoiseChoice::Mode::level, Level::draft};
   options.exposure_ev = ev;
-  return *plan_develop(frame, options, executor);
+  return *plan_develop(frame, options, one_thread);
 }
 
 // Thresholds go by the mean variance of the surroundings: beside a lamp they are higher.
@@ -111,7 +112,7 @@ TEST(VisibleNoise, SurroundingsAreBrighterBesideALamp) {
     for (int x = middle; x < frame.raw.dn.width(); ++x) frame.raw.dn.at(x, y) = 3500;
   }
   const DevelopPlan plan = exposed(frame, 0);
-  const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, executor);
+  const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, one_thread);
   const auto blocks = seen_blocks(frame, plan, thumbnail);
   int beside = 0;
   for (const SeenBlock& block : blocks) {
@@ -134,7 +135,7 @@ TEST(VisibleNoise, ClippingAtBlackIsSeenInTheDark) {
   for (const auto& [green_e, seen] : {std::pair{1.0, true}, std::pair{400.0, false}}) {
     const RawFrame frame = grey(green_e);
     const DevelopPlan plan = exposed(frame, 5);
-    const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, executor);
+    const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, one_thread);
     for (const SeenBlock& block : seen_blocks(frame, plan, thumbnail)) {
       if (seen) {
         EXPECT_GT(block.clip_delta_e, 0.02f);
@@ -156,7 +157,7 @@ RawFrame two_greys(double left_e, double right_e, int edge_px, int width, int he
 
 void expect_work(const RawFrame& frame, std::array<double, 3> start, std::array<double, 3> work) {
   const DevelopPlan plan = exposed(frame, 0);
-  const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, executor);
+  const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, one_thread);
   const ChromaWork found = chroma_work(frame, plan.levels, plan.noise_reduction.noise, thumbnail);
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_NEAR(found.start[i], start[i], 1e-12) << "level " << i;
@@ -215,7 +216,7 @@ TEST(PlanEffects, AllIsAllAndGivenLevelsStay) {
   options.denoise = {DenoiseChoice::Mode::level, Level::draft};
   EXPECT_EQ(effects_of(grey(4), options).level, Level::draft);
   options.denoise.mode = DenoiseChoice::Mode::off;
-  const auto plan = plan_develop(grey(4), options, executor);
+  const auto plan = plan_develop(grey(4), options, one_thread);
   ASSERT_TRUE(plan);
   EXPECT_FALSE(plan->noise_reduction.reduces());
 }
@@ -241,7 +242,7 @@ TEST(PlanEffects, ABudgetTakesTheMostAccuratePlanThatFits) {
 TEST(PlanEffects, ABudgetLeavesOutDemosaicingByResidualsOnlyWhereItMust) {
   const RawFrame frame = grey(2000);
   const auto planned = [&](double budget_s) {
-    return plan_develop(frame, planned_options(std::nullopt, budget_s), executor);
+    return plan_develop(frame, planned_options(std::nullopt, budget_s), one_thread);
   };
   const auto ample = planned(10);
   ASSERT_TRUE(ample);
@@ -256,14 +257,14 @@ TEST(PlanEffects, ABudgetLeavesOutDemosaicingByResidualsOnlyWhereItMust) {
   EXPECT_GT(named(*ample->effects, "demosaicing by residuals").seconds, 0);
   DevelopOptions fixed = planned_options(std::nullopt, 10);
   fixed.demosaic = DemosaicMethod::malvar;
-  const auto given = plan_develop(frame, fixed, executor);
+  const auto given = plan_develop(frame, fixed, one_thread);
   ASSERT_TRUE(given);
   EXPECT_EQ(given->demosaic.demosaic.method, DemosaicMethod::malvar);
   EXPECT_EQ(given->demosaic.reason, "given");
 }
 
 TEST(PlanEffects, ABudgetBelowTheCheapestPlanIsRefusedWithItsTime) {
-  const auto refused = plan_develop(grey(20), planned_options(std::nullopt, 1e-6), executor);
+  const auto refused = plan_develop(grey(20), planned_options(std::nullopt, 1e-6), one_thread);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::insufficient);
   const double cheapest_s =
@@ -286,7 +287,7 @@ TEST(PlanEffects, DarkChargeIsLeftInWhereItCannotBeSeen) {
   EXPECT_TRUE(large.dark);
   EXPECT_GT(named(large, "dark charge").size, 2);
   options.black.measured->dark_mean_e.fill(1);
-  const auto small = plan_develop(frame, options, executor);
+  const auto small = plan_develop(frame, options, one_thread);
   ASSERT_TRUE(small);
   EXPECT_FALSE(small->effects->dark);
   EXPECT_EQ(small->levels.black.dark_mean_e, PerSite<double>{});
@@ -302,14 +303,14 @@ TEST(PlanEffects, DarkChargeDoesNotCountForTheExposure) {
     Camera camera;
     camera.dark_e.fill(dark_e);
     const RawFrame frame = test::night_frame(camera, flat(0.5 * signal_e, signal_e, 0.625 * signal_e), 256, 256);
-    return plan_develop(frame, options, executor)->rendering.exposure_ev;
+    return plan_develop(frame, options, one_thread)->rendering.exposure_ev;
   };
   EXPECT_NEAR(with(300, 300) - std::log2(1 - 300 / test::night_full_e()), with(300, 0), 0.05);
 }
 
 TEST(FrameSample, LargeFramesAreSampledAtEvenPlacesAndSmallOnesWhole) {
   const RawFrame small = grey(40);
-  const auto plan = plan_develop(small, {}, executor);
+  const auto plan = plan_develop(small, {}, one_thread);
   ASSERT_TRUE(plan);
   EXPECT_TRUE(sample_squares(small, plan->levels).empty());
   RawFrame large;

@@ -21,10 +21,13 @@
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/render/output_space.h"
 #include "tests/pipeline/night_frames.h"
+#include "tests/support/executors.h"
 #include "tests/support/reference_cost.h"
 
 namespace lowlux::isp {
 namespace {
+
+using test::two_threads;
 
 constexpr int width = 3072, height = 2048;  // a frame that is sampled
 
@@ -46,8 +49,6 @@ RawFrame grey_with_columns(const Grey& grey, int frame_width = width, int frame_
   };
   return test::night_frame({.read_noise_e = grey.read_noise_e}, scene, frame_width, frame_height);
 }
-
-PoolExecutor executor(2);
 
 DevelopOptions planned(std::optional<double> tolerance, std::optional<double> budget_s = {}) {
   DevelopOptions options;
@@ -74,9 +75,9 @@ Lines lines_of(const RawFrame& frame) {
   DevelopOptions options;
   options.denoise.mode = DenoiseChoice::Mode::automatic;
   options.effects.emplace().cost = test::reference_cost();
-  const auto planned = plan_develop(frame, options, executor);
+  const auto planned = plan_develop(frame, options, two_threads);
   options.effects->all = true;
-  const auto all = plan_develop(frame, options, executor);
+  const auto all = plan_develop(frame, options, two_threads);
   EXPECT_TRUE(planned && all);
   if (!planned || !all) return {};
   const auto& effects = planned->effects->effects;
@@ -101,7 +102,7 @@ Vector3 developed_light(double mean_e) {
   DevelopOptions options = planned(std::nullopt);
   options.effects.reset();
   options.denoise.mode = DenoiseChoice::Mode::off;
-  const Result<Developed> image = develop(frame, options, executor);
+  const Result<Developed> image = develop(frame, options, two_threads);
   EXPECT_TRUE(image);
   Vector3 sum{};
   const auto& codes = std::get<Encoded8>(image->picture);
@@ -126,7 +127,7 @@ TEST(StepSizes, LinesAreRatedByTheirOwnContrast) {
   const auto lab = [&](double e) { return lab_of(xyz_of(to_xyz * developed_light(e)), white); };
   const double per_e = ciede2000(lab(mean_e - step_e), lab(mean_e + step_e)) / (2 * step_e);
   const RawFrame frame = grey_with_columns({mean_e, column_std_e, 8});
-  const auto plan = plan_develop(frame, planned(50), executor);
+  const auto plan = plan_develop(frame, planned(50), two_threads);
   ASSERT_TRUE(plan);
   const double expected = 1.96 * column_std_e * per_e;
   std::printf("  predicted %.3f, expected %.3f\n", named(*plan, lines_step).size, expected);
@@ -139,7 +140,7 @@ TEST(StepSizes, LinesAboveTheToleranceAreSubtractedAndOthersStay) {
   for (const auto& [columns, rows] : {std::pair{width, height}, std::pair{1024, 768}}) {
     const Grey lined{.mean_e = 400, .column_std_e = 20, .read_noise_e = 30};
     const RawFrame frame = grey_with_columns(lined, columns, rows);
-    const auto nothing = plan_develop(frame, planned(50), executor);
+    const auto nothing = plan_develop(frame, planned(50), two_threads);
     ASSERT_TRUE(nothing);
     EXPECT_FALSE(nothing->effects->level);
     EXPECT_TRUE(nothing->noise_reduction.lines.empty());
@@ -149,11 +150,11 @@ TEST(StepSizes, LinesAboveTheToleranceAreSubtractedAndOthersStay) {
     std::printf("  %d x %d: lines %.2f, noise %.2f, tolerance %.2f\n", columns, rows, size, noise, tolerance);
     ASSERT_LT(noise, 0.9 * tolerance);
     ASSERT_GT(size, tolerance);
-    const auto plan = plan_develop(frame, planned(tolerance), executor);
+    const auto plan = plan_develop(frame, planned(tolerance), two_threads);
     ASSERT_TRUE(plan);
     EXPECT_EQ(plan->noise_reduction.lines.size(), 1);
     EXPECT_TRUE(named(*plan, lines_step).used);
-    const auto even = plan_develop(grey_with_columns({400, 0, 30}, columns, rows), planned(tolerance), executor);
+    const auto even = plan_develop(grey_with_columns({400, 0, 30}, columns, rows), planned(tolerance), two_threads);
     ASSERT_TRUE(even);
     EXPECT_FALSE(even->effects->level) << "without lines the noise stays";
     EXPECT_EQ(named(*even, lines_step).size, 0);
@@ -162,8 +163,8 @@ TEST(StepSizes, LinesAboveTheToleranceAreSubtractedAndOthersStay) {
 
 TEST(StepSizes, LinesLeftOutForLackOfTimeAreStatedWithTheirSize) {
   const RawFrame frame = grey_with_columns({.mean_e = 800, .column_std_e = 6, .read_noise_e = 8});
-  const auto ample = plan_develop(frame, planned(std::nullopt, 100), executor);
-  const auto tight = plan_develop(frame, planned(std::nullopt, 0.04), executor);
+  const auto ample = plan_develop(frame, planned(std::nullopt, 100), two_threads);
+  const auto tight = plan_develop(frame, planned(std::nullopt, 0.04), two_threads);
   ASSERT_TRUE(ample && tight);
   EXPECT_TRUE(named(*ample, lines_step).used);
   EXPECT_EQ(named(*ample, lines_step).left, 0);
@@ -172,7 +173,7 @@ TEST(StepSizes, LinesLeftOutForLackOfTimeAreStatedWithTheirSize) {
   EXPECT_GT(left_out.size, 0);
   EXPECT_EQ(left_out.left, left_out.size);
   EXPECT_NE(left_out.decision.find("for lack of time"), std::string::npos) << left_out.decision;
-  const auto tolerant = plan_develop(frame, planned(50), executor);
+  const auto tolerant = plan_develop(frame, planned(50), two_threads);
   ASSERT_TRUE(tolerant);
   EXPECT_NE(named(*tolerant, lines_step).decision.find("below the tolerance"), std::string::npos);
 }

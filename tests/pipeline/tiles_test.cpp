@@ -9,16 +9,16 @@
 #include "isp/pipeline/render/pipeline.h"
 #include "isp/pipeline/render/pipeline_memory.h"
 #include "tests/pipeline/night_frames.h"
-#include "tests/support/count_malloc.h"
+#include "tests/support/count_allocations.h"
+#include "tests/support/executors.h"
 
 namespace lowlux::isp {
 namespace {
 
 using denoise::Level;
 using denoise_testing::Camera;
+using test::one_thread;
 using Mode = DenoiseChoice::Mode;
-
-InlineExecutor executor;
 
 constexpr TileLimits small_tiles{.max_whole_px = 0, .side_px = 256};
 constexpr TileLimits never{.max_whole_px = std::int64_t{1} << 40};
@@ -44,12 +44,13 @@ DevelopOptions options_for(const DenoiseChoice& choice, SampleType samples = Sam
 }
 
 DevelopPlan planned(const RawFrame& frame, const DevelopOptions& options) {
-  Result<DevelopPlan> plan = plan_develop(frame, options, executor);
+  Result<DevelopPlan> plan = plan_develop(frame, options, one_thread);
   EXPECT_TRUE(plan) << plan.error().message;
   return *std::move(plan);
 }
 
-Picture rendered(const RawFrame& frame, const DevelopPlan& plan, const TileLimits& limits, Executor& with = executor) {
+Picture rendered(const RawFrame& frame, const DevelopPlan& plan, const TileLimits& limits,
+                 Executor& with = one_thread) {
   EXPECT_EQ(is_tiled(frame.raw, plan, limits), limits.max_whole_px == 0);
   Picture out = make_picture(plan);
   Pipeline(with, limits).render(frame, plan, out);
@@ -126,6 +127,35 @@ TEST(Tiles, WithoutNoiseReductionTheBitsAreThoseOfTheWholeFrame) {
       }
     }
   }
+}
+
+TEST(Tiles, AProfileIsAppliedAsToTheWholeFrameAndTakesTheMemoryStated) {
+  const RawFrame frame = demanding_frame(BayerPhase::grbg, 701, 523);
+  auto tables = std::make_shared<ProfileTables>();
+  tables->low = HueSatMap{3, 2, 2, true, {}};
+  for (int i = 0; i < 12; ++i) {
+    tables->low->node.insert(tables->low->node.end(), {7.0f * static_cast<float>(i), 1.2f, i % 2 == 0 ? 1 : 0.8f});
+  }
+  tables->look = HueSatMap{1, 2, 1, false, {0, 1, 1, -20, 0.5f, 1.3f}};
+  for (const SampleType samples : {SampleType::u8, SampleType::u16}) {
+    for (const bool half : {false, true}) {
+      DevelopOptions options = options_for({}, samples);
+      options.half = half;
+      const DevelopPlan plain = planned(frame, options);
+      options.profile_tables = tables;
+      const DevelopPlan plan = planned(frame, options);
+      ASSERT_TRUE(plan.rendering.profile && plan.rendering.profile->map && plan.rendering.profile->look);
+      const Picture whole = rendered(frame, plan, never);
+      EXPECT_TRUE(same_bits(rendered(frame, plan, small_tiles), whole)) << static_cast<int>(samples) << half;
+      EXPECT_FALSE(same_bits(rendered(frame, plain, never), whole));
+      const std::size_t planes = 3 * sizeof(float) * static_cast<std::size_t>(plan.width * plan.height);
+      EXPECT_EQ(pipeline_bytes(frame.raw, plan, 1, never), pipeline_bytes(frame.raw, plain, 1, never) + planes);
+    }
+  }
+  DevelopOptions linear = options_for({}, SampleType::f32);
+  linear.space = OutputSpace::linear_srgb;
+  linear.profile_tables = tables;
+  EXPECT_FALSE(planned(frame, linear).rendering.profile) << "linear spaces are for measurement";
 }
 
 TEST(Tiles, ADarkFrameIsTakenOffInItsPlace) {
@@ -320,7 +350,7 @@ TEST(Regions, WhereNoiseStaysItsVarianceIsThatOfTheModel) {
   const Camera camera{.read_noise_e = 2};
   const RawFrame frame = test::night_frame(camera, denoise_testing::flat(30, 50, 20), 700, 500);
   DevelopPlan plan = planned(frame, options_for({.mode = Mode::level, .level = Level::standard, .maps = true}));
-  Pipeline pipeline(executor);
+  Pipeline pipeline(one_thread);
   Picture picture = make_picture(plan);
   pipeline.render(frame, plan, picture);
   const NoiseMaps whole = pipeline.take_noise_maps();
@@ -348,7 +378,7 @@ long held_while_rendering(const RawFrame& frame, const DevelopPlan& plan, const 
   Picture out = make_picture(plan);
   const long before = test::held_bytes;
   test::max_held_bytes = before;
-  Pipeline(executor, limits).render(frame, plan, out);
+  Pipeline(one_thread, limits).render(frame, plan, out);
   return test::max_held_bytes - before;
 }
 

@@ -12,11 +12,12 @@
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
 #include "tests/pipeline/night_frames.h"
+#include "tests/support/executors.h"
 
 namespace lowlux::isp {
 namespace {
 
-PoolExecutor executor(2);
+using test::two_threads;
 
 /// A grey ramp, black at its left, over dark charge; black is tagged.
 RawFrame ramp_over_dark(double dark_e, double floor_e, double exposure_s) {
@@ -30,7 +31,7 @@ RawFrame ramp_over_dark(double dark_e, double floor_e, double exposure_s) {
 }
 
 DevelopPlan planned(const RawFrame& frame, const DevelopOptions& options = {}) {
-  Result<DevelopPlan> plan = plan_develop(frame, options, executor);
+  Result<DevelopPlan> plan = plan_develop(frame, options, two_threads);
   EXPECT_TRUE(plan) << plan.error().message;
   return *std::move(plan);
 }
@@ -114,7 +115,7 @@ std::array<double, 3> saturated_colour(double dark_e, const DenoiseChoice& denoi
                                .samples = SampleType::f32,
                                .half = half,
                                .denoise = denoise};
-  const Result<Developed> out = develop(frame, options, executor);
+  const Result<Developed> out = develop(frame, options, two_threads);
   EXPECT_TRUE(out) << out.error().message;
   EXPECT_EQ(out->plan.dark.state, DarkCharge::State::estimated);
   const auto& picture = std::get<SceneLinear>(out->picture);
@@ -194,7 +195,7 @@ TEST(UnknownDark, KnownChargeOfATaggedBlackKeepsColourAndNoiseModel) {
   EXPECT_FALSE(std::ranges::any_of(plan.warnings, [](const std::string& warning) {
     return warning.find("noise is suspicious") != std::string::npos;
   }));
-  Pipeline pipeline(executor);
+  Pipeline pipeline(two_threads);
   const PlaneView<const float> signal = pipeline.signal(frame, plan);
   double sum = 0;
   for (int y = 0; y < signal.height; ++y) {

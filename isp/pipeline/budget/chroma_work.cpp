@@ -30,10 +30,8 @@ struct Axis {
   int block_in(int tile) const {
     return std::min(static_cast<int>((tile + 0.5) * denoise::tile / cells * blocks), blocks - 1);
   }
-  double share_of(int tile) const {
-    const int width = tile + 1 < tiles ? denoise::tile : cells - (tiles - 1) * denoise::tile;
-    return static_cast<double>(width) / cells;
-  }
+  int cells_of(int tile) const { return tile + 1 < tiles ? denoise::tile : cells - (tiles - 1) * denoise::tile; }
+  double share_of(int tile) const { return static_cast<double>(cells_of(tile)) / cells; }
 };
 
 Axis axis_of(int pixels, int blocks) {
@@ -74,6 +72,12 @@ std::vector<Tile> tiles_of(const Axis& across, const Axis& down, const CameraRgb
   return out;
 }
 
+double ratio_of_tile(const RawFrame& frame, const Axis& across, const Axis& down, int index) {
+  const int x = index % across.tiles, y = index / across.tiles;
+  return view_of(frame.noise_ratio.get())
+      .mean(2 * denoise::tile * x, 2 * denoise::tile * y, 2 * across.cells_of(x), 2 * down.cells_of(y));
+}
+
 }  // namespace
 
 ChromaWork chroma_work(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
@@ -89,7 +93,8 @@ ChromaWork chroma_work(const RawFrame& frame, const RawLevels& levels, const den
   std::vector<unsigned char> has_chroma(count * denoise::max_levels);
   for (std::size_t i = 0; i < count; ++i) {
     const double mean_e = tiles[i].charge_e / tiles[i].blocks;
-    const int level = denoise::start_of(mean_e - dark_e, dark_e, variance_e2);
+    const double ratio = ratio_of_tile(frame, across, down, static_cast<int>(i));
+    const int level = denoise::start_of(mean_e - dark_e, dark_e, variance_e2, ratio);
     start[i] = static_cast<float>(std::min(level, pyramid_levels - 1));
   }
   denoise::ChromaStarts starts{start, has_chroma, across.tiles, down.tiles};

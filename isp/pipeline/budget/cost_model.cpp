@@ -12,11 +12,24 @@
 namespace lowlux::isp {
 
 std::string_view name_of(CostPart part) {
-  static constexpr std::array<std::string_view, cost_parts> names{
-      "planning", "samples", "defects",        "lines",    "offsets",        "check",      "codes",
-      "floats",   "draft-0", "draft-1",        "draft-2",  "standard-0",     "standard-1", "standard-2",
-      "high-0",   "high-1",  "high-2",         "best-0",   "best-2",         "codes-16",   "floats-32",
-      "look",     "display", "encoded-malvar", "residual", "residual-median"};
+  static constexpr std::array<std::string_view, cost_parts> names{"planning",        "samples",
+                                                                  "defects",         "lines",
+                                                                  "offsets",         "check",
+                                                                  "codes",           "floats",
+                                                                  "draft-0",         "draft-1",
+                                                                  "draft-2",         "standard-0",
+                                                                  "standard-1",      "standard-2",
+                                                                  "high-0",          "high-1",
+                                                                  "high-2",          "best-0",
+                                                                  "best-2",          "codes-16",
+                                                                  "floats-32",       "look",
+                                                                  "display",         "encoded-malvar",
+                                                                  "residual",        "residual-median",
+                                                                  "merge-frame",     "merge-mean",
+                                                                  "merge-robust",    "merge-comparison",
+                                                                  "merge-alignment", "merge-cells",
+                                                                  "merge-subpixel",  "merge-prediction",
+                                                                  "merge-codes"};
   return names[static_cast<std::size_t>(part)];
 }
 
@@ -97,6 +110,16 @@ CostModel made() {
       {{9.009, 0.00416}},  // encoded-malvar
       {{9.009, 0.01505}},  // residual
       {{9.009, 0.01740}},  // residual-median
+      // These follow from the pace by the ratios that tests/bench/merge_budget_bench.cpp prints.
+      {{9.009, 0.02030}},  // merge-frame
+      {{9.009, 0.00290}},  // merge-mean
+      {{9.009, 0.04630}},  // merge-robust
+      {{9.009, 0.04160}},  // merge-comparison
+      {{9.009, 0.01510}},  // merge-alignment
+      {{9.009, 0.02650}},  // merge-cells
+      {{9.009, 0.11350}},  // merge-subpixel
+      {{9.009, 0.28400}},  // merge-prediction
+      {{9.009, 0.03410}},  // merge-codes
   }};
   return {.machine = std::string(reference_machine), .threads = 2, .pace_s = pace_s, .points = points};
 }

@@ -8,7 +8,7 @@
 
 #include "isp/base/frame.h"
 
-/// This header predicts how long developing takes on this machine.
+/// This header predicts how long developing and merging take on this machine.
 
 namespace lowlux::isp {
 
@@ -40,8 +40,17 @@ enum class CostPart : std::uint8_t {
   encoded_malvar,  // additional time of demosaicing by this method over DemosaicMethod::malvar
   residual,
   residual_median,
+  merge_frame,       // black level, noise and electrons of one frame of a merge
+  merge_mean,        // adding a frame without motion to the mean
+  merge_robust,      // robust mean of five frames
+  merge_comparison,  // comparison of a frame with the reference
+  merge_alignment,   // displacement of a frame
+  merge_cells,       // placing a frame in whole cells, and adding it
+  merge_subpixel,    // placing a frame by predicted differences, and adding it
+  merge_prediction,  // developing the reference for that
+  merge_codes,       // noise and codes of the merged frame
 };
-inline constexpr int cost_parts = 26;
+inline constexpr int cost_parts = 35;
 
 /// Returns the name of a part: "planning", "draft-1" and so on.
 std::string_view name_of(CostPart part);

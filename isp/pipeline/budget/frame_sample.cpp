@@ -56,4 +56,18 @@ RawElectrons sample_of(const RawElectrons& charge, std::span<const Rect> squares
   return out;
 }
 
+NoiseRatio sample_ratio(const NoiseRatioView& ratio, std::span<const Rect> squares) {
+  constexpr int block_px = 16, side = sample_side_px / block_px;
+  static_assert(sample_side_px % block_px == 0);
+  NoiseRatio out{.block_px = block_px, .ratio = Plane<float>(side, side * static_cast<int>(squares.size()))};
+  for (int y = 0; y < out.ratio.height(); ++y) {
+    const Rect& square = squares[static_cast<std::size_t>(y / side)];
+    for (int x = 0; x < side; ++x) {
+      const int left = square.x + x * block_px, top = square.y + y % side * block_px;
+      out.ratio.at(x, y) = static_cast<float>(ratio.mean(left, top, block_px, block_px));
+    }
+  }
+  return out;
+}
+
 }  // namespace lowlux::isp

@@ -28,4 +28,7 @@ RawElectrons sample_electrons(const RawFrame& frame, const RawLevels& levels, st
 /// Returns the squares of an existing mosaic, one below the other.
 RawElectrons sample_of(const RawElectrons& charge, std::span<const Rect> squares);
 
+/// Returns the noise ratio of the squares, one below the other, in blocks of 16 pixels.
+NoiseRatio sample_ratio(const NoiseRatioView& ratio, std::span<const Rect> squares);
+
 }  // namespace lowlux::isp

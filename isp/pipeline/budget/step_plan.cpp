@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "isp/pipeline/budget/step_candidates.h"
+#include "isp/pipeline/plan/local_noise.h"
 #include "isp/pipeline/plan/plan_demosaic.h"
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/pipeline/plan/plan_regions.h"
@@ -185,10 +186,11 @@ StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thum
   const double tolerance = o.effects->tolerance_delta_e.value_or(0);
   const bool noise_may_stay =
       !facts.level_is_fixed && facts.noise.left_by(std::nullopt) < fraction_for_level * tolerance;
+  const denoise::RawNoise median = facts.has_noise ? median_noise(frame, model->noise) : denoise::RawNoise{};
   facts.sizes = step_sizes(frame, o, levels,
                            {.rendering = rendering,
                             .light = light,
-                            .noise = facts.has_noise ? &model->noise : nullptr,
+                            .noise = facts.has_noise ? &median : nullptr,
                             .blocks = facts.blocks,
                             .lines_may_stay = noise_may_stay && !o.effects->all},
                            executor);

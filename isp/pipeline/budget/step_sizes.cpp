@@ -25,7 +25,9 @@ constexpr double only_how_much = std::numeric_limits<double>::infinity();  // on
 /// Returns how far a pixel differs from its nearest neighbours of the same colour [DN]; negative where it is darker.
 double excess_dn(const RawDn& raw, const Pixel& p) {
   const Rect& active = raw.active;
-  const auto code = [&](int x, int y) { return static_cast<double>(raw.dn.at(active.x + x, active.y + y)); };
+  const auto code = [&](int x, int y) {
+    return with_samples(raw, [&](const auto& dn) { return static_cast<double>(dn.at(active.x + x, active.y + y)); });
+  };
   double sum = 0;
   int neighbours = 0;
   for (const auto [dx, dy] : {std::array{-2, 0}, {2, 0}, {0, -2}, {0, 2}}) {

@@ -29,7 +29,7 @@ struct StepSizes {
 struct SizeRequest {
   const Rendering& rendering;
   const Thumbnail& light;  // dark charge subtracted
-  /// States the noise of the frame; null where it is not known.
+  /// States the noise of the frame, of its median block where it differs; null where it is not known.
   const denoise::RawNoise* noise = nullptr;
   std::span<const SeenBlock> blocks;  // of the frame; none where the noise is not known
   /// Row and column noise is measured in the whole frame where there is no sample, because a plan may leave it in.

@@ -8,6 +8,7 @@
 
 #include "isp/model/colour/colorimetry.h"
 #include "isp/model/colour/colour_difference.h"
+#include "isp/pipeline/plan/local_noise.h"
 #include "isp/pipeline/render/cell_figures.h"
 #include "isp/render/output_space.h"
 #include "isp/render/retarget/retarget_rows.h"
@@ -138,14 +139,25 @@ double above_black_e(double mean_e, double std_e) {
   return std_e * std::sqrt(std::max(2 * ((1 + below * below) * reaching - below * normal_density(below)), 0.0));
 }
 
-SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise::RawNoise& noise,
+/// Holds the mean charge of a block of the thumbnail, and its noise ratio.
+struct NoisyCharge {
+  Vector3 charge_e{};
+  double ratio = 1;
+
+  double variance_e2(int colour, const denoise::RawNoise& noise) const {
+    return ratio * (std::max(charge_e[colour], 0.0) + noise.variance_e2[colour]);
+  }
+};
+
+SeenBlock seen(const NoisyCharge& block, const Channels& channels, const denoise::RawNoise& noise,
                const Display& display) {
+  const Vector3& charge_e = block.charge_e;
   Vector3 signal{};
   double mean_signal = 0, mean_variance = 0, squares = 0;
   for (int c = 0; c < 3; ++c) {
     signal[c] = (charge_e[c] - channels.dark_e[c]) / channels.light_at_white_e[c];
     mean_signal += fraction_of_sites[c] * (charge_e[c] - channels.dark_e[c]);
-    mean_variance += fraction_of_sites[c] * (std::max(charge_e[c], 0.0) + noise.variance_e2[c]);
+    mean_variance += fraction_of_sites[c] * block.variance_e2(c, noise);
   }
   Vector3 lit{};
   for (int c = 0; c < 3; ++c) lit[c] = std::max(signal[c], 0.0);
@@ -154,7 +166,7 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
   const double line_e = std::sqrt(std::max(mean_variance, min_variance_e2) / (seen_box_px * seen_box_px));
   Vector3 pixel_std{};
   for (int c = 0; c < 3; ++c) {
-    const double variance_e2 = std::max(charge_e[c], 0.0) + noise.variance_e2[c];
+    const double variance_e2 = block.variance_e2(c, noise);
     const double step_e = std::sqrt(std::max(variance_e2, min_variance_e2) / samples_in_box[c]);
     Vector3 moved = lit;
     moved[c] += above_black_e(charge_e[c] - channels.dark_e[c], step_e) / channels.light_at_white_e[c];
@@ -178,14 +190,14 @@ SeenBlock seen(const Vector3& charge_e, const Channels& channels, const denoise:
 /// Holds the thumbnail in electrons.
 class Charge {
  public:
-  Charge(const Thumbnail& thumbnail, const Channels& channels, const denoise::RawNoise& noise)
-      : mean_(thumbnail.mean), channels_(channels), noise_(noise) {}
+  Charge(const RawFrame& frame, const Thumbnail& thumbnail, const Channels& channels, const denoise::RawNoise& noise)
+      : frame_(frame), thumbnail_(thumbnail), channels_(channels), noise_(noise) {}
 
-  Vector3 at(int x, int y) const {
-    Vector3 out{};
+  NoisyCharge at(int x, int y) const {
+    NoisyCharge out{.ratio = ratio_of_block(frame_, thumbnail_, x, y)};
     for (int c = 0; c < 3; ++c) {
-      const auto mean = static_cast<double>(mean_.plane[c].at(x, y));
-      out[c] = (std::isfinite(mean) ? mean : 0) * channels_.electrons_at_white[c];
+      const auto mean = static_cast<double>(thumbnail_.mean.plane[c].at(x, y));
+      out.charge_e[c] = (std::isfinite(mean) ? mean : 0) * channels_.electrons_at_white[c];
     }
     return out;
   }
@@ -195,8 +207,8 @@ class Charge {
   double surroundings(int x, int y, int reach) const {
     double sum = 0;
     int count = 0;
-    for (int j = std::max(y - reach, 0); j <= std::min(y + reach, mean_.height() - 1); ++j) {
-      for (int i = std::max(x - reach, 0); i <= std::min(x + reach, mean_.width() - 1); ++i, ++count) {
+    for (int j = std::max(y - reach, 0); j <= std::min(y + reach, thumbnail_.mean.height() - 1); ++j) {
+      for (int i = std::max(x - reach, 0); i <= std::min(x + reach, thumbnail_.mean.width() - 1); ++i, ++count) {
         sum += variance(i, j);
       }
     }
@@ -206,13 +218,14 @@ class Charge {
 
  private:
   double variance(int x, int y) const {
-    const Vector3 charge_e = at(x, y);
+    const NoisyCharge block = at(x, y);
     double out = 0;
-    for (int c = 0; c < 3; ++c) out += fraction_of_sites[c] * (std::max(charge_e[c], 0.0) + noise_.variance_e2[c]);
+    for (int c = 0; c < 3; ++c) out += fraction_of_sites[c] * block.variance_e2(c, noise_);
     return out;
   }
 
-  const CameraRgb& mean_;
+  const RawFrame& frame_;
+  const Thumbnail& thumbnail_;
   const Channels& channels_;
   const denoise::RawNoise& noise_;
 };
@@ -233,7 +246,7 @@ std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopOptions& 
   const Channels channels = channels_of(frame, levels, noise);
   const int columns = thumbnail.mean.width(), rows = thumbnail.mean.height();
   const int along = std::min(columns, max_blocks_along), down = std::min(rows, max_blocks_along);
-  const Charge charge(thumbnail, channels, noise);
+  const Charge charge(frame, thumbnail, channels, noise);
   const int reach = static_cast<int>(std::ceil(surroundings_px * columns / frame.raw.active.width));
   std::vector<SeenBlock> out(static_cast<std::size_t>(along) * static_cast<std::size_t>(down));
   for_each_index(executor, down, [&](int j) {

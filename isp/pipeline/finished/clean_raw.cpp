@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "isp/base/random/random.h"
+#include "isp/pipeline/finished/raw_codes.h"
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/electron_mosaic.h"
 #include "isp/pipeline/render/noise_reducer.h"
@@ -17,67 +17,16 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double most_dn = 65535;
-constexpr double rounding_dn2 = 1.0 / 6;  // mean of f (1 - f) over fractions f
-
-/// Holds the levels of the new codes.
-struct Levels {
-  double black_dn;
-  double range_dn;
-};
-
-/// Returns the levels of the new codes: black is a multiple of 256 from 1024 on, at most a quarter of the codes.
-Levels levels_for(const DevelopPlan& plan) {
+/// Returns the standard deviation of a dark pixel in fractions of white, the largest of all sites.
+double dark_noise(const DevelopPlan& plan) {
   const PerSite<double> light_e = light_at_white_e(plan.levels);
-  double noise = 0;  // of a dark pixel, in fractions of white
+  double noise = 0;
   for (int site = 0; site < 4; ++site) {
     const denoise::RawNoise& n = plan.noise_reduction.noise;
     const double variance = *std::ranges::max_element(n.variance_e2) + n.dark_mean_e[site];
     noise = std::max(noise, std::sqrt(variance) / light_e[site]);
   }
-  const double wanted = 8 * noise / (1 + 8 * noise) * most_dn;
-  const double black_dn = std::clamp(256 * std::ceil(wanted / 256), 1024.0, 16384.0);
-  return {black_dn, most_dn - black_dn};
-}
-
-std::uint16_t rounded(double dn, std::uint32_t word) {
-  const double up = (static_cast<double>(word) + 0.5) / 4294967296.0;
-  return static_cast<std::uint16_t>(std::clamp(std::floor(dn + up), 0.0, most_dn));
-}
-
-Plane<std::uint16_t> coded(const SignalElectrons& signal, const RawElectrons& raw, const DevelopPlan& plan,
-                           const Levels& levels, Executor& executor) {
-  const int width = signal.value.width(), height = signal.value.height();
-  const std::array<double, 3>& saturation_e = plan.noise_reduction.noise.saturation_e;
-  Plane<std::uint16_t> out(width, height);
-  PerSite<double> dn_per_e = light_at_white_e(plan.levels);
-  for (double& per_e : dn_per_e) per_e = levels.range_dn / per_e;
-  for_each_band(executor, height, [&](RowBand band, int) {
-    std::vector<std::uint32_t> words(width);
-    for (int y = band.first; y < band.last; ++y) {
-      words_row({.purpose = draw_purpose::code_dither}, 0, y, 0, words);
-      for (int x = 0; x < width; ++x) {
-        const auto colour = static_cast<std::size_t>(colour_at(raw.phase, x, y));
-        const bool saturated = static_cast<double>(raw.value.at(x, y)) >= saturation_e[colour];
-        const double dn = levels.black_dn + signal.value.at(x, y) * dn_per_e[site_of(x, y)];
-        out.at(x, y) = saturated ? static_cast<std::uint16_t>(most_dn) : rounded(dn, words[x]);
-      }
-    }
-  });
-  return out;
-}
-
-RawDn clean_readout(const RawDn& raw, Plane<std::uint16_t> codes, const Levels& levels) {
-  RawDn out;
-  out.active = {0, 0, codes.width(), codes.height()};
-  out.dn = std::move(codes);
-  out.layout = raw.layout;
-  out.phase = raw.phase;
-  out.default_crop = raw.default_crop;
-  out.black_tag = BlackLevel{.pattern_dn = {levels.black_dn}};
-  out.white_dn.fill(most_dn);
-  out.info = raw.info;
-  return out;
+  return noise;
 }
 
 }  // namespace
@@ -92,14 +41,18 @@ Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options,
   RawElectrons raw = raw_electrons(frame, out.plan.levels, {}, executor);
   const SignalElectrons signal = NoiseReducer(executor).run(raw, out.plan.noise_reduction, {}, &out.maps);
   clock.lap("denoise");
-  const Levels levels = levels_for(out.plan);
-  out.frame.raw = clean_readout(frame.raw, coded(signal, raw, out.plan, levels, executor), levels);
+  const SampleLevels levels = frame.raw.is_float() ? float_levels() : code_levels(dark_noise(out.plan));
+  out.frame.raw = encode_signal({.signal_e = signal.value.view(),
+                                 .charge_e = std::as_const(raw.value).view(),
+                                 .saturation_e = out.plan.noise_reduction.noise.saturation_e,
+                                 .signal_at_white_e = light_at_white_e(out.plan.levels),
+                                 .charge_at_white_e = *out.plan.levels.electrons_at_white},
+                                frame.raw, levels, executor);
   out.frame.colour = frame.colour;
   out.frame.corrections = frame.corrections;
   out.frame.corrections.defects.clear();
-  const double step = 1 / levels.range_dn;
   out.frame.noise = residual_profile(signal, out.maps.site_variance_e2, light_at_white_e(out.plan.levels),
-                                     rounding_dn2 * step * step);
+                                     levels.rounding_variance());
   if (!options.denoise.maps) out.maps = {};
   clock.lap("codes");
   return out;

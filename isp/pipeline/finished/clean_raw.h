@@ -10,18 +10,15 @@ namespace lowlux::isp {
 
 /// Holds a raw frame without noise, for any raw developer.
 struct CleanRaw {
-  RawFrame frame;  // the active area only, in 16-bit codes
+  RawFrame frame;  // the active area only, in 16-bit codes, or floating-point if the frame was
   DevelopPlan plan;
   NoiseMaps maps;  // of the active area; empty unless requested
 };
 
 /// Subtracts lines and dark charge from a Bayer frame, reduces its noise, repairs its defects, and encodes it again in
-/// 16 bits.
+/// 16 bits; a frame of floating-point samples remains one.
 ///
-/// Codes are black + (white - black) * signal / light_at_white_e. Black is so far above 0 that 8 standard deviations
-/// of a dark pixel stay positive: negative electrons survive. Codes are rounded up with the probability of their
-/// fraction, so that no mean is biased and smooth shadows do not break into steps; that adds 1/6 DN^2 on average.
-/// Saturated pixels get the code of white. Corrections that the source requests for linear values (gain maps) are still
+/// Samples are those of encode_signal. Corrections that the source requests for linear values (gain maps) are still
 /// requested; defects, masked pixels and dark charge are gone. The NoiseProfile is that of residual_profile.
 ///
 /// Errors: those of plan_develop; noise that cannot be reduced at all (the plan's reason), also for an automatic level.

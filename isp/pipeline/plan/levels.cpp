@@ -20,8 +20,8 @@ std::array<double, 3> by_colour(const RawDn& raw, const PerSite<double>& sites) 
 }  // namespace
 
 bool renders_from_codes(const RawFrame& frame, const RawLevels& levels, bool reduces_noise) {
-  return frame.raw.layout == SensorLayout::bayer && !reduces_noise && levels.defects.empty() && !levels.dark_frame &&
-         !levels.black.pattern && levels.black.dark_mean_e == PerSite<double>{} &&
+  return frame.raw.layout == SensorLayout::bayer && !frame.raw.is_float() && !reduces_noise && levels.defects.empty() &&
+         !levels.dark_frame && !levels.black.pattern && levels.black.dark_mean_e == PerSite<double>{} &&
          frame.corrections.radial_gains.empty() && std::ranges::none_of(frame.corrections.gain_maps, has_effect);
 }
 

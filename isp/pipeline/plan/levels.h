@@ -21,8 +21,8 @@ struct RawLevels {
   std::vector<Pixel> defects;                         // ascending
 };
 
-/// Returns whether a frame can be rendered directly from its 16-bit codes: no step before that repairs, multiplies,
-/// reduces noise, or subtracts pixel by pixel.
+/// Returns whether a frame can be rendered directly from its 16-bit codes: it has codes, and no step before that
+/// repairs, multiplies, reduces noise, or subtracts pixel by pixel.
 bool renders_from_codes(const RawFrame& frame, const RawLevels& levels, bool reduces_noise);
 
 /// Returns the electrons at white of each colour; both greens have the same number. Precondition:

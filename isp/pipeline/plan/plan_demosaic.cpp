@@ -63,7 +63,8 @@ DemosaicPlan plan_demosaic(const RawFrame& frame, const RawLevels& levels, const
     const bool is_reduced = noise.reduces() && !came_reduced(frame);
     const double dark_e = mean_of_sites(levels.black.dark_mean_e), full_e = green_e + dark_e;
     const double variance_of_white = frame.noise->scale[1] * (signal_e + dark_e) / full_e + frame.noise->offset[1];
-    const double variance = variance_of_white * (is_reduced ? residual_fraction : 1) * std::pow(per_e * full_e, 2);
+    const double fraction = median_ratio(frame.noise_ratio.get()) * (is_reduced ? residual_fraction : 1);
+    const double variance = variance_of_white * fraction * std::pow(per_e * full_e, 2);
     how.noise_std = static_cast<float>(std::sqrt(std::max(variance, 0.0)) / (3 * std::pow(x + how.offset, 2.0 / 3)));
   }
   return out;

@@ -40,7 +40,8 @@ double gain_dn_per_e(const RawFrame& frame, const BlackPoint& black) {
 
 // Returns the noise that the search for defects is based on.
 DefectNoise defect_noise(const RawFrame& frame, const BlackPoint& black, const Thumbnail& thumbnail) {
-  return {thumbnail.black_noise_std * mean_range_dn(frame.raw, black), gain_dn_per_e(frame, black)};
+  return {thumbnail.black_noise_std * mean_range_dn(frame.raw, black), gain_dn_per_e(frame, black),
+          view_of(frame.noise_ratio.get())};
 }
 
 // Holds the defects that the source lists, those with an unknown dark value and, if requested, those found in the
@@ -67,8 +68,7 @@ FoundDefects all_defects(const RawFrame& frame, const RawDn& measured, const Thu
 
 Result<RawLevels> choose_levels(const RawFrame& frame, const DevelopOptions& options) {
   RawLevels out{.dark_frame = options.dark_frame};
-  Result<BlackPoint> black =
-      out.dark_frame ? black_of(frame.raw, *out.dark_frame) : choose_black_by_gain(frame, options.black);
+  Result<BlackPoint> black = choose_black_point(frame, options);
   if (!black) return tl::make_unexpected(std::move(black.error()));
   out.black = *std::move(black);
   const bool is_measured = out.black.source == BlackPoint::Source::masked_pixels || out.dark_frame;
@@ -91,6 +91,10 @@ Result<BlackPoint> choose_black_by_gain(const RawFrame& frame, const BlackReques
   MaskedBlack measured = masked_black_of(frame);
   if (measured.black) black = *std::move(measured.black);
   return black;
+}
+
+Result<BlackPoint> choose_black_point(const RawFrame& frame, const DevelopOptions& options) {
+  return options.dark_frame ? black_of(frame.raw, *options.dark_frame) : choose_black_by_gain(frame, options.black);
 }
 
 Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {

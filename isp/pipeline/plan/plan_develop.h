@@ -12,6 +12,10 @@ namespace lowlux::isp {
 /// which follows from a first black level. Errors: those of choose_black.
 Result<BlackPoint> choose_black_by_gain(const RawFrame& frame, const BlackRequest& request);
 
+/// Returns the black point as the options request it: that of their dark frame, else choose_black_by_gain. Errors:
+/// those of choose_black and black_of.
+Result<BlackPoint> choose_black_point(const RawFrame& frame, const DevelopOptions& options);
+
 /// Measures black, noise, exposure and white of a frame, and decides how to develop it. With a dark frame, everything
 /// is measured after it is subtracted. Errors: no black point (insufficient), those of black_of, no colour calibration
 /// for a space other than `camera` (insufficient), white not above black, invalid matrices (malformed), options that do

@@ -5,12 +5,14 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "denoise/check/noise_check.h"
 #include "isp/pipeline/budget/frame_sample.h"
+#include "isp/pipeline/plan/local_noise.h"
 #include "isp/pipeline/render/cell_figures.h"
 #include "isp/pipeline/render/electron_mosaic.h"
 
@@ -23,14 +25,15 @@ constexpr double saturated_fraction_of_white =
 int colour_of(const RawDn& raw, int site) { return static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)); }
 
 /// Returns the variance of a raw value without light, by the noise model or, if that is more, as measured on the black
-/// point's pixels; at least that of rounding to codes.
+/// point's pixels; at least that of rounding, which floating-point samples do not have.
 std::array<double, 3> black_variance_e2(const RawFrame& frame, const RawLevels& levels) {
   std::array<double, 3> out{};
   for (int site = 0; site < 4; ++site) {
     const int colour = colour_of(frame.raw, site);
     const double electrons = (*levels.electrons_at_white)[site];
     const double e_per_dn = electrons / (white_at(frame.raw, site) - levels.black.pedestal_dn[site]);
-    double variance = std::max(frame.noise->offset[colour] * electrons * electrons, e_per_dn * e_per_dn / 12);
+    const double rounding_e2 = frame.raw.is_float() ? 0 : e_per_dn * e_per_dn / 12;
+    double variance = std::max(frame.noise->offset[colour] * electrons * electrons, rounding_e2);
     // Values measured in the dark include the noise of the dark charge, which a noise profile may not contain.
     variance = std::max(variance, std::pow(levels.black.noise_std_dn[site] * e_per_dn, 2));
     if (levels.dark_frame) variance += levels.dark_frame->added_variance_dn2[site] * e_per_dn * e_per_dn;
@@ -78,9 +81,9 @@ double black_std_e(const denoise::RawNoise& noise) {
 /// Returns the least visible standard deviation of line noise: the eye integrates it along lines.
 double min_line_std_e(const denoise::RawNoise& noise) { return 0.03 * black_std_e(noise); }
 
-std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& reduction, PlaneView<const float> charge_e,
+std::vector<denoise::LineOffsets> lines_of(const denoise::RawNoise& noise, PlaneView<const float> charge_e,
                                            Executor& executor) {
-  const denoise::FrameLineOptions options{.min_std_e = min_line_std_e(reduction.noise)};
+  const denoise::FrameLineOptions options{.min_std_e = min_line_std_e(noise)};
   std::array<std::optional<denoise::LineOffsets>, 2> of_kind;
   for_each_index(executor, 2, [&](int kind) {
     auto found = denoise::line_offsets_of_frame(charge_e, static_cast<denoise::Lines>(kind), options);
@@ -88,14 +91,14 @@ std::vector<denoise::LineOffsets> lines_of(const NoiseReduction& reduction, Plan
   });
   std::vector<denoise::LineOffsets> lines;
   for (auto& found : of_kind) {
-    if (found && lines_stand_out(*found, reduction.noise)) lines.push_back(*std::move(found));
+    if (found && lines_stand_out(*found, noise)) lines.push_back(*std::move(found));
   }
   return lines;
 }
 
 /// Subtracts line noise, and its contribution to the variance of a pixel.
-void subtract_measured_lines(RawElectrons& charge, NoiseReduction& out, Executor& executor) {
-  out.lines = lines_of(out, charge.value.view(), executor);
+void subtract_measured_lines(const RawFrame& frame, RawElectrons& charge, NoiseReduction& out, Executor& executor) {
+  out.lines = lines_of(median_noise(frame, out.noise), charge.value.view(), executor);
   for (const denoise::LineOffsets& lines : out.lines) {
     subtract_lines(lines, charge.value.view());
     const double gone_e2 = lines.line_std_e * lines.line_std_e - lines.residual_std_e * lines.residual_std_e;
@@ -103,8 +106,9 @@ void subtract_measured_lines(RawElectrons& charge, NoiseReduction& out, Executor
   }
 }
 
-NoiseReduction left_alone(std::string reason) {
+NoiseReduction left_alone(const RawFrame& frame, std::string reason) {
   NoiseReduction out;
+  out.noise_ratio = frame.noise_ratio;
   out.reason = std::move(reason);
   return out;
 }
@@ -129,13 +133,27 @@ void choose_level(const NoiseRequest& request, NoiseReduction& out) {
 
 /// Returns the charge to check: lines need the whole frame; the remaining noise is checked on a sample of it where
 /// there is one.
-RawElectrons charge_to_check(const RawFrame& frame, const RawLevels& levels, bool with_lines, NoiseReduction& out,
-                             Executor& executor) {
-  const std::vector<Rect> squares = sample_squares(frame, levels);
+/// @param squares  of the sample; empty: there is none
+RawElectrons charge_to_check(const RawFrame& frame, const RawLevels& levels, std::span<const Rect> squares,
+                             bool with_lines, NoiseReduction& out, Executor& executor) {
   if (!with_lines && !squares.empty()) return sample_electrons(frame, levels, squares, executor);
   RawElectrons charge = raw_electrons(frame, levels, {}, executor);
-  if (with_lines) subtract_measured_lines(charge, out, executor);
+  if (with_lines) subtract_measured_lines(frame, charge, out, executor);
   return squares.empty() ? std::move(charge) : sample_of(charge, squares);
+}
+
+/// Measures lines if requested, and compares the noise with its model.
+denoise::NoiseCheck check_frame(const RawFrame& frame, const RawLevels& levels, bool with_lines, NoiseReduction& out,
+                                Executor& executor) {
+  const std::vector<Rect> squares = sample_squares(frame, levels);
+  const RawElectrons charge = charge_to_check(frame, levels, squares, with_lines, out, executor);
+  NoiseRatioView ratio = view_of(frame.noise_ratio.get());
+  NoiseRatio of_sample;
+  if (frame.noise_ratio && !squares.empty()) {
+    of_sample = sample_ratio(ratio, squares);
+    ratio = view_of(&of_sample);
+  }
+  return denoise::check_noise({charge.value.view(), charge.phase, ratio}, out.noise, executor);
 }
 
 }  // namespace
@@ -178,7 +196,9 @@ double middle_snr(const RawFrame& frame, const RawLevels& levels, const denoise:
   for (std::size_t i = 0; i < snr.size(); ++i) {
     double charge = 0;
     for (int c = 0; c < 3; ++c) charge += fraction_of_sites[c] * electrons[c] * thumbnail.mean.plane[c].data()[i];
-    snr[i] = std::max(charge - dark, 0.0) / std::sqrt(std::max(charge, 0.0) + variance);
+    const int column = static_cast<int>(i) % thumbnail.mean.width(), row = static_cast<int>(i) / thumbnail.mean.width();
+    const double ratio = ratio_of_block(frame, thumbnail, column, row);
+    snr[i] = std::max(charge - dark, 0.0) / std::sqrt(ratio * (std::max(charge, 0.0) + variance));
   }
   const auto middle = snr.begin() + static_cast<std::ptrdiff_t>(snr.size() / 2);
   std::nth_element(snr.begin(), middle, snr.end());
@@ -188,15 +208,16 @@ double middle_snr(const RawFrame& frame, const RawLevels& levels, const denoise:
 Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, const RawLevels& levels,
                                   const NoiseRequest& request, Executor& executor) {
   const DenoiseChoice& choice = request.choice;
-  if (choice.mode == DenoiseChoice::Mode::off) return left_alone("not asked for");
+  if (choice.mode == DenoiseChoice::Mode::off) return left_alone(frame, "not asked for");
   if (auto error = noise_obstacle(frame, levels)) {
     if (choice.mode == DenoiseChoice::Mode::level) return tl::make_unexpected(*std::move(error));
-    return left_alone(std::move(error->message));
+    return left_alone(frame, std::move(error->message));
   }
   const NoiseModel model = noise_model(frame, levels, request.white_gain, request.space);
   NoiseReduction out;
   out.source = model.source;
   out.noise = model.noise;
+  out.noise_ratio = frame.noise_ratio;
   out.options.white_gain = model.white_gain;
   std::vector<double> memory;
   out.snr = middle_snr(frame, levels, out.noise, thumbnail, memory);
@@ -204,8 +225,7 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   if (!out.level) return out;
   out.options.level = *out.level;
   if (choice.unbiased_chroma) out.options.rho = std::numeric_limits<double>::infinity();
-  const RawElectrons charge = charge_to_check(frame, levels, choice.line_noise && request.lines, out, executor);
-  const denoise::NoiseCheck check = denoise::check_noise({charge.value.view(), charge.phase}, out.noise, executor);
+  const denoise::NoiseCheck check = check_frame(frame, levels, choice.line_noise && request.lines, out, executor);
   for (const denoise::NoiseRemark& remark : denoise::remarks_on(check)) out.warnings.push_back(remark.text);
   out.options.variance_scale = denoise::variance_scale_of(check);
   return out;

@@ -50,7 +50,7 @@ struct NoiseModel {
 NoiseModel noise_model(const RawFrame& frame, const RawLevels& levels, const std::array<float, 3>& white_gain,
                        OutputSpace space);
 
-/// Returns the median over all blocks of the signal-to-noise ratio of a mean pixel.
+/// Returns the median over all blocks of the signal-to-noise ratio of a mean pixel, with the noise of each block.
 /// @param snr  memory; grows to one value for each block
 double middle_snr(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
                   const Thumbnail& thumbnail, std::vector<double>& snr);

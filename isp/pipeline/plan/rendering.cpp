@@ -32,6 +32,21 @@ Result<WhiteBalance> choose_white(const RawFrame& frame, const DevelopOptions& o
   return found;
 }
 
+/// Returns the tables of the profile, placed before and after exposure; nullopt where they are not applied.
+std::optional<ProfileRendering> decide_profile(const RawFrame& frame, const DevelopOptions& options,
+                                               const Rendering& rendering) {
+  const bool has_look = rendering.look && rendering.look->kind != Look::camera;
+  if (!options.profile_tables || !rendering.white || has_look || is_linear(options.space)) return std::nullopt;
+  const double limit = tone_limit(options.tone, rendering.exposure_ev);
+  const Matrix3 to_prophoto = xyz_to_prophoto() * *inverse(*xyz_to_output(options.space));
+  return ProfileRendering{.map = map_at(*options.profile_tables, calibration_weight(frame.colour, rendering.white->xy)),
+                          .look = options.profile_tables->look,
+                          .to_prophoto = to_prophoto,
+                          .from_prophoto = *inverse(to_prophoto),
+                          .map_scale = std::exp2(rendering.exposure_ev) / limit,
+                          .limit = limit};
+}
+
 // A neutral that is not a valid colour of a light has no XYZ: an automatic one is replaced by daylight, others are
 // errors.
 Result<WhiteBalance> with_white(Result<WhiteBalance> balance, const RawFrame& frame, const DevelopOptions& o) {
@@ -139,6 +154,7 @@ Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light
   if (out.look) out.exposure_ev += out.look->dimming_ev;
   out.transform = transform_of(out.look ? out.look->adaptation * *balanced : *balanced, out.exposure_ev, options);
   out.tone = tone_of(out.exposure_ev, options);
+  out.profile = decide_profile(frame, options, out);
   if (!out.look || out.look->kind != Look::model) return out;
   Result<ModelTable> model =
       tabulate_model(*out.look, {out.white, out.white_gain, out.transform, out.exposure_ev}, options);

@@ -16,6 +16,7 @@
 #include "isp/pipeline/plan/look.h"
 #include "isp/raw/kernel/raw_to_rgb.h"
 #include "isp/raw/measure/thumbnail.h"
+#include "isp/render/profile_tables.h"
 #include "isp/render/white_balance.h"
 
 namespace lowlux::isp {
@@ -28,7 +29,8 @@ struct Rendering {
   std::array<float, 3> white_gain{1, 1, 1};
   double exposure_ev = 0;
   std::string_view exposure_rule;
-  std::optional<LookPlan> look;  // absent: that of the camera
+  std::optional<LookPlan> look;             // absent: that of the camera
+  std::optional<ProfileRendering> profile;  // tables of DevelopOptions::profile_tables, where they are applied
   RgbTransform transform;
   ToneTable tone;
   std::vector<std::string> warnings;

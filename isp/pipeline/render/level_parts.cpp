@@ -141,12 +141,14 @@ void set_own_noise(const denoise::RawElectronsView& raw_e, const NoiseReduction&
   for (int y = 0; y < rows; y += noise_block) {
     for (int x = 0; x < columns; x += noise_block) {
       const Rect cells{x, y, std::min(noise_block, columns - x), std::min(noise_block, rows - y)};
-      const BlockMeans means = sums_of(raw_e, overlap({2 * x, 2 * y, 2 * cells.width, 2 * cells.height},
-                                                      {0, 0, raw_e.value.width, raw_e.value.height}));
+      const Rect sites{2 * x, 2 * y, 2 * cells.width, 2 * cells.height};
+      const BlockMeans means = sums_of(raw_e, overlap(sites, {0, 0, raw_e.value.width, raw_e.value.height}));
+      const double ratio = raw_e.noise_ratio.mean(sites.x, sites.y, sites.width, sites.height);
       double luma_e2 = 0;
       for (std::size_t c = 0; c < 3; ++c) {
         const double mean_e = means.count[c] > 0 ? means.sum[c] / means.count[c] : 0;
-        const double variance_e2 = how.options.variance_scale[0] * (std::max(mean_e, 0.0) + how.noise.variance_e2[c]);
+        const double variance_e2 =
+            ratio * how.options.variance_scale[0] * (std::max(mean_e, 0.0) + how.noise.variance_e2[c]);
         luma_e2 +=
             (c == 1 ? 2 * 0.3 * 0.3 : 0.2 * 0.2) * how.options.white_gain[c] * how.options.white_gain[c] * variance_e2;
         fill(maps.site_variance[c], cells, variance_e2);

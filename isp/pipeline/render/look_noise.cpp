@@ -60,8 +60,10 @@ NoiseProfile profile_of_light(const DevelopPlan& plan, BayerPhase phase) {
 
 // Applies the raw frame's variance at the fraction x of white, scale x + offset, to each channel, as if each pixel had
 // its own three, except for monochrome frames.
-void of_model(const DevelopPlan& plan, const NoiseProfile& noise, const RgbView<const float>& quarter,
+void of_model(const DevelopPlan& plan, const Rect& crop, const NoiseProfile& noise, const RgbView<const float>& quarter,
               PlaneView<float> out, Executor& executor) {
+  const NoiseRatioView ratio = view_of(plan.noise_reduction.noise_ratio.get()).from(crop.x, crop.y);
+  const int side = plan.options.half ? 8 : 4;  // of a cell of the grid, in pixels of the mosaic
   const std::array<float, 3> weights = weights_of(plan);
   const bool monochrome = !plan.rendering.white;  // one plane serves for all three
   for_each_band(executor, out.height, [&](RowBand band, int) {
@@ -76,7 +78,7 @@ void of_model(const DevelopPlan& plan, const NoiseProfile& noise, const RgbView<
           weight += weights[c] * gain;
           if (monochrome) sum = weight * weight * variance;
         }
-        out.row(y)[x] = sum;
+        out.row(y)[x] = static_cast<float>(ratio.mean(side * x, side * y, side, side)) * sum;
       }
     }
   });
@@ -89,7 +91,7 @@ void noise_of_luminance(const DevelopPlan& plan, const RawDn& raw, const NoiseMa
   if (plan.noise_reduction.has_level()) {
     of_maps(plan, raw.default_crop, maps.residual_variance_e2.view(), out, executor);
   } else {
-    of_model(plan, profile_of_light(plan, raw.phase), quarter, out, executor);
+    of_model(plan, raw.default_crop, profile_of_light(plan, raw.phase), quarter, out, executor);
   }
 }
 

@@ -59,6 +59,13 @@ Rect seen_from(const Rect& piece, const Rect& part) {
   return {part.x - piece.x, part.y - piece.y, part.width, part.height};
 }
 
+/// Returns a region of the frame that lies in a tile, with its noise ratio.
+denoise::RawElectronsView region_of(const NoiseReducer::Piece& piece, const NoiseReduction& how,
+                                    const PlaneView<const float>& raw_e, const Rect& region) {
+  return {crop_of(raw_e, seen_from(piece.whole, region)), piece.phase,
+          view_of(how.noise_ratio.get()).from(region.x, region.y)};
+}
+
 /// Extends a core to an even column and row: it may begin one pixel behind one; what is before then belongs to the
 /// margin.
 Rect from_even_site(const Rect& core) {
@@ -165,7 +172,7 @@ void NoiseReducer::reduce_part(const LevelPart& part, const Piece& piece, const 
     take_dark_off(crop_of(raw_e, even), how.noise, crop_of(signal_e, even), executor_);
     const denoise::DenoiseMaps of_core = crop_of(maps, core);
     if (of_core.residual_variance.data == nullptr) return;
-    return set_own_noise({crop_of(raw_e, core), piece.phase}, how, of_core);
+    return set_own_noise(region_of(piece, how, raw_e, part.core), how, of_core);
   }
   denoise::DenoiseOptions options = how.options;
   options.level = *part.level;
@@ -174,8 +181,7 @@ void NoiseReducer::reduce_part(const LevelPart& part, const Piece& piece, const 
     of_part = crop_of(views_of(part_maps_), {0, 0, whole.width, whole.height});
   }
   const PlaneView<float> out = part_e_.view().crop(0, 0, whole.width, whole.height);
-  denoiser_->run({crop_of(raw_e, seen_from(piece.whole, whole)), piece.phase}, how.noise, options, out, of_part,
-                 executor_);
+  denoiser_->run(region_of(piece, how, raw_e, whole), how.noise, options, out, of_part, executor_);
   const Rect place = seen_from(whole, part.core);
   copy(crop_of(out, place), crop_of(signal_e, core));
   copy(crop_of(of_part, place), crop_of(maps, core));
@@ -188,7 +194,7 @@ void NoiseReducer::reduce_by_level(const Piece& piece, const NoiseReduction& how
     reserve_level(piece.whole.width, piece.whole.height, *parts_.front().level);
     denoise::DenoiseOptions options = how.options;
     options.level = *parts_.front().level;
-    return denoiser_->run({raw_e, piece.phase}, how.noise, options, signal_e, maps, executor_);
+    return denoiser_->run(region_of(piece, how, raw_e, piece.whole), how.noise, options, signal_e, maps, executor_);
   }
   if (const auto [width, height] = largest(parts_, piece); width > 0) {
     reserve_level(width, height, max_level_of(how));

@@ -1,12 +1,12 @@
 #include "isp/pipeline/render/pipeline.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "isp/pipeline/render/electron_mosaic.h"
 #include "isp/pipeline/render/frame_needs.h"
 #include "isp/pipeline/render/look_noise.h"
+#include "isp/pipeline/render/modelled_planes.h"
 #include "isp/pipeline/render/picture_view.h"
 #include "isp/raw/bin_plane.h"
 #include "isp/raw/corrections.h"
@@ -18,16 +18,6 @@ namespace {
 
 PlaneView<const float> crop_of(const Plane<float>& active, const Rect& crop) {
   return active.view().crop(crop.x, crop.y, crop.width, crop.height);
-}
-
-// Returns the remaining transform of planes that are already light in the image's primaries.
-RgbTransform of_modelled(const DevelopPlan& plan, const LookGrid* look) {
-  RgbTransform out;
-  out.luminance = plan.rendering.transform.luminance;
-  out.clip = INFINITY;
-  out.move_into_gamut = plan.rendering.transform.move_into_gamut;
-  out.look = look;
-  return out;
 }
 
 DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
@@ -181,7 +171,11 @@ void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const E
   seeing_.reset();
   if (needs_seeing_map(plan)) map_seeing_of(plan);
   if (needs_table(plan)) {
-    encode(as_modelled(in, plan), of_modelled(plan, transform.look));
+    encode(as_modelled(in, plan), transform_of_modelled(plan, transform.look));
+  } else if (plan.rendering.profile) {
+    for (Plane<float>& plane : modelled_) fit(plane, plan.width, plan.height);
+    const RgbView<float> planes{modelled_[0].view(), modelled_[1].view(), modelled_[2].view()};
+    encode(through_profile(*kernel_, in, plan, planes, executor_), transform_of_modelled(plan, transform.look));
   } else {
     encode(in, transform);
   }

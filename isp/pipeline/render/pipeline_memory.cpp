@@ -19,6 +19,7 @@ std::size_t whole_frame_bytes(const RawDn& raw, const DevelopPlan& plan, int thr
   const std::size_t plane = sizeof(float) * area(width, height);
   std::size_t out = RawToRgb::bytes(raw.default_crop.width, threads);
   if (plan.options.half) out += 3 * sizeof(float) * area(plan.width, plan.height);
+  if (plan.rendering.profile) out += 3 * sizeof(float) * area(plan.width, plan.height);
   if (plan.from_codes) return out;
   if (raw.layout == SensorLayout::linear_rgb) return out + 3 * plane;
   out += plane;
@@ -41,18 +42,19 @@ std::size_t expected_bytes(const RawDn& raw, const DevelopOptions& options, int 
   const bool best = options.effects && !options.effects->tolerance_delta_e;  // within a budget
   DevelopPlan most;
   most.options = options;
+  if (options.profile_tables) most.rendering.profile.emplace();
   most.width = options.half ? raw.default_crop.width / 2 : raw.default_crop.width;
   most.height = options.half ? raw.default_crop.height / 2 : raw.default_crop.height;
   if (denoise.mode == DenoiseChoice::Mode::automatic) {
     most.noise_reduction.level = best ? denoise::Level::best : denoise::Level::high;
   }
   if (denoise.mode == DenoiseChoice::Mode::level) most.noise_reduction.level = denoise.level;
-  const std::size_t codes = sizeof(std::uint16_t) * static_cast<std::size_t>(raw.dn.size());
+  const std::size_t samples = raw.sample_bytes() * raw.samples();
   const std::size_t sample = options.samples == SampleType::u8 ? 1 : options.samples == SampleType::u16 ? 2 : 4;
   const std::size_t picture = 3 * sample * area(most.width, most.height);
   const std::size_t dark = options.dark_frame ? sizeof(float) * area(raw.active.width, raw.active.height) : 0;
   const std::size_t turned = raw.info.orientation == Orientation::normal ? 0 : picture;
-  const std::size_t around = codes + dark + picture + turned;
+  const std::size_t around = samples + dark + picture + turned;
   if (options.look.look == Look::camera) return around + pipeline_bytes(raw, most, threads);
   return around + whole_frame_bytes(raw, most, threads) + 3 * sizeof(float) * area(most.width, most.height);
 }

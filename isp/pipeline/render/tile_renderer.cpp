@@ -7,6 +7,7 @@
 
 #include "isp/pipeline/render/electron_mosaic.h"
 #include "isp/pipeline/render/frame_needs.h"
+#include "isp/pipeline/render/modelled_planes.h"
 #include "isp/pipeline/render/picture_view.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/to_linear.h"
@@ -89,7 +90,8 @@ std::size_t TileRenderer::bytes(const RawDn& raw, const DevelopPlan& plan, const
     noise = denoise::Denoiser::bytes(sizes.width, sizes.height, threads, max_level_of(how)) +
             (how.regions ? 2 : 1) * sizeof(float) * piece;
   }
-  return sizeof(float) * piece + noise +
+  const std::size_t modelled = plan.rendering.profile ? 3 * sizeof(float) * seen / (plan.options.half ? 4 : 1) : 0;
+  return sizeof(float) * piece + noise + modelled +
          seen * (plan.options.half ? sizeof(float) * 3 / 4 : bytes_of(plan.options.samples)) +
          RawToRgb::bytes(sizes.seen_width, threads);
 }
@@ -101,6 +103,10 @@ void TileRenderer::reserve(const RawFrame& frame, const DevelopPlan& plan) {
   if (!kernel_ || kernel_width_ < sizes.seen_width) {
     kernel_ = std::make_unique<RawToRgb>(sizes.seen_width, executor_.width());
     kernel_width_ = sizes.seen_width;
+  }
+  if (plan.rendering.profile) {
+    const int cell = plan.options.half ? 2 : 1;
+    for (Plane<float>& plane : modelled_) fit(plane, sizes.seen_width / cell, sizes.seen_height / cell);
   }
   if (plan.options.half) {
     for (Plane<float>& plane : half_planes_) fit(plane, sizes.seen_width / 2, sizes.seen_height / 2);
@@ -140,6 +146,16 @@ PlaneView<float> TileRenderer::mosaic_of(const RawFrame& frame, const DevelopPla
   return out;
 }
 
+/// Renders a core and what is around it, through the profile's tables where there are any.
+void TileRenderer::encode_core(const RgbInput& in, const DevelopPlan& plan, const PictureSize& size,
+                               const PictureView& out) {
+  if (!plan.rendering.profile) return encode(*kernel_, in, plan.rendering.transform, plan, out, executor_);
+  RgbView<float> planes;
+  for (std::size_t c = 0; c < 3; ++c) planes[c] = modelled_[c].view().crop(0, 0, size.width, size.height);
+  const CameraPlanes light = through_profile(*kernel_, in, plan, planes, executor_);
+  encode(*kernel_, light, transform_of_modelled(plan, nullptr), plan, out, executor_);
+}
+
 void TileRenderer::render_core(const RawFrame& frame, const DevelopPlan& plan, const Rect& core,
                                PlaneView<const float> mosaic, const PictureView& out) {
   const RawDn& raw = frame.raw;
@@ -152,10 +168,10 @@ void TileRenderer::render_core(const RawFrame& frame, const DevelopPlan& plan, c
     for (std::size_t c = 0; c < 3; ++c) half[c] = half_planes_[c].view().crop(0, 0, pixels.width, pixels.height);
     kernel_->bin2x2(in, half, executor_);
     const CameraPlanes planes{{half[0], half[1], half[2]}, {1, 1, 1}};
-    return encode(*kernel_, planes, plan.rendering.transform, plan, isp::crop_of(out, pixels), executor_);
+    return encode_core(planes, plan, {pixels.width, pixels.height}, isp::crop_of(out, pixels));
   }
   const PictureView picture = isp::crop_of(view_of(*picture_), {0, 0, seen.width, seen.height});
-  encode(*kernel_, in, plan.rendering.transform, plan, picture, executor_);
+  encode_core(in, plan, {seen.width, seen.height}, picture);
   copy_pixels(isp::crop_of(picture, {core.x - seen.x, core.y - seen.y, core.width, core.height}),
               isp::crop_of(out, pixels));
 }

@@ -38,6 +38,7 @@ class TileRenderer {
  private:
   void reserve(const RawFrame& frame, const DevelopPlan& plan);
   PlaneView<float> mosaic_of(const RawFrame& frame, const DevelopPlan& plan, const Rect& core, NoiseReducer& noise);
+  void encode_core(const RgbInput& in, const DevelopPlan& plan, const PictureSize& size, const PictureView& out);
   void render_core(const RawFrame& frame, const DevelopPlan& plan, const Rect& core, PlaneView<const float> mosaic,
                    const PictureView& out);
 
@@ -46,6 +47,7 @@ class TileRenderer {
   Plane<float> noisy_;   // of a padded tile
   Plane<float> mosaic_;  // of a padded tile, where noise is reduced
   std::array<Plane<float>, 3> half_planes_;
+  std::array<Plane<float>, 3> modelled_;  // light of a core, changed by the profile
   std::unique_ptr<RawToRgb> kernel_;
   int kernel_width_ = 0;
   std::optional<Picture> picture_;  // of a core and a few pixels around it

@@ -266,24 +266,24 @@ void ResidualBand<Mosaic>::add_differences(const Block& block, int y) const {
 }
 
 template <class Mosaic>
-void ResidualBand<Mosaic>::finish_row(const Block& block, int k) const {
+void ResidualBand<Mosaic>::finish_row(const Block& block, int y) const {
   const int pairs = block.pairs;
-  const int own = (k & 1) == red_row(in_.phase) ? 0 : 2, first = block.first / 2;
+  const int own = (y & 1) == red_row(in_.phase) ? 0 : 2, first = block.first / 2;
   const auto runs = [&](float* SplitRow::*column) -> rows::ColourRuns {
-    return {made(k, own).*column + first, made(k, 1).*column + first, made(k, 2 - own).*column + first};
+    return {made(y, own).*column + first, made(y, 1).*column + first, made(y, 2 - own).*column + first};
   };
   const rows::FinishRows in{
-      .linear = block.at(linear, k),
-      .green_at_own = block.run(green, k),
-      .green = block.run(encoded, k, 1),
-      .own = {{block.run(other, k - 1, 1), block.run(difference, k), block.run(other, k + 1, 1)},
-              {block.run(other, k - 1), block.run(own_at_green, k), block.run(other, k + 1)}},
-      .other = {{block.run(own_at_green, k - 1), block.run(other, k), block.run(own_at_green, k + 1)},
-                {block.run(difference, k - 1), block.run(other, k, 1), block.run(difference, k + 1)}},
-      .shift = shift(k),
+      .linear = block.at(linear, y),
+      .green_at_own = block.run(green, y),
+      .green = block.run(encoded, y, 1),
+      .own = {{block.run(other, y - 1, 1), block.run(difference, y), block.run(other, y + 1, 1)},
+              {block.run(other, y - 1), block.run(own_at_green, y), block.run(other, y + 1)}},
+      .other = {{block.run(own_at_green, y - 1), block.run(other, y), block.run(own_at_green, y + 1)},
+                {block.run(difference, y - 1), block.run(other, y, 1), block.run(difference, y + 1)}},
+      .shift = shift(y),
       .median = median_,
-      .at_own = runs(own_is_odd(k) ? &SplitRow::odd : &SplitRow::even),
-      .at_green = runs(own_is_odd(k) ? &SplitRow::even : &SplitRow::odd)};
+      .at_own = runs(own_is_odd(y) ? &SplitRow::odd : &SplitRow::even),
+      .at_green = runs(own_is_odd(y) ? &SplitRow::even : &SplitRow::odd)};
   rows::finish_row(in, encoding_, pairs);
 }
 

@@ -236,6 +236,10 @@ MaskedBlack measure_masked_black(const RawDn& raw, double gain_dn_per_e) {
     out.refusal = "the file holds demosaiced samples, which have no masked pixels";
     return out;
   }
+  if (raw.is_float()) {
+    out.refusal = "the samples are floating-point numbers, which were computed: masked pixels are measured on codes";
+    return out;
+  }
   const std::optional<Rect> region = best_region(raw);
   if (!region) {
     out.refusal = raw.masked.empty() ? "the file has no masked pixels" : "the masked border is too small to measure on";

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <numeric>
+#include <type_traits>
 
 #include "isp/raw/black_point.h"
 
@@ -37,9 +38,19 @@ ThumbnailSums::ThumbnailSums(const RawDn& raw)
 
 void ThumbnailSums::clear() { std::ranges::fill(blocks_, Block{}); }
 
+namespace {
+
+// Sums of codes in a row of a block fit in 32 bits, and vectorise.
+template <class Sample>
+using RowSum = std::conditional_t<std::is_same_v<Sample, float>, double, std::uint32_t>;
+
+}  // namespace
+
 // Adds one row of one block: sums of the even and of the odd columns.
-void ThumbnailSums::add_mosaic(const std::uint16_t* dn, int width, int y, std::uint16_t white, Block& block) {
-  std::uint32_t even = 0, odd = 0, clipped = 0, difference = 0;
+template <class Sample>
+void ThumbnailSums::add_mosaic(const Sample* dn, int width, int y, Sample white, Block& block) {
+  RowSum<Sample> even = 0, odd = 0, difference = 0;
+  std::uint32_t clipped = 0;
   for (int x = 0; x + 1 < width; x += 2) {
     even += dn[x];
     odd += dn[x + 1];
@@ -49,7 +60,7 @@ void ThumbnailSums::add_mosaic(const std::uint16_t* dn, int width, int y, std::u
     even += dn[width - 1];
     clipped += dn[width - 1] >= white;
   }
-  for (int x = 0; x + 3 < width; x += 4) difference += static_cast<std::uint32_t>(std::abs(dn[x] - dn[x + 2]));
+  for (int x = 0; x + 3 < width; x += 4) difference += static_cast<RowSum<Sample>>(std::abs(dn[x] - dn[x + 2]));
   const int left = site_of(0, y);
   block.sum[left] += even;
   block.sum[left + 1] += odd;
@@ -60,7 +71,8 @@ void ThumbnailSums::add_mosaic(const std::uint16_t* dn, int width, int y, std::u
   block.differences += width / 4;
 }
 
-void ThumbnailSums::add_rgb(const std::uint16_t* dn, int width, Block& block) const {
+template <class Sample>
+void ThumbnailSums::add_rgb(const Sample* dn, int width, Block& block) const {
   for (int x = 0; x < width; ++x) {
     if (x + 1 < width) block.difference += std::abs(dn[3 * x + 1] - dn[3 * x + 4]);
     for (int c = 0; c < 3; ++c) {
@@ -72,8 +84,8 @@ void ThumbnailSums::add_rgb(const std::uint16_t* dn, int width, Block& block) co
   for (int c = 0; c < 3; ++c) block.n[c] += width;
 }
 
-void ThumbnailSums::add_row(const std::uint16_t* dn, int y) {
-  const auto white = static_cast<std::uint16_t>(std::min(65535.0, *std::ranges::min_element(white_dn_)));
+template <class Sample>
+void ThumbnailSums::add_samples(const Sample* dn, int y, Sample white) {
   Block* const blocks = &blocks_[static_cast<std::size_t>(y / block_) * columns_];
   for (int b = 0; b < columns_; ++b) {
     const int x = b * block_;
@@ -84,6 +96,14 @@ void ThumbnailSums::add_row(const std::uint16_t* dn, int y) {
       add_mosaic(dn + x, width, y, white, blocks[b]);
     }
   }
+}
+
+void ThumbnailSums::add_row(const std::uint16_t* dn, int y) {
+  add_samples(dn, y, static_cast<std::uint16_t>(std::min(65535.0, *std::ranges::min_element(white_dn_))));
+}
+
+void ThumbnailSums::add_row(const float* dn, int y) {
+  add_samples(dn, y, static_cast<float>(*std::ranges::min_element(white_dn_)));
 }
 
 void ThumbnailSums::add_columns(const std::array<const std::uint32_t*, 2>& columns, int block_row, int rows) {
@@ -99,8 +119,8 @@ void ThumbnailSums::add_columns(const std::array<const std::uint32_t*, 2>& colum
       }
       if ((width & 1) != 0) even += column[width - 1];
       const int of_parity = (rows + 1 - parity) / 2;
-      blocks[b].sum[2 * parity] += even;
-      blocks[b].sum[2 * parity + 1] += odd;
+      blocks[b].sum[2 * parity] += static_cast<double>(even);
+      blocks[b].sum[2 * parity + 1] += static_cast<double>(odd);
       blocks[b].n[2 * parity] += static_cast<std::int64_t>(of_parity) * ((width + 1) / 2);
       blocks[b].n[2 * parity + 1] += static_cast<std::int64_t>(of_parity) * (width / 2);
     }
@@ -123,7 +143,7 @@ std::array<double, 3> ThumbnailSums::colour_means(const RawDn& raw, const BlackP
   std::array<int, 3> n{};
   for (int i = 0; i < 4; ++i) {
     if (block.n[i] == 0) continue;
-    const double mean = static_cast<double>(block.sum[i]) / static_cast<double>(block.n[i]);
+    const double mean = block.sum[i] / static_cast<double>(block.n[i]);
     const double fraction = (mean - black.pedestal_dn[i]) * per_dn[i];
     const auto add = [&](int c) {
       sum[c] += fraction;
@@ -177,7 +197,7 @@ void ThumbnailSums::make(const RawFrame& frame, const BlackPoint& black, Thumbna
       const auto samples = std::accumulate(block.n.begin(), block.n.end(), std::int64_t{0});
       out.clipped.at(x, y) = static_cast<float>(static_cast<double>(block.clipped) / static_cast<double>(samples));
       if (block.difference > 0 && block.clipped == 0)
-        differences_dn_.push_back(static_cast<double>(block.difference) / static_cast<double>(block.differences));
+        differences_dn_.push_back(block.difference / static_cast<double>(block.differences));
     }
   }
   out.black_noise_std = black_noise(frame, black);
@@ -190,7 +210,7 @@ Thumbnail make_thumbnail(const RawFrame& frame, const BlackPoint& black, Executo
     const int end = std::min(band.last * sums.block(), raw.active.height);
     for (int y = band.first * sums.block(); y < end; ++y) {
       const int samples = raw.layout == SensorLayout::linear_rgb ? 3 : 1;
-      sums.add_row(raw.dn.row(raw.active.y + y) + raw.active.x * samples, y);
+      with_samples(raw, [&](const auto& dn) { sums.add_row(dn.row(raw.active.y + y) + raw.active.x * samples, y); });
     }
   });
   Thumbnail out;

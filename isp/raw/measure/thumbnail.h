@@ -33,6 +33,7 @@ class ThumbnailSums {
   void clear();
   /// Adds row y of the active area, samples interleaved. Rows of one block of rows come from one thread.
   void add_row(const std::uint16_t* dn, int y);
+  void add_row(const float* dn, int y);
   /// Adds a complete block of rows of a mosaic at once, from sums of its columns, separate for even and odd rows. It
   /// does not contribute to the noise estimate.
   /// @param rows  rows in the block: block() except in the last
@@ -43,14 +44,18 @@ class ThumbnailSums {
 
  private:
   struct Block {
-    std::array<std::int64_t, 4> sum{};  // per colour sample: site of a Bayer cell, or R, G, B of linear_rgb
+    std::array<double, 4> sum{};  // per colour sample: site of a Bayer cell, or R, G, B of linear_rgb; exact of codes
     std::array<std::int64_t, 4> n{};
     std::int64_t clipped = 0;
-    std::int64_t difference = 0;
+    double difference = 0;
     std::int64_t differences = 0;
   };
-  static void add_mosaic(const std::uint16_t* dn, int width, int y, std::uint16_t white, Block& block);
-  void add_rgb(const std::uint16_t* dn, int width, Block& block) const;
+  template <class Sample>
+  void add_samples(const Sample* dn, int y, Sample white);
+  template <class Sample>
+  static void add_mosaic(const Sample* dn, int width, int y, Sample white, Block& block);
+  template <class Sample>
+  void add_rgb(const Sample* dn, int width, Block& block) const;
   double black_noise(const RawFrame& frame, const BlackPoint& black);
   static std::array<double, 3> colour_means(const RawDn& raw, const BlackPoint& black, const PerSite<double>& per_dn,
                                             const Block& block, const std::array<double, 3>& beside);
@@ -65,11 +70,11 @@ class ThumbnailSums {
   std::vector<double> differences_dn_;
 };
 
-/// Computes block means of the active area, saturated samples included; sums are integers, so any thread count gives
-/// the same. The noise of black pixels is measured on masked pixels, else sqrt(NoiseProfile offset), else estimated as
-/// the lowest twentieth of the blocks' mean absolute difference of same-colour neighbours (times sqrt(pi) / 2, for a
-/// normal distribution); blocks with clipped samples or without any difference do not count.
-/// Gain maps are not applied: exposure and white balance do not need them.
+/// Computes block means of the active area, saturated samples included. One thread sums each block, so any thread count
+/// gives the same. The noise of black pixels is measured on masked pixels, else sqrt(NoiseProfile offset), else
+/// estimated as the lowest twentieth of the blocks' mean absolute difference of same-colour neighbours (times sqrt(pi)
+/// / 2, for a normal distribution); blocks with clipped samples or without any difference do not count. Gain maps are
+/// not applied: exposure and white balance do not need them.
 Thumbnail make_thumbnail(const RawFrame& frame, const BlackPoint& black, Executor& executor);
 
 }  // namespace lowlux::isp
