@@ -12,6 +12,7 @@
 /// What the soak stands on: the loaded functions, and chance.
 namespace lowlux {
 
+// NOLINTNEXTLINE(bugprone-macro-parentheses): a member is declared
 #define LOWLUX_FUNCTION(name) decltype(&lowlux_stage_##name) name = nullptr
 /// The stage's functions, as a program that loads the library by name has them.
 struct Functions {

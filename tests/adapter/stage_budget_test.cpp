@@ -1,4 +1,5 @@
 #include "isp/adapter/stage_budget.h"
+#include "tests/support/numbers.h"
 
 #include <gtest/gtest.h>
 
@@ -11,11 +12,11 @@
 namespace lowlux {
 namespace {
 
+using enum isp::StageWork;
 using isp::StageBudget;
 using isp::StageWork;
-using enum isp::StageWork;
+using test::nan;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// A machine on which work takes what it takes.

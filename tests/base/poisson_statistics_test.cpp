@@ -29,7 +29,8 @@ struct Histogram {
 Histogram histogram_of(float mean, std::uint64_t seed) {
   const double reach = 8 * std::sqrt(mean) + 16;  // no draw is further than 6.4 sigma, with its skewness
   Histogram out{std::max(0, static_cast<int>(mean - reach)), {}};
-  out.counts.resize(static_cast<std::size_t>(static_cast<int>(mean + reach) - out.first + 1));
+  const int counts = static_cast<int>(mean + reach) - out.first + 1;
+  out.counts.resize(static_cast<std::size_t>(counts));
   const std::vector<float> row_means(width, mean);
   std::vector<float> row(width);
   for (std::uint32_t y = 0; y < height; ++y) {

@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 
+#include "isp/base/float_samples.h"
 #include "isp/base/frame.h"
 
 namespace lowlux::test {
@@ -14,9 +15,11 @@ inline bool inside(const Rect& r, int width, int height) {
 inline void check(const RawFrame& frame) {
   const RawDn& raw = frame.raw;
   const int samples = raw.layout == SensorLayout::linear_rgb ? 3 : 1;
-  bool good = raw.dn.width() % samples == 0 && inside(raw.active, raw.dn.width() / samples, raw.dn.height());
+  bool good = raw.dn.empty() != raw.dn_float.empty() && raw.row_samples() % samples == 0 && !unusable_sample(raw);
+  const int width = raw.row_samples() / samples, height = raw.rows();
+  good = good && inside(raw.active, width, height);
   good = good && inside(raw.default_crop, raw.active.width, raw.active.height);
-  for (const Rect& r : raw.masked) good = good && inside(r, raw.dn.width() / samples, raw.dn.height());
+  for (const Rect& r : raw.masked) good = good && inside(r, width, height);
   for (const DefectRect& d : frame.corrections.defects) {
     good = good && inside({d.x, d.y, d.width, d.height}, raw.active.width, raw.active.height);
   }
@@ -29,6 +32,12 @@ inline void check(const RawFrame& frame) {
     const int last = samples - 1;
     const double black = raw.black_tag->at(raw.active.width - 1, raw.active.height - 1, last);
     good = good && black < raw.white_dn[last];
+  }
+  if (frame.noise_ratio) {
+    const Plane<float>& ratio = frame.noise_ratio->ratio;
+    good = good && ratio.width() == ratio_blocks(raw.active.width, frame.noise_ratio->block_px) &&
+           ratio.height() == ratio_blocks(raw.active.height, frame.noise_ratio->block_px);
+    for (std::size_t i = 0; i < ratio.size(); ++i) good = good && ratio.data()[i] > 0;
   }
   if (!good) std::abort();
 }

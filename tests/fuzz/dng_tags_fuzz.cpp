@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "capture/dng/dng_floats.h"
 #include "capture/dng/dng_frame.h"
 #include "tests/fuzz/check_frame.h"
 
@@ -35,6 +36,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!described) continue;
     const lowlux::capture::DngImage image = described->image;
     if (std::int64_t{image.width} * image.height > max_pixels) continue;
+    if (image.is_float) {
+      auto samples = lowlux::capture::decode_float_image(bytes, raw_image, image);
+      if (!samples) continue;
+      const auto frame = lowlux::capture::complete_float_dng(**dng, *std::move(described), *std::move(samples));
+      if (frame) lowlux::test::check(*frame);
+      continue;
+    }
     const auto frame = lowlux::capture::complete_dng(**dng, *std::move(described), size, decoded(image));
     if (frame) lowlux::test::check(*frame);
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tests/support/dng_builder.h"
+#include "tests/support/float_dng.h"
 
 namespace lowlux::test {
 namespace {
@@ -81,6 +82,17 @@ std::vector<std::pair<std::string, DngBuilder>> seeds() {
   table.set(50712, Tag::numbers(TagType::u16, values));
   table.set(50717, Tag::numbers(TagType::u16, {51000}));
   all.emplace_back("table", table);
+  for (const int bits : {16, 24, 32}) {
+    Plane<std::uint32_t> patterns(bits == 24 ? 30 : 20, 12);
+    for (std::size_t i = 0; i < patterns.size(); ++i) {  // values of 1 to 2, both signs
+      const std::uint32_t one = bits == 16 ? 0x3C00U : bits == 24 ? 0x3F0000U : 0x3F800000U;
+      patterns.data()[i] = one | (i % 5 == 0 ? 1U << (bits - 1) : 0U) | static_cast<std::uint32_t>(37 * i & 1023);
+    }
+    all.emplace_back("float" + std::to_string(bits), float_dng(patterns, {bits, bits == 24 ? 3 : 1, false, 1, 0, 5}));
+    const int predictor = bits == 16 ? 34894 : bits == 24 ? 3 : 34895;
+    const FloatStore how{bits, bits == 24 ? 3 : 1, true, predictor, 16, 16, bits == 16};
+    all.emplace_back("float_tiles" + std::to_string(bits), float_dng(patterns, how));
+  }
   return all;
 }
 

@@ -65,6 +65,20 @@ RawFrame with_every_tag(RawFrame scene) {
   return scene;
 }
 
+/// The scene as 32-bit floats, black 0 and white 1, as merges and `denoise` of floats are written.
+RawFrame as_fractions(RawFrame scene) {
+  RawDn& raw = scene.raw;
+  const double black = raw.black_tag->at(0, 0), range = raw.white_dn[1] - black;
+  raw.dn_float = Plane<float>(raw.dn.width(), raw.dn.height());
+  for (std::size_t i = 0; i < raw.dn.size(); ++i) {
+    raw.dn_float.data()[i] = static_cast<float>((raw.dn.data()[i] - black) / range);
+  }
+  raw.dn = {};
+  raw.black_tag = BlackLevel{.pattern_dn = {0}};
+  raw.white_dn.fill(1);
+  return scene;
+}
+
 int write(const RawFrame& frame, const std::string& file) {
   const auto written = isp::write_dng(frame, file);
   if (!written) std::fprintf(stderr, "peer_frames: %s: %s\n", file.c_str(), written.error().message.c_str());
@@ -84,5 +98,7 @@ int main(int argc, char** argv) {
   failed += write(captured(*scene, SensorLayout::bayer, false), folder + "captured_unknown.dng");
   failed += write(captured(*scene, SensorLayout::monochrome, true), folder + "captured_monochrome.dng");
   failed += write(with_every_tag(*std::move(scene)), folder + "every_tag.dng");
+  scene = capture::read_raw(argv[1]);
+  if (scene) failed += write(as_fractions(*std::move(scene)), folder + "floats.dng");
   return failed == 0 ? 0 : 1;
 }

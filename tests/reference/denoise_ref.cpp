@@ -10,6 +10,7 @@
 #include "denoise/spatial/residual_shares.h"
 #include "tests/reference/denoise_ref_blocks.h"
 #include "tests/reference/nl_bayes_ref.h"
+#include "tests/reference/noise_ratio_ref.h"
 
 namespace lowlux::reference {
 namespace {
@@ -79,7 +80,9 @@ struct Frame {
     }
     for (std::size_t i = 0; i < out.v.size(); ++i) {
       const double s = sum.v[i] / count.v[i];
-      const double q = s > 0 ? s / std::sqrt(s + dark + steady) : 0;
+      const int tile_x = static_cast<int>(i) % out.width, tile_y = static_cast<int>(i) / out.width;
+      const double ratio = ratio_of_tile(raw, tile_x, tile_y, out.width, out.height);
+      const double q = s > 0 ? s / std::sqrt(ratio * (s + dark + steady)) : 0;
       out.v[i] = options.chroma_start ? *options.chroma_start : q >= 3 ? 0 : q >= 0.7 ? 1 : 2;
       if (!options.chroma_start && options.level == Level::best && q >= 0.7) out.v[i] = 0;
     }
@@ -109,10 +112,11 @@ Four decorrelated(const Frame& frame, Four& variance) {
   for (int cy = 0; cy < h; ++cy) {
     for (int cx = 0; cx < w; ++cx) {
       std::array<double, 4> x{}, v{};
+      const double ratio = ratio_at_cell(frame.raw, cx, cy);
       double most = -1e30;
       for (int k = 0; k < 4; ++k) {
         x[k] = frame.gain[k] * (frame.y(k, cx, cy) - frame.dark_e[k]);
-        v[k] = frame.variance(k, mirrored(cx, frame.columns), mirrored(cy, frame.rows));
+        v[k] = ratio * frame.variance(k, mirrored(cx, frame.columns), mirrored(cy, frame.rows));
         most = std::max(most, x[k]);
       }
       for (int k = 0; k < 4; ++k) {
