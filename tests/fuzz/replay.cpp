@@ -11,9 +11,9 @@
 #include <vector>
 
 // Each target's LLVMFuzzerTestOneInput, renamed where it is compiled for this program.
-#define LOWLUX_FUZZ_TARGETS(of)                                                                                     \
-  of(command_line) of(cost) of(decoder) of(dng_tags) of(options) of(profile) of(read_picture) of(read_raw) of(shin) \
-      of(spectra) of(stage) of(unpack) of(v4l2)
+#define LOWLUX_FUZZ_TARGETS(of)                                                                               \
+  of(command_line) of(cost) of(decoder) of(dng_tags) of(noise_files) of(options) of(profile) of(read_picture) \
+      of(read_raw) of(shin) of(spectra) of(stage) of(unpack) of(v4l2)
 
 #define LOWLUX_DECLARE(name) extern "C" int name##_fuzz_input(const std::uint8_t* data, std::size_t size);
 LOWLUX_FUZZ_TARGETS(LOWLUX_DECLARE)
