@@ -155,10 +155,8 @@ struct Drizzle::Target {
     }
   }
 
-  bool is_rejected(int x, int y, const Point& place) const {
-    if (!is_accepted(frame.accepted, x, y)) return true;
-    if (frame.accepted_of_reference.blocks.data == nullptr) return false;
-    return !is_accepted(frame.accepted_of_reference, static_cast<int>(place.x / options.scale),
+  bool is_rejected(const Point& place) const {
+    return !is_accepted(frame.accepted, static_cast<int>(place.x / options.scale),
                         static_cast<int>(place.y / options.scale));
   }
 
@@ -171,7 +169,7 @@ struct Drizzle::Target {
       const Point place{places.first.x + (x - x0) * places.step.x, places.first.y + (x - x0) * places.step.y};
       if (std::isnan(row[x]) || place.y + half < band.first || place.y - half > band.last) continue;
       const bool own = place.y >= band.first && place.y < band.last && place.x >= 0 && place.x < width;
-      if (is_rejected(x, y, place)) {
+      if (is_rejected(place)) {
         counts.rejected += own ? 1 : 0;
         continue;
       }

@@ -26,8 +26,7 @@ struct DrizzleFrame {
   FrameView frame;
   const Motion& motion;       // from the reference to this frame
   PerSite<double> level_e{};  // light that the weight regards in addition to variance_e2: the background
-  AcceptedBlocks accepted;    // by places of the frame, ceil(width / block_px) x ceil(height / block_px) at least
-  AcceptedBlocks accepted_of_reference;  // by places of the reference
+  AcceptedBlocks accepted;    // by places of the reference, ceil(width / block_px) x ceil(height / block_px) at least
 };
 
 /// Counts the samples of one frame that lie within the output.

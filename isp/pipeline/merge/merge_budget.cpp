@@ -59,8 +59,8 @@ double predicted_merge_s(const CostModel& cost, const MergeWork& work, const Mer
   std::vector<CostShare> parts{{CostPart::merge_codes}};
   const auto add = [&](CostPart part, double times) { parts.push_back({part, times}); };
   const int measured = motion_measured ? std::min(motion_frames, n - 1) : 0;
-  add(CostPart::merge_alignment, measured);
   if (is_static(method.alignment)) {
+    add(CostPart::merge_alignment, measured);
     add(CostPart::merge_frame, 1 + n + measured + (compares ? sampled - 1 : 0));
     add(CostPart::merge_mean, n);
     if (compares) add(CostPart::merge_robust, static_cast<double>(sampled) / sampled_frames);

@@ -1,15 +1,10 @@
 #pragma once
 
-#include <functional>
-
 #include "isp/base/executor.h"
 #include "isp/base/result.h"
 #include "isp/pipeline/merge/merged_raw.h"
 
 namespace lowlux::isp {
-
-/// Reports the fraction of the work that is done, 0..1.
-using MergeProgress = std::function<void(double fraction)>;
 
 /// Merges raw frames of one camera and scene to one raw frame with less noise. Memory does not grow with their number.
 ///

@@ -95,4 +95,7 @@ struct FrameToMerge {
 /// another thread while the previous frame is processed, once at a time.
 using FrameReader = std::function<Result<FrameToMerge>(int index)>;
 
+/// Reports the fraction of the work that is done, 0..1.
+using MergeProgress = std::function<void(double fraction)>;
+
 }  // namespace lowlux::isp

@@ -1,0 +1,84 @@
+#include "isp/pipeline/merge/merge_choice.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "isp/merge/align/align.h"
+#include "isp/pipeline/merge/merge_budget.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double still_px = 0.5;  // largest displacement of a camera that stands still
+
+bool has_moved(const merge::Motion& motion) {
+  return motion.found && merge::median_shift_px(motion) > std::max(still_px, 5 * motion.standard_error_px);
+}
+
+/// Measures the motion of the last frame and of one in the middle.
+Result<void> measure_motion(MergeContext& work, MergeChoice& choice) {
+  std::vector<int> order;
+  for (const int index : {work.count - 1, work.count / 2}) {
+    if (index != work.out.reference && (order.empty() || order.front() != index)) order.push_back(index);
+  }
+  const merge::AlignReference reference(view_of(work.reference), work.executor);
+  work.loader.expect(order);
+  for (const int index : order) {
+    Result<FrameElectrons> frame = work.loader.next();
+    if (!frame) return tl::make_unexpected(frame.error());
+    const Result<double> light = work.stated_light();
+    if (!light) return tl::make_unexpected(light.error());
+    merge::Motion motion = merge::find_motion(reference, view_of(*frame), *light, {}, work.executor);
+    if (has_moved(motion)) choice.method.alignment = MergeAlignment::subpixel;
+    choice.motions.emplace(index, std::move(motion));
+  }
+  choice.bracket = work.loader.exposures_differ();
+  if (choice.bracket) choice.motions.clear();
+  work.clock.lap("motion of the camera");
+  return {};
+}
+
+/// Chooses the alignment.
+Result<void> choose_alignment(MergeContext& work, MergeChoice& choice) {
+  if (work.count == 1) return {};
+  if (!work.options.alignment) return measure_motion(work, choice);
+  choice.method.alignment = *work.options.alignment;
+  return {};
+}
+
+}  // namespace
+
+Result<MergeChoice> choose_merge(MergeContext& work) {
+  MergeChoice choice;
+  choice.method.robust = work.options.robust.value_or(true);
+  const auto chosen = [&](Result<void> done) -> Result<MergeChoice> {
+    if (!done) return tl::make_unexpected(done.error());
+    return std::move(choice);
+  };
+  const std::optional<ProcessingGoal>& goal = work.loader.reference_options().effects;
+  if (!goal || !goal->budget_s || !goal->cost) return chosen(choose_alignment(work, choice));
+  const RawDn& raw = work.loader.reference().raw;
+  const MergeWork amount{work.count, cost_size(raw.active.width, raw.active.height), work.options.alignment,
+                         work.options.robust};
+  double budget_s = *goal->budget_s;
+  if (work.options.developed_after) budget_s -= developing_reserve_s(*goal->cost, cost_size(raw), budget_s);
+  std::optional<bool> moved;
+  if (measures_motion(*goal->cost, amount, budget_s)) {
+    if (Result<void> measured = choose_alignment(work, choice); !measured) return chosen(measured);
+    moved = choice.method.alignment != MergeAlignment::none;
+  }
+  choice.plan = choose_merge_method(*goal->cost, amount, budget_s, moved);
+  choice.method = choice.plan->method;
+  if (!choice.plan->fits) {
+    choice.warning = fmt::format(
+        "merging takes at least {:.0f} ms by prediction, more than the budget of {:.3g} ms: the cheapest "
+        "method was used",
+        1e3 * choice.plan->predicted_s, 1e3 * budget_s);
+  }
+  return chosen({});
+}
+
+}  // namespace lowlux::isp
