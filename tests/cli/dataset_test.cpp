@@ -177,6 +177,33 @@ TEST_F(Dataset, AFullDiskLeavesNoHalfSample) {
   EXPECT_EQ(contents("full").size(), 1u);  // dataset.json
 }
 
+// What Slurm does with scripts/cluster/dataset.sbatch: it runs it once for each task, and says which one in variables.
+TEST_F(Dataset, TheTasksOfAJobArrayMakeTheWhole) {
+  const std::string json = spec(small);
+  made(json, "whole");
+  const std::string script = LOWLUX_TESTDATA "/../scripts/cluster/dataset.sbatch";
+  const auto task = [&](int id, int least, int most, int count, const std::vector<std::string>& more) {
+    std::vector<std::string> words{"env",
+                                   "LOWLUX=" LOWLUX_COMMAND,
+                                   "SLURM_ARRAY_TASK_ID=" + std::to_string(id),
+                                   "SLURM_ARRAY_TASK_MIN=" + std::to_string(least),
+                                   "SLURM_ARRAY_TASK_MAX=" + std::to_string(most),
+                                   "SLURM_ARRAY_TASK_COUNT=" + std::to_string(count),
+                                   "bash",
+                                   script};
+    words.insert(words.end(), more.begin(), more.end());
+    return test::run_process(words);
+  };
+  for (const int id : {3, 1}) EXPECT_EQ(task(id, 1, 3, 3, {json, file("tasks")}).exit_code, 0);
+  EXPECT_EQ(task(2, 2, 2, 1, {json, file("tasks"), "3"}).exit_code, 0);  // submitted again, alone
+  EXPECT_EQ(contents("tasks"), contents("whole"));
+
+  EXPECT_EQ(task(2, 2, 2, 1, {json, file("none")}).exit_code, 2);  // of how many is not known
+  EXPECT_EQ(task(1, 1, 1, 1, {json}).exit_code, 2);
+  EXPECT_EQ(task(4, 4, 4, 1, {json, file("none"), "3"}).exit_code, 2);
+  EXPECT_FALSE(fs::exists(file("none")));
+}
+
 TEST_F(Dataset, IndicesReachTwoToThe63) {
   Json last = small;
   last["first_index"] = 9223372036854775806U, last["count"] = 2;
