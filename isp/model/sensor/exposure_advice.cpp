@@ -4,28 +4,16 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <utility>
-
-#include <boost/math/special_functions/erf.hpp>
 
 #include "isp/base/text.h"
 #include "isp/model/colour/chroma_bound.h"
 #include "isp/model/sensor/noise_budget.h"
+#include "isp/model/sensor/saturation_limits.h"
 
 namespace lowlux::isp {
 namespace {
-
-double normal_quantile_above(double share) { return std::numbers::sqrt2 * boost::math::erfc_inv(2 * share); }
-
-double code_range_e(const SensorModel& s) { return (s.white_level_dn - s.black_level_dn) / s.system_gain_dn_per_e; }
-
-/// Returns the mean charge m that is z standard deviations below a limit: m + z sqrt(m + noise^2) = limit. Below 0 if
-/// noise alone reaches the limit.
-double charge_below(double wall_e, double noise_e, double z) {
-  return wall_e + z * z / 2 - z * std::sqrt(wall_e + noise_e * noise_e + z * z / 4);
-}
 
 /// Returns the dark electrons of R, G and B per second.
 Vector3 dark_rate(const AdviceRequest& r, const SensorModel& sensor) {
@@ -40,15 +28,8 @@ double fullest_rate(const AdviceRequest& r, const GainSetting& gain, double lumi
   return most;
 }
 
-/// Holds the mean charges that the two saturation limits of a sensor allow.
-struct Walls {
-  double full_well_e;
-  double converter_e;
-};
-
-Walls saturation_limits(const AdviceRequest& r, const SensorModel& sensor) {
-  const double z = normal_quantile_above(r.clipped_share);
-  return {charge_below(sensor.full_well_e, 0, z), charge_below(code_range_e(sensor), sensor.read_noise_e, z)};
+SaturationLimits limits_of(const AdviceRequest& r, const SensorModel& sensor) {
+  return saturation_limits(sensor, normal_quantile_above(r.clipped_share));
 }
 
 struct Longest {
@@ -57,11 +38,11 @@ struct Longest {
 };
 
 Longest longest_exposure(const AdviceRequest& r, const GainSetting& gain) {
-  const Walls walls = saturation_limits(r, gain.sensor);
+  const SaturationLimits limits = limits_of(r, gain.sensor);
   const double rate = fullest_rate(r, gain, r.highlight_cd_m2);
   Longest out{r.longest_exposure_s, ExposureLimit::motion};
-  if (walls.full_well_e < rate * out.exposure_s) out = {walls.full_well_e / rate, ExposureLimit::full_well};
-  if (walls.converter_e < rate * out.exposure_s) out = {walls.converter_e / rate, ExposureLimit::converter_range};
+  if (limits.full_well_e < rate * out.exposure_s) out = {limits.full_well_e / rate, ExposureLimit::full_well};
+  if (limits.converter_e < rate * out.exposure_s) out = {limits.converter_e / rate, ExposureLimit::converter_range};
   return out;
 }
 
@@ -159,7 +140,7 @@ double decibel(double snr) { return 10 * std::log10(snr); }
 
 AdvicePoint predicted_point(const AdviceRequest& request, std::size_t gain, double exposure_s) {
   const GainSetting& setting = request.gains[gain];
-  const Walls walls = saturation_limits(request, setting.sensor);
+  const SaturationLimits limits = limits_of(request, setting.sensor);
   const double highlight_e = fullest_rate(request, setting, request.highlight_cd_m2) * exposure_s;
   AdvicePoint out;
   out.gain = gain;
@@ -168,13 +149,13 @@ AdvicePoint predicted_point(const AdviceRequest& request, std::size_t gain, doub
   out.highlight_code_fraction = highlight_e / code_range_e(setting.sensor);
   if (exposure_s > request.longest_exposure_s) {
     out.exceeds = ExposureLimit::motion;
-  } else if (highlight_e > walls.converter_e && walls.converter_e <= walls.full_well_e) {
+  } else if (highlight_e > limits.converter_e && limits.converter_e <= limits.full_well_e) {
     out.exceeds = ExposureLimit::converter_range;
-  } else if (highlight_e > walls.full_well_e) {
+  } else if (highlight_e > limits.full_well_e) {
     out.exceeds = ExposureLimit::full_well;
   }
   const double midtone_e = fullest_rate(request, setting, request.midtone_cd_m2) * exposure_s;
-  const double reachable_e = std::min(walls.full_well_e, walls.converter_e) * (1 + 1e-12);  // the limit, up to rounding
+  const double reachable_e = limits.least_e() * (1 + 1e-12);  // the limit, up to rounding
   if (midtone_e <= reachable_e) out.midtone = midtone_quality(request, setting, exposure_s);
   return out;
 }
@@ -185,8 +166,7 @@ Result<ExposureAdvice> advise_exposure(const AdviceRequest& request) {
   out.gains.reserve(request.gains.size());
   for (std::size_t i = 0; i < request.gains.size(); ++i) {
     const GainSetting& gain = request.gains[i];
-    if (const Walls walls = saturation_limits(request, gain.sensor);
-        !(std::min(walls.full_well_e, walls.converter_e) > 0)) {
+    if (!(limits_of(request, gain.sensor).least_e() > 0)) {
       return fail(ErrorCode::invalid_argument,
                   "noise alone clips more pixels than the share allowed; allow a larger share, or leave out this gain",
                   gain.name);

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "isp/model/sensor/exposure_choice.h"
+
+namespace lowlux::isp {
+
+/// Holds the codes of one frame that decide on the exposure of the next ones, above black.
+struct MeteredCodes {
+  double midtone_dn = 0;  // median of the channel with most signal
+  double highlight_dn =
+      0;                // which ExposureLimits::clipped_fraction of the pixels exceed, in the channel that is fullest
+  double range_dn = 0;  // white less black
+  double clipped_fraction = 0;  // of the pixels, in the channel with most: codes of white or above
+};
+
+/// States how a frame was exposed.
+struct StatedExposure {
+  double exposure_s = 0;
+  double gain_factor = 1;
+};
+
+/// Sets exposure time and gain of a stream by choose_exposure(), from the frames themselves. The light is the mean of
+/// the last 16 frames, or fewer since the last setting. A frame whose highlight clips, or differs by more than a
+/// fourth, is a change of light and is followed at once; otherwise a setting is left after four frames at the earliest,
+/// and only where it loses 1 % of the power of the signal-to-noise ratio, after 16 frames 3 %, so that noise moves
+/// nothing. Exposures shorter than half a period of the mains show flicker: where that moves the highlight of 16 frames
+/// by more than 4 %, its largest value counts until the light changes, by a factor of three. Frames between a setting
+/// and its effect are left out. Allocates nothing after construction.
+class ExposureController {
+ public:
+  struct Setup {
+    std::vector<GainStep> gains;  // at least one, by rising factor
+    ExposureLimits limits;
+    ExposureSetting at;      // that the camera has
+    int latency_frames = 8;  // frames after which a setting is in effect at the latest
+  };
+  explicit ExposureController(Setup setup);
+
+  /// Takes one frame. Returns the setting to be made, if the camera should have another one.
+  /// @param stated  of this frame, if the camera states it; its effect is then awaited no longer than necessary
+  std::optional<ExposureSetting> take(const MeteredCodes& codes, const std::optional<StatedExposure>& stated);
+
+  /// Takes what the camera made of the time that was asked for: where it is another one, that is a limit from now on.
+  void was_set(double exposure_s);
+
+  /// Replaces the limits; the next frame decides by the new ones.
+  void set_limits(const ExposureLimits& limits) { limits_ = limits; }
+
+  /// Forgets the light, for a camera that has the setting `at`: the next frame decides at once.
+  void reset(const ExposureSetting& at);
+
+  /// Whether the last frame left the setting as it is.
+  bool settled() const { return settled_; }
+  /// Whether frames to come may still have another setting.
+  bool awaits() const { return await_frames_ > 0; }
+  const ExposureSetting& setting() const { return setting_; }
+  const ExposureChoice& choice() const { return choice_; }  // the last one
+  /// Returns the index of the gain nearest to a factor.
+  std::size_t gain_near(double factor) const;
+  const std::vector<GainStep>& gains() const { return gains_; }
+  int changes() const { return changes_; }  // settings made
+
+ private:
+  struct Metered {
+    MeteredLight light;
+    bool clips = false;
+    double highlight_e = 0;    // in the frame, with noise
+    double white_e_per_s = 0;  // that would fill the range
+    double exposure_s = 0;
+  };
+  bool is_awaited(const std::optional<StatedExposure>& stated);
+  Metered metered(const MeteredCodes& codes, const StatedExposure& exposed) const;
+  bool shows_flicker(double exposure_s) const;
+  bool is_other_light(const Metered& frame, const GainStep& gain) const;
+  MeteredLight light_of_frames(bool may_flicker);
+  bool may_stay() const;
+
+  std::vector<GainStep> gains_;
+  ExposureLimits limits_;
+  ExposureSetting setting_;
+  int latency_frames_;
+  int await_frames_ = 0;
+  std::array<MeteredLight, 16> frames_{};  // the last ones, in turn
+  int count_ = 0;                          // frames since the last setting, or since the light changed
+  std::optional<MeteredLight> light_;      // by which the last decision was made
+  std::optional<double> peak_e_per_s_;     // largest highlight of a light that flickers
+  bool clipped_ = false;                   // the highlight of the last frame
+  bool settled_ = false;
+  ExposureChoice choice_;
+  int changes_ = 0;
+};
+
+}  // namespace lowlux::isp
