@@ -1,6 +1,7 @@
 #include "isp/adapter/lowlux_stage.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstring>
 #include <memory>
@@ -23,17 +24,28 @@ using lowlux::isp::Stage;
 
 constexpr std::size_t largest_struct = 65536;
 
-// Sizes of structs in their first version, before they grew.
+/// Returns the size of a struct that ended before a member, with its padding.
 template <class T>
-constexpr std::size_t first_size = sizeof(T);
+constexpr std::size_t size_before(std::size_t offset) {
+  return (offset + alignof(T) - 1) / alignof(T) * alignof(T);
+}
+
+// Sizes that structs had in earlier versions of the header, before they grew.
+template <class T>
+constexpr std::array<std::size_t, 2> earlier_sizes{sizeof(T), sizeof(T)};
 template <>
-constexpr std::size_t first_size<lowlux_stage_params> = offsetof(lowlux_stage_params, budget_ms);
+constexpr std::array<std::size_t, 2> earlier_sizes<lowlux_stage_params>{
+    size_before<lowlux_stage_params>(offsetof(lowlux_stage_params, budget_ms)),
+    size_before<lowlux_stage_params>(offsetof(lowlux_stage_params, max_exposure_s))};
 template <>
-constexpr std::size_t first_size<lowlux_stage_result> = offsetof(lowlux_stage_result, step);
+constexpr std::array<std::size_t, 2> earlier_sizes<lowlux_stage_result>{
+    size_before<lowlux_stage_result>(offsetof(lowlux_stage_result, step)),
+    size_before<lowlux_stage_result>(offsetof(lowlux_stage_result, advised_exposure_s))};
 
 template <class T>
 bool is_of_a_version(const T& of_caller) {
-  return of_caller.size == first_size<T> || (of_caller.size >= sizeof(T) && of_caller.size <= largest_struct);
+  return std::ranges::find(earlier_sizes<T>, of_caller.size) != earlier_sizes<T>.end() ||
+         (of_caller.size >= sizeof(T) && of_caller.size <= largest_struct);
 }
 
 /// Copies the common part of a caller's struct; false if its size is invalid.

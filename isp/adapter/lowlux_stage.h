@@ -176,7 +176,8 @@ enum {
   LOWLUX_STAGE_HAS_F_NUMBER = 1 << 17,
   LOWLUX_STAGE_HAS_SCENE_LUMINANCE = 1 << 18,
   LOWLUX_STAGE_HAS_BUDGET = 1 << 19,
-  LOWLUX_STAGE_HAS_ALL = (1 << 20) - 1
+  LOWLUX_STAGE_HAS_EXPOSURE_LIMITS = 1 << 20,
+  LOWLUX_STAGE_HAS_ALL = (1 << 21) - 1
 };
 
 /* Known figures of one frame: of the exposed frame, not of the one before. A figure that is not valid is taken from the
@@ -205,7 +206,22 @@ typedef struct {
   float f_number;
   double scene_luminance_cd_m2; /* mean over the image */
   float budget_ms;              /* time limit for this frame, 0.01..1e6; steps that do not fit are left out: */
+  float max_exposure_s;         /* limits of the exposure that the result advises, 1e-7..1e5: motion blur, frame rate */
+  float min_exposure_s;         /* 0..max_exposure_s */
+  float max_gain;               /* 1..1e4; 0: no limit */
+  float clipped_fraction;       /* of the pixels, which the highlight may clip, 1e-9..0.5; 0: 0.001 */
+  int32_t mains_hz; /* lamps whose flicker exposures average out: 50, 60, LOWLUX_STAGE_MAINS_EITHER; 0: none */
 } lowlux_stage_params;
+
+enum { LOWLUX_STAGE_MAINS_EITHER = -1 };
+
+/* Limits of the advised exposure. */
+enum {
+  LOWLUX_STAGE_LIMIT_NONE = 0,
+  LOWLUX_STAGE_LIMIT_TIME = 1,     /* max_exposure_s */
+  LOWLUX_STAGE_LIMIT_CODES = 2,    /* the highlight reaches the largest code at this gain */
+  LOWLUX_STAGE_LIMIT_FULL_WELL = 3 /* the highlight fills the pixels, at any gain */
+};
 
 /* Steps to which a budget reduces the work on a frame. No frame is ever dropped, and look and output are never changed:
  * a budget that even the last step exceeds gives that step, and took_ms reports it. Steps that are no less than the
@@ -269,6 +285,13 @@ typedef struct {
   int32_t step;                /* LOWLUX_STAGE_STEP_...; without a budget 0 */
   float predicted_ms;          /* expected time of the steps done; 0: not known yet */
   float took_ms;               /* time of the frame, from the first read of its rows to the last row of its image */
+  /* Exposure advised for the next frames, with the best predicted signal-to-noise ratio under the limits of the
+   * parameters; all 0 where limits, exposure time or analogue gain are not valid. A caller that sets it, and states
+   * what each frame really had, has automatic exposure: the advice stays the same while the light does. */
+  float advised_exposure_s;
+  float advised_gain;    /* analogue, times digital where that is stated */
+  float advised_snr_db;  /* of the mid tone, 10 log10 of the ratio of powers */
+  int32_t advised_limit; /* LOWLUX_STAGE_LIMIT_... */
 } lowlux_stage_result;
 
 /* Statistics of the input frame, before subtraction and noise reduction: for the next exposure and white balance. */

@@ -12,6 +12,8 @@
 
 #include <fmt/format.h>
 
+#include "calib/noise/exposure_gains.h"
+
 namespace lowlux::isp {
 namespace {
 
@@ -228,6 +230,10 @@ Result<int> Stage::configure(const lowlux_stage_input& in, lowlux_stage_output& 
   const bool hd = out.yuv_matrix == 709 || (out.yuv_matrix == 0 && active.height >= 720);
   made.writer = std::make_unique<StageWriter>(*kind, hd ? YuvStandard::bt709 : YuvStandard::bt601, active.width,
                                               active.height, executor_.width());
+  auto gains = calib::exposure_gains(StageExposure::factors(), *format, made.pipeline->frame().raw.white_dn[1],
+                                     profile_ ? &profile_->profile() : nullptr);
+  if (!gains) return tl::make_unexpected(gains.error());
+  made.exposure = std::make_unique<StageExposure>(*format, *std::move(gains));
   made.budget = StageBudget(settings_.look == LOWLUX_STAGE_LOOK_EYE, made.stream.temporal);
   const bool adjusted = lay_out(*kind, active.width, active.height, out);
   made.layout = out;
@@ -310,6 +316,10 @@ int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& ou
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
   if (answers.result != nullptr) {
     tell(facts, *answers.result);
+    const PerSite<double>& black_dn = pipeline.decided().levels.black.pedestal_dn;
+    if (stream_->exposure->advise(pipeline.frame().raw, black_dn, params, *answers.result)) {
+      answers.result->applied |= LOWLUX_STAGE_HAS_EXPOSURE_LIMITS;
+    }
     answers.result->took_ms = static_cast<float>(took.count());
   }
   stream_->budget.took(done(), took.count());
@@ -319,7 +329,9 @@ int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& ou
 
 void Stage::reset() {
   history_.reset();
-  if (stream_) stream_->pipeline->reset();
+  if (!stream_) return;
+  stream_->pipeline->reset();
+  stream_->exposure->reset();
 }
 
 /// Returns the work done on the frame.

@@ -8,6 +8,7 @@
 
 #include "isp/adapter/lowlux_stage.h"
 #include "isp/adapter/stage_budget.h"
+#include "isp/adapter/stage_exposure.h"
 #include "isp/adapter/stage_formats.h"
 #include "isp/adapter/stage_params.h"
 #include "isp/adapter/stage_profile.h"
@@ -62,6 +63,7 @@ class Stage {
     std::unique_ptr<LivePipeline> pipeline;
     std::unique_ptr<StageWriter> writer;
     StageBudget budget;
+    std::unique_ptr<StageExposure> exposure;
   };
 
   lowlux_stage_settings settings_{};

@@ -4,6 +4,8 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+
+#include "isp/adapter/stage_exposure.h"
 #include "isp/base/sensor.h"
 
 namespace lowlux::isp {
@@ -197,7 +199,7 @@ const char* fault_of(const lowlux_stage_params& p) {
   for (const Rule& rule : rules) {
     if (has(p, rule.bit) && !rule.holds) return rule.fault;
   }
-  return nullptr;
+  return has(p, LOWLUX_STAGE_HAS_EXPOSURE_LIMITS) ? fault_of_limits(p) : nullptr;
 }
 
 StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream, const StageProfile* profile,

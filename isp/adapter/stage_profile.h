@@ -41,6 +41,7 @@ class StageProfile {
   std::optional<StageSensor> at(std::optional<double> analogue_gain, std::optional<double> exposure_s,
                                 std::optional<double> temperature_c) const;
 
+  const CameraProfile& profile() const { return profile_; }
   std::vector<ColourCalibration> calibrations() const;
   /// Returns the pixels that exceed the others by six read noises in a frame of a 25th of a second, ascending.
   std::vector<HotPixelFigure> hot_pixels() const;

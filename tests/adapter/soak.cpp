@@ -188,6 +188,10 @@ class Soak {
     p.noise_gain = static_cast<float>(white / 2000 * (0.1 + chance_.share()));
     p.noise_read = static_cast<float>(3 * p.noise_gain * chance_.share());
     p.f_number = static_cast<float>(1 + 8 * chance_.share());
+    p.max_exposure_s = static_cast<float>(std::exp2(-14 * chance_.share()));
+    p.min_exposure_s = static_cast<float>(p.max_exposure_s * chance_.share());
+    p.max_gain = static_cast<float>(1 + 63 * chance_.share());
+    p.mains_hz = chance_.one_in(2) ? 50 : LOWLUX_STAGE_MAINS_EITHER;
     p.scene_luminance_cd_m2 = std::exp2(14 * chance_.share() - 10);
     if (settings_.look == LOWLUX_STAGE_LOOK_EYE) p.valid |= LOWLUX_STAGE_HAS_SCENE_LUMINANCE;
     // Black that is measured or of a profile may lie above a low white.

@@ -105,6 +105,12 @@ TEST(StageMemory, OfFramesIsNoneFromTheFirstOneOnInEveryMode) {
       auto params = params_of(mode, names.format, i < 8 ? i : i + 5);  // with a gap
       if (i == 2) params.scene_luminance_cd_m2 = 1e4;                  // nothing to see for eyes in the dark
       if (i >= 5) params.valid |= LOWLUX_STAGE_HAS_BUDGET;
+      if (i % 3 != 1) {
+        params.valid |= LOWLUX_STAGE_HAS_EXPOSURE_LIMITS | LOWLUX_STAGE_HAS_EXPOSURE | LOWLUX_STAGE_HAS_ANALOGUE_GAIN;
+        params.exposure_s = 0.01;
+        params.analogue_gain = 2;
+        params.max_exposure_s = 0.05F;
+      }
       params.budget_ms = i % 2 == 0 ? 0.01F : 1e6F;  // down and up again
       if (i == 3 || i == 10) params.denoise = LOWLUX_STAGE_DENOISE_OFF;
       const int code = rig.process(frames[i % 6], stride, params);

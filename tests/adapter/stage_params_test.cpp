@@ -39,7 +39,8 @@ std::vector<Parameter> parameters() {
       {LOWLUX_STAGE_HAS_NOISE, [](P& p, float v) { p.noise_read = v; }, 0, 65535},
       {LOWLUX_STAGE_HAS_F_NUMBER, [](P& p, float v) { p.f_number = v; }, 0.1F, 1e3F},
       {LOWLUX_STAGE_HAS_SCENE_LUMINANCE, [](P& p, float v) { p.scene_luminance_cd_m2 = v; }, 1.001e-7F, 1e9F},
-      {LOWLUX_STAGE_HAS_BUDGET, [](P& p, float v) { p.budget_ms = v; }, 0.01F, 1e6F}};
+      {LOWLUX_STAGE_HAS_BUDGET, [](P& p, float v) { p.budget_ms = v; }, 0.01F, 1e6F},
+      {LOWLUX_STAGE_HAS_EXPOSURE_LIMITS, [](P& p, float v) { p.max_exposure_s = v; }, 1.001e-7F, 1e5F}};
   for (int i = 0; i < 4; ++i) {
     out.push_back({LOWLUX_STAGE_HAS_BLACK, [i](P& p, float v) { p.black_level[i] = v; }, 0, 65535});
   }
@@ -59,6 +60,7 @@ lowlux_stage_params usual() {
   out.analogue_gain = out.digital_gain = out.saturation = out.f_number = 1;
   out.scene_luminance_cd_m2 = 1;
   out.budget_ms = 1000;
+  out.max_exposure_s = 1;
   for (int i = 0; i < 9; i += 4) out.colour_matrix[i] = 1;
   return out;
 }
@@ -96,7 +98,7 @@ TEST(StageParams, MayNotHaveBitsOfALaterVersion) {
   auto params = usual();
   for (int bit = 0; bit < 32; ++bit) {
     params.valid = 1U << bit;
-    EXPECT_EQ(isp::fault_of(params) != nullptr, bit > 19) << bit;
+    EXPECT_EQ(isp::fault_of(params) != nullptr, bit > 20) << bit;
   }
 }
 
@@ -173,7 +175,8 @@ TEST(StageParams, AppliedAreThoseThatTookEffect) {
   const Codes codes = scene(names.format, width, height);
   const std::uint32_t plain = LOWLUX_STAGE_HAS_BLACK | LOWLUX_STAGE_HAS_COLOUR_GAINS | LOWLUX_STAGE_HAS_COLOUR_MATRIX |
                               LOWLUX_STAGE_HAS_DENOISE | LOWLUX_STAGE_HAS_SATURATION | LOWLUX_STAGE_HAS_EXPOSURE_VALUE |
-                              LOWLUX_STAGE_HAS_NOISE | LOWLUX_STAGE_HAS_SCENE_LUMINANCE | LOWLUX_STAGE_HAS_BUDGET;
+                              LOWLUX_STAGE_HAS_NOISE | LOWLUX_STAGE_HAS_SCENE_LUMINANCE | LOWLUX_STAGE_HAS_BUDGET |
+                              LOWLUX_STAGE_HAS_EXPOSURE_LIMITS;
   const std::uint32_t of_time = LOWLUX_STAGE_HAS_SEQUENCE | LOWLUX_STAGE_HAS_TIMESTAMP | LOWLUX_STAGE_HAS_EXPOSURE;
   for (const bool temporal : {false, true}) {
     auto settings = plain_settings();

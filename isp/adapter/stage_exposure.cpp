@@ -1,0 +1,85 @@
+#include "isp/adapter/stage_exposure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double usual_clipped_fraction = 1e-3;
+constexpr double steps_for_each_ev = 16, most_factor = 1e4;
+
+static_assert(static_cast<int>(ExposureLimit::motion) + 1 == LOWLUX_STAGE_LIMIT_TIME &&
+              static_cast<int>(ExposureLimit::converter_range) + 1 == LOWLUX_STAGE_LIMIT_CODES &&
+              static_cast<int>(ExposureLimit::full_well) + 1 == LOWLUX_STAGE_LIMIT_FULL_WELL);
+
+Mains mains_of(std::int32_t hz) {
+  if (hz == 50) return Mains::hz50;
+  if (hz == 60) return Mains::hz60;
+  return hz == LOWLUX_STAGE_MAINS_EITHER ? Mains::either : Mains::off;
+}
+
+ExposureLimits limits_of(const lowlux_stage_params& params) {
+  ExposureLimits out;
+  out.times = {std::max<double>(params.min_exposure_s, 1e-7), params.max_exposure_s, 0};
+  out.longest_s = params.max_exposure_s;
+  if (params.max_gain > 0) out.max_factor = params.max_gain;
+  out.mains = mains_of(params.mains_hz);
+  out.clipped_fraction = params.clipped_fraction > 0 ? params.clipped_fraction : usual_clipped_fraction;
+  if ((params.valid & LOWLUX_STAGE_HAS_TEMPERATURE) != 0) out.temperature_c = params.temperature_c;
+  return out;
+}
+
+}  // namespace
+
+std::vector<double> StageExposure::factors() {
+  std::vector<double> out;
+  for (int i = 0; i <= steps_for_each_ev * std::log2(most_factor); ++i) out.push_back(std::exp2(i / steps_for_each_ev));
+  return out;
+}
+
+StageExposure::StageExposure(const RawFormat& format, std::vector<GainStep> gains)
+    : meter_(format), controller_({.gains = std::move(gains), .limits = {}, .at = {}}) {}
+
+bool StageExposure::advise(const RawDn& raw, const PerSite<double>& black_dn, const lowlux_stage_params& params,
+                           lowlux_stage_result& out) {
+  constexpr std::uint32_t needed =
+      LOWLUX_STAGE_HAS_EXPOSURE_LIMITS | LOWLUX_STAGE_HAS_EXPOSURE | LOWLUX_STAGE_HAS_ANALOGUE_GAIN;
+  if ((params.valid & needed) != needed) return false;
+  const bool is_scaled = (params.valid & LOWLUX_STAGE_HAS_DIGITAL_GAIN) != 0;
+  const double factor = params.analogue_gain * (is_scaled ? params.digital_gain : 1.0);
+  const ExposureLimits limits = limits_of(params);
+  controller_.set_limits(limits);
+  if (!is_running_) controller_.reset({params.exposure_s, controller_.gain_near(factor)});
+  is_running_ = true;
+  meter_.clear();
+  for (int y = 0; y < raw.active.height; ++y) {
+    if (is_metered_row(y, raw.active.height)) {
+      meter_.add_row(raw.dn.row(raw.active.y + y) + raw.active.x, raw.active.width, y);
+    }
+  }
+  controller_.take(meter_.codes(black_dn, raw.white_dn[1], limits.clipped_fraction),
+                   StatedExposure{params.exposure_s, factor});
+  const ExposureSetting& setting = controller_.setting();
+  out.advised_exposure_s = static_cast<float>(setting.exposure_s);
+  out.advised_gain = static_cast<float>(controller_.gains()[setting.gain].factor);
+  out.advised_snr_db = static_cast<float>(decibel(controller_.choice().snr));
+  out.advised_limit = static_cast<std::int32_t>(controller_.choice().limit) + 1;
+  return true;
+}
+
+const char* fault_of_limits(const lowlux_stage_params& params) {
+  const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
+  if (!within(params.max_exposure_s, 1e-7, 1e5)) return "the longest exposure lies between 1e-7 and 1e5 s";
+  if (!within(params.min_exposure_s, 0, params.max_exposure_s)) return "the shortest exposure exceeds the longest";
+  if (params.max_gain != 0 && !within(params.max_gain, 1, most_factor))
+    return "the largest gain lies between 1 and 1e4";
+  if (params.clipped_fraction != 0 && !within(params.clipped_fraction, 1e-9, 0.5)) {
+    return "the fraction that may clip lies between 1e-9 and 0.5";
+  }
+  const bool known = params.mains_hz == 0 || mains_of(params.mains_hz) != Mains::off;
+  return known ? nullptr : "mains are of 50 or 60 Hz, 0 for none, or -1 for either";
+}
+
+}  // namespace lowlux::isp
