@@ -68,6 +68,26 @@ struct CameraFrame {
   int buffer = 0;  // for Camera::give_back
 };
 
+/// One of the gains that a camera can be set to.
+struct CameraGain {
+  double factor = 1;  // analogue gain
+  int code = 0;       // the driver's value, where it has codes
+};
+
+/// What an open camera offers to set its exposure by while it streams.
+struct ExposureControls {
+  double min_s = 0;  // exposure times: min_s + n step_s up to max_s
+  double max_s = 0;
+  double step_s = 0;              // 0: every time
+  std::vector<CameraGain> gains;  // by rising factor; empty: the gain stays as it is
+};
+
+/// Exposure of the coming frames.
+struct CameraExposure {
+  double exposure_s = 0;
+  std::optional<CameraGain> gain;  // absent: stays as it is
+};
+
 /// An open camera that delivers raw frames. Not thread-safe.
 class Camera {
  public:
@@ -83,6 +103,18 @@ class Camera {
   virtual void give_back(const CameraFrame& frame) = 0;
   /// Ends streaming, within two seconds; frames that were not given back become invalid. start() begins anew.
   virtual void stop() = 0;
+
+  /// Switches the camera's own automatic exposure off, and returns what can be set. Errors: the camera has no control
+  /// of its exposure time, or keeps its own (unsupported); a gain that it does not have (invalid_argument).
+  virtual Result<ExposureControls> take_exposure() {
+    return fail(ErrorCode::unsupported, "the camera has no control of its exposure", name());
+  }
+  /// Sets the exposure of the coming frames, after take_exposure(); some frames under way still have the one before.
+  /// @return the exposure time that the device has taken. Errors: the device refuses (unreadable), sets another gain
+  /// (unsupported), is gone (not_found).
+  virtual Result<double> set_exposure(const CameraExposure& /*exposure*/) {
+    return fail(ErrorCode::unsupported, "the camera has no control of its exposure", name());
+  }
 };
 
 /// One entry of a list of cameras.

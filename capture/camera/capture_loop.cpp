@@ -36,7 +36,7 @@ class Loop {
   Loop(Camera& camera, const LoopLimits& limits, const std::atomic<bool>& stop, LoopCount& count)
       : camera_(camera), limits_(limits), stop_(stop), count_(count) {}
 
-  Result<void> run(const FrameWork& work, const LoopWatch& watch) {
+  Result<void> run(const FrameCheck& check, const FrameWork& work, const LoopWatch& watch) {
     last_whole_ = steady_clock::now();
     for (bool wanted = true; wanted;) {
       if (stop_) {
@@ -46,7 +46,7 @@ class Loop {
       auto frame = wait();
       if (!frame) return tl::make_unexpected(frame.error());
       if (*frame) {
-        const Result<bool> more = take(**frame, work);
+        const Result<bool> more = take(**frame, check, work);
         camera_.give_back(**frame);
         if (!more) return tl::make_unexpected(more.error());
         wanted = *more;
@@ -87,15 +87,17 @@ class Loop {
     return {ErrorCode::insufficient, text + "; --timeout allows for longer exposures", last.where};
   }
 
-  Result<bool> take(const CameraFrame& frame, const FrameWork& work) {
+  Result<bool> take(CameraFrame& frame, const FrameCheck& check, const FrameWork& work) {
     if (frame.damaged) {
       const bool late = steady_clock::now() - last_whole_ >= limits_.timeout;
       if (!late) return true;
       return tl::make_unexpected(
           none_in_time({ErrorCode::insufficient, "the device says that what it delivers is damaged", {}}));
     }
+    const Result<bool> good = check ? check(frame) : Result<bool>(true);
+    if (!good) return good;
     Result<bool> more = true;
-    if (count_.skipped < limits_.skip) {
+    if (!*good || count_.skipped < limits_.skip) {
       ++count_.skipped;
     } else {
       more = work(frame);
@@ -118,10 +120,10 @@ class Loop {
 }  // namespace
 
 Result<void> capture_frames(Camera& camera, const LoopLimits& limits, const std::atomic<bool>& stop,
-                            const FrameWork& work, const LoopWatch& watch, LoopCount& count) {
+                            const FrameWork& work, const LoopWatch& watch, LoopCount& count, const FrameCheck& check) {
   const Running running(camera);
   if (auto started = camera.start(); !started) return started;
-  return Loop(camera, limits, stop, count).run(work, watch);
+  return Loop(camera, limits, stop, count).run(check, work, watch);
 }
 
 }  // namespace lowlux::capture

@@ -189,7 +189,9 @@ Result<int> LibcameraDevice::allocate(const CameraRequest& request, std::vector<
       return tl::make_unexpected(added.error());
     }
   }
-  controls_ = start_controls(request, offered_controls(camera_->controls()));
+  request_ = request;
+  offered_ = offered_controls(camera_->controls());
+  controls_ = start_controls(request_, offered_);
   warnings.insert(warnings.end(), controls_.warnings.begin(), controls_.warnings.end());
   camera_->requestCompleted.connect(this, &LibcameraDevice::request_completed);
   camera_->disconnected.connect(this, &LibcameraDevice::disconnected);
@@ -247,6 +249,13 @@ std::span<const std::byte> LibcameraDevice::bytes(int buffer) const {
 bool LibcameraDevice::begin_reading(int buffer) { return planes_[static_cast<std::size_t>(buffer)].begin_reading(); }
 
 void LibcameraDevice::end_reading(int buffer) { planes_[static_cast<std::size_t>(buffer)].end_reading(); }
+
+Result<ExposureControls> LibcameraDevice::take_exposure() { return exposure_controls(request_, offered_); }
+
+void LibcameraDevice::set_exposure(const CameraExposure& exposure) {
+  controls_ = exposure_settings(request_, exposure, offered_);
+  controls_are_due_ = true;
+}
 
 void LibcameraDevice::request_completed(libcamera::Request* request) {
   Completion completion{.buffer = static_cast<int>(request->cookie()), .state = CompletionState::cancelled};

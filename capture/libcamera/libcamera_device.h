@@ -57,6 +57,8 @@ class LibcameraDevice final : public RequestDevice {
   std::span<const std::byte> bytes(int buffer) const override;
   bool begin_reading(int buffer) override;
   void end_reading(int buffer) override;
+  Result<ExposureControls> take_exposure() override;
+  void set_exposure(const CameraExposure& exposure) override;
 
  private:
   Result<void> add_buffer(int buffer);
@@ -68,8 +70,10 @@ class LibcameraDevice final : public RequestDevice {
   std::string name_;
   bool acquired_ = false;
   CameraFormat format_;
+  CameraRequest request_;
+  OfferedControls offered_;
   StartControls controls_;
-  bool controls_are_due_ = false;  // to be set in the first request of a stream
+  bool controls_are_due_ = false;  // to be set in the next request
   std::shared_ptr<CompletionQueue> completions_;
   std::unique_ptr<libcamera::CameraConfiguration> configuration_;
   std::unique_ptr<libcamera::FrameBufferAllocator> allocator_;

@@ -134,4 +134,16 @@ void RequestCamera::stop() {
   open_.completions->clear();
 }
 
+Result<ExposureControls> RequestCamera::take_exposure() {
+  auto controls = open_.device->take_exposure();
+  if (!controls) controls.error().where = open_.name;
+  return controls;
+}
+
+Result<double> RequestCamera::set_exposure(const CameraExposure& exposure) {
+  if (open_.completions->is_gone()) return tl::make_unexpected(gone());
+  open_.device->set_exposure(exposure);
+  return exposure.exposure_s;
+}
+
 }  // namespace lowlux::capture

@@ -24,6 +24,9 @@ class RequestDevice {
   virtual std::span<const std::byte> bytes(int buffer) const = 0;
   virtual bool begin_reading(int buffer) = 0;  // false: the bytes may be stale
   virtual void end_reading(int buffer) = 0;
+  /// Errors: no such control (unsupported).
+  virtual Result<ExposureControls> take_exposure() = 0;
+  virtual void set_exposure(const CameraExposure& exposure) = 0;  // with the next buffer that is queued
 };
 
 /// An open device and what was agreed on with it.
@@ -54,6 +57,8 @@ class RequestCamera final : public Camera {
   Result<CameraFrame> next(std::chrono::milliseconds timeout) override;
   void give_back(const CameraFrame& frame) override;
   void stop() override;
+  Result<ExposureControls> take_exposure() override;
+  Result<double> set_exposure(const CameraExposure& exposure) override;
 
  private:
   Error gone() const;

@@ -74,4 +74,41 @@ StartControls start_controls(const CameraRequest& request, const OfferedControls
   return controls;
 }
 
+Result<ExposureControls> exposure_controls(const CameraRequest& request, const OfferedControls& offered) {
+  const auto& time = offered.exposure_us;
+  if (!time.offered || !time.range || !(time.range->largest >= 1)) {
+    return fail(ErrorCode::unsupported,
+                std::string("automatic exposure: the camera ") +
+                    (time.offered ? "states no range of its exposure time" : "has no control of its exposure time"));
+  }
+  ExposureControls out;
+  out.step_s = 1e-6;
+  out.min_s = std::ceil(std::max(time.range->least, 1.0)) * 1e-6;
+  out.max_s = std::max(std::floor(time.range->largest) * 1e-6, out.min_s);
+  const auto& gain = offered.analogue_gain;
+  if (request.analogue_gain || !gain.offered || !gain.range || !(gain.range->largest >= gain.range->least)) return out;
+  constexpr int steps_for_each_ev = 16, most_steps = 16 * steps_for_each_ev;
+  const double first = std::max(gain.range->least, 1e-3);
+  for (int i = 0; i <= most_steps; ++i) {
+    const double factor = first * std::exp2(static_cast<double>(i) / steps_for_each_ev);
+    if (i > 0 && factor > gain.range->largest) break;
+    out.gains.push_back({.factor = factor, .code = 0});
+  }
+  return out;
+}
+
+StartControls exposure_settings(const CameraRequest& request, const CameraExposure& exposure,
+                                const OfferedControls& offered) {
+  CameraRequest wanted = request;
+  wanted.exposure_s = exposure.exposure_s;
+  if (exposure.gain) wanted.analogue_gain = exposure.gain->factor;
+  StartControls out = start_controls(wanted, offered);
+  if (!request.frame_rate_hz && offered.frame_duration_us.offered) {
+    const double exposure_us = exposure.exposure_s * 1e6;
+    out.frame_duration_us = {whole_us(std::max(exposure_us, usual_frame_us)),
+                             whole_us(std::max(2 * exposure_us, usual_frame_us))};
+  }
+  return out;
+}
+
 }  // namespace lowlux::capture

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "capture/camera/camera.h"
+#include "isp/base/result.h"
 
 namespace lowlux::capture {
 
@@ -46,5 +47,15 @@ struct StartControls {
 /// Pi's defaultMinFrameDuration and defaultMaxFrameDuration), so an exposure above 1/30 s without a frame rate requests
 /// frames long enough for it.
 StartControls start_controls(const CameraRequest& request, const OfferedControls& offered);
+
+/// Returns what automatic exposure can set: times of the stated range, gains of the stated range in steps of a
+/// sixteenth of 1 EV, from the lowest on; none if the request states one. Errors: no control of the exposure time, or
+/// none with a range (unsupported).
+Result<ExposureControls> exposure_controls(const CameraRequest& request, const OfferedControls& offered);
+
+/// Returns the controls for an exposure within exposure_controls(). Frames last as long as the request's rate states,
+/// else 1/30 s, or longer if the exposure is.
+StartControls exposure_settings(const CameraRequest& request, const CameraExposure& exposure,
+                                const OfferedControls& offered);
 
 }  // namespace lowlux::capture

@@ -4,6 +4,7 @@
 #include <poll.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cerrno>
 #include <utility>
 
@@ -35,15 +36,13 @@ std::uint32_t lost_between(std::uint32_t last, std::uint32_t now) {
 }  // namespace
 
 V4l2Camera::V4l2Camera(std::unique_ptr<V4l2Device> device, V4l2Agreement agreement, const V4l2Options& options)
-    : device_(std::move(device)),
-      agreement_(std::move(agreement)),
-      memory_(options.memory),
-      buffers_wanted_(options.request.buffers) {}
+    : device_(std::move(device)), agreement_(std::move(agreement)), options_(options) {}
 
 Result<void> V4l2Camera::start() {
   if (buffers_) return {};
   if (device_->gone()) return tl::make_unexpected(device_->gone_error());
-  auto buffers = V4l2Buffers::request(*device_, memory_, buffers_wanted_, frame_bytes(agreement_.format));
+  auto buffers =
+      V4l2Buffers::request(*device_, options_.memory, options_.request.buffers, frame_bytes(agreement_.format));
   if (!buffers) return pass_on(buffers);
   if (auto unchanged = check_unchanged(); !unchanged) return unchanged;
   facts_ = read_facts(*device_, agreement_.format);
@@ -144,6 +143,7 @@ Result<CameraFrame> V4l2Camera::deliver(const V4l2Taken& taken) {
   frame.timestamp = timestamp_of(taken);
   frame.damaged = (taken.flags & V4L2_BUF_FLAG_ERROR) != 0 || taken.bytes_used < taken.data_offset + whole;
   frame.facts = facts_;
+  if (exposure_) frame.facts.exposure_s = frame.facts.analogue_gain = std::nullopt;
   frame.buffer = session_ << index_bits | static_cast<int>(taken.index);
   last_sequence_ = taken.sequence;
   return frame;
@@ -187,6 +187,18 @@ void V4l2Camera::give_back(const CameraFrame& frame) {
     failure_ = device_->error(code, "the DMA buffer of a frame cannot be handed back");
   }
   requeue(index);
+}
+
+Result<ExposureControls> V4l2Camera::take_exposure() {
+  auto taken = V4l2AutoExposure::take(*device_, options_, agreement_.format);
+  if (!taken) return pass_on(taken);
+  exposure_ = *std::move(taken);
+  return exposure_->controls();
+}
+
+Result<double> V4l2Camera::set_exposure(const CameraExposure& exposure) {
+  assert(exposure_);
+  return exposure_->set(*device_, exposure);
 }
 
 }  // namespace lowlux::capture

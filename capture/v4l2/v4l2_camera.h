@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "capture/camera/camera.h"
+#include "capture/v4l2/v4l2_auto_exposure.h"
 #include "capture/v4l2/v4l2_buffers.h"
 #include "capture/v4l2/v4l2_device.h"
 #include "capture/v4l2/v4l2_negotiation.h"
@@ -26,6 +27,8 @@ class V4l2Camera final : public Camera {
   Result<CameraFrame> next(std::chrono::milliseconds timeout) override;
   void give_back(const CameraFrame& frame) override;
   void stop() override;
+  Result<ExposureControls> take_exposure() override;
+  Result<double> set_exposure(const CameraExposure& exposure) override;
 
  private:
   Result<void> check_unchanged();
@@ -38,9 +41,9 @@ class V4l2Camera final : public Camera {
 
   std::unique_ptr<V4l2Device> device_;  // first: the members below refer to it and are destroyed before it
   V4l2Agreement agreement_;
-  V4l2Memory memory_;
-  int buffers_wanted_;
-  std::unique_ptr<V4l2Buffers> buffers_;  // while streaming
+  V4l2Options options_;
+  std::optional<V4l2AutoExposure> exposure_;  // once taken
+  std::unique_ptr<V4l2Buffers> buffers_;      // while streaming
   FrameFacts facts_;
   std::optional<std::uint32_t> last_sequence_;
   std::optional<Error> failure_;  // failure that occurred where none can be returned

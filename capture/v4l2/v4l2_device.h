@@ -89,6 +89,9 @@ struct V4l2Options {
   /// Value for V4L2_CID_ANALOGUE_GAIN, else V4L2_CID_GAIN, in the driver's own units; instead of
   /// CameraRequest::analogue_gain.
   std::optional<int> gain_code;
+  /// The codes that automatic exposure may set, with the factors that they stand for: V4L2 does not state them. Empty:
+  /// the gain stays as it is.
+  std::vector<CameraGain> gain_codes;
 };
 
 }  // namespace lowlux::capture

@@ -17,12 +17,6 @@ namespace {
 // V4L2 deprecates it as a synonym of brightness, but drivers of raw cameras still use it for the pedestal.
 constexpr std::uint32_t control_black_level = 0x0098090b;
 
-/// The control of the exposure time, with the unit of its steps.
-struct ExposureControl {
-  V4l2Control control;
-  double unit_s;
-};
-
 /// Returns the time of one line: (width read out + horizontal blanking) / pixel rate; nullopt if the node does not have
 /// both.
 std::optional<double> line_time_s(V4l2Device& device, const CameraFormat& format) {
@@ -37,34 +31,16 @@ std::optional<double> line_time_s(V4l2Device& device, const CameraFormat& format
   return (width + *blanking) / static_cast<double>(*rate_hz);
 }
 
-std::optional<ExposureControl> find_exposure(V4l2Device& device, const CameraFormat& format) {
-  if (const auto absolute = find_control(device, V4L2_CID_EXPOSURE_ABSOLUTE)) return ExposureControl{*absolute, 100e-6};
-  const auto lines = find_control(device, V4L2_CID_EXPOSURE);
-  if (!lines) return std::nullopt;
-  const auto line_s = line_time_s(device, format);
-  return line_s ? std::optional(ExposureControl{*lines, *line_s}) : std::nullopt;
-}
-
 bool exposes_by_itself(V4l2Device& device) {
   const auto mode = read_control(device, V4L2_CID_EXPOSURE_AUTO);
   return mode && *mode != V4L2_EXPOSURE_MANUAL && *mode != V4L2_EXPOSURE_SHUTTER_PRIORITY;
 }
 
-/// Ends automatic exposure, or sets the mode in which only the iris is automatic.
-void end_automatic_exposure(V4l2Device& device) {
-  const auto mode = find_control(device, V4L2_CID_EXPOSURE_AUTO);
-  if (!mode) return;
-  for (const int wanted : {V4L2_EXPOSURE_MANUAL, V4L2_EXPOSURE_SHUTTER_PRIORITY}) {
-    if (!exposes_by_itself(device)) return;
-    if (const auto set = write_control(device, *mode, wanted); set && *set == wanted) return;
-  }
-}
-
 void apply_exposure_time(V4l2Device& device, double wanted_s, const CameraFormat& format,
                          std::vector<std::string>& warnings) {
   const std::string asked = "exposure of " + number_text(wanted_s) + " s";
-  end_automatic_exposure(device);
-  const auto exposure = find_exposure(device, format);
+  const bool stays = end_automatic_exposure(device);
+  const auto exposure = find_exposure_time(device, format);
   if (!exposure || !exposure->control.writable) {
     warnings.push_back(asked + ": the driver has no control for it whose unit is known");
     return;
@@ -78,23 +54,11 @@ void apply_exposure_time(V4l2Device& device, double wanted_s, const CameraFormat
   if (std::abs(had_s - wanted_s) > 0.5001 * exposure->control.step * exposure->unit_s) {
     warnings.push_back(asked + ": the driver sets " + number_text(had_s) + " s");
   }
-  if (exposes_by_itself(device)) warnings.push_back(asked + ": the automatic exposure cannot be switched off");
-}
-
-std::optional<V4l2Control> find_gain(V4l2Device& device) {
-  const auto analogue = find_control(device, V4L2_CID_ANALOGUE_GAIN);
-  return analogue ? analogue : find_control(device, V4L2_CID_GAIN);
-}
-
-std::string range_text(const V4l2Control& control) {
-  return std::to_string(control.minimum) + " to " + std::to_string(control.maximum);
+  if (!stays) warnings.push_back(asked + ": the automatic exposure cannot be switched off");
 }
 
 void set_gain(V4l2Device& device, const V4l2Control& gain, int code, std::vector<std::string>& warnings) {
-  if (const auto automatic = find_control(device, V4L2_CID_AUTOGAIN)) {
-    const auto off = write_control(device, *automatic, 0);
-    if (!off || *off != 0) warnings.emplace_back("the automatic gain cannot be switched off");
-  }
+  if (!end_automatic_gain(device)) warnings.emplace_back("the automatic gain cannot be switched off");
   const auto set = write_control(device, gain, code);
   if (set && *set == code) return;
   warnings.push_back("gain code " + std::to_string(code) + ": " +
@@ -134,6 +98,41 @@ v4l2_fract interval_of(double rate_hz) {
 
 }  // namespace
 
+std::optional<V4l2ExposureTime> find_exposure_time(V4l2Device& device, const CameraFormat& format) {
+  if (const auto absolute = find_control(device, V4L2_CID_EXPOSURE_ABSOLUTE))
+    return V4l2ExposureTime{*absolute, 100e-6};
+  const auto lines = find_control(device, V4L2_CID_EXPOSURE);
+  if (!lines) return std::nullopt;
+  const auto line_s = line_time_s(device, format);
+  return line_s ? std::optional(V4l2ExposureTime{*lines, *line_s}) : std::nullopt;
+}
+
+bool end_automatic_exposure(V4l2Device& device) {
+  const auto mode = find_control(device, V4L2_CID_EXPOSURE_AUTO);
+  if (!mode) return true;
+  for (const int wanted : {V4L2_EXPOSURE_MANUAL, V4L2_EXPOSURE_SHUTTER_PRIORITY}) {
+    if (!exposes_by_itself(device)) return true;
+    if (const auto set = write_control(device, *mode, wanted); set && *set == wanted) return true;
+  }
+  return !exposes_by_itself(device);
+}
+
+bool end_automatic_gain(V4l2Device& device) {
+  const auto automatic = find_control(device, V4L2_CID_AUTOGAIN);
+  if (!automatic) return true;
+  const auto off = write_control(device, *automatic, 0);
+  return off && *off == 0;
+}
+
+std::optional<V4l2Control> find_gain(V4l2Device& device) {
+  const auto analogue = find_control(device, V4L2_CID_ANALOGUE_GAIN);
+  return analogue ? analogue : find_control(device, V4L2_CID_GAIN);
+}
+
+std::string range_text(const V4l2Control& control) {
+  return std::to_string(control.minimum) + " to " + std::to_string(control.maximum);
+}
+
 void apply_frame_rate(V4l2Device& device, const CameraRequest& request, CameraFormat& format,
                       std::vector<std::string>& warnings) {
   v4l2_streamparm told{};
@@ -167,7 +166,7 @@ Result<void> apply_exposure(V4l2Device& device, const V4l2Options& options, cons
 
 FrameFacts read_facts(V4l2Device& device, const CameraFormat& format) {
   FrameFacts facts;
-  const auto exposure = find_exposure(device, format);
+  const auto exposure = find_exposure_time(device, format);
   if (exposure && exposure->control.is_steady && !exposes_by_itself(device)) {
     const auto count = read_control(device, exposure->control.id);
     if (count && *count > 0) facts.exposure_s = *count * exposure->unit_s;

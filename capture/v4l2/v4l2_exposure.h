@@ -37,6 +37,23 @@ struct V4l2Control {
   bool is_steady = false;        // active, and its value is not changed by the hardware
   bool modifies_layout = false;  // setting it may change the format
 };
+/// The control of the exposure time, with the unit of its steps.
+struct V4l2ExposureTime {
+  V4l2Control control;
+  double unit_s = 0;
+};
+/// Returns V4L2_CID_EXPOSURE_ABSOLUTE, else V4L2_CID_EXPOSURE if the time of a line is known.
+std::optional<V4l2ExposureTime> find_exposure_time(V4l2Device& device, const CameraFormat& format);
+/// Ends automatic exposure, or sets the mode in which only the iris is automatic. Returns whether the time stays as
+/// set.
+bool end_automatic_exposure(V4l2Device& device);
+/// Returns V4L2_CID_ANALOGUE_GAIN, else V4L2_CID_GAIN.
+std::optional<V4l2Control> find_gain(V4l2Device& device);
+/// Switches automatic gain off. Returns whether the gain stays as set.
+bool end_automatic_gain(V4l2Device& device);
+/// Returns "0 to 232".
+std::string range_text(const V4l2Control& control);
+
 std::optional<V4l2Control> find_control(V4l2Device& device, std::uint32_t id);
 /// Returns the control's value; nullopt if it cannot be read.
 std::optional<int> read_control(V4l2Device& device, std::uint32_t id);

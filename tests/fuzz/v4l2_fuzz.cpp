@@ -116,6 +116,11 @@ bool live(lowlux::capture::Camera& camera, FakeV4l2& fake, FuzzInput& in) {
     lowlux::test::check(lowlux::capture::raw_frame_of(*frame, camera.format(), camera.name()));
     if (in.below(4) != 0) camera.give_back(*frame);
   }
+  if (const auto controls = camera.take_exposure()) {
+    require(controls->min_s > 0 && controls->max_s >= controls->min_s && controls->step_s > 0);
+    const auto set = camera.set_exposure({.exposure_s = 1e-4 * in.below(10000), .gain = {}});
+    require(!set || *set > 0);
+  }
   return honest;
 }
 

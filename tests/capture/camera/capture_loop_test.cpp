@@ -26,7 +26,7 @@ class CaptureLoop : public testing::Test {
           sequences_.push_back(frame.sequence);
           return work_(frame);
         },
-        [&](const LoopCount& count) { watch_(count); }, count_);
+        [&](const LoopCount& count) { watch_(count); }, count_, check_);
   }
   void deliver(std::uint32_t sequence, std::uint32_t lost = 0, bool damaged = false) {
     CameraFrame frame = camera_.frame();
@@ -42,6 +42,7 @@ class CaptureLoop : public testing::Test {
   std::vector<std::uint32_t> sequences_;
   std::function<Result<bool>(const CameraFrame&)> work_ = [](const CameraFrame&) { return true; };
   std::function<void(const LoopCount&)> watch_ = [](const LoopCount&) {};
+  capture::FrameCheck check_;
 };
 
 TEST_F(CaptureLoop, TakesAsManyWholeFramesAsAskedForAfterThoseLeftOut) {
@@ -157,6 +158,34 @@ TEST_F(CaptureLoop, GivesAFrameBackWhoseWorkFails) {
   EXPECT_EQ(count_.taken, 0u);
   EXPECT_EQ(camera_.returned, 1);
   EXPECT_EQ(camera_.stops, 1);
+}
+
+TEST_F(CaptureLoop, LeavesOutWhatTheCheckDoesNotPassAndPassesOnWhatItCompletes) {
+  for (const std::uint32_t sequence : {0U, 1U, 2U, 3U, 4U}) deliver(sequence, 0, sequence == 1);
+  std::vector<std::uint32_t> checked;
+  check_ = [&](CameraFrame& frame) -> Result<bool> {
+    checked.push_back(frame.sequence);
+    frame.facts.exposure_s = 0.25;
+    return frame.sequence >= 2;
+  };
+  work_ = [&](const CameraFrame& frame) {
+    EXPECT_EQ(frame.facts.exposure_s, 0.25);
+    return true;
+  };
+  ASSERT_TRUE(run({.frames = 2}));
+  EXPECT_EQ(checked, (std::vector<std::uint32_t>{0, 2, 3}));  // not the damaged one
+  EXPECT_EQ(sequences_, (std::vector<std::uint32_t>{2, 3}));
+  EXPECT_EQ(count_.skipped, 1u);
+}
+
+TEST_F(CaptureLoop, EndsWithTheErrorOfTheCheckAndGivesTheFrameBack) {
+  deliver(0);
+  check_ = [](CameraFrame&) -> Result<bool> { return fail(ErrorCode::unreadable, "no exposure", "fake"); };
+  const auto done = run({});
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().message, "no exposure");
+  EXPECT_EQ(camera_.returned, 1);
+  EXPECT_TRUE(sequences_.empty());
 }
 
 }  // namespace

@@ -167,5 +167,43 @@ TEST(StartControls, FiguresBeyondLibcamerasIntegersAreTheirEnds) {
   EXPECT_EQ(tiny.frame_duration_us.value()[0], 1);
 }
 
+TEST(ExposureControls, AreTheRangesThatTheCameraStates) {
+  const auto controls = exposure_controls({}, all_controls());
+  ASSERT_TRUE(controls) << controls.error().message;
+  EXPECT_DOUBLE_EQ(controls->min_s, 100e-6);
+  EXPECT_DOUBLE_EQ(controls->max_s, 66666e-6);
+  EXPECT_DOUBLE_EQ(controls->step_s, 1e-6);
+  ASSERT_EQ(controls->gains.size(), 65u);  // 4 EV in sixteenths
+  EXPECT_EQ(controls->gains.front().factor, 1);
+  EXPECT_NEAR(controls->gains.back().factor, 16, 1e-9);
+  EXPECT_TRUE(exposure_controls({.analogue_gain = 2}, all_controls())->gains.empty());  // given: it stays
+}
+
+TEST(ExposureControls, OfACameraWithoutAnExposureTimeAreAnError) {
+  OfferedControls offered = all_controls();
+  offered.exposure_us.range.reset();
+  EXPECT_EQ(exposure_controls({}, offered).error().code, ErrorCode::unsupported);
+  offered.exposure_us = {};
+  EXPECT_NE(exposure_controls({}, offered).error().message.find("no control"), std::string::npos);
+  offered = all_controls();
+  offered.analogue_gain = {};
+  EXPECT_TRUE(exposure_controls({}, offered)->gains.empty());
+}
+
+TEST(ExposureSettings, HoldTheFrameThatTheExposureTakes) {
+  const CameraExposure night{.exposure_s = 0.05, .gain = CameraGain{.factor = 4, .code = 0}};
+  const StartControls slow = exposure_settings({}, night, all_controls());
+  EXPECT_TRUE(slow.ae_off);
+  EXPECT_EQ(slow.exposure_us, 50000);
+  EXPECT_EQ(slow.analogue_gain, 4.0F);
+  EXPECT_EQ(slow.frame_duration_us, (std::array<std::int64_t, 2>{50000, 100000}));
+  // Shorter again: frames of the usual rate, as a limit once set would stay.
+  const StartControls fast = exposure_settings({}, {.exposure_s = 0.001, .gain = {}}, all_controls());
+  EXPECT_EQ(fast.frame_duration_us, (std::array<std::int64_t, 2>{33333, 33333}));
+  EXPECT_FALSE(fast.analogue_gain);
+  const StartControls given = exposure_settings({.frame_rate_hz = 10}, night, all_controls());
+  EXPECT_EQ(given.frame_duration_us, (std::array<std::int64_t, 2>{100000, 100000}));
+}
+
 }  // namespace
 }  // namespace lowlux::capture

@@ -275,5 +275,18 @@ TEST(CompletionQueue, HoldsOneCompletionOfEachBufferAndNoMore) {
   EXPECT_FALSE(queue.take({}));
 }
 
+TEST(RequestCamera, PassesTheExposureOnAndTheErrorOfACameraWithout) {
+  Script script;
+  const auto camera = camera_of(script);
+  EXPECT_FALSE(camera->take_exposure());
+  script.exposure_controls = ExposureControls{.min_s = 0.001, .max_s = 1};
+  EXPECT_EQ(camera->take_exposure()->max_s, 1);
+  EXPECT_EQ(camera->set_exposure({.exposure_s = 0.25}).value(), 0.25);
+  ASSERT_EQ(script.exposures.size(), 1u);
+  EXPECT_EQ(script.exposures[0].exposure_s, 0.25);
+  script.completions->set_gone();
+  EXPECT_EQ(camera->set_exposure({.exposure_s = 0.5}).error().code, ErrorCode::not_found);
+}
+
 }  // namespace
 }  // namespace lowlux::capture

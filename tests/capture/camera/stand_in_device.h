@@ -7,6 +7,7 @@
 #include <deque>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -27,6 +28,8 @@ struct Script {
   int stops = 0;
   int readings = 0;  // begun and not ended
   bool alive = true;
+  Result<ExposureControls> exposure_controls = fail(ErrorCode::unsupported, "no control");
+  std::vector<CameraExposure> exposures;  // that were set
   std::deque<int> queued;
   std::array<std::array<std::byte, 64>, buffer_count> memory{};
 
@@ -68,6 +71,8 @@ class StandIn final : public RequestDevice {
     return script_.readable;
   }
   void end_reading(int /*buffer*/) override { --script_.readings; }
+  Result<ExposureControls> take_exposure() override { return script_.exposure_controls; }
+  void set_exposure(const CameraExposure& exposure) override { script_.exposures.push_back(exposure); }
 
  private:
   Script& script_;
