@@ -71,6 +71,30 @@ TEST_F(CaptureCommand, RefusesOptionsOfPicturesForRawFilesAndFilms) {
   refused({"--v4l2", "/dev/video0", "-o", file("a.png"), "--budget-ms", "20"}, "goes with --live");
 }
 
+TEST_F(CaptureCommand, RefusesLimitsOfAutomaticExposureThatMeanNothing) {
+  const std::string out = file("a.dng");
+  const auto automatic = [&](std::vector<std::string> words, const std::string& why) {
+    words.insert(words.begin(), {"--v4l2", "/dev/video0", "-o", out, "--auto-exposure"});
+    refused(words, why);
+  };
+  automatic({"--exposure-time", "0.1"}, "mutually exclusive");
+  automatic({"--max-exposure", "0"}, "--max-exposure");
+  automatic({"--max-exposure", "nan"}, "--max-exposure");
+  automatic({"--max-gain", "0"}, "--max-gain");
+  automatic({"--mains", "55"}, "auto, 50, 60, off");
+  automatic({"--clip", "0.6"}, "--clip");
+  automatic({"--gain-codes", "16"}, "16=1,32=2");
+  automatic({"--gain-codes", "16=1,x=2"}, "16=1,32=2");
+  automatic({"--gain-codes", "16=1,32=0"}, "16=1,32=2");
+  automatic({"--gain-codes", "1.5=1"}, "16=1,32=2");
+  automatic({"--gain-codes", "16=1,32=1"}, "twice");
+  automatic({"--gain-codes", "16=1", "--gain-code", "16"}, "mutually exclusive");
+  refused({"--libcamera", "0", "-o", out, "--auto-exposure", "--gain-codes", "16=1"}, "V4L2");
+  for (const std::string option : {"--max-exposure", "--max-gain", "--clip"}) {
+    refused({"--v4l2", "/dev/video0", "-o", out, option, "0.1"}, option + " goes with --auto-exposure");
+  }
+}
+
 TEST_F(CaptureCommand, SaysInOneLineThatThereIsNoSuchCamera) {
   refused({"--v4l2", "/dev/video9999", "-o", file("a.png")}, "/dev/video9999", 1);
   refused({"--v4l2", "/dev/null", "-o", file("a.dng")}, "/dev/null", 1);

@@ -249,6 +249,7 @@ Wrong set_kind(const Words& words, CaptureArgs& args) {
 Wrong complete(const CLI::App& app, const Words& words, CaptureArgs& args) {
   if (args.list) return std::nullopt;
   if (auto wrong = wrong_camera(args)) return wrong;
+  if (auto wrong = wrong_auto_exposure(app, args.auto_exposure)) return wrong;
   if (auto wrong = set_kind(words, args)) return wrong;
   DevelopArgs& develop = args.develop;
   if (auto wrong = wrong_profiles(develop)) return wrong;
@@ -272,6 +273,7 @@ Parsed<CaptureArgs> parse_capture(const std::vector<std::string>& words) {
   CaptureArgs args;
   Words said;
   add_source(app, args);
+  add_auto_exposure(app, args.auto_exposure);
   add_frames(app, args, said);
   add_output(app, args, said);
   add_samples(app, args.develop);

@@ -8,6 +8,7 @@
 #include "capture/camera/camera.h"
 #include "capture/camera/capture_loop.h"
 #include "capture/v4l2/v4l2_source.h"
+#include "isp/cli/capture/exposure_args.h"
 #include "isp/cli/develop/develop_args.h"
 
 namespace lowlux::cli {
@@ -24,6 +25,7 @@ struct CaptureArgs {
   capture::CameraRequest request;
   capture::V4l2Memory memory = capture::V4l2Memory::mmap;
   std::optional<int> gain_code;
+  AutoExposureArgs auto_exposure;
   capture::LoopLimits limits;
   CaptureKind kind = CaptureKind::pictures;
   std::string extension;  // extension of files in a folder, without dot

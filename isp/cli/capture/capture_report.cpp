@@ -43,20 +43,34 @@ std::string step_text(const CaptureWork& work) {
   return out;
 }
 
+/// Returns "; exposure 0.04 s, gain 8" for automatic exposure.
+std::string exposure_text(const std::optional<ExposureState>& exposure) {
+  if (!exposure) return "";
+  const std::string gain = exposure->gain ? fmt::format(", gain {:.3g}", *exposure->gain) : "";
+  return fmt::format("; exposure {:.4g} s{}", exposure->exposure_s, gain);
+}
+
+Json exposure_json(const ExposureState& exposure) {
+  static constexpr const char* limits[] = {"time", "converter range", "full well"};
+  return {{"exposure_s", exposure.exposure_s}, {"analogue_gain", exposure.gain ? Json(*exposure.gain) : Json(nullptr)},
+          {"snr_db", exposure.snr_db},         {"limit", limits[static_cast<int>(exposure.limit)]},
+          {"highlight_clips", exposure.clips}, {"changes", exposure.changes}};
+}
+
 }  // namespace
 
 std::string progress_text(const CaptureState& state) {
   const capture::LoopCount& count = state.count;
   const auto rate = rate_hz(count);
-  return fmt::format("{}{} frames, {} lost, {} damaged; ms for each: wait {:.1f}, process {:.1f}, write {:.1f}{}",
+  return fmt::format("{}{} frames, {} lost, {} damaged; ms for each: wait {:.1f}, process {:.1f}, write {:.1f}{}{}",
                      rate ? fmt::format("{:.1f} frames/s, ", *rate) : std::string(), count.taken, count.lost,
                      count.damaged, ms_for_each(count.wait_s, count.taken),
                      ms_for_each(state.work.process_s, count.taken), ms_for_each(state.work.write_s, count.taken),
-                     step_text(state.work));
+                     step_text(state.work), exposure_text(state.exposure));
 }
 
 std::string capture_json(const CaptureState& state, const Error* error) {
-  const auto& [stream, count, work] = state;
+  const auto& [stream, count, work, exposure] = state;
   Json json{{"ok", error == nullptr}};
   if (error != nullptr) {
     json["error"] = error->message;
@@ -82,6 +96,7 @@ std::string capture_json(const CaptureState& state, const Error* error) {
   if (work.steps) {
     for (std::size_t i = 0; i < step_names.size(); ++i) json["steps"][step_names[i]] = (*work.steps)[i];
   }
+  if (exposure) json["auto_exposure"] = exposure_json(*exposure);
   json["files"] = work.files;
   json["warnings"] = work.warnings;
   return json.dump(2, ' ', false, Json::error_handler_t::replace);

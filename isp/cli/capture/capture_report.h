@@ -1,11 +1,13 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 
 #include "capture/camera/camera.h"
 #include "capture/camera/capture_loop.h"
 #include "isp/base/result.h"
+#include "isp/cli/capture/auto_exposure.h"
 #include "isp/cli/capture/capture_sink.h"
 
 namespace lowlux::cli {
@@ -15,9 +17,11 @@ struct CaptureState {
   CaptureStream stream;
   capture::LoopCount count;
   CaptureWork work;
+  std::optional<ExposureState> exposure;  // absent: not automatic
 };
 
-/// Returns "29.9 frames/s, 370 frames, 0 lost, 0 damaged; ms for each: wait 20.1, process 8.0, write 3.2".
+/// Returns "29.9 frames/s, 370 frames, 0 lost, 0 damaged; ms for each: wait 20.1, process 8.0, write 3.2", with the
+/// exposure if it is automatic.
 std::string progress_text(const CaptureState& state);
 /// Returns one JSON object; `error` may be null.
 std::string capture_json(const CaptureState& state, const Error* error);

@@ -17,6 +17,7 @@
 #include "capture/camera/capture_loop.h"
 #include "capture/v4l2/v4l2_source.h"
 #include "isp/base/executor.h"
+#include "isp/cli/capture/auto_exposure.h"
 #include "isp/cli/capture/capture_args.h"
 #include "isp/cli/capture/capture_list.h"
 #include "isp/cli/capture/capture_report.h"
@@ -52,7 +53,10 @@ void listen_to_signals() {
 
 Result<std::unique_ptr<capture::Camera>> open_camera(const CaptureArgs& args) {
   if (!args.v4l2.empty()) {
-    return capture::open_v4l2(args.v4l2, {.request = args.request, .memory = args.memory, .gain_code = args.gain_code});
+    return capture::open_v4l2(args.v4l2, {.request = args.request,
+                                          .memory = args.memory,
+                                          .gain_code = args.gain_code,
+                                          .gain_codes = args.auto_exposure.gain_codes});
   }
   return load_libcamera().and_then(
       [&](const capture::LibcameraModule& module) { return module.open(args.libcamera, args.request); });
@@ -104,13 +108,20 @@ class Capture {
     state_.stream = {(*camera)->format(), (*camera)->name()};
     auto sink = make_sink();
     if (!sink) return tl::make_unexpected(sink.error());
+    if (args_.auto_exposure.wanted) {
+      auto taken = AutoExposure::make(args_, **camera);
+      if (!taken) return tl::make_unexpected(taken.error());
+      exposure_ = *std::move(taken);
+    }
     take_warnings(**camera);
     if (args_.kind == CaptureKind::live) print_warnings();  // the end would be too late for a video
     CaptureProgress progress(!args_.develop.quiet);
     const auto work = [&](const capture::CameraFrame& frame) { return (*sink)->take(frame, state_.work); };
     const auto watch = [&](const capture::LoopCount&) { progress.show(state_); };
-    auto done = capture::capture_frames(**camera, args_.limits, stop_asked, work, watch, state_.count);
+    const auto check = [&](capture::CameraFrame& frame) { return meter(frame); };
+    auto done = capture::capture_frames(**camera, args_.limits, stop_asked, work, watch, state_.count, check);
     take_warnings(**camera);
+    exposure_.reset();  // it refers to the camera
     return done;
   }
 
@@ -133,6 +144,19 @@ class Capture {
   }
 
  private:
+  /// Sets the exposure by a frame, if it is automatic. Returns whether the frame is used: files wait for the exposure.
+  Result<bool> meter(capture::CameraFrame& frame) {
+    if (!exposure_) return true;
+    const bool was_ready = exposure_->is_ready();
+    const auto taken = exposure_->take(frame);
+    state_.exposure = exposure_->state();
+    if (!taken) return tl::make_unexpected(taken.error());
+    if (!was_ready && exposure_->is_ready() && !exposure_->found()) {
+      warn_once("automatic exposure has not settled in 500 frames: is the light steady?", state_.work);
+    }
+    return args_.kind == CaptureKind::live || exposure_->is_ready();
+  }
+
   Result<std::unique_ptr<CaptureSink>> make_sink() {
     switch (args_.kind) {
       case CaptureKind::raw:
@@ -159,6 +183,7 @@ class Capture {
 
   const CaptureArgs& args_;
   PoolExecutor executor_;
+  std::unique_ptr<AutoExposure> exposure_;
   CaptureState state_;
   std::size_t printed_ = 0;  // number of warnings
 };
