@@ -47,6 +47,24 @@ int groups_for(std::size_t samples, int details) {
   return std::clamp(static_cast<int>(static_cast<double>(samples) * details / min_degrees), 1, max_groups);
 }
 
+/// Sums the fraction `share` of a group that has the least coarse detail.
+/// @param memory  its content is replaced
+Sum quietest_of(std::span<const NoiseSample> group, double share, std::vector<NoiseSample>& memory) {
+  memory.assign(group.begin(), group.end());
+  const auto kept = static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(memory.size())));
+  std::nth_element(memory.begin(), memory.begin() + kept - 1, memory.end(),
+                   [](const NoiseSample& a, const NoiseSample& b) { return a.low_dn2 < b.low_dn2; });
+  Sum sum;
+  for (std::ptrdiff_t i = 0; i < kept; ++i) {
+    sum.n += 1;
+    sum.mean += memory[i].mean_dn;
+    sum.high += memory[i].high_dn2;
+    sum.middle += memory[i].middle_dn2;
+  }
+  sum.high_n = sum.n;
+  return sum;
+}
+
 struct Limits {
   double low = 0, middle = 0, high = 0;  // of an energy relative to the line
   double mean_below = 1;
@@ -168,18 +186,7 @@ FlatPoints quietest_points(const NoiseSamples& samples, const PerSite<ClipRange>
     const std::span<const NoiseSample> of = of_site(samples, site);
     std::vector<NoiseSample> quiet;
     for_each_group(of, groups_for(of.size(), samples.details.high), [&](std::span<const NoiseSample> group) {
-      quiet.assign(group.begin(), group.end());
-      const auto kept = static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(quiet.size())));
-      std::nth_element(quiet.begin(), quiet.begin() + kept - 1, quiet.end(),
-                       [](const NoiseSample& a, const NoiseSample& b) { return a.low_dn2 < b.low_dn2; });
-      Sum sum;
-      for (std::ptrdiff_t i = 0; i < kept; ++i) {
-        sum.n += 1;
-        sum.mean += quiet[i].mean_dn;
-        sum.high += quiet[i].high_dn2;
-        sum.middle += quiet[i].middle_dn2;
-      }
-      sum.high_n = sum.n;
+      const Sum sum = quietest_of(group, share, quiet);
       if (!(sum.high > 0)) return;
       all.n += sum.n;
       all.high += sum.n;
@@ -191,6 +198,25 @@ FlatPoints quietest_points(const NoiseSamples& samples, const PerSite<ClipRange>
   out.mean_high = all.n > 0 ? all.high / all.n : 0;
   out.mean_middle = all.n > 0 ? all.middle / all.n : 0;
   return out;
+}
+
+double quiet_ratio(const NoiseSamples& samples, const NoiseLine& line, const PerSite<ClipRange>& clip, double share) {
+  std::vector<double> ratio;
+  std::vector<NoiseSample> memory;
+  for (int site = 0; site < 4; ++site) {
+    const std::span<const NoiseSample> of = of_site(samples, site);
+    for_each_group(of, groups_for(of.size(), samples.details.high), [&](std::span<const NoiseSample> group) {
+      const Sum sum = quietest_of(group, share, memory);
+      const double mean_dn = sum.mean / sum.n;
+      if (clipped_share(line, mean_dn, clip[site]) > max_clipped) return;
+      const double model = read_variance_dn2(line, mean_dn, clip[site]);
+      if (model > 0) ratio.push_back(sum.high / sum.high_n / model);
+    });
+  }
+  if (ratio.empty()) return 1;
+  const auto quarter = ratio.begin() + static_cast<std::ptrdiff_t>(ratio.size() / 4);
+  std::nth_element(ratio.begin(), quarter, ratio.end());
+  return *quarter;
 }
 
 namespace {

@@ -47,6 +47,11 @@ FlatPoints flat_points(const NoiseSamples& samples, const NoiseLine& line, const
 /// known.
 FlatPoints quietest_points(const NoiseSamples& samples, const PerSite<ClipRange>& clip, double share);
 
+/// Returns the ratio of the variance of the finest details to that of a line, in the fraction `share` of each group
+/// that has the least coarse detail: the lower quartile of the groups, as detail of the scene only adds to it. 1 where
+/// no group has enough pixels that are not clipped.
+double quiet_ratio(const NoiseSamples& samples, const NoiseLine& line, const PerSite<ClipRange>& clip, double share);
+
 /// Sorts samples by site and surroundings, as flat_points() and quietest_points() require.
 void sort_by_surroundings(NoiseSamples& samples);
 

@@ -21,6 +21,8 @@ constexpr double expected_contrast = 0.015;  // of PRNU, grain and texture as fi
 constexpr double most_clipped_share = 0.9;   // of the pixels
 constexpr double largest_gain_error = 0.15;  // relative: beyond, the levels were too similar
 constexpr double largest_chi_square = 5;
+constexpr double min_prior_ratio = 0.7;  // of the variance of the quietest samples to the line's: below, it is scaled
+constexpr double least_prior_ratio = 1e-3;
 
 double white_of(const RawDn& raw, int site) {
   if (raw.layout == SensorLayout::monochrome) return raw.white_dn[0];
@@ -124,11 +126,20 @@ Fit settle(const NoiseSamples& samples, const PerSite<ClipRange>& clip, const No
   return out;
 }
 
+NoiseLine multiplied(NoiseLine line, double factor) {
+  for (Estimate* const figure : {&line.gain_dn_per_e, &line.offset_dn2}) {
+    figure->value *= factor;
+    figure->standard_error *= factor;
+  }
+  line.covariance *= factor * factor;
+  return line;
+}
+
 Result<void> check_straight(const NoiseLine& line) {
   if (line.reduced_chi_square <= largest_chi_square) return {};
   return fail(ErrorCode::insufficient,
-              fmt::format("variance against mean is no straight line (reduced chi square {:.1f}, at most 5): give "
-                          "a raw that is linear, or flat fields",
+              fmt::format("the noise does not grow linearly with brightness, as that of unprocessed raws does (reduced "
+                          "chi-square {:.1f}, at most 5)",
                           line.reduced_chi_square));
 }
 
@@ -136,15 +147,13 @@ Result<void> check_fit(const NoiseLine& line) {
   const Estimate& gain = line.gain_dn_per_e;
   if (!(gain.value > 0) || !(gain.standard_error < largest_gain_error * gain.value)) {
     return fail(ErrorCode::insufficient,
-                fmt::format("levels too alike: the gain comes out as {:.3g} +- {:.2g} DN per electron (15 % is the "
-                            "limit): take a picture with flat parts both dark and bright",
-                            gain.value, gain.standard_error));
+                "the smooth areas of the image are too similar in brightness to separate gain from read noise");
   }
   const Estimate& offset = line.offset_dn2;
   if (offset.value + 3 * offset.standard_error < 0) {
     return fail(ErrorCode::insufficient,
-                fmt::format("variance without light comes out as {:.3g} +- {:.2g} DN^2, below 0: give the right black "
-                            "level, or a picture with more of it above black",
+                fmt::format("the noise without light comes out below 0 ({:.3g} +- {:.2g} DN^2): the black level may be "
+                            "wrong",
                             offset.value, offset.standard_error));
   }
   return check_straight(line);
@@ -198,6 +207,19 @@ Result<Evidence> make_evidence(const RawDn& raw, const PerSite<double>& black_dn
   return out;
 }
 
+/// Returns the factor that makes a line no more than the noise of the quietest samples; 1 where it is not far above it.
+/// Clipping makes the variance as read no linear function of the line's, hence the rounds.
+double prior_ratio_of(const Evidence& evidence, const NoiseLine& line) {
+  double out = 1;
+  for (int i = 0; i < max_rounds; ++i) {
+    const double ratio = quiet_ratio(evidence.samples, multiplied(line, out), evidence.clip, first_fraction);
+    if (ratio > (i == 0 ? min_prior_ratio : 1 - settled)) break;
+    out *= ratio;
+    if (out < least_prior_ratio) return least_prior_ratio;
+  }
+  return out;
+}
+
 void judge(PictureNoise& out) {
   const RawTraces& t = out.traces;
   const double step = t.code_step_dn;
@@ -206,24 +228,28 @@ void judge(PictureNoise& out) {
   out.under_dithered = out.darkest_noise_steps < 0.5;
   if (out.under_dithered) {
     out.reasons.push_back(
-        fmt::format("under-dithered: the darkest parts scatter by {:.2f} steps of {} DN, half a step "
-                    "is needed for quantisation to be noise",
+        fmt::format("the noise of the darkest areas is only {:.2f} code steps of {} DN: rounding hides part of it",
                     out.darkest_noise_steps, t.code_step_dn));
   }
   if (t.code_step_dn > 1) out.reasons.push_back(fmt::format("only every {}th code is in use", t.code_step_dn));
   if (t.companded) {
     out.reasons.push_back(
-        fmt::format("lossy: codes lie {} to {} DN apart, depending on the value", t.code_step_dn, t.largest_step_dn));
+        fmt::format("the raw was compressed with loss: its codes are {} to {} DN apart, depending on brightness",
+                    t.code_step_dn, t.largest_step_dn));
   }
   if (t.block_grid) {
-    out.reasons.push_back(fmt::format("lossy: lines of an 8 x 8 grid stand out by {:.0f} %", 100 * t.grid_excess));
+    out.reasons.push_back(fmt::format(
+        "the raw was compressed with loss in blocks of 8 x 8, whose edges are {:.0f} % stronger than other detail",
+        100 * t.grid_excess));
   }
   if (t.denoised) {
-    out.reasons.push_back(fmt::format(
-        "denoised, or grain in the scene: the finest details have {:.2f} of the energy of the next, noise has 1",
-        t.fine_to_coarse));
+    out.reasons.push_back(
+        fmt::format("the raw was denoised before, or has texture everywhere: its finest detail has {:.2f} times the "
+                    "variance of the "
+                    "next coarser one, noise alone has 1",
+                    t.fine_to_coarse));
   }
-  if (!out.converged) out.reasons.emplace_back("the choice of flat samples did not settle");
+  if (!out.converged) out.reasons.emplace_back("the fit did not converge");
 }
 
 PictureNoise described(const Fit& fit, const Evidence& evidence) {
@@ -263,9 +289,7 @@ Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& 
   const auto fit = settle(made->samples, made->clip);
   if (!fit) {
     return fail(ErrorCode::insufficient,
-                fmt::format("too few flat parts of different brightness among {} samples (finest details at {:.2f} of "
-                            "the next coarser ones): take a picture with smooth surfaces",
-                            made->samples.sample.size(), made->traces.fine_to_coarse));
+                fmt::format("too few of the image's {} blocks are smooth", made->samples.sample.size()));
   }
   if (const auto good = check_fit(fit->line); !good) return tl::make_unexpected(good.error());
   return described(*fit, *made);
@@ -275,9 +299,13 @@ Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& 
                                        const PictureNoiseOptions& options, Executor& executor) {
   const auto made = make_evidence(raw, black_dn, options, executor);
   if (!made) return tl::make_unexpected(made.error());
-  const Fit fit = settle(made->samples, made->clip, prior);
-  if (const auto straight = check_straight(fit.line); !straight) return tl::make_unexpected(straight.error());
-  return described(fit, *made);
+  Fit fit = settle(made->samples, made->clip, prior);
+  if (!check_straight(fit.line)) fit = {.line = fit_noise_line({}, 0, prior), .flat = {}, .converged = true};
+  const double ratio = prior_ratio_of(*made, fit.line);
+  fit.line = multiplied(fit.line, ratio);
+  PictureNoise out = described(fit, *made);
+  out.prior_ratio = ratio;
+  return out;
 }
 
 std::array<NoiseAgreement, 3> compare_with(const NoiseProfile& profile, const PictureNoise& noise, double range_dn) {

@@ -47,6 +47,7 @@ struct PictureNoise {
   double darkest_noise_steps = 0;    // their standard deviation, with quantisation subtracted, in code steps
   std::vector<std::string> reasons;  // for doubting the result, one line each; empty: none found
   double contrast_squared = 0;       // at least 0
+  double prior_ratio = 1;  // factor of both figures by which a prior was above all noise of the image; 1: it was not
 };
 
 /// Fits gain and offset to the active area: one of each for all sites, each colour measured on its own pixels. Clipping
@@ -61,7 +62,11 @@ Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& 
 
 /// Fits gain and offset where the image alone does not separate them, with a prior (noise_line.h): what the image does
 /// not show stays as the prior has it. Standard errors include the prior's. `reasons` are those of the image.
-/// Errors: those of fit_picture_noise but for levels, flat samples and an offset below 0.
+/// Detail only adds to the variance of the quietest samples (quiet_ratio). Where they have less than 0.7 of the line's
+/// variance, because the raw was denoised before or its gain is far from the prior, gain and offset are multiplied by
+/// what they have (`prior_ratio`, at least 0.001). Where the samples follow no straight line, the line is the prior's,
+/// multiplied likewise.
+/// Errors: those of fit_picture_noise but for levels, flat samples, an offset below 0 and the reduced chi square.
 Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& black_dn, const NoisePrior& prior,
                                        const PictureNoiseOptions& options, Executor& executor);
 

@@ -261,10 +261,11 @@ std::vector<NoiseRemark> remarks_on(const NoiseCheck& check) {
   const auto* const negative = std::max_element(check.fraction_negative.begin(), check.fraction_negative.end());
   if (*negative > 0.01) {
     constexpr std::array<const char*, 3> names{"red", "green", "blue"};
-    out.push_back({NoiseFinding::black_suspicious,
-                   fmt::format("the black level is suspicious: {:.0f} % of the {} means lie below it by more than 4 "
-                               "standard deviations; the pedestal or the dark charge is too high, measure them anew",
-                               100 * *negative, names[negative - check.fraction_negative.begin()])});
+    out.push_back(
+        {NoiseFinding::black_suspicious,
+         fmt::format("the black level is suspicious: {:.0f} % of the {} areas are darker than black by more than "
+                     "4 standard deviations; the black level or the dark current is too high: --black sets it",
+                     100 * *negative, names[negative - check.fraction_negative.begin()])});
   }
   double least = 1, most_of_least = 0;
   bool measured = false;
@@ -275,24 +276,26 @@ std::vector<NoiseRemark> remarks_on(const NoiseCheck& check) {
     measured = true;
   }
   if (least < min_ratio) {
-    out.push_back({NoiseFinding::noise_below_model,
-                   fmt::format("the noise is suspicious: {:.2f} times the variance its model expects; the raw was "
-                               "denoised or compressed before, or the gain or the read noise is wrong: calibrate them",
-                               least)});
+    out.push_back(
+        {NoiseFinding::noise_below_model,
+         fmt::format("the image has {:.2f} times the noise variance that its model states: it was denoised or "
+                     "compressed before, or the model is wrong (--noise or --profile replaces it)",
+                     least)});
   }
   if (measured && most_of_least > largest_ratio) {
-    out.push_back({NoiseFinding::noise_above_model,
-                   fmt::format("the noise is suspicious: {:.2f} times the variance its model expects; the gain or the "
-                               "read noise is wrong: calibrate them",
-                               most_of_least)});
+    out.push_back(
+        {NoiseFinding::noise_above_model,
+         fmt::format("the image has {:.2f} times the noise variance that its model states: the model is wrong, or "
+                     "the scene has fine texture everywhere (--noise or --profile replaces the model)",
+                     most_of_least)});
   }
   if (check.windows > 0 && check.fraction_without_signal > 0.999) {
     out.push_back({NoiseFinding::all_dark,
-                   "no part of the picture rises above its dark charge: expose longer, or take the lens cap off"});
+                   "no part of the image is brighter than its dark signal: expose longer, or remove the lens cap"});
   }
   if (check.fraction_saturated > 0.99) {
     out.push_back({NoiseFinding::all_saturated,
-                   fmt::format("{:.1f} % of the sites are saturated: expose less", 100 * check.fraction_saturated)});
+                   fmt::format("{:.1f} % of the pixels are saturated: expose less", 100 * check.fraction_saturated)});
   }
   return out;
 }

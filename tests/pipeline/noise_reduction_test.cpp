@@ -163,7 +163,26 @@ TEST(NoiseReduction, AGainThatIsFourTimesOffIsWarnedOf) {
     for (auto& o : wrong.noise->offset) o *= factor;
     const auto warnings = planned(wrong, {.mode = Mode::level}).warnings;
     ASSERT_FALSE(warnings.empty()) << factor;
-    EXPECT_NE(warnings.back().find("noise is suspicious"), std::string::npos) << warnings.back();
+    EXPECT_NE(warnings.back().find("the noise variance that its model states"), std::string::npos) << warnings.back();
+  }
+}
+
+// Nobody can act on a warning about a model that was measured on the frame itself, or about less noise than stated
+// where the file states that it was reduced.
+TEST(NoiseReduction, WhatIsExpectedOfAModelIsNotWarnedOf) {
+  const auto warnings_of = [](double factor, NoiseProfile::Source source, bool reduced) {
+    RawFrame frame = test::night_frame({}, grey(100), 256, 256);
+    for (auto& s : frame.noise->scale) s *= factor;
+    for (auto& o : frame.noise->offset) o *= factor;
+    frame.noise->source = source;
+    frame.noise->reduced = reduced;
+    return planned(frame, {.mode = Mode::level}).warnings.size();
+  };
+  using Source = NoiseProfile::Source;
+  for (const double factor : {0.25, 4.0}) {
+    EXPECT_EQ(warnings_of(factor, Source::picture, false), 0U) << factor;
+    EXPECT_EQ(warnings_of(factor, Source::profile, false), 1U) << factor;
+    EXPECT_EQ(warnings_of(factor, Source::file, true), factor < 1 ? 1U : 0U) << factor;
   }
 }
 

@@ -193,7 +193,7 @@ TEST(UnknownDark, KnownChargeOfATaggedBlackKeepsColourAndNoiseModel) {
   options.denoise = {.mode = DenoiseChoice::Mode::level, .level = denoise::Level::standard};
   const DevelopPlan plan = planned(frame, options);
   EXPECT_FALSE(std::ranges::any_of(plan.warnings, [](const std::string& warning) {
-    return warning.find("noise is suspicious") != std::string::npos;
+    return warning.find("the noise variance that its model states") != std::string::npos;
   }));
   Pipeline pipeline(two_threads);
   const PlaneView<const float> signal = pipeline.signal(frame, plan);

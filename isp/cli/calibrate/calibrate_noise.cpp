@@ -122,7 +122,13 @@ Result<Calibration> calibrate_picture(const CalibrateNoiseArgs& args) {
   const auto noise =
       calib::fit_picture_noise(frame->raw, black->pedestal_dn,
                                {.method = args.method.value_or(calib::PictureNoiseMethod::ponomarenko)}, executor);
-  if (!noise) return at(noise.error());
+  if (!noise) {
+    const bool is_of_image = noise.error().code == ErrorCode::insufficient;
+    return fail(noise.error().code,
+                noise.error().message +
+                    (is_of_image ? "; use an image with smooth areas, dark and bright, or flats and --darks" : ""),
+                file);
+  }
   Calibration found;
   found.profile = std::move(*profile);
   found.report.title = camera_name(frame->raw.info.make, frame->raw.info.model) + ": noise of one picture";

@@ -34,7 +34,8 @@ Result<std::optional<NoiseOrigin>> origin_in(const std::string& file, const RawD
   if (!table) return tl::make_unexpected(table.error());
   const auto match = calib::find_darktable_noise(*table, raw.info.make, raw.info.model, *raw.info.iso, range_dn);
   if (!match) return std::nullopt;
-  return NoiseOrigin{NoiseOrigin::Source::darktable, setting_text(*match), match->figures, {}, false};
+  return NoiseOrigin{
+      .source = NoiseOrigin::Source::darktable, .basis = setting_text(*match), .figures = match->figures};
 }
 
 std::optional<NoiseOrigin> darktable_origin(const RawDn& raw, double range_dn, std::vector<std::string>& warnings) {
@@ -70,11 +71,12 @@ NoiseOrigin known_noise(const RawDn& raw, double range_dn, std::vector<std::stri
   if (raw.info.iso) {
     if (auto found = calib::find_raspberry_noise(raw.info.make, raw.info.model, *raw.info.iso, range_dn)) {
       const std::string setting = fmt::format("{} at analogue gain {:g}", found->sensor, found->analogue_gain);
-      return {NoiseOrigin::Source::raspberry_pi, setting, found->figures, {}, false};
+      return {.source = NoiseOrigin::Source::raspberry_pi, .basis = setting, .figures = found->figures};
     }
   }
   const calib::ClassNoise noise = calib::class_noise(raw, range_dn);
-  return {NoiseOrigin::Source::sensor_class, calib::text_of(noise, raw.info), noise.figures, {}, false};
+  return {
+      .source = NoiseOrigin::Source::sensor_class, .basis = calib::text_of(noise, raw.info), .figures = noise.figures};
 }
 
 }  // namespace lowlux::cli

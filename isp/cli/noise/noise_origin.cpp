@@ -6,26 +6,6 @@
 namespace lowlux::cli {
 namespace {
 
-std::string_view title_of(NoiseOrigin::Source source) {
-  switch (source) {
-    case NoiseOrigin::Source::given:
-      return "--noise";
-    case NoiseOrigin::Source::profile:
-      return "profile";
-    case NoiseOrigin::Source::file:
-      return "NoiseProfile of the file";
-    case NoiseOrigin::Source::picture:
-      return "measured on the image";
-    case NoiseOrigin::Source::darktable:
-      return "installed darktable";
-    case NoiseOrigin::Source::raspberry_pi:
-      return "libcamera's tuning file";
-    case NoiseOrigin::Source::sensor_class:
-      return "sensor class";
-  }
-  return "";
-}
-
 /// Returns an uncertainty in words; empty where none is stated.
 std::string factor_text(double factor) {
   if (!(factor > 1)) return {};
@@ -34,6 +14,26 @@ std::string factor_text(double factor) {
 }
 
 }  // namespace
+
+std::string_view title_of(NoiseOrigin::Source source) {
+  switch (source) {
+    case NoiseOrigin::Source::given:
+      return "given with --noise";
+    case NoiseOrigin::Source::profile:
+      return "camera profile";
+    case NoiseOrigin::Source::file:
+      return "stated by the file (NoiseProfile)";
+    case NoiseOrigin::Source::picture:
+      return "measured on the image";
+    case NoiseOrigin::Source::darktable:
+      return "darktable's measurements";
+    case NoiseOrigin::Source::raspberry_pi:
+      return "libcamera's tuning of the sensor";
+    case NoiseOrigin::Source::sensor_class:
+      return "typical of its class";
+  }
+  return "";
+}
 
 std::string_view name_of(NoiseOrigin::Source source) {
   switch (source) {
@@ -58,7 +58,11 @@ std::string_view name_of(NoiseOrigin::Source source) {
 std::string origin_text(const NoiseOrigin& origin) {
   std::string text(title_of(origin.source));
   if (!origin.basis.empty()) text += " (" + origin.basis + ")";
-  if (origin.is_adjusted) text += ", adjusted to the image";
+  if (origin.prior_ratio < 1) {
+    text += fmt::format(", times {:.2g} as measured on the image", origin.prior_ratio);
+  } else if (origin.is_adjusted) {
+    text += ", adjusted to the image";
+  }
   if (!origin.figures) return text;
   const calib::NoiseFigures& f = *origin.figures;
   return text + fmt::format(": {:.3g} DN/e-{}, read noise {:.2g} e-{}", f.gain_dn_per_e, factor_text(f.gain_factor),
@@ -75,7 +79,9 @@ std::string origin_json(const NoiseOrigin& origin) {
     json["read_noise_factor"] = f.read_noise_factor;
   }
   json["adjusted_to_image"] = origin.is_adjusted;
+  json["measured_over_expected"] = origin.prior_ratio;
   json["unmeasurable"] = origin.unmeasurable;
+  json["doubts"] = origin.doubts;
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

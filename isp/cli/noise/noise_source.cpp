@@ -19,6 +19,10 @@ namespace {
 
 using OptionalOrigin = std::optional<NoiseOrigin>;
 
+/// Relative standard error of the noise variance at a level of the image, from which it is stated in a warning: beyond,
+/// check_noise would call a model suspicious (denoise::largest_ratio).
+constexpr double large_error = 0.5;
+
 /// Returns variance = gain (mean - black) + offset [DN^2] relative to white less black.
 NoiseProfile profile_of(double gain_dn_per_e, double offset_dn2, const RawDn& raw, const BlackPoint& black,
                         NoiseProfile::Source source) {
@@ -69,14 +73,45 @@ calib::NoisePrior prior_of(const calib::NoiseFigures& figures, const RawDn& raw)
       .offset_log_std = std::max(2 * read_part * std::hypot(gain_log_std, std::log(figures.read_noise_factor)), 0.1)};
 }
 
-std::string found_text(const calib::PictureNoise& noise) {
-  const double gain = noise.gain_dn_per_e.value;
-  std::string text = fmt::format(
-      "neither a profile nor the file states usable noise: measured on the picture itself, {:.3g} DN/e-, "
-      "{:.2g} e- without light",
-      gain, std::sqrt(std::max(noise.offset_dn2.value, 0.0)) / gain);
-  for (const std::string& doubt : noise.reasons) text += "; " + doubt;
-  return text;
+/// Returns the relative standard error of the variance of pixels `mean_dn` above black.
+double variance_error(const calib::PictureNoise& noise, double mean_dn) {
+  const double a = noise.gain_dn_per_e.standard_error * mean_dn, b = noise.offset_dn2.standard_error;
+  const double error2 = a * a + b * b + 2 * mean_dn * noise.covariance;
+  return std::sqrt(std::max(error2, 0.0)) / (noise.gain_dn_per_e.value * mean_dn + noise.offset_dn2.value);
+}
+
+/// Adds one warning if a measurement on the image may be wrong by enough to be visible.
+void warn_of_uncertainty(const calib::PictureNoise& noise, std::vector<std::string>& warnings) {
+  const double error = std::max(variance_error(noise, std::max(noise.darkest_dn, 0.0)),
+                                variance_error(noise, std::max(noise.brightest_dn, 0.0)));
+  std::string why;
+  if (noise.traces.denoised) {
+    why = "it was denoised before, or has texture everywhere";
+  } else if (!noise.converged) {
+    why = "the fit did not converge";
+  } else if (error > large_error) {
+    why = fmt::format("its variance within {:.0f} %", 100 * error);
+  } else {
+    return;
+  }
+  warnings.push_back(
+      fmt::format("the noise measured on the image is uncertain ({}): if detail is lost or noise "
+                  "remains, state it: --noise GAIN,READ or --profile",
+                  why));
+}
+
+/// Returns the warning about noise that is assumed for want of a measurement.
+std::string assumed_text(const NoiseOrigin& origin, bool is_denoised) {
+  if (origin.prior_ratio == 1) {
+    return "the noise is estimated, not measured: " + origin_text(origin) +
+           "; --noise GAIN,READ or --profile states it";
+  }
+  const std::string found =
+      fmt::format("the image has {:.2g} times the noise variance expected ({})", origin.prior_ratio, origin.basis);
+  if (!is_denoised) return found + ": noise is reduced by what it has; --noise GAIN,READ states it";
+  return found +
+         ", as it was denoised before: noise is not reduced again; --denoise standard reduces what is left, "
+         "--noise GAIN,READ states it";
 }
 
 /// Sets the noise that is known of the sensor, adjusted to the image where it is of use.
@@ -85,15 +120,21 @@ NoiseOrigin assume_noise(const BlackPoint& black, std::string unmeasurable, RawF
   NoiseOrigin out = known_noise(raw, isp::mean_range_dn(raw, black), frame.warnings);
   out.unmeasurable = std::move(unmeasurable);
   double offset_dn2 = offset_dn2_of(*out.figures, raw);
+  bool is_denoised = false;
   if (const auto fitted = calib::fit_picture_noise(raw, black.pedestal_dn, prior_of(*out.figures, raw), {}, executor)) {
     const calib::NoiseFigures expected = std::exchange(*out.figures, figures_of(*fitted));
-    out.is_adjusted = fitted->flat_fraction > 0;  // an image makes figures more certain, never less
+    out.prior_ratio = fitted->prior_ratio;
+    is_denoised = fitted->prior_ratio < 1 && fitted->traces.denoised;
+    out.doubts = fitted->reasons;
+    out.is_adjusted =
+        fitted->flat_fraction > 0 || out.prior_ratio < 1;  // an image makes figures more certain, never less
     out.figures->gain_factor = std::min(out.figures->gain_factor, expected.gain_factor);
     out.figures->read_noise_factor = std::clamp(out.figures->read_noise_factor, 1.0, expected.read_noise_factor);
     offset_dn2 = fitted->offset_dn2.value;
   }
   frame.noise = profile_of(out.figures->gain_dn_per_e, offset_dn2, raw, black, NoiseProfile::Source::picture);
-  frame.warnings.push_back("noise model from " + origin_text(out) + "; --noise or --profile makes it exact");
+  frame.noise->reduced = is_denoised;
+  frame.warnings.push_back(assumed_text(out, is_denoised));
   return out;
 }
 
@@ -104,7 +145,7 @@ Result<OptionalOrigin> use_given(const calib::NoiseFigures& given, const BlackPo
     return fail(ErrorCode::invalid_argument, fmt::format("--noise: {:g} DN/e- is not possible for a range of {:g} DN",
                                                          given.gain_dn_per_e, isp::mean_range_dn(frame.raw, black)));
   }
-  return NoiseOrigin{NoiseOrigin::Source::given, {}, given, {}, false};
+  return NoiseOrigin{.source = NoiseOrigin::Source::given, .figures = given};
 }
 
 }  // namespace
@@ -123,7 +164,7 @@ Result<OptionalOrigin> find_noise(const isp::DevelopOptions& options, const std:
   const bool is_stated = frame.noise && isp::electrons_at_white(frame.raw, *frame.noise);
   if (!given && is_stated) {
     const bool is_profile = frame.noise->source == NoiseProfile::Source::profile;
-    return NoiseOrigin{is_profile ? NoiseOrigin::Source::profile : NoiseOrigin::Source::file, {}, {}, {}, false};
+    return NoiseOrigin{.source = is_profile ? NoiseOrigin::Source::profile : NoiseOrigin::Source::file};
   }
   if (!given && (options.denoise.mode == Mode::off || frame.raw.layout != SensorLayout::bayer)) return std::nullopt;
   const auto black =
@@ -134,18 +175,16 @@ Result<OptionalOrigin> find_noise(const isp::DevelopOptions& options, const std:
   if (noise) {
     frame.noise = profile_of(noise->gain_dn_per_e.value, noise->offset_dn2.value, frame.raw, *black,
                              NoiseProfile::Source::picture);
-    frame.warnings.push_back(found_text(*noise));
-    return NoiseOrigin{NoiseOrigin::Source::picture, {}, figures_of(*noise), {}, false};
+    NoiseOrigin out{.source = NoiseOrigin::Source::picture, .figures = figures_of(*noise), .doubts = noise->reasons};
+    warn_of_uncertainty(*noise, frame.warnings);
+    return out;
   }
   if (!frame.raw.is_float()) return assume_noise(*black, noise.error().message, frame, executor);
-  const std::string why =
-      "neither a profile nor the file states usable noise, and it cannot be estimated from this "
-      "picture: " +
-      noise.error().message;
+  const std::string why = "the noise is not stated and cannot be measured on the image: " + noise.error().message;
   if (options.denoise.mode == Mode::level || options.denoise.always) {
-    return fail(noise.error().code, why + "; give it (--noise)");
+    return fail(noise.error().code, why + "; state it: --noise GAIN,READ");
   }
-  frame.warnings.push_back(why + "; it is left as it is");
+  frame.warnings.push_back(why + "; it is not reduced. --noise GAIN,READ states it");
   return std::nullopt;
 }
 

@@ -18,9 +18,11 @@ std::optional<calib::NoiseFigures> noise_figures_of(const std::string& text);
 
 /// Sets the noise model of a frame: the figures given, else those of a profile or of the file that are in the frame
 /// already, else those measured on the image, else those known of the sensor (known_noise.h), adjusted to the image as
-/// far as it shows them. A warning states the last three, with their uncertainty. Where noise is not to be reduced, and
-/// for frames that are not Bayer mosaics, nothing is measured or assumed. Frames of floating-point samples are not
-/// those of a sensor: their noise is given, stated, or left as it is with a warning.
+/// far as it shows them, and never above the noise that it has: where that is less and not white, the raw was denoised
+/// before, which is noted as NoiseProfile::reduced. A warning states the last three, and a measurement that is
+/// uncertain. Where noise is not to be reduced, and for frames that are not Bayer mosaics, nothing is measured or
+/// assumed. Frames of floating-point samples are not those of a sensor: their noise is given, stated, or left as it is
+/// with a warning.
 /// @return where the noise comes from; nullopt: the frame is unchanged
 /// Errors: those of the black point; figures given that are not possible for the frame; unknown noise of floats where
 /// noise has to be reduced (a level was requested, or DenoiseChoice::always).

@@ -17,11 +17,11 @@ namespace {
 void add_noise(Lines& out, const isp::NoiseReduction& noise, const std::optional<NoiseOrigin>& origin) {
   if (noise.snr) {
     const auto& variance = noise.noise.variance_e2;
-    out.add("noise", fmt::format("from {}; without light {:.3g} {:.3g} {:.3g} e- (R, G, B)",
-                                 origin ? name_of(origin->source) : name_of(noise.source), std::sqrt(variance[0]),
-                                 std::sqrt(variance[1]), std::sqrt(variance[2])));
-    if (origin && origin->figures) out.add("", origin_text(*origin));
-    if (origin && !origin->unmeasurable.empty()) out.add("", "not by the image alone: " + origin->unmeasurable);
+    out.add("noise", origin ? origin_text(*origin) : fmt::format("of the {}", name_of(noise.source)));
+    out.add("", fmt::format("without light {:.3g} {:.3g} {:.3g} e- (R, G, B)", std::sqrt(variance[0]),
+                            std::sqrt(variance[1]), std::sqrt(variance[2])));
+    if (origin && !origin->unmeasurable.empty()) out.add("", "not measured on the image: " + origin->unmeasurable);
+    for (const std::string& doubt : origin ? origin->doubts : std::vector<std::string>()) out.add("", "note: " + doubt);
     if (noise.noise_ratio) out.add("", ratio_text(*noise.noise_ratio));
   }
   out.add("denoise", fmt::format("{}: {}", noise.level ? denoise::name_of(*noise.level) : "off", noise.reason));
@@ -34,22 +34,20 @@ void add_noise(Lines& out, const isp::NoiseReduction& noise, const std::optional
 
 void add_time(Lines& out, const isp::StepPlan& effects, const isp::ProcessingGoal& choice) {
   if (!effects.predicted_s) {
-    out.add("time", "not predicted: bench --calibrate-cost measures this machine's speed, once");
+    out.add("time", "not predicted: run `lowlux bench --calibrate-cost` once to measure the speed of this machine");
     return;
   }
   const double predicted_ms = 1e3 * *effects.predicted_s;
   if (!choice.budget_s) {
-    out.add("time",
-            fmt::format("predicted {:.1f} ms, one file at a time on this machine as it was calibrated", predicted_ms));
+    out.add("time", fmt::format("predicted {:.1f} ms for one file at a time", predicted_ms));
     return;
   }
   std::string text = fmt::format("{:.1f} ms; predicted {:.1f} ms", 1e3 * *choice.budget_s, predicted_ms);
   if (choice.cost->machine == isp::reference_machine) {
-    text += fmt::format(", roughly: {:.2f} times what {} take; bench --calibrate-cost measures this machine",
+    text += fmt::format(", roughly ({:.2f} times that of {}); `lowlux bench --calibrate-cost` measures this machine",
                         choice.cost->pace, isp::reference_machine);
   } else if (choice.cost->pace_s > 0) {
-    text += fmt::format(", everything taking {:.2f} times what it took when this machine was calibrated",
-                        choice.cost->pace);
+    text += fmt::format(" ({:.2f} times as slow as when its speed was measured)", choice.cost->pace);
   }
   out.add("budget", text);
 }
@@ -58,13 +56,15 @@ void add_effects(Lines& out, const isp::StepPlan& effects, const isp::Processing
   out.add("effects", choice.all ? std::string("all")
                      : choice.tolerance_delta_e
                          ? fmt::format("auto, tolerance {:.2g} CIEDE2000", *choice.tolerance_delta_e)
-                         : std::string("auto, as accurate as the budget lets them be"));
+                         : std::string("auto, as accurate as the time allows"));
   for (const isp::PlannedStep& effect : effects.effects) {
-    std::string text = fmt::format("{}: {}", effect.name, effect.used ? "done" : "left out");
+    std::string text = fmt::format("{}: {}", effect.name, effect.used ? "applied" : "skipped");
     text += std::isfinite(effect.size)
-                ? fmt::format("; {:.2g} CIEDE2000, of which {:.2g} may stay", effect.size, effect.left)
-                : std::string("; size not predicted");
-    if (effect.seconds) text += fmt::format("; {}{:.1f} ms", effect.used ? "" : "would take ", 1e3 * *effect.seconds);
+                ? fmt::format("; changes the image by {:.2g} CIEDE2000, error that remains {:.2g}", effect.size,
+                              effect.left)
+                : std::string();
+    if (effect.seconds)
+      text += fmt::format("; {}{:.1f} ms", effect.used ? "takes " : "would take ", 1e3 * *effect.seconds);
     out.add("", text + " (" + effect.decision + ")");
   }
   add_time(out, effects, choice);
@@ -77,31 +77,33 @@ std::string look_name(const isp::DevelopPlan& plan) {
 void add_look_effects(Lines& out, std::span<const isp::LookEffect> effects) {
   for (const isp::LookEffect& effect : effects) {
     const std::string size = std::isfinite(effect.size) ? fmt::format("up to {:.2g} CIEDE2000", effect.size)
-                                                        : std::string("a matter of taste");
-    out.add("", fmt::format("{} {}: {}", effect.name, effect.used ? "shown" : "left out", size));
+                                                        : std::string("no measurable size");
+    out.add("", fmt::format("{} {}: {}", effect.name, effect.used ? "applied" : "skipped", size));
   }
 }
 
 void add_light(Lines& out, const isp::LookPlan& look, const isp::SceneLight* light) {
   const std::string name = light != nullptr && !light->name.empty() ? light->name + ", " : "";
-  out.add("light", fmt::format("{}S/P {:.3g} ({}), degree of adaptation {:.2f}", name,
+  out.add("light", fmt::format("{}scotopic to photopic luminance (S/P) {:.3g} ({}), degree of adaptation {:.2f}", name,
                                look.look.scotopic_ratio_of_white, look.light_rule, look.adaptation_degree));
   if (look.rods) {
-    out.add("",
-            fmt::format("rods by weights of {}{}", look.rods->source == "profile" ? "the " : "", look.rods->source) +
-                (look.rods->relative_error
-                     ? fmt::format(": off by {:.1f} % rms over reflectances", 100 * *look.rods->relative_error)
-                     : std::string()));
+    out.add("", fmt::format("response of the rods from {}{}", look.rods->source == "profile" ? "the " : "",
+                            look.rods->source) +
+                    (look.rods->relative_error
+                         ? fmt::format(", rms error {:.1f} % over surface colours", 100 * *look.rods->relative_error)
+                         : std::string()));
   }
 }
 
 void add_retina(Lines& out, const isp::RetinaPlan& retina) {
-  out.add("retina", fmt::format("pupil {:.1f} mm; the scene's mean isomerises {:.3g}/s in a rod, {:.3g}/s in a cone",
-                                retina.pupil_mm, retina.mean.rods, retina.mean.cones));
+  out.add(
+      "retina",
+      fmt::format("pupil {:.1f} mm; photons absorbed at the mean of the scene: {:.3g}/s in a rod, {:.3g}/s in a cone",
+                  retina.pupil_mm, retina.mean.rods, retina.mean.cones));
   if (!retina.seen_fraction) return;
   const isp::SeeingModel& seeing = retina.seeing;
-  out.add("seeing", fmt::format("{:.1f} % of the picture seen in more than half of the cases, by {} isomerisations of "
-                                "rods or {} of cones; {:.2g} % false alarms",
+  out.add("seeing", fmt::format("{:.1f} % of the image is detected more often than not, from {} photons absorbed in "
+                                "rods or {} in cones; {:.2g} % false alarms",
                                 100 * *retina.seen_fraction, seeing.rods.threshold, seeing.cones.threshold,
                                 100 * seeing.false_alarm_rate));
 }
@@ -109,7 +111,7 @@ void add_retina(Lines& out, const isp::RetinaPlan& retina) {
 void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, const std::string& coefficients,
               bool noise_known) {
   if (look.kind != isp::Look::camera) {
-    out.add("look", fmt::format("{}; scene {:.3g} cd/m2 ({}), adaptation m {:.2f}, {:+.2f} EV of darkness kept", name,
+    out.add("look", fmt::format("{}; scene {:.3g} cd/m2 ({}), adaptation m {:.2f}, darkened by {:+.2f} EV", name,
                                 look.mean_cd_m2, look.luminance_rule, look.state.m, look.dimming_ev));
     if (look.effects) add_look_effects(out, *look.effects);
     if (look.retina) add_retina(out, *look.retina);
@@ -119,7 +121,7 @@ void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, co
                     "table of {0} x {0} chromaticities, {1} levels: off by {2:.2f} CIEDE2000 in the mean, {3:.2f} at "
                     "most",
                     look.table->cells, look.table->levels, look.table->error.mean, look.table->error.largest));
-    if (look.table->by_noise) out.add("", "colours weighed by the noise that is left at each place");
+    if (look.table->by_noise) out.add("", "colours weighted by the local residual noise");
     if (name == "shin") out.add("", fmt::format("coefficients = {}", coefficients));
   }
   if (look.noise_limit) {
@@ -153,19 +155,18 @@ std::string dark_text(const isp::DevelopPlan& plan) {
     case isp::DarkCharge::State::not_expected:
       return "none expected: " + dark.reason;
     case isp::DarkCharge::State::unknown:
-      return fmt::format("unknown, up to {:.0f} % of the charge of the median block: {}", 100 * *dark.max_fraction,
-                         dark.reason);
+      return fmt::format("unknown, up to {:.0f} % of the median signal: {}", 100 * *dark.max_fraction, dark.reason);
     case isp::DarkCharge::State::in_black_point:
       text += "subtracted with the black level";
       break;
     case isp::DarkCharge::State::estimated:
       text += "estimated from the frame, ";
-      text += plan.levels.black.dark_mean_e == PerSite<double>{} ? "left in" : "subtracted";
+      text += plan.levels.black.dark_mean_e == PerSite<double>{} ? "not subtracted" : "subtracted";
       break;
   }
   text += ": " + dark.reason;
   if (dark.alpha && *dark.mean_e > 0) {
-    text += fmt::format("; left in, it takes {:.0f} % of the saturation of the median block (alpha {:.3f})",
+    text += fmt::format("; if not subtracted, it reduces the median saturation by {:.0f} % (alpha {:.3f})",
                         100 * (1 - *dark.alpha), *dark.alpha);
   }
   return text;
@@ -194,12 +195,12 @@ std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* f
   out.add(
       "black [DN]",
       fmt::format("{:.2f} from {}{}", fmt::join(plan.levels.black.pedestal_dn, " "), name_of(plan.levels.black.source),
-                  plan.levels.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", dark charge in it" : ""));
+                  plan.levels.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", includes dark signal" : ""));
   if (const DarkFrame* const dark = plan.levels.dark_frame.get()) {
     out.add(dark->is_bias ? "bias frame" : "dark frame", dark_frame_text(*dark));
   }
   if (flat != nullptr) out.add("flat field", flat_text(*flat));
-  out.add("dark charge", dark_text(plan));
+  out.add("dark signal", dark_text(plan));
   if (plan.effects) add_effects(out, *plan.effects, *plan.options.effects);
   out.add("defects", fmt::format("{} pixels repaired", plan.levels.defects.size()));
   add_noise(out, plan.noise_reduction, noise);

@@ -168,7 +168,8 @@ StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thum
   facts.display = o.display != nullptr;
   std::optional<NoiseModel> model;
   const bool has_dark = levels.black.dark_mean_e != PerSite<double>{};
-  facts.has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !noise_obstacle(frame, levels);
+  facts.has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !is_denoised_before(frame, o.denoise) &&
+                    !noise_obstacle(frame, levels);
   if (facts.has_noise || (has_dark && levels.electrons_at_white)) {
     model = noise_model(frame, levels, rendering.white_gain, o.space);
     facts.blocks = seen_blocks(frame, o, levels, rendering, model->noise, thumbnail, executor);

@@ -156,6 +156,20 @@ denoise::NoiseCheck check_frame(const RawFrame& frame, const RawLevels& levels, 
   return denoise::check_noise({charge.value.view(), charge.phase, ratio}, out.noise, executor);
 }
 
+/// Adds what is suspicious about a frame. A model that was measured on the frame itself is not held against it: its
+/// uncertainty was stated where it was measured. Where the file states that its noise was reduced, less than its model
+/// has on fine scales is as expected.
+void add_remarks(const denoise::NoiseCheck& check, const NoiseProfile& model, std::vector<std::string>& warnings) {
+  using denoise::NoiseFinding;
+  const bool is_measured = model.source == NoiseProfile::Source::picture;
+  for (denoise::NoiseRemark& remark : denoise::remarks_on(check)) {
+    const bool is_below = remark.finding == NoiseFinding::noise_below_model;
+    const bool is_above = remark.finding == NoiseFinding::noise_above_model;
+    if ((is_measured && (is_below || is_above)) || (model.reduced && is_below)) continue;
+    warnings.push_back(std::move(remark.text));
+  }
+}
+
 }  // namespace
 
 std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& levels) {
@@ -171,6 +185,11 @@ std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& leve
                  "and calib/profiles)"};
   }
   return std::nullopt;
+}
+
+bool is_denoised_before(const RawFrame& frame, const DenoiseChoice& choice) {
+  return choice.mode == DenoiseChoice::Mode::automatic && !choice.always && frame.noise && frame.noise->reduced &&
+         frame.noise->source == NoiseProfile::Source::picture;
 }
 
 bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise) {
@@ -213,6 +232,7 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
     if (choice.mode == DenoiseChoice::Mode::level) return tl::make_unexpected(*std::move(error));
     return left_alone(frame, std::move(error->message));
   }
+  if (is_denoised_before(frame, choice)) return left_alone(frame, "the raw was denoised before");
   const NoiseModel model = noise_model(frame, levels, request.white_gain, request.space);
   NoiseReduction out;
   out.source = model.source;
@@ -226,7 +246,7 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   out.options.level = *out.level;
   if (choice.unbiased_chroma) out.options.rho = std::numeric_limits<double>::infinity();
   const denoise::NoiseCheck check = check_frame(frame, levels, choice.line_noise && request.lines, out, executor);
-  for (const denoise::NoiseRemark& remark : denoise::remarks_on(check)) out.warnings.push_back(remark.text);
+  add_remarks(check, *frame.noise, out.warnings);
   out.options.variance_scale = denoise::variance_scale_of(check);
   return out;
 }

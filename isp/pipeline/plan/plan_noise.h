@@ -18,6 +18,10 @@ namespace lowlux::isp {
 /// too small (invalid_argument), unknown noise (insufficient).
 std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& levels);
 
+/// Returns whether an automatic choice leaves the noise as it is because the raw was denoised before it was written, as
+/// its image shows: what is left is not white, and reducing it takes as much detail as noise.
+bool is_denoised_before(const RawFrame& frame, const DenoiseChoice& choice);
+
 /// Returns whether row or column noise is significant and thus subtracted: it is more than the error of its
 /// measurement, and more than 3 % of a pixel's noise, as the eye integrates it along a line. More than a pixel's noise
 /// is not from the readout but scene structure, such as a blind or a fence.
