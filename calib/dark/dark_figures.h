@@ -38,7 +38,7 @@ struct DarkPoint {
   int group = 0;
   int site = 0;
   double mean_dn = 0;
-  Estimate residual_dn;  // its error is that of the residual, computed pixel by pixel
+  Estimate residual_dn;  // its error is that of the residual, pixel by pixel; both 0 where the fit has to pass through
 };
 
 /// Results for one gain setting from darks of several exposures.

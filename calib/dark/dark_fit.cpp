@@ -223,6 +223,11 @@ std::vector<double> residual_weights(const DarkFit& s, std::size_t group, int si
   return out;
 }
 
+/// Returns whether the fit passes through a group's mean whatever the means are: what is left of it is rounding.
+bool is_zero(const std::vector<double>& weights) {
+  return std::ranges::all_of(weights, [](double weight) { return std::fabs(weight) < 1e-9; });
+}
+
 }  // namespace
 
 std::vector<DarkPoint> points_of(const DarkFit& fit, std::span<const PerSite<Estimate>> parameters) {
@@ -230,7 +235,8 @@ std::vector<DarkPoint> points_of(const DarkFit& fit, std::span<const PerSite<Est
   out.reserve(4 * fit.groups.size());
   for (std::size_t g = 0; g < fit.groups.size(); ++g) {
     for (int site = 0; site < 4; ++site) {
-      const Estimate off = estimate(fit, residual_weights(fit, g, site), site);
+      const std::vector<double> weights = residual_weights(fit, g, site);
+      const Estimate off = is_zero(weights) ? Estimate{} : estimate(fit, weights, site);
       double fitted = 0;
       for (std::size_t p = 0; p < parameters.size(); ++p) fitted += fit.design[g][p] * parameters[p][site].value;
       out.push_back({static_cast<int>(g), site, fitted + off.value, off});

@@ -89,6 +89,27 @@ INSTANTIATE_TEST_SUITE_P(Sensors, DarkSeriesOf,
                            return name;
                          });
 
+// One exposure at a second temperature determines its current: the fit passes through it, and no quotient of rounding
+// errors is left. The others are judged as usual.
+TEST(DarkSeries, HasNoResidualWhereOneSettingDeterminesAParameter) {
+  const SensorBench bench{.sensor = test::hot_sensor(), .width = 256, .height = 256};
+  const auto found = fit_dark_series(groups_at(bench, {{0, 20}, {1, 20}, {2, 20}, {2, 28}}, 4), exact_gain(bench));
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->degrees_of_freedom, 4);
+  int exact = 0;
+  for (const DarkPoint& point : found->points) {
+    const Estimate& off = point.residual_dn;
+    if (point.group == 3) {
+      EXPECT_EQ(off, Estimate{});
+      ++exact;
+    } else {
+      EXPECT_LT(std::fabs(off.value), 6 * off.standard_error);
+      EXPECT_GT(off.standard_error, 1e-6);
+    }
+  }
+  EXPECT_EQ(exact, 4);
+}
+
 TEST(DarkSeries, FindsTheTemperatureLaw) {
   SensorBench bench{.sensor = test::hot_sensor(), .width = 192, .height = 192};
   bench.sensor.dark_doubling_c = 6.3;
