@@ -100,6 +100,50 @@ TEST_F(Config, WrongLinesAreNamed) {
   refused("[develop]\ninclude other\n", 2, "option = value");
 }
 
+TEST_F(Config, DefaultsThatNeedEachOtherAreKeptTogether) {
+  std::filesystem::copy_file(dog, file("dark.dng"));
+  const std::string dark = "dark-frame = " + file("dark.dng") + "\n";
+  for (const std::string& text : {dark + "dark-noise = 0.2\n", "dark-noise = 0.2\n" + dark}) {
+    write("[develop]\n" + text);
+    const auto result = develop({"--explain"});
+    EXPECT_TRUE(holds(result.out, "--dark-noise=0.2")) << result.out << result.err;
+    EXPECT_TRUE(holds(result.out, "--dark-frame=")) << result.out;
+  }
+}
+
+TEST_F(Config, AFileThatBeginsWithAByteOrderMarkIsRead) {
+  write("\xEF\xBB\xBF[develop]\nexposure = 2\n");
+  EXPECT_EQ(Json::parse(develop({"--json"}).out)[0]["exposure"]["ev"], 2);
+}
+
+// Found after the arguments are parsed, in the verb's own checks and in those of its work.
+TEST_F(Config, LaterErrorsNameTheLineOfTheDefault) {
+  write("[develop]\nquality = 90\ndenoise = off\n");
+  auto result = run({"develop", dog, "-o", file("x.png"), "--maps"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_TRUE(holds(result.err, file("lowlux/config") + ":3: --maps")) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  write("[develop]\n# an image of 8 bits\nbits = 8\n");
+  result = run({"develop", dog, "-o", file("x.exr")});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_TRUE(holds(result.err, file("lowlux/config") + ":3: --bits")) << result.err;
+  result = run({"develop", dog, "-o", file("x.exr"), "--bits", "8"});
+  EXPECT_FALSE(holds(result.err, "config")) << "the argument is at fault, and no default: " << result.err;
+  EXPECT_FALSE(scratch_.holds("x.exr"));
+}
+
+TEST_F(Config, DoctorNamesUnknownOptionsOfEveryVerb) {
+  write("[develop]\nexposre = 1\nquality = 90\n[calibrate black]\nisso = 100\n[info]\njson = yes\n");
+  const auto result = run({"doctor"});
+  EXPECT_EQ(result.exit_code, 1);
+  const std::string at = file("lowlux/config");
+  EXPECT_TRUE(holds(result.out, at + ":2: develop has no option 'exposre' (did you mean exposure?)")) << result.out;
+  EXPECT_TRUE(holds(result.out, at + ":5: calibrate black has no option 'isso' (did you mean iso?)")) << result.out;
+  EXPECT_FALSE(holds(result.out, "quality")) << result.out;
+  write("[develop]\nquality = 90\n[info]\njson = yes\n");
+  EXPECT_TRUE(holds(run({"doctor"}).out, "2 in " + at));
+}
+
 TEST_F(Config, AnOptionWithoutItsValueTakesNoWordAfterIt) {
   const auto result = run({"develop", "--dark-frame=", dog, "-o", file("taken.png")});
   EXPECT_EQ(result.exit_code, 2);

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <set>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -68,10 +69,44 @@ Result<const CLI::Option*> option_of(const CLI::App& app, const ConfigLine& line
               fmt::format("{} has no option '{}'{}", line.verb, line.option, suggestion(line.option, known)), place);
 }
 
-bool contradicts(const CLI::Option& option, const Options& given) {
-  const auto is_given = [&](const CLI::Option* other) { return given.contains(other); };
-  const std::set<CLI::Option*> excluded = option.get_excludes(), needed = option.get_needs();
-  return std::ranges::any_of(excluded, is_given) || !std::ranges::all_of(needed, is_given);
+bool is_excluded(const CLI::Option& option, const Options& given) {
+  const std::set<CLI::Option*> excluded = option.get_excludes();
+  return std::ranges::any_of(excluded, [&](const CLI::Option* other) { return given.contains(other); });
+}
+
+/// Holds a default that may be used, and its option.
+struct Candidate {
+  const CLI::Option* option = nullptr;
+  Defaults::Item item;
+};
+
+/// Removes defaults that need an option that is neither given nor another default, until all have what they need.
+void remove_needy(const Options& given, std::vector<Candidate>& candidates) {
+  for (std::size_t before = candidates.size() + 1; candidates.size() < before;) {
+    before = candidates.size();
+    Options present = given;
+    for (const Candidate& candidate : candidates) present.insert(candidate.option);
+    std::erase_if(candidates, [&](const Candidate& candidate) {
+      const std::set<CLI::Option*> needed = candidate.option->get_needs();
+      return !std::ranges::all_of(needed, [&](const CLI::Option* other) { return present.contains(other); });
+    });
+  }
+}
+
+/// Returns whether a text names an option, and not only one that begins with its name.
+bool names_option(std::string_view text, const std::string& flag) {
+  for (std::size_t at = text.find(flag); at != std::string_view::npos; at = text.find(flag, at + 1)) {
+    const std::size_t end = at + flag.size();
+    const bool is_longer = end < text.size() && (text[end] == '-' || (text[end] >= 'a' && text[end] <= 'z'));
+    if (!is_longer) return true;
+  }
+  return false;
+}
+
+/// Returns whether an option has the value that a line of the file gives it.
+bool is_set_by(const ConfigLine& line, const CLI::Option& option) {
+  if (option.count() == 0) return false;
+  return option.get_expected_max() == 0 ? line.value == "yes" : option.results().front() == line.value;
 }
 
 }  // namespace
@@ -89,6 +124,8 @@ std::optional<std::string> config_file() {
 }
 
 Result<std::vector<ConfigLine>> parse_config(std::string_view text, const std::string& file) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   std::vector<ConfigLine> lines;
   std::string verb;
   for (int number = 1; !text.empty(); ++number) {
@@ -128,7 +165,8 @@ Result<Defaults> find_defaults(const CLI::App& app, const std::vector<std::strin
   if (!file || general || app.get_name() == "lowlux doctor") return Defaults{};
   const auto lines = read_config(*file);
   if (!lines) return tl::make_unexpected(lines.error());
-  Defaults defaults;
+  std::vector<Candidate> candidates;
+  std::set<std::string> seen;
   for (const ConfigLine& line : *lines) {
     if (app.get_name() != "lowlux " + line.verb) continue;
     const std::string place = place_of(*file, line.number);
@@ -136,14 +174,36 @@ Result<Defaults> find_defaults(const CLI::App& app, const std::vector<std::strin
     if (!option) return tl::make_unexpected(option.error());
     const auto word = word_of(line, **option, place);
     if (!word) return tl::make_unexpected(word.error());
-    if (defaults.sets("--" + line.option)) {
+    if (!seen.insert(line.option).second) {
       return fail(ErrorCode::invalid_argument, fmt::format("{} is set twice", line.option), place);
     }
-    if (word->empty() || given.contains(*option) || contradicts(**option, given)) continue;
-    defaults.file = *file;
-    defaults.items.push_back({"--" + line.option, *word, place});
+    if (word->empty() || given.contains(*option) || is_excluded(**option, given)) continue;
+    candidates.push_back({*option, {"--" + line.option, *word, place}});
   }
+  remove_needy(given, candidates);
+  Defaults defaults{.file = candidates.empty() ? "" : *file};
+  for (Candidate& candidate : candidates) defaults.items.push_back(std::move(candidate.item));
   return defaults;
+}
+
+std::string default_place(const CLI::App& app, std::string_view text) {
+  const CLI::Option* const no_config = app.get_option_no_throw("--no-config");
+  const auto file = config_file();
+  if (!file || (no_config != nullptr && no_config->count() > 0)) return {};
+  const auto lines = read_config(*file);
+  if (!lines) return {};
+  for (const ConfigLine& line : *lines) {
+    const CLI::Option* const option = app.get_option_no_throw("--" + line.option);
+    const bool is_used = app.get_name() == "lowlux " + line.verb && option != nullptr && is_set_by(line, *option);
+    if (is_used && names_option(text, "--" + line.option)) return place_of(*file, line.number);
+  }
+  return {};
+}
+
+std::string default_place(const Defaults& defaults, std::string_view text) {
+  const auto found =
+      std::ranges::find_if(defaults.items, [&](const auto& item) { return names_option(text, item.flag); });
+  return found == defaults.items.end() ? std::string() : found->line;
 }
 
 std::string defaults_text(const Defaults& defaults) {

@@ -44,9 +44,15 @@ Result<std::vector<ConfigLine>> parse_config(std::string_view text, const std::s
 Result<std::vector<ConfigLine>> read_config(const std::string& file);
 
 /// Returns the defaults of a verb that the arguments leave open: none with --no-config or help, nor for `doctor`, which
-/// reports the file itself; none of an option that is given, that excludes a given one, or that needs one that is not.
+/// reports the file itself; none of an option that is given, that excludes a given one, or that needs one that is
+/// neither given nor a default that is used.
 /// Errors, with FILE:LINE as their place: those of read_config; an option that the verb does not have.
 Result<Defaults> find_defaults(const CLI::App& app, const std::vector<std::string>& words);
+
+/// Returns the place "FILE:LINE" of the default that an error is about, once the app was parsed, or by the defaults
+/// that were used: the first whose option the text names. Empty: none is.
+std::string default_place(const CLI::App& app, std::string_view text);
+std::string default_place(const Defaults& defaults, std::string_view text);
 
 /// Returns the defaults in one line: "--quality=95 --wb=auto (FILE)".
 std::string defaults_text(const Defaults& defaults);

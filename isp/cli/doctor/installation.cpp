@@ -15,6 +15,7 @@
 #include "isp/cli/capture/capture_list.h"
 #include "isp/cli/config/config_file.h"
 #include "isp/cli/develop/cost_file.h"
+#include "isp/cli/doctor/config_check.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/module.h"
 
@@ -101,6 +102,9 @@ InstalledPart find_config() {
             .remedy = fmt::format("{}: {}", lines.error().where, lines.error().message)};
   }
   if (lines->empty()) return {.name = "defaults", .found = "none in " + *file};
+  if (const std::string unknown = unknown_options(*lines, *file); !unknown.empty()) {
+    return {.name = "defaults", .state = State::broken, .remedy = unknown};
+  }
   return {.name = "defaults", .found = fmt::format("{} in {}", lines->size(), *file)};
 }
 

@@ -112,6 +112,15 @@ std::vector<HelpEntry> all_options(const HelpPage& page) {
   return all;
 }
 
+std::vector<HelpEntry> default_options(const HelpPage& page) {
+  std::vector<HelpEntry> options = page.front.entries;
+  for (const HelpSection& section : page.rest) {
+    if (section.title == general_group) continue;
+    options.insert(options.end(), section.entries.begin(), section.entries.end());
+  }
+  return options;
+}
+
 std::string option_text(const HelpEntry& entry) {
   std::string text = fmt::format("{}", fmt::join(entry.flags, ", "));
   if (!entry.placeholder.empty()) text += (text.empty() ? "" : " ") + entry.placeholder;

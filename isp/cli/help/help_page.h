@@ -42,6 +42,9 @@ HelpPage help_page(const CLI::App& app);
 /// Returns all options of a page, the front first.
 std::vector<HelpEntry> all_options(const HelpPage& page);
 
+/// Returns the options that the user's file of defaults may set: all but help and --no-config.
+std::vector<HelpEntry> default_options(const HelpPage& page);
+
 /// Returns an option as it is typed: "-o, --output OUT".
 std::string option_text(const HelpEntry& entry);
 

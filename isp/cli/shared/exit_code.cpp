@@ -14,14 +14,15 @@ int print_failure(const std::string& file, const Error& error) {
 
 int print_failure(const Error& error) { return print_failure(error.where, error); }
 
-int print_usage_error(std::string_view verb, const Error& error) {
-  const std::string place = error.where.empty() ? "" : error.where + ": ";
-  print_err(one_line(fmt::format("lowlux {}: {}{}", verb, place, error.message)) + "\n");
+int print_usage_error(std::string_view verb, const Error& error, const Defaults& defaults) {
+  const std::string text = (error.where.empty() ? "" : error.where + ": ") + error.message;
+  const std::string place = default_place(defaults, text);
+  print_err(one_line(fmt::format("lowlux {}: {}{}{}", verb, place, place.empty() ? "" : ": ", text)) + "\n");
   return exit_usage;
 }
 
-int print_argument_error(std::string_view verb, const Error& error) {
-  return error.code == ErrorCode::invalid_argument ? print_usage_error(verb, error) : print_failure(error);
+int print_argument_error(std::string_view verb, const Error& error, const Defaults& defaults) {
+  return error.code == ErrorCode::invalid_argument ? print_usage_error(verb, error, defaults) : print_failure(error);
 }
 
 Error with_file(Error error, const std::string& file) {

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "isp/base/result.h"
+#include "isp/cli/config/config_file.h"
 
 /// Defines exit codes of the command, and the two ways in which a verb fails.
 namespace lowlux::cli {
@@ -16,10 +17,11 @@ inline constexpr int exit_usage = 2;   // the command line is wrong
 int print_failure(const std::string& file, const Error& error);
 /// Prints the failure of the file that the error itself names. @return exit_failed
 int print_failure(const Error& error);
-/// Prints "lowlux VERB: OPTION: what is wrong"; the option is the error's place, if it has one. @return exit_usage
-int print_usage_error(std::string_view verb, const Error& error);
+/// Prints "lowlux VERB: OPTION: what is wrong"; the option is the error's place, if it has one. Where it is a default
+/// of the user's file, FILE:LINE comes before it. @return exit_usage
+int print_usage_error(std::string_view verb, const Error& error, const Defaults& defaults = {});
 /// Prints a usage error if an argument is invalid, else the failure of the file or folder that it names.
-int print_argument_error(std::string_view verb, const Error& error);
+int print_argument_error(std::string_view verb, const Error& error, const Defaults& defaults = {});
 
 /// Returns the error, with the file as its place if it has none.
 Error with_file(Error error, const std::string& file);

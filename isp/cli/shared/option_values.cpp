@@ -152,7 +152,9 @@ CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::strin
 }
 
 int refuse(const CLI::App& app, const std::string& wrong) {
-  print_err(fmt::format("{}\n", one_line(fmt::format("{}: {}; --help lists the options", app.get_name(), wrong))));
+  const std::string place = default_place(app, wrong);
+  print_err(fmt::format("{}\n", one_line(fmt::format("{}: {}{}{}; --help lists the options", app.get_name(), place,
+                                                     place.empty() ? "" : ": ", wrong))));
   return exit_usage;
 }
 
@@ -165,13 +167,9 @@ void parse_all(CLI::App& app, const std::vector<std::string>& words, const Defau
   app.parse(last_first);
 }
 
-/// Returns the text of an error; that of a default begins with its file and line.
-std::string error_text(const CLI::ParseError& error, const Defaults& defaults) {
+std::string error_text(const CLI::ParseError& error) {
   std::string text = error.what();
   std::replace(text.begin(), text.end(), '\n', ' ');
-  for (const Defaults::Item& item : defaults.items) {
-    if (text.starts_with(item.flag + ":") || text.starts_with(item.flag + " ")) return item.line + ": " + text;
-  }
   return text;
 }
 
@@ -203,7 +201,7 @@ std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& wo
       return exit_done;
     }
     if (const auto unknown = unknown_option(app)) return refuse(app, *unknown);
-    return refuse(app, error_text(error, *defaults));
+    return refuse(app, error_text(error));
   }
   if (used != nullptr) *used = *defaults;
   return std::nullopt;
