@@ -146,16 +146,17 @@ WhiteEstimate estimate_white(const RgbView<const float>& blocks, double block_no
   if (estimate.blocks < options.min_blocks) return out;
   out.balance = balance_of(colour, estimate.neutral, WhiteSource::estimated);
   if (!out.balance.white) {
-    out.remark = "no usable colour matrix: the estimate is not held to the whites of lights";
+    out.remark = "auto white balance is not limited to plausible lights: the colour matrix is missing or unusable";
     return out;
   }
   const auto held = held_to_lights(*out.balance.white, options);
   if (!held) return out;
   if (auto limited = balance_of_white(colour, *held, WhiteSource::estimated)) {
     out.balance = *std::move(limited);
-    out.remark = "the estimate was moved to the nearest white of a light";
+    out.remark = "auto white balance was limited to a plausible light";
   } else {
-    out.remark = "the colour matrices do not reach the nearest light: the estimate is not held to the whites of lights";
+    out.remark =
+        "auto white balance is not limited to plausible lights: the colour matrices do not reach the nearest one";
   }
   return out;
 }

@@ -132,10 +132,17 @@ TEST_F(BadInput, DamagedTagsThatThePictureCanDoWithoutAreWarningsThatHelp) {
   }
 }
 
-TEST_F(BadInput, MissingMatricesSayThatCameraRgbIsStillPossible) {
+TEST_F(BadInput, MissingMatricesGiveAnImageWithOneWarning) {
   DngBuilder dng = small_dng();
-  dng.remove(colour_matrix_1);
-  expect_refused(develop(dng.build()), "--space camera");
+  dng.remove(colour_matrix_1).remove(50728);
+  const test::ProcessResult result = develop(dng.build());
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("the colours of the camera are unknown"), std::string::npos) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 2) << "the other is about noise: " << result.err;
+  EXPECT_NE(result.err.find("the noise is estimated"), std::string::npos) << result.err;
+  const auto linear = test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.exr")});
+  EXPECT_EQ(linear.exit_code, 1);
+  EXPECT_NE(linear.err.find("--space camera"), std::string::npos) << linear.err;
   const auto camera =
       test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.tif"), "--space", "camera"});
   EXPECT_EQ(camera.exit_code, 0) << camera.err;

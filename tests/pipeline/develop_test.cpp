@@ -7,6 +7,7 @@
 
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
+#include "isp/render/output_space.h"
 #include "tests/support/executors.h"
 #include "tests/support/frames.h"
 
@@ -215,13 +216,37 @@ TEST(Develop, AFrameOfBlackNoiseStaysBlack) {
   EXPECT_LT(mean / static_cast<double>(codes.size()), 16);
 }
 
-TEST(Develop, MissingColourIsAnErrorThatNamesTheWayOut) {
+TEST(Develop, MissingColourIsAnErrorOfMeasurementsThatNamesTheWayOut) {
   RawFrame frame = sample_frame();
   frame.colour = {};
-  const auto developed = develop(frame, {}, one_thread);
-  ASSERT_FALSE(developed);
-  EXPECT_NE(developed.error().message.find("--space camera"), std::string::npos);
+  for (const OutputSpace space : {OutputSpace::linear_srgb, OutputSpace::xyz}) {
+    const auto developed =
+        develop(frame, {.tone = ToneCurve::none, .space = space, .samples = SampleType::f32}, one_thread);
+    ASSERT_FALSE(developed);
+    EXPECT_NE(developed.error().message.find("--space camera"), std::string::npos);
+  }
+  DevelopOptions night;
+  night.look.look = Look::eye;
+  EXPECT_FALSE(develop(frame, night, one_thread));
   EXPECT_TRUE(develop(frame, camera_float, one_thread));
+}
+
+// Camera RGB shown as sRGB is what a camera with the colours of sRGB shows.
+TEST(Develop, UnknownColoursAreShownAsThoseOfSrgbWithOneWarning) {
+  RawFrame unknown = sample_frame(), srgb = sample_frame();
+  unknown.colour = {.as_shot_neutral = Vector3{0.5, 1, 0.7}};
+  srgb.colour = unknown.colour;
+  srgb.colour.calibrations = {
+      {.cct_k = 6504, .xyz_to_camera = diagonal3({0.5, 1, 0.7}) * *xyz_to_output(OutputSpace::linear_srgb)}};
+  DevelopOptions options;
+  options.exposure_ev = 0;
+  const auto shown = develop(unknown, options, one_thread), expected = develop(srgb, options, one_thread);
+  ASSERT_TRUE(shown && expected);
+  const auto &a = std::get<Encoded8>(shown->picture).codes, &b = std::get<Encoded8>(expected->picture).codes;
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a.data()[i], b.data()[i], 1) << i;  // D65 is not the 6504 K
+  EXPECT_EQ(shown->plan.warnings.size(), expected->plan.warnings.size() + 1);
+  EXPECT_NE(shown->plan.warnings.front().find("as shot. --profile"), std::string::npos) << shown->plan.warnings.front();
 }
 
 TEST(Develop, MatricesThatMakeNoLightOfTheWhiteAreErrorsThatNameTheWayOut) {

@@ -10,6 +10,7 @@
 #include "isp/pipeline/budget/step_plan.h"
 #include "isp/pipeline/plan/dark_charge.h"
 #include "isp/pipeline/plan/plan_noise.h"
+#include "isp/pipeline/plan/rendering.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/measure/thumbnail.h"
 #include "isp/raw/subtract_dark_frame.h"
@@ -20,8 +21,8 @@ namespace {
 
 Result<void> check(const RawFrame& frame, const DevelopOptions& o) {
   if (Result<void> options = check_options(o); !options) return options;
-  const bool coloured = frame.raw.layout != SensorLayout::monochrome;
-  if (coloured && o.space != OutputSpace::camera && frame.colour.calibrations.empty()) {
+  const bool is_measurement = is_linear(o.space) || o.look.look != Look::camera;
+  if (has_unknown_colours(frame, o.space) && is_measurement) {
     return fail(ErrorCode::insufficient,
                 "the file has no colour matrix and the decoder does not know the camera; "
                 "--space camera develops it without colour conversion");

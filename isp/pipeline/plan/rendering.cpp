@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -28,7 +29,7 @@ Result<WhiteBalance> choose_white(const RawFrame& frame, const DevelopOptions& o
   }
   WhiteBalance found = auto_white_balance(thumbnail.mean.view(), block_noise_std(frame.raw, thumbnail), frame.colour);
   if (o.white_balance.mode == Mode::as_shot && found.reason.empty())
-    found.reason = "the file states no white balance: estimated from the picture";
+    found.reason = "the file states no white balance: estimated from the image";
   return found;
 }
 
@@ -47,18 +48,33 @@ std::optional<ProfileRendering> decide_profile(const RawFrame& frame, const Deve
                           .limit = limit};
 }
 
+/// Returns the white balance of a frame of unknown colours, with what that means as its reason.
+Result<WhiteBalance> without_white(Result<WhiteBalance> balance) {
+  if (!balance) return balance;
+  const char* const white = balance->source == WhiteSource::as_shot     ? "as shot"
+                            : balance->source == WhiteSource::estimated ? "estimated from the image"
+                                                                        : "left as it is";
+  balance->reason = std::string(
+                        "the colours of the camera are unknown (no colour matrix): shown as if they were those of "
+                        "sRGB, white balance ") +
+                    white + ". --profile states them";
+  return balance;
+}
+
 // A neutral that is not a valid colour of a light has no XYZ: an automatic one is replaced by daylight, others are
 // errors.
 Result<WhiteBalance> with_white(Result<WhiteBalance> balance, const RawFrame& frame, const DevelopOptions& o) {
+  if (has_unknown_colours(frame, o.space)) return without_white(std::move(balance));
   if (!balance || balance->white || frame.raw.layout == SensorLayout::monochrome) return balance;
   if (o.white_balance.mode == WhiteBalanceChoice::Mode::automatic) {
     if (Result<WhiteBalance> daylight = white_balance_of_temperature(frame.colour, daylight_k)) {
-      daylight->reason = "the picture's white is no colour of a light under the file's matrices: taken as daylight";
+      daylight->reason =
+          "auto white balance found no colour that a light can have: daylight is used; --wb sets another";
       return daylight;
     }
   }
   return fail(ErrorCode::malformed,
-              "the white balance is no colour of a light under the file's matrices: try --wb 5500, or --space camera");
+              "the white balance of the file is not a colour that a light can have: try --wb 5500, or --space camera");
 }
 
 void decide_exposure(const DevelopOptions& options, std::span<const float> luminance, double black_noise_std,
@@ -74,6 +90,11 @@ void decide_exposure(const DevelopOptions& options, std::span<const float> lumin
 }
 
 }  // namespace
+
+bool has_unknown_colours(const RawFrame& frame, OutputSpace space) {
+  return frame.raw.layout != SensorLayout::monochrome && space != OutputSpace::camera &&
+         frame.colour.calibrations.empty();
+}
 
 std::array<float, 3> white_gain_of(const Vector3& neutral) {
   std::array<float, 3> out{};
@@ -95,6 +116,7 @@ Result<Matrix3> balanced_to_output(const RawFrame& frame, const DevelopOptions& 
     const Xyz white = *xyz_of(output_white);
     return to_output * diagonal3(vector_of(white)) * Matrix3{{{0, 1, 0}, {0, 1, 0}, {0, 1, 0}}};
   }
+  if (has_unknown_colours(frame, o.space)) return to_output * *inverse(*xyz_to_output(OutputSpace::srgb));
   Result<Matrix3> to_xyz = camera_to_xyz(frame.colour, balance.white->xy, output_white);
   if (!to_xyz) return to_xyz;
   return to_output * *to_xyz * diagonal3(balance.neutral);

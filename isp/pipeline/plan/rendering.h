@@ -42,6 +42,10 @@ Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light
 
 // Steps of decide_rendering, which allocate only to report an error.
 
+/// Returns whether a frame has colours that are not known, in a space that needs them. An image to be looked at shows
+/// its white-balanced camera RGB as linear sRGB, with a warning.
+bool has_unknown_colours(const RawFrame& frame, OutputSpace space);
+
 /// Returns the factors of R, G and B that make a neutral equal in all channels; that of its largest channel is 1.
 std::array<float, 3> white_gain_of(const Vector3& neutral);
 
@@ -49,7 +53,7 @@ std::array<float, 3> white_gain_of(const Vector3& neutral);
 double block_noise_std(const RawDn& raw, const Thumbnail& thumbnail);
 
 /// Returns the matrix from white-balanced camera RGB to linear values of the space, white at (1, 1, 1). Needs
-/// balance.white, unless the space is camera RGB or the frame monochrome.
+/// balance.white, unless the space is camera RGB, the frame monochrome or its colours are unknown.
 Result<Matrix3> balanced_to_output(const RawFrame& frame, const DevelopOptions& options, const WhiteBalance& balance);
 
 /// Computes the luminance of each block as it will be rendered, before exposure.
