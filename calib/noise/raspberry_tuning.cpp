@@ -79,14 +79,14 @@ void add_provenance(const RaspberryTuning& tuning, const TunedSensor& sensor, Ga
       fmt::format("{} (BSD-2-Clause): reference_slope {:g}, black_level {:g}; gain within a "
                   "factor of {:.2g}",
                   sensor.source, tuning.reference_slope, tuning.black_level, tuning_gain_factor(tuning)));
-  add("not measured by anyone", "full well: the charge at the white level");
+  add("assumed (no published value)", "full well: the charge at the white level");
   if (tuning.reference_constant > 0) {
     add("read noise", fmt::format("{}: reference_constant {:g}", sensor.source, tuning.reference_constant));
   } else {
-    add("not measured by anyone",
+    add("assumed (no published value)",
         fmt::format("read noise: that of sensors in general, within a factor of {:.2g}", read_noise_factor));
   }
-  add("not measured by anyone", "dark current, PRNU, DSNU, row and column noise: none");
+  add("assumed (no published value)", "dark current, PRNU, DSNU, row and column noise: none");
 }
 
 Result<void> check(const TuningReader& found) {

@@ -27,7 +27,7 @@ GainProfile gain_of(const isp::NamedSensor& named) {
   }
   out.provenance.push_back(quoted("sensor", named.source));
   for (const std::string& assumption : named.assumptions) {
-    out.provenance.push_back(quoted("not measured by anyone", assumption));
+    out.provenance.push_back(quoted("assumed (no published value)", assumption));
   }
   return out;
 }
