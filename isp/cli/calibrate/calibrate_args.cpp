@@ -69,7 +69,7 @@ Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>&
   app.add_option("FRAMES", args.common.frames, "dark frames: lens covered; with --masked any frames")->required();
   add_output(app, args.common);
   add_settings(app, args.common);
-  add_number(app, "--system-gain", "DN_PER_E", "codes per electron",
+  add_number(app, "--system-gain", "DN_PER_E", "system gain in DN per electron",
              [&args](double value) { args.system_gain_dn_per_e = value; });
   app.add_flag("--masked", args.masked, "measure the masked pixels of the frames in place of the picture");
   app.add_option("--map", args.map,

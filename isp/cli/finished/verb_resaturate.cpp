@@ -51,12 +51,12 @@ Result<isp::Xyz> black_of_area(const SceneLinear& xyz, const Rect& area) {
 void add_warnings(ResaturateOutcome& out) {
   if (out.made.fraction_dark > 0.5) {
     out.warnings.push_back(fmt::format(
-        "{:.0f} % of the picture is no brighter than the black point and becomes grey: is the black point too bright?",
+        "{:.0f} % of the image is no brighter than the black point and becomes grey: is the black point too bright?",
         100 * out.made.fraction_dark));
   }
   if (out.made.fraction_saturated > 0.5) {
     out.warnings.push_back(
-        fmt::format("{:.0f} % of the picture is saturated and stays as it is", 100 * out.made.fraction_saturated));
+        fmt::format("{:.0f} % of the image is saturated and stays as it is", 100 * out.made.fraction_saturated));
   }
 }
 
@@ -105,9 +105,9 @@ void print(const ResaturateArgs& args, const ResaturateOutcome& done) {
     Lines lines;
     lines.add("black", fmt::format("X {:.5f}, Y {:.5f}, Z {:.5f} of white 1", b.x, b.y, b.z));
     lines.add("chroma noise", fmt::format("{:.5f} of white{}", done.made.chroma_noise,
-                                          args.chroma_noise ? ", given" : ", measured on the picture"));
-    lines.add("no brighter", fmt::format("{:.1f} % of the pixels: grey now", 100 * done.made.fraction_dark));
-    lines.add("saturated", fmt::format("{:.1f} % of the pixels: as they were", 100 * done.made.fraction_saturated));
+                                          args.chroma_noise ? ", given" : ", measured on the image"));
+    lines.add("at black", fmt::format("{:.1f} % of the pixels, set to grey", 100 * done.made.fraction_dark));
+    lines.add("saturated", fmt::format("{:.1f} % of the pixels, unchanged", 100 * done.made.fraction_saturated));
     print_out(fmt::format("{}\n{}", one_line(args.output), lines.text()));
   }
 }

@@ -43,7 +43,7 @@ void add_camera(CLI::App& app, AdviseArgs& args) {
 
 void add_figures(CLI::App& app, AdviseArgs& args) {
   isp::SensorFigures& f = args.figures;
-  add_optional(app, "--system-gain", "DN_PER_E", "codes per electron; with --gain", f.system_gain_dn_per_e);
+  add_optional(app, "--system-gain", "DN_PER_E", "system gain in DN per electron; with --gain", f.system_gain_dn_per_e);
   add_optional(app, "--read-noise", "E", "standard deviation; with --gain", f.read_noise_e);
   add_optional(app, "--iso", "ISO", "saturation-based speed; with --gain", f.iso);
   add_optional(app, "--full-well", "E", "charge of a full pixel", f.full_well_e);

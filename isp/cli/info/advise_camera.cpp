@@ -108,7 +108,7 @@ Result<void> take_named(const AdviseArgs& args, const Spectrum& light, const isp
       continue;
     }
     for (const std::string& assumption : sensor->assumptions)
-      add_note(out.notes, "not sourced, taken as: " + assumption);
+      add_note(out.notes, "assumed, as there is no published value: " + assumption);
     out.camera = fmt::format("{}, {}", response->name, sensor->source);
     camera = sensor->camera;
     const std::string& name = sensor->gain_setting.empty() ? args.sensor : sensor->gain_setting;

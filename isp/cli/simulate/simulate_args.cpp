@@ -142,7 +142,7 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
                              std::optional<double>& out) {
     add_number(app, flag, type, help, [&out](double value) { out = value; })->group("Sensor figures");
   };
-  figure("--system-gain", "DN_PER_E", "codes per electron", f.system_gain_dn_per_e);
+  figure("--system-gain", "DN_PER_E", "system gain in DN per electron", f.system_gain_dn_per_e);
   figure("--read-noise", "E", "standard deviation", f.read_noise_e);
   figure("--full-well", "E", "charge of a full pixel", f.full_well_e);
   app.add_option("--bits", f.bits, "of the converter")->group("Sensor figures");

@@ -118,7 +118,7 @@ std::string simulate_text(const SimulateArgs& args, const SimulateOutcome& o) {
                  one_line(o.files.front()), m.name, o.sensor.gain_setting.empty() ? "" : " ", o.sensor.gain_setting,
                  m.system_gain_dn_per_e, m.read_noise_e, isp::saturation_charge_e(m), m.bits);
   for (const std::string& assumption : o.sensor.assumptions) {
-    fmt::format_to(out, "  not sourced     taken as: {}\n", assumption);
+    fmt::format_to(out, "  assumed         {} (no published value)\n", assumption);
   }
   fmt::format_to(out, "  exposure        {:g} s at f/{:g}, {:g} C; white {:g} cd/m2{}\n", args.options.exposure.time_s,
                  args.options.f_number, args.options.exposure.temperature_c, o.white_cd_m2,
