@@ -40,7 +40,24 @@ Result<std::vector<std::byte>> load(int fd, std::uint64_t max_bytes) {
   return bytes;
 }
 
+constexpr std::size_t stream_block = std::size_t{1} << 20;
+
 }  // namespace
+
+Result<std::vector<std::byte>> read_stream_bytes(int descriptor, std::uint64_t max_bytes) {
+  std::vector<std::byte> bytes;
+  for (std::size_t have = 0;;) {
+    bytes.resize(have + stream_block);
+    const ssize_t got = read(descriptor, bytes.data() + have, stream_block);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return tl::make_unexpected(system_error(ErrorCode::unreadable, "cannot be read"));
+    have += static_cast<std::size_t>(got);
+    if (have > max_bytes) return too_many_bytes(have, max_bytes);
+    if (got > 0) continue;
+    bytes.resize(have);
+    return bytes;
+  }
+}
 
 tl::unexpected<Error> too_many_bytes(std::uint64_t bytes, std::uint64_t max_bytes) {
   return fail(ErrorCode::too_large, "the file has " + size_text(bytes) + ", over the limit of " + size_text(max_bytes));

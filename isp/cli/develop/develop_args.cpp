@@ -19,7 +19,7 @@ namespace {
 /// Adds the options of every verb that takes raw files one by one.
 /// @param explained  help for --explain
 void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
-  app.add_option("RAW", args.inputs, "raw files, or folders of them")->required();
+  app.add_option("RAW", args.inputs, "raw files, folders of them, or - for standard input")->required();
   app.add_flag("--maps", args.options.denoise.maps,
                "also write maps of residual noise variance [e-^2] and colour confidence (0 to 1) of each 2x2 cell: "
                "OUT.noise.pfm and OUT.confidence.pfm");
@@ -35,11 +35,12 @@ void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
 }
 
 void add_output(CLI::App& app, DevelopArgs& args) {
-  app.add_option("-o,--output", args.output,
-                 "image to write (.png .jpg .tif .exr .pfm), or a folder for several (made if it ends with /)")
+  app.add_option(
+         "-o,--output", args.output,
+         "image to write (.png .jpg .tif .exr .pfm), - for standard output, or a folder (made if it ends with /)")
       ->required()
       ->type_name("OUT");
-  app.add_option("--format", args.format, "format of images written to a folder (default: png)")
+  app.add_option("--format", args.format, "format of images written to a folder or to standard output (default: png)")
       ->check(CLI::IsMember({"png", "jpg", "tif", "exr", "pfm"}));
   add_samples(app, args);
 }
@@ -116,7 +117,7 @@ Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
                "lowlux denoise");
   DevelopArgs args;
   app.add_option("-o,--output", args.output,
-                 "raw file to write (.dng), or a folder for several (made if it ends with /)")
+                 "raw file to write (.dng), - for standard output, or a folder (made if it ends with /)")
       ->required()
       ->type_name("CLEAN.dng");
   add_camera(app, args);

@@ -6,6 +6,7 @@
 #include "isp/cli/develop/raw_batch.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/outputs.h"
+#include "isp/cli/shared/standard_streams.h"
 #include "isp/cli/verbs.h"
 
 namespace lowlux::cli {
@@ -26,13 +27,13 @@ int run_denoise(const std::vector<std::string>& words) {
   const auto& args = std::get<DevelopArgs>(parsed);
 
   Result<std::vector<Job>> jobs = plan_outputs(args, "dng");
-  if (!jobs) return print_argument_error("denoise", jobs.error());
-  if (!jobs->front().output.ends_with(".dng")) {
+  if (!jobs) return print_argument_error("denoise", jobs.error(), args.defaults);
+  if (!jobs->front().output.ends_with(".dng") && !is_standard_stream(jobs->front().output)) {
     return print_usage_error("denoise",
                              {ErrorCode::invalid_argument, "a clean raw is a DNG: its name ends with .dng", "-o"});
   }
   const Result<CalibrationFiles> calibration = calibration_files(args, *jobs);
-  if (!calibration) return print_argument_error("denoise", calibration.error());
+  if (!calibration) return print_argument_error("denoise", calibration.error(), args.defaults);
   Result<RawBatch> batch = make_batch(args, without_rendering(args.options), *std::move(jobs), *calibration);
   if (!batch) return print_failure(batch.error());
   batch->bytes_of = clean_raw_bytes;

@@ -10,6 +10,7 @@
 #include "isp/cli/merge/merge_files.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/outputs.h"
+#include "isp/cli/shared/standard_streams.h"
 #include "isp/cli/verbs.h"
 #include "isp/output/picture/image_writer.h"
 
@@ -33,24 +34,26 @@ int run_develop(const std::vector<std::string>& words) {
   std::optional<std::vector<std::string>> frames;
   if (args.merge) {
     Result<std::vector<std::string>> files = files_to_merge(args);
-    if (!files) return print_argument_error("develop", files.error());
+    if (!files) return print_argument_error("develop", files.error(), args.defaults);
     frames = *std::move(files);
     args.inputs = {frames->front()};
     args.merging.options.developed_after = true;
   }
   Result<std::vector<Job>> jobs = plan_outputs(args, "png");
-  if (!jobs) return print_argument_error("develop", jobs.error());
-  const Result<isp::FileFormat> format = isp::format_of(jobs->front().output);
-  if (!format) return print_usage_error("develop", format.error());
-  if (!args.format.empty() && !names_folder(args) && !args.defaults.sets("--format")) {
-    return print_usage_error("develop", {ErrorCode::invalid_argument,
-                                         "goes with a folder as output; a file's name says its format", "--format"});
+  if (!jobs) return print_argument_error("develop", jobs.error(), args.defaults);
+  const Result<isp::FileFormat> format = format_of_output(args, jobs->front().output);
+  if (!format) return print_usage_error("develop", format.error(), args.defaults);
+  const bool is_named = !names_folder(args) && !is_standard_stream(args.output);
+  if (!args.format.empty() && is_named && !args.defaults.sets("--format")) {
+    return print_usage_error(
+        "develop", {ErrorCode::invalid_argument, "is for a folder or - as output; the name of a file states its format",
+                    "--format"});
   }
   Result<isp::DevelopOptions> options = complete_options(args, *format);
-  if (!options) return print_usage_error("develop", options.error());
+  if (!options) return print_usage_error("develop", options.error(), args.defaults);
 
   const Result<CalibrationFiles> calibration = calibration_files(args, frames ? jobs_of(*frames, *jobs) : *jobs);
-  if (!calibration) return print_argument_error("develop", calibration.error());
+  if (!calibration) return print_argument_error("develop", calibration.error(), args.defaults);
   Result<RawBatch> batch = make_batch(args, *std::move(options), *std::move(jobs), *calibration);
   if (!batch) return print_failure(batch.error());
   return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {

@@ -19,6 +19,7 @@
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/report.h"
+#include "isp/cli/shared/standard_streams.h"
 #include "isp/cli/verbs.h"
 #include "isp/output/report/report.h"
 
@@ -49,7 +50,7 @@ int run_info(const std::vector<std::string>& words) {
   int code = exit_done;
   std::string json;
   for (const std::string& file : args.inputs) {
-    Result<RawFrame> frame = capture::read_raw(file);
+    Result<RawFrame> frame = is_standard_stream(file) ? read_standard_input() : capture::read_raw(file);
     const std::optional<NoiseOrigin> noise = frame ? noise_of(*frame, executor) : std::nullopt;
     if (!frame) {
       code = exit_failed;

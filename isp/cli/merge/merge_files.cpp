@@ -7,13 +7,13 @@
 
 #include <fmt/format.h>
 
-#include "capture/dng/source_tags.h"
 #include "isp/cli/develop/memory_gate.h"
 #include "isp/cli/noise/noise_source.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/outputs.h"
 #include "isp/cli/shared/raw_files.h"
+#include "isp/cli/shared/standard_streams.h"
 #include "isp/output/dng/dng_writer.h"
 
 namespace lowlux::cli {
@@ -33,19 +33,14 @@ std::string description_of(const isp::MergedRaw& merged) {
   return text;
 }
 
-/// Returns the tags without OpcodeList3, whose operations are for the pixels of a frame, not for those of a drizzled
-/// image.
-std::shared_ptr<const SourceTags> without_opcodes(SourceTags tags) {
-  constexpr std::uint16_t opcode_list_3 = 51022;
-  std::erase_if(tags.main, [](const SourceTag& tag) { return tag.id == opcode_list_3; });
-  return std::make_shared<const SourceTags>(std::move(tags));
-}
-
 }  // namespace
 
 Result<std::vector<std::string>> files_to_merge(const DevelopArgs& args) {
   std::vector<std::string> files;
   for (const std::string& input : args.inputs) {
+    if (is_standard_stream(input)) {
+      return fail(ErrorCode::invalid_argument, "frames to merge are read more than once: name their files", "-");
+    }
     Result<std::vector<std::string>> named = raw_files_of(input);
     if (!named) return named;
     std::ranges::move(*named, std::back_inserter(files));
@@ -98,16 +93,12 @@ Result<MergeReport> merge_files(const RawBatch& batch, const std::vector<std::st
 }
 
 Result<void> write_merged(const RawBatch& batch, const Job& output, MergeReport& report) {
-  isp::MergedRaw& merged = report.merged;
-  const std::string& reference = report.inputs[static_cast<std::size_t>(merged.reference)];
-  auto source_tags = capture::read_source_tags(reference, merged.warnings);
-  if (source_tags && batch.args.merging.options.drizzle) source_tags = without_opcodes(*source_tags);
+  const isp::MergedRaw& merged = report.merged;
   const Result<void> written = isp::write_dng(merged.frame, output.output,
                                               {.overwrite = output.overwrite,
                                                .software = "lowlux " + version_number(),
                                                .description = description_of(merged),
                                                .sync = batch.sync,
-                                               .source_tags = source_tags,
                                                .baseline_exposure_ev = merged.baseline_exposure_ev});
   if (!written) return fail(written.error().code, written.error().message, output.output);
   return {};

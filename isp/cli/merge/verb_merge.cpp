@@ -76,7 +76,7 @@ int run_merge(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<DevelopArgs>(parsed);
   const Result<Files> files = files_of(args);
-  if (!files) return print_argument_error("merge", files.error());
+  if (!files) return print_argument_error("merge", files.error(), args.defaults);
   Result<RawBatch> batch = make_batch(args, args.options, {files->output}, files->calibration);
   if (!batch) return print_failure(batch.error());
   const Result<MergeReport> report = merge_and_write(args, *files, *batch);

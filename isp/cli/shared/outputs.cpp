@@ -8,6 +8,7 @@
 
 #include "isp/cli/shared/noise_maps.h"
 #include "isp/cli/shared/raw_files.h"
+#include "isp/cli/shared/standard_streams.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::cli {
@@ -64,8 +65,14 @@ tl::unexpected<Error> written_twice(const std::string& output, const std::string
 }  // namespace
 
 bool names_folder(const DevelopArgs& args) {
+  if (is_standard_stream(args.output)) return false;
   std::error_code ignored;
   return args.output.ends_with('/') || fs::is_directory(args.output, ignored);
+}
+
+Result<FileFormat> format_of_output(const DevelopArgs& args, const std::string& output) {
+  if (!is_standard_stream(output)) return isp::format_of(output);
+  return isp::format_of("-." + (args.format.empty() ? "png" : args.format));
 }
 
 Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string& extension) {
@@ -76,13 +83,14 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
     return fail(ErrorCode::invalid_argument,
                 fmt::format("{} raw files need a folder to go to: '{}/'", inputs->size(), args.output), "-o");
   }
+  if (const auto wrong = wrong_streams(args)) return fail(ErrorCode::invalid_argument, *wrong);
   std::vector<Job> jobs;
   std::map<std::string, std::string> input_of;  // by file that is written
   for (const std::string& input : *inputs) {
     std::string output = args.output;
     if (folder) {
-      output = (fs::path(args.output) / fs::path(input).stem()).string() + "." +
-               (args.format.empty() ? extension : args.format);
+      const fs::path stem = is_standard_stream(input) ? fs::path("stdin") : fs::path(input).stem();
+      output = (fs::path(args.output) / stem).string() + "." + (args.format.empty() ? extension : args.format);
     }
     std::vector<std::string> files{output};
     if (args.options.denoise.maps) {
@@ -92,7 +100,7 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
       const auto [first, is_new] = input_of.emplace(file, input);
       if (!is_new) return written_twice(file, first->second, input);
     }
-    if (same_file(input, output)) {
+    if (!is_standard_stream(input) && !is_standard_stream(output) && same_file(input, output)) {
       return fail(ErrorCode::invalid_argument, fmt::format("{} would be replaced by what is made of it", input), "-o");
     }
     jobs.push_back({input, output});

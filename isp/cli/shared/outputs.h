@@ -20,8 +20,9 @@ struct Job {
 
 /// Returns the output of each input: `output` itself for one, files in it where it is a folder (it exists as one or
 /// ends with /), with `extension` unless the arguments name a format. Inputs that are folders stand for the raw files
-/// in them. Errors: those of raw_files_of; with ErrorCode::invalid_argument (invalid arguments) several inputs and no
-/// folder, two inputs for one image, an image that would replace its own raw file.
+/// in them, and - for standard input and output. Errors: those of wrong_streams; those of raw_files_of; with
+/// ErrorCode::invalid_argument (invalid arguments) several inputs and no folder, two inputs for one image, an image
+/// that would replace its own raw file.
 Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string& extension);
 
 /// Checks outputs. Error (invalid arguments): an output that would replace one of the files that are only read.
@@ -29,6 +30,10 @@ Result<void> check_unharmed(const std::vector<Job>& jobs, const std::vector<std:
 
 /// Returns whether the output is a folder.
 bool names_folder(const DevelopArgs& args);
+
+/// Returns the format of images at an output: by its extension, for standard output that of --format or PNG. Error: the
+/// extension is unknown.
+Result<isp::FileFormat> format_of_output(const DevelopArgs& args, const std::string& output);
 
 /// Holds space and samples of an image file.
 struct PictureKind {

@@ -15,6 +15,7 @@
 #include "isp/codec/source_tags_output.h"
 #include "isp/output/picture/icc.h"
 #include "isp/output/picture/metadata.h"
+#include "isp/output/stream_copy.h"
 
 namespace lowlux::isp {
 namespace {
@@ -172,6 +173,15 @@ Result<void> write_picture(const Picture& picture, OutputSpace space, const Fram
             .and_then([&] { return out.commit(); });
       })
       .map_error(located);
+}
+
+Result<void> write_picture(const Picture& picture, OutputSpace space, const FrameInfo& info, FileFormat format,
+                           int descriptor, const WriteOptions& options, Executor& executor) {
+  return check_writable(format, sample_type(picture), space).and_then([&] {
+    return write_to_stream(descriptor, [&](std::FILE* file) {
+      return encode(picture, format, metadata_for(picture, space, info, options), options, executor, file);
+    });
+  });
 }
 
 Result<std::vector<std::byte>> png_bytes(const Encoded8& picture, OutputSpace space, Executor& executor) {

@@ -50,6 +50,11 @@ struct WriteOptions {
 Result<void> write_picture(const Picture& picture, OutputSpace space, const FrameInfo& info, const std::string& path,
                            const WriteOptions& options, Executor& executor);
 
+/// Writes the image to a file descriptor that may be a pipe (write_to_stream); nothing is written if it cannot be
+/// encoded.
+Result<void> write_picture(const Picture& picture, OutputSpace space, const FrameInfo& info, FileFormat format,
+                           int descriptor, const WriteOptions& options, Executor& executor);
+
 /// Returns a PNG file in memory, with the ICC profile of `space`. Error: there is not enough memory; the size is
 /// impossible.
 Result<std::vector<std::byte>> png_bytes(const Encoded8& picture, OutputSpace space, Executor& executor);
