@@ -7,20 +7,20 @@
 #include <string_view>
 #include <utility>
 
-#include "capture/decoder/decoded_raw.h"
 #include "capture/dng/dng_colour.h"
 #include "capture/dng/dng_file.h"
 #include "capture/dng/dng_tags.h"
+#include "capture/dng/exif_blocks.h"
 #include "capture/dng/opcode_reader.h"
 #include "capture/dng/tiff_directory.h"
-#include "capture/file/file_bytes.h"
 
 namespace lowlux::capture {
 namespace {
 
 constexpr std::size_t max_bytes = std::size_t{64} << 20, max_tags = 4096;
 constexpr double max_baseline_ev = 100;
-constexpr TagName gps_ifd{34853, "GPSInfo"};
+constexpr TagName gps_ifd{34853, "GPSInfo"}, maker_note{37500, "MakerNote"},
+    maker_note_safety{50741, "MakerNoteSafety"};
 // EXIF tags that are not passed on: those of FrameInfo, which are read and written, PixelXDimension and
 // PixelYDimension, and offsets of directories.
 constexpr std::array<std::uint16_t, 11> own_exif_tags{33434, 33437, 34665, 34853, 34855, 36867,
@@ -48,9 +48,11 @@ class Collector {
  public:
   explicit Collector(std::vector<std::string>& warnings) : warnings_(warnings) {}
 
+  /// Adds a tag, unless it was added before.
   void add(const TiffEntry& entry, std::vector<SourceTag>& to) {
     const std::size_t unit = unit_bytes(entry.type);
     if (unit == 0 || entry.count == 0) return;
+    if (std::any_of(to.begin(), to.end(), [&](const SourceTag& tag) { return tag.id == entry.id; })) return;
     if (!entry.inside_file || entry.values.size() > max_bytes - bytes_ || tags_ == max_tags) {
       if (!std::exchange(warned_, true)) {
         warnings_.push_back("tag " + std::to_string(entry.id) +
@@ -155,6 +157,14 @@ bool is_of_lowlux(std::span<const std::byte> bytes) {
          std::string_view(reinterpret_cast<const char*>(bytes.data()), maker.size()) == maker;
 }
 
+/// Removes a maker note that may not be kept: only a DNG can state that it may (MakerNoteSafety, DNG 1.4, 0 by
+/// default). Others refer to places in their file, or hold the preview of an image that has changed.
+void remove_unsafe_note(const TiffDirectory* dng, SourceTags& tags) {
+  const auto safety = dng != nullptr ? dng->whole_or(maker_note_safety, 0) : 0;
+  if (safety && *safety == 1) return;
+  std::erase_if(tags.exif, [](const SourceTag& tag) { return tag.id == maker_note.id; });
+}
+
 SourceTags tags_of_dng(const TiffFile& tiff, const DngFile& dng, Collector& collector) {
   SourceTags tags;
   const TiffDirectory& raw_image = dng.raw_images.front();
@@ -166,6 +176,7 @@ SourceTags tags_of_dng(const TiffFile& tiff, const DngFile& dng, Collector& coll
   follow_calibrations(dng, tags.main);
   if (dng.exif) collector.add_all(*dng.exif, tags.exif);
   add_directory(tiff, dng.main, gps_ifd, collector, tags.gps);
+  remove_unsafe_note(&dng.main, tags);
   const auto baseline = dng.main.numbers(tag::baseline_exposure, 1, 1);
   if (baseline && *baseline && std::fabs((**baseline)[0]) <= max_baseline_ev) {
     tags.baseline_exposure_ev = (**baseline)[0];
@@ -173,33 +184,37 @@ SourceTags tags_of_dng(const TiffFile& tiff, const DngFile& dng, Collector& coll
   return tags;
 }
 
-SourceTags tags_of_tiff(const TiffFile& tiff, Collector& collector) {
+SourceTags tags_of_blocks(const std::vector<ExifBlock>& blocks, Collector& collector) {
   SourceTags tags;
-  const auto main = tiff.directory(tiff.first_directory());
-  if (!main) return tags;
-  collector.add_some(author_tags, *main, nullptr, tags.main);
-  add_directory(tiff, *main, tag::exif_ifd, collector, tags.exif);
-  add_directory(tiff, *main, gps_ifd, collector, tags.gps);
+  for (const ExifBlock& block : blocks) {
+    const auto first = block.tiff.directory(block.tiff.first_directory());
+    if (!first) continue;
+    if (block.first == ExifBlock::First::exif) collector.add_all(*first, tags.exif);
+    if (block.first == ExifBlock::First::gps) collector.add_all(*first, tags.gps);
+    if (block.first != ExifBlock::First::main) continue;
+    collector.add_some(author_tags, *first, nullptr, tags.main);
+    add_directory(block.tiff, *first, tag::exif_ifd, collector, tags.exif);
+    add_directory(block.tiff, *first, gps_ifd, collector, tags.gps);
+  }
+  remove_unsafe_note(nullptr, tags);
   return tags;
 }
 
 }  // namespace
 
-std::shared_ptr<const SourceTags> read_source_tags(std::span<const std::byte> file,
-                                                   std::vector<std::string>& warnings) {
+std::shared_ptr<const SourceTags> dng_source_tags(std::span<const std::byte> file, const DngFile& dng,
+                                                  std::vector<std::string>& warnings) {
   const auto tiff = TiffFile::open(file);
   if (!tiff) return nullptr;
   Collector collector(warnings);
-  const auto dng = open_dng(file);
-  const bool is_dng = dng && *dng;
-  SourceTags tags = is_dng ? tags_of_dng(*tiff, **dng, collector) : tags_of_tiff(*tiff, collector);
-  return std::make_shared<const SourceTags>(std::move(tags));
+  return std::make_shared<const SourceTags>(tags_of_dng(*tiff, dng, collector));
 }
 
-std::shared_ptr<const SourceTags> read_source_tags(const std::filesystem::path& file,
-                                                   std::vector<std::string>& warnings) {
-  const auto bytes = read_file_bytes(file, ReadLimits{}.max_file_bytes);
-  return bytes ? read_source_tags(*bytes, warnings) : nullptr;
+std::shared_ptr<const SourceTags> raw_source_tags(std::span<const std::byte> file, std::vector<std::string>& warnings) {
+  const std::vector<ExifBlock> blocks = find_exif(file);
+  if (blocks.empty()) return nullptr;
+  Collector collector(warnings);
+  return std::make_shared<const SourceTags>(tags_of_blocks(blocks, collector));
 }
 
 }  // namespace lowlux::capture

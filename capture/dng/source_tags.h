@@ -1,25 +1,27 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "capture/dng/dng_file.h"
 #include "isp/base/source_tags.h"
 
 namespace lowlux::capture {
 
-/// Returns the tags of a raw file that are passed on; null if there are none, or the file cannot be read. Of a DNG
-/// these are author, copyright, XMP, IPTC, names and serial numbers of the camera, its colour profile, sharpness and
-/// green split, the maker's data, all EXIF and GPS tags, and of OpcodeList3 what is not in RawFrame::corrections; of
-/// other raws that are a TIFF, such as NEF, CR2, ARW and PEF, author, copyright, XMP, IPTC, EXIF and GPS tags.
+/// Returns the tags of a DNG that are passed on: author, copyright, XMP, IPTC, names and serial numbers of the camera,
+/// its colour profile, sharpness and green split, the maker's data, all EXIF and GPS tags, and of OpcodeList3 what is
+/// not in RawFrame::corrections. The maker note of EXIF is passed on only if MakerNoteSafety states that it may be.
 ///
 /// Values beyond the end of the file, and those above 64 MB in all, are left out with a warning: directories may name
 /// the same bytes any number of times.
-std::shared_ptr<const SourceTags> read_source_tags(std::span<const std::byte> file, std::vector<std::string>& warnings);
-std::shared_ptr<const SourceTags> read_source_tags(const std::filesystem::path& file,
-                                                   std::vector<std::string>& warnings);
+std::shared_ptr<const SourceTags> dng_source_tags(std::span<const std::byte> file, const DngFile& dng,
+                                                  std::vector<std::string>& warnings);
+
+/// Returns the tags of another raw file that are passed on: author, copyright, XMP, IPTC, EXIF and GPS tags, without
+/// the maker note (find_exif); null if the file has no EXIF data. Limits as above.
+std::shared_ptr<const SourceTags> raw_source_tags(std::span<const std::byte> file, std::vector<std::string>& warnings);
 
 }  // namespace lowlux::capture

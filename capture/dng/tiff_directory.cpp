@@ -1,6 +1,7 @@
 #include "capture/dng/tiff_directory.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -8,6 +9,8 @@
 
 namespace lowlux::capture {
 namespace {
+
+constexpr std::array<std::uint16_t, 4> raw_marks{42, 0x4F52, 0x5352, 0x55};  // TIFF; "RO" and "RS" of ORF; RW2
 
 constexpr std::size_t entry_bytes = 12;
 
@@ -178,11 +181,18 @@ Result<std::span<const std::byte>> TiffDirectory::bytes(TagName tag) const {
 }
 
 std::optional<TiffFile> TiffFile::open(std::span<const std::byte> bytes) {
+  return open_marked(bytes, std::span(raw_marks).first(1));
+}
+
+std::optional<TiffFile> TiffFile::open_raw(std::span<const std::byte> bytes) { return open_marked(bytes, raw_marks); }
+
+std::optional<TiffFile> TiffFile::open_marked(std::span<const std::byte> bytes, std::span<const std::uint16_t> marks) {
   if (bytes.size() < 8) return std::nullopt;
   const char first = std::to_integer<char>(bytes[0]), second = std::to_integer<char>(bytes[1]);
   if (first != second || (first != 'I' && first != 'M')) return std::nullopt;
   const bool big_endian = first == 'M';
-  if (load_u16(bytes.data() + 2, big_endian) != 42) return std::nullopt;
+  const std::uint16_t mark = load_u16(bytes.data() + 2, big_endian);
+  if (std::find(marks.begin(), marks.end(), mark) == marks.end()) return std::nullopt;
   return TiffFile(bytes, big_endian, load_u32(bytes.data() + 4, big_endian));
 }
 

@@ -81,12 +81,15 @@ class TiffFile {
  public:
   /// Opens a TIFF; nullopt if the bytes do not begin as a classic (32-bit) TIFF.
   static std::optional<TiffFile> open(std::span<const std::byte> bytes);
+  /// Opens a TIFF, or a raw file that is one but for its mark: ORF and RW2.
+  static std::optional<TiffFile> open_raw(std::span<const std::byte> bytes);
 
   std::uint32_t first_directory() const { return first_directory_; }
   /// Returns the directory at an offset; fails if it does not lie inside the file.
   Result<TiffDirectory> directory(std::uint32_t offset) const;
 
  private:
+  static std::optional<TiffFile> open_marked(std::span<const std::byte> bytes, std::span<const std::uint16_t> marks);
   TiffFile(std::span<const std::byte> bytes, bool big_endian, std::uint32_t first)
       : bytes_(bytes), big_endian_(big_endian), first_directory_(first) {}
 

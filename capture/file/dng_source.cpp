@@ -16,6 +16,7 @@
 #include "capture/dng/dng_levels.h"
 #include "capture/dng/dng_lossy.h"
 #include "capture/dng/dng_tags.h"
+#include "capture/dng/source_tags.h"
 #include "capture/dng/tiff_directory.h"
 #include "capture/file/decoder_frame.h"
 #include "capture/file/file_bytes.h"
@@ -151,14 +152,20 @@ Result<RawFrame> read_bytes(std::span<const std::byte> bytes, const ReadLimits& 
   if (bytes.size() > limits.max_file_bytes) return too_many_bytes(bytes.size(), limits.max_file_bytes);
   auto dng = open_dng(bytes);
   if (!dng) return pass_on(dng);
-  if (*dng) return read_dng(**dng, bytes, limits);
+  if (*dng) {
+    auto frame = read_dng(**dng, bytes, limits);
+    if (frame) frame->source_tags = dng_source_tags(bytes, **dng, frame->warnings);
+    return frame;
+  }
   if (const std::string kind = other_kind(bytes); !kind.empty()) {
     return fail(ErrorCode::unsupported, "this is " + kind + ", not a raw file");
   }
   auto decoded = decode_contained(bytes, limits);
   if (!decoded) return tl::make_unexpected(not_decoded(bytes, std::move(decoded.error())));
   auto frame = frame_of_decoder(*std::move(decoded));
-  if (frame) ignore_impossible_white(frame->colour, frame->warnings);
+  if (!frame) return frame;
+  ignore_impossible_white(frame->colour, frame->warnings);
+  frame->source_tags = raw_source_tags(bytes, frame->warnings);
   return frame;
 }
 

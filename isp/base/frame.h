@@ -13,6 +13,7 @@
 #include "isp/base/matrix3.h"
 #include "isp/base/noise_ratio.h"
 #include "isp/base/plane.h"
+#include "isp/base/source_tags.h"
 
 namespace lowlux {
 
@@ -154,7 +155,8 @@ struct RawFrame {
   std::optional<NoiseProfile> noise;
   std::shared_ptr<const NoiseRatio> noise_ratio;  // of a mosaic; null: the noise is that of `noise` everywhere
   RawCorrections corrections;
-  std::vector<std::string> warnings;  // requests of the source that were not met, by name; one line each
+  std::shared_ptr<const SourceTags> source_tags;  // of the raw file, to be passed on; null: none
+  std::vector<std::string> warnings;              // requests of the source that were not met, by name; one line each
 };
 
 struct Electrons {};        // unit: the system gain is known

@@ -23,4 +23,7 @@ struct SourceTags {
   double baseline_exposure_ev = 0;  // by how much raw developers brighten the image by default (DNG BaselineExposure)
 };
 
+/// Returns the bytes of the values of all tags.
+std::size_t bytes_of(const SourceTags& tags);
+
 }  // namespace lowlux

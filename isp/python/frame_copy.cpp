@@ -18,6 +18,7 @@ RawFrame without_samples(const RawFrame& frame) {
   out.noise = frame.noise;
   out.noise_ratio = frame.noise_ratio;
   out.corrections = frame.corrections;
+  out.source_tags = frame.source_tags;
   out.warnings = frame.warnings;
   return out;
 }

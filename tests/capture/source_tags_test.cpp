@@ -21,6 +21,12 @@ std::vector<std::byte> values_of(const SourceTags& tags, std::uint16_t id) {
   return at == tags.main.end() ? std::vector<std::byte>{} : at->values;
 }
 
+std::shared_ptr<const SourceTags> tags_of(const std::vector<std::byte>& file, std::vector<std::string>& warnings) {
+  const auto dng = open_dng(file);
+  EXPECT_TRUE(dng && *dng);
+  return dng && *dng ? dng_source_tags(file, **dng, warnings) : nullptr;
+}
+
 TEST(SourceTags, TablesOfTheProfileFollowTheSortedCalibrations) {
   for (const bool daylight_first : {false, true}) {
     for (const bool big_endian : {false, true}) {
@@ -34,7 +40,7 @@ TEST(SourceTags, TablesOfTheProfileFollowTheSortedCalibrations) {
       dng.set(50938, Tag::numbers(TagType::f32, {1, 1, 1}));
       dng.set(50939, Tag::numbers(TagType::f32, {2, 2, 2}));
       std::vector<std::string> warnings;
-      const auto tags = read_source_tags(dng.build(), warnings);
+      const auto tags = tags_of(dng.build(), warnings);
       ASSERT_TRUE(tags);
       for (const auto& [id, written] : {std::pair<std::uint16_t, float>{50938, daylight_first ? 2.0F : 1.0F},
                                         {50939, daylight_first ? 1.0F : 2.0F}}) {
@@ -52,7 +58,7 @@ TEST(SourceTags, DataOfLowluxItselfAreNotPassedOn) {
     std::transform(maker.begin(), maker.end(), bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
     DngBuilder dng;
     std::vector<std::string> warnings;
-    const auto tags = read_source_tags(dng.set(50740, Tag::opaque(bytes)).build(), warnings);
+    const auto tags = tags_of(dng.set(50740, Tag::opaque(bytes)).build(), warnings);
     ASSERT_TRUE(tags);
     EXPECT_EQ(values_of(*tags, 50740).empty(), maker == "lowlux");
   }
@@ -81,7 +87,7 @@ TEST(SourceTags, ManyTagsOfTheSameBytesAreBounded) {
     }
   }
   std::vector<std::string> warnings;
-  const auto tags = read_source_tags(bytes, warnings);
+  const auto tags = tags_of(bytes, warnings);
   ASSERT_TRUE(tags);
   std::size_t sum = 0;
   for (const SourceTag& tag : tags->exif) sum += tag.values.size();
@@ -98,15 +104,26 @@ TEST(SourceTags, BaselineExposureIsBoundedAndOfNumbers) {
                                       {Tag::text("bright"), 0.0}}) {
     DngBuilder dng;
     std::vector<std::string> warnings;
-    EXPECT_EQ(read_source_tags(dng.set(50730, tag).build(), warnings)->baseline_exposure_ev, expected);
+    EXPECT_EQ(tags_of(dng.set(50730, tag).build(), warnings)->baseline_exposure_ev, expected);
   }
 }
 
-TEST(SourceTags, FilesThatAreNoTiffHaveNone) {
-  std::vector<std::string> warnings;
-  EXPECT_EQ(read_source_tags(std::vector<std::byte>(100, std::byte{'a'}), warnings), nullptr);
-  EXPECT_EQ(read_source_tags(std::filesystem::path("/nonexistent"), warnings), nullptr);
-  EXPECT_TRUE(warnings.empty());
+TEST(SourceTags, KeepTheMakerNoteOnlyIfTheFileStatesThatItIsSafe) {
+  for (const auto& [safety, is_kept] : {std::pair{-1, false}, {0, false}, {1, true}, {2, false}}) {
+    DngBuilder dng;
+    dng.set(37500, Tag::opaque(std::vector<std::byte>(60, std::byte{0x11})));
+    dng.set(37383, Tag::numbers(TagType::u16, {5}));
+    if (safety >= 0) dng.set(50741, Tag::numbers(TagType::u16, {static_cast<double>(safety)}));
+    std::vector<std::string> warnings;
+    const auto tags = tags_of(dng.build(), warnings);
+    ASSERT_TRUE(tags);
+    const auto has = [&](std::uint16_t id) {
+      return std::any_of(tags->exif.begin(), tags->exif.end(), [id](const SourceTag& tag) { return tag.id == id; });
+    };
+    EXPECT_EQ(has(37500), is_kept) << safety;
+    EXPECT_TRUE(has(37383)) << safety;
+    EXPECT_TRUE(warnings.empty());
+  }
 }
 
 }  // namespace

@@ -1,16 +1,19 @@
 #include "isp/cli/develop/develop_work.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "capture/dng/source_tags.h"
 #include "isp/cli/merge/merge_files.h"
 #include "isp/cli/shared/explain_text.h"
 #include "isp/cli/shared/machine.h"
+#include "isp/cli/shared/outputs.h"
 #include "isp/cli/shared/picture_options.h"
+#include "isp/cli/shared/standard_streams.h"
 #include "isp/output/dng/dng_writer.h"
 #include "isp/output/picture/image_writer.h"
 #include "isp/output/picture/orient.h"
@@ -37,8 +40,6 @@ Result<ReadyFrame> merged_frame(const RawBatch& batch, const Job& job, const std
   merged.frame.noise = ready.frame.noise;  // the report states it
   ready.options = options_of_merged(batch, ready.frame);
   ready.frame.warnings = merged.warnings;
-  ready.source_tags =
-      capture::read_source_tags(frames[static_cast<std::size_t>(merged.reference)], ready.frame.warnings);
   set_profile_tables(batch.args, ready);
   ready.merged_exposure_ev = merged.baseline_exposure_ev;
   out.times.insert(out.times.end(), merged.times.begin(), merged.times.end());
@@ -60,14 +61,14 @@ void remove_repeats(std::vector<std::string>& lines) {
 /// image itself, and linear spaces are for measurement.
 void add_baseline_exposure(const DevelopArgs& args, ReadyFrame& ready) {
   if (!args.baseline_exposure || !ready.options.exposure_ev || is_linear(ready.options.space)) return;
-  const double source_ev = ready.source_tags ? ready.source_tags->baseline_exposure_ev : 0;
+  const double source_ev = ready.frame.source_tags ? ready.frame.source_tags->baseline_exposure_ev : 0;
   const double ev = *ready.options.exposure_ev + source_ev + ready.merged_exposure_ev;
   ready.options.exposure_ev = std::clamp(ev, -max_exposure_ev, max_exposure_ev);
 }
 
 std::string description_of(const isp::NoiseReduction& how, const std::optional<NoiseOrigin>& origin) {
-  return fmt::format("noise reduced by lowlux, level {}, noise from the {}", denoise::name_of(*how.level),
-                     origin ? name_of(origin->source) : name_of(how.source));
+  return fmt::format("noise reduced by lowlux, level {}, noise model: {}", denoise::name_of(*how.level),
+                     origin ? title_of(origin->source) : name_of(how.source));
 }
 
 }  // namespace
@@ -87,8 +88,10 @@ Result<DevelopedFrame> develop_frame(const RawBatch& batch, const Job& job,
   out.times.insert(out.times.end(), developed->plan.times.begin(), developed->plan.times.end());
   progress.reach(0.5);
   isp::StageClock finish(out.times);
-  DevelopedFrame made{
-      isp::oriented(std::move(developed->picture), raw.info.orientation, executor), raw.info, {}, ready->source_tags};
+  DevelopedFrame made{isp::oriented(std::move(developed->picture), raw.info.orientation, executor),
+                      raw.info,
+                      {},
+                      ready->frame.source_tags};
   finish.lap("orientation");
   made.maps = noise_map_files(std::move(developed->noise_maps), raw, job.output, executor);
   if (developed->seeing_map.size() > 0) {
@@ -113,7 +116,12 @@ Result<void> write_developed(const RawBatch& batch, const Job& job, const Develo
   write.source_tags = developed.source_tags;
   if (Result<void> maps = write_maps(batch, job, developed.maps); !maps) return maps;
   const OutputSpace space = batch.options.space;
-  const auto written = isp::write_picture(developed.picture, space, developed.info, job.output, write, executor);
+  const auto written = is_standard_stream(job.output)
+                           ? format_of_output(batch.args, job.output).and_then([&](isp::FileFormat format) {
+                               return isp::write_picture(developed.picture, space, developed.info, format,
+                                                         STDOUT_FILENO, write, executor);
+                             })
+                           : isp::write_picture(developed.picture, space, developed.info, job.output, write, executor);
   clock.lap("encode and write");
   if (!written) return fail(written.error().code, written.error().message, job.output);
   return {};
@@ -138,8 +146,7 @@ Result<DenoisedFrame> denoise_frame(const RawBatch& batch, const Job& job, Execu
   if (!clean) return tl::make_unexpected(clean.error());
   out.times.insert(out.times.end(), clean->plan.times.begin(), clean->plan.times.end());
   progress.reach(0.8);
-  DenoisedFrame made{
-      std::move(clean->frame), {}, description_of(clean->plan.noise_reduction, ready->noise), ready->source_tags};
+  DenoisedFrame made{std::move(clean->frame), {}, description_of(clean->plan.noise_reduction, ready->noise)};
   made.maps = noise_map_files(std::move(clean->maps), ready->frame.raw, job.output, executor);
   out.width = made.frame.raw.default_crop.width;
   out.height = made.frame.raw.default_crop.height;
@@ -151,12 +158,12 @@ Result<DenoisedFrame> denoise_frame(const RawBatch& batch, const Job& job, Execu
 Result<void> write_denoised(const RawBatch& batch, const Job& job, const DenoisedFrame& denoised, DevelopOutcome& out) {
   isp::StageClock clock(out.times);
   if (Result<void> maps = write_maps(batch, job, denoised.maps); !maps) return maps;
-  const Result<void> written = isp::write_dng(denoised.frame, job.output,
-                                              {.overwrite = job.overwrite,
-                                               .software = "lowlux " + version_number(),
-                                               .description = denoised.description,
-                                               .sync = batch.sync,
-                                               .source_tags = denoised.source_tags});
+  const isp::DngWriteOptions options{.overwrite = job.overwrite,
+                                     .software = "lowlux " + version_number(),
+                                     .description = denoised.description,
+                                     .sync = batch.sync};
+  const Result<void> written = is_standard_stream(job.output) ? isp::write_dng(denoised.frame, STDOUT_FILENO, options)
+                                                              : isp::write_dng(denoised.frame, job.output, options);
   clock.lap("write");
   if (!written) return fail(written.error().code, written.error().message, job.output);
   return {};

@@ -42,7 +42,6 @@ struct DenoisedFrame {
   RawFrame frame;
   std::vector<PixelMap> maps;
   std::string description;  // for the file
-  std::shared_ptr<const SourceTags> source_tags;
 };
 
 /// Returns the options of `denoise`: without rendering, since a plan's decisions on colour and tone are not used.

@@ -14,7 +14,6 @@
 
 #include <fmt/format.h>
 
-#include "capture/dng/source_tags.h"
 #include "capture/file/dng_source.h"
 #include "isp/cli/develop/batch_report.h"
 #include "isp/cli/develop/flat_files.h"
@@ -25,6 +24,7 @@
 #include "isp/cli/shared/noise_maps.h"
 #include "isp/cli/shared/picture_options.h"
 #include "isp/cli/shared/profile_option.h"
+#include "isp/cli/shared/standard_streams.h"
 
 namespace lowlux::cli {
 namespace {
@@ -34,7 +34,8 @@ constexpr double used_memory = 0.8;  // of the available: estimates are not exac
 /// Reports an existing output before any work is done; the writer of the file checks again.
 Result<void> check_free(const std::string& output, isp::Overwrite overwrite) {
   std::error_code ignored;
-  if (overwrite == isp::Overwrite::yes || !std::filesystem::exists(output, ignored)) return {};
+  if (is_standard_stream(output) || overwrite == isp::Overwrite::yes || !std::filesystem::exists(output, ignored))
+    return {};
   return fail(ErrorCode::exists,
               fmt::format("{} exists: use --force to overwrite it, --skip-existing to keep it", output), output);
 }
@@ -87,7 +88,9 @@ void FileProgress::reach(double share) {
   reached_ = share;
 }
 
-Result<RawFrame> read_file(const std::string& file) { return capture::read_raw(file); }
+Result<RawFrame> read_file(const std::string& file) {
+  return is_standard_stream(file) ? read_standard_input() : capture::read_raw(file);
+}
 
 Result<RawBatch> make_batch(const DevelopArgs& args, isp::DevelopOptions options, std::vector<Job> jobs,
                             const CalibrationFiles& calibration) {
@@ -137,13 +140,11 @@ Result<ReadyFrame> read_frame(const RawBatch& batch, const Job& job, Executor& e
   Result<isp::DevelopOptions> options = options_for(batch, *frame);
   if (!options) return tl::make_unexpected(options.error());
   ReadyFrame ready{*std::move(frame), *std::move(options)};
-  if (!batch.args.merge) {
-    ready.source_tags = capture::read_source_tags(job.input, ready.frame.warnings);
-    set_profile_tables(batch.args, ready);
-  }
+  if (!batch.args.merge) set_profile_tables(batch.args, ready);
   if (batch.memory) {
     const std::size_t flat = batch.flat ? sizeof(float) * batch.flat->gain.gain.size() : 0;
-    batch.memory->report_size(flat + batch.bytes_of(ready.frame.raw, ready.options, executor.width()));
+    const std::size_t tags = ready.frame.source_tags ? bytes_of(*ready.frame.source_tags) : 0;
+    batch.memory->report_size(flat + tags + batch.bytes_of(ready.frame.raw, ready.options, executor.width()));
   }
   if (batch.darks) clock.lap("dark frame's making");
   return ready;
@@ -151,12 +152,12 @@ Result<ReadyFrame> read_frame(const RawBatch& batch, const Job& job, Executor& e
 
 void set_profile_tables(const DevelopArgs& args, ReadyFrame& ready) {
   const CameraColour& colour = ready.frame.colour;
-  if (!args.camera_profile || !ready.source_tags || is_linear(ready.options.space) ||
+  if (!args.camera_profile || !ready.frame.source_tags || is_linear(ready.options.space) ||
       ready.options.look.look != isp::Look::camera || colour.source != CameraColour::Source::file_tags) {
     return;
   }
   ready.options.profile_tables =
-      isp::read_profile_tables(*ready.source_tags, colour.calibrations.size() == 2, ready.frame.warnings);
+      isp::read_profile_tables(*ready.frame.source_tags, colour.calibrations.size() == 2, ready.frame.warnings);
 }
 
 Result<ReadyFrame> ready_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock) {

@@ -10,7 +10,6 @@
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
-#include "isp/base/source_tags.h"
 #include "isp/cli/develop/calibration_files.h"
 #include "isp/cli/develop/cost_file.h"
 #include "isp/cli/develop/dark_files.h"
@@ -66,12 +65,11 @@ std::vector<std::string> files_of(const RawBatch& batch, const Job& job);
 struct ReadyFrame {
   RawFrame frame;
   isp::DevelopOptions options;
-  std::optional<NoiseOrigin> noise = std::nullopt;          // set by ready_frame where it is known
-  std::shared_ptr<const SourceTags> source_tags = nullptr;  // for the output; null: none
-  double merged_exposure_ev = 0;                            // BaselineExposure that a merge adds to that of the source
+  std::optional<NoiseOrigin> noise = std::nullopt;  // set by ready_frame where it is known
+  double merged_exposure_ev = 0;                    // BaselineExposure that a merge adds to that of the source
 };
 
-/// Reads one file with its profile, darks and flats, and, unless it is merged with others, its source tags. Existing
+/// Reads one file with its profile, darks and flats. Existing
 /// outputs, including maps, are an error before any work is done; a job without an output writes none.
 Result<ReadyFrame> read_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock);
 

@@ -16,6 +16,7 @@
 #include "isp/output/dng/dng_check.h"
 #include "isp/output/dng/dng_tags.h"
 #include "isp/output/picture/metadata.h"
+#include "isp/output/stream_copy.h"
 
 namespace lowlux::isp {
 namespace {
@@ -55,14 +56,14 @@ void set_image(TIFF* tiff, const RawDn& raw, int rows_per_strip) {
   TIFFSetField(tiff, TIFFTAG_CFALAYOUT, 1);  // rectangular
 }
 
-double baseline_exposure_ev(const DngWriteOptions& options) {
-  return options.baseline_exposure_ev + (options.source_tags ? options.source_tags->baseline_exposure_ev : 0);
+double baseline_exposure_ev(const RawFrame& frame, const DngWriteOptions& options) {
+  return options.baseline_exposure_ev + (frame.source_tags ? frame.source_tags->baseline_exposure_ev : 0);
 }
 
 /// Returns whether the tags of the source hold opcodes.
-bool has_opcodes(const DngWriteOptions& options) {
-  if (!options.source_tags) return false;
-  const auto& tags = options.source_tags->main;
+bool has_opcodes(const RawFrame& frame) {
+  if (!frame.source_tags) return false;
+  const auto& tags = frame.source_tags->main;
   return std::any_of(tags.begin(), tags.end(), [](const SourceTag& tag) { return tag.id == opcode_list3; });
 }
 
@@ -73,10 +74,10 @@ bool is_of_profile(const SourceTag& tag) {
   return std::find(ids.begin(), ids.end(), tag.id) != ids.end();
 }
 
-Result<void> add_tags_of_source(std::FILE* file, const CameraColour& colour, const DngWriteOptions& options) {
-  if (!options.source_tags) return {};
-  if (colour.source == CameraColour::Source::file_tags) return add_source_tags(file, *options.source_tags);
-  SourceTags tags = *options.source_tags;
+Result<void> add_tags_of_source(std::FILE* file, const RawFrame& frame) {
+  if (!frame.source_tags) return {};
+  if (frame.colour.source == CameraColour::Source::file_tags) return add_source_tags(file, *frame.source_tags);
+  SourceTags tags = *frame.source_tags;
   std::erase_if(tags.main, is_of_profile);
   return add_source_tags(file, tags);
 }
@@ -85,7 +86,7 @@ void set_identity(TIFF* tiff, const RawFrame& frame, const FrameInfo& info, cons
   constexpr std::array<std::uint8_t, 4> version{1, 4, 0, 0};
   // MaskedAreas came with 1.1; opcodes came with 1.3 and must not be skipped; floating-point samples came with 1.4.
   const RawCorrections& c = frame.corrections;
-  const bool opcodes = !c.gain_maps.empty() || !c.radial_gains.empty() || !c.defects.empty() || has_opcodes(options);
+  const bool opcodes = !c.gain_maps.empty() || !c.radial_gains.empty() || !c.defects.empty() || has_opcodes(frame);
   const int needed = frame.raw.is_float() ? 4 : opcodes ? 3 : 1;
   const std::array<std::uint8_t, 4> backward{1, static_cast<std::uint8_t>(needed), 0, 0};
   TIFFSetField(tiff, TIFFTAG_DNGVERSION, version.data());
@@ -135,12 +136,12 @@ Result<void> encode(const RawFrame& frame, const DngWriteOptions& options, std::
   set_identity(tiff, frame, info, options);
   set_dng_levels(tiff, frame.raw);
   if (frame.raw.layout != SensorLayout::monochrome) set_dng_colour(tiff, frame.colour);
-  TIFFSetField(tiff, TIFFTAG_BASELINEEXPOSURE, baseline_exposure_ev(options));
+  TIFFSetField(tiff, TIFFTAG_BASELINEEXPOSURE, baseline_exposure_ev(frame, options));
   set_dng_noise_and_opcodes(tiff, frame);
   if (exif != 0) TIFFSetField(tiff, TIFFTAG_EXIFIFD, exif);
   const bool stored = with_samples(frame.raw, [&](const auto& dn) { return write_strips(tiff, dn, rows); });
   return output.finish(stored && TIFFWriteDirectory(tiff) != 0)
-      .and_then([&] { return add_tags_of_source(file, frame.colour, options); })
+      .and_then([&] { return add_tags_of_source(file, frame); })
       .and_then([&] { return pad(file); });
 }
 
@@ -148,6 +149,14 @@ Result<void> check_baseline_exposure(double ev) {
   if (std::fabs(ev) <= max_baseline_exposure_ev) return {};
   return fail(ErrorCode::invalid_argument,
               "a DNG cannot hold this BaselineExposure: " + number_text(ev) + " EV, expected -100 to 100");
+}
+
+/// Returns the error of a frame or of options that no DNG can hold.
+Result<void> check_all(const RawFrame& frame, const DngWriteOptions& options) {
+  return check_dng_frame(frame)
+      .and_then([&] { return check_baseline_exposure(baseline_exposure_ev(frame, options)); })
+      .and_then(
+          [&] { return check_dng_size(static_cast<std::int64_t>(frame.raw.samples()), frame.raw.sample_bytes()); });
 }
 
 }  // namespace
@@ -165,16 +174,21 @@ Result<void> write_dng(const RawFrame& frame, const std::string& path, const Dng
     if (error.where.empty()) error = Error{error.code, "cannot write " + path + ": " + error.message, path};
     return error;
   };
-  return check_dng_frame(frame)
-      .and_then([&] { return check_baseline_exposure(baseline_exposure_ev(options)); })
-      .and_then(
-          [&] { return check_dng_size(static_cast<std::int64_t>(frame.raw.samples()), frame.raw.sample_bytes()); })
+  return check_all(frame, options)
       .and_then([&] { return AtomicFile::create(path, options.overwrite, options.sync); })
       .and_then(
           [&](AtomicFile out) { return encode(frame, options, out.file()).and_then([&] { return out.commit(); }); })
       .map_error(located);
 } catch (const std::bad_alloc&) {
   return fail(ErrorCode::too_large, "cannot write " + path + ": there is not enough memory", path);
+}
+
+Result<void> write_dng(const RawFrame& frame, int descriptor, const DngWriteOptions& options) try {
+  return check_all(frame, options).and_then([&] {
+    return write_to_stream(descriptor, [&](std::FILE* file) { return encode(frame, options, file); });
+  });
+} catch (const std::bad_alloc&) {
+  return fail(ErrorCode::too_large, "there is not enough memory");
 }
 
 }  // namespace lowlux::isp

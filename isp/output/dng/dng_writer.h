@@ -2,12 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <string>
 
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
-#include "isp/base/source_tags.h"
 #include "isp/output/atomic_file.h"
 
 namespace lowlux::isp {
@@ -17,9 +15,6 @@ struct DngWriteOptions {
   std::string software = "lowlux";  // with its version; replaces the name in the frame
   std::string description;          // ImageDescription, the processing of the frame; printable ASCII is kept
   Sync sync = Sync::no;
-  /// Of the raw file, to be written as they are, those of its camera profile only with its colour matrices. Their
-  /// UniqueCameraModel takes the place of make and model. Null: none.
-  std::shared_ptr<const SourceTags> source_tags;
   /// By how much raw developers brighten the image by default (BaselineExposure), in addition to what the source
   /// states; the sum is -100 to 100. For a merge of exposures the ratio of the exposure that the image is to have to
   /// the one that white belongs to.
@@ -29,7 +24,9 @@ struct DngWriteOptions {
 /// Writes a raw frame as DNG 1.4, completely or not at all: 16 bits, or 32-bit floats if the frame has floating-point
 /// samples, uncompressed, in adjacent strips of about 1 MB. Floats are preserved bit by bit.
 /// Mosaics and monochrome have one sample per pixel, SensorLayout::linear_rgb three. Every figure of the frame that has
-/// a DNG tag is written; what is absent stays absent. Rationals are within 1e-7 of the figure, relative.
+/// a DNG tag is written; what is absent stays absent. Its source tags are written as they are, those of the camera
+/// profile only with its colour matrices; their UniqueCameraModel takes the place of make and model. Rationals are
+/// within 1e-7 of the figure, relative.
 ///
 /// Figures rounded to what DNG can hold: white levels to integer DN; the temperature of a calibration to the nearest
 /// light source of EXIF (light_source_of). UniqueCameraModel, which DNG requires, is make and model, or "Unknown".
@@ -41,6 +38,9 @@ struct DngWriteOptions {
 ///     too_large         as check_dng_size
 ///     exists, unwritable  as AtomicFile
 Result<void> write_dng(const RawFrame& frame, const std::string& path, const DngWriteOptions& options = {});
+
+/// Writes a raw frame as above to a file descriptor that may be a pipe (write_to_stream).
+Result<void> write_dng(const RawFrame& frame, int descriptor, const DngWriteOptions& options = {});
 
 /// Returns an error if this number of samples would need offsets of 64 bits (BigTIFF), which raw developers do not
 /// read.

@@ -51,6 +51,7 @@ Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options,
   out.frame.colour = frame.colour;
   out.frame.corrections = frame.corrections;
   out.frame.corrections.defects.clear();
+  out.frame.source_tags = frame.source_tags;
   out.frame.noise = residual_profile(signal, out.maps.site_variance_e2, light_at_white_e(out.plan.levels),
                                      levels.rounding_variance());
   if (!options.denoise.maps) out.maps = {};

@@ -225,6 +225,7 @@ void encode_merged(merge::MosaicMean& mean, const FrameElectrons& reference, Pla
   out.frame.colour = std::move(frame.colour);
   out.frame.corrections = std::move(frame.corrections);
   out.frame.corrections.defects.clear();
+  out.frame.source_tags = std::move(frame.source_tags);
   if (out.alignment != MergeAlignment::none)
     smooth_gain_maps(out.frame.corrections, out.frame.raw.active.height, executor);
 }
