@@ -186,7 +186,7 @@ TEST(AutoWhiteBalance, WithoutMatricesIsNotHeldAndSaysSo) {
   EXPECT_EQ(found.source, WhiteSource::estimated);
   EXPECT_FALSE(found.white);
   EXPECT_NEAR(found.neutral[0], 0.125, 1e-6);
-  EXPECT_NE(found.reason.find("no usable colour matrix"), std::string::npos);
+  EXPECT_NE(found.reason.find("the colour matrix is missing or unusable"), std::string::npos);
 }
 
 TEST(WhiteSources, HaveNames) {
