@@ -218,7 +218,7 @@ TEST_F(LookCommand, TakesTheLightByNameRatioAndSpectrum) {
   EXPECT_NEAR(even["white_scotopic_ratio"], 2.26, 0.005) << "equal energy";
   const auto explained = lowlux({"develop", file("night.dng"), "-o", file("seen.png"), "--force", "--look", "eye",
                                  "--light", "LPS", "--explain"});
-  EXPECT_NE(explained.out.find("LPS, S/P 0.2"), std::string::npos) << explained.out;
+  EXPECT_NE(explained.out.find("LPS, S/P ratio 0.2"), std::string::npos) << explained.out;
 }
 
 TEST_F(LookCommand, FitsRodsOnTheCameraOfAProfile) {

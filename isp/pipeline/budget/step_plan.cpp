@@ -31,7 +31,7 @@ std::string reason_words(const StepFacts& facts, const StepCandidate& plan) {
 }
 
 std::string level_words(const StepFacts& facts, const StepCandidate& plan) {
-  if (!facts.has_noise) return "the noise is not known, or not to be reduced";
+  if (!facts.has_noise) return "the noise is not known, or is not to be reduced";
   if (!plan.level) return "left as it is, " + reason_words(facts, plan);
   std::array<double, 3> share = facts.chroma.start;
   if (*plan.level == Level::best) share = {share[0] + share[1], 0, share[2]};  // best starts level 1 on level 0
@@ -81,7 +81,7 @@ PlannedStep demosaic_step(const StepFacts& facts, StepCandidate plan) {
   PlannedStep out{.name = "demosaicing by residuals", .size = std::numeric_limits<double>::quiet_NaN()};
   out.used = plan.max_demosaic >= DemosaicMethod::residual;
   out.decision =
-      out.used ? "where there is light enough for it" : "encoded linear filters instead, " + reason_words(facts, plan);
+      out.used ? "in areas with enough light" : "encoded linear filters instead, " + reason_words(facts, plan);
   if (facts.choice.cost) {
     plan.max_demosaic = DemosaicMethod::residual_median;
     StepCandidate without = plan;
@@ -113,7 +113,7 @@ StepPlan told(const StepFacts& facts, const StepCandidate& plan) {
   }
   if (facts.may_search) {
     add({"hot pixels", facts.sizes.defects, 0, true,
-         fmt::format("{} repaired; the strongest in its own pixel", facts.defects),
+         fmt::format("{} repaired; the change is that of the strongest pixel", facts.defects),
          cost_of(facts, {{CostPart::defects}})});
   }
   if (facts.may_take_lines) {

@@ -121,7 +121,7 @@ void set_lines(const RawFrame& frame, const RawLevels& levels, const SizeRequest
   const std::vector<Rect> squares = sample_squares(frame, levels);
   if (squares.empty() && !request.lines_may_stay) {
     out.lines = nan;
-    out.lines_words = "looked for in the whole frame: a sample would save nothing";
+    out.lines_words = "searched in the whole frame";
     return;
   }
   const MeasuredCharge measured =

@@ -121,7 +121,7 @@ DarkCharge in_black_point(const RawFrame& frame, const RawLevels& levels) {
   if (variance_e2 > 0) out.standard_error_e = std::sqrt(variance_e2);
   const bool is_stated = levels.stated_dark_dn != PerSite<double>{};
   out.reason =
-      is_stated ? "added to the pedestal, as the profile states it" : "the black point less the tagged pedestal";
+      is_stated ? "added to the black level, as the profile states it" : "the black level minus the one of the tag";
   return out;
 }
 

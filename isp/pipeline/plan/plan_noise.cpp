@@ -123,12 +123,12 @@ void choose_level(const NoiseRequest& request, NoiseReduction& out) {
   if (request.level) {
     out.level = request.level->level;
     out.regions = request.level->regions;
-    out.reason = fmt::format("what the frame calls for, at a signal to noise ratio of {:.3g}", *out.snr);
+    out.reason = fmt::format("chosen by its visible effect, at a signal-to-noise ratio of {:.3g}", *out.snr);
     return;
   }
   out.level = level_for(*out.snr);
   if (!out.level && choice.always) out.level = denoise::Level::draft;
-  out.reason = fmt::format("signal to noise ratio {:.3g} of a pixel in the middle block", *out.snr);
+  out.reason = fmt::format("signal-to-noise ratio {:.3g} of a pixel in the median block", *out.snr);
 }
 
 /// Returns the charge to check: lines need the whole frame; the remaining noise is checked on a sample of it where
