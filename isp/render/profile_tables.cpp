@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::uint16_t map_dims = 50937, map_data_1 = 50938, map_data_2 = 50939, map_encoding = 51107;
 constexpr std::uint16_t look_dims = 50981, look_data = 50982, look_encoding = 51108;
+constexpr std::uint16_t tone_curve = 50940;
 constexpr std::uint16_t type_short = 3, type_long = 4, type_float = 11;
 constexpr float max_shift = 360, max_factor = 1000;
 
@@ -121,6 +122,19 @@ void read_look(const SourceTags& tags, ProfileTables& out, std::vector<std::stri
   if (!changes(out.look)) out.look.reset();
 }
 
+void read_curve(const SourceTags& tags, ProfileTables& out, std::vector<std::string>& warnings) {
+  const SourceTag* const tag = find(tags, tone_curve);
+  if (tag == nullptr) return;
+  const bool is_whole = tag->type == type_float && tag->count % 2 == 0 && tag->count <= 2 * max_curve_points &&
+                        tag->values.size() == std::size_t{4} * tag->count;
+  std::vector<CurvePoint> points;
+  for (std::size_t i = 0; is_whole && i < tag->count; i += 2) {
+    points.push_back({std::bit_cast<float>(word_at(*tag, i, 4)), std::bit_cast<float>(word_at(*tag, i + 1, 4))});
+  }
+  out.curve = make_profile_curve(points);
+  if (!out.curve) warnings.emplace_back("the profile's tone curve is not valid: it is not applied");
+}
+
 using FloatMatrix = std::array<float, 9>;
 
 FloatMatrix floats_of(const Matrix3& m, double factor) {
@@ -136,12 +150,13 @@ void multiply(const FloatMatrix& m, float (&v)[3]) {
 
 }  // namespace
 
-std::shared_ptr<const ProfileTables> read_profile_tables(const SourceTags& tags, bool two_maps,
+std::shared_ptr<const ProfileTables> read_profile_tables(const SourceTags& tags, const ProfileParts& parts,
                                                          std::vector<std::string>& warnings) {
   ProfileTables out;
-  read_maps(tags, two_maps, out, warnings);
+  read_maps(tags, parts.two_maps, out, warnings);
   read_look(tags, out, warnings);
-  if (!out.low && !out.look) return nullptr;
+  if (parts.with_curve) read_curve(tags, out, warnings);
+  if (!out.low && !out.look && !out.curve) return nullptr;
   return std::make_shared<const ProfileTables>(std::move(out));
 }
 
@@ -173,6 +188,7 @@ void apply_profile(const ProfileRendering& profile, const RgbView<const float>& 
         if (profile.map) apply_hue_sat_map(*profile.map, v);
         for (float& channel : v) channel *= to_look;
         if (profile.look) apply_hue_sat_map(*profile.look, v);
+        if (profile.curve) apply_profile_curve(*profile.curve, v);
         multiply(from_look, v);
         for (int c = 0; c < 3; ++c) out[c].row(y)[x] = v[c];
       }

@@ -80,6 +80,38 @@ TEST_F(CameraProfileCommand, TablesAreAppliedUnlessToldNotTo) {
             std::string::npos);
 }
 
+TEST_F(CameraProfileCommand, TheToneCurveReplacesTheStandardOne) {
+  const auto with_curve = [&](const std::string& name, const std::vector<double>& points) {
+    DngBuilder dng;
+    dng.width = 192, dng.height = 128;
+    if (!points.empty()) dng.set(50940, Tag::numbers(TagType::f32, points));
+    const auto bytes = dng.build();
+    std::ofstream out(folder_.file(name), std::ios::binary);
+    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  };
+  with_curve("plain.dng", {});
+  with_curve("line.dng", {0, 0, 1, 1});
+  with_curve("bright.dng", {0, 0, 0.2, 0.4, 1, 1});
+  with_curve("wrong.dng", {0, 0, 0.2, 0.4, 1, 0.9});
+  const std::vector<std::string> at_0{"--exposure", "0"}, none{"--exposure", "0", "--camera-profile", "none"},
+      standard{"--exposure", "0", "--tone", "standard"}, linear{"--exposure", "0", "--tone", "none"};
+  const std::string plain = developed("plain.dng", at_0), bright = developed("bright.dng", at_0);
+  EXPECT_EQ(report_["camera_profile"]["tone_curve_points"], 3);
+  EXPECT_NE(bright, plain);
+  EXPECT_EQ(developed("bright.dng", none), plain);
+  EXPECT_EQ(developed("bright.dng", standard), plain) << "a curve that is named comes before";
+  EXPECT_EQ(developed("bright.dng", linear), developed("plain.dng", linear));
+  EXPECT_EQ(developed("wrong.dng", at_0), plain);
+  EXPECT_NE(report_["warnings"].dump().find("tone curve is not valid"), std::string::npos);
+  // The automatic exposure places mid-grey where the curve shows it as mid-grey.
+  developed("plain.dng");
+  const double ev = report_["exposure"]["ev"];
+  developed("line.dng");
+  EXPECT_NEAR(report_["exposure"]["ev"], ev, 0.01);
+  developed("bright.dng");
+  EXPECT_LT(report_["exposure"]["ev"], ev - 0.5);
+}
+
 TEST_F(CameraProfileCommand, IdentityChangesNoByte) {
   write("plain.dng", {}, {});
   write("identity.dng", identity, identity);

@@ -119,7 +119,7 @@ const std::vector<float> warm{0, 1, 1, 5, 1.5, 0.5}, plain{0, 1, 1, 0, 1, 1};
 TEST(ProfileTables, TwoMapsAreInterpolatedByTheirWeight) {
   std::vector<std::string> warnings;
   const SourceTags tags{.main = {longs(50937, {1, 2, 1}), floats(50938, plain), floats(50939, warm)}};
-  const auto tables = read_profile_tables(tags, true, warnings);
+  const auto tables = read_profile_tables(tags, {.two_maps = true}, warnings);
   ASSERT_TRUE(tables && tables->high);
   const auto map = map_at(*tables, 0.25);
   EXPECT_EQ(map->node, (std::vector<float>{0, 1, 1, 1.25, 1.125, 0.875}));
@@ -132,8 +132,8 @@ TEST(ProfileTables, IdentityIsLeftOutWithoutAWarning) {
   const SourceTags tags{.main = {longs(50937, {1, 2, 1}), floats(50938, plain), longs(50981, {1, 2, 1}),
                                  // The factor of value at saturation 0 is 1 whatever the file states.
                                  floats(50982, {0, 1, 0.5, 0, 1, 1})}};
-  EXPECT_EQ(read_profile_tables(tags, false, warnings), nullptr);
-  EXPECT_EQ(read_profile_tables({}, true, warnings), nullptr);
+  EXPECT_EQ(read_profile_tables(tags, {.two_maps = false}, warnings), nullptr);
+  EXPECT_EQ(read_profile_tables({}, {.two_maps = true}, warnings), nullptr);
   EXPECT_TRUE(warnings.empty());
 }
 
@@ -162,13 +162,13 @@ TEST(ProfileTables, HostileTablesAreLeftOutWithOneWarning) {
   hostile.push_back({.main = {longs(50937, {1, 2, 1}), cut}});
   for (std::size_t i = 0; i < hostile.size(); ++i) {
     std::vector<std::string> warnings;
-    EXPECT_EQ(read_profile_tables(hostile[i], false, warnings), nullptr) << i;
+    EXPECT_EQ(read_profile_tables(hostile[i], {.two_maps = false}, warnings), nullptr) << i;
     EXPECT_EQ(warnings.size(), 1u) << i;
   }
   // The second map is missing; the look table of the same profile is good, and stays.
   SourceTags half{.main = {longs(50937, {1, 2, 1}), floats(50938, warm), longs(50981, {1, 2, 1}), floats(50982, warm)}};
   std::vector<std::string> warnings;
-  const auto tables = read_profile_tables(half, true, warnings);
+  const auto tables = read_profile_tables(half, {.two_maps = true}, warnings);
   ASSERT_TRUE(tables);
   EXPECT_TRUE(!tables->low && !tables->high && tables->look);
   EXPECT_EQ(warnings.size(), 1u);

@@ -75,7 +75,8 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   add_choice<bool>(
       app, "--camera-profile", {{"embedded", true}, {"none", false}},
       [&args](bool embedded) { args.camera_profile = embedded; },
-      "hue, saturation and look tables of the DNG: apply or ignore them (default: embedded; never in linear spaces, "
+      "hue, saturation and look tables and tone curve of the DNG: apply or ignore them (default: embedded; never in "
+      "linear spaces, "
       "with --look or with colours of --profile)");
   add_look(app, args.look);
   add_seeing_map(app, args.look);

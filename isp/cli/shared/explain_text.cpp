@@ -84,7 +84,7 @@ void add_look_effects(Lines& out, std::span<const isp::LookEffect> effects) {
 
 void add_light(Lines& out, const isp::LookPlan& look, const isp::SceneLight* light) {
   const std::string name = light != nullptr && !light->name.empty() ? light->name + ", " : "";
-  out.add("light", fmt::format("{}scotopic to photopic luminance (S/P) {:.3g} ({}), degree of adaptation {:.2f}", name,
+  out.add("light", fmt::format("{}S/P ratio {:.3g} (scotopic to photopic, {}), degree of adaptation {:.2f}", name,
                                look.look.scotopic_ratio_of_white, look.light_rule, look.adaptation_degree));
   if (look.rods) {
     out.add("", fmt::format("response of the rods from {}{}", look.rods->source == "profile" ? "the " : "",
@@ -139,6 +139,10 @@ void add_profile(Lines& out, const isp::ProfileRendering& profile) {
   if (profile.map) add_table(out, "profile", "embedded, map", *profile.map);
   if (profile.look)
     add_table(out, profile.map ? "" : "profile", profile.map ? "look table" : "embedded, look table", *profile.look);
+  if (profile.curve) {
+    out.add(profile.map || profile.look ? "" : "profile",
+            fmt::format("tone curve of {} points", profile.curve->points));
+  }
 }
 
 std::string dark_text(const isp::DevelopPlan& plan) {

@@ -220,7 +220,9 @@ Json table_json(const std::optional<isp::HueSatMap>& map) {
 
 Json profile_json(const std::optional<isp::ProfileRendering>& profile) {
   if (!profile) return nullptr;
-  return {{"hue_sat_map", table_json(profile->map)}, {"look_table", table_json(profile->look)}};
+  return {{"hue_sat_map", table_json(profile->map)},
+          {"look_table", table_json(profile->look)},
+          {"tone_curve_points", profile->curve ? Json(profile->curve->points) : Json(nullptr)}};
 }
 
 }  // namespace

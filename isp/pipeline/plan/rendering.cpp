@@ -15,6 +15,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double daylight_k = 6504;  // D65
+constexpr double mid_grey = 0.18;    // what automatic exposure brings the image to: a curve may show it brighter
 
 Vector3 luminance_of(OutputSpace space) { return luminance_weights(space).value_or(Vector3{0, 1, 0}); }
 
@@ -33,15 +34,22 @@ Result<WhiteBalance> choose_white(const RawFrame& frame, const DevelopOptions& o
   return found;
 }
 
+/// Returns whether the tone curve of the profile replaces the standard one.
+bool has_profile_curve(const DevelopOptions& options, const std::optional<WhitePoint>& white) {
+  return options.profile_tables && options.profile_tables->curve && options.tone == ToneCurve::standard && white &&
+         options.look.look == Look::camera && !is_linear(options.space);
+}
+
 /// Returns the tables of the profile, placed before and after exposure; nullopt where they are not applied.
 std::optional<ProfileRendering> decide_profile(const RawFrame& frame, const DevelopOptions& options,
-                                               const Rendering& rendering) {
+                                               const Rendering& rendering, bool has_curve) {
   const bool has_look = rendering.look && rendering.look->kind != Look::camera;
   if (!options.profile_tables || !rendering.white || has_look || is_linear(options.space)) return std::nullopt;
   const double limit = tone_limit(options.tone, rendering.exposure_ev);
   const Matrix3 to_prophoto = xyz_to_prophoto() * *inverse(*xyz_to_output(options.space));
   return ProfileRendering{.map = map_at(*options.profile_tables, calibration_weight(frame.colour, rendering.white->xy)),
                           .look = options.profile_tables->look,
+                          .curve = has_curve ? options.profile_tables->curve : std::nullopt,
                           .to_prophoto = to_prophoto,
                           .from_prophoto = *inverse(to_prophoto),
                           .map_scale = std::exp2(rendering.exposure_ev) / limit,
@@ -153,7 +161,8 @@ ToneTable tone_of(double exposure_ev, const DevelopOptions& options) {
   return make_tone_table(options.tone, options.space, tone_limit(options.tone, exposure_ev));
 }
 
-Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light, const DevelopOptions& options) {
+Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light, const DevelopOptions& requested) {
+  DevelopOptions options = requested;
   Result<WhiteBalance> balance{};
   if (options.space != OutputSpace::camera) balance = with_white(choose_white(frame, options, light), frame, options);
   if (!balance) return tl::make_unexpected(std::move(balance.error()));
@@ -169,6 +178,11 @@ Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light
   rendered_luminance(light.mean, options.space, out.white_gain, *balanced, blocks);
   const double noise_std = light.black_noise_std * *std::ranges::max_element(out.white_gain);
   decide_exposure(options, blocks, noise_std, out);
+  const bool has_curve = has_profile_curve(options, out.white);
+  if (has_curve) {
+    options.tone = ToneCurve::none;
+    if (!options.exposure_ev) out.exposure_ev += std::log2(options.profile_tables->curve->mid_grey / mid_grey);
+  }
   Result<std::optional<LookPlan>> look =
       plan_look(frame, {blocks, noise_std, out.white, out.exposure_ev, *balanced}, options);
   if (!look) return tl::make_unexpected(std::move(look.error()));
@@ -176,7 +190,7 @@ Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light
   if (out.look) out.exposure_ev += out.look->dimming_ev;
   out.transform = transform_of(out.look ? out.look->adaptation * *balanced : *balanced, out.exposure_ev, options);
   out.tone = tone_of(out.exposure_ev, options);
-  out.profile = decide_profile(frame, options, out);
+  out.profile = decide_profile(frame, options, out, has_curve);
   if (!out.look || out.look->kind != Look::model) return out;
   Result<ModelTable> model =
       tabulate_model(*out.look, {out.white, out.white_gain, out.transform, out.exposure_ev}, options);
