@@ -17,6 +17,7 @@
 #include "isp/codec/jpeg.h"
 #include "isp/codec/pfm.h"
 #include "isp/codec/png.h"
+#include "isp/codec/ppm.h"
 #include "isp/codec/tiff.h"
 #include "isp/model/colour/colorimetry.h"
 
@@ -64,11 +65,12 @@ Result<Decoder> decoder_of(std::span<const std::byte> bytes) {
   if (starts_with(bytes, "\xFF\xD8\xFF"sv)) return isp::decode_jpeg;
   if (starts_with(bytes, "\x76\x2F\x31\x01"sv)) return isp::decode_exr;
   if (starts_with(bytes, "PF"sv) || starts_with(bytes, "Pf"sv)) return isp::decode_pfm;
+  if (starts_with(bytes, "P5"sv) || starts_with(bytes, "P6"sv)) return isp::decode_ppm;
   for (const std::string_view magic : {"II\x2A\0"sv, "MM\0\x2A"sv, "II\x2B\0"sv, "MM\0\x2B"sv}) {
     if (starts_with(bytes, magic)) return tiff_decoder_of(bytes);
   }
   return fail(ErrorCode::unsupported,
-              "this is no picture that lowlux reads: convert it to PNG, JPEG, TIFF, OpenEXR or PFM");
+              "this is no picture that lowlux reads: convert it to PNG, JPEG, TIFF, OpenEXR, PFM or PPM");
 }
 
 /// Returns the orientation of the EXIF block, or of the format's own field if there is no block.

@@ -24,7 +24,7 @@ struct ScenePicture {
   std::vector<std::string> warnings;  // one line each
 };
 
-/// Reads PNG, JPEG, TIFF, OpenEXR or PFM, identified by their first bytes, to scene-linear light.
+/// Reads PNG, JPEG, TIFF, OpenEXR, PFM or PPM, identified by their first bytes, to scene-linear light.
 ///
 /// 8 and 16 bits: by the embedded ICC profile (curves and a matrix, or grey; relative colorimetric, adapted to D65),
 /// else as sRGB. EXIF orientation is honoured. Floats: linear; primaries of the OpenEXR chromaticities or of a linear

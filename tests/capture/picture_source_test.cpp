@@ -56,7 +56,7 @@ TEST(ReadPicture, TheFormatIsToldByTheBytes) {
 
 TEST(ReadPicture, FilesThatAreNoPictureAreNamed) {
   EXPECT_TRUE(has(refused({}), "empty"));
-  EXPECT_TRUE(has(refused(Bytes(100)), "PNG, JPEG, TIFF, OpenEXR or PFM"));
+  EXPECT_TRUE(has(refused(Bytes(100)), "PNG, JPEG, TIFF, OpenEXR, PFM or PPM"));
   EXPECT_TRUE(has(refused(test::DngBuilder{}.build()), "raw file (DNG)"));
   Bytes half = png_of(test::noisy_codes<std::uint8_t>(40, 30));
   half.resize(half.size() / 2);

@@ -250,7 +250,7 @@ TEST_F(SimulateInput, PicturesThatAreNoLightAreRefused) {
   const std::string text = "no picture";
   expect_refused(picture("in.png", {reinterpret_cast<const std::byte*>(text.data()),
                                     reinterpret_cast<const std::byte*>(text.data()) + text.size()}),
-                 {}, 1, "PNG, JPEG, TIFF, OpenEXR or PFM");
+                 {}, 1, "PNG, JPEG, TIFF, OpenEXR, PFM or PPM");
   expect_refused(picture("bright.pfm", pfm_of(grey(1e10F))), {"--luminance", "1e6"}, 2, "1e12 cd/m2");
 }
 

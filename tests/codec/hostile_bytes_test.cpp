@@ -9,6 +9,7 @@
 #include "isp/codec/jpeg.h"
 #include "isp/codec/pfm.h"
 #include "isp/codec/png.h"
+#include "isp/codec/ppm.h"
 #include "isp/codec/tiff.h"
 #include "tests/codec/pictures.h"
 
@@ -35,6 +36,17 @@ FileMetadata some_metadata() {
   return metadata;
 }
 
+Bytes deep_ppm() {
+  Bytes out;
+  for (const char c : std::string("P6 # 16 bits\n40 30\n65535\n")) out.push_back(static_cast<std::byte>(c));
+  const auto codes = test::noisy_codes<std::uint16_t>(40, 30);
+  for (std::size_t i = 0; i < codes.codes.size(); ++i) {
+    out.push_back(static_cast<std::byte>(codes.codes.data()[i] >> 8));
+    out.push_back(static_cast<std::byte>(codes.codes.data()[i] & 255));
+  }
+  return out;
+}
+
 std::vector<Format> formats() {
   static InlineExecutor executor;
   const auto codes = test::noisy_codes<std::uint8_t>(40, 30);
@@ -50,6 +62,7 @@ std::vector<Format> formats() {
        bytes([&](std::FILE* f) { return encode_tiff(deep, metadata, {TiffOptions::Compression::deflate}, f); })},
       {"tifff", decode_tiff,
        bytes([&](std::FILE* f) { return encode_tiff(floats, metadata, {TiffOptions::Compression::none}, f); })},
+      {"ppm", decode_ppm, deep_ppm()},
       {"pfm", decode_pfm, bytes([&](std::FILE* f) { return encode_pfm(linear, f); })},
       {"piz", decode_exr, bytes([&](std::FILE* f) {
          return encode_exr(linear, metadata, {ExrOptions::Depth::half, ExrOptions::Compression::piz}, f);

@@ -40,7 +40,7 @@ Parsed<ResaturateArgs> parse_resaturate(const std::vector<std::string>& words) {
       "better.",
       "lowlux resaturate");
   ResaturateArgs args;
-  app.add_option("IMAGE", args.input, "picture (PNG, JPEG, TIFF, OpenEXR, PFM)")->required();
+  app.add_option("IMAGE", args.input, "picture (PNG, JPEG, TIFF, OpenEXR, PFM, PPM)")->required();
   app.add_option("-o,--output", args.output, "picture to write (.png .jpg .tif .exr .pfm)")
       ->required()
       ->type_name("OUT");

@@ -35,7 +35,7 @@ Parsed<RetargetArgs> parse_retarget(const std::vector<std::string>& words) {
       "picture is given more.",
       "lowlux retarget");
   RetargetArgs args;
-  app.add_option("IMAGE", args.input, "picture (PNG, JPEG, TIFF, OpenEXR, PFM)")->required();
+  app.add_option("IMAGE", args.input, "picture (PNG, JPEG, TIFF, OpenEXR, PFM, PPM)")->required();
   app.add_option("-o,--output", args.output, "picture to write (.png .jpg .tif .exr .pfm)")
       ->required()
       ->type_name("OUT");

@@ -108,9 +108,10 @@ Wrong set_seed(const std::string& text, std::uint64_t& seed) {
 }
 
 void add_scene(CLI::App& app, SceneArgs& s) {
-  app.add_option("SCENE", s.what,
-                 "a picture (PNG, JPEG, TIFF, OpenEXR, PFM), or dark, flat, chart, chart:macbeth, chart:munsell, or "
-                 "chart:FILE.csv with reflectances by wavelength")
+  app.add_option(
+         "SCENE", s.what,
+         "a picture (PNG, JPEG, TIFF, OpenEXR, PFM, PPM), or dark, flat, chart, chart:macbeth, chart:munsell, or "
+         "chart:FILE.csv with reflectances by wavelength")
       ->type_name("");
   add_text(app, "--size", "WxH", "of a scene that is no picture (default 1200x800)",
            [&s](const std::string& text) { return set_size(text, s); });
