@@ -8,6 +8,7 @@
 
 #include "isp/bench/stages/denoise_bench.h"
 #include "isp/bench/stages/developing_stages.h"
+#include "isp/bench/stages/methods_bench.h"
 #include "isp/bench/stages/simulation_stages.h"
 
 namespace lowlux::isp {
@@ -32,6 +33,7 @@ constexpr std::array registry{
     BenchStage{"retarget", "Retargeting to a dim display, exact and by tables: error against time", run_retarget_bench},
     BenchStage{"develop", "Whole plans of develop: error against time", run_develop_bench},
     BenchStage{"merge", "Several raw frames merged to one: gain, noise and time of each way", run_merge_bench},
+    BenchStage{"methods", "Noise reduction by other programs, on the same raw frames: leaderboards", run_methods_bench},
     BenchStage{"scaling", "Developing over frame size and threads: time and memory", run_scaling_bench},
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "isp/base/image.h"
 #include "isp/base/result.h"
+#include "isp/bench/methods/method.h"
 #include "isp/bench/peers/nl_means.h"
 #include "isp/output/report/report.h"
 #include "isp/reproduce/bench_picture.h"
@@ -40,6 +42,12 @@ struct BenchComparison {
   std::string after_label;
 };
 
+/// A condition of the measurement, by name.
+struct BenchSetting {
+  std::string name;
+  std::string value;
+};
+
 /// Holds the results of one stage.
 struct BenchOutcome {
   BenchTable table;
@@ -48,7 +56,9 @@ struct BenchOutcome {
   std::vector<BenchImage> images;
   std::vector<std::string> remarks;  // how it was measured, and what was left out; one line each
   std::vector<BenchComparison> comparisons = {};
-  int threads = 1;  // number used by the timed work, where the table has no such column
+  int threads = 1;                          // number used by the timed work, where the table has no such column
+  std::vector<BenchSetting> settings = {};  // what is needed to repeat it, where the stage has options of its own
+  std::vector<Error> failures = {};         // parts of the work that failed, and are left out
 };
 
 struct BenchOptions {
@@ -58,6 +68,9 @@ struct BenchOptions {
   int threads = 1;                                                     // for all work that is not timed
   const NlMeans* nl_means = nullptr;                                   // compared method; absent: its row is left out
   std::string why_no_nl_means;                                         // reason why nl_means is absent
+  std::vector<ScoredMethod> methods;                                   // of the stage `methods`
+  CommandLimits command_limits;                                        // of each run of a method's command
+  std::uint64_t seed = 1;                                              // of the stage `methods`
   std::function<void(double share, const std::string& what)> advance;  // adds to the fraction done; from any thread
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
+#include <map>
 #include <set>
 #include <string>
 #include <string_view>
@@ -121,10 +122,45 @@ TEST(Bench, WithoutPicturesItSaysWhereTheyAre) {
   EXPECT_NE(empty.err.find(".png"), std::string::npos) << empty.err;
 }
 
+TEST(Bench, ProgramsAreScoredNextToOurLevels) {
+  const test::ScratchDirectory scratch;
+  const std::vector<std::string> words{
+      "--quick",           "--seed", "7", "--method", "copy=cp {in} {out}", "--method", "mute=: {in} {out.png}",
+      "--pictures-folder", pictures};
+  std::vector<std::string> with_output = words;
+  with_output.insert(with_output.end(), {"-o", scratch.file("board")});
+  const auto result = bench(with_output);
+  EXPECT_EQ(result.exit_code, 1);  // because one failed
+  EXPECT_NE(result.err.find("method mute: it wrote no clean.png"), std::string::npos) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  const auto json = nlohmann::json::parse(scratch.read("board/methods.json"));
+  std::map<std::string, double> psnr;
+  for (const auto& row : json["rows"]) psnr[row["method"]] = row["PSNR [dB]"].get<double>();
+  for (const char* level : {"lowlux-draft", "lowlux-standard", "lowlux-high", "lowlux-best"}) {
+    EXPECT_GT(psnr.at(level), psnr.at("copy") + 5) << level;  // dB; at 20 e-
+  }
+  EXPECT_EQ(psnr.size(), 7u);
+  EXPECT_EQ(json["settings"]["seed"], "7");
+  EXPECT_EQ(json["settings"]["method copy"], "cp {in} {out}");
+  EXPECT_NE(json["settings"]["command"].get<std::string>().find("'copy=cp {in} {out}'"), std::string::npos);
+  EXPECT_EQ(json["failures"].size(), 1u);
+  EXPECT_NE(scratch.read("board/bench.html").find("To repeat it"), std::string::npos);
+  EXPECT_NE(scratch.read("board/methods.csv").find("lowlux-best"), std::string::npos);
+}
+
 TEST(Bench, WrongCommandLinesExitWithTwo) {
-  const std::vector<std::vector<std::string>> wrong{
-      {"--stage", "zzz"}, {"--stage"}, {"--pictures", "none"}, {"--threads", "0"}, {"--threads", "x"},
-      {"denoise"},        {"-o"}};
+  const std::vector<std::vector<std::string>> wrong{{"--stage", "zzz"},
+                                                    {"--method", "dcrow"},
+                                                    {"--method", "a=p {in}"},
+                                                    {"--method", "a=p {in} {out}", "--method", "a=q {in} {out}"},
+                                                    {"--seed", "x"},
+                                                    {"--time-limit", "0"},
+                                                    {"--stage"},
+                                                    {"--pictures", "none"},
+                                                    {"--threads", "0"},
+                                                    {"--threads", "x"},
+                                                    {"denoise"},
+                                                    {"-o"}};
   for (const auto& args : wrong) {
     const auto result = bench(args);
     EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(args);

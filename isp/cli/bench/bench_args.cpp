@@ -17,9 +17,19 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
       ->type_name("ID[,ID...]")
       ->delimiter(',')
       ->allow_extra_args(false);
+  app.add_option("--method", args.methods,
+                 "program to score: NAME='PROGRAM {in} {out}', or a known one such as dcraw; repeatable")
+      ->type_name("NAME[=COMMAND]")
+      ->allow_extra_args(false);
+  app.add_option("--seed", args.seed, "of the scenes and noise of the stage methods (default: 1)")->type_name("N");
+  app.add_option("--time-limit", args.time_limit_s,
+                 "for each frame and program of the stage methods [s] (default: 120)")
+      ->check(CLI::Range(0.1, 86400.0))
+      ->type_name("S");
   app.add_flag("--calibrate-cost", args.calibrate_cost,
                "measure how fast this machine develops, for develop --budget-ms, and keep it; 2 to 5 minutes")
-      ->excludes("--stage");
+      ->excludes("--stage")
+      ->excludes("--method");
   app.add_flag("--list", args.list, "the stages, one line each");
   app.add_option("-o,--output", args.output,
                  "folder, made if need be, for the page bench.html, STAGE.csv, STAGE.json and parts of pictures (PNG)")

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,10 @@ struct BenchArgs {
   std::string output;               // folder for table, plots, images and the page; empty: none
   std::string pictures_folder;      // empty: next to the command
   isp::PictureSet pictures = isp::PictureSet::held_out;
-  int threads = 0;  // 0: one for each processor
+  std::vector<std::string> methods;  // NAME=COMMAND, or the name of a ready one
+  std::uint64_t seed = 1;            // of the stage `methods`
+  double time_limit_s = 120;         // of one run of a method
+  int threads = 0;                   // 0: one for each processor
   bool list = false;
   bool calibrate_cost = false;  // then nothing else is run
   bool quick = false;

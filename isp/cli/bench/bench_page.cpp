@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/cli/shared/report.h"
 #include "isp/output/picture/image_writer.h"
 
 namespace lowlux::cli {
@@ -131,6 +132,18 @@ isp::ReportSection remarks_part(const std::vector<std::string>& remarks) {
   return part;
 }
 
+isp::ReportSection failures_part(const std::vector<Error>& failures) {
+  isp::ReportSection part{.title = "What failed", .is_part = true};
+  for (const Error& error : failures) part.text += error_line(error.where, error) + "\n";
+  return part;
+}
+
+isp::ReportSection settings_part(const std::vector<isp::BenchSetting>& settings) {
+  isp::ReportSection part{.title = "To repeat it", .table = {{"what", "is"}, {}}, .is_part = true};
+  for (const isp::BenchSetting& setting : settings) part.table.rows.push_back({setting.name, setting.value});
+  return part;
+}
+
 Result<void> add_stage(const MeasuredStage& measured, Executor& executor, isp::Report& page) {
   const isp::BenchOutcome& outcome = measured.outcome;
   page.sections.push_back({.title = std::string(measured.stage.title)});
@@ -143,6 +156,8 @@ Result<void> add_stage(const MeasuredStage& measured, Executor& executor, isp::R
     page.sections.push_back(*std::move(pictures));
   }
   page.sections.push_back(measured_part(outcome.table));
+  if (!outcome.failures.empty()) page.sections.push_back(failures_part(outcome.failures));
+  if (!outcome.settings.empty()) page.sections.push_back(settings_part(outcome.settings));
   if (!outcome.findings.empty()) page.sections.push_back(findings_part(outcome.findings));
   if (!outcome.remarks.empty()) page.sections.push_back(remarks_part(outcome.remarks));
   return {};

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/cli/shared/findings.h"
+#include "isp/cli/shared/report.h"
 #include "isp/output/picture/image_writer.h"
 
 namespace lowlux::cli {
@@ -65,9 +66,14 @@ Json json_of(const MeasuredStage& measured, const Machine& machine) {
     for (std::size_t c = 0; c < cells.size(); ++c) row[measured.outcome.table.columns[c]] = json_of(cells[c]);
     rows.push_back(std::move(row));
   }
-  return {{"stage", measured.stage.id}, {"machine", json_of(machine)},
-          {"took_s", measured.took_s},  {"remarks", measured.outcome.remarks},
-          {"rows", std::move(rows)},    {"findings", Json::parse(findings_json(measured.outcome.findings))}};
+  Json out{{"stage", measured.stage.id}, {"machine", json_of(machine)},
+           {"took_s", measured.took_s},  {"remarks", measured.outcome.remarks},
+           {"rows", std::move(rows)},    {"findings", Json::parse(findings_json(measured.outcome.findings))}};
+  if (measured.outcome.settings.empty()) return out;
+  for (const isp::BenchSetting& setting : measured.outcome.settings) out["settings"][setting.name] = setting.value;
+  out["failures"] = Json::array();
+  for (const Error& error : measured.outcome.failures) out["failures"].push_back(error_line(error.where, error));
+  return out;
 }
 
 struct OutputFile {

@@ -1,14 +1,15 @@
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
-#include <filesystem>
-#include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "denoise/denoiser.h"
 #include "isp/bench/bench_stages.h"
 #include "isp/cli/bench/bench_args.h"
+#include "isp/cli/bench/bench_methods.h"
 #include "isp/cli/bench/bench_report.h"
+#include "isp/cli/bench/bench_work.h"
 #include "isp/cli/develop/cost_file.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
@@ -35,29 +36,27 @@ Result<std::vector<isp::BenchStage>> chosen(const std::vector<std::string>& ids)
   return out;
 }
 
-Result<std::string> existing_pictures_folder(const BenchArgs& args) {
-  const std::string folder = pictures_folder(args.pictures_folder);
-  std::error_code ignored;
-  if (std::filesystem::is_directory(folder, ignored)) return folder;
-  return fail(ErrorCode::not_found,
-              "there is no such folder of pictures: --pictures-folder names the testdata/pictures of lowlux's sources",
-              folder);
+/// Prints what failed within a stage, one line each.
+void print_failures(const std::vector<Error>& failures, Progress& progress) {
+  for (const Error& error : failures) {
+    progress.print([&] { print_err(fmt::format("{}\n", error_line(error.where, error))); });
+  }
 }
 
 /// Runs every stage; a failed stage is reported at once, and the others continue.
-std::vector<MeasuredStage> run_each(const std::vector<isp::BenchStage>& stages, const isp::BenchOptions& options) {
+std::vector<MeasuredStage> run_each(const std::vector<isp::BenchStage>& stages, const isp::BenchOptions& options,
+                                    const std::string& call) {
   std::vector<MeasuredStage> out;
   Progress progress(static_cast<int>(stages.size()), true);
   for (const isp::BenchStage& stage : stages) {
     isp::BenchOptions with = options;
     with.advance = [&progress](double share, const std::string& what) { progress.advance(share, what); };
-    const auto start = std::chrono::steady_clock::now();
-    auto outcome = stage.run(with);
-    if (outcome) {
-      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-      out.push_back({stage, *std::move(outcome), took.count()});
+    auto done = measure_stage(stage, with, call);
+    if (done) {
+      print_failures(done->outcome.failures, progress);
+      out.push_back(*std::move(done));
     } else {
-      const Error& error = outcome.error();
+      const Error& error = done.error();
       const std::string where = error.where.empty() ? std::string(stage.id) : error.where;
       progress.print([&] { print_err(fmt::format("{}\n", error_line(where, error))); });
     }
@@ -65,16 +64,33 @@ std::vector<MeasuredStage> run_each(const std::vector<isp::BenchStage>& stages, 
   return out;
 }
 
-isp::BenchOptions options_of(const BenchArgs& args, const std::string& folder) {
-  isp::BenchOptions options{.pictures_folder = folder, .pictures = args.pictures, .quick = args.quick};
-  options.threads =
-      args.threads > 0 ? args.threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+/// Returns own levels and the methods asked for; those that are not installed are reported.
+Result<std::vector<isp::ScoredMethod>> all_methods(const BenchArgs& args) {
+  auto requested = requested_methods(args.methods);
+  if (!requested) return tl::make_unexpected(requested.error());
+  auto methods = own_methods();
+  if (!methods) return methods;
+  for (isp::ScoredMethod& method : requested->methods) methods->push_back(std::move(method));
+  if (const auto good = check_method_names(*methods); !good) return tl::make_unexpected(good.error());
+  for (const Error& error : requested->not_installed) print_err(fmt::format("{}\n", error_line(error.where, error)));
+  return methods;
+}
+
+/// Returns the command line that repeats a run.
+std::string command_line(const std::vector<std::string>& words) {
+  std::string out = "lowlux bench";
+  for (const std::string& word : words) out += ' ' + isp::shell_word(word);
+  return out;
+}
+
+/// Adds the methods and OpenCV's module, or why it is missing.
+void add_methods(std::vector<isp::ScoredMethod> methods, isp::BenchOptions& options) {
+  options.methods = std::move(methods);
   if (const auto nl_means = load_nl_means()) {
     options.nl_means = *nl_means;
   } else {
     options.why_no_nl_means = nl_means.error().message;
   }
-  return options;
 }
 
 /// Prints the times of each part for a frame of 12 MP.
@@ -110,21 +126,28 @@ int run_bench(const std::vector<std::string>& words) {
     return exit_done;
   }
   if (args.calibrate_cost) return run_calibrate_cost(args);
-  const auto stages = chosen(args.stages);
+  const bool methods_alone = args.stages.empty() && !args.methods.empty();
+  const auto stages = chosen(methods_alone ? std::vector<std::string>{"methods"} : args.stages);
   if (!stages) return print_usage_error("bench", stages.error());
-  const auto folder = existing_pictures_folder(args);
-  if (!folder) return print_failure(folder.error());
+  auto methods = all_methods(args);
+  if (!methods) return print_usage_error("bench", methods.error());
+  auto options = bench_options(args);
+  if (!options) return print_failure(options.error());
   if (const auto free = check_bench_files(*stages, args); !free) return print_failure(free.error());
-  const isp::BenchOptions options = options_of(args, *folder);
-  const std::vector<MeasuredStage> measured = run_each(*stages, options);
-  const Machine machine = this_machine(options.threads);
+  const std::size_t not_installed = args.methods.size() + denoise::all_levels.size() - methods->size();
+  add_methods(*std::move(methods), *options);
+  const std::vector<MeasuredStage> measured = run_each(*stages, *options, command_line(words));
+  const bool all_done =
+      measured.size() == stages->size() && not_installed == 0 &&
+      std::ranges::all_of(measured, [](const MeasuredStage& m) { return m.outcome.failures.empty(); });
+  const Machine machine = this_machine(options->threads);
   if (args.json) {
     print_out(fmt::format("{}\n", bench_json(measured, machine)));
   } else {
     for (const MeasuredStage& stage : measured) print_out(fmt::format("{}", bench_text(stage)));
   }
   if (!args.output.empty() && !measured.empty()) {
-    PoolExecutor executor(options.threads);
+    PoolExecutor executor(options->threads);
     const auto written = write_bench_files(measured, machine, args, executor);
     if (!written) return print_failure(written.error());
     if (!args.json) print_out("\nwritten:\n");
@@ -133,7 +156,7 @@ int run_bench(const std::vector<std::string>& words) {
     }
   }
   if (!args.json && !measured.empty()) print_out(fmt::format("\n{}\n", time_text(measured)));
-  return measured.size() == stages->size() ? exit_done : exit_failed;
+  return all_done ? exit_done : exit_failed;
 }
 
 }  // namespace lowlux::cli

@@ -1,0 +1,202 @@
+#include "isp/bench/stages/methods_bench.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isp/bench/methods/method_frame.h"
+#include "isp/bench/methods/method_scenes.h"
+#include "isp/bench/stages/method_rows.h"
+#include "isp/bench/stages/methods_report.h"
+
+namespace lowlux::isp {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr std::uint64_t seed_step = 1000003;  // seeds of frames differ between seeds of the bench
+
+/// One frame that all methods are given.
+struct Frame {
+  const MethodScene& scene;
+  const PictureTruth& truth;
+  DenoiseShot shot;
+  double megapixels = 0;
+};
+
+/// Sums of one method in one light.
+class Sums {
+ public:
+  void add(const MethodScore& score, const CommandUse& use, double megapixels) {
+    const auto add_to = [this](double& sum, double value) { sum += value / scenes_; };
+    PictureError& error = score_.error;
+    add_to(error.psnr_db, score.error.psnr_db);
+    add_to(error.ciede2000, score.error.ciede2000);
+    add_to(error.box_chroma_rmse, score.error.box_chroma_rmse);
+    add_to(score_.chroma_bias, score.chroma_bias);
+    add_to(score_.texture_kept, score.texture_kept);
+    saturation_.add(score.error.saturation_ratio);
+    stars_.add(score.stars_kept);
+    wall_s_ += use.wall_s;
+    cpu_s_ += use.cpu_s;
+    peak_bytes_ = std::isnan(use.peak_bytes) ? nan : std::max(peak_bytes_, use.peak_bytes);
+    megapixels_ += megapixels;
+  }
+  explicit Sums(std::size_t scenes) : scenes_(static_cast<double>(scenes)) {}
+
+  /// @param run_as  empty: nothing was run, and there are no times
+  MethodRow row(const std::string& light, const std::string& method, const std::string& run_as) const {
+    MethodRow out{.light = light, .method = method, .run_as = run_as, .score = score_};
+    out.score.error.saturation_ratio = saturation_.mean();
+    out.score.stars_kept = stars_.mean();
+    const bool was_run = !run_as.empty();
+    out.ms_per_mp = was_run ? 1e3 * wall_s_ / megapixels_ : nan;
+    out.cpu_ms_per_mp = was_run ? 1e3 * cpu_s_ / megapixels_ : nan;
+    out.peak_mib = was_run ? peak_bytes_ / (1 << 20) : nan;
+    return out;
+  }
+
+ private:
+  /// Mean of the values that are numbers.
+  struct Mean {
+    double sum = 0;
+    int count = 0;
+    void add(double value) {
+      if (!std::isfinite(value)) return;
+      sum += value;
+      ++count;
+    }
+    double mean() const { return count > 0 ? sum / count : nan; }
+  };
+
+  double scenes_;
+  MethodScore score_{};
+  Mean saturation_, stars_;
+  double wall_s_ = 0, cpu_s_ = 0, peak_bytes_ = 0, megapixels_ = 0;
+};
+
+class Bench {
+ public:
+  Bench(std::vector<MethodScene> scenes, const BenchOptions& options)
+      : options_(options), scenes_(std::move(scenes)), executor_(options.threads) {
+    int width = 0;
+    truths_.reserve(scenes_.size());
+    for (const MethodScene& scene : scenes_) {
+      width = std::max(width, scene.picture.linear.width());
+      truths_.emplace_back(scene.picture.linear.view(), executor_);
+    }
+    renderer_.emplace(width, executor_);
+  }
+
+  void run(const DenoiseLight& light) {
+    const std::string name = lowlux::isp::name_of(light);
+    Sums ceiling(scenes_.size()), noisy(scenes_.size());
+    std::map<std::string, Sums> sums;
+    for (std::size_t i = 0; i < scenes_.size(); ++i) {
+      const MethodScene& scene = scenes_[i];
+      Frame frame{scene, truths_[i], take(scene.picture, light, frame_seed(i, light)),
+                  1e-6 * static_cast<double>(scene.picture.linear.plane[0].size())};
+      ceiling.add(score(frame, renderer_->render(frame.shot.signal_e.view(), frame.shot, NoiseLeft::none)), {}, 1);
+      const MethodImage given(noisy_frame(frame.shot));
+      const auto& raw = std::get<RawFrame>(given);
+      if (auto seen = rendered(given, frame.shot, scene.picture.linear, *renderer_)) {
+        noisy.add(score(frame, *seen), {}, 1);
+        keep_part(name, i, name_of_noisy, *seen);
+      }
+      for (const ScoredMethod& method : options_.methods) {
+        run(method, raw, frame, name, i, sums.try_emplace(method.name, scenes_.size()).first->second);
+        options_.advance(1.0 / work_items(), method.name + " at " + name);
+      }
+    }
+    rows_.push_back(ceiling.row(name, name_of_noise_free, ""));
+    rows_.push_back(noisy.row(name, name_of_noisy, ""));
+    for (const ScoredMethod& method : options_.methods) {
+      if (failed_.contains(method.name)) continue;
+      const char* const run_as = method.command.empty() ? "function" : "program";
+      rows_.push_back(sums.at(method.name).row(name, method.name, run_as));
+    }
+  }
+
+  BenchOutcome outcome(const std::vector<DenoiseLight>& lights) {
+    std::erase_if(rows_, [this](const MethodRow& row) { return failed_.contains(row.method); });
+    std::erase_if(parts_, [this](const MethodPart& part) { return failed_.contains(part.method); });
+    rank_methods(rows_);
+    BenchOutcome out = methods_outcome(rows_, std::move(parts_));
+    out.failures = std::move(failures_);
+    out.settings = methods_settings(options_, scenes_, lights);
+    return out;
+  }
+
+  void set_lights(std::size_t count) { lights_ = count; }
+
+ private:
+  double work_items() const {
+    return static_cast<double>(std::max<std::size_t>(1, options_.methods.size()) * scenes_.size() * lights_);
+  }
+  std::uint64_t frame_seed(std::size_t scene, const DenoiseLight& light) const {
+    return seed_step * options_.seed + 1000 * scene + static_cast<std::uint64_t>(light.mean_e);
+  }
+  MethodScore score(const Frame& frame, const RenderedPicture& picture) {
+    return score_of(picture, frame.truth, frame.scene, executor_);
+  }
+
+  /// Runs one method on one frame, unless it has failed before.
+  void run(const ScoredMethod& method, const RawFrame& raw, const Frame& frame, const std::string& light,
+           std::size_t scene, Sums& sums) {
+    if (failed_.contains(method.name)) return;
+    auto done = run_method(method, raw, options_.command_limits, executor_);
+    auto picture = done ? rendered(done->image, frame.shot, frame.scene.picture.linear, *renderer_)
+                        : Result<RenderedPicture>(tl::make_unexpected(done.error()));
+    if (!picture) {
+      failed_.insert(method.name);
+      failures_.push_back({picture.error().code,
+                           fmt::format("{} (scene {}, {} e-); it is left out", picture.error().message,
+                                       frame.scene.picture.name, light),
+                           "method " + method.name});
+      return;
+    }
+    sums.add(score(frame, *picture), done->use, frame.megapixels);
+    keep_part(light, scene, method.name, *picture);
+  }
+
+  void keep_part(const std::string& light, std::size_t scene, const std::string& method,
+                 const RenderedPicture& picture) {
+    if (light == shown_light() && scene == 0) parts_.push_back({method, middle_codes(picture.display)});
+  }
+  static std::string shown_light() { return lowlux::isp::name_of(methods_lights(true).front()); }
+
+  const BenchOptions& options_;
+  std::vector<MethodScene> scenes_;
+  PoolExecutor executor_;
+  std::vector<PictureTruth> truths_;
+  std::optional<BenchRenderer> renderer_;
+  std::size_t lights_ = 1;
+  std::vector<MethodRow> rows_;
+  std::vector<MethodPart> parts_;
+  std::set<std::string> failed_;
+  std::vector<Error> failures_;
+};
+
+constexpr SceneSize whole_size{512, 384}, quick_size{256, 256};
+
+}  // namespace
+
+Result<BenchOutcome> run_methods_bench(const BenchOptions& options) {
+  PoolExecutor executor(options.threads);
+  const SceneSize size = options.quick ? quick_size : whole_size;
+  const auto files = options.quick ? quick_files_of(options.pictures) : files_of(options.pictures);
+  auto scenes = method_scenes(options.pictures_folder, files, size, options.seed, executor);
+  if (!scenes) return tl::make_unexpected(scenes.error());
+  Bench bench(*std::move(scenes), options);
+  const std::vector<DenoiseLight> lights = methods_lights(options.quick);
+  bench.set_lights(lights.size());
+  for (const DenoiseLight& light : lights) bench.run(light);
+  return bench.outcome(lights);
+}
+
+}  // namespace lowlux::isp
