@@ -1,6 +1,7 @@
 #include <pybind11/pybind11.h>
 
 #include "isp/cli/shared/machine.h"
+#include "isp/python/bench.h"
 #include "isp/python/develop.h"
 #include "isp/python/failure.h"
 #include "isp/python/raw_image.h"
@@ -17,4 +18,5 @@ PYBIND11_MODULE(_lowlux, module) {
   lowlux::python::add_develop(module);
   lowlux::python::add_simulate(module);
   lowlux::python::add_calibrate(module);
+  lowlux::python::add_bench(module);
 }

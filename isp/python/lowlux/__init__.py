@@ -4,6 +4,7 @@ Functions are the verbs of the `lowlux` command, with the same options, defaults
 All work runs without Python's global lock, so that threads run at once.
 """
 from ._lowlux import RawImage, __version__
+from ._bench import Leaderboard, bench
 from ._calibrate import Profile, calibrate
 from ._raw import ImageSizes, raw_from_array, read_raw, write_dng
 from ._simulate import Simulated, compare, simulate
@@ -12,8 +13,8 @@ from .errors import (ArgumentError, Error, ExistsError, InsufficientError, Malfo
                      UnreadableError, UnsupportedError, UnwritableError)
 
 __all__ = [
-    "ArgumentError", "Denoised", "Developed", "Error", "ExistsError", "ImageSizes", "InsufficientError", "MalformedError",
-    "Merged", "NotFoundError", "Profile", "RawImage", "Simulated", "TooLargeError", "UnreadableError", "UnsupportedError",
-    "UnwritableError", "__version__", "calibrate", "compare", "denoise", "develop", "merge", "raw_from_array", "read_raw",
-    "simulate", "write_dng",
+    "ArgumentError", "Denoised", "Developed", "Error", "ExistsError", "ImageSizes", "InsufficientError", "Leaderboard",
+    "MalformedError", "Merged", "NotFoundError", "Profile", "RawImage", "Simulated", "TooLargeError", "UnreadableError",
+    "UnsupportedError", "UnwritableError", "__version__", "bench", "calibrate", "compare", "denoise", "develop",
+    "merge", "raw_from_array", "read_raw", "simulate", "write_dng",
 ]

@@ -1,6 +1,6 @@
 """Types of lowlux. Units, shapes and errors are in the docstrings of the functions."""
 import os
-from typing import Any, Dict, List, Literal, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, List, Literal, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -117,6 +117,13 @@ class Simulated:
     motion: Optional[Dict[str, Any]]
     report: Dict[str, Any]
     warnings: List[str]
+
+
+class Leaderboard:
+    rows: List[Dict[str, Any]]
+    settings: Dict[str, str]
+    machine: Dict[str, Any]
+    failures: List[str]
 
 
 class Profile:
@@ -326,6 +333,20 @@ def simulate(
 ) -> Simulated: ...
 
 def compare(reference: Union[_Path, npt.NDArray[Any]], test: Union[_Path, npt.NDArray[Any]]) -> Dict[str, Any]: ...
+
+def bench(
+    methods: Optional[Mapping[str, Union[str, Callable[[RawImage], Any], None]]] = ...,
+    output: Optional[_Path] = ...,
+    *,
+    overwrite: bool = ...,
+    levels: Sequence[Literal["draft", "standard", "high", "best"]] = ...,
+    seed: Optional[int] = ...,
+    quick: bool = ...,
+    pictures: Optional[Literal["held-out", "tuning", "all"]] = ...,
+    pictures_folder: Optional[_Path] = ...,
+    threads: Optional[int] = ...,
+    time_limit: Optional[float] = ...,
+) -> Leaderboard: ...
 
 def calibrate(
     kind: Literal["black", "colour", "noise", "quoted"],
