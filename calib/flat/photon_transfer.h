@@ -22,9 +22,9 @@ struct Saturation {
 };
 
 /// Results for one gain setting by the photon transfer method of EMVA 1288 (release 4.0 linear): a part of its data
-/// sheet. Irradiance is not measured, so that quantum efficiency, sensitivity threshold, dynamic range and maximum SNR
-/// are left out; so are the row, column and pixel parts of PRNU and DSNU, spectrograms and histograms. Standard errors
-/// are those of the fit, multiplied by sqrt(reduced chi square) where that exceeds 1.
+/// sheet. data_sheet.h computes the rest of it: quantum efficiency, sensitivity threshold, dynamic range, maximum SNR,
+/// dark current, and the row, column and pixel parts of PRNU and DSNU. Standard errors are those of the fit, multiplied
+/// by sqrt(reduced chi square) where that exceeds 1.
 struct PhotonTransfer {
   Estimate system_gain_dn_per_e;              // K: one for all sites
   PerSite<Estimate> gain_of_site_dn_per_e{};  // each site fitted alone: should agree with K

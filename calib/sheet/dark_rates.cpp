@@ -1,0 +1,132 @@
+#include "calib/sheet/dark_rates.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lowlux::calib {
+namespace {
+
+/// Mean of a plane and the standard error that its scatter gives it.
+Estimate mean_of(const Plane<float>& plane) {
+  double sum = 0, squares = 0;
+  const auto n = static_cast<double>(plane.size());
+  for (std::size_t i = 0; i < plane.size(); ++i) sum += static_cast<double>(plane.data()[i]);
+  const double mean = sum / n;
+  for (std::size_t i = 0; i < plane.size(); ++i) {
+    const double off = static_cast<double>(plane.data()[i]) - mean;
+    squares += off * off;
+  }
+  return {mean, std::sqrt(squares / n / (n - 1))};
+}
+
+double mean_row_variance(const DarkGroup& group) {
+  double sum = 0;
+  for (const double site : group.row_variance_dn2) sum += std::max(0.0, site) / 4;
+  return sum;
+}
+
+/// Adds the noise of whole rows, two sites of which share each row.
+Estimate with_rows(const Estimate& mean, double row_variance, double rows, double frames) {
+  return {mean.value, std::hypot(mean.standard_error, std::sqrt(row_variance / (rows * frames)))};
+}
+
+/// Returns the slope of a line by weighted least squares.
+Estimate slope_of(const std::vector<double>& x, const std::vector<Estimate>& y) {
+  double weight = 0, mean_x = 0, mean_y = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double w = 1 / (y[i].standard_error * y[i].standard_error);
+    weight += w;
+    mean_x += w * x[i];
+    mean_y += w * y[i].value;
+  }
+  mean_x /= weight;
+  mean_y /= weight;
+  double xx = 0, xy = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double w = 1 / (y[i].standard_error * y[i].standard_error);
+    xx += w * (x[i] - mean_x) * (x[i] - mean_x);
+    xy += w * (x[i] - mean_x) * (y[i].value - mean_y);
+  }
+  return {xy / xx, 1 / std::sqrt(xx)};
+}
+
+/// Divides by a power of the gain.
+Estimate over_gain(const Estimate& slope, const Estimate& gain, int power) {
+  const double unit = std::pow(gain.value, power), value = slope.value / unit;
+  return {value, std::hypot(slope.standard_error / unit, power * value * gain.standard_error / gain.value)};
+}
+
+DarkRate rate_of(std::span<const DarkGroup* const> groups, const Estimate& gain) {
+  constexpr double least_error_dn = 1e-9;  // frames without any noise
+  std::vector<double> time_s;
+  std::vector<Estimate> mean_dn, variance_dn2;
+  for (const DarkGroup* group : groups) {
+    const double rows = group->mean_dn.height(), frames = group->frames, row_variance = mean_row_variance(*group);
+    time_s.push_back(*group->setting.exposure_s);
+    mean_dn.push_back(with_rows(mean_of(group->mean_dn), row_variance, rows, frames));
+    variance_dn2.push_back(mean_of(group->variance_dn2));
+    // Row noise scatters the variances of whole rows together.
+    variance_dn2.back().standard_error =
+        std::hypot(variance_dn2.back().standard_error, row_variance * std::sqrt(2 / (rows * (frames - 1))));
+    for (Estimate* e : {&mean_dn.back(), &variance_dn2.back()}) {
+      e->standard_error = std::max(e->standard_error, least_error_dn);
+    }
+  }
+  return {groups.front()->setting.temperature_c, over_gain(slope_of(time_s, mean_dn), gain, 1),
+          over_gain(slope_of(time_s, variance_dn2), gain, 2), static_cast<int>(groups.size())};
+}
+
+bool same_temperature(const DarkGroup& a, const DarkGroup& b) {
+  const auto &first = a.setting.temperature_c, &second = b.setting.temperature_c;
+  if (!first || !second) return first.has_value() == second.has_value();
+  return std::fabs(*first - *second) <= same_temperature_c;
+}
+
+std::optional<Estimate> doubling_of(std::span<const DarkRate> rates) {
+  std::vector<double> temperature_c;
+  std::vector<Estimate> log2_rate;
+  for (const DarkRate& rate : rates) {
+    const Estimate& current = rate.by_mean_e_per_s;
+    if (!rate.temperature_c || !(current.value > 0)) return std::nullopt;
+    temperature_c.push_back(*rate.temperature_c);
+    log2_rate.push_back({std::log2(current.value), current.standard_error / current.value / std::log(2.0)});
+  }
+  if (rates.size() < 2) return std::nullopt;
+  const Estimate slope = slope_of(temperature_c, log2_rate);
+  if (!(slope.value > 0)) return std::nullopt;
+  return Estimate{1 / slope.value, slope.standard_error / (slope.value * slope.value)};
+}
+
+}  // namespace
+
+Result<DarkRates> dark_rates(std::span<const DarkGroup> groups, const Estimate& gain_dn_per_e) {
+  std::vector<const DarkGroup*> left;
+  for (const DarkGroup& group : groups) {
+    if (const auto known = check_noise_is_known(group); !known) return tl::make_unexpected(known.error());
+    if (const auto same = check_same_camera(groups.front().setting, group.setting, "a group of darks"); !same) {
+      return tl::make_unexpected(same.error());
+    }
+    if (group.setting.exposure_s) left.push_back(&group);
+  }
+  std::ranges::stable_sort(
+      left, [](const DarkGroup* a, const DarkGroup* b) { return a->setting.temperature_c < b->setting.temperature_c; });
+  DarkRates out;
+  for (auto first = left.begin(); first != left.end();) {
+    const auto last =
+        std::find_if(first, left.end(), [&](const DarkGroup* g) { return !same_temperature(**first, *g); });
+    const std::span<const DarkGroup* const> these(first, last);
+    const auto [least, most] =
+        std::ranges::minmax_element(these, {}, [](const DarkGroup* g) { return *g->setting.exposure_s; });
+    if (*(*least)->setting.exposure_s < *(*most)->setting.exposure_s)
+      out.rates.push_back(rate_of(these, gain_dn_per_e));
+    first = last;
+  }
+  if (out.rates.empty()) {
+    return fail(ErrorCode::insufficient,
+                "no two exposure times of darks at one temperature: dark current is not known");
+  }
+  out.doubling_c = doubling_of(out.rates);
+  return out;
+}
+
+}  // namespace lowlux::calib

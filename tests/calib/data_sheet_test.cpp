@@ -1,0 +1,218 @@
+#include "calib/sheet/data_sheet.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "calib/sheet/pattern_plots.h"
+#include "tests/sensor_bench/sensor_bench.h"
+
+namespace lowlux::calib {
+namespace {
+
+using test::SensorBench;
+
+constexpr std::uint64_t first_seed = 20261129;
+constexpr int stack_frames = 8;
+constexpr double efficiency = 0.6;  // of green
+constexpr double dark_times_s[] = {1, 4, 10};
+constexpr double dark_temperatures_c[] = {20, 32};
+constexpr double levels[] = {0.01, 0.03, 0.08, 0.15, 0.25, 0.35, 0.45, 0.52, 0.57, 0.62,
+                             0.66, 0.8,  0.9,  0.95, 1,    1.05, 1.1,  1.2,  1.35, 1.5};
+
+SensorModel drawn_sensor(std::mt19937_64& random) {
+  const auto draw = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  SensorModel out{.name = "drawn",
+                  .system_gain_dn_per_e = draw(0.4, 2),
+                  .read_noise_e = draw(1.5, 6),
+                  .bits = 16,
+                  .black_level_dn = draw(200, 600),
+                  .white_level_dn = 65535,
+                  .dark_temperature_c = 20,
+                  .dark_doubling_c = draw(5, 9),
+                  .prnu = draw(0.004, 0.02),
+                  .dsnu = draw(0.1, 0.28),  // no pixel at 0
+                  .row_noise_e = draw(0, 1),
+                  .column_noise_e = draw(0.3, 2)};
+  out.full_well_e = draw(8000, 25000);
+  out.dark_current_e_per_s.fill(draw(2, 6));
+  return out;
+}
+
+/// Adds frames to a stack. @param first  index of the first frame: noise of its own
+DarkGroup stack_of(const SensorBench& bench, const isp::Exposure& exposure, std::uint32_t first) {
+  DarkStack stack;
+  for (std::uint32_t i = 0; i < stack_frames; ++i) EXPECT_TRUE(stack.add(bench.frame(exposure, first + i)));
+  return *stack.group();
+}
+
+PairStatistics pair_at(const SensorBench& bench, const isp::Exposure& exposure, std::uint32_t first) {
+  return *measure_pair(bench.frame(exposure, first), bench.frame(exposure, first + 1));
+}
+
+Irradiance irradiance_of(double rate_e_per_s) {
+  Irradiance one{.w_per_m2 = 1, .wavelength_nm = 550, .pixel_um2 = 9};
+  one.w_per_m2 = rate_e_per_s / efficiency / photons_of(one, 1);
+  return one;
+}
+
+SheetFrames shoot(SensorBench bench) {
+  SheetFrames out;
+  std::uint32_t frame = 0;
+  for (const double temperature_c : dark_temperatures_c) {
+    for (const double time_s : dark_times_s) {
+      out.darks.push_back(stack_of(bench, {time_s, temperature_c}, frame));
+      frame += stack_frames;
+    }
+  }
+  for (int i = 0; i < 4; ++i, frame += 2) out.dark_pairs.push_back(pair_at(bench, {1, 20}, frame));
+  const double fill = isp::saturation_charge_e(bench.sensor);
+  bench.rate_e_per_s = {0.75 * fill, fill, 0.9 * fill};
+  out.irradiance = irradiance_of(fill);
+  for (const double level : levels) {
+    for (int i = 0; i < 2; ++i, frame += 2) out.flat_pairs.push_back(pair_at(bench, {level, 20}, frame));
+  }
+  out.bright = stack_of(bench, {0.5, 20}, frame);
+  return out;
+}
+
+void expect_near(const char* what, const Estimate& found, double truth) {
+  EXPECT_GT(found.standard_error, 0) << what;
+  EXPECT_NEAR(found.value, truth, 5 * found.standard_error) << what;
+}
+
+/// Near 0 the square of a root is what is normal.
+void expect_root(const char* what, const Estimate& found, double truth) {
+  const double error = std::max(2 * found.value * found.standard_error, found.standard_error * found.standard_error);
+  EXPECT_GT(error, 0) << what;
+  EXPECT_NEAR(found.value * found.value, truth * truth, 5 * error) << what;
+}
+
+TEST(DataSheet, FiguresOfRandomSensorsReturnWithinTheirStandardErrors) {
+  std::mt19937_64 random(first_seed);
+  for (int round = 0; round < 5; ++round) {
+    const SensorModel truth = drawn_sensor(random);
+    const SensorBench bench{.sensor = truth, .width = 256, .height = 192, .seed = random()};
+    SCOPED_TRACE(testing::Message() << "round " << round << ", seed " << bench.seed);
+    const SheetFrames frames = shoot(bench);
+    const auto sheet = make_data_sheet(frames);
+    ASSERT_TRUE(sheet) << sheet.error().message;
+    const double current = truth.dark_current_e_per_s[0];
+    const double dark_variance =
+        truth.read_noise_e * truth.read_noise_e + truth.row_noise_e * truth.row_noise_e + current;
+    const double gain = truth.system_gain_dn_per_e;
+    expect_near("gain", sheet->transfer.system_gain_dn_per_e, gain);
+    expect_near("read noise", *sheet->transfer.read_noise_e, std::sqrt(dark_variance));
+    expect_near("threshold", *sheet->threshold_e, std::sqrt(dark_variance + 1 / (12 * gain * gain) + 0.25) + 0.5);
+    EXPECT_DOUBLE_EQ(sheet->snr_max->value, std::sqrt(sheet->saturation_e->value));
+    EXPECT_DOUBLE_EQ(sheet->dynamic_range->value, sheet->saturation_e->value / sheet->threshold_e->value);
+    // The variance is largest at one of the levels, which are 5 to 20 % apart.
+    EXPECT_NEAR(sheet->saturation_e->value, isp::saturation_charge_e(truth), 0.12 * isp::saturation_charge_e(truth));
+    expect_root("DSNU of rows", sheet->dsnu_e.row, 0);
+    expect_root("DSNU of columns", sheet->dsnu_e.column, truth.column_noise_e);
+    expect_root("DSNU of pixels", sheet->dsnu_e.pixel, truth.dsnu * current);
+    expect_root("DSNU", sheet->dsnu_e.total, std::hypot(truth.column_noise_e, truth.dsnu * current));
+    expect_root("PRNU of rows", sheet->prnu->row, 0);
+    expect_root("PRNU of columns", sheet->prnu->column, 0);
+    expect_root("PRNU of pixels", sheet->prnu->pixel, truth.prnu);
+    ASSERT_TRUE(sheet->dark_rates);
+    ASSERT_EQ(sheet->dark_rates->rates.size(), 2u);
+    for (const DarkRate& rate : sheet->dark_rates->rates) {
+      const double expected = current * std::exp2((*rate.temperature_c - 20) / truth.dark_doubling_c);
+      expect_near("dark current by mean", rate.by_mean_e_per_s, expected);
+      expect_near("dark current by variance", rate.by_variance_e_per_s, expected);
+      EXPECT_EQ(rate.exposures, 3);
+    }
+    expect_near("doubling", *sheet->dark_rates->doubling_c, truth.dark_doubling_c);
+    for (std::size_t c = 0; c < 3; ++c) {
+      expect_near("quantum efficiency", (*sheet->quantum_efficiency)[c], efficiency * std::array{0.75, 1.0, 0.9}[c]);
+    }
+    EXPECT_LT(*sheet->transfer.linearity_error, 0.02);
+  }
+}
+
+TEST(DataSheet, FiguresThatTheFramesDoNotDetermineAreAbsent) {
+  std::mt19937_64 random(first_seed);
+  SheetFrames frames = shoot({.sensor = drawn_sensor(random), .width = 128, .height = 128});
+  frames.darks.resize(1);
+  frames.bright.reset();
+  frames.irradiance.reset();
+  const auto sheet = make_data_sheet(frames);
+  ASSERT_TRUE(sheet) << sheet.error().message;
+  EXPECT_FALSE(sheet->dark_rates || sheet->prnu || sheet->quantum_efficiency || sheet->transfer.linearity_error);
+}
+
+TEST(DataSheet, PhotonsAreThoseOfEmvasEquation) {
+  // EMVA 1288 R4 Eq. 4: 50.34 A[um2] t[ms] lambda[um] E[uW/cm2].
+  EXPECT_NEAR(photons_of({.w_per_m2 = 0.01, .wavelength_nm = 1000, .pixel_um2 = 1}, 1e-3), 50.34, 0.005);
+}
+
+TEST(SpatialParts, RowsColumnsAndPixelsAreSeparated) {
+  std::mt19937_64 random(first_seed);
+  for (int round = 0; round < 8; ++round) {
+    const double row = 3.0 * (round % 2), column = 2.0 * (round / 2 % 2), pixel = 1.0 + round / 4;
+    SCOPED_TRACE(testing::Message() << "row " << row << ", column " << column << ", pixel " << pixel);
+    std::normal_distribution<double> normal;
+    DarkGroup group{.frames = 4, .mean_dn = Plane<float>(200, 160), .variance_dn2 = Plane<float>(200, 160)};
+    std::fill_n(group.variance_dn2.data(), group.variance_dn2.size(), 0.0F);
+    std::vector<double> of_row(160), of_column(200);
+    for (double& r : of_row) r = row * normal(random);
+    for (double& c : of_column) c = column * normal(random);
+    for (int y = 0; y < 160; ++y) {
+      for (int x = 0; x < 200; ++x) {
+        group.mean_dn.at(x, y) = static_cast<float>(100 + of_row[static_cast<std::size_t>(y)] +
+                                                    of_column[static_cast<std::size_t>(x)] + pixel * normal(random));
+      }
+    }
+    const auto parts = spatial_parts(group);
+    ASSERT_TRUE(parts);
+    for (const SpatialParts& site : *parts) {
+      expect_near("row", site.row_dn2, row * row);
+      expect_near("column", site.column_dn2, column * column);
+      expect_near("pixel", site.pixel_dn2, pixel * pixel);
+    }
+  }
+}
+
+TEST(PatternPlots, AWaveHasItsPowerAtItsFrequencyAndNoiseEverywhere) {
+  constexpr int width = 300, height = 64, cycles = 16;  // in 256 pixels
+  std::mt19937_64 random(first_seed);
+  std::normal_distribution<double> noise(0, 2);
+  Plane<float> wave(width, height);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      wave.at(x, y) = static_cast<float>(5 * std::sin(2 * std::numbers::pi * cycles * x / 256.0) + noise(random));
+    }
+  }
+  const auto rows = spectrogram(wave, Direction::along_rows), columns = spectrogram(wave, Direction::along_columns);
+  ASSERT_EQ(rows.size(), 129u);
+  ASSERT_EQ(columns.size(), 33u);
+  // A sine of amplitude a has the power a^2 n / 4; noise of variance s^2 that of s^2, by 64 rows within s^2 / 8.
+  EXPECT_NEAR(rows[cycles] * rows[cycles], 25 * 256 / 4.0 + 4, 5 * 2 * std::sqrt(25 * 256 / 4.0 * 4 / 2 / height));
+  for (std::size_t k = 1; k + 1 < rows.size(); ++k) {
+    if (k == cycles) continue;
+    EXPECT_NEAR(rows[k] * rows[k], 4, 5 * 4 / std::sqrt(static_cast<double>(height))) << k;
+  }
+  for (std::size_t k = 1; k + 1 < columns.size(); ++k) {
+    EXPECT_NEAR(columns[k] * columns[k], 4, 5 * 4 / std::sqrt(300.0)) << k;
+  }
+}
+
+TEST(PatternPlots, AHistogramHasEveryPixel) {
+  Plane<float> values(4, 2);
+  const float of[] = {-1, -1, 0, 0.5F, 1, 2, 3, 3};
+  std::copy_n(of, 8, values.data());
+  const Histogram histogram = histogram_of(values, 4);
+  EXPECT_EQ(histogram.count, (std::vector<double>{2, 2, 1, 3}));
+  EXPECT_EQ(histogram.centre, (std::vector<double>{-0.5, 0.5, 1.5, 2.5}));
+  std::fill_n(values.data(), 8, 7.0F);
+  EXPECT_EQ(histogram_of(values, 2).count, (std::vector<double>{8, 0}));
+}
+
+}  // namespace
+}  // namespace lowlux::calib
