@@ -283,7 +283,7 @@ TEST_F(Calibrate, WrongCommandLinesAreSaid) {
     EXPECT_EQ(done.exit_code, 2) << why;
     EXPECT_TRUE(holds(done.err, why)) << done.err;
   };
-  usage({"calibrate"}, "name what to calibrate: black, colour, noise, quoted");
+  usage({"calibrate"}, "name what to calibrate: black, colour, noise, quoted, sheet");
   usage({"calibrate", "grey"}, "unknown kind 'grey'");
   usage({"calibrate", "black", "-o", file("p.json")}, "FRAMES");
   usage({"calibrate", "black", "a.dng"}, "--output");

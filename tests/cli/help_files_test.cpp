@@ -73,7 +73,7 @@ Words bash_offers(const test::ScratchDirectory& scratch, const std::string& line
 }
 
 TEST(HelpFiles, EveryVerbHasAPageAndEveryOptionIsOnIt) {
-  EXPECT_EQ(pages().size(), 17U);
+  EXPECT_EQ(pages().size(), 18U);
   const std::string main_page = printed({"help", "--man"});
   for (const Words& verb : pages()) {
     Words man{"help", "--man"};
@@ -125,7 +125,7 @@ TEST(HelpFiles, BashOffersVerbsOptionsAndValues) {
   const test::ScratchDirectory scratch;
   scratch.write("lowlux.bash", printed({"help", "--completion", "bash"}));
   EXPECT_EQ(bash_offers(scratch, "lowlux de"), (Words{"denoise", "develop"}));
-  EXPECT_EQ(bash_offers(scratch, "lowlux calibrate "), (Words{"black", "colour", "noise", "quoted"}));
+  EXPECT_EQ(bash_offers(scratch, "lowlux calibrate "), (Words{"black", "colour", "noise", "quoted", "sheet"}));
   EXPECT_EQ(bash_offers(scratch, "lowlux develop --den"), (Words{"--denoise"}));
   EXPECT_EQ(bash_offers(scratch, "lowlux calibrate black --ma"), (Words{"--map", "--masked"}));
   EXPECT_EQ(bash_offers(scratch, "lowlux develop --denoise d"), (Words{"draft"}));

@@ -46,6 +46,7 @@ constexpr std::array verbs{
     Verb{"calibrate black", parsed<parse_calibrate_black>},
     Verb{"calibrate colour", parsed<parse_calibrate_colour>},
     Verb{"calibrate noise", parsed<parse_calibrate_noise>},
+    Verb{"calibrate sheet", parsed<parse_calibrate_sheet>},
     Verb{"calibrate quoted", parsed<parse_calibrate_quoted>},
     Verb{"capture", parsed<parse_capture>},
     Verb{"compare", parsed<parse_compare>},

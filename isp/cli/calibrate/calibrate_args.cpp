@@ -35,13 +35,19 @@ void add_settings(CLI::App& app, CalibrateArgs& args) {
   setting("--temperature", "C", "temperature of the sensor, for all frames", args.temperature_c);
 }
 
-/// Returns the error of the arguments in combination; empty if there is none.
-std::string wrong(const CalibrateArgs& args, const std::vector<std::string>& inputs) {
+/// Returns the error of the frames' settings; empty if there is none.
+std::string wrong_settings(const CalibrateArgs& args) {
   if (args.iso && *args.iso <= 0) return "--iso must be above 0";
   if (args.exposure_s && *args.exposure_s < 0) return "--exposure-time must not be negative";
   if (args.temperature_c && (*args.temperature_c < -200 || *args.temperature_c > 200)) {
     return "--temperature must be from -200 to 200 C";
   }
+  return {};
+}
+
+/// Returns the error of the arguments in combination; empty if there is none.
+std::string wrong(const CalibrateArgs& args, const std::vector<std::string>& inputs) {
+  if (const std::string what = wrong_settings(args); !what.empty()) return what;
   if (!args.output.ends_with(".json")) return "-o: profiles are .json, not " + args.output;
   if (!args.report.empty() && !args.report.ends_with(".html")) return "--report: reports are .html, not " + args.report;
   return wrong_names({args.output, args.report}, inputs);
@@ -116,6 +122,84 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
   std::vector<std::string> inputs = args.common.frames;
   inputs.insert(inputs.end(), args.darks.begin(), args.darks.end());
   if (const std::string what = wrong(args.common, inputs); !what.empty()) return refuse(app, what);
+  return args;
+}
+
+namespace {
+
+/// Options of the light of a data sheet. All three are given, or none.
+struct LightOptions {
+  std::optional<double> irradiance_w_per_m2;
+  std::optional<double> wavelength_nm;
+  std::optional<double> pixel_pitch_um;
+
+  bool any() const { return irradiance_w_per_m2 || wavelength_nm || pixel_pitch_um; }
+  bool all_positive() const {
+    const auto positive = [](const std::optional<double>& value) { return value && *value > 0; };
+    return positive(irradiance_w_per_m2) && positive(wavelength_nm) && positive(pixel_pitch_um);
+  }
+  calib::Irradiance light() const {
+    return {.w_per_m2 = *irradiance_w_per_m2,
+            .wavelength_nm = *wavelength_nm,
+            .pixel_um2 = *pixel_pitch_um * *pixel_pitch_um};
+  }
+};
+
+void add_light(CLI::App& app, LightOptions& light) {
+  add_number(app, "--irradiance", "W_PER_M2", "power on the sensor, constant: measures quantum efficiency",
+             [&light](double value) { light.irradiance_w_per_m2 = value; });
+  add_number(app, "--wavelength", "NM", "of the light of --irradiance",
+             [&light](double value) { light.wavelength_nm = value; });
+  add_number(app, "--pixel-pitch", "UM", "side of a pixel, with --irradiance",
+             [&light](double value) { light.pixel_pitch_um = value; });
+}
+
+}  // namespace
+
+Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>& words) {
+  CLI::App app(
+      "A data sheet of the sensor by EMVA 1288 release 4.0, from flats and darks: a page, and JSON next to it.",
+      "lowlux calibrate sheet");
+  app.footer(
+      "Two flats of the same light make a pair, and four pairs of different light a curve that should reach "
+      "saturation; "
+      "16 flats near half of it show PRNU best. Darks of the shortest exposure time, best 16, give DSNU and dark "
+      "noise; "
+      "those of other times and temperatures the dark current. All frames are of one gain setting.");
+  CalibrateSheetArgs args;
+  LightOptions light;
+  app.add_option("FLATS", args.common.frames, "flats: files, a folder or a quoted pattern")->required();
+  app.add_option("--darks", args.darks, "dark frames: files, a folder or a quoted pattern; repeatable")
+      ->required()
+      ->type_name("FILE[,FILE...]|FOLDER")
+      ->allow_extra_args(false);
+  app.add_option("-o,--output", args.common.output, "page to write; the figures are written to its name with .json")
+      ->required()
+      ->type_name("SHEET.html");
+  app.add_flag("--steady-light", args.steady_light,
+               "the lamp never changed, so that the flats' exposure times show how linear the sensor is");
+  add_light(app, light);
+  add_settings(app, args.common);
+  app.add_flag("--force", args.common.force, "overwrite files that exist");
+  app.add_flag("--json", args.common.json, "the figures as JSON instead of text");
+  app.add_flag("--quiet", args.common.quiet, "no warnings and no progress");
+  if (const auto code = parse_words(app, words)) return *code;
+  for (std::vector<std::string>* files : {&args.common.frames, &args.darks}) {
+    const auto named = raw_files_of_lists(*files);
+    if (!named) return print_failure(named.error());
+    *files = *named;
+  }
+  if (light.any() && !light.all_positive()) {
+    return refuse(app, "--irradiance, --wavelength and --pixel-pitch belong together, and are above 0");
+  }
+  if (light.any()) args.irradiance = light.light();
+  if (args.darks.size() == 1) return refuse(app, one_dark(args.darks.front()));
+  if (!args.common.output.ends_with(".html")) return refuse(app, "-o: pages are .html, not " + args.common.output);
+  if (const std::string what = wrong_settings(args.common); !what.empty()) return refuse(app, what);
+  std::vector<std::string> inputs = args.common.frames;
+  inputs.insert(inputs.end(), args.darks.begin(), args.darks.end());
+  const std::string what = wrong_names({args.common.output, json_of_sheet(args.common.output)}, inputs);
+  if (!what.empty()) return refuse(app, what);
   return args;
 }
 

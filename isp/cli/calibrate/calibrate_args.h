@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calib/picture/picture_noise.h"
+#include "calib/sheet/data_sheet.h"
 #include "isp/cli/develop/develop_args.h"
 
 namespace lowlux::cli {
@@ -37,12 +38,24 @@ struct CalibrateNoiseArgs {
   std::optional<calib::PictureNoiseMethod> method;  // for a single image; absent: ponomarenko
 };
 
+struct CalibrateSheetArgs {
+  CalibrateArgs common;  // `frames` are flats; `output` is the page
+  std::vector<std::string> darks;
+  bool steady_light = false;
+  std::optional<calib::Irradiance> irradiance;  // with steady light
+};
+
 struct CalibrateQuotedArgs {
   CalibrateArgs common;  // `frames` holds the sensor's name
 };
 
 Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>& words);
 Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>& words);
+Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>& words);
+
+/// Returns the file next to the page of a data sheet, with its figures.
+std::string json_of_sheet(const std::string& page);
+
 Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string>& words);
 
 struct CalibrateColourArgs {

@@ -65,6 +65,7 @@ Result<Calibration> calibrate_quoted(const CalibrateQuotedArgs& args);
 
 int run_calibrate_black(const std::vector<std::string>& words);
 int run_calibrate_noise(const std::vector<std::string>& words);
+int run_calibrate_sheet(const std::vector<std::string>& words);
 int run_calibrate_quoted(const std::vector<std::string>& words);
 
 }  // namespace lowlux::cli

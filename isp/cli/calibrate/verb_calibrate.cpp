@@ -36,6 +36,7 @@ constexpr std::array kinds{
     Kind{"colour", "colour matrices from a photographed chart or spectral sensitivities", run_calibrate_colour},
     Kind{"noise", "gain, read noise, full well from flats, or noise from one picture", run_calibrate_noise},
     Kind{"quoted", "the profile of a sensor whose figures are published", run_calibrate_quoted},
+    Kind{"sheet", "a data sheet of the sensor by EMVA 1288, from flats and darks", run_calibrate_sheet},
 };
 
 void print_help() {

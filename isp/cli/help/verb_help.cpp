@@ -57,6 +57,7 @@ const std::vector<VerbHelp>& other_verbs() {
       {"calibrate noise", {}, {"lowlux calibrate noise flats/ --darks bias/ -o camera.json --report camera.html"}},
       {"calibrate colour", {}, {"lowlux calibrate colour chart.dng -o camera.json --overlay patches.png"}},
       {"calibrate quoted", {}, {"lowlux calibrate quoted ELD_NikonD850 -o camera.json"}},
+      {"calibrate sheet", {}, {"lowlux calibrate sheet flats/ --darks darks/ -o sheet.html --steady-light"}},
       {"compare", {}, {"lowlux compare reference.png test.png"}},
       {"bench",
        {},
