@@ -17,7 +17,8 @@ constexpr std::array ready{
                 "HighlightCompr=0 ShadowCompr=0 HistogramMatching=false 'Curve=0;' 'Curve2=0;' '[HLRecovery]' "
                 "Enabled=false '[White Balance]' Enabled=true Setting=Camera '[Sharpening]' Enabled=false "
                 "'[PostDemosaicSharpening]' Enabled=false '[Directional Pyramid Denoising]' Enabled=true Method=Lab "
-                "Luma=40 Ldetail=50 CMethod=AUT '[LensProfile]' LcMode=none '[Color Management]' ToneCurve=false "
+                "Luma=40 Ldetail=50 CMethod=AUT '[RAW Bayer]' Method=amaze Border=0 '[LensProfile]' LcMode=none "
+                "'[Color Management]' ToneCurve=false "
                 "ApplyLookTable=false ApplyBaselineExposureOffset=false WorkingProfile=sRGB OutputProfile=RTv4_sRGB "
                 "> \"$TMPDIR/neutral.pp3\" && rawtherapee-cli -q -Y -t -b16 -o {out.tif} -p \"$TMPDIR/neutral.pp3\" "
                 "-c {in}",
