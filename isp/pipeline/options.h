@@ -17,12 +17,24 @@
 #include "isp/render/output_space.h"
 #include "isp/render/profile_tables.h"
 #include "isp/render/tone.h"
+#include "isp/render/white_balance.h"
 
 namespace lowlux::isp {
 
+/// Describes a square of the upright image, before it is cropped or shrunk, around a pixel.
+struct PickedArea {
+  int x = 0;
+  int y = 0;
+  int size = 16;  // side [px], 1 or more
+};
+
 struct WhiteBalanceChoice {
-  enum class Mode : std::uint8_t { as_shot, automatic, temperature } mode = Mode::as_shot;
+  enum class Mode : std::uint8_t { as_shot, automatic, temperature, preset, gains, picked } mode = Mode::as_shot;
   double cct_k = 0;  // for Mode::temperature, white_min_k..white_max_k
+  double tint = 0;   // for Mode::temperature, see white_balance_of_temperature
+  WhitePreset preset = WhitePreset::daylight;
+  Vector3 gains{1, 1, 1};  // for Mode::gains: factors of R, G, B, above 0
+  PickedArea picked;
 };
 
 /// Describes how much is done of the steps that the options leave open: row and column noise, the level of noise
@@ -36,6 +48,15 @@ struct ProcessingGoal {
   std::shared_ptr<const CostModel> cost;  // of this machine; absent: no time is predicted
 };
 
+/// Describes a region of the upright image, before it is shrunk: in pixels, or in percent of width and height.
+struct PictureCrop {
+  double x = 0;
+  double y = 0;
+  double width = 0;
+  double height = 0;
+  bool percent = false;
+};
+
 /// Describes how a frame is to be developed.
 struct DevelopOptions {
   WhiteBalanceChoice white_balance;
@@ -45,6 +66,8 @@ struct DevelopOptions {
   SampleType samples = SampleType::u8;     // f32 is scene-linear: signed, unbounded, without tone
   bool half = false;                       // exact 2x2 binning instead of demosaicing
   std::optional<DemosaicMethod> demosaic;  // absent: chosen by light, noise reduction and budget
+  std::optional<PictureCrop> crop;
+  std::optional<int> max_size;  // of the longer side [px], 1 or more; larger images are shrunk in linear light
   BlackRequest black;
   bool estimate_dark = true;                    // dark charge that is not known is estimated from the frame itself
   bool find_defects = true;                     // search for hot and dead pixels in addition to those the source lists
@@ -58,11 +81,12 @@ struct DevelopOptions {
   std::optional<ProcessingGoal> effects;         // absent: each option above decides for itself
 };
 
-/// Holds the width and height of the developed image, before orientation.
+/// Holds the width and height of an image, before orientation if nothing else is stated.
 struct PictureSize {
   int width = 0;
   int height = 0;
 };
+/// Returns the size of the rendered image, before it is cropped or shrunk.
 PictureSize picture_size(const RawDn& raw, const DevelopOptions& options);
 
 /// Checks that the options fit together: float samples require a linear space and no tone curve, and XYZ and camera RGB

@@ -10,6 +10,7 @@
 #include "isp/pipeline/noise_reduction.h"
 #include "isp/pipeline/options.h"
 #include "isp/pipeline/plan/dark_charge.h"
+#include "isp/pipeline/plan/framing.h"
 #include "isp/pipeline/plan/levels.h"
 #include "isp/pipeline/plan/plan_demosaic.h"
 #include "isp/pipeline/plan/rendering.h"
@@ -26,9 +27,10 @@ struct DevelopPlan {
   NoiseReduction noise_reduction;
   DemosaicPlan demosaic;
   std::shared_ptr<const DisplayTarget> display;  // set: codes are changed for it
-  int width = 0;                                 // of the image, before orientation
+  int width = 0;                                 // of the rendered image, before framing and orientation
   int height = 0;
-  bool from_codes = false;  // result of renders_from_codes
+  std::optional<Framing> framing;  // set: a part of the image is kept, or it is shrunk
+  bool from_codes = false;         // result of renders_from_codes
   DarkCharge dark;
   std::vector<std::string> warnings;
   std::vector<StageTime> times;

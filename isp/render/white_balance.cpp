@@ -103,10 +103,51 @@ std::string_view name_of(WhiteSource source) {
       return "temperature";
     case WhiteSource::daylight:
       return "daylight";
+    case WhiteSource::preset:
+      return "preset";
+    case WhiteSource::gains:
+      return "gains";
+    case WhiteSource::picked:
+      return "picked";
     case WhiteSource::none:
       break;
   }
   return "none";
+}
+
+std::string_view name_of(WhitePreset preset) {
+  switch (preset) {
+    case WhitePreset::daylight:
+      return "daylight";
+    case WhitePreset::cloudy:
+      return "cloudy";
+    case WhitePreset::shade:
+      return "shade";
+    case WhitePreset::tungsten:
+      return "tungsten";
+    case WhitePreset::fluorescent:
+      return "fluorescent";
+    case WhitePreset::flash:
+      break;
+  }
+  return "flash";
+}
+
+Xy white_of(WhitePreset preset) {
+  switch (preset) {
+    case WhitePreset::cloudy:
+      return {0.31272, 0.32903};  // D65
+    case WhitePreset::shade:
+      return {0.29902, 0.31485};  // D75
+    case WhitePreset::tungsten:
+      return {0.44758, 0.40745};  // A
+    case WhitePreset::fluorescent:
+      return {0.3721, 0.3751};  // FL2
+    case WhitePreset::daylight:
+    case WhitePreset::flash:
+      break;
+  }
+  return {0.33243, 0.34744};  // D55
 }
 
 Result<WhiteBalance> as_shot_white_balance(const CameraColour& colour) {
@@ -128,15 +169,31 @@ Result<WhiteBalance> as_shot_white_balance(const CameraColour& colour) {
   return fail(ErrorCode::insufficient, "the file states no white balance: use --wb auto or --wb 5500", "AsShotNeutral");
 }
 
-Result<WhiteBalance> white_balance_of_temperature(const CameraColour& colour, double kelvin) {
-  const auto xy = white_of_temperature(kelvin);
+Result<WhiteBalance> white_balance_of_temperature(const CameraColour& colour, double kelvin, double tint) {
+  auto xy = white_of_temperature(kelvin);
   if (!xy) {
     return fail(ErrorCode::invalid_argument,
                 "a colour temperature must be in " + rounded(white_min_k) + ".." + rounded(white_max_k) + " K, found " +
                     number_text(kelvin),
                 "white balance");
   }
+  if (tint != 0) {
+    const auto untinted = colour_temperature_of(*xy);
+    xy = untinted ? planckian_xy(untinted->cct_k, untinted->duv + tint / tint_per_duv) : std::nullopt;
+    if (!(std::fabs(tint) <= max_tint) || !xy) {
+      return fail(ErrorCode::invalid_argument,
+                  "no light has a tint of " + number_text(tint) + " at " + number_text(kelvin) + " K", "white balance");
+    }
+  }
   return balance_of_white(colour, *xy, WhiteSource::temperature);
+}
+
+Result<WhiteBalance> white_balance_of_preset(const CameraColour& colour, WhitePreset preset) {
+  return balance_of_white(colour, white_of(preset), WhiteSource::preset);
+}
+
+WhiteBalance white_balance_of_neutral(const CameraColour& colour, const Vector3& neutral, WhiteSource source) {
+  return balance_of(colour, neutral, source);
 }
 
 WhiteEstimate estimate_white(const RgbView<const float>& blocks, double block_noise, const CameraColour& colour,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -14,9 +15,9 @@
 namespace lowlux::isp {
 
 /// Names the source of a white balance.
-enum class WhiteSource : std::uint8_t { as_shot, estimated, temperature, daylight, none };
+enum class WhiteSource : std::uint8_t { as_shot, estimated, temperature, daylight, none, preset, gains, picked };
 
-/// Returns "as-shot", "auto", "temperature", "daylight" or "none".
+/// Returns "as-shot", "auto", "temperature", "daylight", "none", "preset", "gains" or "picked".
 std::string_view name_of(WhiteSource source);
 
 /// Holds the camera RGB that is to become neutral, and its origin.
@@ -31,8 +32,32 @@ struct WhiteBalance {
 /// @return error insufficient if the source has neither, malformed if the value is not a colour of a light
 Result<WhiteBalance> as_shot_white_balance(const CameraColour& colour);
 
+/// A tint of 1 is a distance of 1/3000 in CIE 1960 uv.
+inline constexpr double tint_per_duv = 3000;
+inline constexpr double max_tint = 150;
+
 /// Returns the white of a colour temperature, 1667..25000 K (white_of_temperature), through the camera's matrices.
-Result<WhiteBalance> white_balance_of_temperature(const CameraColour& colour, double kelvin);
+/// @param tint  -150 to 150: moves the white from that of the temperature along the normal of the Planckian locus, by
+///              tint / 3000 in CIE 1960 uv. Positive: the light is greener, and so the image becomes more magenta.
+Result<WhiteBalance> white_balance_of_temperature(const CameraColour& colour, double kelvin, double tint = 0);
+
+/// Lists lights by the names that cameras have for them.
+enum class WhitePreset : std::uint8_t { daylight, cloudy, shade, tungsten, fluorescent, flash };
+inline constexpr std::array all_white_presets{WhitePreset::daylight, WhitePreset::cloudy,      WhitePreset::shade,
+                                              WhitePreset::tungsten, WhitePreset::fluorescent, WhitePreset::flash};
+std::string_view name_of(WhitePreset preset);
+
+/// Returns the chromaticity of a preset: the CIE illuminant (CIE 15:2018, tables T.3 and T.6) that DNG assigns to the
+/// EXIF light source of that name. Daylight and flash are D55, cloudy D65, shade D75, tungsten A, fluorescent FL2.
+Xy white_of(WhitePreset preset);
+
+/// Returns the white of a preset, through the camera's matrices.
+Result<WhiteBalance> white_balance_of_preset(const CameraColour& colour, WhitePreset preset);
+
+/// Returns the balance of a neutral that was measured in the image or follows from given gains. Its white is absent
+/// where the matrices have none for it.
+/// @param neutral  camera RGB, above 0
+WhiteBalance white_balance_of_neutral(const CameraColour& colour, const Vector3& neutral, WhiteSource source);
 
 struct AutoWhiteOptions {
   double norm = 6;       // exponent of the mean; 1 is grey world, infinity the brightest block; 6 is the paper's

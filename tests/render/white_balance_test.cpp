@@ -8,9 +8,11 @@
 #include <limits>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "isp/model/colour/correlated_colour_temperature.h"
+#include "isp/model/spectrum/cie_data.h"
 #include "tests/support/sweep.h"
 #include "tests/support/synthetic_chart.h"
 
@@ -97,6 +99,41 @@ TEST(TemperatureWhiteBalance, IsRefusedOutsideItsRangeAndWithoutMatrices) {
   EXPECT_EQ(white_balance_of_temperature(nikon("D65"), 1600).error().code, ErrorCode::invalid_argument);
   EXPECT_EQ(white_balance_of_temperature(nikon("D65"), 25001).error().code, ErrorCode::invalid_argument);
   EXPECT_EQ(white_balance_of_temperature(CameraColour{}, 5000).error().code, ErrorCode::insufficient);
+}
+
+TEST(PresetWhiteBalance, WhitesAreThoseOfTheIlluminantsSpectra) {
+  const std::pair<WhitePreset, const char*> lights[] = {
+      {WhitePreset::daylight, "D55"}, {WhitePreset::flash, "D55"},  {WhitePreset::cloudy, "D65"},
+      {WhitePreset::shade, "D75"},    {WhitePreset::tungsten, "A"}, {WhitePreset::fluorescent, "FL2"}};
+  const CameraColour colour = nikon("D50");
+  for (const auto& [preset, name] : lights) {
+    const Xy xy = *xy_of(xyz_of(*light_named(name)));
+    EXPECT_NEAR(white_of(preset).x, xy.x, 1e-4) << name;  // sums over 5 nm, see cie_data_test
+    EXPECT_NEAR(white_of(preset).y, xy.y, 1e-4) << name;
+    const auto balance = white_balance_of_preset(colour, preset);
+    ASSERT_TRUE(balance) << name;
+    EXPECT_EQ(balance->source, WhiteSource::preset);
+    const Vector3 neutral = *neutral_of_white(colour, white_of(preset));
+    EXPECT_EQ(balance->neutral, neutral);
+  }
+}
+
+TEST(TemperatureWhiteBalance, TintMovesTheWhiteAlongTheNormalOfTheLocus) {
+  const CameraColour colour = nikon("D50");
+  for (const double kelvin : {2500.0, 3600.0, 5500.0, 12000.0}) {
+    const auto plain = white_balance_of_temperature(colour, kelvin);
+    for (const double tint : {-60.0, -5.0, 12.0, 60.0}) {
+      const auto tinted = white_balance_of_temperature(colour, kelvin, tint);
+      ASSERT_TRUE(plain && tinted);
+      EXPECT_NEAR(tinted->white->duv - plain->white->duv, tint / 3000, 1e-6);
+      EXPECT_NEAR(tinted->white->cct_k, plain->white->cct_k, 1e-3 * kelvin);  // the nearest point of the locus stays
+      // A greener light has more green in its neutral, and so less green in the image.
+      const auto green = [](const Vector3& n) { return n[1] / std::sqrt(n[0] * n[2]); };
+      EXPECT_EQ(green(tinted->neutral) > green(plain->neutral), tint > 0);
+    }
+  }
+  EXPECT_EQ(white_balance_of_temperature(colour, 5000, 151).error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(white_balance_of_temperature(colour, 5000, NAN).error().code, ErrorCode::invalid_argument);
 }
 
 // 3 degrees of camera RGB is some 900 K at 6500 K. These scenes hold a fairly even mix of colours, as the method

@@ -190,7 +190,8 @@ Wrong wrong_for_raw(const CLI::App& app, const CaptureArgs& args) {
 Wrong wrong_for_live(const CLI::App& app, const CaptureArgs& args) {
   if (const auto given = given_of(app, of_pictures)) return *given + " is of picture files, not of --live";
   const isp::DevelopOptions& options = args.develop.options;
-  if (options.white_balance.mode == isp::WhiteBalanceChoice::Mode::temperature) {
+  using WhiteMode = isp::WhiteBalanceChoice::Mode;
+  if (options.white_balance.mode != WhiteMode::as_shot && options.white_balance.mode != WhiteMode::automatic) {
     return "--wb of --live is as-shot or auto";
   }
   if (options.look.look == isp::Look::model) return "--look of --live is camera or eye";

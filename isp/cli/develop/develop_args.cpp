@@ -7,9 +7,10 @@
 
 #include "calib/dark/master_dark.h"
 #include "denoise/denoiser.h"
+#include "isp/cli/develop/finish_args.h"
+#include "isp/cli/develop/white_balance_args.h"
 #include "isp/cli/noise/noise_source.h"
 #include "isp/cli/shared/option_values.h"
-#include "isp/model/colour/correlated_colour_temperature.h"
 #include "isp/render/output_space.h"
 #include "isp/render/tone.h"
 
@@ -69,6 +70,7 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   DevelopArgs args;
   add_output(app, args);
   add_rendering(app, args);
+  add_framing(app, args.options);
   add_choice<bool>(
       app, "--baseline-exposure", {{"on", true}, {"off", false}}, [&args](bool on) { args.baseline_exposure = on; },
       "add the raw file's BaselineExposure to a given --exposure (default: on)");
@@ -204,22 +206,6 @@ Names<OutputSpace> space_names() {
   return names;
 }
 
-std::optional<std::string> set_white_balance(const std::string& text, isp::WhiteBalanceChoice& choice) {
-  using Mode = isp::WhiteBalanceChoice::Mode;
-  if (text == "as-shot") {
-    choice.mode = Mode::as_shot;
-  } else if (text == "auto") {
-    choice.mode = Mode::automatic;
-  } else if (const auto kelvin = quantity_of(text, "K");
-             kelvin && *kelvin >= isp::white_min_k && *kelvin <= isp::white_max_k) {
-    choice = {Mode::temperature, *kelvin};
-  } else {
-    return fmt::format("is neither as-shot nor auto nor a temperature from {:.0f} to {:.0f} K", isp::white_min_k,
-                       isp::white_max_k);
-  }
-  return std::nullopt;
-}
-
 // Returns one value for all sites or four values; nullopt for other text.
 std::optional<PerSite<double>> site_figures(const std::string& text) {
   const auto figures = numbers_of(text, 4);
@@ -267,9 +253,7 @@ void add_rendering(CLI::App& app, DevelopArgs& args) {
       "exposure compensation in EV; auto places the median at middle grey, limited by shadow noise (default: auto; "
       "in linear spaces 0)",
       [&args](const std::string& text) { return set_exposure(text, args); });
-  add_text(app, "--wb", "as-shot|auto|KELVIN",
-           "white balance: of the camera, estimated from the image, or a colour temperature (default: as-shot)",
-           [&o](const std::string& text) { return set_white_balance(text, o.white_balance); });
+  add_white_balance(app, o.white_balance);
   add_choice<isp::ToneCurve>(
       app, "--tone", {{"standard", isp::ToneCurve::standard}, {"none", isp::ToneCurve::none}},
       [&args](isp::ToneCurve tone) { args.tone = tone; }, "tone curve (default: standard, in linear spaces none)");

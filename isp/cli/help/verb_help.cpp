@@ -10,9 +10,10 @@ using Words = std::vector<std::string_view>;
 const std::vector<VerbHelp>& raw_verbs() {
   static const std::vector<VerbHelp> verbs{
       {"develop",
-       {"--output", "--format", "--quality", "--bits", "--exposure", "--wb", "--space", "--half", "--denoise", "--look",
-        "--profile", "--dark-frame", "--jobs", "--skip-existing", "--force"},
-       {"lowlux develop night.nef -o night.jpg", "lowlux develop raws/ -o pictures/ --format jpg --skip-existing",
+       {"--output", "--format", "--quality", "--bits", "--exposure", "--wb", "--space", "--half", "--crop",
+        "--max-size", "--denoise", "--look", "--profile", "--dark-frame", "--jobs", "--skip-existing", "--force"},
+       {"lowlux develop night.nef -o night.jpg",
+        "lowlux develop raws/ -o pictures/ --format jpg --skip-existing --max-size 2048",
         "lowlux develop night.nef -o night.jpg --exposure +1 --wb 3200K",
         "lowlux develop night.dng -o night.png --dark-frame darks/", "lowlux develop night.dng -o seen.jpg --look eye",
         "lowlux develop burst/ -o merged.jpg --merge"}},
@@ -86,7 +87,8 @@ const std::vector<Group>& raw_groups() {
        {"--size", "--fps", "--gain-code", "--flip", "--memory", "--buffers", "--timeout", "--exposure-time", "--gain",
         "--auto-exposure", "--max-exposure", "--max-gain", "--mains", "--clip", "--gain-codes"}},
       {"Rendering",
-       {"--exposure", "--wb", "--tone", "--space", "--demosaic", "--half", "--baseline-exposure", "--camera-profile"}},
+       {"--exposure", "--wb", "--tone", "--space", "--demosaic", "--half", "--crop", "--max-size",
+        "--baseline-exposure", "--camera-profile"}},
       {"Noise and defects", {"--denoise", "--line-noise", "--chroma-bias", "--repair", "--maps", "--temporal"}},
       {"Calibration",
        {"--black", "--profile", "--gain-setting", "--noise", "--dark-estimate", "--dark-frame", "--bias-frame",

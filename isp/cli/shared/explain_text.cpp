@@ -191,6 +191,14 @@ std::string flat_text(const calib::FlatField& flat) {
       100 * flat.noise);
 }
 
+std::string framing_text(const isp::Framing& framing) {
+  const Rect& kept = framing.pixels;
+  std::string text = fmt::format("{} x {} pixels from column {}, row {} (before orientation)", kept.width, kept.height,
+                                 kept.x, kept.y);
+  if (framing.shrinks()) text += fmt::format(", shrunk to {} x {}", framing.size.width, framing.size.height);
+  return text;
+}
+
 }  // namespace
 
 std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* flat,
@@ -215,6 +223,7 @@ std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* f
                        ? fmt::format("{}, {:.0f} K", plan.rendering.white_balance_rule, plan.rendering.white->cct_k)
                        : std::string(plan.rendering.white_balance_rule));
   out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.rendering.exposure_ev, plan.rendering.exposure_rule));
+  if (plan.framing) out.add("framing", framing_text(*plan.framing));
   if (plan.rendering.profile) add_profile(out, *plan.rendering.profile);
   if (plan.rendering.look) {
     add_look(out, *plan.rendering.look, look_name(plan), coefficients_of(plan.options.look),

@@ -91,6 +91,11 @@ Json white_json(const isp::DevelopPlan& plan) {
   return json;
 }
 
+Json framing_json(const isp::DevelopPlan& plan) {
+  if (!plan.framing) return nullptr;
+  return {{"before_orientation", rect_json(plan.framing->pixels)}, {"shrunk", plan.framing->shrinks()}};
+}
+
 Json lines_json(const denoise::LineOffsets& lines) {
   return {{"lines", lines.lines == denoise::Lines::rows ? "rows" : "columns"},
           {"std_e", lines.line_std_e},
@@ -246,6 +251,7 @@ std::string develop_json(const DevelopOutcome& outcome, const Defaults& defaults
             {"unit", plan.levels.electrons_at_white ? "electrons" : "fraction-of-white"},
             {"white_balance", white_json(plan)},
             {"exposure", {{"ev", plan.rendering.exposure_ev}, {"rule", plan.rendering.exposure_rule}}},
+            {"framing", framing_json(plan)},
             {"defects_repaired", plan.levels.defects.size()},
             {"effects", effects_json(plan)},
             {"denoise", noise_json(plan.noise_reduction, outcome.noise)},

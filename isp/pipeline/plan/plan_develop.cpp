@@ -9,6 +9,7 @@
 
 #include "isp/pipeline/budget/step_plan.h"
 #include "isp/pipeline/plan/dark_charge.h"
+#include "isp/pipeline/plan/picked_white.h"
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/pipeline/plan/rendering.h"
 #include "isp/raw/corrections.h"
@@ -103,6 +104,9 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   const PictureSize size = picture_size(frame.raw, options);
   DevelopPlan plan{.options = options, .display = options.display, .width = size.width, .height = size.height};
   plan.warnings = frame.warnings;
+  Result<std::optional<Framing>> framing = decide_framing(size, frame.raw.info.orientation, options);
+  if (!framing) return tl::make_unexpected(std::move(framing.error()));
+  plan.framing = *framing;
   StageClock clock(plan.times);
 
   Result<RawLevels> levels = choose_levels(frame, options);
@@ -124,7 +128,12 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   if (plan.dark.state == DarkCharge::State::estimated) levels->black.dark_mean_e = plan.dark.estimated_e;
   if (plan.dark.state == DarkCharge::State::unknown) plan.warnings.push_back(warning_of(plan.dark, frame.raw.info));
   const Thumbnail light = light_of(thumbnail, frame.raw, *levels);
-  Result<Rendering> rendering = decide_rendering(frame, light, options);
+  Result<Vector3> picked{Vector3{1, 1, 1}};
+  if (options.white_balance.mode == WhiteBalanceChoice::Mode::picked && options.space != OutputSpace::camera) {
+    picked = picked_neutral(measured, *levels, options, executor);
+  }
+  if (!picked) return tl::make_unexpected(std::move(picked.error()));
+  Result<Rendering> rendering = decide_rendering(frame, light, options, *picked);
   if (!rendering) return tl::make_unexpected(std::move(rendering.error()));
   append(plan.warnings, rendering->warnings);
   if (plan.dark.mean_e) {

@@ -19,11 +19,32 @@ constexpr double mid_grey = 0.18;    // what automatic exposure brings the image
 
 Vector3 luminance_of(OutputSpace space) { return luminance_weights(space).value_or(Vector3{0, 1, 0}); }
 
-Result<WhiteBalance> choose_white(const RawFrame& frame, const DevelopOptions& o, const Thumbnail& thumbnail) {
+/// Returns the balance of a choice that does not depend on the image as a whole; nullopt for others.
+std::optional<Result<WhiteBalance>> requested_white(const CameraColour& colour, const WhiteBalanceChoice& choice,
+                                                    const Vector3& picked) {
+  using Mode = WhiteBalanceChoice::Mode;
+  const Vector3& gains = choice.gains;
+  switch (choice.mode) {
+    case Mode::temperature:
+      return white_balance_of_temperature(colour, choice.cct_k, choice.tint);
+    case Mode::preset:
+      return white_balance_of_preset(colour, choice.preset);
+    case Mode::gains:
+      return white_balance_of_neutral(colour, {1 / gains[0], 1 / gains[1], 1 / gains[2]}, WhiteSource::gains);
+    case Mode::picked:
+      return white_balance_of_neutral(colour, picked, WhiteSource::picked);
+    case Mode::as_shot:
+    case Mode::automatic:
+      break;
+  }
+  return std::nullopt;
+}
+
+Result<WhiteBalance> choose_white(const RawFrame& frame, const DevelopOptions& o, const Thumbnail& thumbnail,
+                                  const Vector3& picked) {
   using Mode = WhiteBalanceChoice::Mode;
   if (frame.raw.layout == SensorLayout::monochrome) return WhiteBalance{};
-  if (o.white_balance.mode == Mode::temperature)
-    return white_balance_of_temperature(frame.colour, o.white_balance.cct_k);
+  if (auto requested = requested_white(frame.colour, o.white_balance, picked)) return *std::move(requested);
   if (o.white_balance.mode == Mode::as_shot) {
     Result<WhiteBalance> as_shot = as_shot_white_balance(frame.colour);
     if (as_shot || as_shot.error().code != ErrorCode::insufficient) return as_shot;
@@ -161,10 +182,13 @@ ToneTable tone_of(double exposure_ev, const DevelopOptions& options) {
   return make_tone_table(options.tone, options.space, tone_limit(options.tone, exposure_ev));
 }
 
-Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light, const DevelopOptions& requested) {
+Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light, const DevelopOptions& requested,
+                                   const Vector3& picked) {
   DevelopOptions options = requested;
   Result<WhiteBalance> balance{};
-  if (options.space != OutputSpace::camera) balance = with_white(choose_white(frame, options, light), frame, options);
+  if (options.space != OutputSpace::camera) {
+    balance = with_white(choose_white(frame, options, light, picked), frame, options);
+  }
   if (!balance) return tl::make_unexpected(std::move(balance.error()));
   Rendering out{.neutral = balance->neutral,
                 .white = balance->white,

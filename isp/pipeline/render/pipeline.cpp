@@ -11,6 +11,7 @@
 #include "isp/raw/bin_plane.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/to_linear.h"
+#include "isp/render/area_mean.h"
 #include "isp/render/night/seeing_map.h"
 
 namespace lowlux::isp {
@@ -106,12 +107,14 @@ RgbInput Pipeline::prepare_planes(const RawFrame& frame, const DevelopPlan& plan
   return out;
 }
 
+void Pipeline::reserve_kernel(int width) {
+  if (kernel_ && kernel_width_ >= width) return;
+  kernel_ = std::make_unique<RawToRgb>(width, executor_.width());
+  kernel_width_ = width;
+}
+
 void Pipeline::reserve(const RawFrame& frame, const DevelopPlan& plan) {
-  const int width = frame.raw.default_crop.width;
-  if (!kernel_ || kernel_width_ < width) {
-    kernel_ = std::make_unique<RawToRgb>(width, executor_.width());
-    kernel_width_ = width;
-  }
+  reserve_kernel(frame.raw.default_crop.width);
   if (plan.options.half) {
     for (Plane<float>& plane : half_planes_) fit(plane, plan.width, plan.height);
   }
@@ -182,6 +185,34 @@ void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const E
 }
 
 void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
+  if (!plan.framing) return render_all(frame, plan, out);
+  if (plan.framing->shrinks()) return render_shrunk(frame, plan, out);
+  Picture all = make_picture(plan.options.samples, plan.width, plan.height);
+  render_all(frame, plan, all);
+  copy_pixels(crop_of(view_of(all), plan.framing->pixels), view_of(out));
+}
+
+// The mean is taken of light, signed and before the tone curve: black noise would otherwise be rectified by each pixel.
+void Pipeline::render_shrunk(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
+  DevelopPlan light = plan;
+  light.options.samples = SampleType::f32;
+  light.rendering.transform.move_into_gamut = false;
+  light.display.reset();
+  light.framing.reset();
+  Picture all = make_picture(light);
+  render_all(frame, light, all);
+  const Rect& kept = plan.framing->pixels;
+  const PictureSize& size = plan.framing->size;
+  const auto part = std::get<RgbView<float>>(crop_of(view_of(all), kept));
+  SceneLinear small(size.width, size.height);
+  shrink_by_area({part[0], part[1], part[2]}, small.view(), executor_);
+  reserve_kernel(size.width);
+  const RgbView<const float> planes = std::as_const(small).view();
+  encode(*kernel_, CameraPlanes{planes, {1, 1, 1}}, transform_of_modelled(plan, nullptr), plan, view_of(out),
+         executor_);
+}
+
+void Pipeline::render_all(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
   if (is_tiled(frame.raw, plan, limits_)) {
     has_noise_maps_ = false;
     seeing_.reset();
@@ -230,6 +261,9 @@ CameraPlanes Pipeline::as_modelled(const RgbInput& in, const DevelopPlan& plan) 
   return {{planes[0], planes[1], planes[2]}, {1 / limit, 1 / limit, 1 / limit}};
 }
 
-Picture make_picture(const DevelopPlan& plan) { return make_picture(plan.options.samples, plan.width, plan.height); }
+Picture make_picture(const DevelopPlan& plan) {
+  const PictureSize size = plan.framing ? plan.framing->size : PictureSize{plan.width, plan.height};
+  return make_picture(plan.options.samples, size.width, size.height);
+}
 
 }  // namespace lowlux::isp

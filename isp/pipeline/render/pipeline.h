@@ -27,12 +27,14 @@ class Pipeline {
   explicit Pipeline(Executor& executor, const TileLimits& limits = {})
       : executor_(executor), limits_(limits), noise_reducer_(executor), tiles_(executor, limits) {}
 
-  /// Renders a frame to `out`, an image of plan.width x plan.height of the planned sample type: see make_picture().
+  /// Renders a frame to `out`, an image of the planned size and sample type: see make_picture(). Images that are
+  /// cropped or shrunk allocate memory for the image before that.
   void render(const RawFrame& frame, const DevelopPlan& plan, Picture& out);
-  /// Renders a frame to 8-bit codes, row by row; plan.display is ignored. This function and those that follow process
-  /// frames of any size as a whole.
+  /// Renders a frame to 8-bit codes, row by row; plan.display and plan.framing are ignored. This function and those
+  /// that follow process frames of any size as a whole.
   void render(const RawFrame& frame, const DevelopPlan& plan, const RowSink& out);
-  /// Renders a frame to 16-bit codes in the caller's memory, height x 3 width; plan.display is ignored.
+  /// Renders a frame to 16-bit codes in the caller's memory, height x 3 width; plan.display and plan.framing are
+  /// ignored.
   void render(const RawFrame& frame, const DevelopPlan& plan, PlaneView<std::uint16_t> out);
 
   /// Returns the mosaic of the active area as it is before corrections and white balance: electrons, signed, noise
@@ -55,6 +57,9 @@ class Pipeline {
  private:
   template <class Encode>
   void render_to(const RawFrame& frame, const DevelopPlan& plan, const Encode& encode);
+  void render_all(const RawFrame& frame, const DevelopPlan& plan, Picture& out);
+  void render_shrunk(const RawFrame& frame, const DevelopPlan& plan, Picture& out);
+  void reserve_kernel(int width);
   void reserve(const RawFrame& frame, const DevelopPlan& plan);
   RgbInput prepare_bayer(const RawFrame& frame, const DevelopPlan& plan);
   RgbInput prepare_planes(const RawFrame& frame, const DevelopPlan& plan);

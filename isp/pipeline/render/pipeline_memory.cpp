@@ -52,9 +52,12 @@ std::size_t expected_bytes(const RawDn& raw, const DevelopOptions& options, int 
   const std::size_t samples = raw.sample_bytes() * raw.samples();
   const std::size_t sample = options.samples == SampleType::u8 ? 1 : options.samples == SampleType::u16 ? 2 : 4;
   const std::size_t picture = 3 * sample * area(most.width, most.height);
+  const std::size_t before_framing = options.max_size ? 3 * sizeof(float) * area(most.width, most.height)
+                                     : options.crop   ? picture
+                                                      : 0;
   const std::size_t dark = options.dark_frame ? sizeof(float) * area(raw.active.width, raw.active.height) : 0;
   const std::size_t turned = raw.info.orientation == Orientation::normal ? 0 : picture;
-  const std::size_t around = samples + dark + picture + turned;
+  const std::size_t around = samples + dark + picture + before_framing + turned;
   if (options.look.look == Look::camera) return around + pipeline_bytes(raw, most, threads);
   return around + whole_frame_bytes(raw, most, threads) + 3 * sizeof(float) * area(most.width, most.height);
 }

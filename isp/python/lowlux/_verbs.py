@@ -71,20 +71,22 @@ def _call(verb, inputs, output, overwrite, words):
     return verb(inputs, path, overwrite, [*words, f"--output={path or 'none'}", "--", *(name for name, _ in inputs)])
 
 
-def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, exposure=None, wb=None, tone=None, space=None,
-            demosaic=None, half=False, baseline_exposure=None, camera_profile=None, look=None, scene_luminance=None,
-            field_of_view=None, light=None, adaptation_degree=None, effects=None, tolerance=None, dimming=None,
-            noise_limit=None, coefficients=None, display_luminance=None, seeing_map=False, black=None, profile=None,
-            gain_setting=None, noise=None, dark_estimate=None, repair=None, denoise=None, line_noise=None,
-            chroma_bias=None, dark_frame=None, bias_frame=None, dark_frame_count=None, dark_noise=None,
-            dark_doubling=None, flat_frame=None, budget_ms=None, budget_mpps=None, align=None, foreground=None,
-            drizzle=None, pixfrac=None, mean=None, reference=None, false_alarm=None, maps=False):
+def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, exposure=None, wb=None, tone=None,
+            space=None, demosaic=None, half=False, crop=None, max_size=None, baseline_exposure=None,
+            camera_profile=None, look=None, scene_luminance=None, field_of_view=None, light=None,
+            adaptation_degree=None, effects=None, tolerance=None, dimming=None, noise_limit=None, coefficients=None,
+            display_luminance=None, seeing_map=False, black=None, profile=None, gain_setting=None, noise=None,
+            dark_estimate=None, repair=None, denoise=None, line_noise=None, chroma_bias=None, dark_frame=None,
+            bias_frame=None, dark_frame_count=None, dark_noise=None, dark_doubling=None, flat_frame=None,
+            budget_ms=None, budget_mpps=None, align=None, foreground=None, drizzle=None, pixfrac=None, mean=None,
+            reference=None, false_alarm=None, maps=False):
     """Develop a raw frame to an image, as `lowlux develop` does with the same options.
 
     raw: a path or a RawImage, which is not changed; or a list of them, frames of one scene that are merged first.
     output: image to write (.png .jpg .tif .exr .pfm), with its maps next to it; None writes nothing.
     bits: 8 (default), 16 or 32 bits per sample of the image; with an output the default is that of its format.
-    exposure: gain [EV], or "auto". wb: "as-shot", "auto" or a temperature [K]. tone: "standard" or "none".
+    exposure: gain [EV], or "auto". wb: as --wb, or a temperature [K], or gains (r, g, b). tone: "standard" or "none".
+    crop: (x, y, width, height) of the upright image [px], or "10%,10%,80%,80%". max_size: longer side [px].
     space: "srgb", "p3", "rec2020", "linear-srgb", "linear-rec2020", "xyz" or "camera"; 32 bits are linear.
     black: "auto", "metadata", "masked", one level or four of the 2x2 cell [DN], or a profile.
     noise: (system gain [DN/e-], read noise [e-]). baseline_exposure: "on" or "off".

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "isp/pipeline/options.h"
+
+namespace CLI {
+class App;
+}
+
+namespace lowlux::cli {
+
+/// Adds the options of `develop` that choose a part of the image and its size: --crop, --max-size.
+void add_framing(CLI::App& app, isp::DevelopOptions& options);
+
+}  // namespace lowlux::cli
