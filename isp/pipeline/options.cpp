@@ -18,6 +18,16 @@ Result<void> check_options(const DevelopOptions& o) {
     return fail(ErrorCode::invalid_argument,
                 "float samples are scene-linear: they go with a linear space and --tone none");
   }
+  if (o.tone_shape != ToneShape{} && (o.tone == ToneCurve::none || o.look.noise_limit)) {
+    return fail(ErrorCode::invalid_argument,
+                "brightness and contrast shape the standard tone curve: not with --tone none, linear spaces or "
+                "--noise-limit");
+  }
+  const bool has_look = o.look.look != Look::camera;
+  if (o.saturation != 1 && (needs_float || has_look)) {
+    return fail(ErrorCode::invalid_argument,
+                "saturation is that of RGB images as the camera sees them: not with --space camera or xyz, or --look");
+  }
   if (o.display && (o.space != OutputSpace::srgb || o.samples == SampleType::f32)) {
     return fail(ErrorCode::invalid_argument, "pictures for another display are sRGB of 8 or 16 bits");
   }

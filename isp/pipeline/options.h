@@ -57,11 +57,22 @@ struct PictureCrop {
   bool percent = false;
 };
 
+/// Lists what becomes of colours of which a channel is saturated.
+enum class Highlights : std::uint8_t {
+  clip,         // all channels end where the first saturates: they become neutral
+  reconstruct,  // see reconstruct_highlights
+};
+
 /// Describes how a frame is to be developed.
 struct DevelopOptions {
   WhiteBalanceChoice white_balance;
   std::optional<double> exposure_ev;  // absent: automatic
+  double exposure_offset_ev = 0;      // added to an automatic exposure
   ToneCurve tone = ToneCurve::standard;
+  ToneShape tone_shape;   // of the standard curve
+  double saturation = 1;  // factor of the distance to the grey of the same luminance, in linear light
+  Highlights highlights = Highlights::clip;
+  std::optional<double> sharpen_px;  // blur to sharpen for, see CaptureSharpening; absent: none
   OutputSpace space = OutputSpace::srgb;
   SampleType samples = SampleType::u8;     // f32 is scene-linear: signed, unbounded, without tone
   bool half = false;                       // exact 2x2 binning instead of demosaicing

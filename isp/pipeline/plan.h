@@ -29,8 +29,10 @@ struct DevelopPlan {
   std::shared_ptr<const DisplayTarget> display;  // set: codes are changed for it
   int width = 0;                                 // of the rendered image, before framing and orientation
   int height = 0;
-  std::optional<Framing> framing;  // set: a part of the image is kept, or it is shrunk
-  bool from_codes = false;         // result of renders_from_codes
+  std::optional<Framing> framing;    // set: a part of the image is kept, or it is shrunk
+  std::optional<double> sharpen_px;  // set: sharpened for this blur; requested, and the noise is known
+  double saturation = 1;    // fraction of white at which the sensor saturates; measured where highlights are rebuilt
+  bool from_codes = false;  // result of renders_from_codes
   DarkCharge dark;
   std::vector<std::string> warnings;
   std::vector<StageTime> times;

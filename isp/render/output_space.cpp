@@ -77,4 +77,12 @@ double decode_transfer(OutputSpace space, double code) {
   return space == OutputSpace::rec2020 ? decode_rec2020(code) : code;
 }
 
+Matrix3 saturation_matrix(double factor, const Vector3& luminance) {
+  Matrix3 out{};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) out[i][j] = (1 - factor) * luminance[j] + (i == j ? factor : 0);
+  }
+  return out;
+}
+
 }  // namespace lowlux::isp

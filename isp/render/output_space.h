@@ -50,4 +50,10 @@ double encode_transfer(OutputSpace space, double linear);
 /// Inverts encode_transfer. In the step of the Rec.2020 curve it takes the code value of b as the border.
 double decode_transfer(OutputSpace space, double code);
 
+/// Returns the matrix that moves linear colours away from the neutral of their luminance, or to it: out = Y + factor
+/// (rgb
+/// - Y). Luminance and neutrals stay as they are.
+/// @param luminance  weights of Y, sum 1
+Matrix3 saturation_matrix(double factor, const Vector3& luminance);
+
 }  // namespace lowlux::isp

@@ -18,14 +18,29 @@ constexpr double mid_slope = 2 - black_slope;
 double to_power(double x) { return x * std::sqrt(x); }
 double root(double x) { return std::cbrt(x * x); }
 
-double toe(double x) { return x <= 0 ? black_slope * x : x * (black_slope + (1 - black_slope) * x / mid_grey); }
+/// Holds the slopes of a curve before brightness, and the factor of brightness.
+struct Slopes {
+  double mid = mid_slope;
+  double black = black_slope;
+  double gain = 1;
+};
 
-double shoulder(double x, double limit) {
-  const double range = limit - mid_grey;
-  const double needed = to_power(mid_slope * range / (1 - mid_grey)) - 1;
+Slopes slopes_of(const ToneShape& shape) {
+  if (shape == ToneShape{}) return {};
+  const double mid = mid_slope * shape.contrast;
+  return {mid, 2 - mid, std::exp2(shape.brightness_ev)};
+}
+
+double toe(double x, const Slopes& s) {
+  return s.gain * (x <= 0 ? s.black * x : x * (s.black + (1 - s.black) * x / mid_grey));
+}
+
+double shoulder(double x, double limit, const Slopes& s) {
+  const double range = limit - mid_grey, middle = s.gain * mid_grey, slope = s.gain * s.mid;
+  const double needed = to_power(slope * range / (1 - middle)) - 1;
   const double t = x - mid_grey;
   const double bend = needed * to_power(t / range);
-  return mid_grey + mid_slope * t / root(1 + bend);
+  return middle + slope * t / root(1 + bend);
 }
 
 constexpr int mantissa_bits = 23;
@@ -73,16 +88,17 @@ double tone_limit(ToneCurve curve, double exposure_ev) {
   return curve == ToneCurve::none ? 1 : std::clamp(std::exp2(exposure_ev), 1.0, max_tone_limit);
 }
 
-double apply_tone(ToneCurve curve, double scene_linear, double limit) {
+double apply_tone(ToneCurve curve, double scene_linear, double limit, const ToneShape& shape) {
   if (scene_linear >= limit) return 1;
   if (curve == ToneCurve::none) return scene_linear;
-  return scene_linear <= mid_grey ? toe(scene_linear) : shoulder(scene_linear, limit);
+  const Slopes slopes = slopes_of(shape);
+  return scene_linear <= mid_grey ? toe(scene_linear, slopes) : shoulder(scene_linear, limit, slopes);
 }
 
-ToneTable make_tone_table(ToneCurve curve, OutputSpace space, double limit) {
+ToneTable make_tone_table(ToneCurve curve, OutputSpace space, double limit, const ToneShape& shape) {
   assert(limit >= 1 && limit <= max_tone_limit && (curve == ToneCurve::standard || limit == 1));
   const auto exact = [&](double v) {
-    return encode_transfer(space, apply_tone(curve, std::clamp(v, 0.0, 1.0) * limit, limit));
+    return encode_transfer(space, apply_tone(curve, std::clamp(v, 0.0, 1.0) * limit, limit, shape));
   };
   const int octaves = 6 + static_cast<int>(std::lround(std::log2(limit)));
   ToneTable table;

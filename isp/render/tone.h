@@ -15,6 +15,17 @@ enum class ToneCurve : std::uint8_t { standard, none };
 std::optional<ToneCurve> tone_curve_named(std::string_view name);
 std::string_view name_of(ToneCurve curve);
 
+/// Describes a change of the standard curve; the default changes nothing.
+struct ToneShape {
+  double brightness_ev = 0;  // -1..2: mid-grey is shown 2^brightness_ev times as bright, black and white stay
+  double contrast = 1;       // 0.5..1.5: factor of the slope at mid-grey
+  friend bool operator==(const ToneShape&, const ToneShape&) = default;
+};
+inline constexpr double min_brightness_ev = -1;
+inline constexpr double max_brightness_ev = 2;
+inline constexpr double min_contrast = 0.5;
+inline constexpr double max_contrast = 1.5;
+
 /// make_tone_table accepts limits up to this gain, 2^12.
 inline constexpr double max_tone_limit = 4096;
 
@@ -40,9 +51,16 @@ double tone_limit(ToneCurve curve, double exposure_ev);
 /// follows from y(limit) = 1 and is real because g T >= 1 - m for limit >= 1. The slope g (1 + (a t)^p)^(-1/p - 1) is
 /// positive everywhere and continuous at m: monotone and C1 for every limit.
 ///
+/// A shape changes g to 1.3 contrast (and s to 2 - g, so that the toe stays a parabola through black and mid-grey), and
+/// multiplies the result at m, and the slopes on both sides of it, by k = 2^brightness_ev:
+///     toe:       y = k x (s + (1 - s) x / m)
+///     shoulder:  y = k m + k g t / (1 + (a t)^p)^(1/p),          a so that y(limit) = 1
+/// (a t)^p is negative where the line of slope k g ends below 1: the shoulder then bends upward. All shapes are
+/// monotone and C1, with y(0) = 0 and y(limit) = 1. `none` has no shape.
+///
 /// Above the limit the result is 1.
 /// @param limit  value that tone_limit returns
-double apply_tone(ToneCurve curve, double scene_linear, double limit);
+double apply_tone(ToneCurve curve, double scene_linear, double limit, const ToneShape& shape = {});
 
 /// Combines apply_tone and encode_transfer in one table, for kernels. The table's input is v = x / limit in 0..1. Even
 /// steps reach up to x = 2^-6 (or the power of two next to it, if the limit is not a power of two); from there every
@@ -54,6 +72,6 @@ double apply_tone(ToneCurve curve, double scene_linear, double limit);
 /// v = 0 gives exactly 0 and v = 1 exactly 1; the upper edge of the last bin, beyond v = 1, may lie above 1, so that
 /// the line through it meets 1 at v = 1.
 /// @param limit  1..max_tone_limit; exactly 1 for ToneCurve::none
-ToneTable make_tone_table(ToneCurve curve, OutputSpace space, double limit);
+ToneTable make_tone_table(ToneCurve curve, OutputSpace space, double limit, const ToneShape& shape = {});
 
 }  // namespace lowlux::isp

@@ -31,12 +31,12 @@ class FinishOptions : public testing::Test {
     return result.exit_code == 0 ? Json::parse(result.out)[0] : Json();
   }
   void refused(const Words& options, int code, const std::string& part) const {
-    const auto result = develop(options);
+    const auto result = develop(options, "refused.png");
     const std::string said = testing::PrintToString(options) + result.err;
     EXPECT_EQ(result.exit_code, code) << said;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << said;
     EXPECT_TRUE(holds(result.err, part)) << said;
-    EXPECT_TRUE(scratch_.names().empty()) << said;
+    EXPECT_FALSE(scratch_.holds("refused.png")) << said;
   }
   test::ScratchDirectory scratch_;
 };
@@ -89,6 +89,31 @@ TEST_F(FinishOptions, AbsurdWhiteBalancesAreOneLine) {
   }
   refused({"--wb", "pick:60000,5"}, 1, "outside the upright picture");
   refused({"--wb", "100,0.01,100"}, 1, "--wb 5500");
+}
+
+TEST_F(FinishOptions, ExposureIsAGainOrAChangeOfTheAutomaticOne) {
+  const auto ev = [&](const char* text) { return developed({"--exposure", text})["exposure"]["ev"].get<double>(); };
+  const double automatic = ev("auto");
+  EXPECT_NEAR(ev("auto+1"), automatic + 1, 1e-9);
+  EXPECT_NEAR(ev("auto-0.5 EV"), automatic - 0.5, 1e-9);
+  EXPECT_EQ(ev("1"), 1);
+  EXPECT_EQ(ev("+1"), 1) << "what --explain prints can be given again";
+  EXPECT_EQ(ev("-0.5"), -0.5);
+  for (const char* text : {"auto1", "auto+", "auto+20", "+auto", "13", "", "auto+nan"})
+    refused({"--exposure", text}, 2, "--exposure");
+}
+
+TEST_F(FinishOptions, AdjustmentsTakeNumbersInTheirRange) {
+  developed({"--brightness", "+0.5EV", "--contrast", "1.2", "--saturation", "0.8", "--highlights", "reconstruct",
+             "--sharpen", "0.7px"});
+  developed({"--sharpen", "off", "--highlights", "clip", "--brightness", "0", "--contrast", "1"});
+  for (const char* text : {"3", "-3", "x", "nan", ""}) refused({"--brightness", text}, 2, "--brightness");
+  for (const char* text : {"0.4", "1.6", "inf"}) refused({"--contrast", text}, 2, "--contrast");
+  for (const char* text : {"-1", "3.1", "a lot"}) refused({"--saturation", text}, 2, "--saturation");
+  for (const char* text : {"0.2", "2", "on", "-1"}) refused({"--sharpen", text}, 2, "--sharpen");
+  refused({"--highlights", "rebuild"}, 2, "--highlights");
+  refused({"--tone", "none", "--contrast", "1.2"}, 2, "tone curve");
+  refused({"--look", "eye", "--scene-luminance", "1", "--saturation", "2"}, 2, "saturation");
 }
 
 }  // namespace

@@ -195,21 +195,20 @@ TEST(NoiseRatioPlan, PredictsVisibleNoiseOfEachHalf) {
 TEST(NoiseRatioPlan, MultipliesTheModelsNoiseOfLuminance) {
   const auto owner = std::make_unique<DevelopPlan>();
   DevelopPlan& plan = *owner;
-  plan.rendering.look.emplace();
-  plan.rendering.look->noise = NoiseProfile{.scale = {1, 1, 1}, .offset = {0.1, 0.1, 0.1}};
   plan.rendering.white_gain = {1, 1, 1};
   plan.rendering.transform.luminance = {0.25f, 0.5f, 0.25f};
   for (const std::size_t diagonal : {0, 4, 8}) plan.rendering.transform.matrix[diagonal] = 1;
-  RawDn raw;
-  raw.default_crop = {8, 4, 64, 48};
+  RawFrame model;
+  model.noise = NoiseProfile{.scale = {1, 1, 1}, .offset = {0.1, 0.1, 0.1}};
+  model.raw.default_crop = {8, 4, 64, 48};
   Plane<float> quarter(16, 12), without(16, 12), with(16, 12);
   std::fill_n(quarter.data(), quarter.size(), 0.5f);
   const RgbView<const float> rgb{std::as_const(quarter).view(), std::as_const(quarter).view(),
                                  std::as_const(quarter).view()};
-  noise_of_luminance(plan, raw, {}, rgb, without.view(), one_thread);
+  noise_of_luminance(plan, model, {}, rgb, without.view(), one_thread);
   const RawFrame frame = test::mixed_night({}, flat(1, 1, 1), 80, 60, checked(1));
   plan.noise_reduction.noise_ratio = frame.noise_ratio;
-  noise_of_luminance(plan, raw, {}, rgb, with.view(), one_thread);
+  noise_of_luminance(plan, model, {}, rgb, with.view(), one_thread);
   for (int y = 0; y < 12; ++y) {
     for (int x = 0; x < 16; ++x) {
       const bool single = ((8 + 4 * x) / 8 + (4 + 4 * y) / 8) % 2 == 0;

@@ -32,19 +32,20 @@ RC_GTEST_PROP(ExposureProperty, IsWithinItsRangeAndTheOrderOfBlocksDoesNotMatter
   const auto blocks = any_plane(size_between(1, 60), 1, -0.1F, 1.5F, 9);
   std::vector<float> luminance(blocks.data(), blocks.data() + blocks.size());
   const double noise = *rc::gen::element(0.0, 1e-5, 1e-3);
-  const AutoExposure found = auto_exposure(luminance, noise);
+  const AutoExposure found = auto_exposure(luminance, luminance, noise);
   RC_ASSERT(found.ev >= 0 && found.ev <= AutoExposureOptions{}.max_ev);
   std::ranges::reverse(luminance);
-  const AutoExposure other = auto_exposure_reordering(luminance, noise);
+  std::vector<float> largest = luminance;
+  const AutoExposure other = auto_exposure_reordering(luminance, largest, noise);
   RC_ASSERT(other.ev == found.ev && other.rule == found.rule);
 }
 
 RC_GTEST_PROP(ExposureProperty, HalfTheLightGetsOneStopMore, ()) {
   const auto blocks = any_plane(size_between(20, 60), 1, 0.01F, 0.1F);
   std::vector<float> luminance(blocks.data(), blocks.data() + blocks.size());
-  const AutoExposure full = auto_exposure(luminance, 0);
+  const AutoExposure full = auto_exposure(luminance, luminance, 0);
   for (float& y : luminance) y /= 2;
-  RC_ASSERT(std::abs(auto_exposure(luminance, 0).ev - full.ev - 1) < 1e-5);  // EV of floats
+  RC_ASSERT(std::abs(auto_exposure(luminance, luminance, 0).ev - full.ev - 1) < 1e-5);  // EV of floats
 }
 
 /// A camera whose sensitivities are Rec. 709's, each channel as sensitive as it may be.

@@ -87,5 +87,18 @@ TEST(TransferFunction, TheStepOfTheRec2020CurveIsWhatItsRoundingLeaves) {
   EXPECT_LT(std::fabs(at - below), 2e-5);  // a tenth of a 12-bit code is 2.4e-5
 }
 
+TEST(SaturationMatrix, KeepsLuminanceAndNeutralsAndScalesTheDistanceToThem) {
+  const Vector3 weights = *luminance_weights(OutputSpace::srgb);
+  const auto luminance = [&](const Vector3& v) { return weights[0] * v[0] + weights[1] * v[1] + weights[2] * v[2]; };
+  for (const double factor : {0.0, 0.5, 1.0, 2.0, 3.0}) {
+    const Matrix3 m = saturation_matrix(factor, weights);
+    for (const Vector3& rgb : {Vector3{0.3, 0.3, 0.3}, Vector3{0.9, 0.1, 0.2}, Vector3{-0.1, 0.5, 0.0}}) {
+      const Vector3 out = m * rgb;
+      EXPECT_NEAR(luminance(out), luminance(rgb), 1e-12);
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(out[c] - luminance(rgb), factor * (rgb[c] - luminance(rgb)), 1e-12);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lowlux::isp

@@ -94,6 +94,45 @@ TEST(StandardTone, ShowsADiffuseWhiteAsItsCommentSays) {
   EXPECT_NEAR(standard(0.9, 1000), 0.73, 0.01);
 }
 
+std::vector<ToneShape> shapes() {
+  std::vector<ToneShape> all;
+  for (const double brightness_ev : {-1.0, -0.3, 0.0, 1.0, 2.0}) {
+    for (const double contrast : {0.5, 0.8, 1.0, 1.25, 1.5}) all.push_back({brightness_ev, contrast});
+  }
+  return all;
+}
+
+TEST(ToneShape, OfTheDefaultIsTheStandardCurveBitForBit) {
+  for (const double limit : limits()) {
+    for (const double x : {-0.01, 0.0, 0.003, 0.1, 0.18, 0.19, 0.5, 0.9 * limit}) {
+      EXPECT_EQ(apply_tone(ToneCurve::standard, x, limit, {0, 1}), standard(x, limit));
+    }
+  }
+}
+
+TEST(ToneShape, KeepsBlackAndWhiteMovesMidGreyAndChangesTheSlopeThereAsStated) {
+  constexpr double h = 1e-7;
+  for (const ToneShape& shape : shapes()) {
+    const double gain = std::exp2(shape.brightness_ev);
+    for (const double limit : {1.0, 1.5, 8.0, 4096.0}) {
+      const auto tone = [&](double x) { return apply_tone(ToneCurve::standard, x, limit, shape); };
+      EXPECT_EQ(tone(0), 0);
+      EXPECT_EQ(tone(limit), 1);
+      EXPECT_NEAR(tone(limit * (1 - 1e-9)), 1, 1e-7);  // no step at the limit; the slope is below 30
+      EXPECT_NEAR(tone(0.18), 0.18 * gain, 1e-12);
+      EXPECT_NEAR((tone(0.18) - tone(0.18 - h)) / h, 1.3 * shape.contrast * gain, 1e-4);
+      EXPECT_NEAR((tone(0.18 + h) - tone(0.18)) / h, 1.3 * shape.contrast * gain, 1e-2);     // t^1.5 in the shoulder
+      EXPECT_NEAR((tone(h) - tone(-h)) / (2 * h), (2 - 1.3 * shape.contrast) * gain, 1e-4);  // not rectified
+      double before = tone(-0.01);
+      for (int i = 1; i <= 2000; ++i) {
+        const double y = tone(-0.01 + 0.02 * std::expm1(i / 2000.0 * std::log1p((limit + 0.01) / 0.02)));
+        ASSERT_GE(y, before) << shape.brightness_ev << " " << shape.contrast << " " << limit;
+        before = y;
+      }
+    }
+  }
+}
+
 struct TableErrors {
   double code8 = 0;   // of 255
   double code16 = 0;  // of 65535
@@ -110,13 +149,13 @@ double interpolated(const ToneTable& table, float v) {
   return table.edge[bin] + t * (table.edge[bin + 1] - table.edge[bin]);
 }
 
-TableErrors errors_of(ToneCurve curve, OutputSpace space, double limit) {
-  const ToneTable table = make_tone_table(curve, space, limit);
+TableErrors errors_of(ToneCurve curve, OutputSpace space, double limit, const ToneShape& shape = {}) {
+  const ToneTable table = make_tone_table(curve, space, limit, shape);
   TableErrors worst;
   for (int i = 0; i <= 30000; ++i) {
     const double t = i / 30000.0;
     const auto v = static_cast<float>(t * t * t);  // dense in the shadows
-    const double exact = encode_transfer(space, apply_tone(curve, v * limit, limit));
+    const double exact = encode_transfer(space, apply_tone(curve, v * limit, limit, shape));
     worst.code8 = std::fmax(worst.code8, std::fabs(table.code8[table.bin_of(v)] - 255 * exact));
     worst.code16 = std::fmax(worst.code16, 65535 * std::fabs(interpolated(table, v) - exact));
   }
@@ -148,6 +187,17 @@ TEST(ToneTable, ErrorsAreAsStatedForEverySpaceAndLimit) {
     const TableErrors none = errors_of(ToneCurve::none, known.space, 1);
     EXPECT_LE(none.code8, is_linear(known.space) ? stated_errors[0].code8_linear : stated_errors[0].code8);
     EXPECT_LE(none.code16, stated_errors[0].code16) << known.name;
+  }
+}
+
+TEST(ToneTable, ErrorsOfShapesAreThoseOfTheStandardCurveTimesTheirSlope) {
+  for (const ToneShape& shape : shapes()) {
+    for (const double limit : {1.0, 2.0, 500.0}) {
+      const TableErrors found = errors_of(ToneCurve::standard, OutputSpace::srgb, limit, shape);
+      // Half a code of rounding and half a bin of a slope that is up to 1.5 * 4 times as steep: 0.5 + 6 * 0.2.
+      EXPECT_LE(found.code8, 1.7) << shape.brightness_ev << " " << shape.contrast << " " << limit;
+      EXPECT_LE(found.code16, 3) << shape.brightness_ev << " " << shape.contrast << " " << limit;
+    }
   }
 }
 

@@ -194,6 +194,7 @@ Wrong wrong_for_live(const CLI::App& app, const CaptureArgs& args) {
   if (options.white_balance.mode != WhiteMode::as_shot && options.white_balance.mode != WhiteMode::automatic) {
     return "--wb of --live is as-shot or auto";
   }
+  if (options.exposure_offset_ev != 0) return "--exposure of --live is auto or a number of EV";
   if (options.look.look == isp::Look::model) return "--look of --live is camera or eye";
   if (options.denoise.mode == isp::DenoiseChoice::Mode::level && options.denoise.level == denoise::Level::best) {
     return "--denoise best takes seconds for a frame: --live has up to high";

@@ -70,6 +70,8 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
   DevelopArgs args;
   add_output(app, args);
   add_rendering(app, args);
+  add_adjustments(app, args.options);
+  add_finish(app, args.options);
   add_framing(app, args.options);
   add_choice<bool>(
       app, "--baseline-exposure", {{"on", true}, {"off", false}}, [&args](bool on) { args.baseline_exposure = on; },
@@ -234,13 +236,17 @@ std::optional<std::string> set_black(const std::string& text, DevelopArgs& args)
 
 std::optional<std::string> set_exposure(const std::string& text, DevelopArgs& args) {
   args.exposure_given = true;
-  if (text == "auto") {
-    args.options.exposure_ev.reset();
-  } else if (const auto ev = quantity_of(text, "EV"); ev && std::fabs(*ev) <= max_exposure_ev) {
-    args.options.exposure_ev = *ev;
-  } else {
-    return fmt::format("is neither auto nor a number of EV from -{} to {}", max_exposure_ev, max_exposure_ev);
+  const bool automatic = text.starts_with("auto");
+  const std::string figure = automatic ? text.substr(4) : text;
+  const bool signed_or_none = figure.empty() || figure.front() == '+' || figure.front() == '-';
+  const auto ev = automatic && figure.empty() ? 0.0 : quantity_of(figure, "EV");
+  if (!ev || std::fabs(*ev) > max_exposure_ev || (automatic && !signed_or_none)) {
+    return fmt::format("is neither auto, nor auto with a change (auto+1, auto-0.5), nor a number of EV from -{} to {}",
+                       max_exposure_ev, max_exposure_ev);
   }
+  args.options.exposure_offset_ev = automatic ? *ev : 0;
+  args.options.exposure_ev.reset();
+  if (!automatic) args.options.exposure_ev = *ev;
   return std::nullopt;
 }
 
@@ -249,9 +255,9 @@ std::optional<std::string> set_exposure(const std::string& text, DevelopArgs& ar
 void add_rendering(CLI::App& app, DevelopArgs& args) {
   isp::DevelopOptions& o = args.options;
   add_text(
-      app, "--exposure", "auto|EV",
-      "exposure compensation in EV; auto places the median at middle grey, limited by shadow noise (default: auto; "
-      "in linear spaces 0)",
+      app, "--exposure", "auto[+EV|-EV]|EV",
+      "gain in EV, with or without a sign; auto places the median at middle grey, limited by highlights, night and "
+      "shadow noise; auto+1 is one EV above auto (default: auto; in linear spaces 0)",
       [&args](const std::string& text) { return set_exposure(text, args); });
   add_white_balance(app, o.white_balance);
   add_choice<isp::ToneCurve>(

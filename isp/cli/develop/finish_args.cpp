@@ -6,14 +6,17 @@
 #include <optional>
 #include <string>
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "isp/cli/shared/option_values.h"
+#include "isp/render/capture_sharpening.h"
 
 namespace lowlux::cli {
 namespace {
 
 constexpr int max_side_px = 65535;
+constexpr double max_saturation = 3;
 
 /// Returns a crop of four whole numbers of pixels, or of four percentages, each with its sign.
 std::optional<isp::PictureCrop> crop_of(const std::string& text) {
@@ -34,7 +37,50 @@ std::optional<isp::PictureCrop> crop_of(const std::string& text) {
   return isp::PictureCrop{figures[0], figures[1], figures[2], figures[3], percent};
 }
 
+/// Returns a store for a number within a range, the unit in any case or left out.
+OptionStore store_in_range(double least, double most, const char* unit, double& out) {
+  return [=, &out](const std::string& text) -> std::optional<std::string> {
+    const auto figure = *unit == '\0' ? number_of(text) : quantity_of(text, unit);
+    if (!figure || !(*figure >= least && *figure <= most))
+      return fmt::format("is not a number from {} to {}", least, most);
+    out = *figure;
+    return std::nullopt;
+  };
+}
+
 }  // namespace
+
+void add_adjustments(CLI::App& app, isp::DevelopOptions& options) {
+  add_text(app, "--brightness", "EV", "show mid-tones 2^EV times as bright, black and white stay: -1 to 2 (default: 0)",
+           store_in_range(isp::min_brightness_ev, isp::max_brightness_ev, "EV", options.tone_shape.brightness_ev));
+  add_text(app, "--contrast", "FACTOR", "factor of the tone curve's slope at middle grey: 0.5 to 1.5 (default: 1)",
+           store_in_range(isp::min_contrast, isp::max_contrast, "", options.tone_shape.contrast));
+  add_text(app, "--saturation", "FACTOR",
+           "factor of the distance to the grey of the same luminance, in linear light: 0 to 3 (default: 1)",
+           store_in_range(0, max_saturation, "", options.saturation));
+}
+
+void add_finish(CLI::App& app, isp::DevelopOptions& options) {
+  add_choice<isp::Highlights>(
+      app, "--highlights", {{"clip", isp::Highlights::clip}, {"reconstruct", isp::Highlights::reconstruct}},
+      [&options](isp::Highlights highlights) { options.highlights = highlights; },
+      "saturated colours: make them white, or rebuild them from the channels left and the light around (default: "
+      "clip)");
+  add_text(app, "--sharpen", "off|BLUR",
+           "sharpen for a blur of this standard deviation in pixels, 0.3 to 1.5, as far as detail exceeds the noise "
+           "(default: off)",
+           [&options](const std::string& text) -> std::optional<std::string> {
+             options.sharpen_px.reset();
+             if (text == "off") return std::nullopt;
+             const auto blur = quantity_of(text, "px");
+             if (!blur || !(*blur >= isp::min_sharpening_px && *blur <= isp::max_sharpening_px)) {
+               return fmt::format("is neither off nor a blur from {} to {} pixels", isp::min_sharpening_px,
+                                  isp::max_sharpening_px);
+             }
+             options.sharpen_px = *blur;
+             return std::nullopt;
+           });
+}
 
 void add_framing(CLI::App& app, isp::DevelopOptions& options) {
   add_text(

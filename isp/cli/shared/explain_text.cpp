@@ -191,6 +191,13 @@ std::string flat_text(const calib::FlatField& flat) {
       100 * flat.noise);
 }
 
+std::string gain_text(const isp::DevelopPlan& plan) {
+  std::string text = fmt::format("{:+.2f} EV, {}", plan.rendering.exposure_ev, plan.rendering.exposure_rule);
+  const double offset_ev = plan.options.exposure_offset_ev;
+  if (!plan.options.exposure_ev && offset_ev != 0) text += fmt::format(", changed by {:+.2f} EV", offset_ev);
+  return text;
+}
+
 std::string framing_text(const isp::Framing& framing) {
   const Rect& kept = framing.pixels;
   std::string text = fmt::format("{} x {} pixels from column {}, row {} (before orientation)", kept.width, kept.height,
@@ -222,7 +229,11 @@ std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* f
   out.add("white", plan.rendering.white
                        ? fmt::format("{}, {:.0f} K", plan.rendering.white_balance_rule, plan.rendering.white->cct_k)
                        : std::string(plan.rendering.white_balance_rule));
-  out.add("exposure", fmt::format("{:+.2f} EV, {}", plan.rendering.exposure_ev, plan.rendering.exposure_rule));
+  out.add("exposure", gain_text(plan));
+  if (plan.options.highlights == isp::Highlights::reconstruct) {
+    out.add("highlights", fmt::format("reconstructed up to {:.2f} times the scene's white", plan.rendering.limit));
+  }
+  if (plan.sharpen_px) out.add("sharpening", fmt::format("of a blur of {:g} pixels", *plan.sharpen_px));
   if (plan.framing) out.add("framing", framing_text(*plan.framing));
   if (plan.rendering.profile) add_profile(out, *plan.rendering.profile);
   if (plan.rendering.look) {

@@ -251,6 +251,8 @@ std::string develop_json(const DevelopOutcome& outcome, const Defaults& defaults
             {"unit", plan.levels.electrons_at_white ? "electrons" : "fraction-of-white"},
             {"white_balance", white_json(plan)},
             {"exposure", {{"ev", plan.rendering.exposure_ev}, {"rule", plan.rendering.exposure_rule}}},
+            {"highlights", plan.options.highlights == isp::Highlights::clip ? "clip" : "reconstruct"},
+            {"sharpen_px", optional_json(plan.sharpen_px)},
             {"framing", framing_json(plan)},
             {"defects_repaired", plan.levels.defects.size()},
             {"effects", effects_json(plan)},

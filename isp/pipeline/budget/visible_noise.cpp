@@ -41,7 +41,7 @@ class Display {
   Display(const DevelopOptions& options, const Rendering& rendering)
       : options_(options),
         rendering_(rendering),
-        limit_(tone_limit(options.tone, rendering.exposure_ev)),
+        limit_(rendering.limit),
         to_xyz_(*inverse(*xyz_to_output(options.space))),
         white_(*xyz_of(output_white)) {}
 
@@ -99,7 +99,8 @@ class Display {
   Vector3 toned(const Vector3& linear) const {
     Vector3 out{};
     for (int i = 0; i < 3; ++i) {
-      out[i] = std::min(apply_tone(options_.tone, std::clamp(linear[i], 0.0, 1.0) * limit_, limit_), 1.0);
+      out[i] = std::min(
+          apply_tone(options_.tone, std::clamp(linear[i], 0.0, 1.0) * limit_, limit_, options_.tone_shape), 1.0);
     }
     return out;
   }

@@ -87,15 +87,6 @@ LiveNoise with_masked_charge(LiveNoise noise, const BlackPoint& black) {
   return noise;
 }
 
-/// Returns the matrix that moves linear colours away from the neutral of their luminance, or to it.
-Matrix3 saturated(double saturation, const Vector3& luminance) {
-  Matrix3 out{};
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) out[i][j] = (1 - saturation) * luminance[j] + (i == j ? saturation : 0);
-  }
-  return out;
-}
-
 /// Returns the camera RGB of daylight; equal channels where no calibration states it.
 Vector3 daylight_of(const CameraColour& colour) {
   if (colour.calibrations.empty()) return {1, 1, 1};
@@ -230,7 +221,7 @@ WhiteBalance LivePlanner::choose_white(const LiveFacts& facts, RawFrame& frame) 
 Result<Matrix3> LivePlanner::balanced_matrix(const LiveFacts& facts, const RawFrame& frame,
                                              const WhiteBalance& balance) const {
   const Vector3 luminance = *luminance_weights(plan_.options.space);
-  const Matrix3 colours = saturated(facts.saturation, luminance);
+  const Matrix3 colours = saturation_matrix(facts.saturation, luminance);
   if (facts.colour_matrix) return colours * *facts.colour_matrix;
   const bool coloured = frame.raw.layout != SensorLayout::monochrome;
   if (coloured && frame.colour.calibrations.empty()) return colours;
@@ -260,6 +251,7 @@ Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame)
   if (!balanced) return tl::make_unexpected(balanced.error());
   blocks_.resize(needs_light(facts) ? thumbnail_.mean.plane[0].size() : 0);
   rendered_luminance(thumbnail_.mean, plan_.options.space, out.white_gain, *balanced, blocks_);
+  largest_.resize(blocks_.size());
   const double noise_std = thumbnail_.black_noise_std * *std::ranges::max_element(out.white_gain);
   plan_.options.exposure_ev = facts.exposure_ev;
   if (facts.exposure_ev) {
@@ -267,7 +259,9 @@ Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame)
     out.exposure_rule = "given";
   } else {
     memory_.assign(blocks_.begin(), blocks_.end());
-    const AutoExposure automatic = auto_exposure_reordering(memory_, noise_std);
+    rendered_largest(thumbnail_.mean, out.white_gain, *balanced, largest_);
+    const AutoExposure automatic =
+        auto_exposure_reordering(memory_, largest_, noise_std, exposure_options(frame.raw.info, plan_.options));
     out.exposure_ev = smooth_exposure(automatic.ev);
     out.exposure_rule = name_of(automatic.rule);
   }
@@ -276,10 +270,11 @@ Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame)
   if (!look) return tl::make_unexpected(std::move(look.error()));
   out.look = *std::move(look);
   if (out.look) out.exposure_ev += out.look->dimming_ev;
-  out.transform = transform_of(out.look ? out.look->adaptation * *balanced : *balanced, out.exposure_ev, plan_.options);
-  if (const double limit = tone_limit(plan_.options.tone, out.exposure_ev); limit != tone_limit_) {
-    out.tone = tone_of(out.exposure_ev, plan_.options);
-    tone_limit_ = limit;
+  out.limit = tone_limit(plan_.options.tone, out.exposure_ev);
+  out.transform = transform_of(out.look ? out.look->adaptation * *balanced : *balanced, out, plan_.options);
+  if (out.limit != tone_limit_) {
+    out.tone = tone_of(out.limit, plan_.options);
+    tone_limit_ = out.limit;
   }
   return {};
 }

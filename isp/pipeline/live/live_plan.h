@@ -131,6 +131,7 @@ class LivePlanner {
   struct Before {
     std::optional<double> exposure_s, iso, e_per_dn;
   } last_;
+  std::vector<float> largest_;
   double tone_limit_ = 0;  // of the plan's tone table; 0: none yet
   bool first_ = true;
 };

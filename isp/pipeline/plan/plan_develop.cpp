@@ -13,6 +13,7 @@
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/pipeline/plan/rendering.h"
 #include "isp/raw/corrections.h"
+#include "isp/raw/measure/saturation.h"
 #include "isp/raw/measure/thumbnail.h"
 #include "isp/raw/subtract_dark_frame.h"
 #include "isp/raw/to_linear.h"
@@ -164,6 +165,14 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   append(plan.warnings, noise->warnings);
   if (rendering->look && rendering->look->noise_limit && !rendering->look->noise && !noise->has_level()) {
     plan.warnings.emplace_back("the noise of the frame is not known, so it is not held to a limit");
+  }
+  if (options.highlights == Highlights::reconstruct) plan.saturation = measure_saturation(frame.raw, levels->black);
+  if (options.sharpen_px) {
+    if (noise->has_level() || frame.noise) {
+      plan.sharpen_px = options.sharpen_px;
+    } else {
+      plan.warnings.emplace_back("the noise of the frame is not known, so the image is not sharpened");
+    }
   }
   std::vector<float> memory;
   DemosaicRequest interpolation{.method = options.demosaic, .signal_e = median_green_e(frame, *levels, light, memory)};

@@ -19,6 +19,7 @@ struct FrameLight {
   std::optional<WhitePoint> white;         // absent without a colour calibration
   double exposure_ev = 0;
   Matrix3 balanced = identity3();  // result of balanced_to_output()
+  double headroom_ev = 0;          // by which the tone curve's range is extended
 };
 
 // Steps of plan_look() that concern the light of the scene, in this order.

@@ -227,7 +227,7 @@ Result<std::optional<LookPlan>> plan_look(const RawFrame& frame, const FrameLigh
     if (auto adapted = decide_adaptation(light, options, look); !adapted) return tl::make_unexpected(adapted.error());
   }
   const double exposure_ev = light.exposure_ev + look.dimming_ev;
-  const double units = std::exp2(exposure_ev) / tone_limit(options.tone, exposure_ev);
+  const double units = std::exp2(exposure_ev) / tone_limit(options.tone, exposure_ev + light.headroom_ev);
   eye.cd_m2_per_unit = white_cd_m2 / units;
   eye.dark = static_cast<float>(std::clamp(light.black_noise_std * units, min_dark, 1.0));
   set_primaries(options.space, light.balanced, look);

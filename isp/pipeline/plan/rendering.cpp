@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "isp/model/sensor/scene_luminance.h"
 #include "isp/pipeline/plan/plan_look.h"
-#include "isp/render/exposure.h"
 #include "isp/render/output_space.h"
 
 namespace lowlux::isp {
@@ -62,19 +62,19 @@ bool has_profile_curve(const DevelopOptions& options, const std::optional<WhiteP
 }
 
 /// Returns the tables of the profile, placed before and after exposure; nullopt where they are not applied.
+/// @param colours  applied after the tables
 std::optional<ProfileRendering> decide_profile(const RawFrame& frame, const DevelopOptions& options,
-                                               const Rendering& rendering, bool has_curve) {
+                                               const Rendering& rendering, const Matrix3& colours, bool has_curve) {
   const bool has_look = rendering.look && rendering.look->kind != Look::camera;
   if (!options.profile_tables || !rendering.white || has_look || is_linear(options.space)) return std::nullopt;
-  const double limit = tone_limit(options.tone, rendering.exposure_ev);
   const Matrix3 to_prophoto = xyz_to_prophoto() * *inverse(*xyz_to_output(options.space));
   return ProfileRendering{.map = map_at(*options.profile_tables, calibration_weight(frame.colour, rendering.white->xy)),
                           .look = options.profile_tables->look,
                           .curve = has_curve ? options.profile_tables->curve : std::nullopt,
                           .to_prophoto = to_prophoto,
-                          .from_prophoto = *inverse(to_prophoto),
-                          .map_scale = std::exp2(rendering.exposure_ev) / limit,
-                          .limit = limit};
+                          .from_prophoto = colours * *inverse(to_prophoto),
+                          .map_scale = std::exp2(rendering.exposure_ev) / rendering.limit,
+                          .limit = rendering.limit};
 }
 
 /// Returns the white balance of a frame of unknown colours, with what that means as its reason.
@@ -106,16 +106,28 @@ Result<WhiteBalance> with_white(Result<WhiteBalance> balance, const RawFrame& fr
               "the white balance of the file is not a colour that a light can have: try --wb 5500, or --space camera");
 }
 
-void decide_exposure(const DevelopOptions& options, std::span<const float> luminance, double black_noise_std,
-                     Rendering& out) {
+void decide_exposure(const FrameInfo& info, const DevelopOptions& options, std::span<const float> luminance,
+                     std::span<const float> largest, double black_noise_std, Rendering& out) {
   if (options.exposure_ev) {
     out.exposure_ev = *options.exposure_ev;
     out.exposure_rule = "given";
     return;
   }
-  const AutoExposure automatic = auto_exposure(luminance, black_noise_std);
-  out.exposure_ev = automatic.ev;
+  const AutoExposure automatic = auto_exposure(luminance, largest, black_noise_std, exposure_options(info, options));
+  out.exposure_ev = automatic.ev + options.exposure_offset_ev;
   out.exposure_rule = name_of(automatic.rule);
+}
+
+/// Returns the matrix of --saturation for linear colours of the output space.
+Matrix3 colours_of(const DevelopOptions& options) {
+  return options.saturation == 1 ? identity3() : saturation_matrix(options.saturation, luminance_of(options.space));
+}
+
+/// Returns by how much the range above the first saturated channel is extended, for what is reconstructed: to where the
+/// last channel saturates.
+double headroom_ev(const std::array<float, 3>& white_gain, const DevelopOptions& options) {
+  if (options.highlights == Highlights::clip) return 0;
+  return std::log2(static_cast<double>(*std::ranges::max_element(white_gain)));
 }
 
 }  // namespace
@@ -165,21 +177,37 @@ void rendered_luminance(const CameraRgb& blocks, OutputSpace space, const std::a
   }
 }
 
-RgbTransform transform_of(const Matrix3& balanced, double exposure_ev, const DevelopOptions& options) {
-  const double limit = tone_limit(options.tone, exposure_ev);
-  const Matrix3 scaled = (std::exp2(exposure_ev) / limit) * balanced;
+void rendered_largest(const CameraRgb& blocks, const std::array<float, 3>& white_gain, const Matrix3& balanced,
+                      std::span<float> out) {
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    Vector3 camera{};
+    for (int c = 0; c < 3; ++c) camera[c] = std::min(blocks.plane[c].data()[i] * white_gain[c], 1.0f);
+    const Vector3 rgb = balanced * camera;
+    out[i] = static_cast<float>(*std::ranges::max_element(rgb));
+  }
+}
+
+AutoExposureOptions exposure_options(const FrameInfo& info, const DevelopOptions& options) {
+  AutoExposureOptions out;
+  if (options.look.look == Look::camera) out.white_cd_m2 = saturation_luminance_cd_m2(info);
+  return out;
+}
+
+RgbTransform transform_of(const Matrix3& balanced, const Rendering& rendering, const DevelopOptions& options) {
+  const Matrix3 scaled = (std::exp2(rendering.exposure_ev) / rendering.limit) * balanced;
   const Vector3 luminance = luminance_of(options.space);
   RgbTransform out;
   for (int i = 0; i < 9; ++i) out.matrix[i] = static_cast<float>(scaled[i / 3][i % 3]);
   for (int c = 0; c < 3; ++c) out.luminance[c] = static_cast<float>(luminance[c]);
-  out.clip = options.space == OutputSpace::camera ? INFINITY : 1.0f;
+  const bool keeps_all = options.space == OutputSpace::camera || options.highlights == Highlights::reconstruct;
+  out.clip = keeps_all ? INFINITY : 1.0f;
   out.move_into_gamut = options.samples != SampleType::f32;
   return out;
 }
 
-ToneTable tone_of(double exposure_ev, const DevelopOptions& options) {
+ToneTable tone_of(double limit, const DevelopOptions& options) {
   if (options.samples == SampleType::f32) return {};
-  return make_tone_table(options.tone, options.space, tone_limit(options.tone, exposure_ev));
+  return make_tone_table(options.tone, options.space, limit, options.tone_shape);
 }
 
 Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light, const DevelopOptions& requested,
@@ -198,23 +226,28 @@ Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light
 
   const Result<Matrix3> balanced = balanced_to_output(frame, options, *balance);
   if (!balanced) return tl::make_unexpected(balanced.error());
-  std::vector<float> blocks(light.mean.plane[0].size());
+  std::vector<float> blocks(light.mean.plane[0].size()), largest(blocks.size());
   rendered_luminance(light.mean, options.space, out.white_gain, *balanced, blocks);
+  rendered_largest(light.mean, out.white_gain, *balanced, largest);
   const double noise_std = light.black_noise_std * *std::ranges::max_element(out.white_gain);
-  decide_exposure(options, blocks, noise_std, out);
+  decide_exposure(frame.raw.info, options, blocks, largest, noise_std, out);
   const bool has_curve = has_profile_curve(options, out.white);
   if (has_curve) {
     options.tone = ToneCurve::none;
     if (!options.exposure_ev) out.exposure_ev += std::log2(options.profile_tables->curve->mid_grey / mid_grey);
   }
+  const double headroom = headroom_ev(out.white_gain, options);
   Result<std::optional<LookPlan>> look =
-      plan_look(frame, {blocks, noise_std, out.white, out.exposure_ev, *balanced}, options);
+      plan_look(frame, {blocks, noise_std, out.white, out.exposure_ev, *balanced, headroom}, options);
   if (!look) return tl::make_unexpected(std::move(look.error()));
   out.look = *std::move(look);
   if (out.look) out.exposure_ev += out.look->dimming_ev;
-  out.transform = transform_of(out.look ? out.look->adaptation * *balanced : *balanced, out.exposure_ev, options);
-  out.tone = tone_of(out.exposure_ev, options);
-  out.profile = decide_profile(frame, options, out, has_curve);
+  out.limit = tone_limit(options.tone, out.exposure_ev + headroom);
+  const Matrix3 colours = colours_of(options);
+  out.profile = decide_profile(frame, options, out, colours, has_curve);
+  const Matrix3 adapted = out.look ? out.look->adaptation * *balanced : *balanced;
+  out.transform = transform_of(out.profile ? adapted : colours * adapted, out, options);
+  out.tone = tone_of(out.limit, options);
   if (!out.look || out.look->kind != Look::model) return out;
   Result<ModelTable> model =
       tabulate_model(*out.look, {out.white, out.white_gain, out.transform, out.exposure_ev}, options);

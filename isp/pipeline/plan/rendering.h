@@ -16,6 +16,7 @@
 #include "isp/pipeline/plan/look.h"
 #include "isp/raw/kernel/raw_to_rgb.h"
 #include "isp/raw/measure/thumbnail.h"
+#include "isp/render/exposure.h"
 #include "isp/render/profile_tables.h"
 #include "isp/render/white_balance.h"
 
@@ -29,6 +30,7 @@ struct Rendering {
   std::array<float, 3> white_gain{1, 1, 1};
   double exposure_ev = 0;
   std::string_view exposure_rule;
+  double limit = 1;                         // scene-linear value after exposure that becomes display white
   std::optional<LookPlan> look;             // absent: that of the camera
   std::optional<ProfileRendering> profile;  // tables of DevelopOptions::profile_tables, where they are applied
   RgbTransform transform;
@@ -64,11 +66,20 @@ Result<Matrix3> balanced_to_output(const RawFrame& frame, const DevelopOptions& 
 void rendered_luminance(const CameraRgb& blocks, OutputSpace space, const std::array<float, 3>& white_gain,
                         const Matrix3& balanced, std::span<float> out);
 
-/// Returns the kernels' transform for an exposure. Camera RGB is written unchanged; all other spaces are clipped where
-/// the first channel saturates: clipped colours are then neutral.
-RgbTransform transform_of(const Matrix3& balanced, double exposure_ev, const DevelopOptions& options);
+/// Computes the largest channel of each block as it will be rendered, before exposure.
+void rendered_largest(const CameraRgb& blocks, const std::array<float, 3>& white_gain, const Matrix3& balanced,
+                      std::span<float> out);
 
-/// Returns the tone table for an exposure; an empty one for float samples, which have no tone curve.
-ToneTable tone_of(double exposure_ev, const DevelopOptions& options);
+/// Returns the options of an automatic exposure. The luminance of the scene follows from f-number, exposure time and
+/// ISO speed where they are known; with a look it is left to that.
+AutoExposureOptions exposure_options(const FrameInfo& info, const DevelopOptions& options);
+
+/// Returns the kernels' transform for exposure and limit of `rendering`. Camera RGB is written unchanged; all other
+/// spaces are clipped where the first channel saturates, so that clipped colours are neutral, unless highlights are
+/// reconstructed.
+RgbTransform transform_of(const Matrix3& balanced, const Rendering& rendering, const DevelopOptions& options);
+
+/// Returns the tone table for a limit; an empty one for float samples, which have no tone curve.
+ToneTable tone_of(double limit, const DevelopOptions& options);
 
 }  // namespace lowlux::isp

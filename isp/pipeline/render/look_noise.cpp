@@ -11,20 +11,10 @@
 namespace lowlux::isp {
 namespace {
 
-// Returns the luminance of a unit of each channel of white-balanced camera RGB.
-std::array<float, 3> weights_of(const DevelopPlan& plan) {
-  std::array<float, 3> weights{};
-  for (int c = 0; c < 3; ++c) {
-    for (int j = 0; j < 3; ++j)
-      weights[c] += plan.rendering.transform.luminance[j] * plan.rendering.transform.matrix[3 * j + c];
-  }
-  return weights;
-}
-
 // Averages the residual variance of luma over the cells of 2 x 2 that lie in each cell of the grid.
 void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const float>& residual, PlaneView<float> out,
              Executor& executor) {
-  const std::array<float, 3> weights = weights_of(plan);
+  const std::array<float, 3> weights = luminance_of_camera(plan);
   const auto electrons = static_cast<float>(mean_of_sites(light_at_white_e(plan.levels)));
   const float unit = (weights[0] + weights[1] + weights[2]) / electrons;
   const int cells = plan.options.half ? 4 : 2;  // cells of the map along a side of the grid's
@@ -44,14 +34,13 @@ void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const fl
 
 // Returns the noise profile at fractions of light_at_white_e: with dark charge d and E electrons at white, raw values
 // are d / E + (1 - d / E) x.
-NoiseProfile profile_of_light(const DevelopPlan& plan, BayerPhase phase) {
-  NoiseProfile out = *plan.rendering.look->noise;
+NoiseProfile profile_of_light(const DevelopPlan& plan, const NoiseProfile& raw, BayerPhase phase) {
+  NoiseProfile out = raw;
   const PerSite<double>& dark_e = plan.levels.black.dark_mean_e;
   if (dark_e == PerSite<double>{}) return out;
   for (int site = 0; site < 4; ++site) {
     const auto c = static_cast<std::size_t>(colour_at(phase, site & 1, site >> 1));
     const double dark = dark_e[site] / (*plan.levels.electrons_at_white)[site], light = 1 - dark;
-    const NoiseProfile& raw = *plan.rendering.look->noise;
     out.scale[c] = raw.scale[c] / light;
     out.offset[c] = (raw.offset[c] + raw.scale[c] * dark) / (light * light);
   }
@@ -64,7 +53,7 @@ void of_model(const DevelopPlan& plan, const Rect& crop, const NoiseProfile& noi
               PlaneView<float> out, Executor& executor) {
   const NoiseRatioView ratio = view_of(plan.noise_reduction.noise_ratio.get()).from(crop.x, crop.y);
   const int side = plan.options.half ? 8 : 4;  // of a cell of the grid, in pixels of the mosaic
-  const std::array<float, 3> weights = weights_of(plan);
+  const std::array<float, 3> weights = luminance_of_camera(plan);
   const bool monochrome = !plan.rendering.white;  // one plane serves for all three
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
@@ -86,19 +75,29 @@ void of_model(const DevelopPlan& plan, const Rect& crop, const NoiseProfile& noi
 
 }  // namespace
 
-void noise_of_luminance(const DevelopPlan& plan, const RawDn& raw, const NoiseMaps& maps,
+std::array<float, 3> luminance_of_camera(const DevelopPlan& plan) {
+  std::array<float, 3> weights{};
+  for (int c = 0; c < 3; ++c) {
+    for (int j = 0; j < 3; ++j)
+      weights[c] += plan.rendering.transform.luminance[j] * plan.rendering.transform.matrix[3 * j + c];
+  }
+  return weights;
+}
+
+void noise_of_luminance(const DevelopPlan& plan, const RawFrame& frame, const NoiseMaps& maps,
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
   if (plan.noise_reduction.has_level()) {
-    of_maps(plan, raw.default_crop, maps.residual_variance_e2.view(), out, executor);
+    of_maps(plan, frame.raw.default_crop, maps.residual_variance_e2.view(), out, executor);
   } else {
-    of_model(plan, raw.default_crop, profile_of_light(plan, raw.phase), quarter, out, executor);
+    const RawDn& raw = frame.raw;
+    of_model(plan, raw.default_crop, profile_of_light(plan, *frame.noise, raw.phase), quarter, out, executor);
   }
 }
 
 void signal_to_noise(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<const float> variance,
                      PlaneView<float> out, Executor& executor) {
   constexpr float min_variance = 1e-20f, max_ratio = 1e6f;
-  const std::array<float, 3> weights = weights_of(plan);
+  const std::array<float, 3> weights = luminance_of_camera(plan);
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       for (int x = 0; x < out.width; ++x) {

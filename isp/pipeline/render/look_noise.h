@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "isp/base/executor.h"
 #include "isp/base/image.h"
 #include "isp/pipeline/plan.h"
@@ -8,12 +10,16 @@ namespace lowlux::isp {
 
 /// Computes the variance of the noise in the luminance of the image's pixels, in their unit (that of
 /// plan.rendering.transform), one value for each cell of 4 x 4: the residual noise that the denoiser predicts, or the
-/// input noise that the noise model predicts. Needs noise that was reduced, or a look with a noise model.
+/// input noise that the noise model predicts. Needs noise that was reduced, or a frame with a noise profile.
 /// @param maps  of the active area; read where noise was reduced
 /// @param quarter  means of camera RGB (RawToRgb::quarter), read where noise was not reduced
 /// @param out  ceil(plan.height / 4) x ceil(plan.width / 4)
-void noise_of_luminance(const DevelopPlan& plan, const RawDn& raw, const NoiseMaps& maps,
+void noise_of_luminance(const DevelopPlan& plan, const RawFrame& frame, const NoiseMaps& maps,
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor);
+
+/// Returns the luminance of a unit of each channel of white-balanced camera RGB, in the unit of
+/// plan.rendering.transform.
+std::array<float, 3> luminance_of_camera(const DevelopPlan& plan);
 
 /// Computes NoiseGrid from the result of noise_of_luminance: the mean luminance of each cell over the standard
 /// deviation of its pixels' noise, 0 for cells without light and at most 1e6.

@@ -12,6 +12,8 @@
 #include "isp/raw/corrections.h"
 #include "isp/raw/to_linear.h"
 #include "isp/render/area_mean.h"
+#include "isp/render/capture_sharpening.h"
+#include "isp/render/highlights.h"
 #include "isp/render/night/seeing_map.h"
 
 namespace lowlux::isp {
@@ -29,6 +31,13 @@ DnMosaic code_mosaic(const RawDn& raw, const DevelopPlan& plan) {
           phase_of_crop(raw.phase, crop.x, crop.y),
           {of_crop(plan.levels.black.pedestal_dn, crop), site_gains(raw, plan.rendering.white_gain, range, crop)},
           plan.demosaic.demosaic};
+}
+
+/// Returns the white-balanced camera RGB of a saturated pixel.
+std::array<float, 3> saturation_of(const DevelopPlan& plan) {
+  std::array<float, 3> out = plan.rendering.white_gain;
+  for (float& channel : out) channel *= static_cast<float>(plan.saturation);
+  return out;
 }
 
 }  // namespace
@@ -127,7 +136,7 @@ void Pipeline::measure_cells(const RgbInput& in, const RawFrame& frame, const De
   kernel_->quarter(in, {quarter_[0].view(), quarter_[1].view(), quarter_[2].view()}, executor_);
   if (!needs_noise(plan)) return;
   fit(luminance_noise_, width, height);
-  noise_of_luminance(plan, frame.raw, noise_maps_, quarter_view(), luminance_noise_.view(), executor_);
+  noise_of_luminance(plan, frame, noise_maps_, quarter_view(), luminance_noise_.view(), executor_);
 }
 
 RgbView<const float> Pipeline::quarter_view() const {
@@ -151,19 +160,46 @@ LookGrid Pipeline::look_grid(const DevelopPlan& plan) {
   }
   std::optional<NoiseLimit> limit;
   if (bounds_noise(plan)) {
-    limit = {*plan.rendering.look->noise_limit, tone_limit(plan.options.tone, plan.rendering.exposure_ev),
-             luminance_noise_.view()};
+    limit = {*plan.rendering.look->noise_limit, plan.rendering.limit, luminance_noise_.view()};
   }
   return look_->make(quarter_view(), plan.rendering.transform.matrix, plan.rendering.transform.clip,
                      plan.rendering.look->look, limit, executor_);
+}
+
+// Sharpens luminance as the image has it. Saturated pixels are those at the clip, or, where highlights are rebuilt, at
+// the saturation of each channel.
+void Pipeline::sharpen(const RawFrame& frame, const DevelopPlan& plan, const RgbView<float>& planes) {
+  measure_cells(CameraPlanes{{planes[0], planes[1], planes[2]}, {1, 1, 1}}, frame, plan);
+  CaptureSharpening how{.blur_px = static_cast<float>(*plan.sharpen_px), .luminance = luminance_of_camera(plan)};
+  const float sum = how.luminance[0] + how.luminance[1] + how.luminance[2];
+  for (float& weight : how.luminance) weight /= sum;
+  if (plan.options.highlights == Highlights::reconstruct) how.saturation = saturation_of(plan);
+  // Interpolation between pixels of a mosaic makes the noise of neighbours alike: detail has up to three times the
+  // noise that it would have of independent channels.
+  const float unit = (plan.demosaic.reason.empty() ? 1 : 3) / (sum * sum);
+  Plane<float> variance(luminance_noise_.width(), luminance_noise_.height());
+  std::transform(luminance_noise_.data(), luminance_noise_.data() + luminance_noise_.size(), variance.data(),
+                 [unit](float value) { return unit * value; });
+  sharpen_capture(how, std::as_const(variance).view(), planes, executor_);
+}
+
+CameraPlanes Pipeline::finished_planes(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan) {
+  for (Plane<float>& plane : finished_) fit(plane, plan.width, plan.height);
+  const RgbView<float> planes{finished_[0].view(), finished_[1].view(), finished_[2].view()};
+  kernel_->linear(in, {.clip = plan.rendering.transform.clip, .move_into_gamut = false}, planes, executor_);
+  if (plan.options.highlights == Highlights::reconstruct) {
+    reconstruct_highlights(planes, saturation_of(plan), executor_);
+  }
+  if (plan.sharpen_px) sharpen(frame, plan, planes);
+  return {{planes[0], planes[1], planes[2]}, {1, 1, 1}};
 }
 
 template <class Encode>
 void Pipeline::render_to(const RawFrame& frame, const DevelopPlan& plan, const Encode& encode) {
   has_noise_maps_ = keeps_maps(plan);
   reserve(frame, plan);
-  const RgbInput in =
-      frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);
+  RgbInput in = frame.raw.layout == SensorLayout::bayer ? prepare_bayer(frame, plan) : prepare_planes(frame, plan);
+  if (finishes(plan)) in = finished_planes(in, frame, plan);
   RgbTransform transform = plan.rendering.transform;
   if (needs_grid(plan) || needs_noise(plan) || needs_seeing_map(plan)) measure_cells(in, frame, plan);
   LookGrid look;

@@ -63,6 +63,8 @@ class Pipeline {
   void reserve(const RawFrame& frame, const DevelopPlan& plan);
   RgbInput prepare_bayer(const RawFrame& frame, const DevelopPlan& plan);
   RgbInput prepare_planes(const RawFrame& frame, const DevelopPlan& plan);
+  CameraPlanes finished_planes(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan);
+  void sharpen(const RawFrame& frame, const DevelopPlan& plan, const RgbView<float>& planes);
   void measure_cells(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan);
   RgbView<const float> quarter_view() const;
   void map_seeing_of(const DevelopPlan& plan);
@@ -88,6 +90,7 @@ class Pipeline {
   Plane<float> luminance_noise_;         // variance, for the cells of quarter_
   Plane<float> signal_to_noise_;         // for the cells of quarter_
   std::optional<SeeingMap> seeing_;
+  std::array<Plane<float>, 3> finished_;  // white-balanced camera RGB, highlights rebuilt or sharpened
   std::array<Plane<float>, 3> modelled_;  // light as changed by a model of appearance
   std::array<Plane<float>, 3> planes_;    // camera RGB of frames that need no demosaicing
   std::array<Plane<float>, 3> half_planes_;

@@ -55,9 +55,12 @@ std::size_t expected_bytes(const RawDn& raw, const DevelopOptions& options, int 
   const std::size_t before_framing = options.max_size ? 3 * sizeof(float) * area(most.width, most.height)
                                      : options.crop   ? picture
                                                       : 0;
+  // Camera RGB, and while it is sharpened the luminance, its detail, powers, means and places near saturation.
+  const std::size_t finish_planes = options.sharpen_px ? 12 : options.highlights == Highlights::reconstruct ? 4 : 0;
+  const std::size_t finishing = finish_planes * sizeof(float) * area(most.width, most.height);
   const std::size_t dark = options.dark_frame ? sizeof(float) * area(raw.active.width, raw.active.height) : 0;
   const std::size_t turned = raw.info.orientation == Orientation::normal ? 0 : picture;
-  const std::size_t around = samples + dark + picture + before_framing + turned;
+  const std::size_t around = samples + dark + picture + before_framing + finishing + turned;
   if (options.look.look == Look::camera) return around + pipeline_bytes(raw, most, threads);
   return around + whole_frame_bytes(raw, most, threads) + 3 * sizeof(float) * area(most.width, most.height);
 }

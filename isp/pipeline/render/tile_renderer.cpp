@@ -77,7 +77,7 @@ bool is_tiled(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limit
   const std::int64_t pixels = std::int64_t{raw.active.width} * raw.active.height;
   return pixels > limits.max_whole_px && raw.layout == SensorLayout::bayer && !plan.from_codes &&
          raw.default_crop.width > 0 && raw.default_crop.height > 0 && !needs_grid(plan) && !needs_seeing_map(plan) &&
-         !needs_table(plan) && !keeps_maps(plan) && !plan.noise_reduction.temporal;
+         !needs_table(plan) && !finishes(plan) && !keeps_maps(plan) && !plan.noise_reduction.temporal;
 }
 
 std::size_t TileRenderer::bytes(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limits, int threads) {

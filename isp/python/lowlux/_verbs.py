@@ -72,7 +72,8 @@ def _call(verb, inputs, output, overwrite, words):
 
 
 def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, exposure=None, wb=None, tone=None,
-            space=None, demosaic=None, half=False, crop=None, max_size=None, baseline_exposure=None,
+            brightness=None, contrast=None, saturation=None, space=None, demosaic=None, half=False,
+            highlights=None, sharpen=None, crop=None, max_size=None, baseline_exposure=None,
             camera_profile=None, look=None, scene_luminance=None, field_of_view=None, light=None,
             adaptation_degree=None, effects=None, tolerance=None, dimming=None, noise_limit=None, coefficients=None,
             display_luminance=None, seeing_map=False, black=None, profile=None, gain_setting=None, noise=None,
@@ -85,7 +86,9 @@ def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, expos
     raw: a path or a RawImage, which is not changed; or a list of them, frames of one scene that are merged first.
     output: image to write (.png .jpg .tif .exr .pfm), with its maps next to it; None writes nothing.
     bits: 8 (default), 16 or 32 bits per sample of the image; with an output the default is that of its format.
-    exposure: gain [EV], or "auto". wb: as --wb, or a temperature [K], or gains (r, g, b). tone: "standard" or "none".
+    exposure: gain [EV], "auto", or a change of it ("auto+1"). wb: as --wb, or a temperature [K], or gains (r, g, b). tone: "standard" or "none".
+    brightness: [EV] of mid-tones. contrast, saturation: factors. highlights: "clip" or "reconstruct".
+    sharpen: blur to sharpen for [px], or "off".
     crop: (x, y, width, height) of the upright image [px], or "10%,10%,80%,80%". max_size: longer side [px].
     space: "srgb", "p3", "rec2020", "linear-srgb", "linear-rec2020", "xyz" or "camera"; 32 bits are linear.
     black: "auto", "metadata", "masked", one level or four of the 2x2 cell [DN], or a profile.
