@@ -82,9 +82,9 @@ std::optional<std::string> set_white_balance(const std::string& text, Choice& ch
 
 void add_white_balance(CLI::App& app, Choice& choice) {
   add_text(
-      app, "--wb", "as-shot|auto|PRESET|KELVIN[,TINT]|R,G,B|PIXEL",
+      app, "--wb", "as-shot|auto|PRESET|KELVIN|R,G,B|PIXEL",
       "white balance: of the camera, estimated, a preset (daylight, cloudy, shade, tungsten, fluorescent, flash), a "
-      "colour temperature and tint, gains, or neutral at a pixel, pick:X,Y[,SIZE] (default: as-shot)",
+      "colour temperature and tint (5000,10), gains, or neutral at a pixel, pick:X,Y[,SIZE] (default: as-shot)",
       [&choice](const std::string& text) { return set_white_balance(text, choice); });
 }
 
