@@ -160,8 +160,7 @@ TEST(FloatFrames, ByTilesHaveTheBitsOfTheWholeFrame) {
 }
 
 TEST(FloatFrames, StepsAreChosenAsForCodes) {
-  DevelopOptions options;
-  options.effects = ProcessingGoal{};
+  const DevelopOptions options{.effects = ProcessingGoal{}};
   const auto codes = plan_develop(night(320, 240), options, one_thread);
   const auto floats = plan_develop(floats_of(night(320, 240)), options, one_thread);
   ASSERT_TRUE(codes && floats);
