@@ -33,6 +33,7 @@ double density(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * std::numb
 /// derivative of clamp(x) and of its square, which are delta functions at the bounds.
 isp::Moments read_moments(const NoiseLine& line, const isp::Moments& law, const ClipRange& clip) {
   isp::Moments seen = isp::clamped_normal(law, clip.low_dn, clip.high_dn);
+  if (!(law.variance > 0)) return seen;
   const double s = std::sqrt(law.variance), gain = line.gain_dn_per_e.value;
   const double third = gain * gain * std::max(law.mean, 0.0) / 6;
   double mean = 0, square = 0;

@@ -109,6 +109,23 @@ TEST(ReadVariance, OfPixelsAtBlackIsThatOfHalfANormalLaw) {
   EXPECT_NEAR(read_variance_dn2(line, 4000 - mean, {-1e6, 4000}), 400 * (0.5 - 0.5 / pi), 0.1);
 }
 
+// A variance that rounding makes up for leaves none before it: the clipped value is then one code.
+TEST(ReadVariance, IsFiniteWhereNoiseIsBelowRounding) {
+  std::mt19937 random(20261125);
+  std::uniform_real_distribution<double> exponent(-9, 0), place(-3, 3);
+  for (int draw = 0; draw < 2000; ++draw) {
+    NoiseLine line;
+    line.gain_dn_per_e.value = std::pow(10, exponent(random));
+    line.offset_dn2.value = std::pow(10, exponent(random));
+    const double std_dn = std::sqrt(line.offset_dn2.value), low = draw % 2 == 0 ? 0 : -std_dn;
+    const double mean = draw % 3 == 0 ? low : low + std_dn * place(random);
+    const double variance = read_variance_dn2(line, mean, {low, 1000});
+    ASSERT_TRUE(variance >= 0 && variance <= 2 * (line.offset_dn2.value + line.gain_dn_per_e.value + 1.0 / 12))
+        << variance << " of gain " << line.gain_dn_per_e.value << ", offset " << line.offset_dn2.value << ", mean "
+        << mean;
+  }
+}
+
 TEST(ReadVariance, HoldsTheContrast) {
   NoiseLine line;
   line.gain_dn_per_e.value = 0.5;
