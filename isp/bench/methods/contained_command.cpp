@@ -248,8 +248,10 @@ Result<CommandUse> run_contained(const std::string& command, const std::filesyst
   Pipes pipes;
   if (!pipes.are_open()) return tl::make_unexpected(system_error("no pipe for a program", errno));
   const Subreaper adopting;
+  const std::string memory_kib =
+      command_memory_is_limited ? fmt::format("{}", limits.max_memory_bytes / 1024) : "unlimited";
   const auto group = start({"/bin/sh", "-c", starter, "lowlux", fmt::format("{}", limits.max_file_bytes / 512),
-                            fmt::format("{}", limits.max_memory_bytes / 1024), command, folder.string()},
+                            memory_kib, command, folder.string()},
                            folder, pipes);
   if (!group) return tl::make_unexpected(group.error());
   const pid_t process = read_number(pipes.number);

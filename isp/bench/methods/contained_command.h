@@ -4,9 +4,17 @@
 #include <filesystem>
 #include <string>
 
+#include "isp/base/memory.h"
 #include "isp/base/result.h"
 
 namespace lowlux::isp {
+
+#if defined(LOWLUX_SANITIZED)
+/// lowlux as a command needs the address space for its sanitizer.
+inline constexpr bool command_memory_is_limited = false;
+#else
+inline constexpr bool command_memory_is_limited = true;
+#endif
 
 /// Limits of one run of a command.
 struct CommandLimits {
