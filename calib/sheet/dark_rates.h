@@ -25,7 +25,7 @@ struct DarkRates {
 
 /// Fits straight lines to groups of darks of one gain setting, those of each temperature (same_temperature_c) alone;
 /// temperatures with a single exposure time are left out. Standard errors of means include that the pixels are a sample
-/// of the sensor's; those of variances are by the scatter of pixels. Errors: there is no temperature with two exposure
+/// of the sensor's; those of variances are by the scatter of pixels. Errors: no temperature has two exposure
 /// times; a group has fewer than two frames; cameras differ.
 Result<DarkRates> dark_rates(std::span<const DarkGroup> groups, const Estimate& gain_dn_per_e);
 

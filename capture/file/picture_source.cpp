@@ -70,7 +70,7 @@ Result<Decoder> decoder_of(std::span<const std::byte> bytes) {
     if (starts_with(bytes, magic)) return tiff_decoder_of(bytes);
   }
   return fail(ErrorCode::unsupported,
-              "this is no picture that lowlux reads: convert it to PNG, JPEG, TIFF, OpenEXR, PFM or PPM");
+              "lowlux does not read this format: convert it to PNG, JPEG, TIFF, OpenEXR, PFM or PPM");
 }
 
 /// Returns the orientation of the EXIF block, or of the format's own field if there is no block.
