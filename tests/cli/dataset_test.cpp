@@ -319,6 +319,14 @@ TEST_F(Dataset, BadSpecsAreOneLineWithFileAndKey) {
   }
 }
 
+TEST_F(Dataset, ADryRunNeedsAFolderForTemporaryFiles) {
+  const auto result = test::run_process(
+      {"env", "TMPDIR=" + file("none"), LOWLUX_COMMAND, "dataset", spec(small), "-o", file("none"), "--dry-run"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_TRUE(holds(result.err, "TMPDIR")) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+}
+
 TEST_F(Dataset, AnotherSpecNeedsForceAndADryRunWritesNothing) {
   made(spec(small), "all");
   Json other = small;

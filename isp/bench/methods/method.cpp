@@ -15,8 +15,8 @@
 #include "capture/file/dng_source.h"
 #include "capture/file/picture_source.h"
 #include "isp/base/text.h"
-#include "isp/bench/methods/private_folder.h"
 #include "isp/output/dng/dng_writer.h"
+#include "isp/output/private_folder.h"
 
 namespace lowlux::isp {
 namespace {
@@ -56,7 +56,7 @@ Result<ScoredMethod> ready_method(const std::string& name) {
     return fail(ErrorCode::not_found, "it is not installed: it needs " + std::string(ready.needs), "method " + name);
   }
   const auto near = near_matches(name, names);
-  return wrong_command(fmt::format("there is no method '{}'{}; ready are {}", name,
+  return wrong_command(fmt::format("unknown method '{}'{}; ready are {}", name,
                                    near.empty() ? "" : fmt::format(", did you mean {}?", near.front()), all));
 }
 

@@ -3,7 +3,6 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <limits>
@@ -25,6 +24,7 @@
 #include "isp/bench/stages/developing_stages.h"
 #include "isp/output/dng/dng_writer.h"
 #include "isp/output/picture/image_writer.h"
+#include "isp/output/private_folder.h"
 #include "isp/pipeline/develop.h"
 
 namespace lowlux::isp {
@@ -116,39 +116,21 @@ std::vector<ScalingRow> rows_of(const RawFrame& frame, const std::vector<std::un
   return out;
 }
 
-/// A temporary folder for files, removed with the object.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::error_code error;
-    std::string pattern = (std::filesystem::temp_directory_path(error) / "lowlux-bench-XXXXXX").string();
-    if (!error && mkdtemp(pattern.data()) != nullptr) path_ = pattern;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
+std::string file_in(const PrivateFolder& folder, int index, const char* end) {
+  return (folder.path() / (std::to_string(index) + end)).string();
+}
 
-  bool made() const { return !path_.empty(); }
-  std::string file(int index, const char* end) const { return (path_ / (std::to_string(index) + end)).string(); }
-
- private:
-  std::filesystem::path path_;
-};
-
-Result<void> develop_file(const ScratchFolder& folder, int index, Executor& executor) {
-  const auto frame = capture::read_raw(folder.file(index, ".dng"));
+Result<void> develop_file(const PrivateFolder& folder, int index, Executor& executor) {
+  const auto frame = capture::read_raw(file_in(folder, index, ".dng"));
   if (!frame) return tl::make_unexpected(frame.error());
   const auto developed = develop(*frame, options_of(plan_kinds.back()), executor);
   if (!developed) return tl::make_unexpected(developed.error());
-  return write_picture(developed->picture, OutputSpace::srgb, frame->raw.info, folder.file(index, ".png"),
+  return write_picture(developed->picture, OutputSpace::srgb, frame->raw.info, file_in(folder, index, ".png"),
                        {.overwrite = Overwrite::yes}, executor);
 }
 
 /// Develops all files, several at a time, each with an equal part of the threads.
-Result<void> develop_files(const ScratchFolder& folder, int jobs, int threads) {
+Result<void> develop_files(const PrivateFolder& folder, int jobs, int threads) {
   std::atomic<int> next{0};
   std::vector<Result<void>> outcome(files);
   const auto work = [&] {
@@ -169,10 +151,10 @@ Result<void> develop_files(const ScratchFolder& folder, int jobs, int threads) {
 }
 
 Result<std::vector<ScalingRow>> rows_of_files(const RawFrame& frame, int threads, int rounds) {
-  const ScratchFolder folder;
-  if (!folder.made()) return fail(ErrorCode::unwritable, "no folder for temporary files can be made: is TMPDIR right?");
+  const Result<PrivateFolder> folder = PrivateFolder::make();
+  if (!folder) return tl::make_unexpected(folder.error());
   for (int i = 0; i < files; ++i) {
-    if (const auto written = write_dng(frame, folder.file(i, ".dng")); !written) {
+    if (const auto written = write_dng(frame, file_in(*folder, i, ".dng")); !written) {
       return tl::make_unexpected(written.error());
     }
   }
@@ -187,7 +169,7 @@ Result<std::vector<ScalingRow>> rows_of_files(const RawFrame& frame, int threads
     group.levels.push_back({.name = "",
                             .run =
                                 [&folder, &outcome, jobs, threads] {
-                                  if (auto done = develop_files(folder, jobs, threads); !done) outcome = done;
+                                  if (auto done = develop_files(*folder, jobs, threads); !done) outcome = done;
                                 },
                             .megapixels = files * 1e-6 * pixels_of(frame)});
   }

@@ -2,7 +2,6 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -23,6 +22,7 @@
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/progress.h"
 #include "isp/cli/verbs.h"
+#include "isp/output/private_folder.h"
 
 namespace lowlux::cli {
 namespace {
@@ -145,10 +145,9 @@ Result<DatasetOutcome> dry_run(const DatasetSpec& spec, const DatasetArgs& args)
   constexpr std::uint64_t max_measured = 8;
   DatasetOutcome out{.samples = samples_in(spec, args.shard)};
   if (out.samples == 0) return out;
-  std::string folder = (fs::temp_directory_path() / "lowlux-dataset-XXXXXX").string();
-  if (mkdtemp(folder.data()) == nullptr) {
-    return fail(ErrorCode::unwritable, "no folder can be made for the measured samples", folder);
-  }
+  const Result<isp::PrivateFolder> made = isp::PrivateFolder::make();
+  if (!made) return tl::make_unexpected(made.error());
+  const std::string folder = made->path().string();
   out.measured = std::min(out.samples, max_measured);
   SampleCost cost, sum;
   auto sample = measured_sample(spec, index_in(spec, args.shard, 0), folder, cost);
@@ -156,8 +155,6 @@ Result<DatasetOutcome> dry_run(const DatasetSpec& spec, const DatasetArgs& args)
     sample = measured_sample(spec, index_in(spec, args.shard, out.samples / out.measured * i), folder, cost);
     sum.bytes += cost.bytes, sum.seconds += cost.seconds;
   }
-  std::error_code ignored;
-  fs::remove_all(folder, ignored);
   if (!sample) return tl::make_unexpected(sample.error());
   const auto count = static_cast<double>(out.measured);
   out.cost = SampleCost{sum.bytes / count, sum.seconds / count};

@@ -1,4 +1,4 @@
-#include "isp/bench/methods/private_folder.h"
+#include "isp/output/private_folder.h"
 
 #include <cerrno>
 #include <cstdlib>
@@ -11,9 +11,9 @@ Result<PrivateFolder> PrivateFolder::make() {
   std::error_code failed;
   const std::filesystem::path below = std::filesystem::temp_directory_path(failed);
   if (failed) {
-    return fail(ErrorCode::unwritable, "there is no folder for temporary files (TMPDIR): " + failed.message());
+    return fail(ErrorCode::unwritable, "cannot use the folder for temporary files (TMPDIR): " + failed.message());
   }
-  std::string name = (below / "lowlux-bench-XXXXXX").string();
+  std::string name = (below / "lowlux-XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr) {
     return fail(ErrorCode::unwritable, "no folder can be made here: " + std::generic_category().message(errno),
                 below.string());
