@@ -72,6 +72,15 @@ std::vector<std::string> names_of(const std::vector<Input>& inputs) {
   return out;
 }
 
+/// Returns the inputs as a batch of jobs, with the calibration files of the arguments.
+cli::RawBatch batch_of(const std::vector<Input>& inputs, const cli::DevelopArgs& args, isp::DevelopOptions options) {
+  std::vector<cli::Job> jobs = jobs_of(inputs, args);
+  const cli::CalibrationFiles files = checked_files(args, jobs);
+  cli::RawBatch batch = value_of(cli::make_batch(args, std::move(options), std::move(jobs), files));
+  batch.read = reader_of(inputs);
+  return batch;
+}
+
 struct DevelopResult {
   cli::DevelopedFrame frame;
   std::string plan;
@@ -85,10 +94,7 @@ DevelopResult developed(const std::vector<Input>& inputs, const std::string& out
   if (args.merge) frames = names_of(inputs);
   args.merging.options.developed_after = args.merge;
   isp::DevelopOptions options = value_of(cli::complete_options(args, format_of(args)));
-  std::vector<cli::Job> jobs = jobs_of(inputs, args);
-  const cli::CalibrationFiles files = checked_files(args, jobs);
-  cli::RawBatch batch = value_of(cli::make_batch(args, std::move(options), std::move(jobs), files));
-  batch.read = reader_of(inputs);
+  const cli::RawBatch batch = batch_of(inputs, args, std::move(options));
   const cli::Job& job = batch.jobs.front();
   PoolExecutor executor(cli::threads_of_each(1));
   cli::Progress none(1, false);
@@ -118,10 +124,7 @@ DenoiseResult denoised(const std::vector<Input>& inputs, const std::string& outp
                        const Words& words) {
   auto args = parsed(cli::parse_denoise, words);
   set_call(output, overwrite, args);
-  std::vector<cli::Job> jobs = jobs_of(inputs, args);
-  const cli::CalibrationFiles files = checked_files(args, jobs);
-  cli::RawBatch batch = value_of(cli::make_batch(args, cli::without_rendering(args.options), std::move(jobs), files));
-  batch.read = reader_of(inputs);
+  const cli::RawBatch batch = batch_of(inputs, args, cli::without_rendering(args.options));
   const cli::Job& job = batch.jobs.front();
   PoolExecutor executor(cli::threads_of_each(1));
   cli::Progress none(1, false);
