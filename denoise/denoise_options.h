@@ -54,8 +54,8 @@ struct RawNoise {
 struct DenoiseOptions {
   Level level = Level::standard;
   std::array<double, 3> white_gain{1, 1, 1};  // R, G, B; 1e-3..1e3. Undone at the end; neutral detail must be equal
-  /// Prior standard deviation of chroma relative to luma: chroma C becomes C L^2 rho^2 / (L^2 rho^2 + its variance).
-  /// > 0; infinity leaves chroma as it is.
+  /// Prior standard deviation of chroma relative to luma, both of stabilised values: chroma C becomes C L^2 rho^2 /
+  /// (L^2 rho^2 + its variance). > 0; infinity leaves chroma as it is.
   double rho = 1.5;
   /// Finest pyramid level on which chroma is estimated, 0..2; if absent, it follows from the signal to noise ratio of
   /// each tile of 64 x 64 cells, blended. With Level::best only 0 or 2.
@@ -73,10 +73,12 @@ struct DenoiseMaps {
   /// The factor of DenoiseOptions::rho, 0..1, for the mean variance of the two colour differences; 0 where a site is
   /// saturated.
   PlaneView<float> chroma_confidence;
-  /// Predicted variance of the remaining noise in a site of R, G and B [e-^2], white balance undone. With the planes'
-  /// residual variances r and the factors f of their confidence it is
-  ///     (r_L + 0.36 f1^2 r_C1 + f2^2 r_C2 / 2) / gain^2 for R and B,  (r_L + 0.16 f1^2 r_C1 + f3^2 r_C3 / 4) / gain^2
-  /// for G. It includes neither the colour that rho removes nor the unreduced noise of point sources.
+  /// Predicted variance of the remaining noise in a site of R, G and B [e-^2], white balance undone. With the residual
+  /// variances r of the planes of stabilised values, the factors f of their confidence and the slope b of the light of
+  /// such a value (spatial/stabiliser.h) it is
+  ///     b^2 (r_L + 0.36 f1^2 r_C1 + f2^2 r_C2 / 2) / gain^2 for R and B,
+  ///     b^2 (r_L + 0.16 f1^2 r_C1 + f3^2 r_C3 / 4) / gain^2 for G.
+  /// It includes neither the colour that rho removes nor the unreduced noise of point sources.
   std::array<PlaneView<float>, 3> site_variance;
 };
 

@@ -16,9 +16,15 @@
 #include "denoise/spatial/rows.h"
 #include "denoise/spatial/saturated_chroma.h"
 #include "denoise/spatial/site_slopes.h"
+#include "denoise/spatial/stabiliser.h"
 
 namespace lowlux::denoise {
 namespace {
+
+/// The raw sites of a tile of cells.
+struct TileOfSites {
+  int left, top, right, bottom;
+};
 
 /// State of one call of Denoiser::run.
 struct Run {
@@ -31,6 +37,8 @@ struct Run {
   int rows;
   int levels;
   std::array<double, 3> dark_e;     // R, G, B
+  float most_ratio;                 // of the noise
+  double offset_e = 0;              // of the stabiliser
   PlaneView<std::uint8_t> sources;  // no data: no search for point sources
 
   Run(FrameMemory& m, const RawElectronsView& r, const RawNoise& n, const DenoiseOptions& o, Executor& executor)
@@ -41,9 +49,11 @@ struct Run {
         workers{executor, static_cast<int>(m.thread.size())},
         columns((r.value.width + 1) / 2),
         rows((r.value.height + 1) / 2),
-        levels(levels_of(columns, rows)) {
+        levels(levels_of(columns, rows)),
+        most_ratio(r.noise_ratio.largest()) {
     const PerSite<int> site = sites_of(r.phase);
     dark_e = {n.dark_mean_e[site[0]], (n.dark_mean_e[site[1]] + n.dark_mean_e[site[2]]) / 2, n.dark_mean_e[site[3]]};
+    offset_e = stabilising_offset(dark_e, noise, static_cast<double>(most_ratio), options);
     const int width = padded(columns, levels), height = padded(rows, levels);
     for (int l = 0; l < levels; ++l) {
       m.level[l].width = width >> l;
@@ -55,10 +65,14 @@ struct Run {
   /// Calls work(x, raw value - background) for the sites of raw row y that belong to point sources.
   template <class Work>
   void for_each_source_site(int y, const Work& work) const;
+  TileOfSites sites_of_tile(int x, int y) const;
   ChromaStarts starts() const;
   rows::PackRow packing(const FrontMemory& m) const;
   void pack(int virtual_row, bool planes, const FrontMemory& m) const;
+  /// Returns the least raw mean that the variance of colour k is computed of.
+  float min_e(int k) const { return static_cast<float>(0.3 * dark_e[k] + 0.02); }
   void front() const;
+  std::span<const float> removed(const PlaneSet& planes) const;
   void unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const;
 };
 
@@ -82,6 +96,13 @@ void Run::for_each_source_site(int y, const Work& work) const {
   }
 }
 
+TileOfSites Run::sites_of_tile(int x, int y) const {
+  const auto edge = [](int i, int count, int size) { return i == count ? size : std::min(size, 2 * tile * i); };
+  const int across = tiles_of(columns), down = tiles_of(rows);
+  return {edge(x, across, raw.value.width), edge(y, down, raw.value.height), edge(x + 1, across, raw.value.width),
+          edge(y + 1, down, raw.value.height)};
+}
+
 /// Finds the chroma start of each tile; one thread sums each row of tiles, so that sums are the same for every number
 /// of threads.
 ChromaStarts Run::starts() const {
@@ -93,14 +114,11 @@ ChromaStarts Run::starts() const {
   out.has_chroma = std::span(memory.has_chroma).first(tiles * max_levels);
   const double dark = (dark_e[0] + 2 * dark_e[1] + dark_e[2]) / 4;
   const double variance = (noise.variance_e2[0] + 2 * noise.variance_e2[1] + noise.variance_e2[2]) / 4;
-  const auto edge = [](int i, int count, int size) { return i == count ? size : std::min(size, 2 * tile * i); };
   in_bands(workers, out.rows, [&](int first, int last, int) {
     for (int i = first * out.columns; i < last * out.columns; ++i) {
       int start = options.chroma_start.value_or(0);
       if (!options.chroma_start) {
-        const int x = i % out.columns, y = i / out.columns;
-        const int left = edge(x, out.columns, raw.value.width), right = edge(x + 1, out.columns, raw.value.width);
-        const int top = edge(y, out.rows, raw.value.height), bottom = edge(y + 1, out.rows, raw.value.height);
+        const auto [left, top, right, bottom] = sites_of_tile(i % out.columns, i / out.columns);
         double sum = 0;
         for (int row = top; row < bottom; ++row) sum += rows::sum_of(raw.value.row(row) + left, right - left);
         const double mean = sum / (static_cast<double>(right - left) * (bottom - top));
@@ -119,6 +137,7 @@ rows::PackRow Run::packing(const FrontMemory& m) const {
   for (int i = 0; i < 2; ++i) in.raw[i] = m.raw[i];
   in.red_is_odd = red_column(raw.phase) == 1;
   in.cells = columns;
+  in.offset_e = static_cast<float>(offset_e);
   for (int k = 0; k < 3; ++k) {
     in.saturation_e[k] = static_cast<float>(noise.saturation_e[k]);
     in.dark_e[k] = static_cast<float>(dark_e[k]);
@@ -168,14 +187,21 @@ void Run::front() const {
       rows::VarianceRow in{};
       for (int k = 0; k < 3; ++k) {
         for (int y = 0; y < 10; ++y) in.raw_e[k][y] = m.window[k][(2 * pair - 4 + y + 16) % 16];
-        in.min_e[k] = static_cast<float>(0.3 * dark_e[k] + 0.02);
+        in.min_e[k] = min_e(k);
         in.gain[k] = static_cast<float>(options.white_gain[k] * std::sqrt(options.variance_scale[0]));
+        in.balance[k] = static_cast<float>(options.white_gain[k]);
+        in.dark_e[k] = static_cast<float>(dark_e[k]);
         in.variance_e2[k] = static_cast<float>(noise.variance_e2[k]);
       }
       in.cells = level.width;
+      in.offset_e = static_cast<float>(offset_e);
       if (!raw.noise_ratio.is_one()) {
         ratio_of_squares(raw.noise_ratio, columns, rows, pair, {m.ratio, static_cast<std::size_t>(level.width / 2)});
         in.ratio = m.ratio;
+        in.most_ratio = most_ratio;
+        for (int p = 0; p < 3; ++p) {
+          for (int i = 0; i < 2; ++i) in.plane[p][i] = level.noisy.row(p, 2 * pair + i);
+        }
       }
       float* const out[4] = {level.variance.row(0, pair), level.variance.row(1, pair), level.variance.row(2, pair),
                              level.variance.row(3, pair)};
@@ -184,10 +210,25 @@ void Run::front() const {
   });
 }
 
+/// Computes for each tile what removed noise is missing in the means, as a factor of the variance of RawNoise.
+std::span<const float> Run::removed(const PlaneSet& planes) const {
+  const int across = tiles_of(columns), down = tiles_of(rows);
+  const auto out = std::span(memory.removed).first(static_cast<std::size_t>(across) * static_cast<std::size_t>(down));
+  removed_noise(memory.level[0], planes, offset_e, columns, rows, workers, out);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const TileOfSites at = sites_of_tile(static_cast<int>(i) % across, static_cast<int>(i) / across);
+    const double ratio = raw.noise_ratio.mean(at.left, at.top, at.right - at.left, at.bottom - at.top);
+    const double missing = static_cast<double>(most_ratio) - (1 - static_cast<double>(out[i])) * ratio;
+    out[i] = static_cast<float>(options.variance_scale[0] * missing);
+  }
+  return out;
+}
+
 /// Converts the planes of level 0 back to a mosaic.
 void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const {
   const PyramidLevel& level = memory.level[0];
   const SiteSlopes slopes = site_slopes(raw.phase);
+  const std::span<const float> removed_of_tiles = removed(planes);
   repeat_luma_edges(planes, columns, rows, workers);
   in_bands(workers, rows, [&](int first, int last, int thread) {
     const UnpackMemory& m = memory.thread[thread].unpack;
@@ -203,18 +244,28 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
         in.plane[p] = planes.row(p, y);
         in.residual[p] = m.residual[p];
       }
+      interpolate_row(removed_of_tiles, tiles_of(columns), tiles_of(rows), 0, y,
+                      {m.removed, static_cast<std::size_t>(columns)});
+      in.removed = m.removed;
+      in.offset_e = static_cast<float>(offset_e);
       const std::uint8_t* const saturated = memory.saturated.row(y);
       for (int x = 0; x < columns; ++x) m.seen[x] = saturated[x] != 0 ? 0.0f : 1.0f;
       in.seen = m.seen;
       in.cells = columns;
       in.rho = std::isinf(options.rho) ? -1.0f : static_cast<float>(options.rho);
-      for (int k = 0; k < 3; ++k) in.per_gain[k] = static_cast<float>(1 / options.white_gain[k]);
+      for (int k = 0; k < 3; ++k) {
+        in.per_gain[k] = static_cast<float>(1 / options.white_gain[k]);
+        in.dark_e[k] = static_cast<float>(dark_e[k]);
+        in.min_e[k] = min_e(k);
+        in.variance_e2[k] = static_cast<float>(noise.variance_e2[k]);
+      }
       in.red_is_odd = red_column(raw.phase) == 1;
       const LumaRows luma = luma_rows(planes, y, rows);
       in.luma_beside[0] = luma.above;
       in.luma_beside[1] = luma.below;
       in.slopes = {slopes.c2_x, slopes.c2_y, slopes.c3_x, slopes.c3_y};
-      rows::unpack_row(in, {{m.signal[0], m.signal[1]}, m.confidence, {m.variance[0], m.variance[1], m.variance[2]}});
+      rows::unpack_row(
+          in, {{m.signal[0], m.signal[1]}, m.confidence, m.residual[0], {m.residual[1], m.residual[2], m.residual[3]}});
       for (int i = 0; i < 2; ++i) {
         const int raw_y = 2 * y + (i == 0 ? red_row(raw.phase) : 1 - red_row(raw.phase));
         if (raw_y >= signal_e.height) continue;
@@ -226,7 +277,7 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
       };
       put(maps.residual_variance, m.residual[0]);
       put(maps.chroma_confidence, m.confidence);
-      for (int k = 0; k < 3; ++k) put(maps.site_variance[k], m.variance[k]);
+      for (int k = 0; k < 3; ++k) put(maps.site_variance[k], m.residual[k + 1]);
     }
   });
 }

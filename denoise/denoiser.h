@@ -9,9 +9,10 @@
 
 namespace lowlux::denoise {
 
-/// Reduces the noise of a Bayer mosaic: joint multi-scale DCT on cells, with hard thresholds and empirical Wiener
-/// weights in the linear domain, after G. Yu, G. Sapiro (IPOL 2011) and N. Pierazzo, J.-M. Morel, G. Facciolo (IPOL 7,
-/// 2017). README.md has the equations; tests/reference/denoise_ref.h is a plain double implementation.
+/// Reduces the noise of a Bayer mosaic: joint multi-scale DCT on cells of partly stabilised values
+/// (spatial/stabiliser.h), with hard thresholds and empirical Wiener weights, after G. Yu, G. Sapiro (IPOL 2011) and N.
+/// Pierazzo, J.-M. Morel, G. Facciolo (IPOL 7, 2017). README.md has the equations; tests/reference/denoise_ref.h is a
+/// plain double implementation.
 ///
 /// Owns its memory, allocates only in the constructor, and processes one frame at a time. The result is bit-identical
 /// for every number of threads.

@@ -54,24 +54,29 @@ void complete(ChromaStarts& starts) {
   }
 }
 
-void fraction_row(const ChromaStarts& starts, int level, int grid, int y, std::span<float> out) {
-  const Place v = place_of(y, grid, starts.rows);
-  const float* const upper = starts.start.data() + v.first * starts.columns;
-  const float* const lower = starts.start.data() + v.second * starts.columns;
-  const auto start = [&](int i) { return upper[i] + v.fraction * (lower[i] - upper[i]); };
+void interpolate_row(std::span<const float> tiles, int columns, int rows, int grid, int y, std::span<float> out) {
+  const Place v = place_of(y, grid, rows);
+  const float* const upper = tiles.data() + v.first * columns;
+  const float* const lower = tiles.data() + v.second * columns;
+  const auto value = [&](int i) { return upper[i] + v.fraction * (lower[i] - upper[i]); };
   const int width = static_cast<int>(out.size());
   // Between the centres of two tiles everything is linear: process one run of cells after the other.
   for (int x = 0; x < width;) {
-    const Place u = place_of(x, grid, starts.columns);
+    const Place u = place_of(x, grid, columns);
     const int end = u.second == u.first ? width : std::min(width, next_centre(u.first + 1, grid));
-    const float left = start(u.first), step = start(u.second) - left;
+    const float left = value(u.first), step = value(u.second) - left;
     const float cell = static_cast<float>(1 << grid) / tile, origin = static_cast<float>(u.first);
     for (; x < end; ++x) {
       const float at = (static_cast<float>(x) + 0.5f) * cell - 0.5f;
       const float fraction = u.second == u.first ? 0.0f : std::max(at, 0.0f) - origin;
-      out[x] = std::clamp(left + fraction * step - static_cast<float>(level), 0.0f, 1.0f);
+      out[x] = left + fraction * step;
     }
   }
+}
+
+void fraction_row(const ChromaStarts& starts, int level, int grid, int y, std::span<float> out) {
+  interpolate_row(starts.start, starts.columns, starts.rows, grid, y, out);
+  for (float& start : out) start = std::clamp(start - static_cast<float>(level), 0.0f, 1.0f);
 }
 
 }  // namespace lowlux::denoise

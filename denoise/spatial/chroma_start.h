@@ -29,6 +29,10 @@ int start_of(double mean_signal_e, double mean_dark_e, double variance_e2, doubl
 /// or finer: one tile for the blend, one for the cells that recomposition reads around a cell.
 void complete(ChromaStarts& starts);
 
+/// Interpolates values of tiles bilinearly between the centres of tiles, for a row of cells of level `grid`.
+/// @param tiles  columns * rows of them, row by row
+void interpolate_row(std::span<const float> tiles, int columns, int rows, int grid, int y, std::span<float> out);
+
 /// Computes the fraction of coarser levels in the chroma of `level`, for a row of cells of level `grid`.
 void fraction_row(const ChromaStarts& starts, int level, int grid, int y, std::span<float> out);
 

@@ -25,6 +25,8 @@ HWY_INLINE int lanes() { return static_cast<int>(hn::Lanes(Floats())); }
 constexpr float c1 = 0.490392640202f, c2 = 0.461939766256f, c3 = 0.415734806151f, c5 = 0.277785116510f;
 constexpr float c6 = 0.191341716183f, c7 = 0.0975451610081f, c0 = 0.353553390593f;
 
+constexpr float per_root2 = 0.707106781187f;
+
 /// Returns a x + b y + c z + d w.
 HWY_INLINE VF dot4(float a, VF x, float b, VF y, float c, VF z, float d, VF w) {
   return hn::MulAdd(constant(a), x, hn::MulAdd(constant(b), y, hn::MulAdd(constant(c), z, hn::Mul(constant(d), w))));

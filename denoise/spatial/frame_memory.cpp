@@ -98,8 +98,7 @@ void lay_out(Rows& from, int width, UnpackMemory& out) {
     out.up = from.kernel(rows::up_scratch(width / 2));
     for (float*& r : out.residual) r = from.take(row_size(width), 1);
     for (float*& r : out.signal) r = from.take(row_size(2 * width), 1);
-    for (float** r : {&out.seen, &out.confidence}) *r = from.take(row_size(width), 1);
-    for (float*& r : out.variance) r = from.take(row_size(width), 1);
+    for (float** r : {&out.removed, &out.seen, &out.confidence}) *r = from.take(row_size(width), 1);
   });
 }
 
@@ -184,7 +183,7 @@ std::size_t FrameMemory::bytes(int max_width, int max_height, int threads, bool 
   return sizeof(float) * layout.lay_out(nullptr) + cells + padded_cells +
          sizeof(std::int32_t) * workers * static_cast<std::size_t>(max_width) +
          layout.patches.size() * (sizeof(PatchMemory) + static_cast<std::size_t>(extent.width)) +
-         workers * (sizeof(ThreadMemory) + sizeof(SearchMemory)) + extent.starts * (sizeof(float) + max_levels) +
+         workers * (sizeof(ThreadMemory) + sizeof(SearchMemory)) + extent.starts * (2 * sizeof(float) + max_levels) +
          sizeof(FrameMemory);
 }
 
@@ -205,6 +204,7 @@ FrameMemory::FrameMemory(int max_width, int max_height, int threads, bool best)
   chroma_.resize(patches.size() * width);
   for (std::size_t i = 0; i < patches.size(); ++i) patches[i].chroma = chroma_.data() + i * width;
   starts.resize(extent.starts);
+  removed.resize(extent.starts);
   has_chroma.resize(extent.starts * max_levels);
 }
 

@@ -69,11 +69,11 @@ struct UpMemory {
 struct UnpackMemory {
   Scratch scratch;
   rows::RowScratch up{};
-  std::array<float*, 4> residual{};
+  std::array<float*, 4> residual{};  // then of light: of luma, R, G, B
+  float* removed = nullptr;
   float* seen = nullptr;
   std::array<float*, 2> signal{};  // raw samples
   float* confidence = nullptr;
-  std::array<float*, 3> variance{};
 };
 
 struct ThreadMemory {
@@ -122,6 +122,7 @@ struct FrameMemory : FrameLayout {
   Plane<std::uint8_t> sources;            // cells that hold point sources
   Plane<std::uint8_t> saturated;          // cells of level 0 that hold saturated sites: 1
   std::vector<float> starts;              // chroma start level of each tile
+  std::vector<float> removed;             // see removed_noise(), of each tile
   std::vector<unsigned char> has_chroma;  // for each level, each tile
 
  private:

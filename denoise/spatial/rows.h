@@ -21,6 +21,12 @@ struct RowScratch {
 /// Number of blocks of one row that are transformed together: their coefficients stay in the first-level cache.
 inline constexpr int strip_blocks = 32;
 
+/// Where the stabiliser (stabiliser.h) becomes linear: light and stabilised value over the offset, and the slope of the
+/// light there and below.
+inline constexpr float linear_light = -0.5f;
+inline constexpr float linear_value = -0.585786437627f;  // sqrt 2 - 2
+inline constexpr float linear_slope = 0.707106781187f;
+
 /// Input for one row of cells: two raw rows, which hold an even number of samples each (see raw_of).
 struct PackRow {
   const float* raw[2];  // the row with red, the row with blue
@@ -29,23 +35,29 @@ struct PackRow {
   float dark_e[3];  // R, G, B
   float gain[3];
   float saturation_e[3];
+  float offset_e;  // of the stabiliser
 };
 struct PackedRow {
   float* raw_e[3];   // R, mean of both greens, B, dark charge included, as measured
   float* saturated;  // 1 where a site is saturated, else 0
-  float* plane[4];   // L, C1, C2, C3; null: neither these nor `saturated` are wanted
+  float* plane[4];   // stabilised L, C1, C2, C3; null: neither these nor `saturated` are wanted
 };
 void pack_row(const PackRow& in, const PackedRow& out);
 
-/// Input for variances of the four planes in one row of half width: the ten rows of R, G, B around its two rows of
-/// cells.
+/// Input for variances of the four stabilised planes in one row of half width: the ten rows of R, G, B around its two
+/// rows of cells.
 struct VarianceRow {
   const float* raw_e[3][10];  // read from 4 cells before to 4 cells after
   int cells;
   float min_e[3];  // floor of the local mean
+  float dark_e[3];
   float variance_e2[3];
-  float gain[3];
-  const float* ratio;  // factor of each variance of the row; null: 1
+  float gain[3];       // of the noise: that of white balance and the root of the variance's scale
+  float balance[3];    // of white balance
+  float offset_e;      // of the stabiliser
+  const float* ratio;  // factor of each variance of the row; null: 1, and nothing below is read
+  float most_ratio;    // of the frame
+  float* plane[3][2];  // L, C1, C2 of the two rows of cells, whose means become those of noise of the largest ratio
 };
 std::size_t variance_scratch(int cells);
 void variance_row(const VarianceRow& in, const RowScratch& scratch, float* const out[4]);
@@ -140,13 +152,34 @@ struct UnpackRow {
   bool red_is_odd;
   const float* luma_beside[2];  // rows above and below
   Slopes slopes;
+  float offset_e;  // of the stabiliser
+  float dark_e[3];
+  float min_e[3];  // floor of the raw mean
+  float variance_e2[3];
+  const float* removed;  // variance of the removed noise over that of dark_e, min_e and variance_e2
 };
 struct UnpackedRow {
   float* signal_e[2];  // the row with red, the row with blue
   float* confidence;
-  float* variance_e2[3];  // of sites of R, G, B; null: not wanted
+  float* luma_variance_e2;  // of white-balanced luma; may be the row of its residual, and those below of the others
+  float* variance_e2[3];    // of sites of R, G, B
 };
 void unpack_row(const UnpackRow& in, const UnpackedRow& out);
+
+/// Input for the noise removed from a row of cells, the first of them even; variances have half width.
+struct RemovedRow {
+  const float* noisy[4];  // L, C1, C2, C3
+  const float* value[4];
+  const float* variance[4];  // only C2 and C3 are read
+  int cells;
+  float offset_e;
+};
+/// Sums over sites of squared differences and of stated variances, in squares of the offset; see removed_noise().
+struct RemovedSums {
+  float removed;
+  float stated;
+};
+RemovedSums removed_row(const RemovedRow& in);
 
 /// Computes the sums of two raw rows, samples as in sum_of.
 void pair_row(const float* upper, const float* lower, int width, float* out);

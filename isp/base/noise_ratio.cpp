@@ -42,6 +42,14 @@ void NoiseRatioView::row(int first, int step, int y, std::span<float> out) const
   }
 }
 
+float NoiseRatioView::largest() const {
+  if (is_one()) return 1;
+  float out = 0;
+  for (int y = 0; y < ratio.height; ++y)
+    out = std::max(out, *std::max_element(ratio.row(y), ratio.row(y) + ratio.width));
+  return out;
+}
+
 double NoiseRatioView::mean(int x, int y, int width, int height) const {
   assert(width > 0 && height > 0);
   if (is_one()) return 1;

@@ -31,6 +31,8 @@ struct NoiseRatioView {
   float at(int x, int y) const;
   /// Computes the ratio of pixels first, first + step ... of row y. Precondition: step > 0.
   void row(int first, int step, int y, std::span<float> out) const;
+  /// Returns the largest ratio of all blocks, whatever the region.
+  float largest() const;
   /// Returns the mean over a rectangle of pixels, which is not empty.
   double mean(int x, int y, int width, int height) const;
 };

@@ -25,6 +25,8 @@ struct Frame {
   PerSite<int> site;
   int columns, rows, levels;
   std::array<double, 4> dark_e, gain, variance_e2;
+  double most_ratio = 0;
+  double offset_e = 0;  // c of h(x), see below
 
   Frame(const RawElectronsView& r, const RawNoise& n, const DenoiseOptions& o)
       : raw(r), noise(n), options(o), site(sites_of(r.phase)) {
@@ -35,7 +37,29 @@ struct Frame {
     dark_e[1] = dark_e[2] = (dark_e[1] + dark_e[2]) / 2;
     gain = {o.white_gain[0], o.white_gain[1], o.white_gain[1], o.white_gain[2]};
     variance_e2 = {noise.variance_e2[0], noise.variance_e2[1], noise.variance_e2[1], noise.variance_e2[2]};
+    const double scale = *std::max_element(o.variance_scale.begin(), o.variance_scale.end());
+    for (int y = 0; y < raw.noise_ratio.ratio.height; ++y) {
+      for (int x = 0; x < raw.noise_ratio.ratio.width; ++x) {
+        most_ratio = std::max(most_ratio, static_cast<double>(raw.noise_ratio.ratio.at(x, y)));
+      }
+    }
+    if (raw.noise_ratio.is_one()) most_ratio = 1;
+    for (int k = 0; k < 4; ++k) {
+      offset_e = std::max(
+          offset_e, gain[k] * (10 * std::max(most_ratio, 1.0) + 2 * most_ratio * scale * (dark_e[k] + variance_e2[k])));
+    }
   }
+
+  // h(x) = 2 c (sqrt(1 + x / c) - 1), below x = -c / 2 its tangent there.
+  double stabilised(double x) const {
+    const double edge = -0.5 * offset_e, at = 2 * x / (1 + std::sqrt(1 + std::max(x, edge) / offset_e));
+    return x >= edge ? at : 2 * offset_e * (std::sqrt(0.5) - 1) + std::numbers::sqrt2 * (x - edge);
+  }
+  double edge() const { return 2 * offset_e * (std::sqrt(0.5) - 1); }  // h(-c / 2)
+  double light(double u) const {
+    return u >= edge() ? u + u * u / (4 * offset_e) : -0.5 * offset_e + (u - edge()) / std::numbers::sqrt2;
+  }
+  double slope(double u) const { return std::max(1 + u / (2 * offset_e), std::sqrt(0.5)); }  // of light(u)
 
   double y(int k, int cell_x, int cell_y) const {
     const int cx = mirrored(cell_x, columns), cy = mirrored(cell_y, rows);
@@ -53,7 +77,7 @@ struct Frame {
            saturated(3, cell_x, cell_y);
   }
 
-  double variance(int k, int cell_x, int cell_y) const {
+  double mean(int k, int cell_x, int cell_y) const {
     double sum = 0;
     for (int j = -4; j <= 4; ++j) {
       for (int i = -4; i <= 4; ++i) {
@@ -61,8 +85,14 @@ struct Frame {
                                 : y(k, cell_x + i, cell_y + j);
       }
     }
-    return options.variance_scale[0] * gain[k] * gain[k] *
-           (std::max(sum / 81, 0.3 * dark_e[k] + 0.02) + variance_e2[k]);
+    return sum / 81;
+  }
+
+  /// Returns the stabilised variance of colour k at a mean raw value, without the noise ratio.
+  double variance_of(int k, double mean_e) const {
+    const double x = gain[k] * (mean_e - dark_e[k]);
+    return options.variance_scale[0] * gain[k] * gain[k] * (std::max(mean_e, 0.3 * dark_e[k] + 0.02) + variance_e2[k]) /
+           (1 + std::max(x / offset_e, -0.5));
   }
 
   /// Returns the chroma start level at each tile.
@@ -91,17 +121,21 @@ struct Frame {
   }
 };
 
-/// Returns the fraction of coarser levels in the chroma of `level`, at the position of cell (x, y) of level `grid`.
-double coarser_fraction(const Image& starts, int level, int grid, int x, int y) {
-  const auto place = [grid](int i, int tiles) {
-    return std::clamp((i + 0.5) * (1 << grid) / tile - 0.5, 0.0, static_cast<double>(tiles - 1));
+/// Returns the value of tiles at the position of cell (x, y) of level `grid`, bilinear between their centres.
+double between_tiles(const Image& tiles, int grid, int x, int y) {
+  const auto place = [grid](int i, int count) {
+    return std::clamp((i + 0.5) * (1 << grid) / tile - 0.5, 0.0, static_cast<double>(count - 1));
   };
-  const double u = place(x, starts.width), v = place(y, starts.height);
+  const double u = place(x, tiles.width), v = place(y, tiles.height);
   const int i = static_cast<int>(u), j = static_cast<int>(v);
   const double fx = u - i, fy = v - j;
-  const double start = (1 - fy) * ((1 - fx) * starts.near(i, j) + fx * starts.near(i + 1, j)) +
-                       fy * ((1 - fx) * starts.near(i, j + 1) + fx * starts.near(i + 1, j + 1));
-  return std::clamp(start - level, 0.0, 1.0);
+  return (1 - fy) * ((1 - fx) * tiles.near(i, j) + fx * tiles.near(i + 1, j)) +
+         fy * ((1 - fx) * tiles.near(i, j + 1) + fx * tiles.near(i + 1, j + 1));
+}
+
+/// Returns the fraction of coarser levels in the chroma of `level`, at the position of cell (x, y) of level `grid`.
+double coarser_fraction(const Image& starts, int level, int grid, int x, int y) {
+  return std::clamp(between_tiles(starts, grid, x, y) - level, 0.0, 1.0);
 }
 
 Four decorrelated(const Frame& frame, Four& variance) {
@@ -109,6 +143,7 @@ Four decorrelated(const Frame& frame, Four& variance) {
   Four out;
   out.fill(Image(w, h));
   variance = out;
+  Four loss = out;  // what noise of ratio 1 takes from the mean
   for (int cy = 0; cy < h; ++cy) {
     for (int cx = 0; cx < w; ++cx) {
       std::array<double, 4> x{}, v{};
@@ -116,11 +151,16 @@ Four decorrelated(const Frame& frame, Four& variance) {
       double most = -1e30;
       for (int k = 0; k < 4; ++k) {
         x[k] = frame.gain[k] * (frame.y(k, cx, cy) - frame.dark_e[k]);
-        v[k] = ratio * frame.variance(k, mirrored(cx, frame.columns), mirrored(cy, frame.rows));
+        const double mean = frame.mean(k, mirrored(cx, frame.columns), mirrored(cy, frame.rows));
+        v[k] = ratio * frame.variance_of(k, mean);
+        const double light = frame.gain[k] * (mean - frame.dark_e[k]) / frame.offset_e;
+        loss[k].at(cx, cy) =
+            light > -0.5 ? frame.variance_of(k, mean) / (4 * frame.offset_e * std::sqrt(1 + light)) : 0;
         most = std::max(most, x[k]);
       }
       for (int k = 0; k < 4; ++k) {
         if (frame.saturated(k, cx, cy)) x[k] = most;
+        x[k] = frame.stabilised(x[k]);
       }
       out[0].at(cx, cy) = 0.2 * x[0] + 0.3 * x[1] + 0.3 * x[2] + 0.2 * x[3];
       out[1].at(cx, cy) = 0.5 * (x[0] + x[3] - x[1] - x[2]);
@@ -130,6 +170,16 @@ Four decorrelated(const Frame& frame, Four& variance) {
       variance[1].at(cx, cy) = 0.25 * (v[0] + v[1] + v[2] + v[3]);
       variance[2].at(cx, cy) = 0.5 * (v[0] + v[3]);
       variance[3].at(cx, cy) = v[1] + v[2];
+    }
+  }
+  for (Image& image : loss) image = down2(image);
+  for (int cy = 0; cy < h; ++cy) {
+    for (int cx = 0; cx < w; ++cx) {
+      const double less = frame.most_ratio - ratio_at_cell(frame.raw, cx, cy);
+      const auto at = [&](int k) { return less * loss[k].at(cx / 2, cy / 2); };
+      out[0].at(cx, cy) -= 0.2 * (at(0) + at(3)) + 0.3 * (at(1) + at(2));
+      out[1].at(cx, cy) -= 0.5 * (at(0) + at(3) - at(1) - at(2));
+      out[2].at(cx, cy) -= (at(0) - at(3)) / std::numbers::sqrt2;
     }
   }
   return out;
@@ -228,9 +278,53 @@ void add_slopes(const Frame& frame, double sign, const Image& luma, Four& planes
   }
 }
 
+/// Returns the values of R, the G in its row, the G in the row of B, and B.
+std::array<double, 4> of_sites(double luma, double c1, double c2, double c3) {
+  const double a = 2 * luma + 1.2 * c1, g = 2 * luma - 0.8 * c1;  // R + B and G1 + G2
+  return {a / 2 + c2 / std::numbers::sqrt2, (g + c3) / 2, (g - c3) / 2, a / 2 - c2 / std::numbers::sqrt2};
+}
+
+/// Returns for each tile the variance of noise that is missing in the means, over that of RawNoise: of the largest
+/// ratio, less what was left of the stated variance. What was removed is the excess of light(noisy) over its tangent at
+/// the denoised value, which on the curved part is the square of the difference over 4 c; differences are limited to 5
+/// standard deviations.
+Image removed_noise(const Frame& frame, const Four& noisy, const Four& variance, const Four& value) {
+  Image out(tiles_of(frame.columns), tiles_of(frame.rows));
+  const double edge = frame.edge();
+  Image removed = out, stated = out;
+  const Image other = down2(variance[2]), green = down2(variance[3]);
+  for (int cy = 0; cy < frame.rows; ++cy) {
+    const int ty = tile_of(cy, out.height);
+    if ((cy - ty * tile) % 3 != 0) continue;
+    for (int cx = 0; cx < frame.columns; ++cx) {
+      const auto at = [&](const Four& x) {
+        return of_sites(x[0].at(cx, cy), x[1].at(cx, cy), x[2].at(cx, cy), x[3].at(cx, cy));
+      };
+      const auto before = at(noisy), after = at(value);
+      const int tx = tile_of(cx, out.width);
+      for (int k = 0; k < 4; ++k) {
+        if (!(after[k] > edge)) continue;
+        const double v = k == 1 || k == 2 ? green.at(cx / 2, cy / 2) / 2 : other.at(cx / 2, cy / 2);
+        const double to = after[k] + std::clamp(before[k] - after[k], -5 * std::sqrt(v), 5 * std::sqrt(v));
+        const double tangent = frame.light(after[k]) + frame.slope(after[k]) * (to - after[k]);
+        removed.at(tx, ty) += 4 * frame.offset_e * (frame.light(to) - tangent);
+        stated.at(tx, ty) += v;
+      }
+    }
+  }
+  for (int ty = 0; ty < out.height; ++ty) {
+    for (int tx = 0; tx < out.width; ++tx) {
+      const double part = stated.at(tx, ty) > 0 ? removed.at(tx, ty) / stated.at(tx, ty) : 0;
+      out.at(tx, ty) = frame.most_ratio - (1 - part) * ratio_of_tile(frame.raw, tx, ty, out.width, out.height);
+    }
+  }
+  return out;
+}
+
 struct Pictures {
   Four value;
   Four residual;
+  Image removed;  // of tiles
 };
 
 Pictures both_passes(const Frame& frame, const Image& starts) {
@@ -265,7 +359,7 @@ Pictures both_passes(const Frame& frame, const Image& starts) {
     }
     recompose(value, starts);
   }
-  return {value[0], total_residual(residual, starts)};
+  return {value[0], total_residual(residual, starts), removed_noise(frame, x[0], variance[0], value[0])};
 }
 
 }  // namespace
@@ -295,19 +389,24 @@ Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const Denoi
         left[i] = share * share * residual;
       }
       for (int i = 2; i < 4; ++i) c[i] += slopes[i].at(cx, cy);
-      const double a = 2 * luma + 1.2 * c[1], g = 2 * luma - 0.8 * c[1];  // R + B and G1 + G2
-      const std::array<double, 4> x{a / 2 + c[2] / std::numbers::sqrt2, (g + c[3]) / 2, (g - c[3]) / 2,
-                                    a / 2 - c[2] / std::numbers::sqrt2};
+      const std::array<double, 4> u = of_sites(luma, c[1], c[2], c[3]);
+      const double removed = between_tiles(p.removed, 0, cx, cy);
       for (int k = 0; k < 4; ++k) {
         const int at_x = 2 * cx + (frame.site[k] & 1), at_y = 2 * cy + (frame.site[k] >> 1);
-        if (at_x < raw.value.width && at_y < raw.value.height) out.signal_e.at(at_x, at_y) = x[k] / frame.gain[k];
+        if (at_x >= raw.value.width || at_y >= raw.value.height) continue;
+        const double x = frame.light(u[k]);
+        const double variance = frame.variance_of(k, x / frame.gain[k] + frame.dark_e[k]);
+        const double mean = u[k] > frame.edge() ? removed * variance / (4 * frame.offset_e) : 0;
+        out.signal_e.at(at_x, at_y) = (x + mean) / frame.gain[k];
       }
-      const double kept = out.residual_variance.at(cx, cy) = p.residual[0].at(cx, cy);
+      const double kept = p.residual[0].at(cx, cy);
+      out.residual_variance.at(cx, cy) = std::pow(frame.slope(luma), 2) * kept;
       const std::array<double, 3> of_colour{kept + 0.36 * left[1] + 0.5 * left[2],
                                             kept + 0.16 * left[1] + 0.25 * left[3],
                                             kept + 0.36 * left[1] + 0.5 * left[2]};
+      const std::array<double, 3> at{u[0], (u[1] + u[2]) / 2, u[3]};
       for (int k = 0; k < 3; ++k) {
-        out.site_variance[k].at(cx, cy) = of_colour[k] / std::pow(frame.options.white_gain[k], 2);
+        out.site_variance[k].at(cx, cy) = std::pow(frame.slope(at[k]) / frame.options.white_gain[k], 2) * of_colour[k];
       }
       out.chroma_confidence.at(cx, cy) = factor((p.residual[1].at(cx, cy) + p.residual[2].at(cx, cy)) / 2);
     }

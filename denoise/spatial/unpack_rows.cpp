@@ -1,0 +1,180 @@
+#include <cstddef>
+
+#include "denoise/spatial/rows.h"
+
+#if defined(__aarch64__)  // NEON only, as in isp/raw: arrays of vectors need vectors of known size
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
+#endif
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "denoise/spatial/unpack_rows.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once more for each instruction set
+#include <hwy/highway.h>
+
+#include "denoise/spatial/dct-inl.h"
+#include "denoise/spatial/stabiliser-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lowlux::denoise::rows::HWY_NAMESPACE {
+
+/// The values of the sites of a vector of cells, of R, the G in its row, the G in the row of B, and B.
+struct SiteValues {
+  VF u[4];
+};
+HWY_INLINE SiteValues values_of(VF luma, VF c1, VF c2, VF c3) {
+  const VF half = hn::MulAdd(constant(0.6f), c1, luma), skew = hn::Mul(constant(per_root2), c2);
+  const VF green = hn::MulAdd(constant(-0.4f), c1, luma), maze = hn::Mul(constant(0.5f), c3);
+  return {{hn::Add(half, skew), hn::Add(green, maze), hn::Sub(green, maze), hn::Sub(half, skew)}};
+}
+
+/// Computes the remaining variance of the luma's light, and in R, G and B from that in C1 and C2.
+HWY_INLINE void light_variances(const UnpackRow& in, const UnpackedRow& out, int i, VF luma, const SiteValues& at,
+                                const VF (&left)[4]) {
+  const VF per_offset = constant(1 / in.offset_e), own = load(in.residual[0] + i);
+  const auto of_light = [&](VF u, VF variance) HWY_ATTR {
+    const VF slope = slope_of_light(hn::Mul(per_offset, u));
+    return hn::Mul(hn::Mul(slope, slope), variance);
+  };
+  store(of_light(luma, own), out.luma_variance_e2 + i);
+  const VF other = hn::MulAdd(constant(0.5f), left[2], hn::MulAdd(constant(0.36f), left[1], own));
+  const VF green = hn::MulAdd(constant(0.25f), left[3], hn::MulAdd(constant(0.16f), left[1], own));
+  const VF of_colour[3] = {other, green, other};
+  const VF value[3] = {at.u[0], hn::Mul(constant(0.5f), hn::Add(at.u[1], at.u[2])), at.u[3]};
+  for (int k = 0; k < 3; ++k) {
+    const VF variance = hn::Mul(constant(in.per_gain[k] * in.per_gain[k]), of_light(value[k], of_colour[k]));
+    store(variance, out.variance_e2[k] + i);
+  }
+}
+
+/// Returns the light of stabilised values of colour k in electrons, white balance undone. The mean of the noise that
+/// was removed is added, which is `removed` times the variance of RawNoise.
+HWY_INLINE VF light_e(const UnpackRow& in, int k, VF value, VF removed) {
+  const VF u = hn::Mul(constant(1 / in.offset_e), value), fraction = light_of(u);
+  const VF light = hn::Mul(constant(in.offset_e * in.per_gain[k]), fraction);
+  const VF raw = hn::Max(hn::Add(light, constant(in.dark_e[k])), constant(in.min_e[k]));
+  const VF variance = hn::Div(hn::Add(raw, constant(in.variance_e2[k])), hn::Add(constant(1), fraction));
+  const VF mean = hn::Mul(constant(0.25f / (in.offset_e * in.per_gain[k])), hn::Mul(removed, variance));
+  return hn::Add(light, hn::IfThenElseZero(hn::Gt(u, constant(linear_value)), mean));
+}
+
+/// Returns the harmonic mean of the differences before and after a cell, 0 where they differ in sign (van Leer).
+HWY_INLINE VF slope(VF before, VF after) {
+  const Floats f;
+  const VF product = hn::Mul(before, after), sum = hn::Add(before, after);
+  const VF safe = hn::IfThenElse(hn::Gt(product, hn::Zero(f)), sum, constant(1));
+  return hn::Div(hn::Mul(constant(2), hn::Max(product, hn::Zero(f))), safe);
+}
+
+/// Adds the slopes of the luma at cell i to C2 and C3.
+HWY_INLINE void add_slopes(const float* above, const float* own, const float* below, const Slopes& s, int i,
+                           VF& blue_red, VF& greens) {
+  const VF here = load(own + i);
+  const VF gx = slope(hn::Sub(here, load(own + i - 1)), hn::Sub(load(own + i + 1), here));
+  const VF gy = slope(hn::Sub(here, load(above + i)), hn::Sub(load(below + i), here));
+  blue_red = hn::MulAdd(constant(s.c2_x), gx, hn::MulAdd(constant(s.c2_y), gy, blue_red));
+  greens = hn::MulAdd(constant(s.c3_x), gx, hn::MulAdd(constant(s.c3_y), gy, greens));
+}
+
+void AddSlopes(const float* const (&luma)[3], int cells, const Slopes& slopes, float* const (&chroma)[2]) {
+  for (int i = 0; i < cells; i += lanes()) {
+    VF blue_red = load(chroma[0] + i), greens = load(chroma[1] + i);
+    add_slopes(luma[0], luma[1], luma[2], slopes, i, blue_red, greens);
+    store(blue_red, chroma[0] + i);
+    store(greens, chroma[1] + i);
+  }
+}
+
+void UnpackCells(const UnpackRow& in, const UnpackedRow& out) {
+  const Floats f;
+  const bool prior = in.rho >= 0;
+  for (int i = 0; i < in.cells; i += lanes()) {
+    const VF luma = load(in.plane[0] + i);
+    const VF root = hn::Mul(constant(in.rho), hn::Max(luma, hn::Zero(f))), power = hn::Mul(root, root);
+    const VF seen = load(in.seen + i);
+    const auto factor = [&](VF residual) HWY_ATTR {  // residual > 0
+      return prior ? hn::Mul(seen, hn::Div(power, hn::Add(power, residual))) : seen;
+    };
+    VF c[4], residual[4], share[4], left[4];
+    for (int p = 1; p < 4; ++p) {
+      residual[p] = hn::Max(load(in.residual[p] + i), constant(1e-30f));
+      share[p] = factor(residual[p]);
+      c[p] = hn::Mul(load(in.plane[p] + i), share[p]);
+      left[p] = hn::Mul(hn::Mul(share[p], share[p]), residual[p]);
+    }
+    store(factor(hn::Mul(constant(0.5f), hn::Add(residual[1], residual[2]))), out.confidence + i);
+    add_slopes(in.luma_beside[0], in.plane[0], in.luma_beside[1], in.slopes, i, c[2], c[3]);
+    const SiteValues at = values_of(luma, c[1], c[2], c[3]);
+    light_variances(in, out, i, luma, at, left);
+    const VF removed = load(in.removed + i);
+    const VF r = light_e(in, 0, at.u[0], removed), g1 = light_e(in, 1, at.u[1], removed);
+    const VF g2 = light_e(in, 1, at.u[2], removed), b = light_e(in, 2, at.u[3], removed);
+    if (in.red_is_odd) {
+      hn::StoreInterleaved2(g1, r, f, out.signal_e[0] + 2 * i);
+      hn::StoreInterleaved2(b, g2, f, out.signal_e[1] + 2 * i);
+    } else {
+      hn::StoreInterleaved2(r, g1, f, out.signal_e[0] + 2 * i);
+      hn::StoreInterleaved2(g2, b, f, out.signal_e[1] + 2 * i);
+    }
+  }
+}
+
+/// Adds to the sums the removed and the stated variance of one site of a vector of cells.
+HWY_INLINE void add_removed(VF noisy, VF value, VF variance, VF& removed, VF& stated) {
+  const VF edge = constant(linear_value), limit = hn::Sqrt(hn::Mul(constant(25), variance));
+  const VF change = hn::Min(hn::Max(hn::Sub(noisy, value), hn::Neg(limit)), limit);
+  const VF root = hn::Max(hn::Add(value, change), edge);  // on the curved part
+  const VF curved = hn::Sub(root, value), linear = hn::Sub(change, curved);
+  const VF square = hn::Mul(curved, hn::MulAdd(constant(2), linear, curved));
+  const auto counts = hn::Gt(value, edge);
+  removed = hn::Add(removed, hn::IfThenElseZero(counts, square));
+  stated = hn::Add(stated, hn::IfThenElseZero(counts, variance));
+}
+
+RemovedSums RemovedCells(const RemovedRow& in) {
+  const Floats f;
+  const int n = lanes();
+  const VF scale = constant(1 / in.offset_e);
+  VF removed = hn::Zero(f), stated = hn::Zero(f);
+  for (int i = 0; i < in.cells; i += 2 * n) {
+    VF noisy[2][4], value[2][4], variance[4];
+    for (int p = 0; p < 4; ++p) {
+      hn::LoadInterleaved2(f, in.noisy[p] + i, noisy[0][p], noisy[1][p]);
+      hn::LoadInterleaved2(f, in.value[p] + i, value[0][p], value[1][p]);
+    }
+    const VF four = hn::Mul(constant(4), hn::Mul(scale, scale));  // a quarter is stored, see PyramidLevel
+    for (int p = 2; p < 4; ++p) variance[p] = hn::Mul(four, load(in.variance[p] + i / 2));
+    for (int odd = 0; odd < 2; ++odd) {
+      const int rest = (in.cells - i - odd + 1) / 2;  // cells of this half of the pairs
+      const auto inside = hn::FirstN(f, static_cast<std::size_t>(rest < n ? rest : n));
+      const auto& a = noisy[odd];
+      const auto& b = value[odd];
+      const SiteValues before = values_of(a[0], a[1], a[2], a[3]), after = values_of(b[0], b[1], b[2], b[3]);
+      for (int k = 0; k < 4; ++k) {
+        const bool is_green = k == 1 || k == 2;
+        const VF stated_here = is_green ? hn::Mul(constant(0.5f), variance[3]) : variance[2];
+        add_removed(hn::IfThenElseZero(inside, hn::Mul(scale, before.u[k])),
+                    hn::IfThenElseZero(inside, hn::Mul(scale, after.u[k])), hn::IfThenElseZero(inside, stated_here),
+                    removed, stated);
+      }
+    }
+  }
+  return {hn::GetLane(hn::SumOfLanes(f, removed)), hn::GetLane(hn::SumOfLanes(f, stated))};
+}
+
+}  // namespace lowlux::denoise::rows::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lowlux::denoise::rows {
+
+HWY_EXPORT(AddSlopes);
+HWY_EXPORT(UnpackCells);
+HWY_EXPORT(RemovedCells);
+
+void add_slope_row(const float* const (&luma)[3], int cells, const Slopes& slopes, float* const (&chroma)[2]) {
+  HWY_DYNAMIC_DISPATCH(AddSlopes)(luma, cells, slopes, chroma);
+}
+void unpack_row(const UnpackRow& in, const UnpackedRow& out) { HWY_DYNAMIC_DISPATCH(UnpackCells)(in, out); }
+RemovedSums removed_row(const RemovedRow& in) { return HWY_DYNAMIC_DISPATCH(RemovedCells)(in); }
+
+}  // namespace lowlux::denoise::rows
+#endif
