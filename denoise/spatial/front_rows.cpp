@@ -133,18 +133,23 @@ HWY_INLINE void equalise_losses(const VarianceRow& in, int k, const float* loss)
 }
 
 void VarianceCells(const VarianceRow& in, float* scratch, float* const out[4]) {
-  constexpr float weight[3][4] = {{0.04f, 0.25f, 0.5f, 0}, {0.18f, 0.5f, 0, 2}, {0.04f, 0.25f, 0.5f, 0}};  // k, plane
   const int row = (in.cells + padding) / 16 * 16;
   const VarianceRows rows{{scratch + 16, scratch + 16 + row}, scratch + 2 * row, scratch + 3 * row};
-  for (int k = 0; k < 3; ++k) {
+  float* const other = out[2];  // sum of R and B, in which neither comes first
+  for (const int k : {0, 2, 1}) {
     colour_variance(in, k, rows);
     for (int i = 0; i < in.cells / 2; i += lanes()) {
       VF variance = pairs(rows.variance, i);
       if (in.ratio != nullptr) variance = hn::Mul(load(in.ratio + i), variance);
-      for (int p = 0; p < 4; ++p) {
-        const VF others = k == 0 ? hn::Zero(Floats()) : load(out[p] + i);
-        store(hn::MulAdd(constant(weight[k][p]), variance, others), out[p] + i);
+      if (k != 1) {
+        store(k == 0 ? variance : hn::Add(load(other + i), variance), other + i);
+        continue;
       }
+      const VF both = load(other + i);
+      store(hn::MulAdd(constant(0.18f), variance, hn::Mul(constant(0.04f), both)), out[0] + i);
+      store(hn::MulAdd(constant(0.5f), variance, hn::Mul(constant(0.25f), both)), out[1] + i);
+      store(hn::Mul(constant(0.5f), both), out[2] + i);
+      store(hn::Mul(constant(2), variance), out[3] + i);
     }
     if (in.ratio != nullptr) equalise_losses(in, k, rows.loss);
   }

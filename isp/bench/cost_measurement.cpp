@@ -194,7 +194,7 @@ class Measurement {
       if (taken_[part].empty()) continue;
       const bool sampled = part == static_cast<std::size_t>(CostPart::samples);
       const CostSize size = cost_size(sizes[size_].frame.width, sizes[size_].frame.height);
-      const double of_frame = is_denoising(static_cast<CostPart>(part)) ? size.denoised_megapixels : size.megapixels;
+      const double of_frame = size.megapixels_of(static_cast<CostPart>(part));
       const double megapixels = sampled ? sample_megapixels : of_frame;
       model.points[part].push_back({megapixels, std::max(median(taken_[part]), 0.0) * pace_s});
     }

@@ -113,7 +113,7 @@ TEST(HardCaseExtreme, AHundredMegapixelsAtOnce) {
   row.none(Path::live, "its frame alone takes 200 MB");
 }
 
-/// Largest difference of parts of two float pictures, over the noise of a raw value of the mean light.
+/// Largest difference of parts of two float pictures, over the noise of a raw value of the same light.
 struct Part {
   const SceneLinear& picture;
   int x;
@@ -122,12 +122,13 @@ struct Part {
 double difference(const Part& a, const Part& b, int width, int height, const isp::DevelopPlan& plan) {
   double worst = 0;
   for (std::size_t c = 0; c < 3; ++c) {
-    const double unit = (*plan.levels.electrons_at_white)[0] / plan.rendering.white_gain[c] /
-                        std::sqrt(mean_e + read_noise_e * read_noise_e);
+    const double electrons = (*plan.levels.electrons_at_white)[0] / plan.rendering.white_gain[c];
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
         const auto one = static_cast<double>(a.picture.plane[c].at(a.x + x, a.y + y));
-        keep_worst(worst, unit * std::abs(one - static_cast<double>(b.picture.plane[c].at(b.x + x, b.y + y))));
+        const auto other = static_cast<double>(b.picture.plane[c].at(b.x + x, b.y + y));
+        const double noise_e = std::sqrt(std::max(electrons * other, 0.0) + read_noise_e * read_noise_e);
+        keep_worst(worst, electrons * std::abs(one - other) / noise_e);
       }
     }
   }

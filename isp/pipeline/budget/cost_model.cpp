@@ -48,14 +48,24 @@ CostSize cost_size(const RawDn& raw) {
   for (int i = 0; i < grid.count(); ++i) {
     const Rect core = grid.core(i);
     if (core.width <= 0 || core.height <= 0) continue;
-    const Rect piece = with_margin(core, {}, active.width, active.height);
-    out.denoised_megapixels += cost_size(piece.width, piece.height).denoised_megapixels;
+    const auto denoised_megapixels = [&](denoise::Level level) {
+      const Rect piece = with_margin(core, margin_of(level), active.width, active.height);
+      return cost_size(piece.width, piece.height).denoised_megapixels;
+    };
+    const double usual = denoised_megapixels(denoise::Level::high);
+    out.denoised_megapixels += usual;
+    out.more_for_best_megapixels += denoised_megapixels(denoise::Level::best) - usual;
   }
   return out;
 }
 
+double CostSize::megapixels_of(CostPart part) const {
+  if (!is_denoising(part)) return megapixels;
+  return denoised_megapixels + (part >= CostPart::best_0 ? more_for_best_megapixels : 0);
+}
+
 double CostModel::seconds(CostPart part, const CostSize& size) const {
-  const double megapixels = is_denoising(part) ? size.denoised_megapixels : size.megapixels;
+  const double megapixels = size.megapixels_of(part);
   assert(megapixels > 0);
   const std::vector<CostPoint>& at = points[static_cast<std::size_t>(part)];
   if (at.empty()) return 0;

@@ -59,7 +59,11 @@ constexpr bool is_denoising(CostPart part) { return part >= CostPart::draft_0 &&
 /// Holds the size of the active area of a frame.
 struct CostSize {
   double megapixels = 0;
-  double denoised_megapixels = 0;  // with the denoiser's padding and the overlaps of tiles of a large frame
+  double denoised_megapixels = 0;       // with the denoiser's padding and the overlaps of tiles of a large frame
+  double more_for_best_megapixels = 0;  // what the larger overlaps of Level::best add
+
+  /// Returns the size that the time of a part grows with.
+  double megapixels_of(CostPart part) const;
 };
 /// Returns the size of a frame that is processed as a whole.
 CostSize cost_size(int width, int height);

@@ -41,7 +41,8 @@ double work_of_parts(const NoiseRegions& regions, const Rect& active, Level most
   cut_by_level(how, {0, 0, active.width, active.height}, TileLimits{}.side_px, parts);
   double sum = 0;
   for (const LevelPart& part : parts) {
-    const Rect whole = part.level ? with_margin(part.core, {}, active.width, active.height) : part.core;
+    const Rect whole =
+        part.level ? with_margin(part.core, margin_of(*part.level), active.width, active.height) : part.core;
     sum += work_of(part.level) * whole.width * whole.height;
   }
   return sum;

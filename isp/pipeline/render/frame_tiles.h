@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "denoise/denoise_options.h"
 #include "isp/base/frame.h"
 
 /// Large frames are processed in tiles, so that their memory stays bounded. All rectangles are relative to the corner
@@ -12,9 +13,10 @@ namespace lowlux::isp {
 /// and the tiles that it chooses the start of chroma for lie as they do in the whole frame.
 inline constexpr int tile_lattice_px = 256;
 
-/// A padded tile reaches this far beyond its core. The difference from the whole frame is then at most 3 % of the noise
-/// of a raw value on real images: README.md has the figures, tests/bench/tile_margin_bench.cpp prints them.
-inline constexpr int tile_margin_px = 256;
+/// A padded tile reaches this far beyond its core; with Level::best, whose choice of patches carries small differences
+/// on, best_margin_px. The difference from the whole frame is then at most 3 % of the noise of a raw value on real
+/// images: README.md has the figures, tests/bench/tile_margin_bench.cpp prints them.
+inline constexpr int tile_margin_px = 256, best_margin_px = 384;
 
 /// States which frames are processed in tiles, and in what tiles.
 struct TileLimits {
@@ -53,6 +55,9 @@ struct TileMargin {
   int px = tile_margin_px;
   int lattice = tile_lattice_px;
 };
+constexpr TileMargin margin_of(denoise::Level level) {
+  return {.px = level == denoise::Level::best ? best_margin_px : tile_margin_px};
+}
 Rect with_margin(const Rect& core, const TileMargin& margin, int width, int height);
 
 /// Returns the area that both rectangles cover; empty, with a width or height of 0, where there is none.

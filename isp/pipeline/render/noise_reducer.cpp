@@ -78,9 +78,9 @@ void subtract_measured_lines(const NoiseReduction& how, const Rect& piece, Plane
   }
 }
 
-/// Returns the padded tile in which a tile's noise is reduced.
+/// Returns the padded tile in which the noise of a tile that has a level is reduced.
 Rect with_own_margin(const LevelPart& part, const NoiseReducer::Piece& piece) {
-  return overlap(with_margin(part.core, {}, piece.frame_width, piece.frame_height), piece.whole);
+  return overlap(with_margin(part.core, margin_of(*part.level), piece.frame_width, piece.frame_height), piece.whole);
 }
 
 /// Holds the largest width and height of the tiles that have a level; 0 where none has.
@@ -166,7 +166,7 @@ void NoiseReducer::reserve_pieces(int width, int height, const NoiseReduction& h
 void NoiseReducer::reduce_part(const LevelPart& part, const Piece& piece, const NoiseReduction& how,
                                PlaneView<const float> raw_e, PlaneView<float> signal_e,
                                const denoise::DenoiseMaps& maps) {
-  const Rect core = seen_from(piece.whole, part.core), whole = with_own_margin(part, piece);
+  const Rect core = seen_from(piece.whole, part.core);
   if (!part.level) {
     const Rect even = from_even_site(core);
     take_dark_off(crop_of(raw_e, even), how.noise, crop_of(signal_e, even), executor_);
@@ -174,6 +174,7 @@ void NoiseReducer::reduce_part(const LevelPart& part, const Piece& piece, const 
     if (of_core.residual_variance.data == nullptr) return;
     return set_own_noise(region_of(piece, how, raw_e, part.core), how, of_core);
   }
+  const Rect whole = with_own_margin(part, piece);
   denoise::DenoiseOptions options = how.options;
   options.level = *part.level;
   denoise::DenoiseMaps of_part;

@@ -23,7 +23,7 @@ class NoiseReducer {
   explicit NoiseReducer(Executor& executor) : executor_(executor) {}
 
   /// Reduces the noise of a frame. Where regions differ, each tile with a level is reduced with a margin of
-  /// tile_margin_px of its own, and the others keep their noise.
+  /// its own, and the others keep their noise.
   /// @param raw   as the frame the decision was made for; its lines are subtracted in place
   /// @param maps  filled if not null
   /// Precondition: how.reduces().

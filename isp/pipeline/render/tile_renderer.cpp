@@ -19,9 +19,10 @@ constexpr int repair_reach_px = 6;
 
 /// Returns the margin of a tile: without noise reduction a pixel depends on its neighbours only, as far as demosaicing
 /// and repair reach.
-TileMargin margin_of(const DevelopPlan& plan) {
+TileMargin margin_in(const DevelopPlan& plan) {
   const int reach = reach_px(plan.demosaic.demosaic.method) + repair_reach_px;
-  return plan.noise_reduction.reduces() ? TileMargin{} : TileMargin{.px = reach, .lattice = 2};
+  if (!plan.noise_reduction.reduces()) return {.px = reach, .lattice = 2};
+  return plan.noise_reduction.has_level() ? margin_of(max_level_of(plan.noise_reduction)) : TileMargin{};
 }
 
 /// Returns the region that is demosaiced: at the border of the image the mosaic ends, elsewhere it continues.
@@ -39,7 +40,7 @@ Rect pixels_of(const RawDn& raw, const DevelopPlan& plan, const Rect& core) {
 }
 
 Rect whole_of(const RawDn& raw, const DevelopPlan& plan, const Rect& core) {
-  return with_margin(core, margin_of(plan), raw.active.width, raw.active.height);
+  return with_margin(core, margin_in(plan), raw.active.width, raw.active.height);
 }
 
 PlaneView<const float> crop_of(const PlaneView<const float>& mosaic, const Rect& whole, const Rect& part) {
