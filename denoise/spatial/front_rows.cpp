@@ -1,5 +1,6 @@
 #include <cassert>
 #include <cstddef>
+#include <initializer_list>
 
 #include "denoise/spatial/rows.h"
 
