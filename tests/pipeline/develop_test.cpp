@@ -247,6 +247,18 @@ TEST(Develop, UnknownColoursAreShownAsThoseOfSrgbWithOneWarning) {
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a.data()[i], b.data()[i], 1) << i;  // D65 is not the 6504 K
   EXPECT_EQ(shown->plan.warnings.size(), expected->plan.warnings.size() + 1);
   EXPECT_NE(shown->plan.warnings.front().find("as shot. --profile"), std::string::npos) << shown->plan.warnings.front();
+  options.white_balance.mode = WhiteBalanceChoice::Mode::gains;
+  options.white_balance.gains = {2, 1, 1.5};
+  const auto given = develop(unknown, options, one_thread);
+  ASSERT_TRUE(given);
+  EXPECT_NE(given->plan.warnings.front().find("of the given gains. --profile"), std::string::npos)
+      << given->plan.warnings.front();
+  options.white_balance.mode = WhiteBalanceChoice::Mode::picked;
+  options.white_balance.picked = {.x = 20, .y = 20};
+  const auto picked = develop(unknown, options, one_thread);
+  ASSERT_TRUE(picked) << picked.error().message;
+  EXPECT_NE(picked->plan.warnings.front().find("of the picked pixel. --profile"), std::string::npos)
+      << picked->plan.warnings.front();
 }
 
 TEST(Develop, MatricesThatMakeNoLightOfTheWhiteAreErrorsThatNameTheWayOut) {

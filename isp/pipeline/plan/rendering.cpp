@@ -77,16 +77,28 @@ std::optional<ProfileRendering> decide_profile(const RawFrame& frame, const Deve
                           .limit = rendering.limit};
 }
 
+/// Returns where the white balance of a frame of unknown colours is from, in words.
+std::string origin_of(WhiteSource source) {
+  switch (source) {
+    case WhiteSource::as_shot:
+      return "as shot";
+    case WhiteSource::estimated:
+      return "estimated from the image";
+    case WhiteSource::gains:
+      return "of the given gains";
+    case WhiteSource::picked:
+      return "of the picked pixel";
+    default:
+      return "left as it is";
+  }
+}
+
 /// Returns the white balance of a frame of unknown colours, with what that means as its reason.
 Result<WhiteBalance> without_white(Result<WhiteBalance> balance) {
   if (!balance) return balance;
-  const char* const white = balance->source == WhiteSource::as_shot     ? "as shot"
-                            : balance->source == WhiteSource::estimated ? "estimated from the image"
-                                                                        : "left as it is";
-  balance->reason = std::string(
-                        "the colours of the camera are unknown (no colour matrix): shown as if they were those of "
-                        "sRGB, white balance ") +
-                    white + ". --profile states them";
+  balance->reason =
+      "the colours of the camera are unknown (no colour matrix): shown as if they were those of sRGB, white balance " +
+      origin_of(balance->source) + ". --profile states them";
   return balance;
 }
 
