@@ -52,6 +52,16 @@ TEST_F(StandardStreams, ARawFileOfStandardInputIsThatOfItsName) {
   EXPECT_EQ(nlohmann::json::parse(clean.out)[0]["make"], "Nokia") << clean.out;
 }
 
+TEST_F(StandardStreams, AFileOfThatNameIsNotTheOutput) {
+  ASSERT_EQ(lowlux({"develop", dog, "-o", file("a.png"), "--half", "--quiet"}).exit_code, 0);
+  const auto result =
+      shell("cd " + quoted("") + " && echo other > ./- && lowlux develop - -o - --half --skip-existing " + "< '" +
+            std::filesystem::absolute(dog).string() + "' > b.png");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(test::read_file(file("a.png")) == test::read_file(file("b.png"))) << result.err;
+  EXPECT_EQ(std::filesystem::file_size(file("-")), 6U) << "is left as it is";
+}
+
 TEST_F(StandardStreams, AReaderThatEndsGivesOneLine) {
   const auto result =
       shell("(lowlux develop '" + dog + "' -o - --quiet; echo \"status $?\" >&2) | head -c 10 > /dev/null");

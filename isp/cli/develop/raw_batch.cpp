@@ -251,7 +251,7 @@ class BatchRun {
         // The output is written last: if it exists, the maps do too, and maps without it are from an interrupted run.
         // An empty file is the name that such a run had reserved (see publish.h).
         std::error_code absent;
-        out.skipped = std::filesystem::file_size(job.output, absent) > 0 && !absent;
+        out.skipped = !is_standard_stream(job.output) && std::filesystem::file_size(job.output, absent) > 0 && !absent;
         if (out.skipped) return out;
         const auto exists = [](const std::string& file) { return std::filesystem::exists(file); };
         if (std::ranges::any_of(files_of(batch_, job), exists)) own.overwrite = isp::Overwrite::yes;
