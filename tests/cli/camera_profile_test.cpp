@@ -101,6 +101,11 @@ TEST_F(CameraProfileCommand, TheToneCurveReplacesTheStandardOne) {
   EXPECT_EQ(developed("bright.dng", none), plain);
   EXPECT_EQ(developed("bright.dng", standard), plain) << "a curve that is named comes before";
   EXPECT_EQ(developed("bright.dng", linear), developed("plain.dng", linear));
+  for (const char* const shape : {"--brightness", "--contrast"}) {
+    const std::vector<std::string> shaped{"--exposure", "0", shape, "0.8"};
+    EXPECT_NE(developed("plain.dng", shaped), plain) << shape;
+    EXPECT_EQ(developed("bright.dng", shaped), developed("plain.dng", shaped)) << shape << " is of the standard curve";
+  }
   EXPECT_EQ(developed("wrong.dng", at_0), plain);
   EXPECT_NE(report_["warnings"].dump().find("tone curve is not valid"), std::string::npos);
   // The automatic exposure places mid-grey where the curve shows it as mid-grey.

@@ -156,8 +156,9 @@ void set_profile_tables(const DevelopArgs& args, ReadyFrame& ready) {
       ready.options.look.look != isp::Look::camera || colour.source != CameraColour::Source::file_tags) {
     return;
   }
+  const bool uses_curve = !args.tone && ready.options.tone_shape == isp::ToneShape{};
   ready.options.profile_tables = isp::read_profile_tables(
-      *ready.frame.source_tags, {colour.calibrations.size() == 2, !args.tone}, ready.frame.warnings);
+      *ready.frame.source_tags, {colour.calibrations.size() == 2, uses_curve}, ready.frame.warnings);
 }
 
 Result<ReadyFrame> ready_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock) {
