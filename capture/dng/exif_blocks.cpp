@@ -36,6 +36,10 @@ void add_jpeg(Bytes jpeg, std::vector<ExifBlock>& out) {
   if (!starts_with(jpeg, "\xFF\xD8"sv)) return;
   for (std::size_t at = 2; at + 4 <= jpeg.size() && jpeg[at] == std::byte{0xFF};) {
     const std::byte marker = jpeg[at + 1];
+    if (marker == std::byte{0xFF}) {  // a fill byte (ITU T.81, B.1.1.2)
+      ++at;
+      continue;
+    }
     const std::size_t size = load_u16(jpeg.data() + at + 2, true);
     const auto segment = part_of(jpeg, at + 2, size);
     if (size < 2 || marker == start_of_scan || !segment) return;

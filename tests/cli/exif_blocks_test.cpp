@@ -93,7 +93,7 @@ Bytes jpeg_of(const Bytes& tiff) {
   out.number(0xFFD8FFE0, 4);  // an APP0 comes first
   out.number(16, 2);
   out.append(bytes_of_text(std::string_view("JFIF\0\1\1\0\0\1\0\1\0\0", 14)));
-  out.number(0xFFE1, 2);
+  out.number(0xFFFFFFE1, 4);  // two fill bytes (ITU T.81, B.1.1.2)
   out.number(2 + 6 + tiff.size(), 2);
   out.append(bytes_of_text(std::string_view("Exif\0\0", 6)));
   out.append(tiff);
