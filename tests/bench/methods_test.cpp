@@ -65,8 +65,11 @@ TEST(Methods, WrongCommandsAreRefusedWithAReason) {
 }
 
 TEST(Methods, ScenesArePureFunctionsOfTheSeed) {
-  for (const auto make : {leaves_scene, stars_scene}) {
-    const MethodScene a = make(small, 1), again = make(small, 1), other = make(small, 2);
+  for (const bool stars : {false, true}) {
+    const auto make = [stars](std::uint64_t seed) {
+      return stars ? stars_scene(small, seed) : leaves_scene(small, seed);
+    };
+    const MethodScene a = make(1), again = make(1), other = make(2);
     EXPECT_TRUE(same(a.picture.linear, again.picture.linear));
     EXPECT_FALSE(same(a.picture.linear, other.picture.linear));
     for (const Plane<float>& plane : a.picture.linear.plane) {

@@ -43,16 +43,16 @@ void fill_disc(SceneLinear& image, const StarPlace& centre, double radius, const
   }
 }
 
-void add_star(SceneLinear& image, const StarPlace& centre, const Vector3& peak) {
-  const int reach = static_cast<int>(std::ceil(6 * bench_lens_px));
+void add_star(SceneLinear& image, const StarPlace& centre, const Vector3& peak, double lens_px, float limit) {
+  const int reach = static_cast<int>(std::ceil(6 * lens_px));
   const int x0 = static_cast<int>(std::lround(centre.x_px)), y0 = static_cast<int>(std::lround(centre.y_px));
   for (int y = std::max(0, y0 - reach); y <= std::min(image.height() - 1, y0 + reach); ++y) {
     for (int x = std::max(0, x0 - reach); x <= std::min(image.width() - 1, x0 + reach); ++x) {
       const double r2 = std::pow(x - centre.x_px, 2) + std::pow(y - centre.y_px, 2);
-      const double spread = std::exp(-r2 / (2 * bench_lens_px * bench_lens_px));
+      const double spread = std::exp(-r2 / (2 * lens_px * lens_px));
       for (std::size_t c = 0; c < 3; ++c) {
         float& value = image.plane[c].at(x, y);
-        value = std::min(1.0F, value + static_cast<float>(spread * peak[c]));
+        value = std::min(limit, value + static_cast<float>(spread * peak[c]));
       }
     }
   }
@@ -75,28 +75,31 @@ BenchPicture part_of(const BenchPicture& picture, const SceneSize& size, std::ui
 
 }  // namespace
 
-MethodScene leaves_scene(const SceneSize& size, std::uint64_t seed) {
-  constexpr double min_radius = 2, pixels_per_leaf = 12, darkest = 0.02, brightest = 0.95, chroma = 0.5;
+MethodScene leaves_scene(const SceneSize& size, std::uint64_t seed, const Leaves& how) {
+  constexpr double darkest = 0.02, brightest = 0.95;
   MethodScene out{{"leaves", SceneLinear(size.width, size.height)}, {}};
   SceneLinear& image = out.picture.linear;
   for (Plane<float>& plane : image.plane) std::fill_n(plane.data(), plane.size(), 0.2F);
-  const double max_radius = std::max(2 * min_radius, size.height / 4.0);
-  const auto leaves = static_cast<std::size_t>(size.width * size.height / pixels_per_leaf);
+  const double min_radius = how.min_radius_px;
+  const double max_radius = std::max(2 * min_radius, how.max_radius_px > 0 ? how.max_radius_px : size.height / 4.0);
+  const auto leaves = static_cast<std::size_t>(size.width * size.height / how.pixels_per_leaf);
   for (std::size_t i = 0; i < leaves; ++i) {
     const auto shape = uniform(seed, SceneStream::leaf_shape, i), colour = uniform(seed, SceneStream::leaf_colour, i);
     const double narrow = std::pow(min_radius, -2), wide = std::pow(max_radius, -2);
     const double radius = 1 / std::sqrt(wide + shape[0] * (narrow - wide));  // inverse of the distribution of r^-3
-    const double light = darkest * std::pow(brightest / darkest, colour[0]);
     Vector3 rgb{};
-    for (std::size_t c = 0; c < 3; ++c) rgb[c] = light * (1 - chroma * colour[c + 1]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double power = how.shared * colour[0] + (1 - how.shared) * colour[c + 1];
+      rgb[c] = darkest * std::pow(brightest / darkest, power) * (1 - how.chroma * colour[c + 1]);
+    }
     fill_disc(image, {shape[1] * size.width, shape[2] * size.height}, radius, rgb);
   }
-  for (Plane<float>& plane : image.plane) plane = lens_blurred(plane.view(), bench_lens_px);
+  for (Plane<float>& plane : image.plane) plane = lens_blurred(plane.view(), how.lens_px);
   return out;
 }
 
-MethodScene stars_scene(const SceneSize& size, std::uint64_t seed) {
-  constexpr double pixels_per_star = 600, sky = 0.02, glow = 0.04, faintest = 0.04, brightest = 0.9, border_px = 8;
+MethodScene stars_scene(const SceneSize& size, std::uint64_t seed, const StarField& field) {
+  constexpr double pixels_per_star = 600, sky = 0.02, glow = 0.04, border_px = 8;
   constexpr Vector3 sky_rgb{0.8, 0.95, 1.1}, glow_rgb{1.2, 1, 0.7}, warm{1, 0.8, 0.55}, cold{0.75, 0.88, 1};
   MethodScene out{{"stars", SceneLinear(size.width, size.height)}, {}};
   SceneLinear& image = out.picture.linear;
@@ -109,8 +112,11 @@ MethodScene stars_scene(const SceneSize& size, std::uint64_t seed) {
     const auto place = uniform(seed, SceneStream::star_place, i), light = uniform(seed, SceneStream::star_light, i);
     const StarPlace centre{border_px + place[0] * (size.width - 1 - 2 * border_px),
                            border_px + place[1] * (size.height - 1 - 2 * border_px)};
-    const double flux = std::min(brightest, faintest / std::pow(light[0], 1 / 0.5));
-    add_star(image, centre, sum_of(flux * light[1], warm, flux * (1 - light[1]), cold));
+    const double peak = field.law == StarLaw::power
+                            ? std::min(field.brightest, field.faintest / std::pow(light[0], 1 / 0.5))
+                            : field.faintest * std::pow(field.brightest / field.faintest, light[0]);
+    const double lens_px = std::lerp(field.min_lens_px, field.max_lens_px, light[2]);
+    add_star(image, centre, sum_of(peak * light[1], warm, peak * (1 - light[1]), cold), lens_px, field.limit);
     out.stars.push_back(centre);
   }
   return out;

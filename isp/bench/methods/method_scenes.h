@@ -29,15 +29,38 @@ struct SceneSize {
   int height = 0;
 };
 
-/// Returns dead leaves (Lee, Mumford & Huang 2001; the texture of ISO 19567-2): discs of random colours that cover one
-/// another, radii r distributed as r^-3 from 2 px to a quarter of the height, blurred by the lens. A pure function of
-/// size and seed.
-MethodScene leaves_scene(const SceneSize& size, std::uint64_t seed);
+/// Parameters of dead leaves.
+struct Leaves {
+  double min_radius_px = 2;
+  double max_radius_px = 0;  // 0: a quarter of the height
+  double pixels_per_leaf = 12;
+  double chroma = 0.5;  // each channel loses up to this fraction of its light
+  /// Weight s of what the channels share in the logarithm of their light, 0..1: with `chroma` 0 the correlation of the
+  /// logarithms is s^2 / (s^2 + (1 - s)^2).
+  double shared = 1;
+  double lens_px = bench_lens_px;
+};
 
-/// Returns a field of stars over a dark sky that brightens towards the bottom: one star on 600 pixels, the density of
-/// luminances falls as their power -1.5, colours from orange to blue, spread by the lens. A pure function of size and
-/// seed.
-MethodScene stars_scene(const SceneSize& size, std::uint64_t seed);
+/// Returns dead leaves (Lee, Mumford & Huang 2001; the texture of ISO 19567-2): discs of random colours that cover one
+/// another, radii r distributed as r^-3, blurred by the lens. A pure function of its arguments.
+MethodScene leaves_scene(const SceneSize& size, std::uint64_t seed, const Leaves& leaves = {});
+
+/// Distribution of the flux of stars.
+enum class StarLaw : std::uint8_t { power, log_uniform };
+
+/// Parameters of a field of stars. Their peaks are above `faintest`, and up to `brightest` in units of white.
+struct StarField {
+  StarLaw law = StarLaw::power;  // power: the density of peaks falls as their power -1.5
+  double faintest = 0.04;
+  double brightest = 0.9;
+  double min_lens_px = bench_lens_px;  // the spread of each star is drawn between these
+  double max_lens_px = bench_lens_px;
+  float limit = 1;  // light of a pixel
+};
+
+/// Returns a field of stars over a dark sky that brightens towards the bottom: one star on 600 pixels, colours from
+/// orange to blue, spread by the lens. A pure function of its arguments.
+MethodScene stars_scene(const SceneSize& size, std::uint64_t seed, const StarField& field = {});
 
 /// Returns the scenes of a seed: parts of the pictures at places that the seed draws, then leaves and stars.
 /// @param size  even sides; limited to those of a picture
