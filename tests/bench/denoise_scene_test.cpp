@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -84,6 +85,23 @@ TEST(DenoiseScene, TheExposureWithDarkKeepsTheMeanLuminance) {
   const SceneLinear& linear = with_dark;
   const SceneLinear& truth = picture.linear;
   EXPECT_NEAR(patch_means(linear.view())[0].y, patch_means(truth.view())[0].y, 1e-5);  // float kernels
+}
+
+TEST(DenoiseScene, SaturatedSitesHoldTheChargeOfWhiteAndTheirNoiseSaysSo) {
+  BenchPicture scene{"lamp", SceneLinear(64, 64)};
+  for (Plane<float>& plane : scene.linear.plane) {
+    std::fill_n(plane.data(), plane.size(), 0.1F);
+    for (int y = 16; y < 48; ++y) std::fill_n(plane.row(y) + 16, 32, 50.0F);
+  }
+  const DenoiseShot shot = take(scene, {200, 2, 1.5}, 1, true);
+  EXPECT_NEAR(shot.noise().saturation_e[0], shot.white_e + 2, 1e-6 * shot.white_e);  // float
+  EXPECT_EQ(shot.signal_e.at(32, 32), static_cast<float>(shot.white_e));
+  EXPECT_EQ(shot.raw_e.at(32, 32), static_cast<float>(shot.white_e + 2));
+  EXPECT_NEAR(shot.signal_e.at(3, 2), 0.1 * shot.white_e, 1e-4 * shot.white_e);  // green
+  InlineExecutor one;
+  BenchRenderer renderer(64, one);
+  const RenderedPicture picture = renderer.render(shot.signal_e.view(), shot, NoiseLeft::none);
+  for (const Plane<float>& plane : picture.light.plane) EXPECT_NEAR(plane.at(32, 32), 1, 1e-5);  // float kernels
 }
 
 TEST(BenchPicture, TheLensKeepsLightAndSpreadsAPointByItsSigma) {

@@ -21,10 +21,12 @@ double gain_at(int x, int y) { return bench_white_gain[static_cast<std::size_t>(
 
 Vector3 weights() { return luminance_weights(OutputSpace::linear_srgb).value(); }  // of a space with primaries
 
-RgbTransform transform(bool move_into_gamut) {
+constexpr float no_clip = std::numeric_limits<float>::infinity();
+
+RgbTransform transform(bool move_into_gamut, float clip) {
   const Vector3 w = weights();
   return {.luminance = {static_cast<float>(w[0]), static_cast<float>(w[1]), static_cast<float>(w[2])},
-          .clip = std::numeric_limits<float>::infinity(),  // no pixel is saturated
+          .clip = clip,
           .move_into_gamut = move_into_gamut};
 }
 
@@ -32,6 +34,15 @@ double mean_of(const Plane<float>& plane) {
   double sum = 0;
   for (std::size_t i = 0; i < plane.size(); ++i) sum += static_cast<double>(plane.data()[i]);
   return sum / static_cast<double>(plane.size());
+}
+
+/// Limits a row of charge to what its sites hold.
+void limit(DenoiseShot& shot, int y) {
+  const auto full_e = static_cast<float>(shot.white_e), with_dark_e = static_cast<float>(shot.noise().saturation_e[0]);
+  for (int x = 0; x < shot.raw_e.width(); ++x) {
+    shot.signal_e.at(x, y) = std::min(shot.signal_e.at(x, y), full_e);
+    shot.raw_e.at(x, y) = std::min(shot.raw_e.at(x, y), with_dark_e);
+  }
 }
 
 /// Returns the method that the pipeline chooses.
@@ -46,8 +57,10 @@ std::string name_of(const DenoiseLight& light) { return fmt::format("{:g}/{:g}",
 
 denoise::RawNoise DenoiseShot::noise() const {
   const double read_e2 = light.read_noise_e * light.read_noise_e;
-  return {.dark_mean_e = {light.dark_e, light.dark_e, light.dark_e, light.dark_e},
-          .variance_e2 = {read_e2, read_e2, read_e2}};
+  denoise::RawNoise out{.dark_mean_e = {light.dark_e, light.dark_e, light.dark_e, light.dark_e},
+                        .variance_e2 = {read_e2, read_e2, read_e2}};
+  if (saturates) out.saturation_e.fill(static_cast<float>(white_e + light.dark_e));  // exactly what raw_e is limited to
+  return out;
 }
 
 std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light) {
@@ -56,16 +69,23 @@ std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light) {
   return 1000 * place + static_cast<std::uint64_t>(light.mean_e) + (light.dark_e > 2 ? 100000 : 0);
 }
 
-DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::uint64_t seed) {
+DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::uint64_t seed, bool saturates) {
   const int width = picture.linear.width(), height = picture.linear.height();
-  DenoiseShot shot{.light = light, .signal_e = Plane<float>(width, height), .raw_e = Plane<float>(width, height)};
+  DenoiseShot shot{.light = light,
+                   .signal_e = Plane<float>(width, height),
+                   .raw_e = Plane<float>(width, height),
+                   .saturates = saturates};
+  double limited = 0;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const auto colour = static_cast<std::size_t>(colour_at(phase, x, y));
-      shot.signal_e.at(x, y) = static_cast<float>(picture.linear.plane[colour].at(x, y) / gain_at(x, y));
+      const float value = picture.linear.plane[colour].at(x, y);
+      shot.signal_e.at(x, y) = static_cast<float>(value / gain_at(x, y));
+      limited += std::min<double>(value, 1) / gain_at(x, y);
     }
   }
-  shot.white_e = light.mean_e / mean_of(shot.signal_e);
+  const double mean_signal = saturates ? limited / static_cast<double>(shot.signal_e.size()) : mean_of(shot.signal_e);
+  shot.white_e = light.mean_e / mean_signal;
   std::vector<float> mean(static_cast<std::size_t>(width)), normal(static_cast<std::size_t>(width));
   const DrawStream stream{.seed = seed, .frame = 0, .purpose = draw_purpose::electrons};
   for (int y = 0; y < height; ++y) {
@@ -74,11 +94,13 @@ DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::ui
     for (std::size_t x = 0; x < mean.size(); ++x) {
       signal[x] = static_cast<float>(signal[x] * shot.white_e);
       mean[x] = static_cast<float>(signal[x] + light.dark_e);
+      if (saturates) mean[x] = std::min(mean[x], poisson_max_mean);  // far above saturation
       assert(mean[x] <= poisson_max_mean);
     }
     poisson_row(stream, 0, static_cast<std::uint32_t>(y), mean, {raw, mean.size()});
     normal_row(stream, 0, static_cast<std::uint32_t>(y), 1, normal);
     for (std::size_t x = 0; x < mean.size(); ++x) raw[x] += static_cast<float>(light.read_noise_e) * normal[x];
+    if (saturates) limit(shot, y);
   }
   return shot;
 }
@@ -101,6 +123,10 @@ SignedMosaic mosaic_of(const PlaneView<const float>& mosaic_e, const DenoiseShot
   return out;
 }
 
+float clip_of(const DenoiseShot& shot, double exposure) {
+  return shot.saturates ? static_cast<float>(exposure) : no_clip;
+}
+
 BenchRenderer::BenchRenderer(int max_width, Executor& executor)
     : executor_(executor), kernel_(max_width, executor.width()) {}
 
@@ -108,14 +134,15 @@ RenderedPicture BenchRenderer::render(const PlaneView<const float>& mosaic_e, co
                                       double exposure) {
   const SignedMosaic in = mosaic_of(mosaic_e, shot, left, method_for(shot.light, left), exposure);
   RenderedPicture out{SceneLinear(mosaic_e.width, mosaic_e.height), SceneLinear(mosaic_e.width, mosaic_e.height)};
-  kernel_.linear(in, transform(true), out.display.view(), executor_);
-  kernel_.linear(in, transform(false), out.light.view(), executor_);
+  const float clip = clip_of(shot, exposure);
+  kernel_.linear(in, transform(true, clip), out.display.view(), executor_);
+  kernel_.linear(in, transform(false, clip), out.light.view(), executor_);
   return out;
 }
 
 SceneLinear BenchRenderer::display_of(const SceneLinear& light) {
   SceneLinear out(light.width(), light.height());
-  kernel_.linear(CameraPlanes{.rgb = light.view()}, transform(true), out.view(), executor_);
+  kernel_.linear(CameraPlanes{.rgb = light.view()}, transform(true, no_clip), out.view(), executor_);
   return out;
 }
 

@@ -30,9 +30,10 @@ inline constexpr std::array<double, 3> bench_white_gain{2, 1, 1.5};
 /// One image, captured once. All methods start from `raw_e`.
 struct DenoiseShot {
   DenoiseLight light;
-  double white_e = 0;     // charge of a green pixel at display white, the scale of all renderings
-  Plane<float> signal_e;  // mean
-  Plane<float> raw_e;     // Poisson(signal + dark) + normal read noise; no pedestal, dark still in
+  double white_e = 0;      // charge of a green pixel at display white, the scale of all renderings
+  Plane<float> signal_e;   // mean
+  Plane<float> raw_e;      // Poisson(signal + dark) + normal read noise; no pedestal, dark still in
+  bool saturates = false;  // charge above white_e, dark not counted, is lost; light above white is possible
 
   denoise::RawNoise noise() const;
 };
@@ -44,7 +45,8 @@ std::uint64_t seed_of(const BenchPicture& picture, const DenoiseLight& light);
 /// Captures an image. A site (x, y) of colour c receives linear_c * white_e / gain_c, with white_e such that the mean
 /// over the mosaic is light.mean_e. Equal input gives an equal shot.
 /// @param picture  not black; at most poisson_max_mean electrons anywhere
-DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::uint64_t seed);
+/// @param saturates  each site holds white_e and no more; light.mean_e is then the mean of light limited to 1
+DenoiseShot take(const BenchPicture& picture, const DenoiseLight& light, std::uint64_t seed, bool saturates = false);
 
 /// How much of a shot's noise a mosaic contains.
 enum class NoiseLeft { none, reduced, all };
@@ -54,6 +56,9 @@ enum class NoiseLeft { none, reduced, all };
 /// @param exposure  1 maps white_e to display white
 SignedMosaic mosaic_of(const PlaneView<const float>& mosaic_e, const DenoiseShot& shot, NoiseLeft left,
                        DemosaicMethod method, double exposure = 1);
+
+/// Returns the value at which the renderer clips: that of green's saturation, or infinity.
+float clip_of(const DenoiseShot& shot, double exposure = 1);
 
 /// Renders mosaics by the same rules for all methods: gains, the demosaicing that the pipeline would choose (see
 /// `plan_demosaic`), an exposure that undoes the light.
