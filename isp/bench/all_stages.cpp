@@ -27,6 +27,8 @@ constexpr std::array registry{
     BenchStage{"simulate", "Whole simulated files: photon sampling and effects", run_simulate_bench},
     BenchStage{"chroma-start", "Where the denoiser's chroma starts: error against time", run_chroma_start_bench},
     BenchStage{"demosaic", "Demosaicing: error against time", run_demosaic_bench},
+    BenchStage{"scenes", "Generated scenes: error of every level and demosaicing method, and marks they leave",
+               run_scenes_bench},
     BenchStage{"mesopic", "Mesopic vision, exact and by tables: error against time", run_mesopic_bench},
     BenchStage{"scene-light", "Rods' luminance under every lamp, with the light unknown and stated",
                run_scene_light_bench},

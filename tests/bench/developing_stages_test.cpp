@@ -73,6 +73,19 @@ TEST(DevelopingStages, DemosaicingFallsBehindTheTruthAsItDoesLess) {
   EXPECT_EQ(outcome->plots.size(), 5u);
 }
 
+TEST(DevelopingStages, GeneratedScenesGainByNoiseReductionAndShowTheirMarks) {
+  const auto outcome = run_scenes_bench(quick());
+  ASSERT_TRUE(outcome.has_value());
+  const Rows rows = rows_of(outcome->table);
+  EXPECT_EQ(rows.size(), 11 * 9u);
+  for (const auto& [name, row] : rows) EXPECT_GT(row.at("PSNR [dB]"), 10) << name.first << name.second;
+  for (const char* set : {"text, 200 e-", "text, lens, 200 e-", "lamps, 200 e-", "lamps, lens, 200 e-"}) {
+    EXPECT_LT(error_of(rows, set, "standard"), error_of(rows, set, "none")) << set;
+  }
+  EXPECT_EQ(outcome->findings.size(), 8 * 8u);
+  EXPECT_TRUE(outcome->failures.empty());
+}
+
 TEST(DevelopingStages, ChromaFromWhereTheSignalSaysIsAsGoodAsTheBetterStart) {
   const auto outcome = run_chroma_start_bench(quick());
   ASSERT_TRUE(outcome.has_value());

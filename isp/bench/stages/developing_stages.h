@@ -14,6 +14,9 @@ Result<BenchOutcome> run_chroma_start_bench(const BenchOptions& options);
 /// Runs the stage `demosaic`: methods against the truth, the kernel against its algorithm in double.
 Result<BenchOutcome> run_demosaic_bench(const BenchOptions& options);
 
+/// Runs the stage `scenes`: levels of the denoiser and methods of demosaicing on generated scenes, and their marks.
+Result<BenchOutcome> run_scenes_bench(const BenchOptions& options);
+
 /// Runs the stage `mesopic`: states of CIE 191 and appearance models, tables against the exact results.
 Result<BenchOutcome> run_mesopic_bench(const BenchOptions& options);
 
