@@ -82,7 +82,10 @@ TEST(DevelopingStages, GeneratedScenesGainByNoiseReductionAndShowTheirMarks) {
   for (const char* set : {"text, 200 e-", "text, lens, 200 e-", "lamps, 200 e-", "lamps, lens, 200 e-"}) {
     EXPECT_LT(error_of(rows, set, "standard"), error_of(rows, set, "none")) << set;
   }
-  EXPECT_EQ(outcome->findings.size(), 8 * 8u);
+  EXPECT_EQ(outcome->findings.size(), 11 + 8 * 8u);
+  const auto text = std::ranges::find(outcome->findings, "scenes/gain/text, 200 e-", &Finding::id);
+  ASSERT_TRUE(text != outcome->findings.end());
+  EXPECT_TRUE(text->holds) << text->ours;
   EXPECT_TRUE(outcome->failures.empty());
 }
 

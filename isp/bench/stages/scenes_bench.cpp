@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,6 +12,7 @@
 #include "denoise/denoiser.h"
 #include "isp/base/executor.h"
 #include "isp/bench/marks/development_marks.h"
+#include "isp/bench/peers/denoise_methods.h"
 #include "isp/bench/peers/nl_means.h"
 #include "isp/bench/scenes/denoise_scene.h"
 #include "isp/bench/scenes/generated_scenes.h"
@@ -31,7 +33,7 @@ struct Way {
 };
 
 std::vector<Way> ways() {
-  std::vector<Way> out{{"none", {}, {}}};
+  std::vector<Way> out{{name_of_none, {}, {}}};
   for (const denoise::Level level : denoise::all_levels) out.push_back({std::string(name_of(level)), level, {}});
   for (const DemosaicMethod method : all_demosaic_methods) {
     out.push_back({fmt::format("standard, {}", name_of(method)), denoise::Level::standard, method});
@@ -134,7 +136,27 @@ void add_rows(const std::string& name, std::vector<Sample>& samples, Developer& 
   rows.add(group, std::move(psnr_db), {.rounds = 3});
 }
 
-std::vector<Finding> findings_of(const BenchOptions& options, const SceneSize& size, Developer& developer) {
+/// Returns a check for each set in each light: no level of the denoiser has a lower PSNR than no noise reduction.
+std::vector<Finding> gain_findings(const StageRows& rows) {
+  constexpr double tolerance_db = 0.1;
+  std::vector<Finding> out;
+  double none_db = 0, least_db = 0;
+  for (std::size_t i = 0; i < rows.rows.size(); ++i) {
+    const AccuracyRow& row = rows.rows[i];
+    const double psnr_db = rows.figures[i][0];
+    if (row.level == name_of_none) none_db = psnr_db;
+    const auto is_level = [&](denoise::Level level) { return row.level == name_of(level); };
+    if (!std::ranges::any_of(denoise::all_levels, is_level)) continue;
+    least_db = is_level(denoise::all_levels.front()) ? psnr_db : std::min(least_db, psnr_db);
+    if (!is_level(denoise::all_levels.back())) continue;
+    out.push_back(check_of("scenes/gain/" + row.group, "PSNR of the worst level over none",
+                           fmt::format("at least {:+.1f} dB", -tolerance_db),
+                           fmt::format("{:+.2f} dB", least_db - none_db), least_db - none_db >= -tolerance_db));
+  }
+  return out;
+}
+
+std::vector<Finding> marks_findings(const BenchOptions& options, const SceneSize& size, Developer& developer) {
   std::vector<Finding> out;
   for (const Way& way : ways()) {
     if (!way.level) continue;
@@ -168,7 +190,8 @@ Result<BenchOutcome> run_scenes_bench(const BenchOptions& options) {
   BenchOutcome out = outcome_of("scenes", rows, TimeOf::megapixel);
   out.plots.clear();  // three for each set would say less than the table
   out.images = std::move(images);
-  out.findings = findings_of(options, size, developer);
+  out.findings = gain_findings(rows);
+  std::ranges::move(marks_findings(options, size, developer), std::back_inserter(out.findings));
   out.remarks.push_back(fmt::format(
       "generated scenes of {} x {} px, {} seeds, RGGB, white gains 2, 1, 1.5, 2 e- of dark charge, 1.5 e- of read "
       "noise; lamps and stars saturate at white; times are of noise reduction and demosaicing together; marks at {:g} "
