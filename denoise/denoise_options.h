@@ -46,8 +46,9 @@ struct RawNoise {
   PerSite<double>
       dark_mean_e{};  // subtracted, sites as in site_of(); both greens get their mean, to avoid maze patterns
   std::array<double, 3> variance_e2{};  // of R, G, B: read noise^2 + quantisation step^2 / 12; greens share one value
-  /// Values of at least this are saturated: they count as the largest white-balanced value of their 2x2 cell, which
-  /// becomes neutral, whatever DenoiseOptions::rho, and does not affect the colour of its surroundings.
+  /// Values of at least this are saturated: they count as the largest white-balanced value of their 2x2 cell, and do
+  /// not affect the colour of its surroundings. A cell of four saturated values becomes neutral, whatever
+  /// DenoiseOptions::rho; the values of a cell with fewer stay as they were measured.
   std::array<double, 3> saturation_e{unsaturated_e, unsaturated_e, unsaturated_e};  // of R, G, B
 };
 

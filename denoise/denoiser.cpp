@@ -73,6 +73,7 @@ struct Run {
   float min_e(int k) const { return static_cast<float>(0.3 * dark_e[k] + 0.02); }
   void front() const;
   std::span<const float> removed(const PlaneSet& planes) const;
+  void keep_partly_saturated(int y, const UnpackMemory& m) const;
   void unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const;
 };
 
@@ -224,6 +225,38 @@ std::span<const float> Run::removed(const PlaneSet& planes) const {
   return out;
 }
 
+/// Gives the sites of cells that are saturated in part their measured values, and their variance: at the edge of a
+/// lamp, a cell without chroma would spread it.
+void Run::keep_partly_saturated(int y, const UnpackMemory& m) const {
+  const PerSite<int> site = sites_of(raw.phase);
+  const std::uint8_t* const first = memory.saturated.row(y);
+  const std::uint8_t* const last = first + columns;
+  for (const std::uint8_t* at = std::find(first, last, 1); at != last; at = std::find(at + 1, last, 1)) {
+    const auto x = static_cast<int>(at - first);
+    std::array<double, 4> value_e{};
+    int saturated = 0;
+    for (int k = 0; k < 4; ++k) {
+      const float e = raw.value.at(raw_of(x, site[k] & 1, raw.value.width), raw_of(y, site[k] >> 1, raw.value.height));
+      value_e[k] = std::isnan(e) ? 0 : std::clamp(static_cast<double>(e), -largest_e, largest_e);
+      if (value_e[k] >= noise.saturation_e[(k + 1) / 2]) ++saturated;
+    }
+    if (saturated == 4) continue;
+    for (int k = 0; k < 4; ++k) {
+      const int row = (site[k] >> 1) == red_row(raw.phase) ? 0 : 1;
+      m.signal[row][2 * x + (site[k] & 1)] = static_cast<float>(value_e[k] - dark_e[(k + 1) / 2]);
+    }
+    const double ratio = static_cast<double>(raw.noise_ratio.at(2 * x, 2 * y)) * options.variance_scale[0];
+    const std::array<double, 3> mean_e{value_e[0], (value_e[1] + value_e[2]) / 2, value_e[3]};
+    double luma = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double own = ratio * (std::max(mean_e[k], static_cast<double>(min_e(k))) + noise.variance_e2[k]);
+      m.residual[k + 1][x] = static_cast<float>(own);
+      luma += (k == 1 ? 0.18 : 0.04) * own * options.white_gain[k] * options.white_gain[k];
+    }
+    m.residual[0][x] = static_cast<float>(luma);
+  }
+}
+
 /// Converts the planes of level 0 back to a mosaic.
 void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const {
   const PyramidLevel& level = memory.level[0];
@@ -266,6 +299,7 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
       in.slopes = {slopes.c2_x, slopes.c2_y, slopes.c3_x, slopes.c3_y};
       rows::unpack_row(
           in, {{m.signal[0], m.signal[1]}, m.confidence, m.residual[0], {m.residual[1], m.residual[2], m.residual[3]}});
+      keep_partly_saturated(y, m);
       for (int i = 0; i < 2; ++i) {
         const int raw_y = 2 * y + (i == 0 ? red_row(raw.phase) : 1 - red_row(raw.phase));
         if (raw_y >= signal_e.height) continue;

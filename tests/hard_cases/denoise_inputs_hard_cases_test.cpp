@@ -39,10 +39,25 @@ MosaicCase lamps() {
   return c;
 }
 
-// Red less blue, and green less green, have what slopes of the luma explain; between green and magenta there is none.
+/// Returns how far a cell is from what it must be: as measured where some of its values are saturated, else between
+/// green and magenta. What differs in red less blue, and in green less green, are slopes of the luma.
+double error_of_cell(const MosaicCase& c, PlaneView<const double> out, int x, int y) {
+  const std::array<int, 4> at_x{x, x + 1, x, x + 1}, at_y{y, y, y + 1, y + 1};
+  int saturated = 0;
+  double change = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto raw_e = static_cast<double>(c.raw_e.at(at_x[i], at_y[i]));
+    if (raw_e >= 1000) ++saturated;
+    keep_worst(change, std::abs(out.at(at_x[i], at_y[i]) - raw_e));
+  }
+  if (saturated > 0 && saturated < 4) return change;
+  return std::abs(2 * out.at(x, y) + 1.25 * out.at(x + 1, y + 1) - out.at(x + 1, y) - out.at(x, y + 1));
+}
+
 TEST(HardCaseDenoise5, SaturatedLampsGiveNoColourToWhatIsAround) {
   HardCase row({denoise_inputs_group, "9.5 lamps saturated in one, two, three colours, on grey",
-                "closed form: R + B = G1 + G2 in every cell, balanced", "relative to white"});
+                "closed form: cells saturated in part as measured, R + B = G1 + G2 in the others, balanced",
+                "relative to white"});
   const MosaicCase c = lamps();
   // What removed noise takes from the mean is added by the variance of each colour. Four live codes of 1/16 e-, rounded
   // and balanced.
@@ -50,10 +65,7 @@ TEST(HardCaseDenoise5, SaturatedLampsGiveNoColourToWhatIsAround) {
   measure(row, c, {by_colour, float_sums, float_sums, 5.25 / 32 / 2000}, [&](PlaneView<const double> out) {
     double worst = 0;
     for (int y = 0; y < out.height; y += 2) {
-      for (int x = 0; x < out.width; x += 2) {
-        const double magenta = 2 * out.at(x, y) + 1.25 * out.at(x + 1, y + 1);
-        keep_worst(worst, std::abs(magenta - out.at(x + 1, y) - out.at(x, y + 1)) / 2000);
-      }
+      for (int x = 0; x < out.width; x += 2) keep_worst(worst, error_of_cell(c, out, x, y) / 2000);
     }
     return worst;
   });

@@ -72,6 +72,12 @@ struct Frame {
     return y(k, cell_x, cell_y) >= static_cast<float>(noise.saturation_e[colour]);
   }
 
+  int saturated_sites(int cell_x, int cell_y) const {
+    int sum = 0;
+    for (int k = 0; k < 4; ++k) sum += saturated(k, cell_x, cell_y) ? 1 : 0;
+    return sum;
+  }
+
   bool saturated(int cell_x, int cell_y) const {
     return saturated(0, cell_x, cell_y) || saturated(1, cell_x, cell_y) || saturated(2, cell_x, cell_y) ||
            saturated(3, cell_x, cell_y);
@@ -389,6 +395,8 @@ Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const Denoi
         left[i] = share * share * residual;
       }
       for (int i = 2; i < 4; ++i) c[i] += slopes[i].at(cx, cy);
+      const int saturated = frame.saturated_sites(cx, cy);
+      const bool measured = saturated > 0 && saturated < 4;
       const std::array<double, 4> u = of_sites(luma, c[1], c[2], c[3]);
       const double removed = between_tiles(p.removed, 0, cx, cy);
       for (int k = 0; k < 4; ++k) {
@@ -397,7 +405,7 @@ Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const Denoi
         const double x = frame.light(u[k]);
         const double variance = frame.variance_of(k, x / frame.gain[k] + frame.dark_e[k]);
         const double mean = u[k] > frame.edge() ? removed * variance / (4 * frame.offset_e) : 0;
-        out.signal_e.at(at_x, at_y) = (x + mean) / frame.gain[k];
+        out.signal_e.at(at_x, at_y) = measured ? frame.y(k, cx, cy) - frame.dark_e[k] : (x + mean) / frame.gain[k];
       }
       const double kept = p.residual[0].at(cx, cy);
       out.residual_variance.at(cx, cy) = std::pow(frame.slope(luma), 2) * kept;
@@ -407,6 +415,19 @@ Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const Denoi
       const std::array<double, 3> at{u[0], (u[1] + u[2]) / 2, u[3]};
       for (int k = 0; k < 3; ++k) {
         out.site_variance[k].at(cx, cy) = std::pow(frame.slope(at[k]) / frame.options.white_gain[k], 2) * of_colour[k];
+      }
+      if (measured) {
+        const double ratio = static_cast<double>(frame.raw.noise_ratio.at(2 * cx, 2 * cy)) * options.variance_scale[0];
+        const std::array<double, 3> mean_e{frame.y(0, cx, cy), (frame.y(1, cx, cy) + frame.y(2, cx, cy)) / 2,
+                                           frame.y(3, cx, cy)};
+        double of_luma = 0;
+        for (int k = 0; k < 3; ++k) {
+          const int site = k == 2 ? 3 : k;
+          const double own = ratio * (std::max(mean_e[k], 0.3 * frame.dark_e[site] + 0.02) + frame.variance_e2[site]);
+          out.site_variance[k].at(cx, cy) = own;
+          of_luma += (k == 1 ? 0.18 : 0.04) * std::pow(options.white_gain[k], 2) * own;
+        }
+        out.residual_variance.at(cx, cy) = of_luma;
       }
       out.chroma_confidence.at(cx, cy) = factor((p.residual[1].at(cx, cy) + p.residual[2].at(cx, cy)) / 2);
     }
