@@ -32,8 +32,8 @@ std::optional<Estimate> ratio_of(const std::optional<Estimate>& a, const std::op
   return Estimate{ratio, ratio * std::hypot(a->standard_error / a->value, b->standard_error / b->value)};
 }
 
-/// Returns K times quantum efficiency from the slope of the mean over photons, through the darks, by least squares with
-/// weights of photon noise; nullopt without flats in the linear range.
+/// Returns the quantum efficiency [e-/photon] from the slope of the mean over photons, through the darks, by least
+/// squares with weights of photon noise; nullopt without flats in the linear range.
 std::optional<Estimate> efficiency_of(const SheetFrames& frames, const PhotonTransfer& transfer, int channel,
                                       double max_signal_dn) {
   const double gain = transfer.system_gain_dn_per_e.value;

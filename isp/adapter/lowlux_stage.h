@@ -205,7 +205,7 @@ typedef struct {
   float noise_read;       /* standard deviation of a pixel without light [DN] */
   float f_number;
   double scene_luminance_cd_m2; /* mean over the image */
-  float budget_ms;              /* time limit for this frame, 0.01..1e6; steps that do not fit are left out: */
+  float budget_ms;              /* time limit for this frame, 0.01..1e6; steps that do not fit are left out */
   float max_exposure_s;         /* limits of the exposure that the result advises, 1e-7..1e5: motion blur, frame rate */
   float min_exposure_s;         /* 0..max_exposure_s */
   float max_gain;               /* 1..1e4; 0: no limit */

@@ -36,6 +36,10 @@ TEST(ContainedCommand, WhatFailsIsReportedWithItsCauseAndItsLastLine) {
   EXPECT_TRUE(has(failure("head -c 100000 /dev/zero | tr '\\0' x; exit 1"), "xxx..."));
 }
 
+TEST(ContainedCommand, APipeInThePlaceOfItsOutputIsNotWaitedFor) {
+  EXPECT_EQ(failure("cd \"$TMPDIR\"; rm -f *; mkfifo printed.txt; exit 3"), "it ended with exit code 3");
+}
+
 TEST(ContainedCommand, TimeFilesAndMemoryAreLimited) {
   const auto begin = std::chrono::steady_clock::now();
   EXPECT_TRUE(has(failure("trap '' TERM INT HUP; sleep 600", {.max_wall_s = 0.2}), "time limit of 0.2 s"));

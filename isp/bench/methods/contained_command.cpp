@@ -200,9 +200,12 @@ void end_group(pid_t group) {
   }
 }
 
-/// Returns the last line of the output that is not empty, shortened, as `: "text"`; empty if there is none.
+/// Returns the last line of the output that is not empty, shortened, as `: "text"`; empty if there is none, or if the
+/// command put something else in the place of the file: opening a pipe would wait for ever.
 std::string last_printed(const std::filesystem::path& folder) {
   constexpr std::streamoff tail = 4096;
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(std::filesystem::symlink_status(folder / output_file, unknown))) return {};
   std::ifstream file(folder / output_file, std::ios::binary);
   file.seekg(0, std::ios::end);
   const std::streamoff size = file.tellg();
