@@ -20,9 +20,9 @@ namespace lowlux::denoise::rows::HWY_NAMESPACE {
 struct SiteValues {
   VF u[4];
 };
-HWY_INLINE SiteValues values_of(VF luma, VF c1, VF c2, VF c3) {
-  const VF half = hn::MulAdd(constant(0.6f), c1, luma), skew = hn::Mul(constant(per_root2), c2);
-  const VF green = hn::MulAdd(constant(-0.4f), c1, luma), maze = hn::Mul(constant(0.5f), c3);
+HWY_INLINE SiteValues values_of(VF luma, VF chroma1, VF chroma2, VF chroma3) {
+  const VF half = hn::MulAdd(constant(0.6f), chroma1, luma), skew = hn::Mul(constant(per_root2), chroma2);
+  const VF green = hn::MulAdd(constant(-0.4f), chroma1, luma), maze = hn::Mul(constant(0.5f), chroma3);
   return {{hn::Add(half, skew), hn::Add(green, maze), hn::Sub(green, maze), hn::Sub(half, skew)}};
 }
 
