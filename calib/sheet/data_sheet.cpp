@@ -58,7 +58,7 @@ std::optional<Estimate> efficiency_of(const SheetFrames& frames, const PhotonTra
   if (!(photons > 0)) return std::nullopt;
   const double efficiency = signal_e / photons;
   // The patterns and the black are common to all flats, so that their errors add up: at most as many as there are.
-  const double levels = static_cast<double>(frames.flat_pairs.size());
+  const auto levels = static_cast<double>(frames.flat_pairs.size());
   return Estimate{efficiency, std::hypot(std::sqrt(variance_e2 * levels) / photons,
                                          efficiency * transfer.system_gain_dn_per_e.standard_error / gain)};
 }

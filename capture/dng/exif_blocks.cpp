@@ -8,7 +8,7 @@
 namespace lowlux::capture {
 namespace {
 
-using std::string_view_literals::operator""sv;
+using namespace std::string_view_literals;
 using Bytes = std::span<const std::byte>;
 
 constexpr TagName jpg_from_raw{0x2E, "JpgFromRaw"};  // of RW2

@@ -133,9 +133,9 @@ HWY_INLINE void equalise_losses(const VarianceRow& in, int k, const float* loss)
   }
 }
 
-void VarianceCells(const VarianceRow& in, float* scratch, float* const out[4]) {
+void VarianceCells(const VarianceRow& in, const RowScratch& scratch, float* const out[4]) {
   const int row = (in.cells + padding) / 16 * 16;
-  const VarianceRows rows{{scratch + 16, scratch + 16 + row}, scratch + 2 * row, scratch + 3 * row};
+  const VarianceRows rows{{scratch.data + 16, scratch.data + 16 + row}, scratch.data + 2 * row, scratch.data + 3 * row};
   float* const other = out[2];  // sum of R and B, in which neither comes first
   for (const int k : {0, 2, 1}) {
     colour_variance(in, k, rows);
@@ -188,7 +188,7 @@ void pack_row(const PackRow& in, const PackedRow& out) { HWY_DYNAMIC_DISPATCH(Pa
 std::size_t variance_scratch(int cells) { return 4 * ((static_cast<std::size_t>(cells) + padding) / 16 * 16); }
 void variance_row(const VarianceRow& in, const RowScratch& scratch, float* const out[4]) {
   assert(scratch.floats >= variance_scratch(in.cells));
-  HWY_DYNAMIC_DISPATCH(VarianceCells)(in, scratch.data, out);
+  HWY_DYNAMIC_DISPATCH(VarianceCells)(in, scratch, out);
 }
 double sum_of(const float* in, int count) { return HWY_DYNAMIC_DISPATCH(SumOf)(in, count); }
 const char* target_name() { return HWY_DYNAMIC_DISPATCH(TargetName)(); }

@@ -85,7 +85,7 @@ TEST(ContainedCommand, MemoryAndTimeAreThoseOfTheCommandAlone) {
 
 TEST(ContainedCommand, WordsAreQuotedForTheShell) {
   const test::ScratchDirectory scratch;
-  for (const std::string word : {"plain/path-1.dng", "", "with space", "it's", "$HOME `id` \"x\" \\ ; & | > *"}) {
+  for (const std::string word : {"plain/path-1.dng", "", "with space", "it's", R"($HOME `id` "x" \ ; & | > *)"}) {
     ASSERT_TRUE(run_contained("printf %s " + shell_word(word) + " > \"$TMPDIR/word\"", scratch.path(), limits));
     EXPECT_EQ(scratch.read("word"), word);
   }

@@ -1,4 +1,5 @@
 // The name "-": raw files from standard input, images to standard output.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -34,7 +35,7 @@ TEST_F(StandardStreams, AnImageOnStandardOutputIsTheFileThatWouldBeWritten) {
   for (const char* const format : {"png", "jpg", "tif", "exr", "pfm"}) {
     const std::string written = file(std::string("x.") + format), piped = file(std::string("piped.") + format);
     ASSERT_EQ(lowlux({"develop", dog, "-o", written, "--half", "--quiet"}).exit_code, 0);
-    const auto result = shell("lowlux develop '" + dog + "' -o - --half --format " + format + " > '" + piped + "'");
+    const auto result = shell(fmt::format("lowlux develop '{}' -o - --half --format {} > '{}'", dog, format, piped));
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_TRUE(test::read_file(piped) == test::read_file(written)) << format;
   }
@@ -77,7 +78,7 @@ TEST_F(StandardStreams, RefuseWhatCannotBeInOneLine) {
                                         {"develop " + raw + " -o - --explain", 2, "standard output holds the file"},
                                         {"denoise " + raw + " -o - --timings", 2, "standard output holds the file"},
                                         {"develop " + raw + " -o - --maps", 2, "maps need the name of a file"},
-                                        {"develop " + raw + " " + raw + " -o -", 2, "folder"},
+                                        {fmt::format("develop {} {} -o -", raw, raw), 2, "folder"},
                                         {"merge - " + raw + " -o " + quoted("m.dng"), 2, "more than once"},
                                         {"develop --merge - " + raw + " -o " + quoted("m.png"), 2, "more than once"},
                                         {"develop - -o " + quoted("e.png") + " < /dev/null", 1, "the file is empty"}}) {

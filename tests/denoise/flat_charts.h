@@ -48,7 +48,7 @@ struct Denoised {
   }
 
  private:
-  Denoised(const Plane<float>& raw, const Camera&)
+  Denoised(const Plane<float>& raw, const Camera& /*camera*/)
       : signal(raw.width(), raw.height()), residual(half(raw)), confidence(half(raw)) {
     for (auto& plane : site_variance) plane = half(raw);
   }

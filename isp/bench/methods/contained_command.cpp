@@ -226,7 +226,7 @@ std::string signal_text(int number, const CommandLimits& limits) {
   if (number == SIGXFSZ) {
     return fmt::format("it was stopped when it had written {} MB to one file", limits.max_file_bytes / 1000000);
   }
-  return fmt::format("signal {} ended it ({})", number, strsignal(number));
+  return fmt::format("signal {} ended it ({})", number, sigdescr_np(number));
 }
 
 /// Returns the Error of a command that did not exit with 0.

@@ -43,7 +43,7 @@ struct Leaves {
 
 /// Returns dead leaves (Lee, Mumford & Huang 2001; the texture of ISO 19567-2): discs of random colours that cover one
 /// another, radii r distributed as r^-3, blurred by the lens. A pure function of its arguments.
-MethodScene leaves_scene(const SceneSize& size, std::uint64_t seed, const Leaves& leaves = {});
+MethodScene leaves_scene(const SceneSize& size, std::uint64_t seed, const Leaves& how = {});
 
 /// Distribution of the flux of stars.
 enum class StarLaw : std::uint8_t { power, log_uniform };

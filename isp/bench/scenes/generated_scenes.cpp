@@ -90,7 +90,8 @@ void write_word(SceneLinear& image, std::uint64_t seed, std::size_t word, double
   const double height = 5 * width + 3, advance = 0.9 * height;
   for (std::size_t i = 0; i < letters * strokes; ++i) {
     const auto at = drawn(seed, Stream::stroke, 64 * word + i);
-    const double along = advance * (static_cast<double>(i / strokes) - 1.5) + 0.5 * advance * (at[0] - 0.5);
+    const std::size_t letter = i / strokes;
+    const double along = advance * (static_cast<double>(letter) - 1.5) + 0.5 * advance * (at[0] - 0.5);
     const double across = 0.5 * height * (at[1] - 0.5);
     // A quarter of the strokes are at any angle, the others upright or along the line.
     const double turn =

@@ -41,7 +41,7 @@ struct Rendering {
 /// Decides white balance, exposure and look from the light of a thumbnail whose dark charge is subtracted. Errors:
 /// those of plan_develop that concern colour, and of plan_look.
 /// @param picked  result of picked_neutral(), for WhiteBalanceChoice::Mode::picked
-Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light, const DevelopOptions& options,
+Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light, const DevelopOptions& requested,
                                    const Vector3& picked);
 
 // Steps of decide_rendering, which allocate only to report an error.
