@@ -54,8 +54,8 @@ double cells_averaged(Level level) {
 }
 
 // A block next to a lamp has the variance of the dark part, not that of the lamp: in the 16 columns next to a straight
-// edge the error is that of a flat; without stabilisation it was 5 to 6 times as large. 8 frames hold 8 * 8 * 128 cells
-// there, so many independent means that the root of their mean square scatters by 1 / sqrt(2 n); three of these.
+// edge the error is that of a flat; without stabilisation it was 4.6 to 6 times as large. 8 frames hold 8 * 8 * 128
+// cells there, so many independent means that the root of their mean square scatters by 1 / sqrt(2 n); three of these.
 TEST(Stabiliser, LeavesNoRipplesInTheDarkNextToStraightEdgesOfLamps) {
   constexpr int width = 256, height = 256, edge = 192;
   for (const Level level : denoise::all_levels) {
