@@ -1,6 +1,9 @@
 #include "tests/support/count_allocations.h"
 
 #include <malloc.h>
+#ifdef LOWLUX_COUNTS_BY_HOOKS
+#include <sanitizer/allocator_interface.h>
+#endif
 
 #include <cerrno>
 #include <cstddef>
@@ -16,17 +19,18 @@ std::atomic<long> max_held_bytes{0};
 namespace {
 
 /// Counts a block of memory as held from now on.
-void hold(void* memory) noexcept {
-  const auto bytes = static_cast<long>(malloc_usable_size(memory));
+void hold(std::size_t size) noexcept {
+  const auto bytes = static_cast<long>(size);
   const long held = held_bytes.fetch_add(bytes) + bytes;
   long most = max_held_bytes.load();
   while (most < held && !max_held_bytes.compare_exchange_weak(most, held)) continue;
 }
 
+#ifndef LOWLUX_COUNTS_BY_HOOKS
 void* counted_or_null(std::size_t size) noexcept {
   ++allocations;
   void* const memory = std::malloc(size);
-  hold(memory);
+  hold(malloc_usable_size(memory));
   return memory;
 }
 
@@ -40,9 +44,24 @@ void* counted(std::size_t size) {
   throw std::bad_alloc();
 }
 
+#endif
+
 }  // namespace
 }  // namespace lowlux::test
 
+#ifdef LOWLUX_COUNTS_BY_HOOKS
+extern "C" {
+// NOLINTBEGIN(bugprone-reserved-identifier): names of the sanitizers' interface
+void __sanitizer_malloc_hook(const volatile void* /*memory*/, std::size_t size) {
+  ++lowlux::test::allocations;
+  lowlux::test::hold(size);
+}
+void __sanitizer_free_hook(const volatile void* memory) {
+  lowlux::test::held_bytes -= static_cast<long>(__sanitizer_get_allocated_size(memory));
+}
+// NOLINTEND(bugprone-reserved-identifier)
+}
+#else
 void* operator new(std::size_t size) { return lowlux::test::counted(size); }
 void* operator new[](std::size_t size) { return lowlux::test::counted(size); }
 void* operator new(std::size_t size, const std::nothrow_t& /*tag*/) noexcept {
@@ -55,6 +74,7 @@ void operator delete(void* memory) noexcept { lowlux::test::given_back(memory); 
 void operator delete[](void* memory) noexcept { lowlux::test::given_back(memory); }
 void operator delete(void* memory, std::size_t /*size*/) noexcept { lowlux::test::given_back(memory); }
 void operator delete[](void* memory, std::size_t /*size*/) noexcept { lowlux::test::given_back(memory); }
+#endif
 
 #ifdef LOWLUX_COUNTS_MALLOC
 extern "C" {
@@ -72,7 +92,7 @@ void* malloc(std::size_t size) {
 void* calloc(std::size_t nmemb, std::size_t size) {
   ++lowlux::test::allocations;
   void* const memory = __libc_calloc(nmemb, size);
-  lowlux::test::hold(memory);  // for good: its release is not tracked
+  lowlux::test::hold(malloc_usable_size(memory));  // for good: its release is not tracked
   return memory;
 }
 void* realloc(void* ptr, std::size_t size) {

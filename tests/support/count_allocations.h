@@ -8,6 +8,12 @@
 #if !defined(LOWLUX_SANITIZED) && defined(__GLIBC__)
 #define LOWLUX_COUNTS_MALLOC 1
 #endif
+// clang's thread sanitizer has operators that no program can replace; it calls hooks.
+#if defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+#define LOWLUX_COUNTS_BY_HOOKS 1
+#endif
+#endif
 
 /// These count what a program of which count_allocations.cpp is a source allocates, in any thread, and the bytes it
 /// holds at once.
