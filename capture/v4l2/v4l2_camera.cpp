@@ -143,7 +143,9 @@ Result<CameraFrame> V4l2Camera::deliver(const V4l2Taken& taken) {
   frame.timestamp = timestamp_of(taken);
   frame.damaged = (taken.flags & V4L2_BUF_FLAG_ERROR) != 0 || taken.bytes_used < taken.data_offset + whole;
   frame.facts = facts_;
-  if (exposure_) frame.facts.exposure_s = frame.facts.analogue_gain = std::nullopt;
+  // Frames under way may have the setting before the last one.
+  if (exposure_) frame.facts.exposure_s.reset();
+  if (exposure_ && !exposure_->controls().gains.empty()) frame.facts.analogue_gain.reset();
   frame.buffer = session_ << index_bits | static_cast<int>(taken.index);
   last_sequence_ = taken.sequence;
   return frame;

@@ -3,6 +3,8 @@
 
 #include <cerrno>
 #include <chrono>
+#include <optional>
+#include <vector>
 
 #include "tests/capture/camera/v4l2_opened.h"
 
@@ -66,6 +68,22 @@ TEST(V4l2AutoExposure, SetsTimeAndGainWhileItStreams) {
   EXPECT_FALSE(camera->next(std::chrono::seconds(1)).value().facts.exposure_s);
   camera->stop();
   EXPECT_EQ(fake.misuses, 0);
+}
+
+TEST(V4l2AutoExposure, StatesAGainThatItDoesNotSet) {
+  for (const bool sets_gain : {false, true}) {
+    FakeV4l2 fake = camera_with_controls();
+    fake.controls[V4L2_CID_AUTOGAIN].value = 0;
+    const auto camera = opened(fake, {.gain_codes = sets_gain ? codes : std::vector<CameraGain>{}});
+    ASSERT_TRUE(camera->take_exposure());
+    ASSERT_TRUE(camera->start());
+    fake.frames = {{.sequence = 0}};
+    const auto frame = camera->next(std::chrono::seconds(1));
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_FALSE(frame->facts.exposure_s);
+    // The gain is at its minimum, which is the factor 1.
+    EXPECT_EQ(frame->facts.analogue_gain, sets_gain ? std::nullopt : std::optional(1.0));
+  }
 }
 
 TEST(V4l2AutoExposure, InLinesHasTheUnitOfALine) {
