@@ -34,6 +34,9 @@ constexpr std::size_t size_before(std::size_t offset) {
 template <class T>
 constexpr std::array<std::size_t, 2> earlier_sizes{sizeof(T), sizeof(T)};
 template <>
+constexpr std::array<std::size_t, 2> earlier_sizes<lowlux_stage_settings>{
+    size_before<lowlux_stage_settings>(offsetof(lowlux_stage_settings, demosaic)), sizeof(lowlux_stage_settings)};
+template <>
 constexpr std::array<std::size_t, 2> earlier_sizes<lowlux_stage_params>{
     size_before<lowlux_stage_params>(offsetof(lowlux_stage_params, budget_ms)),
     size_before<lowlux_stage_params>(offsetof(lowlux_stage_params, max_exposure_s))};

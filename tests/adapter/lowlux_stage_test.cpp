@@ -75,6 +75,16 @@ TEST(LowluxStage, NamesSettingsThatCannotBe) {
   EXPECT_EQ(with([](S& s) { s.size = 65537; }), LOWLUX_STAGE_BAD_ARGUMENT);
 }
 
+// Callers that were compiled before the method of demosaicing could be chosen.
+TEST(LowluxStage, TakesTheSettingsOfEarlierCallers) {
+  auto settings = plain_settings();
+  settings.size = offsetof(lowlux_stage_settings, demosaic);
+  settings.demosaic = -1;  // not of the caller: it is not read
+  EXPECT_EQ(opening(settings), LOWLUX_STAGE_OK);
+  settings.size += 4;
+  EXPECT_EQ(opening(settings), LOWLUX_STAGE_BAD_ARGUMENT) << "no version ends within its padding";
+}
+
 TEST(LowluxStage, NamesProfilesThatCannotBeRead) {
   const test::ScratchDirectory scratch;
   scratch.write("broken.json", "{");
