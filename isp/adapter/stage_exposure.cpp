@@ -75,7 +75,7 @@ const char* fault_of_limits(const lowlux_stage_params& params) {
   if (!within(params.min_exposure_s, 0, params.max_exposure_s)) return "the shortest exposure exceeds the longest";
   if (params.max_gain != 0 && !within(params.max_gain, 1, most_factor))
     return "the largest gain lies between 1 and 1e4";
-  if (params.clipped_fraction != 0 && !within(params.clipped_fraction, 1e-9, 0.5)) {
+  if (params.clipped_fraction != 0 && !within(params.clipped_fraction, 1e-9F, 0.5)) {
     return "the fraction that may clip lies between 1e-9 and 0.5";
   }
   const bool known = params.mains_hz == 0 || mains_of(params.mains_hz) != Mains::off;

@@ -140,6 +140,22 @@ TEST(StageExposure, RefusesLimitsThatContradictThemselves) {
   }
 }
 
+TEST(StageExposure, AcceptsLimitsAtTheEndsOfTheirRanges) {
+  using Set = void (*)(lowlux_stage_params&);
+  const Set good[] = {[](lowlux_stage_params& p) { p.max_exposure_s = 1e-7F; },
+                      [](lowlux_stage_params& p) { p.max_exposure_s = 1e5F; },
+                      [](lowlux_stage_params& p) { p.min_exposure_s = p.max_exposure_s; },
+                      [](lowlux_stage_params& p) { p.max_gain = 1; },
+                      [](lowlux_stage_params& p) { p.max_gain = 1e4F; },
+                      [](lowlux_stage_params& p) { p.clipped_fraction = 1e-9F; },
+                      [](lowlux_stage_params& p) { p.clipped_fraction = 0.5F; }};
+  for (const Set& set : good) {
+    auto params = params_of(0.01, 1);
+    set(params);
+    EXPECT_STREQ(isp::fault_of_limits(params), nullptr);
+  }
+}
+
 // Callers compiled with the header before there was advice: 96 bytes of results, whose last ones are padding.
 TEST(StageExposure, IsNotWrittenBeyondTheResultsOfEarlierCallers) {
   std::mt19937 random(7);
