@@ -59,7 +59,12 @@ bool StageExposure::advise(const RawDn& raw, const PerSite<double>& black_dn, co
       meter_.add_row(raw.dn.row(raw.active.y + y) + raw.active.x, raw.active.width, y);
     }
   }
-  controller_.take(meter_.codes(black_dn, raw.white_dn[1], limits.clipped_fraction),
+  // The black level includes the mean dark charge, which the controller subtracts by its own model.
+  const GainStep& step = controller_.gains()[controller_.gain_near(factor)];
+  const double dn_per_e = step.sensor.system_gain_dn_per_e * factor / step.factor;
+  PerSite<double> pedestal_dn = black_dn;
+  for (double& site_dn : pedestal_dn) site_dn -= dark_e_per_s(step, limits) * params.exposure_s * dn_per_e;
+  controller_.take(meter_.codes(pedestal_dn, raw.white_dn[1], limits.clipped_fraction),
                    StatedExposure{params.exposure_s, factor});
   const ExposureSetting& setting = controller_.setting();
   out.advised_exposure_s = static_cast<float>(setting.exposure_s);

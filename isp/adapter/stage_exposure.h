@@ -22,7 +22,7 @@ class StageExposure {
 
   /// Measures a frame, and fills in the advice if exposure time, gain and limits are valid in `params`. Allocates
   /// nothing.
-  /// @param black_dn  of the sites of the active area
+  /// @param black_dn  of the sites of the active area, dark charge included
   /// @return whether there is advice
   bool advise(const RawDn& raw, const PerSite<double>& black_dn, const lowlux_stage_params& params,
               lowlux_stage_result& out);

@@ -8,8 +8,13 @@
 #include <cstdio>
 #include <cstring>
 #include <random>
+#include <string>
 
+#include "calib/profile/profile_io.h"
+#include "isp/base/camera_profile.h"
+#include "isp/base/sensor.h"
 #include "tests/adapter/stage_frames.h"
+#include "tests/support/scratch_directory.h"
 
 namespace lowlux {
 namespace {
@@ -21,13 +26,13 @@ constexpr int width = 128, height = 96;
 const RawFormatNames& names() { return names_of_bayer(12); }
 
 /// A night scene whose exposure can be set: 2000 electrons per second, and lamps of fifty times as many.
-Codes night(double exposure_s, double gain, std::mt19937& random) {
+Codes night(double exposure_s, double gain, std::mt19937& random, double dark_e_per_s = 0) {
   Codes out(width * height);
   std::normal_distribution<double> normal;
   const double dn_per_e = 0.1 * gain;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      const double e = exposure_s * (x < 8 ? 1e5 : 2000);
+      const double e = exposure_s * ((x < 8 ? 1e5 : 2000) + dark_e_per_s);
       const double dn = 256 + dn_per_e * (e + std::sqrt(e + 9) * normal(random));
       out[static_cast<std::size_t>(y * width + x)] =
           static_cast<std::uint16_t>(std::clamp(std::round(dn), 0.0, 4095.0));
@@ -78,6 +83,49 @@ TEST(StageExposure, AdvisesAnExposureAtWhichItStays) {
       EXPECT_NE(rig.result.advised_limit, LOWLUX_STAGE_LIMIT_NONE);
       EXPECT_GT(rig.result.advised_snr_db, 0);
     }
+  }
+}
+
+/// The sensor of night(), with a dark current.
+CameraProfile profile_of_night(double dark_e_per_s) {
+  CameraProfile out;
+  out.mosaic = "RGGB";
+  GainProfile& gain = out.gains.emplace_back();
+  gain.gain_setting = "ISO";
+  gain.iso = 100;
+  gain.sensor = SensorModel{.system_gain_dn_per_e = 0.1, .read_noise_e = 3, .full_well_e = 38390};
+  gain.sensor->black_level_dn = 256;
+  gain.sensor->dark_current_e_per_s = {dark_e_per_s, dark_e_per_s, dark_e_per_s};
+  gain.pedestal_dn.emplace();
+  for (int site = 0; site < 4; ++site) (*gain.pedestal_dn)[site].value = 256;
+  return out;
+}
+
+TEST(StageExposure, CountsDarkChargeOnce) {
+  constexpr double dark_e_per_s = 4000, exposure_s = 0.05;
+  const test::ScratchDirectory scratch;
+  const auto text = calib::profile_text(profile_of_night(dark_e_per_s));
+  ASSERT_TRUE(text) << text.error().message;
+  scratch.write("camera.json", *text);
+  const std::string file = scratch.file("camera.json");
+  auto settings = plain_settings();
+  settings.profile_file = file.c_str();
+  std::mt19937 random(7);
+  for (const bool states_black : {false, true}) {
+    Rig rig(settings, names(), width, height, LOWLUX_STAGE_BGR888);
+    ASSERT_EQ(rig.configured, LOWLUX_STAGE_OK) << rig.error();
+    auto params = params_of(exposure_s, 1);
+    if (!states_black) params.valid &= ~static_cast<std::uint32_t>(LOWLUX_STAGE_HAS_BLACK);
+    params.max_exposure_s = static_cast<float>(exposure_s);
+    params.max_gain = 1;
+    params.mains_hz = 0;
+    ASSERT_EQ(rig.process(night(exposure_s, 1, random, dark_e_per_s), params), LOWLUX_STAGE_OK) << rig.error();
+    EXPECT_NEAR(rig.result.black_level[1], 256 + 0.1 * dark_e_per_s * exposure_s, 1e-3);
+    EXPECT_NEAR(rig.result.advised_exposure_s, exposure_s, 1e-6);
+    const double signal_e = 2000 * exposure_s, dark_e = dark_e_per_s * exposure_s;
+    const double variance_e2 = signal_e + dark_e + 9 + quantisation_dn2 / 0.01;
+    // Five standard errors of a median of 3072 pixels are 0.17 dB; lamps and whole codes move it by as much.
+    EXPECT_NEAR(rig.result.advised_snr_db, 10 * std::log10(signal_e * signal_e / variance_e2), 0.5);
   }
 }
 
