@@ -144,6 +144,14 @@ TEST_F(DataSheetCommand, FiguresOfSimulatedFramesAreThoseOfTheSensor) {
   EXPECT_TRUE(holds(text.out, "quantum efficiency of G")) << text.out;
   const Json measured = Json::parse(scratch_.read("sheet.json"))["figures"];
   EXPECT_GT(measured["quantum_efficiency_g"]["value"].get<double>(), 0);
+  // No file can be made in the folder of this one.
+  std::filesystem::remove(file("sheet.html"));
+  std::filesystem::remove(file("sheet.json"));
+  std::filesystem::create_symlink("/proc/version", file("sheet.json"));
+  const auto half = lowlux(sheet({"--force", "--quiet"}));
+  EXPECT_EQ(half.exit_code, 1);
+  EXPECT_TRUE(holds(half.err, "sheet.json")) << half.err;
+  EXPECT_FALSE(scratch_.holds("sheet.html"));
   const double snr_max = measured["snr_max"]["value"];  // at the last level before saturation, up to 0.6 of the next
   EXPECT_GT(snr_max, std::sqrt(0.6 * full_well_e));
   EXPECT_LT(snr_max, std::sqrt(1.02 * full_well_e));

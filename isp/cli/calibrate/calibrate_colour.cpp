@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "calib/profile/profile_io.h"
 #include "isp/base/executor.h"
 #include "isp/cli/calibrate/calibrate_args.h"
 #include "isp/cli/calibrate/calibrate_colour_report.h"
@@ -19,6 +22,7 @@
 #include "isp/cli/shared/profile_option.h"
 #include "isp/cli/shared/report.h"
 #include "isp/output/picture/image_writer.h"
+#include "isp/output/report/report.h"
 
 namespace lowlux::cli {
 namespace {
@@ -44,11 +48,15 @@ Result<void> write_files(const CalibrateColourArgs& args, const ColourOutcome& o
         isp::write_picture(colour_overlay(*outcome.chart), OutputSpace::srgb, {}, args.overlay, write, executor);
     if (!written) return written;
   }
+  const auto text = calib::profile_text(*profile);
+  if (!text) return fail(text.error().code, text.error().message, args.output);
+  std::vector<isp::TextFile> files{{args.output, *text}};
+  std::string report;
   if (!args.report.empty()) {
-    auto written = isp::write_text(args.report, isp::html_of(colour_report(outcome, args.output)), overwrite);
-    if (!written) return written;
+    report = isp::html_of(colour_report(outcome, args.output));
+    files.push_back({args.report, report});
   }
-  return write_profile(args.output, *profile, overwrite);
+  return isp::write_texts(files, overwrite);
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+#include <array>
 #include <string>
 #include <utility>
 
@@ -41,15 +42,8 @@ Result<MadeSheet> make_sheet(const CalibrateSheetArgs& args) {
 }
 
 Result<void> write_sheet(const CalibrateArgs& args, const MadeSheet& made) {
-  const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
-  if (auto written = isp::write_text(args.output, made.page, overwrite); !written) {
-    return tl::make_unexpected(with_file(written.error(), args.output));
-  }
-  const std::string json = json_of_sheet(args.output);
-  if (auto written = isp::write_text(json, made.json, overwrite); !written) {
-    return tl::make_unexpected(with_file(written.error(), json));
-  }
-  return {};
+  const std::array files{isp::TextFile{json_of_sheet(args.output), made.json}, isp::TextFile{args.output, made.page}};
+  return isp::write_texts(files, args.force ? isp::Overwrite::yes : isp::Overwrite::no);
 }
 
 }  // namespace

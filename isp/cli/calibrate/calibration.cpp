@@ -3,7 +3,9 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -119,13 +121,13 @@ Result<void> write_calibration(const CalibrateArgs& args, const Calibration& fou
   for (const PixelMap& map : found.maps) {
     if (auto written = write_map(map, overwrite); !written) return written;
   }
+  std::vector<isp::TextFile> files{{args.output, *text}};
+  std::string report;
   if (!args.report.empty()) {
-    const auto written = isp::write_text(args.report, isp::html_of(whole_report(args, found)), overwrite);
-    if (!written) return tl::make_unexpected(with_file(written.error(), args.report));
+    report = isp::html_of(whole_report(args, found));
+    files.push_back({args.report, report});
   }
-  const auto written = isp::write_text(args.output, *text, overwrite);
-  if (!written) return tl::make_unexpected(with_file(written.error(), args.output));
-  return {};
+  return isp::write_texts(files, overwrite);
 }
 
 int finish(const CalibrateArgs& args, const Calibration& found) {

@@ -1,11 +1,13 @@
 #include "isp/output/report/report.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <span>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -48,13 +50,25 @@ std::string csv_of(const Plot& plot) {
   return out;
 }
 
-Result<void> write_text(const std::string& path, std::string_view text, Overwrite overwrite) {
-  Result<AtomicFile> file = AtomicFile::create(path, overwrite);
-  if (!file) return tl::make_unexpected(file.error());
-  if (std::fwrite(text.data(), 1, text.size(), file->file()) != text.size()) {
-    return fail(ErrorCode::unwritable, "the file cannot be written whole; is the disk full?", path);
+Result<void> write_texts(std::span<const TextFile> files, Overwrite overwrite) {
+  std::vector<AtomicFile> written;
+  for (const TextFile& file : files) {
+    auto created = AtomicFile::create(file.path, overwrite);
+    if (!created) return fail(created.error().code, created.error().message, file.path);
+    const AtomicFile& now = written.emplace_back(*std::move(created));
+    if (std::fwrite(file.text.data(), 1, file.text.size(), now.file()) != file.text.size() ||
+        std::fflush(now.file()) != 0) {
+      return fail(ErrorCode::unwritable, "the file cannot be written whole; is the disk full?", file.path);
+    }
   }
-  return file->commit();
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (auto done = written[i].commit(); !done) return fail(done.error().code, done.error().message, files[i].path);
+  }
+  return {};
+}
+
+Result<void> write_text(const std::string& path, std::string_view text, Overwrite overwrite) {
+  return write_texts(std::array{TextFile{path, text}}, overwrite);
 }
 
 namespace {

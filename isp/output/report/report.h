@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -81,7 +82,16 @@ std::string csv_of(const Table& table);
 /// Returns one line for each point: series, x, y, with all digits; y is empty where it is not finite.
 std::string csv_of(const Plot& plot);
 
-/// Writes a text file completely or not at all. Errors: those of AtomicFile; a full disk.
+struct TextFile {
+  std::string path;
+  std::string_view text;
+};
+
+/// Writes text files: all of them are complete before the first gets its name, so that a full disk leaves none. Errors,
+/// each with its path: those of AtomicFile; a full disk.
+Result<void> write_texts(std::span<const TextFile> files, Overwrite overwrite);
+
+/// Writes a text file completely or not at all. Errors: those of write_texts.
 Result<void> write_text(const std::string& path, std::string_view text, Overwrite overwrite);
 
 /// Returns the text of Chart.js (MIT licence, its banner included), compiled in from the file found at configuration.
