@@ -108,7 +108,12 @@ Result<DataSheet> make_data_sheet(const SheetFrames& frames) {
   out.snr_max = snr_max_of(out.saturation_e);
   out.threshold_e = threshold_of(out.transfer);
   out.dynamic_range = ratio_of(out.saturation_e, out.threshold_e);
-  if (auto rates = dark_rates(frames.darks, out.transfer.system_gain_dn_per_e)) out.dark_rates = *std::move(rates);
+  auto rates = dark_rates(frames.darks, out.transfer.system_gain_dn_per_e);
+  if (rates) {
+    out.dark_rates = *std::move(rates);
+  } else if (rates.error().code != ErrorCode::insufficient) {
+    return tl::make_unexpected(rates.error());
+  }
   out.dsnu_e = dark_nonuniformity(*dark, out.transfer.system_gain_dn_per_e);
   if (frames.bright) {
     const auto bright = spatial_parts(*frames.bright);

@@ -49,7 +49,8 @@ struct DataSheet {
   std::optional<std::array<Estimate, 3>> quantum_efficiency;  // of R, G, B; without filters three times the same
 };
 
-/// Computes the sheet. Errors: those of fit_photon_transfer and spatial_parts.
+/// Computes the sheet. Errors: those of fit_photon_transfer and spatial_parts; those of dark_rates but for
+/// insufficient.
 Result<DataSheet> make_data_sheet(const SheetFrames& frames);
 
 }  // namespace lowlux::calib

@@ -147,6 +147,15 @@ TEST(DataSheet, FiguresThatTheFramesDoNotDetermineAreAbsent) {
   EXPECT_FALSE(sheet->dark_rates || sheet->prnu || sheet->quantum_efficiency || sheet->transfer.linearity_error);
 }
 
+TEST(DataSheet, DarksOfAnotherCameraAreAnError) {
+  std::mt19937_64 random(first_seed);
+  SheetFrames frames = shoot({.sensor = drawn_sensor(random), .width = 128, .height = 128});
+  frames.darks.back().setting.model += " II";
+  const auto sheet = make_data_sheet(frames);
+  ASSERT_FALSE(sheet);
+  EXPECT_NE(sheet.error().code, ErrorCode::insufficient);
+}
+
 TEST(DataSheet, PhotonsAreThoseOfEmvasEquation) {
   // EMVA 1288 R4 Eq. 4: 50.34 A[um2] t[ms] lambda[um] E[uW/cm2].
   EXPECT_NEAR(photons_of({.w_per_m2 = 0.01, .wavelength_nm = 1000, .pixel_um2 = 1}, 1e-3), 50.34, 0.005);
