@@ -54,7 +54,10 @@ TEST(ContainedCommand, TimeFilesAndMemoryAreLimited) {
 TEST(ContainedCommand, NothingOfItIsLeftWhenItEnds) {
   const test::ScratchDirectory scratch;
   for (const char* command :
-       {"sleep 600 & echo $! > \"$TMPDIR/pid\"", "(sleep 600 & echo $! > \"$TMPDIR/pid\"); exit 1"}) {
+       {"sleep 600 & echo $! > \"$TMPDIR/pid\"", "(sleep 600 & echo $! > \"$TMPDIR/pid\"); exit 1",
+        "setsid sh -c 'echo $$ > \"$TMPDIR/new\"; mv \"$TMPDIR/new\" \"$TMPDIR/pid\"; exec sleep 600' & "
+        "until [ -e \"$TMPDIR/pid\" ]; do sleep 0.01; done"}) {
+    std::filesystem::remove(scratch.file("pid"));
     (void)run_contained(command, scratch.path(), limits);
     const std::string pid = scratch.read("pid");
     ASSERT_FALSE(pid.empty());

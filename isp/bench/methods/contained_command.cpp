@@ -186,8 +186,8 @@ std::optional<Ended> wait_for(pid_t group, pid_t process, Clock::time_point begi
     const pid_t found = wait4(-group, &ended.status, WNOHANG, &ended.used);
     if (found == process) return ended;
     if (found < 0 && errno != EINTR) return std::nullopt;
-    if (found > 0) continue;
     if (seconds_since(begin) > max_wall_s) return std::nullopt;
+    if (found > 0) continue;
     std::this_thread::sleep_for(pause);
   }
 }
@@ -197,6 +197,35 @@ void end_group(pid_t group) {
   kill(-group, SIGKILL);
   for (;;) {
     if (waitpid(-group, nullptr, 0) < 0 && errno != EINTR) return;
+  }
+}
+
+/// Reports whether a process has a text of `NAME=value` in the environment that it was started with.
+bool has_in_environment(const std::filesystem::path& process, const std::string& entry) {
+  std::ifstream file(process / "environ", std::ios::binary);
+  for (std::string found; std::getline(file, found, '\0');) {
+    if (found == entry) return true;
+  }
+  return false;
+}
+
+/// Kills and collects the processes of a command that left its group, as by setsid; its TMPDIR names them. Children of
+/// a killed process become those of the subreaper. One that starts others faster than they are found is given up.
+void end_outside_group(const std::filesystem::path& folder) {
+  constexpr int max_rounds = 100;
+  const std::string entry = "TMPDIR=" + folder.string();
+  std::vector<pid_t> killed{0};
+  for (int round = 0; !killed.empty() && round < max_rounds; ++round) {
+    killed.clear();
+    std::error_code failed;
+    for (std::filesystem::directory_iterator at("/proc", failed), end; !failed && at != end; at.increment(failed)) {
+      const auto process = static_cast<pid_t>(std::strtol(at->path().filename().c_str(), nullptr, 10));
+      if (process <= 0 || process == getpid() || !has_in_environment(at->path(), entry)) continue;
+      if (kill(process, SIGKILL) == 0) killed.push_back(process);
+    }
+    // A grandchild can be collected once its parent is.
+    std::vector<pid_t> left = killed;
+    while (std::erase_if(left, [](pid_t process) { return waitpid(process, nullptr, 0) == process; }) > 0) continue;
   }
 }
 
@@ -264,6 +293,7 @@ Result<CommandUse> run_contained(const std::string& command, const std::filesyst
   const auto ended = begun ? wait_for(*group, process, begin, limits.max_wall_s) : std::nullopt;
   CommandUse use{.wall_s = seconds_since(begin)};
   end_group(*group);
+  end_outside_group(folder);
   if (!begun) return fail(ErrorCode::unreadable, "/bin/sh cannot start it" + last_printed(folder));
   if (!ended && use.wall_s < limits.max_wall_s) {
     return fail(ErrorCode::unreadable, "its exit was collected by other code of this process");
