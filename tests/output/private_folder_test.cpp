@@ -51,6 +51,20 @@ TEST(PrivateFolder, IsThatOfItsUserAndEndsWithAllItHolds) {
   EXPECT_TRUE(scratch.names().empty());
 }
 
+TEST(PrivateFolder, FoldersWithoutPermissionsAreRemoved) {  // root needs none
+  const test::ScratchDirectory scratch;
+  const TemporaryFiles below(scratch.path());
+  {
+    const auto folder = PrivateFolder::make();
+    ASSERT_TRUE(folder);
+    fs::create_directories(folder->path() / "closed" / "deep");
+    std::ofstream(folder->path() / "closed" / "deep" / "file") << "text";
+    fs::permissions(folder->path() / "closed" / "deep", fs::perms::none);
+    fs::permissions(folder->path() / "closed", fs::perms::none);
+  }
+  EXPECT_TRUE(scratch.names().empty());
+}
+
 TEST(PrivateFolder, WithoutAFolderForTemporaryFilesIsAnError) {
   const test::ScratchDirectory scratch;
   const TemporaryFiles below(scratch.file("none"));
