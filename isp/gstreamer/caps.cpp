@@ -107,7 +107,7 @@ GstStructure* same_frames(const GstStructure* from, const char* name) {
   return out;
 }
 
-std::size_t padded(std::size_t bytes) { return (bytes + 3) / 4 * 4; }
+std::size_t padded(std::size_t count) { return (count + 3) / 4 * 4; }
 
 /// Returns the one structure of fixed caps, and its size.
 const GstStructure* fixed_structure(const GstCaps* caps, int& width, int& height) {
@@ -164,8 +164,18 @@ std::optional<BayerCaps> read_bayer_caps(const GstCaps* caps) {
   if (mosaic == mosaics.end()) return std::nullopt;
   out.fourcc = mosaic->fourcc;
   out.bits = bits_of(mosaic->name);
-  out.stride = padded(static_cast<std::size_t>(out.width) * (out.bits == 8 ? 1 : 2));
+  const std::size_t sample_bytes = out.bits == 8 ? 1 : 2;
+  out.row_bytes = static_cast<std::size_t>(out.width) * sample_bytes;
+  out.stride = padded(static_cast<std::size_t>(out.width)) * sample_bytes;
   return out;
+}
+
+std::size_t BayerCaps::stride_of(std::size_t bytes) const {
+  const auto rows = static_cast<std::size_t>(height);
+  for (const std::size_t shorter : {padded(row_bytes), row_bytes}) {
+    if (shorter < stride && bytes == shorter * rows) return shorter;
+  }
+  return stride;
 }
 
 std::optional<OutputCaps> read_output_caps(const GstCaps* caps) {

@@ -16,7 +16,12 @@ struct BayerCaps {
   int bits = 0;
   int width = 0;
   int height = 0;
-  std::size_t stride = 0;  // GStreamer's of such frames: rows are padded to 4 bytes
+  std::size_t row_bytes = 0;  // of the samples of a row
+  std::size_t stride = 0;     // GStreamer's of such frames, as bayer2rgb has it: rows are padded to 4 pixels
+
+  /// Returns the stride of a frame without metadata. Sources hand on the rows of drivers, which are padded to 4 bytes
+  /// or not at all: frames of exactly that size have them.
+  std::size_t stride_of(std::size_t bytes) const;
 };
 
 /// Describes the frames of the source pad: pictures, or mosaics of 16 bits.

@@ -251,7 +251,7 @@ int process(GstBaseTransform* element, GstBuffer* in, const GstMapInfo& bytes, c
     params.valid |= LOWLUX_STAGE_HAS_TIMESTAMP;
   }
   if (GST_BUFFER_FLAG_IS_SET(in, GST_BUFFER_FLAG_DISCONT)) lowlux_stage_reset(state.stage);
-  lowlux_stage_source source{bytes.data, bytes.size, state.in->stride, -1};
+  lowlux_stage_source source{bytes.data, bytes.size, state.in->stride_of(bytes.size), -1};
   if (const GstVideoMeta* meta = gst_buffer_get_video_meta(in)) {
     const std::size_t skipped = std::min<std::size_t>(meta->offset[0], bytes.size);
     source = {bytes.data + skipped, bytes.size - skipped, static_cast<std::size_t>(std::max(meta->stride[0], 0)), -1};

@@ -244,6 +244,28 @@ TEST(LowluxIsp, ReadsRowsAsTheirMetadataStatesThem) {
   expect_image(image, caps, reference, reference.processed(bytes, 0));
 }
 
+TEST(LowluxIsp, RowsAreThoseOfGstreamersElementsOrOfDrivers) {
+  const Stream stream{.width = 50};  // rows of 100 bytes, padded to 52 pixels
+  const BayerCaps in = stream.in();
+  ASSERT_EQ(in.stride, 104U);
+  const Stream bytewise{.mosaic = "rggb", .width = 50};
+  EXPECT_EQ(bytewise.in().stride, 52U);
+  const Bytes bytes = frame_of(stream, 3);
+  Bytes tight;
+  for (int y = 0; y < in.height; ++y) {
+    const auto row = bytes.begin() + static_cast<std::ptrdiff_t>(in.stride) * y;
+    tight.insert(tight.end(), row, row + 100);
+  }
+  for (const Bytes& frame : {bytes, tight}) {
+    const Harness harness = harness_of(stream);
+    GstBuffer* image = gst_harness_push_and_pull(harness.get(), buffer_of(frame, 0));
+    const OutputCaps caps = output_of(harness.get());
+    Reference reference(false);
+    reference.configure(stream, caps);
+    expect_image(image, caps, reference, reference.processed(bytes, 0));
+  }
+}
+
 TEST(LowluxIsp, ForgetsFramesBeforeAFlushAndAGap) {
   for (const bool flush : {true, false}) {
     const Stream stream{.width = 96, .height = 80};
