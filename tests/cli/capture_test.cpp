@@ -87,7 +87,8 @@ TEST_F(CaptureCommand, RefusesLimitsOfAutomaticExposureThatMeanNothing) {
   automatic({"--gain-codes", "16=1,x=2"}, "16=1,32=2");
   automatic({"--gain-codes", "16=1,32=0"}, "16=1,32=2");
   automatic({"--gain-codes", "1.5=1"}, "16=1,32=2");
-  automatic({"--gain-codes", "16=1,32=1"}, "twice");
+  automatic({"--gain-codes", "16=1,32=1"}, "factor 1 twice");
+  automatic({"--gain-codes", "16=2,32=4,16=1"}, "code 16 twice");
   automatic({"--gain-codes", "16=1", "--gain-code", "16"}, "mutually exclusive");
   refused({"--libcamera", "0", "-o", out, "--auto-exposure", "--gain-codes", "16=1"}, "V4L2");
   for (const std::string option : {"--max-exposure", "--max-gain", "--clip"}) {

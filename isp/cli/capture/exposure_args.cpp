@@ -29,6 +29,9 @@ Wrong set_gain_codes(const std::string& text, std::vector<capture::CameraGain>& 
     }
     out.push_back({.factor = *factor, .code = static_cast<int>(*code)});
   }
+  std::ranges::sort(out, {}, &capture::CameraGain::code);
+  const auto twice = std::ranges::adjacent_find(out, {}, &capture::CameraGain::code);
+  if (twice != out.end()) return fmt::format("has the code {} twice", twice->code);
   std::ranges::sort(out, {}, &capture::CameraGain::factor);
   const auto same = std::ranges::adjacent_find(out, {}, &capture::CameraGain::factor);
   if (same != out.end()) return fmt::format("has the factor {:g} twice", same->factor);
