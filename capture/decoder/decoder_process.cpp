@@ -29,8 +29,6 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr const char* decoder_file = "lowlux-decode";
-
 class FileDescriptor {
  public:
   explicit FileDescriptor(int fd) : fd_(fd) {}
@@ -272,14 +270,16 @@ Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadL
   return collect(result.get(), limits);
 }
 
-Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits) {
+Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits, DecoderProgram program) {
   auto folder = own_folder();
   if (!folder) return pass_on(folder);
-  for (const auto& place : {*folder / decoder_file, *folder / "lowlux" / decoder_file}) {
-    if (access(place.c_str(), X_OK) == 0) return decode_contained(file, limits, {place.string()});
+  const std::string name = program == DecoderProgram::libraw ? "lowlux-decode" : "lowlux-decode-jxl";
+  for (const auto& place : {*folder / name, *folder / "lowlux" / name}) {
+    if (access(place.c_str(), X_OK) == 0) return decode_contained(file, limits, std::vector{place.string()});
   }
-  return fail(ErrorCode::unreadable, std::string("the program ") + decoder_file + " is neither in " + folder->string() +
-                                         " nor in lowlux/ there: install lowlux again");
+  std::string message = "the program " + name + " is neither in " + folder->string() + " nor in lowlux/ there: ";
+  if (program == DecoderProgram::libraw) return fail(ErrorCode::unreadable, message + "install lowlux again");
+  return fail(ErrorCode::unsupported, message + "JPEG XL needs a build of lowlux with libjxl (libjxl-dev)");
 }
 
 }  // namespace lowlux::capture

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,8 +21,14 @@ namespace lowlux::capture {
 Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits,
                                     std::vector<std::string> command);
 
-/// Runs lowlux-decode, which uses LibRaw, on a file. The program is in the folder of this library or, once installed,
-/// in lowlux/ below it.
-Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits);
+enum class DecoderProgram : std::uint8_t {
+  libraw,  // lowlux-decode, of raw files
+  libjxl,  // lowlux-decode-jxl, of a JpegXlJob; built where libjxl is
+};
+
+/// Runs a program of lowlux on a file. The program is in the folder of this library or, once installed, in lowlux/
+/// below it. Errors: that of a program that is not there, besides.
+Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits,
+                                    DecoderProgram program = DecoderProgram::libraw);
 
 }  // namespace lowlux::capture

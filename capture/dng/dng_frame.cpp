@@ -30,7 +30,7 @@ Result<DngDescription> decoded_image(const DngFile& dng, DngDescription expected
   if (fits(expected.image, h)) return expected;
   for (const TiffDirectory& directory : dng.raw_images) {
     const auto image = dng_image(directory, file_bytes);
-    if (image && !image->is_float && !image->is_lossy && fits(*image, h))
+    if (image && !image->is_float && !image->is_lossy && !image->is_jpeg_xl && fits(*image, h))
       return describe_dng(dng, directory, file_bytes);
   }
   return fail(ErrorCode::malformed, "the decoder delivers " + std::to_string(h.raw_width) + " x " +
@@ -71,12 +71,13 @@ void read_corrections(const DngFile& dng, const TiffDirectory& directory, Sample
 }
 
 /// Finishes a frame that has its samples.
-Result<RawFrame> finished(const DngFile& dng, const TiffDirectory& directory, RawFrame frame, bool is_lossy = false) {
+Result<RawFrame> finished(const DngFile& dng, const TiffDirectory& directory, RawFrame frame,
+                          bool has_linear_codes = false) {
   if (frame.colour.calibrations.empty() && frame.raw.layout != SensorLayout::monochrome) {
     if (auto sound = check_colour_matrices(dng, directory); !sound) return pass_on(sound);
   }
-  const bool linearized = is_lossy || directory.find(tag::linearization_table) != nullptr;
-  read_corrections(dng, directory, {.linearized = linearized, .polynomials = is_lossy}, frame);
+  const bool linearized = has_linear_codes || directory.find(tag::linearization_table) != nullptr;
+  read_corrections(dng, directory, {.linearized = linearized, .polynomials = has_linear_codes}, frame);
   ignore_impossible_white(frame.colour, frame.warnings);
   return frame;
 }
@@ -115,11 +116,11 @@ Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std:
   return finished(dng, *chosen->directory, std::move(frame));
 }
 
-Result<RawFrame> complete_lossy_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes) {
+Result<RawFrame> complete_linearized_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes) {
   RawFrame frame = std::move(described.frame);
   const TiffDirectory& directory = *described.directory;
   frame.raw.dn = std::move(codes);
-  auto linear = linearize_lossy(directory, directory_of_list(dng, directory, 2), frame.raw);
+  auto linear = linearize_codes(directory, directory_of_list(dng, directory, 2), described.image.bits, frame.raw);
   if (!linear) return pass_on(linear);
   return finished(dng, directory, std::move(frame), true);
 }

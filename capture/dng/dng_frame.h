@@ -23,8 +23,8 @@ Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw
 /// decoder's table is used, if it has the camera.
 Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std::size_t file_bytes, DecodedRaw decoded);
 
-/// Adds the samples of a lossy image, given its codes. Errors: those of linearize_lossy.
-Result<RawFrame> complete_lossy_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes);
+/// Adds the samples of an image in lossy JPEG or JPEG XL, given its codes. Errors: those of linearize_codes.
+Result<RawFrame> complete_linearized_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes);
 
 /// Adds floating-point samples to the frame. Errors: those of unusable_sample (isp/base/float_samples.h).
 Result<RawFrame> complete_float_dng(const DngFile& dng, DngDescription described, Plane<float> samples);

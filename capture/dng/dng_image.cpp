@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "capture/dng/dng_floats.h"
+#include "capture/dng/dng_jpeg_xl.h"
 #include "capture/dng/dng_lossy.h"
 #include "capture/dng/dng_tags.h"
 #include "capture/file/pass_on.h"
@@ -155,6 +157,27 @@ Result<void> fill_layout(const TiffDirectory& directory, DngImage& image) {
   return {};
 }
 
+/// Reads how many images the rows and columns are stored as: one but for JPEG XL.
+Result<void> fill_interleave(const TiffDirectory& directory, DngImage& image) {
+  const std::tuple<TagName, int, int&> sides[] = {
+      {tag::row_interleave_factor, image.height, image.row_interleave},
+      {tag::column_interleave_factor, image.width, image.column_interleave}};
+  for (const auto& [name, pixels, factor] : sides) {
+    auto stated = directory.whole_or(name, 1);
+    if (!stated) return pass_on(stated);
+    if (*stated == 1) continue;
+    if (!image.is_jpeg_xl) {
+      return fail(ErrorCode::unsupported, "raws whose rows or columns are stored apart are supported in JPEG XL alone",
+                  name.name);
+    }
+    if (*stated < 1 || *stated > static_cast<std::uint32_t>(pixels)) {
+      return fail(ErrorCode::malformed, std::string("the tag ") + name.name + " is damaged", name.name);
+    }
+    factor = static_cast<int>(*stated);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_bytes) {
@@ -175,12 +198,14 @@ Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_byte
                                           " to 65535 each way can");
   }
   const bool is_lossy = !*is_float && *compression == tag::compression_lossy_jpeg;
-  if (!*is_float && !is_lossy) {
+  const bool is_jpeg_xl = !*is_float && *compression == tag::compression_jpeg_xl;
+  if (!*is_float && !is_lossy && !is_jpeg_xl) {
     if (auto known = check_compression(*compression); !known) return pass_on(known);
   }
   DngImage image;
   image.is_float = *is_float;
   image.is_lossy = is_lossy;
+  image.is_jpeg_xl = is_jpeg_xl;
   image.width = static_cast<int>(*width);
   image.height = static_cast<int>(*height);
   image.samples = static_cast<int>(std::min<std::uint32_t>(*samples, 65535));
@@ -188,9 +213,11 @@ Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_byte
   if (!bits) return pass_on(bits);
   image.bits = *bits;
   if (auto layout = fill_layout(directory, image); !layout) return pass_on(layout);
-  auto stored = image.is_float   ? check_float_image(directory, image, file_bytes)
-                : image.is_lossy ? check_lossy_image(directory, image, file_bytes)
-                                 : check_storage(directory, image, *compression == tag::compression_jpeg, file_bytes);
+  if (auto interleave = fill_interleave(directory, image); !interleave) return pass_on(interleave);
+  auto stored = image.is_float     ? check_float_image(directory, image, file_bytes)
+                : image.is_lossy   ? check_lossy_image(directory, image, file_bytes)
+                : image.is_jpeg_xl ? check_jpeg_xl_image(directory, image, file_bytes)
+                                   : check_storage(directory, image, *compression == tag::compression_jpeg, file_bytes);
   if (!stored) return pass_on(stored);
   return image;
 }

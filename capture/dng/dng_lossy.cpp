@@ -1,7 +1,6 @@
 #include "capture/dng/dng_lossy.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -17,7 +16,6 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr std::size_t codes = 256;
 constexpr double linear_white_dn = 65535;
 
 Result<DngGrid> lossy_grid(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
@@ -43,14 +41,14 @@ Result<Plane<std::uint8_t>> decode_part(std::span<const std::byte> bytes, int wi
 }
 
 /// Returns LinearizationTable at each code, the identity without one; codes beyond the table have its last value.
-Result<std::array<double, codes>> linearization(const TiffDirectory& directory) {
-  std::array<double, codes> out{};
+Result<std::vector<double>> linearization(const TiffDirectory& directory, int bits) {
+  std::vector<double> out(std::size_t{1} << bits);
   auto table = directory.numbers(tag::linearization_table, 1, 65536);
   if (!table) return pass_on(table);
   if (*table && !std::ranges::all_of(**table, [](double dn) { return std::isfinite(dn); })) {
     return fail(ErrorCode::malformed, "the table has a value that is not finite", tag::linearization_table.name);
   }
-  for (std::size_t i = 0; i < codes; ++i) {
+  for (std::size_t i = 0; i < out.size(); ++i) {
     out[i] = *table ? (**table)[std::min(i, (*table)->size() - 1)] : static_cast<double>(i);
   }
   return out;
@@ -76,15 +74,15 @@ double value_of(const Polynomial& polynomial, double x) {
   return std::clamp(sum, 0.0, 1.0);
 }
 
-using Curve = std::array<std::uint16_t, codes>;
+using Curve = std::vector<std::uint16_t>;
 
 /// Returns the linear sample of each code after the polynomials of a plane.
-Result<Curve> polynomial_curve(const std::vector<Polynomial>& polynomials, const std::array<double, codes>& linear,
+Result<Curve> polynomial_curve(const std::vector<Polynomial>& polynomials, const std::vector<double>& linear,
                                const RawDn& raw, std::size_t plane) {
   auto black = uniform_black(raw, plane);
   if (!black) return pass_on(black);
-  Curve curve{};
-  for (std::size_t i = 0; i < codes; ++i) {
+  Curve curve(linear.size());
+  for (std::size_t i = 0; i < curve.size(); ++i) {
     double x = std::clamp((linear[i] - *black) / (raw.white_dn[plane] - *black), 0.0, 1.0);
     for (const Polynomial& polynomial : polynomials) {
       if (polynomial.applies_to(static_cast<int>(plane))) x = value_of(polynomial, x);
@@ -132,15 +130,17 @@ Result<Plane<std::uint16_t>> decode_lossy_image(std::span<const std::byte> file,
   return out;
 }
 
-Result<void> linearize_lossy(const TiffDirectory& directory, const TiffDirectory& opcodes, RawDn& raw) {
-  auto linear = linearization(directory);
+Result<void> linearize_codes(const TiffDirectory& directory, const TiffDirectory& opcodes, int bits, RawDn& raw) {
+  auto linear = linearization(directory, bits);
   if (!linear) return pass_on(linear);
   auto polynomials =
       opcodes.bytes(tag::opcode_list[1]).and_then([&](auto bytes) { return read_polynomials(bytes, raw.active); });
   if (!polynomials) return pass_on(polynomials);
+  if (polynomials->empty() && directory.find(tag::linearization_table) == nullptr) return {};
   std::vector<Curve> curves(raw.layout == SensorLayout::linear_rgb ? 3 : 1);
   for (std::size_t plane = 0; plane < curves.size(); ++plane) {
     if (polynomials->empty()) {
+      curves[plane].resize(linear->size());
       std::transform(linear->begin(), linear->end(), curves[plane].begin(),
                      [](double dn) { return static_cast<std::uint16_t>(std::clamp(dn, 0.0, linear_white_dn)); });
       continue;

@@ -21,14 +21,14 @@ Result<void> check_lossy_image(const TiffDirectory& directory, const DngImage& i
 Result<Plane<std::uint16_t>> decode_lossy_image(std::span<const std::byte> file, const TiffDirectory& directory,
                                                 const DngImage& image);
 
-/// Replaces the 8-bit codes of a readout by linear samples: LinearizationTable, then the MapPolynomial opcodes of
-/// OpcodeList2 (DNG 1.4, chapter 7). With polynomials, samples are 16 bits, black is 0 and white 65535: a polynomial
-/// takes (code - black) / (white - black), which it clips to 0..1 before and after.
+/// Replaces the codes of a readout, of `bits` bits, by linear samples: LinearizationTable, then the MapPolynomial
+/// opcodes of OpcodeList2 (DNG 1.4, chapter 7). With polynomials, samples are 16 bits, black is 0 and white 65535: a
+/// polynomial takes (code - black) / (white - black), which it clips to 0..1 before and after.
 ///
 /// Only polynomials of all pixels and all rows and columns are applied, the way in which writers store the curve by
-/// which 8 bits suffice. Errors: a damaged tag, a polynomial of a part of the image, a degree above 8, or one after
+/// which few bits suffice. Errors: a damaged tag, a polynomial of a part of the image, a degree above 8, or one after
 /// which a linear value falls. `opcodes` is the directory with OpcodeList2. Without the curve the image would be wrong,
 /// so none of these is ignored.
-Result<void> linearize_lossy(const TiffDirectory& directory, const TiffDirectory& opcodes, RawDn& raw);
+Result<void> linearize_codes(const TiffDirectory& directory, const TiffDirectory& opcodes, int bits, RawDn& raw);
 
 }  // namespace lowlux::capture

@@ -66,9 +66,11 @@ inline constexpr TagName active_area{50829, "ActiveArea"};
 inline constexpr TagName masked_areas{50830, "MaskedAreas"};
 inline constexpr TagName noise_reduction_applied{50935, "NoiseReductionApplied"};
 inline constexpr TagName forward_matrix[] = {{50964, "ForwardMatrix1"}, {50965, "ForwardMatrix2"}};
+inline constexpr TagName row_interleave_factor{50975, "RowInterleaveFactor"};
 inline constexpr TagName opcode_list[] = {{51008, "OpcodeList1"}, {51009, "OpcodeList2"}, {51022, "OpcodeList3"}};
 inline constexpr TagName noise_profile{51041, "NoiseProfile"};
 inline constexpr TagName color_matrix_3{52531, "ColorMatrix3"};
+inline constexpr TagName column_interleave_factor{52547, "ColumnInterleaveFactor"};
 
 /// Values of PhotometricInterpretation.
 inline constexpr std::uint32_t photometric_cfa = 32803;
@@ -81,5 +83,6 @@ inline constexpr std::uint32_t compression_deflate = 8;
 inline constexpr std::uint32_t compression_vc5 = 9;
 inline constexpr std::uint32_t compression_lossy_jpeg = 34892;
 inline constexpr std::uint32_t compression_old_deflate = 32946;
+inline constexpr std::uint32_t compression_jpeg_xl = 52546;
 
 }  // namespace lowlux::capture::tag

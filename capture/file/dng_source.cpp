@@ -13,6 +13,7 @@
 #include "capture/dng/dng_file.h"
 #include "capture/dng/dng_floats.h"
 #include "capture/dng/dng_frame.h"
+#include "capture/dng/dng_jpeg_xl.h"
 #include "capture/dng/dng_levels.h"
 #include "capture/dng/dng_lossy.h"
 #include "capture/dng/dng_tags.h"
@@ -135,7 +136,12 @@ Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, 
   if (image.is_lossy) {
     auto codes = decode_lossy_image(bytes, *described->directory, image);
     if (!codes) return pass_on(codes);
-    return complete_lossy_dng(dng, *std::move(described), *std::move(codes));
+    return complete_linearized_dng(dng, *std::move(described), *std::move(codes));
+  }
+  if (image.is_jpeg_xl) {
+    auto codes = decode_jpeg_xl_image(bytes, *described->directory, image, limits);
+    if (!codes) return pass_on(codes);
+    return complete_linearized_dng(dng, *std::move(described), *std::move(codes));
   }
   if (image.is_float) {
     auto samples = decode_float_image(bytes, *described->directory, image);

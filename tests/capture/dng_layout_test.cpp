@@ -202,7 +202,7 @@ TEST(DngLayout, KindsThatAreNotDevelopedAreNamed) {
   EXPECT_TRUE(has(with(50711, Tag::numbers(TagType::u16, {2})), "not rectangular"));
   EXPECT_TRUE(has(with(258, Tag::numbers(TagType::u16, {32})), "32 bits"));
   EXPECT_TRUE(has(with(259, Tag::numbers(TagType::u16, {9})), "VC-5"));
-  EXPECT_TRUE(has(with(259, Tag::numbers(TagType::u16, {52546})), "JPEG XL"));
+  EXPECT_TRUE(has(with(259, Tag::numbers(TagType::u16, {52546})), "JPEG XL"));  // decoded, if it were one
   EXPECT_TRUE(has(with(259, Tag::numbers(TagType::u16, {34892})), "lossy JPEG is supported for LinearRaw images"));
   EXPECT_TRUE(has(with(259, Tag::numbers(TagType::u16, {777})), "compression 777"));
 }

@@ -13,6 +13,7 @@
 #include "capture/decoder/libraw_decoder.h"
 #include "tests/capture/read_built.h"
 #include "tests/support/float_dng.h"
+#include "tests/support/jpeg_xl.h"
 
 namespace lowlux::capture {
 namespace {
@@ -54,6 +55,16 @@ std::vector<std::byte> floats(int bits, bool deflate, int predictor) {
   return test::float_dng(zeros, {.bits = bits, .deflate = deflate, .predictor = predictor}).build();
 }
 
+#ifdef LOWLUX_WITH_JPEG_XL
+std::vector<std::byte> in_jpeg_xl(int samples) {
+  DngBuilder dng = plain(samples, 12);
+  Plane<std::uint16_t> zeros(64 * samples, 64);
+  std::fill_n(zeros.data(), zeros.size(), std::uint16_t{0});
+  dng.stored_parts = {test::jpeg_xl_of(zeros, samples, 12)};
+  return with(dng, 259, {52546});
+}
+#endif
+
 std::vector<Format> stored_formats() {
   std::vector<Format> out;
   for (const int bits : {8, 10, 12, 14, 16}) {
@@ -71,6 +82,10 @@ std::vector<Format> stored_formats() {
                  }});
   out.push_back({"DNG, LinearRaw, uncompressed", [] { return plain(3).build(); }});
   out.push_back({"DNG, LinearRaw, lossless JPEG", [] { return plain(3, 16, DngStorage::lossless_jpeg).build(); }});
+#ifdef LOWLUX_WITH_JPEG_XL
+  out.push_back({"DNG, Bayer, JPEG XL", [] { return in_jpeg_xl(1); }});
+  out.push_back({"DNG, LinearRaw, JPEG XL", [] { return in_jpeg_xl(3); }});
+#endif
   out.push_back({"DNG, 16-bit floats, uncompressed", [] { return floats(16, false, 1); }});
   out.push_back({"DNG, 24-bit floats, Deflate, predictor 3", [] { return floats(24, true, 3); }});
   out.push_back({"DNG, 32-bit floats, Deflate, predictor 34894", [] { return floats(32, true, 34894); }});
@@ -88,7 +103,6 @@ std::vector<Format> other_formats() {
            }},
           {"DNG, Bayer, lossy JPEG", [] { return with(plain(1, 8), 259, {34892}); }},
           {"DNG, integers, Deflate", [] { return with(plain(), 259, {8}); }},
-          {"DNG, JPEG XL", [] { return with(plain(), 259, {52546}); }},
           {"DNG, VC-5 (GoPro GPR)", [] { return file_of("gopro_hero6_GOPR0024.gpr"); }},
           {"DNG, X-Trans",
            [] {
@@ -137,12 +151,23 @@ std::string page() {
   return out;
 }
 
+/// Returns the text of the page; without the rows of JPEG XL where this build lacks it.
+std::string stated_page(const std::string& path) {
+  std::ifstream in(path);
+  std::string out;
+  for (std::string line; std::getline(in, line);) {
+#ifndef LOWLUX_WITH_JPEG_XL
+    if (line.find("JPEG XL |") != std::string::npos) continue;
+#endif
+    out += line + '\n';
+  }
+  return out;
+}
+
 TEST(FormatTable, IsWhatThePageSays) {
   const std::string path = LOWLUX_TESTDATA "/../docs/formats.md", now = page();
   if (std::getenv("LOWLUX_WRITE_FORMATS") != nullptr) std::ofstream(path) << now;
-  std::ifstream in(path);
-  const std::string stated{std::istreambuf_iterator<char>(in), {}};
-  EXPECT_EQ(now, stated);
+  EXPECT_EQ(now, stated_page(path));
 }
 
 }  // namespace

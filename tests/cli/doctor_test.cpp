@@ -28,8 +28,8 @@ TEST(Doctor, StatesEveryPartOnceInTextAndJson) {
   EXPECT_EQ(text.exit_code, 0) << text.out;
   EXPECT_EQ(json.exit_code, 0);
   const auto parts = parts_of(json.out);
-  for (const char* name : {"decoder", "kernels", "machine", "charts", "libcamera", "peers of bench", "cameras",
-                           "profiles", "cost table", "defaults", "bench images"}) {
+  for (const char* name : {"decoder", "JPEG XL", "kernels", "machine", "charts", "libcamera", "peers of bench",
+                           "cameras", "profiles", "cost table", "defaults", "bench images"}) {
     ASSERT_TRUE(parts.contains(name)) << name;
     EXPECT_TRUE(holds(text.out, std::string("\n  ") + name)) << text.out;
     const Json& part = parts.at(name);

@@ -35,6 +35,14 @@ InstalledPart find_decoder() {
   return {.name = "decoder", .state = State::broken, .remedy = decoded.error().message};
 }
 
+/// Lets the decoder of JPEG XL refuse an empty job.
+InstalledPart find_jpeg_xl() {
+  constexpr std::array<std::byte, 1> no_job{};
+  const auto decoded = capture::decode_contained(no_job, {}, capture::DecoderProgram::libjxl);
+  if (decoded || decoded.error().code == ErrorCode::malformed) return {.name = "JPEG XL", .found = "in DNG (libjxl)"};
+  return {.name = "JPEG XL", .state = State::missing, .remedy = decoded.error().message};
+}
+
 InstalledPart find_machine() {
   const Machine machine = this_machine(threads_of_each(1));
   return {.name = "machine",
@@ -121,6 +129,7 @@ InstalledPart find_bench_pictures() {
 
 std::vector<InstalledPart> find_installation() {
   return {find_decoder(),
+          find_jpeg_xl(),
           {.name = "kernels", .found = this_machine(1).kernels},
           find_machine(),
           module_part("charts", "colour charts in photographs (OpenCV)", load_chart_detector()),

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+
+namespace lowlux::capture {
+
+/// What lowlux-decode-jxl receives as its file: this header, `parts` sizes [bytes] of 64 bits each, and the parts, each
+/// a JPEG XL of the samples of one strip or tile. It delivers the samples of the whole image as codes of `bits` bits.
+struct JpegXlJob {
+  std::int32_t width, height;            // of the image [pixels]
+  std::int32_t samples;                  // per pixel, 1 or 3
+  std::int32_t bits;                     // of a code, 8 to 16
+  std::int32_t part_width, part_height;  // the parts cover the image row after row; the last ones may be smaller
+  std::uint64_t parts;
+};
+static_assert(std::is_trivially_copyable_v<JpegXlJob>);
+
+}  // namespace lowlux::capture
