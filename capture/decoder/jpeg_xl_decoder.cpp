@@ -3,6 +3,7 @@
 #include <jxl/decode.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
@@ -125,7 +126,7 @@ std::vector<std::uint16_t> codes_of_full_scale(int bits) {
   std::vector<std::uint16_t> out(65536);
   const double largest = (1 << bits) - 1;
   for (std::size_t i = 0; i < out.size(); ++i) {
-    out[i] = static_cast<std::uint16_t>(static_cast<double>(i) * largest / full_scale + 0.5);
+    out[i] = static_cast<std::uint16_t>(std::lround(static_cast<double>(i) * largest / full_scale));
   }
   return out;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <variant>
@@ -69,8 +70,9 @@ Result<double> uniform_black(const RawDn& raw, std::size_t sample) {
 }
 
 double value_of(const Polynomial& polynomial, double x) {
-  double sum = 0;
-  for (auto k = polynomial.coefficient.rbegin(); k != polynomial.coefficient.rend(); ++k) sum = sum * x + *k;
+  const auto& k = polynomial.coefficient;
+  const double sum =
+      std::accumulate(k.rbegin(), k.rend(), 0.0, [x](double all, double next) { return all * x + next; });
   return std::clamp(sum, 0.0, 1.0);
 }
 

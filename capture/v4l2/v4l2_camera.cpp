@@ -35,8 +35,8 @@ std::uint32_t lost_between(std::uint32_t last, std::uint32_t now) {
 
 }  // namespace
 
-V4l2Camera::V4l2Camera(std::unique_ptr<V4l2Device> device, V4l2Agreement agreement, const V4l2Options& options)
-    : device_(std::move(device)), agreement_(std::move(agreement)), options_(options) {}
+V4l2Camera::V4l2Camera(std::unique_ptr<V4l2Device> device, V4l2Agreement agreement, V4l2Options options)
+    : device_(std::move(device)), agreement_(std::move(agreement)), options_(std::move(options)) {}
 
 Result<void> V4l2Camera::start() {
   if (buffers_) return {};

@@ -18,7 +18,7 @@ namespace lowlux::capture {
 /// A V4L2 node with which a format was agreed. It holds memory and streams from start() to stop().
 class V4l2Camera final : public Camera {
  public:
-  V4l2Camera(std::unique_ptr<V4l2Device> device, V4l2Agreement agreement, const V4l2Options& options);
+  V4l2Camera(std::unique_ptr<V4l2Device> device, V4l2Agreement agreement, V4l2Options options);
 
   const std::string& name() const override { return device_->name(); }
   const CameraFormat& format() const override { return agreement_.format; }

@@ -34,7 +34,7 @@ Codes night(double exposure_s, double gain, std::mt19937& random, double dark_e_
     for (int x = 0; x < width; ++x) {
       const double e = exposure_s * ((x < 8 ? 1e5 : 2000) + dark_e_per_s);
       const double dn = 256 + dn_per_e * (e + std::sqrt(e + 9) * normal(random));
-      out[static_cast<std::size_t>(y * width + x)] =
+      out[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)] =
           static_cast<std::uint16_t>(std::clamp(std::round(dn), 0.0, 4095.0));
     }
   }

@@ -164,7 +164,8 @@ TEST(DataSheet, PhotonsAreThoseOfEmvasEquation) {
 TEST(SpatialParts, RowsColumnsAndPixelsAreSeparated) {
   std::mt19937_64 random(first_seed);
   for (int round = 0; round < 8; ++round) {
-    const double row = 3.0 * (round % 2), column = 2.0 * (round / 2 % 2), pixel = 1.0 + round / 4;
+    const int half = round / 2, quarter = round / 4;
+    const double row = 3.0 * (round % 2), column = 2.0 * (half % 2), pixel = 1.0 + quarter;
     SCOPED_TRACE(testing::Message() << "row " << row << ", column " << column << ", pixel " << pixel);
     std::normal_distribution<double> normal;
     DarkGroup group{.frames = 4, .mean_dn = Plane<float>(200, 160), .variance_dn2 = Plane<float>(200, 160)};

@@ -120,6 +120,7 @@ TEST(JpegXlDng, RowsAndColumnsStoredApartComeToTheirPlaces) {
 TEST(JpegXlDng, ATableIsApplied) {
   Stored in = stored({.bits = 10}, 4);
   std::vector<double> table;
+  table.reserve(1024);
   for (int i = 0; i < 1024; ++i) table.push_back(i < 512 ? i : 512 + 4 * (i - 512));
   in.dng.set(50712, Tag::numbers(TagType::u16, table));
   in.dng.set(50717, Tag::numbers(TagType::u16, {2556}));

@@ -18,7 +18,7 @@ using Json = nlohmann::json;
 
 class CaptureCommand : public test::SimulateCommand {
  protected:
-  void refused(const std::vector<std::string>& args, const std::string& why, int exit_code = 2) {
+  static void refused(const std::vector<std::string>& args, const std::string& why, int exit_code = 2) {
     std::vector<std::string> words{"capture"};
     words.insert(words.end(), args.begin(), args.end());
     const auto result = lowlux(words);

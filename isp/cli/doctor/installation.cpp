@@ -90,14 +90,14 @@ InstalledPart find_profiles() {
 
 InstalledPart find_cost_table() {
   const int threads = threads_of_each(1);
-  if (const auto kept = kept_cost(threads)) {
+  const auto kept = kept_cost(threads);
+  if (kept) {
     return {.name = "cost table", .found = fmt::format("{}, {} threads", cost_file(threads).value_or(""), threads)};
-  } else {
-    return {.name = "cost table",
-            .state = State::missing,
-            .remedy = kept.error().message +
-                      ": times of --budget-ms are rough estimates; `lowlux bench --calibrate-cost` measures them"};
   }
+  return {.name = "cost table",
+          .state = State::missing,
+          .remedy = kept.error().message +
+                    ": times of --budget-ms are rough estimates; `lowlux bench --calibrate-cost` measures them"};
 }
 
 InstalledPart find_config() {
