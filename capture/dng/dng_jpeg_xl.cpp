@@ -1,7 +1,6 @@
 #include "capture/dng/dng_jpeg_xl.h"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -44,6 +43,24 @@ std::vector<int> places(int count, int factor) {
   return out;
 }
 
+/// Puts rows and columns that are stored apart in their places. DNG stores every `factor`-th row of an image, then the
+/// rows after these, and so on (RowInterleaveFactor, ColumnInterleaveFactor): of a mosaic, each of four colours as an
+/// image of its own.
+Plane<std::uint16_t> without_interleave(const Plane<std::uint16_t>& stored, const DngImage& image) {
+  const std::vector<int> rows = places(image.height, image.row_interleave);
+  const std::vector<int> columns = places(image.width, image.column_interleave);
+  Plane<std::uint16_t> out(stored.width(), stored.height());
+  for (int y = 0; y < image.height; ++y) {
+    const std::uint16_t* from = stored.row(y);
+    std::uint16_t* to = out.row(rows[static_cast<std::size_t>(y)]);
+    for (int x = 0; x < image.width; ++x) {
+      const std::ptrdiff_t place = columns[static_cast<std::size_t>(x)];
+      std::copy_n(from + std::ptrdiff_t{x} * image.samples, image.samples, to + place * image.samples);
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 Result<void> check_jpeg_xl_image(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
@@ -66,21 +83,6 @@ Result<Plane<std::uint16_t>> decode_jpeg_xl_image(std::span<const std::byte> fil
   }
   if (image.row_interleave == 1 && image.column_interleave == 1) return std::move(decoded->samples);
   return without_interleave(decoded->samples, image);
-}
-
-Plane<std::uint16_t> without_interleave(const Plane<std::uint16_t>& stored, const DngImage& image) {
-  const std::vector<int> rows = places(image.height, image.row_interleave);
-  const std::vector<int> columns = places(image.width, image.column_interleave);
-  Plane<std::uint16_t> out(stored.width(), stored.height());
-  for (int y = 0; y < image.height; ++y) {
-    const std::uint16_t* from = stored.row(y);
-    std::uint16_t* to = out.row(rows[static_cast<std::size_t>(y)]);
-    for (int x = 0; x < image.width; ++x) {
-      const std::ptrdiff_t place = columns[static_cast<std::size_t>(x)];
-      std::copy_n(from + std::ptrdiff_t{x} * image.samples, image.samples, to + place * image.samples);
-    }
-  }
-  return out;
 }
 
 }  // namespace lowlux::capture

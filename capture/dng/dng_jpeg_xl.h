@@ -20,9 +20,4 @@ Result<void> check_jpeg_xl_image(const TiffDirectory& directory, const DngImage&
 Result<Plane<std::uint16_t>> decode_jpeg_xl_image(std::span<const std::byte> file, const TiffDirectory& directory,
                                                   const DngImage& image, const ReadLimits& limits);
 
-/// Puts rows and columns that are stored apart in their places. DNG stores every `factor`-th row of an image, then the
-/// rows after these, and so on (RowInterleaveFactor, ColumnInterleaveFactor): of a mosaic, each of four colours as an
-/// image of its own.
-Plane<std::uint16_t> without_interleave(const Plane<std::uint16_t>& stored, const DngImage& image);
-
 }  // namespace lowlux::capture

@@ -20,7 +20,7 @@ struct DngImage {
   bool is_float = false;                          // floating-point samples, of 16, 24 or 32 bits
   bool is_lossy = false;                          // 8-bit codes in baseline JPEG, one for each strip or tile
   bool is_jpeg_xl = false;                        // codes in JPEG XL, one for each strip or tile
-  int row_interleave = 1, column_interleave = 1;  // see without_interleave(); 1 but for JPEG XL
+  int row_interleave = 1, column_interleave = 1;  // images that they are stored as; 1 but for JPEG XL
   SensorLayout layout = SensorLayout::bayer;
   BayerPhase phase = BayerPhase::rggb;
 };

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "capture/dng/dng_jpeg_xl.h"
 #include "tests/capture/read_built.h"
 #include "tests/support/jpeg_xl.h"
 
