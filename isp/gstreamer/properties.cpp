@@ -27,24 +27,25 @@ constexpr std::array<Number, 13> numbers{{
      180, &Properties::field_of_view_deg, before_start},
     {"black-level", "Black level", "In codes of the frames; below 0: of the profile, else measured", -1, 65535,
      &Properties::black_level_dn},
-    {"exposure-time", "Exposure time", "Of the frames [s]; 0: not known", 0, 1e5, &Properties::exposure_s},
-    {"analogue-gain", "Analogue gain", "Of the frames, 1 is ISO 100 of the profile; 0: not known", 0, 1e4,
+    {"exposure-time", "Exposure time", "Of the frames [s]; below 1e-7: not known", 0, 1e5, &Properties::exposure_s},
+    {"analogue-gain", "Analogue gain", "Of the frames, 1 is ISO 100 of the profile; below 0.1: not known", 0, 1e4,
      &Properties::analogue_gain},
-    {"noise-gain", "System gain", "Codes per electron; 0: of the profile, else measured. Goes with noise-read", 0, 1e6,
-     &Properties::noise_gain_dn_per_e},
+    {"noise-gain", "System gain", "Codes per electron; below 1e-6: of the profile, else measured. Goes with noise-read",
+     0, 65535, &Properties::noise_gain_dn_per_e},
     {"noise-read", "Read noise", "Standard deviation of a pixel without light, in codes; below 0: not known", -1, 65535,
      &Properties::noise_read_dn},
-    {"red-gain", "Gain of red", "For white, relative to green; 0: estimated. Goes with blue-gain", 0, 1e3,
+    {"red-gain", "Gain of red", "For white, relative to green; below 0.001: estimated. Goes with blue-gain", 0, 1e3,
      &Properties::red_gain},
-    {"blue-gain", "Gain of blue", "For white, relative to green; 0: estimated. Goes with red-gain", 0, 1e3,
+    {"blue-gain", "Gain of blue", "For white, relative to green; below 0.001: estimated. Goes with red-gain", 0, 1e3,
      &Properties::blue_gain},
     {"saturation", "Saturation", "Of the colours; 0: none, 1: as they are", 0, 4, &Properties::saturation},
     {"exposure-ev", "Exposure of the image", "Gain of the image [EV]; below -10: automatic", -100, 20,
      &Properties::exposure_ev},
     {"lux", "Illuminance", "Of the scene [lx], for the look of the eye; below 0: not known", -1, 1e6, &Properties::lux},
-    {"f-number", "F-number", "Of the lens, for the look of the eye; 0: not known", 0, 100, &Properties::f_number},
-    {"budget-ms", "Time for a frame", "Noise reduction is left out in steps to keep to it [ms]; 0: no limit", 0, 1e6,
-     &Properties::budget_ms},
+    {"f-number", "F-number", "Of the lens, for the look of the eye; below 0.1: not known", 0, 100,
+     &Properties::f_number},
+    {"budget-ms", "Time for a frame", "Noise reduction is left out in steps to keep to it [ms]; below 0.01: no limit",
+     0, 1e6, &Properties::budget_ms},
 }};
 
 // Other properties follow the numbers, whose identifiers are 1 and on.
@@ -209,6 +210,7 @@ lowlux_stage_settings Properties::settings() const {
   return out;
 }
 
+// What is below the least value that the stage takes is not stated.
 lowlux_stage_params Properties::params() const {
   lowlux_stage_params out{};
   out.size = sizeof out;
@@ -218,15 +220,15 @@ lowlux_stage_params Properties::params() const {
   std::fill_n(out.black_level, 4, static_cast<float>(black_level_dn));
   state(black_level_dn >= 0, LOWLUX_STAGE_HAS_BLACK);
   out.exposure_s = exposure_s;
-  state(exposure_s > 0, LOWLUX_STAGE_HAS_EXPOSURE);
+  state(exposure_s >= 1e-7, LOWLUX_STAGE_HAS_EXPOSURE);
   out.analogue_gain = static_cast<float>(analogue_gain);
-  state(analogue_gain > 0, LOWLUX_STAGE_HAS_ANALOGUE_GAIN);
+  state(analogue_gain >= 0.1, LOWLUX_STAGE_HAS_ANALOGUE_GAIN);
   out.noise_gain = static_cast<float>(noise_gain_dn_per_e);
   out.noise_read = static_cast<float>(noise_read_dn);
-  state(noise_gain_dn_per_e > 0 && noise_read_dn >= 0, LOWLUX_STAGE_HAS_NOISE);
+  state(noise_gain_dn_per_e >= 1e-6 && noise_read_dn >= 0, LOWLUX_STAGE_HAS_NOISE);
   out.colour_gains[0] = static_cast<float>(red_gain);
   out.colour_gains[1] = static_cast<float>(blue_gain);
-  state(red_gain > 0 && blue_gain > 0, LOWLUX_STAGE_HAS_COLOUR_GAINS);
+  state(red_gain >= 1e-3 && blue_gain >= 1e-3, LOWLUX_STAGE_HAS_COLOUR_GAINS);
   out.saturation = static_cast<float>(saturation);
   state(true, LOWLUX_STAGE_HAS_SATURATION);
   out.exposure_ev = static_cast<float>(exposure_ev);
@@ -234,9 +236,9 @@ lowlux_stage_params Properties::params() const {
   out.lux = static_cast<float>(lux);
   state(lux >= 0, LOWLUX_STAGE_HAS_LUX);
   out.f_number = static_cast<float>(f_number);
-  state(f_number > 0, LOWLUX_STAGE_HAS_F_NUMBER);
+  state(f_number >= 0.1, LOWLUX_STAGE_HAS_F_NUMBER);
   out.budget_ms = static_cast<float>(budget_ms);
-  state(budget_ms > 0, LOWLUX_STAGE_HAS_BUDGET);
+  state(budget_ms >= 0.01, LOWLUX_STAGE_HAS_BUDGET);
   return out;
 }
 

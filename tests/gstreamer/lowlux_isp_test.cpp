@@ -389,6 +389,27 @@ TEST(LowluxIsp, PostsWhatWasDoneWhereAsked) {
   gst_element_set_bus(harness->element, nullptr);
 }
 
+// At either end of the range of each number and between, alone.
+TEST(LowluxIsp, NoValueOfAPropertyEndsTheStream) {
+  const Stream stream;
+  const Bytes bytes = frame_of(stream, 1);
+  std::mt19937 random(20261125);
+  for (const char* name : {"exposure-time", "analogue-gain", "noise-gain", "noise-read", "red-gain", "blue-gain",
+                           "saturation", "exposure-ev", "lux", "f-number", "budget-ms", "field-of-view"}) {
+    for (int i = 0; i < 6; ++i) {
+      const Harness harness = harness_of(stream);
+      g_object_set(harness->element, "noise-gain", 0.5, "noise-read", 1.5, "red-gain", 2.0, "blue-gain", 1.5, nullptr);
+      const auto* const spec =
+          reinterpret_cast<GParamSpecDouble*>(g_object_class_find_property(G_OBJECT_GET_CLASS(harness->element), name));
+      const double share = std::pow(10, -std::uniform_real_distribution(0.0, 12.0)(random));
+      const double value =
+          i == 0 ? spec->minimum : spec->minimum + (spec->maximum - spec->minimum) * (i == 1 ? 1 : share);
+      g_object_set(harness->element, name, value, nullptr);
+      EXPECT_EQ(gst_harness_push(harness.get(), buffer_of(bytes, 0)), GST_FLOW_OK) << name << " " << value;
+    }
+  }
+}
+
 TEST(LowluxIsp, PropertiesAreReturnedAsTheyWereSet) {
   GstElement* element = gst_element_factory_make("lowluxisp", nullptr);
   gst_object_ref_sink(element);
