@@ -190,6 +190,24 @@ TEST_F(Layer, LeavesFramesAsTheyAreThatAreDamagedOrOfOtherStreams) {
   EXPECT_EQ(completed(bytes), bytes);
 }
 
+TEST_F(Layer, FollowsABufferWhoseMemoryIsAnotherOne) {
+  const RawFormatNames& names = names_of_bayer(10);
+  const std::size_t stride = row_bytes(names.format, width);
+  configure(names, stride);
+  const auto bytes = packed_frame(names.format, scene(names.format, width, height), width, stride);
+  const auto expected = completed(bytes);
+  libcamera::FrameBuffer buffer;  // at one address, as a program's next buffer may be
+  request_.own_buffers = {{&stream_, &buffer}};
+  for (int i = 0; i < 3; ++i) {
+    const SharedMemory memory(offset + bytes.size());  // its descriptor has one number each time
+    memory.write(bytes);
+    buffer.own_planes = {{.fd = {memory.fd()}, .offset = offset, .length = static_cast<unsigned>(bytes.size())}};
+    buffer.own_metadata = {.status = libcamera::FrameMetadata::FrameSuccess, .sequence = 0, .timestamp = 0};
+    layer_->bufferCompleted(closure_, &request_, &buffer);
+    EXPECT_EQ(memory.read(), expected) << i;
+  }
+}
+
 TEST_F(Layer, LeavesAFrameAsItIsThatIsShorterThanItsFormat) {
   const RawFormatNames& names = names_of_bayer(10);
   const std::size_t stride = row_bytes(names.format, width);

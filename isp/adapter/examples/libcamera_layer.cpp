@@ -22,6 +22,7 @@
 #include <linux/dma-buf.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -49,7 +50,10 @@ void report(const std::string& what) { std::fprintf(stderr, "lowlux layer: %s\n"
 class Mapping {
  public:
   explicit Mapping(const libcamera::FrameBuffer::Plane& plane)
-      : fd_(plane.fd.get()), offset_(plane.offset), length_(std::size_t{plane.offset} + plane.length) {
+      : fd_(plane.fd.get()),
+        file_(file_of(fd_)),
+        offset_(plane.offset),
+        length_(std::size_t{plane.offset} + plane.length) {
     if (plane.offset == std::numeric_limits<unsigned int>::max()) return;
     start_ = mmap(nullptr, length_, PROT_READ | PROT_WRITE, MAP_SHARED, fd_, 0);
   }
@@ -60,6 +64,12 @@ class Mapping {
   Mapping& operator=(const Mapping&) = delete;
 
   bool is_mapped() const { return start_ != MAP_FAILED; }
+  /// Returns whether this is the memory of that plane. An application may free a buffer and make another one, which has
+  /// the address and the descriptor of the first, while the camera runs.
+  bool is_of(const libcamera::FrameBuffer::Plane& plane) const {
+    return plane.fd.get() == fd_ && file_of(fd_) == file_ && plane.offset == offset_ &&
+           std::size_t{plane.offset} + plane.length == length_;
+  }
   std::uint8_t* data() const { return static_cast<std::uint8_t*>(start_) + offset_; }
   std::size_t length() const { return length_ - offset_; }
 
@@ -72,7 +82,14 @@ class Mapping {
   }
 
  private:
+  using File = std::pair<dev_t, ino_t>;
+  static File file_of(int fd) {
+    struct stat status {};
+    return fstat(fd, &status) == 0 ? File{status.st_dev, status.st_ino} : File{};
+  }
+
   int fd_;
+  File file_;
   std::size_t offset_;
   std::size_t length_;
   void* start_ = MAP_FAILED;
@@ -244,8 +261,9 @@ class CleanRaw {
     CleanStream* const stream = stream_of(request, buffer);
     if (stream == nullptr || frame.status != libcamera::FrameMetadata::FrameSuccess) return;
     if (buffer.planes().empty()) return;
+    const libcamera::FrameBuffer::Plane& plane = buffer.planes()[0];
     auto& memory = memory_[&buffer];
-    if (!memory) memory = std::make_unique<Mapping>(buffer.planes()[0]);
+    if (!memory || !memory->is_of(plane)) memory = std::make_unique<Mapping>(plane);
     if (!memory->is_mapped()) return report_once("a buffer cannot be mapped: frames stay as they are");
     if (!stream->clean(request, frame, *memory)) report_once(stream->error());
   }
