@@ -49,6 +49,8 @@ class Completed {
   std::deque<libcamera::Request*> requests_;
 };
 
+constexpr int most_failed_in_turn = 100;
+
 struct Mapping {
   void* start = MAP_FAILED;
   std::size_t length = 0;
@@ -179,7 +181,7 @@ int stream_frames(libcamera::Camera& camera, libcamera::CameraConfiguration& con
   camera.requestCompleted.connect(&completed, [&](libcamera::Request* request) { completed.add(request); });
   int code = camera.start() < 0 ? failed("the camera does not start") : 0;
   for (const auto& request : requests) camera.queueRequest(request.get());
-  for (int done = 0; done < frames && code == 0;) {
+  for (int done = 0, failed_in_turn = 0; done < frames && code == 0;) {
     libcamera::Request* const request = completed.next();
     if (request == nullptr) code = failed("no frame came for five seconds");
     if (request == nullptr || request->status() == libcamera::Request::RequestCancelled) break;
@@ -193,6 +195,9 @@ int stream_frames(libcamera::Camera& camera, libcamera::CameraConfiguration& con
         failed("a frame:", lowlux_stage_last_error(opened));  // the stage continues with the next frame
       }
       ++done;
+      failed_in_turn = 0;
+    } else if (++failed_in_turn == most_failed_in_turn) {
+      code = failed("the camera gives damaged frames only");
     }
     request->reuse(libcamera::Request::ReuseBuffers);
     camera.queueRequest(request);
