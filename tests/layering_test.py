@@ -25,14 +25,15 @@ ALLOWED = {
     "isp/output": "isp/model isp/codec isp/base",
     "isp/pipeline": "isp/merge isp/raw denoise isp/render isp/model isp/base",
     "isp/metrics": "isp/render isp/model isp/base",
+    "isp/cost": "isp/metrics isp/pipeline isp/merge isp/render isp/model isp/base",
     "isp/reproduce": "isp/metrics capture isp/output isp/raw isp/render isp/model isp/codec isp/base",
-    "isp/bench": "isp/reproduce isp/metrics isp/pipeline capture calib isp/output isp/merge isp/raw denoise isp/render "
-                 "isp/model isp/codec isp/base",
+    "isp/bench": "isp/cost isp/reproduce isp/metrics isp/pipeline capture calib isp/output isp/merge isp/raw denoise "
+                 "isp/render isp/model isp/codec isp/base",
     "isp/adapter": "isp/pipeline calib isp/raw isp/render isp/model isp/base",
     "isp/gstreamer": "isp/adapter",
-    "isp/cli": "isp/bench isp/reproduce isp/metrics isp/adapter isp/pipeline capture calib isp/output isp/merge isp/raw "
-               "denoise isp/render isp/model isp/codec isp/base",
-    "isp/python": "isp/cli isp/bench isp/reproduce isp/metrics isp/adapter isp/pipeline capture calib isp/output isp/merge "
+    "isp/cli": "isp/bench isp/cost isp/reproduce isp/metrics isp/adapter isp/pipeline capture calib isp/output isp/merge "
+               "isp/raw denoise isp/render isp/model isp/codec isp/base",
+    "isp/python": "isp/cli isp/bench isp/cost isp/reproduce isp/metrics isp/adapter isp/pipeline capture calib isp/output isp/merge "
                   "isp/raw denoise isp/render isp/model isp/codec isp/base",
 }
 MOST_FILES_IN_A_FOLDER = 35

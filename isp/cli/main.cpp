@@ -49,8 +49,10 @@ constexpr std::array verbs{
     Verb{"simulate", "simulate raw files with a known noise-free reference", run_simulate},
     Verb{"dataset", "simulate data sets: scenes, sensors and settings from distributions", run_dataset},
     Verb{"compare", "compare two images: CIEDE2000, gamut, PSNR, SSIM", run_compare},
+#ifdef LOWLUX_WITH_MEASUREMENT
     Verb{"bench", "measure accuracy against time, compared with other methods", run_bench},
     Verb{"reproduce", "run the published experiments and compare the findings", run_reproduce},
+#endif
 };
 constexpr std::size_t photographers_verbs = 9;  // the first ones; the others are for measurement
 

@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "isp/base/executor.h"
-#include "isp/bench/merge_cost.h"
-#include "isp/bench/speed_probe.h"
-#include "isp/bench/timing_frame.h"
+#include "isp/cost/merge_cost.h"
+#include "isp/cost/speed_probe.h"
+#include "isp/cost/timing_frame.h"
 #include "isp/metrics/statistics.h"
 #include "isp/pipeline/merge/merge_budget.h"
 #include "isp/pipeline/merge/merge_frames.h"

@@ -9,7 +9,7 @@
 //                             are sampled and go by regions
 // Each frame is planned and developed five times as the command line does it, by the machine's pace of that moment:
 // "wall/pred" is the median of what the wall clock says over what was predicted, and the verdict goes by that clock.
-// The times in the table are for the comparison of plans: a fixed piece of work (isp/bench/speed_probe.h) is timed
+// The times in the table are for the comparison of plans: a fixed piece of work (isp/cost/speed_probe.h) is timed
 // before each run, and a time is the median of its ratio to that work, in milliseconds of the moment the frame was
 // planned.
 #include <algorithm>
@@ -24,8 +24,8 @@
 #include <utility>
 #include <vector>
 
-#include "isp/bench/cost_measurement.h"
-#include "isp/bench/speed_probe.h"
+#include "isp/cost/cost_measurement.h"
+#include "isp/cost/speed_probe.h"
 #include "isp/metrics/picture_metrics.h"
 #include "isp/metrics/statistics.h"
 #include "isp/pipeline/develop.h"

@@ -30,9 +30,11 @@ const std::vector<Words> all_verbs{{"develop"},
                                    {"resaturate"},
                                    {"simulate"},
                                    {"dataset"},
-                                   {"compare"},
+#ifdef LOWLUX_WITH_MEASUREMENT
                                    {"bench"},
-                                   {"reproduce"}};
+                                   {"reproduce"},
+#endif
+                                   {"compare"}};
 
 std::string help_of(Words verb, const char* flag) {
   verb.emplace_back(flag);

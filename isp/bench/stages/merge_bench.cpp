@@ -16,7 +16,7 @@
 #include "capture/synthetic/burst.h"
 #include "isp/bench/scenes/simulated_camera.h"
 #include "isp/bench/stages/developing_stages.h"
-#include "isp/bench/timing_frame.h"
+#include "isp/cost/timing_frame.h"
 #include "isp/metrics/picture_comparison.h"
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/merge/merge_frames.h"

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isp/cli/shared/findings.h"
+#include "isp/cli/bench/findings.h"
 #include "isp/cli/shared/report.h"
 #include "isp/output/picture/image_writer.h"
 

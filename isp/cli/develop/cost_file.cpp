@@ -16,8 +16,8 @@
 
 #include "capture/file/file_bytes.h"
 #include "isp/base/executor.h"
-#include "isp/bench/cost_measurement.h"
-#include "isp/bench/speed_probe.h"
+#include "isp/cost/cost_measurement.h"
+#include "isp/cost/speed_probe.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/progress.h"

@@ -8,7 +8,7 @@
 
 #include "isp/base/executor.h"
 #include "isp/base/result.h"
-#include "isp/bench/speed_probe.h"
+#include "isp/cost/speed_probe.h"
 #include "isp/pipeline/budget/cost_model.h"
 
 /// Stores the costs of developing on this machine between runs.

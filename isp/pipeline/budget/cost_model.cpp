@@ -86,7 +86,7 @@ double predicted_s(const CostModel& model, const CostSize& size, const std::vect
 
 namespace {
 
-/// States the time of the fixed workload of isp/bench/speed_probe.h, 0.79 MP at the level standard, by the table below:
+/// States the time of the fixed workload of isp/cost/speed_probe.h, 0.79 MP at the level standard, by the table below:
 /// 13 ms/MP. It was not recorded with the times.
 constexpr double pace_s = 0.0105;
 

@@ -80,7 +80,7 @@ struct CostPoint {
 struct CostModel {
   std::string machine;  // machine that was measured; see isp/cli/develop/cost_file.h
   int threads = 1;
-  double pace_s = 0;  // time of a fixed workload at that moment (isp/bench/speed_probe.h); 0: not known
+  double pace_s = 0;  // time of a fixed workload at that moment (isp/cost/speed_probe.h); 0: not known
   double pace = 1;    // current time of that workload over pace_s: factor of all times
   std::array<std::vector<CostPoint>, cost_parts> points;  // of each part, by ascending size; none: the part is free
 

@@ -1,4 +1,4 @@
-#include "isp/bench/merge_cost.h"
+#include "isp/cost/merge_cost.h"
 
 #include <array>
 #include <cstddef>
@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "isp/bench/timing_frame.h"
+#include "isp/cost/timing_frame.h"
 #include "isp/metrics/statistics.h"
 #include "isp/pipeline/merge/merge_frames.h"
 

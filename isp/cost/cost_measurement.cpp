@@ -1,4 +1,4 @@
-#include "isp/bench/cost_measurement.h"
+#include "isp/cost/cost_measurement.h"
 
 #include <algorithm>
 #include <array>
@@ -10,9 +10,9 @@
 
 #include <fmt/format.h>
 
-#include "isp/bench/merge_cost.h"
-#include "isp/bench/speed_probe.h"
-#include "isp/bench/timing_frame.h"
+#include "isp/cost/merge_cost.h"
+#include "isp/cost/speed_probe.h"
+#include "isp/cost/timing_frame.h"
 #include "isp/metrics/statistics.h"
 #include "isp/pipeline/budget/frame_sample.h"
 #include "isp/pipeline/develop.h"

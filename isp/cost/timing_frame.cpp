@@ -1,4 +1,4 @@
-#include "isp/bench/timing_frame.h"
+#include "isp/cost/timing_frame.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
-#include "isp/bench/speed_probe.h"
+#include "isp/cost/speed_probe.h"
 
-#include "isp/bench/timing_frame.h"
+#include "isp/cost/timing_frame.h"
 #include "isp/metrics/statistics.h"
 #include "isp/pipeline/develop.h"
 

@@ -1,4 +1,4 @@
-#include "isp/cli/shared/findings.h"
+#include "isp/cli/bench/findings.h"
 
 #include <algorithm>
 #include <array>
