@@ -106,16 +106,22 @@ TEST(DenoiseRows, TableAndPlotsHoldWhatWasMeasured) {
       row("noise-free", MethodKind::ceiling, dim, 0, 40, 0.5), row("none", MethodKind::other, dim, 0.001, 20, 10),
       row("draft", MethodKind::ours, dim, 0.02, 28, 4), row("draft", MethodKind::ours, dark, 0.01, 23, 7)};
   rows[2].spread = 0.03;
+  rows[2].patch_uv = 0.004;
+  rows[2].patch_uv_bound = 0.002;
   mark_undominated(rows);
   const Table table = table_of(denoise_table(rows), 4);
   ASSERT_EQ(table.rows.size(), rows.size());
   for (const auto& cells : table.rows) EXPECT_EQ(cells.size(), table.columns.size());
   EXPECT_EQ(table.rows[2][3], "draft");
   EXPECT_EQ(table.rows[2][4], "28");
-  EXPECT_EQ(table.rows[0][10], "");  // the ceiling takes no time
-  EXPECT_EQ(table.columns[11], "spread_percent");
-  EXPECT_EQ(table.rows[2][11], "3");
-  EXPECT_EQ(table.rows[1][11], "");
+  EXPECT_EQ(table.rows[0][12], "");  // the ceiling takes no time
+  EXPECT_EQ(table.columns[9], "patch_uv");
+  EXPECT_EQ(table.rows[2][9], "0.004");
+  EXPECT_EQ(table.columns[10], "patch_uv_bound");
+  EXPECT_EQ(table.rows[2][10], "0.002");
+  EXPECT_EQ(table.columns[13], "spread_percent");
+  EXPECT_EQ(table.rows[2][13], "3");
+  EXPECT_EQ(table.rows[1][13], "");
   EXPECT_EQ(table.rows[2].back(), "yes");
   const std::vector<Plot> plots = denoise_plots(rows);
   ASSERT_EQ(plots.size(), 2u);

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "isp/base/executor.h"
+#include "isp/bench/scenes/patch_bound.h"
 
 namespace lowlux::isp {
 namespace {
@@ -133,6 +134,7 @@ class LightRows {
     const BenchPicture& picture = work_.pictures[index];
     const DenoiseShot shot = take(picture, work_.lights[light_], seed_of(picture, work_.lights[light_]));
     const PictureTruth truth(picture.linear.view(), executor);
+    const PatchBound patches(picture, shot);
     if (index == 0) parts.push_back({"truth", middle_codes(picture.linear)});
     MethodInput input{picture, shot, work_.tuned[light_], work_.options.nl_means};
     if (!work_.strengths.empty()) input.strength = work_.strengths[index * work_.lights.size() + light_].best;
@@ -144,6 +146,8 @@ class LightRows {
       const auto result = methods_[m].run(input, methods_[m].level, memory);
       if (!result) return tl::make_unexpected(result.error());
       add(rows_[m].error, picture_error(result->picture, truth, executor), share);
+      rows_[m].patch_uv += share * patches.distance_uv(result->picture.light);
+      rows_[m].patch_uv_bound += share * patches.bound_uv();
       rows_[m].s_per_mp += share * result->cpu_s / megapixels;
       rows_[m].times_memcpy += share * result->cpu_s / result->memcpy_s;
       if (std::isfinite(result->spread)) spreads_[m].push_back(result->spread);
@@ -186,6 +190,12 @@ std::vector<std::string> remarks_of(const Work& work) {
       "picture, of one with the others; spread: half the distance of the quartiles over the median, mean of the "
       "pictures with several rounds; {}",
       rounds, name_of_nl_means, slow_rounds, denoise::denoiser_target()));
+  out.push_back(fmt::format(
+      "patch_uv: distance of the means of {0} x {0} pixels from the truth in u'v', root mean square, over patches "
+      "whose "
+      "light can be known to a fifth; patch_uv_bound: the Cramer-Rao bound of it, which no unbiased method passes that "
+      "knows of a patch's pixels alone",
+      bound_patch_px));
   for (std::size_t i = 0; i < work.lights.size(); ++i) {
     const TunedParameters& tuned = work.tuned[i];
     std::string line = fmt::format(
@@ -332,18 +342,18 @@ void mark_undominated(std::span<DenoiseRow> rows) {
 }
 
 BenchTable denoise_table(std::span<const DenoiseRow> rows) {
-  BenchTable table{
-      {"mean_e", "dark_e", "read_noise_e", "method", "psnr_db", "ciede2000", "chroma_rmse", "box_chroma_rmse",
-       "uv_shift", "saturation_ratio", "s_per_mp", "spread_percent", "times_memcpy", "speed_of_nlm", "undominated"},
-      {}};
+  BenchTable table{{"mean_e", "dark_e", "read_noise_e", "method", "psnr_db", "ciede2000", "chroma_rmse",
+                    "box_chroma_rmse", "uv_shift", "patch_uv", "patch_uv_bound", "saturation_ratio", "s_per_mp",
+                    "spread_percent", "times_memcpy", "speed_of_nlm", "undominated"},
+                   {}};
   table.rows.reserve(rows.size());
   for (const DenoiseRow& row : rows) {
     const PictureError& e = row.error;
     table.rows.push_back({row.light.mean_e, row.light.dark_e, row.light.read_noise_e, row.method, e.psnr_db,
-                          e.ciede2000, e.chroma_rmse, e.box_chroma_rmse, e.uv_shift, e.saturation_ratio,
-                          if_ceiling_none(row, row.s_per_mp), if_ceiling_none(row, 100 * row.spread),
-                          if_ceiling_none(row, row.times_memcpy), if_ceiling_none(row, row.speed_of_nlm),
-                          std::string(row.undominated ? "yes" : "")});
+                          e.ciede2000, e.chroma_rmse, e.box_chroma_rmse, e.uv_shift, row.patch_uv, row.patch_uv_bound,
+                          e.saturation_ratio, if_ceiling_none(row, row.s_per_mp),
+                          if_ceiling_none(row, 100 * row.spread), if_ceiling_none(row, row.times_memcpy),
+                          if_ceiling_none(row, row.speed_of_nlm), std::string(row.undominated ? "yes" : "")});
   }
   return table;
 }

@@ -16,7 +16,9 @@ struct DenoiseRow {
   MethodKind kind = MethodKind::other;
   DenoiseLight light;
   PictureError error;
-  double s_per_mp = 0;  // CPU time of the denoising alone, one thread; not a number if it was not timed
+  double patch_uv = 0;        // distance of patches from the truth in u'v' (PatchBound)
+  double patch_uv_bound = 0;  // the Cramer-Rao bound of it
+  double s_per_mp = 0;        // CPU time of the denoising alone, one thread; not a number if it was not timed
   /// Mean of spread_of() the rounds over the images that have several rounds.
   double spread = std::numeric_limits<double>::quiet_NaN();
   double times_memcpy = 0;  // ratio to the time of copying the mosaic
