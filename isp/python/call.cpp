@@ -55,6 +55,22 @@ cli::ReadRaw reader_of(const std::vector<Input>& inputs) {
   };
 }
 
+void check_frames_in_memory(const std::vector<Input>& inputs) {
+  for (const Input& frame : inputs) {
+    if (!frame.frame) continue;
+    for (const Input& other : inputs) {
+      if (&other == &frame) continue;
+      if (other.frame == frame.frame) {
+        throw Failure({ErrorCode::invalid_argument, "it is the same frame as " + frame.name, other.name});
+      }
+      if (!other.frame && cli::same_name(other.name, frame.name)) {
+        throw Failure({ErrorCode::invalid_argument, "a file has the name that stands for a frame in memory: rename it",
+                       other.name});
+      }
+    }
+  }
+}
+
 void set_call(const std::string& output, bool overwrite, cli::DevelopArgs& args) {
   args.output = output;
   args.force = overwrite;

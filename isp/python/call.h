@@ -44,6 +44,10 @@ struct Input {
 /// have been written by way of a view: those that no frame can have (unusable_sample) are an error.
 cli::ReadRaw reader_of(const std::vector<Input>& inputs);
 
+/// Checks the frames of a merge where names do not suffice (cli::check_frames): one frame in memory may be given twice,
+/// and a file may have the name that stands for a frame in memory. Throws Failure.
+void check_frames_in_memory(const std::vector<Input>& inputs);
+
 /// Prepares arguments of `develop`, `denoise` or `merge` for one call.
 /// @param output  file that is written; empty: none
 void set_call(const std::string& output, bool overwrite, cli::DevelopArgs& args);

@@ -91,7 +91,10 @@ DevelopResult developed(const std::vector<Input>& inputs, const std::string& out
   auto args = parsed(cli::parse_develop, words);
   set_call(output, overwrite, args);
   std::optional<std::vector<std::string>> frames;
-  if (args.merge) frames = names_of(inputs);
+  if (args.merge) {
+    check_frames_in_memory(inputs);
+    frames = names_of(inputs);
+  }
   args.merging.options.developed_after = args.merge;
   isp::DevelopOptions options = value_of(cli::complete_options(args, format_of(args)));
   const cli::RawBatch batch = batch_of(inputs, args, std::move(options));
@@ -154,6 +157,7 @@ struct MergeResult {
 MergeResult merged(const std::vector<Input>& inputs, const std::string& output, bool overwrite, const Words& words) {
   auto args = parsed(cli::parse_merge, words);
   set_call(output, overwrite, args);
+  check_frames_in_memory(inputs);
   const std::vector<cli::Job> jobs = jobs_of(inputs, args);
   const cli::CalibrationFiles files = checked_files(args, jobs);
   const std::vector<std::string> names = names_of(inputs);

@@ -103,6 +103,39 @@ def test_a_list_is_merged_and_developed_as_the_command_does(burst, tmp_path, com
     assert (tmp_path / "python.png").read_bytes() == (tmp_path / "command.png").read_bytes()
 
 
+def test_a_frame_that_is_given_twice_is_not_merged(burst, tmp_path, monkeypatch):
+    """Its noise would be taken for that of independent frames."""
+    raw, other = lowlux.read_raw(burst[0]), lowlux.read_raw(burst[1])
+    monkeypatch.chdir(burst[0].parent)
+    twice = ([burst[0], burst[1], f"./{burst[0].name}"], [raw, other, raw], [burst[0], burst[0]])
+    for frames in twice:
+        for call in (lowlux.merge, lambda frames, output: lowlux.develop(frames, output.with_suffix(".png"))):
+            with pytest.raises(lowlux.ArgumentError, match="given twice|same frame"):
+                call(frames, tmp_path / "a.dng")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_reference_is_one_of_the_frames(burst, tmp_path):
+    raws = [lowlux.read_raw(path) for path in burst]
+    by_path = lowlux.merge(burst, reference=burst[2])
+    assert [frame["reference"] for frame in by_path.plan["frames"]].index(True) == 2
+    for reference in (raws[2], "raws[2]"):
+        by_frame = lowlux.merge(raws, reference=reference)
+        np.testing.assert_array_equal(by_frame.raw.raw_image, by_path.raw.raw_image)
+    for frames in (burst, raws):
+        for reference in ("nonsense.dng", "raws[9]", repr(raws[2])):
+            for call in (lowlux.merge, lowlux.develop):
+                with pytest.raises(lowlux.ArgumentError, match="reference"):
+                    call(frames, reference=reference)
+
+
+def test_a_file_with_the_name_of_a_frame_in_memory_is_not_taken_for_it(burst, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "raws[1]").write_bytes(burst[0].read_bytes())
+    with pytest.raises(lowlux.ArgumentError, match="rename"):
+        lowlux.merge(["raws[1]", lowlux.read_raw(burst[1])])
+
+
 def test_an_array_is_developed_like_its_file(rng, tmp_path):
     mosaic = rng.integers(64, 1200, (64, 96), dtype=np.uint16)
     figures = dict(black=64, white=4095, cfa="GBRG", noise=(1e-3, 1e-5), matrix=np.diag([0.6, 1.0, 0.7]))
@@ -156,8 +189,9 @@ def test_values_written_to_a_view_are_checked(value, rng, tmp_path):
     raw = lowlux.raw_from_array(rng.random((64, 64)), **figures)
     whole = lowlux.develop(raw).image
     raw.raw_image[40, 3] = value
+    other = lowlux.raw_from_array(np.full((64, 64), 0.5), **figures)
     for call in (lambda: lowlux.develop(raw, tmp_path / "a.png"), lambda: lowlux.denoise(raw, tmp_path / "a.dng"),
-                 lambda: lowlux.merge([raw, raw], tmp_path / "a.dng"), lambda: lowlux.write_dng(tmp_path / "a.dng", raw)):
+                 lambda: lowlux.merge([other, raw], tmp_path / "a.dng"), lambda: lowlux.write_dng(tmp_path / "a.dng", raw)):
         with pytest.raises(lowlux.ArgumentError):
             call()
     assert list(tmp_path.iterdir()) == []

@@ -45,18 +45,23 @@ Result<std::vector<std::string>> files_to_merge(const DevelopArgs& args) {
     if (!named) return named;
     std::ranges::move(*named, std::back_inserter(files));
   }
+  return check_frames(files, args.merging).map([&] { return std::move(files); });
+}
+
+Result<void> check_frames(const std::vector<std::string>& files, const MergeArgs& args) {
   if (const std::string wrong = wrong_names({}, files); !wrong.empty()) {
     return fail(ErrorCode::invalid_argument, wrong);
   }
-  if (!args.merging.reference.empty() && !reference_index(args.merging, files)) {
+  if (!args.reference.empty() && !reference_index(args, files)) {
     return fail(ErrorCode::invalid_argument, "the reference is not one of the raw files", "--reference");
   }
-  return files;
+  return {};
 }
 
 Result<MergeReport> merge_files(const RawBatch& batch, const std::vector<std::string>& inputs, const Job& output,
                                 Executor& executor, FileProgress& progress) {
   const MergeArgs& args = batch.args.merging;
+  if (const auto good = check_frames(inputs, args); !good) return tl::make_unexpected(good.error());
   isp::MergeOptions options = args.options;
   options.reference = reference_index(args, inputs);
   if (!options.reference && options.alignment == isp::MergeAlignment::stars) {

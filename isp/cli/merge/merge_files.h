@@ -10,11 +10,16 @@
 namespace lowlux::cli {
 
 /// Returns the raw files that the inputs of the arguments name, folders and patterns included. Errors: those of
-/// raw_files_of; a file that is named twice; a reference that is not among them.
+/// raw_files_of and of check_frames.
 Result<std::vector<std::string>> files_to_merge(const DevelopArgs& args);
 
-/// Merges raw files for a batch of one output. Errors: those of reading, with the file, and of isp::merge_frames.
-/// @param inputs  result of files_to_merge
+/// Checks frames by their names. Error (invalid arguments): one is given twice, and would be averaged with itself; the
+/// reference is not among them.
+Result<void> check_frames(const std::vector<std::string>& files, const MergeArgs& args);
+
+/// Merges raw files for a batch of one output. Errors: those of check_frames, of reading, with the file, and of
+/// isp::merge_frames.
+/// @param inputs  names of files, or what batch.read reads by these names
 /// @param output  where the result goes; it may not exist unless it is overwritten
 Result<MergeReport> merge_files(const RawBatch& batch, const std::vector<std::string>& inputs, const Job& output,
                                 Executor& executor, FileProgress& progress);

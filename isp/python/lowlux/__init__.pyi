@@ -222,7 +222,7 @@ def develop(
     drizzle: Optional[float] = ...,
     pixfrac: Optional[float] = ...,
     mean: Optional[Literal["robust", "plain"]] = ...,
-    reference: Optional[str] = ...,
+    reference: Optional[_Raw] = ...,
     false_alarm: Optional[float] = ...,
     maps: bool = ...,
 ) -> Developed: ...
@@ -259,7 +259,7 @@ def merge(
     drizzle: Optional[float] = ...,
     pixfrac: Optional[float] = ...,
     mean: Optional[Literal["robust", "plain"]] = ...,
-    reference: Optional[str] = ...,
+    reference: Optional[_Raw] = ...,
     false_alarm: Optional[float] = ...,
     black: Union[str, float, Sequence[float], _Path, None] = ...,
     profile: Optional[_Path] = ...,

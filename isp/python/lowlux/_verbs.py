@@ -71,6 +71,11 @@ def _call(verb, inputs, output, overwrite, words):
     return verb(inputs, path, overwrite, [*words, f"--output={path or 'none'}", "--", *(name for name, _ in inputs)])
 
 
+def _reference(reference, inputs):
+    """Return the name of a reference that is a RawImage among the inputs; anything else as it is."""
+    return next((name for name, frame in inputs if frame is not None and frame is reference), reference)
+
+
 def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, exposure=None, wb=None, tone=None,
             brightness=None, contrast=None, saturation=None, space=None, demosaic=None, half=False,
             highlights=None, sharpen=None, crop=None, max_size=None, baseline_exposure=None,
@@ -101,8 +106,8 @@ def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, expos
     """
     options = {name: value for name, value in locals().items() if name not in ("raw", "output", "overwrite")}
     several = isinstance(raw, (list, tuple))
-    words = words_of({**options, "merge": several}, _FILES)
     inputs = inputs_of(raw) if several else [input_of(raw)]
+    words = words_of({**options, "merge": several, "reference": _reference(reference, inputs)}, _FILES)
     image, plan, found = _call(_lowlux.develop, inputs, output, overwrite, words)
     return Developed(image, json.loads(plan), found.get("noise"), found.get("confidence"), found.get("seeing"))
 
@@ -133,13 +138,14 @@ def merge(raws, output=None, *, overwrite=False, align=None, foreground=None, dr
     raws: two or more paths or RawImages, which are not changed.
     output: DNG to write; None writes nothing.
     align: "auto", "none", "cells", "subpixel" or "stars". mean: "robust" or "plain".
-    reference: path among raws that the others are brought to; the name of the RawImage raws[2] is "raws[2]".
+    reference: the path or the RawImage among raws that the others are brought to.
     All other options are described by `lowlux merge --help`.
-    Returns Merged. Errors: those of develop; frames that do not belong together.
+    Returns Merged. Errors: those of develop; frames that do not belong together; a frame that is given twice.
     """
     options = {name: value for name, value in locals().items() if name not in ("raws", "output", "overwrite")}
     _check_dng(output)
     inputs = inputs_of(raws)
+    options["reference"] = _reference(reference, inputs)
     raw, plan, warnings = _call(_lowlux.merge, inputs, output, overwrite, words_of(options, _FILES))
     return Merged(raw, json.loads(plan), warnings)
 
