@@ -163,6 +163,23 @@ def test_wrong_options_have_the_message_of_the_command(options, night, tmp_path,
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("value", [True, False, np.True_, np.False_])
+@pytest.mark.parametrize("name", ["denoise", "repair", "line_noise", "sharpen", "dark_estimate", "baseline_exposure", "look",
+                                  "effects", "exposure", "max_size", "dark_frame"])
+def test_a_truth_value_is_for_flags_only(name, value, night, tmp_path):
+    with pytest.raises(lowlux.ArgumentError, match=f'{name}: .*"off"'):
+        lowlux.develop(night, tmp_path / "a.png", **{name: value})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_flags_are_true_or_false(night):
+    assert lowlux.develop(night, half=np.True_).image.shape == (80, 120, 3)
+    assert lowlux.develop(night, half=np.False_).image.shape == (160, 240, 3)
+    for value in ("off", 0, 1, [True]):
+        with pytest.raises(lowlux.ArgumentError, match="half: .*True nor False"):
+            lowlux.develop(night, half=value)
+
+
 def test_bad_inputs_and_outputs(night, tmp_path, rng):
     with pytest.raises(lowlux.ArgumentError, match="raw_from_array"):
         lowlux.develop(np.zeros((24, 24), np.uint16))

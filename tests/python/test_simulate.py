@@ -139,6 +139,27 @@ def test_wrong_simulations_have_the_message_of_the_command(options, tmp_path, co
     assert list(tmp_path.iterdir()) == []
 
 
+def test_truth_values_are_for_flags_only(burst, tmp_path):
+    with pytest.raises(lowlux.ArgumentError, match="effects"):
+        lowlux.simulate("chart", effects=False)
+    with pytest.raises(lowlux.ArgumentError, match="system_gain"):
+        lowlux.calibrate("black", burst, tmp_path / "a.json", system_gain=True)
+    assert lowlux.simulate("flat", size=(32, 32), no_truth=True).truth is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_every_flag_of_the_command_is_one_of_python(command):
+    """In the help, an option without a value is followed by spaces."""
+    from lowlux import _words
+    flags = set()
+    for verb in ("develop", "denoise", "merge", "simulate", "bench", *(f"calibrate {kind}" for kind in
+                                                                      ("black", "noise", "colour", "quoted"))):
+        page = command(*verb.split(), "--help-all")
+        flags |= set(re.findall(r"^  (?:-\w,)?--([a-z-]+)(?:  |$)", page, re.MULTILINE))
+    of_the_command = NOT_ARGUMENTS | {"skip-existing", "sync", "calibrate-cost"}
+    assert {flag.replace("-", "_") for flag in flags - of_the_command} == _words._FLAGS
+
+
 def test_unknown_sensors_and_kinds():
     with pytest.raises(lowlux.Error, match="no_such"):
         lowlux.calibrate("quoted", "no_such")

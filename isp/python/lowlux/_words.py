@@ -1,8 +1,14 @@
 """Arguments of Python as those of the command."""
 import os
 
+import numpy as np
+
 from . import errors
 from ._lowlux import RawImage
+
+# Options of the verbs that take no value.
+_FLAGS = frozenset(["even_light", "half", "maps", "masked", "merge", "no_truth", "per_photon", "preserve_white", "quick",
+                    "seeing_map", "steady_light"])
 
 
 def _word(flag, value):
@@ -17,18 +23,27 @@ def _text(value):
     return repr(float(value)) if isinstance(value, float) else str(value)
 
 
+def _truth(name, value):
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    raise errors.ArgumentError(f"{name}: {value!r} is neither True nor False", name)
+
+
 def words_of(options, files=()):
-    """Return the command's options: True is a flag, None and False are left out, lists are joined by commas.
+    """Return the command's options: flags that are True; values that are not None, lists joined by commas.
 
     files: names of options that name files, once for each of a list.
     """
     words = []
     for name, value in options.items():
         flag = "--" + name.replace("_", "-")
-        if value is None or value is False:
+        if value is None:
             continue
-        if value is True:
-            words.append(flag)
+        if name in _FLAGS:
+            words += [flag] if _truth(name, value) else []
+        elif isinstance(value, (bool, np.bool_)):
+            raise errors.ArgumentError(
+                f'{name}: it takes a value, not {value}: None is the default, and "off" turns off what can be', name)
         elif name in files:
             words += [_word(flag, file) for file in (value if isinstance(value, (list, tuple)) else [value])]
         else:
