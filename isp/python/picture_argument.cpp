@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -10,6 +11,7 @@
 
 #include "capture/file/picture_colour.h"
 #include "capture/file/picture_light.h"
+#include "isp/codec/picture_file.h"
 #include "isp/model/colour/colorimetry.h"
 #include "isp/python/failure.h"
 
@@ -22,6 +24,11 @@ PictureArgument picture_argument(const py::object& image, const std::string& nam
   const auto array = image.cast<py::array>();
   if (array.ndim() != 3 || array.shape(2) != 3 || array.size() == 0) {
     throw Failure({ErrorCode::invalid_argument, "an image is an array of (height, width, 3)", name});
+  }
+  const isp::DecodeLimits limits;
+  if (!isp::check_size(array.shape(1), array.shape(0), limits)) {
+    throw Failure(
+        {ErrorCode::too_large, "an image has at most " + std::to_string(limits.max_pixels) + " pixels", name});
   }
   const auto height = static_cast<int>(array.shape(0)), width = static_cast<int>(array.shape(1));
   const auto codes = [&](auto sample) {

@@ -18,7 +18,9 @@ struct PictureArgument {
 };
 
 /// Returns the path, or a copy of an array of (height, width, 3): bytes and 16-bit codes of sRGB, or floats of linear
-/// sRGB. Throws Failure for other arrays. @param name  what errors call an array
+/// sRGB. Throws Failure for other arrays, and for more pixels than a file may have (isp::DecodeLimits), before any
+/// copy.
+/// @param name  what errors call an array
 PictureArgument picture_argument(const pybind11::object& image, const std::string& name);
 
 /// Returns an image as light. Throws Failure as capture::read_picture fails.

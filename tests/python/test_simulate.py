@@ -68,6 +68,18 @@ def test_comparing_files_and_arrays(night, tmp_path, command):
         lowlux.compare(a, b.astype(np.int64))
 
 
+@pytest.mark.parametrize("shape", [(2**32 + 2, 1, 3), (1, 2**32 + 2, 3), (1, 1_500_000_000, 3), (2**38, 2**20, 3),
+                                   (20_000, 20_000, 3)])
+@pytest.mark.parametrize("kind", [np.uint8, np.float32])
+def test_arrays_of_more_pixels_than_a_file_may_have_are_refused(shape, kind):
+    """Strides of 0: the arrays take no memory, a copy would."""
+    huge = np.broadcast_to(kind(0), shape)
+    small = np.zeros((2, 1, 3), kind)
+    for images in ((huge, small), (small, huge)):
+        with pytest.raises(lowlux.TooLargeError, match="268435456 pixels"):
+            lowlux.compare(*images)
+
+
 def test_calibrating_gives_the_profile_of_the_command(tmp_path, command):
     darks, flats = [], []
     figures = ["--sensor", "ELD_NikonD850", "--size", "128x96", "--no-truth", "--quiet"]
