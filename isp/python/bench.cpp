@@ -1,6 +1,9 @@
 #include "isp/python/bench.h"
 
+#include <exception>
 #include <memory>
+#include <new>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -8,12 +11,14 @@
 
 #include <pybind11/stl.h>
 
+#include "isp/base/float_samples.h"
 #include "isp/bench/bench_stages.h"
 #include "isp/cli/bench/bench_args.h"
 #include "isp/cli/bench/bench_methods.h"
 #include "isp/cli/bench/bench_report.h"
 #include "isp/cli/bench/bench_work.h"
 #include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/python/call.h"
 #include "isp/python/frame_copy.h"
@@ -27,26 +32,42 @@ namespace py = pybind11;
 /// A method as Python passes it: its name, --method's text ("" for a function), the function (None for a command).
 using Entry = std::tuple<std::string, std::string, py::object>;
 
-/// Returns what a function made, copied.
+/// Returns what a function made, copied. Throws Failure for what is not an image, and for samples that no frame can
+/// have.
 isp::MethodImage image_of(const py::object& result, Executor& executor) {
-  if (py::isinstance<RawImage>(result)) return clone(result.cast<RawImagePtr>()->frame);
+  if (py::isinstance<RawImage>(result)) {
+    RawFrame frame = clone(result.cast<RawImagePtr>()->frame);
+    if (const auto wrong = unusable_sample(frame.raw)) {
+      throw Failure({ErrorCode::malformed, "its result: " + *wrong, {}});
+    }
+    return frame;
+  }
   if (!py::isinstance<py::array>(result)) {
     throw Failure({ErrorCode::malformed, "its result is neither a RawImage nor an array", {}});
   }
   return std::move(scene_of(picture_argument(result, "its result"), executor).xyz);
 }
 
-/// Returns the exception of a function in one line, without its traceback.
-std::string line_of(const py::error_already_set& error) {
-  const auto type = py::str(error.type().attr("__name__")).cast<std::string>();
-  std::string text = type + ": " + py::str(error.value()).cast<std::string>();
-  for (char& c : text) {
-    if (c == '\n' || c == '\r') c = ' ';
-  }
-  return text;
+/// Returns str(object), with what UTF-8 cannot hold as escapes; nullopt if there is no such text.
+std::optional<std::string> text_of(const py::handle& object) {
+  const auto text = py::reinterpret_steal<py::object>(PyObject_Str(object.ptr()));
+  const auto bytes =
+      text ? py::reinterpret_steal<py::object>(PyUnicode_AsEncodedString(text.ptr(), "utf-8", "backslashreplace"))
+           : py::object();
+  if (bytes) return bytes.cast<std::string>();
+  PyErr_Clear();  // of an exception's own __str__
+  return std::nullopt;
 }
 
-/// Calls a function with a copy of the frame. An interruption by the user is passed on.
+/// Returns the exception of a function in one line, without its traceback.
+std::string line_of(const py::error_already_set& error) {
+  std::string line = text_of(error.type().attr("__name__")).value_or("an exception");
+  if (const auto text = text_of(error.value())) line += ": " + *text;
+  return cli::one_line(line);
+}
+
+/// Calls a function with a copy of the frame. Whatever it does wrong is an Error; SystemExit, KeyboardInterrupt and
+/// others that are no Exception of Python are passed on.
 Result<isp::MethodImage> call(const py::handle& function, const RawFrame& noisy) {
   const py::gil_scoped_acquire held;
   InlineExecutor executor;
@@ -55,8 +76,12 @@ Result<isp::MethodImage> call(const py::handle& function, const RawFrame& noisy)
   } catch (const Failure& failure) {
     return tl::make_unexpected(failure.error());
   } catch (const py::error_already_set& error) {
-    if (error.matches(PyExc_KeyboardInterrupt)) throw;
+    if (!error.matches(PyExc_Exception)) throw;
     return fail(ErrorCode::malformed, "it raised " + line_of(error));
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::too_large, "not enough memory");
+  } catch (const std::exception& failure) {
+    return fail(ErrorCode::malformed, cli::one_line(failure.what()));
   }
 }
 
@@ -64,11 +89,11 @@ Result<isp::MethodImage> call(const py::handle& function, const RawFrame& noisy)
 cli::RequestedMethods methods_of(const std::vector<Entry>& entries) {
   cli::RequestedMethods out;
   for (const auto& [name, text, function] : entries) {
+    if (!isp::is_method_name(name)) {
+      throw Failure(
+          {ErrorCode::invalid_argument, "'" + name + "' is not a name of letters, digits and ._-", "methods"});
+    }
     if (text.empty()) {
-      if (!isp::is_method_name(name)) {
-        throw Failure(
-            {ErrorCode::invalid_argument, "'" + name + "' is not a name of letters, digits and ._-", "methods"});
-      }
       const py::handle borrowed = function;
       out.methods.push_back(
           {.name = name, .call = [borrowed](const RawFrame& noisy) { return call(borrowed, noisy); }});

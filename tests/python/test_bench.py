@@ -33,8 +33,51 @@ def test_functions_and_commands_are_scored_next_to_our_levels(tmp_path):
     assert json.loads((tmp_path / "board" / "methods.json").read_text())["rows"] == board.rows
 
 
+def test_samples_that_no_frame_can_have_are_failures():
+    def spoiled(value):
+        def run(raw):
+            floats = lowlux.raw_from_array(raw.raw_image.astype(np.float32), black=raw.black_dn, white=raw.white_level)
+            floats.raw_image[9, 7] = value
+            return floats
+
+        return run
+
+    methods = {"nan": spoiled(np.nan), "inf": spoiled(-np.inf), "floats": spoiled(1000),
+               "image": lambda raw: np.full((*raw.raw_image.shape, 3), np.nan, np.float32)}
+    board = lowlux.bench(methods, levels=(), quick=True, pictures_folder=PICTURES)
+    assert {row["method"] for row in board.rows} == {"noise-free", "noisy", "floats"}
+    assert {line.split(":")[1].split()[1] for line in board.failures} == {"nan", "inf", "image"}
+
+
+class Mute(Exception):
+    def __str__(self):
+        raise ValueError("no text")
+
+
+def test_any_failure_of_a_function_is_its_own():
+    """The texts of exceptions may be anything; what asks Python to end is passed on."""
+    def raising(error):
+        def run(raw):
+            raise error
+
+        return run
+
+    methods = {"surrogates": raising(ValueError("\udc80 here")), "mute": raising(Mute()), "memory": raising(MemoryError()),
+               "generator": raising(StopIteration(1)), "objects": lambda raw: np.full((*raw.raw_image.shape, 3), None),
+               "class": lambda raw: lowlux.RawImage}
+    board = lowlux.bench(methods, levels=(), quick=True, pictures_folder=PICTURES)
+    assert {row["method"] for row in board.rows} == {"noise-free", "noisy"}
+    assert {line.split(":")[1].split()[1] for line in board.failures} == set(methods)
+    assert any(r"it raised ValueError: \udc80 here" in line for line in board.failures)
+    assert any("it raised Mute" in line and "no text" not in line for line in board.failures)
+    for error in (SystemExit(3), KeyboardInterrupt(), GeneratorExit()):
+        with pytest.raises(type(error)):
+            lowlux.bench({"ends": raising(error)}, levels=(), quick=True, pictures_folder=PICTURES)
+
+
 def test_methods_that_are_none_are_refused(tmp_path):
-    for methods in ({"x": 3}, {"x": "cp {in}"}, {"a b": lambda raw: raw}, {"nosuch": None}):
+    for methods in ({"x": 3}, {"x": "cp {in}"}, {"a b": lambda raw: raw}, {"nosuch": None},
+                    {"a=FOO": "cp {in} {out}"}, {"a=cp {in} {out}": None}, {"": lambda raw: raw}):
         with pytest.raises(lowlux.ArgumentError):
             lowlux.bench(methods, quick=True, pictures_folder=PICTURES)
     with pytest.raises(lowlux.NotFoundError):
