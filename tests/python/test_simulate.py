@@ -124,6 +124,18 @@ def test_profiles(tmp_path, command, night):
         lowlux.Profile(tmp_path / "none.json")
 
 
+def test_a_profile_with_changed_data_is_saved_before_it_is_used(night, tmp_path):
+    profile = lowlux.calibrate("quoted", "thesis", tmp_path / "a.json")
+    before = lowlux.develop(night, profile=profile).image
+    profile.gain()["sensor"]["read_noise_e"]["value"] *= 10
+    with pytest.raises(lowlux.ArgumentError, match="save"):
+        lowlux.develop(night, profile=profile)
+    profile.save(tmp_path / "b.json")
+    after = lowlux.develop(night, profile=profile).image
+    np.testing.assert_array_equal(after, lowlux.develop(night, profile=tmp_path / "b.json").image)
+    assert (after != before).any()
+
+
 def test_colour_of_spectral_sensitivities(tmp_path, command):
     listed = command("simulate", "--list")
     camera = re.search(r"cameras.*\n(?:\(.*\n)?\s+(.+?)(?:  .*)?\n", listed).group(1).split(",")[0].strip()

@@ -11,7 +11,8 @@ class Profile:
     """What has been measured of a camera: black level, noise, dark current, colour.
 
     Profile(path) reads the file that `lowlux calibrate` writes, Profile(dict) checks its contents. `data` is that
-    dict: figures have units in their names. str(profile) is the text of the file.
+    dict: figures have units in their names. str(profile) is the text of the file. As an option, profile=, a profile is
+    its file: after a change of `data`, save() it first.
     Errors: those of reading; MalformedError or ArgumentError, with the key, for contents that are no profile.
     """
 
@@ -31,7 +32,7 @@ class Profile:
         return self._text
 
     def __fspath__(self):
-        if self.path is None:
+        if self.path is None or self.data != json.loads(self._text):
             raise ArgumentError("profile: save() it first: options name the file of a profile", "profile")
         return self.path
 
