@@ -247,12 +247,31 @@ Result<void> AtomicFile::publish() {
   return {};
 }
 
-Result<void> AtomicFile::commit() {
-  return close_file().and_then([&] { return publish(); }).and_then([&]() -> Result<void> {
-    const int cause = sync_ == Sync::yes ? sync_directory(directory_of(target_)) : 0;
-    if (cause != 0) return cannot_write(path_, cause);
-    return {};
-  });
+/// Removes the published file, if it did not replace another one.
+void AtomicFile::withdraw() const {
+  if (overwrite_ == Overwrite::no) unlink(target_.c_str());
+}
+
+Result<void> AtomicFile::sync_name() const {
+  const int cause = sync_ == Sync::yes ? sync_directory(directory_of(target_)) : 0;
+  if (cause != 0) return cannot_write(path_, cause);
+  return {};
+}
+
+Result<void> AtomicFile::commit_all(std::span<AtomicFile> files) {
+  for (AtomicFile& file : files) {
+    if (auto closed = file.close_file(); !closed) return closed;
+  }
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    auto published = files[i].publish();
+    if (published) continue;
+    for (const AtomicFile& earlier : files.first(i)) earlier.withdraw();
+    return published;
+  }
+  for (const AtomicFile& file : files) {
+    if (auto synced = file.sync_name(); !synced) return synced;
+  }
+  return {};
 }
 
 namespace {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "isp/base/result.h"
@@ -40,7 +41,11 @@ class AtomicFile {
 
   /// Flushes and closes the file, then gives it its name in one step. Without Overwrite::yes a file that has appeared
   /// under that name since create() is kept, and that is an error. Call it once.
-  Result<void> commit();
+  Result<void> commit() { return commit_all({this, 1}); }
+
+  /// Commits files in their order, all or none: all are on the file system before the first gets its name. If one
+  /// cannot get its name, the earlier ones are removed, except for those that were allowed to replace a file.
+  static Result<void> commit_all(std::span<AtomicFile> files);
 
  private:
   struct Close {
@@ -49,6 +54,8 @@ class AtomicFile {
   AtomicFile(std::string path, std::string target, Overwrite overwrite, Sync sync);
   Result<void> close_file();
   Result<void> publish();
+  void withdraw() const;
+  Result<void> sync_name() const;
 
   std::string path_;       // as the caller named it
   std::string target_;     // after resolving symbolic links

@@ -77,6 +77,37 @@ TEST(AtomicFile, AFileThatAppearsMeanwhileIsKept) {
 
 // A process that is killed lets go of its lock, and the next one that writes there removes what it left. Files of
 // processes that live, of other hosts and of other programs stay.
+/// Returns files with words in them, not committed.
+std::vector<AtomicFile> prepared(const ScratchDirectory& scratch, Overwrite overwrite) {
+  std::vector<AtomicFile> out;
+  for (const char* name : {"a.txt", "b.txt", "c.txt"}) {
+    out.push_back(AtomicFile::create(scratch.file(name), overwrite).value());
+    std::fputs(name, out.back().file());
+  }
+  return out;
+}
+
+TEST(AtomicFile, SeveralAppearTogetherOrNotAtAll) {
+  for (const Overwrite overwrite : {Overwrite::no, Overwrite::yes}) {
+    const ScratchDirectory scratch;
+    auto files = prepared(scratch, overwrite);
+    ASSERT_TRUE(AtomicFile::commit_all(files));
+    EXPECT_EQ(scratch.names(), (std::vector<std::string>{"a.txt", "b.txt", "c.txt"}));
+    EXPECT_EQ(scratch.read("c.txt"), "c.txt");
+  }
+  const ScratchDirectory scratch;
+  {
+    auto files = prepared(scratch, Overwrite::no);
+    scratch.write("c.txt", "another's");
+    const auto refused = AtomicFile::commit_all(files);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::exists);
+    EXPECT_EQ(refused.error().where, scratch.file("c.txt"));
+  }
+  EXPECT_EQ(scratch.names(), std::vector<std::string>{"c.txt"});
+  EXPECT_EQ(scratch.read("c.txt"), "another's");
+}
+
 TEST(AtomicFile, RemnantsOfKilledProcessesAreRemoved) {
   const ScratchDirectory scratch;
   std::array<int, 2> ready{};

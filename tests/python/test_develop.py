@@ -2,6 +2,8 @@
 import inspect
 import json
 import re
+import subprocess
+import sys
 import threading
 import time
 
@@ -214,6 +216,26 @@ def test_values_written_to_a_view_are_checked(value, rng, tmp_path):
     assert list(tmp_path.iterdir()) == []
     raw.raw_image[40, 3] = 0.5
     assert lowlux.develop(raw).image.shape == whole.shape
+
+
+LIMITED = """
+import resource, sys
+import lowlux
+raw = lowlux.read_raw(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))  # between a map, of 38 kB, and the image
+try:
+    getattr(lowlux, sys.argv[1])(raw, sys.argv[3], maps=True)
+except lowlux.UnwritableError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("verb, name", [("develop", "a.tif"), ("develop", "a.pfm"), ("denoise", "a.dng")])
+def test_an_output_that_cannot_be_written_leaves_no_maps(verb, name, night, tmp_path):
+    done = subprocess.run([sys.executable, "-c", LIMITED, verb, night, tmp_path / name], capture_output=True, text=True,
+                          check=True)
+    assert name in done.stdout and done.stdout.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_threads_run_at_once(night):

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <string>
 #include <thread>
 #include <utility>
@@ -40,23 +41,28 @@ Result<void> write_files(const CalibrateColourArgs& args, const ColourOutcome& o
   const auto profile = colour_profile(args, outcome);
   if (!profile) return tl::make_unexpected(profile.error());
   const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
+  std::vector<isp::AtomicFile> files;
   if (!args.overlay.empty() && outcome.chart) {
     isp::WriteOptions write;
     write.overwrite = overwrite;
     write.software = "lowlux " + version_number();
-    auto written =
-        isp::write_picture(colour_overlay(*outcome.chart), OutputSpace::srgb, {}, args.overlay, write, executor);
-    if (!written) return written;
+    auto file =
+        isp::prepare_picture(colour_overlay(*outcome.chart), OutputSpace::srgb, {}, args.overlay, write, executor);
+    if (!file) return tl::make_unexpected(file.error());
+    files.push_back(*std::move(file));
   }
   const auto text = calib::profile_text(*profile);
   if (!text) return fail(text.error().code, text.error().message, args.output);
-  std::vector<isp::TextFile> files{{args.output, *text}};
+  std::vector<isp::TextFile> texts{{args.output, *text}};
   std::string report;
   if (!args.report.empty()) {
     report = isp::html_of(colour_report(outcome, args.output));
-    files.push_back({args.report, report});
+    texts.push_back({args.report, report});
   }
-  return isp::write_texts(files, overwrite);
+  auto pages = isp::prepare_texts(texts, overwrite);
+  if (!pages) return tl::make_unexpected(pages.error());
+  std::ranges::move(*pages, std::back_inserter(files));
+  return isp::AtomicFile::commit_all(files);
 }
 
 }  // namespace

@@ -1,8 +1,10 @@
 #include "isp/cli/calibrate/calibration.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -118,16 +120,18 @@ Result<void> write_calibration(const CalibrateArgs& args, const Calibration& fou
   for (const PixelMap& map : found.maps) {
     if (auto free = check_place(map.path, args.force); !free) return free;
   }
-  for (const PixelMap& map : found.maps) {
-    if (auto written = write_map(map, overwrite); !written) return written;
-  }
-  std::vector<isp::TextFile> files{{args.output, *text}};
+  auto files = prepare_maps(found.maps, overwrite);
+  if (!files) return tl::make_unexpected(files.error());
+  std::vector<isp::TextFile> texts{{args.output, *text}};
   std::string report;
   if (!args.report.empty()) {
     report = isp::html_of(whole_report(args, found));
-    files.push_back({args.report, report});
+    texts.push_back({args.report, report});
   }
-  return isp::write_texts(files, overwrite);
+  auto pages = isp::prepare_texts(texts, overwrite);
+  if (!pages) return tl::make_unexpected(pages.error());
+  std::ranges::move(*pages, std::back_inserter(*files));
+  return isp::AtomicFile::commit_all(*files);
 }
 
 int finish(const CalibrateArgs& args, const Calibration& found) {

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "isp/cli/merge/merge_files.h"
+#include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/explain_text.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/outputs.h"
@@ -66,6 +68,19 @@ void add_baseline_exposure(const DevelopArgs& args, ReadyFrame& ready) {
   ready.options.exposure_ev = std::clamp(ev, -max_exposure_ev, max_exposure_ev);
 }
 
+/// Writes the output of a job and its maps, all or none.
+/// @param prepare  writes the output to a file without its name
+template <class Prepare>
+Result<void> write_with_maps(const RawBatch& batch, const Job& job, const std::vector<PixelMap>& maps,
+                             const Prepare& prepare) {
+  auto files = prepare_maps(maps, job.overwrite, batch.sync);
+  if (!files) return tl::make_unexpected(files.error());
+  Result<isp::AtomicFile> output = prepare();
+  if (!output) return tl::make_unexpected(output.error());
+  files->push_back(*std::move(output));
+  return isp::AtomicFile::commit_all(*files);
+}
+
 std::string description_of(const isp::NoiseReduction& how, const std::optional<NoiseOrigin>& origin) {
   return fmt::format("noise reduced by lowlux, level {}, noise model: {}", denoise::name_of(*how.level),
                      origin ? title_of(origin->source) : name_of(how.source));
@@ -114,17 +129,18 @@ Result<void> write_developed(const RawBatch& batch, const Job& job, const Develo
   write.overwrite = job.overwrite;
   write.sync = batch.sync;
   write.source_tags = developed.source_tags;
-  if (Result<void> maps = write_maps(batch, job, developed.maps); !maps) return maps;
+  const Picture& picture = developed.picture;
   const OutputSpace space = batch.options.space;
-  const auto written = is_standard_stream(job.output)
-                           ? format_of_output(batch.args, job.output).and_then([&](isp::FileFormat format) {
-                               return isp::write_picture(developed.picture, space, developed.info, format,
-                                                         STDOUT_FILENO, write, executor);
-                             })
-                           : isp::write_picture(developed.picture, space, developed.info, job.output, write, executor);
+  const auto written =
+      is_standard_stream(job.output)
+          ? format_of_output(batch.args, job.output).and_then([&](isp::FileFormat format) {
+              return isp::write_picture(picture, space, developed.info, format, STDOUT_FILENO, write, executor);
+            })
+          : write_with_maps(batch, job, developed.maps, [&] {
+              return isp::prepare_picture(picture, space, developed.info, job.output, write, executor);
+            });
   clock.lap("encode and write");
-  if (!written) return fail(written.error().code, written.error().message, job.output);
-  return {};
+  return written.map_error([&](Error error) { return with_file(std::move(error), job.output); });
 }
 
 isp::DevelopOptions without_rendering(isp::DevelopOptions o) {
@@ -157,16 +173,16 @@ Result<DenoisedFrame> denoise_frame(const RawBatch& batch, const Job& job, Execu
 
 Result<void> write_denoised(const RawBatch& batch, const Job& job, const DenoisedFrame& denoised, DevelopOutcome& out) {
   isp::StageClock clock(out.times);
-  if (Result<void> maps = write_maps(batch, job, denoised.maps); !maps) return maps;
   const isp::DngWriteOptions options{.overwrite = job.overwrite,
                                      .software = "lowlux " + version_number(),
                                      .description = denoised.description,
                                      .sync = batch.sync};
-  const Result<void> written = is_standard_stream(job.output) ? isp::write_dng(denoised.frame, STDOUT_FILENO, options)
-                                                              : isp::write_dng(denoised.frame, job.output, options);
+  const auto written = is_standard_stream(job.output) ? isp::write_dng(denoised.frame, STDOUT_FILENO, options)
+                                                      : write_with_maps(batch, job, denoised.maps, [&] {
+                                                          return isp::prepare_dng(denoised.frame, job.output, options);
+                                                        });
   clock.lap("write");
-  if (!written) return fail(written.error().code, written.error().message, job.output);
-  return {};
+  return written.map_error([&](Error error) { return with_file(std::move(error), job.output); });
 }
 
 }  // namespace lowlux::cli

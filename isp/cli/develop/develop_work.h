@@ -33,7 +33,8 @@ Result<DevelopedFrame> develop_frame(const RawBatch& batch, const Job& job,
                                      const std::optional<std::vector<std::string>>& frames, Executor& executor,
                                      FileProgress& progress, DevelopOutcome& out);
 
-/// Writes maps and image of a job. The output is written last: if it exists, --skip-existing takes all as done.
+/// Writes maps and image of a job, all or none. The output gets its name last: if it exists, --skip-existing takes all
+/// as done.
 Result<void> write_developed(const RawBatch& batch, const Job& job, const DevelopedFrame& developed, Executor& executor,
                              DevelopOutcome& out);
 
@@ -52,7 +53,7 @@ isp::DevelopOptions without_rendering(isp::DevelopOptions options);
 Result<DenoisedFrame> denoise_frame(const RawBatch& batch, const Job& job, Executor& executor, FileProgress& progress,
                                     DevelopOutcome& out);
 
-/// Writes maps and raw file of a job.
+/// Writes maps and raw file of a job, all or none, as write_developed does.
 Result<void> write_denoised(const RawBatch& batch, const Job& job, const DenoisedFrame& denoised, DevelopOutcome& out);
 
 }  // namespace lowlux::cli

@@ -182,13 +182,6 @@ Result<void> set_cost(const RawBatch& batch, isp::DevelopOptions& options, Execu
   return {};
 }
 
-Result<void> write_maps(const RawBatch& batch, const Job& job, const std::vector<PixelMap>& maps) {
-  for (const PixelMap& map : maps) {
-    if (Result<void> written = write_map(map, job.overwrite, batch.sync); !written) return written;
-  }
-  return {};
-}
-
 namespace {
 
 /// Processes all files. Of a finished file only counts and the text to be printed at the end are kept: memory does not

@@ -86,9 +86,6 @@ isp::DevelopOptions options_of_goal(const RawBatch& batch, const RawFrame& frame
 /// Sets the cost of the machine as it is now, where there is a budget. Errors: those of MachineSpeed::now.
 Result<void> set_cost(const RawBatch& batch, isp::DevelopOptions& options, Executor& executor, isp::StageClock& clock);
 
-/// Writes maps of an image.
-Result<void> write_maps(const RawBatch& batch, const Job& job, const std::vector<PixelMap>& maps);
-
 /// Advances the progress bar for one file: roughly by the fraction of its time that has passed, to 1 in the end.
 class FileProgress {
  public:

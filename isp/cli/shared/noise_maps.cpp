@@ -54,15 +54,18 @@ PixelMap seeing_map_file(Plane<float> map, const RawDn& raw, const std::string& 
   return {seeing_map_name(picture), std::move(upright.plane[0])};
 }
 
-Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite, isp::Sync sync) {
-  auto file = isp::AtomicFile::create(map.path, overwrite, sync);
-  if (!file) return tl::make_unexpected(with_file(file.error(), map.path));
-  if (const auto written = isp::encode_pfm(map.value.view(), file->file()); !written) {
-    return tl::make_unexpected(with_file(written.error(), map.path));
+Result<std::vector<isp::AtomicFile>> prepare_maps(const std::vector<PixelMap>& maps, isp::Overwrite overwrite,
+                                                  isp::Sync sync) {
+  std::vector<isp::AtomicFile> files;
+  for (const PixelMap& map : maps) {
+    auto file = isp::AtomicFile::create(map.path, overwrite, sync);
+    if (!file) return tl::make_unexpected(with_file(file.error(), map.path));
+    if (const auto written = isp::encode_pfm(map.value.view(), file->file()); !written) {
+      return tl::make_unexpected(with_file(written.error(), map.path));
+    }
+    files.push_back(*std::move(file));
   }
-  const auto committed = file->commit();
-  if (!committed) return tl::make_unexpected(with_file(committed.error(), map.path));
-  return {};
+  return files;
 }
 
 }  // namespace lowlux::cli

@@ -18,8 +18,9 @@ struct PixelMap {
   Plane<float> value;
 };
 
-/// Writes a map as grey PFM, completely or not at all. Errors name the file.
-Result<void> write_map(const PixelMap& map, isp::Overwrite overwrite, isp::Sync sync = isp::Sync::no);
+/// Writes maps as grey PFM, each to a file that gets its name by AtomicFile::commit_all. Errors name the file.
+Result<std::vector<isp::AtomicFile>> prepare_maps(const std::vector<PixelMap>& maps, isp::Overwrite overwrite,
+                                                  isp::Sync sync = isp::Sync::no);
 
 /// Returns the files of an image's maps: OUT.noise.pfm and OUT.confidence.pfm for OUT.png.
 std::vector<std::string> noise_map_names(const std::string& picture);

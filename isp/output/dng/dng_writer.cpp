@@ -169,15 +169,18 @@ Result<void> check_dng_size(std::int64_t samples, std::size_t sample_bytes) {
                                         std::to_string(samples) + ": crop it");
 }
 
-Result<void> write_dng(const RawFrame& frame, const std::string& path, const DngWriteOptions& options) try {
+Result<void> write_dng(const RawFrame& frame, const std::string& path, const DngWriteOptions& options) {
+  return prepare_dng(frame, path, options).and_then([](AtomicFile out) { return out.commit(); });
+}
+
+Result<AtomicFile> prepare_dng(const RawFrame& frame, const std::string& path, const DngWriteOptions& options) try {
   const auto located = [&](Error error) {
     if (error.where.empty()) error = Error{error.code, "cannot write " + path + ": " + error.message, path};
     return error;
   };
   return check_all(frame, options)
       .and_then([&] { return AtomicFile::create(path, options.overwrite, options.sync); })
-      .and_then(
-          [&](AtomicFile out) { return encode(frame, options, out.file()).and_then([&] { return out.commit(); }); })
+      .and_then([&](AtomicFile out) { return encode(frame, options, out.file()).map([&] { return std::move(out); }); })
       .map_error(located);
 } catch (const std::bad_alloc&) {
   return fail(ErrorCode::too_large, "cannot write " + path + ": there is not enough memory", path);

@@ -39,6 +39,9 @@ struct DngWriteOptions {
 ///     exists, unwritable  as AtomicFile
 Result<void> write_dng(const RawFrame& frame, const std::string& path, const DngWriteOptions& options = {});
 
+/// Writes a raw frame as above to a file that gets its name by AtomicFile::commit or commit_all.
+Result<AtomicFile> prepare_dng(const RawFrame& frame, const std::string& path, const DngWriteOptions& options = {});
+
 /// Writes a raw frame as above to a file descriptor that may be a pipe (write_to_stream).
 Result<void> write_dng(const RawFrame& frame, int descriptor, const DngWriteOptions& options = {});
 

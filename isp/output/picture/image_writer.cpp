@@ -160,6 +160,13 @@ Result<void> check_writable(FileFormat format, SampleType type, OutputSpace spac
 
 Result<void> write_picture(const Picture& picture, OutputSpace space, const FrameInfo& info, const std::string& path,
                            const WriteOptions& options, Executor& executor) {
+  return prepare_picture(picture, space, info, path, options, executor).and_then([](AtomicFile out) {
+    return out.commit();
+  });
+}
+
+Result<AtomicFile> prepare_picture(const Picture& picture, OutputSpace space, const FrameInfo& info,
+                                   const std::string& path, const WriteOptions& options, Executor& executor) {
   const auto located = [&](Error error) {
     if (error.where.empty()) error = Error{error.code, "cannot write " + path + ": " + error.message, path};
     return error;
@@ -170,7 +177,7 @@ Result<void> write_picture(const Picture& picture, OutputSpace space, const Fram
       .and_then([&] { return AtomicFile::create(path, options.overwrite, options.sync); })
       .and_then([&](AtomicFile out) {
         return encode(picture, *format, metadata_for(picture, space, info, options), options, executor, out.file())
-            .and_then([&] { return out.commit(); });
+            .map([&] { return std::move(out); });
       })
       .map_error(located);
 }

@@ -50,6 +50,10 @@ struct WriteOptions {
 Result<void> write_picture(const Picture& picture, OutputSpace space, const FrameInfo& info, const std::string& path,
                            const WriteOptions& options, Executor& executor);
 
+/// Writes the image as write_picture does, to a file that gets its name by AtomicFile::commit or commit_all.
+Result<AtomicFile> prepare_picture(const Picture& picture, OutputSpace space, const FrameInfo& info,
+                                   const std::string& path, const WriteOptions& options, Executor& executor);
+
 /// Writes the image to a file descriptor that may be a pipe (write_to_stream); nothing is written if it cannot be
 /// encoded.
 Result<void> write_picture(const Picture& picture, OutputSpace space, const FrameInfo& info, FileFormat format,

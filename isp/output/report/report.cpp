@@ -50,7 +50,7 @@ std::string csv_of(const Plot& plot) {
   return out;
 }
 
-Result<void> write_texts(std::span<const TextFile> files, Overwrite overwrite) {
+Result<std::vector<AtomicFile>> prepare_texts(std::span<const TextFile> files, Overwrite overwrite) {
   std::vector<AtomicFile> written;
   for (const TextFile& file : files) {
     auto created = AtomicFile::create(file.path, overwrite);
@@ -61,10 +61,13 @@ Result<void> write_texts(std::span<const TextFile> files, Overwrite overwrite) {
       return fail(ErrorCode::unwritable, "the file cannot be written whole; is the disk full?", file.path);
     }
   }
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    if (auto done = written[i].commit(); !done) return fail(done.error().code, done.error().message, files[i].path);
-  }
-  return {};
+  return written;
+}
+
+Result<void> write_texts(std::span<const TextFile> files, Overwrite overwrite) {
+  return prepare_texts(files, overwrite).and_then([](std::vector<AtomicFile> written) {
+    return AtomicFile::commit_all(written);
+  });
 }
 
 Result<void> write_text(const std::string& path, std::string_view text, Overwrite overwrite) {

@@ -87,8 +87,11 @@ struct TextFile {
   std::string_view text;
 };
 
-/// Writes text files: all of them are complete before the first gets its name, so that a full disk leaves none. Errors,
-/// each with its path: those of AtomicFile; a full disk.
+/// Writes texts to files that get their names by AtomicFile::commit_all. Errors, each with its path: those of
+/// AtomicFile; a full disk.
+Result<std::vector<AtomicFile>> prepare_texts(std::span<const TextFile> files, Overwrite overwrite);
+
+/// Writes text files, all or none. Errors: those of prepare_texts and of AtomicFile::commit_all.
 Result<void> write_texts(std::span<const TextFile> files, Overwrite overwrite);
 
 /// Writes a text file completely or not at all. Errors: those of write_texts.
