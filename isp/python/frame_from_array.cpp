@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <climits>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
+#include "isp/base/text.h"
 #include "isp/output/dng/dng_check.h"
 #include "isp/python/failure.h"
 #include "isp/python/frame_copy.h"
@@ -142,6 +144,18 @@ void set_matrix(const std::vector<double>& matrix, CameraColour& colour) {
   colour.source = CameraColour::Source::file_tags;
 }
 
+void set_exposure(const MosaicFigures& figures, FrameInfo& info) {
+  const auto check = [](const std::optional<double>& value, const char* name) {
+    if (value && !(*value > 0 && std::isfinite(*value))) {
+      refuse(number_text(*value) + " is not a finite number above 0", name);
+    }
+  };
+  check(figures.exposure_s, "exposure_s");
+  check(figures.iso, "iso");
+  if (figures.exposure_s) info.exposure_s = figures.exposure_s;
+  if (figures.iso) info.iso = figures.iso;
+}
+
 }  // namespace
 
 RawImagePtr frame_from_array(const py::array& mosaic, const MosaicFigures& figures, const RawImage* like) {
@@ -161,8 +175,7 @@ RawImagePtr frame_from_array(const py::array& mosaic, const MosaicFigures& figur
   set_levels(figures, like != nullptr, frame.raw);
   set_noise(figures.noise, frame);
   set_matrix(figures.matrix, frame.colour);
-  if (figures.exposure_s) frame.raw.info.exposure_s = figures.exposure_s;
-  if (figures.iso) frame.raw.info.iso = figures.iso;
+  set_exposure(figures, frame.raw.info);
   if (is_float) {
     frame.raw.dn_float = copied<float>(mosaic);
   } else {

@@ -137,6 +137,11 @@ BAD = {
     "mosaic": (np.zeros((24, 24), np.uint16), dict(cfa="XTRANS"), "XTRANS"),
     "noise": (np.zeros((24, 24), np.uint16), dict(noise=(1, 2, 3)), "3 values"),
     "negative noise": (np.zeros((24, 24), np.uint16), dict(noise=(-1, 0)), "NoiseProfile"),
+    "exposure of NaN": (np.zeros((24, 24), np.uint16), dict(exposure_s=np.nan), "exposure_s: .* above 0"),
+    "endless exposure": (np.zeros((24, 24), np.uint16), dict(exposure_s=np.inf), "exposure_s: .* above 0"),
+    "exposure of 0": (np.zeros((24, 24), np.uint16), dict(exposure_s=0), "exposure_s: .* above 0"),
+    "negative ISO": (np.zeros((24, 24), np.uint16), dict(iso=-100), "iso: .* above 0"),
+    "ISO of NaN": (np.zeros((24, 24), np.uint16), dict(iso=np.nan), "iso: .* above 0"),
     "singular matrix": (np.zeros((24, 24), np.uint16), dict(matrix=np.zeros((3, 3))), "ColorMatrix"),
 }
 
