@@ -117,6 +117,9 @@ void set_levels(const MosaicFigures& figures, bool has_like, RawDn& raw) {
   if (white.size() != 1 && white.size() != static_cast<std::size_t>(channels)) {
     refuse(std::to_string(white.size()) + " values: expected 1, or 3 for RGB", "white");
   }
+  for (const double level : white) {
+    if (level != std::round(level)) refuse(number_text(level) + " is not an integer, as a DNG states it", "white");
+  }
   for (std::size_t i = 0; i < 3; ++i) raw.white_dn[i] = white[white.size() == 3 ? i : 0];
 }
 

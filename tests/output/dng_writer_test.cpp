@@ -157,12 +157,14 @@ TEST(DngWriter, ASinglePixelIsAFileOfOneSample) {
   const ScratchDirectory scratch;
   for (const SensorLayout layout : {SensorLayout::bayer, SensorLayout::monochrome, SensorLayout::linear_rgb}) {
     RawFrame frame = plain_frame(1, 1, layout);
-    for (std::size_t i = 0; i < frame.raw.dn.size(); ++i) frame.raw.dn.data()[i] = static_cast<std::uint16_t>(9000 + i);
+    test::make_floats(frame.raw);
+    for (std::size_t i = 0; i < frame.raw.dn_float.size(); ++i)
+      frame.raw.dn_float.data()[i] = 9000 + static_cast<float>(i);
     ASSERT_TRUE(write_dng(frame, scratch.file("a.dng"), {.overwrite = Overwrite::yes}));
     TIFF* tiff = TIFFOpen(scratch.file("a.dng").c_str(), "r");
     ASSERT_NE(tiff, nullptr);
-    std::array<std::uint16_t, 3> samples{};
-    EXPECT_EQ(TIFFReadEncodedStrip(tiff, 0, samples.data(), sizeof samples), 2 * samples_of(layout));
+    std::array<float, 3> samples{};
+    EXPECT_EQ(TIFFReadEncodedStrip(tiff, 0, samples.data(), sizeof samples), 4 * samples_of(layout));
     EXPECT_EQ(samples[0], 9000);
     EXPECT_EQ(samples[2], layout == SensorLayout::linear_rgb ? 9002 : 0);
     TIFFClose(tiff);
@@ -354,6 +356,18 @@ TEST(DngWriter, FloatsADngCannotHoldAreRefusedByTheTagsName) {
   }
 }
 
+TEST(DngWriter, SidesThatRawDevelopersDoNotReadAreRefused) {
+  const ScratchDirectory scratch;
+  for (const auto& [width, height] : {std::pair(21, 40), std::pair(40, 21), std::pair(64001, 22)}) {
+    const auto written = write_dng(plain_frame(width, height), scratch.file("a.dng"));
+    ASSERT_FALSE(written) << width << " x " << height;
+    EXPECT_EQ(written.error().code, ErrorCode::invalid_argument);
+    EXPECT_NE(written.error().message.find("pixels: expected 22 to 64000 each way"), std::string::npos)
+        << written.error().message;
+  }
+  EXPECT_TRUE(scratch.names().empty());
+}
+
 TEST(DngWriter, FiguresADngCannotHoldAreRefusedByTheTagsName) {
   const std::vector<Fault> faults{
       {"image", [](RawFrame& f) { f.raw.dn = {}; }},
@@ -377,6 +391,10 @@ TEST(DngWriter, FiguresADngCannotHoldAreRefusedByTheTagsName) {
       {"WhiteLevel", [](RawFrame& f) { f.raw.white_dn.fill(nan); }},
       {"ColorMatrix", [](RawFrame& f) { f.colour.calibrations.resize(3, f.colour.calibrations[0]); }},
       {"ColorMatrix", [](RawFrame& f) { f.colour.calibrations[0].xyz_to_camera = {}; }},
+      {"ColorMatrix",
+       [](RawFrame& f) {
+         f.colour.calibrations[0].xyz_to_camera = diagonal3({1e-30, 1e-30, 1e-30});
+       }},
       {"ColorMatrix", [](RawFrame& f) { f.colour.calibrations[1].xyz_to_camera[1][1] = nan; }},
       {"ColorMatrix", [](RawFrame& f) { f.colour.calibrations[1].xyz_to_camera[1][1] = 1e9; }},
       {"CameraCalibration", [](RawFrame& f) { f.colour.calibrations[0].camera_calibration[0][0] = -infinity; }},

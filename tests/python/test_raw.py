@@ -137,6 +137,14 @@ BAD = {
     "mosaic": (np.zeros((24, 24), np.uint16), dict(cfa="XTRANS"), "XTRANS"),
     "noise": (np.zeros((24, 24), np.uint16), dict(noise=(1, 2, 3)), "3 values"),
     "negative noise": (np.zeros((24, 24), np.uint16), dict(noise=(-1, 0)), "NoiseProfile"),
+    "white between codes": (np.zeros((24, 24), np.uint16), dict(white=4095.5), "white: 4095.5 is not an integer"),
+    "white of NaN": (np.zeros((24, 24), np.uint16), dict(white=np.nan), "white"),
+    "matrix of almost 0": (np.zeros((24, 24), np.uint16), dict(matrix=np.eye(3) * 1e-30), "ColorMatrix"),
+    "a row of almost 0": (np.zeros((24, 24), np.uint16), dict(matrix=np.diag([1, 1, 4e-10])), "ColorMatrix"),
+    "low": (np.zeros((21, 24), np.uint16), {}, "24 x 21 pixels: expected 22"),
+    "narrow": (np.zeros((24, 21), np.uint16), {}, "21 x 24 pixels: expected 22"),
+    "long": (np.zeros((22, 64001), np.uint16), {}, "64001 x 22 pixels: expected 22 to 64000"),
+    "long floats": (np.zeros((1, 65536), np.float32), {}, "65536 x 1 pixels"),
     "exposure of NaN": (np.zeros((24, 24), np.uint16), dict(exposure_s=np.nan), "exposure_s: .* above 0"),
     "endless exposure": (np.zeros((24, 24), np.uint16), dict(exposure_s=np.inf), "exposure_s: .* above 0"),
     "exposure of 0": (np.zeros((24, 24), np.uint16), dict(exposure_s=0), "exposure_s: .* above 0"),
@@ -153,6 +161,28 @@ def test_bad_arrays_are_refused_and_nothing_is_written(case, tmp_path):
         lowlux.write_dng(tmp_path / "bad.dng", mosaic, **{**LEVELS, **figures})
     assert isinstance(caught.value, ValueError)
     assert list(tmp_path.iterdir()) == []
+
+
+EXTREMES = {
+    "smallest": (np.full((22, 22), 100, np.uint16), {}),
+    "longest": (np.full((22, 64000), 100, np.uint16), {}),
+    "highest": (np.full((64000, 22), 100, np.uint16), {}),
+    "longest of floats": (np.full((1, 65535), 100, np.float32), {}),
+    "one float": (np.full((1, 1), 100, np.float32), {}),
+    "small matrix": (np.full((24, 24), 100, np.uint16), dict(matrix=np.eye(3) * 2e-9)),
+    "small row": (np.full((24, 24), 100, np.uint16), dict(matrix=np.diag([1, 1, 1e-9]))),
+    "large matrix": (np.full((24, 24), 100, np.uint16), dict(matrix=np.eye(3) * 1000)),
+    "short exposure": (np.full((24, 24), 100, np.uint16), dict(exposure_s=1e-6, iso=1)),
+}
+
+
+@pytest.mark.parametrize("case", EXTREMES)
+def test_what_is_written_can_be_read(case, tmp_path):
+    mosaic, figures = EXTREMES[case]
+    raw = written(tmp_path / "a.dng", mosaic, **figures)
+    np.testing.assert_array_equal(raw.raw_image, mosaic)
+    if "matrix" in figures:
+        np.testing.assert_allclose(raw.matrices[0], figures["matrix"], rtol=1e-6, atol=0)
 
 
 def test_errors_are_those_of_the_command(tmp_path, command):

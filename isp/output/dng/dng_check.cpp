@@ -17,6 +17,7 @@ constexpr double max_float_level_dn = 4294967295.0;  // WhiteLevel is an integer
 constexpr std::size_t max_values = 65535;            // libtiff counts the values of these tags in 16 bits
 constexpr double largest_coefficient =
     1000;  // of a matrix or gain: above it no camera is plausible, and rationals are too coarse
+constexpr double smallest_coefficient = 1e-9;  // rationals hold 4.7e-10 as the least, and libtiff rounds below to 0
 constexpr double smallest_gain = 1e-4;
 
 tl::unexpected<Error> cannot(const char* tag, const std::string& why) {
@@ -126,13 +127,16 @@ Result<void> check_white(const RawDn& raw) {
   return {};
 }
 
+/// Returns whether the coefficients are in range, and the matrix of the rationals that the file holds is regular.
 bool fits(const Matrix3& matrix) {
-  for (const Vector3& row : matrix) {
-    for (const double value : row) {
+  Matrix3 written = matrix;
+  for (Vector3& row : written) {
+    for (double& value : row) {
       if (!within(value, -largest_coefficient, largest_coefficient)) return false;
+      if (std::fabs(value) < smallest_coefficient) value = 0;
     }
   }
-  return inverse(matrix).has_value();
+  return inverse(written).has_value();
 }
 
 bool fits(const Vector3& gains) {

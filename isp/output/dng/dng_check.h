@@ -10,8 +10,9 @@ constexpr int samples_of(SensorLayout layout) { return layout == SensorLayout::l
 
 /// Returns an error of code invalid_argument, naming the tag, unless the frame is consistent and DNG tags can hold its
 /// figures: rectangles inside one another, as many figures as there are sites, columns and rows, levels of 0 to 65535
-/// DN (of floating-point samples to 4294967295, white an integer) with white above black, regular matrices, positive
-/// gains, noise ratios in blocks that cover the active area, and no sample that unusable_sample names.
+/// DN (of floating-point samples to 4294967295, white an integer) with white above black, matrices that are regular as
+/// rationals, positive gains, noise ratios in blocks that cover the active area, and no sample that unusable_sample
+/// names.
 Result<void> check_dng_frame(const RawFrame& frame);
 
 }  // namespace lowlux::isp

@@ -151,9 +151,22 @@ Result<void> check_baseline_exposure(double ev) {
               "a DNG cannot hold this BaselineExposure: " + number_text(ev) + " EV, expected -100 to 100");
 }
 
+/// Returns an error if raw developers do not read frames of this size. LibRaw, and with it capture::read_raw for codes,
+/// takes smaller ones for thumbnails, and refuses greater ones.
+Result<void> check_sides(const RawDn& raw) {
+  constexpr int min_side = 22, max_side = 64000, max_float_side = 65535;
+  const int width = raw.row_samples() / samples_of(raw.layout), height = raw.rows();
+  const int least = raw.is_float() ? 1 : min_side, most = raw.is_float() ? max_float_side : max_side;
+  if (std::min(width, height) >= least && std::max(width, height) <= most) return {};
+  return fail(ErrorCode::invalid_argument, "raw developers do not read a DNG of " + std::to_string(width) + " x " +
+                                               std::to_string(height) + " pixels: expected " + std::to_string(least) +
+                                               " to " + std::to_string(most) + " each way");
+}
+
 /// Returns the error of a frame or of options that no DNG can hold.
 Result<void> check_all(const RawFrame& frame, const DngWriteOptions& options) {
   return check_dng_frame(frame)
+      .and_then([&] { return check_sides(frame.raw); })
       .and_then([&] { return check_baseline_exposure(baseline_exposure_ev(frame, options)); })
       .and_then(
           [&] { return check_dng_size(static_cast<std::int64_t>(frame.raw.samples()), frame.raw.sample_bytes()); });

@@ -34,7 +34,8 @@ struct DngWriteOptions {
 /// Errors
 ///     invalid_argument  a figure that DNG cannot hold or that contradicts another (the message names it); samples
 ///                       that are not finite or too large (unusable_sample); with floats a white level that is no
-///                       integer
+///                       integer; sides that raw developers do not read: with codes outside of 22 to 64000 px, the
+///                       limits of LibRaw, with floats above 65535 px
 ///     too_large         as check_dng_size
 ///     exists, unwritable  as AtomicFile
 Result<void> write_dng(const RawFrame& frame, const std::string& path, const DngWriteOptions& options = {});

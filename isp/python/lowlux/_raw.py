@@ -38,7 +38,7 @@ def raw_from_array(mosaic, *, black=None, white=None, cfa=None, noise=None, matr
     mosaic: (height, width), or (height, width, 3) for RGB that is demosaiced already. Integers of 0 to 65535 or finite
         floats of any width, strides and byte order. Floats are held in 32 bits, and may lie below black and above white.
     black, white: levels in the units of the samples [DN]: one value; black also one for each site of the 2x2 cell, row
-        by row; for RGB also three. The white level of floats is an integer: scale them to white=1.
+        by row; for RGB also three. The white level is an integer: scale floats to white=1.
     cfa: "RGGB" (default), "GRBG", "GBRG", "BGGR", or "MONO" for a sensor without filters.
     noise: (scale, offset), or three such pairs for R, G and B: the variance of x, with x = 0 at black and 1 at white, is
         scale * x + offset (DNG NoiseProfile).
@@ -57,7 +57,8 @@ def write_dng(path, mosaic, *, black=None, white=None, cfa=None, noise=None, mat
     """Write a DNG of 16-bit codes, or of 32-bit floats if the samples are floats, completely or not at all.
 
     path: ends with .dng; an existing file is an ExistsError unless overwrite is True.
-    mosaic: an array, with the other arguments as in raw_from_array; or a RawImage, without them.
+    mosaic: an array, with the other arguments as in raw_from_array; or a RawImage, without them. Its sides are of 22 to
+        64000 px, of floats of up to 65535 px: others are not read again.
     Errors: those of raw_from_array; ExistsError, UnwritableError, TooLargeError.
     """
     path = os.fspath(path)
