@@ -99,6 +99,7 @@ cli::RequestedMethods methods_of(const std::vector<Entry>& entries) {
           {.name = name, .call = [borrowed](const RawFrame& noisy) { return call(borrowed, noisy); }});
       continue;
     }
+    const py::gil_scoped_release released;  // a program is looked for, after the runs of other threads
     cli::RequestedMethods one = value_of(cli::requested_methods({text}));
     for (isp::ScoredMethod& method : one.methods) out.methods.push_back(std::move(method));
     for (Error& error : one.not_installed) out.not_installed.push_back(std::move(error));

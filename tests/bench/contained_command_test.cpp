@@ -1,6 +1,7 @@
 #include "isp/bench/methods/contained_command.h"
 
 #include <gtest/gtest.h>
+#include <sys/prctl.h>
 
 #include <chrono>
 #include <cstring>
@@ -49,6 +50,26 @@ TEST(ContainedCommand, TimeFilesAndMemoryAreLimited) {
 #if !defined(LOWLUX_SANITIZED)
   EXPECT_TRUE(has(failure("dd if=/dev/zero of=/dev/null bs=600M count=1"), "exit code 1"));
 #endif
+}
+
+TEST(ContainedCommand, RunsOfSeveralThreadsLeaveTheProcessAsItWas) {
+  const auto adopts_orphans = [] {
+    int adopts = 0;
+    prctl(PR_GET_CHILD_SUBREAPER, &adopts, 0, 0, 0);
+    return adopts;
+  };
+  ASSERT_EQ(adopts_orphans(), 0);
+  const auto run = [](double wait_s, double run_s) {
+    return std::jthread([wait_s, run_s] {
+      std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
+      const test::ScratchDirectory scratch;
+      EXPECT_TRUE(run_contained("sleep " + std::to_string(run_s), scratch.path(), limits));
+    });
+  };
+  {
+    const std::jthread first = run(0, 0.4), second = run(0.2, 0.4);  // the second ends last, and began meanwhile
+  }
+  EXPECT_EQ(adopts_orphans(), 0);
 }
 
 TEST(ContainedCommand, NothingOfItIsLeftWhenItEnds) {

@@ -15,6 +15,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <mutex>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -277,6 +278,8 @@ std::optional<Error> failure_of(int status, const std::filesystem::path& folder,
 
 Result<CommandUse> run_contained(const std::string& command, const std::filesystem::path& folder,
                                  const CommandLimits& limits) {
+  static std::mutex one_at_a_time;  // the setting of a subreaper is the process's
+  const std::lock_guard turn(one_at_a_time);
   Pipes pipes;
   if (!pipes.are_open()) return tl::make_unexpected(system_error("no pipe for a program", errno));
   const Subreaper adopting;

@@ -34,7 +34,7 @@ struct CommandUse {
 /// files of `folder`, which is also its TMPDIR. When it ends, when the time is over, or when this process dies, all
 /// that is left of its process group is killed. For the duration of the run this process adopts orphans of its
 /// descendants (PR_SET_CHILD_SUBREAPER), so that peak memory is that of the command, without this process's own.
-/// Must not run in several threads at once.
+/// Runs of several threads take turns.
 /// @param folder  a private folder of this run; removed if this process dies during it
 /// Errors, with the last line that the command printed: it cannot be started; its exit code is not 0; a signal ended
 /// it; one of the limits was reached.
