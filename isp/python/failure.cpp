@@ -1,5 +1,6 @@
 #include "isp/python/failure.h"
 
+#include <new>
 #include <string_view>
 
 #include <pybind11/pybind11.h>
@@ -56,6 +57,8 @@ void register_failures() {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const Failure& failure) {
       set_python_error(failure.error());
+    } catch (const std::bad_alloc&) {
+      set_python_error({ErrorCode::too_large, "not enough memory", {}});
     }
   });
 }

@@ -27,7 +27,8 @@ T value_of(Result<T>&& result) {
   if constexpr (!std::is_void_v<T>) return *std::move(result);
 }
 
-/// Makes Failure the Python exception for its ErrorCode, with the message that the command prints.
+/// Makes Failure the Python exception for its ErrorCode, with the message that the command prints, and std::bad_alloc
+/// that of ErrorCode::too_large.
 void register_failures();
 
 }  // namespace lowlux::python

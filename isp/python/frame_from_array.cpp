@@ -5,9 +5,11 @@
 #include <utility>
 
 #include "isp/base/text.h"
+#include "isp/cli/develop/memory_gate.h"
 #include "isp/output/dng/dng_check.h"
 #include "isp/python/failure.h"
 #include "isp/python/frame_copy.h"
+#include "isp/python/quiet_numpy.h"
 #include "isp/python/raw_image.h"
 
 namespace lowlux::python {
@@ -38,6 +40,18 @@ bool check_samples(const py::array& mosaic) {
   return false;
 }
 
+/// Throws unless there is memory for a copy: an array of stride 0 takes less than its samples.
+void check_memory(const py::array& mosaic) {
+  const std::size_t sample_bytes = mosaic.dtype().kind() == 'f' ? sizeof(float) : sizeof(std::uint16_t);
+  const double bytes = static_cast<double>(mosaic.size()) * static_cast<double>(sample_bytes);
+  const auto available = cli::available_memory();
+  if (!available || bytes <= *available) return;
+  throw Failure({ErrorCode::too_large,
+                 "not enough memory for a copy of the array, which takes " + number_text(1e-9 * bytes, 3) +
+                     " GB: " + number_text(1e-9 * *available, 3) + " GB are available",
+                 "mosaic"});
+}
+
 /// Copies the array into new samples: one copy, of any strides and byte order. NumPy converts.
 template <class Sample>
 Plane<Sample> copied(const py::array& mosaic) {
@@ -46,11 +60,8 @@ Plane<Sample> copied(const py::array& mosaic) {
   Plane<Sample> out(width, height);
   const std::vector<py::ssize_t> shape(mosaic.shape(), mosaic.shape() + mosaic.ndim());
   const py::array_t<Sample> view(shape, out.data(), py::capsule(out.data(), [](void*) {}));
-  const py::module_ numpy = py::module_::import("numpy");
-  const py::object quiet = numpy.attr("errstate")(py::arg("over") = "ignore");  // infinity is found later
-  quiet.attr("__enter__")();
-  numpy.attr("copyto")(view, mosaic, py::arg("casting") = "unsafe");
-  quiet.attr("__exit__")(py::none(), py::none(), py::none());
+  const QuietNumpy quiet;
+  py::module_::import("numpy").attr("copyto")(view, mosaic, py::arg("casting") = "unsafe");
   return out;
 }
 
@@ -169,6 +180,7 @@ RawImagePtr frame_from_array(const py::array& mosaic, const MosaicFigures& figur
            "mosaic");
   }
   if (mosaic.shape(0) > INT_MAX || mosaic.shape(1) > INT_MAX / 3) refuse("the array is too large", "mosaic");
+  check_memory(mosaic);
   const bool is_float = check_samples(mosaic);
   auto out = std::make_shared<RawImage>();
   RawFrame& frame = out->frame;

@@ -14,6 +14,7 @@
 #include "isp/codec/picture_file.h"
 #include "isp/model/colour/colorimetry.h"
 #include "isp/python/failure.h"
+#include "isp/python/quiet_numpy.h"
 
 namespace lowlux::python {
 
@@ -33,6 +34,7 @@ PictureArgument picture_argument(const py::object& image, const std::string& nam
   const auto height = static_cast<int>(array.shape(0)), width = static_cast<int>(array.shape(1));
   const auto codes = [&](auto sample) {
     using Sample = decltype(sample);
+    const QuietNumpy quiet;
     const auto values = py::array_t<Sample, py::array::c_style | py::array::forcecast>(array);
     Plane<Sample> plane(3 * width, height);
     std::copy_n(values.data(), plane.size(), plane.data());

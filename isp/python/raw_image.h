@@ -34,7 +34,7 @@ struct MosaicFigures {
 /// 65535 or finite floats, in any layout and byte order.
 /// @param like  frame whose metadata is taken over; null: none
 /// Throws Failure with ErrorCode::invalid_argument for arrays of other types, shapes or values, and for figures that
-/// contradict each other (isp::check_dng_frame).
+/// contradict each other (isp::check_dng_frame); with ErrorCode::too_large without memory for the copy.
 RawImagePtr frame_from_array(const pybind11::array& mosaic, const MosaicFigures& figures, const RawImage* like);
 
 /// Adds RawImage, read_raw, write_dng and frame_from_array.

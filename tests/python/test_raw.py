@@ -1,6 +1,7 @@
 """Raw frames: views, and files written of arrays of all kinds, against what NumPy itself makes of them."""
 import gc
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -161,6 +162,33 @@ def test_bad_arrays_are_refused_and_nothing_is_written(case, tmp_path):
         lowlux.write_dng(tmp_path / "bad.dng", mosaic, **{**LEVELS, **figures})
     assert isinstance(caught.value, ValueError)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("state", ["raise", "warn", "ignore"])
+@pytest.mark.parametrize("value", [1e300, -1e300, 1e-300, np.nan])
+def test_conversions_leave_the_error_state_of_numpy_alone(value, state):
+    """What 32 bits cannot hold is an error of lowlux, and 1e-300 is 0 in them; NumPy reports neither."""
+    image = np.full((24, 24, 3), value)
+    with np.errstate(all=state), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        before = np.geterr()
+        for call in (lambda: lowlux.raw_from_array(image[..., 0], **LEVELS), lambda: lowlux.compare(image, image)):
+            try:
+                call()
+            except lowlux.Error:
+                assert not 0 < value < 1
+            else:
+                assert 0 < value < 1
+            assert np.geterr() == before
+
+
+@pytest.mark.parametrize("kind", [np.uint16, np.int64, np.float32])
+def test_arrays_without_memory_for_a_copy_are_refused_at_once(kind):
+    """The array has strides of 0: it takes no memory, a copy would take exabytes, and finding its minimum years."""
+    huge = np.broadcast_to(kind(100), (2**31 - 1, 500_000_000))
+    with pytest.raises(lowlux.TooLargeError, match="mosaic: not enough memory .* GB") as caught:
+        lowlux.raw_from_array(huge, **LEVELS)
+    assert isinstance(caught.value, MemoryError)
 
 
 EXTREMES = {

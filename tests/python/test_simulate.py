@@ -184,6 +184,13 @@ def test_every_flag_of_the_command_is_one_of_python(command):
     assert {flag.replace("-", "_") for flag in flags - of_the_command} == _words._FLAGS
 
 
+def test_frames_that_memory_does_not_hold_are_refused_at_once(tmp_path):
+    for options in (dict(size=(65535, 65535), frames=10000), dict(size=(65535, 65535), frames=10000, no_truth=True)):
+        with pytest.raises(lowlux.TooLargeError, match="not enough memory .*10000 of 65535 x 65535 pixels"):
+            lowlux.simulate("flat", tmp_path / "a.dng", **options)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_unknown_sensors_and_kinds():
     with pytest.raises(lowlux.Error, match="no_such"):
         lowlux.calibrate("quoted", "no_such")

@@ -11,6 +11,7 @@
 #include "capture/synthetic/burst.h"
 #include "capture/synthetic/synthetic_source.h"
 #include "isp/base/executor.h"
+#include "isp/cli/develop/memory_gate.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/progress.h"
 #include "isp/cli/simulate/burst_truth.h"
@@ -113,12 +114,19 @@ class Simulation {
 
  private:
   Result<capture::Scene> make_scene() {
+    if (args_.scene.size_given) {  // reported before the scene is made
+      const auto fits = check_memory(args_.scene.width, args_.scene.height);
+      if (!fits) return tl::make_unexpected(fits.error());
+    }
     auto scene = scene_of(args_.scene, args_.options.seed, executor_);
     if (!scene) return tl::make_unexpected(scene.error());
     out_.white_cd_m2 = scene->white_luminance_cd_m2;
     out_.warnings = scene->warnings;
     description_ = scene->scene.description;
-    if (const auto fits = check_size(scene->scene.xyz_cd_m2); !fits) return tl::make_unexpected(fits.error());
+    const SceneLinear& light = scene->scene.xyz_cd_m2;
+    if (const auto fits = check_size(light); !fits) return tl::make_unexpected(fits.error());
+    const auto fits = check_memory(light.width() / args_.scene.reduction, light.height() / args_.scene.reduction);
+    if (!fits) return tl::make_unexpected(fits.error());
     return std::move(scene->scene);
   }
 
@@ -131,6 +139,21 @@ class Simulation {
     return fail(ErrorCode::insufficient,
                 fmt::format("the picture{} has {} x {} pixels, and raw developers read {} x {} and more: enlarge it",
                             reduced, width, height, min_side, min_side));
+  }
+
+  /// Returns an error if less memory is available than frames and truths take that are kept in it.
+  Result<void> check_memory(int width, int height) const {
+    if (keep_ == nullptr) return {};
+    const double truth_samples = has_truth(args_) ? 2 * 3 : 0;
+    const double bytes_per_pixel =
+        static_cast<double>(sizeof(std::uint16_t)) * args_.frames + sizeof(float) * truth_samples;
+    const double bytes = bytes_per_pixel * width * height;
+    const auto available = available_memory();
+    if (!available || bytes <= *available) return {};
+    return fail(ErrorCode::too_large,
+                fmt::format("not enough memory for frames: {} of {} x {} pixels and their truth take {:.3g} GB, and "
+                            "{:.3g} GB are available",
+                            args_.frames, width, height, 1e-9 * bytes, 1e-9 * *available));
   }
 
   /// Writes everything of a source.

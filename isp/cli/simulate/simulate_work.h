@@ -22,7 +22,7 @@ struct SimulatedData {
 
 /// Does the work of `simulate`: writes the files that the arguments name, and prints nothing.
 /// @param keep  set: frames and truths are also put there; arguments without an output then write no file
-/// Errors: outputs that exist, those of scene, sensor and writers.
+/// Errors: outputs that exist, those of scene, sensor and writers; frames that take more memory than there is.
 Result<SimulateOutcome> simulate(const SimulateArgs& args, SimulatedData* keep = nullptr);
 
 }  // namespace lowlux::cli

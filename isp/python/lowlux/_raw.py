@@ -46,7 +46,7 @@ def raw_from_array(mosaic, *, black=None, white=None, cfa=None, noise=None, matr
     exposure_s, iso: exposure time [s] and ISO setting.
     like: a RawImage of the camera: what is not given here is that of this frame, metadata included. The array has the
         size of its readout or of its visible part.
-    Errors: ArgumentError for other types, shapes and values, and for figures that contradict each other.
+    Errors: ArgumentError for other types, shapes and values, and for figures that contradict each other; TooLargeError.
     """
     return _lowlux.from_array(np.asarray(mosaic), _numbers("black", black), _numbers("white", white), cfa or "",
                               _numbers("noise", noise), _numbers("matrix", matrix), exposure_s, iso, like)

@@ -45,7 +45,8 @@ def simulate(scene, output=None, *, overwrite=False, size=None, light=None, lumi
     frames: number of frames. shake [px], roll [degrees], drift (x, y) [px]: motion from frame to frame.
     system_gain [DN/e-], read_noise, full_well [e-], dark_current [e-/s], black_level, white_level [DN]: figures that
     replace those of the sensor. All other options are described by `lowlux simulate --help`.
-    Returns Simulated. Errors: ArgumentError for options and unknown sensors; those of reading and writing.
+    Returns Simulated. Errors: ArgumentError for options and unknown sensors; those of reading and writing; TooLargeError
+    where frames and truth take more memory than there is.
     """
     options = {name: value for name, value in locals().items() if name not in ("scene", "output", "overwrite")}
     if isinstance(size, (tuple, list)):
