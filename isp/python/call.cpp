@@ -47,9 +47,9 @@ cli::ReadRaw reader_of(const std::vector<Input>& inputs) {
   return [&inputs](const std::string& name) -> Result<RawFrame> {
     for (const Input& input : inputs) {
       if (!input.frame || input.name != name) continue;
-      const RawFrame& frame = input.frame->frame;
+      RawFrame frame = clone(input.frame->frame);  // other threads may write to its views
       if (const auto wrong = unusable_sample(frame.raw)) return fail(ErrorCode::invalid_argument, *wrong, name);
-      return clone(frame);
+      return frame;
     }
     return cli::read_file(name);
   };

@@ -41,7 +41,7 @@ struct Input {
 };
 
 /// Returns a function that reads inputs: a copy of a frame in memory, as the work changes it. Samples may
-/// have been written by way of a view: those that no frame can have (unusable_sample) are an error.
+/// have been written by way of a view: those of the copy that no frame can have (unusable_sample) are an error.
 cli::ReadRaw reader_of(const std::vector<Input>& inputs);
 
 /// Checks the frames of a merge where names do not suffice (cli::check_frames): one frame in memory may be given twice,

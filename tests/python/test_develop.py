@@ -218,6 +218,30 @@ def test_values_written_to_a_view_are_checked(value, rng, tmp_path):
     assert lowlux.develop(raw).image.shape == whole.shape
 
 
+def test_values_that_another_thread_writes_are_checked_in_the_copy(rng):
+    """Either the sample is refused, or nothing of it is in the result. Checking takes long enough for it to change."""
+    raw = lowlux.raw_from_array(rng.random((2048, 2048), dtype=np.float32), black=0, white=1)
+    view, done = raw.raw_image, threading.Event()
+
+    def write():
+        while not done.is_set():
+            view[0, 0] = 1e30
+            view[0, 0] = 0.5
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        for _ in range(50):
+            try:
+                image = lowlux.develop(raw, bits=32, space="camera", denoise="off", repair="off", half=True).image
+            except lowlux.ArgumentError:
+                continue
+            assert np.abs(image[:8, :8]).max() < 100
+    finally:
+        done.set()
+        writer.join()
+
+
 LIMITED = """
 import resource, sys
 import lowlux
