@@ -147,6 +147,12 @@ RawImagePtr from_array(const py::array& mosaic, std::vector<double> black_dn_, s
                           like);
 }
 
+/// Takes the place of RawImage.__new__, which would make an object without a frame.
+PyObject* refuse_new(PyTypeObject* /*type*/, PyObject* /*positional*/, PyObject* /*named*/) {
+  PyErr_SetString(PyExc_TypeError, "a RawImage is made by read_raw or raw_from_array");
+  return nullptr;
+}
+
 /// Adds an attribute of FrameInfo.
 template <class Value>
 void add_info(py::class_<RawImage, RawImagePtr>& type, const char* name, Value FrameInfo::*member, const char* doc) {
@@ -159,6 +165,7 @@ void add_info(py::class_<RawImage, RawImagePtr>& type, const char* name, Value F
 void add_raw_image(py::module_& module) {
   py::class_<RawImage, RawImagePtr> type(
       module, "RawImage", "A raw frame and what is known of it; what its source does not state is None.");
+  reinterpret_cast<PyTypeObject*>(type.ptr())->tp_new = refuse_new;
   const auto add = [&type](const char* name, auto get, const char* doc) { type.def_property_readonly(name, get, doc); };
   add("raw_image", raw_image,
       "Samples of the whole readout, a writable view: raw_height x raw_width (x 3 for RGB), uint16 or float32 [DN].");

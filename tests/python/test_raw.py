@@ -1,4 +1,5 @@
 """Raw frames: views, and files written of arrays of all kinds, against what NumPy itself makes of them."""
+import copy
 import gc
 import pickle
 import warnings
@@ -95,10 +96,10 @@ def test_views_share_memory_and_keep_the_frame(night):
     assert np.shares_memory(whole, visible) and np.shares_memory(whole, raw.raw_image)
     visible[1, 2] = 77
     assert raw.raw_value(sizes.top_margin + 1, sizes.left_margin + 2) == 77
-    copy = whole.copy()
+    before = whole.copy()
     del raw, visible
     gc.collect()
-    np.testing.assert_array_equal(whole, copy)
+    np.testing.assert_array_equal(whole, before)
 
 
 def test_metadata_like_another_frame(raws, tmp_path):
@@ -189,6 +190,19 @@ def test_arrays_without_memory_for_a_copy_are_refused_at_once(kind):
     with pytest.raises(lowlux.TooLargeError, match="mosaic: not enough memory .* GB") as caught:
         lowlux.raw_from_array(huge, **LEVELS)
     assert isinstance(caught.value, MemoryError)
+
+
+def test_a_raw_image_is_made_by_functions_only(night):
+    """One without a frame would read memory that was never written."""
+    class Sub(lowlux.RawImage):
+        pass
+
+    raw = lowlux.read_raw(night)
+    for make in (lowlux.RawImage, Sub, lambda: lowlux.RawImage.__new__(lowlux.RawImage), lambda: Sub.__new__(Sub),
+                 lambda: lowlux.RawImage.__new__(Sub), lambda: object.__new__(lowlux.RawImage), lambda: object.__new__(Sub),
+                 lambda: copy.copy(raw), lambda: copy.deepcopy(raw), lambda: pickle.dumps(raw)):
+        with pytest.raises(TypeError):
+            make()
 
 
 EXTREMES = {
