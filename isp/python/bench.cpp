@@ -49,7 +49,7 @@ isp::MethodImage image_of(const py::object& result, Executor& executor) {
 }
 
 /// Returns str(object), with what UTF-8 cannot hold as escapes; nullopt if there is no such text.
-std::optional<std::string> text_of(const py::handle& object) {
+std::optional<std::string> escaped_text(const py::handle& object) {
   const auto text = py::reinterpret_steal<py::object>(PyObject_Str(object.ptr()));
   const auto bytes =
       text ? py::reinterpret_steal<py::object>(PyUnicode_AsEncodedString(text.ptr(), "utf-8", "backslashreplace"))
@@ -61,8 +61,8 @@ std::optional<std::string> text_of(const py::handle& object) {
 
 /// Returns the exception of a function in one line, without its traceback.
 std::string line_of(const py::error_already_set& error) {
-  std::string line = text_of(error.type().attr("__name__")).value_or("an exception");
-  if (const auto text = text_of(error.value())) line += ": " + *text;
+  std::string line = escaped_text(error.type().attr("__name__")).value_or("an exception");
+  if (const auto text = escaped_text(error.value())) line += ": " + *text;
   return cli::one_line(line);
 }
 

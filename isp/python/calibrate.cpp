@@ -12,6 +12,7 @@
 #include "isp/cli/shared/profile_option.h"
 #include "isp/python/call.h"
 #include "isp/python/simulate.h"
+#include "isp/python/text.h"
 
 namespace lowlux::python {
 namespace {
@@ -68,7 +69,7 @@ py::tuple calibrate(const std::string& kind, const std::string& output, bool ove
   } else {
     throw Failure({ErrorCode::invalid_argument, "'" + kind + "' is none of black, colour, noise, quoted", "kind"});
   }
-  return py::make_tuple(made.profile, made.warnings);
+  return py::make_tuple(made.profile, strs_of(made.warnings));
 }
 
 std::string read_profile(const std::string& path) {

@@ -12,6 +12,7 @@
 #include "isp/cli/shared/report.h"
 #include "isp/output/picture/image_writer.h"
 #include "isp/python/call.h"
+#include "isp/python/text.h"
 
 namespace lowlux::python {
 namespace {
@@ -181,7 +182,7 @@ py::tuple merge(const Names& names, const std::string& output, bool overwrite, c
   }
   auto raw = std::make_shared<RawImage>();
   raw->frame = std::move(made->merged.frame);
-  return py::make_tuple(raw, made->plan, made->merged.warnings);
+  return py::make_tuple(raw, made->plan, strs_of(made->merged.warnings));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <pybind11/pybind11.h>
 
 #include "isp/cli/shared/report.h"
+#include "isp/python/text.h"
 
 namespace lowlux::python {
 namespace {
@@ -45,7 +46,7 @@ std::string message_of(const Error& error) {
 
 void set_python_error(const Error& error) {
   const py::object type = py::module_::import("lowlux.errors").attr(name_of(error.code));
-  const py::object raised = type(message_of(error), error.where);
+  const py::object raised = type(str_of(message_of(error)), str_of(error.where));
   PyErr_SetObject(type.ptr(), raised.ptr());
 }
 

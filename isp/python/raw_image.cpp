@@ -9,6 +9,7 @@
 #include "isp/output/dng/dng_check.h"
 #include "isp/output/dng/dng_writer.h"
 #include "isp/python/failure.h"
+#include "isp/python/text.h"
 
 namespace lowlux::python {
 namespace {
@@ -181,15 +182,20 @@ void add_raw_image(py::module_& module) {
   add("matrices", matrices_of, "3 x 3 matrices from XYZ to camera RGB, by rising colour temperature of their light.");
   add("_sizes", sizes_of, "");
   add(
-      "warnings", [](const RawImage& image) { return image.frame.warnings; }, "Warnings of reading, one line each.");
+      "warnings", [](const RawImage& image) { return strs_of(image.frame.warnings); },
+      "Warnings of reading, one line each.");
   add(
       "as_shot_neutral", [](const RawImage& image) { return image.frame.colour.as_shot_neutral; },
       "Camera RGB of a neutral as the camera chose it, largest 1; None if unknown.");
   add(
       "orientation", [](const RawImage& image) { return static_cast<int>(image.frame.raw.info.orientation); },
       "EXIF orientation, 1 to 8; 1 is upright.");
-  add_info(type, "make", &FrameInfo::make, "Maker of the camera; empty if unknown.");
-  add_info(type, "model", &FrameInfo::model, "Model of the camera; empty if unknown.");
+  add(
+      "make", [](const RawImage& image) { return str_of(image.frame.raw.info.make); },
+      "Maker of the camera; empty if unknown.");
+  add(
+      "model", [](const RawImage& image) { return str_of(image.frame.raw.info.model); },
+      "Model of the camera; empty if unknown.");
   add_info(type, "exposure_s", &FrameInfo::exposure_s, "Exposure time [s]; None if unknown.");
   add_info(type, "iso", &FrameInfo::iso, "ISO setting; None if unknown.");
   add_info(type, "f_number", &FrameInfo::f_number, "f-number; None if unknown.");

@@ -13,6 +13,7 @@
 #include "isp/cli/simulate/simulate_work.h"
 #include "isp/python/call.h"
 #include "isp/python/picture_argument.h"
+#include "isp/python/text.h"
 
 namespace lowlux::python {
 namespace {
@@ -59,7 +60,7 @@ py::tuple simulate(const std::string& output, bool overwrite, const Words& words
   std::vector<RawImagePtr> frames;
   for (RawFrame& frame : made->data.frames) frames.push_back(std::make_shared<RawImage>(std::move(frame)));
   return py::make_tuple(frames, made->report, array_or_none(std::move(made->data.truth)),
-                        array_or_none(std::move(made->data.truth_e)), made->data.burst_truth, made->warnings);
+                        array_or_none(std::move(made->data.truth_e)), made->data.burst_truth, strs_of(made->warnings));
 }
 
 std::string compare(const py::object& reference, const py::object& test) {

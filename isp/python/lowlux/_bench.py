@@ -1,13 +1,12 @@
 """bench: methods of noise reduction, scored on the same raw frames."""
 import dataclasses
 import json
-import os
 import pathlib
 from typing import List
 
 from . import _lowlux
 from ._verbs import denoise
-from ._words import words_of
+from ._words import bytes_of, output_of, words_of
 from .errors import ArgumentError
 
 
@@ -60,12 +59,11 @@ def bench(methods=None, output=None, *, overwrite=False, levels=("draft", "stand
         elif callable(method):
             entries.append((name, "", method))
         elif isinstance(method, str):
-            entries.append((name, f"{name}={method}", None))
+            entries.append((name, name.encode() + b"=" + bytes_of(method, name), None))
         else:
             raise ArgumentError(f"methods: {name} is a {type(method).__name__}, not a function, a command or None",
                                 "methods")
-    options = {"seed": seed, "quick": quick, "pictures": pictures, "pictures_folder": pictures_folder or _pictures(),
-               "threads": threads, "time_limit": time_limit}
-    path = "" if output is None else os.fspath(output)
-    (found,) = json.loads(_lowlux.bench(path, overwrite, words_of(options), entries))
+    options = {"seed": seed, "quick": quick, "pictures": pictures, "threads": threads, "time_limit": time_limit,
+               "pictures_folder": _pictures() if pictures_folder is None else pictures_folder}
+    (found,) = json.loads(_lowlux.bench(output_of(output), overwrite, words_of(options), entries))
     return Leaderboard(found["rows"], found["settings"], found["machine"], found["failures"])

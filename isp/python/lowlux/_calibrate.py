@@ -3,7 +3,7 @@ import json
 import os
 
 from . import _lowlux
-from ._words import words_of
+from ._words import bytes_of, output_of, words_of
 from .errors import ArgumentError
 
 
@@ -24,8 +24,9 @@ class Profile:
         if isinstance(source, dict):
             self._text = _lowlux.profile_text(json.dumps(source))
         else:
-            self.path = os.fspath(source)
-            self._text = _lowlux.read_profile(self.path)
+            path = bytes_of(source, "source")
+            self.path = os.fsdecode(path)
+            self._text = _lowlux.read_profile(path)
         self.data = json.loads(self._text)
 
     def __str__(self):
@@ -38,9 +39,10 @@ class Profile:
 
     def save(self, path, *, overwrite=False):
         """Write the profile as JSON, completely or not at all. Errors: ExistsError, UnwritableError."""
+        path = bytes_of(path, "path")
         self._text = _lowlux.profile_text(json.dumps(self.data))
-        _lowlux.write_profile(self._text, os.fspath(path), overwrite)
-        self.path = os.fspath(path)
+        _lowlux.write_profile(self._text, path, overwrite)
+        self.path = os.fsdecode(path)
 
     def gain(self, iso=None):
         """Return the figures of one gain setting, by its ISO; None for the only one. Error: ArgumentError."""
@@ -74,11 +76,11 @@ def calibrate(kind, frames=(), output=None, *, overwrite=False, **options):
     """
     if kind not in ("black", "colour", "noise", "quoted"):
         raise ArgumentError(f"kind: {kind!r} is none of black, colour, noise, quoted", "kind")
-    path = "" if output is None else os.fspath(output)
+    path = output_of(output)
     named = frames if isinstance(frames, (list, tuple)) else [frames]
-    words = [*words_of(options, ("darks",)), f"--output={path or 'none.json'}"]
-    words += ["--", *(os.fspath(frame) for frame in named)] if named else []
+    words = [*words_of(options, ("darks",)), b"--output=" + (path or b"none.json")]
+    words += [b"--", *(bytes_of(frame, "frames") for frame in named)] if named else []
     text, warnings = _lowlux.calibrate(kind, path, overwrite, words)
     profile = Profile(json.loads(text), warnings)
-    profile.path = path or None
+    profile.path = os.fsdecode(path) if path else None
     return profile

@@ -7,6 +7,7 @@ import numpy as np
 from . import _lowlux
 from . import errors as _errors
 from ._lowlux import RawImage
+from ._words import bytes_of
 
 ImageSizes = collections.namedtuple("ImageSizes", "raw_height raw_width height width top_margin left_margin")
 ImageSizes.__doc__ = "Size of the readout and of its visible part, and where that begins [px], as rawpy names them."
@@ -18,7 +19,7 @@ def read_raw(path):
     Values that the file does not state are None, never guessed.
     Errors: NotFoundError, UnreadableError, MalformedError, UnsupportedError, TooLargeError.
     """
-    return _lowlux.read_raw(os.fspath(path))
+    return _lowlux.read_raw(bytes_of(path, "path"))
 
 
 def _numbers(name, value):
@@ -61,9 +62,10 @@ def write_dng(path, mosaic, *, black=None, white=None, cfa=None, noise=None, mat
         64000 px, of floats of up to 65535 px: others are not read again.
     Errors: those of raw_from_array; ExistsError, UnwritableError, TooLargeError.
     """
-    path = os.fspath(path)
-    if not path.endswith(".dng"):
-        raise _errors.ArgumentError(f"{path}: a raw file is written as DNG: its name ends with .dng", path)
+    path = bytes_of(path, "path")
+    if not path.endswith(b".dng"):
+        name = os.fsdecode(path)
+        raise _errors.ArgumentError(f"{name}: a raw file is written as DNG: its name ends with .dng", name)
     figures = dict(black=black, white=white, cfa=cfa, noise=noise, matrix=matrix, exposure_s=exposure_s, iso=iso,
                    like=like)
     if isinstance(mosaic, RawImage):

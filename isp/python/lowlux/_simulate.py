@@ -1,13 +1,12 @@
 """simulate and compare: raw files of known truth, and how far one image is from another."""
 import dataclasses
 import json
-import os
 from typing import List, Optional
 
 import numpy as np
 
 from . import _lowlux
-from ._words import words_of
+from ._words import bytes_of, output_of, words_of
 from .errors import ArgumentError
 
 
@@ -51,10 +50,10 @@ def simulate(scene, output=None, *, overwrite=False, size=None, light=None, lumi
     options = {name: value for name, value in locals().items() if name not in ("scene", "output", "overwrite")}
     if isinstance(size, (tuple, list)):
         options["size"] = "x".join(str(side) for side in size)
-    path = "" if output is None else os.fspath(output)
+    path = output_of(output)
     if not path and (truth is not None or truth_electrons is not None):
         raise ArgumentError("truth: a file of the truth goes with an output", "truth")
-    words = [*words_of(options, ("lamp",)), f"--output={path or 'none.dng'}", "--", os.fspath(scene)]
+    words = [*words_of(options, ("lamp",)), b"--output=" + (path or b"none.dng"), b"--", bytes_of(scene, "scene")]
     made, report, found, found_e, motion, warnings = _lowlux.simulate(path, overwrite, words)
     return Simulated(made, found, found_e, json.loads(motion) if motion else None, json.loads(report), warnings)
 
@@ -67,5 +66,6 @@ def compare(reference, test):
     Returns a dict as `lowlux compare --json` prints it: CIEDE2000 and other colour differences, psnr_db, ssim, gamut.
     Errors: those of reading; ArgumentError for different sizes, UnsupportedError or MalformedError for NaN.
     """
-    images = [image if isinstance(image, np.ndarray) else os.fspath(image) for image in (reference, test)]
+    images = [image if isinstance(image, np.ndarray) else bytes_of(image, name)
+              for name, image in (("reference", reference), ("test", test))]
     return json.loads(_lowlux.compare(*images))

@@ -7,7 +7,7 @@ from typing import Optional
 import numpy as np
 
 from . import _lowlux
-from ._words import input_of, inputs_of, words_of
+from ._words import input_of, inputs_of, output_of, words_of
 from .errors import ArgumentError
 
 _FILES = ("dark_frame", "bias_frame", "flat_frame")
@@ -65,10 +65,11 @@ class Merged:
 
 def _call(verb, inputs, output, overwrite, words):
     """Call a verb, whose parser wants a name of an output and of inputs."""
-    path = "" if output is None else os.fspath(output)
-    if path.endswith("/") or path and os.path.isdir(path):
-        raise ArgumentError(f"{path}: the output is one file, not a folder", path)
-    return verb(inputs, path, overwrite, [*words, f"--output={path or 'none'}", "--", *(name for name, _ in inputs)])
+    path = output_of(output)
+    if path.endswith(b"/") or path and os.path.isdir(path):
+        raise ArgumentError(f"{os.fsdecode(path)}: the output is one file, not a folder", os.fsdecode(path))
+    words = [*words, b"--output=" + (path or b"none"), b"--", *(name for name, _ in inputs)]
+    return verb(inputs, path, overwrite, words)
 
 
 def _reference(reference, inputs):
@@ -151,5 +152,7 @@ def merge(raws, output=None, *, overwrite=False, align=None, foreground=None, dr
 
 
 def _check_dng(output):
-    if output is not None and not os.fspath(output).endswith(".dng"):
-        raise ArgumentError(f"{os.fspath(output)}: a raw file is written as DNG: its name ends with .dng", os.fspath(output))
+    path = output_of(output)
+    if path and not path.endswith(b".dng"):
+        name = os.fsdecode(path)
+        raise ArgumentError(f"{name}: a raw file is written as DNG: its name ends with .dng", name)

@@ -1,4 +1,5 @@
-"""Arguments of Python as those of the command."""
+"""Arguments of Python as those of the command. All texts go to C++ as bytes, so that any name of a file does."""
+import numbers
 import os
 
 import numpy as np
@@ -11,16 +12,39 @@ _FLAGS = frozenset(["even_light", "half", "maps", "masked", "merge", "no_truth",
                     "seeing_map", "steady_light"])
 
 
-def _word(flag, value):
-    if isinstance(value, (list, tuple)):
-        return f"{flag}={','.join(_text(item) for item in value)}"
-    return f"{flag}={_text(value)}"
+def bytes_of(text, name):
+    """Return a text or a path as bytes of the file system. ArgumentError if it is empty or holds a NUL."""
+    try:
+        found = os.fsencode(text)
+    except (TypeError, UnicodeEncodeError):
+        what = repr(text) if isinstance(text, str) else f"a {type(text).__name__}"
+        raise errors.ArgumentError(f"{name}: {what} is neither a text nor a path", name) from None
+    if not found:
+        raise errors.ArgumentError(f"{name}: an empty text names nothing", name)
+    if b"\0" in found:
+        raise errors.ArgumentError(f"{name}: {text!r} holds a NUL, which no file's name does", name)
+    return found
 
 
-def _text(value):
-    if hasattr(value, "__fspath__"):
-        return os.fsdecode(value)
-    return repr(float(value)) if isinstance(value, float) else str(value)
+def output_of(output):
+    """Return the path of an output as bytes; empty for None, which writes nothing."""
+    return b"" if output is None else bytes_of(output, "output")
+
+
+def _value(name, value):
+    if isinstance(value, (bool, np.bool_)):
+        raise errors.ArgumentError(
+            f'{name}: it takes a value, not {value}: None is the default, and "off" turns off what can be', name)
+    if isinstance(value, numbers.Number):
+        return (repr(float(value)) if isinstance(value, float) else str(value)).encode()
+    return bytes_of(value, name)
+
+
+def _values(value):
+    """Return what an argument lists, and itself as a list if it is one value."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    return value if isinstance(value, (list, tuple)) else [value]
 
 
 def _truth(name, value):
@@ -36,33 +60,32 @@ def words_of(options, files=()):
     """
     words = []
     for name, value in options.items():
-        flag = "--" + name.replace("_", "-")
+        flag = b"--" + name.replace("_", "-").encode()
         if value is None:
             continue
         if name in _FLAGS:
             words += [flag] if _truth(name, value) else []
-        elif isinstance(value, (bool, np.bool_)):
-            raise errors.ArgumentError(
-                f'{name}: it takes a value, not {value}: None is the default, and "off" turns off what can be', name)
-        elif name in files:
-            words += [_word(flag, file) for file in (value if isinstance(value, (list, tuple)) else [value])]
-        else:
-            words.append(_word(flag, value))
+            continue
+        values = [_value(name, one) for one in _values(value)]
+        words += [flag + b"=" + one for one in (values if name in files else [b",".join(values)])]
     return words
 
 
 def input_of(raw, name="raw"):
-    """Return the name and the frame (None for a file) of a path or a RawImage."""
+    """Return the name, as bytes, and the frame (None for a file) of a path or a RawImage."""
     if isinstance(raw, RawImage):
-        return name, raw
-    try:
-        return os.fspath(raw), None
-    except TypeError:
+        return name.encode(), raw
+    if not isinstance(raw, (str, bytes, os.PathLike)):
         raise errors.ArgumentError(
-            f"{name}: a {type(raw).__name__} is neither a path nor a RawImage; raw_from_array makes one of an array",
-            name) from None
+            f"{name}: a {type(raw).__name__} is neither a path nor a RawImage; raw_from_array makes one of an array", name)
+    path = bytes_of(raw, name)
+    if path == b"-":
+        raise errors.ArgumentError(f"{name}: standard input is for the command; the file of that name is ./-", name)
+    return path, None
 
 
 def inputs_of(raws):
-    """Return input_of of each."""
+    """Return input_of of each of a list."""
+    if isinstance(raws, (str, bytes, os.PathLike, RawImage)) or not hasattr(raws, "__iter__"):
+        raise errors.ArgumentError(f"raws: a {type(raws).__name__} is not a list of frames", "raws")
     return [input_of(raw, f"raws[{index}]") for index, raw in enumerate(raws)]
