@@ -80,5 +80,12 @@ def test_methods_that_are_none_are_refused(tmp_path):
                     {"a=FOO": "cp {in} {out}"}, {"a=cp {in} {out}": None}, {"": lambda raw: raw}):
         with pytest.raises(lowlux.ArgumentError):
             lowlux.bench(methods, quick=True, pictures_folder=PICTURES)
+    for methods in ({1: lambda raw: raw}, {None: "cp {in} {out}"}, {b"x": "cp {in} {out}"}, [lambda raw: raw], "cp {in} {out}",
+                    {"x": ""}, {"\udc80": lambda raw: raw}):
+        with pytest.raises(lowlux.ArgumentError):
+            lowlux.bench(methods, quick=True, pictures_folder=PICTURES)
+    for levels in ("draft", 3, b"draft"):
+        with pytest.raises(lowlux.ArgumentError, match="levels"):
+            lowlux.bench({}, levels=levels, quick=True, pictures_folder=PICTURES)
     with pytest.raises(lowlux.NotFoundError):
         lowlux.bench({}, quick=True, pictures_folder=tmp_path / "none")

@@ -149,6 +149,13 @@ BAD = {
     "narrow": (np.zeros((24, 21), np.uint16), {}, "21 x 24 pixels: expected 22"),
     "long": (np.zeros((22, 64001), np.uint16), {}, "64001 x 22 pixels: expected 22 to 64000"),
     "long floats": (np.zeros((1, 65536), np.float32), {}, "65536 x 1 pixels"),
+    "rows that differ": ([[1], [2, 3]], {}, "rows differ"),
+    "exposure in words": (np.zeros((24, 24), np.uint16), dict(exposure_s="x"), "exposure_s: 'x' is not a number"),
+    "ISO of two": (np.zeros((24, 24), np.uint16), dict(iso=[1, 2]), "iso: .* is not a number"),
+    "mosaic of 5": (np.zeros((24, 24), np.uint16), dict(cfa=5), "cfa: a int"),
+    "empty mosaic": (np.zeros((24, 24), np.uint16), dict(cfa=""), "cfa"),
+    "like a path": (np.zeros((24, 24), np.uint16), dict(like="a.dng"), "like: a str is not a RawImage"),
+    "like an array": (np.zeros((24, 24), np.uint16), dict(like=np.zeros((24, 24))), "like: a ndarray is not a RawImage"),
     "exposure of NaN": (np.zeros((24, 24), np.uint16), dict(exposure_s=np.nan), "exposure_s: .* above 0"),
     "endless exposure": (np.zeros((24, 24), np.uint16), dict(exposure_s=np.inf), "exposure_s: .* above 0"),
     "exposure of 0": (np.zeros((24, 24), np.uint16), dict(exposure_s=0), "exposure_s: .* above 0"),
@@ -252,6 +259,22 @@ def test_names_of_any_bytes_and_bytes_themselves_are_paths(night, tmp_path):
     with pytest.raises(lowlux.NotFoundError) as caught:
         lowlux.read_raw(folder + b"/none\xff")
     assert caught.value.where == os.fsdecode(folder + b"/none\xff")
+
+
+@pytest.mark.parametrize("cfa", PHASES)
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (6, 1), (5, 3)])
+def test_levels_of_frames_that_lack_filters(shape, cfa):
+    """The filters are those of the 2x2 cell, whether or not the frame has a pixel of each."""
+    raw = lowlux.raw_from_array(np.full(shape, 100, np.uint16), black=[60, 61, 63, 62], white=4095, cfa=cfa)
+    level = dict(zip(np.ravel(PHASES[cfa]).tolist(), raw.black_dn.ravel().tolist()))
+    assert raw.black_level_per_channel == [level[channel] for channel in range(4)]
+
+
+def test_the_colour_of_a_pixel_needs_a_mosaic(rng):
+    for raw in (lowlux.raw_from_array(codes(rng), cfa="MONO", **LEVELS),
+                lowlux.raw_from_array(rng.random((24, 24, 3)), black=0, white=1)):
+        with pytest.raises(lowlux.ArgumentError, match="no mosaic"):
+            raw.raw_color(0, 0)
 
 
 EXTREMES = {

@@ -191,6 +191,20 @@ def test_frames_that_memory_does_not_hold_are_refused_at_once(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_sizes_may_be_arrays():
+    options = dict(seed=3, no_truth=True)
+    for size in (np.array([40, 30]), np.array([40.0, 30.0]), [np.int16(40), 30]):
+        made = lowlux.simulate("flat", size=size, **options).frames[0]
+        np.testing.assert_array_equal(made.raw_image, lowlux.simulate("flat", size=(40, 30), **options).frames[0].raw_image)
+
+
+@pytest.mark.parametrize("name", ["help", "help_all", "json", "force", "quiet", "no_config"])
+def test_options_that_print_are_for_the_command(name, capfd):
+    with pytest.raises(lowlux.ArgumentError, match=f"{name}: .*command"):
+        lowlux.calibrate("quoted", "thesis", **{name: True})
+    assert capfd.readouterr() == ("", "")
+
+
 def test_unknown_sensors_and_kinds():
     with pytest.raises(lowlux.Error, match="no_such"):
         lowlux.calibrate("quoted", "no_such")

@@ -1,4 +1,5 @@
 """bench: methods of noise reduction, scored on the same raw frames."""
+import collections.abc
 import dataclasses
 import json
 import pathlib
@@ -52,14 +53,22 @@ def bench(methods=None, output=None, *, overwrite=False, levels=("draft", "stand
     Returns Leaderboard. A method that fails is left out, and a line in failures says why.
     Errors: ArgumentError; NotFoundError without pictures; ExistsError, UnwritableError.
     """
-    entries = [(f"lowlux-{level}", "", _level(level)) for level in levels]
-    for name, method in (methods or {}).items():
+    if isinstance(levels, (str, bytes)) or not hasattr(levels, "__iter__"):
+        raise ArgumentError(f"levels: {levels!r} is not a list of names", "levels")
+    methods = {} if methods is None else methods
+    if not isinstance(methods, collections.abc.Mapping):
+        raise ArgumentError(f"methods: a {type(methods).__name__} is not a dict of names and methods", "methods")
+    entries = [(bytes_of(f"lowlux-{level}", "levels"), b"", _level(level)) for level in levels]
+    for name, method in methods.items():
+        title = bytes_of(name, "methods") if isinstance(name, str) else None
+        if title is None:
+            raise ArgumentError(f"methods: {name!r} is not a name", "methods")
         if method is None:
-            entries.append((name, name, None))
+            entries.append((title, title, None))
         elif callable(method):
-            entries.append((name, "", method))
+            entries.append((title, b"", method))
         elif isinstance(method, str):
-            entries.append((name, name.encode() + b"=" + bytes_of(method, name), None))
+            entries.append((title, title + b"=" + bytes_of(method, name), None))
         else:
             raise ArgumentError(f"methods: {name} is a {type(method).__name__}, not a function, a command or None",
                                 "methods")

@@ -65,6 +65,10 @@ class Profile:
         return (gain * noise_e) ** 2 + 1 / 12 + gain * signal_dn
 
 
+# Options of the command that print, or that this function has arguments for.
+_OF_THE_COMMAND = frozenset(["force", "help", "help_all", "json", "no_config", "quiet"])
+
+
 def calibrate(kind, frames=(), output=None, *, overwrite=False, **options):
     """Measure a camera, as `lowlux calibrate KIND` does with the same options.
 
@@ -74,8 +78,10 @@ def calibrate(kind, frames=(), output=None, *, overwrite=False, **options):
     options: those of `lowlux calibrate KIND --help`, with _ for -: darks=[...], exposure_time= [s], iso=, add_to=...
     Returns the Profile. Errors: ArgumentError for options and unknown sensors; InsufficientError; those of reading.
     """
-    if kind not in ("black", "colour", "noise", "quoted"):
+    if kind not in ["black", "colour", "noise", "quoted"]:
         raise ArgumentError(f"kind: {kind!r} is none of black, colour, noise, quoted", "kind")
+    for name in sorted(_OF_THE_COMMAND.intersection(options)):
+        raise ArgumentError(f"{name}: it is an option of the command alone", name)
     path = output_of(output)
     named = frames if isinstance(frames, (list, tuple)) else [frames]
     words = [*words_of(options, ("darks",)), b"--output=" + (path or b"none.json")]

@@ -32,6 +32,21 @@ def _numbers(name, value):
         raise _errors.ArgumentError(f"{name}: {value!r} is neither a number nor numbers", name) from None
 
 
+def _number(name, value):
+    """Return an argument as a float; None stays."""
+    try:
+        return None if value is None else float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise _errors.ArgumentError(f"{name}: {value!r} is not a number", name) from None
+
+
+def _array(mosaic):
+    try:
+        return np.asarray(mosaic)
+    except (TypeError, ValueError):
+        raise _errors.ArgumentError(f"mosaic: a {type(mosaic).__name__} whose rows differ is no array", "mosaic") from None
+
+
 def raw_from_array(mosaic, *, black=None, white=None, cfa=None, noise=None, matrix=None, exposure_s=None, iso=None,
                    like=None):
     """Make a raw frame of a copy of an array, for develop, denoise, merge and write_dng.
@@ -49,8 +64,11 @@ def raw_from_array(mosaic, *, black=None, white=None, cfa=None, noise=None, matr
         size of its readout or of its visible part.
     Errors: ArgumentError for other types, shapes and values, and for figures that contradict each other; TooLargeError.
     """
-    return _lowlux.from_array(np.asarray(mosaic), _numbers("black", black), _numbers("white", white), cfa or "",
-                              _numbers("noise", noise), _numbers("matrix", matrix), exposure_s, iso, like)
+    if like is not None and not isinstance(like, RawImage):
+        raise _errors.ArgumentError(f"like: a {type(like).__name__} is not a RawImage; read_raw reads one", "like")
+    return _lowlux.from_array(_array(mosaic), _numbers("black", black), _numbers("white", white),
+                              b"" if cfa is None else bytes_of(cfa, "cfa"), _numbers("noise", noise),
+                              _numbers("matrix", matrix), _number("exposure_s", exposure_s), _number("iso", iso), like)
 
 
 def write_dng(path, mosaic, *, black=None, white=None, cfa=None, noise=None, matrix=None, exposure_s=None, iso=None,
@@ -104,7 +122,8 @@ def _black_level_per_channel(self):
         return None
     if self.cfa in ("MONO", "RGB"):
         return black.ravel()[:len(self.color_desc)].tolist()
-    order = self.raw_colors_visible[:2, :2].ravel().tolist()
+    sizes = self.sizes
+    order = np.roll(self.raw_pattern, (-sizes.top_margin, -sizes.left_margin), (0, 1)).ravel().tolist()
     return [float(black.ravel()[order.index(channel)]) for channel in range(4)]
 
 
@@ -118,7 +137,9 @@ def _raw_value(self, row, column):
 
 
 def _raw_color(self, row, column):
-    """Return the index into color_desc of the filter at a row and column of raw_image; it needs a mosaic."""
+    """Return the index into color_desc of the filter at a row and column of raw_image. ArgumentError without mosaic."""
+    if self.raw_pattern is None:
+        raise _errors.ArgumentError(f"raw_color: a frame of {self.cfa} has no mosaic", "raw_color")
     return int(self.raw_colors[row, column])
 
 
