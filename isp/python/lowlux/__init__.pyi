@@ -1,6 +1,6 @@
 """Types of lowlux. Units, shapes and errors are in the docstrings of the functions."""
 import os
-from typing import Any, Callable, Dict, List, Literal, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, List, Literal, Mapping, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +19,9 @@ from .errors import UnwritableError as UnwritableError
 __version__: str
 __all__: List[str]
 
-_Path = Union[str, os.PathLike[str]]
+_Path = Union[str, bytes, os.PathLike[str], os.PathLike[bytes]]
 _Raw = Union[_Path, RawImage]
+_Numbers = Union[Sequence[float], npt.NDArray[Any]]
 
 
 class ImageSizes(NamedTuple):
@@ -174,7 +175,7 @@ def develop(
     bits: Optional[int] = ...,
     quality: Optional[int] = ...,
     exposure: Union[str, float, None] = ...,
-    wb: Union[str, float, Sequence[float], None] = ...,
+    wb: Union[str, float, _Numbers, None] = ...,
     tone: Optional[Literal["standard", "none"]] = ...,
     brightness: Union[str, float, None] = ...,
     contrast: Optional[float] = ...,
@@ -184,7 +185,7 @@ def develop(
     half: bool = ...,
     highlights: Optional[Literal["clip", "reconstruct"]] = ...,
     sharpen: Union[str, float, None] = ...,
-    crop: Union[str, Sequence[int], None] = ...,
+    crop: Union[str, _Numbers, None] = ...,
     max_size: Optional[int] = ...,
     baseline_exposure: Optional[Literal["on", "off"]] = ...,
     camera_profile: Optional[Literal["embedded", "none"]] = ...,
@@ -200,10 +201,10 @@ def develop(
     coefficients: Optional[_Path] = ...,
     display_luminance: Optional[float] = ...,
     seeing_map: bool = ...,
-    black: Union[str, float, Sequence[float], _Path, None] = ...,
+    black: Union[str, float, _Numbers, _Path, None] = ...,
     profile: Optional[_Path] = ...,
     gain_setting: Optional[str] = ...,
-    noise: Optional[Tuple[float, float]] = ...,
+    noise: Optional[_Numbers] = ...,
     dark_estimate: Optional[Literal["auto", "off"]] = ...,
     repair: Optional[Literal["auto", "off"]] = ...,
     denoise: Optional[Literal["auto", "off", "draft", "standard", "high", "best"]] = ...,
@@ -232,10 +233,10 @@ def denoise(
     output: Optional[_Path] = ...,
     *,
     overwrite: bool = ...,
-    black: Union[str, float, Sequence[float], _Path, None] = ...,
+    black: Union[str, float, _Numbers, _Path, None] = ...,
     profile: Optional[_Path] = ...,
     gain_setting: Optional[str] = ...,
-    noise: Optional[Tuple[float, float]] = ...,
+    noise: Optional[_Numbers] = ...,
     dark_estimate: Optional[Literal["auto", "off"]] = ...,
     repair: Optional[Literal["auto", "off"]] = ...,
     denoise: Optional[Literal["auto", "off", "draft", "standard", "high", "best"]] = ...,
@@ -261,10 +262,10 @@ def merge(
     mean: Optional[Literal["robust", "plain"]] = ...,
     reference: Optional[_Raw] = ...,
     false_alarm: Optional[float] = ...,
-    black: Union[str, float, Sequence[float], _Path, None] = ...,
+    black: Union[str, float, _Numbers, _Path, None] = ...,
     profile: Optional[_Path] = ...,
     gain_setting: Optional[str] = ...,
-    noise: Optional[Tuple[float, float]] = ...,
+    noise: Optional[_Numbers] = ...,
     dark_estimate: Optional[Literal["auto", "off"]] = ...,
     repair: Optional[Literal["auto", "off"]] = ...,
     line_noise: Optional[Literal["auto", "off"]] = ...,
@@ -282,7 +283,7 @@ def simulate(
     output: Optional[_Path] = ...,
     *,
     overwrite: bool = ...,
-    size: Union[str, Tuple[float, float], None] = ...,
+    size: Union[str, _Numbers, None] = ...,
     light: Optional[_Path] = ...,
     luminance: Optional[float] = ...,
     stars: Optional[int] = ...,
@@ -304,18 +305,18 @@ def simulate(
     seed: Optional[int] = ...,
     sensor_seed: Optional[int] = ...,
     frames: Optional[int] = ...,
-    tolerance: Union[float, Sequence[float], None] = ...,
+    tolerance: Union[float, _Numbers, None] = ...,
     shake: Optional[float] = ...,
     roll: Optional[float] = ...,
     dither: Optional[float] = ...,
     field_rotation: Optional[float] = ...,
-    field_centre: Union[str, Tuple[float, float], None] = ...,
-    drift: Union[str, Tuple[float, float], None] = ...,
+    field_centre: Union[str, _Numbers, None] = ...,
+    drift: Union[str, _Numbers, None] = ...,
     horizon: Optional[int] = ...,
     movers: Optional[int] = ...,
     mover_size: Optional[float] = ...,
     mover_speed: Optional[float] = ...,
-    bracket: Union[str, float, Sequence[float], None] = ...,
+    bracket: Union[str, float, _Numbers, None] = ...,
     reduce: Optional[int] = ...,
     system_gain: Optional[float] = ...,
     read_noise: Optional[float] = ...,
@@ -323,7 +324,7 @@ def simulate(
     bits: Optional[int] = ...,
     black_level: Optional[float] = ...,
     white_level: Optional[float] = ...,
-    dark_current: Union[str, float, Sequence[float], None] = ...,
+    dark_current: Union[str, float, _Numbers, None] = ...,
     dark_temperature: Optional[float] = ...,
     dark_doubling: Optional[float] = ...,
     prnu: Optional[float] = ...,

@@ -49,7 +49,8 @@ def simulate(scene, output=None, *, overwrite=False, size=None, light=None, lumi
     """
     options = {name: value for name, value in locals().items() if name not in ("scene", "output", "overwrite")}
     if isinstance(size, (tuple, list, np.ndarray)):
-        options["size"] = "x".join(str(side) for side in np.ravel(size).tolist())
+        sides = size.ravel().tolist() if isinstance(size, np.ndarray) else size
+        options["size"] = "x".join(str(side) for side in sides)
     path = output_of(output)
     if not path and (truth is not None or truth_electrons is not None):
         raise ArgumentError("truth: a file of the truth goes with an output", "truth")
