@@ -58,7 +58,7 @@ py::tuple simulate(const std::string& output, bool overwrite, const Words& words
     made = simulated(output, overwrite, words);
   }
   std::vector<RawImagePtr> frames;
-  for (RawFrame& frame : made->data.frames) frames.push_back(std::make_shared<RawImage>(std::move(frame)));
+  for (RawFrame& frame : made->data.frames) frames.push_back(std::make_shared<RawImage>(RawImage{std::move(frame)}));
   return py::make_tuple(frames, made->report, array_or_none(std::move(made->data.truth)),
                         array_or_none(std::move(made->data.truth_e)), made->data.burst_truth, strs_of(made->warnings));
 }
