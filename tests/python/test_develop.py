@@ -165,48 +165,6 @@ def test_wrong_options_have_the_message_of_the_command(options, night, tmp_path,
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("value", [True, False, np.True_, np.False_])
-@pytest.mark.parametrize("name", ["denoise", "repair", "line_noise", "sharpen", "dark_estimate", "baseline_exposure", "look",
-                                  "effects", "exposure", "max_size", "dark_frame"])
-def test_a_truth_value_is_for_flags_only(name, value, night, tmp_path):
-    with pytest.raises(lowlux.ArgumentError, match=f'{name}: .*"off"'):
-        lowlux.develop(night, tmp_path / "a.png", **{name: value})
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_flags_are_true_or_false(night):
-    assert lowlux.develop(night, half=np.True_).image.shape == (80, 120, 3)
-    assert lowlux.develop(night, half=np.False_).image.shape == (160, 240, 3)
-    for value in ("off", 0, 1, [True]):
-        with pytest.raises(lowlux.ArgumentError, match="half: .*True nor False"):
-            lowlux.develop(night, half=value)
-
-
-def test_arrays_are_values_like_tuples(night):
-    of_tuples = lowlux.develop(night, wb=(2.0, 1.0, 1.5), crop=(8, 6, 60, 40), denoise="off").image
-    of_arrays = lowlux.develop(night, wb=np.array([2.0, 1, 1.5]), crop=np.array([8, 6, 60, 40]), denoise="off").image
-    np.testing.assert_array_equal(of_arrays, of_tuples)
-    of_scalars = lowlux.develop(night, exposure=np.float32(0.5), max_size=np.int64(50), contrast=np.array(1.25)).image
-    np.testing.assert_array_equal(of_scalars, lowlux.develop(night, exposure=0.5, max_size=50, contrast=1.25).image)
-    for bad in (np.eye(3), object(), {"r": 2}, lowlux.read_raw(night), [[2, 1, 1]], lowlux):
-        with pytest.raises(lowlux.ArgumentError, match="wb"):
-            lowlux.develop(night, wb=bad)
-
-
-def test_one_frame_is_no_list_of_frames(night):
-    raw = lowlux.read_raw(night)
-    for frames in (str(night), night, bytes(night), raw, 3, None):
-        with pytest.raises(lowlux.ArgumentError, match="not a list of frames"):
-            lowlux.merge(frames)
-
-
-def test_standard_input_is_for_the_command(burst):
-    for call in (lambda: lowlux.develop("-"), lambda: lowlux.denoise("-"), lambda: lowlux.merge([*burst, "-"]),
-                 lambda: lowlux.develop([b"-", *burst])):
-        with pytest.raises(lowlux.ArgumentError, match="standard input"):
-            call()
-
-
 def test_bad_inputs_and_outputs(night, tmp_path, rng):
     with pytest.raises(lowlux.ArgumentError, match="raw_from_array"):
         lowlux.develop(np.zeros((24, 24), np.uint16))

@@ -1,8 +1,6 @@
 """Raw frames: views, and files written of arrays of all kinds, against what NumPy itself makes of them."""
 import copy
 import gc
-import os
-import pathlib
 import pickle
 import warnings
 
@@ -212,53 +210,6 @@ def test_a_raw_image_is_made_by_functions_only(night):
                  lambda: copy.copy(raw), lambda: copy.deepcopy(raw), lambda: pickle.dumps(raw)):
         with pytest.raises(TypeError):
             make()
-
-
-def test_a_text_without_an_end_or_with_one_inside_is_no_path(night, tmp_path, rng):
-    """A NUL would end the name in C: the file `nul` would be written."""
-    raw, image = lowlux.read_raw(night), np.zeros((24, 24, 3), np.uint8)
-    profile = lowlux.calibrate("quoted", "thesis")
-    for bad in (str(tmp_path / "nul\0x.dng"), os.fsencode(tmp_path) + b"/nul\0x.dng", "", b"", "\ud800.dng"):
-        calls = [lambda: lowlux.read_raw(bad), lambda: lowlux.write_dng(bad, raw), lambda: profile.save(bad),
-                 lambda: lowlux.Profile(bad), lambda: lowlux.compare(image, bad), lambda: lowlux.simulate(bad, size=(32, 32)),
-                 lambda: lowlux.simulate("flat", bad, size=(32, 32)), lambda: lowlux.develop(bad),
-                 lambda: lowlux.develop(raw, bad), lambda: lowlux.develop(raw, profile=bad),
-                 lambda: lowlux.develop(raw, dark_frame=[bad]), lambda: lowlux.denoise(raw, bad),
-                 lambda: lowlux.merge([raw, bad]), lambda: lowlux.merge([raw, raw], bad),
-                 lambda: lowlux.calibrate("black", bad), lambda: lowlux.calibrate("quoted", "thesis", bad),
-                 lambda: lowlux.bench({}, bad, quick=True), lambda: lowlux.bench({}, pictures_folder=bad, quick=True),
-                 lambda: lowlux.bench({"x": bad}, quick=True)]
-        for call in calls:
-            with pytest.raises(lowlux.ArgumentError):
-                call()
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_names_of_any_bytes_and_bytes_themselves_are_paths(night, tmp_path):
-    raw = lowlux.read_raw(night)
-    folder = os.fsencode(tmp_path) + b"/\xff\xfe"
-    os.mkdir(folder)
-    for path in (folder + b"/a\xe4.dng", os.fsdecode(folder + b"/b\xe4.dng"), pathlib.Path(os.fsdecode(folder)) / "c.dng"):
-        name = os.fsdecode(path)
-        lowlux.write_dng(path, raw)
-        np.testing.assert_array_equal(lowlux.read_raw(path).raw_image, raw.raw_image)
-        with pytest.raises(lowlux.ExistsError) as caught:
-            lowlux.write_dng(path, raw)
-        assert caught.value.where == name and name in str(caught.value)
-        made = lowlux.develop(path, name + ".png", half=True, maps=True)
-        np.testing.assert_array_equal(lowlux.develop(raw, half=True).image, made.image)
-        assert lowlux.denoise(path, denoise="draft").plan["denoise"]["level"] == "draft"
-        profile = lowlux.calibrate("quoted", "thesis", name + ".json")
-        assert profile.path == name + ".json" and lowlux.Profile(os.fsencode(profile.path)).data == profile.data
-        lowlux.develop(path, profile=profile, half=True)
-        assert lowlux.compare(name + ".png", os.fsencode(name + ".png"))["identical_codes"]
-    burst = lowlux.simulate("chart", folder + b"/s\xf6.dng", size=(64, 48), frames=2, shake=1)
-    names = [os.fsdecode(folder + b"/s\xf6_000%d.dng" % index) for index in range(2)]
-    np.testing.assert_array_equal(lowlux.read_raw(names[1]).raw_image, burst.frames[1].raw_image)
-    assert len(lowlux.merge(names, reference=os.fsencode(names[1])).plan["frames"]) == 2
-    with pytest.raises(lowlux.NotFoundError) as caught:
-        lowlux.read_raw(folder + b"/none\xff")
-    assert caught.value.where == os.fsdecode(folder + b"/none\xff")
 
 
 @pytest.mark.parametrize("cfa", PHASES)

@@ -163,46 +163,11 @@ def test_wrong_simulations_have_the_message_of_the_command(options, tmp_path, co
     assert list(tmp_path.iterdir()) == []
 
 
-def test_truth_values_are_for_flags_only(burst, tmp_path):
-    with pytest.raises(lowlux.ArgumentError, match="effects"):
-        lowlux.simulate("chart", effects=False)
-    with pytest.raises(lowlux.ArgumentError, match="system_gain"):
-        lowlux.calibrate("black", burst, tmp_path / "a.json", system_gain=True)
-    assert lowlux.simulate("flat", size=(32, 32), no_truth=True).truth is None
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_every_flag_of_the_command_is_one_of_python(command):
-    """In the help, an option without a value is followed by spaces."""
-    from lowlux import _words
-    flags = set()
-    for verb in ("develop", "denoise", "merge", "simulate", "bench", *(f"calibrate {kind}" for kind in
-                                                                      ("black", "noise", "colour", "quoted"))):
-        page = command(*verb.split(), "--help-all")
-        flags |= set(re.findall(r"^  (?:-\w,)?--([a-z-]+)(?:  |$)", page, re.MULTILINE))
-    of_the_command = NOT_ARGUMENTS | {"skip-existing", "sync", "calibrate-cost"}
-    assert {flag.replace("-", "_") for flag in flags - of_the_command} == _words._FLAGS
-
-
 def test_frames_that_memory_does_not_hold_are_refused_at_once(tmp_path):
     for options in (dict(size=(65535, 65535), frames=10000), dict(size=(65535, 65535), frames=10000, no_truth=True)):
         with pytest.raises(lowlux.TooLargeError, match="not enough memory .*10000 of 65535 x 65535 pixels"):
             lowlux.simulate("flat", tmp_path / "a.dng", **options)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_sizes_may_be_arrays():
-    options = dict(seed=3, no_truth=True)
-    for size in (np.array([40, 30]), np.array([40.0, 30.0]), [np.int16(40), 30]):
-        made = lowlux.simulate("flat", size=size, **options).frames[0]
-        np.testing.assert_array_equal(made.raw_image, lowlux.simulate("flat", size=(40, 30), **options).frames[0].raw_image)
-
-
-@pytest.mark.parametrize("name", ["help", "help_all", "json", "force", "quiet", "no_config"])
-def test_options_that_print_are_for_the_command(name, capfd):
-    with pytest.raises(lowlux.ArgumentError, match=f"{name}: .*command"):
-        lowlux.calibrate("quoted", "thesis", **{name: True})
-    assert capfd.readouterr() == ("", "")
 
 
 def test_unknown_sensors_and_kinds():
