@@ -19,10 +19,10 @@ namespace {
 
 using Wrong = std::optional<std::string>;
 
-/// Returns an integer from min_side to 65535; 0 for other text.
+/// Returns an integer from min_side to max_side; 0 for other text.
 int side_of(const std::string& text) {
   const double side = number_of(text).value_or(0);
-  return side >= min_side && side <= 65535 && side == std::floor(side) ? static_cast<int>(side) : 0;
+  return side >= min_side && side <= max_side && side == std::floor(side) ? static_cast<int>(side) : 0;
 }
 
 Wrong set_size(const std::string& text, SceneArgs& scene) {
@@ -31,7 +31,8 @@ Wrong set_size(const std::string& text, SceneArgs& scene) {
   scene.width = side_of(text.substr(0, x));
   scene.height = side_of(text.substr(std::min(x + 1, text.size())));
   if (scene.width == 0 || scene.height == 0) {
-    return fmt::format("is not WIDTHxHEIGHT of {} to 65535 pixels: raw developers read no smaller frames", min_side);
+    return fmt::format("is not WIDTHxHEIGHT of {} to {} pixels: raw developers read no other frames", min_side,
+                       max_side);
   }
   return std::nullopt;
 }

@@ -15,6 +15,8 @@ namespace lowlux::cli {
 /// Minimum width and height of a raw image: LibRaw, and with it most raw developers, takes smaller ones for thumbnails.
 /// Masked columns do not count.
 inline constexpr int min_side = 22;
+/// Maximum width and height of a raw image: LibRaw refuses greater ones.
+inline constexpr int max_side = 64000;
 
 /// Holds a distant lamp: --lamp X,Y,LIGHT,LUMINANCE.
 struct LampArgs {
