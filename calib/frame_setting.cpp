@@ -52,6 +52,11 @@ Result<FrameSetting> setting_of(const RawDn& raw) {
                       a.height,      raw.white_dn,   raw.info.iso, raw.info.exposure_s, raw.info.temperature_c};
 }
 
+bool same_temperature(const std::optional<double>& first_c, const std::optional<double>& second_c) {
+  if (!first_c || !second_c) return first_c.has_value() == second_c.has_value();
+  return std::fabs(*first_c - *second_c) <= same_temperature_c;
+}
+
 Result<void> check_same_camera(const FrameSetting& first, const FrameSetting& second, const std::string& what) {
   if (first.make != second.make || first.model != second.model) {
     return differs(what, fmt::format("is of camera \"{}\"", camera_name(second.make, second.model)),

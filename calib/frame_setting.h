@@ -29,6 +29,12 @@ struct FrameSetting {
 /// a white level that is not positive, an exposure time that is negative or NaN.
 Result<FrameSetting> setting_of(const RawDn& raw);
 
+/// Largest temperature difference of frames of one setting.
+inline constexpr double same_temperature_c = 1;
+
+/// Returns whether two temperatures agree within same_temperature_c, or neither is stated.
+bool same_temperature(const std::optional<double>& first_c, const std::optional<double>& second_c);
+
 /// Returns an error unless both are of the same camera, size, mosaic, white level and gain; `what` names the second.
 Result<void> check_same_camera(const FrameSetting& first, const FrameSetting& second, const std::string& what);
 

@@ -15,8 +15,7 @@ namespace {
 
 constexpr double cut_deviations = 5;
 constexpr double dithered_variance_dn2 = 0.25 + quantisation_dn2;  // half a code of noise, with quantisation
-constexpr double same_temperature_c = 1;
-constexpr int iterations = 3;  // of corrections that are a small fraction of a mean
+constexpr int iterations = 3;                                      // of corrections that are a small fraction of a mean
 
 void name_temperatures(DarkFit& s) {
   const auto celsius = [](const DarkGroup& g) { return g.setting.temperature_c.value_or(0); };

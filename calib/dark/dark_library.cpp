@@ -11,9 +11,7 @@ namespace lowlux::calib {
 namespace {
 
 bool belongs_to(const FrameSetting& stack, const FrameSetting& frame) {
-  if (stack.exposure_s != frame.exposure_s) return false;
-  if (stack.temperature_c.has_value() != frame.temperature_c.has_value()) return false;
-  return !stack.temperature_c || std::fabs(*stack.temperature_c - *frame.temperature_c) <= same_temperature_c;
+  return stack.exposure_s == frame.exposure_s && same_temperature(stack.temperature_c, frame.temperature_c);
 }
 
 }  // namespace

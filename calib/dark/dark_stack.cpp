@@ -47,11 +47,9 @@ Result<void> DarkStack::add(const RawDn& raw) {
   if (frames_ == 0) {
     if (auto begun = begin(raw, std::move(*setting)); !begun) return begun;
   } else {
-    const auto what = fmt::format("{} {}", kind_, frames_ + 1);
+    const auto what = fmt::format("{} frame {}", kind_ == StackedFrames::darks ? "dark" : "flat", frames_ + 1);
     if (auto same = check_same_setting(setting_, *setting, what); !same) return same;
-    const bool known = setting_.temperature_c.has_value();
-    if (known != setting->temperature_c.has_value() ||
-        (known && std::fabs(*setting_.temperature_c - *setting->temperature_c) > same_temperature_c)) {
+    if (kind_ == StackedFrames::darks && !same_temperature(setting_.temperature_c, setting->temperature_c)) {
       return fail(ErrorCode::invalid_argument,
                   what + " has another temperature than the first; frames of one stack agree within 1 degree");
     }

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "calib/frame_setting.h"
@@ -11,9 +9,6 @@
 #include "isp/base/result.h"
 
 namespace lowlux::calib {
-
-/// Largest temperature difference of frames of one setting.
-inline constexpr double same_temperature_c = 1;
 
 /// Dark frames of one exposure time and temperature, reduced to two planes of the active area.
 struct DarkGroup {
@@ -29,14 +24,16 @@ struct DarkGroup {
 /// Returns an error for a single frame, which contains no information about noise.
 Result<void> check_noise_is_known(const DarkGroup& group);
 
+/// Frames that a DarkStack holds. The temperature of flats does not matter: their signal is light.
+enum class StackedFrames : unsigned char { darks, flats };
+
 /// Accumulates dark frames, or flats, as they are added: 10 bytes for each pixel, for any number of frames.
 class DarkStack {
  public:
-  /// @param kind  what the frames are called in errors
-  explicit DarkStack(std::string kind = "dark frame") : kind_(std::move(kind)) {}
+  explicit DarkStack(StackedFrames kind = StackedFrames::darks) : kind_(kind) {}
 
   /// Adds a frame. Errors: those of setting_of; a frame that differs from the first in camera, size,
-  /// mosaic, white level, gain, exposure time, or by more than a degree; more than 32,768 frames.
+  /// mosaic, white level, gain, exposure time, or, among darks, by more than a degree; more than 32,768 frames.
   Result<void> add(const RawDn& raw);
 
   /// Returns the group of the added frames. Errors: fewer than two frames, which contain no information about noise.
@@ -53,7 +50,7 @@ class DarkStack {
   Result<void> begin(const RawDn& raw, FrameSetting setting);
   void add_row(const RawDn& raw, int y);
 
-  std::string kind_;
+  StackedFrames kind_;
   FrameSetting setting_;
   int frames_ = 0;
   Plane<std::uint16_t> first_;  // the accumulated values are differences to it, to avoid cancellation

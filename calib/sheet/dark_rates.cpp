@@ -76,12 +76,6 @@ DarkRate rate_of(std::span<const DarkGroup* const> groups, const Estimate& gain)
           over_gain(slope_of(time_s, variance_dn2), gain, 2), static_cast<int>(groups.size())};
 }
 
-bool same_temperature(const DarkGroup& a, const DarkGroup& b) {
-  const auto &first = a.setting.temperature_c, &second = b.setting.temperature_c;
-  if (!first || !second) return first.has_value() == second.has_value();
-  return std::fabs(*first - *second) <= same_temperature_c;
-}
-
 std::optional<Estimate> doubling_of(std::span<const DarkRate> rates) {
   std::vector<double> temperature_c;
   std::vector<Estimate> log2_rate;
@@ -112,8 +106,9 @@ Result<DarkRates> dark_rates(std::span<const DarkGroup> groups, const Estimate& 
       left, [](const DarkGroup* a, const DarkGroup* b) { return a->setting.temperature_c < b->setting.temperature_c; });
   DarkRates out;
   for (auto first = left.begin(); first != left.end();) {
-    const auto last =
-        std::find_if(first, left.end(), [&](const DarkGroup* g) { return !same_temperature(**first, *g); });
+    const auto last = std::find_if(first, left.end(), [&](const DarkGroup* g) {
+      return !same_temperature((*first)->setting.temperature_c, g->setting.temperature_c);
+    });
     const std::span<const DarkGroup* const> these(first, last);
     const auto [least, most] =
         std::ranges::minmax_element(these, {}, [](const DarkGroup* g) { return *g->setting.exposure_s; });

@@ -72,6 +72,18 @@ TEST(DarkStack, RefusesFramesThatDoNotBelongTogether) {
   EXPECT_TRUE(refused([](RawDn& r) { r.layout = SensorLayout::linear_rgb; }));
 }
 
+TEST(DarkStack, FlatsMayWarmUp) {
+  DarkStack stack(StackedFrames::flats);
+  for (const double temperature_c : {20.0, 24.0, 29.0}) {
+    RawDn raw = even_frame(100);
+    raw.info.temperature_c = temperature_c;
+    EXPECT_TRUE(stack.add(raw));
+  }
+  RawDn other = even_frame(100);
+  other.info.exposure_s = 3;
+  EXPECT_FALSE(stack.add(other));
+}
+
 TEST(DarkStack, NeedsTwoFrames) {
   DarkStack stack;
   EXPECT_EQ(stack.group().error().code, ErrorCode::insufficient);

@@ -26,7 +26,7 @@ SensorBench bench_with(double shading, double centre_e = charge_e, int side = 25
 }
 
 DarkGroup flats_of(const SensorBench& bench, int frames, std::uint32_t first = 100) {
-  DarkStack stack("flat frame");
+  DarkStack stack(StackedFrames::flats);
   for (int i = 0; i < frames; ++i) EXPECT_TRUE(stack.add(bench.frame(exposure, first + i)));
   return stack.average();
 }
@@ -178,7 +178,7 @@ TEST(FlatField, FlatsThatCannotServeAreRefusedWithTheCause) {
 
 TEST(FlatField, FlatsThatDifferInSettingAreRefusedByTheirName) {
   const SensorBench bench = bench_with(0, charge_e, 32);
-  DarkStack stack("flat frame");
+  DarkStack stack(StackedFrames::flats);
   ASSERT_TRUE(stack.add(bench.frame(exposure, 1)));
   RawDn other = bench.frame(exposure, 2);
   other.info.iso = 12345;

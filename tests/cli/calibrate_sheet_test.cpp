@@ -157,6 +157,19 @@ TEST_F(DataSheetCommand, FiguresOfSimulatedFramesAreThoseOfTheSensor) {
   EXPECT_LT(snr_max, std::sqrt(1.02 * full_well_e));
 }
 
+TEST_F(DataSheetCommand, FlatsMayWarmUp) {
+  shoot_all();
+  for (const char* time_s : {"0.05", "0.07", "0.09", "0.11"}) {
+    shoot(std::string("flats/warm") + time_s + ".dng", "flat", time_s, 4, "24");
+  }
+  const auto done = lowlux(sheet({}));
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_TRUE(holds(scratch_.read("sheet.html"), "and of 8 flats")) << done.err;
+  const Json json = Json::parse(scratch_.read("sheet.json"));
+  EXPECT_NEAR(json["figures"]["prnu_pixel"]["value"], prnu,
+              5 * json["figures"]["prnu_pixel"]["standard_error"].get<double>());
+}
+
 TEST_F(DataSheetCommand, WhatIsMissingIsSaidInOneLine) {
   std::filesystem::create_directory(file("flats"));
   std::filesystem::create_directory(file("darks"));

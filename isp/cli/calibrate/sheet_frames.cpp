@@ -54,9 +54,8 @@ class Reader {
 };
 
 bool belongs(const DarkFile& dark, const calib::FrameSetting& setting) {
-  if (setting.exposure_s != dark.info.exposure_s) return false;
-  if (!setting.temperature_c || !dark.info.temperature_c) return setting.temperature_c == dark.info.temperature_c;
-  return std::fabs(*setting.temperature_c - *dark.info.temperature_c) <= calib::same_temperature_c;
+  return setting.exposure_s == dark.info.exposure_s &&
+         calib::same_temperature(setting.temperature_c, dark.info.temperature_c);
 }
 
 /// Averages darks by exposure time and temperature, the shortest first; single ones are left out with a warning.
@@ -146,7 +145,7 @@ std::vector<std::string> half_saturated(const std::vector<FramePair>& flats, con
 }
 
 Result<calib::DarkGroup> average(const std::vector<std::string>& files, Reader& reader) {
-  calib::DarkStack stack("flat");
+  calib::DarkStack stack(calib::StackedFrames::flats);
   for (const std::string& file : files) {
     const auto raw = reader.read(file, nullptr);
     if (!raw) return tl::make_unexpected(raw.error());

@@ -33,7 +33,7 @@ Result<void> add_flat(const std::string& file, calib::DarkStack& stack, calib::F
 }  // namespace
 
 Result<std::shared_ptr<const calib::FlatField>> read_flats(const std::vector<std::string>& files) {
-  calib::DarkStack stack("flat frame");
+  calib::DarkStack stack(calib::StackedFrames::flats);
   calib::FlatLevels levels;
   std::optional<double> f_number;
   for (const std::string& file : files) {
