@@ -57,30 +57,52 @@ Result<void> DarkStack::add(const RawDn& raw) {
   if (frames_ == max_frames) {
     return fail(ErrorCode::too_large, fmt::format("a stack holds at most {} frames", max_frames));
   }
-  for (int y = 0; y < setting_.height; ++y) add_row(raw, y);
+  const PerSite<double> frame_dn = mean_difference(raw);
+  for (int site = 0; site < 4; ++site) {
+    frame_sum_[site] += frame_dn[site];
+    frame_squares_[site] += frame_dn[site] * frame_dn[site];
+  }
+  for (int y = 0; y < setting_.height; ++y) add_row(raw, y, frame_dn);
   ++frames_;
   return {};
 }
 
-void DarkStack::add_row(const RawDn& raw, int y) {
+PerSite<double> DarkStack::mean_difference(const RawDn& raw) const {
+  PerSite<std::int64_t> sum{};
+  for (int y = 0; y < setting_.height; ++y) {
+    const std::uint16_t* codes = raw.dn.row(raw.active.y + y) + raw.active.x;
+    const std::uint16_t* first = first_.row(y);
+    for (int x = 0; x < setting_.width; ++x) sum[site_of(x, y)] += codes[x] - first[x];
+  }
+  PerSite<double> out{};
+  for (int site = 0; site < 4; ++site) {
+    out[site] = static_cast<double>(sum[site]) / static_cast<double>(pixels_of_site(setting_, site));
+  }
+  return out;
+}
+
+void DarkStack::add_row(const RawDn& raw, int y, const PerSite<double>& frame_dn) {
   const std::uint16_t* codes = raw.dn.row(raw.active.y + y) + raw.active.x;
   const std::uint16_t* first = first_.row(y);
   std::int32_t* sum = sum_.row(y);
   float* squares = squares_.row(y);
   for (int parity = 0; parity < 2; ++parity) {
+    const int site = site_of(parity, y);
+    const auto of_frame = static_cast<float>(frame_dn[site]);
     std::int64_t difference = 0, at_zero = 0;
     for (int x = parity; x < setting_.width; x += 2) {
       const std::int32_t d = codes[x] - first[x];
+      const float off = static_cast<float>(d) - of_frame;
       sum[x] += d;
-      squares[x] += static_cast<float>(d) * static_cast<float>(d);
+      squares[x] += off * off;
       difference += d;
       at_zero += codes[x] == 0;
     }
     const int columns = (setting_.width + 1 - parity) / 2;
-    const double mean = static_cast<double>(difference) / columns;
+    const double mean = static_cast<double>(difference) / columns - frame_dn[site];
     row_sum_[2 * y + parity] += mean;
     row_squares_[2 * y + parity] += mean * mean;
-    at_zero_[site_of(parity, y)] += at_zero;
+    at_zero_[site] += at_zero;
   }
 }
 
@@ -91,6 +113,19 @@ Result<DarkGroup> DarkStack::group() const {
   return average();
 }
 
+PerSite<double> DarkStack::frame_variance() const {
+  PerSite<double> out{};
+  const double n = frames_, degrees = std::max(1, frames_ - 1);
+  for (int site = 0; site < 4; ++site) {
+    out[site] = (frame_squares_[site] - frame_sum_[site] * frame_sum_[site] / n) / degrees;
+  }
+  return out;
+}
+
+// With M rows, N columns and temporal variances f^2 of frames, r^2 of rows and p^2 of pixels, the expectations are
+//     row means about the mean of the frame   (r^2 + p^2 / N) (1 - 1 / M)
+//     pixels about the mean of the frame      r^2 (1 - 1 / M) + p^2 (1 - 1 / (M N))
+//     means of frames                         f^2 + r^2 / M + p^2 / (M N).
 DarkGroup DarkStack::average() const {
   assert(frames_ > 0);
   DarkGroup out;
@@ -102,24 +137,27 @@ DarkGroup DarkStack::average() const {
   PerSite<double> variance{}, row_variance{};
   for (int y = 0; y < setting_.height; ++y) {
     for (int x = 0; x < setting_.width; ++x) {
-      const double sum = sum_.at(x, y);
-      const double pixel = std::max(0.0, (squares_.at(x, y) - sum * sum / n) / degrees);
+      const int site = site_of(x, y);
+      const double sum = sum_.at(x, y), off = sum - frame_sum_[site];
+      const double pixel = std::max(0.0, (squares_.at(x, y) - off * off / n) / degrees);
+      const auto pixels = static_cast<double>(pixels_of_site(setting_, site));
       out.mean_dn.at(x, y) = static_cast<float>(first_.at(x, y) + sum / n);
-      out.variance_dn2.at(x, y) = static_cast<float>(pixel);
-      variance[site_of(x, y)] += pixel;
+      out.variance_dn2.at(x, y) = static_cast<float>(pixel * pixels / (pixels - 1));
+      variance[site] += pixel / pixels;
     }
     for (int parity = 0; parity < 2; ++parity) {
       const double sum = row_sum_[2 * y + parity];
       row_variance[site_of(parity, y)] += (row_squares_[2 * y + parity] - sum * sum / n) / degrees;
     }
   }
+  out.frame_variance_dn2 = frame_variance();
   for (int site = 0; site < 4; ++site) {
-    const auto pixels = static_cast<double>(pixels_of_site(setting_, site));
     const int columns = (setting_.width + 1 - (site & 1)) / 2, rows = (setting_.height + 1 - (site >> 1)) / 2;
-    // The pixels' variance includes that of the rows.
-    const double of_rows = row_variance[site] / rows, of_pixels = variance[site] / pixels;
-    out.row_variance_dn2[site] = (of_rows * columns - of_pixels) / (columns - 1);
-    out.fraction_at_zero[site] = static_cast<double>(at_zero_[site]) / (pixels * n);
+    const double of_pixels = (variance[site] - row_variance[site] / rows) * columns / (columns - 1);
+    const double of_row_means = row_variance[site] / (rows - 1);
+    out.row_variance_dn2[site] = of_row_means - of_pixels / columns;
+    out.frame_variance_dn2[site] -= of_row_means / rows;
+    out.fraction_at_zero[site] = static_cast<double>(at_zero_[site]) / (pixels_of_site(setting_, site) * n);
   }
   return out;
 }

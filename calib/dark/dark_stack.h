@@ -13,12 +13,14 @@ namespace lowlux::calib {
 /// Dark frames of one exposure time and temperature, reduced to two planes of the active area.
 struct DarkGroup {
   FrameSetting setting;
-  int frames = 0;                      // files; each may itself be a mean of several exposures, a master dark
-  bool rounded = true;                 // the files hold whole codes
-  Plane<float> mean_dn;                // of the frames, for each pixel
-  Plane<float> variance_dn2;           // temporal, for each pixel, quantisation included; unbiased
-  PerSite<double> row_variance_dn2{};  // temporal, common to whole rows; unbiased, may be negative
-  PerSite<double> fraction_at_zero{};  // fraction of the samples at code 0
+  int frames = 0;             // files; each may itself be a mean of several exposures, a master dark
+  bool rounded = true;        // the files hold whole codes
+  Plane<float> mean_dn;       // of the frames, for each pixel
+  Plane<float> variance_dn2;  // temporal, for each pixel, about the mean of its site in each frame, as EMVA 1288 has
+                              // it: drift and flicker of whole frames are not in it; quantisation included; unbiased
+  PerSite<double> row_variance_dn2{};    // the part of it that whole rows have in common; unbiased, may be negative
+  PerSite<double> frame_variance_dn2{};  // temporal, common to whole frames; unbiased, may be negative
+  PerSite<double> fraction_at_zero{};    // fraction of the samples at code 0
 };
 
 /// Returns an error for a single frame, which contains no information about noise.
@@ -48,7 +50,9 @@ class DarkStack {
 
  private:
   Result<void> begin(const RawDn& raw, FrameSetting setting);
-  void add_row(const RawDn& raw, int y);
+  PerSite<double> mean_difference(const RawDn& raw) const;
+  void add_row(const RawDn& raw, int y, const PerSite<double>& frame_dn);
+  PerSite<double> frame_variance() const;
 
   StackedFrames kind_;
   FrameSetting setting_;
@@ -56,7 +60,8 @@ class DarkStack {
   Plane<std::uint16_t> first_;  // the accumulated values are differences to it, to avoid cancellation
   Plane<std::int32_t> sum_;
   Plane<float> squares_;
-  std::vector<double> row_sum_, row_squares_;  // of row means, two for each row: even and odd columns
+  std::vector<double> row_sum_, row_squares_;      // of row means, two for each row: even and odd columns
+  PerSite<double> frame_sum_{}, frame_squares_{};  // of means of frames; all squares are about these means
   PerSite<std::int64_t> at_zero_{};
 };
 

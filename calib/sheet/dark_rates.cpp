@@ -25,9 +25,12 @@ double mean_row_variance(const DarkGroup& group) {
   return sum;
 }
 
-/// Adds the noise of whole rows, two sites of which share each row.
-Estimate with_rows(const Estimate& mean, double row_variance, double rows, double frames) {
-  return {mean.value, std::hypot(mean.standard_error, std::sqrt(row_variance / (rows * frames)))};
+/// Adds the noise of whole rows, two sites of which share each row, and that of whole frames: drift and flicker.
+Estimate with_rows_and_frames(const Estimate& mean, const DarkGroup& group) {
+  double frame_variance = 0;
+  for (const double site : group.frame_variance_dn2) frame_variance += std::max(0.0, site) / 4;
+  const double common = mean_row_variance(group) / group.mean_dn.height() + frame_variance;
+  return {mean.value, std::hypot(mean.standard_error, std::sqrt(common / group.frames))};
 }
 
 /// Returns the slope of a line by weighted least squares.
@@ -63,7 +66,7 @@ DarkRate rate_of(std::span<const DarkGroup* const> groups, const Estimate& gain)
   for (const DarkGroup* group : groups) {
     const double rows = group->mean_dn.height(), frames = group->frames, row_variance = mean_row_variance(*group);
     time_s.push_back(*group->setting.exposure_s);
-    mean_dn.push_back(with_rows(mean_of(group->mean_dn), row_variance, rows, frames));
+    mean_dn.push_back(with_rows_and_frames(mean_of(group->mean_dn), *group));
     variance_dn2.push_back(mean_of(group->variance_dn2));
     // Row noise scatters the variances of whole rows together.
     variance_dn2.back().standard_error =

@@ -134,6 +134,66 @@ TEST(DataSheet, FiguresOfRandomSensorsReturnWithinTheirStandardErrors) {
   }
 }
 
+/// A sensor whose dark current and its nonuniformity are a large part of long exposures.
+SensorModel warm_sensor(std::mt19937_64& random) {
+  SensorModel out = drawn_sensor(random);
+  out.dark_current_e_per_s.fill(30);
+  out.dsnu = 0.1;
+  out.prnu = 0.003;
+  out.row_noise_e = 0;
+  out.full_well_e = 30000;
+  return out;
+}
+
+TEST(DataSheet, FlickerOfTheLampChangesNoPrnu) {
+  constexpr double prnu = 0.003;
+  std::mt19937_64 random(first_seed);
+  for (const double flicker : {0.0, 0.005, 0.016}) {
+    SensorModel sensor = warm_sensor(random);
+    sensor.dark_current_e_per_s.fill(0);
+    SensorBench bench{.sensor = sensor, .width = 256, .height = 192, .seed = random()};
+    SCOPED_TRACE(testing::Message() << "flicker " << flicker << ", seed " << bench.seed);
+    const auto dark = spatial_parts(stack_of(bench, {1, 20}, 0));
+    DarkStack flats(StackedFrames::flats);
+    for (std::uint32_t i = 0; i < 16; ++i) {
+      bench.rate_e_per_s.fill(15000 * (1 + flicker * std::uniform_real_distribution<double>(-1, 1)(random)));
+      ASSERT_TRUE(flats.add(bench.frame({1, 20}, 100 + i)));
+    }
+    const auto bright = spatial_parts(*flats.group());
+    ASSERT_TRUE(dark && bright);
+    const Nonuniformity found = photo_response_nonuniformity(*bright, *dark);
+    expect_root("PRNU of pixels", found.pixel, prnu);
+    EXPECT_LT(found.pixel.standard_error, 0.03 * prnu);
+    expect_root("PRNU of rows", found.row, 0);
+  }
+}
+
+TEST(DarkRates, DriftOfTheTemperatureChangesNoVariance) {
+  std::mt19937_64 random(first_seed);
+  const SensorModel sensor = warm_sensor(random);
+  const SensorBench bench{.sensor = sensor, .width = 256, .height = 192, .seed = random()};
+  std::vector<DarkGroup> groups;
+  std::uint32_t frame = 0;
+  for (const double time_s : {0.1, 3.2, 6.4}) {
+    DarkStack stack;
+    for (int i = 0; i < stack_frames; ++i, ++frame) {
+      RawDn raw = bench.frame({time_s, 19.5 + i / (stack_frames - 1.0)}, frame);
+      raw.info.temperature_c = 20;
+      ASSERT_TRUE(stack.add(raw));
+    }
+    groups.push_back(*stack.group());
+  }
+  const auto rates = dark_rates(groups, {sensor.system_gain_dn_per_e, 1e-4 * sensor.system_gain_dn_per_e});
+  ASSERT_TRUE(rates) << rates.error().message;
+  double current = 0;  // mean over the drift
+  for (int i = 0; i < stack_frames; ++i) {
+    current += 30 * std::exp2((i / (stack_frames - 1.0) - 0.5) / sensor.dark_doubling_c) / stack_frames;
+  }
+  expect_near("by variance", rates->rates[0].by_variance_e_per_s, current);
+  EXPECT_LT(rates->rates[0].by_variance_e_per_s.standard_error, 0.02 * current);
+  expect_near("by mean", rates->rates[0].by_mean_e_per_s, current);
+}
+
 TEST(DataSheet, FiguresThatTheFramesDoNotDetermineAreAbsent) {
   std::mt19937_64 random(first_seed);
   SheetFrames frames = shoot({.sensor = drawn_sensor(random), .width = 128, .height = 128});

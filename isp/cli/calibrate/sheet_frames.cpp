@@ -124,7 +124,7 @@ double signal_dn(const FramePair& pair, const PerSite<double>& black_dn) {
 
 /// Returns the files of the flats whose brightest site is nearest half of saturation.
 std::vector<std::string> half_saturated(const std::vector<FramePair>& flats, const calib::PhotonTransfer& transfer) {
-  constexpr double same_level = 0.02;  // relative, as frames are paired
+  constexpr double same_level = 0.005;  // relative: flicker of the lamp; levels of light that differ are further apart
   double most = 0;
   for (const FramePair& pair : flats) most = std::max(most, signal_dn(pair, transfer.black_dn));
   const double saturation_dn = transfer.saturation_capacity_e
