@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "calib/frame_setting.h"
+#include "calib/sheet/dark_levels.h"
 #include "isp/base/sensor.h"
 
 namespace lowlux::calib {
@@ -34,33 +37,34 @@ std::optional<Estimate> ratio_of(const std::optional<Estimate>& a, const std::op
 
 /// Returns the quantum efficiency [e-/photon] from the slope of the mean over photons, through the darks, by least
 /// squares with weights of photon noise; nullopt without flats in the linear range.
-std::optional<Estimate> efficiency_of(const SheetFrames& frames, const PhotonTransfer& transfer, int channel,
-                                      double max_signal_dn) {
-  const double gain = transfer.system_gain_dn_per_e.value;
-  double signal_e = 0, photons = 0, variance_e2 = 0;
-  for (const PairStatistics& pair : frames.flat_pairs) {
+std::optional<Estimate> efficiency_of(const SheetFrames& frames, const std::vector<DarkLevel>& darks,
+                                      const Estimate& gain_dn_per_e, int channel, double max_signal_dn) {
+  const double gain = gain_dn_per_e.value;
+  double signal_e = 0, photons = 0, variance_e2 = 0, dark_error_e = 0;
+  for (std::size_t i = 0; i < frames.flat_pairs.size(); ++i) {
+    const PairStatistics& pair = frames.flat_pairs[i];
     if (!pair.setting.exposure_s) continue;
     for (int site = 0; site < 4; ++site) {
       const auto s = static_cast<std::size_t>(site);
       const SiteStatistics& statistics = pair.site[s];
-      const double signal_dn = statistics.mean_dn - transfer.black_dn[s];
+      const Estimate& dark_dn = darks[i].level_dn[s];
+      const double signal_dn = statistics.mean_dn - dark_dn.value;
       if (channel_of_site(pair.setting, site) != channel || signal_dn > max_signal_dn || signal_dn <= 0) continue;
       signal_e += signal_dn / gain;
       photons += photons_of(*frames.irradiance, *pair.setting.exposure_s);
       const auto pixels = static_cast<double>(statistics.pixels);
-      const double black_error_dn = transfer.black_standard_error_dn[s];
       variance_e2 += (statistics.variance_dn2 / (2 * pixels) + statistics.covariance_dn2 / pixels +
                       std::max(0.0, statistics.row_variance_dn2) / (2 * statistics.rows)) /
-                         (gain * gain) +
-                     std::pow(black_error_dn / gain, 2);
+                     (gain * gain);
+      dark_error_e += dark_dn.standard_error / gain;
     }
   }
   if (!(photons > 0)) return std::nullopt;
   const double efficiency = signal_e / photons;
-  // The patterns and the black are common to all flats, so that their errors add up: at most as many as there are.
+  // The patterns and the darks are common to all flats, so that their errors add up: at most as many as there are.
   const auto levels = static_cast<double>(frames.flat_pairs.size());
-  return Estimate{efficiency, std::hypot(std::sqrt(variance_e2 * levels) / photons,
-                                         efficiency * transfer.system_gain_dn_per_e.standard_error / gain)};
+  return Estimate{efficiency, std::hypot(std::sqrt(variance_e2 * levels) / photons, dark_error_e / photons,
+                                         efficiency * gain_dn_per_e.standard_error / gain)};
 }
 
 double largest_signal_dn(const std::vector<PairStatistics>& flats, const PhotonTransfer& transfer) {
@@ -73,8 +77,52 @@ double largest_signal_dn(const std::vector<PairStatistics>& flats, const PhotonT
   return most;
 }
 
-std::optional<std::array<Estimate, 3>> efficiencies_of(const SheetFrames& frames, const DataSheet& sheet) {
+std::string setting_text(const FrameSetting& setting) {
+  const std::string time = setting.exposure_s ? fmt::format("{:g} s", *setting.exposure_s) : "exposure time";
+  return setting.temperature_c ? fmt::format("{} at {:g} C", time, *setting.temperature_c) : time;
+}
+
+std::vector<DarkLevel> dark_levels_of_flats(const SheetFrames& frames, const DarkLevels& levels, DataSheet& out) {
+  std::vector<DarkLevel> darks;
+  const FrameSetting* without = nullptr;
+  for (const PairStatistics& pair : frames.flat_pairs) {
+    darks.push_back(levels.at(pair.setting));
+    if (without == nullptr && !darks.back().contains_dark_current) without = &pair.setting;
+  }
+  if (without == nullptr) return darks;
+  out.warnings.push_back(
+      fmt::format("quantum efficiency contains dark current: there are no two darks of the flats' {}, nor of two "
+                  "exposure times at that temperature; take darks of the exposure time of the flats",
+                  setting_text(*without)));
+  return darks;
+}
+
+/// @param shortest  parts of the darks of the shortest exposure, for flats without darks of their own exposure
+Result<void> put_prnu(const DarkGroup& flats, const PerSite<SpatialParts>& shortest, const DarkLevels& levels,
+                      DataSheet& out) {
+  const auto bright = spatial_parts(flats);
+  if (!bright) return tl::make_unexpected(bright.error());
+  const DarkLevel level = levels.at(flats.setting);
+  PerSite<SpatialParts> dark = shortest;
+  if (level.same_time != nullptr) {
+    const auto same = spatial_parts(*level.same_time);
+    if (!same) return tl::make_unexpected(same.error());
+    dark = *same;
+  } else {
+    out.warnings.push_back(
+        fmt::format("PRNU contains the nonuniformity of dark current: there are no two darks of the flats' {}; take 16 "
+                    "darks of the exposure time of the flats near half of saturation",
+                    setting_text(flats.setting)));
+  }
+  for (std::size_t site = 0; site < dark.size(); ++site) dark[site].mean_dn = level.level_dn[site].value;
+  out.prnu = photo_response_nonuniformity(*bright, dark);
+  return {};
+}
+
+std::optional<std::array<Estimate, 3>> efficiencies_of(const SheetFrames& frames, const DarkLevels& levels,
+                                                       DataSheet& sheet) {
   if (!frames.irradiance) return std::nullopt;
+  const std::vector<DarkLevel> darks = dark_levels_of_flats(frames, levels, sheet);
   const double saturation_dn = sheet.saturation_e
                                    ? sheet.saturation_e->value * sheet.transfer.system_gain_dn_per_e.value
                                    : largest_signal_dn(frames.flat_pairs, sheet.transfer);
@@ -82,7 +130,7 @@ std::optional<std::array<Estimate, 3>> efficiencies_of(const SheetFrames& frames
   const bool filters = frames.flat_pairs.front().setting.layout == SensorLayout::bayer;
   std::array<Estimate, 3> out;
   for (int c = 0; c < 3; ++c) {
-    const auto found = efficiency_of(frames, sheet.transfer, filters ? c : 1, max_dn);
+    const auto found = efficiency_of(frames, darks, sheet.transfer.system_gain_dn_per_e, filters ? c : 1, max_dn);
     if (!found) return std::nullopt;
     out[static_cast<std::size_t>(c)] = *found;
   }
@@ -115,12 +163,11 @@ Result<DataSheet> make_data_sheet(const SheetFrames& frames) {
     return tl::make_unexpected(rates.error());
   }
   out.dsnu_e = dark_nonuniformity(*dark, out.transfer.system_gain_dn_per_e);
+  const DarkLevels levels(frames.darks, out.dark_rates, out.transfer.system_gain_dn_per_e);
   if (frames.bright) {
-    const auto bright = spatial_parts(*frames.bright);
-    if (!bright) return tl::make_unexpected(bright.error());
-    out.prnu = photo_response_nonuniformity(*bright, *dark);
+    if (auto done = put_prnu(*frames.bright, *dark, levels, out); !done) return tl::make_unexpected(done.error());
   }
-  out.quantum_efficiency = efficiencies_of(frames, out);
+  out.quantum_efficiency = efficiencies_of(frames, levels, out);
   return out;
 }
 

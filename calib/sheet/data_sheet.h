@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "calib/dark/dark_stack.h"
@@ -36,7 +37,9 @@ struct SheetFrames {
 /// Data sheet of one gain setting by EMVA 1288 release 4.0 linear; figures that the frames do not determine are absent.
 /// SNR_max = sqrt(mu_sat); the absolute sensitivity threshold is the mean at which the SNR is 1,
 ///     mu_min = sqrt(sigma_d^2 + 1 / (12 K^2) + 1/4) + 1/2  [e-],
-/// and the dynamic range mu_sat / mu_min (R4, sections 2.6 and 6.6).
+/// and the dynamic range mu_sat / mu_min (R4, sections 2.6 and 6.6). Quantum efficiency and PRNU1288 take the darks of
+/// the flats' exposure time (DarkLevels); where there are none, PRNU1288 contains the nonuniformity of the dark
+/// current, and there is a warning.
 struct DataSheet {
   PhotonTransfer transfer;
   std::optional<Estimate> saturation_e;  // mu_sat: EMVA's saturation capacity
@@ -47,6 +50,7 @@ struct DataSheet {
   Nonuniformity dsnu_e;
   std::optional<Nonuniformity> prnu;                          // relative
   std::optional<std::array<Estimate, 3>> quantum_efficiency;  // of R, G, B; without filters three times the same
+  std::vector<std::string> warnings;                          // figures that contain dark current
 };
 
 /// Computes the sheet. Errors: those of fit_photon_transfer and spatial_parts; those of dark_rates but for

@@ -39,6 +39,7 @@ Nonuniformity dark_nonuniformity(const PerSite<SpatialParts>& dark, const Estima
 
 /// Returns PRNU1288 (R4 Eq. 36): sqrt(s_50^2 - s_dark^2) / (mu_50 - mu_dark), the mean square of the sites.
 /// @param bright  flats near half of saturation, brighter than the darks
+/// @param dark    darks of the flats' exposure time
 Nonuniformity photo_response_nonuniformity(const PerSite<SpatialParts>& bright, const PerSite<SpatialParts>& dark);
 
 /// Returns the square root of a variance: 0 where it is negative. Its standard error is s / (2 root), and at most the

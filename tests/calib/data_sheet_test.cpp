@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -143,6 +144,78 @@ SensorModel warm_sensor(std::mt19937_64& random) {
   out.row_noise_e = 0;
   out.full_well_e = 30000;
   return out;
+}
+
+/// Takes flats of 0.1 to 3.2 s, and darks of the given times; PRNU has the flats of 3.2 s.
+SheetFrames shoot_long(SensorBench bench, const std::vector<double>& times_of_darks_s) {
+  SheetFrames out;
+  std::uint32_t frame = 0;
+  for (const double time_s : times_of_darks_s) {
+    out.darks.push_back(stack_of(bench, {time_s, 20}, frame));
+    frame += stack_frames;
+  }
+  for (int i = 0; i < 4; ++i, frame += 2)
+    out.dark_pairs.push_back(pair_at(bench, {times_of_darks_s.front(), 20}, frame));
+  bench.rate_e_per_s = {800, 1600, 1200};
+  out.irradiance = irradiance_of(1600);
+  for (const double time_s : {0.1, 0.2, 0.4, 0.8, 1.6, 3.2}) {
+    for (int i = 0; i < 2; ++i, frame += 2) out.flat_pairs.push_back(pair_at(bench, {time_s, 20}, frame));
+  }
+  out.bright = stack_of(bench, {3.2, 20}, frame);
+  return out;
+}
+
+void expect_efficiency(const DataSheet& sheet) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    const Estimate& found = (*sheet.quantum_efficiency)[c];
+    expect_near("quantum efficiency", found, efficiency * std::array{0.5, 1.0, 0.75}[c]);
+    EXPECT_LT(found.standard_error, 0.01 * found.value);
+  }
+}
+
+TEST(DataSheet, DarksOfTheFlatsExposureTimeAreSubtracted) {
+  std::mt19937_64 random(first_seed);
+  for (int round = 0; round < 3; ++round) {
+    const SensorBench bench{.sensor = warm_sensor(random), .width = 256, .height = 192, .seed = random()};
+    SCOPED_TRACE(testing::Message() << "round " << round << ", seed " << bench.seed);
+    const auto sheet = make_data_sheet(shoot_long(bench, {0.001, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2}));
+    ASSERT_TRUE(sheet) << sheet.error().message;
+    EXPECT_EQ(sheet->warnings, std::vector<std::string>{});
+    expect_efficiency(*sheet);
+    // Shot noise of 8 frames of 1000 to 5000 e- in 12,288 pixels of a site leaves 10 to 20 % of this PRNU's square.
+    expect_root("PRNU of pixels", sheet->prnu->pixel, bench.sensor.prnu);
+    EXPECT_LT(sheet->prnu->pixel.standard_error, 0.15 * bench.sensor.prnu);
+  }
+}
+
+TEST(DataSheet, DarkCurrentStandsInForMissingDarks) {
+  std::mt19937_64 random(first_seed);
+  const SensorBench bench{.sensor = warm_sensor(random), .width = 256, .height = 192, .seed = random()};
+  const auto sheet = make_data_sheet(shoot_long(bench, {0.001, 2}));
+  ASSERT_TRUE(sheet) << sheet.error().message;
+  expect_efficiency(*sheet);
+  ASSERT_EQ(sheet->warnings.size(), 1u);
+  EXPECT_EQ(sheet->warnings[0],
+            "PRNU contains the nonuniformity of dark current: there are no two darks of the flats' 3.2 s at 20 C; take "
+            "16 darks of the exposure time of the flats near half of saturation");
+}
+
+TEST(DataSheet, FiguresThatContainDarkCurrentAreWarnedOf) {
+  std::mt19937_64 random(first_seed);
+  const SensorBench bench{.sensor = warm_sensor(random), .width = 128, .height = 128, .seed = random()};
+  SheetFrames frames = shoot_long(bench, {0.001});
+  const auto few = make_data_sheet(frames);
+  ASSERT_TRUE(few) << few.error().message;
+  ASSERT_EQ(few->warnings.size(), 2u);
+  EXPECT_EQ(few->warnings[1].find("quantum efficiency contains dark current"), 0u) << few->warnings[1];
+  // 30 e-/s of dark current next to 1600 e-/s of light.
+  EXPECT_GT((*few->quantum_efficiency)[1].value, efficiency * 1.015);
+  // Darks of the flats' time, but 3 degrees warmer, are those of another dark current.
+  frames = shoot_long(bench, {0.001, 3.2});
+  frames.darks.back().setting.temperature_c = 23;
+  const auto warm = make_data_sheet(frames);
+  ASSERT_TRUE(warm) << warm.error().message;
+  EXPECT_EQ(warm->warnings.size(), 2u);
 }
 
 TEST(DataSheet, FlickerOfTheLampChangesNoPrnu) {

@@ -157,17 +157,22 @@ TEST_F(DataSheetCommand, FiguresOfSimulatedFramesAreThoseOfTheSensor) {
   EXPECT_LT(snr_max, std::sqrt(1.02 * full_well_e));
 }
 
-TEST_F(DataSheetCommand, FlatsMayWarmUp) {
+TEST_F(DataSheetCommand, FlatsMayWarmUpAndMissingDarksAreWarnedOf) {
   shoot_all();
   for (const char* time_s : {"0.05", "0.07", "0.09", "0.11"}) {
     shoot(std::string("flats/warm") + time_s + ".dng", "flat", time_s, 4, "24");
   }
-  const auto done = lowlux(sheet({}));
+  const auto done = lowlux(sheet({"--irradiance", "0.001", "--wavelength", "550", "--pixel-pitch", "4"}));
   ASSERT_EQ(done.exit_code, 0) << done.err;
   EXPECT_TRUE(holds(scratch_.read("sheet.html"), "and of 8 flats")) << done.err;
+  // Flats at 20 C have the dark current of that temperature; those at 24 C have none, and none has darks of its time.
   const Json json = Json::parse(scratch_.read("sheet.json"));
   EXPECT_NEAR(json["figures"]["prnu_pixel"]["value"], prnu,
               5 * json["figures"]["prnu_pixel"]["standard_error"].get<double>());
+  ASSERT_EQ(json["warnings"].size(), 2u) << json["warnings"];
+  EXPECT_TRUE(holds(done.err, "PRNU contains the nonuniformity of dark current")) << done.err;
+  EXPECT_TRUE(holds(done.err, "quantum efficiency contains dark current")) << done.err;
+  EXPECT_TRUE(holds(done.err, "at 24 C")) << done.err;
 }
 
 TEST_F(DataSheetCommand, WhatIsMissingIsSaidInOneLine) {

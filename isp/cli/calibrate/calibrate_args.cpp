@@ -162,10 +162,10 @@ Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>&
       "lowlux calibrate sheet");
   app.footer(
       "Two flats of the same light make a pair, and four pairs of different light a curve that should reach "
-      "saturation; "
-      "16 flats near half of it show PRNU best. Darks of the shortest exposure time, best 16, give DSNU and dark "
-      "noise; "
-      "those of other times and temperatures the dark current. All frames are of one gain setting.");
+      "saturation; 16 flats near half of it show PRNU best. Darks of the shortest exposure time, best 16, give DSNU "
+      "and "
+      "dark noise; those of the exposure times of the flats are subtracted for PRNU and quantum efficiency; those of "
+      "two or more times and temperatures give the dark current. All frames are of one gain setting.");
   CalibrateSheetArgs args;
   LightOptions light;
   app.add_option("FLATS", args.common.frames, "flats: files, a folder or a quoted pattern")->required();

@@ -151,7 +151,9 @@ isp::Plot histogram_plot(const char* id, const char* title, const calib::DarkGro
 
 isp::ReportSection sheet_section(const calib::DataSheet& sheet) {
   isp::ReportSection out{.title = "Data sheet",
-                         .text = fmt::format("By {}. Values are followed by their standard errors.", method),
+                         .text = fmt::format("By {}. Values are followed by their standard errors. PRNU and quantum "
+                                             "efficiency are of flats less the darks of their exposure time.",
+                                             method),
                          .table = {{"figure", "value"}, {}}};
   for (const Figure& figure : figures_of(sheet)) out.table.rows.push_back({figure.name, text_of(figure)});
   return out;
@@ -183,6 +185,7 @@ Json json_of(const std::optional<Estimate>& estimate) {
 }  // namespace
 
 void show_data_sheet(const calib::DataSheet& sheet, const calib::SheetFrames& frames, Calibration& found) {
+  found.warnings.insert(found.warnings.end(), sheet.warnings.begin(), sheet.warnings.end());
   found.report.sections.push_back(sheet_section(sheet));
   show_photon_transfer(sheet.transfer, frames.dark_pairs, frames.flat_pairs, found);
   found.report.sections.push_back(pattern_section(frames, sheet.transfer.system_gain_dn_per_e.value));
