@@ -107,11 +107,12 @@ void put_prnu(const Curve& curve, Pairs pairs, const Darks& darks, PhotonTransfe
 
 void put_saturation(const Curve& curve, Pairs pairs, const Darks& darks, PhotonTransfer& out) {
   const double gain = out.system_gain_dn_per_e.value;
-  double peaks = 0, peak_dn = 0, full = 0, full_dn = 0, at_white = 0, error2 = 0;
+  double peaks = 0, peak_dn = 0, step_dn = 0, full = 0, full_dn = 0, at_white = 0, error2 = 0;
   for (int site = 0; site < 4; ++site) {
     if (!curve.peak[site].reached) continue;
     ++peaks;
     peak_dn += curve.peak[site].signal_dn;
+    step_dn += curve.peak[site].fallen_dn - curve.peak[site].signal_dn;
     for (const TransferPoint& p : curve.flats) {
       const double photon_noise = p.variance_dn2 - darks.scatter.dark_variance_dn2;
       if (p.site != site || !(p.signal_dn >= curve.peak[site].signal_dn)) continue;
@@ -123,7 +124,9 @@ void put_saturation(const Curve& curve, Pairs pairs, const Darks& darks, PhotonT
     }
   }
   if (peaks == 0) return;
-  out.saturation_capacity_e = scaled(peak_dn / peaks, 0, out.system_gain_dn_per_e);
+  // The variance is largest somewhere between the two levels; they are those of all sites.
+  const double step_error_dn = step_dn / peaks / std::sqrt(3.0);
+  out.saturation_capacity_e = scaled(peak_dn / peaks, step_error_dn, out.system_gain_dn_per_e);
   if (full == 0) return;
   // Codes that do not scatter may all have the same offset: at most half a code for each of the two means.
   const double undithered_dn = out.under_dithered ? 1 / std::sqrt(6.0) : 0;

@@ -34,7 +34,8 @@ struct PhotonTransfer {
   double row_noise_e = 0;                     // the part of the read noise common to whole rows
   PerSite<double> black_dn{};                 // mean of the darks
   std::optional<Estimate>
-      saturation_capacity_e;              // EMVA: mean charge where the variance is largest; absent if not reached
+      saturation_capacity_e;  // EMVA: mean charge of the level with the largest variance; absent if not reached; its
+                              // error is that of a value spread evenly up to the level where the variance has fallen
   std::optional<Saturation> saturation;   // mean charge of flats without photon noise; absent if there are none
   Estimate prnu;                          // relative, at half saturation
   std::optional<Estimate> dsnu_e;         // of the darks; absent if under-dithered

@@ -88,14 +88,16 @@ TransferPeak peak_of(const Points& flats, Pairs pairs, int site) {
     largest = p.variance_dn2;
     peak.signal_dn = p.signal_dn;
   }
-  double brightest = 0;
+  double brightest = 0, fallen_dn = std::numeric_limits<double>::infinity();
   for (const TransferPoint& p : flats) {
     if (p.site != site) continue;
     brightest = std::max(brightest, p.signal_dn);
     const bool fallen = p.signal_dn > peak.signal_dn && p.variance_dn2 < fallen_variance * largest;
+    if (fallen) fallen_dn = std::min(fallen_dn, p.signal_dn);
     peak.reached |= fallen || pairs[p.pair].site[site].fraction_at_white > clipped_share;
   }
   if (!peak.reached) peak.signal_dn = brightest;
+  peak.fallen_dn = std::min(fallen_dn, brightest);
   return peak;
 }
 

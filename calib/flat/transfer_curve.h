@@ -22,6 +22,7 @@ struct JoinedDarks {
 /// Point where a site's variance is largest; `reached` if it falls beyond or codes end there, else the brightest flats.
 struct TransferPeak {
   double signal_dn = 0;
+  double fallen_dn = 0;  // darkest signal beyond it at which the variance has fallen; the largest one if it has not
   bool reached = false;
 };
 
