@@ -65,18 +65,17 @@ class SampleFiles {
     }
     std::error_code ignored;
     fs::remove(stem_ + ".json", ignored);  // the old one describes files that are replaced now
-    SimulatedData data;
-    const auto outcome = simulate(*args, spec_.mask ? &data : nullptr);
+    std::vector<std::string> masks;
+    const auto write_its_mask = [&](const RawFrame& frame, int i, const SensorModel& sensor) {
+      const std::string& raw = files.frames[static_cast<std::size_t>(i)];
+      masks.push_back(raw.substr(0, raw.size() - 4) + ".mask.npy");
+      started_.push_back(masks.back());
+      return write_mask(frame, *args, sensor, masks.back());
+    };
+    const auto outcome = simulate(*args, nullptr, spec_.mask ? FrameTaker(write_its_mask) : FrameTaker());
     if (!outcome) return tl::make_unexpected(with_index(outcome.error()));
     std::vector<std::string> written = outcome->files;
-    for (std::size_t i = 0; i < data.frames.size(); ++i) {
-      const std::string file = files.frames[i].substr(0, files.frames[i].size() - 4) + ".mask.npy";
-      started_.push_back(file);
-      if (const auto done = write_mask(data.frames[i], *args, outcome->sensor.model, file); !done) {
-        return tl::make_unexpected(done.error());
-      }
-      written.push_back(file);
-    }
+    written.insert(written.end(), masks.begin(), masks.end());
     return finish(written, Json::parse(simulate_json(*args, *outcome)));
   }
 

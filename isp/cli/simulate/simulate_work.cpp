@@ -81,9 +81,10 @@ void report_plan(const capture::BurstSource& source, bool explain, Executor& exe
 
 class Simulation {
  public:
-  Simulation(const SimulateArgs& args, SimulatedData* keep)
+  Simulation(const SimulateArgs& args, SimulatedData* keep, const FrameTaker& take)
       : args_(args),
         keep_(keep),
+        take_(take),
         files_(files_of(args)),
         executor_(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8)) {}
 
@@ -192,6 +193,9 @@ class Simulation {
       clock.lap("raw file");
       read_out_s += times[0].seconds;
       write_s += times[1].seconds;
+      if (take_) {
+        if (auto taken = take_(*frame, i, out_.sensor.model); !taken) return taken;
+      }
       progress.advance(1, files_.frames[i]);
       if (keep_ != nullptr) keep_->frames.push_back(*std::move(frame));
     }
@@ -261,6 +265,7 @@ class Simulation {
 
   const SimulateArgs& args_;
   SimulatedData* keep_;
+  const FrameTaker& take_;
   SimulateFiles files_;
   PoolExecutor executor_;
   std::string description_;
@@ -269,6 +274,8 @@ class Simulation {
 
 }  // namespace
 
-Result<SimulateOutcome> simulate(const SimulateArgs& args, SimulatedData* keep) { return Simulation(args, keep).run(); }
+Result<SimulateOutcome> simulate(const SimulateArgs& args, SimulatedData* keep, const FrameTaker& take) {
+  return Simulation(args, keep, take).run();
+}
 
 }  // namespace lowlux::cli

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -7,6 +8,7 @@
 #include "isp/base/frame.h"
 #include "isp/base/image.h"
 #include "isp/base/result.h"
+#include "isp/base/sensor.h"
 #include "isp/cli/simulate/simulate_args.h"
 #include "isp/cli/simulate/simulate_report.h"
 
@@ -20,9 +22,13 @@ struct SimulatedData {
   std::string burst_truth;             // JSON, see burst_truth_json; empty: not a burst
 };
 
+/// Takes each frame after its file is written: its index, and the sensor it is of. An error ends the simulation.
+using FrameTaker = std::function<Result<void>(const RawFrame& frame, int index, const SensorModel& sensor)>;
+
 /// Does the work of `simulate`: writes the files that the arguments name, and prints nothing.
 /// @param keep  set: frames and truths are also put there; arguments without an output then write no file
-/// Errors: outputs that exist, those of scene, sensor and writers; frames that take more memory than there is.
-Result<SimulateOutcome> simulate(const SimulateArgs& args, SimulatedData* keep = nullptr);
+/// @param take  set: is called with one frame after the other
+/// Errors: outputs that exist, those of scene, sensor, writers and `take`; frames that take more memory than there is.
+Result<SimulateOutcome> simulate(const SimulateArgs& args, SimulatedData* keep = nullptr, const FrameTaker& take = {});
 
 }  // namespace lowlux::cli
