@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "isp/cli/develop/cost_file.h"
 #include "tests/cli/command.h"
 #include "tests/support/scratch_directory.h"
 
@@ -15,6 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
+using test::holds;
 using test::lowlux;
 
 const Json plain{
@@ -38,9 +41,28 @@ class DatasetFaults : public testing::Test {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_EQ(result.err, "");
   }
+  /// Expects one line that begins with the spec's file, and no folder.
+  void refused(const std::string& message) {
+    const auto result = run("refused");
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_TRUE(result.err.starts_with("lowlux: " + file("spec.json") + ": ")) << result.err.substr(0, 300);
+    EXPECT_TRUE(holds(result.err, message)) << message << '\n' << result.err.substr(0, 300);
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err.substr(0, 300);
+    EXPECT_FALSE(scratch_.holds("refused"));
+  }
+  std::map<std::string, std::string> contents(const std::string& folder) const {
+    std::map<std::string, std::string> all;
+    for (const auto& entry : fs::directory_iterator(file(folder))) {
+      const std::string name = entry.path().filename();
+      if (!name.starts_with("manifest")) all[name] = scratch_.read(folder + "/" + name);
+    }
+    return all;
+  }
 
   test::ScratchDirectory scratch_;
 };
+
+std::string brackets(std::size_t levels) { return std::string(levels, '[') + std::string(levels, ']'); }
 
 TEST_F(DatasetFaults, MemoryDoesNotGrowWithTheFramesOfASample) {
   Json json = plain;
@@ -56,6 +78,39 @@ TEST_F(DatasetFaults, MemoryDoesNotGrowWithTheFramesOfASample) {
   // 60 frames of 800 x 600 codes have 58 MB.
   EXPECT_LT(peak_bytes[1], peak_bytes[0] + 20e6);
   EXPECT_TRUE(scratch_.holds("many/000000000000_0063.mask.npy"));
+}
+
+TEST_F(DatasetFaults, DeepNestingIsOneLine) {
+  constexpr std::size_t deep = 200000;
+  const std::string rest = R"(,"count":1,"sensors":["ELD_NikonD850"])";
+  for (const std::string& keys :
+       {R"("scenes":[)" + brackets(deep) + "]", R"("scenes":["flat"],"gain":{"choice":)" + brackets(deep) + "}"}) {
+    scratch_.write("spec.json", "{" + keys + rest + "}");
+    refused("levels of brackets");
+  }
+  // Brackets within texts are not levels, and 64 levels are read.
+  scratch_.write("spec.json", R"({"scenes":["flat\"\\)" + std::string(deep, '[') + "\"]" + rest + "}");
+  refused("there is no such file");
+  scratch_.write("spec.json", R"({"scenes":[)" + brackets(62) + "]" + rest + "}");
+  refused("is not a text");
+}
+
+TEST_F(DatasetFaults, ADamagedSampleThatIsNestedDeeplyIsMadeAgain) {
+  made(plain, "all");
+  const auto all = contents("all");
+  Json sample = Json::parse(all.at("000000000001.json"));
+  std::string text = sample.dump();
+  const std::size_t at = text.find(R"("name")");
+  ASSERT_NE(at, std::string::npos);
+  scratch_.write("all/000000000001.json", text.insert(at, R"("more":)" + brackets(200000) + ","));
+  made(plain, "all");
+  EXPECT_EQ(contents("all"), all);
+}
+
+TEST(CostFile, DeepNestingIsAnError) {
+  const auto cost = cli::parse_cost(R"({"lowlux_cost_model":6,"machine":)" + brackets(200000) + "}");
+  ASSERT_FALSE(cost);
+  EXPECT_EQ(cost.error().code, ErrorCode::malformed);
 }
 
 }  // namespace

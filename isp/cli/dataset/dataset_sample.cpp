@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/file/file_bytes.h"
+#include "isp/base/json_depth.h"
 #include "isp/cli/dataset/dataset_draw.h"
 #include "isp/cli/dataset/pixel_mask.h"
 #include "isp/cli/shared/machine.h"
@@ -38,6 +39,16 @@ DatasetSample sample_of(Json files, const std::string& name, std::string_view pa
   DatasetSample sample{text_of(files), 0};
   for (const Json& file : files) sample.bytes += file["bytes"].get<std::uint64_t>();
   return sample;
+}
+
+/// Returns the parameters of a sample; nullopt if the file is missing or damaged.
+std::optional<std::string> read_parameters(const std::string& file) {
+  constexpr std::uint64_t max_bytes = 4 << 20;
+  const auto bytes = capture::read_file_bytes(file, max_bytes);
+  if (!bytes) return std::nullopt;
+  std::string text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  if (nests_deeper(text, max_json_depth)) return std::nullopt;
+  return text;
 }
 
 /// Writes one sample, and removes its files unless they are complete.
@@ -124,13 +135,11 @@ class SampleFiles {
 }  // namespace
 
 std::optional<DatasetSample> find_sample(const DatasetSpec& spec, std::uint64_t index, const std::string& folder) {
-  constexpr std::uint64_t max_bytes = 4 << 20;
   const std::string file = stem_of(index, folder) + ".json";
-  const auto bytes = capture::read_file_bytes(file, max_bytes);
-  if (!bytes) return std::nullopt;
-  const std::string text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  const auto text = read_parameters(file);
+  if (!text) return std::nullopt;
   try {
-    const Json json = Json::parse(text);
+    const Json json = Json::parse(*text);
     if (json.at("lowlux") != version_number() || json.at("spec_sha256") != spec.sha256 || json.at("index") != index) {
       return std::nullopt;
     }
@@ -140,7 +149,7 @@ std::optional<DatasetSample> find_sample(const DatasetSpec& spec, std::uint64_t 
       if (failed || found != part.at("bytes").get<std::uint64_t>()) return std::nullopt;
       if (part.at("sha256").get<std::string>().size() != 64) return std::nullopt;
     }
-    return sample_of(json.at("files"), fs::path(file).filename().string(), text);
+    return sample_of(json.at("files"), fs::path(file).filename().string(), *text);
   } catch (const Json::exception&) {
     return std::nullopt;  // of another program, or damaged: the sample is made again
   }

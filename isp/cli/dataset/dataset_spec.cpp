@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/file/file_bytes.h"
+#include "isp/base/json_depth.h"
 #include "isp/base/text.h"
 
 namespace lowlux::cli {
@@ -131,8 +132,11 @@ Result<DatasetSensor> sensor_of(const Json& entry, std::vector<DrawnSetting> com
   return out;
 }
 
-/// Parses JSON. Errors: another text; a key that an object has twice.
+/// Parses JSON. Errors: another text; a key that an object has twice; more than max_json_depth levels.
 Result<Json> parse(const std::string& text) {
+  if (nests_deeper(text, max_json_depth)) {
+    return fail(ErrorCode::malformed, fmt::format("is nested in more than {} levels of brackets", max_json_depth));
+  }
   std::vector<std::set<std::string>> keys;
   std::string twice;
   const auto note = [&](int /*depth*/, Json::parse_event_t event, Json& value) {

@@ -16,6 +16,7 @@
 
 #include "capture/file/file_bytes.h"
 #include "isp/base/executor.h"
+#include "isp/base/json_depth.h"
 #include "isp/cost/cost_measurement.h"
 #include "isp/cost/speed_probe.h"
 #include "isp/cli/shared/lines.h"
@@ -106,6 +107,7 @@ std::string cost_text(const isp::CostModel& model) {
 }
 
 Result<isp::CostModel> parse_cost(std::string_view text) {
+  if (nests_deeper(text, max_json_depth)) return malformed("it is nested too deeply");
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object() || json.value("lowlux_cost_model", Json()) != Json(format_number)) {
     return malformed(fmt::format("it does not say \"lowlux_cost_model\": {}", format_number));
