@@ -14,7 +14,6 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr double most_pixels = 1 << 28;
 constexpr double brightest_cd_m2 = 1e12;
 constexpr double gap = 0.08;  // fraction of a patch's pitch: the frame around it
 
@@ -29,7 +28,7 @@ Result<void> check_luminance(double luminance_cd_m2) {
 
 /// Returns a scene of one size without light, and the radiance of its white.
 Result<Scene> empty_scene(const SceneSetup& setup) {
-  if (setup.width < 1 || setup.height < 1 || static_cast<double>(setup.width) * setup.height > most_pixels) {
+  if (setup.width < 1 || setup.height < 1 || static_cast<double>(setup.width) * setup.height > max_scene_pixels) {
     return wrong("a scene has 1 to 2^28 pixels, found " + std::to_string(setup.width) + " x " +
                  std::to_string(setup.height));
   }

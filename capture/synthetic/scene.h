@@ -57,8 +57,11 @@ struct SceneSetup {
   double luminance_cd_m2 = 1;  // of a perfect white diffuser under it
 };
 
-/// The functions below fail for a size below 1 or above 2^28 pixels, a light without luminance or with negative power,
-/// a luminance that is negative, not finite or above 1e12 cd/m2.
+/// Largest number of pixels of a scene.
+inline constexpr double max_scene_pixels = 268435456;  // 2^28
+
+/// The functions below fail for a size below 1 or above max_scene_pixels, a light without luminance or with negative
+/// power, a luminance that is negative, not finite or above 1e12 cd/m2.
 
 /// Returns a scene without light, for dark frames.
 Result<Scene> dark_scene(const SceneSetup& setup);

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "isp/cli/dataset/dataset_draw.h"
+#include "isp/cli/dataset/dataset_spec.h"
 #include "isp/cli/develop/cost_file.h"
 #include "tests/cli/command.h"
 #include "tests/support/scratch_directory.h"
@@ -111,6 +114,48 @@ TEST(CostFile, DeepNestingIsAnError) {
   const auto cost = cli::parse_cost(R"({"lowlux_cost_model":6,"machine":)" + brackets(200000) + "}");
   ASSERT_FALSE(cost);
   EXPECT_EQ(cost.error().code, ErrorCode::malformed);
+}
+
+TEST_F(DatasetFaults, MaskedColumnsAreDrawnEven) {
+  Json json = plain;
+  json["masked_columns"] = {{"uniform", {0, 64}}};
+  const auto read = cli::read_dataset_spec(spec(json));
+  ASSERT_TRUE(read) << read.error().message;
+  std::set<int> drawn;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    drawn.insert(std::stoi(cli::draw_sample(*read, i).settings.at("masked_columns")));
+  }
+  std::set<int> even;
+  for (int columns = 0; columns <= 64; columns += 2) even.insert(columns);
+  EXPECT_EQ(drawn, even);
+  json["count"] = 12;
+  made(json, "all", {"--quiet"});
+  json["masked_columns"] = {{"uniform", {0, 63}}};
+  spec(json);
+  refused("masked_columns: the limits of the range [0,63] are not even");
+}
+
+TEST_F(DatasetFaults, SettingsThatDoNotGoTogetherAreFoundBeforeAnySample) {
+  Json json = plain;
+  json["size"] = {{"choice", {"64x48", "60000x60000"}}};
+  spec(json);
+  refused("size: ");
+  json = plain;
+  json["black_level_dn"] = {{"choice", {0, 2000}}};
+  json["white_level_dn"] = {{"choice", {16383, 1000}}};
+  spec(json);
+  refused("black_level_dn");
+}
+
+TEST_F(DatasetFaults, FailuresOfSamplesNameTheSpec) {
+  scratch_.write("broken.png", "this is no image");
+  Json json = plain;
+  json["scenes"] = {"broken.png"};
+  spec(json);
+  const auto result = run("all", {"--quiet"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_TRUE(result.err.starts_with("lowlux: " + file("spec.json") + ": sample 0, scene broken.png: ")) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
 }
 
 }  // namespace

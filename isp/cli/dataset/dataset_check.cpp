@@ -7,6 +7,7 @@
 
 #include "capture/synthetic/synthetic_camera.h"
 #include "isp/cli/dataset/dataset_draw.h"
+#include "isp/cli/shared/option_values.h"
 #include "isp/cli/simulate/scene_argument.h"
 #include "isp/model/sensor/given_figures.h"
 #include "isp/model/spectrum/spectral_response.h"
@@ -60,7 +61,47 @@ std::string place_of_fault(const DatasetSpec& spec, const DatasetDraw& draw, Exe
   return "sensors: " + draw.sensor->name;
 }
 
-/// Checks a sensor with each limit and each choice of one setting after the other, the other settings at their first.
+/// Returns the least and the largest value of numbers, and all texts.
+std::vector<std::string> limits_of(const DrawnSetting& drawn) {
+  const std::vector<std::string> values = extremes_of(drawn);
+  if (drawn.setting->kind == SettingKind::text) return values;
+  const auto number = [](const std::string& json) { return number_of(json).value_or(0); };
+  const auto [least, largest] = std::ranges::minmax_element(values, {}, number);
+  return {*least, *largest};
+}
+
+/// Checks each pair of limits of two settings, the others at their first: settings may depend on each other, as black
+/// and white level do. Pairs with a first value are those that check_sensor has checked.
+Result<void> check_pairs(const DatasetSpec& spec, const DatasetDraw& first, Executor& executor) {
+  const std::vector<DrawnSetting>& all = first.sensor->settings;
+  const auto others_than_first = [&](const DrawnSetting& drawn) {
+    std::vector<std::string> values = limits_of(drawn);
+    std::erase(values, first.settings.at(std::string(drawn.setting->key)));
+    return values;
+  };
+  for (auto one = all.begin(); one != all.end(); ++one) {
+    const std::vector<std::string> values = others_than_first(*one);
+    for (auto other = one + 1; !values.empty() && other != all.end(); ++other) {
+      const std::vector<std::string> other_values = others_than_first(*other);
+      for (const std::string& value : values) {
+        for (const std::string& other_value : other_values) {
+          DatasetDraw draw = first;
+          draw.settings[std::string(one->setting->key)] = value;
+          draw.settings[std::string(other->setting->key)] = other_value;
+          if (const auto good = check_draw(spec, draw, executor); !good) {
+            return tl::make_unexpected(
+                with_key(good.error(), fmt::format("sensors: {}: {} {} with {} {}", first.sensor->name,
+                                                   one->setting->key, value, other->setting->key, other_value)));
+          }
+        }
+      }
+    }
+  }
+  return {};
+}
+
+/// Checks a sensor with each limit and each choice of one setting, and the limits of two, the other settings at their
+/// first.
 Result<void> check_sensor(const DatasetSpec& spec, const DatasetSensor& sensor, Executor& executor) {
   DatasetDraw first{.scene = "flat", .sensor = &sensor, .settings = {}};
   for (const DrawnSetting& drawn : sensor.settings) {
@@ -89,6 +130,20 @@ Result<void> check_sensor(const DatasetSpec& spec, const DatasetSensor& sensor, 
       }
     }
   }
+  return check_pairs(spec, first, executor);
+}
+
+/// Checks the first draws: combinations of three and more settings.
+Result<void> check_first_draws(const DatasetSpec& spec, Executor& executor) {
+  constexpr std::uint64_t max_checked = 64;
+  for (std::uint64_t i = 0; i < std::min(spec.count, max_checked); ++i) {
+    DatasetDraw draw = draw_sample(spec, spec.first_index + i);
+    draw.scene = "flat";
+    if (const auto good = check_draw(spec, draw, executor); !good) {
+      return tl::make_unexpected(
+          with_key(good.error(), fmt::format("sensors: {}: sample {}", draw.sensor->name, spec.first_index + i)));
+    }
+  }
   return {};
 }
 
@@ -98,6 +153,7 @@ Result<void> check_dataset(const DatasetSpec& spec, Executor& executor) {
   for (const DatasetSensor& sensor : spec.sensors) {
     if (const auto good = check_sensor(spec, sensor, executor); !good) return good;
   }
+  if (const auto good = check_first_draws(spec, executor); !good) return good;
   for (const std::string& scene : spec.scenes) {
     if (!is_generated(scene)) continue;
     const DatasetDraw draw{.scene = scene, .sensor = &spec.sensors.front(), .settings = {}};

@@ -84,9 +84,10 @@ std::string draw_value(const Distribution& distribution, SettingKind kind, std::
     return distribution.choices[std::min(static_cast<std::size_t>(u * static_cast<double>(count)), count - 1)];
   }
   const bool uniform = distribution.kind == Distribution::Kind::uniform;
-  if (kind == SettingKind::whole) {
-    const double value = uniform ? low + u * (high - low + 1) : low * std::pow((high + 1) / low, u);
-    return std::to_string(static_cast<std::int64_t>(std::clamp(std::floor(value), low, high)));
+  if (kind == SettingKind::whole || kind == SettingKind::even) {
+    const double step = kind == SettingKind::even ? 2 : 1;
+    const double value = uniform ? low + u * (high - low + step) : low * std::pow((high + step) / low, u);
+    return std::to_string(static_cast<std::int64_t>(std::clamp(step * std::floor(value / step), low, high)));
   }
   // The sum of two products does not overflow where high - low does.
   return Json(rounded(uniform ? (1 - u) * low + u * high : low * std::exp(u * (std::log(high) - std::log(low))), low,

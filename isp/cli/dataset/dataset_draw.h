@@ -23,7 +23,7 @@ struct DatasetDraw {
 std::uint64_t draw_bits(const DatasetSpec& spec, std::uint64_t index, std::string_view quantity);
 
 /// Returns a value, as JSON, of a distribution for 64 random bits. Values of ranges are rounded to six digits, so that
-/// they do not depend on the last bit of the machine's logarithm; those of whole numbers include both limits.
+/// they do not depend on the last bit of the machine's logarithm; those of whole and even numbers include both limits.
 std::string draw_value(const Distribution& distribution, SettingKind kind, std::uint64_t bits);
 
 /// Draws the sample of an index: a function of the spec's hash and the index alone.

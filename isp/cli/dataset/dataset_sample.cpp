@@ -65,7 +65,7 @@ class SampleFiles {
 
   Result<DatasetSample> make() {
     auto args = simulate_args(spec_, draw_);
-    if (!args) return tl::make_unexpected(args.error());
+    if (!args) return tl::make_unexpected(with_index(args.error()));
     args->output = stem_ + ".dng";
     args->force = true;
     if (spec_.truth_electrons) args->truth_electrons = stem_ + ".electrons.exr";
@@ -118,11 +118,12 @@ class SampleFiles {
     return sample_of(std::move(files), fs::path(stem_ + ".json").filename().string(), text);
   }
 
-  /// Returns the error with scene and index, which find the sample again.
+  /// Returns the error with scene and index, which find the sample again; the caller adds the spec's file.
   Error with_index(Error error) const {
     if (error.code == ErrorCode::unwritable) return error;
-    error.message = fmt::format("sample {}, scene {}: {}", index_, draw_.scene, in_keys(error.message));
-    return error;
+    const std::string place = error.where.empty() ? "" : error.where + ": ";
+    return {
+        error.code, in_keys(fmt::format("sample {}, scene {}: {}{}", index_, draw_.scene, place, error.message)), {}};
   }
 
   const DatasetSpec& spec_;

@@ -17,7 +17,7 @@ constexpr std::array all_settings{
     Setting{"f_number", "--f-number", SettingKind::number},
     Setting{"temperature_c", "--temperature", SettingKind::number},
     Setting{"cfa", "--cfa", SettingKind::text},
-    Setting{"masked_columns", "--masked-columns", SettingKind::whole},
+    Setting{"masked_columns", "--masked-columns", SettingKind::even},
     Setting{"effects", "--effects", SettingKind::text},
     Setting{"sampling", "--sampling", SettingKind::text},
     Setting{"sensor_seed", "--sensor-seed", SettingKind::whole},

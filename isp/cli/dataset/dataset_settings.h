@@ -6,8 +6,8 @@
 
 namespace lowlux::cli {
 
-/// Selects the kind of values that a setting has.
-enum class SettingKind : std::uint8_t { number, whole, text };
+/// Selects the kind of values that a setting has. Even numbers are drawn from ranges whose limits are even.
+enum class SettingKind : std::uint8_t { number, whole, even, text };
 
 /// Describes a key of a spec and the option of `lowlux simulate` that it sets.
 struct Setting {

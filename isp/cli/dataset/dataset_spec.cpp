@@ -44,6 +44,7 @@ bool is_value(const Json& value, SettingKind kind) {
     case SettingKind::number:
       return value.is_number();
     case SettingKind::whole:
+    case SettingKind::even:
       return value.is_number_integer();
     case SettingKind::text:
       break;
@@ -52,7 +53,7 @@ bool is_value(const Json& value, SettingKind kind) {
 }
 
 const char* kind_text(SettingKind kind) {
-  return kind == SettingKind::number ? "a number" : kind == SettingKind::whole ? "a whole number" : "a text";
+  return kind == SettingKind::number ? "a number" : kind == SettingKind::text ? "a text" : "a whole number";
 }
 
 Result<Distribution> range_of(const Json& range, const std::string& name, SettingKind kind, const std::string& key) {
@@ -73,8 +74,11 @@ Result<Distribution> range_of(const Json& range, const std::string& name, Settin
     return wrong(key, fmt::format("the range {} of log_uniform does not begin above 0", range.dump()));
   }
   constexpr double max_whole = 9007199254740992;  // 2^53
-  if (kind == SettingKind::whole && (out.low < -max_whole || out.high > max_whole)) {
+  if (kind != SettingKind::number && (out.low < -max_whole || out.high > max_whole)) {
     return wrong(key, "a limit of the range exceeds 2^53");
+  }
+  if (kind == SettingKind::even && (std::fmod(out.low, 2) != 0 || std::fmod(out.high, 2) != 0)) {
+    return wrong(key, fmt::format("the limits of the range {} are not even", range.dump()));
   }
   return out;
 }

@@ -34,6 +34,7 @@ Wrong set_size(const std::string& text, SceneArgs& scene) {
     return fmt::format("is not WIDTHxHEIGHT of {} to {} pixels: raw developers read no other frames", min_side,
                        max_side);
   }
+  if (static_cast<double>(scene.width) * scene.height > capture::max_scene_pixels) return "has more than 2^28 pixels";
   return std::nullopt;
 }
 
