@@ -2,6 +2,8 @@
 
 #include <cerrno>
 #include <cstdlib>
+#include <mutex>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -20,6 +22,27 @@ void open_folders(const fs::path& folder) {
   }
 }
 
+/// Removes a folder and all it holds.
+void remove_folder(const fs::path& folder) {
+  std::error_code failed;
+  fs::remove_all(folder, failed);
+  if (!failed) return;
+  open_folders(folder);
+  fs::remove_all(folder, failed);
+}
+
+/// Holds the folders of this process.
+struct Folders {
+  std::mutex mutex;
+  std::set<fs::path> all;
+};
+
+/// Returns the folders. They are never destroyed: a thread that handles signals may use them while the process ends.
+Folders& folders() {
+  static Folders& only = *new Folders;
+  return only;
+}
+
 }  // namespace
 
 Result<PrivateFolder> PrivateFolder::make() {
@@ -29,20 +52,28 @@ Result<PrivateFolder> PrivateFolder::make() {
     return fail(ErrorCode::unwritable, "cannot use the folder for temporary files (TMPDIR): " + failed.message());
   }
   std::string name = (below / "lowlux-XXXXXX").string();
+  Folders& made = folders();
+  const std::lock_guard guard(made.mutex);
   if (mkdtemp(name.data()) == nullptr) {
     return fail(ErrorCode::unwritable, "no folder can be made here: " + std::generic_category().message(errno),
                 below.string());
   }
+  made.all.insert(name);
   return PrivateFolder(name);
+}
+
+void PrivateFolder::abandon_all() {
+  Folders& made = folders();
+  made.mutex.lock();  // never unlocked
+  for (const fs::path& folder : made.all) remove_folder(folder);
 }
 
 PrivateFolder::~PrivateFolder() {
   if (path_.empty()) return;
-  std::error_code failed;
-  fs::remove_all(path_, failed);
-  if (!failed) return;
-  open_folders(path_);
-  fs::remove_all(path_, failed);
+  Folders& made = folders();
+  const std::lock_guard guard(made.mutex);
+  remove_folder(path_);
+  made.all.erase(path_);
 }
 
 PrivateFolder::PrivateFolder(PrivateFolder&& other) noexcept : path_(std::exchange(other.path_, {})) {}

@@ -18,6 +18,10 @@ class PrivateFolder {
   PrivateFolder(const PrivateFolder&) = delete;
   PrivateFolder& operator=(const PrivateFolder&) = delete;
 
+  /// Removes the folders of this process. Threads that make or destroy one block forever from then on: for a process
+  /// that is about to end.
+  static void abandon_all();
+
   const std::filesystem::path& path() const { return path_; }
 
  private:

@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <map>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -156,6 +159,32 @@ TEST_F(DatasetFaults, FailuresOfSamplesNameTheSpec) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_TRUE(result.err.starts_with("lowlux: " + file("spec.json") + ": sample 0, scene broken.png: ")) << result.err;
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+}
+
+TEST_F(DatasetFaults, ASignalRemovesTheFolderOfADryRun) {
+  Json json = plain;
+  json["size"] = "2000x1500", json["count"] = 8;
+  spec(json);
+  fs::create_directory(file("temporary"));
+  const auto holds_file = [&] {
+    std::error_code gone;
+    for (fs::recursive_directory_iterator at(file("temporary"), gone), end; !gone && at != end; at.increment(gone)) {
+      if (at->path().extension() == ".dng") return true;
+    }
+    return false;
+  };
+  for (const int signal : {SIGINT, SIGTERM}) {
+    test::RunningProcess process({"env", "TMPDIR=" + file("temporary"), LOWLUX_COMMAND, "dataset", file("spec.json"),
+                                  "-o", file("none"), "--dry-run", "--quiet"});
+    int tries = 0;
+    while (tries < 60000 && !holds_file()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      ++tries;
+    }
+    process.send(signal);
+    EXPECT_EQ(process.wait().exit_code, 128 + signal);
+    EXPECT_TRUE(fs::is_empty(file("temporary"))) << signal;
+  }
 }
 
 }  // namespace

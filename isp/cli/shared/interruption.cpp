@@ -16,6 +16,7 @@
 
 #include "isp/cli/shared/lines.h"
 #include "isp/output/atomic_file.h"
+#include "isp/output/private_folder.h"
 
 namespace lowlux::cli {
 namespace {
@@ -45,7 +46,8 @@ void note(int number) {
 
 void end_when_asked() {
   while (sem_wait(&arrived) != 0) continue;
-  isp::AtomicFile::abandon_all();
+  isp::AtomicFile::abandon_all();  // first: no file is made in the folders from here on
+  isp::PrivateFolder::abandon_all();
   alarm(2);  // ends the process if the reader of stderr has stopped
   {
     Report& current = report();
