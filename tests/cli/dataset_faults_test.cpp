@@ -161,6 +161,33 @@ TEST_F(DatasetFaults, FailuresOfSamplesNameTheSpec) {
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
 }
 
+TEST_F(DatasetFaults, ForceRemovesTheFilesOfTheSamplesItReplaces) {
+  Json bursts = plain;
+  bursts["frames"] = 3, bursts["truth_electrons"] = true;
+  made(bursts, "all", {"--quiet"});
+  ASSERT_TRUE(scratch_.holds("all/000000000000_0002.dng"));
+  made(plain, "all", {"--force", "--quiet"});
+  made(plain, "other", {"--quiet"});
+  EXPECT_EQ(contents("all"), contents("other"));
+}
+
+TEST_F(DatasetFaults, ForceRemovesNoFileOfAnother) {
+  made(plain, "all", {"--quiet"});
+  Json sample = Json::parse(scratch_.read("all/000000000000.json"));
+  const std::vector<std::string> others{"all/0000000000001.dng", "all/notes.txt", "outside.txt",
+                                        "all/000000000002.dng"};
+  for (const std::string& other : others) scratch_.write(other, "kept");
+  for (const char* name :
+       {"0000000000001.dng", "notes.txt", "../outside.txt", "000000000002.dng", "000000000000./../../outside.txt"}) {
+    sample["files"].push_back({{"name", name}, {"bytes", 4}, {"sha256", ""}});
+  }
+  scratch_.write("all/000000000000.json", sample.dump());
+  Json other = plain;
+  other["count"] = 1, other["seed"] = 9;
+  made(other, "all", {"--force", "--quiet"});
+  for (const std::string& name : others) EXPECT_EQ(scratch_.read(name), "kept") << name;
+}
+
 TEST_F(DatasetFaults, ASignalRemovesTheFolderOfADryRun) {
   Json json = plain;
   json["size"] = "2000x1500", json["count"] = 8;

@@ -51,6 +51,31 @@ std::optional<std::string> read_parameters(const std::string& file) {
   return text;
 }
 
+/// Returns whether a name is that of a file of a sample: its number, and no digit after it, in no other folder.
+bool is_of_sample(const std::string& name, const std::string& number) {
+  return name.starts_with(number) && name.size() > number.size() &&
+         (name[number.size()] == '.' || name[number.size()] == '_') && name.find('/') == std::string::npos;
+}
+
+/// Removes the parameters of an older sample of the same number, and the files that they list. It may have more files
+/// than the new one.
+void remove_old_sample(const std::string& stem) {
+  const std::string file = stem + ".json", number = fs::path(stem).filename().string();
+  std::error_code ignored;
+  if (const auto text = read_parameters(file)) {
+    try {
+      const Json json = Json::parse(*text);
+      for (const Json& part : json.at("files")) {
+        const auto name = part.at("name").get<std::string>();
+        if (is_of_sample(name, number)) fs::remove(fs::path(stem).replace_filename(name), ignored);
+      }
+    } catch (const Json::exception&) {
+      // Of another program, or damaged: no file of it is known.
+    }
+  }
+  fs::remove(file, ignored);
+}
+
 /// Writes one sample, and removes its files unless they are complete.
 class SampleFiles {
  public:
@@ -74,8 +99,7 @@ class SampleFiles {
     for (const std::string& file : {files.truth, files.truth_electrons, stem_ + ".json"}) {
       if (!file.empty()) started_.push_back(file);
     }
-    std::error_code ignored;
-    fs::remove(stem_ + ".json", ignored);  // the old one describes files that are replaced now
+    remove_old_sample(stem_);
     std::vector<std::string> masks;
     const auto write_its_mask = [&](const RawFrame& frame, int i, const SensorModel& sensor) {
       const std::string& raw = files.frames[static_cast<std::size_t>(i)];
