@@ -188,6 +188,19 @@ TEST_F(DatasetFaults, ForceRemovesNoFileOfAnother) {
   for (const std::string& name : others) EXPECT_EQ(scratch_.read(name), "kept") << name;
 }
 
+TEST_F(DatasetFaults, AFolderThatCannotBeUsedIsOneLine) {
+  spec(plain);
+  fs::create_symlink("loop", file("loop"));
+  scratch_.write("file", "");
+  for (const std::string& folder : {std::string(300, 'x'), std::string("loop"), std::string("file")}) {
+    const auto result = run(folder);
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_TRUE(holds(result.err, "is not a folder, and cannot be made one")) << result.err;
+    EXPECT_FALSE(holds(result.err, "filesystem error")) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+}
+
 TEST_F(DatasetFaults, ASignalRemovesTheFolderOfADryRun) {
   Json json = plain;
   json["size"] = "2000x1500", json["count"] = 8;

@@ -85,11 +85,12 @@ Result<void> check_files(const CaptureArgs& args) {
   const std::size_t at = name.rfind("0001");
   const fs::path folder = fs::path(first).parent_path();
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder.empty() ? fs::path(".") : folder, error)) {
-    const std::uint64_t index = index_in(entry.path().filename().string(), name.substr(0, at), name.substr(at + 4));
+  for (fs::directory_iterator entry(folder.empty() ? fs::path(".") : folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string file = entry->path().string();
+    const std::uint64_t index = index_in(entry->path().filename().string(), name.substr(0, at), name.substr(at + 4));
     if (index == 0 || (args.limits.frames > 0 && index > args.limits.frames)) continue;
-    return fail(ErrorCode::exists, fmt::format("{} exists: use --force to overwrite it", entry.path().string()),
-                entry.path().string());
+    return fail(ErrorCode::exists, fmt::format("{} exists: use --force to overwrite it", file), file);
   }
   return {};
 }

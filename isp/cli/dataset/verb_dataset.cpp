@@ -89,7 +89,7 @@ class ShardRun {
   Result<DatasetOutcome> run() {
     std::error_code failed;
     fs::create_directories(args_.output, failed);
-    if (!fs::is_directory(args_.output)) {
+    if (!fs::is_directory(args_.output, failed)) {
       return fail(ErrorCode::unwritable, "is not a folder, and cannot be made one", args_.output);
     }
     if (const auto claimed = claim_folder(spec_, args_.output, args_.force); !claimed) {

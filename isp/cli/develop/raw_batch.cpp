@@ -247,7 +247,7 @@ class BatchRun {
         std::error_code absent;
         out.skipped = !is_standard_stream(job.output) && std::filesystem::file_size(job.output, absent) > 0 && !absent;
         if (out.skipped) return out;
-        const auto exists = [](const std::string& file) { return std::filesystem::exists(file); };
+        const auto exists = [&absent](const std::string& file) { return std::filesystem::exists(file, absent); };
         if (std::ranges::any_of(files_of(batch_, job), exists)) own.overwrite = isp::Overwrite::yes;
       }
       const Result<void> worked = work_(own, executor, progress, out);
