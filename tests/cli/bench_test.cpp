@@ -155,6 +155,8 @@ TEST(Bench, WrongCommandLinesExitWithTwo) {
                                                     {"--method", "a=p {in} {out}", "--method", "a=q {in} {out}"},
                                                     {"--seed", "x"},
                                                     {"--time-limit", "0"},
+                                                    {"--time-limit", "nan"},
+                                                    {"--time-limit", "inf"},
                                                     {"--stage"},
                                                     {"--pictures", "none"},
                                                     {"--threads", "0"},

@@ -22,10 +22,8 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
       ->type_name("NAME[=COMMAND]")
       ->allow_extra_args(false);
   app.add_option("--seed", args.seed, "of the scenes and noise of the stage methods (default: 1)")->type_name("N");
-  app.add_option("--time-limit", args.time_limit_s,
-                 "for each frame and program of the stage methods [s] (default: 120)")
-      ->check(CLI::Range(0.1, 86400.0))
-      ->type_name("S");
+  add_number_within(app, "--time-limit", "S", "for each frame and program of the stage methods [s] (default: 120)", 0.1,
+                    86400, args.time_limit_s);
   app.add_flag("--calibrate-cost", args.calibrate_cost,
                "measure how fast this machine develops, for develop --budget-ms, and keep it; 2 to 5 minutes")
       ->excludes("--stage")

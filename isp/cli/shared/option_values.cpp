@@ -151,6 +151,18 @@ CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::strin
       });
 }
 
+CLI::Option* add_number_within(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
+                               double low, double high, double& value) {
+  return add_text(app, flag, type, help,
+                  [low, high, unit = unit_of(type), &value](const std::string& text) -> std::optional<std::string> {
+                    const auto number = quantity_of(text, unit);
+                    if (!number || *number < low || *number > high)
+                      return fmt::format("is not a number of {:g} to {:g}", low, high);
+                    value = *number;
+                    return std::nullopt;
+                  });
+}
+
 int refuse(const CLI::App& app, const std::string& wrong) {
   const std::string place = default_place(app, wrong);
   print_err(fmt::format("{}\n", one_line(fmt::format("{}: {}{}{}; --help lists the options", app.get_name(), place,

@@ -67,6 +67,11 @@ CLI::Option* add_text(CLI::App& app, const std::string& flag, const std::string&
 CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
                         std::function<void(double)> store);
 
+/// Adds an option that takes a quantity from `low` to `high`, as add_number does. CLI::Range accepts NaN: it is for
+/// whole numbers only.
+CLI::Option* add_number_within(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
+                               double low, double high, double& value);
+
 /// Adds an option whose values are names, which are its placeholder; the message for any other lists them.
 template <class Enum, class Store>
 CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum>& names, Store store,
