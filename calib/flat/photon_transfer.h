@@ -33,11 +33,11 @@ struct PhotonTransfer {
   bool under_dithered = false;                // darks scatter by less than half a code: see quantisation_bounds()
   double row_noise_e = 0;                     // the part of the read noise common to whole rows
   PerSite<double> black_dn{};                 // mean of the darks
-  std::optional<Estimate>
-      saturation_capacity_e;  // EMVA: mean charge of the level with the largest variance; absent if not reached; its
-                              // error is that of a value spread evenly up to the level where the variance has fallen
-  std::optional<Saturation> saturation;   // mean charge of flats without photon noise; absent if there are none
-  Estimate prnu;                          // relative, at half saturation
+  // EMVA: mean charge of the level with the largest variance; absent if not reached. Its error includes that of a value
+  // spread evenly up to the level where the variance has fallen.
+  std::optional<Estimate> saturation_capacity_e;
+  std::optional<Saturation> saturation;  // mean charge of flats without photon noise; absent if there are none
+  Estimate prnu;  // relative, at half saturation; contains the nonuniformity of dark current that the darks lack
   std::optional<Estimate> dsnu_e;         // of the darks; absent if under-dithered
   std::optional<double> linearity_error;  // EMVA LE: mean relative deviation from the line, 5 to 95 % of range
   double reduced_chi_square = 0;          // of variance against mean
