@@ -21,7 +21,7 @@ PerSite<Estimate> levels_of(const DarkGroup& group) {
   }
   PerSite<Estimate> out{};
   for (std::size_t site = 0; site < out.size(); ++site) {
-    const double rows = (height + 1 - static_cast<int>(site >> 1)) / 2;
+    const int rows = (height + 1 - static_cast<int>(site >> 1)) / 2;
     const double variance_dn2 = variance[site] / pixels[site] / pixels[site] +
                                 std::max(0.0, group.row_variance_dn2[site]) / rows +
                                 std::max(0.0, group.frame_variance_dn2[site]);

@@ -63,7 +63,7 @@ std::string place_of_fault(const DatasetSpec& spec, const DatasetDraw& draw, Exe
 
 /// Returns the least and the largest value of numbers, and all texts.
 std::vector<std::string> limits_of(const DrawnSetting& drawn) {
-  const std::vector<std::string> values = extremes_of(drawn);
+  std::vector<std::string> values = extremes_of(drawn);
   if (drawn.setting->kind == SettingKind::text) return values;
   const auto number = [](const std::string& json) { return number_of(json).value_or(0); };
   const auto [least, largest] = std::ranges::minmax_element(values, {}, number);
@@ -151,9 +151,9 @@ Result<void> check_first_draws(const DatasetSpec& spec, Executor& executor) {
 
 Result<void> check_dataset(const DatasetSpec& spec, Executor& executor) {
   for (const DatasetSensor& sensor : spec.sensors) {
-    if (const auto good = check_sensor(spec, sensor, executor); !good) return good;
+    if (auto good = check_sensor(spec, sensor, executor); !good) return good;
   }
-  if (const auto good = check_first_draws(spec, executor); !good) return good;
+  if (auto good = check_first_draws(spec, executor); !good) return good;
   for (const std::string& scene : spec.scenes) {
     if (!is_generated(scene)) continue;
     const DatasetDraw draw{.scene = scene, .sensor = &spec.sensors.front(), .settings = {}};
