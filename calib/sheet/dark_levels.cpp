@@ -74,10 +74,10 @@ const DarkRate* DarkLevels::rate_at(const std::optional<double>& temperature_c) 
   return out;
 }
 
-DarkLevel DarkLevels::at(const FrameSetting& flats) const {
+DarkOfFlats DarkLevels::at(const FrameSetting& flats) const {
   const DarkGroup* group = nearest(flats);
   if (group == nullptr) return {levels_dn_.front(), nullptr, false};
-  DarkLevel out{levels_dn_[static_cast<std::size_t>(group - groups_.data())], nullptr, true};
+  DarkOfFlats out{levels_dn_[static_cast<std::size_t>(group - groups_.data())], nullptr, true};
   const double more_s = flats.exposure_s.value_or(0) - group->setting.exposure_s.value_or(0);
   if (more_s == 0) {
     out.same_time = group;

@@ -13,7 +13,7 @@
 namespace lowlux::calib {
 
 /// Mean of the darks that belong to flats of one exposure time and temperature.
-struct DarkLevel {
+struct DarkOfFlats {
   PerSite<Estimate> level_dn{};          // standard errors are by temporal noise: patterns are those of the flats too
   const DarkGroup* same_time = nullptr;  // darks of that exposure time and temperature; null if there are none
   bool contains_dark_current = false;    // known from darks of that time, or from the dark current
@@ -29,7 +29,7 @@ class DarkLevels {
   /// Returns the level of darks that belong to flats (EMVA 1288 R4 takes darks of their exposure time): that of the
   /// group of their exposure time and temperature (same_temperature); else that of the nearest exposure time at that
   /// temperature, plus the dark current times the difference of the times; else that of the first group.
-  DarkLevel at(const FrameSetting& flats) const;
+  DarkOfFlats at(const FrameSetting& flats) const;
 
  private:
   const DarkGroup* nearest(const FrameSetting& flats) const;

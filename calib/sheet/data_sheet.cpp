@@ -37,7 +37,7 @@ std::optional<Estimate> ratio_of(const std::optional<Estimate>& a, const std::op
 
 /// Returns the quantum efficiency [e-/photon] from the slope of the mean over photons, through the darks, by least
 /// squares with weights of photon noise; nullopt without flats in the linear range.
-std::optional<Estimate> efficiency_of(const SheetFrames& frames, const std::vector<DarkLevel>& darks,
+std::optional<Estimate> efficiency_of(const SheetFrames& frames, const std::vector<DarkOfFlats>& darks,
                                       const Estimate& gain_dn_per_e, int channel, double max_signal_dn) {
   const double gain = gain_dn_per_e.value;
   double signal_e = 0, photons = 0, variance_e2 = 0, dark_error_e = 0;
@@ -82,8 +82,8 @@ std::string setting_text(const FrameSetting& setting) {
   return setting.temperature_c ? fmt::format("{} at {:g} C", time, *setting.temperature_c) : time;
 }
 
-std::vector<DarkLevel> dark_levels_of_flats(const SheetFrames& frames, const DarkLevels& levels, DataSheet& out) {
-  std::vector<DarkLevel> darks;
+std::vector<DarkOfFlats> dark_levels_of_flats(const SheetFrames& frames, const DarkLevels& levels, DataSheet& out) {
+  std::vector<DarkOfFlats> darks;
   const FrameSetting* without = nullptr;
   for (const PairStatistics& pair : frames.flat_pairs) {
     darks.push_back(levels.at(pair.setting));
@@ -102,7 +102,7 @@ Result<void> put_prnu(const DarkGroup& flats, const PerSite<SpatialParts>& short
                       DataSheet& out) {
   const auto bright = spatial_parts(flats);
   if (!bright) return tl::make_unexpected(bright.error());
-  const DarkLevel level = levels.at(flats.setting);
+  const DarkOfFlats level = levels.at(flats.setting);
   PerSite<SpatialParts> dark = shortest;
   if (level.same_time != nullptr) {
     const auto same = spatial_parts(*level.same_time);
@@ -122,7 +122,7 @@ Result<void> put_prnu(const DarkGroup& flats, const PerSite<SpatialParts>& short
 std::optional<std::array<Estimate, 3>> efficiencies_of(const SheetFrames& frames, const DarkLevels& levels,
                                                        DataSheet& sheet) {
   if (!frames.irradiance) return std::nullopt;
-  const std::vector<DarkLevel> darks = dark_levels_of_flats(frames, levels, sheet);
+  const std::vector<DarkOfFlats> darks = dark_levels_of_flats(frames, levels, sheet);
   const double saturation_dn = sheet.saturation_e
                                    ? sheet.saturation_e->value * sheet.transfer.system_gain_dn_per_e.value
                                    : largest_signal_dn(frames.flat_pairs, sheet.transfer);
