@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "isp/cli/bench/findings.h"
 #include "isp/cli/develop/develop_args.h"
 #include "isp/cli/shared/exit_code.h"
-#include "isp/cli/bench/findings.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/module.h"
 #include "isp/cli/shared/progress.h"
