@@ -8,7 +8,9 @@
 #include <string_view>
 #include <vector>
 
+#ifdef LOWLUX_WITH_MEASUREMENT
 #include "isp/cli/bench/bench_args.h"
+#endif
 #include "isp/cli/calibrate/calibrate_args.h"
 #include "isp/cli/capture/capture_args.h"
 #include "isp/cli/compare/compare_args.h"
@@ -42,7 +44,9 @@ struct Verb {
 };
 
 constexpr std::array verbs{
+#ifdef LOWLUX_WITH_MEASUREMENT
     Verb{"bench", parsed<parse_bench>},
+#endif
     Verb{"calibrate black", parsed<parse_calibrate_black>},
     Verb{"calibrate colour", parsed<parse_calibrate_colour>},
     Verb{"calibrate noise", parsed<parse_calibrate_noise>},
