@@ -16,13 +16,13 @@ class Events {
  public:
   explicit Events(JsonReader& reader) : reader_(reader) {}
 
-  bool null() { return true; }
+  static bool null() { return true; }
   bool boolean(bool value) { return reader_.flag(here(), value); }
   bool number_integer(std::int64_t value) { return reader_.number(here(), static_cast<double>(value)); }
   bool number_unsigned(std::uint64_t value) { return reader_.number(here(), static_cast<double>(value)); }
   bool number_float(double value, const std::string& /*digits*/) { return reader_.number(here(), value); }
   bool string(std::string& value) { return reader_.text(here(), value); }
-  bool binary(std::vector<std::uint8_t>& /*bytes*/) { return true; }
+  static bool binary(std::vector<std::uint8_t>& /*bytes*/) { return true; }
 
   bool start_object(std::size_t /*elements*/) { return enter(); }
   bool key(std::string& name) {

@@ -94,7 +94,7 @@ class Loop {
       return tl::make_unexpected(
           none_in_time({ErrorCode::insufficient, "the device says that what it delivers is damaged", {}}));
     }
-    const Result<bool> good = check ? check(frame) : Result<bool>(true);
+    Result<bool> good = check ? check(frame) : Result<bool>(true);
     if (!good) return good;
     Result<bool> more = true;
     if (!*good || count_.skipped < limits_.skip) {

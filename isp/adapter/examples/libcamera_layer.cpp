@@ -161,6 +161,7 @@ lowlux_stage_params params_of(libcamera::Request& request, const libcamera::Fram
   return out;
 }
 
+// NOLINTBEGIN(concurrency-mt-unsafe): nothing here sets variables
 int level_of_environment() {
   const char* const level = std::getenv("LOWLUX_LAYER_LEVEL");
   if (level != nullptr && std::strcmp(level, "draft") == 0) return LOWLUX_STAGE_LEVEL_DRAFT;
@@ -168,6 +169,9 @@ int level_of_environment() {
   if (level != nullptr && std::strcmp(level, "standard") != 0) report(std::string("no such level: ") + level);
   return LOWLUX_STAGE_LEVEL_STANDARD;
 }
+
+const char* profile_of_environment() { return std::getenv("LOWLUX_LAYER_PROFILE"); }
+// NOLINTEND(concurrency-mt-unsafe)
 
 /// One raw stream of a camera: a stage, and the codes it gives.
 class CleanStream {
@@ -183,7 +187,7 @@ class CleanStream {
     lowlux_stage_settings settings{};
     settings.size = sizeof settings;
     settings.most_denoise = level_of_environment();
-    settings.profile_file = std::getenv("LOWLUX_LAYER_PROFILE");
+    settings.profile_file = profile_of_environment();
     char message[256] = "";
     lowlux_stage* opened = nullptr;
     if (lowlux_stage_open(&settings, &opened, message, sizeof message) < 0) return report(message), nullptr;
