@@ -95,6 +95,7 @@ int run_help(const std::vector<std::string>& args) {
   }
   if (args.front() == "--man") {
     std::vector<std::pair<std::string_view, std::string_view>> names;
+    names.reserve(verbs.size());
     for (const Verb& verb : verbs) names.emplace_back(verb.name, verb.summary);
     print_out(command_man_page(names));
   } else if (args.front() == "--pages") {

@@ -127,7 +127,7 @@ double noise_of(const RawFormat& format, const std::vector<std::byte>& bytes, st
   for (int y = 0; y < height; ++y) {
     unpack_row(format, bytes.data() + static_cast<std::size_t>(y) * stride, width, row.data());
     for (int x = 4; x + 2 < width / 4; ++x, ++count) {
-      const double off = row[static_cast<std::size_t>(x + 2)] - row[static_cast<std::size_t>(x)];
+      const double off = row[static_cast<std::size_t>(x) + 2] - row[static_cast<std::size_t>(x)];
       sum += off * off;
     }
   }
@@ -160,7 +160,7 @@ TEST_F(Layer, RewritesFramesOfEveryPackingAsTheStageCleansThem) {
         const std::byte* const at = out.data() + static_cast<std::size_t>(y) * stride;
         unpack_row(names.format, at, width, row.data());
         for (int x = 0; x < width; ++x) {
-          const int wide = expected[static_cast<std::size_t>(y * width + x)];
+          const int wide = expected[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)];
           ASSERT_EQ(row[static_cast<std::size_t>(x)], std::min((wide + (1 << shift) / 2) >> shift, most))
               << x << ' ' << y;
         }

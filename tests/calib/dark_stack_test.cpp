@@ -83,7 +83,7 @@ TEST(DarkStack, FramesRowsAndPixelsAreSeparatedWithoutBias) {
   std::mt19937 engine(11);
   std::normal_distribution<double> normal;
   for (int round = 0; round < 4; ++round) {
-    const double frame = 30.0 * (round % 2), row = 9.0 * (round / 2), pixel = 12;
+    const double frame = 30.0 * (round % 2), row = round < 2 ? 0 : 9, pixel = 12;
     SCOPED_TRACE(testing::Message() << "frame " << frame << ", row " << row << ", pixel " << pixel);
     Estimates of_frames, of_rows, of_pixels;
     for (int g = 0; g < groups; ++g) {

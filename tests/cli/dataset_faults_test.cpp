@@ -60,7 +60,7 @@ class DatasetFaults : public testing::Test {
     std::map<std::string, std::string> all;
     for (const auto& entry : fs::directory_iterator(file(folder))) {
       const std::string name = entry.path().filename();
-      if (!name.starts_with("manifest")) all[name] = scratch_.read(folder + "/" + name);
+      if (!name.starts_with("manifest")) all[name] = scratch_.read((fs::path(folder) / name).string());
     }
     return all;
   }
@@ -91,7 +91,7 @@ TEST_F(DatasetFaults, DeepNestingIsOneLine) {
   const std::string rest = R"(,"count":1,"sensors":["ELD_NikonD850"])";
   for (const std::string& keys :
        {R"("scenes":[)" + brackets(deep) + "]", R"("scenes":["flat"],"gain":{"choice":)" + brackets(deep) + "}"}) {
-    scratch_.write("spec.json", "{" + keys + rest + "}");
+    scratch_.write("spec.json", std::string("{").append(keys).append(rest).append("}"));
     refused("levels of brackets");
   }
   // Brackets within texts are not levels, and 64 levels are read.

@@ -17,7 +17,7 @@ using test::lowlux;
 
 using Words = std::vector<std::string>;
 
-std::string printed(Words words) {
+std::string printed(const Words& words) {
   const auto result = lowlux(words);
   EXPECT_EQ(result.exit_code, 0) << testing::PrintToString(words) << result.err;
   EXPECT_EQ(result.err, "");

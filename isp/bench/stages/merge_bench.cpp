@@ -336,7 +336,7 @@ Result<BenchOutcome> run_merge_bench(const BenchOptions& options) {
   const std::array motions{MergeMotion{"at rest", on_a_tripod()},
                            MergeMotion{"hand-held, 3 objects move", hand_held()}};
   const std::span<const MergeLight> lights = std::span(merge_lights).first(options.quick ? 1 : merge_lights.size());
-  const double steps = static_cast<double>(pictures->size() * lights.size() * motions.size());
+  const auto steps = static_cast<double>(pictures->size() * lights.size() * motions.size());
   for (const BenchPicture& picture : *pictures) {
     for (const MergeLight& light : lights) {
       for (const MergeMotion& motion : motions) {

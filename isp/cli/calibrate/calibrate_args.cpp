@@ -47,7 +47,7 @@ std::string wrong_settings(const CalibrateArgs& args) {
 
 /// Returns the error of the arguments in combination; empty if there is none.
 std::string wrong(const CalibrateArgs& args, const std::vector<std::string>& inputs) {
-  if (const std::string what = wrong_settings(args); !what.empty()) return what;
+  if (std::string what = wrong_settings(args); !what.empty()) return what;
   if (!args.output.ends_with(".json")) return "-o: profiles are .json, not " + args.output;
   if (!args.report.empty() && !args.report.ends_with(".html")) return "--report: reports are .html, not " + args.report;
   return wrong_names({args.output, args.report}, inputs);

@@ -121,7 +121,7 @@ Result<SimulateArgs> simulate_args(const DatasetSpec& spec, const DatasetDraw& d
     const auto setting = std::ranges::find(settings(), std::string_view(key), &Setting::key);
     const std::string flag = setting == settings().end() ? "--" + key : std::string(setting->flag);
     const std::string text = setting == settings().end() ? text_of(value) : option_value(spec, *setting, value);
-    words.push_back(flag + "=" + text);
+    words.push_back(fmt::format("{}={}", flag, text));
   }
   const ErrorText errors;
   Parsed<SimulateArgs> parsed = parse_simulate(words);

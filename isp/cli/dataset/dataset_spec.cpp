@@ -209,7 +209,7 @@ Result<void> set_sensors(const Json& json, DatasetSpec& spec) {
   for (const auto& [key, value] : json.items()) {
     if (std::ranges::find(own_keys, key) != own_keys.end()) continue;
     if (setting_of(key) == nullptr) return unknown(key, "", false);
-    if (const auto put = put_setting(key, value, "", common); !put) return put;
+    if (auto put = put_setting(key, value, "", common); !put) return put;
   }
   for (const Json& entry : json["sensors"]) {
     auto sensor = sensor_of(entry, common);
