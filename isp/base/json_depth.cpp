@@ -10,7 +10,7 @@ bool nests_deeper(std::string_view json, int levels) {
   for (std::size_t i = 0; i < json.size(); ++i) {
     const char c = json[i];
     if (quoted && c == '\\') {
-      ++i;  // the next character is no end of the text
+      ++i;  // the next character does not end the text
     } else if (c == '"') {
       quoted = !quoted;
     } else if (!quoted && (c == '[' || c == '{')) {

@@ -48,7 +48,7 @@ isp::MethodImage image_of(const py::object& result, Executor& executor) {
   return std::move(scene_of(picture_argument(result, "its result"), executor).xyz);
 }
 
-/// Returns str(object), with what UTF-8 cannot hold as escapes; nullopt if there is no such text.
+/// Returns str(object), with escapes for what UTF-8 cannot hold; nullopt if str() fails.
 std::optional<std::string> escaped_text(const py::handle& object) {
   const auto text = py::reinterpret_steal<py::object>(PyObject_Str(object.ptr()));
   const auto bytes =
