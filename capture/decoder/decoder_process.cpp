@@ -53,6 +53,17 @@ Error system_error(const std::string& what, int number) {
   return {ErrorCode::unreadable, what + ": " + std::system_category().message(number), {}};
 }
 
+/// Returns the environment of this process, and for the C library of a decoder the setting to ask for huge pages as
+/// prefer_huge_pages() does, unless the user has settings of their own.
+std::vector<char*> decoder_environment() {
+  static char huge_pages[] = "GLIBC_TUNABLES=glibc.malloc.hugetlb=1";
+  std::vector<char*> out;
+  for (char** variable = environ; *variable != nullptr; ++variable) out.push_back(*variable);
+  if (std::getenv("GLIBC_TUNABLES") == nullptr) out.push_back(huge_pages);
+  out.push_back(nullptr);
+  return out;
+}
+
 /// Starts a program with default signal handling, and with no open files except its two. It has a process group of its
 /// own: signals of a terminal reach the caller alone.
 Result<pid_t> start(const std::vector<std::string>& command, int file, int result) {
@@ -76,8 +87,9 @@ Result<pid_t> start(const std::vector<std::string>& command, int file, int resul
   words.reserve(command.size() + 1);
   for (const std::string& word : command) words.push_back(const_cast<char*>(word.c_str()));
   words.push_back(nullptr);
+  std::vector<char*> environment = decoder_environment();
   pid_t child = 0;
-  const int failed = posix_spawn(&child, words[0], &actions, &attributes, words.data(), environ);
+  const int failed = posix_spawn(&child, words[0], &actions, &attributes, words.data(), environment.data());
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (failed != 0) return tl::make_unexpected(system_error("the decoder " + command[0] + " cannot start", failed));

@@ -9,6 +9,8 @@
 #include <system_error>
 #include <utility>
 
+#include "isp/base/memory.h"
+
 namespace lowlux::capture {
 namespace {
 
@@ -27,7 +29,10 @@ Result<std::vector<std::byte>> load(int fd, std::uint64_t max_bytes) {
   if (!S_ISREG(status.st_mode)) return fail(ErrorCode::unreadable, "is not a regular file");
   const auto size = static_cast<std::uint64_t>(status.st_size);
   if (size > max_bytes) return too_many_bytes(size, max_bytes);
-  std::vector<std::byte> bytes(size);
+  std::vector<std::byte> bytes;
+  bytes.reserve(size);
+  prefer_huge_pages(bytes.data(), size);
+  bytes.resize(size);
   std::size_t have = 0;
   while (have < bytes.size()) {
     const ssize_t got = read(fd, bytes.data() + have, bytes.size() - have);
