@@ -6,6 +6,7 @@
 #include <random>
 #include <string>
 
+#include "tests/cli/command.h"
 #include "tests/support/dng_builder.h"
 #include "tests/support/process.h"
 #include "tests/support/scratch_directory.h"
@@ -33,7 +34,7 @@ class BadInput : public testing::Test {
   // Writes the bytes as a raw file and develops it.
   test::ProcessResult develop(const std::vector<std::byte>& bytes) {
     test::write_file(raw_, bytes.data(), bytes.size());
-    return test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.png")});
+    return test::run_process({test::tested_command(), "develop", raw_, "-o", scratch_.file("out.png")});
   }
 
   // Exit code 1, one line that names the file and holds `clue`, and no file but the raw.
@@ -140,18 +141,18 @@ TEST_F(BadInput, MissingMatricesGiveAnImageWithOneWarning) {
   EXPECT_NE(result.err.find("the colours of the camera are unknown"), std::string::npos) << result.err;
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 2) << "the other is about noise: " << result.err;
   EXPECT_NE(result.err.find("the noise is estimated"), std::string::npos) << result.err;
-  const auto linear = test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.exr")});
+  const auto linear = test::run_process({test::tested_command(), "develop", raw_, "-o", scratch_.file("out.exr")});
   EXPECT_EQ(linear.exit_code, 1);
   EXPECT_NE(linear.err.find("--space camera"), std::string::npos) << linear.err;
   const auto camera =
-      test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.tif"), "--space", "camera"});
+      test::run_process({test::tested_command(), "develop", raw_, "-o", scratch_.file("out.tif"), "--space", "camera"});
   EXPECT_EQ(camera.exit_code, 0) << camera.err;
 }
 
 TEST_F(BadInput, MissingFilesAndFolders) {
   expect_refused(develop({}), "");
   for (const std::string& name : {scratch_.file("absent.dng"), std::string("/")}) {
-    const auto result = test::run_process({LOWLUX_COMMAND, "develop", name, "-o", scratch_.file("out.png")});
+    const auto result = test::run_process({test::tested_command(), "develop", name, "-o", scratch_.file("out.png")});
     EXPECT_EQ(result.exit_code, 1);
     EXPECT_NE(result.err.find(name), std::string::npos);
     EXPECT_EQ(scratch_.names(), (std::vector<std::string>{"in.dng"}));
@@ -162,7 +163,7 @@ TEST_F(BadInput, OutputsThatCannotBeWritten) {
   ASSERT_EQ(develop(small_dng().build()).exit_code, 0);
   for (const std::string& out :
        {scratch_.file("no/such/folder/out.png"), std::string("/proc/out.png"), scratch_.file("in.dng/out.png")}) {
-    const auto result = test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", out});
+    const auto result = test::run_process({test::tested_command(), "develop", raw_, "-o", out});
     EXPECT_EQ(result.exit_code, 1) << out;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     EXPECT_NE(result.err.find(out), std::string::npos) << result.err;
@@ -176,7 +177,8 @@ TEST_F(BadInput, ExistingOutputsAreKeptWithoutForce) {
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_NE(refused.err.find("--force"), std::string::npos);
   EXPECT_EQ(test::read_file(scratch_.file("out.png")), "precious");
-  const auto forced = test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.png"), "--force"});
+  const auto forced =
+      test::run_process({test::tested_command(), "develop", raw_, "-o", scratch_.file("out.png"), "--force"});
   EXPECT_EQ(forced.exit_code, 0);
   EXPECT_NE(test::read_file(scratch_.file("out.png")), "precious");
 }
@@ -184,8 +186,9 @@ TEST_F(BadInput, ExistingOutputsAreKeptWithoutForce) {
 TEST_F(BadInput, AFailedFileLeavesTheForcedOutputAsItWas) {
   test::write_file(scratch_.file("out.png"), "precious", 8);
   test::write_file(raw_, "II", 2);
-  EXPECT_EQ(test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.png"), "--force"}).exit_code,
-            1);
+  EXPECT_EQ(
+      test::run_process({test::tested_command(), "develop", raw_, "-o", scratch_.file("out.png"), "--force"}).exit_code,
+      1);
   EXPECT_EQ(test::read_file(scratch_.file("out.png")), "precious");
 }
 
@@ -194,7 +197,7 @@ TEST_F(BadInput, AbsentBlackIsNotGuessed) {
   dng.remove(black_level);
   expect_refused(develop(dng.build()), "--black");
   const auto given =
-      test::run_process({LOWLUX_COMMAND, "develop", raw_, "-o", scratch_.file("out.png"), "--black", "64.5"});
+      test::run_process({test::tested_command(), "develop", raw_, "-o", scratch_.file("out.png"), "--black", "64.5"});
   EXPECT_EQ(given.exit_code, 0) << given.err;
 }
 

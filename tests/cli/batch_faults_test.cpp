@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "tests/cli/command.h"
 #include "tests/cli/simulate_command.h"
 
 namespace lowlux {
@@ -50,7 +51,7 @@ class BatchFaults : public test::SimulateCommand {
   static std::string name_of(int index) { return std::string("raw_") + static_cast<char>('a' + index); }
 
   std::vector<std::string> develop(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> args{LOWLUX_COMMAND, "develop", raws_, "-o", out_ + "/", "--jobs", "2"};
+    std::vector<std::string> args{test::tested_command(), "develop", raws_, "-o", out_ + "/", "--jobs", "2"};
     args.insert(args.end(), more.begin(), more.end());
     return args;
   }

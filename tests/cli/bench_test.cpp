@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/bench/bench_stages.h"
+#include "tests/cli/command.h"
 #include "tests/support/process.h"
 #include "tests/support/scratch_directory.h"
 
@@ -20,7 +21,7 @@ namespace {
 using Json = nlohmann::json;
 
 test::ProcessResult bench(std::vector<std::string> args) {
-  args.insert(args.begin(), {LOWLUX_COMMAND, "bench"});
+  args.insert(args.begin(), {test::tested_command(), "bench"});
   return test::run_process(args);
 }
 

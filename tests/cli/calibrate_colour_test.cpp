@@ -31,7 +31,7 @@ const std::string rose = raws + "nikon_dsc1339_crop_rggb14.dng";
 class CalibrateColour : public testing::Test {
  protected:
   static test::ProcessResult calibrate(std::vector<std::string> args) {
-    const std::vector<std::string> verb{LOWLUX_COMMAND, "calibrate", "colour"};
+    const std::vector<std::string> verb{test::tested_command(), "calibrate", "colour"};
     args.insert(args.begin(), verb.begin(), verb.end());
     return test::run_process(args);
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdlib>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -8,13 +9,23 @@
 
 namespace lowlux::test {
 
+/// Returns the path of the command that is tested: that of this build, or of the variable LOWLUX_TESTED_COMMAND, by
+/// which scripts/test has the commands of other builds, with sanitizers, tested.
+inline std::string tested_command() {
+  const char* const other = std::getenv("LOWLUX_TESTED_COMMAND");
+  return other != nullptr ? other : LOWLUX_COMMAND;
+}
+
 /// Runs the command with these words to its end.
 inline ProcessResult lowlux(std::vector<std::string> words) {
-  words.insert(words.begin(), LOWLUX_COMMAND);
+  words.insert(words.begin(), tested_command());
   return run_process(words);
 }
 
 inline bool holds(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
+
+/// Returns whether the command has the verbs bench and reproduce, which builds may leave out.
+inline bool has_measurement() { return holds(lowlux({"--help"}).out, "  reproduce "); }
 
 /// Real raw files.
 inline const std::string raws = LOWLUX_TESTDATA "/raws/";

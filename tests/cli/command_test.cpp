@@ -205,9 +205,8 @@ TEST(Command, OrientationIsAppliedToThePixels) {
 }
 
 TEST(Command, AFullStandardOutputIsAFailure) {
-  EXPECT_EQ(
-      test::run_process({"sh", "-c", std::string(LOWLUX_COMMAND) + " info " + dog + " --json > /dev/full"}).exit_code,
-      1);
+  EXPECT_EQ(test::run_process({"sh", "-c", test::tested_command() + " info " + dog + " --json > /dev/full"}).exit_code,
+            1);
 }
 
 TEST(Command, TimingsNameTheStages) {

@@ -33,7 +33,7 @@ class Config : public testing::Test {
     return run(words);
   }
   test::ProcessResult run(Words words) const {
-    words.insert(words.begin(), {"env", "XDG_CONFIG_HOME=" + scratch_.path(), LOWLUX_COMMAND});
+    words.insert(words.begin(), {"env", "XDG_CONFIG_HOME=" + scratch_.path(), test::tested_command()});
     return test::run_process(words);
   }
 

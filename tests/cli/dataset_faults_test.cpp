@@ -214,8 +214,8 @@ TEST_F(DatasetFaults, ASignalRemovesTheFolderOfADryRun) {
     return false;
   };
   for (const int signal : {SIGINT, SIGTERM}) {
-    test::RunningProcess process({"env", "TMPDIR=" + file("temporary"), LOWLUX_COMMAND, "dataset", file("spec.json"),
-                                  "-o", file("none"), "--dry-run", "--quiet"});
+    test::RunningProcess process({"env", "TMPDIR=" + file("temporary"), test::tested_command(), "dataset",
+                                  file("spec.json"), "-o", file("none"), "--dry-run", "--quiet"});
     int tries = 0;
     while (tries < 60000 && !holds_file()) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));

@@ -121,7 +121,7 @@ TEST_F(Dataset, OneThreadAnotherFolderAndMoreSamplesChangeNoByte) {
   spec(part, "elsewhere/one.json");
   const auto result = test::run_process(
       {"bash", "-c",
-       "cd " + file("elsewhere") + " && taskset -c 0 " + LOWLUX_COMMAND + " dataset one.json -o out --quiet"});
+       "cd " + file("elsewhere") + " && taskset -c 0 " + test::tested_command() + " dataset one.json -o out --quiet"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   const auto all = contents("all");
   for (const auto& [name, text] : contents("elsewhere/out")) EXPECT_EQ(all.at(name), text) << name;
@@ -154,7 +154,7 @@ TEST_F(Dataset, AKilledRunContinues) {
   many["count"] = 60;
   const std::string name = spec(many);
   {
-    test::RunningProcess process({LOWLUX_COMMAND, "dataset", name, "-o", file("killed"), "--quiet"});
+    test::RunningProcess process({test::tested_command(), "dataset", name, "-o", file("killed"), "--quiet"});
     while (!scratch_.holds("killed/000000000003.json")) std::this_thread::yield();
     process.send(SIGKILL);
     EXPECT_EQ(process.wait().exit_code, 128 + SIGKILL);
@@ -169,8 +169,8 @@ TEST_F(Dataset, AFullDiskLeavesNoHalfSample) {
   Json large = small;
   large["size"] = "400x300";  // 240 kB of raw, more than a file may have
   const auto result = test::run_process({"bash", "-c",
-                                         std::string("ulimit -f 100; exec ") + LOWLUX_COMMAND + " dataset " +
-                                             spec(large) + " -o " + file("full") + " --quiet"});
+                                         "ulimit -f 100; exec " + test::tested_command() + " dataset " + spec(large) +
+                                             " -o " + file("full") + " --quiet"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   EXPECT_TRUE(holds(result.err, "000000000000")) << result.err;
@@ -184,7 +184,7 @@ TEST_F(Dataset, TheTasksOfAJobArrayMakeTheWhole) {
   const std::string script = LOWLUX_TESTDATA "/../scripts/cluster/dataset.sbatch";
   const auto task = [&](int id, int least, int most, int count, const std::vector<std::string>& more) {
     std::vector<std::string> words{"env",
-                                   "LOWLUX=" LOWLUX_COMMAND,
+                                   "LOWLUX=" + test::tested_command(),
                                    "SLURM_ARRAY_TASK_ID=" + std::to_string(id),
                                    "SLURM_ARRAY_TASK_MIN=" + std::to_string(least),
                                    "SLURM_ARRAY_TASK_MAX=" + std::to_string(most),
@@ -320,8 +320,8 @@ TEST_F(Dataset, BadSpecsAreOneLineWithFileAndKey) {
 }
 
 TEST_F(Dataset, ADryRunNeedsAFolderForTemporaryFiles) {
-  const auto result = test::run_process(
-      {"env", "TMPDIR=" + file("none"), LOWLUX_COMMAND, "dataset", spec(small), "-o", file("none"), "--dry-run"});
+  const auto result = test::run_process({"env", "TMPDIR=" + file("none"), test::tested_command(), "dataset",
+                                         spec(small), "-o", file("none"), "--dry-run"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_TRUE(holds(result.err, "TMPDIR")) << result.err;
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;

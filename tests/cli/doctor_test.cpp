@@ -46,8 +46,8 @@ TEST(Doctor, StatesEveryPartOnceInTextAndJson) {
 TEST(Doctor, WithoutTheDecoderItFailsAndStatesTheRemedy) {
   const test::ScratchDirectory scratch;
   const std::filesystem::path alone = scratch.file("lowlux"),
-                              build = std::filesystem::path(LOWLUX_COMMAND).parent_path();
-  std::filesystem::copy_file(LOWLUX_COMMAND, alone);
+                              build = std::filesystem::path(test::tested_command()).parent_path();
+  std::filesystem::copy_file(test::tested_command(), alone);
   for (const auto& entry : std::filesystem::directory_iterator(build)) {
     const std::string name = entry.path().filename();
     if (name.starts_with("liblowlux.so") || name.starts_with("liblowlux_io.so") ||
@@ -68,7 +68,7 @@ TEST(Doctor, WithoutTheDecoderItFailsAndStatesTheRemedy) {
 TEST(Doctor, WithoutACostTableItNamesTheCommandThatMeasures) {
   const test::ScratchDirectory scratch;
   const auto doctor =
-      test::run_process({"env", "XDG_CACHE_HOME=" + scratch.path(), LOWLUX_COMMAND, "doctor", "--json"});
+      test::run_process({"env", "XDG_CACHE_HOME=" + scratch.path(), test::tested_command(), "doctor", "--json"});
   const Json cost = parts_of(doctor.out).at("cost table");
   EXPECT_EQ(cost["state"], "missing");
   EXPECT_TRUE(holds(cost["remedy"].get<std::string>(), "lowlux bench --calibrate-cost")) << cost;

@@ -67,7 +67,7 @@ TEST(OptionValues, AnythingElseIsNoNumber) {
 class OptionForms : public testing::Test {
  protected:
   test::ProcessResult developed(const std::string& option, const std::string& value) const {
-    return test::run_process({LOWLUX_COMMAND, "develop", dog, "-o", scratch_.file("x.png"), "--force", "--half",
+    return test::run_process({test::tested_command(), "develop", dog, "-o", scratch_.file("x.png"), "--force", "--half",
                               "--denoise", "off", "--json", option, value});
   }
   test::ScratchDirectory scratch_;

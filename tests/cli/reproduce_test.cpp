@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/cli/command.h"
 #include "tests/support/process.h"
 #include "tests/support/scratch_directory.h"
 
@@ -14,7 +15,7 @@ namespace {
 using Json = nlohmann::json;
 
 test::ProcessResult reproduce(std::vector<std::string> args) {
-  args.insert(args.begin(), {LOWLUX_COMMAND, "reproduce"});
+  args.insert(args.begin(), {test::tested_command(), "reproduce"});
   return test::run_process(args);
 }
 

@@ -256,7 +256,7 @@ TEST_F(SimulateBurst, ValuesOutsideTheirRangesAreRefused) {
 // An address space of 600 MB holds the program (not one with sanitizers) and no scene of 12000 x 12000 samples.
 TEST_F(SimulateBurst, WithoutMemoryItSaysSoInOneLine) {
   const auto confined = [](const std::string& words) {
-    return test::run_process({"sh", "-c", "ulimit -v 600000; exec " + std::string(LOWLUX_COMMAND) + " " + words});
+    return test::run_process({"sh", "-c", "ulimit -v 600000; exec " + test::tested_command() + " " + words});
   };
   if (confined("--version").exit_code != 0) GTEST_SKIP() << "a program with sanitizers needs terabytes of addresses";
   const auto result = confined("simulate chart --size 6000x6000 --frames 2 --shake 3 -o " + file("a.dng"));

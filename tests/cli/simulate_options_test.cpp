@@ -120,7 +120,7 @@ TEST_F(SimulateOptions, AFineTableKeepsItsNodes) {
 // An address space of 600 MB holds the program (not one with sanitizers) and no frame of 16384 x 16384 pixels.
 TEST_F(SimulateOptions, WithoutMemoryItSaysSoInOneLine) {
   const auto confined = [](const std::string& words) {
-    return test::run_process({"sh", "-c", "ulimit -v 600000; exec " + std::string(LOWLUX_COMMAND) + " " + words});
+    return test::run_process({"sh", "-c", "ulimit -v 600000; exec " + test::tested_command() + " " + words});
   };
   if (confined("--version").exit_code != 0) GTEST_SKIP() << "a program with sanitizers needs terabytes of addresses";
   const auto result = confined("simulate flat --size 16384x16384 -o " + file("a.dng"));

@@ -291,8 +291,20 @@ TEST_F(Simulate, TimingsNameTheStagesAndQuietSaysNothing) {
 TEST_F(Simulate, ProgressIsShownOnTerminalsOnly) {
   using Clock = std::chrono::steady_clock;
   const auto command = [this](const std::string& name) {
-    return Words{LOWLUX_COMMAND, "simulate",  "flat", "--size",   "64x48", "--no-truth", "--sampling",
-                 "published",    "--effects", "all",  "--frames", "10000", "-o",         file(name)};
+    return Words{test::tested_command(),
+                 "simulate",
+                 "flat",
+                 "--size",
+                 "64x48",
+                 "--no-truth",
+                 "--sampling",
+                 "published",
+                 "--effects",
+                 "all",
+                 "--frames",
+                 "10000",
+                 "-o",
+                 file(name)};
   };
   const auto on_terminal = [&](const std::string& name, const std::string& more) {
     std::string line = "echo $$ > " + file(name + ".pid") + "; exec";

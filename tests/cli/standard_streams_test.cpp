@@ -24,7 +24,7 @@ class StandardStreams : public testing::Test {
   std::string quoted(const std::string& name) const { return "'" + file(name) + "'"; }
   /// Runs a line of the shell in which lowlux is the command.
   static test::ProcessResult shell(const std::string& line) {
-    return test::run_process({"sh", "-c", "lowlux() { '" + std::string(LOWLUX_COMMAND) + "' \"$@\"; }; " + line});
+    return test::run_process({"sh", "-c", "lowlux() { '" + test::tested_command() + "' \"$@\"; }; " + line});
   }
   static int lines_of(const std::string& text) { return static_cast<int>(std::count(text.begin(), text.end(), '\n')); }
 

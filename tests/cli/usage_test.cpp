@@ -68,7 +68,7 @@ TEST_F(Usage, MisspelledNamesGetASuggestion) {
 
 TEST_F(Usage, FilesThatBeginWithADashAreReadAfterTwoDashes) {
   std::filesystem::copy_file(dog, file("-dash.dng"));
-  const std::string in_folder = "cd " + scratch_.path() + " && " LOWLUX_COMMAND " ";
+  const std::string in_folder = "cd " + scratch_.path() + " && " + test::tested_command() + " ";
   const auto hint = test::run_process({"sh", "-c", in_folder + "info -dash.dng"});
   EXPECT_EQ(hint.exit_code, 2);
   EXPECT_TRUE(holds(hint.err, "write ./-dash.dng")) << hint.err;
