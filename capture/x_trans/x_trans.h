@@ -1,0 +1,34 @@
+#pragma once
+
+#include <array>
+
+#include "capture/x_trans/x_trans_pattern.h"
+#include "isp/base/executor.h"
+#include "isp/base/plane.h"
+
+/// Interpolation of X-Trans mosaics by filters that were computed for the least error (scripts/train-x-trans).
+/// capture/README.md has the method, its figures and its limits.
+namespace lowlux::capture {
+
+/// States what the interpolation has to know of a mosaic. Values are fractions of white.
+struct XTransSetting {
+  XTransPhase phase{};
+  std::array<double, 3> neutral{1, 1, 1};  // what a neutral is in R, G, B; any scale, > 0
+  double noise_scale = 0;                  // the variance of a value x is noise_scale x + noise_offset, both >= 0
+  double noise_offset = 0;
+};
+
+/// Interpolates three colours at every site. Every site keeps the value that was measured there.
+///
+/// Constants and, away from borders, linear gradients of each colour are reproduced exactly but for rounding, whatever
+/// the other colours are: noise of mean 0 leaves means as they are. Values are signed and not limited. Where all sites
+/// of a colour within one pixel are saturated (1 or more), the interpolated value is their least, and where some are,
+/// it is within their range. A colour without any site in the mosaic gets the mean of the sites there are.
+///
+/// @param mosaic  height x width, finite
+/// @param out     height x (3 width), R, G, B interleaved; must not overlap `mosaic`
+/// @note The bytes do not depend on the number of threads. It takes 1 MB for each thread.
+void interpolate_x_trans(PlaneView<const float> mosaic, const XTransSetting& setting, PlaneView<float> out,
+                         Executor& executor);
+
+}  // namespace lowlux::capture

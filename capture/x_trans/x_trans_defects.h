@@ -1,0 +1,29 @@
+#pragma once
+
+#include <vector>
+
+#include "capture/x_trans/x_trans_noise.h"
+#include "capture/x_trans/x_trans_pattern.h"
+#include "isp/base/correction.h"
+#include "isp/base/executor.h"
+#include "isp/base/plane.h"
+
+namespace lowlux::capture {
+
+/// Finds hot and dead sites of an X-Trans mosaic by the facts that isp/raw/repair.h states for Bayer mosaics: a site is
+/// defective when both hold.
+///   1. It lies outside the range of the sites of its colour within two pixels, beyond the nearer end by more than 12
+///      times the part of the range that noise does not explain, 8 standard deviations of noise and 1 % of white.
+///   2. The mean excess of its four direct neighbours over the median of the sites of their colours around them is less
+///      than a tenth of its own excess (7 % at green sites): a star would be spread by the lens.
+/// @param mosaic  height x width, fractions of white
+/// @return single sites, ascending by row, then column. Sites within three of the border are not tested.
+std::vector<DefectRect> find_mosaic_defects(PlaneView<const float> mosaic, const XTransPhase& phase,
+                                            const NoiseLine& noise, Executor& executor);
+
+/// Replaces the sites of each rectangle by the mean of the nearest sound sites of their colour: of those on the
+/// smallest square around them that has some, up to 6 pixels away; a site without any keeps its value. Rectangles are
+/// clipped to the mosaic.
+void repair_mosaic(PlaneView<float> mosaic, const XTransPhase& phase, const std::vector<DefectRect>& defects);
+
+}  // namespace lowlux::capture

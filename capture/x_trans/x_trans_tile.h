@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "capture/x_trans/x_trans.h"
+#include "capture/x_trans/x_trans_bank.h"
+#include "isp/base/plane.h"
+
+namespace lowlux::capture::x_trans {
+
+inline constexpr int core = 128;   // side of the region that a tile computes
+inline constexpr int margin = 12;  // of sites around it that are read
+inline constexpr int padded = core + 2 * margin;
+
+/// Interpolates one tile. Memory is allocated once, by the constructor.
+class Tile {
+ public:
+  explicit Tile(const XTransSetting& setting);
+
+  /// Returns row y of the samples to be filled in, 0 .. padded - 1, each divided by the neutral of its colour. Sites
+  /// beyond the mosaic need a value of their colour too.
+  float* samples(int y) { return samples_.row(y); }
+
+  /// Interpolates `width` x `height` sites of the core. Site (margin, margin) of the samples is (x, y) of the mosaic.
+  /// @param out  height x (3 width): fractions of white
+  void run(int x, int y, PlaneView<float> out);
+
+ private:
+  std::size_t site_at(int x, int y) const {
+    return row_sites_[static_cast<std::size_t>(y)] + column_sites_[static_cast<std::size_t>(x)];
+  }
+  void compute_ratios();
+  PlacedFilter patch_of(const SiteFilters& site, int x, int y) const;
+  void compute_luma();
+  void compute_tensor();
+  void mark_saturated();
+  void write_pixel(int x, int y, float* rgb) const;
+  float limited(float value, std::size_t colour, int x, int y) const;
+
+  XTransSetting setting_;
+  std::array<float, 3> neutral_{}, white_{};  // relative to green; white over neutral
+  float luma_scale_ = 0, luma_offset_ = 0;    // noise of luma
+  float ratio_floor_ = 0, root_offset_ = 0;
+  std::array<std::size_t, padded> row_sites_{}, column_sites_{};  // whose sum is the number of a site
+  bool has_saturated_ = false;
+  Plane<float> samples_, luma_;
+  std::array<Plane<float>, 3> ratio_;     // by which samples of each colour are divided around a site
+  std::array<Plane<float>, 4> row_sums_;  // scratch
+  std::array<Plane<float>, 4> tensor_;    // xx, xy, yy and mean luma
+  Plane<std::uint8_t> near_saturated_;
+};
+
+}  // namespace lowlux::capture::x_trans
