@@ -27,7 +27,8 @@ struct DecodedHeader {
   std::int32_t left, top, width, height;        // the visible area
   std::int32_t masks[8][4];                     // top, left, bottom, right in the readout, ends excluded
   std::int32_t flip;                            // bit 0 mirrors x, bit 1 mirrors y, bit 2 then transposes
-  std::uint32_t filters;                        // 0: none; else dcraw's pattern, 2 bits a site, 8 x 2 sites
+  std::uint32_t filters;                        // 0: none; 9: X-Trans; else dcraw's pattern, 2 bits a site, 8 x 2 sites
+  std::uint8_t x_trans[36];                     // colours of 6 x 6 sites from the corner of the visible area
   std::uint32_t black, channel_black[4];        // to be added, see decoder_black()
   std::int32_t pattern_rows, pattern_columns;
   std::uint32_t pattern_black[4098];
@@ -42,6 +43,8 @@ struct DecodedHeader {
   char make[64], model[64], software[64];
 };
 static_assert(std::is_trivially_copyable_v<DecodedHeader>);
+
+inline constexpr std::uint32_t x_trans_filters = 9;  // what LibRaw calls X-Trans mosaics
 
 struct DecodedRaw {
   DecodedHeader header{};

@@ -34,6 +34,7 @@ void fill_sizes(const libraw_data_t& data, DecodedHeader& h) {
 void fill_colour(const libraw_data_t& data, DecodedHeader& h) {
   const libraw_colordata_t& colour = data.color;
   h.filters = data.idata.filters;
+  for (int i = 0; i < 36; ++i) h.x_trans[i] = static_cast<std::uint8_t>(data.idata.xtrans[i / 6][i % 6]);
   h.black = colour.black;
   std::copy_n(colour.cblack, 4, h.channel_black);
   h.pattern_rows = static_cast<std::int32_t>(std::min(colour.cblack[4], 4098U));
@@ -81,9 +82,8 @@ const char* unsupported_kind(LibRaw& libraw) {
   const libraw_iparams_t& id = libraw.imgdata.idata;
   if (id.is_foveon != 0) return "Foveon (three-layer) sensors are not supported";
   if (libraw.is_floating_point() != 0) return "floating-point raws are not supported: convert to an integer DNG";
-  if (id.filters == 9) return "X-Trans mosaics are not supported: only Bayer mosaics and monochrome are";
-  if (id.filters != 0 && id.filters < 1000)
-    return "this mosaic is not supported: only Bayer mosaics and monochrome are";
+  if (id.filters != 0 && id.filters != x_trans_filters && id.filters < 1000)
+    return "this mosaic is not supported: only Bayer and X-Trans mosaics and monochrome are";
   if (libraw.is_fuji_rotated() != 0) return "rotated (Super CCD) mosaics are not supported";
   if (libraw.is_sraw() != 0) return "reduced (sRAW, YCbCr) raws are not supported: set the camera to full raws";
   if (id.colors != 1 && id.colors != 3) return "sensors with two or four colours are not supported";

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -14,6 +15,7 @@
 #include "capture/dng/dng_tags.h"
 #include "capture/file/decoder_frame.h"
 #include "capture/file/pass_on.h"
+#include "capture/x_trans/x_trans_frame.h"
 #include "isp/base/float_samples.h"
 #include "isp/codec/noise_ratio_bytes.h"
 
@@ -71,14 +73,20 @@ void read_corrections(const DngFile& dng, const TiffDirectory& directory, Sample
 }
 
 /// Finishes a frame that has its samples.
-Result<RawFrame> finished(const DngFile& dng, const TiffDirectory& directory, RawFrame frame,
+Result<RawFrame> finished(const DngFile& dng, const DngDescription& described, RawFrame frame,
                           bool has_linear_codes = false) {
+  const TiffDirectory& directory = *described.directory;
+  const std::optional<XTransPhase>& x_trans = described.image.x_trans;
   if (frame.colour.calibrations.empty() && frame.raw.layout != SensorLayout::monochrome) {
     if (auto sound = check_colour_matrices(dng, directory); !sound) return pass_on(sound);
   }
   const bool linearized = has_linear_codes || directory.find(tag::linearization_table) != nullptr;
-  read_corrections(dng, directory, {.linearized = linearized, .polynomials = has_linear_codes}, frame);
+  if (x_trans) frame.raw.layout = SensorLayout::linear_rgb;  // whose gains are wanted
+  read_corrections(dng, directory,
+                   {.linearized = linearized, .polynomials = has_linear_codes, .is_x_trans = x_trans.has_value()},
+                   frame);
   ignore_impossible_white(frame.colour, frame.warnings);
+  if (x_trans) interpolate_frame(frame, *x_trans);
   return frame;
 }
 
@@ -113,7 +121,7 @@ Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std:
     frame.colour.calibrations.push_back(*table);
     frame.colour.source = CameraColour::Source::decoder_table;
   }
-  return finished(dng, *chosen->directory, std::move(frame));
+  return finished(dng, *chosen, std::move(frame));
 }
 
 Result<RawFrame> complete_linearized_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes) {
@@ -122,7 +130,7 @@ Result<RawFrame> complete_linearized_dng(const DngFile& dng, DngDescription desc
   frame.raw.dn = std::move(codes);
   auto linear = linearize_codes(directory, directory_of_list(dng, directory, 2), described.image.bits, frame.raw);
   if (!linear) return pass_on(linear);
-  return finished(dng, directory, std::move(frame), true);
+  return finished(dng, described, std::move(frame), true);
 }
 
 Result<RawFrame> complete_float_dng(const DngFile& dng, DngDescription described, Plane<float> samples) {
@@ -132,7 +140,7 @@ Result<RawFrame> complete_float_dng(const DngFile& dng, DngDescription described
   if (described.directory->find(tag::linearization_table) != nullptr) {
     frame.warnings.emplace_back("LinearizationTable is not applied: the samples are floating-point numbers");
   }
-  return finished(dng, *described.directory, std::move(frame));
+  return finished(dng, described, std::move(frame));
 }
 
 }  // namespace lowlux::capture

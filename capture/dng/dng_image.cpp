@@ -59,16 +59,20 @@ Result<int> bits_of(const TiffDirectory& directory, std::size_t samples, bool is
   return static_cast<int>(values.front());
 }
 
-Result<BayerPhase> phase_of(const TiffDirectory& directory) {
+/// Reads the side of a mosaic's pattern: 2 or 6 sites.
+Result<std::uint32_t> pattern_side(const TiffDirectory& directory) {
   auto size = directory.numbers(tag::cfa_repeat_pattern_dim, 2, 2);
   if (!size) return pass_on(size);
-  if (*size && **size != std::vector<double>{2, 2}) {
-    const bool x_trans = **size == std::vector<double>{6, 6};
-    return fail(ErrorCode::unsupported,
-                std::string(x_trans ? "X-Trans" : "repeating") + " mosaics of " + number_text((**size)[0]) + " x " +
-                    number_text((**size)[1]) + " sites are not supported: only Bayer mosaics and monochrome are",
-                tag::cfa_repeat_pattern_dim.name);
-  }
+  if (!*size || **size == std::vector<double>{2, 2}) return 2;
+  if (**size == std::vector<double>{6, 6}) return 6;
+  return fail(ErrorCode::unsupported,
+              "repeating mosaics of " + number_text((**size)[0]) + " x " + number_text((**size)[1]) +
+                  " sites are not supported: only Bayer and X-Trans mosaics and monochrome are",
+              tag::cfa_repeat_pattern_dim.name);
+}
+
+/// Checks that sites are rectangular and have colours R, G, B.
+Result<void> check_sites(const TiffDirectory& directory) {
   auto layout = directory.whole_or(tag::cfa_layout, 1);
   if (!layout) return pass_on(layout);
   if (*layout != 1) {
@@ -80,16 +84,39 @@ Result<BayerPhase> phase_of(const TiffDirectory& directory) {
     return fail(ErrorCode::unsupported, "mosaics of colours other than R, G, B are not supported",
                 tag::cfa_plane_color.name);
   }
-  auto pattern = directory.numbers(tag::cfa_pattern, 4, 4);
+  return {};
+}
+
+/// Returns the phase of 36 colours.
+Result<XTransPhase> x_trans_phase_of(const std::vector<double>& pattern) {
+  std::vector<std::uint8_t> colours;
+  for (const double colour : pattern)
+    colours.push_back(colour >= 0 && colour <= 2 ? static_cast<std::uint8_t>(colour) : std::uint8_t{3});
+  if (const auto phase = x_trans_phase(colours)) return *phase;
+  return fail(ErrorCode::unsupported, "this mosaic of 6 x 6 sites is not X-Trans", tag::cfa_pattern.name);
+}
+
+Result<void> fill_mosaic(const TiffDirectory& directory, DngImage& image) {
+  auto side = pattern_side(directory);
+  if (!side) return pass_on(side);
+  if (auto known = check_sites(directory); !known) return known;
+  auto pattern = directory.numbers(tag::cfa_pattern, *side * *side, *side * *side);
   if (!pattern) return pass_on(pattern);
   if (!*pattern) return fail(ErrorCode::malformed, "the tag CFAPattern is missing", tag::cfa_pattern.name);
+  if (*side == 6) {
+    auto phase = x_trans_phase_of(**pattern);
+    if (!phase) return pass_on(phase);
+    image.x_trans = *phase;
+    return {};
+  }
   const std::vector<double> patterns[] = {{0, 1, 1, 2}, {1, 0, 2, 1}, {1, 2, 0, 1}, {2, 1, 1, 0}};
   const auto* const at = std::find(std::begin(patterns), std::end(patterns), **pattern);
   if (at == std::end(patterns)) {
     return fail(ErrorCode::unsupported, "this mosaic is not one of the four Bayer patterns of R, G, B",
                 tag::cfa_pattern.name);
   }
-  return static_cast<BayerPhase>(at - std::begin(patterns));
+  image.phase = static_cast<BayerPhase>(at - std::begin(patterns));
+  return {};
 }
 
 /// Returns the tile width; 0 for strips.
@@ -137,10 +164,7 @@ Result<void> fill_layout(const TiffDirectory& directory, DngImage& image) {
       return fail(ErrorCode::unsupported, "mosaics with more than one sample per pixel are not supported",
                   tag::samples_per_pixel.name);
     }
-    auto phase = phase_of(directory);
-    if (!phase) return pass_on(phase);
-    image.phase = *phase;
-    return {};
+    return fill_mosaic(directory, image);
   }
   if (image.samples != 1 && image.samples != 3) {
     return fail(ErrorCode::unsupported,

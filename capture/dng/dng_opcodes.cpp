@@ -84,6 +84,16 @@ void add_split(const OpcodeContext& context, const GainMap& map) {
   }
 }
 
+/// Adds a map of an X-Trans mosaic to the planes that are made of it.
+void add_to_all_planes(const OpcodeContext& context, GainMap map) {
+  if (map.row_pitch != 1 || map.column_pitch != 1 || map.map_planes != 1) {
+    return context.not_applied(gain_map, ": it skips sites of an X-Trans mosaic");
+  }
+  map.first_plane = 0;
+  map.planes = 3;
+  context.found.gain_maps.push_back(std::move(map));
+}
+
 bool is_usable(const GainMap& map) {
   return map.row_pitch >= 1 && map.column_pitch >= 1 && map.points_v >= 1 && map.points_h >= 1 && map.map_planes >= 1 &&
          std::isfinite(map.spacing_v) && std::isfinite(map.spacing_h) && std::isfinite(map.origin_v) &&
@@ -125,6 +135,8 @@ Result<void> read_gain_map(const OpcodeContext& context, OpcodeReader in) {
   if (auto room = context.check_gains(split ? 4 : 1); !room) return room;
   if (context.list == 1) {
     context.not_applied(gain_map, ": it is meant for values that still hold the black level");
+  } else if (context.list == 2 && context.samples.is_x_trans) {
+    add_to_all_planes(context, std::move(map));
   } else if (split && (map.row_pitch != 1 || map.column_pitch != 1)) {
     context.not_applied(gain_map, ": it skips rows or columns of demosaiced data");
   } else if (split) {
@@ -190,7 +202,8 @@ Result<void> read_defect_constant(const OpcodeContext& context, OpcodeReader in)
   const std::uint32_t constant = in.u32();
   if (!in.complete()) return context.damaged(fix_bad_pixels_constant);
   const RawDn& raw = context.frame.raw;
-  if (context.samples.linearized || context.list != 1 || raw.layout == SensorLayout::linear_rgb || raw.is_float()) {
+  const bool is_mosaic = raw.layout != SensorLayout::linear_rgb || context.samples.is_x_trans;
+  if (context.samples.linearized || context.list != 1 || !is_mosaic || raw.is_float()) {
     context.not_applied(fix_bad_pixels_constant, ": its constant does not refer to the decoded values");
   } else if (constant < context.constants.size()) {
     context.constants.set(constant);

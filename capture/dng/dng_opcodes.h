@@ -14,6 +14,7 @@ namespace lowlux::capture {
 struct SampleState {
   bool linearized = false;   // a LinearizationTable, which opcodes of list 1 precede
   bool polynomials = false;  // MapPolynomial of list 2
+  bool is_x_trans = false;   // one for each site, of a frame that will have three planes
 };
 
 /// Reads a DNG opcode list (DNG 1.4, chapter 7) into the corrections of a frame. Precondition: the geometry, layout,

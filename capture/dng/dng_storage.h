@@ -2,11 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "capture/dng/tiff_directory.h"
+#include "capture/x_trans/x_trans_pattern.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 
@@ -23,6 +25,7 @@ struct DngImage {
   int row_interleave = 1, column_interleave = 1;  // images that they are stored as; 1 but for JPEG XL
   SensorLayout layout = SensorLayout::bayer;
   BayerPhase phase = BayerPhase::rggb;
+  std::optional<XTransPhase> x_trans;  // of a mosaic that is X-Trans and not Bayer, from the corner of the active area
 };
 
 /// Locations of the parts (strips or tiles) of an image, all inside the file.

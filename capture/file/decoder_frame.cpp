@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +13,7 @@
 #include "capture/dng/dng_info.h"
 #include "capture/dng/dng_levels.h"
 #include "capture/file/pass_on.h"
+#include "capture/x_trans/x_trans_frame.h"
 
 namespace lowlux::capture {
 namespace {
@@ -56,6 +59,12 @@ Result<void> fill_geometry(const DecodedHeader& h, RawDn& raw) {
   return {};
 }
 
+/// Returns the colour number of a site of the visible area.
+int channel_of(const DecodedHeader& h, int x, int y) {
+  if (h.filters != x_trans_filters) return channel_of(h.filters, x, y);
+  return std::min<int>(h.x_trans[y % 6 * 6 + x % 6], 3);
+}
+
 /// Returns the black level as dcraw and LibRaw sum it: one for all, one for each colour number, and a pattern.
 BlackLevel decoder_black(const DecodedHeader& h) {
   const bool has_pattern =
@@ -63,13 +72,14 @@ BlackLevel decoder_black(const DecodedHeader& h) {
       std::int64_t{h.pattern_rows} * h.pattern_columns <= std::int64_t{std::ssize(h.pattern_black)};
   const int rows = has_pattern ? h.pattern_rows : 1, columns = has_pattern ? h.pattern_columns : 1;
   BlackLevel black;
-  black.rows = h.filters == 0 ? rows : rows * (rows % 2 == 0 ? 1 : 2);  // multiple of a Bayer cell
-  black.columns = h.filters == 0 ? columns : columns * (columns % 2 == 0 ? 1 : 2);
+  const int cell = h.filters == 0 ? 1 : h.filters == x_trans_filters ? 6 : 2;
+  black.rows = std::lcm(rows, cell);
+  black.columns = std::lcm(columns, cell);
   black.samples = h.samples;
   for (int y = 0; y < black.rows; ++y) {
     for (int x = 0; x < black.columns; ++x) {
       for (int s = 0; s < black.samples; ++s) {
-        const int channel = h.filters == 0 ? s : channel_of(h.filters, x, y);
+        const int channel = h.filters == 0 ? s : channel_of(h, x, y);
         const double pattern = has_pattern ? h.pattern_black[(y % rows) * columns + x % columns] : 0.0;
         black.pattern_dn.push_back(static_cast<double>(h.black) + h.channel_black[channel] + pattern);
       }
@@ -156,15 +166,18 @@ std::optional<double> decoder_temperature_c(const DecodedHeader& header) {
 
 Result<RawFrame> frame_of_decoder(DecodedRaw decoded) {
   const DecodedHeader& h = decoded.header;
+  const auto x_trans = h.samples == 1 && h.filters == x_trans_filters ? x_trans_phase(h.x_trans) : std::nullopt;
   RawFrame frame;
   if (h.samples == 3) {
     frame.raw.layout = SensorLayout::linear_rgb;
   } else if (h.filters == 0) {
     frame.raw.layout = SensorLayout::monochrome;
+  } else if (x_trans) {
+    // The samples are a mosaic until they are interpolated below.
   } else if (const auto phase = phase_of(h.filters)) {
     frame.raw.phase = *phase;
   } else {
-    return fail(ErrorCode::unsupported, "this mosaic is not one of the four Bayer patterns of R, G, B");
+    return fail(ErrorCode::unsupported, "this mosaic is neither X-Trans nor one of the four Bayer patterns of R, G, B");
   }
   if (auto filled = fill_geometry(h, frame.raw); !filled) return pass_on(filled);
   if (auto filled = fill_levels(h, frame.raw, frame.warnings); !filled) return pass_on(filled);
@@ -174,6 +187,7 @@ Result<RawFrame> frame_of_decoder(DecodedRaw decoded) {
     frame.warnings.emplace_back("the pixels are not square: their aspect is not applied");
   }
   frame.raw.dn = std::move(decoded.samples);
+  if (x_trans) interpolate_frame(frame, *x_trans);
   return frame;
 }
 

@@ -93,6 +93,7 @@ struct RawDn {
   bool masked_is_stated = false;        // true: the source states them; false: assumed to be all that is not active
   std::optional<BlackLevel> black_tag;  // what the source states; absent if it states nothing
   std::array<double, 3> white_dn{};     // saturation of R, G, B (all equal for monochrome)
+  bool from_x_trans = false;            // linear_rgb that was interpolated from an X-Trans mosaic at reading
   FrameInfo info;
 
   bool is_float() const { return !dn_float.empty(); }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "capture/decoder/libraw_decoder.h"
+#include "capture/x_trans/x_trans_pattern.h"
 #include "tests/capture/read_built.h"
 #include "tests/support/float_dng.h"
 #include "tests/support/jpeg_xl.h"
@@ -80,6 +81,14 @@ std::vector<Format> stored_formats() {
                    dng.monochrome = true;
                    return dng.build();
                  }});
+  out.push_back({"DNG, X-Trans", [] {
+                   std::vector<double> colours;
+                   for (int i = 0; i < 36; ++i)
+                     colours.push_back(static_cast<double>(colour_at(XTransPhase{}, i % 6, i / 6)));
+                   DngBuilder dng = plain();
+                   dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
+                   return dng.set(33422, Tag::numbers(TagType::byte, colours)).build();
+                 }});
   out.push_back({"DNG, LinearRaw, uncompressed", [] { return plain(3).build(); }});
   out.push_back({"DNG, LinearRaw, lossless JPEG", [] { return plain(3, 16, DngStorage::lossless_jpeg).build(); }});
 #ifdef LOWLUX_WITH_JPEG_XL
@@ -104,11 +113,15 @@ std::vector<Format> other_formats() {
           {"DNG, Bayer, lossy JPEG", [] { return with(plain(1, 8), 259, {34892}); }},
           {"DNG, integers, Deflate", [] { return with(plain(), 259, {8}); }},
           {"DNG, VC-5 (GoPro GPR)", [] { return file_of("gopro_hero6_GOPR0024.gpr"); }},
-          {"DNG, X-Trans",
+          {"DNG, mosaic of 6 x 6 sites other than X-Trans",
            [] {
              DngBuilder dng = plain();
              dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
              return dng.set(33422, Tag::numbers(TagType::byte, std::vector<double>(36, 1))).build();
+           }},
+          {"DNG, mosaic of 4 x 4 sites (Quad Bayer)",
+           [] {
+             return plain().set(33421, Tag::numbers(TagType::u16, {4, 4})).build();
            }},
           {"DNG, mosaic of cyan, magenta, yellow",
            [] {
@@ -135,7 +148,7 @@ std::string row_of(const Format& format) {
   const char* const layouts[] = {"mosaic", "monochrome", "three colours"};
   const RawDn& raw = frame->raw;
   return "| " + format.name + " | decoded | " + layouts[static_cast<std::size_t>(raw.layout)] +
-         (raw.is_float() ? ", floats" : "") + " |\n";
+         (raw.is_float() ? ", floats" : "") + (raw.from_x_trans ? ", interpolated at reading" : "") + " |\n";
 }
 
 std::string page() {
@@ -143,7 +156,7 @@ std::string page() {
       "# Formats\n\nEach row is a file that `tests/capture/format_table_test.cpp` builds or has, and what reading it "
       "gives: the layout\nof the samples, or the message of the refusal. LibRaw decodes raws other than DNG, of which "
       "no camera's file of a free\nlicence is small enough to be kept here; its list of cameras applies, without "
-      "X-Trans, Foveon, rotated and four-colour\nmosaics and sRAW. `tests/capture/lossy_dng_test.cpp` has lossy "
+      "Foveon, rotated and four-colour mosaics\nand sRAW. `tests/capture/lossy_dng_test.cpp` has lossy "
       "LinearRaw, which is decoded.\n\n| format | result | layout or reason |\n|---|---|---|\n";
   for (const auto& formats : {stored_formats(), other_formats()}) {
     for (const Format& format : formats) out += row_of(format);

@@ -21,7 +21,9 @@ std::string rect_text(const Rect& r) { return fmt::format("{} x {} at ({}, {})",
 
 void add_layout(Lines& out, const RawDn& raw) {
   const bool rgb = raw.layout == SensorLayout::linear_rgb;
-  const std::string layout = rgb ? "demosaiced RGB" : calib::mosaic_of(raw);
+  const std::string layout = raw.from_x_trans ? "X-Trans, interpolated at reading"
+                             : rgb            ? "demosaiced RGB"
+                                              : calib::mosaic_of(raw);
   const std::string floats = raw.is_float() ? ", floating-point" : "";
   out.add("readout", fmt::format("{} x {}, {}{}", raw.row_samples() / (rgb ? 3 : 1), raw.rows(), layout, floats));
   out.add("active area", rect_text(raw.active));

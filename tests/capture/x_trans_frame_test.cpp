@@ -1,0 +1,187 @@
+// X-Trans mosaics from the file to the frame: levels, noise, areas, corrections.
+#include "capture/x_trans/x_trans_frame.h"
+
+#include <gtest/gtest.h>
+
+#include "capture/file/decoder_frame.h"
+#include "tests/capture/read_built.h"
+
+namespace lowlux::capture {
+namespace {
+
+using test::DngBuilder;
+using test::Tag;
+using test::TagType;
+
+/// The code of a site by its colour, above black.
+constexpr std::array<int, 3> code{1500, 4000, 2400};
+
+/// A DNG whose active area begins at a corner and has one value in each colour.
+DngBuilder x_trans_dng(const XTransPhase& phase, int left = 0, int top = 0, int black = 64) {
+  DngBuilder dng;
+  dng.width = 44, dng.height = 38;
+  std::vector<double> pattern;
+  for (int i = 0; i < 36; ++i) pattern.push_back(static_cast<double>(colour_at(phase, i % 6, i / 6)));
+  for (int y = 0; y < dng.height; ++y) {
+    for (int x = 0; x < dng.width; ++x) {
+      const auto c = static_cast<std::size_t>(colour_at(phase, x - left, y - top));
+      dng.pixels.push_back(static_cast<std::uint16_t>(black + code[c]));
+    }
+  }
+  dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
+  dng.set(33422, Tag::numbers(TagType::byte, pattern));
+  if (left + top > 0) {
+    dng.set(50829, Tag::numbers(TagType::u32, {static_cast<double>(top), static_cast<double>(left), 38, 44}));
+  }
+  return dng;
+}
+
+void expect_colours(const RawFrame& frame, double black_dn = 64) {
+  const RawDn& raw = frame.raw;
+  ASSERT_EQ(raw.layout, SensorLayout::linear_rgb);
+  ASSERT_TRUE(raw.is_float() && raw.from_x_trans && raw.dn.empty());
+  for (std::size_t i = 0; i < raw.dn_float.size(); ++i) {
+    ASSERT_NEAR(raw.dn_float.data()[i], black_dn + code[i % 3], 0.05) << i;  // 1e-5 of the largest code
+  }
+}
+
+TEST(XTransFrame, EveryPhaseIsReadAsThreeColours) {
+  for (int i = 0; i < 36; ++i) {
+    const int left = i % 3, top = i % 5;
+    const RawFrame frame = test::read_built(x_trans_dng({i % 6, i / 6}, left, top));
+    expect_colours(frame);
+    EXPECT_EQ(frame.raw.active, (Rect{0, 0, 44 - left, 38 - top}));
+    EXPECT_EQ(frame.raw.default_crop, frame.raw.active);
+    EXPECT_TRUE(frame.raw.masked.empty());
+    ASSERT_TRUE(frame.raw.black_tag);
+    EXPECT_EQ(frame.raw.black_tag->samples, 3);
+    for (int c = 0; c < 3; ++c) EXPECT_EQ(frame.raw.black_tag->at(0, 0, c), 64);
+    EXPECT_EQ(frame.raw.white_dn, (std::array<double, 3>{65535, 65535, 65535}));
+    EXPECT_TRUE(frame.warnings.empty());
+  }
+}
+
+TEST(XTransFrame, BlackOfAPatternBecomesOneForEachColour) {
+  DngBuilder dng = x_trans_dng({0, 0});
+  for (int i = 0; i < dng.width * dng.height; ++i)
+    dng.pixels[i] = static_cast<std::uint16_t>(dng.pixels[i] + i % 2 * 10);
+  dng.set(50713, Tag::numbers(TagType::u16, {1, 2}));
+  dng.set(50714, Tag::numbers(TagType::u16, {64, 74}));
+  expect_colours(test::read_built(dng), 69);  // every colour is in even and odd columns alike
+}
+
+TEST(XTransFrame, BlackThatIsNotStatedIsMeasuredOnStatedMaskedAreas) {
+  DngBuilder dng = x_trans_dng({1, 4}, 8, 0, 100);
+  for (int y = 0; y < dng.height; ++y) {
+    for (int x = 0; x < 8; ++x) dng.pixels[y * dng.width + x] = 100;
+  }
+  dng.remove(50714);
+  dng.set(50830, Tag::numbers(TagType::u32, {0, 0, 38, 8}));
+  const RawFrame frame = test::read_built(dng);
+  expect_colours(frame, 100);
+  ASSERT_TRUE(frame.raw.black_tag);
+  EXPECT_EQ(frame.raw.black_tag->at(0, 0, 1), 100);
+}
+
+TEST(XTransFrame, NoiseIsThatOfTheDensityOfEachColour) {
+  DngBuilder dng = x_trans_dng({3, 2});
+  dng.set(51041, Tag::numbers(TagType::f64, {2e-4, 3e-6}));
+  const RawFrame frame = test::read_built(dng);
+  ASSERT_TRUE(frame.noise);
+  const std::array<double, 3> density{8.0 / 36, 20.0 / 36, 8.0 / 36};
+  for (std::size_t c = 0; c < 3; ++c) {
+    EXPECT_DOUBLE_EQ(frame.noise->scale[c], 2e-4 / density[c]);
+    EXPECT_DOUBLE_EQ(frame.noise->offset[c], 3e-6 / density[c]);
+  }
+}
+
+TEST(XTransFrame, SaturatedSitesStayAtWhite) {
+  DngBuilder dng = x_trans_dng({2, 2});
+  dng.set(50717, Tag::numbers(TagType::u16, {4000 + 64}));  // green saturates
+  const RawFrame frame = test::read_built(dng);
+  for (int y = 0; y < dng.height; ++y) {
+    for (int x = 0; x < dng.width; ++x) EXPECT_EQ(frame.raw.dn_float.at(3 * x + 1, y), 4064);
+  }
+}
+
+/// An opcode list of one opcode (DNG 1.4, chapter 7).
+Tag opcodes(std::uint32_t id, const std::vector<std::byte>& parameters) {
+  std::vector<std::byte> out;
+  for (const std::uint32_t word : {1U, id, 0x01030000U, 1U, static_cast<std::uint32_t>(parameters.size())})
+    test::append_u32(out, word);
+  out.insert(out.end(), parameters.begin(), parameters.end());
+  return Tag::opaque(out);
+}
+
+TEST(XTransFrame, DefectsThatTheFileNamesAreRepaired) {
+  DngBuilder dng = x_trans_dng({0, 5});
+  dng.pixels[10 * dng.width + 12] = 300;
+  dng.pixels[11 * dng.width + 12] = 9;
+  std::vector<std::byte> list;
+  for (const std::uint32_t word : {0U, 2U, 0U, 10U, 12U, 11U, 12U}) test::append_u32(list, word);
+  dng.set(51008, opcodes(5, list));
+  const RawFrame frame = test::read_built(dng);
+  expect_colours(frame);
+  EXPECT_TRUE(frame.corrections.defects.empty());
+
+  DngBuilder constant = x_trans_dng({0, 5});
+  constant.pixels[10 * constant.width + 12] = 4;
+  std::vector<std::byte> value;
+  for (const std::uint32_t word : {4U, 0U}) test::append_u32(value, word);
+  constant.set(51008, opcodes(4, value));
+  expect_colours(test::read_built(constant));
+}
+
+TEST(XTransFrame, GainMapsOfTheMosaicAreForAllPlanes) {
+  const auto with_pitch = [](std::uint32_t pitch) {
+    std::vector<std::byte> map;
+    for (const std::uint32_t word : {0U, 0U, 38U, 44U, 0U, 1U, pitch, pitch, 1U, 1U}) test::append_u32(map, word);
+    for (const double number : {1.0, 1.0, 0.0, 0.0}) test::append_f64(map, number);
+    test::append_u32(map, 1);
+    test::append_f32(map, 1.5F);
+    DngBuilder dng = x_trans_dng({4, 4});
+    dng.set(51009, opcodes(9, map));
+    return test::read_built(dng);
+  };
+  const RawFrame all = with_pitch(1);
+  ASSERT_EQ(all.corrections.gain_maps.size(), 1u);
+  EXPECT_EQ(all.corrections.gain_maps[0].planes, 3);
+  const RawFrame some = with_pitch(6);
+  EXPECT_TRUE(some.corrections.gain_maps.empty());
+  ASSERT_EQ(some.warnings.size(), 1u);
+  EXPECT_NE(some.warnings[0].find("X-Trans"), std::string::npos);
+}
+
+TEST(XTransFrame, TheDecodersReportOfAnXTransRawIsFollowed) {
+  DecodedRaw raw;
+  DecodedHeader& h = raw.header;
+  h.outcome = DecodeOutcome::decoded;
+  h.raw_width = 48, h.raw_height = 40, h.samples = 1;
+  h.left = 5, h.top = 2, h.width = 40, h.height = 36;
+  h.filters = x_trans_filters;
+  h.black = 50;
+  for (int c = 0; c < 3; ++c) h.channel_black[c] = 14;
+  h.maximum = 16383;
+  h.camera_multiplier[0] = 2, h.camera_multiplier[1] = 1, h.camera_multiplier[2] = 1.6F;
+  h.sensor_temperature_c = h.camera_temperature_c = -1000;
+  h.pixel_aspect = 1;
+  const XTransPhase phase{4, 1};
+  for (int i = 0; i < 36; ++i) h.x_trans[i] = static_cast<std::uint8_t>(colour_at(phase, i % 6, i / 6));
+  raw.samples = Plane<std::uint16_t>(48, 40);
+  for (int y = 0; y < 40; ++y) {
+    for (int x = 0; x < 48; ++x) {
+      const auto c = static_cast<std::size_t>(colour_at(phase, x - 5, y - 2));
+      raw.samples.at(x, y) = static_cast<std::uint16_t>(64 + code[c]);
+    }
+  }
+  DecodedRaw other{h, raw.samples.clone()};
+  const auto frame = frame_of_decoder(std::move(raw));
+  ASSERT_TRUE(frame) << frame.error().message;
+  expect_colours(*frame);
+  EXPECT_EQ(frame->raw.active, (Rect{0, 0, 40, 36}));
+  other.header.x_trans[7] = 3;
+  EXPECT_FALSE(frame_of_decoder(std::move(other)));
+}
+
+}  // namespace
+}  // namespace lowlux::capture
