@@ -1,22 +1,12 @@
 #pragma once
 
-#include <array>
-
-#include "capture/x_trans/x_trans_pattern.h"
+#include "capture/x_trans/x_trans_setting.h"
 #include "isp/base/executor.h"
 #include "isp/base/plane.h"
 
 /// Interpolation of X-Trans mosaics by filters that were computed for the least error (scripts/train-x-trans).
 /// capture/README.md has the method, its figures and its limits.
 namespace lowlux::capture {
-
-/// States what the interpolation has to know of a mosaic. Values are fractions of white.
-struct XTransSetting {
-  XTransPhase phase{};
-  std::array<double, 3> neutral{1, 1, 1};  // what a neutral is in R, G, B; any scale, > 0
-  double noise_scale = 0;                  // the variance of a value x is noise_scale x + noise_offset, both >= 0
-  double noise_offset = 0;
-};
 
 /// Interpolates three colours at every site. Every site keeps the value that was measured there.
 ///

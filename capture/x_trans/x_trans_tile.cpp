@@ -16,16 +16,13 @@ static_assert(ratio_border == 8 && luma_border == 5 && half_gaussian >= 4);
 constexpr std::array<float, 9> gaussian{0.0076143F, 0.0360740F, 0.1095866F, 0.2134430F, 0.2665642F,
                                         0.2134430F, 0.1095866F, 0.0360740F, 0.0076143F};
 constexpr float least_ratio_mean = 0.004F, least_root = 0.002F;
+constexpr float least_of_lowest = 0.7F;  // of the lowest site within two pixels: no dark rings around lamps
 
 using Lanes = std::array<float, lanes>;
-using Base = std::array<float, terms>;
 
 Plane<float> tile_plane() { return {padded + lanes, padded}; }
 
 float sum_of(const Lanes& v) { return ((v[0] + v[4]) + (v[1] + v[5])) + ((v[2] + v[6]) + (v[3] + v[7])); }
-
-/// The samples around a site, each divided by the ratio that its colour has at the site.
-using Patch = PlacedFilter;
 
 float filtered(const PlacedFilter& filter, const Patch& patch) {
   Lanes sum{};
@@ -36,7 +33,7 @@ float filtered(const PlacedFilter& filter, const Patch& patch) {
 }
 
 /// Returns the weighted sum of the filters of all terms.
-float filtered(const std::array<PlacedFilter, terms>& filters, const Base& base, const Patch& patch) {
+float filtered(const PlacedFilters& filters, const Base& base, const Patch& patch) {
   std::array<Lanes, terms> sum{};
   for (int r = 0; r < side; ++r) {
     for (int t = 0; t < terms; ++t) {
@@ -96,6 +93,7 @@ Tile::Tile(const XTransSetting& setting)
     const double neutral = setting.neutral[c] / setting.neutral[1];
     neutral_[c] = static_cast<float>(neutral);
     white_[c] = 1 / neutral_[c];
+    least_white_ = std::min(least_white_, white_[c]);
     scale += luma_weights[c] * setting.noise_scale / neutral;
     offset += luma_weights[c] * setting.noise_offset / (neutral * neutral);
   }
@@ -112,7 +110,8 @@ void Tile::compute_ratios() {
   for (std::size_t c = 0; c < 3; ++c) {
     for (int y = 0; y < padded; ++y) {
       const float* from = samples_.row(y);
-      for (int x = 0; x < padded; ++x) masked[x] = static_cast<std::size_t>(bank[site_at(x, y)].own) == c ? from[x] : 0;
+      for (int x = 0; x < padded; ++x)
+        masked[x] = static_cast<std::size_t>(bank[site_at(x, y)].own) == c ? std::min(from[x], least_white_) : 0;
       sum_along_row(triangle, masked.data(), half_triangle, padded - half_triangle, row_sums_[c].row(y));
     }
   }
@@ -132,7 +131,7 @@ void Tile::compute_ratios() {
   }
 }
 
-PlacedFilter Tile::patch_of(const SiteFilters& site, int x, int y) const {
+Patch Tile::patch_of(const SiteFilters& site, int x, int y) const {
   const float red = 1 / ratio_[0].row(y)[x], blue = 1 / ratio_[2].row(y)[x];
   Patch patch;
   for (int r = 0; r < side; ++r) {
@@ -183,28 +182,52 @@ void Tile::compute_tensor() {
 
 void Tile::mark_saturated() {
   const auto& bank = filter_bank();
-  has_saturated_ = false;
   std::fill_n(near_saturated_.data(), near_saturated_.size(), std::uint8_t{0});
   for (int y = margin - reach; y < padded - margin + reach; ++y) {
     for (int x = margin - reach; x < padded - margin + reach; ++x) {
       if (samples_.row(y)[x] < white_[static_cast<std::size_t>(bank[site_at(x, y)].own)]) continue;
-      has_saturated_ = true;
       for (int dy = -reach; dy <= reach; ++dy)
         std::fill_n(near_saturated_.row(y + dy) + x - reach, side, std::uint8_t{1});
     }
   }
 }
 
-float Tile::limited(float value, std::size_t colour, int x, int y) const {
-  float low = INFINITY, high = -INFINITY;
-  for (int j = y - 1; j <= y + 1; ++j) {
-    for (int i = x - 1; i <= x + 1; ++i) {
+Tile::Range Tile::range_of(std::size_t colour, int x, int y, int distance) const {
+  Range range;
+  for (int j = y - distance; j <= y + distance; ++j) {
+    for (int i = x - distance; i <= x + distance; ++i) {
       if (static_cast<std::size_t>(filter_bank()[site_at(i, j)].own) != colour) continue;
-      low = std::min(low, samples_.row(j)[i]);
-      high = std::max(high, samples_.row(j)[i]);
+      range.low = std::min(range.low, samples_.row(j)[i]);
+      range.high = std::max(range.high, samples_.row(j)[i]);
     }
   }
-  return std::clamp(value, low, high);
+  return range;
+}
+
+Patch Tile::clipped(Patch patch, int x, int y) const {
+  const SiteFilters& site = filter_bank()[site_at(x, y)];
+  std::array<float, 3> limit;
+  for (std::size_t c = 0; c < 3; ++c) limit[c] = least_white_ / ratio_[c].row(y)[x];
+  for (std::size_t i = 0; i < patch.size(); ++i) {
+    patch[i] = std::min(
+        patch[i], limit[0] * site.is_colour[0][i] + limit[1] * site.is_colour[1][i] + limit[2] * site.is_colour[2][i]);
+  }
+  return patch;
+}
+
+float Tile::value_near_saturation(const PlacedFilters& filters, const Base& base, const Patch& patch,
+                                  std::size_t colour, int x, int y) const {
+  const Range range = range_of(colour, x, y, 1);
+  const float ratio = ratio_[colour].row(y)[x];
+  if (range.low < least_white_) {
+    const float value = ratio * filtered(filters, base, clipped(patch, x, y));
+    if (value < least_white_) {
+      const float low = range_of(colour, x, y, 2).low;
+      return low > 0 ? std::max(value, least_of_lowest * low) : value;
+    }
+  }
+  const float value = ratio * filtered(filters, base, patch);
+  return range.high >= white_[colour] ? std::clamp(value, range.low, range.high) : value;
 }
 
 void Tile::write_pixel(int x, int y, float* rgb) const {
@@ -217,8 +240,9 @@ void Tile::write_pixel(int x, int y, float* rgb) const {
   rgb[own] = samples_.row(y)[x] * neutral_[own];
   for (std::size_t slot = 0; slot < 2; ++slot) {
     const auto target = static_cast<std::size_t>(site.target[slot]);
-    float value = ratio_[target].row(y)[x] * filtered(site.colour[slot], base, patch);
-    if (has_saturated_ && near_saturated_.row(y)[x] != 0) value = limited(value, target, x, y);
+    const float value = near_saturated_.row(y)[x] != 0
+                            ? value_near_saturation(site.colour[slot], base, patch, target, x, y)
+                            : ratio_[target].row(y)[x] * filtered(site.colour[slot], base, patch);
     rgb[target] = value * neutral_[target];
   }
 }

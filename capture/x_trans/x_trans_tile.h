@@ -1,14 +1,20 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
-#include "capture/x_trans/x_trans.h"
 #include "capture/x_trans/x_trans_bank.h"
+#include "capture/x_trans/x_trans_setting.h"
 #include "isp/base/plane.h"
 
 namespace lowlux::capture::x_trans {
+
+/// The samples around a site, each divided by the ratio that its colour has at the site.
+using Patch = PlacedFilter;
+using Base = std::array<float, terms>;  // weights of the terms
+using PlacedFilters = std::array<PlacedFilter, terms>;
 
 inline constexpr int core = 128;   // side of the region that a tile computes
 inline constexpr int margin = 12;  // of sites around it that are read
@@ -32,19 +38,29 @@ class Tile {
     return row_sites_[static_cast<std::size_t>(y)] + column_sites_[static_cast<std::size_t>(x)];
   }
   void compute_ratios();
-  PlacedFilter patch_of(const SiteFilters& site, int x, int y) const;
+  Patch patch_of(const SiteFilters& site, int x, int y) const;
   void compute_luma();
   void compute_tensor();
   void mark_saturated();
   void write_pixel(int x, int y, float* rgb) const;
-  float limited(float value, std::size_t colour, int x, int y) const;
+  /// The range of the sites of a colour within some pixels.
+  struct Range {
+    float low = INFINITY, high = -INFINITY;
+  };
+  Range range_of(std::size_t colour, int x, int y, int distance) const;
+  /// Returns a patch whose values are at most the level up to which no colour saturates.
+  Patch clipped(Patch patch, int x, int y) const;
+  /// Interpolates where a saturated site is within the filters' reach: from clipped values, so that edges of saturated
+  /// regions are alike in all colours; and from all there is where that gives a value beyond the clipping level.
+  float value_near_saturation(const PlacedFilters& filters, const Base& base, const Patch& patch, std::size_t colour,
+                              int x, int y) const;
 
   XTransSetting setting_;
   std::array<float, 3> neutral_{}, white_{};  // relative to green; white over neutral
   float luma_scale_ = 0, luma_offset_ = 0;    // noise of luma
+  float least_white_ = INFINITY;
   float ratio_floor_ = 0, root_offset_ = 0;
   std::array<std::size_t, padded> row_sites_{}, column_sites_{};  // whose sum is the number of a site
-  bool has_saturated_ = false;
   Plane<float> samples_, luma_;
   std::array<Plane<float>, 3> ratio_;     // by which samples of each colour are divided around a site
   std::array<Plane<float>, 4> row_sums_;  // scratch

@@ -5,6 +5,7 @@
 
 #include "capture/file/decoder_frame.h"
 #include "tests/capture/read_built.h"
+#include "tests/support/float_dng.h"
 
 namespace lowlux::capture {
 namespace {
@@ -58,6 +59,25 @@ TEST(XTransFrame, EveryPhaseIsReadAsThreeColours) {
     for (int c = 0; c < 3; ++c) EXPECT_EQ(frame.raw.black_tag->at(0, 0, c), 64);
     EXPECT_EQ(frame.raw.white_dn, (std::array<double, 3>{65535, 65535, 65535}));
     EXPECT_TRUE(frame.warnings.empty());
+  }
+}
+
+TEST(XTransFrame, FloatingPointMosaicsOfAnySizeAreReadToo) {
+  for (const int side : {1, 2, 5, 40}) {
+    Plane<float> value(side, side);
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < side; ++x)
+        value.at(x, y) = 0.25F + 0.25F * static_cast<float>(colour_at(XTransPhase{2, 1}, x, y));
+    }
+    DngBuilder dng = test::float_dng(value, 1);
+    std::vector<double> pattern;
+    for (int i = 0; i < 36; ++i) pattern.push_back(static_cast<double>(colour_at(XTransPhase{2, 1}, i % 6, i / 6)));
+    dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
+    dng.set(33422, Tag::numbers(TagType::byte, pattern));
+    const RawDn raw = test::read_built(dng).raw;
+    ASSERT_EQ(raw.dn_float.width(), 3 * side);
+    ASSERT_TRUE(raw.from_x_trans);
+    for (int c = 0; side > 2 && c < 3; ++c) EXPECT_NEAR(raw.dn_float.at(c, 0), 0.25 + 0.25 * c, 1e-5);
   }
 }
 
