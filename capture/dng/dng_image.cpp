@@ -89,9 +89,10 @@ Result<void> check_sites(const TiffDirectory& directory) {
 
 /// Returns the phase of 36 colours.
 Result<XTransPhase> x_trans_phase_of(const std::vector<double>& pattern) {
-  std::vector<std::uint8_t> colours;
-  for (const double colour : pattern)
-    colours.push_back(colour >= 0 && colour <= 2 ? static_cast<std::uint8_t>(colour) : std::uint8_t{3});
+  std::vector<std::uint8_t> colours(pattern.size());
+  std::transform(pattern.begin(), pattern.end(), colours.begin(), [](double colour) {
+    return colour >= 0 && colour <= 2 ? static_cast<std::uint8_t>(colour) : std::uint8_t{3};
+  });
   if (const auto phase = x_trans_phase(colours)) return *phase;
   return fail(ErrorCode::unsupported, "this mosaic of 6 x 6 sites is not X-Trans", tag::cfa_pattern.name);
 }

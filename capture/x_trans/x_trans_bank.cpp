@@ -48,8 +48,7 @@ void add(const Filter& filter, const Mirror& mirror, float factor, PlacedFilter&
   for (int dy = -reach; dy <= reach; ++dy) {
     for (int dx = -reach; dx <= reach; ++dx) {
       const int at = (mirror.y(dx, dy) + reach) * lanes + mirror.x(dx, dy) + reach;
-      to[static_cast<std::size_t>(at)] +=
-          factor * unit * static_cast<float>(filter[static_cast<std::size_t>((dy + reach) * side + dx + reach)]);
+      to[static_cast<std::size_t>(at)] += factor * unit * static_cast<float>(filter[(dy + reach) * side + dx + reach]);
     }
   }
 }
@@ -78,19 +77,17 @@ SiteFilters filters_of(int x, int y) {
   site.own = colour_at(origin, x, y);
   const int own = static_cast<int>(site.own);
   site.target = {own == 0 ? 1 : 0, own == 2 ? 1 : 2};
-  site.luma[static_cast<std::size_t>(reach * lanes + reach)] = luma_weights[static_cast<std::size_t>(own)];
+  site.luma[reach * lanes + reach] = luma_weights[static_cast<std::size_t>(own)];
   place(x, y, 0, site);
   place(x, y, 1, site);
   for (int i = 0; i < side * side; ++i) {
     const int dx = i % side - reach, dy = i / side - reach;
-    site.is_colour[static_cast<std::size_t>(colour_of(x + dx, y + dy))]
-                  [static_cast<std::size_t>((dy + reach) * lanes + dx + reach)] = 1;
+    site.is_colour[static_cast<std::size_t>(colour_of(x + dx, y + dy))][(dy + reach) * lanes + dx + reach] = 1;
   }
   const int half = static_cast<int>(triangle.size()) / 2;
   for (int dy = -half; dy <= half; ++dy) {
     for (int dx = -half; dx <= half; ++dx) {
-      site.mean_scale[static_cast<std::size_t>(colour_of(x + dx, y + dy))] +=
-          triangle[static_cast<std::size_t>(dy + half)] * triangle[static_cast<std::size_t>(dx + half)];
+      site.mean_scale[static_cast<std::size_t>(colour_of(x + dx, y + dy))] += triangle[dy + half] * triangle[dx + half];
     }
   }
   for (float& scale : site.mean_scale) scale = 1 / scale;

@@ -28,7 +28,7 @@ Neighbours neighbours_of(const XTransPhase& phase) {
       for (int dy = -neighbourhood; dy <= neighbourhood; ++dy) {
         for (int dx = -neighbourhood; dx <= neighbourhood; ++dx) {
           if ((dx != 0 || dy != 0) && colour_at(phase, x + dx, y + dy) == colour_at(phase, x, y))
-            all[static_cast<std::size_t>(y * period + x)].push_back({dx, dy});
+            all[y * period + x].push_back({dx, dy});
         }
       }
     }
@@ -42,9 +42,7 @@ struct Criterion {
   const NoiseLine& noise;
   const Neighbours& neighbours;
 
-  const std::vector<Offset>& around(int x, int y) const {
-    return neighbours[static_cast<std::size_t>(y % period * period + x % period)];
-  }
+  const std::vector<Offset>& around(int x, int y) const { return neighbours[y % period * period + x % period]; }
 
   /// Returns the difference of a site from the median of its neighbours; (skip_x, skip_y) is none of them.
   float excess(int x, int y, int skip_x, int skip_y) const {
@@ -55,8 +53,8 @@ struct Criterion {
       if (inside && (x + o.x != skip_x || y + o.y != skip_y)) values[count++] = mosaic.row(y + o.y)[x + o.x];
     }
     if (count == 0) return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(count));
+    float* const middle = values.data() + count / 2;
+    std::nth_element(values.data(), middle, values.data() + count);
     return mosaic.row(y)[x] - *middle;
   }
 

@@ -39,7 +39,7 @@ PerColour mean_black(const BlackLevel& black, const XTransPhase& phase) {
   for (int y = 0; y < black.rows * period; ++y) {
     for (int x = 0; x < black.columns * period; ++x) {
       const std::size_t c = colour_index(phase, x, y);
-      sum[c] += black.pattern_dn[static_cast<std::size_t>(y % black.rows * black.columns + x % black.columns)];
+      sum[c] += black.pattern_dn[y % black.rows * black.columns + x % black.columns];
       ++count[c];
     }
   }
@@ -124,7 +124,7 @@ void to_dn(PlaneView<float> rgb, const PerColour& black, const PerColour& white)
   for (int y = 0; y < rgb.height; ++y) {
     float* row = rgb.row(y);
     for (int i = 0; i < rgb.width; ++i) {
-      const auto c = static_cast<std::size_t>(i % 3);
+      const auto c = i % 3;
       row[i] = static_cast<float>(static_cast<double>(row[i]) * (white[c] - black[c]) + black[c]);
     }
   }

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "capture/decoder/libraw_decoder.h"
-#include "capture/x_trans/x_trans_pattern.h"
 #include "tests/capture/read_built.h"
+#include "tests/capture/x_trans_colours.h"
 #include "tests/support/float_dng.h"
 #include "tests/support/jpeg_xl.h"
 
@@ -82,12 +82,9 @@ std::vector<Format> stored_formats() {
                    return dng.build();
                  }});
   out.push_back({"DNG, X-Trans", [] {
-                   std::vector<double> colours;
-                   for (int i = 0; i < 36; ++i)
-                     colours.push_back(static_cast<double>(colour_at(XTransPhase{}, i % 6, i / 6)));
                    DngBuilder dng = plain();
                    dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
-                   return dng.set(33422, Tag::numbers(TagType::byte, colours)).build();
+                   return dng.set(33422, Tag::numbers(TagType::byte, test::x_trans_colours({}))).build();
                  }});
   out.push_back({"DNG, LinearRaw, uncompressed", [] { return plain(3).build(); }});
   out.push_back({"DNG, LinearRaw, lossless JPEG", [] { return plain(3, 16, DngStorage::lossless_jpeg).build(); }});

@@ -5,6 +5,7 @@
 
 #include "capture/file/decoder_frame.h"
 #include "tests/capture/read_built.h"
+#include "tests/capture/x_trans_colours.h"
 #include "tests/support/float_dng.h"
 
 namespace lowlux::capture {
@@ -21,8 +22,6 @@ constexpr std::array<int, 3> code{1500, 4000, 2400};
 DngBuilder x_trans_dng(const XTransPhase& phase, int left = 0, int top = 0, int black = 64) {
   DngBuilder dng;
   dng.width = 44, dng.height = 38;
-  std::vector<double> pattern;
-  for (int i = 0; i < 36; ++i) pattern.push_back(static_cast<double>(colour_at(phase, i % 6, i / 6)));
   for (int y = 0; y < dng.height; ++y) {
     for (int x = 0; x < dng.width; ++x) {
       const auto c = static_cast<std::size_t>(colour_at(phase, x - left, y - top));
@@ -30,7 +29,7 @@ DngBuilder x_trans_dng(const XTransPhase& phase, int left = 0, int top = 0, int 
     }
   }
   dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
-  dng.set(33422, Tag::numbers(TagType::byte, pattern));
+  dng.set(33422, Tag::numbers(TagType::byte, test::x_trans_colours(phase)));
   if (left + top > 0) {
     dng.set(50829, Tag::numbers(TagType::u32, {static_cast<double>(top), static_cast<double>(left), 38, 44}));
   }
@@ -70,10 +69,8 @@ TEST(XTransFrame, FloatingPointMosaicsOfAnySizeAreReadToo) {
         value.at(x, y) = 0.25F + 0.25F * static_cast<float>(colour_at(XTransPhase{2, 1}, x, y));
     }
     DngBuilder dng = test::float_dng(value, 1);
-    std::vector<double> pattern;
-    for (int i = 0; i < 36; ++i) pattern.push_back(static_cast<double>(colour_at(XTransPhase{2, 1}, i % 6, i / 6)));
     dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
-    dng.set(33422, Tag::numbers(TagType::byte, pattern));
+    dng.set(33422, Tag::numbers(TagType::byte, test::x_trans_colours({2, 1})));
     const RawDn raw = test::read_built(dng).raw;
     ASSERT_EQ(raw.dn_float.width(), 3 * side);
     ASSERT_TRUE(raw.from_x_trans);

@@ -259,8 +259,8 @@ TEST(XTrans, TheNoiseOfFlatsIsEstimated) {
 TEST(XTrans, HotAndDeadSitesAreFoundAndStarsAreNot) {
   const XTransPhase phase{0, 3};
   auto mosaic = noisy_flat(200, phase, 100, 3, 23);
-  std::vector<std::array<int, 2>> hot;
-  for (int i = 0; i < 40; ++i) hot.push_back({10 + 4 * i, 20 + i});
+  std::vector<std::array<int, 2>> hot(40);
+  for (int i = 0; i < 40; ++i) hot[i] = {10 + 4 * i, 20 + i};
   for (const auto& [x, y] : hot) mosaic.at(x, y) = y % 2 == 0 ? 0.9F : -0.1F;
   for (int i = 0; i < 8; ++i) {  // stars of 1.5 pixels FWHM at all positions in the pattern
     const double cx = 20 + 20 * i + 0.1 * i, cy = 150 + i;
