@@ -119,6 +119,13 @@ NoiseLine noise_of(const std::optional<NoiseProfile>& stated, PlaneView<const fl
   return estimate_mosaic_noise(mosaic, phase);
 }
 
+/// Returns noise that was measured on the mosaic: the same for all colours.
+NoiseProfile profile_of(const NoiseLine& noise) {
+  return {.scale = {noise.scale, noise.scale, noise.scale},
+          .offset = {noise.offset, noise.offset, noise.offset},
+          .source = NoiseProfile::Source::picture};
+}
+
 /// Changes fractions of white to DN above zero.
 void to_dn(PlaneView<float> rgb, const PerColour& black, const PerColour& white) {
   for (int y = 0; y < rgb.height; ++y) {
@@ -162,6 +169,7 @@ void interpolate_frame(RawFrame& frame, const XTransPhase& phase) {
   keep_active_area(raw);
   raw.layout = SensorLayout::linear_rgb;
   raw.from_x_trans = true;
+  if (!frame.noise && noise.scale > 0) frame.noise = profile_of(noise);
   for (std::size_t c = 0; frame.noise && c < 3; ++c) {
     frame.noise->scale[c] /= density[c];
     frame.noise->offset[c] /= density[c];

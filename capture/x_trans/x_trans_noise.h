@@ -13,7 +13,7 @@ struct NoiseLine {
 
 /// Estimates the noise of a mosaic from its blocks of 2 x 2 green sites: the difference of their diagonals has the
 /// variance of a site where the scene is a plane, and the lower quartile of many of its amounts is that of smooth
-/// regions. Texture makes the estimate too large, never too small. It serves to weight filters, not to describe a file.
+/// regions. Texture makes the estimate too large, never too small.
 /// @param mosaic  height x width, fractions of white; every 4th row of blocks of large mosaics is used
 /// @return a line through the levels that occur; 0 and 0 for mosaics with fewer than 64 blocks
 NoiseLine estimate_mosaic_noise(PlaneView<const float> mosaic, const XTransPhase& phase);

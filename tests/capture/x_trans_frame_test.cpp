@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <random>
+
 #include "capture/file/decoder_frame.h"
 #include "tests/capture/read_built.h"
 #include "tests/capture/x_trans_colours.h"
@@ -110,6 +113,31 @@ TEST(XTransFrame, NoiseIsThatOfTheDensityOfEachColour) {
     EXPECT_DOUBLE_EQ(frame.noise->scale[c], 2e-4 / density[c]);
     EXPECT_DOUBLE_EQ(frame.noise->offset[c], 3e-6 / density[c]);
   }
+}
+
+TEST(XTransFrame, NoiseThatIsNotStatedIsMeasuredOnTheMosaic) {
+  DngBuilder dng = x_trans_dng({1, 1});
+  dng.width = dng.height = 240;
+  dng.pixels.resize(240 * 240);
+  std::mt19937 draw(20261125);
+  std::normal_distribution<double> noise(0, 1);
+  for (int y = 0; y < dng.height; ++y) {
+    for (int x = 0; x < dng.width; ++x) {  // 2 DN/e- and 3 e- of read noise; white 65535
+      const double mean = x < dng.width / 2 ? 800 : 8000;
+      dng.pixels[y * dng.width + x] =
+          static_cast<std::uint16_t>(std::lround(64 + mean + std::sqrt(2 * mean + 36) * noise(draw)));
+    }
+  }
+  const RawFrame frame = test::read_built(dng);
+  ASSERT_TRUE(frame.noise);
+  EXPECT_EQ(frame.noise->source, NoiseProfile::Source::picture);
+  const double range = frame.raw.white_dn[1] - 64, density = 20.0 / 36;
+  for (const double mean : {800.0, 8000.0}) {
+    const double variance = frame.noise->scale[1] * mean / range + frame.noise->offset[1];
+    // The variance from a quartile of 3,200 differences has a standard error of 6.3 %.
+    EXPECT_NEAR(variance * density * range * range / (2 * mean + 36), 1, 5 * 0.063) << mean;
+  }
+  EXPECT_DOUBLE_EQ(frame.noise->scale[0] * 8, frame.noise->scale[1] * 20);
 }
 
 TEST(XTransFrame, SaturatedSitesStayAtWhite) {

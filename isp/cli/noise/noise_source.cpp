@@ -148,6 +148,19 @@ Result<OptionalOrigin> use_given(const calib::NoiseFigures& given, const BlackPo
   return NoiseOrigin{.source = NoiseOrigin::Source::given, .figures = given};
 }
 
+/// Returns where noise comes from that a frame has when it is read; X-Trans mosaics are measured then.
+NoiseOrigin::Source source_of(const NoiseProfile& noise) {
+  switch (noise.source) {
+    case NoiseProfile::Source::profile:
+      return NoiseOrigin::Source::profile;
+    case NoiseProfile::Source::picture:
+      return NoiseOrigin::Source::picture;
+    case NoiseProfile::Source::file:
+      break;
+  }
+  return NoiseOrigin::Source::file;
+}
+
 }  // namespace
 
 std::optional<calib::NoiseFigures> noise_figures_of(const std::string& text) {
@@ -163,8 +176,7 @@ Result<OptionalOrigin> find_noise(const isp::DevelopOptions& options, const std:
   using Mode = isp::DenoiseChoice::Mode;
   const bool is_stated = frame.noise && isp::electrons_at_white(frame.raw, *frame.noise);
   if (!given && is_stated) {
-    const bool is_profile = frame.noise->source == NoiseProfile::Source::profile;
-    return NoiseOrigin{.source = is_profile ? NoiseOrigin::Source::profile : NoiseOrigin::Source::file};
+    return NoiseOrigin{.source = source_of(*frame.noise)};
   }
   if (!given && (options.denoise.mode == Mode::off || frame.raw.layout != SensorLayout::bayer)) return std::nullopt;
   const auto black =
