@@ -87,6 +87,9 @@ Result<RawFrame> finished(const DngFile& dng, const DngDescription& described, R
                    frame);
   ignore_impossible_white(frame.colour, frame.warnings);
   if (x_trans) interpolate_frame(frame, *x_trans);
+  if (const auto& quad_bayer = described.image.quad_bayer) {
+    if (auto binned = bin_quad_bayer(*quad_bayer, frame); !binned) return pass_on(binned);
+  }
   return frame;
 }
 

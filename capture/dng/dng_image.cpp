@@ -59,15 +59,16 @@ Result<int> bits_of(const TiffDirectory& directory, std::size_t samples, bool is
   return static_cast<int>(values.front());
 }
 
-/// Reads the side of a mosaic's pattern: 2 or 6 sites.
+/// Reads the side of a mosaic's pattern: 2, 4 or 6 sites.
 Result<std::uint32_t> pattern_side(const TiffDirectory& directory) {
   auto size = directory.numbers(tag::cfa_repeat_pattern_dim, 2, 2);
   if (!size) return pass_on(size);
   if (!*size || **size == std::vector<double>{2, 2}) return 2;
+  if (**size == std::vector<double>{4, 4}) return 4;
   if (**size == std::vector<double>{6, 6}) return 6;
   return fail(ErrorCode::unsupported,
               "repeating mosaics of " + number_text((**size)[0]) + " x " + number_text((**size)[1]) +
-                  " sites are not supported: only Bayer and X-Trans mosaics and monochrome are",
+                  " sites are not supported: only Bayer, Quad Bayer and X-Trans mosaics and monochrome are",
               tag::cfa_repeat_pattern_dim.name);
 }
 
@@ -109,6 +110,11 @@ Result<void> fill_mosaic(const TiffDirectory& directory, DngImage& image) {
     if (!phase) return pass_on(phase);
     image.x_trans = *phase;
     return {};
+  }
+  if (*side == 4) {
+    image.quad_bayer = quad_bayer_of(**pattern);
+    if (image.quad_bayer) return {};
+    return fail(ErrorCode::unsupported, "this mosaic of 4 x 4 sites is not Quad Bayer", tag::cfa_pattern.name);
   }
   const std::vector<double> patterns[] = {{0, 1, 1, 2}, {1, 0, 2, 1}, {1, 2, 0, 1}, {2, 1, 1, 0}};
   const auto* const at = std::find(std::begin(patterns), std::end(patterns), **pattern);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/dng/quad_bayer.h"
 #include "capture/dng/tiff_directory.h"
 #include "capture/x_trans/x_trans_pattern.h"
 #include "isp/base/frame.h"
@@ -25,6 +26,7 @@ struct DngImage {
   int row_interleave = 1, column_interleave = 1;  // images that they are stored as; 1 but for JPEG XL
   SensorLayout layout = SensorLayout::bayer;
   BayerPhase phase = BayerPhase::rggb;
+  std::optional<QuadBayer> quad_bayer;  // of a mosaic that is Quad Bayer
   std::optional<XTransPhase> x_trans;  // of a mosaic that is X-Trans and not Bayer, from the corner of the active area
 };
 

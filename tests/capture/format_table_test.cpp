@@ -86,6 +86,12 @@ std::vector<Format> stored_formats() {
                    dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
                    return dng.set(33422, Tag::numbers(TagType::byte, test::x_trans_colours({}))).build();
                  }});
+  out.push_back({"DNG, Quad Bayer", [] {
+                   DngBuilder dng = plain(1, 12);
+                   dng.set(33421, Tag::numbers(TagType::u16, {4, 4}));
+                   const std::vector<double> colours{0, 0, 1, 1, 0, 0, 1, 1, 1, 1, 2, 2, 1, 1, 2, 2};
+                   return dng.set(33422, Tag::numbers(TagType::byte, colours)).build();
+                 }});
   out.push_back({"DNG, LinearRaw, uncompressed", [] { return plain(3).build(); }});
   out.push_back({"DNG, LinearRaw, lossless JPEG", [] { return plain(3, 16, DngStorage::lossless_jpeg).build(); }});
 #ifdef LOWLUX_WITH_JPEG_XL
@@ -116,9 +122,11 @@ std::vector<Format> other_formats() {
              dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
              return dng.set(33422, Tag::numbers(TagType::byte, std::vector<double>(36, 1))).build();
            }},
-          {"DNG, mosaic of 4 x 4 sites (Quad Bayer)",
+          {"DNG, mosaic of 4 x 4 sites other than Quad Bayer",
            [] {
-             return plain().set(33421, Tag::numbers(TagType::u16, {4, 4})).build();
+             DngBuilder dng = plain();
+             dng.set(33421, Tag::numbers(TagType::u16, {4, 4}));
+             return dng.set(33422, Tag::numbers(TagType::byte, std::vector<double>(16, 1))).build();
            }},
           {"DNG, mosaic of cyan, magenta, yellow",
            [] {

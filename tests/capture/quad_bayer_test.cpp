@@ -1,0 +1,181 @@
+// Quad Bayer mosaics from the file to the binned frame, against sums of the test's own.
+#include "capture/dng/quad_bayer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "tests/capture/read_built.h"
+#include "tests/support/dng_builder.h"
+
+namespace lowlux::capture {
+namespace {
+
+using test::DngBuilder;
+using test::Tag;
+using test::TagType;
+
+/// Returns the colour of a site whose pattern of blocks begins at (left, top).
+int colour_of(BayerPhase phase, int x, int y, int left, int top) {
+  return static_cast<int>(colour_at(phase, (x - left + 8) / 2, (y - top + 8) / 2));
+}
+
+/// A file of random codes below 1000, whose first complete block begins at (left, top) of the active area.
+DngBuilder quad_dng(BayerPhase phase, int left, int top, std::mt19937& draw) {
+  DngBuilder dng;
+  dng.width = 28 + static_cast<int>(draw() % 20), dng.height = 28 + static_cast<int>(draw() % 20);
+  dng.bits = 12;
+  for (int i = 0; i < dng.width * dng.height; ++i) dng.pixels.push_back(static_cast<std::uint16_t>(draw() % 1000));
+  std::vector<double> colours;
+  for (int i = 0; i < 16; ++i) colours.push_back(colour_of(phase, i % 4, i / 4, left, top));
+  dng.set(33421, Tag::numbers(TagType::u16, {4, 4}));
+  dng.set(33422, Tag::numbers(TagType::byte, colours));
+  return dng;
+}
+
+void set_active(DngBuilder& dng, const Rect& active) {
+  dng.set(50829, Tag::numbers(TagType::u32, {static_cast<double>(active.y), static_cast<double>(active.x),
+                                             static_cast<double>(active.y + active.height),
+                                             static_cast<double>(active.x + active.width)}));
+}
+
+TEST(QuadBayer, EveryPhaseCornerAndActiveAreaGivesTheSumsOfItsBlocks) {
+  std::mt19937 draw(20261125);
+  for (int i = 0; i < 64; ++i) {
+    const auto phase = static_cast<BayerPhase>(i % 4);
+    const int left = i / 4 % 2, top = i / 8 % 2;
+    DngBuilder dng = quad_dng(phase, left, top, draw);
+    const Rect active{static_cast<int>(draw() % 4), static_cast<int>(draw() % 4), dng.width - 4, dng.height - 5};
+    set_active(dng, active);
+    SCOPED_TRACE("seed 20261125, file " + std::to_string(i));
+    const RawFrame frame = test::read_built(dng);
+    const RawDn& raw = frame.raw;
+    ASSERT_EQ(raw.layout, SensorLayout::bayer);
+    EXPECT_EQ(raw.phase, phase);
+    ASSERT_FALSE(raw.is_float());
+    ASSERT_EQ(raw.active.width, (active.width - left) / 2);
+    ASSERT_EQ(raw.active.height, (active.height - top) / 2);
+    EXPECT_EQ(raw.default_crop, (Rect{0, 0, raw.active.width, raw.active.height}));
+    for (int y = 0; y < raw.active.height; ++y) {
+      for (int x = 0; x < raw.active.width; ++x) {
+        int sum = 0;
+        for (int site = 0; site < 4; ++site) {
+          const int column = active.x + left + 2 * x + site % 2, row = active.y + top + 2 * y + site / 2;
+          sum += dng.pixels[static_cast<std::size_t>(row) * dng.width + column];
+        }
+        ASSERT_EQ(raw.dn.at(raw.active.x + x, raw.active.y + y), sum) << x << ", " << y;
+      }
+    }
+    EXPECT_EQ(raw.white_dn, (std::array<double, 3>{4 * 4095, 4 * 4095, 4 * 4095}));
+    ASSERT_TRUE(raw.black_tag);
+    EXPECT_EQ(raw.black_tag->at(0, 0), 4 * 64);
+    ASSERT_EQ(frame.warnings.size(), 1U);
+    EXPECT_NE(frame.warnings[0].find("Quad Bayer"), std::string::npos);
+  }
+}
+
+TEST(QuadBayer, BlackLevelsOfAPatternOfColumnsAndOfRowsAreSummed) {
+  std::mt19937 draw(3);
+  DngBuilder dng = quad_dng(BayerPhase::grbg, 1, 0, draw);
+  std::vector<double> pattern, columns, rows;
+  for (int i = 0; i < 16; ++i) pattern.push_back(60 + i);
+  for (int i = 0; i < dng.width; ++i) columns.push_back(i % 7);
+  for (int i = 0; i < dng.height; ++i) rows.push_back(i % 5);
+  dng.set(50713, Tag::numbers(TagType::u16, {4, 4}));
+  dng.set(50714, Tag::numbers(TagType::u16, pattern));
+  dng.set(50715, Tag::numbers(TagType::f64, columns));
+  dng.set(50716, Tag::numbers(TagType::f64, rows));
+  const RawFrame frame = test::read_built(dng);
+  ASSERT_TRUE(frame.raw.black_tag);
+  for (int y = 0; y < frame.raw.active.height; ++y) {
+    for (int x = 0; x < frame.raw.active.width; ++x) {
+      double sum = 0;
+      for (int site = 0; site < 4; ++site) {
+        const int column = 1 + 2 * x + site % 2, row = 2 * y + site / 2;
+        sum += pattern[row % 4 * 4 + column % 4] + columns[column] + rows[row];
+      }
+      ASSERT_DOUBLE_EQ(frame.raw.black_tag->at(x, y), sum) << x << ", " << y;
+    }
+  }
+}
+
+TEST(QuadBayer, ABlockWithASaturatedSiteIsSaturated) {
+  std::mt19937 draw(5);
+  DngBuilder dng = quad_dng(BayerPhase::rggb, 0, 0, draw);
+  dng.pixels[5 * dng.width + 6] = 4095;
+  const RawFrame frame = test::read_built(dng);
+  EXPECT_EQ(frame.raw.dn.at(3, 2), 4 * 4095);
+  EXPECT_LT(frame.raw.dn.at(2, 2), 4 * 1000);
+}
+
+TEST(QuadBayer, SumsThatCodesCannotHoldAreFloatingPointSamples) {
+  std::mt19937 draw(7);
+  DngBuilder dng = quad_dng(BayerPhase::bggr, 0, 0, draw);
+  dng.bits = 16;
+  for (std::uint16_t& pixel : dng.pixels) pixel = static_cast<std::uint16_t>(draw() % 65535);
+  const RawFrame frame = test::read_built(dng);
+  ASSERT_TRUE(frame.raw.is_float());
+  const auto at = [&](int x, int y) {
+    return static_cast<int>(dng.pixels[static_cast<std::size_t>(y) * dng.width + x]);
+  };
+  EXPECT_EQ(frame.raw.dn_float.at(4, 3), static_cast<float>(at(8, 6) + at(9, 6) + at(8, 7) + at(9, 7)));
+  EXPECT_EQ(frame.raw.white_dn[0], 4.0 * 65535);
+}
+
+TEST(QuadBayer, NoiseIsThatOfTheMeanOfFour) {
+  std::mt19937 draw(9);
+  DngBuilder dng = quad_dng(BayerPhase::gbrg, 0, 1, draw);
+  dng.set(51041, Tag::numbers(TagType::f64, {2e-4, 3e-6}));
+  const RawFrame frame = test::read_built(dng);
+  ASSERT_TRUE(frame.noise);
+  EXPECT_EQ(frame.noise->scale[1], 2e-4 / 4);
+  EXPECT_EQ(frame.noise->offset[1], 3e-6 / 4);
+}
+
+TEST(QuadBayer, AreasKeepCompleteBlocksAndDefectsThoseTheyTouch) {
+  RawFrame frame;
+  frame.raw.dn = Plane<std::uint16_t>(40, 30);
+  std::fill_n(frame.raw.dn.data(), frame.raw.dn.size(), std::uint16_t{100});
+  frame.raw.active = {8, 0, 32, 30};
+  frame.raw.default_crop = {3, 2, 20, 21};
+  frame.raw.masked = {{0, 0, 7, 30}, {7, 0, 1, 30}};
+  frame.raw.white_dn = {1000, 1000, 1000};
+  frame.corrections.defects = {{5, 4, 2, 1}, {31, 29, 1, 1}};
+  frame.corrections.gain_maps = {{.top = 0, .left = 1, .bottom = 30, .right = 32}, {.row_pitch = 2}};
+  ASSERT_TRUE(bin_quad_bayer({}, frame));
+  EXPECT_EQ(frame.raw.active, (Rect{4, 0, 16, 15}));
+  EXPECT_EQ(frame.raw.default_crop, (Rect{2, 1, 9, 10}));
+  ASSERT_EQ(frame.raw.masked.size(), 1U);
+  EXPECT_EQ(frame.raw.masked[0], (Rect{0, 0, 3, 15}));
+  ASSERT_EQ(frame.corrections.defects.size(), 2U);
+  EXPECT_EQ(frame.corrections.defects[0].x, 2);
+  EXPECT_EQ(frame.corrections.defects[0].width, 2);
+  EXPECT_EQ(frame.corrections.defects[1].x, 15);
+  EXPECT_EQ(frame.corrections.defects[1].y, 14);
+  ASSERT_EQ(frame.corrections.gain_maps.size(), 1U);
+  EXPECT_EQ(frame.corrections.gain_maps[0].left, 1);
+  EXPECT_EQ(frame.corrections.gain_maps[0].right, 16);
+  EXPECT_EQ(frame.warnings.size(), 2U);
+}
+
+TEST(QuadBayer, OtherPatternsAndAreasWithoutABlockAreRefused) {
+  std::mt19937 draw(11);
+  DngBuilder other = quad_dng(BayerPhase::rggb, 0, 0, draw);
+  other.set(33422, Tag::numbers(TagType::byte, std::vector<double>(16, 1)));
+  EXPECT_NE(test::refused(other).message.find("not Quad Bayer"), std::string::npos);
+  RawFrame small;
+  small.raw.dn = Plane<std::uint16_t>(6, 6);
+  std::fill_n(small.raw.dn.data(), small.raw.dn.size(), std::uint16_t{0});
+  small.raw.active = {3, 1, 2, 4};
+  const auto binned = bin_quad_bayer({BayerPhase::rggb, 1, 0}, small);
+  ASSERT_FALSE(binned);
+  EXPECT_NE(binned.error().message.find("2 x 4"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace lowlux::capture
