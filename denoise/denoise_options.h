@@ -61,6 +61,9 @@ struct DenoiseOptions {
   /// Finest pyramid level on which chroma is estimated, 0..2; if absent, it follows from the signal to noise ratio of
   /// each tile of 64 x 64 cells, blended. With Level::best only 0 or 2.
   std::optional<int> chroma_start;
+  /// The four sites of a cell are at one place, as those of a pixel that has all colours: a slope of the luma is no
+  /// difference between them (spatial/site_slopes.h).
+  bool sites_coincide = false;
   bool keep_point_sources = true;  // stars pass unfiltered: see point_sources.h
   /// Ratio of the noise variance to that of RawNoise on each pyramid level, finest first; 0.01..100. It differs from 1
   /// where noise is not white, as in raws that were already denoised or compressed with loss: see noise_check.h. The

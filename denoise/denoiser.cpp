@@ -260,7 +260,7 @@ void Run::keep_partly_saturated(int y, const UnpackMemory& m) const {
 /// Converts the planes of level 0 back to a mosaic.
 void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const {
   const PyramidLevel& level = memory.level[0];
-  const SiteSlopes slopes = site_slopes(raw.phase);
+  const SiteSlopes slopes = options.sites_coincide ? SiteSlopes{} : site_slopes(raw.phase);
   const std::span<const float> removed_of_tiles = removed(planes);
   repeat_luma_edges(planes, columns, rows, workers);
   in_bands(workers, rows, [&](int first, int last, int thread) {
@@ -353,7 +353,9 @@ void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const Den
   const ChromaStarts starts = run.starts();
   const PassFrame frame{state_->memory, starts, run.levels, run.workers, options.variance_scale};
   run.front();
-  take_slopes_off(state_->memory.level[0], raw.phase, run.columns, run.rows, run.workers);
+  if (!options.sites_coincide) {
+    take_slopes_off(state_->memory.level[0], raw.phase, run.columns, run.rows, run.workers);
+  }
   fill_saturated_chroma(state_->memory, run.levels, run.workers);
   build_pyramid(frame);
   run_pass(frame, 0, options.level == Level::best ? 2 : 4);

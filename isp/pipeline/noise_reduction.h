@@ -63,6 +63,9 @@ struct NoiseReduction {
   std::shared_ptr<const NoiseRatio> noise_ratio;  // RawFrame::noise_ratio, also where nothing is reduced
   denoise::DenoiseOptions options;
   std::vector<denoise::LineOffsets> lines;  // subtracted before noise reduction
+  /// Set where each pixel is a cell of its own (pixel_cells.h): the charge of its sites of R, G, B at white [e-], in
+  /// which `noise` is stated.
+  std::optional<std::array<double, 3>> cell_e;
   std::optional<TemporalReduction> temporal;
   std::optional<NoiseRegions> regions;  // set: their levels apply, and `level` does not
   std::vector<std::string> warnings;    // contradictions to the noise model

@@ -98,17 +98,23 @@ RawFraction to_fraction(const RawDn& raw, const BlackPoint& black, Executor& exe
 }
 
 void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, RgbView<float> out, Executor& executor) {
+  to_fraction_rgb(raw, black, whole_of(raw), out, executor);
+}
+
+void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, const Rect& part, RgbView<float> out,
+                     Executor& executor) {
   const auto subtract = [&](const auto* dn, int y, int c) {
     float* row = out[c].row(y);
-    for (int x = 0; x < raw.active.width; ++x) {
-      const double level = black.pattern ? black.pattern->at(x, y, c) : black.pedestal_dn[c];
+    for (int x = 0; x < part.width; ++x) {
+      const double level = black.pattern ? black.pattern->at(part.x + x, part.y + y, c) : black.pedestal_dn[c];
       row[x] = static_cast<float>((dn[3 * x + c] - level) / (raw.white_dn[c] - level));
     }
   };
-  for_each_band(executor, raw.active.height, [&](RowBand band, int) {
+  for_each_band(executor, part.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       with_samples(raw, [&](const auto& samples) {
-        for (int c = 0; c < 3; ++c) subtract(samples.row(raw.active.y + y) + 3 * raw.active.x, y, c);
+        const auto* const dn = samples.row(raw.active.y + part.y + y) + std::ptrdiff_t{3} * (raw.active.x + part.x);
+        for (int c = 0; c < 3; ++c) subtract(dn, y, c);
       });
     }
   });

@@ -21,6 +21,10 @@ void to_fraction(const RawDn& raw, const BlackPoint& black, const Rect& part, Pl
 
 /// Subtracts the black point from a SensorLayout::linear_rgb frame into three planes of active height x width.
 void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, RgbView<float> out, Executor& executor);
+/// Subtracts the black point from a region of the active area of such a frame; the values are those of the entire area.
+/// @param out  three planes of `part` height x width
+void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, const Rect& part, RgbView<float> out,
+                     Executor& executor);
 
 /// The largest full wells hold about 1e6 electrons; raw data with reduced noise counts as if it held a thousand times
 /// as many.

@@ -178,7 +178,9 @@ Result<OptionalOrigin> find_noise(const isp::DevelopOptions& options, const std:
   if (!given && is_stated) {
     return NoiseOrigin{.source = source_of(*frame.noise)};
   }
-  if (!given && (options.denoise.mode == Mode::off || frame.raw.layout != SensorLayout::bayer)) return std::nullopt;
+  if (!given && (options.denoise.mode == Mode::off || frame.raw.layout == SensorLayout::linear_rgb)) {
+    return std::nullopt;
+  }
   const auto black =
       options.dark_frame ? isp::black_of(frame.raw, *options.dark_frame) : isp::choose_black(frame.raw, options.black);
   if (!black) return tl::make_unexpected(black.error());

@@ -47,7 +47,8 @@ struct StepFacts {
   const ProcessingGoal& choice;
   StepSizes sizes;
   std::vector<SeenBlock> blocks;
-  bool has_noise = false;  // the noise is known, and may be reduced
+  bool noise_by_ratio = false;  // a frame that is not a mosaic: plan_noise decides by its signal-to-noise ratio
+  bool has_noise = false;       // the noise is known, and may be reduced
   LevelNoise noise;
   ChromaWork chroma;
   std::optional<denoise::Level> fixed_level;

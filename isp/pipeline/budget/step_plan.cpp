@@ -31,6 +31,7 @@ std::string reason_words(const StepFacts& facts, const StepCandidate& plan) {
 }
 
 std::string level_words(const StepFacts& facts, const StepCandidate& plan) {
+  if (facts.noise_by_ratio) return "not decided by its effect, as the frame is no mosaic";
   if (!facts.has_noise) return "the noise is not known, or is not to be reduced";
   if (!plan.level) return "left as it is, " + reason_words(facts, plan);
   std::array<double, 3> share = facts.chroma.start;
@@ -169,7 +170,9 @@ StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thum
   std::optional<NoiseModel> model;
   const bool has_dark = levels.black.dark_mean_e != PerSite<double>{};
   facts.has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !is_denoised_before(frame, o.denoise) &&
-                    !noise_obstacle(frame, levels);
+                    frame.raw.layout == SensorLayout::bayer && !noise_obstacle(frame, levels);
+  facts.noise_by_ratio = frame.raw.layout != SensorLayout::bayer && o.denoise.mode != DenoiseChoice::Mode::off &&
+                         !noise_obstacle(frame, levels);
   if (facts.has_noise || (has_dark && levels.electrons_at_white)) {
     model = noise_model(frame, levels, rendering.white_gain, o.space);
     facts.blocks = seen_blocks(frame, o, levels, rendering, model->noise, thumbnail, executor);

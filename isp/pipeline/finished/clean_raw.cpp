@@ -32,6 +32,10 @@ double dark_noise(const DevelopPlan& plan) {
 }  // namespace
 
 Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
+  if (frame.raw.layout != SensorLayout::bayer) {
+    return fail(ErrorCode::unsupported,
+                "clean raws are made of Bayer mosaics, and this is none: develop reduces its noise in images");
+  }
   Result<DevelopPlan> plan = plan_develop(frame, options, executor);
   if (!plan) return tl::make_unexpected(std::move(plan.error()));
   if (!plan->noise_reduction.has_level()) return fail(ErrorCode::insufficient, plan->noise_reduction.reason);

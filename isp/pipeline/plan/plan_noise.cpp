@@ -13,14 +13,13 @@
 #include "denoise/check/noise_check.h"
 #include "isp/pipeline/budget/frame_sample.h"
 #include "isp/pipeline/plan/local_noise.h"
+#include "isp/pipeline/plan/pixel_noise.h"
 #include "isp/pipeline/render/cell_figures.h"
 #include "isp/pipeline/render/electron_mosaic.h"
+#include "isp/pipeline/render/pixel_cells.h"
 
 namespace lowlux::isp {
 namespace {
-
-constexpr double saturated_fraction_of_white =
-    0.99;  // slightly below 1, because pixels do not all saturate at one code
 
 int colour_of(const RawDn& raw, int site) { return static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)); }
 
@@ -156,27 +155,10 @@ denoise::NoiseCheck check_frame(const RawFrame& frame, const RawLevels& levels, 
   return denoise::check_noise({charge.value.view(), charge.phase, ratio}, out.noise, executor);
 }
 
-/// Adds what is suspicious about a frame. A model that was measured on the frame itself is not held against it: its
-/// uncertainty was stated where it was measured. Where the file states that its noise was reduced, less than its model
-/// has on fine scales is as expected.
-void add_remarks(const denoise::NoiseCheck& check, const NoiseProfile& model, std::vector<std::string>& warnings) {
-  using denoise::NoiseFinding;
-  const bool is_measured = model.source == NoiseProfile::Source::picture;
-  for (denoise::NoiseRemark& remark : denoise::remarks_on(check)) {
-    const bool is_below = remark.finding == NoiseFinding::noise_below_model;
-    const bool is_above = remark.finding == NoiseFinding::noise_above_model;
-    if ((is_measured && (is_below || is_above)) || (model.reduced && is_below)) continue;
-    warnings.push_back(std::move(remark.text));
-  }
-}
-
 }  // namespace
 
 std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& levels) {
-  if (frame.raw.layout != SensorLayout::bayer) {
-    return Error{ErrorCode::unsupported, "noise is reduced on Bayer mosaics, and this is none"};
-  }
-  if (frame.raw.active.width < 2 || frame.raw.active.height < 2) {
+  if (is_mosaic(frame.raw) && (frame.raw.active.width < 2 || frame.raw.active.height < 2)) {
     return Error{ErrorCode::invalid_argument, "the picture is too small to separate noise from detail"};
   }
   if (!levels.electrons_at_white) {
@@ -209,19 +191,7 @@ NoiseModel noise_model(const RawFrame& frame, const RawLevels& levels, const std
 
 double middle_snr(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
                   const Thumbnail& thumbnail, std::vector<double>& snr) {
-  const std::array<double, 3> electrons = electrons_by_colour(frame.raw, levels);
-  const double dark = mean_of_sites(noise.dark_mean_e), variance = mean_of_colours(noise.variance_e2);
-  snr.resize(thumbnail.mean.plane[0].size());
-  for (std::size_t i = 0; i < snr.size(); ++i) {
-    double charge = 0;
-    for (int c = 0; c < 3; ++c) charge += fraction_of_sites[c] * electrons[c] * thumbnail.mean.plane[c].data()[i];
-    const int column = static_cast<int>(i) % thumbnail.mean.width(), row = static_cast<int>(i) / thumbnail.mean.width();
-    const double ratio = ratio_of_block(frame, thumbnail, column, row);
-    snr[i] = std::max(charge - dark, 0.0) / std::sqrt(ratio * (std::max(charge, 0.0) + variance));
-  }
-  const auto middle = snr.begin() + static_cast<std::ptrdiff_t>(snr.size() / 2);
-  std::nth_element(snr.begin(), middle, snr.end());
-  return *middle;
+  return middle_snr(frame, thumbnail, electrons_by_colour(frame.raw, levels), noise, snr);
 }
 
 Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, const RawLevels& levels,
@@ -233,6 +203,7 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
     return left_alone(frame, std::move(error->message));
   }
   if (is_denoised_before(frame, choice)) return left_alone(frame, "the raw was denoised before");
+  if (!is_mosaic(frame.raw)) return plan_pixel_noise(frame, thumbnail, levels, request, executor);
   const NoiseModel model = noise_model(frame, levels, request.white_gain, request.space);
   NoiseReduction out;
   out.source = model.source;

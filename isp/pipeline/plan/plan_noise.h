@@ -10,12 +10,13 @@
 #include "isp/pipeline/noise_reduction.h"
 #include "isp/pipeline/options.h"
 #include "isp/pipeline/plan/levels.h"
+#include "isp/pipeline/plan/noise_facts.h"
 #include "isp/raw/measure/thumbnail.h"
 
 namespace lowlux::isp {
 
-/// Returns why the noise of a frame cannot be reduced at all; nullopt if it can. Errors: no Bayer mosaic (unsupported),
-/// too small (invalid_argument), unknown noise (insufficient).
+/// Returns why the noise of a frame cannot be reduced at all; nullopt if it can. Errors: a mosaic that is too small
+/// (invalid_argument), unknown noise (insufficient).
 std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& levels);
 
 /// Returns whether an automatic choice leaves the noise as it is because the raw was denoised before it was written, as
@@ -27,17 +28,8 @@ bool is_denoised_before(const RawFrame& frame, const DenoiseChoice& choice);
 /// is not from the readout but scene structure, such as a blind or a fence.
 bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise);
 
-/// Holds what the reduction of a frame's noise is decided by.
-struct NoiseRequest {
-  DenoiseChoice choice;
-  OutputSpace space = OutputSpace::srgb;
-  std::array<float, 3> white_gain{1, 1, 1};
-  std::optional<DecidedLevel> level;  // set: used instead of the choice of Mode::automatic
-  bool lines = true;                  // false: row and column noise stays, whatever the choice
-};
-
-/// Decides how noise is reduced. Errors for a requested level: a frame that is not a Bayer mosaic (unsupported),
-/// unknown noise (insufficient). For an automatic level these are reasons to leave the noise.
+/// Decides how noise is reduced. Errors for a requested level: those of noise_obstacle. For an automatic level these
+/// are reasons to leave the noise.
 Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, const RawLevels& levels,
                                   const NoiseRequest& request, Executor& executor);
 

@@ -86,7 +86,7 @@ std::array<float, 3> luminance_of_camera(const DevelopPlan& plan) {
 
 void noise_of_luminance(const DevelopPlan& plan, const RawFrame& frame, const NoiseMaps& maps,
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
-  if (plan.noise_reduction.has_level()) {
+  if (plan.noise_reduction.has_level() && !plan.noise_reduction.cell_e) {
     of_maps(plan, frame.raw.default_crop, maps.residual_variance_e2.view(), out, executor);
   } else {
     const RawDn& raw = frame.raw;

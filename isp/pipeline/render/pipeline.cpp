@@ -1,6 +1,8 @@
 #include "isp/pipeline/render/pipeline.h"
 
 #include <algorithm>
+#include <array>
+#include <span>
 #include <utility>
 
 #include "isp/pipeline/render/electron_mosaic.h"
@@ -8,6 +10,7 @@
 #include "isp/pipeline/render/look_noise.h"
 #include "isp/pipeline/render/modelled_planes.h"
 #include "isp/pipeline/render/picture_view.h"
+#include "isp/pipeline/render/pixel_cells.h"
 #include "isp/raw/bin_plane.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/to_linear.h"
@@ -92,18 +95,22 @@ RgbInput Pipeline::prepare_bayer(const RawFrame& frame, const DevelopPlan& plan)
 // Monochrome frames serve as R, G and B at once; demosaiced ones have three planes of their own.
 RgbInput Pipeline::prepare_planes(const RawFrame& frame, const DevelopPlan& plan) {
   const RawDn& raw = frame.raw;
-  const bool monochrome = raw.layout == SensorLayout::monochrome;
-  const int planes = monochrome ? 1 : 3;
-  for (int c = 0; c < planes; ++c) fit(planes_[c], raw.active.width, raw.active.height);
-  if (monochrome) {
-    subtract_black(raw, plan.levels, planes_[0].view(), executor_);
-    repair(planes_[0].view(), plan.levels.defects, 1);
+  const int planes = planes_of(raw);
+  std::array<PlaneView<float>, 3> views;
+  for (int c = 0; c < planes; ++c) {
+    fit(planes_[c], raw.active.width, raw.active.height);
+    views[c] = planes_[c].view();
+  }
+  read_pixels(frame, plan.levels, {0, 0, raw.active.width, raw.active.height},
+              std::span(views).first(static_cast<std::size_t>(planes)), executor_);
+  if (plan.noise_reduction.reduces()) {
+    pixel_reducer_.run(std::span(planes_).first(static_cast<std::size_t>(planes)), plan.noise_reduction,
+                       noise_reducer_);
+  }
+  if (planes == 1) {
     apply_gains(frame.corrections, planes_[0].view(), executor_);
   } else {
-    const RgbView<float> rgb{planes_[0].view(), planes_[1].view(), planes_[2].view()};
-    to_fraction_rgb(raw, plan.levels.black, rgb, executor_);
-    for (const auto& plane : rgb) repair(plane, plan.levels.defects, 1);
-    apply_gains(frame.corrections, rgb, executor_);
+    apply_gains(frame.corrections, RgbView<float>{planes_[0].view(), planes_[1].view(), planes_[2].view()}, executor_);
   }
   CameraPlanes out{{}, plan.rendering.white_gain};
   for (int c = 0; c < 3; ++c) {

@@ -9,6 +9,7 @@
 #include "isp/base/image.h"
 #include "isp/pipeline/plan.h"
 #include "isp/pipeline/render/noise_reducer.h"
+#include "isp/pipeline/render/pixel_noise_reducer.h"
 #include "isp/pipeline/render/tile_renderer.h"
 
 namespace lowlux::isp {
@@ -25,7 +26,11 @@ class Pipeline {
  public:
   /// @param limits  from which size on frames are rendered in tiles, which bounds their memory: see is_tiled
   explicit Pipeline(Executor& executor, const TileLimits& limits = {})
-      : executor_(executor), limits_(limits), noise_reducer_(executor), tiles_(executor, limits) {}
+      : executor_(executor),
+        limits_(limits),
+        noise_reducer_(executor),
+        pixel_reducer_(executor),
+        tiles_(executor, limits) {}
 
   /// Renders a frame to `out`, an image of the planned size and sample type: see make_picture(). Images that are
   /// cropped or shrunk allocate memory for the image before that.
@@ -76,6 +81,7 @@ class Pipeline {
   Executor& executor_;
   TileLimits limits_;
   NoiseReducer noise_reducer_;
+  PixelNoiseReducer pixel_reducer_;
   TileRenderer tiles_;
   std::unique_ptr<RawToRgb> kernel_;
   int kernel_width_ = 0;

@@ -6,6 +6,8 @@
 #include "isp/pipeline/render/frame_needs.h"
 #include "isp/pipeline/render/level_parts.h"
 #include "isp/pipeline/render/noise_reducer.h"
+#include "isp/pipeline/render/pixel_cells.h"
+#include "isp/pipeline/render/pixel_noise_reducer.h"
 #include "isp/pipeline/render/tile_renderer.h"
 #include "isp/raw/kernel/raw_to_rgb.h"
 
@@ -21,7 +23,10 @@ std::size_t whole_frame_bytes(const RawDn& raw, const DevelopPlan& plan, int thr
   if (plan.options.half) out += 3 * sizeof(float) * area(plan.width, plan.height);
   if (plan.rendering.profile) out += 3 * sizeof(float) * area(plan.width, plan.height);
   if (plan.from_codes) return out;
-  if (raw.layout == SensorLayout::linear_rgb) return out + 3 * plane;
+  if (!is_mosaic(raw)) {
+    return out + static_cast<std::size_t>(planes_of(raw)) * plane +
+           PixelNoiseReducer::bytes(raw, plan.noise_reduction, threads);
+  }
   out += plane;
   if (!plan.noise_reduction.reduces()) return out;
   const bool maps = keeps_maps(plan);

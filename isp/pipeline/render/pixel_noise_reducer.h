@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "isp/base/executor.h"
+#include "isp/base/frame.h"
+#include "isp/base/plane.h"
+#include "isp/pipeline/noise_reduction.h"
+#include "isp/pipeline/render/frame_tiles.h"
+#include "isp/pipeline/render/noise_reducer.h"
+
+namespace lowlux::isp {
+
+/// Reduces the noise of frames that are no mosaics, in cells of pixel_cells.h, tile by tile. The memory for the cells
+/// is that of one tile; the first frame of a size allocates.
+class PixelNoiseReducer {
+ public:
+  /// @param side_px  maximum side of a tile's core, in sites: see TileLimits
+  explicit PixelNoiseReducer(Executor& executor, int side_px = TileLimits{}.side_px)
+      : executor_(executor), side_px_(side_px) {}
+
+  /// Reduces the noise of the planes of a frame, which are fractions of white.
+  /// @param planes  three, or one
+  /// @param noise   does the work
+  /// Precondition: how.level, how.cell_e.
+  void run(std::span<Plane<float>> planes, const NoiseReduction& how, NoiseReducer& noise);
+
+  /// Returns the bytes for a frame of width x height pixels, those of the NoiseReducer included.
+  static std::size_t bytes(const RawDn& raw, const NoiseReduction& how, int threads);
+
+ private:
+  Executor& executor_;
+  int side_px_;
+  std::array<Plane<float>, 3> clean_;
+  Plane<float> cells_;        // of a tile and its margin
+  Plane<float> clean_cells_;  // likewise
+};
+
+}  // namespace lowlux::isp
