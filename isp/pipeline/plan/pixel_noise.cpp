@@ -88,15 +88,18 @@ denoise::NoiseCheck check_pixels(const RawFrame& frame, const RawLevels& levels,
   std::array<Plane<float>, 3> planes;
   const auto used = static_cast<std::size_t>(planes_of(frame.raw));
   for (std::size_t c = 0; c < used; ++c) planes[c] = Plane<float>(width, height);
+  const NoiseRatioView of_frame = view_of(frame.noise_ratio.get());
   for (int i = 0; i < count; ++i) {
     const std::array<PlaneView<float>, 3> views{planes[0].view(), planes[1].view(), planes[2].view()};
     const std::array<PlaneView<const float>, 3> pixels{views[0], views[1], views[2]};
-    read_pixels(frame, levels, parts[static_cast<std::size_t>(i)], std::span(views).first(used), executor);
-    make_cells(std::span(pixels).first(used), cell.cell_e, cells.view().crop(0, 2 * height * i, 2 * width, 2 * height),
-               executor);
+    const Rect& part = parts[static_cast<std::size_t>(i)];
+    read_pixels(frame, levels, part, std::span(views).first(used), executor);
+    make_cells(std::span(pixels).first(used),
+               {cell.cell_e, cell.noise.variance_e2[1], of_frame.from(part.x, part.y), 0, height * i},
+               cells.view().crop(0, 2 * height * i, 2 * width, 2 * height), executor);
   }
   NoiseRatio of_sample;
-  NoiseRatioView ratio = view_of(frame.noise_ratio.get());
+  NoiseRatioView ratio = of_frame;
   if (frame.noise_ratio && count > 1) {
     of_sample = sample_ratio(ratio, parts);
     ratio = view_of(&of_sample);

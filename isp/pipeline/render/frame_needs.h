@@ -39,7 +39,8 @@ inline bool needs_seeing_map(const DevelopPlan& plan) {
 }
 
 inline bool keeps_maps(const DevelopPlan& plan) {
-  return plan.noise_reduction.has_level() && !plan.noise_reduction.cell_e && (plan.options.denoise.maps || needs_noise(plan));
+  return plan.noise_reduction.has_level() && !plan.noise_reduction.cell_e &&
+         (plan.options.denoise.maps || needs_noise(plan));
 }
 
 }  // namespace lowlux::isp

@@ -80,7 +80,12 @@ void PixelNoiseReducer::run(std::span<Plane<float>> planes, const NoiseReduction
     }
     const PlaneView<float> in = cells_.view().crop(0, 0, whole.width, whole.height);
     const PlaneView<float> out = clean_cells_.view().crop(0, 0, whole.width, whole.height);
-    make_cells(std::span(noisy).first(planes.size()), *how.cell_e, in, executor_);
+    CellCharge charge{.cell_e = *how.cell_e,
+                      .noise_ratio = view_of(how.noise_ratio.get()).from(from.x, from.y),
+                      .x = from.x,
+                      .y = from.y};
+    if (planes.size() == 3) charge.half_variance_e2 = how.noise.variance_e2[1];
+    make_cells(std::span(noisy).first(planes.size()), charge, in, executor_);
     noise.run_piece({core, whole, width, height, BayerPhase::rggb}, of_sites, in, out);
     const PlaneView<float> kept = out.crop(core.x - whole.x, core.y - whole.y, core.width, core.height);
     join_cells(kept, *how.cell_e, std::span(clean).first(planes.size()), executor_);
