@@ -152,7 +152,9 @@ Result<NoiseReduction> plan_pixel_noise(const RawFrame& frame, const Thumbnail& 
   if (request.choice.maps) out.warnings.emplace_back("noise maps are made of Bayer mosaics only, and this is none");
   const denoise::NoiseCheck check = check_pixels(frame, levels, checked, executor);
   out.options.variance_scale = denoise::variance_scale_of(check);
-  add_remarks(check, *frame.noise, out.warnings);
+  NoiseProfile model = *frame.noise;
+  model.reduced = model.reduced || frame.raw.from_x_trans;  // interpolation leaves less noise on fine scales
+  add_remarks(check, model, out.warnings);
   return out;
 }
 
