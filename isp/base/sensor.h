@@ -26,10 +26,12 @@ struct SensorModel {
   double white_level_dn = 4095;     // largest code the converter gives
   Quantisation quantisation = Quantisation::round;
 
-  /// Mean dark current at dark_temperature_c; it doubles every dark_doubling_c degrees.
+  /// Mean dark current at dark_temperature_c; the part above the floor follows isp::dark_current_factor.
   std::array<double, 3> dark_current_e_per_s{};
   double dark_temperature_c = 20;
-  double dark_doubling_c = 7;
+  double dark_doubling_c = 7;     // degrees over which it doubles, unless there is an activation energy
+  double dark_activation_ev = 0;  // E_a of an Arrhenius law, which replaces the doubling; 0: none
+  double dark_floor_e_per_s = 0;  // part of the current of all channels that is the same at every temperature
 
   double prnu = 0;                // standard deviation of the pixels' sensitivity, relative to its mean
   double dsnu = 0;                // standard deviation of the pixels' dark current, relative to its mean

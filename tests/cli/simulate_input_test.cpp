@@ -88,6 +88,8 @@ TEST_F(SimulateInput, ImpossibleSensorsAreRefused) {
                 {{"--dark-current", "1,2,-3"}, "dark current of blue"},
                 {{"--dark-current", "1,2"}, "neither one number nor three"},
                 {{"--dark-current", "1", "--dark-doubling", "0"}, "double"},
+                {{"--dark-current", "1", "--dark-activation", "3"}, "0.01 and 2 eV, found 3"},
+                {{"--dark-current", "1", "--dark-floor", "1.5"}, "1 e-/s, found 1.5"},
                 {{"--prnu", "-0.1"}, "photo response"},
                 {{"--prnu", "1.1"}, "at most 1"},
                 {{"--dsnu", "nan"}, "--dsnu"},

@@ -94,6 +94,7 @@ TEST_F(Simulate, EveryOptionOfTheHelpWorks) {
        "--quantise",
        "floor"},
       {"--white-luminance", "20", "--size", "64x48", "--force"},
+      {"--dark-current", "2", "--dark-activation", "0.6", "--dark-floor", "0.5"},
       {"--frames", "2", "--shake", "3", "--roll", "1", "--dither", "0.5", "--bracket", "0,-1", "--reduce", "3"},
       {"--frames", "2", "--stars", "9", "--field-rotation", "1", "--field-centre", "10,-5.5", "--drift", "0.5,-1",
        "--horizon", "30", "--movers", "1", "--mover-size", "9.5", "--mover-speed", "2"},

@@ -54,6 +54,15 @@ TEST(GivenFigures, WhatMultipliesDarkCurrentNeedsDarkCurrent) {
     given.dark_current_e_per_s = {0, 0.5, 0};
     EXPECT_TRUE(check(given));
   }
+  SensorFigures activation, floor;
+  activation.dark_activation_ev = 0.6;
+  floor.dark_floor_e_per_s = 0.1;
+  expect_refused(activation, "--dark-activation does nothing without --dark-current");
+  expect_refused(floor, "--dark-floor does nothing without --dark-current");
+  activation.dark_current_e_per_s = {1, 1, 1};
+  EXPECT_TRUE(check(activation));
+  activation.dark_doubling_c = 6;
+  expect_refused(activation, "--dark-doubling does nothing without --dark-activation 0");
   dsnu.dsnu = 0;
   EXPECT_TRUE(check(dsnu)) << "it says that there is none";
 }

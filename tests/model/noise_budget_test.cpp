@@ -56,6 +56,27 @@ TEST(NoiseBudget, DarkCurrentDoublesWithEveryDoublingTemperature) {
   EXPECT_EQ(dark_mean_e(s, {0, 60}), (std::array<double, 3>{0, 0, 0}));
 }
 
+TEST(NoiseBudget, DarkCurrentAboveItsFloorFollowsArrhenius) {
+  SensorModel s = good_sensor();
+  s.dark_current_e_per_s = {3, 5, 7};
+  s.dark_activation_ev = 0.6;
+  EXPECT_EQ(dark_current_factor(s, 20), 1);
+  // E_a / k = 6962.7109 K from CODATA 2018; 20 to 30 C and 20 to -40 C.
+  EXPECT_NEAR(dark_current_factor(s, 30), std::exp(6962.7109 * (1 / 293.15 - 1 / 303.15)), 1e-7);
+  EXPECT_NEAR(dark_current_factor(s, -40), std::exp(6962.7109 * (1 / 293.15 - 1 / 233.15)), 1e-8);
+  // The product of the factors of two steps is that of both.
+  SensorModel at_30 = s;
+  at_30.dark_temperature_c = 30;
+  EXPECT_NEAR(dark_current_factor(s, 30) * dark_current_factor(at_30, 55) / dark_current_factor(s, 55), 1, 1e-14);
+  s.dark_floor_e_per_s = 3;
+  const auto warm = dark_mean_e(s, {2, 30});
+  EXPECT_EQ(warm[0], 6) << "red is at its floor";
+  EXPECT_NEAR(warm[1], 6 + 4 * dark_current_factor(s, 30), 1e-12);
+  EXPECT_NEAR(warm[2], 6 + 8 * dark_current_factor(s, 30), 1e-12);
+  for (const double mean_e : dark_mean_e(s, {2, -100})) EXPECT_NEAR(mean_e, 6, 1e-5);
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(dark_mean_e(s, {1, 20})[k], s.dark_current_e_per_s[k]);
+}
+
 TEST(NoiseBudget, ThePixelSaturatesAtTheLesserOfFullWellAndConverter) {
   SensorModel s = good_sensor();
   EXPECT_EQ(saturation_charge_e(s), 4095 - 256);
@@ -81,6 +102,8 @@ TEST(CheckSensor, PassesBothEndsOfEveryRangeAndNothingBeyond) {
       {"white level", &SensorModel::white_level_dn, {257, 4095}, {256, 100, 4094.5, 4095.001, nan, inf, -inf}},
       {"dark temperature", &SensorModel::dark_temperature_c, {-200, 200}, {-200.1, 200.1, nan, inf}},
       {"dark doubling", &SensorModel::dark_doubling_c, {1, 1000}, {0.999, 1000.1, 0, -7, nan, inf}},
+      {"dark activation", &SensorModel::dark_activation_ev, {0, 0.01, 2}, {0.009, 2.001, -0.6, nan, inf, -inf}},
+      {"dark floor", &SensorModel::dark_floor_e_per_s, {0}, {-1e-300, 1e-300, nan, inf, -inf}},
       {"prnu", &SensorModel::prnu, good_fraction, bad_fraction},
       {"dsnu", &SensorModel::dsnu, good_fraction, bad_fraction},
       {"hot pixel fraction", &SensorModel::hot_pixel_fraction, good_fraction, bad_fraction},
@@ -120,6 +143,16 @@ TEST(CheckSensor, LooksAtTheDarkCurrentOfEachChannelAndAtTheBits) {
     s.white_level_dn = 1;
     EXPECT_EQ(static_cast<bool>(check_sensor(s)), possible) << bits;
   }
+}
+
+TEST(CheckSensor, TheFloorIsNoMoreThanTheLeastDarkCurrent) {
+  SensorModel s = good_sensor();
+  s.dark_current_e_per_s = {3, 2, 5};
+  s.dark_floor_e_per_s = 2;
+  EXPECT_TRUE(check_sensor(s));
+  s.dark_floor_e_per_s = 2.001;
+  ASSERT_FALSE(check_sensor(s));
+  EXPECT_NE(check_sensor(s).error().message.find("2 e-/s, found 2.001"), std::string::npos);
 }
 
 TEST(CheckSensor, NamesWhatIsWrongAndWhatItFound) {

@@ -105,6 +105,8 @@ TEST(SensorDb, FiguresGivenTakeThePlaceOfTheTablesAndOfAssumptions) {
   EXPECT_EQ(m.dark_current_e_per_s, (std::array<double, 3>{1, 2, 3}));
   EXPECT_EQ(m.dark_temperature_c, 5);
   EXPECT_EQ(m.dark_doubling_c, 6);
+  EXPECT_EQ(m.dark_activation_ev, 0);
+  EXPECT_EQ(m.dark_floor_e_per_s, 0);
   EXPECT_EQ(m.prnu, 0.01);
   EXPECT_EQ(m.dsnu, 0.02);
   EXPECT_EQ(m.hot_pixel_fraction, 0.03);
@@ -118,6 +120,19 @@ TEST(SensorDb, FiguresGivenTakeThePlaceOfTheTablesAndOfAssumptions) {
   EXPECT_TRUE(sensor->iso_given);
   EXPECT_EQ(sensor->camera, "Canon_EOS_600D");
   EXPECT_TRUE(sensor->assumptions.empty()) << sensor->assumptions.front();
+}
+
+TEST(SensorDb, AnActivationEnergyLeavesNothingToAssumeOfTheDoubling) {
+  SensorFigures given;
+  given.dark_current_e_per_s = {1, 2, 3};
+  EXPECT_TRUE(assumes(*sensor_named("ELD_NikonD850", "ISO 100", given), "doubles every 7 C"));
+  given.dark_activation_ev = 0.6;
+  given.dark_floor_e_per_s = 0.5;
+  const auto sensor = sensor_named("ELD_NikonD850", "ISO 100", given);
+  ASSERT_TRUE(sensor);
+  EXPECT_FALSE(assumes(*sensor, "doubles"));
+  EXPECT_EQ(sensor->model.dark_activation_ev, 0.6);
+  EXPECT_EQ(sensor->model.dark_floor_e_per_s, 0.5);
 }
 
 TEST(SensorDb, SettingsAreFoundByTheirNumberInAnyCase) {

@@ -31,6 +31,8 @@ constexpr std::array all_settings{
     Setting{"dark_current_e_per_s", "--dark-current", SettingKind::number},
     Setting{"dark_temperature_c", "--dark-temperature", SettingKind::number},
     Setting{"dark_doubling_c", "--dark-doubling", SettingKind::number},
+    Setting{"dark_activation_ev", "--dark-activation", SettingKind::number},
+    Setting{"dark_floor_e_per_s", "--dark-floor", SettingKind::number},
     Setting{"prnu", "--prnu", SettingKind::number},
     Setting{"dsnu", "--dsnu", SettingKind::number},
     Setting{"hot_pixel_fraction", "--hot-pixels", SettingKind::number},

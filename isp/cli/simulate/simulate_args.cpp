@@ -162,6 +162,9 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
       ->group("Sensor figures");
   figure("--dark-temperature", "C", "at which the dark current is that", f.dark_temperature_c);
   figure("--dark-doubling", "C", "degrees over which it doubles", f.dark_doubling_c);
+  figure("--dark-activation", "EV", "activation energy: an Arrhenius law in place of the doubling",
+         f.dark_activation_ev);
+  figure("--dark-floor", "E_PER_S", "part of it that is the same at every temperature", f.dark_floor_e_per_s);
   figure("--prnu", "RATIO", "photo response non-uniformity", f.prnu);
   figure("--dsnu", "RATIO", "dark signal non-uniformity, of the dark current", f.dsnu);
   figure("--hot-pixels", "RATIO", "fraction of pixels that are hot", f.hot_pixel_fraction);

@@ -66,6 +66,8 @@ Json sensor_json(const isp::NamedSensor& sensor) {
           {"dark_current_e_per_s", m.dark_current_e_per_s},
           {"dark_temperature_c", m.dark_temperature_c},
           {"dark_doubling_c", m.dark_doubling_c},
+          {"dark_activation_ev", m.dark_activation_ev},
+          {"dark_floor_e_per_s", m.dark_floor_e_per_s},
           {"prnu", m.prnu},
           {"dsnu", m.dsnu},
           {"hot_pixel_fraction", m.hot_pixel_fraction},

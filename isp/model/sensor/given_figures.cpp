@@ -30,6 +30,10 @@ Result<void> check_given_figures(const SensorFigures& given, const NamedSensor& 
       {positive(given.dsnu) && no_dark, "--dsnu", "--dark-current", no_dark_current},
       {given.dark_temperature_c && no_dark, "--dark-temperature", "--dark-current", no_dark_current},
       {given.dark_doubling_c && no_dark, "--dark-doubling", "--dark-current", no_dark_current},
+      {positive(given.dark_activation_ev) && no_dark, "--dark-activation", "--dark-current", no_dark_current},
+      {positive(given.dark_floor_e_per_s) && no_dark, "--dark-floor", "--dark-current", no_dark_current},
+      {given.dark_doubling_c && positive(given.dark_activation_ev), "--dark-doubling", "--dark-activation 0",
+       "an activation energy replaces the doubling"},
       {given.pixel_pitch_um && no_pitch, "--pixel-pitch", "--peak-qe",
        "no source gives the sensor's quantum efficiency"},
   };

@@ -7,7 +7,8 @@
 namespace lowlux::isp {
 
 /// Rejects figures that would have no effect, because another one they depend on is missing: hot pixels without their
-/// dark current and vice versa; DSNU, or the dark current's temperature or doubling, of a sensor without dark current;
+/// dark current and vice versa; DSNU, or the dark current's temperature, doubling, activation energy or floor, of a
+/// sensor without dark current; a doubling next to an activation energy;
 /// a pixel pitch without peak quantum efficiency, unless the luminance that fills a pixel is given. A fraction of 0
 /// states that there is no such effect, and depends on nothing.
 /// @param sensor  made by sensor_named() of these figures

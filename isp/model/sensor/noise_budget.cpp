@@ -19,6 +19,28 @@ struct Named {
 
 std::string six_digits(double value) { return number_text(value, 6); }
 
+/// Rejects a law of the dark current that no sensor follows.
+Result<void> check_dark_law(const SensorModel& s) {
+  const auto wrong = [&](const std::string& what) { return fail(ErrorCode::invalid_argument, what, s.name); };
+  if (!(s.dark_doubling_c >= 1) || !(s.dark_doubling_c <= 1e3)) {
+    return wrong("the dark current must double every 1 to 1000 degrees, found " + six_digits(s.dark_doubling_c));
+  }
+  if (!(std::fabs(s.dark_temperature_c) <= 200)) {
+    return wrong("the temperature of the dark current must lie between -200 and 200 C, found " +
+                 six_digits(s.dark_temperature_c));
+  }
+  if (s.dark_activation_ev != 0 && !(s.dark_activation_ev >= 0.01 && s.dark_activation_ev <= 2)) {
+    return wrong("the activation energy of the dark current must be 0 or between 0.01 and 2 eV, found " +
+                 six_digits(s.dark_activation_ev));
+  }
+  const double least = *std::ranges::min_element(s.dark_current_e_per_s);
+  if (!(s.dark_floor_e_per_s >= 0) || !(s.dark_floor_e_per_s <= least)) {
+    return wrong("the floor of the dark current must lie between 0 and the least channel's current, " +
+                 six_digits(least) + " e-/s, found " + six_digits(s.dark_floor_e_per_s));
+  }
+  return {};
+}
+
 Result<void> check_not_negative(const SensorModel& s) {
   for (const Named& figure : std::initializer_list<Named>{{"read noise", s.read_noise_e},
                                                           {"dark current of red", s.dark_current_e_per_s[0]},
@@ -80,14 +102,7 @@ Result<void> check_sensor(const SensorModel& s) {
     if (share.value > 1)
       return wrong(std::string("the ") + share.name + " is at most 1, found " + six_digits(share.value));
   }
-  if (!(s.dark_doubling_c >= 1) || !(s.dark_doubling_c <= 1e3)) {
-    return wrong("the dark current must double every 1 to 1000 degrees, found " + six_digits(s.dark_doubling_c));
-  }
-  if (!(std::fabs(s.dark_temperature_c) <= 200)) {
-    return wrong("the temperature of the dark current must lie between -200 and 200 C, found " +
-                 six_digits(s.dark_temperature_c));
-  }
-  return {};
+  return check_dark_law(s);
 }
 
 Result<void> check_exposure(const Exposure& exposure) {
@@ -103,13 +118,20 @@ Result<void> check_exposure(const Exposure& exposure) {
 }
 
 double dark_current_factor(const SensorModel& sensor, double temperature_c) {
+  if (sensor.dark_activation_ev > 0) {
+    const double t_k = temperature_c + zero_celsius_k, reference_k = sensor.dark_temperature_c + zero_celsius_k;
+    return std::exp(sensor.dark_activation_ev / boltzmann_ev_per_k * (t_k - reference_k) / (t_k * reference_k));
+  }
   return std::exp2((temperature_c - sensor.dark_temperature_c) / sensor.dark_doubling_c);
 }
 
 std::array<double, 3> dark_mean_e(const SensorModel& sensor, const Exposure& exposure) {
   const double factor = exposure.time_s * dark_current_factor(sensor, exposure.temperature_c);
   std::array<double, 3> mean{};
-  for (int k = 0; k < 3; ++k) mean[k] = sensor.dark_current_e_per_s[k] * factor;
+  const double floor_e = sensor.dark_floor_e_per_s * exposure.time_s;
+  for (int k = 0; k < 3; ++k) {
+    mean[k] = (sensor.dark_current_e_per_s[k] - sensor.dark_floor_e_per_s) * factor + floor_e;
+  }
   return mean;
 }
 

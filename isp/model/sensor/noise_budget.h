@@ -28,10 +28,16 @@ struct Exposure {
 /// Returns an error unless the time is finite and not negative and the temperature within -100..150 C.
 Result<void> check_exposure(const Exposure& exposure);
 
-/// Returns the factor of dark current against the sensor's reference temperature: 2^((T - T_ref) / dT).
+inline constexpr double boltzmann_ev_per_k = 1.380649e-23 / 1.602176634e-19;  // k / e, exact in the SI since 2019
+inline constexpr double zero_celsius_k = 273.15;
+
+/// Returns the factor of dark current above the floor against the sensor's reference temperature: with an activation
+/// energy, the Arrhenius law exp(-(E_a / k) (1 / T - 1 / T_ref)), T in kelvin (Widenhorn and others 2002, without
+/// the slow power of T); else 2^((T - T_ref) / dT).
 double dark_current_factor(const SensorModel& sensor, double temperature_c);
 
-/// Returns the mean dark charge of R, G, B pixels that are not hot [e-].
+/// Returns the mean dark charge of R, G, B pixels that are not hot [e-]: time (floor + (D - floor) factor), with D the
+/// current at the reference temperature.
 std::array<double, 3> dark_mean_e(const SensorModel& sensor, const Exposure& exposure);
 
 /// Returns the charge at which a pixel reads the largest code: its full well or the converter's range, whichever is

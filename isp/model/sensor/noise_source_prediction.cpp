@@ -188,7 +188,7 @@ ChannelChange channel_change(const SensorModel& s, const Charge& q, NoiseSourceS
 
 Charge charge_of(const SensorModel& s, const Exposure& exposure, int channel, double signal_e) {
   const double time_factor = exposure.time_s * dark_current_factor(s, exposure.temperature_c);
-  return {signal_e, s.dark_current_e_per_s[channel] * time_factor, s.hot_pixel_current_e_per_s * time_factor};
+  return {signal_e, dark_mean_e(s, exposure)[channel], s.hot_pixel_current_e_per_s * time_factor};
 }
 
 Lab lab_of_dn(const SensorModel& s, const Developing& developing, const Vector3& dn) {

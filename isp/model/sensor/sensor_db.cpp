@@ -139,9 +139,11 @@ void take_dark_current(NamedSensor& out, int row, const SensorFigures& given) {
   const auto at = given.dark_temperature_c ? given.dark_temperature_c : t.number(row, "dark_temperature_C");
   m.dark_temperature_c = at.value_or(20);
   if (!at) out.assumptions.emplace_back("the dark current is that at 20 C");
+  m.dark_floor_e_per_s = given.dark_floor_e_per_s.value_or(0);
+  m.dark_activation_ev = given.dark_activation_ev.value_or(0);
   const auto doubling = given.dark_doubling_c ? given.dark_doubling_c : t.number(row, "doubling_temperature_C");
   m.dark_doubling_c = doubling.value_or(7);
-  if (!doubling) out.assumptions.emplace_back("the dark current doubles every 7 C");
+  if (!doubling && m.dark_activation_ev == 0) out.assumptions.emplace_back("the dark current doubles every 7 C");
 }
 
 void take_fixed_pattern(NamedSensor& out, const SensorFigures& given) {

@@ -22,6 +22,8 @@ struct SensorFigures {
   std::optional<std::array<double, 3>> dark_current_e_per_s;
   std::optional<double> dark_temperature_c;
   std::optional<double> dark_doubling_c;
+  std::optional<double> dark_activation_ev;
+  std::optional<double> dark_floor_e_per_s;
   std::optional<double> prnu;
   std::optional<double> dsnu;
   std::optional<double> hot_pixel_fraction;

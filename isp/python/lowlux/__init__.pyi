@@ -327,6 +327,8 @@ def simulate(
     dark_current: Union[str, float, _Numbers, None] = ...,
     dark_temperature: Optional[float] = ...,
     dark_doubling: Optional[float] = ...,
+    dark_activation: Optional[float] = ...,
+    dark_floor: Optional[float] = ...,
     prnu: Optional[float] = ...,
     dsnu: Optional[float] = ...,
     hot_pixels: Optional[float] = ...,
