@@ -115,8 +115,10 @@ void ExposedSensor::choose_storage() {
   if (!clipped) {
     const double steady =
         s.read_noise_e * s.read_noise_e + s.row_noise_e * s.row_noise_e + s.column_noise_e * s.column_noise_e;
+    const double telegraph_e = isp::telegraph_variance_e2(s) > 0 ? 0.5 * hottest * s.telegraph_e : 0;
     const double noise_dn = s.system_gain_dn_per_e * std::sqrt(steady);
-    storage_.offset_dn = std::max(0.0, std::ceil(pedestal_sigmas * noise_dn - s.black_level_dn));
+    storage_.offset_dn =
+        std::max(0.0, std::ceil(pedestal_sigmas * noise_dn + s.system_gain_dn_per_e * telegraph_e - s.black_level_dn));
   }
   if (!quantised) storage_.scale = std::max(1, static_cast<int>(65535 / (s.white_level_dn + storage_.offset_dn)));
 }
@@ -171,6 +173,7 @@ std::optional<NoiseProfile> ExposedSensor::noise_profile() const {
   double offset_dn2 = kept.has(Effect::quantisation) ? quantisation_dn2 : 0;
   if (kept.has(Effect::read_noise)) offset_dn2 += k * k * s.read_noise_e * s.read_noise_e;
   if (kept.has(Effect::row_noise)) offset_dn2 += k * k * s.row_noise_e * s.row_noise_e;
+  if (kept.has(Effect::telegraph_noise)) offset_dn2 += k * k * isp::telegraph_variance_e2(s);
   NoiseProfile out;
   out.scale.fill(k / range);
   out.offset.fill(offset_dn2 / (range * range));

@@ -33,6 +33,15 @@ void find_hot_pixels(const PatternRow& row, double fraction, std::span<std::uint
 /// Adds the column pattern to a row of offsets [e-].
 void add_column_pattern(const PatternRow& row, float deviation_e, std::span<float> offset_e, std::span<float> scratch);
 
+/// Adds random telegraph noise to a row of offsets [e-]: a fraction of the pixels, a fixed pattern, has a trap in its
+/// transistor, which moves the level between +A/2 and -A/2, with A exponentially distributed. The trap is captured in
+/// half of the frames, drawn for each frame by itself: frames are farther apart than the time constants of most traps.
+/// The read-noise histogram of the sensor gets exponential tails (Wang and others 2006).
+/// @param seed, frame  of the frame
+/// @param mean_e       mean of A
+void add_telegraph_noise(const PatternRow& row, std::uint64_t seed, std::uint32_t frame, double fraction, double mean_e,
+                         std::span<float> offset_e, std::span<std::uint32_t> scratch);
+
 /// Returns the offset of one row of one frame [e-].
 float row_offset_e(std::uint64_t seed, std::uint32_t frame, std::uint32_t y, float deviation_e);
 

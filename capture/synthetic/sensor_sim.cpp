@@ -87,15 +87,21 @@ class RowReadout {
   }
 
   std::span<const float> fill_offset(const Run& run, NoiseSourceSet kept, Scratch& s) const {
-    if (!kept.has(Effect::row_noise) && !kept.has(Effect::column_noise)) return {};
+    const SensorModel& sensor = frame_.sensor;
+    const bool telegraph = kept.has(Effect::telegraph_noise) && isp::telegraph_variance_e2(sensor) > 0;
+    if (!kept.has(Effect::row_noise) && !kept.has(Effect::column_noise) && !telegraph) return {};
     const auto offset = std::span(s.offset).first(run.size());
     const float row = kept.has(Effect::row_noise)
                           ? row_offset_e(frame_.seed, frame_.frame, static_cast<std::uint32_t>(run.y),
-                                         static_cast<float>(frame_.sensor.row_noise_e))
+                                         static_cast<float>(sensor.row_noise_e))
                           : 0;
     std::fill(offset.begin(), offset.end(), row);
     if (kept.has(Effect::column_noise)) {
-      add_column_pattern(pattern(run), static_cast<float>(frame_.sensor.column_noise_e), offset, s.normal);
+      add_column_pattern(pattern(run), static_cast<float>(sensor.column_noise_e), offset, s.normal);
+    }
+    if (telegraph) {
+      add_telegraph_noise(pattern(run), frame_.seed, frame_.frame, sensor.telegraph_fraction, sensor.telegraph_e,
+                          offset, s.words);
     }
     return offset;
   }

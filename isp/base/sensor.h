@@ -37,9 +37,12 @@ struct SensorModel {
   double dsnu = 0;                // standard deviation of the pixels' dark current, relative to its mean
   double hot_pixel_fraction = 0;  // fraction of all pixels
   double hot_pixel_current_e_per_s =
-      0;                      // mean of their extra dark current, exponentially distributed; same temperature law
-  double row_noise_e = 0;     // standard deviation of an offset drawn for each row of each frame
-  double column_noise_e = 0;  // standard deviation of an offset drawn for each column, the same in all frames
+      0;  // mean of their extra dark current, exponentially distributed; same temperature law
+  /// Random telegraph noise: a trap in the transistor of a pixel moves its signal between two levels.
+  double telegraph_fraction = 0;  // fraction of all pixels that have a trap
+  double telegraph_e = 0;         // mean distance of the levels, exponentially distributed
+  double row_noise_e = 0;         // standard deviation of an offset drawn for each row of each frame
+  double column_noise_e = 0;      // standard deviation of an offset drawn for each column, the same in all frames
 };
 
 /// Describes the response of the sensor to light: electrons in one pixel for radiance in front of the camera.

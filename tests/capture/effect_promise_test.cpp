@@ -62,6 +62,8 @@ isp::NamedSensor draw_sensor(Draws& draws) {
   figures.hot_pixel_current_e_per_s = draws.log_uniform(1, 1e4);
   figures.row_noise_e = draws.log_uniform(0.01, 3);
   figures.column_noise_e = draws.log_uniform(0.01, 3);
+  figures.telegraph_fraction = draws.log_uniform(1e-4, 1);
+  figures.telegraph_e = draws.log_uniform(0.1, 30);
   auto sensor = *isp::sensor_named(name, gain, figures);
   if (sensor.model.dark_current_e_per_s[1] == 0) sensor.model.dark_current_e_per_s.fill(draws.log_uniform(0.01, 100));
   return sensor;

@@ -126,6 +126,33 @@ TEST(FixedPattern, NoPixelIsHotAtAFractionOfZeroAndAllAreAtOne) {
   EXPECT_EQ(std::count(charge.begin(), charge.end(), 0.0f), 0);
 }
 
+TEST(Telegraph, HasVarianceAndKurtosisOfItsLawAndTheSamePixelsInAllFrames) {
+  SensorModel s = quiet_sensor();
+  s.telegraph_fraction = 0.2;
+  s.telegraph_e = 40;
+  const double f = s.telegraph_fraction, a = s.telegraph_e, n = width * height;
+  const Plane<float> first = pattern(s, {Effect::telegraph_noise}, 0, 3, 0);
+  const Plane<float> second = pattern(s, {Effect::telegraph_noise}, 0, 3, 1);
+  double sum = 0, square = 0, fourth = 0, differ = 0, traps = 0;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const double z = first.data()[i] - 1000;
+    ASSERT_NEAR(std::fabs(z), std::fabs(second.data()[i] - 1000), 1e-3) << "only the state changes";
+    traps += z != 0;
+    differ += first.data()[i] != second.data()[i];
+    sum += z / n;
+    square += z * z / n;
+    fourth += z * z * z * z / n;
+  }
+  // E[A^j] = j! a^j, so E[z^j] = f j! (a/2)^j for even j.
+  const auto moment = [&](int j) { return f * std::tgamma(j + 1) * std::pow(a / 2, j); };
+  EXPECT_NEAR(sum, 0, 5 * std::sqrt(moment(2) / n));
+  EXPECT_NEAR(square, isp::telegraph_variance_e2(s), 5 * std::sqrt((moment(4) - moment(2) * moment(2)) / n));
+  EXPECT_NEAR(fourth, moment(4), 5 * std::sqrt((moment(8) - moment(4) * moment(4)) / n));
+  EXPECT_NEAR(traps / n, f, 5 * std::sqrt(f * (1 - f) / n));
+  EXPECT_NEAR(differ / traps, 0.5, 5 * std::sqrt(0.25 / traps));
+  EXPECT_FALSE(same(first, pattern(s, {Effect::telegraph_noise}, 0, 4, 0))) << "another sensor";
+}
+
 std::vector<double> first_column(const Plane<float>& plane) {
   std::vector<double> out;
   for (int y = 0; y < plane.height(); ++y) out.push_back(plane.at(0, y));

@@ -95,6 +95,8 @@ TEST_F(SimulateInput, ImpossibleSensorsAreRefused) {
                 {{"--dsnu", "nan"}, "--dsnu"},
                 {{"--hot-pixels", "2"}, "hot pixels"},
                 {{"--hot-current", "-1"}, "hot pixels"},
+                {{"--telegraph-pixels", "2", "--telegraph-noise", "1"}, "at most 1, found 2"},
+                {{"--telegraph-noise", "-1"}, "telegraph noise"},
                 {{"--row-noise", "-1"}, "row noise"},
                 {{"--column-noise", "inf"}, "--column-noise"},
                 {{"--pixel-pitch", "-4"}, "pixel pitch"},
@@ -110,6 +112,8 @@ TEST_F(SimulateInput, ImpossibleSensorsAreRefused) {
 TEST_F(SimulateInput, OptionsThatWouldDoNothingNameTheOneThatIsMissing) {
   expect_usage({{{"--hot-pixels", "0.001"}, "--hot-pixels does nothing without --hot-current"},
                 {{"--hot-current", "100"}, "--hot-current does nothing without --hot-pixels"},
+                {{"--telegraph-pixels", "0.1"}, "--telegraph-pixels does nothing without --telegraph-noise"},
+                {{"--telegraph-noise", "3"}, "--telegraph-noise does nothing without --telegraph-pixels"},
                 {{"--dsnu", "0.1"}, "--dsnu does nothing without --dark-current"},
                 {{"--dark-temperature", "5"}, "--dark-temperature does nothing without --dark-current"},
                 {{"--dark-doubling", "6"}, "--dark-doubling does nothing without --dark-current"},

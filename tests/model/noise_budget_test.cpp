@@ -108,6 +108,8 @@ TEST(CheckSensor, PassesBothEndsOfEveryRangeAndNothingBeyond) {
       {"dsnu", &SensorModel::dsnu, good_fraction, bad_fraction},
       {"hot pixel fraction", &SensorModel::hot_pixel_fraction, good_fraction, bad_fraction},
       {"hot pixel current", &SensorModel::hot_pixel_current_e_per_s, good_current, bad_current},
+      {"telegraph fraction", &SensorModel::telegraph_fraction, good_fraction, bad_fraction},
+      {"telegraph noise", &SensorModel::telegraph_e, good_noise, bad_noise},
       {"row noise", &SensorModel::row_noise_e, good_noise, bad_noise},
       {"column noise", &SensorModel::column_noise_e, good_noise, bad_noise},
   };

@@ -36,6 +36,8 @@ SensorModel rich_sensor() {
   m.hot_pixel_current_e_per_s = 50;
   m.row_noise_e = 0.8;
   m.column_noise_e = 0.6;
+  m.telegraph_fraction = 0.01;
+  m.telegraph_e = 4;
   return m;
 }
 
@@ -79,6 +81,7 @@ TEST(EffectNames, AreAsManyAsEffectsAllDifferent) {
   EXPECT_EQ(std::set<std::string_view>(names.begin(), names.end()).size(), names.size());
   EXPECT_EQ(names[static_cast<int>(Effect::photon_noise)], "photon-noise");
   EXPECT_EQ(names[static_cast<int>(Effect::column_noise)], "column-noise");
+  EXPECT_EQ(names[static_cast<int>(Effect::telegraph_noise)], "telegraph-noise");
 }
 
 TEST(NoiseSourcePlan, ATinyToleranceKeepsEveryEffectThatIsThere) {

@@ -86,6 +86,8 @@ TEST(SensorDb, FiguresGivenTakeThePlaceOfTheTablesAndOfAssumptions) {
   given.dsnu = 0.02;
   given.hot_pixel_fraction = 0.03;
   given.hot_pixel_current_e_per_s = 40;
+  given.telegraph_fraction = 0.04;
+  given.telegraph_e = 8;
   given.row_noise_e = 0.5;
   given.column_noise_e = 0.6;
   given.pixel_pitch_um = 3.3;
@@ -111,6 +113,8 @@ TEST(SensorDb, FiguresGivenTakeThePlaceOfTheTablesAndOfAssumptions) {
   EXPECT_EQ(m.dsnu, 0.02);
   EXPECT_EQ(m.hot_pixel_fraction, 0.03);
   EXPECT_EQ(m.hot_pixel_current_e_per_s, 40);
+  EXPECT_EQ(m.telegraph_fraction, 0.04);
+  EXPECT_EQ(m.telegraph_e, 8);
   EXPECT_EQ(m.row_noise_e, 0.5);
   EXPECT_EQ(m.column_noise_e, 0.6);
   EXPECT_EQ(m.quantisation, Quantisation::floor);

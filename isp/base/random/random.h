@@ -28,6 +28,8 @@ inline constexpr std::uint32_t risk_probe = 8;           // perturbation of a de
 inline constexpr std::uint32_t code_dither = 9;          // word 0: rounds electrons to codes without bias
 inline constexpr std::uint32_t visual_noise_rods = 10;   // word 0: isomerisations in rods, by cells of 4 pixels
 inline constexpr std::uint32_t visual_noise_cones = 11;  // word 0: isomerisations in cones, by cells of 4 pixels
+inline constexpr std::uint32_t telegraph_noise = 12;     // frame 0: words 0: has a trap, 1: amplitude
+inline constexpr std::uint32_t telegraph_state = 13;     // word 0: state of the trap in a frame
 inline constexpr std::uint32_t wavelength_bin = 16;      // + i, for photons sampled by wavelength
 }  // namespace draw_purpose
 

@@ -37,6 +37,8 @@ constexpr std::array all_settings{
     Setting{"dsnu", "--dsnu", SettingKind::number},
     Setting{"hot_pixel_fraction", "--hot-pixels", SettingKind::number},
     Setting{"hot_pixel_current_e_per_s", "--hot-current", SettingKind::number},
+    Setting{"telegraph_fraction", "--telegraph-pixels", SettingKind::number},
+    Setting{"telegraph_e", "--telegraph-noise", SettingKind::number},
     Setting{"row_noise_e", "--row-noise", SettingKind::number},
     Setting{"column_noise_e", "--column-noise", SettingKind::number},
     Setting{"pixel_pitch_um", "--pixel-pitch", SettingKind::number},

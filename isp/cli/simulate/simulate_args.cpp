@@ -169,6 +169,8 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
   figure("--dsnu", "RATIO", "dark signal non-uniformity, of the dark current", f.dsnu);
   figure("--hot-pixels", "RATIO", "fraction of pixels that are hot", f.hot_pixel_fraction);
   figure("--hot-current", "E_PER_S", "mean dark current of hot pixels", f.hot_pixel_current_e_per_s);
+  figure("--telegraph-pixels", "RATIO", "fraction of pixels with random telegraph noise", f.telegraph_fraction);
+  figure("--telegraph-noise", "E", "mean distance of their two levels", f.telegraph_e);
   figure("--row-noise", "E", "standard deviation", f.row_noise_e);
   figure("--column-noise", "E", "standard deviation", f.column_noise_e);
   figure("--pixel-pitch", "UM", "side of a pixel", f.pixel_pitch_um);

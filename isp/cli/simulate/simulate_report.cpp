@@ -72,6 +72,8 @@ Json sensor_json(const isp::NamedSensor& sensor) {
           {"dsnu", m.dsnu},
           {"hot_pixel_fraction", m.hot_pixel_fraction},
           {"hot_pixel_current_e_per_s", m.hot_pixel_current_e_per_s},
+          {"telegraph_fraction", m.telegraph_fraction},
+          {"telegraph_e", m.telegraph_e},
           {"row_noise_e", m.row_noise_e},
           {"column_noise_e", m.column_noise_e}};
 }
@@ -92,13 +94,13 @@ std::string explain_text(const SimulateArgs& args, const SimulateOutcome& outcom
   auto out = std::back_inserter(text);
   for (const isp::RegionPlan& region : plan.regions) {
     fmt::format_to(out, "{} blocks of {:.3g} to {:.3g} e-\n", region.blocks, region.darkest_e, region.brightest_e);
-    fmt::format_to(out, "  {:<13} {:>10} {:>12}  {:<9} {}\n", "effect", "delta E", "variance", "decision", "because");
+    fmt::format_to(out, "  {:<15} {:>10} {:>12}  {:<9} {}\n", "effect", "delta E", "variance", "decision", "because");
     for (const isp::NoiseSourceDecision& d : region.decisions) {
-      fmt::format_to(out, "  {:<13} {:>10.3g} {:>12.3g}  {:<9} {}\n", name_of(d.effect), d.alone.delta_e,
+      fmt::format_to(out, "  {:<15} {:>10.3g} {:>12.3g}  {:<9} {}\n", name_of(d.effect), d.alone.delta_e,
                      d.alone.relative_variance, d.kept ? "simulate" : "leave out",
                      reason_of(d, args.options.effects.effects));
     }
-    fmt::format_to(out, "  {:<13} {:>10.3g} {:>12.3g}  of {:g} and {:g} tolerated\n", "left out",
+    fmt::format_to(out, "  {:<15} {:>10.3g} {:>12.3g}  of {:g} and {:g} tolerated\n", "left out",
                    region.left_out_together.delta_e, region.left_out_together.relative_variance, plan.tolerance.delta_e,
                    plan.tolerance.relative_variance);
   }
@@ -107,7 +109,7 @@ std::string explain_text(const SimulateArgs& args, const SimulateOutcome& outcom
                  outcome.cost->all_ms);
   for (int i = 0; i < isp::effect_count; ++i) {
     if (!outcome.cost->saved_ms[i]) continue;
-    fmt::format_to(out, "  without {:<13} {:>8.1f} ms less\n", isp::effect_names()[i], *outcome.cost->saved_ms[i]);
+    fmt::format_to(out, "  without {:<15} {:>8.1f} ms less\n", isp::effect_names()[i], *outcome.cost->saved_ms[i]);
   }
   return text;
 }

@@ -50,6 +50,8 @@ Result<void> check_not_negative(const SensorModel& s) {
                                                           {"dark signal non-uniformity", s.dsnu},
                                                           {"fraction of hot pixels", s.hot_pixel_fraction},
                                                           {"dark current of hot pixels", s.hot_pixel_current_e_per_s},
+                                                          {"fraction of telegraph pixels", s.telegraph_fraction},
+                                                          {"telegraph noise", s.telegraph_e},
                                                           {"row noise", s.row_noise_e},
                                                           {"column noise", s.column_noise_e}}) {
     if (!(figure.value >= 0) || !(figure.value <= 1e9)) {
@@ -58,8 +60,10 @@ Result<void> check_not_negative(const SensorModel& s) {
                   s.name);
     }
   }
-  for (const Named& noise : std::initializer_list<Named>{
-           {"read noise", s.read_noise_e}, {"row noise", s.row_noise_e}, {"column noise", s.column_noise_e}}) {
+  for (const Named& noise : std::initializer_list<Named>{{"read noise", s.read_noise_e},
+                                                         {"telegraph noise", s.telegraph_e},
+                                                         {"row noise", s.row_noise_e},
+                                                         {"column noise", s.column_noise_e}}) {
     if (noise.value > largest_noise_e) {
       return fail(ErrorCode::invalid_argument,
                   std::string("the ") + noise.name + " is at most 1e6 e-, found " + six_digits(noise.value), s.name);
@@ -98,7 +102,8 @@ Result<void> check_sensor(const SensorModel& s) {
   }
   for (const Named& share : std::initializer_list<Named>{{"photo response non-uniformity", s.prnu},
                                                          {"dark signal non-uniformity", s.dsnu},
-                                                         {"fraction of hot pixels", s.hot_pixel_fraction}}) {
+                                                         {"fraction of hot pixels", s.hot_pixel_fraction},
+                                                         {"fraction of telegraph pixels", s.telegraph_fraction}}) {
     if (share.value > 1)
       return wrong(std::string("the ") + share.name + " is at most 1, found " + six_digits(share.value));
   }
@@ -133,6 +138,10 @@ std::array<double, 3> dark_mean_e(const SensorModel& sensor, const Exposure& exp
     mean[k] = (sensor.dark_current_e_per_s[k] - sensor.dark_floor_e_per_s) * factor + floor_e;
   }
   return mean;
+}
+
+double telegraph_variance_e2(const SensorModel& sensor) {
+  return 0.5 * sensor.telegraph_fraction * sensor.telegraph_e * sensor.telegraph_e;
 }
 
 double saturation_charge_e(const SensorModel& sensor) {

@@ -40,6 +40,10 @@ double dark_current_factor(const SensorModel& sensor, double temperature_c);
 /// current at the reference temperature.
 std::array<double, 3> dark_mean_e(const SensorModel& sensor, const Exposure& exposure);
 
+/// Returns the variance that telegraph noise adds over all pixels [e-^2]: f a^2 / 2 for a fraction f of pixels at +A/2
+/// or -A/2, with A exponentially distributed of mean a. The fourth moment is 3 f a^4 / 2.
+double telegraph_variance_e2(const SensorModel& sensor);
+
 /// Returns the charge at which a pixel reads the largest code: its full well or the converter's range, whichever is
 /// less [e-].
 double saturation_charge_e(const SensorModel& sensor);

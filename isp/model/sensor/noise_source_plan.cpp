@@ -11,9 +11,9 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr std::array<std::string_view, effect_count> names{"photon-noise", "dark-current", "read-noise", "quantisation",
-                                                           "clipping",     "prnu",         "dsnu",       "hot-pixels",
-                                                           "row-noise",    "column-noise"};
+constexpr std::array<std::string_view, effect_count> names{
+    "photon-noise", "dark-current", "read-noise", "quantisation", "clipping",       "prnu",
+    "dsnu",         "hot-pixels",   "row-noise",  "column-noise", "telegraph-noise"};
 
 /// Limits the fraction of the tolerance that predictions may use up. They assume normal distributions, which do not
 /// hold near saturation and at a few electrons.
@@ -36,6 +36,8 @@ bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
       return s.dsnu > 0 && has_dark;
     case Effect::hot_pixels:
       return s.hot_pixel_fraction > 0 && s.hot_pixel_current_e_per_s > 0 && exposure.time_s > 0;
+    case Effect::telegraph_noise:
+      return telegraph_variance_e2(s) > 0;
     case Effect::row_noise:
       return s.row_noise_e > 0;
     case Effect::column_noise:

@@ -15,18 +15,19 @@ namespace lowlux::isp {
 
 /// Lists the switchable noise sources and nonlinearities between charge and code.
 enum class Effect : std::uint8_t {
-  photon_noise,  // the signal's Poisson fluctuation
-  dark_current,  // its mean and its Poisson fluctuation
-  read_noise,    // Gaussian
-  quantisation,  // integer codes, by rounding or by floor
-  clipping,      // full well and the converter's range
-  prnu,          // pixels differ in sensitivity
-  dsnu,          // pixels differ in dark current
-  hot_pixels,    // a few pixels have much more dark current
-  row_noise,     // an offset for each row and frame
-  column_noise,  // an offset for each column
+  photon_noise,     // the signal's Poisson fluctuation
+  dark_current,     // its mean and its Poisson fluctuation
+  read_noise,       // Gaussian
+  quantisation,     // integer codes, by rounding or by floor
+  clipping,         // full well and the converter's range
+  prnu,             // pixels differ in sensitivity
+  dsnu,             // pixels differ in dark current
+  hot_pixels,       // a few pixels have much more dark current
+  row_noise,        // an offset for each row and frame
+  column_noise,     // an offset for each column
+  telegraph_noise,  // a few pixels move between two levels
 };
-inline constexpr int effect_count = 10;
+inline constexpr int effect_count = 11;
 
 /// Returns "photon-noise", "dark-current"... in the order of Effect.
 std::span<const std::string_view> effect_names();
@@ -90,8 +91,8 @@ struct PredictedChange {
   double relative_variance = 0;
 };
 
-/// Predicts the change in a block if only the effects `kept` are simulated. Hot pixels are discrete events: a block may
-/// hold none, so they widen no other effect's tolerance, or several.
+/// Predicts the change in a block if only the effects `kept` are simulated. Hot pixels and those with
+/// telegraph noise are discrete events: a block may hold none, so they widen no other effect's tolerance, or several.
 PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
                                const BlockLevel& block, NoiseSourceSet kept);
 

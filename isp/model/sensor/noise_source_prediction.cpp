@@ -146,6 +146,31 @@ double changed_charge_of_hot_pixel(const SensorModel& s, const Charge& q, NoiseS
   return kept.has(Effect::clipping) ? 0 : std::max(0.0, hot + noise - room);
 }
 
+/// Holds what telegraph noise may change in one channel of a block: the mean, and the variance [DN, DN^2].
+struct TelegraphChange {
+  double mean_dn = 0, variance_dn2 = 0;
+};
+
+/// Returns bounds for telegraph noise that is left out: five standard deviations of mean and variance of independent
+/// pixels, and one pixel more at the one-in-a-million amplitude, since the tail is exponential. If clipping is left out
+/// instead, as many pixels as a block may hold move by what their amplitude exceeds the range by.
+TelegraphChange telegraph_change(const SensorModel& s, const Charge& q, NoiseSourceSet kept) {
+  const double variance = telegraph_variance_e2(s), k = s.system_gain_dn_per_e, largest = 0.5 * hottest * s.telegraph_e;
+  if (variance == 0) return {};
+  if (!kept.has(Effect::telegraph_noise)) {
+    const double fourth = 1.5 * s.telegraph_fraction * square(square(s.telegraph_e));
+    const double mean = sigmas * std::sqrt(variance / channel_pixels) + largest / channel_pixels;
+    const double spread = sigmas * std::sqrt((fourth - square(variance)) / channel_pixels);
+    return {k * mean, k * k * (variance + spread + square(largest) / channel_pixels)};
+  }
+  if (kept.has(Effect::clipping)) return {};
+  const double noise = sigmas * std::sqrt(q.signal + q.dark + square(s.read_noise_e));
+  const double level = q.signal + q.dark, room = std::min(saturation_charge_e(s) - level, s.black_level_dn / k + level);
+  const double beyond = k * std::clamp(largest + noise - room, 0.0, largest);
+  const double share = count_in_block(s.telegraph_fraction) / channel_pixels;
+  return {share * beyond, share * square(beyond)};
+}
+
 /// Holds bounds on the changes in one channel of a block.
 struct ChannelChange {
   double shift_dn = 0;    // known shift of the mean
@@ -163,6 +188,7 @@ ChannelChange channel_change(const SensorModel& s, const Charge& q, NoiseSourceS
   const double hot_dn = k * changed_charge_of_hot_pixel(s, q, kept), hot_count = count_in_block(s.hot_pixel_fraction);
   const double hot_mean = hot_count * hot_dn / channel_pixels,
                hot_variance = hot_count * square(hot_dn) / channel_pixels;
+  const TelegraphChange telegraph = telegraph_change(s, q, kept);
   ChannelChange out;
   out.shift_dn = left.dn.mean - all.dn.mean;
   const bool quantisation_differs = pixel + line > 0 || !kept.has(Effect::quantisation);
@@ -170,16 +196,18 @@ ChannelChange channel_change(const SensorModel& s, const Charge& q, NoiseSourceS
   const double rounding_variance = quantisation_differs ? all.uncertain.variance_dn2 + left.uncertain.variance_dn2 : 0;
   // Without clipping, a pixel at the end of the range may read one code beyond it.
   const double beyond = kept.has(Effect::clipping) ? 0 : count_in_block(1 - all.inside) / channel_pixels;
-  out.scatter_dn = sigmas * std::sqrt(pixel / channel_pixels + line / block_lines) + rounding_mean + hot_mean + beyond;
+  out.scatter_dn = sigmas * std::sqrt(pixel / channel_pixels + line / block_lines) + rounding_mean + hot_mean +
+                   telegraph.mean_dn + beyond;
   // Where most pixels are clipped, the few others determine the variance.
   const double pixels = std::max(1.0, channel_pixels * std::min(all.inside, left.inside));
   // Terms of the sample variances: their own scatter, and the sample covariance of what is left out with what is kept.
   const double larger = std::max(all.dn.variance, left.dn.variance);
   const double slope = std::max(all.variance_slope_dn, left.variance_slope_dn);
   const double moved =
-      std::fabs(left.dn.variance - all.dn.variance) + rounding_variance + hot_variance + beyond +
+      std::fabs(left.dn.variance - all.dn.variance) + rounding_variance + hot_variance + telegraph.variance_dn2 +
+      beyond +
       sigmas * (pixel * std::sqrt(2 / pixels) + line * std::sqrt(2 / std::min(block_lines, pixels)) +
-                2 * std::sqrt((pixel + line) * larger / pixels)) +
+                2 * std::sqrt((pixel + line + telegraph.variance_dn2) * larger / pixels)) +
       slope * (std::fabs(out.shift_dn) + sigmas * std::sqrt(pixel / channel_pixels + line / block_lines));
   const double seen = all.dn.variance * (1 - sigmas * std::sqrt(2 / pixels));  // lower bound of a block's variance
   out.relative_variance = moved / std::max(seen, variance_floor_dn2);

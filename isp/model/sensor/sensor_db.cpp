@@ -153,6 +153,8 @@ void take_fixed_pattern(NamedSensor& out, const SensorFigures& given) {
   m.dsnu = given.dsnu.value_or(0);
   m.hot_pixel_fraction = given.hot_pixel_fraction.value_or(0);
   m.hot_pixel_current_e_per_s = given.hot_pixel_current_e_per_s.value_or(0);
+  m.telegraph_fraction = given.telegraph_fraction.value_or(0);
+  m.telegraph_e = given.telegraph_e.value_or(0);
   m.column_noise_e = given.column_noise_e.value_or(0);
   const auto row = out.iso ? eld_row(eld, m.name, *out.iso) : std::nullopt;
   m.row_noise_e = given.row_noise_e.value_or(row ? *eld.number(*row, "row_e") : 0);

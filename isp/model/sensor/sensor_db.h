@@ -28,6 +28,8 @@ struct SensorFigures {
   std::optional<double> dsnu;
   std::optional<double> hot_pixel_fraction;
   std::optional<double> hot_pixel_current_e_per_s;
+  std::optional<double> telegraph_fraction;
+  std::optional<double> telegraph_e;
   std::optional<double> row_noise_e;
   std::optional<double> column_noise_e;
   std::optional<double> pixel_pitch_um;

@@ -333,6 +333,8 @@ def simulate(
     dsnu: Optional[float] = ...,
     hot_pixels: Optional[float] = ...,
     hot_current: Optional[float] = ...,
+    telegraph_pixels: Optional[float] = ...,
+    telegraph_noise: Optional[float] = ...,
     row_noise: Optional[float] = ...,
     column_noise: Optional[float] = ...,
     pixel_pitch: Optional[float] = ...,
