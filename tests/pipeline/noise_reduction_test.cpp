@@ -132,13 +132,14 @@ TEST(NoiseReduction, UnknownNoiseIsLeftOrAnErrorIfALevelWasAskedFor) {
   EXPECT_EQ(asked.error().code, ErrorCode::insufficient);
 }
 
-TEST(NoiseReduction, FramesWithoutMosaicAreLeftOrAnErrorIfALevelWasAskedFor) {
+TEST(NoiseReduction, FramesWithoutMosaicAreReducedByTheirRatioOrAsAskedFor) {
   RawFrame frame = test::night_frame({}, grey(20), 64, 64);
   frame.raw.layout = SensorLayout::monochrome;
-  EXPECT_EQ(planned(frame, {.mode = Mode::automatic}).noise_reduction.level, std::nullopt);
-  const auto asked = plan_develop(frame, linear({Mode::level, Level::draft}), one_thread);
-  ASSERT_FALSE(asked);
-  EXPECT_EQ(asked.error().code, ErrorCode::unsupported);
+  const auto plan = planned(frame, {.mode = Mode::automatic});
+  ASSERT_TRUE(plan.noise_reduction.snr);
+  EXPECT_NE(plan.noise_reduction.level, std::nullopt);
+  EXPECT_EQ(plan.noise_reduction.level, level_for(*plan.noise_reduction.snr));
+  EXPECT_EQ(planned(frame, {Mode::level, Level::draft}).noise_reduction.level, Level::draft);
 }
 
 TEST(NoiseReduction, ABrightFrameIsLeftUnlessItIsAlwaysToBeReduced) {
