@@ -10,7 +10,7 @@ namespace lowlux::isp {
 /// dark current and vice versa, and telegraph noise without its pixels and vice versa; DSNU, or the dark current's
 /// temperature, doubling, activation energy or floor, of a sensor without dark current; a doubling next to an
 /// activation energy; a pixel pitch without peak quantum efficiency, unless the luminance that fills a pixel is given.
-/// A fraction of 0 states that there is no such effect, and depends on nothing.
+/// A fraction of 0 means that the sensor does not have the effect, and needs no other figure.
 /// @param sensor  made by sensor_named() of these figures
 /// Errors: invalid_argument; the message names the option that does nothing and the one that is missing.
 Result<void> check_given_figures(const SensorFigures& given, const NamedSensor& sensor, const Optics& optics);

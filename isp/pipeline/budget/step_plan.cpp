@@ -31,7 +31,7 @@ std::string reason_words(const StepFacts& facts, const StepCandidate& plan) {
 }
 
 std::string level_words(const StepFacts& facts, const StepCandidate& plan) {
-  if (facts.noise_by_ratio) return "not decided by its effect, as the frame is no mosaic";
+  if (facts.noise_by_ratio) return "its level follows from the signal-to-noise ratio, as the frame is not a mosaic";
   if (!facts.has_noise) return "the noise is not known, or is not to be reduced";
   if (!plan.level) return "left as it is, " + reason_words(facts, plan);
   std::array<double, 3> share = facts.chroma.start;

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "isp/pipeline/plan/local_noise.h"
 #include "isp/pipeline/render/cell_figures.h"
 
@@ -24,6 +26,17 @@ double middle_snr(const RawFrame& frame, const Thumbnail& thumbnail, const std::
   const auto middle = snr.begin() + static_cast<std::ptrdiff_t>(snr.size() / 2);
   std::nth_element(snr.begin(), middle, snr.end());
   return *middle;
+}
+
+void choose_level_by_ratio(const DenoiseChoice& choice, NoiseReduction& out) {
+  if (choice.mode == DenoiseChoice::Mode::level) {
+    out.level = choice.level;
+    out.reason = "given";
+    return;
+  }
+  out.level = level_for(*out.snr);
+  if (!out.level && choice.always) out.level = denoise::Level::draft;
+  out.reason = fmt::format("signal-to-noise ratio {:.3g} of a pixel in the median block", *out.snr);
 }
 
 void add_remarks(const denoise::NoiseCheck& check, const NoiseProfile& model, std::vector<std::string>& warnings) {

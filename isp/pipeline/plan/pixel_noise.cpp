@@ -10,8 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "denoise/check/noise_check.h"
 #include "isp/base/noise_ratio.h"
 #include "isp/pipeline/budget/frame_sample.h"
@@ -111,21 +109,14 @@ denoise::NoiseCheck check_pixels(const RawFrame& frame, const RawLevels& levels,
 }
 
 void choose_level(const NoiseRequest& request, NoiseReduction& out) {
-  const DenoiseChoice& choice = request.choice;
-  if (choice.mode == DenoiseChoice::Mode::level) {
-    out.level = choice.level;
-    out.reason = "given";
-    return;
-  }
-  if (request.goal && request.goal->budget_s) {
+  const bool is_given = request.choice.mode == DenoiseChoice::Mode::level;
+  if (!is_given && request.goal && request.goal->budget_s) {
     out.reason =
         "a time budget counts the noise reduction of mosaics only: --denoise LEVEL reduces it whatever it takes";
     return;
   }
-  out.level = level_for(*out.snr);
-  if (!out.level && choice.always) out.level = denoise::Level::draft;
-  if (request.goal && request.goal->all) out.level = denoise::Level::high;
-  out.reason = fmt::format("signal-to-noise ratio {:.3g} of a pixel in the median block", *out.snr);
+  choose_level_by_ratio(request.choice, out);
+  if (!is_given && request.goal && request.goal->all) out.level = denoise::Level::high;
 }
 
 }  // namespace

@@ -113,21 +113,12 @@ NoiseReduction left_alone(const RawFrame& frame, std::string reason) {
 }
 
 void choose_level(const NoiseRequest& request, NoiseReduction& out) {
-  const DenoiseChoice& choice = request.choice;
-  if (choice.mode == DenoiseChoice::Mode::level) {
-    out.level = choice.level;
-    out.reason = "given";
-    return;
+  if (request.choice.mode == DenoiseChoice::Mode::level || !request.level) {
+    return choose_level_by_ratio(request.choice, out);
   }
-  if (request.level) {
-    out.level = request.level->level;
-    out.regions = request.level->regions;
-    out.reason = fmt::format("chosen by its visible effect, at a signal-to-noise ratio of {:.3g}", *out.snr);
-    return;
-  }
-  out.level = level_for(*out.snr);
-  if (!out.level && choice.always) out.level = denoise::Level::draft;
-  out.reason = fmt::format("signal-to-noise ratio {:.3g} of a pixel in the median block", *out.snr);
+  out.level = request.level->level;
+  out.regions = request.level->regions;
+  out.reason = fmt::format("chosen by its visible effect, at a signal-to-noise ratio of {:.3g}", *out.snr);
 }
 
 /// Returns the charge to check: lines need the whole frame; the remaining noise is checked on a sample of it where
