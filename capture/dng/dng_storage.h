@@ -27,7 +27,7 @@ struct DngImage {
   SensorLayout layout = SensorLayout::bayer;
   BayerPhase phase = BayerPhase::rggb;
   std::optional<QuadBayer> quad_bayer;  // of a mosaic that is Quad Bayer
-  std::optional<XTransPhase> x_trans;  // of a mosaic that is X-Trans and not Bayer, from the corner of the active area
+  std::optional<XTransPhase> x_trans;   // of a mosaic that is X-Trans and not Bayer, from the corner of the active area
 };
 
 /// Locations of the parts (strips or tiles) of an image, all inside the file.
