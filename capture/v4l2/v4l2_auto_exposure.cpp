@@ -5,6 +5,7 @@
 #include <string>
 
 #include "capture/file/pass_on.h"
+#include "isp/base/text.h"
 
 namespace lowlux::capture {
 namespace {
@@ -46,7 +47,7 @@ Result<V4l2AutoExposure> V4l2AutoExposure::take(V4l2Device& device, const V4l2Op
   const double unit_s = time->unit_s;
   const int first = std::max(time->control.minimum, time->control.minimum > 0 ? 0 : time->control.step);
   out.controls_.min_s = first * unit_s;
-  out.controls_.max_s = time->control.maximum * unit_s;
+  out.controls_.max_s = time->max_s();
   out.controls_.step_s = time->control.step * unit_s;
   if (!(out.controls_.max_s >= out.controls_.min_s)) {
     return unsupported(device, "the driver states exposure times of " + range_text(time->control));
@@ -70,10 +71,10 @@ Result<double> V4l2AutoExposure::set(V4l2Device& device, const CameraExposure& e
     }
     code_ = wanted;
   }
-  auto set = write_control(device, time_.control, exposure.exposure_s / time_.unit_s);
-  if (!set) return pass_on(set);
-  if (*set <= 0) return unsupported(device, "the driver sets an exposure time of " + std::to_string(*set));
-  return *set * time_.unit_s;
+  auto set_s = set_exposure_time(device, time_, exposure.exposure_s);
+  if (set_s && *set_s <= 0)
+    return unsupported(device, "the driver sets an exposure time of " + number_text(*set_s) + " s");
+  return set_s;
 }
 
 }  // namespace lowlux::capture

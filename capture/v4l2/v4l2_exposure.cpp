@@ -45,14 +45,13 @@ void apply_exposure_time(V4l2Device& device, double wanted_s, const CameraFormat
     warnings.push_back(asked + ": the driver has no control for it whose unit is known");
     return;
   }
-  const auto set = write_control(device, exposure->control, wanted_s / exposure->unit_s);
-  if (!set) {
-    warnings.push_back(asked + ": " + set.error().message);
+  const auto set_s = set_exposure_time(device, *exposure, wanted_s);
+  if (!set_s) {
+    warnings.push_back(asked + ": " + set_s.error().message);
     return;
   }
-  const double had_s = *set * exposure->unit_s;
-  if (std::abs(had_s - wanted_s) > 0.5001 * exposure->control.step * exposure->unit_s) {
-    warnings.push_back(asked + ": the driver sets " + number_text(had_s) + " s");
+  if (std::abs(*set_s - wanted_s) > 0.5001 * exposure->control.step * exposure->unit_s) {
+    warnings.push_back(asked + ": the driver sets " + number_text(*set_s) + " s");
   }
   if (!stays) warnings.push_back(asked + ": the automatic exposure cannot be switched off");
 }
@@ -100,11 +99,40 @@ v4l2_fract interval_of(double rate_hz) {
 
 std::optional<V4l2ExposureTime> find_exposure_time(V4l2Device& device, const CameraFormat& format) {
   if (const auto absolute = find_control(device, V4L2_CID_EXPOSURE_ABSOLUTE))
-    return V4l2ExposureTime{*absolute, 100e-6};
+    return V4l2ExposureTime{.control = *absolute, .unit_s = 100e-6};
   const auto lines = find_control(device, V4L2_CID_EXPOSURE);
   if (!lines) return std::nullopt;
   const auto line_s = line_time_s(device, format);
-  return line_s ? std::optional(V4l2ExposureTime{*lines, *line_s}) : std::nullopt;
+  if (!line_s) return std::nullopt;
+  V4l2ExposureTime out{.control = *lines, .unit_s = *line_s};
+  const auto blanking = find_control(device, V4L2_CID_VBLANK);
+  const auto blanking_lines = blanking && blanking->writable ? read_control(device, V4L2_CID_VBLANK) : std::nullopt;
+  if (blanking_lines) {
+    out.blanking = blanking;
+    out.blanking_lines = *blanking_lines;
+  }
+  return out;
+}
+
+double V4l2ExposureTime::max_s() const {
+  const double added = blanking ? std::max(0.0, static_cast<double>(blanking->maximum) - blanking_lines) : 0;
+  return (control.maximum + added) * unit_s;
+}
+
+Result<double> set_exposure_time(V4l2Device& device, const V4l2ExposureTime& time, double wanted_s) {
+  const double wanted = wanted_s / time.unit_s;
+  V4l2Control control = time.control;
+  if (time.blanking) {
+    const double lines = time.blanking_lines + std::max(0.0, std::ceil(wanted - control.maximum));
+    // If the driver refuses, its blanking stays and the exposure is the longest that fits, which the caller sees.
+    if (read_control(device, time.blanking->id) != lines) {
+      static_cast<void>(write_control(device, *time.blanking, lines + (time.blanking->step - 1) / 2.0));
+    }
+    control = find_control(device, control.id).value_or(control);  // its range follows the blanking
+  }
+  const auto set = write_control(device, control, wanted);
+  if (!set) return tl::make_unexpected(set.error());
+  return *set * time.unit_s;
 }
 
 bool end_automatic_exposure(V4l2Device& device) {

@@ -41,9 +41,20 @@ struct V4l2Control {
 struct V4l2ExposureTime {
   V4l2Control control;
   double unit_s = 0;
+  /// V4L2_CID_VBLANK, if the exposure counts lines and the driver lets it be set: a frame holds no longer exposure than
+  /// its lines, and vertical blanking adds lines to it.
+  std::optional<V4l2Control> blanking;
+  int blanking_lines = 0;  // when `control` was read
+
+  /// Returns the longest exposure time, with the most blanking [s].
+  double max_s() const;
 };
 /// Returns V4L2_CID_EXPOSURE_ABSOLUTE, else V4L2_CID_EXPOSURE if the time of a line is known.
 std::optional<V4l2ExposureTime> find_exposure_time(V4l2Device& device, const CameraFormat& format);
+/// Sets the exposure time that is nearest to `wanted_s` and returns the one that the driver set [s]. Adds as much
+/// vertical blanking as the exposure needs, so that frames come more slowly, and takes it back for shorter exposures.
+/// An error states why the driver refuses.
+Result<double> set_exposure_time(V4l2Device& device, const V4l2ExposureTime& time, double wanted_s);
 /// Ends automatic exposure, or sets the mode in which only the iris is automatic. Returns whether the time stays as
 /// set.
 bool end_automatic_exposure(V4l2Device& device);

@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -97,6 +99,22 @@ TEST(V4l2AutoExposure, InLinesHasTheUnitOfALine) {
   EXPECT_DOUBLE_EQ(controls->step_s, 40e-6);
   EXPECT_NEAR(camera->set_exposure({.exposure_s = 0.001}).value(), 0.001, 1e-12);
   EXPECT_EQ(fake.controls[V4L2_CID_EXPOSURE].value, 100);
+}
+
+TEST(V4l2AutoExposure, LengthensFramesForLongExposuresAndShortensThemAgain) {
+  FakeV4l2 fake;
+  give_sensor_of_lines(fake, 9520);
+  const auto camera = opened(fake);
+  const auto controls = camera->take_exposure();
+  ASSERT_TRUE(controls) << controls.error().message;
+  EXPECT_NEAR(controls->max_s, 0.9996, 1e-12);  // s: 480 + 9520 - 4 lines
+  for (const double wanted_s : {0.01, 0.0496, 0.0497, 0.9996, 0.5, 0.01, 0.3}) {
+    EXPECT_NEAR(camera->set_exposure({.exposure_s = wanted_s}).value(), wanted_s, 1e-12);
+    const int needed = std::max(20, static_cast<int>(std::lround(wanted_s / 1e-4)) - sensor_lines + 4);
+    EXPECT_NEAR(fake.controls[V4L2_CID_VBLANK].value, needed, wanted_s < 0.04 ? 0 : 1) << wanted_s;
+  }
+  EXPECT_NEAR(camera->set_exposure({.exposure_s = 5}).value(), 0.9996, 1e-12);
+  EXPECT_EQ(fake.misuses, 0);
 }
 
 TEST(V4l2AutoExposure, StatesTheTimeThatADriverClampsTo) {

@@ -91,6 +91,31 @@ TEST(V4l2Exposure, InLinesNeedsThePixelRateAndTheBlankingOnTheNode) {
   EXPECT_NEAR(*facts_of(fake, *camera).exposure_s, 0.01, 1e-15);  // s: rounding of doubles
 }
 
+TEST(V4l2Exposure, LongerThanAFrameMakesTheFrameLonger) {
+  FakeV4l2 fake;
+  give_sensor_of_lines(fake, 60000);
+  const auto camera = opened(fake, {.request = {.exposure_s = 2}});
+  EXPECT_TRUE(camera->warnings().empty()) << joined(camera->warnings());
+  EXPECT_EQ(fake.controls[V4L2_CID_EXPOSURE].value, 20000);
+  EXPECT_NEAR(fake.controls[V4L2_CID_VBLANK].value, 20000 - sensor_lines + 4, 1);  // lines: no more than it takes
+  EXPECT_NEAR(*facts_of(fake, *camera).exposure_s, 2, 1e-12);                      // s: rounding of doubles
+  EXPECT_EQ(fake.misuses, 0);
+}
+
+TEST(V4l2Exposure, WithTheMostBlankingIsTheLongest) {
+  FakeV4l2 fake;
+  give_sensor_of_lines(fake, 1000);
+  const auto camera = opened(fake, {.request = {.exposure_s = 2}});
+  EXPECT_EQ(fake.controls[V4L2_CID_EXPOSURE].value, sensor_lines + 1000 - 4);
+  EXPECT_NE(joined(camera->warnings()).find("the driver sets 0.1476 s"), std::string::npos);
+  fake.controls[V4L2_CID_VBLANK].flags = V4L2_CTRL_FLAG_READ_ONLY;
+  fake.controls[V4L2_CID_VBLANK].value = 20;
+  fake.on_set_control(V4L2_CID_VBLANK);
+  EXPECT_FALSE(opened(fake, {.request = {.exposure_s = 2}})->warnings().empty());
+  EXPECT_EQ(fake.controls[V4L2_CID_EXPOSURE].value, sensor_lines + 16);
+  EXPECT_EQ(fake.misuses, 0);
+}
+
 TEST(V4l2Exposure, ControlsThatRefuseOrChangeByThemselvesAreTold) {
   FakeV4l2 fake;
   EXPECT_EQ(opened(fake, {.request = {.exposure_s = 0.01, .analogue_gain = 1}})->warnings().size(), 2u);

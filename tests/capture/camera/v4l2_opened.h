@@ -1,7 +1,10 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <linux/videodev2.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
@@ -27,6 +30,23 @@ inline std::unique_ptr<capture::Camera> opened(FakeV4l2& fake, const capture::V4
   auto camera = capture::open_v4l2("/dev/video0", options, fake.system());
   if (!camera) ADD_FAILURE() << camera.error().message;
   return std::move(camera).value();
+}
+
+/// Lines of the sensor that give_sensor_of_lines simulates.
+inline constexpr int sensor_lines = 480;
+
+/// Gives the driver the controls of a sensor: lines of 100 us, 20 to `max_blanking` lines of blanking, and no exposure
+/// longer than lines and blanking less four lines.
+inline void give_sensor_of_lines(FakeV4l2& fake, int max_blanking) {
+  fake.controls = {{V4L2_CID_EXPOSURE, {4, 4, sensor_lines + 16}},
+                   {V4L2_CID_VBLANK, {20, 20, max_blanking}},
+                   {V4L2_CID_HBLANK, {68, 68, 68}}};
+  fake.pixel_rate_hz = 1'000'000;  // (32 + 68) / 1 MHz
+  fake.on_set_control = [&fake](std::uint32_t id) {
+    auto& exposure = fake.controls[V4L2_CID_EXPOSURE];
+    if (id == V4L2_CID_VBLANK) exposure.maximum = sensor_lines + fake.controls[id].value - 4;
+    exposure.value = std::min(exposure.value, exposure.maximum);
+  };
 }
 
 /// The error of opening, after which nothing may be left open.
