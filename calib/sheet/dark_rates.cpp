@@ -94,6 +94,15 @@ std::optional<Estimate> doubling_of(std::span<const DarkRate> rates) {
   return Estimate{1 / slope.value, slope.standard_error / (slope.value * slope.value)};
 }
 
+std::optional<DarkLaw> law_of(std::span<const DarkRate> rates) {
+  std::vector<RateAtTemperature> points;
+  for (const DarkRate& rate : rates) {
+    if (!rate.temperature_c) return std::nullopt;
+    points.push_back({*rate.temperature_c, rate.by_mean_e_per_s});
+  }
+  return fit_dark_law(points);
+}
+
 }  // namespace
 
 Result<DarkRates> dark_rates(std::span<const DarkGroup> groups, const Estimate& gain_dn_per_e) {
@@ -124,6 +133,7 @@ Result<DarkRates> dark_rates(std::span<const DarkGroup> groups, const Estimate& 
                 "no two exposure times of darks at one temperature: dark current is not known");
   }
   out.doubling_c = doubling_of(out.rates);
+  out.law = law_of(out.rates);
   return out;
 }
 

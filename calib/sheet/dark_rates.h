@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calib/dark/dark_stack.h"
+#include "calib/sheet/dark_law.h"
 #include "isp/base/estimate.h"
 #include "isp/base/result.h"
 
@@ -21,6 +22,7 @@ struct DarkRate {
 struct DarkRates {
   std::vector<DarkRate> rates;         // by rising temperature
   std::optional<Estimate> doubling_c;  // by the means of two or more temperatures; absent if one is not above 0
+  std::optional<DarkLaw> law;          // by the means of three or more temperatures, if they determine it
 };
 
 /// Fits straight lines to groups of darks of one gain setting, those of each temperature (same_temperature_c) alone;

@@ -70,6 +70,11 @@ void add_dark_rates(const calib::DataSheet& sheet, std::vector<Figure>& out) {
                    rate.by_variance_e_per_s, "e-/s"});
   }
   out.push_back({"doubling of dark current", "dark_current_doubling_c", sheet.dark_rates->doubling_c, "C"});
+  const std::optional<calib::DarkLaw>& law = sheet.dark_rates->law;
+  out.push_back({"activation energy of dark current", "dark_current_activation_ev",
+                 law ? std::optional(law->activation_ev) : std::nullopt, "eV"});
+  out.push_back({"floor of dark current", "dark_current_floor_e_per_s",
+                 law ? std::optional(law->floor_e_per_s) : std::nullopt, "e-/s"});
 }
 
 void add_efficiencies(const calib::DataSheet& sheet, std::vector<Figure>& out) {
