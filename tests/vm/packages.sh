@@ -1,0 +1,25 @@
+# What fetches and builds from Debian's packages share, sourced by them. They install nothing.
+
+# none WHY: ends the script; what it makes is not to be had here
+none() {
+  echo "$(basename "$0"): $1" >&2
+  exit 77
+}
+
+# fetch PACKAGE[=VERSION]...: into the folder it is called in
+fetch() {
+  apt-get -q -o DPkg::Lock::Timeout=300 -o APT::Sandbox::User=root download "$@" >download.log 2>&1 ||
+    none "apt-get download $* failed: $(tail -n 1 download.log); if the archive has moved on, apt-get update, and remove what was fetched before"
+}
+
+# lacking PACKAGE...: those of them, and of what they need, that apt would install
+lacking() {
+  apt-get install -s --no-install-recommends "$@" >install.log 2>&1 || none "no $*: $(tail -n 1 install.log)"
+  sed -n 's/^Inst \([^ ]*\).*/\1/p' install.log
+}
+
+# unpack FOLDER: what was fetched
+unpack() {
+  for package in ./*.deb; do dpkg-deb -x "$package" "$1"; done
+  rm ./*.deb
+}
