@@ -4,7 +4,7 @@
  *   replay_stage LIBRARY WIDTH HEIGHT OUT_WIDTH OUT_HEIGHT OUT_STRIDE < frames
  *
  * Input: SRGGB10 without padding. A line for each frame, in order: RAW IMAGE SEQUENCE TIMESTAMP BLACK_R BLACK_G BLACK_B
- * GAIN_R GAIN_B, where IMAGE is the file to write: BGR888. A black level or gain of 0 is not known. */
+ * GAIN_R GAIN_B EXPOSURE_EV, where IMAGE is the file to write: BGR888. A black level or gain of 0 is not known. */
 #include <dlfcn.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -106,8 +106,9 @@ int main(int argc, char** argv) {
   uint64_t timestamp_ns;
   float black[3];
   float gains[2];
-  while (scanf("%255s %255s %" SCNu32 " %" SCNu64 " %f %f %f %f %f", raw_name, image_name, &sequence, &timestamp_ns,
-               &black[0], &black[1], &black[2], &gains[0], &gains[1]) == 9) {
+  float exposure_ev; /* a result: compared by way of the image */
+  while (scanf("%255s %255s %" SCNu32 " %" SCNu64 " %f %f %f %f %f %f", raw_name, image_name, &sequence, &timestamp_ns,
+               &black[0], &black[1], &black[2], &gains[0], &gains[1], &exposure_ev) == 10) {
     transfer(raw_name, "rb", raw, raw_bytes);
     const lowlux_stage_source source = {.data = raw, .length = raw_bytes, .stride = in.stride, .fd = -1};
     lowlux_stage_picture planes = {.size = sizeof planes, .planes = 1};

@@ -133,18 +133,22 @@ struct DebayerCpu::Lowlux {
     params.sequence = metadata.sequence;
     params.timestamp_ns = metadata.timestamp;
     add_known(params, debayer, Rank1{});
-    LOG(Debayer, Debug) << "lowlux: frame " << params.sequence << " " << params.timestamp_ns << std::setprecision(9)
-                        << " black " << params.black_level[0] << " " << params.black_level[1] << " "
-                        << params.black_level[3] << " gains " << params.colour_gains[0] << " "
-                        << params.colour_gains[1];
     const lowlux_stage_source source = {in.planes()[0].data(), in.planes()[0].size(), input.stride, -1};
     lowlux_stage_picture picture = {};
     picture.size = sizeof(picture);
     picture.planes = 1;
     picture.plane[0] = {out.planes()[0].data(), out.planes()[0].size(), output.stride[0]};
-    if (process(stage, &source, &picture, &params, nullptr, nullptr) == LOWLUX_STAGE_OK) return true;
-    LOG(Debayer, Error) << "lowlux: " << last_error(stage);
-    return false;
+    lowlux_stage_result result = {};
+    result.size = sizeof(result);
+    if (process(stage, &source, &picture, &params, &result, nullptr) != LOWLUX_STAGE_OK) {
+      LOG(Debayer, Error) << "lowlux: " << last_error(stage);
+      return false;
+    }
+    LOG(Debayer, Debug) << "lowlux: frame " << params.sequence << " " << params.timestamp_ns << std::setprecision(9)
+                        << " black " << params.black_level[0] << " " << params.black_level[1] << " "
+                        << params.black_level[3] << " gains " << params.colour_gains[0] << " " << params.colour_gains[1]
+                        << " exposure " << result.exposure_ev;
+    return true;
   }
 
   // Statistics for exposure and white balance stay libcamera's own: of a whole frame since 0.7.0, which takes the

@@ -22,9 +22,12 @@ cam_frames() {
   [ "$images" -eq "$frames" ] || fail "$folder: $images images, not $frames"
 }
 
-# reported FOLDER: for each frame what replay_stage reads: files, number, time, black level, gains
+# stage_log FILE: for each frame its number, time, black level of R, G and B, gains of R and B, exposure [EV]
+stage_log() { sed -n 's/.*lowlux: frame \(.*\) black \(.*\) gains \(.*\) exposure \(.*\)/\1 \2 \3 \4/p' "$1"; }
+
+# reported FOLDER: for each frame what replay_stage reads: files, then what stage_log has
 reported() {
-  sed -n 's/.*lowlux: frame \([0-9]*\) \([0-9]*\) black \(.*\) gains \(.*\)/\1 \2 \3 \4/p' "$1.log" |
+  stage_log "$1.log" |
     while read -r number rest; do
       name=$(printf '%06d' "$number")
       [ ! -e "$1/cam0-stream0-$name" ] || echo "$1/cam0-stream1-$name $1/replayed-$name $number $rest"
