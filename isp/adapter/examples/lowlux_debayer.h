@@ -1,18 +1,14 @@
 // A stage of lowlux in libcamera's software ISP: what libcamera-softisp.patch adds to DebayerCpu. It is copied next to
-// debayer_cpu.cpp, which includes it last, and serves releases from 0.4.0 to the tree after 0.7.2: where they differ,
-// the first overload that compiles is taken.
+// debayer_cpu.cpp, which includes it last, after <dlfcn.h> and <lowlux/lowlux_stage.h>, and serves releases from 0.4.0
+// to the tree after 0.7.2: where they differ, the first overload that compiles is taken.
 //
 // LOWLUX_STAGE names liblowlux_stage.so.0. LOWLUX_PROFILE may name a profile of `lowlux calibrate`. What the stage does
 // not support, such as formats without a mosaic, is left to libcamera's own loop, with a warning.
 #pragma once
 
-#include <dlfcn.h>
-
 #include <cstdlib>
 #include <iomanip>
 #include <memory>
-
-#include <lowlux/lowlux_stage.h>
 
 namespace libcamera {
 
