@@ -208,6 +208,17 @@ BenchOutcome quickly(Result<BenchOutcome> (*run)(const BenchOptions&)) {
   return *std::move(out);
 }
 
+/// Returns the largest figure of a level over its cases.
+double largest_figure_of(const BenchOutcome& out, const std::string& level, const std::string& column) {
+  const auto at = std::ranges::find(out.table.columns, column) - out.table.columns.begin();
+  double largest = 0;
+  for (const auto& cells : out.table.rows) {
+    if (std::get<std::string>(cells[1]) != level) continue;
+    largest = std::max(largest, std::get<double>(cells.at(static_cast<std::size_t>(at))));
+  }
+  return largest;
+}
+
 /// A figure of the first row of a level, whatever the case.
 double figure_of(const BenchOutcome& out, const std::string& level, const std::string& column) {
   const auto at = std::ranges::find(out.table.columns, column) - out.table.columns.begin();
@@ -233,6 +244,11 @@ TEST(SimulationStages, EffectsAreWithinWhatIsPredictedAndAllChangeNothing) {
   EXPECT_EQ(figure_of(out, "all", "error"), 0);
   EXPECT_GT(figure_of(out, "without photon-noise", "error"), 0);
   EXPECT_GT(figure_of(out, "none", "relative variance"), 0.5);
+  for (const std::string_view effect : effect_names()) {
+    if (effect == "clipping") continue;  // nothing saturates in these lights
+    EXPECT_GT(largest_figure_of(out, "without " + std::string(effect), "error"), 0) << effect;
+    EXPECT_GT(largest_figure_of(out, "without " + std::string(effect), "predicted CIEDE2000"), 0) << effect;
+  }
   ASSERT_EQ(out.images.size(), bench_lights.size());
   EXPECT_EQ(out.images[2].id, "simulation-effects-very-dark");
   EXPECT_EQ(out.images[2].codes.width(), 5 * 192 / 2);

@@ -56,6 +56,14 @@ NamedSensor bench_camera() {
   return sensor_named("ELD_NikonD850", "ISO 1600", figures).value();  // cannot fail for an entry of the table
 }
 
+NamedSensor effects_camera() {
+  NamedSensor camera = bench_camera();
+  camera.model.hot_pixel_fraction = 2e-4;  // a few in the smallest images too
+  camera.model.telegraph_fraction = 0.01;
+  camera.model.telegraph_e = 3;
+  return camera;
+}
+
 SpectralResponse bench_response() {
   return spectral_response(bench_camera(), {.f_number = 2, .white_luminance_cd_m2 = bench_full_cd_m2}).value();
 }

@@ -24,7 +24,11 @@ namespace lowlux::isp {
 /// Returns ELD_NikonD850 at ISO 1600, with assumed values for effects missing in its source: all are simulated.
 NamedSensor bench_camera();
 
-/// Returns its response: a white of bench_full_cd_m2 under D65 fills it in 1 s.
+/// Returns bench_camera() with assumed values for the effects that are absent or rare in other stages' frames: hot
+/// pixels and random telegraph noise.
+NamedSensor effects_camera();
+
+/// Returns the response of both: a white of bench_full_cd_m2 under D65 fills it in 1 s.
 SpectralResponse bench_response();
 inline constexpr double bench_full_cd_m2 = 100;
 

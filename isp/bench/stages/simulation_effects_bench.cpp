@@ -133,7 +133,7 @@ class EffectsLight {
   }
 
  private:
-  explicit EffectsLight(const BenchLight& light) : light_(light), camera_(bench_camera()) {}
+  explicit EffectsLight(const BenchLight& light) : light_(light), camera_(effects_camera()) {}
 
   std::vector<BlockLevel> block_levels_of(const capture::SyntheticSource& source) const {
     return capture::block_levels(source.rate_e_per_s().view(), BayerPhase::rggb, light_.time_s);
