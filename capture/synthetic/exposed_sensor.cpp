@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "capture/synthetic/block_levels.h"
 #include "isp/base/random/random.h"
 #include "isp/base/sensor.h"
 #include "isp/base/text.h"
@@ -70,7 +71,7 @@ Result<ExposedSensor> ExposedSensor::of(SyntheticCamera camera, Plane<float> rat
 std::vector<isp::BlockLevel> ExposedSensor::plan_effects() {
   const SyntheticOptions& options = camera_.options;
   const SensorModel& sensor = camera_.sensor.model;
-  auto blocks = block_levels(std::as_const(rate_e_per_s_).view(), options.phase, options.exposure.time_s);
+  auto blocks = block_levels(sensor_frame(0, nullptr));
   developing_ =
       isp::developing_of(sensor, options.exposure, camera_.camera_to_xyz, *camera_.colour.as_shot_neutral, blocks);
   const NoiseSourceChoice& choice = options.effects;
@@ -85,13 +86,14 @@ double ExposedSensor::largest_mean_e(const isp::BlockLevel& block, isp::NoiseSou
   const auto dark = isp::dark_mean_e(s, camera_.options.exposure);
   const double dark_e = kept.has(Effect::dark_current) ? *std::max_element(dark.begin(), dark.end()) : 0;
   // The planner has considered the loss in the few extreme pixels; a caller who sets effects has not.
-  if (camera_.options.effects.tolerance) return block.peak_e + dark_e;
+  const double glow_e = kept.has(Effect::amplifier_glow) ? block.glow.peak_e : 0;
+  if (camera_.options.effects.tolerance) return block.peak_e + dark_e + glow_e;
   const double prnu = kept.has(Effect::prnu) ? s.prnu : 0, dsnu = kept.has(Effect::dsnu) ? s.dsnu : 0;
   const double hot_e = kept.has(Effect::hot_pixels) && s.hot_pixel_fraction > 0
                            ? s.hot_pixel_current_e_per_s * camera_.options.exposure.time_s *
                                  isp::dark_current_factor(s, camera_.options.exposure.temperature_c)
                            : 0;
-  return block.peak_e * (1 + largest_deviate * prnu) + dark_e * (1 + largest_deviate * dsnu) + hottest * hot_e;
+  return block.peak_e * (1 + largest_deviate * prnu) + dark_e * (1 + largest_deviate * dsnu) + hottest * hot_e + glow_e;
 }
 
 Result<void> ExposedSensor::check_means(const std::vector<isp::BlockLevel>& blocks) const {

@@ -34,7 +34,8 @@ struct Run {
 
 class RowReadout {
  public:
-  explicit RowReadout(const SensorFrame& frame) : frame_(frame), dark_(isp::dark_mean_e(frame.sensor, frame.exposure)) {
+  explicit RowReadout(const SensorFrame& frame)
+      : frame_(frame), dark_(isp::dark_mean_e(frame.sensor, frame.exposure)), glow_(glow_of(frame)) {
     hot_mean_e_ = frame.sensor.hot_pixel_current_e_per_s * frame.exposure.time_s *
                   isp::dark_current_factor(frame.sensor, frame.exposure.temperature_c);
   }
@@ -84,6 +85,11 @@ class RowReadout {
     if (kept.has(Effect::hot_pixels)) {
       add_hot_pixels(pattern(run), frame_.sensor.hot_pixel_fraction, hot_mean_e_, mean, s.words);
     }
+    if (kept.has(Effect::amplifier_glow) && glow_.present()) {
+      for (std::size_t i = 0; i < mean.size(); ++i) {
+        mean[i] += static_cast<float>(glow_.mean_e(run.x0 + static_cast<int>(i), run.y));
+      }
+    }
   }
 
   std::span<const float> fill_offset(const Run& run, NoiseSourceSet kept, Scratch& s) const {
@@ -116,7 +122,8 @@ class RowReadout {
     p.black_dn = static_cast<float>(sensor.black_level_dn);
     p.max_dn = static_cast<float>(sensor.white_level_dn);
     p.quantisation = sensor.quantisation;
-    p.photon_noise = !steady || kept.has(Effect::dark_current) || kept.has(Effect::hot_pixels);
+    p.photon_noise = !steady || kept.has(Effect::dark_current) || kept.has(Effect::hot_pixels) ||
+                     (kept.has(Effect::amplifier_glow) && glow_.present());
     p.quantise = kept.has(Effect::quantisation);
     p.clip = kept.has(Effect::clipping);
     return p;
@@ -124,6 +131,7 @@ class RowReadout {
 
   const SensorFrame& frame_;
   std::array<double, 3> dark_;
+  isp::AmplifierGlow glow_;
   double hot_mean_e_ = 0;
 };
 
@@ -166,6 +174,10 @@ double time_rows(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, Pla
 
 }  // namespace
 
+isp::AmplifierGlow glow_of(const SensorFrame& frame) {
+  return {frame.sensor, frame.exposure, frame.rate_e_per_s.width, frame.rate_e_per_s.height};
+}
+
 void read_out(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, Executor& executor, PlaneView<float> dn) {
   read_out_bands(frame, plan, executor, dn);
 }
@@ -175,50 +187,17 @@ void read_out(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, Execut
   read_out_bands(frame, plan, executor, dn);
 }
 
-std::vector<isp::BlockLevel> block_levels(PlaneView<const float> rate_e_per_s, BayerPhase phase, double time_s) {
-  std::vector<isp::BlockLevel> blocks;
-  for (int y0 = 0; y0 < rate_e_per_s.height; y0 += isp::effect_block) {
-    for (int x0 = 0; x0 < rate_e_per_s.width; x0 += isp::effect_block) {
-      Vector3 sum{};
-      std::array<int, 3> count{};
-      float peak = 0;
-      std::array<float, 3> darkest;
-      darkest.fill(std::numeric_limits<float>::infinity());
-      for (int y = y0; y < std::min(rate_e_per_s.height, y0 + isp::effect_block); ++y) {
-        const float* row = rate_e_per_s.row(y);
-        for (int x = x0; x < std::min(rate_e_per_s.width, x0 + isp::effect_block); ++x) {
-          const int k = static_cast<int>(colour_at(phase, x, y));
-          sum[k] += row[x];
-          ++count[k];
-          peak = std::max(peak, row[x]);
-          darkest[k] = std::min(darkest[k], row[x]);
-        }
-      }
-      const double whole = (sum[0] + sum[1] + sum[2]) / (count[0] + count[1] + count[2]);
-      isp::BlockLevel block;
-      block.peak_e = time_s * peak;
-      for (int k = 0; k < 3; ++k) {
-        block.signal_e[k] = time_s * (count[k] > 0 ? sum[k] / count[k] : whole);
-        block.darkest_e[k] = count[k] > 0 ? time_s * darkest[k] : block.signal_e[k];
-      }
-      blocks.push_back(block);
-    }
-  }
-  return blocks;
-}
-
 EffectCost measure_cost(const SensorFrame& frame, const isp::NoiseSourcePlan& plan) {
   constexpr int measured_rows = 128;
-  SensorFrame top = frame;
-  top.rate_e_per_s.height = std::min(frame.rate_e_per_s.height, measured_rows);
-  const double scale = static_cast<double>(frame.rate_e_per_s.height) / top.rate_e_per_s.height;
-  Plane<float> dn(top.rate_e_per_s.width, top.rate_e_per_s.height);
+  const int height = frame.rate_e_per_s.height, rows = std::min(height, measured_rows);
+  const double scale = static_cast<double>(height) / rows;
+  Plane<float> dn(frame.rate_e_per_s.width, rows);
   Plane<std::uint16_t> codes(dn.width(), dn.height());
   isp::NoiseSourcePlan timed = plan;
   const auto time_with = [&](NoiseSourceSet kept) {
     for (isp::RegionPlan& region : timed.regions) region.kept = kept;
     const bool whole = kept.has(Effect::quantisation) && kept.has(Effect::clipping);
-    return scale * (whole ? time_rows(top, timed, codes) : time_rows(top, timed, dn));
+    return scale * (whole ? time_rows(frame, timed, codes) : time_rows(frame, timed, dn));
   };
   NoiseSourceSet present;
   for (const isp::NoiseSourceDecision& d : plan.regions.front().decisions) {

@@ -8,6 +8,7 @@
 #include "isp/base/executor.h"
 #include "isp/base/plane.h"
 #include "isp/base/sensor.h"
+#include "isp/model/sensor/amplifier_glow.h"
 #include "isp/model/sensor/noise_source_plan.h"
 
 namespace lowlux::capture {
@@ -34,9 +35,8 @@ void read_out(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, Execut
 void read_out(const SensorFrame& frame, const isp::NoiseSourcePlan& plan, Executor& executor,
               PlaneView<std::uint16_t> dn);
 
-/// Returns the levels of each block at the sensor in a time, row by row, for the planner. A block without a pixel of a
-/// channel (frames one pixel wide) has the mean of the others there.
-std::vector<isp::BlockLevel> block_levels(PlaneView<const float> rate_e_per_s, BayerPhase phase, double time_s);
+/// Returns the amplifier glow of the frame.
+isp::AmplifierGlow glow_of(const SensorFrame& frame);
 
 /// Time of reading out with all effects, and the time saved by each effect that the plan leaves out [ms per frame],
 /// measured on up to 128 rows and scaled to the frame; nullopt for effects the plan keeps everywhere or the sensor does

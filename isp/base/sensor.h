@@ -41,8 +41,12 @@ struct SensorModel {
   /// Random telegraph noise: a trap in the transistor of a pixel moves its signal between two levels.
   double telegraph_fraction = 0;  // fraction of all pixels that have a trap
   double telegraph_e = 0;         // mean distance of the levels, exponentially distributed
-  double row_noise_e = 0;         // standard deviation of an offset drawn for each row of each frame
-  double column_noise_e = 0;      // standard deviation of an offset drawn for each column, the same in all frames
+  /// Amplifier glow: light of the output amplifier falls on the pixels around it (isp/model/sensor/amplifier_glow.h).
+  double glow_e_per_s = 0;                    // at its source, the same at every temperature
+  std::array<double, 2> glow_position{1, 1};  // of the source, in widths and heights from the upper left corner
+  double glow_length = 0.1;                   // distance over which it falls by a factor e, in diagonals
+  double row_noise_e = 0;                     // standard deviation of an offset drawn for each row of each frame
+  double column_noise_e = 0;  // standard deviation of an offset drawn for each column, the same in all frames
 };
 
 /// Describes the response of the sensor to light: electrons in one pixel for radiance in front of the camera.

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "capture/synthetic/block_levels.h"
 #include "tests/support/sensor_frames.h"
 #include "tests/support/synthetic_camera.h"
 
@@ -44,7 +45,8 @@ TEST(BlockLevels, AreTheMeansOfEachChannelAndTheBrightestPixel) {
     }
   }
   rate.at(69, 32) += 5;
-  const auto blocks = block_levels(std::as_const(rate).view(), BayerPhase::grbg, 2);
+  const SensorModel sensor = test::plain_sensor().model;
+  const auto blocks = block_levels({sensor, {.time_s = 2}, BayerPhase::grbg, std::as_const(rate).view()});
   ASSERT_EQ(blocks.size(), 6u);
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) EXPECT_DOUBLE_EQ(blocks[i].signal_e[k], 2 * (1 + k + 10 * i));

@@ -95,7 +95,7 @@ TEST_F(Simulate, EveryOptionOfTheHelpWorks) {
        "floor"},
       {"--white-luminance", "20", "--size", "64x48", "--force"},
       {"--dark-current", "2", "--dark-activation", "0.6", "--dark-floor", "0.5", "--telegraph-pixels", "0.01",
-       "--telegraph-noise", "5"},
+       "--telegraph-noise", "5", "--glow", "20", "--glow-position", "0,0.5", "--glow-length", "0.2"},
       {"--frames", "2", "--shake", "3", "--roll", "1", "--dither", "0.5", "--bracket", "0,-1", "--reduce", "3"},
       {"--frames", "2", "--stars", "9", "--field-rotation", "1", "--field-centre", "10,-5.5", "--drift", "0.5,-1",
        "--horizon", "30", "--movers", "1", "--mover-size", "9.5", "--mover-speed", "2"},
@@ -127,7 +127,7 @@ TEST_F(Simulate, TheListNamesWhatTheOptionsTake) {
 }
 
 TEST_F(Simulate, JsonHoldsWhatExplainPrints) {
-  const Words options{"--light", "A", "--explain", "--luminance", "0.001", "--prnu", "0.005"};
+  const Words options{"--light", "A", "--explain", "--luminance", "0.001", "--prnu", "0.005", "--glow", "9"};
   const auto text = simulated("chart", "text.dng", options);
   Words with_json = options;
   with_json.emplace_back("--json");
@@ -141,7 +141,8 @@ TEST_F(Simulate, JsonHoldsWhatExplainPrints) {
   };
   for (const Json& region : json["regions"]) {
     expect_next(std::to_string(region["blocks"].get<int>()) + " blocks of " + three_digits(region["darkest_e"]) +
-                " to " + three_digits(region["brightest_e"]) + " e-");
+                " to " + three_digits(region["brightest_e"]) + " e-, glow up to " + three_digits(region["glow_e"]) +
+                " e-");
     for (const Json& effect : region["effects"]) {
       expect_next(effect["effect"]);
       expect_next(three_digits(effect["predicted_delta_e"]));

@@ -39,6 +39,18 @@ TEST(GivenFigures, HotPixelsNeedTheirCurrentAndTheOtherWayRound) {
   EXPECT_TRUE(check(given)) << "it says that there are none";
 }
 
+TEST(GivenFigures, PlaceAndLengthOfTheGlowNeedAGlow) {
+  SensorFigures position, length;
+  position.glow_position = {0, 0.5};
+  length.glow_length = 0.2;
+  expect_refused(position, "--glow-position does nothing without --glow");
+  expect_refused(length, "--glow-length does nothing without --glow");
+  for (SensorFigures given : {position, length}) {
+    given.glow_e_per_s = 1;
+    EXPECT_TRUE(check(given));
+  }
+}
+
 TEST(GivenFigures, WhatMultipliesDarkCurrentNeedsDarkCurrent) {
   SensorFigures dsnu, temperature, doubling;
   dsnu.dsnu = 0.1;

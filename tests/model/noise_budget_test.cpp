@@ -110,6 +110,8 @@ TEST(CheckSensor, PassesBothEndsOfEveryRangeAndNothingBeyond) {
       {"hot pixel current", &SensorModel::hot_pixel_current_e_per_s, good_current, bad_current},
       {"telegraph fraction", &SensorModel::telegraph_fraction, good_fraction, bad_fraction},
       {"telegraph noise", &SensorModel::telegraph_e, good_noise, bad_noise},
+      {"glow", &SensorModel::glow_e_per_s, {0, 1e6}, {-1e-300, 1.0000001e6, nan, inf, -inf}},
+      {"glow length", &SensorModel::glow_length, {0.001, 10}, {0, 0.0009, 10.001, nan, inf, -inf}},
       {"row noise", &SensorModel::row_noise_e, good_noise, bad_noise},
       {"column noise", &SensorModel::column_noise_e, good_noise, bad_noise},
   };
@@ -144,6 +146,17 @@ TEST(CheckSensor, LooksAtTheDarkCurrentOfEachChannelAndAtTheBits) {
     s.black_level_dn = 0;
     s.white_level_dn = 1;
     EXPECT_EQ(static_cast<bool>(check_sensor(s)), possible) << bits;
+  }
+}
+
+TEST(CheckSensor, TheSourceOfTheGlowMayLieOutsideButNotFar) {
+  for (const int axis : {0, 1}) {
+    for (const auto& [part, possible] :
+         {std::pair{-1.0, true}, {2.0, true}, {-1.001, false}, {2.001, false}, {nan, false}, {inf, false}}) {
+      SensorModel s = good_sensor();
+      s.glow_position[axis] = part;
+      EXPECT_EQ(static_cast<bool>(check_sensor(s)), possible) << axis << " " << part;
+    }
   }
 }
 

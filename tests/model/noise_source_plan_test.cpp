@@ -38,10 +38,13 @@ SensorModel rich_sensor() {
   m.column_noise_e = 0.6;
   m.telegraph_fraction = 0.01;
   m.telegraph_e = 4;
+  m.glow_e_per_s = 40;
   return m;
 }
 
-BlockLevel grey(double level_e) { return {{level_e, level_e, level_e}, {level_e, level_e, level_e}, level_e}; }
+BlockLevel grey(double level_e) {
+  return {{level_e, level_e, level_e}, {level_e, level_e, level_e}, level_e, {3, 2, 4, 0.25}};
+}
 
 struct Case {
   SensorModel sensor = rich_sensor();
@@ -82,6 +85,7 @@ TEST(EffectNames, AreAsManyAsEffectsAllDifferent) {
   EXPECT_EQ(names[static_cast<int>(Effect::photon_noise)], "photon-noise");
   EXPECT_EQ(names[static_cast<int>(Effect::column_noise)], "column-noise");
   EXPECT_EQ(names[static_cast<int>(Effect::telegraph_noise)], "telegraph-noise");
+  EXPECT_EQ(names[static_cast<int>(Effect::amplifier_glow)], "amplifier-glow");
 }
 
 TEST(NoiseSourcePlan, ATinyToleranceKeepsEveryEffectThatIsThere) {
@@ -128,6 +132,7 @@ TEST(NoiseSourcePlan, EffectsTheSensorHasNotAreAbsent) {
   EXPECT_EQ(decisions[static_cast<std::size_t>(Effect::dark_current)].reason, Reason::absent);
   EXPECT_EQ(decisions[static_cast<std::size_t>(Effect::dsnu)].reason, Reason::absent);
   EXPECT_EQ(decisions[static_cast<std::size_t>(Effect::hot_pixels)].reason, Reason::absent);
+  EXPECT_EQ(decisions[static_cast<std::size_t>(Effect::amplifier_glow)].reason, Reason::absent);
 }
 
 TEST(NoiseSourcePlan, AskedForEffectsAreKeptAndAllOthersLeftOut) {
@@ -160,7 +165,7 @@ TEST(NoiseSourcePlan, DarkNonUniformityIsNothingWithoutDarkCurrent) {
 
 TEST(NoiseSourcePlan, BlocksOfADecadeMakeARegion) {
   Case c;
-  c.blocks = {grey(55), grey(0.5), grey(5), grey(50), {{2, 90, 1}, {2, 90, 1}, 95}, grey(0), grey(5.5)};
+  c.blocks = {grey(55), grey(0.5), grey(5), grey(50), {{2, 90, 1}, {2, 90, 1}, 95, grey(0).glow}, grey(0), grey(5.5)};
   const NoiseSourcePlan plan = c.plan({});
   ASSERT_EQ(plan.regions.size(), 4u);
   EXPECT_EQ(plan.region_of_block, (std::vector<std::uint8_t>{3, 1, 2, 3, 3, 0, 2}));
@@ -171,6 +176,18 @@ TEST(NoiseSourcePlan, BlocksOfADecadeMakeARegion) {
     EXPECT_EQ(plan.regions[r].darkest_e, darkest[r]);
     EXPECT_EQ(plan.regions[r].brightest_e, brightest[r]) << "the level of a block is its largest channel's";
   }
+}
+
+TEST(NoiseSourcePlan, BlocksOfADecadeOfGlowMakeARegion) {
+  Case c;
+  c.blocks = {grey(5), grey(50), grey(6), grey(7)};
+  c.blocks[0].glow = {0.2, 0.1, 0.3, 0};
+  c.blocks[3].glow = {0.9, 0.6, 1.2, 0.1};
+  const NoiseSourcePlan plan = c.plan({});
+  ASSERT_EQ(plan.regions.size(), 3u);
+  EXPECT_EQ(plan.region_of_block, (std::vector<std::uint8_t>{0, 2, 1, 0}));
+  EXPECT_EQ(plan.regions[0].glow_e, 0.9);
+  EXPECT_EQ(plan.regions[2].glow_e, 3);
 }
 
 TEST(NoiseSourcePlan, WhatIsLeftOutTogetherStaysBelowTheTolerance) {
@@ -224,13 +241,14 @@ TEST(PredictChange, IsNothingWhereNothingIsLeftOut) {
 
 TEST(PredictChange, IsAtLeastTheShareOfTheVarianceThatIsLeftOut) {
   const Case c;
-  // 1000 + 8 + 2.5^2 + (0.01 x 1000)^2 + (0.3 x 8)^2 + 0.8^2 + 0.6^2 e-^2 of green, and 4/12 for quantisation
-  const double whole = 1000 + 8 + 6.25 + 100 + 5.76 + 0.64 + 0.36 + 4.0 / 12;
+  // 1000 + 8 + 3 + 2.5^2 + (0.01 x 1000)^2 + (0.3 x 8)^2 + 0.8^2 + 0.6^2 e-^2 of green, and 4/12 for quantisation
+  const double whole = 1000 + 8 + 3 + 6.25 + 100 + 5.76 + 0.64 + 0.36 + 4.0 / 12;
   const struct {
     Effect effect;
     double variance_e2;
-  } shares[] = {{Effect::photon_noise, 1000}, {Effect::read_noise, 6.25}, {Effect::prnu, 100},
-                {Effect::dsnu, 5.76},         {Effect::row_noise, 0.64},  {Effect::column_noise, 0.36}};
+  } shares[] = {{Effect::amplifier_glow, 3}, {Effect::photon_noise, 1000}, {Effect::read_noise, 6.25},
+                {Effect::prnu, 100},         {Effect::dsnu, 5.76},         {Effect::row_noise, 0.64},
+                {Effect::column_noise, 0.36}};
   for (const auto& share : shares) {
     const PredictedChange change =
         predict_change(c.sensor, c.exposure, c.developing(), c.blocks[0], NoiseSourceSet::all().without(share.effect));

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "capture/synthetic/block_levels.h"
 #include "capture/synthetic/readout.h"
 #include "capture/synthetic/sensor_sim.h"
 #include "isp/base/executor.h"
@@ -114,6 +115,9 @@ SensorModel any_sensor() {
   out.dsnu = any_between(0, 0.5);
   out.hot_pixel_fraction = any_between(0, 0.01);
   out.hot_pixel_current_e_per_s = any_between(0, 500);
+  out.glow_e_per_s = any_between(0, 100);
+  out.glow_position = {any_between(-1, 2), any_between(-1, 2)};
+  out.glow_length = any_decade(-3, 1);
   out.row_noise_e = any_between(0, 2);
   out.column_noise_e = any_between(0, 2);
   return out;
@@ -126,7 +130,7 @@ struct Setup {
   BayerPhase phase = any_phase();
   Plane<float> rate_e_per_s =
       any_plane(size_between(2, 100), size_between(2, 70), 0, static_cast<float>(any_decade(0, 5)));
-  std::vector<isp::BlockLevel> blocks = capture::block_levels(rate_e_per_s.view(), phase, exposure.time_s);
+  std::vector<isp::BlockLevel> blocks = capture::block_levels(frame(0));
   isp::Developing developing = isp::developing_of(sensor, exposure, identity3(), {1, 1, 1}, blocks);
 
   isp::NoiseSourcePlan plan_of(NoiseSourceSet effects) const {

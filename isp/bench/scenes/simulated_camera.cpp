@@ -61,6 +61,7 @@ NamedSensor effects_camera() {
   camera.model.hot_pixel_fraction = 2e-4;  // a few in the smallest images too
   camera.model.telegraph_fraction = 0.01;
   camera.model.telegraph_e = 3;
+  camera.model.glow_e_per_s = 5;
   return camera;
 }
 

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "capture/synthetic/block_levels.h"
 #include "capture/synthetic/sensor_sim.h"
 #include "capture/synthetic/synthetic_source.h"
 #include "isp/bench/peers/nl_means.h"
@@ -69,10 +70,10 @@ class EffectsLight {
       auto source = capture::SyntheticSource::of(bench_scene(picture, light.white_cd_m2), out.camera_, bench_response(),
                                                  {.exposure = light.exposure()}, executor);
       if (!source) return tl::make_unexpected(source.error());
-      auto blocks = out.block_levels_of(*source);
       Plane<float> dn(source->rate_e_per_s().width(), source->rate_e_per_s().height());
-      out.shots_.push_back({*std::move(source), std::move(blocks), std::move(dn)});
+      out.shots_.push_back({*std::move(source), {}, std::move(dn)});
       PictureShot& shot = out.shots_.back();
+      shot.blocks = capture::block_levels(out.frame_of(shot));
       capture::read_out(out.frame_of(shot), out.plan_of(shot, choices().front()), executor, shot.all_dn.view());
       out.megapixels_ += 1e-6 * static_cast<double>(shot.all_dn.size());
       out.most_width_ = std::max(out.most_width_, shot.all_dn.width());
@@ -135,9 +136,6 @@ class EffectsLight {
  private:
   explicit EffectsLight(const BenchLight& light) : light_(light), camera_(effects_camera()) {}
 
-  std::vector<BlockLevel> block_levels_of(const capture::SyntheticSource& source) const {
-    return capture::block_levels(source.rate_e_per_s().view(), BayerPhase::rggb, light_.time_s);
-  }
   capture::SensorFrame frame_of(const PictureShot& shot) const {
     return {.sensor = camera_.model,
             .exposure = light_.exposure(),

@@ -171,6 +171,16 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
   figure("--hot-current", "E_PER_S", "mean dark current of hot pixels", f.hot_pixel_current_e_per_s);
   figure("--telegraph-pixels", "RATIO", "fraction of pixels with random telegraph noise", f.telegraph_fraction);
   figure("--telegraph-noise", "E", "mean distance of their two levels", f.telegraph_e);
+  figure("--glow", "E_PER_S", "amplifier glow: its dark current at its source", f.glow_e_per_s);
+  add_text(app, "--glow-position", "X,Y", "of the source, in widths and heights (default 1,1: lower right corner)",
+           [&f](const std::string& text) -> Wrong {
+             const auto n = numbers_of(text, 2);
+             if (!n || n->size() != 2) return "is not two numbers";
+             f.glow_position = {(*n)[0], (*n)[1]};
+             return std::nullopt;
+           })
+      ->group("Sensor figures");
+  figure("--glow-length", "RATIO", "over which it falls by e, in diagonals (default 0.1)", f.glow_length);
   figure("--row-noise", "E", "standard deviation", f.row_noise_e);
   figure("--column-noise", "E", "standard deviation", f.column_noise_e);
   figure("--pixel-pitch", "UM", "side of a pixel", f.pixel_pitch_um);

@@ -44,6 +44,7 @@ Json region_json(const isp::RegionPlan& region, isp::NoiseSourceSet wanted) {
   }
   return {{"darkest_e", region.darkest_e},
           {"brightest_e", region.brightest_e},
+          {"glow_e", region.glow_e},
           {"blocks", region.blocks},
           {"left_out_delta_e", region.left_out_together.delta_e},
           {"left_out_relative_variance", region.left_out_together.relative_variance},
@@ -74,6 +75,9 @@ Json sensor_json(const isp::NamedSensor& sensor) {
           {"hot_pixel_current_e_per_s", m.hot_pixel_current_e_per_s},
           {"telegraph_fraction", m.telegraph_fraction},
           {"telegraph_e", m.telegraph_e},
+          {"glow_e_per_s", m.glow_e_per_s},
+          {"glow_position", m.glow_position},
+          {"glow_length", m.glow_length},
           {"row_noise_e", m.row_noise_e},
           {"column_noise_e", m.column_noise_e}};
 }
@@ -93,7 +97,9 @@ std::string explain_text(const SimulateArgs& args, const SimulateOutcome& outcom
   std::string text;
   auto out = std::back_inserter(text);
   for (const isp::RegionPlan& region : plan.regions) {
-    fmt::format_to(out, "{} blocks of {:.3g} to {:.3g} e-\n", region.blocks, region.darkest_e, region.brightest_e);
+    const std::string glow = region.glow_e > 0 ? fmt::format(", glow up to {:.3g} e-", region.glow_e) : "";
+    fmt::format_to(out, "{} blocks of {:.3g} to {:.3g} e-{}\n", region.blocks, region.darkest_e, region.brightest_e,
+                   glow);
     fmt::format_to(out, "  {:<15} {:>10} {:>12}  {:<9} {}\n", "effect", "delta E", "variance", "decision", "because");
     for (const isp::NoiseSourceDecision& d : region.decisions) {
       fmt::format_to(out, "  {:<15} {:>10.3g} {:>12.3g}  {:<9} {}\n", name_of(d.effect), d.alone.delta_e,

@@ -22,6 +22,7 @@ Result<void> check_given_figures(const SensorFigures& given, const NamedSensor& 
   const bool no_dark = std::ranges::all_of(m.dark_current_e_per_s, [](double rate) { return rate == 0; });
   const bool no_pitch = !sensor.peak_quantum_efficiency && !optics.white_luminance_cd_m2;
   constexpr const char* no_dark_current = "the sensor has no dark current";
+  constexpr const char* no_glow = "the sensor has no amplifier glow";
   const Useless options[] = {
       {positive(given.hot_pixel_fraction) && m.hot_pixel_current_e_per_s == 0, "--hot-pixels", "--hot-current",
        "hot pixels differ from others by their dark current"},
@@ -31,6 +32,8 @@ Result<void> check_given_figures(const SensorFigures& given, const NamedSensor& 
        "its pixels differ from others by their two levels"},
       {positive(given.telegraph_e) && m.telegraph_fraction == 0, "--telegraph-noise", "--telegraph-pixels",
        "no pixel of the sensor has telegraph noise"},
+      {given.glow_position && m.glow_e_per_s == 0, "--glow-position", "--glow", no_glow},
+      {given.glow_length && m.glow_e_per_s == 0, "--glow-length", "--glow", no_glow},
       {positive(given.dsnu) && no_dark, "--dsnu", "--dark-current", no_dark_current},
       {given.dark_temperature_c && no_dark, "--dark-temperature", "--dark-current", no_dark_current},
       {given.dark_doubling_c && no_dark, "--dark-doubling", "--dark-current", no_dark_current},

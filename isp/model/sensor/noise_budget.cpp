@@ -41,6 +41,26 @@ Result<void> check_dark_law(const SensorModel& s) {
   return {};
 }
 
+/// Rejects a glow unless its rate lies within 0..1e6 e-/s, its position within -1..2 widths and heights, and its length
+/// within 0.001..10 diagonals.
+Result<void> check_glow(const SensorModel& sensor) {
+  const auto wrong = [&](const std::string& limits, double found) {
+    return fail(ErrorCode::invalid_argument, limits + ", found " + six_digits(found), sensor.name);
+  };
+  if (!(sensor.glow_e_per_s >= 0) || !(sensor.glow_e_per_s <= 1e6)) {
+    return wrong("the amplifier glow must lie between 0 and 1e6 e-/s", sensor.glow_e_per_s);
+  }
+  for (const double part : sensor.glow_position) {
+    if (!(part >= -1) || !(part <= 2)) {
+      return wrong("the position of the amplifier glow must lie between -1 and 2 widths and heights", part);
+    }
+  }
+  if (!(sensor.glow_length >= 0.001) || !(sensor.glow_length <= 10)) {
+    return wrong("the length of the amplifier glow must lie between 0.001 and 10 diagonals", sensor.glow_length);
+  }
+  return {};
+}
+
 Result<void> check_not_negative(const SensorModel& s) {
   for (const Named& figure : std::initializer_list<Named>{{"read noise", s.read_noise_e},
                                                           {"dark current of red", s.dark_current_e_per_s[0]},
@@ -107,6 +127,7 @@ Result<void> check_sensor(const SensorModel& s) {
     if (share.value > 1)
       return wrong(std::string("the ") + share.name + " is at most 1, found " + six_digits(share.value));
   }
+  if (auto good = check_glow(s); !good) return good;
   return check_dark_law(s);
 }
 

@@ -12,8 +12,8 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::array<std::string_view, effect_count> names{
-    "photon-noise", "dark-current", "read-noise", "quantisation", "clipping",       "prnu",
-    "dsnu",         "hot-pixels",   "row-noise",  "column-noise", "telegraph-noise"};
+    "photon-noise", "dark-current", "read-noise", "quantisation", "clipping",        "prnu",
+    "dsnu",         "hot-pixels",   "row-noise",  "column-noise", "telegraph-noise", "amplifier-glow"};
 
 /// Limits the fraction of the tolerance that predictions may use up. They assume normal distributions, which do not
 /// hold near saturation and at a few electrons.
@@ -38,6 +38,8 @@ bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
       return s.hot_pixel_fraction > 0 && s.hot_pixel_current_e_per_s > 0 && exposure.time_s > 0;
     case Effect::telegraph_noise:
       return telegraph_variance_e2(s) > 0;
+    case Effect::amplifier_glow:
+      return s.glow_e_per_s > 0 && exposure.time_s > 0;
     case Effect::row_noise:
       return s.row_noise_e > 0;
     case Effect::column_noise:
@@ -52,32 +54,43 @@ bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
 
 double level_of(const BlockLevel& block) { return *std::max_element(block.signal_e.begin(), block.signal_e.end()); }
 
-/// Returns the decade of a level; levels below a thousandth of an electron share a decade, and so do those above 1e9.
-int decade_of(double level_e) { return static_cast<int>(std::floor(std::log10(std::clamp(level_e, 1e-3, 1e9)))); }
+/// Returns the decade of a level; levels below the least one share its decade, and so do those above 1e9.
+int decade_of(double level_e, double least_e) {
+  return static_cast<int>(std::floor(std::log10(std::clamp(level_e, least_e, 1e9))));
+}
 
-/// Returns the blocks a region is evaluated by: sorted by level, its extremes and others between, and the extremes of
-/// each channel.
+/// Returns the blocks a region is evaluated by: its extremes by level and others evenly between them, the extremes of
+/// each channel and of the glow.
 std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vector<std::size_t> members) {
+  std::vector<std::size_t> chosen;
   const auto by = [&](auto key) {
     return [&blocks, key](std::size_t a, std::size_t b) { return key(blocks[a]) < key(blocks[b]); };
   };
-  std::vector<BlockLevel> samples;
-  samples.reserve(10 + max_samples);
-  samples.push_back(
-      blocks[*std::max_element(members.begin(), members.end(), by([](const BlockLevel& b) { return b.peak_e; }))]);
+  const auto add_most = [&](auto key) {
+    const std::size_t most = *std::max_element(members.begin(), members.end(), by(key));
+    if (key(blocks[most]) != 0) chosen.push_back(most);  // 0: the sensor does not have the effect
+  };
+  chosen.push_back(*std::max_element(members.begin(), members.end(), by([](const BlockLevel& b) { return b.peak_e; })));
   for (int c = 0; c < 3; ++c) {
-    samples.push_back(blocks[*std::min_element(members.begin(), members.end(),
-                                               by([c](const BlockLevel& b) { return b.darkest_e[c]; }))]);
+    chosen.push_back(
+        *std::min_element(members.begin(), members.end(), by([c](const BlockLevel& b) { return b.darkest_e[c]; })));
     const auto [low, high] =
         std::minmax_element(members.begin(), members.end(), by([c](const BlockLevel& b) { return b.signal_e[c]; }));
-    samples.push_back(blocks[*low]);
-    samples.push_back(blocks[*high]);
+    chosen.push_back(*low);
+    chosen.push_back(*high);
   }
+  add_most([](const BlockLevel& b) { return b.glow.mean_e; });
+  add_most([](const BlockLevel& b) { return -b.glow.mean_e; });
   std::sort(members.begin(), members.end(), by(level_of));
   const std::size_t count = std::min<std::size_t>(members.size(), max_samples);
   for (std::size_t i = 0; i < count; ++i) {
-    samples.push_back(blocks[members[count == 1 ? 0 : i * (members.size() - 1) / (count - 1)]]);
+    chosen.push_back(members[count == 1 ? 0 : i * (members.size() - 1) / (count - 1)]);
   }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  std::vector<BlockLevel> samples;
+  samples.reserve(chosen.size());
+  for (const std::size_t i : chosen) samples.push_back(blocks[i]);
   return samples;
 }
 
@@ -145,10 +158,13 @@ void drop_negligible(const Region& region, const Tolerance& tolerance, RegionPla
   }
 }
 
-/// Groups the blocks into regions by decade.
+/// Groups the blocks into regions by the decades of their level and glow: at most 13 x 16. In the dark, where white is
+/// that of the noise, a hundredth of an electron of glow can be visible.
 std::vector<std::vector<std::size_t>> group(std::span<const BlockLevel> blocks) {
-  std::map<int, std::vector<std::size_t>> decades;
-  for (std::size_t i = 0; i < blocks.size(); ++i) decades[decade_of(level_of(blocks[i]))].push_back(i);
+  std::map<std::pair<int, int>, std::vector<std::size_t>> decades;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    decades[{decade_of(level_of(blocks[i]), 1e-3), decade_of(blocks[i].glow.mean_e, 1e-6)}].push_back(i);
+  }
   std::vector<std::vector<std::size_t>> regions;
   regions.reserve(decades.size());
   for (auto& decade : decades) regions.push_back(std::move(decade.second));
@@ -169,6 +185,7 @@ NoiseSourcePlan plan_regions(const SensorModel& sensor, const Exposure& exposure
       plan.region_of_block[i] = static_cast<std::uint8_t>(plan.regions.size());
       r.darkest_e = std::min(r.darkest_e, level_of(blocks[i]));
       r.brightest_e = std::max(r.brightest_e, level_of(blocks[i]));
+      r.glow_e = std::max(r.glow_e, blocks[i].glow.mean_e);
     }
     r.decisions = decisions_alone(region);
     for (const NoiseSourceDecision& d : r.decisions) {

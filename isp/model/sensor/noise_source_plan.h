@@ -26,8 +26,9 @@ enum class Effect : std::uint8_t {
   row_noise,        // an offset for each row and frame
   column_noise,     // an offset for each column
   telegraph_noise,  // a few pixels move between two levels
+  amplifier_glow,   // additional charge around a point, and its Poisson fluctuation
 };
-inline constexpr int effect_count = 11;
+inline constexpr int effect_count = 12;
 
 /// Returns "photon-noise", "dark-current"... in the order of Effect.
 std::span<const std::string_view> effect_names();
@@ -70,6 +71,10 @@ struct BlockLevel {
   Vector3 signal_e{};   // mean signal of its R, G and B pixels
   Vector3 darkest_e{};  // signal of its darkest R, G and B pixels: a star's block is dark around it
   double peak_e = 0;    // signal of its brightest pixel
+  struct Glow {
+    double mean_e = 0, least_e = 0, peak_e = 0;  // of its pixels
+    double variance_e2 = 0;                      // of the means of its pixels: the glow falls off
+  } glow;
 };
 
 /// Describes how block means become colours, in which the tolerance is measured.
@@ -114,6 +119,7 @@ struct NoiseSourceDecision {
 struct RegionPlan {
   double darkest_e = 0;  // lowest level of the blocks: that of the largest channel
   double brightest_e = 0;
+  double glow_e = 0;  // largest mean glow of the blocks
   int blocks = 0;
   NoiseSourceSet kept = NoiseSourceSet::all();
   PredictedChange left_out_together;
@@ -127,8 +133,8 @@ struct NoiseSourcePlan {
   std::vector<std::uint8_t> region_of_block;
 };
 
-/// Decides by the closed forms. Blocks whose levels differ by decades are different regions; in each, effects are left
-/// out smallest first as long as all that is left out together is predicted to stay below the tolerance.
+/// Decides by the closed forms. Blocks whose levels or glow differ by decades are different regions; in each, effects
+/// are left out smallest first as long as all that is left out together is predicted to stay below the tolerance.
 /// @param blocks of the frame, row by row; not empty
 NoiseSourcePlan plan_noise_sources(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
                                    std::span<const BlockLevel> blocks, const Tolerance& tolerance);

@@ -20,6 +20,9 @@ double square(double x) { return x * x; }
 /// Holds the mean charge of one channel's pixels by origin [e-].
 struct Charge {
   double signal, dark, hot;  // hot: additional charge of a hot pixel
+  double glow, glow_variance;
+
+  double level() const { return signal + dark + glow; }  // of all pixels but the hot ones
 };
 
 /// Holds the kept part of one channel without hot pixels: mean, and variance by how pixels share it [e-, e-^2].
@@ -39,6 +42,10 @@ Budget budget_of(const SensorModel& s, const Charge& q, NoiseSourceSet kept) {
     b.collected_mean += q.dark;
     b.collected_variance += q.dark;
     if (kept.has(Effect::dsnu)) b.collected_variance += square(s.dsnu * q.dark);
+  }
+  if (kept.has(Effect::amplifier_glow)) {
+    b.collected_mean += q.glow;
+    b.collected_variance += q.glow;
   }
   if (kept.has(Effect::read_noise)) b.pixel_variance += square(s.read_noise_e);
   if (kept.has(Effect::row_noise)) b.line_variance += square(s.row_noise_e);
@@ -140,9 +147,9 @@ double count_in_block(double fraction) {
 /// saturation if clipping is.
 double changed_charge_of_hot_pixel(const SensorModel& s, const Charge& q, NoiseSourceSet kept) {
   if (q.hot == 0) return 0;
-  const double hot = q.hot * hottest, room = saturation_charge_e(s) - q.signal - q.dark;
+  const double hot = q.hot * hottest, room = saturation_charge_e(s) - q.level();
   if (!kept.has(Effect::hot_pixels)) return kept.has(Effect::clipping) ? std::clamp(room, 0.0, hot) : hot;
-  const double noise = sigmas * std::sqrt(q.signal + q.dark + hot + square(s.read_noise_e));
+  const double noise = sigmas * std::sqrt(q.level() + hot + square(s.read_noise_e));
   return kept.has(Effect::clipping) ? 0 : std::max(0.0, hot + noise - room);
 }
 
@@ -164,11 +171,19 @@ TelegraphChange telegraph_change(const SensorModel& s, const Charge& q, NoiseSou
     return {k * mean, k * k * (variance + spread + square(largest) / channel_pixels)};
   }
   if (kept.has(Effect::clipping)) return {};
-  const double noise = sigmas * std::sqrt(q.signal + q.dark + square(s.read_noise_e));
-  const double level = q.signal + q.dark, room = std::min(saturation_charge_e(s) - level, s.black_level_dn / k + level);
+  const double noise = sigmas * std::sqrt(q.level() + square(s.read_noise_e));
+  const double level = q.level(), room = std::min(saturation_charge_e(s) - level, s.black_level_dn / k + level);
   const double beyond = k * std::clamp(largest + noise - room, 0.0, largest);
   const double share = count_in_block(s.telegraph_fraction) / channel_pixels;
   return {share * beyond, share * square(beyond)};
+}
+
+/// Returns by how much the slope of the glow in a block may change the variance, if glow is left out [DN^2]: the
+/// variance of its means, and its covariance with the slopes of the scene, which are no larger than what is seen.
+double glow_slope_change(const SensorModel& s, const Charge& q, NoiseSourceSet kept, double seen_dn2) {
+  if (kept.has(Effect::amplifier_glow)) return 0;
+  const double slope_dn2 = square(s.system_gain_dn_per_e) * q.glow_variance;
+  return slope_dn2 + 2 * std::sqrt(slope_dn2 * seen_dn2);
 }
 
 /// Holds bounds on the changes in one channel of a block.
@@ -205,7 +220,7 @@ ChannelChange channel_change(const SensorModel& s, const Charge& q, NoiseSourceS
   const double slope = std::max(all.variance_slope_dn, left.variance_slope_dn);
   const double moved =
       std::fabs(left.dn.variance - all.dn.variance) + rounding_variance + hot_variance + telegraph.variance_dn2 +
-      beyond +
+      beyond + glow_slope_change(s, q, kept, larger) +
       sigmas * (pixel * std::sqrt(2 / pixels) + line * std::sqrt(2 / std::min(block_lines, pixels)) +
                 2 * std::sqrt((pixel + line + telegraph.variance_dn2) * larger / pixels)) +
       slope * (std::fabs(out.shift_dn) + sigmas * std::sqrt(pixel / channel_pixels + line / block_lines));
@@ -214,9 +229,11 @@ ChannelChange channel_change(const SensorModel& s, const Charge& q, NoiseSourceS
   return out;
 }
 
-Charge charge_of(const SensorModel& s, const Exposure& exposure, int channel, double signal_e) {
+Charge charge_of(const SensorModel& s, const Exposure& exposure, int channel, double signal_e,
+                 const BlockLevel::Glow& glow) {
   const double time_factor = exposure.time_s * dark_current_factor(s, exposure.temperature_c);
-  return {signal_e, dark_mean_e(s, exposure)[channel], s.hot_pixel_current_e_per_s * time_factor};
+  return {signal_e, dark_mean_e(s, exposure)[channel], s.hot_pixel_current_e_per_s * time_factor, glow.mean_e,
+          glow.variance_e2};
 }
 
 Lab lab_of_dn(const SensorModel& s, const Developing& developing, const Vector3& dn) {
@@ -245,11 +262,11 @@ double farthest(const SensorModel& s, const Developing& developing, const Vector
 }
 
 PredictedChange change_at(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                          const Vector3& signal_e, NoiseSourceSet kept) {
+                          const Vector3& signal_e, const BlockLevel::Glow& glow, NoiseSourceSet kept) {
   PredictedChange out;
   Vector3 mean{}, shift{}, scatter{};
   for (int c = 0; c < 3; ++c) {
-    const Charge charge = charge_of(sensor, exposure, c, signal_e[c]);
+    const Charge charge = charge_of(sensor, exposure, c, signal_e[c], glow);
     mean[c] = moments_of(sensor, budget_of(sensor, charge, NoiseSourceSet::all()), NoiseSourceSet::all()).dn.mean;
     const ChannelChange change = channel_change(sensor, charge, kept);
     shift[c] = change.shift_dn;
@@ -277,7 +294,7 @@ Developing developing_of(const SensorModel& sensor, const Exposure& exposure, co
   }
   level = std::min(level, saturation_charge_e(sensor));
   for (int c = 0; c < 3; ++c) {
-    const Budget black = budget_of(sensor, charge_of(sensor, exposure, c, 0), NoiseSourceSet::all());
+    const Budget black = budget_of(sensor, charge_of(sensor, exposure, c, 0, {}), NoiseSourceSet::all());
     const double variance_e2 = black.collected_variance + black.pixel_variance + black.line_variance +
                                1 / (12 * square(sensor.system_gain_dn_per_e));
     level = std::max(level, std::sqrt(variance_e2) / (black_noise_of_white * neutral[c]));
@@ -287,11 +304,14 @@ Developing developing_of(const SensorModel& sensor, const Exposure& exposure, co
 
 PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
                                const BlockLevel& block, NoiseSourceSet kept) {
-  PredictedChange out = larger(change_at(sensor, exposure, developing, block.signal_e, kept),
-                               change_at(sensor, exposure, developing, block.darkest_e, kept));
+  BlockLevel::Glow least = block.glow, most = block.glow;
+  least.mean_e = block.glow.least_e;
+  most.mean_e = block.glow.peak_e;
+  PredictedChange out = larger(change_at(sensor, exposure, developing, block.signal_e, block.glow, kept),
+                               change_at(sensor, exposure, developing, block.darkest_e, least, kept));
   if (kept.has(Effect::clipping)) return out;
   // The mean of a block does not show the loss of its brightest pixel: a block as bright as that is predicted too.
-  const PredictedChange peak = change_at(sensor, exposure, developing, {block.peak_e, block.peak_e, block.peak_e},
+  const PredictedChange peak = change_at(sensor, exposure, developing, {block.peak_e, block.peak_e, block.peak_e}, most,
                                          NoiseSourceSet::all().without(Effect::clipping));
   return larger(out, peak);
 }

@@ -30,6 +30,9 @@ struct SensorFigures {
   std::optional<double> hot_pixel_current_e_per_s;
   std::optional<double> telegraph_fraction;
   std::optional<double> telegraph_e;
+  std::optional<double> glow_e_per_s;
+  std::optional<std::array<double, 2>> glow_position;
+  std::optional<double> glow_length;
   std::optional<double> row_noise_e;
   std::optional<double> column_noise_e;
   std::optional<double> pixel_pitch_um;
