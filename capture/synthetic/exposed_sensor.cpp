@@ -127,8 +127,8 @@ void ExposedSensor::choose_storage() {
 
 SensorFrame ExposedSensor::sensor_frame(std::uint32_t index, const PhotonRows* photons) const {
   const SyntheticOptions& options = camera_.options;
-  return {camera_.sensor.model, options.exposure,    options.phase, rate_e_per_s_.view(), photons,
-          options.seed,         options.sensor_seed, index};
+  return {camera_.sensor.model, options.exposure,    options.phase, rate_e_per_s_.view(),  photons,
+          options.seed,         options.sensor_seed, index,         options.masked_columns};
 }
 
 Plane<float> ExposedSensor::frame_dn(std::uint32_t index, const PhotonRows* photons, Executor& executor) const {

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "capture/synthetic/crosstalk.h"
 #include "capture/synthetic/fixed_pattern.h"
 #include "capture/synthetic/readout.h"
 #include "isp/base/random/random.h"
@@ -66,6 +67,9 @@ class RowReadout {
     const auto time = static_cast<float>(frame_.exposure.time_s);
     if (frame_.photons != nullptr && kept.has(Effect::photon_noise)) {
       frame_.photons->collect(frame_.seed, frame_.frame, run.x0, run.y, frame_.exposure.time_s, signal);
+    } else if (kept.has(Effect::crosstalk) && frame_.sensor.crosstalk > 0) {
+      mix_neighbours(frame_.rate_e_per_s, {frame_.sensor.crosstalk, frame_.masked_columns}, run.x0, run.y, signal);
+      for (float& value : signal) value *= time;
     } else {
       const float* rate = frame_.rate_e_per_s.row(run.y) + run.x0;
       for (std::size_t i = 0; i < signal.size(); ++i) signal[i] = rate[i] * time;

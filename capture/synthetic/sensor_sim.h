@@ -23,6 +23,7 @@ struct SensorFrame {
   std::uint64_t seed = 0;               // of the noise that is drawn for each frame
   std::uint64_t pattern_seed = 0;       // of the fixed pattern: PRNU, DSNU, hot pixels, columns
   std::uint32_t frame = 0;
+  int masked_columns = 0;  // at the left: light-shielded, without crosstalk
 };
 
 /// Reads out the frame in DN, as floats in the form the plan keeps: integers where quantisation is kept, signed values

@@ -35,7 +35,7 @@ Result<CameraColour> colour_of(const isp::NamedSensor& sensor, const SpectralRes
   return colour;
 }
 
-Result<void> check_options(const SyntheticOptions& options) {
+Result<void> check_options(const SensorModel& sensor, const SyntheticOptions& options) {
   if (options.masked_columns < 0 || options.masked_columns > 4096 || options.masked_columns % 2 != 0) {
     return fail(ErrorCode::invalid_argument, "masked columns are an even number between 0 and 4096");
   }
@@ -45,6 +45,11 @@ Result<void> check_options(const SyntheticOptions& options) {
   if (options.sampling == PhotonSampling::published && options.effects.tolerance) {
     return fail(ErrorCode::invalid_argument,
                 "the planner knows the variance of physical photons only: name the effects of published sampling");
+  }
+  if (options.sampling == PhotonSampling::published && sensor.crosstalk > 0 &&
+      options.effects.effects.has(isp::Effect::crosstalk)) {
+    return fail(ErrorCode::invalid_argument,
+                "published photon sampling draws each pixel by itself: leave crosstalk out of the effects");
   }
   if (!(options.f_number >= 0.5) || !(options.f_number <= 1000)) {
     return fail(ErrorCode::invalid_argument, "the f-number must lie between 0.5 and 1000");
@@ -58,7 +63,7 @@ Result<SyntheticCamera> make_camera(isp::NamedSensor sensor, const SpectralRespo
                                     const SyntheticOptions& options) {
   if (const auto good = isp::check_sensor(sensor.model); !good) return tl::make_unexpected(good.error());
   if (const auto good = isp::check_exposure(options.exposure); !good) return tl::make_unexpected(good.error());
-  if (const auto good = check_options(options); !good) return tl::make_unexpected(good.error());
+  if (const auto good = check_options(sensor.model, options); !good) return tl::make_unexpected(good.error());
   auto colour = colour_of(sensor, response, white);
   if (!colour) return tl::make_unexpected(colour.error());
   const auto seen = isp::white_of_neutral(*colour, *colour->as_shot_neutral);

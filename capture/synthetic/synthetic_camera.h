@@ -44,7 +44,8 @@ struct SyntheticCamera {
 /// Makes a camera whose white balance is that of a white.
 /// @param white radiance of a white diffuser in the scene
 /// Errors: an invalid sensor or exposure; masked columns that are odd, negative or more than 4096; a tolerance that is
-/// not above 0, or with published sampling, which the planner does not support; an f-number outside 0.5..1000.
+/// not above 0, or with published sampling, which the planner does not support; crosstalk with
+/// published sampling; an f-number outside 0.5..1000.
 Result<SyntheticCamera> make_camera(isp::NamedSensor sensor, const SpectralResponse& response, const Spectrum& white,
                                     const SyntheticOptions& options);
 

@@ -41,6 +41,7 @@ struct SensorModel {
   /// Random telegraph noise: a trap in the transistor of a pixel moves its signal between two levels.
   double telegraph_fraction = 0;  // fraction of all pixels that have a trap
   double telegraph_e = 0;         // mean distance of the levels, exponentially distributed
+  double crosstalk = 0;           // fraction of the light of a pixel that each of its four neighbours collects
   /// Amplifier glow: light of the output amplifier falls on the pixels around it (isp/model/sensor/amplifier_glow.h).
   double glow_e_per_s = 0;                    // at its source, the same at every temperature
   std::array<double, 2> glow_position{1, 1};  // of the source, in widths and heights from the upper left corner

@@ -64,6 +64,7 @@ isp::NamedSensor draw_sensor(Draws& draws) {
   figures.column_noise_e = draws.log_uniform(0.01, 3);
   figures.telegraph_fraction = draws.log_uniform(1e-4, 1);
   figures.telegraph_e = draws.log_uniform(0.1, 30);
+  figures.crosstalk = draws.log_uniform(1e-6, 0.05);
   figures.glow_e_per_s = draws.log_uniform(0.01, 1e4);
   figures.glow_position = {1.4 * draws.uniform() - 0.2, 1.4 * draws.uniform() - 0.2};
   figures.glow_length = draws.log_uniform(0.02, 1);

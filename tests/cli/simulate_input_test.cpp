@@ -97,6 +97,8 @@ TEST_F(SimulateInput, ImpossibleSensorsAreRefused) {
                 {{"--hot-current", "-1"}, "hot pixels"},
                 {{"--telegraph-pixels", "2", "--telegraph-noise", "1"}, "at most 1, found 2"},
                 {{"--telegraph-noise", "-1"}, "telegraph noise"},
+                {{"--crosstalk", "0.25"}, "between 0 and 0.2 of a pixel's light for each neighbour, found 0.25"},
+                {{"--crosstalk", "0.01", "--sampling", "published"}, "leave crosstalk out of the effects"},
                 {{"--glow", "2e6"}, "between 0 and 1e6 e-/s, found 2e+06"},
                 {{"--glow", "1", "--glow-position", "1,3"}, "between -1 and 2 widths and heights, found 3"},
                 {{"--glow", "1", "--glow-position", "1"}, "is not two numbers"},

@@ -110,6 +110,7 @@ TEST(CheckSensor, PassesBothEndsOfEveryRangeAndNothingBeyond) {
       {"hot pixel current", &SensorModel::hot_pixel_current_e_per_s, good_current, bad_current},
       {"telegraph fraction", &SensorModel::telegraph_fraction, good_fraction, bad_fraction},
       {"telegraph noise", &SensorModel::telegraph_e, good_noise, bad_noise},
+      {"crosstalk", &SensorModel::crosstalk, {0, 0.2}, {-1e-300, 0.2001, 1, nan, inf, -inf}},
       {"glow", &SensorModel::glow_e_per_s, {0, 1e6}, {-1e-300, 1.0000001e6, nan, inf, -inf}},
       {"glow length", &SensorModel::glow_length, {0.001, 10}, {0, 0.0009, 10.001, nan, inf, -inf}},
       {"row noise", &SensorModel::row_noise_e, good_noise, bad_noise},

@@ -39,11 +39,15 @@ SensorModel rich_sensor() {
   m.telegraph_fraction = 0.01;
   m.telegraph_e = 4;
   m.glow_e_per_s = 40;
+  m.crosstalk = 0.01;
   return m;
 }
 
+/// Flat blocks, with neighbours from which crosstalk adds a hundredth to green.
 BlockLevel grey(double level_e) {
-  return {{level_e, level_e, level_e}, {level_e, level_e, level_e}, level_e, {3, 2, 4, 0.25}};
+  BlockLevel out{{level_e, level_e, level_e}, {level_e, level_e, level_e}, level_e, {3, 2, 4, 0.25}};
+  out.crosstalk.mean_e = out.crosstalk.moved_e = {0, 0.01 * level_e, 0};
+  return out;
 }
 
 struct Case {
@@ -86,6 +90,7 @@ TEST(EffectNames, AreAsManyAsEffectsAllDifferent) {
   EXPECT_EQ(names[static_cast<int>(Effect::column_noise)], "column-noise");
   EXPECT_EQ(names[static_cast<int>(Effect::telegraph_noise)], "telegraph-noise");
   EXPECT_EQ(names[static_cast<int>(Effect::amplifier_glow)], "amplifier-glow");
+  EXPECT_EQ(names[static_cast<int>(Effect::crosstalk)], "crosstalk");
 }
 
 TEST(NoiseSourcePlan, ATinyToleranceKeepsEveryEffectThatIsThere) {
@@ -133,6 +138,7 @@ TEST(NoiseSourcePlan, EffectsTheSensorHasNotAreAbsent) {
   EXPECT_EQ(decisions[static_cast<std::size_t>(Effect::dsnu)].reason, Reason::absent);
   EXPECT_EQ(decisions[static_cast<std::size_t>(Effect::hot_pixels)].reason, Reason::absent);
   EXPECT_EQ(decisions[static_cast<std::size_t>(Effect::amplifier_glow)].reason, Reason::absent);
+  EXPECT_EQ(decisions[static_cast<std::size_t>(Effect::crosstalk)].reason, Reason::absent);
 }
 
 TEST(NoiseSourcePlan, AskedForEffectsAreKeptAndAllOthersLeftOut) {

@@ -88,6 +88,7 @@ TEST(SensorDb, FiguresGivenTakeThePlaceOfTheTablesAndOfAssumptions) {
   given.hot_pixel_current_e_per_s = 40;
   given.telegraph_fraction = 0.04;
   given.telegraph_e = 8;
+  given.crosstalk = 0.015;
   given.glow_e_per_s = 9;
   given.glow_position = {0.25, 0.75};
   given.glow_length = 0.3;
@@ -118,6 +119,7 @@ TEST(SensorDb, FiguresGivenTakeThePlaceOfTheTablesAndOfAssumptions) {
   EXPECT_EQ(m.hot_pixel_current_e_per_s, 40);
   EXPECT_EQ(m.telegraph_fraction, 0.04);
   EXPECT_EQ(m.telegraph_e, 8);
+  EXPECT_EQ(m.crosstalk, 0.015);
   EXPECT_EQ(m.glow_e_per_s, 9);
   EXPECT_EQ(m.glow_position, (std::array<double, 2>{0.25, 0.75}));
   EXPECT_EQ(m.glow_length, 0.3);

@@ -115,6 +115,7 @@ SensorModel any_sensor() {
   out.dsnu = any_between(0, 0.5);
   out.hot_pixel_fraction = any_between(0, 0.01);
   out.hot_pixel_current_e_per_s = any_between(0, 500);
+  out.crosstalk = any_between(0, 0.2);
   out.glow_e_per_s = any_between(0, 100);
   out.glow_position = {any_between(-1, 2), any_between(-1, 2)};
   out.glow_length = any_decade(-3, 1);

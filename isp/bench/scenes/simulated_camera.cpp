@@ -62,6 +62,7 @@ NamedSensor effects_camera() {
   camera.model.telegraph_fraction = 0.01;
   camera.model.telegraph_e = 3;
   camera.model.glow_e_per_s = 5;
+  camera.model.crosstalk = 0.01;
   return camera;
 }
 

@@ -25,7 +25,7 @@ namespace lowlux::isp {
 NamedSensor bench_camera();
 
 /// Returns bench_camera() with assumed values for the effects that are absent or rare in other stages' frames: hot
-/// pixels, random telegraph noise and amplifier glow.
+/// pixels, random telegraph noise, amplifier glow and crosstalk.
 NamedSensor effects_camera();
 
 /// Returns the response of both: a white of bench_full_cd_m2 under D65 fills it in 1 s.

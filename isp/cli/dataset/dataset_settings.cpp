@@ -39,6 +39,7 @@ constexpr std::array all_settings{
     Setting{"hot_pixel_current_e_per_s", "--hot-current", SettingKind::number},
     Setting{"telegraph_fraction", "--telegraph-pixels", SettingKind::number},
     Setting{"telegraph_e", "--telegraph-noise", SettingKind::number},
+    Setting{"crosstalk", "--crosstalk", SettingKind::number},
     Setting{"glow_e_per_s", "--glow", SettingKind::number},
     Setting{"glow_position", "--glow-position", SettingKind::text},
     Setting{"glow_length", "--glow-length", SettingKind::number},

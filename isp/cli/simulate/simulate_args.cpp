@@ -171,6 +171,7 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
   figure("--hot-current", "E_PER_S", "mean dark current of hot pixels", f.hot_pixel_current_e_per_s);
   figure("--telegraph-pixels", "RATIO", "fraction of pixels with random telegraph noise", f.telegraph_fraction);
   figure("--telegraph-noise", "E", "mean distance of their two levels", f.telegraph_e);
+  figure("--crosstalk", "RATIO", "fraction of a pixel's light that each of four neighbours collects", f.crosstalk);
   figure("--glow", "E_PER_S", "amplifier glow: its dark current at its source", f.glow_e_per_s);
   add_text(app, "--glow-position", "X,Y", "of the source, in widths and heights (default 1,1: lower right corner)",
            [&f](const std::string& text) -> Wrong {

@@ -75,6 +75,7 @@ Json sensor_json(const isp::NamedSensor& sensor) {
           {"hot_pixel_current_e_per_s", m.hot_pixel_current_e_per_s},
           {"telegraph_fraction", m.telegraph_fraction},
           {"telegraph_e", m.telegraph_e},
+          {"crosstalk", m.crosstalk},
           {"glow_e_per_s", m.glow_e_per_s},
           {"glow_position", m.glow_position},
           {"glow_length", m.glow_length},

@@ -127,6 +127,10 @@ Result<void> check_sensor(const SensorModel& s) {
     if (share.value > 1)
       return wrong(std::string("the ") + share.name + " is at most 1, found " + six_digits(share.value));
   }
+  if (!(s.crosstalk >= 0) || !(s.crosstalk <= largest_crosstalk)) {
+    return wrong("the crosstalk must lie between 0 and 0.2 of a pixel's light for each neighbour, found " +
+                 six_digits(s.crosstalk));
+  }
   if (auto good = check_glow(s); !good) return good;
   return check_dark_law(s);
 }

@@ -19,6 +19,9 @@ inline constexpr double largest_noise_e = 1e6;
 /// a mean beyond the limit fills the pixel in any case.
 inline constexpr double largest_full_well_e = 9.9e5;
 
+/// Limits the crosstalk that check_sensor() accepts: a pixel keeps as much of its light as each neighbour collects.
+inline constexpr double largest_crosstalk = 0.2;
+
 /// Describes the exposure of a frame.
 struct Exposure {
   double time_s = 1;

@@ -12,8 +12,8 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::array<std::string_view, effect_count> names{
-    "photon-noise", "dark-current", "read-noise", "quantisation", "clipping",        "prnu",
-    "dsnu",         "hot-pixels",   "row-noise",  "column-noise", "telegraph-noise", "amplifier-glow"};
+    "photon-noise", "dark-current", "read-noise",   "quantisation",    "clipping",       "prnu",     "dsnu",
+    "hot-pixels",   "row-noise",    "column-noise", "telegraph-noise", "amplifier-glow", "crosstalk"};
 
 /// Limits the fraction of the tolerance that predictions may use up. They assume normal distributions, which do not
 /// hold near saturation and at a few electrons.
@@ -38,6 +38,8 @@ bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
       return s.hot_pixel_fraction > 0 && s.hot_pixel_current_e_per_s > 0 && exposure.time_s > 0;
     case Effect::telegraph_noise:
       return telegraph_variance_e2(s) > 0;
+    case Effect::crosstalk:
+      return s.crosstalk > 0 && exposure.time_s > 0;
     case Effect::amplifier_glow:
       return s.glow_e_per_s > 0 && exposure.time_s > 0;
     case Effect::row_noise:
@@ -59,8 +61,22 @@ int decade_of(double level_e, double least_e) {
   return static_cast<int>(std::floor(std::log10(std::clamp(level_e, least_e, 1e9))));
 }
 
+/// Adds the members whose glow and whose change by crosstalk, relative to their noise, are extreme.
+template <class AddMost>
+void add_uneven_samples(const AddMost& add_most) {
+  add_most([](const BlockLevel& b) { return b.glow.mean_e; });
+  add_most([](const BlockLevel& b) { return -b.glow.mean_e; });
+  for (int c = 0; c < 3; ++c) {
+    add_most([c](const BlockLevel& b) { return std::fabs(b.crosstalk.mean_e[c]) / (1 + b.signal_e[c]); });
+    add_most([c](const BlockLevel& b) { return b.crosstalk.moved_e[c] / (1 + b.signal_e[c]); });
+    add_most([c](const BlockLevel& b) {
+      return std::fabs(b.crosstalk.more_contrast_e2[c]) / (1 + b.signal_e[c] + b.crosstalk.contrast_e2[c]);
+    });
+  }
+}
+
 /// Returns the blocks a region is evaluated by: its extremes by level and others evenly between them, the extremes of
-/// each channel and of the glow.
+/// each channel, of the glow and of crosstalk.
 std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vector<std::size_t> members) {
   std::vector<std::size_t> chosen;
   const auto by = [&](auto key) {
@@ -79,8 +95,7 @@ std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vect
     chosen.push_back(*low);
     chosen.push_back(*high);
   }
-  add_most([](const BlockLevel& b) { return b.glow.mean_e; });
-  add_most([](const BlockLevel& b) { return -b.glow.mean_e; });
+  add_uneven_samples(add_most);
   std::sort(members.begin(), members.end(), by(level_of));
   const std::size_t count = std::min<std::size_t>(members.size(), max_samples);
   for (std::size_t i = 0; i < count; ++i) {

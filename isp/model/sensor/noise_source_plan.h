@@ -27,8 +27,9 @@ enum class Effect : std::uint8_t {
   column_noise,     // an offset for each column
   telegraph_noise,  // a few pixels move between two levels
   amplifier_glow,   // additional charge around a point, and its Poisson fluctuation
+  crosstalk,        // neighbours exchange a fraction of their light
 };
-inline constexpr int effect_count = 12;
+inline constexpr int effect_count = 13;
 
 /// Returns "photon-noise", "dark-current"... in the order of Effect.
 std::span<const std::string_view> effect_names();
@@ -66,15 +67,21 @@ inline constexpr int effect_block = 32;
 /// Changes of variance below this are ignored [DN^2]: a block of integer codes cannot show them.
 inline constexpr double variance_floor_dn2 = 0.01;
 
-/// Holds the signal that a block of the scene gives to the sensor.
+/// Holds the signal that a block of the scene gives to the sensor, after crosstalk.
 struct BlockLevel {
   Vector3 signal_e{};   // mean signal of its R, G and B pixels
   Vector3 darkest_e{};  // signal of its darkest R, G and B pixels: a star's block is dark around it
-  double peak_e = 0;    // signal of its brightest pixel
+  double peak_e = 0;    // signal of its brightest pixel, with or without crosstalk
   struct Glow {
     double mean_e = 0, least_e = 0, peak_e = 0;  // of its pixels
     double variance_e2 = 0;                      // of the means of its pixels: the glow falls off
   } glow;
+  /// Describes what crosstalk adds to the signal of R, G and B pixels, here d.
+  struct Crosstalk {
+    Vector3 mean_e{}, moved_e{};                // means of d and of |d|
+    Vector3 variance_e2{};                      // of d
+    Vector3 contrast_e2{}, more_contrast_e2{};  // variance of the signal, and what d adds to it, often negative
+  } crosstalk;
 };
 
 /// Describes how block means become colours, in which the tolerance is measured.

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "isp/model/colour/colorimetry.h"
 #include "isp/model/colour/colour_difference.h"
@@ -21,6 +22,9 @@ double square(double x) { return x * x; }
 struct Charge {
   double signal, dark, hot;  // hot: additional charge of a hot pixel
   double glow, glow_variance;
+  struct {
+    double mean, moved, variance, contrast, more_contrast;
+  } crosstalk;  // see BlockLevel::Crosstalk
 
   double level() const { return signal + dark + glow; }  // of all pixels but the hot ones
 };
@@ -35,9 +39,10 @@ struct Budget {
 
 Budget budget_of(const SensorModel& s, const Charge& q, NoiseSourceSet kept) {
   Budget b;
-  b.collected_mean = q.signal;
-  if (kept.has(Effect::photon_noise)) b.collected_variance += q.signal;
-  if (kept.has(Effect::prnu)) b.collected_variance += square(s.prnu * q.signal);
+  const double signal = kept.has(Effect::crosstalk) ? q.signal : std::max(0.0, q.signal - q.crosstalk.mean);
+  b.collected_mean = signal;
+  if (kept.has(Effect::photon_noise)) b.collected_variance += signal;
+  if (kept.has(Effect::prnu)) b.collected_variance += square(s.prnu * signal);
   if (kept.has(Effect::dark_current)) {
     b.collected_mean += q.dark;
     b.collected_variance += q.dark;
@@ -125,6 +130,7 @@ ChangeVariance change_variance(const SensorModel& s, const Charge& q, NoiseSourc
             std::max(0.0, all.pixel_variance - left.pixel_variance);
   if (!kept.has(Effect::prnu)) v.pixel += std::min(0.25, s.prnu * q.signal);
   if (!kept.has(Effect::dsnu)) v.pixel += std::min(0.25, s.dsnu * q.dark);
+  if (!kept.has(Effect::crosstalk)) v.pixel += q.crosstalk.moved;
   if (!kept.has(Effect::quantisation)) v.pixel += 1 / (12 * square(s.system_gain_dn_per_e));
   return v;
 }
@@ -186,6 +192,22 @@ double glow_slope_change(const SensorModel& s, const Charge& q, NoiseSourceSet k
   return slope_dn2 + 2 * std::sqrt(slope_dn2 * seen_dn2);
 }
 
+/// Returns by how much the variance may change if crosstalk, which blurs the scene, is left out, relative to what is
+/// seen: the contrast of the scene in the block, and the covariance of the change with the noise.
+/// @param noise_dn2     variance of the noise
+/// @param pixels_error  five standard errors of the mean of the pixels' squares, relative to it: sigmas / sqrt(n)
+double crosstalk_contrast_change(const SensorModel& s, const Charge& q, NoiseSourceSet kept, double noise_dn2,
+                                 double pixels_error) {
+  if (kept.has(Effect::crosstalk)) return 0;
+  const double k2 = square(s.system_gain_dn_per_e);
+  const double moved =
+      k2 * std::fabs(q.crosstalk.more_contrast) + 2 * pixels_error * std::sqrt(k2 * q.crosstalk.variance * noise_dn2);
+  const double contrast_dn2 = k2 * q.crosstalk.contrast;
+  const double seen = noise_dn2 * (1 - pixels_error * std::numbers::sqrt2) + contrast_dn2 -
+                      2 * pixels_error * std::sqrt(contrast_dn2 * noise_dn2);  // a lower bound
+  return moved / std::max(seen, variance_floor_dn2);
+}
+
 /// Holds bounds on the changes in one channel of a block.
 struct ChannelChange {
   double shift_dn = 0;    // known shift of the mean
@@ -225,15 +247,23 @@ ChannelChange channel_change(const SensorModel& s, const Charge& q, NoiseSourceS
                 2 * std::sqrt((pixel + line + telegraph.variance_dn2) * larger / pixels)) +
       slope * (std::fabs(out.shift_dn) + sigmas * std::sqrt(pixel / channel_pixels + line / block_lines));
   const double seen = all.dn.variance * (1 - sigmas * std::sqrt(2 / pixels));  // lower bound of a block's variance
-  out.relative_variance = moved / std::max(seen, variance_floor_dn2);
+  out.relative_variance = moved / std::max(seen, variance_floor_dn2) +
+                          crosstalk_contrast_change(s, q, kept, all.dn.variance, sigmas / std::sqrt(pixels));
   return out;
 }
 
 Charge charge_of(const SensorModel& s, const Exposure& exposure, int channel, double signal_e,
-                 const BlockLevel::Glow& glow) {
+                 const BlockLevel& block) {
   const double time_factor = exposure.time_s * dark_current_factor(s, exposure.temperature_c);
-  return {signal_e, dark_mean_e(s, exposure)[channel], s.hot_pixel_current_e_per_s * time_factor, glow.mean_e,
-          glow.variance_e2};
+  const BlockLevel::Crosstalk& x = block.crosstalk;
+  // What saturates has less contrast than its light.
+  const double contrast_e2 = block.peak_e < saturation_charge_e(s) ? x.contrast_e2[channel] : 0;
+  return {signal_e,
+          dark_mean_e(s, exposure)[channel],
+          s.hot_pixel_current_e_per_s * time_factor,
+          block.glow.mean_e,
+          block.glow.variance_e2,
+          {x.mean_e[channel], x.moved_e[channel], x.variance_e2[channel], contrast_e2, x.more_contrast_e2[channel]}};
 }
 
 Lab lab_of_dn(const SensorModel& s, const Developing& developing, const Vector3& dn) {
@@ -262,11 +292,11 @@ double farthest(const SensorModel& s, const Developing& developing, const Vector
 }
 
 PredictedChange change_at(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                          const Vector3& signal_e, const BlockLevel::Glow& glow, NoiseSourceSet kept) {
+                          const Vector3& signal_e, const BlockLevel& block, NoiseSourceSet kept) {
   PredictedChange out;
   Vector3 mean{}, shift{}, scatter{};
   for (int c = 0; c < 3; ++c) {
-    const Charge charge = charge_of(sensor, exposure, c, signal_e[c], glow);
+    const Charge charge = charge_of(sensor, exposure, c, signal_e[c], block);
     mean[c] = moments_of(sensor, budget_of(sensor, charge, NoiseSourceSet::all()), NoiseSourceSet::all()).dn.mean;
     const ChannelChange change = channel_change(sensor, charge, kept);
     shift[c] = change.shift_dn;
@@ -304,15 +334,17 @@ Developing developing_of(const SensorModel& sensor, const Exposure& exposure, co
 
 PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
                                const BlockLevel& block, NoiseSourceSet kept) {
-  BlockLevel::Glow least = block.glow, most = block.glow;
-  least.mean_e = block.glow.least_e;
-  most.mean_e = block.glow.peak_e;
-  PredictedChange out = larger(change_at(sensor, exposure, developing, block.signal_e, block.glow, kept),
-                               change_at(sensor, exposure, developing, block.darkest_e, least, kept));
+  BlockLevel darkest = block;
+  darkest.glow.mean_e = block.glow.least_e;
+  PredictedChange out = larger(change_at(sensor, exposure, developing, block.signal_e, block, kept),
+                               change_at(sensor, exposure, developing, block.darkest_e, darkest, kept));
   if (kept.has(Effect::clipping)) return out;
   // The mean of a block does not show the loss of its brightest pixel: a block as bright as that is predicted too.
-  const PredictedChange peak = change_at(sensor, exposure, developing, {block.peak_e, block.peak_e, block.peak_e}, most,
-                                         NoiseSourceSet::all().without(Effect::clipping));
+  BlockLevel brightest;
+  brightest.glow.mean_e = block.glow.peak_e;
+  brightest.glow.variance_e2 = block.glow.variance_e2;
+  const PredictedChange peak = change_at(sensor, exposure, developing, {block.peak_e, block.peak_e, block.peak_e},
+                                         brightest, NoiseSourceSet::all().without(Effect::clipping));
   return larger(out, peak);
 }
 

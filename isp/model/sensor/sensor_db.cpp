@@ -155,6 +155,7 @@ void take_fixed_pattern(NamedSensor& out, const SensorFigures& given) {
   m.hot_pixel_current_e_per_s = given.hot_pixel_current_e_per_s.value_or(0);
   m.telegraph_fraction = given.telegraph_fraction.value_or(0);
   m.telegraph_e = given.telegraph_e.value_or(0);
+  m.crosstalk = given.crosstalk.value_or(0);
   m.glow_e_per_s = given.glow_e_per_s.value_or(m.glow_e_per_s);
   m.glow_position = given.glow_position.value_or(m.glow_position);
   m.glow_length = given.glow_length.value_or(m.glow_length);

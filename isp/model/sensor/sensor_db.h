@@ -30,6 +30,7 @@ struct SensorFigures {
   std::optional<double> hot_pixel_current_e_per_s;
   std::optional<double> telegraph_fraction;
   std::optional<double> telegraph_e;
+  std::optional<double> crosstalk;
   std::optional<double> glow_e_per_s;
   std::optional<std::array<double, 2>> glow_position;
   std::optional<double> glow_length;

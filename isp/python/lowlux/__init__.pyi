@@ -335,6 +335,7 @@ def simulate(
     hot_current: Optional[float] = ...,
     telegraph_pixels: Optional[float] = ...,
     telegraph_noise: Optional[float] = ...,
+    crosstalk: Optional[float] = ...,
     glow: Optional[float] = ...,
     glow_position: Union[str, _Numbers, None] = ...,
     glow_length: Optional[float] = ...,

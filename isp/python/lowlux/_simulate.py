@@ -34,8 +34,9 @@ def simulate(scene, output=None, *, overwrite=False, size=None, light=None, lumi
              mover_speed=None, bracket=None, reduce=None, system_gain=None, read_noise=None, full_well=None, bits=None,
              black_level=None, white_level=None, dark_current=None, dark_temperature=None, dark_doubling=None,
              dark_activation=None, dark_floor=None, prnu=None, dsnu=None, hot_pixels=None, hot_current=None,
-             telegraph_pixels=None, telegraph_noise=None, glow=None, glow_position=None, glow_length=None,
-             row_noise=None, column_noise=None, pixel_pitch=None, peak_qe=None, iso=None, white_luminance=None, quantise=None):
+             telegraph_pixels=None, telegraph_noise=None, crosstalk=None, glow=None, glow_position=None,
+             glow_length=None, row_noise=None, column_noise=None, pixel_pitch=None, peak_qe=None, iso=None,
+             white_luminance=None, quantise=None):
     """Simulate raw frames of a scene, as `lowlux simulate` does with the same options.
 
     scene: a path of an image, or "dark", "flat", "chart", "chart:macbeth", "chart:munsell", "chart:FILE.csv".
