@@ -8,6 +8,7 @@
 #include <string>
 
 #include "isp/base/random/random.h"
+#include "isp/pipeline/finished/residual_profile.h"
 #include "tests/pipeline/night_frames.h"
 #include "tests/support/executors.h"
 

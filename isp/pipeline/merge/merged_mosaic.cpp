@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "isp/pipeline/finished/clean_raw.h"
 #include "isp/pipeline/finished/raw_codes.h"
+#include "isp/pipeline/finished/residual_profile.h"
 
 namespace lowlux::isp {
 namespace {

@@ -125,9 +125,8 @@ Result<NoiseReduction> plan_pixel_noise(const RawFrame& frame, const Thumbnail& 
                                         const NoiseRequest& request, Executor& executor) {
   const std::optional<CellNoise> whole = cell_noise(frame, levels, {1, 1, 1});
   if (!whole) return fail(ErrorCode::insufficient, "the noise of a colour is unknown: its NoiseProfile is not usable");
-  const bool coloured = planes_of(frame.raw) == 3;
   const CellNoise checked = *cell_noise(frame, levels, parts_of_colours);
-  const CellNoise cell = coloured ? checked : *cell_noise(frame, levels, parts_of_grey);
+  const CellNoise cell = *cell_noise(frame, levels, parts_of(frame.raw));
   NoiseReduction out;
   out.source = frame.noise->source;
   out.noise = cell.noise;

@@ -41,8 +41,10 @@ class NoiseReducer {
   /// Reduces the noise of a tile of a frame, as run() does for a frame.
   /// @param raw_e     the padded tile; its lines are subtracted in place
   /// @param signal_e  as large; the core is set
+  /// @param maps      of the cells of the padded tile, those of the core are set; none if they are not wanted
   /// Precondition: how.reduces(), without previous frames.
-  void run_piece(const Piece& piece, const NoiseReduction& how, PlaneView<float> raw_e, PlaneView<float> signal_e);
+  void run_piece(const Piece& piece, const NoiseReduction& how, PlaneView<float> raw_e, PlaneView<float> signal_e,
+                 const denoise::DenoiseMaps& maps = {});
   /// Returns the bytes for a frame of width x height pixels, without previous frames.
   /// @param maps  whether they are requested; their own memory is not included
   static std::size_t bytes(int width, int height, const NoiseReduction& how, bool maps, int threads);

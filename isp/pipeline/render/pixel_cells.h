@@ -21,6 +21,11 @@ namespace lowlux::isp {
 inline constexpr std::array<double, 3> parts_of_colours{1, 0.5, 1};
 inline constexpr std::array<double, 3> parts_of_grey{0.26, 0.26, 0.26};
 
+/// Returns the parts for a frame that is not a mosaic.
+constexpr const std::array<double, 3>& parts_of(const RawDn& raw) {
+  return raw.layout == SensorLayout::linear_rgb ? parts_of_colours : parts_of_grey;
+}
+
 constexpr bool is_mosaic(const RawDn& raw) { return raw.layout == SensorLayout::bayer; }
 constexpr int planes_of(const RawDn& raw) { return raw.layout == SensorLayout::linear_rgb ? 3 : 1; }
 

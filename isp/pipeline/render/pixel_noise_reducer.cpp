@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "isp/pipeline/render/level_parts.h"
+#include "isp/pipeline/render/map_views.h"
 #include "isp/pipeline/render/pixel_cells.h"
 
 namespace lowlux::isp {
@@ -57,7 +58,8 @@ std::size_t PixelNoiseReducer::bytes(const RawDn& raw, const NoiseReduction& how
          denoise::Denoiser::bytes(tile.width, tile.height, threads, *how.level);
 }
 
-void PixelNoiseReducer::run(std::span<Plane<float>> planes, const NoiseReduction& how, NoiseReducer& noise) {
+void PixelNoiseReducer::run(std::span<Plane<float>> planes, const NoiseReduction& how, NoiseReducer& noise,
+                            NoiseMaps* maps) {
   assert(how.level && how.cell_e && !how.regions && !how.temporal && how.lines.empty());
   const int width = 2 * planes[0].width(), height = 2 * planes[0].height();
   const TileGrid grid({0, 0, width, height}, side_px_);
@@ -65,32 +67,48 @@ void PixelNoiseReducer::run(std::span<Plane<float>> planes, const NoiseReduction
   const TileSize most = largest_tile(grid, margin, width, height);
   fit(cells_, most.width, most.height);
   fit(clean_cells_, most.width, most.height);
+  Frame frame{planes, view_of(how.noise_ratio.get()), in_sites(how), {}};
+  if (maps != nullptr) {
+    fit(tile_maps_, most.width, most.height);
+    fit(*maps, width, height);
+    frame.maps = views_of(*maps);
+  }
   noise.reserve_pieces(most.width, most.height, how);
   for (std::size_t c = 0; c < planes.size(); ++c) fit(clean_[c], planes[c].width(), planes[c].height());
-  const NoiseReduction of_sites = in_sites(how);
   for (int i = 0; i < grid.count(); ++i) {
     const Rect core = grid.core(i);
     if (core.width <= 0 || core.height <= 0) continue;
-    const Rect whole = with_margin(core, margin, width, height), from = pixels_of(whole), to = pixels_of(core);
-    std::array<PlaneView<const float>, 3> noisy;
-    std::array<PlaneView<float>, 3> clean;
-    for (std::size_t c = 0; c < planes.size(); ++c) {
-      noisy[c] = std::as_const(planes[c]).view().crop(from.x, from.y, from.width, from.height);
-      clean[c] = clean_[c].view().crop(to.x, to.y, to.width, to.height);
-    }
-    const PlaneView<float> in = cells_.view().crop(0, 0, whole.width, whole.height);
-    const PlaneView<float> out = clean_cells_.view().crop(0, 0, whole.width, whole.height);
-    CellCharge charge{.cell_e = *how.cell_e,
-                      .noise_ratio = view_of(how.noise_ratio.get()).from(from.x, from.y),
-                      .x = from.x,
-                      .y = from.y};
-    if (planes.size() == 3) charge.half_variance_e2 = how.noise.variance_e2[1];
-    make_cells(std::span(noisy).first(planes.size()), charge, in, executor_);
-    noise.run_piece({core, whole, width, height, BayerPhase::rggb}, of_sites, in, out);
-    const PlaneView<float> kept = out.crop(core.x - whole.x, core.y - whole.y, core.width, core.height);
-    join_cells(kept, *how.cell_e, std::span(clean).first(planes.size()), executor_);
+    const Rect whole = with_margin(core, margin, width, height);
+    reduce_tile(frame, {core, whole, width, height, BayerPhase::rggb}, noise);
   }
   for (std::size_t c = 0; c < planes.size(); ++c) std::swap(planes[c], clean_[c]);
+}
+
+void PixelNoiseReducer::reduce_tile(const Frame& frame, const NoiseReducer::Piece& piece, NoiseReducer& noise) {
+  const Rect &core = piece.core, &whole = piece.whole;
+  const Rect from = pixels_of(whole), to = pixels_of(core);
+  const NoiseReduction& how = frame.of_sites;
+  const std::size_t count = frame.planes.size();
+  std::array<PlaneView<const float>, 3> noisy;
+  std::array<PlaneView<float>, 3> clean;
+  for (std::size_t c = 0; c < count; ++c) {
+    noisy[c] = frame.planes[c].view().crop(from.x, from.y, from.width, from.height);
+    clean[c] = clean_[c].view().crop(to.x, to.y, to.width, to.height);
+  }
+  const PlaneView<float> in = cells_.view().crop(0, 0, whole.width, whole.height);
+  const PlaneView<float> out = clean_cells_.view().crop(0, 0, whole.width, whole.height);
+  CellCharge charge{
+      .cell_e = *how.cell_e, .noise_ratio = frame.noise_ratio.from(from.x, from.y), .x = from.x, .y = from.y};
+  if (count == 3) charge.half_variance_e2 = how.noise.variance_e2[1];
+  make_cells(std::span(noisy).first(count), charge, in, executor_);
+  denoise::DenoiseMaps maps;
+  if (frame.maps.residual_variance.data != nullptr) {
+    maps = crop_of(views_of(tile_maps_), {0, 0, whole.width, whole.height});
+  }
+  noise.run_piece(piece, how, in, out, maps);
+  const Rect kept{core.x - whole.x, core.y - whole.y, core.width, core.height};
+  join_cells(out.crop(kept.x, kept.y, kept.width, kept.height), *how.cell_e, std::span(clean).first(count), executor_);
+  copy(crop_of(maps, kept), crop_of(frame.maps, core));
 }
 
 }  // namespace lowlux::isp

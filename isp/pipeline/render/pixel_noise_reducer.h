@@ -4,8 +4,10 @@
 #include <cstddef>
 #include <span>
 
+#include "denoise/denoise_options.h"
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
+#include "isp/base/noise_ratio.h"
 #include "isp/base/plane.h"
 #include "isp/pipeline/noise_reduction.h"
 #include "isp/pipeline/render/frame_tiles.h"
@@ -24,18 +26,30 @@ class PixelNoiseReducer {
   /// Reduces the noise of the planes of a frame, which are fractions of white.
   /// @param planes  three, or one
   /// @param noise   does the work
+  /// @param maps    filled if not null: a value for each pixel, of the sites of its cell
   /// Precondition: how.level, how.cell_e.
-  void run(std::span<Plane<float>> planes, const NoiseReduction& how, NoiseReducer& noise);
+  void run(std::span<Plane<float>> planes, const NoiseReduction& how, NoiseReducer& noise, NoiseMaps* maps = nullptr);
 
   /// Returns the bytes for a frame of width x height pixels, those of the NoiseReducer included.
   static std::size_t bytes(const RawDn& raw, const NoiseReduction& how, int threads);
 
  private:
+  /// Holds a frame whose noise is reduced.
+  struct Frame {
+    std::span<const Plane<float>> planes;
+    NoiseRatioView noise_ratio;  // of the pixels
+    NoiseReduction of_sites;     // the decision in sites
+    denoise::DenoiseMaps maps;   // of all pixels; none if they are not wanted
+  };
+  /// Reduces the noise of a tile, whose regions are in sites, to clean_.
+  void reduce_tile(const Frame& frame, const NoiseReducer::Piece& piece, NoiseReducer& noise);
+
   Executor& executor_;
   int side_px_;
   std::array<Plane<float>, 3> clean_;
   Plane<float> cells_;        // of a tile and its margin
   Plane<float> clean_cells_;  // likewise
+  NoiseMaps tile_maps_;       // likewise, where maps are wanted
 };
 
 }  // namespace lowlux::isp
