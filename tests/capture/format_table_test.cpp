@@ -162,7 +162,8 @@ std::string page() {
       "gives: the layout\nof the samples, or the message of the refusal. LibRaw decodes raws other than DNG, of which "
       "no camera's file of a free\nlicence is small enough to be kept here; its list of cameras applies, without "
       "Foveon, rotated and four-colour mosaics\nand sRAW. `tests/capture/lossy_dng_test.cpp` has lossy "
-      "LinearRaw, which is decoded.\n\n| format | result | layout or reason |\n|---|---|---|\n";
+      "LinearRaw, which is decoded. `lowlux denoise` writes\na DNG of the same layout: mosaic, monochrome, or three "
+      "colours as LinearRaw.\n\n| format | result | layout or reason |\n|---|---|---|\n";
   for (const auto& formats : {stored_formats(), other_formats()}) {
     for (const Format& format : formats) out += row_of(format);
   }

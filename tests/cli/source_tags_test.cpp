@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "capture/dng/tiff_directory.h"
+#include "tests/capture/x_trans_colours.h"
 #include "tests/cli/command.h"
 #include "tests/support/dng_builder.h"
 #include "tests/support/scratch_directory.h"
@@ -50,13 +51,21 @@ std::vector<std::byte> opcodes(bool with_vignette) {
   return out.out;
 }
 
+enum class Layout : std::uint8_t { bayer, x_trans, linear_raw, monochrome };
+
 /// A DNG of grey with Poisson-like noise, and with the tags of a camera, a lens, a place and a profile.
-std::vector<std::byte> source_dng(bool big_endian) {
+std::vector<std::byte> source_dng(bool big_endian, Layout layout = Layout::bayer) {
   DngBuilder dng;
   dng.width = 192, dng.height = 128, dng.big_endian = big_endian;
+  if (layout == Layout::linear_raw) dng.samples = 3;
+  dng.monochrome = layout == Layout::monochrome;
+  if (layout == Layout::x_trans) {
+    dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
+    dng.set(33422, Tag::numbers(TagType::byte, test::x_trans_colours({})));
+  }
   std::mt19937 draw(7);
   std::normal_distribution<double> noise(0, 40);
-  for (int i = 0; i < dng.width * dng.height; ++i) {
+  for (int i = 0; i < dng.width * dng.height * dng.samples; ++i) {
     dng.pixels.push_back(static_cast<std::uint16_t>(std::lround(3000 + noise(draw))));
   }
   dng.set(51041, Tag::numbers(TagType::f64, {1e-6, 4e-7}));  // NoiseProfile
@@ -173,10 +182,12 @@ class SourceTagsCommand : public testing::Test {
   test::ScratchDirectory folder_;
 };
 
-void expect_kept(const std::vector<std::byte>& source, const std::vector<std::byte>& result) {
+/// @param with_profile  false: the result has no colour matrices, and thus no profile that refers to them
+void expect_kept(const std::vector<std::byte>& source, const std::vector<std::byte>& result, bool with_profile = true) {
   const Directories before = directories_of(source), after = directories_of(result);
   for (const std::uint16_t id :
        {315, 700, 33432, 50708, 50709, 50732, 50735, 50736, 50740, 50741, 50936, 50937, 50938, 50940, 50942}) {
+    if (!with_profile && id >= 50936) continue;
     ASSERT_TRUE(after.main.contains(id)) << id;
     EXPECT_EQ(after.main.at(id), before.main.at(id)) << "tag " << id;
   }
@@ -209,6 +220,18 @@ TEST_F(SourceTagsCommand, SurviveDenoisingAndMerging) {
     // What lowlux wrote is itself a source.
     run({"denoise", file("clean.dng"), "-o", file("again.dng"), "--force", "--quiet"});
     expect_kept(source, bytes_of_file(file("again.dng")));
+  }
+}
+
+TEST_F(SourceTagsCommand, SurviveDenoisingOfFilesThatAreNoMosaics) {
+  for (const Layout layout : {Layout::linear_raw, Layout::monochrome, Layout::x_trans}) {
+    SCOPED_TRACE(static_cast<int>(layout));
+    const auto source = source_dng(layout == Layout::monochrome, layout);
+    write("a.dng", source);
+    run({"denoise", file("a.dng"), "-o", file("clean.dng"), "--force", "--quiet"});
+    expect_kept(source, bytes_of_file(file("clean.dng")), layout != Layout::monochrome);
+    run({"denoise", file("clean.dng"), "-o", file("again.dng"), "--force", "--quiet"});
+    expect_kept(source, bytes_of_file(file("again.dng")), layout != Layout::monochrome);
   }
 }
 

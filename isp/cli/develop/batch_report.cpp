@@ -17,7 +17,7 @@ void print_outcome(const DevelopArgs& args, const DevelopOutcome& outcome) {
   if (args.json) return;
   if (args.explain) {
     print_out(fmt::format("{}\n{}{}", one_line(outcome.input), outcome.merged ? merge_text(*outcome.merged) : "",
-                          explain_text(*outcome.plan, outcome.flat.get(), outcome.noise)));
+                          explain_text(outcome)));
   }
   if (args.timings) print_out(fmt::format("{}\n{}", one_line(outcome.input), times_text(outcome.times)));
 }

@@ -86,6 +86,16 @@ std::string description_of(const isp::NoiseReduction& how, const std::optional<N
                      origin ? title_of(origin->source) : name_of(how.source));
 }
 
+/// Describes the clean raw of a frame.
+std::string clean_raw_text(const RawDn& from) {
+  const char* const samples = from.is_float() ? "32-bit floats" : "16 bits";
+  if (from.from_x_trans) {
+    return fmt::format("LinearRaw DNG of three colours, {}: X-Trans is interpolated when it is read", samples);
+  }
+  if (from.layout == SensorLayout::linear_rgb) return fmt::format("LinearRaw DNG of three colours, {}", samples);
+  return fmt::format("DNG of a {}, {}", from.layout == SensorLayout::bayer ? "mosaic" : "monochrome sensor", samples);
+}
+
 }  // namespace
 
 Result<DevelopedFrame> develop_frame(const RawBatch& batch, const Job& job,
@@ -166,6 +176,7 @@ Result<DenoisedFrame> denoise_frame(const RawBatch& batch, const Job& job, Execu
   made.maps = noise_map_files(std::move(clean->maps), ready->frame.raw, job.output, executor);
   out.width = made.frame.raw.default_crop.width;
   out.height = made.frame.raw.default_crop.height;
+  out.clean_raw = clean_raw_text(ready->frame.raw);
   out.plan = std::move(clean->plan);
   out.noise = std::move(ready->noise);
   return made;

@@ -8,18 +8,9 @@
 #include "isp/cli/shared/outputs.h"
 #include "isp/cli/shared/standard_streams.h"
 #include "isp/cli/verbs.h"
+#include "isp/pipeline/finished/clean_raw.h"
 
 namespace lowlux::cli {
-namespace {
-
-/// Returns the memory of `denoise`: the maps are always made, and codes take the place of an image.
-std::size_t clean_raw_bytes(const RawDn& raw, const isp::DevelopOptions& options, int threads) {
-  isp::DevelopOptions with_maps = options;
-  with_maps.denoise.maps = true;
-  return isp::expected_bytes(raw, with_maps, threads);
-}
-
-}  // namespace
 
 int run_denoise(const std::vector<std::string>& words) {
   Parsed<DevelopArgs> parsed = parse_denoise(words);
@@ -36,7 +27,7 @@ int run_denoise(const std::vector<std::string>& words) {
   if (!calibration) return print_argument_error("denoise", calibration.error(), args.defaults);
   Result<RawBatch> batch = make_batch(args, without_rendering(args.options), *std::move(jobs), *calibration);
   if (!batch) return print_failure(batch.error());
-  batch->bytes_of = clean_raw_bytes;
+  batch->bytes_of = isp::clean_raw_bytes;
   return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {
     return denoise_frame(*batch, job, executor, progress, out).and_then([&](const DenoisedFrame& denoised) {
       return write_denoised(*batch, job, denoised, out);

@@ -208,8 +208,8 @@ std::string framing_text(const isp::Framing& framing) {
 
 }  // namespace
 
-std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* flat,
-                         const std::optional<NoiseOrigin>& noise) {
+std::string explain_text(const DevelopOutcome& outcome) {
+  const isp::DevelopPlan& plan = *outcome.plan;
   Lines out;
   out.add(
       "black [DN]",
@@ -218,11 +218,12 @@ std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* f
   if (const DarkFrame* const dark = plan.levels.dark_frame.get()) {
     out.add(dark->is_bias ? "bias frame" : "dark frame", dark_frame_text(*dark));
   }
-  if (flat != nullptr) out.add("flat field", flat_text(*flat));
+  if (outcome.flat) out.add("flat field", flat_text(*outcome.flat));
   out.add("dark signal", dark_text(plan));
   if (plan.effects) add_effects(out, *plan.effects, *plan.options.effects);
   out.add("defects", fmt::format("{} pixels repaired", plan.levels.defects.size()));
-  add_noise(out, plan.noise_reduction, noise);
+  add_noise(out, plan.noise_reduction, outcome.noise);
+  if (!outcome.clean_raw.empty()) out.add("clean raw", outcome.clean_raw);
   if (!plan.demosaic.reason.empty()) {
     out.add("demosaic", fmt::format("{}: {}", name_of(plan.demosaic.demosaic.method), plan.demosaic.reason));
   }

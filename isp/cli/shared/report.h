@@ -24,6 +24,7 @@ struct DevelopOutcome {
   std::shared_ptr<const calib::FlatField> flat;  // set where the image was divided by flats
   std::optional<MergeReport> merged;             // set where several frames were merged first
   std::optional<NoiseOrigin> noise;              // set where it is known where the noise model comes from
+  std::string clean_raw;                         // what the raw file that was written holds; empty for images
   bool skipped = false;                          // the outputs exist, and are kept
   int width = 0;                                 // of the written image, upright
   int height = 0;
@@ -32,11 +33,8 @@ struct DevelopOutcome {
 
 /// Returns one JSON object.
 std::string develop_json(const DevelopOutcome& outcome, const Defaults& defaults);
-/// Returns the decisions for a frame, with reasons, as text.
-/// @param flat  nullptr: none was used
-/// @param noise  where the noise model comes from; nullopt: not known, as for merged frames
-std::string explain_text(const isp::DevelopPlan& plan, const calib::FlatField* flat,
-                         const std::optional<NoiseOrigin>& noise);
+/// Returns the decisions for a frame, with reasons, as text. Precondition: outcome.plan.
+std::string explain_text(const DevelopOutcome& outcome);
 /// Returns stage times as text, one line for each and their sum.
 std::string times_text(const std::vector<isp::StageTime>& times);
 

@@ -270,6 +270,7 @@ std::string develop_json(const DevelopOutcome& outcome, const Defaults& defaults
                        {"table_mean_ciede2000", display.made.error.mean_ciede2000},
                        {"table_max_ciede2000", display.made.error.max_ciede2000}};
   }
+  if (!outcome.clean_raw.empty()) json["clean_raw"] = outcome.clean_raw;
   if (outcome.merged) json["merge"] = Json::parse(merge_json(*outcome.merged));
   for (const isp::StageTime& time : outcome.times) json["timings_s"][std::string(time.stage)] = time.seconds;
   return dumped(json);
