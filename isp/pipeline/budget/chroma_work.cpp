@@ -34,10 +34,7 @@ struct Axis {
   double share_of(int tile) const { return static_cast<double>(cells_of(tile)) / cells; }
 };
 
-Axis axis_of(int pixels, int blocks) {
-  const int cells = (pixels + 1) / 2;
-  return {cells, denoise::tiles_of(cells), blocks};
-}
+Axis axis_of(int cells, int blocks) { return {cells, denoise::tiles_of(cells), blocks}; }
 
 /// Returns the denoiser's tiles, from left to right and from top to bottom. A block counts in the tile that holds its
 /// centre; a tile without any centre, because it is smaller than a block, takes the block around it.
@@ -72,28 +69,28 @@ std::vector<Tile> tiles_of(const Axis& across, const Axis& down, const CameraRgb
   return out;
 }
 
-double ratio_of_tile(const RawFrame& frame, const Axis& across, const Axis& down, int index) {
+/// @param side  of a cell [px]
+double ratio_of_tile(const RawFrame& frame, const Axis& across, const Axis& down, int side, int index) {
   const int x = index % across.tiles, y = index / across.tiles;
   return view_of(frame.noise_ratio.get())
-      .mean(2 * denoise::tile * x, 2 * denoise::tile * y, 2 * across.cells_of(x), 2 * down.cells_of(y));
+      .mean(side * denoise::tile * x, side * denoise::tile * y, side * across.cells_of(x), side * down.cells_of(y));
 }
 
-}  // namespace
-
-ChromaWork chroma_work(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
-                       const Thumbnail& thumbnail) {
+/// @param side  of a cell [px]
+ChromaWork work_of_cells(const RawFrame& frame, const CellNoise& cell, int side, const Thumbnail& thumbnail) {
+  const denoise::RawNoise& noise = cell.noise;
   const double dark_e = mean_of_sites(noise.dark_mean_e), variance_e2 = mean_of_colours(noise.variance_e2);
   const Rect& active = frame.raw.active;
-  const Axis across = axis_of(active.width, thumbnail.mean.width());
-  const Axis down = axis_of(active.height, thumbnail.mean.height());
-  const std::vector<Tile> tiles = tiles_of(across, down, thumbnail.mean, electrons_by_colour(frame.raw, levels));
+  const Axis across = axis_of((active.width + side - 1) / side, thumbnail.mean.width());
+  const Axis down = axis_of((active.height + side - 1) / side, thumbnail.mean.height());
+  const std::vector<Tile> tiles = tiles_of(across, down, thumbnail.mean, cell.cell_e);
   const int pyramid_levels = denoise::levels_of(across.cells, down.cells);
   const std::size_t count = tiles.size();
   std::vector<float> start(count);
   std::vector<unsigned char> has_chroma(count * denoise::max_levels);
   for (std::size_t i = 0; i < count; ++i) {
     const double mean_e = tiles[i].charge_e / tiles[i].blocks;
-    const double ratio = ratio_of_tile(frame, across, down, static_cast<int>(i));
+    const double ratio = ratio_of_tile(frame, across, down, side, static_cast<int>(i));
     const int level = denoise::start_of(mean_e - dark_e, dark_e, variance_e2, ratio);
     start[i] = static_cast<float>(std::min(level, pyramid_levels - 1));
   }
@@ -105,6 +102,17 @@ ChromaWork chroma_work(const RawFrame& frame, const RawLevels& levels, const den
     out.work[has_chroma[i] != 0 ? 0 : has_chroma[count + i] != 0 ? 1 : 2] += tiles[i].share;
   }
   return out;
+}
+
+}  // namespace
+
+ChromaWork chroma_work(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
+                       const Thumbnail& thumbnail) {
+  return work_of_cells(frame, {electrons_by_colour(frame.raw, levels), noise}, 2, thumbnail);
+}
+
+ChromaWork chroma_work(const RawFrame& frame, const CellNoise& cell, const Thumbnail& thumbnail) {
+  return work_of_cells(frame, cell, 1, thumbnail);
 }
 
 }  // namespace lowlux::isp

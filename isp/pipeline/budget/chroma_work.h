@@ -5,6 +5,7 @@
 #include "denoise/denoiser.h"
 #include "isp/base/frame.h"
 #include "isp/pipeline/plan/levels.h"
+#include "isp/pipeline/plan/pixel_noise.h"
 #include "isp/raw/measure/thumbnail.h"
 
 namespace lowlux::isp {
@@ -21,5 +22,8 @@ struct ChromaWork {
 /// @param noise  of the frame, its dark charge included
 ChromaWork chroma_work(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
                        const Thumbnail& thumbnail);
+
+/// Predicts the same of a frame that is not a mosaic, of which each pixel is a cell.
+ChromaWork chroma_work(const RawFrame& frame, const CellNoise& cell, const Thumbnail& thumbnail);
 
 }  // namespace lowlux::isp

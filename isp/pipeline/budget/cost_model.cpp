@@ -8,6 +8,7 @@
 
 #include "denoise/spatial/layout.h"
 #include "isp/pipeline/render/frame_tiles.h"
+#include "isp/pipeline/render/pixel_cells.h"
 
 namespace lowlux::isp {
 
@@ -38,23 +39,35 @@ CostSize cost_size(int width, int height) {
   return {1e-6 * width * height, 4e-6 * denoise::padded(columns, levels) * denoise::padded(rows, levels)};
 }
 
-CostSize cost_size(const RawDn& raw) {
-  constexpr TileLimits limits;
-  const Rect& active = raw.active;
-  CostSize out = cost_size(active.width, active.height);
-  if (static_cast<std::int64_t>(active.width) * active.height <= limits.max_whole_px) return out;
+namespace {
+
+/// Sets the denoised size of a mosaic of width x height sites that is processed in tiles.
+void set_denoised(const TileGrid& grid, int width, int height, CostSize& out) {
   out.denoised_megapixels = 0;
-  const TileGrid grid(raw.default_crop, limits.side_px);
   for (int i = 0; i < grid.count(); ++i) {
     const Rect core = grid.core(i);
     if (core.width <= 0 || core.height <= 0) continue;
     const auto denoised_megapixels = [&](denoise::Level level) {
-      const Rect piece = with_margin(core, margin_of(level), active.width, active.height);
+      const Rect piece = with_margin(core, margin_of(level), width, height);
       return cost_size(piece.width, piece.height).denoised_megapixels;
     };
     const double usual = denoised_megapixels(denoise::Level::high);
     out.denoised_megapixels += usual;
     out.more_for_best_megapixels += denoised_megapixels(denoise::Level::best) - usual;
+  }
+}
+
+}  // namespace
+
+CostSize cost_size(const RawDn& raw) {
+  constexpr TileLimits limits;
+  const Rect& active = raw.active;
+  CostSize out = cost_size(active.width, active.height);
+  if (!is_mosaic(raw)) {  // PixelNoiseReducer: each pixel is a cell of 2 x 2 sites
+    const int width = 2 * active.width, height = 2 * active.height;
+    set_denoised(TileGrid({0, 0, width, height}, limits.side_px), width, height, out);
+  } else if (static_cast<std::int64_t>(active.width) * active.height > limits.max_whole_px) {
+    set_denoised(TileGrid(raw.default_crop, limits.side_px), active.width, active.height, out);
   }
   return out;
 }

@@ -67,7 +67,8 @@ struct CostSize {
 };
 /// Returns the size of a frame that is processed as a whole.
 CostSize cost_size(int width, int height);
-/// Returns the size of any frame, in tiles where TileLimits require them.
+/// Returns the size of any frame, in tiles where TileLimits require them. Where each pixel is a cell of four sites
+/// (pixel_cells.h), the denoised size is four times as large.
 CostSize cost_size(const RawDn& raw);
 
 /// Holds a time measured at one size.

@@ -47,7 +47,9 @@ struct StepFacts {
   const ProcessingGoal& choice;
   StepSizes sizes;
   std::vector<SeenBlock> blocks;
-  bool noise_by_ratio = false;  // a frame that is not a mosaic: plan_noise decides by its signal-to-noise ratio
+  bool noise_by_ratio = false;  // a frame that is not a mosaic: its level follows from its signal-to-noise ratio
+  int pixel_planes = 0;         // of a frame that is not a mosaic: 1 or 3; 0 for mosaics
+  double checked_fraction = 1;  // of a frame that is not a mosaic: see pixel_noise.h
   bool has_noise = false;       // the noise is known, and may be reduced
   LevelNoise noise;
   ChromaWork chroma;

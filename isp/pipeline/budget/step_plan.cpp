@@ -10,9 +10,11 @@
 
 #include "isp/pipeline/budget/step_candidates.h"
 #include "isp/pipeline/plan/local_noise.h"
+#include "isp/pipeline/plan/pixel_noise.h"
 #include "isp/pipeline/plan/plan_demosaic.h"
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/pipeline/plan/plan_regions.h"
+#include "isp/pipeline/render/pixel_cells.h"
 
 namespace lowlux::isp {
 namespace {
@@ -31,8 +33,11 @@ std::string reason_words(const StepFacts& facts, const StepCandidate& plan) {
 }
 
 std::string level_words(const StepFacts& facts, const StepCandidate& plan) {
-  if (facts.noise_by_ratio) return "its level follows from the signal-to-noise ratio, as the frame is not a mosaic";
   if (!facts.has_noise) return "the noise is not known, or is not to be reduced";
+  if (facts.noise_by_ratio) {
+    return fmt::format("{}: its level follows from the signal-to-noise ratio, as the frame is not a mosaic",
+                       plan.level ? name_of(*plan.level) : "none");
+  }
   if (!plan.level) return "left as it is, " + reason_words(facts, plan);
   std::array<double, 3> share = facts.chroma.start;
   if (*plan.level == Level::best) share = {share[0] + share[1], 0, share[2]};  // best starts level 1 on level 0
@@ -146,14 +151,33 @@ StepPlan told(const StepFacts& facts, const StepCandidate& plan) {
   out.display = plan.display;
   out.max_demosaic = plan.max_demosaic;
   out.level = plan.level;
-  out.level_decided = facts.has_noise;
+  out.level_decided = facts.has_noise && !facts.noise_by_ratio;
   return out;
+}
+
+/// Sets what is known of the noise of a frame that is not a mosaic. A tolerance alone does not choose its level, which
+/// follows from the signal-to-noise ratio: what levels leave was measured on mosaics.
+void set_pixel_noise(const RawFrame& frame, const Thumbnail& thumbnail, const DevelopOptions& o,
+                     const RawLevels& levels, const Rendering& rendering, StepFacts& facts, Executor& executor) {
+  const std::optional<CellNoise> pixel = cell_noise(frame, levels, {1, 1, 1});
+  if (!pixel) return;
+  facts.blocks = seen_blocks(frame, o, levels, rendering, pixel->noise, thumbnail, executor);
+  facts.has_noise = !facts.blocks.empty();
+  facts.chroma = chroma_work(frame, *cell_noise(frame, levels, parts_of(frame.raw)), thumbnail);
+  if (facts.level_is_fixed || o.effects->all || o.effects->budget_s) return;
+  std::vector<double> memory;
+  facts.noise_by_ratio = facts.level_is_fixed = true;
+  facts.fixed_level = level_by_ratio(o.denoise, middle_snr(frame, thumbnail, pixel->cell_e, pixel->noise, memory));
 }
 
 StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thumbnail& light, const DevelopOptions& o,
                    const RawLevels& levels, const Rendering& rendering, Executor& executor) {
   StepFacts facts{*o.effects, {}, {}};
   facts.size = cost_size(frame.raw);
+  if (!is_mosaic(frame.raw)) {
+    facts.pixel_planes = planes_of(frame.raw);
+    facts.checked_fraction = checked_fraction(frame, levels);
+  }
   facts.samples = o.samples;
   facts.active = frame.raw.active;
   if (frame.raw.layout == SensorLayout::bayer && !o.half) {
@@ -167,34 +191,33 @@ StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thum
   }
   facts.look = rendering.look.has_value();
   facts.display = o.display != nullptr;
-  std::optional<NoiseModel> model;
-  const bool has_dark = levels.black.dark_mean_e != PerSite<double>{};
-  facts.has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !is_denoised_before(frame, o.denoise) &&
-                    frame.raw.layout == SensorLayout::bayer && !noise_obstacle(frame, levels);
-  facts.noise_by_ratio = frame.raw.layout != SensorLayout::bayer && o.denoise.mode != DenoiseChoice::Mode::off &&
-                         !noise_obstacle(frame, levels);
-  if (facts.has_noise || (has_dark && levels.electrons_at_white)) {
-    model = noise_model(frame, levels, rendering.white_gain, o.space);
-    facts.blocks = seen_blocks(frame, o, levels, rendering, model->noise, thumbnail, executor);
-  }
-  facts.has_noise = facts.has_noise && !facts.blocks.empty();
-  if (facts.has_noise) {
-    facts.noise = level_noise(facts.blocks);
-    facts.chroma = chroma_work(frame, levels, model->noise, thumbnail);
-  }
   facts.level_is_fixed = o.denoise.mode != DenoiseChoice::Mode::automatic;
   if (o.denoise.mode == DenoiseChoice::Mode::level) facts.fixed_level = o.denoise.level;
-  facts.may_search = o.find_defects && frame.raw.layout == SensorLayout::bayer;
+  std::optional<NoiseModel> model;
+  const bool has_dark = levels.black.dark_mean_e != PerSite<double>{};
+  const bool has_noise = o.denoise.mode != DenoiseChoice::Mode::off && !is_denoised_before(frame, o.denoise) &&
+                         !noise_obstacle(frame, levels);
+  if (!is_mosaic(frame.raw)) {
+    if (has_noise) set_pixel_noise(frame, thumbnail, o, levels, rendering, facts, executor);
+  } else if (has_noise || (has_dark && levels.electrons_at_white)) {
+    model = noise_model(frame, levels, rendering.white_gain, o.space);
+    facts.blocks = seen_blocks(frame, o, levels, rendering, model->noise, thumbnail, executor);
+    facts.has_noise = has_noise && !facts.blocks.empty();
+  }
+  const bool of_mosaic = facts.has_noise && model;
+  if (of_mosaic) facts.chroma = chroma_work(frame, levels, model->noise, thumbnail);
+  if (facts.has_noise) facts.noise = level_noise(facts.blocks);
+  facts.may_search = o.find_defects && is_mosaic(frame.raw);
   facts.defects = levels.defects.size();
-  facts.may_take_lines = facts.has_noise && o.denoise.line_noise;
+  facts.may_take_lines = of_mosaic && o.denoise.line_noise;
   const double tolerance = o.effects->tolerance_delta_e.value_or(0);
   const bool noise_may_stay =
       !facts.level_is_fixed && facts.noise.left_by(std::nullopt) < fraction_for_level * tolerance;
-  const denoise::RawNoise median = facts.has_noise ? median_noise(frame, model->noise) : denoise::RawNoise{};
+  const denoise::RawNoise median = of_mosaic ? median_noise(frame, model->noise) : denoise::RawNoise{};
   facts.sizes = step_sizes(frame, o, levels,
                            {.rendering = rendering,
                             .light = light,
-                            .noise = facts.has_noise ? &median : nullptr,
+                            .noise = of_mosaic ? &median : nullptr,
                             .blocks = facts.blocks,
                             .lines_may_stay = noise_may_stay && !o.effects->all},
                            executor);

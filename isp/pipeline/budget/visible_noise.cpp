@@ -10,6 +10,7 @@
 #include "isp/model/colour/colour_difference.h"
 #include "isp/pipeline/plan/local_noise.h"
 #include "isp/pipeline/render/cell_figures.h"
+#include "isp/pipeline/render/pixel_cells.h"
 #include "isp/render/output_space.h"
 #include "isp/render/retarget/retarget_rows.h"
 #include "isp/render/tone.h"
@@ -18,7 +19,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr int max_blocks_along = 16;
-constexpr std::array<double, 3> samples_in_box{16, 32, 16};  // of R, G, B
+constexpr std::array<double, 3> samples_in_box{16, 32, 16};  // of R, G, B in a mosaic
 constexpr double min_variance_e2 = 1e-6;
 constexpr double surroundings_px =
     12;  // each way: a block of the denoiser, whose thresholds are those of its mean variance
@@ -119,9 +120,21 @@ struct Channels {
   std::array<double, 3> electrons_at_white{};
   std::array<double, 3> light_at_white_e{};
   std::array<double, 3> dark_e{};
+  std::array<double, 3> samples = samples_in_box;
+  bool is_grey = false;  // one value serves for all colours
 };
 
 Channels channels_of(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise) {
+  if (!is_mosaic(frame.raw)) {
+    Channels out;
+    for (std::size_t c = 0; c < 3; ++c) {
+      out.electrons_at_white[c] = 1 / frame.noise->scale[planes_of(frame.raw) == 3 ? c : 0];
+    }
+    out.light_at_white_e = out.electrons_at_white;
+    out.samples.fill(seen_box_px * seen_box_px);
+    out.is_grey = planes_of(frame.raw) == 1;
+    return out;
+  }
   Channels out{.electrons_at_white = electrons_by_colour(frame.raw, levels),
                .light_at_white_e = light_at_white_by_colour(frame.raw, levels)};
   for (int site = 0; site < 4; ++site) {
@@ -168,11 +181,12 @@ SeenBlock seen(const NoisyCharge& block, const Channels& channels, const denoise
   Vector3 pixel_std{};
   for (int c = 0; c < 3; ++c) {
     const double variance_e2 = block.variance_e2(c, noise);
-    const double step_e = std::sqrt(std::max(variance_e2, min_variance_e2) / samples_in_box[c]);
+    const double step_e = std::sqrt(std::max(variance_e2, min_variance_e2) / channels.samples[c]);
+    const double step = above_black_e(charge_e[c] - channels.dark_e[c], step_e) / channels.light_at_white_e[c];
     Vector3 moved = lit;
-    moved[c] += above_black_e(charge_e[c] - channels.dark_e[c], step_e) / channels.light_at_white_e[c];
+    for (int i = 0; i < 3; ++i) moved[i] += i == c || channels.is_grey ? step : 0;
     const double difference = ciede2000(lab, display.lab(moved));
-    squares += difference * difference;
+    squares += difference * difference / (channels.is_grey ? 3 : 1);
     pixel_std[c] = std::sqrt(std::max(variance_e2, 0.0)) / channels.light_at_white_e[c];
     with_dark[c] += channels.dark_e[c] / channels.light_at_white_e[c];
     with_line[c] += line_e / channels.light_at_white_e[c];

@@ -36,6 +36,7 @@ struct SeenBlock {
 /// Returns up to 256 blocks, evenly spread over the frame. With C the colour as it will be displayed and s_c the
 /// standard deviation of the mean of the 16, 32 and 16 samples of R, G and B that 64 pixels hold,
 ///     noise_delta_e^2 = sum over c of CIEDE2000(C(r), C(r + s_c))^2.
+/// Frames that are not mosaics have 64 samples of each colour; those of a monochrome frame move together.
 /// Clipping raises the mean of a displayed primary p, whose pixels scatter by d around m, by d (phi(m / d) + m / d
 /// Phi(m / d)) - max(m, 0); the luminance is kept, as moving colours into the gamut does.
 /// Empty for spaces without primaries. Precondition: levels.electrons_at_white.

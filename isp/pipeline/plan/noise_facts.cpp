@@ -28,15 +28,24 @@ double middle_snr(const RawFrame& frame, const Thumbnail& thumbnail, const std::
   return *middle;
 }
 
-void choose_level_by_ratio(const DenoiseChoice& choice, NoiseReduction& out) {
-  if (choice.mode == DenoiseChoice::Mode::level) {
-    out.level = choice.level;
-    out.reason = "given";
+std::optional<denoise::Level> level_by_ratio(const DenoiseChoice& choice, double snr) {
+  if (choice.mode == DenoiseChoice::Mode::level) return choice.level;
+  const std::optional<denoise::Level> level = level_for(snr);
+  return !level && choice.always ? denoise::Level::draft : level;
+}
+
+void choose_level(const NoiseRequest& request, NoiseReduction& out) {
+  const DenoiseChoice& choice = request.choice;
+  if (choice.mode != DenoiseChoice::Mode::level && request.level) {
+    out.level = request.level->level;
+    out.regions = request.level->regions;
+    out.reason = fmt::format("chosen by its visible effect, at a signal-to-noise ratio of {:.3g}", *out.snr);
     return;
   }
-  out.level = level_for(*out.snr);
-  if (!out.level && choice.always) out.level = denoise::Level::draft;
-  out.reason = fmt::format("signal-to-noise ratio {:.3g} of a pixel in the median block", *out.snr);
+  out.level = level_by_ratio(choice, *out.snr);
+  out.reason = choice.mode == DenoiseChoice::Mode::level
+                   ? "given"
+                   : fmt::format("signal-to-noise ratio {:.3g} of a pixel in the median block", *out.snr);
 }
 
 void add_remarks(const denoise::NoiseCheck& check, const NoiseProfile& model, std::vector<std::string>& warnings) {

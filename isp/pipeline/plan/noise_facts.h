@@ -22,9 +22,8 @@ struct NoiseRequest {
   DenoiseChoice choice;
   OutputSpace space = OutputSpace::srgb;
   std::array<float, 3> white_gain{1, 1, 1};
-  std::optional<DecidedLevel> level;   // set: used instead of the choice of Mode::automatic
-  bool lines = true;                   // false: row and column noise stays, whatever the choice
-  std::optional<ProcessingGoal> goal;  // for frames that are not mosaics
+  std::optional<DecidedLevel> level;  // set: used instead of the choice of Mode::automatic
+  bool lines = true;                  // false: row and column noise stays, whatever the choice
 };
 
 /// Returns the median over all blocks of the signal-to-noise ratio of a mean pixel, with the noise of each block.
@@ -33,8 +32,12 @@ struct NoiseRequest {
 double middle_snr(const RawFrame& frame, const Thumbnail& thumbnail, const std::array<double, 3>& electrons,
                   const denoise::RawNoise& noise, std::vector<double>& snr);
 
-/// Sets the level and its reason: the one that is asked for, else by the signal-to-noise ratio `out.snr`, which is set.
-void choose_level_by_ratio(const DenoiseChoice& choice, NoiseReduction& out);
+/// Returns the level that is asked for, else that of the signal-to-noise ratio of a pixel in the median block.
+std::optional<denoise::Level> level_by_ratio(const DenoiseChoice& choice, double snr);
+
+/// Sets the level and its reason: as requested, else as decided, else by the signal-to-noise ratio `out.snr`, which is
+/// set.
+void choose_level(const NoiseRequest& request, NoiseReduction& out);
 
 /// Adds what is suspicious about a frame. A model that was measured on the frame itself is not held against it: its
 /// uncertainty was stated where it was measured. Where the file states that its noise was reduced, less than its model

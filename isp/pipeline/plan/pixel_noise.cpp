@@ -21,36 +21,10 @@ namespace {
 
 constexpr int most_sample_px = 2048;
 
-/// Noise of the sites of cells.
-struct CellNoise {
-  std::array<double, 3> cell_e{};  // charge at white
-  denoise::RawNoise noise;
-};
-
 /// Returns the black level of a colour [DN]; that of a monochrome frame is the mean over its sites.
 double black_dn_of(const RawFrame& frame, const RawLevels& levels, std::size_t colour) {
   const PerSite<double>& black = levels.black.pedestal_dn;
   return planes_of(frame.raw) == 3 ? black[colour] : (black[0] + black[1] + black[2] + black[3]) / 4;
-}
-
-/// Returns the noise of cells whose sites get these parts of a pixel's charge; nullopt where a gain is not usable.
-std::optional<CellNoise> cell_noise(const RawFrame& frame, const RawLevels& levels, const std::array<double, 3>& part) {
-  CellNoise out;
-  const bool coloured = planes_of(frame.raw) == 3;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const std::size_t plane = coloured ? c : 0;
-    const double electrons = 1 / frame.noise->scale[plane];
-    if (!(electrons >= 1 && electrons <= max_electrons_at_white)) return std::nullopt;
-    const double e_per_dn = electrons / (frame.raw.white_dn[plane] - black_dn_of(frame, levels, plane));
-    const double rounding_e2 = frame.raw.is_float() ? 0 : e_per_dn * e_per_dn / 12;
-    double variance_e2 = std::max(frame.noise->offset[plane] * electrons * electrons, rounding_e2);
-    variance_e2 = std::max(variance_e2, std::pow(levels.black.noise_std_dn[plane] * e_per_dn, 2));
-    if (levels.dark_frame) variance_e2 += levels.dark_frame->added_variance_dn2[plane] * e_per_dn * e_per_dn;
-    out.cell_e[c] = part[c] * electrons;
-    out.noise.variance_e2[c] = std::min(part[c] * variance_e2, denoise::largest_e);
-    out.noise.saturation_e[c] = saturated_fraction_of_white * out.cell_e[c];
-  }
-  return out;
 }
 
 /// Returns the gains that make a neutral equal in all sites.
@@ -108,18 +82,33 @@ denoise::NoiseCheck check_pixels(const RawFrame& frame, const RawLevels& levels,
   return denoise::check_noise({std::as_const(cells).view(), BayerPhase::rggb, ratio}, cell.noise, executor);
 }
 
-void choose_level(const NoiseRequest& request, NoiseReduction& out) {
-  const bool is_given = request.choice.mode == DenoiseChoice::Mode::level;
-  if (!is_given && request.goal && request.goal->budget_s) {
-    out.reason =
-        "a time budget counts the noise reduction of mosaics only: --denoise LEVEL reduces it whatever it takes";
-    return;
+}  // namespace
+
+std::optional<CellNoise> cell_noise(const RawFrame& frame, const RawLevels& levels, const std::array<double, 3>& part) {
+  CellNoise out;
+  const bool coloured = planes_of(frame.raw) == 3;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::size_t plane = coloured ? c : 0;
+    const double electrons = 1 / frame.noise->scale[plane];
+    if (!(electrons >= 1 && electrons <= max_electrons_at_white)) return std::nullopt;
+    const double e_per_dn = electrons / (frame.raw.white_dn[plane] - black_dn_of(frame, levels, plane));
+    const double rounding_e2 = frame.raw.is_float() ? 0 : e_per_dn * e_per_dn / 12;
+    double variance_e2 = std::max(frame.noise->offset[plane] * electrons * electrons, rounding_e2);
+    variance_e2 = std::max(variance_e2, std::pow(levels.black.noise_std_dn[plane] * e_per_dn, 2));
+    if (levels.dark_frame) variance_e2 += levels.dark_frame->added_variance_dn2[plane] * e_per_dn * e_per_dn;
+    out.cell_e[c] = part[c] * electrons;
+    out.noise.variance_e2[c] = std::min(part[c] * variance_e2, denoise::largest_e);
+    out.noise.saturation_e[c] = saturated_fraction_of_white * out.cell_e[c];
   }
-  choose_level_by_ratio(request.choice, out);
-  if (!is_given && request.goal && request.goal->all) out.level = denoise::Level::high;
+  return out;
 }
 
-}  // namespace
+double checked_fraction(const RawFrame& frame, const RawLevels& levels) {
+  const Rect& active = frame.raw.active;
+  double pixels = 0;
+  for (const Rect& part : checked_parts(frame, levels)) pixels += static_cast<double>(part.width) * part.height;
+  return pixels / (static_cast<double>(active.width) * active.height);
+}
 
 Result<NoiseReduction> plan_pixel_noise(const RawFrame& frame, const Thumbnail& thumbnail, const RawLevels& levels,
                                         const NoiseRequest& request, Executor& executor) {

@@ -157,7 +157,6 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   }
   NoiseRequest request{.choice = options.denoise, .space = options.space, .white_gain = rendering->white_gain};
   if (plan.effects) {
-    request.goal = options.effects;
     if (plan.effects->level_decided) request.level.emplace(DecidedLevel{plan.effects->level, plan.effects->regions});
     request.lines = plan.effects->lines;
   }

@@ -112,15 +112,6 @@ NoiseReduction left_alone(const RawFrame& frame, std::string reason) {
   return out;
 }
 
-void choose_level(const NoiseRequest& request, NoiseReduction& out) {
-  if (request.choice.mode == DenoiseChoice::Mode::level || !request.level) {
-    return choose_level_by_ratio(request.choice, out);
-  }
-  out.level = request.level->level;
-  out.regions = request.level->regions;
-  out.reason = fmt::format("chosen by its visible effect, at a signal-to-noise ratio of {:.3g}", *out.snr);
-}
-
 /// Returns the charge to check: lines need the whole frame; the remaining noise is checked on a sample of it where
 /// there is one.
 /// @param squares  of the sample; empty: there is none
