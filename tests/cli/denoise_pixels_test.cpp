@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -58,7 +60,7 @@ DngBuilder night(Kind kind) {
 class DenoisePixels : public testing::Test {
  protected:
   std::string file(const std::string& name) const { return folder_.file(name); }
-  void write(const std::string& name, const DngBuilder& dng) {
+  void write(const std::string& name, const DngBuilder& dng) const {
     const auto bytes = dng.build();
     std::ofstream(file(name), std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
