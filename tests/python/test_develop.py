@@ -181,8 +181,10 @@ def test_bad_inputs_and_outputs(night, tmp_path, rng):
         lowlux.develop(night, tmp_path / "a.png")
     assert (tmp_path / "a.png").read_bytes() == b"kept"
     grey = lowlux.raw_from_array(rng.integers(64, 999, (64, 64)), black=64, white=4095, cfa="MONO")
+    assert lowlux.denoise(grey).raw.raw_image.shape == (64, 64)
+    unknown = lowlux.raw_from_array(rng.random((64, 64, 3)), black=0, white=1)
     with pytest.raises(lowlux.Error):
-        lowlux.denoise(grey)
+        lowlux.denoise(unknown)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
