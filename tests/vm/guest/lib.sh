@@ -43,6 +43,7 @@ cable() {
   v4l2-ctl -d /dev/video0 -c osd_text_mode=2 --set-dv-bt-timings index="$timings" --set-fmt-video="$format"
   v4l2-ctl -d /dev/video1 --set-dv-bt-timings index="$timings" --set-fmt-video-out="$format"
   control loop_video=1 || control hdmi_000_0_is_connected_to=2  # before and after Linux 6.11
+  : >sender.log  # of an earlier cable: what is started below may empty it too late
   v4l2-ctl -d /dev/video1 --stream-out-mmap=4 --stream-count=100000 --stream-from="$3" --stream-loop >sender.log 2>&1 &
   wait_for "frames on the cable" grep -q '>>>>' sender.log
   killall -STOP v4l2-ctl  # the driver repeats the last frame it has, at less work
