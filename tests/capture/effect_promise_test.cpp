@@ -23,8 +23,6 @@
 namespace lowlux::capture {
 namespace {
 
-using isp::Effect;
-
 constexpr int blocks_across = 4, blocks_down = 3;
 constexpr std::uint32_t draws_purpose = 77;  // of this test's own choices
 

@@ -20,8 +20,6 @@
 namespace lowlux {
 namespace {
 
-using capture::TagName;
-using capture::TiffDirectory;
 using capture::TiffEntry;
 using capture::TiffFile;
 using test::DngBuilder;
@@ -174,7 +172,7 @@ class SourceTagsCommand : public testing::Test {
     std::ofstream out(file(name), std::ios::binary);
     out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
-  void run(const std::vector<std::string>& words) {
+  static void run(const std::vector<std::string>& words) {
     const auto result = lowlux(words);
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
