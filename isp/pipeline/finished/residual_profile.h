@@ -22,11 +22,10 @@ NoiseProfile residual_profile(const SignalElectrons& signal_e, const std::array<
 /// Returns the same line for frames that are no mosaics.
 /// @param planes  the clean pixels in fractions of white: R, G and B, or the one of a monochrome frame, whose line all
 ///                three colours of the profile get
-/// @param maps    of their cells, one for each pixel. The variance of a green value is taken as that of its sites,
-/// which
-///                is at most a little too much: their difference is left out of their mean. The standard deviation
-///                stated for flats is 0.9 to 1.2 times that measured (clean_pixels_test); for monochrome frames 0.9
-///                to 0.95, with Level::best 0.7 to 0.8.
+/// @param maps    of their cells, one for each pixel. The variance of a green value is taken as that of its sites, a
+///                little too much at most: their difference is left out of their mean. The standard deviation stated
+///                for flats is 0.9 to 1.2 times that measured (clean_pixels_test); for monochrome frames 0.9 to 0.95,
+///                with Level::best 0.7 to 0.8.
 /// @param cell_e  charge of the sites of R, G and B at white: NoiseReduction::cell_e
 NoiseProfile residual_profile(std::span<const Plane<float>> planes, const NoiseMaps& maps,
                               const std::array<double, 3>& cell_e, double added);
