@@ -14,7 +14,6 @@
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/frame_tiles.h"
 #include "isp/pipeline/render/pipeline.h"
-#include "isp/pipeline/render/tile_renderer.h"
 #include "tests/hard_cases/rendering.h"
 #include "tests/pipeline/night_frames.h"
 

@@ -186,7 +186,7 @@ std::array<Plane<float>, 3> variances(const SignalElectrons& signal, double scal
 }
 
 TEST(ResidualProfile, FindsTheLineItIsGiven) {
-  const SignalElectrons signal = ramp(200, 64);
+  SignalElectrons signal = ramp(200, 64);
   const PerSite<double> electrons{1000, 1000, 1000, 1000};
   const auto profile = residual_profile(signal, variances(signal, 0.05, 2), electrons, 1e-8);
   // Green sites lie a pixel beside those the variances were made for: half an electron on average, 0.025 e-^2.
@@ -197,7 +197,7 @@ TEST(ResidualProfile, FindsTheLineItIsGiven) {
 }
 
 TEST(ResidualProfile, NeverFallsAndNeverStartsBelowZero) {
-  const SignalElectrons signal = ramp(200, 64);
+  SignalElectrons signal = ramp(200, 64);
   const PerSite<double> electrons{1000, 1000, 1000, 1000};
   auto falling = variances(signal, 0, 2);
   for (auto& plane : falling) {

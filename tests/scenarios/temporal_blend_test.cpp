@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "isp/pipeline/render/map_views.h"
 #include "isp/pipeline/render/noise_reducer.h"
 #include "tests/sensor_bench/picture_raw.h"
 
@@ -96,11 +97,18 @@ Plane<float> blended(const Plane<float>& level, const Plane<float>& mean, const 
   return out;
 }
 
+NoiseReducer::Piece whole(int width, int height) {
+  return {{0, 0, width, height}, {0, 0, width, height}, width, height, phase};
+}
+
 /// One film through all that is compared.
 class Reducers {
  public:
   explicit Reducers(const Film& film)
-      : film_(film), mean_of_frames_(film.side, film.side, 1), fraction_(film.side / 2, film.side / 2) {}
+      : film_(film), mean_of_frames_(film.side, film.side, 1), fraction_(film.side / 2, film.side / 2) {
+    for (Plane<float>* plane : {&time_, &level_, &both_}) *plane = Plane<float>(film.side, film.side);
+    fit(maps_, film.side, film.side);
+  }
 
   void next() {
     ++frame_;
@@ -108,22 +116,24 @@ class Reducers {
     Plane<float> mean(film_.side, film_.side);
     mean_of_frames_.run({std::as_const(raw.value).view(), phase}, how(false, true, false).noise, 1, {}, mean.view(),
                         fraction_.view(), one_);
-    time_ = time_only_.run(raw, how(false, true, frame_ == 1), std::move(time_.value), nullptr);
-    both_ = together_.run(raw, how(true, true, frame_ == 1), std::move(both_.value), nullptr);
-    level_ = level_only_.run(raw, how(true, false, false), std::move(level_.value), &maps_);
+    const NoiseReducer::Piece all = whole(film_.side, film_.side);
+    const PlaneView<float> raw_e = raw.value.view();
+    time_only_.run(all, how(false, true, frame_ == 1), raw_e, time_.view());
+    together_.run(all, how(true, true, frame_ == 1), raw_e, both_.view());
+    level_only_.run(all, how(true, false, false), raw_e, level_.view(), views_of(maps_));
   }
-  double time_db() const { return psnr_db(time_.value, film_, frame_); }
-  double level_db() const { return psnr_db(level_.value, film_, frame_); }
-  double both_db() const { return psnr_db(both_.value, film_, frame_); }
+  double time_db() const { return psnr_db(time_, film_, frame_); }
+  double level_db() const { return psnr_db(level_, film_, frame_); }
+  double both_db() const { return psnr_db(both_, film_, frame_); }
   template <class Doubt>
   Plane<float> with(const Doubt& doubt) const {
-    return blended(level_.value, time_.value, fraction_, maps_, doubt);
+    return blended(level_, time_, fraction_, maps_, doubt);
   }
   template <class Doubt>
   double db_with(const Doubt& doubt) const {
     return psnr_db(with(doubt), film_, frame_);
   }
-  const Plane<float>& both() const { return both_.value; }
+  const Plane<float>& both() const { return both_; }
   double moved() const { return together_.moved(); }
 
  private:
@@ -132,7 +142,7 @@ class Reducers {
   denoise::TemporalMean mean_of_frames_;  // for its shares
   Plane<float> fraction_;
   NoiseReducer time_only_{one_}, level_only_{one_}, together_{one_};
-  SignalElectrons time_, level_, both_;
+  Plane<float> time_, level_, both_;
   NoiseMaps maps_;
   int frame_ = 0;
 };
@@ -171,15 +181,16 @@ TEST(TemporalBlend, KeepsTheMeanOfFewElectrons) {
   std::mt19937 random(5);
   std::poisson_distribution<int> photons(signal_e);
   std::normal_distribution<double> read(0, read_e);
+  Plane<float> out(side, side);
   for (int frame = 1; frame <= 6; ++frame) {
     RawElectrons raw{Plane<float>(side, side), BayerPhase::rggb};
     for (std::size_t i = 0; i < raw.value.size(); ++i) {
       raw.value.data()[i] = static_cast<float>(photons(random) + read(random));
     }
     how.temporal->restart = frame == 1;
-    const SignalElectrons out = reducer.run(raw, how, {}, nullptr);
+    reducer.run(whole(side, side), how, raw.value.view(), out.view());
     double sum = 0;
-    for (std::size_t i = 0; i < out.value.size(); ++i) sum += static_cast<double>(out.value.data()[i]);
+    for (std::size_t i = 0; i < out.size(); ++i) sum += static_cast<double>(out.data()[i]);
     const double standard_error = std::sqrt(signal_e + read_e * read_e) / side;  // of one frame
     EXPECT_NEAR(sum / (side * side), signal_e, 5 * standard_error) << frame;
   }

@@ -76,7 +76,7 @@ MeasuredCharge sampled_charge(const RawFrame& frame, const RawLevels& levels, st
 }
 
 MeasuredCharge whole_charge(const RawFrame& frame, const RawLevels& levels, Executor& executor) {
-  MeasuredCharge out{raw_electrons(frame, levels, {}, executor), {}};
+  MeasuredCharge out{raw_electrons(frame, levels, executor), {}};
   out.parts.push_back(std::as_const(out.charge).value.view());
   return out;
 }

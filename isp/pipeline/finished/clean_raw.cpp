@@ -10,11 +10,10 @@
 #include "isp/pipeline/finished/raw_codes.h"
 #include "isp/pipeline/finished/residual_profile.h"
 #include "isp/pipeline/plan/plan_develop.h"
-#include "isp/pipeline/render/electron_mosaic.h"
-#include "isp/pipeline/render/noise_reducer.h"
 #include "isp/pipeline/render/pipeline_memory.h"
 #include "isp/pipeline/render/pixel_cells.h"
-#include "isp/pipeline/render/pixel_noise_reducer.h"
+#include "isp/pipeline/render/region.h"
+#include "isp/pipeline/render/signal_stages.h"
 #include "isp/pipeline/stage_clock.h"
 #include "isp/raw/to_linear.h"
 
@@ -42,12 +41,14 @@ double dark_noise(const DevelopPlan& plan) {
 void clean_mosaic(const RawFrame& frame, CleanRaw& out, StageClock& clock, Executor& executor) {
   const NoiseReduction& how = out.plan.noise_reduction;
   const PerSite<double> light_e = light_at_white_e(out.plan.levels);
-  RawElectrons raw = raw_electrons(frame, out.plan.levels, {}, executor);
-  const SignalElectrons signal = NoiseReducer(executor).run(raw, how, {}, &out.maps);
+  const Region whole = whole_frame(frame.raw);
+  SignalStages stages(executor);
+  stages.reserve(size_of(whole), how);
+  const SignalElectronsView signal = stages.electrons(frame, out.plan, whole, &out.maps);
   clock.lap("denoise");
   const SampleLevels levels = levels_of(frame.raw, dark_noise(out.plan));
-  out.frame.raw = encode_signal({.signal_e = signal.value.view(),
-                                 .charge_e = std::as_const(raw.value).view(),
+  out.frame.raw = encode_signal({.signal_e = signal.value,
+                                 .charge_e = stages.charge_e(),
                                  .saturation_e = how.noise.saturation_e,
                                  .signal_at_white_e = light_e,
                                  .charge_at_white_e = *out.plan.levels.electrons_at_white},
@@ -96,20 +97,10 @@ void clean_pixels(const RawFrame& frame, CleanRaw& out, StageClock& clock, Execu
   const RawDn& raw = frame.raw;
   const NoiseReduction& how = out.plan.noise_reduction;
   const PixelCharge charge = charge_of(how, parts_of(raw));
-  const auto count = static_cast<std::size_t>(planes_of(raw));
-  std::array<Plane<float>, 3> planes;
-  std::array<PlaneView<float>, 3> views;
-  for (std::size_t c = 0; c < count; ++c) {
-    planes[c] = Plane<float>(raw.active.width, raw.active.height);
-    views[c] = planes[c].view();
-  }
-  read_pixels(frame, out.plan.levels, {0, 0, raw.active.width, raw.active.height}, std::span(views).first(count),
-              executor);
-  const std::span<Plane<float>> used = std::span(planes).first(count);
-  const Plane<float> charge_e = interleaved(used, charge.at_white_e, executor);
-  NoiseReducer reducer(executor);
-  PixelNoiseReducer(executor).run(used, how, reducer, &out.maps);
-  const Plane<float> signal_e = interleaved(used, charge.at_white_e, executor);
+  SignalStages stages(executor);
+  const Plane<float> charge_e = interleaved(stages.noisy_pixels(frame, out.plan), charge.at_white_e, executor);
+  const std::span<Plane<float>> pixels = stages.pixels(frame, out.plan, &out.maps);
+  const Plane<float> signal_e = interleaved(pixels, charge.at_white_e, executor);
   clock.lap("denoise");
   const SampleLevels levels = levels_of(raw, charge.dark_noise);
   out.frame.raw = encode_signal({.signal_e = signal_e.view(),
@@ -118,7 +109,7 @@ void clean_pixels(const RawFrame& frame, CleanRaw& out, StageClock& clock, Execu
                                  .signal_at_white_e = charge.at_white_e,
                                  .charge_at_white_e = charge.at_white_e},
                                 raw, levels, executor);
-  out.frame.noise = residual_profile(used, out.maps, *how.cell_e, levels.rounding_variance());
+  out.frame.noise = residual_profile(pixels, out.maps, *how.cell_e, levels.rounding_variance());
   out.maps = {};
 }
 

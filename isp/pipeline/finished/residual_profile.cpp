@@ -59,10 +59,10 @@ std::int64_t sample_step(std::int64_t cells) { return std::max<std::int64_t>(1, 
 
 }  // namespace
 
-NoiseProfile residual_profile(const SignalElectrons& signal_e, const std::array<Plane<float>, 3>& site_variance_e2,
+NoiseProfile residual_profile(const SignalElectronsView& signal_e, const std::array<Plane<float>, 3>& site_variance_e2,
                               const PerSite<double>& light_e, double added) {
   std::array<std::vector<Sample>, 3> samples;
-  const int columns = signal_e.value.width() / 2, rows = signal_e.value.height() / 2;
+  const int columns = signal_e.value.width / 2, rows = signal_e.value.height / 2;
   const std::int64_t cells = static_cast<std::int64_t>(columns) * rows;
   const std::int64_t step = sample_step(cells);
   for (std::int64_t cell = 0; cell < cells; cell += step) {

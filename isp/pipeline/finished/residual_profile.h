@@ -6,6 +6,7 @@
 #include "isp/base/frame.h"
 #include "isp/base/plane.h"
 #include "isp/pipeline/noise_reduction.h"
+#include "isp/pipeline/render/region.h"
 
 namespace lowlux::isp {
 
@@ -16,7 +17,7 @@ namespace lowlux::isp {
 /// @param site_variance_e2 of R, G, B in each 2x2 cell
 /// @param light_e          signal of a white pixel
 /// @param added            variance of the codes' rounding, in fractions of white squared
-NoiseProfile residual_profile(const SignalElectrons& signal_e, const std::array<Plane<float>, 3>& site_variance_e2,
+NoiseProfile residual_profile(const SignalElectronsView& signal_e, const std::array<Plane<float>, 3>& site_variance_e2,
                               const PerSite<double>& light_e, double added);
 
 /// Returns the same line for frames that are no mosaics.

@@ -56,10 +56,8 @@ Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptio
   FrameElectrons out{.phase = frame.raw.phase, .warnings = std::move(plan->warnings)};
   describe_noise(frame, *plan, out);
   const std::vector<Pixel> defects = std::exchange(plan->levels.defects, {});
-  RawElectrons charge = raw_electrons(frame, plan->levels, {}, executor);
-  for (const denoise::LineOffsets& lines : plan->noise_reduction.lines) {
-    denoise::subtract_lines(lines, charge.value.view());
-  }
+  RawElectrons charge = raw_electrons(frame, plan->levels, executor);
+  subtract_lines(plan->noise_reduction.lines, {0, 0, charge.value.width(), charge.value.height()}, charge.value.view());
   out.signal_e = subtract_dark(std::move(charge), plan->levels.black, executor).value;
   for (const Pixel& defect : defects) out.signal_e.at(defect.x, defect.y) = std::numeric_limits<float>::quiet_NaN();
   return out;

@@ -118,7 +118,7 @@ NoiseReduction left_alone(const RawFrame& frame, std::string reason) {
 RawElectrons charge_to_check(const RawFrame& frame, const RawLevels& levels, std::span<const Rect> squares,
                              bool with_lines, NoiseReduction& out, Executor& executor) {
   if (!with_lines && !squares.empty()) return sample_electrons(frame, levels, squares, executor);
-  RawElectrons charge = raw_electrons(frame, levels, {}, executor);
+  RawElectrons charge = raw_electrons(frame, levels, executor);
   if (with_lines) subtract_measured_lines(frame, charge, out, executor);
   return squares.empty() ? std::move(charge) : sample_of(charge, squares);
 }

@@ -1,21 +1,9 @@
 #include "isp/pipeline/render/electron_mosaic.h"
 
-#include <utility>
-
 #include "isp/raw/subtract_dark_frame.h"
 #include "isp/raw/to_linear.h"
 
 namespace lowlux::isp {
-namespace {
-
-Rect whole_of(const RawDn& raw) { return {0, 0, raw.active.width, raw.active.height}; }
-
-}  // namespace
-
-void subtract_black(const RawDn& raw, const RawLevels& levels, PlaneView<float> out, Executor& executor) {
-  subtract_black(raw, levels, whole_of(raw), out, executor);
-}
-
 void subtract_black(const RawDn& raw, const RawLevels& levels, const Rect& part, PlaneView<float> out,
                     Executor& executor) {
   if (levels.dark_frame) {
@@ -25,13 +13,11 @@ void subtract_black(const RawDn& raw, const RawLevels& levels, const Rect& part,
   }
 }
 
-RawElectrons raw_electrons(const RawFrame& frame, const RawLevels& levels, Plane<float> memory, Executor& executor) {
-  const RawDn& raw = frame.raw;
-  if (memory.width() != raw.active.width || memory.height() != raw.active.height) {
-    memory = Plane<float>(raw.active.width, raw.active.height);
-  }
-  raw_electrons(frame, levels, whole_of(raw), memory.view(), executor);
-  return {std::move(memory), raw.phase};
+RawElectrons raw_electrons(const RawFrame& frame, const RawLevels& levels, Executor& executor) {
+  const int width = frame.raw.active.width, height = frame.raw.active.height;
+  RawElectrons out{Plane<float>(width, height), frame.raw.phase};
+  raw_electrons(frame, levels, {0, 0, width, height}, out.value.view(), executor);
+  return out;
 }
 
 void raw_electrons(const RawFrame& frame, const RawLevels& levels, const Rect& part, PlaneView<float> out,
@@ -45,6 +31,12 @@ void raw_electrons(const RawFrame& frame, const RawLevels& levels, const Rect& p
   repair(out, {part.x, part.y}, levels.defects, 2);
 }
 
+void subtract_lines(std::span<const denoise::LineOffsets> lines, const Rect& part, PlaneView<float> raw_e) {
+  for (const denoise::LineOffsets& offsets : lines) {
+    denoise::subtract_lines(offsets, raw_e, offsets.lines == denoise::Lines::rows ? part.y : part.x);
+  }
+}
+
 PerSite<float> of_crop(const PerSite<double>& active, const Rect& crop) {
   PerSite<float> out{};
   for (int site = 0; site < 4; ++site) {
@@ -53,12 +45,12 @@ PerSite<float> of_crop(const PerSite<double>& active, const Rect& crop) {
   return out;
 }
 
-PerSite<float> site_gains(const RawDn& raw, const std::array<float, 3>& white_gain,
-                          const PerSite<double>& units_at_white, const Rect& crop) {
+PerSite<float> site_gains(const RawDn& raw, const std::array<float, 3>& white_gain, const PerSite<double>& at_white,
+                          const Rect& crop) {
   PerSite<double> gain{};
   for (int site = 0; site < 4; ++site) {
     const int colour = static_cast<int>(colour_at(raw.phase, site & 1, site >> 1));
-    gain[site] = white_gain[colour] / units_at_white[site];
+    gain[site] = white_gain[colour] / at_white[site];
   }
   return of_crop(gain, crop);
 }

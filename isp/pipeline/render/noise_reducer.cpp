@@ -34,12 +34,6 @@ Rect from_even_site(const Rect& core) {
   return {core.x & ~1, core.y & ~1, core.width + (core.x & 1), core.height + (core.y & 1)};
 }
 
-void subtract_measured_lines(const NoiseReduction& how, const Rect& piece, PlaneView<float> raw_e) {
-  for (const denoise::LineOffsets& lines : how.lines) {
-    subtract_lines(lines, raw_e, lines.lines == denoise::Lines::rows ? piece.y : piece.x);
-  }
-}
-
 /// Returns the padded tile in which the noise of a tile that has a level is reduced.
 Rect with_own_margin(const LevelPart& part, const NoiseReducer::Piece& piece) {
   return overlap(with_margin(part.core, margin_of(*part.level), piece.frame_width, piece.frame_height), piece.whole);
@@ -169,20 +163,20 @@ void NoiseReducer::reduce_by_level(const Piece& piece, const NoiseReduction& how
   for (const LevelPart& part : parts_) reduce_part(part, piece, how, raw_e, signal_e, maps);
 }
 
-void NoiseReducer::reduce_by_time(const RawElectrons& raw, const NoiseReduction& how) {
+void NoiseReducer::reduce_by_time(const denoise::RawElectronsView& raw, const NoiseReduction& how) {
   if (how.temporal->restart) temporal_->reset();
-  moved_ = temporal_->run({raw.value.view(), raw.phase}, how.noise, how.temporal->light, how.temporal->options,
-                          mean_e_.view(), variance_fraction_.view(), executor_);
+  moved_ = temporal_->run(raw, how.noise, how.temporal->light, how.temporal->options, mean_e_.view(),
+                          variance_fraction_.view(), executor_);
 }
 
-void NoiseReducer::blend(const RawElectrons& raw, const NoiseReduction& how, const NoiseMaps& maps,
+void NoiseReducer::blend(BayerPhase phase, const NoiseReduction& how, const denoise::DenoiseMaps& level,
                          PlaneView<float> signal_e) {
   for_each_band(executor_, signal_e.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       for (int column = 0; column < std::min(2, signal_e.width); ++column) {
-        const auto colour = static_cast<std::size_t>(colour_at(raw.phase, column, y));
+        const auto colour = static_cast<std::size_t>(colour_at(phase, column, y));
         const BlendSites sites{mean_e_.row(y) + column, variance_fraction_.row(y / 2),
-                               maps.site_variance_e2[colour].row(y / 2),
+                               level.site_variance[colour].row(y / 2),
                                static_cast<float>(how.noise.dark_mean_e[site_of(column, y)]),
                                static_cast<float>(how.noise.variance_e2[colour])};
         blend_sites(sites, (signal_e.width + 1 - column) / 2, signal_e.row(y) + column);
@@ -191,37 +185,22 @@ void NoiseReducer::blend(const RawElectrons& raw, const NoiseReduction& how, con
   });
 }
 
-void NoiseReducer::run_piece(const Piece& piece, const NoiseReduction& how, PlaneView<float> raw_e,
-                             PlaneView<float> signal_e, const denoise::DenoiseMaps& maps) {
-  assert(how.reduces() && !how.temporal);
+void NoiseReducer::run(const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e,
+                       PlaneView<float> signal_e, const denoise::DenoiseMaps& maps) {
+  assert(how.reduces());
   moved_ = 0;
-  subtract_measured_lines(how, piece.whole, raw_e);
-  reduce_by_level(piece, how, raw_e, signal_e, maps);
-}
-
-SignalElectrons NoiseReducer::run(RawElectrons& raw, const NoiseReduction& how, Plane<float> memory, NoiseMaps* maps) {
-  const int width = raw.value.width(), height = raw.value.height();
-  const Rect whole{0, 0, width, height};
-  fit(memory, width, height);
-  subtract_measured_lines(how, whole, raw.value.view());
-  moved_ = 0;
-  if (how.temporal) {
-    reserve_time(width, height);
-    reduce_by_time(raw, how);
+  if (!how.temporal) return reduce_by_level(piece, how, raw_e, signal_e, maps);
+  assert(piece.whole.width == piece.frame_width && piece.whole.height == piece.frame_height);
+  reserve_time(raw_e.width, raw_e.height);
+  reduce_by_time({raw_e, piece.phase}, how);
+  if (!how.has_level()) return take_dark_off(std::as_const(mean_e_).view(), how.noise, signal_e, executor_);
+  denoise::DenoiseMaps of_level = maps;
+  if (maps.residual_variance.data == nullptr) {
+    fit(level_maps_, raw_e.width, raw_e.height);
+    of_level = views_of(level_maps_);
   }
-  if (!how.has_level()) {
-    take_dark_off(std::as_const(mean_e_).view(), how.noise, memory.view(), executor_);
-    return {std::move(memory), raw.phase};
-  }
-  NoiseMaps* const level_maps = maps != nullptr || !how.temporal ? maps : &level_maps_;
-  denoise::DenoiseMaps views;
-  if (level_maps != nullptr) {
-    fit(*level_maps, width, height);
-    views = views_of(*level_maps);
-  }
-  reduce_by_level({whole, whole, width, height, raw.phase}, how, std::as_const(raw.value).view(), memory.view(), views);
-  if (how.temporal) blend(raw, how, *level_maps, memory.view());
-  return {std::move(memory), raw.phase};
+  reduce_by_level(piece, how, raw_e, signal_e, of_level);
+  blend(piece.phase, how, of_level, signal_e);
 }
 
 }  // namespace lowlux::isp

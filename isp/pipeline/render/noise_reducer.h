@@ -12,7 +12,7 @@
 
 namespace lowlux::isp {
 
-/// Subtracts lines and dark charge from a mosaic and reduces its noise as decided. Owns the denoisers and their memory
+/// Subtracts dark charge from a mosaic and reduces its noise as decided. Owns the denoisers and their memory
 /// (see Denoiser and TemporalMean), which the first frame of a size allocates.
 ///
 /// Where a level and previous frames both take part, each site is the mean of both results, weighted by the inverse of
@@ -22,15 +22,8 @@ class NoiseReducer {
  public:
   explicit NoiseReducer(Executor& executor) : executor_(executor) {}
 
-  /// Reduces the noise of a frame. Where regions differ, each tile with a level is reduced with a margin of
-  /// its own, and the others keep their noise.
-  /// @param raw   as the frame the decision was made for; its lines are subtracted in place
-  /// @param maps  filled if not null
-  /// Precondition: how.reduces().
-  SignalElectrons run(RawElectrons& raw, const NoiseReduction& how, Plane<float> memory, NoiseMaps* maps);
-
-  /// Describes a tile of a frame, in pixels of its active area. The corner of `whole` is on the lattice of
-  /// frame_tiles.h.
+  /// Describes a tile of a frame, or all of it, in pixels of its active area. The corner of `whole` is on the lattice
+  /// of frame_tiles.h.
   struct Piece {
     Rect core;   // region that is requested
     Rect whole;  // padded tile: the region that is known, margin included
@@ -38,13 +31,14 @@ class NoiseReducer {
     int frame_height = 0;
     BayerPhase phase = BayerPhase::rggb;  // of the frame
   };
-  /// Reduces the noise of a tile of a frame, as run() does for a frame.
-  /// @param raw_e     the padded tile; its lines are subtracted in place
+  /// Reduces the noise of a tile of a frame, or of all of it. Where regions differ, each rectangle with a level is
+  /// reduced with a margin of its own, and the others keep their noise.
+  /// @param raw_e     the padded tile, without the lines of `how`
   /// @param signal_e  as large; the core is set
   /// @param maps      of the cells of the padded tile, those of the core are set; none if they are not wanted
-  /// Precondition: how.reduces(), without previous frames.
-  void run_piece(const Piece& piece, const NoiseReduction& how, PlaneView<float> raw_e, PlaneView<float> signal_e,
-                 const denoise::DenoiseMaps& maps = {});
+  /// Precondition: how.reduces(); with previous frames, the piece is the whole frame.
+  void run(const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e, PlaneView<float> signal_e,
+           const denoise::DenoiseMaps& maps = {});
   /// Returns the bytes for a frame of width x height pixels, without previous frames.
   /// @param maps  whether they are requested; their own memory is not included
   static std::size_t bytes(int width, int height, const NoiseReduction& how, bool maps, int threads);
@@ -70,8 +64,8 @@ class NoiseReducer {
                        PlaneView<float> signal_e, const denoise::DenoiseMaps& maps);
   void reduce_part(const LevelPart& part, const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e,
                    PlaneView<float> signal_e, const denoise::DenoiseMaps& maps);
-  void reduce_by_time(const RawElectrons& raw, const NoiseReduction& how);
-  void blend(const RawElectrons& raw, const NoiseReduction& how, const NoiseMaps& maps, PlaneView<float> signal_e);
+  void reduce_by_time(const denoise::RawElectronsView& raw, const NoiseReduction& how);
+  void blend(BayerPhase phase, const NoiseReduction& how, const denoise::DenoiseMaps& level, PlaneView<float> signal_e);
 
   Executor& executor_;
   std::unique_ptr<denoise::Denoiser> denoiser_;

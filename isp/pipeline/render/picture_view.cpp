@@ -46,6 +46,13 @@ Picture make_picture(SampleType samples, int width, int height) {
   return SceneLinear(width, height);
 }
 
+void fit(std::optional<Picture>& picture, SampleType samples, int width, int height) {
+  const auto has_size = [&](const auto& image) { return image.width() == width && image.height() == height; };
+  if (picture && picture->index() == static_cast<std::size_t>(samples) && std::visit(has_size, *picture)) return;
+  picture.reset();  // frees its memory before the next one is allocated
+  picture = make_picture(samples, width, height);
+}
+
 PictureView view_of(Picture& picture) {
   return std::visit(
       [](auto& image) -> PictureView {

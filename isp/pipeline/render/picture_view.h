@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <variant>
 
 #include "isp/base/executor.h"
@@ -16,6 +17,9 @@ using PictureView = std::variant<PlaneView<std::uint8_t>, PlaneView<std::uint16_
 
 /// Returns an uninitialised image.
 Picture make_picture(SampleType samples, int width, int height);
+
+/// Allocates memory for an image of that type and size, unless `picture` is one.
+void fit(std::optional<Picture>& picture, SampleType samples, int width, int height);
 
 PictureView view_of(Picture& picture);
 

@@ -8,13 +8,15 @@
 #include "isp/pipeline/render/noise_reducer.h"
 #include "isp/pipeline/render/pixel_cells.h"
 #include "isp/pipeline/render/pixel_noise_reducer.h"
-#include "isp/pipeline/render/tile_renderer.h"
+#include "isp/pipeline/render/region.h"
 #include "isp/raw/kernel/raw_to_rgb.h"
 
 namespace lowlux::isp {
 namespace {
 
 std::size_t area(int width, int height) { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
+
+std::size_t bytes_of(SampleType samples) { return samples == SampleType::u8 ? 1 : samples == SampleType::u16 ? 2 : 4; }
 
 std::size_t whole_frame_bytes(const RawDn& raw, const DevelopPlan& plan, int threads) {
   const int width = raw.active.width, height = raw.active.height;
@@ -34,11 +36,25 @@ std::size_t whole_frame_bytes(const RawDn& raw, const DevelopPlan& plan, int thr
   return out + plane + NoiseReducer::bytes(width, height, plan.noise_reduction, maps, threads);
 }
 
+std::size_t tiles_bytes(const RawDn& raw, const DevelopPlan& plan, int threads, const TileLimits& limits) {
+  const RegionSize size = largest_tile(raw, plan, limits);
+  const std::size_t mosaic = sizeof(float) * area(size.mosaic_width, size.mosaic_height);
+  const std::size_t seen = area(size.seen_width, size.seen_height);
+  const NoiseReduction& how = plan.noise_reduction;
+  std::size_t out = mosaic + RawToRgb::bytes(size.seen_width, threads);
+  if (how.reduces()) {
+    out += (how.regions ? 2 : 1) * mosaic +
+           denoise::Denoiser::bytes(size.mosaic_width, size.mosaic_height, threads, max_level_of(how));
+  }
+  if (plan.rendering.profile) out += 3 * sizeof(float) * seen / (plan.options.half ? 4 : 1);
+  return out + seen * (plan.options.half ? sizeof(float) * 3 / 4 : 3 * bytes_of(plan.options.samples));
+}
+
 }  // namespace
 
 std::size_t pipeline_bytes(const RawDn& raw, const DevelopPlan& plan, int threads, const TileLimits& limits) {
   assert(!needs_grid(plan) && !needs_seeing_map(plan) && !needs_table(plan) && !plan.noise_reduction.temporal);
-  if (is_tiled(raw, plan, limits)) return TileRenderer::bytes(raw, plan, limits, threads);
+  if (is_tiled(raw, plan, limits)) return tiles_bytes(raw, plan, threads, limits);
   return whole_frame_bytes(raw, plan, threads);
 }
 
@@ -55,8 +71,7 @@ std::size_t expected_bytes(const RawDn& raw, const DevelopOptions& options, int 
   }
   if (denoise.mode == DenoiseChoice::Mode::level) most.noise_reduction.level = denoise.level;
   const std::size_t samples = raw.sample_bytes() * raw.samples();
-  const std::size_t sample = options.samples == SampleType::u8 ? 1 : options.samples == SampleType::u16 ? 2 : 4;
-  const std::size_t picture = 3 * sample * area(most.width, most.height);
+  const std::size_t picture = 3 * bytes_of(options.samples) * area(most.width, most.height);
   const std::size_t before_framing = options.max_size ? 3 * sizeof(float) * area(most.width, most.height)
                                      : options.crop   ? picture
                                                       : 0;

@@ -105,7 +105,7 @@ void PixelNoiseReducer::reduce_tile(const Frame& frame, const NoiseReducer::Piec
   if (frame.maps.residual_variance.data != nullptr) {
     maps = crop_of(views_of(tile_maps_), {0, 0, whole.width, whole.height});
   }
-  noise.run_piece(piece, how, in, out, maps);
+  noise.run(piece, how, in, out, maps);
   const Rect kept{core.x - whole.x, core.y - whole.y, core.width, core.height};
   join_cells(out.crop(kept.x, kept.y, kept.width, kept.height), *how.cell_e, std::span(clean).first(count), executor_);
   copy(crop_of(maps, kept), crop_of(frame.maps, core));
