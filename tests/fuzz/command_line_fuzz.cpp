@@ -14,6 +14,7 @@
 #include "isp/cli/calibrate/calibrate_args.h"
 #include "isp/cli/capture/capture_args.h"
 #include "isp/cli/compare/compare_args.h"
+#include "isp/cli/dataset/dataset_args.h"
 #include "isp/cli/develop/develop_args.h"
 #include "isp/cli/finished/resaturate_args.h"
 #include "isp/cli/finished/retarget_args.h"
@@ -54,9 +55,11 @@ constexpr std::array verbs{
     Verb{"calibrate quoted", parsed<parse_calibrate_quoted>},
     Verb{"capture", parsed<parse_capture>},
     Verb{"compare", parsed<parse_compare>},
+    Verb{"dataset", parsed<parse_dataset>},
     Verb{"denoise", parsed<parse_denoise>},
     Verb{"develop", parsed<parse_develop>},
     Verb{"info", parsed<parse_info>},
+    Verb{"merge", parsed<parse_merge>},
     Verb{"reproduce", parsed<parse_reproduce>},
     Verb{"resaturate", parsed<parse_resaturate>},
     Verb{"retarget", parsed<parse_retarget>},
