@@ -12,9 +12,9 @@ namespace lowlux::capture {
 ///
 /// Constants and, away from borders, linear gradients of each colour are reproduced exactly but for rounding, whatever
 /// the other colours are: noise of mean 0 leaves means as they are. Values are signed and not limited, except within
-/// three pixels of saturated sites (1 or more): where all sites of a colour within one pixel are saturated, so is the
-/// interpolated value; elsewhere capture/README.md states the limits. A colour without any site in the mosaic gets the
-/// mean of the sites there are.
+/// five pixels of saturated sites (1 or more): gradients are not exact there, and where all sites of a colour within
+/// one pixel are saturated, so is the interpolated value (capture/README.md). A colour without any site in the mosaic
+/// gets the mean of the sites there are.
 ///
 /// @param mosaic  height x width, finite
 /// @param out     height x (3 width), R, G, B interleaved; must not overlap `mosaic`

@@ -16,7 +16,9 @@ static_assert(ratio_border == 8 && luma_border == 5 && half_gaussian >= 4);
 constexpr std::array<float, 9> gaussian{0.0076143F, 0.0360740F, 0.1095866F, 0.2134430F, 0.2665642F,
                                         0.2134430F, 0.1095866F, 0.0360740F, 0.0076143F};
 constexpr float least_ratio_mean = 0.004F, least_root = 0.002F;
-constexpr float least_of_lowest = 0.7F;  // of the lowest site within two pixels: no dark rings around lamps
+constexpr float least_knee = 0.002F;
+constexpr int saturated_reach = 5;  // of a saturated site: the filters' reach, and two pixels of a lamp's edge
+static_assert(saturated_reach >= reach && saturated_reach < margin);
 
 using Lanes = std::array<float, lanes>;
 
@@ -83,11 +85,15 @@ Base base_of(float xx, float xy, float yy, float noise) {
 }  // namespace
 
 Tile::Tile(const XTransSetting& setting)
-    : setting_(setting), samples_(tile_plane()), luma_(tile_plane()), near_saturated_(padded, padded) {
+    : setting_(setting),
+      samples_(tile_plane()),
+      luma_(tile_plane()),
+      compressed_(tile_plane()),
+      near_saturated_(padded, padded) {
   for (auto& plane : ratio_) plane = tile_plane();
   for (auto& plane : row_sums_) plane = tile_plane();
   for (auto& plane : tensor_) plane = tile_plane();
-  for (Plane<float>* plane : {&samples_, &luma_}) std::fill_n(plane->data(), plane->size(), 0.0F);
+  for (Plane<float>* plane : {&samples_, &luma_, &compressed_}) std::fill_n(plane->data(), plane->size(), 0.0F);
   double scale = 0, offset = 0;
   for (std::size_t c = 0; c < 3; ++c) {
     const double neutral = setting.neutral[c] / setting.neutral[1];
@@ -99,6 +105,7 @@ Tile::Tile(const XTransSetting& setting)
   }
   luma_scale_ = static_cast<float>(scale);
   luma_offset_ = static_cast<float>(offset);
+  knee_ = least_knee + luma_scale_ + std::sqrt(luma_offset_);
   ratio_floor_ = least_ratio_mean + 2 * luma_scale_;
   root_offset_ = least_root + 0.375F * luma_scale_;
   if (scale > 0) root_offset_ += static_cast<float>(std::min(offset / scale, 1.0));
@@ -182,20 +189,33 @@ void Tile::compute_tensor() {
 
 void Tile::mark_saturated() {
   const auto& bank = filter_bank();
+  constexpr int first = margin - saturated_reach, width = 2 * saturated_reach + 1;
   std::fill_n(near_saturated_.data(), near_saturated_.size(), std::uint8_t{0});
-  for (int y = margin - reach; y < padded - margin + reach; ++y) {
-    for (int x = margin - reach; x < padded - margin + reach; ++x) {
+  bool any = false;
+  for (int y = first; y < padded - first; ++y) {
+    for (int x = first; x < padded - first; ++x) {
       if (samples_.row(y)[x] < white_[static_cast<std::size_t>(bank[site_at(x, y)].own)]) continue;
-      for (int dy = -reach; dy <= reach; ++dy)
-        std::fill_n(near_saturated_.row(y + dy) + x - reach, side, std::uint8_t{1});
+      any = true;
+      for (int dy = -saturated_reach; dy <= saturated_reach; ++dy)
+        std::fill_n(near_saturated_.row(y + dy) + x - saturated_reach, width, std::uint8_t{1});
     }
+  }
+  if (any) compress_samples();
+}
+
+void Tile::compress_samples() {
+  for (int y = margin - reach; y < padded - margin + reach; ++y) {
+    const float* from = samples_.row(y);
+    float* to = compressed_.row(y);
+    for (int x = margin - reach; x < padded - margin + reach; ++x)
+      to[x] = std::asinh(std::min(from[x], least_white_) / (2 * knee_));
   }
 }
 
-Tile::Range Tile::range_of(std::size_t colour, int x, int y, int distance) const {
+Tile::Range Tile::range_of(std::size_t colour, int x, int y) const {
   Range range;
-  for (int j = y - distance; j <= y + distance; ++j) {
-    for (int i = x - distance; i <= x + distance; ++i) {
+  for (int j = y - 1; j <= y + 1; ++j) {
+    for (int i = x - 1; i <= x + 1; ++i) {
       if (static_cast<std::size_t>(filter_bank()[site_at(i, j)].own) != colour) continue;
       range.low = std::min(range.low, samples_.row(j)[i]);
       range.high = std::max(range.high, samples_.row(j)[i]);
@@ -204,29 +224,20 @@ Tile::Range Tile::range_of(std::size_t colour, int x, int y, int distance) const
   return range;
 }
 
-Patch Tile::clipped(Patch patch, int x, int y) const {
-  const SiteFilters& site = filter_bank()[site_at(x, y)];
-  std::array<float, 3> limit;
-  for (std::size_t c = 0; c < 3; ++c) limit[c] = least_white_ / ratio_[c].row(y)[x];
-  for (std::size_t i = 0; i < patch.size(); ++i) {
-    patch[i] = std::min(
-        patch[i], limit[0] * site.is_colour[0][i] + limit[1] * site.is_colour[1][i] + limit[2] * site.is_colour[2][i]);
-  }
-  return patch;
+float Tile::compressed_value(const PlacedFilters& filters, const Base& base, int x, int y) const {
+  Patch patch;
+  for (int r = 0; r < side; ++r) std::copy_n(compressed_.row(y + r - reach) + x - reach, lanes, &patch[r * lanes]);
+  return 2 * knee_ * std::sinh(filtered(filters, base, patch));
 }
 
 float Tile::value_near_saturation(const PlacedFilters& filters, const Base& base, const Patch& patch,
                                   std::size_t colour, int x, int y) const {
-  const Range range = range_of(colour, x, y, 1);
-  const float ratio = ratio_[colour].row(y)[x];
+  const Range range = range_of(colour, x, y);
   if (range.low < least_white_) {
-    const float value = ratio * filtered(filters, base, clipped(patch, x, y));
-    if (value < least_white_) {
-      const float low = range_of(colour, x, y, 2).low;
-      return low > 0 ? std::max(value, least_of_lowest * low) : value;
-    }
+    const float value = compressed_value(filters, base, x, y);
+    if (value < least_white_) return value;
   }
-  const float value = ratio * filtered(filters, base, patch);
+  const float value = ratio_[colour].row(y)[x] * filtered(filters, base, patch);
   return range.high >= white_[colour] ? std::clamp(value, range.low, range.high) : value;
 }
 

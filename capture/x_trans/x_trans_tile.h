@@ -43,15 +43,20 @@ class Tile {
   void compute_tensor();
   void mark_saturated();
   void write_pixel(int x, int y, float* rgb) const;
-  /// The range of the sites of a colour within some pixels.
+  /// The range of the sites of a colour.
   struct Range {
     float low = INFINITY, high = -INFINITY;
   };
-  Range range_of(std::size_t colour, int x, int y, int distance) const;
-  /// Returns a patch whose values are at most the level up to which no colour saturates.
-  Patch clipped(Patch patch, int x, int y) const;
-  /// Interpolates where a saturated site is within the filters' reach: from clipped values, so that edges of saturated
-  /// regions are alike in all colours; and from all there is where that gives a value beyond the clipping level.
+  /// Returns the range of the sites of a colour within one pixel.
+  Range range_of(std::size_t colour, int x, int y) const;
+  /// Computes asinh(v / (2 knee)) of the samples v around the core, clipped to the level up to which no colour
+  /// saturates: a logarithm well above the knee, and linear in noise around zero.
+  void compress_samples();
+  /// Interpolates compressed samples. The ratios of colours are constants there, which the filters keep.
+  float compressed_value(const PlacedFilters& filters, const Base& base, int x, int y) const;
+  /// Interpolates close to a saturated site: from compressed samples, so that edges of saturated regions are alike in
+  /// all colours and a lamp does not shine into its dark surroundings; and from all there is where that gives a value
+  /// beyond the clipping level.
   float value_near_saturation(const PlacedFilters& filters, const Base& base, const Patch& patch, std::size_t colour,
                               int x, int y) const;
 
@@ -59,9 +64,9 @@ class Tile {
   std::array<float, 3> neutral_{}, white_{};  // relative to green; white over neutral
   float luma_scale_ = 0, luma_offset_ = 0;    // noise of luma
   float least_white_ = INFINITY;
-  float ratio_floor_ = 0, root_offset_ = 0;
+  float ratio_floor_ = 0, root_offset_ = 0, knee_ = 0;
   std::array<std::size_t, padded> row_sites_{}, column_sites_{};  // whose sum is the number of a site
-  Plane<float> samples_, luma_;
+  Plane<float> samples_, luma_, compressed_;
   std::array<Plane<float>, 3> ratio_;     // by which samples of each colour are divided around a site
   std::array<Plane<float>, 4> row_sums_;  // scratch
   std::array<Plane<float>, 4> tensor_;    // xx, xy, yy and mean luma

@@ -206,6 +206,65 @@ TEST(XTrans, SaturatedRegionsStaySaturatedAndTheirSurroundingsInRange) {
   }
 }
 
+/// A lamp behind a lens: a Gaussian spot of another colour than the ground.
+struct Lamp {
+  double x, y, sigma;
+  std::array<double, 3> peak, ground;  // fractions of white
+
+  double at(int px, int py, int c) const {
+    const double squared = (px - x) * (px - x) + (py - y) * (py - y);
+    return ground[c] + peak[c] * std::exp(-squared / (2 * sigma * sigma));
+  }
+};
+
+Lamp drawn_lamp(std::mt19937& draw) {
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(draw); };
+  Lamp lamp{20 + uniform(0, 6), 20 + uniform(0, 6), uniform(1, 2.5), {}, {}};
+  const double brightness = std::exp(uniform(std::log(3), std::log(30))), dark = uniform(0.01, 0.04);
+  for (std::size_t c = 0; c < 3; ++c) {
+    lamp.peak[c] = brightness * uniform(0.3, 1);
+    lamp.ground[c] = dark * uniform(0.3, 1);
+  }
+  return lamp;
+}
+
+TEST(XTrans, SaturatedLampsKeepTheirColourAndThatOfTheirDarkSurroundings) {
+  constexpr int side = 46, lamps = 200, border = 6;
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE(testing::Message() << "seed " << seed);
+  std::mt19937 draw(seed);
+  double sum = 0, squares = 0, lowest = INFINITY;  // of |ln(value / truth)|; of value / truth
+  for (int i = 0; i < lamps; ++i) {
+    const Lamp lamp = drawn_lamp(draw);
+    const XTransPhase phase = phase_number(i % 36);
+    const auto truth = [&](int x, int y, int c) { return std::min(lamp.at(x, y, c), 1.0); };
+    const auto out = interpolated(mosaic_of(side, side, phase, truth), {phase});
+    double error = 0;
+    int count = 0;
+    for (int y = border; y < side - border; ++y) {
+      for (int x = border; x < side - border; ++x) {
+        double brightest = 0, colour = 0;
+        for (int c = 0; c < 3; ++c) brightest = std::max(brightest, lamp.at(x, y, c));
+        const bool close = std::hypot(x - lamp.x, y - lamp.y) < 3 * lamp.sigma + 5;
+        if (brightest >= 1 || !close) continue;
+        for (int c = 0; c < 3; ++c) {
+          const double ratio = static_cast<double>(out.at(3 * x + c, y)) / truth(x, y, c);
+          lowest = std::min(lowest, ratio);
+          colour += std::fabs(std::log(std::max(ratio, 1e-3))) / 3;
+        }
+        error += colour;
+        ++count;
+      }
+    }
+    sum += error / count;
+    squares += error / count * error / count;
+  }
+  const double mean = sum / lamps, standard_error = std::sqrt((squares / lamps - mean * mean) / lamps);
+  RecordProperty("mean_error", std::to_string(mean));
+  EXPECT_LT(mean, 0.04 + 5 * standard_error);  // 0.031 when this was written
+  EXPECT_GT(lowest, 0);                        // no dark dots
+}
+
 /// A flat of Poisson noise and read noise [e-], as fractions of 1000 e-.
 Plane<float> noisy_flat(int side, const XTransPhase& phase, double mean_e, double read_noise_e, unsigned seed) {
   std::mt19937 draw(seed);
