@@ -9,7 +9,7 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr int neighbourhood = 2, tested_border = 3, search = 6, period = 6;
+constexpr int neighbourhood = 2, tested_border = 3, search = 6, period = x_trans_period;
 constexpr float floor_of_white = 0.01F, noise_factor = 8, detail_factor = 12;
 constexpr float noise_range = 4.5F;  // of the sites of a colour, in standard deviations, as for Bayer mosaics
 constexpr float max_shared = 0.1F, max_shared_green = 0.07F;

@@ -5,7 +5,7 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr int period = 6;
+constexpr int period = x_trans_period;
 // Blocks of 3 x 3 sites with green in the centre and the corners, as on a chessboard: in one half of them red is left
 // and right of the centre and blue above and below it, in the other half the reverse.
 constexpr std::uint8_t colours[period][period] = {{1, 1, 0, 1, 1, 2}, {1, 1, 2, 1, 1, 0}, {2, 0, 1, 0, 2, 1},
