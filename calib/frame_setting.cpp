@@ -23,8 +23,10 @@ std::string text_of(const std::optional<double>& value) { return value ? fmt::fo
 Result<FrameSetting> setting_of(const RawDn& raw) {
   if (raw.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported,
-                "the frame is already demosaiced, as X-Trans is at reading; calibration needs the mosaic as the sensor "
-                "gave it");
+                raw.from_x_trans
+                    ? "X-Trans has dark and bias frames (--dark-frame, --bias-frame) only: flats, profiles and "
+                      "calibration go by the 2 x 2 sites of a Bayer mosaic"
+                    : "the frame is already demosaiced; calibration needs the mosaic as the sensor gave it");
   }
   if (raw.is_float()) {
     return fail(ErrorCode::unsupported,

@@ -240,7 +240,8 @@ std::vector<ColourCalibration> calibrations_of(const CameraProfile& profile) {
 Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame, const std::string& gain_setting) {
   if (frame.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported,
-                "the frame is already demosaiced, as X-Trans is at reading: a profile describes the mosaic");
+                frame.from_x_trans ? "profiles describe the 2 x 2 sites of a Bayer mosaic, and X-Trans has none"
+                                   : "the frame is already demosaiced: a profile describes the mosaic");
   }
   if (const auto same = check_camera(profile, frame.info); !same) return tl::make_unexpected(same.error());
   ProfileAtFrame out;

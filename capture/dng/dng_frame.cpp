@@ -73,7 +73,7 @@ void read_corrections(const DngFile& dng, const TiffDirectory& directory, Sample
 }
 
 /// Finishes a frame that has its samples.
-Result<RawFrame> finished(const DngFile& dng, const DngDescription& described, RawFrame frame,
+Result<RawFrame> finished(const DngFile& dng, const DngDescription& described, RawFrame frame, const XTransUse& use,
                           bool has_linear_codes = false) {
   const TiffDirectory& directory = *described.directory;
   const std::optional<XTransPhase>& x_trans = described.image.x_trans;
@@ -86,7 +86,9 @@ Result<RawFrame> finished(const DngFile& dng, const DngDescription& described, R
                    {.linearized = linearized, .polynomials = has_linear_codes, .is_x_trans = x_trans.has_value()},
                    frame);
   ignore_impossible_white(frame.colour, frame.warnings);
-  if (x_trans) interpolate_frame(frame, *x_trans);
+  if (x_trans) {
+    if (auto used = use_mosaic(frame, *x_trans, use); !used) return pass_on(used);
+  }
   if (const auto& quad_bayer = described.image.quad_bayer) {
     if (auto binned = bin_quad_bayer(*quad_bayer, frame); !binned) return pass_on(binned);
   }
@@ -111,8 +113,8 @@ Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw
   return described;
 }
 
-Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std::size_t file_bytes,
-                              DecodedRaw decoded) {
+Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std::size_t file_bytes, DecodedRaw decoded,
+                              const XTransUse& use) {
   const DecodedHeader& h = decoded.header;
   auto chosen = decoded_image(dng, std::move(described), file_bytes, h);
   if (!chosen) return pass_on(chosen);
@@ -124,26 +126,28 @@ Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std:
     frame.colour.calibrations.push_back(*table);
     frame.colour.source = CameraColour::Source::decoder_table;
   }
-  return finished(dng, *chosen, std::move(frame));
+  return finished(dng, *chosen, std::move(frame), use);
 }
 
-Result<RawFrame> complete_linearized_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes) {
+Result<RawFrame> complete_linearized_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes,
+                                         const XTransUse& use) {
   RawFrame frame = std::move(described.frame);
   const TiffDirectory& directory = *described.directory;
   frame.raw.dn = std::move(codes);
   auto linear = linearize_codes(directory, directory_of_list(dng, directory, 2), described.image.bits, frame.raw);
   if (!linear) return pass_on(linear);
-  return finished(dng, described, std::move(frame), true);
+  return finished(dng, described, std::move(frame), use, true);
 }
 
-Result<RawFrame> complete_float_dng(const DngFile& dng, DngDescription described, Plane<float> samples) {
+Result<RawFrame> complete_float_dng(const DngFile& dng, DngDescription described, Plane<float> samples,
+                                    const XTransUse& use) {
   RawFrame frame = std::move(described.frame);
   frame.raw.dn_float = std::move(samples);
   if (auto unusable = unusable_sample(frame.raw)) return fail(ErrorCode::malformed, *std::move(unusable));
   if (described.directory->find(tag::linearization_table) != nullptr) {
     frame.warnings.emplace_back("LinearizationTable is not applied: the samples are floating-point numbers");
   }
-  return finished(dng, described, std::move(frame));
+  return finished(dng, described, std::move(frame), use);
 }
 
 }  // namespace lowlux::capture

@@ -62,7 +62,7 @@ Result<void> fill_geometry(const DecodedHeader& h, RawDn& raw) {
 /// Returns the colour number of a site of the visible area.
 int channel_of(const DecodedHeader& h, int x, int y) {
   if (h.filters != x_trans_filters) return channel_of(h.filters, x, y);
-  return std::min<int>(h.x_trans[y % 6 * 6 + x % 6], 3);
+  return std::min<int>(h.x_trans[y % x_trans_period * x_trans_period + x % x_trans_period], 3);
 }
 
 /// Returns the black level as dcraw and LibRaw sum it: one for all, one for each colour number, and a pattern.
@@ -72,7 +72,7 @@ BlackLevel decoder_black(const DecodedHeader& h) {
       std::int64_t{h.pattern_rows} * h.pattern_columns <= std::int64_t{std::ssize(h.pattern_black)};
   const int rows = has_pattern ? h.pattern_rows : 1, columns = has_pattern ? h.pattern_columns : 1;
   BlackLevel black;
-  const int cell = h.filters == 0 ? 1 : h.filters == x_trans_filters ? 6 : 2;
+  const int cell = h.filters == 0 ? 1 : h.filters == x_trans_filters ? x_trans_period : 2;
   black.rows = std::lcm(rows, cell);
   black.columns = std::lcm(columns, cell);
   black.samples = h.samples;
@@ -164,7 +164,7 @@ std::optional<double> decoder_temperature_c(const DecodedHeader& header) {
   return sensor ? sensor : plausible_temperature_c(header.camera_temperature_c);
 }
 
-Result<RawFrame> frame_of_decoder(DecodedRaw decoded) {
+Result<RawFrame> frame_of_decoder(DecodedRaw decoded, const XTransUse& x_trans_use) {
   const DecodedHeader& h = decoded.header;
   const auto x_trans = h.samples == 1 && h.filters == x_trans_filters ? x_trans_phase(h.x_trans) : std::nullopt;
   RawFrame frame;
@@ -187,7 +187,9 @@ Result<RawFrame> frame_of_decoder(DecodedRaw decoded) {
     frame.warnings.emplace_back("the pixels are not square: their aspect is not applied");
   }
   frame.raw.dn = std::move(decoded.samples);
-  if (x_trans) interpolate_frame(frame, *x_trans);
+  if (x_trans) {
+    if (auto used = use_mosaic(frame, *x_trans, x_trans_use); !used) return pass_on(used);
+  }
   return frame;
 }
 

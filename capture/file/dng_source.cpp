@@ -124,7 +124,8 @@ Result<DecodedRaw> decode_dng(const DngFile& dng, std::span<const std::byte> byt
   return decode_contained(without, limits);
 }
 
-Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, const ReadLimits& limits) {
+Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, const ReadLimits& limits,
+                          const XTransUse& use) {
   auto described = describe_dng(dng, dng.raw_images.front(), bytes.size());
   if (!described) return pass_on(described);
   const DngImage& image = described->image;
@@ -136,30 +137,30 @@ Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, 
   if (image.is_lossy) {
     auto codes = decode_lossy_image(bytes, *described->directory, image);
     if (!codes) return pass_on(codes);
-    return complete_linearized_dng(dng, *std::move(described), *std::move(codes));
+    return complete_linearized_dng(dng, *std::move(described), *std::move(codes), use);
   }
   if (image.is_jpeg_xl) {
     auto codes = decode_jpeg_xl_image(bytes, *described->directory, image, limits);
     if (!codes) return pass_on(codes);
-    return complete_linearized_dng(dng, *std::move(described), *std::move(codes));
+    return complete_linearized_dng(dng, *std::move(described), *std::move(codes), use);
   }
   if (image.is_float) {
     auto samples = decode_float_image(bytes, *described->directory, image);
     if (!samples) return pass_on(samples);
-    return complete_float_dng(dng, *std::move(described), *std::move(samples));
+    return complete_float_dng(dng, *std::move(described), *std::move(samples), use);
   }
   auto decoded = decode_dng(dng, bytes, limits);
   if (!decoded) return pass_on(decoded);
-  return complete_dng(dng, *std::move(described), bytes.size(), *std::move(decoded));
+  return complete_dng(dng, *std::move(described), bytes.size(), *std::move(decoded), use);
 }
 
-Result<RawFrame> read_bytes(std::span<const std::byte> bytes, const ReadLimits& limits) {
+Result<RawFrame> read_bytes(std::span<const std::byte> bytes, const ReadLimits& limits, const XTransUse& use) {
   if (bytes.empty()) return fail(ErrorCode::malformed, "the file is empty");
   if (bytes.size() > limits.max_file_bytes) return too_many_bytes(bytes.size(), limits.max_file_bytes);
   auto dng = open_dng(bytes);
   if (!dng) return pass_on(dng);
   if (*dng) {
-    auto frame = read_dng(**dng, bytes, limits);
+    auto frame = read_dng(**dng, bytes, limits, use);
     if (frame) frame->source_tags = dng_source_tags(bytes, **dng, frame->warnings);
     return frame;
   }
@@ -168,7 +169,7 @@ Result<RawFrame> read_bytes(std::span<const std::byte> bytes, const ReadLimits& 
   }
   auto decoded = decode_contained(bytes, limits);
   if (!decoded) return tl::make_unexpected(not_decoded(bytes, std::move(decoded.error())));
-  auto frame = frame_of_decoder(*std::move(decoded));
+  auto frame = frame_of_decoder(*std::move(decoded), use);
   if (!frame) return frame;
   ignore_impossible_white(frame->colour, frame->warnings);
   frame->source_tags = raw_source_tags(bytes, frame->warnings);
@@ -177,15 +178,16 @@ Result<RawFrame> read_bytes(std::span<const std::byte> bytes, const ReadLimits& 
 
 }  // namespace
 
-Result<RawFrame> read_raw(const std::filesystem::path& file, const ReadLimits& limits) {
+Result<RawFrame> read_raw(const std::filesystem::path& file, const ReadLimits& limits, const XTransUse& use) {
   auto bytes = read_file_bytes(file, limits.max_file_bytes);
   if (!bytes) return pass_on(bytes);
-  return read_raw(*bytes, file.string(), limits);
+  return read_raw(*bytes, file.string(), limits, use);
 }
 
-Result<RawFrame> read_raw(std::span<const std::byte> bytes, const std::string& name, const ReadLimits& limits) {
+Result<RawFrame> read_raw(std::span<const std::byte> bytes, const std::string& name, const ReadLimits& limits,
+                          const XTransUse& use) {
   try {
-    auto frame = read_bytes(bytes, limits);
+    auto frame = read_bytes(bytes, limits, use);
     if (!frame) frame.error().where = name;
     return frame;
   } catch (const std::bad_alloc&) {

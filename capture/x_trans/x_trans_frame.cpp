@@ -18,7 +18,7 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr int period = 6;
+constexpr int period = x_trans_period;
 constexpr std::array<double, 3> density{8.0 / 36, 20.0 / 36, 8.0 / 36};  // fraction of the sites of R, G, B
 constexpr double max_neutral_ratio = 16;
 
@@ -175,6 +175,19 @@ void interpolate_frame(RawFrame& frame, const XTransPhase& phase) {
     frame.noise->offset[c] /= density[c];
   }
   frame.noise_ratio = nullptr;
+}
+
+Result<bool> keep_x_trans(RawFrame& /*mosaic*/) { return false; }
+
+Result<void> use_mosaic(RawFrame& frame, const XTransPhase& phase, const XTransUse& use) {
+  if (use) {
+    frame.raw.layout = SensorLayout::bayer;
+    const Result<bool> interpolates = use(frame);
+    if (!interpolates) return tl::make_unexpected(interpolates.error());
+    if (!*interpolates) return {};
+  }
+  interpolate_frame(frame, phase);
+  return {};
 }
 
 }  // namespace lowlux::capture

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <functional>
+
 #include "capture/x_trans/x_trans_pattern.h"
 #include "isp/base/frame.h"
+#include "isp/base/result.h"
 
 namespace lowlux::capture {
 
@@ -16,5 +19,16 @@ namespace lowlux::capture {
 /// @param phase  of the corner of the active area
 /// @note It runs on up to eight threads.
 void interpolate_frame(RawFrame& frame, const XTransPhase& phase);
+
+/// Uses a frame that holds an X-Trans mosaic as the sensor gave it, for work on single photosites: its layout is
+/// SensorLayout::bayer, whose phase means nothing here. It may change samples, black level, noise and defects.
+/// @return whether the frame is to be interpolated; if not it stays a mosaic
+using XTransUse = std::function<Result<bool>(RawFrame& mosaic)>;
+
+/// Leaves X-Trans mosaics as they are.
+Result<bool> keep_x_trans(RawFrame& mosaic);
+
+/// Gives the mosaic to `use`, if there is one, and interpolates it unless `use` states otherwise.
+Result<void> use_mosaic(RawFrame& frame, const XTransPhase& phase, const XTransUse& use);
 
 }  // namespace lowlux::capture

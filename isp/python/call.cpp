@@ -44,14 +44,14 @@ py::array array_of_codes(SceneLinear picture) {
 }  // namespace
 
 cli::ReadRaw reader_of(const std::vector<Input>& inputs) {
-  return [&inputs](const std::string& name) -> Result<RawFrame> {
+  return [&inputs](const std::string& name, const capture::XTransUse& x_trans_use) -> Result<RawFrame> {
     for (const Input& input : inputs) {
       if (!input.frame || input.name != name) continue;
       RawFrame frame = clone(input.frame->frame);  // other threads may write to its views
       if (const auto wrong = unusable_sample(frame.raw)) return fail(ErrorCode::invalid_argument, *wrong, name);
       return frame;
     }
-    return cli::read_file(name);
+    return cli::read_file(name, x_trans_use);
   };
 }
 

@@ -55,8 +55,7 @@ void for_each_pixel(const RawDn& raw, const DarkFrame& dark, const BlackPoint& b
 Result<BlackPoint> black_of(const RawDn& raw, const DarkFrame& dark) {
   if (raw.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported,
-                "the picture is already demosaiced, as X-Trans is at reading; dark frames are subtracted from the "
-                "mosaic as the sensor gave it");
+                "the picture is already demosaiced; dark frames are subtracted from the mosaic as the sensor gave it");
   }
   if (raw.is_float()) {
     return fail(ErrorCode::unsupported,

@@ -98,7 +98,7 @@ TEST_F(DenoisePixels, WritesARawOfTheSameKindAndSaysSo) {
   }
 }
 
-TEST_F(DenoisePixels, LevelsAreThoseOfMosaicsAndMapsAreRefusedByName) {
+TEST_F(DenoisePixels, LevelsAreThoseOfMosaics) {
   write("night.dng", night(Kind::linear_raw));
   for (const std::string level : {"draft", "standard", "high", "best"}) {
     const auto result =
@@ -106,11 +106,71 @@ TEST_F(DenoisePixels, LevelsAreThoseOfMosaicsAndMapsAreRefusedByName) {
     ASSERT_EQ(result.exit_code, 0) << result.err;
     EXPECT_EQ(Json::parse(result.out)[0]["denoise"]["level"], level);
   }
-  const auto maps = lowlux({"denoise", file("night.dng"), "-o", file("maps.dng"), "--maps"});
-  EXPECT_EQ(maps.exit_code, 0) << maps.err;
-  EXPECT_NE(maps.err.find("noise maps are made of Bayer mosaics only"), std::string::npos) << maps.err;
-  EXPECT_TRUE(std::filesystem::exists(file("maps.dng")));
-  EXPECT_FALSE(std::filesystem::exists(file("maps.noise.pfm")));
+}
+
+/// X-Trans frames of one sensor: a grey of 200 e- or none, 16 DN/e-, a dark charge of 0 to 60 e- that differs between
+/// photosites but not between frames.
+DngBuilder warm_x_trans(double light_e, unsigned seed) {
+  DngBuilder dng;
+  dng.width = 96, dng.height = 72;
+  dng.set(33421, Tag::numbers(TagType::u16, {6, 6}));
+  dng.set(33422, Tag::numbers(TagType::byte, test::x_trans_colours({2, 1})));
+  dng.set(50728, Tag::numbers(TagType::rational, {1, 1, 1}));
+  dng.set(33434, Tag::numbers(TagType::rational, {1}));  // ExposureTime
+  const double full_e = 65471 / 16.0;
+  dng.set(51041, Tag::numbers(TagType::f64, {1 / full_e, 9 / (full_e * full_e)}));
+  std::mt19937 pattern(1), draw(seed);
+  std::uniform_real_distribution<double> charge_e(0, 60);
+  std::normal_distribution<double> read_e(0, 3);
+  for (int i = 0; i < dng.width * dng.height; ++i) {
+    std::poisson_distribution<int> electrons(light_e + charge_e(pattern));
+    const double dn = 64 + 16 * (electrons(draw) + read_e(draw));
+    dng.pixels.push_back(static_cast<std::uint16_t>(std::lround(std::clamp(dn, 0.0, 65535.0))));
+  }
+  return dng;
+}
+
+TEST_F(DenoisePixels, DarkFramesAreSubtractedFromSinglePhotositesOfXTrans) {
+  const auto error_e = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> words{"develop", file("light.dng"), "-o", file("out.pfm"), "--force", "--tone",
+                                   "none",    "--exposure",      "0",  "--space",       "camera",  "--denoise",
+                                   "off",     "--quiet"};
+    words.insert(words.end(), options.begin(), options.end());
+    const auto result = lowlux(words);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    std::ifstream pfm(file("out.pfm"), std::ios::binary);
+    std::string line;
+    for (int i = 0; i < 3; ++i) std::getline(pfm, line);
+    std::vector<float> values(std::size_t{96} * 72 * 3);
+    pfm.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(float)));
+    double mean = 0, squares = 0;
+    for (const float v : values) mean += 65471 / 16.0 * v / static_cast<double>(values.size());
+    for (const float v : values) squares += std::pow(65471 / 16.0 * v - mean, 2) / static_cast<double>(values.size());
+    return std::pair{mean, std::sqrt(squares)};
+  };
+  write("light.dng", warm_x_trans(200, 77));
+  std::filesystem::create_directory(file("darks"));
+  for (unsigned i = 0; i < 16; ++i) write("darks/" + std::to_string(i) + ".dng", warm_x_trans(0, 100 + i));
+  const auto without = error_e({}), with = error_e({"--dark-frame", file("darks")});
+  // Noise: sqrt(230 + 9) e- of a site, of its dark charge 17 e-, which the darks measure to 2 e- or less.
+  EXPECT_NEAR(without.first, 230, 5);
+  EXPECT_NEAR(with.first, 200, 5 * 17 / std::sqrt(96 * 72 * 8 / 36.0) + 1);
+  EXPECT_LT(with.second, 0.85 * without.second);
+}
+
+TEST_F(DenoisePixels, WhatXTransIsNotUsedForIsStated) {
+  write("light.dng", warm_x_trans(200, 5));
+  write("flat.dng", warm_x_trans(2000, 6));
+  const auto refused = [&](const std::vector<std::string>& words, const std::string& why) {
+    const auto result = lowlux(words);
+    EXPECT_EQ(result.exit_code, 1) << result.err;
+    EXPECT_NE(result.err.find(why), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find("X-Trans"), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  };
+  refused({"develop", file("light.dng"), "-o", file("a.png"), "--flat-frame", file("flat.dng")}, "2 x 2 sites");
+  refused({"merge", file("light.dng"), file("flat.dng"), "-o", file("a.dng")}, "not merged");
+  refused({"calibrate", "black", file("light.dng"), file("flat.dng"), "-o", file("a.json")}, "2 x 2 sites");
 }
 
 TEST_F(DenoisePixels, BadInputIsOneLineAndNoFile) {

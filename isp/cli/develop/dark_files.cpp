@@ -118,7 +118,7 @@ Result<DarkNames> dark_files(const DevelopArgs& args, const std::vector<Job>& jo
 namespace {
 
 Result<void> add_bias(const std::string& file, calib::DarkLibrary& bias) {
-  const Result<RawFrame> frame = capture::read_raw(file);
+  const Result<RawFrame> frame = capture::read_raw(file, {}, capture::keep_x_trans);
   return frame ? bias.add(frame->raw) : tl::make_unexpected(frame.error());
 }
 
@@ -128,7 +128,7 @@ Result<void> add_dark(const std::string& file, calib::DarkLibrary& darks, std::v
   if (is_tiff_name(file)) {
     master = read_mosaic_tiff(file);
   } else {
-    Result<RawFrame> frame = capture::read_raw(file);
+    Result<RawFrame> frame = capture::read_raw(file, {}, capture::keep_x_trans);
     if (!frame) return tl::make_unexpected(frame.error());
     if (!frame->raw.is_float()) return darks.add(frame->raw);
     master = mosaic_of(*std::move(frame), file);

@@ -70,9 +70,7 @@ bool is_tiff_name(const std::string& file) {
 
 Result<MosaicTiff> mosaic_of(RawFrame frame, const std::string& file) {
   if (frame.raw.layout == SensorLayout::linear_rgb) {
-    return fail(
-        ErrorCode::unsupported,
-        "this DNG has colours, as X-Trans has at reading; save the mosaic as the sensor gave it, not demosaiced");
+    return fail(ErrorCode::unsupported, "this DNG has colours; save the mosaic as the sensor gave it, not demosaiced");
   }
   return MosaicTiff{.file = file,
                     .dn = std::move(frame.raw.dn_float),

@@ -17,6 +17,7 @@
 #include "capture/file/dng_source.h"
 #include "isp/cli/develop/batch_report.h"
 #include "isp/cli/develop/flat_files.h"
+#include "isp/cli/develop/x_trans_dark.h"
 #include "isp/cli/noise/noise_source.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/interruption.h"
@@ -41,7 +42,8 @@ Result<void> check_free(const std::string& output, isp::Overwrite overwrite) {
 }
 
 /// Returns the options of one frame: profile and darks; values of the profile are put into the frame.
-Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) {
+/// @param without_dark  the dark frame was subtracted when the file was read
+Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame, bool without_dark) {
   isp::DevelopOptions options = options_of_goal(batch, frame);
   if (batch.profile) {
     const ProfileChoice choice{.everything = !batch.args.profile.empty(),
@@ -53,7 +55,7 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame) 
   if (batch.flat) {
     if (const auto used = use_flat(*batch.flat, frame); !used) return tl::make_unexpected(used.error());
   }
-  if (!batch.darks) return options;
+  if (!batch.darks || without_dark) return options;
   Result<std::shared_ptr<const DarkFrame>> dark = batch.darks->frame_for(frame, options.black);
   if (!dark) return tl::make_unexpected(dark.error());
   options.dark_frame = std::move(*dark);
@@ -88,8 +90,8 @@ void FileProgress::reach(double share) {
   reached_ = share;
 }
 
-Result<RawFrame> read_file(const std::string& file) {
-  return is_standard_stream(file) ? read_standard_input() : capture::read_raw(file);
+Result<RawFrame> read_file(const std::string& file, const capture::XTransUse& x_trans_use) {
+  return is_standard_stream(file) ? read_standard_input(x_trans_use) : capture::read_raw(file, {}, x_trans_use);
 }
 
 Result<RawBatch> make_batch(const DevelopArgs& args, isp::DevelopOptions options, std::vector<Job> jobs,
@@ -134,10 +136,15 @@ Result<ReadyFrame> read_frame(const RawBatch& batch, const Job& job, Executor& e
   for (const std::string& output : job.output.empty() ? std::vector<std::string>() : files_of(batch, job)) {
     if (const auto free = check_free(output, job.overwrite); !free) return tl::make_unexpected(free.error());
   }
-  Result<RawFrame> frame = batch.read(job.input);
+  bool without_dark = false;
+  const auto subtract = [&](RawFrame& mosaic) {
+    without_dark = true;
+    return subtract_from_x_trans(*batch.darks, batch.options.black, mosaic);
+  };
+  Result<RawFrame> frame = batch.read(job.input, batch.darks ? capture::XTransUse(subtract) : capture::XTransUse());
   clock.lap("read and decode");
   if (!frame) return tl::make_unexpected(frame.error());
-  Result<isp::DevelopOptions> options = options_for(batch, *frame);
+  Result<isp::DevelopOptions> options = options_for(batch, *frame, without_dark);
   if (!options) return tl::make_unexpected(options.error());
   ReadyFrame ready{*std::move(frame), *std::move(options)};
   if (!batch.args.merge) set_profile_tables(batch.args, ready);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/x_trans/x_trans_frame.h"
 #include "isp/base/camera_profile.h"
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
@@ -30,11 +31,12 @@ namespace lowlux::cli {
 /// Estimates the peak memory of the work on one frame.
 using EstimateBytes = std::size_t (*)(const RawDn& raw, const isp::DevelopOptions& options, int threads);
 
-/// Returns the raw frame of a job's input. It may be called from several threads.
-using ReadRaw = std::function<Result<RawFrame>(const std::string& input)>;
+/// Returns the raw frame of a job's input; X-Trans mosaics are shown before they are interpolated. It may be called
+/// from several threads.
+using ReadRaw = std::function<Result<RawFrame>(const std::string& input, const capture::XTransUse& x_trans_use)>;
 
 /// Reads a raw file, see capture::read_raw.
-Result<RawFrame> read_file(const std::string& file);
+Result<RawFrame> read_file(const std::string& file, const capture::XTransUse& x_trans_use);
 
 /// Holds the data that all files have in common.
 struct RawBatch {

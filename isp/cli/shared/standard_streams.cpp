@@ -10,12 +10,12 @@
 
 namespace lowlux::cli {
 
-Result<RawFrame> read_standard_input() {
+Result<RawFrame> read_standard_input(const capture::XTransUse& use) {
   const capture::ReadLimits limits;
   const std::string name = "standard input";
   const auto bytes = capture::read_stream_bytes(STDIN_FILENO, limits.max_file_bytes);
   if (!bytes) return fail(bytes.error().code, bytes.error().message, name);
-  return capture::read_raw(*bytes, name, limits);
+  return capture::read_raw(*bytes, name, limits, use);
 }
 
 std::optional<std::string> wrong_streams(const DevelopArgs& args) {

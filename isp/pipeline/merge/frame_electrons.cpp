@@ -51,6 +51,12 @@ DevelopOptions without_rendering(DevelopOptions options, denoise::Level level) {
 }
 
 Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
+  if (frame.raw.layout == SensorLayout::linear_rgb) {
+    return fail(ErrorCode::unsupported,
+                frame.raw.from_x_trans
+                    ? "X-Trans is not merged: frames are aligned and averaged by the 2 x 2 sites of a Bayer mosaic"
+                    : "the frame is already demosaiced: frames are aligned and averaged by the sites of their mosaic");
+  }
   Result<DevelopPlan> plan = plan_develop(frame, without_rendering(options, denoise::Level::draft), executor);
   if (!plan) return tl::make_unexpected(std::move(plan.error()));
   FrameElectrons out{.phase = frame.raw.phase, .warnings = std::move(plan->warnings)};

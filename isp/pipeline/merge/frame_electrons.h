@@ -35,7 +35,8 @@ inline merge::FrameView view_of(const FrameElectrons& frame) {
 DevelopOptions without_rendering(DevelopOptions options, denoise::Level level);
 
 /// Measures a frame as plan_develop does and converts it. The options that matter are those of black level, dark frame,
-/// defects and line noise. Errors: those of plan_develop; unknown noise (insufficient), no Bayer mosaic (unsupported).
+/// defects and line noise. Errors: those of plan_develop; unknown noise (insufficient), three colours in each pixel
+/// (unsupported).
 Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
 
 }  // namespace lowlux::isp
