@@ -108,6 +108,31 @@ TEST_F(DenoisePixels, LevelsAreThoseOfMosaics) {
   }
 }
 
+TEST_F(DenoisePixels, MapsHaveTheSizeOfTheImageTurnedUpright) {
+  for (const Kind kind : kinds) {
+    DngBuilder dng = night(kind);
+    dng.set(274, Tag::numbers(TagType::u16, {6}));  // Orientation: a quarter turn
+    write("night.dng", dng);
+    for (const std::string verb : {"denoise", "develop"}) {
+      const std::string output = file(verb == "denoise" ? "maps.dng" : "maps.png");
+      const auto result = lowlux({verb, file("night.dng"), "-o", output, "--maps", "--denoise", "high", "--force"});
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+      EXPECT_EQ(result.err.find("maps"), std::string::npos) << result.err;
+      for (const std::string map : {"noise", "confidence"}) {
+        std::ifstream pfm(file("maps." + map + ".pfm"), std::ios::binary);
+        std::string type;
+        int width = 0, height = 0;
+        pfm >> type >> width >> height;
+        EXPECT_EQ(type, "Pf");
+        EXPECT_EQ(width, 72) << verb << ' ' << map;
+        EXPECT_EQ(height, 96) << verb << ' ' << map;
+        pfm.close();
+        std::filesystem::remove(file("maps." + map + ".pfm"));
+      }
+    }
+  }
+}
+
 /// X-Trans frames of one sensor: a grey of 200 e- or none, 16 DN/e-, a dark charge of 0 to 60 e- that differs between
 /// photosites but not between frames.
 DngBuilder warm_x_trans(double light_e, unsigned seed) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <random>
 #include <span>
 #include <string>
@@ -133,6 +134,73 @@ TEST(CleanPixels, FlatsKeepTheirMeanAndStateTheirNoise) {
         EXPECT_GT(std::sqrt(stated[c] / measured[c]), layout == SensorLayout::monochrome ? 0.85 : 0.9);
         EXPECT_LT(std::sqrt(stated[c] / measured[c]), 1.15);
       }
+    }
+  }
+}
+
+/// Variance of luma 0.2 R + 0.6 G + 0.2 B, or of the one colour, of a clean flat [e-^2], `border` pixels from its ends.
+double luma_variance_e2(const RawFrame& clean, int border) {
+  const RawDn& raw = clean.raw;
+  const int samples = planes_of(raw);
+  const double e_per_dn = full_e / (raw.white_dn[0] - raw.black_tag->pattern_dn[0]);
+  double sum = 0, squares = 0;
+  int count = 0;
+  for (int y = border; y < raw.active.height - border; ++y) {
+    for (int x = border; x < raw.active.width - border; ++x, ++count) {
+      const std::uint16_t* const dn = raw.dn.row(y) + samples * x;
+      const double luma = e_per_dn * (samples == 1 ? dn[0] : 0.2 * dn[0] + 0.6 * dn[1] + 0.2 * dn[2]);
+      sum += luma;
+      squares += luma * luma;
+    }
+  }
+  return squares / count - sum / count * sum / count;
+}
+
+// Limits are those of the stated noise above, as the map is its origin.
+TEST(CleanPixels, MapsHoldTheNoiseOfLumaOfEachPixel) {
+  constexpr int side = 272, border = 8;
+  for (const SensorLayout layout : layouts) {
+    for (const double mean_e : {20.0, 200.0, 2000.0}) {
+      SCOPED_TRACE(std::to_string(static_cast<int>(layout)) + ' ' + std::to_string(mean_e));
+      double mapped = 0, measured = 0;
+      for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+        const RawFrame frame = pixel_frame(layout, flat(mean_e, mean_e, mean_e), side, side, 60 + seed);
+        DenoiseChoice choice = at(Level::draft);
+        choice.maps = true;
+        const Result<CleanRaw> clean = clean_raw(frame, options_of(choice), one_thread);
+        ASSERT_TRUE(clean) << clean.error().message;
+        const Plane<float>& map = clean->maps.residual_variance_e2;
+        ASSERT_EQ(map.width(), side);
+        ASSERT_EQ(map.height(), side);
+        mapped += std::accumulate(map.data(), map.data() + map.size(), 0.0) / static_cast<double>(map.size());
+        measured += luma_variance_e2(clean->frame, border);
+      }
+      EXPECT_GT(std::sqrt(mapped / measured), 0.85);
+      EXPECT_LT(std::sqrt(mapped / measured), 1.15);
+    }
+  }
+}
+
+TEST(CleanPixels, MapsOfImagesAreThoseOfCleanRawsTimesTheSquareOfGains) {
+  for (const SensorLayout layout : layouts) {
+    RawFrame frame = pixel_frame(layout, lines(100), 97, 63, 3);
+    DenoiseChoice choice = at(Level::high);
+    EXPECT_TRUE(developed(frame, choice).noise_maps.chroma_confidence.empty());
+    choice.maps = true;
+    const Result<CleanRaw> clean = clean_raw(frame, options_of(choice), one_thread);
+    ASSERT_TRUE(clean) << clean.error().message;
+    const NoiseMaps plain = developed(frame, choice).noise_maps;
+    GainMap twice{.bottom = 63, .right = 97, .planes = 3};
+    twice.gain = {2};
+    frame.corrections.gain_maps = {twice};
+    const NoiseMaps gained = developed(frame, choice).noise_maps;
+    ASSERT_EQ(plain.residual_variance_e2.size(), clean->maps.residual_variance_e2.size());
+    ASSERT_EQ(plain.chroma_confidence.width(), 97);
+    for (std::size_t i = 0; i < plain.residual_variance_e2.size(); ++i) {
+      ASSERT_EQ(plain.residual_variance_e2.data()[i], clean->maps.residual_variance_e2.data()[i]);
+      ASSERT_EQ(gained.residual_variance_e2.data()[i], 4 * plain.residual_variance_e2.data()[i]);
+      ASSERT_GE(plain.chroma_confidence.data()[i], 0);
+      ASSERT_LE(plain.chroma_confidence.data()[i], 1);
     }
   }
 }

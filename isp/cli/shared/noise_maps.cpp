@@ -13,9 +13,10 @@ namespace lowlux::cli {
 namespace {
 
 /// Returns the cells that intersect a crop.
-Plane<float> cropped(const Plane<float>& cells, const Rect& crop) {
-  const int left = crop.x / 2, top = crop.y / 2;
-  Plane<float> out((crop.x + crop.width + 1) / 2 - left, (crop.y + crop.height + 1) / 2 - top);
+/// @param side  of a cell, in pixels
+Plane<float> cropped(const Plane<float>& cells, const Rect& crop, int side) {
+  const int left = crop.x / side, top = crop.y / side;
+  Plane<float> out((crop.x + crop.width + side - 1) / side - left, (crop.y + crop.height + side - 1) / side - top);
   for (int y = 0; y < out.height(); ++y) std::copy_n(cells.row(top + y) + left, out.width(), out.row(y));
   return out;
 }
@@ -31,8 +32,9 @@ std::vector<PixelMap> noise_map_files(isp::NoiseMaps maps, const RawDn& raw, con
                                       Executor& executor) {
   if (maps.chroma_confidence.size() == 0) return {};
   SceneLinear both;  // as planes of one image they are rotated alike
-  both.plane[0] = cropped(maps.residual_variance_e2, raw.default_crop);
-  both.plane[1] = cropped(maps.chroma_confidence, raw.default_crop);
+  const int side = raw.layout == SensorLayout::bayer ? 2 : 1;
+  both.plane[0] = cropped(maps.residual_variance_e2, raw.default_crop, side);
+  both.plane[1] = cropped(maps.chroma_confidence, raw.default_crop, side);
   both.plane[2] = Plane<float>(both.plane[0].width(), both.plane[0].height());
   auto upright = std::get<SceneLinear>(isp::oriented(std::move(both), raw.info.orientation, executor));
   const std::vector<std::string> names = noise_map_names(picture);

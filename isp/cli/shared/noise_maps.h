@@ -25,7 +25,8 @@ Result<std::vector<isp::AtomicFile>> prepare_maps(const std::vector<PixelMap>& m
 /// Returns the files of an image's maps: OUT.noise.pfm and OUT.confidence.pfm for OUT.png.
 std::vector<std::string> noise_map_names(const std::string& picture);
 
-/// Returns the maps in their image's geometry: cropped and upright, one pixel per 2x2 cell; none if `maps` is empty.
+/// Returns the maps in their image's geometry: cropped and upright, one pixel per 2x2 cell of mosaics, one
+/// per pixel of other frames; none if `maps` is empty.
 std::vector<PixelMap> noise_map_files(isp::NoiseMaps maps, const RawDn& raw, const std::string& picture,
                                       Executor& executor);
 

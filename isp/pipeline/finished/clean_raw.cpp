@@ -110,7 +110,7 @@ void clean_pixels(const RawFrame& frame, CleanRaw& out, StageClock& clock, Execu
                                  .charge_at_white_e = charge.at_white_e},
                                 raw, levels, executor);
   out.frame.noise = residual_profile(pixels, out.maps, *how.cell_e, levels.rounding_variance());
-  out.maps = {};
+  scale_to_pixels(raw, out.maps);
 }
 
 }  // namespace
@@ -138,12 +138,11 @@ Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options,
 
 std::size_t clean_raw_bytes(const RawDn& raw, const DevelopOptions& options, int threads) {
   DevelopOptions with_maps = options;
-  with_maps.denoise.maps = true;
+  with_maps.denoise.maps = true;  // a NoiseProfile needs them
   const std::size_t bytes = expected_bytes(raw, with_maps, threads);
   if (is_mosaic(raw)) return bytes;
   const std::size_t pixels = static_cast<std::size_t>(raw.active.width) * static_cast<std::size_t>(raw.active.height);
-  constexpr std::size_t maps = 5;  // NoiseMaps, which a NoiseProfile needs
-  return bytes + sizeof(float) * pixels * (2 * static_cast<std::size_t>(planes_of(raw)) + maps);
+  return bytes + sizeof(float) * pixels * 2 * static_cast<std::size_t>(planes_of(raw));
 }
 
 }  // namespace lowlux::isp

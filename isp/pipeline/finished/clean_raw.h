@@ -20,7 +20,7 @@ struct CleanRaw {
 /// Reduces the noise of a frame, repairs its defects, and encodes it again in 16 bits; a frame of floating-point
 /// samples remains one. Mosaics, monochrome frames and images of three colours (SensorLayout::linear_rgb, X-Trans
 /// included) stay what they are. Lines and dark charge are subtracted from mosaics; other frames have none that are
-/// known (see plan_pixel_noise), and no maps.
+/// known (see plan_pixel_noise). Their maps have a value for each pixel (scale_to_pixels).
 ///
 /// Samples are those of encode_signal. Corrections that the source requests for linear values (gain maps) are still
 /// requested; defects, masked pixels and dark charge are gone. The NoiseProfile is that of residual_profile.

@@ -128,7 +128,6 @@ Result<NoiseReduction> plan_pixel_noise(const RawFrame& frame, const Thumbnail& 
   if (!out.level) return out;
   out.options.level = *out.level;
   if (request.choice.unbiased_chroma) out.options.rho = std::numeric_limits<double>::infinity();
-  if (request.choice.maps) out.warnings.emplace_back("noise maps are made of Bayer mosaics only, and this is none");
   const denoise::NoiseCheck check = check_pixels(frame, levels, checked, executor);
   out.options.variance_scale = denoise::variance_scale_of(check);
   NoiseProfile model = *frame.noise;

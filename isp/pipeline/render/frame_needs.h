@@ -39,8 +39,8 @@ inline bool needs_seeing_map(const DevelopPlan& plan) {
 }
 
 inline bool keeps_maps(const DevelopPlan& plan) {
-  return plan.noise_reduction.has_level() && !plan.noise_reduction.cell_e &&
-         (plan.options.denoise.maps || needs_noise(plan));
+  const bool in_cells = plan.noise_reduction.cell_e.has_value();  // whose noise of luminance is that of the model
+  return plan.noise_reduction.has_level() && (plan.options.denoise.maps || (needs_noise(plan) && !in_cells));
 }
 
 }  // namespace lowlux::isp

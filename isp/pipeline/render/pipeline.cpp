@@ -46,7 +46,9 @@ CameraPlanes balanced(std::span<Plane<float>> pixels, const Rect& crop, const De
   return out;
 }
 
-void apply_flat_field(const RawCorrections& corrections, std::span<Plane<float>> pixels, Executor& executor) {
+void apply_flat_field(const RawCorrections& corrections, std::span<Plane<float>> pixels, NoiseMaps* maps,
+                      Executor& executor) {
+  if (maps != nullptr) apply_gains_to_maps(corrections, *maps, executor);
   if (pixels.size() == 1) return apply_gains(corrections, pixels[0].view(), executor);
   apply_gains(corrections, RgbView<float>{pixels[0].view(), pixels[1].view(), pixels[2].view()}, executor);
 }
@@ -80,8 +82,10 @@ void Pipeline::render_region(const RawFrame& frame, const DevelopPlan& plan, con
 RgbInput Pipeline::camera_rgb(const RawFrame& frame, const DevelopPlan& plan, const Region& region) {
   if (plan.from_codes) return code_mosaic(frame.raw, plan);  // the kernel subtracts black
   if (!is_mosaic(frame.raw)) {
-    const std::span<Plane<float>> pixels = signal_.pixels(frame, plan, maps_of(plan));
-    apply_flat_field(frame.corrections, pixels, executor_);
+    NoiseMaps* const maps = maps_of(plan);
+    const std::span<Plane<float>> pixels = signal_.pixels(frame, plan, maps);
+    if (maps != nullptr) scale_to_pixels(frame.raw, *maps);
+    apply_flat_field(frame.corrections, pixels, maps, executor_);
     return balanced(pixels, region.seen, plan);
   }
   if (!plan.levels.electrons_at_white) {

@@ -26,6 +26,7 @@ std::size_t whole_frame_bytes(const RawDn& raw, const DevelopPlan& plan, int thr
   if (plan.rendering.profile) out += 3 * sizeof(float) * area(plan.width, plan.height);
   if (plan.from_codes) return out;
   if (!is_mosaic(raw)) {
+    if (plan.noise_reduction.reduces() && keeps_maps(plan)) out += NoiseReducer::maps_bytes(2 * width, 2 * height);
     return out + static_cast<std::size_t>(planes_of(raw)) * plane +
            PixelNoiseReducer::bytes(raw, plan.noise_reduction, threads);
   }

@@ -10,6 +10,7 @@
 #include "isp/pipeline/render/level_parts.h"
 #include "isp/pipeline/render/map_views.h"
 #include "isp/pipeline/render/pixel_cells.h"
+#include "isp/raw/corrections.h"
 
 namespace lowlux::isp {
 namespace {
@@ -109,6 +110,25 @@ void PixelNoiseReducer::reduce_tile(const Frame& frame, const NoiseReducer::Piec
   const Rect kept{core.x - whole.x, core.y - whole.y, core.width, core.height};
   join_cells(out.crop(kept.x, kept.y, kept.width, kept.height), *how.cell_e, std::span(clean).first(count), executor_);
   copy(crop_of(maps, kept), crop_of(frame.maps, core));
+}
+
+void scale_to_pixels(const RawDn& raw, NoiseMaps& maps) {
+  const auto part = static_cast<float>(parts_of(raw)[1]);  // by which the luma of a cell is smaller
+  Plane<float>& variance = maps.residual_variance_e2;
+  std::transform(variance.data(), variance.data() + variance.size(), variance.data(),
+                 [part](float v) { return v / (part * part); });
+}
+
+void apply_gains_to_maps(const RawCorrections& corrections, NoiseMaps& maps, Executor& executor) {
+  if (corrections.gain_maps.empty() && corrections.radial_gains.empty()) return;
+  Plane<float>& variance = maps.residual_variance_e2;
+  std::array<Plane<float>, 3> gain;
+  for (Plane<float>& plane : gain) {
+    plane = Plane<float>(variance.width(), variance.height());
+    std::fill_n(plane.data(), plane.size(), 1.0F);
+  }
+  apply_gains(corrections, RgbView<float>{gain[0].view(), gain[1].view(), gain[2].view()}, executor);
+  for (std::size_t i = 0; i < variance.size(); ++i) variance.data()[i] *= gain[1].data()[i] * gain[1].data()[i];
 }
 
 }  // namespace lowlux::isp

@@ -26,7 +26,7 @@ class PixelNoiseReducer {
   /// Reduces the noise of the planes of a frame, which are fractions of white.
   /// @param planes  three, or one
   /// @param noise   does the work
-  /// @param maps    filled if not null: a value for each pixel, of the sites of its cell
+  /// @param maps    filled if not null: a value for each pixel, of the sites of its cell (scale_to_pixels)
   /// Precondition: how.level, how.cell_e.
   void run(std::span<Plane<float>> planes, const NoiseReduction& how, NoiseReducer& noise, NoiseMaps* maps = nullptr);
 
@@ -51,5 +51,12 @@ class PixelNoiseReducer {
   Plane<float> clean_cells_;  // likewise
   NoiseMaps tile_maps_;       // likewise, where maps are wanted
 };
+
+/// Scales the residual variance of maps from the sites of cells to pixels [e-^2]: that of white-balanced luma
+/// 0.2 R + 0.6 G + 0.2 B, or of the one value of a monochrome pixel.
+void scale_to_pixels(const RawDn& raw, NoiseMaps& maps);
+
+/// Propagates the gains g of green, or of monochrome pixels, to the residual variance of each pixel: V -> g^2 V.
+void apply_gains_to_maps(const RawCorrections& corrections, NoiseMaps& maps, Executor& executor);
 
 }  // namespace lowlux::isp
