@@ -67,7 +67,8 @@ bool has_opcodes(const RawFrame& frame) {
   return std::any_of(tags.begin(), tags.end(), [](const SourceTag& tag) { return tag.id == opcode_list3; });
 }
 
-/// Returns whether a tag belongs to the source's camera profile, which refers to its colour matrices.
+/// Returns whether a tag belongs to the source's camera profile, which refers to its colour matrices. That of a
+/// monochrome frame, which has none, stays.
 bool is_of_profile(const SourceTag& tag) {
   constexpr std::array<std::uint16_t, 11> ids{50932, 50934, 50936, 50937, 50938, 50939,
                                               50940, 50981, 50982, 51107, 51108};
@@ -76,7 +77,9 @@ bool is_of_profile(const SourceTag& tag) {
 
 Result<void> add_tags_of_source(std::FILE* file, const RawFrame& frame) {
   if (!frame.source_tags) return {};
-  if (frame.colour.source == CameraColour::Source::file_tags) return add_source_tags(file, *frame.source_tags);
+  if (frame.colour.source == CameraColour::Source::file_tags || frame.raw.layout == SensorLayout::monochrome) {
+    return add_source_tags(file, *frame.source_tags);
+  }
   SourceTags tags = *frame.source_tags;
   std::erase_if(tags.main, is_of_profile);
   return add_source_tags(file, tags);
