@@ -107,9 +107,6 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
     }
     if (const auto wrong = complete_effects(good->look, good->effects)) return refuse(app, *wrong);
     if (const auto wrong = settle_merging(good->merging, good->effects.budgeted())) return refuse(app, *wrong);
-    if (good->merging.drizzle_scale && good->options.denoise.mode == isp::DenoiseChoice::Mode::level) {
-      return refuse(app, "a level of --denoise is for mosaics, and --drizzle makes none: leave one of them out");
-    }
     if (good->effects.budgeted() && good->jobs > 1) {
       return refuse(app, "a budget is for one file at a time: leave --jobs out");
     }
