@@ -66,8 +66,7 @@ void join_greens(const RawDn& raw, PerSite<ClipRange>& clip) {
 
 Result<void> check(const RawDn& raw, const PerSite<double>& black_dn, const PictureNoiseOptions& options) {
   if (raw.layout == SensorLayout::linear_rgb) {
-    return fail(ErrorCode::unsupported,
-                "demosaiced pixels: their noise is that of the demosaicing too: give the raw with its mosaic");
+    return fail(ErrorCode::unsupported, "demosaicing spread the noise of each pixel over its neighbours");
   }
   if (raw.is_float()) {
     return fail(ErrorCode::unsupported,

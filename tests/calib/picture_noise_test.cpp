@@ -120,7 +120,7 @@ TEST(PictureNoise, RefusesArgumentsOutOfRange) {
   expect_refused(fit(raw, 100, {.max_samples = 10'000'001}), ErrorCode::invalid_argument, "most_samples");
   RawDn rgb = stairs(512, 0.8, 6, 100, white_noise);
   rgb.layout = SensorLayout::linear_rgb;
-  expect_refused(fit(rgb, 100), ErrorCode::unsupported, "demosaiced");
+  expect_refused(fit(rgb, 100), ErrorCode::unsupported, "demosaicing");
 }
 
 TEST(PictureNoise, TellsFilteredNoise) {

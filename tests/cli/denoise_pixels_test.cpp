@@ -198,6 +198,23 @@ TEST_F(DenoisePixels, WhatXTransIsNotUsedForIsStated) {
   refused({"calibrate", "black", file("light.dng"), file("flat.dng"), "-o", file("a.json")}, "2 x 2 sites");
 }
 
+TEST_F(DenoisePixels, LinearRawWithoutStatedNoiseIsDevelopedWithOneWarning) {
+  write("night.dng", night(Kind::linear_raw).remove(51041));
+  const auto warnings = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> words{"develop", file("night.dng"), "-o", file("out.png"), "--force"};
+    words.insert(words.end(), options.begin(), options.end());
+    const auto result = lowlux(words);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    const std::string remedy = "--noise GAIN,READ states it";
+    int count = 0;
+    for (auto at = result.err.find(remedy); at != std::string::npos; at = result.err.find(remedy, at + 1)) ++count;
+    return count;
+  };
+  EXPECT_EQ(warnings({}), 1);
+  EXPECT_EQ(warnings({"--denoise", "off"}), 0);
+  EXPECT_EQ(warnings({"--noise", "16,2"}), 0);
+}
+
 TEST_F(DenoisePixels, BadInputIsOneLineAndNoFile) {
   const auto refused = [&](const std::string& why) {
     const auto result = lowlux({"denoise", file("night.dng"), "-o", file("clean.dng")});
@@ -207,7 +224,7 @@ TEST_F(DenoisePixels, BadInputIsOneLineAndNoFile) {
     EXPECT_FALSE(std::filesystem::exists(file("clean.dng")));
   };
   write("night.dng", night(Kind::linear_raw).remove(51041));
-  refused("the noise is unknown");
+  refused("state it: --noise GAIN,READ");
   DngBuilder cut = night(Kind::monochrome);
   write("night.dng", cut);
   std::filesystem::resize_file(file("night.dng"), std::filesystem::file_size(file("night.dng")) / 2);

@@ -178,9 +178,7 @@ Result<OptionalOrigin> find_noise(const isp::DevelopOptions& options, const std:
   if (!given && is_stated) {
     return NoiseOrigin{.source = source_of(*frame.noise)};
   }
-  if (!given && (options.denoise.mode == Mode::off || frame.raw.layout == SensorLayout::linear_rgb)) {
-    return std::nullopt;
-  }
+  if (!given && options.denoise.mode == Mode::off) return std::nullopt;
   const auto black =
       options.dark_frame ? isp::black_of(frame.raw, *options.dark_frame) : isp::choose_black(frame.raw, options.black);
   if (!black) return tl::make_unexpected(black.error());
@@ -193,7 +191,8 @@ Result<OptionalOrigin> find_noise(const isp::DevelopOptions& options, const std:
     warn_of_uncertainty(*noise, frame.warnings);
     return out;
   }
-  if (!frame.raw.is_float()) return assume_noise(*black, noise.error().message, frame, executor);
+  const bool has_class = !frame.raw.is_float() && frame.raw.layout != SensorLayout::linear_rgb;
+  if (has_class) return assume_noise(*black, noise.error().message, frame, executor);
   const std::string why = "the noise is not stated and cannot be measured on the image: " + noise.error().message;
   if (options.denoise.mode == Mode::level || options.denoise.always) {
     return fail(noise.error().code, why + "; state it: --noise GAIN,READ");
