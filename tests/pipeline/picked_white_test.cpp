@@ -73,6 +73,21 @@ TEST(PickedWhite, MakesTheSquareNeutralInEveryOrientationAndAtHalfSize) {
   }
 }
 
+TEST(PickedWhite, LeavesOutHotPixels) {
+  RawFrame frame = patches();
+  const double before = plan_develop(frame, picking(220, 120, 16), one_thread)->rendering.neutral[0];
+  frame.raw.dn.at(220, 120) = 65535;  // a red site of RGGB
+  frame.raw.dn.at(224, 117) = static_cast<std::uint16_t>(frame.raw.white_dn[1] - 1);
+  const auto plan = plan_develop(frame, picking(220, 120, 16), one_thread);
+  ASSERT_TRUE(plan) << plan.error().message;
+  EXPECT_NEAR(plan->rendering.neutral[0], before, 0.02 * before);  // one of 64 red sites less, of 6 % of noise each
+  EXPECT_NEAR(plan->rendering.neutral[2], 0.8, 0.8 * 0.03);
+  DevelopOptions as_it_is = picking(220, 120, 16);
+  as_it_is.find_defects = false;
+  const auto hot = plan_develop(frame, as_it_is, one_thread);
+  EXPECT_TRUE(!hot || hot->rendering.neutral[0] > 1.1 * before) << "the pixel is bright enough to be seen";
+}
+
 TEST(PickedWhite, CountsGainMaps) {
   RawFrame frame = patches();
   frame.corrections.gain_maps = {{.bottom = 203, .right = 301, .gain = {1}}};

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -12,6 +13,7 @@
 #include "isp/raw/black_point.h"
 #include "isp/raw/corrections.h"
 #include "isp/raw/measure/thumbnail.h"
+#include "isp/raw/repair.h"
 
 namespace lowlux::isp {
 namespace {
@@ -49,13 +51,18 @@ struct RegionSums {
   }
 };
 
-RegionSums sums_of(const RawDn& raw, const BlackPoint& black, const Rect& region) {
+/// Returns whether a pixel comes before another in ascending order: by row, then column.
+bool is_before(const Pixel& one, const Pixel& other) { return one.y != other.y ? one.y < other.y : one.x < other.x; }
+
+/// @param defects  ascending: they are left out, because they are repaired in the image
+RegionSums sums_of(const RawDn& raw, const BlackPoint& black, const std::vector<Pixel>& defects, const Rect& region) {
   const int samples = raw.layout == SensorLayout::bayer ? 1 : 3;
   RegionSums out;
   with_samples(raw, [&](const auto& readout) {
     for (int y = region.y; y < region.y + region.height; ++y) {
       const auto* const row = readout.row(raw.active.y + y) + samples * raw.active.x;
       for (int x = region.x; x < region.x + region.width; ++x) {
+        if (std::ranges::binary_search(defects, Pixel{x, y}, is_before)) continue;
         for (int s = 0; s < samples; ++s) out.add(raw, black, row[samples * x + s], x, y, s);
       }
     }
@@ -124,7 +131,7 @@ Result<Vector3> picked_neutral(const RawFrame& measured, const RawLevels& levels
   if (raw.layout == SensorLayout::monochrome) return refuse("a monochrome frame has no white to pick");
   const Result<Rect> region = region_of(raw, options);
   if (!region) return tl::make_unexpected(region.error());
-  const RegionSums sums = sums_of(raw, levels.black, *region);
+  const RegionSums sums = sums_of(raw, levels.black, levels.defects, *region);
   const auto all = sums.colour[0].n + sums.colour[1].n + sums.colour[2].n;
   if (static_cast<double>(sums.saturated) > max_saturated * static_cast<double>(all)) {
     return refuse("the picked area is saturated, so its colour is unknown: pick a grey that is not clipped");

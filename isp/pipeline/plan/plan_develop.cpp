@@ -128,6 +128,11 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   plan.dark = find_dark_charge(frame, *levels, thumbnail, options.estimate_dark);
   if (plan.dark.state == DarkCharge::State::estimated) levels->black.dark_mean_e = plan.dark.estimated_e;
   if (plan.dark.state == DarkCharge::State::unknown) plan.warnings.push_back(warning_of(plan.dark, frame.raw.info));
+  FoundDefects found = all_defects(frame, measured.raw, thumbnail, *levels, options.find_defects, executor);
+  levels->defects = std::move(found.defects);
+  append(plan.warnings, found.warnings);
+  clock.lap("defects");
+
   const Thumbnail light = light_of(thumbnail, frame.raw, *levels);
   Result<Vector3> picked{Vector3{1, 1, 1}};
   if (options.white_balance.mode == WhiteBalanceChoice::Mode::picked && options.space != OutputSpace::camera) {
@@ -141,11 +146,6 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
     plan.dark.alpha = signal_fraction_at_median(frame, *levels, *rendering, light, plan.dark.charge_e);
   }
   clock.lap("white and exposure");
-
-  FoundDefects found = all_defects(frame, measured.raw, thumbnail, *levels, options.find_defects, executor);
-  levels->defects = std::move(found.defects);
-  append(plan.warnings, found.warnings);
-  clock.lap("defects");
 
   if (options.effects) {
     Result<StepPlan> effects = choose_steps(frame, thumbnail, light, options, *levels, *rendering, executor);
