@@ -153,6 +153,19 @@ TEST_F(CapturedNight, NeedsABlackLevelFromSomewhere) {
   EXPECT_EQ(read->raw.black_tag->at(1, 1), 63);
 }
 
+TEST_F(CapturedNight, BlackLevelsOfRawFilesThatAreNotBelowWhiteAreRefused) {
+  use_format(bayer(10));
+  for (const char* black : {"65535", "1023", "60,61,62,1023"}) {
+    const cli::CaptureArgs raw = args_of({"-o", file("a.dng"), "--black", black});
+    const auto taken = cli::make_raw_sink(raw, stream())->take(frame_, work_);
+    ASSERT_FALSE(taken) << black;
+    EXPECT_NE(taken.error().message.find("is not above the black level"), std::string::npos) << taken.error().message;
+    EXPECT_FALSE(scratch_.holds("a.dng"));
+  }
+  const cli::CaptureArgs highest = args_of({"-o", file("a.dng"), "--black", "1022"});
+  EXPECT_TRUE(cli::make_raw_sink(highest, stream())->take(frame_, work_));
+}
+
 /// The three planes of a film's frame by BT.601 in video range, in double, from 8-bit sRGB codes; chroma of the mean of
 /// 2 x 2 pixels.
 struct YuvReference {
