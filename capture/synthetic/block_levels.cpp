@@ -7,7 +7,7 @@
 #include <limits>
 #include <span>
 
-#include "capture/synthetic/crosstalk.h"
+#include "capture/synthetic/optics/crosstalk.h"
 
 namespace lowlux::capture {
 namespace {

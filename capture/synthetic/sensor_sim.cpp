@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "capture/synthetic/crosstalk.h"
+#include "capture/synthetic/optics/crosstalk.h"
 #include "capture/synthetic/fixed_pattern.h"
 #include "capture/synthetic/readout.h"
 #include "isp/base/random/random.h"

@@ -1,4 +1,4 @@
-#include "capture/synthetic/crosstalk.h"
+#include "capture/synthetic/optics/crosstalk.h"
 
 #include <gtest/gtest.h>
 
