@@ -17,24 +17,44 @@ struct BlockArea {
   int left, top, right, bottom;
 };
 
-/// Calls look(colour, before, after) for each pixel, with its rate without and with crosstalk [e-/s].
+/// Charge rates of a row of a block [e-/s]: without the effects that move light between pixels, with the blur of the
+/// lens, with crosstalk, and with both. Where the frame does not have an effect, rates with and without it are the
+/// same.
+struct RowRates {
+  std::span<const float> none, blurred, mixed, both;
+};
+
+/// Calls look(y, rates) for each row of a block.
 template <class Look>
-void for_each_rate(const SensorFrame& frame, const BlockArea& area, const Look& look) {
-  std::array<float, isp::effect_block> mixed{};
+void for_each_row(const SensorFrame& frame, const BlockArea& area, const Look& look) {
+  std::array<float, isp::effect_block> mixed{}, both{};
   const Crosstalk crosstalk{frame.sensor.crosstalk, frame.masked_columns};
-  const int width = area.right - area.left;
+  const auto width = static_cast<std::size_t>(area.right - area.left);
+  const PlaneView<const float>& blurred = frame.has_lens_blur() ? frame.blurred_e_per_s : frame.rate_e_per_s;
   for (int y = area.top; y < area.bottom; ++y) {
-    const float* before = frame.rate_e_per_s.row(y) + area.left;
-    const float* after = before;
+    const auto row_of = [&](const PlaneView<const float>& rate) { return std::span(rate.row(y) + area.left, width); };
+    RowRates rates{row_of(frame.rate_e_per_s), row_of(blurred), row_of(frame.rate_e_per_s), row_of(blurred)};
     if (crosstalk.fraction > 0) {
-      mix_neighbours(frame.rate_e_per_s, crosstalk, area.left, y,
-                     std::span(mixed).first(static_cast<std::size_t>(width)));
-      after = mixed.data();
+      rates.both = std::span(both).first(width);
+      mix_neighbours(blurred, crosstalk, area.left, y, std::span(both).first(width));
+      rates.mixed = rates.both;
+      if (frame.has_lens_blur()) {
+        rates.mixed = std::span(mixed).first(width);
+        mix_neighbours(frame.rate_e_per_s, crosstalk, area.left, y, std::span(mixed).first(width));
+      }
     }
-    for (int i = 0; i < width; ++i) {
-      look(static_cast<int>(colour_at(frame.phase, area.left + i, y)), before[i], after[i]);
-    }
+    look(y, rates);
   }
+}
+
+/// Calls look(colour, pixel, rates) for each pixel of a block.
+template <class Look>
+void for_each_pixel(const SensorFrame& frame, const BlockArea& area, const Look& look) {
+  for_each_row(frame, area, [&](int y, const RowRates& rates) {
+    for (std::size_t i = 0; i < rates.both.size(); ++i) {
+      look(static_cast<int>(colour_at(frame.phase, area.left + static_cast<int>(i), y)), i, rates);
+    }
+  });
 }
 
 isp::BlockLevel signal_level(const SensorFrame& frame, const BlockArea& area) {
@@ -43,11 +63,11 @@ isp::BlockLevel signal_level(const SensorFrame& frame, const BlockArea& area) {
   float peak = 0;
   std::array<float, 3> darkest;
   darkest.fill(std::numeric_limits<float>::infinity());
-  for_each_rate(frame, area, [&](int k, float, float rate) {
-    sum[k] += rate;
+  for_each_pixel(frame, area, [&](int k, std::size_t i, const RowRates& rates) {
+    sum[k] += rates.both[i];
     ++count[k];
-    peak = std::max(peak, rate);
-    darkest[k] = std::min(darkest[k], rate);
+    peak = std::max({peak, rates.none[i], rates.blurred[i], rates.mixed[i], rates.both[i]});
+    darkest[k] = std::min({darkest[k], rates.none[i], rates.blurred[i], rates.mixed[i], rates.both[i]});
   });
   const double time_s = frame.exposure.time_s;
   const double whole = (sum[0] + sum[1] + sum[2]) / (count[0] + count[1] + count[2]);
@@ -60,46 +80,82 @@ isp::BlockLevel signal_level(const SensorFrame& frame, const BlockArea& area) {
   return block;
 }
 
-/// Sums over the pixels of one colour in a block [e-/s]: of the signal, and of what crosstalk adds to it.
-struct AddedSums {
-  int count = 0;
-  double signal = 0, signal_square = 0;
-  double added = 0, moved = 0, added_square = 0, product = 0;
-  double darkest_before = std::numeric_limits<double>::infinity(), peak_before = 0;
+/// Sums over the pixels of one colour in a block: of what effects that move light add to their signal, see MovedLight.
+struct MovedSums {
+  double count = 0, added = 0, moved = 0, added_square = 0, product = 0;
+  double variance = 0, squares_by_signal = 0, counts_by_signal = 0, counts_by_contrast = 0;
 
-  void take(double before, double after) {
-    const double more = after - before;
+  /// @param before_e, after_e mean charge of a pixel without and with the effects
+  /// @param mean_e            of all pixels with them
+  /// @param step_e            charge of a code
+  void take(double before_e, double after_e, double mean_e, double step_e) {
+    const double more = after_e - before_e, off = after_e - mean_e;
+    const double counts =
+        isp::count_change_variance_e2(std::min(before_e, after_e), std::max(before_e, after_e), step_e);
     ++count;
-    signal += after;
-    signal_square += after * after;
     added += more;
     moved += std::fabs(more);
     added_square += more * more;
-    product += after * more;
-    darkest_before = std::min(darkest_before, before);
-    peak_before = std::max(peak_before, before);
+    product += off * more;
+    variance += counts;
+    squares_by_signal += more * more * after_e;
+    counts_by_signal += counts * after_e;
+    counts_by_contrast += counts * off * off;
   }
 };
 
-/// Adds what crosstalk changes in a block whose signal is known.
-void add_crosstalk(const SensorFrame& frame, const BlockArea& area, isp::BlockLevel& block) {
-  std::array<AddedSums, 3> sums;
-  for_each_rate(frame, area, [&](int k, float before, float after) { sums[k].take(before, after); });
-  const double time_s = frame.exposure.time_s, time2 = time_s * time_s;
-  isp::BlockLevel::Crosstalk& out = block.crosstalk;
+/// Returns what effects add that turn the rates `before` of a block to those with all effects.
+/// @param mean_e of R, G and B pixels with them
+isp::MovedLight moved_light(const SensorFrame& frame, const BlockArea& area, std::span<const float> RowRates::*before,
+                            const Vector3& mean_e) {
+  std::array<MovedSums, 3> sums;
+  const double time_s = frame.exposure.time_s, step_e = 1 / frame.sensor.system_gain_dn_per_e;
+  for_each_pixel(frame, area, [&](int k, std::size_t i, const RowRates& rates) {
+    sums[static_cast<std::size_t>(k)].take(time_s * (rates.*before)[i], time_s * rates.both[i], mean_e[k], step_e);
+  });
+  isp::MovedLight out;
   for (int k = 0; k < 3; ++k) {
-    if (sums[k].count == 0) continue;
-    const double n = sums[k].count, mean = sums[k].signal / n, added = sums[k].added / n;
-    const double variance = std::max(0.0, sums[k].added_square / n - added * added);
-    out.mean_e[k] = time_s * added;
-    out.moved_e[k] = time_s * sums[k].moved / n;
-    out.variance_e2[k] = time2 * variance;
-    out.contrast_e2[k] = time2 * std::max(0.0, sums[k].signal_square / n - mean * mean);
-    // Var(a) - Var(a - d) = 2 Cov(a, d) - Var(d)
-    out.more_contrast_e2[k] = time2 * (2 * (sums[k].product / n - mean * added) - variance);
-    block.darkest_e[k] = std::min(block.darkest_e[k], time_s * sums[k].darkest_before);
-    block.peak_e = std::max(block.peak_e, time_s * sums[k].peak_before);
+    const MovedSums& of = sums[static_cast<std::size_t>(k)];
+    if (of.count == 0) continue;
+    const double n = of.count, added = of.added / n;
+    out.mean_e[k] = added;
+    out.moved_e[k] = of.moved / n;
+    out.variance_e2[k] = std::max(0.0, of.added_square / n - added * added);
+    out.more_contrast_e2[k] = 2 * of.product / n - out.variance_e2[k];  // Var(s) - Var(s - d) = 2 Cov(s, d) - Var(d)
+    out.count_variance_e2[k] = of.variance / n;
+    out.squares_by_signal_e3[k] = of.squares_by_signal / n;
+    out.counts_by_signal_e3[k] = of.counts_by_signal / n;
+    out.counts_by_contrast_e4[k] = of.counts_by_contrast / n;
   }
+  return out;
+}
+
+isp::Contrast contrast_of(const SensorFrame& frame, const BlockArea& area, const Vector3& mean_e) {
+  isp::Contrast out;
+  Vector3 count{};
+  for_each_pixel(frame, area, [&](int k, std::size_t i, const RowRates& rates) {
+    const double signal = frame.exposure.time_s * rates.both[i], off = signal - mean_e[k];
+    ++count[k];
+    out.variance_e2[k] += off * off;
+    out.by_signal_e3[k] += off * off * signal;
+  });
+  for (int k = 0; k < 3; ++k) {
+    out.variance_e2[k] /= std::max(1.0, count[k]);
+    out.by_signal_e3[k] /= std::max(1.0, count[k]);
+  }
+  return out;
+}
+
+/// Adds what effects that move light change in a block whose signal is known.
+void add_moved_light(const SensorFrame& frame, const BlockArea& area, isp::BlockLevel& block) {
+  const bool mixes = frame.sensor.crosstalk > 0;
+  const Vector3& mean_e = block.signal_e;
+  block.contrast = contrast_of(frame, area, mean_e);
+  if (frame.has_lens_blur()) block.by_lens_blur = moved_light(frame, area, &RowRates::mixed, mean_e);
+  if (mixes) block.by_crosstalk = moved_light(frame, area, &RowRates::blurred, mean_e);
+  block.by_both = !mixes                  ? block.by_lens_blur
+                  : frame.has_lens_blur() ? moved_light(frame, area, &RowRates::none, mean_e)
+                                          : block.by_crosstalk;
 }
 
 isp::BlockLevel::Glow glow_level(const isp::AmplifierGlow& glow, const BlockArea& area) {
@@ -127,7 +183,7 @@ std::vector<isp::BlockLevel> block_levels(const SensorFrame& frame) {
       const BlockArea area{x0, y0, std::min(frame.rate_e_per_s.width, x0 + isp::effect_block),
                            std::min(frame.rate_e_per_s.height, y0 + isp::effect_block)};
       isp::BlockLevel block = signal_level(frame, area);
-      if (frame.sensor.crosstalk > 0) add_crosstalk(frame, area, block);
+      if (frame.sensor.crosstalk > 0 || frame.has_lens_blur()) add_moved_light(frame, area, block);
       if (glow.present()) block.glow = glow_level(glow, area);
       blocks.push_back(block);
     }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "capture/synthetic/exposed_scene.h"
+#include "capture/synthetic/optics/lens_blur.h"
 #include "isp/base/text.h"
 #include "isp/model/sensor/noise_budget.h"
 #include "isp/model/spectrum/spectral_response.h"
@@ -148,17 +149,28 @@ std::vector<PointSource> BurstSource::points_in_frame(std::uint32_t index) const
 std::vector<BurstPoint> BurstSource::points(std::uint32_t index) const {
   std::vector<Vector3> rates;
   for (const Spectrum& light : scene_.point_lights) rates.push_back(isp::electron_rate(response_, light));
-  const double time_s = truth(index).exposure_s;
+  const double time_s = truth(index).exposure_s, blur_px = camera_.options.simulated_blur_px();
   std::vector<BurstPoint> out;
   for (const PointSource& point : points_in_frame(index)) {
-    BurstPoint of_frame{{point.x_px, point.y_px}, point.spread_px, {}};
+    BurstPoint of_frame{{point.x_px, point.y_px}, std::hypot(point.spread_px, blur_px), {}};
     for (int k = 0; k < 3; ++k) of_frame.signal_e[k] = time_s * point.luminance_cd_m2 * rates[point.light][k];
     out.push_back(of_frame);
   }
   return out;
 }
 
-Plane<float> BurstSource::rate_e_per_s(std::uint32_t index, Executor& executor) const {
+CameraRgb BurstSource::rate_rgb_e_per_s(std::uint32_t index, Executor& executor) const {
+  if (!grids_.sky) return charge_rate_rgb(scene_, response_, table_.get(), executor);
+  CameraRgb out(size_.width_px, size_.height_px);
+  render_planes(view_of(grids_, index), executor, out.view());
+  add_points(points_in_frame(index), scene_.point_lights, response_, out);
+  return out;
+}
+
+SensorLight BurstSource::light(std::uint32_t index, Executor& executor) const {
+  if (const double blur_px = camera_.options.lens_blur_px; blur_px > 0) {
+    return light_through_lens(rate_rgb_e_per_s(index, executor), camera_.options.phase, blur_px, executor);
+  }
   Plane<float> out;
   if (grids_.sky) {
     out = Plane<float>(size_.width_px, size_.height_px);
@@ -167,13 +179,13 @@ Plane<float> BurstSource::rate_e_per_s(std::uint32_t index, Executor& executor) 
     out = still_.clone();
   }
   add_points(points_in_frame(index), scene_.point_lights, response_, camera_.options.phase, out);
-  return out;
+  return {std::move(out), {}};
 }
 
 Result<ExposedSensor> BurstSource::exposed(std::uint32_t index, Executor& executor) const {
   SyntheticCamera camera = camera_;
   camera.options.exposure.time_s = truth(index).exposure_s;
-  return ExposedSensor::of(std::move(camera), rate_e_per_s(index, executor));
+  return ExposedSensor::of(std::move(camera), light(index, executor));
 }
 
 Result<RawFrame> BurstSource::frame(std::uint32_t index, Executor& executor) const {
@@ -183,21 +195,19 @@ Result<RawFrame> BurstSource::frame(std::uint32_t index, Executor& executor) con
 }
 
 Plane<float> BurstSource::mosaic_e(std::uint32_t index, Executor& executor) const {
-  Plane<float> out = rate_e_per_s(index, executor);
+  SensorLight light = this->light(index, executor);
+  Plane<float> out = std::move(camera_.options.simulated_blur_px() > 0 ? light.blurred_e_per_s : light.e_per_s);
   multiply(out, static_cast<float>(truth(index).exposure_s));
   return out;
 }
 
 CameraRgb BurstSource::signal_e(std::uint32_t index, Executor& executor) const {
-  CameraRgb out;
-  if (grids_.sky) {
-    out = CameraRgb(size_.width_px, size_.height_px);
-    render_planes(view_of(grids_, index), executor, out.view());
-    add_points(points_in_frame(index), scene_.point_lights, response_, out);
-  } else {
-    out = charge_rate_rgb(scene_, response_, table_.get(), executor);
+  CameraRgb out = rate_rgb_e_per_s(index, executor);
+  const LensBlur lens(camera_.options.simulated_blur_px());
+  for (Plane<float>& plane : out.plane) {
+    lens.apply(plane, executor);
+    multiply(plane, static_cast<float>(truth(index).exposure_s));
   }
-  for (Plane<float>& plane : out.plane) multiply(plane, static_cast<float>(truth(index).exposure_s));
   return out;
 }
 
@@ -209,6 +219,8 @@ SceneLinear BurstSource::xyz_cd_m2(std::uint32_t index, Executor& executor) cons
     for (int c = 0; c < 3; ++c) out.plane[c] = scene_.xyz_cd_m2.plane[c].clone();
   }
   add_points(points_in_frame(index), scene_.point_lights, out);
+  const LensBlur lens(camera_.options.simulated_blur_px());
+  for (Plane<float>& plane : out.plane) lens.apply(plane, executor);
   return out;
 }
 

@@ -34,7 +34,7 @@ struct BurstTruth {
 /// A point source as one frame has it.
 struct BurstPoint {
   ImagePoint place;
-  double spread_px = 0;  // standard deviation
+  double spread_px = 0;  // standard deviation, the blur of the lens included
   Vector3 signal_e{};    // all of its light in the frame's exposure time, under the filters R, G and B
 };
 
@@ -63,8 +63,8 @@ class BurstSource {
   BurstTruth truth(std::uint32_t index) const;
   std::vector<BurstPoint> points(std::uint32_t index) const;
 
-  /// The noise-free truth of a frame: mean signal electrons under each pixel's own filter, and of R, G and B at every
-  /// pixel, in its own exposure time; and the XYZ of the scene [cd/m2].
+  /// The noise-free truth of a frame, with the blur of the lens if that is simulated: mean signal electrons under each
+  /// pixel's own filter, and of R, G and B at every pixel, in its own exposure time; and the XYZ of the scene [cd/m2].
   Plane<float> mosaic_e(std::uint32_t index, Executor& executor) const;
   CameraRgb signal_e(std::uint32_t index, Executor& executor) const;
   SceneLinear xyz_cd_m2(std::uint32_t index, Executor& executor) const;
@@ -78,7 +78,8 @@ class BurstSource {
   BurstSource(Scene scene, SpectralResponse response, SyntheticCamera camera, const BurstOptions& burst);
   Grids grids_of(const RgbView<const float>& samples, Executor& executor) const;
   BurstView view_of(const Grids& grids, std::uint32_t index) const;
-  Plane<float> rate_e_per_s(std::uint32_t index, Executor& executor) const;
+  SensorLight light(std::uint32_t index, Executor& executor) const;
+  CameraRgb rate_rgb_e_per_s(std::uint32_t index, Executor& executor) const;
   std::vector<PointSource> points_in_frame(std::uint32_t index) const;
   std::vector<PointSource> stars_around(const RigidMotion& motion) const;
 

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "capture/synthetic/optics/lens_blur.h"
 #include "isp/model/spectrum/cie_data.h"
 #include "isp/model/spectrum/spectral_response.h"
 
@@ -113,7 +114,28 @@ std::int64_t for_each_pixel(const Scene& scene, const SpectralResponse& response
   return moved;
 }
 
+/// Returns the samples of a mosaic.
+Plane<float> mosaic_of(const CameraRgb& colours, BayerPhase phase, Executor& executor) {
+  Plane<float> out(colours.width(), colours.height());
+  for_each_band(executor, out.height(), [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      for (int x = 0; x < out.width(); ++x) {
+        out.row(y)[x] = colours.plane[static_cast<std::size_t>(colour_at(phase, x, y))].row(y)[x];
+      }
+    }
+  });
+  return out;
+}
+
 }  // namespace
+
+SensorLight light_through_lens(CameraRgb e_per_s, BayerPhase phase, double blur_px, Executor& executor) {
+  SensorLight out{mosaic_of(e_per_s, phase, executor), {}};
+  const LensBlur lens(blur_px);
+  for (Plane<float>& plane : e_per_s.plane) lens.apply(plane, executor);
+  out.blurred_e_per_s = mosaic_of(e_per_s, phase, executor);
+  return out;
+}
 
 ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
                        BayerPhase phase, Executor& executor) {

@@ -12,6 +12,16 @@
 
 namespace lowlux::capture {
 
+/// Mean electrons per second under each pixel's own filter, height x width.
+struct SensorLight {
+  Plane<float> e_per_s;          // without the blur of the lens
+  Plane<float> blurred_e_per_s;  // with it; empty: there is none
+};
+
+/// Returns the light that three colours give to a mosaic, with and without the blur of a lens.
+/// @param blur_px see LensBlur; above 0
+SensorLight light_through_lens(CameraRgb e_per_s, BayerPhase phase, double blur_px, Executor& executor);
+
 /// Effect of a scene's light in a sensor, before any noise.
 struct ChargeRate {
   Plane<float> e_per_s;           // height x width: mean electrons per second under each pixel's own filter

@@ -38,14 +38,15 @@ Plane<float> with_mask(const Plane<float>& rate, int masked_columns) {
 /// converter's.
 double range_dn(const SensorModel& s) { return s.system_gain_dn_per_e * isp::saturation_charge_e(s); }
 
-/// Returns the plan of a file: the planner's, with the converter, which costs no time and makes files of one sensor
-/// alike.
-isp::NoiseSourcePlan with_converter(isp::NoiseSourcePlan plan) {
+/// Returns the plan of a file: the planner's, with the effects that cost no time: the converter, which makes files of
+/// one sensor alike, and the blur of the lens, which is computed once for all frames, and which the truth has too.
+isp::NoiseSourcePlan with_free_effects(isp::NoiseSourcePlan plan) {
   for (isp::RegionPlan& region : plan.regions) {
-    for (const Effect effect : {Effect::quantisation, Effect::clipping}) {
-      region.kept = region.kept.with(effect);
+    for (const Effect effect : {Effect::quantisation, Effect::clipping, Effect::lens_blur}) {
       isp::NoiseSourceDecision& d = region.decisions[static_cast<int>(effect)];
-      if (!d.kept) d.reason = isp::NoiseSourceDecision::Reason::free;
+      if (d.reason != isp::NoiseSourceDecision::Reason::negligible) continue;
+      region.kept = region.kept.with(effect);
+      d.reason = isp::NoiseSourceDecision::Reason::free;
       d.kept = true;
     }
   }
@@ -54,14 +55,16 @@ isp::NoiseSourcePlan with_converter(isp::NoiseSourcePlan plan) {
 
 }  // namespace
 
-ExposedSensor::ExposedSensor(SyntheticCamera camera, Plane<float> rate_e_per_s)
-    : camera_(std::move(camera)), rate_e_per_s_(std::move(rate_e_per_s)) {
+ExposedSensor::ExposedSensor(SyntheticCamera camera, SensorLight light)
+    : camera_(std::move(camera)), light_(std::move(light)) {
   const int masked = camera_.options.masked_columns;
-  if (masked > 0) rate_e_per_s_ = with_mask(rate_e_per_s_, masked);
+  for (Plane<float>* const plane : {&light_.e_per_s, &light_.blurred_e_per_s}) {
+    if (masked > 0 && !plane->empty()) *plane = with_mask(*plane, masked);
+  }
 }
 
-Result<ExposedSensor> ExposedSensor::of(SyntheticCamera camera, Plane<float> rate_e_per_s) {
-  ExposedSensor out(std::move(camera), std::move(rate_e_per_s));
+Result<ExposedSensor> ExposedSensor::of(SyntheticCamera camera, SensorLight light) {
+  ExposedSensor out(std::move(camera), std::move(light));
   const std::vector<isp::BlockLevel> blocks = out.plan_effects();
   out.choose_storage();
   if (const auto good = out.check_means(blocks); !good) return tl::make_unexpected(good.error());
@@ -77,7 +80,7 @@ std::vector<isp::BlockLevel> ExposedSensor::plan_effects() {
   const NoiseSourceChoice& choice = options.effects;
   plan_ = choice.tolerance ? isp::plan_noise_sources(sensor, options.exposure, developing_, blocks, *choice.tolerance)
                            : isp::fixed_effects(sensor, options.exposure, developing_, blocks, choice.effects);
-  file_plan_ = choice.tolerance ? with_converter(plan_) : plan_;
+  file_plan_ = choice.tolerance ? with_free_effects(plan_) : plan_;
   return blocks;
 }
 
@@ -127,19 +130,20 @@ void ExposedSensor::choose_storage() {
 
 SensorFrame ExposedSensor::sensor_frame(std::uint32_t index, const PhotonRows* photons) const {
   const SyntheticOptions& options = camera_.options;
-  return {camera_.sensor.model, options.exposure,    options.phase, rate_e_per_s_.view(),  photons,
-          options.seed,         options.sensor_seed, index,         options.masked_columns};
+  return {
+      camera_.sensor.model, options.exposure,    options.phase, light_.e_per_s.view(),  photons,
+      options.seed,         options.sensor_seed, index,         options.masked_columns, light_.blurred_e_per_s.view()};
 }
 
 Plane<float> ExposedSensor::frame_dn(std::uint32_t index, const PhotonRows* photons, Executor& executor) const {
-  Plane<float> dn(rate_e_per_s_.width(), rate_e_per_s_.height());
+  Plane<float> dn(light_.e_per_s.width(), light_.e_per_s.height());
   read_out(sensor_frame(index, photons), plan_, executor, dn.view());
   return dn;
 }
 
 Plane<std::uint16_t> ExposedSensor::stored_codes(std::uint32_t index, const PhotonRows* photons,
                                                  Executor& executor) const {
-  Plane<std::uint16_t> codes(rate_e_per_s_.width(), rate_e_per_s_.height());
+  Plane<std::uint16_t> codes(light_.e_per_s.width(), light_.e_per_s.height());
   if (storage_.codes) {
     read_out(sensor_frame(index, photons), file_plan_, executor, codes.view());
     return codes;

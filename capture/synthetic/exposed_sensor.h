@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "capture/synthetic/exposed_scene.h"
 #include "capture/synthetic/photon_rows.h"
 #include "capture/synthetic/sensor_sim.h"
 #include "capture/synthetic/synthetic_camera.h"
@@ -20,13 +21,13 @@ namespace lowlux::capture {
 class ExposedSensor {
  public:
   /// Plans the noise sources of an exposure.
-  /// @param rate_e_per_s of the image, without the masked columns
+  /// @param light of the image, without the masked columns
   /// Errors: a mean charge beyond the sampler's limit without a full well to bound it.
-  static Result<ExposedSensor> of(SyntheticCamera camera, Plane<float> rate_e_per_s);
+  static Result<ExposedSensor> of(SyntheticCamera camera, SensorLight light);
 
-  /// Returns frame number `index`. Any index, in any order. A file holds the converter's integer codes, which cost no
-  /// time: quantisation and clipping that the planner would leave out are kept (file_plan). For a caller that leaves
-  /// them out, see Storage.
+  /// Returns frame number `index`. Any index, in any order. Effects that cost no time are kept although the planner
+  /// would leave them out (file_plan): quantisation and clipping, and the blur of the lens, which is in the truth. For
+  /// a caller that leaves the converter out, see Storage.
   RawFrame frame(std::uint32_t index, const PhotonRows* photons, Executor& executor) const;
 
   /// Returns a frame in DN as floats, before storage: the output of the converter.
@@ -35,7 +36,7 @@ class ExposedSensor {
   /// Return the effects simulated by frame_dn() and by frame().
   const isp::NoiseSourcePlan& plan() const { return plan_; }
   const isp::NoiseSourcePlan& file_plan() const { return file_plan_; }
-  const Plane<float>& rate_e_per_s() const { return rate_e_per_s_; }  // with the masked columns
+  const SensorLight& light() const { return light_; }  // with the masked columns
   const isp::Developing& developing() const { return developing_; }
   EffectCost measure_cost(const PhotonRows* photons) const;
 
@@ -48,7 +49,7 @@ class ExposedSensor {
     bool codes = true;  // the readout gives integer codes
   };
 
-  ExposedSensor(SyntheticCamera camera, Plane<float> rate_e_per_s);
+  ExposedSensor(SyntheticCamera camera, SensorLight light);
   std::vector<isp::BlockLevel> plan_effects();
   /// Returns the largest mean of a block's pixels, fixed pattern included [e-].
   double largest_mean_e(const isp::BlockLevel& block, isp::NoiseSourceSet kept) const;
@@ -60,7 +61,7 @@ class ExposedSensor {
   RawFrame described(Plane<std::uint16_t> codes) const;
 
   SyntheticCamera camera_;
-  Plane<float> rate_e_per_s_;
+  SensorLight light_;
   isp::Developing developing_;
   isp::NoiseSourcePlan plan_;
   isp::NoiseSourcePlan file_plan_;

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "capture/synthetic/optics/crosstalk.h"
 #include "capture/synthetic/fixed_pattern.h"
+#include "capture/synthetic/optics/crosstalk.h"
 #include "capture/synthetic/readout.h"
 #include "isp/base/random/random.h"
 
@@ -65,13 +65,15 @@ class RowReadout {
 
   void fill_signal(const Run& run, NoiseSourceSet kept, Scratch& s, std::span<float> signal) const {
     const auto time = static_cast<float>(frame_.exposure.time_s);
+    const PlaneView<const float>& light =
+        kept.has(Effect::lens_blur) && frame_.has_lens_blur() ? frame_.blurred_e_per_s : frame_.rate_e_per_s;
     if (frame_.photons != nullptr && kept.has(Effect::photon_noise)) {
       frame_.photons->collect(frame_.seed, frame_.frame, run.x0, run.y, frame_.exposure.time_s, signal);
     } else if (kept.has(Effect::crosstalk) && frame_.sensor.crosstalk > 0) {
-      mix_neighbours(frame_.rate_e_per_s, {frame_.sensor.crosstalk, frame_.masked_columns}, run.x0, run.y, signal);
+      mix_neighbours(light, {frame_.sensor.crosstalk, frame_.masked_columns}, run.x0, run.y, signal);
       for (float& value : signal) value *= time;
     } else {
-      const float* rate = frame_.rate_e_per_s.row(run.y) + run.x0;
+      const float* rate = light.row(run.y) + run.x0;
       for (std::size_t i = 0; i < signal.size(); ++i) signal[i] = rate[i] * time;
     }
     if (kept.has(Effect::prnu)) apply_prnu(pattern(run), static_cast<float>(frame_.sensor.prnu), signal, s.normal);

@@ -18,12 +18,15 @@ struct SensorFrame {
   const SensorModel& sensor;
   isp::Exposure exposure;
   BayerPhase phase = BayerPhase::rggb;
-  PlaneView<const float> rate_e_per_s;  // height x width, see charge_rate
+  PlaneView<const float> rate_e_per_s;  // height x width, see charge_rate; without the blur of the lens
   const PhotonRows* photons = nullptr;  // set: published photon sampling, else physical
   std::uint64_t seed = 0;               // of the noise that is drawn for each frame
   std::uint64_t pattern_seed = 0;       // of the fixed pattern: PRNU, DSNU, hot pixels, columns
   std::uint32_t frame = 0;
-  int masked_columns = 0;  // at the left: light-shielded, without crosstalk
+  int masked_columns = 0;                       // at the left: light-shielded, without crosstalk
+  PlaneView<const float> blurred_e_per_s = {};  // as large, with the blur of the lens; empty: it has none
+
+  bool has_lens_blur() const { return blurred_e_per_s.data != nullptr; }
 };
 
 /// Reads out the frame in DN, as floats in the form the plan keeps: integers where quantisation is kept, signed values

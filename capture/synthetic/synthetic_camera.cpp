@@ -1,8 +1,11 @@
 #include "capture/synthetic/synthetic_camera.h"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
+#include "capture/synthetic/optics/lens_blur.h"
+#include "isp/base/text.h"
 #include "isp/model/colour/camera_colour.h"
 #include "isp/model/colour/camera_matrix.h"
 #include "isp/model/sensor/photon.h"
@@ -50,6 +53,14 @@ Result<void> check_options(const SensorModel& sensor, const SyntheticOptions& op
       options.effects.effects.has(isp::Effect::crosstalk)) {
     return fail(ErrorCode::invalid_argument,
                 "published photon sampling draws each pixel by itself: leave crosstalk out of the effects");
+  }
+  if (!(options.lens_blur_px >= 0) || !(options.lens_blur_px <= max_lens_blur_px)) {
+    return fail(ErrorCode::invalid_argument,
+                "the blur of the lens must lie between 0 and 10 px, found " + number_text(options.lens_blur_px, 6));
+  }
+  if (options.sampling == PhotonSampling::published && options.simulated_blur_px() > 0) {
+    return fail(ErrorCode::invalid_argument,
+                "published photon sampling draws each pixel by itself: leave lens-blur out of the effects");
   }
   if (!(options.f_number >= 0.5) || !(options.f_number <= 1000)) {
     return fail(ErrorCode::invalid_argument, "the f-number must lie between 0.5 and 1000");

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "capture/synthetic/optics/lens_blur.h"
 #include "isp/base/random/random.h"
 #include "isp/base/text.h"
 
@@ -21,13 +22,22 @@ Result<SyntheticSource> SyntheticSource::of(Scene scene, isp::NamedSensor sensor
   }
   if (const auto good = check_points(scene); !good) return tl::make_unexpected(good.error());
   SyntheticSource source(std::move(scene), std::move(response), options);
-  ChargeRate rate = charge_rate(source.scene_, source.response_, source.table_.get(), options.phase, executor);
-  source.moved_pixels_ = rate.moved_pixels;
+  SensorLight light = source.exposed_light(executor);
   if (const auto good = source.check_photons(executor); !good) return tl::make_unexpected(good.error());
-  auto exposed = ExposedSensor::of(*std::move(camera), std::move(rate.e_per_s));
+  auto exposed = ExposedSensor::of(*std::move(camera), std::move(light));
   if (!exposed) return tl::make_unexpected(exposed.error());
   source.sensor_ = *std::move(exposed);
   return source;
+}
+
+SensorLight SyntheticSource::exposed_light(Executor& executor) {
+  if (options_.lens_blur_px > 0) {
+    CameraRgb rate = charge_rate_rgb(scene_, response_, table_.get(), executor, &moved_pixels_);
+    return light_through_lens(std::move(rate), options_.phase, options_.lens_blur_px, executor);
+  }
+  ChargeRate rate = charge_rate(scene_, response_, table_.get(), options_.phase, executor);
+  moved_pixels_ = rate.moved_pixels;
+  return {std::move(rate.e_per_s), {}};
 }
 
 Result<void> SyntheticSource::check_photons(Executor& executor) const {
@@ -58,16 +68,20 @@ Plane<float> SyntheticSource::frame_dn(std::uint32_t index, Executor& executor) 
 CameraRgb SyntheticSource::signal_e(Executor& executor) const {
   CameraRgb truth = charge_rate_rgb(scene_, response_, table_.get(), executor);
   const auto time = static_cast<float>(options_.exposure.time_s);
+  const LensBlur lens(options_.simulated_blur_px());
   for (Plane<float>& plane : truth.plane) {
+    lens.apply(plane, executor);
     for (std::size_t i = 0; i < plane.size(); ++i) plane.data()[i] *= time;
   }
   return truth;
 }
 
-SceneLinear SyntheticSource::xyz_cd_m2() const {
+SceneLinear SyntheticSource::xyz_cd_m2(Executor& executor) const {
   SceneLinear truth;
   for (int c = 0; c < 3; ++c) truth.plane[c] = scene_.xyz_cd_m2.plane[c].clone();
   add_points(scene_.points, scene_.point_lights, truth);
+  const LensBlur lens(options_.simulated_blur_px());
+  for (Plane<float>& plane : truth.plane) lens.apply(plane, executor);
   return truth;
 }
 

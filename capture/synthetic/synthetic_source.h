@@ -31,14 +31,15 @@ class SyntheticSource {
   /// Returns a frame in DN as floats, before storage: the output of the converter.
   Plane<float> frame_dn(std::uint32_t index, Executor& executor) const;
 
-  /// Return the noise-free truth: mean signal electrons of R, G, B at every pixel, and the scene's XYZ [cd/m2].
+  /// Return the noise-free truth, with the blur of the lens if that is simulated, and without crosstalk: mean signal
+  /// electrons of R, G, B at every pixel, and the scene's XYZ [cd/m2].
   CameraRgb signal_e(Executor& executor) const;
-  SceneLinear xyz_cd_m2() const;
+  SceneLinear xyz_cd_m2(Executor& executor) const;
 
   /// Return the effects simulated by frame_dn() and by frame().
   const isp::NoiseSourcePlan& plan() const { return sensor_->plan(); }
   const isp::NoiseSourcePlan& file_plan() const { return sensor_->file_plan(); }
-  const Plane<float>& rate_e_per_s() const { return sensor_->rate_e_per_s(); }
+  const SensorLight& light() const { return sensor_->light(); }
   std::int64_t moved_pixels() const { return moved_pixels_; }
   const isp::Developing& developing() const { return sensor_->developing(); }
   EffectCost measure_cost() const;
@@ -47,6 +48,7 @@ class SyntheticSource {
   SyntheticSource(Scene scene, SpectralResponse response, const SyntheticOptions& options);
   Result<void> check_photons(Executor& executor) const;
   std::optional<PhotonRows> photon_rows() const;
+  SensorLight exposed_light(Executor& executor);
 
   Scene scene_;
   SpectralResponse response_;

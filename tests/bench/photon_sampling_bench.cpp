@@ -76,7 +76,7 @@ void measure(Way& way, const Plane<float>& dn, double gain_dn_per_e, double blac
       const double e = (dn.at(x, y) - black_dn) / gain_dn_per_e;
       sum += e;
       square += e * e;
-      rate += way.source.rate_e_per_s().at(x, y);
+      rate += way.source.light().e_per_s.at(x, y);
       ++count;
     }
   }
@@ -126,6 +126,6 @@ int main(int argc, char** argv) {
                 ways[i].median_ms() / ways[i - i % 2].median_ms(), ways[i].mean_ratio, ways[i].variance_ratio);
   }
   std::printf("one standard error: mean %.5f, variance %.4f\n",
-              std::sqrt(1 / (0.5 * pixels * ways[0].source.rate_e_per_s().at(1, 0))), std::sqrt(2 / (0.5 * pixels)));
+              std::sqrt(1 / (0.5 * pixels * ways[0].source.light().e_per_s.at(1, 0))), std::sqrt(2 / (0.5 * pixels)));
   return 0;
 }

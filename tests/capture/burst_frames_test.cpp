@@ -47,6 +47,7 @@ TEST(BurstFrames, AreTheSameInAnyOrderForEveryNumberOfThreads) {
     SyntheticOptions options;
     options.masked_columns = 4;
     if (planned) options.effects.tolerance = isp::Tolerance{};
+    if (planned) options.lens_blur_px = 1.2;
     const BurstSource one = burst_of(busy_scene(131, 117), everything(), options, noisy_sensor());
     InlineExecutor executor;
     std::vector<RawFrame> expected;
@@ -72,6 +73,7 @@ TEST(BurstFrames, AreTheSameInAnyOrderForEveryNumberOfThreads) {
 TEST(BurstFrames, OfASceneAtRestAreThoseOfTheSingleScene) {
   InlineExecutor executor;
   SyntheticOptions options;
+  options.lens_blur_px = 0.6;
   options.phase = BayerPhase::gbrg;
   options.effects.tolerance = isp::Tolerance{};
   const auto single = test::source_of(busy_scene(65, 43), noisy_sensor(), options);
@@ -82,7 +84,7 @@ TEST(BurstFrames, OfASceneAtRestAreThoseOfTheSingleScene) {
   }
   for (int k = 0; k < 3; ++k) {
     EXPECT_TRUE(equal(burst.signal_e(0, executor).plane[k], single->signal_e(executor).plane[k]));
-    EXPECT_TRUE(equal(burst.xyz_cd_m2(0, executor).plane[k], single->xyz_cd_m2().plane[k]));
+    EXPECT_TRUE(equal(burst.xyz_cd_m2(0, executor).plane[k], single->xyz_cd_m2(executor).plane[k]));
   }
 }
 
@@ -91,9 +93,10 @@ TEST(BurstFrames, TheMosaicIsTheTruthSeenThroughTheFilters) {
   SyntheticOptions options;
   options.phase = BayerPhase::bggr;
   options.exposure.time_s = 0.25;
-  options.effects.effects = {};
-  const BurstSource source = burst_of(busy_scene(131, 117), everything(), options);
+  options.effects.effects = {isp::Effect::lens_blur};
   for (const std::uint32_t i : {0U, 1U, 2U}) {
+    options.lens_blur_px = 0.7 * i;
+    const BurstSource source = burst_of(busy_scene(131, 117), everything(), options);
     const Plane<float> mosaic = source.mosaic_e(i, executor);
     const CameraRgb signal = source.signal_e(i, executor);
     const Plane<float> dn = source.exposed(i, executor)->frame_dn(i, nullptr, executor);

@@ -43,7 +43,12 @@ struct Case {
   }
   double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(generator); }
   SensorFrame frame() const {
-    return {.sensor = sensor, .phase = phase, .rate_e_per_s = rate.view(), .seed = 9, .masked_columns = masked};
+    return {.sensor = sensor,
+            .phase = phase,
+            .rate_e_per_s = rate.view(),
+            .seed = 9,
+            .masked_columns = masked,
+            .blurred_e_per_s = blurred.view()};
   }
   Plane<float> electrons(NoiseSourceSet kept = {Effect::crosstalk}) const {
     InlineExecutor executor;
@@ -57,6 +62,7 @@ struct Case {
   BayerPhase phase = BayerPhase::rggb;
   SensorModel sensor;
   Plane<float> rate;
+  Plane<float> blurred;  // empty: no lens blur
 };
 
 TEST(Crosstalk, MixesTheColoursOfEvenLightByItsMatrix) {
@@ -182,32 +188,59 @@ ColourMoments moments_of(const Case& c, const PlaneView<const float>& plane, int
   return out;
 }
 
+/// Compares what a block states of light that is moved with two frames, without and with what moves it.
+void expect_moved(const Case& c, const isp::MovedLight& level, const Plane<float>& without, const Plane<float>& with) {
+  Plane<float> added(c.width, c.height), moved(c.width, c.height);
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    added.data()[i] = with.data()[i] - without.data()[i];
+    moved.data()[i] = std::fabs(added.data()[i]);
+  }
+  for (int k = 0; k < 3; ++k) {
+    const ColourMoments before = moments_of(c, without.view(), k), after = moments_of(c, with.view(), k);
+    const double scale = before.mean * float_error, square = (before.variance + after.variance) * float_error;
+    EXPECT_NEAR(level.mean_e[k], after.mean - before.mean, scale);
+    EXPECT_NEAR(level.moved_e[k], moments_of(c, moved.view(), k).mean, scale);
+    EXPECT_NEAR(level.variance_e2[k], moments_of(c, added.view(), k).variance, square);
+    EXPECT_NEAR(level.more_contrast_e2[k], after.variance - before.variance, square);
+    double variance = 0;
+    for (int y = 0; y < c.height; ++y) {
+      for (int x = 0; x < c.width; ++x) {
+        if (static_cast<int>(colour_at(c.phase, x, y)) != k) continue;
+        const double a = without.at(x, y), b = with.at(x, y);
+        variance += isp::count_change_variance_e2(std::min(a, b), std::max(a, b), 1) / before.n;
+      }
+    }
+    EXPECT_NEAR(level.count_variance_e2[k], variance, 10 * scale);
+  }
+}
+
 TEST(Crosstalk, LevelsOfABlockStateItsMeansAndContrast) {
-  for (std::uint32_t seed = 51; seed <= 56; ++seed) {
+  for (std::uint32_t seed = 51; seed <= 58; ++seed) {
     Case c(seed);
     c.width = std::min(c.width, isp::effect_block);
     c.height = std::min(c.height, isp::effect_block);
-    c.rate = test::filled(c.width, c.height, 0);
-    for (std::size_t i = 0; i < c.rate.size(); ++i) c.rate.data()[i] = static_cast<float>(std::exp(c.between(0, 6)));
+    const auto drawn = [&] {
+      Plane<float> out(c.width, c.height);
+      for (std::size_t i = 0; i < out.size(); ++i) out.data()[i] = static_cast<float>(std::exp(c.between(0, 6)));
+      return out;
+    };
+    c.rate = drawn();
+    if (seed % 2 == 0) c.blurred = drawn();  // any light: levels are those of the two planes
+    if (seed % 4 == 0) c.sensor.crosstalk = 0;
     const auto blocks = block_levels(c.frame());
     ASSERT_EQ(blocks.size(), 1u);
-    const Plane<float> out = c.electrons();
-    Plane<float> added(c.width, c.height), moved(c.width, c.height);
-    for (std::size_t i = 0; i < out.size(); ++i) {
-      added.data()[i] = out.data()[i] - c.rate.data()[i];
-      moved.data()[i] = std::fabs(added.data()[i]);
-    }
-    const auto& level = blocks[0].crosstalk;
+    const isp::BlockLevel& block = blocks[0];
+    const Plane<float> both = c.electrons({Effect::crosstalk, Effect::lens_blur});
     for (int k = 0; k < 3; ++k) {
-      const ColourMoments before = moments_of(c, std::as_const(c.rate).view(), k), after = moments_of(c, out.view(), k);
-      const double scale = before.mean * float_error, square = before.variance * float_error;
-      EXPECT_NEAR(blocks[0].signal_e[k], after.mean, scale);
-      EXPECT_NEAR(level.mean_e[k], after.mean - before.mean, scale);
-      EXPECT_NEAR(level.moved_e[k], moments_of(c, moved.view(), k).mean, scale);
-      EXPECT_NEAR(level.variance_e2[k], moments_of(c, added.view(), k).variance, square);
-      EXPECT_NEAR(level.contrast_e2[k], after.variance, square);
-      EXPECT_NEAR(level.more_contrast_e2[k], after.variance - before.variance, square);
+      const ColourMoments all = moments_of(c, both.view(), k);
+      EXPECT_NEAR(block.signal_e[k], all.mean, all.mean * float_error);
+      EXPECT_NEAR(block.contrast.variance_e2[k], all.variance, all.variance * float_error);
     }
+    const NoiseSourceSet all = NoiseSourceSet::all();
+    expect_moved(c, block.left_out(all), both, both);
+    expect_moved(c, block.left_out(all.without(Effect::lens_blur)), c.electrons({Effect::crosstalk}), both);
+    expect_moved(c, block.left_out(all.without(Effect::crosstalk)), c.electrons({Effect::lens_blur}), both);
+    expect_moved(c, block.left_out({}), c.electrons({}), both);
   }
 }
 

@@ -66,6 +66,7 @@ TEST(SyntheticSource, GivesTheSameCodesForEveryNumberOfThreads) {
       options.sampling = sampling;
       options.masked_columns = 6;
       if (planned) options.effects.tolerance = isp::Tolerance{};
+      if (sampling == PhotonSampling::physical) options.lens_blur_px = 1.5;
       InlineExecutor one;
       const SyntheticSource source = made(picture(71, 67), rich_sensor(), options);
       const RawFrame expected = source.frame(3, one);
@@ -215,7 +216,8 @@ TEST(SyntheticSource, TheTruthInXyzIsTheSceneWithItsStars) {
   Scene scene = *picture_scene(test::even_picture(21, 21, {0.3, 0.25, 0.4}), 2);
   ASSERT_TRUE(add_lamp(scene, 10, 10, *isp::light_named("A"), 7));
   const SyntheticSource source = made(std::move(scene), test::plain_sensor());
-  const SceneLinear truth = source.xyz_cd_m2();
+  InlineExecutor executor;
+  const SceneLinear truth = source.xyz_cd_m2(executor);
   EXPECT_FLOAT_EQ(truth.plane[1].at(0, 0), 0.5f);
   double added = 0;
   for (std::size_t i = 0; i < truth.plane[1].size(); ++i) added += truth.plane[1].data()[i] - 0.5;

@@ -99,6 +99,8 @@ TEST_F(SimulateInput, ImpossibleSensorsAreRefused) {
                 {{"--telegraph-noise", "-1"}, "telegraph noise"},
                 {{"--crosstalk", "0.25"}, "between 0 and 0.2 of a pixel's light for each neighbour, found 0.25"},
                 {{"--crosstalk", "0.01", "--sampling", "published"}, "leave crosstalk out of the effects"},
+                {{"--lens-blur", "11"}, "between 0 and 10 px, found 11"},
+                {{"--lens-blur", "1", "--sampling", "published"}, "leave lens-blur out of the effects"},
                 {{"--glow", "2e6"}, "between 0 and 1e6 e-/s, found 2e+06"},
                 {{"--glow", "1", "--glow-position", "1,3"}, "between -1 and 2 widths and heights, found 3"},
                 {{"--glow", "1", "--glow-position", "1"}, "is not two numbers"},

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "isp/model/colour/colorimetry.h"
+#include "isp/model/colour/colour_difference.h"
 #include "tests/support/numbers.h"
 #include "tests/support/sweep.h"
 
@@ -43,10 +44,17 @@ SensorModel rich_sensor() {
   return m;
 }
 
-/// Flat blocks, with neighbours from which crosstalk adds a hundredth to green.
+/// Flat blocks, with neighbours from which crosstalk adds a hundredth to green, and the lens a thousandth to red.
 BlockLevel grey(double level_e) {
   BlockLevel out{{level_e, level_e, level_e}, {level_e, level_e, level_e}, level_e, {3, 2, 4, 0.25}};
-  out.crosstalk.mean_e = out.crosstalk.moved_e = {0, 0.01 * level_e, 0};
+  const auto adds = [](const Vector3& d) {
+    MovedLight moved;
+    moved.mean_e = moved.moved_e = moved.count_variance_e2 = d;
+    return moved;
+  };
+  out.by_crosstalk = adds({0, 0.01 * level_e, 0});
+  out.by_lens_blur = adds({0.001 * level_e, 0, 0});
+  out.by_both = adds({0.001 * level_e, 0.01 * level_e, 0});
   return out;
 }
 
@@ -91,6 +99,7 @@ TEST(EffectNames, AreAsManyAsEffectsAllDifferent) {
   EXPECT_EQ(names[static_cast<int>(Effect::telegraph_noise)], "telegraph-noise");
   EXPECT_EQ(names[static_cast<int>(Effect::amplifier_glow)], "amplifier-glow");
   EXPECT_EQ(names[static_cast<int>(Effect::crosstalk)], "crosstalk");
+  EXPECT_EQ(names[static_cast<int>(Effect::lens_blur)], "lens-blur");
 }
 
 TEST(NoiseSourcePlan, ATinyToleranceKeepsEveryEffectThatIsThere) {
@@ -131,6 +140,9 @@ TEST(NoiseSourcePlan, EffectsTheSensorHasNotAreAbsent) {
     EXPECT_FALSE(d.kept);
     EXPECT_FALSE(plan.regions[0].kept.has(effect));
   }
+  c.blocks[0].by_lens_blur = {};
+  EXPECT_EQ(c.plan({1e-12, 1e-12}).regions[0].decisions[static_cast<std::size_t>(Effect::lens_blur)].reason,
+            Reason::absent);
   Case no_time;  // without time there is no dark charge
   no_time.exposure.time_s = 0;
   const auto decisions = no_time.plan({1e-12, 1e-12}).regions[0].decisions;
@@ -220,6 +232,9 @@ TEST(NoiseSourcePlan, ALargerToleranceKeepsASubset) {
     for (const double time_s : {1e-3, 1.0, 60.0}) {
       Case c;
       c.blocks = {grey(level)};
+      // With two effects that move light, leaving out one more can cost the other.
+      c.blocks[0].by_lens_blur = {};
+      c.blocks[0].by_both = c.blocks[0].by_crosstalk;
       c.exposure.time_s = time_s;
       NoiseSourceSet before = NoiseSourceSet::all();
       for (const double scale : test::ratios(1e-3, 1e4, 1.5)) {
@@ -260,6 +275,67 @@ TEST(PredictChange, IsAtLeastTheShareOfTheVarianceThatIsLeftOut) {
         predict_change(c.sensor, c.exposure, c.developing(), c.blocks[0], NoiseSourceSet::all().without(share.effect));
     EXPECT_GE(change.relative_variance, share.variance_e2 / whole);
     EXPECT_GT(change.delta_e, 0);
+  }
+}
+
+// Quantiles of two Poisson distributions by their sums, over means and changes of them.
+TEST(CountChangeVariance, IsNoLessThanThatOfTheQuantilesOfOneNumber) {
+  const auto sums = [](double mean, int count) {
+    std::vector<double> out;
+    double sum = 0;
+    for (int n = 0; n < count; ++n) {
+      sum += std::exp(n * std::log(mean) - mean - std::lgamma(n + 1.0));
+      out.push_back(sum);
+    }
+    return out;
+  };
+  for (const double mean : {0.01, 0.3, 1.0, 4.7, 30.0, 200.0}) {
+    for (const double d : {0.001, 0.1, 0.5, 1.0, 3.3, 20.0}) {
+      const int count = static_cast<int>(mean + d + 12 * std::sqrt(mean + d) + 30);
+      const std::vector<double> low = sums(mean, count), high = sums(mean + d, count);
+      double at = 0, first = 0, second = 0;
+      int i = 0, j = 0;
+      while (i < count && j < count) {
+        const double next = std::min(low[static_cast<std::size_t>(i)], high[static_cast<std::size_t>(j)]);
+        const double change = j - i;
+        first += (next - at) * change;
+        second += (next - at) * change * change;
+        at = next;
+        (low[static_cast<std::size_t>(i)] <= high[static_cast<std::size_t>(j)] ? i : j) += 1;
+      }
+      EXPECT_NEAR(first, d, 1e-6 * (1 + d));
+      EXPECT_LE(second - first * first, count_change_variance_e2(mean, mean + d, 0) * (1 + 1e-6)) << mean << " " << d;
+    }
+  }
+  EXPECT_EQ(count_change_variance_e2(0, 7, 0), 7) << "photons on a dark pixel";
+  EXPECT_NEAR(count_change_variance_e2(100, 100.01, 10), 0.1, 1e-12)
+      << "0.01 counts, a tenth of them by a code of 10 e-";
+}
+
+TEST(PredictChange, OfLightThatMovesIsItsShiftWhereThereIsNoNoise) {
+  Case c;
+  c.sensor = {};
+  c.sensor.full_well_e = 30000;
+  c.sensor.bits = 16;
+  c.sensor.white_level_dn = 65535;
+  const BlockLevel block = grey(20000);
+  const Developing d = c.developing();
+  const auto lab = [&](const Vector3& signal_e) {
+    Vector3 rgb{};
+    for (int k = 0; k < 3; ++k) rgb[k] = signal_e[k] / d.white_e[k];
+    return lab_of(xyz_of(d.camera_to_xyz * rgb), *xyz_of(white_d65));
+  };
+  const struct {
+    NoiseSourceSet kept;
+    Vector3 signal_e;
+  } cases[] = {{NoiseSourceSet::all().without(Effect::crosstalk), {20000, 19800, 20000}},
+               {NoiseSourceSet::all().without(Effect::lens_blur), {19980, 20000, 20000}},
+               {NoiseSourceSet::all().without(Effect::lens_blur).without(Effect::crosstalk), {19980, 19800, 20000}}};
+  for (const auto& left_out : cases) {
+    const double exact = ciede2000(lab({20000, 20000, 20000}), lab(left_out.signal_e));
+    const double found = predict_change(c.sensor, c.exposure, d, block, left_out.kept).delta_e;
+    EXPECT_GE(found, exact);
+    EXPECT_LT(found, 1.1 * exact) << "five standard deviations of a count of 20 or 200 e- more in 256 pixels";
   }
 }
 

@@ -48,6 +48,18 @@ def test_the_noise_of_simulated_frames_is_that_of_their_truth():
     assert abs(excess.mean()) < 5 * excess.std() / np.sqrt(n)
 
 
+def test_the_blur_of_the_lens_is_in_frames_and_truth():
+    sharp, blurred = (lowlux.simulate("chart", **SCENE, effects="all", **lens) for lens in ({}, dict(lens_blur=1.5)))
+    none = lowlux.simulate("chart", **SCENE, effects="all", lens_blur=0)
+    np.testing.assert_array_equal(none.frames[0].raw_image, sharp.frames[0].raw_image)
+    np.testing.assert_array_equal(none.truth, sharp.truth)
+    assert (blurred.frames[0].raw_image != sharp.frames[0].raw_image).mean() > 0.1
+    for before, after in ((sharp.truth, blurred.truth), (sharp.truth_e, blurred.truth_e)):
+        np.testing.assert_allclose(after.sum(axis=(0, 1), dtype=float), before.sum(axis=(0, 1), dtype=float), rtol=1e-5)
+        assert np.abs(np.diff(after, axis=1)).max() < 0.7 * np.abs(np.diff(before, axis=1)).max()
+    assert blurred.report["lens_blur_px"] == 1.5
+
+
 def test_comparing_files_and_arrays(night, tmp_path, command):
     a = lowlux.develop(night, tmp_path / "a.png", denoise="off").image
     b = lowlux.develop(night, tmp_path / "b.png").image

@@ -119,7 +119,7 @@ Result<SimulatedRaws> simulated_raws(const BenchPicture& picture, const DevelopL
   options.effects.effects = NoiseSourceSet{};
   const auto probe = source_of(picture, light, 1, options, executor);
   if (!probe) return tl::make_unexpected(probe.error());
-  const double luminance = light.mean_e / (exposure_s * mean_of(probe->rate_e_per_s(), masked_columns));
+  const double luminance = light.mean_e / (exposure_s * mean_of(probe->light().e_per_s, masked_columns));
   const auto mean = source_of(picture, light, luminance, options, executor);
   if (!mean) return tl::make_unexpected(mean.error());
   options.effects.effects = NoiseSourceSet::all();

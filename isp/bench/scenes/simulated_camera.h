@@ -27,6 +27,7 @@ NamedSensor bench_camera();
 /// Returns bench_camera() with assumed values for the effects that are absent or rare in other stages' frames: hot
 /// pixels, random telegraph noise, amplifier glow and crosstalk.
 NamedSensor effects_camera();
+inline constexpr double effects_lens_px = 0.5;  // blur of the lens in front of it, in addition to that of the images
 
 /// Returns the response of both: a white of bench_full_cd_m2 under D65 fills it in 1 s.
 SpectralResponse bench_response();

@@ -132,7 +132,7 @@ Result<RawFrame> frame_of(const BenchPicture& picture, const NamedSensor& sensor
   capture::SyntheticOptions options{.exposure = draw.exposure, .seed = draw.seed, .sensor_seed = draw.seed};
   const auto probe = capture::SyntheticSource::of(bench_scene(picture, 1), sensor, *response, options, executor);
   if (!probe) return tl::make_unexpected(probe.error());
-  const Plane<float>& rate = probe->rate_e_per_s();
+  const Plane<float>& rate = probe->light().e_per_s;
   double sum = 0;
   for (std::size_t i = 0; i < rate.size(); ++i) sum += static_cast<double>(rate.data()[i]);
   const double per_cd_m2 = draw.exposure.time_s * sum / static_cast<double>(rate.size());

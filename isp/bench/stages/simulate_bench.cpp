@@ -74,7 +74,7 @@ Result<PlanSources> sources_of(const std::vector<BenchPicture>& pictures, const 
         bench_scene(picture, light.white_cd_m2), bench_camera(), bench_response(),
         {.exposure = light.exposure(), .sampling = plan.sampling, .effects = plan.effects}, executor);
     if (!source) return tl::make_unexpected(source.error());
-    out.megapixels += 1e-6 * static_cast<double>(source->rate_e_per_s().size());
+    out.megapixels += 1e-6 * static_cast<double>(source->light().e_per_s.size());
     out.sources.push_back(*std::move(source));
   }
   return out;

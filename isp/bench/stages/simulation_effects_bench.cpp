@@ -67,10 +67,11 @@ class EffectsLight {
                                  Executor& executor) {
     EffectsLight out(light);
     for (const BenchPicture& picture : pictures) {
-      auto source = capture::SyntheticSource::of(bench_scene(picture, light.white_cd_m2), out.camera_, bench_response(),
-                                                 {.exposure = light.exposure()}, executor);
+      auto source =
+          capture::SyntheticSource::of(bench_scene(picture, light.white_cd_m2), out.camera_, bench_response(),
+                                       {.exposure = light.exposure(), .lens_blur_px = effects_lens_px}, executor);
       if (!source) return tl::make_unexpected(source.error());
-      Plane<float> dn(source->rate_e_per_s().width(), source->rate_e_per_s().height());
+      Plane<float> dn(source->light().e_per_s.width(), source->light().e_per_s.height());
       out.shots_.push_back({*std::move(source), {}, std::move(dn)});
       PictureShot& shot = out.shots_.back();
       shot.blocks = capture::block_levels(out.frame_of(shot));
@@ -139,9 +140,10 @@ class EffectsLight {
   capture::SensorFrame frame_of(const PictureShot& shot) const {
     return {.sensor = camera_.model,
             .exposure = light_.exposure(),
-            .rate_e_per_s = shot.source.rate_e_per_s().view(),
+            .rate_e_per_s = shot.source.light().e_per_s.view(),
             .seed = 1,
-            .pattern_seed = 1};
+            .pattern_seed = 1,
+            .blurred_e_per_s = shot.source.light().blurred_e_per_s.view()};
   }
   NoiseSourcePlan plan_of(const PictureShot& shot, const Choice& choice) const {
     if (!choice.tolerance) return plan_keeping(choice.kept, shot.all_dn.width(), shot.all_dn.height());

@@ -15,6 +15,7 @@ constexpr std::array all_settings{
     Setting{"camera", "--camera", SettingKind::text},
     Setting{"exposure_s", "--exposure", SettingKind::number},
     Setting{"f_number", "--f-number", SettingKind::number},
+    Setting{"lens_blur_px", "--lens-blur", SettingKind::number},
     Setting{"temperature_c", "--temperature", SettingKind::number},
     Setting{"cfa", "--cfa", SettingKind::text},
     Setting{"masked_columns", "--masked-columns", SettingKind::even},

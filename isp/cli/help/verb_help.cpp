@@ -107,7 +107,7 @@ const std::vector<Group>& raw_groups() {
 const std::vector<Group>& simulation_groups() {
   static const std::vector<Group> groups{
       {"Scene", {"--stars", "--star-luminance", "--lamp"}},
-      {"Camera", {"--camera", "--temperature", "--cfa", "--masked-columns", "--sensor-seed"}},
+      {"Camera", {"--camera", "--lens-blur", "--temperature", "--cfa", "--masked-columns", "--sensor-seed"}},
       {"Noise sources", {"--effects", "--tolerance", "--sampling"}},
       {"Files", {"--truth", "--truth-electrons"}},
       {"Reports", {"--explain", "--json", "--timings", "--quiet"}},

@@ -203,6 +203,8 @@ void add_camera(CLI::App& app, SimulateArgs& args) {
       ->type_name("NAME");
   add_number(app, "--exposure", "S", "exposure time (default 0.1)", [&o](double s) { o.exposure.time_s = s; });
   add_number(app, "--f-number", "f/N", "(default 2)", [&args](double n) { args.optics.f_number = n; });
+  add_number(app, "--lens-blur", "PX", "standard deviation of the blur of the lens, 0 to 10 (default 0)",
+             [&o](double px) { o.lens_blur_px = px; });
   add_number(app, "--temperature", "C", "of the sensor (default 20)", [&o](double c) { o.exposure.temperature_c = c; });
   add_choice<BayerPhase>(
       app, "--cfa",

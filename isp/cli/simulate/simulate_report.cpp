@@ -18,7 +18,7 @@ using Json = nlohmann::ordered_json;
 const char* reason_of(const isp::NoiseSourceDecision& decision, isp::NoiseSourceSet wanted) {
   switch (decision.reason) {
     case isp::NoiseSourceDecision::Reason::absent:
-      return "the sensor has none";
+      return decision.effect == isp::Effect::lens_blur ? "no blur, or none in even light" : "the sensor has none";
     case isp::NoiseSourceDecision::Reason::negligible:
       return "below the tolerance with all that is left out";
     case isp::NoiseSourceDecision::Reason::asked_for:
@@ -147,6 +147,7 @@ std::string simulate_json(const SimulateArgs& args, const SimulateOutcome& o) {
             {"exposure_s", args.options.exposure.time_s},
             {"temperature_c", args.options.exposure.temperature_c},
             {"f_number", args.options.f_number},
+            {"lens_blur_px", args.options.lens_blur_px},
             {"white_luminance_cd_m2", o.white_cd_m2},
             {"seed", args.options.seed},
             {"tolerance",

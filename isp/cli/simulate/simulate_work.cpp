@@ -61,7 +61,7 @@ Result<RawFrame> frame_of(const capture::BurstSource& source, std::uint32_t inde
   return source.frame(index, executor);
 }
 
-SceneLinear truth_of(const capture::SyntheticSource& source, Executor& /*executor*/) { return source.xyz_cd_m2(); }
+SceneLinear truth_of(const capture::SyntheticSource& source, Executor& executor) { return source.xyz_cd_m2(executor); }
 SceneLinear truth_of(const capture::BurstSource& source, Executor& executor) { return source.xyz_cd_m2(0, executor); }
 
 CameraRgb electrons_of(const capture::SyntheticSource& source, Executor& executor) { return source.signal_e(executor); }
@@ -255,12 +255,13 @@ class Simulation {
 
   std::string describe(const RawFrame& frame) const {
     return fmt::format(
-        "simulated: {}, white {:g} cd/m2, {:g} s, f/{:g}, {:g} C, {} photons, effects {}, seed {}, sensor {}{}",
+        "simulated: {}, white {:g} cd/m2, {:g} s, f/{:g}, {:g} C, {} photons, effects {}, seed {}, sensor {}{}{}",
         description_, out_.white_cd_m2, *frame.raw.info.exposure_s, args_.options.f_number,
         args_.options.exposure.temperature_c,
         args_.options.sampling == capture::PhotonSampling::physical ? "physical" : "published",
         args_.effects.empty() ? (args_.options.effects.tolerance ? "auto" : "all") : args_.effects.c_str(),
-        args_.options.seed, args_.options.sensor_seed, args_.burst.is_burst() ? ", burst" : "");
+        args_.options.seed, args_.options.sensor_seed, args_.burst.is_burst() ? ", burst" : "",
+        args_.options.lens_blur_px > 0 ? fmt::format(", lens blur {:g} px", args_.options.lens_blur_px) : "");
   }
 
   const SimulateArgs& args_;

@@ -12,8 +12,8 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::array<std::string_view, effect_count> names{
-    "photon-noise", "dark-current", "read-noise",   "quantisation",    "clipping",       "prnu",     "dsnu",
-    "hot-pixels",   "row-noise",    "column-noise", "telegraph-noise", "amplifier-glow", "crosstalk"};
+    "photon-noise", "dark-current", "read-noise",   "quantisation",    "clipping",       "prnu",      "dsnu",
+    "hot-pixels",   "row-noise",    "column-noise", "telegraph-noise", "amplifier-glow", "crosstalk", "lens-blur"};
 
 /// Limits the fraction of the tolerance that predictions may use up. They assume normal distributions, which do not
 /// hold near saturation and at a few electrons.
@@ -49,6 +49,7 @@ bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
     case Effect::photon_noise:
     case Effect::quantisation:
     case Effect::clipping:
+    case Effect::lens_blur:  // of the light, not of the sensor
       break;
   }
   return true;
@@ -61,22 +62,24 @@ int decade_of(double level_e, double least_e) {
   return static_cast<int>(std::floor(std::log10(std::clamp(level_e, least_e, 1e9))));
 }
 
-/// Adds the members whose glow and whose change by crosstalk, relative to their noise, are extreme.
+/// Adds the members whose glow and whose moved light, relative to their noise, are extreme.
 template <class AddMost>
 void add_uneven_samples(const AddMost& add_most) {
   add_most([](const BlockLevel& b) { return b.glow.mean_e; });
   add_most([](const BlockLevel& b) { return -b.glow.mean_e; });
-  for (int c = 0; c < 3; ++c) {
-    add_most([c](const BlockLevel& b) { return std::fabs(b.crosstalk.mean_e[c]) / (1 + b.signal_e[c]); });
-    add_most([c](const BlockLevel& b) { return b.crosstalk.moved_e[c] / (1 + b.signal_e[c]); });
-    add_most([c](const BlockLevel& b) {
-      return std::fabs(b.crosstalk.more_contrast_e2[c]) / (1 + b.signal_e[c] + b.crosstalk.contrast_e2[c]);
-    });
+  for (const auto moved : {&BlockLevel::by_lens_blur, &BlockLevel::by_crosstalk, &BlockLevel::by_both}) {
+    for (int c = 0; c < 3; ++c) {
+      add_most([=](const BlockLevel& b) { return std::fabs((b.*moved).mean_e[c]) / (1 + b.signal_e[c]); });
+      add_most([=](const BlockLevel& b) { return (b.*moved).moved_e[c] / (1 + b.signal_e[c]); });
+      add_most([=](const BlockLevel& b) {
+        return std::fabs((b.*moved).more_contrast_e2[c]) / (1 + b.signal_e[c] + b.contrast.variance_e2[c]);
+      });
+    }
   }
 }
 
 /// Returns the blocks a region is evaluated by: its extremes by level and others evenly between them, the extremes of
-/// each channel, of the glow and of crosstalk.
+/// each channel, of the glow and of moved light.
 std::vector<BlockLevel> samples_of(std::span<const BlockLevel> blocks, std::vector<std::size_t> members) {
   std::vector<std::size_t> chosen;
   const auto by = [&](auto key) {
@@ -125,7 +128,10 @@ class Region {
     }
     return worst;
   }
-  bool has(Effect effect) const { return present(sensor_, exposure_, effect); }
+  bool has(Effect effect) const {
+    if (effect != Effect::lens_blur) return present(sensor_, exposure_, effect);
+    return std::ranges::any_of(samples_, [](const BlockLevel& b) { return b.by_lens_blur.moves(); });
+  }
 
  private:
   const SensorModel& sensor_;
@@ -215,6 +221,12 @@ NoiseSourcePlan plan_regions(const SensorModel& sensor, const Exposure& exposure
 }  // namespace
 
 std::span<const std::string_view> effect_names() { return names; }
+
+MovedLight BlockLevel::left_out(NoiseSourceSet kept) const {
+  const bool lens = !kept.has(Effect::lens_blur), neighbours = !kept.has(Effect::crosstalk);
+  if (lens) return neighbours ? by_both : by_lens_blur;
+  return neighbours ? by_crosstalk : MovedLight{};
+}
 
 NoiseSourcePlan plan_noise_sources(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
                                    std::span<const BlockLevel> blocks, const Tolerance& tolerance) {

@@ -9,6 +9,7 @@
 
 #include "isp/base/matrix3.h"
 #include "isp/base/sensor.h"
+#include "isp/model/sensor/moved_light.h"
 #include "isp/model/sensor/noise_budget.h"
 
 namespace lowlux::isp {
@@ -28,8 +29,9 @@ enum class Effect : std::uint8_t {
   telegraph_noise,  // a few pixels move between two levels
   amplifier_glow,   // additional charge around a point, and its Poisson fluctuation
   crosstalk,        // neighbours exchange a fraction of their light
+  lens_blur,        // the lens spreads the light of a point
 };
-inline constexpr int effect_count = 13;
+inline constexpr int effect_count = 14;
 
 /// Returns "photon-noise", "dark-current"... in the order of Effect.
 std::span<const std::string_view> effect_names();
@@ -67,21 +69,20 @@ inline constexpr int effect_block = 32;
 /// Changes of variance below this are ignored [DN^2]: a block of integer codes cannot show them.
 inline constexpr double variance_floor_dn2 = 0.01;
 
-/// Holds the signal that a block of the scene gives to the sensor, after crosstalk.
+/// Holds the signal that a block of the scene gives to the sensor, after the blur of the lens and crosstalk.
 struct BlockLevel {
   Vector3 signal_e{};   // mean signal of its R, G and B pixels
   Vector3 darkest_e{};  // signal of its darkest R, G and B pixels: a star's block is dark around it
-  double peak_e = 0;    // signal of its brightest pixel, with or without crosstalk
+  double peak_e = 0;    // signal of its brightest pixel, with or without the effects that move light
   struct Glow {
     double mean_e = 0, least_e = 0, peak_e = 0;  // of its pixels
     double variance_e2 = 0;                      // of the means of its pixels: the glow falls off
   } glow;
-  /// Describes what crosstalk adds to the signal of R, G and B pixels, here d.
-  struct Crosstalk {
-    Vector3 mean_e{}, moved_e{};                // means of d and of |d|
-    Vector3 variance_e2{};                      // of d
-    Vector3 contrast_e2{}, more_contrast_e2{};  // variance of the signal, and what d adds to it, often negative
-  } crosstalk;
+  Contrast contrast;  // 0 where no effect moves light
+  MovedLight by_lens_blur, by_crosstalk, by_both;
+
+  /// Returns what the effects that move light, and are not kept, add.
+  MovedLight left_out(NoiseSourceSet kept) const;
 };
 
 /// Describes how block means become colours, in which the tolerance is measured.

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "isp/model/colour/colorimetry.h"
 #include "isp/model/colour/colour_difference.h"
@@ -9,9 +8,9 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double sigmas = 5;            // standard deviations of a bound
-constexpr double channel_pixels = 256;  // pixels of R or B in a block; G has twice as many
-constexpr double block_lines = 16;      // rows, or columns, of a block that hold one channel
+constexpr double sigmas = bound_sigmas;
+constexpr MovedLight no_light_moves;
+constexpr double block_lines = 16;  // rows, or columns, of a block that hold one channel
 constexpr double hottest =
     14;  // quantile of an exponential distribution, in units of its mean: exceeded once in a million
 constexpr double black_noise_of_white = 0.02;  // isp/render/exposure
@@ -22,9 +21,11 @@ double square(double x) { return x * x; }
 struct Charge {
   double signal, dark, hot;  // hot: additional charge of a hot pixel
   double glow, glow_variance;
-  struct {
-    double mean, moved, variance, contrast, more_contrast;
-  } crosstalk;  // see BlockLevel::Crosstalk
+  int channel;
+  const MovedLight* moved;  // what is left out, of all channels
+  double shift;             // mean of what is left out
+  double clipped;           // mean of its size where pixels saturate, else 0
+  Contrast contrast;        // of all channels; 0 where pixels saturate
 
   double level() const { return signal + dark + glow; }  // of all pixels but the hot ones
 };
@@ -39,10 +40,9 @@ struct Budget {
 
 Budget budget_of(const SensorModel& s, const Charge& q, NoiseSourceSet kept) {
   Budget b;
-  const double signal = kept.has(Effect::crosstalk) ? q.signal : std::max(0.0, q.signal - q.crosstalk.mean);
-  b.collected_mean = signal;
-  if (kept.has(Effect::photon_noise)) b.collected_variance += signal;
-  if (kept.has(Effect::prnu)) b.collected_variance += square(s.prnu * signal);
+  b.collected_mean = q.signal;
+  if (kept.has(Effect::photon_noise)) b.collected_variance += q.signal;
+  if (kept.has(Effect::prnu)) b.collected_variance += square(s.prnu * q.signal);
   if (kept.has(Effect::dark_current)) {
     b.collected_mean += q.dark;
     b.collected_variance += q.dark;
@@ -130,23 +130,9 @@ ChangeVariance change_variance(const SensorModel& s, const Charge& q, NoiseSourc
             std::max(0.0, all.pixel_variance - left.pixel_variance);
   if (!kept.has(Effect::prnu)) v.pixel += std::min(0.25, s.prnu * q.signal);
   if (!kept.has(Effect::dsnu)) v.pixel += std::min(0.25, s.dsnu * q.dark);
-  if (!kept.has(Effect::crosstalk)) v.pixel += q.crosstalk.moved;
+  if (kept.has(Effect::prnu)) v.pixel += square(s.prnu) * (q.moved->variance_e2[q.channel] + square(q.shift));
   if (!kept.has(Effect::quantisation)) v.pixel += 1 / (12 * square(s.system_gain_dn_per_e));
   return v;
-}
-
-/// Returns the number of pixels of a kind that a channel of a block may hold: exceeded once in a million.
-double count_in_block(double fraction) {
-  const double mean = fraction * channel_pixels;
-  if (mean < 1e-6) return 0;
-  double term = std::exp(-mean), sum = term;
-  int count = 0;
-  while (sum < 1 - 1e-6 && count < channel_pixels) {
-    ++count;
-    term *= mean / count;
-    sum += term;
-  }
-  return std::max(count, 1);
 }
 
 /// Returns how far the charge of a hot pixel can change: all of it if hot pixels are left out, the excess over
@@ -192,32 +178,19 @@ double glow_slope_change(const SensorModel& s, const Charge& q, NoiseSourceSet k
   return slope_dn2 + 2 * std::sqrt(slope_dn2 * seen_dn2);
 }
 
-/// Returns by how much the variance may change if crosstalk, which blurs the scene, is left out, relative to what is
-/// seen: the contrast of the scene in the block, and the covariance of the change with the noise.
-/// @param noise_dn2     variance of the noise
-/// @param pixels_error  five standard errors of the mean of the pixels' squares, relative to it: sigmas / sqrt(n)
-double crosstalk_contrast_change(const SensorModel& s, const Charge& q, NoiseSourceSet kept, double noise_dn2,
-                                 double pixels_error) {
-  if (kept.has(Effect::crosstalk)) return 0;
-  const double k2 = square(s.system_gain_dn_per_e);
-  const double moved =
-      k2 * std::fabs(q.crosstalk.more_contrast) + 2 * pixels_error * std::sqrt(k2 * q.crosstalk.variance * noise_dn2);
-  const double contrast_dn2 = k2 * q.crosstalk.contrast;
-  const double seen = noise_dn2 * (1 - pixels_error * std::numbers::sqrt2) + contrast_dn2 -
-                      2 * pixels_error * std::sqrt(contrast_dn2 * noise_dn2);  // a lower bound
-  return moved / std::max(seen, variance_floor_dn2);
-}
-
 /// Holds bounds on the changes in one channel of a block.
 struct ChannelChange {
   double shift_dn = 0;    // known shift of the mean
   double scatter_dn = 0;  // bound on the scatter of the mean
   double relative_variance = 0;
+  double noise_sigmas = sigmas;  // see MovedChange
 };
 
 ChannelChange channel_change(const SensorModel& s, const Charge& q, NoiseSourceSet kept) {
   const ChannelMoments all = moments_of(s, budget_of(s, q, NoiseSourceSet::all()), NoiseSourceSet::all());
-  const ChannelMoments left = moments_of(s, budget_of(s, q, kept), kept);
+  Charge unmoved = q;
+  unmoved.signal = std::max(0.0, q.signal - q.shift);
+  const ChannelMoments left = moments_of(s, budget_of(s, unmoved, kept), kept);
   const double k = s.system_gain_dn_per_e;
   const double passed = std::max(all.unclipped, left.unclipped);
   const ChangeVariance change = change_variance(s, q, kept);
@@ -226,6 +199,13 @@ ChannelChange channel_change(const SensorModel& s, const Charge& q, NoiseSourceS
   const double hot_mean = hot_count * hot_dn / channel_pixels,
                hot_variance = hot_count * square(hot_dn) / channel_pixels;
   const TelegraphChange telegraph = telegraph_change(s, q, kept);
+  // Where most pixels are clipped, the few others determine the variance.
+  const double pixels = std::max(1.0, channel_pixels * std::min(all.inside, left.inside));
+  MovedChange moved_light;
+  if (q.moved->moves()) {
+    moved_light = moved_change(*q.moved, q.contrast, q.channel,
+                               {all.dn.variance / square(k), q.signal, pixels, 1 / k, variance_floor_dn2 / square(k)});
+  }
   ChannelChange out;
   out.shift_dn = left.dn.mean - all.dn.mean;
   const bool quantisation_differs = pixel + line > 0 || !kept.has(Effect::quantisation);
@@ -234,9 +214,7 @@ ChannelChange channel_change(const SensorModel& s, const Charge& q, NoiseSourceS
   // Without clipping, a pixel at the end of the range may read one code beyond it.
   const double beyond = kept.has(Effect::clipping) ? 0 : count_in_block(1 - all.inside) / channel_pixels;
   out.scatter_dn = sigmas * std::sqrt(pixel / channel_pixels + line / block_lines) + rounding_mean + hot_mean +
-                   telegraph.mean_dn + beyond;
-  // Where most pixels are clipped, the few others determine the variance.
-  const double pixels = std::max(1.0, channel_pixels * std::min(all.inside, left.inside));
+                   telegraph.mean_dn + beyond + k * (q.clipped + moved_light.scatter_e);
   // Terms of the sample variances: their own scatter, and the sample covariance of what is left out with what is kept.
   const double larger = std::max(all.dn.variance, left.dn.variance);
   const double slope = std::max(all.variance_slope_dn, left.variance_slope_dn);
@@ -247,23 +225,46 @@ ChannelChange channel_change(const SensorModel& s, const Charge& q, NoiseSourceS
                 2 * std::sqrt((pixel + line + telegraph.variance_dn2) * larger / pixels)) +
       slope * (std::fabs(out.shift_dn) + sigmas * std::sqrt(pixel / channel_pixels + line / block_lines));
   const double seen = all.dn.variance * (1 - sigmas * std::sqrt(2 / pixels));  // lower bound of a block's variance
-  out.relative_variance = moved / std::max(seen, variance_floor_dn2) +
-                          crosstalk_contrast_change(s, q, kept, all.dn.variance, sigmas / std::sqrt(pixels));
+  out.relative_variance = moved / std::max(seen, variance_floor_dn2) + moved_light.relative_variance;
+  out.noise_sigmas = moved_light.sigmas;
   return out;
 }
 
-Charge charge_of(const SensorModel& s, const Exposure& exposure, int channel, double signal_e,
-                 const BlockLevel& block) {
+/// Returns how far the mean of one channel of a block, with all effects, may be from its expected value [DN].
+double scatter_of_mean_dn(const SensorModel& s, const Charge& q) {
+  const NoiseSourceSet all = NoiseSourceSet::all();
+  const Budget budget = budget_of(s, q, all);
+  const double k = s.system_gain_dn_per_e;
+  const double pixel_e2 = budget.collected_variance + square(s.prnu) * q.contrast.variance_e2[q.channel] +
+                          budget.pixel_variance + 1 / (12 * square(k));
+  const double hot_e = changed_charge_of_hot_pixel(s, q, all.without(Effect::hot_pixels));
+  return k * sigmas * std::sqrt(pixel_e2 / channel_pixels + budget.line_variance / block_lines) +
+         k * count_in_block(s.hot_pixel_fraction) * hot_e / channel_pixels +
+         telegraph_change(s, q, all.without(Effect::telegraph_noise)).mean_dn;
+}
+
+/// Returns whether the brightest pixel of a block may saturate: contrast and means are then not those of the light.
+bool saturates(const SensorModel& s, const Exposure& exposure, const BlockLevel& block) {
+  const auto dark = dark_mean_e(s, exposure);
+  const double level = block.peak_e + block.glow.peak_e + *std::max_element(dark.begin(), dark.end());
+  const double variance_e2 = level + square(s.prnu * block.peak_e) + square(s.read_noise_e);
+  return level + sigmas * std::sqrt(variance_e2) >= saturation_charge_e(s);
+}
+
+Charge charge_of(const SensorModel& s, const Exposure& exposure, int channel, double signal_e, const BlockLevel& block,
+                 const MovedLight& moved) {
   const double time_factor = exposure.time_s * dark_current_factor(s, exposure.temperature_c);
-  const BlockLevel::Crosstalk& x = block.crosstalk;
-  // What saturates has less contrast than its light.
-  const double contrast_e2 = block.peak_e < saturation_charge_e(s) ? x.contrast_e2[channel] : 0;
+  const bool clipped = moved.moves() && saturates(s, exposure, block);
   return {signal_e,
           dark_mean_e(s, exposure)[channel],
           s.hot_pixel_current_e_per_s * time_factor,
           block.glow.mean_e,
           block.glow.variance_e2,
-          {x.mean_e[channel], x.moved_e[channel], x.variance_e2[channel], contrast_e2, x.more_contrast_e2[channel]}};
+          channel,
+          &moved,
+          moved.mean_e[channel],
+          clipped ? moved.moved_e[channel] : 0,
+          clipped ? Contrast{} : block.contrast};
 }
 
 Lab lab_of_dn(const SensorModel& s, const Developing& developing, const Vector3& dn) {
@@ -291,26 +292,37 @@ double farthest(const SensorModel& s, const Developing& developing, const Vector
   return largest;
 }
 
+/// Predicts the change of a block whose pixels have a signal, without and with the effects that move light.
+/// @param moved what those add that are left out
 PredictedChange change_at(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
-                          const Vector3& signal_e, const BlockLevel& block, NoiseSourceSet kept) {
+                          const Vector3& signal_e, const BlockLevel& block, const MovedLight& moved,
+                          NoiseSourceSet kept) {
   PredictedChange out;
-  Vector3 mean{}, shift{}, scatter{};
+  Vector3 mean{}, shift{}, scatter{}, noise{};
   for (int c = 0; c < 3; ++c) {
-    const Charge charge = charge_of(sensor, exposure, c, signal_e[c], block);
+    const Charge charge = charge_of(sensor, exposure, c, signal_e[c], block, moved);
     mean[c] = moments_of(sensor, budget_of(sensor, charge, NoiseSourceSet::all()), NoiseSourceSet::all()).dn.mean;
     const ChannelChange change = channel_change(sensor, charge, kept);
     shift[c] = change.shift_dn;
     scatter[c] = change.scatter_dn;
+    if (moved.moves()) noise[c] = change.noise_sigmas / sigmas * scatter_of_mean_dn(sensor, charge);
     out.relative_variance = std::max(out.relative_variance, change.relative_variance);
   }
-  // The remaining noise changes the colour: where it happens to be grey, differences count most.
+  // The remaining noise changes the colour: where it happens to be grey, differences count most. Where the change is
+  // that of light that moves, which is computed from the pixels, colours are those that noise can make.
   const double grey = (mean[0] + mean[1] + mean[2]) / 3 - sensor.black_level_dn;
   Vector3 neutral{};
   for (int c = 0; c < 3; ++c) {
-    neutral[c] = sensor.black_level_dn + grey * developing.white_e[c] / developing.white_e[1];
+    const double dn = sensor.black_level_dn + grey * developing.white_e[c] / developing.white_e[1];
+    neutral[c] = moved.moves() ? std::clamp(dn, mean[c] - noise[c], mean[c] + noise[c]) : dn;
   }
   out.delta_e = std::max(farthest(sensor, developing, mean, shift, scatter),
                          farthest(sensor, developing, neutral, shift, scatter));
+  for (int corner = 0; moved.moves() && corner < 8; ++corner) {
+    Vector3 colour = mean;
+    for (int c = 0; c < 3; ++c) colour[c] += (corner >> c) & 1 ? noise[c] : -noise[c];
+    out.delta_e = std::max(out.delta_e, farthest(sensor, developing, colour, shift, scatter));
+  }
   return out;
 }
 
@@ -324,7 +336,8 @@ Developing developing_of(const SensorModel& sensor, const Exposure& exposure, co
   }
   level = std::min(level, saturation_charge_e(sensor));
   for (int c = 0; c < 3; ++c) {
-    const Budget black = budget_of(sensor, charge_of(sensor, exposure, c, 0, {}), NoiseSourceSet::all());
+    const Budget black =
+        budget_of(sensor, charge_of(sensor, exposure, c, 0, {}, no_light_moves), NoiseSourceSet::all());
     const double variance_e2 = black.collected_variance + black.pixel_variance + black.line_variance +
                                1 / (12 * square(sensor.system_gain_dn_per_e));
     level = std::max(level, std::sqrt(variance_e2) / (black_noise_of_white * neutral[c]));
@@ -334,18 +347,26 @@ Developing developing_of(const SensorModel& sensor, const Exposure& exposure, co
 
 PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
                                const BlockLevel& block, NoiseSourceSet kept) {
+  const auto change = [&](const Vector3& signal_e, const BlockLevel& level, const MovedLight& moved) {
+    return change_at(sensor, exposure, developing, signal_e, level, moved, kept);
+  };
   BlockLevel darkest = block;
   darkest.glow.mean_e = block.glow.least_e;
-  PredictedChange out = larger(change_at(sensor, exposure, developing, block.signal_e, block, kept),
-                               change_at(sensor, exposure, developing, block.darkest_e, darkest, kept));
+  PredictedChange out =
+      larger(change(block.signal_e, block, no_light_moves), change(block.darkest_e, darkest, no_light_moves));
+  if (const MovedLight moved = block.left_out(kept); moved.moves()) {
+    out = larger(out, change(block.signal_e, block, moved));
+    // Where pixels saturate, those around them determine mean and variance.
+    if (saturates(sensor, exposure, block)) out = larger(out, change(block.darkest_e, darkest, moved));
+  }
   if (kept.has(Effect::clipping)) return out;
   // The mean of a block does not show the loss of its brightest pixel: a block as bright as that is predicted too.
   BlockLevel brightest;
   brightest.glow.mean_e = block.glow.peak_e;
   brightest.glow.variance_e2 = block.glow.variance_e2;
-  const PredictedChange peak = change_at(sensor, exposure, developing, {block.peak_e, block.peak_e, block.peak_e},
-                                         brightest, NoiseSourceSet::all().without(Effect::clipping));
-  return larger(out, peak);
+  const Vector3 peak_e{block.peak_e, block.peak_e, block.peak_e};
+  return larger(out, change_at(sensor, exposure, developing, peak_e, brightest, no_light_moves,
+                               NoiseSourceSet::all().without(Effect::clipping)));
 }
 
 }  // namespace lowlux::isp

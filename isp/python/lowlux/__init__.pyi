@@ -297,6 +297,7 @@ def simulate(
     camera: Optional[str] = ...,
     exposure: Optional[float] = ...,
     f_number: Optional[float] = ...,
+    lens_blur: Optional[float] = ...,
     temperature: Optional[float] = ...,
     cfa: Optional[Literal["rggb", "grbg", "gbrg", "bggr"]] = ...,
     masked_columns: Optional[int] = ...,

@@ -28,20 +28,21 @@ class Simulated:
 
 def simulate(scene, output=None, *, overwrite=False, size=None, light=None, luminance=None, stars=None,
              star_luminance=None, lamp=None, truth=None, no_truth=False, truth_electrons=None, sensor=None, gain=None,
-             camera=None, exposure=None, f_number=None, temperature=None, cfa=None, masked_columns=None, effects=None,
-             sampling=None, seed=None, sensor_seed=None, frames=None, tolerance=None, shake=None, roll=None, dither=None,
-             field_rotation=None, field_centre=None, drift=None, horizon=None, movers=None, mover_size=None,
-             mover_speed=None, bracket=None, reduce=None, system_gain=None, read_noise=None, full_well=None, bits=None,
-             black_level=None, white_level=None, dark_current=None, dark_temperature=None, dark_doubling=None,
-             dark_activation=None, dark_floor=None, prnu=None, dsnu=None, hot_pixels=None, hot_current=None,
-             telegraph_pixels=None, telegraph_noise=None, crosstalk=None, glow=None, glow_position=None,
-             glow_length=None, row_noise=None, column_noise=None, pixel_pitch=None, peak_qe=None, iso=None,
-             white_luminance=None, quantise=None):
+             camera=None, exposure=None, f_number=None, lens_blur=None, temperature=None, cfa=None, masked_columns=None,
+             effects=None, sampling=None, seed=None, sensor_seed=None, frames=None, tolerance=None, shake=None,
+             roll=None, dither=None, field_rotation=None, field_centre=None, drift=None, horizon=None, movers=None,
+             mover_size=None, mover_speed=None, bracket=None, reduce=None, system_gain=None, read_noise=None,
+             full_well=None, bits=None, black_level=None, white_level=None, dark_current=None, dark_temperature=None,
+             dark_doubling=None, dark_activation=None, dark_floor=None, prnu=None, dsnu=None, hot_pixels=None,
+             hot_current=None, telegraph_pixels=None, telegraph_noise=None, crosstalk=None, glow=None,
+             glow_position=None, glow_length=None, row_noise=None, column_noise=None, pixel_pitch=None, peak_qe=None,
+             iso=None, white_luminance=None, quantise=None):
     """Simulate raw frames of a scene, as `lowlux simulate` does with the same options.
 
     scene: a path of an image, or "dark", "flat", "chart", "chart:macbeth", "chart:munsell", "chart:FILE.csv".
     output: DNG to write, with the truth next to it as the command names it; None writes nothing.
     size: (width, height) [px]. luminance: of white in the scene [cd/m2]. exposure: time [s]. temperature: [C].
+    lens_blur: standard deviation of the blur of the lens [px]; the truth is blurred too.
     sensor: a name that `lowlux simulate --list` prints. seed: of the random numbers; sensor_seed: of the fixed pattern.
     frames: number of frames. shake [px], roll [degrees], drift (x, y) [px]: motion from frame to frame.
     system_gain [DN/e-], read_noise, full_well [e-], dark_current [e-/s], black_level, white_level [DN]: figures that
