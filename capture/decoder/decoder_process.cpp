@@ -59,6 +59,7 @@ std::vector<char*> decoder_environment() {
   static char huge_pages[] = "GLIBC_TUNABLES=glibc.malloc.hugetlb=1";
   std::vector<char*> out;
   for (char** variable = environ; *variable != nullptr; ++variable) out.push_back(*variable);
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing here sets variables
   if (std::getenv("GLIBC_TUNABLES") == nullptr) out.push_back(huge_pages);
   out.push_back(nullptr);
   return out;
