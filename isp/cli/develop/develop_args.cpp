@@ -23,7 +23,7 @@ void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
   app.add_option("RAW", args.inputs, "raw files, folders of them, or - for standard input")->required();
   app.add_flag("--maps", args.options.denoise.maps,
                "also write maps of residual noise variance [e-^2] and colour confidence (0 to 1) of each 2x2 cell, "
-               "of each pixel where the raw is no mosaic: OUT.noise.pfm and OUT.confidence.pfm");
+               "of each pixel where the raw file is not a mosaic: OUT.noise.pfm and OUT.confidence.pfm");
   app.add_flag("--skip-existing", args.skip_existing, "leave out raw files whose outputs exist")
       ->excludes(app.add_flag("--force", args.force, "overwrite files that exist"));
   app.add_flag("--sync", args.sync, "wait until each file is on the disk (fsync)");
