@@ -8,11 +8,12 @@
 #include <numbers>
 #include <vector>
 
+#include "isp/merge/block_rows.h"
+
 namespace lowlux::merge {
 namespace {
 
 constexpr double neighbour_statistics = 6;  // independent statistics of a block: two, and half of eight of its squares
-constexpr float unexplained_excess = 3;     // standard deviations of a site's mean that its block's mean explains
 
 double normal_quantile(double tail) {
   double low = -10, high = 10;
@@ -36,28 +37,14 @@ Thresholds thresholds_of(double block_false_alarm, double site) {
           site > 0 ? static_cast<float>(normal_quantile(site / 2)) : 0};
 }
 
-/// Describes the noise of d for one site of the cell: Var = slope max(mu, 0) + offset, and its cumulants per electron.
-struct DifferenceNoise {
-  float reference_offset;
-  float frame_offset;
-  float offset;
-};
-
-struct Noise {
-  std::array<DifferenceNoise, 4> site;
-  float reference_slope;  // variance per electron of signal
-  float frame_slope;
-  float slope;
-  float third;   // third cumulant of d per electron of signal
-  float fourth;  // fourth cumulant
-};
-
-Noise noise_of(const MosaicNoise& reference, const MosaicNoise& frame) {
-  Noise out{};
+rows::BlockNoise noise_of(const MosaicNoise& reference, const MosaicNoise& frame) {
+  rows::BlockNoise out{};
   const double s = reference.fraction, f = frame.fraction;
   for (int i = 0; i < 4; ++i) {
     const double r = s * reference.variance_e2[i], k = f * frame.variance_e2[i];
-    out.site[i] = {static_cast<float>(r), static_cast<float>(k), static_cast<float>(r + k)};
+    out.reference_offset[i] = static_cast<float>(r);
+    out.frame_offset[i] = static_cast<float>(k);
+    out.offset[i] = static_cast<float>(r + k);
   }
   out.reference_slope = static_cast<float>(s);
   out.frame_slope = static_cast<float>(f);
@@ -111,118 +98,54 @@ float worst_deviate(const Sums& s) {
   return std::max(step_deviate(s), deviate(s.spread, s.spread_mean, s.spread_variance));
 }
 
-/// Compares one block; keeps what its sites have in common.
-class Block {
- public:
-  Block(const Noise& noise, float z_site, float error_px)
-      : noise_(noise), z_site_(z_site), error2_px2_(error_px * error_px) {}
+/// Returns the statistics of the sums of one block.
+Sums statistics_of(const rows::BlockSums& block) {
+  Sums out{.spread = block.spread};
+  float classes = 0;
+  for (int i = 0; i < 4; ++i) {
+    out.d[i] = block.d[i];
+    out.v[i] = block.v[i];
+    out.fourth[i] = block.fourth[i];
+    if (!(block.v[i] > 0)) continue;
+    out.spread -= block.d[i] * block.d[i] / block.v[i];
+    classes += 1;
+  }
+  out.spread_mean = block.count - classes;
+  if (out.spread_mean < 1) return {};
+  out.spread_variance = block.spread_variance * out.spread_mean / block.count;
+  return out;
+}
 
-  /// @param outliers  counts the sites that become NaN
-  Sums compare(PlaneView<const float> reference, PlaneView<float> frame, int x0, int y0, std::int64_t& outliers) {
-    const int width = std::min(block_px, frame.width - x0), height = std::min(block_px, frame.height - y0);
-    for (int parity = 0; parity < 4; ++parity) measure(reference, frame, {x0, y0, width, height}, parity);
-    Sums out;
-    for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) add(reference, frame, x0 + x, y0 + y, outliers, out);
+/// Adds up a block at the border, of which some sites or neighbours do not exist.
+rows::BlockSums add_border_block(PlaneView<const float> reference, PlaneView<float> frame, int x0, int y0,
+                                 const rows::BlockNoise& noise, const rows::BlockLimits& limits) {
+  constexpr int around = 2, stride = block_px + 2 * around;
+  std::array<float, static_cast<std::size_t>(stride) * stride> wide{};
+  std::array<float, static_cast<std::size_t>(block_px) * block_px> own{};
+  wide.fill(std::numeric_limits<float>::quiet_NaN());
+  own.fill(std::numeric_limits<float>::quiet_NaN());
+  for (int y = std::max(y0 - around, 0); y < std::min(y0 + block_px + around, reference.height); ++y) {
+    for (int x = std::max(x0 - around, 0); x < std::min(x0 + block_px + around, reference.width); ++x) {
+      wide[static_cast<std::size_t>(y - y0 + around) * stride + static_cast<std::size_t>(x - x0 + around)] =
+          reference.at(x, y);
     }
-    float count = 0, classes = 0;
-    for (int i = 0; i < 4; ++i) {
-      if (!(out.v[i] > 0)) continue;
-      out.spread -= out.d[i] * out.d[i] / out.v[i];
-      classes += 1;
-    }
-    count = out.spread_mean;  // sites counted so far
-    out.spread_mean = count - classes;
-    if (out.spread_mean < 1) return {};
-    out.spread_variance *= out.spread_mean / count;
-    return out;
   }
+  const int width = std::min(block_px, frame.width - x0), height = std::min(block_px, frame.height - y0);
+  const auto row_of_own = [&](int y) { return own.data() + static_cast<std::ptrdiff_t>(y) * block_px; };
+  for (int y = 0; y < height; ++y) std::copy_n(frame.row(y0 + y) + x0, width, row_of_own(y));
+  const rows::BlockSums out =
+      rows::add_block(wide.data() + around * stride + around, stride, own.data(), block_px, noise, limits);
+  for (int y = 0; y < height; ++y) std::copy_n(row_of_own(y), width, frame.row(y0 + y) + x0);
+  return out;
+}
 
- private:
-  struct Area {
-    int x, y, width, height;
-  };
-
-  /// Finds the mean of both mosaics over one site of the block's cells.
-  void measure(PlaneView<const float> reference, PlaneView<float> frame, const Area& area, int site) {
-    float r = 0, f = 0, n = 0;
-    for (int y = site >> 1; y < area.height; y += 2) {
-      const float* const a = reference.row(area.y + y) + area.x;
-      const float* const b = frame.row(area.y + y) + area.x;
-      for (int x = site & 1; x < area.width; x += 2) {
-        const bool valid = a[x] == a[x] && b[x] == b[x];
-        r += valid ? a[x] : 0;
-        f += valid ? b[x] : 0;
-        n += valid ? 1.0F : 0.0F;
-      }
-    }
-    mean_[site] = n > 0 ? combined(r / n, f / n, site, 0) : 0;
-  }
-
-  /// Returns the mean of both values, weighted by the inverse of their variances at the signal `level`.
-  float combined(float r, float f, int site, float level) const {
-    const float vr = noise_.reference_slope * level + noise_.site[site].reference_offset;
-    const float vf = noise_.frame_slope * level + noise_.site[site].frame_offset;
-    if (!(vr + vf > 0)) return (r * noise_.frame_slope + f * noise_.reference_slope) / noise_.slope;
-    return (r * vf + f * vr) / (vr + vf);
-  }
-
-  float variance_of_combined(int site, float level) const {
-    const float vr = noise_.reference_slope * level + noise_.site[site].reference_offset;
-    const float vf = noise_.frame_slope * level + noise_.site[site].frame_offset;
-    return vr + vf > 0 ? vr * vf / (vr + vf) : 0;
-  }
-
-  /// Returns the variance that an error of the displacement adds: its square times that of the slope, which is the
-  /// larger difference to neighbours of the same colour, less what noise explains.
-  float detail(PlaneView<const float> reference, int x, int y, float vr) const {
-    if (!(error2_px2_ > 0)) return 0;
-    const auto across = [&](int dx, int dy) {
-      const int u = x + dx, v = y + dy;
-      if (u < 0 || v < 0 || u >= reference.width || v >= reference.height) return 0.0F;
-      const float d = reference.at(u, v) - reference.at(x, y);
-      return d == d ? d * d : 0.0F;
-    };
-    const float horizontal = std::max(across(-2, 0), across(2, 0)), vertical = std::max(across(0, -2), across(0, 2));
-    return error2_px2_ * std::max(horizontal + vertical - 8 * vr, 0.0F) / 4;
-  }
-
-  void add(PlaneView<const float> reference, PlaneView<float> frame, int x, int y, std::int64_t& outliers, Sums& out) {
-    const float r = reference.at(x, y), f = frame.at(x, y), d = f - r;
-    if (!(d == d)) return;
-    const int site = site_of(x, y);
-    float mu = std::max(mean_[site], 0.0F);
-    const float own = combined(r, f, site, mu);
-    const float own_variance = variance_of_combined(site, mu);
-    mu += std::max(own - mu - unexplained_excess * std::sqrt(own_variance), 0.0F);
-    const float vr = noise_.reference_slope * mu + noise_.site[site].reference_offset;
-    const float v = noise_.slope * mu + noise_.site[site].offset + detail(reference, x, y, vr);
-    if (!(v > 0)) return;
-    if (z_site_ > 0 && is_outlier(d, v, mu)) {
-      frame.at(x, y) = std::numeric_limits<float>::quiet_NaN();
-      ++outliers;
-      return;
-    }
-    const float fourth = noise_.fourth * mu;
-    out.d[site] += d;
-    out.v[site] += v;
-    out.fourth[site] += fourth;
-    out.spread += d * d / v;
-    out.spread_mean += 1;
-    out.spread_variance += 2 + fourth / (v * v);
-  }
-
-  bool is_outlier(float d, float v, float mu) const {
-    const float sigma = std::sqrt(v), skewness = noise_.third * mu / (v * sigma);
-    const float shift = (z_site_ * z_site_ - 1) * skewness / 6;
-    return d > (z_site_ + std::max(shift, 0.0F)) * sigma || d < -(z_site_ - std::min(shift, 0.0F)) * sigma;
-  }
-
-  const Noise& noise_;
-  float z_site_;
-  float error2_px2_;
-  std::array<float, 4> mean_{};
-};
+/// Adds up the block whose corner is (x0, y0).
+rows::BlockSums add_block(PlaneView<const float> reference, PlaneView<float> frame, int x0, int y0,
+                          const rows::BlockNoise& noise, const rows::BlockLimits& limits) {
+  const bool inner = x0 >= 2 && y0 >= 2 && x0 + block_px + 2 <= frame.width && y0 + block_px + 2 <= frame.height;
+  if (!inner) return add_border_block(reference, frame, x0, y0, noise, limits);
+  return rows::add_block(reference.row(y0) + x0, reference.stride, frame.row(y0) + x0, frame.stride, noise, limits);
+}
 
 constexpr std::uint8_t matches = 0, matches_alone = 1, differs = 2;
 
@@ -319,12 +242,15 @@ Comparison compare_mosaics(PlaneView<const float> reference, const MosaicNoise& 
   const std::array at{thresholds_of(options.block_false_alarm, options.site_false_alarm),
                       thresholds_of(single.block_false_alarm, options.site_false_alarm)};
   const auto kind = [&](int x, int y) { return single.is_single.data != nullptr ? single.is_single.at(x, y) : 0; };
+  const auto error_px = static_cast<float>(options.displacement_error_px);
   std::vector<std::int64_t> outliers(rows);
   for_each_index(executor, rows, [&](int y) {
     for (int x = 0; x < columns; ++x) {
-      Block block(noise[kind(x, y)], at[0].site, static_cast<float>(options.displacement_error_px));
+      const rows::BlockSums block =
+          add_block(reference, frame, block_px * x, block_px * y, noise[kind(x, y)], {at[0].site, error_px * error_px});
+      outliers[y] += block.outliers;
       Sums& sums = grid.sums[grid.at(x, y)];
-      sums = block.compare(reference, frame, block_px * x, block_px * y, outliers[y]);
+      sums = statistics_of(block);
       grid.alone[grid.at(x, y)] = worst_deviate(sums);
     }
   });

@@ -54,12 +54,26 @@ float nearest_mean(const Plane<float>& mean, const Plane<float>& weight, int x, 
   return 0;
 }
 
-/// Calls add(x) for each site of a row whose block counts.
+/// Calls add(first, last) for each run of sites of a row whose blocks count.
 template <class Add>
 void for_matching(int y, int width, PlaneView<const std::uint8_t> block_matches, const Add& add) {
-  for (int x0 = 0; x0 < width; x0 += block_px) {
-    if (block_matches.data != nullptr && block_matches.at(x0 / block_px, y / block_px) == 0) continue;
-    for (int x = x0; x < std::min(x0 + block_px, width); ++x) add(x);
+  if (block_matches.data == nullptr) return add(0, width);
+  const std::uint8_t* const matches = block_matches.row(y / block_px);
+  for (int block = 0; block < block_matches.width;) {
+    const int first = block;
+    while (block < block_matches.width && (matches[block] != 0) == (matches[first] != 0)) ++block;
+    if (matches[first] != 0) add(first * block_px, std::min(block * block_px, width));
+  }
+}
+
+/// Adds a run of sites without a branch. `weight_of(x)` is that of a site.
+template <class WeightOf>
+void add_run(const float* value, const WeightOf& weight_of, int first, int last, float* sum, float* weight) {
+  for (int x = first; x < last; ++x) {
+    const float w = weight_of(x);
+    const bool counts = (value[x] == value[x]) & (w > 0);
+    sum[x] += counts ? w * value[x] : 0;
+    weight[x] += counts ? w : 0;
   }
 }
 
@@ -91,12 +105,13 @@ MosaicMean::MosaicMean(int width, int height) : sum_(width, height), weight_(wid
 void MosaicMean::add_row(int y, const WeightedRow& row, PlaneView<const std::uint8_t> block_matches) {
   float* const sum = sum_.row(y);
   float* const weight = weight_.row(y);
-  for_matching(y, sum_.width(), block_matches, [&](int x) {
-    const float site = row.site_weight != nullptr ? row.site_weight[x] : 1;
-    const float w = site * (row.weight != nullptr ? row.weight[x] : 1);
-    if (!(row.value[x] == row.value[x]) || !(w > 0)) return;
-    sum[x] += w * row.value[x];
-    weight[x] += w;
+  for_matching(y, sum_.width(), block_matches, [&](int first, int last) {
+    const float *const drop = row.weight, *const site = row.site_weight;
+    const auto add = [&](const auto& weight_of) { add_run(row.value, weight_of, first, last, sum, weight); };
+    if (drop != nullptr && site != nullptr) return add([=](int x) { return site[x] * drop[x]; });
+    if (drop != nullptr) return add([=](int x) { return drop[x]; });
+    if (site != nullptr) return add([=](int x) { return site[x]; });
+    add([](int) { return 1.0F; });
   });
 }
 

@@ -135,7 +135,7 @@ double MotionComparison::turn_step(const SearchRange& range) const {
 /// Returns the frame at the displaced cells of the reference, with so many more on each side.
 Plane<float> MotionComparison::displaced(const RigidMotion& motion, const SearchRange& range, int margin) const {
   Plane<float> out(constant_.width() + 2 * margin, constant_.height() + 2 * margin);
-  const rows::Source source{frame_.row(0), frame_.stride(), frame_.width(), frame_.height()};
+  const rows::Samples source{frame_.row(0), frame_.stride(), frame_.width(), frame_.height()};
   const double centre = (cell_px_ - 1) / 2.0, cell = cell_px_;
   const GlobalMotion global = motion.in(range.width, range.height);
   std::vector<float> dx(static_cast<std::size_t>(out.width())), dy(dx.size());

@@ -56,7 +56,7 @@ HWY_INLINE VF interpolate(const Weights& wx, const Weights& wy, std::ptrdiff_t s
   return sum;
 }
 
-HWY_INLINE VF sample(const Source& source, int x, int y, VF dx, VF dy) {
+HWY_INLINE VF sample(const Samples& level, int x, int y, VF dx, VF dy) {
   const Floats f;
   const Ints s32;
   const VF floor_x = hn::Floor(dx), floor_y = hn::Floor(dy);
@@ -64,30 +64,30 @@ HWY_INLINE VF sample(const Source& source, int x, int y, VF dx, VF dy) {
   const VI at_x = hn::Add(hn::ConvertTo(s32, floor_x), hn::Iota(s32, x));
   const VI at_y = hn::Add(hn::ConvertTo(s32, floor_y), whole(y));
   // Positions farther out than the interpolation reaches are moved to where no cell exists.
-  const VI column = hn::Min(hn::Max(at_x, whole(-3)), whole(source.width + 1));
-  const VI line = hn::Min(hn::Max(at_y, whole(-2)), whole(source.height + 1));
+  const VI column = hn::Min(hn::Max(at_x, whole(-3)), whole(level.width + 1));
+  const VI line = hn::Min(hn::Max(at_y, whole(-2)), whole(level.height + 1));
   const int first_column = hn::GetLane(column), first_line = hn::GetLane(line);
   const VI straight = hn::Iota(s32, first_column);
   if (hn::AllTrue(s32, hn::And(hn::Eq(column, straight), hn::Eq(line, whole(first_line))))) {
-    const float* const from = source.cells + first_line * source.stride + first_column;
-    return interpolate(wx, wy, source.stride, [=](std::ptrdiff_t offset) HWY_ATTR { return load(from + offset); });
+    const float* const from = level.data + first_line * level.stride + first_column;
+    return interpolate(wx, wy, level.stride, [=](std::ptrdiff_t offset) HWY_ATTR { return load(from + offset); });
   }
-  const VI at = hn::Add(hn::Mul(line, whole(static_cast<int>(source.stride))), column);
-  return interpolate(wx, wy, source.stride,
-                     [=](std::ptrdiff_t offset) HWY_ATTR { return hn::GatherIndex(f, source.cells + offset, at); });
+  const VI at = hn::Add(hn::Mul(line, whole(static_cast<int>(level.stride))), column);
+  return interpolate(wx, wy, level.stride,
+                     [=](std::ptrdiff_t offset) HWY_ATTR { return hn::GatherIndex(f, level.data + offset, at); });
 }
 
-void SampleRow(const Source& source, int x0, int y, const float* dx, const float* dy, int count, float* out) {
+void SampleRow(const Samples& level, int x0, int y, const float* dx, const float* dy, int count, float* out) {
   int i = 0;
   for (; i + lanes() <= count; i += lanes()) {
-    hn::StoreU(sample(source, x0 + i, y, load(dx + i), load(dy + i)), Floats(), out + i);
+    hn::StoreU(sample(level, x0 + i, y, load(dx + i), load(dy + i)), Floats(), out + i);
   }
   if (i == count) return;
   const std::size_t left = static_cast<std::size_t>(count - i) * sizeof(float);
   HWY_ALIGN float last_x[columns] = {}, last_y[columns] = {}, last[columns];
   std::memcpy(last_x, dx + i, left);
   std::memcpy(last_y, dy + i, left);
-  hn::StoreU(sample(source, x0 + i, y, load(last_x), load(last_y)), Floats(), last);
+  hn::StoreU(sample(level, x0 + i, y, load(last_x), load(last_y)), Floats(), last);
   std::memcpy(out + i, last, left);
 }
 
@@ -214,8 +214,8 @@ void add_tile(const float* reference, std::ptrdiff_t stride, const float* frame,
 float capped_cost(const float* frame, const CostRow& cost, float max_cost, int count) {
   return HWY_DYNAMIC_DISPATCH(CappedCost)(frame, cost, max_cost, count);
 }
-void sample_row(const Source& source, int x0, int y, const float* dx, const float* dy, int count, float* out) {
-  HWY_DYNAMIC_DISPATCH(SampleRow)(source, x0, y, dx, dy, count, out);
+void sample_row(const Samples& level, int x0, int y, const float* dx, const float* dy, int count, float* out) {
+  HWY_DYNAMIC_DISPATCH(SampleRow)(level, x0, y, dx, dy, count, out);
 }
 
 }  // namespace lowlux::merge::rows

@@ -2,22 +2,16 @@
 
 #include <cstddef>
 
+#include "isp/merge/samples.h"
+
 /// The kernels under measure_tiles and MotionComparison, with plain types only: their source is compiled for several
 /// instruction sets.
 namespace lowlux::merge::rows {
 
-/// A level of a pyramid to take samples from; see LumaLevel.
-struct Source {
-  const float* cells;  // cell (0, 0)
-  std::ptrdiff_t stride;
-  int width;
-  int height;
-};
-
-/// Interpolates a source at (x0 + i + dx[i], y + dy[i]), i = 0..count - 1, by cubic Lagrange polynomials through 4 x 4
-/// cells, whose phase error is a fifth of that of bilinear weights and of cubic convolution at a period of 6 cells. NaN
-/// where one of the cells does not exist. Displacements are at most 1e6 cells.
-void sample_row(const Source& source, int x0, int y, const float* dx, const float* dy, int count, float* out);
+/// Interpolates a level of a pyramid (see LumaLevel) at (x0 + i + dx[i], y + dy[i]), i = 0..count - 1, by cubic
+/// Lagrange polynomials through 4 x 4 cells, whose phase error is a fifth of that of bilinear weights and of cubic
+/// convolution at a period of 6 cells. NaN where one of the cells does not exist. Displacements are at most 1e6 cells.
+void sample_row(const Samples& level, int x0, int y, const float* dx, const float* dy, int count, float* out);
 
 /// How a difference of a cell d = frame - light * reference is weighted. With m the mean of the reference's four
 /// neighbours, at least min_mean_e, and g = light * gradient of the reference:

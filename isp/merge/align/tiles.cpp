@@ -71,7 +71,7 @@ void measure_row_of_tiles(const LevelPair& pair, const Motion& motion, const row
                           TileGrid& grid, Scratch& scratch) {
   const LumaLevel& reference = *pair.reference;
   const LumaLevel& frame = *pair.frame;
-  const rows::Source source{frame.row(0), frame.stride(), frame.width(), frame.height()};
+  const rows::Samples source{frame.row(0), frame.stride(), frame.width(), frame.height()};
   const int n = grid.cells, width = reference.width();
   const int first = std::max(0, row * n - n / 2), last = std::min(reference.height(), row * n + n / 2);
   for (int y = first - 1; y <= last; ++y) {  // with the neighbours of the first row and the last

@@ -67,6 +67,8 @@ Result<void> MovedMerge::add_frames() {
 }
 
 void MovedMerge::encode() {
+  differences_ = {};
+  placed_ = {};
   RawFrame& frame = work_.loader.reference();
   if (drizzle_) {
     merge::DrizzleImage image = drizzle_->finish(work_.executor);
@@ -145,6 +147,8 @@ Result<void> MovedMerge::predict() {
 
 /// Begins the mean. Until the reference is found, its memory is not needed.
 void MovedMerge::begin_sum() {
+  differences_ = Plane<float>(work_.width, work_.height);
+  placed_ = Plane<float>(work_.width, work_.height);
   if (work_.options.drizzle) {
     drizzle_.emplace(work_.width, work_.height, *work_.options.drizzle);
     level_e_ = mean_level_e();
@@ -177,25 +181,24 @@ Result<void> MovedMerge::add(FrameElectrons& frame, int index) {
   work_.report_added();
   if (!motion) return {};
   Executor& executor = work_.executor;
-  Plane<float> placed(work_.width, work_.height), site_weight;
+  Plane<float> site_weight;
   if (bracket_) {
     use.light = bracket_->measured_light(view_of(work_.reference), frame, *motion, *stated);
     bracket_->add(frame, use.light, saturated, *motion);
     site_weight = bracket_->placed_weights(frame, use.light, *motion);
     work_.clock.lap("exposure ratio");
   }
-  Plane<float> differences(work_.width, work_.height);
-  merge::subtract_prediction(view_of(frame), use.light, *motion, expected(), differences.view(), executor);
+  merge::subtract_prediction(view_of(frame), use.light, *motion, expected(), differences_.view(), executor);
   if (!by_stars() && !drizzle_) frame.signal_e = {};
-  merge::place_nearest(std::as_const(differences).view(), frame.phase, *motion, expected(), placed.view(), executor);
-  put_still_blocks(still_, std::as_const(frame.signal_e).view(), placed.view(), executor);
+  merge::place_nearest(std::as_const(differences_).view(), frame.phase, *motion, expected(), placed_.view(), executor);
+  put_still_blocks(still_, std::as_const(frame.signal_e).view(), placed_.view(), executor);
   work_.clock.lap("placement");
   double error_px = motion->standard_error_px;
   if (work_.out.alignment != MergeAlignment::none) error_px += predicts() ? predicted_error_px : cell_error_px;
   merge::Comparison found =
-      work_.compared(placed, merge::noise_in_light(frame.variance_e2, use.light),
+      work_.compared(placed_, merge::noise_in_light(frame.variance_e2, use.light),
                      {.block_false_alarm = work_.options.false_alarm, .displacement_error_px = error_px}, index);
-  add_matching({frame, *motion, use.light, differences, placed, site_weight}, found.block_matches, index);
+  add_matching({frame, *motion, use.light, differences_, placed_, site_weight}, found.block_matches, index);
   work_.clock.lap("mean");
   return {};
 }

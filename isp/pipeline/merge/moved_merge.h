@@ -75,7 +75,8 @@ class MovedMerge {
   Plane<std::uint8_t> still_;              // blocks of the foreground: 1; empty: none
   std::optional<merge::MosaicMean> mean_;  // the sum is one of these
   std::optional<merge::Drizzle> drizzle_;
-  PerSite<double> level_e_{};  // mean signal, for the weights of drizzling
+  Plane<float> differences_, placed_;  // of the frame that is added
+  PerSite<double> level_e_{};          // mean signal, for the weights of drizzling
 };
 
 }  // namespace lowlux::isp
