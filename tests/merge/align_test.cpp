@@ -109,6 +109,25 @@ TEST(Align, ErrorsAreThosePredictedAtLightLevelsDrawnAtRandom) {
   EXPECT_LT(ratios / found, 1 + 5 * std::sqrt(2.0 / 24));
 }
 
+// Interpolation takes noise from a frame, which may not make a displacement between its cells more likely.
+TEST(Align, InLittleLightMotionsAreRightOrNotFound) {
+  std::mt19937 random(13);
+  const auto drawn = [&](double least, double most) {
+    return std::uniform_real_distribution<double>(least, most)(random);
+  };
+  int found = 0;
+  for (std::uint32_t i = 0; i < 80; ++i) {
+    const double mean_e = std::exp(drawn(std::log(0.2), std::log(2)));
+    const View view = rigid_view(width, height, drawn(-25, 25), drawn(-25, 25), drawn(-1.5, 1.5) * degree);
+    const Motion motion = expose_pair(waves(300 + i), view, mean_e, i).motion();
+    if (!motion.found) continue;
+    ++found;
+    // Three parameters: chi-square above 3 * 2.5^2 has a probability of 3e-4 for each pair.
+    EXPECT_LT(rms_error_px(motion, view, width, height), 2.5 * motion.standard_error_px) << "pair " << i;
+  }
+  EXPECT_GE(found, 30);
+}
+
 TEST(Align, ShiftsTo128PixelsAndRotationsTo5DegreesAreFound) {
   constexpr int columns = 640, rows = 512;
   const struct { double dx, dy, turn; } cases[] = {{127, -120, 0}, {-128, 40, 1}, {10, -20, 5}, {-60, 60, -4.9}};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 namespace lowlux::merge {
 namespace {
@@ -67,6 +68,15 @@ float squared_slope(float before, float at, float after, float noise) {
   return std::max(central * central, (first * first + last * last) / 2 - 2 * noise);
 }
 
+/// Returns the part of the variance of white noise that is left at a place between two samples, along one axis: the sum
+/// of the squared weights of sample_row.
+double noise_left_at(float place) {
+  const double a = static_cast<double>(place - std::floor(place)), inner = a * (1 - a);
+  const double outer = (1 + a) * (2 - a);
+  return std::pow(inner / 6, 2) * (std::pow(2 - a, 2) + std::pow(1 + a, 2)) +
+         std::pow(outer / 2, 2) * (std::pow(1 - a, 2) + a * a);
+}
+
 double size_of(const RigidMotion& m, const SearchRange& range) {
   return std::hypot(m.dx_px, m.dy_px, m.turn_rad * std::hypot(range.width, range.height) / 2);
 }
@@ -100,6 +110,7 @@ MotionComparison::MotionComparison(const SearchLevel& reference, const SearchLev
   };
   // M and N, and S of each cell before it is averaged.
   Plane<float> of_reference(width, height), of_frame(width, height), excess(width, height), counts(width, height);
+  noise_loss_ = Plane<float>(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const float mean = std::max(reference.mean_e.at(x, y), noise.min_mean_e);
@@ -111,6 +122,7 @@ MotionComparison::MotionComparison(const SearchLevel& reference, const SearchLev
       counts.at(x, y) = is_there ? 1 : 0;
       excess.at(x, y) = is_there ? value(x, y) * value(x, y) - own : 0;
       of_reference.at(x, y) = own;
+      noise_loss_.at(x, y) = is_there ? all - own : 0;
       of_frame.at(x, y) = all - own + static_cast<float>(motion_variance_cells) * (across + down);
     }
   }
@@ -124,6 +136,8 @@ MotionComparison::MotionComparison(const SearchLevel& reference, const SearchLev
       constant_.at(x, y) = static_cast<float>((n / d - 1 / m) / 2 * r * r - std::log(m * n / d) / 2);
       linear_.at(x, y) = static_cast<float>(s / d * r);
       square_.at(x, y) = static_cast<float>((m / d - 1 / n) / 2);
+      noise_loss_.at(x, y) *= square_.at(x, y);
+      sum_of_noise_loss_ += static_cast<double>(noise_loss_.at(x, y));
     }
   }
 }
@@ -133,8 +147,10 @@ double MotionComparison::turn_step(const SearchRange& range) const {
 }
 
 /// Returns the frame at the displaced cells of the reference, with so many more on each side.
-Plane<float> MotionComparison::displaced(const RigidMotion& motion, const SearchRange& range, int margin) const {
+MotionComparison::Displaced MotionComparison::displaced(const RigidMotion& motion, const SearchRange& range,
+                                                        int margin) const {
   Plane<float> out(constant_.width() + 2 * margin, constant_.height() + 2 * margin);
+  double noise_left = 0;
   const rows::Samples source{frame_.row(0), frame_.stride(), frame_.width(), frame_.height()};
   const double centre = (cell_px_ - 1) / 2.0, cell = cell_px_;
   const GlobalMotion global = motion.in(range.width, range.height);
@@ -151,15 +167,17 @@ Plane<float> MotionComparison::displaced(const RigidMotion& motion, const Search
       dy[i] = (first.dy_px + static_cast<float>(x) * step_y) / static_cast<float>(cell);
     }
     rows::sample_row(source, -margin, y - margin, dx.data(), dy.data(), out.width(), out.row(y));
+    for (std::size_t i = 0; i < dx.size(); ++i) noise_left += noise_left_at(dx[i]) * noise_left_at(dy[i]);
   }
-  return out;
+  const auto count = static_cast<double>(out.size());
+  return {std::move(out), noise_left / count};
 }
 
-double MotionComparison::gain_of(const Plane<float>& displaced, int margin, int dx, int dy) const {
-  double loss = 0;
+double MotionComparison::gain_of(const Displaced& displaced, int margin, int dx, int dy) const {
+  double loss = (1 - displaced.noise_left) * sum_of_noise_loss_;
   for (int y = 0; y < constant_.height(); ++y) {
     const rows::CostRow cost{constant_.row(y), linear_.row(y), square_.row(y)};
-    const float* const frame = displaced.row(y + margin + dy) + margin + dx;
+    const float* const frame = displaced.cells.row(y + margin + dy) + margin + dx;
     loss += static_cast<double>(rows::capped_cost(frame, cost, max_loss, constant_.width()));
   }
   return -loss;
@@ -172,11 +190,11 @@ std::vector<RatedMotion> MotionComparison::search(const SearchRange& range, int 
   const int most_y = static_cast<int>(std::min(range.max_shift_px, range.height / 2.0) / cell_px_ + 0.999);
   const double max_turn =
       std::min(range.max_turn_rad, std::min(range.width, range.height) / std::hypot(range.width, range.height));
-  const int turns = static_cast<int>(max_turn / step + 0.5), margin = std::max(most_x, most_y);
+  const int turns = static_cast<int>(std::lround(max_turn / step)), margin = std::max(most_x, most_y);
   std::vector<std::vector<RatedMotion>> found(static_cast<std::size_t>(2 * turns + 1));
   for_each_index(executor, 2 * turns + 1, [&](int i) {
     const double turn = (i - turns) * step;
-    const Plane<float> frame = displaced({0, 0, turn}, range, margin);
+    const Displaced frame = displaced({0, 0, turn}, range, margin);
     for (int dy = -most_y; dy <= most_y; ++dy) {
       for (int dx = -most_x; dx <= most_x; ++dx) {
         const RigidMotion motion{static_cast<double>(cell_px_) * dx, static_cast<double>(cell_px_) * dy, turn};
@@ -195,7 +213,7 @@ std::vector<RatedMotion> MotionComparison::refine(const std::vector<RatedMotion>
   for_each_index(executor, tasks, [&](int task) {
     const RigidMotion& start = motions[static_cast<std::size_t>(task / 3)].motion;
     const double turn = start.turn_rad + (task % 3 - 1) * step;
-    const Plane<float> frame = displaced({start.dx_px, start.dy_px, turn}, range, 1);
+    const Displaced frame = displaced({start.dx_px, start.dy_px, turn}, range, 1);
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
         const RigidMotion motion{start.dx_px + cell_px_ * dx, start.dy_px + cell_px_ * dy, turn};
@@ -207,12 +225,13 @@ std::vector<RatedMotion> MotionComparison::refine(const std::vector<RatedMotion>
 }
 
 Plane<float> MotionComparison::losses(const RigidMotion& motion, const SearchRange& range) const {
-  Plane<float> out = displaced(motion, range, 0);
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    const float f = out.data()[i], loss = constant_.data()[i] + f * (square_.data()[i] * f - linear_.data()[i]);
-    out.data()[i] = std::isnan(f) ? 0 : std::min(loss, max_loss);
+  Displaced out = displaced(motion, range, 0);
+  const auto noise_taken = static_cast<float>(1 - out.noise_left);
+  for (std::size_t i = 0; i < out.cells.size(); ++i) {
+    const float f = out.cells.data()[i], loss = constant_.data()[i] + f * (square_.data()[i] * f - linear_.data()[i]);
+    out.cells.data()[i] = std::isnan(f) ? 0 : std::min(loss + noise_taken * noise_loss_.data()[i], max_loss);
   }
-  return out;
+  return std::move(out.cells);
 }
 
 RatedMotion MotionComparison::smallest_of_best(const std::vector<RatedMotion>& motions,

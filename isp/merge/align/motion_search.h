@@ -54,6 +54,8 @@ struct RatedMotion {
 ///     2
 /// against having nothing in common: correlation where noise dominates, and squared difference where structure does.
 /// Losses of a cell are limited to that of 3 standard deviations, 4.5. Where one frame ends, nothing is gained or lost.
+/// Interpolating the frame between its cells takes a part of the noise from f, and so of the term with f^2: its mean is
+/// added, so that interpolation makes no motion more likely.
 class MotionComparison {
  public:
   MotionComparison(const SearchLevel& reference, const SearchLevel& frame, const LevelPair& pair);
@@ -72,15 +74,23 @@ class MotionComparison {
   RatedMotion smallest_of_best(const std::vector<RatedMotion>& motions, const SearchRange& range) const;
 
  private:
+  /// The frame at displaced cells, and the part of its noise variance that interpolation has left, on average.
+  struct Displaced {
+    Plane<float> cells;
+    double noise_left = 1;
+  };
+
   double turn_step(const SearchRange& range) const;
-  Plane<float> displaced(const RigidMotion& motion, const SearchRange& range, int margin) const;
-  double gain_of(const Plane<float>& displaced, int margin, int dx, int dy) const;
+  Displaced displaced(const RigidMotion& motion, const SearchRange& range, int margin) const;
+  double gain_of(const Displaced& displaced, int margin, int dx, int dy) const;
   Plane<float> losses(const RigidMotion& motion, const SearchRange& range) const;
 
   const LumaLevel& frame_;
   Plane<float> constant_;  // the loss of a cell is constant - linear f + square f^2
   Plane<float> linear_;
   Plane<float> square_;
+  Plane<float> noise_loss_;  // what the noise of the frame adds to the loss on average
+  double sum_of_noise_loss_ = 0;
   int cell_px_ = 2;
 };
 
