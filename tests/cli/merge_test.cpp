@@ -137,6 +137,7 @@ TEST_F(MergeCommand, DrizzlesANightThatOtherCommandsDevelop) {
   EXPECT_NE(result.err.find("no data of one colour"), std::string::npos) << result.err;
   const auto developed = lowlux({"develop", file("sky.dng"), "-o", file("sky.png"), "--json"});
   ASSERT_EQ(developed.exit_code, 0) << developed.err;
+  EXPECT_EQ(developed.err.find("noise variance"), std::string::npos) << developed.err;
   const Json picture = Json::parse(developed.out)[0];
   EXPECT_EQ(picture["width"], 450);
   EXPECT_EQ(picture["height"], 300);

@@ -131,7 +131,8 @@ Result<NoiseReduction> plan_pixel_noise(const RawFrame& frame, const Thumbnail& 
   const denoise::NoiseCheck check = check_pixels(frame, levels, checked, executor);
   out.options.variance_scale = denoise::variance_scale_of(check);
   NoiseProfile model = *frame.noise;
-  model.reduced = model.reduced || frame.raw.from_x_trans;  // interpolation leaves less noise on fine scales
+  // Interpolated and drizzled samples have less noise on fine scales than NoiseProfile states for larger areas.
+  model.reduced = model.reduced || frame.raw.layout == SensorLayout::linear_rgb;
   add_remarks(check, model, out.warnings);
   return out;
 }
