@@ -69,7 +69,7 @@ constexpr std::array verbs{
 }  // namespace
 }  // namespace lowlux::cli
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(command_line)(const std::uint8_t* data, std::size_t size) {
   std::istringstream lines(std::string(reinterpret_cast<const char*>(data), size));
   std::string name, word;
   std::getline(lines, name);

@@ -51,7 +51,7 @@ void require_same(const CostModel& a, const CostModel& b) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(cost)(const std::uint8_t* data, std::size_t size) {
   const auto model = lowlux::cli::parse_cost({reinterpret_cast<const char*>(data), size});
   if (!model) {
     require(!model.error().message.empty() && model.error().message.find('\n') == std::string::npos);

@@ -25,7 +25,7 @@ void end_texts(lowlux::capture::DecodedHeader& header) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(decoder)(const std::uint8_t* data, std::size_t size) {
   lowlux::test::FuzzInput in{data, size};
   lowlux::capture::DecodedRaw decoded;
   auto& h = decoded.header;

@@ -8,6 +8,7 @@
 #include "capture/dng/dng_floats.h"
 #include "capture/dng/dng_frame.h"
 #include "tests/fuzz/check_frame.h"
+#include "tests/fuzz/input.h"
 
 namespace {
 
@@ -27,7 +28,7 @@ lowlux::capture::DecodedRaw decoded(const lowlux::capture::DngImage& image) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(dng_tags)(const std::uint8_t* data, std::size_t size) {
   const auto bytes = std::as_bytes(std::span(data, size));
   const auto dng = lowlux::capture::open_dng(bytes);
   if (!dng || !*dng) return 0;

@@ -6,6 +6,13 @@
 #include <cstdlib>
 #include <cstring>
 
+/// The function of a fuzz target: libFuzzer calls one by its own name, fuzz_replay holds all of them.
+#ifdef LOWLUX_FUZZ_REPLAY
+#define LOWLUX_FUZZ_TARGET(name) extern "C" int name##_fuzz_input
+#else
+#define LOWLUX_FUZZ_TARGET(name) extern "C" int LLVMFuzzerTestOneInput
+#endif
+
 namespace lowlux::test {
 
 inline void require(bool good) {

@@ -10,7 +10,7 @@
 
 using lowlux::test::require;
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(options)(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
   if (const auto number = lowlux::cli::number_of(text)) {
     require(std::isfinite(*number));

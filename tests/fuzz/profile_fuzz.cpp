@@ -8,7 +8,7 @@
 
 using lowlux::test::require;
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(profile)(const std::uint8_t* data, std::size_t size) {
   const auto profile = lowlux::calib::parse_profile({reinterpret_cast<const char*>(data), size});
   if (!profile) {
     require(!profile.error().message.empty() && profile.error().message.find('\n') == std::string::npos);

@@ -46,7 +46,7 @@ void check(const lowlux::capture::ScenePicture& scene, bool positive) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(read_picture)(const std::uint8_t* data, std::size_t size) {
   lowlux::InlineExecutor executor;
   const auto scene = lowlux::capture::read_picture(std::as_bytes(std::span(data, size)), "fuzz", executor, limits);
   if (scene) {

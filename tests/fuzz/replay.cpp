@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-// Each target's LLVMFuzzerTestOneInput, renamed where it is compiled for this program.
+// See LOWLUX_FUZZ_TARGET.
 #define LOWLUX_FUZZ_TARGETS(of)                                                                               \
   of(command_line) of(cost) of(decoder) of(dng_tags) of(noise_files) of(options) of(profile) of(read_picture) \
       of(read_raw) of(shin) of(spectra) of(stage) of(unpack) of(v4l2)

@@ -10,7 +10,7 @@
 
 using lowlux::test::require;
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(shin)(const std::uint8_t* data, std::size_t size) {
   const auto table = lowlux::isp::read_shin_table({reinterpret_cast<const char*>(data), size}, "fuzz");
   if (!table) {
     require(!table.error().message.empty() && table.error().message.find('\n') == std::string::npos);

@@ -57,7 +57,7 @@ void require_same(const Table& a, const Table& b) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(spectra)(const std::uint8_t* data, std::size_t size) {
   const auto table = lowlux::capture::parse_spectra({reinterpret_cast<const char*>(data), size}, "fuzz");
   if (!table) {
     require(table.error().where == "fuzz" && table.error().message.find('\n') == std::string::npos);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "tests/fuzz/input.h"
 #include "tests/fuzz/stage_calls.h"
 #include "tests/fuzz/stage_draws.h"
 
@@ -64,7 +65,7 @@ void functions_that_need_no_stage() {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(stage)(const std::uint8_t* data, std::size_t size) {
   FuzzInput bytes{data, size};
   functions_that_need_no_stage();
   frames_of_one_stream(bytes);

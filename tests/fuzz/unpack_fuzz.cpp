@@ -7,9 +7,10 @@
 #include <vector>
 
 #include "isp/base/packed/raw_format.h"
+#include "tests/fuzz/input.h"
 #include "tests/reference/unpack_ref.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(unpack)(const std::uint8_t* data, std::size_t size) {
   if (size < 3) return 0;
   const auto formats = lowlux::raw_formats();
   const lowlux::RawFormat& format = formats[data[0] % formats.size()].format;

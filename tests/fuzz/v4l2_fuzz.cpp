@@ -126,7 +126,7 @@ bool live(lowlux::capture::Camera& camera, FakeV4l2& fake, FuzzInput& in) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+LOWLUX_FUZZ_TARGET(v4l2)(const std::uint8_t* data, std::size_t size) {
   FuzzInput in{data, size};
   FakeV4l2 fake(in.below(2) == 0);
   set_up(fake, in);

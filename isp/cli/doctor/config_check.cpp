@@ -34,7 +34,7 @@ std::string text_of_pipe(int descriptor) {
   std::string text;
   std::array<char, 4096> block{};
   for (;;) {
-    const ssize_t got = read(descriptor, block.data(), block.size());
+    const ssize_t got = ::read(descriptor, block.data(), block.size());
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) return text;
     text.append(block.data(), static_cast<std::size_t>(got));
@@ -50,6 +50,7 @@ std::optional<std::string> output_of_command(std::vector<std::string> words) {
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
   words.insert(words.begin(), "lowlux");
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   pid_t child = 0;
