@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "isp/base/float_samples.h"
+#include "isp/cli/dataset/array_file.h"
 #include "isp/python/frame_copy.h"
 
 namespace lowlux::python {
@@ -27,18 +28,8 @@ py::array array_of_codes(Encoded16 picture) {
   return owned(std::move(picture.codes), {height, width, 3});
 }
 
-/// Returns planes as an array of interleaved values, in NumPy's usual order of images.
-py::array array_of_codes(SceneLinear picture) {
-  const int height = picture.height(), width = picture.width();
-  Plane<float> values(3 * width, height);
-  for (int y = 0; y < height; ++y) {
-    float* const out = values.row(y);
-    for (int c = 0; c < 3; ++c) {
-      const float* const in = picture.plane[static_cast<std::size_t>(c)].row(y);
-      for (int x = 0; x < width; ++x) out[3 * x + c] = in[x];
-    }
-  }
-  return owned(std::move(values), {height, width, 3});
+py::array array_of_codes(const SceneLinear& picture) {
+  return owned(cli::interleaved(picture), {picture.height(), picture.width(), 3});
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "capture/file/file_bytes.h"
 #include "isp/base/json_depth.h"
+#include "isp/cli/dataset/array_file.h"
 #include "isp/cli/dataset/dataset_draw.h"
 #include "isp/cli/dataset/pixel_mask.h"
 #include "isp/cli/shared/machine.h"
@@ -105,7 +106,10 @@ class SampleFiles {
       const std::string& raw = files.frames[static_cast<std::size_t>(i)];
       masks.push_back(raw.substr(0, raw.size() - 4) + ".mask.npy");
       started_.push_back(masks.back());
-      return write_mask(frame, *args, sensor, masks.back());
+      const Plane<std::uint8_t> mask = mask_of(frame, *args, sensor);
+      const ArrayEntry array{
+          "mask", ElementType::u8, {static_cast<std::size_t>(mask.height()), static_cast<std::size_t>(mask.width())}};
+      return write_npy(masks.back(), array, bytes_of(mask));
     };
     const auto outcome = simulate(*args, nullptr, spec_.mask ? FrameTaker(write_its_mask) : FrameTaker());
     if (!outcome) return tl::make_unexpected(with_index(outcome.error()));

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <string>
+#include <cstdint>
 
 #include "isp/base/frame.h"
-#include "isp/base/result.h"
+#include "isp/base/plane.h"
 #include "isp/base/sensor.h"
 #include "isp/cli/simulate/simulate_args.h"
 
@@ -14,9 +14,7 @@ inline constexpr unsigned char mask_saturated = 1;  // the code is at the file's
 inline constexpr unsigned char mask_hot = 2;        // the pixel is a hot pixel of the sensor's specimen
 inline constexpr unsigned char mask_shielded = 4;   // the pixel is in a light-shielded column
 
-/// Writes the mask of a simulated frame as an array for NumPy (.npy, format 1.0): one byte for each pixel of the
-/// readout, height x width. An existing file is replaced. Errors: those of AtomicFile; a full disk.
-Result<void> write_mask(const RawFrame& frame, const SimulateArgs& args, const SensorModel& sensor,
-                        const std::string& file);
+/// Returns the mask of a simulated frame: one byte for each pixel of the readout.
+Plane<std::uint8_t> mask_of(const RawFrame& frame, const SimulateArgs& args, const SensorModel& sensor);
 
 }  // namespace lowlux::cli
