@@ -73,17 +73,22 @@ std::string brackets(std::size_t levels) { return std::string(levels, '[') + std
 TEST_F(DatasetFaults, MemoryDoesNotGrowWithTheFramesOfASample) {
   Json json = plain;
   json["count"] = 1, json["size"] = "800x600";
-  double peak_bytes[2] = {};
-  for (const int many : {0, 1}) {
-    json["frames"] = many == 1 ? 64 : 4;
-    spec(json);
-    const auto result = run(many == 1 ? "many" : "few", {"--quiet"});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    peak_bytes[many] = result.peak_bytes;
+  for (const std::string format : {"dng", "npy", "safetensors"}) {
+    json["format"] = format;
+    double peak_bytes[2] = {};
+    for (const int many : {0, 1}) {
+      json["frames"] = many == 1 ? 64 : 4;
+      spec(json);
+      const auto result = run(format + (many == 1 ? "/many" : "/few"), {"--quiet"});
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+      peak_bytes[many] = result.peak_bytes;
+    }
+    // 60 frames of 800 x 600 codes have 58 MB.
+    EXPECT_LT(peak_bytes[1], peak_bytes[0] + 20e6) << format;
   }
-  // 60 frames of 800 x 600 codes have 58 MB.
-  EXPECT_LT(peak_bytes[1], peak_bytes[0] + 20e6);
-  EXPECT_TRUE(scratch_.holds("many/000000000000_0063.mask.npy"));
+  for (const char* last : {"dng/many/000000000000_0063.mask.npy", "npy/many/000000000000_0063.raw.npy"}) {
+    EXPECT_TRUE(scratch_.holds(last)) << last;
+  }
 }
 
 TEST_F(DatasetFaults, DeepNestingIsOneLine) {
@@ -166,9 +171,13 @@ TEST_F(DatasetFaults, ForceRemovesTheFilesOfTheSamplesItReplaces) {
   bursts["frames"] = 3, bursts["truth_electrons"] = true;
   made(bursts, "all", {"--quiet"});
   ASSERT_TRUE(scratch_.holds("all/000000000000_0002.dng"));
-  made(plain, "all", {"--force", "--quiet"});
-  made(plain, "other", {"--quiet"});
-  EXPECT_EQ(contents("all"), contents("other"));
+  for (const char* format : {"npy", "safetensors", "dng"}) {
+    Json other = plain;
+    other["format"] = format;
+    made(other, "all", {"--force", "--quiet"});
+    made(other, format, {"--quiet"});
+    EXPECT_EQ(contents("all"), contents(format)) << format;
+  }
 }
 
 TEST_F(DatasetFaults, ForceRemovesNoFileOfAnother) {

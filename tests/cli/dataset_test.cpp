@@ -55,7 +55,7 @@ class Dataset : public testing::Test {
     std::map<std::string, std::string> all;
     for (const auto& entry : fs::directory_iterator(file(folder))) {
       const std::string name = entry.path().filename();
-      if (!name.starts_with("manifest")) all[name] = scratch_.read(folder + "/" + name);
+      if (!name.starts_with("manifest")) all[name] = scratch_.read((fs::path(folder) / name).string());
     }
     return all;
   }
@@ -63,6 +63,19 @@ class Dataset : public testing::Test {
 
   test::ScratchDirectory scratch_;
 };
+
+/// The parameter is the format of samples; empty: the spec does not state one.
+class DatasetFormats : public Dataset, public testing::WithParamInterface<std::string> {
+ protected:
+  static Json of_format(Json json) {
+    if (!GetParam().empty()) json["format"] = GetParam();
+    return json;
+  }
+  static std::size_t files_per_sample() {  // raw, truth, mask and parameters; one file and parameters
+    return GetParam() == "safetensors" ? 2 : 4;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Formats, DatasetFormats, testing::Values("", "npy", "safetensors"));
 
 TEST(Sha256, HashesAreThoseOfFips180) {
   EXPECT_EQ(cli::sha256_of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
@@ -89,8 +102,8 @@ TEST(Sha256, PartsOfAnyLengthGiveOneHash) {
   }
 }
 
-TEST_F(Dataset, ShardsHaveTheBytesOfTheWholeAndManifestsTheirHashes) {
-  const std::string name = spec(small);
+TEST_P(DatasetFormats, ShardsHaveTheBytesOfTheWholeAndManifestsTheirHashes) {
+  const std::string name = spec(of_format(small));
   made(name, "all");
   std::size_t listed = 0;
   for (const char* shard : {"1/3", "2/3", "3/3"}) {
@@ -107,15 +120,15 @@ TEST_F(Dataset, ShardsHaveTheBytesOfTheWholeAndManifestsTheirHashes) {
     }
   }
   EXPECT_EQ(contents("all"), contents("shards"));
-  EXPECT_EQ(contents("all").size(), 7 * 4 + 1u);  // raw, truth, mask and parameters; dataset.json
-  EXPECT_EQ(listed, 7 * 4u);
+  EXPECT_EQ(contents("all").size(), 7 * files_per_sample() + 1);  // dataset.json
+  EXPECT_EQ(listed, 7 * files_per_sample());
   made(name, "none", {"--shard", "9/9"});
   EXPECT_TRUE(json_of("none/manifest-9-of-9.json")["samples"].empty());
 }
 
-TEST_F(Dataset, OneThreadAnotherFolderAndMoreSamplesChangeNoByte) {
-  made(spec(small), "all");
-  Json part = small;
+TEST_P(DatasetFormats, OneThreadAnotherFolderAndMoreSamplesChangeNoByte) {
+  made(spec(of_format(small)), "all");
+  Json part = of_format(small);
   part["first_index"] = 2, part["count"] = 1;
   fs::create_directory(file("elsewhere"));
   spec(part, "elsewhere/one.json");
@@ -125,13 +138,13 @@ TEST_F(Dataset, OneThreadAnotherFolderAndMoreSamplesChangeNoByte) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
   const auto all = contents("all");
   for (const auto& [name, text] : contents("elsewhere/out")) EXPECT_EQ(all.at(name), text) << name;
-  EXPECT_EQ(contents("elsewhere/out").size(), 5u);
+  EXPECT_EQ(contents("elsewhere/out").size(), files_per_sample() + 1);
   made(file("elsewhere/one.json"), "all");  // samples are added to a folder, and kept
   EXPECT_EQ(contents("all"), all);
 }
 
-TEST_F(Dataset, ADeletedOrCutHalfIsMadeAgain) {
-  const std::string name = spec(small);
+TEST_P(DatasetFormats, ADeletedOrCutHalfIsMadeAgain) {
+  const std::string name = spec(of_format(small));
   made(name, "all");
   const auto all = contents("all");
   const std::string manifest = scratch_.read("all/manifest-1-of-1.json");
@@ -149,8 +162,8 @@ TEST_F(Dataset, ADeletedOrCutHalfIsMadeAgain) {
   EXPECT_EQ(again["samples"], 7);
 }
 
-TEST_F(Dataset, AKilledRunContinues) {
-  Json many = small;
+TEST_P(DatasetFormats, AKilledRunContinues) {
+  Json many = of_format(small);
   many["count"] = 60;
   const std::string name = spec(many);
   {
@@ -165,8 +178,8 @@ TEST_F(Dataset, AKilledRunContinues) {
   EXPECT_EQ(contents("killed"), contents("whole"));
 }
 
-TEST_F(Dataset, AFullDiskLeavesNoHalfSample) {
-  Json large = small;
+TEST_P(DatasetFormats, AFullDiskLeavesNoHalfSample) {
+  Json large = of_format(small);
   large["size"] = "400x300";  // 240 kB of raw, more than a file may have
   const auto result = test::run_process({"bash", "-c",
                                          "ulimit -f 100; exec " + test::tested_command() + " dataset " + spec(large) +
@@ -228,7 +241,7 @@ TEST_F(Dataset, MasksStateTheHotPixelsAndTheSaturatedOnes) {
   ASSERT_TRUE(frame);
   const std::string npy = scratch_.read("dark/000000000000.mask.npy");
   const RawDn& raw = frame->raw;
-  const std::size_t pixels = static_cast<std::size_t>(raw.dn.size());
+  const std::size_t pixels = raw.dn.size();
   ASSERT_TRUE(holds(npy, "'shape': (48, 68)"));
   ASSERT_EQ(npy.size(), 128 + pixels);
   const double black = 64;  // all noise without hot pixels stays within it
@@ -270,9 +283,9 @@ TEST_F(Dataset, DrawsFollowTheirDistributions) {
   EXPECT_NEAR(log_squares / n, 1 / 3.0, 5 * std::sqrt(4 / 45.0 / n));
   EXPECT_NEAR(product / n, 0, 5 / std::sqrt(144.0 * n));
   for (const char* half : {"chart", "flat", "ELD_SonyA7S2", "ELD_NikonD850"}) {
-    EXPECT_NEAR(counts[half], n / 2, 5 * std::sqrt(n / 4.0)) << half;
+    EXPECT_NEAR(counts[half], n / 2.0, 5 * std::sqrt(n / 4.0)) << half;
   }
-  for (const char* quarter : {"0", "1", "2", "3"}) EXPECT_NEAR(counts[quarter], n / 4, 5 * std::sqrt(n * 3 / 16.0));
+  for (const char* quarter : {"0", "1", "2", "3"}) EXPECT_NEAR(counts[quarter], n / 4.0, 5 * std::sqrt(n * 3 / 16.0));
 }
 
 TEST_F(Dataset, BadSpecsAreOneLineWithFileAndKey) {
@@ -298,6 +311,15 @@ TEST_F(Dataset, BadSpecsAreOneLineWithFileAndKey) {
       {text(R"("luminance_cd_m2":{"uniform":[1,1e13]})"), "luminance_cd_m2: "},
       {text(R"("light":"D66")"), "light: "},
       {text(R"("size":"6x4")"), "size: "},
+      {text(R"("format":"tiff")"), "format: is not one of dng, npy, safetensors"},
+      {text(R"("format":"NPY")"), "format: is not one of"},
+      {text(R"("format":"../npy")"), "format: is not one of"},
+      {text(R"("format":"npy\u0000\n")"), "format: is not one of"},
+      {text(R"("format":")" + std::string(1 << 20, 'x') + '"'), "format: is not one of"},
+      {text(R"("format":"")"), "format: is not one of"},
+      {text(R"("format":null)"), "format: is not one of"},
+      {text(R"("format":{"choice":["npy"]})"), "format: is not one of"},
+      {text(R"("formt":"npy")"), "formt: unknown key; similar keys: format"},
       {text(R"("bits":1.5)"), "bits: "},
       {R"({"count":0,"scenes":["flat"],"sensors":["x"]})", "count: has to be at least 1"},
       {R"({"count":1,"scenes":[],"sensors":["x"]})", "scenes: is not a list of at least one"},
@@ -327,9 +349,9 @@ TEST_F(Dataset, ADryRunNeedsAFolderForTemporaryFiles) {
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
 }
 
-TEST_F(Dataset, AnotherSpecNeedsForceAndADryRunWritesNothing) {
+TEST_P(DatasetFormats, AnotherSpecNeedsForceAndADryRunWritesNothing) {
   made(spec(small), "all");
-  Json other = small;
+  Json other = of_format(small);
   other["seed"] = 4;
   const auto refused = run(spec(other), "all");
   EXPECT_EQ(refused.exit_code, 1);

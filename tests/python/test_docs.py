@@ -1,4 +1,5 @@
 """The examples of docs/python.md, as they stand."""
+import os
 import pathlib
 import re
 
@@ -23,6 +24,7 @@ def examples():
 @pytest.mark.parametrize("heading, code", examples(), ids=[heading for heading, _ in examples()])
 def test_an_example_runs_as_it_stands(heading, code, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", os.pathsep.join([os.path.dirname(os.environ["LOWLUX"]), os.environ["PATH"]]))
     exec(compile(code, f"{PAGE.name}: {heading}", "exec"), {"__name__": "__main__"})
 
 

@@ -70,7 +70,7 @@ std::string in_keys(std::string message) {
 }
 
 std::uint64_t draw_bits(const DatasetSpec& spec, std::uint64_t index, std::string_view quantity) {
-  const auto key = first_bits<std::uint64_t>(spec.sha256);
+  const auto key = first_bits<std::uint64_t>(spec.draw_sha256);
   const auto low = [](std::uint64_t bits) { return static_cast<std::uint32_t>(bits); };
   const auto words = philox4x32_10({low(index), low(index >> 32), first_bits<std::uint32_t>(sha256_of(quantity)), 0},
                                    {low(key), low(key >> 32)});

@@ -1,6 +1,9 @@
 #include "isp/cli/dataset/dataset_sample.h"
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <map>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -10,12 +13,14 @@
 
 #include "capture/file/file_bytes.h"
 #include "isp/base/json_depth.h"
-#include "isp/cli/dataset/array_file.h"
 #include "isp/cli/dataset/dataset_draw.h"
 #include "isp/cli/dataset/pixel_mask.h"
+#include "isp/cli/dataset/sample_arrays.h"
 #include "isp/cli/shared/machine.h"
+#include "isp/cli/shared/report.h"
 #include "isp/cli/simulate/simulate_files.h"
 #include "isp/cli/simulate/simulate_work.h"
+#include "isp/model/sensor/noise_budget.h"
 #include "isp/output/report/report.h"
 
 namespace lowlux::cli {
@@ -77,6 +82,22 @@ void remove_old_sample(const std::string& stem) {
   fs::remove(file, ignored);
 }
 
+/// Returns what the tags of a DNG of the frame state, in the form of `info --json`, and the gain of its codes.
+Json raw_json(const RawFrame& frame, const SensorModel& sensor) {
+  const Json info = Json::parse(info_json("", frame, std::nullopt));
+  const double black_dn = frame.raw.black_tag->pattern_dn[0], white_dn = std::round(frame.raw.white_dn[0]);
+  // Codes of sensors without quantisation are stored in units of a whole fraction of a DN.
+  const double range_dn = sensor.system_gain_dn_per_e * isp::saturation_charge_e(sensor);
+  const double scale = std::max(1.0, std::round((white_dn - black_dn) / range_dn));
+  Json out{{"black_level_dn", black_dn},
+           {"white_level_dn", white_dn},
+           {"gain_e_per_dn", 1 / (scale * sensor.system_gain_dn_per_e)}};
+  for (const char* key : {"cfa", "active", "default_crop", "masked", "noise_profile", "exposure", "colour"}) {
+    out[key] = info[key];
+  }
+  return out;
+}
+
 /// Writes one sample, and removes its files unless they are complete.
 class SampleFiles {
  public:
@@ -96,49 +117,83 @@ class SampleFiles {
     args->force = true;
     if (spec_.truth_electrons) args->truth_electrons = stem_ + ".electrons.exr";
     const SimulateFiles files = files_of(*args);
-    started_ = files.frames;
-    for (const std::string& file : {files.truth, files.truth_electrons, stem_ + ".json"}) {
-      if (!file.empty()) started_.push_back(file);
+    const SampleFormat format = spec_.format.value_or(SampleFormat::dng);
+    SampleArrays arrays(format, files, stem_, spec_.mask);
+    started_ = arrays.files();
+    started_.push_back(stem_ + ".json");
+    const SimulationTaker take = taker(*args, files, arrays);
+    if (format == SampleFormat::dng) {
+      started_.insert(started_.end(), files.frames.begin(), files.frames.end());
+      for (const std::string& file : {files.truth, files.truth_electrons}) {
+        if (!file.empty()) started_.push_back(file);
+      }
+    } else {
+      args->output.clear();
     }
     remove_old_sample(stem_);
-    std::vector<std::string> masks;
-    const auto write_its_mask = [&](const RawFrame& frame, int i, const SensorModel& sensor) {
-      const std::string& raw = files.frames[static_cast<std::size_t>(i)];
-      masks.push_back(raw.substr(0, raw.size() - 4) + ".mask.npy");
-      started_.push_back(masks.back());
-      const Plane<std::uint8_t> mask = mask_of(frame, *args, sensor);
-      const ArrayEntry array{
-          "mask", ElementType::u8, {static_cast<std::size_t>(mask.height()), static_cast<std::size_t>(mask.width())}};
-      return write_npy(masks.back(), array, bytes_of(mask));
-    };
-    const auto outcome = simulate(*args, nullptr, spec_.mask ? FrameTaker(write_its_mask) : FrameTaker());
+    const auto outcome = simulate(*args, nullptr, take);
     if (!outcome) return tl::make_unexpected(with_index(outcome.error()));
+    if (const auto done = arrays.finish(); !done) return tl::make_unexpected(with_index(done.error()));
     std::vector<std::string> written = outcome->files;
-    written.insert(written.end(), masks.begin(), masks.end());
-    return finish(written, Json::parse(simulate_json(*args, *outcome)));
+    for (const std::string& file : arrays.files()) written.push_back(file);
+    return finish(written);
   }
 
  private:
+  /// Returns what writes the arrays of the sample. The arguments have to live as long.
+  SimulationTaker taker(const SimulateArgs& args, const SimulateFiles& files, SampleArrays& arrays) {
+    SimulationTaker take;
+    take.frame = [this, &args, &arrays](const RawFrame& frame, int i, const SimulateOutcome& so_far) -> Result<void> {
+      if (i == 0) {
+        set_parameters(frame, args, so_far);
+        if (auto begun = arrays.begin(frame.raw, metadata()); !begun) return begun;
+      }
+      const auto mask = spec_.mask ? mask_of(frame, args, so_far.sensor.model) : Plane<std::uint8_t>();
+      return arrays.add_frame(frame.raw, i, mask);
+    };
+    if (spec_.format.value_or(SampleFormat::dng) == SampleFormat::dng) return take;
+    if (!files.truth.empty()) take.truth = [&arrays](const SceneLinear& truth) { return arrays.add_truth(truth); };
+    if (!files.truth_electrons.empty()) {
+      take.truth_e = [&arrays](const SceneLinear& electrons) { return arrays.add_electrons(electrons); };
+    }
+    return take;
+  }
+
+  /// Sets the parameters but for the files.
+  void set_parameters(const RawFrame& frame, const SimulateArgs& args, const SimulateOutcome& outcome) {
+    const Json report = Json::parse(simulate_json(args, outcome));
+    parameters_ = {{"lowlux", version_number()},
+                   {"spec_sha256", spec_.sha256},
+                   {"index", index_},
+                   {"scene", draw_.scene},
+                   {"drawn", Json::object()}};
+    for (const auto& [key, value] : draw_.settings) parameters_["drawn"][key] = Json::parse(value);
+    for (const char* key : {"exposure_s", "temperature_c", "f_number", "white_luminance_cd_m2",
+                            "saturation_luminance_cd_m2", "sensor", "warnings"}) {
+      if (report.contains(key)) parameters_[key] = report[key];
+    }
+    if (spec_.format) parameters_["raw"] = raw_json(frame, outcome.sensor.model);
+  }
+
+  /// Returns the parameters as texts: those that are not are JSON.
+  std::map<std::string, std::string> metadata() const {
+    std::map<std::string, std::string> out;
+    for (const auto& [key, value] : parameters_.items()) {
+      out[key] = value.is_string() ? value.get<std::string>() : text_of(value);
+    }
+    return out;
+  }
+
   /// Writes the parameters.
-  Result<DatasetSample> finish(const std::vector<std::string>& written, const Json& report) {
+  Result<DatasetSample> finish(const std::vector<std::string>& written) {
     Json files = Json::array();
     for (const std::string& file : written) {
       const auto hash = sha256_of_file(file);
       if (!hash) return tl::make_unexpected(hash.error());
       files.push_back(file_json(fs::path(file).filename().string(), hash->bytes, hash->sha256));
     }
-    Json out{{"lowlux", version_number()},
-             {"spec_sha256", spec_.sha256},
-             {"index", index_},
-             {"scene", draw_.scene},
-             {"drawn", Json::object()}};
-    for (const auto& [key, value] : draw_.settings) out["drawn"][key] = Json::parse(value);
-    for (const char* key : {"exposure_s", "temperature_c", "f_number", "white_luminance_cd_m2",
-                            "saturation_luminance_cd_m2", "sensor", "warnings"}) {
-      if (report.contains(key)) out[key] = report[key];
-    }
-    out["files"] = files;
-    const std::string text = out.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+    parameters_["files"] = files;
+    const std::string text = parameters_.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
     if (const auto done = isp::write_text(stem_ + ".json", text, isp::Overwrite::yes); !done) {
       return tl::make_unexpected(done.error());
     }
@@ -158,6 +213,7 @@ class SampleFiles {
   std::uint64_t index_;
   std::string stem_;
   DatasetDraw draw_;
+  Json parameters_;
   std::vector<std::string> started_;  // removed by the destructor
 };
 

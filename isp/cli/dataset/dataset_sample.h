@@ -19,9 +19,9 @@ struct DatasetSample {
 /// this spec and version, and the other files have their sizes.
 std::optional<DatasetSample> find_sample(const DatasetSpec& spec, std::uint64_t index, const std::string& folder);
 
-/// Makes the sample of an index: raw files, truth, masks, and at last the parameters. Existing files are replaced, and
-/// all files that the parameters of an older sample of that index list are removed.
-/// Errors: those of scene, sensor and writers; no file of the sample is left then.
+/// Makes the sample of an index: raws, truths and masks in the format of the spec, and at last the parameters. Existing
+/// files are replaced, and all files that the parameters of an older sample of that index list are removed. Errors:
+/// those of scene, sensor and writers; no file of the sample is left then.
 Result<DatasetSample> make_sample(const DatasetSpec& spec, std::uint64_t index, const std::string& folder);
 
 }  // namespace lowlux::cli

@@ -14,14 +14,15 @@
 #include "capture/file/file_bytes.h"
 #include "isp/base/json_depth.h"
 #include "isp/base/text.h"
+#include "isp/cli/shared/option_values.h"
 
 namespace lowlux::cli {
 namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::array<std::string_view, 7> own_keys{"seed",    "first_index", "count",          "scenes",
-                                                   "sensors", "mask",        "truth_electrons"};
+constexpr std::array<std::string_view, 8> own_keys{"seed",    "first_index", "count",           "scenes",
+                                                   "sensors", "mask",        "truth_electrons", "format"};
 constexpr std::uint64_t max_end = std::uint64_t{1} << 63;
 
 std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
@@ -177,6 +178,15 @@ Result<bool> flag_of(const Json& json, const char* key, bool fallback) {
   return json[key].get<bool>();
 }
 
+Result<std::optional<SampleFormat>> format_of(const Json& json) {
+  if (!json.contains("format")) return std::nullopt;
+  const Names<SampleFormat> names{
+      {"dng", SampleFormat::dng}, {"npy", SampleFormat::npy}, {"safetensors", SampleFormat::safetensors}};
+  const auto found = names.find(json["format"].is_string() ? json["format"].get<std::string>() : "");
+  if (found == names.end()) return wrong("format", fmt::format("is not one of {}", joined(names)));
+  return found->second;
+}
+
 Result<void> set_own_keys(const Json& json, DatasetSpec& spec) {
   for (const char* key : {"count", "scenes", "sensors"}) {
     if (!json.contains(key)) return wrong(key, "the key is missing");
@@ -194,9 +204,12 @@ Result<void> set_own_keys(const Json& json, DatasetSpec& spec) {
   for (const auto* flag : {&mask, &electrons}) {
     if (!*flag) return tl::make_unexpected(flag->error());
   }
+  const auto format = format_of(json);
+  if (!format) return tl::make_unexpected(format.error());
   if (*count == 0) return wrong("count", "has to be at least 1");
   if (*count > max_end - *first) return wrong("count", "first_index + count exceeds 2^63");
   spec.first_index = *first, spec.count = *count, spec.mask = *mask, spec.truth_electrons = *electrons;
+  spec.format = *format;
   for (const Json& scene : json["scenes"]) {
     if (!scene.is_string()) return wrong("scenes", fmt::format("{} is not a text", scene.dump()));
     spec.scenes.push_back(scene.get<std::string>());
@@ -277,8 +290,10 @@ Result<DatasetSpec> read_dataset_spec(const std::string& file) {
   for (const DatasetInput& input : spec.inputs) {
     inputs.push_back({{"name", input.name}, {"bytes", input.hash.bytes}, {"sha256", input.hash.sha256}});
   }
-  spec.identity = text_of({{"spec", *std::move(json)}, {"inputs", std::move(inputs)}});
+  spec.identity = text_of({{"spec", *json}, {"inputs", inputs}});
   spec.sha256 = sha256_of(spec.identity);
+  json->erase("format");
+  spec.draw_sha256 = sha256_of(text_of({{"spec", *std::move(json)}, {"inputs", std::move(inputs)}}));
   return spec;
 }
 

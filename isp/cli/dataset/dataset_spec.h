@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,10 @@ struct DatasetInput {
   FileHash hash;
 };
 
+/// Lists the formats of a sample. `dng`: raw files, and truths as OpenEXR; `npy`: a file for each array; `safetensors`:
+/// one file.
+enum class SampleFormat : std::uint8_t { dng, npy, safetensors };
+
 /// Describes a data set.
 struct DatasetSpec {
   std::string folder;  // of the spec's file: names of files are relative to it
@@ -44,9 +49,11 @@ struct DatasetSpec {
   std::vector<DatasetSensor> sensors;
   bool mask = true;
   bool truth_electrons = false;
+  std::optional<SampleFormat> format;  // as given; absent: dng
   std::vector<DatasetInput> inputs;
-  std::string identity;  // JSON: the spec without first_index and count, and the hashes of its files
-  std::string sha256;    // of `identity`: together with an index it determines a sample
+  std::string identity;     // JSON: the spec without first_index and count, and the hashes of its files
+  std::string sha256;       // of `identity`: together with an index it determines a sample
+  std::string draw_sha256;  // of `identity` without the format, which does not change what is drawn
 };
 
 /// Returns whether a scene is generated: any other is an image file.

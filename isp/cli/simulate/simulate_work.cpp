@@ -74,14 +74,14 @@ void report_plan(const capture::SyntheticSource& source, bool explain, Executor&
 }
 void report_plan(const capture::BurstSource& source, bool explain, Executor& executor, SimulateOutcome& out) {
   const auto sensor = source.exposed(0, executor);
-  if (!sensor) return;  // write_frames() has reported it
+  if (!sensor) return;  // write_frames() reports it
   out.plan = sensor->file_plan();
   if (explain) out.cost = sensor->measure_cost(nullptr);
 }
 
 class Simulation {
  public:
-  Simulation(const SimulateArgs& args, SimulatedData* keep, const FrameTaker& take)
+  Simulation(const SimulateArgs& args, SimulatedData* keep, const SimulationTaker& take)
       : args_(args),
         keep_(keep),
         take_(take),
@@ -166,11 +166,11 @@ class Simulation {
       out_.warnings.push_back(
           fmt::format("{} pixels have colours no light can have: moved towards white", source->moved_pixels()));
     }
+    report_plan(*source, args_.explain, executor_, out_);
     if (const auto done = write_frames(*source); !done) return tl::make_unexpected(done.error());
     isp::StageClock finish(out_.times);
     if (const auto done = write_truth(*source); !done) return tl::make_unexpected(done.error());
     finish.lap("truth");
-    report_plan(*source, args_.explain, executor_, out_);
     return std::move(out_);
   }
 
@@ -193,8 +193,8 @@ class Simulation {
       clock.lap("raw file");
       read_out_s += times[0].seconds;
       write_s += times[1].seconds;
-      if (take_) {
-        if (auto taken = take_(*frame, i, out_.sensor.model); !taken) return taken;
+      if (take_.frame) {
+        if (auto taken = take_.frame(*frame, i, out_); !taken) return taken;
       }
       progress.advance(1, files_.frames[i]);
       if (keep_ != nullptr) keep_->frames.push_back(*std::move(frame));
@@ -209,22 +209,22 @@ class Simulation {
     isp::WriteOptions write;
     write.overwrite = overwrite();
     write.software = "lowlux " + version_number();
-    if (!files_.truth.empty() || (keep_ != nullptr && has_truth(args_))) {
+    if (!files_.truth.empty() || take_.truth || (keep_ != nullptr && has_truth(args_))) {
       SceneLinear truth = truth_of(source, executor_);
       to_relative_srgb(truth, out_.white_cd_m2, executor_);
       if (out_.white_cd_m2 > 0) write.white_luminance_cd_m2 = out_.white_cd_m2;
       write.exr.depth = fits_half(truth) ? isp::ExrOptions::Depth::half : isp::ExrOptions::Depth::full;
       auto done = write_picture(std::move(truth), OutputSpace::linear_srgb, files_.truth, write,
-                                keep_ != nullptr ? &keep_->truth : nullptr);
+                                keep_ != nullptr ? &keep_->truth : nullptr, take_.truth);
       if (!done) return done;
     }
-    if (!files_.truth_electrons.empty() || (keep_ != nullptr && has_truth(args_))) {
+    if (!files_.truth_electrons.empty() || take_.truth_e || (keep_ != nullptr && has_truth(args_))) {
       write.white_luminance_cd_m2.reset();
       write.exr.depth = isp::ExrOptions::Depth::full;
       SceneLinear electrons{};
       electrons.plane = electrons_of(source, executor_).plane;
       auto done = write_picture(std::move(electrons), OutputSpace::camera, files_.truth_electrons, write,
-                                keep_ != nullptr ? &keep_->truth_e : nullptr);
+                                keep_ != nullptr ? &keep_->truth_e : nullptr, take_.truth_e);
       if (!done) return done;
     }
     return write_burst_truth(source);
@@ -233,11 +233,15 @@ class Simulation {
   /// Writes a truth if it has a file.
   /// @param kept  where it goes then; null: nowhere
   Result<void> write_picture(SceneLinear truth, OutputSpace space, const std::string& file,
-                             const isp::WriteOptions& options, std::optional<SceneLinear>* kept) {
+                             const isp::WriteOptions& options, std::optional<SceneLinear>* kept,
+                             const std::function<Result<void>(const SceneLinear&)>& take) {
     Picture picture = std::move(truth);
     if (!file.empty()) {
       if (auto done = isp::write_picture(picture, space, {}, file, options, executor_); !done) return done;
       out_.files.push_back(file);
+    }
+    if (take) {
+      if (auto taken = take(std::get<SceneLinear>(picture)); !taken) return taken;
     }
     if (kept != nullptr) *kept = std::get<SceneLinear>(std::move(picture));
     return {};
@@ -266,7 +270,7 @@ class Simulation {
 
   const SimulateArgs& args_;
   SimulatedData* keep_;
-  const FrameTaker& take_;
+  const SimulationTaker& take_;
   SimulateFiles files_;
   PoolExecutor executor_;
   std::string description_;
@@ -275,7 +279,7 @@ class Simulation {
 
 }  // namespace
 
-Result<SimulateOutcome> simulate(const SimulateArgs& args, SimulatedData* keep, const FrameTaker& take) {
+Result<SimulateOutcome> simulate(const SimulateArgs& args, SimulatedData* keep, const SimulationTaker& take) {
   return Simulation(args, keep, take).run();
 }
 
