@@ -22,7 +22,8 @@ std::optional<Colours> blocks_at(std::span<const double> pattern, int x, int y) 
   for (int block = 0; block < 4; ++block) {
     const int left = x + 2 * (block % 2), top = y + 2 * (block / 2);
     const auto colour = [&](int site) {
-      return pattern[static_cast<std::size_t>((top + site / 2) % period * period + (left + site % 2) % period)];
+      const int row = (top + site / 2) % period, column = (left + site % 2) % period;
+      return pattern[static_cast<std::size_t>(row) * period + static_cast<std::size_t>(column)];
     };
     out[static_cast<std::size_t>(block)] = colour(0);
     if (colour(1) != colour(0) || colour(2) != colour(0) || colour(3) != colour(0)) return std::nullopt;
@@ -34,8 +35,8 @@ std::optional<BayerPhase> phase_of(const Colours& colours) {
   for (const BayerPhase phase : {BayerPhase::rggb, BayerPhase::grbg, BayerPhase::gbrg, BayerPhase::bggr}) {
     bool alike = true;
     for (int site = 0; site < 4; ++site) {
-      const auto expected = static_cast<double>(colour_at(phase, site % 2, site / 2));
-      alike = alike && colours[static_cast<std::size_t>(site)] == expected;
+      const CfaColour expected = colour_at(phase, site & 1, site >> 1);
+      alike = alike && colours[static_cast<std::size_t>(site)] == static_cast<double>(expected);
     }
     if (alike) return phase;
   }
@@ -72,7 +73,7 @@ BlackLevel sum_of(const BlackLevel& site, const QuadBayer& mosaic, const Rect& a
   const auto sums = [](const std::vector<double>& deltas, int first, int blocks) {
     std::vector<double> of_blocks;
     for (int i = 0; !deltas.empty() && i < blocks; ++i) {
-      const auto at = static_cast<std::size_t>(first + 2 * i);
+      const auto at = static_cast<std::size_t>(first) + 2 * static_cast<std::size_t>(i);
       of_blocks.push_back(2 * (deltas[at] + deltas[at + 1]));
     }
     return of_blocks;
