@@ -41,7 +41,8 @@ std::span<const std::byte> part_of(const std::string& bytes, std::size_t from, s
 }
 
 TEST(ArrayFile, NumpyReadsEveryShape) {
-  if (test::run_process({"/usr/bin/python3", "-c", "import numpy"}).exit_code != 0) GTEST_SKIP() << "there is no NumPy";
+  if (test::run_process({"/usr/bin/python3", "-c", "import numpy"}).exit_code != 0)
+    GTEST_SKIP() << "NumPy is not installed";
   const test::ScratchDirectory scratch;
   std::mt19937 random(29);
   std::vector<Drawn> all;
