@@ -10,6 +10,7 @@
 
 #include "isp/base/image.h"
 #include "isp/base/result.h"
+#include "isp/base/shard.h"
 #include "isp/bench/methods/method.h"
 #include "isp/bench/peers/nl_means.h"
 #include "isp/output/report/report.h"
@@ -71,6 +72,7 @@ struct BenchOptions {
   std::vector<ScoredMethod> methods;                                   // of the stage `methods`
   CommandLimits command_limits;                                        // of each run of a method's command
   std::uint64_t seed = 1;                                              // of the stage `methods`
+  Shard shard;                                                         // of the lights of the stage `methods`
   std::function<void(double share, const std::string& what)> advance;  // adds to the fraction done; from any thread
 };
 

@@ -117,6 +117,7 @@ std::string bench(const std::string& output, bool overwrite, const std::vector<s
   const py::gil_scoped_release released;
   const isp::BenchStage stage = value_of(isp::bench_stage_named("methods"));
   isp::BenchOptions options = value_of(cli::bench_options(args));
+  options.shard = args.shard;
   value_of(cli::check_bench_files({stage}, args));
   options.methods = std::move(requested.methods);
   std::vector<cli::MeasuredStage> measured;

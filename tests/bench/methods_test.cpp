@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <random>
 #include <string>
@@ -13,6 +14,7 @@
 #include "isp/bench/methods/method_scenes.h"
 #include "isp/bench/methods/method_score.h"
 #include "isp/bench/stages/methods_bench.h"
+#include "isp/bench/stages/methods_report.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux::isp {
@@ -249,6 +251,29 @@ TEST(Methods, GoodOnesAreRankedAndFailuresLeaveTheOthersAlone) {
                                               "method hang", "method small", "method throws"}));
   EXPECT_EQ(scratch.read("seen").substr(0, 22), "noisy.dng\nprinted.txt\n");  // and nothing else
   EXPECT_EQ(scratch.read("seen").size() % 22, 0u);
+}
+
+TEST(Methods, AShardHasTheRowsOfItsLights) {
+  BenchOptions options = quick();
+  options.quick = false;
+  options.pictures = PictureSet::tuning;
+  options.methods.clear();
+  const auto rows_of = [&](const Shard& shard) {
+    options.shard = shard;
+    auto outcome = run_methods_bench(options);
+    EXPECT_TRUE(outcome) << outcome.error().message;
+    return outcome ? table_of(outcome->table, 17).rows : std::vector<std::vector<std::string>>();
+  };
+  auto whole = rows_of({});
+  ASSERT_EQ(whole.size(), 2 * methods_lights(false).size());
+  const std::string light = name_of(methods_lights(false)[1]);
+  std::erase_if(whole, [&](const std::vector<std::string>& row) { return row.front() != light; });
+  EXPECT_EQ(whole.size(), 2U);
+  EXPECT_EQ(rows_of({2, 3}), whole);
+  options.shard = {methods_lights(false).size() + 1, 9};
+  const auto none = run_methods_bench(options);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().where, "--shard");
 }
 
 TEST(Methods, ASeedRepeatsARunAndAnotherDoesNot) {

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/command.h"
@@ -131,6 +133,42 @@ TEST_F(Batch, AFolderStandsForTheRawFilesInIt) {
   refused(lowlux({"develop", file("empty"), "-o", file("out/")}), "no raw files", 1);
   refused(lowlux({"develop", file("raws"), "-o", file("x.png")}), "2 raw files need a folder");
   refused(lowlux({"develop", file("none*.dng"), "-o", file("out/")}), "no file matches", 1);
+}
+
+TEST_F(Batch, ShardsMakeEachFileOnceAsOneRunDoes) {
+  raw("a.dng", {"--size", "48x32"});
+  std::mt19937 random(20261126);
+  for (int draw = 0; draw < 4; ++draw) {
+    const unsigned files = 1 + random() % 7, shards = 1 + random() % 5;
+    const std::string in = fmt::format("in{}", draw), whole = fmt::format("whole{}", draw),
+                      parts = fmt::format("parts{}", draw);
+    std::vector<std::string> names;
+    for (unsigned i = 0; i < files; ++i) names.push_back(fmt::format("{}/{}.dng", in, i));
+    copies("a.dng", names);
+    const std::string verb = draw % 2 == 0 ? "develop" : "denoise";
+    ASSERT_EQ(lowlux({verb, file(in), "-o", file(whole + "/")}).exit_code, 0);
+    std::size_t made = 0;
+    for (unsigned i = 1; i <= shards; ++i) {
+      const auto result =
+          lowlux({verb, file(in), "-o", file(parts + "/"), "--json", "--shard", fmt::format("{}/{}", i, shards)});
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+      const Json report = Json::parse(result.out);
+      EXPECT_EQ(report.size(), i > files ? 0 : (files - i) / shards + 1) << i << "/" << shards << " of " << files;
+      EXPECT_EQ(result.err.find("no raw file falls to shard") != std::string::npos, report.empty()) << result.err;
+      made += report.size();
+    }
+    EXPECT_EQ(made, files);
+    EXPECT_EQ(names_in(parts), names_in(whole));
+    for (const std::string& name : names_in(whole)) {
+      EXPECT_TRUE(test::read_file(file(parts + "/" + name)) == test::read_file(file(whole + "/" + name))) << name;
+    }
+  }
+  for (const char* wrong :
+       {"0/2", "3/2", "1", "/", "1/", "-1/2", "1/2/3", "a/b", "1.5/2", "", "1/18446744073709551615"}) {
+    refused(lowlux({"develop", file("a.dng"), "-o", file("x/"), "--shard", wrong}), "1/4 is the first of four shards");
+  }
+  refused(lowlux({"develop", file("a.dng"), "-o", file("x.png"), "--merge", "--shard", "1/2"}), "--shard");
+  EXPECT_FALSE(fs::exists(file("x")));
 }
 
 TEST_F(Batch, TwoInputsForOneOutputAreRefusedWithARemedy) {

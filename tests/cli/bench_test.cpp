@@ -149,6 +149,23 @@ TEST(Bench, ProgramsAreScoredNextToOurLevels) {
   EXPECT_NE(scratch.read("board/methods.csv").find("lowlux-best"), std::string::npos);
 }
 
+TEST(Bench, AShardRunsItsStages) {
+  const auto ran = [](const std::string& shard) {
+    const auto result = bench({"--stage", "scene-light,photon-sampling", "--quick", "--json", "--shard", shard,
+                               "--pictures-folder", pictures});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    std::vector<std::string> ids;
+    for (const Json& stage : Json::parse(result.out)) ids.push_back(stage["stage"]);
+    return ids;
+  };
+  EXPECT_EQ(ran("1/2"), std::vector<std::string>{"scene-light"});
+  EXPECT_EQ(ran("2/2"), std::vector<std::string>{"photon-sampling"});
+  const auto beyond =
+      bench({"--stage", "scene-light,photon-sampling", "--quick", "--shard", "3/3", "--pictures-folder", pictures});
+  EXPECT_EQ(beyond.exit_code, 2);
+  EXPECT_NE(beyond.err.find("no stage for shard 3 of 3: 2 are asked for"), std::string::npos) << beyond.err;
+}
+
 TEST(Bench, WrongCommandLinesExitWithTwo) {
   const std::vector<std::vector<std::string>> wrong{{"--stage", "zzz"},
                                                     {"--method", "dcrow"},

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <optional>
@@ -187,13 +188,21 @@ constexpr SceneSize whole_size{512, 384}, quick_size{256, 256};
 }  // namespace
 
 Result<BenchOutcome> run_methods_bench(const BenchOptions& options) {
+  std::vector<DenoiseLight> lights = methods_lights(options.quick);
+  if (options.shard.number > lights.size()) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("there is no light for shard {} of {}: methods are measured in {}", options.shard.number,
+                            options.shard.count, lights.size()),
+                "--shard");
+  }
+  std::uint64_t index = 0;
+  std::erase_if(lights, [&](const DenoiseLight&) { return !options.shard.has(index++); });
   PoolExecutor executor(options.threads);
   const SceneSize size = options.quick ? quick_size : whole_size;
   const auto files = options.quick ? quick_files_of(options.pictures) : files_of(options.pictures);
   auto scenes = method_scenes(options.pictures_folder, files, size, options.seed, executor);
   if (!scenes) return tl::make_unexpected(scenes.error());
   Bench bench(*std::move(scenes), options);
-  const std::vector<DenoiseLight> lights = methods_lights(options.quick);
   bench.set_lights(lights.size());
   for (const DenoiseLight& light : lights) bench.run(light);
   return bench.outcome(lights);

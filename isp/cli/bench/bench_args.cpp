@@ -24,10 +24,15 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
   app.add_option("--seed", args.seed, "of the scenes and noise of the stage methods (default: 1)")->type_name("N");
   add_number_within(app, "--time-limit", "S", "for each frame and program of the stage methods [s] (default: 120)", 0.1,
                     86400, args.time_limit_s);
+  CLI::Option* const shard = add_shard(
+      app,
+      "run every N-th stage from the I-th on; of methods, if that is the only one, every N-th light (default 1/1: all)",
+      args.shard);
   app.add_flag("--calibrate-cost", args.calibrate_cost,
                "measure how fast this machine develops, for develop --budget-ms, and keep it; 2 to 5 minutes")
       ->excludes("--stage")
-      ->excludes("--method");
+      ->excludes("--method")
+      ->excludes(shard);
   app.add_flag("--list", args.list, "the stages, one line each");
   app.add_option("-o,--output", args.output,
                  "folder, made if need be, for the page bench.html, STAGE.csv, STAGE.json and parts of pictures (PNG)")

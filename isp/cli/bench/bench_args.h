@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "isp/base/shard.h"
 #include "isp/cli/develop/develop_args.h"
 #include "isp/reproduce/bench_picture.h"
 
@@ -18,6 +19,7 @@ struct BenchArgs {
   std::vector<std::string> methods;  // NAME=COMMAND, or the name of a ready one
   std::uint64_t seed = 1;            // of the stage `methods`
   double time_limit_s = 120;         // of one run of a method
+  Shard shard;                       // of the stages; of the lights of `methods` if that is the only one
   int threads = 0;                   // 0: one for each processor
   bool list = false;
   bool calibrate_cost = false;  // then nothing else is run

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <utility>
 
@@ -23,7 +24,7 @@
 namespace lowlux::cli {
 namespace {
 
-Result<std::vector<isp::BenchStage>> chosen(const std::vector<std::string>& ids) {
+Result<std::vector<isp::BenchStage>> stages_of(const std::vector<std::string>& ids) {
   if (ids.empty()) return std::vector<isp::BenchStage>(isp::bench_stages().begin(), isp::bench_stages().end());
   std::vector<isp::BenchStage> out;
   out.reserve(ids.size());
@@ -34,6 +35,29 @@ Result<std::vector<isp::BenchStage>> chosen(const std::vector<std::string>& ids)
     if (!again) out.push_back(*stage);
   }
   return out;
+}
+
+/// Holds the stages to run, and which lights of the stage `methods`.
+struct ChosenStages {
+  std::vector<isp::BenchStage> stages;
+  Shard lights;
+};
+
+/// Returns the stages that are asked for, or a shard of them; `methods` alone is divided by its lights instead.
+Result<ChosenStages> chosen(const BenchArgs& args) {
+  const bool methods_alone = args.stages.empty() && !args.methods.empty();
+  auto stages = stages_of(methods_alone ? std::vector<std::string>{"methods"} : args.stages);
+  if (!stages) return tl::make_unexpected(stages.error());
+  if (stages->size() == 1 && stages->front().id == "methods") return ChosenStages{*std::move(stages), args.shard};
+  if (args.shard.number > stages->size()) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("there is no stage for shard {} of {}: {} are asked for", args.shard.number,
+                            args.shard.count, stages->size()),
+                "--shard");
+  }
+  std::uint64_t index = 0;
+  std::erase_if(*stages, [&](const isp::BenchStage&) { return !args.shard.has(index++); });
+  return ChosenStages{*std::move(stages), {}};
 }
 
 /// Prints what failed within a stage, one line each.
@@ -126,19 +150,20 @@ int run_bench(const std::vector<std::string>& words) {
     return exit_done;
   }
   if (args.calibrate_cost) return run_calibrate_cost(args);
-  const bool methods_alone = args.stages.empty() && !args.methods.empty();
-  const auto stages = chosen(methods_alone ? std::vector<std::string>{"methods"} : args.stages);
-  if (!stages) return print_usage_error("bench", stages.error());
+  const auto to_run = chosen(args);
+  if (!to_run) return print_usage_error("bench", to_run.error());
+  const std::vector<isp::BenchStage>& stages = to_run->stages;
   auto methods = all_methods(args);
   if (!methods) return print_usage_error("bench", methods.error());
   auto options = bench_options(args);
   if (!options) return print_failure(options.error());
-  if (const auto free = check_bench_files(*stages, args); !free) return print_failure(free.error());
+  options->shard = to_run->lights;
+  if (const auto free = check_bench_files(stages, args); !free) return print_failure(free.error());
   const std::size_t not_installed = args.methods.size() + denoise::all_levels.size() - methods->size();
   add_methods(*std::move(methods), *options);
-  const std::vector<MeasuredStage> measured = run_each(*stages, *options, command_line(words));
+  const std::vector<MeasuredStage> measured = run_each(stages, *options, command_line(words));
   const bool all_done =
-      measured.size() == stages->size() && not_installed == 0 &&
+      measured.size() == stages.size() && not_installed == 0 &&
       std::ranges::all_of(measured, [](const MeasuredStage& m) { return m.outcome.failures.empty(); });
   const Machine machine = this_machine(options->threads);
   if (args.json) {

@@ -32,6 +32,9 @@ void print_counts(const DevelopArgs& args, const BatchCounts& counts, std::chron
     print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: {} of {} files written to {}, {:.1f} s", counts.done,
                                                        counts.files, args.output, took.count()))));
   }
+  if (counts.files == 0 && !args.quiet) {
+    print_err(fmt::format("lowlux: no raw file falls to shard {}/{}\n", args.shard.number, args.shard.count));
+  }
   if (counts.skipped > 0 && !args.quiet) {
     print_err(fmt::format("lowlux: {} of {} files skipped: their outputs exist\n", counts.skipped, counts.files));
   }

@@ -29,6 +29,7 @@ void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
   app.add_flag("--sync", args.sync, "wait until each file is on the disk (fsync)");
   app.add_option("--jobs", args.jobs, "files at a time (default: one per processor, fewer if memory is short)")
       ->check(CLI::Range(1, 256));
+  add_shard(app, "take every N-th raw file from the I-th on (default 1/1: all)", args.shard);
   app.add_flag("--explain", args.explain, explained);
   app.add_flag("--json", args.json, "one JSON object for each file on stdout, as an array");
   app.add_flag("--timings", args.timings, "time of each stage");
@@ -100,6 +101,7 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
       "what was decided for each file, why, and, where this machine's speed is known (bench --calibrate-cost), what "
       "it takes",
       args);
+  app.get_option("--shard")->excludes(merge);
   Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
   if (auto* const good = std::get_if<DevelopArgs>(&parsed)) {
     if (const auto wrong = complete_look(good->look, Planner::of_everything, good->options.look)) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/noise/noise_figures.h"
+#include "isp/base/shard.h"
 #include "isp/cli/config/config_file.h"
 #include "isp/cli/develop/look_args.h"
 #include "isp/cli/info/advise_args.h"
@@ -53,6 +54,7 @@ struct DevelopArgs {
   std::optional<calib::NoiseFigures> noise;  // --noise
   int jpeg_quality = 92;
   int jobs = 0;  // files at a time; 0: one for each processor
+  Shard shard;   // of the files
   bool force = false;
   bool skip_existing = false;
   bool sync = false;  // files are flushed to disk before the next one begins

@@ -20,7 +20,8 @@ const std::vector<VerbHelp>& raw_verbs() {
       {"denoise",
        {"--output", "--denoise", "--profile", "--black", "--dark-frame", "--jobs", "--skip-existing", "--force",
         "--quiet"},
-       {"lowlux denoise night.nef -o clean.dng", "lowlux denoise raws/ -o clean/ --skip-existing"}},
+       {"lowlux denoise night.nef -o clean.dng", "lowlux denoise raws/ -o clean/ --skip-existing",
+        "lowlux denoise raws/ -o clean/ --shard 2/8"}},
       {"merge",
        {"--output", "--align", "--drizzle", "--reference", "--profile", "--dark-frame", "--flat-frame", "--explain",
         "--force"},
@@ -81,8 +82,8 @@ struct Group {
 const std::vector<Group>& raw_groups() {
   static const std::vector<Group> groups{
       {"Files",
-       {"--output", "--format", "--as", "--raw", "--bits", "--quality", "--jobs", "--skip-existing", "--force",
-        "--sync"}},
+       {"--output", "--format", "--as", "--raw", "--bits", "--quality", "--jobs", "--shard", "--skip-existing",
+        "--force", "--sync"}},
       {"Camera",
        {"--size", "--fps", "--gain-code", "--flip", "--memory", "--buffers", "--timeout", "--exposure-time", "--gain",
         "--auto-exposure", "--max-exposure", "--max-gain", "--mains", "--clip", "--gain-codes"}},

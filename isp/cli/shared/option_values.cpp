@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -12,6 +13,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "isp/base/shard.h"
 #include "isp/base/text.h"
 #include "isp/cli/config/config_file.h"
 #include "isp/cli/help/help_form.h"
@@ -84,6 +86,25 @@ std::optional<std::string> unknown_option(const CLI::App& app) {
   const std::vector<std::string_view> known(names.begin(), names.end());
   const std::string name = found->substr(0, found->find('='));
   return fmt::format("unknown option {}{}", name, suggestion(name, known));
+}
+
+std::optional<std::uint64_t> whole_number(std::string_view text) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+std::optional<std::string> set_shard(std::string_view text, Shard& shard) {
+  constexpr std::uint64_t max_count = std::uint64_t{1} << 63;
+  const std::size_t slash = text.find('/');
+  const auto number = whole_number(text.substr(0, slash));
+  const auto count = slash == std::string_view::npos ? std::nullopt : whole_number(text.substr(slash + 1));
+  if (!number || !count || *number < 1 || *number > *count || *count > max_count) {
+    return "is not I/N with 1 <= I <= N <= 2^63: 1/4 is the first of four shards";
+  }
+  shard = {*number, *count};
+  return std::nullopt;
 }
 
 }  // namespace
@@ -217,6 +238,10 @@ std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& wo
   }
   if (used != nullptr) *used = *defaults;
   return std::nullopt;
+}
+
+CLI::Option* add_shard(CLI::App& app, const std::string& help, Shard& shard) {
+  return add_text(app, "--shard", "I/N", help, [&shard](const std::string& text) { return set_shard(text, shard); });
 }
 
 }  // namespace lowlux::cli

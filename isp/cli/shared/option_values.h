@@ -14,6 +14,10 @@ class App;
 class Option;
 }  // namespace CLI
 
+namespace lowlux {
+struct Shard;
+}
+
 namespace lowlux::cli {
 
 struct Defaults;
@@ -84,6 +88,9 @@ CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum
                     return std::nullopt;
                   });
 }
+
+/// Adds --shard I/N. @param help  which pieces of work are counted
+CLI::Option* add_shard(CLI::App& app, const std::string& help, Shard& shard);
 
 /// Help text of --bits, for all verbs that write images.
 inline constexpr const char* bits_help = "bits per sample: 8, 16 or 32 (default: PNG, JPEG 8, TIFF, EXR 16, PFM 32)";

@@ -363,6 +363,7 @@ def bench(
     pictures_folder: Optional[_Path] = ...,
     threads: Optional[int] = ...,
     time_limit: Optional[float] = ...,
+    shard: Optional[str] = ...,
 ) -> Leaderboard: ...
 
 def calibrate(

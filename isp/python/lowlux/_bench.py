@@ -39,7 +39,7 @@ def _level(name):
 
 
 def bench(methods=None, output=None, *, overwrite=False, levels=("draft", "standard", "high", "best"), seed=None,
-          quick=False, pictures=None, pictures_folder=None, threads=None, time_limit=None):
+          quick=False, pictures=None, pictures_folder=None, threads=None, time_limit=None, shard=None):
     """Score methods of noise reduction next to lowlux's levels, as `lowlux bench --method` does.
 
     methods: {name: method}. A method is a function of a RawImage that returns a RawImage, or an image of (height,
@@ -49,6 +49,7 @@ def bench(methods=None, output=None, *, overwrite=False, levels=("draft", "stand
     output: folder for the page bench.html, methods.csv, methods.json and images; None writes nothing.
     levels: levels of lowlux.denoise to score as well. seed: of scenes and noise. pictures_folder: testdata/pictures of
     lowlux's sources, which a package that is not installed finds by itself. time_limit: of a command [s]; functions have none.
+    shard: "2/3" measures in every third light from the second on, for tasks that share the work.
     All methods are given the same frames. The truth is never passed to them.
     Returns Leaderboard. A method that fails is left out, and a line in failures says why.
     Errors: ArgumentError; NotFoundError without pictures; ExistsError, UnwritableError.
@@ -72,7 +73,7 @@ def bench(methods=None, output=None, *, overwrite=False, levels=("draft", "stand
         else:
             raise ArgumentError(f"methods: {name} is a {type(method).__name__}, not a function, a command or None",
                                 "methods")
-    options = {"seed": seed, "quick": quick, "pictures": pictures, "threads": threads, "time_limit": time_limit,
+    options = {"seed": seed, "quick": quick, "pictures": pictures, "threads": threads, "time_limit": time_limit, "shard": shard,
                "pictures_folder": _pictures() if pictures_folder is None else pictures_folder}
     (found,) = json.loads(_lowlux.bench(output_of(output), overwrite, words_of(options), entries))
     return Leaderboard(found["rows"], found["settings"], found["machine"], found["failures"])
