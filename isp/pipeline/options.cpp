@@ -28,6 +28,10 @@ Result<void> check_options(const DevelopOptions& o) {
     return fail(ErrorCode::invalid_argument,
                 "saturation is that of RGB images as the camera sees them: not with --space camera or xyz, or --look");
   }
+  if (o.local_tone > 0 && (o.tone == ToneCurve::none || has_look)) {
+    return fail(ErrorCode::invalid_argument,
+                "local tone goes with the standard tone curve: not with --tone none, linear spaces or --look");
+  }
   if (o.display && (o.space != OutputSpace::srgb || o.samples == SampleType::f32)) {
     return fail(ErrorCode::invalid_argument, "pictures for another display are sRGB of 8 or 16 bits");
   }

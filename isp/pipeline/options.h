@@ -72,6 +72,7 @@ struct DevelopOptions {
   ToneShape tone_shape;   // of the standard curve
   double saturation = 1;  // factor of the distance to the grey of the same luminance, in linear light
   Highlights highlights = Highlights::clip;
+  double local_tone = 0;             // 0..1, see LocalTone; for images with the standard curve and without a look
   std::optional<double> sharpen_px;  // blur to sharpen for, see CaptureSharpening; absent: none
   OutputSpace space = OutputSpace::srgb;
   SampleType samples = SampleType::u8;     // f32 is scene-linear: signed, unbounded, without tone

@@ -31,6 +31,7 @@ struct DevelopPlan {
   int height = 0;
   std::optional<Framing> framing;    // set: a part of the image is kept, or it is shrunk
   std::optional<double> sharpen_px;  // set: sharpened for this blur; requested, and the noise is known
+  bool local_tone_by_noise = false;  // local tone was requested, and the noise that limits it is known
   double saturation = 1;    // fraction of white at which the sensor saturates; measured where highlights are rebuilt
   bool from_codes = false;  // result of renders_from_codes
   DarkCharge dark;

@@ -105,13 +105,17 @@ TEST_F(FinishOptions, ExposureIsAGainOrAChangeOfTheAutomaticOne) {
 
 TEST_F(FinishOptions, AdjustmentsTakeNumbersInTheirRange) {
   developed({"--brightness", "+0.5EV", "--contrast", "1.2", "--saturation", "0.8", "--highlights", "reconstruct",
-             "--sharpen", "0.7px"});
+             "--sharpen", "0.7px", "--local-tone", "0.4"});
+  EXPECT_EQ(developed({"--local-tone", "1"})["local_tone"], 1);
+  EXPECT_EQ(developed({})["local_tone"], 0);
   developed({"--sharpen", "off", "--highlights", "clip", "--brightness", "0", "--contrast", "1"});
   for (const char* text : {"3", "-3", "x", "nan", ""}) refused({"--brightness", text}, 2, "--brightness");
   for (const char* text : {"0.4", "1.6", "inf"}) refused({"--contrast", text}, 2, "--contrast");
   for (const char* text : {"-1", "3.1", "a lot"}) refused({"--saturation", text}, 2, "--saturation");
   for (const char* text : {"0.2", "2", "on", "-1"}) refused({"--sharpen", text}, 2, "--sharpen");
+  for (const char* text : {"-0.1", "1.1", "nan", "on", ""}) refused({"--local-tone", text}, 2, "--local-tone");
   refused({"--highlights", "rebuild"}, 2, "--highlights");
+  refused({"--tone", "none", "--local-tone", "0.5"}, 2, "local tone");
   refused({"--tone", "none", "--contrast", "1.2"}, 2, "tone curve");
   refused({"--look", "eye", "--scene-luminance", "1", "--saturation", "2"}, 2, "saturation");
 }

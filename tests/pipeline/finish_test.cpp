@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <string>
 
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
+#include "isp/render/local_tone.h"
+#include "isp/render/output_space.h"
 #include "tests/pipeline/night_frames.h"
 #include "tests/support/executors.h"
 
@@ -156,6 +159,111 @@ TEST(Finishing, HasTheSameBitsForAnyThreadsAndWhereTilesAreAskedFor) {
   EXPECT_TRUE(same_bits(one, std::get<SceneLinear>(tiled)));
 }
 
+Encoded16 codes_of(const RawFrame& frame, const DevelopOptions& options, Executor& executor = one_thread) {
+  Result<Developed> developed = develop(frame, options, executor);
+  EXPECT_TRUE(developed) << developed.error().message;
+  return std::get<Encoded16>(std::move(developed->picture));
+}
+
+struct Lightness {
+  double mean = 0, std = 0;
+};
+
+/// Returns mean and standard deviation of CIE L* of grey sRGB codes, 16 px from the border.
+Lightness lightness_of(const Encoded16& picture) {
+  double sum = 0, squares = 0, n = 0;
+  for (int y = 16; y < picture.height() - 16; ++y) {
+    for (int x = 16; x < picture.width() - 16; ++x, ++n) {
+      double light = 0;
+      for (int c = 0; c < 3; ++c) {
+        const double weight[]{0.2126, 0.7152, 0.0722};
+        light += weight[c] * decode_transfer(OutputSpace::srgb, picture.codes.at(3 * x + c, y) / 65535.0);
+      }
+      const double l = light > 216.0 / 24389 ? 116 * std::cbrt(light) - 16 : 24389.0 / 27 * light;
+      sum += l, squares += l * l;
+    }
+  }
+  return {sum / n, std::sqrt(squares / n - (sum / n) * (sum / n))};
+}
+
+TEST(LocalTone, FlatFramesAreLiftedByTheFormula) {
+  for (const double light_e : {30.0, 300.0, 3000.0}) {
+    const RawFrame frame =
+        test::night_frame({.read_noise_e = 1}, denoise_testing::flat(light_e / 2, light_e, light_e * 0.625), 256, 256);
+    for (const double limit_ev : {0.0, 2.0}) {
+      DevelopOptions options{.exposure_ev = limit_ev,
+                             .samples = SampleType::u16,
+                             .denoise = {DenoiseChoice::Mode::level, Level::standard}};
+      options.local_tone = 0.5;
+      const double level = light_e / test::night_full_e() * std::exp2(limit_ev), limit = std::exp2(limit_ev);
+      const double base = std::log2(level / 0.18), white = std::log2(limit / 0.18);
+      const double ev = base < 0 ? -0.5 * base / (1 - base / 6) : -0.5 * base * (1 - base / white);
+      const double shown = apply_tone(ToneCurve::standard, level * std::exp2(ev), limit);
+      const double expected = shown > 216.0 / 24389 ? 116 * std::cbrt(shown) - 16 : 24389.0 / 27 * shown;
+      EXPECT_NEAR(lightness_of(codes_of(frame, options)).mean, expected, 0.5)
+          << light_e << " e-, " << limit_ev << " EV";
+    }
+  }
+}
+
+// Interpolation makes neighbours alike and the toe of the tone curve changes the slope by 0.7 to 1.3.
+TEST(LocalTone, DarkFramesAreNotLiftedBeyondWhatTheirNoiseAllows) {
+  int lifted = 0;
+  for (const double light_e : {0.5, 1.0, 2.0, 5.0, 10.0, 20.0}) {
+    const RawFrame frame =
+        test::night_frame({.read_noise_e = 3}, denoise_testing::flat(light_e / 2, light_e, light_e * 0.625), 256, 256);
+    for (const DenoiseChoice& choice :
+         {DenoiseChoice{.mode = DenoiseChoice::Mode::off}, DenoiseChoice{DenoiseChoice::Mode::level, Level::draft}}) {
+      DevelopOptions options{.exposure_ev = 3, .samples = SampleType::u16, .denoise = choice};
+      const Lightness before = lightness_of(codes_of(frame, options));
+      options.local_tone = 1;
+      const Lightness after = lightness_of(codes_of(frame, options));
+      EXPECT_LE(after.std, std::max(1.3 * local_tone_noise, 1.02 * before.std)) << light_e << " e-";
+      EXPECT_GE(after.mean, 0.99 * before.mean) << light_e << " e-";
+      lifted += after.mean > before.mean + 2;
+    }
+  }
+  EXPECT_GE(lifted, 3);
+}
+
+TEST(LocalTone, WithoutKnownNoiseIsNotLimitedAndSaysSo) {
+  RawFrame frame = lamp_frame();
+  DevelopOptions options{.exposure_ev = 0};
+  options.local_tone = 0.5;
+  const auto known = plan_develop(frame, options, one_thread);
+  frame.noise.reset();
+  const auto unknown = plan_develop(frame, options, one_thread);
+  ASSERT_TRUE(known && unknown);
+  EXPECT_TRUE(known->local_tone_by_noise);
+  EXPECT_FALSE(unknown->local_tone_by_noise);
+  ASSERT_FALSE(unknown->warnings.empty());
+  EXPECT_NE(unknown->warnings.back().find("--local-tone"), std::string::npos);
+}
+
+TEST(LocalTone, HasTheSameCodesForAnyThreadsAndWhereTilesAreAskedFor) {
+  const RawFrame frame = lamp_frame();
+  DevelopOptions options{.exposure_ev = 1,
+                         .highlights = Highlights::reconstruct,
+                         .samples = SampleType::u16,
+                         .denoise = {DenoiseChoice::Mode::level, Level::draft}};
+  options.local_tone = 0.6;
+  for (const std::optional<double>& sharpen_px : {std::optional<double>(), std::optional(0.6)}) {
+    options.sharpen_px = sharpen_px;
+    const Encoded16 one = codes_of(frame, options), two = codes_of(frame, options, test::two_threads);
+    const auto same = [&](const Encoded16& other) {
+      return std::equal(one.codes.data(), one.codes.data() + one.codes.size(), other.codes.data());
+    };
+    EXPECT_TRUE(same(two));
+    const auto plan = plan_develop(frame, options, one_thread);
+    Picture tiled = make_picture(*plan);
+    Pipeline(one_thread, {.max_whole_px = 0, .side_px = 64}).render(frame, *plan, tiled);
+    EXPECT_TRUE(same(std::get<Encoded16>(tiled)));
+    options.local_tone = 0;
+    EXPECT_FALSE(same(codes_of(frame, options)));
+    options.local_tone = 0.6;
+  }
+}
+
 TEST(Adjustments, NeutralValuesChangeNoCodeAndOthersDo) {
   const RawFrame frame = lamp_frame();
   const auto codes = [&](const DevelopOptions& options) {
@@ -208,7 +316,9 @@ TEST(Adjustments, ThatDoNotFitAreRefused) {
   DevelopOptions contrast = floats(), saturation{.look = {.look = Look::eye}};
   contrast.tone_shape.contrast = 1.2;
   saturation.saturation = 1.5;
-  for (const DevelopOptions& options : {contrast, saturation}) {
+  DevelopOptions linear = floats(), eye{.look = {.look = Look::eye}};
+  linear.local_tone = eye.local_tone = 0.5;
+  for (const DevelopOptions& options : {contrast, saturation, linear, eye}) {
     const auto plan = plan_develop(frame, options, one_thread);
     ASSERT_FALSE(plan);
     EXPECT_EQ(plan.error().code, ErrorCode::invalid_argument);

@@ -13,7 +13,7 @@ import pytest
 import lowlux
 
 FIXED = {"output", "overwrite"}  # of Python; --output and --force
-OF_THE_COMMAND = {"help", "help-all", "no-config", "output", "format", "force", "skip-existing", "sync", "jobs", "explain",
+OF_THE_COMMAND = {"help", "help-all", "no-config", "output", "format", "force", "skip-existing", "sync", "jobs", "shard", "explain",
                   "json", "timings",
                   "quiet", "merge"}
 
@@ -38,7 +38,7 @@ DEVELOPED = {
     "night look": dict(look="eye", scene_luminance=0.05, seeing_map=True),
     "16 bits": dict(bits=16, space="rec2020", wb=4000, exposure=1.5, denoise="high"),
     "half size": dict(half=True, exposure=-0.5, black=(500, 501, 502, 503), repair="off"),
-    "finished": dict(wb="tungsten", exposure="auto-0.5", brightness=0.5, contrast=1.2, saturation=1.1, sharpen=0.6,
+    "finished": dict(wb="tungsten", exposure="auto-0.5", brightness=0.5, contrast=1.2, saturation=1.1, local_tone=0.4, sharpen=0.6,
                      highlights="reconstruct", crop=(8, 6, 60, 40), max_size=50),
     "levels": dict(denoise="off", tone="none", effects="all"),
 }

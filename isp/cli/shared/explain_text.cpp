@@ -234,6 +234,11 @@ std::string explain_text(const DevelopOutcome& outcome) {
   if (plan.options.highlights == isp::Highlights::reconstruct) {
     out.add("highlights", fmt::format("reconstructed up to {:.2f} times the scene's white", plan.rendering.limit));
   }
+  if (plan.options.local_tone > 0) {
+    out.add("local tone", fmt::format("{:g}, {}", plan.options.local_tone,
+                                      plan.local_tone_by_noise ? "shadows as far as their noise allows"
+                                                               : "without a limit by noise, which is not known"));
+  }
   if (plan.sharpen_px) out.add("sharpening", fmt::format("of a blur of {:g} pixels", *plan.sharpen_px));
   if (plan.framing) out.add("framing", framing_text(*plan.framing));
   if (plan.rendering.profile) add_profile(out, *plan.rendering.profile);

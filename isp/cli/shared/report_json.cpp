@@ -253,6 +253,7 @@ std::string develop_json(const DevelopOutcome& outcome, const Defaults& defaults
             {"exposure", {{"ev", plan.rendering.exposure_ev}, {"rule", plan.rendering.exposure_rule}}},
             {"highlights", plan.options.highlights == isp::Highlights::clip ? "clip" : "reconstruct"},
             {"sharpen_px", optional_json(plan.sharpen_px)},
+            {"local_tone", plan.options.local_tone},
             {"framing", framing_json(plan)},
             {"defects_repaired", plan.levels.defects.size()},
             {"effects", effects_json(plan)},

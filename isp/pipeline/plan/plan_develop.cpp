@@ -167,12 +167,14 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
     plan.warnings.emplace_back("the noise of the frame is not known, so it is not held to a limit");
   }
   if (options.highlights == Highlights::reconstruct) plan.saturation = measure_saturation(frame.raw, levels->black);
-  if (options.sharpen_px) {
-    if (noise->has_level() || frame.noise) {
-      plan.sharpen_px = options.sharpen_px;
-    } else {
-      plan.warnings.emplace_back("the noise of the frame is not known, so the image is not sharpened");
-    }
+  const bool knows_noise = noise->has_level() || frame.noise;
+  if (knows_noise) plan.sharpen_px = options.sharpen_px;
+  plan.local_tone_by_noise = knows_noise && options.local_tone > 0;
+  if (options.sharpen_px && !knows_noise) {
+    plan.warnings.emplace_back("the noise of the frame is not known, so the image is not sharpened");
+  }
+  if (options.local_tone > 0 && !knows_noise) {
+    plan.warnings.emplace_back("the noise of the frame is not known, so it does not limit --local-tone");
   }
   std::vector<float> memory;
   DemosaicRequest interpolation{.method = options.demosaic, .signal_e = median_green_e(frame, *levels, light, memory)};

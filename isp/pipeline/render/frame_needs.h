@@ -16,13 +16,14 @@ inline bool needs_table(const DevelopPlan& plan) { return plan.rendering.look &&
 
 /// Returns whether camera RGB is changed after demosaicing and before colour, as a whole.
 inline bool finishes(const DevelopPlan& plan) {
-  return plan.options.highlights == Highlights::reconstruct || plan.sharpen_px;
+  return plan.options.highlights == Highlights::reconstruct || plan.sharpen_px || plan.options.local_tone > 0;
 }
 
-/// Returns whether the noise of each part of the image is needed: to hold it to a limit, to sharpen above it, or by a
-/// model that weighs it.
+/// Returns whether the noise of each part of the image is needed: to hold it to a limit, to sharpen above it, to lift
+/// shadows no further than it allows, or by a model that weighs it.
 inline bool needs_noise(const DevelopPlan& plan) {
-  return bounds_noise(plan) || plan.sharpen_px || (needs_table(plan) && plan.rendering.look->table->by_noise);
+  return bounds_noise(plan) || plan.sharpen_px || plan.local_tone_by_noise ||
+         (needs_table(plan) && plan.rendering.look->table->by_noise);
 }
 
 inline bool needs_grid(const DevelopPlan& plan) {

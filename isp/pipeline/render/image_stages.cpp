@@ -10,6 +10,7 @@
 #include "isp/raw/bin_plane.h"
 #include "isp/render/capture_sharpening.h"
 #include "isp/render/highlights.h"
+#include "isp/render/local_tone.h"
 #include "isp/render/night/seeing_map.h"
 #include "isp/render/profile_tables.h"
 
@@ -131,6 +132,19 @@ void ImageStages::sharpen(const RawFrame& frame, const DevelopPlan& plan, const 
   sharpen_capture(how, std::as_const(variance).view(), planes, executor_);
 }
 
+void ImageStages::change_local_tone(const RawFrame& frame, const DevelopPlan& plan, const NoiseMaps& maps,
+                                    const RgbView<float>& planes) {
+  const LocalTone how{.share = static_cast<float>(plan.options.local_tone),
+                      .luminance = luminance_of_camera(plan),
+                      .limit = static_cast<float>(plan.rendering.limit)};
+  PlaneView<const float> variance;
+  if (plan.local_tone_by_noise) {
+    measure_cells(CameraPlanes{constant(planes), {1, 1, 1}}, frame, plan, maps);
+    variance = std::as_const(luminance_noise_).view();
+  }
+  apply_local_tone(how, variance, planes, executor_);
+}
+
 CameraPlanes ImageStages::finish(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan,
                                  const NoiseMaps& maps) {
   fit(finished_, plan.width, plan.height);
@@ -140,6 +154,7 @@ CameraPlanes ImageStages::finish(const RgbInput& in, const RawFrame& frame, cons
     reconstruct_highlights(planes, saturation_of(plan), executor_);
   }
   if (plan.sharpen_px) sharpen(frame, plan, maps, planes);
+  if (plan.options.local_tone > 0) change_local_tone(frame, plan, maps, planes);
   return {constant(planes), {1, 1, 1}};
 }
 

@@ -42,7 +42,8 @@ class ImageStages {
   /// Returns camera RGB of half the size: each cell of a mosaic, or 2 x 2 pixels, become one pixel.
   CameraPlanes halve(const RgbInput& in);
 
-  /// Rebuilds highlights and sharpens, as planned; returns white-balanced camera RGB. Precondition: finishes(plan).
+  /// Rebuilds highlights, sharpens and changes local tone, as planned; returns white-balanced camera RGB. Precondition:
+  /// finishes(plan).
   CameraPlanes finish(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan, const NoiseMaps& maps);
 
   /// Changes the light as the plan's look or profile requests, and returns what remains to be done.
@@ -54,6 +55,8 @@ class ImageStages {
 
  private:
   void sharpen(const RawFrame& frame, const DevelopPlan& plan, const NoiseMaps& maps, const RgbView<float>& planes);
+  void change_local_tone(const RawFrame& frame, const DevelopPlan& plan, const NoiseMaps& maps,
+                         const RgbView<float>& planes);
   void measure_cells(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan, const NoiseMaps& maps);
   RgbView<const float> quarter_view() const;
   void map_seeing_of(const DevelopPlan& plan);
@@ -65,7 +68,7 @@ class ImageStages {
   std::unique_ptr<RawToRgb> kernel_;
   int kernel_width_ = 0;
   std::array<Plane<float>, 3> half_;
-  std::array<Plane<float>, 3> finished_;  // white-balanced camera RGB, highlights rebuilt or sharpened
+  std::array<Plane<float>, 3> finished_;  // white-balanced camera RGB, finished
   std::array<Plane<float>, 3> modelled_;  // light as changed by a model of appearance or a profile
   std::array<Plane<float>, 3> quarter_;   // for the look: means of 4 x 4 pixels
   Plane<float> luminance_noise_;          // variance, for the cells of quarter_

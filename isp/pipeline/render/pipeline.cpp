@@ -72,7 +72,7 @@ void Pipeline::render_region(const RawFrame& frame, const DevelopPlan& plan, con
                              const Encode& encode) {
   RgbInput camera = camera_rgb(frame, plan, region);  // black, repair, lines, noise, dark, flat field
   if (plan.options.half) camera = image_.halve(camera);
-  if (finishes(plan)) camera = image_.finish(camera, frame, plan, noise_maps_);  // highlights, sharpening
+  if (finishes(plan)) camera = image_.finish(camera, frame, plan, noise_maps_);  // highlights, sharpening, local tone
   const ImageStages::Light light = image_.look(camera, frame, plan, noise_maps_);
   encode(light.in, light.transform);
 }

@@ -77,7 +77,8 @@ std::size_t expected_bytes(const RawDn& raw, const DevelopOptions& options, int 
                                      : options.crop   ? picture
                                                       : 0;
   // Camera RGB, and while it is sharpened the luminance, its detail, powers, means and places near saturation.
-  const std::size_t finish_planes = options.sharpen_px ? 12 : options.highlights == Highlights::reconstruct ? 4 : 0;
+  const bool finishes = options.highlights == Highlights::reconstruct || options.local_tone > 0;
+  const std::size_t finish_planes = options.sharpen_px ? 12 : finishes ? 4 : 0;
   const std::size_t finishing = finish_planes * sizeof(float) * area(most.width, most.height);
   const std::size_t dark = options.dark_frame ? sizeof(float) * area(raw.active.width, raw.active.height) : 0;
   const std::size_t turned = raw.info.orientation == Orientation::normal ? 0 : picture;

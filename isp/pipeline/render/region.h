@@ -54,8 +54,8 @@ RegionSize largest_tile(const RawDn& raw, const DevelopPlan& plan, const TileLim
 /// Returns whether a frame is rendered in tiles: a Bayer frame above TileLimits::max_whole_px whose mosaic is
 /// processed in floats. Frames rendered directly from codes need no mosaic. Never split, whatever their size, are
 /// frames that are demosaiced or monochrome, looks that are made of the entire image or tabulated (`--look`), noise
-/// that is held to a limit, maps of the noise, reconstructed highlights, sharpening, and frames in which previous ones
-/// take part.
+/// that is held to a limit, maps of the noise, reconstructed highlights, sharpening, local tone, and frames in which
+/// previous ones take part.
 bool is_tiled(const RawDn& raw, const DevelopPlan& plan, const TileLimits& limits);
 
 }  // namespace lowlux::isp

@@ -184,6 +184,7 @@ def develop(
     demosaic: Optional[str] = ...,
     half: bool = ...,
     highlights: Optional[Literal["clip", "reconstruct"]] = ...,
+    local_tone: Optional[float] = ...,
     sharpen: Union[str, float, None] = ...,
     crop: Union[str, _Numbers, None] = ...,
     max_size: Optional[int] = ...,

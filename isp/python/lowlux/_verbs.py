@@ -79,7 +79,7 @@ def _reference(reference, inputs):
 
 def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, exposure=None, wb=None, tone=None,
             brightness=None, contrast=None, saturation=None, space=None, demosaic=None, half=False,
-            highlights=None, sharpen=None, crop=None, max_size=None, baseline_exposure=None,
+            highlights=None, local_tone=None, sharpen=None, crop=None, max_size=None, baseline_exposure=None,
             camera_profile=None, look=None, scene_luminance=None, field_of_view=None, light=None,
             adaptation_degree=None, effects=None, tolerance=None, dimming=None, noise_limit=None, coefficients=None,
             display_luminance=None, seeing_map=False, black=None, profile=None, gain_setting=None, noise=None,
@@ -94,7 +94,7 @@ def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, expos
     bits: 8 (default), 16 or 32 bits per sample of the image; with an output the default is that of its format.
     exposure: gain [EV], "auto", or a change of it ("auto+1"). wb: as --wb, or a temperature [K], or gains (r, g, b). tone: "standard" or "none".
     brightness: [EV] of mid-tones. contrast, saturation: factors. highlights: "clip" or "reconstruct".
-    sharpen: blur to sharpen for [px], or "off".
+    local_tone: 0 to 1, shadows brighter and lights darker. sharpen: blur to sharpen for [px], or "off".
     crop: (x, y, width, height) of the upright image [px], or "10%,10%,80%,80%". max_size: longer side [px].
     space: "srgb", "p3", "rec2020", "linear-srgb", "linear-rec2020", "xyz" or "camera"; 32 bits are linear.
     black: "auto", "metadata", "masked", one level or four of the 2x2 cell [DN], or a profile.

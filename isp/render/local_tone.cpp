@@ -1,0 +1,202 @@
+#include "isp/render/local_tone.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+namespace lowlux::isp {
+namespace {
+
+constexpr int cell_px = 4;
+constexpr float middle_grey = 0.18f;
+constexpr float detail_variance = 0.25f;  // of l [EV^2]: half an EV of contrast is still detail
+constexpr int windows_across = 20;        // squares along the longer side
+constexpr float most_lift_ev = 6;         // the limit of t / (1 + t / 6)
+constexpr float unknown_noise = 0x1p-12f * middle_grey;
+
+/// Holds one value of each kind for each cell.
+struct Cells {
+  Plane<float> slope, level;  // a and b
+  Plane<float> noise;         // n
+  Plane<float> most_lift;     // M [EV]
+};
+
+float luminance_of(const LocalTone& how, float r, float g, float b) {
+  return how.luminance[0] * r + how.luminance[1] * g + how.luminance[2] * b;
+}
+
+float log_level(float luminance, float noise) { return std::log2((std::max(luminance, 0.0f) + noise) / middle_grey); }
+
+/// Returns the means of the luminance of cells; those at the right and lower border may be smaller than 4 x 4 pixels.
+Plane<float> cell_means(const LocalTone& how, const RgbView<float>& rgb, Executor& executor) {
+  const int width = rgb[0].width, height = rgb[0].height;
+  Plane<float> out((width + cell_px - 1) / cell_px, (height + cell_px - 1) / cell_px);
+  for_each_band(executor, out.height(), [&](const RowBand& band, int /*index*/) {
+    for (int cy = band.first; cy < band.last; ++cy) {
+      const int last = std::min(height, cell_px * (cy + 1));
+      for (int cx = 0; cx < out.width(); ++cx) {
+        const int end = std::min(width, cell_px * (cx + 1));
+        float sum = 0;
+        for (int y = cell_px * cy; y < last; ++y) {
+          const float *r = rgb[0].row(y), *g = rgb[1].row(y), *b = rgb[2].row(y);
+          for (int x = cell_px * cx; x < end; ++x) sum += luminance_of(how, r[x], g[x], b[x]);
+        }
+        out.at(cx, cy) = sum / static_cast<float>((last - cell_px * cy) * (end - cell_px * cx));
+      }
+    }
+  });
+  return out;
+}
+
+/// Replaces values by their means over squares of 2 reach + 1, cut off at the borders. Sums run along whole rows and
+/// columns, so that they do not depend on the number of threads.
+void average(Plane<float>& plane, int reach, Executor& executor) {
+  const int width = plane.width(), height = plane.height();
+  Plane<float> rows(width, height);
+  for_each_band(executor, height, [&](const RowBand& band, int /*index*/) {
+    for (int y = band.first; y < band.last; ++y) {
+      double sum = 0;
+      for (int x = -reach; x < width; ++x) {
+        if (x + reach < width) sum += plane.at(x + reach, y);
+        if (x < 0) continue;
+        if (x > reach) sum -= plane.at(x - reach - 1, y);
+        rows.at(x, y) = static_cast<float>(sum / (std::min(width - 1, x + reach) - std::max(0, x - reach) + 1));
+      }
+    }
+  });
+  for_each_band(executor, width, [&](const RowBand& columns, int /*index*/) {
+    std::vector<double> sum(static_cast<std::size_t>(columns.last - columns.first));
+    const auto add = [&](int y, double sign) {
+      for (int x = columns.first; x < columns.last; ++x)
+        sum[static_cast<std::size_t>(x - columns.first)] += sign * rows.at(x, y);
+    };
+    for (int y = -reach; y < height; ++y) {
+      if (y + reach < height) add(y + reach, 1);
+      if (y < 0) continue;
+      if (y > reach) add(y - reach - 1, -1);
+      const double count = std::min(height - 1, y + reach) - std::max(0, y - reach) + 1;
+      for (int x = columns.first; x < columns.last; ++x) {
+        plane.at(x, y) = static_cast<float>(sum[static_cast<std::size_t>(x - columns.first)] / count);
+      }
+    }
+  });
+}
+
+/// Calls change(x, y) for each cell.
+template <class Change>
+void for_each_cell(const Plane<float>& cells, Executor& executor, const Change& change) {
+  for_each_band(executor, cells.height(), [&](const RowBand& band, int /*index*/) {
+    for (int y = band.first; y < band.last; ++y) {
+      for (int x = 0; x < cells.width(); ++x) change(x, y);
+    }
+  });
+}
+
+/// Returns the lift in EV, 0 or more, at which noise has the CIE L* local_tone_noise: dL*/dY is 903.3 up to Y =
+/// 0.008856, and 116/3 Y^(-2/3) above.
+float largest_lift_ev(float luminance, float noise) {
+  constexpr double dark = 216.0 / 24389, dark_slope = 24389.0 / 27;
+  if (!(noise > 0)) return std::numeric_limits<float>::max();
+  const double y = std::max(luminance, 0.0f), sigma = noise;
+  double gain = local_tone_noise / (dark_slope * sigma);
+  if (gain * y > dark) gain = std::pow(3 * local_tone_noise / (116 * sigma), 3) * y * y;
+  return static_cast<float>(std::log2(std::clamp(gain, 1.0, 1e9)));
+}
+
+Cells cells_of(const LocalTone& how, const PlaneView<const float>& variance, const RgbView<float>& rgb,
+               Executor& executor) {
+  Plane<float> level = cell_means(how, rgb, executor);
+  const int width = level.width(), height = level.height();
+  const bool known = variance.data != nullptr;
+  const int reach = std::max(1, std::max(width, height) / (2 * windows_across));
+  Cells out{Plane<float>(width, height), Plane<float>(width, height), Plane<float>(width, height),
+            Plane<float>(width, height)};
+  for_each_cell(level, executor, [&](int x, int y) {
+    const float own = known ? how.limit * std::sqrt(std::max(variance.row(y)[x], 0.0f)) : 0;
+    const float noise = std::max(own, unknown_noise);
+    out.noise.at(x, y) = noise;
+    level.at(x, y) = log_level(level.at(x, y), noise);
+    out.slope.at(x, y) = level.at(x, y) * level.at(x, y);
+  });
+  Plane<float> mean = level.clone();
+  average(mean, reach, executor);
+  average(out.slope, reach, executor);
+  for_each_cell(level, executor, [&](int x, int y) {
+    const float m = mean.at(x, y), v = std::max(out.slope.at(x, y) - m * m, 0.0f), a = v / (v + detail_variance);
+    out.slope.at(x, y) = a;
+    out.level.at(x, y) = (1 - a) * m;
+  });
+  average(out.slope, reach, executor);
+  average(out.level, reach, executor);
+  for_each_cell(level, executor, [&](int x, int y) {
+    const float base = out.slope.at(x, y) * level.at(x, y) + out.level.at(x, y), noise = out.noise.at(x, y);
+    out.most_lift.at(x, y) =
+        known ? largest_lift_ev(middle_grey * std::exp2(base) - noise, noise) : std::numeric_limits<float>::max();
+  });
+  return out;
+}
+
+/// Returns e for a B.
+float change_ev(const LocalTone& how, float white_ev, float base_ev, float most_lift_ev_here) {
+  if (base_ev < 0) return std::min(how.share * -base_ev / (1 - base_ev / most_lift_ev), most_lift_ev_here);
+  const float b = std::min(base_ev, white_ev);
+  return -how.share * b * (1 - b / white_ev);
+}
+
+/// Interpolates the rows of cells next to a row of pixels.
+class RowOfCells {
+ public:
+  explicit RowOfCells(int width) : values_(static_cast<std::size_t>(width)) {}
+
+  void set(const Plane<float>& cells, int y) {
+    const float place =
+        std::clamp((static_cast<float>(y) + 0.5f) / cell_px - 0.5f, 0.0f, static_cast<float>(cells.height() - 1));
+    const int above = static_cast<int>(place), below = std::min(above + 1, cells.height() - 1);
+    const float part = place - static_cast<float>(above);
+    const float *const from = cells.row(above), *const to = cells.row(below);
+    for (std::size_t x = 0; x < values_.size(); ++x) values_[x] = from[x] + part * (to[x] - from[x]);
+  }
+  float at(int x) const {
+    const int last = static_cast<int>(values_.size()) - 1;
+    const float place = std::clamp((static_cast<float>(x) + 0.5f) / cell_px - 0.5f, 0.0f, static_cast<float>(last));
+    const auto left = static_cast<std::size_t>(place);
+    const std::size_t right = std::min(left + 1, values_.size() - 1);
+    return values_[left] + (place - static_cast<float>(left)) * (values_[right] - values_[left]);
+  }
+
+ private:
+  std::vector<float> values_;
+};
+
+}  // namespace
+
+void apply_local_tone(const LocalTone& relative, PlaneView<const float> variance, const RgbView<float>& rgb,
+                      Executor& executor) {
+  const int width = rgb[0].width, height = rgb[0].height;
+  if (!(relative.share > 0) || width == 0 || height == 0) return;
+  LocalTone how = relative;
+  for (float& weight : how.luminance) weight *= how.limit;
+  const Cells cells = cells_of(how, variance, rgb, executor);
+  const float white_ev = std::log2(how.limit / middle_grey);
+  for_each_band(executor, height, [&](const RowBand& band, int /*index*/) {
+    RowOfCells slope(cells.slope.width()), level = slope, noise = slope, most_lift = slope;
+    for (int y = band.first; y < band.last; ++y) {
+      slope.set(cells.slope, y);
+      level.set(cells.level, y);
+      noise.set(cells.noise, y);
+      most_lift.set(cells.most_lift, y);
+      float *const r = rgb[0].row(y), *const g = rgb[1].row(y), *const b = rgb[2].row(y);
+      for (int x = 0; x < width; ++x) {
+        const float base = slope.at(x) * log_level(luminance_of(how, r[x], g[x], b[x]), noise.at(x)) + level.at(x);
+        const float gain = std::exp2(change_ev(how, white_ev, base, most_lift.at(x)));
+        r[x] *= gain;
+        g[x] *= gain;
+        b[x] *= gain;
+      }
+    }
+  });
+}
+
+}  // namespace lowlux::isp
