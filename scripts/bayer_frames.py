@@ -51,3 +51,23 @@ def of_sites(of_colours, cfa):
     """Return what each site of the 2 x 2 cell has, of values of R, G and B."""
     _, np = import_lowlux()
     return np.asarray(of_colours)[["RGB".index(colour) for colour in cfa]].reshape(2, 2)
+
+
+def pack(mosaic, cfa):
+    """Return the half-size planes R, G next to R, G next to B, B. A cell begins at its R, whatever the phase; what a
+    mosaic lacks of its first and last cells is its reflection."""
+    _, np = import_lowlux()
+    top, left = divmod(cfa.index("R"), 2)
+    height, width = mosaic.shape
+    padded = np.pad(mosaic, ((top, (top + height) % 2), (left, (left + width) % 2)), mode="reflect")
+    return np.stack([padded[y::2, x::2] for y in (0, 1) for x in (0, 1)])
+
+
+def unpack(planes, cfa, shape):
+    """Return the mosaic of height x width that pack() made planes of."""
+    _, np = import_lowlux()
+    top, left = divmod(cfa.index("R"), 2)
+    mosaic = np.empty((2 * planes.shape[1], 2 * planes.shape[2]), planes.dtype)
+    for plane, (y, x) in zip(planes, np.ndindex(2, 2)):
+        mosaic[y::2, x::2] = plane
+    return mosaic[top:top + shape[0], left:left + shape[1]]
