@@ -1,9 +1,10 @@
 #include "isp/render/local_tone.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
-#include <limits>
+#include <cstdint>
 #include <vector>
 
 namespace lowlux::isp {
@@ -98,7 +99,6 @@ void for_each_cell(const Plane<float>& cells, Executor& executor, const Change& 
 /// 0.008856, and 116/3 Y^(-2/3) above.
 float largest_lift_ev(float luminance, float noise) {
   constexpr double dark = 216.0 / 24389, dark_slope = 24389.0 / 27;
-  if (!(noise > 0)) return std::numeric_limits<float>::max();
   const double y = std::max(luminance, 0.0f), sigma = noise;
   double gain = local_tone_noise / (dark_slope * sigma);
   if (gain * y > dark) gain = std::pow(3 * local_tone_noise / (116 * sigma), 3) * y * y;
@@ -132,23 +132,37 @@ Cells cells_of(const LocalTone& how, const PlaneView<const float>& variance, con
   average(out.level, reach, executor);
   for_each_cell(level, executor, [&](int x, int y) {
     const float base = out.slope.at(x, y) * level.at(x, y) + out.level.at(x, y), noise = out.noise.at(x, y);
-    out.most_lift.at(x, y) =
-        known ? largest_lift_ev(middle_grey * std::exp2(base) - noise, noise) : std::numeric_limits<float>::max();
+    out.most_lift.at(x, y) = known ? largest_lift_ev(middle_grey * std::exp2(base) - noise, noise) : most_lift_ev;
   });
   return out;
 }
 
-/// Returns e for a B.
-float change_ev(const LocalTone& how, float white_ev, float base_ev, float most_lift_ev_here) {
-  if (base_ev < 0) return std::min(how.share * -base_ev / (1 - base_ev / most_lift_ev), most_lift_ev_here);
-  const float b = std::min(base_ev, white_ev);
-  return -how.share * b * (1 - b / white_ev);
+/// Returns log2(x) of a normal number above 0, within 1e-6; for loops that the compiler vectorises.
+float fast_log2(float x) {
+  constexpr std::int32_t half_root = 0x3f3504f3;  // sqrt(1/2): mantissas are 0.707 to 1.414
+  const auto bits = std::bit_cast<std::int32_t>(x);
+  const std::int32_t exponent = (bits - half_root) >> 23;
+  const auto mantissa = std::bit_cast<float>(bits - exponent * (1 << 23));
+  const float t = (mantissa - 1) / (mantissa + 1), t2 = t * t;  // log2 m = 2 / ln 2 artanh t
+  const float series = t * (2.88539008f + t2 * (0.961796694f + t2 * (0.577078016f + t2 * 0.412198583f)));
+  return static_cast<float>(exponent) + series;
 }
 
-/// Interpolates the rows of cells next to a row of pixels.
-class RowOfCells {
+/// Returns 2^x for |x| below 126, within 1e-6 of itself.
+float fast_exp2(float x) {
+  const std::int32_t whole = static_cast<std::int32_t>(x + 128.5f) - 128;
+  const float f = x - static_cast<float>(whole);  // -0.5..0.5: powers of f ln 2 over factorials
+  const float series =
+      1 +
+      f * (0.693147181f +
+           f * (0.240226507f + f * (0.0555041087f + f * (0.00961812911f + f * (0.00133335581f + f * 1.54035304e-4f)))));
+  return series * std::bit_cast<float>((whole + 127) << 23);
+}
+
+/// Values of a row of pixels, interpolated between the centres of the cells around them.
+class PixelRow {
  public:
-  explicit RowOfCells(int width) : values_(static_cast<std::size_t>(width)) {}
+  explicit PixelRow(int width) : values_(static_cast<std::size_t>(width)) {}
 
   void set(const Plane<float>& cells, int y) {
     const float place =
@@ -156,19 +170,37 @@ class RowOfCells {
     const int above = static_cast<int>(place), below = std::min(above + 1, cells.height() - 1);
     const float part = place - static_cast<float>(above);
     const float *const from = cells.row(above), *const to = cells.row(below);
-    for (std::size_t x = 0; x < values_.size(); ++x) values_[x] = from[x] + part * (to[x] - from[x]);
+    const auto cell = [&](int x) { return from[x] + part * (to[x] - from[x]); };
+    const int width = static_cast<int>(values_.size());
+    float left = cell(0);
+    std::fill_n(values_.begin(), std::min(cell_px / 2, width), left);
+    for (int x = cell_px / 2, i = 1; x < width; x += cell_px, ++i) {
+      const float right = i < cells.width() ? cell(i) : left, step = (right - left) / cell_px;
+      for (int k = 0; k < std::min(cell_px, width - x); ++k) {
+        values_[static_cast<std::size_t>(x + k)] = left + (static_cast<float>(k) + 0.5f) * step;
+      }
+      left = right;
+    }
   }
-  float at(int x) const {
-    const int last = static_cast<int>(values_.size()) - 1;
-    const float place = std::clamp((static_cast<float>(x) + 0.5f) / cell_px - 0.5f, 0.0f, static_cast<float>(last));
-    const auto left = static_cast<std::size_t>(place);
-    const std::size_t right = std::min(left + 1, values_.size() - 1);
-    return values_[left] + (place - static_cast<float>(left)) * (values_[right] - values_[left]);
-  }
+  const float* data() const { return values_.data(); }
 
  private:
   std::vector<float> values_;
 };
+
+/// Computes 2^e of a row of pixels from the luminance in `gain`.
+void luminance_to_gain(const LocalTone& how, const PixelRow& slope, const PixelRow& level, const PixelRow& noise,
+                       const PixelRow& most_lift, std::vector<float>& gain) {
+  const float share = how.share, white_ev = std::log2(how.limit / middle_grey);
+  const float *const a = slope.data(), *const b = level.data(), *const n = noise.data(), *const most = most_lift.data();
+  float* const g = gain.data();
+  for (std::size_t x = 0; x < gain.size(); ++x) {
+    const float base = a[x] * fast_log2((std::max(g[x], 0.0f) + n[x]) / middle_grey) + b[x];
+    const float dark = std::max(-base, 0.0f), light = std::clamp(base, 0.0f, white_ev);
+    const float lift = std::min(share * dark / (1 + dark / most_lift_ev), most[x]);
+    g[x] = fast_exp2(lift - share * light * (1 - light / white_ev));
+  }
+}
 
 }  // namespace
 
@@ -179,21 +211,19 @@ void apply_local_tone(const LocalTone& relative, PlaneView<const float> variance
   LocalTone how = relative;
   for (float& weight : how.luminance) weight *= how.limit;
   const Cells cells = cells_of(how, variance, rgb, executor);
-  const float white_ev = std::log2(how.limit / middle_grey);
   for_each_band(executor, height, [&](const RowBand& band, int /*index*/) {
-    RowOfCells slope(cells.slope.width()), level = slope, noise = slope, most_lift = slope;
+    PixelRow slope(width), level(width), noise(width), most_lift(width);
+    std::vector<float> gain(static_cast<std::size_t>(width));
     for (int y = band.first; y < band.last; ++y) {
       slope.set(cells.slope, y);
       level.set(cells.level, y);
       noise.set(cells.noise, y);
       most_lift.set(cells.most_lift, y);
       float *const r = rgb[0].row(y), *const g = rgb[1].row(y), *const b = rgb[2].row(y);
-      for (int x = 0; x < width; ++x) {
-        const float base = slope.at(x) * log_level(luminance_of(how, r[x], g[x], b[x]), noise.at(x)) + level.at(x);
-        const float gain = std::exp2(change_ev(how, white_ev, base, most_lift.at(x)));
-        r[x] *= gain;
-        g[x] *= gain;
-        b[x] *= gain;
+      for (int x = 0; x < width; ++x) gain[static_cast<std::size_t>(x)] = luminance_of(how, r[x], g[x], b[x]);
+      luminance_to_gain(how, slope, level, noise, most_lift, gain);
+      for (float* const channel : {r, g, b}) {
+        for (int x = 0; x < width; ++x) channel[x] *= gain[static_cast<std::size_t>(x)];
       }
     }
   });
