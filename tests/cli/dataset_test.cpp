@@ -113,7 +113,7 @@ TEST_P(DatasetFormats, ShardsHaveTheBytesOfTheWholeAndManifestsTheirHashes) {
       for (const Json& part : sample["files"]) {
         const auto hash = cli::sha256_of_file(file("shards/" + part["name"].get<std::string>()));
         ASSERT_TRUE(hash);
-        EXPECT_EQ(hash->sha256, part["sha256"]);
+        EXPECT_EQ(part["sha256"], hash->sha256);
         EXPECT_EQ(hash->bytes, part["bytes"]);
         ++listed;
       }
