@@ -201,7 +201,7 @@ RawFrame ExposedSensor::described(Plane<std::uint16_t> codes) const {
   }
   const double scale = storage_.scale, offset = storage_.offset_dn;
   out.raw.black_tag = BlackLevel{1, 1, 1, {scale * (s.black_level_dn + offset)}, {}, {}};
-  out.raw.white_dn.fill(std::min(65535.0, scale * (s.black_level_dn + range_dn(s) + offset)));
+  out.raw.white_dn.fill(std::round(std::min(65535.0, scale * (s.black_level_dn + range_dn(s) + offset))));
   FrameInfo& info = out.raw.info;
   info.make = "lowlux";
   const std::string& gain = camera_.sensor.gain_setting;

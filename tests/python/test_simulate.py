@@ -48,6 +48,18 @@ def test_the_noise_of_simulated_frames_is_that_of_their_truth():
     assert abs(excess.mean()) < 5 * excess.std() / np.sqrt(n)
 
 
+def test_frames_have_the_white_level_of_their_files(tmp_path, rng):
+    """So that what is made of them in memory can be written like them."""
+    for _ in range(12):
+        name = str(rng.choice(["ELD_CanonEOS5D4", "ELD_CanonEOS700D", "ELD_NikonD850", "ELD_SonyA7S2"]))
+        frame = lowlux.simulate("flat", sensor=name, size=(32, 24), system_gain=float(np.exp(rng.uniform(-2, 2))),
+                                no_truth=True).frames[0]
+        lowlux.write_dng(tmp_path / "codes.dng", frame.raw_image, like=frame, overwrite=True)
+        lowlux.write_dng(tmp_path / "floats.dng", frame.raw_image.astype(np.float32), like=frame, overwrite=True)
+        for file in ("codes.dng", "floats.dng"):
+            assert (lowlux.read_raw(tmp_path / file).white_dn == frame.white_dn).all(), name
+
+
 def test_the_blur_of_the_lens_is_in_frames_and_truth():
     sharp, blurred = (lowlux.simulate("chart", **SCENE, effects="all", **lens) for lens in ({}, dict(lens_blur=1.5)))
     none = lowlux.simulate("chart", **SCENE, effects="all", lens_blur=0)
