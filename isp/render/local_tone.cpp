@@ -172,13 +172,12 @@ class PixelRow {
     const float *const from = cells.row(above), *const to = cells.row(below);
     const auto cell = [&](int x) { return from[x] + part * (to[x] - from[x]); };
     const int width = static_cast<int>(values_.size());
+    float* const out = values_.data();
     float left = cell(0);
-    std::fill_n(values_.begin(), std::min(cell_px / 2, width), left);
+    std::fill_n(out, std::min(cell_px / 2, width), left);
     for (int x = cell_px / 2, i = 1; x < width; x += cell_px, ++i) {
       const float right = i < cells.width() ? cell(i) : left, step = (right - left) / cell_px;
-      for (int k = 0; k < std::min(cell_px, width - x); ++k) {
-        values_[static_cast<std::size_t>(x + k)] = left + (static_cast<float>(k) + 0.5f) * step;
-      }
+      for (int k = 0; k < std::min(cell_px, width - x); ++k) out[x + k] = left + (static_cast<float>(k) + 0.5f) * step;
       left = right;
     }
   }
@@ -204,13 +203,13 @@ void luminance_to_gain(const LocalTone& how, const PixelRow& slope, const PixelR
 
 }  // namespace
 
-void apply_local_tone(const LocalTone& relative, PlaneView<const float> variance, const RgbView<float>& rgb,
+void apply_local_tone(const LocalTone& how, PlaneView<const float> variance, const RgbView<float>& rgb,
                       Executor& executor) {
   const int width = rgb[0].width, height = rgb[0].height;
-  if (!(relative.share > 0) || width == 0 || height == 0) return;
-  LocalTone how = relative;
-  for (float& weight : how.luminance) weight *= how.limit;
-  const Cells cells = cells_of(how, variance, rgb, executor);
+  if (!(how.share > 0) || width == 0 || height == 0) return;
+  LocalTone in_light = how;  // with luminance as scene-linear values
+  for (float& weight : in_light.luminance) weight *= how.limit;
+  const Cells cells = cells_of(in_light, variance, rgb, executor);
   for_each_band(executor, height, [&](const RowBand& band, int /*index*/) {
     PixelRow slope(width), level(width), noise(width), most_lift(width);
     std::vector<float> gain(static_cast<std::size_t>(width));
@@ -220,7 +219,7 @@ void apply_local_tone(const LocalTone& relative, PlaneView<const float> variance
       noise.set(cells.noise, y);
       most_lift.set(cells.most_lift, y);
       float *const r = rgb[0].row(y), *const g = rgb[1].row(y), *const b = rgb[2].row(y);
-      for (int x = 0; x < width; ++x) gain[static_cast<std::size_t>(x)] = luminance_of(how, r[x], g[x], b[x]);
+      for (int x = 0; x < width; ++x) gain[static_cast<std::size_t>(x)] = luminance_of(in_light, r[x], g[x], b[x]);
       luminance_to_gain(how, slope, level, noise, most_lift, gain);
       for (float* const channel : {r, g, b}) {
         for (int x = 0; x < width; ++x) channel[x] *= gain[static_cast<std::size_t>(x)];

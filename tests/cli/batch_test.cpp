@@ -41,7 +41,7 @@ class Batch : public test::SimulateCommand {
     std::ranges::sort(found);
     return found;
   }
-  void refused(const test::ProcessResult& result, const std::string& why, int exit_code = 2) {
+  static void refused(const test::ProcessResult& result, const std::string& why, int exit_code = 2) {
     EXPECT_EQ(result.exit_code, exit_code) << result.err;
     EXPECT_NE(result.err.find(why), std::string::npos) << result.err;
     EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
@@ -66,7 +66,7 @@ TEST_F(Batch, ExistingOutputsAreSkippedAndCounted) {
   EXPECT_EQ(report[1], Json({{"file", file("b.dng")}, {"ok", true}, {"output", file("out/b.png")}, {"skipped", true}}));
   EXPECT_EQ(names_in("out"), (std::vector<std::string>{"a.png", "b.png", "c.png"}));
   EXPECT_EQ(test::read_file(file("out/b.png")), before);
-  args.push_back("--force");
+  args.emplace_back("--force");
   refused(lowlux(args), "--force");
   const auto cleaned = [&] {
     return lowlux({"denoise", file("a.dng"), "-o", file("clean.dng"), "--skip-existing", "--sync"});
@@ -160,7 +160,8 @@ TEST_F(Batch, ShardsMakeEachFileOnceAsOneRunDoes) {
     EXPECT_EQ(made, files);
     EXPECT_EQ(names_in(parts), names_in(whole));
     for (const std::string& name : names_in(whole)) {
-      EXPECT_TRUE(test::read_file(file(parts + "/" + name)) == test::read_file(file(whole + "/" + name))) << name;
+      const std::string part = fmt::format("{}/{}", parts, name), one = fmt::format("{}/{}", whole, name);
+      EXPECT_TRUE(test::read_file(file(part)) == test::read_file(file(one))) << name;
     }
   }
   for (const char* wrong :
@@ -216,7 +217,7 @@ TEST_F(Batch, DarksOfACalibrationAreNotTakenForFlats) {
   refused(calibrated({"--darks", first, second}), "--darks " + file("bias/"));
   for (const std::vector<std::string>& darks :
        std::vector<std::vector<std::string>>{{"--darks", file("bias")},
-                                             {"--darks", first + "," + second},
+                                             {"--darks", fmt::format("{},{}", first, second)},
                                              {"--darks", first, "--darks", second},
                                              {"--darks", file("bias/*.dng")}}) {
     const auto result = calibrated(darks);

@@ -229,7 +229,7 @@ TEST(CostFile, TextComesBackAndFaultsAreNamed) {
   };
   for (const std::string& text :
        {std::string(), std::string("[]"), std::string("{\"lowlux_cost_model\": 6}"), good.substr(0, good.size() / 2),
-        changed("\"lowlux_cost_model\": 6", "\"x\": 1"), changed("\"threads\": 2", "\"threads\": \"2\""),
+        changed("\"lowlux_cost_model\": 6", "\"x\": 1"), changed("\"threads\": 2", R"("threads": "2")"),
         changed("\"threads\": 2", "\"threads\": 0"), changed("\"threads\": 2", "\"threads\": 4294967298"),
         changed("\"look\"", "\"loop\""), changed("9.009", "-1"), changed("9.009", "1e999"), changed("0.0125", "-1"),
         changed("\"pace_s\"", "\"race_s\"")}) {
