@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 namespace lowlux {
 
@@ -9,8 +12,15 @@ struct Shard {
   std::uint64_t number = 1;  // 1..count
   std::uint64_t count = 1;   // up to 2^63
 
-  /// Returns whether a piece is in it. @param index  0 for the first piece
-  bool has(std::uint64_t index) const { return index % count == number - 1; }
+  /// Removes the pieces that are not in it, and keeps the order of the others.
+  template <class Piece>
+  void select(std::vector<Piece>& pieces) const {
+    std::vector<Piece> chosen;
+    for (std::uint64_t i = number - 1; i < pieces.size(); i += count) {
+      chosen.push_back(std::move(pieces[static_cast<std::size_t>(i)]));
+    }
+    pieces = std::move(chosen);
+  }
 };
 
 }  // namespace lowlux

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "isp/render/night/night_look.h"
+
 namespace lowlux::isp {
 namespace {
 
@@ -95,14 +97,11 @@ void for_each_cell(const Plane<float>& cells, Executor& executor, const Change& 
   });
 }
 
-/// Returns the lift in EV, 0 or more, at which noise has the CIE L* local_tone_noise: dL*/dY is 903.3 up to Y =
-/// 0.008856, and 116/3 Y^(-2/3) above.
+/// Returns the largest lift in EV, 0 to 6, within the limit of the noise.
 float largest_lift_ev(float luminance, float noise) {
-  constexpr double dark = 216.0 / 24389, dark_slope = 24389.0 / 27;
-  const double y = std::max(luminance, 0.0f), sigma = noise;
-  double gain = local_tone_noise / (dark_slope * sigma);
-  if (gain * y > dark) gain = std::pow(3 * local_tone_noise / (116 * sigma), 3) * y * y;
-  return static_cast<float>(std::log2(std::clamp(gain, 1.0, 1e9)));
+  constexpr double most = 64;  // 2^most_lift_ev
+  const double gain = most * gain_within_noise_limit(most * luminance, most * noise, local_tone_noise);
+  return static_cast<float>(std::log2(std::max(gain, 1.0)));
 }
 
 Cells cells_of(const LocalTone& how, const PlaneView<const float>& variance, const RgbView<float>& rgb,

@@ -29,8 +29,8 @@ inline constexpr double local_tone_noise = 2;
 ///     e = min(share t / (1 + t / 6), M),   t = -B,      in the shadows
 ///     e = -share B (1 - B / W),            B = 0..W,    in the lights,   W = log2(limit / 0.18)
 /// Even areas keep their order for every share, and middle grey, black and white stay. M is the largest lift at which
-/// the noise of an even area of that luminance stays below local_tone_noise in CIE L*. The result does not depend on
-/// the number of threads.
+/// the noise of an even area of that luminance stays below local_tone_noise in CIE L*, after the standard tone curve
+/// too: gain_within_noise_limit. The result does not depend on the number of threads.
 /// @param variance  of the noise of Y, one value for each cell of 4 x 4 pixels: ceil(height / 4) x ceil(width / 4);
 ///                  without data the noise is unknown: nothing is limited, and n = 2^-12 of middle grey
 void apply_local_tone(const LocalTone& how, PlaneView<const float> variance, const RgbView<float>& rgb,

@@ -163,7 +163,7 @@ TEST(Bench, AShardRunsItsStages) {
   const auto beyond =
       bench({"--stage", "scene-light,photon-sampling", "--quick", "--shard", "3/3", "--pictures-folder", pictures});
   EXPECT_EQ(beyond.exit_code, 2);
-  EXPECT_NE(beyond.err.find("no stage for shard 3 of 3: 2 are asked for"), std::string::npos) << beyond.err;
+  EXPECT_NE(beyond.err.find("shard 3 of 3 is empty: 2 stages are requested"), std::string::npos) << beyond.err;
 }
 
 TEST(Bench, WrongCommandLinesExitWithTwo) {

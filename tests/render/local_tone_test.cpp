@@ -58,10 +58,10 @@ double expected_ev(double share, double base, double limit) {
   return -share * b * (1 - b / white);
 }
 
-/// Noise of a lifted flat in CIE L*, by the difference quotient.
+/// Noise of a lifted flat in CIE L* behind a tone curve y(x) >= 0.7 x with y' <= 1.3, by the difference quotient.
 double noise_lightness(double y, double gain, double sigma) {
-  const double step = 1e-4 * sigma;
-  return (lightness(gain * (y + step)) - lightness(gain * (y - step))) / (2 * step) * sigma;
+  const double shown = 0.7 * gain * y, step = 1e-4 * gain * sigma;
+  return (lightness(shown + step) - lightness(shown - step)) / (2 * step) * 1.3 * gain * sigma;
 }
 
 TEST(LocalTone, FlatsFollowTheFormulaAndTheirNoiseStaysBelowTheLimit) {
@@ -173,7 +173,7 @@ SceneLinear reference(const SceneLinear& in, const LocalTone& how, const Plane<f
   a = averaged(a), b = averaged(b);
   for (int i = 0; variance.size() > 0 && i < across * down; ++i) {  // by bisection of what the header promises
     const double y = std::max(0.0, grey * std::exp2(a[i] * l[i] + b[i]) - noise[i]);
-    double low = 0, high = 40;
+    double low = 0, high = 6;
     if (noise_lightness(y, std::exp2(high), noise[i]) < local_tone_noise) low = high;
     while (high - low > 1e-9) {
       const double ev = (low + high) / 2;

@@ -191,12 +191,11 @@ Result<BenchOutcome> run_methods_bench(const BenchOptions& options) {
   std::vector<DenoiseLight> lights = methods_lights(options.quick);
   if (options.shard.number > lights.size()) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("there is no light for shard {} of {}: methods are measured in {}", options.shard.number,
+                fmt::format("shard {} of {} is empty: methods are measured in {} lights", options.shard.number,
                             options.shard.count, lights.size()),
                 "--shard");
   }
-  std::uint64_t index = 0;
-  std::erase_if(lights, [&](const DenoiseLight&) { return !options.shard.has(index++); });
+  options.shard.select(lights);
   PoolExecutor executor(options.threads);
   const SceneSize size = options.quick ? quick_size : whole_size;
   const auto files = options.quick ? quick_files_of(options.pictures) : files_of(options.pictures);

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cstdint>
 #include <cstdio>
 #include <utility>
 
@@ -51,12 +50,11 @@ Result<ChosenStages> chosen(const BenchArgs& args) {
   if (stages->size() == 1 && stages->front().id == "methods") return ChosenStages{*std::move(stages), args.shard};
   if (args.shard.number > stages->size()) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("there is no stage for shard {} of {}: {} are asked for", args.shard.number,
-                            args.shard.count, stages->size()),
+                fmt::format("shard {} of {} is empty: {} stages are requested", args.shard.number, args.shard.count,
+                            stages->size()),
                 "--shard");
   }
-  std::uint64_t index = 0;
-  std::erase_if(*stages, [&](const isp::BenchStage&) { return !args.shard.has(index++); });
+  args.shard.select(*stages);
   return ChosenStages{*std::move(stages), {}};
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cstdint>
 #include <exception>
 #include <filesystem>
 #include <new>
@@ -98,8 +97,7 @@ Result<RawFrame> read_file(const std::string& file, const capture::XTransUse& x_
 Result<RawBatch> make_batch(const DevelopArgs& args, isp::DevelopOptions options, std::vector<Job> jobs,
                             const CalibrationFiles& calibration) {
   if (const auto made = make_for_display(args, options); !made) return tl::make_unexpected(made.error());
-  std::uint64_t index = 0;
-  std::erase_if(jobs, [&](const Job&) { return !args.shard.has(index++); });
+  args.shard.select(jobs);
   RawBatch batch{.args = args, .options = std::move(options), .jobs = std::move(jobs)};
   if (!calibration.flats.empty()) {
     auto flat = read_flats(calibration.flats);
