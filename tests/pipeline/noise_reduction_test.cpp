@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <random>
 #include <string>
 
 #include "isp/pipeline/develop.h"
@@ -260,6 +263,41 @@ TEST(NoiseReduction, OnePipelineTakesFramesOfAnySizeAndLevelOneAfterTheOther) {
       const Developed fresh = developed(frame, {Mode::level, level});
       const auto &a = std::get<SceneLinear>(again).plane[1], &b = std::get<SceneLinear>(fresh.picture).plane[1];
       EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(float)), 0) << width;
+    }
+  }
+}
+
+// Masked pixels of some cameras have twice the variance of those of the image (Canon EOS Kiss X4, bundled).
+TEST(NoiseReduction, NoiseMeasuredOnTheImageIsNotRaisedToThatOfMaskedPixels) {
+  constexpr int border = 64, side = 256;
+  std::mt19937_64 engine(17);
+  for (int i = 0; i < 12; ++i) {
+    const double read_e = std::exp(std::uniform_real_distribution(std::log(0.5), std::log(8.0))(engine));
+    const double masked_e = read_e * std::uniform_real_distribution(0.5, 4.0)(engine);
+    SCOPED_TRACE(testing::Message() << "read noise " << read_e << " e-, of masked pixels " << masked_e << " e-");
+    RawFrame frame = test::night_frame({.read_noise_e = read_e}, grey(40), border + side, side);
+    std::normal_distribution<double> noise_dn(test::night_black_dn, masked_e * test::night_gain_dn_per_e);
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < border; ++x) {
+        frame.raw.dn.at(x, y) = static_cast<std::uint16_t>(std::lround(std::max(noise_dn(engine), 0.0)));
+      }
+    }
+    frame.raw.active = frame.raw.default_crop = {border, 0, side, side};
+    frame.raw.masked = {{0, 0, border, side}};
+    frame.raw.masked_is_stated = true;
+    const double rounding_e2 = 1.0 / 12 / (test::night_gain_dn_per_e * test::night_gain_dn_per_e);
+    const double model_e2 = read_e * read_e + rounding_e2, measured_e2 = masked_e * masked_e + rounding_e2;
+    constexpr double sites = 48.0 * side / 4;           // of red or blue: 48 columns are measured
+    const double tolerance = 5 * std::sqrt(2 / sites);  // of a variance
+    for (const auto source :
+         {NoiseProfile::Source::file, NoiseProfile::Source::profile, NoiseProfile::Source::picture}) {
+      frame.noise->source = source;
+      const bool is_of_image = source == NoiseProfile::Source::picture;
+      const NoiseReduction found = planned(frame, {.mode = Mode::level}).noise_reduction;
+      for (const double variance_e2 : found.noise.variance_e2) {
+        const double expected_e2 = is_of_image ? model_e2 : std::max(model_e2, measured_e2);
+        EXPECT_NEAR(variance_e2, expected_e2, (is_of_image ? 1e-6 : tolerance) * expected_e2);
+      }
     }
   }
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstddef>
 
 #include "isp/raw/corrections.h"
@@ -23,6 +24,20 @@ bool renders_from_codes(const RawFrame& frame, const RawLevels& levels, bool red
   return frame.raw.layout == SensorLayout::bayer && !frame.raw.is_float() && !reduces_noise && levels.defects.empty() &&
          !levels.dark_frame && !levels.black.pattern && levels.black.dark_mean_e == PerSite<double>{} &&
          frame.corrections.radial_gains.empty() && std::ranges::none_of(frame.corrections.gain_maps, has_effect);
+}
+
+double black_variance_e2(const RawFrame& frame, const RawLevels& levels, int site, int colour, double electrons,
+                         double e_per_dn) {
+  const NoiseProfile& noise = *frame.noise;
+  const BlackPoint& black = levels.black;
+  const double rounding_e2 = frame.raw.is_float() ? 0 : e_per_dn * e_per_dn / 12;
+  double variance_e2 = std::max(noise.offset[colour] * electrons * electrons, rounding_e2);
+  const bool is_of_image = noise.source == NoiseProfile::Source::picture;
+  if (!is_of_image || black.source != BlackPoint::Source::masked_pixels) {
+    variance_e2 = std::max(variance_e2, std::pow(black.noise_std_dn[site] * e_per_dn, 2));
+  }
+  if (levels.dark_frame) variance_e2 += levels.dark_frame->added_variance_dn2[site] * e_per_dn * e_per_dn;
+  return variance_e2;
 }
 
 std::array<double, 3> electrons_by_colour(const RawDn& raw, const RawLevels& levels) {

@@ -25,6 +25,18 @@ struct RawLevels {
 /// repairs, multiplies, reduces noise, or subtracts pixel by pixel.
 bool renders_from_codes(const RawFrame& frame, const RawLevels& levels, bool reduces_noise);
 
+/// Returns the variance of a raw value without light [e-^2]: that of the noise model or, if that is more, that of the
+/// pixels which the black point was measured on, as a model may lack the noise of dark charge. A model that was
+/// measured on the image itself contains that charge and is not raised to masked pixels, which on some cameras have
+/// twice the variance. At least that of rounding, which floating-point samples do not have; what subtracting a dark
+/// frame adds is in. Precondition: frame.noise.
+/// @param site        of the black point: of a mosaic's cell, or a plane of other frames
+/// @param colour      of the noise model
+/// @param electrons   at white
+/// @param e_per_dn    electrons of a code
+double black_variance_e2(const RawFrame& frame, const RawLevels& levels, int site, int colour, double electrons,
+                         double e_per_dn);
+
 /// Returns the electrons at white of each colour; both greens have the same number. Precondition:
 /// levels.electrons_at_white.
 std::array<double, 3> electrons_by_colour(const RawDn& raw, const RawLevels& levels);

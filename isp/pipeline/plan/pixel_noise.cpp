@@ -92,10 +92,8 @@ std::optional<CellNoise> cell_noise(const RawFrame& frame, const RawLevels& leve
     const double electrons = 1 / frame.noise->scale[plane];
     if (!(electrons >= 1 && electrons <= max_electrons_at_white)) return std::nullopt;
     const double e_per_dn = electrons / (frame.raw.white_dn[plane] - black_dn_of(frame, levels, plane));
-    const double rounding_e2 = frame.raw.is_float() ? 0 : e_per_dn * e_per_dn / 12;
-    double variance_e2 = std::max(frame.noise->offset[plane] * electrons * electrons, rounding_e2);
-    variance_e2 = std::max(variance_e2, std::pow(levels.black.noise_std_dn[plane] * e_per_dn, 2));
-    if (levels.dark_frame) variance_e2 += levels.dark_frame->added_variance_dn2[plane] * e_per_dn * e_per_dn;
+    const int channel = static_cast<int>(plane);
+    const double variance_e2 = black_variance_e2(frame, levels, channel, channel, electrons, e_per_dn);
     out.cell_e[c] = part[c] * electrons;
     out.noise.variance_e2[c] = std::min(part[c] * variance_e2, denoise::largest_e);
     out.noise.saturation_e[c] = saturated_fraction_of_white * out.cell_e[c];

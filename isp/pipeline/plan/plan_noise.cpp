@@ -23,20 +23,14 @@ namespace {
 
 int colour_of(const RawDn& raw, int site) { return static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)); }
 
-/// Returns the variance of a raw value without light, by the noise model or, if that is more, as measured on the black
-/// point's pixels; at least that of rounding, which floating-point samples do not have.
+/// Returns the variance of a raw value of each colour without light.
 std::array<double, 3> black_variance_e2(const RawFrame& frame, const RawLevels& levels) {
   std::array<double, 3> out{};
   for (int site = 0; site < 4; ++site) {
     const int colour = colour_of(frame.raw, site);
     const double electrons = (*levels.electrons_at_white)[site];
     const double e_per_dn = electrons / (white_at(frame.raw, site) - levels.black.pedestal_dn[site]);
-    const double rounding_e2 = frame.raw.is_float() ? 0 : e_per_dn * e_per_dn / 12;
-    double variance = std::max(frame.noise->offset[colour] * electrons * electrons, rounding_e2);
-    // Values measured in the dark include the noise of the dark charge, which a noise profile may not contain.
-    variance = std::max(variance, std::pow(levels.black.noise_std_dn[site] * e_per_dn, 2));
-    if (levels.dark_frame) variance += levels.dark_frame->added_variance_dn2[site] * e_per_dn * e_per_dn;
-    out[colour] += variance * (colour == 1 ? 0.5 : 1);
+    out[colour] += black_variance_e2(frame, levels, site, colour, electrons, e_per_dn) * (colour == 1 ? 0.5 : 1);
   }
   return out;
 }
