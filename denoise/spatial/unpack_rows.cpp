@@ -1,4 +1,5 @@
 #include <cstddef>
+#include <initializer_list>
 
 #include "denoise/spatial/rows.h"
 
@@ -148,12 +149,16 @@ RemovedSums RemovedCells(const RemovedRow& in) {
       const auto& a = noisy[odd];
       const auto& b = value[odd];
       const SiteValues before = values_of(a[0], a[1], a[2], a[3]), after = values_of(b[0], b[1], b[2], b[3]);
-      for (int k = 0; k < 4; ++k) {
-        const bool is_green = k == 1 || k == 2;
-        const VF stated_here = is_green ? hn::Mul(constant(0.5f), variance[3]) : variance[2];
-        add_removed(hn::IfThenElseZero(inside, hn::Mul(scale, before.u[k])),
-                    hn::IfThenElseZero(inside, hn::Mul(scale, after.u[k])), hn::IfThenElseZero(inside, stated_here),
-                    removed, stated);
+      for (const bool is_green : {false, true}) {  // sites in pairs, in which neither comes first: R and B, both G
+        VF removed_here = hn::Zero(f), stated_here = removed_here;
+        const VF of_site = is_green ? hn::Mul(constant(0.5f), variance[3]) : variance[2];
+        for (const int k : {is_green ? 1 : 0, is_green ? 2 : 3}) {
+          add_removed(hn::IfThenElseZero(inside, hn::Mul(scale, before.u[k])),
+                      hn::IfThenElseZero(inside, hn::Mul(scale, after.u[k])), hn::IfThenElseZero(inside, of_site),
+                      removed_here, stated_here);
+        }
+        removed = hn::Add(removed, removed_here);
+        stated = hn::Add(stated, stated_here);
       }
     }
   }
