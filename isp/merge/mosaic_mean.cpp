@@ -102,6 +102,13 @@ MosaicMean::MosaicMean(int width, int height) : sum_(width, height), weight_(wid
   for (Plane<float>* plane : {&sum_, &weight_}) std::fill_n(plane->data(), plane->size(), 0.0F);
 }
 
+MosaicMean MosaicMean::clone() const {
+  MosaicMean out(0, 0);
+  out.sum_ = sum_.clone();
+  out.weight_ = weight_.clone();
+  return out;
+}
+
 void MosaicMean::add_row(int y, const WeightedRow& row, PlaneView<const std::uint8_t> block_matches) {
   float* const sum = sum_.row(y);
   float* const weight = weight_.row(y);

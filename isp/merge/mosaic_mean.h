@@ -29,6 +29,8 @@ class MosaicMean {
  public:
   MosaicMean(int width, int height);
 
+  MosaicMean clone() const;
+
   /// Adds a row of a mosaic. Different rows may be added at the same time.
   /// @param block_matches  as in Comparison; without data all count
   void add_row(int y, const WeightedRow& row, PlaneView<const std::uint8_t> block_matches);

@@ -162,6 +162,17 @@ TEST(MergeBudget, TimesAreTheSumOfTheFramesWork) {
   EXPECT_DOUBLE_EQ(seconds(MergeAlignment::subpixel, false, true), 2 * (10 + 10 + 7e4 + 7e6 + 1e7 + 1e8));
 }
 
+TEST(MergeBudget, TheReferenceIsPredictedAnewAtPowersOfTwoUpToHalfOfTheFrames) {
+  CostModel cost;
+  cost.points[static_cast<std::size_t>(CostPart::merge_prediction)] = {{1, 1}};
+  for (int frames = 2; frames <= 300; ++frames) {
+    const double predictions =
+        predicted_merge_s(cost, {.frames = frames, .size = {.megapixels = 1}}, {MergeAlignment::subpixel, true}, false);
+    EXPECT_DOUBLE_EQ(predictions, frames < 16 ? 1 : std::floor(std::log2(frames)) - 2) << frames;
+    EXPECT_FALSE(predicts_again(frames - frames / 2 + 1, frames)) << frames;
+  }
+}
+
 /// Merges a burst with the budget in the options of its reference.
 MergedRaw merged_within(const Burst& burst, int count, double budget_s, MergeOptions options = {}) {
   auto cost = std::make_shared<CostModel>();

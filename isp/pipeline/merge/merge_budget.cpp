@@ -1,6 +1,7 @@
 #include "isp/pipeline/merge/merge_budget.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <functional>
 #include <vector>
@@ -35,6 +36,13 @@ std::vector<MergeMethod> open_methods(const MergeWork& work, bool moved) {
   return out;
 }
 
+/// Returns how many times a sub-pixel merge predicts the reference.
+int predictions_of(int frames) {
+  int out = 1;
+  for (int averaged = 2; averaged < frames; ++averaged) out += predicts_again(averaged, frames) ? 1 : 0;
+  return out;
+}
+
 bool motion_is_open(const MergeWork& work) { return !work.alignment && work.frames > 1; }
 
 /// States the cheapest of the methods that are better than the chosen one.
@@ -50,6 +58,11 @@ void state_better(const CostModel& cost, const MergeWork& work, const std::vecto
 }
 
 }  // namespace
+
+bool predicts_again(int averaged, int frames) {
+  constexpr int first = 8;
+  return averaged >= first && std::has_single_bit(static_cast<unsigned>(averaged)) && averaged <= frames / 2;
+}
 
 double predicted_merge_s(const CostModel& cost, const MergeWork& work, const MergeMethod& method,
                          bool motion_measured) {
@@ -73,7 +86,7 @@ double predicted_merge_s(const CostModel& cost, const MergeWork& work, const Mer
   if (compares) add(CostPart::merge_comparison, n - 1);
   const bool cells = method.alignment == MergeAlignment::cells;
   add(cells ? CostPart::merge_cells : CostPart::merge_subpixel, n - 1);
-  if (!cells) add(CostPart::merge_prediction, 1);
+  if (!cells) add(CostPart::merge_prediction, predictions_of(n));
   return predicted_s(cost, work.size, parts);
 }
 

@@ -11,6 +11,11 @@ namespace lowlux::isp {
 /// Frames whose mean is compared with the others, of a camera at rest and of stars.
 inline constexpr int sampled_frames = 5;
 
+/// Returns whether a sub-pixel merge of `frames` frames predicts the reference anew once so many are averaged: at 8,
+/// 16 ... frames, where at least as many are still to come. Drops blur what a prediction lacks, such as detail that
+/// noise hides in a single frame.
+bool predicts_again(int averaged, int frames);
+
 /// Describes the frames to merge, and what of the method is open to choice.
 struct MergeWork {
   int frames = 1;

@@ -11,6 +11,7 @@
 #include "isp/merge/block_test.h"
 #include "isp/merge/placement.h"
 #include "isp/pipeline/merge/drizzled_raw.h"
+#include "isp/pipeline/merge/merge_budget.h"
 #include "isp/pipeline/merge/merged_mosaic.h"
 #include "isp/pipeline/merge/predicted_frame.h"
 #include "isp/pipeline/merge/star_reference.h"
@@ -20,10 +21,26 @@ namespace {
 
 constexpr double max_error_px = 1.5;         // standard error of a displacement, beyond which a frame is left out
 constexpr double cell_error_px = 0.6;        // of whole cells: uniform over two pixels, 2 / sqrt(12)
-constexpr double drop_radius_px = 1.5;       // sites of red and blue are two pixels apart, and stay apart
-constexpr double star_drop_radius_px = 1;    // without a prediction; a drop always holds a sample of each colour
 constexpr double noticeable_gaps = 1e-3;     // of the pixels of a drizzled image
 constexpr double predicted_error_px = 0.35;  // error of a predicted difference, as a displacement
+
+/// Returns the radius of the drops of so many frames with a signal-to-noise ratio: 1.5 px until frames x ratio^2 is
+/// 256, as sites of red and blue are two pixels apart and stay apart. Above that it falls with the sixth root, at which
+/// noise and blur of a mean over drops in a plane fall alike; to 1 px, so that a drop holds a sample of each colour.
+double drop_radius_px(int frames, double signal_to_noise) {
+  const double radius_px = 1.5 * std::sqrt(std::cbrt(256 / (frames * signal_to_noise * signal_to_noise)));
+  return std::clamp(std::round(64 * radius_px) / 64, 1.0, 1.5);  // of one value for all math libraries
+}
+
+/// Returns the signal-to-noise ratio of a site at the mean level.
+double mean_signal_to_noise(const PerSite<double>& level_e, const FrameElectrons& frame) {
+  double level = 0, variance = 0;
+  for (int site = 0; site < 4; ++site) {
+    level += level_e[site] / 4;
+    variance += (level_e[site] + frame.variance_e2[site] + frame.common_variance_e2[site]) / 4;
+  }
+  return level / std::sqrt(std::max(variance, 1e-6));
+}
 
 void divide(Plane<float>& signal_e, double light, Executor& executor) {
   if (light == 1) return;
@@ -57,11 +74,15 @@ Result<void> MovedMerge::add_frames() {
   }
   if (order.empty()) return {};
   work_.loader.expect(order);
+  int averaged = 1;
   for (const int index : order) {
     Result<FrameElectrons> frame = work_.loader.next();
     if (!frame) return tl::make_unexpected(frame.error());
     if (work_.loader.exposures_differ() && !work_.out.bracket) return {};
     if (Result<void> added = add(*frame, index); !added) return added;
+    frame->signal_e = {};
+    if (work_.out.frames[static_cast<std::size_t>(index)].used_fraction == 0 || !predicts_again(++averaged)) continue;
+    if (Result<void> again = predict_again(); !again) return again;
   }
   return {};
 }
@@ -145,13 +166,38 @@ Result<void> MovedMerge::predict() {
   return {};
 }
 
-/// Begins the mean. Until the reference is found, its memory is not needed.
-void MovedMerge::begin_sum() {
+/// Returns whether the mean of so many frames is to predict the reference in place of a mean of fewer.
+bool MovedMerge::predicts_again(int averaged) const {
+  const bool by_differences = work_.out.alignment == MergeAlignment::subpixel && !drizzle_ && !work_.out.bracket;
+  return by_differences && isp::predicts_again(averaged, work_.count);
+}
+
+/// Predicts the reference from the mean of the frames so far.
+Result<void> MovedMerge::predict_again() {
+  differences_ = {};
+  placed_ = {};
+  prediction_ = {};
+  Result<CameraRgb> predicted = predicted_electrons(mean_->clone(), work_.reference, work_.loader.reference(),
+                                                    work_.loader.reference_options(), work_.executor);
+  if (!predicted) return tl::make_unexpected(at_frame(predicted.error(), work_.loader.reference_name()));
+  prediction_ = *std::move(predicted);
+  make_room_for_frame();
+  work_.clock.lap("prediction");
+  return {};
+}
+
+void MovedMerge::make_room_for_frame() {
   differences_ = Plane<float>(work_.width, work_.height);
   placed_ = Plane<float>(work_.width, work_.height);
+}
+
+/// Begins the mean. Until the reference is found, its memory is not needed.
+void MovedMerge::begin_sum() {
+  make_room_for_frame();
+  level_e_ = mean_level_e();
+  if (!by_stars()) drop_radius_px_ = drop_radius_px(work_.count, mean_signal_to_noise(level_e_, work_.reference));
   if (work_.options.drizzle) {
     drizzle_.emplace(work_.width, work_.height, *work_.options.drizzle);
-    level_e_ = mean_level_e();
   } else {
     mean_.emplace(work_.width, work_.height);
   }
@@ -258,7 +304,7 @@ void MovedMerge::add_drops(const MovedFrame& moved, const merge::MeanPart& part)
   if (by_stars()) divide(moved.frame.signal_e, moved.light, work_.executor);
   merge::add_drops(by_stars() ? std::as_const(moved.frame.signal_e).view() : moved.differences.view(),
                    work_.reference.phase, moved.motion, by_stars() ? RgbView<const float>{} : expected(),
-                   by_stars() ? star_drop_radius_px : drop_radius_px, part, *mean_, work_.executor);
+                   drop_radius_px_, part, *mean_, work_.executor);
 }
 
 /// Removes the blocks that stand still from those that match. @return those that were removed

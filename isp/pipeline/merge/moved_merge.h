@@ -55,8 +55,11 @@ class MovedMerge {
   Result<void> check_bracket() const;
   Result<void> prepare_alignment();
   Result<void> predict();
+  bool predicts_again(int averaged) const;
+  Result<void> predict_again();
   Result<void> average_reference();
   void begin_sum();
+  void make_room_for_frame();
   void add_reference();
   Result<void> add(FrameElectrons& frame, int index);
   std::optional<merge::Motion> motion_of(const FrameElectrons& frame, double light, int index);
@@ -76,7 +79,8 @@ class MovedMerge {
   std::optional<merge::MosaicMean> mean_;  // the sum is one of these
   std::optional<merge::Drizzle> drizzle_;
   Plane<float> differences_, placed_;  // of the frame that is added
-  PerSite<double> level_e_{};          // mean signal, for the weights of drizzling
+  PerSite<double> level_e_{};          // mean signal, for the weights of drizzling and the size of drops
+  double drop_radius_px_ = 1;          // of stars, which have no prediction; a drop holds a sample of each colour
 };
 
 }  // namespace lowlux::isp

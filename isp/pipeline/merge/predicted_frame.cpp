@@ -1,6 +1,7 @@
 #include "isp/pipeline/merge/predicted_frame.h"
 
 #include <array>
+#include <cstdint>
 #include <utility>
 #include <variant>
 
@@ -10,6 +11,8 @@
 
 namespace lowlux::isp {
 namespace {
+
+constexpr std::int64_t max_whole_mean_px = 10'000'000;
 
 /// Returns the description of a frame whose image is its whole active area, without gains. The samples are borrowed
 /// from `frame` and have to be given back.
@@ -23,9 +26,9 @@ RawFrame whole_area(RawFrame& frame) {
   return out;
 }
 
-}  // namespace
-
-Result<CameraRgb> predicted_electrons(RawFrame& frame, const DevelopOptions& options, Executor& executor) {
+/// As predicted_electrons(), of frames above `limits` in tiles.
+Result<CameraRgb> predicted(RawFrame& frame, const DevelopOptions& options, const TileLimits& limits,
+                            Executor& executor) {
   const Rect crop = frame.raw.default_crop;
   RawFrame whole = whole_area(frame);
   const auto give_back = [&] {
@@ -38,7 +41,7 @@ Result<CameraRgb> predicted_electrons(RawFrame& frame, const DevelopOptions& opt
     return tl::make_unexpected(std::move(plan.error()));
   }
   Picture picture = make_picture(*plan);
-  Pipeline(executor).render(whole, *plan, picture);
+  Pipeline(executor, limits).render(whole, *plan, picture);
   give_back();
   CameraRgb out;
   out.plane = std::move(std::get<SceneLinear>(picture).plane);
@@ -53,6 +56,12 @@ Result<CameraRgb> predicted_electrons(RawFrame& frame, const DevelopOptions& opt
   return out;
 }
 
+}  // namespace
+
+Result<CameraRgb> predicted_electrons(RawFrame& frame, const DevelopOptions& options, Executor& executor) {
+  return predicted(frame, options, {}, executor);
+}
+
 Result<CameraRgb> predicted_electrons(merge::MosaicMean mean, const FrameElectrons& reference, const RawFrame& frame,
                                       const DevelopOptions& options, Executor& executor) {
   RawFrame like{.colour = frame.colour, .noise = frame.noise};
@@ -64,15 +73,16 @@ Result<CameraRgb> predicted_electrons(merge::MosaicMean mean, const FrameElectro
   DevelopOptions options_of_mean = options;
   options_of_mean.black = {};
   options_of_mean.estimate_dark = options_of_mean.find_defects = false;
-  Result<CameraRgb> predicted = predicted_electrons(merged.frame, options_of_mean, executor);
-  if (!predicted) return predicted;
+  // Tiles bound the memory, as the mean is kept in addition to the frame made of it.
+  Result<CameraRgb> out = predicted(merged.frame, options_of_mean, {.max_whole_px = max_whole_mean_px}, executor);
+  if (!out) return out;
   // The NoiseProfile of a mean counts as electrons those of all its frames.
-  for (Plane<float>& plane : predicted->plane) {
+  for (Plane<float>& plane : out->plane) {
     for_each_index(executor, plane.height(), [&](int y) {
       for (int x = 0; x < plane.width(); ++x) plane.at(x, y) /= static_cast<float>(merged.mean_count);
     });
   }
-  return predicted;
+  return out;
 }
 
 }  // namespace lowlux::isp
