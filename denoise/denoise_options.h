@@ -13,7 +13,7 @@
 
 namespace lowlux::denoise {
 
-/// The amount of work; docs/ and tests/bench/denoise_bench.cpp compare the levels.
+/// The amount of work; docs/ and `measure denoise` compare the levels.
 enum class Level : std::uint8_t {
   draft,     // hard thresholds, blocks every 4 quads
   standard,  // hard thresholds, then empirical Wiener weights from that result, blocks every 4 quads

@@ -129,11 +129,11 @@ CostModel made() {
       {{9.009, 0.00000}},  // floats-32
       {{9.009, 0.01160}},  // look
       {{9.009, 0.02373}},  // display
-      // These three follow from that of codes by the ratios that tests/bench/raw_to_rgb_bench.cpp prints.
+      // These three follow from that of codes by the ratios that `measure raw-to-rgb` prints.
       {{9.009, 0.00416}},  // encoded-malvar
       {{9.009, 0.01505}},  // residual
       {{9.009, 0.01740}},  // residual-median
-      // These follow from the pace by the ratios that tests/bench/merge_budget_bench.cpp prints.
+      // These follow from the pace by the ratios that `measure merge-budget` prints.
       {{9.009, 0.02030}},  // merge-frame
       {{9.009, 0.00290}},  // merge-mean
       {{9.009, 0.04630}},  // merge-robust

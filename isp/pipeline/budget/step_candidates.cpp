@@ -59,7 +59,7 @@ void add_output(const StepFacts& facts, const StepCandidate& plan, std::vector<C
 }
 
 /// States the time of work on a frame that is not a mosaic over that of planning or, for all else, of rendering a
-/// mosaic of as many pixels from floats, as tests/bench/pixel_cost_bench.cpp prints them.
+/// mosaic of as many pixels from floats, as `measure pixel-cost` prints them.
 struct PixelRatios {
   double planning;
   double floats;  // rendering without noise reduction

@@ -62,7 +62,7 @@ double seen_percentile(std::span<const float> rms_delta_e);
 
 /// Returns the fraction of the visible noise that a level of noise reduction leaves, relative to Level::high, for
 /// blocks of this signal-to-noise ratio in even surroundings: about the largest value over images, except for lamps in
-/// the dark; nullopt is no reduction. tests/bench/planner_bench.cpp prints measured values relative to it.
+/// the dark; nullopt is no reduction. `measure planner` prints measured values relative to it.
 double residual_noise_fraction(std::optional<denoise::Level> level, double snr);
 
 /// Returns the root mean square CIEDE2000 that a level leaves of a block's noise: residual_noise_fraction() of the

@@ -15,7 +15,7 @@ inline constexpr int tile_lattice_px = 256;
 
 /// A padded tile reaches this far beyond its core; with Level::best, whose choice of patches carries small differences
 /// on, best_margin_px. The difference from the whole frame is then at most 3 % of the noise of a raw value on real
-/// images: README.md has the figures, tests/bench/tile_margin_bench.cpp prints them.
+/// images: README.md has the figures, `measure tile-margin` prints them.
 inline constexpr int tile_margin_px = 256, best_margin_px = 384;
 
 /// States which frames are processed in tiles, and in what tiles.

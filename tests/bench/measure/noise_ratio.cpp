@@ -1,18 +1,14 @@
 // Compares noise that differs from place to place with noise that is the same everywhere: see denoise/README.md.
-//   noise_ratio_bench [--time-only | --quality-only]
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <string>
-#include <string_view>
-#include <vector>
 
 #include "denoise/denoiser.h"
 #include "isp/base/random/random.h"
 #include "isp/bench/scenes/denoise_scene.h"
 #include "isp/reproduce/bench_picture.h"
+#include "tests/bench/measure/measure.h"
 
 namespace {
 
@@ -52,7 +48,7 @@ Plane<float> mean_of_frames(const isp::BenchPicture& picture, const DenoiseLight
 }
 
 /// Sums squared errors of white-balanced values where a frame is single, and where it is a mean.
-struct Error {
+struct SquaredErrors {
   std::array<double, 2> squared{};
   std::array<double, 2> count{};
   double db(int single) const { return -10 * std::log10(squared[single] / count[single]); }
@@ -83,7 +79,7 @@ struct Scene {
     }
     return out;
   }
-  void add(const Plane<float>& got_e, Error& error) const {
+  void add(const Plane<float>& got_e, SquaredErrors& error) const {
     for (int y = 0; y < got_e.height(); ++y) {
       for (int x = 0; x < got_e.width(); ++x) {
         const int which = single(x, y) ? 1 : 0;
@@ -124,7 +120,7 @@ void add(const isp::BenchPicture& picture, const DenoiseLight& light, Level leve
   for (std::size_t i = 0; i < patterns.size(); ++i) {
     const Scene scene{shot, mean_e, patterns[i]};
     const NoiseRatio ratio = scene.ratio();
-    Error both, means, single;
+    SquaredErrors both, means, single;
     scene.add(denoised(scene.mixed(), view_of(&ratio), shot.noise(), level), both);
     scene.add(from_means, means);
     scene.add(from_single, single);
@@ -134,14 +130,10 @@ void add(const isp::BenchPicture& picture, const DenoiseLight& light, Level leve
   }
 }
 
-int print_quality() {
+void print_ratio_quality() {
   InlineExecutor one;
-  const auto pictures = isp::read_bench_pictures(std::string(LOWLUX_TESTDATA) + "/pictures",
-                                                 isp::files_of(isp::PictureSet::held_out), {1024, 768}, one);
-  if (!pictures) {
-    std::fprintf(stderr, "%s\n", pictures.error().message.c_str());
-    return 1;
-  }
+  const auto pictures = test::value_of(isp::read_bench_pictures(
+      std::string(LOWLUX_TESTDATA) + "/pictures", isp::files_of(isp::PictureSet::held_out), {1024, 768}, one));
   std::printf(
       "PSNR of single frames / of means of %d, less that of mosaics that are all of one kind [dB], mean of the "
       "held-out pictures\n%-18s",
@@ -152,21 +144,14 @@ int print_quality() {
     for (const Level level : denoise::all_levels) {
       std::printf("%-8s %-9s", isp::name_of(light).c_str(), std::string(denoise::name_of(level)).c_str());
       std::array<Difference, patterns.size()> sums;
-      for (const auto& picture : *pictures) add(picture, light, level, sums);
+      for (const auto& picture : pictures) add(picture, light, level, sums);
       for (const Difference& d : sums) std::printf("   %+.2f/%+.2f", d.single / d.count, d.mean / d.count);
       std::printf("\n");
     }
   }
-  return 0;
 }
 
-double cpu_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
-void print_times() {
+void print_ratio_times() {
   constexpr int width = 2000, height = 1500, rounds = 9;
   const Plane<float> raw_e = [] {
     Plane<float> out(width, height);
@@ -185,28 +170,24 @@ void print_times() {
   denoise::Denoiser denoiser(width, height, 1, Level::best);
   std::printf("\nms/MP without / with a ratio, one thread, median CPU time of %d rounds\n", rounds);
   for (const Level level : denoise::all_levels) {
-    std::array<std::vector<double>, 2> ms;
-    for (int i = 0; i < 2 * rounds; ++i) {
-      const double start = cpu_ms();
-      denoiser.run({raw_e.view(), BayerPhase::rggb, i % 2 == 0 ? NoiseRatioView{} : view_of(&ratio)}, noise,
-                   {.level = level}, out.view(), {}, one);
-      ms[i % 2].push_back((cpu_ms() - start) / (1e-6 * width * height));
-    }
-    for (auto& times : ms) std::sort(times.begin(), times.end());
-    std::printf("%-9s %7.2f / %7.2f\n", std::string(denoise::name_of(level)).c_str(), ms[0][rounds / 2],
-                ms[1][rounds / 2]);
+    const auto run = [&](const NoiseRatioView& view) {
+      denoiser.run({raw_e.view(), BayerPhase::rggb, view}, noise, {.level = level}, out.view(), {}, one);
+    };
+    constexpr double megapixels = 1e-6 * width * height;
+    std::array tasks{test::Task{"without", [&] { run({}); }, megapixels},
+                     test::Task{"with", [&] { run(view_of(&ratio)); }, megapixels}};
+    test::time_in_turn(tasks, rounds);
+    std::printf("%-9s %7.2f / %7.2f\n", std::string(denoise::name_of(level)).c_str(), tasks[0].median_cpu_ms(),
+                tasks[1].median_cpu_ms());
   }
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  const std::string_view only = argc == 2 ? argv[1] : "";
-  if (argc > 2 || (argc == 2 && only != "--time-only" && only != "--quality-only")) {
-    std::fprintf(stderr, "usage: noise_ratio_bench [--time-only | --quality-only]\n");
-    return 2;
-  }
-  if (only != "--time-only" && print_quality() != 0) return 1;
-  if (only != "--quality-only") print_times();
+int lowlux::test::measure_noise_ratio(Arguments& arguments) {
+  const bool times = !arguments.flag("--quality-only"), quality = !arguments.flag("--time-only");
+  arguments.end();
+  if (quality) print_ratio_quality();
+  if (times) print_ratio_times();
   return 0;
 }

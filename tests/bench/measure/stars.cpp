@@ -1,17 +1,15 @@
 // Times and accuracy of the registration on stars, of drizzling and of merged nights: the figures of
 // isp/merge/stars/README.md. Times are those of the processor, of all threads together.
-//   stars_bench [ROUNDS, at least 3]
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <ctime>
 #include <functional>
 #include <vector>
 
 #include "isp/merge/stars/drizzle.h"
 #include "isp/merge/stars/find_stars.h"
 #include "isp/merge/stars/match_stars.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/merge/star_motion.h"
 #include "tests/pipeline/star_nights.h"
 
@@ -21,19 +19,10 @@ using namespace lowlux;
 using namespace lowlux::star_testing;
 
 double median_ms(int rounds, const std::function<void()>& work) {
-  const auto now_ms = [] {
-    timespec now{};
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-  };
-  std::vector<double> times;
-  for (int i = 0; i < rounds; ++i) {
-    const double start = now_ms();
-    work();
-    times.push_back(now_ms() - start);
-  }
-  std::sort(times.begin(), times.end());
-  return times[times.size() / 2];
+  std::vector<double> times_ms;
+  times_ms.reserve(static_cast<std::size_t>(rounds));
+  for (int i = 0; i < rounds; ++i) times_ms.push_back(test::ms_of(test::cpu_ms, work));
+  return isp::median(times_ms);
 }
 
 /// Texture everywhere: a scene without stars.
@@ -266,8 +255,9 @@ void print_merged_nights() {
 
 }  // namespace
 
-int main(int count, char** arguments) {
-  const int rounds = count > 1 ? std::max(std::atoi(arguments[1]), 3) : 5;
+int lowlux::test::measure_stars(Arguments& arguments) {
+  const int rounds = arguments.next(5, 3);
+  arguments.end();
   print_detection_times(rounds);
   print_drizzle_times(rounds);
   print_false_stars();

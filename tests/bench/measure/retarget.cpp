@@ -1,9 +1,7 @@
 // Retargeting to dim displays: how alike pictures look by several models, what tables cost in accuracy and time.
-//   retarget_bench PICTURES [--display CD_M2] [--tables]
 #include <algorithm>
-#include <chrono>
+#include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <thread>
@@ -17,24 +15,15 @@
 #include "isp/render/retarget/retarget_rows.h"
 #include "isp/render/retarget/retarget_table.h"
 #include "isp/reproduce/bench_picture.h"
+#include "tests/bench/measure/measure.h"
 
 namespace lowlux::isp {
 namespace {
 
 constexpr double source_cd_m2 = 250;
 constexpr std::size_t colours_of_a_picture = 60000;
+
 constexpr const char* judges[]{"shin", "wanat_mantiuk", "mikamo", "icam06"};
-
-[[noreturn]] void give_up(const Error& error) {
-  std::fprintf(stderr, "%s: %s\n", error.where.c_str(), error.message.c_str());
-  std::exit(1);
-}
-
-template <class T>
-T value_of(Result<T> result) {
-  if (!result) give_up(result.error());
-  return std::move(*result);
-}
 
 struct Space {
   Matrix3 to_xyz = rgb_to_xyz(primaries_rec709).value();
@@ -80,7 +69,7 @@ Eye eye_of(const char* model, double white_cd_m2, ShinUnits units) {
   conditions.white_cd_m2 = white_cd_m2;
   conditions.white = Space().white;
   conditions.shin_units = units;
-  Eye eye{value_of(value_of(appearance_model_named(model)).at(conditions)), conditions.white};
+  Eye eye{test::value_of(test::value_of(appearance_model_named(model)).at(conditions)), conditions.white};
   if (std::strcmp(model, "mikamo") == 0) eye.white = eye.map(conditions.white);
   return eye;
 }
@@ -95,7 +84,7 @@ RetargetOptions options_for(RetargetMethod method, double display_cd_m2, ShinUni
 }
 
 CodeMap code_map(const RetargetOptions& options) {
-  return [map = value_of(retargeting(options))](const Vector3& code) { return map(code).code; };
+  return [map = test::value_of(retargeting(options))](const Vector3& code) { return map(code).code; };
 }
 
 struct Score {
@@ -126,7 +115,7 @@ void compare_methods(const std::string& folder, double display_cd_m2, ShinUnits 
     tables.push_back(tabulated(code_map(options_for(named.method, display_cd_m2, units)), 33, executor));
   }
   for (const std::string_view file : files_of(PictureSet::all)) {
-    const auto picture = value_of(read_bench_picture(folder + "/" + std::string(file), 0, 0, executor));
+    const auto picture = test::value_of(read_bench_picture(folder + "/" + std::string(file), 0, 0, executor));
     const std::vector<Vector3> codes = codes_of(picture);
     std::vector<std::vector<Lab>> originals;
     originals.reserve(std::size(judges));
@@ -146,26 +135,20 @@ void compare_methods(const std::string& folder, double display_cd_m2, ShinUnits 
   }
 }
 
-double seconds(const auto& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 /// Nanoseconds for a pixel of a natural row, the best of some rounds; on one thread.
 template <class Code>
 double ns_per_pixel(const RetargetTable& table, const std::vector<std::uint16_t>& rgb) {
   const auto width = static_cast<int>(rgb.size() / 3);
   std::vector<Code> out(rgb.size());
-  double best = 1e9;
+  double best_ms = 1e9;
   for (int round = 0; round < 20; ++round) {
-    best = std::min(best, seconds([&] { apply(table, rgb.data(), width, out.data()); }));
+    best_ms = std::min(best_ms, test::ms_of(test::wall_ms, [&] { apply(table, rgb.data(), width, out.data()); }));
   }
-  return 1e9 * best / width;
+  return 1e6 * best_ms / width;
 }
 
 void compare_tables(const std::string& folder, double display_cd_m2, Executor& executor) {
-  const auto picture = value_of(read_bench_picture(folder + "/kodim23.png", 0, 0, executor));
+  const auto picture = test::value_of(read_bench_picture(folder + "/kodim23.png", 0, 0, executor));
   const std::vector<Vector3> codes = codes_of(picture);
   std::vector<std::uint16_t> rgb;
   rgb.reserve(3 * codes.size());
@@ -178,7 +161,7 @@ void compare_tables(const std::string& folder, double display_cd_m2, Executor& e
     const CodeMap map = code_map(options_for(method, display_cd_m2, ShinUnits::lux));
     for (const int levels : {17, 33, 65}) {
       RetargetTable table;
-      const double build_s = seconds([&] { table = tabulated(map, levels, executor); });
+      const double build_s = 1e-3 * test::ms_of(test::wall_ms, [&] { table = tabulated(map, levels, executor); });
       const TableError error = table_error(table, map, 4096, executor);
       std::printf("%-17s%6d | %8.3f %8.2f   | %8.3f %8.2f       | %7.2f | %5.2f %5.2f\n",
                   std::string(name_of(method)).c_str(), levels, error.mean_ciede2000, error.max_ciede2000,
@@ -191,23 +174,16 @@ void compare_tables(const std::string& folder, double display_cd_m2, Executor& e
 }  // namespace
 }  // namespace lowlux::isp
 
-int main(int argc, char** argv) {
-  using namespace lowlux;
-  if (argc < 2) {
-    std::fprintf(stderr, "usage: retarget_bench PICTURES [--display CD_M2] [--tables]\n");
-    return 2;
-  }
-  double display_cd_m2 = 2;
-  bool only_tables = false;
-  for (int i = 2; i < argc; ++i) {
-    if (std::strcmp(argv[i], "--display") == 0 && i + 1 < argc) display_cd_m2 = std::atof(argv[++i]);
-    only_tables = only_tables || std::strcmp(argv[i], "--tables") == 0;
-  }
+int lowlux::test::measure_retarget(Arguments& arguments) {
+  const double display_cd_m2 = arguments.option("--display", 2.0, 0.0);
+  const bool only_tables = arguments.flag("--tables");
+  const std::string folder = arguments.required("PICTURES");
+  arguments.end();
   PoolExecutor executor(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
-  isp::compare_tables(argv[1], display_cd_m2, executor);
+  isp::compare_tables(folder, display_cd_m2, executor);
   if (only_tables) return 0;
   for (const isp::ShinUnits units : {isp::ShinUnits::luminance_as_is, isp::ShinUnits::lux}) {
-    isp::compare_methods(argv[1], display_cd_m2, units, executor);
+    isp::compare_methods(folder, display_cd_m2, units, executor);
   }
   return 0;
 }

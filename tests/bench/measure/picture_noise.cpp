@@ -2,17 +2,15 @@
 // point over a Gaussian, behind a sharper one and without any; both methods, and time against accuracy when samples are
 // left out. Tuned on the first four pictures; the other four are for the figures only.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <initializer_list>
-#include <utility>
 #include <vector>
 
 #include "calib/picture/picture_noise.h"
 #include "isp/base/executor.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/sensor_bench/picture_raw.h"
 #include "tests/sensor_bench/sensor_bench.h"
 
@@ -42,9 +40,9 @@ void measure(const Row& row, const calib::PictureNoiseOptions& options, Executor
   const SensorModel& sensor = row.sensor;
   const RawDn raw = test::take_picture(row.light, sensor, {.mean_green_e = row.mean_e, .seed = row.seed}, executor);
   const double black = sensor.black_level_dn;
-  const auto start = std::chrono::steady_clock::now();
+  const double start_ms = test::wall_ms();
   const auto found = calib::fit_picture_noise(raw, {black, black, black, black}, options, executor);
-  tally.ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  tally.ms += test::wall_ms() - start_ms;
   tally.megapixels += 1e-6 * static_cast<double>(raw.dn.size());
   ++tally.cases;
   if (!found) {
@@ -79,12 +77,7 @@ using Lights = std::vector<test::PictureLight>;
 Lights lights_behind(double lens_sigma_px, Executor& executor) {
   Lights out;
   for (const char* name : test::clean_pictures) {
-    auto light = test::picture_light(name, executor, lens_sigma_px);
-    if (!light) {
-      std::fprintf(stderr, "%s\n", light.error().message.c_str());
-      std::exit(1);
-    }
-    out.push_back(*std::move(light));
+    out.push_back(test::value_of(test::picture_light(name, executor, lens_sigma_px)));
   }
   return out;
 }
@@ -110,7 +103,8 @@ void run(const Run& r, Executor& executor) {
 
 }  // namespace
 
-int main() {
+int lowlux::test::measure_picture_noise(Arguments& arguments) {
+  arguments.end();
   PoolExecutor executor(1);
   using calib::PictureNoiseMethod;
   SensorModel clipping = test::modern_small();

@@ -1,29 +1,26 @@
 // How fast the stage of isp/adapter is, by the protocol of libcamera's software ISP: 30 frames to warm up, the mean of
 // the next 30, lowlux_stage_process alone; and what its levels gain on a night scene that stands still.
-//   stage_bench PICTURE [--small] [--mode NAME] [--threads N] [--look camera|eye]
-// PICTURE: a name of testdata/pictures; --small: 1920 x 1080 alone; the others: these alone.
+//   measure stage [PICTURE] [--small] [--mode NAME] [--threads N] [--look camera|eye]
+// PICTURE: a name of testdata/pictures, kodim19.png by default; --small: 1920 x 1080 alone; the others: these alone.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <random>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "isp/adapter/lowlux_stage.h"
 #include "isp/base/executor.h"
 #include "isp/base/packed/raw_format.h"
 #include "isp/base/plane.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/sensor_bench/picture_raw.h"
 
 namespace {
 
 using namespace lowlux;
-using Clock = std::chrono::steady_clock;
 
 constexpr double black_dn = 64, gain_dn = 0.24, read_e = 2, white_dn = 1023;
 constexpr int warm_up = 30, measured = 30, distinct = 6;  // frames
@@ -129,17 +126,15 @@ class Bench {
     out.planes = 1;
     out.plane[0] = {picture_.data(), picture_.size(), stride_};
     const lowlux_stage_params p = params(mode_.denoise, sequence_++);
-    const auto start = Clock::now();
-    check(lowlux_stage_process(stage_, &in, &out, &p, nullptr, &statistics_));
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+    return test::ms_of(test::wall_ms,
+                       [&] { check(lowlux_stage_process(stage_, &in, &out, &p, nullptr, &statistics_)); });
   }
   const std::vector<std::uint8_t>& picture() const { return picture_; }
 
  private:
   void check(int code) const {
     if (code >= 0) return;
-    std::fprintf(stderr, "stage_bench: error %d: %s\n", code, lowlux_stage_last_error(stage_));
-    std::exit(1);
+    throw test::Failure(1, "error " + std::to_string(code) + ": " + lowlux_stage_last_error(stage_));
   }
   const Mode& mode_;
   Size size_;
@@ -162,15 +157,9 @@ double psnr(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>&
 
 double memcpy_ms(std::size_t bytes) {
   std::vector<std::uint8_t> from(bytes, 1), to(bytes);
-  std::vector<double> times;
-  for (int i = 0; i < 15; ++i) {
-    const auto start = Clock::now();
-    std::memcpy(to.data(), from.data(), bytes);
-    asm volatile("" : : "r"(to.data()) : "memory");
-    times.push_back(std::chrono::duration<double, std::milli>(Clock::now() - start).count());
-  }
-  std::nth_element(times.begin(), times.begin() + 7, times.end());
-  return times[7];
+  test::Task copy{"memcpy", [&] { std::memcpy(to.data(), from.data(), bytes); }};
+  test::time_in_turn({&copy, 1}, 15);
+  return copy.median_wall_ms();
 }
 
 /// What is asked for; empty or 0: all.
@@ -223,24 +212,20 @@ void bench_size(const Plane<float>& light, double mean_e, Size size, const Choic
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  const std::string picture = argc > 1 ? argv[1] : "kodim19.png";
-  Choice choice;
-  for (int i = 2; i < argc; ++i) {
-    const std::string option = argv[i], value = i + 1 < argc ? argv[i + 1] : "";
-    choice.small = choice.small || option == "--small";
-    if (option == "--mode") choice.mode = value;
-    if (option == "--look") choice.look = value;
-    if (option == "--threads") choice.threads = std::atoi(value.c_str());
+int lowlux::test::measure_stage(Arguments& arguments) {
+  const Choice choice{arguments.option("--mode").value_or(""), arguments.option("--look").value_or(""),
+                      arguments.option("--threads", 0, 1), arguments.flag("--small")};
+  const std::string picture = arguments.next().value_or("kodim19.png");
+  arguments.end();
+  const bool eye = choice.look == "eye";
+  const int threads = choice.threads == 2 ? 2 : 1;
+  if (std::ranges::none_of(modes, [&](const Mode& mode) { return wanted(choice, mode, eye, threads); })) {
+    throw Failure(2, "there is no such mode, look or number of threads");
   }
   PoolExecutor executor(2);
-  const auto light = test::picture_light(picture, executor, 0.6);
-  if (!light) {
-    std::fprintf(stderr, "stage_bench: %s\n", light.error().message.c_str());
-    return 1;
-  }
+  const PictureLight light = value_of(picture_light(picture, executor, 0.6));
   std::printf("lowlux stage, vectors: %s\n", unpack_target());
-  bench_size(light->rate_e, 20, {1920, 1080}, choice);
-  if (!choice.small) bench_size(light->rate_e, 20, {3280, 2464}, choice);
+  bench_size(light.rate_e, 20, {1920, 1080}, choice);
+  if (!choice.small) bench_size(light.rate_e, 20, {3280, 2464}, choice);
   return 0;
 }

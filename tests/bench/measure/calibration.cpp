@@ -1,12 +1,9 @@
 // What accuracy costs in time, for each estimator of a camera's figures: root mean square error against the simulated
 // truth over several seeds, the standard error the estimator itself reports, and the processor time of the estimate
 // (reading frames from files excluded). Errors fall with the root of the pixels, time grows with them.
-//   calibration_bench [--seeds N, at least 4]
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <ctime>
 #include <random>
 #include <string>
 #include <utility>
@@ -22,18 +19,13 @@
 #include "capture/synthetic/fixed_pattern.h"
 #include "isp/model/colour/colorimetry.h"
 #include "isp/model/spectrum/cie_data.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/sensor_bench/sensor_bench.h"
 
 namespace {
 
 using namespace lowlux;
-using test::SensorBench;
-
-double cpu_clock_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
+using namespace test;
 
 /// Errors of one estimator at one cost.
 struct Row {
@@ -52,9 +44,9 @@ struct Row {
 
 template <class Work>
 auto timed(double& ms, const Work& work) {
-  const double start = cpu_clock_ms();
+  const double start = cpu_ms();
   auto out = work();
-  ms += cpu_clock_ms() - start;
+  ms += cpu_ms() - start;
   return out;
 }
 
@@ -62,7 +54,7 @@ std::string pixels_text(int side) { return std::to_string(side / 2 * (side / 2))
 
 /// Black of masked pixels: 200 e- of dark charge, 4 e- of read noise.
 void black_rows(int seeds) {
-  SensorModel sensor = test::modern_small();
+  SensorModel sensor = modern_small();
   sensor.read_noise_e = 4;
   sensor.system_gain_dn_per_e = 2;
   sensor.full_well_e = 1800;
@@ -97,7 +89,7 @@ std::vector<calib::DarkGroup> darks(const SensorBench& bench, int frames, double
 }
 
 void dark_rows(int seeds) {
-  const SensorModel sensor = test::modern_small();
+  const SensorModel sensor = modern_small();
   const Estimate gain{sensor.system_gain_dn_per_e, 0};
   for (const auto& [side, frames] : {std::pair(128, 2), std::pair(128, 8), std::pair(512, 2), std::pair(512, 8)}) {
     Row current, system_gain;
@@ -122,7 +114,7 @@ void dark_rows(int seeds) {
 }
 
 void transfer_rows(int seeds) {
-  const SensorModel sensor = test::modern_small();
+  const SensorModel sensor = modern_small();
   const double fill = isp::saturation_charge_e(sensor);
   for (const auto& [side, levels] : {std::pair(64, 6), std::pair(256, 6), std::pair(256, 24), std::pair(512, 24)}) {
     Row gain, read_noise;
@@ -152,7 +144,7 @@ void transfer_rows(int seeds) {
 /// Pixels 8 standard deviations of one frame above the others: share of them that is found, and of those found that
 /// are.
 void hot_rows() {
-  SensorModel sensor = test::modern_small();
+  SensorModel sensor = modern_small();
   sensor.hot_pixel_fraction = 0.002;
   sensor.hot_pixel_current_e_per_s = 100;
   std::printf("\n%-26s %-34s %11s %11s %-6s %9s\n", "finder", "cost", "recall", "precision", "", "cpu ms");
@@ -205,7 +197,8 @@ void colour_rows(int seeds) {
       std::vector<calib::ColourSample> clean, noisy;
       for (std::size_t i = 0; i < references.size(); ++i) {
         const Vector3 camera = to_camera * isp::vector_of(references[i]);
-        const double x = static_cast<double>(i % 6) / 2.5 - 1, y = static_cast<double>(i / 6) / 1.5 - 1;
+        const std::size_t column = i % 6, row = i / 6;
+        const double x = static_cast<double>(column) / 2.5 - 1, y = static_cast<double>(row) / 1.5 - 1;
         clean.push_back({camera, references[i], x, y});
         const Vector3 off{camera[0] * (1 + normal(engine)), camera[1] * (1 + normal(engine)),
                           camera[2] * (1 + normal(engine))};
@@ -224,13 +217,9 @@ void colour_rows(int seeds) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  int seeds = 8;
-  if (argc == 3 && std::string(argv[1]) == "--seeds") seeds = std::atoi(argv[2]);
-  if (seeds < 4 || (argc != 1 && argc != 3)) {
-    std::fprintf(stderr, "usage: calibration_bench [--seeds N, at least 4]\n");
-    return 2;
-  }
+int lowlux::test::measure_calibration(Arguments& arguments) {
+  const int seeds = arguments.option("--seeds", 8, 4);
+  arguments.end();
   std::printf("%-26s %-34s %11s %11s %-6s %9s\n", "estimator", "cost", "rms error", "reported", "unit", "cpu ms");
   black_rows(seeds);
   dark_rows(seeds);

@@ -1,16 +1,13 @@
 // Times the temporal mean against memcpy, and measures what it gains on a still scene, how often it takes one to move,
 // and what moving things leave behind: see denoise/README.md.
-//   temporal_bench [ROUNDS, at least 5]
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
-#include <ctime>
-#include <vector>
+#include <span>
 
 #include "denoise/temporal/temporal.h"
-#include "isp/metrics/statistics.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/denoise/frames.h"
 
 namespace {
@@ -19,14 +16,8 @@ using namespace lowlux;
 using denoise_testing::Camera;
 using denoise_testing::exposed;
 
-double cpu_clock_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
-}
-
 /// Still frames, then the same with light that changes a little from frame to frame.
-void print_times(int rounds) {
+void print_temporal_times(int rounds) {
   constexpr int width = 2000, height = 1500;
   const Camera camera{.dark_e = {2, 2, 2, 2}};
   const std::array raw{exposed(camera, denoise_testing::waves(50), width, height, 1),
@@ -34,27 +25,22 @@ void print_times(int rounds) {
   Plane<float> out(width, height), share(width / 2, height / 2);
   denoise::TemporalMean temporal(width, height, 1);
   InlineExecutor one;
-  std::vector<double> copying, still, changing;
-  const auto time = [](std::vector<double>& times, const auto& work) {
-    const double start = cpu_clock_ns();
-    work();
-    times.push_back((cpu_clock_ns() - start) / (static_cast<double>(width) * height));
+  int round = 0;
+  const auto run = [&](double light) {
+    temporal.run({raw[round % 2].view(), camera.phase}, camera.noise(), light, {}, out.view(), share.view(), one);
   };
-  for (int round = 0; round < rounds; ++round) {
-    const Plane<float>& frame = raw[round % 2];
-    const auto run = [&](double light) {
-      temporal.run({frame.view(), camera.phase}, camera.noise(), light, {}, out.view(), share.view(), one);
-    };
-    time(copying, [&] { std::memcpy(out.data(), frame.data(), frame.size() * sizeof(float)); });
-    time(still, [&] { run(1); });
-    time(changing, [&] { run(round % 2 == 0 ? 1.01 : 1 / 1.01); });
-  }
-  const double copy = isp::median(copying);
+  constexpr double pixels = static_cast<double>(width) * height;
+  std::array tasks{
+      test::Task{"memcpy", [&] { std::memcpy(out.data(), raw[round % 2].data(), out.size() * sizeof(float)); }, pixels},
+      test::Task{"light as before", [&] { run(1); }, pixels},
+      test::Task{"light that changes", [&] { run(round++ % 2 == 0 ? 1.01 : 1 / 1.01); }, pixels}};
+  test::time_in_turn(tasks, rounds);
+  const double copy = 1e6 * tasks[0].median_cpu_ms();
   std::printf("one thread, %d rounds, median CPU time [ns/pixel], and of memcpy's\n", rounds);
   std::printf("%-22s %5.2f\n", "memcpy", copy);
-  for (auto* const times : {&still, &changing}) {
-    const double ns = isp::median(*times);
-    std::printf("%-22s %5.2f %5.1f\n", times == &still ? "light as before" : "light that changes", ns, ns / copy);
+  for (const test::Task& task : std::span(tasks).subspan(1)) {
+    const double ns = 1e6 * task.median_cpu_ms();
+    std::printf("%-22s %5.2f %5.1f\n", task.name.c_str(), ns, ns / copy);
   }
 }
 
@@ -177,13 +163,10 @@ void print_trails() {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  const int rounds = argc > 1 ? std::atoi(argv[1]) : 21;
-  if (rounds < 5 || argc > 2) {
-    std::fprintf(stderr, "usage: temporal_bench [ROUNDS, at least 5]\n");
-    return 2;
-  }
-  print_times(rounds);
+int lowlux::test::measure_temporal(Arguments& arguments) {
+  const int rounds = arguments.next(21, 5);
+  arguments.end();
+  print_temporal_times(rounds);
   print_gain();
   print_alarms();
   print_alarms_of_structure();

@@ -1,15 +1,11 @@
 // Times the denoiser against memcpy and against its reference, and measures what it leaves of the noise on simulated
 // raws of the pictures in testdata: see denoise/README.md.
-//   denoise_bench [--rounds N, at least 5] [--quality-only | --time-only]
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <fstream>
-#include <functional>
 #include <iterator>
 #include <numeric>
 #include <optional>
@@ -21,6 +17,7 @@
 #include "capture/file/picture_source.h"
 #include "denoise/denoiser.h"
 #include "isp/codec/exr.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/denoise/frames.h"
 #include "tests/reference/denoise_ref.h"
 
@@ -33,45 +30,16 @@ using denoise::Level;
 using denoise_testing::Camera;
 using denoise_testing::exposed;
 
-double cpu_clock_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
-struct Task {
-  std::string name;
-  double megapixels;
-  std::function<void()> run;
-  std::vector<double> ms{};  // CPU time of each round
-
-  double median_per_megapixel() const {
-    std::vector<double> sorted = ms;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted[sorted.size() / 2] / megapixels;
-  }
-};
-
-void time_interleaved(std::vector<Task>& tasks, int rounds) {
-  for (int round = -1; round < rounds; ++round) {  // one to warm up
-    for (Task& task : tasks) {
-      const double start = cpu_clock_ms();
-      task.run();
-      if (round >= 0) task.ms.push_back(cpu_clock_ms() - start);
-    }
-  }
-}
-
 /// The reference, which leaves nothing out, takes the same time for every chroma start.
-void print_table(const std::vector<Task>& tasks) {
+void print_table(const std::vector<test::Task>& tasks) {
   std::printf("%-26s %8s %10s %14s\n", "", "ms/MP", "x memcpy", "reference is x");
   double reference_ms = 0;
-  for (const Task& task : tasks) {
-    const double ms = task.median_per_megapixel();
+  for (const test::Task& task : tasks) {
+    const double ms = task.median_cpu_ms();
     if (task.name == "reference") {
       reference_ms = ms;
     } else {
-      std::printf("%-26s %8.2f %10.1f", task.name.c_str(), ms, ms / tasks[0].median_per_megapixel());
+      std::printf("%-26s %8.2f %10.1f", task.name.c_str(), ms, ms / tasks[0].median_cpu_ms());
       std::printf(reference_ms > 0 ? " %14.0f\n" : "\n", reference_ms / ms);
     }
   }
@@ -85,22 +53,26 @@ void print_times(int rounds) {
   Plane<float> out(width, height);
   denoise::Denoiser denoiser(width, height, 1, Level::best);
   InlineExecutor one;
-  std::vector<Task> tasks;
+  std::vector<test::Task> tasks;
   tasks.reserve(1 + 4 * all_levels.size());
-  tasks.push_back({"memcpy", 3, [&] { std::memcpy(out.data(), raw.data(), raw.size() * sizeof(float)); }});
+  tasks.push_back({"memcpy", [&] { std::memcpy(out.data(), raw.data(), raw.size() * sizeof(float)); }, 3});
   for (const Level level : all_levels) {
     const DenoiseOptions options{.level = level, .chroma_start = 0};
-    tasks.push_back({"reference", small * small * 1e-6, [&, options] {
+    tasks.push_back({"reference",
+                     [&, options] {
                        reference::denoise({part.view(), camera.phase}, camera.noise(), options);
-                     }});
+                     },
+                     small * small * 1e-6});
     for (const int start : {0, 1, 2}) {
       const DenoiseOptions with{.level = level, .chroma_start = start};
-      tasks.push_back({std::string(denoise::name_of(level)) + ", chroma from " + std::to_string(start), 3, [&, with] {
+      tasks.push_back({std::string(denoise::name_of(level)) + ", chroma from " + std::to_string(start),
+                       [&, with] {
                          denoiser.run({raw.view(), camera.phase}, camera.noise(), with, out.view(), {}, one);
-                       }});
+                       },
+                       3});
     }
   }
-  time_interleaved(tasks, rounds);
+  test::time_in_turn(tasks, rounds);
   std::printf("target %s, one thread, %d rounds, median CPU time\n\n", denoise::denoiser_target(), rounds);
   print_table(tasks);
 }
@@ -139,21 +111,15 @@ Plane<float> blurred(const Plane<float>& in, int dx, int dy) {
   return out;
 }
 
-[[noreturn]] void refuse(const Error& error) {
-  std::fprintf(stderr, "%s\n", error.message.c_str());
-  std::exit(1);
-}
-
 /// The channels as they are, what lies below black set to it: capture::read_picture takes so much of it for no
 /// radiance.
 Shot clipped_shot_of(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   const std::string bytes(std::istreambuf_iterator<char>(file), {});
-  const auto picture = isp::decode_exr(std::as_bytes(std::span(bytes)));
-  if (!picture) refuse(picture.error());
+  const auto picture = test::value_of(isp::decode_exr(std::as_bytes(std::span(bytes))));
   Shot shot;
   for (std::size_t c = 0; c < 3; ++c) {
-    shot.rgb[c] = std::get<SceneLinear>(picture->picture).plane[c].clone();
+    shot.rgb[c] = std::get<SceneLinear>(picture.picture).plane[c].clone();
     for (float& e : std::span(shot.rgb[c].data(), shot.rgb[c].size())) e = std::max(0.0f, e);
     shot.rgb[c] = blurred(blurred(shot.rgb[c], 1, 0), 0, 1);
   }
@@ -163,11 +129,10 @@ Shot clipped_shot_of(const std::string& path) {
 Shot shot_of(const std::string& name) {
   if (name.ends_with(".exr")) return clipped_shot_of(std::string(LOWLUX_TESTDATA) + "/pictures/" + name);
   InlineExecutor one;
-  const auto picture = capture::read_picture(std::string(LOWLUX_TESTDATA) + "/pictures/" + name, one);
-  if (!picture) refuse(picture.error());
+  const auto picture = test::value_of(capture::read_picture(std::string(LOWLUX_TESTDATA) + "/pictures/" + name, one));
   // IEC 61966-2-1
   constexpr Matrix3 from_xyz{{{3.2406, -1.5372, -0.4986}, {-0.9689, 1.8758, 0.0415}, {0.0557, -0.2040, 1.0570}}};
-  const auto& xyz = picture->xyz.plane;
+  const auto& xyz = picture.xyz.plane;
   Shot shot;
   for (auto& plane : shot.rgb) plane = Plane<float>(xyz[0].width(), xyz[0].height());
   for (int y = 0; y < xyz[0].height(); ++y) {
@@ -275,24 +240,10 @@ void print_quality() {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  int rounds = 5;
-  bool times = true, quality = true;
-  for (int i = 1; i < argc; ++i) {
-    if (std::strcmp(argv[i], "--rounds") == 0 && i + 1 < argc) {
-      rounds = std::atoi(argv[++i]);
-    } else if (std::strcmp(argv[i], "--quality-only") == 0) {
-      times = false;
-    } else if (std::strcmp(argv[i], "--time-only") == 0) {
-      quality = false;
-    } else {
-      rounds = 0;
-    }
-  }
-  if (rounds < 5) {
-    std::fprintf(stderr, "usage: denoise_bench [--rounds N, at least 5] [--quality-only | --time-only]\n");
-    return 2;
-  }
+int lowlux::test::measure_denoise(Arguments& arguments) {
+  const int rounds = arguments.option("--rounds", 5, 5);
+  const bool times = !arguments.flag("--quality-only"), quality = !arguments.flag("--time-only");
+  arguments.end();
   if (times) print_times(rounds);
   if (times && quality) std::printf("\n");
   if (quality) print_quality();

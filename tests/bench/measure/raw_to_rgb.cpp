@@ -1,17 +1,13 @@
 // Times RawToRgb against memcpy of 60 MB in the same run; see docs/kernels.md.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <functional>
 #include <memory>
 #include <random>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,8 +15,8 @@
 
 #include "isp/base/executor.h"
 #include "isp/base/image.h"
-#include "isp/metrics/statistics.h"
 #include "isp/raw/kernel/raw_to_rgb.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/reference/raw_to_rgb_ref.h"
 
 namespace {
@@ -31,10 +27,10 @@ constexpr std::size_t memcpy_bytes = 60'000'000;
 constexpr float black_dn = 512, white_dn = 16383;
 
 struct Settings {
-  int width = 4000;
-  int height = 3000;
-  int rounds = 31;
-  bool json = false;
+  int width;
+  int height;
+  int rounds;
+  bool json;
 };
 
 /// White-balanced camera RGB to linear sRGB, typical of a consumer sensor; rows sum to 1.
@@ -97,38 +93,6 @@ double fraction_outside(isp::RawToRgb& kernel, const isp::RgbInput& in, SceneLin
   return static_cast<double>(outside) / (static_cast<double>(scratch.width()) * scratch.height());
 }
 
-struct Task {
-  std::string name;
-  int threads;
-  std::function<void()> run;
-  std::vector<double> wall_ms{};
-  std::vector<double> cpu_ms{};  // of all threads together
-
-  double median_ms() const { return isp::median(wall_ms); }
-  double median_cpu_ms() const { return isp::median(cpu_ms); }
-  double minimum_ms() const { return *std::min_element(wall_ms.begin(), wall_ms.end()); }
-};
-
-double cpu_clock_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
-void time_interleaved(std::vector<Task>& tasks, int rounds) {
-  for (int round = -2; round < rounds; ++round) {  // two to warm up
-    for (Task& task : tasks) {
-      const double cpu_start = cpu_clock_ms();
-      const auto start = std::chrono::steady_clock::now();
-      task.run();
-      const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - start;
-      if (round < 0) continue;
-      task.wall_ms.push_back(wall.count());
-      task.cpu_ms.push_back(cpu_clock_ms() - cpu_start);
-    }
-  }
-}
-
 /// Everything the tasks work on, made once and touched before timing.
 struct Stage {
   Settings settings;
@@ -168,13 +132,13 @@ struct Stage {
   }
 };
 
-std::vector<Task> tasks_of(Stage& s) {
-  std::vector<Task> tasks;
-  tasks.push_back({"memcpy 60 MB", 1, [&s] { std::memcpy(s.copy_to.data(), s.copy_from.data(), memcpy_bytes); }});
+std::vector<test::Task> tasks_of(Stage& s) {
+  std::vector<test::Task> tasks;
+  tasks.push_back({"memcpy 60 MB", [&s] { std::memcpy(s.copy_to.data(), s.copy_from.data(), memcpy_bytes); }});
   for (const int threads : {1, 2}) {
     Executor& executor = threads == 1 ? static_cast<Executor&>(s.one) : s.two;
     const auto add = [&](std::string name, std::function<void()> run) {
-      tasks.push_back({std::move(name), threads, std::move(run)});
+      tasks.push_back({.name = std::move(name), .run = std::move(run), .threads = threads});
     };
     const auto to8 = [&s, &executor](const isp::RgbInput& in, bool move) {
       return [&s, &executor, in, move] { s.kernel.rgb8(in, transform(move), s.tone, s.codes8.codes.view(), executor); };
@@ -198,79 +162,57 @@ std::vector<Task> tasks_of(Stage& s) {
   return tasks;
 }
 
+double minimum_ms(const test::Task& task) { return std::ranges::min(task.wall_times_ms); }
+
 struct Shares {
   double natural;
   double saturated;
 };
 
-void print_table(const Stage& s, const std::vector<Task>& tasks, const Shares& outside) {
-  const Task& copy = tasks[0];
+void print_table(const Stage& s, const std::vector<test::Task>& tasks, const Shares& outside) {
+  const test::Task& copy = tasks[0];
   std::printf("target %s, %d x %d, %d rounds\n", isp::raw_to_rgb_target(), s.settings.width, s.settings.height,
               s.settings.rounds);
   std::printf("pixels outside the gamut: natural %.1f %%, saturated %.1f %%\n\n", 100 * outside.natural,
               100 * outside.saturated);
   std::printf("%-36s %7s | %8s %8s %8s | %8s %8s\n", "task", "threads", "median", "x memcpy", "minimum", "CPU",
               "x memcpy");
-  for (const Task& t : tasks) {
-    std::printf("%-36s %7d | %8.2f %8.2f %8.2f | %8.2f %8.2f\n", t.name.c_str(), t.threads, t.median_ms(),
-                t.median_ms() / copy.median_ms(), t.minimum_ms(), t.median_cpu_ms(),
+  for (const test::Task& t : tasks) {
+    std::printf("%-36s %7d | %8.2f %8.2f %8.2f | %8.2f %8.2f\n", t.name.c_str(), t.threads, t.median_wall_ms(),
+                t.median_wall_ms() / copy.median_wall_ms(), minimum_ms(t), t.median_cpu_ms(),
                 t.median_cpu_ms() / copy.median_cpu_ms());
   }
   std::printf("\nms; CPU is the median of all threads together, and the ratio to trust where cores are shared\n");
 }
 
-void print_json(const Stage& s, const std::vector<Task>& tasks, const Shares& outside) {
-  const Task& copy = tasks[0];
+void print_json(const Stage& s, const std::vector<test::Task>& tasks, const Shares& outside) {
+  const test::Task& copy = tasks[0];
   std::printf("{\"target\": \"%s\", \"width\": %d, \"height\": %d, \"rounds\": %d,\n", isp::raw_to_rgb_target(),
               s.settings.width, s.settings.height, s.settings.rounds);
   std::printf(" \"natural_outside_gamut\": %.4f, \"saturated_outside_gamut\": %.4f,\n \"tasks\": [\n", outside.natural,
               outside.saturated);
-  for (const Task& t : tasks) {
+  for (const test::Task& t : tasks) {
     std::printf(R"(  {"name": "%s", "threads": %d, "median_ms": %.3f, "min_ms": %.3f, "cpu_median_ms": %.3f,)",
-                t.name.c_str(), t.threads, t.median_ms(), t.minimum_ms(), t.median_cpu_ms());
+                t.name.c_str(), t.threads, t.median_wall_ms(), minimum_ms(t), t.median_cpu_ms());
     std::printf(R"( "median_per_memcpy": %.3f, "min_per_memcpy": %.3f, "cpu_per_memcpy": %.3f}%s)",
-                t.median_ms() / copy.median_ms(), t.minimum_ms() / copy.minimum_ms(),
+                t.median_wall_ms() / copy.median_wall_ms(), minimum_ms(t) / minimum_ms(copy),
                 t.median_cpu_ms() / copy.median_cpu_ms(), &t == &tasks.back() ? "\n" : ",\n");
   }
   std::printf(" ]}\n");
 }
 
-bool parse(int argc, char** argv, Settings& settings) {
-  for (int i = 1; i < argc; ++i) {
-    const std::string_view option = argv[i];
-    const auto number = [&](int& into, int least) {
-      into = i + 1 < argc ? std::atoi(argv[++i]) : 0;
-      return into >= least;
-    };
-    if (option == "--json") {
-      settings.json = true;
-    } else if (option == "--rounds") {
-      if (!number(settings.rounds, 15)) return false;
-    } else if (option == "--width") {
-      if (!number(settings.width, 2)) return false;
-    } else if (option == "--height") {
-      if (!number(settings.height, 2)) return false;
-    } else {
-      return false;
-    }
-  }
-  return true;
-}
-
 }  // namespace
 
-int main(int argc, char** argv) {
-  Settings settings;
-  if (!parse(argc, argv, settings)) {
-    std::fprintf(stderr, "usage: raw_to_rgb_bench [--json] [--rounds N, at least 15] [--width N] [--height N]\n");
-    return 2;
-  }
+int lowlux::test::measure_raw_to_rgb(Arguments& arguments) {
+  const Settings settings{arguments.option("--width", 4000, 2), arguments.option("--height", 3000, 2),
+                          arguments.option("--rounds", 31, 15), arguments.flag("--json")};
+  arguments.end();
   const auto stage = std::make_unique<Stage>(settings);
   Shares outside{};
   outside.saturated = fraction_outside(stage->kernel, Stage::dn(stage->saturated), stage->planes);
   outside.natural = fraction_outside(stage->kernel, Stage::dn(stage->natural), stage->planes);  // planes stay natural
   std::vector<Task> tasks = tasks_of(*stage);
-  time_interleaved(tasks, settings.rounds);
+  time_in_turn(tasks, settings.rounds);
   (settings.json ? print_json : print_table)(*stage, tasks, outside);
   return 0;
 }

@@ -1,16 +1,10 @@
 // What the look of the eye and retargeting cost beside the raw pass they are joined to, and how far their fast levels
 // are from double arithmetic: accuracy against time.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
-#include <ctime>
-#include <functional>
-#include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -21,6 +15,7 @@
 #include "isp/render/retarget/retarget.h"
 #include "isp/render/retarget/retarget_rows.h"
 #include "isp/render/retarget/retarget_table.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/reference/night_look_ref.h"
 #include "tests/reference/raw_to_rgb_ref.h"
 
@@ -31,9 +26,9 @@ using namespace lowlux;
 constexpr std::size_t memcpy_bytes = 60'000'000;
 
 struct Settings {
-  int width = 4000;
-  int height = 3000;
-  int rounds = 15;
+  int width;
+  int height;
+  int rounds;
 };
 
 /// A street by night: a few lamps, falling off, over a dark ground; colours in between. Linear, 1 at the white level.
@@ -79,41 +74,14 @@ isp::NightLook look_at(double mean_cd_m2, double width) {
   return look;
 }
 
-double cpu_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
-struct Task {
-  std::string name;
-  std::function<void()> run;
-  std::vector<double> ms{};
-  double median() const {
-    std::vector<double> sorted = ms;
-    std::ranges::sort(sorted);
-    return sorted[sorted.size() / 2];
-  }
-};
-
-void time_interleaved(std::vector<Task>& tasks, int rounds) {
-  for (int round = -1; round < rounds; ++round) {  // one to warm up
-    for (Task& task : tasks) {
-      const double start = cpu_ms();
-      task.run();
-      if (round >= 0) task.ms.push_back(cpu_ms() - start);
-    }
-  }
-}
-
-void print_times(const std::vector<Task>& tasks, const Settings& settings) {
+void print_look_times(const std::vector<test::Task>& tasks, const Settings& settings) {
   const double pixels = 1e6 * settings.width * settings.height / 1e6;
   std::printf("%d x %d, %s, one core, CPU time, medians of %d rounds in turn\n\n", settings.width, settings.height,
               isp::raw_to_rgb_target(), settings.rounds);
   std::printf("%-52s %8s %9s %9s %9s\n", "", "ms", "ns/pixel", "x memcpy", "x raw");
-  for (const Task& t : tasks) {
-    std::printf("%-52s %8.2f %9.2f %9.2f %9.2f\n", t.name.c_str(), t.median(), 1e6 * t.median() / pixels,
-                t.median() / tasks[0].median(), t.median() / tasks[1].median());
+  for (const test::Task& t : tasks) {
+    std::printf("%-52s %8.2f %9.2f %9.2f %9.2f\n", t.name.c_str(), t.median_cpu_ms(), 1e6 * t.median_cpu_ms() / pixels,
+                t.median_cpu_ms() / tasks[0].median_cpu_ms(), t.median_cpu_ms() / tasks[1].median_cpu_ms());
   }
 }
 
@@ -163,7 +131,7 @@ void time_all(const Settings& settings) {
   const isp::RetargetTable table = isp::tabulated(code_map, 33, stage.one);
   const isp::CodeChange change = change_by(table);
   std::vector<unsigned char> from(memcpy_bytes, 1), to(memcpy_bytes, 2);
-  std::vector<Task> tasks;
+  std::vector<test::Task> tasks;
   tasks.push_back({"memcpy 60 MB", [&] { std::memcpy(to.data(), from.data(), memcpy_bytes); }});
   tasks.push_back({"raw to rgb8", [&] { stage.render(nullptr); }});
   for (const double cd_m2 : {100.0, 1.0, 0.1, 0.01}) {
@@ -183,10 +151,10 @@ void time_all(const Settings& settings) {
                    }});
   tasks.push_back({"raw to rgb8 with the grid ready", [&] { stage.render(&ready); }});
   tasks.push_back({"raw to rgb8 for a display of 2 cd/m2 (table of 33)", [&] { stage.render(nullptr, &change); }});
-  time_interleaved(tasks, settings.rounds);
-  print_times(tasks, settings);
+  test::time_in_turn(tasks, settings.rounds);
+  print_look_times(tasks, settings);
   double worst = 0;
-  for (std::size_t k = 2; k < 6; ++k) worst = std::max(worst, tasks[k].median() / tasks[1].median() - 1);
+  for (std::size_t k = 2; k < 6; ++k) worst = std::max(worst, tasks[k].median_cpu_ms() / tasks[1].median_cpu_ms() - 1);
   std::printf("\nthe look adds %.2f of the raw pass at most\n", worst);
 }
 
@@ -218,12 +186,12 @@ void print_errors() {
       "cd/m2", "mean", "99 %", "largest", "table ns/px", "exact ns/px");
   for (const double cd_m2 : {30.0, 3.0, 1.0, 0.3, 0.1, 0.03, 0.01, 0.001}) {
     const isp::NightLook look = look_at(cd_m2, settings.width);
-    double start = cpu_ms();
+    double start = test::cpu_ms();
     const LookGrid fast = stage.grid(look);
-    const double table_ms = cpu_ms() - start;
-    start = cpu_ms();
+    const double table_ms = test::cpu_ms() - start;
+    start = test::cpu_ms();
     const auto parts = reference::night_look(std::as_const(stage.quarter).view(), transform().matrix, 1, look);
-    const double exact_ms = cpu_ms() - start;
+    const double exact_ms = test::cpu_ms() - start;
     std::vector<Plane<float>> memory;
     const LookGrid exact = reference::look_grid(parts, look, memory);
     stage.render(&fast);
@@ -241,19 +209,10 @@ void print_errors() {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  Settings settings;
-  for (int i = 1; i + 1 < argc; i += 2) {
-    const std::string_view option = argv[i];
-    int* const into = option == "--width"    ? &settings.width
-                      : option == "--height" ? &settings.height
-                      : option == "--rounds" ? &settings.rounds
-                                             : nullptr;
-    if (into == nullptr || (*into = std::atoi(argv[i + 1])) < 1) {
-      std::fprintf(stderr, "usage: look_bench [--width N] [--height N] [--rounds N]\n");
-      return 2;
-    }
-  }
+int lowlux::test::measure_look(Arguments& arguments) {
+  const Settings settings{arguments.option("--width", 4000, 1), arguments.option("--height", 3000, 1),
+                          arguments.option("--rounds", 15, 1)};
+  arguments.end();
   time_all(settings);
   print_errors();
   return 0;

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <random>
 #include <vector>
 
@@ -16,11 +15,10 @@
 #include "isp/codec/jpeg.h"
 #include "isp/codec/png.h"
 #include "isp/codec/tiff.h"
+#include "tests/bench/measure/measure.h"
 
+namespace lowlux::isp {
 namespace {
-
-using namespace lowlux;
-using namespace lowlux::isp;
 
 constexpr int width = 4000, height = 3000;
 
@@ -58,14 +56,8 @@ Encoded<Code> codes_of(const SceneLinear& linear) {
   return out;
 }
 
-double cpu_s() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-void print_row(const char* name, double seconds, std::size_t size, std::size_t raw) {
-  std::printf("%-32s %6.0f ms CPU %6.1f MB %5.1f %%\n", name, 1e3 * seconds, static_cast<double>(size) / 1e6,
+void print_row(const char* name, double ms, std::size_t size, std::size_t raw) {
+  std::printf("%-32s %6.0f ms CPU %6.1f MB %5.1f %%\n", name, ms, static_cast<double>(size) / 1e6,
               100.0 * static_cast<double>(size) / static_cast<double>(raw));
 }
 
@@ -73,19 +65,19 @@ void print_row(const char* name, double seconds, std::size_t size, std::size_t r
 template <class Encode>
 void time_format(const char* name, std::size_t raw, const Encode& encode) {
   std::vector<char> memory(raw + raw / 4 + 100'000);
-  double best = 1e9;
+  double best_ms = 1e9;
   std::size_t size = 0;
   for (int round = 0; round < 3; ++round) {
     std::FILE* file = fmemopen(memory.data(), memory.size(), "w+b");
-    const double start = cpu_s();
+    const double start_ms = test::cpu_ms();
     if (!encode(file)) std::abort();
     std::fflush(file);
-    best = std::min(best, cpu_s() - start);
+    best_ms = std::min(best_ms, test::cpu_ms() - start_ms);
     std::fseek(file, 0, SEEK_END);
     size = static_cast<std::size_t>(std::ftell(file));
     std::fclose(file);
   }
-  print_row(name, best, size, raw);
+  print_row(name, best_ms, size, raw);
 }
 
 std::vector<unsigned char> filtered(const Encoded8& picture, int filter) {
@@ -112,15 +104,18 @@ void time_zlib(const Encoded8& picture, int filter, int level, int strategy, con
   stream.avail_in = static_cast<uInt>(in.size());
   stream.next_out = out.data();
   stream.avail_out = static_cast<uInt>(out.size());
-  const double start = cpu_s();
+  const double start_ms = test::cpu_ms();
   deflate(&stream, Z_FINISH);
-  print_row(name, cpu_s() - start, stream.total_out, picture.codes.size());
+  print_row(name, test::cpu_ms() - start_ms, stream.total_out, picture.codes.size());
   deflateEnd(&stream);
 }
 
 }  // namespace
+}  // namespace lowlux::isp
 
-int main() {
+int lowlux::test::measure_encoding(Arguments& arguments) {
+  using namespace isp;
+  arguments.end();
   const SceneLinear linear = developed_like();
   const Encoded8 codes8 = codes_of<std::uint8_t>(linear);
   const Encoded16 codes16 = codes_of<std::uint16_t>(linear);
@@ -154,4 +149,5 @@ int main() {
   time_zlib(codes8, 3, 3, Z_FILTERED, "zlib: Average, level 3");
   time_zlib(codes8, 3, 6, Z_FILTERED, "zlib: Average, level 6");
   time_zlib(codes8, 1, 6, Z_FILTERED, "zlib: Sub, level 6");
+  return 0;
 }

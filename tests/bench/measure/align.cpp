@@ -1,21 +1,20 @@
 // Errors and times of find_motion on simulated pairs of hand-held frames: shifts to 40 px, rotations to 1.5 degrees,
 // 2 e- read noise. Errors are those of the nodes, for one axis, against the true motion.
-//   align_bench waves [PAIRS]     generated scenes, 768 x 512
-//   align_bench pictures [PAIRS]  testdata/pictures, of which frames are crops with a sub-pixel motion
-//   align_bench times [WIDTH HEIGHT [THREADS]]
+//   measure align waves [PAIRS]     generated scenes, 768 x 512
+//   measure align pictures [PAIRS]  testdata/pictures, of which frames are crops with a sub-pixel motion
+//   measure align times [WIDTH HEIGHT [THREADS]]
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <memory>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "capture/file/picture_source.h"
 #include "isp/merge/align/align.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/sensor_bench/picture_raw.h"
 #include "tests/support/moving_scene.h"
 
@@ -23,11 +22,6 @@ namespace {
 
 using namespace lowlux;
 using namespace lowlux::test;
-using Clock = std::chrono::steady_clock;
-
-double ms_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 struct Pair {
   int width;
@@ -142,12 +136,7 @@ void print_pictures(int pairs, Executor& executor) {
   }
 }
 
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
-
-void print_times(int width, int height, int threads) {
+void print_motion_times(int width, int height, int threads) {
   PoolExecutor executor(threads);
   std::mt19937 random(3);
   const WaveScene scene(7, 0.4, 0.15, 16);
@@ -158,41 +147,32 @@ void print_times(int width, int height, int threads) {
     const Plane<float> a = expose(
         light, [](Position p) { return p; }, width, height, first, executor);
     const Plane<float> b = expose(light, pair.view, width, height, second, executor);
-    std::vector<double> copying, preparing, aligning;
     Plane<float> copy = a.clone();
-    for (int round = 0; round < 7; ++round) {
-      auto start = Clock::now();
-      std::copy_n(b.data(), b.size(), copy.data());
-      copying.push_back(ms_since(start));
-      start = Clock::now();
-      const merge::AlignReference reference(frame_view(a, first), executor);
-      preparing.push_back(ms_since(start));
-      start = Clock::now();
-      const merge::Motion motion = merge::find_motion(reference, frame_view(b, second), 1, {}, executor);
-      aligning.push_back(ms_since(start));
-    }
+    std::optional<merge::AlignReference> reference;
+    std::vector<Task> tasks{{"copy", [&] { std::copy_n(b.data(), b.size(), copy.data()); }},
+                            {"reference", [&] { reference.emplace(frame_view(a, first), executor); }},
+                            {"frame", [&] { merge::find_motion(*reference, frame_view(b, second), 1, {}, executor); }}};
+    time_in_turn(tasks, 7);
     const double megapixels = 1e-6 * width * height;
     std::printf("%d x %d, %d threads, %6g e-: reference %.2f, frame %.2f, copy of a frame %.2f ms/MP\n", width, height,
-                threads, mean_e, median(preparing) / megapixels, median(aligning) / megapixels,
-                median(copying) / megapixels);
+                threads, mean_e, tasks[1].median_wall_ms() / megapixels, tasks[2].median_wall_ms() / megapixels,
+                tasks[0].median_wall_ms() / megapixels);
   }
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  const std::string what = argc > 1 ? argv[1] : "";
-  const auto number = [&](int i, int otherwise) { return argc > i ? std::atoi(argv[i]) : otherwise; };
+int lowlux::test::measure_align(Arguments& arguments) {
+  const std::string what = arguments.one_of({"waves", "pictures", "times"});
   PoolExecutor executor(2);
-  if (what == "waves") {
-    print_waves(number(2, 16), executor);
-  } else if (what == "pictures") {
-    print_pictures(number(2, 8), executor);
-  } else if (what == "times") {
-    print_times(number(2, 4000), number(3, 3000), number(4, 2));
-  } else {
-    std::fprintf(stderr, "align_bench waves [PAIRS] | pictures [PAIRS] | times [WIDTH HEIGHT [THREADS]]\n");
-    return 2;
+  if (what == "times") {
+    const int width = arguments.next(4000, 1), height = arguments.next(3000, 1), threads = arguments.next(2, 1);
+    arguments.end();
+    print_motion_times(width, height, threads);
+    return 0;
   }
+  const int pairs = arguments.next(what == "waves" ? 16 : 8, 1);
+  arguments.end();
+  what == "waves" ? print_waves(pairs, executor) : print_pictures(pairs, executor);
   return 0;
 }

@@ -1,17 +1,16 @@
 // What a frame loses by being denoised in pieces: the difference to the whole frame, over the noise of a raw value,
 // near seams (32 px) and away from them, for margins on the denoiser's lattice and off it.
-//   tile_margin_bench PICTURE [best]
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <random>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "capture/file/picture_source.h"
 #include "denoise/denoiser.h"
 #include "isp/pipeline/render/frame_tiles.h"
+#include "tests/bench/measure/measure.h"
 
 namespace {
 
@@ -44,7 +43,7 @@ Plane<float> means_of(const SceneLinear& picture, double mean_e) {
   return out;
 }
 
-Plane<float> exposed(const Plane<float>& mean) {
+Plane<float> noisy(const Plane<float>& mean) {
   Plane<float> out(width, height);
   std::mt19937 engine(7);
   std::normal_distribution<double> normal;
@@ -114,15 +113,15 @@ void print_difference(const Plane<float>& tiled, const Plane<float>& whole, cons
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  if (argc < 2) return std::fprintf(stderr, "usage: tile_margin_bench PICTURE [best]\n"), 2;
+int lowlux::test::measure_tile_margin(Arguments& arguments) {
   InlineExecutor executor;
-  const auto picture = capture::read_picture(argv[1], executor);
-  if (!picture) return std::fprintf(stderr, "tile_margin_bench: %s\n", picture.error().message.c_str()), 1;
+  const std::string file = arguments.required("PICTURE");
   std::vector<Level> levels{Level::draft, Level::standard, Level::high};
-  if (argc > 2) levels = {Level::best};
+  if (arguments.is_next("best")) levels = {Level::best};
+  arguments.end();
+  const auto picture = value_of(capture::read_picture(file, executor));
   for (const double mean_e : {1.0, 20.0, 200.0}) {
-    const Plane<float> mean = means_of(picture->xyz, mean_e), raw = exposed(mean);
+    const Plane<float> mean = means_of(picture.xyz, mean_e), raw = noisy(mean);
     for (const Level level : levels) {
       Work work{raw, level};
       Plane<float> whole(width, height);

@@ -1,12 +1,11 @@
-// What the planner says of time, beside the clock.
-//   planned_time_bench budget [DRAW [FRAMES]]
-//                             FRAMES (default 40) of 0.3 to 4 MP and budgets, others for each number DRAW (default: the
-//                             day, so that it is not chosen): the plan's time against prediction and budget by the
-//                             wall clock, its error against the best of all plans that fit; exit code 1 if fewer than
-//                             95 % keep all three
-//   planned_time_bench saved  the 300 of the promise's scenes in 6.3 MP: the plan's time against everything's, and what
-//                             is seen of the difference over the tolerance; exit code 1 if one exceeds it. These frames
-//                             are sampled and go by regions
+// Compares what the planner predicts of time with the clock.
+//   measure planned-time budget [DRAW [FRAMES]]
+//       FRAMES (default 40) of 0.3 to 4 MP and budgets, others for each number DRAW (default: the day, so that it is
+//       not chosen): the plan's time against prediction and budget by the wall clock, its error against the best of all
+//       plans that fit; exit code 1 if fewer than 95 % keep all three
+//   measure planned-time saved
+//       the 300 of the promise's scenes in 6.3 MP: the plan's time against everything's, and what is seen of the
+//       difference over the tolerance; exit code 1 if one exceeds it. These frames are sampled and go by regions
 // Each frame is planned and developed five times as the command line does it, by the machine's pace of that moment:
 // "wall/pred" is the median of what the wall clock says over what was predicted, and the verdict goes by that clock.
 // The times in the table are for the comparison of plans: a fixed piece of work (isp/cost/speed_probe.h) is timed
@@ -16,7 +15,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -27,9 +25,9 @@
 #include "isp/cost/cost_measurement.h"
 #include "isp/cost/speed_probe.h"
 #include "isp/metrics/picture_metrics.h"
-#include "isp/metrics/statistics.h"
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/plan.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/scenarios/bench_raw.h"
 #include "tests/scenarios/planner_scene.h"
 #include "tests/scenarios/seen_difference.h"
@@ -43,9 +41,9 @@ using test::two_threads;
 constexpr double min_kept = 0.95;  // of the frames
 
 double seconds_of(const RawFrame& frame, const DevelopOptions& options, Encoded8* picture = nullptr) {
-  const auto start = std::chrono::steady_clock::now();
+  const double start_ms = test::wall_ms();
   Result<Developed> done = develop(frame, options, two_threads);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = 1e-3 * (test::wall_ms() - start_ms);
   if (!done) std::printf("failed: %s\n", done.error().message.c_str());
   if (done && picture != nullptr) *picture = std::get<Encoded8>(std::move(done->picture));
   return seconds;
@@ -166,9 +164,9 @@ WallShares by_the_wall(Clock& clock, const RawFrame& frame, DevelopOptions optio
   int refused = 0;
   for (int round = 0; round < 5; ++round) {
     options.effects->cost = clock.now();
-    const auto start = std::chrono::steady_clock::now();
+    const double start_ms = test::wall_ms();
     const Result<Developed> done = develop(frame, options, two_threads);
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = 1e-3 * (test::wall_ms() - start_ms);
     if (!done) {
       ++refused;
       continue;
@@ -294,13 +292,10 @@ int saved() {
 }  // namespace
 }  // namespace lowlux::isp
 
-int main(int argc, char** argv) {
-  const std::string what = argc > 1 ? argv[1] : "";
-  if (what == "budget") {
-    const auto frames = argc > 3 ? static_cast<std::uint32_t>(std::strtoul(argv[3], nullptr, 10)) : 40;
-    return lowlux::isp::budgets(argc > 2 ? std::strtoull(argv[2], nullptr, 10) : lowlux::isp::draw_of_today(), frames);
-  }
-  if (what == "saved") return lowlux::isp::saved();
-  std::fprintf(stderr, "usage: planned_time_bench budget [DRAW [FRAMES]]|saved\n");
-  return 2;
+int lowlux::test::measure_planned_time(Arguments& arguments) {
+  const bool saved = arguments.one_of({"budget", "saved"}) == "saved";
+  const std::uint64_t draw = saved ? 0 : arguments.next(isp::draw_of_today(), std::uint64_t{0});
+  const std::uint32_t frames = saved ? 0 : arguments.next(std::uint32_t{40}, std::uint32_t{1});
+  arguments.end();
+  return saved ? isp::saved() : isp::budgets(draw, frames);
 }

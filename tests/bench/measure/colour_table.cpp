@@ -1,16 +1,12 @@
 // Times a map of colours through a table against memcpy and against the map itself, in one run, with the error of the
 // table: see isp/render/README.md.
-//   colour_table_bench [--rounds N, at least 15]
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
-#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,32 +15,13 @@
 #include "isp/model/appearance/entropy_model.h"
 #include "isp/render/colour_table.h"
 #include "isp/render/colour_table_rows.h"
+#include "tests/bench/measure/measure.h"
 
+namespace lowlux::isp {
 namespace {
-
-using namespace lowlux;
-using namespace lowlux::isp;
 
 constexpr int width = 2000, height = 1500;
 constexpr std::size_t pixels = std::size_t{width} * height;
-
-double cpu_clock_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
-}
-
-struct Task {
-  std::string name;
-  std::function<void()> run;
-  std::vector<double> ns{};  // CPU time of one pixel, in each round
-
-  double median_ns() const {
-    std::vector<double> sorted = ns;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted[sorted.size() / 2];
-  }
-};
 
 /// Colours at random, 0..1 or, `signed_noise`, around a dark grey with a tenth of them out of gamut.
 SceneLinear colours(bool signed_noise) {
@@ -72,10 +49,9 @@ struct Row {
 };
 
 Row built(const std::string& name, const ColourMap& map, double bound) {
-  const auto start = std::chrono::steady_clock::now();
+  const double start_ms = test::wall_ms();
   ColourTable table = *make_colour_table(map, {.error_bound = bound});
-  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
-  return {name, std::move(table), took.count()};
+  return {name, std::move(table), test::wall_ms() - start_ms};
 }
 
 ColourMap entropy_at(double white_cd_m2, EntropyVariant variant = EntropyVariant::rendering) {
@@ -99,20 +75,20 @@ std::vector<Row> tables() {
 double solver_us(const ColourMap& map, const SceneLinear& in) {
   constexpr int count = 5000;
   double kept = 0;
-  const double start = cpu_clock_ns();
+  const double start_ms = test::cpu_ms();
   for (int i = 0; i < count; ++i) kept += map({in.plane[0].data()[i], in.plane[1].data()[i], in.plane[2].data()[i]}).y;
-  const double took = cpu_clock_ns() - start;
+  const double took_ms = test::cpu_ms() - start_ms;
   if (!(kept > 0)) std::abort();  // so that nothing can be left out
-  return 1e-3 * took / count;
+  return 1e3 * took_ms / count;
 }
 
 }  // namespace
+}  // namespace lowlux::isp
 
-int main(int argc, char** argv) {
-  const int rounds = argc == 3 && std::strcmp(argv[1], "--rounds") == 0 ? std::atoi(argv[2]) : 15;
-  if ((argc != 1 && argc != 3) || rounds < 15) {
-    return std::fprintf(stderr, "usage: colour_table_bench [--rounds N, at least 15]\n"), 2;
-  }
+int lowlux::test::measure_colour_table(Arguments& arguments) {
+  using namespace isp;
+  const int rounds = arguments.option("--rounds", 15, 15);
+  arguments.end();
   const std::vector<Row> rows = tables();
   const SceneLinear plain = colours(false), noisy = colours(true);
   SceneLinear out(width, height);
@@ -126,15 +102,9 @@ int main(int argc, char** argv) {
     tasks.push_back({row.name, [&] { apply_colour_table(row.table, plain.view(), out.view(), one); }});
     tasks.push_back({row.name, [&] { apply_colour_table(row.table, noisy.view(), out.view(), one); }});
   }
-  for (int round = -2; round < rounds; ++round) {  // two to warm up
-    for (Task& task : tasks) {
-      const double start = cpu_clock_ns();
-      task.run();
-      const double ns = (cpu_clock_ns() - start) / static_cast<double>(pixels);
-      if (round >= 0) task.ns.push_back(ns);
-    }
-  }
-  const double copy = tasks[0].median_ns();
+  time_in_turn(tasks, rounds);
+  const auto ns = [](const Task& task) { return 1e6 * task.median_cpu_ms() / static_cast<double>(pixels); };
+  const double copy = ns(tasks[0]);
   std::printf(
       "target %s, %d rounds, median CPU time of one core; memcpy of R, G, B %.2f ns/pixel; the solver %.1f us\n\n",
       table_rows::target_name(), rounds, copy, solver_us(entropy_at(0.5), plain));
@@ -148,8 +118,8 @@ int main(int argc, char** argv) {
   }
   std::printf("\n%-32s %10s %10s %14s\n", "12 bytes in, 12 out", "ns/pixel", "x memcpy", "noisy ns/pixel");
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const double ns = tasks[1 + 2 * i].median_ns();
-    std::printf("%-32s %10.2f %10.1f %14.2f\n", rows[i].name.c_str(), ns, ns / copy, tasks[2 + 2 * i].median_ns());
+    const double plain_ns = ns(tasks[1 + 2 * i]);
+    std::printf("%-32s %10.2f %10.1f %14.2f\n", rows[i].name.c_str(), plain_ns, plain_ns / copy, ns(tasks[2 + 2 * i]));
   }
   return 0;
 }

@@ -1,27 +1,25 @@
 // Measures the time of developing frames that are not mosaics:
-//     pixel_cost_bench ratios         the figures of PixelRatios (step_candidates.cpp)
-//     pixel_cost_bench draw [DRAW]    20 frames and levels drawn by DRAW (default 1): what they take over what is
-//                                     predicted of the times of mosaics; exit code 1 if fewer than 95 % are within 20 %
+//     measure pixel-cost ratios         the figures of PixelRatios (step_candidates.cpp)
+//     measure pixel-cost draw [DRAW]    20 frames and levels drawn by DRAW (default 1): what they take over what is
+//                                       predicted of the times of mosaics; exit code 1 if fewer than 95 % are within
+//                                       20 %
 // Times are processor times of one thread, the least of seven rounds.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
-#include <ctime>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <random>
 #include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include "isp/cost/timing_frame.h"
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/plan/plan_develop.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/support/executors.h"
 
 namespace lowlux::isp {
@@ -71,16 +69,7 @@ struct Times {
 template <class Work>
 double least_time(const Work& work) {
   double least_s = std::numeric_limits<double>::infinity();
-  const auto now_s = [] {
-    timespec time{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-  };
-  for (int round = 0; round < 7; ++round) {
-    const double start_s = now_s();
-    work();
-    least_s = std::min(least_s, now_s() - start_s);
-  }
+  for (int round = 0; round < 7; ++round) least_s = std::min(least_s, 1e-3 * test::ms_of(test::cpu_ms, work));
   return least_s;
 }
 
@@ -168,12 +157,12 @@ bool are_predicted(std::uint32_t seed) {
 }  // namespace
 }  // namespace lowlux::isp
 
-int main(int argc, char** argv) {
-  const std::string_view what = argc > 1 ? argv[1] : "ratios";
-  if (what == "ratios") {
-    lowlux::isp::print_ratios();
-    return 0;
-  }
-  const auto seed = argc > 2 ? static_cast<std::uint32_t>(std::strtoul(argv[2], nullptr, 10)) : 1;
-  return lowlux::isp::are_predicted(seed) ? 0 : 1;
+int lowlux::test::measure_pixel_cost(Arguments& arguments) {
+  const bool drawn = arguments.is_next("draw");
+  if (!drawn) (void)arguments.is_next("ratios");
+  const std::uint32_t seed = drawn ? arguments.next(std::uint32_t{1}, std::uint32_t{0}) : 0;
+  arguments.end();
+  if (drawn) return isp::are_predicted(seed) ? 0 : 1;
+  isp::print_ratios();
+  return 0;
 }

@@ -1,5 +1,5 @@
 // Measures how well the times of merging are predicted and budgets kept:
-//     merge_budget_bench [DRAW] [MERGES]
+//     measure merge-budget [DRAW] [MERGES]
 // Frames of 0.4 to 9 MP, 2 to 12 of them, at rest or hand-held, with budgets between the cheapest and the best method.
 // DRAW is the seed (default 1). The machine is measured first.
 
@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
-#include <cstdlib>
 #include <memory>
 #include <random>
 #include <string>
@@ -18,14 +17,12 @@
 #include "isp/cost/merge_cost.h"
 #include "isp/cost/speed_probe.h"
 #include "isp/cost/timing_frame.h"
-#include "isp/metrics/statistics.h"
 #include "isp/pipeline/merge/merge_budget.h"
 #include "isp/pipeline/merge/merge_frames.h"
+#include "tests/bench/measure/measure.h"
 
+namespace lowlux::isp {
 namespace {
-
-using namespace lowlux;
-using namespace lowlux::isp;
 
 constexpr double tolerance = 0.2;  // of budget and prediction
 
@@ -59,9 +56,8 @@ bool run(const Draw& draw, std::shared_ptr<CostModel> cost, SpeedProbe& pace, Ex
   frames.reserve(static_cast<std::size_t>(draw.frames));
   const RawFrame first = timing_frame(draw.size, {20, 5});
   for (int i = 0; i < draw.frames; ++i) frames.push_back(displaced(first, draw.moves ? i : 0));
-  const auto now_s = pace_now(pace, executor);
-  if (!now_s) return false;
-  cost->pace = *now_s / cost->pace_s;
+  const double now_s = test::value_of(pace_now(pace, executor));
+  cost->pace = now_s / cost->pace_s;
   const MergeWork work{.frames = draw.frames, .size = cost_size(draw.size.width, draw.size.height)};
   const double least_s = predicted_merge_s(*cost, work, {MergeAlignment::none, false}, false);
   const double most_s = predicted_merge_s(*cost, work, {MergeAlignment::subpixel, true}, true);
@@ -87,16 +83,17 @@ bool run(const Draw& draw, std::shared_ptr<CostModel> cost, SpeedProbe& pace, Ex
 }
 
 }  // namespace
+}  // namespace lowlux::isp
 
-int main(int argc, char** argv) {
-  const unsigned seed = argc > 1 ? static_cast<unsigned>(std::atoi(argv[1])) : 1;
-  const int merges = argc > 2 ? std::atoi(argv[2]) : 30;
+int lowlux::test::measure_merge_budget(Arguments& arguments) {
+  using namespace isp;
+  const unsigned seed = arguments.next(1U, 0U);
+  const int merges = arguments.next(30, 1);
+  arguments.end();
   PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));
   SpeedProbe pace;
-  const auto warm_s = pace_now(pace, executor);
-  if (!warm_s) return 1;
   auto cost = std::make_shared<CostModel>();
-  cost->pace_s = *warm_s;
+  cost->pace_s = value_of(pace_now(pace, executor));
   if (const auto measured = measure_merge_cost(pace, cost->pace_s, executor, *cost); !measured) return 1;
   for (int i = static_cast<int>(CostPart::merge_frame); i < cost_parts; ++i) {
     const auto part = static_cast<CostPart>(i);

@@ -1,9 +1,9 @@
-// What the planner of developing rests on.
-//   planner_bench levels   what levels of noise reduction change, beside what is predicted of the noise, on the tuning
-//                          pictures: the figures of isp/pipeline/budget/step_plan.cpp
-//   planner_bench bounds   what they change over the bound that the planner has of it, in 300 drawn parts of the tuning
-//                          pictures at drawn lights, and likewise of the held-out ones
-//   planner_bench truth    what they leave against the noise-free picture, likewise
+// Measures what the planner of developing rests on.
+//   measure planner levels   what levels of noise reduction change, over what is predicted of the noise, on the tuning
+//                            pictures: the figures of isp/pipeline/budget/step_plan.cpp
+//   measure planner bounds   what they change over the bound that the planner has of it, in 300 drawn parts of the
+//                            tuning pictures at drawn lights, and likewise of the held-out ones
+//   measure planner truth    what they leave against the noise-free picture, on the tuning pictures
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -19,6 +19,7 @@
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
+#include "tests/bench/measure/measure.h"
 #include "tests/scenarios/bench_raw.h"
 #include "tests/scenarios/planner_scene.h"
 #include "tests/scenarios/seen_difference.h"
@@ -72,7 +73,7 @@ BenchRaw noise_free(const DenoiseShot& shot) {
   return raw_of(mean, {}, 7);
 }
 
-int against_truth(PictureSet set) {
+void against_truth(PictureSet set) {
   using denoise::Level;
   std::printf("picture e-/dark pred | none draft standard high best: p95 and mean against the noise-free, over pred\n");
   for (const std::string_view name : files_of(set)) {
@@ -95,10 +96,9 @@ int against_truth(PictureSet set) {
       std::printf("\n");
     }
   }
-  return 0;
 }
 
-int levels(PictureSet set) {
+void levels(PictureSet set) {
   using denoise::Level;
   const std::array<Reduction, 9> ways{{{{}, {}},
                                        {Level::draft, {}},
@@ -130,7 +130,6 @@ int levels(PictureSet set) {
       std::printf("\n");
     }
   }
-  return 0;
 }
 
 double quantile(std::vector<double>& values, double share) {
@@ -138,7 +137,7 @@ double quantile(std::vector<double>& values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-int bounds(PictureSet set) {
+void bounds(PictureSet set) {
   using denoise::Level;
   constexpr double min_delta_e = 0.22;  // nine tenths of the least tolerance of the planner's promise
   constexpr std::array ways{std::optional<Level>(), std::optional(Level::draft), std::optional(Level::standard)};
@@ -165,21 +164,20 @@ int bounds(PictureSet set) {
     std::printf("%-14s %-8s of %3zu parts: median %.2f, 95 %% %.2f, largest %.2f\n", of.first.c_str(), names[of.second],
                 ratios.size(), quantile(ratios, 0.5), quantile(ratios, 0.95), quantile(ratios, 1));
   }
-  return 0;
 }
 
 }  // namespace
 }  // namespace lowlux::isp
 
-int main(int argc, char** argv) {
-  using lowlux::isp::PictureSet;
-  const std::string what = argc > 1 ? argv[1] : "";
-  if (what == "levels") return lowlux::isp::levels(PictureSet::tuning);
-  if (what == "truth") return lowlux::isp::against_truth(PictureSet::tuning);
+int lowlux::test::measure_planner(Arguments& arguments) {
+  using isp::PictureSet;
+  const std::string what = arguments.one_of({"levels", "truth", "bounds"});
+  arguments.end();
+  if (what == "levels") isp::levels(PictureSet::tuning);
+  if (what == "truth") isp::against_truth(PictureSet::tuning);
   if (what == "bounds") {
-    const int tuning = lowlux::isp::bounds(PictureSet::tuning);
-    return tuning == 0 ? lowlux::isp::bounds(PictureSet::held_out) : tuning;
+    isp::bounds(PictureSet::tuning);
+    isp::bounds(PictureSet::held_out);
   }
-  std::fprintf(stderr, "usage: planner_bench levels|truth|bounds\n");
-  return 2;
+  return 0;
 }

@@ -1,11 +1,7 @@
 // Times the random draws of isp/base/random/random.h and the readout against what they replace, in one run: see
 // docs/kernels.md.
-//   sampler_bench [--rounds N, at least 15]
-#include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <functional>
 #include <random>
 #include <string>
@@ -15,6 +11,7 @@
 #include "capture/synthetic/readout.h"
 #include "isp/base/random/random.h"
 #include "isp/base/random/random_rows.h"
+#include "tests/bench/measure/measure.h"
 
 namespace {
 
@@ -22,36 +19,6 @@ using namespace lowlux;
 
 constexpr std::size_t width = 4000, height = 3000;
 constexpr std::size_t few = 100'000;  // draws of std::poisson_distribution in one round
-
-double cpu_clock_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
-}
-
-struct Task {
-  std::string name;
-  std::size_t draws;
-  std::function<void()> run;
-  std::vector<double> ns{};  // CPU time of one draw, in each round
-
-  double median_ns() const {
-    std::vector<double> sorted = ns;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted[sorted.size() / 2];
-  }
-};
-
-void time_interleaved(std::vector<Task>& tasks, int rounds) {
-  for (int round = -2; round < rounds; ++round) {  // two to warm up
-    for (Task& task : tasks) {
-      const double start = cpu_clock_ns();
-      task.run();
-      const double ns = (cpu_clock_ns() - start) / static_cast<double>(task.draws);
-      if (round >= 0) task.ns.push_back(ns);
-    }
-  }
-}
 
 struct Stage {
   DrawStream stream{.seed = 1, .frame = 1, .purpose = draw_purpose::electrons};
@@ -69,28 +36,33 @@ struct Stage {
 };
 
 /// A task that makes `rows` rows.
-Task rows_task(std::string name, std::size_t rows, std::function<void(std::uint32_t)> row) {
-  return {std::move(name), rows * width, [rows, row = std::move(row)] {
+test::Task rows_task(std::string name, std::size_t rows, std::function<void(std::uint32_t)> row) {
+  return {std::move(name),
+          [rows, row = std::move(row)] {
             for (std::uint32_t y = 0; y < rows; ++y) row(y);
-          }};
+          },
+          static_cast<double>(rows * width)};
 }
 
 /// std::poisson_distribution and poisson_row at one mean, in this order.
-void add_poisson(std::vector<Task>& tasks, Stage& s, double mean) {
-  tasks.push_back({"std", few, [&s, mean] {
+void add_poisson(std::vector<test::Task>& tasks, Stage& s, double mean) {
+  tasks.push_back({"std",
+                   [&s, mean] {
                      std::poisson_distribution<int> poisson(mean);
                      for (std::size_t i = 0; i < few; ++i) s.kept += poisson(s.sequence);
-                   }});
+                   },
+                   few});
   const std::vector<float> means(width, static_cast<float>(mean));
   tasks.push_back(
       rows_task("poisson_row", 250, [&s, means](std::uint32_t y) { poisson_row(s.stream, 0, y, means, s.floats); }));
 }
 
-void add_frames(std::vector<Task>& tasks, Stage& s) {
+void add_frames(std::vector<test::Task>& tasks, Stage& s) {
   const capture::ReadoutParameters camera{.full_well_e = 9000, .read_noise_e = 4, .black_dn = 64, .max_dn = 16383};
   const auto codes = [&s](std::uint32_t y) { return std::span(s.codes).subspan(y * width, width); };
-  tasks.push_back({"memcpy of the codes", width * height,
-                   [&s] { std::memcpy(s.copy.data(), s.codes.data(), width * height * sizeof(s.codes[0])); }});
+  tasks.push_back({"memcpy of the codes",
+                   [&s] { std::memcpy(s.copy.data(), s.codes.data(), width * height * sizeof(s.codes[0])); },
+                   width * height});
   tasks.push_back(rows_task("Philox alone", height, [&s](std::uint32_t y) { words_row(s.stream, 0, y, 0, s.words); }));
   tasks.push_back(rows_task("normal_row", height, [&s](std::uint32_t y) { normal_row(s.stream, 0, y, 1, s.floats); }));
   tasks.push_back(rows_task("poisson_row, ramp", height,
@@ -106,30 +78,31 @@ void add_frames(std::vector<Task>& tasks, Stage& s) {
   }));
 }
 
+/// Returns the time of one draw.
+double ns_of(const test::Task& task) { return 1e6 * task.median_cpu_ms(); }
+
 }  // namespace
 
-int main(int argc, char** argv) {
-  const int rounds = argc == 3 && std::strcmp(argv[1], "--rounds") == 0 ? std::atoi(argv[2]) : 15;
-  if ((argc != 1 && argc != 3) || rounds < 15) {
-    return std::fprintf(stderr, "usage: sampler_bench [--rounds N, at least 15]\n"), 2;
-  }
+int lowlux::test::measure_sampler(Arguments& arguments) {
+  const int rounds = arguments.option("--rounds", 15, 15);
+  arguments.end();
   Stage stage;
   const std::vector<double> means{0.1, 1, 5, 11, 12, 100, 1000, 1e5};
   std::vector<Task> tasks;
   for (const double mean : means) add_poisson(tasks, stage, mean);
   add_frames(tasks, stage);
-  time_interleaved(tasks, rounds);
+  time_in_turn(tasks, rounds);
 
   std::printf("target %s, %d rounds, median CPU time of one draw\n\n", draws::target_name(), rounds);
   std::printf("%10s %18s %14s %7s\n", "mean", "std::poisson [ns]", "poisson_row", "ratio");
   for (std::size_t i = 0; i < means.size(); ++i) {
-    const double slow = tasks[2 * i].median_ns(), fast = tasks[2 * i + 1].median_ns();
+    const double slow = ns_of(tasks[2 * i]), fast = ns_of(tasks[2 * i + 1]);
     std::printf("%10g %18.1f %14.2f %7.1f\n", means[i], slow, fast, slow / fast);
   }
-  const double copy = tasks[2 * means.size()].median_ns(), philox = tasks[2 * means.size() + 1].median_ns();
+  const double copy = ns_of(tasks[2 * means.size()]), philox = ns_of(tasks[2 * means.size() + 1]);
   std::printf("\n%-22s %10s %10s %10s %10s\n", "12 MP", "ns/pixel", "ms", "x Philox", "x memcpy");
   for (std::size_t i = 2 * means.size(); i < tasks.size(); ++i) {
-    const double ns = tasks[i].median_ns();
+    const double ns = ns_of(tasks[i]);
     std::printf("%-22s %10.2f %10.1f %10.2f %10.1f\n", tasks[i].name.c_str(), ns, ns * 1e-6 * width * height,
                 ns / philox, ns / copy);
   }
