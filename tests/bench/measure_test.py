@@ -65,7 +65,7 @@ def main():
         check_refused(done, f"measure: there is no measurement '{other}'", other)
         check(name in done.stderr, f"{other}: does not suggest {name}: {done.stderr}")
     for name, words in {"unpack": ["--rounds"], "sampler": ["--rounds", str(draw.randrange(15))], "stars": ["2"],
-                        "temporal": ["5", "6"], "planner": ["saved"], "retarget": ["--tables"],
+                        "temporal": ["5", "6"], "planner": ["saved"], "retarget": ["--display", "2"],
                         "stage": ["--threads", "3"]}.items():
         check_refused(run(measure, name, *words), f"measure {name}: ", f"{name} {words}")
 

@@ -1,4 +1,4 @@
-// Retargeting to dim displays: how alike pictures look by several models, what tables cost in accuracy and time.
+// Images for dim displays: how alike they look by several models.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -12,7 +12,6 @@
 #include "isp/model/colour/colour_difference.h"
 #include "isp/render/output_space.h"
 #include "isp/render/retarget/retarget.h"
-#include "isp/render/retarget/retarget_rows.h"
 #include "isp/render/retarget/retarget_table.h"
 #include "isp/reproduce/bench_picture.h"
 #include "tests/bench/measure/measure.h"
@@ -135,53 +134,14 @@ void compare_methods(const std::string& folder, double display_cd_m2, ShinUnits 
   }
 }
 
-/// Nanoseconds for a pixel of a natural row, the best of some rounds; on one thread.
-template <class Code>
-double ns_per_pixel(const RetargetTable& table, const std::vector<std::uint16_t>& rgb) {
-  const auto width = static_cast<int>(rgb.size() / 3);
-  std::vector<Code> out(rgb.size());
-  double best_ms = 1e9;
-  for (int round = 0; round < 20; ++round) {
-    best_ms = std::min(best_ms, test::ms_of(test::wall_ms, [&] { apply(table, rgb.data(), width, out.data()); }));
-  }
-  return 1e6 * best_ms / width;
-}
-
-void compare_tables(const std::string& folder, double display_cd_m2, Executor& executor) {
-  const auto picture = test::value_of(read_bench_picture(folder + "/kodim23.png", 0, 0, executor));
-  const std::vector<Vector3> codes = codes_of(picture);
-  std::vector<std::uint16_t> rgb;
-  rgb.reserve(3 * codes.size());
-  for (const Vector3& code : codes) {
-    for (const double v : code) rgb.push_back(static_cast<std::uint16_t>(65535 * v + 0.5));
-  }
-  std::printf(
-      "\nmethod           levels | CIEDE2000 mean, max | steps of 255 mean, max | build s | ns/px to 8, 16 bits\n");
-  for (const RetargetMethod method : {RetargetMethod::constrained, RetargetMethod::shin, RetargetMethod::wanat}) {
-    const CodeMap map = code_map(options_for(method, display_cd_m2, ShinUnits::lux));
-    for (const int levels : {17, 33, 65}) {
-      RetargetTable table;
-      const double build_s = 1e-3 * test::ms_of(test::wall_ms, [&] { table = tabulated(map, levels, executor); });
-      const TableError error = table_error(table, map, 4096, executor);
-      std::printf("%-17s%6d | %8.3f %8.2f   | %8.3f %8.2f       | %7.2f | %5.2f %5.2f\n",
-                  std::string(name_of(method)).c_str(), levels, error.mean_ciede2000, error.max_ciede2000,
-                  error.mean_steps, error.max_steps, build_s, ns_per_pixel<std::uint8_t>(table, rgb),
-                  ns_per_pixel<std::uint16_t>(table, rgb));
-    }
-  }
-}
-
 }  // namespace
 }  // namespace lowlux::isp
 
 int lowlux::test::measure_retarget(Arguments& arguments) {
   const double display_cd_m2 = arguments.option("--display", 2.0, 0.0);
-  const bool only_tables = arguments.flag("--tables");
   const std::string folder = arguments.required("PICTURES");
   arguments.end();
   PoolExecutor executor(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
-  isp::compare_tables(folder, display_cd_m2, executor);
-  if (only_tables) return 0;
   for (const isp::ShinUnits units : {isp::ShinUnits::luminance_as_is, isp::ShinUnits::lux}) {
     isp::compare_methods(folder, display_cd_m2, units, executor);
   }
