@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -66,6 +65,10 @@ Predicted predicted(const BenchRaw& raw) {
   return {*plan->noise_reduction.snr, level_noise(blocks)};
 }
 
+std::vector<BenchPicture> pictures_of(PictureSet set, const PicturePart& part) {
+  return test::value_of(read_bench_pictures(LOWLUX_TESTDATA "/pictures", files_of(set), part, two_threads));
+}
+
 /// The same camera without noise.
 BenchRaw noise_free(const DenoiseShot& shot) {
   DenoiseShot mean{shot.light, shot.white_e, shot.signal_e.clone(), shot.signal_e.clone()};
@@ -76,18 +79,16 @@ BenchRaw noise_free(const DenoiseShot& shot) {
 void against_truth(PictureSet set) {
   using denoise::Level;
   std::printf("picture e-/dark pred | none draft standard high best: p95 and mean against the noise-free, over pred\n");
-  for (const std::string_view name : files_of(set)) {
-    const auto path = (std::filesystem::path(LOWLUX_TESTDATA) / "pictures" / name).string();
-    const auto picture = read_bench_picture(path, 384, 256, two_threads);
+  for (const BenchPicture& picture : pictures_of(set, {384, 256})) {
     for (const DenoiseLight light :
          {DenoiseLight{2000, 2, 1.5}, DenoiseLight{200, 2, 1.5}, DenoiseLight{60, 2, 1.5}, DenoiseLight{20, 2, 1.5},
           DenoiseLight{6, 2, 1.5}, DenoiseLight{2, 2, 1.5}, DenoiseLight{4, 200, 4}}) {
-      const DenoiseShot shot = take(*picture, light, 7);
+      const DenoiseShot shot = take(picture, light, 7);
       const BenchRaw raw = raw_of(shot, {}, 7);
       const auto [snr, noise] = predicted(raw);
       const double expected = noise.all;
       const Encoded8 truth = developed(noise_free(shot), {});
-      std::printf("%-12s %8s %6.2f | %6.2f", std::string(name).c_str(), name_of(light).c_str(), snr, expected);
+      std::printf("%-12s %8s %6.2f | %6.2f", picture.name.c_str(), name_of(light).c_str(), snr, expected);
       for (const Reduction& way : {Reduction{}, Reduction{Level::draft, {}}, Reduction{Level::standard, {}},
                                    Reduction{Level::high, {}}, Reduction{Level::best, {}}}) {
         const SeenDifference seen = seen_difference(developed(raw, way), truth, two_threads);
@@ -111,17 +112,15 @@ void levels(PictureSet set) {
                                        {Level::high, 0}}};
   std::printf("%-12s %8s %6s | %6s %6s | none draft d1 d2 standard s1 h1 h2 h0 (p95 against high, over predicted)\n",
               "picture", "e-/dark", "snr", "pred", "none");
-  for (const std::string_view name : files_of(set)) {
-    const auto path = (std::filesystem::path(LOWLUX_TESTDATA) / "pictures" / name).string();
-    const auto picture = read_bench_picture(path, 512, 384, two_threads);
+  for (const BenchPicture& picture : pictures_of(set, {512, 384})) {
     for (const DenoiseLight light : {DenoiseLight{2000, 2, 1.5}, DenoiseLight{600, 2, 1.5}, DenoiseLight{200, 2, 1.5},
                                      DenoiseLight{60, 2, 1.5}, DenoiseLight{20, 2, 1.5}, DenoiseLight{6, 2, 1.5},
                                      DenoiseLight{2, 2, 1.5}, DenoiseLight{20, 200, 4}, DenoiseLight{4, 200, 4}}) {
-      const BenchRaw raw = raw_of(take(*picture, light, 7), {}, 7);
+      const BenchRaw raw = raw_of(take(picture, light, 7), {}, 7);
       const auto [snr, noise] = predicted(raw);
       const double expected = noise.all;
       const Encoded8 best = developed(raw, {Level::high, {}});
-      std::printf("%-12s %8s %6.2f | %6.2f", std::string(name).c_str(), name_of(light).c_str(), snr, expected);
+      std::printf("%-12s %8s %6.2f | %6.2f", picture.name.c_str(), name_of(light).c_str(), snr, expected);
       for (const Reduction& way : ways) {
         const double seen = seen_difference(developed(raw, way), best, two_threads).percentile95;
         if (!way.level) std::printf(" %6.2f |", seen);
@@ -141,11 +140,7 @@ void bounds(PictureSet set) {
   using denoise::Level;
   constexpr double min_delta_e = 0.22;  // nine tenths of the least tolerance of the planner's promise
   constexpr std::array ways{std::optional<Level>(), std::optional(Level::draft), std::optional(Level::standard)};
-  std::vector<BenchPicture> pictures;
-  for (const std::string_view name : files_of(set)) {
-    const auto path = (std::filesystem::path(LOWLUX_TESTDATA) / "pictures" / name).string();
-    pictures.push_back(*read_bench_picture(path, 0, 0, two_threads));
-  }
+  const std::vector<BenchPicture> pictures = pictures_of(set, {});
   std::map<std::pair<std::string, std::size_t>, std::vector<double>> found;
   for (std::uint32_t i = 0; i < 300; ++i) {
     test::Draws draws(set == PictureSet::tuning ? 777 : 778, 80, i);
