@@ -80,7 +80,6 @@ Result<void> MovedMerge::add_frames() {
     if (!frame) return tl::make_unexpected(frame.error());
     if (work_.loader.exposures_differ() && !work_.out.bracket) return {};
     if (Result<void> added = add(*frame, index); !added) return added;
-    frame->signal_e = {};
     if (work_.out.frames[static_cast<std::size_t>(index)].used_fraction == 0 || !predicts_again(++averaged)) continue;
     if (Result<void> again = predict_again(); !again) return again;
   }
