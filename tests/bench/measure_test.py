@@ -62,7 +62,7 @@ def main():
         if other in names:
             continue
         done = run(measure, other)
-        check_refused(done, f"measure: there is no measurement '{other}'", other)
+        check_refused(done, f"measure: unknown measurement '{other}'", other)
         check(name in done.stderr, f"{other}: does not suggest {name}: {done.stderr}")
     for name, words in {"unpack": ["--rounds"], "sampler": ["--rounds", str(draw.randrange(15))], "stars": ["2"],
                         "temporal": ["5", "6"], "planner": ["saved"], "retarget": ["--display", "2"],

@@ -77,7 +77,7 @@ int refuse_name(std::string_view name) {
   for (const Measurement& m : measurements) names.push_back(m.name);
   const auto near = lowlux::near_matches(name, names);
   fmt::print(
-      stderr, "measure: there is no measurement '{}'{}\n", name,
+      stderr, "measure: unknown measurement '{}'{}\n", name,
       near.empty() ? "; measure --help lists them" : fmt::format(" (did you mean {}?)", fmt::join(near, " or ")));
   return 2;
 }

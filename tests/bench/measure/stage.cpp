@@ -220,7 +220,7 @@ int lowlux::test::measure_stage(Arguments& arguments) {
   const bool eye = choice.look == "eye";
   const int threads = choice.threads == 2 ? 2 : 1;
   if (std::ranges::none_of(modes, [&](const Mode& mode) { return wanted(choice, mode, eye, threads); })) {
-    throw Failure(2, "there is no such mode, look or number of threads");
+    throw Failure(2, "unknown mode or look, or threads other than 1 and 2");
   }
   PoolExecutor executor(2);
   const PictureLight light = value_of(picture_light(picture, executor, 0.6));
