@@ -1,6 +1,7 @@
 #include "isp/pipeline/render/noise_reducer.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cstddef>
 #include <utility>
@@ -55,25 +56,55 @@ PartSize largest(const std::vector<LevelPart>& parts, const NoiseReducer::Piece&
   return out;
 }
 
+constexpr int block_cells = 4;   // of a side of the blocks in which lost detail is measured
+constexpr int strip_cells = 64;  // blocks are blended side by side
+constexpr float max_detail = 4;  // variance of lost detail, over that of the level's noise
+constexpr float smallest_e2 = 1e-20f;
+
 /// Holds the sites of one column parity of one row of mosaics, where a mean over frames and a level's result are
 /// blended.
 struct BlendSites {
   const float* mean_e;    // dark charge included; every second sample
-  const float* share;     // one for each cell
+  const float* share;     // variance of the mean over that of a raw value, one for each cell
   const float* level_e2;  // variance of the level's result, one for each cell
+  float* signal_e;        // the level's result; every second sample
+  int sites;
   float dark_e;
   float variance_e2;
+
+  float difference(int i) const { return mean_e[2 * i] - dark_e - signal_e[2 * i]; }
+  /// Returns the variance of the mean. The charge is that of the level's result: with the noisy mean itself, low values
+  /// would count more than high ones.
+  float mean_e2(int i) const { return share[i] * (std::max(signal_e[2 * i] + dark_e, 0.0f) + variance_e2); }
 };
 
-void blend_sites(const BlendSites& in, int sites, float* signal_e) {
-  for (int i = 0; i < sites; ++i) {
-    const float mean_e = in.mean_e[2 * i];
-    // The charge is that of the level's result: with the noisy mean itself, low values would count more than high ones.
-    const float charge_e = std::max(signal_e[2 * i] + in.dark_e, 0.0f);
-    const float time_e2 = in.share[i] * (charge_e + in.variance_e2);
-    const float level_e2 = NoiseReducer::variance_penalty(in.share[i]) * in.level_e2[i];
-    const float way = level_e2 / (level_e2 + time_e2);
-    signal_e[2 * i] += way * (mean_e - in.dark_e - signal_e[2 * i]);
+/// Adds the squared differences less their expectation to the sums of cells. The frame is in both results, so that the
+/// mean shares a part `share` of the level's noise.
+void add_detail(const BlendSites& in, float* sums) {
+  for (int i = 0; i < in.sites; ++i) {
+    const float d = in.difference(i);
+    sums[i] += d * d - in.mean_e2(i) - (1 - 2 * in.share[i]) * in.level_e2[i];
+  }
+}
+
+/// @param detail_e2  variance of the detail that the level has lost, for each cell
+void blend_sites(const BlendSites& in, const float* detail_e2) {
+  for (int i = 0; i < in.sites; ++i) {
+    const float level_e2 = in.level_e2[i] + std::min(detail_e2[i], max_detail * in.level_e2[i]);
+    const float without_frame = (1 - in.share[i]) * level_e2;
+    in.signal_e[2 * i] += without_frame / (without_frame + in.mean_e2(i) + smallest_e2) * in.difference(i);
+  }
+}
+
+/// Replaces the sums of cells by the mean over the sites of their block, at least 0.
+/// @param columns  of sites
+void average_blocks(float* sums, int columns, int rows) {
+  constexpr int block = 2 * block_cells;
+  for (int x = 0; x < columns; x += block) {
+    const int first = x / 2, sites = std::min(block, columns - x), last = first + (sites + 1) / 2;
+    float sum = 0;
+    for (int i = first; i < last; ++i) sum += sums[i];
+    std::fill(sums + first, sums + last, std::max(sum / static_cast<float>(sites * rows), 0.0f));
   }
 }
 
@@ -171,15 +202,34 @@ void NoiseReducer::reduce_by_time(const denoise::RawElectronsView& raw, const No
 
 void NoiseReducer::blend(BayerPhase phase, const NoiseReduction& how, const denoise::DenoiseMaps& level,
                          PlaneView<float> signal_e) {
-  for_each_band(executor_, signal_e.height, [&](RowBand band, int) {
-    for (int y = band.first; y < band.last; ++y) {
-      for (int column = 0; column < std::min(2, signal_e.width); ++column) {
-        const auto colour = static_cast<std::size_t>(colour_at(phase, column, y));
-        const BlendSites sites{mean_e_.row(y) + column, variance_fraction_.row(y / 2),
-                               level.site_variance[colour].row(y / 2),
-                               static_cast<float>(how.noise.dark_mean_e[site_of(column, y)]),
-                               static_cast<float>(how.noise.variance_e2[colour])};
-        blend_sites(sites, (signal_e.width + 1 - column) / 2, signal_e.row(y) + column);
+  constexpr int block = 2 * block_cells;
+  const auto sites_at = [&](int cell, int column, int y) {
+    const auto colour = static_cast<std::size_t>(colour_at(phase, column, y));
+    const int x = 2 * cell + column;
+    return BlendSites{mean_e_.row(y) + x,
+                      variance_fraction_.row(y / 2) + cell,
+                      level.site_variance[colour].row(y / 2) + cell,
+                      signal_e.row(y) + x,
+                      std::min(strip_cells, (signal_e.width + 1 - x) / 2),
+                      static_cast<float>(how.noise.dark_mean_e[site_of(column, y)]),
+                      static_cast<float>(how.noise.variance_e2[colour])};
+  };
+  const int cells = (signal_e.width + 1) / 2, columns = std::min(2, signal_e.width);
+  for_each_band(executor_, (signal_e.height + block - 1) / block, [&](RowBand band, int) {
+    for (int top = block * band.first; top < std::min(block * band.last, signal_e.height); top += block) {
+      const int bottom = std::min(top + block, signal_e.height);
+      for (int cell = 0; cell < cells; cell += strip_cells) {
+        std::array<float, strip_cells> detail_e2{};
+        const auto each_row = [&](const auto& work) {
+          for (int y = top; y < bottom; ++y) {
+            for (int column = 0; column < columns; ++column) {
+              if (2 * cell + column < signal_e.width) work(sites_at(cell, column, y));
+            }
+          }
+        };
+        each_row([&](const BlendSites& sites) { add_detail(sites, detail_e2.data()); });
+        average_blocks(detail_e2.data(), std::min(2 * strip_cells, signal_e.width - 2 * cell), bottom - top);
+        each_row([&](const BlendSites& sites) { blend_sites(sites, detail_e2.data()); });
       }
     }
   });

@@ -15,9 +15,11 @@ namespace lowlux::isp {
 /// Subtracts dark charge from a mosaic and reduces its noise as decided. Owns the denoisers and their memory
 /// (see Denoiser and TemporalMean), which the first frame of a size allocates.
 ///
-/// Where a level and previous frames both take part, each site is the mean of both results, weighted by the inverse of
-/// their predicted variances: what moves is left to the level, what stands still to the previous frames. The variance
-/// of the level counts variance_penalty() times, because it does not include the detail that the level removes.
+/// Where a level and previous frames both take part, each site is a mean of the level's result and of the mean over
+/// frames. Its weights are those by inverse variances of the level's result and of the previous frames alone. The
+/// variance of the level includes the detail it has lost: what both results differ by beyond their noise, in blocks of
+/// 8 x 8 sites, and at most 4 times the variance of the level's noise, because something may have moved too little to
+/// be detected. denoise/README.md has the equations.
 class NoiseReducer {
  public:
   explicit NoiseReducer(Executor& executor) : executor_(executor) {}
@@ -46,13 +48,6 @@ class NoiseReducer {
   static std::size_t maps_bytes(int width, int height);
   /// Allocates memory for tiles of up to width x height pixels, so that later ones need none.
   void reserve_pieces(int width, int height, const NoiseReduction& how);
-
-  /// Returns the factor of the level's variance: 1 where only this frame is known, 4 where many previous ones are:
-  /// noise of a single frame that comes back is visible, and a mean of few frames may be of something that moved too
-  /// little to be detected. Chosen on the images of tests/scenarios/temporal_blend_test.cpp, which prints the results
-  /// of other factors.
-  /// @param share  variance of the mean over frames, as a fraction of a raw value's, 0..1
-  static constexpr float variance_penalty(float share) { return 1 + 3 * (1 - share) * (1 - share); }
 
   /// Returns the fraction of the blocks that moved in the last frame; 0 where no previous frames took part.
   double moved() const { return moved_; }
