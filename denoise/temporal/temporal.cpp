@@ -7,9 +7,11 @@
 #include <cstdint>
 #include <cstring>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "denoise/spatial/bands.h"
+#include "denoise/temporal/frame_motion.h"
 #include "denoise/temporal/temporal_rows.h"
 #include "denoise/temporal/temporal_thresholds.h"
 
@@ -22,6 +24,8 @@ using rows::sites_of_strip;
 
 constexpr double largest_fraction = 1e6;  // relative variance of a history without value
 constexpr double max_light = 1e6;         // ratio, up or down, beyond which a history has no value
+constexpr double min_moved = 0.02;        // fraction of the blocks, from which on their motion is looked for
+constexpr int search_frames = 8;          // for so many frames after motion was last seen
 
 constexpr int rounded_up(int n, int unit) { return (n + unit - 1) / unit * unit; }
 
@@ -29,6 +33,7 @@ constexpr int rounded_up(int n, int unit) { return (n + unit - 1) / unit * unit;
 struct StripMemory {
   std::array<std::array<float, sites_of_strip>, motion_block> raw{};
   std::array<std::array<float, sites_of_strip>, motion_block> out{};
+  std::array<std::array<float, sites_of_strip>, motion_block> before{};
   float sums[2][sites_of_strip]{};
 };
 
@@ -43,20 +48,42 @@ struct StripMemory {
 
 /// State that is kept between frames, sized for the largest one.
 struct Memory {
-  Memory(int max_width, int max_height, int threads)
+  Memory(int largest_width, int largest_height, int threads)
       // Rows are an odd number of cache lines: at a power of two, those that are read together would share cache sets.
-      : mean_e(rounded_up(max_width, sites_of_strip) + 16, rounded_up(max_height, motion_block)),
-        share(rounded_up(max_width, sites_of_strip) / motion_block, mean_e.height() / motion_block),
+      : max_width(largest_width),
+        max_height(largest_height),
+        mean_e(rounded_up(largest_width, sites_of_strip) + 16, rounded_up(largest_height, motion_block)),
+        share(rounded_up(largest_width, sites_of_strip) / motion_block, mean_e.height() / motion_block),
         moved(share.width(), share.height()),
+        motion(largest_width, largest_height),
+        next_mean_e(mean_e.width(), mean_e.height()),
+        next_share(share.width(), share.height()),
         strip(static_cast<std::size_t>(threads)),
         count(static_cast<std::size_t>(threads)) {
     std::fill(mean_e.data(), mean_e.data() + mean_e.size(), 0.0f);
+    std::fill(next_mean_e.data(), next_mean_e.data() + next_mean_e.size(), 0.0f);
     std::fill(share.data(), share.data() + share.size(), 1.0f);
+    std::fill(next_share.data(), next_share.data() + next_share.size(), 1.0f);
   }
 
+  void forget_motion() {
+    motion.forget();
+    frames_to_search = 0;
+  }
+  void take_next() {
+    std::swap(mean_e, next_mean_e);
+    std::swap(share, next_share);
+  }
+
+  int max_width;
+  int max_height;
   Plane<float> mean_e;  // without dark charge
   Plane<float> share;   // of each block: ratio of the variance of the mean to that of a raw value
   Plane<std::uint8_t> moved;
+  FrameMotion motion;
+  Plane<float> next_mean_e;  // mean and shares that follow, while the previous ones are displaced
+  Plane<float> next_share;
+  int frames_to_search = 0;        // for motion
   std::vector<StripMemory> strip;  // one for each thread
   std::vector<long long> count;    // number of blocks that moved, for each thread
   bool empty = true;
@@ -74,14 +101,19 @@ struct Frame {
   double light;
   TemporalOptions options;
   bool first;
+  bool displaced;  // the mean of the previous frames is, by memory.motion
   int columns = (raw.value.width + motion_block - 1) / motion_block;  // number of blocks
   int rows = (raw.value.height + motion_block - 1) / motion_block;
 
+  Plane<float>& new_mean_e() const { return displaced ? memory.next_mean_e : memory.mean_e; }
+  Plane<float>& new_share() const { return displaced ? memory.next_share : memory.share; }
   float min_weight() const { return 1 / static_cast<float>(options.max_frames); }
   std::array<const float*, motion_block> raw_rows(int x, int y, StripMemory& strip) const;
+  std::array<const float*, motion_block> before_rows(int x, int y, StripMemory& strip) const;
   std::size_t colour_of(int site) const { return static_cast<std::size_t>(colour_at(raw.phase, site % 2, site / 2)); }
   double fraction_now(double share, const std::array<const float*, 2>& sums, int width, int height) const;
   void rescale(int y, StripMemory& strip) const;
+  void displace(const Workers& workers, bool same) const;
   void find(int y, const MotionThresholds& at, StripMemory& strip) const;
   bool has_moved(int x, int y) const;
   long long update(int y, PlaneView<float> out, StripMemory& strip) const;
@@ -99,6 +131,29 @@ std::array<const float*, motion_block> Frame::raw_rows(int x, int y, StripMemory
     if (width == sites_of_strip) continue;
     std::memcpy(strip.raw[r].data(), out[r], width * sizeof(float));
     out[r] = strip.raw[r].data();
+  }
+  return out;
+}
+
+/// Returns eight rows of a strip of the mean of the previous frames, which are copied where blocks are displaced
+/// differently.
+std::array<const float*, motion_block> Frame::before_rows(int x, int y, StripMemory& strip) const {
+  std::array<const float*, motion_block> out{};
+  const int left_block = x / motion_block, blocks = std::min(blocks_of_strip, columns - left_block);
+  const FrameMotion::Displacement by = displaced ? memory.motion.at(left_block, y) : FrameMotion::Displacement{};
+  bool as_one = x + by.x >= 0 && x + by.x + sites_of_strip <= memory.mean_e.width() && motion_block * y + by.y >= 0 &&
+                motion_block * (y + 1) + by.y <= memory.mean_e.height();
+  for (int b = 1; as_one && displaced && b < blocks; ++b) as_one = memory.motion.at(left_block + b, y) == by;
+  for (int r = 0; r < motion_block; ++r) {
+    out[r] = as_one ? memory.mean_e.row(motion_block * y + r + by.y) + x + by.x : strip.before[r].data();
+  }
+  for (int b = 0; !as_one && b < blocks; ++b) {
+    const FrameMotion::Displacement own = memory.motion.at(left_block + b, y);
+    const int left = std::clamp(x + motion_block * b + own.x, 0, memory.mean_e.width() - motion_block);
+    for (int r = 0; r < motion_block; ++r) {
+      const int row = std::clamp(motion_block * y + r + own.y, 0, memory.mean_e.height() - 1);
+      std::copy_n(memory.mean_e.row(row) + left, motion_block, strip.before[r].data() + motion_block * b);
+    }
   }
   return out;
 }
@@ -154,15 +209,21 @@ void Frame::find(int y, const MotionThresholds& at, StripMemory& strip) const {
   for (int x = 0; x < columns; x += blocks_of_strip) {
     const int left = motion_block * x;
     const auto raw_row = raw_rows(left, y, strip);
+    const auto before = before_rows(left, y, strip);
     for (int r = 0; r < motion_block; ++r) {
       const int source = r ^ red_row(raw.phase);  // the row with red first
       in.raw[r] = raw_row[source];
-      in.mean_e[r] = memory.mean_e.row(motion_block * y + source) + left;
+      in.mean_e[r] = before[source];
       in.inside[r] = motion_block * y + source < raw.value.height;
     }
     in.width = std::min(sites_of_strip, raw.value.width - left);
-    in.share = memory.share.row(y) + x;
-    rows::find_motion(in, memory.moved.row(y) + x);
+    in.share = new_share().row(y) + x;
+    std::uint8_t* const moved = memory.moved.row(y) + x;
+    rows::find_motion(in, moved);
+    // Blocks without content start anew, and say nothing of their neighbours.
+    for (int b = 0; displaced && b < blocks_of_strip; ++b) {
+      if (in.share[b] >= FrameMotion::no_content) moved[b] = 0;
+    }
   }
 }
 
@@ -192,8 +253,8 @@ long long Frame::update(int y, PlaneView<float> out, StripMemory& strip) const {
     const int left = motion_block * x, width = std::min(sites_of_strip, raw.value.width - left);
     std::array<float, blocks_of_strip> weight{};
     for (int b = 0; b < std::min(blocks_of_strip, columns - x); ++b) {
-      float& share = memory.share.at(x + b, y);
-      const bool starts = first || has_moved(x + b, y);
+      float& share = new_share().at(x + b, y);
+      const bool starts = first || (displaced && share >= FrameMotion::no_content) || has_moved(x + b, y);
       const float k = starts ? 1.0f : std::max(share / (1 + share), min_weight());
       share = starts ? 1.0f : (1 - k) * (1 - k) * share + k * k;
       weight[b] = k;
@@ -201,9 +262,11 @@ long long Frame::update(int y, PlaneView<float> out, StripMemory& strip) const {
     }
     in.weight = weight.data();
     const auto raw_row = raw_rows(left, y, strip);
+    const auto before = before_rows(left, y, strip);
     for (int r = 0; r < in.rows; ++r) {
       in.raw[r] = raw_row[r];
-      in.mean_e[r] = memory.mean_e.row(motion_block * y + r) + left;
+      in.before_e[r] = before[r];
+      in.mean_e[r] = new_mean_e().row(motion_block * y + r) + left;
       in.out[r] = width == sites_of_strip ? out.row(motion_block * y + r) + left : strip.out[r].data();
     }
     rows::update_mean(in);
@@ -219,16 +282,29 @@ long long Frame::update(int y, PlaneView<float> out, StripMemory& strip) const {
 void Frame::put_fractions(int y, PlaneView<float> map) const {
   constexpr int cells = motion_block / 2;
   for (int v = cells * y; v < std::min(cells * (y + 1), map.height); ++v) {
-    for (int u = 0; u < map.width; ++u) map.at(u, v) = memory.share.at(u / cells, y);
+    for (int u = 0; u < map.width; ++u) map.at(u, v) = new_share().at(u / cells, y);
   }
+}
+
+/// Scales the mean to the light of this frame, and finds where it is displaced.
+/// @param same  light and noise are as before
+void Frame::displace(const Workers& workers, bool same) const {
+  if (!same) {
+    in_bands(workers, rows, [&](int top, int bottom, int thread) {
+      for (int y = top; y < bottom; ++y) rescale(y, memory.strip[thread]);
+    });
+  }
+  const FrameMotion::Before before{std::as_const(memory.mean_e).view(), std::as_const(memory.share).view()};
+  memory.motion.find(raw, noise, before, memory.next_share.view().crop(0, 0, columns, rows), workers);
 }
 
 /// Adds the frame to the mean, and counts blocks that moved in memory.count.
 void Frame::take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const {
   const bool same = light == 1 && noise == memory.noise;
+  if (displaced) displace(workers, same);
   const MotionThresholds at = motion_thresholds(options.false_alarm);
   const auto compare = [&](int y, StripMemory& strip) {
-    if (!same) rescale(y, strip);
+    if (!same && !displaced) rescale(y, strip);
     find(y, at, strip);
   };
   // Compare the ends of each thread's rows first, as neighbours need them. The other rows follow while in the cache.
@@ -269,21 +345,28 @@ double TemporalMean::run(const RawElectronsView& raw, const RawNoise& noise, dou
                          Executor& executor) {
   Memory& memory = state_->memory;
   assert(raw.value.width >= 2 && raw.value.height >= 2);
-  assert(raw.value.width <= memory.share.width() * motion_block);
-  assert(raw.value.height <= memory.share.height() * motion_block);
+  assert(raw.value.width <= memory.max_width && raw.value.height <= memory.max_height);
   assert(mean_e.width == raw.value.width && mean_e.height == raw.value.height);
   assert(usable(noise, light, options) && raw.noise_ratio.is_one());
   const bool known = memory.width == raw.value.width && memory.height == raw.value.height && memory.phase == raw.phase;
   const bool worthless = light > max_light || light < 1 / max_light;
-  const Frame frame{memory, raw, site_noise(noise, raw.phase), light, options, memory.empty || !known || worthless};
+  const bool first = memory.empty || !known || worthless;
+  if (first) memory.forget_motion();
+  const bool displaced = options.compensate_motion && memory.frames_to_search > 0 &&
+                         std::min(raw.value.width, raw.value.height) >= FrameMotion::min_side;
+  const Frame frame{memory, raw, site_noise(noise, raw.phase), light, options, first, displaced};
   frame.take_in({executor, static_cast<int>(memory.strip.size())}, mean_e, variance_fraction);
   memory.empty = false;
   memory.width = raw.value.width;
   memory.height = raw.value.height;
   memory.phase = raw.phase;
   memory.noise = frame.noise;
-  const long long moved = std::accumulate(memory.count.begin(), memory.count.end(), 0LL);
-  return static_cast<double>(moved) / (static_cast<double>(frame.columns) * frame.rows);
+  const long long blocks = std::accumulate(memory.count.begin(), memory.count.end(), 0LL);
+  const double moved = static_cast<double>(blocks) / (static_cast<double>(frame.columns) * frame.rows);
+  if (displaced) memory.take_next();
+  const bool motion = moved > std::max(min_moved, 4 * options.false_alarm) || (displaced && memory.motion.found());
+  memory.frames_to_search = first ? 0 : motion ? search_frames : std::max(memory.frames_to_search - 1, 0);
+  return moved;
 }
 
 }  // namespace lowlux::denoise

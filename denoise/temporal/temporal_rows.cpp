@@ -216,7 +216,7 @@ void UpdateMean(const UpdateStrip& in) {
     const VF dark = alternating(in.dark_e[site], in.dark_e[site + 1]);
     const VF most = alternating(in.saturation_e[site], in.saturation_e[site + 1]);
     for (int i = 0; i < sites_of_strip; i += lanes()) {
-      const VF raw = usable(load(in.raw[row] + i)), weight = load(weights + i), before = load(in.mean_e[row] + i);
+      const VF raw = usable(load(in.raw[row] + i)), weight = load(weights + i), before = load(in.before_e[row] + i);
       const VF signal = hn::Sub(raw, dark), y = hn::Min(signal, most);
       const MF starts = hn::Ge(weight, constant(1));
       const VF mean = hn::IfThenElse(starts, y, hn::Add(before, hn::Mul(weight, hn::Sub(y, before))));

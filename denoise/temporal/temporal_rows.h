@@ -57,8 +57,9 @@ void scale_mean(const ScaleStrip& in, float (*sums)[sites_of_strip]);
 /// The rows of a strip to be updated, in their order.
 struct UpdateStrip {
   const float* raw[motion_block];
-  float* mean_e[motion_block];
-  float* out[motion_block];  // the new mean, with dark charge
+  const float* before_e[motion_block];  // the mean of the previous frames, as in MotionStrip
+  float* mean_e[motion_block];          // the new mean; may be before_e
+  float* out[motion_block];             // the new mean, with dark charge
   int rows;
   float dark_e[4];        // of sites as in site_of()
   float saturation_e[4];  // without dark charge

@@ -147,7 +147,7 @@ typedef struct {
   uint64_t memory_limit;    /* bytes; 0: 1 GiB */
   const char* profile_file; /* of `lowlux calibrate`, JSON; its hot pixels are positions in full frames; null: none */
   int32_t most_denoise;     /* LOWLUX_STAGE_LEVEL_... that memory is allocated for; 0, as for every level: none */
-  int32_t temporal;         /* 1: previous frames contribute */
+  int32_t temporal;         /* 1: previous frames contribute, displaced where the scene moves */
   int32_t look;             /* LOWLUX_STAGE_LOOK_... */
   int32_t tone;             /* 1: the standard curve; 0: none, linear light in sRGB's encoding */
   double field_of_view_deg; /* of the image's longer side; 0: 50 */
@@ -279,7 +279,7 @@ typedef struct {
   float exposure_ev;
   int32_t level;               /* LOWLUX_STAGE_LEVEL_... of noise reduction */
   int32_t temporal;            /* 1: previous frames contributed */
-  float moved;                 /* fraction of the image detected as moving */
+  float moved;                 /* fraction of the image without previous frames: motion that was not found again */
   float scene_luminance_cd_m2; /* 0: not known */
   float adaptation;            /* m of CIE 191, 0 scotopic to 1 photopic; 1 without the look of the eye */
   int32_t step;                /* LOWLUX_STAGE_STEP_...; without a budget 0 */

@@ -131,7 +131,7 @@ std::uint64_t stage_memory_bytes(const LiveSetup& setup, int threads) {
     for_each = 4;  // the repaired mosaic, or its plane
   }
   if (setup.levels) for_each += 24;    // Denoiser
-  if (setup.temporal) for_each += 16;  // TemporalMean, its mean, maps
+  if (setup.temporal) for_each += 22;  // TemporalMean, its mean, maps
   if (setup.look.look == Look::eye) for_each += 8;
   if (setup.samples == SampleType::u16) for_each += 6;  // the warm-up frame's image
   const auto row = static_cast<std::uint64_t>(setup.width) + 4096;

@@ -179,29 +179,40 @@ TEST(TemporalMotion, IsSeenInStepsOfOneAndTexturesOfTwoSigma) {
   }
 }
 
-// A bar of 60 sites moves by 3 sites for each frame. What it leaves behind stays below the raw noise of a site,
-// whatever its contrast; what is clearly seen leaves nothing.
+/// Mean of what a bar leaves 1..20 sites behind itself, less 5 standard errors [e-]: 60 sites wide, `steps` standard
+/// deviations brighter than 20 e-, and moving by 3 sites for each frame.
+std::array<double, 20> trail_e(double steps, bool compensate) {
+  const double mean_e = 20, sigma = std::sqrt(24);
+  Stream stream(384, 256, {.read_noise_e = 2}, {.compensate_motion = compensate});
+  std::array<MeanOf, 20> trail;
+  for (int frame = 0; frame < 40; ++frame) {
+    const int right = 100 + 3 * frame;
+    stream.take(
+        [&](int x, int) {
+          const double e = mean_e + (x >= right - 60 && x < right ? steps * sigma : 0);
+          return std::array{e, e, e};
+        },
+        5000 + static_cast<std::uint64_t>(frame));
+    if (frame < 20) continue;
+    for (int i = 0; i < 20; ++i) {
+      for (int y = 0; y < 256; ++y) trail[i].add(static_cast<double>(stream.mean.at(right - 61 - i, y)) - mean_e);
+    }
+  }
+  std::array<double, 20> out{};
+  for (int i = 0; i < 20; ++i) out[i] = std::abs(trail[i].mean()) - 5 * trail[i].standard_error();
+  return out;
+}
+
+// What a bar leaves behind stays below the raw noise of a site, whatever its contrast; what is clearly seen leaves
+// nothing. Where its motion is compensated by whole cells, the next site has up to a quarter of the contrast.
 TEST(TemporalMotion, LeavesNoTrailAboveTheNoise) {
   for (const double steps : {0.5, 1.0, 2.0, 4.0, 16.0}) {
-    const double mean_e = 20, sigma = std::sqrt(24);
-    Stream stream(384, 256, {.read_noise_e = 2});
-    std::array<MeanOf, 20> trail;
-    for (int frame = 0; frame < 40; ++frame) {
-      const int right = 100 + 3 * frame;
-      stream.take(
-          [&](int x, int) {
-            const double e = mean_e + (x >= right - 60 && x < right ? steps * sigma : 0);
-            return std::array{e, e, e};
-          },
-          5000 + static_cast<std::uint64_t>(frame));
-      if (frame < 20) continue;
+    for (const bool compensate : {false, true}) {
+      const auto trail = trail_e(steps, compensate);
       for (int i = 0; i < 20; ++i) {
-        for (int y = 0; y < 256; ++y) trail[i].add(static_cast<double>(stream.mean.at(right - 61 - i, y)) - mean_e);
+        const double limit = compensate && i == 0 ? std::max(0.6, 0.25 * steps) : steps < 4 ? 0.6 : 0.02;
+        EXPECT_LT(trail[i], limit * std::sqrt(24)) << steps << " sigma, " << i + 1 << " sites behind, " << compensate;
       }
-    }
-    for (int i = 0; i < 20; ++i) {
-      EXPECT_LT(std::abs(trail[i].mean()) - 5 * trail[i].standard_error(), (steps < 4 ? 0.6 : 0.02) * sigma)
-          << steps << " sigma, " << i + 1 << " sites behind";
     }
   }
 }
@@ -239,7 +250,8 @@ TEST(TemporalMean, StartsAnewAfterResetAndWithAnotherSizePhaseOrLightBeyondBound
   EXPECT_EQ(std::memcmp(out.data(), small.data(), small.size() * sizeof(float)), 0);
 }
 
-/// Largest difference to the reference [e-] over some frames with motion, light that changes, and saturation.
+/// Largest difference to the reference [e-] over some frames with motion, light that changes, and saturation. Frames of
+/// 64 pixels each way have their motion compensated.
 double difference(int width, int height, BayerPhase phase) {
   Stream stream(width, height, {.phase = phase, .dark_e = {3, 1, 2, 4}, .read_noise_e = 1.5}, {.false_alarm = 0.05});
   reference::TemporalMean plain;
@@ -263,7 +275,9 @@ double difference(int width, int height, BayerPhase phase) {
                                   std::max(1000.0, std::abs(plain.mean_e.data()[i])));
     }
     for (std::size_t i = 0; i < stream.share.size(); ++i) {
-      EXPECT_NEAR(static_cast<double>(stream.share.data()[i]), plain.variance_fraction.data()[i], 1e-5);
+      EXPECT_NEAR(static_cast<double>(stream.share.data()[i]), plain.variance_fraction.data()[i],
+                  std::min(width, height) < 64 ? 1e-5 : 1e-4)
+          << "a rounded cell may differ by a unit";
     }
   }
   return worst;
@@ -271,8 +285,10 @@ double difference(int width, int height, BayerPhase phase) {
 
 TEST(TemporalMean, AgreesWithTheReferenceAtAnySizeAndPhase) {
   for (const auto phase : {BayerPhase::rggb, BayerPhase::grbg, BayerPhase::gbrg, BayerPhase::bggr}) {
-    for (const auto& size : {std::array{2, 2}, {3, 5}, {8, 8}, {9, 2}, {127, 17}, {128, 24}, {261, 35}}) {
-      EXPECT_LT(difference(size[0], size[1], phase), 1e-6) << "of 1000 e-: a digit of floats, added up over 6 frames";
+    for (const auto& size :
+         {std::array{2, 2}, {3, 5}, {8, 8}, {9, 2}, {127, 17}, {128, 24}, {261, 35}, {64, 64}, {149, 107}}) {
+      const double digits = std::min(size[0], size[1]) < 64 ? 1e-6 : 1e-5;  // weights differ with rounded cells
+      EXPECT_LT(difference(size[0], size[1], phase), digits) << "of 1000 e-: a digit of floats, added up over 6 frames";
     }
   }
 }

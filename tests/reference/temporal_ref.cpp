@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace lowlux::reference {
 namespace {
@@ -125,12 +126,34 @@ bool TemporalMean::has_moved(int x, int y) const {
   return own == 2 || (own == 1 && beside);
 }
 
+/// Moves the mean to where the frame has its content.
+void TemporalMean::displace(const Now& now) {
+  const int width = signal_e_.width(), height = signal_e_.height();
+  Plane<double> share(blocks_.width(), blocks_.height()), moved(width, height);
+  for (std::size_t i = 0; i < share.size(); ++i) share.data()[i] = blocks_.data()[i].share;
+  double offset_e2 = 0;
+  for (int site = 0; site < 4; ++site) offset_e2 += now.variance(now.colour(site % 2, site / 2), 0);
+  motion_.find(
+      width, height, [&](int x, int y) { return now.value_e(x, y); }, [&](int x, int y) { return signal_e_.at(x, y); },
+      offset_e2, share);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto by = motion_.at(x / side, y / side);
+      moved.at(x, y) = signal_e_.at(std::clamp(x + by.x, 0, width - 1), std::clamp(y + by.y, 0, height - 1));
+    }
+  }
+  signal_e_ = std::move(moved);
+  for (std::size_t i = 0; i < share.size(); ++i) blocks_.data()[i].share = share.data()[i];
+}
+
 double TemporalMean::run(const denoise::RawElectronsView& raw, const denoise::RawNoise& noise, double light,
                          const denoise::TemporalOptions& options) {
   const Now now{raw, noise, 1.0 / options.max_frames};
   const int width = raw.value.width, height = raw.value.height;
   const bool first = blocks_.empty() || mean_e.width() != width || mean_e.height() != height || phase_ != raw.phase;
+  const bool displaced = !first && options.compensate_motion && frames_to_search_ > 0 && std::min(width, height) >= 64;
   if (first) {
+    motion_.forget();
     mean_e = Plane<double>(width, height);
     signal_e_ = Plane<double>(width, height);
     variance_fraction = Plane<double>((width + 1) / 2, (height + 1) / 2);
@@ -141,15 +164,21 @@ double TemporalMean::run(const denoise::RawElectronsView& raw, const denoise::Ra
     for (int y = 0; y < blocks_.height(); ++y) {
       for (int x = 0; x < blocks_.width(); ++x) {
         rescale(now, light, x, y);
-        blocks_.at(x, y).level = level_of(now, x, y, at);
+      }
+    }
+    if (displaced) displace(now);
+    for (int y = 0; y < blocks_.height(); ++y) {
+      for (int x = 0; x < blocks_.width(); ++x) {
+        Block& block = blocks_.at(x, y);
+        block.level = displaced && block.share >= 1e6 ? 0 : level_of(now, x, y, at);
       }
     }
   }
   double moved = 0;
   for (int y = 0; y < blocks_.height(); ++y) {
     for (int x = 0; x < blocks_.width(); ++x) {
-      const bool starts = first || has_moved(x, y);
       double& share = blocks_.at(x, y).share;
+      const bool starts = first || (displaced && share >= 1e6) || has_moved(x, y);
       const double weight = starts ? 1 : std::max(share / (1 + share), now.min_weight);
       share = starts ? 1 : (1 - weight) * (1 - weight) * share + weight * weight;
       moved += starts ? 1 : 0;
@@ -165,7 +194,10 @@ double TemporalMean::run(const denoise::RawElectronsView& raw, const denoise::Ra
   }
   noise_ = noise;
   phase_ = raw.phase;
-  return moved / static_cast<double>(blocks_.size());
+  moved /= static_cast<double>(blocks_.size());
+  const bool motion = moved > std::max(0.02, 4 * options.false_alarm) || (displaced && motion_.found());
+  frames_to_search_ = first ? 0 : motion ? 8 : std::max(frames_to_search_ - 1, 0);
+  return moved;
 }
 
 }  // namespace lowlux::reference

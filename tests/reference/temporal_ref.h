@@ -2,6 +2,7 @@
 
 #include "denoise/temporal/temporal.h"
 #include "denoise/temporal/temporal_thresholds.h"
+#include "tests/reference/motion_ref.h"
 
 namespace lowlux::reference {
 
@@ -24,11 +25,14 @@ class TemporalMean {
   void rescale(const Now& now, double light, int x, int y);
   int level_of(const Now& now, int x, int y, const denoise::MotionThresholds& at) const;
   bool has_moved(int x, int y) const;
+  void displace(const Now& now);
 
   Plane<double> signal_e_;  // the mean without dark charge
   Plane<Block> blocks_;
   denoise::RawNoise noise_;
   BayerPhase phase_ = BayerPhase::rggb;
+  FrameMotion motion_;
+  int frames_to_search_ = 0;
 };
 
 }  // namespace lowlux::reference

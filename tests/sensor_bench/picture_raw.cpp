@@ -83,7 +83,8 @@ void blur(SceneLinear& picture, double sigma_px) {
 
 }  // namespace
 
-Result<PictureLight> picture_light(const std::string& name, Executor& executor, double lens_sigma_px) {
+Result<PictureLight> picture_light(const std::string& name, Executor& executor, double lens_sigma_px,
+                                   BayerPhase phase) {
   auto xyz = picture_xyz(std::string(LOWLUX_TESTDATA "/pictures/") + name, executor);
   if (!xyz) return tl::make_unexpected(xyz.error());
   if (lens_sigma_px > 0) blur(*xyz, lens_sigma_px);
@@ -92,10 +93,11 @@ Result<PictureLight> picture_light(const std::string& name, Executor& executor, 
   const auto response = nikon_response();
   if (!response) return tl::make_unexpected(response.error());
   const isp::LiftTable table(*response);
-  PictureLight out{name, capture::charge_rate(*scene, *response, &table, BayerPhase::rggb, executor).e_per_s};
+  PictureLight out{name, capture::charge_rate(*scene, *response, &table, phase, executor).e_per_s};
   double green = 0, pixels = 0;
   for (int y = 0; y < out.rate_e.height(); ++y) {
-    for (int x = 1 - (y & 1); x < out.rate_e.width(); x += 2) {
+    for (int x = 0; x < out.rate_e.width(); ++x) {
+      if (colour_at(phase, x, y) != CfaColour::green) continue;
       green += out.rate_e.at(x, y);
       pixels += 1;
     }

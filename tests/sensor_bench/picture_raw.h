@@ -26,8 +26,10 @@ struct PictureLight {
 
 /// @param lens_sigma_px  standard deviation of the Gaussian that a lens spreads each point over, before the mosaic
 ///                       samples the light; 0: none, as sharp as the picture
+/// @param phase  of the mosaic
 /// Errors: those of reading the file and of making a scene of it.
-Result<PictureLight> picture_light(const std::string& name, Executor& executor, double lens_sigma_px = 0);
+Result<PictureLight> picture_light(const std::string& name, Executor& executor, double lens_sigma_px = 0,
+                                   BayerPhase phase = BayerPhase::rggb);
 
 /// How a picture is taken.
 struct PictureShot {

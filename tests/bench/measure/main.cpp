@@ -40,6 +40,8 @@ constexpr Measurement measurements[]{
      "writes a large raw file for timing: the active area of another, repeated; 14 bits, lossless JPEG", make_raw},
     {"merge-budget", "[DRAW [MERGES]]", "predicted times of merging, and budgets kept, of series drawn by DRAW",
      measure_merge_budget},
+    {"motion", "[FRAMES, at least 4]", "videos of pictures that move: errors with and without motion compensation",
+     measure_motion},
     {"noise-ratio", "[--quality-only|--time-only]", "noise that differs from place to place: PSNR lost, time",
      measure_noise_ratio},
     {"picture-noise", "", "noise of single images: error, refusals and time", measure_picture_noise},

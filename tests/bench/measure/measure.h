@@ -110,6 +110,7 @@ int measure_encoding(Arguments& arguments);
 int measure_look(Arguments& arguments);
 int make_raw(Arguments& arguments);
 int measure_merge_budget(Arguments& arguments);
+int measure_motion(Arguments& arguments);
 int measure_noise_ratio(Arguments& arguments);
 int measure_picture_noise(Arguments& arguments);
 int measure_pixel_cost(Arguments& arguments);

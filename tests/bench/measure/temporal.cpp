@@ -16,24 +16,28 @@ using namespace lowlux;
 using denoise_testing::Camera;
 using denoise_testing::exposed;
 
-/// Still frames, then the same with light that changes a little from frame to frame.
+/// Still frames, the same with light that changes a little from frame to frame, and frames that move there and back.
 void print_temporal_times(int rounds) {
   constexpr int width = 2000, height = 1500;
   const Camera camera{.dark_e = {2, 2, 2, 2}};
-  const std::array raw{exposed(camera, denoise_testing::waves(50), width, height, 1),
-                       exposed(camera, denoise_testing::waves(50), width, height, 2)};
+  const auto scene = denoise_testing::waves(50);
+  const auto displaced = [&](int x, int y) { return scene(x + 6, y + 4); };
+  const std::array raw{exposed(camera, scene, width, height, 1), exposed(camera, scene, width, height, 2),
+                       exposed(camera, displaced, width, height, 3)};
   Plane<float> out(width, height), share(width / 2, height / 2);
-  denoise::TemporalMean temporal(width, height, 1);
+  denoise::TemporalMean still(width, height, 1), moving(width, height, 1);
   InlineExecutor one;
   int round = 0;
-  const auto run = [&](double light) {
-    temporal.run({raw[round % 2].view(), camera.phase}, camera.noise(), light, {}, out.view(), share.view(), one);
+  const auto run = [&](denoise::TemporalMean& temporal, int frame, double light) {
+    temporal.run({raw[frame].view(), camera.phase}, camera.noise(), light, {}, out.view(), share.view(), one);
   };
   constexpr double pixels = static_cast<double>(width) * height;
   std::array tasks{
       test::Task{"memcpy", [&] { std::memcpy(out.data(), raw[round % 2].data(), out.size() * sizeof(float)); }, pixels},
-      test::Task{"light as before", [&] { run(1); }, pixels},
-      test::Task{"light that changes", [&] { run(round++ % 2 == 0 ? 1.01 : 1 / 1.01); }, pixels}};
+      test::Task{"light as before", [&] { run(still, round % 2, 1); }, pixels},
+      test::Task{"light that changes", [&] { ++round, run(still, round % 2, round % 2 == 0 ? 1.01 : 1 / 1.01); },
+                 pixels},
+      test::Task{"scene that moves", [&] { run(moving, 2 * (round % 2), 1); }, pixels}};
   test::time_in_turn(tasks, rounds);
   const double copy = 1e6 * tasks[0].median_cpu_ms();
   std::printf("one thread, %d rounds, median CPU time [ns/pixel], and of memcpy's\n", rounds);
