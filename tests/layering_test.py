@@ -98,7 +98,8 @@ def main():
                     faults.append(f"{file}: third-party header <{included}> outside a .cpp file")
     for group in circles(edges):
         faults.append(f"{len(group)} modules include each other in a circle: {', '.join(group)}")
-    for folder, count in collections.Counter(file.rpartition("/")[0] for file in files).items():
+    tests = [path.relative_to(root).as_posix() for path in (root / "tests").rglob("*") if path.suffix in (".h", ".cpp", ".py")]
+    for folder, count in collections.Counter(file.rpartition("/")[0] for file in files + tests).items():
         if count > MOST_FILES_IN_A_FOLDER:
             faults.append(f"{folder}: {count} source files, more than {MOST_FILES_IN_A_FOLDER}: make folders by subject")
     if len(files) < 10:

@@ -22,7 +22,7 @@
 #include "isp/codec/tiff.h"
 #include "isp/model/colour/colorimetry.h"
 #include "tests/codec/pictures.h"
-#include "tests/support/dng_builder.h"
+#include "tests/support/dng/dng_builder.h"
 #include "tests/support/error_words.h"
 
 /// Picture files of every format in memory, and what read_picture makes of them.

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "tests/capture/read_built.h"
-#include "tests/support/float_dng.h"
+#include "tests/support/dng/float_dng.h"
 #include "tests/support/peak_memory.h"
 
 namespace lowlux::capture {

@@ -13,8 +13,8 @@
 #include "capture/decoder/libraw_decoder.h"
 #include "tests/capture/read_built.h"
 #include "tests/capture/x_trans_colours.h"
-#include "tests/support/float_dng.h"
-#include "tests/support/jpeg_xl.h"
+#include "tests/support/dng/float_dng.h"
+#include "tests/support/dng/jpeg_xl.h"
 
 namespace lowlux::capture {
 namespace {

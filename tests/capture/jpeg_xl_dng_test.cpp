@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "tests/capture/read_built.h"
-#include "tests/support/jpeg_xl.h"
+#include "tests/support/dng/jpeg_xl.h"
 
 namespace lowlux::capture {
 namespace {

@@ -15,7 +15,7 @@
 #include "isp/model/colour/colorimetry.h"
 #include "tests/capture/built_pictures.h"
 #include "tests/codec/pictures.h"
-#include "tests/support/dng_builder.h"
+#include "tests/support/dng/dng_builder.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux::capture {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "tests/capture/read_built.h"
-#include "tests/support/dng_builder.h"
+#include "tests/support/dng/dng_builder.h"
 
 namespace lowlux::capture {
 namespace {

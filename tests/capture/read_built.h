@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "capture/file/dng_source.h"
-#include "tests/support/dng_builder.h"
+#include "tests/support/dng/dng_builder.h"
 #include "tests/support/error_words.h"
 
 namespace lowlux::test {

@@ -7,7 +7,7 @@
 
 #include "capture/dng/source_tags.h"
 #include "capture/dng/tiff_directory.h"
-#include "tests/support/dng_builder.h"
+#include "tests/support/dng/dng_builder.h"
 
 namespace lowlux::capture {
 namespace {

@@ -9,7 +9,7 @@
 #include "capture/file/decoder_frame.h"
 #include "tests/capture/read_built.h"
 #include "tests/capture/x_trans_colours.h"
-#include "tests/support/float_dng.h"
+#include "tests/support/dng/float_dng.h"
 
 namespace lowlux::capture {
 namespace {

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/command.h"
-#include "tests/cli/simulate_command.h"
+#include "tests/cli/simulate/simulate_command.h"
 
 namespace lowlux {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "tests/cli/command.h"
-#include "tests/support/dng_builder.h"
+#include "tests/support/dng/dng_builder.h"
 #include "tests/support/process.h"
 #include "tests/support/scratch_directory.h"
 

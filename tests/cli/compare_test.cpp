@@ -15,7 +15,7 @@
 #include "isp/output/picture/image_writer.h"
 #include "isp/render/output_space.h"
 #include "tests/cli/command.h"
-#include "tests/cli/simulate_command.h"
+#include "tests/cli/simulate/simulate_command.h"
 
 namespace lowlux {
 namespace {

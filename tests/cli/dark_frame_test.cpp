@@ -21,8 +21,8 @@
 #include "isp/output/dng/dng_writer.h"
 #include "isp/raw/black_point.h"
 #include "tests/cli/command.h"
-#include "tests/cli/simulate_command.h"
-#include "tests/support/float_dng.h"
+#include "tests/cli/simulate/simulate_command.h"
+#include "tests/support/dng/float_dng.h"
 
 namespace lowlux {
 namespace {

@@ -13,7 +13,7 @@
 #include "capture/file/file_bytes.h"
 #include "isp/codec/tiff.h"
 #include "tests/cli/command.h"
-#include "tests/cli/simulate_command.h"
+#include "tests/cli/simulate/simulate_command.h"
 
 namespace lowlux {
 namespace {

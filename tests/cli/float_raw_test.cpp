@@ -14,9 +14,9 @@
 #include "isp/base/executor.h"
 #include "isp/output/dng/dng_writer.h"
 #include "tests/cli/command.h"
-#include "tests/cli/simulate_command.h"
+#include "tests/cli/simulate/simulate_command.h"
 #include "tests/support/as_floats.h"
-#include "tests/support/float_dng.h"
+#include "tests/support/dng/float_dng.h"
 
 namespace lowlux {
 namespace {

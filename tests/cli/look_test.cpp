@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/model/vision/scene_light.h"
-#include "tests/cli/simulate_command.h"
+#include "tests/cli/simulate/simulate_command.h"
 
 namespace lowlux {
 namespace {

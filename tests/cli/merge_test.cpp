@@ -9,7 +9,7 @@
 
 #include "capture/file/dng_source.h"
 #include "tests/cli/command.h"
-#include "tests/cli/simulate_command.h"
+#include "tests/cli/simulate/simulate_command.h"
 
 namespace lowlux {
 namespace {

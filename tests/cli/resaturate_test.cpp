@@ -13,7 +13,7 @@
 #include "isp/model/colour/colorimetry.h"
 #include "isp/output/picture/image_writer.h"
 #include "tests/cli/command.h"
-#include "tests/cli/simulate_command.h"
+#include "tests/cli/simulate/simulate_command.h"
 
 namespace lowlux {
 namespace {

@@ -12,7 +12,7 @@
 #include "capture/file/picture_source.h"
 #include "isp/base/executor.h"
 #include "isp/output/picture/image_writer.h"
-#include "tests/cli/simulate_command.h"
+#include "tests/cli/simulate/simulate_command.h"
 
 namespace lowlux {
 namespace {

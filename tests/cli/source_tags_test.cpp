@@ -14,7 +14,7 @@
 #include "capture/dng/tiff_directory.h"
 #include "tests/capture/x_trans_colours.h"
 #include "tests/cli/command.h"
-#include "tests/support/dng_builder.h"
+#include "tests/support/dng/dng_builder.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux {

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <random>
 
-#include "tests/support/float_dng.h"
+#include "tests/support/dng/float_dng.h"
 
 namespace lowlux::isp {
 namespace {

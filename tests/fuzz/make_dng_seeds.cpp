@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/dng_builder.h"
-#include "tests/support/float_dng.h"
+#include "tests/support/dng/dng_builder.h"
+#include "tests/support/dng/float_dng.h"
 
 namespace lowlux::test {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "tests/hard_cases/hard_case.h"
 #include "tests/merge/drizzle_frames.h"
-#include "tests/pipeline/merge_bursts.h"
+#include "tests/pipeline/merge/merge_bursts.h"
 
 // Several frames of one scene.
 namespace lowlux::hard_cases {

@@ -5,7 +5,7 @@
 
 #include "capture/file/dng_source.h"
 #include "tests/bench/measure/measure.h"
-#include "tests/support/dng_builder.h"
+#include "tests/support/dng/dng_builder.h"
 
 int lowlux::test::make_raw(Arguments& arguments) {
   const std::string in = arguments.required("IN.dng");

@@ -11,7 +11,7 @@
 #include "isp/merge/stars/match_stars.h"
 #include "tests/bench/measure/measure.h"
 #include "tests/merge/star_motion.h"
-#include "tests/pipeline/star_nights.h"
+#include "tests/pipeline/merge/star_nights.h"
 
 namespace {
 

@@ -20,7 +20,7 @@
 #include "isp/cli/capture/capture_args.h"
 #include "isp/cli/capture/capture_report.h"
 #include "isp/codec/png.h"
-#include "tests/cli/simulate_command.h"
+#include "tests/cli/simulate/simulate_command.h"
 #include "tests/support/fake_camera.h"
 
 namespace lowlux {

@@ -13,10 +13,10 @@
 
 #include "capture/dng/source_tags.h"
 #include "isp/output/dng/dng_writer.h"
+#include "tests/support/dng/tiff_writer.h"
 #include "tests/support/frames.h"
 #include "tests/support/process.h"
 #include "tests/support/scratch_directory.h"
-#include "tests/support/tiff_writer.h"
 
 namespace lowlux {
 namespace {

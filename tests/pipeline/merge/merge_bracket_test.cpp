@@ -1,0 +1,157 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/pipeline/merge/merge_bursts.h"
+
+namespace lowlux::isp {
+namespace {
+
+using test::Burst;
+
+/// A ramp from 1 to 50,000 e- in the light of the first frame; it saturates at 3968 e-.
+Burst ramp(const std::vector<double>& lights) {
+  Burst burst{.width = 1024, .height = 64};
+  burst.scene = [](double x, double, int) { return std::pow(10, 4.7 * x / 1023); };
+  burst.light = [lights](int index) { return lights[static_cast<std::size_t>(index)]; };
+  return burst;
+}
+
+/// Holds what a merge did to a column.
+struct Column {
+  double bias_e = 0;
+  double variance_e2 = 0;
+};
+
+Column column_of(const Burst& burst, const RawFrame& frame, int x, double white_e) {
+  Column out;
+  for (int y = 0; y < burst.height; ++y) {
+    const double error = Burst::signal_e(frame, x, y, white_e) - burst.truth_e(x, y);
+    out.bias_e += error / burst.height;
+    out.variance_e2 += error * error / burst.height;
+  }
+  return out;
+}
+
+/// Returns the variance of the best weighted mean of the exposures that do not saturate at a signal.
+double best_variance(const std::vector<double>& lights, double signal_e, double read_e) {
+  double weight = 0;
+  for (const double light : lights) {
+    if (light * signal_e < 0.85 * test::night_full_e()) {
+      weight += light * light / (light * signal_e + read_e * read_e + 1.0 / 192);
+    }
+  }
+  return 1 / weight;
+}
+
+TEST(MergeBracket, EightStopsAreUnbiasedAndNearTheBestWeightsAtEveryLevel) {
+  const std::vector<double> lights{1, 16, 1.0 / 16};
+  const Burst burst = ramp(lights);
+  const MergedRaw merged = burst.merged(3);
+  ASSERT_TRUE(merged.bracket);
+  EXPECT_EQ(merged.alignment, MergeAlignment::none);
+  EXPECT_TRUE(merged.frame.raw.is_float());  // 16 bits would be coarser than the noise
+  EXPECT_NEAR(merged.baseline_exposure_ev, 4, 0.05);
+  const double white_e = 16 * test::night_full_e();
+  double bias_chi_square = 0, excess = 0;
+  int count = 0;
+  for (int x = 0; x < 1024; ++x) {
+    const Column column = column_of(burst, merged.frame, x, white_e);
+    const double best = best_variance(lights, burst.truth_e(x, 0), 2);
+    bias_chi_square += column.bias_e * column.bias_e / (best / burst.height);
+    excess += column.variance_e2 / best;
+    ++count;
+  }
+  EXPECT_LT(excess / count, 1.15);          // weights fade towards saturation, and are not those of the truth
+  EXPECT_LT(bias_chi_square / count, 1.3);  // 1 without any bias
+}
+
+TEST(MergeBracket, ThereIsNoSeamWhereAnExposureSaturatesThoughItsTimeIsWrong) {
+  // Shutters of 1/16 and 16 times the time that let 8 % more and 6 % less light through than the file states.
+  Burst burst = ramp({1, 16 * 0.94, 1.08 / 16});
+  const FrameReader read = [&](int index) {
+    RawFrame frame = burst.frame(index);
+    frame.raw.info.exposure_s = 0.1 * std::array{1.0, 16.0, 1.0 / 16}[static_cast<std::size_t>(index)];
+    return Result<FrameToMerge>({std::move(frame), burst.options()});
+  };
+  InlineExecutor executor;
+  const auto merged = merge_frames(3, read, {}, executor);
+  ASSERT_TRUE(merged) << merged.error().message;
+  EXPECT_NEAR(merged->frames[1].light, 16 * 0.94, 0.1);
+  EXPECT_NEAR(merged->frames[2].light, 1.08 / 16, 0.0003);
+  const double white_e = test::night_full_e() / merged->frames[2].light;
+  for (int x0 = 0; x0 < 1024; x0 += 32) {
+    double relative = 0, error2 = 0;
+    for (int x = x0; x < x0 + 32; ++x) {
+      const Column column = column_of(burst, merged->frame, x, white_e);
+      const double truth = burst.truth_e(x, 0);
+      relative += column.bias_e / truth / 32;
+      error2 += best_variance({1, 16 * 0.94, 1.08 / 16}, truth, 2) / (truth * truth) / (32.0 * 32 * burst.height);
+    }
+    EXPECT_LT(std::fabs(relative), 0.006 + 5 * std::sqrt(error2)) << x0;
+  }
+}
+
+TEST(MergeBracket, LampsKeepTheirColourAndWhatSaturatesEverywhereIsWhite) {
+  Burst burst{.width = 128, .height = 128};
+  burst.light = [](int index) { return std::array{1.0, 1.0 / 16}[static_cast<std::size_t>(index)]; };
+  burst.scene = [](double x, double y, int colour) {
+    if (x >= 32 && x < 64 && y >= 32 && y < 64)
+      return std::array{40000.0, 20000.0, 5000.0}[static_cast<std::size_t>(colour)];
+    if (x >= 80 && x < 90 && y >= 80 && y < 90) return 500000.0;
+    return 20.0;
+  };
+  const MergedRaw merged = burst.merged(2);
+  const double white_e = 16 * test::night_full_e();
+  std::array<double, 3> sum{}, count{};
+  for (int y = 36; y < 60; ++y) {
+    for (int x = 36; x < 60; ++x) {
+      const auto c = static_cast<std::size_t>(colour_at(BayerPhase::grbg, x, y));
+      sum[c] += Burst::signal_e(merged.frame, x, y, white_e);
+      count[c] += 1;
+    }
+  }
+  EXPECT_NEAR(sum[0] / count[0], 40000, 300);
+  EXPECT_NEAR(sum[1] / count[1], 20000, 150);
+  EXPECT_NEAR(sum[2] / count[2], 5000, 100);
+  for (int y = 82; y < 88; ++y) {
+    for (int x = 82; x < 88; ++x) EXPECT_GE(Burst::signal_e(merged.frame, x, y, white_e), white_e);
+  }
+}
+
+TEST(MergeBracket, IsFoundWhereverTheExposureChanges) {
+  for (const int changed : {1, 2, 4}) {
+    Burst burst;
+    burst.light = [changed](int index) { return index == changed ? 4.0 : 1.0; };
+    for (const auto alignment : {std::optional(MergeAlignment::none), std::optional<MergeAlignment>()}) {
+      const MergedRaw merged = burst.merged(5, {.alignment = alignment});
+      EXPECT_TRUE(merged.bracket);
+      // Five frames of 8 times the light of one; 4 e-^2 of read noise in each.
+      const double expected = burst.mean_square_error(burst.frame(0)) / 8;
+      EXPECT_LT(burst.mean_square_error(merged.frame), 1.1 * expected);
+      EXPECT_NEAR(burst.stated_variance(merged.frame) / burst.mean_square_error(merged.frame), 1, 0.1);
+    }
+  }
+}
+
+TEST(MergeBracket, WithoutAnExposureTimeItIsRefused) {
+  Burst burst;
+  burst.light = [](int index) { return index == 1 ? 4.0 : 1.0; };
+  burst.disturb = [](RawFrame& frame, int index) {
+    if (index == 1) frame.raw.info.exposure_s.reset();
+  };
+  InlineExecutor executor;
+  const FrameReader read = [&](int index) {
+    return Result<FrameToMerge>({burst.frame(index), burst.options(), "frame " + std::to_string(index)});
+  };
+  const auto merged = merge_frames(3, read, {}, executor);
+  ASSERT_FALSE(merged);
+  EXPECT_EQ(merged.error().code, ErrorCode::insufficient);
+  EXPECT_EQ(merged.error().where, "frame 1");
+}
+
+}  // namespace
+}  // namespace lowlux::isp

@@ -1,0 +1,149 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <numbers>
+#include <random>
+
+#include "tests/pipeline/merge/merge_bursts.h"
+
+namespace lowlux::isp {
+namespace {
+
+using test::Burst;
+
+/// A burst whose frames are displaced by up to 20 pixels and turned by up to one degree.
+Burst hand_held(double mean_e) {
+  Burst burst{.width = 320, .height = 256, .mean_e = mean_e};
+  burst.scene = [mean_e](double x, double y, int colour) { return test::textured(x, y, colour, mean_e); };
+  burst.position = [](int index, double x, double y) {
+    std::mt19937_64 draw(static_cast<std::uint64_t>(index));
+    std::uniform_real_distribution<double> unit(-1, 1);
+    const double dx = 20 * unit(draw), dy = 20 * unit(draw), turn = std::numbers::pi / 180 * unit(draw);
+    const double u = x - 160 - dx, v = y - 128 - dy;
+    return std::array{160 + u * std::cos(turn) + v * std::sin(turn), 128 - u * std::sin(turn) + v * std::cos(turn)};
+  };
+  return burst;
+}
+
+constexpr Rect middle{32, 32, 256, 192};
+
+TEST(MergeMoving, GainsNearlyAsMuchAsFramesAtRest) {
+  for (const double mean_e : {20.0, 4.0}) {
+    const Burst burst = hand_held(mean_e);
+    const MergedRaw merged = burst.merged(8);
+    EXPECT_EQ(merged.alignment, MergeAlignment::subpixel);
+    const double single = burst.mean_square_error(burst.frame(0), middle);
+    const double gain_db = 10 * std::log10(single / burst.mean_square_error(merged.frame, middle));
+    EXPECT_GT(gain_db, 10 * std::log10(8) - 1) << mean_e;
+    const MergedRaw cells = burst.merged(8, {.alignment = MergeAlignment::cells});
+    EXPECT_LT(burst.mean_square_error(merged.frame, middle), burst.mean_square_error(cells.frame, middle)) << mean_e;
+  }
+}
+
+// Waves of 3.5 pixels with 0.7 of the noise of a frame, which noise reduction of a single frame removes. A mean over
+// drops of radius 1.5 px keeps sinc^2(1.5 / 3.5) = 0.52 of their contrast.
+TEST(MergeMoving, DetailThatNoiseHidesInOneFrameKeepsItsContrast) {
+  constexpr double amplitude_e = 3.5, turns_per_px = 1 / 3.5;
+  const auto wave = [](double x, double y) {
+    return std::sin(2 * std::numbers::pi * turns_per_px * (0.8 * x + 0.6 * y));
+  };
+  Burst burst = hand_held(20);
+  burst.scene = [&](double x, double y, int colour) {
+    return test::textured(x, y, colour, 20) + amplitude_e * wave(x, y);
+  };
+  const auto contrast = [&](int frames) {
+    const MergedRaw merged = burst.merged(frames, {.alignment = MergeAlignment::subpixel});
+    double found = 0, square = 0;
+    for (int y = middle.y; y < middle.y + middle.height; ++y) {
+      for (int x = middle.x; x < middle.x + middle.width; ++x) {
+        const auto colour = static_cast<int>(colour_at(BayerPhase::grbg, x, y));
+        const double rest = Burst::signal_e(merged.frame, x, y) - test::textured(x, y, colour, 20);
+        found += rest * wave(x, y);
+        square += amplitude_e * wave(x, y) * wave(x, y);
+      }
+    }
+    return found / square;
+  };
+  const double of_one = 0.02;  // standard error of one frame: 5 / (3.5 sqrt(0.5 x 256 x 192)), and of displacements
+  EXPECT_NEAR(contrast(1), 1, 5 * of_one);
+  const double of_8 = contrast(8), of_32 = contrast(32);
+  std::printf("contrast kept of 8 and 32 frames: %.3f, %.3f\n", of_8, of_32);
+  EXPECT_GT(of_8, 0.73);
+  EXPECT_GT(of_32, 0.87);
+}
+
+TEST(MergeMoving, WhatMovesInTheSceneStaysThatOfTheReference) {
+  Burst burst = hand_held(20);
+  burst.disturb = [](RawFrame& frame, int index) {
+    for (int y = 60; y < 110; ++y) {
+      for (int x = 60 + 15 * index; x < 110 + 15 * index; ++x) {
+        frame.raw.dn.at(x, y) = static_cast<std::uint16_t>(frame.raw.dn.at(x, y) + 4 * 40);
+      }
+    }
+  };
+  const Burst still = hand_held(20);
+  const MergedRaw merged = burst.merged(8);
+  // Where an object is in other frames, and not in the reference: no worse than the reference alone.
+  const Rect swept{115, 60, 120, 50};
+  EXPECT_LT(still.mean_square_error(merged.frame, swept), still.mean_square_error(still.frame(0), swept));
+  // Where it is in the reference, it stays there.
+  double sum = 0;
+  for (int y = 65; y < 105; ++y) {
+    for (int x = 65; x < 105; ++x) sum += Burst::signal_e(merged.frame, x, y) - still.truth_e(x, y);
+  }
+  EXPECT_NEAR(sum / (40 * 40), 40, 3);
+  ASSERT_TRUE(merged.frame.noise_ratio);
+}
+
+TEST(MergeMoving, TheNoiseRatioStatesTheNoiseOfPlacesThatFewFramesShow) {
+  const Burst burst = hand_held(20);
+  const MergedRaw merged = burst.merged(8);
+  ASSERT_TRUE(merged.frame.noise_ratio);
+  const NoiseRatio& ratio = *merged.frame.noise_ratio;
+  double corner = 0, centre = 0;
+  for (int j = 0; j < 1; ++j) {
+    for (int i = 0; i < ratio.ratio.width(); ++i) corner += static_cast<double>(ratio.ratio.at(i, j));
+  }
+  for (int i = 0; i < ratio.ratio.width(); ++i)
+    centre += static_cast<double>(ratio.ratio.at(i, ratio.ratio.height() / 2));
+  EXPECT_GT(corner, 1.5 * centre);
+}
+
+TEST(MergeMoving, IsTheSameForAnyNumberOfThreads) {
+  Burst burst = hand_held(20);
+  burst.width = 131;
+  burst.height = 97;
+  InlineExecutor one;
+  constexpr int frames = 16;  // the reference is predicted a second time
+  const MergedRaw expected = burst.merged(frames, {.alignment = MergeAlignment::subpixel}, &one);
+  for (const int threads : {2, 3, 7}) {
+    PoolExecutor pool(threads);
+    const MergedRaw result = burst.merged(frames, {.alignment = MergeAlignment::subpixel}, &pool);
+    EXPECT_TRUE(test::same_samples(result.frame.raw, expected.frame.raw)) << threads;
+  }
+}
+
+TEST(MergeMoving, FramesOfPureNoiseDarkOrWhiteAreMerged) {
+  Burst noise{.mean_e = 0};
+  noise.scene = [](double, double, int) { return 0.0; };
+  const MergedRaw merged = noise.merged(6, {.alignment = MergeAlignment::subpixel});
+  // Drops average neighbours too; without structure to align by, displacements are 0 and each site is its own drop.
+  const double left = noise.mean_square_error(merged.frame) / noise.mean_square_error(noise.frame(0));
+  EXPECT_LT(left, 1.03 / 6);
+  EXPECT_GT(left, 0.6 / 6);
+  for (const auto alignment : {MergeAlignment::cells, MergeAlignment::subpixel}) {
+    Burst white{.width = 64, .height = 48};
+    white.disturb = [](RawFrame& frame, int) {
+      std::fill_n(frame.raw.dn.data(), frame.raw.dn.size(), std::uint16_t{16383});
+    };
+    const MergedRaw saturated = white.merged(16, {.alignment = alignment});  // the reference is predicted twice
+    for (std::size_t i = 0; i < saturated.frame.raw.dn.size(); ++i) ASSERT_EQ(saturated.frame.raw.dn.data()[i], 65535);
+    const Burst narrow{.width = 2, .height = 301};
+    EXPECT_EQ(narrow.merged(16, {.alignment = alignment}).frame.raw.dn.height(), 301);
+  }
+}
+
+}  // namespace
+}  // namespace lowlux::isp
