@@ -32,6 +32,7 @@ DngBuilder quad_dng(BayerPhase phase, int left, int top, std::mt19937& draw) {
   dng.bits = 12;
   for (int i = 0; i < dng.width * dng.height; ++i) dng.pixels.push_back(static_cast<std::uint16_t>(draw() % 1000));
   std::vector<double> colours;
+  colours.reserve(16);
   for (int i = 0; i < 16; ++i) colours.push_back(colour_of(phase, i % 4, i / 4, left, top));
   dng.set(33421, Tag::numbers(TagType::u16, {4, 4}));
   dng.set(33422, Tag::numbers(TagType::byte, colours));

@@ -155,6 +155,7 @@ TEST(Telegraph, HasVarianceAndKurtosisOfItsLawAndTheSamePixelsInAllFrames) {
 
 std::vector<double> first_column(const Plane<float>& plane) {
   std::vector<double> out;
+  out.reserve(plane.height());
   for (int y = 0; y < plane.height(); ++y) out.push_back(plane.at(0, y));
   return out;
 }
