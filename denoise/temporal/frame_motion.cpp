@@ -24,7 +24,7 @@ constexpr double frame_significance = 4;  // standard deviations by which a disp
 constexpr double significance = 2;        // and better than another one, for a tile or block
 constexpr double max_residual_cells = 0.5;
 /// What a displacement that is off changes at a site, over what it changes in the mean of a cell, squared. Chosen on
-/// kodim05.png and kodim15.png.
+/// kodim05, kodim15, kodim19 and kodim23.
 constexpr double mismatch_of_sites = 1.5;
 constexpr double min_displaced = 1.0 / 32;  // part of the tiles, from which on motion counts as found
 constexpr double min_mismatch = 0.01;       // and mean relative variance

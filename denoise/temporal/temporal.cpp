@@ -22,10 +22,10 @@ using rows::blocks_of_strip;
 using rows::motion_block;
 using rows::sites_of_strip;
 
-constexpr double largest_fraction = 1e6;  // relative variance of a history without value
-constexpr double max_light = 1e6;         // ratio, up or down, beyond which a history has no value
-constexpr double min_moved = 0.02;        // fraction of the blocks, from which on their motion is looked for
-constexpr int search_frames = 8;          // for so many frames after motion was last seen
+constexpr double largest_fraction = FrameMotion::no_content;  // relative variance of a history without value
+constexpr double max_light = 1e6;                             // ratio, up or down, beyond which a history has no value
+constexpr double min_moved = 0.02;  // fraction of the blocks, from which on their motion is looked for
+constexpr int search_frames = 8;    // for so many frames after motion was last seen
 
 constexpr int rounded_up(int n, int unit) { return (n + unit - 1) / unit * unit; }
 

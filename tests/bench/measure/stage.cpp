@@ -180,7 +180,7 @@ bool wanted(const Choice& choice, const Mode& mode, bool eye, int threads) {
 void bench_size(const Plane<float>& light, double mean_e, Size size, const Choice& choice) {
   std::vector<Codes> frames;
   const Codes clean = frame_of(light, mean_e, size.width, size.height, 0);
-  // Frames that come again are averaged as if they were new: then there is no PSNR.
+  // Repeated frames would be averaged as if they were new: no PSNR is printed for them.
   const std::size_t fitting = max_frame_bytes / sizeof(Codes::value_type) / clean.size();
   const auto distinct = static_cast<unsigned>(std::min<std::size_t>(fitting, warm_up + measured));
   for (unsigned i = 1; i <= distinct; ++i) frames.push_back(frame_of(light, mean_e, size.width, size.height, i));
