@@ -228,8 +228,10 @@ Result<int> Stage::configure(const lowlux_stage_input& in, lowlux_stage_output& 
   if (!pipeline) return tl::make_unexpected(pipeline.error());
   made.pipeline = *std::move(pipeline);
   const bool hd = out.yuv_matrix == 709 || (out.yuv_matrix == 0 && active.height >= 720);
-  made.writer = std::make_unique<StageWriter>(*kind, hd ? YuvStandard::bt709 : YuvStandard::bt601, active.width,
-                                              active.height, executor_.width());
+  if (*kind == StageOutput::nv12) {
+    made.nv12 = std::make_unique<Nv12Writer>(hd ? YuvStandard::bt709 : YuvStandard::bt601, active.width, active.height,
+                                             executor_.width());
+  }
   auto gains = calib::exposure_gains(StageExposure::factors(), *format, made.pipeline->frame().raw.white_dn[1],
                                      profile_ ? &profile_->profile() : nullptr);
   if (!gains) return tl::make_unexpected(gains.error());
@@ -284,8 +286,11 @@ void Stage::render(const lowlux_stage_picture& out) {
     case StageOutput::mosaic:
       stream_->pipeline->render_mosaic(wide);
       return;
+    case StageOutput::nv12:
+      stream_->pipeline->render(stream_->nv12->sink(out.plane));
+      return;
     default:
-      stream_->pipeline->render(stream_->writer->sink(out.plane));
+      stream_->pipeline->render(pixels_in(first, stream_->kind, stream_->layout.width, stream_->layout.height));
   }
 }
 

@@ -61,7 +61,7 @@ class Stage {
     int width = 0;
     int height = 0;  // width and height of full frames
     std::unique_ptr<LivePipeline> pipeline;
-    std::unique_ptr<StageWriter> writer;
+    std::unique_ptr<Nv12Writer> nv12;  // where that is the output
     StageBudget budget;
     std::unique_ptr<StageExposure> exposure;
   };

@@ -90,46 +90,35 @@ bool lay_out(StageOutput kind, int width, int height, lowlux_stage_output& out) 
   return adjusted;
 }
 
-StageWriter::StageWriter(StageOutput kind, YuvStandard standard, int width, int height, int threads)
-    : kind_(kind),
-      matrix_(yuv_matrix(standard)),
+PixelView pixels_in(const lowlux_stage_plane& plane, StageOutput kind, int width, int height) {
+  return {.data = static_cast<std::uint8_t*>(plane.data),
+          .width = width,
+          .height = height,
+          .stride_bytes = static_cast<std::ptrdiff_t>(plane.stride),
+          .pixel_bytes = kind == StageOutput::rgbx || kind == StageOutput::bgrx ? 4 : 3,
+          .is_bgr = kind == StageOutput::bgrx || kind == StageOutput::bgr};
+}
+
+Nv12Writer::Nv12Writer(YuvStandard standard, int width, int height, int threads)
+    : matrix_(yuv_matrix(standard)),
       width_(width),
       height_(height),
       above_(
           std::make_unique<std::uint8_t[]>(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(threads))) {}
 
-RowSink StageWriter::sink(const lowlux_stage_plane* planes) {
+RowSink Nv12Writer::sink(const lowlux_stage_plane* planes) {
   planes_ = planes;
   return {[](void* context, int thread, int y, const std::uint8_t* rgb, int) {
-            static_cast<StageWriter*>(context)->write(thread, y, rgb);
+            static_cast<Nv12Writer*>(context)->write(thread, y, rgb);
           },
           this};
 }
 
-std::uint8_t* StageWriter::row(int plane, int y) const {
+std::uint8_t* Nv12Writer::row(int plane, int y) const {
   return static_cast<std::uint8_t*>(planes_[plane].data) + planes_[plane].stride * static_cast<std::size_t>(y);
 }
 
-void StageWriter::write(int thread, int y, const std::uint8_t* rgb) {
-  switch (kind_) {
-    case StageOutput::rgbx:
-      rgbx_row(rgb, width_, row(0, y));
-      return;
-    case StageOutput::bgrx:
-      bgrx_row(rgb, width_, row(0, y));
-      return;
-    case StageOutput::bgr:
-      bgr_row(rgb, width_, row(0, y));
-      return;
-    case StageOutput::rgb:
-      std::memcpy(row(0, y), rgb, 3 * static_cast<std::size_t>(width_));
-      return;
-    case StageOutput::nv12:
-      break;
-    case StageOutput::rgb48:
-    case StageOutput::mosaic:
-      return;  // no rows of 8 bits
-  }
+void Nv12Writer::write(int thread, int y, const std::uint8_t* rgb) {
   luma_row(matrix_, rgb, width_, row(0, y));
   const std::size_t bytes = 3 * static_cast<std::size_t>(width_);
   std::uint8_t* const above = above_.get() + bytes * static_cast<std::size_t>(thread);

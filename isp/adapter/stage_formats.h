@@ -34,12 +34,15 @@ std::size_t plane_row_bytes(StageOutput kind, int width, int plane);
 int plane_rows(StageOutput kind, int height, int plane);
 int planes_of(StageOutput kind);
 
-/// Writes rows of 8-bit codes in one of the stage's output formats. Allocates its memory in the constructor.
-class StageWriter {
+/// Returns an image of R, G and B of 8 bits in the memory of a plane.
+/// @param kind  rgbx, bgrx, rgb or bgr
+PixelView pixels_in(const lowlux_stage_plane& plane, StageOutput kind, int width, int height);
+
+/// Converts rows of R, G and B to NV12. Allocates its memory in the constructor.
+class Nv12Writer {
  public:
   /// Makes a writer for images of one size.
-  /// @param kind  of 8 bits
-  StageWriter(StageOutput kind, YuvStandard standard, int width, int height, int threads);
+  Nv12Writer(YuvStandard standard, int width, int height, int threads);
 
   /// Returns a sink for one image; `planes` must outlive it.
   RowSink sink(const lowlux_stage_plane* planes);
@@ -48,7 +51,6 @@ class StageWriter {
   void write(int thread, int y, const std::uint8_t* rgb);
   std::uint8_t* row(int plane, int y) const;
 
-  StageOutput kind_;
   YuvMatrix matrix_;
   int width_, height_;
   std::unique_ptr<std::uint8_t[]> above_;  // last even row of each thread

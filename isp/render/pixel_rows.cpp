@@ -15,45 +15,6 @@ HWY_BEFORE_NAMESPACE();
 namespace lowlux::isp::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Bytes = hn::CappedTag<std::uint8_t, 32>;
-using VB = hn::Vec<Bytes>;
-
-enum class Order : std::uint8_t { rgbx, bgrx, bgr };
-
-HWY_INLINE void put(Order order, VB r, VB g, VB b, std::uint8_t* out) {
-  const Bytes d;
-  const VB full = hn::Set(d, 255);
-  if (order == Order::rgbx) hn::StoreInterleaved4(r, g, b, full, d, out);
-  if (order == Order::bgrx) hn::StoreInterleaved4(b, g, r, full, d, out);
-  if (order == Order::bgr) hn::StoreInterleaved3(b, g, r, d, out);
-}
-
-void put_one(Order order, const std::uint8_t* rgb, std::uint8_t* out) {
-  const bool rgb_first = order == Order::rgbx;
-  out[0] = rgb[rgb_first ? 0 : 2];
-  out[1] = rgb[1];
-  out[2] = rgb[rgb_first ? 2 : 0];
-  if (order != Order::bgr) out[3] = 255;
-}
-
-HWY_INLINE void reorder(Order order, const std::uint8_t* rgb, int width, std::uint8_t* out) {
-  const Bytes d;
-  const int lanes = static_cast<int>(hn::Lanes(d)), bytes = order == Order::bgr ? 3 : 4;
-  int x = 0;
-  for (; x + lanes <= width; x += lanes) {
-    VB r, g, b;
-    hn::LoadInterleaved3(d, rgb + 3 * static_cast<std::ptrdiff_t>(x), r, g, b);
-    put(order, r, g, b, out + bytes * static_cast<std::ptrdiff_t>(x));
-  }
-  for (; x < width; ++x) {
-    put_one(order, rgb + 3 * static_cast<std::ptrdiff_t>(x), out + bytes * static_cast<std::ptrdiff_t>(x));
-  }
-}
-
-void RgbxRow(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Order::rgbx, rgb, width, out); }
-void BgrxRow(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Order::bgrx, rgb, width, out); }
-void BgrRow(const std::uint8_t* rgb, int width, std::uint8_t* out) { reorder(Order::bgr, rgb, width, out); }
-
 /// Sixteen pixels are processed at once in 32 bits: weighted sums of three channels, rounded, shifted by `shift` bits.
 using Pixels = hn::FixedTag<std::uint8_t, 16>;
 using Quads = hn::CappedTag<std::int32_t, 8>;
@@ -161,9 +122,6 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace lowlux::isp {
-HWY_EXPORT(RgbxRow);
-HWY_EXPORT(BgrxRow);
-HWY_EXPORT(BgrRow);
 HWY_EXPORT(LumaRow);
 HWY_EXPORT(ChromaRow);
 
@@ -188,9 +146,6 @@ YuvMatrix yuv_matrix(YuvStandard standard) {
           scaled({0.5, -kg * r, -kb * r}, 224, 0)};
 }
 
-void rgbx_row(const std::uint8_t* rgb, int width, std::uint8_t* out) { HWY_DYNAMIC_DISPATCH(RgbxRow)(rgb, width, out); }
-void bgrx_row(const std::uint8_t* rgb, int width, std::uint8_t* out) { HWY_DYNAMIC_DISPATCH(BgrxRow)(rgb, width, out); }
-void bgr_row(const std::uint8_t* rgb, int width, std::uint8_t* out) { HWY_DYNAMIC_DISPATCH(BgrRow)(rgb, width, out); }
 void luma_row(const YuvMatrix& matrix, const std::uint8_t* rgb, int width, std::uint8_t* out) {
   HWY_DYNAMIC_DISPATCH(LumaRow)(matrix, rgb, width, out);
 }

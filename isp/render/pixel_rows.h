@@ -18,11 +18,7 @@ struct YuvMatrix {
 enum class YuvStandard : std::uint8_t { bt601, bt709 };
 YuvMatrix yuv_matrix(YuvStandard standard);
 
-// These functions convert rows of interleaved 8-bit codes R G B to other orders; they write only `width` pixels.
-
-void rgbx_row(const std::uint8_t* rgb, int width, std::uint8_t* out);  // R G B 255
-void bgrx_row(const std::uint8_t* rgb, int width, std::uint8_t* out);  // B G R 255
-void bgr_row(const std::uint8_t* rgb, int width, std::uint8_t* out);   // B G R
+/// Writes the luma of a row of interleaved 8-bit codes R G B.
 void luma_row(const YuvMatrix& matrix, const std::uint8_t* rgb, int width, std::uint8_t* out);
 /// Writes Cb Cr of the mean of 2x2 pixels, ceil(width / 2) pairs: sited in the middle, as in JPEG. A last odd column
 /// counts twice.

@@ -239,6 +239,39 @@ TEST(RawToRgb, HandsOutTheRowsOfRgb8InOrderFromAnEvenOne) {
   }
 }
 
+TEST(RawToRgb, WritesTheCodesOfRgb8InOtherOrdersAndNothingElse) {
+  constexpr std::uint8_t guard = 0xA5;
+  constexpr int padding = 5;  // bytes between rows
+  for (const int w : {1, 2, 3, 15, 16, 17, 31, 32, 33, 63, 64, 65, 97, 1921}) {
+    constexpr int h = 3;
+    const auto dn = random_dn(w, h, 9);
+    const isp::DnMosaic in{dn.view(), BayerPhase::gbrg, uneven_levels()};
+    PoolExecutor pool(2);
+    isp::RawToRgb kernel(w, 2);
+    Encoded8 expected{Plane<std::uint8_t>(3 * w, h)};
+    kernel.rgb8(in, typical_transform(), tone(), expected.codes.view(), pool);
+    for (const int pixel_bytes : {3, 4}) {
+      for (const bool is_bgr : {false, true}) {
+        const std::ptrdiff_t stride = static_cast<std::ptrdiff_t>(pixel_bytes) * w + padding;
+        std::vector<std::uint8_t> out(static_cast<std::size_t>(stride * h), guard);
+        kernel.pixels8(in, typical_transform(), tone(), {out.data(), w, h, stride, pixel_bytes, is_bgr}, pool);
+        for (int y = 0; y < h; ++y) {
+          const std::uint8_t* const row = out.data() + stride * y;
+          for (int x = 0; x < w; ++x) {
+            for (int c = 0; c < 3; ++c) {
+              ASSERT_EQ(row[pixel_bytes * x + (is_bgr ? 2 - c : c)], expected.codes.at(3 * x + c, y)) << w << " " << x;
+            }
+            if (pixel_bytes == 4) {
+              ASSERT_EQ(row[4 * x + 3], 255);
+            }
+          }
+          for (int i = 0; i < padding; ++i) ASSERT_EQ(row[pixel_bytes * w + i], guard) << w;
+        }
+      }
+    }
+  }
+}
+
 TEST(RawToRgb, KeepsConstantMosaicsConstant) {
   constexpr int w = 23, h = 9;
   for (const BayerPhase phase : all_phases) {

@@ -21,31 +21,6 @@ std::vector<std::uint8_t> random_row(int width, unsigned seed) {
 /// Widths below, at and above those of vectors, odd ones too.
 constexpr int widths[] = {1, 2, 3, 15, 16, 17, 31, 32, 33, 63, 64, 65, 97, 1921};
 
-TEST(PixelRows, ChannelsLieInTheNamedOrderAndNothingBeyondIsWritten) {
-  for (const int width : widths) {
-    const auto rgb = random_row(width, 1);
-    std::vector<std::uint8_t> rgbx(static_cast<std::size_t>(4 * width + 8), guard), bgrx = rgbx, bgr = rgbx;
-    rgbx_row(rgb.data(), width, rgbx.data());
-    bgrx_row(rgb.data(), width, bgrx.data());
-    bgr_row(rgb.data(), width, bgr.data());
-    for (int x = 0; x < width; ++x) {
-      for (int c = 0; c < 3; ++c) {
-        const std::uint8_t code = rgb[static_cast<std::size_t>(3 * x + c)];
-        ASSERT_EQ(rgbx[static_cast<std::size_t>(4 * x + c)], code) << width;
-        ASSERT_EQ(bgrx[static_cast<std::size_t>(4 * x + 2 - c)], code) << width;
-        ASSERT_EQ(bgr[static_cast<std::size_t>(3 * x + 2 - c)], code) << width;
-      }
-      ASSERT_EQ(rgbx[static_cast<std::size_t>(4 * x + 3)], 255);
-      ASSERT_EQ(bgrx[static_cast<std::size_t>(4 * x + 3)], 255);
-    }
-    for (std::size_t i = static_cast<std::size_t>(4 * width); i < rgbx.size(); ++i) {
-      ASSERT_EQ(rgbx[i], guard);
-      ASSERT_EQ(bgrx[i], guard);
-    }
-    for (std::size_t i = static_cast<std::size_t>(3 * width); i < bgr.size(); ++i) ASSERT_EQ(bgr[i], guard);
-  }
-}
-
 struct Standard {
   YuvStandard standard;
   double kr, kb;

@@ -49,6 +49,8 @@ class LivePipeline {
 
   /// Renders the image in display codes, active area, row by row.
   void render(const RowSink& sink) { pipeline_.render(frame_, decided(), sink); }
+  /// Renders the image in display codes of 8 bits, in the caller's order of bytes.
+  void render(const PixelView& out) { pipeline_.render(frame_, decided(), out); }
   /// Renders the image in display codes of 16 bits: height x 3 width.
   void render(PlaneView<std::uint16_t> rgb) { pipeline_.render(frame_, decided(), rgb); }
   /// Renders the mosaic of the active area without noise, in codes of 16 bits whose largest is 2^bits - 1 times 2^(16 -

@@ -172,6 +172,12 @@ void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, const RowS
   });
 }
 
+void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, const PixelView& out) {
+  render_whole(frame, plan, [&](const RgbInput& in, const RgbTransform& transform) {
+    image_.kernel(plan.width).pixels8(in, transform, plan.rendering.tone, out, executor_);
+  });
+}
+
 void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, PlaneView<std::uint16_t> out) {
   render_whole(frame, plan, [&](const RgbInput& in, const RgbTransform& transform) {
     image_.kernel(plan.width).rgb16(in, transform, plan.rendering.tone, out, executor_);

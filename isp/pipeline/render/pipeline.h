@@ -30,6 +30,8 @@ class Pipeline {
   /// Renders a frame to 8-bit codes, row by row; plan.display and plan.framing are ignored. This function and those
   /// that follow process frames of any size as a whole.
   void render(const RawFrame& frame, const DevelopPlan& plan, const RowSink& out);
+  /// Renders a frame to 8-bit codes in the caller's memory; plan.display and plan.framing are ignored.
+  void render(const RawFrame& frame, const DevelopPlan& plan, const PixelView& out);
   /// Renders a frame to 16-bit codes in the caller's memory, height x 3 width; plan.display and plan.framing are
   /// ignored.
   void render(const RawFrame& frame, const DevelopPlan& plan, PlaneView<std::uint16_t> out);

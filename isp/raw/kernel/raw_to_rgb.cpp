@@ -44,6 +44,13 @@ struct CodeRows {
   void finish(int /*y*/) const {}
 };
 
+struct PixelRows {
+  const ToneTable* tone;
+  const PixelView* out;
+  rows::Codes8 operator()(int y) const { return {tone, out->row(y), out->pixel_bytes, out->is_bgr}; }
+  void finish(int /*y*/) const {}
+};
+
 void change_row(const CodeChange& change, const std::uint16_t* rgb, int width, std::uint8_t* out) {
   change.to8(change.context, rgb, width, out);
 }
@@ -313,6 +320,17 @@ void RawToRgb::to_codes(const RgbInput& in, const RgbTransform& transform, const
 void RawToRgb::rgb8(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone,
                     PlaneView<std::uint8_t> out, Executor& executor, const CodeChange* change) {
   to_codes<rows::Codes8>(in, transform, tone, out, executor, change);
+}
+
+void RawToRgb::pixels8(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, const PixelView& out,
+                       Executor& executor) {
+  assert(reaches_one(tone));
+  convert(
+      in, transform,
+      [&](const BandScratch&) {
+        return PixelRows{&tone, &out};
+      },
+      executor);
 }
 
 void RawToRgb::rgb16(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone,

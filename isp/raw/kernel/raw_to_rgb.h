@@ -41,6 +41,18 @@ struct RowSink {
   void* context = nullptr;
 };
 
+/// Borrows an image of interleaved 8-bit codes in the caller's memory: pixels of 3 bytes, or of 4 with 255 in the last.
+struct PixelView {
+  std::uint8_t* data = nullptr;
+  int width = 0;
+  int height = 0;
+  std::ptrdiff_t stride_bytes = 0;
+  int pixel_bytes = 3;
+  bool is_bgr = false;  // B G R in place of R G B
+
+  std::uint8_t* row(int y) const { return data + stride_bytes * y; }
+};
+
 struct BandScratch;
 
 /// Converts a mosaic or camera RGB to an image in one pass over row bands: Malvar-He-Cutler demosaic (ICASSP 2004, the
@@ -59,6 +71,9 @@ class RawToRgb {
   /// @param change  applied to the codes, row by row; null: none
   void rgb8(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, PlaneView<std::uint8_t> out,
             Executor& executor, const CodeChange* change = nullptr);
+  /// Writes the codes of rgb8 in another order of bytes.
+  void pixels8(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, const PixelView& out,
+               Executor& executor);
   /// Makes 16-bit codes round(65535 tone), linear between the edges of a bin.
   void rgb16(const RgbInput& in, const RgbTransform& transform, const ToneTable& tone, PlaneView<std::uint16_t> out,
              Executor& executor, const CodeChange* change = nullptr);

@@ -120,8 +120,11 @@ struct ToCodes8 {
   static constexpr bool clamps = true;
   Tone tone;
   std::uint8_t* out;
+  int pixel_bytes;
+  bool is_bgr;
 
-  explicit HWY_INLINE ToCodes8(const Codes8& to) : tone(*to.tone), out(to.out) {}
+  explicit HWY_INLINE ToCodes8(const Codes8& to)
+      : tone(*to.tone), out(to.out), pixel_bytes(to.pixel_bytes), is_bgr(to.is_bgr) {}
 
   HWY_INLINE auto codes(VF even, VF odd) const {
     const hn::Rebind<std::uint16_t, Floats> u16;
@@ -131,13 +134,20 @@ struct ToCodes8 {
   }
   HWY_INLINE void write(const SitePair& v, int x, int left) const {
     const hn::Repartition<std::uint8_t, hn::Rebind<std::uint16_t, Floats>> u8;
-    HWY_ALIGN std::uint8_t last[3 * pixels_at_once()];
+    HWY_ALIGN std::uint8_t last[4 * pixels_at_once()];
     const auto r = codes(v.even.c[0], v.odd.c[0]);
     const auto g = codes(v.even.c[1], v.odd.c[1]);
     const auto b = codes(v.even.c[2], v.odd.c[2]);
-    std::uint8_t* to = out + 3 * static_cast<std::ptrdiff_t>(x);
-    hn::StoreInterleaved3(r, g, b, u8, left < pixels_at_once() ? last : to);
-    if (left < pixels_at_once()) std::memcpy(to, last, 3 * static_cast<std::size_t>(left));
+    const bool whole = left >= pixels_at_once();
+    std::uint8_t* const row = out + pixel_bytes * static_cast<std::ptrdiff_t>(x);
+    std::uint8_t* const to = whole ? row : last;
+    if (pixel_bytes == 4) {
+      const auto full = hn::Set(u8, 255);
+      is_bgr ? hn::StoreInterleaved4(b, g, r, full, u8, to) : hn::StoreInterleaved4(r, g, b, full, u8, to);
+    } else {
+      is_bgr ? hn::StoreInterleaved3(b, g, r, u8, to) : hn::StoreInterleaved3(r, g, b, u8, to);
+    }
+    if (!whole) std::memcpy(row, last, static_cast<std::size_t>(pixel_bytes) * static_cast<std::size_t>(left));
   }
 };
 

@@ -71,7 +71,9 @@ struct Colour {
 
 struct Codes8 {
   const ToneTable* tone;
-  std::uint8_t* out;  // 3 width interleaved
+  std::uint8_t* out;    // interleaved
+  int pixel_bytes = 3;  // 4: the last is 255
+  bool is_bgr = false;  // B G R in place of R G B
 };
 struct Codes16 {
   const ToneTable* tone;
