@@ -66,6 +66,23 @@ void count_masked(const RawDn& raw, int y, Tally& tally) {
 
 }  // namespace
 
+namespace {
+
+/// Adds the sums of the even and of the odd columns of rows of one parity to those of their sites.
+void add_sites(std::span<const std::uint32_t> columns, int parity, PerSite<std::uint64_t>& sum) {
+  std::uint64_t even = 0, odd = 0;
+  std::size_t x = 0;
+  for (; x + 1 < columns.size(); x += 2) {
+    even += columns[x];
+    odd += columns[x + 1];
+  }
+  if (x < columns.size()) even += columns[x];
+  sum[2 * parity] += even;
+  sum[2 * parity + 1] += odd;
+}
+
+}  // namespace
+
 // Counts the cells of rows y - 1 and y of the active area.
 void FrameMeter::count_cells(const RawDn& raw, int y, int thread) {
   std::vector<std::uint16_t>& bin = columns_[static_cast<std::size_t>(thread)].bin;
@@ -83,33 +100,35 @@ void FrameMeter::count_cells(const RawDn& raw, int y, int thread) {
 
 // Measures row y of the active area.
 void FrameMeter::measure_row(const RawDn& raw, int y, const MeterWants& wants, int thread) {
-  const std::uint16_t* const dn = raw.dn.row(raw.active.y + y) + raw.active.x;
   const int width = raw.active.width;
-  Columns& columns = columns_[static_cast<std::size_t>(thread)];
-  meter::add_row(dn, width, columns.sum[y & 1].data());
-  if (wants.noise) meter::add_squares(dn, width, columns.square[y & 1].data());
   if (wants.statistics) {
+    const std::uint16_t* const dn = raw.dn.row(raw.active.y + y) + raw.active.x;
     const auto found = meter::count_extremes(dn, width, static_cast<std::uint16_t>(raw.white_dn[1]));
     Tally& tally = tallies_[static_cast<std::size_t>(thread)];
     tally.clipped += found.clipped;
     tally.zero += found.zero;
     if ((y & 3) == 1) count_cells(raw, y, thread);
   }
-  if ((y + 1) % thumbnail_.block() == 0 || y + 1 == raw.active.height) fold(raw, y, wants, columns);
+  if ((y + 1) % thumbnail_.block() == 0 || y + 1 == raw.active.height) measure_block(raw, y, wants, thread);
 }
 
-// Closes the columns' sums at row y, where a block of rows is complete or the frame ends.
-void FrameMeter::fold(const RawDn& raw, int y, const MeterWants& wants, Columns& columns) {
-  const int block = thumbnail_.block();
+// Measures the block of rows that ends with row y, while its codes are in the cache.
+void FrameMeter::measure_block(const RawDn& raw, int y, const MeterWants& wants, int thread) {
+  const int block = thumbnail_.block(), block_row = y / block, first = block_row * block, rows = y - first + 1;
+  Columns& columns = columns_[static_cast<std::size_t>(thread)];
+  for (int parity = 0; parity < std::min(rows, 2); ++parity) {
+    const std::uint16_t* const dn = raw.dn.row(raw.active.y + first + parity) + raw.active.x;
+    const meter::CodeRows in{dn, 2 * raw.dn.view().stride, (rows + 1 - parity) / 2, raw.active.width};
+    std::uint32_t* const sum = columns.sum[parity].data();
+    wants.noise ? meter::sum_columns(in, sum, columns.square[parity].data()) : meter::sum_columns(in, sum);
+    if (wants.statistics) add_sites(columns.sum[parity], parity, tallies_[static_cast<std::size_t>(thread)].sum);
+  }
+  if (rows == 1) std::ranges::fill(columns.sum[1], 0U);
   const std::array<const std::uint32_t*, 2> sum{columns.sum[0].data(), columns.sum[1].data()};
   const std::array<const std::uint32_t*, 2> square{columns.square[0].data(), columns.square[1].data()};
-  thumbnail_.add_columns(sum, y / block, y % block + 1);
+  if (wants.light) thumbnail_.add_columns(sum, block_row, rows);
   const bool whole_tile = y / tiles_.tile() < raw.active.height / tiles_.tile();
   if (wants.noise && whole_tile) tiles_.add_columns(sum, square, y / tiles_.tile());
-  for (int parity = 0; parity < 2; ++parity) {
-    std::ranges::fill(columns.sum[parity], 0U);
-    if (wants.noise) std::ranges::fill(columns.square[parity], 0U);
-  }
 }
 
 void FrameMeter::read_rows(const Job& job, RowBand rows, int thread) {
@@ -127,7 +146,7 @@ void FrameMeter::read(std::span<const std::byte> bytes, std::size_t stride, RawD
                       const MeterWants& wants) {
   assert(bytes.size() >= stride * static_cast<std::size_t>(raw.dn.height() - 1) + row_bytes(format_, raw.dn.width()));
   wanted_ = wants;
-  thumbnail_.clear();
+  if (wants.light) thumbnail_.clear();
   if (wants.noise) tiles_.clear();
   const Job job{bytes, stride, raw, wants, std::min(executor.width(), static_cast<int>(tallies_.size()))};
   for_each_index(executor, job.bands, [&](int index) {
@@ -145,7 +164,7 @@ void FrameMeter::read(std::span<const std::byte> bytes, std::size_t stride, RawD
 void FrameMeter::add_up(const RawDn& raw, int threads, const MeterWants& wants) {
   masked_sum_ = masked_count_ = {};
   statistics_ = {};
-  const PerSite<std::uint64_t> sums = wants.statistics ? thumbnail_.sums() : PerSite<std::uint64_t>{};
+  PerSite<std::uint64_t> sums{};
   for (int i = 0; i < threads; ++i) {
     const Tally& tally = tallies_[static_cast<std::size_t>(i)];
     for (int site = 0; site < 4; ++site) {
@@ -153,6 +172,7 @@ void FrameMeter::add_up(const RawDn& raw, int threads, const MeterWants& wants) 
       masked_count_[site] += tally.masked_count[site];
     }
     if (!wants.statistics) continue;
+    for (int site = 0; site < 4; ++site) sums[site] += tally.sum[site];
     statistics_.clipped += tally.clipped;
     statistics_.zero += tally.zero;
     for (std::size_t k = 0; k < FrameStatistics::bins; ++k) statistics_.luma[k] += tally.luma[0][k] + tally.luma[1][k];

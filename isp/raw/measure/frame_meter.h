@@ -61,6 +61,7 @@ class FrameMeter {
   struct Tally {
     PerSite<std::uint64_t> masked_sum{};
     PerSite<std::uint64_t> masked_count{};
+    PerSite<std::uint64_t> sum{};  // of the codes
     std::uint64_t clipped = 0;
     std::uint64_t zero = 0;
     std::array<std::array<std::uint32_t, FrameStatistics::bins>, 2> luma{};  // histograms of even and of odd cells
@@ -75,7 +76,7 @@ class FrameMeter {
   void read_rows(const Job& job, RowBand rows, int thread);
   void measure_row(const RawDn& raw, int y, const MeterWants& wants, int thread);
   void count_cells(const RawDn& raw, int y, int thread);
-  void fold(const RawDn& raw, int y, const MeterWants& wants, Columns& columns);
+  void measure_block(const RawDn& raw, int y, const MeterWants& wants, int thread);
   void add_up(const RawDn& raw, int threads, const MeterWants& wants);
 
   RawFormat format_;

@@ -22,32 +22,49 @@ using Words = hn::ScalableTag<std::uint16_t>;
 
 constexpr int max_difference = 5792;
 
-void AddRow(const std::uint16_t* dn, int width, std::uint32_t* column) {
+/// Sums the columns of x on.
+template <bool kSquares>
+HWY_INLINE void sum_from(const CodeRows& in, int x, std::uint32_t* column, std::uint32_t* square) {
   const Sums s;
   const Codes c;
-  const int n = static_cast<int>(hn::Lanes(s));
-  int x = 0;
-  for (; x + n <= width; x += n) {
-    hn::StoreU(hn::Add(hn::LoadU(s, column + x), hn::PromoteTo(s, hn::LoadU(c, dn + x))), s, column + x);
+  const auto most = hn::Set(c, max_difference);
+  const std::uint16_t* dn = in.dn + x;
+  auto sum = hn::Zero(s), squares = hn::Zero(s);
+  for (int row = 0; row < in.rows; ++row, dn += in.stride) {
+    const auto a = hn::LoadU(c, dn);
+    sum = hn::Add(sum, hn::PromoteTo(s, a));
+    if constexpr (kSquares) {
+      const auto b = hn::LoadU(c, dn + 2);
+      const auto d = hn::PromoteTo(s, hn::Min(hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a)), most));
+      squares = hn::Add(squares, hn::Mul(d, d));
+    }
   }
-  for (; x < width; ++x) column[x] += dn[x];
+  hn::StoreU(sum, s, column + x);
+  if constexpr (kSquares) hn::StoreU(squares, s, square + x);
 }
 
-void AddSquares(const std::uint16_t* dn, int width, std::uint32_t* column) {
-  const Sums s;
-  const Codes c;
-  const int n = static_cast<int>(hn::Lanes(s));
-  const auto most = hn::Set(c, max_difference);
+template <bool kSquares>
+HWY_INLINE void sum_all(const CodeRows& in, std::uint32_t* column, std::uint32_t* square) {
+  const int n = static_cast<int>(hn::Lanes(Sums())), needed = kSquares ? n + 2 : n;
   int x = 0;
-  for (; x + n + 2 <= width; x += n) {
-    const auto a = hn::LoadU(c, dn + x), b = hn::LoadU(c, dn + x + 2);
-    const auto d = hn::PromoteTo(s, hn::Min(hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a)), most));
-    hn::StoreU(hn::Add(hn::LoadU(s, column + x), hn::Mul(d, d)), s, column + x);
+  for (; x + needed <= in.width; x += n) sum_from<kSquares>(in, x, column, square);
+  for (; x < in.width; ++x) {
+    std::uint32_t sum = 0, squares = 0;
+    for (int row = 0; row < in.rows; ++row) {
+      const std::uint16_t* const dn = in.dn + in.stride * row + x;
+      sum += dn[0];
+      if (!kSquares || x + 2 >= in.width) continue;
+      const int d = std::min(std::abs(dn[0] - dn[2]), max_difference);
+      squares += static_cast<std::uint32_t>(d * d);
+    }
+    column[x] = sum;
+    if (kSquares && x + 2 < in.width) square[x] = squares;
   }
-  for (; x + 2 < width; ++x) {
-    const int d = std::min(std::abs(dn[x] - dn[x + 2]), max_difference);
-    column[x] += static_cast<std::uint32_t>(d * d);
-  }
+}
+
+void SumColumns(const CodeRows& in, std::uint32_t* column) { sum_all<false>(in, column, nullptr); }
+void SumColumnsAndSquares(const CodeRows& in, std::uint32_t* column, std::uint32_t* square) {
+  sum_all<true>(in, column, square);
 }
 
 Extremes CountExtremes(const std::uint16_t* dn, int width, std::uint16_t white) {
@@ -102,16 +119,14 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace lowlux::isp::meter {
-HWY_EXPORT(AddRow);
-HWY_EXPORT(AddSquares);
+HWY_EXPORT(SumColumns);
+HWY_EXPORT(SumColumnsAndSquares);
 HWY_EXPORT(CountExtremes);
 HWY_EXPORT(LumaOfCells);
 
-void add_row(const std::uint16_t* dn, int width, std::uint32_t* column) {
-  HWY_DYNAMIC_DISPATCH(AddRow)(dn, width, column);
-}
-void add_squares(const std::uint16_t* dn, int width, std::uint32_t* column) {
-  HWY_DYNAMIC_DISPATCH(AddSquares)(dn, width, column);
+void sum_columns(const CodeRows& in, std::uint32_t* column) { HWY_DYNAMIC_DISPATCH(SumColumns)(in, column); }
+void sum_columns(const CodeRows& in, std::uint32_t* column, std::uint32_t* square) {
+  HWY_DYNAMIC_DISPATCH(SumColumnsAndSquares)(in, column, square);
 }
 Extremes count_extremes(const std::uint16_t* dn, int width, std::uint16_t white) {
   return HWY_DYNAMIC_DISPATCH(CountExtremes)(dn, width, white);

@@ -1,16 +1,25 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 /// The row kernels of FrameMeter are dispatched at run time; they read and write only `width` samples.
 namespace lowlux::isp::meter {
 
-/// Computes column[x] += dn[x].
-void add_row(const std::uint16_t* dn, int width, std::uint32_t* column);
+/// Borrows rows of codes, `stride` codes apart; at most 128, so that no sum below can overflow.
+struct CodeRows {
+  const std::uint16_t* dn;
+  std::ptrdiff_t stride;
+  int rows;
+  int width;
+};
 
-/// Computes column[x] += min(|dn[x] - dn[x + 2]|, 5792)^2 for x < width - 2: 128 rows cannot overflow it.
-void add_squares(const std::uint16_t* dn, int width, std::uint32_t* column);
+/// Computes column[x] = sum of dn[x] over the rows.
+void sum_columns(const CodeRows& in, std::uint32_t* column);
+
+/// Computes the same, and square[x] = sum of min(|dn[x] - dn[x + 2]|, 5792)^2 for x < width - 2.
+void sum_columns(const CodeRows& in, std::uint32_t* column, std::uint32_t* square);
 
 struct Extremes {
   std::uint32_t clipped = 0;  // number of codes of white or more
