@@ -44,22 +44,27 @@ struct ColourVectors {
     return {{output(0), output(1), output(2)}};
   }
 
-  /// Returns Y + t (v - Y) with t = min(Y / (Y - min(v, 0)), (1 - Y) / (max(v, 1) - Y)), as one division. t is taken
-  /// 2^-22 short, so that no rounding can leave 0..1; colours inside keep every bit, as 0 + 1 (v - 0).
-  HWY_INLINE Site moved(const Site& v, VF least, VF greatest) const {
+  /// Returns Y + t (v - Y) with t = min(Y / (Y - min(v, 0)), (1 - Y) / (max(v, 1) - Y)), as one division; the second
+  /// only where a channel of v reaches 1, which none of the vector does without kAbove. t is taken 2^-22 short, so that
+  /// no rounding can leave 0..1; colours inside keep every bit, as 0 + 1 (v - 0).
+  template <bool kAbove>
+  HWY_INLINE Site moved(const Site& v, VF least, [[maybe_unused]] VF greatest) const {
     const VF zero = constant(0), one = constant(1);
     const VF weighted =
         hn::MulAdd(luminance[2], v.c[2], hn::MulAdd(luminance[1], v.c[1], hn::Mul(luminance[0], v.c[0])));
     const VF y = hn::Min(hn::Max(weighted, zero), one);
-    const VF rest = hn::Sub(one, y);
     // The ends lie 1e-30 and one rounding step outside 0..1, so that no distance is 0, and t is 0 where Y is at one.
-    const VF below = hn::Sub(y, hn::Min(least, constant(-1e-30f)));
-    const VF above = hn::Sub(hn::Max(greatest, constant(1 + 0x1p-23f)), y);
-    const auto low_end_first = hn::Lt(hn::Mul(y, above), hn::Mul(rest, below));
-    const VF part = hn::Mul(hn::IfThenElse(low_end_first, y, rest), constant(1 - 0x1p-22f));
-    const VF whole = hn::IfThenElse(low_end_first, below, above);
-    const auto outside = hn::Or(hn::Lt(least, zero), hn::Gt(greatest, one));
-    const VF t = hn::IfThenElse(outside, hn::Div(part, whole), one);
+    VF part = y, whole = hn::Sub(y, hn::Min(least, constant(-1e-30f)));
+    auto outside = hn::Lt(least, zero);
+    if constexpr (kAbove) {
+      const VF rest = hn::Sub(one, y);
+      const VF above = hn::Sub(hn::Max(greatest, constant(1 + 0x1p-23f)), y);
+      const auto high_end_first = hn::And(hn::Ge(greatest, one), hn::Ge(hn::Mul(y, above), hn::Mul(rest, whole)));
+      part = hn::IfThenElse(high_end_first, rest, part);
+      whole = hn::IfThenElse(high_end_first, above, whole);
+      outside = hn::Or(outside, hn::Gt(greatest, one));
+    }
+    const VF t = hn::IfThenElse(outside, hn::Div(hn::Mul(part, constant(1 - 0x1p-22f)), whole), one);
     const VF from = hn::IfThenElseZero(outside, y);
     return {{hn::MulAdd(t, hn::Sub(v.c[0], from), from), hn::MulAdd(t, hn::Sub(v.c[1], from), from),
              hn::MulAdd(t, hn::Sub(v.c[2], from), from)}};
@@ -69,12 +74,14 @@ struct ColourVectors {
     const auto least = [](const Site& s) HWY_ATTR { return hn::Min(hn::Min(s.c[0], s.c[1]), s.c[2]); };
     const auto greatest = [](const Site& s) HWY_ATTR { return hn::Max(hn::Max(s.c[0], s.c[1]), s.c[2]); };
     const VF min_even = least(v.even), min_odd = least(v.odd);
-    const VF greatest_even = greatest(v.even), greatest_odd = greatest(v.odd);
-    const auto outside = hn::Or(hn::Lt(hn::Min(min_even, min_odd), constant(0)),
-                                hn::Gt(hn::Max(greatest_even, greatest_odd), constant(1)));
-    if (HWY_LIKELY(hn::AllFalse(Floats(), outside))) return;
-    v.even = moved(v.even, min_even, greatest_even);
-    v.odd = moved(v.odd, min_odd, greatest_odd);
+    const VF max_even = greatest(v.even), max_odd = greatest(v.odd);
+    if (!hn::AllFalse(Floats(), hn::Ge(hn::Max(max_even, max_odd), constant(1)))) {
+      v.even = moved<true>(v.even, min_even, max_even);
+      v.odd = moved<true>(v.odd, min_odd, max_odd);
+    } else if (!hn::AllFalse(Floats(), hn::Lt(hn::Min(min_even, min_odd), constant(0)))) {
+      v.even = moved<false>(v.even, min_even, max_even);
+      v.odd = moved<false>(v.odd, min_odd, max_odd);
+    }
   }
 };
 
