@@ -40,15 +40,15 @@ enum {
   LOWLUX_STAGE_OK = 0,
   LOWLUX_STAGE_ADJUSTED = 1,      /* configured, but not as requested: read the formats again */
   LOWLUX_STAGE_BAD_ARGUMENT = -1, /* a null pointer, an invalid struct size, a value out of range */
-  LOWLUX_STAGE_UNSUPPORTED = -2,  /* the format, or this output for this input */
-  LOWLUX_STAGE_TOO_LARGE = -3,    /* more memory than the limit */
+  LOWLUX_STAGE_UNSUPPORTED = -2,  /* the format is not supported, or not this output for this input */
+  LOWLUX_STAGE_TOO_LARGE = -3,    /* the stage would need more memory than the limit */
   LOWLUX_STAGE_NO_MEMORY = -4,
   LOWLUX_STAGE_NOT_CONFIGURED = -5,
   LOWLUX_STAGE_SHORT_BUFFER = -6, /* a plane ends before the image does */
   LOWLUX_STAGE_BAD_STRIDE = -7,   /* rows would overlap */
   LOWLUX_STAGE_MISSING_PLANE = -8,
-  LOWLUX_STAGE_BAD_PARAMETER = -9,  /* not a number, or implausible */
-  LOWLUX_STAGE_BAD_PROFILE = -10,   /* cannot be read, or does not apply to these frames */
+  LOWLUX_STAGE_BAD_PARAMETER = -9,  /* a value is not a number, or out of range */
+  LOWLUX_STAGE_BAD_PROFILE = -10,   /* the profile cannot be read, or does not apply to these frames */
   LOWLUX_STAGE_UNKNOWN_LIGHT = -11, /* the look of the eye needs the luminance of the scene */
   LOWLUX_STAGE_INTERNAL = -12
 };
@@ -80,9 +80,9 @@ typedef struct {
   size_t size;
   int32_t api; /* LOWLUX_STAGE_DRM or LOWLUX_STAGE_V4L2 */
   uint32_t fourcc;
-  uint64_t modifier; /* of DRM codes; else 0 */
-  int32_t width;     /* of full frames, 2..65536 */
-  int32_t height;
+  uint64_t modifier;        /* modifier of a DRM code; 0 for V4L2 */
+  int32_t width;            /* width of full frames, 2..65536 */
+  int32_t height;           /* height of full frames, 2..65536 */
   size_t stride;            /* smallest number of bytes from one row to the next; each frame states its own */
   lowlux_stage_rect crop;   /* region that becomes the image; all 0: the full frame */
   lowlux_stage_rect masked; /* light-shielded pixels; all 0: none */
@@ -97,7 +97,7 @@ typedef struct {
   int32_t height;
   int32_t planes;                         /* set by lowlux_stage_configure */
   size_t stride[LOWLUX_STAGE_MAX_PLANES]; /* in bytes: minimum, or as requested */
-  size_t bytes[LOWLUX_STAGE_MAX_PLANES];  /* size of a plane of that stride */
+  size_t bytes[LOWLUX_STAGE_MAX_PLANES];  /* size of each plane at that stride */
   int32_t yuv_matrix; /* for NV12: 601 or 709; 0: 709 from 720 rows on, 601 below. Video range, central chroma */
 } lowlux_stage_output;
 
@@ -109,8 +109,8 @@ typedef struct {
   int32_t mosaic; /* 0 RGGB, 1 GRBG, 2 GBRG, 3 BGGR, -1 monochrome */
   int32_t group_pixels;
   int32_t group_bytes;
-  int32_t alignment; /* required alignment of the buffer: 1, none */
-  int32_t margin;    /* pixels lost at each edge: 0, none */
+  int32_t alignment; /* required alignment of the buffer in bytes: 1 */
+  int32_t margin;    /* pixels lost at each edge: 0 */
   int32_t outputs;   /* number of entries used in output */
   uint32_t output[8];
 } lowlux_stage_format_info;
@@ -130,8 +130,8 @@ enum {
   LOWLUX_STAGE_LEVEL_HIGH = 3
 };
 
-/* Methods by which missing colours are interpolated, at most; frames of which better is not known or not possible get
- * less: isp/adapter/README.md. */
+/* The most expensive method by which missing colours may be interpolated. Frames for which it is not possible, or not
+ * known to be better, use a cheaper one: isp/adapter/README.md. */
 enum {
   LOWLUX_STAGE_DEMOSAIC_DEFAULT = 0, /* ENCODED_MALVAR */
   LOWLUX_STAGE_DEMOSAIC_MALVAR = 1,
@@ -145,16 +145,16 @@ typedef struct {
   size_t size;
   int32_t threads;          /* 1..8, including the caller's; 0: 2 */
   uint64_t memory_limit;    /* bytes; 0: 1 GiB */
-  const char* profile_file; /* of `lowlux calibrate`, JSON; its hot pixels are positions in full frames; null: none */
-  int32_t most_denoise;     /* LOWLUX_STAGE_LEVEL_... that memory is allocated for; 0, as for every level: none */
-  int32_t temporal;         /* 1: previous frames contribute, displaced where the scene moves */
+  const char* profile_file; /* JSON of `lowlux calibrate`; its hot pixels are positions in full frames; null: none */
+  int32_t most_denoise;     /* highest LOWLUX_STAGE_LEVEL_... that memory is allocated for; 0: no level */
+  int32_t temporal;         /* 1: average with previous frames, motion compensated; 0: do not */
   int32_t look;             /* LOWLUX_STAGE_LOOK_... */
   int32_t tone;             /* 1: the standard curve; 0: none, linear light in sRGB's encoding */
-  double field_of_view_deg; /* of the image's longer side; 0: 50 */
+  double field_of_view_deg; /* field of view of the image's longer side; 0: 50 */
   int32_t demosaic;         /* LOWLUX_STAGE_DEMOSAIC_... */
 } lowlux_stage_settings;
 
-/* Validity of the members of lowlux_stage_params, and which of them took effect. */
+/* Bits for the members of lowlux_stage_params: which of them are valid, and which took effect. */
 enum {
   LOWLUX_STAGE_HAS_BLACK = 1 << 0,
   LOWLUX_STAGE_HAS_EXPOSURE = 1 << 1,
@@ -180,42 +180,42 @@ enum {
   LOWLUX_STAGE_HAS_ALL = (1 << 21) - 1
 };
 
-/* Known figures of one frame: of the exposed frame, not of the one before. A figure that is not valid is taken from the
- * profile, else from the frame itself, else it is left out. */
+/* What is known of one frame, as it was exposed; not values of the frame before it. A value that is not valid is taken
+ * from the profile, else measured on the frame, else left out. */
 typedef struct {
   size_t size;
   uint32_t valid;         /* LOWLUX_STAGE_HAS_... */
-  float black_level[4];   /* R, Gr, Gb, B, in codes of the input; libcamera's 16-bit figure is v 2^bits / 65536 */
+  float black_level[4];   /* R, Gr, Gb, B, in codes of the input; a 16-bit value v of libcamera is v 2^bits / 65536 */
   double exposure_s;      /* 1e-7..1e5 */
   float analogue_gain;    /* 0.1..1e4; 1 is ISO 100 of the profile */
   float digital_gain;     /* already applied to the codes, 0.1..1e3; noise scales with it */
   float colour_gains[2];  /* R and B, relative to G = 1; 1e-3..1e3 */
   float colour_matrix[9]; /* rows; white-balanced camera RGB to linear sRGB; each within 1e3 */
-  float lux;              /* of the scene: for its luminance, if there is no better source */
-  float temperature_c;    /* of the sensor, -100..200 */
+  float lux;              /* illuminance of the scene; gives its luminance if there is no better source */
+  float temperature_c;    /* temperature of the sensor, -100..200 */
   int32_t denoise;        /* LOWLUX_STAGE_DENOISE_...; libcamera's ZSL (4) counts as MINIMAL */
   uint32_t sequence;      /* a gap or a step back discards the previous frames */
-  uint64_t timestamp_ns;  /* so does a step back, or one above both two seconds and three exposures */
+  uint64_t timestamp_ns;  /* a step back, or one above both 2 s and three exposures, discards the previous frames */
   float gamma;            /* accepted, without effect: the stage has its own curve */
   float contrast;         /* accepted, without effect */
   float saturation;       /* 0..4 */
   float sharpness;        /* accepted, without effect */
-  float exposure_ev;      /* gain 2^EV of the image, -10..20; absent: automatic */
+  float exposure_ev;      /* gain 2^EV of the image, -10..20; if not valid: automatic */
   float noise_gain;       /* DN per electron, at this frame's gain; requires noise_read */
   float noise_read;       /* standard deviation of a pixel without light [DN] */
   float f_number;
-  double scene_luminance_cd_m2; /* mean over the image */
+  double scene_luminance_cd_m2; /* mean luminance over the image */
   float budget_ms;              /* time limit for this frame, 0.01..1e6; steps that do not fit are left out */
   float max_exposure_s;         /* limits of the exposure that the result advises, 1e-7..1e5: motion blur, frame rate */
   float min_exposure_s;         /* 0..max_exposure_s */
   float max_gain;               /* 1..1e4; 0: no limit */
-  float clipped_fraction;       /* of the pixels, which the highlight may clip, 1e-9..0.5; 0: 0.001 */
-  int32_t mains_hz; /* lamps whose flicker exposures average out: 50, 60, LOWLUX_STAGE_MAINS_EITHER; 0: none */
+  float clipped_fraction;       /* fraction of the pixels that may clip, 1e-9..0.5; 0: 0.001 */
+  int32_t mains_hz; /* mains whose flicker exposures average out: 50, 60, LOWLUX_STAGE_MAINS_EITHER; 0: none */
 } lowlux_stage_params;
 
 enum { LOWLUX_STAGE_MAINS_EITHER = -1 };
 
-/* Limits of the advised exposure. */
+/* What limits the advised exposure. */
 enum {
   LOWLUX_STAGE_LIMIT_NONE = 0,
   LOWLUX_STAGE_LIMIT_TIME = 1,     /* max_exposure_s */
@@ -228,13 +228,13 @@ enum {
  * frame's work without a budget are skipped. Times are those of previous frames: the first frame after
  * lowlux_stage_configure, for which none are known, is processed at the last step. A better step is chosen when it is
  * expected to leave a tenth of its time spare, and abandoned for one that fits when frames take longer. A step that did
- * not fit is tried again from time to time, the sooner the closer it was: isp/adapter/README.md. lowlux_stage_reset
+ * not fit is tried again from time to time, sooner if it nearly fitted: isp/adapter/README.md. lowlux_stage_reset
  * keeps the measured times. */
 enum {
   LOWLUX_STAGE_STEP_ALL = 0,           /* everything requested */
   LOWLUX_STAGE_STEP_STANDARD = 1,      /* the level standard in place of high */
   LOWLUX_STAGE_STEP_DRAFT = 2,         /* the level draft in place of a higher one; demosaicing by linear filters */
-  LOWLUX_STAGE_STEP_FRAMES_BEFORE = 3, /* no level; previous frames, if the settings enable them */
+  LOWLUX_STAGE_STEP_FRAMES_BEFORE = 3, /* no level; previous frames only, if the settings enable them */
   LOWLUX_STAGE_STEP_PLAIN = 4          /* straight from codes, without noise reduction */
 };
 
@@ -242,7 +242,7 @@ typedef struct {
   const void* data;
   size_t length; /* bytes available */
   size_t stride;
-  int fd; /* a dma-buf, whose access is then bracketed by DMA_BUF_IOCTL_SYNC; else -1 */
+  int fd; /* a dma-buf, whose accesses are bracketed by DMA_BUF_IOCTL_SYNC; -1: none */
 } lowlux_stage_source;
 
 typedef struct {
@@ -268,18 +268,18 @@ enum {
 /* Reports the processing of the frame. */
 typedef struct {
   size_t size;
-  uint32_t applied;   /* LOWLUX_STAGE_HAS_... that took effect, as far as look and output use them */
-  int32_t black_from; /* LOWLUX_STAGE_FROM_... */
-  int32_t noise_from;
-  int32_t white_from;
+  uint32_t applied;     /* LOWLUX_STAGE_HAS_... that took effect, as far as look and output use them */
+  int32_t black_from;   /* source of the black level, LOWLUX_STAGE_FROM_... */
+  int32_t noise_from;   /* source of the noise model */
+  int32_t white_from;   /* source of the white balance */
   float black_level[4]; /* R, Gr, Gb, B that was subtracted, including dark charge */
   float noise_gain;     /* DN per electron; 0: not known */
-  float noise_read;     /* DN */
+  float noise_read;     /* standard deviation of a pixel without light [DN] */
   float colour_gains[2];
   float exposure_ev;
   int32_t level;               /* LOWLUX_STAGE_LEVEL_... of noise reduction */
   int32_t temporal;            /* 1: previous frames contributed */
-  float moved;                 /* fraction of the image without previous frames: motion that was not found again */
+  float moved;                 /* fraction of the image without previous frames, because its motion was not found */
   float scene_luminance_cd_m2; /* 0: not known */
   float adaptation;            /* m of CIE 191, 0 scotopic to 1 photopic; 1 without the look of the eye */
   int32_t step;                /* LOWLUX_STAGE_STEP_...; without a budget 0 */
@@ -287,10 +287,10 @@ typedef struct {
   float took_ms;               /* time of the frame, from the first read of its rows to the last row of its image */
   /* Exposure advised for the next frames, with the best predicted signal-to-noise ratio under the limits of the
    * parameters; all 0 where limits, exposure time or analogue gain are not valid. A caller that sets it, and states
-   * what each frame really had, has automatic exposure: the advice stays the same while the light does. */
+   * what each frame really had, has automatic exposure: the advice does not change while the light does not. */
   float advised_exposure_s;
-  float advised_gain;    /* analogue, times digital where that is stated */
-  float advised_snr_db;  /* of the mid tone, 10 log10 of the ratio of powers */
+  float advised_gain;    /* analogue gain, times the digital gain if that is valid */
+  float advised_snr_db;  /* predicted for the mid tone, 10 log10 of the ratio of powers */
   int32_t advised_limit; /* LOWLUX_STAGE_LIMIT_... */
 } lowlux_stage_result;
 
@@ -304,10 +304,10 @@ typedef struct {
   uint32_t luma[1024];           /* histogram of 2x2 cells in every second row of cells, by
                                     (77 R + 75 Gr + 75 Gb + 29 B) / 256, even bins over all codes */
   uint32_t luma64[64];           /* luma in 64 bins, as in libcamera's SwIspStats */
-  float measured_black[4];       /* R, Gr, Gb, B: of masked pixels, else of the darkest hundredth of the image */
-  int32_t measured_black_masked; /* 1: of masked pixels */
-  float measured_noise_gain;     /* DN per electron, from the frame alone; 0: not measurable */
-  float measured_noise_read;     /* DN */
+  float measured_black[4];       /* R, Gr, Gb, B: on masked pixels, else on the darkest hundredth of the image */
+  int32_t measured_black_masked; /* 1: measured on masked pixels */
+  float measured_noise_gain;     /* DN per electron, measured on this frame; 0: not measurable */
+  float measured_noise_read;     /* standard deviation of a pixel without light [DN]; 0: not measurable */
 } lowlux_stage_statistics;
 
 LOWLUX_STAGE_EXPORT uint32_t lowlux_stage_version(void);
@@ -331,7 +331,7 @@ LOWLUX_STAGE_EXPORT int lowlux_stage_process(lowlux_stage* stage, const lowlux_s
                                              const lowlux_stage_picture* out, const lowlux_stage_params* params,
                                              lowlux_stage_result* result, lowlux_stage_statistics* statistics);
 
-/* Discards the previous frames: for the start of a stream or a change of mode. */
+/* Discards the previous frames. Call it at the start of a stream or a change of mode. */
 LOWLUX_STAGE_EXPORT int lowlux_stage_reset(lowlux_stage* stage);
 
 /* Ends threads and frees memory; null is allowed. */

@@ -22,7 +22,7 @@ enum class StageWork : std::uint8_t {
 ///
 /// The time of each kind of work is a mean that moves three quarters of the way up to a frame that took longer and a
 /// tenth of the way down to one that took less. The time of work that was never done is predicted in proportion to work
-/// that was (README.md, "A time for each frame"). The estimate for work more expensive than the current work decays:
+/// that was (README.md, "Time limit of a frame"). The estimate for work more expensive than the current work decays:
 /// its time moves to half of that prediction, a hundredth of the way with each frame. So it is tried again after 25
 /// frames where it takes 1.02 times the budget, after 79 at 1.25 times, 155 at 1.5 times, and never from 1.82 times on.
 /// A trial that does not last 100 frames doubles these, up to eightfold.
