@@ -23,15 +23,13 @@ std::string text_of(const std::optional<double>& value) { return value ? fmt::fo
 Result<FrameSetting> setting_of(const RawDn& raw) {
   if (raw.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported,
-                raw.from_x_trans
-                    ? "X-Trans has dark and bias frames (--dark-frame, --bias-frame) only: flats, profiles and "
-                      "calibration go by the 2 x 2 sites of a Bayer mosaic"
-                    : "the frame is already demosaiced; calibration needs the mosaic as the sensor gave it");
+                raw.from_x_trans ? "X-Trans supports dark and bias frames (--dark-frame, --bias-frame) only: flats, "
+                                   "profiles and calibration need the 2 x 2 sites of a Bayer mosaic"
+                                 : "the frame is already demosaiced; calibration needs the mosaic of the sensor");
   }
   if (raw.is_float()) {
     return fail(ErrorCode::unsupported,
-                "the frame has floating-point samples, which are computed; darks, flats and calibration need the codes "
-                "of the sensor");
+                "the frame has floating-point samples; darks, flats and calibration need integer codes of the sensor");
   }
   const Rect& a = raw.active;
   if (a.width < smallest_side || a.height < smallest_side) {

@@ -53,9 +53,10 @@ Result<double> excluded_fraction(const PixelMask& mask) {
   const auto excluded = std::count(mask.data(), mask.data() + mask.size(), std::uint8_t{1});
   const double share = static_cast<double>(excluded) / static_cast<double>(mask.size());
   if (share <= max_excluded) return share;
-  return fail(ErrorCode::insufficient,
-              fmt::format("{:.2g} % of the pixels lie far from the others, at most {:g} % may; are these dark frames?",
-                          100 * share, 100 * max_excluded));
+  return fail(
+      ErrorCode::insufficient,
+      fmt::format("{:.2g} % of the pixels are far from the others, at most {:g} % are allowed; are these dark frames?",
+                  100 * share, 100 * max_excluded));
 }
 
 double dark_charge_dn(const DarkFit& s, const std::vector<PerSite<Estimate>>& parameters, std::size_t g, int site) {
@@ -72,11 +73,12 @@ Result<void> check_linear(const DarkFit& s, const std::vector<PerSite<Estimate>>
     const Estimate& off = p.residual_dn;
     if (std::fabs(off.value) <= certain * off.standard_error) continue;
     if (std::fabs(off.value) <= min_misfit * most[p.site]) continue;
-    return fail(ErrorCode::malformed,
-                fmt::format("the darks are not linear in time: at {:g} s the mean is off by {:.3g} +- {:.2g} DN of "
-                            "{:.3g} DN; light gets in, or the temperature changes; cover the camera and let it settle",
-                            *s.groups[p.group].setting.exposure_s, off.value, off.standard_error,
-                            dark_charge_dn(s, parameters, p.group, p.site)));
+    return fail(
+        ErrorCode::malformed,
+        fmt::format("the darks are not linear in time: at {:g} s the mean is off by {:.3g} +- {:.2g} DN of {:.3g} DN; "
+                    "light reaches the sensor, or the temperature changes; cover the camera and let it settle",
+                    *s.groups[p.group].setting.exposure_s, off.value, off.standard_error,
+                    dark_charge_dn(s, parameters, p.group, p.site)));
   }
   return {};
 }
@@ -99,11 +101,10 @@ Result<void> check_even(const DarkFit& s) {
       const ImageFigures f = figures_of({s.groups, s.estimators[site][p]}, s.mask, site);
       for (const auto& [change, error] : {std::pair(f.change_x, f.error_x), std::pair(f.change_y, f.error_y)}) {
         if (std::fabs(change) <= certain * error || std::fabs(change) <= min_gradient * std::fabs(f.mean)) continue;
-        return fail(
-            ErrorCode::malformed,
-            fmt::format("the dark charge changes by {:.3g} DN/s across the frame, its mean is {:.3g} DN/s; light "
-                        "gets in, or the sensor glows; cover camera and viewfinder",
-                        std::fabs(change), f.mean));
+        return fail(ErrorCode::malformed,
+                    fmt::format("the dark charge changes by {:.3g} DN/s across the frame, its mean is {:.3g} DN/s; "
+                                "light reaches the sensor, or the sensor glows; cover camera and viewfinder",
+                                std::fabs(change), f.mean));
       }
     }
   }

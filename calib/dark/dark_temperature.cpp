@@ -145,7 +145,7 @@ Points points_of(std::span<const DarkGroup> groups, const PixelMask& mask) {
 
 tl::unexpected<Error> too_little(const std::string& found) {
   return fail(ErrorCode::insufficient,
-              "the darks do not give the system gain (" + found +
+              "the darks do not determine the system gain (" + found +
                   "): give it with --system-gain, or --add-to a profile made by `calibrate noise`; or take darks long "
                   "enough to collect a few times the read noise squared in electrons");
 }
@@ -159,9 +159,9 @@ Result<Estimate> gain_of_darks(std::span<const DarkGroup> groups) {
   }
   const DarkFit fit = begin_fit(groups, {1, 0});
   const Points points = points_of(groups, fit.mask);
-  if (points.variance.empty()) return too_little("frames of a setting are equal; was one file given twice?");
+  if (points.variance.empty()) return too_little("frames of one setting are equal; was one file given twice?");
   const auto estimators = linear_estimators(points.design, points.weights);
-  if (!estimators) return too_little("all means are alike");
+  if (!estimators) return too_little("all means are similar");
   std::vector<double> parameters(5);
   for (std::size_t p = 0; p < parameters.size(); ++p) {
     for (std::size_t i = 0; i < points.variance.size(); ++i) parameters[p] += (*estimators)[p][i] * points.variance[i];
@@ -176,7 +176,7 @@ Result<Estimate> gain_of_darks(std::span<const DarkGroup> groups) {
   const double freedom = std::max(1.0, static_cast<double>(points.variance.size()) - 5);
   const Estimate gain{parameters[0], std::sqrt(error2 * std::max(1.0, chi_square / freedom))};
   if (gain.value > 0 && gain.standard_error <= largest_error * gain.value) return gain;
-  return too_little(fmt::format("it comes out as {:.3g} +- {:.2g} DN/e-", gain.value, gain.standard_error));
+  return too_little(fmt::format("the estimate is {:.3g} +- {:.2g} DN/e-", gain.value, gain.standard_error));
 }
 
 }  // namespace lowlux::calib

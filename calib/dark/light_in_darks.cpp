@@ -82,11 +82,11 @@ Result<void> check_even_dark(const DarkGroup& group, const PerSite<DarkSite>& si
     const double floor = std::max(std::sqrt(sites[site].noise_dn2), min_gradient * charge);
     for (const auto& [change, error] : {std::pair(f.change_x, f.error_x), std::pair(f.change_y, f.error_y)}) {
       if (std::fabs(change) <= std::max(certain * error, floor)) continue;
-      return fail(ErrorCode::malformed,
-                  fmt::format("the darks of {:g} s change by {:.3g} DN across the frame, at most {:.3g} DN are dark "
-                              "current's; light gets in, or the sensor glows; cover camera and viewfinder and take "
-                              "them again",
-                              *group.setting.exposure_s, std::fabs(change), floor));
+      return fail(
+          ErrorCode::malformed,
+          fmt::format("the darks of {:g} s change by {:.3g} DN across the frame, at most {:.3g} DN by dark current; "
+                      "light reaches the sensor, or the sensor glows; cover camera and viewfinder and take them again",
+                      *group.setting.exposure_s, std::fabs(change), floor));
     }
   }
   return {};
@@ -99,17 +99,16 @@ Result<std::optional<std::string>> check_masked_level(const RawDn& picture, cons
     const double distance = dark.mean_dn[site] - masked_dn[site];
     const double range = *std::ranges::min_element(picture.white_dn) - masked_dn[site];
     if (std::fabs(distance) > std::max(far_off * dark.noise_std_dn[site], far_off_range * range)) {
-      return fail(
-          ErrorCode::malformed,
-          fmt::format("the darks lie {:.3g} DN {} the picture's masked pixels; {}; take them again, covered, as "
-                      "warm as the picture",
-                      std::fabs(distance), distance > 0 ? "above" : "below",
-                      distance > 0 ? "light gets in, or they are warmer" : "they are colder"));
+      return fail(ErrorCode::malformed,
+                  fmt::format("the darks are {:.3g} DN {} the masked pixels of the image; {}; take them again, "
+                              "covered, at the temperature of the image",
+                              std::fabs(distance), distance > 0 ? "above" : "below",
+                              distance > 0 ? "light reaches the sensor, or they are warmer" : "they are colder"));
     }
     if (std::fabs(distance) > off * dark.noise_std_dn[site] && std::fabs(distance) > std::fabs(worst)) worst = distance;
   }
   if (worst == 0) return std::nullopt;
-  return fmt::format("the darks lie {:+.3g} DN off the picture's masked pixels", worst);
+  return fmt::format("the darks differ by {:+.3g} DN from the masked pixels of the image", worst);
 }
 
 Result<void> check_below_picture(const RawDn& picture, const DarkFrame& dark) {
@@ -126,9 +125,9 @@ Result<void> check_below_picture(const RawDn& picture, const DarkFrame& dark) {
   const double share = static_cast<double>(count) / static_cast<double>(dark.dn.size());
   if (share <= max_below) return {};
   return fail(ErrorCode::malformed,
-              fmt::format("{:.2g} % of the picture's pixels lie more than {:g} standard deviations below the darks, at "
-                          "most {:g} % may; the darks hold light or are warmer than the picture; take them again, "
-                          "covered, as warm as the picture",
+              fmt::format("{:.2g} % of the pixels of the image are more than {:g} standard deviations below the darks, "
+                          "at most {:g} % are allowed; light reached the darks, or they are warmer than the image; "
+                          "take them again, covered, at the temperature of the image",
                           100 * share, below, 100 * max_below));
 }
 

@@ -122,7 +122,7 @@ Result<DarkGroup> group_of_master(const Plane<float>& dn, bool rounded, const Fr
   const bool is_readout = dn.width() == picture.dn.width() && dn.height() == picture.dn.height();
   if (!is_readout && (dn.width() != active.width || dn.height() != active.height)) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("the dark frame has {} x {} pixels, the picture {} x {}; take darks with its camera",
+                fmt::format("the dark frame has {} x {} pixels, the image {} x {}; take darks with its camera",
                             dn.width(), dn.height(), active.width, active.height));
   }
   const auto setting = setting_of(picture);
@@ -145,11 +145,10 @@ Result<DarkGroup> group_of_master(const Plane<float>& dn, bool rounded, const Fr
     const double limit = std::max(far_below * std::sqrt(sites[site].noise_dn2), far_below_range * range);
     const double level = sites[site].spread.median;
     if (level >= (*pedestal_dn)[site] - limit) continue;
-    return fail(
-        ErrorCode::malformed,
-        fmt::format("the dark frame's level, {:.4g} DN, is below the picture's black level, {:.4g} DN; its bias "
-                    "was subtracted, or it is in other units; make it without that",
-                    level, (*pedestal_dn)[site]));
+    return fail(ErrorCode::malformed,
+                fmt::format("the level of the dark frame, {:.4g} DN, is below the black level of the image, {:.4g} DN; "
+                            "its bias was subtracted, or it has other units; make it without subtracting the bias",
+                            level, (*pedestal_dn)[site]));
   }
   return out;
 }

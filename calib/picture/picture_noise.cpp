@@ -70,8 +70,8 @@ Result<void> check(const RawDn& raw, const PerSite<double>& black_dn, const Pict
   }
   if (raw.is_float()) {
     return fail(ErrorCode::unsupported,
-                "floating-point samples are computed, as by a merge of exposures: no straight line describes their "
-                "noise: give the raw with the codes of the sensor");
+                "the samples are floating-point numbers, as of a merge of exposures, whose noise no straight line "
+                "describes: give the raw with the codes of the sensor");
   }
   if (options.max_samples < 1 || options.max_samples > 10'000'000) {
     return fail(ErrorCode::invalid_argument,
@@ -150,10 +150,11 @@ Result<void> check_fit(const NoiseLine& line) {
   }
   const Estimate& offset = line.offset_dn2;
   if (offset.value + 3 * offset.standard_error < 0) {
-    return fail(ErrorCode::insufficient,
-                fmt::format("the noise without light comes out below 0 ({:.3g} +- {:.2g} DN^2): the black level may be "
-                            "wrong",
-                            offset.value, offset.standard_error));
+    return fail(
+        ErrorCode::insufficient,
+        fmt::format(
+            "the estimated noise without light is below 0 ({:.3g} +- {:.2g} DN^2): the black level may be wrong",
+            offset.value, offset.standard_error));
   }
   return check_straight(line);
 }

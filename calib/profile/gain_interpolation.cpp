@@ -80,7 +80,7 @@ Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<
     const GainProfile& only = profile.gains[0];
     if (!only.iso) return GainAtIso{only, ""};
     return GainAtIso{only,
-                     fmt::format("the frame states no ISO: the profile's only setting, ISO {:g}, is taken", *only.iso)};
+                     fmt::format("the frame states no ISO: the profile's only setting, ISO {:g}, is used", *only.iso)};
   }
   std::vector<const GainProfile*> stated, unstated;
   for (const GainProfile& g : profile.gains) (g.iso ? stated : unstated).push_back(&g);
@@ -105,11 +105,10 @@ Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<
   const double share = std::log(*iso / *low.iso) / std::log(*high.iso / *low.iso);
   if (low.pedestal_holds != high.pedestal_holds || low.sensor.has_value() != high.sensor.has_value()) {
     const GainProfile& nearer = share < 0.5 ? low : high;
-    return GainAtIso{
-        beyond(nearer, *iso / *nearer.iso),
-        fmt::format("ISO {:g} and ISO {:g} of the profile were not measured alike: ISO {:g} is extrapolated "
-                    "from ISO {:g}",
-                    *low.iso, *high.iso, *iso, *nearer.iso)};
+    return GainAtIso{beyond(nearer, *iso / *nearer.iso),
+                     fmt::format("ISO {:g} and ISO {:g} of the profile were not measured in the same way: ISO {:g} is "
+                                 "extrapolated from ISO {:g}",
+                                 *low.iso, *high.iso, *iso, *nearer.iso)};
   }
   return GainAtIso{between(low, high, share), ""};
 }

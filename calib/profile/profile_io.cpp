@@ -223,7 +223,7 @@ class KeyCheck {
     if (levels_.back().keys.insert(key).second) return;
     std::string path;
     for (const Level& level : levels_) path = joined(path, level.last);
-    failure_.set(ErrorCode::malformed, path, "this key is there twice");
+    failure_.set(ErrorCode::malformed, path, "this key is given twice");
   }
 
   ProfileFailure& failure_;

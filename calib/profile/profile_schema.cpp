@@ -32,7 +32,7 @@ void check_gain(const GainProfile& gain, const std::string& path, ProfileFailure
   const auto check_rising = [&](const std::optional<MeasuredRange>& range, const char* key) {
     if (range && range->low > range->high) {
       failure.set(ErrorCode::malformed, joined(path, key),
-                  fmt::format("{:g} to {:g} is no range", range->low, range->high));
+                  fmt::format("{:g} to {:g} is not a range", range->low, range->high));
     }
   };
   check_rising(gain.dark_exposure_s, "dark_exposure_s");

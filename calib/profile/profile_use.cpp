@@ -35,11 +35,11 @@ Result<void> check_mosaic(const CameraProfile& profile, const RawDn& frame, std:
   if (profile.mosaic == monochrome || mosaic == monochrome) {
     return fail(
         ErrorCode::invalid_argument,
-        fmt::format("the profile was measured on a sensor that is {}, the frame is {}", profile.mosaic, mosaic));
+        fmt::format("the profile was measured on a sensor that is {}, but the frame is {}", profile.mosaic, mosaic));
   }
   warnings.push_back(
-      fmt::format("the profile was measured on a {} mosaic, the frame is {}: what it says of sites may "
-                  "be that of others; calibrate in the mode the picture was taken in",
+      fmt::format("the profile was measured on a {} mosaic, but the frame is {}: its values may belong to other sites; "
+                  "calibrate in the mode in which the image was taken",
                   profile.mosaic, mosaic));
   return {};
 }
@@ -56,13 +56,13 @@ double temperature_factor(const GainProfile& gain, const FrameInfo& info, double
   const bool was_measured = gain.dark_exposure_s.has_value();
   if (!info.temperature_c) {
     if (matters && gain.dark_temperature_c) {
-      warnings.push_back(fmt::format("the frame states no temperature: dark current is taken as at {:g} C",
+      warnings.push_back(fmt::format("the frame states no temperature: the dark current at {:g} C is used",
                                      sensor.dark_temperature_c));
     }
     return 1;
   }
   if (was_measured && !gain.dark_temperature_c) {
-    if (matters) warnings.emplace_back("the profile's darks state no temperature: dark current is taken as theirs");
+    if (matters) warnings.emplace_back("the profile's darks state no temperature: their dark current is used");
     return 1;
   }
   const double celsius = *info.temperature_c;
@@ -73,7 +73,7 @@ double temperature_factor(const GainProfile& gain, const FrameInfo& info, double
         fmt::format("the sensor was at {:g} C, the profile's darks at {:g} to {:g} C: dark current is "
                     "extrapolated, doubling every {:.2g} C{}",
                     celsius, gain.dark_temperature_c->low, gain.dark_temperature_c->high, sensor.dark_doubling_c,
-                    gain.errors.dark_doubling_c > 0 ? "" : ", a figure that was not measured"));
+                    gain.errors.dark_doubling_c > 0 ? "" : ", a value that was not measured"));
   }
   return std::exp2((celsius - sensor.dark_temperature_c) / sensor.dark_doubling_c);
 }
@@ -100,7 +100,7 @@ Result<PerSite<double>> find_dark_charge(const GainProfile& gain, const RawDn& f
   SensorModel& sensor = *out.sensor;
   const double fastest = *std::max_element(sensor.dark_current_e_per_s.begin(), sensor.dark_current_e_per_s.end());
   if (fastest == 0) {
-    if (!gain.dark_exposure_s) out.warnings.emplace_back("the profile knows no dark current");
+    if (!gain.dark_exposure_s) out.warnings.emplace_back("the profile states no dark current");
     return PerSite<double>{};
   }
   if (!frame.info.exposure_s) {
@@ -240,7 +240,7 @@ std::vector<ColourCalibration> calibrations_of(const CameraProfile& profile) {
 Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& frame, const std::string& gain_setting) {
   if (frame.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported,
-                frame.from_x_trans ? "profiles describe the 2 x 2 sites of a Bayer mosaic, and X-Trans has none"
+                frame.from_x_trans ? "profiles describe the 2 x 2 sites of a Bayer mosaic, which X-Trans does not have"
                                    : "the frame is already demosaiced: a profile describes the mosaic");
   }
   if (const auto same = check_camera(profile, frame.info); !same) return tl::make_unexpected(same.error());
@@ -249,8 +249,8 @@ Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& fra
   if (profile.gains.empty()) return out;
   if (frame.is_float()) {
     out.warnings.emplace_back(
-        "the frame has floating-point samples: the profile's black level, noise and hot pixels, which are those of the "
-        "sensor's codes, are not used");
+        "the frame has floating-point samples: the profile's black level, noise and hot pixels apply to integer codes "
+        "and are not used");
     return out;
   }
   auto found = gain_setting.empty() ? gain_at_iso(profile, frame.info.iso) : gain_named(profile, gain_setting);

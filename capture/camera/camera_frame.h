@@ -12,7 +12,7 @@ namespace lowlux::capture {
 
 /// Entry of RawFrame::warnings for a colour camera that states no colour matrix.
 inline constexpr std::string_view colours_unknown =
-    "the camera's colours are not known: taken for sRGB's; --profile has them";
+    "the colours of the camera are not known: sRGB is assumed; --profile states them";
 
 /// Converts a camera's frame to a raw frame, from which images and raw files are made; `frame.bytes` holds at least
 /// frame_bytes(format) and is read once, row by row. White is the largest code. Facts are stored where a DNG has a

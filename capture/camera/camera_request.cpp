@@ -47,10 +47,10 @@ Result<void> check_camera_request(const CameraRequest& request) {
     return fail(ErrorCode::invalid_argument, "a camera needs 2 to 32 buffers, not " + std::to_string(request.buffers));
   }
   if (request.width.has_value() != request.height.has_value()) {
-    return fail(ErrorCode::invalid_argument, "a camera's width and height are given together, or neither is");
+    return fail(ErrorCode::invalid_argument, "width and height of a camera must be given together");
   }
   if (!is_side(request.width) || !is_side(request.height)) {
-    return fail(ErrorCode::invalid_argument, "a camera's width and height are 1 to 65535 pixels, not " +
+    return fail(ErrorCode::invalid_argument, "width and height of a camera must be 1 to 65535 pixels, found " +
                                                  std::to_string(*request.width) + "x" +
                                                  std::to_string(*request.height));
   }

@@ -92,7 +92,7 @@ class Loop {
       const bool late = steady_clock::now() - last_whole_ >= limits_.timeout;
       if (!late) return true;
       return tl::make_unexpected(
-          none_in_time({ErrorCode::insufficient, "the device says that what it delivers is damaged", {}}));
+          none_in_time({ErrorCode::insufficient, "the device reports that its frames are damaged", {}}));
     }
     Result<bool> good = check ? check(frame) : Result<bool>(true);
     if (!good) return good;

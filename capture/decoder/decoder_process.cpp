@@ -141,7 +141,7 @@ Error ended_by(int number, const Ended& ended, const ReadLimits& limits) {
   if (number == SIGKILL) {
     return {ErrorCode::too_large,
             "the decoder was killed after " + seconds_text(ended.elapsed_s) +
-                ": the system is short of memory, or an operator ended it; read fewer files at a time",
+                ": the system is short of memory, or a user ended it; read fewer files at a time",
             {}};
   }
   return {ErrorCode::malformed,

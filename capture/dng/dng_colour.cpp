@@ -50,7 +50,7 @@ Result<std::optional<Matrix3>> read_forward(const DngFile& dng, const TiffDirect
   if (!matrix || !*matrix) return matrix;
   const Vector3 white = **matrix * Vector3{1, 1, 1};
   if (std::all_of(white.begin(), white.end(), [](double sum) { return sum > 0; })) return matrix;
-  return bad(name, "takes a neutral to a colour that cannot be");
+  return bad(name, "maps a neutral to an impossible colour");
 }
 
 /// Reads three positive numbers; nullopt if there is no such tag.

@@ -81,7 +81,7 @@ Result<std::optional<DngFile>> open_dng(std::span<const std::byte> bytes) {
     (is_full_raw(directory) ? dng.raw_images : dng.previews).push_back(std::move(directory));
   }
   if (dng.raw_images.empty())
-    return fail(ErrorCode::unsupported, "this DNG holds no raw image, only rendered pictures");
+    return fail(ErrorCode::unsupported, "this DNG contains no raw image, only rendered images");
   std::stable_sort(dng.raw_images.begin(), dng.raw_images.end(),
                    [](const auto& a, const auto& b) { return area_of(a) > area_of(b); });
   dng.exif = or_ignored(exif_of(*tiff, dng.main), dng.warnings);

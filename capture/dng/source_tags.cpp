@@ -56,8 +56,8 @@ class Collector {
     if (!entry.inside_file || entry.values.size() > max_bytes - bytes_ || tags_ == max_tags) {
       if (!std::exchange(warned_, true)) {
         warnings_.push_back("tag " + std::to_string(entry.id) +
-                            (entry.inside_file ? " is not passed on: the tags are too many or too large"
-                                               : " is not passed on: its values lie beyond the end of the file"));
+                            (entry.inside_file ? " is not copied: the tags are too many or too large"
+                                               : " is not copied: its values lie beyond the end of the file"));
       }
       return;
     }

@@ -100,7 +100,7 @@ Result<void> fill_levels(const DecodedHeader& h, RawDn& raw, std::vector<std::st
   const bool all_zero = std::all_of(black.pattern_dn.begin(), black.pattern_dn.end(), [](double b) { return b == 0; });
   if (!(all_zero && raw.masked_is_stated)) raw.black_tag = std::move(black);
   if (all_zero && !raw.masked_is_stated) {
-    warnings.emplace_back("the black level of 0 is the decoder's, which says 0 also where it does not know");
+    warnings.emplace_back("the black level of 0 is that of the decoder, which also reports 0 if it is not known");
   }
   return check_levels(raw, "as the decoder reports them");
 }

@@ -68,7 +68,7 @@ Result<std::unique_ptr<V4l2Device>> V4l2Device::open(const V4l2System& system, c
 Result<void> V4l2Device::identify() {
   v4l2_capability told{};
   if (const int code = call(VIDIOC_QUERYCAP, &told)) {
-    if (code == ENOTTY || code == EINVAL) return fail(ErrorCode::unsupported, "this is no V4L2 device", path_);
+    if (code == ENOTTY || code == EINVAL) return fail(ErrorCode::unsupported, "this is not a V4L2 device", path_);
     return tl::make_unexpected(error(code, "the driver does not state what the device is"));
   }
   name_ = printable(told.card);

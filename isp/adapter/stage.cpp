@@ -65,15 +65,15 @@ class DmaAccess {
 
 Result<void> check(const lowlux_stage_settings& s) {
   const auto wrong = [](const char* message) { return fail(ErrorCode::invalid_argument, message); };
-  if (s.threads < 0 || s.threads > max_threads) return wrong("a stage has 1 to 8 threads, or 0 for 2");
+  if (s.threads < 0 || s.threads > max_threads) return wrong("the number of threads must be 1 to 8, or 0 for 2");
   if (s.most_denoise < 0 || s.most_denoise > LOWLUX_STAGE_LEVEL_HIGH) return wrong("no such level of noise reduction");
   if (s.look != LOWLUX_STAGE_LOOK_CAMERA && s.look != LOWLUX_STAGE_LOOK_EYE) return wrong("no such look");
   if (s.demosaic < 0 || s.demosaic > LOWLUX_STAGE_DEMOSAIC_RESIDUAL_MEDIAN)
     return wrong("no such method of demosaicing");
   if (s.tone != 0 && s.tone != 1) return wrong("no such tone curve");
-  if (s.temporal != 0 && s.temporal != 1) return wrong("temporal is 0 or 1");
+  if (s.temporal != 0 && s.temporal != 1) return wrong("temporal must be 0 or 1");
   if (!(s.field_of_view_deg == 0 || (s.field_of_view_deg >= 0.1 && s.field_of_view_deg <= 180))) {
-    return wrong("a field of view has 0.1 to 180 degrees");
+    return wrong("the field of view must be 0.1 to 180 degrees");
   }
   return {};
 }
@@ -191,19 +191,19 @@ Result<int> Stage::configure(const lowlux_stage_input& in, lowlux_stage_output& 
   stream_.reset();
   history_.reset();
   const auto format = stage_input(in.api, in.fourcc, in.modifier);
-  if (!format) return fail(ErrorCode::unsupported, "the input is no raw format that lowlux reads");
+  if (!format) return fail(ErrorCode::unsupported, "the input is not a raw format that lowlux reads");
   const auto kind = stage_output(out.fourcc);
-  if (!kind) return fail(ErrorCode::unsupported, "the output is none that lowlux writes");
+  if (!kind) return fail(ErrorCode::unsupported, "the output is not a format that lowlux writes");
   if (*kind == StageOutput::mosaic && format->layout != SensorLayout::bayer) {
-    return fail(ErrorCode::unsupported, "a monochrome input has no mosaic to give");
+    return fail(ErrorCode::unsupported, "a monochrome input has no mosaic to output");
   }
   if (out.yuv_matrix != 0 && out.yuv_matrix != 601 && out.yuv_matrix != 709) {
-    return fail(ErrorCode::invalid_argument, "the matrix of NV12 is 601 or 709, or 0 for the usual one");
+    return fail(ErrorCode::invalid_argument, "the matrix of NV12 must be 601 or 709, or 0 for the default");
   }
   Result<LiveSetup> setup = setup_for(in, *format, *kind);
   if (!setup) return tl::make_unexpected(setup.error());
   if (in.width < 2 || in.height < 2 || in.width > 65536 || in.height > 65536) {
-    return fail(ErrorCode::invalid_argument, "frames have 2 to 65536 pixels each way");
+    return fail(ErrorCode::invalid_argument, "width and height of frames must be 2 to 65536 pixels");
   }
   const std::uint64_t limit = settings_.memory_limit == 0 ? default_memory_limit : settings_.memory_limit;
   if (const std::uint64_t wanted = stage_memory_bytes(*setup, executor_.width()); wanted > limit) {
@@ -211,7 +211,7 @@ Result<int> Stage::configure(const lowlux_stage_input& in, lowlux_stage_output& 
                                                   in.height, wanted >> 20U, limit >> 20U));
   }
   if (in.stride != 0 && (in.stride < row_bytes(*format, in.width) || in.stride > longest_stride)) {
-    return fail(ErrorCode::invalid_argument, "the input's stride is shorter than a row, or absurd");
+    return fail(ErrorCode::invalid_argument, "the stride of the input is shorter than a row, or implausibly long");
   }
   Stream made;
   made.kind = *kind;
@@ -244,10 +244,10 @@ Result<int> Stage::configure(const lowlux_stage_input& in, lowlux_stage_output& 
 }
 
 int Stage::check_source(const lowlux_stage_source& in) {
-  if (in.data == nullptr) return say(LOWLUX_STAGE_MISSING_PLANE, "there is no input");
+  if (in.data == nullptr) return say(LOWLUX_STAGE_MISSING_PLANE, "the input is missing");
   const std::size_t row = row_bytes(stream_->stream.format, stream_->width);
   if (in.stride < row || in.stride > longest_stride) {
-    return say(LOWLUX_STAGE_BAD_STRIDE, "the input's stride is shorter than a row, or absurd");
+    return say(LOWLUX_STAGE_BAD_STRIDE, "the stride of the input is shorter than a row, or implausibly long");
   }
   if (in.length < in.stride * static_cast<std::size_t>(stream_->height - 1) + row) {
     return say(LOWLUX_STAGE_SHORT_BUFFER, "the input ends before the frame does");
@@ -265,11 +265,12 @@ int Stage::check_picture(const lowlux_stage_picture& out) {
     const bool wide = stream_->kind == StageOutput::rgb48 || stream_->kind == StageOutput::mosaic;
     const bool even = !wide || (plane.stride % 2 == 0 && reinterpret_cast<std::uintptr_t>(plane.data) % 2 == 0);
     if (plane.stride < row || plane.stride > longest_stride || !even) {
-      return say(LOWLUX_STAGE_BAD_STRIDE, "a stride of the output is shorter than a row, odd for 16 bits, or absurd");
+      return say(LOWLUX_STAGE_BAD_STRIDE,
+                 "a stride of the output is shorter than a row, odd for 16 bits, or implausibly long");
     }
     const auto rows = static_cast<std::size_t>(plane_rows(stream_->kind, layout.height, i));
     if (plane.length < plane.stride * (rows - 1) + row) {
-      return say(LOWLUX_STAGE_SHORT_BUFFER, "a plane of the output ends before the picture does");
+      return say(LOWLUX_STAGE_SHORT_BUFFER, "a plane of the output ends before the image does");
     }
   }
   return LOWLUX_STAGE_OK;
@@ -296,7 +297,7 @@ void Stage::render(const lowlux_stage_picture& out) {
 
 int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& out, const lowlux_stage_params& params,
                    const Answers& answers) {
-  if (!stream_) return say(LOWLUX_STAGE_NOT_CONFIGURED, "the stage has no format yet");
+  if (!stream_) return say(LOWLUX_STAGE_NOT_CONFIGURED, "the stage is not configured");
   if (const int wrong = check_source(in); wrong != LOWLUX_STAGE_OK) return wrong;
   if (const int wrong = check_picture(out); wrong != LOWLUX_STAGE_OK) return wrong;
   if (const char* fault = fault_of(params); fault != nullptr) return say(LOWLUX_STAGE_BAD_PARAMETER, fault);

@@ -76,15 +76,15 @@ bool StageExposure::advise(const RawDn& raw, const PerSite<double>& black_dn, co
 
 const char* fault_of_limits(const lowlux_stage_params& params) {
   const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
-  if (!within(params.max_exposure_s, 1e-7, 1e5)) return "the longest exposure lies between 1e-7 and 1e5 s";
+  if (!within(params.max_exposure_s, 1e-7, 1e5)) return "the longest exposure must be between 1e-7 and 1e5 s";
   if (!within(params.min_exposure_s, 0, params.max_exposure_s)) return "the shortest exposure exceeds the longest";
   if (params.max_gain != 0 && !within(params.max_gain, 1, most_factor))
-    return "the largest gain lies between 1 and 1e4";
+    return "the largest gain must be between 1 and 1e4";
   if (params.clipped_fraction != 0 && !within(params.clipped_fraction, 1e-9F, 0.5)) {
-    return "the fraction that may clip lies between 1e-9 and 0.5";
+    return "the fraction that may clip must be between 1e-9 and 0.5";
   }
   const bool known = params.mains_hz == 0 || mains_of(params.mains_hz) != Mains::off;
-  return known ? nullptr : "mains are of 50 or 60 Hz, 0 for none, or -1 for either";
+  return known ? nullptr : "the mains frequency must be 50 or 60 Hz, 0 for none, or -1 for either";
 }
 
 }  // namespace lowlux::isp

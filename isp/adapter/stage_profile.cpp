@@ -98,8 +98,9 @@ Result<void> StageProfile::prepare(const RawFormat& format, BayerPhase phase) {
   const bool monochrome = profile_.mosaic == "monochrome";
   const bool mono_stream = format.layout == SensorLayout::monochrome;
   if (!profile_.mosaic.empty() && monochrome != mono_stream) {
-    return fail(ErrorCode::malformed, fmt::format("the profile was measured on a sensor that is {}, the stream is {}",
-                                                  profile_.mosaic, mono_stream ? "monochrome" : "a mosaic"));
+    return fail(ErrorCode::malformed,
+                fmt::format("the profile was measured on a sensor that is {}, but the stream is {}", profile_.mosaic,
+                            mono_stream ? "monochrome" : "a mosaic"));
   }
   format_ = format;
   phase_ = phase;

@@ -178,13 +178,13 @@ tl::unexpected<Error> malformed(const Failure& failure) { return not_readable("J
 Result<void> check_encodable(const Encoded8& picture, const FileMetadata& metadata, const JpegOptions& options) {
   if (picture.width() < 1 || picture.height() < 1 || picture.width() > JPEG_MAX_DIMENSION ||
       picture.height() > JPEG_MAX_DIMENSION) {
-    return fail(ErrorCode::unsupported, "a JPEG holds 1 to 65500 pixels on a side, the picture is " +
+    return fail(ErrorCode::unsupported, "a JPEG has 1 to 65500 pixels per side, the image is " +
                                             std::to_string(picture.width()) + " x " + std::to_string(picture.height()) +
                                             ": choose .png, .tif or .exr");
   }
   if (options.quality < 1 || options.quality > 100) {
     return fail(ErrorCode::invalid_argument,
-                "the JPEG quality is " + std::to_string(options.quality) + ", it goes from 1 to 100");
+                "the JPEG quality is " + std::to_string(options.quality) + ", it must be 1 to 100");
   }
   if (metadata.exif.size() > max_segment - exif_prefix.size()) {
     return fail(ErrorCode::unsupported,

@@ -17,7 +17,7 @@
 namespace lowlux::gst {
 namespace {
 
-/// Holds what an element has besides what its base class has.
+/// Holds the members of an element in addition to those of its base class.
 struct State {
   Properties properties;  // under the lock of the object
   lowlux_stage* stage = nullptr;
@@ -108,7 +108,7 @@ gboolean set_caps(GstBaseTransform* element, GstCaps* in_caps, GstCaps* out_caps
   state.out = read_output_caps(out_caps);
   if (!state.in || !state.out) {
     GST_ELEMENT_ERROR(
-        element, STREAM, FORMAT, ("The format of the frames is none that lowluxisp knows"),
+        element, STREAM, FORMAT, ("lowluxisp does not support the format of the frames"),
         ("%" GST_PTR_FORMAT " to %" GST_PTR_FORMAT, static_cast<void*>(in_caps), static_cast<void*>(out_caps)));
     return FALSE;
   }
@@ -299,11 +299,10 @@ void init_class(gpointer any_class, gpointer /*data*/) {
   object_class->finalize = finalize;
   install_properties(object_class);
   auto* element_class = static_cast<GstElementClass*>(any_class);
-  gst_element_class_set_static_metadata(
-      element_class, "lowlux ISP", "Filter/Converter/Video",
-      "Raw frames of a sensor to pictures, for the dark: black level, noise reduction, "
-      "demosaicing, colour, look",
-      "the lowlux authors");
+  gst_element_class_set_static_metadata(element_class, "lowlux ISP", "Filter/Converter/Video",
+                                        "Converts raw frames of a sensor to images, for low light: black level, noise "
+                                        "reduction, demosaicing, colour, look",
+                                        "the lowlux authors");
   add_pad(element_class, "sink", GST_PAD_SINK, sink_template());
   add_pad(element_class, "src", GST_PAD_SRC, source_template());
   auto* transform_class = static_cast<GstBaseTransformClass*>(any_class);

@@ -11,5 +11,5 @@ gboolean add_elements(GstPlugin* plugin) {
 }  // namespace
 
 #define PACKAGE "lowlux"
-GST_PLUGIN_DEFINE(GST_VERSION_MAJOR, GST_VERSION_MINOR, lowlux, "A camera ISP for the dark", add_elements,
+GST_PLUGIN_DEFINE(GST_VERSION_MAJOR, GST_VERSION_MINOR, lowlux, "A camera ISP for low light", add_elements,
                   LOWLUX_VERSION, "BSD", "lowlux", "lowlux")

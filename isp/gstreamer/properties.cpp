@@ -23,29 +23,35 @@ struct Number {
 };
 
 constexpr std::array<Number, 13> numbers{{
-    {"field-of-view", "Field of view", "Of the longer side of the image [degrees]; 0: 50. For the look of the eye", 0,
-     180, &Properties::field_of_view_deg, before_start},
-    {"black-level", "Black level", "In codes of the frames; below 0: of the profile, else measured", -1, 65535,
-     &Properties::black_level_dn},
-    {"exposure-time", "Exposure time", "Of the frames [s]; below 1e-7: not known", 0, 1e5, &Properties::exposure_s},
-    {"analogue-gain", "Analogue gain", "Of the frames, 1 is ISO 100 of the profile; below 0.1: not known", 0, 1e4,
-     &Properties::analogue_gain},
-    {"noise-gain", "System gain", "Codes per electron; below 1e-6: of the profile, else measured. Goes with noise-read",
-     0, 65535, &Properties::noise_gain_dn_per_e},
+    {"field-of-view", "Field of view",
+     "Field of view of the longer side of the image [degrees]; 0: 50. For the look of the eye", 0, 180,
+     &Properties::field_of_view_deg, before_start},
+    {"black-level", "Black level", "Black level in codes of the frames; below 0: that of the profile, else measured",
+     -1, 65535, &Properties::black_level_dn},
+    {"exposure-time", "Exposure time", "Exposure time of the frames [s]; below 1e-7: not known", 0, 1e5,
+     &Properties::exposure_s},
+    {"analogue-gain", "Analogue gain", "Analogue gain of the frames, 1 is ISO 100 of the profile; below 0.1: not known",
+     0, 1e4, &Properties::analogue_gain},
+    {"noise-gain", "System gain",
+     "Codes per electron; below 1e-6: that of the profile, else measured. Requires noise-read", 0, 65535,
+     &Properties::noise_gain_dn_per_e},
     {"noise-read", "Read noise", "Standard deviation of a pixel without light, in codes; below 0: not known", -1, 65535,
      &Properties::noise_read_dn},
-    {"red-gain", "Gain of red", "For white, relative to green; below 0.001: estimated. Goes with blue-gain", 0, 1e3,
-     &Properties::red_gain},
-    {"blue-gain", "Gain of blue", "For white, relative to green; below 0.001: estimated. Goes with red-gain", 0, 1e3,
+    {"red-gain", "Gain of red", "Gain of red for white, relative to green; below 0.001: estimated. Requires blue-gain",
+     0, 1e3, &Properties::red_gain},
+    {"blue-gain", "Gain of blue",
+     "Gain of blue for white, relative to green; below 0.001: estimated. Requires red-gain", 0, 1e3,
      &Properties::blue_gain},
-    {"saturation", "Saturation", "Of the colours; 0: none, 1: as they are", 0, 4, &Properties::saturation},
+    {"saturation", "Saturation", "Saturation of the colours; 0: grey, 1: unchanged", 0, 4, &Properties::saturation},
     {"exposure-ev", "Exposure of the image", "Gain of the image [EV]; below -10: automatic", -100, 20,
      &Properties::exposure_ev},
-    {"lux", "Illuminance", "Of the scene [lx], for the look of the eye; below 0: not known", -1, 1e6, &Properties::lux},
-    {"f-number", "F-number", "Of the lens, for the look of the eye; below 0.1: not known", 0, 100,
+    {"lux", "Illuminance", "Illuminance of the scene [lx], for the look of the eye; below 0: not known", -1, 1e6,
+     &Properties::lux},
+    {"f-number", "F-number", "F-number of the lens, for the look of the eye; below 0.1: not known", 0, 100,
      &Properties::f_number},
-    {"budget-ms", "Time for a frame", "Noise reduction is left out in steps to keep to it [ms]; below 0.01: no limit",
-     0, 1e6, &Properties::budget_ms},
+    {"budget-ms", "Time for a frame",
+     "Time limit for a frame [ms], to which noise reduction is reduced in steps; below 0.01: no limit", 0, 1e6,
+     &Properties::budget_ms},
 }};
 
 // Other properties follow the numbers, whose identifiers are 1 and on.
@@ -83,9 +89,10 @@ GType demosaic_type() {
 }
 
 GType look_type() {
-  static const std::array<GEnumValue, 3> values{{{LOWLUX_STAGE_LOOK_CAMERA, "As a camera shows the scene", "camera"},
-                                                 {LOWLUX_STAGE_LOOK_EYE, "As a person saw the scene", "eye"},
-                                                 {0, nullptr, nullptr}}};
+  static const std::array<GEnumValue, 3> values{
+      {{LOWLUX_STAGE_LOOK_CAMERA, "As a camera shows the scene", "camera"},
+       {LOWLUX_STAGE_LOOK_EYE, "As an observer on site would perceive the scene", "eye"},
+       {0, nullptr, nullptr}}};
   static const GType type = g_enum_register_static("LowluxLook", values.data());
   return type;
 }
@@ -105,23 +112,24 @@ void install_properties(GObjectClass* element_class) {
   };
   install(id_profile, g_param_spec_string("profile", "Profile", "File of `lowlux calibrate`: noise, black, colour",
                                           nullptr, before_start));
-  install(id_threads,
-          g_param_spec_int("threads", "Threads", "That work on a frame; 0: 2", 0, 8, defaults.threads, before_start));
+  install(id_threads, g_param_spec_int("threads", "Threads", "Number of threads for a frame; 0: 2", 0, 8,
+                                       defaults.threads, before_start));
   install(id_level,
-          g_param_spec_enum("level", "Level", "Of noise reduction, at most; noise has to be known or measurable",
+          g_param_spec_enum("level", "Level", "Highest level of noise reduction; the noise must be known or measurable",
                             level_type(), defaults.level, before_start));
-  install(id_demosaic, g_param_spec_enum("demosaic", "Demosaicing", "How missing colours are interpolated, at most",
+  install(id_demosaic, g_param_spec_enum("demosaic", "Demosaicing",
+                                         "Most expensive method by which missing colours are interpolated",
                                          demosaic_type(), defaults.demosaic, before_start));
-  install(id_look, g_param_spec_enum("look", "Look", "Whose view of the scene is shown", look_type(), defaults.look,
-                                     before_start));
-  install(id_temporal, g_param_spec_boolean("temporal", "Temporal noise reduction", "Frames before contribute",
+  install(id_look, g_param_spec_enum("look", "Look", "Rendering: that of a camera or of the eye", look_type(),
+                                     defaults.look, before_start));
+  install(id_temporal, g_param_spec_boolean("temporal", "Temporal noise reduction", "Previous frames contribute",
                                             static_cast<gboolean>(defaults.temporal), before_start));
   install(id_tone,
           g_param_spec_boolean("tone", "Tone curve", "The standard curve; off: linear light in sRGB's encoding",
                                static_cast<gboolean>(defaults.tone), before_start));
-  install(id_post_messages,
-          g_param_spec_boolean("post-messages", "Post messages", "A message \"lowlux\" for each frame: what was done",
-                               static_cast<gboolean>(defaults.posts_messages), always));
+  install(id_post_messages, g_param_spec_boolean("post-messages", "Post messages",
+                                                 "Posts a message \"lowlux\" for each frame, with its processing",
+                                                 static_cast<gboolean>(defaults.posts_messages), always));
 }
 
 bool set_property(Properties& properties, guint id, const GValue* value) {
@@ -210,7 +218,7 @@ lowlux_stage_settings Properties::settings() const {
   return out;
 }
 
-// What is below the least value that the stage takes is not stated.
+// Values below the minimum of the stage are not stated.
 lowlux_stage_params Properties::params() const {
   lowlux_stage_params out{};
   out.size = sizeof out;

@@ -55,7 +55,7 @@ Result<PrivateFolder> PrivateFolder::make() {
   Folders& made = folders();
   const std::lock_guard guard(made.mutex);
   if (mkdtemp(name.data()) == nullptr) {
-    return fail(ErrorCode::unwritable, "no folder can be made here: " + std::generic_category().message(errno),
+    return fail(ErrorCode::unwritable, "no folder can be created here: " + std::generic_category().message(errno),
                 below.string());
   }
   made.all.insert(name);

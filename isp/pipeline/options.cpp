@@ -16,7 +16,7 @@ Result<void> check_options(const DevelopOptions& o) {
   }
   if (o.samples == SampleType::f32 && (!is_linear(o.space) || o.tone != ToneCurve::none)) {
     return fail(ErrorCode::invalid_argument,
-                "float samples are scene-linear: they go with a linear space and --tone none");
+                "float samples are scene-linear: they require a linear space and --tone none");
   }
   if (o.tone_shape != ToneShape{} && (o.tone == ToneCurve::none || o.look.noise_limit)) {
     return fail(ErrorCode::invalid_argument,
@@ -25,15 +25,16 @@ Result<void> check_options(const DevelopOptions& o) {
   }
   const bool has_look = o.look.look != Look::camera;
   if (o.saturation != 1 && (needs_float || has_look)) {
-    return fail(ErrorCode::invalid_argument,
-                "saturation is that of RGB images as the camera sees them: not with --space camera or xyz, or --look");
+    return fail(
+        ErrorCode::invalid_argument,
+        "saturation applies to RGB images with the look of the camera: not with --space camera or xyz, or --look");
   }
   if (o.local_tone > 0 && (o.tone == ToneCurve::none || has_look)) {
     return fail(ErrorCode::invalid_argument,
-                "local tone goes with the standard tone curve: not with --tone none, linear spaces or --look");
+                "local tone requires the standard tone curve: not with --tone none, linear spaces or --look");
   }
   if (o.display && (o.space != OutputSpace::srgb || o.samples == SampleType::f32)) {
-    return fail(ErrorCode::invalid_argument, "pictures for another display are sRGB of 8 or 16 bits");
+    return fail(ErrorCode::invalid_argument, "images for another display must be sRGB of 8 or 16 bits");
   }
   return {};
 }

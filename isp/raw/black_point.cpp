@@ -43,9 +43,8 @@ bool four_figures_do(const BlackLevel& tag) {
 
 Result<BlackPoint> black_from_tag(const RawDn& raw, const std::string& why_not_measured) {
   if (!raw.black_tag) {
-    return fail(ErrorCode::insufficient,
-                fmt::format("the file states no black level{}{}; black is not guessed: give it with --black DN",
-                            why_not_measured.empty() ? "" : ", and ", why_not_measured));
+    return fail(ErrorCode::insufficient, fmt::format("the file states no black level{}{}; give it with --black DN",
+                                                     why_not_measured.empty() ? "" : ", and ", why_not_measured));
   }
   BlackPoint black;
   black.source = BlackPoint::Source::tag;
@@ -93,7 +92,7 @@ Result<BlackPoint> requested_black(const RawDn& raw, const BlackRequest& request
   if (request.choice == BlackChoice::measured) {
     if (request.measured) return *request.measured;
     return fail(ErrorCode::invalid_argument,
-                "a measured black level is requested and none is given: use a profile that holds one, or --black DN");
+                "a measured black level is requested, but none is given: use a profile that has one, or --black DN");
   }
   if (request.choice == BlackChoice::metadata) return tagged_black(raw, request, "");
   // A tag that is finer than four figures is not replaced with four figures.

@@ -55,21 +55,20 @@ void for_each_pixel(const RawDn& raw, const DarkFrame& dark, const BlackPoint& b
 Result<BlackPoint> black_of(const RawDn& raw, const DarkFrame& dark) {
   if (raw.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported,
-                "the picture is already demosaiced; dark frames are subtracted from the mosaic as the sensor gave it");
+                "the image is already demosaiced; dark frames are subtracted from the mosaic of the sensor");
   }
   if (raw.is_float()) {
     return fail(ErrorCode::unsupported,
-                "the picture has floating-point samples, which are computed; dark frames are subtracted from the codes "
-                "of the sensor");
+                "the image has floating-point samples; dark frames are subtracted from integer codes of the sensor");
   }
   if (dark.dn.width() != raw.active.width || dark.dn.height() != raw.active.height) {
-    return fail(ErrorCode::invalid_argument,
-                fmt::format("the dark frame has {} x {} pixels, the picture {} x {}; take darks with its camera and "
-                            "settings",
-                            dark.dn.width(), dark.dn.height(), raw.active.width, raw.active.height));
+    return fail(
+        ErrorCode::invalid_argument,
+        fmt::format("the dark frame has {} x {} pixels, the image {} x {}; take darks with its camera and settings",
+                    dark.dn.width(), dark.dn.height(), raw.active.width, raw.active.height));
   }
   if (!named_defects(raw, dark.unknown)) {
-    return fail(ErrorCode::malformed, "the dark frame knows nothing of a large part of its pixels");
+    return fail(ErrorCode::malformed, "the dark frame has no value for a large part of its pixels");
   }
   BlackPoint black;
   black.pedestal_dn = dark.mean_dn;

@@ -127,7 +127,7 @@ table_rows::Table view_of(const ColourTable& t) {
 bool fits_floats(const Vector3& v) { return std::fabs(v[0]) + std::fabs(v[1]) + std::fabs(v[2]) <= largest_answer; }
 
 tl::unexpected<Error> not_finite() {
-  return fail(ErrorCode::invalid_argument, "the map of colours gives figures that are not finite, or beyond 1e30");
+  return fail(ErrorCode::invalid_argument, "the map of colours gives values that are not finite, or beyond 1e30");
 }
 
 /// Returns the node of a table that is coarser in cells or levels at the place of one of `t`; null where it has none.

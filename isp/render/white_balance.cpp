@@ -88,7 +88,7 @@ WhiteBalance fallback(const CameraColour& colour, const std::string& reason) {
     daylight->reason = reason + "; daylight (D65) instead";
     return *std::move(daylight);
   }
-  return {{1, 1, 1}, std::nullopt, WhiteSource::none, reason + "; no colour matrix either: channels left as they are"};
+  return {{1, 1, 1}, std::nullopt, WhiteSource::none, reason + "; no colour matrix either: channels are not changed"};
 }
 
 }  // namespace
@@ -156,7 +156,7 @@ Result<WhiteBalance> as_shot_white_balance(const CameraColour& colour) {
     for (const double channel : neutral) {
       if (!std::isfinite(channel) || channel <= 0) {
         return fail(ErrorCode::malformed,
-                    "the file's neutral holds a figure that is not positive: use --wb auto or --wb 5500",
+                    "the file's neutral contains a value that is not positive: use --wb auto or --wb 5500",
                     "AsShotNeutral");
       }
     }
@@ -203,17 +203,17 @@ WhiteEstimate estimate_white(const RgbView<const float>& blocks, double block_no
   if (estimate.blocks < options.min_blocks) return out;
   out.balance = balance_of(colour, estimate.neutral, WhiteSource::estimated);
   if (!out.balance.white) {
-    out.remark = "auto white balance is not limited to plausible lights: the colour matrix is missing or unusable";
+    out.remark = "automatic white balance is not limited to plausible lights: the colour matrix is missing or unusable";
     return out;
   }
   const auto held = held_to_lights(*out.balance.white, options);
   if (!held) return out;
   if (auto limited = balance_of_white(colour, *held, WhiteSource::estimated)) {
     out.balance = *std::move(limited);
-    out.remark = "auto white balance was limited to a plausible light";
+    out.remark = "automatic white balance was limited to a plausible light";
   } else {
     out.remark =
-        "auto white balance is not limited to plausible lights: the colour matrices do not reach the nearest one";
+        "automatic white balance is not limited to plausible lights: the colour matrices do not reach the nearest one";
   }
   return out;
 }
@@ -224,8 +224,7 @@ WhiteBalance auto_white_balance(const RgbView<const float>& blocks, double block
   WhiteEstimate found = estimate_white(blocks, block_noise, colour, options, memory);
   if (found.blocks < options.min_blocks) {
     return fallback(colour, "only " + std::to_string(found.blocks) +
-                                " of the picture's blocks are neither black nor "
-                                "clipped, too few to estimate the white");
+                                " of the image's blocks are neither black nor clipped, too few to estimate the white");
   }
   found.balance.reason = found.remark;
   return std::move(found.balance);

@@ -140,7 +140,7 @@ TEST(StageParams, BlackMustLieBelowWhite) {
   EXPECT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK) << rig.error();
   params.black_level[2] = 900;
   EXPECT_EQ(rig.process(codes, params), LOWLUX_STAGE_BAD_PARAMETER);
-  EXPECT_STREQ(rig.error(), "the white level 900 DN is not above black 900 DN, dark charge in it");
+  EXPECT_STREQ(rig.error(), "the white level 900 DN is not above the black level 900 DN, dark charge included");
 }
 
 TEST(StageParams, BlackIsInTheOrderRGrGbBWhateverTheMosaicBeginsWith) {

@@ -285,7 +285,7 @@ TEST(DarkFrame, DarksThatHoldLightAreRefused) {
   lit.rate_e_per_s = {8, 8, 8};  // not above the picture, but above its masked pixels: 32 e- are 26 DN
   EXPECT_NE(refusal(lit, picture, {.masked_dn = masked}).find("masked pixels"), std::string::npos);
   lit.shading = 1;
-  EXPECT_NE(refusal(lit, picture).find("light gets in"), std::string::npos);
+  EXPECT_NE(refusal(lit, picture).find("light reaches the sensor"), std::string::npos);
 }
 
 TEST(DarkFrame, FramesThatDoNotBelongToThePictureAreRefused) {

@@ -242,7 +242,7 @@ TEST(DarkSeries, SeesLightThatLeaksInOnOneSide) {
   EXPECT_EQ(refusal(groups_at(bench, exposures, 4)), "");
   bench.rate_e_per_s = {2, 2, 2};
   bench.shading = 1;
-  EXPECT_NE(refusal(groups_at(bench, exposures, 4)).find("light gets in"), std::string::npos);
+  EXPECT_NE(refusal(groups_at(bench, exposures, 4)).find("light reaches the sensor"), std::string::npos);
 }
 
 TEST(DarkSeries, SeesDarksThatAreNotLinearInTime) {

@@ -253,7 +253,7 @@ TEST(ProfileUse, GainsThatWereNotMeasuredAlikeAreNotMixed) {
   const auto near_low = profile_at(profile, frame(150, 5, 20));
   ASSERT_TRUE(near_low);
   ASSERT_EQ(near_low->warnings.size(), 1U);
-  EXPECT_NE(near_low->warnings[0].find("not measured alike"), std::string::npos);
+  EXPECT_NE(near_low->warnings[0].find("not measured in the same way"), std::string::npos);
   EXPECT_NEAR(near_low->black->pedestal_dn[0], 500 + 1.5 * 20, 1e-9);  // gain by the ISO, charge in electrons
 }
 

@@ -117,7 +117,7 @@ TEST(BadInput, WhatIsNotARawIsCalledWhatItIs) {
   picture.samples = 3;
   picture.bits = 8;
   picture.set(262, Tag::numbers(TagType::u16, {2}));
-  EXPECT_TRUE(has(refused(picture), "holds no raw image"));
+  EXPECT_TRUE(has(refused(picture), "contains no raw image"));
   picture.remove(50706).remove(50707);
   EXPECT_TRUE(has(refused(picture), "a TIFF picture"));
 }

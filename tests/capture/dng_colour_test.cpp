@@ -115,7 +115,7 @@ TEST(DngColour, SingularAndTruncatedMatricesAreIgnoredByName) {
   EXPECT_TRUE(warns(brief, "CameraCalibration1 has 6 values, expected 9 values"));
   DngBuilder forward;
   forward.set(50964, Tag::numbers(TagType::srational, {-1, 0, 0, 0, 1, 0, 0, 0, 1}));
-  EXPECT_TRUE(warns(forward, "ForwardMatrix1 takes a neutral to a colour that cannot be"));
+  EXPECT_TRUE(warns(forward, "ForwardMatrix1 maps a neutral to an impossible colour"));
 }
 
 TEST(DngColour, ADamagedColourMatrixIsAnErrorUnlessAnotherOneServes) {

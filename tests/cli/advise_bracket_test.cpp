@@ -91,7 +91,7 @@ TEST_F(AdviseBracket, RefusesWhatIsForASensorAndWhatCannotBe) {
            {{raw, "--snr", "90"}, 2, "--snr is not within"},
            {{raw, "--clip", "0"}, 2, "--clip is not within"},
            {{raw, "--max-exposure", "0"}, 2, "--max-exposure is not above 0"},
-           {{raw, "--motion", "3"}, 2, "go together"},
+           {{raw, "--motion", "3"}, 2, "must be given together"},
            {{raw, "--max-exposure", "1e-5", "--snr", "60"}, 1, "more than 9999 frames"},
            {{raw, "--snr", "10", "--sensor", "thesis", "--max-exposure", "1"}, 2, "leave --sensor out"}}) {
     Words words{"info", "--advise"};

@@ -175,7 +175,8 @@ TEST_F(Batch, ShardsMakeEachFileOnceAsOneRunDoes) {
 TEST_F(Batch, TwoInputsForOneOutputAreRefusedWithARemedy) {
   raw("a.dng");
   copies("a.dng", {"other/a.dng"});
-  refused(lowlux({"develop", file("a.dng"), file("other/a.dng"), "-o", file("out/")}), "a run and a folder of its own");
+  refused(lowlux({"develop", file("a.dng"), file("other/a.dng"), "-o", file("out/")}),
+          "separate runs with separate folders");
   refused(lowlux({"develop", file("a.dng"), file("a.dng"), "-o", file("out/")}), "given twice");
   EXPECT_FALSE(fs::exists(file("out")));
 }

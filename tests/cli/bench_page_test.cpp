@@ -113,7 +113,7 @@ TEST(BenchPage, LeavesOutWhatAStageDoesNotHave) {
 TEST(BenchPage, SaysWhatTheMachineIsAndWhatIsNotKnownOfIt) {
   const std::string page = page_of({}, {.cpu = "Made <up>", .processors = 3, .memory_gib = 7.75, .system = "\xff"});
   for (const char* part : {"Made &lt;up&gt;", ">3<", "7.8 GiB"}) EXPECT_TRUE(holds(page, part)) << part;
-  EXPECT_TRUE(holds(page_of({}), "the system does not say"));
+  EXPECT_TRUE(holds(page_of({}), "not stated by the system"));
 }
 
 TEST(BenchFiles, AreOnePageAndTwoFilesForEachStageAndNoneIfOneIsInTheWay) {

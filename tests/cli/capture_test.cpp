@@ -33,15 +33,15 @@ TEST_F(CaptureCommand, RefusesCommandLinesThatMeanNothing) {
   const std::string out = file("a.png");
   refused({}, "name one camera");
   refused({"--v4l2", "/dev/video0", "--libcamera", "0", "-o", out}, "name one camera");
-  refused({"--v4l2", "/dev/video0"}, "say where frames go");
+  refused({"--v4l2", "/dev/video0"}, "name an output");
   refused({"--v4l2", "/dev/video0", "--live", "-o", out}, "no files");
   refused({"--v4l2", "/dev/video0", "--temporal", "-o", out}, "--temporal");
   refused({"--v4l2", "/dev/video0", "-o", file("a.gif")}, ".dng");
   refused({"--v4l2", "/dev/video0", "-o", out, "--as", "dng"}, "--as");
   refused({"--v4l2", "/dev/video0", "-o", out, "--raw"}, "--raw");
-  refused({"--v4l2", "/dev/video0", "-o", out, "--format", "YUYV"}, "no raw format");
-  refused({"--v4l2", "/dev/video0", "-o", out, "--size", "640"}, "no size");
-  refused({"--v4l2", "/dev/video0", "-o", out, "--size", "0x480"}, "no size");
+  refused({"--v4l2", "/dev/video0", "-o", out, "--format", "YUYV"}, "not a valid raw format");
+  refused({"--v4l2", "/dev/video0", "-o", out, "--size", "640"}, "not a size");
+  refused({"--v4l2", "/dev/video0", "-o", out, "--size", "0x480"}, "not a size");
   refused({"--v4l2", "/dev/video0", "-o", out, "--fps", "0"}, "--fps");
   refused({"--v4l2", "/dev/video0", "-o", out, "--exposure-time", "nan"}, "--exposure-time");
   refused({"--v4l2", "/dev/video0", "-o", out, "--flip", "x"}, "--flip");
@@ -51,7 +51,7 @@ TEST_F(CaptureCommand, RefusesCommandLinesThatMeanNothing) {
   refused({"--v4l2", "/dev/video0", "-o", out, "--buffers", "1"}, "--buffers");
   refused({"--v4l2", "/dev/video0", "-o", out, "--bits", "32"}, "PNG");
   refused({"--libcamera", "0", "-o", out, "--gain-code", "3"}, "V4L2");
-  refused({"--v4l2", "/dev/video0", "-o", out, "--gain", "2", "--gain-code", "3"}, "together");
+  refused({"--v4l2", "/dev/video0", "-o", out, "--gain", "2", "--gain-code", "3"}, "mutually exclusive");
 }
 
 TEST_F(CaptureCommand, RefusesOptionsOfPicturesForRawFilesAndFilms) {
@@ -68,7 +68,7 @@ TEST_F(CaptureCommand, RefusesOptionsOfPicturesForRawFilesAndFilms) {
   refused({"--v4l2", "/dev/video0", "--live", "--denoise", "best"}, "best");
   refused({"--v4l2", "/dev/video0", "--live", "--look", "shin"}, "--look");
   refused({"--v4l2", "/dev/video0", "--live", "--budget-ms", "0"}, "--budget-ms");
-  refused({"--v4l2", "/dev/video0", "-o", file("a.png"), "--budget-ms", "20"}, "goes with --live");
+  refused({"--v4l2", "/dev/video0", "-o", file("a.png"), "--budget-ms", "20"}, "requires --live");
 }
 
 TEST_F(CaptureCommand, RefusesLimitsOfAutomaticExposureThatMeanNothing) {
@@ -92,7 +92,7 @@ TEST_F(CaptureCommand, RefusesLimitsOfAutomaticExposureThatMeanNothing) {
   automatic({"--gain-codes", "16=1", "--gain-code", "16"}, "mutually exclusive");
   refused({"--libcamera", "0", "-o", out, "--auto-exposure", "--gain-codes", "16=1"}, "V4L2");
   for (const std::string option : {"--max-exposure", "--max-gain", "--clip"}) {
-    refused({"--v4l2", "/dev/video0", "-o", out, option, "0.1"}, option + " goes with --auto-exposure");
+    refused({"--v4l2", "/dev/video0", "-o", out, option, "0.1"}, option + " requires --auto-exposure");
   }
 }
 

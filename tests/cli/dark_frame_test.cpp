@@ -126,8 +126,8 @@ TEST_F(DarkFrameCommand, WhatCannotBeIsRefusedWithACure) {
   refused({"--dark-frame", folder, "--black", "600"}, 2, "green shadows");
   refused({"--dark-frame", folder + "," + file("night.dng")}, 2, "one of its darks");
   refused({"--dark-noise", "0.1"}, 2, "--dark-frame");
-  refused({"--dark-frame", folder, "--dark-noise", "0"}, 2, "share");
-  refused({"--dark-frame", folder, "--dark-noise", "nan"}, 2, "share");
+  refused({"--dark-frame", folder, "--dark-noise", "0"}, 2, "fraction");
+  refused({"--dark-frame", folder, "--dark-noise", "nan"}, 2, "fraction");
   refused({"--dark-frame", folder, "--dark-doubling", "1"}, 2, "2 to 30");
   refused({"--dark-frame", folder, "--dark-doubling", "hot"}, 2, "profile");
   refused({"--dark-frame", folder, "--dark-doubling", file("none.json")}, 1, "none.json");
@@ -342,7 +342,7 @@ TEST_F(DarkFrameCommand, BiasFramesAloneGiveThePatternAndMaskedPixelsTheLevel) {
 
 TEST_F(DarkFrameCommand, BiasFramesThatAreNoneAreRefused) {
   darks("brief/d.dng", "0.3", 2);
-  refused({"--bias-frame", file("brief")}, 1, "bias frame is exposed 0.3 s");
+  refused({"--bias-frame", file("brief")}, 1, "exposure time of a bias frame is 0.3 s");
   refused({"--bias-frame", file("brief"), "--black", "600"}, 2, "green shadows");
   refused({"--bias-frame", file("night.dng")}, 2, "one of its bias frames");
   refused({"--bias-frame", file("some.tif")}, 1, "exposure time");

@@ -224,7 +224,7 @@ TEST_F(DenoisePixels, BadInputIsOneLineAndNoFile) {
     EXPECT_FALSE(std::filesystem::exists(file("clean.dng")));
   };
   write("night.dng", night(Kind::linear_raw).remove(51041));
-  refused("state it: --noise GAIN,READ");
+  refused("state it with --noise GAIN,READ");
   DngBuilder cut = night(Kind::monochrome);
   write("night.dng", cut);
   std::filesystem::resize_file(file("night.dng"), std::filesystem::file_size(file("night.dng")) / 2);

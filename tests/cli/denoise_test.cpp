@@ -116,8 +116,8 @@ TEST_F(DenoiseCommand, TheNoiseIsThatOfTheProfileIfThereIsOne) {
 
 TEST_F(DenoiseCommand, RefusesWhatCannotBe) {
   const std::string night = file("night.dng");
-  refused({"denoise", night, "-o", file("clean.tif")}, 2, "ends with .dng");
-  refused({"denoise", night, "-o", night}, 2, "would be replaced");
+  refused({"denoise", night, "-o", file("clean.tif")}, 2, "must end with .dng");
+  refused({"denoise", night, "-o", night}, 2, "would replace the input");
   refused({"denoise", night, "-o", file("clean.dng"), "--denoise", "off"}, 2, "nothing to do");
   refused({"denoise", night, "-o", file("clean.dng"), "--denoise", "finest"}, 2, "is none of");
   refused({"denoise", night}, 2, "--output");

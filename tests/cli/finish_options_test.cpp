@@ -63,8 +63,8 @@ TEST_F(FinishOptions, AbsurdCropsAndSizesAreOneLine) {
                            "a,b,c,d", "", "nan,0,5,5", "0,0,1e9,5"}) {
     refused({"--crop", crop}, 2, "--crop");
   }
-  refused({"--crop", "0,0,257,10"}, 1, "the upright picture has");
-  refused({"--crop", "60%,0%,60%,10%"}, 1, "the upright picture has");
+  refused({"--crop", "0,0,257,10"}, 1, "the upright image has");
+  refused({"--crop", "60%,0%,60%,10%"}, 1, "the upright image has");
   for (const char* size : {"0", "-5", "1.5", "65536", "big"}) refused({"--max-size", size}, 2, "--max-size");
 }
 
@@ -87,7 +87,7 @@ TEST_F(FinishOptions, AbsurdWhiteBalancesAreOneLine) {
                            "pick:5,5,0", "pick:-1,2", "pick:1.5,2", "pick:1,2,3,4", ",", "5000,", "nan", "nan,1,1"}) {
     refused({"--wb", text}, 2, "--wb");
   }
-  refused({"--wb", "pick:60000,5"}, 1, "outside the upright picture");
+  refused({"--wb", "pick:60000,5"}, 1, "outside the upright image");
   refused({"--wb", "100,0.01,100"}, 1, "--wb 5500");
 }
 

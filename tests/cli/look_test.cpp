@@ -176,8 +176,8 @@ TEST_F(LookCommand, WritesAMapOfSeeingForEachFileOfABatch) {
 }
 
 TEST_F(LookCommand, HasAMapOfSeeingForFilesAndTheEyeAlone) {
-  refused({"--seeing-map"}, "--seeing-map goes with --look eye");
-  refused({"--look", "shin", "--seeing-map"}, "--seeing-map goes with --look eye");
+  refused({"--seeing-map"}, "--seeing-map requires --look eye");
+  refused({"--look", "shin", "--seeing-map"}, "--seeing-map requires --look eye");
   const auto live = lowlux({"capture", "--v4l2", "/dev/video0", "--live", "--look", "eye", "--seeing-map"});
   EXPECT_EQ(live.exit_code, 2);
   EXPECT_NE(live.err.find("--seeing-map"), std::string::npos) << live.err;
@@ -272,7 +272,7 @@ TEST_F(LookCommand, RefusesLightsThatAreNone) {
   broken("wavelength_nm,power\n400,1\n700,-1\n", "negative");
   broken("wavelength_nm,power\n400,1\n700,nan\n", "not a finite number");
   broken("wavelength_nm,power\n700,1\n400,1\n", "must rise");
-  broken("wavelength_nm,a,b\n400,1,1\n700,1,1\n", "a light is one spectrum");
+  broken("wavelength_nm,a,b\n400,1,1\n700,1,1\n", "a light must be one spectrum");
   broken("wavelength_nm,power\n400,0\n700,0\n", "no luminance");
   broken("wavelength_nm,power\n699,0\n700,1\n701,0\n", "0.1 to 60");
   std::filesystem::remove(file("light.csv"));

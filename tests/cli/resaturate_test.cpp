@@ -97,14 +97,14 @@ TEST_F(ResaturateCommand, WritesEveryFormat) {
 }
 
 TEST_F(ResaturateCommand, RefusesWhatCannotBe) {
-  refused({}, 2, "black point is needed once");
-  refused({"--black", "1,2,3", "--black-area", "0,0,4,4"}, 2, "black point is needed once");
+  refused({}, 2, "give the black point once");
+  refused({"--black", "1,2,3", "--black-area", "0,0,4,4"}, 2, "give the black point once");
   refused({"--black", "1,2"}, 2, "three codes");
   refused({"--black", "1,2,256"}, 2, "three codes");
   refused({"--black", "nan,2,3"}, 2, "three codes");
   refused({"--black-area", "0,0,0,4"}, 2, "left, top, width and height");
   refused({"--black-area", "0.5,0,4,4"}, 2, "left, top, width and height");
-  refused({"--black-area", "60,0,16,16"}, 1, "do not lie in it");
+  refused({"--black-area", "60,0,16,16"}, 1, "are not inside it");
   refused({"--black", "1,2,3", "--bits", "12"}, 2, "--bits");
   refused({"--black", "1,2,3", "--radius", "-1"}, 2, "--radius");
   const auto same = lowlux({"resaturate", file("in.png"), "-o", file("in.png"), "--black", "1,2,3", "--force"});

@@ -297,7 +297,7 @@ TEST_F(SourceTagsCommand, DamagedTagsAreLeftOutWithAWarning) {
   write("a.dng", bytes);
   const auto result = lowlux({"develop", file("a.dng"), "-o", file("a.jpg")});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.err.find("tag 700 is not passed on: its values lie beyond"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("tag 700 is not copied: its values lie beyond"), std::string::npos) << result.err;
 }
 
 }  // namespace

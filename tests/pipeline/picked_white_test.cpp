@@ -110,7 +110,7 @@ TEST(PickedWhite, SaturatedDarkAndOutsideAreErrors) {
   };
   refused(picking(40, 40, 16), "saturated");
   refused(picking(40, 120, 16), "too dark");
-  refused(picking(301, 0, 16), "outside the upright picture of 301 x 203");
+  refused(picking(301, 0, 16), "outside the upright image of 301 x 203");
 }
 
 TEST(PickedWhite, TheCornerIsPickedToo) {

@@ -30,11 +30,11 @@ isp::ReportSection machine_section(const Machine& machine) {
   const auto add = [&](std::string what, std::string is) {
     section.table.rows.push_back({std::move(what), std::move(is)});
   };
-  add("processor", machine.cpu.value_or("the system does not say"));
+  add("processor", machine.cpu.value_or("not stated by the system"));
   add("processors online", fmt::format("{}", machine.processors));
-  add("threads used, where a stage does not say otherwise", fmt::format("{}", machine.threads));
+  add("threads used, unless a stage states otherwise", fmt::format("{}", machine.threads));
   add("instruction set of the kernels", machine.kernels);
-  add("memory", machine.memory_gib ? fmt::format("{:.1f} GiB", *machine.memory_gib) : "the system does not say");
+  add("memory", machine.memory_gib ? fmt::format("{:.1f} GiB", *machine.memory_gib) : "not stated by the system");
   add("system", machine.system);
   add("compiler", machine.compiler);
   add("lowlux", machine.lowlux);
@@ -49,8 +49,8 @@ std::string count_of_findings(const std::vector<isp::Finding>& findings) {
 isp::ReportSection overview(const std::vector<const MeasuredStage*>& stages) {
   isp::ReportSection section{.title = "At a glance",
                              .text =
-                                 "Findings are what a stage must show, next to what it shows. Rows whose findings "
-                                 "do not all hold are on a tinted ground.",
+                                 "Findings are the expectations of a stage, next to its results. Rows whose findings "
+                                 "do not all hold have a tinted background.",
                              .table = {{"stage", "what", "rows measured", "findings", "took [s]"}, {}}};
   section.table.rows.reserve(stages.size());
   for (const MeasuredStage* m : stages) {
@@ -81,7 +81,8 @@ isp::ReportSection measured_part(const isp::BenchTable& table) {
   isp::ReportSection part{.title = "What was measured", .table = isp::table_of(table, shown_digits), .is_part = true};
   part.table.marked = undominated_rows(table);
   if (!part.table.marked.empty()) {
-    part.text = "Rows on a tinted ground are undominated: no other is faster and as good, or better and as fast.";
+    part.text =
+        "Rows with a tinted background are undominated: no other row is faster and as good, or better and as fast.";
   }
   return part;
 }
@@ -92,7 +93,7 @@ isp::ReportSection findings_part(const std::vector<isp::Finding>& findings) {
     if (!findings[i].holds) part.table.marked.push_back(i);
   }
   part.text = count_of_findings(findings);
-  part.text += part.table.marked.empty() ? "." : "; those that do not are on a tinted ground.";
+  part.text += part.table.marked.empty() ? "." : "; the others have a tinted background.";
   return part;
 }
 
@@ -110,7 +111,7 @@ Result<isp::ReportSection> pictures_part(const isp::BenchOutcome& outcome, Execu
   if (!outcome.comparisons.empty()) {
     part.text = "The slider moves the edge between the two, with the mouse, a finger, or the arrow keys.\n";
   }
-  part.text += "Beside this page lie";
+  part.text += "Next to this page are";
   for (const isp::BenchImage& image : outcome.images) {
     part.text += fmt::format("{} {}.png", &image == &outcome.images.front() ? "" : ",", image.id);
   }
@@ -173,12 +174,11 @@ std::string time_text(const std::vector<MeasuredStage>& measured) {
 
 Result<std::string> bench_page(const std::vector<MeasuredStage>& measured, const Machine& machine, Executor& executor) {
   const std::vector<const MeasuredStage*> stages = in_order_of_page(measured);
-  isp::Report page{
-      .title = "lowlux bench: accuracy against time",
-      .text =
-          "What each stage of the pipeline costs and what it gets right, at each of its levels and "
-          "compared with other methods. Times are of the machine below; ratios carry over to others better.",
-      .sections = {machine_section(machine), overview(stages)}};
+  isp::Report page{.title = "lowlux bench: accuracy against time",
+                   .text =
+                       "Time and error of each stage of the pipeline, at each of its levels and compared with other "
+                       "methods. Times were measured on the machine below; ratios apply better to other machines.",
+                   .sections = {machine_section(machine), overview(stages)}};
   page.sections.back().text += '\n' + time_text(measured) + '.';
   for (const MeasuredStage* stage : stages) {
     if (auto added = add_stage(*stage, executor, page); !added) return tl::make_unexpected(added.error());

@@ -144,7 +144,7 @@ Result<void> check_bench_files(const std::vector<isp::BenchStage>& stages, const
   if (args.output.empty()) return {};
   std::error_code error;
   std::filesystem::create_directories(args.output, error);
-  if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
+  if (error) return fail(ErrorCode::unwritable, "the folder cannot be created: " + error.message(), args.output);
   if (auto free = check_free(page_name, args); !free) return free;
   for (const isp::BenchStage& stage : stages) {
     if (auto free = check_texts_free(stage, args); !free) return free;

@@ -119,7 +119,7 @@ Result<void> write_all(const std::vector<TextFile>& files, const ReproduceArgs& 
   std::error_code error;
   const std::filesystem::path folder(args.output);
   std::filesystem::create_directories(folder, error);
-  if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
+  if (error) return fail(ErrorCode::unwritable, "the folder cannot be created: " + error.message(), args.output);
   for (const TextFile& file : files) {
     std::error_code ignored;
     if (!args.force && std::filesystem::exists(folder / file.name, ignored)) {

@@ -178,7 +178,7 @@ void show_black(const calib::BlackFigures& black, const calib::FrameSetting& set
                                    black.column_noise_dn));
   out.add("pixels", fmt::format("{} in {} frame{}, {:.2g} % left out", black.pixels, black.frames,
                                 black.frames == 1 ? "" : "s", 100 * black.excluded_fraction));
-  out.add("holds", fmt::format("pedestal and dark charge in one{}: a second exposure time would separate them",
+  out.add("holds", fmt::format("pedestal including dark charge{}: a second exposure time would separate them",
                                setting.exposure_s ? fmt::format(", at {:g} s", *setting.exposure_s) : ""));
   found.text += name_of_gain(setting) + "\n" + out.text();
 
@@ -220,7 +220,7 @@ void show_dark_series(const calib::DarkSeries& series, std::span<const calib::Da
   }
   if (series.law) out.add("doubling", fmt::format("every {} C", text_of(series.law->doubling_c)));
   out.add("read noise", series.read_noise_e ? text_of(*series.read_noise_e) + " e-"
-                                            : std::string("lost in quantisation and dark charge"));
+                                            : std::string("not measurable: below quantisation and dark charge"));
   out.add("patterns", fmt::format("DSNU {:.3g} of the dark current, row noise {:.3g} e-, column noise {:.3g} e-",
                                   series.dsnu.value, series.row_noise_e, series.column_noise_e));
   out.add("hot pixels", std::to_string(series.hot.size()));

@@ -16,12 +16,12 @@ namespace {
 
 void add_output(CLI::App& app, CalibrateArgs& args) {
   app.add_option("-o,--output", args.output, "profile to write (JSON)")->required()->type_name("PROFILE.json");
-  app.add_option("--add-to", args.add_to, "start from this profile: what is measured now takes the place of its own")
+  app.add_option("--add-to", args.add_to, "start from this profile: new measurements replace its values")
       ->type_name("PROFILE.json");
-  app.add_option("--report", args.report, "page with tables and plots")->type_name("PAGE.html");
+  app.add_option("--report", args.report, "write a page with tables and plots")->type_name("PAGE.html");
   app.add_flag("--force", args.force, "overwrite files that exist");
-  app.add_flag("--json", args.json, "JSON instead of text");
-  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+  app.add_flag("--json", args.json, "print JSON instead of text");
+  app.add_flag("--quiet", args.quiet, "print no warnings and no progress");
 }
 
 void add_settings(CLI::App& app, CalibrateArgs& args) {
@@ -68,16 +68,17 @@ Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>&
   CLI::App app("Pedestal, dark current, its temperature law and hot pixels from dark frames.",
                "lowlux calibrate black");
   app.footer(
-      "Frames are put together by gain, exposure time and temperature. Two exposure times separate dark current from "
-      "the pedestal, two temperatures give its law; with one exposure time, or one frame, both stay in one figure. The "
-      "system gain comes from --system-gain, else from --add-to, else from the noise of the dark charge itself.");
+      "Frames are grouped by gain, exposure time and temperature. Two exposure times separate dark current from the "
+      "pedestal, and two temperatures determine its temperature law. With one exposure time, or one frame, the "
+      "pedestal includes the dark signal. The system gain is that of --system-gain, else of --add-to, else it is "
+      "measured on the noise of the dark charge.");
   CalibrateBlackArgs args;
   app.add_option("FRAMES", args.common.frames, "dark frames: lens covered; with --masked any frames")->required();
   add_output(app, args.common);
   add_settings(app, args.common);
   add_number(app, "--system-gain", "DN_PER_E", "system gain in DN per electron",
              [&args](double value) { args.system_gain_dn_per_e = value; });
-  app.add_flag("--masked", args.masked, "measure the masked pixels of the frames in place of the picture");
+  app.add_flag("--masked", args.masked, "measure the masked pixels of the frames instead of the image area");
   app.add_option("--map", args.map,
                  "write each pixel's pedestal and dark current to PREFIX_pedestal.pfm [DN] and "
                  "PREFIX_current.pfm [e-/s] (with the ISO in the name if there are several)")
@@ -92,9 +93,9 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
   CLI::App app("System gain, read noise, full well, PRNU and linearity by photon transfer (EMVA 1288).",
                "lowlux calibrate noise");
   app.footer(
-      "Two flats of the same light make a pair, and four pairs of different light a curve; frames are paired by "
-      "gain, exposure time and level, in the order given. Darks are of one exposure time, the shorter the better. "
-      "Without --darks there is one ordinary picture: noise is then measured in its even parts.");
+      "Two flats of the same light form a pair, and a fit needs four pairs of different light. Frames are paired by "
+      "gain, exposure time and level, in the given order. All darks have one exposure time, best a short one. Without "
+      "--darks the input is one ordinary image, and noise is measured in its even areas.");
   CalibrateNoiseArgs args;
   app.add_option("FRAMES", args.common.frames, "flats in pairs, or one ordinary picture")->required();
   app.add_option("--darks", args.darks, "two or more dark frames: files, a folder or a quoted pattern; repeatable")
@@ -103,7 +104,7 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
   add_output(app, args.common);
   add_settings(app, args.common);
   app.add_flag("--steady-light", args.steady_light,
-               "the lamp never changed, so that the flats' exposure times show how linear the sensor is");
+               "the lamp was constant, so that the exposure times of the flats measure linearity");
   using Method = calib::PictureNoiseMethod;
   add_choice<Method>(
       app, "--method", {{"ponomarenko", Method::ponomarenko}, {"foi", Method::foi}},
@@ -146,9 +147,9 @@ struct LightOptions {
 };
 
 void add_light(CLI::App& app, LightOptions& light) {
-  add_number(app, "--irradiance", "W_PER_M2", "power on the sensor, constant: measures quantum efficiency",
+  add_number(app, "--irradiance", "W_PER_M2", "constant irradiance of the sensor: measures quantum efficiency",
              [&light](double value) { light.irradiance_w_per_m2 = value; });
-  add_number(app, "--wavelength", "NM", "of the light of --irradiance",
+  add_number(app, "--wavelength", "NM", "wavelength of the light of --irradiance",
              [&light](double value) { light.wavelength_nm = value; });
   add_number(app, "--pixel-pitch", "UM", "side of a pixel, with --irradiance",
              [&light](double value) { light.pixel_pitch_um = value; });
@@ -161,11 +162,11 @@ Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>&
       "A data sheet of the sensor by EMVA 1288 release 4.0, from flats and darks: a page, and JSON next to it.",
       "lowlux calibrate sheet");
   app.footer(
-      "Two flats of the same light make a pair, and four pairs of different light a curve that should reach "
-      "saturation; 16 flats near half of it show PRNU best. Darks of the shortest exposure time, best 16, give DSNU "
-      "and "
-      "dark noise; those of the exposure times of the flats are subtracted for PRNU and quantum efficiency; those of "
-      "two or more times and temperatures give the dark current. All frames are of one gain setting.");
+      "Two flats of the same light form a pair. Four or more pairs of different light are needed, and should reach "
+      "saturation; 16 flats near half of saturation measure PRNU best. Darks of the shortest exposure time, best 16, "
+      "measure DSNU and dark noise. Darks of the exposure times of the flats are subtracted for PRNU and quantum "
+      "efficiency. Darks of two or more times and temperatures measure the dark current. All frames must have one gain "
+      "setting.");
   CalibrateSheetArgs args;
   LightOptions light;
   app.add_option("FLATS", args.common.frames, "flats: files, a folder or a quoted pattern")->required();
@@ -173,16 +174,17 @@ Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>&
       ->required()
       ->type_name("FILE[,FILE...]|FOLDER")
       ->allow_extra_args(false);
-  app.add_option("-o,--output", args.common.output, "page to write; the figures are written to its name with .json")
+  app.add_option("-o,--output", args.common.output,
+                 "page to write; the figures are written next to it, with the extension .json")
       ->required()
       ->type_name("SHEET.html");
   app.add_flag("--steady-light", args.steady_light,
-               "the lamp never changed, so that the flats' exposure times show how linear the sensor is");
+               "the lamp was constant, so that the exposure times of the flats measure linearity");
   add_light(app, light);
   add_settings(app, args.common);
   app.add_flag("--force", args.common.force, "overwrite files that exist");
-  app.add_flag("--json", args.common.json, "the figures as JSON instead of text");
-  app.add_flag("--quiet", args.common.quiet, "no warnings and no progress");
+  app.add_flag("--json", args.common.json, "print the figures as JSON instead of text");
+  app.add_flag("--quiet", args.common.quiet, "print no warnings and no progress");
   if (const auto code = parse_words(app, words)) return *code;
   for (std::vector<std::string>* files : {&args.common.frames, &args.darks}) {
     const auto named = raw_files_of_lists(*files);
@@ -208,12 +210,12 @@ Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string
                "lowlux calibrate quoted");
   CalibrateQuotedArgs args;
   app.add_option("SENSOR", args.common.frames,
-                 "its name; of a Raspberry Pi camera also imx219, imx477, ... or its tuning file (imx477.json)")
+                 "name of the sensor; for Raspberry Pi cameras also imx219, imx477, ... or a tuning file (imx477.json)")
       ->required()
       ->expected(1);
   app.add_option("-o,--output", args.common.output, "profile to write (JSON)")->required()->type_name("PROFILE.json");
   app.add_flag("--force", args.common.force, "overwrite files that exist");
-  app.add_flag("--json", args.common.json, "JSON instead of text");
+  app.add_flag("--json", args.common.json, "print JSON instead of text");
   if (const auto code = parse_words(app, words)) return *code;
   if (const std::string what = wrong(args.common, {}); !what.empty()) return refuse(app, what);
   return args;
@@ -254,24 +256,26 @@ Parsed<CalibrateColourArgs> parse_calibrate_colour(const std::vector<std::string
   CLI::App app("A camera's colour matrix from a photographed ColorChecker or from its spectral sensitivities.",
                "lowlux calibrate colour");
   CalibrateColourArgs args;
-  app.add_option("CHART", args.chart, "raw file that shows a ColorChecker Classic, whole and once")->type_name("");
+  app.add_option("CHART", args.chart, "raw file that shows one complete ColorChecker Classic")->type_name("");
   app.add_option("--camera", args.camera,
-                 "in place of a chart: spectral sensitivities, by name (`lowlux simulate --list`) or a table of "
+                 "instead of a chart: spectral sensitivities, by name (`lowlux simulate --list`) or a table of "
                  "wavelength, R, G, B")
       ->type_name("NAME|FILE.csv");
   app.add_flag("--per-photon", args.per_photon, "the table is quantum efficiency, not response per unit of power");
   app.add_option("--illuminant", args.illuminant,
-                 "the light on the chart: a CIE illuminant or a lamp, or a table (default: of A, D50, D55, D65 and D75 "
-                 "the nearest to the chart's neutral; D50 where the file has no matrix, and with --camera)")
+                 "light on the chart: a CIE illuminant, a lamp, or a table (default: of A, D50, D55, D65 and D75 the "
+                 "one nearest to the chart's neutral; D50 if the file has no matrix, and with --camera)")
       ->type_name("NAME|FILE.csv");
-  app.add_flag("--preserve-white", args.preserve_white, "the grey row's mean colour becomes the light's white exactly");
-  app.add_flag("--even-light", args.even_light, "do not fit how the light falls off over the chart");
+  app.add_flag("--preserve-white", args.preserve_white,
+               "map the mean colour of the grey row exactly to the white of the light");
+  app.add_flag("--even-light", args.even_light, "assume even light: do not fit its fall-off over the chart");
   app.add_option("-o,--output", args.output, "profile to write")->type_name("PROFILE.json");
-  app.add_option("--add-to", args.add_to, "profile whose other figures are kept")->type_name("PROFILE.json");
-  app.add_option("--report", args.report, "page with tables and plots")->type_name("PAGE.html");
-  app.add_option("--overlay", args.overlay, "picture that shows where patches were measured")->type_name("FILE.png");
+  app.add_option("--add-to", args.add_to, "profile whose other values are kept")->type_name("PROFILE.json");
+  app.add_option("--report", args.report, "write a page with tables and plots")->type_name("PAGE.html");
+  app.add_option("--overlay", args.overlay, "write an image that shows where patches were measured")
+      ->type_name("FILE.png");
   app.add_flag("--force", args.force, "overwrite files that exist");
-  app.add_flag("--json", args.json, "one JSON object on stdout");
+  app.add_flag("--json", args.json, "print one JSON object on stdout");
   if (const auto code = parse_words(app, words)) return *code;
   if (const std::string what = wrong(args); !what.empty()) return refuse(app, what);
   return args;

@@ -79,7 +79,7 @@ std::string facts(const ColourOutcome& o) {
     fmt::format_to(
         out, "  chart           corners ({:.0f}, {:.0f}) ({:.0f}, {:.0f}) ({:.0f}, {:.0f}) ({:.0f}, {:.0f})\n",
         corner[0].x, corner[0].y, corner[1].x, corner[1].y, corner[2].x, corner[2].y, corner[3].x, corner[3].y);
-    fmt::format_to(out, "  light on it     {:+.1f} % from its middle to its right, {:+.1f} % to its lower edge\n",
+    fmt::format_to(out, "  light on it     {:+.1f} % from its centre to its right, {:+.1f} % to its lower edge\n",
                    100 * o.chart->light.per_x, 100 * o.chart->light.per_y);
     fmt::format_to(out, "  neutral         {:.4f} {:.4f} {:.4f}\n", o.chart->neutral[0], o.chart->neutral[1],
                    o.chart->neutral[2]);
@@ -197,10 +197,11 @@ std::string colour_json(const ColourOutcome& outcome, const std::string& profile
 isp::Report colour_report(const ColourOutcome& outcome, const std::string& profile) {
   isp::ReportSection summary{"Matrices", facts(outcome), summary_table(outcome), {}};
   isp::ReportSection patches{"Patches", {}, patch_table(outcome), {error_plot(outcome), ab_plot(outcome)}};
-  return {fmt::format("Colour calibration: {}", outcome.input),
-          "CIEDE2000 between what a matrix makes of the camera's patches and a ColorChecker under the illuminant.\n" +
-              measurement_text(profile),
-          {std::move(summary), std::move(patches)}};
+  return {
+      fmt::format("Colour calibration: {}", outcome.input),
+      "CIEDE2000 between the patches of the camera, converted by a matrix, and a ColorChecker under the illuminant.\n" +
+          measurement_text(profile),
+      {std::move(summary), std::move(patches)}};
 }
 
 namespace {

@@ -37,7 +37,7 @@ Result<Sensitivity> sensitivity_of(const CalibrateColourArgs& args) {
   if (!table) return tl::make_unexpected(table.error());
   if (table->size() != 3) {
     return fail(ErrorCode::malformed,
-                fmt::format("sensitivities are three spectra, of R, G and B; the table has {}", table->size()),
+                fmt::format("sensitivities must be three spectra, of R, G and B; the table has {}", table->size()),
                 args.camera);
   }
   const auto per_power = [&](std::size_t i) {

@@ -24,7 +24,7 @@ using calib::ColourSample;
 
 Result<calib::ChartPicture> picture_of(const RawFrame& frame, Executor& executor) {
   if (frame.raw.layout != SensorLayout::bayer) {
-    return fail(ErrorCode::unsupported, "a chart is measured on a Bayer mosaic, and the file holds none");
+    return fail(ErrorCode::unsupported, "a chart is measured on a Bayer mosaic, but the file is not one");
   }
   const auto black = isp::choose_black(frame.raw, {});
   if (!black) return tl::make_unexpected(black.error());

@@ -78,7 +78,7 @@ Result<void> put_camera(const FrameInfo& info, CameraProfile& profile) {
 Result<void> put_mosaic(const std::string& mosaic, CameraProfile& profile) {
   if (!profile.mosaic.empty() && !mosaic.empty() && profile.mosaic != mosaic) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("the profile is of a sensor that is {}, what is to be added of one that is {}",
+                fmt::format("the profile is of a sensor that is {}, but the added frames are of one that is {}",
                             profile.mosaic, mosaic));
   }
   if (profile.mosaic.empty()) profile.mosaic = mosaic;

@@ -26,7 +26,8 @@ std::string optional_text(const std::optional<Estimate>& e, const char* unit, co
 std::string saturation_text(const calib::PhotonTransfer& t) {
   if (!t.saturation) {
     return t.saturation_capacity_e
-               ? fmt::format("{:.5g} e- where the variance is largest; no flat is full", t.saturation_capacity_e->value)
+               ? fmt::format("{:.5g} e- where the variance is largest; no flat reaches the full well",
+                             t.saturation_capacity_e->value)
                : "not reached by the flats";
   }
   const bool well = t.saturation->limited_by == calib::Saturation::LimitedBy::full_well;
@@ -49,8 +50,9 @@ std::vector<std::pair<const char*, std::string>> figures_of(const calib::PhotonT
       {"full well", saturation_text(t)},
       {"PRNU", fmt::format("{:.3g} +- {:.2g} %", 100 * t.prnu.value, 100 * t.prnu.standard_error)},
       {"dark pattern", optional_text(t.dsnu_e, " e-", "unknown: the darks scatter by less than half a code")},
-      {"linearity", t.linearity_error ? fmt::format("{:.2g} % mean deviation from a line", 100 * *t.linearity_error)
-                                      : std::string("not measured: it takes --steady-light and three exposure times")},
+      {"linearity", t.linearity_error
+                        ? fmt::format("{:.2g} % mean deviation from a line", 100 * *t.linearity_error)
+                        : std::string("not measured: this needs --steady-light and three exposure times")},
       {"fit", fmt::format("reduced chi square {:.3g}, {} degrees of freedom, {} levels of light", t.reduced_chi_square,
                           t.degrees_of_freedom, t.levels)},
   };
@@ -135,7 +137,7 @@ std::string black_text(const BlackPoint& black) {
 }
 
 std::string agreement_text(const calib::NoiseAgreement& a) {
-  return fmt::format("gain {:.4g} DN/e-, offset {:.4g} DN^2: ours are {:.3g} and {:.3g} times that, {}",
+  return fmt::format("gain {:.4g} DN/e-, offset {:.4g} DN^2: the measured values are {:.3g} and {:.3g} times these, {}",
                      a.gain_dn_per_e, a.offset_dn2, a.gain_ratio, a.offset_ratio,
                      a.agrees ? "they agree" : "they disagree");
 }

@@ -155,11 +155,12 @@ isp::Plot histogram_plot(const char* id, const char* title, const calib::DarkGro
 }
 
 isp::ReportSection sheet_section(const calib::DataSheet& sheet) {
-  isp::ReportSection out{.title = "Data sheet",
-                         .text = fmt::format("By {}. Values are followed by their standard errors. PRNU and quantum "
-                                             "efficiency are of flats less the darks of their exposure time.",
-                                             method),
-                         .table = {{"figure", "value"}, {}}};
+  isp::ReportSection out{
+      .title = "Data sheet",
+      .text = fmt::format("By {}. Values are followed by their standard errors. PRNU and quantum efficiency are "
+                          "computed from flats minus the darks of their exposure time.",
+                          method),
+      .table = {{"figure", "value"}, {}}};
   for (const Figure& figure : figures_of(sheet)) out.table.rows.push_back({figure.name, text_of(figure)});
   return out;
 }
@@ -167,8 +168,8 @@ isp::ReportSection sheet_section(const calib::DataSheet& sheet) {
 isp::ReportSection pattern_section(const calib::SheetFrames& frames, double gain) {
   isp::ReportSection out{
       .title = "Patterns",
-      .text = fmt::format("Averages of {} darks{}. White patterns are level in the spectrogram. The light has to be "
-                          "even: it is not corrected, and no high-pass filter is applied.",
+      .text = fmt::format("Averages of {} darks{}. White noise is flat in the spectrogram. The light must be even: it "
+                          "is not corrected, and no high-pass filter is applied.",
                           frames.darks.front().frames,
                           frames.bright ? fmt::format(" and of {} flats", frames.bright->frames) : "")};
   out.plots = {spectrogram_plot(frames, gain, calib::Direction::along_rows),

@@ -41,8 +41,7 @@ constexpr std::array kinds{
 
 void print_help() {
   print_out(
-      "Measures a camera and writes what was found to a profile.\n\nUsage: lowlux calibrate KIND [OPTIONS]\n\n"
-      "Kinds:\n");
+      "Measures a camera and writes the results to a profile.\n\nUsage: lowlux calibrate KIND [OPTIONS]\n\nKinds:\n");
   for (const Kind& kind : kinds) print_out(fmt::format("  {:<10} {}\n", kind.name, kind.summary));
   print_out(
       "\n`lowlux calibrate KIND --help` lists a kind's options. `lowlux develop --black PROFILE.json` uses the "
@@ -68,8 +67,10 @@ Result<CameraProfile> profile_of_file(const std::string& file) {
   const std::string name = std::filesystem::path(file).filename().string();
   auto sensor = calib::tuned_sensor(name);
   if (!sensor) {
-    return fail(ErrorCode::invalid_argument,
-                "a tuning file has the name of its sensor, such as imx477.json, and this sensor is not known", file);
+    return fail(
+        ErrorCode::invalid_argument,
+        "the name of a tuning file must be that of its sensor, such as imx477.json, and this sensor is not known",
+        file);
   }
   const auto bytes = capture::read_file_bytes(file, calib::max_tuning_bytes);
   if (!bytes) return tl::make_unexpected(bytes.error());

@@ -42,8 +42,8 @@ Wrong set_format(const std::string& text, capture::CameraRequest& request) {
     return text == names.libcamera || (names.v4l2_fourcc != 0 && text == v4l2_text(names.v4l2_fourcc));
   });
   if (found == formats.end()) {
-    return "is no raw format: name one as V4L2 (RG10, pRAA) or libcamera does (SRGGB10, SRGGB10_CSI2P); --list has "
-           "those of the cameras here";
+    return "is not a valid raw format: use a name of V4L2 (RG10, pRAA) or libcamera (SRGGB10, SRGGB10_CSI2P); --list "
+           "prints those of the connected cameras";
   }
   request.format = found->format;
   return std::nullopt;
@@ -58,7 +58,7 @@ Wrong set_size(const std::string& text, capture::CameraRequest& request) {
   };
   const auto width = whole(text.substr(0, cross));
   const auto height = cross == std::string::npos ? std::nullopt : whole(text.substr(cross + 1));
-  if (!width || !height) return "is no size such as 640x480";
+  if (!width || !height) return "is not a size such as 640x480";
   request.width = width;
   request.height = height;
   return std::nullopt;
@@ -75,25 +75,27 @@ std::function<Wrong(const std::string&)> store_positive(std::optional<double>& o
 }
 
 void add_source(CLI::App& app, CaptureArgs& args) {
-  app.add_flag("--list", args.list, "the cameras here and their raw formats");
+  app.add_flag("--list", args.list, "list the connected cameras and their raw formats");
   app.add_option("--v4l2", args.v4l2, "V4L2 camera: its device node")->type_name("/dev/videoN");
-  app.add_option("--libcamera", args.libcamera, "libcamera's camera: its id, its place in --list, or part of its name")
+  app.add_option("--libcamera", args.libcamera, "libcamera camera: its id, its index in --list, or a part of its name")
       ->type_name("ID");
   capture::CameraRequest& request = args.request;
   add_text(app, "--format", "FORMAT",
-           "raw format, by V4L2's or libcamera's name (RG10, SRGGB10_CSI2P...; default: the deepest there is)",
+           "raw format, by V4L2's or libcamera's name (RG10, SRGGB10_CSI2P...; default: the one with most bits)",
            [&request](const std::string& text) { return set_format(text, request); });
-  add_text(app, "--size", "WxH", "of the frames (default: the largest there is)",
+  add_text(app, "--size", "WxH", "size of the frames (default: the largest)",
            [&request](const std::string& text) { return set_size(text, request); });
-  add_text(app, "--fps", "HZ", "frames in a second (default: as the camera has it)",
+  add_text(app, "--fps", "HZ", "frames per second (default: the camera's setting)",
            store_positive(request.frame_rate_hz, 1e5, "Hz"));
-  add_text(app, "--exposure-time", "S", "of a frame (default: as the camera has it)",
+  add_text(app, "--exposure-time", "S", "exposure time of a frame (default: the camera's setting)",
            store_positive(request.exposure_s, 1e5, "s"));
-  add_text(app, "--gain", "X", "analogue gain, a factor (default: as the camera has it)",
+  add_text(app, "--gain", "X", "analogue gain, a factor (default: the camera's setting)",
            store_positive(request.analogue_gain, 1e6, "x"));
-  app.add_option("--gain-code", args.gain_code, "of a V4L2 camera, whose driver does not say what factor a code is")
+  app.add_option("--gain-code", args.gain_code,
+                 "gain code of a V4L2 camera, whose driver does not state the factor of a code")
       ->type_name("CODE");
-  add_text(app, "--flip", "h|v|hv", "horizontally, vertically or both, on the sensor (default: as the camera has it)",
+  add_text(app, "--flip", "h|v|hv",
+           "flip the readout of the sensor horizontally, vertically or both (default: the camera's setting)",
            [&request](const std::string& text) -> Wrong {
              if (text != "h" && text != "v" && text != "hv") return "is none of h, v, hv";
              request.flip_horizontal = text.starts_with('h');
@@ -103,8 +105,8 @@ void add_source(CLI::App& app, CaptureArgs& args) {
   add_choice<capture::V4l2Memory>(
       app, "--memory", {{"mmap", capture::V4l2Memory::mmap}, {"dma-buf", capture::V4l2Memory::dma_buf}},
       [&args](capture::V4l2Memory memory) { args.memory = memory; },
-      "how frames of a V4L2 camera get here, both without a copy (default: mmap)");
-  app.add_option("--buffers", request.buffers, "frames under way at a time, 2 to 32 (default 4)")
+      "how frames of a V4L2 camera are read, both without a copy (default: mmap)");
+  app.add_option("--buffers", request.buffers, "number of frame buffers, 2 to 32 (default 4)")
       ->check(CLI::Range(2, 32));
 }
 
@@ -114,40 +116,41 @@ void add_frames(CLI::App& app, CaptureArgs& args, Words& words) {
       const auto number = number_of(text);
       if (!number || !(*number >= 0 && *number <= max_frames) ||
           *number != static_cast<double>(static_cast<std::uint64_t>(*number))) {
-        return "is no number of frames";
+        return "is not a number of frames";
       }
       store(*number);
       return std::nullopt;
     };
   };
-  add_text(app, "--frames", "N", "to take; 0: until stopped (default: 1 to a file, 0 to a folder and with --live)",
+  add_text(app, "--frames", "N",
+           "number of frames to take; 0: until stopped (default: 1 to a file, 0 to a folder and with --live)",
            store_whole([&words](double number) { words.frames = number; }));
-  add_text(app, "--skip", "N", "frames to leave out first, while exposure settles (default 0)",
+  add_text(app, "--skip", "N", "number of frames to leave out first, while exposure settles (default 0)",
            store_whole([&args](double number) { args.limits.skip = static_cast<std::uint64_t>(number); }));
-  add_text(app, "--timeout", "S", "to wait for a frame (default 5)", [&args](const std::string& text) -> Wrong {
-    const auto number = quantity_of(text, "s");
-    if (!number || !(*number >= 0.001 && *number <= longest_timeout_s)) {
-      return fmt::format("is not within 0.001 to {:g} s", longest_timeout_s);
-    }
-    args.limits.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(*number * 1000));
-    return std::nullopt;
-  });
+  add_text(app, "--timeout", "S", "longest time to wait for a frame (default 5)",
+           [&args](const std::string& text) -> Wrong {
+             const auto number = quantity_of(text, "s");
+             if (!number || !(*number >= 0.001 && *number <= longest_timeout_s)) {
+               return fmt::format("is not within 0.001 to {:g} s", longest_timeout_s);
+             }
+             args.limits.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(*number * 1000));
+             return std::nullopt;
+           });
 }
 
 void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
-  app.add_option(
-         "-o,--output", args.develop.output,
-         "picture (.png .jpg .tif .exr .pfm) or raw file (.dng) to write, with -NNNN before its end where there "
-         "are several frames; or a folder (made if it ends with /)")
+  app.add_option("-o,--output", args.develop.output,
+                 "image (.png .jpg .tif .exr .pfm) or raw file (.dng) to write, with -NNNN before the extension if "
+                 "there are several frames; or a folder (created if it ends with /)")
       ->type_name("OUT");
-  app.add_option("--as", words.as, "what is written to a folder: png (default), jpg, tif, exr, pfm or dng")
+  app.add_option("--as", words.as, "type of the files in a folder: png (default), jpg, tif, exr, pfm or dng")
       ->check(CLI::IsMember({"png", "jpg", "tif", "exr", "pfm", "dng"}));
-  app.add_flag("--raw", words.raw, "raw files: the same as --as dng");
-  app.add_flag("--live", words.live, "video to standard output instead: YUV4MPEG2, which ffplay and ffmpeg read");
+  app.add_flag("--raw", words.raw, "write raw files, as with --as dng");
+  app.add_flag("--live", words.live, "write video to standard output: YUV4MPEG2, which ffplay and ffmpeg read");
   app.add_flag("--temporal", args.temporal, "with --live: use previous frames for noise reduction");
   add_text(app, "--budget-ms", "MS",
-           "with --live: time for each frame; what does not fit is left out step by step: the level standard for high, "
-           "draft, no level, plain. No frame is",
+           "with --live: time limit for each frame; noise reduction that does not fit is reduced in steps: standard in "
+           "place of high, draft, no level, plain. No frame is dropped",
            [&args](const std::string& text) -> Wrong {
              args.budget_ms = quantity_of(text, "ms");
              if (args.budget_ms && *args.budget_ms >= min_budget_ms && *args.budget_ms <= max_budget_ms) {
@@ -156,8 +159,8 @@ void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
              return "is not a number of milliseconds from 0.01 to 1e6";
            });
   app.add_flag("--force", args.develop.force, "overwrite files that exist");
-  app.add_flag("--json", args.develop.json, "what was done, as JSON on stdout (with --live on stderr)");
-  app.add_flag("--quiet", args.develop.quiet, "no warnings, no progress and no summary");
+  app.add_flag("--json", args.develop.json, "print a report as JSON on stdout (with --live on stderr)");
+  app.add_flag("--quiet", args.develop.quiet, "print no warnings, no progress and no summary");
 }
 
 // The first list applies to images alone, the second to images and videos; neither applies to raw files.
@@ -178,41 +181,42 @@ std::optional<std::string> given_of(const CLI::App& app, std::span<const char* c
 Wrong wrong_for_raw(const CLI::App& app, const CaptureArgs& args) {
   auto given = given_of(app, of_pictures);
   if (!given) given = given_of(app, of_pictures_and_films);
-  if (given) return *given + " is of pictures: a raw file keeps what the camera said, and `develop` has the option";
+  if (given)
+    return *given + " applies to images: a raw file keeps the values of the camera, and `develop` has the option";
   const isp::BlackChoice black = args.develop.options.black.choice;
   if (!args.develop.black_profile.empty() ||
       (black != isp::BlackChoice::automatic && black != isp::BlackChoice::given)) {
-    return "--black of a raw file is one or four figures in DN";
+    return "--black of a raw file must be one or four numbers in DN";
   }
   return std::nullopt;
 }
 
 Wrong wrong_for_live(const CLI::App& app, const CaptureArgs& args) {
-  if (const auto given = given_of(app, of_pictures)) return *given + " is of picture files, not of --live";
+  if (const auto given = given_of(app, of_pictures)) return *given + " applies to image files, not to --live";
   const isp::DevelopOptions& options = args.develop.options;
   using WhiteMode = isp::WhiteBalanceChoice::Mode;
   if (options.white_balance.mode != WhiteMode::as_shot && options.white_balance.mode != WhiteMode::automatic) {
-    return "--wb of --live is as-shot or auto";
+    return "--wb with --live must be as-shot or auto";
   }
-  if (options.exposure_offset_ev != 0) return "--exposure of --live is auto or a number of EV";
-  if (options.look.look == isp::Look::model) return "--look of --live is camera or eye";
+  if (options.exposure_offset_ev != 0) return "--exposure with --live must be auto or a number of EV";
+  if (options.look.look == isp::Look::model) return "--look with --live must be camera or eye";
   if (options.denoise.mode == isp::DenoiseChoice::Mode::level && options.denoise.level == denoise::Level::best) {
     return "--denoise best takes seconds for a frame: --live has up to high";
   }
   const isp::BlackChoice black = options.black.choice;
   if (!args.develop.black_profile.empty() ||
       (black != isp::BlackChoice::automatic && black != isp::BlackChoice::given)) {
-    return "--black of --live is one or four figures in DN; --profile names a profile";
+    return "--black with --live must be one or four numbers in DN; --profile names a profile";
   }
   return std::nullopt;
 }
 
 Wrong wrong_camera(const CaptureArgs& args) {
   if (args.v4l2.empty() == args.libcamera.empty()) {
-    return "name one camera: --v4l2 /dev/videoN or --libcamera ID; --list has those that are here";
+    return "name one camera: --v4l2 /dev/videoN or --libcamera ID; --list prints the connected cameras";
   }
-  if (args.v4l2.empty() && args.gain_code) return "--gain-code is of V4L2 cameras";
-  if (args.gain_code && args.request.analogue_gain) return "--gain and --gain-code do not go together";
+  if (args.v4l2.empty() && args.gain_code) return "--gain-code is an option of V4L2 cameras";
+  if (args.gain_code && args.request.analogue_gain) return "--gain and --gain-code are mutually exclusive";
   if (const auto checked = capture::check_camera_request(args.request); !checked) return checked.error().message;
   return std::nullopt;
 }
@@ -225,9 +229,9 @@ Wrong set_kind(const Words& words, CaptureArgs& args) {
     args.kind = CaptureKind::live;
     return std::nullopt;
   }
-  if (args.temporal) return "--temporal goes with --live";
-  if (args.budget_ms) return "--budget-ms goes with --live; of files `develop` has it";
-  if (output.empty()) return "say where frames go: -o OUT, or --live";
+  if (args.temporal) return "--temporal requires --live";
+  if (args.budget_ms) return "--budget-ms requires --live; for files use `develop`";
+  if (output.empty()) return "name an output: -o OUT, or --live";
   std::error_code ignored;
   args.folder = output.ends_with('/') || fs::is_directory(output, ignored);
   if (words.raw && !words.as.empty() && words.as != "dng")
@@ -237,7 +241,7 @@ Wrong set_kind(const Words& words, CaptureArgs& args) {
     args.kind = args.extension == "dng" ? CaptureKind::raw : CaptureKind::pictures;
     return std::nullopt;
   }
-  if (!words.as.empty()) return "--as goes with a folder as output; a file's name says its format";
+  if (!words.as.empty()) return "--as requires a folder as output; the name of a file states its format";
   std::string end = fs::path(output).extension().string();
   std::ranges::transform(end, end.begin(), ascii_lower);
   args.kind = end == ".dng" ? CaptureKind::raw : CaptureKind::pictures;
@@ -270,7 +274,7 @@ Wrong complete(const CLI::App& app, const Words& words, CaptureArgs& args) {
 }  // namespace
 
 Parsed<CaptureArgs> parse_capture(const std::vector<std::string>& words) {
-  CLI::App app("Takes raw frames from a camera: to pictures, raw files, or video on standard output.",
+  CLI::App app("Takes raw frames from a camera and writes images, raw files, or video to standard output.",
                "lowlux capture");
   CaptureArgs args;
   Words said;

@@ -62,8 +62,8 @@ int list_cameras(bool json) {
   print_listing("--libcamera", found.libcamera);
   if (found.v4l2.empty() && found.libcamera.empty()) print_out("no cameras\n");
   if (!found.note.empty()) {
-    print_err(
-        fmt::format("{}\n", one_line(fmt::format("lowlux: note: libcamera's cameras are left out: {}", found.note))));
+    print_err(fmt::format("{}\n",
+                          one_line(fmt::format("lowlux: note: cameras of libcamera are not listed: {}", found.note))));
   }
   return exit_done;
 }

@@ -25,7 +25,7 @@ Wrong set_gain_codes(const std::string& text, std::vector<capture::CameraGain>& 
     const auto factor = equals == std::string::npos ? std::nullopt : quantity_of(word.substr(equals + 1), "x");
     if (!code || !factor || std::abs(*code) > 1e9 || *code != std::round(*code) ||
         !(*factor > 0 && *factor <= most_gain)) {
-      return "is not a list such as 16=1,32=2,64=4: codes and the factors they stand for";
+      return "is not a list such as 16=1,32=2,64=4: codes and their factors";
     }
     out.push_back({.factor = *factor, .code = static_cast<int>(*code)});
   }
@@ -61,7 +61,7 @@ void add_auto_exposure(CLI::App& app, AutoExposureArgs& args) {
       app, "--mains",
       {{"auto", isp::Mains::either}, {"50", isp::Mains::hz50}, {"60", isp::Mains::hz60}, {"off", isp::Mains::off}},
       [&args](isp::Mains mains) { args.mains = mains; },
-      "with --auto-exposure: lamps that must not flicker (default auto: 50 and 60 Hz)");
+      "with --auto-exposure: mains frequency whose flicker is avoided (default auto: 50 and 60 Hz)");
   add_text(app, "--clip", "FRACTION", "with --auto-exposure: fraction of pixels that may clip (default 0.001)",
            store_within(args.clipped_fraction, 1e-9, 0.5, ""));
   add_text(app, "--gain-codes", "CODE=X,...", "with --auto-exposure: gain codes of a V4L2 camera, and their factors",
@@ -74,7 +74,7 @@ std::optional<std::string> wrong_auto_exposure(const CLI::App& app, const AutoEx
     const auto* const given =
         std::ranges::find_if(of_automatic, [&](const char* option) { return app.count(option) > 0; });
     if (given == of_automatic.end()) return std::nullopt;
-    return fmt::format("{} goes with --auto-exposure", *given);
+    return fmt::format("{} requires --auto-exposure", *given);
   }
   if (app.count("--exposure-time") > 0) return "--auto-exposure and --exposure-time are mutually exclusive";
   if (args.gain_codes.empty()) return std::nullopt;

@@ -77,7 +77,7 @@ Result<void> check_files(const CaptureArgs& args) {
   if (args.folder) {
     std::error_code error;
     fs::create_directories(develop.output, error);
-    if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), develop.output);
+    if (error) return fail(ErrorCode::unwritable, "the folder cannot be created: " + error.message(), develop.output);
   }
   const std::string first = frame_file(args, 1);
   if (auto place = check_place(first, develop.force); !place || args.limits.frames == 1 || develop.force) return place;

@@ -143,7 +143,7 @@ Result<std::vector<ConfigLine>> parse_config(std::string_view text, const std::s
     const std::size_t equals = line.find('=');
     const std::string_view option = trimmed(line.substr(0, equals));
     if (equals == std::string_view::npos || option.empty()) return wrong("a line is [VERB] or option = value");
-    if (verb.empty()) return wrong("a line [VERB], such as [develop], has to come first");
+    if (verb.empty()) return wrong("a line [VERB], such as [develop], must come first");
     lines.push_back({verb, std::string(option), std::string(trimmed(line.substr(equals + 1))), number});
   }
   return lines;

@@ -16,8 +16,8 @@ Parsed<DatasetArgs> parse_dataset(const std::vector<std::string>& words) {
   add_shard(app, "make every N-th sample from the I-th on (default 1/1: all)", args.shard);
   app.add_flag("--dry-run", args.dry_run, "predict bytes and time from up to 8 samples; write nothing to DIR");
   app.add_flag("--force", args.force, "replace samples of another spec or version in DIR");
-  app.add_flag("--json", args.json, "one JSON object on stdout");
-  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+  app.add_flag("--json", args.json, "print one JSON object on stdout");
+  app.add_flag("--quiet", args.quiet, "print no warnings and no progress");
   if (const auto code = parse_words(app, words)) return *code;
   if (args.output.empty() && !args.dry_run) return refuse(app, "-o is required: the folder of the samples");
   return args;

@@ -206,7 +206,7 @@ Result<void> set_own_keys(const Json& json, DatasetSpec& spec) {
   }
   const auto format = format_of(json);
   if (!format) return tl::make_unexpected(format.error());
-  if (*count == 0) return wrong("count", "has to be at least 1");
+  if (*count == 0) return wrong("count", "must be at least 1");
   if (*count > max_end - *first) return wrong("count", "first_index + count exceeds 2^63");
   spec.first_index = *first, spec.count = *count, spec.mask = *mask, spec.truth_electrons = *electrons;
   spec.format = *format;

@@ -76,7 +76,7 @@ Result<void> Manifest::commit() {
 
 Result<void> Manifest::write(std::string_view text) {
   if (std::fwrite(text.data(), 1, text.size(), file_.file()) == text.size()) return {};
-  return fail(ErrorCode::unwritable, "the file cannot be written whole; is the disk full?", name_);
+  return fail(ErrorCode::unwritable, "the file cannot be written completely; is the disk full?", name_);
 }
 
 }  // namespace lowlux::cli

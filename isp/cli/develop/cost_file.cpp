@@ -58,7 +58,7 @@ std::optional<std::vector<isp::CostPoint>> points_of(const Json& json) {
 Result<void> write_cost(const std::string& path, const isp::CostModel& model) {
   std::error_code error;
   std::filesystem::create_directories(std::filesystem::path(path).parent_path(), error);
-  if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), path);
+  if (error) return fail(ErrorCode::unwritable, "the folder cannot be created: " + error.message(), path);
   return isp::write_text(path, cost_text(model), isp::Overwrite::yes);
 }
 
@@ -110,7 +110,7 @@ Result<isp::CostModel> parse_cost(std::string_view text) {
   if (nests_deeper(text, max_json_depth)) return malformed("it is nested too deeply");
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object() || json.value("lowlux_cost_model", Json()) != Json(format_number)) {
-    return malformed(fmt::format("it does not say \"lowlux_cost_model\": {}", format_number));
+    return malformed(fmt::format("it does not contain \"lowlux_cost_model\": {}", format_number));
   }
   const Json machine = json.value("machine", Json()), threads = json.value("threads", Json());
   const Json parts = json.value("megapixels_and_seconds", Json()), pace = json.value("pace_s", Json());
@@ -135,20 +135,22 @@ Result<isp::CostModel> parse_cost(std::string_view text) {
 
 Result<isp::CostModel> kept_cost(int threads) {
   const auto path = cost_file(threads);
-  if (!path) return fail(ErrorCode::not_found, "without XDG_CACHE_HOME and HOME it is kept nowhere");
+  if (!path) return fail(ErrorCode::not_found, "it is not stored, because neither XDG_CACHE_HOME nor HOME is set");
   std::error_code ignored;
-  if (!std::filesystem::exists(*path, ignored)) return fail(ErrorCode::not_found, "no measurement is kept", *path);
+  if (!std::filesystem::exists(*path, ignored)) return fail(ErrorCode::not_found, "no measurement is stored", *path);
   const auto bytes = capture::read_file_bytes(*path, largest_file);
   if (!bytes) return tl::make_unexpected(bytes.error());
   auto model = parse_cost(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()));
   if (!model) return model;
   if (const std::string machine = machine_name(); model->machine != machine) {
-    return fail(ErrorCode::unsupported,
-                fmt::format("what is kept is of another machine: {}, and this is {}", model->machine, machine), *path);
+    return fail(
+        ErrorCode::unsupported,
+        fmt::format("the stored measurement is of another machine: {}, and this is {}", model->machine, machine),
+        *path);
   }
   if (model->threads != threads) {
-    return fail(ErrorCode::unsupported, fmt::format("what is kept is of {} threads, not {}", model->threads, threads),
-                *path);
+    return fail(ErrorCode::unsupported,
+                fmt::format("the stored measurement is for {} threads, not {}", model->threads, threads), *path);
   }
   return model;
 }
@@ -166,9 +168,10 @@ Result<isp::CostModel> calibrate_cost(int threads, bool quiet, std::string& writ
   if (const auto written = write_cost(*path, *model); !written) {
     progress.print([&] {
       print_err(fmt::format(
-          "{}\n", one_line(fmt::format(
-                      "lowlux: warning: {}: this machine's speed is not kept, so times stay rough estimates: {}", *path,
-                      written.error().message))));
+          "{}\n",
+          one_line(fmt::format(
+              "lowlux: warning: {}: the speed of this machine is not stored, so times remain rough estimates: {}",
+              *path, written.error().message))));
     });
   } else {
     written_to = *path;

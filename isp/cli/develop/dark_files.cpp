@@ -38,7 +38,8 @@ Result<double> doubling_of_profile(const std::string& file, const calib::FrameSe
     if (gain.sensor && gain.errors.dark_doubling_c > 0) return gain.sensor->dark_doubling_c;
   }
   return fail(ErrorCode::insufficient,
-              "the profile holds no measured doubling of the dark current; calibrate it with darks of two temperatures",
+              "the profile has no measured doubling temperature of the dark current; calibrate it with darks of two "
+              "temperatures",
               file);
 }
 
@@ -53,8 +54,8 @@ Plane<float> in_codes(const MosaicTiff& master, const RawDn& picture) {
 
 std::string unchecked_text(const MosaicTiff& master) {
   std::string text = fmt::format(
-      "{}: a {} does not state all of camera, ISO, exposure time, temperature and orientation; those of the picture "
-      "are assumed",
+      "{}: a {} does not state all of camera, ISO, exposure time, temperature and orientation; those of the image are "
+      "assumed",
       master.file, master.white ? "floating-point DNG" : "TIFF");
   if (master.scaled) text += "; its values, at most 1, are taken as fractions of 65535";
   return text;
@@ -84,7 +85,8 @@ Result<void> check_no_picture(const std::vector<Job>& jobs, const std::vector<st
       return fs::equivalent(job.input, file, ignored);
     });
     if (same == files.end()) continue;
-    return fail(ErrorCode::invalid_argument, fmt::format("{} is a picture and one of its {}", job.input, kind), option);
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("{} is given as an image and as one of its {}", job.input, kind), option);
   }
   return {};
 }
@@ -102,9 +104,10 @@ Result<DarkNames> dark_files(const DevelopArgs& args, const std::vector<Job>& jo
   if (!bias) return tl::make_unexpected(bias.error());
   const bool level_given = args.options.black.choice != isp::BlackChoice::automatic;
   if ((!darks->empty() && (level_given || !args.black_profile.empty())) || (!bias->empty() && level_given)) {
-    return fail(ErrorCode::invalid_argument,
-                "dark frames hold the black level already: taking both off leaves green shadows; give one of the two",
-                "--black");
+    return fail(
+        ErrorCode::invalid_argument,
+        "dark frames already contain the black level: subtracting both leaves green shadows; give one of the two",
+        "--black");
   }
   if (const auto apart = check_no_picture(jobs, *darks, "--dark-frame", "darks"); !apart) {
     return tl::make_unexpected(apart.error());
@@ -226,11 +229,10 @@ Result<void> DarkSource::check_bias_times(const RawDn& picture) const {
   for (std::size_t g = files_.darks; g < raw_groups_; ++g) {
     const auto& bias_s = files_.groups[g].setting.exposure_s;
     if (!bias_s || !picture.info.exposure_s || *bias_s <= max_time * *picture.info.exposure_s) continue;
-    return fail(
-        ErrorCode::invalid_argument,
-        fmt::format("a bias frame is exposed {:g} s, the picture {:g} s; take bias frames of the shortest time, "
-                    "or give darks with --dark-frame",
-                    *bias_s, *picture.info.exposure_s));
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("the exposure time of a bias frame is {:g} s, that of the image {:g} s; take bias frames "
+                            "of the shortest time, or give darks with --dark-frame",
+                            *bias_s, *picture.info.exposure_s));
   }
   return {};
 }

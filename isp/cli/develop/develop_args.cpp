@@ -22,8 +22,8 @@ namespace {
 void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
   app.add_option("RAW", args.inputs, "raw files, folders of them, or - for standard input")->required();
   app.add_flag("--maps", args.options.denoise.maps,
-               "also write maps of residual noise variance [e-^2] and colour confidence (0 to 1) of each 2x2 cell, "
-               "of each pixel where the raw file is not a mosaic: OUT.noise.pfm and OUT.confidence.pfm");
+               "also write maps of residual noise variance [e-^2] and colour confidence (0 to 1) of each 2x2 cell, or "
+               "of each pixel if the raw file is not a mosaic: OUT.noise.pfm and OUT.confidence.pfm");
   app.add_flag("--skip-existing", args.skip_existing, "leave out raw files whose outputs exist")
       ->excludes(app.add_flag("--force", args.force, "overwrite files that exist"));
   app.add_flag("--sync", args.sync, "wait until each file is on the disk (fsync)");
@@ -31,15 +31,15 @@ void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
       ->check(CLI::Range(1, 256));
   add_shard(app, "take every N-th raw file from the I-th on (default 1/1: all)", args.shard);
   app.add_flag("--explain", args.explain, explained);
-  app.add_flag("--json", args.json, "one JSON object for each file on stdout, as an array");
-  app.add_flag("--timings", args.timings, "time of each stage");
-  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+  app.add_flag("--json", args.json, "print one JSON object for each file on stdout, as an array");
+  app.add_flag("--timings", args.timings, "print the time of each stage");
+  app.add_flag("--quiet", args.quiet, "print no warnings and no progress");
 }
 
 void add_output(CLI::App& app, DevelopArgs& args) {
   app.add_option(
          "-o,--output", args.output,
-         "image to write (.png .jpg .tif .exr .pfm), - for standard output, or a folder (made if it ends with /)")
+         "image to write (.png .jpg .tif .exr .pfm), - for standard output, or a folder (created if it ends with /)")
       ->required()
       ->type_name("OUT");
   app.add_option("--format", args.format, "format of images written to a folder or to standard output (default: png)")
@@ -56,7 +56,7 @@ Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& w
   Parsed<DevelopArgs> parsed = parse(app, words, args);
   const isp::DenoiseChoice& choice = args.options.denoise;
   if (std::holds_alternative<DevelopArgs>(parsed) && choice.maps && choice.mode == isp::DenoiseChoice::Mode::off) {
-    return refuse(app, "--maps are of what --denoise leaves: they do not go with off");
+    return refuse(app, "--maps describes the result of --denoise and cannot be combined with --denoise off");
   }
   if (std::holds_alternative<DevelopArgs>(parsed)) {
     if (const auto wrong = wrong_profiles(args)) return refuse(app, *wrong);
@@ -96,11 +96,10 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
        {"--align", "--foreground", "--drizzle", "--pixfrac", "--mean", "--reference", "--false-alarm"}) {
     app.get_option(name)->needs(merge);
   }
-  add_batch(
-      app,
-      "what was decided for each file, why, and, where this machine's speed is known (bench --calibrate-cost), what "
-      "it takes",
-      args);
+  add_batch(app,
+            "print the decisions for each file, their reasons and, if the speed of this machine is known (bench "
+            "--calibrate-cost), their time",
+            args);
   app.get_option("--shard")->excludes(merge);
   Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
   if (auto* const good = std::get_if<DevelopArgs>(&parsed)) {
@@ -110,7 +109,7 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
     if (const auto wrong = complete_effects(good->look, good->effects)) return refuse(app, *wrong);
     if (const auto wrong = settle_merging(good->merging, good->effects.budgeted())) return refuse(app, *wrong);
     if (good->effects.budgeted() && good->jobs > 1) {
-      return refuse(app, "a budget is for one file at a time: leave --jobs out");
+      return refuse(app, "a budget requires one file at a time: leave --jobs out");
     }
   }
   return parsed;
@@ -121,7 +120,7 @@ Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
                "lowlux denoise");
   DevelopArgs args;
   app.add_option("-o,--output", args.output,
-                 "raw file to write (.dng), - for standard output, or a folder (made if it ends with /)")
+                 "raw file to write (.dng), - for standard output, or a folder (created if it ends with /)")
       ->required()
       ->type_name("CLEAN.dng");
   add_camera(app, args);
@@ -152,9 +151,9 @@ Parsed<DevelopArgs> parse_merge(const std::vector<std::string>& words) {
   app.add_flag("--force", args.force, "overwrite the file if it exists");
   app.add_flag("--sync", args.sync, "wait until the file is on the disk (fsync)");
   app.add_flag("--explain", args.explain, "how much of each frame was used, and why");
-  app.add_flag("--json", args.json, "one JSON object on stdout");
-  app.add_flag("--timings", args.timings, "time of each stage");
-  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+  app.add_flag("--json", args.json, "print one JSON object on stdout");
+  app.add_flag("--timings", args.timings, "print the time of each stage");
+  app.add_flag("--quiet", args.quiet, "print no warnings and no progress");
   Parsed<DevelopArgs> parsed = parse(app, words, args);
   if (auto* const good = std::get_if<DevelopArgs>(&parsed)) {
     if (const auto wrong = wrong_profiles(*good)) return refuse(app, *wrong);
@@ -165,10 +164,10 @@ Parsed<DevelopArgs> parse_merge(const std::vector<std::string>& words) {
 }
 
 Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
-  CLI::App app("Prints what raw files say, and what was measured on them.", "lowlux info");
+  CLI::App app("Prints the metadata of raw files and measurements on them.", "lowlux info");
   InfoArgs args;
   app.add_option("RAW", args.inputs, "raw files; with --advise one or none");
-  app.add_flag("--json", args.json, "JSON instead of text");
+  app.add_flag("--json", args.json, "print JSON instead of text");
   add_advise(app, args.advise);
   if (const auto code = parse_words(app, words)) return *code;
   const std::string wrong = validate_advise(app, args.advise, args.inputs.size());
@@ -181,19 +180,19 @@ Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words) {
                "lowlux reproduce");
   ReproduceArgs args;
   app.add_option("ID", args.experiments, "experiments (default: all); --list names them");
-  app.add_flag("--list", args.list, "the experiments, one line each");
+  app.add_flag("--list", args.list, "list the experiments");
   app.add_option("-o,--output", args.output,
-                 "folder, made if need be, for findings.csv, the plots' data and report.html")
+                 "folder, created if necessary, for findings.csv, the data of the plots and report.html")
       ->type_name("DIR");
   app.add_option(
          "--pictures-folder", args.pictures_folder,
-         "where the pictures of `retargeting` are (default: pictures next to the command, as its build makes them)")
+         "folder of the pictures of `retargeting` (default: pictures next to the command, as its build makes them)")
       ->type_name("DIR");
   app.add_flag("--quick", args.quick, "fewer samples: wider confidence intervals");
   app.add_option("--seed", args.seed, "of the random numbers (default 1)")
       ->check(CLI::NonNegativeNumber)
       ->type_name("N");
-  app.add_flag("--json", args.json, "JSON instead of a table");
+  app.add_flag("--json", args.json, "print JSON instead of a table");
   app.add_flag("--force", args.force, "overwrite files that exist");
   if (const auto code = parse_words(app, words)) return *code;
   return args;
@@ -228,7 +227,7 @@ std::optional<std::string> set_black(const std::string& text, DevelopArgs& args)
   } else if (text.ends_with(".json")) {
     args.black_profile = text;
   } else {
-    return fmt::format("is neither {} nor one or four figures in DN nor a profile (PROFILE.json)", joined(names));
+    return fmt::format("is neither {} nor one or four numbers in DN nor a profile (PROFILE.json)", joined(names));
   }
   return std::nullopt;
 }
@@ -253,11 +252,10 @@ std::optional<std::string> set_exposure(const std::string& text, DevelopArgs& ar
 
 void add_rendering(CLI::App& app, DevelopArgs& args) {
   isp::DevelopOptions& o = args.options;
-  add_text(
-      app, "--exposure", "auto[+EV|-EV]|EV",
-      "gain in EV, with or without a sign; auto places the median at middle grey, limited by highlights, night and "
-      "shadow noise; auto+1 is one EV above auto (default: auto; in linear spaces 0)",
-      [&args](const std::string& text) { return set_exposure(text, args); });
+  add_text(app, "--exposure", "auto[+EV|-EV]|EV",
+           "gain in EV, with or without a sign; auto places the median at middle grey, limited by highlights, scene "
+           "luminance and shadow noise; auto+1 is one EV above auto (default: auto; in linear spaces 0)",
+           [&args](const std::string& text) { return set_exposure(text, args); });
   add_white_balance(app, o.white_balance);
   add_choice<isp::ToneCurve>(
       app, "--tone", {{"standard", isp::ToneCurve::standard}, {"none", isp::ToneCurve::none}},
@@ -304,10 +302,10 @@ void add_camera(CLI::App& app, DevelopArgs& args) {
 
 std::optional<std::string> wrong_profiles(const DevelopArgs& args) {
   if (!args.profile.empty() && !args.black_profile.empty()) {
-    return "--black and --profile name a profile each: --profile uses all that is in one";
+    return "--black and --profile both name a profile: --profile uses all values of one";
   }
   if (!args.gain_setting.empty() && args.profile.empty() && args.black_profile.empty()) {
-    return "--gain-setting is one of a profile's: name the profile with --profile";
+    return "--gain-setting selects a setting of a profile: name the profile with --profile";
   }
   return std::nullopt;
 }
@@ -359,7 +357,7 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
            "maximum increase of the shadow noise variance by dark subtraction (default: 0.1)",
            [&dark](const std::string& text) -> std::optional<std::string> {
              const auto share = number_of(text);
-             if (!share || !(*share > 0 && *share <= 1)) return "is not a share above 0 and at most 1";
+             if (!share || !(*share > 0 && *share <= 1)) return "is not a fraction above 0 and at most 1";
              dark.noise_fraction = *share;
              return std::nullopt;
            })

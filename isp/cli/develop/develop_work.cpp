@@ -59,7 +59,7 @@ void remove_repeats(std::vector<std::string>& lines) {
   }
 }
 
-/// Adds BaselineExposure to an exposure that was given, for images to be looked at. The automatic one measures the
+/// Adds BaselineExposure to an exposure that was given, for images for viewing. The automatic one measures the
 /// image itself, and linear spaces are for measurement.
 void add_baseline_exposure(const DevelopArgs& args, ReadyFrame& ready) {
   if (!args.baseline_exposure || !ready.options.exposure_ev || is_linear(ready.options.space)) return;
@@ -127,7 +127,7 @@ Result<DevelopedFrame> develop_frame(const RawBatch& batch, const Job& job,
   out.noise = std::move(ready->noise);
   if (frames) remove_repeats(out.plan->warnings);
   if (ready->options.denoise.maps && !out.plan->noise_reduction.has_level()) {
-    out.plan->warnings.emplace_back("no maps were written: the noise is left as it is");
+    out.plan->warnings.emplace_back("no maps were written: noise is not reduced");
   }
   return made;
 }

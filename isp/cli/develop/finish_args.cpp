@@ -64,11 +64,11 @@ void add_finish(CLI::App& app, isp::DevelopOptions& options) {
   add_choice<isp::Highlights>(
       app, "--highlights", {{"clip", isp::Highlights::clip}, {"reconstruct", isp::Highlights::reconstruct}},
       [&options](isp::Highlights highlights) { options.highlights = highlights; },
-      "saturated colours: make them white, or rebuild them from the channels left and the light around (default: "
-      "clip)");
+      "saturated colours: make them white, or reconstruct them from the unsaturated channels and the light around "
+      "(default: clip)");
   add_text(app, "--local-tone", "SHARE",
-           "make shadows brighter and lights darker, 0 to 1, and keep their detail and the order of areas; shadows no "
-           "further than their noise allows (default: 0)",
+           "make shadows brighter and highlights darker, 0 to 1, and preserve detail and the order of areas; noise "
+           "limits the brightening of shadows (default: 0)",
            store_in_range(0, 1, "", options.local_tone));
   add_text(app, "--sharpen", "off|BLUR",
            "sharpen for a blur of this standard deviation in pixels, 0.3 to 1.5, as far as detail exceeds the noise "

@@ -53,13 +53,13 @@ Result<void> use_flat(const calib::FlatField& flat, RawFrame& picture) {
   calib::FrameSetting of_flats = flat.setting;
   of_flats.iso = setting->iso;  // neither vignetting nor response depends on the gain
   if (auto same = calib::check_same_camera(*setting, of_flats, "the flat frame"); !same) {
-    same.error().message += "; the first frame is the picture: take flats with its camera and size";
+    same.error().message += "; the first frame is the image: take flats with its camera and size";
     return same;
   }
   const auto& f_number = picture.raw.info.f_number;
   if (f_number && flat.f_number && *f_number != *flat.f_number) {
     picture.warnings.push_back(fmt::format(
-        "the flats were taken at f/{:g}, the picture at f/{:g}: the vignetting may differ", *flat.f_number, *f_number));
+        "the flats were taken at f/{:g}, the image at f/{:g}: the vignetting may differ", *flat.f_number, *f_number));
   }
   RawCorrections& corrections = picture.corrections;
   if (!corrections.gain_maps.empty() || !corrections.radial_gains.empty()) {

@@ -73,8 +73,8 @@ void add_scene(CLI::App& app, LookArgs& args) {
            });
   add_text(
       app, "--field-of-view", "DEGREES",
-      "that the longer side of the picture covers in the scene, which decides what detail the eye resolves (default "
-      "50)",
+      "angle that the longer side of the image covers in the scene; determines the detail that the eye resolves "
+      "(default 50)",
       [&args](const std::string& text) {
         args.given.emplace_back("--field-of-view");
         return store_number(text, {0.1, 180, "is not an angle in degrees", "degrees"}, args.choice.field_of_view_deg);
@@ -171,7 +171,7 @@ void add_look(CLI::App& app, LookArgs& args) {
   add_light(app, args);
   add_effects(app, args);
   add_text(app, "--noise-limit", "off|LIGHTNESS",
-           "CIE L* that noise may reach in even parts of the picture: shadows whose noise would exceed it are lifted "
+           "largest CIE L* of noise in even areas of the image: shadows whose noise would exceed it are brightened "
            "less (default: off, with --look eye 2)",
            [&args](const std::string& text) -> Wrong {
              args.noise_limit_given = true;
@@ -188,8 +188,7 @@ void add_look(CLI::App& app, LookArgs& args) {
          "(default: SHIN-SUB-1, a substitute)")
       ->type_name("FILE");
   add_text(app, "--display-luminance", "CD_M2",
-           "white of the display the picture is made for: colours are compensated for what the eye loses there, "
-           "compared with "
+           "luminance of white of the intended display: compensates for the loss of colour perception compared with "
            "displays of 250 cd/m2 (default: no change)",
            [&args](const std::string& text) -> Wrong {
              double luminance = 0;
@@ -213,7 +212,7 @@ void add_seeing_map(CLI::App& app, LookArgs& args) {
 std::optional<std::string> complete_look(const LookArgs& args, Planner planner, isp::LookChoice& choice) {
   choice = args.choice;
   if (!args.coefficients.empty() && choice.model != "shin" && !args.display_cd_m2) {
-    return "--coefficients go with --look shin or --display-luminance";
+    return "--coefficients requires --look shin or --display-luminance";
   }
   constexpr std::array only_eye{"--effects", "--tolerance", "--field-of-view", "--seeing-map"};
   const bool lists =
@@ -224,7 +223,7 @@ std::optional<std::string> complete_look(const LookArgs& args, Planner planner, 
     if (planner == Planner::of_everything && planned) continue;
     const bool for_models = std::ranges::find(only_eye, option) == only_eye.end();
     if (choice.look == isp::Look::camera || (choice.look == isp::Look::model && !for_models)) {
-      return option + (for_models ? " goes with --look eye or a model" : " goes with --look eye");
+      return option + (for_models ? " requires --look eye or a model" : " requires --look eye");
     }
   }
   if (choice.look == isp::Look::eye && !args.noise_limit_given) choice.noise_limit = eye_noise_limit;
@@ -256,23 +255,23 @@ void add_merge_budget(CLI::App& app, EffectsArgs& args) {
 }
 
 void add_budget(CLI::App& app, EffectsArgs& args) {
-  add_positive(
-      app, "--budget-ms", "MS", "ms",
-      "time for developing each frame, from decoded codes to a finished picture (files are read and written "
-      "besides): the most accurate way that is predicted to fit, or with --tolerance the fastest within it. "
-      "Times are rough estimates until bench --calibrate-cost has measured this machine; before each file how busy it "
-      "is is measured, which takes a tenth of a second or two more; one file at a time; with --merge the time is for "
-      "merging and developing",
-      args.budget_ms);
-  add_positive(app, "--budget-mpps", "MP_PER_S", "MP/s", "the same as megapixels in a second", args.budget_mpps);
+  add_positive(app, "--budget-ms", "MS", "ms",
+               "time limit for developing each frame, from decoded codes to a finished image, without reading and "
+               "writing files: chooses the most accurate plan that is predicted to fit, or with --tolerance the "
+               "fastest within it. Times are rough estimates until bench --calibrate-cost has measured this machine. "
+               "The load of the machine is measured before each file, which takes 0.1 to 0.2 s more. Files are "
+               "processed one at a time. With --merge the limit includes merging and developing",
+               args.budget_ms);
+  add_positive(app, "--budget-mpps", "MP_PER_S", "MP/s", "time limit like --budget-ms, in megapixels per second",
+               args.budget_mpps);
 }
 
 std::optional<std::string> complete_effects(const LookArgs& look, EffectsArgs& args) {
   using Which = isp::LookChoice::Which;
   if (args.budget_ms && args.budget_mpps) return "--budget-ms and --budget-mpps are mutually exclusive";
   const bool all = look.choice.which == Which::all;
-  if (all && is_given(look, "--tolerance")) return "--effects all leaves nothing out: --tolerance goes with auto";
-  if (all && args.budgeted()) return "--effects all leaves nothing out: a budget goes with auto";
+  if (all && is_given(look, "--tolerance")) return "--effects all leaves nothing out: --tolerance requires auto";
+  if (all && args.budgeted()) return "--effects all leaves nothing out: a budget requires auto";
   args.effects.emplace().all = all;
   if (args.budgeted() && !is_given(look, "--tolerance")) {
     args.effects->tolerance_delta_e.reset();

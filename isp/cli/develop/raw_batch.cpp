@@ -113,7 +113,7 @@ Result<RawBatch> make_batch(const DevelopArgs& args, isp::DevelopOptions options
   if (args.output.ends_with('/')) {
     std::error_code error;
     std::filesystem::create_directories(args.output, error);
-    if (error) return fail(ErrorCode::unwritable, "the folder cannot be made: " + error.message(), args.output);
+    if (error) return fail(ErrorCode::unwritable, "the folder cannot be created: " + error.message(), args.output);
   }
   if (args.effects.budgeted()) {
     batch.speed = std::make_shared<MachineSpeed>(cost_of_this_machine(threads_of_each(1), args.quiet));
@@ -261,7 +261,7 @@ class BatchRun {
       const Result<void> worked = work_(own, executor, progress, out);
       if (!worked) out.error = with_file(worked.error(), job.input);
     } catch (const std::bad_alloc&) {
-      out.error = Error{ErrorCode::too_large, "not enough memory; --jobs 1 takes the least", job.input};
+      out.error = Error{ErrorCode::too_large, "not enough memory; --jobs 1 needs least", job.input};
     } catch (const std::exception& failure) {
       out.error = Error{ErrorCode::too_large, failure.what(), job.input};
     }
@@ -279,7 +279,7 @@ class BatchRun {
       if (batch_.args.json) json_[static_cast<std::size_t>(index)] = develop_json(outcome, batch_.args.defaults);
       progress_.print([&] { print_outcome(batch_.args, outcome); });
     } catch (const std::bad_alloc&) {
-      print_err("lowlux: not enough memory to print what was done\n");
+      print_err("lowlux: not enough memory to print the report\n");
       reports_lost_ = true;
     }
   }

@@ -20,8 +20,8 @@ int run_denoise(const std::vector<std::string>& words) {
   Result<std::vector<Job>> jobs = plan_outputs(args, "dng");
   if (!jobs) return print_argument_error("denoise", jobs.error(), args.defaults);
   if (!jobs->front().output.ends_with(".dng") && !is_standard_stream(jobs->front().output)) {
-    return print_usage_error("denoise",
-                             {ErrorCode::invalid_argument, "a clean raw is a DNG: its name ends with .dng", "-o"});
+    return print_usage_error("denoise", {ErrorCode::invalid_argument,
+                                         "denoised raw files are written as DNG: the name must end with .dng", "-o"});
   }
   const Result<CalibrationFiles> calibration = calibration_files(args, *jobs);
   if (!calibration) return print_argument_error("denoise", calibration.error(), args.defaults);

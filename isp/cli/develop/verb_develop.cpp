@@ -45,9 +45,9 @@ int run_develop(const std::vector<std::string>& words) {
   if (!format) return print_usage_error("develop", format.error(), args.defaults);
   const bool is_named = !names_folder(args) && !is_standard_stream(args.output);
   if (!args.format.empty() && is_named && !args.defaults.sets("--format")) {
-    return print_usage_error(
-        "develop", {ErrorCode::invalid_argument, "is for a folder or - as output; the name of a file states its format",
-                    "--format"});
+    return print_usage_error("develop",
+                             {ErrorCode::invalid_argument,
+                              "requires a folder or - as output; the name of a file states its format", "--format"});
   }
   Result<isp::DevelopOptions> options = complete_options(args, *format);
   if (!options) return print_usage_error("develop", options.error(), args.defaults);

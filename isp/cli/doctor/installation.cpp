@@ -83,9 +83,9 @@ InstalledPart find_profiles() {
   }
   return {.name = "profiles",
           .state = State::missing,
-          .remedy = fmt::format("none in {}: `cmake --install` puts them there; they are in calib/profiles of the "
-                                "sources",
-                                folder.string())};
+          .remedy = fmt::format(
+              "none in {}: `cmake --install` installs them there; they are in calib/profiles of the sources",
+              folder.string())};
 }
 
 InstalledPart find_cost_table() {

@@ -59,7 +59,7 @@ int run_doctor(const std::vector<std::string>& words) {
       "would help. The exit status is 1 if raw files cannot be developed.",
       "lowlux doctor");
   bool json = false;
-  app.add_flag("--json", json, "JSON instead of text");
+  app.add_flag("--json", json, "print JSON instead of text");
   if (const auto code = parse_words(app, words)) return *code;
   const std::vector<InstalledPart> parts = find_installation();
   json ? print_json(parts) : print_parts(parts);

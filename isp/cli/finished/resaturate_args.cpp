@@ -35,45 +35,42 @@ std::optional<std::string> set_area(const std::string& text, ResaturateArgs& arg
 
 Parsed<ResaturateArgs> parse_resaturate(const std::vector<std::string>& words) {
   CLI::App app(
-      "Gives a finished picture, whose raw file is lost, the colours back that dark current took. A picture's noise is "
-      "not changed, nor is its luminance; of raw files `develop` and `denoise` take the dark charge off, which is "
-      "better.",
+      "Restores colour lost to dark current in a finished image. Noise and luminance are not changed. If the raw file "
+      "exists, use `develop` or `denoise` instead: they subtract the dark charge.",
       "lowlux resaturate");
   ResaturateArgs args;
   app.add_option("IMAGE", args.input, "picture (PNG, JPEG, TIFF, OpenEXR, PFM, PPM)")->required();
   app.add_option("-o,--output", args.output, "picture to write (.png .jpg .tif .exr .pfm)")
       ->required()
       ->type_name("OUT");
-  add_text(app, "--black", "R,G,B",
-           "black point: what the picture shows where there is no light, in sRGB codes 0 to 255",
+  add_text(app, "--black", "R,G,B", "black point: sRGB codes, 0 to 255, of areas without light",
            [&args](const std::string& text) { return set_codes(text, args); });
-  add_text(app, "--black-area", "X,Y,WIDTH,HEIGHT", "black point: the mean of this part of the picture, in pixels",
+  add_text(app, "--black-area", "X,Y,WIDTH,HEIGHT", "black point: the mean of this area of the image, in pixels",
            [&args](const std::string& text) { return set_area(text, args); });
-  add_text(
-      app, "--chroma-noise", "SHARE",
-      "standard deviation of a pixel's chroma, of white (default: measured on the picture): the larger, the less is "
-      "colour believed in the dark",
-      [&args](const std::string& text) -> std::optional<std::string> {
-        args.chroma_noise = number_of(text);
-        if (!args.chroma_noise || *args.chroma_noise < 0 || *args.chroma_noise > 1) return "is not within 0 to 1";
-        return std::nullopt;
-      });
-  add_text(app, "--prior", "STD", "how colourful scenes are: standard deviation of x and y (default 0.065)",
+  add_text(app, "--chroma-noise", "SHARE",
+           "standard deviation of a pixel's chroma, relative to white (default: measured on the image); larger values "
+           "fade uncertain colour in the dark more",
+           [&args](const std::string& text) -> std::optional<std::string> {
+             args.chroma_noise = number_of(text);
+             if (!args.chroma_noise || *args.chroma_noise < 0 || *args.chroma_noise > 1) return "is not within 0 to 1";
+             return std::nullopt;
+           });
+  add_text(app, "--prior", "STD", "expected colourfulness of scenes: standard deviation of x and y (default 0.065)",
            [&args](const std::string& text) -> std::optional<std::string> {
              args.prior_std = number_of(text).value_or(0);
              if (args.prior_std < 0.001 || args.prior_std > 1) return "is not within 0.001 to 1";
              return std::nullopt;
            });
-  app.add_option("--radius", args.radius, "pixels around one over which its brightness is averaged (default 4)")
+  app.add_option("--radius", args.radius, "radius in pixels over which the brightness is averaged (default 4)")
       ->check(CLI::Range(0, 64));
   app.add_option("--bits", args.bits, bits_help)->check(CLI::IsMember({8, 16, 32}));
   app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
   app.add_flag("--force", args.force, "overwrite a file that exists");
-  app.add_flag("--json", args.json, "JSON instead of text");
-  app.add_flag("--quiet", args.quiet, "no warnings and no text");
+  app.add_flag("--json", args.json, "print JSON instead of text");
+  app.add_flag("--quiet", args.quiet, "print no warnings and no text");
   if (const auto code = parse_words(app, words)) return *code;
   if (args.black_codes.has_value() == args.black_area.has_value()) {
-    return refuse(app, "the black point is needed once: --black R,G,B, or --black-area of a part without light");
+    return refuse(app, "give the black point once: --black R,G,B, or --black-area of an area without light");
   }
   return args;
 }

@@ -16,7 +16,7 @@ void add_model(CLI::App& app, RetargetArgs& args) {
   for (const auto& [method, name] : isp::retarget_methods) methods.emplace(name, method);
   add_choice(
       app, "--model", methods, [&args](isp::RetargetMethod method) { args.options.method = method; },
-      "how colours are found (default constrained: best by Shin's model alone)");
+      "method (default constrained, which is best by Shin's model)");
   app.add_option(
          "--coefficients", args.coefficients,
          "coefficients of Shin's model: lines of E, alpha, beta, l, a, m, b (default: SHIN-SUB-1, a substitute)")
@@ -24,22 +24,22 @@ void add_model(CLI::App& app, RetargetArgs& args) {
   const Names<isp::ShinUnits> units{{"lux", isp::ShinUnits::lux}, {"luminance", isp::ShinUnits::luminance_as_is}};
   add_choice(
       app, "--units", units, [&args](isp::ShinUnits unit) { args.options.units = unit; },
-      "what E of the coefficients is: the lux on white, or its luminance in cd/m2 (default lux)");
+      "unit of E in the coefficients: illuminance of white in lux, or its luminance in cd/m2 (default lux)");
 }
 
 }  // namespace
 
 Parsed<RetargetArgs> parse_retarget(const std::vector<std::string>& words) {
   CLI::App app(
-      "Makes a picture look on a dim display as it does on a bright one: in dim light the eye sees less colour, so the "
-      "picture is given more.",
+      "Adapts an image to a dim display, so that it looks as it does on a bright one: colour is increased, because the "
+      "eye sees less colour in dim light.",
       "lowlux retarget");
   RetargetArgs args;
   app.add_option("IMAGE", args.input, "picture (PNG, JPEG, TIFF, OpenEXR, PFM, PPM)")->required();
   app.add_option("-o,--output", args.output, "picture to write (.png .jpg .tif .exr .pfm)")
       ->required()
       ->type_name("OUT");
-  add_luminance(app, "--source-luminance", "luminance of white the picture is right for (default 250)",
+  add_luminance(app, "--source-luminance", "luminance of white for which the image was made (default 250)",
                 args.options.source_cd_m2);
   add_luminance(app, "--display-luminance", "luminance of the display's white (default 2)", args.options.display_cd_m2);
   add_luminance(app, "--display-black", "luminance of the display's black (default 0)",
@@ -48,8 +48,8 @@ Parsed<RetargetArgs> parse_retarget(const std::vector<std::string>& words) {
   app.add_option("--bits", args.bits, bits_help)->check(CLI::IsMember({8, 16, 32}));
   app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
   app.add_flag("--force", args.force, "overwrite a file that exists");
-  app.add_flag("--json", args.json, "JSON instead of text");
-  app.add_flag("--quiet", args.quiet, "no warnings and no text");
+  app.add_flag("--json", args.json, "print JSON instead of text");
+  app.add_flag("--quiet", args.quiet, "print no warnings and no text");
   if (const auto code = parse_words(app, words)) return *code;
   if (const auto possible = isp::retargeting(args.options); !possible) return refuse(app, possible.error().message);
   if (isp::coefficients_name(args.options).empty() && (!args.coefficients.empty() || app.count("--units") > 0)) {

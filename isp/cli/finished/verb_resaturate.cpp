@@ -34,8 +34,8 @@ isp::Xyz black_of_codes(const std::array<double, 3>& codes) {
 Result<isp::Xyz> black_of_area(const SceneLinear& xyz, const Rect& area) {
   if (area.x + area.width > xyz.width() || area.y + area.height > xyz.height()) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("the picture is {} x {}, {} x {} pixels at ({}, {}) do not lie in it", xyz.width(),
-                            xyz.height(), area.width, area.height, area.x, area.y),
+                fmt::format("the image has {} x {} pixels, and {} x {} pixels at ({}, {}) are not inside it",
+                            xyz.width(), xyz.height(), area.width, area.height, area.x, area.y),
                 "--black-area");
   }
   Vector3 sum{};
@@ -56,7 +56,7 @@ void add_warnings(ResaturateOutcome& out) {
   }
   if (out.made.fraction_saturated > 0.5) {
     out.warnings.push_back(
-        fmt::format("{:.0f} % of the image is saturated and stays as it is", 100 * out.made.fraction_saturated));
+        fmt::format("{:.0f} % of the image is saturated and not changed", 100 * out.made.fraction_saturated));
   }
 }
 

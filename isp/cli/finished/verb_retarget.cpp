@@ -83,8 +83,8 @@ void print_outcome(const RetargetArgs& args, const RetargetOutcome& done) {
                                           o.units == isp::ShinUnits::lux ? "the lux on white" : "luminance"));
   }
   lines.add("beyond gamut",
-            fmt::format("{:.1f} % of the pixels: as near as the display shows", 100 * done.made.fraction_held));
-  lines.add("table", fmt::format("{0} x {0} x {0}, off by {1:.2f} CIEDE2000 in the mean, {2:.1f} at most",
+            fmt::format("{:.1f} % of the pixels: nearest colour of the display", 100 * done.made.fraction_held));
+  lines.add("table", fmt::format("{0} x {0} x {0}, error {1:.2f} CIEDE2000 on average, {2:.1f} at most",
                                  done.made.levels, done.made.error.mean_ciede2000, done.made.error.max_ciede2000));
   print_out(fmt::format("{}\n{}", one_line(args.output), lines.text()));
 }

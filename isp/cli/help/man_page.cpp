@@ -100,7 +100,7 @@ std::string command_man_page(std::span<const std::pair<std::string_view, std::st
   std::string out = heading("lowlux", "raw developer for low light");
   out +=
       ".SH SYNOPSIS\n.B lowlux\n.I VERB\n[\\fIOPTIONS\\fR]\n.SH DESCRIPTION\nDevelops raw files taken in low light, "
-      "measures cameras and simulates them. Each verb has a manual page of its own, lowlux\\-VERB(1).\n.SH VERBS\n";
+      "measures cameras and simulates them. Each verb has its own manual page, lowlux\\-VERB(1).\n.SH VERBS\n";
   for (const auto& [name, summary] : verbs) out += fmt::format(".TP\n\\fB{}\\fR\n{}\n", roff(name), roff(summary));
   out += ".SH OPTIONS\n.TP\n\\fB\\-h\\fR, \\fB\\-\\-help\\fR\nlist the verbs\n.TP\n";
   out += "\\fB\\-v\\fR, \\fB\\-\\-version\\fR\nprint the version and what is built in\n";

@@ -27,28 +27,28 @@ std::optional<std::string> set_highlight(const std::string& text, AdviseArgs& ar
 }
 
 void add_camera(CLI::App& app, AdviseArgs& args) {
-  app.add_option("--sensor", args.sensor, "by name (`lowlux simulate --list`), or the file of a camera's profile")
+  app.add_option("--sensor", args.sensor, "sensor by name (`lowlux simulate --list`), or file of a camera profile")
       ->type_name("NAME|PROFILE.json")
       ->group(group);
   app.add_option("--gain", args.gain, "only this gain setting (default: the best of all)")
       ->type_name("SETTING")
       ->group(group);
   app.add_option("--camera", args.figures.camera,
-                 "whose spectral sensitivities (default: the sensor's own or a stand-in)")
+                 "camera whose spectral sensitivities are used (default: the sensor's own or a substitute)")
       ->type_name("NAME")
       ->group(group);
-  add_optional(app, "--f-number", "f/N", "(default: the file's; without a file 2)", args.f_number);
-  add_optional(app, "--temperature", "C", "of the sensor (default: the file's, or 20)", args.temperature_c);
+  add_optional(app, "--f-number", "f/N", "f-number of the lens (default: the file's; without a file 2)", args.f_number);
+  add_optional(app, "--temperature", "C", "temperature of the sensor (default: the file's, or 20)", args.temperature_c);
 }
 
 void add_figures(CLI::App& app, AdviseArgs& args) {
   isp::SensorFigures& f = args.figures;
   add_optional(app, "--system-gain", "DN_PER_E", "system gain in DN per electron; with --gain", f.system_gain_dn_per_e);
-  add_optional(app, "--read-noise", "E", "standard deviation; with --gain", f.read_noise_e);
+  add_optional(app, "--read-noise", "E", "read noise, standard deviation in electrons; with --gain", f.read_noise_e);
   add_optional(app, "--iso", "ISO", "saturation-based speed; with --gain", f.iso);
   add_optional(app, "--full-well", "E", "charge of a full pixel", f.full_well_e);
-  app.add_option("--bits", f.bits, "of the converter")->type_name("N")->group(group);
-  add_text(app, "--dark-current", "E_PER_S[,G,B]", "for all channels, or for red, green and blue",
+  app.add_option("--bits", f.bits, "number of bits of the converter")->type_name("N")->group(group);
+  add_text(app, "--dark-current", "E_PER_S[,G,B]", "dark current of all channels, or of red, green and blue",
            [&f](const std::string& text) -> std::optional<std::string> {
              const auto n = numbers_of(text, 3);
              if (!n || n->size() == 2) return "is neither one number nor three";
@@ -59,15 +59,16 @@ void add_figures(CLI::App& app, AdviseArgs& args) {
   add_optional(app, "--pixel-pitch", "UM", "side of a pixel", f.pixel_pitch_um);
   add_optional(app, "--peak-qe", "RATIO", "largest quantum efficiency, electrons per photon",
                f.peak_quantum_efficiency);
-  add_optional(app, "--white-luminance", "CD_M2", "of a white that fills a pixel in 1 s", args.white_luminance_cd_m2);
+  add_optional(app, "--white-luminance", "CD_M2", "luminance of a white that fills a pixel in 1 s",
+               args.white_luminance_cd_m2);
 }
 
 void add_scene(CLI::App& app, AdviseArgs& args) {
-  add_optional(app, "--luminance", "CD_M2", "of the mid tone (default: the median of the file's green pixels)",
-               args.midtone_cd_m2);
+  add_optional(app, "--luminance", "CD_M2",
+               "luminance of the mid tone (default: the median of the file's green pixels)", args.midtone_cd_m2);
   add_text(app, "--highlight", "CD_M2|RATIOx",
-           "luminance that must not clip, or how many times the mid tone's it is (default: what the share --clip of "
-           "the file's green pixels exceeds)",
+           "luminance that must not clip, in cd/m2 or as a multiple of the mid tone's (default: the one that the "
+           "fraction --clip of the file's green pixels exceeds)",
            [&args](const std::string& text) { return set_highlight(text, args); })
       ->group(group);
   app.add_option("--illuminant", args.light, "light of the scene, by name (default D65)")
@@ -87,21 +88,24 @@ void add_advise(CLI::App& app, AdviseArgs& args) {
   add_figures(app, args);
   add_scene(app, args);
   add_optional(app, "--max-exposure", "S", "longest exposure", args.longest_exposure_s);
-  add_optional(app, "--motion", "PX_PER_S", "how fast the scene moves; goes with --blur", args.speed_px_per_s);
-  add_optional(app, "--blur", "PX", "how far it may move during the exposure", args.blur_px);
+  add_optional(app, "--motion", "PX_PER_S", "speed of the scene; with --blur", args.speed_px_per_s);
+  add_optional(app, "--blur", "PX", "largest displacement of the scene during the exposure; with --motion",
+               args.blur_px);
   add_number(app, "--clip", "SHARE", "fraction of pixels that may clip (default 0.001; without --sensor 0.00001)",
              [&args](double share) { args.clipped_share = share; })
       ->group(group);
-  add_optional(app, "--snr", "DB", "that the darkest tenth is to reach in a merged raw (default 20); without --sensor",
+  add_optional(app, "--snr", "DB",
+               "signal-to-noise ratio of the darkest tenth in a merged raw (default 20); without --sensor",
                args.snr_db);
-  add_number(app, "--patch", "PIXELS", "red pixels of the patch whose chromaticity is judged (default 256)",
+  add_number(app, "--patch", "PIXELS",
+             "number of red pixels of the patch whose chromaticity is evaluated (default 256)",
              [&args](double pixels) { args.patch_pixels = pixels; })
       ->group(group);
-  app.add_option("--frames", args.frames, "frames that are averaged (default 1)")
+  app.add_option("--frames", args.frames, "number of frames that are averaged (default 1)")
       ->check(CLI::Range(1, 1000000))
       ->type_name("N")
       ->group(group);
-  app.add_option("--report", args.report, "page to write, with the curves")->type_name("PAGE.html")->group(group);
+  app.add_option("--report", args.report, "write a page with the curves")->type_name("PAGE.html")->group(group);
   app.add_flag("--force", args.force, "overwrite the page if it exists")->group(group);
   for (CLI::Option* option : app.get_options([](const CLI::Option* o) { return o->get_group() == group; })) {
     if (option != wanted) option->needs(wanted);
@@ -134,16 +138,16 @@ std::string validate_bracket(const CLI::App& app, const AdviseArgs& args, std::s
 
 std::string validate_advise(const CLI::App& app, const AdviseArgs& args, std::size_t files) {
   if (!args.wanted) return files == 0 ? "RAW is required" : "";
-  if (args.speed_px_per_s.has_value() != args.blur_px.has_value()) return "--motion and --blur go together";
+  if (args.speed_px_per_s.has_value() != args.blur_px.has_value()) return "--motion and --blur must be given together";
   if (args.sensor.empty() && files <= 1) return validate_bracket(app, args, files);
   if (files > 1) return "--advise takes one raw file, or none with --luminance and --highlight";
   if (files == 0 && !args.midtone_cd_m2) return "--advise without a raw file needs --luminance";
   if (files == 0 && !args.highlight_cd_m2 && !args.highlight_ratio) {
     return "--advise without a raw file needs --highlight, as a luminance or as 20x";
   }
-  if (args.snr_db) return "--snr is for the frames of a merge: leave --sensor out";
+  if (args.snr_db) return "--snr applies to the frames of a merge: leave --sensor out";
   if (!args.report.empty() && !args.report.ends_with(".html")) {
-    return "--report is a page, its name ends with .html, found " + args.report;
+    return "--report writes a page, whose name must end with .html, found " + args.report;
   }
   if (!args.longest_exposure_s && !args.speed_px_per_s) {
     return "--advise needs a longest exposure: --max-exposure, or --motion with --blur";

@@ -59,9 +59,9 @@ std::string reason(const BracketCase& found) {
   const std::string levels = fmt::format(
       "the brightest lamps saturate after {}, a single frame reaches {:.3g} dB in the darkest tenth after {}",
       exposure_text(a.highlight_exposure_s), isp::decibel(found.request.snr), exposure_text(a.shadow_exposure_s));
-  if (a.is_bracket()) return "one exposure does not hold both: " + levels;
+  if (a.is_bracket()) return "one exposure does not suffice for both: " + levels;
   if (a.shadow_exposure_s <= std::min(a.highlight_exposure_s, found.request.longest_exposure_s)) {
-    return "one exposure holds both: " + levels;
+    return "one exposure suffices for both: " + levels;
   }
   if (found.request.longest_exposure_s < a.highlight_exposure_s) {
     return fmt::format("exposures are at most {}, before highlights saturate: {}",

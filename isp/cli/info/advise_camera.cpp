@@ -48,7 +48,7 @@ void note_unknown(const isp::GainSetting& gain, std::vector<std::string>& notes)
 Result<Spectrum> light_of(const std::string& name) {
   if (auto light = isp::light_named(name)) return *std::move(light);
   return fail(ErrorCode::invalid_argument,
-              fmt::format("there is no light '{}'; {}", name, cure_of(near_matches(name, isp::light_names()))),
+              fmt::format("unknown light '{}'; {}", name, cure_of(near_matches(name, isp::light_names()))),
               "--illuminant");
 }
 
@@ -59,7 +59,7 @@ Result<Matrix3> matrix_of(const std::string& camera, const Spectrum& light) {
   const auto sensitivity = isp::camera_sensitivity(camera);
   if (!sensitivity) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("there are no spectral sensitivities of a '{}'; {}", camera,
+                fmt::format("no spectral sensitivities of '{}' are known; {}", camera,
                             cure_of(near_matches(camera, isp::camera_names()))),
                 "--camera");
   }
@@ -79,8 +79,7 @@ Result<std::vector<std::string>> settings_of(const AdviseArgs& args) {
   const isp::SensorFigures& f = args.figures;
   if (settings.size() > 1 && (f.system_gain_dn_per_e || f.read_noise_e || f.iso)) {
     return fail(ErrorCode::invalid_argument,
-                "--system-gain, --read-noise and --iso are those of one gain setting; say of which with --gain",
-                args.sensor);
+                "--system-gain, --read-noise and --iso apply to one gain setting; name it with --gain", args.sensor);
   }
   return settings;
 }
@@ -108,7 +107,7 @@ Result<void> take_named(const AdviseArgs& args, const Spectrum& light, const isp
       continue;
     }
     for (const std::string& assumption : sensor->assumptions)
-      add_note(out.notes, "assumed, as there is no published value: " + assumption);
+      add_note(out.notes, "assumed, because there is no published value: " + assumption);
     out.camera = fmt::format("{}, {}", response->name, sensor->source);
     camera = sensor->camera;
     const std::string& name = sensor->gain_setting.empty() ? args.sensor : sensor->gain_setting;
@@ -133,7 +132,7 @@ Result<CameraColour> colour_of(const CameraProfile& profile, const std::string& 
     std::string names;
     for (const ColourProfile& c : profile.colours) names += (names.empty() ? "" : ", ") + c.illuminant;
     return fail(ErrorCode::insufficient,
-                fmt::format("the profile has no colours for {}; give --illuminant one of {}", light, names));
+                fmt::format("the profile has no colour matrix for {}; use --illuminant with one of {}", light, names));
   }
   colour.calibrations.reserve(profile.colours.size());
   for (const ColourProfile& c : profile.colours) colour.calibrations.push_back(c.calibration);
@@ -151,7 +150,8 @@ Result<ProfileColour> profile_colour(const AdviseArgs& args, const CameraProfile
   ProfileColour out;
   if (args.figures.camera || profile.colours.empty()) {
     if (!args.figures.camera) {
-      return fail(ErrorCode::insufficient, "the profile has no colours; give --camera, whose sensitivities come near");
+      return fail(ErrorCode::insufficient,
+                  "the profile has no colour matrix; name a camera with similar sensitivities with --camera");
     }
     const auto matrix = matrix_of(*args.figures.camera, light);
     if (!matrix) return tl::make_unexpected(matrix.error());
@@ -172,7 +172,7 @@ Result<ProfileColour> profile_colour(const AdviseArgs& args, const CameraProfile
 
 Result<void> take_profile(const AdviseArgs& args, const Spectrum& light, const isp::Optics& optics, AdviceCase& out) {
   if (has_figures(args.figures)) {
-    return fail(ErrorCode::invalid_argument, "a profile has its own figures; change them there", args.sensor);
+    return fail(ErrorCode::invalid_argument, "these values are those of the profile; change them there", args.sensor);
   }
   const auto profile = read_profile(args.sensor);
   if (!profile) return tl::make_unexpected(profile.error());
@@ -202,7 +202,7 @@ Result<void> take_profile(const AdviseArgs& args, const Spectrum& light, const i
   }
   if (out.request.gains.empty()) {
     return fail(ErrorCode::insufficient,
-                "no gain of the profile that is asked for has sensor figures and an ISO speed; measure its photon "
+                "no requested gain setting of the profile has sensor figures and an ISO speed; measure its photon "
                 "transfer, or give --white-luminance",
                 args.sensor);
   }
@@ -222,7 +222,7 @@ Result<void> take_scene(const AdviseArgs& args, const RawFrame* frame, AdviceCas
     if (!highlight && !args.highlight_ratio) highlight = std::max(seen->highlight_cd_m2, *midtone);
     add_note(out.notes, "luminances of the file are estimated from its f-number, ISO and exposure time");
     if (seen->highlight_clips)
-      add_note(out.notes, "the file's highlights are clipped: they are brighter than is known");
+      add_note(out.notes, "the file's highlights are clipped: their luminance is higher than estimated");
   }
   r.midtone_cd_m2 = *midtone;
   r.highlight_cd_m2 = args.highlight_ratio ? *args.highlight_ratio * *midtone : *highlight;
@@ -237,7 +237,7 @@ Result<void> take_scene(const AdviseArgs& args, const RawFrame* frame, AdviceCas
   r.frames = args.frames;
   const auto of_file = frame != nullptr ? frame->raw.info.temperature_c : std::nullopt;
   r.temperature_c = args.temperature_c.value_or(of_file.value_or(20));
-  if (!args.temperature_c && !of_file) add_note(out.notes, "the sensor is taken to be at 20 C");
+  if (!args.temperature_c && !of_file) add_note(out.notes, "a sensor temperature of 20 C is assumed");
   return {};
 }
 
@@ -295,10 +295,9 @@ double exceeded_by(std::vector<float>& values, double share) {
 Result<RawLuminance> raw_luminance(const RawFrame& frame, const FrameInfo& info, double share) {
   const auto saturation_cd_m2 = isp::saturation_luminance_cd_m2(info);
   if (!saturation_cd_m2) {
-    return fail(
-        ErrorCode::insufficient,
-        "the luminance is unknown, it takes exposure time, f-number and ISO to estimate it; give --luminance and "
-        "--highlight");
+    return fail(ErrorCode::insufficient,
+                "the luminance is unknown, because its estimate needs exposure time, f-number and ISO; give "
+                "--luminance and --highlight");
   }
   const auto black = isp::choose_black(frame.raw, {});
   if (!black) return tl::make_unexpected(black.error());

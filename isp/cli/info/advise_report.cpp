@@ -96,7 +96,7 @@ std::string scene_of(const isp::AdviceRequest& r) {
       r.patch_pixels);
 }
 
-constexpr const char* heavy_note = "* a bound only: of so little signal the chromaticity scatters with heavy tails";
+constexpr const char* heavy_note = "* a bound only: at so little signal the chromaticity scatters with heavy tails";
 
 Json point_json(const isp::AdvicePoint& p) {
   Json json{{"exposure_s", p.exposure_s},
@@ -146,7 +146,7 @@ isp::Plot plot_of(const AdviceCase& asked, const isp::ExposureAdvice& advice, bo
   const isp::AdvicePoint& best = advice.gains[advice.best].at;
   plot.series.push_back({"advised", {best.exposure_s}, {value(best)}, isp::Mark::points});
   plot.caption =
-      chromaticity ? "The bound no unbiased estimator passes (Cramer-Rao)." : "Of the channel with most signal.";
+      chromaticity ? "Lower bound for unbiased estimators (Cramer-Rao)." : "Of the channel with most signal.";
   return plot;
 }
 

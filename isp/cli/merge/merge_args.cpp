@@ -38,19 +38,19 @@ void add_merging(CLI::App& app, MergeArgs& args) {
        {"subpixel", isp::MergeAlignment::subpixel},
        {"stars", isp::MergeAlignment::stars}},
       [&options](Alignment alignment) { options.alignment = alignment; },
-      "how frames are brought to one place (auto: subpixel if the camera moved, else none)");
+      "how frames are aligned (auto: subpixel if the camera moved, else none)");
   add_choice<bool>(
       app, "--foreground", {{"move", false}, {"keep", true}}, [&options](bool keep) { options.keep_foreground = keep; },
-      "with --align stars: what stands still on the ground moves with them, or keeps its place");
+      "with --align stars: displace a foreground that stands still with the stars, or keep its position");
   add_within(app, "--drizzle", "SCALE", "make a LinearRaw image of measured colours, SCALE times as wide (1 to 3)", 1,
              3, [&args](double scale) { args.drizzle_scale = scale; });
   add_within(app, "--pixfrac", "SIDE", "with --drizzle: side of a drop in pixels (default 1)", 0.05, 1,
              [&args](double side) { args.pixfrac = side; });
   add_choice<bool>(
       app, "--mean", {{"robust", true}, {"plain", false}}, [&options](bool robust) { options.robust = robust; },
-      "leave out what does not match (default; a budget may decide), or average everything");
+      "leave out content that does not match (default; a budget may decide), or average everything");
   app.add_option("--reference", args.reference,
-                 "raw file that the others are brought to (default: the first; the middle one if aligned by stars)")
+                 "raw file to which the others are aligned (default: the first; the middle one if aligned by stars)")
       ->type_name("RAW");
   add_within(app, "--false-alarm", "RATE", "fraction of a static scene that is left out by chance (default 0.001)",
              1e-6, 0.5, [&options](double rate) { options.false_alarm = rate; });
@@ -65,9 +65,9 @@ std::optional<std::string> settle_merging(MergeArgs& args, bool budgeted) {
     return "--budget-ms does not know the times of --align stars and --drizzle: leave it out";
   if (args.pixfrac && !args.drizzle_scale) return "--pixfrac needs --drizzle";
   if (!args.drizzle_scale) return std::nullopt;
-  if (alignment == isp::MergeAlignment::none) return "--drizzle needs frames that moved, and --align none moves none";
+  if (alignment == isp::MergeAlignment::none) return "--drizzle needs displaced frames, and --align none aligns none";
   if (args.options.keep_foreground) {
-    return "--drizzle measures colours at displaced places, and --foreground keep displaces nothing: choose one";
+    return "--drizzle measures colours at displaced positions, and --foreground keep displaces nothing: choose one";
   }
   args.options.drizzle = merge::DrizzleOptions{.scale = *args.drizzle_scale, .pixfrac = args.pixfrac.value_or(1)};
   return std::nullopt;

@@ -26,7 +26,7 @@ std::string reason_of(const isp::FrameUse& use, bool by_stars) {
   if (!use.aligned) return by_stars ? "its stars do not match" : "its displacement could not be found";
   if (use.used_fraction > 0.99) return "it matches the reference";
   if (use.mean_chi_square > 2) return "it differs from the reference by more than noise";
-  return "parts of it moved";
+  return "parts of its content moved";
 }
 
 std::string method_name(const isp::MergeMethod& method) {
@@ -35,9 +35,9 @@ std::string method_name(const isp::MergeMethod& method) {
 
 /// Returns why no better method was chosen.
 std::string reason_of(const isp::MergePlan& plan) {
-  if (!plan.fits) return "nothing fits, and this is the cheapest";
+  if (!plan.fits) return "no method fits, and this is the cheapest";
   if (plan.better) return fmt::format("{} would take {:.0f} ms", method_name(*plan.better), 1e3 * plan.better_s);
-  return "nothing better is open to choice";
+  return "no better method can be chosen";
 }
 
 std::string budget_text(const isp::MergePlan& plan) {
@@ -71,7 +71,7 @@ std::string merge_text(const MergeReport& report) {
     const isp::FrameUse& use = merged.frames[i];
     const bool moved = merged.alignment != isp::MergeAlignment::none;
     if (moved && !by_stars && static_cast<int>(i) == merged.reference) {
-      out.add(i == 0 ? "used" : "", fmt::format("{}: all, it is the reference", inputs[i]));
+      out.add(i == 0 ? "used" : "", fmt::format("{}: 100 %: it is the reference", inputs[i]));
       continue;
     }
     std::string text = fmt::format("{}: {:.1f} %: {}", inputs[i], 100 * use.used_fraction, reason_of(use, by_stars));
@@ -85,7 +85,7 @@ std::string merge_text(const MergeReport& report) {
     out.add(i == 0 ? "used" : "", text);
   }
   if (merged.still_fraction > 0) {
-    out.add("foreground", fmt::format("{:.1f} % of the image stands still", 100 * merged.still_fraction));
+    out.add("foreground", fmt::format("{:.1f} % of the image does not move", 100 * merged.still_fraction));
   }
   return out.text();
 }

@@ -28,7 +28,7 @@ Result<Files> files_of(const DevelopArgs& args) {
   Files out;
   out.output = {{}, args.output, args.force ? isp::Overwrite::yes : isp::Overwrite::no};
   if (!args.output.ends_with(".dng")) {
-    return fail(ErrorCode::invalid_argument, "a merged raw is a DNG: its name ends with .dng", "-o");
+    return fail(ErrorCode::invalid_argument, "merged raw files are written as DNG: the name must end with .dng", "-o");
   }
   Result<std::vector<std::string>> inputs = files_to_merge(args);
   if (!inputs) return tl::make_unexpected(inputs.error());

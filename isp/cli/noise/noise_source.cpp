@@ -95,12 +95,12 @@ void warn_of_uncertainty(const calib::PictureNoise& noise, std::vector<std::stri
     return;
   }
   warnings.push_back(
-      fmt::format("the noise measured on the image is uncertain ({}): if detail is lost or noise "
-                  "remains, state it: --noise GAIN,READ or --profile",
+      fmt::format("the noise measured on the image is uncertain ({}): if detail is lost or noise remains, state the "
+                  "noise with --noise GAIN,READ or --profile",
                   why));
 }
 
-/// Returns the warning about noise that is assumed for want of a measurement.
+/// Returns the warning about noise that is assumed because it cannot be measured.
 std::string assumed_text(const NoiseOrigin& origin, bool is_denoised) {
   if (origin.prior_ratio == 1) {
     return "the noise is estimated, not measured: " + origin_text(origin) +
@@ -108,10 +108,10 @@ std::string assumed_text(const NoiseOrigin& origin, bool is_denoised) {
   }
   const std::string found =
       fmt::format("the image has {:.2g} times the noise variance expected ({})", origin.prior_ratio, origin.basis);
-  if (!is_denoised) return found + ": noise is reduced by what it has; --noise GAIN,READ states it";
+  if (!is_denoised) return found + ": noise reduction uses the measured noise; --noise GAIN,READ states another";
   return found +
-         ", as it was denoised before: noise is not reduced again; --denoise standard reduces what is left, "
-         "--noise GAIN,READ states it";
+         ", because it was denoised before: noise is not reduced again; --denoise standard reduces the residual noise, "
+         "--noise GAIN,READ states its size";
 }
 
 /// Sets the noise that is known of the sensor, adjusted to the image where it is of use.
@@ -195,7 +195,7 @@ Result<OptionalOrigin> find_noise(const isp::DevelopOptions& options, const std:
   if (has_class) return assume_noise(*black, noise.error().message, frame, executor);
   const std::string why = "the noise is not stated and cannot be measured on the image: " + noise.error().message;
   if (options.denoise.mode == Mode::level || options.denoise.always) {
-    return fail(noise.error().code, why + "; state it: --noise GAIN,READ");
+    return fail(noise.error().code, why + "; state it with --noise GAIN,READ");
   }
   frame.warnings.push_back(why + "; it is not reduced. --noise GAIN,READ states it");
   return std::nullopt;

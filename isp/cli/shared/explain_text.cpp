@@ -117,10 +117,10 @@ void add_look(Lines& out, const isp::LookPlan& look, const std::string& name, co
     if (look.retina) add_retina(out, *look.retina);
   }
   if (look.table) {
-    out.add("", fmt::format(
-                    "table of {0} x {0} chromaticities, {1} levels: off by {2:.2f} CIEDE2000 in the mean, {3:.2f} at "
-                    "most",
-                    look.table->cells, look.table->levels, look.table->error.mean, look.table->error.largest));
+    out.add("",
+            fmt::format(
+                "table of {0} x {0} chromaticities, {1} levels: error {2:.2f} CIEDE2000 on average, {3:.2f} at most",
+                look.table->cells, look.table->levels, look.table->error.mean, look.table->error.largest));
     if (look.table->by_noise) out.add("", "colours weighted by the local residual noise");
     if (name == "shin") out.add("", fmt::format("coefficients = {}", coefficients));
   }
@@ -159,7 +159,7 @@ std::string dark_text(const isp::DevelopPlan& plan) {
     case isp::DarkCharge::State::not_expected:
       return "none expected: " + dark.reason;
     case isp::DarkCharge::State::unknown:
-      return fmt::format("unknown, up to {:.0f} % of the median signal: {}", 100 * *dark.max_fraction, dark.reason);
+      return fmt::format("unknown, at most {:.0f} % of the median signal: {}", 100 * *dark.max_fraction, dark.reason);
     case isp::DarkCharge::State::in_black_point:
       text += "subtracted with the black level";
       break;
@@ -251,9 +251,10 @@ std::string explain_text(const DevelopOutcome& outcome) {
   }
   if (plan.display) {
     const isp::DisplayTarget& display = *plan.display;
-    out.add("display", fmt::format("{:g} to {:g} cd/m2, coefficients {}, table off by {:.2f} CIEDE2000 in the mean",
-                                   display.source_cd_m2, display.display_cd_m2, display.coefficients,
-                                   display.made.error.mean_ciede2000));
+    out.add("display",
+            fmt::format("{:g} to {:g} cd/m2, coefficients {}, error of the table {:.2f} CIEDE2000 on average",
+                        display.source_cd_m2, display.display_cd_m2, display.coefficients,
+                        display.made.error.mean_ciede2000));
   }
   return out.text();
 }

@@ -56,10 +56,11 @@ tl::unexpected<Error> written_twice(const std::string& output, const std::string
   if (same_file(first, second)) {
     return fail(ErrorCode::invalid_argument, fmt::format("{} is given twice", second), "RAW");
   }
-  return fail(ErrorCode::invalid_argument,
-              fmt::format("{} would be written twice, from {} and from {}: give each a run and a folder of its own",
-                          output, first, second),
-              "-o");
+  return fail(
+      ErrorCode::invalid_argument,
+      fmt::format("{} would be written twice, from {} and from {}: process them in separate runs with separate folders",
+                  output, first, second),
+      "-o");
 }
 
 }  // namespace
@@ -81,7 +82,7 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
   if (!inputs) return tl::make_unexpected(inputs.error());
   if (inputs->size() > 1 && !folder) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("{} raw files need a folder to go to: '{}/'", inputs->size(), args.output), "-o");
+                fmt::format("{} raw files need a folder as output: '{}/'", inputs->size(), args.output), "-o");
   }
   if (const auto wrong = wrong_streams(args)) return fail(ErrorCode::invalid_argument, *wrong);
   std::vector<Job> jobs;
@@ -101,7 +102,7 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
       if (!is_new) return written_twice(file, first->second, input);
     }
     if (!is_standard_stream(input) && !is_standard_stream(output) && same_file(input, output)) {
-      return fail(ErrorCode::invalid_argument, fmt::format("{} would be replaced by what is made of it", input), "-o");
+      return fail(ErrorCode::invalid_argument, fmt::format("the output would replace the input {}", input), "-o");
     }
     jobs.push_back({input, output});
   }

@@ -62,12 +62,12 @@ Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choi
   const bool knows_dark = found->dark_mean_e != PerSite<double>{};
   if (frame.raw.is_float() && !choice.everything) {
     return fail(ErrorCode::unsupported,
-                "the profile's black level is one of the sensor's codes, and the frame has floating-point samples");
+                "the profile's black level applies to integer codes, but the frame has floating-point samples");
   }
   if (!found->black && !knows_dark && !choice.everything) {
     return fail(ErrorCode::insufficient,
-                "the profile holds no black level and no dark current: add them with `calibrate black --add-to`, "
-                "or use what else it holds with --profile");
+                "the profile has no black level and no dark current: add them with `calibrate black --add-to`, or use "
+                "its other values with --profile");
   }
   if (knows_dark) {  // for a pedestal of the file or of the user, which does not include it
     for (int site = 0; site < 4; ++site) {

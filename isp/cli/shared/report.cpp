@@ -59,8 +59,7 @@ void add_black(Lines& out, const RawFrame& frame) {
   row("  measured", b.pedestal_dn);
   row("  std. error", b.pedestal_standard_error_dn);
   row("  noise", b.noise_std_dn);
-  out.add("  measured on",
-          fmt::format("masked pixels {}: pedestal and dark charge in one", rect_text(measured.region)));
+  out.add("  measured on", fmt::format("masked pixels {}: pedestal including dark charge", rect_text(measured.region)));
 }
 
 void add_noise(Lines& out, const RawFrame& frame) {
@@ -91,7 +90,7 @@ void add_exposure(Lines& out, const FrameInfo& info) {
     out.add("luminance", fmt::format("saturates at about {:.3g} cd/m2 (estimated from f-number, ISO and exposure time)",
                                      *luminance));
   } else {
-    out.add("luminance", "unknown: it takes exposure time, f-number and ISO to estimate it");
+    out.add("luminance", "unknown: the estimate needs exposure time, f-number and ISO");
   }
 }
 

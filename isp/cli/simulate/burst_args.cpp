@@ -79,10 +79,10 @@ void add_objects(CLI::App& app, BurstArgs& args) {
 /// Returns the first option that does nothing without another, and why; empty if there is none.
 std::string without_effect(const BurstArgs& args, const std::string& scene) {
   const capture::BurstOptions& o = args.options;
-  if (o.field_centre && o.field_rotation_deg == 0) return "--field-centre does nothing without --field-rotation";
-  if (o.horizon_px && !o.sky_moves()) return "--horizon does nothing without --field-rotation or --drift";
-  if (o.movers == 0 && o.mover_size_px) return "--mover-size does nothing without --movers";
-  if (o.movers == 0 && args.mover_speed_given) return "--mover-speed does nothing without --movers";
+  if (o.field_centre && o.field_rotation_deg == 0) return "--field-centre has no effect without --field-rotation";
+  if (o.horizon_px && !o.sky_moves()) return "--horizon has no effect without --field-rotation or --drift";
+  if (o.movers == 0 && o.mover_size_px) return "--mover-size has no effect without --movers";
+  if (o.movers == 0 && args.mover_speed_given) return "--mover-speed has no effect without --movers";
   if (o.movers != 0 && scene == "dark") return "--movers: objects show parts of the scene, and it is dark";
   return {};
 }
@@ -119,7 +119,7 @@ Result<void> complete_burst(BurstArgs& args, const std::string& scene, std::opti
   }
   if (exposures > 0 && !frames) frames = exposures;
   if (const char* motion = motion_option(o); motion != nullptr && frames.value_or(1) == 1) {
-    return wrong(fmt::format("{} does nothing without --frames: frame 0 is never moved", motion));
+    return wrong(fmt::format("{} has no effect without --frames: frame 0 is never moved", motion));
   }
   constexpr int max_reduction = 8;
   if (args.reduction && (*args.reduction < 1 || *args.reduction > max_reduction)) {

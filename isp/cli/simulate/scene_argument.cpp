@@ -52,11 +52,10 @@ Result<std::vector<capture::SpectrumColumn>> read_reflectances(const std::string
   for (const capture::SpectrumColumn& column : *table) {
     const auto values = column.spectrum.values();
     if (const double most = *std::max_element(values.begin(), values.end()); most > largest) {
-      return fail(
-          ErrorCode::malformed,
-          fmt::format("the reflectance of {} is {:g}, and at most {:g} is taken for one: is the table in percent?",
-                      column.name, most, largest),
-          file);
+      return fail(ErrorCode::malformed,
+                  fmt::format("the reflectance of {} is {:g}, the maximum is {:g}: is the table in percent?",
+                              column.name, most, largest),
+                  file);
     }
   }
   return table;
@@ -76,9 +75,10 @@ Result<capture::Scene> chart_of(const SceneArgs& args, const capture::SceneSetup
                                               {"munsell", isp::SpectrumSet::munsell_ten}};
   const auto found = charts.find(which);
   if (found == charts.end()) {
-    return fail(ErrorCode::invalid_argument,
-                fmt::format("there is no chart '{}': there are {}, and tables (chart:FILE.csv)", which, joined(charts)),
-                "SCENE");
+    return fail(
+        ErrorCode::invalid_argument,
+        fmt::format("unknown chart '{}': the charts are {}, and tables (chart:FILE.csv)", which, joined(charts)),
+        "SCENE");
   }
   return capture::chart_scene(setup, isp::spectra_of(found->second));
 }
@@ -123,7 +123,8 @@ Result<Spectrum> light_of(const std::string& name, const std::string& option) {
     auto table = capture::read_spectra(name);
     if (!table) return tl::make_unexpected(table.error());
     if (table->size() != 1) {
-      return fail(ErrorCode::malformed, fmt::format("a light is one spectrum, the table has {}", table->size()), name);
+      return fail(ErrorCode::malformed, fmt::format("a light must be one spectrum, the table has {}", table->size()),
+                  name);
     }
     const auto power = table->front().spectrum.values();
     if (*std::min_element(power.begin(), power.end()) < 0) {
@@ -134,7 +135,7 @@ Result<Spectrum> light_of(const std::string& name, const std::string& option) {
   if (auto light = isp::light_named(name)) return *std::move(light);
   const auto near = near_matches(name, isp::light_names());
   return fail(ErrorCode::invalid_argument,
-              fmt::format("there is no light '{}'; {}", name,
+              fmt::format("unknown light '{}'; {}", name,
                           near.empty() ? "`lowlux simulate --list` names them"
                                        : fmt::format("near it: {}", fmt::join(near, ", "))),
               option);

@@ -31,8 +31,7 @@ Wrong set_size(const std::string& text, SceneArgs& scene) {
   scene.width = side_of(text.substr(0, x));
   scene.height = side_of(text.substr(std::min(x + 1, text.size())));
   if (scene.width == 0 || scene.height == 0) {
-    return fmt::format("is not WIDTHxHEIGHT of {} to {} pixels: raw developers read no other frames", min_side,
-                       max_side);
+    return fmt::format("is not WIDTHxHEIGHT of {} to {} pixels, which raw developers can read", min_side, max_side);
   }
   if (static_cast<double>(scene.width) * scene.height > capture::max_scene_pixels) return "has more than 2^28 pixels";
   return std::nullopt;
@@ -40,7 +39,7 @@ Wrong set_size(const std::string& text, SceneArgs& scene) {
 
 Wrong add_lamp(const std::string& text, SceneArgs& scene) {
   const auto words = words_of(text);
-  constexpr const char* expected = "is no X,Y,LIGHT,LUMINANCE with a luminance of 0 to 1e12 cd/m2";
+  constexpr const char* expected = "is not X,Y,LIGHT,LUMINANCE with a luminance of 0 to 1e12 cd/m2";
   if (words.size() != 4) return expected;
   const auto x = number_of(words[0]), y = number_of(words[1]), luminance = number_of(words[3]);
   if (!x || !y || !luminance || std::fabs(*x) > 1e6 || std::fabs(*y) > 1e6 || *luminance < 0 || *luminance > 1e12) {
@@ -53,7 +52,7 @@ Wrong add_lamp(const std::string& text, SceneArgs& scene) {
 std::string no_effect(const std::string& word) {
   const auto names = isp::effect_names();
   const auto near = near_matches(word, names);
-  return fmt::format("holds '{}', which is none of auto, all, none, {}{}", word, fmt::join(names, ", "),
+  return fmt::format("contains '{}', which is none of auto, all, none, {}{}", word, fmt::join(names, ", "),
                      near.empty() ? "" : fmt::format("; near it: {}", fmt::join(near, ", ")));
 }
 
@@ -70,7 +69,7 @@ Wrong set_effects(const std::string& text, capture::NoiseSourceChoice& choice) {
     const bool without = word.starts_with('-');
     if (without) word.erase(0, 1);
     const auto found = std::find(names.begin(), names.end(), word);
-    if (word == "auto") return "holds auto, which decides on every effect and cannot be combined";
+    if (word == "auto") return "contains auto, which decides on every effect and cannot be combined";
     if (word == "all" && !without) {
       effects = isp::NoiseSourceSet::all();
     } else if (word == "none" && !without) {
@@ -95,7 +94,7 @@ Wrong set_effects(const std::string& text, capture::NoiseSourceChoice& choice) {
 Wrong set_tolerance(const std::string& text, isp::Tolerance& tolerance) {
   const auto numbers = numbers_of(text, 2);
   if (!numbers || (*numbers)[0] <= 0 || (numbers->size() == 2 && (*numbers)[1] <= 0)) {
-    return "is no positive DELTA_E or DELTA_E,RELATIVE_VARIANCE";
+    return "is not a positive DELTA_E or DELTA_E,RELATIVE_VARIANCE";
   }
   tolerance.delta_e = (*numbers)[0];
   if (numbers->size() == 2) tolerance.relative_variance = (*numbers)[1];
@@ -105,7 +104,7 @@ Wrong set_tolerance(const std::string& text, isp::Tolerance& tolerance) {
 Wrong set_seed(const std::string& text, std::uint64_t& seed) {
   const char* end = text.data() + text.size();
   const auto read = std::from_chars(text.data(), end, seed);
-  if (read.ec != std::errc() || read.ptr != end) return "is no whole number of 0 to 18446744073709551615";
+  if (read.ec != std::errc() || read.ptr != end) return "is not a whole number of 0 to 18446744073709551615";
   return std::nullopt;
 }
 
@@ -115,22 +114,23 @@ void add_scene(CLI::App& app, SceneArgs& s) {
          "a picture (PNG, JPEG, TIFF, OpenEXR, PFM, PPM), or dark, flat, chart, chart:macbeth, chart:munsell, or "
          "chart:FILE.csv with reflectances by wavelength")
       ->type_name("");
-  add_text(app, "--size", "WxH", "of a scene that is no picture (default 1200x800)",
+  add_text(app, "--size", "WxH", "size of a scene that is not a picture (default 1200x800)",
            [&s](const std::string& text) { return set_size(text, s); });
   add_text(app, "--light", "NAME|FILE.csv",
-           "of charts and flats: a CIE illuminant or a lamp (--list), or a table's file (default D65)",
+           "light of charts and flats: a CIE illuminant or a lamp (--list), or a table file (default D65)",
            [&s](const std::string& text) -> Wrong {
              s.light = text;
              s.light_given = true;
              return std::nullopt;
            });
   add_number(app, "--luminance", "CD_M2",
-             "of a white diffuser in the scene, in pictures of their white (default 1, or what the picture states)",
+             "luminance of a white diffuser in the scene, or of white in a picture (default 1, or the value that the "
+             "picture states)",
              [&s](double value) {
                s.luminance_cd_m2 = value;
                s.luminance_given = true;
              });
-  app.add_option("--stars", s.stars, "add so many stars")->check(CLI::Range(0, 1000000))->type_name("N");
+  app.add_option("--stars", s.stars, "number of stars to add")->check(CLI::Range(0, 1000000))->type_name("N");
   add_number(app, "--star-luminance", "CD_M2",
              "of the faintest star's light, spread over one pixel (default: a tenth of --luminance)",
              [&s](double value) { s.star_luminance_cd_m2 = value; });
@@ -146,12 +146,12 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
     add_number(app, flag, type, help, [&out](double value) { out = value; })->group("Sensor figures");
   };
   figure("--system-gain", "DN_PER_E", "system gain in DN per electron", f.system_gain_dn_per_e);
-  figure("--read-noise", "E", "standard deviation", f.read_noise_e);
+  figure("--read-noise", "E", "read noise, standard deviation in electrons", f.read_noise_e);
   figure("--full-well", "E", "charge of a full pixel", f.full_well_e);
-  app.add_option("--bits", f.bits, "of the converter")->group("Sensor figures");
-  figure("--black-level", "DN", "pedestal", f.black_level_dn);
-  figure("--white-level", "DN", "largest code", f.white_level_dn);
-  add_text(app, "--dark-current", "E_PER_S[,G,B]", "for all channels, or for red, green and blue",
+  app.add_option("--bits", f.bits, "number of bits of the converter")->group("Sensor figures");
+  figure("--black-level", "DN", "black level (pedestal)", f.black_level_dn);
+  figure("--white-level", "DN", "white level (largest code)", f.white_level_dn);
+  add_text(app, "--dark-current", "E_PER_S[,G,B]", "dark current of all channels, or of red, green and blue",
            [&f](const std::string& text) -> Wrong {
              const auto n = numbers_of(text, 3);
              if (!n || n->size() == 2) return "is neither one number nor three";
@@ -160,20 +160,22 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
              return std::nullopt;
            })
       ->group("Sensor figures");
-  figure("--dark-temperature", "C", "at which the dark current is that", f.dark_temperature_c);
-  figure("--dark-doubling", "C", "degrees over which it doubles", f.dark_doubling_c);
+  figure("--dark-temperature", "C", "temperature at which the dark current is stated", f.dark_temperature_c);
+  figure("--dark-doubling", "C", "degrees over which the dark current doubles", f.dark_doubling_c);
   figure("--dark-activation", "EV", "activation energy: an Arrhenius law in place of the doubling",
          f.dark_activation_ev);
-  figure("--dark-floor", "E_PER_S", "part of it that is the same at every temperature", f.dark_floor_e_per_s);
+  figure("--dark-floor", "E_PER_S", "part of the dark current that does not depend on temperature",
+         f.dark_floor_e_per_s);
   figure("--prnu", "RATIO", "photo response non-uniformity", f.prnu);
   figure("--dsnu", "RATIO", "dark signal non-uniformity, of the dark current", f.dsnu);
   figure("--hot-pixels", "RATIO", "fraction of pixels that are hot", f.hot_pixel_fraction);
   figure("--hot-current", "E_PER_S", "mean dark current of hot pixels", f.hot_pixel_current_e_per_s);
   figure("--telegraph-pixels", "RATIO", "fraction of pixels with random telegraph noise", f.telegraph_fraction);
-  figure("--telegraph-noise", "E", "mean distance of their two levels", f.telegraph_e);
+  figure("--telegraph-noise", "E", "mean distance of the two levels of these pixels", f.telegraph_e);
   figure("--crosstalk", "RATIO", "fraction of a pixel's light that each of four neighbours collects", f.crosstalk);
   figure("--glow", "E_PER_S", "amplifier glow: its dark current at its source", f.glow_e_per_s);
-  add_text(app, "--glow-position", "X,Y", "of the source, in widths and heights (default 1,1: lower right corner)",
+  add_text(app, "--glow-position", "X,Y",
+           "position of the source of the glow, in widths and heights (default 1,1: lower right corner)",
            [&f](const std::string& text) -> Wrong {
              const auto n = numbers_of(text, 2);
              if (!n || n->size() != 2) return "is not two numbers";
@@ -181,35 +183,38 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
              return std::nullopt;
            })
       ->group("Sensor figures");
-  figure("--glow-length", "RATIO", "over which it falls by e, in diagonals (default 0.1)", f.glow_length);
-  figure("--row-noise", "E", "standard deviation", f.row_noise_e);
-  figure("--column-noise", "E", "standard deviation", f.column_noise_e);
+  figure("--glow-length", "RATIO", "distance over which the glow falls by a factor e, in diagonals (default 0.1)",
+         f.glow_length);
+  figure("--row-noise", "E", "row noise, standard deviation in electrons", f.row_noise_e);
+  figure("--column-noise", "E", "column noise, standard deviation in electrons", f.column_noise_e);
   figure("--pixel-pitch", "UM", "side of a pixel", f.pixel_pitch_um);
   figure("--peak-qe", "RATIO", "largest quantum efficiency, electrons per photon", f.peak_quantum_efficiency);
   figure("--iso", "ISO", "saturation-based speed of the gain setting", f.iso);
-  figure("--white-luminance", "CD_M2", "of a white that fills a pixel in 1 s", args.optics.white_luminance_cd_m2);
+  figure("--white-luminance", "CD_M2", "luminance of a white that fills a pixel in 1 s",
+         args.optics.white_luminance_cd_m2);
   add_choice<Quantisation>(
       app, "--quantise", {{"round", Quantisation::round}, {"floor", Quantisation::floor}},
-      [&f](Quantisation q) { f.quantisation = q; }, "how the converter makes codes")
+      [&f](Quantisation q) { f.quantisation = q; }, "how the converter rounds to codes")
       ->group("Sensor figures");
 }
 
 void add_camera(CLI::App& app, SimulateArgs& args) {
   capture::SyntheticOptions& o = args.options;
-  app.add_option("--sensor", args.sensor, "by name (--list; default ELD_NikonD850)")->type_name("NAME");
+  app.add_option("--sensor", args.sensor, "sensor by name (--list; default ELD_NikonD850)")->type_name("NAME");
   app.add_option("--gain", args.gain, "gain setting of the sensor, as ISO 1600 or its number")->type_name("SETTING");
   app.add_option("--camera", args.figures.camera,
-                 "whose spectral sensitivities (--list; default: the sensor's own or a stand-in)")
+                 "camera whose spectral sensitivities are used (--list; default: the sensor's own or a substitute)")
       ->type_name("NAME");
   add_number(app, "--exposure", "S", "exposure time (default 0.1)", [&o](double s) { o.exposure.time_s = s; });
-  add_number(app, "--f-number", "f/N", "(default 2)", [&args](double n) { args.optics.f_number = n; });
+  add_number(app, "--f-number", "f/N", "f-number of the lens (default 2)",
+             [&args](double n) { args.optics.f_number = n; });
   add_number(app, "--lens-blur", "PX", "standard deviation of the blur of the lens, 0 to 10 (default 0)",
              [&o](double px) { o.lens_blur_px = px; });
   add_number(app, "--temperature", "C", "of the sensor (default 20)", [&o](double c) { o.exposure.temperature_c = c; });
   add_choice<BayerPhase>(
       app, "--cfa",
       {{"rggb", BayerPhase::rggb}, {"grbg", BayerPhase::grbg}, {"gbrg", BayerPhase::gbrg}, {"bggr", BayerPhase::bggr}},
-      [&o](BayerPhase phase) { o.phase = phase; }, "mosaic (default rggb)");
+      [&o](BayerPhase phase) { o.phase = phase; }, "Bayer pattern (default rggb)");
   app.add_option("--masked-columns", o.masked_columns, "light-shielded columns left of the picture (even; default 0)")
       ->type_name("N");
 }
@@ -217,8 +222,8 @@ void add_camera(CLI::App& app, SimulateArgs& args) {
 void add_work(CLI::App& app, SimulateArgs& args, std::optional<int>& frames) {
   capture::SyntheticOptions& o = args.options;
   add_text(app, "--effects", "auto|all|none|LIST",
-           "what is simulated: what the scene calls for (auto; default, but with --sampling published all), or names "
-           "separated by commas (-prnu is all but one)",
+           "noise sources to simulate: those that matter in the scene (auto; default, but all with --sampling "
+           "published), or names separated by commas (-prnu is all except one)",
            [&args](const std::string& text) {
              args.effects = text;
              return set_effects(text, args.options.effects);
@@ -227,41 +232,42 @@ void add_work(CLI::App& app, SimulateArgs& args, std::optional<int>& frames) {
       app, "--sampling",
       {{"physical", capture::PhotonSampling::physical}, {"published", capture::PhotonSampling::published}},
       [&o](capture::PhotonSampling sampling) { o.sampling = sampling; },
-      "photons: one Poisson draw for each pixel (default), or one for each wavelength as the thesis has it");
-  add_text(
-      app, "--seed", "N",
-      "of the noise, the stars and the motion (default 1); darks and lights that are to have noise of their own need "
-      "seeds of their own",
-      [&o](const std::string& text) { return set_seed(text, o.seed); });
-  add_text(app, "--sensor-seed", "N", "of the fixed pattern: which specimen of the sensor it is (default 1)",
+      "photons: one Poisson draw for each pixel (default), or one for each wavelength as in the thesis");
+  add_text(app, "--seed", "N",
+           "seed of the noise, the stars and the motion (default 1); use different seeds for darks and lights whose "
+           "noise must be independent",
+           [&o](const std::string& text) { return set_seed(text, o.seed); });
+  add_text(app, "--sensor-seed", "N",
+           "seed of the fixed pattern, which stands for the specimen of the sensor (default 1)",
            [&o](const std::string& text) { return set_seed(text, o.sensor_seed); });
-  app.add_option("--frames", frames, "frames OUT_0000.dng and on (default 1, or the exposures of --bracket)")
+  app.add_option("--frames", frames,
+                 "number of frames, OUT_0000.dng and following (default 1, or the exposures of --bracket)")
       ->check(CLI::Range(1, 10000))
       ->type_name("N");
-  app.add_flag("--explain", args.explain, "what each effect was predicted to change, what was decided, what it saved");
+  app.add_flag("--explain", args.explain, "print the predicted change of each effect, the decision and the time saved");
 }
 
 void add_files(CLI::App& app, SimulateArgs& args) {
   app.add_option("-o,--output", args.output, "raw file to write (.dng)")->type_name("OUT.dng");
   auto* truth = app.add_option("--truth", args.truth,
                                "the noise-free scene, linear, white at --luminance (.exr, .pfm, .tif; default "
-                               "OUT.truth.exr, of a dark frame none)")
+                               "OUT.truth.exr, none for a dark frame)")
                     ->type_name("FILE");
-  app.add_flag("--no-truth", args.no_truth, "do not write it")->excludes(truth);
+  app.add_flag("--no-truth", args.no_truth, "do not write the noise-free reference")->excludes(truth);
   app.add_option("--truth-electrons", args.truth_electrons,
                  "also write the noise-free electrons of R, G and B at every pixel (.exr, .pfm, .tif)")
       ->type_name("FILE");
-  app.add_flag("--list", args.list, "the sensors, lights and cameras there are");
+  app.add_flag("--list", args.list, "list the sensors, lights and cameras");
   app.add_flag("--force", args.force, "overwrite files that exist");
-  app.add_flag("--json", args.json, "one JSON object on stdout");
-  app.add_flag("--timings", args.timings, "time of each stage");
-  app.add_flag("--quiet", args.quiet, "no warnings and no progress");
+  app.add_flag("--json", args.json, "print one JSON object on stdout");
+  app.add_flag("--timings", args.timings, "print the time of each stage");
+  app.add_flag("--quiet", args.quiet, "print no warnings and no progress");
 }
 
 }  // namespace
 
 Parsed<SimulateArgs> parse_simulate(const std::vector<std::string>& words) {
-  CLI::App app("Makes raw files of scenes of known truth.", "lowlux simulate");
+  CLI::App app("Simulates raw files of scenes with a known noise-free reference.", "lowlux simulate");
   SimulateArgs args;
   args.options.exposure.time_s = 0.1;
   args.options.effects.tolerance = isp::Tolerance{};
@@ -272,7 +278,7 @@ Parsed<SimulateArgs> parse_simulate(const std::vector<std::string>& words) {
   std::optional<int> frames;
   add_work(app, args, frames);
   add_text(app, "--tolerance", "DE[,VARIANCE]",
-           "what leaving effects out may change: CIEDE2000 of 32x32 block means, relative variance of blocks "
+           "largest change by effects that are left out: CIEDE2000 of 32x32 block means, relative variance of blocks "
            "(default 0.5,0.05)",
            [&tolerance](const std::string& text) { return set_tolerance(text, tolerance.emplace()); });
   add_burst(app, args.burst);

@@ -20,7 +20,7 @@ const char* reason_of(const isp::NoiseSourceDecision& decision, isp::NoiseSource
     case isp::NoiseSourceDecision::Reason::absent:
       return decision.effect == isp::Effect::lens_blur ? "no blur, or none in even light" : "the sensor has none";
     case isp::NoiseSourceDecision::Reason::negligible:
-      return "below the tolerance with all that is left out";
+      return "below the tolerance together with all other effects that are left out";
     case isp::NoiseSourceDecision::Reason::asked_for:
       return wanted.has(decision.effect) && !decision.kept ? "nothing without dark current" : "as asked";
     case isp::NoiseSourceDecision::Reason::free:
@@ -28,7 +28,7 @@ const char* reason_of(const isp::NoiseSourceDecision& decision, isp::NoiseSource
     case isp::NoiseSourceDecision::Reason::needed:
       break;
   }
-  return "above the tolerance, alone or with what is left out";
+  return "above the tolerance, alone or together with effects that are left out";
 }
 
 std::string name_of(isp::Effect effect) { return std::string(isp::effect_names()[static_cast<int>(effect)]); }
@@ -162,8 +162,8 @@ std::string simulate_json(const SimulateArgs& args, const SimulateOutcome& o) {
 
 std::string simulate_list() {
   std::string text =
-      "sensors, with their gain settings and the options that must be given where no source has the figure\n"
-      "(--iso or --white-luminance in place of --pixel-pitch and --peak-qe)\n";
+      "sensors, with their gain settings and the options that must be given if no source states the value\n(--iso or "
+      "--white-luminance in place of --pixel-pitch and --peak-qe)\n";
   auto out = std::back_inserter(text);
   for (const std::string_view name : isp::sensor_names()) {
     std::vector<std::string> settings;

@@ -169,9 +169,10 @@ class Refinement {
 };
 
 tl::unexpected<Error> too_few(const StarField& reference, const StarField& frame, int matched) {
-  return fail(ErrorCode::insufficient,
-              fmt::format("{} of {} stars match the {} of the reference: too few to know how the frame is displaced",
-                          matched, frame.stars.size(), reference.stars.size()));
+  return fail(
+      ErrorCode::insufficient,
+      fmt::format("{} of {} stars match the {} of the reference: too few to determine the displacement of the frame",
+                  matched, frame.stars.size(), reference.stars.size()));
 }
 
 }  // namespace
@@ -187,11 +188,10 @@ Result<StarMatch> match_stars(const StarField& reference, const StarField& frame
   if (!consensus || consensus->log10_false_probability > limit)
     return too_few(reference, frame, consensus ? consensus->matched : 0);
   if (consensus->log10_rival_probability < max_rival * consensus->log10_false_probability) {
-    return fail(
-        ErrorCode::insufficient,
-        fmt::format("{} of {} stars match the reference in one way, and about as many in another: their pattern "
-                    "repeats, so it does not show how the frame is displaced",
-                    consensus->matched, frame.stars.size()));
+    return fail(ErrorCode::insufficient,
+                fmt::format("{} of {} stars match the reference in one way, and about as many in another: their "
+                            "pattern repeats, so it does not determine the displacement of the frame",
+                            consensus->matched, frame.stars.size()));
   }
   Refinement refinement(reference, frame);
   if (!refinement.run(*consensus)) return too_few(reference, frame, consensus->matched);

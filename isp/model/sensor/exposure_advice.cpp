@@ -167,9 +167,10 @@ Result<ExposureAdvice> advise_exposure(const AdviceRequest& request) {
   for (std::size_t i = 0; i < request.gains.size(); ++i) {
     const GainSetting& gain = request.gains[i];
     if (!(limits_of(request, gain.sensor).least_e() > 0)) {
-      return fail(ErrorCode::invalid_argument,
-                  "noise alone clips more pixels than the share allowed; allow a larger share, or leave out this gain",
-                  gain.name);
+      return fail(
+          ErrorCode::invalid_argument,
+          "noise alone clips more pixels than the fraction allowed; allow a larger fraction, or leave out this gain",
+          gain.name);
     }
     out.gains.push_back(best_of(request, i));
     if (!out.gains.back().at.midtone) {
@@ -207,7 +208,8 @@ Result<void> check_gain(const GainSetting& gain) {
     }
     most = std::max(most, rate);
   }
-  if (!(most >= least)) return fail(ErrorCode::invalid_argument, "no channel sees the light; give another", gain.name);
+  if (!(most >= least))
+    return fail(ErrorCode::invalid_argument, "no channel is sensitive to the light; give another", gain.name);
   return {};
 }
 
@@ -220,7 +222,7 @@ Result<void> check_light(const AdviceRequest& r) {
                  " cd/m2 and at most 1e12 cd/m2, found " + text_of(r.highlight_cd_m2));
   }
   if (!(r.clipped_share >= 1e-9) || !(r.clipped_share <= 0.5)) {
-    return wrong("the share allowed to clip must lie between 1e-9 and 0.5, found " + text_of(r.clipped_share));
+    return wrong("the fraction allowed to clip must be between 1e-9 and 0.5, found " + text_of(r.clipped_share));
   }
   return {};
 }

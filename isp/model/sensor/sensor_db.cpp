@@ -92,7 +92,7 @@ Result<int> find_row(std::string_view name, std::string_view gain) {
     const auto names = sensor_names();
     const auto near = near_matches(name, names);
     return fail(ErrorCode::invalid_argument,
-                "there is no sensor '" + std::string(name) + "'; " +
+                "unknown sensor '" + std::string(name) + "'; " +
                     (near.empty() ? "there are " + list(names) : "near it: " + list(near)));
   }
   if (gain.empty()) return rows.front();

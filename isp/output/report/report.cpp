@@ -58,7 +58,7 @@ Result<std::vector<AtomicFile>> prepare_texts(std::span<const TextFile> files, O
     const AtomicFile& now = written.emplace_back(*std::move(created));
     if (std::fwrite(file.text.data(), 1, file.text.size(), now.file()) != file.text.size() ||
         std::fflush(now.file()) != 0) {
-      return fail(ErrorCode::unwritable, "the file cannot be written whole; is the disk full?", file.path);
+      return fail(ErrorCode::unwritable, "the file cannot be written completely; is the disk full?", file.path);
     }
   }
   return written;

@@ -33,12 +33,12 @@ std::string reason_words(const StepFacts& facts, const StepCandidate& plan) {
 }
 
 std::string level_words(const StepFacts& facts, const StepCandidate& plan) {
-  if (!facts.has_noise) return "the noise is not known, or is not to be reduced";
+  if (!facts.has_noise) return "the noise is not known, or noise reduction is off";
   if (facts.noise_by_ratio) {
-    return fmt::format("{}: its level follows from the signal-to-noise ratio, as the frame is not a mosaic",
+    return fmt::format("{}: its level follows from the signal-to-noise ratio, because the frame is not a mosaic",
                        plan.level ? name_of(*plan.level) : "none");
   }
-  if (!plan.level) return "left as it is, " + reason_words(facts, plan);
+  if (!plan.level) return "not reduced, " + reason_words(facts, plan);
   std::array<double, 3> share = facts.chroma.start;
   if (*plan.level == Level::best) share = {share[0] + share[1], 0, share[2]};  // best starts level 1 on level 0
   return fmt::format("{}; chroma from level 0, 1, 2 in {:.0f}, {:.0f}, {:.0f} % of the frame", name_of(*plan.level),
@@ -100,7 +100,7 @@ PlannedStep demosaic_step(const StepFacts& facts, StepCandidate plan) {
 std::string lines_words(const StepFacts& facts, const StepCandidate& plan) {
   if (plan.lines && plan.level) return facts.sizes.lines_words;
   const std::string measured = std::isfinite(facts.sizes.lines) ? facts.sizes.lines_words + "; " : std::string();
-  return measured + (plan.level ? "" : "subtracted with the noise or not at all, ") + reason_words(facts, plan);
+  return measured + (plan.level ? "" : "only subtracted with noise reduction, ") + reason_words(facts, plan);
 }
 
 StepPlan told(const StepFacts& facts, const StepCandidate& plan) {

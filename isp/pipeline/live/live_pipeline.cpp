@@ -19,24 +19,25 @@ bool inside(const Rect& r, int width, int height) {
 
 Result<void> check(const LiveSetup& setup) {
   const auto wrong = [](std::string message) { return fail(ErrorCode::invalid_argument, std::move(message)); };
-  if (names_of(setup.format) == nullptr) return fail(ErrorCode::unsupported, "no raw format that is known");
+  if (names_of(setup.format) == nullptr) return fail(ErrorCode::unsupported, "the raw format is not known");
   if (setup.width < 2 || setup.height < 2 || setup.width > most_side || setup.height > most_side) {
-    return wrong(fmt::format("frames have 2 to {} pixels each way, not {} x {}", most_side, setup.width, setup.height));
+    return wrong(fmt::format("width and height of frames must be 2 to {} pixels, found {} x {}", most_side, setup.width,
+                             setup.height));
   }
   if (!inside(setup.active, setup.width, setup.height) || setup.active.width < 2 || setup.active.height < 2) {
-    return wrong("the picture's part of the frame lies inside it and has two pixels each way at least");
+    return wrong("the crop must be inside the frame and have at least 2 x 2 pixels");
   }
   for (const Rect& masked : setup.masked) {
     if (!inside(masked, setup.width, setup.height) || masked.width < 2 || masked.height < 2) {
-      return wrong("masked pixels lie inside the frame, two each way at least");
+      return wrong("masked pixels must be inside the frame and at least 2 x 2 pixels");
     }
   }
   if (setup.white_dn != 0 && !(setup.white_dn >= 0.001 && setup.white_dn <= 65535)) {
-    return wrong("white lies between 0.001 and 65535, or is 0 for the largest code");
+    return wrong("the white level must be between 0.001 and 65535, or 0 for the largest code");
   }
-  if (setup.most == denoise::Level::best) return wrong("live frames are denoised by draft, standard or high");
-  if (setup.look.look == Look::model) return wrong("live frames have the look of the camera or of the eye");
-  if (setup.samples == SampleType::f32) return wrong("live frames have codes of 8 or 16 bits");
+  if (setup.most == denoise::Level::best) return wrong("the level of live frames must be draft, standard or high");
+  if (setup.look.look == Look::model) return wrong("the look of live frames must be that of the camera or of the eye");
+  if (setup.samples == SampleType::f32) return wrong("codes of live frames must have 8 or 16 bits");
   return {};
 }
 
@@ -125,7 +126,7 @@ void LivePipeline::render_mosaic(PlaneView<std::uint16_t> codes) {
     for_each_band(executor_, active.height, [&](RowBand band, int) {
       for (int y = band.first; y < band.last; ++y) {
         const std::uint16_t* const dn = frame_.raw.dn.row(active.y + y) + active.x;
-        // 16-bit words may hold values above the format's largest code, which would come out dark.
+        // 16-bit words may hold values above the format's largest code, which would become dark.
         for (int x = 0; x < active.width; ++x) {
           codes.at(x, y) = static_cast<std::uint16_t>(std::min<int>(dn[x], largest) << shift);
         }

@@ -156,7 +156,7 @@ Result<void> LivePlanner::set_black(const LiveFacts& facts, FrameMeter& meter, c
     const double white = white_at(frame.raw, site);
     if (white > black.pedestal_dn[site]) continue;
     return fail(ErrorCode::malformed,
-                fmt::format("the white level {:g} DN is not above black {:g} DN, dark charge in it", white,
+                fmt::format("the white level {:g} DN is not above the black level {:g} DN, dark charge included", white,
                             black.pedestal_dn[site]));
   }
   return {};
@@ -226,7 +226,7 @@ Result<Matrix3> LivePlanner::balanced_matrix(const LiveFacts& facts, const RawFr
   const bool coloured = frame.raw.layout != SensorLayout::monochrome;
   if (coloured && frame.colour.calibrations.empty()) return colours;
   if (coloured && !balance.white) {
-    return fail(ErrorCode::malformed, "the white balance is no colour of a light under the camera's matrices");
+    return fail(ErrorCode::malformed, "the white balance is not the colour of a light under the camera's matrices");
   }
   Result<Matrix3> balanced = balanced_to_output(frame, plan_.options, balance);
   if (!balanced) return balanced;

@@ -107,7 +107,7 @@ Result<BracketScene> measure_bracket_scene(const RawFrame& frame, const DevelopO
                                            double clipped_fraction, Executor& executor) {
   const std::optional<double> exposure_s = frame.raw.info.exposure_s;
   if (!exposure_s || !(*exposure_s > 0)) {
-    return fail(ErrorCode::insufficient, "the file does not state its exposure time, which a bracket is based on");
+    return fail(ErrorCode::insufficient, "the file does not state its exposure time, which a bracket needs");
   }
   const Result<FrameElectrons> electrons = frame_electrons(frame, options, executor);
   if (!electrons) return tl::make_unexpected(electrons.error());

@@ -122,11 +122,11 @@ Result<FrameElectrons> FrameLoader::next() {
     Result<std::optional<NoiseProfile>> expected = noise_at_levels(reference_, *read);
     if (!expected) return tl::make_unexpected(at_frame(expected.error(), last_name_));
     if (noise_differs(*expected, frame.noise)) {
-      return tl::make_unexpected(at_frame({ErrorCode::invalid_argument,
-                                           "its noise is not that of the reference at the same ISO: raw files have to "
-                                           "be merged as the camera wrote them",
-                                           {}},
-                                          last_name_));
+      return tl::make_unexpected(
+          at_frame({ErrorCode::invalid_argument,
+                    "its noise is not that of the reference at the same ISO: only unprocessed raw files can be merged",
+                    {}},
+                   last_name_));
     }
     frame.noise = *std::move(expected);  // a profile that is measured in an image has an error of its own
   }
@@ -140,7 +140,7 @@ Result<double> FrameLoader::stated_light() const {
   const FrameInfo& info = reference_.frame.raw.info;
   if (!info.exposure_s || !last_.exposure_s || !(*info.exposure_s > 0) || !(*last_.exposure_s > 0)) {
     return tl::make_unexpected(at_frame(
-        {ErrorCode::insufficient, "frames of different exposure have to state their exposure times", {}}, last_name_));
+        {ErrorCode::insufficient, "frames of different exposure must state their exposure times", {}}, last_name_));
   }
   double light = *last_.exposure_s / *info.exposure_s;
   if (info.f_number && last_.f_number) light *= std::pow(*info.f_number / *last_.f_number, 2);

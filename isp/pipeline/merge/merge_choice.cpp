@@ -74,8 +74,8 @@ Result<MergeChoice> choose_merge(MergeContext& work) {
   choice.method = choice.plan->method;
   if (!choice.plan->fits) {
     choice.warning = fmt::format(
-        "merging takes at least {:.0f} ms by prediction, more than the budget of {:.3g} ms: the cheapest "
-        "method was used",
+        "merging is predicted to take at least {:.0f} ms, more than the budget of {:.3g} ms: the cheapest method was "
+        "used",
         1e3 * choice.plan->predicted_s, 1e3 * budget_s);
   }
   return chosen({});

@@ -54,7 +54,7 @@ void warn_of_gaps(MergedRaw& out) {
   if (most < noticeable_gaps) return;
   out.warnings.push_back(
       fmt::format("{:.1f} % of the pixels have no data of one colour and were filled from the denoised frames: take "
-                  "more frames at other places, or a smaller image",
+                  "more frames at other positions, or choose a smaller image",
                   100 * most));
 }
 
@@ -116,12 +116,13 @@ Result<void> MovedMerge::check_bracket() const {
   if (!work_.out.bracket) return {};
   const std::string& reference = work_.loader.reference_name();
   if (work_.options.drizzle) {
-    return fail(ErrorCode::invalid_argument, "frames of other exposure than it cannot be drizzled: leave them out",
-                reference);
+    return fail(ErrorCode::invalid_argument,
+                "frames of another exposure than the reference cannot be drizzled: leave them out", reference);
   }
   if (work_.options.keep_foreground) {
     return fail(ErrorCode::invalid_argument,
-                "the foreground of frames of other exposure than it cannot be kept apart: leave them out", reference);
+                "--foreground keep does not support frames of another exposure than the reference: leave them out",
+                reference);
   }
   return {};
 }

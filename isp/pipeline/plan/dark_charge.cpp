@@ -101,7 +101,7 @@ DarkCharge in_black_point(const RawFrame& frame, const RawLevels& levels) {
   if (levels.black.dark_mean_e != PerSite<double>{}) {
     out.charge_e = levels.black.dark_mean_e;
     out.mean_e = mean_of_sites(out.charge_e);
-    out.reason = "the black point states it apart from its pedestal";
+    out.reason = "the black point states it separately from its pedestal";
     return out;
   }
   const std::optional<PerSite<double>> dark_dn = dark_of_black_point(frame, levels);
@@ -138,13 +138,13 @@ DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, cons
   if (frame.raw.layout != SensorLayout::bayer) return {.reason = "not a mosaic of filters"};
   const bool is_known = levels.black.dark_mean_e != PerSite<double>{};
   if (is_known || levels.black.holds == BlackPoint::Holds::pedestal_and_dark) return in_black_point(frame, levels);
-  // Of a raw that came denoised its maker knew more: `lowlux denoise` subtracts dark charge, or warns.
+  // If a raw is denoised already, its maker knew more: `lowlux denoise` subtracts dark charge, or warns.
   if (!levels.electrons_at_white) return {.reason = "the gain is not known"};
   if (frame.noise->reduced) return {.reason = "noise was reduced before"};
   if (!info.exposure_s) return {.reason = "the exposure time is not known"};
   DarkCharge out{.state = DarkCharge::State::not_expected};
   if (!(charge_of(high_current_e_per_s, info) >= min_charge_e)) {
-    out.reason = "the exposure was short, or cold";
+    out.reason = "the exposure was short, or the sensor cold";
     return out;
   }
   if (may_estimate) {
@@ -155,7 +155,7 @@ DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, cons
     }
     out.reason = refusal_of(found, info);
   } else {
-    out.reason = "an estimate was not wanted";
+    out.reason = "the estimate is switched off";
   }
   out.max_fraction = max_dark_fraction(frame, levels, thumbnail);
   if (out.max_fraction) out.state = DarkCharge::State::unknown;
@@ -166,8 +166,8 @@ std::string warning_of(const DarkCharge& dark, const FrameInfo& info) {
   if (dark.state != DarkCharge::State::unknown) return {};
   const std::string place = info.temperature_c ? fmt::format(" and {:g} C", *info.temperature_c) : std::string();
   return fmt::format(
-      "the dark charge is unknown: at {:g} s{} it may take up to {:.0f} % of the saturation; use "
-      "--dark-frame, or --profile with a dark current",
+      "the dark charge is unknown: at {:g} s{} it may reduce the saturation by up to {:.0f} %; use --dark-frame, or "
+      "--profile with a dark current",
       *info.exposure_s, place, 100 * *dark.max_fraction);
 }
 

@@ -28,11 +28,11 @@ Result<Rect> upright_crop(const PictureCrop& crop, const PictureSize& upright) {
   const auto [y, height] = pixels_along(crop.y, crop.height, crop.percent, upright.height);
   if (!(width >= 1 && height >= 1)) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("the crop holds no pixel of the {} x {} picture", upright.width, upright.height), "crop");
+                fmt::format("the crop contains no pixel of the {} x {} image", upright.width, upright.height), "crop");
   }
   if (!(x >= 0 && y >= 0 && x + width <= upright.width && y + height <= upright.height)) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("the crop reaches to column {:g} and row {:g}, the upright picture has {} x {} pixels",
+                fmt::format("the crop extends to column {:g} and row {:g}, but the upright image has {} x {} pixels",
                             x + width, y + height, upright.width, upright.height),
                 "crop");
   }

@@ -79,7 +79,7 @@ Result<Rect> region_of(const RawDn& raw, const DevelopOptions& options) {
   const PickedArea& area = options.white_balance.picked;
   if (area.x < 0 || area.y < 0 || area.x >= upright.width || area.y >= upright.height) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("the picked pixel {},{} is outside the upright picture of {} x {} pixels", area.x, area.y,
+                fmt::format("the picked pixel {},{} is outside the upright image of {} x {} pixels", area.x, area.y,
                             upright.width, upright.height),
                 "white balance");
   }
@@ -145,7 +145,7 @@ Result<Vector3> picked_neutral(const RawFrame& measured, const RawLevels& levels
   for (std::size_t c = 0; c < 3; ++c) {
     const double value = light.mean.plane[c].at(0, 0);
     if (!(value > min_standard_errors * sums.colour[c].standard_error())) {
-      return refuse("the picked area is too dark to tell its colour from noise: pick a brighter or a larger one");
+      return refuse("the picked area is too dark to separate its colour from noise: pick a brighter or a larger one");
     }
     out[c] = value * gains[c];
   }

@@ -27,13 +27,14 @@ double green_e_at_white(const RawFrame& frame, const RawLevels& levels) {
 DemosaicPlan chosen(const RawFrame& frame, const NoiseReduction& noise, const DemosaicRequest& request) {
   if (request.method) return {{*request.method}, "given"};
   if (!noise.reduces() && !came_reduced(frame) && request.signal_e && *request.signal_e < min_encoded_noisy_e) {
-    return {{DemosaicMethod::malvar}, "little light, and its noise stays: filters on linear light leave no bias"};
+    return {{DemosaicMethod::malvar}, "little light without noise reduction: filters on linear light leave no bias"};
   }
-  if (request.max_method < DemosaicMethod::residual) return {{request.max_method}, "as much as there is time for"};
+  if (request.max_method < DemosaicMethod::residual)
+    return {{request.max_method}, "best method that fits into the time"};
   if (request.max_method > DemosaicMethod::residual && request.signal_e && *request.signal_e < max_median_e) {
     return {{DemosaicMethod::residual_median}, "little light: medians remove false colour"};
   }
-  return {{DemosaicMethod::residual}, "keeps most detail"};
+  return {{DemosaicMethod::residual}, "preserves most detail"};
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ Result<void> check(const RawFrame& frame, const DevelopOptions& o) {
   }
   const Rect& crop = frame.raw.default_crop;
   if (o.half && (crop.width < 2 || crop.height < 2)) {
-    return fail(ErrorCode::invalid_argument, "the picture is too small to halve");
+    return fail(ErrorCode::invalid_argument, "the image is too small for half size");
   }
   return {};
 }
@@ -164,7 +164,7 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   if (!noise) return tl::make_unexpected(std::move(noise.error()));
   append(plan.warnings, noise->warnings);
   if (rendering->look && rendering->look->noise_limit && !rendering->look->noise && !noise->has_level()) {
-    plan.warnings.emplace_back("the noise of the frame is not known, so it is not held to a limit");
+    plan.warnings.emplace_back("the noise of the frame is not known, so --noise-limit has no effect");
   }
   if (options.highlights == Highlights::reconstruct) plan.saturation = measure_saturation(frame.raw, levels->black);
   const bool knows_noise = noise->has_level() || frame.noise;

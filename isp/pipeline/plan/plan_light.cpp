@@ -55,10 +55,10 @@ Result<void> decide_adaptation(const FrameLight& light, const DevelopOptions& op
   const Xy scene = choice.light && choice.light->white ? *choice.light->white : light.white->xy;
   const auto adaptation = incomplete_adaptation(scene, output_white, plan.adaptation_degree);
   if (!adaptation) {
-    return fail(ErrorCode::invalid_argument,
-                fmt::format("CAT02 has no adaptation of degree {:.3g} to a light as saturated as this one: use "
-                            "--adaptation-degree 1",
-                            plan.adaptation_degree));
+    return fail(
+        ErrorCode::invalid_argument,
+        fmt::format("CAT02 has no adaptation of degree {:.3g} to a light of this saturation: use --adaptation-degree 1",
+                    plan.adaptation_degree));
   }
   const Matrix3 from_xyz = *xyz_to_output(options.space);
   plan.adaptation = from_xyz * *adaptation * *inverse(from_xyz);

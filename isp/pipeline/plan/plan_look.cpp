@@ -32,17 +32,18 @@ Result<void> check(const LookChoice& o, OutputSpace space) {
         "linear-rec2020");
   }
   if (o.scene_luminance_cd_m2 && !(*o.scene_luminance_cd_m2 >= min_cd_m2 && *o.scene_luminance_cd_m2 <= max_cd_m2)) {
-    return wrong(fmt::format("a scene's luminance lies between {} and {} cd/m2, not at {}", min_cd_m2, max_cd_m2,
+    return wrong(fmt::format("the luminance of a scene must be between {} and {} cd/m2, found {}", min_cd_m2, max_cd_m2,
                              *o.scene_luminance_cd_m2));
   }
-  if (!(o.dimming >= 0 && o.dimming <= 1)) return wrong("the fraction of darkness that is kept is between 0 and 1");
+  if (!(o.dimming >= 0 && o.dimming <= 1))
+    return wrong("the fraction of darkness that is kept must be between 0 and 1");
   if (!(o.field_of_view_deg >= 0.1 && o.field_of_view_deg <= 180))
-    return wrong("a field of view has 0.1 to 180 degrees");
-  if (!(o.tolerance > 0 && o.tolerance <= 100)) return wrong("a tolerance lies above 0 and at most at 100");
+    return wrong("the field of view must be 0.1 to 180 degrees");
+  if (!(o.tolerance > 0 && o.tolerance <= 100)) return wrong("a tolerance must be above 0 and at most 100");
   if (o.adaptation_degree && !(*o.adaptation_degree >= 0 && *o.adaptation_degree <= 1))
-    return wrong("a degree of adaptation is between 0 and 1");
+    return wrong("a degree of adaptation must be between 0 and 1");
   if (o.noise_limit && !(*o.noise_limit > 0 && *o.noise_limit <= 100)) {
-    return wrong("the limit of noise is a CIE lightness above 0 and at most 100");
+    return wrong("the noise limit must be a CIE lightness above 0 and at most 100");
   }
   return {};
 }
@@ -66,8 +67,8 @@ Result<double> white_level_cd_m2(const RawFrame& frame, double mean, LookPlan& l
   const std::optional<double> saturation = saturation_luminance_cd_m2(info);
   if (!saturation) {
     return fail(ErrorCode::insufficient,
-                "the luminance of the scene is unknown: it takes exposure time, f-number and ISO to estimate it, and "
-                "the file lacks one; give its mean with --scene-luminance, in cd/m2");
+                "the luminance of the scene is unknown: the estimate needs exposure time, f-number and ISO, and the "
+                "file lacks one; give its mean with --scene-luminance, in cd/m2");
   }
   look.luminance_rule = by_profile ? "profile" : "exposure";
   look.mean_cd_m2 = mean * *saturation;
@@ -251,11 +252,11 @@ Result<ModelTable> tabulate_model(const LookPlan& look, const ModelBasis& basis,
   ModelTable out{*std::move(table), {}};
   if (!(look.white_cd_m2 >= model->valid_from_cd_m2 && look.white_cd_m2 <= model->valid_to_cd_m2)) {
     out.warnings.push_back(
-        fmt::format("the model {} is known for whites of {:g} to {:g} cd/m2; this scene's has {:.3g}", model->name,
-                    model->valid_from_cd_m2, model->valid_to_cd_m2, look.white_cd_m2));
+        fmt::format("the model {} is valid for whites of {:g} to {:g} cd/m2; that of this scene has {:.3g}",
+                    model->name, model->valid_from_cd_m2, model->valid_to_cd_m2, look.white_cd_m2));
   }
   if (!out.table.within_bound) {
-    out.warnings.push_back(fmt::format("the table of the model {} is off by up to {:.2g} CIEDE2000", model->name,
+    out.warnings.push_back(fmt::format("the table of the model {} has an error of up to {:.2g} CIEDE2000", model->name,
                                        out.table.error.largest));
   }
   return out;

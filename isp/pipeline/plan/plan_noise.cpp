@@ -135,7 +135,7 @@ denoise::NoiseCheck check_frame(const RawFrame& frame, const RawLevels& levels, 
 
 std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& levels) {
   if (is_mosaic(frame.raw) && (frame.raw.active.width < 2 || frame.raw.active.height < 2)) {
-    return Error{ErrorCode::invalid_argument, "the picture is too small to separate noise from detail"};
+    return Error{ErrorCode::invalid_argument, "the image is too small to separate noise from detail"};
   }
   if (!levels.electrons_at_white) {
     return Error{ErrorCode::insufficient,

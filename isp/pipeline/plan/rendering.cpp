@@ -89,7 +89,7 @@ std::string origin_of(WhiteSource source) {
     case WhiteSource::picked:
       return "of the picked pixel";
     default:
-      return "left as it is";
+      return "not changed";
   }
 }
 
@@ -110,7 +110,7 @@ Result<WhiteBalance> with_white(Result<WhiteBalance> balance, const RawFrame& fr
   if (o.white_balance.mode == WhiteBalanceChoice::Mode::automatic) {
     if (Result<WhiteBalance> daylight = white_balance_of_temperature(frame.colour, daylight_k)) {
       daylight->reason =
-          "auto white balance found no colour that a light can have: daylight is used; --wb sets another";
+          "automatic white balance found no plausible colour of a light: daylight is used; --wb sets another";
       return daylight;
     }
   }

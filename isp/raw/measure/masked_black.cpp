@@ -214,11 +214,11 @@ double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 
 
 std::string why_not_dark(const RawDn& raw, const Rect& region, const BlackPoint& black) {
   if (!raw.black_tag)
-    return "the file does not say that its border is masked, and there is no black level to check it by";
+    return "the file does not state that its border is masked, and there is no black level to verify it";
   const double level = mean_of(black.pedestal_dn);
   const double noise = mean_of(black.noise_std_dn);
   const double tag = raw.black_tag->pattern_dn.front();
-  if (!(noise > 0)) return "the border holds one value only, so it was not read out";
+  if (!(noise > 0)) return "the border has one value only, so it was not read out";
   if (std::fabs(level - tag) > std::max(max_offset_of_noise * noise, max_offset_of_range * (raw.white_dn[1] - tag))) {
     return fmt::format("the border's level {:.1f} DN is too far from the tagged black {:.1f} DN to be masked", level,
                        tag);
@@ -233,11 +233,11 @@ std::string why_not_dark(const RawDn& raw, const Rect& region, const BlackPoint&
 MaskedBlack measure_masked_black(const RawDn& raw, double gain_dn_per_e) {
   MaskedBlack out;
   if (raw.layout == SensorLayout::linear_rgb) {
-    out.refusal = "the file holds demosaiced samples, which have no masked pixels";
+    out.refusal = "the file has demosaiced samples, which have no masked pixels";
     return out;
   }
   if (raw.is_float()) {
-    out.refusal = "the samples are floating-point numbers, which were computed: masked pixels are measured on codes";
+    out.refusal = "the samples are floating-point numbers: masked pixels are measured on integer codes only";
     return out;
   }
   const std::optional<Rect> region = best_region(raw);

@@ -163,7 +163,7 @@ TEST(V4l2Open, NodesThatAreNoCameraAreToldApart) {
   fake.capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_READWRITE;
   EXPECT_TRUE(has(refused(fake), "does not stream"));
   fake.faults[VIDIOC_QUERYCAP] = {ENOTTY};
-  EXPECT_TRUE(has(refused(fake), "no V4L2 device"));
+  EXPECT_TRUE(has(refused(fake), "not a V4L2 device"));
 }
 
 TEST(V4l2Open, EachFailureToOpenHasItsCodeAndItsCure) {
@@ -186,7 +186,7 @@ TEST(V4l2Open, EachFailureToOpenHasItsCodeAndItsCure) {
   }
   // The real system.
   EXPECT_EQ(capture::open_v4l2("/dev/lowlux-none", {}).error().code, ErrorCode::not_found);
-  EXPECT_TRUE(has(capture::open_v4l2("/dev/null", {}).error(), "no V4L2 device"));
+  EXPECT_TRUE(has(capture::open_v4l2("/dev/null", {}).error(), "not a V4L2 device"));
 }
 
 TEST(V4l2Open, AFormatThatAnotherProgramHoldsIsBusy) {

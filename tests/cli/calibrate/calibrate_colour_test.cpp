@@ -169,7 +169,7 @@ TEST_F(CalibrateColour, RefusesBadInputInOneLineAndLeavesNothing) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> bad{
       {{rose}, "no chart found"},
       {{file("none.dng")}, "none.dng"},
-      {{kiss_x4, "--illuminant", "D99"}, "there is no light 'D99'"},
+      {{kiss_x4, "--illuminant", "D99"}, "unknown light 'D99'"},
       {{"--camera", "Nikon_D51"}, "near it: Nikon_D5100"},
       {{"--camera", "zzzzzz"}, "lowlux simulate --list"},
       {{"--camera", "Nikon_D5100", "--per-photon"}, "per unit of power"},

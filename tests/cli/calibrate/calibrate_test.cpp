@@ -324,7 +324,7 @@ TEST_F(Calibrate, NoInputAndNoOutputIsReplacedByAnother) {
   usage({"calibrate", "black", dark[0], "-o", file("p.json"), "--report", file("p.json")}, ".html");
   usage({"calibrate", "noise", dark[0], "-o", file("p.json"), "--steady-light"}, "for flats");
   usage({"calibrate", "noise", dark[0], "--darks", dark[1], "-o", file("p.json"), "--method", "foi"}, "one picture");
-  usage({"develop", dark[0], "-o", file("p.png"), "--black", "a.json", "--profile", "b.json"}, "a profile each");
+  usage({"develop", dark[0], "-o", file("p.png"), "--black", "a.json", "--profile", "b.json"}, "both name a profile");
   EXPECT_EQ(scratch_.read("d_0000.dng"), before);
 }
 

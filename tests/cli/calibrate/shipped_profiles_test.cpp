@@ -108,7 +108,7 @@ class ShippedProfiles : public test::SimulateCommand {
   static void expect_no_false_warning(const std::string& text, const std::string& what) {
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) {
-      EXPECT_NE(line.find("the profile knows no dark current"), std::string::npos) << what << ": " << line;
+      EXPECT_NE(line.find("the profile states no dark current"), std::string::npos) << what << ": " << line;
     }
   }
 };
@@ -163,7 +163,8 @@ TEST_F(UnknownDarkCharge, IsUndoneForTheSensorOfTheThesis) {
     shoot_with_truth(c.sensor, {"--sensor", "thesis"});
     EXPECT_EQ(developed("noisy.dng", "with.pfm", {}).err, "");
     const std::string warned = developed("noisy.dng", "without.pfm", {"--dark-estimate", "off"}).err;
-    EXPECT_NE(warned.find("the dark charge is unknown: at 1 s and 20 C it may take up to"), std::string::npos)
+    EXPECT_NE(warned.find("the dark charge is unknown: at 1 s and 20 C it may reduce the saturation by up to"),
+              std::string::npos)
         << warned;
     const double with = saturation_of("with.pfm"), without = saturation_of("without.pfm");
     std::printf("  saturation kept: %.3f, with the dark charge left in %.3f\n", with, without);

@@ -200,15 +200,15 @@ TEST_F(SimulateBurst, NoTruthIsOverwrittenWithoutForce) {
 
 TEST_F(SimulateBurst, OptionsThatWouldDoNothingOrContradictAreRefused) {
   const std::vector<std::pair<Words, std::string>> wrong{
-      {{"--shake", "3"}, "--shake does nothing without --frames"},
-      {{"--roll", "3", "--frames", "1"}, "--roll does nothing without --frames"},
-      {{"--dither", "3"}, "--dither does nothing without --frames"},
-      {{"--drift", "1,0"}, "--drift does nothing without --frames"},
-      {{"--field-rotation", "1"}, "--field-rotation does nothing without --frames"},
-      {{"--frames", "4", "--field-centre", "1,2"}, "--field-centre does nothing without --field-rotation"},
-      {{"--frames", "4", "--horizon", "20", "--shake", "2"}, "--horizon does nothing without"},
-      {{"--mover-size", "9"}, "--mover-size does nothing without --movers"},
-      {{"--mover-speed", "9"}, "--mover-speed does nothing without --movers"},
+      {{"--shake", "3"}, "--shake has no effect without --frames"},
+      {{"--roll", "3", "--frames", "1"}, "--roll has no effect without --frames"},
+      {{"--dither", "3"}, "--dither has no effect without --frames"},
+      {{"--drift", "1,0"}, "--drift has no effect without --frames"},
+      {{"--field-rotation", "1"}, "--field-rotation has no effect without --frames"},
+      {{"--frames", "4", "--field-centre", "1,2"}, "--field-centre has no effect without --field-rotation"},
+      {{"--frames", "4", "--horizon", "20", "--shake", "2"}, "--horizon has no effect without"},
+      {{"--mover-size", "9"}, "--mover-size has no effect without --movers"},
+      {{"--mover-speed", "9"}, "--mover-speed has no effect without --movers"},
       {{"--frames", "4", "--bracket", "0,1,2"}, "4 is not a multiple of the 3 exposures"},
       {{"--frames", "2", "--shake", "2", "--sampling", "published"}, "published"}};
   for (const auto& [options, clue] : wrong) expect_refused("chart", options, 2, clue);

@@ -212,7 +212,7 @@ TEST(ExposureAdvice, RefusesWhatCannotBeAndSaysWhich) {
                         {[](AdviceRequest& r) {
                            r.gains[1].white_e_per_s = {0, 0, 0};
                          },
-                         "no channel sees the light"},
+                         "no channel is sensitive to the light"},
                         {[](AdviceRequest& r) { r.gains[1].white_e_per_s[2] = -1; }, "electrons of a white"},
                         {[](AdviceRequest& r) { r.gains[1].white_e_per_s[2] = inf; }, "electrons of a white"},
                         {[](AdviceRequest& r) { r.midtone_cd_m2 = 0; }, "mid tone's luminance"},
