@@ -35,7 +35,7 @@ inline constexpr double largest_e = 1e9;
 struct RawElectronsView {
   PlaneView<const float> value;
   BayerPhase phase = BayerPhase::rggb;
-  NoiseRatioView noise_ratio{};  // of each value's variance to that of RawNoise; 1e-6..1e6
+  NoiseRatioView noise_ratio{};  // ratio of each value's variance to that of RawNoise; 1e-6..1e6
 };
 
 inline constexpr double unsaturated_e = std::numeric_limits<double>::infinity();
@@ -45,11 +45,11 @@ inline constexpr double unsaturated_e = std::numeric_limits<double>::infinity();
 struct RawNoise {
   PerSite<double>
       dark_mean_e{};  // subtracted, sites as in site_of(); both greens get their mean, to avoid maze patterns
-  std::array<double, 3> variance_e2{};  // of R, G, B: read noise^2 + quantisation step^2 / 12; greens share one value
+  std::array<double, 3> variance_e2{};  // for R, G, B: read noise^2 + quantisation step^2 / 12; greens share one value
   /// Values of at least this are saturated: they count as the largest white-balanced value of their 2x2 cell, and do
   /// not affect the colour of its surroundings. A cell of four saturated values becomes neutral, whatever
   /// DenoiseOptions::rho; the values of a cell with fewer stay as they were measured.
-  std::array<double, 3> saturation_e{unsaturated_e, unsaturated_e, unsaturated_e};  // of R, G, B
+  std::array<double, 3> saturation_e{unsaturated_e, unsaturated_e, unsaturated_e};  // levels of R, G, B
 };
 
 struct DenoiseOptions {
@@ -73,7 +73,7 @@ struct DenoiseOptions {
 
 /// Optional outputs for each 2x2 cell, ceil(height / 2) x ceil(width / 2); views without data are not written.
 struct DenoiseMaps {
-  PlaneView<float> residual_variance;  // of white-balanced luma 0.2 R + 0.3 G1 + 0.3 G2 + 0.2 B [e-^2]
+  PlaneView<float> residual_variance;  // variance of white-balanced luma 0.2 R + 0.3 G1 + 0.3 G2 + 0.2 B [e-^2]
   /// The factor of DenoiseOptions::rho, 0..1, for the mean variance of the two colour differences; 0 where a site is
   /// saturated.
   PlaneView<float> chroma_confidence;

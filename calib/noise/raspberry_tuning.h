@@ -46,8 +46,8 @@ double tuning_gain_dn_per_e(const RaspberryTuning& tuning, int bits);
 
 /// Returns a profile with the settings "analogue gain 1", ISO 100, and the largest analogue gain. Full well and
 /// pedestal follow from the black level. Where the constant is 0, the tuning file does not state the read noise: it is
-/// that of the class of the sensor, at most, and a provenance entry says so. Standard errors hold the uncertainty.
-/// Errors: bits outside 8 to 16, a gain of at most 1; figures that no sensor has (isp::check_sensor).
+/// that of the class of the sensor, at most, and a provenance entry states this. Standard errors include the
+/// uncertainty. Errors: bits outside 8 to 16, a gain of at most 1; figures that no sensor has (isp::check_sensor).
 Result<CameraProfile> profile_of_tuning(const RaspberryTuning& tuning, const TunedSensor& sensor);
 
 }  // namespace lowlux::calib

@@ -40,7 +40,7 @@ double read_variance_dn2(const NoiseLine& line, double mean_dn, const ClipRange&
 /// Returns the fraction of pixels whose clipped mean is `mean_dn` that is clipped, according to the line.
 double clipped_share(const NoiseLine& line, double mean_dn, const ClipRange& clip);
 
-/// What is known of a line before any point is measured: gain and offset are distributed log-normally about these
+/// Holds the prior of a line: before any point is measured, gain and offset are distributed log-normally about these
 /// values, independent of each other.
 struct NoisePrior {
   double gain_dn_per_e = 0;  // above 0, as the others

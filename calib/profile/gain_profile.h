@@ -62,7 +62,7 @@ std::string gain_setting_of(const FrameSetting& setting);
 
 /// Writes results from flats and darks into a gain setting's profile. Its values in electrons are converted to the new
 /// system gain; a pedestal that was measured on darks stays. A full well that the flats do not reach is replaced by the
-/// charge at the white level, and provenance says so; so it does for a read noise below the quantisation.
+/// charge at the white level, and provenance states this, as it does for a read noise below the quantisation.
 /// @param darks  setting of the darks
 void put_photon_transfer(const PhotonTransfer& transfer, const FrameSetting& darks, const Measured& measured,
                          GainProfile& out);

@@ -23,7 +23,7 @@ struct DecodedHeader {
   DecodeOutcome outcome;
   char reason[192];
 
-  std::int32_t raw_width, raw_height, samples;  // of the readout; samples per pixel, 1 or 3
+  std::int32_t raw_width, raw_height, samples;  // size of the readout; samples per pixel, 1 or 3
   std::int32_t left, top, width, height;        // the visible area
   std::int32_t masks[8][4];                     // top, left, bottom, right in the readout, ends excluded
   std::int32_t flip;                            // bit 0 mirrors x, bit 1 mirrors y, bit 2 then transposes
@@ -54,7 +54,7 @@ struct DecodedRaw {
 /// Limits for reading one file. Each is checked before the memory is allocated or the time is spent.
 struct ReadLimits {
   std::uint64_t max_file_bytes = std::uint64_t{2} << 30;
-  std::int64_t max_pixels = 400'000'000;  // of the readout, borders included
+  std::int64_t max_pixels = 400'000'000;  // pixels of the readout, borders included
   double max_decode_cpu_s = 120;          // rounded up to whole seconds; the wall clock gets five times as much
 };
 

@@ -27,7 +27,7 @@ enum class DecoderProgram : std::uint8_t {
 };
 
 /// Runs a program of lowlux on a file. The program is in the folder of this library or, once installed, in lowlux/
-/// below it. Errors: that of a program that is not there, besides.
+/// below it. Errors: those of the decoder, and that of a missing program.
 Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits,
                                     DecoderProgram program = DecoderProgram::libraw);
 

@@ -5,8 +5,8 @@
 
 namespace lowlux::capture {
 
-/// What lowlux-decode-jxl receives as its file: this header, `parts` sizes [bytes] of 64 bits each, and the parts, each
-/// a JPEG XL of the samples of one strip or tile. It delivers the samples of the whole image as codes of `bits` bits.
+/// Header of the input of lowlux-decode-jxl. It is followed by `parts` sizes [bytes] of 64 bits each, and the parts,
+/// each a JPEG XL of the samples of one strip or tile. The output has the samples of the image, codes of `bits` bits.
 struct JpegXlJob {
   std::int32_t width, height;            // of the image [pixels]
   std::int32_t samples;                  // per pixel, 1 or 3

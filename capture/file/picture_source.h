@@ -20,7 +20,7 @@ struct ScenePicture {
   SceneLinear xyz;
   /// Whether the file states the luminance of Y = 1 (OpenEXR whiteLuminance).
   bool absolute = false;
-  double white_luminance_cd_m2 = 0;   // of Y = 1; 0 unless `absolute`
+  double white_luminance_cd_m2 = 0;   // luminance of Y = 1; 0 unless `absolute`
   std::vector<std::string> warnings;  // one line each
 };
 

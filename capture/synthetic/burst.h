@@ -23,7 +23,7 @@
 
 namespace lowlux::capture {
 
-/// What is known of one frame of a burst.
+/// Holds the true motion and content of one frame of a burst.
 struct BurstTruth {
   RigidMotion motion;         // of the scene from frame 0 to this frame; with a horizon, of the sky above it
   RigidMotion camera_motion;  // of the foreground and of what moving objects are measured against

@@ -18,7 +18,7 @@ struct PointSource {
   double x_px = 0;  // in the image; integers are centres of pixels
   double y_px = 0;
   int light = 0;               // index in Scene::point_lights
-  double luminance_cd_m2 = 0;  // of a pixel that it fills uniformly: the light of one pixel's area
+  double luminance_cd_m2 = 0;  // luminance of a pixel that it fills uniformly: the light of one pixel's area
   double spread_px = 0.7;      // standard deviation
   bool is_star = false;        // moves with the sky, see BurstOptions
 };
@@ -28,7 +28,7 @@ struct StarField {
   int count = 0;              // in each cell
   double faintest_cd_m2 = 0;  // see add_stars
   std::uint64_t seed = 0;
-  int width_px = 0;  // of a cell
+  int width_px = 0;  // width of a cell
   int height_px = 0;
   int first_light = 0;  // index in Scene::point_lights of the first of their four lights
 };
@@ -40,7 +40,7 @@ std::vector<PointSource> stars_of_cell(const StarField& field, int column, int r
 struct Scene {
   SceneLinear xyz_cd_m2;            // CIE 1931 XYZ of each pixel, without the point sources
   Plane<std::uint16_t> patch;       // index of each pixel's radiance; empty: spectra are lifted from colours
-  std::vector<Spectrum> radiances;  // of patches [W m-2 sr-1 nm-1]
+  std::vector<Spectrum> radiances;  // radiances of patches [W m-2 sr-1 nm-1]
   std::vector<PointSource> points;
   std::vector<Spectrum> point_lights;  // radiance at 1 cd/m2
   Spectrum white;                      // radiance of a white diffuser in the scene: the camera's white balance
@@ -54,7 +54,7 @@ struct SceneSetup {
   int height = 800;
   Spectrum light;  // relative power
   std::string light_name;
-  double luminance_cd_m2 = 1;  // of a perfect white diffuser under it
+  double luminance_cd_m2 = 1;  // luminance of a perfect white diffuser under it
 };
 
 /// Largest number of pixels of a scene.

@@ -20,8 +20,8 @@ struct SensorFrame {
   BayerPhase phase = BayerPhase::rggb;
   PlaneView<const float> rate_e_per_s;  // height x width, see charge_rate; without the blur of the lens
   const PhotonRows* photons = nullptr;  // set: published photon sampling, else physical
-  std::uint64_t seed = 0;               // of the noise that is drawn for each frame
-  std::uint64_t pattern_seed = 0;       // of the fixed pattern: PRNU, DSNU, hot pixels, columns
+  std::uint64_t seed = 0;               // seed of the noise that is drawn for each frame
+  std::uint64_t pattern_seed = 0;       // seed of the fixed pattern: PRNU, DSNU, hot pixels, columns
   std::uint32_t frame = 0;
   int masked_columns = 0;                       // at the left: light-shielded, without crosstalk
   PlaneView<const float> blurred_e_per_s = {};  // as large, with the blur of the lens; empty: it has none

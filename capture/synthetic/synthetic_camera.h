@@ -29,8 +29,8 @@ struct SyntheticOptions {
   double lens_blur_px = 0;  // standard deviation of the lens's point spread function, see LensBlur; 0: no blur
   PhotonSampling sampling = PhotonSampling::physical;
   NoiseSourceChoice effects;
-  std::uint64_t seed = 1;         // of the noise: frames of one seed and index have the same noise, for any scene
-  std::uint64_t sensor_seed = 1;  // of the fixed pattern: selects the specimen of the sensor
+  std::uint64_t seed = 1;         // seed of the noise: frames of one seed and index have the same noise, for any scene
+  std::uint64_t sensor_seed = 1;  // seed of the fixed pattern: selects the specimen of the sensor
 
   /// Returns the blur of the lens in frames and in their truth: none if it is not among the effects.
   double simulated_blur_px() const {
@@ -43,7 +43,7 @@ struct SyntheticCamera {
   isp::NamedSensor sensor;
   SyntheticOptions options;
   CameraColour colour;    // matrices for A and D65 fitted to the sensitivities, and the neutral of `white`
-  Matrix3 camera_to_xyz;  // of white-balanced camera RGB, for that neutral
+  Matrix3 camera_to_xyz;  // matrix of white-balanced camera RGB, for that neutral
   double iso = 0;         // speed at which exposure, f-number and saturation agree (ISO 12232)
 };
 

@@ -54,7 +54,7 @@ class V4l2Device {
   const V4l2System& system() const { return system_; }
   int file() const { return file_; }
   const std::string& path() const { return path_; }
-  const std::string& name() const { return name_; }    // of the hardware, printable; the path if it states none
+  const std::string& name() const { return name_; }    // name of the hardware, printable; the path if it states none
   std::uint32_t buffer_type() const { return type_; }  // V4L2_BUF_TYPE_VIDEO_CAPTURE, with _MPLANE or not
   bool multi_planar() const { return multi_planar_; }
   /// Whether the driver leaves the route from the sensor to this node to the media controller: the formats it lists are

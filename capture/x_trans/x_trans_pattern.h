@@ -9,7 +9,7 @@
 
 namespace lowlux::capture {
 
-inline constexpr int x_trans_period = 6;  // of the pattern, in columns and in rows
+inline constexpr int x_trans_period = 6;  // period of the pattern, in columns and in rows
 
 /// States where the corner of an X-Trans mosaic lies in the pattern of 6 x 6 sites of x_trans_pattern.cpp: column and
 /// row, 0 to 5. Of the 36 phases each has the same colours as one other, three columns and three rows away.

@@ -8,7 +8,7 @@
 namespace lowlux::denoise {
 
 inline constexpr int block = 8;             // cells, each way
-inline constexpr int max_levels = 5;        // of the pyramid
+inline constexpr int max_levels = 5;        // levels of the pyramid
 inline constexpr int largest_side = 65536;  // sites
 inline constexpr int tile = 64;             // cells at the finest level, each way
 

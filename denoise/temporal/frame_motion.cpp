@@ -23,7 +23,7 @@ constexpr double noise2 = rows::units_per_sigma * rows::units_per_sigma;  // var
 constexpr double frame_significance = 4;  // standard deviations by which a displacement is better than none
 constexpr double significance = 2;        // and better than another one, for a tile or block
 constexpr double max_residual_cells = 0.5;
-/// What a displacement that is off changes at a site, over what it changes in the mean of a cell, squared. Chosen on
+/// Squared ratio of the change by an error of a displacement at a site to that in the mean of a cell. Chosen on
 /// kodim05, kodim15, kodim19 and kodim23.
 constexpr double mismatch_of_sites = 1.5;
 constexpr double min_displaced = 1.0 / 32;  // part of the tiles, from which on motion counts as found

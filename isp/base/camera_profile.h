@@ -40,7 +40,7 @@ struct Provenance {
   std::string source;              // the program and its version, or the publication
   std::string date;                // YYYY-MM-DD
   std::vector<std::string> files;  // files that were measured
-  double reduced_chi_square = 0;   // of the fit; 0 if nothing was fitted
+  double reduced_chi_square = 0;   // quality of the fit; 0 if nothing was fitted
   int degrees_of_freedom = 0;
 };
 

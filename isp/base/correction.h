@@ -22,7 +22,7 @@ struct GainMap {
   double spacing_v = 1, spacing_h = 1;  // distance of the points, relative to the active area's height and width
   double origin_v = 0, origin_h = 0;    // position of the first point, relative likewise
   std::vector<float> gain;              // points_v x points_h x map_planes
-  std::array<GainNoise, 4> noise{};     // of each site of a mosaic; 0 where the gains are exact
+  std::array<GainNoise, 4> noise{};     // noise of each site of a mosaic; 0 where the gains are exact
 };
 
 /// Describes radial lens shading: gain 1 + k0 r^2 + k1 r^4 + ... + k4 r^10 (DNG opcode FixVignetteRadial), with r the

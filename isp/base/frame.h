@@ -54,7 +54,7 @@ struct FrameInfo {
   std::optional<double> iso;
   std::optional<double> f_number;
   std::optional<double> focal_length_mm;
-  std::optional<double> temperature_c;  // of the sensor, else of the camera, else of the air
+  std::optional<double> temperature_c;  // temperature of the sensor, else of the camera, else of the air
   Orientation orientation = Orientation::normal;
 };
 
@@ -91,14 +91,14 @@ struct RawDn {
   Rect default_crop;                    // the region of the active area that makes the image
   std::vector<Rect> masked;             // light-shielded regions of the readout, in readout pixels
   bool masked_is_stated = false;        // true: the source states them; false: assumed to be all that is not active
-  std::optional<BlackLevel> black_tag;  // what the source states; absent if it states nothing
+  std::optional<BlackLevel> black_tag;  // black level that the source states; absent if it states none
   std::array<double, 3> white_dn{};     // saturation of R, G, B (all equal for monochrome)
   bool from_x_trans = false;            // linear_rgb that was interpolated from an X-Trans mosaic at reading
   FrameInfo info;
 
   bool is_float() const { return !dn_float.empty(); }
   int row_samples() const { return is_float() ? dn_float.width() : dn.width(); }  // in one row of the readout
-  int rows() const { return is_float() ? dn_float.height() : dn.height(); }       // of the readout
+  int rows() const { return is_float() ? dn_float.height() : dn.height(); }       // rows of the readout
   std::size_t samples() const { return is_float() ? dn_float.size() : dn.size(); }
   std::size_t sample_bytes() const { return is_float() ? sizeof(float) : sizeof(std::uint16_t); }
 };
@@ -110,10 +110,10 @@ decltype(auto) with_samples(const RawDn& raw, Use&& use) {
   return use(raw.dn.view());
 }
 
-/// Holds the black point of one frame, per CFA site. The pedestal [DN] is subtracted, or is the mean of what is
-/// subtracted where `pattern` is set. If it was measured on masked pixels or dark frames it holds the dark charge too,
-/// and the dark mean left to subtract is 0. For a dark frame it is the mean: what is subtracted is the frame itself
-/// (dark_frame.h). For SensorLayout::linear_rgb the four figures are those of R, G, B and B.
+/// Holds the black point of one frame, per CFA site. The pedestal [DN] is subtracted; if `pattern` is set, the pattern
+/// is subtracted and the pedestal is its mean. If it was measured on masked pixels or dark frames it includes the dark
+/// charge, and the dark mean left to subtract is 0. For a dark frame it is the mean of the frame that is subtracted
+/// (dark_frame.h). For SensorLayout::linear_rgb the four values are those of R, G, B and B.
 struct BlackPoint {
   PerSite<double> pedestal_dn{};
   PerSite<double> pedestal_standard_error_dn{};  // 0 where the pedestal is quoted and not measured
@@ -129,12 +129,12 @@ struct NoiseProfile {
   std::array<double, 3> scale{};
   std::array<double, 3> offset{};
   enum class Source : std::uint8_t { file, profile, picture } source = Source::file;  // origin of the figures
-  bool reduced = false;  // noise reduction was applied, and this is what it left (DNG NoiseReductionApplied)
+  bool reduced = false;  // true: noise after noise reduction (DNG NoiseReductionApplied)
 };
 
 /// Holds one colour calibration of a camera (DNG ColorMatrixN, CameraCalibrationN, ForwardMatrixN).
 struct ColourCalibration {
-  double cct_k = 0;  // of its calibration illuminant; 0 if the source does not state it
+  double cct_k = 0;  // temperature of its calibration illuminant; 0 if the source does not state it
   Matrix3 xyz_to_camera = identity3();
   Matrix3 camera_calibration = identity3();
   std::optional<Matrix3> forward;  // white-balanced camera RGB -> XYZ under D50
@@ -149,14 +149,14 @@ struct CameraColour {
   enum class Source : std::uint8_t { none, file_tags, decoder_table, profile } source = Source::none;
 };
 
-/// Holds a frame with all that its source states about it: capture passes it to the pipeline.
+/// Holds a frame with all metadata of its source: capture passes it to the pipeline.
 struct RawFrame {
   RawDn raw;
   CameraColour colour;
   std::optional<NoiseProfile> noise;
-  std::shared_ptr<const NoiseRatio> noise_ratio;  // of a mosaic; null: the noise is that of `noise` everywhere
+  std::shared_ptr<const NoiseRatio> noise_ratio;  // for mosaics; null: the noise is that of `noise` everywhere
   RawCorrections corrections;
-  std::shared_ptr<const SourceTags> source_tags;  // of the raw file, to be passed on; null: none
+  std::shared_ptr<const SourceTags> source_tags;  // tags of the raw file, to be passed on; null: none
   std::vector<std::string> warnings;              // requests of the source that were not met, by name; one line each
 };
 

@@ -44,7 +44,7 @@ struct SensorModel {
   double crosstalk = 0;           // fraction of the light of a pixel that each of its four neighbours collects
   /// Amplifier glow: light of the output amplifier falls on the pixels around it (isp/model/sensor/amplifier_glow.h).
   double glow_e_per_s = 0;                    // at its source, the same at every temperature
-  std::array<double, 2> glow_position{1, 1};  // of the source, in widths and heights from the upper left corner
+  std::array<double, 2> glow_position{1, 1};  // source, in widths and heights from the upper left corner
   double glow_length = 0.1;                   // distance over which it falls by a factor e, in diagonals
   double row_noise_e = 0;                     // standard deviation of an offset drawn for each row of each frame
   double column_noise_e = 0;  // standard deviation of an offset drawn for each column, the same in all frames
@@ -55,7 +55,7 @@ struct SensorModel {
 /// with photons in s-1 m-2 sr-1 nm-1 (isp/model/sensor/photon.h).
 struct SpectralResponse {
   std::string name;
-  std::array<Spectrum, 3> quantum_efficiency;  // of R, G, B [e- per photon]; filters and optics included
+  std::array<Spectrum, 3> quantum_efficiency;  // efficiencies of R, G, B [e- per photon]; filters and optics included
   double etendue_m2_sr = 0;                    // pixel area times solid angle
 };
 

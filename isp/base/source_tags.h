@@ -10,14 +10,14 @@ namespace lowlux {
 struct SourceTag {
   std::uint16_t id = 0;
   std::uint16_t type = 0;         // 1 (BYTE) to 12 (DOUBLE)
-  std::uint32_t count = 0;        // of values
+  std::uint32_t count = 0;        // number of values
   std::vector<std::byte> values;  // little-endian, whatever the order of the file
 };
 
 /// Holds the tags of a raw file that lowlux passes on without using them: author, lens, place, maker's notes, XMP,
 /// camera profile.
 struct SourceTags {
-  std::vector<SourceTag> main;  // of the first directory of a DNG
+  std::vector<SourceTag> main;  // tags of the first directory of a DNG
   std::vector<SourceTag> exif;
   std::vector<SourceTag> gps;
   double baseline_exposure_ev = 0;  // by how much raw developers brighten the image by default (DNG BaselineExposure)

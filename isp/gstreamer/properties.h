@@ -10,7 +10,7 @@ namespace lowlux::gst {
 
 /// Holds what the properties of an element state.
 struct Properties {
-  // Of the stage, used when the element starts.
+  // These are settings of the stage, used when the element starts.
   std::string profile;
   int threads = 0;
   int level = LOWLUX_STAGE_LEVEL_STANDARD;
@@ -19,7 +19,7 @@ struct Properties {
   bool temporal = false;
   bool tone = true;
   double field_of_view_deg = 0;
-  // Of each frame; below their ranges: not known.
+  // These apply to each frame; values below their ranges mean not known.
   double black_level_dn = -1;
   double exposure_s = 0;
   double analogue_gain = 0;

@@ -18,7 +18,7 @@ struct BlockNoise {
   float offset[4];
 };
 
-/// What counts as the same scene.
+/// Holds the limits within which content counts as the same scene.
 struct BlockLimits {
   float site_deviate;               // normal deviate beyond which a site is an outlier; 0: none is
   float displacement_variance_px2;  // expected square of the error of the displacement, for each axis

@@ -13,7 +13,7 @@
 #include <hwy/foreach_target.h>  // compiles this file once more for each instruction set
 #include <hwy/highway.h>
 
-// The same bits on every processor: no fused products, no estimates, sums in one order for all lengths of vectors.
+// The bits are the same on every processor: no fused products, no estimates, sums in one order for all vector lengths.
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::merge::rows::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;

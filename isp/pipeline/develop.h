@@ -13,7 +13,7 @@ namespace lowlux::isp {
 struct Developed {
   Picture picture;
   DevelopPlan plan;
-  NoiseMaps noise_maps;     // of the active area; empty unless its noise was reduced and maps were requested
+  NoiseMaps noise_maps;     // maps of the active area; empty unless its noise was reduced and maps were requested
   Plane<float> seeing_map;  // probability of seeing, one value for 4 x 4 pixels of the image; empty unless requested
 };
 

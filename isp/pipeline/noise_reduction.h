@@ -57,7 +57,7 @@ struct DecidedLevel {
 struct NoiseReduction {
   std::optional<denoise::Level> level;  // absent: values stay as they are
   std::string reason;                   // for the level or its absence; one line
-  std::optional<double> snr;            // of one pixel in the median block of the frame, by the noise model
+  std::optional<double> snr;            // ratio of one pixel in the median block, by the noise model
   NoiseProfile::Source source = NoiseProfile::Source::file;
   denoise::RawNoise noise;
   std::shared_ptr<const NoiseRatio> noise_ratio;  // RawFrame::noise_ratio, also where nothing is reduced
@@ -88,7 +88,7 @@ std::optional<denoise::Level> level_for(double snr);
 struct NoiseMaps {
   Plane<float> residual_variance_e2;
   Plane<float> chroma_confidence;
-  std::array<Plane<float>, 3> site_variance_e2;  // of R, G, B
+  std::array<Plane<float>, 3> site_variance_e2;  // variances of R, G, B
 };
 
 }  // namespace lowlux::isp

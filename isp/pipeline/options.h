@@ -45,7 +45,7 @@ struct ProcessingGoal {
   /// absent: then the most accurate plan that fits is wanted, Level::best included.
   std::optional<double> tolerance_delta_e = 0.5;
   std::optional<double> budget_s;         // time for planning and rendering the frame; requires `cost`
-  std::shared_ptr<const CostModel> cost;  // of this machine; absent: no time is predicted
+  std::shared_ptr<const CostModel> cost;  // speed of this machine; absent: no time is predicted
 };
 
 /// Describes a region of the upright image, before it is shrunk: in pixels, or in percent of width and height.
@@ -69,7 +69,7 @@ struct DevelopOptions {
   std::optional<double> exposure_ev;  // absent: automatic
   double exposure_offset_ev = 0;      // added to an automatic exposure
   ToneCurve tone = ToneCurve::standard;
-  ToneShape tone_shape;   // of the standard curve
+  ToneShape tone_shape;   // shape of the standard curve
   double saturation = 1;  // factor of the distance to the grey of the same luminance, in linear light
   Highlights highlights = Highlights::clip;
   double local_tone = 0;             // 0..1, see LocalTone; for images with the standard curve and without a look
@@ -79,14 +79,14 @@ struct DevelopOptions {
   bool half = false;                       // exact 2x2 binning instead of demosaicing
   std::optional<DemosaicMethod> demosaic;  // absent: chosen by light, noise reduction and budget
   std::optional<PictureCrop> crop;
-  std::optional<int> max_size;  // of the longer side [px], 1 or more; larger images are shrunk in linear light
+  std::optional<int> max_size;  // length of the longer side [px], 1 or more; larger images are shrunk in linear light
   BlackRequest black;
   bool estimate_dark = true;                    // dark charge that is not known is estimated from the frame itself
   bool find_defects = true;                     // search for hot and dead pixels in addition to those the source lists
   std::shared_ptr<const DarkFrame> dark_frame;  // set: subtracted pixel by pixel instead of `black`
   DenoiseChoice denoise;
   LookChoice look;
-  /// Holds the tables of the profile in the file; null: none. They are applied where an image is made to be looked at:
+  /// Holds the tables of the profile in the file; null: none. They are applied to images for viewing:
   /// in spaces that are not linear, without a look of the eye or of a model.
   std::shared_ptr<const ProfileTables> profile_tables;
   std::shared_ptr<const DisplayTarget> display;  // set: sRGB codes are changed for it

@@ -27,7 +27,7 @@ struct DevelopPlan {
   NoiseReduction noise_reduction;
   DemosaicPlan demosaic;
   std::shared_ptr<const DisplayTarget> display;  // set: codes are changed for it
-  int width = 0;                                 // of the rendered image, before framing and orientation
+  int width = 0;                                 // size of the rendered image, before framing and orientation
   int height = 0;
   std::optional<Framing> framing;    // set: a part of the image is kept, or it is shrunk
   std::optional<double> sharpen_px;  // set: sharpened for this blur; requested, and the noise is known

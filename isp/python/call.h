@@ -17,7 +17,7 @@
 #include "isp/python/failure.h"
 #include "isp/python/raw_image.h"
 
-/// What calls of the command's verbs from Python have in common.
+/// Functions that all calls of the command's verbs from Python share.
 namespace lowlux::python {
 
 /// Parses arguments as the command does, without the user's file of defaults: a program has the same results

@@ -19,7 +19,7 @@ struct Pixel {
 struct DefectNoise {
   double black_std_dn = 0;  // 0 if unknown
   double shot_dn = 0;       // the system gain [DN/e-]; 0 if unknown
-  NoiseRatioView ratio{};   // of the active area; only used where both figures are known
+  NoiseRatioView ratio{};   // noise ratio of the active area; only used where both figures are known
 };
 
 /// Finds hot and dead pixels of a Bayer frame by one fact of optics: the lens spreads a point of light over more than

@@ -16,7 +16,7 @@ namespace lowlux::isp {
 
 /// Requests a table: its colour space, range, accuracy and size.
 struct ColourTableRequest {
-  Matrix3 rgb_to_xyz = *isp::rgb_to_xyz(primaries_rec709);  // of the linear RGB of images, in and out
+  Matrix3 rgb_to_xyz = *isp::rgb_to_xyz(primaries_rec709);  // matrix of the linear RGB of images, in and out
   double limit = 1;                                  // brightest channel value of interest, white being 1: 1e-6 to 1e6
   double error_bound = 0.5;                          // CIEDE2000 that 99 % of the colours should stay below
   std::size_t largest_bytes = std::size_t{8} << 20;  // 512 KiB to 256 MiB

@@ -157,7 +157,7 @@ std::array<float, 3> rebuilt(const std::array<float, 3>& value, const std::array
     weight += 1 - fraction[c];
     least = std::max(least, saturation[c] / colour[c]);
   }
-  // As the last channel saturates, its own value reaches the least light that saturates all: nothing jumps.
+  // When the last channel saturates, its own value reaches the least light that saturates all: nothing jumps.
   const float known = std::min(weight, 1.0f);
   const float light_level = weight > 0 ? known * (scale / weight) + (1 - known) * least : least;
   std::array<float, 3> out = value;

@@ -19,7 +19,7 @@ inline constexpr std::size_t max_curve_points = 8192;
 /// root of x, as shadows need more steps than highlights.
 struct ProfileCurve {
   static constexpr int steps = 4096;
-  int points = 0;                        // of the file
+  int points = 0;                        // points of the file
   std::array<float, steps + 1> value{};  // 0..1
   double mid_grey = 0.18;                // x for which y is 0.18
 };

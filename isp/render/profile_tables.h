@@ -16,8 +16,8 @@ namespace lowlux::isp {
 
 /// Holds the tables and the tone curve of the profile in a DNG.
 struct ProfileTables {
-  std::optional<HueSatMap> low;       // of the calibration with the lower temperature, or the only one
-  std::optional<HueSatMap> high;      // of the other calibration
+  std::optional<HueSatMap> low;       // table of the calibration with the lower temperature, or the only one
+  std::optional<HueSatMap> high;      // table of the other calibration
   std::optional<HueSatMap> look;      // applied after exposure
   std::optional<ProfileCurve> curve;  // replaces ToneCurve::standard
 };

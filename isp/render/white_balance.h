@@ -25,7 +25,7 @@ struct WhiteBalance {
   Vector3 neutral{1, 1, 1};         // largest component 1; divide by it to balance
   std::optional<WhitePoint> white;  // the scene white it stands for, if the colour matrices determine it
   WhiteSource source = WhiteSource::none;
-  std::string reason;  // of a fallback or a limit that was applied, one line; empty if neither applies
+  std::string reason;  // reason of a fallback or a limit that was applied, one line; empty if neither applies
 };
 
 /// Returns the camera's own choice: AsShotNeutral, else AsShotWhiteXY.

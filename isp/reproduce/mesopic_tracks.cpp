@@ -24,7 +24,7 @@ constexpr std::array<PublishedPair, 10> table_5_1{{{"shin", spectral_model, 9.14
                                                    {"icam06", "cao", 254.07},
                                                    {spectral_model, "cao", 254.48},
                                                    {"shin", "cao", 256.33}}};
-// Of the first six pairs, which rise as published, three are without Khan & Pattanaik.
+// Three of the first six pairs, which rise as published, are without Khan & Pattanaik.
 constexpr std::size_t pairs_without_cao = 6, pairs_without_khan = 3;
 
 constexpr std::array<std::string_view, 10> models_of_colours{

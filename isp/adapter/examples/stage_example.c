@@ -1,10 +1,10 @@
-/* One raw frame through lowlux's stage, from C99, with the library loaded by name.
+/* Processes one raw frame with lowlux's stage, from C99, with the library loaded by name.
  *
  *   stage_example LIBRARY PICTURE.ppm        e.g. stage_example liblowlux_stage.so.0 night.ppm
  *
- * The frame is made up here: 10-bit words in the order RGGB, as a driver of V4L2 delivers them (RG10), of a dim scene
- * that brightens to the right: a black level of 64, shot noise, and 2 DN of read noise. With a camera, `frame` would be
- * the memory of a dequeued buffer, `stride` the driver's bytesperline. */
+ * The frame is simulated: 10-bit words in the order RGGB, as a V4L2 driver delivers them (RG10), of a dim scene that
+ * becomes brighter to the right, with a black level of 64, shot noise, and 2 DN of read noise. With a camera, `frame`
+ * is the memory of a dequeued buffer, and `stride` the driver's bytesperline. */
 #include <dlfcn.h>
 #include <math.h>
 #include <stdio.h>
@@ -19,7 +19,7 @@
 
 enum { WIDTH = 640, HEIGHT = 480 };
 
-/* What is used of the library. POSIX lets an object pointer become a function pointer by way of memory. */
+/* The functions of the library. POSIX allows converting an object pointer to a function pointer through memory. */
 static struct {
   int (*open)(const lowlux_stage_settings*, lowlux_stage**, char*, size_t);
   int (*configure)(lowlux_stage*, const lowlux_stage_input*, lowlux_stage_output*);
@@ -51,7 +51,7 @@ static void load(const char* file) {
   find(library, "lowlux_stage_last_error", &lowlux.last_error);
 }
 
-/* The mean of twelve dice is near enough to a normal law: mean 0, variance 1. */
+/* Returns an approximately normal deviate of mean 0 and variance 1: the sum of twelve uniform ones, minus 6. */
 static double noise(void) {
   double sum = -6;
   for (int i = 0; i < 12; ++i) sum += rand() / (RAND_MAX + 1.0);
@@ -78,7 +78,7 @@ int main(int argc, char** argv) {
   }
   load(argv[1]);
 
-  /* Every struct begins with its size; what stays 0 has a default or is absent. */
+  /* Every struct begins with its size; members that are 0 have their default or are absent. */
   lowlux_stage_settings settings = {.size = sizeof settings};
   settings.threads = 2;
   settings.most_denoise = LOWLUX_STAGE_LEVEL_STANDARD;
@@ -90,7 +90,7 @@ int main(int argc, char** argv) {
     return 1;
   }
 
-  /* Once for a stream: what comes in, what goes out. All memory is taken here. */
+  /* Once for each stream: the formats of input and output. All memory is allocated here. */
   lowlux_stage_input in = {.size = sizeof in, .api = LOWLUX_STAGE_V4L2};
   in.fourcc = LOWLUX_STAGE_FOURCC('R', 'G', '1', '0');
   in.width = WIDTH;
@@ -106,8 +106,8 @@ int main(int argc, char** argv) {
   if (frame == NULL || picture == NULL) return 1;
   expose(frame, in.stride);
 
-  /* For every frame: its memory, and what is known of it. White balance, exposure and noise are not: they are measured.
-   */
+  /* For every frame: its memory and its known parameters. White balance, exposure and noise are not given here, so they
+   * are measured. */
   const lowlux_stage_source source = {.data = frame, .length = in.stride * HEIGHT, .stride = in.stride, .fd = -1};
   lowlux_stage_picture planes = {.size = sizeof planes, .planes = 1};
   planes.plane[0].data = picture;

@@ -23,7 +23,7 @@ struct CommandLimits {
   std::uint64_t max_memory_bytes = std::uint64_t{4} << 30;  // writable memory of each of its processes
 };
 
-/// What a command used.
+/// Holds the resources that a command used.
 struct CommandUse {
   double wall_s = 0;
   double cpu_s = 0;       // of all its processes that it waited for

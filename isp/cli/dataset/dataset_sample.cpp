@@ -76,7 +76,7 @@ void remove_old_sample(const std::string& stem) {
         if (is_of_sample(name, number)) fs::remove(fs::path(stem).replace_filename(name), ignored);
       }
     } catch (const Json::exception&) {
-      // Of another program, or damaged: no file of it is known.
+      // The file is of another program, or damaged: it lists no files.
     }
   }
   fs::remove(file, ignored);

@@ -75,7 +75,7 @@ struct ReadyFrame {
 /// outputs, including maps, are an error before any work is done; a job without an output writes none.
 Result<ReadyFrame> read_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock);
 
-/// Sets the tables of the profile in the source where they are applied: to images to be looked at, without a look, with
+/// Sets the tables of the profile in the source where they are applied: to images for viewing, without a look, with
 /// the colours of the file. Tables that are not valid are left out with a warning.
 void set_profile_tables(const DevelopArgs& args, ReadyFrame& ready);
 

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int min_tile_cells = 8;
 
-/// Of normal differences r with unit variance and weights q = 1 / (1 + r^2 / student): integrals that
+/// For normal differences r with unit variance and weights q = 1 / (1 + r^2 / student): integrals that
 /// tests/merge/tiles_test.cpp computes.
 constexpr double mean_weight = 0.931823;     // E[q]
 constexpr double score_variance = 0.682220;  // E[r^2 q^2]
@@ -132,7 +132,7 @@ TileFit fit_of(const std::array<float, rows::sums>& tile, int cell_px) {
   const auto sum = [&](int figure) { return static_cast<double>(tile[static_cast<std::size_t>(figure)]); };
   const double n = sum(rows::count);
   if (n < min_cells) return {};
-  // What differences remain after the best displacement by the gradients.
+  // Differences that remain after the best displacement by the gradients.
   const double bx = sum(rows::score_x), by = sum(rows::score_y);
   const double xx = sum(rows::gradient_xx), xy = sum(rows::gradient_xy), yy = sum(rows::gradient_yy);
   const double determinant = xx * yy - xy * xy;

@@ -16,7 +16,7 @@ namespace {
 constexpr int max_gap_px = 12;     // of a saturated core
 constexpr float bright_score = 3;  // of the sites next to it
 constexpr int border_px = 2;       // candidates are no closer to the border
-constexpr int directions = 16;     // in which the surroundings are looked at
+constexpr int directions = 16;     // in which the surroundings are examined
 constexpr int max_bright_directions = 5;
 
 /// Limits of the matched filter at levels of background in geometric steps.

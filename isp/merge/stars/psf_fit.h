@@ -11,7 +11,7 @@ namespace lowlux::merge {
 /// Largest width of a PSF that is fitted [px].
 inline constexpr double max_psf_sigma_px = 6;
 
-/// Where a fit begins, and what is known before it.
+/// Holds the start values of a fit, and its prior.
 struct PsfStart {
   double x_px = 0;
   double y_px = 0;

@@ -21,7 +21,7 @@ enum class ShinUnits : std::uint8_t { lux, luminance_as_is };
 
 /// States the noise of a measured colour, for models that weigh it.
 struct ColourNoise {
-  Matrix3 covariance = identity3();  // of X, Y and Z where the noise of Y has a variance of 1
+  Matrix3 covariance = identity3();  // covariance of X, Y and Z where the noise of Y has a variance of 1
   double to_signal = 0;              // standard deviation of Y over Y
 };
 
@@ -29,9 +29,9 @@ struct ColourNoise {
 struct ViewingConditions {
   double white_cd_m2 = 100;  // luminance of a perfect white diffuser in the scene
   Xyz white{0.95047, 1.0, 1.08883};
-  std::optional<double> adaptation_cd_m2;      // of the adaptation field; absent: a fifth of the white
+  std::optional<double> adaptation_cd_m2;      // luminance of the adaptation field; absent: a fifth of the white
   double scotopic_ratio = 2.26;                // S/P of the adaptation field
-  std::optional<double> colour_temperature_k;  // of the light
+  std::optional<double> colour_temperature_k;  // temperature of the light
   const ShinTable* shin = nullptr;             // absent: the substitute SHIN-SUB-1
   ShinUnits shin_units = ShinUnits::lux;
   std::optional<ColourNoise> noise;  // for AppearanceModel::uses_noise

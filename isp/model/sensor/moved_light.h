@@ -36,7 +36,7 @@ double count_change_variance_e2(double less_e, double more_e, double step_e);
 
 /// Describes the noise of one channel of a block.
 struct BlockNoise {
-  double variance_e2 = 0;  // of a pixel, all effects
+  double variance_e2 = 0;  // variance of a pixel, all effects
   double signal_e = 0;     // mean, and variance of its photon noise
   double pixels = 0;       // that are neither full nor black
   double step_e = 0;       // charge of a code

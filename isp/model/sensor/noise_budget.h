@@ -25,7 +25,7 @@ inline constexpr double largest_crosstalk = 0.2;
 /// Describes the exposure of a frame.
 struct Exposure {
   double time_s = 1;
-  double temperature_c = 20;  // of the sensor
+  double temperature_c = 20;  // temperature of the sensor
 };
 
 /// Returns an error unless the time is finite and not negative and the temperature within -100..150 C.

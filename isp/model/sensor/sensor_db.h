@@ -47,11 +47,11 @@ struct SensorFigures {
 struct NamedSensor {
   SensorModel model;
   std::string gain_setting;  // as the source names it; may be empty
-  std::string source;        // of the figures
+  std::string source;        // source of the figures
   std::string camera;        // camera whose spectral sensitivities are used, see camera_sensitivity()
   std::optional<double> pixel_pitch_um;
   std::optional<double> peak_quantum_efficiency;
-  std::optional<double> iso;             // of the gain setting
+  std::optional<double> iso;             // speed of the gain setting
   bool iso_given = false;                // by the user: it takes precedence over pitch and efficiency
   std::vector<std::string> assumptions;  // one line each: a figure no source gives, and the value used instead
   bool black_level_is_sourced = false;   // by the table or the user
@@ -66,8 +66,8 @@ std::vector<std::string_view> sensor_names();
 /// Returns the gain settings of a sensor, as its source names them.
 std::vector<std::string_view> gain_settings(std::string_view name);
 
-/// Returns the camera of camera_sensitivity() that is the camera of a sensor, empty where another camera's
-/// sensitivities stand in for unknown ones.
+/// Returns the camera of camera_sensitivity() that is the camera of a sensor; empty if its sensitivities are unknown
+/// and those of another camera replace them.
 std::string_view own_camera(std::string_view sensor);
 
 /// Returns the options without which a sensor at a gain setting cannot be simulated, none if its sources suffice: those

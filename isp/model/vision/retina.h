@@ -51,7 +51,7 @@ inline constexpr std::array all_receptors{Receptor::l_cone, Receptor::m_cone, Re
 /// densest.
 struct ReceptorFigures {
   RetinalPath path;         // at the wavelength of peak sensitivity to photons at the cornea
-  double aperture_um2 = 0;  // of the inner segment, which collects the light
+  double aperture_um2 = 0;  // aperture of the inner segment, which collects the light
   double density_per_deg2 = 0;
   double integration_s = 0;  // over which responses add up
   double dark_per_s = 0;     // isomerisations without light, or their equivalent, in one receptor

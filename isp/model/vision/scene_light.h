@@ -13,7 +13,7 @@ namespace lowlux::isp {
 
 /// Describes the light that falls on a scene.
 struct SceneLight {
-  std::string name;                  // of the lamp or of the file; empty where only the ratio is known
+  std::string name;                  // name of the lamp or of the file; empty where only the ratio is known
   double scotopic_ratio = 1;         // S/P
   std::optional<Xy> white;           // chromaticity; absent without a spectrum
   std::optional<Spectrum> spectrum;  // relative power

@@ -37,7 +37,7 @@ struct WriteOptions {
   Overwrite overwrite = Overwrite::no;
   Sync sync = Sync::no;
   std::string software = "lowlux";                // with its version, for the metadata
-  std::shared_ptr<const SourceTags> source_tags;  // of the raw file: picture_tags of them are added to EXIF; null: none
+  std::shared_ptr<const SourceTags> source_tags;  // tags of the raw file; picture_tags are added to EXIF; null: none
   std::optional<double> white_luminance_cd_m2;    // luminance of (1, 1, 1); OpenEXR keeps it
   JpegOptions jpeg;
   TiffOptions tiff;

@@ -83,7 +83,7 @@ struct CostModel {
   int threads = 1;
   double pace_s = 0;  // time of a fixed workload at that moment (isp/cost/speed_probe.h); 0: not known
   double pace = 1;    // current time of that workload over pace_s: factor of all times
-  std::array<std::vector<CostPoint>, cost_parts> points;  // of each part, by ascending size; none: the part is free
+  std::array<std::vector<CostPoint>, cost_parts> points;  // for each part, by ascending size; none: no time
 
   /// Returns the seconds of a part for a frame of this size: linear between two points, which is exact for the sum of a
   /// fixed time and one for each pixel; beyond them the seconds per megapixel of the nearest.

@@ -14,7 +14,7 @@ namespace lowlux::isp {
 struct CleanRaw {
   RawFrame frame;  // the active area only, in 16-bit codes, or floating-point if the frame was
   DevelopPlan plan;
-  NoiseMaps maps;  // of the active area; empty unless requested
+  NoiseMaps maps;  // maps of the active area; empty unless requested
 };
 
 /// Reduces the noise of a frame, repairs its defects, and encodes it again in 16 bits; a frame of floating-point

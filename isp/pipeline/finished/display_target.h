@@ -16,7 +16,7 @@ inline constexpr double retarget_table_tolerance = 0.5;
 struct DisplayTarget {
   double source_cd_m2 = 0;   // white of the displays that the codes were made for
   double display_cd_m2 = 0;  // white of this display
-  std::string coefficients;  // of Shin's model; empty: it is not used
+  std::string coefficients;  // coefficients of Shin's model; empty: it is not used
   MeasuredTable made;
 };
 

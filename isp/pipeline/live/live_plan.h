@@ -18,13 +18,13 @@ namespace lowlux::isp {
 /// Describes what holds for all frames of a stream.
 struct LiveSetup {
   RawFormat format;
-  int width = 0;  // of whole frames
+  int width = 0;  // size of whole frames
   int height = 0;
   Rect active;                 // region that becomes the image, its corner even or odd; at least 2 x 2
   std::vector<Rect> masked;    // light-shielded pixels of the frame, if any
   double white_dn = 0;         // saturation, 0.001 to 65535; 0: the format's largest code
   CameraColour colour;         // without calibrations the camera's colours count as those of the output
-  std::vector<Pixel> defects;  // of the active area, ascending
+  std::vector<Pixel> defects;  // defects of the active area, ascending
   ToneCurve tone = ToneCurve::standard;
   SampleType samples = SampleType::u8;
   LookChoice look;                                 // that of the eye or the camera
@@ -50,13 +50,13 @@ struct LiveNoise {
   /// Set where the code without dark charge is known: the dark charge of masked pixels, and with it the variance of
   /// black, then follows from their level (masked_variance_dn2).
   std::optional<PerSite<double>> pedestal_dn;
-  double read_variance_dn2 = 0;  // of black without dark charge; only for `pedestal_dn`
+  double read_variance_dn2 = 0;  // variance of black without dark charge; only for `pedestal_dn`
 };
 
 /// Holds what is known of one frame. What is absent is measured on it or left out; so is an exposure time or ISO speed
 /// that is not positive and finite.
 struct LiveFacts {
-  std::optional<PerSite<double>> black_dn;  // of the active area's sites, mean dark charge included
+  std::optional<PerSite<double>> black_dn;  // levels of the active area's sites, mean dark charge included
   std::optional<LiveNoise> noise;
   std::optional<double> exposure_s;
   std::optional<double> iso;
@@ -65,7 +65,7 @@ struct LiveFacts {
   std::optional<Vector3> neutral;               // camera RGB of white; any scale
   std::optional<Matrix3> colour_matrix;         // white-balanced camera RGB to linear sRGB, in place of calibrations
   std::optional<double> exposure_ev;            // absent: automatic
-  double saturation = 1;                        // of the image's colours, 0..4
+  double saturation = 1;                        // saturation of the image's colours, 0..4
   DemosaicMethod max_demosaic = DemosaicMethod::residual_median;  // that there is time for
   bool follows = true;  // the previous frame; false forgets previous frames and their noise
   LiveDenoise denoise;
@@ -121,9 +121,9 @@ class LivePlanner {
   Thumbnail thumbnail_;
   std::vector<float> blocks_, memory_;
   std::vector<double> snr_;
-  std::optional<double> exposure_ev_;  // of the previous frame
-  std::optional<Vector3> neutral_;     // of the previous frame, where it was estimated
-  std::optional<NoiseLine> line_;      // of the previous frames, where noise is not given
+  std::optional<double> exposure_ev_;  // exposure of the previous frame
+  std::optional<Vector3> neutral_;     // neutral of the previous frame, where it was estimated
+  std::optional<NoiseLine> line_;      // noise of the previous frames, where noise is not given
   std::optional<denoise::Level> level_;
   bool has_level_ = false;           // level_ was decided for a previous frame
   std::optional<double> noise_iso_;  // ISO speed that line_ was measured at
@@ -132,7 +132,7 @@ class LivePlanner {
     std::optional<double> exposure_s, iso, e_per_dn;
   } last_;
   std::vector<float> largest_;
-  double tone_limit_ = 0;  // of the plan's tone table; 0: none yet
+  double tone_limit_ = 0;  // limit of the plan's tone table; 0: none yet
   bool first_ = true;
 };
 

@@ -8,7 +8,7 @@
 
 namespace lowlux::isp {
 
-/// Knows what frames of different exposure need besides those of equal exposure: weights, ratios of light, saturation.
+/// Holds additional data for merging frames of different exposure: weights, ratios of light, saturation.
 class BracketFrames {
  public:
   BracketFrames(int width, int height, Executor& executor);

@@ -26,7 +26,7 @@ RawFrame whole_area(RawFrame& frame) {
   return out;
 }
 
-/// As predicted_electrons(), of frames above `limits` in tiles.
+/// Implements predicted_electrons() in tiles, for frames above `limits`.
 Result<CameraRgb> predicted(RawFrame& frame, const DevelopOptions& options, const TileLimits& limits,
                             Executor& executor) {
   const Rect crop = frame.raw.default_crop;

@@ -34,7 +34,7 @@ struct LookChoice {
   std::optional<double> profile_iso;            // ISO speed from the camera's profile, where the frame states none
   std::shared_ptr<const SceneLight> light;      // absent: S/P is estimated from the chromaticity of the white
   std::string camera;                           // usual name, from its profile; empty: that of the frame
-  std::optional<Vector3> rod_weights;           // of white-balanced R, G, B under `light`, from the camera's profile
+  std::optional<Vector3> rod_weights;           // for white-balanced R, G, B under `light`, from the profile
   /// States the degree of chromatic adaptation, 0..1. Absent: that of degree_of_adaptation() where `light` is set, else
   /// 1, for the white balance of a camera is not known to be the chromaticity of the light.
   std::optional<double> adaptation_degree;
@@ -43,7 +43,7 @@ struct LookChoice {
   VisionEffects listed;
   double tolerance = 0.5;         // CIEDE2000: effects below it are left out by Which::automatic
   double dimming = 0.4;           // fraction of the darkness that the image keeps, 0..1; see apparent_dimming_ev
-  double field_of_view_deg = 50;  // of the image's longer side
+  double field_of_view_deg = 50;  // angle of the image's longer side
   bool seeing_map = false;        // the probability of seeing is requested for each cell, see map_seeing(); Look::eye
   /// States the CIE L* that noise may reach, see NoiseLimit; absent: no limit.
   std::optional<double> noise_limit;
@@ -64,7 +64,7 @@ struct LookEffect {
 /// Holds how the rods' luminance follows from the channels of a camera under a stated light.
 struct RodWeights {
   std::string_view source;               // "profile", or the camera as known_camera() names it
-  Vector3 weights{};                     // of white-balanced R, G and B, up to a factor
+  Vector3 weights{};                     // weights of white-balanced R, G and B, up to a factor
   std::optional<double> relative_error;  // rms over the reflectances they were fitted on; unknown of a profile
 };
 
@@ -73,7 +73,7 @@ struct RetinaPlan {
   double pupil_mm = 0;                  // diameter
   ReceptorRates mean;                   // isomerisations by the mean of the scene in one receptor [s-1]
   SeeingModel seeing;                   // thresholds and false alarms
-  std::optional<double> seen_fraction;  // of the image, with more than 0.5; set once a map is rendered
+  std::optional<double> seen_fraction;  // fraction of the image, with more than 0.5; set once a map is rendered
 };
 
 /// States the mean of a scene as a fraction of white.
@@ -83,20 +83,20 @@ inline constexpr double scene_mean_of_white = 0.18;
 struct LookPlan {
   Look kind = Look::camera;  // with Look::camera only noise is bounded
   NightLook look;
-  std::optional<ColourTable> table;  // of a model of appearance, on light relative to white_cd_m2
-  double white_cd_m2 = 0;            // of a white in the scene, whose mean counts as mid-grey
+  std::optional<ColourTable> table;  // table of a model of appearance, on light relative to white_cd_m2
+  double white_cd_m2 = 0;            // luminance of a white in the scene, whose mean counts as mid-grey
   double mean_cd_m2 = 0;
   std::string_view luminance_rule;  // "given", "exposure", or "profile" where the ISO speed is from there
-  MesopicState state;               // of an eye adapted to the mean
+  MesopicState state;               // state of an eye adapted to the mean
   double dimming_ev = 0;
-  std::string_view light_rule;       // of S/P: "spectrum", "given", or "white" where it is estimated from its xy
+  std::string_view light_rule;       // source of S/P: "spectrum", "given", or "white" where it is estimated from its xy
   std::optional<RodWeights> rods;    // absent: the weights of XYZ
   double adaptation_degree = 1;      // D of incomplete_adaptation()
-  Matrix3 adaptation = identity3();  // of completely adapted values in the output's primaries
+  Matrix3 adaptation = identity3();  // adaptation of completely adapted values in the output's primaries
   std::optional<std::array<LookEffect, 6>> effects;  // set for Look::eye
   std::optional<RetinaPlan> retina;  // set where visual noise is shown or the map of seeing is requested
   std::optional<double> noise_limit;
-  std::optional<NoiseProfile> noise;  // of the raw frame; absent: not known
+  std::optional<NoiseProfile> noise;  // noise of the raw frame; absent: not known
 };
 
 /// Lists the names of the effects: "purkinje", "chroma", "hue", "acuity", "glare", "visual-noise", in this order.

@@ -11,7 +11,7 @@
 #include "isp/pipeline/options.h"
 #include "isp/raw/measure/thumbnail.h"
 
-/// What noise reduction is decided by, for mosaics and other frames.
+/// Measurements on which decisions about noise reduction are based, for mosaics and other frames.
 namespace lowlux::isp {
 
 /// Values slightly below white are saturated too, because pixels do not all saturate at one code.

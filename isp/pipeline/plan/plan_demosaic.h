@@ -23,7 +23,7 @@ struct DemosaicPlan {
 struct DemosaicRequest {
   std::optional<DemosaicMethod> method;                         // given; absent: chosen
   DemosaicMethod max_method = DemosaicMethod::residual_median;  // that there is time for
-  std::optional<double> signal_e;  // of a green pixel in the median block; absent: not known
+  std::optional<double> signal_e;  // signal of a green pixel in the median block; absent: not known
 };
 
 /// Decides how missing colours are interpolated: with medians of the colour differences where a green pixel of the

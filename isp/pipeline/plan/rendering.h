@@ -46,7 +46,7 @@ Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light
 
 // Steps of decide_rendering, which allocate only to report an error.
 
-/// Returns whether a frame has colours that are not known, in a space that needs them. An image to be looked at shows
+/// Returns whether a frame has colours that are not known, in a space that needs them. An image for viewing shows
 /// its white-balanced camera RGB as linear sRGB, with a warning.
 bool has_unknown_colours(const RawFrame& frame, OutputSpace space);
 

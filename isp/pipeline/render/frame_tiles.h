@@ -20,7 +20,7 @@ inline constexpr int tile_margin_px = 256, best_margin_px = 384;
 
 /// States which frames are processed in tiles, and in what tiles.
 struct TileLimits {
-  std::int64_t max_whole_px = 25'000'000;  // of the active area; larger ones are split into tiles
+  std::int64_t max_whole_px = 25'000'000;  // pixels of the active area; larger ones are split into tiles
   int side_px = 2048;                      // maximum side of a core; a multiple of tile_lattice_px
 };
 

@@ -31,7 +31,7 @@ class NoiseReducer {
     Rect whole;  // padded tile: the region that is known, margin included
     int frame_width = 0;
     int frame_height = 0;
-    BayerPhase phase = BayerPhase::rggb;  // of the frame
+    BayerPhase phase = BayerPhase::rggb;  // phase of the frame
   };
   /// Reduces the noise of a tile of a frame, or of all of it. Where regions differ, each rectangle with a level is
   /// reduced with a margin of its own, and the others keep their noise.
@@ -70,12 +70,12 @@ class NoiseReducer {
   int temporal_width_ = 0;
   int temporal_height_ = 0;
   Plane<float> mean_e_;             // mean over frames, dark charge included
-  Plane<float> variance_fraction_;  // of mean_e_ over a raw value's, one for each 2x2 cell
+  Plane<float> variance_fraction_;  // variance of mean_e_ over a raw value's, one for each 2x2 cell
   NoiseMaps level_maps_;
   double moved_ = 0;
   denoise::Level most_ = denoise::Level::high;  // highest level that there is memory for
   std::vector<LevelPart> parts_;
-  Plane<float> part_e_;  // of a tile and its margin
+  Plane<float> part_e_;  // values of a tile and its margin
   NoiseMaps part_maps_;
 };
 

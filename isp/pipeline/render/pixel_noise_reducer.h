@@ -37,9 +37,9 @@ class PixelNoiseReducer {
   /// Holds a frame whose noise is reduced.
   struct Frame {
     std::span<const Plane<float>> planes;
-    NoiseRatioView noise_ratio;  // of the pixels
+    NoiseRatioView noise_ratio;  // noise ratio of the pixels
     NoiseReduction of_sites;     // the decision in sites
-    denoise::DenoiseMaps maps;   // of all pixels; none if they are not wanted
+    denoise::DenoiseMaps maps;   // maps of all pixels; none if they are not wanted
   };
   /// Reduces the noise of a tile, whose regions are in sites, to clean_.
   void reduce_tile(const Frame& frame, const NoiseReducer::Piece& piece, NoiseReducer& noise);
@@ -47,7 +47,7 @@ class PixelNoiseReducer {
   Executor& executor_;
   int side_px_;
   std::array<Plane<float>, 3> clean_;
-  Plane<float> cells_;        // of a tile and its margin
+  Plane<float> cells_;        // cells of a tile and its margin
   Plane<float> clean_cells_;  // likewise
   NoiseMaps tile_maps_;       // likewise, where maps are wanted
 };

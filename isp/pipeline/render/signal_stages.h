@@ -55,7 +55,7 @@ class SignalStages {
   Plane<float> raw_;     // mosaic of a region before noise reduction
   Plane<float> signal_;  // after it
   PlaneView<float> raw_e_;
-  std::array<Plane<float>, 3> planes_;  // of frames that are not mosaics
+  std::array<Plane<float>, 3> planes_;  // planes of frames that are not mosaics
 };
 
 }  // namespace lowlux::isp

@@ -16,7 +16,7 @@ struct Thumbnail {
                    // pixel in a block at an odd edge takes the value of the preceding block
   /// Fraction of the samples of each block that are at white or above. Blocks of live frames are not examined: 0.
   Plane<float> clipped;
-  double black_noise_std = 0;  // of one raw pixel without light, fraction of white; 0 if unknown
+  double black_noise_std = 0;  // noise of one raw pixel without light, fraction of white; 0 if unknown
 };
 
 /// Accumulates the sums of a thumbnail row by row, while a frame is being read. It reserves its memory in the

@@ -20,7 +20,7 @@ struct NightLook {
   VisionEffects effects;
   double cd_m2_per_unit = 100;            // luminance in the scene of Y = 1 of the pixels
   double scotopic_ratio_of_white = 2.46;  // S/P of the white of the pixels
-  double pixels_per_degree = 60;          // of the image
+  double pixels_per_degree = 60;          // resolution of the image
   double scene_cd_m2 = 100;               // mean luminance of the scene, which sets the pupil
   std::array<float, 3> luminance{};       // weights in the pixels' primaries, as in LookGrid
   std::array<float, 3> rods{};

@@ -17,7 +17,7 @@ namespace lowlux::isp {
 struct NoiseLimit {
   double lightness = 2;
   double display_per_unit = 1;      // light on the display, white 1, of Y = 1 of the pixels, before the tone curve
-  PlaneView<const float> variance;  // of Y of the pixels, one for each cell of the grid
+  PlaneView<const float> variance;  // variance of Y of the pixels, one for each cell of the grid
 };
 
 /// Returns the largest gain in 0..1 for pixels of luminance y with noise of standard deviation noise_std, both

@@ -30,7 +30,7 @@ Vector3 looked_up(const RetargetTable& table, const Vector3& code);
 
 /// Measures the error of looked_up against the map.
 struct TableError {
-  double mean_ciede2000 = 0;  // of sRGB under D65
+  double mean_ciede2000 = 0;  // error of sRGB under D65
   double max_ciede2000 = 0;
   double mean_steps = 0;  // of 255, mean of the largest of the three components
   double max_steps = 0;
