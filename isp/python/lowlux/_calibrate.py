@@ -8,19 +8,19 @@ from .errors import ArgumentError
 
 
 class Profile:
-    """What has been measured of a camera: black level, noise, dark current, colour.
+    """Measurements of a camera: black level, noise, dark current, colour.
 
     Profile(path) reads the file that `lowlux calibrate` writes, Profile(dict) checks its contents. `data` is that
-    dict: figures have units in their names. str(profile) is the text of the file. As an option, profile=, a profile is
-    its file: after a change of `data`, save() it first.
-    Errors: those of reading; MalformedError or ArgumentError, with the key, for contents that are no profile.
+    dict: values have units in their names. str(profile) is the text of the file. The option profile= uses the file of a
+    profile: after a change of `data`, save() it first.
+    Errors: those of reading; MalformedError or ArgumentError, with the key, for contents that are not a profile.
     """
 
     def __init__(self, source, warnings=()):
         self.path = None
         """The file it was read from or written to; None if there is none."""
         self.warnings = list(warnings)
-        """Warnings of the calibration it is the result of."""
+        """Warnings of the calibration that made the profile."""
         if isinstance(source, dict):
             self._text = _lowlux.profile_text(json.dumps(source))
         else:
@@ -81,7 +81,7 @@ def calibrate(kind, frames=(), output=None, *, overwrite=False, **options):
     if kind not in ["black", "colour", "noise", "quoted"]:
         raise ArgumentError(f"kind: {kind!r} is none of black, colour, noise, quoted", "kind")
     for name in sorted(_OF_THE_COMMAND.intersection(options)):
-        raise ArgumentError(f"{name}: it is an option of the command alone", name)
+        raise ArgumentError(f"{name}: it is an option of the command only", name)
     path = output_of(output)
     named = frames if isinstance(frames, (list, tuple)) else [frames]
     words = [*words_of(options, ("darks",)), b"--output=" + (path or b"none.json")]

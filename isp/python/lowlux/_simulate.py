@@ -1,4 +1,4 @@
-"""simulate and compare: raw files of known truth, and how far one image is from another."""
+"""simulate and compare: raw files with a known noise-free reference, and differences between two images."""
 import dataclasses
 import json
 from typing import List, Optional
@@ -20,7 +20,7 @@ class Simulated:
     truth_e: Optional[np.ndarray]
     """height x width x 3, float32: mean electrons of R, G and B at each pixel, without noise."""
     motion: Optional[dict]
-    """Motion and exposure time of each frame of a burst; None without one."""
+    """Motion and exposure time of each frame of a burst; None for single frames."""
     report: dict
     """Sensor, plan of noise sources and assumptions, as `lowlux simulate --json` prints them."""
     warnings: List[str]
@@ -48,7 +48,7 @@ def simulate(scene, output=None, *, overwrite=False, size=None, light=None, lumi
     system_gain [DN/e-], read_noise, full_well [e-], dark_current [e-/s], black_level, white_level [DN]: figures that
     replace those of the sensor. All other options are described by `lowlux simulate --help`.
     Returns Simulated. Errors: ArgumentError for options and unknown sensors; those of reading and writing; TooLargeError
-    where frames and truth take more memory than there is.
+    if frames and truth take more memory than is available.
     """
     options = {name: value for name, value in locals().items() if name not in ("scene", "output", "overwrite")}
     if isinstance(size, (tuple, list, np.ndarray)):
@@ -56,7 +56,7 @@ def simulate(scene, output=None, *, overwrite=False, size=None, light=None, lumi
         options["size"] = "x".join(str(side) for side in sides)
     path = output_of(output)
     if not path and (truth is not None or truth_electrons is not None):
-        raise ArgumentError("truth: a file of the truth goes with an output", "truth")
+        raise ArgumentError("truth: a file of the truth requires an output", "truth")
     words = [*words_of(options, ("lamp",)), b"--output=" + (path or b"none.dng"), b"--", bytes_of(scene, "scene")]
     made, report, found, found_e, motion, warnings = _lowlux.simulate(path, overwrite, words)
     return Simulated(made, found, found_e, json.loads(motion) if motion else None, json.loads(report), warnings)

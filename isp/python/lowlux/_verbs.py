@@ -20,11 +20,11 @@ class Developed:
     image: np.ndarray
     """height x width x 3, upright: display codes (uint8, uint16), or float32 of the requested space, white at 1."""
     plan: dict
-    """What was decided and why, as `lowlux develop --json` prints it: values with units in their names."""
+    """Decisions and their reasons, as `lowlux develop --json` prints them: values with units in their names."""
     noise_map: Optional[np.ndarray]
-    """With maps=True: variance of the noise that is left in each 2x2 cell [e-^2]."""
+    """With maps=True: variance of the residual noise in each 2x2 cell [e-^2]."""
     confidence_map: Optional[np.ndarray]
-    """With maps=True: how far colour can be believed in each 2x2 cell, 0 to 1."""
+    """With maps=True: confidence of the colour of each 2x2 cell, 0 to 1."""
     seeing_map: Optional[np.ndarray]
     """With seeing_map=True: probability of seeing each 4x4 pixels, 0 to 1."""
 
@@ -36,15 +36,15 @@ class Developed:
 
 @dataclasses.dataclass(frozen=True)
 class Denoised:
-    """A raw frame without noise and how it was made."""
+    """A denoised raw frame and how it was made."""
 
     raw: _lowlux.RawImage
     plan: dict
-    """What was decided and why, as `lowlux denoise --json` prints it."""
+    """Decisions and their reasons, as `lowlux denoise --json` prints them."""
     noise_map: Optional[np.ndarray]
-    """With maps=True: variance of the noise that is left in each 2x2 cell [e-^2]."""
+    """With maps=True: variance of the residual noise in each 2x2 cell [e-^2]."""
     confidence_map: Optional[np.ndarray]
-    """With maps=True: how far colour can be believed in each 2x2 cell, 0 to 1."""
+    """With maps=True: confidence of the colour of each 2x2 cell, 0 to 1."""
 
     @property
     def warnings(self):
@@ -58,13 +58,13 @@ class Merged:
 
     raw: _lowlux.RawImage
     plan: dict
-    """How much of each frame was used and why, as `lowlux merge --json` prints it."""
+    """The used fraction of each frame and the reason, as `lowlux merge --json` prints them."""
     warnings: list
     """Warnings that the command prints, one line each."""
 
 
 def _call(verb, inputs, output, overwrite, words):
-    """Call a verb, whose parser wants a name of an output and of inputs."""
+    """Call a verb, whose parser requires names of output and inputs."""
     path = output_of(output)
     if path.endswith(b"/") or path and os.path.isdir(path):
         raise ArgumentError(f"{os.fsdecode(path)}: the output is one file, not a folder", os.fsdecode(path))
@@ -73,7 +73,7 @@ def _call(verb, inputs, output, overwrite, words):
 
 
 def _reference(reference, inputs):
-    """Return the name of a reference that is a RawImage among the inputs; anything else as it is."""
+    """Return the name of a reference that is a RawImage among the inputs; anything else unchanged."""
     return next((name for name, frame in inputs if frame is not None and frame is reference), reference)
 
 
@@ -94,7 +94,7 @@ def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, expos
     bits: 8 (default), 16 or 32 bits per sample of the image; with an output the default is that of its format.
     exposure: gain [EV], "auto", or a change of it ("auto+1"). wb: as --wb, or a temperature [K], or gains (r, g, b). tone: "standard" or "none".
     brightness: [EV] of mid-tones. contrast, saturation: factors. highlights: "clip" or "reconstruct".
-    local_tone: 0 to 1, shadows brighter and lights darker. sharpen: blur to sharpen for [px], or "off".
+    local_tone: 0 to 1, shadows brighter and highlights darker. sharpen: blur to sharpen for [px], or "off".
     crop: (x, y, width, height) of the upright image [px], or "10%,10%,80%,80%". max_size: longer side [px].
     space: "srgb", "p3", "rec2020", "linear-srgb", "linear-rec2020", "xyz" or "camera"; 32 bits are linear.
     black: "auto", "metadata", "masked", one level or four of the 2x2 cell [DN], or a profile.
@@ -122,7 +122,7 @@ def denoise(raw, output=None, *, overwrite=False, black=None, profile=None, gain
     output: DNG to write, with its maps next to it; None writes nothing.
     denoise: "auto", "draft", "standard", "high" or "best".
     All other options are those of develop.
-    Returns Denoised, whose noise property states what is left. Errors: those of develop; noise that is not known.
+    Returns Denoised, whose noise property states the residual noise. Errors: those of develop; noise that is not known.
     """
     options = {name: value for name, value in locals().items() if name not in ("raw", "output", "overwrite")}
     _check_dng(output)
@@ -139,7 +139,7 @@ def merge(raws, output=None, *, overwrite=False, align=None, foreground=None, dr
     raws: two or more paths or RawImages, which are not changed.
     output: DNG to write; None writes nothing.
     align: "auto", "none", "cells", "subpixel" or "stars". mean: "robust" or "plain".
-    reference: the path or the RawImage among raws that the others are brought to.
+    reference: the path or the RawImage among raws to which the others are aligned.
     All other options are described by `lowlux merge --help`.
     Returns Merged. Errors: those of develop; frames that do not belong together; a frame that is given twice.
     """
@@ -155,4 +155,4 @@ def _check_dng(output):
     path = output_of(output)
     if path and not path.endswith(b".dng"):
         name = os.fsdecode(path)
-        raise ArgumentError(f"{name}: a raw file is written as DNG: its name ends with .dng", name)
+        raise ArgumentError(f"{name}: raw files are written as DNG: the name must end with .dng", name)
