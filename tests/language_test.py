@@ -23,6 +23,21 @@ STOP_WORDS = {
     r"made-up": "warm-up, synthetic",
     r"somebody|nobody": "the passive voice, or who it is",
     r"takes? off|took off|taken off": "subtracts, removes",
+    r"(?<!two )frames before(?= (alone|and|are|contribute|of|where)\b)": "previous frames",
+    r"be had": "be available",
+    r"go(es)? by|going by": "follows, is based on",
+    r"pil(es?|ing) up": "accumulates, has a peak",
+    r"whole or not at all": "completely or not at all",
+    r"beats?": "is better than",
+    r"stands? in for|stand-ins?": "replaces, substitute",
+    r"besides": "in addition to",
+    r"looked at": "read, examined, viewed",
+    r"comes? out|came out": "is, becomes",
+    r"for want of": "because there is no",
+    r"what is not \w+ is not": "the subject of the sentence",
+    r"none of .{1,20} business": "does not concern",
+    r"absurd": "implausible",
+    r"heed(s|ed)?": "uses, takes effect",
 }
 FOLDERS = ("capture", "calib", "denoise", "isp")
 PATTERNS = {re.compile(rf"\b(?:{words})\b", re.IGNORECASE): instead for words, instead in STOP_WORDS.items()}
