@@ -191,7 +191,7 @@ Result<BenchOutcome> run_methods_bench(const BenchOptions& options) {
   std::vector<DenoiseLight> lights = methods_lights(options.quick);
   if (options.shard.number > lights.size()) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("shard {} of {} is empty: methods are measured in {} lights", options.shard.number,
+                fmt::format("shard {} of {} is empty: the number of lights is {}", options.shard.number,
                             options.shard.count, lights.size()),
                 "--shard");
   }
