@@ -156,6 +156,7 @@ std::optional<ColourCalibration> table_calibration(const DecodedHeader& header) 
     for (int j = 0; j < 3; ++j) calibration.xyz_to_camera[i][j] = header.xyz_to_camera[i][j];
   }
   if (!inverse(calibration.xyz_to_camera)) return std::nullopt;
+  calibration.cct_k = 6504;  // the table holds Adobe's matrices for D65, as dcraw's adobe_coeff does
   return calibration;
 }
 

@@ -132,6 +132,7 @@ TEST(DecoderFrame, TheTableMatrixIsUsedIfItHasAnInverse) {
   EXPECT_EQ(colour.source, CameraColour::Source::decoder_table);
   ASSERT_EQ(colour.calibrations.size(), 1u);
   EXPECT_EQ(colour.calibrations[0].xyz_to_camera, (0.5 * identity3()));
+  EXPECT_EQ(colour.calibrations[0].cct_k, 6504);
 }
 
 TEST(DecoderFrame, FlipsBecomeOrientations) {

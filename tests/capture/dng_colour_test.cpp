@@ -82,6 +82,7 @@ TEST(DngColour, AKnownCameraWithoutMatrixGetsTheDecodersTable) {
   // Adobe's matrix for this camera under D65, as dcraw publishes it.
   EXPECT_NEAR(colour.calibrations[0].xyz_to_camera[0][0], 0.4716, 1e-6);
   EXPECT_NEAR(colour.calibrations[0].xyz_to_camera[2][2], 0.6651, 1e-6);
+  EXPECT_EQ(colour.calibrations[0].cct_k, 6504);
 }
 
 bool warns(const DngBuilder& dng, const std::string& words) {

@@ -53,7 +53,7 @@ AdviceRequest request_of(const Camera& camera, double midtone_cd_m2, double high
   }
   CameraColour colour;
   colour.calibrations = {
-      *isp::fit_calibration(*isp::camera_sensitivity(camera.sensors[0].camera), light, isp::ForwardMatrix::leave_out)};
+      *isp::fit_calibration(*isp::camera_sensitivity(camera.sensors[0].camera), light, isp::ForwardMatrix::fit)};
   r.camera_to_xyz = *isp::camera_to_xyz(colour, isp::white_d65, isp::white_d65);
   r.midtone_cd_m2 = midtone_cd_m2;
   r.highlight_cd_m2 = highlight_cd_m2;

@@ -63,7 +63,7 @@ Result<Matrix3> matrix_of(const std::string& camera, const Spectrum& light) {
                             cure_of(near_matches(camera, isp::camera_names()))),
                 "--camera");
   }
-  const auto calibration = isp::fit_calibration(*sensitivity, light, isp::ForwardMatrix::leave_out);
+  const auto calibration = isp::fit_calibration(*sensitivity, light, isp::ForwardMatrix::fit);
   if (!calibration) return tl::make_unexpected(calibration.error());
   CameraColour colour;
   colour.calibrations = {*calibration};

@@ -13,6 +13,8 @@
 namespace lowlux::isp {
 namespace {
 
+constexpr double d65_cct_k = 6504;  // white_d65 is more exact than the temperature
+
 /// Holds the interpolated matrices at one white.
 struct Calibration {
   Matrix3 reference_to_camera = identity3();  // AnalogBalance * CameraCalibration
@@ -85,6 +87,22 @@ double weight_of(const Bracket& bracket, const Xy& white) {
   if (!temperature) return 1;
   const double low = 1 / bracket.low->cct_k, high = 1 / bracket.high->cct_k;
   return std::clamp((low - 1 / temperature->cct_k) / (low - high), 0.0, 1.0);
+}
+
+/// Returns the ForwardMatrix that a ColorMatrix implies: Bradford(w -> D50) ColorMatrix^-1 diag(ColorMatrix w) with w
+/// the white of its temperature; nullopt between two calibrations, and where the temperature is not stated or the
+/// matrix has no inverse or no neutral.
+std::optional<Matrix3> implied_forward(const Bracket& bracket) {
+  if (bracket.low != bracket.high) return std::nullopt;
+  const ColourCalibration& only = *bracket.low;
+  const auto white = only.cct_k == d65_cct_k ? white_d65 : white_of_temperature(only.cct_k);
+  const auto to_xyz = inverse(only.xyz_to_camera);
+  const auto to_d50 = white ? bradford_adaptation(*white, white_d50) : std::nullopt;
+  if (!to_xyz || !to_d50) return std::nullopt;
+  const Vector3 neutral = only.xyz_to_camera * vector_of(*xyz_of(*white));
+  if (!is_positive(neutral)) return std::nullopt;
+  const Matrix3 forward = *to_d50 * *to_xyz * diagonal3(neutral);
+  return inverse(forward) ? std::optional(forward) : std::nullopt;
 }
 
 Calibration interpolate(const CameraColour& colour, const Bracket& bracket, double weight) {
@@ -225,14 +243,16 @@ Result<Vector3> neutral_of_white(const CameraColour& colour, const Xy& scene_whi
 }
 
 Result<Matrix3> camera_to_xyz(const CameraColour& colour, const Xy& scene_white, const Xy& output_white) {
-  const auto calibration = calibration_at(colour, scene_white);
+  auto calibration = calibration_at(colour, scene_white);
   if (!calibration) return tl::make_unexpected(calibration.error());
   const auto neutral = neutral_at(*calibration, scene_white);
   if (!neutral) return tl::make_unexpected(neutral.error());
+  const auto from_scene = bradford_adaptation(scene_white, output_white);  // none: no light has such a white
+  if (!calibration->forward && from_scene) calibration->forward = implied_forward(bracket_of(colour));
   const bool by_forward = calibration->forward.has_value();
   auto to_xyz = by_forward ? to_xyz_by_forward(*calibration, *neutral) : to_xyz_by_inverse(*calibration, *neutral);
   if (!to_xyz) return to_xyz;
-  const auto adaptation = bradford_adaptation(by_forward ? white_d50 : scene_white, output_white);
+  const auto adaptation = by_forward ? bradford_adaptation(white_d50, output_white) : from_scene;
   if (!adaptation) {
     return fail(ErrorCode::malformed,
                 "no chromatic adaptation leads from the white " + text_of(scene_white) + " to " +

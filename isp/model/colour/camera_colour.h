@@ -46,7 +46,12 @@ Result<Vector3> neutral_of_white(const CameraColour& colour, const Xy& scene_whi
 ///     with ForwardMatrix F:  Bradford(D50 -> output) F diag(1 / (A n)) A,  A = (AnalogBalance CameraCalibration)^-1
 ///     without:               Bradford(scene -> output) (AnalogBalance CameraCalibration ColorMatrix)^-1, scaled
 /// The rows of F are scaled to take (1, 1, 1) to D50 exactly, which a file's rounded figures do approximately.
-/// Where only one calibration has a ForwardMatrix, it is used for both.
+/// Where only one calibration has a ForwardMatrix, it is used for both. A calibration that is alone, with a stated
+/// temperature and no ForwardMatrix, has the one that its ColorMatrix CM implies at the white w of that temperature,
+///     F = Bradford(w -> D50) CM^-1 diag(CM w)
+/// so that lights far from w are white balanced on camera RGB, as LibRaw and RawTherapee do. In artificial light this
+/// is closer to the true colours of surfaces than the inverse of CM is: ColourChecker.* of scenarios_test print both
+/// errors.
 Result<Matrix3> camera_to_xyz(const CameraColour& colour, const Xy& scene_white, const Xy& output_white);
 
 }  // namespace lowlux::isp

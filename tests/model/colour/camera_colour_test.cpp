@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "isp/model/colour/correlated_colour_temperature.h"
 #include "tests/support/sweep.h"
@@ -128,6 +129,49 @@ TEST(CameraColour, OneForwardMatrixServesForBothCalibrations) {
   both.calibrations[1].forward = forward_matrix;
   const Xy scene = *planckian_xy(5000);
   expect_near(*camera_to_xyz(colour, scene, white_d65), *camera_to_xyz(both, scene, white_d65), 1e-14);
+}
+
+/// Returns cool_matrix with each element changed by up to a tenth, and a reference camera that is not the sensor.
+CameraColour drawn_single_calibration(std::mt19937_64& random, double cct_k) {
+  std::uniform_real_distribution<double> change(-0.1, 0.1);
+  CameraColour colour;
+  colour.calibrations = {calibration(cct_k, cool_matrix)};
+  for (Vector3& row : colour.calibrations[0].xyz_to_camera) {
+    for (double& value : row) value += change(random);
+  }
+  for (int i = 0; i < 3; ++i) {
+    colour.analog_balance[i] = 1 + change(random);
+    colour.calibrations[0].camera_calibration[i][i] = 1 + change(random);
+  }
+  return colour;
+}
+
+// At the white of the calibration the matrix that is implied is the inverse of ColorMatrix; at others it is the same
+// after white balance: von Kries adaptation in camera RGB.
+TEST(CameraColour, ALoneCalibrationIsBalancedInCameraRgb) {
+  constexpr unsigned seed = 1;
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> temperature(2000, 12000);
+  for (int draw = 0; draw < 200; ++draw) {
+    const double cct_k = temperature(random), scene_k = temperature(random);
+    SCOPED_TRACE(testing::Message() << "seed " << seed << " draw " << draw << " " << cct_k << " K " << scene_k << " K");
+    const CameraColour colour = drawn_single_calibration(random, cct_k);
+    const Xy own = *white_of_temperature(cct_k), scene = *white_of_temperature(scene_k);
+    const Matrix3 to_xyz = *camera_to_xyz(colour, own, white_d65);
+    const Matrix3 inverted = *bradford_adaptation(own, white_d65) * *inverse(*xyz_to_camera(colour, own));
+    const Vector3 own_neutral = *neutral_of_white(colour, own), neutral = *neutral_of_white(colour, scene);
+    expect_near(to_xyz, (1 / (inverted * own_neutral)[1]) * inverted, 1e-9);  // condition numbers near 10, twice
+    expect_near(*camera_to_xyz(colour, scene, white_d65) * diagonal3(neutral), to_xyz * diagonal3(own_neutral), 1e-9);
+  }
+}
+
+TEST(CameraColour, ALoneCalibrationOfUnknownTemperatureIsInverted) {
+  CameraColour colour;
+  colour.calibrations = {calibration(0, cool_matrix)};
+  const Xy scene = *planckian_xy(3000);
+  const Matrix3 product = *camera_to_xyz(colour, scene, white_d65) * cool_matrix;
+  const Matrix3 bradford = *bradford_adaptation(scene, white_d65);
+  expect_near(product, (product[0][0] / bradford[0][0]) * bradford, 1e-12);
 }
 
 TEST(CameraColour, IdenticalCalibrationsAreOne) {
