@@ -90,11 +90,9 @@ double weight_of(const Bracket& bracket, const Xy& white) {
 }
 
 /// Returns the ForwardMatrix that a ColorMatrix implies: Bradford(w -> D50) ColorMatrix^-1 diag(ColorMatrix w) with w
-/// the white of its temperature; nullopt between two calibrations, and where the temperature is not stated or the
-/// matrix has no inverse or no neutral.
-std::optional<Matrix3> implied_forward(const Bracket& bracket) {
-  if (bracket.low != bracket.high) return std::nullopt;
-  const ColourCalibration& only = *bracket.low;
+/// the white of its temperature; nullopt where the temperature is not stated or the matrix has no inverse or no
+/// neutral.
+std::optional<Matrix3> implied_forward(const ColourCalibration& only) {
   const auto white = only.cct_k == d65_cct_k ? white_d65 : white_of_temperature(only.cct_k);
   const auto to_xyz = inverse(only.xyz_to_camera);
   const auto to_d50 = white ? bradford_adaptation(*white, white_d50) : std::nullopt;
@@ -248,7 +246,12 @@ Result<Matrix3> camera_to_xyz(const CameraColour& colour, const Xy& scene_white,
   const auto neutral = neutral_at(*calibration, scene_white);
   if (!neutral) return tl::make_unexpected(neutral.error());
   const auto from_scene = bradford_adaptation(scene_white, output_white);  // none: no light has such a white
-  if (!calibration->forward && from_scene) calibration->forward = implied_forward(bracket_of(colour));
+  if (!calibration->forward && from_scene && colour.calibrations.size() == 1) {
+    // CameraCalibration may take a neutral of this camera to none of the reference camera: then the inverse remains.
+    const auto to_reference = inverse(calibration->reference_to_camera);
+    const bool balances = to_reference && is_positive(*to_reference * *neutral);
+    if (balances) calibration->forward = implied_forward(colour.calibrations[0]);
+  }
   const bool by_forward = calibration->forward.has_value();
   auto to_xyz = by_forward ? to_xyz_by_forward(*calibration, *neutral) : to_xyz_by_inverse(*calibration, *neutral);
   if (!to_xyz) return to_xyz;

@@ -174,6 +174,31 @@ TEST(CameraColour, ALoneCalibrationOfUnknownTemperatureIsInverted) {
   expect_near(product, (product[0][0] / bradford[0][0]) * bradford, 1e-12);
 }
 
+// Bradford adaptation and the inverse of ColorMatrix, as of a calibration without a temperature.
+void expect_inverted(const CameraColour& colour, const Xy& scene) {
+  const Matrix3 inverted = *bradford_adaptation(scene, white_d65) * *inverse(*xyz_to_camera(colour, scene));
+  const Vector3 neutral = *neutral_of_white(colour, scene);
+  const auto found = camera_to_xyz(colour, scene, white_d65);
+  ASSERT_TRUE(found) << found.error().message;
+  expect_near(*found, (1 / (inverted * neutral)[1]) * inverted, 1e-9);
+}
+
+TEST(CameraColour, OneOfTwoCalibrationsImpliesNoForwardMatrix) {
+  CameraColour colour;
+  for (const double other_k : {0.0, 6504.0, 2856.0}) {
+    colour.calibrations = {calibration(other_k, warm_matrix), calibration(6504, cool_matrix)};
+    expect_inverted(colour, *planckian_xy(3000));
+  }
+}
+
+TEST(CameraColour, ALoneCalibrationIsInvertedWhereTheReferenceCameraHasNoSuchNeutral) {
+  CameraColour colour;
+  colour.calibrations = {
+      calibration(6504, {{{1.4134, -0.5576, -0.1527}, {0.1991, 1.0719, -0.1273}, {-0.1158, 0.1929, 0.3581}}})};
+  colour.calibrations[0].camera_calibration[0][1] = 0.3;
+  expect_inverted(colour, {0.2, 0.7});
+}
+
 TEST(CameraColour, IdenticalCalibrationsAreOne) {
   CameraColour colour;
   colour.calibrations = {calibration(6504, warm_matrix), calibration(6504, cool_matrix)};
