@@ -261,7 +261,7 @@ class BatchRun {
       const Result<void> worked = work_(own, executor, progress, out);
       if (!worked) out.error = with_file(worked.error(), job.input);
     } catch (const std::bad_alloc&) {
-      out.error = Error{ErrorCode::too_large, "not enough memory; --jobs 1 needs least", job.input};
+      out.error = Error{ErrorCode::too_large, "not enough memory; --jobs 1 needs the least", job.input};
     } catch (const std::exception& failure) {
       out.error = Error{ErrorCode::too_large, failure.what(), job.input};
     }

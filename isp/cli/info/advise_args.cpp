@@ -95,7 +95,7 @@ void add_advise(CLI::App& app, AdviseArgs& args) {
              [&args](double share) { args.clipped_share = share; })
       ->group(group);
   add_optional(app, "--snr", "DB",
-               "signal-to-noise ratio of the darkest tenth in a merged raw (default 20); without --sensor",
+               "signal-to-noise ratio to reach in the darkest tenth when merged (default 20); without --sensor",
                args.snr_db);
   add_number(app, "--patch", "PIXELS",
              "number of red pixels of the patch whose chromaticity is evaluated (default 256)",

@@ -41,7 +41,7 @@ void add_merging(CLI::App& app, MergeArgs& args) {
       "how frames are aligned (auto: subpixel if the camera moved, else none)");
   add_choice<bool>(
       app, "--foreground", {{"move", false}, {"keep", true}}, [&options](bool keep) { options.keep_foreground = keep; },
-      "with --align stars: displace a foreground that stands still with the stars, or keep its position");
+      "with --align stars: move a foreground at rest along with the stars, or keep its position");
   add_within(app, "--drizzle", "SCALE", "make a LinearRaw image of measured colours, SCALE times as wide (1 to 3)", 1,
              3, [&args](double scale) { args.drizzle_scale = scale; });
   add_within(app, "--pixfrac", "SIDE", "with --drizzle: side of a drop in pixels (default 1)", 0.05, 1,
