@@ -10,8 +10,7 @@ TO_XYZ = np.array([[0.4124564, 0.3575761, 0.1804375],  # linear sRGB to XYZ, IEC
                    [0.0193339, 0.1191920, 0.9503041]])
 
 
-def read_tiff(data):
-    """Return the picture of an uncompressed TIFF file; ValueError for another."""
+def parse_tiff(data):
     order = {b"II": "<", b"MM": ">"}.get(data[:2])
     if not order:
         raise ValueError("not a TIFF file")
@@ -31,6 +30,14 @@ def read_tiff(data):
         raise ValueError("expected 8 bits, uncompressed")
     strips = b"".join(data[o:o + n] for o, n in zip(tags[273], tags[279]))
     return np.frombuffer(strips, np.uint8).reshape(height, width, 3)
+
+
+def read_tiff(data):
+    """Return the picture of an uncompressed TIFF file; ValueError for another."""
+    try:
+        return parse_tiff(data)
+    except (struct.error, KeyError, IndexError) as fault:
+        raise ValueError("a damaged TIFF file, or one of another kind") from fault
 
 
 def read_ppm(data):
