@@ -5,8 +5,8 @@
 namespace lowlux::isp {
 namespace {
 
-// Milliseconds of README.md's table at 1920x1080 with two threads. The table has no value for high: it is extrapolated
-// from standard and draft in proportion to denoise/README.md (33 - 21 and 50 - 33 ms/MP).
+// Milliseconds of an early run of README.md's table, 1920x1080, two threads. It has no value for high: it is
+// extrapolated from standard and draft in proportion to denoise/README.md (33 - 21 and 50 - 33 ms/MP).
 constexpr std::array<double, 5> camera_ms{77, 50, 31, 14, 9.2};
 constexpr std::array<double, 5> eye_ms{92, 65, 46, 22, 19.2};
 // Time that previous frames add to a level: temporal and draft minus draft.
