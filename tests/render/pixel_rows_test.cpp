@@ -43,11 +43,11 @@ TEST(PixelRows, LumaIsTheStandardsRoundedToTheNearestCode) {
       std::vector<std::uint8_t> y(static_cast<std::size_t>(width + 4), guard);
       luma_row(yuv_matrix(s.standard), rgb.data(), width, y.data());
       for (int x = 0; x < width; ++x) {
-        const auto* p = &rgb[static_cast<std::size_t>(3 * x)];
+        const auto* p = &rgb[3 * static_cast<std::size_t>(x)];
         // Half a code, and 3 weights off by half of 1/65536 each.
         ASSERT_NEAR(y[static_cast<std::size_t>(x)], exact(s, p[0], p[1], p[2]).y, 0.5 + 1.5 * 255 / 65536) << width;
       }
-      for (std::size_t i = static_cast<std::size_t>(width); i < y.size(); ++i) ASSERT_EQ(y[i], guard);
+      for (auto i = static_cast<std::size_t>(width); i < y.size(); ++i) ASSERT_EQ(y[i], guard);
     }
   }
 }
@@ -63,14 +63,16 @@ TEST(PixelRows, ChromaIsThatOfTheMeanOfFourPixels) {
         const int left = 2 * i, right = std::min(left + 1, width - 1);
         double mean[3];
         for (int c = 0; c < 3; ++c) {
-          const auto at = [&](const auto& row, int x) { return row[static_cast<std::size_t>(3 * x + c)] / 4.0; };
+          const auto at = [&](const auto& row, int x) {
+            return row[3 * static_cast<std::size_t>(x) + static_cast<std::size_t>(c)] / 4.0;
+          };
           mean[c] = at(above, left) + at(above, right) + at(below, left) + at(below, right);
         }
         const Yuv want = exact(s, mean[0], mean[1], mean[2]);
         ASSERT_NEAR(uv[static_cast<std::size_t>(2 * i)], want.cb, 0.5 + 2.0 * 255 / 65536) << width;
         ASSERT_NEAR(uv[static_cast<std::size_t>(2 * i + 1)], want.cr, 0.5 + 2.0 * 255 / 65536) << width;
       }
-      for (std::size_t i = static_cast<std::size_t>(2 * pairs); i < uv.size(); ++i) ASSERT_EQ(uv[i], guard);
+      for (std::size_t i = 2 * static_cast<std::size_t>(pairs); i < uv.size(); ++i) ASSERT_EQ(uv[i], guard);
     }
   }
 }
