@@ -56,21 +56,44 @@ TEST(RawToRgbGamut, NeverLeavesTheUnitCube) {
   }
 }
 
-TEST(RawToRgbGamut, KeepsLuminanceAndDirectionBetweenBlackAndWhite) {
+/// Differences of the channels say the direction of chroma: those of `to` are those of `from`, times one factor >= 0.
+void expect_same_direction(const Rgb& from, const Rgb& to) {
+  const Rgb before{from[0] - from[1], from[1] - from[2], from[2] - from[0]};
+  const Rgb after{to[0] - to[1], to[1] - to[2], to[2] - to[0]};
+  for (int c = 0; c < 3; ++c) {
+    const int d = (c + 1) % 3;
+    ASSERT_NEAR(before[c] * after[d], before[d] * after[c], 4e-6);
+    ASSERT_GE(before[c] * after[c], -1e-6);
+  }
+}
+
+TEST(RawToRgbGamut, KeepsTheDirectionOfChromaOfAllThatIsBrighterThanBlack) {
+  const auto colours = random_colours(20000, -1.0f, 2.0f);
+  const auto results = moved(colours);
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    if (luminance(colours[i]) <= 0) continue;
+    ASSERT_NO_FATAL_FAILURE(expect_same_direction(colours[i], results[i]));
+  }
+}
+
+TEST(RawToRgbGamut, KeepsTheLuminanceOfColoursBelowBlack) {
   const auto colours = random_colours(20000, -1.0f, 2.0f);
   const auto results = moved(colours);
   for (std::size_t i = 0; i < colours.size(); ++i) {
     const double y = luminance(colours[i]);
-    if (y <= 0 || y >= 1) continue;
+    if (y <= 0 || *std::max_element(results[i].begin(), results[i].end()) > 0.999) continue;
     ASSERT_NEAR(luminance(results[i]), y, 1e-5);
-    // out' - Y = t (out - Y): cross products vanish, and t is not negative.
-    const Rgb from{colours[i][0] - y, colours[i][1] - y, colours[i][2] - y};
-    const Rgb to{results[i][0] - y, results[i][1] - y, results[i][2] - y};
-    for (int c = 0; c < 3; ++c) {
-      const int d = (c + 1) % 3;
-      ASSERT_NEAR(from[c] * to[d], from[d] * to[c], 2e-6);
-      ASSERT_GE(from[c] * to[c], -1e-6);
-    }
+  }
+}
+
+TEST(RawToRgbGamut, KeepsTheLeastChannelOfColoursAboveWhite) {
+  const auto colours = random_colours(20000, 0.0f, 3.0f);
+  const auto results = moved(colours);
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    const auto [least, greatest] = std::minmax_element(colours[i].begin(), colours[i].end());
+    if (*greatest <= 1) continue;
+    ASSERT_NEAR(*std::min_element(results[i].begin(), results[i].end()), std::min(*least, 1.0), 1e-6);
+    ASSERT_NEAR(*std::max_element(results[i].begin(), results[i].end()), 1, 1e-6);
   }
 }
 
@@ -95,25 +118,21 @@ TEST(RawToRgbGamut, LeavesColoursInsideUntouchedWhateverTheirNeighboursAre) {
   }
 }
 
-TEST(RawToRgbGamut, MakesBlackBelowBlackAndWhiteAboveWhite) {
-  const auto results = moved({{-1, -0.2, 2}, {-0.1, -0.1, -0.1}, {0, 0, 0}, {1, 1, 1}, {3, 2, -1}, {0.9, 1.2, 1.5}});
+TEST(RawToRgbGamut, MakesBlackBelowBlackAndWhiteOnlyWhereEveryChannelIs) {
+  const auto results = moved({{-1, -0.2, 2}, {-0.1, -0.1, -0.1}, {0, 0, 0}, {1, 1, 1}, {3, 2, 1}, {1.2, 1.01, 1.5}});
   const Rgb black{0, 0, 0}, white{1, 1, 1};
-  EXPECT_EQ(results[0], black);
-  EXPECT_EQ(results[1], black);
-  EXPECT_EQ(results[2], black);
-  EXPECT_EQ(results[3], white);
-  for (const int i : {4, 5}) {
-    for (const double c : results[i]) EXPECT_NEAR(c, 1, 1e-6);
-  }
+  for (const int i : {0, 1, 2}) EXPECT_EQ(results[i], black);
+  for (const int i : {3, 4, 5}) EXPECT_EQ(results[i], white);
 }
 
-TEST(RawToRgbGamut, MakesBlackAndWhiteOfColoursWhoseLuminanceIsExactlyThat) {
-  const auto results = moved({{2, 0, 0}, {-0.5, 0, 0}, {0.5, 1, -0.25}, {2, 1, 1}}, {0, 1, 0});
-  const Rgb black{0, 0, 0}, white{1, 1, 1};
-  EXPECT_EQ(results[0], black);
-  EXPECT_EQ(results[1], black);
-  EXPECT_EQ(results[2], white);
-  EXPECT_EQ(results[3], white);
+TEST(RawToRgbGamut, FollowsTheEquations) {
+  // Beyond white alone; yellow brighter than white; beyond both ends; luminance exactly 0, exactly 1.
+  const auto results =
+      moved({{1.5, 0.5, 0.25}, {2, 1.5, 0.5}, {3, 2, -1}, {2, 0, 0}, {-0.5, 0, 0}, {0.5, 1, -0.25}}, {0, 1, 0});
+  const Rgb expected[] = {{1, 0.4, 0.25}, {1, 0.5 + 1.0 / 3, 0.5}, {1, 0.75, 0}, {1, 0, 0}, {0, 0, 0}, {0.6, 1, 0}};
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(results[i][c], expected[i][c], 1e-6) << i << ' ' << c;
+  }
 }
 
 TEST(RawToRgbGamut, EqualsTheReference) {

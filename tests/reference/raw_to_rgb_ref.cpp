@@ -74,14 +74,16 @@ Rgb camera_rgb(const isp::CameraPlanes& in, int x, int y) {
 
 Rgb moved_into_gamut(const Rgb& v, const std::array<float, 3>& luminance) {
   const double y = luminance[0] * v[0] + luminance[1] * v[1] + luminance[2] * v[2];
-  const auto [least, greatest] = std::minmax({v[0], v[1], v[2]});
-  if (least >= 0 && greatest <= 1) return v;
-  if (y <= 0) return {0, 0, 0};
-  if (y >= 1) return {1, 1, 1};
-  double t = 1;
-  if (least < 0) t = std::min(t, y / (y - least));
-  if (greatest > 1) t = std::min(t, (1 - y) / (greatest - y));
-  return {y + t * (v[0] - y), y + t * (v[1] - y), y + t * (v[2] - y)};
+  Rgb out = v;
+  if (const double least = std::min({v[0], v[1], v[2]}); least < 0) {
+    if (y <= 0) return {0, 0, 0};
+    for (double& c : out) c = y + y / (y - least) * (c - y);
+  }
+  const auto [least, greatest] = std::minmax({out[0], out[1], out[2]});
+  if (greatest <= 1) return out;
+  if (least >= 1) return {1, 1, 1};
+  for (double& c : out) c = least + (1 - least) / (greatest - least) * (c - least);
+  return out;
 }
 
 Rgb seen(const Rgb& v, const LookGrid& look, int x, int y) {

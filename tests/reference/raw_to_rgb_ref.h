@@ -40,7 +40,7 @@ Rgb seen(const Rgb& v, const LookGrid& look, int x, int y);
 /// Applies min(c, clip), matrix, and the move into the gamut where it is requested.
 Rgb transformed(const Rgb& camera, const isp::RgbTransform& transform);
 
-/// Moves a colour along the line to the neutral of equal luminance until all channels are in 0..1.
+/// Moves a colour along the line to neutral until all channels are in 0..1, as RgbTransform says.
 Rgb moved_into_gamut(const Rgb& v, const std::array<float, 3>& luminance);
 
 /// Returns the IEC 61966-2-1 transfer function of v in 0..1; values outside are clamped first.

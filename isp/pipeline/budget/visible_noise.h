@@ -38,7 +38,7 @@ struct SeenBlock {
 ///     noise_delta_e^2 = sum over c of CIEDE2000(C(r), C(r + s_c))^2.
 /// Frames that are not mosaics have 64 samples of each colour; those of a monochrome frame move together.
 /// Clipping raises the mean of a displayed primary p, whose pixels scatter by d around m, by d (phi(m / d) + m / d
-/// Phi(m / d)) - max(m, 0); the luminance is kept, as moving colours into the gamut does.
+/// Phi(m / d)) - max(m, 0); the luminance is kept, as moving colours below black into the gamut does.
 /// Empty for spaces without primaries. Precondition: levels.electrons_at_white.
 std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
                                    const Rendering& rendering, const denoise::RawNoise& noise,

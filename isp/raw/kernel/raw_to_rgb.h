@@ -16,8 +16,12 @@ namespace lowlux::isp {
 
 /// Converts white-balanced camera RGB c to the output's primaries, 0..1 being the display range:
 ///     out = matrix * min(c, clip)
-/// and then, on request, moves it along the line to the neutral of the same luminance Y until all channels are in 0..1:
-///     out' = Y + t (out - Y), t the largest in 0..1 that fits; Y <= 0 gives black, Y >= 1 white.
+/// and then, on request, moves it along its line to neutral until all channels are in 0..1. Colours below black move
+/// first and keep their luminance Y, so that noise does not brighten the dark: Y <= 0 gives black, else
+///     out' = Y + t (out - Y), t = Y / (Y - min(out)) where min(out) < 0.
+/// Of colours brighter than the display the greatest channel becomes 1 and the least stays, if it is not above 1 too:
+///     out'' = m + s (out' - m), m = min(out', 1), s = (1 - m) / (max(out') - m) where max(out') > 1.
+/// Such a colour turns white as its least channel comes to 1, not as its luminance does.
 struct RgbTransform {
   std::array<float, 9> matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};  // rows; exposure included
   std::array<float, 3> luminance{};  // weights of Y, >= 0, sum 1; only read when colours are moved into the gamut

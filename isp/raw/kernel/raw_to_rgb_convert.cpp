@@ -44,44 +44,48 @@ struct ColourVectors {
     return {{output(0), output(1), output(2)}};
   }
 
-  /// Returns Y + t (v - Y) with t = min(Y / (Y - min(v, 0)), (1 - Y) / (max(v, 1) - Y)), as one division; the second
-  /// only where a channel of v reaches 1, which none of the vector does without kAbove. t is taken 2^-22 short, so that
-  /// no rounding can leave 0..1; colours inside keep every bit, as 0 + 1 (v - 0).
-  template <bool kAbove>
-  HWY_INLINE Site moved(const Site& v, VF least, [[maybe_unused]] VF greatest) const {
-    const VF zero = constant(0), one = constant(1);
+  /// Returns colours below black as Y + t (v - Y) with t = Y / (Y - min(v)). t is taken 2^-22 short, so that no
+  /// rounding can leave 0..1; colours inside keep every bit, as 0 + 1 (v - 0).
+  HWY_INLINE Site above_black(const Site& v, VF least) const {
     const VF weighted =
         hn::MulAdd(luminance[2], v.c[2], hn::MulAdd(luminance[1], v.c[1], hn::Mul(luminance[0], v.c[0])));
-    const VF y = hn::Min(hn::Max(weighted, zero), one);
-    // The ends lie 1e-30 and one rounding step outside 0..1, so that no distance is 0, and t is 0 where Y is at one.
-    VF part = y, whole = hn::Sub(y, hn::Min(least, constant(-1e-30f)));
-    auto outside = hn::Lt(least, zero);
-    if constexpr (kAbove) {
-      const VF rest = hn::Sub(one, y);
-      const VF above = hn::Sub(hn::Max(greatest, constant(1 + 0x1p-23f)), y);
-      const auto high_end_first = hn::And(hn::Ge(greatest, one), hn::Ge(hn::Mul(y, above), hn::Mul(rest, whole)));
-      part = hn::IfThenElse(high_end_first, rest, part);
-      whole = hn::IfThenElse(high_end_first, above, whole);
-      outside = hn::Or(outside, hn::Gt(greatest, one));
-    }
-    const VF t = hn::IfThenElse(outside, hn::Div(hn::Mul(part, constant(1 - 0x1p-22f)), whole), one);
-    const VF from = hn::IfThenElseZero(outside, y);
-    return {{hn::MulAdd(t, hn::Sub(v.c[0], from), from), hn::MulAdd(t, hn::Sub(v.c[1], from), from),
-             hn::MulAdd(t, hn::Sub(v.c[2], from), from)}};
+    const VF y = hn::Max(weighted, constant(0));
+    const auto outside = hn::Lt(least, constant(0));
+    // The end lies 1e-30 below 0, so that no distance is 0.
+    const VF distance = hn::Sub(y, hn::Min(least, constant(-1e-30f)));
+    const VF t = hn::IfThenElse(outside, hn::Div(hn::Mul(y, constant(1 - 0x1p-22f)), distance), constant(1));
+    return scaled(v, hn::IfThenElseZero(outside, y), t);
+  }
+
+  /// Returns colours that reach beyond white as m + s (v - m) with m = min(v, 1), s = (1 - m) / (max(v) - m), likewise.
+  static HWY_INLINE Site below_white(const Site& v) {
+    const VF one = constant(1), high = greatest(v), low = hn::Min(least(v), one);
+    const auto outside = hn::Gt(high, one);
+    const VF distance = hn::Sub(hn::Max(high, constant(1 + 0x1p-23f)), low);
+    const VF s = hn::IfThenElse(outside, hn::Div(hn::Mul(hn::Sub(one, low), constant(1 - 0x1p-22f)), distance), one);
+    return scaled(v, hn::IfThenElseZero(outside, low), s);
   }
 
   HWY_INLINE void move_into_gamut(SitePair& v) const {
-    const auto least = [](const Site& s) HWY_ATTR { return hn::Min(hn::Min(s.c[0], s.c[1]), s.c[2]); };
-    const auto greatest = [](const Site& s) HWY_ATTR { return hn::Max(hn::Max(s.c[0], s.c[1]), s.c[2]); };
     const VF min_even = least(v.even), min_odd = least(v.odd);
-    const VF max_even = greatest(v.even), max_odd = greatest(v.odd);
-    if (!hn::AllFalse(Floats(), hn::Ge(hn::Max(max_even, max_odd), constant(1)))) {
-      v.even = moved<true>(v.even, min_even, max_even);
-      v.odd = moved<true>(v.odd, min_odd, max_odd);
-    } else if (!hn::AllFalse(Floats(), hn::Lt(hn::Min(min_even, min_odd), constant(0)))) {
-      v.even = moved<false>(v.even, min_even, max_even);
-      v.odd = moved<false>(v.odd, min_odd, max_odd);
+    if (!hn::AllFalse(Floats(), hn::Lt(hn::Min(min_even, min_odd), constant(0)))) {
+      v.even = above_black(v.even, min_even);
+      v.odd = above_black(v.odd, min_odd);
     }
+    if (!hn::AllFalse(Floats(), hn::Gt(hn::Max(greatest(v.even), greatest(v.odd)), constant(1)))) {
+      v.even = below_white(v.even);
+      v.odd = below_white(v.odd);
+    }
+  }
+
+ private:
+  static HWY_INLINE VF least(const Site& s) { return hn::Min(hn::Min(s.c[0], s.c[1]), s.c[2]); }
+  static HWY_INLINE VF greatest(const Site& s) { return hn::Max(hn::Max(s.c[0], s.c[1]), s.c[2]); }
+
+  /// Returns from + factor (v - from).
+  static HWY_INLINE Site scaled(const Site& v, VF from, VF factor) {
+    return {{hn::MulAdd(factor, hn::Sub(v.c[0], from), from), hn::MulAdd(factor, hn::Sub(v.c[1], from), from),
+             hn::MulAdd(factor, hn::Sub(v.c[2], from), from)}};
   }
 };
 
