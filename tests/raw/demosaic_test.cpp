@@ -246,6 +246,73 @@ TEST(Demosaic, StaysFiniteForAnySamplesAndParameters) {
   }
 }
 
+/// Returns a mosaic whose sites have the values light(x, y, colour).
+template <class Light>
+Strided<float> mosaic_of(int width, int height, BayerPhase phase, const Light& light) {
+  Strided<float> out(width, height, 0, 0);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) out.view().at(x, y) = light(x, y, colour_at(phase, x & 1, y & 1));
+  }
+  return out;
+}
+
+// Detail of red and blue that green does not share shall not become a mesh of greens.
+TEST(Demosaic, KeepsFlatGreenFlatAmongTextureOfRedAndBlue) {
+  std::mt19937 random(31);
+  std::uniform_real_distribution<float> log_level(-2, -0.3f), any(0, 1);
+  for (int i = 0; i < 24; ++i) {
+    const float green = std::pow(10.0f, log_level(random)), texture = std::pow(10.0f, log_level(random));
+    const BayerPhase phase = all_phases[i % 4];
+    const Strided<float> value = mosaic_of(64, 48, phase, [&](int, int, CfaColour colour) {
+      return colour == CfaColour::green ? green : texture * (0.05f + 0.95f * any(random));
+    });
+    for (const DemosaicMethod method : {DemosaicMethod::residual, DemosaicMethod::residual_median}) {
+      const auto planes = kernel_result({value.view(), phase, {1, 1, 1, 1}, {method, 1e-3f, 1, 0}}, 1);
+      for (const float out : planes[1].memory) {
+        if (out == -777) continue;  // beyond the row
+        ASSERT_NEAR(out, green, 0.01f * green) << name_of(method) << ", texture up to " << texture;
+      }
+    }
+  }
+}
+
+// Detail of grey is that of all colours: green at red and blue is then far better than the mean of the greens beside.
+TEST(Demosaic, TakesTheDetailOfGreyTextureFromEveryColour) {
+  constexpr int width = 64, height = 48;
+  std::mt19937 random(37);
+  const auto drawn = [&](float low, float high) { return std::uniform_real_distribution<float>(low, high)(random); };
+  for (int i = 0; i < 12; ++i) {
+    const float level = drawn(0.02f, 0.5f);
+    Strided<float> scene(width, height, 0, 0);
+    // Radians per pixel: oblique stripes of 4.5 to 5.2 px along both axes, and steep ones of 3.3 to 3.8 px along the
+    // row.
+    const bool oblique = i % 2 == 0;
+    const float turn_x = oblique ? drawn(1.2f, 1.4f) : drawn(1.65f, 1.9f);
+    const float turn_y = oblique ? drawn(1.2f, 1.4f) : drawn(0.4f, 0.6f);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const float phase = turn_x * static_cast<float>(x) + turn_y * static_cast<float>(y);
+        scene.view().at(x, y) = level * (1 + 0.4f * std::sin(phase));
+      }
+    }
+    const auto at = [&](int x, int y) { return scene.view().at(x, y); };
+    const Strided<float> value =
+        mosaic_of(width, height, BayerPhase::grbg, [&](int x, int y, CfaColour) { return at(x, y); });
+    const isp::SignedMosaic in{value.view(), BayerPhase::grbg, {1, 1, 1, 1}, {DemosaicMethod::residual, 1e-3f, 1, 0}};
+    const auto planes = kernel_result(in, 1);
+    Distance found, of_mean;
+    for (int y = 8; y < height - 8; ++y) {
+      for (int x = 8; x < width - 8; ++x) {
+        if (colour_at(BayerPhase::grbg, x & 1, y & 1) == CfaColour::green) continue;
+        found.add(std::fabs(planes[1].view().at(x, y) - at(x, y)));
+        of_mean.add(std::fabs((at(x - 1, y) + at(x + 1, y) + at(x, y - 1) + at(x, y + 1)) / 4 - at(x, y)));
+      }
+    }
+    EXPECT_LT(found.rms(), (oblique ? 0.25 : 0.05) * of_mean.rms())
+        << "level " << level << ", " << turn_x << ", " << turn_y;
+  }
+}
+
 /// Sum of the distances of red and blue from green.
 double colour_of(const std::vector<Strided<float>>& planes) {
   double sum = 0;

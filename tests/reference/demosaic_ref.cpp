@@ -98,18 +98,52 @@ std::vector<Rgb> by_residual(const LinearisedMosaic& mosaic, const LinearisedMos
   const Field dh = difference(1, 0), dv = difference(0, 1);
   const Field gh = field([&](int x, int y) { return std::fabs(dh(x + 1, y) - dh(x - 1, y)); });
   const Field gv = field([&](int x, int y) { return std::fabs(dv(x, y + 1) - dv(x, y - 1)); });
-  // Green: four one-sided means, weighted by the gradients on their side (Pekkucuksen, Altunbasak 2010).
+  // How far green shares the detail of the other colour: differences across a site in both directions.
+  struct Detail {
+    double own, green;
+  };
+  const auto detail = [&](int x, int y, int dx, int dy) -> Detail {
+    const auto beside = [&](int k) {  // green at distance k: measured if odd, else the mean of those across
+      const int px = x + k * dx, py = y + k * dy;
+      return k % 2 != 0 ? u(px, py) : 0.5 * (u(px + dy, py + dx) + u(px - dy, py - dx));
+    };
+    return {u(x + 2 * dx, y + 2 * dy) - u(x - 2 * dx, y - 2 * dy),
+            0.5 * (beside(1) - beside(-1)) + 0.5 * (beside(2) - beside(-2))};
+  };
+  const auto product = [&](double Detail::*a, double Detail::*b) {
+    return field([&, a, b](int x, int y) {
+      const Detail h = detail(x, y, 1, 0), v = detail(x, y, 0, 1);
+      return h.*a * (h.*b) + v.*a * (v.*b);
+    });
+  };
+  const Field own_squared = product(&Detail::own, &Detail::own), both = product(&Detail::own, &Detail::green),
+              green_squared = product(&Detail::green, &Detail::green);
+  const Field fine = field([&](int x, int y) {
+    const double d = u(x - 1, y) + u(x + 1, y) - u(x, y - 1) - u(x, y + 1);
+    return d * d;
+  });
+  const double noise = limited(how.noise_std, 0, 1), detail_floor = 1e-5 * scale * scale + 64 * noise * noise;
+  const auto shared_detail = [&](int x, int y) {
+    const double o = sum_3x3(own_squared, x, y, 2) / 9, g = sum_3x3(green_squared, x, y, 2) / 9;
+    const double correlation = sum_3x3(both, x, y, 2) / 9 / (std::sqrt(o * g) + detail_floor);
+    const double by_detail = std::min(1 + 2 * correlation, (4 * g + detail_floor) / (o + detail_floor));
+    return std::clamp(std::max(by_detail, 2 * sum_3x3(fine, x, y, 2) / 9 / (o + detail_floor)), 0.0, 1.0);
+  };
+  // Green: four one-sided means, weighted by the gradients on their side (Pekkucuksen, Altunbasak 2010), as far as
+  // green shares detail; for the rest the neighbouring greens with the same weights.
   const Field green = field([&](int x, int y) {
     if (is_green(x, y)) return u(x, y);
-    double sum = 0, weights = 0;
+    double sum = 0, neighbours = 0, weights = 0;
     for (const auto& [dx, dy] : {std::pair{-1, 0}, std::pair{1, 0}, std::pair{0, -1}, std::pair{0, 1}}) {
       double mean = 0;
       for (int k = 0; k <= 4; ++k) mean += (dy == 0 ? dh : dv)(x + k * dx, y + k * dy) / 5;
       const double weight = std::pow(floor + sum_3x3(dy == 0 ? gh : gv, x + 2 * dx, y + 2 * dy, 1), -2);
       sum += weight * mean;
+      neighbours += weight * (0.5 * (u(x - dx, y - dy) + u(x + dx, y + dy)) - u(x, y));
       weights += weight;
     }
-    return u(x, y) + sum / weights;
+    const double shared = shared_detail(x, y);
+    return u(x, y) + (shared * sum + (1 - shared) * neighbours) / weights;
   });
   // Red and blue: residual interpolation (Kiku, Monno, Tanaka, Okutomi 2013) of the difference to green, with the slope
   // of a ridge regression in windows of 3x3 samples.

@@ -16,7 +16,7 @@ using rows::SiteRow;
 constexpr int reach = 12;          // rows and columns on which a result depends, to each side
 constexpr int halo = 16;           // columns of a block beyond those it makes
 constexpr int block_width = 1024;  // at most
-constexpr int chunk_rows = 8;      // made of one block before the next
+constexpr int chunk_rows = 4;      // made of one block before the next
 
 // Pairs of a run before the first and after the last of a block: what kernels and splitting may touch. The first pair
 // that kernels store starts a cache line.
@@ -35,6 +35,8 @@ enum Quantity {
   gradient_v,
   sum_h,
   sum_v,
+  detail,
+  shared,
   green,       // at the own colour
   difference,  // own colour - green at the own colour
   slope,
@@ -42,7 +44,7 @@ enum Quantity {
   rest,
   own_at_green,  // differences interpolated
   other,
-  sums,  // memory of slope_row
+  sums,  // memory of shared_detail_row and slope_row
   quantities
 };
 
@@ -59,6 +61,8 @@ constexpr std::array<RingSize, quantities> ring_sizes{{{13, 2},
                                                        {3, 2},
                                                        {3, 1},
                                                        {5, 1},
+                                                       {5, 4},
+                                                       {1, 1},
                                                        {7, 1},
                                                        {8, 1},
                                                        {5, 1},
@@ -117,7 +121,9 @@ ResidualBand<Mosaic>::ResidualBand(const Mosaic& in, const Demosaic& how, float 
   encoding_ = encoding_with(how.offset);
   const float scale = std::cbrt(limited(how.white, 1e-3f, 1));
   ridge_ = 2e-3f * scale * scale;
-  floor_ = 1e-4f * scale + 4.5f * std::sqrt(1.75f) * limited(how.noise_std, 0, 1);
+  const float noise_std = limited(how.noise_std, 0, 1);
+  floor_ = 1e-4f * scale + 4.5f * std::sqrt(1.75f) * noise_std;
+  detail_floor_ = 1e-5f * scale * scale + 64 * noise_std * noise_std;  // 16 times what white noise adds to o
   made_ = memory + static_cast<std::size_t>(blocks_of(width_of(in))) * block_floats;
   next_ = band.first - reach;
 }
@@ -215,14 +221,29 @@ void ResidualBand<Mosaic>::add_green(const Block& block, int y) const {
                             block.run(sum_h, k),
                             block.run(sum_v, k)},
                            pairs);
+    rows::detail_row(
+        {{block.at(encoded, k - 2), block.at(encoded, k - 1), block.at(encoded, k), block.at(encoded, k + 1),
+          block.at(encoded, k + 2)},
+         shift(k),
+         {block.run(detail, k), block.run(detail, k, 1), block.run(detail, k, 2), block.run(detail, k, 3)}},
+        pairs);
   }
   if (const int k = y - 6; starts(k, 6)) {
-    rows::GreenRows in{.own = block.run(encoded, k),
+    const auto details = [&](int row) -> rows::DetailRow<const float> {
+      return {block.run(detail, row), block.run(detail, row, 1), block.run(detail, row, 2), block.run(detail, row, 3)};
+    };
+    rows::shared_detail_row({{details(k - 2), details(k), details(k + 2)},
+                             detail_floor_,
+                             {block.run(sums, 0), block.run(sums, 0, 1), block.run(sums, 0, 2), block.run(sums, 0, 3)},
+                             block.run(shared, k)},
+                            pairs);
+    rows::GreenRows in{.u = {block.at(encoded, k - 1), block.at(encoded, k), block.at(encoded, k + 1)},
                        .horizontal = block.at(horizontal, k),
                        .vertical = {},
                        .sum_h = block.run(sum_h, k),
                        .sum_above = block.run(sum_v, k - 2),
                        .sum_below = block.run(sum_v, k + 2),
+                       .shared = block.run(shared, k),
                        .floor = floor_,
                        .shift = shift(k),
                        .green = block.run(green, k),

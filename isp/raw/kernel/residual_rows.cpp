@@ -88,9 +88,55 @@ void GradientSumRow(const GradientSumRows& in, int pairs) {
   });
 }
 
+void DetailRow(const DetailRows& in, int pairs) {
+  const VF half = constant(0.5f), quarter = constant(0.25f);
+  const int left = in.shift - 1;
+  for_each_vector(pairs, [&](int i) HWY_ATTR {
+    const auto difference = [](const float* a, const float* b) HWY_ATTR { return hn::Sub(load(a), load(b)); };
+    const auto greens = [&](int row, int of) HWY_ATTR {  // left and right of a site of the own colour
+      return sum_of(in.u[row].green + of + left, in.u[row].green + of + left + 1);
+    };
+    const auto column = [&](int of) HWY_ATTR { return sum_of(in.u[1].green + of, in.u[3].green + of); };
+    const VF own_h = difference(in.u[2].own + i + 1, in.u[2].own + i - 1);
+    const VF own_v = difference(in.u[4].own + i, in.u[0].own + i);
+    const VF beside = difference(in.u[2].green + i + left + 1, in.u[2].green + i + left);
+    const VF above = difference(in.u[3].green + i, in.u[1].green + i);
+    const VF green_h = hn::MulAdd(quarter, hn::Sub(column(i + 1), column(i - 1)), hn::Mul(half, beside));
+    const VF green_v = hn::MulAdd(quarter, hn::Sub(greens(4, i), greens(0, i)), hn::Mul(half, above));
+    store(hn::MulAdd(own_h, own_h, hn::Mul(own_v, own_v)), in.detail.own + i);
+    store(hn::MulAdd(green_h, green_h, hn::Mul(green_v, green_v)), in.detail.green + i);
+    store(hn::MulAdd(own_h, green_h, hn::Mul(own_v, green_v)), in.detail.both + i);
+    const VF fine = hn::Sub(greens(2, i), column(i));
+    store(hn::Mul(fine, fine), in.detail.fine + i);
+  });
+}
+
+void SharedDetailRow(const SharedDetailRows& in, int pairs) {
+  for_each_vector(pairs, [&](int i) HWY_ATTR {
+    const auto column = [&](const float* a, const float* b, const float* c)
+                            HWY_ATTR { return hn::Add(load(b + i), sum_of(a + i, c + i)); };
+    store(column(in.detail[0].own, in.detail[1].own, in.detail[2].own), in.sum[0] + i);
+    store(column(in.detail[0].green, in.detail[1].green, in.detail[2].green), in.sum[1] + i);
+    store(column(in.detail[0].both, in.detail[1].both, in.detail[2].both), in.sum[2] + i);
+    store(column(in.detail[0].fine, in.detail[1].fine, in.detail[2].fine), in.sum[3] + i);
+  });
+  // The second loop reads one more pair at each end than the first writes: its results there are not read.
+  const VF ninth = constant(1.0f / 9), floor = constant(in.floor), one = constant(1);
+  for_each_vector(pairs, [&](int i) HWY_ATTR {
+    const auto mean = [&](const float* sum)
+                          HWY_ATTR { return hn::Mul(ninth, hn::Add(load(sum + i), sum_of(sum + i - 1, sum + i + 1))); };
+    const VF own = mean(in.sum[0]), green = mean(in.sum[1]), both = mean(in.sum[2]), fine = mean(in.sum[3]);
+    const VF correlation = hn::Div(both, hn::Add(hn::Sqrt(hn::Mul(own, green)), floor));
+    const VF over_own = hn::Div(one, hn::Add(own, floor));
+    const VF ratio = hn::Mul(hn::MulAdd(constant(4), green, floor), over_own);
+    const VF shared = hn::Min(hn::MulAdd(constant(2), correlation, one), ratio);
+    store(hn::Min(hn::Max(shared, hn::Mul(hn::Add(fine, fine), over_own)), one), in.shared + i);
+  });
+}
+
 void GreenRow(const GreenRows& in, int pairs) {
-  const VF floor = constant(in.floor), fifth = constant(0.2f);
-  const float* const left = in.horizontal.green - 1 + in.shift;
+  const VF floor = constant(in.floor), fifth = constant(0.2f), half = constant(0.5f);
+  const float *const left = in.horizontal.green - 1 + in.shift, *const green_left = in.u[1].green - 1 + in.shift;
   const auto squared = [&](const float* sum) HWY_ATTR {
     const VF root = hn::Add(floor, load(sum));
     return hn::Mul(root, root);
@@ -108,12 +154,18 @@ void GreenRow(const GreenRows& in, int pairs) {
                              sum_of(in.vertical[7].green + i, in.vertical[5].green + i));
     const VF w = squared(in.sum_h + i - 1), e = squared(in.sum_h + i + 1);
     const VF n = squared(in.sum_above + i), s = squared(in.sum_below + i);
-    // This is the mean weighted by 1/w, 1/e, 1/n, 1/s with all fractions brought to one denominator.
+    // These are the means weighted by 1/w, 1/e, 1/n, 1/s with all fractions brought to one denominator.
     const VF we = hn::Mul(w, e), ns = hn::Mul(n, s);
+    const VF weight_h = hn::Mul(hn::Add(w, e), ns), weight_v = hn::Mul(hn::Add(n, s), we);
     const VF along = hn::MulAdd(west, e, hn::Mul(east, w)), across = hn::MulAdd(north, s, hn::Mul(south, n));
-    const VF weight = hn::MulAdd(hn::Add(w, e), ns, hn::Mul(hn::Add(n, s), we));
-    const VF difference = hn::Mul(fifth, hn::Div(hn::MulAdd(along, ns, hn::Mul(across, we)), weight));
-    store(hn::Add(load(in.own + i), difference), in.green + i);
+    const VF by_differences = hn::Mul(fifth, hn::MulAdd(along, ns, hn::Mul(across, we)));
+    const VF own = load(in.u[1].own + i);
+    const VF beside = hn::MulSub(half, sum_of(green_left + i, green_left + i + 1), own);
+    const VF above = hn::MulSub(half, sum_of(in.u[0].green + i, in.u[2].green + i), own);
+    const VF by_neighbours = hn::MulAdd(weight_h, beside, hn::Mul(weight_v, above));
+    const VF sum = hn::MulAdd(load(in.shared + i), hn::Sub(by_differences, by_neighbours), by_neighbours);
+    const VF difference = hn::Div(sum, hn::Add(weight_h, weight_v));
+    store(hn::Add(own, difference), in.green + i);
     store(hn::Sub(constant(0), difference), in.difference + i);
   });
 }
@@ -244,6 +296,8 @@ HWY_EXPORT(EncodeRow);
 HWY_EXPORT(DifferenceRow);
 HWY_EXPORT(GradientRow);
 HWY_EXPORT(GradientSumRow);
+HWY_EXPORT(DetailRow);
+HWY_EXPORT(SharedDetailRow);
 HWY_EXPORT(GreenRow);
 HWY_EXPORT(SlopeRow);
 HWY_EXPORT(RestRow);
@@ -256,6 +310,8 @@ void encode_row(const float* in, float clip, const Encoding& encoding, int n, fl
 void difference_row(const DifferenceRows& in, int pairs) { HWY_DYNAMIC_DISPATCH(DifferenceRow)(in, pairs); }
 void gradient_row(const GradientRows& in, int pairs) { HWY_DYNAMIC_DISPATCH(GradientRow)(in, pairs); }
 void gradient_sum_row(const GradientSumRows& in, int pairs) { HWY_DYNAMIC_DISPATCH(GradientSumRow)(in, pairs); }
+void detail_row(const DetailRows& in, int pairs) { HWY_DYNAMIC_DISPATCH(DetailRow)(in, pairs); }
+void shared_detail_row(const SharedDetailRows& in, int pairs) { HWY_DYNAMIC_DISPATCH(SharedDetailRow)(in, pairs); }
 void green_row(const GreenRows& in, int pairs) { HWY_DYNAMIC_DISPATCH(GreenRow)(in, pairs); }
 void slope_row(const SlopeRows& in, int pairs) { HWY_DYNAMIC_DISPATCH(SlopeRow)(in, pairs); }
 void rest_row(const RestRows& in, int pairs) { HWY_DYNAMIC_DISPATCH(RestRow)(in, pairs); }

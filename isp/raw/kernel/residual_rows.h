@@ -59,15 +59,52 @@ struct GradientSumRows {
 };
 void gradient_sum_row(const GradientSumRows& in, int pairs);
 
-/// Computes green at the sites of the own colour (Pekkucuksen, Altunbasak, ICIP 2010): the mean of four one-sided means
-/// of five differences, weighted by 1 / (floor + sum)^2 of the gradients two sites away on that side.
+/// Holds the detail of a row at the sites of its own colour: with d the difference of the own colour across a site,
+/// u[2] - u[-2], and e that of green at the same places, the sums over both directions of d^2, e^2 and d e. `fine` is
+/// the square of the two greens next to a site along the row less the two along the column.
+template <class Float>
+struct DetailRow {
+  Float* own;
+  Float* green;
+  Float* both;
+  Float* fine;
+};
+
+/// Computes the detail of row y. Along the row, e is half of u[1] - u[-1] plus half of the difference between the means
+/// of the greens above and below the places of u[2] and of u[-2]. Along the column it is computed in the same way.
+struct DetailRows {
+  ConstSiteRow u[5];  // rows y - 2 to y + 2
+  int shift;
+  DetailRow<float> detail;
+};
+void detail_row(const DetailRows& in, int pairs);
+
+/// Computes how far green shares the detail of the own colour. With o, g, b and f the means of d^2, e^2, d e and `fine`
+/// over 3x3 sites of the own colour,
+///     shared = max(min(1 + 2 b / (sqrt(o g) + floor), (4 g + floor) / (o + floor)), 2 f / (o + floor)),
+/// limited to 0..1. The last term is for detail of 3 to 4 px, which is aliased in the own colour, so that b says
+/// nothing. Where all colours share detail of more than 4 px this is 1. Next to petals, signs or lamps of one strong
+/// colour green has less detail, or the opposite.
+struct SharedDetailRows {
+  DetailRow<const float> detail[3];  // rows y - 2, y, y + 2
+  float floor;
+  float* sum[4];  // memory
+  float* shared;
+};
+void shared_detail_row(const SharedDetailRows& in, int pairs);
+
+/// Computes green at the sites of the own colour. Where it shares the detail of the own colour this is the own colour
+/// plus the mean of four one-sided means of five differences (Pekkucuksen, Altunbasak, ICIP 2010), where it does not,
+/// the mean of the neighbouring greens, else between the two. Both means are weighted by 1 / (floor + sum)^2 of the
+/// gradients two sites away on a side.
 struct GreenRows {
-  const float* own;          // u
+  ConstSiteRow u[3];         // rows y - 1 to y + 1
   ConstSiteRow horizontal;   // differences of the row
   ConstSiteRow vertical[9];  // of rows y - 4 to y + 4; own in every other one, green in those between
   const float* sum_h;
   const float* sum_above;  // vertical sums of rows y - 2 and y + 2
   const float* sum_below;
+  const float* shared;
   float floor;
   int shift;
   float* green;       // u of green
