@@ -123,9 +123,8 @@ TEST(FloatFrames, OfAnyLayoutAndSizeAreDevelopedLikeCodes) {
         options.demosaic = method;
         const Picture codes = developed(frame, options);
         const Picture floats = developed(floats_of(std::move(frame), 1.0 / 65536), options);
-        // Float rounding of values to 2. With `residual`, rounding (6e-8, of gradients of 0.005) also changes the
-        // weights of the means along rows and columns, which differ by up to 0.3 in a frame without any smooth part.
-        const double tolerance = method == DemosaicMethod::malvar ? 4e-6 : 2e-5;
+        // Float rounding of values to 2; with `residual` it also moves the weights, and 5.0e-6 was measured.
+        const double tolerance = method == DemosaicMethod::malvar ? 4e-6 : 6e-6;
         EXPECT_LE(difference(floats, codes), tolerance) << width << " x " << height << ", " << name_of(method);
       }
     }

@@ -62,7 +62,7 @@ void expect_same_direction(const Rgb& from, const Rgb& to) {
   const Rgb after{to[0] - to[1], to[1] - to[2], to[2] - to[0]};
   for (int c = 0; c < 3; ++c) {
     const int d = (c + 1) % 3;
-    ASSERT_NEAR(before[c] * after[d], before[d] * after[c], 4e-6);
+    ASSERT_NEAR(before[c] * after[d], before[d] * after[c], 2e-6);
     ASSERT_GE(before[c] * after[c], -1e-6);
   }
 }
